@@ -1,0 +1,7 @@
+//! # Etalon: an explicit Vulkan renderer
+//!
+//! glTF (and OBJ/MTL) in, radiance out: raster G-buffer → deferred lighting → tone map, written directly against `ash`.
+
+pub mod image;
+pub mod scene;
+pub mod study;

@@ -1,0 +1,45 @@
+//! Punctual lights (lecture R3, R4; KHR_lights_punctual), in world space.
+
+use glam::DVec3;
+
+/// A light without extent.
+#[derive(Debug, Clone)]
+pub struct Light {
+    /// Name from the file.
+    pub name: String,
+    /// Linear Rec. 709 colour times strength: radiant intensity I (cd) for point and spot lights,
+    /// perpendicular irradiance E (lx) for directional ones. Never negative.
+    pub color: [f32; 3],
+    /// What kind, with its geometry.
+    pub kind: LightKind,
+}
+
+/// Geometry of a light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LightKind {
+    /// Parallel rays that travel along `direction` (unit, away from the light).
+    Directional {
+        /// Unit direction in which the light travels.
+        direction: DVec3,
+    },
+    /// All directions from one position.
+    Point {
+        /// Position in metres.
+        position: DVec3,
+        /// Distance beyond which the light is cut off smoothly (KHR_lights_punctual), if any.
+        range: Option<f64>,
+    },
+    /// A cone from one position along `direction`.
+    Spot {
+        /// Position in metres.
+        position: DVec3,
+        /// Unit axis of the cone, away from the light.
+        direction: DVec3,
+        /// Distance beyond which the light is cut off smoothly, if any.
+        range: Option<f64>,
+        /// Half angle in radians inside which the light has full strength.
+        inner: f64,
+        /// Half angle in radians outside which there is none; `inner < outer <= π/2`.
+        outer: f64,
+    },
+}

@@ -1,0 +1,173 @@
+//! Materials: the glTF 2.0 metallic-roughness model with its extensions, and OBJ/MTL folded into the same fields.
+
+use glam::Affine2;
+
+/// One surface description. Factors are linear Rec. 709; a texture multiplies its factor.
+#[derive(Debug, Clone)]
+pub struct Material {
+    /// Name from the file.
+    pub name: String,
+    /// Base colour and opacity.
+    pub base_color: [f32; 4],
+    /// Base colour and opacity texture (sRGB, alpha linear).
+    pub base_color_texture: Option<TextureRef>,
+    /// 0 dielectric … 1 metal.
+    pub metallic: f32,
+    /// Perceptual roughness; α = roughness².
+    pub roughness: f32,
+    /// Roughness in G, metallic in B (linear).
+    pub metallic_roughness_texture: Option<TextureRef>,
+    /// Tangent-space normals (linear).
+    pub normal_texture: Option<TextureRef>,
+    /// Scale of the normal texture's x and y.
+    pub normal_scale: f32,
+    /// Ambient occlusion in R (linear).
+    pub occlusion_texture: Option<TextureRef>,
+    /// How much of the occlusion is applied, 0 … 1.
+    pub occlusion_strength: f32,
+    /// Emitted radiance (emissive factor times strength), W/(m² sr) per channel.
+    pub emissive: [f32; 3],
+    /// Emissive texture (sRGB).
+    pub emissive_texture: Option<TextureRef>,
+    /// What alpha means.
+    pub alpha_mode: AlphaMode,
+    /// Back faces are drawn, with the normal turned to the viewer.
+    pub double_sided: bool,
+    /// Base colour is shown as it is (KHR_materials_unlit).
+    pub unlit: bool,
+    /// Index of refraction n (KHR_materials_ior); 1.5 unless the file says otherwise.
+    pub ior: f32,
+    /// Strength of the dielectric specular reflection (KHR_materials_specular).
+    pub specular: f32,
+    /// Specular strength in A (linear).
+    pub specular_texture: Option<TextureRef>,
+    /// Colour of F0 for dielectrics (KHR_materials_specular).
+    pub specular_color: [f32; 3],
+    /// Colour of F0 (sRGB).
+    pub specular_color_texture: Option<TextureRef>,
+    /// Share of the non-reflected light that passes through (KHR_materials_transmission).
+    pub transmission: f32,
+    /// Transmission in R (linear).
+    pub transmission_texture: Option<TextureRef>,
+    /// Thickness in metres of object space below the surface (KHR_materials_volume); 0 is a thin sheet.
+    pub thickness: f32,
+    /// Thickness in G (linear).
+    pub thickness_texture: Option<TextureRef>,
+    /// Distance in metres after which white light has become `attenuation_color`; infinite for clear media.
+    pub attenuation_distance: f32,
+    /// See `attenuation_distance`.
+    pub attenuation_color: [f32; 3],
+    /// Strength of a clear coat of n = 1.5 (KHR_materials_clearcoat).
+    pub clearcoat: f32,
+    /// Clear-coat strength in R (linear).
+    pub clearcoat_texture: Option<TextureRef>,
+    /// Perceptual roughness of the coat.
+    pub clearcoat_roughness: f32,
+    /// Coat roughness in G (linear).
+    pub clearcoat_roughness_texture: Option<TextureRef>,
+    /// Tangent-space normals of the coat.
+    pub clearcoat_normal_texture: Option<TextureRef>,
+    /// Abbe-like dispersion 20/V_d (KHR_materials_dispersion).
+    pub dispersion: f32,
+}
+
+/// glTF 2.0 section 3.9.4.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum AlphaMode {
+    /// Alpha is ignored.
+    #[default]
+    Opaque,
+    /// Fragments below the cutoff do not exist, the others are opaque.
+    Mask(
+        /// Alpha cutoff.
+        f32,
+    ),
+    /// Alpha is coverage, composited over what lies behind.
+    Blend,
+}
+
+/// A texture as a material uses it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TextureRef {
+    /// Index into [`super::Scene::images`].
+    pub image: usize,
+    /// Texture-coordinate set, 0 or 1.
+    pub uv_set: u32,
+    /// KHR_texture_transform, applied to the coordinate before sampling.
+    pub uv_transform: Affine2,
+    /// Filters and wrap modes.
+    pub sampler: Sampler,
+}
+
+/// glTF sampler. Minification is always trilinear with mips unless the file asks for nearest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Sampler {
+    /// Along u.
+    pub wrap_u: Wrap,
+    /// Along v.
+    pub wrap_v: Wrap,
+    /// Magnification takes the nearest texel.
+    pub mag_nearest: bool,
+    /// Minification takes the nearest texel of a level.
+    pub min_nearest: bool,
+    /// Mip levels are used.
+    pub mips: bool,
+}
+
+/// What a texture coordinate outside 0 … 1 means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
+pub enum Wrap {
+    /// The picture repeats.
+    #[default]
+    Repeat,
+    /// The picture repeats mirrored.
+    Mirror,
+    /// The edge texel continues.
+    Clamp,
+}
+
+impl Default for Sampler {
+    fn default() -> Self {
+        Self { wrap_u: Wrap::Repeat, wrap_v: Wrap::Repeat, mag_nearest: false, min_nearest: false, mips: true }
+    }
+}
+
+impl Default for Material {
+    /// glTF's default material: white, fully rough metal factors of section 3.9.2.
+    fn default() -> Self {
+        Self {
+            name: "default".to_owned(),
+            base_color: [1.0; 4],
+            base_color_texture: None,
+            metallic: 1.0,
+            roughness: 1.0,
+            metallic_roughness_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+            occlusion_texture: None,
+            occlusion_strength: 1.0,
+            emissive: [0.0; 3],
+            emissive_texture: None,
+            alpha_mode: AlphaMode::Opaque,
+            double_sided: false,
+            unlit: false,
+            ior: 1.5,
+            specular: 1.0,
+            specular_texture: None,
+            specular_color: [1.0; 3],
+            specular_color_texture: None,
+            transmission: 0.0,
+            transmission_texture: None,
+            thickness: 0.0,
+            thickness_texture: None,
+            attenuation_distance: f32::INFINITY,
+            attenuation_color: [1.0; 3],
+            clearcoat: 0.0,
+            clearcoat_texture: None,
+            clearcoat_roughness: 0.0,
+            clearcoat_roughness_texture: None,
+            clearcoat_normal_texture: None,
+            dispersion: 0.0,
+        }
+    }
+}

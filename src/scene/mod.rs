@@ -1,0 +1,132 @@
+//! Scenes as data: what a file says, in world units, before any device sees it.
+//!
+//! Nothing here knows Vulkan. A [`Scene`] comes from [`load`] (glTF, OBJ) or from [`crate::study`];
+//! the passes upload it. Lengths are metres, the world is right-handed with +Y up as in glTF 2.0 section 3.4.
+
+pub mod camera;
+pub mod environment;
+pub mod light;
+pub mod material;
+
+use glam::{DAffine3, DVec3};
+
+pub use camera::{Camera, Projection};
+pub use light::{Light, LightKind};
+pub use material::{AlphaMode, Material, Sampler, TextureRef, Wrap};
+
+/// Everything a picture is made from.
+#[derive(Debug, Clone, Default)]
+pub struct Scene {
+    /// What the user asked for: a path or `study:NAME`.
+    pub name: String,
+    /// Geometry in object space; drawn only through [`Scene::instances`].
+    pub meshes: Vec<Mesh>,
+    /// Placements of meshes in the world.
+    pub instances: Vec<Instance>,
+    /// Surface descriptions; never empty once meshes exist (glTF's default material is appended when needed).
+    pub materials: Vec<Material>,
+    /// Decoded pictures that materials refer to.
+    pub images: Vec<Image>,
+    /// Punctual lights in world space.
+    pub lights: Vec<Light>,
+    /// Cameras in world space, in the order of the file's nodes.
+    pub cameras: Vec<Camera>,
+    /// Things that were read around: each one sentence that names the file, the place and the consequence.
+    pub warnings: Vec<String>,
+}
+
+/// Triangles that share one material, in object space.
+///
+/// Points and lines of a file have become thin triangles by the time a mesh exists.
+#[derive(Debug, Clone, Default)]
+pub struct Mesh {
+    /// Name from the file, for messages and object labels.
+    pub name: String,
+    /// Object-space positions in metres.
+    pub positions: Vec<[f32; 3]>,
+    /// Unit normals, one per position.
+    pub normals: Vec<[f32; 3]>,
+    /// Unit tangents with handedness in w; one per position, or empty when the material has no normal map.
+    pub tangents: Vec<[f32; 4]>,
+    /// Two texture-coordinate sets; each has one entry per position or is empty.
+    pub uvs: [Vec<[f32; 2]>; 2],
+    /// Linear vertex colours with alpha; one per position or empty (white).
+    pub colors: Vec<[f32; 4]>,
+    /// Three indices a triangle, each below `positions.len()`; counter-clockwise seen from the front.
+    pub indices: Vec<u32>,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+}
+
+/// One mesh placed in the world.
+#[derive(Debug, Clone)]
+pub struct Instance {
+    /// Name of the node.
+    pub name: String,
+    /// Index into [`Scene::meshes`].
+    pub mesh: usize,
+    /// Affine placement in f64, so that a chain of nodes far from the origin keeps its millimetres.
+    /// May mirror (negative determinant) and scale non-uniformly.
+    pub world_from_object: DAffine3,
+}
+
+/// A decoded picture: 8-bit RGBA rows from the top.
+#[derive(Debug, Clone, Default)]
+pub struct Image {
+    /// Name or URI, for messages.
+    pub name: String,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// `width * height * 4` bytes, as stored: not premultiplied, not linearised.
+    pub rgba: Vec<u8>,
+}
+
+/// An axis-aligned box in world space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// Smallest corner.
+    pub min: DVec3,
+    /// Largest corner.
+    pub max: DVec3,
+}
+
+impl Bounds {
+    /// Half the diagonal: the radius of the sphere around the box, in metres.
+    #[must_use]
+    pub fn radius(&self) -> f64 {
+        (self.max - self.min).length() * 0.5
+    }
+
+    /// Middle of the box.
+    #[must_use]
+    pub fn center(&self) -> DVec3 {
+        (self.min + self.max) * 0.5
+    }
+}
+
+impl Scene {
+    /// World-space box around every drawn vertex; `None` for a scene without triangles.
+    #[must_use]
+    pub fn bounds(&self) -> Option<Bounds> {
+        let mut bounds: Option<Bounds> = None;
+        for instance in &self.instances {
+            let mesh = &self.meshes[instance.mesh];
+            for &position in &mesh.positions {
+                let p_world = instance.world_from_object.transform_point3(glam::Vec3::from(position).as_dvec3());
+                bounds = Some(bounds.map_or(Bounds { min: p_world, max: p_world }, |b| Bounds {
+                    min: b.min.min(p_world),
+                    max: b.max.max(p_world),
+                }));
+            }
+        }
+        bounds
+    }
+
+    /// Triangles as drawn: instances counted.
+    #[must_use]
+    pub fn triangles(&self) -> usize {
+        self.instances.iter().map(|i| self.meshes[i.mesh].indices.len() / 3).sum()
+    }
+}

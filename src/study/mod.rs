@@ -1,0 +1,1 @@
+//! The built-in study scenes, generated; no files needed.
