@@ -2,6 +2,9 @@
 //!
 //! glTF (and OBJ/MTL) in, radiance out: raster G-buffer → deferred lighting → tone map, written directly against `ash`.
 
+pub mod gpu;
 pub mod image;
 pub mod scene;
+pub mod shader;
+pub mod share;
 pub mod study;

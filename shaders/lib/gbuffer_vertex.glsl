@@ -1,0 +1,31 @@
+// One vertex of a surface: object space to clip space, and what the fragments interpolate.
+#include "lib/gbuffer_interface.glsl"
+#include "share/camera.glsl"
+
+layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera_block; };
+layout(scalar, set = 0, binding = 1) readonly buffer Instances { Instance instances[]; };
+
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in vec4 tangent;
+layout(location = 3) in vec2 uv0;
+layout(location = 4) in vec2 uv1;
+layout(location = 5) in vec4 color;
+
+layout(location = 0) out vec3 p_rel;
+layout(location = 1) out vec3 n_rel;
+layout(location = 2) out vec4 t_rel;
+layout(location = 3) out vec4 uv;
+layout(location = 4) out vec4 vertex_color;
+layout(location = 5) flat out uvec2 ids; // instance, material
+
+void main() {
+    Instance instance = instances[gl_InstanceIndex];
+    p_rel = instance.rel_from_object * vec4(position, 1.0);
+    n_rel = instance.normal_from_object * normal;
+    t_rel = HAS_NORMAL ? vec4(mat3(instance.rel_from_object) * tangent.xyz, tangent.w * instance.handedness) : vec4(0);
+    uv = HAS_TEXTURES ? vec4(uv0, uv1) : vec4(0);
+    vertex_color = HAS_COLOR ? color : vec4(1);
+    ids = uvec2(gl_InstanceIndex, instance.material);
+    gl_Position = camera_block.clip_from_rel * vec4(p_rel, 1.0);
+}

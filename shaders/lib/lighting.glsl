@@ -1,0 +1,117 @@
+// Radiance that a surface sends to the eye: emitted, from punctual lights, and from the environment.
+#ifndef LIGHTING_GLSL
+#define LIGHTING_GLSL
+#include "lib/encode.glsl"
+#include "lib/light.glsl"
+#include "lib/surface.glsl"
+#include "share/environment.glsl"
+
+layout(constant_id = 13) const uint DIRECTIONAL_LIGHTS = 0; // lights [0, this) of the table
+layout(constant_id = 14) const uint LOCAL_LIGHTS = 0;       // point and spot lights after them; 0 where tiles list them
+layout(constant_id = 15) const uint TILE_WORDS = 0;         // words of a tile's bit mask; 0 without lists
+layout(constant_id = 16) const bool ENVIRONMENT = false;
+const uint TILE = 16;                                       // pixels a side
+
+// Four texels per light: position (or direction to it), unused | colour, 1 / range² | axis, spot scale | spot offset.
+layout(set = 0, binding = 20, rgba32f) readonly uniform imageBuffer lights;
+layout(set = 0, binding = 21, r32ui) readonly uniform uimageBuffer tile_lights;
+layout(scalar, set = 0, binding = 22) uniform Environment { EnvironmentTerms environment; };
+layout(set = 0, binding = 23) uniform sampler2D prefiltered;
+layout(set = 0, binding = 24) uniform sampler2D reflectance;
+
+vec3 local_light(Surface s, uint index) {
+    vec4 place = imageLoad(lights, int(index * 4));
+    vec4 color = imageLoad(lights, int(index * 4 + 1));
+    vec4 axis = imageLoad(lights, int(index * 4 + 2));
+    float spot_offset = imageLoad(lights, int(index * 4 + 3)).x;
+    vec3 to_light = place.xyz - s.p_rel;
+    float r2 = dot(to_light, to_light);
+    vec3 l = to_light * inversesqrt(max(r2, 1e-30));
+    float falloff = point_falloff(r2, color.w) * spot_share(-dot(axis.xyz, l), axis.w, spot_offset);
+    return reflected(s, l) * color.rgb * falloff;
+}
+
+vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across) {
+    vec3 sum = vec3(0.0);
+    for (uint i = 0; i < DIRECTIONAL_LIGHTS; i++) {
+        sum += reflected(s, imageLoad(lights, int(i * 4)).xyz) * imageLoad(lights, int(i * 4 + 1)).rgb;
+    }
+    for (uint i = 0; i < LOCAL_LIGHTS; i++) sum += local_light(s, DIRECTIONAL_LIGHTS + i);
+    if (TILE_WORDS > 0) {
+        // Lights of the tile as a bit mask, in ascending order whatever built it.
+        uint tile = (uint(pixel.y) / TILE * tiles_across + uint(pixel.x) / TILE) * TILE_WORDS;
+        for (uint word = 0; word < TILE_WORDS; word++) {
+            uint bits = imageLoad(tile_lights, int(tile + word)).x;
+            while (bits != 0) {
+                uint bit = uint(findLSB(bits));
+                bits &= bits - 1;
+                sum += local_light(s, DIRECTIONAL_LIGHTS + word * 32 + bit);
+            }
+        }
+    }
+    return sum;
+}
+
+vec3 turned(vec3 d) {
+    float c = environment.cos_rotation;
+    float s = environment.sin_rotation;
+    return vec3(c * d.x - s * d.z, d.y, s * d.x + c * d.z);
+}
+
+// Level of the prefiltered map whose texels are 1/16 of the lobe: α = 16 / width (pass/prefilter.comp).
+float prefiltered_level(float alpha) {
+    float first = environment.width * alpha * 0.0625;
+    return first >= 2.0 ? min(log2(first), environment.levels - 1.0) : first * 0.5;
+}
+
+vec3 prefiltered_radiance(vec3 direction, float alpha) {
+    vec2 at = equirectangular_from_direction(turned(direction));
+    return textureLod(prefiltered, at, prefiltered_level(alpha)).rgb * environment.intensity;
+}
+
+// Irradiance from nine spherical-harmonic coefficients.
+vec3 environment_irradiance(vec3 n) {
+    vec3 d = turned(n);
+    vec3 e = environment.irradiance[0] * 0.282095;
+    e += (environment.irradiance[1] * d.y + environment.irradiance[2] * d.z + environment.irradiance[3] * d.x) * 0.488603;
+    e += (environment.irradiance[4] * (d.x * d.y) + environment.irradiance[5] * (d.y * d.z) + environment.irradiance[7] * (d.x * d.z)) * 1.092548;
+    e += environment.irradiance[6] * (0.315392 * (3.0 * d.z * d.z - 1.0));
+    e += environment.irradiance[8] * (0.546274 * (d.x * d.x - d.y * d.y));
+    return max(e, 0.0) * environment.intensity;
+}
+
+// Light from all around: irradiance on the diffuse part, the prefiltered map in the mirror direction times the
+// directional reflectance of the lobe (split sum, Karis 2013) on the specular part.
+vec3 environment_light(Surface s) {
+    float cos_v = clamp(dot(s.n, s.v), 0.0, 1.0);
+    vec3 r = 2.0 * dot(s.n, s.v) * s.n - s.v;
+    vec2 ab = textureLod(reflectance, vec2(cos_v, s.roughness), 0.0).rg;
+    vec3 single = s.f0 * ab.x + s.f90 * ab.y;
+    vec3 specular = single;
+    if (BRDF == 3) {
+        // Light that leaves the microsurface after more than one reflection (Fdez-Agüera 2019).
+        float lost = 1.0 - (ab.x + ab.y);
+        vec3 average = s.f0 + (vec3(s.f90) - s.f0) / 21.0;
+        specular += single * average * lost / (1.0 - average * lost);
+    }
+    vec3 result = s.diffuse * INV_PI * (1.0 - specular) * environment_irradiance(s.n);
+    result += specular * prefiltered_radiance(r, s.alpha);
+    result *= s.occlusion;
+    if (CLEARCOAT) {
+        vec2 coat = textureLod(reflectance, vec2(cos_v, s.clearcoat_roughness), 0.0).rg;
+        float f = s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, cos_v).x;
+        float reflects = s.clearcoat * (0.04 * coat.x + coat.y);
+        result = result * (1.0 - f) + reflects * prefiltered_radiance(r, s.clearcoat_alpha) * s.occlusion;
+    }
+    return result;
+}
+
+vec3 radiance_to_eye(Surface s, ivec2 pixel, uint tiles_across) {
+    vec3 result = punctual_light(s, pixel, tiles_across);
+    if (ENVIRONMENT) result += environment_light(s);
+    float under_coat = 1.0;
+    if (CLEARCOAT) under_coat = 1.0 - s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, clamp(dot(s.n, s.v), 0.0, 1.0)).x;
+    result += s.emissive * under_coat;
+    return s.unlit ? s.base : result;
+}
+#endif

@@ -1,0 +1,108 @@
+// A surface point as the lighting sees it, and its reflected radiance.
+#ifndef SURFACE_GLSL
+#define SURFACE_GLSL
+#include "lib/brdf.glsl"
+#include "lib/fresnel.glsl"
+#include "share/scene.glsl"
+
+// The knobs `brdf` and `fresnel` (product.md): one formula each, chosen when the pipeline is made.
+layout(constant_id = 10) const uint BRDF = 2;    // 0 blinn-phong, 1 blinn-phong-reciprocal, 2 ggx, 3 ggx-multi
+layout(constant_id = 11) const uint FRESNEL = 0; // 0 schlick, 1 exact
+layout(constant_id = 12) const bool CLEARCOAT = false;
+
+struct Surface {
+    vec3 p_rel;
+    vec3 n;              // shading normal
+    vec3 v;              // to the viewer
+    vec3 diffuse;        // albedo of the diffuse part
+    vec3 f0;
+    float f90;
+    float ior;           // of the dielectric part; 0 where it has none (a metal)
+    float alpha;         // roughness²
+    float roughness;
+    float occlusion;
+    vec3 emissive;
+    float clearcoat;
+    float clearcoat_alpha;
+    float clearcoat_roughness;
+    bool unlit;
+    vec3 base;
+};
+
+// Roughness below this is a mirror to 16-bit normals; the lobe stays finite (numerics.md 20 holds from α = 1e-5).
+const float MIN_ROUGHNESS = 0.01;
+
+Surface surface_from_texels(Material m, vec3 base, float metallic, float roughness, float occlusion, vec3 emissive,
+                            vec3 layers, vec3 n, vec3 v, vec3 p_rel) {
+    Surface s;
+    s.p_rel = p_rel;
+    s.v = v;
+    s.n = n;
+    s.base = base * m.base_color.rgb;
+    float metal = metallic * m.metallic;
+    s.diffuse = s.base * (1.0 - metal);
+    s.f0 = mix(m.f0 * layers.z, s.base, metal);
+    s.f90 = mix(m.f90 * layers.z, 1.0, metal);
+    s.ior = m.ior * (1.0 - metal);
+    s.roughness = max(roughness * m.roughness, MIN_ROUGHNESS);
+    s.alpha = s.roughness * s.roughness;
+    s.occlusion = 1.0 + m.occlusion_strength * (occlusion - 1.0);
+    s.emissive = emissive * m.emissive;
+    s.clearcoat = layers.x * m.clearcoat;
+    s.clearcoat_roughness = max(layers.y * m.clearcoat_roughness, MIN_ROUGHNESS);
+    s.clearcoat_alpha = s.clearcoat_roughness * s.clearcoat_roughness;
+    s.unlit = (m.flags & 1u) != 0;
+    return s;
+}
+
+vec3 fresnel(Surface s, float cos_in) {
+    vec3 schlick = fresnel_schlick(s.f0, s.f90, cos_in);
+    if (FRESNEL == 0) return schlick;
+    // Exact for what the index of refraction describes; F0 may be tinted by KHR_materials_specular, so the exact curve
+    // is carried over as its share between F0 and 1. Metals given by a colour alone have no n and κ: Schlick.
+    if (s.ior <= 0.0) return schlick;
+    float n = s.ior;
+    float r0 = (n - 1.0) / (n + 1.0);
+    r0 *= r0;
+    float share = clamp((fresnel_dielectric(n, cos_in) - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
+    return s.f0 + (vec3(s.f90) - s.f0) * share;
+}
+
+// BRDF times cosθ_l for light from the unit direction l (lecture B2): what irradiance perpendicular to l becomes.
+vec3 reflected(Surface s, vec3 l) {
+    float cos_l = dot(s.n, l);
+    // Self-shadow (lecture B9).
+    if (cos_l <= 0.0) return vec3(0.0);
+    float cos_v = max(dot(s.n, s.v), 1e-4);
+    vec3 sum = l + s.v;
+    float sum2 = dot(sum, sum);
+    vec3 h = sum2 > 0.0 ? sum * inversesqrt(sum2) : s.n;
+    float cos_d = clamp(dot(s.v, h), 0.0, 1.0);
+    vec3 result;
+    if (BRDF <= 1) {
+        float shine = shine_from_alpha(s.alpha);
+        float lobe = pow(max(dot(s.n, h), 0.0), shine);
+        // k_s such that the lobe of B6 reflects F0 of the light at normal incidence (lecture B6).
+        vec3 ks = s.f0 * ((shine + 2.0) * 0.5 * INV_PI);
+        if (BRDF == 0) {
+            // B5: the lobe is not multiplied by cosθ_l.
+            result = s.diffuse * INV_PI * cos_l + ks * (lobe * 0.25);
+        } else {
+            // B6: the reciprocal form; (L + V)² is taken from the components (numerics.md 18).
+            result = (s.diffuse * INV_PI + (sum2 > 0.0 ? ks * (lobe / sum2) : vec3(0.0))) * cos_l;
+        }
+    } else {
+        vec3 f = fresnel(s, cos_d);
+        float d = ggx_distribution(s.n, h, s.alpha);
+        float vis = ggx_visibility(cos_l, cos_v, s.alpha);
+        result = (s.diffuse * INV_PI * (1.0 - f) + f * (d * vis)) * cos_l;
+    }
+    if (CLEARCOAT) {
+        float f = s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, cos_d).x;
+        float d = ggx_distribution(s.n, h, s.clearcoat_alpha);
+        float vis = ggx_visibility(cos_l, cos_v, s.clearcoat_alpha);
+        result = result * (1.0 - f) + f * d * vis * cos_l;
+    }
+    return result;
+}
+#endif

@@ -1,0 +1,101 @@
+// A surface at a fragment: the material's textures read, normals turned to the viewer. Shared by the G-buffer and by
+// the fragment list of see-through surfaces, which store the same quantities.
+#ifndef SURFACE_FRAGMENT_GLSL
+#define SURFACE_FRAGMENT_GLSL
+#include "lib/gbuffer_interface.glsl"
+
+layout(scalar, set = 0, binding = 2) readonly buffer Materials { Material materials[]; };
+layout(scalar, set = 0, binding = 3) readonly buffer Slots { TextureSlot slots[]; };
+layout(set = 0, binding = 4) uniform sampler2DArray base_page;
+layout(set = 0, binding = 5) uniform sampler2DArray metallic_roughness_page;
+layout(set = 0, binding = 6) uniform sampler2DArray normal_page;
+layout(set = 0, binding = 7) uniform sampler2DArray occlusion_page;
+layout(set = 0, binding = 8) uniform sampler2DArray emissive_page;
+layout(set = 0, binding = 9) uniform sampler2DArray clearcoat_page;
+layout(set = 0, binding = 10) uniform sampler2DArray clearcoat_roughness_page;
+layout(set = 0, binding = 11) uniform sampler2DArray specular_page;
+layout(set = 0, binding = 12) uniform sampler2DArray transmission_page;
+layout(set = 0, binding = 13) uniform sampler2DArray thickness_page;
+
+layout(location = 0) in vec3 p_rel;
+layout(location = 1) in vec3 n_rel;
+layout(location = 2) in vec4 t_rel;
+layout(location = 3) in vec4 uv;
+layout(location = 4) in vec4 vertex_color;
+layout(location = 5) flat in uvec2 ids;
+
+layout(push_constant, scalar) uniform Push { float lod_bias; };
+
+struct SurfaceFragment {
+    vec4 base;          // texel times vertex colour; the constant factor is not in it
+    float metallic;     // texel
+    float roughness;    // texel
+    float occlusion;    // texel
+    vec3 emissive;      // texel
+    vec4 layers;        // texels: clearcoat, clearcoat roughness, specular, transmission
+    float thickness;    // texel
+    vec3 n_shading;     // unit, to the viewer's side of the face
+    vec3 n_geometric;   // unit, to the viewer
+};
+
+// The array index is the rounded third coordinate; a layer never bleeds into the next.
+vec4 read(sampler2DArray page, uint slot_index) {
+    TextureSlot slot = slots[ids.y * SLOTS + slot_index];
+    vec3 set = vec3(slot.uv_set == 0 ? uv.xy : uv.zw, 1.0);
+    return texture(page, vec3(dot(slot.row_u, set), dot(slot.row_v, set), float(slot.layer)), lod_bias);
+}
+
+// Opacity alone: what decides whether the fragment exists.
+float fragment_alpha() {
+    float alpha = vertex_color.a;
+    if (HAS_BASE) alpha *= read(base_page, SLOT_BASE).a;
+    return alpha;
+}
+
+SurfaceFragment surface_fragment() {
+    SurfaceFragment s;
+    s.base = vertex_color;
+    if (HAS_BASE) s.base *= read(base_page, SLOT_BASE);
+    s.metallic = 1.0;
+    s.roughness = 1.0;
+    if (HAS_METALLIC_ROUGHNESS) {
+        vec4 texel = read(metallic_roughness_page, SLOT_METALLIC_ROUGHNESS);
+        s.roughness = texel.g;
+        s.metallic = texel.b;
+    }
+    s.occlusion = HAS_OCCLUSION ? read(occlusion_page, SLOT_OCCLUSION).r : 1.0;
+    s.emissive = HAS_EMISSIVE ? read(emissive_page, SLOT_EMISSIVE).rgb : vec3(1.0);
+    s.layers = vec4(1.0);
+    s.thickness = 1.0;
+    if (HAS_LAYERS) {
+        s.layers.x = read(clearcoat_page, SLOT_CLEARCOAT).r;
+        s.layers.y = read(clearcoat_roughness_page, SLOT_CLEARCOAT_ROUGHNESS).g;
+        s.layers.z = read(specular_page, SLOT_SPECULAR).a;
+        s.layers.w = read(transmission_page, SLOT_TRANSMISSION).r;
+        s.thickness = read(thickness_page, SLOT_THICKNESS).g;
+    }
+
+    // The face's own normal from the positions of neighbouring fragments: they lie in the plane of the triangle.
+    vec3 face = cross(dFdx(p_rel), dFdy(p_rel));
+    face = dot(face, p_rel) > 0.0 ? -face : face;
+    float size = max(abs(face.x), max(abs(face.y), abs(face.z)));
+    // A face seen exactly edge-on has no extent on the screen: any normal to the viewer will do.
+    s.n_geometric = size > 0.0 ? normalize(face / size) : normalize(-p_rel);
+
+    vec3 n = normalize(n_rel);
+    if (!gl_FrontFacing) n = -n;
+    s.n_shading = n;
+    if (HAS_NORMAL) {
+        vec3 texel = read(normal_page, SLOT_NORMAL).xyz * 2.0 - 1.0;
+        texel.xy *= materials[ids.y].normal_scale;
+        vec3 t = t_rel.xyz - n * dot(n, t_rel.xyz);
+        float t2 = dot(t, t);
+        vec3 t_unit = t2 > 0.0 ? t * inversesqrt(t2) : vec3(0.0);
+        float side = gl_FrontFacing ? t_rel.w : -t_rel.w;
+        vec3 bent = t_unit * texel.x + cross(n, t_unit) * (side * texel.y) + n * texel.z;
+        float bent2 = dot(bent, bent);
+        s.n_shading = bent2 > 0.0 ? bent * inversesqrt(bent2) : n;
+    }
+    return s;
+}
+#endif

@@ -1,0 +1,44 @@
+// The G-buffer as arbitrary output variables: plain f32 words per pixel, in the order of AovPixel.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+layout(local_size_x = 8, local_size_y = 8) in;
+#include "lib/camera.glsl"
+#include "lib/encode.glsl"
+#include "share/scene.glsl"
+#include "share/aov.glsl"
+
+layout(constant_id = 0) const bool HAS_EMISSIVE = false;
+layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
+layout(scalar, set = 0, binding = 1) readonly buffer Materials { Material materials[]; };
+layout(set = 0, binding = 2) uniform sampler2D depth;
+layout(set = 0, binding = 3, rgba16f) readonly uniform image2D base;
+layout(set = 0, binding = 4, rgba16_snorm) readonly uniform image2D normals;
+layout(set = 0, binding = 5, rg32ui) readonly uniform uimage2D ids;
+layout(set = 0, binding = 6, rgba16f) readonly uniform image2D emissive;
+layout(scalar, set = 0, binding = 7) writeonly buffer Pixels { AovPixel pixels[]; };
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
+    float z = texelFetch(depth, pixel, 0).x;
+    AovPixel result = AovPixel(vec3(0), vec3(0), vec3(0), vec3(0), 0, 0, 0, vec3(0), 0, 0);
+    if (z > 0.0) {
+        uvec2 id = imageLoad(ids, pixel).xy;
+        vec4 texel = imageLoad(base, pixel);
+        vec4 octahedral = imageLoad(normals, pixel);
+        Material m = materials[id.x & 0xffffu];
+        result.p_rel = rel_from_pixel(camera, pixel, z);
+        result.normal = unit_from_octahedral(octahedral.xy);
+        result.geometric_normal = unit_from_octahedral(octahedral.zw);
+        result.albedo = texel.rgb * m.base_color.rgb;
+        result.distance = camera.orthographic != 0 ? view_depth(camera, z) : length(result.p_rel);
+        result.roughness = float(id.x >> 16) * (1.0 / 65535.0) * m.roughness;
+        result.metallic = texel.a * m.metallic;
+        result.emissive = (HAS_EMISSIVE ? imageLoad(emissive, pixel).rgb : vec3(1.0)) * m.emissive;
+        // 0 is "nothing": ids count from 1.
+        result.material = 1 + (id.x & 0xffffu);
+        result.instance = 1 + (id.y & 0xffffffu);
+    }
+    pixels[pixel.y * camera.size.x + pixel.x] = result;
+}

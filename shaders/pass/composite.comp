@@ -1,0 +1,86 @@
+// See-through surfaces over what lies behind them, nearest first: radiance += T a L, T *= 1 − a + a t, where a is
+// coverage and t what the surface lets through. Repeated selection of the next nearest fragment sorts without moving
+// anything; n fragments cost n² / 2 steps of one invocation's 65,535 on lavapipe.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+layout(local_size_x = 8, local_size_y = 8) in;
+#include "lib/camera.glsl"
+#include "lib/fragment_list.glsl"
+#include "lib/lighting.glsl"
+
+layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
+layout(scalar, set = 0, binding = 1) readonly buffer Materials { Material materials[]; };
+layout(set = 0, binding = 2, r32ui) readonly uniform uimage2D heads;
+layout(scalar, set = 0, binding = 3) readonly buffer Nodes { uint nodes[]; };
+layout(set = 0, binding = 4, rgba32f) uniform image2D radiance;
+layout(scalar, set = 0, binding = 5) buffer Dropped { uint dropped; };
+layout(push_constant, scalar) uniform Push { uint first_row; };
+
+// Fragments of one pixel beyond this many are counted as dropped: 220²/2 selections leave half of the loop budget to
+// the lights.
+const uint MOST_FRAGMENTS = 220;
+
+// Whether key a comes after key b: farther (smaller depth), then larger instance, then larger primitive.
+bool after(uvec3 a, uvec3 b) {
+    if (a.x != b.x) return a.x < b.x; // depth is in [0, 1]: its bits order as its values do
+    if (a.y != b.y) return a.y > b.y;
+    return a.z > b.z;
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, first_row);
+    if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
+    uint head = imageLoad(heads, pixel).x;
+    if (head == END_OF_LIST) return;
+    uint tiles_across = (camera.size.x + TILE - 1) / TILE;
+    vec3 direction = view_direction(camera, pixel);
+    vec3 sum = vec3(0.0);
+    vec3 through = vec3(1.0);
+    uvec3 last = uvec3(0xffffffffu, 0, 0);
+    uint drawn = 0;
+    while (true) {
+        uint best = END_OF_LIST;
+        uvec3 best_key = uvec3(0, 0xffffffffu, 0xffffffffu);
+        for (uint node = head; node != END_OF_LIST; node = nodes[node * NODE_WORDS]) {
+            uint at = node * NODE_WORDS;
+            uvec3 key = uvec3(nodes[at + 1], nodes[at + 2], nodes[at + 3]);
+            if (after(key, last) && !after(key, best_key)) {
+                best = node;
+                best_key = key;
+            }
+        }
+        if (best == END_OF_LIST) break;
+        if (drawn == MOST_FRAGMENTS) {
+            atomicAdd(dropped, 1u);
+            break;
+        }
+        drawn++;
+        last = best_key;
+        uint at = best * NODE_WORDS;
+        uint word = nodes[at + 4];
+        Material m = materials[word & 0xffffu];
+        vec2 blue_metal = unpackHalf2x16(nodes[at + 6]);
+        vec2 blue_alpha = unpackHalf2x16(nodes[at + 9]);
+        vec4 layer = unpackUnorm4x8(nodes[at + 10]);
+        vec2 occlusion_thickness = unpackUnorm2x16(nodes[at + 11]);
+        vec3 base = vec3(unpackHalf2x16(nodes[at + 5]), blue_metal.x);
+        vec3 n = unit_from_octahedral(unpackSnorm2x16(nodes[at + 7]));
+        vec3 p = rel_from_pixel(camera, pixel, uintBitsToFloat(nodes[at + 1]));
+        vec3 glow = vec3(unpackHalf2x16(nodes[at + 8]), blue_alpha.x);
+        Surface s = surface_from_texels(m, base, blue_metal.y, float(word >> 16) * (1.0 / 65535.0),
+                                        occlusion_thickness.x, glow, layer.rgb, n, -direction, p);
+        // Refraction `off`: what is not reflected goes straight on, tinted by the base colour and by absorption through
+        // the nominal thickness (A1).
+        float transmits = m.transmission * layer.a * (1.0 - blue_metal.y * m.metallic);
+        vec3 f = fresnel(s, clamp(dot(s.n, s.v), 0.0, 1.0));
+        vec3 passes = transmits * s.base * exp(-m.sigma_thickness * occlusion_thickness.y) * (1.0 - f);
+        s.diffuse *= 1.0 - transmits;
+        float alpha = blue_alpha.y;
+        sum += through * alpha * radiance_to_eye(s, pixel, tiles_across);
+        through *= 1.0 - alpha + alpha * passes;
+    }
+    vec4 behind = imageLoad(radiance, pixel);
+    float coverage = 1.0 - (through.r + through.g + through.b) * (1.0 / 3.0) * (1.0 - behind.a);
+    imageStore(radiance, pixel, vec4(sum + through * behind.rgb, coverage));
+}

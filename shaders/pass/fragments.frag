@@ -1,0 +1,38 @@
+// Every see-through fragment in front of the opaque surfaces goes to its pixel's list (lib/fragment_list.glsl).
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+layout(early_fragment_tests) in;
+#include "lib/surface_fragment.glsl"
+#include "lib/encode.glsl"
+#include "lib/fragment_list.glsl"
+
+layout(set = 0, binding = 14, r32ui) uniform uimage2D heads;
+layout(scalar, set = 0, binding = 15) buffer Counter { uint counter; };
+layout(scalar, set = 0, binding = 16) writeonly buffer Nodes { uint nodes[]; };
+
+void main() {
+    SurfaceFragment s = surface_fragment();
+    float alpha = s.base.a * materials[ids.y].base_color.a;
+    bool covers = (materials[ids.y].flags & 2u) != 0;
+    if (!covers) alpha = 1.0;
+    if (MASKED && s.base.a * materials[ids.y].base_color.a < materials[ids.y].alpha_cutoff) return;
+    // A fragment without coverage leaves no trace; NaN coverage must not vanish here, it is counted later.
+    if (alpha <= 0.0) return;
+    uint slot = atomicAdd(counter, 1u);
+    uint at = slot * NODE_WORDS;
+    // The counter runs on past the end, so that the host learns how many slots the frame needs.
+    if (at + NODE_WORDS > uint(nodes.length())) return;
+    nodes[at + 0] = imageAtomicExchange(heads, ivec2(gl_FragCoord.xy), slot);
+    nodes[at + 1] = floatBitsToUint(gl_FragCoord.z);
+    nodes[at + 2] = ids.x;
+    nodes[at + 3] = uint(gl_PrimitiveID);
+    nodes[at + 4] = ids.y | uint(clamp(s.roughness, 0.0, 1.0) * 65535.0 + 0.5) << 16;
+    nodes[at + 5] = packHalf2x16(s.base.rg);
+    nodes[at + 6] = packHalf2x16(vec2(s.base.b, s.metallic));
+    nodes[at + 7] = packSnorm2x16(octahedral_from_unit(s.n_shading));
+    nodes[at + 8] = packHalf2x16(s.emissive.rg);
+    nodes[at + 9] = packHalf2x16(vec2(s.emissive.b, alpha));
+    nodes[at + 10] = packUnorm4x8(s.layers);
+    nodes[at + 11] = packUnorm2x16(vec2(s.occlusion, s.thickness));
+}

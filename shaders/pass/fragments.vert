@@ -1,0 +1,5 @@
+// See-through surfaces: the G-buffer's vertex stage as it is.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "lib/gbuffer_vertex.glsl"

@@ -1,0 +1,25 @@
+// The nearest opaque surface of every pixel. What is constant over a material stays in the material table: an
+// untextured material is exact, a textured one as exact as its texels.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "lib/surface_fragment.glsl"
+#include "lib/encode.glsl"
+
+layout(location = 0) out vec4 out_base;     // RGBA16F: base colour, metallic
+layout(location = 1) out vec4 out_normals;  // RGBA16_SNORM: octahedral shading normal, octahedral geometric normal
+layout(location = 2) out uvec2 out_ids;     // RG32UI: material | roughness << 16, instance | occlusion << 24
+layout(location = 3) out vec4 out_emissive; // RGBA16F, where the plan has it
+layout(location = 4) out vec4 out_layers;   // RGBA8, where the plan has it: clearcoat, its roughness, specular
+
+void main() {
+    SurfaceFragment s = surface_fragment();
+    if (MASKED && s.base.a * materials[ids.y].base_color.a < materials[ids.y].alpha_cutoff) discard;
+    out_base = vec4(s.base.rgb, s.metallic);
+    out_normals = vec4(octahedral_from_unit(s.n_shading), octahedral_from_unit(s.n_geometric));
+    uint roughness = uint(clamp(s.roughness, 0.0, 1.0) * 65535.0 + 0.5);
+    uint occlusion = uint(clamp(s.occlusion, 0.0, 1.0) * 255.0 + 0.5);
+    out_ids = uvec2(ids.y | roughness << 16, ids.x | occlusion << 24);
+    out_emissive = vec4(s.emissive, 1.0);
+    out_layers = s.layers;
+}

@@ -1,0 +1,5 @@
+// Opaque surfaces: object space to clip space.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "lib/gbuffer_vertex.glsl"

@@ -1,0 +1,46 @@
+// One level of the environment prefiltered with the GGX lobe of α = 16 / width of the level: the lobe is the same
+// number of texels wide on every level, so the same number of samples serves them all. N = V = R as in Karis 2013.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+layout(local_size_x = 8, local_size_y = 8) in;
+#include "lib/brdf.glsl"
+#include "lib/encode.glsl"
+
+layout(set = 0, binding = 0) uniform sampler2D environment_map;
+layout(scalar, set = 0, binding = 1) writeonly buffer Level { vec4 level[]; };
+layout(push_constant, scalar) uniform Push { uvec2 size; float alpha; float base_width; };
+const uint SAMPLES = 64;
+
+void main() {
+    uvec2 at = gl_GlobalInvocationID.xy;
+    if (any(greaterThanEqual(at, size))) return;
+    vec3 n = direction_from_equirectangular((vec2(at) + 0.5) / vec2(size));
+    // Orthonormal basis without a branch (Duff et al., JCGT 6(1) 2017).
+    float side = n.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (side + n.z);
+    float b = n.x * n.y * a;
+    vec3 t = vec3(1.0 + side * n.x * n.x * a, side * b, -side * n.x);
+    vec3 u = vec3(b, side + n.y * n.y * a, -n.y);
+    vec3 sum = vec3(0.0);
+    float weight = 0.0;
+    float texel = 4.0 * PI / (base_width * base_width * 0.5); // solid angle of a texel at the equator, roughly
+    for (uint i = 0; i < SAMPLES; i++) {
+        float x = (float(i) + 0.5) / float(SAMPLES);
+        float phi = 2.0 * PI * float(bitfieldReverse(i)) * 2.3283064365386963e-10;
+        // GGX half vector: tan²θ = α² x / (1 − x).
+        float cos_h = sqrt((1.0 - x) / (1.0 + (alpha * alpha - 1.0) * x));
+        float sin_h = sqrt(max(1.0 - cos_h * cos_h, 0.0));
+        vec3 h = t * (sin_h * cos(phi)) + u * (sin_h * sin(phi)) + n * cos_h;
+        vec3 l = 2.0 * dot(n, h) * h - n;
+        float cos_l = dot(n, l);
+        if (cos_l > 0.0) {
+            // Each sample stands for 1 / (N pdf) of solid angle: read the level whose texels are that large.
+            float pdf = ggx_distribution(n, h, alpha) * 0.25;
+            float lod = 0.5 * log2(1.0 / (float(SAMPLES) * pdf * texel)) + 1.0;
+            sum += textureLod(environment_map, equirectangular_from_direction(l), max(lod, 0.0)).rgb * cos_l;
+            weight += cos_l;
+        }
+    }
+    level[at.y * size.x + at.x] = vec4(sum / max(weight, 1e-6), 1.0);
+}

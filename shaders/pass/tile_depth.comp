@@ -1,0 +1,36 @@
+// Nearest and farthest view depth of each 16x16 tile. With see-through surfaces the near end is the camera: they are
+// lit by the same lists.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+layout(local_size_x = 8, local_size_y = 8) in;
+#include "lib/camera.glsl"
+
+layout(constant_id = 0) const bool FROM_CAMERA = false;
+layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
+layout(set = 0, binding = 1) uniform sampler2D depth;
+layout(set = 0, binding = 2, rg32f) writeonly uniform imageBuffer tile_depths;
+const int TILE = 16;
+
+void main() {
+    ivec2 tile = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 tiles = (ivec2(camera.size) + TILE - 1) / TILE;
+    if (any(greaterThanEqual(tile, tiles))) return;
+    ivec2 last = min((tile + 1) * TILE, ivec2(camera.size));
+    float nearest = 0.0; // reversed depth
+    float farthest = 1.0;
+    bool empty = true;
+    for (int y = tile.y * TILE; y < last.y; y++) {
+        for (int x = tile.x * TILE; x < last.x; x++) {
+            float z = texelFetch(depth, ivec2(x, y), 0).x;
+            nearest = max(nearest, z);
+            if (z > 0.0) {
+                farthest = min(farthest, z);
+                empty = false;
+            }
+        }
+    }
+    vec2 range = empty ? vec2(1.0, -1.0) : vec2(view_depth(camera, nearest), view_depth(camera, farthest));
+    if (FROM_CAMERA) range = vec2(0.0, empty ? 3e38 : range.y);
+    imageStore(tile_depths, tile.y * tiles.x + tile.x, vec4(range, 0.0, 0.0));
+}

@@ -1,0 +1,56 @@
+// Which point and spot lights reach which 16x16 tile: one invocation per tile and word of 32 lights, each light's sphere
+// against the tile's four side planes and its range of depths. A bit mask cannot overflow and has one order.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+layout(local_size_x = 64) in;
+#include "lib/camera.glsl"
+
+layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
+layout(set = 0, binding = 1, rgba32f) readonly uniform imageBuffer lights;
+layout(set = 0, binding = 2, rg32f) readonly uniform imageBuffer tile_depths;
+layout(set = 0, binding = 3, r32ui) writeonly uniform uimageBuffer tile_lights;
+layout(push_constant, scalar) uniform Push { uint first; uint count; uint words; uint tiles_across; uint tiles; };
+const int TILE = 16;
+
+void main() {
+    uint job = gl_GlobalInvocationID.x;
+    if (job >= tiles * words) return;
+    uint tile = job / words;
+    uint word = job - tile * words;
+    vec2 range = imageLoad(tile_depths, int(tile)).xy; // nearest and farthest view depth; empty where nothing was drawn
+    uint bits = 0;
+    if (range.x <= range.y) {
+        ivec2 corner = ivec2(tile % tiles_across, tile / tiles_across) * TILE;
+        // Ray displacements at the tile's borders, half a pixel wider than any sample of it.
+        vec2 scale = 2.0 / vec2(camera.size);
+        vec2 low = (vec2(corner) - 0.5) * scale - 1.0;
+        vec2 high = (vec2(corner + TILE) + 0.5) * scale - 1.0;
+        bool parallel = camera.orthographic != 0;
+        vec3 r = camera.right;
+        vec3 u = -camera.up;
+        vec3 f = camera.forward;
+        float r2 = dot(r, r);
+        float u2 = dot(u, u);
+        for (uint i = 0; i < 32; i++) {
+            uint index = word * 32 + i;
+            if (index >= count) break;
+            vec4 place = imageLoad(lights, int((first + index) * 4));
+            float radius = place.w; // the light's range; negative: unlimited
+            bool hit = radius < 0.0;
+            if (!hit) {
+                float z = dot(place.xyz, f);
+                float x = dot(place.xyz, r) / r2;
+                float y = dot(place.xyz, u) / u2;
+                float w = parallel ? 1.0 : z;
+                // Signed distances to the planes x = low.x w …: their normals are not unit, so the radius grows instead.
+                float rx = radius * (parallel ? 1.0 : sqrt(1.0 + r2 * max(low.x * low.x, high.x * high.x))) * inversesqrt(r2);
+                float ry = radius * (parallel ? 1.0 : sqrt(1.0 + u2 * max(low.y * low.y, high.y * high.y))) * inversesqrt(u2);
+                hit = z + radius >= range.x && z - radius <= range.y && x - low.x * w >= -rx && high.x * w - x >= -rx &&
+                      y - low.y * w >= -ry && high.y * w - y >= -ry;
+            }
+            if (hit) bits |= 1u << i;
+        }
+    }
+    imageStore(tile_lights, int(job), uvec4(bits));
+}

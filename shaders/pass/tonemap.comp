@@ -1,0 +1,37 @@
+// Film to display: counts what is not a radiance, exposes, bends, encodes (lecture C4).
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+layout(local_size_x = 8, local_size_y = 8) in;
+#include "lib/colour.glsl"
+
+layout(constant_id = 0) const uint CURVE = 0;
+layout(set = 0, binding = 0, rgba32f) readonly uniform image2D film;
+layout(scalar, set = 0, binding = 1) writeonly buffer Display { uint display[]; };
+layout(scalar, set = 0, binding = 2) buffer Counts { uint nan; uint inf; uint negative; };
+// `background` is display-linear and lies behind what is not covered; its alpha 0 keeps the picture transparent.
+layout(push_constant, scalar) uniform Push { vec4 background; float exposure; };
+
+uint byte_from(float x) {
+    return uint(floor(x * 255.0 + 0.5));
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 size = imageSize(film);
+    if (any(greaterThanEqual(pixel, size))) return;
+    vec4 value = imageLoad(film, pixel);
+    // Counted before anything clamps: max(NaN, 0) is 0.
+    if (any(isnan(value))) atomicAdd(nan, 1u);
+    if (any(isinf(value))) atomicAdd(inf, 1u);
+    if (any(lessThan(value, vec4(0.0)))) atomicAdd(negative, 1u);
+    float alpha = clamp(value.a, 0.0, 1.0);
+    vec3 linear = alpha > 0.0 ? tone(CURVE, value.rgb / alpha * exposure) : vec3(0.0);
+    if (background.a > 0.0) {
+        linear = mix(background.rgb, linear, alpha);
+        alpha = 1.0;
+    }
+    uvec4 bytes = uvec4(byte_from(srgb_encode(linear.r)), byte_from(srgb_encode(linear.g)), byte_from(srgb_encode(linear.b)),
+                        byte_from(alpha));
+    display[pixel.y * size.x + pixel.x] = bytes.r | bytes.g << 8 | bytes.b << 16 | bytes.a << 24;
+}

@@ -1,0 +1,13 @@
+// One pixel of arbitrary output variables. Twin: src/share.rs (build.rs compares the layouts).
+struct AovPixel {
+    vec3 p_rel;            // metres from the eye, world axes
+    vec3 normal;           // shading normal
+    vec3 geometric_normal;
+    vec3 albedo;
+    float distance;        // from the eye; along the view direction where the camera is orthographic
+    float roughness;
+    float metallic;
+    vec3 emissive;
+    uint material;         // index + 1; 0 where nothing was drawn
+    uint instance;         // index + 1
+};

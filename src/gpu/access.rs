@@ -1,0 +1,98 @@
+//! The dozen ways a pass can touch a resource, and the one table that turns them into Vulkan's masks.
+
+use ash::vk;
+
+/// How a pass uses a buffer or an image. No stage, access or layout mask is written anywhere else.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Access {
+    /// Colour attachment, written (and cleared or blended over).
+    ColorTarget,
+    /// Depth attachment, tested and written.
+    DepthTarget,
+    /// Depth attachment, tested but not written; may be sampled in the same pass.
+    DepthRead,
+    /// Read through a sampler.
+    Sampled,
+    /// Uniform buffer.
+    UniformRead,
+    /// `readonly` storage buffer, storage image or texel buffer.
+    StorageRead,
+    /// `writeonly` storage.
+    StorageWrite,
+    /// Storage both read and written.
+    StorageReadWrite,
+    /// Vertex attributes.
+    VertexRead,
+    /// Indices.
+    IndexRead,
+    /// Arguments of an indirect command.
+    IndirectRead,
+    /// Source of a copy.
+    TransferSrc,
+    /// Destination of a copy or clear.
+    TransferDst,
+    /// Read by the host after the frame has finished.
+    HostRead,
+    /// Shown by the presentation engine.
+    Present,
+}
+
+/// What an [`Access`] means to Vulkan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Masks {
+    /// Stages that perform the access.
+    pub stages: vk::PipelineStageFlags2,
+    /// Kinds of memory access.
+    pub access: vk::AccessFlags2,
+    /// Layout an image has to be in.
+    pub layout: vk::ImageLayout,
+    /// Whether anything is written.
+    pub writes: bool,
+}
+
+impl Access {
+    /// The table. `shaders` are the shader stages of the binding, for the accesses that shaders perform.
+    #[must_use]
+    pub fn masks(self, shaders: vk::ShaderStageFlags) -> Masks {
+        use vk::{AccessFlags2 as A, ImageLayout as L, PipelineStageFlags2 as S};
+        let mut shader = S::NONE;
+        for (flag, stage) in [
+            (vk::ShaderStageFlags::VERTEX, S::VERTEX_SHADER),
+            (vk::ShaderStageFlags::FRAGMENT, S::FRAGMENT_SHADER),
+            (vk::ShaderStageFlags::COMPUTE, S::COMPUTE_SHADER),
+        ] {
+            if shaders.contains(flag) {
+                shader |= stage;
+            }
+        }
+        let depth = S::EARLY_FRAGMENT_TESTS | S::LATE_FRAGMENT_TESTS;
+        let (stages, access, layout, writes) = match self {
+            Self::ColorTarget => (
+                S::COLOR_ATTACHMENT_OUTPUT,
+                A::COLOR_ATTACHMENT_READ | A::COLOR_ATTACHMENT_WRITE,
+                L::COLOR_ATTACHMENT_OPTIMAL,
+                true,
+            ),
+            Self::DepthTarget => (
+                depth,
+                A::DEPTH_STENCIL_ATTACHMENT_READ | A::DEPTH_STENCIL_ATTACHMENT_WRITE,
+                L::DEPTH_ATTACHMENT_OPTIMAL,
+                true,
+            ),
+            Self::DepthRead => (depth, A::DEPTH_STENCIL_ATTACHMENT_READ, L::DEPTH_READ_ONLY_OPTIMAL, false),
+            Self::Sampled => (shader, A::SHADER_SAMPLED_READ, L::SHADER_READ_ONLY_OPTIMAL, false),
+            Self::UniformRead => (shader, A::UNIFORM_READ, L::GENERAL, false),
+            Self::StorageRead => (shader, A::SHADER_STORAGE_READ, L::GENERAL, false),
+            Self::StorageWrite => (shader, A::SHADER_STORAGE_WRITE, L::GENERAL, true),
+            Self::StorageReadWrite => (shader, A::SHADER_STORAGE_READ | A::SHADER_STORAGE_WRITE, L::GENERAL, true),
+            Self::VertexRead => (S::VERTEX_ATTRIBUTE_INPUT, A::VERTEX_ATTRIBUTE_READ, L::UNDEFINED, false),
+            Self::IndexRead => (S::INDEX_INPUT, A::INDEX_READ, L::UNDEFINED, false),
+            Self::IndirectRead => (S::DRAW_INDIRECT, A::INDIRECT_COMMAND_READ, L::UNDEFINED, false),
+            Self::TransferSrc => (S::ALL_TRANSFER, A::TRANSFER_READ, L::TRANSFER_SRC_OPTIMAL, false),
+            Self::TransferDst => (S::ALL_TRANSFER, A::TRANSFER_WRITE, L::TRANSFER_DST_OPTIMAL, true),
+            Self::HostRead => (S::HOST, A::HOST_READ, L::GENERAL, false),
+            Self::Present => (S::NONE, A::NONE, L::PRESENT_SRC_KHR, false),
+        };
+        Masks { stages, access, layout, writes }
+    }
+}

@@ -1,0 +1,512 @@
+//! Instance, choice of a device, and the device with its queue, allocator and caches.
+
+use std::collections::HashMap;
+use std::ffi::{CStr, CString, c_void};
+use std::mem::ManuallyDrop;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use anyhow::{Context as _, Result, anyhow, bail};
+use ash::{ext, khr, vk};
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use serde::Serialize;
+
+use super::pipeline::Caches;
+
+const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+/// Which device the user wants.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum DeviceChoice {
+    /// The best there is: discrete, integrated, virtual, then CPU.
+    #[default]
+    Best,
+    /// A software device.
+    Cpu,
+    /// Anything but a software device.
+    Gpu,
+    /// By place in `etalon devices`.
+    Index(usize),
+    /// By part of its name, ignoring case.
+    Name(String),
+}
+
+impl std::str::FromStr for DeviceChoice {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Ok(match text {
+            "cpu" => Self::Cpu,
+            "gpu" => Self::Gpu,
+            _ => text.parse().map_or_else(|_| Self::Name(text.to_owned()), Self::Index),
+        })
+    }
+}
+
+/// A device as reports name it.
+#[derive(Debug, Clone, Serialize)]
+pub struct DeviceInfo {
+    /// Marketing name.
+    pub name: String,
+    /// Driver and its version in words.
+    pub driver: String,
+    /// Driver version.
+    pub version: String,
+    /// `cpu`, `discrete`, `integrated`, `virtual` or `other`.
+    #[serde(rename = "type")]
+    pub kind: &'static str,
+    /// Vulkan version.
+    pub api: String,
+}
+
+/// A device that Vulkan offers here, and what keeps Etalon from using it.
+#[derive(Debug, Clone, Serialize)]
+pub struct Candidate {
+    /// Its identity.
+    #[serde(flatten)]
+    pub info: DeviceInfo,
+    /// What Etalon needs and the device lacks; empty when it can be used.
+    pub missing: Vec<String>,
+    #[serde(skip)]
+    physical: vk::PhysicalDevice,
+}
+
+/// How much a validation message matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// Worth a look.
+    Warning,
+    /// A mistake of ours.
+    Error,
+}
+
+/// A message of the validation layer.
+#[derive(Debug, Clone, Serialize)]
+pub struct Message {
+    /// Warning or error.
+    pub severity: Severity,
+    /// What it says.
+    pub text: String,
+}
+
+type Messages = Mutex<Vec<Message>>;
+
+/// Locks without caring about a panic elsewhere: the data is only counters and caches.
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The instance with everything that hangs on it.
+struct Instance {
+    entry: ash::Entry,
+    raw: ash::Instance,
+    debug: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    has_debug_utils: bool,
+    messages: Box<Messages>,
+}
+
+impl Instance {
+    fn new(validate: bool) -> Result<Self> {
+        // SAFETY: the loader is a shared library that stays loaded as long as `entry` lives.
+        let entry = unsafe { ash::Entry::load() }
+            .map_err(|e| anyhow!("no Vulkan loader (Debian: libvulkan1, mesa-vulkan-drivers): {e}"))?;
+        // SAFETY: plain queries.
+        let (extensions, layers) = unsafe {
+            (entry.enumerate_instance_extension_properties(None)?, entry.enumerate_instance_layer_properties()?)
+        };
+        let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+        let mut enabled = Vec::new();
+        let mut flags = vk::InstanceCreateFlags::empty();
+        let has_debug_utils = has(ext::debug_utils::NAME);
+        if has_debug_utils {
+            enabled.push(ext::debug_utils::NAME.as_ptr());
+        }
+        if has(khr::portability_enumeration::NAME) {
+            enabled.push(khr::portability_enumeration::NAME.as_ptr());
+            flags |= vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
+        }
+        let mut layer_names = Vec::new();
+        if validate {
+            if !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
+                bail!("--validate needs the Khronos validation layer (Debian: vulkan-validationlayers)");
+            }
+            layer_names.push(VALIDATION_LAYER.as_ptr());
+            enabled.push(ext::validation_features::NAME.as_ptr());
+        }
+        let app = vk::ApplicationInfo::default().application_name(c"etalon").api_version(vk::API_VERSION_1_3);
+        let wanted = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+        let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&wanted);
+        let mut info = vk::InstanceCreateInfo::default()
+            .application_info(&app)
+            .enabled_extension_names(&enabled)
+            .enabled_layer_names(&layer_names)
+            .flags(flags);
+        if validate {
+            info = info.push_next(&mut features);
+        }
+        // SAFETY: `info` points at data that outlives the call.
+        let raw = unsafe { entry.create_instance(&info, None) }.context("creating a Vulkan 1.3 instance")?;
+        let messages: Box<Messages> = Box::default();
+        let debug = if validate {
+            let utils = ext::debug_utils::Instance::new(&entry, &raw);
+            let create = vk::DebugUtilsMessengerCreateInfoEXT::default()
+                .message_severity(
+                    vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
+                )
+                .message_type(
+                    vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION | vk::DebugUtilsMessageTypeFlagsEXT::GENERAL,
+                )
+                .pfn_user_callback(Some(on_message))
+                .user_data(std::ptr::from_ref::<Messages>(&messages).cast_mut().cast());
+            // SAFETY: the box behind `user_data` is freed after the messenger is destroyed.
+            let messenger = unsafe { utils.create_debug_utils_messenger(&create, None) }?;
+            Some((utils, messenger))
+        } else {
+            None
+        };
+        Ok(Self { entry, raw, debug, has_debug_utils, messages })
+    }
+
+    fn candidates(&self) -> Result<Vec<Candidate>> {
+        // SAFETY: plain queries on a live instance.
+        let devices = unsafe { self.raw.enumerate_physical_devices() }.context("listing Vulkan devices")?;
+        Ok(devices.into_iter().map(|physical| self.candidate(physical)).collect())
+    }
+
+    fn candidate(&self, physical: vk::PhysicalDevice) -> Candidate {
+        let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut push = vk::PhysicalDevicePushDescriptorPropertiesKHR::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut push);
+        // SAFETY: plain queries; the chain outlives the call.
+        unsafe { self.raw.get_physical_device_properties2(physical, &mut properties) };
+        let properties = properties.properties;
+        let text = |s: Result<&CStr, _>| s.map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+        let version = |v: u32| {
+            format!("{}.{}.{}", vk::api_version_major(v), vk::api_version_minor(v), vk::api_version_patch(v))
+        };
+        let info = DeviceInfo {
+            name: text(properties.device_name_as_c_str()),
+            driver: format!(
+                "{} {}",
+                text(driver.driver_name_as_c_str()),
+                text(driver.driver_info_as_c_str())
+            ),
+            version: version(properties.driver_version),
+            kind: match properties.device_type {
+                vk::PhysicalDeviceType::CPU => "cpu",
+                vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
+                vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
+                vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
+                _ => "other",
+            },
+            api: version(properties.api_version),
+        };
+        let missing = self.missing(physical, properties.api_version, push.max_push_descriptors);
+        Candidate { info, missing, physical }
+    }
+
+    /// What the device lacks, each with the Mesa version that brings it where that helps.
+    fn missing(&self, physical: vk::PhysicalDevice, api: u32, push_descriptors: u32) -> Vec<String> {
+        if api < vk::API_VERSION_1_3 {
+            return vec!["Vulkan 1.3 (lavapipe: Mesa 22.1 or newer)".to_owned()];
+        }
+        let mut missing = Vec::new();
+        let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
+        let mut v13 = vk::PhysicalDeviceVulkan13Features::default();
+        let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut v12).push_next(&mut v13);
+        // SAFETY: plain queries; the chain outlives the call.
+        let (extensions, families) = unsafe {
+            self.raw.get_physical_device_features2(physical, &mut all);
+            (
+                self.raw.enumerate_device_extension_properties(physical).unwrap_or_default(),
+                self.raw.get_physical_device_queue_family_properties(physical),
+            )
+        };
+        let core = all.features;
+        for (has, what) in [
+            (core.fragment_stores_and_atomics, "feature fragmentStoresAndAtomics"),
+            (core.shader_storage_image_extended_formats, "feature shaderStorageImageExtendedFormats"),
+            (core.sampler_anisotropy, "feature samplerAnisotropy"),
+            (v12.timeline_semaphore, "feature timelineSemaphore"),
+            (v12.scalar_block_layout, "feature scalarBlockLayout (lavapipe: Mesa 21.1 or newer)"),
+            (v13.dynamic_rendering, "feature dynamicRendering (lavapipe: Mesa 22.1 or newer)"),
+            (v13.synchronization2, "feature synchronization2 (lavapipe: Mesa 22.1 or newer)"),
+        ] {
+            if has == vk::FALSE {
+                missing.push(what.to_owned());
+            }
+        }
+        if !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::push_descriptor::NAME)) {
+            missing.push("extension VK_KHR_push_descriptor (lavapipe: Mesa 20.3 or newer)".to_owned());
+        } else if push_descriptors < 32 {
+            missing.push(format!("32 push descriptors (it has {push_descriptors})"));
+        }
+        if !families.iter().any(|f| f.queue_flags.contains(QUEUE)) {
+            missing.push("a queue with graphics and compute".to_owned());
+        }
+        missing
+    }
+}
+
+const QUEUE: vk::QueueFlags =
+    vk::QueueFlags::from_raw(vk::QueueFlags::GRAPHICS.as_raw() | vk::QueueFlags::COMPUTE.as_raw());
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        // SAFETY: the device, the only child, is gone; the messenger goes before the box it writes to.
+        unsafe {
+            if let Some((utils, messenger)) = &self.debug {
+                utils.destroy_debug_utils_messenger(*messenger, None);
+            }
+            self.raw.destroy_instance(None);
+        }
+    }
+}
+
+unsafe extern "system" fn on_message(
+    severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    user: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: Vulkan passes valid callback data, and `user` is the messages' box (see `Instance::new`).
+    let (text, messages) = unsafe {
+        let text = CStr::from_ptr((*data).p_message).to_string_lossy().into_owned();
+        (text, &*user.cast::<Messages>())
+    };
+    let error = severity.contains(vk::DebugUtilsMessageSeverityFlagsEXT::ERROR);
+    let severity = if error { Severity::Error } else { Severity::Warning };
+    tracing::warn!(target: "validation", "{text}");
+    lock(messages).push(Message { severity, text });
+    vk::FALSE
+}
+
+/// All devices that Vulkan offers here, in the order of `--device INDEX`.
+pub fn candidates() -> Result<Vec<Candidate>> {
+    Instance::new(false)?.candidates()
+}
+
+fn choose(all: Vec<Candidate>, choice: &DeviceChoice) -> Result<Candidate> {
+    if all.is_empty() {
+        bail!("Vulkan offers no device here (Debian: install mesa-vulkan-drivers for the software device)");
+    }
+    let names = all.iter().map(|c| format!("\"{}\"", c.info.name)).collect::<Vec<_>>().join(", ");
+    let rank = |kind: &str| ["discrete", "integrated", "virtual", "other", "cpu"].iter().position(|k| *k == kind);
+    let mut wanted: Vec<(usize, Candidate)> = all
+        .into_iter()
+        .enumerate()
+        .filter(|(index, c)| match choice {
+            DeviceChoice::Best => true,
+            DeviceChoice::Cpu => c.info.kind == "cpu",
+            DeviceChoice::Gpu => c.info.kind != "cpu",
+            DeviceChoice::Index(i) => i == index,
+            DeviceChoice::Name(name) => c.info.name.to_lowercase().contains(&name.to_lowercase()),
+        })
+        .collect();
+    // A usable device of lower rank beats an unusable one.
+    wanted.sort_by_key(|(index, c)| (!c.missing.is_empty(), rank(c.info.kind), *index));
+    let Some((_, best)) = wanted.into_iter().next() else {
+        let what = match choice {
+            DeviceChoice::Best => "a device".to_owned(),
+            DeviceChoice::Cpu => "a software device".to_owned(),
+            DeviceChoice::Gpu => "a GPU".to_owned(),
+            DeviceChoice::Index(i) => format!("a device of index {i}"),
+            DeviceChoice::Name(name) => format!("a device named like \"{name}\""),
+        };
+        bail!("--device asks for {what}; Vulkan offers {names}");
+    };
+    if !best.missing.is_empty() {
+        bail!("device \"{}\" ({}) lacks {}", best.info.name, best.info.driver, best.missing.join(", "));
+    }
+    Ok(best)
+}
+
+/// A Vulkan device, its one queue, and the caches of what was made on it.
+pub struct Device {
+    pub(super) raw: ash::Device,
+    pub(super) queue: vk::Queue,
+    pub(super) commands: vk::CommandPool,
+    pub(super) timeline: vk::Semaphore,
+    pub(super) push: khr::push_descriptor::Device,
+    pub(super) debug: Option<ext::debug_utils::Device>,
+    pub(super) allocator: Mutex<ManuallyDrop<Allocator>>,
+    pub(super) caches: Mutex<Caches>,
+    pub(super) limits: vk::PhysicalDeviceLimits,
+    pub(super) submitted: AtomicU64,
+    next_id: AtomicU64,
+    created: Mutex<HashMap<&'static str, usize>>,
+    info: DeviceInfo,
+    instance: Instance,
+    physical: vk::PhysicalDevice,
+}
+
+impl Device {
+    /// Opens the chosen device; with `validate`, core and synchronization validation report into [`Device::messages`].
+    ///
+    /// # Errors
+    /// One sentence when there is no loader, no such device, or the device lacks something that Etalon needs.
+    pub fn open(choice: &DeviceChoice, validate: bool) -> Result<Arc<Self>> {
+        let instance = Instance::new(validate)?;
+        let Candidate { info, physical, .. } = choose(instance.candidates()?, choice)?;
+        let opening = || format!("opening device \"{}\"", info.name);
+        // SAFETY: plain queries on a live instance.
+        let (families, properties, extensions) = unsafe {
+            (
+                instance.raw.get_physical_device_queue_family_properties(physical),
+                instance.raw.get_physical_device_properties(physical),
+                instance.raw.enumerate_device_extension_properties(physical)?,
+            )
+        };
+        let family = families
+            .iter()
+            .position(|f| f.queue_flags.contains(QUEUE))
+            .ok_or_else(|| anyhow!("no queue with graphics and compute"))
+            .with_context(opening)? as u32;
+
+        let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
+        let mut names = vec![khr::push_descriptor::NAME.as_ptr()];
+        if extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::portability_subset::NAME)) {
+            names.push(khr::portability_subset::NAME.as_ptr());
+        }
+        let core = vk::PhysicalDeviceFeatures::default()
+            .fragment_stores_and_atomics(true)
+            .shader_storage_image_extended_formats(true)
+            .sampler_anisotropy(true);
+        let mut v12 = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true).scalar_block_layout(true);
+        let mut v13 = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true).synchronization2(true);
+        let create = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_extension_names(&names)
+            .enabled_features(&core)
+            .push_next(&mut v12)
+            .push_next(&mut v13);
+        // SAFETY: everything `create` asks for was found present by `Instance::missing`.
+        let raw = unsafe { instance.raw.create_device(physical, &create, None) }.with_context(opening)?;
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.raw.clone(),
+            device: raw.clone(),
+            physical_device: physical,
+            debug_settings: gpu_allocator::AllocatorDebugSettings::default(),
+            buffer_device_address: false,
+            // Small blocks: an idle 256 MiB block is most of a software renderer's memory.
+            allocation_sizes: gpu_allocator::AllocationSizes::new(16 << 20, 8 << 20),
+        })
+        .with_context(opening)?;
+        // SAFETY: the family was created above; the create infos outlive the calls.
+        let (queue, commands, timeline) = unsafe {
+            let pool = vk::CommandPoolCreateInfo::default()
+                .queue_family_index(family)
+                .flags(vk::CommandPoolCreateFlags::TRANSIENT);
+            let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+            (
+                raw.get_device_queue(family, 0),
+                raw.create_command_pool(&pool, None).with_context(opening)?,
+                raw.create_semaphore(&vk::SemaphoreCreateInfo::default().push_next(&mut kind), None)
+                    .with_context(opening)?,
+            )
+        };
+        Ok(Arc::new(Self {
+            push: khr::push_descriptor::Device::new(&instance.raw, &raw),
+            debug: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw)),
+            raw,
+            queue,
+            commands,
+            timeline,
+            allocator: Mutex::new(ManuallyDrop::new(allocator)),
+            caches: Mutex::default(),
+            limits: properties.limits,
+            submitted: AtomicU64::new(0),
+            next_id: AtomicU64::new(1),
+            created: Mutex::default(),
+            info,
+            instance,
+            physical,
+        }))
+    }
+
+    /// Who this is.
+    #[must_use]
+    pub fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    /// What the validation layer has said so far.
+    #[must_use]
+    pub fn messages(&self) -> Vec<Message> {
+        lock(&self.instance.messages).clone()
+    }
+
+    /// Number of objects created so far by kind (`buffer`, `image`, `pipeline`, `sampler`).
+    #[must_use]
+    pub fn created(&self) -> HashMap<&'static str, usize> {
+        lock(&self.created).clone()
+    }
+
+    /// Bytes of device memory in blocks now.
+    #[must_use]
+    pub fn memory_bytes(&self) -> u64 {
+        lock(&self.allocator).generate_report().total_capacity_bytes
+    }
+
+    /// Largest width and height of a 2D image and of a viewport.
+    #[must_use]
+    pub fn max_image_size(&self) -> u32 {
+        self.limits.max_image_dimension2_d.min(self.limits.max_viewport_dimensions[0])
+    }
+
+    /// Largest storage buffer binding in bytes.
+    #[must_use]
+    pub fn max_storage_bytes(&self) -> u64 {
+        u64::from(self.limits.max_storage_buffer_range)
+    }
+
+    /// Whether images of this format can be used so.
+    #[must_use]
+    pub fn supports(&self, format: vk::Format, features: vk::FormatFeatureFlags) -> bool {
+        // SAFETY: a plain query.
+        let properties = unsafe { self.instance.raw.get_physical_device_format_properties(self.physical, format) };
+        properties.optimal_tiling_features.contains(features)
+    }
+
+    pub(super) fn count(&self, kind: &'static str) {
+        *lock(&self.created).entry(kind).or_default() += 1;
+    }
+
+    pub(super) fn next_id(&self) -> u64 {
+        self.next_id.fetch_add(1, Ordering::Relaxed)
+    }
+
+    /// Gives an object a name for validation messages and captures.
+    pub(super) fn name<H: vk::Handle>(&self, object: H, name: &str) {
+        if let Some(debug) = &self.debug {
+            let name = CString::new(name.replace('\0', " ")).unwrap_or_default();
+            let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
+            // SAFETY: the object is alive. A name that cannot be set is not worth an error.
+            let _ = unsafe { debug.set_debug_utils_object_name(&info) };
+        }
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        // SAFETY: every buffer, image and frame holds an `Arc` of the device, so none is left; the allocator goes before
+        // the device it allocates from.
+        unsafe {
+            let _ = self.raw.device_wait_idle();
+            lock(&self.caches).destroy(&self.raw);
+            ManuallyDrop::drop(&mut lock(&self.allocator));
+            self.raw.destroy_semaphore(self.timeline, None);
+            self.raw.destroy_command_pool(self.commands, None);
+            self.raw.destroy_device(None);
+        }
+        // `instance` is dropped after this; it keeps `entry`, the loader's library, until then.
+        let _ = &self.instance.entry;
+    }
+}
+
+impl std::fmt::Debug for Device {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Device({})", self.info.name)
+    }
+}

@@ -1,0 +1,666 @@
+//! A frame: passes in reading order, barriers derived from what they declare, a timestamp pair around each.
+//!
+//! Passes are plain data (`Vec<Pass>`) until [`Frame::finish`] records them in the order they were written, submits once,
+//! and waits. Labels, object names, timestamps and barriers come by themselves.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use anyhow::{Context as _, Result};
+use ash::vk;
+
+use super::access::Access;
+use super::device::{Device, lock};
+use super::memory::{Buffer, Image};
+use super::pipeline::{Descriptor, Layout, PipelineKey, RasterKey, Resource};
+use super::shader::{Bindings, Program};
+use super::sync::{self, Barrier, ResourceId, State, Use};
+
+/// GPU time of one pass.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PassTime {
+    /// Name of the pass.
+    pub name: String,
+    /// Milliseconds between its timestamps.
+    pub ms: f64,
+}
+
+/// A colour attachment of a raster pass.
+#[derive(Clone, Copy)]
+pub struct ColorTarget<'a> {
+    /// Where it draws.
+    pub image: &'a Image,
+    /// Cleared to this, as raw words of the format's numeric type; `None` keeps what is there.
+    pub clear: Option<[u32; 4]>,
+}
+
+/// The depth attachment of a raster pass (reversed: 0 is infinitely far).
+#[derive(Clone, Copy)]
+pub struct DepthTarget<'a> {
+    /// Where it tests.
+    pub image: &'a Image,
+    /// Whether it is cleared to 0 first.
+    pub clear: bool,
+    /// Whether fragments write it.
+    pub write: bool,
+}
+
+/// One attribute stream of a draw.
+#[derive(Clone, Copy)]
+pub struct VertexStream<'a> {
+    /// Tightly packed f32 components.
+    pub buffer: &'a Buffer,
+    /// First byte.
+    pub offset: u64,
+    /// Bytes between vertices; 0 gives every vertex the first element.
+    pub stride: u32,
+}
+
+/// One indexed draw.
+pub struct Draw<'a> {
+    /// Index into the pass's list of bindings.
+    pub binding: usize,
+    /// Specialization constants.
+    pub constants: Vec<(u32, u32)>,
+    /// One stream per vertex input of the program.
+    pub streams: Vec<VertexStream<'a>>,
+    /// 32-bit indices.
+    pub indices: &'a Buffer,
+    /// First index.
+    pub first_index: u32,
+    /// Number of indices.
+    pub index_count: u32,
+    /// Passed to the shader as `gl_InstanceIndex`.
+    pub instance: u32,
+    /// Whether back faces are dropped.
+    pub cull_back: bool,
+    /// Whether clockwise triangles face the front: a mirrored placement.
+    pub clockwise: bool,
+}
+
+/// A raster pass without its draws.
+pub struct Raster<'a> {
+    /// Name in labels and timings.
+    pub name: &'a str,
+    /// Colour attachments in location order.
+    pub colors: &'a [ColorTarget<'a>],
+    /// Depth attachment.
+    pub depth: Option<DepthTarget<'a>>,
+    /// Size of the viewport in pixels.
+    pub size: [u32; 2],
+    /// Rows drawn: from, up to.
+    pub rows: [u32; 2],
+}
+
+type Record<'a> = Box<dyn FnOnce(&Device, vk::CommandBuffer) + 'a>;
+
+struct Pass<'a> {
+    name: String,
+    uses: Vec<Use>,
+    record: Record<'a>,
+}
+
+/// A barrier's target.
+#[derive(Clone, Copy)]
+enum Target<'a> {
+    Buffer(&'a Buffer),
+    Image(&'a Image),
+}
+
+/// A frame being described.
+pub struct Frame<'a> {
+    device: Arc<Device>,
+    passes: Vec<Pass<'a>>,
+    targets: HashMap<ResourceId, Target<'a>>,
+    without_barriers: bool,
+}
+
+impl<'a> Frame<'a> {
+    /// An empty frame.
+    #[must_use]
+    pub fn new(device: &Arc<Device>) -> Self {
+        Self { device: device.clone(), passes: Vec::new(), targets: HashMap::new(), without_barriers: false }
+    }
+
+    /// Leaves out every buffer barrier, for the test that validation would notice.
+    #[doc(hidden)]
+    pub fn forget_barriers(&mut self) {
+        self.without_barriers = true;
+    }
+
+    fn use_buffer(&mut self, uses: &mut Vec<Use>, buffer: &'a Buffer, access: Access, shaders: vk::ShaderStageFlags) {
+        self.targets.insert(buffer.id, Target::Buffer(buffer));
+        uses.push(Use { resource: buffer.id, is_image: false, access, shaders });
+    }
+
+    fn use_image(&mut self, uses: &mut Vec<Use>, image: &'a Image, access: Access, shaders: vk::ShaderStageFlags) {
+        self.targets.insert(image.id, Target::Image(image));
+        uses.push(Use { resource: image.id, is_image: true, access, shaders });
+    }
+
+    /// Notes the uses of a program's bindings and prepares their descriptors.
+    fn bind(
+        &mut self,
+        uses: &mut Vec<Use>,
+        program: &'static Program,
+        resources: &[Resource<'a>],
+        depth: Option<ResourceId>,
+    ) -> Result<Vec<Descriptor>> {
+        let mut descriptors = Vec::with_capacity(resources.len());
+        for (binding, &resource) in program.bindings.iter().zip(resources) {
+            let mut layout = binding.access.masks(binding.stages).layout;
+            match resource {
+                Resource::Buffer(buffer) => self.use_buffer(uses, buffer, binding.access, binding.stages),
+                Resource::Image(image) => self.use_image(uses, image, binding.access, binding.stages),
+                Resource::Sampled(sampled) => {
+                    if depth == Some(sampled.image.id) {
+                        layout = vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL;
+                    }
+                    self.use_image(uses, sampled.image, binding.access, binding.stages);
+                }
+            }
+            descriptors.push(Descriptor::new(&self.device, binding.kind, resource, layout)?);
+        }
+        Ok(descriptors)
+    }
+
+    /// One dispatch of `groups` workgroups.
+    ///
+    /// # Errors
+    /// When the driver refuses the pipeline.
+    ///
+    /// # Panics
+    /// When the push constants are not of the size that the shader declares: our mistake.
+    pub fn compute(
+        &mut self,
+        name: &str,
+        bindings: &impl Bindings<'a>,
+        constants: Vec<(u32, u32)>,
+        push: &[u8],
+        groups: [u32; 3],
+    ) -> Result<()> {
+        let program = bindings.program();
+        assert_eq!(push.len(), program.push_bytes as usize, "push constants of \"{}\"", program.name);
+        let mut uses = Vec::new();
+        let descriptors = self.bind(&mut uses, program, &bindings.resources(), None)?;
+        let layout = self.device.layout(program)?;
+        let pipeline =
+            self.device.pipeline(program, PipelineKey { program: program.name, constants, raster: None })?;
+        let push = push.to_vec();
+        self.passes.push(Pass {
+            name: name.to_owned(),
+            uses,
+            record: Box::new(move |device, commands| {
+                // SAFETY: the command buffer is recording; handles are alive until the frame has finished.
+                unsafe {
+                    device.raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline);
+                    push_descriptors(device, commands, vk::PipelineBindPoint::COMPUTE, layout, program, &descriptors);
+                    push_constants(device, commands, layout, program, &push);
+                    device.raw.cmd_dispatch(commands, groups[0], groups[1], groups[2]);
+                }
+            }),
+        });
+        Ok(())
+    }
+
+    /// One dispatch with an invocation per pixel of `size` (rounded up to workgroups).
+    ///
+    /// # Errors
+    /// As [`Frame::compute`].
+    pub fn compute_over(
+        &mut self,
+        name: &str,
+        bindings: &impl Bindings<'a>,
+        constants: Vec<(u32, u32)>,
+        push: &[u8],
+        size: [u32; 2],
+    ) -> Result<()> {
+        let [x, y, _] = bindings.program().local_size;
+        self.compute(name, bindings, constants, push, [size[0].div_ceil(x), size[1].div_ceil(y), 1])
+    }
+
+    /// A raster pass: `draws` in order, each with one of `bindings`.
+    ///
+    /// # Errors
+    /// When the driver refuses a pipeline.
+    pub fn raster<B: Bindings<'a>>(
+        &mut self,
+        raster: &Raster<'a>,
+        program: &'static Program,
+        bindings: &[B],
+        push: &[u8],
+        draws: Vec<Draw<'a>>,
+    ) -> Result<()> {
+        assert_eq!(push.len(), program.push_bytes as usize, "push constants of \"{}\"", program.name);
+        let mut uses = Vec::new();
+        let none = vk::ShaderStageFlags::empty();
+        for color in raster.colors {
+            self.use_image(&mut uses, color.image, Access::ColorTarget, none);
+        }
+        if let Some(depth) = raster.depth {
+            let access = if depth.write || depth.clear { Access::DepthTarget } else { Access::DepthRead };
+            self.use_image(&mut uses, depth.image, access, none);
+        }
+        let mut descriptors = Vec::with_capacity(bindings.len());
+        for binding in bindings {
+            let resources = binding.resources();
+            descriptors.push(self.bind(&mut uses, program, &resources, raster.depth.map(|d| d.image.id))?);
+        }
+        let layout = self.device.layout(program)?;
+        let key = RasterKey {
+            colors: raster.colors.iter().map(|c| c.image.desc().format).collect(),
+            depth: raster.depth.map(|d| (d.image.desc().format, d.write)),
+        };
+        let mut pipelines = Vec::with_capacity(draws.len());
+        for draw in &draws {
+            for stream in &draw.streams {
+                self.use_buffer(&mut uses, stream.buffer, Access::VertexRead, none);
+            }
+            self.use_buffer(&mut uses, draw.indices, Access::IndexRead, none);
+            let constants = draw.constants.clone();
+            let key = PipelineKey { program: program.name, constants, raster: Some(key.clone()) };
+            pipelines.push(self.device.pipeline(program, key)?);
+        }
+        uses.sort_by_key(|u| (u.resource, u.access as u32));
+        uses.dedup();
+
+        let colors: Vec<_> = raster.colors.iter().map(|c| (c.image.view, c.clear)).collect();
+        let depth = raster.depth.map(|d| {
+            let layout = if d.write || d.clear {
+                vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL
+            } else {
+                vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL
+            };
+            (d.image.view, d.clear, layout)
+        });
+        let ([width, height], [from, to]) = (raster.size, raster.rows);
+        let push = push.to_vec();
+        let record = move |device: &Device, commands: vk::CommandBuffer| {
+            let color_infos: Vec<_> = colors
+                .iter()
+                .map(|&(view, clear)| {
+                    attachment(view, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, clear.is_some()).clear_value(
+                        vk::ClearValue { color: vk::ClearColorValue { uint32: clear.unwrap_or_default() } },
+                    )
+                })
+                .collect();
+            let depth_info = depth.map(|(view, clear, layout)| attachment(view, layout, clear));
+            let area = vk::Rect2D {
+                offset: vk::Offset2D { x: 0, y: from as i32 },
+                extent: vk::Extent2D { width, height: to - from },
+            };
+            let mut info =
+                vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&color_infos);
+            if let Some(depth) = &depth_info {
+                info = info.depth_attachment(depth);
+            }
+            let viewport =
+                vk::Viewport { x: 0.0, y: 0.0, width: width as f32, height: height as f32, min_depth: 0.0, max_depth: 1.0 };
+            // SAFETY: the command buffer is recording; handles are alive until the frame has finished.
+            unsafe {
+                device.raw.cmd_begin_rendering(commands, &info);
+                device.raw.cmd_set_viewport(commands, 0, &[viewport]);
+                device.raw.cmd_set_scissor(commands, 0, &[area]);
+                push_constants(device, commands, layout, program, &push);
+                let mut bound = (vk::Pipeline::null(), usize::MAX);
+                for (draw, pipeline) in draws.iter().zip(pipelines) {
+                    if bound.0 != pipeline {
+                        device.raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, pipeline);
+                        bound.0 = pipeline;
+                    }
+                    if bound.1 != draw.binding {
+                        let point = vk::PipelineBindPoint::GRAPHICS;
+                        push_descriptors(device, commands, point, layout, program, &descriptors[draw.binding]);
+                        bound.1 = draw.binding;
+                    }
+                    record_draw(device, commands, draw);
+                }
+                device.raw.cmd_end_rendering(commands);
+            }
+        };
+        self.passes.push(Pass { name: raster.name.to_owned(), uses, record: Box::new(record) });
+        Ok(())
+    }
+
+    /// Copies a buffer to the start of another.
+    pub fn copy_buffer(&mut self, name: &str, from: &'a Buffer, to: &'a Buffer, bytes: u64) {
+        let mut uses = Vec::new();
+        let none = vk::ShaderStageFlags::empty();
+        self.use_buffer(&mut uses, from, Access::TransferSrc, none);
+        self.use_buffer(&mut uses, to, Access::TransferDst, none);
+        let region = vk::BufferCopy { src_offset: 0, dst_offset: 0, size: bytes };
+        let (from, to) = (from.raw, to.raw);
+        self.passes.push(Pass {
+            name: name.to_owned(),
+            uses,
+            // SAFETY: the command buffer is recording; handles are alive until the frame has finished.
+            record: Box::new(move |device, commands| unsafe {
+                device.raw.cmd_copy_buffer(commands, from, to, &[region]);
+            }),
+        });
+    }
+
+    /// Sets every word of a buffer.
+    pub fn fill(&mut self, name: &str, buffer: &'a Buffer, word: u32) {
+        let mut uses = Vec::new();
+        self.use_buffer(&mut uses, buffer, Access::TransferDst, vk::ShaderStageFlags::empty());
+        let raw = buffer.raw;
+        self.passes.push(Pass {
+            name: name.to_owned(),
+            uses,
+            // SAFETY: as above.
+            record: Box::new(move |device, commands| unsafe {
+                device.raw.cmd_fill_buffer(commands, raw, 0, vk::WHOLE_SIZE, word);
+            }),
+        });
+    }
+
+    /// Copies tightly packed texels to one layer: `levels` holds the byte offset of each mip level.
+    pub fn upload(&mut self, name: &str, from: &'a Buffer, to: &'a Image, layer: u32, levels: &[u64]) {
+        let mut uses = Vec::new();
+        let none = vk::ShaderStageFlags::empty();
+        self.use_buffer(&mut uses, from, Access::TransferSrc, none);
+        self.use_image(&mut uses, to, Access::TransferDst, none);
+        let desc = to.desc();
+        let regions: Vec<_> = levels
+            .iter()
+            .enumerate()
+            .map(|(level, &offset)| {
+                let level = level as u32;
+                region(offset, to.aspect(), level, layer, [
+                    (desc.width >> level).max(1),
+                    (desc.height >> level).max(1),
+                ])
+            })
+            .collect();
+        let (from, to) = (from.raw, to.raw);
+        self.passes.push(Pass {
+            name: name.to_owned(),
+            uses,
+            record: Box::new(move |device, commands| {
+                let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+                // SAFETY: as above.
+                unsafe { device.raw.cmd_copy_buffer_to_image(commands, from, to, layout, &regions) };
+            }),
+        });
+    }
+
+    /// Copies the base level of an image to a buffer, tightly packed.
+    pub fn download(&mut self, name: &str, from: &'a Image, to: &'a Buffer) {
+        let mut uses = Vec::new();
+        let none = vk::ShaderStageFlags::empty();
+        self.use_image(&mut uses, from, Access::TransferSrc, none);
+        self.use_buffer(&mut uses, to, Access::TransferDst, none);
+        let desc = from.desc();
+        let region = region(0, from.aspect(), 0, 0, [desc.width, desc.height]);
+        let (from, to) = (from.raw, to.raw);
+        self.passes.push(Pass {
+            name: name.to_owned(),
+            uses,
+            record: Box::new(move |device, commands| {
+                let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+                // SAFETY: as above.
+                unsafe { device.raw.cmd_copy_image_to_buffer(commands, from, layout, to, &[region]) };
+            }),
+        });
+    }
+
+    /// Makes what the device wrote to a buffer visible to [`Buffer::read`].
+    pub fn read_back(&mut self, buffer: &'a Buffer) {
+        let mut uses = Vec::new();
+        self.use_buffer(&mut uses, buffer, Access::HostRead, vk::ShaderStageFlags::empty());
+        self.passes.push(Pass { name: "read back".to_owned(), uses, record: Box::new(|_, _| {}) });
+    }
+
+    /// Records, submits, waits, and returns the time of each pass in order.
+    ///
+    /// # Errors
+    /// When the driver fails: out of memory, or a lost device.
+    pub fn finish(self) -> Result<Vec<PassTime>> {
+        let Self { device, passes, targets, without_barriers } = self;
+        let uses: Vec<Vec<Use>> = passes.iter().map(|pass| pass.uses.clone()).collect();
+        let mut states: HashMap<ResourceId, State> = targets
+            .iter()
+            .map(|(&id, target)| {
+                let state = match target {
+                    Target::Buffer(buffer) => *lock(&buffer.state),
+                    Target::Image(image) => *lock(&image.state),
+                };
+                (id, state)
+            })
+            .collect();
+        let barriers = sync::barriers(&uses, &mut states);
+        for (id, target) in &targets {
+            let state = states.get(id).copied().unwrap_or_default();
+            match target {
+                Target::Buffer(buffer) => *lock(&buffer.state) = state,
+                Target::Image(image) => *lock(&image.state) = state,
+            }
+        }
+
+        let timed = device.limits.timestamp_compute_and_graphics == vk::TRUE && !passes.is_empty();
+        let queries = 2 * passes.len() as u32;
+        let names: Vec<String> = passes.iter().map(|pass| pass.name.clone()).collect();
+        let all = vk::PipelineStageFlags2::ALL_COMMANDS;
+        // SAFETY: one command buffer, recorded here, submitted once and waited for before anything is freed. Every handle
+        // in it is borrowed for `'a`, which ends after this function.
+        unsafe {
+            let raw = &device.raw;
+            let pool = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(queries.max(1));
+            let pool = raw.create_query_pool(&pool, None).context("creating timestamps")?;
+            let info = vk::CommandBufferAllocateInfo::default()
+                .command_pool(device.commands)
+                .level(vk::CommandBufferLevel::PRIMARY)
+                .command_buffer_count(1);
+            let commands = raw.allocate_command_buffers(&info).context("allocating a command buffer")?[0];
+            let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+            raw.begin_command_buffer(commands, &begin).context("recording a frame")?;
+            raw.cmd_reset_query_pool(commands, pool, 0, queries.max(1));
+            for (index, (pass, barriers)) in passes.into_iter().zip(&barriers).enumerate() {
+                record_barriers(&device, commands, barriers, &targets, without_barriers);
+                label(&device, commands, Some(&pass.name));
+                if timed {
+                    raw.cmd_write_timestamp2(commands, all, pool, 2 * index as u32);
+                }
+                (pass.record)(&device, commands);
+                if timed {
+                    raw.cmd_write_timestamp2(commands, all, pool, 2 * index as u32 + 1);
+                }
+                label(&device, commands, None);
+            }
+            raw.end_command_buffer(commands).context("recording a frame")?;
+
+            let done = device.submitted.fetch_add(1, Ordering::Relaxed) + 1;
+            let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
+            let signals =
+                [vk::SemaphoreSubmitInfo::default().semaphore(device.timeline).value(done).stage_mask(all)];
+            let submit =
+                vk::SubmitInfo2::default().command_buffer_infos(&buffers).signal_semaphore_infos(&signals);
+            raw.queue_submit2(device.queue, &[submit], vk::Fence::null()).context("submitting a frame")?;
+            let (semaphores, values) = ([device.timeline], [done]);
+            let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+            raw.wait_semaphores(&wait, u64::MAX)
+                .with_context(|| format!("waiting for a frame of passes {}", names.join(", ")))?;
+
+            let mut ticks = vec![0_u64; queries as usize];
+            if timed {
+                let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+                raw.get_query_pool_results(pool, 0, &mut ticks, flags).context("reading timestamps")?;
+            }
+            raw.free_command_buffers(device.commands, &[commands]);
+            raw.destroy_query_pool(pool, None);
+            let period = f64::from(device.limits.timestamp_period) * 1e-6;
+            Ok(names
+                .into_iter()
+                .zip(ticks.chunks_exact(2))
+                .map(|(name, pair)| PassTime { name, ms: pair[1].saturating_sub(pair[0]) as f64 * period })
+                .collect())
+        }
+    }
+}
+
+fn attachment<'x>(view: vk::ImageView, layout: vk::ImageLayout, clear: bool) -> vk::RenderingAttachmentInfo<'x> {
+    vk::RenderingAttachmentInfo::default()
+        .image_view(view)
+        .image_layout(layout)
+        .load_op(if clear { vk::AttachmentLoadOp::CLEAR } else { vk::AttachmentLoadOp::LOAD })
+        .store_op(vk::AttachmentStoreOp::STORE)
+}
+
+fn region(
+    offset: u64,
+    aspect: vk::ImageAspectFlags,
+    level: u32,
+    layer: u32,
+    [width, height]: [u32; 2],
+) -> vk::BufferImageCopy {
+    vk::BufferImageCopy::default()
+        .buffer_offset(offset)
+        .image_subresource(vk::ImageSubresourceLayers {
+            aspect_mask: aspect,
+            mip_level: level,
+            base_array_layer: layer,
+            layer_count: 1,
+        })
+        .image_extent(vk::Extent3D { width, height, depth: 1 })
+}
+
+unsafe fn label(device: &Device, commands: vk::CommandBuffer, name: Option<&str>) {
+    let Some(debug) = &device.debug else { return };
+    // SAFETY: the command buffer is recording.
+    unsafe {
+        match name {
+            Some(name) => {
+                let name = std::ffi::CString::new(name).unwrap_or_default();
+                debug.cmd_begin_debug_utils_label(commands, &vk::DebugUtilsLabelEXT::default().label_name(&name));
+            }
+            None => debug.cmd_end_debug_utils_label(commands),
+        }
+    }
+}
+
+unsafe fn record_barriers(
+    device: &Device,
+    commands: vk::CommandBuffer,
+    barriers: &[Barrier],
+    targets: &HashMap<ResourceId, Target<'_>>,
+    without_buffers: bool,
+) {
+    let mut images = Vec::new();
+    let mut buffers = Vec::new();
+    for barrier in barriers {
+        match targets[&barrier.resource] {
+            Target::Image(image) => {
+                let (old, new) = barrier.layouts.unwrap_or_default();
+                images.push(
+                    vk::ImageMemoryBarrier2::default()
+                        .image(image.raw)
+                        .subresource_range(image.range())
+                        .src_stage_mask(barrier.src_stages)
+                        .src_access_mask(barrier.src_access)
+                        .dst_stage_mask(barrier.dst_stages)
+                        .dst_access_mask(barrier.dst_access)
+                        .old_layout(old)
+                        .new_layout(new),
+                );
+            }
+            Target::Buffer(buffer) if !without_buffers => buffers.push(
+                vk::BufferMemoryBarrier2::default()
+                    .buffer(buffer.raw)
+                    .size(vk::WHOLE_SIZE)
+                    .src_stage_mask(barrier.src_stages)
+                    .src_access_mask(barrier.src_access)
+                    .dst_stage_mask(barrier.dst_stages)
+                    .dst_access_mask(barrier.dst_access),
+            ),
+            Target::Buffer(_) => {}
+        }
+    }
+    if !images.is_empty() || !buffers.is_empty() {
+        let info = vk::DependencyInfo::default().image_memory_barriers(&images).buffer_memory_barriers(&buffers);
+        // SAFETY: the command buffer is recording; the targets are alive.
+        unsafe { device.raw.cmd_pipeline_barrier2(commands, &info) };
+    }
+}
+
+unsafe fn push_constants(
+    device: &Device,
+    commands: vk::CommandBuffer,
+    layout: Layout,
+    program: &'static Program,
+    push: &[u8],
+) {
+    if !push.is_empty() {
+        let stages = program.stages.iter().fold(vk::ShaderStageFlags::empty(), |all, s| all | s.flag);
+        // SAFETY: the command buffer is recording; the layout has a range of this size.
+        unsafe { device.raw.cmd_push_constants(commands, layout.pipeline, stages, 0, push) };
+    }
+}
+
+unsafe fn push_descriptors(
+    device: &Device,
+    commands: vk::CommandBuffer,
+    point: vk::PipelineBindPoint,
+    layout: Layout,
+    program: &'static Program,
+    descriptors: &[Descriptor],
+) {
+    if descriptors.is_empty() {
+        return;
+    }
+    let mut buffers = Vec::with_capacity(descriptors.len());
+    let mut texels = Vec::with_capacity(descriptors.len());
+    let mut images = Vec::with_capacity(descriptors.len());
+    for descriptor in descriptors {
+        buffers.push(match descriptor {
+            Descriptor::Buffer(info) => *info,
+            _ => vk::DescriptorBufferInfo::default(),
+        });
+        texels.push(match descriptor {
+            Descriptor::Texels(view) => *view,
+            _ => vk::BufferView::null(),
+        });
+        images.push(match descriptor {
+            Descriptor::Image(info) => *info,
+            _ => vk::DescriptorImageInfo::default(),
+        });
+    }
+    let writes: Vec<_> = program
+        .bindings
+        .iter()
+        .zip(descriptors)
+        .enumerate()
+        .map(|(i, (binding, descriptor))| {
+            let write = vk::WriteDescriptorSet::default()
+                .dst_binding(binding.slot)
+                .descriptor_type(binding.kind.descriptor_type());
+            match descriptor {
+                Descriptor::Buffer(_) => write.buffer_info(&buffers[i..=i]),
+                Descriptor::Texels(_) => write.texel_buffer_view(&texels[i..=i]),
+                Descriptor::Image(_) => write.image_info(&images[i..=i]),
+            }
+        })
+        .collect();
+    // SAFETY: the command buffer is recording; the writes match the layout, both come from reflection.
+    unsafe { device.push.cmd_push_descriptor_set(commands, point, layout.pipeline, 0, &writes) };
+}
+
+unsafe fn record_draw(device: &Device, commands: vk::CommandBuffer, draw: &Draw<'_>) {
+    let buffers: Vec<_> = draw.streams.iter().map(|s| s.buffer.raw).collect();
+    let offsets: Vec<_> = draw.streams.iter().map(|s| s.offset).collect();
+    let strides: Vec<_> = draw.streams.iter().map(|s| u64::from(s.stride)).collect();
+    let cull = if draw.cull_back { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE };
+    let front = if draw.clockwise { vk::FrontFace::CLOCKWISE } else { vk::FrontFace::COUNTER_CLOCKWISE };
+    // SAFETY: the command buffer is recording inside a render pass; the ranges were checked on import.
+    unsafe {
+        let raw = &device.raw;
+        raw.cmd_set_cull_mode(commands, cull);
+        raw.cmd_set_front_face(commands, front);
+        if !buffers.is_empty() {
+            raw.cmd_bind_vertex_buffers2(commands, 0, &buffers, &offsets, None, Some(&strides));
+        }
+        raw.cmd_bind_index_buffer(commands, draw.indices.raw, 0, vk::IndexType::UINT32);
+        raw.cmd_draw_indexed(commands, draw.index_count, 1, draw.first_index, 0, draw.instance);
+    }
+}

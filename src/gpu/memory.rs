@@ -1,0 +1,316 @@
+//! Buffers and images with their memory.
+
+use std::sync::{Arc, Mutex};
+
+use anyhow::{Context as _, Result, bail};
+use ash::vk;
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+
+use super::device::{Device, lock};
+use super::sync::State;
+
+/// Where a buffer lives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// Fast for the device, invisible to the host.
+    Device,
+    /// Written by the host, read by the device.
+    Upload,
+    /// Written by the device, read by the host.
+    Readback,
+}
+
+/// A range of memory that shaders and copies use.
+pub struct Buffer {
+    pub(super) raw: vk::Buffer,
+    pub(super) view: vk::BufferView,
+    pub(super) id: u64,
+    pub(super) state: Mutex<State>,
+    bytes: u64,
+    allocation: Mutex<Option<Allocation>>,
+    device: Arc<Device>,
+}
+
+impl Buffer {
+    /// A buffer of `bytes` bytes (at least 16, so that an empty list still binds), usable for everything a shader or
+    /// copy does.
+    ///
+    /// # Errors
+    /// When it is larger than a storage buffer may be, or memory is short.
+    pub fn new(device: &Arc<Device>, name: &str, bytes: u64, place: Place) -> Result<Self> {
+        Self::create(device, name, bytes, place, None)
+    }
+
+    /// A buffer whose elements shaders also fetch as texels of `format`: `imageBuffer`, `samplerBuffer`.
+    ///
+    /// # Errors
+    /// As [`Buffer::new`].
+    pub fn texels(device: &Arc<Device>, name: &str, bytes: u64, place: Place, format: vk::Format) -> Result<Self> {
+        Self::create(device, name, bytes, place, Some(format))
+    }
+
+    /// An upload buffer that holds `data`.
+    ///
+    /// # Errors
+    /// As [`Buffer::new`].
+    pub fn with_data<T: bytemuck::NoUninit>(device: &Arc<Device>, name: &str, data: &[T]) -> Result<Self> {
+        let mut buffer = Self::new(device, name, size_of_val(data) as u64, Place::Upload)?;
+        buffer.write(bytemuck::cast_slice(data));
+        Ok(buffer)
+    }
+
+    fn create(
+        device: &Arc<Device>,
+        name: &str,
+        bytes: u64,
+        place: Place,
+        texels: Option<vk::Format>,
+    ) -> Result<Self> {
+        let creating = || format!("creating buffer \"{name}\" of {bytes} bytes");
+        let bytes = bytes.max(16);
+        let mut usage = vk::BufferUsageFlags::UNIFORM_BUFFER
+            | vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::VERTEX_BUFFER
+            | vk::BufferUsageFlags::INDEX_BUFFER
+            | vk::BufferUsageFlags::INDIRECT_BUFFER
+            | vk::BufferUsageFlags::TRANSFER_SRC
+            | vk::BufferUsageFlags::TRANSFER_DST;
+        if texels.is_some() {
+            usage |= vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER | vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER;
+        }
+        let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
+        let location = match place {
+            Place::Device => MemoryLocation::GpuOnly,
+            Place::Upload => MemoryLocation::CpuToGpu,
+            Place::Readback => MemoryLocation::GpuToCpu,
+        };
+        // SAFETY: the create infos are valid for the device, and the memory satisfies the buffer's requirements.
+        unsafe {
+            let raw = device.raw.create_buffer(&info, None).with_context(creating)?;
+            let requirements = device.raw.get_buffer_memory_requirements(raw);
+            let allocation = lock(&device.allocator).allocate(&AllocationCreateDesc {
+                name,
+                requirements,
+                location,
+                linear: true,
+                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+            });
+            let allocation = match allocation {
+                Ok(allocation) => allocation,
+                Err(error) => {
+                    device.raw.destroy_buffer(raw, None);
+                    return Err(error).with_context(creating);
+                }
+            };
+            let mut buffer = Self {
+                raw,
+                view: vk::BufferView::null(),
+                id: device.next_id(),
+                state: Mutex::default(),
+                bytes,
+                allocation: Mutex::new(None),
+                device: device.clone(),
+            };
+            let bound = device.raw.bind_buffer_memory(raw, allocation.memory(), allocation.offset());
+            buffer.allocation = Mutex::new(Some(allocation));
+            bound.with_context(creating)?;
+            if let Some(format) = texels {
+                let info =
+                    vk::BufferViewCreateInfo::default().buffer(raw).format(format).offset(0).range(vk::WHOLE_SIZE);
+                buffer.view = device.raw.create_buffer_view(&info, None).with_context(creating)?;
+            }
+            device.count("buffer");
+            device.name(raw, name);
+            Ok(buffer)
+        }
+    }
+
+    /// Size in bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Copies `data` to the start of an upload buffer.
+    ///
+    /// # Panics
+    /// When the buffer is not host-visible or too small: our mistake.
+    pub fn write(&mut self, data: &[u8]) {
+        self.write_at(0, data);
+    }
+
+    /// Copies `data` to `offset` of an upload buffer.
+    ///
+    /// # Panics
+    /// As [`Buffer::write`].
+    pub fn write_at(&mut self, offset: usize, data: &[u8]) {
+        let mut allocation = lock(&self.allocation);
+        let mapped = allocation.as_mut().and_then(Allocation::mapped_slice_mut).expect("an upload buffer is mapped");
+        mapped[offset..offset + data.len()].copy_from_slice(data);
+    }
+
+    /// Lets `read` see the bytes of a readback buffer, after the frame that wrote them has finished.
+    ///
+    /// # Panics
+    /// When the buffer is not host-visible: our mistake.
+    pub fn read<R>(&self, read: impl FnOnce(&[u8]) -> R) -> R {
+        let allocation = lock(&self.allocation);
+        let mapped = allocation.as_ref().and_then(Allocation::mapped_slice).expect("a readback buffer is mapped");
+        read(&mapped[..self.bytes as usize])
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        // SAFETY: frames wait for the device before they end, so nothing uses the buffer any more.
+        unsafe {
+            self.device.raw.destroy_buffer_view(self.view, None);
+            self.device.raw.destroy_buffer(self.raw, None);
+        }
+        if let Some(allocation) = lock(&self.allocation).take() {
+            // Freeing fails only for memory of another allocator.
+            let _ = lock(&self.device.allocator).free(allocation);
+        }
+    }
+}
+
+/// Shape of an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ImageDesc {
+    /// Pixel format.
+    pub format: vk::Format,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Array layers; `array` decides whether one layer is viewed as an array.
+    pub layers: u32,
+    /// Mip levels.
+    pub levels: u32,
+    /// Viewed as `2DArray`.
+    pub array: bool,
+    /// Uses beyond copies.
+    pub usage: vk::ImageUsageFlags,
+}
+
+impl ImageDesc {
+    /// A single-level 2D image.
+    #[must_use]
+    pub fn flat(format: vk::Format, width: u32, height: u32, usage: vk::ImageUsageFlags) -> Self {
+        Self { format, width, height, layers: 1, levels: 1, array: false, usage }
+    }
+}
+
+/// An image with a view of all of it.
+pub struct Image {
+    pub(super) raw: vk::Image,
+    pub(super) view: vk::ImageView,
+    pub(super) id: u64,
+    pub(super) state: Mutex<State>,
+    desc: ImageDesc,
+    allocation: Mutex<Option<Allocation>>,
+    device: Arc<Device>,
+}
+
+impl Image {
+    /// An image with undefined content.
+    ///
+    /// # Errors
+    /// When it is larger than the device allows or memory is short.
+    pub fn new(device: &Arc<Device>, name: &str, desc: ImageDesc) -> Result<Self> {
+        let ImageDesc { width, height, layers, levels, .. } = desc;
+        let creating = || format!("creating image \"{name}\" of {width}x{height}x{layers}, {levels} levels");
+        let limit = device.limits.max_image_dimension2_d;
+        if width > limit || height > limit || layers > device.limits.max_image_array_layers {
+            bail!("{}: the device allows {limit} pixels a side", creating());
+        }
+        let info = vk::ImageCreateInfo::default()
+            .image_type(vk::ImageType::TYPE_2D)
+            .format(desc.format)
+            .extent(vk::Extent3D { width, height, depth: 1 })
+            .mip_levels(levels)
+            .array_layers(layers)
+            .samples(vk::SampleCountFlags::TYPE_1)
+            .tiling(vk::ImageTiling::OPTIMAL)
+            .usage(desc.usage | vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST);
+        // SAFETY: the create infos are valid for the device, and the memory satisfies the image's requirements.
+        unsafe {
+            let raw = device.raw.create_image(&info, None).with_context(creating)?;
+            let requirements = device.raw.get_image_memory_requirements(raw);
+            let allocation = lock(&device.allocator).allocate(&AllocationCreateDesc {
+                name,
+                requirements,
+                location: MemoryLocation::GpuOnly,
+                linear: false,
+                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+            });
+            let allocation = match allocation {
+                Ok(allocation) => allocation,
+                Err(error) => {
+                    device.raw.destroy_image(raw, None);
+                    return Err(error).with_context(creating);
+                }
+            };
+            let mut image = Self {
+                raw,
+                view: vk::ImageView::null(),
+                id: device.next_id(),
+                state: Mutex::default(),
+                desc,
+                allocation: Mutex::new(None),
+                device: device.clone(),
+            };
+            let bound = device.raw.bind_image_memory(raw, allocation.memory(), allocation.offset());
+            image.allocation = Mutex::new(Some(allocation));
+            bound.with_context(creating)?;
+            let kind = if desc.array { vk::ImageViewType::TYPE_2D_ARRAY } else { vk::ImageViewType::TYPE_2D };
+            let view = vk::ImageViewCreateInfo::default()
+                .image(raw)
+                .view_type(kind)
+                .format(desc.format)
+                .subresource_range(image.range());
+            image.view = device.raw.create_image_view(&view, None).with_context(creating)?;
+            device.count("image");
+            device.name(raw, name);
+            Ok(image)
+        }
+    }
+
+    /// Its shape.
+    #[must_use]
+    pub fn desc(&self) -> ImageDesc {
+        self.desc
+    }
+
+    pub(super) fn aspect(&self) -> vk::ImageAspectFlags {
+        match self.desc.format {
+            vk::Format::D32_SFLOAT => vk::ImageAspectFlags::DEPTH,
+            _ => vk::ImageAspectFlags::COLOR,
+        }
+    }
+
+    pub(super) fn range(&self) -> vk::ImageSubresourceRange {
+        vk::ImageSubresourceRange {
+            aspect_mask: self.aspect(),
+            base_mip_level: 0,
+            level_count: self.desc.levels,
+            base_array_layer: 0,
+            layer_count: self.desc.layers,
+        }
+    }
+}
+
+impl Drop for Image {
+    fn drop(&mut self) {
+        // SAFETY: frames wait for the device before they end, so nothing uses the image any more.
+        unsafe {
+            self.device.raw.destroy_image_view(self.view, None);
+            self.device.raw.destroy_image(self.raw, None);
+        }
+        if let Some(allocation) = lock(&self.allocation).take() {
+            // Freeing fails only for memory of another allocator.
+            let _ = lock(&self.device.allocator).free(allocation);
+        }
+    }
+}

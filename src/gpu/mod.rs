@@ -1,0 +1,21 @@
+//! Explicit Vulkan without a renderer in it: devices, memory, pipelines, and frames with derived barriers.
+//!
+//! The only part of Etalon that is allowed `unsafe`: every call into the driver is here, and each block says why it is
+//! sound. Objects own a reference to their [`Device`] and destroy themselves; a [`Frame`] has always finished on the
+//! device when [`Frame::finish`] returns, so nothing is ever destroyed while in use.
+#![allow(unsafe_code, reason = "the one room that talks to the driver")]
+
+mod access;
+mod device;
+mod frame;
+mod memory;
+mod pipeline;
+mod shader;
+pub mod sync;
+
+pub use access::Access;
+pub use device::{Candidate, Device, DeviceChoice, DeviceInfo, Message, Severity, candidates};
+pub use frame::{ColorTarget, DepthTarget, Draw, Frame, PassTime, Raster, VertexStream};
+pub use memory::{Buffer, Image, ImageDesc, Place};
+pub use pipeline::{Resource, Sampled, SamplerDesc};
+pub use shader::{Binding, BindingKind, Bindings, Program, Stage, VertexInput};

@@ -1,0 +1,106 @@
+//! What build.rs says about the shaders.
+
+use ash::vk;
+
+use super::access::Access;
+use super::pipeline::Resource;
+
+/// One program: a compute shader, or a vertex shader with its fragment shader.
+#[derive(Debug)]
+pub struct Program {
+    /// Stem of the files under `shaders/pass/`.
+    pub name: &'static str,
+    /// Optimised SPIR-V per stage.
+    pub stages: &'static [Stage],
+    /// Everything it binds, all in set 0, in slot order.
+    pub bindings: &'static [Binding],
+    /// Vertex attributes, each its own tightly packed stream of f32.
+    pub inputs: &'static [VertexInput],
+    /// Size of the push constants.
+    pub push_bytes: u32,
+    /// Workgroup size of a compute shader.
+    pub local_size: [u32; 3],
+}
+
+impl Program {
+    /// Bytes of SPIR-V that ship.
+    #[must_use]
+    pub fn spirv_bytes(&self) -> usize {
+        self.stages.iter().map(|s| s.words.len() * 4).sum()
+    }
+}
+
+/// One stage's code.
+#[derive(Debug)]
+pub struct Stage {
+    /// Which stage.
+    pub flag: vk::ShaderStageFlags,
+    /// SPIR-V 1.6.
+    pub words: &'static [u32],
+}
+
+/// One binding, with the access that its GLSL qualifiers declare.
+#[derive(Debug)]
+pub struct Binding {
+    /// Name in the GLSL.
+    pub name: &'static str,
+    /// Binding number.
+    pub slot: u32,
+    /// Kind of descriptor.
+    pub kind: BindingKind,
+    /// What the shader does with it.
+    pub access: Access,
+    /// Stages that declare it.
+    pub stages: vk::ShaderStageFlags,
+}
+
+/// Kinds of descriptors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BindingKind {
+    /// `uniform` block.
+    UniformBuffer,
+    /// `buffer` block.
+    StorageBuffer,
+    /// `sampler2D` and its kin.
+    SampledImage,
+    /// `image2D` and its kin.
+    StorageImage,
+    /// `samplerBuffer`.
+    UniformTexelBuffer,
+    /// `imageBuffer`: the fastest fetch on lavapipe.
+    StorageTexelBuffer,
+}
+
+impl BindingKind {
+    /// Vulkan's name.
+    #[must_use]
+    pub fn descriptor_type(self) -> vk::DescriptorType {
+        match self {
+            Self::UniformBuffer => vk::DescriptorType::UNIFORM_BUFFER,
+            Self::StorageBuffer => vk::DescriptorType::STORAGE_BUFFER,
+            Self::SampledImage => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
+            Self::StorageImage => vk::DescriptorType::STORAGE_IMAGE,
+            Self::UniformTexelBuffer => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+            Self::StorageTexelBuffer => vk::DescriptorType::STORAGE_TEXEL_BUFFER,
+        }
+    }
+}
+
+/// One vertex attribute.
+#[derive(Debug)]
+pub struct VertexInput {
+    /// Name in the GLSL.
+    pub name: &'static str,
+    /// Location, also the stream's index.
+    pub location: u32,
+    /// 1 to 4 components of f32.
+    pub components: u32,
+}
+
+/// A generated struct with one field per binding of a program.
+pub trait Bindings<'a> {
+    /// The program the fields belong to.
+    fn program(&self) -> &'static Program;
+    /// The fields in slot order, parallel to [`Program::bindings`].
+    fn resources(&self) -> Vec<Resource<'a>>;
+}

@@ -1,0 +1,226 @@
+//! Barriers as a pure function of what the passes declare; tested without a device.
+//!
+//! One rule per hazard (Vulkan specification, chapter 7): a read after a write waits for the write and makes it visible
+//! once per reading stage; a write waits for every earlier read and write; a layout change counts as a write.
+
+use std::collections::HashMap;
+
+use ash::vk;
+
+use super::access::{Access, Masks};
+
+/// Identity of a buffer or an image.
+pub type ResourceId = u64;
+
+/// One use of one resource by one pass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Use {
+    /// What is used.
+    pub resource: ResourceId,
+    /// Whether it has a layout.
+    pub is_image: bool,
+    /// How.
+    pub access: Access,
+    /// By which shader stages, for the accesses that shaders perform.
+    pub shaders: vk::ShaderStageFlags,
+}
+
+/// What is known of a resource between two passes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct State {
+    layout: vk::ImageLayout,
+    /// Last write: where it happens, and what has to be made available.
+    write_stages: vk::PipelineStageFlags2,
+    write_access: vk::AccessFlags2,
+    /// Stages and accesses that already see the last write.
+    visible_stages: vk::PipelineStageFlags2,
+    visible_access: vk::AccessFlags2,
+    /// Stages that have read since the last write.
+    read_stages: vk::PipelineStageFlags2,
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self {
+            layout: vk::ImageLayout::UNDEFINED,
+            write_stages: vk::PipelineStageFlags2::NONE,
+            write_access: vk::AccessFlags2::NONE,
+            visible_stages: vk::PipelineStageFlags2::NONE,
+            visible_access: vk::AccessFlags2::NONE,
+            read_stages: vk::PipelineStageFlags2::NONE,
+        }
+    }
+}
+
+/// A dependency to record before a pass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Barrier {
+    /// What it guards.
+    pub resource: ResourceId,
+    /// Wait for these stages …
+    pub src_stages: vk::PipelineStageFlags2,
+    /// … and make these writes available.
+    pub src_access: vk::AccessFlags2,
+    /// Before these stages …
+    pub dst_stages: vk::PipelineStageFlags2,
+    /// … perform these accesses.
+    pub dst_access: vk::AccessFlags2,
+    /// Layout before and after, for images.
+    pub layouts: Option<(vk::ImageLayout, vk::ImageLayout)>,
+}
+
+/// The barriers each pass needs before it, given each pass's uses in execution order.
+///
+/// `states` holds what is known at the start (absent: never used) and is left as it is after the last pass.
+pub fn barriers(passes: &[Vec<Use>], states: &mut HashMap<ResourceId, State>) -> Vec<Vec<Barrier>> {
+    passes
+        .iter()
+        .map(|uses| {
+            merged(uses)
+                .into_iter()
+                .filter_map(|(resource, is_image, masks)| {
+                    step(resource, is_image, masks, states.entry(resource).or_default())
+                })
+                .collect()
+        })
+        .collect()
+}
+
+/// One entry per resource, in order of first use: a pass that both reads and writes a resource is one access.
+fn merged(uses: &[Use]) -> Vec<(ResourceId, bool, Masks)> {
+    let mut all: Vec<(ResourceId, bool, Masks)> = Vec::new();
+    for usage in uses {
+        let masks = usage.access.masks(usage.shaders);
+        match all.iter_mut().find(|(resource, ..)| *resource == usage.resource) {
+            Some((.., known)) => {
+                known.stages |= masks.stages;
+                known.access |= masks.access;
+                known.writes |= masks.writes;
+                if known.layout != masks.layout {
+                    // A depth image that is tested and sampled in one pass is the one legal mixture (DEPTH_READ_ONLY
+                    // allows both); anything else is a mistake of ours.
+                    let depth = vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL;
+                    let sampled = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
+                    let legal =
+                        [(depth, sampled), (sampled, depth)].contains(&(known.layout, masks.layout)) || !usage.is_image;
+                    assert!(legal, "one pass uses an image in layouts {:?} and {:?}", known.layout, masks.layout);
+                    known.layout = depth;
+                }
+            }
+            None => all.push((usage.resource, usage.is_image, masks)),
+        }
+    }
+    all
+}
+
+fn step(resource: ResourceId, is_image: bool, masks: Masks, state: &mut State) -> Option<Barrier> {
+    let relayout = is_image && state.layout != masks.layout;
+    let barrier = |src_stages, src_access, layouts| Barrier {
+        resource,
+        src_stages,
+        src_access,
+        dst_stages: masks.stages,
+        dst_access: masks.access,
+        layouts,
+    };
+    if masks.writes || relayout {
+        let src_stages = state.write_stages | state.read_stages;
+        let needed = relayout || !src_stages.is_empty();
+        let layouts = is_image.then_some((state.layout, masks.layout));
+        let needed = needed.then(|| barrier(src_stages, state.write_access, layouts));
+        *state = State {
+            layout: if is_image { masks.layout } else { vk::ImageLayout::UNDEFINED },
+            write_stages: masks.stages,
+            // A transition alone leaves nothing to flush: what it wrote is visible to the use that asked for it.
+            write_access: if masks.writes { write_part(masks.access) } else { vk::AccessFlags2::NONE },
+            visible_stages: if masks.writes { vk::PipelineStageFlags2::NONE } else { masks.stages },
+            visible_access: if masks.writes { vk::AccessFlags2::NONE } else { masks.access },
+            read_stages: vk::PipelineStageFlags2::NONE,
+        };
+        return needed;
+    }
+    let seen = state.visible_stages.contains(masks.stages) && state.visible_access.contains(masks.access);
+    state.read_stages |= masks.stages;
+    if state.write_stages.is_empty() || seen {
+        return None;
+    }
+    state.visible_stages |= masks.stages;
+    state.visible_access |= masks.access;
+    Some(barrier(state.write_stages, state.write_access, is_image.then_some((state.layout, state.layout))))
+}
+
+/// Only writes have to be made available.
+fn write_part(access: vk::AccessFlags2) -> vk::AccessFlags2 {
+    use vk::AccessFlags2 as A;
+    access
+        & (A::COLOR_ATTACHMENT_WRITE | A::DEPTH_STENCIL_ATTACHMENT_WRITE | A::SHADER_STORAGE_WRITE | A::TRANSFER_WRITE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn usage(resource: ResourceId, access: Access) -> Use {
+        let image = matches!(access, Access::ColorTarget | Access::DepthTarget | Access::DepthRead | Access::Sampled);
+        Use { resource, is_image: image, access, shaders: vk::ShaderStageFlags::COMPUTE }
+    }
+
+    fn count(passes: &[Vec<Use>]) -> Vec<usize> {
+        barriers(passes, &mut HashMap::new()).iter().map(Vec::len).collect()
+    }
+
+    #[test]
+    fn a_buffer_read_after_a_write_waits_once_per_stage() {
+        let write = vec![usage(1, Access::StorageWrite)];
+        let read = vec![usage(1, Access::StorageRead)];
+        assert_eq!(count(&[write, read.clone(), read]), [0, 1, 0]);
+    }
+
+    #[test]
+    fn a_write_waits_for_earlier_reads_and_writes() {
+        let write = vec![usage(1, Access::StorageWrite)];
+        let read = vec![usage(1, Access::StorageRead)];
+        let all = barriers(&[write.clone(), write.clone(), read, write], &mut HashMap::new());
+        assert_eq!(all.iter().map(Vec::len).collect::<Vec<_>>(), [0, 1, 1, 1]);
+        assert_eq!(all[3][0].src_stages, vk::PipelineStageFlags2::COMPUTE_SHADER);
+    }
+
+    #[test]
+    fn reads_of_untouched_buffers_need_nothing() {
+        assert_eq!(count(&[vec![usage(1, Access::UniformRead)], vec![usage(1, Access::IndexRead)]]), [0, 0]);
+    }
+
+    #[test]
+    fn an_image_changes_layout_between_target_and_sampled() {
+        let all =
+            barriers(&[vec![usage(7, Access::ColorTarget)], vec![usage(7, Access::Sampled)]], &mut HashMap::new());
+        let [first, second] = [all[0][0], all[1][0]];
+        assert_eq!(first.layouts, Some((vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)));
+        assert_eq!(second.src_access, vk::AccessFlags2::COLOR_ATTACHMENT_WRITE);
+        assert_eq!(second.dst_access, vk::AccessFlags2::SHADER_SAMPLED_READ);
+    }
+
+    #[test]
+    fn depth_may_be_tested_and_sampled_in_one_pass() {
+        let all =
+            barriers(&[vec![usage(3, Access::DepthRead), usage(3, Access::Sampled)]], &mut HashMap::new());
+        assert_eq!(all[0].len(), 1);
+        assert_eq!(all[0][0].layouts.map(|l| l.1), Some(vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL));
+    }
+
+    #[test]
+    fn a_second_frame_starts_where_the_first_ended() {
+        let mut states = HashMap::new();
+        barriers(&[vec![usage(1, Access::StorageWrite)]], &mut states);
+        let next = barriers(&[vec![usage(1, Access::StorageRead)]], &mut states);
+        assert_eq!(next[0].len(), 1);
+    }
+
+    #[test]
+    fn a_reader_in_another_stage_gets_its_own_barrier() {
+        let write = vec![usage(1, Access::StorageWrite)];
+        let compute = vec![usage(1, Access::StorageRead)];
+        let index = vec![usage(1, Access::IndexRead)];
+        assert_eq!(count(&[write, compute, index.clone(), index]), [0, 1, 1, 0]);
+    }
+}

@@ -1,0 +1,89 @@
+//! `#[repr(C)]` twins of `shaders/share/`. build.rs writes an assert for the size and for each offset.
+
+#![allow(missing_docs, reason = "the fields are described in shaders/share/")]
+
+use bytemuck::{Pod, Zeroable};
+
+/// `shaders/share/camera.glsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Camera {
+    pub clip_from_rel: [[f32; 4]; 4],
+    pub right: [f32; 3],
+    pub near: f32,
+    pub up: [f32; 3],
+    pub far: f32,
+    pub forward: [f32; 3],
+    pub orthographic: u32,
+    pub jitter: [f32; 2],
+    pub size: [u32; 2],
+}
+
+/// `shaders/share/scene.glsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Instance {
+    pub rel_from_object: [[f32; 3]; 4],
+    pub normal_from_object: [[f32; 3]; 3],
+    pub handedness: f32,
+    pub material: u32,
+}
+
+/// `shaders/share/scene.glsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Material {
+    pub base_color: [f32; 4],
+    pub emissive: [f32; 3],
+    pub metallic: f32,
+    pub f0: [f32; 3],
+    pub roughness: f32,
+    pub sigma_thickness: [f32; 3],
+    pub f90: f32,
+    pub ior: f32,
+    pub occlusion_strength: f32,
+    pub normal_scale: f32,
+    pub alpha_cutoff: f32,
+    pub transmission: f32,
+    pub clearcoat: f32,
+    pub clearcoat_roughness: f32,
+    pub flags: u32,
+}
+
+/// `shaders/share/scene.glsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct TextureSlot {
+    pub row_u: [f32; 3],
+    pub row_v: [f32; 3],
+    pub layer: u32,
+    pub uv_set: u32,
+}
+
+/// `shaders/share/environment.glsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct EnvironmentTerms {
+    pub irradiance: [[f32; 3]; 9],
+    pub cos_rotation: f32,
+    pub sin_rotation: f32,
+    pub intensity: f32,
+    pub width: f32,
+    pub levels: f32,
+}
+
+/// `shaders/share/aov.glsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct AovPixel {
+    pub p_rel: [f32; 3],
+    pub normal: [f32; 3],
+    pub geometric_normal: [f32; 3],
+    pub albedo: [f32; 3],
+    pub distance: f32,
+    pub roughness: f32,
+    pub metallic: f32,
+    pub emissive: [f32; 3],
+    pub material: u32,
+    pub instance: u32,
+}
