@@ -27,6 +27,7 @@ pub struct Instance {
     pub normal_from_object: [[f32; 3]; 3],
     pub handedness: f32,
     pub material: u32,
+    pub scale: f32,
 }
 
 /// `shaders/share/scene.glsl`.

@@ -9,7 +9,8 @@
 layout(constant_id = 13) const uint DIRECTIONAL_LIGHTS = 0; // lights [0, this) of the table
 layout(constant_id = 14) const uint LOCAL_LIGHTS = 0;       // point and spot lights after them; 0 where tiles list them
 layout(constant_id = 15) const uint TILE_WORDS = 0;         // words of a tile's bit mask; 0 without lists
-layout(constant_id = 16) const bool ENVIRONMENT = false;
+layout(constant_id = 16) const bool AMBIENT = false;        // irradiance of the environment on diffuse surfaces
+layout(constant_id = 17) const bool REFLECTION = false;     // the prefiltered environment in specular ones
 const uint TILE = 16;                                       // pixels a side
 
 // Four texels per light: position (or direction to it), unused | colour, 1 / range² | axis, spot scale | spot offset.
@@ -86,29 +87,27 @@ vec3 environment_light(Surface s) {
     float cos_v = clamp(dot(s.n, s.v), 0.0, 1.0);
     vec3 r = 2.0 * dot(s.n, s.v) * s.n - s.v;
     vec2 ab = textureLod(reflectance, vec2(cos_v, s.roughness), 0.0).rg;
-    vec3 single = s.f0 * ab.x + s.f90 * ab.y;
-    vec3 specular = single;
+    vec3 specular = s.f0 * ab.x + s.f90 * ab.y;
     if (BRDF == 3) {
         // Light that leaves the microsurface after more than one reflection (Fdez-Agüera 2019).
         float lost = 1.0 - (ab.x + ab.y);
         vec3 average = s.f0 + (vec3(s.f90) - s.f0) / 21.0;
-        specular += single * average * lost / (1.0 - average * lost);
+        specular += specular * average * lost / (1.0 - average * lost);
     }
-    vec3 result = s.diffuse * INV_PI * (1.0 - specular) * environment_irradiance(s.n);
-    result += specular * prefiltered_radiance(r, s.alpha);
-    result *= s.occlusion;
+    vec3 result = vec3(0.0);
+    if (AMBIENT) result += s.diffuse * INV_PI * (1.0 - specular) * environment_irradiance(s.n);
+    if (REFLECTION) result += specular * prefiltered_radiance(r, s.alpha);
     if (CLEARCOAT) {
         vec2 coat = textureLod(reflectance, vec2(cos_v, s.clearcoat_roughness), 0.0).rg;
-        float f = s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, cos_v).x;
-        float reflects = s.clearcoat * (0.04 * coat.x + coat.y);
-        result = result * (1.0 - f) + reflects * prefiltered_radiance(r, s.clearcoat_alpha) * s.occlusion;
+        result *= 1.0 - s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, cos_v).x;
+        if (REFLECTION) result += s.clearcoat * (0.04 * coat.x + coat.y) * prefiltered_radiance(r, s.clearcoat_alpha);
     }
-    return result;
+    return result * s.occlusion;
 }
 
 vec3 radiance_to_eye(Surface s, ivec2 pixel, uint tiles_across) {
     vec3 result = punctual_light(s, pixel, tiles_across);
-    if (ENVIRONMENT) result += environment_light(s);
+    if (AMBIENT || REFLECTION) result += environment_light(s);
     float under_coat = 1.0;
     if (CLEARCOAT) under_coat = 1.0 - s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, clamp(dot(s.n, s.v), 0.0, 1.0)).x;
     result += s.emissive * under_coat;

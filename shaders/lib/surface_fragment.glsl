@@ -24,7 +24,7 @@ layout(location = 3) in vec4 uv;
 layout(location = 4) in vec4 vertex_color;
 layout(location = 5) flat in uvec2 ids;
 
-layout(push_constant, scalar) uniform Push { float lod_bias; };
+layout(push_constant, scalar) uniform Push { float lod_bias; uint strip; };
 
 struct SurfaceFragment {
     vec4 base;          // texel times vertex colour; the constant factor is not in it

@@ -15,7 +15,8 @@ layout(set = 0, binding = 2, r32ui) readonly uniform uimage2D heads;
 layout(scalar, set = 0, binding = 3) readonly buffer Nodes { uint nodes[]; };
 layout(set = 0, binding = 4, rgba32f) uniform image2D radiance;
 layout(scalar, set = 0, binding = 5) buffer Dropped { uint dropped; };
-layout(push_constant, scalar) uniform Push { uint first_row; };
+layout(scalar, set = 0, binding = 6) readonly buffer Instances { Instance instances[]; };
+layout(push_constant, scalar) uniform Push { uint first_row; uint end_row; };
 
 // Fragments of one pixel beyond this many are counted as dropped: 220²/2 selections leave half of the loop budget to
 // the lights.
@@ -30,7 +31,7 @@ bool after(uvec3 a, uvec3 b) {
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, first_row);
-    if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
+    if (any(greaterThanEqual(uvec2(pixel), uvec2(camera.size.x, end_row)))) return;
     uint head = imageLoad(heads, pixel).x;
     if (head == END_OF_LIST) return;
     uint tiles_across = (camera.size.x + TILE - 1) / TILE;
@@ -74,7 +75,7 @@ void main() {
         // the nominal thickness (A1).
         float transmits = m.transmission * layer.a * (1.0 - blue_metal.y * m.metallic);
         vec3 f = fresnel(s, clamp(dot(s.n, s.v), 0.0, 1.0));
-        vec3 passes = transmits * s.base * exp(-m.sigma_thickness * occlusion_thickness.y) * (1.0 - f);
+        vec3 passes = transmits * s.base * exp(-m.sigma_thickness * (occlusion_thickness.y * instances[nodes[at + 2]].scale)) * (1.0 - f);
         s.diffuse *= 1.0 - transmits;
         float alpha = blue_alpha.y;
         sum += through * alpha * radiance_to_eye(s, pixel, tiles_across);

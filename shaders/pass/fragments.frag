@@ -8,7 +8,7 @@ layout(early_fragment_tests) in;
 #include "lib/fragment_list.glsl"
 
 layout(set = 0, binding = 14, r32ui) uniform uimage2D heads;
-layout(scalar, set = 0, binding = 15) buffer Counter { uint counter; };
+layout(scalar, set = 0, binding = 15) buffer Counters { uint counters[]; };
 layout(scalar, set = 0, binding = 16) writeonly buffer Nodes { uint nodes[]; };
 
 void main() {
@@ -19,7 +19,7 @@ void main() {
     if (MASKED && s.base.a * materials[ids.y].base_color.a < materials[ids.y].alpha_cutoff) return;
     // A fragment without coverage leaves no trace; NaN coverage must not vanish here, it is counted later.
     if (alpha <= 0.0) return;
-    uint slot = atomicAdd(counter, 1u);
+    uint slot = atomicAdd(counters[strip], 1u);
     uint at = slot * NODE_WORDS;
     // The counter runs on past the end, so that the host learns how many slots the frame needs.
     if (at + NODE_WORDS > uint(nodes.length())) return;

@@ -5,6 +5,7 @@ struct Instance {
     mat3 normal_from_object; // cofactor matrix times the sign of the determinant, scaled to fit (numerics.md 41)
     float handedness;        // sign of the determinant: −1 mirrors
     uint material;
+    float scale;             // cube root of |determinant|: how long a metre of the object is in the world
 };
 
 // What is constant over a material, in full f32: the G-buffer holds only what varies over it.

@@ -1,0 +1,38 @@
+//! The G-buffer as arbitrary output variables (shaders/pass/aov.comp).
+
+use anyhow::Result;
+
+use super::gbuffer::GBuffer;
+use super::scene::SceneOnDevice;
+use crate::gpu::{Buffer, Frame, Sampled, SamplerDesc};
+use crate::plan::Plan;
+use crate::shader::aov;
+
+/// Writes one [`crate::share::AovPixel`] per pixel.
+///
+/// # Errors
+/// When the driver refuses the pipeline.
+pub fn aov<'a>(
+    frame: &mut Frame<'a>,
+    plan: &Plan,
+    scene: &'a SceneOnDevice,
+    camera: &'a Buffer,
+    gbuffer: &'a GBuffer,
+    pixels: &'a Buffer,
+) -> Result<()> {
+    let bind = aov::Bind {
+        camera_block: camera,
+        materials: &scene.materials,
+        depth: Sampled { image: &gbuffer.depth, sampler: SamplerDesc::NEAREST },
+        base: &gbuffer.base,
+        normals: &gbuffer.normals,
+        ids: &gbuffer.ids,
+        emissive: &gbuffer.emissive,
+        pixels,
+    };
+    let size = gbuffer.depth.desc();
+    let constants = aov::Constants { has_emissive: plan.emissive }.words();
+    frame.compute_over("AOVs", &bind, constants, &[], [size.width, size.height])?;
+    frame.read_back(pixels);
+    Ok(())
+}

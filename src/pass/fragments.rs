@@ -1,0 +1,161 @@
+//! See-through surfaces into lists per pixel (shaders/pass/fragments.*).
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use ash::vk;
+
+use super::gbuffer::GBuffer;
+use super::scene::SceneOnDevice;
+use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Frame, Image, ImageDesc, Place, Raster};
+use crate::shader::fragments;
+
+/// Bytes of one fragment: `NODE_WORDS` of shaders/lib/fragment_list.glsl.
+const NODE_BYTES: u64 = 48;
+
+/// Lists of see-through fragments, drawn in horizontal strips so that any number of fragments fits the memory of one.
+pub struct FragmentLists {
+    /// First fragment of each pixel.
+    pub heads: Image,
+    /// The fragments of a strip.
+    pub nodes: Buffer,
+    /// Per strip, how many fragments it has: more than `nodes` holds means that the frame has to be drawn again.
+    pub counters: Buffer,
+    /// Pixels whose list was too long for one invocation.
+    pub dropped: Buffer,
+    strips: u32,
+    size: [u32; 2],
+    device: Arc<Device>,
+}
+
+impl FragmentLists {
+    /// Lists that hold one fragment per pixel to begin with.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn new(device: &Arc<Device>, size: [u32; 2]) -> Result<Self> {
+        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        let limit = device.max_storage_bytes() / NODE_BYTES;
+        Ok(Self {
+            heads: Image::new(
+                device,
+                "fragment list heads",
+                ImageDesc::flat(
+                    vk::Format::R32_UINT,
+                    size[0],
+                    size[1],
+                    vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::COLOR_ATTACHMENT,
+                ),
+            )?,
+            nodes: Buffer::new(device, "fragment list nodes", pixels.min(limit) * NODE_BYTES, Place::Device)?,
+            counters: Buffer::new(device, "fragment counters", 4, Place::Readback)?,
+            dropped: Buffer::new(device, "dropped fragments", 4, Place::Readback)?,
+            strips: 1,
+            size,
+            device: device.clone(),
+        })
+    }
+
+    /// Rows of each strip.
+    #[must_use]
+    pub fn strips(&self) -> Vec<[u32; 2]> {
+        let rows = self.size[1].div_ceil(self.strips);
+        (0..self.strips)
+            .map(|i| [(i * rows).min(self.size[1]), ((i + 1) * rows).min(self.size[1])])
+            .filter(|[from, to]| from < to)
+            .collect()
+    }
+
+    /// Whether the frame that has just finished fitted. If not, the lists have grown (or the strips shrunk): draw again.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn fitted(&mut self) -> Result<bool> {
+        let strips = self.strips as usize;
+        let most = self.counters.read(|bytes| {
+            bytemuck::cast_slice::<u8, u32>(bytes)[..strips].iter().copied().max().unwrap_or_default()
+        });
+        let most = u64::from(most);
+        if most * NODE_BYTES <= self.nodes.bytes() {
+            return Ok(true);
+        }
+        let limit = self.device.max_storage_bytes() / NODE_BYTES;
+        // Room for the next samples, whose edges fall a little differently.
+        let wanted = most + most / 16 + 1024;
+        if wanted > limit {
+            self.strips = (self.strips * 2).min(self.size[1]);
+            self.counters =
+                Buffer::new(&self.device, "fragment counters", 4 * u64::from(self.strips), Place::Readback)?;
+        }
+        if self.nodes.bytes() < wanted.min(limit) * NODE_BYTES {
+            let bytes = wanted.min(limit) * NODE_BYTES;
+            self.nodes = Buffer::new(&self.device, "fragment list nodes", bytes, Place::Device)?;
+        }
+        Ok(false)
+    }
+
+    /// Pixels, counted over all frames since the start, whose farthest fragments were left out.
+    #[must_use]
+    pub fn dropped(&self) -> u32 {
+        self.dropped.read(|bytes| u32::from_ne_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
+    }
+}
+
+/// Draws every see-through surface in front of the opaque ones into the lists of one strip.
+///
+/// # Errors
+/// When the driver refuses a pipeline.
+pub fn fragments<'a>(
+    frame: &mut Frame<'a>,
+    scene: &'a SceneOnDevice,
+    camera: &'a Buffer,
+    gbuffer: &'a GBuffer,
+    lists: &'a FragmentLists,
+    strip: u32,
+    rows: [u32; 2],
+    lod_bias: f32,
+) -> Result<()> {
+    // An empty raster pass clears the heads; one that draws could not, it exchanges them atomically.
+    let clear = Raster {
+        name: "clear fragment lists",
+        colors: &[ColorTarget { image: &lists.heads, clear: Some([u32::MAX; 4]) }],
+        depth: None,
+        size: lists.size,
+        rows,
+    };
+    let bindings: Vec<_> = scene
+        .page_sets()
+        .into_iter()
+        .map(|[base, metallic_roughness, normal, occlusion, emissive, clearcoat, coat_roughness, specular, transmission, thickness]| {
+            fragments::Bind {
+                camera_block: camera,
+                instances: &scene.instances,
+                materials: &scene.materials,
+                slots: &scene.slots,
+                base_page: base,
+                metallic_roughness_page: metallic_roughness,
+                normal_page: normal,
+                occlusion_page: occlusion,
+                emissive_page: emissive,
+                clearcoat_page: clearcoat,
+                clearcoat_roughness_page: coat_roughness,
+                specular_page: specular,
+                transmission_page: transmission,
+                thickness_page: thickness,
+                heads: &lists.heads,
+                counters: &lists.counters,
+                nodes: &lists.nodes,
+            }
+        })
+        .collect();
+    let push = [lod_bias.to_bits(), strip];
+    frame.raster(&clear, &fragments::PROGRAM, &bindings[..0], bytemuck::cast_slice(&push), Vec::new())?;
+    let raster = Raster {
+        name: "see-through fragments",
+        colors: &[],
+        depth: Some(DepthTarget { image: &gbuffer.depth, clear: false, write: false }),
+        size: lists.size,
+        rows,
+    };
+    frame.raster(&raster, &fragments::PROGRAM, &bindings, bytemuck::cast_slice(&push), scene.draws(true))
+}

@@ -1,0 +1,116 @@
+//! Raster G-buffer: the nearest opaque surface of every pixel (shaders/pass/gbuffer.*).
+//!
+//! 24 bytes a pixel beside depth: RGBA16F base colour and metallic, RGBA16_SNORM two octahedral normals, RG32UI ids,
+//! roughness and occlusion; 4 to 12 more where the plan has emissive or layer textures. docs/decisions/gbuffer.md has
+//! what narrower and wider choices cost.
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use ash::vk;
+
+use super::scene::SceneOnDevice;
+use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Frame, Image, ImageDesc, Raster};
+use crate::plan::Plan;
+use crate::shader::gbuffer;
+
+/// The images of the G-buffer.
+pub struct GBuffer {
+    /// Reversed depth; 0 where nothing was drawn.
+    pub depth: Image,
+    /// Base colour and metallic texels.
+    pub base: Image,
+    /// Shading and geometric normal.
+    pub normals: Image,
+    /// Material, roughness, instance, occlusion.
+    pub ids: Image,
+    /// Emissive texels; one pixel where the plan has none.
+    pub emissive: Image,
+    /// Layer texels; one pixel where the plan has none.
+    pub layers: Image,
+    size: [u32; 2],
+    with: [bool; 2],
+}
+
+impl GBuffer {
+    /// Images for a picture of `size` pixels.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn new(device: &Arc<Device>, plan: &Plan, size: [u32; 2]) -> Result<Self> {
+        let target = |name, format, exists: bool| {
+            let [width, height] = if exists { size } else { [1, 1] };
+            let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::STORAGE;
+            Image::new(device, name, ImageDesc::flat(format, width, height, usage))
+        };
+        let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
+        Ok(Self {
+            depth: Image::new(
+                device,
+                "G-buffer depth",
+                ImageDesc::flat(vk::Format::D32_SFLOAT, size[0], size[1], usage),
+            )?,
+            base: target("G-buffer base colour", vk::Format::R16G16B16A16_SFLOAT, true)?,
+            normals: target("G-buffer normals", vk::Format::R16G16B16A16_SNORM, true)?,
+            ids: target("G-buffer ids", vk::Format::R32G32_UINT, true)?,
+            emissive: target("G-buffer emissive", vk::Format::R16G16B16A16_SFLOAT, plan.emissive || plan.layers)?,
+            layers: target("G-buffer layers", vk::Format::R8G8B8A8_UNORM, plan.layers)?,
+            size,
+            with: [plan.emissive, plan.layers],
+        })
+    }
+}
+
+/// Draws every opaque and masked surface.
+///
+/// # Errors
+/// When the driver refuses a pipeline.
+pub fn gbuffer<'a>(
+    frame: &mut Frame<'a>,
+    scene: &'a SceneOnDevice,
+    camera: &'a Buffer,
+    target: &'a GBuffer,
+    lod_bias: f32,
+) -> Result<()> {
+    // Only depth is cleared: the other targets are read where depth says that something was drawn.
+    let color = |image| ColorTarget { image, clear: None };
+    // Locations are attachment indices: layers at 4 need something at 3.
+    let mut colors = vec![color(&target.base), color(&target.normals), color(&target.ids)];
+    if target.with[0] || target.with[1] {
+        colors.push(color(&target.emissive));
+    }
+    if target.with[1] {
+        colors.push(color(&target.layers));
+    }
+    let bindings: Vec<_> = scene
+        .page_sets()
+        .into_iter()
+        .map(|[base, metallic_roughness, normal, occlusion, emissive, clearcoat, coat_roughness, specular, transmission, thickness]| {
+            gbuffer::Bind {
+                camera_block: camera,
+                instances: &scene.instances,
+                materials: &scene.materials,
+                slots: &scene.slots,
+                base_page: base,
+                metallic_roughness_page: metallic_roughness,
+                normal_page: normal,
+                occlusion_page: occlusion,
+                emissive_page: emissive,
+                clearcoat_page: clearcoat,
+                clearcoat_roughness_page: coat_roughness,
+                specular_page: specular,
+                transmission_page: transmission,
+                thickness_page: thickness,
+            }
+        })
+        .collect();
+    let raster = Raster {
+        name: "G-buffer",
+        colors: &colors,
+        depth: Some(DepthTarget { image: &target.depth, clear: true, write: true }),
+        size: target.size,
+        rows: [0, target.size[1]],
+    };
+    let push = [lod_bias.to_bits(), 0];
+    frame.raster(&raster, &gbuffer::PROGRAM, &bindings, bytemuck::cast_slice(&push), scene.draws(false))
+}

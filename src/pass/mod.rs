@@ -1,0 +1,16 @@
+//! One file per pass, each with one public function that describes it to a [`crate::gpu::Frame`].
+//!
+//! A pass takes what it reads, writes what its name says, and contains no formula: those are in `shaders/lib/`.
+
+pub mod accumulate;
+pub mod aov;
+pub mod composite;
+pub mod environment;
+pub mod fragments;
+pub mod gbuffer;
+pub mod light;
+pub mod scene;
+pub mod texture;
+pub mod tiles;
+pub mod tonemap;
+pub mod view;

@@ -1,0 +1,446 @@
+//! The scene on the device: vertex streams, indices, tables of materials, instances and lights, textures.
+
+use std::sync::Arc;
+
+use anyhow::{Result, bail};
+use ash::vk;
+use glam::{DMat3, DVec3};
+
+use super::texture::{Meaning, Textures};
+use super::view::View;
+use crate::gpu::{Buffer, Device, Draw, Frame, Place, Sampled, VertexStream};
+use crate::plan::{Knobs, is_see_through};
+use crate::scene::{AlphaMode, Bounds, Light, LightKind, Material, Scene, TextureRef};
+use crate::shader::gbuffer;
+use crate::share;
+
+/// Texture slots of a material, in the order of `shaders/lib/gbuffer_interface.glsl`.
+pub const SLOTS: usize = 10;
+
+/// Where a mesh's data lies in the scene's buffers.
+struct MeshRange {
+    first_vertex: u64,
+    first_index: u32,
+    index_count: u32,
+    material: usize,
+    has_tangents: bool,
+    has_uvs: [bool; 2],
+    has_colors: bool,
+}
+
+/// An instance as it was read, for every frame's eye.
+struct Placement {
+    world_from_object: glam::DAffine3,
+    mesh: usize,
+}
+
+/// One concatenated attribute of all meshes that have it; others read the fallback with stride 0.
+struct Stream {
+    data: Buffer,
+    /// First byte of each mesh.
+    offsets: Vec<u64>,
+    stride: u32,
+}
+
+/// Everything about a scene that outlives a frame.
+pub struct SceneOnDevice {
+    device: Arc<Device>,
+    positions: Stream,
+    normals: Stream,
+    tangents: Stream,
+    uvs: [Stream; 2],
+    colors: Stream,
+    /// 0, 0, 0, 0 and 1, 1, 1, 1.
+    fallback: Buffer,
+    indices: Buffer,
+    meshes: Vec<MeshRange>,
+    placements: Vec<Placement>,
+    materials_cpu: Vec<Material>,
+    /// The table of materials.
+    pub materials: Buffer,
+    /// Ten texture slots per material.
+    pub slots: Buffer,
+    /// Instances relative to the eye of the current view.
+    pub instances: Buffer,
+    /// Lights relative to the eye of the current view: directional first, four texels each.
+    pub lights: Buffer,
+    lights_cpu: Vec<Light>,
+    textures: Textures,
+    /// Materials by index → place in [`SceneOnDevice::page_sets`].
+    page_of_material: Vec<usize>,
+    page_materials: Vec<usize>,
+    /// World-space box of the drawn triangles.
+    pub bounds: Option<Bounds>,
+}
+
+/// The slots of a material with their meanings.
+fn texture_slots(m: &Material) -> [(Option<TextureRef>, Meaning); SLOTS] {
+    [
+        (m.base_color_texture, Meaning::Color),
+        (m.metallic_roughness_texture, Meaning::Data),
+        (m.normal_texture, Meaning::Data),
+        (m.occlusion_texture, Meaning::Data),
+        (m.emissive_texture, Meaning::Color),
+        (m.clearcoat_texture, Meaning::Data),
+        (m.clearcoat_roughness_texture, Meaning::Data),
+        (m.specular_texture, Meaning::Data),
+        (m.transmission_texture, Meaning::Data),
+        (m.thickness_texture, Meaning::Data),
+    ]
+}
+
+/// A buffer with `data` where the device reads it fastest: written in place on a CPU device, staged on others.
+fn upload<T: bytemuck::NoUninit>(device: &Arc<Device>, name: &str, data: &[T], texels: Option<vk::Format>) -> Result<Buffer> {
+    let bytes: &[u8] = bytemuck::cast_slice(data);
+    let place = if device.info().kind == "cpu" { Place::Upload } else { Place::Device };
+    let size = bytes.len() as u64;
+    if size > device.max_storage_bytes() {
+        bail!("{name} need {size} bytes, the device binds at most {} at once", device.max_storage_bytes());
+    }
+    let mut buffer = match texels {
+        Some(format) => Buffer::texels(device, name, size, place, format)?,
+        None => Buffer::new(device, name, size, place)?,
+    };
+    if place == Place::Upload {
+        buffer.write(bytes);
+    } else if size > 0 {
+        let staging = Buffer::with_data(device, "staging", bytes)?;
+        let mut frame = Frame::new(device);
+        frame.copy_buffer("upload", &staging, &buffer, size);
+        frame.finish()?;
+    }
+    Ok(buffer)
+}
+
+fn stream<T: bytemuck::NoUninit>(
+    device: &Arc<Device>,
+    name: &str,
+    scene: &Scene,
+    attribute: impl Fn(&crate::scene::Mesh) -> &Vec<T>,
+) -> Result<Stream> {
+    let mut offsets = Vec::with_capacity(scene.meshes.len());
+    let mut all: Vec<T> = Vec::with_capacity(scene.meshes.iter().map(|m| attribute(m).len()).sum());
+    for mesh in &scene.meshes {
+        offsets.push(size_of_val(all.as_slice()) as u64);
+        all.extend_from_slice(attribute(mesh));
+    }
+    Ok(Stream { data: upload(device, name, &all, None)?, offsets, stride: size_of::<T>() as u32 })
+}
+
+impl SceneOnDevice {
+    /// Uploads a scene; decoded images and geometry are taken out of it.
+    ///
+    /// # Errors
+    /// When the scene does not fit the device.
+    pub fn new(device: &Arc<Device>, mut scene: Scene, knobs: &Knobs) -> Result<Self> {
+        if scene.materials.len() > 0xffff || scene.instances.len() > 0xff_ffff {
+            bail!(
+                "{}: {} materials and {} instances, the G-buffer's ids hold 65535 and 16777215",
+                scene.name,
+                scene.materials.len(),
+                scene.instances.len()
+            );
+        }
+        let bounds = scene.bounds();
+        let positions = stream(device, "positions", &scene, |m| &m.positions)?;
+        let normals = stream(device, "normals", &scene, |m| &m.normals)?;
+        let tangents = stream(device, "tangents", &scene, |m| &m.tangents)?;
+        let uvs = [
+            stream(device, "texture coordinates 0", &scene, |m| &m.uvs[0])?,
+            stream(device, "texture coordinates 1", &scene, |m| &m.uvs[1])?,
+        ];
+        let colors = stream(device, "vertex colours", &scene, |m| &m.colors)?;
+        let mut meshes = Vec::with_capacity(scene.meshes.len());
+        let mut all_indices: Vec<u32> = Vec::with_capacity(scene.meshes.iter().map(|m| m.indices.len()).sum());
+        let mut first_vertex = 0;
+        for mesh in &scene.meshes {
+            meshes.push(MeshRange {
+                first_vertex,
+                first_index: all_indices.len() as u32,
+                index_count: mesh.indices.len() as u32,
+                material: mesh.material,
+                has_tangents: !mesh.tangents.is_empty(),
+                has_uvs: [!mesh.uvs[0].is_empty(), !mesh.uvs[1].is_empty()],
+                has_colors: !mesh.colors.is_empty(),
+            });
+            first_vertex += mesh.positions.len() as u64;
+            all_indices.extend_from_slice(&mesh.indices);
+        }
+        scene.meshes = Vec::new();
+        let indices = upload(device, "indices", &all_indices, None)?;
+        drop(all_indices);
+
+        let mut wanted = Vec::new();
+        for material in &scene.materials {
+            wanted.extend(texture_slots(material).into_iter().filter_map(|(t, meaning)| t.map(|t| (t.image, meaning))));
+        }
+        wanted.sort_unstable();
+        wanted.dedup();
+        let textures = Textures::new(device, &mut scene, &wanted)?;
+
+        let table: Vec<_> = scene.materials.iter().map(|m| shared_material(m, knobs)).collect();
+        let mut slot_table = Vec::with_capacity(scene.materials.len() * SLOTS);
+        let mut page_of_material = Vec::with_capacity(scene.materials.len());
+        let mut page_materials: Vec<usize> = Vec::new();
+        for (index, material) in scene.materials.iter().enumerate() {
+            for (texture, meaning) in texture_slots(material) {
+                slot_table.push(shared_slot(texture, &textures, meaning));
+            }
+            // Materials that read the same pages through the same samplers share a set of descriptors.
+            let same = |&other: &usize| same_pages(&textures, material, &scene.materials[other]);
+            let set = page_materials.iter().position(same).unwrap_or_else(|| {
+                page_materials.push(index);
+                page_materials.len() - 1
+            });
+            page_of_material.push(set);
+        }
+        // Directional lights first: the shader runs them in a loop of their own.
+        let mut lights_cpu = std::mem::take(&mut scene.lights);
+        lights_cpu.sort_by_key(|light| !matches!(light.kind, LightKind::Directional { .. }));
+
+        let instance_bytes = (scene.instances.len() * size_of::<share::Instance>()) as u64;
+        let light_bytes = (lights_cpu.len() * 64) as u64;
+        Ok(Self {
+            materials: upload(device, "materials", &table, None)?,
+            slots: upload(device, "texture slots", &slot_table, None)?,
+            instances: Buffer::new(device, "instances", instance_bytes, Place::Upload)?,
+            lights: Buffer::texels(device, "lights", light_bytes, Place::Upload, vk::Format::R32G32B32A32_SFLOAT)?,
+            fallback: upload(device, "attribute fallback", &[0.0_f32, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0], None)?,
+            device: device.clone(),
+            positions,
+            normals,
+            tangents,
+            uvs,
+            colors,
+            indices,
+            meshes,
+            placements: scene
+                .instances
+                .iter()
+                .map(|i| Placement { world_from_object: i.world_from_object, mesh: i.mesh })
+                .collect(),
+            materials_cpu: scene.materials,
+            lights_cpu,
+            textures,
+            page_of_material,
+            page_materials,
+            bounds,
+        })
+    }
+
+    /// Moves instances and lights to the eye of `view`: differences in f64, stored in f32.
+    pub fn look_from(&mut self, view: &View) {
+        let table: Vec<_> = self
+            .placements
+            .iter()
+            .map(|placement| shared_instance(placement, view.eye, self.meshes[placement.mesh].material))
+            .collect();
+        self.instances.write(bytemuck::cast_slice(&table));
+        let table: Vec<[[f32; 4]; 4]> = self.lights_cpu.iter().map(|light| shared_light(light, view.eye)).collect();
+        self.lights.write(bytemuck::cast_slice(&table));
+    }
+
+    /// The device that holds it.
+    #[must_use]
+    pub fn device(&self) -> &Arc<Device> {
+        &self.device
+    }
+
+    /// One set of texture pages per distinct combination, in slot order: what the bindings of a raster pass vary over.
+    #[must_use]
+    pub fn page_sets(&self) -> Vec<[Sampled<'_>; SLOTS]> {
+        self.page_materials
+            .iter()
+            .map(|&m| texture_slots(&self.materials_cpu[m]).map(|(t, meaning)| self.textures.sampled(t, meaning)))
+            .collect()
+    }
+
+    /// The draws of all instances whose material is see-through or not, in the order of the file.
+    #[must_use]
+    pub fn draws(&self, see_through: bool) -> Vec<Draw<'_>> {
+        self.placements
+            .iter()
+            .enumerate()
+            .filter(|(_, p)| is_see_through(&self.materials_cpu[self.meshes[p.mesh].material]) == see_through)
+            .filter(|(_, p)| self.meshes[p.mesh].index_count > 0)
+            .map(|(instance, placement)| self.draw(instance as u32, placement))
+            .collect()
+    }
+
+    fn draw(&self, instance: u32, placement: &Placement) -> Draw<'_> {
+        let mesh = &self.meshes[placement.mesh];
+        let material = &self.materials_cpu[mesh.material];
+        let at = |stream: &Stream| stream.offsets[placement.mesh];
+        let given = |stream: &'_ Stream| VertexStream { buffer: &stream.data, offset: at(stream), stride: stream.stride };
+        let fallback = |offset| VertexStream { buffer: &self.fallback, offset, stride: 0 };
+        let or = |has: bool, stream, offset| if has { given(stream) } else { fallback(offset) };
+        let textured = |slot: usize| texture_slots(material)[slot].0.is_some();
+        let constants = gbuffer::Constants {
+            has_base: textured(0),
+            has_metallic_roughness: textured(1),
+            has_normal: textured(2) && mesh.has_tangents,
+            has_occlusion: textured(3),
+            has_emissive: textured(4),
+            has_layers: (5..SLOTS).any(textured),
+            has_color: mesh.has_colors,
+            masked: matches!(material.alpha_mode, AlphaMode::Mask(_)),
+        };
+        debug_assert!(mesh.first_vertex * 12 == at(&self.positions));
+        Draw {
+            binding: self.page_of_material[mesh.material],
+            constants: constants.words(),
+            streams: vec![
+                given(&self.positions),
+                given(&self.normals),
+                or(mesh.has_tangents, &self.tangents, 0),
+                or(mesh.has_uvs[0], &self.uvs[0], 0),
+                or(mesh.has_uvs[1], &self.uvs[1], 0),
+                or(mesh.has_colors, &self.colors, 16),
+            ],
+            indices: &self.indices,
+            first_index: mesh.first_index,
+            index_count: mesh.index_count,
+            instance,
+            cull_back: !material.double_sided,
+            clockwise: placement.world_from_object.matrix3.determinant() < 0.0,
+        }
+    }
+}
+
+fn same_pages(textures: &Textures, a: &Material, b: &Material) -> bool {
+    texture_slots(a).into_iter().zip(texture_slots(b)).all(|((a, meaning), (b, _))| {
+        let (a, b) = (textures.sampled(a, meaning), textures.sampled(b, meaning));
+        std::ptr::eq(a.image, b.image) && a.sampler == b.sampler
+    })
+}
+
+fn shared_slot(texture: Option<TextureRef>, textures: &Textures, meaning: Meaning) -> share::TextureSlot {
+    let Some(texture) = texture else {
+        return share::TextureSlot { row_u: [1.0, 0.0, 0.0], row_v: [0.0, 1.0, 0.0], layer: 0, uv_set: 0 };
+    };
+    let m = texture.uv_transform;
+    share::TextureSlot {
+        row_u: [m.matrix2.x_axis.x, m.matrix2.y_axis.x, m.translation.x],
+        row_v: [m.matrix2.x_axis.y, m.matrix2.y_axis.y, m.translation.y],
+        layer: textures.layer(texture, meaning),
+        uv_set: texture.uv_set,
+    }
+}
+
+/// The constants of a material. F0 of a dielectric is ((n − 1) / (n + 1))² tinted and scaled by KHR_materials_specular;
+/// the optical depth is −ln(attenuation colour) · thickness / attenuation distance (lecture A1, KHR_materials_volume).
+fn shared_material(m: &Material, knobs: &Knobs) -> share::Material {
+    let r = (m.ior - 1.0) / (m.ior + 1.0);
+    let absorbs = knobs.rung("absorption") != "off";
+    let depth = |color: f32| {
+        let sigma = -color.max(1e-6).ln() / m.attenuation_distance;
+        if absorbs && m.thickness > 0.0 && sigma > 0.0 { sigma * m.thickness } else { 0.0 }
+    };
+    let (alpha_cutoff, coverage) = match m.alpha_mode {
+        AlphaMode::Mask(cutoff) => (cutoff, 0),
+        AlphaMode::Blend => (0.0, 2),
+        AlphaMode::Opaque => (0.0, 0),
+    };
+    share::Material {
+        base_color: m.base_color,
+        emissive: m.emissive,
+        metallic: m.metallic,
+        f0: m.specular_color.map(|c| (r * r * c).min(1.0) * m.specular),
+        roughness: m.roughness,
+        sigma_thickness: m.attenuation_color.map(depth),
+        f90: m.specular,
+        ior: m.ior,
+        occlusion_strength: m.occlusion_strength,
+        normal_scale: m.normal_scale,
+        alpha_cutoff,
+        transmission: m.transmission,
+        clearcoat: m.clearcoat,
+        clearcoat_roughness: m.clearcoat_roughness,
+        flags: u32::from(m.unlit) | coverage,
+    }
+}
+
+/// Normals transform by the cofactor matrix, which needs no division and survives a singular matrix; the sign of the
+/// determinant keeps them outside of mirrored objects, and a power of two keeps them in range (numerics.md 41).
+fn shared_instance(placement: &Placement, eye: DVec3, material: usize) -> share::Instance {
+    let m = placement.world_from_object.matrix3;
+    let determinant = m.determinant();
+    let sign = if determinant < 0.0 { -1.0 } else { 1.0 };
+    let cofactors = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+    let largest = cofactors.to_cols_array().iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+    let scale = if largest > 0.0 { sign * (-largest.log2().floor()).exp2() } else { 1.0 };
+    let normals = cofactors * scale;
+    let column = |v: DVec3| v.as_vec3().to_array();
+    share::Instance {
+        rel_from_object: [
+            column(m.x_axis),
+            column(m.y_axis),
+            column(m.z_axis),
+            column(placement.world_from_object.translation - eye),
+        ],
+        normal_from_object: [column(normals.x_axis), column(normals.y_axis), column(normals.z_axis)],
+        handedness: sign as f32,
+        material: material as u32,
+        scale: determinant.abs().cbrt() as f32,
+    }
+}
+
+/// Four texels: see `shaders/lib/lighting.glsl`.
+fn shared_light(light: &Light, eye: DVec3) -> [[f32; 4]; 4] {
+    let [r, g, b] = light.color;
+    let local = |position: DVec3, range: Option<f64>| {
+        let p = (position - eye).as_vec3();
+        let inv_range2 = range.map_or(0.0, |range| (1.0 / (range * range)) as f32);
+        // A negative radius tells the tile pass that the light reaches everywhere.
+        ([p.x, p.y, p.z, range.map_or(-1.0, |range| range as f32)], [r, g, b, inv_range2])
+    };
+    match light.kind {
+        LightKind::Directional { direction } => {
+            let to = (-direction).as_vec3();
+            [[to.x, to.y, to.z, 0.0], [r, g, b, 0.0], [0.0; 4], [0.0; 4]]
+        }
+        LightKind::Point { position, range } => {
+            let (place, color) = local(position, range);
+            [place, color, [0.0; 4], [1.0, 0.0, 0.0, 0.0]]
+        }
+        LightKind::Spot { position, direction, range, inner, outer } => {
+            let (place, color) = local(position, range);
+            let axis = direction.as_vec3();
+            // KHR_lights_punctual's ramp: (cosθ − cos outer) / (cos inner − cos outer).
+            let scale = 1.0 / (inner.cos() - outer.cos()).max(0.001);
+            let offset = -outer.cos() * scale;
+            [place, color, [axis.x, axis.y, axis.z, scale as f32], [offset as f32, 0.0, 0.0, 0.0]]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DAffine3, DQuat};
+
+    use super::*;
+
+    #[test]
+    fn normals_stay_perpendicular_under_any_transform() {
+        let tangents = [DVec3::new(1.0, 0.3, -0.2), DVec3::new(-0.4, 2.0, 0.7)];
+        let normal = tangents[0].cross(tangents[1]);
+        for scale in [DVec3::new(1e-9, 3.0, 2.0), DVec3::new(-1.0, 1.0, 1.0), DVec3::new(1e6, -2.0, -5.0)] {
+            let world_from_object = DAffine3::from_scale_rotation_translation(
+                scale,
+                DQuat::from_rotation_y(0.7),
+                DVec3::new(1e7, 0.0, 0.0),
+            );
+            let instance = shared_instance(&Placement { world_from_object, mesh: 0 }, DVec3::new(1e7, 1.0, 0.0), 3);
+            let columns = instance.normal_from_object.map(|c| glam::Vec3::from(c).as_dvec3());
+            let n = (columns[0] * normal.x + columns[1] * normal.y + columns[2] * normal.z).normalize();
+            for t in tangents {
+                let t = world_from_object.transform_vector3(t).normalize();
+                assert!(n.dot(t).abs() < 1e-6, "{scale}: {}", n.dot(t));
+            }
+            // Outside stays outside: the transform of a point just above the surface is on the normal's side.
+            assert!(n.dot(world_from_object.transform_vector3(normal)) > 0.0, "{scale}");
+            assert_eq!(instance.rel_from_object[3], [0.0, -1.0, 0.0]);
+            assert_eq!(instance.handedness < 0.0, scale.x * scale.y * scale.z < 0.0);
+        }
+    }
+}

@@ -1,0 +1,264 @@
+//! Textures as pages: images of one size and transfer function are the layers of one array image, with mip levels.
+//!
+//! lavapipe cannot index arrays of sampled images, but a layer is only a coordinate (lavapipe.md section 2).
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, OnceLock};
+
+use anyhow::Result;
+use ash::vk;
+use rayon::prelude::*;
+
+use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, Place, Sampled, SamplerDesc};
+use crate::scene::{Sampler, Scene, TextureRef, Wrap};
+
+/// How the bytes of an image are meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Meaning {
+    /// sRGB-encoded colour, linear alpha.
+    Color,
+    /// Linear numbers.
+    Data,
+}
+
+/// Every texture of a scene on the device.
+pub struct Textures {
+    pages: Vec<Image>,
+    /// (image, meaning) → (page, layer).
+    places: BTreeMap<(usize, Meaning), (usize, u32)>,
+    white: Image,
+}
+
+impl Textures {
+    /// Uploads the images that `wanted` names; their pixels are taken out of the scene, image by image, so that only one
+    /// decoded image exists twice at a time.
+    ///
+    /// # Errors
+    /// When memory is short or an image is larger than the device allows.
+    pub fn new(device: &Arc<Device>, scene: &mut Scene, wanted: &[(usize, Meaning)]) -> Result<Self> {
+        let mut groups: BTreeMap<(u32, u32, Meaning), Vec<usize>> = BTreeMap::new();
+        for &(image, meaning) in wanted {
+            let source = &scene.images[image];
+            let layers = groups.entry((source.width, source.height, meaning)).or_default();
+            if !layers.contains(&image) {
+                layers.push(image);
+            }
+        }
+        let mut pages = Vec::new();
+        let mut places = BTreeMap::new();
+        for (&(width, height, meaning), images) in &groups {
+            let levels = 32 - width.max(height).leading_zeros();
+            let format = match meaning {
+                Meaning::Color => vk::Format::R8G8B8A8_SRGB,
+                Meaning::Data => vk::Format::R8G8B8A8_UNORM,
+            };
+            let page = Image::new(device, &format!("texture page {width}x{height}"), ImageDesc {
+                format,
+                width,
+                height,
+                layers: images.len() as u32,
+                levels,
+                array: true,
+                usage: vk::ImageUsageFlags::SAMPLED,
+            })?;
+            // Two images at a time: their mips are made in parallel, their staging memory is what is held at once.
+            for (chunk_index, chunk) in images.chunks(2).enumerate() {
+                let chains: Vec<Vec<u8>> = chunk
+                    .par_iter()
+                    .map(|&image| mip_chain(&scene.images[image].rgba, width, height, levels, meaning))
+                    .collect();
+                for (i, (&image, chain)) in chunk.iter().zip(chains).enumerate() {
+                    let layer = (chunk_index * 2 + i) as u32;
+                    places.insert((image, meaning), (pages.len(), layer));
+                    let mut staging = Buffer::new(device, "staging", chain.len() as u64, Place::Upload)?;
+                    staging.write(&chain);
+                    drop(chain);
+                    let mut frame = Frame::new(device);
+                    frame.upload("upload texture", &staging, &page, layer, &level_offsets(width, height, levels));
+                    frame.finish()?;
+                    let last_use = groups.iter().filter(|((.., m), list)| *m > meaning && list.contains(&image)).count() == 0;
+                    if last_use {
+                        scene.images[image].rgba = Vec::new();
+                    }
+                }
+            }
+            pages.push(page);
+        }
+        let white = Image::new(device, "white texture", ImageDesc {
+            format: vk::Format::R8G8B8A8_UNORM,
+            width: 1,
+            height: 1,
+            layers: 1,
+            levels: 1,
+            array: true,
+            usage: vk::ImageUsageFlags::SAMPLED,
+        })?;
+        let staging = Buffer::with_data(device, "staging", &[0xffff_ffff_u32])?;
+        let mut frame = Frame::new(device);
+        frame.upload("upload white", &staging, &white, 0, &[0]);
+        frame.finish()?;
+        Ok(Self { pages, places, white })
+    }
+
+    /// The page of a texture with its sampler; white where the material has none.
+    #[must_use]
+    pub fn sampled(&self, texture: Option<TextureRef>, meaning: Meaning) -> Sampled<'_> {
+        match texture.and_then(|t| self.places.get(&(t.image, meaning)).map(|place| (t, place))) {
+            Some((texture, &(page, _))) => Sampled { image: &self.pages[page], sampler: sampler(texture.sampler) },
+            None => Sampled { image: &self.white, sampler: SamplerDesc::NEAREST },
+        }
+    }
+
+    /// Layer of a texture in its page.
+    #[must_use]
+    pub fn layer(&self, texture: TextureRef, meaning: Meaning) -> u32 {
+        self.places.get(&(texture.image, meaning)).map_or(0, |&(_, layer)| layer)
+    }
+}
+
+fn sampler(sampler: Sampler) -> SamplerDesc {
+    let wrap = |wrap| match wrap {
+        Wrap::Repeat => vk::SamplerAddressMode::REPEAT,
+        Wrap::Mirror => vk::SamplerAddressMode::MIRRORED_REPEAT,
+        Wrap::Clamp => vk::SamplerAddressMode::CLAMP_TO_EDGE,
+    };
+    let filter = |nearest| if nearest { vk::Filter::NEAREST } else { vk::Filter::LINEAR };
+    SamplerDesc {
+        wrap: [wrap(sampler.wrap_u), wrap(sampler.wrap_v)],
+        mag: filter(sampler.mag_nearest),
+        min: filter(sampler.min_nearest),
+        mip: sampler.mips.then_some(vk::SamplerMipmapMode::LINEAR),
+        anisotropy: 1,
+    }
+}
+
+/// Byte offset of each level in a tightly packed RGBA8 chain.
+fn level_offsets(width: u32, height: u32, levels: u32) -> Vec<u64> {
+    let mut offset = 0;
+    (0..levels)
+        .map(|level| {
+            let here = offset;
+            offset += 4 * u64::from((width >> level).max(1)) * u64::from((height >> level).max(1));
+            here
+        })
+        .collect()
+}
+
+/// Linear value of each sRGB byte (IEC 61966-2-1).
+fn linear_from_srgb() -> &'static [f32; 256] {
+    static TABLE: OnceLock<[f32; 256]> = OnceLock::new();
+    TABLE.get_or_init(|| {
+        std::array::from_fn(|byte| {
+            let x = byte as f64 / 255.0;
+            (if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }) as f32
+        })
+    })
+}
+
+/// sRGB byte of each of 2^14 linear values: half a step of the darkest bytes is 2.5 entries.
+fn srgb_from_linear() -> &'static [u8] {
+    static TABLE: OnceLock<Vec<u8>> = OnceLock::new();
+    TABLE.get_or_init(|| {
+        (0..=1_u32 << 14)
+            .map(|i| {
+                let x = f64::from(i) / f64::from(1 << 14);
+                let y = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
+                (y * 255.0 + 0.5) as u8
+            })
+            .collect()
+    })
+}
+
+/// The base level and all smaller ones: averages of 2x2 texels (3 along an odd side), colour in linear light and weighted
+/// by alpha, so that what is invisible does not fringe what is visible.
+fn mip_chain(rgba: &[u8], width: u32, height: u32, levels: u32, meaning: Meaning) -> Vec<u8> {
+    let offsets = level_offsets(width, height, levels);
+    let last = offsets.last().copied().unwrap_or(0) as usize + 4;
+    let mut chain = Vec::with_capacity(last);
+    chain.extend_from_slice(rgba);
+    let opaque = rgba.chunks_exact(4).all(|texel| texel[3] == 255);
+    let (to_linear, to_srgb) = (linear_from_srgb(), srgb_from_linear());
+    let (mut w, mut h) = (width as usize, height as usize);
+    for level in 1..levels as usize {
+        let (nw, nh) = ((w / 2).max(1), (h / 2).max(1));
+        let from = offsets[level - 1] as usize;
+        for y in 0..nh {
+            for x in 0..nw {
+                // An odd side of 2k + 1 becomes k: the last texel takes three.
+                let xs = [2 * x, (2 * x + 2).min(w).max(2 * x + 1)];
+                let xs = if x + 1 == nw { [xs[0].min(w - 1), w] } else { xs };
+                let ys = if y + 1 == nh { [(2 * y).min(h - 1), h] } else { [2 * y, 2 * y + 2] };
+                let mut sum = [0.0_f32; 4];
+                let mut weight = 0.0_f32;
+                let mut count = 0.0_f32;
+                for sy in ys[0]..ys[1] {
+                    for sx in xs[0]..xs[1] {
+                        let at = from + 4 * (sy * w + sx);
+                        let texel = [chain[at], chain[at + 1], chain[at + 2], chain[at + 3]];
+                        let alpha = if opaque || meaning == Meaning::Data { 1.0 } else { f32::from(texel[3]) };
+                        for c in 0..3 {
+                            let value = match meaning {
+                                Meaning::Color => to_linear[usize::from(texel[c])],
+                                Meaning::Data => f32::from(texel[c]),
+                            };
+                            sum[c] += alpha * value;
+                        }
+                        sum[3] += f32::from(texel[3]);
+                        weight += alpha;
+                        count += 1.0;
+                    }
+                }
+                for value in &sum[..3] {
+                    let mean = if weight > 0.0 { value / weight } else { 0.0 };
+                    chain.push(match meaning {
+                        Meaning::Color => to_srgb[(mean * 16384.0 + 0.5) as usize],
+                        Meaning::Data => (mean + 0.5) as u8,
+                    });
+                }
+                chain.push((sum[3] / count + 0.5) as u8);
+            }
+        }
+        (w, h) = (nw, nh);
+    }
+    chain
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_constant_image_stays_constant_on_every_level() {
+        for (width, height) in [(8, 8), (7, 5), (1, 9), (6, 1)] {
+            let levels = 32 - width.max(height as u32).leading_zeros();
+            let rgba: Vec<u8> = [200, 13, 77, 255].repeat((width * height as u32) as usize);
+            for meaning in [Meaning::Color, Meaning::Data] {
+                let chain = mip_chain(&rgba, width, height as u32, levels, meaning);
+                assert!(chain.chunks_exact(4).all(|t| t == [200, 13, 77, 255]), "{width}x{height}");
+            }
+        }
+    }
+
+    #[test]
+    fn colour_is_averaged_in_linear_light() {
+        let rgba = [[255, 255, 255, 255], [0, 0, 0, 255]].concat();
+        let chain = mip_chain(&rgba, 2, 1, 2, Meaning::Color);
+        assert_eq!(chain[8], 188); // sRGB of 0.5
+        assert_eq!(mip_chain(&rgba, 2, 1, 2, Meaning::Data)[8], 128);
+    }
+
+    #[test]
+    fn invisible_texels_do_not_fringe() {
+        let rgba = [[10, 200, 10, 255], [255, 0, 255, 0]].concat();
+        let chain = mip_chain(&rgba, 2, 1, 2, Meaning::Color);
+        assert_eq!(&chain[8..], [10, 200, 10, 128]);
+    }
+
+    #[test]
+    fn every_byte_survives_the_tables() {
+        for byte in 0..=255_u8 {
+            let linear = linear_from_srgb()[usize::from(byte)];
+            assert_eq!(srgb_from_linear()[(linear * 16384.0 + 0.5) as usize], byte);
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Light lists: which point and spot lights reach which 16x16 tile (shaders/pass/tile_depth.comp, tiles.comp).
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use ash::vk;
+
+use super::gbuffer::GBuffer;
+use super::scene::SceneOnDevice;
+use crate::gpu::{Buffer, Device, Frame, Place, Sampled, SamplerDesc};
+use crate::plan::Plan;
+use crate::shader::{tile_depth, tiles};
+
+const TILE: u32 = 16;
+
+/// Depth ranges and light masks of the tiles of a picture.
+pub struct Tiles {
+    depths: Buffer,
+    /// One bit per light, `words` words per tile.
+    pub masks: Buffer,
+    words: u32,
+    across: u32,
+    down: u32,
+}
+
+impl Tiles {
+    /// Buffers for a picture of `size` pixels; minimal where the plan has no lists.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn new(device: &Arc<Device>, plan: &Plan, size: [u32; 2]) -> Result<Self> {
+        let words = if plan.tiles { plan.local_lights.div_ceil(32) } else { 0 };
+        let (across, down) = (size[0].div_ceil(TILE), size[1].div_ceil(TILE));
+        let count = if plan.tiles { u64::from(across) * u64::from(down) } else { 0 };
+        Ok(Self {
+            depths: Buffer::texels(device, "tile depths", 8 * count, Place::Device, vk::Format::R32G32_SFLOAT)?,
+            masks: Buffer::texels(
+                device,
+                "tile light masks",
+                4 * count * u64::from(words),
+                Place::Device,
+                vk::Format::R32_UINT,
+            )?,
+            words,
+            across,
+            down,
+        })
+    }
+
+    /// Words of a tile's mask; 0 without lists.
+    #[must_use]
+    pub fn words(&self) -> u32 {
+        self.words
+    }
+}
+
+/// Fills the masks for what the G-buffer holds.
+///
+/// # Errors
+/// When the driver refuses a pipeline.
+pub fn tiles<'a>(
+    frame: &mut Frame<'a>,
+    plan: &Plan,
+    scene: &'a SceneOnDevice,
+    camera: &'a Buffer,
+    gbuffer: &'a GBuffer,
+    target: &'a Tiles,
+) -> Result<()> {
+    let depth = Sampled { image: &gbuffer.depth, sampler: SamplerDesc::NEAREST };
+    let bind = tile_depth::Bind { camera_block: camera, depth, tile_depths: &target.depths };
+    let constants = tile_depth::Constants { from_camera: plan.see_through };
+    frame.compute_over("tile depths", &bind, constants.words(), &[], [target.across, target.down])?;
+
+    let bind = tiles::Bind {
+        camera_block: camera,
+        lights: &scene.lights,
+        tile_depths: &target.depths,
+        tile_lights: &target.masks,
+    };
+    let count = target.across * target.down;
+    let push = [plan.directional_lights, plan.local_lights, target.words, target.across, count];
+    let groups = [(count * target.words).div_ceil(tiles::PROGRAM.local_size[0]), 1, 1];
+    frame.compute("light lists", &bind, tiles::Constants {}.words(), bytemuck::cast_slice(&push), groups)
+}

@@ -1,0 +1,73 @@
+//! Film to display bytes (shaders/pass/tonemap.comp).
+
+use std::sync::Arc;
+
+use anyhow::Result;
+
+use crate::gpu::{Buffer, Device, Frame, Image, Place};
+use crate::shader::tonemap;
+
+/// What the last pass leaves for the host.
+pub struct Display {
+    /// RGBA8, sRGB-encoded, rows from the top.
+    pub pixels: Buffer,
+    counts: Buffer,
+}
+
+/// Values that are not radiances, counted before anything clamps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// Pixels with a NaN.
+    pub nan: u32,
+    /// Pixels with an infinity.
+    pub inf: u32,
+    /// Pixels with a negative component.
+    pub negative: u32,
+}
+
+impl Display {
+    /// Buffers for a picture of `size` pixels.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn new(device: &Arc<Device>, size: [u32; 2]) -> Result<Self> {
+        Ok(Self {
+            pixels: Buffer::new(device, "display", 4 * u64::from(size[0]) * u64::from(size[1]), Place::Readback)?,
+            counts: Buffer::new(device, "counts of non-radiances", 12, Place::Readback)?,
+        })
+    }
+
+    /// The counts of the frame that has just finished.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        self.counts.read(|bytes| {
+            let words: &[u32] = bytemuck::cast_slice(bytes);
+            Counts { nan: words[0], inf: words[1], negative: words[2] }
+        })
+    }
+}
+
+/// Exposes by `exposure` stops, bends by tone curve number `curve`, and encodes; `background` is display-linear with
+/// alpha 1, or all 0 to keep transparency.
+///
+/// # Errors
+/// When the driver refuses the pipeline.
+pub fn tonemap<'a>(
+    frame: &mut Frame<'a>,
+    film: &'a Image,
+    display: &'a Display,
+    curve: u32,
+    exposure: f32,
+    background: [f32; 4],
+) -> Result<()> {
+    frame.fill("reset counts", &display.counts, 0);
+    let [r, g, b, a] = background;
+    let push = [r, g, b, a, exposure.exp2()];
+    let bind = tonemap::Bind { film, display: &display.pixels, counts: &display.counts };
+    let size = [film.desc().width, film.desc().height];
+    let constants = tonemap::Constants { curve }.words();
+    frame.compute_over("tone map", &bind, constants, bytemuck::cast_slice(&push), size)?;
+    frame.read_back(&display.pixels);
+    frame.read_back(&display.counts);
+    Ok(())
+}

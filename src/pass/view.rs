@@ -1,0 +1,177 @@
+//! A camera as the device sees it: relative to the eye, reversed depth, one sub-pixel offset.
+
+use glam::{DMat3, DVec2, DVec3};
+
+use crate::scene::{Bounds, Camera, Projection};
+use crate::share;
+
+/// Basis and projection of a camera for a picture of a given size, in f64.
+#[derive(Debug, Clone, Copy)]
+pub struct View {
+    /// Where the eye is, in world space.
+    pub eye: DVec3,
+    /// Unit axes of the camera in world space: right, up, and the viewing direction.
+    pub axes: [DVec3; 3],
+    /// Half the picture's width and height: at depth 1 (perspective) or anywhere (orthographic).
+    pub half: DVec2,
+    near: f64,
+    far: f64,
+    orthographic: bool,
+    size: [u32; 2],
+}
+
+impl View {
+    /// The view of `camera`; `bounds` decides the near distance where the camera leaves it open.
+    #[must_use]
+    pub fn new(camera: &Camera, size: [u32; 2], bounds: Option<Bounds>) -> Self {
+        let axes = DMat3::from(camera.world_from_camera.matrix3);
+        let eye = camera.world_from_camera.translation;
+        let aspect = f64::from(size[0]) / f64::from(size[1]);
+        let (half_height, near, far, orthographic) = match camera.projection {
+            Projection::Perspective { fov_y, near } => {
+                ((fov_y * 0.5).tan(), near.unwrap_or_else(|| near_distance(eye, bounds)), f64::INFINITY, false)
+            }
+            Projection::Orthographic { half_height, near, far } => (half_height, near, far, true),
+        };
+        Self {
+            eye,
+            axes: [axes.x_axis, axes.y_axis, -axes.z_axis],
+            half: DVec2::new(half_height * aspect, half_height),
+            near,
+            far,
+            orthographic,
+            size,
+        }
+    }
+
+    /// What the shaders get, for a sample `jitter` pixels off the pixel centres.
+    #[must_use]
+    pub fn shared(&self, jitter: DVec2) -> share::Camera {
+        let [right, up, forward] = self.axes;
+        // Rows of clip_from_rel. The picture's y points down in clip space, as Vulkan has it. A sample offset by +j means
+        // that the world moves by −j pixels.
+        let shift = -2.0 * jitter / DVec2::new(f64::from(self.size[0]), f64::from(self.size[1]));
+        let (w, w0) = if self.orthographic { (DVec3::ZERO, 1.0) } else { (forward, 0.0) };
+        let x = right / self.half.x + w * shift.x;
+        let y = -up / self.half.y + w * shift.y;
+        let (z, z0) = if self.orthographic {
+            // 1 at near, 0 at far.
+            let depth = self.far - self.near;
+            (-forward / depth, self.far / depth)
+        } else {
+            (DVec3::ZERO, self.near)
+        };
+        let row = |v: DVec3, last: f64| [v.x as f32, v.y as f32, v.z as f32, last as f32];
+        let rows = [row(x, w0 * shift.x), row(y, w0 * shift.y), row(z, z0), row(w, w0)];
+        let mut clip_from_rel = [[0.0; 4]; 4];
+        for (column, values) in clip_from_rel.iter_mut().enumerate() {
+            for (value, row) in values.iter_mut().zip(&rows) {
+                *value = row[column];
+            }
+        }
+        share::Camera {
+            clip_from_rel,
+            right: (right * self.half.x).as_vec3().into(),
+            near: self.near as f32,
+            up: (up * self.half.y).as_vec3().into(),
+            far: self.far as f32,
+            forward: forward.as_vec3().into(),
+            orthographic: u32::from(self.orthographic),
+            jitter: jitter.as_vec2().into(),
+            size: self.size,
+        }
+    }
+}
+
+/// A near distance that clips nothing of a scene seen from outside and next to nothing from inside. Reversed floating
+/// depth has the same relative precision for every near distance (numerics.md 42), so small is free.
+fn near_distance(eye: DVec3, bounds: Option<Bounds>) -> f64 {
+    let Some(bounds) = bounds else { return 0.01 };
+    let radius = bounds.radius().max(1e-6);
+    let outside = (eye - eye.clamp(bounds.min, bounds.max)).length();
+    (0.5 * outside).max(1e-5 * radius)
+}
+
+/// Sub-pixel offsets in (−0.5, 0.5)² of `count` samples: the centre for one, else the R2 sequence (Roberts 2018), which
+/// covers the pixel evenly for any count. The box they fill is the reconstruction filter.
+#[must_use]
+pub fn jitter(index: u32, count: u32) -> DVec2 {
+    if count == 1 {
+        return DVec2::ZERO;
+    }
+    // Powers of the inverse of the plastic number, the root of x³ = x + 1.
+    const STEP: DVec2 = DVec2::new(0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
+    let at = DVec2::splat(0.5) + STEP * f64::from(index + 1);
+    at - at.floor() - 0.5
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DAffine3;
+
+    use super::*;
+
+    fn project(camera: &share::Camera, p_rel: [f32; 3]) -> [f64; 3] {
+        let p = [p_rel[0], p_rel[1], p_rel[2], 1.0];
+        let clip: Vec<f64> = (0..4)
+            .map(|row| (0..4).map(|c| f64::from(camera.clip_from_rel[c][row]) * f64::from(p[c])).sum())
+            .collect();
+        [clip[0] / clip[3], clip[1] / clip[3], clip[2] / clip[3]]
+    }
+
+    fn camera(projection: Projection) -> Camera {
+        Camera { name: String::new(), world_from_camera: DAffine3::IDENTITY, projection }
+    }
+
+    #[test]
+    fn reversed_depth_is_one_at_near_and_falls_to_zero() {
+        let view = View::new(&camera(Projection::Perspective { fov_y: 1.0, near: Some(0.1) }), [16, 9], None);
+        let shared = view.shared(DVec2::ZERO);
+        assert!((project(&shared, [0.0, 0.0, -0.1])[2] - 1.0).abs() < 1e-6);
+        assert!((project(&shared, [0.0, 0.0, -100.0])[2] - 1e-3).abs() < 1e-9);
+        let view = View::new(
+            &camera(Projection::Orthographic { half_height: 1.0, near: 1.0, far: 3.0 }),
+            [16, 9],
+            None,
+        );
+        let shared = view.shared(DVec2::ZERO);
+        assert!((project(&shared, [0.0, 0.0, -1.0])[2] - 1.0).abs() < 1e-6);
+        assert!(project(&shared, [0.0, 0.0, -3.0])[2].abs() < 1e-6);
+    }
+
+    #[test]
+    fn up_is_up_and_the_field_of_view_is_vertical() {
+        let fov_y = std::f64::consts::FRAC_PI_2;
+        let view = View::new(&camera(Projection::Perspective { fov_y, near: Some(0.1) }), [200, 100], None);
+        let shared = view.shared(DVec2::ZERO);
+        let top = project(&shared, [0.0, 1.0, -1.0]);
+        assert!((top[1] + 1.0).abs() < 1e-6, "the top edge is ndc y = -1: {top:?}");
+        let right = project(&shared, [2.0, 0.0, -1.0]);
+        assert!((right[0] - 1.0).abs() < 1e-6, "{right:?}");
+    }
+
+    #[test]
+    fn jitter_moves_the_picture_against_the_sample() {
+        for projection in [
+            Projection::Perspective { fov_y: 1.0, near: Some(0.1) },
+            Projection::Orthographic { half_height: 1.0, near: 0.1, far: 10.0 },
+        ] {
+            let view = View::new(&camera(projection), [100, 100], None);
+            let centre = project(&view.shared(DVec2::ZERO), [0.1, 0.2, -2.0]);
+            let moved = project(&view.shared(DVec2::new(0.25, -0.5)), [0.1, 0.2, -2.0]);
+            assert!((moved[0] - centre[0] + 0.25 * 0.02).abs() < 1e-6);
+            assert!((moved[1] - centre[1] - 0.5 * 0.02).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn jitters_fill_the_pixel_evenly() {
+        for count in [4, 16, 64, 256] {
+            let all: Vec<_> = (0..count).map(|i| jitter(i, count)).collect();
+            let mean = all.iter().sum::<DVec2>() / f64::from(count);
+            assert!(mean.length() < 0.6 / f64::from(count).sqrt(), "{count}: {mean}");
+            assert!(all.iter().all(|j| j.abs().max_element() <= 0.5));
+        }
+        assert_eq!(jitter(0, 1), DVec2::ZERO);
+    }
+}

@@ -1,0 +1,167 @@
+//! Knobs as data: each approximation's rungs, which of them exist in this build, and what they are called.
+
+use anyhow::{Result, bail};
+
+/// One knob of product.md.
+#[derive(Debug)]
+pub struct Knob {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// Rungs that can be chosen, cheap to exact; `*` stands for a power of four.
+    pub rungs: &'static [&'static str],
+    /// Rungs of product.md that are not built yet.
+    pub unbuilt: &'static [&'static str],
+    /// What the presets choose.
+    pub default: &'static str,
+    /// What it approximates, with the lecture's ids.
+    pub about: &'static str,
+}
+
+/// Every knob, in product.md's order. The command line, the report and the documentation read this table.
+pub static KNOBS: &[Knob] = &[
+    Knob { name: "shadows", rungs: &["off"], unbuilt: &["map", "ray"], default: "off", about: "visibility of lights (R5)" },
+    Knob { name: "fresnel", rungs: &["schlick", "exact"], unbuilt: &[], default: "schlick", about: "Fresnel curve (F2, F3)" },
+    Knob {
+        name: "brdf",
+        rungs: &["blinn-phong", "blinn-phong-reciprocal", "ggx", "ggx-multi"],
+        unbuilt: &[],
+        default: "ggx",
+        about: "rough reflection (B1, B5, B6)",
+    },
+    Knob {
+        name: "reflection",
+        rungs: &["off", "environment"],
+        unbuilt: &["screen", "ray"],
+        default: "environment",
+        about: "what a surface mirrors (F4)",
+    },
+    Knob { name: "refraction", rungs: &["off"], unbuilt: &["screen", "ray"], default: "off", about: "bent transmission (F5)" },
+    Knob {
+        name: "absorption",
+        rungs: &["off", "thickness"],
+        unbuilt: &["path", "march"],
+        default: "thickness",
+        about: "light lost inside media (A1, A2)",
+    },
+    Knob {
+        name: "indirect",
+        rungs: &["off", "ambient"],
+        unbuilt: &["path"],
+        default: "ambient",
+        about: "diffuse light from all around (R6)",
+    },
+    Knob { name: "lights", rungs: &["points"], unbuilt: &["area"], default: "points", about: "extent of lights (R2)" },
+    Knob { name: "samples", rungs: &["1", "4", "16", "64", "256", "1024"], unbuilt: &[], default: "4", about: "samples per pixel" },
+    Knob { name: "colour", rungs: &["rgb"], unbuilt: &["spectral"], default: "rgb", about: "wavelengths (C1–C3)" },
+    Knob { name: "arithmetic", rungs: &["stable"], unbuilt: &["fast", "compensated"], default: "stable", about: "form of the formulas" },
+    Knob { name: "normals", rungs: &["oct32"], unbuilt: &["oct16", "oct24", "f32"], default: "oct32", about: "stored normals" },
+    Knob { name: "position", rungs: &["depth"], unbuilt: &["stored"], default: "depth", about: "stored positions" },
+];
+
+/// A rung for every knob.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Knobs {
+    rungs: Vec<usize>,
+}
+
+impl Default for Knobs {
+    fn default() -> Self {
+        let rung = |knob: &Knob| knob.rungs.iter().position(|r| *r == knob.default).unwrap_or_default();
+        Self { rungs: KNOBS.iter().map(rung).collect() }
+    }
+}
+
+impl Knobs {
+    /// Applies one `KNOB=RUNG`.
+    ///
+    /// # Errors
+    /// One sentence when there is no such knob or rung, or it is not built yet.
+    pub fn set(&mut self, choice: &str) -> Result<()> {
+        let Some((name, rung)) = choice.split_once('=') else {
+            bail!("--set {choice}: expected KNOB=RUNG, for example samples=16");
+        };
+        let Some((index, knob)) = KNOBS.iter().enumerate().find(|(_, knob)| knob.name == name) else {
+            let names: Vec<_> = KNOBS.iter().map(|knob| knob.name).collect();
+            bail!("--set {choice}: no knob is called \"{name}\"; there are {}", names.join(", "));
+        };
+        if let Some(found) = knob.rungs.iter().position(|r| *r == rung) {
+            self.rungs[index] = found;
+            return Ok(());
+        }
+        let stem = rung.split(':').next().unwrap_or(rung);
+        if knob.unbuilt.contains(&stem) {
+            bail!("--set {choice}: the rung \"{rung}\" is not built yet; {name} has {}", knob.rungs.join(", "));
+        }
+        bail!("--set {choice}: {name} has no rung \"{rung}\", it has {}", knob.rungs.join(", "));
+    }
+
+    /// The chosen rung of a knob.
+    ///
+    /// # Panics
+    /// When there is no such knob: our mistake.
+    #[must_use]
+    pub fn rung(&self, name: &str) -> &'static str {
+        let index = KNOBS.iter().position(|knob| knob.name == name).expect("a knob of the table");
+        KNOBS[index].rungs[self.rungs[index]]
+    }
+
+    /// Place of the chosen rung in the knob's list.
+    ///
+    /// # Panics
+    /// As [`Knobs::rung`].
+    #[must_use]
+    pub fn index(&self, name: &str) -> u32 {
+        let index = KNOBS.iter().position(|knob| knob.name == name).expect("a knob of the table");
+        self.rungs[index] as u32
+    }
+
+    /// Samples per pixel.
+    #[must_use]
+    pub fn samples(&self) -> u32 {
+        4_u32.pow(self.index("samples"))
+    }
+
+    /// (knob, rung) in table order.
+    #[must_use]
+    pub fn list(&self) -> Vec<(&'static str, &'static str)> {
+        KNOBS.iter().map(|knob| (knob.name, self.rung(knob.name))).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_are_powers_of_four_as_named() {
+        let mut knobs = Knobs::default();
+        for rung in ["1", "4", "16", "64", "256", "1024"] {
+            knobs.set(&format!("samples={rung}")).unwrap();
+            assert_eq!(knobs.samples().to_string(), rung);
+        }
+    }
+
+    #[test]
+    fn defaults_exist_and_names_are_unique() {
+        for (i, knob) in KNOBS.iter().enumerate() {
+            assert!(knob.rungs.contains(&knob.default), "{}", knob.name);
+            assert!(KNOBS[..i].iter().all(|other| other.name != knob.name), "{}", knob.name);
+        }
+    }
+
+    #[test]
+    fn wrong_choices_say_what_there_is() {
+        let mut knobs = Knobs::default();
+        for (choice, said) in [
+            ("shadows=ray", "not built yet"),
+            ("absorption=march:8", "not built yet"),
+            ("brdf=oren", "no rung"),
+            ("gloss=1", "no knob"),
+            ("samples", "KNOB=RUNG"),
+        ] {
+            let error = knobs.set(choice).unwrap_err().to_string();
+            assert!(error.contains(said), "{error}");
+        }
+        assert_eq!(knobs, Knobs::default());
+    }
+}
