@@ -276,8 +276,19 @@ fn find_source(meta: &MetaData) -> Result<Source> {
     )
 }
 
-/// Channels of the first flat part by name, in the order of the file, with the part's size: half samples become f32.
-pub fn read_channels(path: &Path) -> Result<(u32, u32, Vec<(String, AovData)>)> {
+/// All channels of one part of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channels {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Full name (`R`, `normal.X`) and `width * height` samples of each, in the order of their names.
+    pub list: Vec<(String, AovData)>,
+}
+
+/// Every channel of the first flat part, with the extent of its data window; half samples become f32.
+pub fn read_channels(path: &Path) -> Result<Channels> {
     let bytes = super::file::read(path)?;
     let read = || -> Result<_> {
         let meta = MetaData::read_from_buffered(Cursor::new(&bytes), false).map_err(|error| anyhow!("{error}"))?;
@@ -297,7 +308,7 @@ pub fn read_channels(path: &Path) -> Result<(u32, u32, Vec<(String, AovData)>)> 
             };
             (channel.name.to_string(), samples)
         });
-        Ok((layer.size.x() as u32, layer.size.y() as u32, channels.collect()))
+        Ok(Channels { width: layer.size.x() as u32, height: layer.size.y() as u32, list: channels.collect() })
     };
     read().with_context(|| format!("reading {}", path.display()))
 }

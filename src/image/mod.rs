@@ -1,11 +1,12 @@
 //! Pictures as data: reading, writing, comparing.
 //!
 //! Nothing here knows Vulkan. A render ends in a [`Picture`] of scene-linear radiance; [`exr`] keeps it as it is,
-//! [`tone`] brings it to display values and [`png`] keeps those. [`file`] puts bytes
+//! [`tone`] brings it to display values and [`png`] keeps those. [`metric`] compares two pictures, [`file`] puts bytes
 //! on disk so that a partial file is never seen.
 
 pub mod exr;
 pub mod file;
+pub mod metric;
 pub mod png;
 pub mod tone;
 

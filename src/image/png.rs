@@ -67,7 +67,7 @@ pub fn decode_display(bytes: &[u8]) -> Result<Display> {
     let known = [::image::ImageFormat::Png, ::image::ImageFormat::Jpeg, ::image::ImageFormat::WebP];
     ensure!(
         reader.format().is_some_and(|format| known.contains(&format)),
-        "the contents are neither PNG nor JPEG nor WebP"
+        "the contents are not a picture of a known kind (OpenEXR for radiance; PNG, JPEG or WebP for display values)"
     );
     let mut limits = ::image::Limits::default();
     limits.max_alloc = Some(super::MAX_PIXELS * 8);

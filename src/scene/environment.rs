@@ -86,9 +86,9 @@ impl Environment {
         let (width, height) = (512u32, 256u32);
         let boxes = [
             // Towards, half width and height as tangents of angles, radiance.
-            SoftBox::new(DVec3::new(-0.62, 0.58, 0.68), [0.36, 0.46], [12.4, 12.0, 11.5]),
-            SoftBox::new(DVec3::new(0.90, 0.22, 0.42), [0.34, 0.52], [2.7, 2.8, 3.0]),
-            SoftBox::new(DVec3::new(0.38, 0.52, -0.86), [0.62, 0.20], [6.6, 6.7, 7.0]),
+            SoftBox::new(DVec3::new(-0.62, 0.58, 0.68), [0.31, 0.40], [12.4, 12.0, 11.5]),
+            SoftBox::new(DVec3::new(0.90, 0.22, 0.42), [0.30, 0.46], [2.7, 2.8, 3.0]),
+            SoftBox::new(DVec3::new(0.38, 0.52, -0.86), [0.52, 0.17], [6.6, 6.7, 7.0]),
         ];
         let radiance = (0..height)
             .into_par_iter()
