@@ -2,6 +2,7 @@
 //!
 //! glTF (and OBJ/MTL) in, radiance out: raster G-buffer → deferred lighting → tone map, written directly against `ash`.
 
+pub mod cli;
 pub mod gpu;
 pub mod image;
 pub mod scene;

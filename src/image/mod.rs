@@ -1,1 +1,131 @@
 //! Pictures as data: reading, writing, comparing.
+//!
+//! Nothing here knows Vulkan. A render ends in a [`Picture`] of scene-linear radiance; [`exr`] keeps it as it is,
+//! [`tone`] brings it to display values and [`png`] keeps those. [`metric`] compares two pictures, [`file`] puts bytes
+//! on disk so that a partial file is never seen.
+
+pub mod exr;
+pub mod file;
+pub mod metric;
+pub mod png;
+pub mod tone;
+
+use serde::Serialize;
+
+/// Largest picture that is read or written, in pixels: 16384 x 8192, the largest environment map in common use.
+///
+/// The limit keeps a damaged header from asking for more memory than the machine has.
+pub const MAX_PIXELS: u64 = 1 << 27;
+
+/// A scene-linear picture.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Picture {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// `width * height` pixels, rows from the top: Rec. 709 radiance premultiplied by coverage, then coverage 0..=1.
+    pub rgba: Vec<[f32; 4]>,
+}
+
+/// One further quantity per pixel ("arbitrary output variable"), stored beside the radiance in an EXR.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Aov {
+    /// Prefix of its channels in the file: `normal` gives `normal.X`, `normal.Y`, `normal.Z`.
+    pub name: String,
+    /// Channel names in sample order: `["R", "G", "B"]`, `["X", "Y", "Z"]`, `["Z"]`, `["id"]`.
+    pub channels: Vec<String>,
+    /// `width * height * channels.len()` samples, rows from the top, the channels of a pixel side by side.
+    pub samples: AovData,
+}
+
+/// Samples of an [`Aov`].
+#[derive(Debug, Clone, PartialEq)]
+pub enum AovData {
+    /// Measured quantities.
+    F32(Vec<f32>),
+    /// Identifiers and counts.
+    U32(Vec<u32>),
+}
+
+impl AovData {
+    /// Number of samples over all pixels and channels.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F32(samples) => samples.len(),
+            Self::U32(samples) => samples.len(),
+        }
+    }
+
+    /// Whether there are no samples.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// What the colour samples of a picture hold, counted before anything clamps (product.md, `image` of the report).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Statistics {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// NaN samples among the three colours and coverage.
+    pub nan: u64,
+    /// Infinite samples among the three colours and coverage.
+    pub inf: u64,
+    /// Finite samples below zero among the three colours and coverage.
+    pub negative: u64,
+    /// Smallest finite colour sample; 0 when there is none.
+    pub min: f64,
+    /// Largest finite colour sample; 0 when there is none.
+    pub max: f64,
+    /// Mean of the finite colour samples; 0 when there is none.
+    pub mean: f64,
+}
+
+impl Picture {
+    /// A picture of one colour.
+    pub fn filled(width: u32, height: u32, rgba: [f32; 4]) -> Self {
+        Self { width, height, rgba: vec![rgba; width as usize * height as usize] }
+    }
+
+    /// Counts and extremes of the samples, in one pass and f64.
+    pub fn statistics(&self) -> Statistics {
+        let mut found = Statistics {
+            width: self.width,
+            height: self.height,
+            nan: 0,
+            inf: 0,
+            negative: 0,
+            min: f64::INFINITY,
+            max: f64::NEG_INFINITY,
+            mean: 0.0,
+        };
+        let mut finite = 0u64;
+        for pixel in &self.rgba {
+            for (channel, &sample) in pixel.iter().enumerate() {
+                if sample.is_nan() {
+                    found.nan += 1;
+                } else if sample.is_infinite() {
+                    found.inf += 1;
+                } else {
+                    found.negative += u64::from(sample < 0.0);
+                    if channel < 3 {
+                        let sample = f64::from(sample);
+                        finite += 1;
+                        found.min = found.min.min(sample);
+                        found.max = found.max.max(sample);
+                        found.mean += sample;
+                    }
+                }
+            }
+        }
+        if finite == 0 {
+            (found.min, found.max) = (0.0, 0.0);
+        } else {
+            found.mean /= finite as f64;
+        }
+        found
+    }
+}

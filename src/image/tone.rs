@@ -1,0 +1,158 @@
+//! From scene-linear radiance to display values: tone curves and the sRGB transfer, in f64.
+//!
+//! These functions are the truth that the GLSL of the same names is tested against. Every curve takes exposed linear
+//! Rec. 709 radiance and gives linear display light in 0..=1; [`srgb_encode`] and [`quantise`] follow. Before any
+//! curve a sample is made usable: NaN and negative become 0 and values above [`LARGEST`], infinity included, become
+//! [`LARGEST`], so no curve returns NaN. Counting such samples is the caller's duty, before this.
+
+use clap::ValueEnum;
+use serde::Serialize;
+
+/// Where samples are cut off before a curve: the largest finite half float (numerics.md row 43).
+pub const LARGEST: f64 = 65504.0;
+
+/// How radiance becomes display light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ToneMap {
+    /// Radiance as it is, cut at 1.
+    Linear,
+    /// x / (1 + x) for each channel (Reinhard et al. 2002, equation 3, on channels instead of luminance).
+    Reinhard,
+    /// Stephen Hill's fit of the ACES RRT and sRGB ODT.
+    Aces,
+    /// Troy Sobotka's AgX, base look, in Benjamin Wrensch's polynomial form.
+    Agx,
+    /// Khronos PBR Neutral: base colours under grey light come out as they went in.
+    #[default]
+    KhronosNeutral,
+}
+
+impl ToneMap {
+    /// Linear display light in 0..=1 for exposed linear Rec. 709 radiance.
+    pub fn apply(self, rgb: [f64; 3]) -> [f64; 3] {
+        match self {
+            Self::Linear => linear(rgb),
+            Self::Reinhard => reinhard(rgb),
+            Self::Aces => aces(rgb),
+            Self::Agx => agx(rgb),
+            Self::KhronosNeutral => khronos_neutral(rgb),
+        }
+    }
+
+    /// Display bytes for exposed linear Rec. 709 radiance: curve, sRGB transfer, rounding.
+    pub fn to_display(self, rgb: [f64; 3]) -> [u8; 3] {
+        self.apply(rgb).map(|light| quantise(srgb_encode(light)))
+    }
+}
+
+/// NaN and negative to 0, too large to [`LARGEST`].
+fn usable(sample: f64) -> f64 {
+    if sample > 0.0 { sample.min(LARGEST) } else { 0.0 }
+}
+
+fn unit(rgb: [f64; 3]) -> [f64; 3] {
+    rgb.map(|light| light.clamp(0.0, 1.0))
+}
+
+/// Matrix given by rows, times a column.
+fn transform(rows: &[[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
+    rows.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
+}
+
+/// Cut at 1.
+pub fn linear(rgb: [f64; 3]) -> [f64; 3] {
+    unit(rgb.map(usable))
+}
+
+/// x / (1 + x), channel by channel; 1 is reached only in the limit.
+pub fn reinhard(rgb: [f64; 3]) -> [f64; 3] {
+    rgb.map(usable).map(|x| x / (1.0 + x))
+}
+
+/// sRGB to the RRT's working space with its saturation, rows (Hill, "ACES fitted", BakingLab `ACES.hlsl`).
+pub const ACES_IN: [[f64; 3]; 3] =
+    [[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]];
+
+/// ODT saturation and back to sRGB, rows (the same source).
+pub const ACES_OUT: [[f64; 3]; 3] =
+    [[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]];
+
+/// Stephen Hill's fit of the ACES reference rendering and output transforms for sRGB screens.
+///
+/// No exposure of 1/0.6 is applied before it, unlike in some engines: exposure is `--exposure`.
+pub fn aces(rgb: [f64; 3]) -> [f64; 3] {
+    let fitted = transform(&ACES_IN, rgb.map(usable)).map(|v| {
+        let above = v * (v + 0.0245786) - 0.000090537;
+        let below = v * (0.983729 * v + 0.4329510) + 0.238081;
+        above / below
+    });
+    unit(transform(&ACES_OUT, fitted))
+}
+
+/// Inset of AgX, rows (Wrensch, "Minimal AgX Implementation", iolite-engine.com; GLSL gives it by columns).
+pub const AGX_IN: [[f64; 3]; 3] = [
+    [0.842479062253094, 0.0784335999999992, 0.0792237451477643],
+    [0.0423282422610123, 0.878468636469772, 0.0791661274605434],
+    [0.0423756549057051, 0.0784336, 0.879142973793104],
+];
+
+/// Outset of AgX, rows (the same source).
+pub const AGX_OUT: [[f64; 3]; 3] = [
+    [1.19687900512017, -0.0980208811401368, -0.0990297440797205],
+    [-0.0528968517574562, 1.15190312990417, -0.0989611768448433],
+    [-0.0529716355144438, -0.0980434501171241, 1.15107367264116],
+];
+
+/// Smallest and largest log2 radiance of AgX: 10 stops below and 6.5 above middle grey 0.18.
+pub const AGX_EV: [f64; 2] = [-12.47393, 4.026069];
+
+/// AgX base look: inset, log2 encoding, the sixth-degree polynomial of its contrast curve, outset, exponent 2.2.
+///
+/// The exponent undoes the display encoding that AgX ends in, because the sRGB transfer follows here for every curve.
+pub fn agx(rgb: [f64; 3]) -> [f64; 3] {
+    let [low, high] = AGX_EV;
+    let curve = transform(&AGX_IN, rgb.map(usable)).map(|v| {
+        // log2 of 0 is minus infinity and lands on the lower end.
+        let x = (v.log2().clamp(low, high) - low) / (high - low);
+        let (x2, x4) = (x * x, x * x * x * x);
+        15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x - 0.00232
+    });
+    unit(transform(&AGX_OUT, curve).map(|v| v.max(0.0).powf(2.2)))
+}
+
+/// Khronos PBR Neutral tone mapper (Khronos ToneMapping specification, `pbrNeutral.glsl`): F90 0.04, compression from
+/// 0.8 - 0.04, desaturation 0.15.
+pub fn khronos_neutral(rgb: [f64; 3]) -> [f64; 3] {
+    const START: f64 = 0.8 - 0.04;
+    const DESATURATION: f64 = 0.15;
+    let rgb = rgb.map(usable);
+    let low = rgb[0].min(rgb[1]).min(rgb[2]);
+    let offset = if low < 0.08 { low - 6.25 * low * low } else { 0.04 };
+    let rgb = rgb.map(|x| x - offset);
+    let peak = rgb[0].max(rgb[1]).max(rgb[2]);
+    if peak < START {
+        return unit(rgb);
+    }
+    let d = 1.0 - START;
+    let new_peak = 1.0 - d * d / (peak + d - START);
+    let g = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
+    unit(rgb.map(|x| x * (new_peak / peak)).map(|x| x * (1.0 - g) + new_peak * g))
+}
+
+/// sRGB transfer of IEC 61966-2-1: linear light in 0..=1 (cut outside, NaN as 0) to a display value in 0..=1.
+pub fn srgb_encode(light: f64) -> f64 {
+    let light = usable(light).min(1.0);
+    if light <= 0.0031308 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Inverse of [`srgb_encode`]: a display value in 0..=1 (cut outside, NaN as 0) to linear light in 0..=1.
+pub fn srgb_decode(display: f64) -> f64 {
+    let display = usable(display).min(1.0);
+    if display <= 0.04045 { display / 12.92 } else { ((display + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Display value in 0..=1 (cut outside, NaN as 0) to eight bits, halves up: floor(255 x + 1/2).
+pub fn quantise(display: f64) -> u8 {
+    (usable(display).min(1.0) * 255.0 + 0.5).floor() as u8
+}
