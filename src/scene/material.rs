@@ -69,6 +69,19 @@ pub struct Material {
     pub clearcoat_normal_texture: Option<TextureRef>,
     /// Abbe-like dispersion 20/V_d (KHR_materials_dispersion).
     pub dispersion: f32,
+    /// The raw Phong numbers of an OBJ/MTL material, for the passes that show that model as it was written.
+    pub phong: Option<Phong>,
+}
+
+/// What an MTL file says, before it is folded into the fields above.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Phong {
+    /// Diffuse colour `Kd`, without its texture.
+    pub kd: [f32; 3],
+    /// Specular colour `Ks`.
+    pub ks: [f32; 3],
+    /// Specular exponent `Ns`.
+    pub shine: f32,
 }
 
 /// glTF 2.0 section 3.9.4.
@@ -168,6 +181,7 @@ impl Default for Material {
             clearcoat_roughness_texture: None,
             clearcoat_normal_texture: None,
             dispersion: 0.0,
+            phong: None,
         }
     }
 }

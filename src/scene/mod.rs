@@ -3,16 +3,53 @@
 //! Nothing here knows Vulkan. A [`Scene`] comes from [`load`] (glTF, OBJ) or from [`crate::study`];
 //! the passes upload it. Lengths are metres, the world is right-handed with +Y up as in glTF 2.0 section 3.4.
 
+mod accessor;
 pub mod camera;
+mod container;
 pub mod environment;
+mod geometry;
+mod gltf_import;
+mod gltf_material;
 pub mod light;
 pub mod material;
+mod nodes;
+mod obj;
+mod pictures;
+mod thin;
 
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
 use glam::{DAffine3, DVec3};
 
 pub use camera::{Camera, Projection};
 pub use light::{Light, LightKind};
-pub use material::{AlphaMode, Material, Sampler, TextureRef, Wrap};
+pub use material::{AlphaMode, Material, Phong, Sampler, TextureRef, Wrap};
+
+/// What [`load`] may be told.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct LoadOptions {
+    /// Animation time in seconds at which the scene is frozen; all animations of the file play together, each
+    /// channel clamped to its own range. `None` is the rest pose stored in the file: node transforms and default
+    /// weights as written, skins evaluated with them.
+    pub time: Option<f64>,
+}
+
+/// Reads a scene from a glTF 2.0 file (`.gltf`, `.glb`) or a Wavefront file (`.obj`).
+///
+/// # Errors
+/// One sentence when printed with `{:#}`: the file, the place in it and what is wrong there.
+pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    let scene = match extension.as_str() {
+        "gltf" | "glb" => gltf_import::load(path, options),
+        "obj" => obj::load(path),
+        _ => {
+            bail!("loading {}: only .gltf, .glb and .obj files are supported", path.display())
+        }
+    };
+    scene.with_context(|| format!("loading {}", path.display()))
+}
 
 /// Everything a picture is made from.
 #[derive(Debug, Clone, Default)]
