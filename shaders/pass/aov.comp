@@ -17,10 +17,11 @@ layout(set = 0, binding = 4, rgba16_snorm) readonly uniform image2D normals;
 layout(set = 0, binding = 5, rg32ui) readonly uniform uimage2D ids;
 layout(set = 0, binding = 6, rgba16f) readonly uniform image2D emissive;
 layout(scalar, set = 0, binding = 7) writeonly buffer Pixels { AovPixel pixels[]; };
+layout(push_constant, scalar) uniform Push { uint first_row; uint end_row; };
 
 void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, first_row);
+    if (any(greaterThanEqual(uvec2(pixel), uvec2(camera.size.x, end_row)))) return;
     float z = texelFetch(depth, pixel, 0).x;
     AovPixel result = AovPixel(vec3(0), vec3(0), vec3(0), vec3(0), 0, 0, 0, vec3(0), 0, 0);
     if (z > 0.0) {
@@ -40,5 +41,5 @@ void main() {
         result.material = 1 + (id.x & 0xffffu);
         result.instance = 1 + (id.y & 0xffffffu);
     }
-    pixels[pixel.y * camera.size.x + pixel.x] = result;
+    pixels[(pixel.y - first_row) * camera.size.x + pixel.x] = result;
 }

@@ -84,7 +84,7 @@ pub struct Raster<'a> {
     /// Name in labels and timings.
     pub name: &'a str,
     /// Colour attachments in location order.
-    pub colors: &'a [ColorTarget<'a>],
+    pub colors: Vec<ColorTarget<'a>>,
     /// Depth attachment.
     pub depth: Option<DepthTarget<'a>>,
     /// Size of the viewport in pixels.
@@ -235,7 +235,7 @@ impl<'a> Frame<'a> {
         assert_eq!(push.len(), program.push_bytes as usize, "push constants of \"{}\"", program.name);
         let mut uses = Vec::new();
         let none = vk::ShaderStageFlags::empty();
-        for color in raster.colors {
+        for color in &raster.colors {
             self.use_image(&mut uses, color.image, Access::ColorTarget, none);
         }
         if let Some(depth) = raster.depth {

@@ -8,7 +8,7 @@ use crate::gpu::{Buffer, Frame, Sampled, SamplerDesc};
 use crate::plan::Plan;
 use crate::shader::aov;
 
-/// Writes one [`crate::share::AovPixel`] per pixel.
+/// Writes one [`crate::share::AovPixel`] per pixel of the rows from `rows[0]` up to `rows[1]`.
 ///
 /// # Errors
 /// When the driver refuses the pipeline.
@@ -19,6 +19,7 @@ pub fn aov<'a>(
     camera: &'a Buffer,
     gbuffer: &'a GBuffer,
     pixels: &'a Buffer,
+    rows: [u32; 2],
 ) -> Result<()> {
     let bind = aov::Bind {
         camera_block: camera,
@@ -32,7 +33,7 @@ pub fn aov<'a>(
     };
     let size = gbuffer.depth.desc();
     let constants = aov::Constants { has_emissive: plan.emissive }.words();
-    frame.compute_over("AOVs", &bind, constants, &[], [size.width, size.height])?;
+    frame.compute_over("AOVs", &bind, constants, bytemuck::cast_slice(&rows), [size.width, rows[1] - rows[0]])?;
     frame.read_back(pixels);
     Ok(())
 }

@@ -118,7 +118,7 @@ pub fn fragments<'a>(
     // An empty raster pass clears the heads; one that draws could not, it exchanges them atomically.
     let clear = Raster {
         name: "clear fragment lists",
-        colors: &[ColorTarget { image: &lists.heads, clear: Some([u32::MAX; 4]) }],
+        colors: vec![ColorTarget { image: &lists.heads, clear: Some([u32::MAX; 4]) }],
         depth: None,
         size: lists.size,
         rows,
@@ -152,7 +152,7 @@ pub fn fragments<'a>(
     frame.raster(&clear, &fragments::PROGRAM, &bindings[..0], bytemuck::cast_slice(&push), Vec::new())?;
     let raster = Raster {
         name: "see-through fragments",
-        colors: &[],
+        colors: Vec::new(),
         depth: Some(DepthTarget { image: &gbuffer.depth, clear: false, write: false }),
         size: lists.size,
         rows,

@@ -106,7 +106,7 @@ pub fn gbuffer<'a>(
         .collect();
     let raster = Raster {
         name: "G-buffer",
-        colors: &colors,
+        colors,
         depth: Some(DepthTarget { image: &target.depth, clear: true, write: true }),
         size: target.size,
         rows: [0, target.size[1]],

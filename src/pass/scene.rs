@@ -19,7 +19,6 @@ pub const SLOTS: usize = 10;
 
 /// Where a mesh's data lies in the scene's buffers.
 struct MeshRange {
-    first_vertex: u64,
     first_index: u32,
     index_count: u32,
     material: usize,
@@ -40,6 +39,12 @@ struct Stream {
     /// First byte of each mesh.
     offsets: Vec<u64>,
     stride: u32,
+}
+
+impl Stream {
+    fn of(&self, mesh: usize) -> VertexStream<'_> {
+        VertexStream { buffer: &self.data, offset: self.offsets[mesh], stride: self.stride }
+    }
 }
 
 /// Everything about a scene that outlives a frame.
@@ -152,10 +157,8 @@ impl SceneOnDevice {
         let colors = stream(device, "vertex colours", &scene, |m| &m.colors)?;
         let mut meshes = Vec::with_capacity(scene.meshes.len());
         let mut all_indices: Vec<u32> = Vec::with_capacity(scene.meshes.iter().map(|m| m.indices.len()).sum());
-        let mut first_vertex = 0;
         for mesh in &scene.meshes {
             meshes.push(MeshRange {
-                first_vertex,
                 first_index: all_indices.len() as u32,
                 index_count: mesh.indices.len() as u32,
                 material: mesh.material,
@@ -163,7 +166,6 @@ impl SceneOnDevice {
                 has_uvs: [!mesh.uvs[0].is_empty(), !mesh.uvs[1].is_empty()],
                 has_colors: !mesh.colors.is_empty(),
             });
-            first_vertex += mesh.positions.len() as u64;
             all_indices.extend_from_slice(&mesh.indices);
         }
         scene.meshes = Vec::new();
@@ -270,10 +272,7 @@ impl SceneOnDevice {
     fn draw(&self, instance: u32, placement: &Placement) -> Draw<'_> {
         let mesh = &self.meshes[placement.mesh];
         let material = &self.materials_cpu[mesh.material];
-        let at = |stream: &Stream| stream.offsets[placement.mesh];
-        let given = |stream: &'_ Stream| VertexStream { buffer: &stream.data, offset: at(stream), stride: stream.stride };
         let fallback = |offset| VertexStream { buffer: &self.fallback, offset, stride: 0 };
-        let or = |has: bool, stream, offset| if has { given(stream) } else { fallback(offset) };
         let textured = |slot: usize| texture_slots(material)[slot].0.is_some();
         let constants = gbuffer::Constants {
             has_base: textured(0),
@@ -285,17 +284,16 @@ impl SceneOnDevice {
             has_color: mesh.has_colors,
             masked: matches!(material.alpha_mode, AlphaMode::Mask(_)),
         };
-        debug_assert!(mesh.first_vertex * 12 == at(&self.positions));
         Draw {
             binding: self.page_of_material[mesh.material],
             constants: constants.words(),
             streams: vec![
-                given(&self.positions),
-                given(&self.normals),
-                or(mesh.has_tangents, &self.tangents, 0),
-                or(mesh.has_uvs[0], &self.uvs[0], 0),
-                or(mesh.has_uvs[1], &self.uvs[1], 0),
-                or(mesh.has_colors, &self.colors, 16),
+                self.positions.of(placement.mesh),
+                self.normals.of(placement.mesh),
+                if mesh.has_tangents { self.tangents.of(placement.mesh) } else { fallback(0) },
+                if mesh.has_uvs[0] { self.uvs[0].of(placement.mesh) } else { fallback(0) },
+                if mesh.has_uvs[1] { self.uvs[1].of(placement.mesh) } else { fallback(0) },
+                if mesh.has_colors { self.colors.of(placement.mesh) } else { fallback(16) },
             ],
             indices: &self.indices,
             first_index: mesh.first_index,

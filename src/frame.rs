@@ -1,0 +1,342 @@
+//! The score: the whole frame, one call per pass, top to bottom. See [`Renderer::sample`].
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use anyhow::{Result, bail};
+use ash::vk;
+
+use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, PassTime, Place};
+use crate::image::tone::ToneMap;
+use crate::image::{Picture, png};
+use crate::pass::accumulate::accumulate;
+use crate::pass::aov::aov;
+use crate::pass::composite::composite;
+use crate::pass::environment::{EnvironmentOnDevice, Turn};
+use crate::pass::fragments::{FragmentLists, fragments};
+use crate::pass::gbuffer::{GBuffer, gbuffer};
+use crate::pass::light::{Lighting, light};
+use crate::pass::scene::SceneOnDevice;
+use crate::pass::tiles::{Tiles, tiles};
+use crate::pass::tonemap::{Counts, Display, tonemap};
+use crate::pass::view::{View, jitter};
+use crate::plan::{Knobs, Plan, Surroundings};
+use crate::scene::environment::Environment;
+use crate::scene::{Camera, Scene};
+use crate::share::{self, AovPixel};
+
+/// What lies behind the scene.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Background {
+    /// The environment where there is one; else nothing, which a PNG shows as [`NEUTRAL_GREY`].
+    #[default]
+    Default,
+    /// The environment.
+    Environment,
+    /// Nothing: transparent in every output.
+    Transparent,
+    /// A display colour (sRGB bytes).
+    Color([u8; 3]),
+}
+
+/// Grey behind a scene without an environment, as sRGB bytes.
+pub const NEUTRAL_GREY: [u8; 3] = [119; 3];
+
+/// How a picture is made; everything that does not change between the frames of a sequence.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Pixels.
+    pub size: [u32; 2],
+    /// Rungs.
+    pub knobs: Knobs,
+    /// Tone curve of the display output.
+    pub tonemap: ToneMap,
+    /// Exposure in stops.
+    pub exposure: f32,
+    /// What lies behind.
+    pub background: Background,
+    /// Multiplies the environment.
+    pub environment_intensity: f32,
+    /// Turns the environment about +Y, in degrees.
+    pub environment_rotation: f32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            size: [1280, 720],
+            knobs: Knobs::default(),
+            tonemap: ToneMap::default(),
+            exposure: 0.0,
+            background: Background::default(),
+            environment_intensity: 1.0,
+            environment_rotation: 0.0,
+        }
+    }
+}
+
+/// A picture that has been drawn.
+pub struct Rendered {
+    /// RGBA8, sRGB-encoded, rows from the top.
+    pub display: Vec<u8>,
+    /// Whether `display` has transparency.
+    pub has_alpha: bool,
+    /// Values that are no radiances, counted before anything clamped.
+    pub counts: Counts,
+    /// Pixels whose list of see-through fragments was too long for one invocation: their farthest were left out.
+    pub dropped: u32,
+    /// GPU time per pass, summed over the samples, in the order of the frame.
+    pub passes: Vec<PassTime>,
+}
+
+/// A scene on a device, ready to be drawn from any camera.
+pub struct Renderer {
+    device: Arc<Device>,
+    /// What will be done and why.
+    pub plan: Plan,
+    settings: Settings,
+    scene: SceneOnDevice,
+    environment: EnvironmentOnDevice,
+    gbuffer: GBuffer,
+    tiles: Tiles,
+    lists: Option<FragmentLists>,
+    radiance: Image,
+    /// The mean of the samples, where there is more than one.
+    film: Option<Image>,
+    display: Display,
+    camera: Buffer,
+}
+
+impl Renderer {
+    /// Plans, uploads and prefilters.
+    ///
+    /// # Errors
+    /// When the scene has nothing to draw, the size is out of range, or it does not fit the device.
+    pub fn new(
+        device: &Arc<Device>,
+        scene: Scene,
+        environment: Option<&Environment>,
+        settings: Settings,
+    ) -> Result<Self> {
+        let size = settings.size;
+        let limit = device.max_image_size();
+        if size.contains(&0) || size.iter().any(|&side| side > limit) {
+            bail!("--size {}x{}: a picture has 1 to {limit} pixels a side on this device", size[0], size[1]);
+        }
+        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        if pixels * 4 > device.max_storage_bytes() {
+            let most = device.max_storage_bytes() / 4;
+            bail!("--size {}x{}: this device holds at most {most} pixels in one picture", size[0], size[1]);
+        }
+        if scene.triangles() == 0 {
+            bail!("{}: there is nothing to draw, the scene has 0 triangles", scene.name);
+        }
+        let sky = match settings.background {
+            Background::Default | Background::Environment => environment.is_some(),
+            Background::Transparent | Background::Color(_) => false,
+        };
+        if settings.background == Background::Environment && environment.is_none() {
+            bail!("--background env: there is no environment (--env none, or the scene has lights of its own)");
+        }
+        let surroundings = Surroundings { environment: environment.is_some(), sky };
+        let plan = Plan::new(&scene, surroundings, &settings.knobs);
+        let turn = Turn { intensity: settings.environment_intensity, rotation: settings.environment_rotation };
+        let target = |name| {
+            let usage = vk::ImageUsageFlags::STORAGE;
+            Image::new(device, name, ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], usage))
+        };
+        Ok(Self {
+            environment: EnvironmentOnDevice::new(device, &plan, environment, turn)?,
+            scene: SceneOnDevice::new(device, scene, &settings.knobs)?,
+            gbuffer: GBuffer::new(device, &plan, size)?,
+            tiles: Tiles::new(device, &plan, size)?,
+            lists: if plan.see_through { Some(FragmentLists::new(device, size)?) } else { None },
+            radiance: target("radiance")?,
+            film: if plan.samples > 1 { Some(target("film")?) } else { None },
+            display: Display::new(device, size)?,
+            camera: Buffer::new(device, "camera", size_of::<share::Camera>() as u64, Place::Upload)?,
+            device: device.clone(),
+            plan,
+            settings,
+        })
+    }
+
+    /// Draws the scene from a camera.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn render(&mut self, camera: &Camera, progress: &mut dyn FnMut(u32, u32)) -> Result<Rendered> {
+        let view = View::new(camera, self.settings.size, self.scene.bounds);
+        self.scene.look_from(&view);
+        let mut times = Times::default();
+        let count = self.plan.samples;
+        for index in 0..count {
+            // A frame whose see-through fragments did not fit is drawn again with more room.
+            loop {
+                times.add(self.sample(&view, index, count)?);
+                let fitted = match &mut self.lists {
+                    Some(lists) => lists.fitted()?,
+                    None => true,
+                };
+                if fitted {
+                    break;
+                }
+            }
+            progress(index + 1, count);
+        }
+        let (background, has_alpha) = self.display_background();
+        let mut frame = Frame::new(&self.device);
+        let film = self.film.as_ref().unwrap_or(&self.radiance);
+        tonemap(&mut frame, film, &self.display, self.settings.tonemap as u32, self.settings.exposure, background)?;
+        times.add(frame.finish()?);
+        Ok(Rendered {
+            display: self.display.pixels.read(<[u8]>::to_vec),
+            has_alpha,
+            counts: self.display.counts(),
+            dropped: self.lists.as_ref().map_or(0, FragmentLists::dropped),
+            passes: times.list(),
+        })
+    }
+
+    /// One sample of every pixel: the frame, pass by pass.
+    fn sample(&mut self, view: &View, index: u32, count: u32) -> Result<Vec<PassTime>> {
+        self.camera.write(bytemuck::bytes_of(&view.shared(jitter(index, count))));
+        let Self { device, plan, scene, camera, gbuffer: g, tiles: lists_of_lights, lists, radiance, .. } = &*self;
+        // With n samples a pixel each one stands for 1/n of its area: textures are read that much sharper.
+        let lod_bias = -0.5 * (count as f32).log2();
+        let lighting = Lighting {
+            plan,
+            knobs: &self.settings.knobs,
+            scene,
+            tiles: lists_of_lights,
+            environment: &self.environment,
+            camera,
+            size: self.settings.size,
+        };
+
+        let mut frame = Frame::new(device);
+        gbuffer(&mut frame, scene, camera, g, lod_bias)?;
+        if plan.tiles {
+            tiles(&mut frame, plan, scene, camera, g, lists_of_lights)?;
+        }
+        light(&mut frame, lighting, g, radiance)?;
+        if let Some(lists) = lists {
+            frame.fill("reset fragment counters", &lists.counters, 0);
+            for (strip, rows) in lists.strips().into_iter().enumerate() {
+                fragments(&mut frame, scene, camera, g, lists, strip as u32, rows, lod_bias)?;
+                composite(&mut frame, lighting, lists, radiance, rows)?;
+            }
+            frame.read_back(&lists.counters);
+            frame.read_back(&lists.dropped);
+        }
+        if let Some(film) = &self.film {
+            accumulate(&mut frame, radiance, film, index, count)?;
+        }
+        frame.finish()
+    }
+
+    /// Display-linear colour behind the scene with alpha 1, or all 0, and whether the display output is transparent.
+    fn display_background(&self) -> ([f32; 4], bool) {
+        let linear = |bytes: [u8; 3]| {
+            let [r, g, b] = bytes.map(|byte| crate::image::tone::srgb_decode(f64::from(byte) / 255.0) as f32);
+            ([r, g, b, 1.0], false)
+        };
+        match self.settings.background {
+            Background::Color(bytes) => linear(bytes),
+            Background::Transparent => ([0.0; 4], true),
+            Background::Default | Background::Environment => linear(NEUTRAL_GREY),
+        }
+    }
+
+    /// The scene-linear film of the last render.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn film(&self) -> Result<Picture> {
+        let [width, height] = self.settings.size;
+        let film = self.film.as_ref().unwrap_or(&self.radiance);
+        let bytes = 16 * u64::from(width) * u64::from(height);
+        let target = Buffer::new(&self.device, "film read back", bytes, Place::Readback)?;
+        let mut frame = Frame::new(&self.device);
+        frame.download("read film", film, &target);
+        frame.read_back(&target);
+        frame.finish()?;
+        let mut rgba: Vec<[f32; 4]> = target.read(|all| bytemuck::pod_collect_to_vec(&all[..bytes as usize]));
+        if let Background::Color(color) = self.settings.background {
+            let behind = color.map(|byte| crate::image::tone::srgb_decode(f64::from(byte) / 255.0) as f32);
+            for pixel in &mut rgba {
+                let rest = 1.0 - pixel[3];
+                for (value, behind) in pixel.iter_mut().zip(behind) {
+                    *value += rest * behind;
+                }
+                pixel[3] = 1.0;
+            }
+        }
+        Ok(Picture { width, height, rgba })
+    }
+
+    /// The G-buffer at the pixel centres, with the eye that `p_rel` is relative to.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn aovs(&mut self, camera: &Camera) -> Result<(Vec<AovPixel>, View)> {
+        let [width, height] = self.settings.size;
+        let view = View::new(camera, self.settings.size, self.scene.bounds);
+        self.scene.look_from(&view);
+        self.camera.write(bytemuck::bytes_of(&view.shared(jitter(0, 1))));
+        let mut frame = Frame::new(&self.device);
+        gbuffer(&mut frame, &self.scene, &self.camera, &self.gbuffer, 0.0)?;
+        frame.finish()?;
+        // As many rows at a time as one storage buffer holds.
+        let row_bytes = u64::from(width) * size_of::<AovPixel>() as u64;
+        let rows = ((self.device.max_storage_bytes() / row_bytes) as u32).clamp(1, height);
+        let pixels = Buffer::new(&self.device, "AOVs", row_bytes * u64::from(rows), Place::Readback)?;
+        let mut all: Vec<AovPixel> = Vec::with_capacity(width as usize * height as usize);
+        for first in (0..height).step_by(rows as usize) {
+            let end = (first + rows).min(height);
+            let mut frame = Frame::new(&self.device);
+            aov(&mut frame, &self.plan, &self.scene, &self.camera, &self.gbuffer, &pixels, [first, end])?;
+            frame.finish()?;
+            let bytes = (row_bytes * u64::from(end - first)) as usize;
+            all.extend(pixels.read(|words| bytemuck::pod_collect_to_vec::<u8, AovPixel>(&words[..bytes])));
+        }
+        Ok((all, view))
+    }
+
+    /// The device it draws on.
+    #[must_use]
+    pub fn device(&self) -> &Arc<Device> {
+        &self.device
+    }
+
+    /// PNG bytes of a picture.
+    ///
+    /// # Errors
+    /// When encoding fails.
+    pub fn png(&self, rendered: &Rendered) -> Result<Vec<u8>> {
+        let [width, height] = self.settings.size;
+        png::encode_png(width, height, &rendered.display, rendered.has_alpha)
+    }
+}
+
+/// Pass times summed by name, in order of first appearance.
+#[derive(Default)]
+struct Times {
+    order: Vec<String>,
+    sums: BTreeMap<String, f64>,
+}
+
+impl Times {
+    fn add(&mut self, passes: Vec<PassTime>) {
+        for PassTime { name, ms } in passes {
+            if !self.sums.contains_key(&name) {
+                self.order.push(name.clone());
+            }
+            *self.sums.entry(name).or_default() += ms;
+        }
+    }
+
+    fn list(self) -> Vec<PassTime> {
+        self.order.into_iter().map(|name| PassTime { ms: self.sums[&name], name }).collect()
+    }
+}

@@ -1,0 +1,292 @@
+//! The environment on the device: the map itself, its GGX-prefiltered levels, its irradiance, and the directional
+//! reflectance of the lobe (shaders/pass/prefilter.comp).
+//!
+//! Prefiltering is done once per map and kept in the user's cache folder; a changed map or shader has another name there.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::Result;
+use ash::vk;
+use rayon::prelude::*;
+
+use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, Place, Sampled, SamplerDesc};
+use crate::image::file;
+use crate::plan::Plan;
+use crate::scene::environment::Environment;
+use crate::shader::prefilter;
+use crate::share;
+
+/// Widest level 0 of the prefiltered map; a wider environment enters it at the first mip level that fits.
+const WIDEST: u32 = 1024;
+/// Width of the level for α = 1.
+const NARROWEST: u32 = 16;
+/// Side of the table of directional reflectance, over cosθ and perceptual roughness.
+const REFLECTANCE: u32 = 32;
+
+/// The environment's images and terms; one black texel where the plan has none.
+pub struct EnvironmentOnDevice {
+    sky: Image,
+    prefiltered: Image,
+    reflectance: Image,
+    /// [`share::EnvironmentTerms`].
+    pub terms: Buffer,
+}
+
+/// How the user wants the environment.
+#[derive(Debug, Clone, Copy)]
+pub struct Turn {
+    /// Multiplies its radiance.
+    pub intensity: f32,
+    /// Degrees about +Y.
+    pub rotation: f32,
+}
+
+type Texel = [f32; 4];
+
+/// A mip chain: width, height and texels of each level.
+type Levels = Vec<(u32, u32, Vec<Texel>)>;
+
+impl EnvironmentOnDevice {
+    /// Uploads and prefilters `environment` as far as the plan asks for it.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn new(device: &Arc<Device>, plan: &Plan, environment: Option<&Environment>, turn: Turn) -> Result<Self> {
+        let lights = plan.ambient || plan.reflection;
+        let black = || vec![(1, 1, vec![[0.0; 4]])];
+        let chain = match environment {
+            Some(environment) if lights || plan.sky => box_chain(environment),
+            _ => black(),
+        };
+        let sky = image(device, "environment", &chain, vk::Format::R32G32B32A32_SFLOAT)?;
+        let levels = if plan.reflection { prefilter(device, &sky, &chain)? } else { black() };
+        let prefiltered = image(device, "prefiltered environment", &levels, vk::Format::R32G32B32A32_SFLOAT)?;
+        let table = if lights { reflectance_table() } else { vec![[0.0; 4]] };
+        let side = if lights { REFLECTANCE } else { 1 };
+        let table = vec![(side, side, table)];
+        let reflectance = image(device, "directional reflectance", &table, vk::Format::R32G32B32A32_SFLOAT)?;
+        let mut irradiance = [[0.0; 3]; 9];
+        if let (true, Some(environment)) = (plan.ambient, environment) {
+            // The cosine lobe of Ramamoorthi & Hanrahan 2001 by band.
+            use std::f64::consts::PI;
+            let lobe = |i: usize| [PI, 2.0 * PI / 3.0, PI / 4.0][usize::from(i > 0) + usize::from(i > 3)];
+            let coefficients = environment.irradiance_sh9();
+            irradiance = std::array::from_fn(|i| coefficients[i].map(|c| (c * lobe(i)) as f32));
+        }
+        let (sin, cos) = f64::from(turn.rotation).to_radians().sin_cos();
+        let terms = share::EnvironmentTerms {
+            irradiance,
+            cos_rotation: cos as f32,
+            sin_rotation: sin as f32,
+            intensity: turn.intensity,
+            width: levels[0].0 as f32,
+            levels: levels.len() as f32,
+        };
+        Ok(Self {
+            sky,
+            prefiltered,
+            reflectance,
+            terms: Buffer::with_data(device, "environment terms", &[terms])?,
+        })
+    }
+
+    /// The map as it is, for the background.
+    #[must_use]
+    pub fn sky(&self) -> Sampled<'_> {
+        Sampled { image: &self.sky, sampler: SamplerDesc::EQUIRECTANGULAR }
+    }
+
+    /// The prefiltered map.
+    #[must_use]
+    pub fn prefiltered(&self) -> Sampled<'_> {
+        Sampled { image: &self.prefiltered, sampler: SamplerDesc::EQUIRECTANGULAR }
+    }
+
+    /// Directional reflectance: F0 and F90 factors over (cosθ, roughness).
+    #[must_use]
+    pub fn reflectance(&self) -> Sampled<'_> {
+        Sampled { image: &self.reflectance, sampler: SamplerDesc::LINEAR }
+    }
+}
+
+fn image(device: &Arc<Device>, name: &str, levels: &Levels, format: vk::Format) -> Result<Image> {
+    let (width, height, _) = levels[0];
+    let desc = ImageDesc {
+        levels: levels.len() as u32,
+        ..ImageDesc::flat(format, width, height, vk::ImageUsageFlags::SAMPLED)
+    };
+    let image = Image::new(device, name, desc)?;
+    let mut offsets = Vec::with_capacity(levels.len());
+    let mut texels: Vec<Texel> = Vec::new();
+    for (.., level) in levels {
+        offsets.push(size_of_val(texels.as_slice()) as u64);
+        texels.extend_from_slice(level);
+    }
+    let staging = Buffer::with_data(device, "staging", &texels)?;
+    let mut frame = Frame::new(device);
+    frame.upload("upload environment", &staging, &image, 0, &offsets);
+    frame.finish()?;
+    Ok(image)
+}
+
+/// The map and its averages by twos, down to one texel of height.
+fn box_chain(environment: &Environment) -> Levels {
+    let texels = environment.radiance.iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
+    let mut levels: Levels = vec![(environment.width, environment.height, texels)];
+    loop {
+        let (w, h, last) = &levels[levels.len() - 1];
+        let (w, h) = (*w as usize, *h as usize);
+        if w == 1 && h == 1 {
+            return levels;
+        }
+        let (nw, nh) = ((w / 2).max(1), (h / 2).max(1));
+        let mut next = vec![[0.0; 4]; nw * nh];
+        next.par_chunks_mut(nw).enumerate().for_each(|(y, row)| {
+            for (x, texel) in row.iter_mut().enumerate() {
+                let xs = [(2 * x).min(w - 1), (2 * x + 1).min(w - 1)];
+                let ys = [(2 * y).min(h - 1), (2 * y + 1).min(h - 1)];
+                for sy in ys {
+                    for sx in xs {
+                        for (sum, value) in texel.iter_mut().zip(last[sy * w + sx]) {
+                            *sum += 0.25 * value;
+                        }
+                    }
+                }
+            }
+        });
+        levels.push((nw as u32, nh as u32, next));
+    }
+}
+
+/// Levels of halving width from at most [`WIDEST`] to [`NARROWEST`] texels: level 0 is the map, each other one is
+/// filtered with the lobe of α = 16 / width.
+fn prefilter(device: &Arc<Device>, sky: &Image, chain: &Levels) -> Result<Levels> {
+    let first = chain.iter().position(|(width, ..)| *width <= WIDEST).unwrap_or(chain.len() - 1);
+    let (width, height, base) = &chain[first];
+    let mut levels: Levels = vec![(*width, *height, base.clone())];
+    let mut sizes = Vec::new();
+    let (mut w, mut h) = (*width, *height);
+    while w / 2 >= NARROWEST {
+        (w, h) = (w / 2, (h / 2).max(1));
+        sizes.push((w, h));
+    }
+    let cache = cache_file(chain);
+    if let Some(known) = cache.as_ref().and_then(|path| std::fs::read(path).ok()) {
+        let total: usize = sizes.iter().map(|&(w, h)| (w * h) as usize).sum();
+        if known.len() == total * size_of::<Texel>() {
+            let texels: Vec<Texel> = bytemuck::pod_collect_to_vec(&known);
+            let mut rest = texels.as_slice();
+            for &(w, h) in &sizes {
+                let (level, after) = rest.split_at((w * h) as usize);
+                levels.push((w, h, level.to_vec()));
+                rest = after;
+            }
+            return Ok(levels);
+        }
+    }
+    let mut all: Vec<Texel> = Vec::new();
+    for &(w, h) in &sizes {
+        let level = Buffer::new(device, "prefiltered level", 16 * u64::from(w * h), Place::Readback)?;
+        let mut frame = Frame::new(device);
+        let map = Sampled { image: sky, sampler: SamplerDesc::EQUIRECTANGULAR };
+        let bind = prefilter::Bind { environment_map: map, level: &level };
+        let alpha = NARROWEST as f32 / w as f32;
+        let push = [w, h, alpha.to_bits(), (chain[0].0 as f32).to_bits()];
+        let constants = prefilter::Constants {}.words();
+        frame.compute_over("prefilter environment", &bind, constants, bytemuck::cast_slice(&push), [w, h])?;
+        frame.read_back(&level);
+        frame.finish()?;
+        let texels: Vec<Texel> = level.read(|bytes| bytemuck::pod_collect_to_vec(&bytes[..16 * (w * h) as usize]));
+        all.extend_from_slice(&texels);
+        levels.push((w, h, texels));
+    }
+    if let Some(path) = cache {
+        // A cache that cannot be written costs time at the next start, nothing else.
+        let _ = path.parent().map(std::fs::create_dir_all);
+        let _ = file::write(&path, bytemuck::cast_slice(&all));
+    }
+    Ok(levels)
+}
+
+/// Where the prefiltered levels of this map are kept: named by the map's texels and the shader's words.
+fn cache_file(chain: &Levels) -> Option<PathBuf> {
+    let folder = std::env::var_os("XDG_CACHE_HOME")
+        .map(PathBuf::from)
+        .or_else(|| std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cache")))?;
+    let map = file::hash(bytemuck::cast_slice(&chain[0].2));
+    let words: &[u8] = bytemuck::cast_slice(prefilter::PROGRAM.stages[0].words);
+    let (width, height, _) = chain[0];
+    Some(folder.join("etalon").join(format!("environment-{map}-{}-{width}x{height}", file::hash(words))))
+}
+
+/// Directional reflectance of the GGX lobe, split into the factors of F0 and F90 (Karis 2013):
+/// A = ∫ (1 − (1 − V·H)⁵) G₂ V·H / (N·H N·V), B the same with (1 − V·H)⁵, over the distribution of half vectors.
+fn reflectance_table() -> Vec<Texel> {
+    let side = REFLECTANCE as usize;
+    (0..side * side)
+        .into_par_iter()
+        .map(|i| {
+            let center = |i: usize| (i as f64 + 0.5) / side as f64;
+            let [a, b] = directional_reflectance(center(i % side), center(i / side));
+            [a as f32, b as f32, 0.0, 1.0]
+        })
+        .collect()
+}
+
+fn directional_reflectance(cos_v: f64, roughness: f64) -> [f64; 2] {
+    const SAMPLES: u32 = 128;
+    let alpha = roughness * roughness;
+    let sin_v = (1.0 - cos_v * cos_v).sqrt();
+    let mut sum = [0.0; 2];
+    for i in 0..SAMPLES {
+        let x = (f64::from(i) + 0.5) / f64::from(SAMPLES);
+        let phi = std::f64::consts::TAU * f64::from(i.reverse_bits()) / f64::from(u32::MAX);
+        let cos_h = ((1.0 - x) / (1.0 + (alpha * alpha - 1.0) * x)).sqrt();
+        let sin_h = (1.0 - cos_h * cos_h).max(0.0).sqrt();
+        let v_h = sin_v * sin_h * phi.cos() + cos_v * cos_h;
+        let cos_l = 2.0 * v_h * cos_h - cos_v;
+        if cos_l > 0.0 && v_h > 0.0 {
+            let a2 = alpha * alpha;
+            let root = |c: f64| (a2 + (1.0 - a2) * c * c).sqrt();
+            // Visibility G₂ / (4 cosθ_l cosθ_v), times 4 V·H cosθ_l / N·H: the estimator's weight.
+            let visibility = 0.5 / (cos_v * root(cos_l) + cos_l * root(cos_v));
+            let weight = 4.0 * visibility * v_h * cos_l / cos_h;
+            let grazing = (1.0 - v_h).powi(5);
+            sum[0] += weight * (1.0 - grazing);
+            sum[1] += weight * grazing;
+        }
+    }
+    sum.map(|s| s / f64::from(SAMPLES))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_smooth_lobe_reflects_as_fresnel_says() {
+        let [a, b] = directional_reflectance(0.5, 0.02);
+        let grazing = 0.5_f64.powi(5);
+        assert!((a - (1.0 - grazing)).abs() < 5e-3, "{a}");
+        assert!((b - grazing).abs() < 5e-3, "{b}");
+    }
+
+    #[test]
+    fn no_lobe_reflects_more_than_it_receives() {
+        for roughness in [0.05, 0.2, 0.5, 0.8, 1.0] {
+            for cos_v in [0.02, 0.1, 0.5, 1.0] {
+                let [a, b] = directional_reflectance(cos_v, roughness);
+                assert!(a + b <= 1.01 && a >= 0.0 && b >= 0.0, "{cos_v} {roughness}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn averaging_keeps_a_constant_map() {
+        let environment = Environment::constant([0.25, 0.5, 1.0]);
+        for (.., level) in box_chain(&environment) {
+            assert!(level.iter().all(|t| *t == [0.25, 0.5, 1.0, 1.0]));
+        }
+    }
+}
