@@ -1,6 +1,6 @@
 //! Environment maps: lookup, projection onto spherical harmonics, reading, and the built-in studio.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{PI, TAU};
 
 use etalon::image::{Picture, exr};
 use etalon::scene::environment::{Environment, direction, irradiance, sh9_basis};
@@ -196,5 +196,5 @@ fn directions_invert_the_lookup() {
         assert!((d.length() - 1.0).abs() < 1e-15);
         assert!((d.z.atan2(d.x) / TAU + 0.5 - u).abs() < 1e-15 && (0.5 - d.y.asin() / PI - v).abs() < 1e-15);
     }
-    assert!((direction(0.75, 0.5) - DVec3::Z).length() < 1e-15 && FRAC_PI_2 > 1.5);
+    assert!((direction(0.75, 0.5) - DVec3::Z).length() < 1e-15);
 }

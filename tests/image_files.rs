@@ -243,3 +243,59 @@ fn statistics_count_before_anything_clamps() {
     assert_eq!((found.min, found.max), (-1.0, 3.0));
     assert_eq!(found.mean, 1.7); // (3 * 6 - 1) / 10
 }
+
+#[test]
+fn exr_files_of_other_programs() {
+    use ::exr::prelude::*;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("other.exr");
+    let write = |names: [&str; 3], encoding: Encoding, half: bool, window: (i32, i32, usize, usize)| {
+        let values = |offset: usize| -> Vec<f32> { (0..15 * 9).map(|i| (i + offset) as f32).collect() };
+        let list = names.iter().enumerate().filter(|(_, name)| !name.is_empty()).map(|(index, &name)| {
+            let samples = values(index * 200);
+            let samples = if half {
+                FlatSamples::F16(samples.into_iter().map(f16::from_f32).collect())
+            } else {
+                FlatSamples::F32(samples)
+            };
+            AnyChannel::new(Text::from(name), samples)
+        });
+        let channels = AnyChannels::sort(list.collect());
+        let layer = Layer::new((15, 9), LayerAttributes::named("main"), encoding, channels);
+        let bounds = IntegerBounds::new((window.0, window.1), (window.2, window.3));
+        Image::empty(ImageAttributes::new(bounds)).with_layer(layer).write().to_file(&path).unwrap();
+    };
+    let expected = |i: usize| [i as f32, (i + 200) as f32, (i + 400) as f32, 1.0];
+    let compressions = [
+        Compression::Uncompressed,
+        Compression::RLE,
+        Compression::ZIP1,
+        Compression::ZIP16,
+        Compression::PIZ,
+        Compression::PXR24,
+    ];
+    for compression in compressions {
+        for blocks in [Blocks::ScanLines, Blocks::Tiles(Vec2(8, 4))] {
+            for half in [false, true] {
+                let encoding = Encoding { compression, blocks, line_order: LineOrder::Increasing };
+                write(["R", "G", "B"], encoding, half, (0, 0, 15, 9));
+                let back = read_exr(&path).unwrap();
+                assert!((0..15 * 9).all(|i| back.rgba[i] == expected(i)), "{compression:?} {blocks:?} half {half}");
+            }
+        }
+    }
+    // Only a layer's channels: they are the picture all the same.
+    write(["View.R", "View.G", "View.B"], Encoding::FAST_LOSSLESS, false, (0, 0, 15, 9));
+    assert_eq!(read_exr(&path).unwrap().rgba[7], expected(7));
+    write(["Y", "", ""], Encoding::FAST_LOSSLESS, false, (0, 0, 15, 9));
+    assert_eq!(read_exr(&path).unwrap().rgba[7], [7.0, 7.0, 7.0, 1.0]);
+    // The display window begins one right of and two below the data, and ends beyond it.
+    write(["R", "G", "B"], Encoding::FAST_LOSSLESS, false, (1, 2, 16, 8));
+    let back = read_exr(&path).unwrap();
+    assert_eq!((back.width, back.height), (16, 8));
+    assert_eq!(back.rgba[0], expected(2 * 15 + 1));
+    assert_eq!(back.rgba[15], [0.0; 4]);
+    write(["U", "V", ""], Encoding::FAST_LOSSLESS, false, (0, 0, 15, 9));
+    let error = format!("{:#}", read_exr(&path).unwrap_err());
+    assert!(error.ends_with("other.exr: there are no channels R, G and B, only U, V"), "{error}");
+}

@@ -1,7 +1,7 @@
 //! Tone curves and the sRGB transfer against values worked out by hand, and the properties every curve has.
 
 use clap::ValueEnum;
-use etalon::image::tone::{ToneMap, quantise, srgb_decode, srgb_encode};
+use etalon::image::tone::{AGX_IN, AGX_OUT, ToneMap, quantise, srgb_decode, srgb_encode};
 
 fn near(got: f64, expected: f64, bound: f64) {
     assert!((got - expected).abs() <= bound, "{got} is not {expected}");
@@ -96,4 +96,12 @@ fn srgb_transfer() {
     assert_eq!((quantise(0.5 / 255.0), quantise(0.499 / 255.0), quantise(127.5 / 255.0)), (1, 0, 128));
     assert_eq!((quantise(-1.0), quantise(2.0), quantise(f64::NAN)), (0, 255, 0));
     assert_eq!(ToneMap::Linear.to_display([0.21404114048223255, 0.0, 9.0]), [128, 0, 255]);
+}
+
+#[test]
+fn agx_matrices_undo_each_other() {
+    for (row, out) in AGX_OUT.iter().enumerate() {
+        let product = [0, 1, 2].map(|c| (0..3).map(|k| out[k] * AGX_IN[k][c]).sum::<f64>());
+        product.iter().enumerate().for_each(|(c, &got)| near(got, if row == c { 1.0 } else { 0.0 }, 1e-6));
+    }
 }
