@@ -18,12 +18,12 @@ use gltf::json::{
 use rayon::prelude::*;
 
 use super::{
-    Bounds, Camera, Instance, Light, LightKind, LoadOptions, Material, Mesh, Projection, Scene,
+    Camera, Instance, Light, LightKind, LoadOptions, Material, Mesh, Projection, Scene,
     accessor::Accessor,
     container::Document,
     geometry, gltf_material,
     nodes::{Nodes, label},
-    thin,
+    thin::{self, Stroke},
 };
 
 /// Reads a `.gltf` or `.glb` file.
@@ -133,12 +133,6 @@ struct Built {
     warnings: Vec<String>,
 }
 
-#[derive(Clone, Copy)]
-enum Stroke {
-    Point(u32),
-    Line(u32, u32),
-}
-
 struct Placing<'d, 'b, 'w> {
     document: &'d Document<'b>,
     nodes: &'d Nodes,
@@ -174,7 +168,8 @@ impl<'d, 'b, 'w> Placing<'d, 'b, 'w> {
             self.warnings.extend(built.warnings);
             let placements: Vec<_> = job.nodes.iter().map(|&node| (node, self.placement(job, node))).collect();
             if !built.strokes.is_empty() {
-                strokes.push((placements, built.mesh, built.strokes));
+                let placements = placements.into_iter().map(|(node, world)| (self.node_name(node), world)).collect();
+                strokes.push(thin::Group { placements, mesh: built.mesh, strokes: built.strokes });
                 continue;
             }
             if built.mesh.indices.is_empty() {
@@ -191,7 +186,7 @@ impl<'d, 'b, 'w> Placing<'d, 'b, 'w> {
         }
         instances.sort_by_key(|(node, _)| *node);
         let mut instances = instances.into_iter().map(|(_, instance)| instance).collect();
-        self.add_strokes(strokes, &mut meshes, &mut instances);
+        thin::add(&strokes, &mut meshes, &mut instances);
         Ok((meshes, instances))
     }
 
@@ -273,57 +268,6 @@ impl<'d, 'b, 'w> Placing<'d, 'b, 'w> {
                 Ok(joint)
             })
             .collect()
-    }
-
-    fn add_strokes(
-        &self,
-        strokes: Vec<(Vec<(usize, DAffine3)>, Mesh, Vec<Stroke>)>,
-        meshes: &mut Vec<Mesh>,
-        instances: &mut Vec<Instance>,
-    ) {
-        if strokes.is_empty() {
-            return;
-        }
-        let at = |mesh: &Mesh, world: &DAffine3, i: u32| {
-            world.transform_point3(Vec3::from(mesh.positions[i as usize]).as_dvec3())
-        };
-        let drawn = Scene { meshes: std::mem::take(meshes), instances: std::mem::take(instances), ..Scene::default() };
-        let mut bounds = drawn.bounds();
-        (*meshes, *instances) = (drawn.meshes, drawn.instances);
-        for (placements, mesh, strokes) in &strokes {
-            for (_, world) in placements {
-                for stroke in strokes {
-                    let (a, b) = match *stroke {
-                        Stroke::Point(a) => (a, a),
-                        Stroke::Line(a, b) => (a, b),
-                    };
-                    for p in [at(mesh, world, a), at(mesh, world, b)] {
-                        let b = bounds.get_or_insert(Bounds { min: p, max: p });
-                        *b = Bounds { min: b.min.min(p), max: b.max.max(p) };
-                    }
-                }
-            }
-        }
-        let diagonal = bounds.map_or(0.0, |b| 2.0 * b.radius());
-        let radius = thin::HALF_THICKNESS * if diagonal > 0.0 { diagonal } else { 1.0 };
-        for (placements, mesh, strokes) in &strokes {
-            for (node, world) in placements {
-                let origin = match strokes[0] {
-                    Stroke::Point(i) | Stroke::Line(i, _) => at(mesh, world, i),
-                };
-                let corner = |i: u32| thin::Corner { position: at(mesh, world, i), source: i as usize };
-                let mut builder = thin::Builder::new(origin, radius, mesh);
-                for stroke in strokes {
-                    match *stroke {
-                        Stroke::Point(i) => builder.point(corner(i)),
-                        Stroke::Line(a, b) => builder.line(corner(a), corner(b)),
-                    }
-                }
-                let (thin, world_from_object) = builder.finish();
-                instances.push(Instance { name: self.node_name(*node), mesh: meshes.len(), world_from_object });
-                meshes.push(thin);
-            }
-        }
     }
 }
 
@@ -512,9 +456,12 @@ fn morph(document: &Document<'_>, json: &json::mesh::Primitive, weights: &[f32],
     Ok(())
 }
 
+/// Four joints and their weights for every vertex.
+type JointSet = (Vec<[u16; 4]>, Vec<[f32; 4]>);
+
 /// Joints and weights of every vertex: one or two sets of four.
 struct Skin {
-    sets: Vec<(Vec<[u16; 4]>, Vec<[f32; 4]>)>,
+    sets: Vec<JointSet>,
     unweighted: usize,
 }
 

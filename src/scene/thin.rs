@@ -3,24 +3,86 @@
 //! Their thickness is a share of the whole scene's size, so they are built in the world, after everything else is
 //! known, and placed by a translation alone.
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, Vec3};
 
-use super::Mesh;
+use super::{Bounds, Instance, Mesh, Scene};
 
 /// Half-thickness as a share of the scene's bounding diagonal.
-pub(crate) const HALF_THICKNESS: f64 = 0.001;
+const HALF_THICKNESS: f64 = 0.001;
+
+/// A point or a line, by its vertices.
+#[derive(Clone, Copy)]
+pub(crate) enum Stroke {
+    Point(u32),
+    Line(u32, u32),
+}
+
+/// Strokes over the vertices of one mesh, and the places where they are drawn.
+pub(crate) struct Group {
+    /// Name and world placement of each.
+    pub(crate) placements: Vec<(String, DAffine3)>,
+    /// Vertices with their attributes; its triangles and normals are not looked at.
+    pub(crate) mesh: Mesh,
+    /// What to draw.
+    pub(crate) strokes: Vec<Stroke>,
+}
+
+/// Turns strokes into meshes and instances; their thickness comes from the bounds of everything.
+pub(crate) fn add(groups: &[Group], meshes: &mut Vec<Mesh>, instances: &mut Vec<Instance>) {
+    if groups.is_empty() {
+        return;
+    }
+    let at = |mesh: &Mesh, world: &DAffine3, i: u32| {
+        world.transform_point3(Vec3::from(mesh.positions[i as usize]).as_dvec3())
+    };
+    let drawn = Scene { meshes: std::mem::take(meshes), instances: std::mem::take(instances), ..Scene::default() };
+    let mut bounds = drawn.bounds();
+    (*meshes, *instances) = (drawn.meshes, drawn.instances);
+    for Group { placements, mesh, strokes } in groups {
+        for (_, world) in placements {
+            for stroke in strokes {
+                let (a, b) = match *stroke {
+                    Stroke::Point(a) => (a, a),
+                    Stroke::Line(a, b) => (a, b),
+                };
+                for p in [at(mesh, world, a), at(mesh, world, b)] {
+                    let b = bounds.get_or_insert(Bounds { min: p, max: p });
+                    *b = Bounds { min: b.min.min(p), max: b.max.max(p) };
+                }
+            }
+        }
+    }
+    let diagonal = bounds.map_or(0.0, |b| 2.0 * b.radius());
+    let radius = HALF_THICKNESS * if diagonal > 0.0 { diagonal } else { 1.0 };
+    for Group { placements, mesh, strokes } in groups {
+        let Some(Stroke::Point(first) | Stroke::Line(first, _)) = strokes.first().copied() else { continue };
+        for (name, world) in placements {
+            let corner = |i: u32| Corner { position: at(mesh, world, i), source: i as usize };
+            let mut builder = Builder::new(at(mesh, world, first), radius, mesh);
+            for stroke in strokes {
+                match *stroke {
+                    Stroke::Point(i) => builder.point(corner(i)),
+                    Stroke::Line(a, b) => builder.line(corner(a), corner(b)),
+                }
+            }
+            let (thin, world_from_object) = builder.finish();
+            instances.push(Instance { name: name.clone(), mesh: meshes.len(), world_from_object });
+            meshes.push(thin);
+        }
+    }
+}
 
 /// What a vertex carries besides its position.
 #[derive(Clone, Copy)]
-pub(crate) struct Corner {
+struct Corner {
     /// World position.
-    pub(crate) position: DVec3,
+    position: DVec3,
     /// Index of the vertex that the other attributes are copied from.
-    pub(crate) source: usize,
+    source: usize,
 }
 
 /// Collects thin geometry around an origin.
-pub(crate) struct Builder<'a> {
+struct Builder<'a> {
     origin: DVec3,
     radius: f64,
     attributes: &'a Mesh,
@@ -29,7 +91,7 @@ pub(crate) struct Builder<'a> {
 
 impl<'a> Builder<'a> {
     /// Geometry `radius` thick on each side; colours and texture coordinates come from `attributes`.
-    pub(crate) fn new(origin: DVec3, radius: f64, attributes: &'a Mesh) -> Self {
+    fn new(origin: DVec3, radius: f64, attributes: &'a Mesh) -> Self {
         let out = Mesh { name: attributes.name.clone(), material: attributes.material, ..Mesh::default() };
         Self { origin, radius, attributes, out }
     }
@@ -51,7 +113,7 @@ impl<'a> Builder<'a> {
     }
 
     /// An octahedron around a point.
-    pub(crate) fn point(&mut self, at: Corner) {
+    fn point(&mut self, at: Corner) {
         for octant in 0..8 {
             let sign = |bit: u32| if octant >> bit & 1 == 0 { 1.0 } else { -1.0 };
             let s = DVec3::new(sign(0), sign(1), sign(2));
@@ -63,7 +125,7 @@ impl<'a> Builder<'a> {
     }
 
     /// A four-sided box from `a` to `b`; coincident ends become a point.
-    pub(crate) fn line(&mut self, a: Corner, b: Corner) {
+    fn line(&mut self, a: Corner, b: Corner) {
         let Some(along) = (b.position - a.position).try_normalize() else {
             return self.point(a);
         };
@@ -87,7 +149,7 @@ impl<'a> Builder<'a> {
     }
 
     /// The mesh and where it stands.
-    pub(crate) fn finish(self) -> (Mesh, DAffine3) {
+    fn finish(self) -> (Mesh, DAffine3) {
         (self.out, DAffine3::from_translation(self.origin))
     }
 }
