@@ -22,11 +22,11 @@ layout(push_constant, scalar) uniform Push { uint first_row; uint end_row; };
 // the lights.
 const uint MOST_FRAGMENTS = 220;
 
-// Whether key a comes after key b: farther (smaller depth), then larger instance, then larger primitive.
+// Whether key a comes after key b: farther (smaller depth); of coplanar ones the later drawn lies on top.
 bool after(uvec3 a, uvec3 b) {
     if (a.x != b.x) return a.x < b.x; // depth is in [0, 1]: its bits order as its values do
-    if (a.y != b.y) return a.y > b.y;
-    return a.z > b.z;
+    if (a.y != b.y) return a.y < b.y;
+    return a.z < b.z;
 }
 
 void main() {
@@ -38,11 +38,11 @@ void main() {
     vec3 direction = view_direction(camera, pixel);
     vec3 sum = vec3(0.0);
     vec3 through = vec3(1.0);
-    uvec3 last = uvec3(0xffffffffu, 0, 0);
+    uvec3 last = uvec3(0xffffffffu);
     uint drawn = 0;
     while (true) {
         uint best = END_OF_LIST;
-        uvec3 best_key = uvec3(0, 0xffffffffu, 0xffffffffu);
+        uvec3 best_key = uvec3(0);
         for (uint node = head; node != END_OF_LIST; node = nodes[node * NODE_WORDS]) {
             uint at = node * NODE_WORDS;
             uvec3 key = uvec3(nodes[at + 1], nodes[at + 2], nodes[at + 3]);

@@ -1,3 +1,19 @@
 //! The commands of the program, one module each.
 
+pub mod devices;
 pub mod diff;
+pub mod options;
+pub mod render;
+pub mod report;
+
+use std::io::{self, Write as _};
+
+use anyhow::{Context as _, Result};
+
+/// One line to stdout. A reader that has closed the pipe has seen enough: that is no error.
+fn print(line: &str) -> Result<()> {
+    match writeln!(io::stdout().lock(), "{line}") {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        other => other.context("writing to stdout"),
+    }
+}

@@ -228,9 +228,11 @@ impl Instance {
             (core.fragment_stores_and_atomics, "feature fragmentStoresAndAtomics"),
             (core.shader_storage_image_extended_formats, "feature shaderStorageImageExtendedFormats"),
             (core.sampler_anisotropy, "feature samplerAnisotropy"),
+            (core.geometry_shader, "feature geometryShader (for gl_PrimitiveID in fragments)"),
             (v12.timeline_semaphore, "feature timelineSemaphore"),
             (v12.scalar_block_layout, "feature scalarBlockLayout (lavapipe: Mesa 21.1 or newer)"),
             (v13.dynamic_rendering, "feature dynamicRendering (lavapipe: Mesa 22.1 or newer)"),
+            (v13.maintenance4, "feature maintenance4 (lavapipe: Mesa 22.1 or newer)"),
             (v13.synchronization2, "feature synchronization2 (lavapipe: Mesa 22.1 or newer)"),
         ] {
             if has == vk::FALSE {
@@ -372,9 +374,13 @@ impl Device {
         let core = vk::PhysicalDeviceFeatures::default()
             .fragment_stores_and_atomics(true)
             .shader_storage_image_extended_formats(true)
-            .sampler_anisotropy(true);
+            .sampler_anisotropy(true)
+            .geometry_shader(true);
         let mut v12 = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true).scalar_block_layout(true);
-        let mut v13 = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true).synchronization2(true);
+        let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
+            .dynamic_rendering(true)
+            .synchronization2(true)
+            .maintenance4(true);
         let create = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_extension_names(&names)

@@ -1,6 +1,8 @@
 //! Cameras: where the picture is taken from (product.md "Conventions").
 
-use glam::DAffine3;
+use glam::{DAffine3, DMat3, DVec2, DVec3};
+
+use super::Bounds;
 
 /// A camera in the world. It looks along −Z of its frame; +X is right and +Y up in the picture.
 #[derive(Debug, Clone)]
@@ -33,4 +35,118 @@ pub enum Projection {
         /// Far distance in metres.
         far: f64,
     },
+}
+
+/// Vertical field of view where nothing says otherwise, in radians (40°).
+pub const DEFAULT_FOV_Y: f64 = 0.698_131_700_797_731_8;
+
+/// Why a camera cannot be made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CameraError {
+    /// The target lies on the eye.
+    NoDirection,
+    /// The up direction is zero or along the view.
+    NoUp,
+    /// Something is NaN or infinite.
+    NotFinite,
+}
+
+impl std::fmt::Display for CameraError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::NoDirection => "the target equals the eye, so there is no direction to look in",
+            Self::NoUp => "the up direction is zero or parallel to the view",
+            Self::NotFinite => "a coordinate is not a finite number",
+        })
+    }
+}
+
+impl std::error::Error for CameraError {}
+
+impl Camera {
+    /// A perspective camera at `eye` that looks at `target` with `up` upwards in the picture; `fov_y` in radians.
+    ///
+    /// # Errors
+    /// When these do not give a frame of reference.
+    pub fn looking_at(eye: DVec3, target: DVec3, up: DVec3, fov_y: f64) -> Result<Self, CameraError> {
+        if !(eye.is_finite() && target.is_finite() && up.is_finite() && fov_y.is_finite()) {
+            return Err(CameraError::NotFinite);
+        }
+        let forward = (target - eye).try_normalize().ok_or(CameraError::NoDirection)?;
+        let up = up.try_normalize().ok_or(CameraError::NoUp)?;
+        let right = forward.cross(up);
+        // Within a ten-thousandth of a degree of parallel the picture's roll would be rounding noise.
+        if right.length() < 1e-6 {
+            return Err(CameraError::NoUp);
+        }
+        let right = right.normalize();
+        let frame = DMat3::from_cols(right, right.cross(forward), -forward);
+        Ok(Self {
+            name: "eye and target".to_owned(),
+            world_from_camera: DAffine3::from_mat3_translation(frame, eye),
+            projection: Projection::Perspective { fov_y, near: None },
+        })
+    }
+
+    /// A camera that looks at a box from the front, a little from the right and from above, and just fits it.
+    #[must_use]
+    pub fn framing(bounds: Bounds, aspect: f64, fov_y: f64) -> Self {
+        const MARGIN: f64 = 1.06;
+        let backward = DVec3::new(0.35, 0.25, 1.0).normalize();
+        let right = DVec3::Y.cross(backward).normalize();
+        let up = backward.cross(right);
+        let tangent = DVec2::new((fov_y * 0.5).tan() * aspect, (fov_y * 0.5).tan()) / MARGIN;
+        let mut distance = 0.0_f64;
+        for corner in 0..8 {
+            let pick = |bit: i32, min: f64, max: f64| if corner >> bit & 1 == 0 { min } else { max };
+            let (min, max) = (bounds.min, bounds.max);
+            let offset = DVec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z)) - bounds.center();
+            let toward = offset.dot(backward);
+            distance = distance
+                .max(offset.dot(right).abs() / tangent.x + toward)
+                .max(offset.dot(up).abs() / tangent.y + toward);
+        }
+        // A single point still needs some distance.
+        let distance = if distance > 0.0 { distance } else { 1.0 };
+        let frame = DMat3::from_cols(right, up, backward);
+        Self {
+            name: "framing".to_owned(),
+            world_from_camera: DAffine3::from_mat3_translation(frame, bounds.center() + backward * distance),
+            projection: Projection::Perspective { fov_y, near: None },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn framing_contains_the_box() {
+        let bounds = Bounds { min: DVec3::new(-1.0, 2.0, -3.0), max: DVec3::new(4.0, 2.5, 7.0) };
+        for aspect in [0.3, 1.0, 3.0] {
+            let camera = Camera::framing(bounds, aspect, 0.7);
+            let to_camera = camera.world_from_camera.inverse();
+            for corner in [bounds.min, bounds.max, DVec3::new(-1.0, 2.5, 7.0), DVec3::new(4.0, 2.0, -3.0)] {
+                let p = to_camera.transform_point3(corner);
+                let tangent = 0.35_f64.tan();
+                assert!(p.z < 0.0 && (p.y / -p.z).abs() < tangent && (p.x / -p.z).abs() < tangent * aspect);
+            }
+        }
+    }
+
+    #[test]
+    fn impossible_cameras_are_errors() {
+        let at = |eye, target, up| Camera::looking_at(eye, target, up, 0.7).unwrap_err();
+        assert_eq!(at(DVec3::ONE, DVec3::ONE, DVec3::Y), CameraError::NoDirection);
+        assert_eq!(at(DVec3::ZERO, DVec3::Y, DVec3::Y), CameraError::NoUp);
+        assert_eq!(at(DVec3::ZERO, DVec3::X, DVec3::ZERO), CameraError::NoUp);
+        assert_eq!(at(DVec3::NAN, DVec3::X, DVec3::Y), CameraError::NotFinite);
+    }
+
+    #[test]
+    fn looking_down_z_is_the_identity() {
+        let camera = Camera::looking_at(DVec3::ZERO, -DVec3::Z, DVec3::Y, 0.7).unwrap();
+        assert!(camera.world_from_camera.abs_diff_eq(DAffine3::IDENTITY, 1e-15));
+    }
 }

@@ -1,0 +1,259 @@
+//! Options that several commands share, and what they mean.
+
+use std::path::PathBuf;
+
+use anyhow::{Context as _, Result, anyhow, bail};
+use clap::{Args, ValueEnum};
+use glam::DVec3;
+
+use crate::frame::{Background, Settings};
+use crate::gpu::DeviceChoice;
+use crate::image::tone::ToneMap;
+use crate::plan::Knobs;
+use crate::scene::camera::{Camera, DEFAULT_FOV_Y};
+use crate::scene::environment::Environment;
+use crate::scene::{LoadOptions, Scene};
+
+/// When to show something.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum When {
+    /// On a terminal.
+    Auto,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
+}
+
+/// The lecture's three models (R6).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Model {
+    /// Direct light only.
+    Local,
+    /// Plus ideal reflection and refraction; not built yet.
+    Recursive,
+    /// Global illumination; not built yet.
+    Global,
+}
+
+/// What to draw, and from where.
+#[derive(Debug, Clone, Args)]
+pub struct SceneOptions {
+    /// A .glb, .gltf or .obj file, or study:NAME
+    #[arg(default_value = "study:etalon")]
+    pub scene: String,
+    /// A camera of the file, by name or index [default: the first; else one that frames the scene]
+    #[arg(long, value_name = "NAME|INDEX", conflicts_with_all = ["eye", "target", "up"])]
+    pub camera: Option<String>,
+    /// Eye position in metres
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
+    pub eye: Option<DVec3>,
+    /// Point to look at [default: the scene's middle]
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true, requires = "eye")]
+    pub target: Option<DVec3>,
+    /// Direction that is up in the picture [default: 0,1,0]
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true, requires = "eye")]
+    pub up: Option<DVec3>,
+    /// Vertical field of view in degrees, for cameras that are not the file's [default: 40]
+    #[arg(long, value_name = "DEG", conflicts_with = "camera")]
+    pub fov: Option<f64>,
+    /// Animation time in seconds, or none for the rest pose stored in the file
+    #[arg(long, value_name = "SECONDS|none", default_value = "none", allow_hyphen_values = true)]
+    pub time: String,
+    /// Environment map, or none [default: a built-in studio when the scene has no lights of its own]
+    #[arg(long, value_name = "FILE.hdr|FILE.exr|none")]
+    pub env: Option<String>,
+    /// Multiplies the environment's radiance
+    #[arg(long, value_name = "K", default_value_t = 1.0)]
+    pub env_intensity: f32,
+    /// Turns the environment about +Y
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub env_rotation: f32,
+    /// What lies behind the scene [default: the environment; without one transparent in EXR, grey in PNG]
+    #[arg(long, value_name = "env|transparent|#rrggbb", value_parser = background)]
+    pub background: Option<Background>,
+}
+
+/// How to draw it.
+#[derive(Debug, Clone, Args)]
+pub struct PictureOptions {
+    /// Pixels across and down
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
+    pub size: [u32; 2],
+    /// How much light transport is simulated
+    #[arg(long, value_enum, default_value_t = Model::Local)]
+    pub model: Model,
+    /// Choose a knob's rung, for example samples=16; repeatable
+    #[arg(long = "set", value_name = "KNOB=RUNG")]
+    pub set: Vec<String>,
+    /// Exposure in stops, display outputs only
+    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub exposure: f32,
+    /// Tone curve, display outputs only
+    #[arg(long, value_enum, default_value_t = ToneMap::default())]
+    pub tonemap: ToneMap,
+}
+
+/// Where to draw it.
+#[derive(Debug, Clone, Args)]
+pub struct DeviceOptions {
+    /// Device by part of its name, index, or kind [default: the best there is]
+    #[arg(long, value_name = "NAME|INDEX|cpu|gpu")]
+    pub device: Option<String>,
+    /// Check every Vulkan call and every hazard with the Khronos validation layer; any error fails the run
+    #[arg(long)]
+    pub validate: bool,
+}
+
+fn vector(text: &str) -> Result<DVec3, String> {
+    let numbers: Vec<f64> =
+        text.split(',').map(|part| part.trim().parse::<f64>()).collect::<Result<_, _>>().map_err(|e| e.to_string())?;
+    match numbers[..] {
+        [x, y, z] if numbers.iter().all(|n| n.is_finite()) => Ok(DVec3::new(x, y, z)),
+        _ => Err("expected three finite numbers, X,Y,Z".to_owned()),
+    }
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let parts: Option<(u32, u32)> =
+        text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    match parts {
+        Some((w, h)) if w > 0 && h > 0 => Ok([w, h]),
+        Some(_) => Err("a picture has at least one pixel a side".to_owned()),
+        None => Err("expected WIDTHxHEIGHT, for example 1280x720".to_owned()),
+    }
+}
+
+fn background(text: &str) -> Result<Background, String> {
+    match text {
+        "env" => Ok(Background::Environment),
+        "transparent" => Ok(Background::Transparent),
+        _ => text
+            .strip_prefix('#')
+            .filter(|hex| hex.len() == 6)
+            .and_then(|hex| u32::from_str_radix(hex, 16).ok())
+            .map(|rgb| Background::Color([(rgb >> 16) as u8, (rgb >> 8) as u8, rgb as u8]))
+            .ok_or_else(|| "expected env, transparent or #rrggbb".to_owned()),
+    }
+}
+
+impl SceneOptions {
+    /// Loads the scene at the asked time.
+    ///
+    /// # Errors
+    /// One sentence with file, place and cause.
+    pub fn load(&self) -> Result<Scene> {
+        let time = match self.time.as_str() {
+            "none" => None,
+            text => match text.parse::<f64>() {
+                Ok(seconds) if seconds.is_finite() => Some(seconds),
+                _ => bail!("--time {text}: expected seconds, or none"),
+            },
+        };
+        match self.scene.strip_prefix("study:") {
+            Some(_) if time.is_some() => bail!("--time: {} has no animation", self.scene),
+            Some(name) => crate::study::load(name),
+            None => crate::scene::load(&PathBuf::from(&self.scene), &LoadOptions { time }),
+        }
+    }
+
+    /// Loads the environment that is asked for, or would be used if the scene has no lights.
+    ///
+    /// # Errors
+    /// One sentence with file and cause.
+    pub fn load_environment(&self) -> Result<(Option<Environment>, Vec<String>)> {
+        if !(self.env_intensity.is_finite() && self.env_intensity >= 0.0 && self.env_rotation.is_finite()) {
+            bail!("--env-intensity and --env-rotation are finite numbers, the intensity not negative");
+        }
+        match self.env.as_deref() {
+            Some("none") => Ok((None, Vec::new())),
+            Some(path) => Environment::load(&PathBuf::from(path)).map(|(map, warnings)| (Some(map), warnings)),
+            None => Ok((Some(Environment::studio()), Vec::new())),
+        }
+    }
+
+    /// Whether the environment of [`SceneOptions::load_environment`] lights this scene: asked for, or needed.
+    #[must_use]
+    pub fn uses_environment(&self, scene: &Scene) -> bool {
+        self.env.is_some() || self.background == Some(Background::Environment) || scene.lights.is_empty()
+    }
+
+    /// The camera to draw from.
+    ///
+    /// # Errors
+    /// One sentence when there is no such camera or the directions do not give one.
+    pub fn choose_camera(&self, scene: &Scene, size: [u32; 2]) -> Result<Camera> {
+        let fov_y = match self.fov {
+            None => DEFAULT_FOV_Y,
+            Some(degrees) if degrees > 0.0 && degrees < 180.0 => degrees.to_radians(),
+            Some(degrees) => bail!("--fov {degrees}: a field of view lies between 0 and 180 degrees"),
+        };
+        let bounds = scene.bounds().ok_or_else(|| anyhow!("{}: there is nothing to draw", scene.name))?;
+        if let Some(eye) = self.eye {
+            let target = self.target.unwrap_or_else(|| bounds.center());
+            let up = self.up.unwrap_or(DVec3::Y);
+            return Camera::looking_at(eye, target, up, fov_y).with_context(|| format!("--eye {eye} --target {target}"));
+        }
+        if let Some(wanted) = &self.camera {
+            let names = || scene.cameras.iter().map(|c| format!("\"{}\"", c.name)).collect::<Vec<_>>().join(", ");
+            return scene
+                .cameras
+                .iter()
+                .find(|camera| camera.name == *wanted)
+                .or_else(|| wanted.parse::<usize>().ok().and_then(|index| scene.cameras.get(index)))
+                .cloned()
+                .ok_or_else(|| match scene.cameras.len() {
+                    0 => anyhow!("--camera {wanted}: {} has no cameras", scene.name),
+                    _ => anyhow!("--camera {wanted}: {} has the cameras {}", scene.name, names()),
+                });
+        }
+        match scene.cameras.first() {
+            Some(camera) if self.fov.is_none() => Ok(camera.clone()),
+            _ => Ok(Camera::framing(bounds, f64::from(size[0]) / f64::from(size[1]), fov_y)),
+        }
+    }
+}
+
+impl PictureOptions {
+    /// The knobs as set.
+    ///
+    /// # Errors
+    /// One sentence for a model, knob or rung that does not exist or is not built yet.
+    pub fn knobs(&self) -> Result<Knobs> {
+        if self.model != Model::Local {
+            bail!("--model {:?}: only the local model is built so far", self.model);
+        }
+        let mut knobs = Knobs::default();
+        for choice in &self.set {
+            knobs.set(choice)?;
+        }
+        Ok(knobs)
+    }
+
+    /// Everything the renderer needs to know.
+    ///
+    /// # Errors
+    /// As [`PictureOptions::knobs`].
+    pub fn settings(&self, scene: &SceneOptions) -> Result<Settings> {
+        if !self.exposure.is_finite() {
+            bail!("--exposure {}: expected a finite number of stops", self.exposure);
+        }
+        Ok(Settings {
+            size: self.size,
+            knobs: self.knobs()?,
+            tonemap: self.tonemap,
+            exposure: self.exposure,
+            background: scene.background.unwrap_or_default(),
+            environment_intensity: scene.env_intensity,
+            environment_rotation: scene.env_rotation,
+        })
+    }
+}
+
+impl DeviceOptions {
+    /// Which device is meant.
+    #[must_use]
+    pub fn choice(&self) -> DeviceChoice {
+        self.device.as_deref().map(|text| text.parse().unwrap_or_default()).unwrap_or_default()
+    }
+}

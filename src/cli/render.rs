@@ -1,0 +1,406 @@
+//! `etalon render`: one picture, or a sequence of them.
+
+use std::collections::BTreeMap;
+use std::io::IsTerminal as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use anyhow::{Context as _, Result, anyhow, bail};
+use clap::{Args, ValueEnum};
+use glam::DVec3;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::options::{DeviceOptions, PictureOptions, SceneOptions, When};
+use super::print;
+use super::report::{
+    MemoryFacts, Output, PassFacts, PipelineFacts, Report, SceneFacts, Spread, Validation, Work, knob_map,
+};
+use crate::frame::{Rendered, Renderer};
+use crate::gpu::{Device, Severity};
+use crate::image::{Aov, AovData, Picture, exr, file};
+use crate::pass::view::View;
+use crate::plan::Plan;
+use crate::scene::{Camera, Scene};
+use crate::share::AovPixel;
+
+/// Draw a picture of a scene.
+#[derive(Debug, Clone, Args)]
+pub struct RenderArgs {
+    #[command(flatten)]
+    scene: SceneOptions,
+    /// Output file: .png (display) or .exr (scene-linear radiance); repeatable [default: the scene's name with .png]
+    #[arg(short, long, value_name = "FILE")]
+    output: Vec<PathBuf>,
+    #[command(flatten)]
+    picture: PictureOptions,
+    #[command(flatten)]
+    device: DeviceOptions,
+    /// Further layers of the EXR, taken at the pixel centres
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,...")]
+    aov: Vec<AovName>,
+    /// Draw N times and fail unless all are bit-identical
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    repeat: u32,
+    /// Write a machine-readable account of the run
+    #[arg(long, value_name = "FILE.json")]
+    report: Option<PathBuf>,
+    /// Progress: a bar on a terminal, a line per step elsewhere
+    #[arg(long, value_enum, default_value_t = When::Auto)]
+    progress: When,
+}
+
+/// Layers that can be asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub enum AovName {
+    /// Base colour.
+    Albedo,
+    /// Shading normal in world space.
+    Normal,
+    /// Normal of the triangle, towards the viewer.
+    GeometricNormal,
+    /// Position in world space, metres.
+    Position,
+    /// Distance along the viewing direction, metres.
+    Depth,
+    /// Distance from the eye, metres.
+    Distance,
+    /// Perceptual roughness.
+    Roughness,
+    /// Metallic.
+    Metallic,
+    /// Emitted radiance.
+    Emissive,
+    /// Index of the material, counted from 1; 0 is nothing.
+    Material,
+    /// Index of the instance, counted from 1; 0 is nothing.
+    Instance,
+    /// Not built yet.
+    Reflection,
+    /// Not built yet.
+    Refraction,
+}
+
+/// What an output path asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Png,
+    Exr,
+}
+
+fn format_of(path: &Path) -> Result<Format> {
+    match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
+        Some("png") => Ok(Format::Png),
+        Some("exr") => Ok(Format::Exr),
+        _ => bail!("--output {}: only .png and .exr are written", path.display()),
+    }
+}
+
+/// Wall time of named phases.
+struct Phases {
+    start: Instant,
+    last: Instant,
+    all: BTreeMap<&'static str, f64>,
+}
+
+impl Phases {
+    fn end(&mut self, name: &'static str) {
+        let now = Instant::now();
+        *self.all.entry(name).or_default() += (now - self.last).as_secs_f64() * 1e3;
+        self.last = now;
+    }
+}
+
+/// Steps as a bar on a terminal, as lines elsewhere, or not at all.
+struct Steps {
+    bar: Option<ProgressBar>,
+    lines: bool,
+}
+
+impl Steps {
+    fn new(progress: When, quiet: bool) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        let shown = !quiet && progress != When::Never;
+        let bar = (shown && (terminal || progress == When::Always)).then(|| {
+            let bar = ProgressBar::with_draw_target(Some(1), ProgressDrawTarget::stderr());
+            let style = ProgressStyle::with_template("{msg:<24} {wide_bar} {pos}/{len} {elapsed}");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            bar
+        });
+        Self { lines: shown && bar.is_none(), bar }
+    }
+
+    fn step(&self, message: &str, of: u32) {
+        if let Some(bar) = &self.bar {
+            bar.set_message(message.to_owned());
+            bar.set_length(u64::from(of));
+            bar.set_position(0);
+        }
+        if self.lines {
+            eprintln!("{message}");
+        }
+    }
+
+    fn at(&self, position: u32) {
+        if let Some(bar) = &self.bar {
+            bar.set_position(u64::from(position));
+        }
+    }
+
+    /// A line that stays, whatever the bar does.
+    fn say(&self, line: &str) {
+        match &self.bar {
+            Some(bar) => bar.suspend(|| eprintln!("{line}")),
+            None => eprintln!("{line}"),
+        }
+    }
+}
+
+impl Drop for Steps {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// One sentence with what was being done, to what, and the cause.
+pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
+    let now = Instant::now();
+    let mut phases = Phases { start: now, last: now, all: BTreeMap::new() };
+    let outputs = outputs(args)?;
+    let settings = args.picture.settings(&args.scene)?;
+    let steps = Steps::new(args.progress, quiet);
+
+    // The device opens and the environment is read while the scene loads: three things that do not wait for each other.
+    steps.step(&format!("loading {}", args.scene.scene), 1);
+    let (device, scene, environment) = std::thread::scope(|scope| {
+        let device = scope.spawn(|| Device::open(&args.device.choice(), args.device.validate));
+        let environment = scope.spawn(|| args.scene.load_environment());
+        let scene = args.scene.load();
+        let join = |_| anyhow!("a loading thread failed");
+        (device.join().map_err(join), scene, environment.join().map_err(join))
+    });
+    let scene = scene?;
+    let (environment, environment_warnings) = environment??;
+    let device = device??;
+    phases.end("load");
+    let info = device.info().clone();
+    if !quiet {
+        let software = if info.kind == "cpu" { ", a software device" } else { "" };
+        steps.say(&format!("drawing on {} ({}{software})", info.name, info.driver));
+    }
+    for warning in scene.warnings.iter().chain(&environment_warnings) {
+        tracing::warn!("{warning}");
+    }
+    let environment = environment.filter(|_| args.scene.uses_environment(&scene));
+    let camera = args.scene.choose_camera(&scene, settings.size)?;
+    let facts = facts(&scene);
+
+    steps.step("uploading", 1);
+    let knobs = settings.knobs.clone();
+    let mut renderer = Renderer::new(&device, scene, environment.as_ref(), settings)?;
+    drop(environment);
+    phases.end("upload");
+    if tracing::enabled!(tracing::Level::INFO) {
+        for effect in &renderer.plan.effects {
+            tracing::info!("{}: {} ({})", effect.name, effect.state, effect.reason);
+        }
+    }
+
+    let samples = renderer.plan.samples;
+    let mut rounds = Vec::new();
+    let mut first: Option<(Rendered, Option<Picture>)> = None;
+    let needs_film = args.report.is_some() || outputs.iter().any(|(_, format)| *format == Format::Exr) || args.repeat > 1;
+    for round in 0..args.repeat {
+        steps.step("drawing", samples);
+        let rendered = renderer.render(&camera, &mut |done, _| steps.at(done))?;
+        phases.end("frame");
+        let film = if needs_film { Some(renderer.film()?) } else { None };
+        phases.end("readback");
+        rounds.push(rendered.passes.clone());
+        match &first {
+            None => first = Some((rendered, film)),
+            Some((known, known_film)) => {
+                let same = |a: &Picture, b: &Picture| bytemuck::cast_slice::<_, u8>(&a.rgba) == bytemuck::cast_slice::<_, u8>(&b.rgba);
+                let films = known_film.as_ref().zip(film.as_ref()).is_none_or(|(a, b)| same(a, b));
+                if known.display != rendered.display || !films {
+                    bail!("--repeat: picture {} differs from the first", round + 1);
+                }
+            }
+        }
+    }
+    let (rendered, film) = first.ok_or_else(|| anyhow!("nothing was drawn"))?;
+    let aovs = if args.aov.is_empty() { Vec::new() } else { layers(&mut renderer, &camera, &args.aov)? };
+    phases.end("readback");
+    warn_about(&rendered, settings_size(&args.picture));
+
+    steps.step("encoding", outputs.len() as u32);
+    let mut written = Vec::new();
+    for (index, (path, format)) in outputs.iter().enumerate() {
+        let bytes = match (format, &film) {
+            (Format::Exr, Some(film)) => exr::encode_exr(film, &aovs, &metadata(args))?,
+            _ => renderer.png(&rendered)?,
+        };
+        file::write(path, &bytes)?;
+        written.push(Output { path: path.display().to_string(), hash: file::hash(&bytes) });
+        steps.at(index as u32 + 1);
+    }
+    phases.end("encode");
+    let validation = Validation::of(&device, args.device.validate);
+    let failed = validation.messages.iter().find(|m| m.severity == Severity::Error).map(|m| m.text.clone());
+    if let (Some(path), Some(film)) = (&args.report, &film) {
+        let total = phases.start.elapsed().as_secs_f64() * 1e3;
+        phases.all.insert("total", total);
+        let (count, spirv_bytes) = device.pipelines();
+        let report = Report {
+            schema: "etalon.report/1",
+            device: info,
+            scene: facts,
+            knobs: knob_map(&knobs),
+            plan: plan_facts(&renderer.plan),
+            passes: pass_facts(&rounds),
+            phases_ms: phases.all,
+            work: Work::default(),
+            pipelines: PipelineFacts { count, spirv_bytes },
+            memory: MemoryFacts::now(&device),
+            image: film.statistics(),
+            validation,
+            outputs: written,
+        };
+        file::write(path, serde_json::to_string_pretty(&report)?.as_bytes())?;
+    }
+    drop(steps);
+    for (path, _) in &outputs {
+        print(&path.display().to_string())?;
+    }
+    if let Some(text) = failed {
+        bail!("validation: {text}");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn settings_size(picture: &PictureOptions) -> u64 {
+    u64::from(picture.size[0]) * u64::from(picture.size[1])
+}
+
+fn plan_facts(plan: &Plan) -> super::report::PlanFacts {
+    plan.into()
+}
+
+/// Checks everything about the outputs that can be checked before any work is done.
+fn outputs(args: &RenderArgs) -> Result<Vec<(PathBuf, Format)>> {
+    let mut paths = args.output.clone();
+    if paths.is_empty() {
+        let name = args.scene.scene.strip_prefix("study:").map_or_else(|| Path::new(&args.scene.scene), Path::new);
+        paths.push(PathBuf::from(name.file_stem().unwrap_or_default()).with_extension("png"));
+    }
+    let mut all = Vec::new();
+    for path in paths {
+        let format = format_of(&path)?;
+        file::check_writable(&path)?;
+        if all.iter().any(|(known, _)| *known == path) {
+            bail!("--output {}: named twice", path.display());
+        }
+        all.push((path, format));
+    }
+    if let Some(report) = &args.report {
+        file::check_writable(report)?;
+    }
+    if !args.aov.is_empty() && !all.iter().any(|(_, format)| *format == Format::Exr) {
+        bail!("--aov: layers go into an EXR; add -o FILE.exr");
+    }
+    for name in [AovName::Reflection, AovName::Refraction] {
+        if args.aov.contains(&name) {
+            bail!("--aov {name:?}: this layer is not built yet");
+        }
+    }
+    Ok(all)
+}
+
+fn facts(scene: &Scene) -> SceneFacts {
+    SceneFacts {
+        path: scene.name.clone(),
+        triangles: scene.triangles(),
+        instances: scene.instances.len(),
+        materials: scene.materials.len(),
+        lights: scene.lights.len(),
+        textures: scene.images.len(),
+        warnings: scene.warnings.clone(),
+    }
+}
+
+/// What the EXR says of its making.
+fn metadata(args: &RenderArgs) -> Vec<(String, String)> {
+    vec![
+        ("software".to_owned(), format!("etalon {}", env!("CARGO_PKG_VERSION"))),
+        ("scene".to_owned(), args.scene.scene.clone()),
+    ]
+}
+
+fn warn_about(rendered: &Rendered, pixels: u64) {
+    let counts = rendered.counts;
+    for (count, what) in [(counts.nan, "NaN"), (counts.inf, "infinite"), (counts.negative, "negative")] {
+        if count > 0 {
+            tracing::warn!("{count} of {pixels} pixels hold {what} radiance, shown as black or white");
+        }
+    }
+    if rendered.dropped > 0 {
+        tracing::warn!(
+            "{} pixels have more see-through surfaces than one invocation sorts; their farthest were left out",
+            rendered.dropped
+        );
+    }
+}
+
+fn pass_facts(rounds: &[Vec<crate::gpu::PassTime>]) -> Vec<PassFacts> {
+    let Some(first) = rounds.first() else { return Vec::new() };
+    first
+        .iter()
+        .map(|pass| {
+            let times = rounds.iter().flatten().filter(|p| p.name == pass.name).map(|p| p.ms).collect();
+            PassFacts { name: pass.name.clone(), gpu_ms: Spread::of(times) }
+        })
+        .collect()
+}
+
+/// The asked layers in the order asked.
+fn layers(renderer: &mut Renderer, camera: &Camera, names: &[AovName]) -> Result<Vec<Aov>> {
+    let (pixels, view) = renderer.aovs(camera).context("reading the G-buffer")?;
+    Ok(names.iter().map(|&name| layer(&pixels, &view, name)).collect())
+}
+
+fn layer(pixels: &[AovPixel], view: &View, name: AovName) -> Aov {
+    let drawn = |p: &AovPixel| p.material != 0;
+    let vectors = |get: &dyn Fn(&AovPixel) -> [f32; 3]| AovData::F32(pixels.iter().flat_map(get).collect());
+    let numbers = |get: &dyn Fn(&AovPixel) -> f32| AovData::F32(pixels.iter().map(get).collect());
+    let (rgb, xyz): (&[&str], &[&str]) = (&["R", "G", "B"], &["X", "Y", "Z"]);
+    // World positions are sums in f64: far from the origin f32 is only good for the difference.
+    let world = |p: &AovPixel| {
+        if drawn(p) { (glam::Vec3::from(p.p_rel).as_dvec3() + view.eye).as_vec3().to_array() } else { [0.0; 3] }
+    };
+    let along = |p: &AovPixel| {
+        let p_rel: DVec3 = glam::Vec3::from(p.p_rel).as_dvec3();
+        p_rel.dot(view.axes[2]) as f32
+    };
+    let (title, channels, samples) = match name {
+        AovName::Albedo => ("albedo", rgb, vectors(&|p| p.albedo)),
+        AovName::Normal => ("normal", xyz, vectors(&|p| p.normal)),
+        AovName::GeometricNormal => ("geometric_normal", xyz, vectors(&|p| p.geometric_normal)),
+        AovName::Position => ("position", xyz, vectors(&world)),
+        AovName::Depth => ("depth", &["Z"][..], numbers(&along)),
+        AovName::Distance => ("distance", &["Z"][..], numbers(&|p| p.distance)),
+        AovName::Roughness => ("roughness", &["Y"][..], numbers(&|p| p.roughness)),
+        AovName::Metallic => ("metallic", &["Y"][..], numbers(&|p| p.metallic)),
+        AovName::Emissive => ("emissive", rgb, vectors(&|p| p.emissive)),
+        AovName::Material => ("material", &["id"][..], AovData::U32(pixels.iter().map(|p| p.material).collect())),
+        AovName::Instance | AovName::Reflection | AovName::Refraction => {
+            ("instance", &["id"][..], AovData::U32(pixels.iter().map(|p| p.instance).collect()))
+        }
+    };
+    Aov { name: title.to_owned(), channels: channels.iter().map(|c| (*c).to_owned()).collect(), samples }
+}

@@ -1,0 +1,203 @@
+//! `render --report FILE`: the machine-readable account of a run, schema `etalon.report/1` (product.md, "JSON names").
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::gpu::{Device, DeviceInfo, Message, Severity};
+use crate::image::Statistics;
+use crate::plan::{Effect, Knobs, Plan};
+
+/// The document.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    /// `etalon.report/1`.
+    pub schema: &'static str,
+    /// Where it ran.
+    pub device: DeviceInfo,
+    /// What was drawn.
+    pub scene: SceneFacts,
+    /// Rung of every knob.
+    pub knobs: BTreeMap<&'static str, &'static str>,
+    /// What was done and why.
+    pub plan: PlanFacts,
+    /// GPU time per pass over the repeats.
+    pub passes: Vec<PassFacts>,
+    /// Wall time of each phase in milliseconds.
+    pub phases_ms: BTreeMap<&'static str, f64>,
+    /// Work counts: the same on every machine.
+    pub work: Work,
+    /// Pipelines made.
+    pub pipelines: PipelineFacts,
+    /// Peak memory.
+    pub memory: MemoryFacts,
+    /// Statistics of the film.
+    pub image: Statistics,
+    /// What the validation layer said.
+    pub validation: Validation,
+    /// Files written, with hashes of their bytes.
+    pub outputs: Vec<Output>,
+}
+
+/// What was drawn.
+#[derive(Debug, Clone, Serialize)]
+pub struct SceneFacts {
+    /// Path or `study:NAME`.
+    pub path: String,
+    /// As drawn: instances counted.
+    pub triangles: usize,
+    /// Placed meshes.
+    pub instances: usize,
+    /// Materials.
+    pub materials: usize,
+    /// Punctual lights.
+    pub lights: usize,
+    /// Decoded images.
+    pub textures: usize,
+    /// What was read around.
+    pub warnings: Vec<String>,
+}
+
+/// The plan as data.
+#[derive(Debug, Serialize)]
+pub struct PlanFacts {
+    /// Every effect with its reason.
+    pub effects: Vec<Effect>,
+    /// Samples per pixel.
+    pub samples: u32,
+}
+
+impl From<&Plan> for PlanFacts {
+    fn from(plan: &Plan) -> Self {
+        Self { effects: plan.effects.clone(), samples: plan.samples }
+    }
+}
+
+/// One pass.
+#[derive(Debug, Serialize)]
+pub struct PassFacts {
+    /// Its name.
+    pub name: String,
+    /// Milliseconds on the device.
+    pub gpu_ms: Spread,
+}
+
+/// A sample of times.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Spread {
+    /// Smallest.
+    pub min: f64,
+    /// Middle.
+    pub median: f64,
+    /// Largest.
+    pub max: f64,
+    /// How many.
+    pub n: usize,
+}
+
+impl Spread {
+    /// Of some numbers, at least one.
+    #[must_use]
+    pub fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        let n = values.len();
+        let at = |i: usize| values.get(i).copied().unwrap_or_default();
+        let median = (at((n.max(1) - 1) / 2) + at(n / 2)) * 0.5;
+        Self { min: at(0), median, max: at(n.saturating_sub(1)), n }
+    }
+}
+
+/// Exact counts.
+#[derive(Debug, Default, Serialize)]
+pub struct Work {
+    /// Rays by kind; primary visibility is rasterised.
+    pub rays: BTreeMap<&'static str, u64>,
+    /// BVH nodes visited.
+    pub node_visits: u64,
+    /// Triangles tested by rays.
+    pub triangle_tests: u64,
+}
+
+/// Pipelines made.
+#[derive(Debug, Serialize)]
+pub struct PipelineFacts {
+    /// How many.
+    pub count: usize,
+    /// SPIR-V in them.
+    pub spirv_bytes: usize,
+}
+
+/// Memory.
+#[derive(Debug, Serialize)]
+pub struct MemoryFacts {
+    /// Largest resident size of the process; on a CPU device this includes the device's memory.
+    pub host_peak_bytes: u64,
+    /// Blocks allocated on the device at the end.
+    pub device_bytes: u64,
+}
+
+impl MemoryFacts {
+    /// As things stand.
+    #[must_use]
+    pub fn now(device: &Device) -> Self {
+        // Linux keeps the high-water mark; elsewhere it is not known.
+        let peak = std::fs::read_to_string("/proc/self/status")
+            .ok()
+            .and_then(|status| {
+                let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+                line.split_whitespace().nth(1)?.parse::<u64>().ok()
+            })
+            .unwrap_or_default();
+        Self { host_peak_bytes: peak * 1024, device_bytes: device.memory_bytes() }
+    }
+}
+
+/// Validation.
+#[derive(Debug, Serialize)]
+pub struct Validation {
+    /// Whether the layer was on.
+    pub enabled: bool,
+    /// Errors.
+    pub errors: usize,
+    /// Warnings.
+    pub warnings: usize,
+    /// All of them.
+    pub messages: Vec<Message>,
+}
+
+impl Validation {
+    /// What the layer has said so far.
+    #[must_use]
+    pub fn of(device: &Device, enabled: bool) -> Self {
+        let messages = device.messages();
+        let count = |severity| messages.iter().filter(|m| m.severity == severity).count();
+        Self { enabled, errors: count(Severity::Error), warnings: count(Severity::Warning), messages }
+    }
+}
+
+/// A file that was written.
+#[derive(Debug, Serialize)]
+pub struct Output {
+    /// Where.
+    pub path: String,
+    /// XXH3-128 of its bytes.
+    pub hash: String,
+}
+
+/// Knobs as the report lists them.
+#[must_use]
+pub fn knob_map(knobs: &Knobs) -> BTreeMap<&'static str, &'static str> {
+    knobs.list().into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spread_has_the_middle_in_the_middle() {
+        let spread = Spread::of(vec![3.0, 1.0, 2.0, 10.0]);
+        assert_eq!((spread.min, spread.median, spread.max, spread.n), (1.0, 2.5, 10.0, 4));
+        assert_eq!(Spread::of(vec![7.0]).median, 7.0);
+    }
+}
