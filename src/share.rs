@@ -51,16 +51,6 @@ pub struct Material {
     pub flags: u32,
 }
 
-/// `shaders/share/scene.glsl`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub struct TextureSlot {
-    pub row_u: [f32; 3],
-    pub row_v: [f32; 3],
-    pub layer: u32,
-    pub uv_set: u32,
-}
-
 /// `shaders/share/environment.glsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]

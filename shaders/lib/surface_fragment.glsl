@@ -5,7 +5,9 @@
 #include "lib/gbuffer_interface.glsl"
 
 layout(scalar, set = 0, binding = 2) readonly buffer Materials { Material materials[]; };
-layout(scalar, set = 0, binding = 3) readonly buffer Slots { TextureSlot slots[]; };
+// Two texels per slot: row of u, layer | row of v, coordinate set. A texel buffer, not a storage buffer: lavapipe 22.3
+// masks storage-buffer loads of helper invocations to 0, and the texture's level would come out of those coordinates.
+layout(set = 0, binding = 3, rgba32f) readonly uniform imageBuffer slots;
 layout(set = 0, binding = 4) uniform sampler2DArray base_page;
 layout(set = 0, binding = 5) uniform sampler2DArray metallic_roughness_page;
 layout(set = 0, binding = 6) uniform sampler2DArray normal_page;
@@ -40,9 +42,11 @@ struct SurfaceFragment {
 
 // The array index is the rounded third coordinate; a layer never bleeds into the next.
 vec4 read(sampler2DArray page, uint slot_index) {
-    TextureSlot slot = slots[ids.y * SLOTS + slot_index];
-    vec3 set = vec3(slot.uv_set == 0 ? uv.xy : uv.zw, 1.0);
-    return texture(page, vec3(dot(slot.row_u, set), dot(slot.row_v, set), float(slot.layer)), lod_bias);
+    int at = int(ids.y * SLOTS + slot_index) * 2;
+    vec4 u_layer = imageLoad(slots, at);
+    vec4 v_set = imageLoad(slots, at + 1);
+    vec3 set = vec3(v_set.w == 0.0 ? uv.xy : uv.zw, 1.0);
+    return texture(page, vec3(dot(u_layer.xyz, set), dot(v_set.xyz, set), u_layer.w), lod_bias);
 }
 
 // Opacity alone: what decides whether the fragment exists.

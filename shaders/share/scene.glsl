@@ -26,11 +26,3 @@ struct Material {
     float clearcoat_roughness;
     uint flags;               // bit 0: unlit; bit 1: alpha is coverage
 };
-
-// Where a material finds one of its textures: layer of the bound page, coordinate set, and KHR_texture_transform rows.
-struct TextureSlot {
-    vec3 row_u;
-    vec3 row_v;
-    uint layer;
-    uint uv_set;
-};

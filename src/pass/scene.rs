@@ -204,7 +204,7 @@ impl SceneOnDevice {
         let light_bytes = (lights_cpu.len() * 64) as u64;
         Ok(Self {
             materials: upload(device, "materials", &table, None)?,
-            slots: upload(device, "texture slots", &slot_table, None)?,
+            slots: upload(device, "texture slots", &slot_table, Some(vk::Format::R32G32B32A32_SFLOAT))?,
             instances: Buffer::new(device, "instances", instance_bytes, Place::Upload)?,
             lights: Buffer::texels(device, "lights", light_bytes, Place::Upload, vk::Format::R32G32B32A32_SFLOAT)?,
             fallback: upload(device, "attribute fallback", &[0.0_f32, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0], None)?,
@@ -312,17 +312,12 @@ fn same_pages(textures: &Textures, a: &Material, b: &Material) -> bool {
     })
 }
 
-fn shared_slot(texture: Option<TextureRef>, textures: &Textures, meaning: Meaning) -> share::TextureSlot {
-    let Some(texture) = texture else {
-        return share::TextureSlot { row_u: [1.0, 0.0, 0.0], row_v: [0.0, 1.0, 0.0], layer: 0, uv_set: 0 };
-    };
-    let m = texture.uv_transform;
-    share::TextureSlot {
-        row_u: [m.matrix2.x_axis.x, m.matrix2.y_axis.x, m.translation.x],
-        row_v: [m.matrix2.x_axis.y, m.matrix2.y_axis.y, m.translation.y],
-        layer: textures.layer(texture, meaning),
-        uv_set: texture.uv_set,
-    }
+/// Two texels: row of u, layer | row of v, coordinate set (shaders/lib/surface_fragment.glsl).
+fn shared_slot(texture: Option<TextureRef>, textures: &Textures, meaning: Meaning) -> [[f32; 4]; 2] {
+    let Some(texture) = texture else { return [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]] };
+    let (m, t) = (texture.uv_transform.matrix2, texture.uv_transform.translation);
+    let layer = textures.layer(texture, meaning) as f32;
+    [[m.x_axis.x, m.y_axis.x, t.x, layer], [m.x_axis.y, m.y_axis.y, t.y, texture.uv_set as f32]]
 }
 
 /// The constants of a material. F0 of a dielectric is ((n − 1) / (n + 1))² tinted and scaled by KHR_materials_specular;
