@@ -24,7 +24,7 @@ pub(super) fn scene() -> Scene {
         b.picture("stripes", 64, |x, _| if (x / 8) % 2 == 0 { [0.05, 0.05, 0.05, 1.0] } else { [0.6, 0.6, 0.6, 1.0] });
     let board =
         b.material(Material { base_color_texture: Some(stripes), unlit: true, ..dielectric("board", [1.0; 3], 1.0) });
-    b.add("board", Shape::panel(5.0, 3.0).repeat_uv(5.0, 3.0), board, at(0.0, 0.0, -1.0, 0.0));
+    b.add("board", Shape::panel(6.0, 4.0).repeat_uv(6.0, 4.0), board, at(0.0, 0.0, -1.0, 0.0));
 
     let red = b.material(pane("red glass", [0.9, 0.1, 0.1, 0.5]));
     let green = b.material(pane("green glass", [0.1, 0.8, 0.1, 0.5]));
@@ -57,6 +57,6 @@ pub(super) fn scene() -> Scene {
     b.add("lattice", Shape::panel(0.9, 0.9), lattice, at(1.3, 0.0, 0.2, 0.0));
     b.place("pane before the lattice", panes[0], at(1.5, -0.15, 0.4, 0.0));
 
-    b.camera("front", DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, 25.0);
+    b.camera("front", DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, 28.0);
     b.finish()
 }

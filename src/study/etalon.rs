@@ -85,8 +85,8 @@ fn basin(b: &mut Builder) {
     b.add("water", Shape::lathe(&body, 96), water, at(0.42, 0.0001, 0.0, 0.0));
 }
 
-/// A ball that glows on a thin stand. Its point light hangs in front of the ball: inside it, its own ball would
-/// shadow it.
+/// A ball that glows on a thin stand. Its point light hangs below the ball: inside it, its own ball would
+/// shadow it. It ends before the backdrop, where the ball's shadow would tell.
 fn lamp(b: &mut Builder) {
     let (x, z, radius, height) = (0.56, -0.62, 0.05, 0.30);
     let brass = b.material(metal("brass", [0.89, 0.76, 0.43], 0.3));
@@ -101,8 +101,8 @@ fn lamp(b: &mut Builder) {
     b.add("lamp stand", Shape::lathe(&stand, 48), brass, at(x, 0.0001, z, 0.0));
     let glow = b.material(emitter("lamp glow", [14.0, 8.4, 3.6]));
     b.add("lamp ball", Shape::sphere(radius, 32), glow, at(x, height, z, 0.0));
-    let position = DVec3::new(x - 0.03, height - 0.01, z + 0.06);
-    b.light("lamp", [0.55, 0.33, 0.14], LightKind::Point { position, range: None });
+    let position = DVec3::new(x - 0.02, height - 0.06, z + 0.035);
+    b.light("lamp", [0.60, 0.36, 0.15], LightKind::Point { position, range: Some(1.1) });
 }
 
 /// Two soft boxes, for the shine on glass and metal, and the lights that stand for them where only points light.

@@ -46,6 +46,6 @@ pub(super) fn scene() -> Scene {
         let front = position + (middle - position).normalize() * 0.05;
         b.light(&format!("soft box {i}"), [9.0; 3], LightKind::Point { position: front, range: None });
     }
-    b.camera("front", DVec3::new(0.0, 0.5, 2.6), DVec3::new(0.0, 0.2, 0.0), 21.0);
+    b.camera("front", DVec3::new(0.0, 0.5, 2.6), DVec3::new(0.0, 0.2, 0.0), 25.0);
     b.finish()
 }
