@@ -12,12 +12,17 @@ mod raycast;
 use raycast::{Options, Ray, World};
 
 fn scenes() -> Vec<Scene> {
-    let mut scenes: Vec<Scene> = study::NAMES.iter().map(|name| study::load(name).unwrap()).collect();
+    let mut scenes: Vec<Scene> =
+        study::NAMES.iter().map(|name| study::load(name).expect("a listed name loads")).collect();
     scenes.push(generate::lights(64));
     scenes.push(generate::sphere_field(20_000));
     scenes.push(generate::quads_at(&[0.5, 1.0, 2.0, 1000.0]));
     scenes.push(generate::checker_plane(100.0, 100.0));
-    scenes.push(generate::at_scale(study::load("etalon").unwrap(), 1000.0, DVec3::new(1e6, -3e5, 2e5)));
+    scenes.push(generate::at_scale(
+        study::load("etalon").expect("the default scene loads"),
+        1000.0,
+        DVec3::new(1e6, -3e5, 2e5),
+    ));
     scenes
 }
 
