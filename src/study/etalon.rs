@@ -4,18 +4,16 @@
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::build::{Builder, at, dielectric, emitter, facing, glass, metal};
+use super::metals;
 use super::shape::{Shape, arc, line};
 use crate::scene::{LightKind, Material, Scene};
-
-/// Gold at about 645, 526 and 444 nm (Johnson & Christy 1972), as the `metals` scene computes it.
-const GOLD: [f32; 3] = [0.953, 0.674, 0.408];
 
 pub(super) fn scene() -> Scene {
     let mut b = Builder::new("etalon");
     table(&mut b);
     plates(&mut b);
 
-    let gold = b.material(metal("gold", GOLD, 0.06));
+    let gold = b.material(metal("gold", metals::f0(metals::GOLD), 0.06));
     b.add("gold ball", Shape::sphere(0.07, 48), gold, at(-0.16, 0.07, 0.03, 0.0));
 
     let crown = b.material(glass("crown glass", 1.517, 0.16));
@@ -35,16 +33,19 @@ pub(super) fn scene() -> Scene {
     b.finish()
 }
 
-/// The sweep: matt, with a checker faint enough to stay behind the subject and clear enough to be seen in a mirror.
+/// Matt floor and backdrop. The floor's checker is faint enough to stay behind the subject and clear enough to be
+/// seen in a mirror.
 fn table(b: &mut Builder) {
-    let checker = b.checker("table checker", [0.30, 0.30, 0.32], [0.44, 0.43, 0.42]);
+    let checker = b.checker("table checker", [0.30, 0.30, 0.31], [0.43, 0.42, 0.41]);
     let matt = b.material(Material { base_color_texture: Some(checker), ..dielectric("table", [1.0; 3], 0.9) });
-    // One repeat of eight squares on half a metre.
-    b.add("table", Shape::sweep(7.0, 2.4, -1.1, 0.6, 2.6).repeat_uv(2.0, 2.0), matt, DAffine3::IDENTITY);
+    // One repeat of eight squares on half a metre: 7 m by 3.5 m, from behind the camera to the backdrop.
+    b.add("table", Shape::plane(7.0, 3.5, 1).repeat_uv(14.0, 7.0), matt, at(0.0, 0.0, 0.65, 0.0));
+    let paper = b.material(dielectric("backdrop", [0.36, 0.36, 0.37], 0.9));
+    b.add("backdrop", Shape::backdrop(7.0, -1.1, 0.6, 2.6), paper, DAffine3::IDENTITY);
 }
 
-/// The etalon itself. The plates stand a finger's width apart from parallel objects' size: near enough for a chain
-/// of images, open enough to look in.
+/// The etalon itself. The plates stand near enough to each other for a chain of images, and open enough to
+/// look in.
 fn plates(b: &mut Builder) {
     // Part metal, part clear glass: the metallic share reflects, the rest lets through.
     let silver = b.material(Material {
@@ -84,8 +85,8 @@ fn basin(b: &mut Builder) {
     b.add("water", Shape::lathe(&body, 96), water, at(0.42, 0.0001, 0.0, 0.0));
 }
 
-/// A ball that glows on a thin stand. Its point light hangs in front of the ball: inside it, its own ball would
-/// shadow it.
+/// A ball that glows on a thin stand. Its point light hangs below the ball: inside it, its own ball would
+/// shadow it. It ends before the backdrop, where the ball's shadow would tell.
 fn lamp(b: &mut Builder) {
     let (x, z, radius, height) = (0.56, -0.62, 0.05, 0.30);
     let brass = b.material(metal("brass", [0.89, 0.76, 0.43], 0.3));
@@ -100,8 +101,8 @@ fn lamp(b: &mut Builder) {
     b.add("lamp stand", Shape::lathe(&stand, 48), brass, at(x, 0.0001, z, 0.0));
     let glow = b.material(emitter("lamp glow", [14.0, 8.4, 3.6]));
     b.add("lamp ball", Shape::sphere(radius, 32), glow, at(x, height, z, 0.0));
-    let position = DVec3::new(x - 0.03, height - 0.01, z + 0.06);
-    b.light("lamp", [0.55, 0.33, 0.14], LightKind::Point { position, range: None });
+    let position = DVec3::new(x - 0.02, height - 0.06, z + 0.035);
+    b.light("lamp", [0.60, 0.36, 0.15], LightKind::Point { position, range: Some(1.1) });
 }
 
 /// Two soft boxes, for the shine on glass and metal, and the lights that stand for them where only points light.
@@ -124,6 +125,6 @@ fn studio(b: &mut Builder) {
         outer: 62.0_f64.to_radians(),
     };
     b.light("key", [15.0, 15.0, 15.0], kind);
-    let direction = (middle - rim_at).normalize();
-    b.light("fill", [0.35, 0.40, 0.48], LightKind::Directional { direction });
+    let position = rim_at + (middle - rim_at).normalize() * 0.05;
+    b.light("fill", [1.3, 1.5, 1.8], LightKind::Point { position, range: None });
 }

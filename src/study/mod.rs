@@ -3,8 +3,15 @@
 //! One file per scene, put together by one builder from the shapes of [`shape`]; scenes that take parameters, for
 //! tests and measurements, are in [`generate`].
 
+mod blend;
 mod build;
+mod cornell;
 mod etalon;
+pub mod generate;
+mod lamps;
+mod materials;
+mod metals;
+mod radiance;
 pub mod shape;
 
 use anyhow::{Result, bail};
@@ -12,7 +19,7 @@ use anyhow::{Result, bail};
 use crate::scene::Scene;
 
 /// Study scenes that can be loaded, the default one first.
-pub const NAMES: &[&str] = &["etalon"];
+pub const NAMES: &[&str] = &["etalon", "materials", "lamps", "radiance", "cornell", "metals", "blend"];
 
 /// Announced names whose scenes do not exist yet: asking for one is no typing mistake.
 const PLANNED: &[&str] = &["pool", "golden-bridge", "prism", "absorber", "metamers", "nested", "torture"];
@@ -21,6 +28,12 @@ const PLANNED: &[&str] = &["pool", "golden-bridge", "prism", "absorber", "metame
 pub fn load(name: &str) -> Result<Scene> {
     Ok(match name {
         "etalon" => etalon::scene(),
+        "materials" => materials::scene(),
+        "lamps" => lamps::scene(),
+        "radiance" => radiance::scene(),
+        "cornell" => cornell::scene(),
+        "metals" => metals::scene(),
+        "blend" => blend::scene(),
         _ if PLANNED.contains(&name) => {
             bail!("the study scene `{name}` is not built yet; these are: {}", NAMES.join(", "))
         }

@@ -234,18 +234,16 @@ impl Shape {
         shape
     }
 
-    /// A photographer's sweep: a floor that runs back from z = `front` to z = `back` and bends up into a wall of
-    /// height `top`, `width` across. Texture coordinates are in metres.
+    /// The back of a photographer's sweep: from the floor's end at z = `back` it bends up, with radius `bend`, into a
+    /// wall that ends at y = `top`; `width` across. Texture coordinates are in metres.
     #[must_use]
-    pub fn sweep(width: f64, front: f64, back: f64, bend: f64, top: f64) -> Self {
-        // Outline in (−z, y): from the front along the floor, up the bend, up the wall. The surface lies to the left
-        // of travel.
-        let floor = line(DVec2::new(-front, 0.0), DVec2::new(-back, 0.0));
+    pub fn backdrop(width: f64, back: f64, bend: f64, top: f64) -> Self {
+        // Outline in (−z, y); the surface lies to the left of travel, where an arc's normals would have to point in.
         let curve = arc(DVec2::new(-back, bend), bend, -FRAC_PI_2, 0.0, 24);
         let wall = line(DVec2::new(-back + bend, bend), DVec2::new(-back + bend, top));
         let mut shape = Self::default();
         let mut travelled = 0.0;
-        for stretch in [floor, curve, wall] {
+        for stretch in [curve, wall] {
             let first = shape.positions.len() as u32;
             for (i, &(p, n)) in stretch.iter().enumerate() {
                 if i > 0 {
