@@ -415,7 +415,8 @@ fn triangulate(corners: &[DVec3]) -> Vec<[usize; 3]> {
     let mut out = Vec::with_capacity(n - 2);
     while left.len() > 3 {
         let m = left.len();
-        let ear = (0..m).find(|&i| {
+        // Beginning at corner 1 makes convex polygons the fan that everybody expects.
+        let ear = (1..=m).map(|i| i % m).find(|&i| {
             let (a, b, c) = (left[(i + m - 1) % m], left[i], left[(i + 1) % m]);
             turn(a, b, c) > 0.0
                 && left.iter().all(|&p| {
@@ -636,11 +637,11 @@ mod tests {
         let p = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (3.0, 1.0)].map(|(x, y)| DVec3::new(x, y, 1.0));
         for shift in 0..4 {
             let turned: Vec<DVec3> = (0..4).map(|i| p[(i + shift) % 4]).collect();
-            let areas = triangulate(&turned).iter().map(|t| {
+            let area = |t: &[usize; 3]| {
                 let [a, b, c] = t.map(|i| turned[i]);
                 (b - a).cross(c - a).z / 2.0
-            });
-            let areas: Vec<f64> = areas.collect();
+            };
+            let areas: Vec<f64> = triangulate(&turned).iter().map(area).collect();
             assert!(areas.iter().all(|&a| a > 0.0), "{areas:?}");
             assert!((areas.iter().sum::<f64>() - 4.0).abs() < 1e-12, "{areas:?}");
         }
