@@ -254,7 +254,7 @@ fn transforms_chain_in_f64_and_keep_mirroring() {
     // 10 000 km away and back: f32 would leave nothing of the millimetres.
     b.json["nodes"] = json!([
         { "translation": [1.0e7, 0.0, 0.0], "children": [1] },
-        { "translation": [-1.0e7, 0.001, 0.0], "rotation": [0.0, 0.0, 0.70710678, 0.70710678], "children": [2, 3] },
+        { "translation": [-1.0e7, 0.001, 0.0], "rotation": [0.0, 0.0, std::f64::consts::FRAC_1_SQRT_2, std::f64::consts::FRAC_1_SQRT_2], "children": [2, 3] },
         { "mesh": 0, "scale": [-2.0, 1.0, 3.0], "name": "mirrored" },
         { "mesh": 0, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1] },
     ]);
@@ -598,6 +598,36 @@ fn slivers_keep_their_normal_and_triangles_without_area_or_number_go() {
     assert!(scene.warnings[0].contains("2 triangle(s) with a corner that is not finite"), "{:?}", scene.warnings);
     assert!(scene.warnings[1].contains("1 triangle(s) without area"), "{:?}", scene.warnings);
     assert!(scene.bounds().unwrap().max.is_finite());
+}
+
+#[test]
+fn vertices_that_no_triangle_uses_are_left_out() {
+    let mut b = Builder::new();
+    let position = b.floats("VEC3", &[99.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, f32::NAN, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    let normal = b.floats("VEC3", &[0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
+    let indices = b.indices(&[1, 2, 4, 2, 4, 1]);
+    let mesh = b.mesh(json!({ "attributes": { "POSITION": position, "NORMAL": normal }, "indices": indices }));
+    b.root(json!({ "mesh": mesh }));
+    let scene = load(&b);
+    assert_eq!(scene.meshes[0].positions.len(), 3);
+    assert_eq!(scene.meshes[0].normals, [[0.0, 0.0, 1.0]; 3]);
+    assert_eq!(scene.bounds().unwrap().max, DVec3::new(1.0, 1.0, 0.0));
+    assert_close(&corners(&scene)[..3], &TRIANGLE, 0.0);
+}
+
+#[test]
+fn nodes_scaled_to_nothing_are_left_out_with_a_warning() {
+    let mut b = one_triangle();
+    b.push("cameras", json!({ "type": "perspective", "perspective": { "yfov": 1, "znear": 0.1 } }));
+    b.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+    b.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [{ "type": "directional" }] } });
+    b.root(
+        json!({ "mesh": 0, "camera": 0, "scale": [0, 0, 0], "extensions": { "KHR_lights_punctual": { "light": 0 } } }),
+    );
+    b.root(json!({ "mesh": 0, "scale": [1, 1, 0] }));
+    let scene = load(&b);
+    assert_eq!((scene.instances.len(), scene.cameras.len(), scene.lights.len()), (2, 0, 0));
+    assert_eq!(scene.warnings.len(), 3, "{:?}", scene.warnings);
 }
 
 #[test]
