@@ -1,4 +1,5 @@
 //! Every real model and every broken file of the shared collection, where it is present.
+#![allow(clippy::unwrap_used, reason = "a test may stop where it stands")]
 
 use std::{
     fs,

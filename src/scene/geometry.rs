@@ -47,6 +47,7 @@ impl Repairs {
 /// `tangent_set` where they are asked for and absent.
 pub(crate) fn finish(mesh: &mut Mesh, tangent_set: Option<usize>) -> Repairs {
     let mut repairs = Repairs { not_finite: drop_not_finite(mesh), ..Repairs::default() };
+    compact(mesh);
     for uvs in &mut mesh.uvs {
         repairs.bad_attributes += zero_not_finite(uvs);
     }
@@ -85,13 +86,6 @@ fn drop_not_finite(mesh: &mut Mesh) -> usize {
     let kept =
         mesh.indices.as_chunks::<3>().0.iter().filter(|t| t.iter().all(|&i| finite(&mesh.positions[i as usize])));
     mesh.indices = kept.flatten().copied().collect();
-    // The vertices stay where they are, but nobody may meet a NaN in them (bounds, uploads).
-    let stand_in = mesh.indices.first().map_or([0.0; 3], |&i| mesh.positions[i as usize]);
-    for p in &mut mesh.positions {
-        if !p.iter().all(|x| x.is_finite()) {
-            *p = stand_in;
-        }
-    }
     (before - mesh.indices.len()) / 3
 }
 
@@ -107,7 +101,7 @@ fn zero_not_finite<const N: usize>(values: &mut [[f32; N]]) -> usize {
 }
 
 /// Copies every attribute of `mesh` so that new vertex `i` is old vertex `sources[i]`.
-pub(crate) fn gather(mesh: &mut Mesh, sources: &[u32]) {
+fn gather(mesh: &mut Mesh, sources: &[u32]) {
     fn pick<T: Copy>(values: &mut Vec<T>, sources: &[u32]) {
         if !values.is_empty() {
             *values = sources.iter().map(|&i| values[i as usize]).collect();
@@ -120,13 +114,15 @@ pub(crate) fn gather(mesh: &mut Mesh, sources: &[u32]) {
     pick(&mut mesh.colors, sources);
 }
 
-/// Leaves out vertices that no triangle uses, when they are the greater part.
-pub(crate) fn compact(mesh: &mut Mesh) {
-    if mesh.indices.len() >= mesh.positions.len() {
+/// Leaves out vertices that no triangle uses: they would count in bounds and cost memory.
+fn compact(mesh: &mut Mesh) {
+    let mut used = vec![false; mesh.positions.len()];
+    mesh.indices.iter().for_each(|&i| used[i as usize] = true);
+    if used.iter().all(|&u| u) {
         return;
     }
     let mut renamed = vec![u32::MAX; mesh.positions.len()];
-    let mut sources = Vec::with_capacity(mesh.indices.len());
+    let mut sources = Vec::new();
     for index in &mut mesh.indices {
         let slot = &mut renamed[*index as usize];
         if *slot == u32::MAX {

@@ -35,7 +35,7 @@ pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let mut materials = gltf_material::read(&document, &mut warnings)?;
     check_unseen_meshes(&document)?;
     let (meshes, instances) = Placing::new(&document, &nodes, &mut materials.materials, &mut warnings).run()?;
-    let cameras = cameras(&document, &nodes)?;
+    let cameras = cameras(&document, &nodes, &mut warnings)?;
     let lights = lights(&document, &nodes, &mut warnings)?;
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     Ok(Scene {
@@ -392,7 +392,6 @@ fn build(document: &Document<'_>, materials: &[Material], job: &Job) -> Result<B
     if mirrored {
         mesh.indices.as_chunks_mut::<3>().0.iter_mut().for_each(|t| t.swap(1, 2));
     }
-    geometry::compact(&mut mesh);
     let repairs = geometry::finish(&mut mesh, needs.tangent_set);
     warnings.extend(repairs.sentences(&place));
     Ok(Built { mesh, strokes: Vec::new(), warnings })
@@ -546,20 +545,20 @@ fn bend(mesh: &mut Mesh, skin: &Skin, joints: &[DAffine3]) -> bool {
     mirrored * 2 > mesh.positions.len()
 }
 
-fn cameras(document: &Document<'_>, nodes: &Nodes) -> Result<Vec<Camera>> {
+fn cameras(document: &Document<'_>, nodes: &Nodes, warnings: &mut Vec<String>) -> Result<Vec<Camera>> {
     let root = &document.root;
     let mut cameras = Vec::new();
     for &node in &nodes.shown {
         let Some(index) = root.nodes[node].camera.map(|c| c.value()) else { continue };
         let camera = &root.cameras[index];
-        let what = || format!("camera {index} at {}", label(document, node));
-        let projection = projection(camera).with_context(what)?;
+        let place = format!("camera {index} at {}", label(document, node));
+        let projection = projection(camera).with_context(|| place.clone())?;
+        let Some(world_from_camera) = rigid(&nodes.world_from_node[node]) else {
+            warnings.push(format!("{place}: its node is scaled to nothing, so it is left out"));
+            continue;
+        };
         let name = camera.name.clone().or_else(|| root.nodes[node].name.clone());
-        cameras.push(Camera {
-            name: name.unwrap_or_else(|| format!("camera {index}")),
-            world_from_camera: rigid(&nodes.world_from_node[node]).with_context(what)?,
-            projection,
-        });
+        cameras.push(Camera { name: name.unwrap_or_else(|| format!("camera {index}")), world_from_camera, projection });
     }
     Ok(cameras)
 }
@@ -594,12 +593,12 @@ fn projection(camera: &json::Camera) -> Result<Projection> {
 }
 
 /// The placement without scale, shear and mirroring: the view direction is kept, then the upward one.
-fn rigid(world_from_node: &DAffine3) -> Result<DAffine3> {
+fn rigid(world_from_node: &DAffine3) -> Option<DAffine3> {
     let m = world_from_node.matrix3;
-    let backward = m.z_axis.try_normalize().context("its node is scaled to nothing along the view direction")?;
-    let right = m.y_axis.cross(backward).try_normalize().context("its node is scaled to nothing across the view")?;
+    let backward = m.z_axis.try_normalize()?;
+    let right = m.y_axis.cross(backward).try_normalize()?;
     let matrix3 = DMat3::from_cols(right, backward.cross(right), backward);
-    Ok(DAffine3 { matrix3, translation: world_from_node.translation })
+    Some(DAffine3 { matrix3, translation: world_from_node.translation })
 }
 
 fn lights(document: &Document<'_>, nodes: &Nodes, warnings: &mut Vec<String>) -> Result<Vec<Light>> {
@@ -615,10 +614,9 @@ fn lights(document: &Document<'_>, nodes: &Nodes, warnings: &mut Vec<String>) ->
         let json = all.get(index).with_context(|| format!("{place} does not exist; the file has {}", all.len()))?;
         let world = &nodes.world_from_node[node];
         let position = world.translation;
-        let direction = || {
-            (world.matrix3 * DVec3::NEG_Z)
-                .try_normalize()
-                .with_context(|| format!("{place}: its node is scaled to nothing along the light's direction"))
+        let Some(direction) = (world.matrix3 * DVec3::NEG_Z).try_normalize() else {
+            warnings.push(format!("{place}: its node is scaled to nothing, so it is left out"));
+            continue;
         };
         let range = match json.range {
             Some(range) if range > 0.0 && range.is_finite() => Some(f64::from(range)),
@@ -629,12 +627,12 @@ fn lights(document: &Document<'_>, nodes: &Nodes, warnings: &mut Vec<String>) ->
             None => None,
         };
         let kind = match json.type_ {
-            Checked::Valid(LightType::Directional) => LightKind::Directional { direction: direction()? },
+            Checked::Valid(LightType::Directional) => LightKind::Directional { direction },
             Checked::Valid(LightType::Point) => LightKind::Point { position, range },
             Checked::Valid(LightType::Spot) => {
                 let spot = json.spot.as_ref().with_context(|| format!("{place} is a spot without a cone"))?;
                 let (inner, outer) = cone(spot.inner_cone_angle, spot.outer_cone_angle, &place, warnings);
-                LightKind::Spot { position, direction: direction()?, range, inner, outer }
+                LightKind::Spot { position, direction, range, inner, outer }
             }
             Checked::Invalid => anyhow::bail!("{place} has an unknown type"),
         };

@@ -3,8 +3,10 @@
 //! How MTL's numbers become a metallic-roughness material is written down in `docs/scene-input.md`.
 
 use std::{
+    borrow::Cow,
     collections::HashMap,
     fs,
+    hash::{BuildHasherDefault, Hasher},
     path::{Path, PathBuf},
     str::SplitWhitespace,
 };
@@ -41,23 +43,52 @@ pub(crate) fn load(path: &Path) -> Result<Scene> {
 }
 
 /// Lines without comments, a backslash at the end joining the next one; numbered by their first line from 1.
-fn logical_lines(text: &str) -> impl Iterator<Item = (usize, String)> {
+fn logical_lines(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
     let mut lines = text.lines().enumerate();
     std::iter::from_fn(move || {
         let (number, first) = lines.next()?;
-        let mut line = first.to_owned();
-        while line.trim_end().ends_with('\\') {
-            line.truncate(line.trim_end().len() - 1);
-            match lines.next() {
-                Some((_, next)) => line = format!("{line} {next}"),
-                None => break,
-            }
+        let mut line = Cow::Borrowed(first.trim_end());
+        while let Some(begun) = line.strip_suffix('\\') {
+            line = match lines.next() {
+                Some((_, next)) => Cow::Owned(format!("{begun} {}", next.trim_end())),
+                None => Cow::Owned(begun.to_owned()),
+            };
         }
         if let Some(comment) = line.find('#') {
-            line.truncate(comment);
+            line = match line {
+                Cow::Borrowed(line) => Cow::Borrowed(&line[..comment]),
+                Cow::Owned(line) => Cow::Owned(line[..comment].to_owned()),
+            };
         }
         Some((number + 1, line))
     })
+}
+
+/// A multiplicative hash: corners are small numbers, and a million of them should not wait for a cryptographic one.
+#[derive(Default)]
+struct CornerHasher(u64);
+
+impl Hasher for CornerHasher {
+    fn finish(&self) -> u64 {
+        // The table takes its bits from both ends.
+        self.0 ^ self.0 >> 32
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|&b| self.write_u64(u64::from(b)));
+    }
+
+    fn write_u32(&mut self, value: u32) {
+        self.write_u64(u64::from(value));
+    }
+
+    fn write_isize(&mut self, value: isize) {
+        self.write_u64(value as u64);
+    }
+
+    fn write_u64(&mut self, value: u64) {
+        self.0 = (self.0.rotate_left(5) ^ value).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
 }
 
 /// A corner of a face: position, texture coordinate, normal.
@@ -351,7 +382,7 @@ impl Reader {
             warnings.push(format!("object \"{name}\" has a texture but lacks coordinates; (0, 0) is taken"));
         }
         let colored = corners.iter().all(|c| self.colors[c.0 as usize].is_some());
-        let mut known: HashMap<Corner, u32> = HashMap::with_capacity(corners.len() / 3);
+        let mut known: HashMap<Corner, u32, BuildHasherDefault<CornerHasher>> = HashMap::default();
         let mut indices = Vec::with_capacity(corners.len());
         for &corner in corners {
             let next = mesh.positions.len() as u32;
@@ -415,7 +446,8 @@ fn triangulate(corners: &[DVec3]) -> Vec<[usize; 3]> {
     let mut out = Vec::with_capacity(n - 2);
     while left.len() > 3 {
         let m = left.len();
-        let ear = (0..m).find(|&i| {
+        // Beginning at corner 1 makes convex polygons the fan that everybody expects.
+        let ear = (1..=m).map(|i| i % m).find(|&i| {
             let (a, b, c) = (left[(i + m - 1) % m], left[i], left[(i + 1) % m]);
             turn(a, b, c) > 0.0
                 && left.iter().all(|&p| {
@@ -636,11 +668,11 @@ mod tests {
         let p = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (3.0, 1.0)].map(|(x, y)| DVec3::new(x, y, 1.0));
         for shift in 0..4 {
             let turned: Vec<DVec3> = (0..4).map(|i| p[(i + shift) % 4]).collect();
-            let areas = triangulate(&turned).iter().map(|t| {
+            let area = |t: &[usize; 3]| {
                 let [a, b, c] = t.map(|i| turned[i]);
                 (b - a).cross(c - a).z / 2.0
-            });
-            let areas: Vec<f64> = areas.collect();
+            };
+            let areas: Vec<f64> = triangulate(&turned).iter().map(area).collect();
             assert!(areas.iter().all(|&a| a > 0.0), "{areas:?}");
             assert!((areas.iter().sum::<f64>() - 4.0).abs() < 1e-12, "{areas:?}");
         }
