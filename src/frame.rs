@@ -11,6 +11,8 @@ use crate::image::tone::ToneMap;
 use crate::image::{Picture, png};
 use crate::pass::accumulate::accumulate;
 use crate::pass::aov::aov;
+use crate::pass::background::background;
+use crate::pass::classify::{WorkLists, classify};
 use crate::pass::composite::composite;
 use crate::pass::environment::{EnvironmentOnDevice, Turn};
 use crate::pass::fragments::{FragmentLists, fragments};
@@ -99,6 +101,7 @@ pub struct Renderer {
     environment: EnvironmentOnDevice,
     gbuffer: GBuffer,
     tiles: Tiles,
+    work: WorkLists,
     lists: Option<FragmentLists>,
     radiance: Image,
     /// The mean of the samples, where there is more than one.
@@ -150,6 +153,7 @@ impl Renderer {
             scene: SceneOnDevice::new(device, scene, &settings.knobs)?,
             gbuffer: GBuffer::new(device, &plan, size)?,
             tiles: Tiles::new(device, &plan, size)?,
+            work: WorkLists::new(device, size)?,
             lists: if plan.see_through { Some(FragmentLists::new(device, size)?) } else { None },
             radiance: target("radiance")?,
             film: if plan.samples > 1 { Some(target("film")?) } else { None },
@@ -201,7 +205,7 @@ impl Renderer {
     /// One sample of every pixel: the frame, pass by pass.
     fn sample(&mut self, view: &View, index: u32, count: u32) -> Result<Vec<PassTime>> {
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(index, count))));
-        let Self { device, plan, scene, camera, gbuffer: g, tiles: lists_of_lights, lists, radiance, .. } = &*self;
+        let Self { device, plan, scene, camera, gbuffer: g, tiles: lists_of_lights, work, lists, radiance, .. } = &*self;
         // With n samples a pixel each one stands for 1/n of its area: textures are read that much sharper.
         let lod_bias = -0.5 * (count as f32).log2();
         let lighting = Lighting {
@@ -219,7 +223,9 @@ impl Renderer {
         if plan.tiles {
             tiles(&mut frame, plan, scene, camera, g, lists_of_lights)?;
         }
-        light(&mut frame, lighting, g, radiance)?;
+        classify(&mut frame, g, work)?;
+        light(&mut frame, lighting, g, work, radiance)?;
+        background(&mut frame, lighting, g, work, radiance)?;
         if let Some(lists) = lists {
             frame.fill("reset fragment counters", &lists.counters, 0);
             for (strip, rows) in lists.strips().into_iter().enumerate() {

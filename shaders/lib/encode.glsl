@@ -29,6 +29,11 @@ vec2 equirectangular_from_direction(vec3 d) {
     return vec2(atan(d.z, d.x) * (0.5 * INV_PI) + 0.5, 0.5 - asin(clamp(d.y, -1.0, 1.0)) * INV_PI);
 }
 
+// A direction turned about +Y.
+vec3 turned(vec3 d, float cos_angle, float sin_angle) {
+    return vec3(cos_angle * d.x - sin_angle * d.z, d.y, sin_angle * d.x + cos_angle * d.z);
+}
+
 vec3 direction_from_equirectangular(vec2 uv) {
     float phi = (uv.x - 0.5) * 2.0 * PI;
     float elevation = (0.5 - uv.y) * PI;

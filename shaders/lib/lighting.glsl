@@ -53,10 +53,8 @@ vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across) {
     return sum;
 }
 
-vec3 turned(vec3 d) {
-    float c = environment.cos_rotation;
-    float s = environment.sin_rotation;
-    return vec3(c * d.x - s * d.z, d.y, s * d.x + c * d.z);
+vec3 into_environment(vec3 d) {
+    return turned(d, environment.cos_rotation, environment.sin_rotation);
 }
 
 // Level of the prefiltered map whose texels are 1/16 of the lobe: α = 16 / width (pass/prefilter.comp).
@@ -66,13 +64,13 @@ float prefiltered_level(float alpha) {
 }
 
 vec3 prefiltered_radiance(vec3 direction, float alpha) {
-    vec2 at = equirectangular_from_direction(turned(direction));
+    vec2 at = equirectangular_from_direction(into_environment(direction));
     return textureLod(prefiltered, at, prefiltered_level(alpha)).rgb * environment.intensity;
 }
 
 // Irradiance from nine spherical-harmonic coefficients.
 vec3 environment_irradiance(vec3 n) {
-    vec3 d = turned(n);
+    vec3 d = into_environment(n);
     vec3 e = environment.irradiance[0] * 0.282095;
     e += (environment.irradiance[1] * d.y + environment.irradiance[2] * d.z + environment.irradiance[3] * d.x) * 0.488603;
     e += (environment.irradiance[4] * (d.x * d.y) + environment.irradiance[5] * (d.y * d.z) + environment.irradiance[7] * (d.x * d.z)) * 1.092548;

@@ -11,7 +11,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(constant_id = 0) const bool HAS_EMISSIVE = false;
 layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
 layout(scalar, set = 0, binding = 1) readonly buffer Materials { Material materials[]; };
-layout(set = 0, binding = 2) uniform sampler2D depth;
+layout(set = 0, binding = 2, r32f) readonly uniform imageBuffer depth;
 layout(set = 0, binding = 3, rgba16f) readonly uniform image2D base;
 layout(set = 0, binding = 4, rgba16_snorm) readonly uniform image2D normals;
 layout(set = 0, binding = 5, rg32ui) readonly uniform uimage2D ids;
@@ -22,7 +22,7 @@ layout(push_constant, scalar) uniform Push { uint first_row; uint end_row; };
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, first_row);
     if (any(greaterThanEqual(uvec2(pixel), uvec2(camera.size.x, end_row)))) return;
-    float z = texelFetch(depth, pixel, 0).x;
+    float z = imageLoad(depth, pixel.y * int(camera.size.x) + pixel.x).x;
     AovPixel result = AovPixel(vec3(0), vec3(0), vec3(0), vec3(0), 0, 0, 0, vec3(0), 0, 0);
     if (z > 0.0) {
         uvec2 id = imageLoad(ids, pixel).xy;

@@ -8,6 +8,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "lib/camera.glsl"
 #include "lib/fragment_list.glsl"
 #include "lib/lighting.glsl"
+#include "lib/work_tile.glsl"
 
 layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
 layout(scalar, set = 0, binding = 1) readonly buffer Materials { Material materials[]; };
@@ -16,7 +17,8 @@ layout(scalar, set = 0, binding = 3) readonly buffer Nodes { uint nodes[]; };
 layout(set = 0, binding = 4, rgba32f) uniform image2D radiance;
 layout(scalar, set = 0, binding = 5) buffer Dropped { uint dropped; };
 layout(scalar, set = 0, binding = 6) readonly buffer Instances { Instance instances[]; };
-layout(push_constant, scalar) uniform Push { uint first_row; uint end_row; };
+layout(scalar, set = 0, binding = 7) readonly buffer Tiles { uint fragment_tiles[]; };
+layout(push_constant, scalar) uniform Push { uint end_row; };
 
 // Fragments of one pixel beyond this many are counted as dropped: 220²/2 selections leave half of the loop budget to
 // the lights.
@@ -30,7 +32,7 @@ bool after(uvec3 a, uvec3 b) {
 }
 
 void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, first_row);
+    ivec2 pixel = first_pixel(fragment_tiles[gl_WorkGroupID.x]) + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(uvec2(pixel), uvec2(camera.size.x, end_row)))) return;
     uint head = imageLoad(heads, pixel).x;
     if (head == END_OF_LIST) return;

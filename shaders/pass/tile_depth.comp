@@ -8,7 +8,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(constant_id = 0) const bool FROM_CAMERA = false;
 layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
-layout(set = 0, binding = 1) uniform sampler2D depth;
+layout(set = 0, binding = 1, r32f) readonly uniform imageBuffer depth;
 layout(set = 0, binding = 2, rg32f) writeonly uniform imageBuffer tile_depths;
 const int TILE = 16;
 
@@ -22,7 +22,7 @@ void main() {
     bool empty = true;
     for (int y = tile.y * TILE; y < last.y; y++) {
         for (int x = tile.x * TILE; x < last.x; x++) {
-            float z = texelFetch(depth, ivec2(x, y), 0).x;
+            float z = imageLoad(depth, y * int(camera.size.x) + x).x;
             nearest = max(nearest, z);
             if (z > 0.0) {
                 farthest = min(farthest, z);

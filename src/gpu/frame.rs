@@ -101,6 +101,13 @@ struct Pass<'a> {
     record: Record<'a>,
 }
 
+/// How many workgroups a dispatch has.
+#[derive(Clone, Copy)]
+enum Groups<'a> {
+    Count([u32; 3]),
+    At(&'a Buffer, u64),
+}
+
 /// A barrier's target.
 #[derive(Clone, Copy)]
 enum Target<'a> {
@@ -180,10 +187,40 @@ impl<'a> Frame<'a> {
         push: &[u8],
         groups: [u32; 3],
     ) -> Result<()> {
+        self.dispatch(name, bindings, constants, push, Groups::Count(groups))
+    }
+
+    /// One dispatch whose number of workgroups lies at `offset` bytes of `sizes`.
+    ///
+    /// # Errors
+    /// As [`Frame::compute`].
+    pub fn compute_indirect(
+        &mut self,
+        name: &str,
+        bindings: &impl Bindings<'a>,
+        constants: Vec<(u32, u32)>,
+        push: &[u8],
+        sizes: &'a Buffer,
+        offset: u64,
+    ) -> Result<()> {
+        self.dispatch(name, bindings, constants, push, Groups::At(sizes, offset))
+    }
+
+    fn dispatch(
+        &mut self,
+        name: &str,
+        bindings: &impl Bindings<'a>,
+        constants: Vec<(u32, u32)>,
+        push: &[u8],
+        groups: Groups<'a>,
+    ) -> Result<()> {
         let program = bindings.program();
         assert_eq!(push.len(), program.push_bytes as usize, "push constants of \"{}\"", program.name);
         let mut uses = Vec::new();
         let descriptors = self.bind(&mut uses, program, &bindings.resources(), None)?;
+        if let Groups::At(sizes, _) = groups {
+            self.use_buffer(&mut uses, sizes, Access::IndirectRead, vk::ShaderStageFlags::empty());
+        }
         let layout = self.device.layout(program)?;
         let pipeline =
             self.device.pipeline(program, PipelineKey { program: program.name, constants, raster: None })?;
@@ -197,7 +234,10 @@ impl<'a> Frame<'a> {
                     device.raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline);
                     push_descriptors(device, commands, vk::PipelineBindPoint::COMPUTE, layout, program, &descriptors);
                     push_constants(device, commands, layout, program, &push);
-                    device.raw.cmd_dispatch(commands, groups[0], groups[1], groups[2]);
+                    match groups {
+                        Groups::Count([x, y, z]) => device.raw.cmd_dispatch(commands, x, y, z),
+                        Groups::At(sizes, offset) => device.raw.cmd_dispatch_indirect(commands, sizes.raw, offset),
+                    }
                 }
             }),
         });

@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use super::gbuffer::GBuffer;
 use super::scene::SceneOnDevice;
-use crate::gpu::{Buffer, Frame, Sampled, SamplerDesc};
+use crate::gpu::{Buffer, Frame};
 use crate::plan::Plan;
 use crate::shader::aov;
 
@@ -24,7 +24,7 @@ pub fn aov<'a>(
     let bind = aov::Bind {
         camera_block: camera,
         materials: &scene.materials,
-        depth: Sampled { image: &gbuffer.depth, sampler: SamplerDesc::NEAREST },
+        depth: &gbuffer.depth_texels,
         base: &gbuffer.base,
         normals: &gbuffer.normals,
         ids: &gbuffer.ids,

@@ -30,11 +30,12 @@ pub fn composite<'a>(
         lights: &scene.lights,
         tile_lights: &lighting.tiles.masks,
         environment: &environment.terms,
+        tiles: &lists.work.tiles,
         prefiltered: environment.prefiltered(),
         reflectance: environment.reflectance(),
     };
-    let push = [rows[0], rows[1]];
+    let push = [rows[1]];
     let constants = lighting.composite_constants().words();
-    let size = [lighting.size[0], rows[1] - rows[0]];
-    frame.compute_over("see-through lighting", &bind, constants, bytemuck::cast_slice(&push), size)
+    let push = bytemuck::cast_slice(&push);
+    frame.compute_indirect("see-through lighting", &bind, constants, push, &lists.work.sizes, 0)
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use anyhow::Result;
 use ash::vk;
 
+use super::classify::{FragmentTiles, classify_fragments};
 use super::gbuffer::GBuffer;
 use super::scene::SceneOnDevice;
 use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Frame, Image, ImageDesc, Place, Raster};
@@ -23,6 +24,8 @@ pub struct FragmentLists {
     pub counters: Buffer,
     /// Pixels whose list was too long for one invocation.
     pub dropped: Buffer,
+    /// Tiles that hold fragments.
+    pub work: FragmentTiles,
     strips: u32,
     size: [u32; 2],
     device: Arc<Device>,
@@ -50,6 +53,7 @@ impl FragmentLists {
             nodes: Buffer::new(device, "fragment list nodes", pixels.min(limit) * NODE_BYTES, Place::Device)?,
             counters: Buffer::new(device, "fragment counters", 4, Place::Readback)?,
             dropped: Buffer::new(device, "dropped fragments", 4, Place::Readback)?,
+            work: FragmentTiles::new(device, size)?,
             strips: 1,
             size,
             device: device.clone(),
@@ -157,5 +161,6 @@ pub fn fragments<'a>(
         size: lists.size,
         rows,
     };
-    frame.raster(&raster, &fragments::PROGRAM, &bindings, bytemuck::cast_slice(&push), scene.draws(true))
+    frame.raster(&raster, &fragments::PROGRAM, &bindings, bytemuck::cast_slice(&push), scene.draws(true))?;
+    classify_fragments(frame, &lists.heads, &lists.work, rows)
 }

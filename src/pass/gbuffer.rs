@@ -10,7 +10,7 @@ use anyhow::Result;
 use ash::vk;
 
 use super::scene::SceneOnDevice;
-use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Frame, Image, ImageDesc, Raster};
+use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Frame, Image, ImageDesc, Place, Raster};
 use crate::plan::Plan;
 use crate::shader::gbuffer;
 
@@ -18,6 +18,9 @@ use crate::shader::gbuffer;
 pub struct GBuffer {
     /// Reversed depth; 0 where nothing was drawn.
     pub depth: Image,
+    /// The same depth as a texel buffer, row by row: what the lighting reads. On lavapipe a texel buffer is fetched inline
+    /// where a sampled image is a call that spills (lavapipe.md); the copy costs 1 ms.
+    pub depth_texels: Buffer,
     /// Base colour and metallic texels.
     pub base: Image,
     /// Shading and geometric normal.
@@ -49,6 +52,13 @@ impl GBuffer {
                 device,
                 "G-buffer depth",
                 ImageDesc::flat(vk::Format::D32_SFLOAT, size[0], size[1], usage),
+            )?,
+            depth_texels: Buffer::texels(
+                device,
+                "G-buffer depth texels",
+                4 * u64::from(size[0]) * u64::from(size[1]),
+                Place::Device,
+                vk::Format::R32_SFLOAT,
             )?,
             base: target("G-buffer base colour", vk::Format::R16G16B16A16_SFLOAT, true)?,
             normals: target("G-buffer normals", vk::Format::R16G16B16A16_SNORM, true)?,
@@ -112,5 +122,7 @@ pub fn gbuffer<'a>(
         rows: [0, target.size[1]],
     };
     let push = [lod_bias.to_bits(), 0];
-    frame.raster(&raster, &gbuffer::PROGRAM, &bindings, bytemuck::cast_slice(&push), scene.draws(false))
+    frame.raster(&raster, &gbuffer::PROGRAM, &bindings, bytemuck::cast_slice(&push), scene.draws(false))?;
+    frame.download("copy depth", &target.depth, &target.depth_texels);
+    Ok(())
 }

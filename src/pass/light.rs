@@ -1,12 +1,13 @@
-//! Deferred lighting of the opaque surfaces, and the background (shaders/pass/light.comp).
+//! Deferred lighting of the opaque surfaces (shaders/pass/light.comp).
 
 use anyhow::Result;
 
+use super::classify::WorkLists;
 use super::environment::EnvironmentOnDevice;
 use super::gbuffer::GBuffer;
 use super::scene::SceneOnDevice;
 use super::tiles::Tiles;
-use crate::gpu::{Buffer, Frame, Image, Sampled, SamplerDesc};
+use crate::gpu::{Buffer, Frame, Image};
 use crate::plan::{Knobs, Plan};
 use crate::shader::{composite, light};
 
@@ -50,16 +51,21 @@ impl Lighting<'_> {
     }
 }
 
-/// Writes `radiance`: the surfaces of the G-buffer lit, or what lies behind the scene.
+/// Writes `radiance` where the G-buffer holds a surface.
 ///
 /// # Errors
 /// When the driver refuses the pipeline.
-pub fn light<'a>(frame: &mut Frame<'a>, lighting: Lighting<'a>, gbuffer: &'a GBuffer, radiance: &'a Image) -> Result<()> {
+pub fn light<'a>(
+    frame: &mut Frame<'a>,
+    lighting: Lighting<'a>,
+    gbuffer: &'a GBuffer,
+    work: &'a WorkLists,
+    radiance: &'a Image,
+) -> Result<()> {
     let Lighting { plan, scene, environment, camera, .. } = lighting;
     let constants = light::Constants {
         has_emissive: plan.emissive,
         has_layers: plan.layers,
-        show_environment: plan.sky,
         brdf: lighting.knobs.index("brdf"),
         fresnel: lighting.knobs.index("fresnel"),
         clearcoat: plan.clearcoat,
@@ -72,19 +78,19 @@ pub fn light<'a>(frame: &mut Frame<'a>, lighting: Lighting<'a>, gbuffer: &'a GBu
     let bind = light::Bind {
         camera_block: camera,
         materials: &scene.materials,
-        depth: Sampled { image: &gbuffer.depth, sampler: SamplerDesc::NEAREST },
+        depth: &gbuffer.depth_texels,
         base: &gbuffer.base,
         normals: &gbuffer.normals,
         ids: &gbuffer.ids,
         emissive: &gbuffer.emissive,
         layers: &gbuffer.layers,
         radiance,
-        sky: environment.sky(),
+        surface_tiles: &work.surface,
         lights: &scene.lights,
         tile_lights: &lighting.tiles.masks,
         environment: &environment.terms,
         prefiltered: environment.prefiltered(),
         reflectance: environment.reflectance(),
     };
-    frame.compute_over("lighting", &bind, constants.words(), &[], lighting.size)
+    frame.compute_indirect("lighting", &bind, constants.words(), &[], &work.sizes, 0)
 }

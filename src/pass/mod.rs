@@ -4,6 +4,8 @@
 
 pub mod accumulate;
 pub mod aov;
+pub mod background;
+pub mod classify;
 pub mod composite;
 pub mod environment;
 pub mod fragments;

@@ -7,7 +7,7 @@ use ash::vk;
 
 use super::gbuffer::GBuffer;
 use super::scene::SceneOnDevice;
-use crate::gpu::{Buffer, Device, Frame, Place, Sampled, SamplerDesc};
+use crate::gpu::{Buffer, Device, Frame, Place};
 use crate::plan::Plan;
 use crate::shader::{tile_depth, tiles};
 
@@ -66,8 +66,8 @@ pub fn tiles<'a>(
     gbuffer: &'a GBuffer,
     target: &'a Tiles,
 ) -> Result<()> {
-    let depth = Sampled { image: &gbuffer.depth, sampler: SamplerDesc::NEAREST };
-    let bind = tile_depth::Bind { camera_block: camera, depth, tile_depths: &target.depths };
+    let bind =
+        tile_depth::Bind { camera_block: camera, depth: &gbuffer.depth_texels, tile_depths: &target.depths };
     let constants = tile_depth::Constants { from_camera: plan.see_through };
     frame.compute_over("tile depths", &bind, constants.words(), &[], [target.across, target.down])?;
 

@@ -1,0 +1,34 @@
+// Which 8x8 tiles hold surfaces and which hold background: two lists and the sizes of their dispatches. A branch saves
+// nothing on lavapipe, which runs both sides for every group of eight pixels; not dispatching does. Tiles are listed in
+// whatever order they are found: each one writes only its own pixels.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+layout(local_size_x = 64) in;
+#include "lib/work_tile.glsl"
+
+layout(set = 0, binding = 0, r32f) readonly uniform imageBuffer depth;
+layout(scalar, set = 0, binding = 1) buffer Sizes { DispatchSize surface_size; DispatchSize background_size; };
+layout(scalar, set = 0, binding = 2) writeonly buffer SurfaceTiles { uint surface_tiles[]; };
+layout(scalar, set = 0, binding = 3) writeonly buffer BackgroundTiles { uint background_tiles[]; };
+layout(push_constant, scalar) uniform Push { uvec2 size; };
+
+void main() {
+    uvec2 tiles = (size + WORK_TILE - 1) / WORK_TILE;
+    uint tile = gl_GlobalInvocationID.x;
+    if (tile >= tiles.x * tiles.y) return;
+    uvec2 first = uvec2(tile % tiles.x, tile / tiles.x) * WORK_TILE;
+    uvec2 last = min(first + WORK_TILE, size);
+    float nearest = 0.0;
+    float farthest = 1.0;
+    for (uint y = first.y; y < last.y; y++) {
+        for (uint x = first.x; x < last.x; x++) {
+            float z = imageLoad(depth, int(y * size.x + x)).x;
+            nearest = max(nearest, z);
+            farthest = min(farthest, z);
+        }
+    }
+    uint packed = packed_tile(first);
+    if (nearest > 0.0) surface_tiles[atomicAdd(surface_size.x, 1u)] = packed;
+    if (farthest == 0.0) background_tiles[atomicAdd(background_size.x, 1u)] = packed;
+}

@@ -1,0 +1,28 @@
+// Which 8x8 tiles of a strip hold see-through fragments: a list and the size of the dispatch over it.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+layout(local_size_x = 64) in;
+#include "lib/fragment_list.glsl"
+#include "lib/work_tile.glsl"
+
+layout(set = 0, binding = 0, r32ui) readonly uniform uimage2D heads;
+layout(scalar, set = 0, binding = 1) buffer Sizes { DispatchSize tiles_size; };
+layout(scalar, set = 0, binding = 2) writeonly buffer Tiles { uint fragment_tiles[]; };
+layout(push_constant, scalar) uniform Push { uint width; uint first_row; uint end_row; };
+
+void main() {
+    uvec2 size = uvec2(width, end_row - first_row);
+    uvec2 tiles = (size + WORK_TILE - 1) / WORK_TILE;
+    uint tile = gl_GlobalInvocationID.x;
+    if (tile >= tiles.x * tiles.y) return;
+    uvec2 first = uvec2(tile % tiles.x, tile / tiles.x) * WORK_TILE + uvec2(0, first_row);
+    uvec2 last = min(first + WORK_TILE, uvec2(width, end_row));
+    bool any_fragment = false;
+    for (uint y = first.y; y < last.y; y++) {
+        for (uint x = first.x; x < last.x; x++) {
+            any_fragment = any_fragment || imageLoad(heads, ivec2(x, y)).x != END_OF_LIST;
+        }
+    }
+    if (any_fragment) fragment_tiles[atomicAdd(tiles_size.x, 1u)] = packed_tile(first);
+}

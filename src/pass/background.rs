@@ -1,0 +1,32 @@
+//! What lies behind the scene (shaders/pass/background.comp).
+
+use anyhow::Result;
+
+use super::classify::{DISPATCH_BYTES, WorkLists};
+use super::gbuffer::GBuffer;
+use super::light::Lighting;
+use crate::gpu::{Frame, Image};
+use crate::shader::background;
+
+/// Writes `radiance` where no surface was drawn.
+///
+/// # Errors
+/// When the driver refuses the pipeline.
+pub fn background<'a>(
+    frame: &mut Frame<'a>,
+    lighting: Lighting<'a>,
+    gbuffer: &'a GBuffer,
+    work: &'a WorkLists,
+    radiance: &'a Image,
+) -> Result<()> {
+    let bind = background::Bind {
+        camera_block: lighting.camera,
+        depth: &gbuffer.depth_texels,
+        radiance,
+        background_tiles: &work.background,
+        environment: &lighting.environment.terms,
+        sky: lighting.environment.sky(),
+    };
+    let constants = background::Constants { sky: lighting.plan.sky }.words();
+    frame.compute_indirect("background", &bind, constants, &[], &work.sizes, DISPATCH_BYTES)
+}

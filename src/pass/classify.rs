@@ -1,0 +1,107 @@
+//! Work lists: which 8x8 tiles hold surfaces, which hold background or see-through fragments
+//! (shaders/pass/classify.comp, classify_fragments.comp).
+
+use std::sync::Arc;
+
+use anyhow::Result;
+
+use super::gbuffer::GBuffer;
+use crate::gpu::{Buffer, Device, Frame, Image, Place};
+use crate::shader::{classify, classify_fragments};
+
+const TILE: u32 = 8;
+
+/// Bytes of one VkDispatchIndirectCommand.
+pub const DISPATCH_BYTES: u64 = 12;
+
+/// The tiles of a strip that hold see-through fragments.
+pub struct FragmentTiles {
+    /// One VkDispatchIndirectCommand.
+    pub sizes: Buffer,
+    empty: Buffer,
+    /// The tiles.
+    pub tiles: Buffer,
+    width: u32,
+}
+
+impl FragmentTiles {
+    /// A list for a picture of `size` pixels.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn new(device: &Arc<Device>, size: [u32; 2]) -> Result<Self> {
+        let bytes = 4 * u64::from(size[0].div_ceil(TILE)) * u64::from(size[1].div_ceil(TILE));
+        Ok(Self {
+            sizes: Buffer::new(device, "fragment work size", DISPATCH_BYTES, Place::Device)?,
+            empty: Buffer::with_data(device, "empty fragment work size", &[0_u32, 1, 1])?,
+            tiles: Buffer::new(device, "fragment tiles", bytes, Place::Device)?,
+            width: size[0],
+        })
+    }
+}
+
+/// Lists the tiles of rows `rows[0]` up to `rows[1]` that hold see-through fragments.
+///
+/// # Errors
+/// When the driver refuses the pipeline.
+pub fn classify_fragments<'a>(
+    frame: &mut Frame<'a>,
+    heads: &'a Image,
+    list: &'a FragmentTiles,
+    rows: [u32; 2],
+) -> Result<()> {
+    frame.copy_buffer("reset fragment work size", &list.empty, &list.sizes, DISPATCH_BYTES);
+    let bind = classify_fragments::Bind { heads, sizes: &list.sizes, tiles: &list.tiles };
+    let tiles = list.width.div_ceil(TILE) * (rows[1] - rows[0]).div_ceil(TILE);
+    let groups = [tiles.div_ceil(classify_fragments::PROGRAM.local_size[0]), 1, 1];
+    let push = [list.width, rows[0], rows[1]];
+    let constants = classify_fragments::Constants {}.words();
+    frame.compute("classify fragment tiles", &bind, constants, bytemuck::cast_slice(&push), groups)
+}
+
+/// Lists of tiles and the sizes of the dispatches over them.
+pub struct WorkLists {
+    /// Two VkDispatchIndirectCommand: surfaces, background.
+    pub sizes: Buffer,
+    empty: Buffer,
+    /// Tiles with surfaces.
+    pub surface: Buffer,
+    /// Tiles with background.
+    pub background: Buffer,
+    size: [u32; 2],
+}
+
+impl WorkLists {
+    /// Lists for a picture of `size` pixels.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn new(device: &Arc<Device>, size: [u32; 2]) -> Result<Self> {
+        let bytes = 4 * u64::from(size[0].div_ceil(TILE)) * u64::from(size[1].div_ceil(TILE));
+        Ok(Self {
+            sizes: Buffer::new(device, "work sizes", 2 * DISPATCH_BYTES, Place::Device)?,
+            empty: Buffer::with_data(device, "empty work sizes", &[0_u32, 1, 1, 0, 1, 1])?,
+            surface: Buffer::new(device, "surface tiles", bytes, Place::Device)?,
+            background: Buffer::new(device, "background tiles", bytes, Place::Device)?,
+            size,
+        })
+    }
+}
+
+/// Sorts the tiles of the G-buffer into the lists.
+///
+/// # Errors
+/// When the driver refuses the pipeline.
+pub fn classify<'a>(frame: &mut Frame<'a>, gbuffer: &'a GBuffer, lists: &'a WorkLists) -> Result<()> {
+    frame.copy_buffer("reset work sizes", &lists.empty, &lists.sizes, 2 * DISPATCH_BYTES);
+    let bind = classify::Bind {
+        depth: &gbuffer.depth_texels,
+        sizes: &lists.sizes,
+        surface_tiles: &lists.surface,
+        background_tiles: &lists.background,
+    };
+    let tiles = lists.size[0].div_ceil(TILE) * lists.size[1].div_ceil(TILE);
+    let groups = [tiles.div_ceil(classify::PROGRAM.local_size[0]), 1, 1];
+    let constants = classify::Constants {}.words();
+    frame.compute("classify tiles", &bind, constants, bytemuck::cast_slice(&lists.size), groups)
+}
