@@ -400,6 +400,10 @@ fn a_picture_of_absurd_size_is_refused() {
     let view = b.view(&picture, None);
     b.json["images"][0]["bufferView"] = view.into();
     assert_refused(&b, "image 0");
+    // A sound one that no device could hold.
+    let view = b.view(&png(16_385, 1, [0; 4]), None);
+    b.json["images"][0]["bufferView"] = view.into();
+    assert_refused(&b, "image 0");
 }
 
 #[test]

@@ -240,9 +240,9 @@ fn points_and_lines_become_thin_bodies_that_scale_with_the_scene() {
             let scene = load(&b);
             assert_eq!(scene.triangles(), bodies * triangles, "mode {mode}");
             let bounds = scene.bounds().unwrap();
-            // Half-thickness is a thousandth of the diagonal of 5.
-            let stick_out = -bounds.min.min_element();
-            assert!(stick_out > 0.0 && stick_out <= 0.005 * scale * 1.0001, "mode {mode}: {stick_out}");
+            // Half-thickness is a thousandth of the diagonal of 5; a box turned by an eighth shows 1/√2 of it.
+            let stick_out = -bounds.min.min_element() / scale;
+            assert!((0.0035..=0.00501).contains(&stick_out), "mode {mode}: {stick_out}");
             assert!((bounds.max - DVec3::new(3.0, 4.0, 0.0) * scale).abs().max_element() <= 0.0051 * scale);
         }
     }
@@ -628,6 +628,20 @@ fn nodes_scaled_to_nothing_are_left_out_with_a_warning() {
     let scene = load(&b);
     assert_eq!((scene.instances.len(), scene.cameras.len(), scene.lights.len()), (2, 0, 0));
     assert_eq!(scene.warnings.len(), 3, "{:?}", scene.warnings);
+}
+
+#[test]
+fn a_sliver_of_large_coordinates_has_the_normal_of_exact_arithmetic() {
+    let [a, b, c] = [[1_i64, 2, 3], [8_000_001, 7_000_003, 5_000_007], [16_000_000, 14_000_005, 10_000_012]];
+    let (u, v) = ([b[0] - a[0], b[1] - a[1], b[2] - a[2]], [c[0] - a[0], c[1] - a[1], c[2] - a[2]]);
+    let exact = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    let mut builder = Builder::new();
+    let position = builder.floats("VEC3", &[a, b, c].concat().iter().map(|&x| x as f32).collect::<Vec<_>>());
+    let mesh = builder.mesh(json!({ "attributes": { "POSITION": position } }));
+    builder.root(json!({ "mesh": mesh }));
+    let found = Vec3::from(load(&builder).meshes[0].normals[0]).as_dvec3();
+    let expected = DVec3::from(exact.map(|x| x as f64)).normalize();
+    assert!(found.angle_between(expected) < 1e-6, "{found} is not {expected}");
 }
 
 #[test]
