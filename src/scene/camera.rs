@@ -92,7 +92,7 @@ impl Camera {
     #[must_use]
     pub fn framing(bounds: Bounds, aspect: f64, fov_y: f64) -> Self {
         const MARGIN: f64 = 1.06;
-        let backward = DVec3::new(0.35, 0.25, 1.0).normalize();
+        let backward = DVec3::new(0.4, 0.35, 1.0).normalize();
         let right = DVec3::Y.cross(backward).normalize();
         let up = backward.cross(right);
         let tangent = DVec2::new((fov_y * 0.5).tan() * aspect, (fov_y * 0.5).tan()) / MARGIN;
