@@ -24,6 +24,23 @@ vec3 unit_from_octahedral(vec2 p) {
     return normalize(n);
 }
 
+// Clear-coat strength and roughness as the two bytes of one 16-bit number, specular strength, and the coat's normal: for
+// four unorm16 components.
+vec4 packed_layers(vec3 coat_roughness_specular, vec3 n_coat) {
+    vec2 bytes = floor(clamp(coat_roughness_specular.xy, 0.0, 1.0) * 255.0 + 0.5);
+    float both = (bytes.x * 256.0 + bytes.y) * (1.0 / 65535.0);
+    return vec4(both, coat_roughness_specular.z, octahedral_from_unit(n_coat) * 0.5 + 0.5);
+}
+
+vec3 layers_from_packed(vec4 packed_value) {
+    uint both = uint(packed_value.x * 65535.0 + 0.5);
+    return vec3(vec2(both >> 8, both & 255u) * (1.0 / 255.0), packed_value.y);
+}
+
+vec3 coat_normal_from_packed(vec4 packed_value) {
+    return unit_from_octahedral(packed_value.zw * 2.0 - 1.0);
+}
+
 // Equirectangular coordinates of a unit direction (product.md, "Conventions"): u to the right, v down from the top.
 vec2 equirectangular_from_direction(vec3 d) {
     return vec2(atan(d.z, d.x) * (0.5 * INV_PI) + 0.5, 0.5 - asin(clamp(d.y, -1.0, 1.0)) * INV_PI);

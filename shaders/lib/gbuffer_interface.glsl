@@ -12,7 +12,9 @@ layout(constant_id = 4) const bool HAS_EMISSIVE = false;
 layout(constant_id = 5) const bool HAS_LAYERS = false;
 layout(constant_id = 6) const bool HAS_COLOR = false;
 layout(constant_id = 7) const bool MASKED = false;
-const bool HAS_TEXTURES = HAS_BASE || HAS_METALLIC_ROUGHNESS || HAS_NORMAL || HAS_OCCLUSION || HAS_EMISSIVE || HAS_LAYERS;
+layout(constant_id = 8) const bool HAS_COAT_NORMAL = false;
+const bool HAS_TEXTURES = HAS_BASE || HAS_METALLIC_ROUGHNESS || HAS_NORMAL || HAS_OCCLUSION || HAS_EMISSIVE || HAS_LAYERS ||
+                          HAS_COAT_NORMAL;
 
 // Order of a material's texture slots.
 const uint SLOT_BASE = 0;
@@ -25,5 +27,6 @@ const uint SLOT_CLEARCOAT_ROUGHNESS = 6;
 const uint SLOT_SPECULAR = 7;
 const uint SLOT_TRANSMISSION = 8;
 const uint SLOT_THICKNESS = 9;
-const uint SLOTS = 10;
+const uint SLOT_CLEARCOAT_NORMAL = 10;
+const uint SLOTS = 11;
 #endif

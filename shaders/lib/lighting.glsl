@@ -96,9 +96,11 @@ vec3 environment_light(Surface s) {
     if (AMBIENT) result += s.diffuse * INV_PI * (1.0 - specular) * environment_irradiance(s.n);
     if (REFLECTION) result += specular * prefiltered_radiance(r, s.alpha);
     if (CLEARCOAT) {
-        vec2 coat = textureLod(reflectance, vec2(cos_v, s.clearcoat_roughness), 0.0).rg;
-        result *= 1.0 - s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, cos_v).x;
-        if (REFLECTION) result += s.clearcoat * (0.04 * coat.x + coat.y) * prefiltered_radiance(r, s.clearcoat_alpha);
+        float coat_v = clamp(dot(s.n_coat, s.v), 0.0, 1.0);
+        vec3 coat_r = 2.0 * dot(s.n_coat, s.v) * s.n_coat - s.v;
+        vec2 coat = textureLod(reflectance, vec2(coat_v, s.clearcoat_roughness), 0.0).rg;
+        result *= 1.0 - s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, coat_v).x;
+        if (REFLECTION) result += s.clearcoat * (0.04 * coat.x + coat.y) * prefiltered_radiance(coat_r, s.clearcoat_alpha);
     }
     return result * s.occlusion;
 }
@@ -107,7 +109,7 @@ vec3 radiance_to_eye(Surface s, ivec2 pixel, uint tiles_across) {
     vec3 result = punctual_light(s, pixel, tiles_across);
     if (AMBIENT || REFLECTION) result += environment_light(s);
     float under_coat = 1.0;
-    if (CLEARCOAT) under_coat = 1.0 - s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, clamp(dot(s.n, s.v), 0.0, 1.0)).x;
+    if (CLEARCOAT) under_coat = 1.0 - s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, clamp(dot(s.n_coat, s.v), 0.0, 1.0)).x;
     result += s.emissive * under_coat;
     return s.unlit ? s.base : result;
 }

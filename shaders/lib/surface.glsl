@@ -13,6 +13,7 @@ layout(constant_id = 12) const bool CLEARCOAT = false;
 struct Surface {
     vec3 p_rel;
     vec3 n;              // shading normal
+    vec3 n_coat;         // shading normal of the clear coat
     vec3 v;              // to the viewer
     vec3 diffuse;        // albedo of the diffuse part
     vec3 f0;
@@ -33,11 +34,12 @@ struct Surface {
 const float MIN_ROUGHNESS = 0.01;
 
 Surface surface_from_texels(Material m, vec3 base, float metallic, float roughness, float occlusion, vec3 emissive,
-                            vec3 layers, vec3 n, vec3 v, vec3 p_rel) {
+                            vec3 layers, vec3 n, vec3 n_coat, vec3 v, vec3 p_rel) {
     Surface s;
     s.p_rel = p_rel;
     s.v = v;
     s.n = n;
+    s.n_coat = n_coat;
     s.base = base * m.base_color.rgb;
     float metal = metallic * m.metallic;
     s.diffuse = s.base * (1.0 - metal);
@@ -99,9 +101,10 @@ vec3 reflected(Surface s, vec3 l) {
     }
     if (CLEARCOAT) {
         float f = s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, cos_d).x;
-        float d = ggx_distribution(s.n, h, s.clearcoat_alpha);
-        float vis = ggx_visibility(cos_l, cos_v, s.clearcoat_alpha);
-        result = result * (1.0 - f) + f * d * vis * cos_l;
+        float coat_l = max(dot(s.n_coat, l), 0.0);
+        float d = ggx_distribution(s.n_coat, h, s.clearcoat_alpha);
+        float vis = ggx_visibility(coat_l, max(dot(s.n_coat, s.v), 1e-4), s.clearcoat_alpha);
+        result = result * (1.0 - f) + f * d * vis * coat_l;
     }
     return result;
 }

@@ -18,6 +18,7 @@ layout(set = 0, binding = 10) uniform sampler2DArray clearcoat_roughness_page;
 layout(set = 0, binding = 11) uniform sampler2DArray specular_page;
 layout(set = 0, binding = 12) uniform sampler2DArray transmission_page;
 layout(set = 0, binding = 13) uniform sampler2DArray thickness_page;
+layout(set = 0, binding = 14) uniform sampler2DArray coat_normal_page;
 
 layout(location = 0) in vec3 p_rel;
 layout(location = 1) in vec3 n_rel;
@@ -37,6 +38,7 @@ struct SurfaceFragment {
     vec4 layers;        // texels: clearcoat, clearcoat roughness, specular, transmission
     float thickness;    // texel
     vec3 n_shading;     // unit, to the viewer's side of the face
+    vec3 n_coat;        // unit: of the clear coat, which does not follow the base's normal texture
     vec3 n_geometric;   // unit, to the viewer
 };
 
@@ -54,6 +56,17 @@ float fragment_alpha() {
     float alpha = vertex_color.a;
     if (HAS_BASE) alpha *= read(base_page, SLOT_BASE).a;
     return alpha;
+}
+
+// A tangent-space normal in the frame of the interpolated normal and tangent; the normal itself where that is no frame.
+vec3 bent_normal(vec3 n, vec3 texel) {
+    vec3 t = t_rel.xyz - n * dot(n, t_rel.xyz);
+    float t2 = dot(t, t);
+    vec3 t_unit = t2 > 0.0 ? t * inversesqrt(t2) : vec3(0.0);
+    float side = gl_FrontFacing ? t_rel.w : -t_rel.w;
+    vec3 bent = t_unit * texel.x + cross(n, t_unit) * (side * texel.y) + n * texel.z;
+    float bent2 = dot(bent, bent);
+    return bent2 > 0.0 ? bent * inversesqrt(bent2) : n;
 }
 
 SurfaceFragment surface_fragment() {
@@ -89,17 +102,12 @@ SurfaceFragment surface_fragment() {
     vec3 n = normalize(n_rel);
     if (!gl_FrontFacing) n = -n;
     s.n_shading = n;
+    s.n_coat = n;
     if (HAS_NORMAL) {
         vec3 texel = read(normal_page, SLOT_NORMAL).xyz * 2.0 - 1.0;
-        texel.xy *= materials[ids.y].normal_scale;
-        vec3 t = t_rel.xyz - n * dot(n, t_rel.xyz);
-        float t2 = dot(t, t);
-        vec3 t_unit = t2 > 0.0 ? t * inversesqrt(t2) : vec3(0.0);
-        float side = gl_FrontFacing ? t_rel.w : -t_rel.w;
-        vec3 bent = t_unit * texel.x + cross(n, t_unit) * (side * texel.y) + n * texel.z;
-        float bent2 = dot(bent, bent);
-        s.n_shading = bent2 > 0.0 ? bent * inversesqrt(bent2) : n;
+        s.n_shading = bent_normal(n, vec3(texel.xy * materials[ids.y].normal_scale, texel.z));
     }
+    if (HAS_COAT_NORMAL) s.n_coat = bent_normal(n, read(coat_normal_page, SLOT_CLEARCOAT_NORMAL).xyz * 2.0 - 1.0);
     return s;
 }
 #endif

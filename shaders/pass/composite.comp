@@ -72,7 +72,8 @@ void main() {
         vec3 p = rel_from_pixel(camera, pixel, uintBitsToFloat(nodes[at + 1]));
         vec3 glow = vec3(unpackHalf2x16(nodes[at + 8]), blue_alpha.x);
         Surface s = surface_from_texels(m, base, blue_metal.y, float(word >> 16) * (1.0 / 65535.0),
-                                        occlusion_thickness.x, glow, layer.rgb, n, -direction, p);
+                                        occlusion_thickness.x, glow, layer.rgb, n,
+                                        unit_from_octahedral(unpackSnorm2x16(nodes[at + 12])), -direction, p);
         // Refraction `off`: what is not reflected goes straight on, tinted by the base colour and by absorption through
         // the nominal thickness (A1).
         float transmits = m.transmission * layer.a * (1.0 - blue_metal.y * m.metallic);

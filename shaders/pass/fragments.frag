@@ -7,9 +7,9 @@ layout(early_fragment_tests) in;
 #include "lib/encode.glsl"
 #include "lib/fragment_list.glsl"
 
-layout(set = 0, binding = 14, r32ui) uniform uimage2D heads;
-layout(scalar, set = 0, binding = 15) buffer Counters { uint counters[]; };
-layout(scalar, set = 0, binding = 16) writeonly buffer Nodes { uint nodes[]; };
+layout(set = 0, binding = 15, r32ui) uniform uimage2D heads;
+layout(scalar, set = 0, binding = 16) buffer Counters { uint counters[]; };
+layout(scalar, set = 0, binding = 17) writeonly buffer Nodes { uint nodes[]; };
 
 void main() {
     SurfaceFragment s = surface_fragment();
@@ -35,4 +35,5 @@ void main() {
     nodes[at + 9] = packHalf2x16(vec2(s.emissive.b, alpha));
     nodes[at + 10] = packUnorm4x8(s.layers);
     nodes[at + 11] = packUnorm2x16(vec2(s.occlusion, s.thickness));
+    nodes[at + 12] = packSnorm2x16(octahedral_from_unit(s.n_coat));
 }

@@ -10,7 +10,7 @@ layout(location = 0) out vec4 out_base;     // RGBA16F: base colour, metallic
 layout(location = 1) out vec4 out_normals;  // RGBA16_SNORM: octahedral shading normal, octahedral geometric normal
 layout(location = 2) out uvec2 out_ids;     // RG32UI: material | roughness << 16, instance | occlusion << 24
 layout(location = 3) out vec4 out_emissive; // RGBA16F, where the plan has it
-layout(location = 4) out vec4 out_layers;   // RGBA8, where the plan has it: clearcoat, its roughness, specular
+layout(location = 4) out vec4 out_layers;   // RGBA16, where the plan has it: lib/encode.glsl, packed_layers
 
 void main() {
     SurfaceFragment s = surface_fragment();
@@ -21,5 +21,5 @@ void main() {
     uint occlusion = uint(clamp(s.occlusion, 0.0, 1.0) * 255.0 + 0.5);
     out_ids = uvec2(ids.y | roughness << 16, ids.x | occlusion << 24);
     out_emissive = vec4(s.emissive, 1.0);
-    out_layers = s.layers;
+    out_layers = packed_layers(s.layers.xyz, s.n_coat);
 }

@@ -17,7 +17,7 @@ layout(set = 0, binding = 3, rgba16f) readonly uniform image2D base;
 layout(set = 0, binding = 4, rgba16_snorm) readonly uniform image2D normals;
 layout(set = 0, binding = 5, rg32ui) readonly uniform uimage2D ids;
 layout(set = 0, binding = 6, rgba16f) readonly uniform image2D emissive;
-layout(set = 0, binding = 7, rgba8) readonly uniform image2D layers;
+layout(set = 0, binding = 7, rgba16) readonly uniform image2D layers;
 layout(set = 0, binding = 8, rgba32f) writeonly uniform image2D radiance;
 layout(scalar, set = 0, binding = 9) readonly buffer SurfaceTiles { uint surface_tiles[]; };
 
@@ -29,11 +29,17 @@ void main() {
     uvec2 id = imageLoad(ids, pixel).xy;
     vec4 texel = imageLoad(base, pixel);
     vec3 glow = HAS_EMISSIVE ? imageLoad(emissive, pixel).rgb : vec3(1.0);
-    vec3 layer = HAS_LAYERS ? imageLoad(layers, pixel).rgb : vec3(1.0);
     vec3 n = unit_from_octahedral(imageLoad(normals, pixel).xy);
+    vec3 layer = vec3(1.0);
+    vec3 n_coat = n;
+    if (HAS_LAYERS) {
+        vec4 packed_value = imageLoad(layers, pixel);
+        layer = layers_from_packed(packed_value);
+        n_coat = coat_normal_from_packed(packed_value);
+    }
     float roughness = float(id.x >> 16) * (1.0 / 65535.0);
     float occlusion = float(id.y >> 24) * (1.0 / 255.0);
-    Surface s = surface_from_texels(materials[id.x & 0xffffu], texel.rgb, texel.a, roughness, occlusion, glow, layer, n,
+    Surface s = surface_from_texels(materials[id.x & 0xffffu], texel.rgb, texel.a, roughness, occlusion, glow, layer, n, n_coat,
                                     -view_direction(camera, pixel), rel_from_pixel(camera, pixel, z));
     uint tiles_across = (camera.size.x + TILE - 1) / TILE;
     imageStore(radiance, pixel, vec4(radiance_to_eye(s, pixel, tiles_across), 1.0));

@@ -12,7 +12,7 @@ use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Frame, Image, ImageDe
 use crate::shader::fragments;
 
 /// Bytes of one fragment: `NODE_WORDS` of shaders/lib/fragment_list.glsl.
-const NODE_BYTES: u64 = 48;
+const NODE_BYTES: u64 = 52;
 
 /// Lists of see-through fragments, drawn in horizontal strips so that any number of fragments fits the memory of one.
 pub struct FragmentLists {
@@ -130,7 +130,7 @@ pub fn fragments<'a>(
     let bindings: Vec<_> = scene
         .page_sets()
         .into_iter()
-        .map(|[base, metallic_roughness, normal, occlusion, emissive, clearcoat, coat_roughness, specular, transmission, thickness]| {
+        .map(|[base, metallic_roughness, normal, occlusion, emissive, clearcoat, coat_roughness, specular, transmission, thickness, coat_normal]| {
             fragments::Bind {
                 camera_block: camera,
                 instances: &scene.instances,
@@ -146,6 +146,7 @@ pub fn fragments<'a>(
                 specular_page: specular,
                 transmission_page: transmission,
                 thickness_page: thickness,
+                coat_normal_page: coat_normal,
                 heads: &lists.heads,
                 counters: &lists.counters,
                 nodes: &lists.nodes,

@@ -1,7 +1,7 @@
 //! Raster G-buffer: the nearest opaque surface of every pixel (shaders/pass/gbuffer.*).
 //!
 //! 24 bytes a pixel beside depth: RGBA16F base colour and metallic, RGBA16_SNORM two octahedral normals, RG32UI ids,
-//! roughness and occlusion; 4 to 12 more where the plan has emissive or layer textures. docs/decisions/gbuffer.md has
+//! roughness and occlusion; 8 more for emissive textures and 16 for layers where the plan has them. docs/decisions/gbuffer.md has
 //! what narrower and wider choices cost.
 
 use std::sync::Arc;
@@ -64,7 +64,7 @@ impl GBuffer {
             normals: target("G-buffer normals", vk::Format::R16G16B16A16_SNORM, true)?,
             ids: target("G-buffer ids", vk::Format::R32G32_UINT, true)?,
             emissive: target("G-buffer emissive", vk::Format::R16G16B16A16_SFLOAT, plan.emissive || plan.layers)?,
-            layers: target("G-buffer layers", vk::Format::R8G8B8A8_UNORM, plan.layers)?,
+            layers: target("G-buffer layers", vk::Format::R16G16B16A16_UNORM, plan.layers)?,
             size,
             with: [plan.emissive, plan.layers],
         })
@@ -95,7 +95,7 @@ pub fn gbuffer<'a>(
     let bindings: Vec<_> = scene
         .page_sets()
         .into_iter()
-        .map(|[base, metallic_roughness, normal, occlusion, emissive, clearcoat, coat_roughness, specular, transmission, thickness]| {
+        .map(|[base, metallic_roughness, normal, occlusion, emissive, clearcoat, coat_roughness, specular, transmission, thickness, coat_normal]| {
             gbuffer::Bind {
                 camera_block: camera,
                 instances: &scene.instances,
@@ -111,6 +111,7 @@ pub fn gbuffer<'a>(
                 specular_page: specular,
                 transmission_page: transmission,
                 thickness_page: thickness,
+                coat_normal_page: coat_normal,
             }
         })
         .collect();

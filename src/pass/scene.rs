@@ -15,7 +15,7 @@ use crate::shader::gbuffer;
 use crate::share;
 
 /// Texture slots of a material, in the order of `shaders/lib/gbuffer_interface.glsl`.
-pub const SLOTS: usize = 10;
+pub const SLOTS: usize = 11;
 
 /// Where a mesh's data lies in the scene's buffers.
 struct MeshRange {
@@ -63,7 +63,7 @@ pub struct SceneOnDevice {
     materials_cpu: Vec<Material>,
     /// The table of materials.
     pub materials: Buffer,
-    /// Ten texture slots per material.
+    /// Eleven texture slots per material.
     pub slots: Buffer,
     /// Instances relative to the eye of the current view.
     pub instances: Buffer,
@@ -91,6 +91,7 @@ fn texture_slots(m: &Material) -> [(Option<TextureRef>, Meaning); SLOTS] {
         (m.specular_texture, Meaning::Data),
         (m.transmission_texture, Meaning::Data),
         (m.thickness_texture, Meaning::Data),
+        (m.clearcoat_normal_texture, Meaning::Data),
     ]
 }
 
@@ -280,7 +281,8 @@ impl SceneOnDevice {
             has_normal: textured(2) && mesh.has_tangents,
             has_occlusion: textured(3),
             has_emissive: textured(4),
-            has_layers: (5..SLOTS).any(textured),
+            has_layers: (5..10).any(textured),
+            has_coat_normal: textured(10) && mesh.has_tangents,
             has_color: mesh.has_colors,
             masked: matches!(material.alpha_mode, AlphaMode::Mask(_)),
         };

@@ -13,7 +13,7 @@ use crate::scene::{AlphaMode, LightKind, Material, Scene};
 pub struct Plan {
     /// A G-buffer target for emissive texels: some material has an emissive texture.
     pub emissive: bool,
-    /// A G-buffer target for clear-coat and specular texels.
+    /// A G-buffer target for clear-coat and specular texels and the coat's normal.
     pub layers: bool,
     /// Code for the clear coat.
     pub clearcoat: bool,
@@ -105,9 +105,8 @@ impl Plan {
         let clearcoat = find(&|m| m.clearcoat > 0.0);
         let clearcoat =
             decide("clear coat", "", clearcoat.map(|m| format!("{}: clearcoat {}", quoted(m), m.clearcoat)), true);
-        let layers = find(&|m| has_layers(m));
-        let layers =
-            decide("layer textures", "", layers.map(|m| format!("{} has layer textures", quoted(m))), true);
+        let layers = find(&|m| has_layers(m) || m.clearcoat > 0.0);
+        let layers = decide("layers", "", layers.map(|m| format!("{} has a coat or layer textures", quoted(m))), true);
         let see_through = find(&is_see_through).map(|m| match m.alpha_mode {
             AlphaMode::Blend => format!("{} is alpha-blended", quoted(m)),
             _ => format!("{}: transmission {}", quoted(m), m.transmission),
