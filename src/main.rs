@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use etalon::cli::options::When;
+use etalon::cli::unbuilt::UnbuiltCommand;
 use etalon::cli::{devices, diff, render};
 
 /// A Vulkan renderer written directly against ash: glTF in, radiance out.
@@ -29,6 +30,14 @@ enum Command {
     Render(Box<render::RenderArgs>),
     Diff(diff::DiffArgs),
     Devices(devices::DevicesArgs),
+    #[command(hide = true)]
+    View(UnbuiltCommand),
+    #[command(hide = true)]
+    Plan(UnbuiltCommand),
+    #[command(hide = true)]
+    Cost(UnbuiltCommand),
+    #[command(hide = true)]
+    Verify(UnbuiltCommand),
 }
 
 fn main() -> ExitCode {
@@ -55,6 +64,10 @@ fn main() -> ExitCode {
         Command::Render(args) => render::run(args, arguments.quiet),
         Command::Diff(args) => diff::run(args),
         Command::Devices(args) => devices::run(args),
+        Command::View(args) => args.refuse("view"),
+        Command::Plan(args) => args.refuse("plan"),
+        Command::Cost(args) => args.refuse("cost"),
+        Command::Verify(args) => args.refuse("verify"),
     };
     result.unwrap_or_else(|error| {
         let label = if color { "\x1b[1;31merror:\x1b[0m" } else { "error:" };

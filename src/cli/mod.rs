@@ -5,6 +5,7 @@ pub mod diff;
 pub mod options;
 pub mod render;
 pub mod report;
+pub mod unbuilt;
 
 use std::io::{self, Write as _};
 

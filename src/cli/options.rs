@@ -118,8 +118,7 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     let parts: Option<(u32, u32)> =
         text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     match parts {
-        Some((w, h)) if w > 0 && h > 0 => Ok([w, h]),
-        Some(_) => Err("a picture has at least one pixel a side".to_owned()),
+        Some((w, h)) => Ok([w, h]),
         None => Err("expected WIDTHxHEIGHT, for example 1280x720".to_owned()),
     }
 }
@@ -235,6 +234,9 @@ impl PictureOptions {
     /// # Errors
     /// As [`PictureOptions::knobs`].
     pub fn settings(&self, scene: &SceneOptions) -> Result<Settings> {
+        if self.size.contains(&0) {
+            bail!("--size {}x{}: a picture has at least one pixel a side", self.size[0], self.size[1]);
+        }
         if !self.exposure.is_finite() {
             bail!("--exposure {}: expected a finite number of stops", self.exposure);
         }

@@ -13,6 +13,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::options::{DeviceOptions, PictureOptions, SceneOptions, When};
 use super::print;
+use super::unbuilt::UnbuiltOptions;
 use super::report::{
     MemoryFacts, Output, PassFacts, PipelineFacts, Report, SceneFacts, Spread, Validation, Work, knob_map,
 };
@@ -48,6 +49,8 @@ pub struct RenderArgs {
     /// Progress: a bar on a terminal, a line per step elsewhere
     #[arg(long, value_enum, default_value_t = When::Auto)]
     progress: When,
+    #[command(flatten)]
+    unbuilt: UnbuiltOptions,
 }
 
 /// Layers that can be asked for.
@@ -172,6 +175,7 @@ impl Drop for Steps {
 pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let now = Instant::now();
     let mut phases = Phases { start: now, last: now, all: BTreeMap::new() };
+    args.unbuilt.refuse()?;
     let outputs = outputs(args)?;
     let settings = args.picture.settings(&args.scene)?;
     let steps = Steps::new(args.progress, quiet);

@@ -8,7 +8,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use super::{Bounds, Instance, Mesh, Scene};
 
 /// Half-thickness as a share of the scene's bounding diagonal.
-const HALF_THICKNESS: f64 = 0.001;
+const HALF_THICKNESS: f64 = 0.002;
 
 /// A point or a line, by its vertices.
 #[derive(Clone, Copy)]
