@@ -1,4 +1,4 @@
-//! The score: the whole frame, one call per pass, top to bottom. See [`Renderer::sample`].
+//! The score: the whole frame, one call per pass, top to bottom. Read `Renderer::sample` first.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
