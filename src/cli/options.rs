@@ -170,10 +170,12 @@ impl SceneOptions {
         }
     }
 
-    /// Whether the environment of [`SceneOptions::load_environment`] lights this scene: asked for, or needed.
+    /// How strongly the environment of [`SceneOptions::load_environment`] lights this scene: fully when it is asked for
+    /// or the scene has no lights, as the scene says beside its own lights, else (`None`) not at all.
     #[must_use]
-    pub fn uses_environment(&self, scene: &Scene) -> bool {
-        self.env.is_some() || self.background == Some(Background::Environment) || scene.lights.is_empty()
+    pub fn environment_share(&self, scene: &Scene) -> Option<f32> {
+        let asked = self.env.is_some() || self.background == Some(Background::Environment);
+        if asked { Some(1.0) } else { scene.studio.or(scene.lights.is_empty().then_some(1.0)) }
     }
 
     /// The camera to draw from.

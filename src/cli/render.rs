@@ -177,7 +177,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let mut phases = Phases { start: now, last: now, all: BTreeMap::new() };
     args.unbuilt.refuse()?;
     let outputs = outputs(args)?;
-    let settings = args.picture.settings(&args.scene)?;
+    let mut settings = args.picture.settings(&args.scene)?;
     let steps = Steps::new(args.progress, quiet);
 
     // The device opens and the environment is read while the scene loads: three things that do not wait for each other.
@@ -201,7 +201,9 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     for warning in scene.warnings.iter().chain(&environment_warnings) {
         tracing::warn!("{warning}");
     }
-    let environment = environment.filter(|_| args.scene.uses_environment(&scene));
+    let share = args.scene.environment_share(&scene);
+    let environment = environment.filter(|_| share.is_some());
+    settings.environment_intensity *= share.unwrap_or(1.0);
     let camera = args.scene.choose_camera(&scene, settings.size)?;
     let facts = facts(&scene);
 

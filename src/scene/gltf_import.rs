@@ -45,6 +45,7 @@ pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
         materials: materials.materials,
         images: materials.images,
         lights,
+        studio: None,
         cameras,
         warnings: warnings.into_iter().map(|w| format!("{file}: {w}")).collect(),
     })

@@ -66,6 +66,9 @@ pub struct Scene {
     pub images: Vec<Image>,
     /// Punctual lights in world space.
     pub lights: Vec<Light>,
+    /// Intensity of the built-in studio where the user names no environment; `None`: 1 for a scene without lights of its
+    /// own, and no studio beside lights.
+    pub studio: Option<f32>,
     /// Cameras in world space, in the order of the file's nodes.
     pub cameras: Vec<Camera>,
     /// Things that were read around: each one sentence that names the file, the place and the consequence.

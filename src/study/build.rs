@@ -84,6 +84,11 @@ impl Builder {
         });
     }
 
+    /// Adds the built-in studio to the scene's own lights, for surfaces that need something to mirror.
+    pub(super) fn studio(&mut self, intensity: f32) {
+        self.scene.studio = Some(intensity);
+    }
+
     pub(super) fn finish(self) -> Scene {
         self.scene
     }

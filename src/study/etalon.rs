@@ -30,6 +30,7 @@ pub(super) fn scene() -> Scene {
     studio(&mut b);
     b.camera("front", DVec3::new(0.0, 0.44, 1.75), DVec3::new(0.02, 0.19, 0.0), 24.0);
     b.camera("above", DVec3::new(0.9, 1.1, 1.2), DVec3::new(0.0, 0.12, -0.05), 30.0);
+    b.studio(0.4);
     b.finish()
 }
 

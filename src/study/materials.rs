@@ -44,5 +44,6 @@ pub(super) fn scene() -> Scene {
     let position = DVec3::new(-2.4, 2.2, 2.6);
     b.light("lamp", [9.0, 8.6, 8.0], LightKind::Point { position, range: None });
     b.camera("front", DVec3::new(0.0, 0.0, 6.4), DVec3::ZERO, 24.5);
+    b.studio(0.6);
     b.finish()
 }

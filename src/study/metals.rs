@@ -47,5 +47,6 @@ pub(super) fn scene() -> Scene {
         b.light(&format!("soft box {i}"), [9.0; 3], LightKind::Point { position: front, range: None });
     }
     b.camera("front", DVec3::new(0.0, 0.5, 2.6), DVec3::new(0.0, 0.2, 0.0), 25.0);
+    b.studio(0.6);
     b.finish()
 }
