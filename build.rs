@@ -346,21 +346,20 @@ fn vertex_inputs(stage: &Stage, names: &Names) -> Result<BTreeMap<u32, (String, 
 }
 
 fn push_bytes(names: &Names) -> Result<u32> {
-    for line in names.module.types_global_values.iter().filter(|line| line.class.opcode == Op::Variable) {
-        if matches!(line.operands[0], Operand::StorageClass(StorageClass::PushConstant)) {
-            return names.size(word(&names.types[&line.result_type.unwrap_or(0)].operands[1]));
-        }
-    }
-    Ok(0)
+    let mut variables = names.module.types_global_values.iter().filter(|line| line.class.opcode == Op::Variable);
+    let block = variables.find(|line| matches!(line.operands[0], Operand::StorageClass(StorageClass::PushConstant)));
+    block.map_or(Ok(0), |line| names.size(word(&names.types[&line.result_type.unwrap_or(0)].operands[1])))
 }
 
 fn local_size(module: &Module) -> [u32; 3] {
-    for line in &module.execution_modes {
-        if let [_, Operand::ExecutionMode(ExecutionMode::LocalSize), x, y, z] = &line.operands[..] {
-            return [word(x), word(y), word(z)];
-        }
-    }
-    [1; 3]
+    module
+        .execution_modes
+        .iter()
+        .find_map(|line| match &line.operands[..] {
+            [_, Operand::ExecutionMode(ExecutionMode::LocalSize), x, y, z] => Some([word(x), word(y), word(z)]),
+            _ => None,
+        })
+        .unwrap_or([1; 3])
 }
 
 /// Names of the structs that `src/share.rs` must repeat.
@@ -389,12 +388,13 @@ fn generate(programs: &BTreeMap<String, Vec<Stage>>, shared: &BTreeSet<String>) 
             layout_asserts(&mut layouts, shared, &Names::new(&stage.module), &stage.path)?;
         }
     }
-    for missing in shared.iter().filter(|name| !layouts.contains_key(*name)) {
+    if let Some(missing) = shared.iter().find(|name| !layouts.contains_key(*name)) {
         return Err(format!("shaders/share: struct {missing} is used by no shader"));
     }
     code.extend(layouts.into_values());
     let list = programs.keys().fold(String::new(), |list, name| list + &format!("&{name}::PROGRAM, "));
-    writeln!(code, "/// Every program, by name.\npub static PROGRAMS: &[&Program] = &[{list}];").map_err(|e| e.to_string())?;
+    writeln!(code, "/// Every program, by name.\npub static PROGRAMS: &[&Program] = &[{list}];")
+        .map_err(|e| e.to_string())?;
     Ok(code)
 }
 
@@ -488,7 +488,7 @@ fn program(code: &mut String, name: &str, stages: &[Stage]) -> Result<()> {
     write!(
         code,
         "/// `shaders/pass/{name}`.
-#[allow(clippy::struct_excessive_bools, missing_docs, reason = \"generated\")]
+#[allow(clippy::derivable_impls, missing_docs, reason = \"generated\")]
 pub mod {name} {{
     use super::*;
     /// The program.

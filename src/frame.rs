@@ -1,4 +1,4 @@
-//! The score: the whole frame, one call per pass, top to bottom. See [`Renderer::sample`].
+//! The score: the whole frame, one call per pass, top to bottom. Read `Renderer::sample` first.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -205,7 +205,8 @@ impl Renderer {
     /// One sample of every pixel: the frame, pass by pass.
     fn sample(&mut self, view: &View, index: u32, count: u32) -> Result<Vec<PassTime>> {
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(index, count))));
-        let Self { device, plan, scene, camera, gbuffer: g, tiles: lists_of_lights, work, lists, radiance, .. } = &*self;
+        let Self { device, plan, scene, camera, gbuffer: g, tiles: lists_of_lights, work, lists, radiance, .. } =
+            &*self;
         // With n samples a pixel each one stands for 1/n of its area: textures are read that much sharper.
         let lod_bias = -0.5 * (count as f32).log2();
         let lighting = Lighting {
@@ -228,9 +229,9 @@ impl Renderer {
         background(&mut frame, lighting, g, work, radiance)?;
         if let Some(lists) = lists {
             frame.fill("reset fragment counters", &lists.counters, 0);
-            for (strip, rows) in lists.strips().into_iter().enumerate() {
-                fragments(&mut frame, scene, camera, g, lists, strip as u32, rows, lod_bias)?;
-                composite(&mut frame, lighting, lists, radiance, rows)?;
+            for strip in lists.strips() {
+                fragments(&mut frame, scene, camera, g, lists, strip, lod_bias)?;
+                composite(&mut frame, lighting, lists, radiance, strip.rows)?;
             }
             frame.read_back(&lists.counters);
             frame.read_back(&lists.dropped);

@@ -115,8 +115,7 @@ fn vector(text: &str) -> Result<DVec3, String> {
 }
 
 fn size(text: &str) -> Result<[u32; 2], String> {
-    let parts: Option<(u32, u32)> =
-        text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    let parts: Option<(u32, u32)> = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     match parts {
         Some((w, h)) => Ok([w, h]),
         None => Err("expected WIDTHxHEIGHT, for example 1280x720".to_owned()),
@@ -191,7 +190,8 @@ impl SceneOptions {
         if let Some(eye) = self.eye {
             let target = self.target.unwrap_or_else(|| bounds.center());
             let up = self.up.unwrap_or(DVec3::Y);
-            return Camera::looking_at(eye, target, up, fov_y).with_context(|| format!("--eye {eye} --target {target}"));
+            return Camera::looking_at(eye, target, up, fov_y)
+                .with_context(|| format!("--eye {eye} --target {target}"));
         }
         if let Some(wanted) = &self.camera {
             let names = || scene.cameras.iter().map(|c| format!("\"{}\"", c.name)).collect::<Vec<_>>().join(", ");

@@ -13,10 +13,10 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::options::{DeviceOptions, PictureOptions, SceneOptions, When};
 use super::print;
-use super::unbuilt::UnbuiltOptions;
 use super::report::{
     MemoryFacts, Output, PassFacts, PipelineFacts, Report, SceneFacts, Spread, Validation, Work, knob_map,
 };
+use super::unbuilt::UnbuiltOptions;
 use crate::frame::{Rendered, Renderer};
 use crate::gpu::{Device, Severity};
 use crate::image::{Aov, AovData, Picture, exr, file};
@@ -219,7 +219,8 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let samples = renderer.plan.samples;
     let mut rounds = Vec::new();
     let mut first: Option<(Rendered, Option<Picture>)> = None;
-    let needs_film = args.report.is_some() || outputs.iter().any(|(_, format)| *format == Format::Exr) || args.repeat > 1;
+    let needs_film =
+        args.report.is_some() || outputs.iter().any(|(_, format)| *format == Format::Exr) || args.repeat > 1;
     for round in 0..args.repeat {
         steps.step("drawing", samples);
         let rendered = renderer.render(&camera, &mut |done, _| steps.at(done))?;
@@ -230,7 +231,9 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         match &first {
             None => first = Some((rendered, film)),
             Some((known, known_film)) => {
-                let same = |a: &Picture, b: &Picture| bytemuck::cast_slice::<_, u8>(&a.rgba) == bytemuck::cast_slice::<_, u8>(&b.rgba);
+                let same = |a: &Picture, b: &Picture| {
+                    bytemuck::cast_slice::<_, u8>(&a.rgba) == bytemuck::cast_slice::<_, u8>(&b.rgba)
+                };
                 let films = known_film.as_ref().zip(film.as_ref()).is_none_or(|(a, b)| same(a, b));
                 if known.display != rendered.display || !films {
                     bail!("--repeat: picture {} differs from the first", round + 1);

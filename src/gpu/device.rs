@@ -182,16 +182,11 @@ impl Instance {
         unsafe { self.raw.get_physical_device_properties2(physical, &mut properties) };
         let properties = properties.properties;
         let text = |s: Result<&CStr, _>| s.map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-        let version = |v: u32| {
-            format!("{}.{}.{}", vk::api_version_major(v), vk::api_version_minor(v), vk::api_version_patch(v))
-        };
+        let version =
+            |v: u32| format!("{}.{}.{}", vk::api_version_major(v), vk::api_version_minor(v), vk::api_version_patch(v));
         let info = DeviceInfo {
             name: text(properties.device_name_as_c_str()),
-            driver: format!(
-                "{} {}",
-                text(driver.driver_name_as_c_str()),
-                text(driver.driver_info_as_c_str())
-            ),
+            driver: format!("{} {}", text(driver.driver_name_as_c_str()), text(driver.driver_info_as_c_str())),
             version: version(properties.driver_version),
             kind: match properties.device_type {
                 vk::PhysicalDeviceType::CPU => "cpu",

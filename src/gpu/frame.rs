@@ -222,8 +222,7 @@ impl<'a> Frame<'a> {
             self.use_buffer(&mut uses, sizes, Access::IndirectRead, vk::ShaderStageFlags::empty());
         }
         let layout = self.device.layout(program)?;
-        let pipeline =
-            self.device.pipeline(program, PipelineKey { program: program.name, constants, raster: None })?;
+        let pipeline = self.device.pipeline(program, PipelineKey { program: program.name, constants, raster: None })?;
         let push = push.to_vec();
         self.passes.push(Pass {
             name: name.to_owned(),
@@ -335,8 +334,14 @@ impl<'a> Frame<'a> {
             if let Some(depth) = &depth_info {
                 info = info.depth_attachment(depth);
             }
-            let viewport =
-                vk::Viewport { x: 0.0, y: 0.0, width: width as f32, height: height as f32, min_depth: 0.0, max_depth: 1.0 };
+            let viewport = vk::Viewport {
+                x: 0.0,
+                y: 0.0,
+                width: width as f32,
+                height: height as f32,
+                min_depth: 0.0,
+                max_depth: 1.0,
+            };
             // SAFETY: the command buffer is recording; handles are alive until the frame has finished.
             unsafe {
                 device.raw.cmd_begin_rendering(commands, &info);
@@ -408,10 +413,7 @@ impl<'a> Frame<'a> {
             .enumerate()
             .map(|(level, &offset)| {
                 let level = level as u32;
-                region(offset, to.aspect(), level, layer, [
-                    (desc.width >> level).max(1),
-                    (desc.height >> level).max(1),
-                ])
+                region(offset, to.aspect(), level, layer, [(desc.width >> level).max(1), (desc.height >> level).max(1)])
             })
             .collect();
         let (from, to) = (from.raw, to.raw);
@@ -487,7 +489,8 @@ impl<'a> Frame<'a> {
         // in it is borrowed for `'a`, which ends after this function.
         unsafe {
             let raw = &device.raw;
-            let pool = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(queries.max(1));
+            let pool =
+                vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(queries.max(1));
             let pool = raw.create_query_pool(&pool, None).context("creating timestamps")?;
             let info = vk::CommandBufferAllocateInfo::default()
                 .command_pool(device.commands)
@@ -518,10 +521,8 @@ impl<'a> Frame<'a> {
 
             let done = device.submitted.fetch_add(1, Ordering::Relaxed) + 1;
             let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
-            let signals =
-                [vk::SemaphoreSubmitInfo::default().semaphore(device.timeline).value(done).stage_mask(all)];
-            let submit =
-                vk::SubmitInfo2::default().command_buffer_infos(&buffers).signal_semaphore_infos(&signals);
+            let signals = [vk::SemaphoreSubmitInfo::default().semaphore(device.timeline).value(done).stage_mask(all)];
+            let submit = vk::SubmitInfo2::default().command_buffer_infos(&buffers).signal_semaphore_infos(&signals);
             raw.queue_submit2(device.queue, &[submit], vk::Fence::null()).context("submitting a frame")?;
             let (semaphores, values) = ([device.timeline], [done]);
             let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);

@@ -60,13 +60,7 @@ impl Buffer {
         Ok(buffer)
     }
 
-    fn create(
-        device: &Arc<Device>,
-        name: &str,
-        bytes: u64,
-        place: Place,
-        texels: Option<vk::Format>,
-    ) -> Result<Self> {
+    fn create(device: &Arc<Device>, name: &str, bytes: u64, place: Place, texels: Option<vk::Format>) -> Result<Self> {
         let creating = || format!("creating buffer \"{name}\" of {bytes} bytes");
         let bytes = bytes.max(16);
         let mut usage = vk::BufferUsageFlags::UNIFORM_BUFFER

@@ -299,11 +299,11 @@ impl Device {
             .depth_test_enable(raster.depth.is_some())
             .depth_write_enable(raster.depth.is_some_and(|(_, write)| write))
             .depth_compare_op(vk::CompareOp::GREATER_OR_EQUAL);
-        let attachments =
-            vec![
-                vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
-                raster.colors.len()
-            ];
+        let attachments = vec![
+            vk::PipelineColorBlendAttachmentState::default()
+                .color_write_mask(vk::ColorComponentFlags::RGBA);
+            raster.colors.len()
+        ];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
         let dynamic = [
             vk::DynamicState::VIEWPORT,
@@ -349,18 +349,25 @@ pub(super) enum Descriptor {
 }
 
 impl Descriptor {
-    pub(super) fn new(device: &Device, kind: BindingKind, resource: Resource<'_>, layout: vk::ImageLayout) -> Result<Self> {
+    pub(super) fn new(
+        device: &Device,
+        kind: BindingKind,
+        resource: Resource<'_>,
+        layout: vk::ImageLayout,
+    ) -> Result<Self> {
         Ok(match (kind, resource) {
             (BindingKind::UniformTexelBuffer | BindingKind::StorageTexelBuffer, Resource::Buffer(buffer)) => {
                 assert!(buffer.view != vk::BufferView::null(), "a texel buffer needs `Buffer::texels`");
                 Self::Texels(buffer.view)
             }
-            (BindingKind::UniformBuffer | BindingKind::StorageBuffer, Resource::Buffer(buffer)) => Self::Buffer(
-                vk::DescriptorBufferInfo { buffer: buffer.raw, offset: 0, range: vk::WHOLE_SIZE },
-            ),
-            (BindingKind::StorageImage, Resource::Image(image)) => Self::Image(
-                vk::DescriptorImageInfo { sampler: vk::Sampler::null(), image_view: image.view, image_layout: layout },
-            ),
+            (BindingKind::UniformBuffer | BindingKind::StorageBuffer, Resource::Buffer(buffer)) => {
+                Self::Buffer(vk::DescriptorBufferInfo { buffer: buffer.raw, offset: 0, range: vk::WHOLE_SIZE })
+            }
+            (BindingKind::StorageImage, Resource::Image(image)) => Self::Image(vk::DescriptorImageInfo {
+                sampler: vk::Sampler::null(),
+                image_view: image.view,
+                image_layout: layout,
+            }),
             (BindingKind::SampledImage, Resource::Sampled(sampled)) => Self::Image(vk::DescriptorImageInfo {
                 sampler: device.sampler(sampled.sampler)?,
                 image_view: sampled.image.view,

@@ -202,8 +202,7 @@ mod tests {
 
     #[test]
     fn depth_may_be_tested_and_sampled_in_one_pass() {
-        let all =
-            barriers(&[vec![usage(3, Access::DepthRead), usage(3, Access::Sampled)]], &mut HashMap::new());
+        let all = barriers(&[vec![usage(3, Access::DepthRead), usage(3, Access::Sampled)]], &mut HashMap::new());
         assert_eq!(all[0].len(), 1);
         assert_eq!(all[0][0].layouts.map(|l| l.1), Some(vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL));
     }

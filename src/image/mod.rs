@@ -1,7 +1,7 @@
 //! Pictures as data: reading, writing, comparing.
 //!
 //! Nothing here knows Vulkan. A render ends in a [`Picture`] of scene-linear radiance; [`exr`] keeps it as it is,
-//! [`tone`] brings it to display values and [`png`] keeps those. [`metric`] compares two pictures, [`file`] puts bytes
+//! [`tone`] brings it to display values and [`png`] keeps those. [`metric`] compares two pictures, [`mod@file`] puts bytes
 //! on disk so that a partial file is never seen.
 
 pub mod exr;

@@ -9,7 +9,13 @@ use crate::shader::accumulate;
 ///
 /// # Errors
 /// When the driver refuses the pipeline.
-pub fn accumulate<'a>(frame: &mut Frame<'a>, radiance: &'a Image, film: &'a Image, index: u32, count: u32) -> Result<()> {
+pub fn accumulate<'a>(
+    frame: &mut Frame<'a>,
+    radiance: &'a Image,
+    film: &'a Image,
+    index: u32,
+    count: u32,
+) -> Result<()> {
     let scale = if index + 1 == count { 1.0 / count as f32 } else { 1.0 };
     let push = [u32::from(index == 0), scale.to_bits()];
     let size = [film.desc().width, film.desc().height];

@@ -83,12 +83,7 @@ impl EnvironmentOnDevice {
             width: levels[0].0 as f32,
             levels: levels.len() as f32,
         };
-        Ok(Self {
-            sky,
-            prefiltered,
-            reflectance,
-            terms: Buffer::with_data(device, "environment terms", &[terms])?,
-        })
+        Ok(Self { sky, prefiltered, reflectance, terms: Buffer::with_data(device, "environment terms", &[terms])? })
     }
 
     /// The map as it is, for the background.

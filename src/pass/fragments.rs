@@ -31,6 +31,15 @@ pub struct FragmentLists {
     device: Arc<Device>,
 }
 
+/// Rows of the picture whose fragments are in memory together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Strip {
+    /// Counted from the top.
+    pub index: u32,
+    /// From, up to.
+    pub rows: [u32; 2],
+}
+
 impl FragmentLists {
     /// Lists that hold one fragment per pixel to begin with.
     ///
@@ -60,13 +69,13 @@ impl FragmentLists {
         })
     }
 
-    /// Rows of each strip.
+    /// The strips from top to bottom.
     #[must_use]
-    pub fn strips(&self) -> Vec<[u32; 2]> {
+    pub fn strips(&self) -> Vec<Strip> {
         let rows = self.size[1].div_ceil(self.strips);
         (0..self.strips)
-            .map(|i| [(i * rows).min(self.size[1]), ((i + 1) * rows).min(self.size[1])])
-            .filter(|[from, to]| from < to)
+            .map(|index| Strip { index, rows: [index, index + 1].map(|i| (i * rows).min(self.size[1])) })
+            .filter(|strip| strip.rows[0] < strip.rows[1])
             .collect()
     }
 
@@ -76,9 +85,9 @@ impl FragmentLists {
     /// When memory is short.
     pub fn fitted(&mut self) -> Result<bool> {
         let strips = self.strips as usize;
-        let most = self.counters.read(|bytes| {
-            bytemuck::cast_slice::<u8, u32>(bytes)[..strips].iter().copied().max().unwrap_or_default()
-        });
+        let most = self
+            .counters
+            .read(|bytes| bytemuck::cast_slice::<u8, u32>(bytes)[..strips].iter().copied().max().unwrap_or_default());
         let most = u64::from(most);
         if most * NODE_BYTES <= self.nodes.bytes() {
             return Ok(true);
@@ -115,8 +124,7 @@ pub fn fragments<'a>(
     camera: &'a Buffer,
     gbuffer: &'a GBuffer,
     lists: &'a FragmentLists,
-    strip: u32,
-    rows: [u32; 2],
+    strip: Strip,
     lod_bias: f32,
 ) -> Result<()> {
     // An empty raster pass clears the heads; one that draws could not, it exchanges them atomically.
@@ -125,43 +133,57 @@ pub fn fragments<'a>(
         colors: vec![ColorTarget { image: &lists.heads, clear: Some([u32::MAX; 4]) }],
         depth: None,
         size: lists.size,
-        rows,
+        rows: strip.rows,
     };
     let bindings: Vec<_> = scene
         .page_sets()
         .into_iter()
-        .map(|[base, metallic_roughness, normal, occlusion, emissive, clearcoat, coat_roughness, specular, transmission, thickness, coat_normal]| {
-            fragments::Bind {
-                camera_block: camera,
-                instances: &scene.instances,
-                materials: &scene.materials,
-                slots: &scene.slots,
-                base_page: base,
-                metallic_roughness_page: metallic_roughness,
-                normal_page: normal,
-                occlusion_page: occlusion,
-                emissive_page: emissive,
-                clearcoat_page: clearcoat,
-                clearcoat_roughness_page: coat_roughness,
-                specular_page: specular,
-                transmission_page: transmission,
-                thickness_page: thickness,
-                coat_normal_page: coat_normal,
-                heads: &lists.heads,
-                counters: &lists.counters,
-                nodes: &lists.nodes,
-            }
-        })
+        .map(
+            |[
+                base,
+                metallic_roughness,
+                normal,
+                occlusion,
+                emissive,
+                clearcoat,
+                coat_roughness,
+                specular,
+                transmission,
+                thickness,
+                coat_normal,
+            ]| {
+                fragments::Bind {
+                    camera_block: camera,
+                    instances: &scene.instances,
+                    materials: &scene.materials,
+                    slots: &scene.slots,
+                    base_page: base,
+                    metallic_roughness_page: metallic_roughness,
+                    normal_page: normal,
+                    occlusion_page: occlusion,
+                    emissive_page: emissive,
+                    clearcoat_page: clearcoat,
+                    clearcoat_roughness_page: coat_roughness,
+                    specular_page: specular,
+                    transmission_page: transmission,
+                    thickness_page: thickness,
+                    coat_normal_page: coat_normal,
+                    heads: &lists.heads,
+                    counters: &lists.counters,
+                    nodes: &lists.nodes,
+                }
+            },
+        )
         .collect();
-    let push = [lod_bias.to_bits(), strip];
+    let push = [lod_bias.to_bits(), strip.index];
     frame.raster(&clear, &fragments::PROGRAM, &bindings[..0], bytemuck::cast_slice(&push), Vec::new())?;
     let raster = Raster {
         name: "see-through fragments",
         colors: Vec::new(),
         depth: Some(DepthTarget { image: &gbuffer.depth, clear: false, write: false }),
         size: lists.size,
-        rows,
+        rows: strip.rows,
     };
     frame.raster(&raster, &fragments::PROGRAM, &bindings, bytemuck::cast_slice(&push), scene.draws(true))?;
-    classify_fragments(frame, &lists.heads, &lists.work, rows)
+    classify_fragments(frame, &lists.heads, &lists.work, strip.rows)
 }

@@ -95,25 +95,39 @@ pub fn gbuffer<'a>(
     let bindings: Vec<_> = scene
         .page_sets()
         .into_iter()
-        .map(|[base, metallic_roughness, normal, occlusion, emissive, clearcoat, coat_roughness, specular, transmission, thickness, coat_normal]| {
-            gbuffer::Bind {
-                camera_block: camera,
-                instances: &scene.instances,
-                materials: &scene.materials,
-                slots: &scene.slots,
-                base_page: base,
-                metallic_roughness_page: metallic_roughness,
-                normal_page: normal,
-                occlusion_page: occlusion,
-                emissive_page: emissive,
-                clearcoat_page: clearcoat,
-                clearcoat_roughness_page: coat_roughness,
-                specular_page: specular,
-                transmission_page: transmission,
-                thickness_page: thickness,
-                coat_normal_page: coat_normal,
-            }
-        })
+        .map(
+            |[
+                base,
+                metallic_roughness,
+                normal,
+                occlusion,
+                emissive,
+                clearcoat,
+                coat_roughness,
+                specular,
+                transmission,
+                thickness,
+                coat_normal,
+            ]| {
+                gbuffer::Bind {
+                    camera_block: camera,
+                    instances: &scene.instances,
+                    materials: &scene.materials,
+                    slots: &scene.slots,
+                    base_page: base,
+                    metallic_roughness_page: metallic_roughness,
+                    normal_page: normal,
+                    occlusion_page: occlusion,
+                    emissive_page: emissive,
+                    clearcoat_page: clearcoat,
+                    clearcoat_roughness_page: coat_roughness,
+                    specular_page: specular,
+                    transmission_page: transmission,
+                    thickness_page: thickness,
+                    coat_normal_page: coat_normal,
+                }
+            },
+        )
         .collect();
     let raster = Raster {
         name: "G-buffer",

@@ -96,7 +96,12 @@ fn texture_slots(m: &Material) -> [(Option<TextureRef>, Meaning); SLOTS] {
 }
 
 /// A buffer with `data` where the device reads it fastest: written in place on a CPU device, staged on others.
-fn upload<T: bytemuck::NoUninit>(device: &Arc<Device>, name: &str, data: &[T], texels: Option<vk::Format>) -> Result<Buffer> {
+fn upload<T: bytemuck::NoUninit>(
+    device: &Arc<Device>,
+    name: &str,
+    data: &[T],
+    texels: Option<vk::Format>,
+) -> Result<Buffer> {
     let bytes: &[u8] = bytemuck::cast_slice(data);
     let place = if device.info().kind == "cpu" { Place::Upload } else { Place::Device };
     let size = bytes.len() as u64;

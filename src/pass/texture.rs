@@ -52,15 +52,19 @@ impl Textures {
                 Meaning::Color => vk::Format::R8G8B8A8_SRGB,
                 Meaning::Data => vk::Format::R8G8B8A8_UNORM,
             };
-            let page = Image::new(device, &format!("texture page {width}x{height}"), ImageDesc {
-                format,
-                width,
-                height,
-                layers: images.len() as u32,
-                levels,
-                array: true,
-                usage: vk::ImageUsageFlags::SAMPLED,
-            })?;
+            let page = Image::new(
+                device,
+                &format!("texture page {width}x{height}"),
+                ImageDesc {
+                    format,
+                    width,
+                    height,
+                    layers: images.len() as u32,
+                    levels,
+                    array: true,
+                    usage: vk::ImageUsageFlags::SAMPLED,
+                },
+            )?;
             // Two images at a time: their mips are made in parallel, their staging memory is what is held at once.
             for (chunk_index, chunk) in images.chunks(2).enumerate() {
                 let chains: Vec<Vec<u8>> = chunk
@@ -76,7 +80,8 @@ impl Textures {
                     let mut frame = Frame::new(device);
                     frame.upload("upload texture", &staging, &page, layer, &level_offsets(width, height, levels));
                     frame.finish()?;
-                    let last_use = groups.iter().filter(|((.., m), list)| *m > meaning && list.contains(&image)).count() == 0;
+                    let last_use =
+                        groups.iter().filter(|((.., m), list)| *m > meaning && list.contains(&image)).count() == 0;
                     if last_use {
                         scene.images[image].rgba = Vec::new();
                     }
@@ -84,15 +89,19 @@ impl Textures {
             }
             pages.push(page);
         }
-        let white = Image::new(device, "white texture", ImageDesc {
-            format: vk::Format::R8G8B8A8_UNORM,
-            width: 1,
-            height: 1,
-            layers: 1,
-            levels: 1,
-            array: true,
-            usage: vk::ImageUsageFlags::SAMPLED,
-        })?;
+        let white = Image::new(
+            device,
+            "white texture",
+            ImageDesc {
+                format: vk::Format::R8G8B8A8_UNORM,
+                width: 1,
+                height: 1,
+                layers: 1,
+                levels: 1,
+                array: true,
+                usage: vk::ImageUsageFlags::SAMPLED,
+            },
+        )?;
         let staging = Buffer::with_data(device, "staging", &[0xffff_ffff_u32])?;
         let mut frame = Frame::new(device);
         frame.upload("upload white", &staging, &white, 0, &[0]);

@@ -66,8 +66,7 @@ pub fn tiles<'a>(
     gbuffer: &'a GBuffer,
     target: &'a Tiles,
 ) -> Result<()> {
-    let bind =
-        tile_depth::Bind { camera_block: camera, depth: &gbuffer.depth_texels, tile_depths: &target.depths };
+    let bind = tile_depth::Bind { camera_block: camera, depth: &gbuffer.depth_texels, tile_depths: &target.depths };
     let constants = tile_depth::Constants { from_camera: plan.see_through };
     frame.compute_over("tile depths", &bind, constants.words(), &[], [target.across, target.down])?;
 

@@ -1,6 +1,6 @@
 //! A camera as the device sees it: relative to the eye, reversed depth, one sub-pixel offset.
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
 use crate::scene::{Bounds, Camera, Projection};
 use crate::share;
@@ -24,7 +24,7 @@ impl View {
     /// The view of `camera`; `bounds` decides the near distance where the camera leaves it open.
     #[must_use]
     pub fn new(camera: &Camera, size: [u32; 2], bounds: Option<Bounds>) -> Self {
-        let axes = DMat3::from(camera.world_from_camera.matrix3);
+        let axes = camera.world_from_camera.matrix3;
         let eye = camera.world_from_camera.translation;
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let (half_height, near, far, orthographic) = match camera.projection {
@@ -113,9 +113,8 @@ mod tests {
 
     fn project(camera: &share::Camera, p_rel: [f32; 3]) -> [f64; 3] {
         let p = [p_rel[0], p_rel[1], p_rel[2], 1.0];
-        let clip: Vec<f64> = (0..4)
-            .map(|row| (0..4).map(|c| f64::from(camera.clip_from_rel[c][row]) * f64::from(p[c])).sum())
-            .collect();
+        let clip: Vec<f64> =
+            (0..4).map(|row| (0..4).map(|c| f64::from(camera.clip_from_rel[c][row]) * f64::from(p[c])).sum()).collect();
         [clip[0] / clip[3], clip[1] / clip[3], clip[2] / clip[3]]
     }
 
@@ -129,11 +128,8 @@ mod tests {
         let shared = view.shared(DVec2::ZERO);
         assert!((project(&shared, [0.0, 0.0, -0.1])[2] - 1.0).abs() < 1e-6);
         assert!((project(&shared, [0.0, 0.0, -100.0])[2] - 1e-3).abs() < 1e-9);
-        let view = View::new(
-            &camera(Projection::Orthographic { half_height: 1.0, near: 1.0, far: 3.0 }),
-            [16, 9],
-            None,
-        );
+        let view =
+            View::new(&camera(Projection::Orthographic { half_height: 1.0, near: 1.0, far: 3.0 }), [16, 9], None);
         let shared = view.shared(DVec2::ZERO);
         assert!((project(&shared, [0.0, 0.0, -1.0])[2] - 1.0).abs() < 1e-6);
         assert!(project(&shared, [0.0, 0.0, -3.0])[2].abs() < 1e-6);

@@ -19,8 +19,20 @@ pub struct Knob {
 
 /// Every knob, in product.md's order. The command line, the report and the documentation read this table.
 pub static KNOBS: &[Knob] = &[
-    Knob { name: "shadows", rungs: &["off"], unbuilt: &["map", "ray"], default: "off", about: "visibility of lights (R5)" },
-    Knob { name: "fresnel", rungs: &["schlick", "exact"], unbuilt: &[], default: "schlick", about: "Fresnel curve (F2, F3)" },
+    Knob {
+        name: "shadows",
+        rungs: &["off"],
+        unbuilt: &["map", "ray"],
+        default: "off",
+        about: "visibility of lights (R5)",
+    },
+    Knob {
+        name: "fresnel",
+        rungs: &["schlick", "exact"],
+        unbuilt: &[],
+        default: "schlick",
+        about: "Fresnel curve (F2, F3)",
+    },
     Knob {
         name: "brdf",
         rungs: &["blinn-phong", "blinn-phong-reciprocal", "ggx", "ggx-multi"],
@@ -35,7 +47,13 @@ pub static KNOBS: &[Knob] = &[
         default: "environment",
         about: "what a surface mirrors (F4)",
     },
-    Knob { name: "refraction", rungs: &["off"], unbuilt: &["screen", "ray"], default: "off", about: "bent transmission (F5)" },
+    Knob {
+        name: "refraction",
+        rungs: &["off"],
+        unbuilt: &["screen", "ray"],
+        default: "off",
+        about: "bent transmission (F5)",
+    },
     Knob {
         name: "absorption",
         rungs: &["off", "thickness"],
@@ -51,10 +69,28 @@ pub static KNOBS: &[Knob] = &[
         about: "diffuse light from all around (R6)",
     },
     Knob { name: "lights", rungs: &["points"], unbuilt: &["area"], default: "points", about: "extent of lights (R2)" },
-    Knob { name: "samples", rungs: &["1", "4", "16", "64", "256", "1024"], unbuilt: &[], default: "4", about: "samples per pixel" },
+    Knob {
+        name: "samples",
+        rungs: &["1", "4", "16", "64", "256", "1024"],
+        unbuilt: &[],
+        default: "4",
+        about: "samples per pixel",
+    },
     Knob { name: "colour", rungs: &["rgb"], unbuilt: &["spectral"], default: "rgb", about: "wavelengths (C1–C3)" },
-    Knob { name: "arithmetic", rungs: &["stable"], unbuilt: &["fast", "compensated"], default: "stable", about: "form of the formulas" },
-    Knob { name: "normals", rungs: &["oct32"], unbuilt: &["oct16", "oct24", "f32"], default: "oct32", about: "stored normals" },
+    Knob {
+        name: "arithmetic",
+        rungs: &["stable"],
+        unbuilt: &["fast", "compensated"],
+        default: "stable",
+        about: "form of the formulas",
+    },
+    Knob {
+        name: "normals",
+        rungs: &["oct32"],
+        unbuilt: &["oct16", "oct24", "f32"],
+        default: "oct32",
+        about: "stored normals",
+    },
     Knob { name: "position", rungs: &["depth"], unbuilt: &["stored"], default: "depth", about: "stored positions" },
 ];
 

@@ -113,7 +113,8 @@ impl Plan {
         });
         let see_through = decide("see-through surfaces", "refraction", see_through, true);
         let reflects = surroundings.environment.then(|| "there is an environment".to_owned());
-        let reflection = decide("mirrored environment", "reflection", reflects.clone(), knobs.rung("reflection") != "off");
+        let reflection =
+            decide("mirrored environment", "reflection", reflects.clone(), knobs.rung("reflection") != "off");
         let ambient = decide("ambient light", "indirect", reflects, knobs.rung("indirect") != "off");
 
         let local = |light: &LightKind| !matches!(light, LightKind::Directional { .. });

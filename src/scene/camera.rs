@@ -100,7 +100,8 @@ impl Camera {
         for corner in 0..8 {
             let pick = |bit: i32, min: f64, max: f64| if corner >> bit & 1 == 0 { min } else { max };
             let (min, max) = (bounds.min, bounds.max);
-            let offset = DVec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z)) - bounds.center();
+            let offset =
+                DVec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z)) - bounds.center();
             let toward = offset.dot(backward);
             distance = distance
                 .max(offset.dot(right).abs() / tangent.x + toward)
