@@ -1,14 +1,55 @@
 //! # Etalon: an explicit Vulkan renderer
 //!
 //! glTF (and OBJ/MTL) in, radiance out: raster G-buffer → deferred lighting → tone map, written directly against `ash`.
+//!
+//! ```text
+//! cli ─► study ─► scene        what to draw: data, no Vulkan
+//!  │                ▲
+//!  ▼                │
+//! frame ─► pass ─► plan        what it calls for, and why
+//!           │
+//!           ▼
+//!         shader ─► gpu        explicit Vulkan, no renderer in it
+//! ```
+//!
+//! Start at [`frame::Renderer`]: its private `sample` is the whole frame, one call per pass, top to bottom. Then read one
+//! pass, its shader and its formulas:
+//!
+//! 1. [`pass::light`]: names what it reads and writes, and asks for one dispatch;
+//! 2. `shaders/pass/light.comp`: fetches, calls, stores;
+//! 3. `shaders/lib/lighting.glsl`, `surface.glsl`, `brdf.glsl`: the equations;
+//! 4. [`gpu::sync::barriers`]: the barriers of the whole frame, as a pure function of what the passes declare.
+//!
+//! A pass declares nothing by hand. build.rs reads `readonly` and `writeonly` out of the compiled GLSL and writes, per program, a
+//! module in [`shader`]: `PROGRAM` with the access of each binding, `Bind` with one named field per binding, `Constants`.
+//! [`gpu::Access`] is the one table that turns an access into Vulkan's stages, accesses and layouts. Structs that both sides
+//! know are in [`share`], and differences from their GLSL twins do not compile.
+//!
+//! [`plan::Plan`] is made before any Vulkan object from the scene's values and the [`plan::Knobs`]: a pass, an image or a piece of
+//! shader code exists only if it says so. [`scene`] reads files that are not trusted; [`study`] generates scenes without files;
+//! [`image`] keeps and compares pictures; [`cli`] is the program.
+//!
+//! Lengths are metres, the world is right-handed with +Y up. On the device positions are relative to the eye (`p_rel`);
+//! differences are taken in f64. Depth is reversed. `unsafe` is allowed in [`gpu`] alone.
+//!
+//! The modules below are in reading order. `docs/tour.md` goes through them room by room, `docs/frame.md` through the passes.
+
+pub mod frame;
+
+pub mod pass;
+
+pub mod shader;
+
+pub mod share;
+
+pub mod gpu;
+
+pub mod plan;
+
+pub mod scene;
+
+pub mod study;
+
+pub mod image;
 
 pub mod cli;
-pub mod frame;
-pub mod gpu;
-pub mod image;
-pub mod pass;
-pub mod plan;
-pub mod scene;
-pub mod shader;
-pub mod share;
-pub mod study;
