@@ -85,7 +85,8 @@ pub struct Rendered {
     pub has_alpha: bool,
     /// Values that are no radiances, counted before anything clamped.
     pub counts: Counts,
-    /// Pixels whose list of see-through fragments was too long for one invocation: their farthest were left out.
+    /// Pixels whose list of see-through fragments was too long for one invocation, in the worst sample: their farthest
+    /// were left out.
     pub dropped: u32,
     /// GPU time per pass, summed over the samples, in the order of the frame.
     pub passes: Vec<PassTime>,
@@ -174,18 +175,21 @@ impl Renderer {
         self.scene.look_from(&view);
         let mut times = Times::default();
         let count = self.plan.samples;
+        let mut dropped = 0;
         for index in 0..count {
             // A frame whose see-through fragments did not fit is drawn again with more room.
             loop {
-                times.add(self.sample(&view, index, count)?);
+                let passes = self.sample(&view, index, count)?;
                 let fitted = match &mut self.lists {
                     Some(lists) => lists.fitted()?,
                     None => true,
                 };
                 if fitted {
+                    times.add(passes);
                     break;
                 }
             }
+            dropped = dropped.max(self.lists.as_ref().map_or(0, FragmentLists::dropped));
             progress(index + 1, count);
         }
         let (background, has_alpha) = self.display_background();
@@ -197,7 +201,7 @@ impl Renderer {
             display: self.display.pixels.read(<[u8]>::to_vec),
             has_alpha,
             counts: self.display.counts(),
-            dropped: self.lists.as_ref().map_or(0, FragmentLists::dropped),
+            dropped,
             passes: times.list(),
         })
     }
@@ -229,6 +233,7 @@ impl Renderer {
         background(&mut frame, lighting, g, work, radiance)?;
         if let Some(lists) = lists {
             frame.fill("reset fragment counters", &lists.counters, 0);
+            frame.fill("reset dropped fragments", &lists.dropped, 0);
             for strip in lists.strips() {
                 fragments(&mut frame, scene, camera, g, lists, strip, lod_bias)?;
                 composite(&mut frame, lighting, lists, radiance, strip.rows)?;

@@ -4,12 +4,21 @@
 
 const uint WORK_TILE = 8;
 
-// VkDispatchIndirectCommand.
-struct DispatchSize {
+// A VkDispatchIndirectCommand, and the number of tiles listed: the last row of workgroups may run past it. Every Vulkan
+// device dispatches 65535 workgroups along x; longer lists go on along y.
+struct WorkSize {
     uint x;
     uint y;
     uint z;
+    uint count;
 };
+const uint ROW = 32768;
+
+// Grows the dispatch by one tile and gives its place in the list.
+#define APPEND_TILE(size, place) \
+    uint place = atomicAdd(size.count, 1u); \
+    atomicMax(size.x, min(place + 1, ROW)); \
+    atomicMax(size.y, place / ROW + 1)
 
 uint packed_tile(uvec2 first_pixel) {
     return first_pixel.x | first_pixel.y << 16;
@@ -17,5 +26,10 @@ uint packed_tile(uvec2 first_pixel) {
 
 ivec2 first_pixel(uint packed) {
     return ivec2(packed & 0xffffu, packed >> 16);
+}
+
+// Place in the list of a workgroup.
+uint listed_tile(uvec3 workgroup) {
+    return workgroup.y * ROW + workgroup.x;
 }
 #endif

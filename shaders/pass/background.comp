@@ -16,9 +16,12 @@ layout(set = 0, binding = 2, rgba32f) writeonly uniform image2D radiance;
 layout(scalar, set = 0, binding = 3) readonly buffer BackgroundTiles { uint background_tiles[]; };
 layout(scalar, set = 0, binding = 4) uniform Environment { EnvironmentTerms environment; };
 layout(set = 0, binding = 5) uniform sampler2D sky;
+layout(scalar, set = 0, binding = 6) readonly buffer Sizes { WorkSize surface_size; WorkSize background_size; } work;
 
 void main() {
-    ivec2 pixel = first_pixel(background_tiles[gl_WorkGroupID.x]) + ivec2(gl_LocalInvocationID.xy);
+    uint place = listed_tile(gl_WorkGroupID);
+    if (place >= work.background_size.count) return;
+    ivec2 pixel = first_pixel(background_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
     if (imageLoad(depth, pixel.y * int(camera.size.x) + pixel.x).x != 0.0) return;
     vec4 result = vec4(0.0);

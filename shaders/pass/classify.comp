@@ -8,7 +8,7 @@ layout(local_size_x = 64) in;
 #include "lib/work_tile.glsl"
 
 layout(set = 0, binding = 0, r32f) readonly uniform imageBuffer depth;
-layout(scalar, set = 0, binding = 1) buffer Sizes { DispatchSize surface_size; DispatchSize background_size; };
+layout(scalar, set = 0, binding = 1) buffer Sizes { WorkSize surface_size; WorkSize background_size; };
 layout(scalar, set = 0, binding = 2) writeonly buffer SurfaceTiles { uint surface_tiles[]; };
 layout(scalar, set = 0, binding = 3) writeonly buffer BackgroundTiles { uint background_tiles[]; };
 layout(push_constant, scalar) uniform Push { uvec2 size; };
@@ -29,6 +29,12 @@ void main() {
         }
     }
     uint packed = packed_tile(first);
-    if (nearest > 0.0) surface_tiles[atomicAdd(surface_size.x, 1u)] = packed;
-    if (farthest == 0.0) background_tiles[atomicAdd(background_size.x, 1u)] = packed;
+    if (nearest > 0.0) {
+        APPEND_TILE(surface_size, place);
+        surface_tiles[place] = packed;
+    }
+    if (farthest == 0.0) {
+        APPEND_TILE(background_size, place);
+        background_tiles[place] = packed;
+    }
 }

@@ -7,7 +7,7 @@ layout(local_size_x = 64) in;
 #include "lib/work_tile.glsl"
 
 layout(set = 0, binding = 0, r32ui) readonly uniform uimage2D heads;
-layout(scalar, set = 0, binding = 1) buffer Sizes { DispatchSize tiles_size; };
+layout(scalar, set = 0, binding = 1) buffer Sizes { WorkSize tiles_size; };
 layout(scalar, set = 0, binding = 2) writeonly buffer Tiles { uint fragment_tiles[]; };
 layout(push_constant, scalar) uniform Push { uint width; uint first_row; uint end_row; };
 
@@ -24,5 +24,8 @@ void main() {
             any_fragment = any_fragment || imageLoad(heads, ivec2(x, y)).x != END_OF_LIST;
         }
     }
-    if (any_fragment) fragment_tiles[atomicAdd(tiles_size.x, 1u)] = packed_tile(first);
+    if (any_fragment) {
+        APPEND_TILE(tiles_size, place);
+        fragment_tiles[place] = packed_tile(first);
+    }
 }

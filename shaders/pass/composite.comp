@@ -18,6 +18,7 @@ layout(set = 0, binding = 4, rgba32f) uniform image2D radiance;
 layout(scalar, set = 0, binding = 5) buffer Dropped { uint dropped; };
 layout(scalar, set = 0, binding = 6) readonly buffer Instances { Instance instances[]; };
 layout(scalar, set = 0, binding = 7) readonly buffer Tiles { uint fragment_tiles[]; };
+layout(scalar, set = 0, binding = 8) readonly buffer Sizes { WorkSize tiles_size; } work;
 layout(push_constant, scalar) uniform Push { uint end_row; };
 
 // Fragments of one pixel beyond this many are counted as dropped: 220²/2 selections leave half of the loop budget to
@@ -32,7 +33,9 @@ bool after(uvec3 a, uvec3 b) {
 }
 
 void main() {
-    ivec2 pixel = first_pixel(fragment_tiles[gl_WorkGroupID.x]) + ivec2(gl_LocalInvocationID.xy);
+    uint place = listed_tile(gl_WorkGroupID);
+    if (place >= work.tiles_size.count) return;
+    ivec2 pixel = first_pixel(fragment_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(uvec2(pixel), uvec2(camera.size.x, end_row)))) return;
     uint head = imageLoad(heads, pixel).x;
     if (head == END_OF_LIST) return;

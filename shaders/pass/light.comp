@@ -20,9 +20,12 @@ layout(set = 0, binding = 6, rgba16f) readonly uniform image2D emissive;
 layout(set = 0, binding = 7, rgba16) readonly uniform image2D layers;
 layout(set = 0, binding = 8, rgba32f) writeonly uniform image2D radiance;
 layout(scalar, set = 0, binding = 9) readonly buffer SurfaceTiles { uint surface_tiles[]; };
+layout(scalar, set = 0, binding = 10) readonly buffer Sizes { WorkSize surface_size; WorkSize background_size; } work;
 
 void main() {
-    ivec2 pixel = first_pixel(surface_tiles[gl_WorkGroupID.x]) + ivec2(gl_LocalInvocationID.xy);
+    uint place = listed_tile(gl_WorkGroupID);
+    if (place >= work.surface_size.count) return;
+    ivec2 pixel = first_pixel(surface_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
     float z = imageLoad(depth, pixel.y * int(camera.size.x) + pixel.x).x;
     if (z == 0.0) return;

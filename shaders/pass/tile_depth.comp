@@ -1,5 +1,5 @@
-// Nearest and farthest view depth of each 16x16 tile. With see-through surfaces the near end is the camera: they are
-// lit by the same lists.
+// Nearest and farthest view depth of each 16x16 tile. With see-through surfaces the near end is the camera and, where
+// the background shows, the far end is infinity: they are lit by the same lists.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -19,18 +19,21 @@ void main() {
     ivec2 last = min((tile + 1) * TILE, ivec2(camera.size));
     float nearest = 0.0; // reversed depth
     float farthest = 1.0;
-    bool empty = true;
+    bool drawn = false;
+    bool seen_through = false; // some pixel shows the background
     for (int y = tile.y * TILE; y < last.y; y++) {
         for (int x = tile.x * TILE; x < last.x; x++) {
             float z = imageLoad(depth, y * int(camera.size.x) + x).x;
             nearest = max(nearest, z);
             if (z > 0.0) {
                 farthest = min(farthest, z);
-                empty = false;
+                drawn = true;
+            } else {
+                seen_through = true;
             }
         }
     }
-    vec2 range = empty ? vec2(1.0, -1.0) : vec2(view_depth(camera, nearest), view_depth(camera, farthest));
-    if (FROM_CAMERA) range = vec2(0.0, empty ? 3e38 : range.y);
+    vec2 range = drawn ? vec2(view_depth(camera, nearest), view_depth(camera, farthest)) : vec2(1.0, -1.0);
+    if (FROM_CAMERA) range = vec2(0.0, seen_through ? 3e38 : range.y);
     imageStore(tile_depths, tile.y * tiles.x + tile.x, vec4(range, 0.0, 0.0));
 }

@@ -28,9 +28,9 @@ pub enum When {
 /// The lecture's three models (R6).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Model {
-    /// Direct light only.
+    /// Direct light, and the environment as ambient and mirrored light.
     Local,
-    /// Plus ideal reflection and refraction; not built yet.
+    /// Plus traced reflection and refraction; not built yet.
     Recursive,
     /// Global illumination; not built yet.
     Global,
@@ -222,7 +222,8 @@ impl PictureOptions {
     /// One sentence for a model, knob or rung that does not exist or is not built yet.
     pub fn knobs(&self) -> Result<Knobs> {
         if self.model != Model::Local {
-            bail!("--model {:?}: only the local model is built so far", self.model);
+            let name = self.model.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default();
+            bail!("--model {name}: only the local model is built so far");
         }
         let mut knobs = Knobs::default();
         for choice in &self.set {

@@ -37,7 +37,7 @@ pub struct RenderArgs {
     picture: PictureOptions,
     #[command(flatten)]
     device: DeviceOptions,
-    /// Further layers of the EXR, taken at the pixel centres
+    /// Further layers of the EXR: the nearest opaque surface at the pixel centres
     #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,...")]
     aov: Vec<AovName>,
     /// Draw N times and fail unless all are bit-identical
@@ -174,11 +174,13 @@ impl Drop for Steps {
 /// One sentence with what was being done, to what, and the cause.
 pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let now = Instant::now();
-    let mut phases = Phases { start: now, last: now, all: BTreeMap::new() };
+    let mut phases =
+        Phases { start: now, last: now, all: BTreeMap::from(["bvh", "pipelines"].map(|name| (name, 0.0))) };
     args.unbuilt.refuse()?;
     let outputs = outputs(args)?;
     let mut settings = args.picture.settings(&args.scene)?;
     let steps = Steps::new(args.progress, quiet);
+    phases.end("start");
 
     // The device opens and the environment is read while the scene loads: three things that do not wait for each other.
     steps.step(&format!("loading {}", args.scene.scene), 1);
@@ -325,7 +327,8 @@ fn outputs(args: &RenderArgs) -> Result<Vec<(PathBuf, Format)>> {
     }
     for name in [AovName::Reflection, AovName::Refraction] {
         if args.aov.contains(&name) {
-            bail!("--aov {name:?}: this layer is not built yet");
+            let name = name.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default();
+            bail!("--aov {name}: this layer is not built yet");
         }
     }
     Ok(all)

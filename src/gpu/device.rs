@@ -222,7 +222,6 @@ impl Instance {
         for (has, what) in [
             (core.fragment_stores_and_atomics, "feature fragmentStoresAndAtomics"),
             (core.shader_storage_image_extended_formats, "feature shaderStorageImageExtendedFormats"),
-            (core.sampler_anisotropy, "feature samplerAnisotropy"),
             (core.geometry_shader, "feature geometryShader (for gl_PrimitiveID in fragments)"),
             (v12.timeline_semaphore, "feature timelineSemaphore"),
             (v12.scalar_block_layout, "feature scalarBlockLayout (lavapipe: Mesa 21.1 or newer)"),
@@ -369,7 +368,6 @@ impl Device {
         let core = vk::PhysicalDeviceFeatures::default()
             .fragment_stores_and_atomics(true)
             .shader_storage_image_extended_formats(true)
-            .sampler_anisotropy(true)
             .geometry_shader(true);
         let mut v12 = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true).scalar_block_layout(true);
         let mut v13 = vk::PhysicalDeviceVulkan13Features::default()

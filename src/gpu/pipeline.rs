@@ -29,8 +29,6 @@ pub struct SamplerDesc {
     pub min: vk::Filter,
     /// Between levels; `None` stays on the base level.
     pub mip: Option<vk::SamplerMipmapMode>,
-    /// Anisotropic samples at most; 1 is isotropic.
-    pub anisotropy: u8,
 }
 
 impl SamplerDesc {
@@ -40,7 +38,6 @@ impl SamplerDesc {
         mag: vk::Filter::LINEAR,
         min: vk::Filter::LINEAR,
         mip: None,
-        anisotropy: 1,
     };
     /// Nearest, clamped, no mips: for fetches.
     pub const NEAREST: Self = Self { mag: vk::Filter::NEAREST, min: vk::Filter::NEAREST, ..Self::LINEAR };
@@ -158,8 +155,6 @@ impl Device {
             .address_mode_u(desc.wrap[0])
             .address_mode_v(desc.wrap[1])
             .address_mode_w(vk::SamplerAddressMode::CLAMP_TO_EDGE)
-            .anisotropy_enable(desc.anisotropy > 1)
-            .max_anisotropy(f32::from(desc.anisotropy).min(self.limits.max_sampler_anisotropy))
             .max_lod(if desc.mip.is_some() { vk::LOD_CLAMP_NONE } else { 0.0 });
         // SAFETY: a valid create info.
         let sampler = unsafe { self.raw.create_sampler(&info, None) }.context("creating a sampler")?;

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 
-use super::classify::{DISPATCH_BYTES, WorkLists};
+use super::classify::{WORK_BYTES, WorkLists};
 use super::gbuffer::GBuffer;
 use super::light::Lighting;
 use crate::gpu::{Frame, Image};
@@ -26,7 +26,8 @@ pub fn background<'a>(
         background_tiles: &work.background,
         environment: &lighting.environment.terms,
         sky: lighting.environment.sky(),
+        work: &work.sizes,
     };
     let constants = background::Constants { sky: lighting.plan.sky }.words();
-    frame.compute_indirect("background", &bind, constants, &[], &work.sizes, DISPATCH_BYTES)
+    frame.compute_indirect("background", &bind, constants, &[], &work.sizes, WORK_BYTES)
 }

@@ -11,12 +11,14 @@ use crate::shader::{classify, classify_fragments};
 
 const TILE: u32 = 8;
 
-/// Bytes of one VkDispatchIndirectCommand.
-pub const DISPATCH_BYTES: u64 = 12;
+/// Bytes of one `WorkSize` of shaders/lib/work_tile.glsl: a VkDispatchIndirectCommand and a count.
+pub const WORK_BYTES: u64 = 16;
+/// A dispatch of nothing.
+const EMPTY: [u32; 4] = [0, 1, 1, 0];
 
 /// The tiles of a strip that hold see-through fragments.
 pub struct FragmentTiles {
-    /// One VkDispatchIndirectCommand.
+    /// One `WorkSize`.
     pub sizes: Buffer,
     empty: Buffer,
     /// The tiles.
@@ -32,8 +34,8 @@ impl FragmentTiles {
     pub fn new(device: &Arc<Device>, size: [u32; 2]) -> Result<Self> {
         let bytes = 4 * u64::from(size[0].div_ceil(TILE)) * u64::from(size[1].div_ceil(TILE));
         Ok(Self {
-            sizes: Buffer::new(device, "fragment work size", DISPATCH_BYTES, Place::Device)?,
-            empty: Buffer::with_data(device, "empty fragment work size", &[0_u32, 1, 1])?,
+            sizes: Buffer::new(device, "fragment work size", WORK_BYTES, Place::Device)?,
+            empty: Buffer::with_data(device, "empty fragment work size", &EMPTY)?,
             tiles: Buffer::new(device, "fragment tiles", bytes, Place::Device)?,
             width: size[0],
         })
@@ -50,7 +52,7 @@ pub fn classify_fragments<'a>(
     list: &'a FragmentTiles,
     rows: [u32; 2],
 ) -> Result<()> {
-    frame.copy_buffer("reset fragment work size", &list.empty, &list.sizes, DISPATCH_BYTES);
+    frame.copy_buffer("reset fragment work size", &list.empty, &list.sizes, WORK_BYTES);
     let bind = classify_fragments::Bind { heads, sizes: &list.sizes, tiles: &list.tiles };
     let tiles = list.width.div_ceil(TILE) * (rows[1] - rows[0]).div_ceil(TILE);
     let groups = [tiles.div_ceil(classify_fragments::PROGRAM.local_size[0]), 1, 1];
@@ -61,7 +63,7 @@ pub fn classify_fragments<'a>(
 
 /// Lists of tiles and the sizes of the dispatches over them.
 pub struct WorkLists {
-    /// Two VkDispatchIndirectCommand: surfaces, background.
+    /// Two `WorkSize`: surfaces, background.
     pub sizes: Buffer,
     empty: Buffer,
     /// Tiles with surfaces.
@@ -79,8 +81,8 @@ impl WorkLists {
     pub fn new(device: &Arc<Device>, size: [u32; 2]) -> Result<Self> {
         let bytes = 4 * u64::from(size[0].div_ceil(TILE)) * u64::from(size[1].div_ceil(TILE));
         Ok(Self {
-            sizes: Buffer::new(device, "work sizes", 2 * DISPATCH_BYTES, Place::Device)?,
-            empty: Buffer::with_data(device, "empty work sizes", &[0_u32, 1, 1, 0, 1, 1])?,
+            sizes: Buffer::new(device, "work sizes", 2 * WORK_BYTES, Place::Device)?,
+            empty: Buffer::with_data(device, "empty work sizes", &[EMPTY, EMPTY])?,
             surface: Buffer::new(device, "surface tiles", bytes, Place::Device)?,
             background: Buffer::new(device, "background tiles", bytes, Place::Device)?,
             size,
@@ -93,7 +95,7 @@ impl WorkLists {
 /// # Errors
 /// When the driver refuses the pipeline.
 pub fn classify<'a>(frame: &mut Frame<'a>, gbuffer: &'a GBuffer, lists: &'a WorkLists) -> Result<()> {
-    frame.copy_buffer("reset work sizes", &lists.empty, &lists.sizes, 2 * DISPATCH_BYTES);
+    frame.copy_buffer("reset work sizes", &lists.empty, &lists.sizes, 2 * WORK_BYTES);
     let bind = classify::Bind {
         depth: &gbuffer.depth_texels,
         sizes: &lists.sizes,

@@ -31,6 +31,7 @@ pub fn composite<'a>(
         tile_lights: &lighting.tiles.masks,
         environment: &environment.terms,
         tiles: &lists.work.tiles,
+        work: &lists.work.sizes,
         prefiltered: environment.prefiltered(),
         reflectance: environment.reflectance(),
     };

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use ash::vk;
 
 use super::classify::{FragmentTiles, classify_fragments};
@@ -96,6 +96,9 @@ impl FragmentLists {
         // Room for the next samples, whose edges fall a little differently.
         let wanted = most + most / 16 + 1024;
         if wanted > limit {
+            if self.strips == self.size[1] {
+                bail!("one row of the picture has {most} see-through fragments, this device holds {limit}");
+            }
             self.strips = (self.strips * 2).min(self.size[1]);
             self.counters =
                 Buffer::new(&self.device, "fragment counters", 4 * u64::from(self.strips), Place::Readback)?;
@@ -107,7 +110,7 @@ impl FragmentLists {
         Ok(false)
     }
 
-    /// Pixels, counted over all frames since the start, whose farthest fragments were left out.
+    /// Pixels of the sample that has just finished whose farthest fragments were left out.
     #[must_use]
     pub fn dropped(&self) -> u32 {
         self.dropped.read(|bytes| u32::from_ne_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))

@@ -86,6 +86,7 @@ pub fn light<'a>(
         layers: &gbuffer.layers,
         radiance,
         surface_tiles: &work.surface,
+        work: &work.sizes,
         lights: &scene.lights,
         tile_lights: &lighting.tiles.masks,
         environment: &environment.terms,

@@ -137,7 +137,6 @@ fn sampler(sampler: Sampler) -> SamplerDesc {
         mag: filter(sampler.mag_nearest),
         min: filter(sampler.min_nearest),
         mip: sampler.mips.then_some(vk::SamplerMipmapMode::LINEAR),
-        anisotropy: 1,
     }
 }
 

@@ -91,7 +91,15 @@ impl Plan {
         let mut decide = |name, knob: &'static str, called: Option<String>, allowed: bool| {
             let rung = if knob.is_empty() { "" } else { knobs.rung(knob) };
             let (state, reason) = match called {
-                None => ("not called for", "nothing in the scene has it".to_owned()),
+                None => (
+                    "not called for",
+                    if knob == "reflection" || knob == "indirect" {
+                        "there is no environment"
+                    } else {
+                        "nothing in the scene has it"
+                    }
+                    .to_owned(),
+                ),
                 Some(_) if !allowed => ("dropped", format!("{knob}={rung}")),
                 Some(reason) => ("kept", reason),
             };
@@ -111,7 +119,7 @@ impl Plan {
             AlphaMode::Blend => format!("{} is alpha-blended", quoted(m)),
             _ => format!("{}: transmission {}", quoted(m), m.transmission),
         });
-        let see_through = decide("see-through surfaces", "refraction", see_through, true);
+        let see_through = decide("see-through surfaces", "", see_through, true);
         let reflects = surroundings.environment.then(|| "there is an environment".to_owned());
         let reflection =
             decide("mirrored environment", "reflection", reflects.clone(), knobs.rung("reflection") != "off");
