@@ -41,7 +41,7 @@ vec3 coat_normal_from_packed(vec4 packed_value) {
     return unit_from_octahedral(packed_value.zw * 2.0 - 1.0);
 }
 
-// Equirectangular coordinates of a unit direction (product.md, "Conventions"): u to the right, v down from the top.
+// Equirectangular coordinates of a unit direction (README, "Conventions"): u to the right, v down from the top.
 vec2 equirectangular_from_direction(vec3 d) {
     return vec2(atan(d.z, d.x) * (0.5 * INV_PI) + 0.5, 0.5 - asin(clamp(d.y, -1.0, 1.0)) * INV_PI);
 }

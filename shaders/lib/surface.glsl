@@ -5,7 +5,7 @@
 #include "lib/fresnel.glsl"
 #include "share/scene.glsl"
 
-// The knobs `brdf` and `fresnel` (product.md): one formula each, chosen when the pipeline is made.
+// The knobs `brdf` and `fresnel` (src/plan/knobs.rs): one formula each, chosen when the pipeline is made.
 layout(constant_id = 10) const uint BRDF = 2;    // 0 blinn-phong, 1 blinn-phong-reciprocal, 2 ggx, 3 ggx-multi
 layout(constant_id = 11) const uint FRESNEL = 0; // 0 schlick, 1 exact
 layout(constant_id = 12) const bool CLEARCOAT = false;

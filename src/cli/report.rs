@@ -1,4 +1,4 @@
-//! `render --report FILE`: the machine-readable account of a run, schema `etalon.report/1` (product.md, "JSON names").
+//! `render --report FILE`: the machine-readable account of a run, schema `etalon.report/1`.
 
 use std::collections::BTreeMap;
 

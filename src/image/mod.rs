@@ -63,7 +63,7 @@ impl AovData {
     }
 }
 
-/// What the colour samples of a picture hold, counted before anything clamps (product.md, `image` of the report).
+/// What the colour samples of a picture hold, counted before anything clamps: `image` of the report.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Statistics {
     /// Pixels across.

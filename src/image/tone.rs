@@ -8,7 +8,7 @@
 use clap::ValueEnum;
 use serde::Serialize;
 
-/// Where samples are cut off before a curve: the largest finite half float (numerics.md row 43).
+/// Where samples are cut off before a curve: the largest finite half float (docs/numerics.md 43).
 pub const LARGEST: f64 = 65504.0;
 
 /// How radiance becomes display light.

@@ -1,6 +1,6 @@
 //! Textures as pages: images of one size and transfer function are the layers of one array image, with mip levels.
 //!
-//! lavapipe cannot index arrays of sampled images, but a layer is only a coordinate (lavapipe.md section 2).
+//! lavapipe cannot index arrays of sampled images, but a layer is only a coordinate.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};

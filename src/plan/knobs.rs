@@ -2,14 +2,14 @@
 
 use anyhow::{Result, bail};
 
-/// One knob of product.md.
+/// One knob.
 #[derive(Debug)]
 pub struct Knob {
     /// Name on the command line.
     pub name: &'static str,
     /// Rungs that can be chosen, cheap to exact; `*` stands for a power of four.
     pub rungs: &'static [&'static str],
-    /// Rungs of product.md that are not built yet.
+    /// Planned rungs that are not built yet.
     pub unbuilt: &'static [&'static str],
     /// What the presets choose.
     pub default: &'static str,
@@ -17,7 +17,7 @@ pub struct Knob {
     pub about: &'static str,
 }
 
-/// Every knob, in product.md's order. The command line, the report and the documentation read this table.
+/// Every knob. The command line, the report and the documentation read this table.
 pub static KNOBS: &[Knob] = &[
     Knob {
         name: "shadows",

@@ -1,4 +1,4 @@
-//! Cameras: where the picture is taken from (product.md "Conventions").
+//! Cameras: where the picture is taken from (README, "Conventions").
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 

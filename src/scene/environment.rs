@@ -1,4 +1,4 @@
-//! Environment light: an equirectangular radiance map (product.md "Conventions").
+//! Environment light: an equirectangular radiance map (README, "Conventions").
 //!
 //! Lookup for a world direction d: u = atan2(d.z, d.x) / 2π + 0.5, v = 0.5 − asin(d.y) / π; u to the right, v down
 //! from the top row, bilinear, wrapping in u.
