@@ -6,8 +6,11 @@ mod gpu;
 #[path = "support/made.rs"]
 mod made;
 
+use etalon::frame::Settings;
+use etalon::image::tone::ToneMap;
+use etalon::scene::LightKind;
 use etalon::study::shape::Shape;
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use gpu::{Gpu, settings};
 
 /// A mesh without vertex colours and textures passes the constant 1 through perspective interpolation (0.99999994 at
@@ -24,4 +27,23 @@ fn untextured_albedo_loses_an_ulp_of_half() {
     let wrong = seen.iter().filter(|p| p.albedo != [0.7, 0.3, 0.1]).count();
     println!("{wrong} of {} pixels", seen.len());
     assert!(wrong > 0, "mended");
+}
+
+/// `tone` of lib/colour.glsl does not cut at 65504 as its twin in image/tone.rs does: three curves then divide infinity by
+/// infinity, and the brightest pixels of a picture are black. The twin shows white. When mended: tone.rs,
+/// `light_beyond_f32_is_counted_as_infinite`, loops over all curves; `every_curve_shows_the_bytes_of_its_twin` may go on
+/// to radiances of 1e38.
+#[test]
+fn infinite_radiance_is_shown_as_black() {
+    let gpu = Gpu::new();
+    let mut made = made::Made::new("overflow");
+    made.add(Shape::panel(8.0, 4.0), made::lambert([1.0; 3]), DAffine3::IDENTITY);
+    made.light([1e38; 3], LightKind::Point { position: DVec3::new(0.0, 0.0, 0.01), range: None });
+    made.front(1.0);
+    for tonemap in [ToneMap::Reinhard, ToneMap::Aces, ToneMap::KhronosNeutral] {
+        let (rendered, film) = gpu.shot(&made.0, None, Settings { tonemap, ..settings([64, 36]) });
+        let at = film.rgba.iter().position(|p| p[0].is_infinite()).expect("too much light");
+        assert_eq!(tonemap.to_display([f64::INFINITY; 3])[0], 255, "the twin's promise");
+        assert_eq!(rendered.display[at * 4], 0, "{tonemap:?}: mended");
+    }
 }
