@@ -5,6 +5,8 @@
 mod gpu;
 #[path = "support/made.rs"]
 mod made;
+#[path = "support/program.rs"]
+mod program;
 
 use etalon::frame::Settings;
 use etalon::image::tone::ToneMap;
@@ -45,5 +47,34 @@ fn infinite_radiance_is_shown_as_black() {
         let at = film.rgba.iter().position(|p| p[0].is_infinite()).expect("too much light");
         assert_eq!(tonemap.to_display([f64::INFINITY; 3])[0], 255, "the twin's promise");
         assert_eq!(rendered.display[at * 4], 0, "{tonemap:?}: mended");
+    }
+}
+
+/// The report lacks names of the contract (product.md, "JSON names"): phases, the rays by kind, and all of the plan but
+/// its effects. When mended: cli.rs, `the_report_has_every_name_of_the_contract`, takes them into its list.
+#[test]
+fn the_report_lacks_names_of_the_contract() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let arguments = ["render", "study:radiance", "--size", "16x9", "-q", "-o", "a.png", "--report", "r.json"];
+    program::etalon(folder.path(), &arguments, &[]).succeeded();
+    let text = std::fs::read_to_string(folder.path().join("r.json")).expect("the report");
+    let report: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    for pointer in [
+        "/phases_ms/start",
+        "/phases_ms/bvh",
+        "/phases_ms/pipelines",
+        "/plan/schema",
+        "/plan/effects/0/evidence",
+        "/plan/passes",
+        "/plan/pipelines",
+        "/plan/buffers",
+        "/plan/warnings",
+        "/work/rays/primary",
+        "/work/rays/reflection",
+        "/work/rays/refraction",
+        "/work/rays/shadow",
+        "/work/rays/indirect",
+    ] {
+        assert!(report.pointer(pointer).is_none(), "{pointer}: mended");
     }
 }

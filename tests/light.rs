@@ -210,8 +210,8 @@ fn against_all_lights(gpu: &Gpu, scene: &Scene, orthographic: bool, size: [u32; 
     let (mut lit, mut brightest) = (0, 0.0_f64);
     let mut wants = Vec::new();
     for pixel in &aovs {
-        let want = (pixel.material != 0)
-            .then(|| shade::direct(scene, &shade::point(scene, pixel, &view, orthographic)));
+        let want =
+            (pixel.material != 0).then(|| shade::direct(scene, &shade::point(scene, pixel, &view, orthographic)));
         brightest = brightest.max(want.unwrap_or_default().max_element());
         lit += usize::from(want.is_some_and(|w| w.max_element() > 0.0));
         wants.push(want);

@@ -164,8 +164,7 @@ fn parallel_views_see_the_same() {
     {
         let scene = study::load(name).expect("a study scene");
         let bounds = scene.bounds().expect("a scene");
-        let camera =
-            Camera { projection: made::orthographic(half_height), ..made::looking(eye, bounds.center()) };
+        let camera = Camera { projection: made::orthographic(half_height), ..made::looking(eye, bounds.center()) };
         check(&compare(&gpu, &scene, &camera), &format!("{name}, parallel"));
     }
 }
@@ -178,9 +177,7 @@ fn mirrored_and_stretched_placements_stay_outside_out() {
     let position = b.floats("VEC3", ball.positions.as_flattened());
     let normal = b.floats("VEC3", ball.normals.as_flattened());
     let indices = b.indices(&ball.indices.iter().map(|&i| i as u16).collect::<Vec<_>>());
-    let primitive = |material: usize| {
-        json!({ "attributes": { "POSITION": position, "NORMAL": normal }, "indices": indices, "material": material })
-    };
+    let primitive = |material: usize| json!({ "attributes": { "POSITION": position, "NORMAL": normal }, "indices": indices, "material": material });
     for (index, double_sided) in [false, true].into_iter().enumerate() {
         let base = [0.3 + 0.1 * index as f64, 0.7, 1.0 / 3.0, 1.0];
         let pbr = json!({ "baseColorFactor": base, "roughnessFactor": 0.37, "metallicFactor": 0.21 });

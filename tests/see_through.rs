@@ -45,14 +45,7 @@ fn over_in(scene: &Scene, world: &raycast::World<'_>, ray: &raycast::Ray) -> [f6
 
 /// Whether a pixel's ray and the four beside it, a 64th of a pixel away, see the same stack of surfaces to `slack`:
 /// centres on outlines are anyone's.
-fn steady(
-    scene: &Scene,
-    world: &raycast::World<'_>,
-    size: [u32; 2],
-    x: u32,
-    y: u32,
-    slack: f64,
-) -> Option<[f64; 4]> {
+fn steady(scene: &Scene, world: &raycast::World<'_>, size: [u32; 2], x: u32, y: u32, slack: f64) -> Option<[f64; 4]> {
     let camera = &scene.cameras[0];
     let ray = |dx: f64, dy: f64| {
         raycast::camera_ray(camera, size[0], size[1], f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy)

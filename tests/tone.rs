@@ -18,8 +18,7 @@ use glam::{DAffine3, DVec3};
 use gpu::{Gpu, settings};
 use made::{Made, Random, lambert, unlit};
 
-const CURVES: [ToneMap; 5] =
-    [ToneMap::Linear, ToneMap::Reinhard, ToneMap::Aces, ToneMap::Agx, ToneMap::KhronosNeutral];
+const CURVES: [ToneMap; 5] = [ToneMap::Linear, ToneMap::Reinhard, ToneMap::Aces, ToneMap::Agx, ToneMap::KhronosNeutral];
 
 /// What the pass makes of a film of `width` pixels a row.
 fn display(
@@ -95,10 +94,8 @@ fn exposure_is_a_power_of_two_before_the_curve() {
     let film: Vec<[f32; 4]> = (0..256).map(|i| [i as f32 / 64.0, i as f32 / 128.0, 0.1, 1.0]).collect();
     for curve in CURVES {
         for stops in [-3.0_f32, 2.0] {
-            let exposed: Vec<_> = film
-                .iter()
-                .map(|p| [p[0] * stops.exp2(), p[1] * stops.exp2(), p[2] * stops.exp2(), 1.0])
-                .collect();
+            let exposed: Vec<_> =
+                film.iter().map(|p| [p[0] * stops.exp2(), p[1] * stops.exp2(), p[2] * stops.exp2(), 1.0]).collect();
             let (a, _) = display(&gpu, &film, 16, curve, stops, [0.0; 4]);
             let (b, _) = display(&gpu, &exposed, 16, curve, 0.0, [0.0; 4]);
             assert_eq!(a, b, "{curve:?} at {stops} stops");
