@@ -1,0 +1,109 @@
+//! The barriers are needed: the same passes without them are reported as hazards by synchronization validation, and with
+//! them nothing is. Otherwise a validation that sees nothing would prove nothing.
+
+#[path = "support/gpu.rs"]
+mod gpu;
+
+use ash::vk;
+use etalon::gpu::{Buffer, Frame, Image, ImageDesc, Place};
+use etalon::pass::classify::{WorkLists, classify};
+use etalon::pass::gbuffer::GBuffer;
+use etalon::pass::tonemap::{Display, tonemap};
+use etalon::plan::{Knobs, Plan, Surroundings};
+use etalon::scene::Scene;
+use gpu::Gpu;
+
+/// Validation's error texts after `describe` has been run as a frame, with or without buffer barriers.
+fn errors_of(forget: bool, describe: impl for<'a> FnOnce(&'a Things, &mut Frame<'a>)) -> Vec<String> {
+    let gpu = std::mem::ManuallyDrop::new(Gpu::new());
+    let things = Things::new(&gpu);
+    let mut frame = Frame::new(&gpu.device);
+    if forget {
+        frame.forget_barriers();
+    }
+    describe(&things, &mut frame);
+    frame.finish().expect("a frame");
+    let errors = gpu.errors();
+    drop(things);
+    errors
+}
+
+struct Things {
+    gbuffer: GBuffer,
+    work: WorkLists,
+    film: Image,
+    display: Display,
+    buffers: [Buffer; 3],
+}
+
+impl Things {
+    fn new(gpu: &Gpu) -> Self {
+        let size = [64, 36];
+        let plan = Plan::new(&Scene::default(), Surroundings { environment: false, sky: false }, &Knobs::default());
+        let desc = ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], vk::ImageUsageFlags::STORAGE);
+        let buffer = |name| Buffer::new(&gpu.device, name, 256, Place::Device).expect("a buffer");
+        Self {
+            gbuffer: GBuffer::new(&gpu.device, &plan, size).expect("a G-buffer"),
+            work: WorkLists::new(&gpu.device, size).expect("work lists"),
+            film: Image::new(&gpu.device, "film", desc).expect("a film"),
+            display: Display::new(&gpu.device, size).expect("a display"),
+            buffers: [buffer("a"), buffer("b"), buffer("c")],
+        }
+    }
+}
+
+/// Clean with barriers, a hazard without.
+fn proves(name: &str, describe: impl for<'a> Fn(&'a Things, &mut Frame<'a>)) {
+    let clean = errors_of(false, &describe);
+    assert!(clean.is_empty(), "{name}, with barriers: {clean:?}");
+    let hazards = errors_of(true, &describe);
+    assert!(hazards.iter().any(|text| text.contains("SYNC-HAZARD")), "{name}, without barriers: {hazards:?}");
+}
+
+#[test]
+fn sorting_tiles_waits_for_its_counters() {
+    // copy → compute atomics on the sizes.
+    proves("classify", |things, frame| classify(frame, &things.gbuffer, &things.work).expect("the pass"));
+}
+
+#[test]
+fn sorting_tiles_again_waits_for_the_first_time() {
+    // compute → copy → compute on the same lists; the tiles are written twice.
+    proves("classify twice", |things, frame| {
+        classify(frame, &things.gbuffer, &things.work).expect("the pass");
+        classify(frame, &things.gbuffer, &things.work).expect("the pass");
+    });
+}
+
+#[test]
+fn tone_mapping_waits_for_its_counters() {
+    // fill → compute atomics.
+    proves("tone map", |things, frame| {
+        tonemap(frame, &things.film, &things.display, 0, 0.0, [0.0; 4]).expect("the pass");
+    });
+}
+
+#[test]
+fn copies_wait_for_each_other() {
+    // Write after write, read after write, write after read.
+    let [waw, raw, war] = [0, 1, 2];
+    for kind in [waw, raw, war] {
+        proves(&format!("copies {kind}"), |things, frame| {
+            let [a, b, c] = &things.buffers;
+            match kind {
+                0 => {
+                    frame.copy_buffer("first", a, b, 256);
+                    frame.copy_buffer("second", c, b, 256);
+                }
+                1 => {
+                    frame.copy_buffer("first", a, b, 256);
+                    frame.copy_buffer("second", b, c, 256);
+                }
+                _ => {
+                    frame.copy_buffer("first", b, a, 256);
+                    frame.copy_buffer("second", c, b, 256);
+                }
+            }
+        });
+    }
+}

@@ -1,0 +1,80 @@
+//! Bugs that are known and not yet mended, each as a test that passes while the bug is there. A test that fails here is
+//! good news: delete it, and tighten the test that its comment names.
+
+#[path = "support/gpu.rs"]
+mod gpu;
+#[path = "support/made.rs"]
+mod made;
+#[path = "support/program.rs"]
+mod program;
+
+use etalon::frame::Settings;
+use etalon::image::tone::ToneMap;
+use etalon::scene::LightKind;
+use etalon::study::shape::Shape;
+use glam::{DAffine3, DVec3};
+use gpu::{Gpu, settings};
+
+/// A mesh without vertex colours and textures passes the constant 1 through perspective interpolation (0.99999994 at
+/// some pixels) and then into RGBA16F, which lavapipe rounds downwards: 0.99951. Albedo, and with it radiance, is off by
+/// 2^-11 at those pixels. When mended: raster.rs, `check`, demands equal bits of albedo.
+#[test]
+fn untextured_albedo_loses_an_ulp_of_half() {
+    let gpu = Gpu::new();
+    let mut scene = made::Made::new("albedo");
+    scene.add(Shape::plane(8.0, 8.0, 1), made::lambert([0.7, 0.3, 0.1]), made::at(0.0, -1.0, -4.0));
+    scene.camera(DVec3::ZERO, DVec3::new(0.0, -1.0, -4.0), made::perspective(40.0));
+    let (aovs, _) = gpu.renderer(&scene.0, None, settings([64, 36])).aovs(&scene.0.cameras[0]).expect("AOVs");
+    let seen: Vec<_> = aovs.iter().filter(|p| p.material != 0).collect();
+    let wrong = seen.iter().filter(|p| p.albedo != [0.7, 0.3, 0.1]).count();
+    println!("{wrong} of {} pixels", seen.len());
+    assert!(wrong > 0, "mended");
+}
+
+/// `tone` of lib/colour.glsl does not cut at 65504 as its twin in image/tone.rs does: three curves then divide infinity by
+/// infinity, and the brightest pixels of a picture are black. The twin shows white. When mended: tone.rs,
+/// `light_beyond_f32_is_counted_as_infinite`, loops over all curves; `every_curve_shows_the_bytes_of_its_twin` may go on
+/// to radiances of 1e38.
+#[test]
+fn infinite_radiance_is_shown_as_black() {
+    let gpu = Gpu::new();
+    let mut made = made::Made::new("overflow");
+    made.add(Shape::panel(8.0, 4.0), made::lambert([1.0; 3]), DAffine3::IDENTITY);
+    made.light([1e38; 3], LightKind::Point { position: DVec3::new(0.0, 0.0, 0.01), range: None });
+    made.front(1.0);
+    for tonemap in [ToneMap::Reinhard, ToneMap::Aces, ToneMap::KhronosNeutral] {
+        let (rendered, film) = gpu.shot(&made.0, None, Settings { tonemap, ..settings([64, 36]) });
+        let at = film.rgba.iter().position(|p| p[0].is_infinite()).expect("too much light");
+        assert_eq!(tonemap.to_display([f64::INFINITY; 3])[0], 255, "the twin's promise");
+        assert_eq!(rendered.display[at * 4], 0, "{tonemap:?}: mended");
+    }
+}
+
+/// The report lacks names of the contract (product.md, "JSON names"): phases, the rays by kind, and all of the plan but
+/// its effects. When mended: cli.rs, `the_report_has_every_name_of_the_contract`, takes them into its list.
+#[test]
+fn the_report_lacks_names_of_the_contract() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let arguments = ["render", "study:radiance", "--size", "16x9", "-q", "-o", "a.png", "--report", "r.json"];
+    program::etalon(folder.path(), &arguments, &[]).succeeded();
+    let text = std::fs::read_to_string(folder.path().join("r.json")).expect("the report");
+    let report: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    for pointer in [
+        "/phases_ms/start",
+        "/phases_ms/bvh",
+        "/phases_ms/pipelines",
+        "/plan/schema",
+        "/plan/effects/0/evidence",
+        "/plan/passes",
+        "/plan/pipelines",
+        "/plan/buffers",
+        "/plan/warnings",
+        "/work/rays/primary",
+        "/work/rays/reflection",
+        "/work/rays/refraction",
+        "/work/rays/shadow",
+        "/work/rays/indirect",
+    ] {
+        assert!(report.pointer(pointer).is_none(), "{pointer}: mended");
+    }
+}

@@ -1,0 +1,271 @@
+//! See-through surfaces against the over operator: far to near, in f64, whatever the order in which they were drawn. All
+//! panes here are unlit, so that coverage and order are all there is to get wrong.
+
+#[path = "support/gpu.rs"]
+mod gpu;
+#[path = "support/made.rs"]
+mod made;
+#[path = "support/raycast.rs"]
+mod raycast;
+
+use etalon::frame::{Background, Settings};
+use etalon::image::Picture;
+use etalon::scene::{AlphaMode, Camera, Image, Material, Sampler, Scene, TextureRef};
+use etalon::study;
+use etalon::study::shape::Shape;
+use glam::{Affine2, DAffine3, DVec3};
+use gpu::{Gpu, bits, settings};
+use made::{Made, Random, at, pane, unlit};
+
+const SIZE: [u32; 2] = [80, 45];
+
+/// Radiance and coverage behind a pixel: every surface along its ray, far to near, over nothing.
+fn over(scene: &Scene, camera: &Camera, size: [u32; 2], x: u32, y: u32) -> [f64; 4] {
+    let world = raycast::World::new(scene, raycast::Options { blend: true, textures: true });
+    over_in(scene, &world, &raycast::camera_ray(camera, size[0], size[1], f64::from(x) + 0.5, f64::from(y) + 0.5))
+}
+
+fn over_in(scene: &Scene, world: &raycast::World<'_>, ray: &raycast::Ray) -> [f64; 4] {
+    let mut ray = *ray;
+    let mut sum = DVec3::ZERO;
+    let mut through = 1.0;
+    while let Some(hit) = world.closest(&ray) {
+        // What a mask leaves is opaque.
+        let blends = scene.materials[hit.material].alpha_mode == AlphaMode::Blend;
+        let alpha = if blends { hit.alpha } else { 1.0 };
+        sum += through * alpha * hit.albedo;
+        through *= 1.0 - alpha;
+        if alpha >= 1.0 {
+            break;
+        }
+        ray.nearest = hit.distance * (1.0 + 1e-12);
+    }
+    [sum.x, sum.y, sum.z, 1.0 - through]
+}
+
+/// Whether a pixel's ray and the four beside it, a 64th of a pixel away, see the same stack of surfaces to `slack`:
+/// centres on outlines are anyone's.
+fn steady(scene: &Scene, world: &raycast::World<'_>, size: [u32; 2], x: u32, y: u32, slack: f64) -> Option<[f64; 4]> {
+    let camera = &scene.cameras[0];
+    let ray = |dx: f64, dy: f64| {
+        raycast::camera_ray(camera, size[0], size[1], f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy)
+    };
+    let here = over_in(scene, world, &ray(0.0, 0.0));
+    let step = 1.0 / 64.0;
+    [(-step, 0.0), (step, 0.0), (0.0, -step), (0.0, step)]
+        .into_iter()
+        .all(|(dx, dy)| {
+            let there = over_in(scene, world, &ray(dx, dy));
+            here.iter().zip(there).all(|(a, b)| (a - b).abs() <= slack)
+        })
+        .then_some(here)
+}
+
+/// Largest difference from the over operator, and how many pixels were left out as unsteady.
+fn against_over(film: &Picture, scene: &Scene, slack: f64) -> (f64, usize) {
+    let world = raycast::World::new(scene, raycast::Options { blend: true, textures: true });
+    let size = [film.width, film.height];
+    let (mut worst, mut left_out) = (0.0_f64, 0);
+    for (i, got) in film.rgba.iter().enumerate() {
+        let (x, y) = (i as u32 % size[0], i as u32 / size[0]);
+        let Some(want) = steady(scene, &world, size, x, y, slack) else {
+            left_out += 1;
+            continue;
+        };
+        for (got, want) in got.iter().zip(want) {
+            worst = worst.max((f64::from(*got) - want).abs());
+        }
+    }
+    (worst, left_out)
+}
+
+/// `count` panes at depths of their own, each somewhere else and turned, with the opacities that `alpha` gives.
+fn stack(count: usize, mut alpha: impl FnMut(&mut Random) -> f32) -> Scene {
+    let mut made = Made::new("stack");
+    made.add(Shape::panel(9.0, 5.0), unlit([0.25, 0.5, 0.75]), at(0.0, 0.0, -1.0));
+    let mut random = Random(3);
+    for i in 0..count {
+        let color = [0, 1, 2].map(|_| random.unit() as f32);
+        let alpha = alpha(&mut random);
+        let frame = at(random.between(-0.8, 0.8), random.between(-0.5, 0.5), 2.0 * i as f64 / count as f64)
+            * DAffine3::from_rotation_z(random.between(0.0, 3.0));
+        made.add(Shape::panel(2.5, 1.5), pane(color, alpha), frame);
+    }
+    made.camera(DVec3::new(0.0, 0.0, 6.0), DVec3::ZERO, made::perspective(30.0));
+    made.0
+}
+
+/// Opacities that a half float holds exactly.
+fn eighths(random: &mut Random) -> f32 {
+    ((random.unit() * 7.0) as i32 + 1) as f32 / 8.0
+}
+
+#[test]
+fn panes_in_any_order_are_composited_far_to_near() {
+    let gpu = Gpu::new();
+    for count in [1, 2, 7, 60] {
+        let scene = stack(count, eighths);
+        let film = gpu.film(&scene, settings(SIZE));
+        let (worst, left_out) = against_over(&film, &scene, 1e-9);
+        println!("{count} panes: {worst:e}, left out {left_out}");
+        // As many products and sums of numbers below 1: half an ulp each.
+        assert!(worst < (count + 2) as f64 * 2.0_f64.powi(-24), "{count} panes: {worst:e}");
+        assert!(left_out < 300, "{count} panes: {left_out}");
+
+        let mut shuffled = scene.clone();
+        Random(count as u64).shuffle(&mut shuffled.instances);
+        let again = gpu.film(&shuffled, settings(SIZE));
+        assert!(bits(&film) == bits(&again), "{count} panes: the order of drawing shows");
+    }
+}
+
+#[test]
+fn any_opacity_is_good_to_a_half_float() {
+    let gpu = Gpu::new();
+    let mut scene = stack(20, |random| random.unit() as f32);
+    scene.cameras[0].projection = made::orthographic(1.2);
+    let film = gpu.film(&scene, settings(SIZE));
+    let (worst, left_out) = against_over(&film, &scene, 1e-9);
+    println!("{worst:e}, left out {left_out}");
+    // Each opacity is rounded to 11 bits, relative 2^-12, and moves what shows by at most alpha times that; what stays
+    // visible of all panes adds up to 1, and what shines through changes as much again.
+    assert!(worst < 3.0 * 2.0_f64.powi(-12), "{worst:e}");
+    assert!(left_out < 200, "{left_out}");
+}
+
+#[test]
+fn the_study_of_blending_shows_the_over_operator() {
+    let gpu = Gpu::new();
+    let mut scene = study::load("blend").expect("a study scene");
+    for material in &mut scene.materials {
+        // The oracle reads level 0 only.
+        if let Some(texture) = &mut material.base_color_texture {
+            texture.sampler.mips = false;
+        }
+    }
+    let film = gpu.film(&scene, settings([160, 90]));
+    let (worst, left_out) = against_over(&film, &scene, 2e-3);
+    println!("{worst:e}, left out {left_out}");
+    // Texels pass through half floats, rounded downwards: 2^-11 for each of up to three surfaces. What changes by as much
+    // over a 64th of a pixel is left out.
+    assert!(left_out < 160 * 90 / 5, "{left_out}");
+    assert!(worst < 3.0 * 2.0_f64.powi(-11) + 2e-4, "{worst:e}");
+}
+
+#[test]
+fn panes_through_each_other_change_places_at_the_line() {
+    let gpu = Gpu::new();
+    let mut made = Made::new("crossing");
+    for (color, turn) in [([1.0, 0.0, 0.0], 40.0_f64), ([0.0, 0.0, 1.0], -40.0)] {
+        made.add(Shape::panel(3.0, 1.5), pane(color, 0.5), DAffine3::from_rotation_y(turn.to_radians()));
+    }
+    made.front(1.0);
+    let film = gpu.film(&made.0, settings(SIZE));
+    let row = &film.rgba[SIZE[0] as usize * 22..][..SIZE[0] as usize];
+    // Red is turned towards the viewer on the left (+Y turns its left edge to +z): nearest there, so ½ red over ½ blue.
+    assert_eq!(row[30], [0.5, 0.0, 0.25, 0.75]);
+    assert_eq!(row[50], [0.25, 0.0, 0.5, 0.75]);
+    let (worst, left_out) = against_over(&film, &made.0, 1e-9);
+    assert!(worst == 0.0 && left_out < 80, "{worst:e}, {left_out}");
+}
+
+#[test]
+fn a_mask_is_there_or_not_at_its_cutoff() {
+    let gpu = Gpu::new();
+    let mut made = Made::new("mask");
+    // Alpha runs from 0 to 255 over as many texels; nearest, so that texel i is there exactly where i / 255 ≥ cutoff.
+    let rgba = (0..256_u32).flat_map(|i| [255, 255, 255, i as u8]).collect();
+    made.0.images.push(Image { name: "ramp".to_owned(), width: 256, height: 1, rgba });
+    let sampler = Sampler { mag_nearest: true, min_nearest: true, mips: false, ..Sampler::default() };
+    let texture = TextureRef { image: 0, uv_set: 0, uv_transform: Affine2::IDENTITY, sampler };
+    for (row, cutoff) in [0.0_f32, 0.25, 0.5, 128.0 / 255.0, 1.0, 1.5].into_iter().enumerate() {
+        let material = Material {
+            base_color_texture: Some(texture),
+            alpha_mode: AlphaMode::Mask(cutoff),
+            ..unlit([0.5, 0.25, 1.0])
+        };
+        made.add(Shape::panel(256.0, 1.0), material, at(0.0, 2.5 - row as f64, 0.0));
+    }
+    made.front(3.0);
+    // One pixel a texel, one row of pixels a mask.
+    let film = gpu.film(&made.0, settings([256, 6]));
+    for (row, cutoff) in [0.0_f32, 0.25, 0.5, 128.0 / 255.0, 1.0, 1.5].into_iter().enumerate() {
+        for x in 0..256 {
+            let there = film.rgba[row * 256 + x][3] == 1.0;
+            assert_eq!(there, x as f32 / 255.0 >= cutoff, "cutoff {cutoff}, texel {x}");
+        }
+    }
+}
+
+#[test]
+fn coverage_reaches_the_picture_with_a_transparent_background() {
+    let gpu = Gpu::new();
+    let mut made = Made::new("coverage");
+    made.add(Shape::panel(2.0, 8.0), pane([1.0, 0.5, 0.25], 0.5), at(-2.0, 0.0, 0.0));
+    made.add(Shape::panel(2.0, 8.0), unlit([1.0, 0.5, 0.25]), at(2.0, 0.0, 0.0));
+    made.front(2.0);
+    let settings = Settings { background: Background::Transparent, ..settings([64, 32]) };
+    let (rendered, film) = gpu.shot(&made.0, None, settings);
+    assert!(rendered.has_alpha);
+    let alpha = |x: usize| (film.rgba[64 * 16 + x], rendered.display[(64 * 16 + x) * 4 + 3]);
+    assert_eq!(alpha(16), ([0.5, 0.25, 0.125, 0.5], 128), "premultiplied in the film; 0.5 rounds up to 128");
+    assert_eq!(alpha(48), ([1.0, 0.5, 0.25, 1.0], 255));
+    assert_eq!(alpha(32), ([0.0; 4], 0));
+    // The display is not premultiplied: the pane and the wall are of one colour.
+    let color = |x: usize| &rendered.display[(64 * 16 + x) * 4..][..3];
+    assert_eq!(color(16), color(48));
+}
+
+#[test]
+fn opaque_walls_hide_what_is_behind_them() {
+    let gpu = Gpu::new();
+    let mut made = Made::new("hidden");
+    made.add(Shape::panel(9.0, 5.0), unlit([0.0, 1.0, 0.0]), at(0.0, 0.0, 0.0));
+    made.add(Shape::panel(9.0, 5.0), pane([1.0, 0.0, 0.0], 0.5), at(0.0, 0.0, -0.01));
+    made.front(1.0);
+    let film = gpu.film(&made.0, settings(SIZE));
+    assert!(film.rgba.iter().all(|p| *p == [0.0, 1.0, 0.0, 1.0]));
+}
+
+#[test]
+fn lists_grow_and_split_until_everything_fits() {
+    let gpu = Gpu::new();
+    // 48 bytes a fragment: more than one storage buffer holds, so that the picture is drawn in strips.
+    let size = [320, 180];
+    let fit = gpu.device.max_storage_bytes() / 48;
+    let panes = (fit / (320 * 180) + 2).min(200) as usize;
+    assert!(panes as u64 * 320 * 180 > fit, "this device holds {fit} fragments: the case needs a larger picture");
+    let mut made = Made::new("many");
+    for i in 0..panes {
+        let shade = i as f32 / panes as f32;
+        made.add(Shape::panel(9.0, 5.0), pane([shade, 1.0 - shade, 0.5], 0.125), at(0.0, 0.0, 0.01 * i as f64));
+    }
+    Random(5).shuffle(&mut made.0.instances);
+    made.front(1.0);
+    let (rendered, film) = gpu.shot(&made.0, None, settings(size));
+    let want = over(&made.0, &made.0.cameras[0], size, 7, 11);
+    for pixel in &film.rgba {
+        for (got, want) in pixel.iter().zip(want) {
+            // As many products and sums of numbers below 1.
+            let bound = panes as f64 * 2.0_f64.powi(-24);
+            assert!((f64::from(*got) - want).abs() < bound, "{pixel:?}, not {want:?}");
+        }
+    }
+    assert_eq!(rendered.dropped, 0);
+    println!("{panes} panes, room for {fit} fragments");
+}
+
+#[test]
+fn what_one_invocation_cannot_sort_is_counted() {
+    let gpu = Gpu::new();
+    let mut made = Made::new("too many");
+    for i in 0..230 {
+        made.add(Shape::panel(1.0, 8.0), pane([1.0; 3], 0.125), at(0.0, 0.0, 0.01 * i as f64));
+    }
+    made.front(2.0);
+    // 16 rows are 4 m: the panes of 1 m cover 4 columns.
+    let (rendered, film) = gpu.shot(&made.0, None, settings([32, 16]));
+    let covered = film.rgba.iter().filter(|p| p[3] > 0.0).count();
+    assert_eq!(covered, 4 * 16);
+    assert_eq!(rendered.dropped as usize, covered, "every pixel with more than 220 panes is counted, once");
+}

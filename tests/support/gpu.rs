@@ -1,0 +1,96 @@
+//! A device under validation, and the short ways to a picture that the tests share.
+//!
+//! Core and synchronization validation are on; an error message fails the test that owns the [`Gpu`] when it ends.
+#![allow(dead_code, unreachable_pub, reason = "each test program includes this file and uses its own part of it")]
+
+use std::sync::Arc;
+
+use etalon::frame::{Rendered, Renderer, Settings};
+use etalon::gpu::{Device, DeviceChoice, Severity};
+use etalon::image::Picture;
+use etalon::pass::view::View;
+use etalon::plan::Knobs;
+use etalon::scene::environment::Environment;
+use etalon::scene::{Camera, Scene};
+use etalon::share::AovPixel;
+
+/// The software device with validation on.
+pub struct Gpu {
+    pub device: Arc<Device>,
+}
+
+impl Gpu {
+    /// Opens it; a machine without it fails the test.
+    pub fn new() -> Self {
+        match Device::open(&DeviceChoice::Cpu, true) {
+            Ok(device) => Self { device },
+            Err(error) => panic!("these tests need lavapipe and the Khronos validation layer: {error:#}"),
+        }
+    }
+
+    /// What validation calls errors, so far.
+    pub fn errors(&self) -> Vec<String> {
+        let messages = self.device.messages();
+        messages.into_iter().filter(|m| m.severity == Severity::Error).map(|m| m.text).collect()
+    }
+
+    pub fn renderer(&self, scene: &Scene, environment: Option<&Environment>, settings: Settings) -> Renderer {
+        Renderer::new(&self.device, scene.clone(), environment, settings).expect("a renderer")
+    }
+
+    /// The scene-linear picture from the scene's first camera, without an environment.
+    pub fn film(&self, scene: &Scene, settings: Settings) -> Picture {
+        self.shot(scene, None, settings).1
+    }
+
+    pub fn shot(&self, scene: &Scene, environment: Option<&Environment>, settings: Settings) -> (Rendered, Picture) {
+        let mut renderer = self.renderer(scene, environment, settings);
+        let rendered = renderer.render(&scene.cameras[0], &mut |_, _| ()).expect("a picture");
+        let film = renderer.film().expect("the film");
+        (rendered, film)
+    }
+
+    /// Picture, G-buffer and view of one renderer.
+    pub fn all(&self, scene: &Scene, camera: &Camera, settings: Settings) -> (Picture, Vec<AovPixel>, View) {
+        let mut renderer = self.renderer(scene, None, settings);
+        renderer.render(camera, &mut |_, _| ()).expect("a picture");
+        let film = renderer.film().expect("the film");
+        let (aovs, view) = renderer.aovs(camera).expect("the G-buffer");
+        (film, aovs, view)
+    }
+}
+
+impl Drop for Gpu {
+    fn drop(&mut self) {
+        // A second panic while one unwinds would hide the first.
+        if !std::thread::panicking() {
+            let errors = self.errors();
+            assert!(errors.is_empty(), "validation: {}", errors.join("\n"));
+        }
+    }
+}
+
+/// One sample per pixel, at the pixel centres, of a picture of `size`.
+pub fn settings(size: [u32; 2]) -> Settings {
+    Settings { size, knobs: knobs(&["samples=1"]), ..Settings::default() }
+}
+
+pub fn knobs(choices: &[&str]) -> Knobs {
+    let mut knobs = Knobs::default();
+    for choice in choices {
+        knobs.set(choice).expect("a rung");
+    }
+    knobs
+}
+
+/// The bits of a picture.
+pub fn bits(picture: &Picture) -> Vec<[u32; 4]> {
+    picture.rgba.iter().map(|p| p.map(f32::to_bits)).collect()
+}
+
+/// Largest |a − b| / scale over the three colours of all pixels.
+pub fn largest_difference(a: &Picture, b: &Picture, scale: f64) -> f64 {
+    assert_eq!((a.width, a.height), (b.width, b.height));
+    let all = a.rgba.iter().flatten().zip(b.rgba.iter().flatten());
+    all.fold(0.0, |most, (a, b)| most.max((f64::from(*a) - f64::from(*b)).abs() / scale))
+}
