@@ -78,3 +78,35 @@ fn the_report_lacks_names_of_the_contract() {
         assert!(report.pointer(pointer).is_none(), "{pointer}: mended");
     }
 }
+
+/// `FragmentLists::dropped` is created and then only ever added to: a second picture of the same renderer counts the
+/// first one's pixels again, and more samples count each pixel again, so that the warning speaks of more pixels than there
+/// are. When mended: see_through.rs,
+/// `what_one_invocation_cannot_sort_is_counted`, draws twice and with samples=4.
+#[test]
+fn dropped_pixels_are_counted_again_with_every_picture() {
+    let gpu = Gpu::new();
+    let mut made = made::Made::new("too many");
+    for i in 0..230 {
+        made.add(Shape::panel(1.0, 8.0), made::pane([1.0; 3], 0.125), made::at(0.0, 0.0, 0.01 * f64::from(i)));
+    }
+    made.front(2.0);
+    let mut renderer = gpu.renderer(&made.0, None, settings([32, 16]));
+    let mut dropped = || renderer.render(&made.0.cameras[0], &mut |_, _| ()).expect("a picture").dropped;
+    let (first, second) = (dropped(), dropped());
+    println!("{first} pixels, then {second}");
+    assert_eq!(second, 2 * first, "mended");
+}
+
+/// The same counter is never cleared: it begins with what the memory held before, here staging of the environment or of a
+/// texture, so that the plainest call of a see-through scene warns of a thousand million pixels. When mended: delete this;
+/// see_through.rs asserts `dropped == 0` where it draws.
+#[test]
+fn dropped_pixels_begin_with_whatever_the_memory_held() {
+    let gpu = Gpu::new();
+    let scene = etalon::study::load("blend").expect("a study scene");
+    let environment = etalon::scene::environment::Environment::studio();
+    let (rendered, _) = gpu.shot(&scene, Some(&environment), settings([96, 54]));
+    println!("{} of {} pixels", rendered.dropped, 96 * 54);
+    assert!(rendered.dropped > 96 * 54, "mended");
+}

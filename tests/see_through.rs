@@ -170,6 +170,25 @@ fn panes_through_each_other_change_places_at_the_line() {
 }
 
 #[test]
+fn of_coplanar_panes_the_later_one_lies_on_top() {
+    let gpu = Gpu::new();
+    for turned in [false, true] {
+        let mut made = Made::new("coplanar");
+        let mut panes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        if turned {
+            panes.reverse();
+        }
+        for color in panes {
+            made.add(Shape::panel(9.0, 5.0), pane(color, 0.5), DAffine3::IDENTITY);
+        }
+        made.front(1.0);
+        let film = gpu.film(&made.0, settings(SIZE));
+        let want = if turned { [0.5, 0.25, 0.125, 0.875] } else { [0.125, 0.25, 0.5, 0.875] };
+        assert!(film.rgba.iter().all(|p| *p == want), "{:?}, not {want:?}", film.rgba[0]);
+    }
+}
+
+#[test]
 fn a_mask_is_there_or_not_at_its_cutoff() {
     let gpu = Gpu::new();
     let mut made = Made::new("mask");
