@@ -83,7 +83,7 @@ fn every_curve_shows_the_bytes_of_its_twin() {
                 assert!(is_right(got[c], want[c], slack), "{curve:?}: {rgba:?} shows {got:?}, twin {want:?}");
             }
         }
-        println!("{curve:?}: {off} of {} bytes differ, by at most {most}", film.len() * 3);
+        eprintln!("{curve:?}: {off} of {} bytes differ, by at most {most}", film.len() * 3);
         assert!(off * 1000 < film.len() * 3, "{curve:?}: {off} bytes on rounding boundaries");
     }
 }
@@ -204,7 +204,7 @@ fn light_beyond_f32_is_counted_as_infinite() {
     let (rendered, film) = gpu.shot(&made.0, None, settings);
     let infinite = film.rgba.iter().filter(|p| p.iter().any(|v| v.is_infinite())).count();
     let nan = film.rgba.iter().filter(|p| p.iter().any(|v| v.is_nan())).count();
-    println!("{:?}", rendered.counts);
+    eprintln!("{:?}", rendered.counts);
     assert!(infinite > 10);
     assert_eq!((rendered.counts.inf, rendered.counts.nan), (infinite as u32, nan as u32));
     assert_eq!(nan, 0, "too much light is infinite, not nothing");
