@@ -110,6 +110,9 @@ fn mistakes_end_in_one_sentence_and_no_file() {
         etalon(at, &all, &[]).failed(code, said);
         assert_eq!(files(at), before, "{arguments:?} left a file");
     }
+    // Also the outputs that could be written are not when another one cannot.
+    etalon(at, &["render", "scene.glb", "-o", "out.png", "-o", "nowhere/out.exr"], &[]).failed(1, "nowhere");
+    assert_eq!(files(at), before, "an output beside the one that cannot be written");
     etalon(at, &["diff", "a.png", "b.png"], &[]).failed(1, "a.png");
     etalon(at, &["nonsense"], &[]).failed(2, "nonsense");
 }

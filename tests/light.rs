@@ -101,7 +101,7 @@ fn a_point_light_falls_with_the_square_of_the_distance_and_ends_at_its_range() {
             // The wall's depth is good to an ulp of 1 over a range of 40 m: 1.2e-6 m, and cosθ / r² has three powers of it;
             // where the window closes it is a difference of ones, whose error is absolute and has four more.
             let error = worst(&film, if range.is_some() { 1.0 } else { 0.01 }, expected);
-            println!("range {range:?}, height {z}: {error:e}");
+            eprintln!("range {range:?}, height {z}: {error:e}");
             assert!(error < 2e-6 + 12e-6 / z, "range {range:?}, height {z}: {error:e}");
         }
     }
@@ -119,7 +119,7 @@ fn a_point_light_far_away_is_a_directional_light() {
         let [near, far] = [near, far].map(|made| gpu.film(&made.0, settings(SIZE)));
         // The wall reaches 2 m from the point that the light is r away from: (1 ± 2/r)² and the cosine as much again.
         let error = worst(&near, 1.0, |i| Vec3::from_slice(&far.rgba[i]).as_dvec3());
-        println!("{r:e} m: {error:e}");
+        eprintln!("{r:e} m: {error:e}");
         assert!(error < 8.0 / r + 2e-6, "{r:e} m: {error:e}");
     }
 }
@@ -146,7 +146,7 @@ fn a_spot_has_a_squared_ramp_between_its_cones() {
         // The ramp's slope over cosθ is 1 / (cos inner − cos outer), and it is squared: what 1.2e-6 m (see above) at 1.5 m
         // do to cosθ, 8e-7 at most, grows by twice that.
         let slope = 2.0 / (inner.cos() - outer.cos());
-        println!("{inner} to {outer}: {error:e}");
+        eprintln!("{inner} to {outer}: {error:e}");
         assert!(error < 3e-6 + 8e-7 * slope, "{inner} to {outer}: {error:e}");
     }
 }
@@ -224,7 +224,7 @@ fn against_all_lights(gpu: &Gpu, scene: &Scene, orthographic: bool, size: [u32; 
             if e > error {
                 error = e;
                 if e > 1e-4 {
-                    println!("{i}: {got:?} for {want} {:?}", aovs[i]);
+                    eprintln!("{i}: {got:?} for {want} {:?}", aovs[i]);
                 }
             }
         }
@@ -251,7 +251,7 @@ fn lists_of_lights_per_tile_lose_no_light() {
                     etalon::scene::Projection::Orthographic { half_height: 9.0, near: 0.1, far: 90.0 };
             }
             let error = against_all_lights(&gpu, &scene, orthographic, size);
-            println!("{count} lights, parallel {orthographic}: {error:e}");
+            eprintln!("{count} lights, parallel {orthographic}: {error:e}");
             // Grazing light is the worst: cosθ has an absolute error of 1.2e-7 (numerics.md 25) and pixels count from 1e-3
             // of the brightest on, which is 1e-4.
             assert!(error < 1e-4, "{count} lights, parallel {orthographic}: {error:e}");
@@ -277,7 +277,7 @@ fn all_kinds_of_light_on_study_scenes_agree_with_the_formulas() {
             material.occlusion_texture = None;
         }
         let error = against_all_lights(&gpu, &scene, false, SIZE);
-        println!("{name}: {error:e}");
+        eprintln!("{name}: {error:e}");
         assert!(error < 1e-5, "{name}: {error:e}");
     }
 }
@@ -327,7 +327,7 @@ fn a_white_body_vanishes_in_a_white_furnace() {
                 error = error.max((f64::from(pixel[c]) / f64::from(radiance[c]) - 1.0).abs());
             }
         }
-        println!("{name}: {error:e}");
+        eprintln!("{name}: {error:e}");
         assert!(error < bound, "{name}: {error:e}");
     }
 }
@@ -384,7 +384,7 @@ fn behind_the_scene_is_the_environment_turned_as_asked() {
             }
         }
         assert!(seen > 1000, "{seen}");
-        println!("turned {degrees}: {error:e}");
+        eprintln!("turned {degrees}: {error:e}");
         // lavapipe weighs texels with 8 bits of fraction: 1/512 of the largest step between neighbours (0.1) twice, and
         // its atan2 is good to 342 ulps (numerics.md, 2).
         assert!(error < 2.0 * 0.1 / 512.0 + 1e-4, "turned {degrees}: {error:e}");
@@ -405,7 +405,7 @@ fn a_turned_environment_lights_as_the_turned_map_does() {
     let (_, a) = gpu.shot(&scene, Some(&environment), turned);
     let (_, b) = gpu.shot(&scene, Some(&moved), settings(SIZE));
     let error = gpu::largest_difference(&a, &b, 1.0);
-    println!("{error:e}");
+    eprintln!("{error:e}");
     // The same texels at the same places up to rounding of the coordinates (1e-6 of the map) and the fraction's 8 bits.
     assert!(error < 1e-3, "{error:e}");
     let (_, unturned) = gpu.shot(&scene, Some(&environment), settings(SIZE));

@@ -43,7 +43,7 @@ fn same_but_outlines(a: &Picture, b: &Picture, scene: &Scene, bound: f64, what: 
     let many = differences.iter().filter(|d| **d > bound).count();
     let inside = differences.iter().zip(&edges).filter(|(_, p)| !p.edge).map(|(d, _)| *d);
     let (count, most) = inside.fold((0, 0.0_f64), |(count, most), d| (count + 1, most.max(d)));
-    println!("{}, {what}: {most:e} over {count} pixels, {many} beyond", scene.name);
+    eprintln!("{}, {what}: {most:e} over {count} pixels, {many} beyond", scene.name);
     assert!(count > 1000, "{}, {what}: nearly nothing was compared", scene.name);
     assert!(most <= bound, "{}, {what}: {most:e}", scene.name);
     assert!(many * 1000 <= a.rgba.len(), "{}, {what}: {many} pixels", scene.name);

@@ -120,7 +120,7 @@ fn compare(gpu: &Gpu, scene: &Scene, camera: &Camera) -> Worst {
 /// distance over the width of a pixel, 2^-23 / (0.7 rad / 90) = 9e-4 degrees, some of these beside the octahedron's.
 /// Base colour texels pass through a half float (known_issues.rs): half an ulp of it either way or one downwards, 2^-11.
 fn check(worst: &Worst, name: &str) {
-    println!("{name}: {worst:?}");
+    eprintln!("{name}: {worst:?}");
     assert!(worst.compared * 3 > worst.edges && worst.compared > 300, "{name}: nearly nothing was compared: {worst:?}");
     assert!(worst.position < 1e-5 && worst.distance < 1e-5, "{name}: {worst:?}");
     assert!(worst.shading < 0.0045, "{name}: {worst:?}");

@@ -1,5 +1,5 @@
-//! See-through surfaces against the over operator: far to near, in f64, whatever the order in which they were drawn. All
-//! panes here are unlit, so that coverage and order are all there is to get wrong.
+//! See-through surfaces against the over operator: far to near, in f64, whatever the order in which they were drawn. Panes
+//! are unlit, so that coverage and order are all there is to get wrong.
 
 #[path = "support/gpu.rs"]
 mod gpu;
@@ -107,7 +107,7 @@ fn panes_in_any_order_are_composited_far_to_near() {
         let scene = stack(count, eighths);
         let film = gpu.film(&scene, settings(SIZE));
         let (worst, left_out) = against_over(&film, &scene, 1e-9);
-        println!("{count} panes: {worst:e}, left out {left_out}");
+        eprintln!("{count} panes: {worst:e}, left out {left_out}");
         // As many products and sums of numbers below 1: half an ulp each.
         assert!(worst < (count + 2) as f64 * 2.0_f64.powi(-24), "{count} panes: {worst:e}");
         assert!(left_out < 300, "{count} panes: {left_out}");
@@ -126,7 +126,7 @@ fn any_opacity_is_good_to_a_half_float() {
     scene.cameras[0].projection = made::orthographic(1.2);
     let film = gpu.film(&scene, settings(SIZE));
     let (worst, left_out) = against_over(&film, &scene, 1e-9);
-    println!("{worst:e}, left out {left_out}");
+    eprintln!("{worst:e}, left out {left_out}");
     // Each opacity is rounded to 11 bits, relative 2^-12, and moves what shows by at most alpha times that; what stays
     // visible of all panes adds up to 1, and what shines through changes as much again.
     assert!(worst < 3.0 * 2.0_f64.powi(-12), "{worst:e}");
@@ -145,7 +145,7 @@ fn the_study_of_blending_shows_the_over_operator() {
     }
     let film = gpu.film(&scene, settings([160, 90]));
     let (worst, left_out) = against_over(&film, &scene, 2e-3);
-    println!("{worst:e}, left out {left_out}");
+    eprintln!("{worst:e}, left out {left_out}");
     // Texels pass through half floats, rounded downwards: 2^-11 for each of up to three surfaces. What changes by as much
     // over a 64th of a pixel is left out.
     assert!(left_out < 160 * 90 / 5, "{left_out}");
@@ -167,6 +167,25 @@ fn panes_through_each_other_change_places_at_the_line() {
     assert_eq!(row[50], [0.25, 0.0, 0.5, 0.75]);
     let (worst, left_out) = against_over(&film, &made.0, 1e-9);
     assert!(worst == 0.0 && left_out < 80, "{worst:e}, {left_out}");
+}
+
+#[test]
+fn of_coplanar_panes_the_later_one_lies_on_top() {
+    let gpu = Gpu::new();
+    for turned in [false, true] {
+        let mut made = Made::new("coplanar");
+        let mut panes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        if turned {
+            panes.reverse();
+        }
+        for color in panes {
+            made.add(Shape::panel(9.0, 5.0), pane(color, 0.5), DAffine3::IDENTITY);
+        }
+        made.front(1.0);
+        let film = gpu.film(&made.0, settings(SIZE));
+        let want = if turned { [0.5, 0.25, 0.125, 0.875] } else { [0.125, 0.25, 0.5, 0.875] };
+        assert!(film.rgba.iter().all(|p| *p == want), "{:?}, not {want:?}", film.rgba[0]);
+    }
 }
 
 #[test]
@@ -217,6 +236,40 @@ fn coverage_reaches_the_picture_with_a_transparent_background() {
 }
 
 #[test]
+fn clear_sheets_tint_and_absorb_by_their_thickness() {
+    // Refraction `off`, straight on and unlit: what passes is base · (1 − F0) · attenuation^(thickness · scale / distance).
+    let gpu = Gpu::new();
+    for (ior, scale, thickness) in [(1.0_f32, 1.0, 0.5_f32), (1.5, 1.0, 0.25), (2.0, 3.0, 0.25), (1.5, 1.0, 0.0)] {
+        let mut made = Made::new("sheet");
+        made.add(Shape::panel(99.0, 50.0), unlit([1.0; 3]), at(0.0, 0.0, -1.0));
+        let sheet = Material {
+            base_color: [1.0, 0.5, 0.25, 1.0],
+            transmission: 1.0,
+            metallic: 0.0,
+            roughness: 0.0,
+            ior,
+            thickness,
+            attenuation_distance: 0.5,
+            attenuation_color: [0.5, 1.0, 0.25],
+            ..Material::default()
+        };
+        made.add(Shape::panel(9.0, 5.0), sheet, DAffine3::from_scale(DVec3::splat(scale)));
+        made.front(1.0);
+        let film = gpu.film(&made.0, settings(SIZE));
+        let f0 = ((f64::from(ior) - 1.0) / (f64::from(ior) + 1.0)).powi(2);
+        let path = f64::from(thickness) * scale / 0.5;
+        let want = [1.0 * 0.5_f64.powf(path), 0.5, 0.25 * 0.25_f64.powf(path)].map(|v| v * (1.0 - f0));
+        for pixel in &film.rgba {
+            for c in 0..3 {
+                // exp is good to 3 + 2 |x| ulps (numerics.md, 2), x below 4.
+                assert!((f64::from(pixel[c]) - want[c]).abs() < 1e-6, "{ior}, {thickness}: {pixel:?}, not {want:?}");
+            }
+            assert!((pixel[3] - 1.0).abs() < 1e-6);
+        }
+    }
+}
+
+#[test]
 fn opaque_walls_hide_what_is_behind_them() {
     let gpu = Gpu::new();
     let mut made = Made::new("hidden");
@@ -252,7 +305,7 @@ fn lists_grow_and_split_until_everything_fits() {
         }
     }
     assert_eq!(rendered.dropped, 0);
-    println!("{panes} panes, room for {fit} fragments");
+    eprintln!("{panes} panes, room for {fit} fragments");
 }
 
 #[test]

@@ -76,14 +76,14 @@ fn every_curve_shows_the_bytes_of_its_twin() {
                 let byte = quantise(want[c]);
                 off += usize::from(byte != got[c]);
                 most = most.max(byte.abs_diff(got[c]));
-                // What f32 does to a display value: pow is good to 2e-6 here, and AgX raises differences of products with
-                // the numbers 1.2 and 0.1 of a sixth-degree polynomial with coefficients to 40: 40 · 2^-24 · a few. A byte
+                // What f32 does to a display value: pow is good to 33 ulps on lavapipe (numerics.md, 2), 2e-6, beside a few
+                // roundings; AgX's polynomial has coefficients to 40 and the outset another 1.2, 50 · 2^-24 · a few. A byte
                 // can then differ only where the exact value lies that close to a rounding boundary, and only by one.
-                let slack = if curve == ToneMap::Agx { 1e-4 } else { 1e-5 };
+                let slack = if curve == ToneMap::Agx { 1e-5 } else { 3e-6 };
                 assert!(is_right(got[c], want[c], slack), "{curve:?}: {rgba:?} shows {got:?}, twin {want:?}");
             }
         }
-        println!("{curve:?}: {off} of {} bytes differ, by at most {most}", film.len() * 3);
+        eprintln!("{curve:?}: {off} of {} bytes differ, by at most {most}", film.len() * 3);
         assert!(off * 1000 < film.len() * 3, "{curve:?}: {off} bytes on rounding boundaries");
     }
 }
@@ -204,7 +204,7 @@ fn light_beyond_f32_is_counted_as_infinite() {
     let (rendered, film) = gpu.shot(&made.0, None, settings);
     let infinite = film.rgba.iter().filter(|p| p.iter().any(|v| v.is_infinite())).count();
     let nan = film.rgba.iter().filter(|p| p.iter().any(|v| v.is_nan())).count();
-    println!("{:?}", rendered.counts);
+    eprintln!("{:?}", rendered.counts);
     assert!(infinite > 10);
     assert_eq!((rendered.counts.inf, rendered.counts.nan), (infinite as u32, nan as u32));
     assert_eq!(nan, 0, "too much light is infinite, not nothing");
