@@ -44,6 +44,9 @@ pub enum Background {
 /// Grey behind a scene without an environment, as sRGB bytes.
 pub const NEUTRAL_GREY: [u8; 3] = [119; 3];
 
+/// Lights that one invocation can loop over where the driver limits loops (65,535 heads), the masks' words included.
+const MOST_LIGHTS: usize = 60_000;
+
 /// How a picture is made; everything that does not change between the frames of a sequence.
 #[derive(Debug, Clone)]
 pub struct Settings {
@@ -134,6 +137,9 @@ impl Renderer {
         }
         if scene.triangles() == 0 {
             bail!("{}: there is nothing to draw, the scene has 0 triangles", scene.name);
+        }
+        if device.limits_loops() && scene.lights.len() > MOST_LIGHTS {
+            bail!("{}: {} lights, a software device lights with at most {MOST_LIGHTS}", scene.name, scene.lights.len());
         }
         let sky = match settings.background {
             Background::Default | Background::Environment => environment.is_some(),

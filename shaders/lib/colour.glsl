@@ -59,7 +59,8 @@ vec3 tone_khronos_neutral(vec3 x) {
 
 // `curve`: 0 linear, 1 reinhard, 2 aces, 3 agx, 4 khronos-neutral. Result in [0, 1], display-linear.
 vec3 tone(uint curve, vec3 x) {
-    x = max(x, 0.0);
+    // Cut where a half float ends: a curve that divides would make NaN, shown black, of the brightest pixels.
+    x = clamp(x, 0.0, 65504.0);
     if (curve == 1) x = tone_reinhard(x);
     if (curve == 2) x = tone_aces(x);
     if (curve == 3) x = tone_agx(x);

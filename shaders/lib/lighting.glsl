@@ -32,8 +32,12 @@ vec3 local_light(Surface s, uint index) {
     return reflected(s, l) * color.rgb * falloff;
 }
 
+// Evaluations of loop heads so far: lavapipe ends all loops of an invocation in silence after 65,535 of them.
+uint loop_heads = 0;
+
 vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across) {
     vec3 sum = vec3(0.0);
+    loop_heads += DIRECTIONAL_LIGHTS + LOCAL_LIGHTS + 2;
     for (uint i = 0; i < DIRECTIONAL_LIGHTS; i++) {
         sum += reflected(s, imageLoad(lights, int(i * 4)).xyz) * imageLoad(lights, int(i * 4 + 1)).rgb;
     }
@@ -43,6 +47,7 @@ vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across) {
         uint tile = (uint(pixel.y) / TILE * tiles_across + uint(pixel.x) / TILE) * TILE_WORDS;
         for (uint word = 0; word < TILE_WORDS; word++) {
             uint bits = imageLoad(tile_lights, int(tile + word)).x;
+            loop_heads += 2 + uint(bitCount(bits));
             while (bits != 0) {
                 uint bit = uint(findLSB(bits));
                 bits &= bits - 1;

@@ -51,13 +51,6 @@ vec4 read(sampler2DArray page, uint slot_index) {
     return texture(page, vec3(dot(u_layer.xyz, set), dot(v_set.xyz, set), u_layer.w), lod_bias);
 }
 
-// Opacity alone: what decides whether the fragment exists.
-float fragment_alpha() {
-    float alpha = vertex_color.a;
-    if (HAS_BASE) alpha *= read(base_page, SLOT_BASE).a;
-    return alpha;
-}
-
 // A tangent-space normal in the frame of the interpolated normal and tangent; the normal itself where that is no frame.
 vec3 bent_normal(vec3 n, vec3 texel) {
     vec3 t = t_rel.xyz - n * dot(n, t_rel.xyz);
@@ -71,7 +64,8 @@ vec3 bent_normal(vec3 n, vec3 texel) {
 
 SurfaceFragment surface_fragment() {
     SurfaceFragment s;
-    s.base = vertex_color;
+    // Not the varying's constant: perspective interpolation makes 0.99999994 of 1, which a half rounds to 0.9995.
+    s.base = HAS_COLOR ? vertex_color : vec4(1.0);
     if (HAS_BASE) s.base *= read(base_page, SLOT_BASE);
     s.metallic = 1.0;
     s.roughness = 1.0;

@@ -14,14 +14,13 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::options::{DeviceOptions, PictureOptions, SceneOptions, When};
 use super::print;
 use super::report::{
-    MemoryFacts, Output, PassFacts, PipelineFacts, Report, SceneFacts, Spread, Validation, Work, knob_map,
+    MemoryFacts, Output, PassFacts, PipelineFacts, PlanFacts, Report, SceneFacts, Spread, Validation, Work, knob_map,
 };
 use super::unbuilt::UnbuiltOptions;
 use crate::frame::{Rendered, Renderer};
 use crate::gpu::{Device, Severity};
 use crate::image::{Aov, AovData, Picture, exr, file};
 use crate::pass::view::View;
-use crate::plan::Plan;
 use crate::scene::{Camera, Scene};
 use crate::share::AovPixel;
 
@@ -273,7 +272,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
             device: info,
             scene: facts,
             knobs: knob_map(&knobs),
-            plan: plan_facts(&renderer.plan),
+            plan: PlanFacts::of(&renderer.plan, &device, rendered.passes.iter().map(|p| p.name.clone()).collect()),
             passes: pass_facts(&rounds),
             phases_ms: phases.all,
             work: Work::default(),
@@ -297,10 +296,6 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
 
 fn settings_size(picture: &PictureOptions) -> u64 {
     u64::from(picture.size[0]) * u64::from(picture.size[1])
-}
-
-fn plan_facts(plan: &Plan) -> super::report::PlanFacts {
-    plan.into()
 }
 
 /// Checks everything about the outputs that can be checked before any work is done.

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::gpu::{Device, DeviceInfo, Message, Severity};
+use crate::gpu::{Created, Device, DeviceInfo, Message, Severity};
 use crate::image::Statistics;
 use crate::plan::{Effect, Knobs, Plan};
+use crate::shader::PROGRAMS;
 
 /// The document.
 #[derive(Debug, Serialize)]
@@ -58,18 +59,61 @@ pub struct SceneFacts {
     pub warnings: Vec<String>,
 }
 
-/// The plan as data.
+/// The plan as data, with what came of it on the device.
 #[derive(Debug, Serialize)]
 pub struct PlanFacts {
+    /// `etalon.plan/1`.
+    pub schema: &'static str,
     /// Every effect with its reason.
     pub effects: Vec<Effect>,
     /// Samples per pixel.
     pub samples: u32,
+    /// Passes of a frame in order.
+    pub passes: Vec<String>,
+    /// Pipelines that were made.
+    pub pipelines: Vec<PipelineFact>,
+    /// Buffers and images that outlive a frame or feed one, by label.
+    pub buffers: Vec<Created>,
+    /// What the chosen rungs leave out.
+    pub warnings: Vec<String>,
 }
 
-impl From<&Plan> for PlanFacts {
-    fn from(plan: &Plan) -> Self {
-        Self { effects: plan.effects.clone(), samples: plan.samples }
+/// One pipeline.
+#[derive(Debug, Serialize)]
+pub struct PipelineFact {
+    /// Its program.
+    pub name: &'static str,
+    /// Specialization constants by number, as 32-bit words.
+    pub constants: BTreeMap<u32, u32>,
+    /// SPIR-V that ships for the program.
+    pub spirv_bytes: usize,
+}
+
+impl PlanFacts {
+    /// What was planned, and what the device made of it in the passes of a frame.
+    #[must_use]
+    pub fn of(plan: &Plan, device: &Device, passes: Vec<String>) -> Self {
+        let bytes = |name| PROGRAMS.iter().find(|p| p.name == name).map_or(0, |p| p.spirv_bytes());
+        let pipelines = device.pipeline_list().into_iter();
+        Self {
+            schema: "etalon.plan/1",
+            effects: plan.effects.clone(),
+            samples: plan.samples,
+            passes,
+            pipelines: pipelines
+                .map(|(name, constants)| PipelineFact {
+                    name,
+                    constants: constants.into_iter().collect(),
+                    spirv_bytes: bytes(name),
+                })
+                .collect(),
+            buffers: device
+                .created()
+                .into_iter()
+                .filter(|made| matches!(made.kind, "buffer" | "image") && made.name != "staging")
+                .collect(),
+            warnings: Vec::new(),
+        }
     }
 }
 
@@ -108,7 +152,7 @@ impl Spread {
 }
 
 /// Exact counts.
-#[derive(Debug, Default, Serialize)]
+#[derive(Debug, Serialize)]
 pub struct Work {
     /// Rays by kind; primary visibility is rasterised.
     pub rays: BTreeMap<&'static str, u64>,
@@ -116,6 +160,14 @@ pub struct Work {
     pub node_visits: u64,
     /// Triangles tested by rays.
     pub triangle_tests: u64,
+}
+
+impl Default for Work {
+    /// No rays: primary visibility is rasterised, and nothing is traced yet.
+    fn default() -> Self {
+        let kinds = ["primary", "reflection", "refraction", "shadow", "indirect"];
+        Self { rays: kinds.into_iter().map(|kind| (kind, 0)).collect(), node_visits: 0, triangle_tests: 0 }
+    }
 }
 
 /// Pipelines made.

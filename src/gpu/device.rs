@@ -1,6 +1,5 @@
 //! Instance, choice of a device, and the device with its queue, allocator and caches.
 
-use std::collections::HashMap;
 use std::ffi::{CStr, CString, c_void};
 use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -88,6 +87,17 @@ pub struct Message {
     pub severity: Severity,
     /// What it says.
     pub text: String,
+}
+
+/// A Vulkan object that was created.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Created {
+    /// `buffer`, `image`, `pipeline` or `sampler`.
+    pub kind: &'static str,
+    /// Its label.
+    pub name: String,
+    /// Memory bound to it.
+    pub bytes: u64,
 }
 
 type Messages = Mutex<Vec<Message>>;
@@ -331,7 +341,7 @@ pub struct Device {
     pub(super) limits: vk::PhysicalDeviceLimits,
     pub(super) submitted: AtomicU64,
     next_id: AtomicU64,
-    created: Mutex<HashMap<&'static str, usize>>,
+    created: Mutex<Vec<Created>>,
     info: DeviceInfo,
     instance: Instance,
     physical: vk::PhysicalDevice,
@@ -436,9 +446,9 @@ impl Device {
         lock(&self.instance.messages).clone()
     }
 
-    /// Number of objects created so far by kind (`buffer`, `image`, `pipeline`, `sampler`).
+    /// Every object created so far, in order.
     #[must_use]
-    pub fn created(&self) -> HashMap<&'static str, usize> {
+    pub fn created(&self) -> Vec<Created> {
         lock(&self.created).clone()
     }
 
@@ -446,6 +456,12 @@ impl Device {
     #[must_use]
     pub fn memory_bytes(&self) -> u64 {
         lock(&self.allocator).generate_report().total_capacity_bytes
+    }
+
+    /// Whether the driver ends all loops of an invocation, in silence, after 65,535 evaluations of their heads: lavapipe.
+    #[must_use]
+    pub fn limits_loops(&self) -> bool {
+        self.info.kind == "cpu"
     }
 
     /// Largest width and height of a 2D image and of a viewport.
@@ -468,8 +484,8 @@ impl Device {
         properties.optimal_tiling_features.contains(features)
     }
 
-    pub(super) fn count(&self, kind: &'static str) {
-        *lock(&self.created).entry(kind).or_default() += 1;
+    pub(super) fn note(&self, kind: &'static str, name: &str, bytes: u64) {
+        lock(&self.created).push(Created { kind, name: name.to_owned(), bytes });
     }
 
     pub(super) fn next_id(&self) -> u64 {

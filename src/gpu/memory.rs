@@ -114,7 +114,7 @@ impl Buffer {
                     vk::BufferViewCreateInfo::default().buffer(raw).format(format).offset(0).range(vk::WHOLE_SIZE);
                 buffer.view = device.raw.create_buffer_view(&info, None).with_context(creating)?;
             }
-            device.count("buffer");
+            device.note("buffer", name, requirements.size);
             device.name(raw, name);
             Ok(buffer)
         }
@@ -265,7 +265,7 @@ impl Image {
                 .format(desc.format)
                 .subresource_range(image.range());
             image.view = device.raw.create_image_view(&view, None).with_context(creating)?;
-            device.count("image");
+            device.note("image", name, requirements.size);
             device.name(raw, name);
             Ok(image)
         }

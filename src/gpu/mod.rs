@@ -14,7 +14,7 @@ mod shader;
 pub mod sync;
 
 pub use access::Access;
-pub use device::{Candidate, Device, DeviceChoice, DeviceInfo, Message, Severity, candidates};
+pub use device::{Candidate, Created, Device, DeviceChoice, DeviceInfo, Message, Severity, candidates};
 pub use frame::{ColorTarget, DepthTarget, Draw, Frame, PassTime, Raster, VertexStream};
 pub use memory::{Buffer, Image, ImageDesc, Place};
 pub use pipeline::{Resource, Sampled, SamplerDesc};

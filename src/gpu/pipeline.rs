@@ -158,7 +158,7 @@ impl Device {
             .max_lod(if desc.mip.is_some() { vk::LOD_CLAMP_NONE } else { 0.0 });
         // SAFETY: a valid create info.
         let sampler = unsafe { self.raw.create_sampler(&info, None) }.context("creating a sampler")?;
-        self.count("sampler");
+        self.note("sampler", "sampler", 0);
         lock(&self.caches).samplers.insert(desc, sampler);
         Ok(sampler)
     }
@@ -218,7 +218,7 @@ impl Device {
             unsafe { self.raw.destroy_shader_module(module, None) };
         }
         let pipeline = pipeline.with_context(|| format!("creating pipeline \"{}\"", program.name))?;
-        self.count("pipeline");
+        self.note("pipeline", program.name, 0);
         self.name(pipeline, program.name);
         let mut caches = lock(&self.caches);
         caches.spirv_bytes += program.spirv_bytes();

@@ -11,6 +11,9 @@ use crate::gpu::{Buffer, Frame, Image};
 use crate::plan::{Knobs, Plan};
 use crate::shader::{composite, light};
 
+/// Loop heads that one invocation of the see-through pass may evaluate where the driver limits them.
+const LOOP_BUDGET: u32 = 40_000;
+
 /// What both lighting passes need beside their surfaces.
 #[derive(Clone, Copy)]
 pub struct Lighting<'a> {
@@ -47,6 +50,7 @@ impl Lighting<'_> {
             tile_words: self.tiles.words(),
             ambient: self.plan.ambient,
             reflection: self.plan.reflection,
+            loop_budget: if self.scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
         }
     }
 }

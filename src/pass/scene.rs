@@ -407,7 +407,8 @@ fn shared_light(light: &Light, eye: DVec3) -> [[f32; 4]; 4] {
             let (place, color) = local(position, range);
             let axis = direction.as_vec3();
             // KHR_lights_punctual's ramp: (cosθ − cos outer) / (cos inner − cos outer).
-            let scale = 1.0 / (inner.cos() - outer.cos()).max(0.001);
+            // Equal cones are a step, which a ramp of 1e-7 is to f32.
+            let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-7);
             let offset = -outer.cos() * scale;
             [place, color, [axis.x, axis.y, axis.z, scale as f32], [offset as f32, 0.0, 0.0, 0.0]]
         }

@@ -4,6 +4,8 @@ mod knobs;
 
 pub use knobs::{KNOBS, Knob, Knobs};
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use crate::scene::{AlphaMode, LightKind, Material, Scene};
@@ -48,6 +50,8 @@ pub struct Effect {
     pub rung: &'static str,
     /// One sentence.
     pub reason: String,
+    /// What the reason rests on.
+    pub evidence: BTreeMap<&'static str, String>,
 }
 
 /// What is known beside the scene.
@@ -86,58 +90,68 @@ impl Plan {
     pub fn new(scene: &Scene, surroundings: Surroundings, knobs: &Knobs) -> Self {
         let used = used_materials(scene);
         let find = |test: &dyn Fn(&Material) -> bool| used.iter().copied().find(|m| test(m));
-        let quoted = |m: &Material| format!("material \"{}\"", m.name);
         let mut effects = Vec::new();
-        let mut decide = |name, knob: &'static str, called: Option<String>, allowed: bool| {
+        let mut decide = |name, knob: &'static str, cause: Cause, allowed: bool| {
             let rung = if knob.is_empty() { "" } else { knobs.rung(knob) };
-            let (state, reason) = match called {
-                None => (
-                    "not called for",
-                    if knob == "reflection" || knob == "indirect" {
-                        "there is no environment"
-                    } else {
-                        "nothing in the scene has it"
-                    }
-                    .to_owned(),
-                ),
-                Some(_) if !allowed => ("dropped", format!("{knob}={rung}")),
-                Some(reason) => ("kept", reason),
+            let (state, reason, evidence) = match cause {
+                Err(reason) => ("not called for", reason.to_owned(), BTreeMap::new()),
+                Ok((_, evidence)) if !allowed => ("dropped", format!("{knob}={rung}"), evidence),
+                Ok((reason, evidence)) => ("kept", reason, evidence),
             };
-            effects.push(Effect { name, state, rung, reason });
+            effects.push(Effect { name, state, rung, reason, evidence });
             state == "kept"
         };
+        let material = |found: Option<&Material>, says: &dyn Fn(&Material) -> String| {
+            let found = found.ok_or("no material in use has it")?;
+            let evidence = BTreeMap::from([("material", found.name.clone())]);
+            Ok((format!("material \"{}\" {}", found.name, says(found)), evidence))
+        };
 
-        let emissive = find(&|m| m.emissive_texture.is_some() && m.emissive != [0.0; 3]);
-        let emissive =
-            decide("emissive textures", "", emissive.map(|m| format!("{} has an emissive texture", quoted(m))), true);
-        let clearcoat = find(&|m| m.clearcoat > 0.0);
-        let clearcoat =
-            decide("clear coat", "", clearcoat.map(|m| format!("{}: clearcoat {}", quoted(m), m.clearcoat)), true);
-        let layers = find(&|m| has_layers(m) || m.clearcoat > 0.0);
-        let layers = decide("layers", "", layers.map(|m| format!("{} has a coat or layer textures", quoted(m))), true);
-        let see_through = find(&is_see_through).map(|m| match m.alpha_mode {
-            AlphaMode::Blend => format!("{} is alpha-blended", quoted(m)),
-            _ => format!("{}: transmission {}", quoted(m), m.transmission),
+        let found = find(&|m| m.emissive_texture.is_some() && m.emissive != [0.0; 3]);
+        let cause = material(found, &|_| "has an emissive texture".to_owned());
+        let emissive = decide("emissive textures", "", cause, true);
+        let cause = material(find(&|m| m.clearcoat > 0.0), &|m| format!("has clearcoat {}", m.clearcoat));
+        let clearcoat = decide("clear coat", "", cause, true);
+        let found = find(&|m| has_layers(m) || m.clearcoat > 0.0);
+        let layers = decide("layers", "", material(found, &|_| "has a coat or layer textures".to_owned()), true);
+        let cause = material(find(&is_see_through), &|m| match m.alpha_mode {
+            AlphaMode::Blend => "is alpha-blended".to_owned(),
+            _ => format!("has transmission {}", m.transmission),
         });
-        let see_through = decide("see-through surfaces", "", see_through, true);
-        let reflects = surroundings.environment.then(|| "there is an environment".to_owned());
-        let reflection =
-            decide("mirrored environment", "reflection", reflects.clone(), knobs.rung("reflection") != "off");
-        let ambient = decide("ambient light", "indirect", reflects, knobs.rung("indirect") != "off");
+        let see_through = decide("see-through surfaces", "", cause, true);
 
-        let local = |light: &LightKind| !matches!(light, LightKind::Directional { .. });
-        let local_lights = scene.lights.iter().filter(|l| local(&l.kind)).count() as u32;
-        let directional_lights = scene.lights.len() as u32 - local_lights;
-        let ranged = scene.lights.iter().filter(|l| {
-            matches!(l.kind, LightKind::Point { range: Some(_), .. } | LightKind::Spot { range: Some(_), .. })
+        let environment = || match surroundings.environment {
+            true => Ok(("there is an environment".to_owned(), BTreeMap::new())),
+            false => Err("there is no environment"),
+        };
+        let reflection = decide("mirrored environment", "reflection", environment(), knobs.rung("reflection") != "off");
+        let ambient = decide("ambient light", "indirect", environment(), knobs.rung("indirect") != "off");
+
+        let count = |test: &dyn Fn(&LightKind) -> bool| scene.lights.iter().filter(|l| test(&l.kind)).count() as u32;
+        let directional_lights = count(&|kind| matches!(kind, LightKind::Directional { .. }));
+        let local_lights = scene.lights.len() as u32 - directional_lights;
+        let ranged = count(&|kind| {
+            matches!(kind, LightKind::Point { range: Some(_), .. } | LightKind::Spot { range: Some(_), .. })
         });
-        let ranged = ranged.count();
-        let lights = (!scene.lights.is_empty())
-            .then(|| format!("{directional_lights} directional, {local_lights} point and spot lights"));
-        decide("punctual lights", "lights", lights, true);
-        let tiles = (local_lights >= TILES_FROM && ranged > 0)
-            .then(|| format!("{ranged} of {local_lights} point and spot lights have a range"));
-        let tiles = decide("light lists per tile", "", tiles, true);
+        let evidence = BTreeMap::from([
+            ("directional", directional_lights.to_string()),
+            ("local", local_lights.to_string()),
+            ("with a range", ranged.to_string()),
+        ]);
+        let cause = match scene.lights.is_empty() {
+            true => Err("the scene has no lights"),
+            false => {
+                let reason = format!("{directional_lights} directional, {local_lights} point and spot lights");
+                Ok((reason, evidence.clone()))
+            }
+        };
+        decide("punctual lights", "lights", cause, true);
+        let cause = match (local_lights >= TILES_FROM, ranged > 0) {
+            (false, _) => Err("few point and spot lights"),
+            (_, false) => Err("no light has a range"),
+            _ => Ok((format!("{ranged} of {local_lights} point and spot lights have a range"), evidence)),
+        };
+        let tiles = decide("light lists per tile", "", cause, true);
         Self {
             emissive,
             layers,
@@ -154,6 +168,9 @@ impl Plan {
         }
     }
 }
+
+/// Why a scene calls for an effect, with what that rests on; or why it does not.
+type Cause = Result<(String, BTreeMap<&'static str, String>), &'static str>;
 
 fn used_materials(scene: &Scene) -> Vec<&Material> {
     let mut used = vec![false; scene.materials.len()];
