@@ -11,10 +11,11 @@ use anyhow::{Context as _, Result};
 use ash::vk;
 
 use super::access::Access;
+use super::bind::{Bindings, Descriptor, Resource};
+use super::cache::{Layout, PipelineKey, RasterKey};
 use super::device::{Device, lock};
 use super::memory::{Buffer, Image};
-use super::pipeline::{Descriptor, Layout, PipelineKey, RasterKey, Resource};
-use super::shader::{Bindings, Program};
+use super::shader::Program;
 use super::sync::{self, Barrier, ResourceId, State, Use};
 
 /// GPU time of one pass.

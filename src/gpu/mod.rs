@@ -6,6 +6,8 @@
 #![allow(unsafe_code, reason = "the one room that talks to the driver")]
 
 mod access;
+mod bind;
+mod cache;
 mod device;
 mod frame;
 mod memory;
@@ -14,8 +16,9 @@ mod shader;
 pub mod sync;
 
 pub use access::Access;
+pub use bind::{Bindings, Resource, Sampled};
+pub use cache::SamplerDesc;
 pub use device::{Candidate, Created, Device, DeviceChoice, DeviceInfo, Message, Severity, candidates};
 pub use frame::{ColorTarget, DepthTarget, Draw, Frame, PassTime, Raster, VertexStream};
 pub use memory::{Buffer, Image, ImageDesc, Place};
-pub use pipeline::{Resource, Sampled, SamplerDesc};
-pub use shader::{Binding, BindingKind, Bindings, Program, Stage, VertexInput};
+pub use shader::{Binding, BindingKind, Program, Stage, VertexInput};

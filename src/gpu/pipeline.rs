@@ -1,131 +1,11 @@
-//! Pipelines, layouts and samplers, made once per distinct description; and what a descriptor can point at.
-
-use std::collections::HashMap;
+//! Pipelines, layouts and samplers, made once per distinct description.
 
 use anyhow::{Context as _, Result};
 use ash::vk;
 
+use super::cache::{Layout, PipelineKey, SamplerDesc};
 use super::device::{Device, lock};
-use super::memory::{Buffer, Image};
-use super::shader::{BindingKind, Program};
-
-/// An image with the sampler it is read through.
-#[derive(Clone, Copy)]
-pub struct Sampled<'a> {
-    /// The image.
-    pub image: &'a Image,
-    /// How it is read.
-    pub sampler: SamplerDesc,
-}
-
-/// How an image is sampled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct SamplerDesc {
-    /// Along u and v.
-    pub wrap: [vk::SamplerAddressMode; 2],
-    /// Magnification.
-    pub mag: vk::Filter,
-    /// Minification within a level.
-    pub min: vk::Filter,
-    /// Between levels; `None` stays on the base level.
-    pub mip: Option<vk::SamplerMipmapMode>,
-}
-
-impl SamplerDesc {
-    /// Bilinear, clamped, no mips.
-    pub const LINEAR: Self = Self {
-        wrap: [vk::SamplerAddressMode::CLAMP_TO_EDGE; 2],
-        mag: vk::Filter::LINEAR,
-        min: vk::Filter::LINEAR,
-        mip: None,
-    };
-    /// Nearest, clamped, no mips: for fetches.
-    pub const NEAREST: Self = Self { mag: vk::Filter::NEAREST, min: vk::Filter::NEAREST, ..Self::LINEAR };
-    /// Trilinear equirectangular map: wraps in u only.
-    pub const EQUIRECTANGULAR: Self = Self {
-        wrap: [vk::SamplerAddressMode::REPEAT, vk::SamplerAddressMode::CLAMP_TO_EDGE],
-        mip: Some(vk::SamplerMipmapMode::LINEAR),
-        ..Self::LINEAR
-    };
-}
-
-/// What one binding points at.
-#[derive(Clone, Copy)]
-pub enum Resource<'a> {
-    /// Any kind of buffer.
-    Buffer(&'a Buffer),
-    /// A storage image.
-    Image(&'a Image),
-    /// An image with a sampler.
-    Sampled(Sampled<'a>),
-}
-
-impl<'a> From<&'a Buffer> for Resource<'a> {
-    fn from(buffer: &'a Buffer) -> Self {
-        Self::Buffer(buffer)
-    }
-}
-
-impl<'a> From<&'a Image> for Resource<'a> {
-    fn from(image: &'a Image) -> Self {
-        Self::Image(image)
-    }
-}
-
-impl<'a> From<Sampled<'a>> for Resource<'a> {
-    fn from(sampled: Sampled<'a>) -> Self {
-        Self::Sampled(sampled)
-    }
-}
-
-/// Everything that decides which pipeline a draw or dispatch needs.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(super) struct PipelineKey {
-    pub(super) program: &'static str,
-    pub(super) constants: Vec<(u32, u32)>,
-    pub(super) raster: Option<RasterKey>,
-}
-
-/// The part of a raster pipeline that is not dynamic.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(super) struct RasterKey {
-    pub(super) colors: Vec<vk::Format>,
-    pub(super) depth: Option<(vk::Format, bool)>,
-}
-
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Layout {
-    pub(super) set: vk::DescriptorSetLayout,
-    pub(super) pipeline: vk::PipelineLayout,
-}
-
-#[derive(Default)]
-pub(super) struct Caches {
-    layouts: HashMap<&'static str, Layout>,
-    pipelines: HashMap<PipelineKey, vk::Pipeline>,
-    samplers: HashMap<SamplerDesc, vk::Sampler>,
-    spirv_bytes: usize,
-}
-
-impl Caches {
-    /// # Safety
-    /// Nothing that was handed out may be in use.
-    pub(super) unsafe fn destroy(&mut self, raw: &ash::Device) {
-        // SAFETY: by the caller's promise.
-        unsafe {
-            for pipeline in self.pipelines.drain().map(|(_, p)| p) {
-                raw.destroy_pipeline(pipeline, None);
-            }
-            for layout in self.layouts.drain().map(|(_, l)| l) {
-                raw.destroy_pipeline_layout(layout.pipeline, None);
-                raw.destroy_descriptor_set_layout(layout.set, None);
-            }
-            for sampler in self.samplers.drain().map(|(_, s)| s) {
-                raw.destroy_sampler(sampler, None);
-            }
-        }
-    }
-}
+use super::shader::Program;
 
 impl Device {
     /// (pipelines made, bytes of SPIR-V in them).
@@ -332,43 +212,5 @@ impl Device {
         // SAFETY: a valid create info whose pointees outlive the call.
         let made = unsafe { self.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
         made.map(|p| p[0]).map_err(|(_, error)| error.into())
-    }
-}
-
-/// A descriptor ready to be pushed.
-#[derive(Clone, Copy)]
-pub(super) enum Descriptor {
-    Buffer(vk::DescriptorBufferInfo),
-    Texels(vk::BufferView),
-    Image(vk::DescriptorImageInfo),
-}
-
-impl Descriptor {
-    pub(super) fn new(
-        device: &Device,
-        kind: BindingKind,
-        resource: Resource<'_>,
-        layout: vk::ImageLayout,
-    ) -> Result<Self> {
-        Ok(match (kind, resource) {
-            (BindingKind::UniformTexelBuffer | BindingKind::StorageTexelBuffer, Resource::Buffer(buffer)) => {
-                assert!(buffer.view != vk::BufferView::null(), "a texel buffer needs `Buffer::texels`");
-                Self::Texels(buffer.view)
-            }
-            (BindingKind::UniformBuffer | BindingKind::StorageBuffer, Resource::Buffer(buffer)) => {
-                Self::Buffer(vk::DescriptorBufferInfo { buffer: buffer.raw, offset: 0, range: vk::WHOLE_SIZE })
-            }
-            (BindingKind::StorageImage, Resource::Image(image)) => Self::Image(vk::DescriptorImageInfo {
-                sampler: vk::Sampler::null(),
-                image_view: image.view,
-                image_layout: layout,
-            }),
-            (BindingKind::SampledImage, Resource::Sampled(sampled)) => Self::Image(vk::DescriptorImageInfo {
-                sampler: device.sampler(sampled.sampler)?,
-                image_view: sampled.image.view,
-                image_layout: layout,
-            }),
-            _ => unreachable!("build.rs gives each kind of binding its type"),
-        })
     }
 }

@@ -3,7 +3,6 @@
 use ash::vk;
 
 use super::access::Access;
-use super::pipeline::Resource;
 
 /// One program: a compute shader, or a vertex shader with its fragment shader.
 #[derive(Debug)]
@@ -95,12 +94,4 @@ pub struct VertexInput {
     pub location: u32,
     /// 1 to 4 components of f32.
     pub components: u32,
-}
-
-/// A generated struct with one field per binding of a program.
-pub trait Bindings<'a> {
-    /// The program the fields belong to.
-    fn program(&self) -> &'static Program;
-    /// The fields in slot order, parallel to [`Program::bindings`].
-    fn resources(&self) -> Vec<Resource<'a>>;
 }

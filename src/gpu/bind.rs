@@ -1,0 +1,93 @@
+//! What a program's bindings point at.
+
+use anyhow::Result;
+use ash::vk;
+
+use super::cache::SamplerDesc;
+use super::device::Device;
+use super::memory::{Buffer, Image};
+use super::shader::{BindingKind, Program};
+
+/// An image with the sampler it is read through.
+#[derive(Clone, Copy)]
+pub struct Sampled<'a> {
+    /// The image.
+    pub image: &'a Image,
+    /// How it is read.
+    pub sampler: SamplerDesc,
+}
+
+/// What one binding points at.
+#[derive(Clone, Copy)]
+pub enum Resource<'a> {
+    /// Any kind of buffer.
+    Buffer(&'a Buffer),
+    /// A storage image.
+    Image(&'a Image),
+    /// An image with a sampler.
+    Sampled(Sampled<'a>),
+}
+
+impl<'a> From<&'a Buffer> for Resource<'a> {
+    fn from(buffer: &'a Buffer) -> Self {
+        Self::Buffer(buffer)
+    }
+}
+
+impl<'a> From<&'a Image> for Resource<'a> {
+    fn from(image: &'a Image) -> Self {
+        Self::Image(image)
+    }
+}
+
+impl<'a> From<Sampled<'a>> for Resource<'a> {
+    fn from(sampled: Sampled<'a>) -> Self {
+        Self::Sampled(sampled)
+    }
+}
+
+/// A generated struct with one field per binding of a program.
+pub trait Bindings<'a> {
+    /// The program the fields belong to.
+    fn program(&self) -> &'static Program;
+    /// The fields in slot order, parallel to [`Program::bindings`].
+    fn resources(&self) -> Vec<Resource<'a>>;
+}
+
+/// A descriptor ready to be pushed.
+#[derive(Clone, Copy)]
+pub(super) enum Descriptor {
+    Buffer(vk::DescriptorBufferInfo),
+    Texels(vk::BufferView),
+    Image(vk::DescriptorImageInfo),
+}
+
+impl Descriptor {
+    pub(super) fn new(
+        device: &Device,
+        kind: BindingKind,
+        resource: Resource<'_>,
+        layout: vk::ImageLayout,
+    ) -> Result<Self> {
+        Ok(match (kind, resource) {
+            (BindingKind::UniformTexelBuffer | BindingKind::StorageTexelBuffer, Resource::Buffer(buffer)) => {
+                assert!(buffer.view != vk::BufferView::null(), "a texel buffer needs `Buffer::texels`");
+                Self::Texels(buffer.view)
+            }
+            (BindingKind::UniformBuffer | BindingKind::StorageBuffer, Resource::Buffer(buffer)) => {
+                Self::Buffer(vk::DescriptorBufferInfo { buffer: buffer.raw, offset: 0, range: vk::WHOLE_SIZE })
+            }
+            (BindingKind::StorageImage, Resource::Image(image)) => Self::Image(vk::DescriptorImageInfo {
+                sampler: vk::Sampler::null(),
+                image_view: image.view,
+                image_layout: layout,
+            }),
+            (BindingKind::SampledImage, Resource::Sampled(sampled)) => Self::Image(vk::DescriptorImageInfo {
+                sampler: device.sampler(sampled.sampler)?,
+                image_view: sampled.image.view,
+                image_layout: layout,
+            }),
+            _ => unreachable!("build.rs gives each kind of binding its type"),
+        })
+    }
+}

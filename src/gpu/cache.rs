@@ -1,0 +1,85 @@
+//! What a device makes once per distinct description: the descriptions and the store.
+
+use std::collections::HashMap;
+
+use ash::vk;
+
+/// How an image is sampled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct SamplerDesc {
+    /// Along u and v.
+    pub wrap: [vk::SamplerAddressMode; 2],
+    /// Magnification.
+    pub mag: vk::Filter,
+    /// Minification within a level.
+    pub min: vk::Filter,
+    /// Between levels; `None` stays on the base level.
+    pub mip: Option<vk::SamplerMipmapMode>,
+}
+
+impl SamplerDesc {
+    /// Bilinear, clamped, no mips.
+    pub const LINEAR: Self = Self {
+        wrap: [vk::SamplerAddressMode::CLAMP_TO_EDGE; 2],
+        mag: vk::Filter::LINEAR,
+        min: vk::Filter::LINEAR,
+        mip: None,
+    };
+    /// Nearest, clamped, no mips: for fetches.
+    pub const NEAREST: Self = Self { mag: vk::Filter::NEAREST, min: vk::Filter::NEAREST, ..Self::LINEAR };
+    /// Trilinear equirectangular map: wraps in u only.
+    pub const EQUIRECTANGULAR: Self = Self {
+        wrap: [vk::SamplerAddressMode::REPEAT, vk::SamplerAddressMode::CLAMP_TO_EDGE],
+        mip: Some(vk::SamplerMipmapMode::LINEAR),
+        ..Self::LINEAR
+    };
+}
+
+/// Everything that decides which pipeline a draw or dispatch needs.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) struct PipelineKey {
+    pub(super) program: &'static str,
+    pub(super) constants: Vec<(u32, u32)>,
+    pub(super) raster: Option<RasterKey>,
+}
+
+/// The part of a raster pipeline that is not dynamic.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) struct RasterKey {
+    pub(super) colors: Vec<vk::Format>,
+    pub(super) depth: Option<(vk::Format, bool)>,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Layout {
+    pub(super) set: vk::DescriptorSetLayout,
+    pub(super) pipeline: vk::PipelineLayout,
+}
+
+#[derive(Default)]
+pub(super) struct Caches {
+    pub(super) layouts: HashMap<&'static str, Layout>,
+    pub(super) pipelines: HashMap<PipelineKey, vk::Pipeline>,
+    pub(super) samplers: HashMap<SamplerDesc, vk::Sampler>,
+    pub(super) spirv_bytes: usize,
+}
+
+impl Caches {
+    /// # Safety
+    /// Nothing that was handed out may be in use.
+    pub(super) unsafe fn destroy(&mut self, raw: &ash::Device) {
+        // SAFETY: by the caller's promise.
+        unsafe {
+            for pipeline in self.pipelines.drain().map(|(_, p)| p) {
+                raw.destroy_pipeline(pipeline, None);
+            }
+            for layout in self.layouts.drain().map(|(_, l)| l) {
+                raw.destroy_pipeline_layout(layout.pipeline, None);
+                raw.destroy_descriptor_set_layout(layout.set, None);
+            }
+            for sampler in self.samplers.drain().map(|(_, s)| s) {
+                raw.destroy_sampler(sampler, None);
+            }
+        }
+    }
+}
