@@ -1,4 +1,5 @@
 //! Writes small glTF files for tests: JSON by hand, one buffer, as GLB or as JSON with a data URI.
+#![allow(clippy::unwrap_used, reason = "what it builds is its own JSON")]
 #![allow(dead_code, reason = "every test file uses its own share of this")]
 
 use std::path::{Path, PathBuf};
