@@ -43,16 +43,22 @@ vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across) {
     }
     for (uint i = 0; i < LOCAL_LIGHTS; i++) sum += local_light(s, DIRECTIONAL_LIGHTS + i);
     if (TILE_WORDS > 0) {
-        // Lights of the tile as a bit mask, in ascending order whatever built it.
-        uint tile = (uint(pixel.y) / TILE * tiles_across + uint(pixel.x) / TILE) * TILE_WORDS;
-        for (uint word = 0; word < TILE_WORDS; word++) {
-            uint bits = imageLoad(tile_lights, int(tile + word)).x;
-            loop_heads += 2 + uint(bitCount(bits));
-            while (bits != 0) {
-                uint bit = uint(findLSB(bits));
-                bits &= bits - 1;
-                sum += local_light(s, DIRECTIONAL_LIGHTS + word * 32 + bit);
+        // Lights of the tile as a bit mask, in ascending order whatever built it. Empty words are skipped in a loop of
+        // their own: lavapipe goes through a loop's body at least once, and a light is a long body.
+        int tile = int((uint(pixel.y) / TILE * tiles_across + uint(pixel.x) / TILE) * TILE_WORDS);
+        uint word = 0;
+        uint bits = imageLoad(tile_lights, tile).x;
+        while (true) {
+            loop_heads += 2;
+            while (bits == 0 && word + 1 < TILE_WORDS) {
+                loop_heads++;
+                word++;
+                bits = imageLoad(tile_lights, tile + int(word)).x;
             }
+            if (bits == 0) break;
+            uint bit = uint(findLSB(bits));
+            bits &= bits - 1;
+            sum += local_light(s, DIRECTIONAL_LIGHTS + word * 32 + bit);
         }
     }
     return sum;
