@@ -3,6 +3,7 @@
 //! lavapipe cannot index arrays of sampled images, but a layer is only a coordinate.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use anyhow::Result;
@@ -181,54 +182,58 @@ fn srgb_from_linear() -> &'static [u8] {
 /// by alpha, so that what is invisible does not fringe what is visible.
 fn mip_chain(rgba: &[u8], width: u32, height: u32, levels: u32, meaning: Meaning) -> Vec<u8> {
     let offsets = level_offsets(width, height, levels);
-    let last = offsets.last().copied().unwrap_or(0) as usize + 4;
-    let mut chain = Vec::with_capacity(last);
-    chain.extend_from_slice(rgba);
-    let opaque = rgba.chunks_exact(4).all(|texel| texel[3] == 255);
-    let (to_linear, to_srgb) = (linear_from_srgb(), srgb_from_linear());
+    let bytes = offsets.last().copied().unwrap_or(0) as usize + 4;
+    let mut chain = vec![0; bytes.max(rgba.len())];
+    chain[..rgba.len()].copy_from_slice(rgba);
+    let weighted = meaning == Meaning::Color && rgba.chunks_exact(4).any(|texel| texel[3] != 255);
     let (mut w, mut h) = (width as usize, height as usize);
     for level in 1..levels as usize {
         let (nw, nh) = ((w / 2).max(1), (h / 2).max(1));
-        let from = offsets[level - 1] as usize;
-        for y in 0..nh {
-            for x in 0..nw {
-                // An odd side of 2k + 1 becomes k: the last texel takes three.
-                let xs = [2 * x, (2 * x + 2).min(w).max(2 * x + 1)];
-                let xs = if x + 1 == nw { [xs[0].min(w - 1), w] } else { xs };
-                let ys = if y + 1 == nh { [(2 * y).min(h - 1), h] } else { [2 * y, 2 * y + 2] };
-                let mut sum = [0.0_f32; 4];
-                let mut weight = 0.0_f32;
-                let mut count = 0.0_f32;
-                for sy in ys[0]..ys[1] {
-                    for sx in xs[0]..xs[1] {
-                        let at = from + 4 * (sy * w + sx);
-                        let texel = [chain[at], chain[at + 1], chain[at + 2], chain[at + 3]];
-                        let alpha = if opaque || meaning == Meaning::Data { 1.0 } else { f32::from(texel[3]) };
-                        for c in 0..3 {
-                            let value = match meaning {
-                                Meaning::Color => to_linear[usize::from(texel[c])],
-                                Meaning::Data => f32::from(texel[c]),
-                            };
-                            sum[c] += alpha * value;
-                        }
-                        sum[3] += f32::from(texel[3]);
-                        weight += alpha;
-                        count += 1.0;
-                    }
-                }
-                for value in &sum[..3] {
-                    let mean = if weight > 0.0 { value / weight } else { 0.0 };
-                    chain.push(match meaning {
-                        Meaning::Color => to_srgb[(mean * 16384.0 + 0.5) as usize],
-                        Meaning::Data => (mean + 0.5) as u8,
-                    });
-                }
-                chain.push((sum[3] / count + 0.5) as u8);
+        let (above, below) = chain.split_at_mut(offsets[level] as usize);
+        let above = &above[offsets[level - 1] as usize..];
+        below[..4 * nw * nh].par_chunks_mut(4 * nw).enumerate().for_each(|(y, row)| {
+            // An odd side of 2k + 1 becomes k: the last texel takes three.
+            let ys = if y + 1 == nh { (2 * y).min(h - 1)..h } else { 2 * y..2 * y + 2 };
+            for (x, texel) in row.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+                let xs = if x + 1 == nw { (2 * x).min(w - 1)..w } else { 2 * x..2 * x + 2 };
+                *texel = average(above, w, xs, ys.clone(), meaning, weighted);
             }
-        }
+        });
         (w, h) = (nw, nh);
     }
     chain
+}
+
+/// Mean of a block of texels of a level `width` texels wide.
+fn average(
+    level: &[u8],
+    width: usize,
+    xs: Range<usize>,
+    ys: Range<usize>,
+    meaning: Meaning,
+    weighted: bool,
+) -> [u8; 4] {
+    let (to_linear, to_srgb) = (linear_from_srgb(), srgb_from_linear());
+    let mut sum = [0.0_f32; 4];
+    let mut weight = 0.0_f32;
+    let count = (xs.len() * ys.len()) as f32;
+    for y in ys {
+        for texel in level[4 * (y * width + xs.start)..4 * (y * width + xs.end)].as_chunks::<4>().0 {
+            let alpha = f32::from(texel[3]);
+            let share = if weighted { alpha } else { 1.0 };
+            for (sum, &byte) in sum.iter_mut().zip(&texel[..3]) {
+                *sum += share * if meaning == Meaning::Color { to_linear[usize::from(byte)] } else { f32::from(byte) };
+            }
+            sum[3] += alpha;
+            weight += share;
+        }
+    }
+    let mean = |sum: f32| if weight > 0.0 { sum / weight } else { 0.0 };
+    let byte = |sum: f32| match meaning {
+        Meaning::Color => to_srgb[(mean(sum) * 16384.0 + 0.5) as usize],
+        Meaning::Data => (mean(sum) + 0.5) as u8,
+    };
+    [byte(sum[0]), byte(sum[1]), byte(sum[2]), (sum[3] / count + 0.5) as u8]
 }
 
 #[cfg(test)]
