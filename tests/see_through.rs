@@ -10,14 +10,21 @@ mod raycast;
 
 use etalon::frame::{Background, Settings};
 use etalon::image::Picture;
-use etalon::scene::{AlphaMode, Camera, Image, Material, Sampler, Scene, TextureRef};
+use etalon::scene::{AlphaMode, Camera, Image, LightKind, Material, Sampler, Scene, TextureRef};
 use etalon::study;
 use etalon::study::shape::Shape;
 use glam::{Affine2, DAffine3, DVec3};
-use gpu::{Gpu, bits, settings};
-use made::{Made, Random, at, pane, unlit};
+use gpu::{Gpu, bits, knobs, settings};
+use made::{Made, Random, at, lambert, pane, unlit};
 
 const SIZE: [u32; 2] = [80, 45];
+
+/// The film of a picture from which nothing may be dropped.
+fn whole(gpu: &Gpu, scene: &Scene, settings: Settings) -> Picture {
+    let (rendered, film) = gpu.shot(scene, None, settings);
+    assert_eq!(rendered.dropped, 0, "{}: dropped fragments", scene.name);
+    film
+}
 
 /// Radiance and coverage behind a pixel: every surface along its ray, far to near, over nothing.
 fn over(scene: &Scene, camera: &Camera, size: [u32; 2], x: u32, y: u32) -> [f64; 4] {
@@ -105,7 +112,7 @@ fn panes_in_any_order_are_composited_far_to_near() {
     let gpu = Gpu::new();
     for count in [1, 2, 7, 60] {
         let scene = stack(count, eighths);
-        let film = gpu.film(&scene, settings(SIZE));
+        let film = whole(&gpu, &scene, settings(SIZE));
         let (worst, left_out) = against_over(&film, &scene, 1e-9);
         eprintln!("{count} panes: {worst:e}, left out {left_out}");
         // As many products and sums of numbers below 1: half an ulp each.
@@ -114,7 +121,7 @@ fn panes_in_any_order_are_composited_far_to_near() {
 
         let mut shuffled = scene.clone();
         Random(count as u64).shuffle(&mut shuffled.instances);
-        let again = gpu.film(&shuffled, settings(SIZE));
+        let again = whole(&gpu, &shuffled, settings(SIZE));
         assert!(bits(&film) == bits(&again), "{count} panes: the order of drawing shows");
     }
 }
@@ -124,7 +131,7 @@ fn any_opacity_is_good_to_a_half_float() {
     let gpu = Gpu::new();
     let mut scene = stack(20, |random| random.unit() as f32);
     scene.cameras[0].projection = made::orthographic(1.2);
-    let film = gpu.film(&scene, settings(SIZE));
+    let film = whole(&gpu, &scene, settings(SIZE));
     let (worst, left_out) = against_over(&film, &scene, 1e-9);
     eprintln!("{worst:e}, left out {left_out}");
     // Each opacity is rounded to 11 bits, relative 2^-12, and moves what shows by at most alpha times that; what stays
@@ -143,7 +150,7 @@ fn the_study_of_blending_shows_the_over_operator() {
             texture.sampler.mips = false;
         }
     }
-    let film = gpu.film(&scene, settings([160, 90]));
+    let film = whole(&gpu, &scene, settings([160, 90]));
     let (worst, left_out) = against_over(&film, &scene, 2e-3);
     eprintln!("{worst:e}, left out {left_out}");
     // Texels pass through half floats, rounded downwards: 2^-11 for each of up to three surfaces. What changes by as much
@@ -160,7 +167,7 @@ fn panes_through_each_other_change_places_at_the_line() {
         made.add(Shape::panel(3.0, 1.5), pane(color, 0.5), DAffine3::from_rotation_y(turn.to_radians()));
     }
     made.front(1.0);
-    let film = gpu.film(&made.0, settings(SIZE));
+    let film = whole(&gpu, &made.0, settings(SIZE));
     let row = &film.rgba[SIZE[0] as usize * 22..][..SIZE[0] as usize];
     // Red is turned towards the viewer on the left (+Y turns its left edge to +z): nearest there, so ½ red over ½ blue.
     assert_eq!(row[30], [0.5, 0.0, 0.25, 0.75]);
@@ -182,7 +189,7 @@ fn of_coplanar_panes_the_later_one_lies_on_top() {
             made.add(Shape::panel(9.0, 5.0), pane(color, 0.5), DAffine3::IDENTITY);
         }
         made.front(1.0);
-        let film = gpu.film(&made.0, settings(SIZE));
+        let film = whole(&gpu, &made.0, settings(SIZE));
         let want = if turned { [0.5, 0.25, 0.125, 0.875] } else { [0.125, 0.25, 0.5, 0.875] };
         assert!(film.rgba.iter().all(|p| *p == want), "{:?}, not {want:?}", film.rgba[0]);
     }
@@ -207,7 +214,7 @@ fn a_mask_is_there_or_not_at_its_cutoff() {
     }
     made.front(3.0);
     // One pixel a texel, one row of pixels a mask.
-    let film = gpu.film(&made.0, settings([256, 6]));
+    let film = whole(&gpu, &made.0, settings([256, 6]));
     for (row, cutoff) in [0.0_f32, 0.25, 0.5, 128.0 / 255.0, 1.0, 1.5].into_iter().enumerate() {
         for x in 0..256 {
             let there = film.rgba[row * 256 + x][3] == 1.0;
@@ -225,6 +232,7 @@ fn coverage_reaches_the_picture_with_a_transparent_background() {
     made.front(2.0);
     let settings = Settings { background: Background::Transparent, ..settings([64, 32]) };
     let (rendered, film) = gpu.shot(&made.0, None, settings);
+    assert_eq!(rendered.dropped, 0);
     assert!(rendered.has_alpha);
     let alpha = |x: usize| (film.rgba[64 * 16 + x], rendered.display[(64 * 16 + x) * 4 + 3]);
     assert_eq!(alpha(16), ([0.5, 0.25, 0.125, 0.5], 128), "premultiplied in the film; 0.5 rounds up to 128");
@@ -255,7 +263,7 @@ fn clear_sheets_tint_and_absorb_by_their_thickness() {
         };
         made.add(Shape::panel(9.0, 5.0), sheet, DAffine3::from_scale(DVec3::splat(scale)));
         made.front(1.0);
-        let film = gpu.film(&made.0, settings(SIZE));
+        let film = whole(&gpu, &made.0, settings(SIZE));
         let f0 = ((f64::from(ior) - 1.0) / (f64::from(ior) + 1.0)).powi(2);
         let path = f64::from(thickness) * scale / 0.5;
         let want = [1.0 * 0.5_f64.powf(path), 0.5, 0.25 * 0.25_f64.powf(path)].map(|v| v * (1.0 - f0));
@@ -276,7 +284,7 @@ fn opaque_walls_hide_what_is_behind_them() {
     made.add(Shape::panel(9.0, 5.0), unlit([0.0, 1.0, 0.0]), at(0.0, 0.0, 0.0));
     made.add(Shape::panel(9.0, 5.0), pane([1.0, 0.0, 0.0], 0.5), at(0.0, 0.0, -0.01));
     made.front(1.0);
-    let film = gpu.film(&made.0, settings(SIZE));
+    let film = whole(&gpu, &made.0, settings(SIZE));
     assert!(film.rgba.iter().all(|p| *p == [0.0, 1.0, 0.0, 1.0]));
 }
 
@@ -317,8 +325,111 @@ fn what_one_invocation_cannot_sort_is_counted() {
     }
     made.front(2.0);
     // 16 rows are 4 m: the panes of 1 m cover 4 columns.
-    let (rendered, film) = gpu.shot(&made.0, None, settings([32, 16]));
-    let covered = film.rgba.iter().filter(|p| p[3] > 0.0).count();
-    assert_eq!(covered, 4 * 16);
-    assert_eq!(rendered.dropped as usize, covered, "every pixel with more than 220 panes is counted, once");
+    for samples in ["samples=1", "samples=4"] {
+        let settings = Settings { knobs: knobs(&[samples]), ..settings([32, 16]) };
+        let mut renderer = gpu.renderer(&made.0, None, settings);
+        for picture in 1..=2 {
+            let rendered = renderer.render(&made.0.cameras[0], &mut |_, _| ()).expect("a picture");
+            let covered = renderer.film().expect("the film").rgba.iter().filter(|p| p[3] > 0.0).count();
+            eprintln!("{samples}, picture {picture}: {} dropped, {covered} covered", rendered.dropped);
+            // Edges lie between pixels: every sample of a covered pixel is covered.
+            assert_eq!(covered, 4 * 16);
+            assert_eq!(rendered.dropped as usize, covered, "{samples}, picture {picture}: each pixel is counted once");
+        }
+    }
+}
+
+#[test]
+fn memory_s_old_contents_are_not_counted_as_dropped() {
+    let gpu = Gpu::new();
+    let scene = study::load("blend").expect("a study scene");
+    let environment = etalon::scene::environment::Environment::studio();
+    // Staging of textures and of the environment has been where the counter lies.
+    let (rendered, _) = gpu.shot(&scene, Some(&environment), settings([96, 54]));
+    assert_eq!(rendered.dropped, 0);
+}
+
+/// `panes` sheets of white glass, 1 cm apart, under `lights` lights that are as strong together however many they are. With
+/// `stairs` each pane reaches less far to the right than the one before it, so that pixels beside each other see other
+/// numbers of them.
+fn lit_stack(panes: usize, lights: usize, stairs: bool) -> Scene {
+    let mut made = Made::new("lit stack");
+    let sheet = Material { base_color: [1.0, 1.0, 1.0, 0.03], alpha_mode: AlphaMode::Blend, ..lambert([1.0; 3]) };
+    for i in 0..panes {
+        let x = if stairs { -2.0 * i as f64 / panes as f64 } else { 0.0 };
+        made.add(Shape::panel(if stairs { 2.0 } else { 8.0 }, 4.0), sheet.clone(), at(x, 0.0, -0.01 * i as f64));
+    }
+    for _ in 0..lights {
+        made.light([1e5 / lights as f32; 3], LightKind::Point { position: DVec3::Z * 5.0, range: None });
+    }
+    made.front(1.0);
+    made.0
+}
+
+#[test]
+fn what_does_not_fit_into_the_loops_of_an_invocation_is_counted() {
+    let gpu = Gpu::new();
+    // lavapipe ends loops in silence after 65,535 heads; a pane costs a head for each light and for each pane.
+    for (panes, lights, stairs, fits) in [
+        (1, 10, false, Some(true)),
+        (30, 1000, false, Some(true)),
+        (36, 1000, false, None),
+        (60, 1000, false, Some(false)),
+        (100, 1000, false, Some(false)),
+        (1, 39_000, false, Some(true)),
+        (1, 60_000, false, None),
+        (2, 60_000, false, Some(false)),
+        (90, 300, true, Some(true)),
+        (100, 1000, true, Some(false)),
+        (150, 60, true, None),
+        (200, 20, true, None),
+    ] {
+        let want = gpu.film(&lit_stack(panes, 1, stairs), settings([8, 8]));
+        let (rendered, got) = gpu.shot(&lit_stack(panes, lights, stairs), None, settings([8, 8]));
+        // As many terms, half an ulp of the sum each; 64 pixels are alike or nearly so.
+        let bound = (lights + panes) as f64 * 2.0_f64.powi(-24);
+        let wrong = want.rgba.iter().zip(&got.rgba).filter(|(w, g)| {
+            (0..4).any(|c| (f64::from(w[c]) - f64::from(g[c])).abs() > bound * f64::from(w[c]) + 1e-9)
+        });
+        let wrong = wrong.count();
+        eprintln!("{panes} panes, {lights} lights, stairs {stairs}: {} dropped, {wrong} wrong", rendered.dropped);
+        assert!(want.rgba[0][0] > 1.0, "nothing is lit");
+        assert!(wrong <= rendered.dropped as usize, "{panes} panes, {lights} lights: wrong in silence");
+        assert!(rendered.dropped <= 64);
+        if let Some(fits) = fits {
+            assert_eq!(rendered.dropped == 0, fits, "{panes} panes, {lights} lights, stairs {stairs}");
+        }
+    }
+}
+
+#[test]
+fn glass_beside_a_nearer_wall_is_lit_through_the_background_s_part_of_its_tile() {
+    let gpu = Gpu::new();
+    for projection in [made::orthographic(1.0), made::perspective(20.0)] {
+        let scene = |dark: usize| {
+            let mut made = Made::new("behind");
+            // The wall ends in the midst of a tile of 16 pixels: column 24 of 64, seen in parallel.
+            made.add(Shape::panel(4.0, 8.0), unlit([0.25; 3]), at(-2.25, 0.0, 0.0));
+            let glass =
+                Material { base_color: [1.0, 0.5, 0.25, 0.5], alpha_mode: AlphaMode::Blend, ..lambert([1.0; 3]) };
+            made.add(Shape::panel(9.0, 5.0), glass, at(0.0, 0.0, -6.0));
+            // It reaches the glass and not the wall.
+            let position = DVec3::new(0.0, 0.0, -4.5);
+            made.light([9.0; 3], LightKind::Point { position, range: Some(4.0) });
+            for i in 0..dark {
+                let position = DVec3::new(0.1 * i as f64, 0.0, -5.0);
+                made.light([0.0; 3], LightKind::Point { position, range: Some(3.0) });
+            }
+            made.camera(DVec3::Z * 6.0, DVec3::ZERO, projection);
+            made.0
+        };
+        let one = whole(&gpu, &scene(0), settings([64, 64]));
+        let lists = whole(&gpu, &scene(15), settings([64, 64]));
+        let wrong = bits(&one).iter().zip(bits(&lists)).filter(|(a, b)| **a != *b).count();
+        eprintln!("{projection:?}: {wrong} pixels");
+        let lit = one.rgba.iter().filter(|p| p[0] > 0.26 && p[3] == 0.5).count();
+        assert!(lit > 500, "{projection:?}: {lit} pixels of lit glass");
+        // Adding zeros is exact: the same bits.
+        assert_eq!(wrong, 0, "{projection:?}: lists of lights show");
+    }
 }
