@@ -1,5 +1,4 @@
 //! Writes small glTF files for tests: JSON by hand, one buffer, as GLB or as JSON with a data URI.
-#![allow(clippy::unwrap_used, reason = "what it builds is its own JSON")]
 #![allow(dead_code, reason = "every test file uses its own share of this")]
 #![allow(clippy::unwrap_used, reason = "a test may stop where it stands")]
 
