@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::{env, fs, process};
 
 use rspirv::dr::{Instruction, Module, Operand};
-use rspirv::spirv::{BuiltIn, Decoration, Dim, ExecutionMode, Op, StorageClass};
+use rspirv::spirv::{Decoration, Dim, ExecutionMode, Op, StorageClass};
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
@@ -121,7 +121,6 @@ struct Names<'m> {
 fn word(operand: &Operand) -> u32 {
     match operand {
         Operand::IdRef(v) | Operand::LiteralBit32(v) => *v,
-        Operand::BuiltIn(b) => *b as u32,
         _ => 0,
     }
 }
@@ -330,7 +329,7 @@ fn vertex_inputs(stage: &Stage, names: &Names) -> Result<BTreeMap<u32, (String, 
         if !matches!(line.operands[0], Operand::StorageClass(StorageClass::Input)) {
             continue;
         }
-        if names.decorated(id, Decoration::BuiltIn).is_some_and(|b| b != BuiltIn::FragCoord as u32 || b == 0) {
+        if names.decorated(id, Decoration::BuiltIn).is_some() {
             continue;
         }
         let Some(location) = names.decorated(id, Decoration::Location) else { continue };
@@ -414,12 +413,14 @@ fn program(code: &mut String, name: &str, stages: &[Stage]) -> Result<()> {
         let names = Names::new(&stage.module);
         for binding in bindings(stage, &names)? {
             match all_bindings.get_mut(&binding.slot) {
-                Some(known) if known.name == binding.name && known.kind == binding.kind => {
+                Some(known)
+                    if (&known.name, known.kind, known.access) == (&binding.name, binding.kind, binding.access) =>
+                {
                     known.stages.extend(binding.stages);
                 }
                 Some(known) => {
                     return Err(format!(
-                        "{}: binding {} is `{}` here and `{}` in another stage",
+                        "{}: binding {} is `{}` here and `{}` in another stage, or of another kind or access",
                         stage.path, binding.slot, binding.name, known.name
                     ));
                 }

@@ -44,8 +44,10 @@ pub enum Background {
 /// Grey behind a scene without an environment, as sRGB bytes.
 pub const NEUTRAL_GREY: [u8; 3] = [119; 3];
 
-/// Lights that one invocation can loop over where the driver limits loops (65,535 heads), the masks' words included.
+/// Lights that one invocation can loop over where the driver limits loops to 65,535 heads: one head each …
 const MOST_LIGHTS: usize = 60_000;
+/// … and two each, besides one a word of 32, where tiles list them.
+const MOST_LISTED_LIGHTS: usize = 30_000;
 
 /// How a picture is made; everything that does not change between the frames of a sequence.
 #[derive(Debug, Clone)]
@@ -138,9 +140,6 @@ impl Renderer {
         if scene.triangles() == 0 {
             bail!("{}: there is nothing to draw, the scene has 0 triangles", scene.name);
         }
-        if device.limits_loops() && scene.lights.len() > MOST_LIGHTS {
-            bail!("{}: {} lights, a software device lights with at most {MOST_LIGHTS}", scene.name, scene.lights.len());
-        }
         let sky = match settings.background {
             Background::Default | Background::Environment => environment.is_some(),
             Background::Transparent | Background::Color(_) => false,
@@ -150,6 +149,10 @@ impl Renderer {
         }
         let surroundings = Surroundings { environment: environment.is_some(), sky };
         let plan = Plan::new(&scene, surroundings, &settings.knobs);
+        let most = if plan.tiles { MOST_LISTED_LIGHTS } else { MOST_LIGHTS };
+        if device.limits_loops() && scene.lights.len() > most {
+            bail!("{}: {} lights, a software device lights with at most {most} such", scene.name, scene.lights.len());
+        }
         let turn = Turn { intensity: settings.environment_intensity, rotation: settings.environment_rotation };
         let target = |name| {
             let usage = vk::ImageUsageFlags::STORAGE;
@@ -194,6 +197,11 @@ impl Renderer {
                     times.add(passes);
                     break;
                 }
+            }
+            if let Some(film) = &self.film {
+                let mut frame = Frame::new(&self.device);
+                accumulate(&mut frame, &self.radiance, film, index, count)?;
+                times.add(frame.finish()?);
             }
             dropped = dropped.max(self.lists.as_ref().map_or(0, FragmentLists::dropped));
             progress(index + 1, count);
@@ -246,9 +254,6 @@ impl Renderer {
             }
             frame.read_back(&lists.counters);
             frame.read_back(&lists.dropped);
-        }
-        if let Some(film) = &self.film {
-            accumulate(&mut frame, radiance, film, index, count)?;
         }
         frame.finish()
     }

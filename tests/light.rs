@@ -278,6 +278,18 @@ fn more_lights_than_a_loop_can_run_over_are_refused() {
         }
         made.0
     };
+    // Lists spend two loop heads a light.
+    let mut listed = with(30_001);
+    for light in &mut listed.lights {
+        if let LightKind::Point { range, .. } = &mut light.kind {
+            *range = Some(100.0);
+        }
+    }
+    assert!(Renderer::new(&gpu.device, listed.clone(), None, settings([8, 8])).is_err(), "30,001 listed lights");
+    listed.lights.remove(0);
+    let error = against_all_lights(&gpu, &listed, true, [9, 7]);
+    eprintln!("30,000 listed lights: {error:e}");
+    assert!(error < 30_000.0 * 2.0_f64.powi(-24), "{error:e}");
     for count in [60_001, 70_000] {
         let Err(error) = Renderer::new(&gpu.device, with(count), None, settings([8, 8])) else {
             panic!("{count} lights are drawn on a software device");
@@ -362,6 +374,83 @@ fn a_white_body_vanishes_in_a_white_furnace() {
         }
         eprintln!("{name}: {error:e}");
         assert!(error < bound, "{name}: {error:e}");
+    }
+}
+
+/// A rough white metal loses to single scattering what `ggx-multi` gives back: its directional reflectance, A + B of the
+/// table, divides out to a rounding where F0 = F90 = 1.
+#[test]
+fn a_rough_metal_is_dark_in_the_furnace_until_compensated() {
+    let gpu = Gpu::new();
+    let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness: 0.9, ..Material::default() };
+    let environment = Environment::constant([1.0; 3]);
+    let darkest = |brdf: &str| {
+        let mut settings = settings(SIZE);
+        settings.knobs.set(brdf).expect("a rung");
+        let (_, film) = gpu.shot(&ball(metal.clone()), Some(&environment), settings);
+        film.rgba.iter().fold((f32::MAX, f32::MIN), |(low, high), p| (low.min(p[0]), high.max(p[0])))
+    };
+    let (low, high) = darkest("brdf=ggx");
+    eprintln!("ggx {low} .. {high}");
+    assert!(low < 0.8 && high < 1.0001);
+    let (low, high) = darkest("brdf=ggx-multi");
+    eprintln!("ggx-multi {low} .. {high}");
+    assert!((low - 1.0).abs() < 2e-5 && (high - 1.0).abs() < 2e-5);
+}
+
+/// The same compensation for punctual lights: by 1 / (A + B), which is what the same metal shows in a furnace of 1.
+#[test]
+fn compensation_is_for_lights_too() {
+    let gpu = Gpu::new();
+    let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness: 0.9, ..Material::default() };
+    let mut scene = ball(metal);
+    let seen = |scene: &Scene, environment: Option<&Environment>, brdf: &str| {
+        let mut settings = settings(SIZE);
+        settings.knobs.set(brdf).expect("a rung");
+        gpu.shot(scene, environment, settings).1
+    };
+    let furnace = seen(&scene, Some(&Environment::constant([1.0; 3])), "brdf=ggx");
+    let direction = DVec3::new(0.0, -0.3, -1.0).normalize();
+    scene.lights.push(etalon::scene::Light {
+        name: "sun".to_owned(),
+        color: [1.0; 3],
+        kind: LightKind::Directional { direction },
+    });
+    let (single, multiple) = (seen(&scene, None, "brdf=ggx"), seen(&scene, None, "brdf=ggx-multi"));
+    let mut lit = 0;
+    for ((single, multiple), furnace) in single.rgba.iter().zip(&multiple.rgba).zip(&furnace.rgba) {
+        if single[0] > 1e-3 {
+            lit += 1;
+            // A handful of roundings of f32, and of the map's filter.
+            assert!((multiple[0] / single[0] * furnace[0] - 1.0).abs() < 2e-5, "{single:?} {multiple:?} {furnace:?}");
+        }
+    }
+    assert!(lit > 100, "{lit} pixels");
+}
+
+/// `fresnel=exact` of a half metal lies between its dielectric and its metal: the index of refraction is not mixed
+/// towards 1, below which a surface would reflect totally.
+#[test]
+fn exact_fresnel_of_a_half_metal_lies_between() {
+    let gpu = Gpu::new();
+    let environment = Environment::constant([1.0; 3]);
+    let seen = |metallic: f32| {
+        let material = Material { base_color: [0.5, 0.5, 0.5, 1.0], metallic, roughness: 0.3, ..Material::default() };
+        let mut scene = ball(material);
+        scene.lights.push(etalon::scene::Light {
+            name: "sun".to_owned(),
+            color: [1.0; 3],
+            kind: LightKind::Directional { direction: DVec3::new(0.9, -0.1, 0.4).normalize() },
+        });
+        let mut settings = settings(SIZE);
+        settings.knobs.set("fresnel=exact").expect("a rung");
+        gpu.shot(&scene, Some(&environment), settings).1
+    };
+    let (dielectric, half, metal) = (seen(0.0), seen(0.5), seen(1.0));
+    for ((d, h), m) in dielectric.rgba.iter().zip(&half.rgba).zip(&metal.rgba) {
+        let (low, high) = (d[0].min(m[0]), d[0].max(m[0]));
+        // The mixture is linear but for the ambient term's largest component: a hundredth of room.
+        assert!(h[0] > low * 0.99 - 1e-4 && h[0] < high * 1.01 + 1e-4, "{d:?} {h:?} {m:?}");
     }
 }
 

@@ -238,3 +238,30 @@ fn edges_between_triangles_do_not_show_in_a_texture() {
         assert!(most < 3.0 * 0.88 / 256.0, "{cells} cells a side: {most:e}");
     }
 }
+
+/// Tangent-space normals on a double-sided face: (T x + B y + N z) from the front, and all of it reversed from behind
+/// (glTF 2.0, double sided): a bump seen from behind is a dent.
+#[test]
+fn a_mapped_normal_is_reversed_as_a_whole_from_behind() {
+    use etalon::scene::{Image, Material, Sampler, TextureRef};
+    let gpu = Gpu::new();
+    let mut made = made::Made::new("bumps");
+    let texel = [192_u8, 160, 230, 255];
+    made.0.images.push(Image { name: "tilt".to_owned(), width: 1, height: 1, rgba: texel.to_vec() });
+    let texture =
+        TextureRef { image: 0, uv_set: 0, uv_transform: glam::Affine2::IDENTITY, sampler: Sampler::default() };
+    let material = Material { normal_texture: Some(texture), double_sided: true, ..Material::default() };
+    made.add(Shape::panel(8.0, 8.0), material, glam::DAffine3::IDENTITY);
+    let corners = made.0.meshes[0].positions.len();
+    made.0.meshes[0].tangents = vec![[1.0, 0.0, 0.0, 1.0]; corners];
+    made.camera(DVec3::Z * 5.0, DVec3::ZERO, made::perspective(40.0));
+    made.camera(DVec3::NEG_Z * 5.0, DVec3::ZERO, made::perspective(40.0));
+    let expected = DVec3::from_array([0, 1, 2].map(|c| f64::from(texel[c]) / 255.0 * 2.0 - 1.0)).normalize();
+    for (camera, sign) in [(0, 1.0), (1, -1.0)] {
+        let mut renderer = gpu.renderer(&made.0, None, settings([16, 16]));
+        let (aovs, _) = renderer.aovs(&made.0.cameras[camera]).expect("AOVs");
+        let seen = Vec3::from(aovs[8 * 16 + 8].normal).as_dvec3();
+        // Octahedral 2x16 bits: 3.7e-3 degrees are 6.5e-5.
+        assert!((seen - expected * sign).length() < 1e-4, "camera {camera}: {seen} is not {}", expected * sign);
+    }
+}

@@ -433,3 +433,28 @@ fn glass_beside_a_nearer_wall_is_lit_through_the_background_s_part_of_its_tile()
         assert_eq!(wrong, 0, "{projection:?}: lists of lights show");
     }
 }
+
+/// The lists begin with one node a pixel. A pane over the whole picture fills them; a sliver that only the second sample
+/// meets overflows them, so that this sample is drawn again. The second picture of the same renderer has room from the
+/// start: it must be the same.
+#[test]
+fn a_sample_that_is_drawn_again_counts_once() {
+    let gpu = Gpu::new();
+    let size = [8, 8];
+    let mut made = Made::new("overflow at the second sample");
+    made.add(Shape::panel(16.0, 16.0), pane([0.5, 0.25, 1.0], 0.5), DAffine3::IDENTITY);
+    // One unit is one pixel; samples lie at jitter(1, 4) from the centres of pixels, y down.
+    let jitter = etalon::pass::view::jitter(1, 4);
+    made.add(Shape::panel(0.05, 0.05), pane([1.0; 3], 0.5), at(0.5 + jitter.x, 0.5 - jitter.y, 1.0));
+    made.front(4.0);
+    let settings = Settings { knobs: knobs(&["samples=4"]), ..settings(size) };
+    let mut renderer = gpu.renderer(&made.0, None, settings);
+    let mut film = || {
+        renderer.render(&made.0.cameras[0], &mut |_, _| ()).expect("a picture");
+        renderer.film().expect("a film")
+    };
+    let (first, second) = (film(), film());
+    assert_eq!(bits(&first), bits(&second));
+    let brightest = first.rgba.iter().fold(0.0_f32, |most, p| most.max(p[3]));
+    assert!(brightest > 0.5 && brightest < 0.7, "the sliver is seen by one sample of four: {brightest}");
+}

@@ -96,32 +96,32 @@ vec3 environment_light(Surface s) {
     float cos_v = clamp(dot(s.n, s.v), 0.0, 1.0);
     vec3 r = 2.0 * dot(s.n, s.v) * s.n - s.v;
     vec2 ab = textureLod(reflectance, vec2(cos_v, s.roughness), 0.0).rg;
-    vec3 specular = s.f0 * ab.x + s.f90 * ab.y;
-    if (BRDF == 3) {
-        // Light that leaves the microsurface after more than one reflection (Fdez-Agüera 2019).
-        float lost = 1.0 - (ab.x + ab.y);
-        vec3 average = s.f0 + (vec3(s.f90) - s.f0) / 21.0;
-        specular += specular * average * lost / (1.0 - average * lost);
-    }
     vec3 result = vec3(0.0);
-    if (AMBIENT) result += s.diffuse * INV_PI * (1.0 - specular) * environment_irradiance(s.n);
-    if (REFLECTION) result += specular * prefiltered_radiance(r, s.alpha);
+    if (AMBIENT) {
+        float enters = 1.0 - largest(s.f0_dielectric * ab.x + s.f90_dielectric * ab.y);
+        result += s.diffuse * (INV_PI * enters) * environment_irradiance(s.n);
+    }
+    if (REFLECTION) result += (s.f0 * ab.x + s.f90 * ab.y) * s.compensation * prefiltered_radiance(r, s.alpha);
     if (CLEARCOAT) {
-        float coat_v = clamp(dot(s.n_coat, s.v), 0.0, 1.0);
         vec3 coat_r = 2.0 * dot(s.n_coat, s.v) * s.n_coat - s.v;
-        vec2 coat = textureLod(reflectance, vec2(coat_v, s.clearcoat_roughness), 0.0).rg;
-        result *= 1.0 - s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, coat_v).x;
+        vec2 coat_at = vec2(clamp(dot(s.n_coat, s.v), 0.0, 1.0), s.clearcoat_roughness);
+        vec2 coat = textureLod(reflectance, coat_at, 0.0).rg;
+        result *= under_coat(s);
         if (REFLECTION) result += s.clearcoat * (0.04 * coat.x + coat.y) * prefiltered_radiance(coat_r, s.clearcoat_alpha);
     }
     return result * s.occlusion;
 }
 
 vec3 radiance_to_eye(Surface s, ivec2 pixel, uint tiles_across) {
+    if (BRDF == 3) {
+        // Light that leaves the microsurface after more than one reflection keeps the shape of the lobe: scaled so that a
+        // white metal reflects all it receives (Turquin 2019).
+        vec2 ab = textureLod(reflectance, vec2(clamp(dot(s.n, s.v), 0.0, 1.0), s.roughness), 0.0).rg;
+        s.compensation = 1.0 + s.f0 * (1.0 / (ab.x + ab.y) - 1.0);
+    }
     vec3 result = punctual_light(s, pixel, tiles_across);
     if (AMBIENT || REFLECTION) result += environment_light(s);
-    float under_coat = 1.0;
-    if (CLEARCOAT) under_coat = 1.0 - s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, clamp(dot(s.n_coat, s.v), 0.0, 1.0)).x;
-    result += s.emissive * under_coat;
+    result += CLEARCOAT ? s.emissive * under_coat(s) : s.emissive;
     return s.unlit ? s.base : result;
 }
 #endif

@@ -16,9 +16,13 @@ struct Surface {
     vec3 n_coat;         // shading normal of the clear coat
     vec3 v;              // to the viewer
     vec3 diffuse;        // albedo of the diffuse part
-    vec3 f0;
+    float metallic;
+    vec3 f0_dielectric;
+    float f90_dielectric;
+    vec3 f0;             // of the mixture of dielectric and metal
     float f90;
-    float ior;           // of the dielectric part; 0 where it has none (a metal)
+    float ior;           // of the dielectric part
+    vec3 compensation;   // of light lost to single scattering: 1 but for `ggx-multi`
     float alpha;         // roughness²
     float roughness;
     float occlusion;
@@ -43,9 +47,13 @@ Surface surface_from_texels(Material m, vec3 base, float metallic, float roughne
     s.base = base * m.base_color.rgb;
     float metal = metallic * m.metallic;
     s.diffuse = s.base * (1.0 - metal);
-    s.f0 = mix(m.f0 * layers.z, s.base, metal);
-    s.f90 = mix(m.f90 * layers.z, 1.0, metal);
-    s.ior = m.ior * (1.0 - metal);
+    s.metallic = metal;
+    s.f0_dielectric = m.f0 * layers.z;
+    s.f90_dielectric = m.f90 * layers.z;
+    s.f0 = mix(s.f0_dielectric, s.base, metal);
+    s.f90 = mix(s.f90_dielectric, 1.0, metal);
+    s.ior = m.ior;
+    s.compensation = vec3(1.0);
     s.roughness = max(roughness * m.roughness, MIN_ROUGHNESS);
     s.alpha = s.roughness * s.roughness;
     s.occlusion = 1.0 + m.occlusion_strength * (occlusion - 1.0);
@@ -57,47 +65,56 @@ Surface surface_from_texels(Material m, vec3 base, float metallic, float roughne
     return s;
 }
 
-vec3 fresnel(Surface s, float cos_in) {
-    vec3 schlick = fresnel_schlick(s.f0, s.f90, cos_in);
-    if (FRESNEL == 0) return schlick;
-    // Exact for what the index of refraction describes; F0 may be tinted by KHR_materials_specular, so the exact curve
-    // is carried over as its share between F0 and 1. Metals given by a colour alone have no n and κ: Schlick.
-    if (s.ior <= 0.0) return schlick;
-    float n = s.ior;
-    float r0 = (n - 1.0) / (n + 1.0);
+// Reflectance of the dielectric part.
+vec3 fresnel_of_dielectric(Surface s, float cos_in) {
+    if (FRESNEL == 0) return fresnel_schlick(s.f0_dielectric, s.f90_dielectric, cos_in);
+    // F0 may be tinted by KHR_materials_specular, so the exact curve is carried over as its share between F0 and 1.
+    float r0 = (s.ior - 1.0) / (s.ior + 1.0);
     r0 *= r0;
-    float share = clamp((fresnel_dielectric(n, cos_in) - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
-    return s.f0 + (vec3(s.f90) - s.f0) * share;
+    float share = clamp((fresnel_dielectric(s.ior, cos_in) - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
+    return s.f0_dielectric + (vec3(s.f90_dielectric) - s.f0_dielectric) * share;
+}
+
+// Reflectance of the mixture. Metals given by a colour alone have no n and κ: Schlick on every rung.
+vec3 fresnel(Surface s, float cos_in) {
+    return mix(fresnel_of_dielectric(s, cos_in), fresnel_schlick(s.base, 1.0, cos_in), s.metallic);
+}
+
+float largest(vec3 v) {
+    return max(v.x, max(v.y, v.z));
 }
 
 // BRDF times cosθ_l for light from the unit direction l (lecture B2): what irradiance perpendicular to l becomes.
 vec3 reflected(Surface s, vec3 l) {
     float cos_l = dot(s.n, l);
-    // Self-shadow (lecture B9).
-    if (cos_l <= 0.0) return vec3(0.0);
     float cos_v = max(dot(s.n, s.v), 1e-4);
     vec3 sum = l + s.v;
     float sum2 = dot(sum, sum);
     vec3 h = sum2 > 0.0 ? sum * inversesqrt(sum2) : s.n;
     float cos_d = clamp(dot(s.v, h), 0.0, 1.0);
-    vec3 result;
-    if (BRDF <= 1) {
-        float shine = shine_from_alpha(s.alpha);
-        float lobe = pow(max(dot(s.n, h), 0.0), shine);
-        // k_s such that the lobe of B6 reflects F0 of the light at normal incidence (lecture B6).
-        vec3 ks = s.f0 * ((shine + 2.0) * 0.5 * INV_PI);
-        if (BRDF == 0) {
-            // B5: the lobe is not multiplied by cosθ_l.
-            result = s.diffuse * INV_PI * cos_l + ks * (lobe * 0.25);
+    vec3 result = vec3(0.0);
+    // Self-shadow (lecture B9).
+    if (cos_l > 0.0) {
+        if (BRDF <= 1) {
+            float shine = shine_from_alpha(s.alpha);
+            float lobe = pow(max(dot(s.n, h), 0.0), shine);
+            // k_s such that the lobe of B6 reflects F0 of the light at normal incidence (lecture B6).
+            vec3 ks = s.f0 * ((shine + 2.0) * 0.5 * INV_PI);
+            if (BRDF == 0) {
+                // B5: the lobe is not multiplied by cosθ_l.
+                result = s.diffuse * INV_PI * cos_l + ks * (lobe * 0.25);
+            } else {
+                // B6: the reciprocal form; (L + V)² is taken from the components (numerics.md 18).
+                result = (s.diffuse * INV_PI + (sum2 > 0.0 ? ks * (lobe / sum2) : vec3(0.0))) * cos_l;
+            }
         } else {
-            // B6: the reciprocal form; (L + V)² is taken from the components (numerics.md 18).
-            result = (s.diffuse * INV_PI + (sum2 > 0.0 ? ks * (lobe / sum2) : vec3(0.0))) * cos_l;
+            // What the dielectric's surface reflects does not reach its diffuse ground; its largest component, so that a
+            // tinted F0 gives no complementary colour (KHR_materials_specular).
+            float enters = 1.0 - largest(fresnel_of_dielectric(s, cos_d));
+            float d = ggx_distribution(s.n, h, s.alpha);
+            float vis = ggx_visibility(cos_l, cos_v, s.alpha);
+            result = (s.diffuse * (INV_PI * enters) + fresnel(s, cos_d) * s.compensation * (d * vis)) * cos_l;
         }
-    } else {
-        vec3 f = fresnel(s, cos_d);
-        float d = ggx_distribution(s.n, h, s.alpha);
-        float vis = ggx_visibility(cos_l, cos_v, s.alpha);
-        result = (s.diffuse * INV_PI * (1.0 - f) + f * (d * vis)) * cos_l;
     }
     if (CLEARCOAT) {
         float f = s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, cos_d).x;
@@ -107,5 +124,10 @@ vec3 reflected(Surface s, vec3 l) {
         result = result * (1.0 - f) + f * d * vis * coat_l;
     }
     return result;
+}
+
+// What the clear coat lets through to the eye.
+float under_coat(Surface s) {
+    return 1.0 - s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, clamp(dot(s.n_coat, s.v), 0.0, 1.0)).x;
 }
 #endif

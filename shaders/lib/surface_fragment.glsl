@@ -3,7 +3,9 @@
 #ifndef SURFACE_FRAGMENT_GLSL
 #define SURFACE_FRAGMENT_GLSL
 #include "lib/gbuffer_interface.glsl"
+#include "share/camera.glsl"
 
+layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera_block; };
 layout(scalar, set = 0, binding = 2) readonly buffer Materials { Material materials[]; };
 // Two texels per slot: row of u, layer | row of v, coordinate set. A texel buffer, not a storage buffer: lavapipe 22.3
 // masks storage-buffer loads of helper invocations to 0, and the texture's level would come out of those coordinates.
@@ -56,8 +58,7 @@ vec3 bent_normal(vec3 n, vec3 texel) {
     vec3 t = t_rel.xyz - n * dot(n, t_rel.xyz);
     float t2 = dot(t, t);
     vec3 t_unit = t2 > 0.0 ? t * inversesqrt(t2) : vec3(0.0);
-    float side = gl_FrontFacing ? t_rel.w : -t_rel.w;
-    vec3 bent = t_unit * texel.x + cross(n, t_unit) * (side * texel.y) + n * texel.z;
+    vec3 bent = t_unit * texel.x + cross(n, t_unit) * (t_rel.w * texel.y) + n * texel.z;
     float bent2 = dot(bent, bent);
     return bent2 > 0.0 ? bent * inversesqrt(bent2) : n;
 }
@@ -88,13 +89,13 @@ SurfaceFragment surface_fragment() {
 
     // The face's own normal from the positions of neighbouring fragments: they lie in the plane of the triangle.
     vec3 face = cross(dFdx(p_rel), dFdy(p_rel));
-    face = dot(face, p_rel) > 0.0 ? -face : face;
+    vec3 view = camera_block.orthographic != 0 ? camera_block.forward : p_rel;
+    face = dot(face, view) > 0.0 ? -face : face;
     float size = max(abs(face.x), max(abs(face.y), abs(face.z)));
     // A face seen exactly edge-on has no extent on the screen: any normal to the viewer will do.
-    s.n_geometric = size > 0.0 ? normalize(face / size) : normalize(-p_rel);
+    s.n_geometric = size > 0.0 ? normalize(face / size) : normalize(-view);
 
     vec3 n = normalize(n_rel);
-    if (!gl_FrontFacing) n = -n;
     s.n_shading = n;
     s.n_coat = n;
     if (HAS_NORMAL) {
@@ -102,6 +103,11 @@ SurfaceFragment surface_fragment() {
         s.n_shading = bent_normal(n, vec3(texel.xy * materials[ids.y].normal_scale, texel.z));
     }
     if (HAS_COAT_NORMAL) s.n_coat = bent_normal(n, read(coat_normal_page, SLOT_CLEARCOAT_NORMAL).xyz * 2.0 - 1.0);
+    // From behind, the mapped normal is reversed as a whole (glTF 2.0 section 3.9.5, double sided).
+    if (!gl_FrontFacing) {
+        s.n_shading = -s.n_shading;
+        s.n_coat = -s.n_coat;
+    }
     return s;
 }
 #endif

@@ -15,7 +15,7 @@ layout(push_constant, scalar) uniform Push { uvec2 size; };
 
 void main() {
     uvec2 tiles = (size + WORK_TILE - 1) / WORK_TILE;
-    uint tile = gl_GlobalInvocationID.x;
+    uint tile = listed_tile(gl_WorkGroupID) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
     if (tile >= tiles.x * tiles.y) return;
     uvec2 first = uvec2(tile % tiles.x, tile / tiles.x) * WORK_TILE;
     uvec2 last = min(first + WORK_TILE, size);

@@ -14,7 +14,7 @@ layout(push_constant, scalar) uniform Push { uint width; uint first_row; uint en
 void main() {
     uvec2 size = uvec2(width, end_row - first_row);
     uvec2 tiles = (size + WORK_TILE - 1) / WORK_TILE;
-    uint tile = gl_GlobalInvocationID.x;
+    uint tile = listed_tile(gl_WorkGroupID) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
     if (tile >= tiles.x * tiles.y) return;
     uvec2 first = uvec2(tile % tiles.x, tile / tiles.x) * WORK_TILE + uvec2(0, first_row);
     uvec2 last = min(first + WORK_TILE, uvec2(width, end_row));

@@ -84,6 +84,7 @@ void main() {
         float transmits = m.transmission * layer.a * (1.0 - blue_metal.y * m.metallic);
         vec3 f = fresnel(s, clamp(dot(s.n, s.v), 0.0, 1.0));
         vec3 passes = transmits * s.base * exp(-m.sigma_thickness * (occlusion_thickness.y * instances[nodes[at + 2]].scale)) * (1.0 - f);
+        if (CLEARCOAT) passes *= under_coat(s);
         s.diffuse *= 1.0 - transmits;
         float alpha = blue_alpha.y;
         sum += through * alpha * radiance_to_eye(s, pixel, tiles_across);

@@ -5,6 +5,7 @@
 #extension GL_EXT_scalar_block_layout : require
 layout(local_size_x = 64) in;
 #include "lib/camera.glsl"
+#include "lib/work_tile.glsl"
 
 layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
 layout(set = 0, binding = 1, rgba32f) readonly uniform imageBuffer lights;
@@ -14,7 +15,7 @@ layout(push_constant, scalar) uniform Push { uint first; uint count; uint words;
 const int TILE = 16;
 
 void main() {
-    uint job = gl_GlobalInvocationID.x;
+    uint job = listed_tile(gl_WorkGroupID) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
     if (job >= tiles * words) return;
     uint tile = job / words;
     uint word = job - tile * words;

@@ -31,9 +31,8 @@ struct Document<'a> {
 /// When there is no Vulkan loader.
 pub fn run(args: &DevicesArgs) -> Result<ExitCode> {
     let devices = candidates()?;
-    let rank =
-        |c: &Candidate| ["discrete", "integrated", "virtual", "other", "cpu"].iter().position(|k| *k == c.info.kind);
-    let used = (0..devices.len()).filter(|&i| devices[i].missing.is_empty()).min_by_key(|&i| (rank(&devices[i]), i));
+    let used =
+        (0..devices.len()).filter(|&i| devices[i].missing.is_empty()).min_by_key(|&i| (devices[i].info.rank(), i));
     if args.json {
         let document = Document { schema: "etalon.devices/1", devices: &devices, used };
         print(&serde_json::to_string_pretty(&document)?)?;

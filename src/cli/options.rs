@@ -164,6 +164,9 @@ impl SceneOptions {
             bail!("--env-intensity and --env-rotation are finite numbers, the intensity not negative");
         }
         match self.env.as_deref() {
+            Some("none") if self.env_intensity != 1.0 || self.env_rotation != 0.0 => {
+                bail!("--env none: there is no environment for --env-intensity and --env-rotation to change")
+            }
             Some("none") => Ok((None, Vec::new())),
             Some(path) => Environment::load(&PathBuf::from(path)).map(|(map, warnings)| (Some(map), warnings)),
             None => Ok((Some(Environment::studio()), Vec::new())),

@@ -213,6 +213,9 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let mut renderer = Renderer::new(&device, scene, environment.as_ref(), settings)?;
     drop(environment);
     phases.end("upload");
+    for warning in &renderer.plan.warnings {
+        tracing::info!("{warning}");
+    }
     if tracing::enabled!(tracing::Level::INFO) {
         for effect in &renderer.plan.effects {
             tracing::info!("{}: {} ({})", effect.name, effect.state, effect.reason);
@@ -405,9 +408,8 @@ fn layer(pixels: &[AovPixel], view: &View, name: AovName) -> Aov {
         AovName::Metallic => ("metallic", &["Y"][..], numbers(&|p| p.metallic)),
         AovName::Emissive => ("emissive", rgb, vectors(&|p| p.emissive)),
         AovName::Material => ("material", &["id"][..], AovData::U32(pixels.iter().map(|p| p.material).collect())),
-        AovName::Instance | AovName::Reflection | AovName::Refraction => {
-            ("instance", &["id"][..], AovData::U32(pixels.iter().map(|p| p.instance).collect()))
-        }
+        AovName::Instance => ("instance", &["id"][..], AovData::U32(pixels.iter().map(|p| p.instance).collect())),
+        AovName::Reflection | AovName::Refraction => unreachable!("refused by `outputs`"),
     };
     Aov { name: title.to_owned(), channels: channels.iter().map(|c| (*c).to_owned()).collect(), samples }
 }

@@ -24,7 +24,8 @@ pub struct Report {
     pub plan: PlanFacts,
     /// GPU time per pass over the repeats.
     pub passes: Vec<PassFacts>,
-    /// Wall time of each phase in milliseconds.
+    /// Wall time of each phase in milliseconds. `bvh` is 0, none is built; `pipelines` is 0, they are made inside `upload`
+    /// and `frame`, where the driver compiles them at their first use.
     pub phases_ms: BTreeMap<&'static str, f64>,
     /// Work counts: the same on every machine.
     pub work: Work,
@@ -112,7 +113,7 @@ impl PlanFacts {
                 .into_iter()
                 .filter(|made| matches!(made.kind, "buffer" | "image") && made.name != "staging")
                 .collect(),
-            warnings: Vec::new(),
+            warnings: plan.warnings.clone(),
         }
     }
 }

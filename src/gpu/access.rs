@@ -33,8 +33,6 @@ pub enum Access {
     TransferDst,
     /// Read by the host after the frame has finished.
     HostRead,
-    /// Shown by the presentation engine.
-    Present,
 }
 
 /// What an [`Access`] means to Vulkan.
@@ -91,7 +89,6 @@ impl Access {
             Self::TransferSrc => (S::ALL_TRANSFER, A::TRANSFER_READ, L::TRANSFER_SRC_OPTIMAL, false),
             Self::TransferDst => (S::ALL_TRANSFER, A::TRANSFER_WRITE, L::TRANSFER_DST_OPTIMAL, true),
             Self::HostRead => (S::HOST, A::HOST_READ, L::GENERAL, false),
-            Self::Present => (S::NONE, A::NONE, L::PRESENT_SRC_KHR, false),
         };
         Masks { stages, access, layout, writes }
     }

@@ -58,6 +58,14 @@ pub struct DeviceInfo {
     pub api: String,
 }
 
+impl DeviceInfo {
+    /// Place of its kind among the kinds, the best first.
+    #[must_use]
+    pub fn rank(&self) -> Option<usize> {
+        ["discrete", "integrated", "virtual", "other", "cpu"].iter().position(|kind| *kind == self.kind)
+    }
+}
+
 /// A device that Vulkan offers here, and what keeps Etalon from using it.
 #[derive(Debug, Clone, Serialize)]
 pub struct Candidate {
@@ -207,12 +215,18 @@ impl Instance {
             },
             api: version(properties.api_version),
         };
-        let missing = self.missing(physical, properties.api_version, push.max_push_descriptors);
+        let missing = self.missing(physical, properties.api_version, push.max_push_descriptors, properties.limits);
         Candidate { info, missing, physical }
     }
 
     /// What the device lacks, each with the Mesa version that brings it where that helps.
-    fn missing(&self, physical: vk::PhysicalDevice, api: u32, push_descriptors: u32) -> Vec<String> {
+    fn missing(
+        &self,
+        physical: vk::PhysicalDevice,
+        api: u32,
+        push_descriptors: u32,
+        limits: vk::PhysicalDeviceLimits,
+    ) -> Vec<String> {
         if api < vk::API_VERSION_1_3 {
             return vec!["Vulkan 1.3 (lavapipe: Mesa 22.1 or newer)".to_owned()];
         }
@@ -232,6 +246,7 @@ impl Instance {
         for (has, what) in [
             (core.fragment_stores_and_atomics, "feature fragmentStoresAndAtomics"),
             (core.shader_storage_image_extended_formats, "feature shaderStorageImageExtendedFormats"),
+            (core.full_draw_index_uint32, "feature fullDrawIndexUint32"),
             (core.geometry_shader, "feature geometryShader (for gl_PrimitiveID in fragments)"),
             (v12.timeline_semaphore, "feature timelineSemaphore"),
             (v12.scalar_block_layout, "feature scalarBlockLayout (lavapipe: Mesa 21.1 or newer)"),
@@ -241,6 +256,31 @@ impl Instance {
         ] {
             if has == vk::FALSE {
                 missing.push(what.to_owned());
+            }
+        }
+        use vk::FormatFeatureFlags as F;
+        let target = F::COLOR_ATTACHMENT | F::STORAGE_IMAGE;
+        for (format, uses, what) in [
+            (vk::Format::R16G16B16A16_SFLOAT, target, "colour targets and storage images of RGBA16_SFLOAT"),
+            (vk::Format::R16G16B16A16_SNORM, target, "colour targets and storage images of RGBA16_SNORM"),
+            (vk::Format::R16G16B16A16_UNORM, target, "colour targets and storage images of RGBA16_UNORM"),
+            (vk::Format::R32G32_UINT, target, "colour targets and storage images of RG32_UINT"),
+            (vk::Format::R32G32B32A32_SFLOAT, F::SAMPLED_IMAGE_FILTER_LINEAR, "linear filtering of RGBA32_SFLOAT"),
+        ] {
+            // SAFETY: a plain query.
+            let has = unsafe { self.raw.get_physical_device_format_properties(physical, format) };
+            if !has.optimal_tiling_features.contains(uses) {
+                missing.push(what.to_owned());
+            }
+        }
+        for (has, needed, what) in [
+            (limits.max_per_stage_descriptor_storage_images, 10, "storage images in a shader"),
+            (limits.max_per_stage_descriptor_storage_buffers, 8, "storage buffers in a shader"),
+            (limits.max_color_attachments, 5, "colour targets"),
+            (limits.max_texel_buffer_elements, 1 << 22, "texels in a buffer"),
+        ] {
+            if has < needed {
+                missing.push(format!("{needed} {what} (it has {has})"));
             }
         }
         if !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::push_descriptor::NAME)) {
@@ -298,7 +338,6 @@ fn choose(all: Vec<Candidate>, choice: &DeviceChoice) -> Result<Candidate> {
         bail!("Vulkan offers no device here (Debian: install mesa-vulkan-drivers for the software device)");
     }
     let names = all.iter().map(|c| format!("\"{}\"", c.info.name)).collect::<Vec<_>>().join(", ");
-    let rank = |kind: &str| ["discrete", "integrated", "virtual", "other", "cpu"].iter().position(|k| *k == kind);
     let mut wanted: Vec<(usize, Candidate)> = all
         .into_iter()
         .enumerate()
@@ -311,7 +350,7 @@ fn choose(all: Vec<Candidate>, choice: &DeviceChoice) -> Result<Candidate> {
         })
         .collect();
     // A usable device of lower rank beats an unusable one.
-    wanted.sort_by_key(|(index, c)| (!c.missing.is_empty(), rank(c.info.kind), *index));
+    wanted.sort_by_key(|(index, c)| (!c.missing.is_empty(), c.info.rank(), *index));
     let Some((_, best)) = wanted.into_iter().next() else {
         let what = match choice {
             DeviceChoice::Best => "a device".to_owned(),
@@ -344,7 +383,6 @@ pub struct Device {
     created: Mutex<Vec<Created>>,
     info: DeviceInfo,
     instance: Instance,
-    physical: vk::PhysicalDevice,
 }
 
 impl Device {
@@ -378,6 +416,7 @@ impl Device {
         let core = vk::PhysicalDeviceFeatures::default()
             .fragment_stores_and_atomics(true)
             .shader_storage_image_extended_formats(true)
+            .full_draw_index_uint32(true)
             .geometry_shader(true);
         let mut v12 = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true).scalar_block_layout(true);
         let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
@@ -430,7 +469,6 @@ impl Device {
             created: Mutex::default(),
             info,
             instance,
-            physical,
         }))
     }
 
@@ -474,14 +512,6 @@ impl Device {
     #[must_use]
     pub fn max_storage_bytes(&self) -> u64 {
         u64::from(self.limits.max_storage_buffer_range)
-    }
-
-    /// Whether images of this format can be used so.
-    #[must_use]
-    pub fn supports(&self, format: vk::Format, features: vk::FormatFeatureFlags) -> bool {
-        // SAFETY: a plain query.
-        let properties = unsafe { self.instance.raw.get_physical_device_format_properties(self.physical, format) };
-        properties.optimal_tiling_features.contains(features)
     }
 
     pub(super) fn note(&self, kind: &'static str, name: &str, bytes: u64) {

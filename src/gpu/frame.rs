@@ -325,7 +325,12 @@ impl<'a> Frame<'a> {
                     )
                 })
                 .collect();
-            let depth_info = depth.map(|(view, clear, layout)| attachment(view, layout, clear));
+            let depth_info = depth.map(|(view, clear, layout)| {
+                let read_only = layout == vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL;
+                let info = attachment(view, layout, clear);
+                // Storing counts as a write, which a depth that is only tested does not declare.
+                if read_only { info.store_op(vk::AttachmentStoreOp::NONE) } else { info }
+            });
             let area = vk::Rect2D {
                 offset: vk::Offset2D { x: 0, y: from as i32 },
                 extent: vk::Extent2D { width, height: to - from },

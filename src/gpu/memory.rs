@@ -37,7 +37,7 @@ impl Buffer {
     /// copy does.
     ///
     /// # Errors
-    /// When it is larger than a storage buffer may be, or memory is short.
+    /// When memory is short.
     pub fn new(device: &Arc<Device>, name: &str, bytes: u64, place: Place) -> Result<Self> {
         Self::create(device, name, bytes, place, None)
     }
@@ -45,7 +45,7 @@ impl Buffer {
     /// A buffer whose elements shaders also fetch as texels of `format`: `imageBuffer`, `samplerBuffer`.
     ///
     /// # Errors
-    /// As [`Buffer::new`].
+    /// When it has more texels than the device allows, or memory is short.
     pub fn texels(device: &Arc<Device>, name: &str, bytes: u64, place: Place, format: vk::Format) -> Result<Self> {
         Self::create(device, name, bytes, place, Some(format))
     }
@@ -63,6 +63,12 @@ impl Buffer {
     fn create(device: &Arc<Device>, name: &str, bytes: u64, place: Place, texels: Option<vk::Format>) -> Result<Self> {
         let creating = || format!("creating buffer \"{name}\" of {bytes} bytes");
         let bytes = bytes.max(16);
+        let most = u64::from(device.limits.max_texel_buffer_elements);
+        if let Some(format) = texels
+            && bytes / texel_bytes(format) > most
+        {
+            bail!("{}: the device fetches at most {most} texels from one", creating());
+        }
         let mut usage = vk::BufferUsageFlags::UNIFORM_BUFFER
             | vk::BufferUsageFlags::STORAGE_BUFFER
             | vk::BufferUsageFlags::VERTEX_BUFFER
@@ -169,6 +175,15 @@ impl Drop for Buffer {
     }
 }
 
+/// Size of the texels of a buffer.
+fn texel_bytes(format: vk::Format) -> u64 {
+    match format {
+        vk::Format::R32G32B32A32_SFLOAT => 16,
+        vk::Format::R32G32_SFLOAT => 8,
+        _ => 4,
+    }
+}
+
 /// Shape of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ImageDesc {
@@ -217,7 +232,8 @@ impl Image {
         let creating = || format!("creating image \"{name}\" of {width}x{height}x{layers}, {levels} levels");
         let limit = device.limits.max_image_dimension2_d;
         if width > limit || height > limit || layers > device.limits.max_image_array_layers {
-            bail!("{}: the device allows {limit} pixels a side", creating());
+            let layers = device.limits.max_image_array_layers;
+            bail!("{}: the device allows {limit} pixels a side and {layers} layers", creating());
         }
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)

@@ -13,6 +13,15 @@ const TILE: u32 = 8;
 
 /// Bytes of one `WorkSize` of shaders/lib/work_tile.glsl: a VkDispatchIndirectCommand and a count.
 pub const WORK_BYTES: u64 = 16;
+/// Workgroups along x before a dispatch goes on along y: `ROW` of shaders/lib/work_tile.glsl.
+const ROW: u32 = 32768;
+
+/// A dispatch of `count` workgroups in rows; the shader takes its place from `listed_tile`.
+#[must_use]
+pub fn rows_of(count: u32) -> [u32; 3] {
+    [count.min(ROW), count.div_ceil(ROW), 1]
+}
+
 /// A dispatch of nothing.
 const EMPTY: [u32; 4] = [0, 1, 1, 0];
 
@@ -55,7 +64,7 @@ pub fn classify_fragments<'a>(
     frame.copy_buffer("reset fragment work size", &list.empty, &list.sizes, WORK_BYTES);
     let bind = classify_fragments::Bind { heads, sizes: &list.sizes, tiles: &list.tiles };
     let tiles = list.width.div_ceil(TILE) * (rows[1] - rows[0]).div_ceil(TILE);
-    let groups = [tiles.div_ceil(classify_fragments::PROGRAM.local_size[0]), 1, 1];
+    let groups = rows_of(tiles.div_ceil(classify_fragments::PROGRAM.local_size[0]));
     let push = [list.width, rows[0], rows[1]];
     let constants = classify_fragments::Constants {}.words();
     frame.compute("classify fragment tiles", &bind, constants, bytemuck::cast_slice(&push), groups)
@@ -103,7 +112,7 @@ pub fn classify<'a>(frame: &mut Frame<'a>, gbuffer: &'a GBuffer, lists: &'a Work
         background_tiles: &lists.background,
     };
     let tiles = lists.size[0].div_ceil(TILE) * lists.size[1].div_ceil(TILE);
-    let groups = [tiles.div_ceil(classify::PROGRAM.local_size[0]), 1, 1];
+    let groups = rows_of(tiles.div_ceil(classify::PROGRAM.local_size[0]));
     let constants = classify::Constants {}.words();
     frame.compute("classify tiles", &bind, constants, bytemuck::cast_slice(&lists.size), groups)
 }

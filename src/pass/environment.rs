@@ -63,8 +63,8 @@ impl EnvironmentOnDevice {
         let sky = image(device, "environment", &chain, vk::Format::R32G32B32A32_SFLOAT)?;
         let levels = if plan.reflection { prefilter(device, &sky, &chain)? } else { black() };
         let prefiltered = image(device, "prefiltered environment", &levels, vk::Format::R32G32B32A32_SFLOAT)?;
-        let table = if lights { reflectance_table() } else { vec![[0.0; 4]] };
-        let side = if lights { REFLECTANCE } else { 1 };
+        let table = if plan.reflectance { reflectance_table() } else { vec![[0.0; 4]] };
+        let side = if plan.reflectance { REFLECTANCE } else { 1 };
         let table = vec![(side, side, table)];
         let reflectance = image(device, "directional reflectance", &table, vk::Format::R32G32B32A32_SFLOAT)?;
         let mut irradiance = [[0.0; 3]; 9];
@@ -126,7 +126,7 @@ fn image(device: &Arc<Device>, name: &str, levels: &Levels, format: vk::Format) 
     Ok(image)
 }
 
-/// The map and its averages by twos, down to one texel of height.
+/// The map and its averages by twos, down to a single texel.
 fn box_chain(environment: &Environment) -> Levels {
     let texels = environment.radiance.iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
     let mut levels: Levels = vec![(environment.width, environment.height, texels)];
@@ -167,11 +167,13 @@ fn prefilter(device: &Arc<Device>, sky: &Image, chain: &Levels) -> Result<Levels
         (w, h) = (w / 2, (h / 2).max(1));
         sizes.push((w, h));
     }
-    let cache = cache_file(chain);
+    let cache = cache_file(device, chain);
     if let Some(known) = cache.as_ref().and_then(|path| std::fs::read(path).ok()) {
-        let total: usize = sizes.iter().map(|&(w, h)| (w * h) as usize).sum();
-        if known.len() == total * size_of::<Texel>() {
-            let texels: Vec<Texel> = bytemuck::pod_collect_to_vec(&known);
+        let total: usize = sizes.iter().map(|&(w, h)| (w * h) as usize * size_of::<Texel>()).sum();
+        // The file begins with the hash of the rest: a damaged one is made anew.
+        let (hash, rest) = known.split_at(known.len().min(HASH_BYTES));
+        if rest.len() == total && file::hash(rest).as_bytes() == hash {
+            let texels: Vec<Texel> = bytemuck::pod_collect_to_vec(rest);
             let mut rest = texels.as_slice();
             for &(w, h) in &sizes {
                 let (level, after) = rest.split_at((w * h) as usize);
@@ -200,20 +202,26 @@ fn prefilter(device: &Arc<Device>, sky: &Image, chain: &Levels) -> Result<Levels
     if let Some(path) = cache {
         // A cache that cannot be written costs time at the next start, nothing else.
         let _ = path.parent().map(std::fs::create_dir_all);
-        let _ = file::write(&path, bytemuck::cast_slice(&all));
+        let texels = bytemuck::cast_slice(&all);
+        let _ = file::write(&path, &[file::hash(texels).as_bytes(), texels].concat());
     }
     Ok(levels)
 }
 
-/// Where the prefiltered levels of this map are kept: named by the map's texels and the shader's words.
-fn cache_file(chain: &Levels) -> Option<PathBuf> {
+/// Hexadecimal digits of [`file::hash`].
+const HASH_BYTES: usize = 32;
+
+/// Where the prefiltered levels of this map are kept: named by the map's texels, the shader's words and the device.
+fn cache_file(device: &Device, chain: &Levels) -> Option<PathBuf> {
     let folder = std::env::var_os("XDG_CACHE_HOME")
         .map(PathBuf::from)
         .or_else(|| std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cache")))?;
     let map = file::hash(bytemuck::cast_slice(&chain[0].2));
     let words: &[u8] = bytemuck::cast_slice(prefilter::PROGRAM.stages[0].words);
+    let info = device.info();
+    let maker = file::hash(&[words, info.name.as_bytes(), info.driver.as_bytes(), info.version.as_bytes()].concat());
     let (width, height, _) = chain[0];
-    Some(folder.join("etalon").join(format!("environment-{map}-{}-{width}x{height}", file::hash(words))))
+    Some(folder.join("etalon").join(format!("environment-{map}-{maker}-{width}x{height}")))
 }
 
 /// Directional reflectance of the GGX lobe, split into the factors of F0 and F90 (Karis 2013):

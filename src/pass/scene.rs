@@ -306,7 +306,8 @@ impl SceneOnDevice {
             first_index: mesh.first_index,
             index_count: mesh.index_count,
             instance,
-            cull_back: !material.double_sided,
+            // A volume's boundary is crossed once: KHR_materials_volume gives double sidedness no effect.
+            cull_back: !material.double_sided || material.thickness > 0.0,
             clockwise: placement.world_from_object.matrix3.determinant() < 0.0,
         }
     }

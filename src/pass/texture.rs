@@ -2,7 +2,7 @@
 //!
 //! lavapipe cannot index arrays of sampled images, but a layer is only a coordinate.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
@@ -11,7 +11,7 @@ use ash::vk;
 use rayon::prelude::*;
 
 use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, Place, Sampled, SamplerDesc};
-use crate::scene::{Sampler, Scene, TextureRef, Wrap};
+use crate::scene::{AlphaMode, Sampler, Scene, TextureRef, Wrap};
 
 /// How the bytes of an image are meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -37,6 +37,13 @@ impl Textures {
     /// # Errors
     /// When memory is short or an image is larger than the device allows.
     pub fn new(device: &Arc<Device>, scene: &mut Scene, wanted: &[(usize, Meaning)]) -> Result<Self> {
+        // Images whose alpha hides texels: only there does it weigh them.
+        let faded: BTreeSet<usize> = scene
+            .materials
+            .iter()
+            .filter(|material| material.alpha_mode != AlphaMode::Opaque)
+            .filter_map(|material| material.base_color_texture.map(|texture| texture.image))
+            .collect();
         let mut groups: BTreeMap<(u32, u32, Meaning), Vec<usize>> = BTreeMap::new();
         for &(image, meaning) in wanted {
             let source = &scene.images[image];
@@ -70,7 +77,10 @@ impl Textures {
             for (chunk_index, chunk) in images.chunks(2).enumerate() {
                 let chains: Vec<Vec<u8>> = chunk
                     .par_iter()
-                    .map(|&image| mip_chain(&scene.images[image].rgba, width, height, levels, meaning))
+                    .map(|&image| {
+                        let weighted = meaning == Meaning::Color && faded.contains(&image);
+                        mip_chain(&scene.images[image].rgba, width, height, levels, meaning, weighted)
+                    })
                     .collect();
                 for (i, (&image, chain)) in chunk.iter().zip(chains).enumerate() {
                     let layer = (chunk_index * 2 + i) as u32;
@@ -178,14 +188,13 @@ fn srgb_from_linear() -> &'static [u8] {
     })
 }
 
-/// The base level and all smaller ones: averages of 2x2 texels (3 along an odd side), colour in linear light and weighted
+/// The base level and all smaller ones: averages of 2x2 texels (3 along an odd side), colour in linear light; `weighted`
 /// by alpha, so that what is invisible does not fringe what is visible.
-fn mip_chain(rgba: &[u8], width: u32, height: u32, levels: u32, meaning: Meaning) -> Vec<u8> {
+fn mip_chain(rgba: &[u8], width: u32, height: u32, levels: u32, meaning: Meaning, weighted: bool) -> Vec<u8> {
     let offsets = level_offsets(width, height, levels);
     let bytes = offsets.last().copied().unwrap_or(0) as usize + 4;
     let mut chain = vec![0; bytes.max(rgba.len())];
     chain[..rgba.len()].copy_from_slice(rgba);
-    let weighted = meaning == Meaning::Color && rgba.chunks_exact(4).any(|texel| texel[3] != 255);
     let (mut w, mut h) = (width as usize, height as usize);
     for level in 1..levels as usize {
         let (nw, nh) = ((w / 2).max(1), (h / 2).max(1));
@@ -217,7 +226,7 @@ fn average(
     let mut sum = [0.0_f32; 4];
     let mut weight = 0.0_f32;
     let count = (xs.len() * ys.len()) as f32;
-    for y in ys {
+    for y in ys.clone() {
         for texel in level[4 * (y * width + xs.start)..4 * (y * width + xs.end)].as_chunks::<4>().0 {
             let alpha = f32::from(texel[3]);
             let share = if weighted { alpha } else { 1.0 };
@@ -228,7 +237,11 @@ fn average(
             weight += share;
         }
     }
-    let mean = |sum: f32| if weight > 0.0 { sum / weight } else { 0.0 };
+    if weight == 0.0 {
+        // Nothing here is visible; its colour still bleeds into neighbours that are, when filtered.
+        return average(level, width, xs, ys, meaning, false);
+    }
+    let mean = |sum: f32| sum / weight;
     let byte = |sum: f32| match meaning {
         Meaning::Color => to_srgb[(mean(sum) * 16384.0 + 0.5) as usize],
         Meaning::Data => (mean(sum) + 0.5) as u8,
@@ -246,7 +259,7 @@ mod tests {
             let levels = 32 - width.max(height as u32).leading_zeros();
             let rgba: Vec<u8> = [200, 13, 77, 255].repeat((width * height as u32) as usize);
             for meaning in [Meaning::Color, Meaning::Data] {
-                let chain = mip_chain(&rgba, width, height as u32, levels, meaning);
+                let chain = mip_chain(&rgba, width, height as u32, levels, meaning, true);
                 assert!(chain.chunks_exact(4).all(|t| t == [200, 13, 77, 255]), "{width}x{height}");
             }
         }
@@ -255,16 +268,20 @@ mod tests {
     #[test]
     fn colour_is_averaged_in_linear_light() {
         let rgba = [[255, 255, 255, 255], [0, 0, 0, 255]].concat();
-        let chain = mip_chain(&rgba, 2, 1, 2, Meaning::Color);
+        let chain = mip_chain(&rgba, 2, 1, 2, Meaning::Color, false);
         assert_eq!(chain[8], 188); // sRGB of 0.5
-        assert_eq!(mip_chain(&rgba, 2, 1, 2, Meaning::Data)[8], 128);
+        assert_eq!(mip_chain(&rgba, 2, 1, 2, Meaning::Data, false)[8], 128);
     }
 
     #[test]
     fn invisible_texels_do_not_fringe() {
         let rgba = [[10, 200, 10, 255], [255, 0, 255, 0]].concat();
-        let chain = mip_chain(&rgba, 2, 1, 2, Meaning::Color);
+        let chain = mip_chain(&rgba, 2, 1, 2, Meaning::Color, true);
         assert_eq!(&chain[8..], [10, 200, 10, 128]);
+        // Where alpha means nothing it weighs nothing, and what is all invisible keeps its colour.
+        assert_eq!(mip_chain(&rgba, 2, 1, 2, Meaning::Color, false)[8], 188);
+        let hidden = [[255, 255, 255, 0], [0, 0, 0, 0]].concat();
+        assert_eq!(mip_chain(&hidden, 2, 1, 2, Meaning::Color, true)[8..], [188, 188, 188, 0]);
     }
 
     #[test]

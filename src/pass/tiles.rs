@@ -5,6 +5,7 @@ use std::sync::Arc;
 use anyhow::Result;
 use ash::vk;
 
+use super::classify::rows_of;
 use super::gbuffer::GBuffer;
 use super::scene::SceneOnDevice;
 use crate::gpu::{Buffer, Device, Frame, Place};
@@ -78,6 +79,6 @@ pub fn tiles<'a>(
     };
     let count = target.across * target.down;
     let push = [plan.directional_lights, plan.local_lights, target.words, target.across, count];
-    let groups = [(count * target.words).div_ceil(tiles::PROGRAM.local_size[0]), 1, 1];
+    let groups = rows_of((count * target.words).div_ceil(tiles::PROGRAM.local_size[0]));
     frame.compute("light lists", &bind, tiles::Constants {}.words(), bytemuck::cast_slice(&push), groups)
 }

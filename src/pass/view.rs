@@ -29,7 +29,10 @@ impl View {
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let (half_height, near, far, orthographic) = match camera.projection {
             Projection::Perspective { fov_y, near } => {
-                ((fov_y * 0.5).tan(), near.unwrap_or_else(|| near_distance(eye, bounds)), f64::INFINITY, false)
+                let half = (fov_y * 0.5).tan();
+                // A corner's ray is this much longer than its depth.
+                let slant = DVec3::new(half * aspect, half, 1.0).length();
+                (half, near.unwrap_or_else(|| near_distance(eye, bounds) / slant), f64::INFINITY, false)
             }
             Projection::Orthographic { half_height, near, far } => (half_height, near, far, true),
         };
@@ -83,7 +86,7 @@ impl View {
     }
 }
 
-/// A near distance that clips nothing of a scene seen from outside and next to nothing from inside. Reversed floating
+/// A distance from the eye that clips nothing of a scene seen from outside and next to nothing from inside. Reversed floating
 /// depth has the same relative precision for every near distance (numerics.md 42), so small is free.
 fn near_distance(eye: DVec3, bounds: Option<Bounds>) -> f64 {
     let Some(bounds) = bounds else { return 0.01 };

@@ -33,10 +33,14 @@ pub struct Plan {
     pub local_lights: u32,
     /// Lists of lights per tile.
     pub tiles: bool,
+    /// The table of directional reflectance: for an environment, or to make up for single scattering.
+    pub reflectance: bool,
     /// Samples per pixel.
     pub samples: u32,
     /// Every effect with its reason.
     pub effects: Vec<Effect>,
+    /// What the chosen rungs leave out of this scene, a sentence each.
+    pub warnings: Vec<String>,
 }
 
 /// One effect, kept or not, and why.
@@ -163,10 +167,26 @@ impl Plan {
             directional_lights,
             local_lights,
             tiles,
+            reflectance: reflection || ambient || knobs.rung("brdf") == "ggx-multi",
             samples: knobs.samples(),
             effects,
+            warnings: left_out(&used),
         }
     }
+}
+
+/// What no rung that is built can show of these materials.
+fn left_out(used: &[&Material]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let mut say = |test: &dyn Fn(&Material) -> bool, what: &str| {
+        if let Some(material) = used.iter().find(|material| test(material)) {
+            warnings.push(format!("material \"{}\" {what}", material.name));
+        }
+    };
+    say(&|m| m.transmission > 0.0, "transmits light: it goes straight on, refraction is not built");
+    say(&|m| m.transmission > 0.0 && m.roughness > 0.1, "transmits through a rough surface: shown clear");
+    say(&|m| m.dispersion > 0.0, "has dispersion, which is not built");
+    warnings
 }
 
 /// Why a scene calls for an effect, with what that rests on; or why it does not.

@@ -189,6 +189,9 @@ impl Reader<'_, '_, '_> {
             m.specular_texture = self.texture(specular.specular_texture.as_ref())?;
             m.specular_color = specular.specular_color_factor.0.map(|x| self.positive(x, "the specular colour"));
             m.specular_color_texture = self.texture(specular.specular_color_texture.as_ref())?;
+            if m.specular_color_texture.is_some() {
+                self.warn("the specular colour texture is not drawn; its factor is");
+            }
         }
         if let Some(transmission) = &json.transmission {
             m.transmission = self.unit(transmission.transmission_factor.0, "the transmission factor");
