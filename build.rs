@@ -259,8 +259,7 @@ fn bindings(stage: &Stage, names: &Names) -> Result<Vec<Binding>> {
             (_, Op::TypeImage) => {
                 let buffer = matches!(ty.operands[1], Operand::Dim(Dim::DimBuffer));
                 match (buffer, word(&ty.operands[5])) {
-                    (true, 1) => ("UniformTexelBuffer", "StorageRead"),
-                    (true, _) => ("StorageTexelBuffer", access(readable, writable)),
+                    (true, 2) => ("StorageTexelBuffer", access(readable, writable)),
                     (false, 2) => ("StorageImage", access(readable, writable)),
                     _ => return Err(format!("{}: {name}: separate images are not used", stage.path)),
                 }
@@ -439,7 +438,7 @@ fn program(code: &mut String, name: &str, stages: &[Stage]) -> Result<()> {
     let mut resources = String::new();
     for binding in all_bindings.values() {
         let ty = match binding.kind {
-            "UniformBuffer" | "StorageBuffer" | "UniformTexelBuffer" | "StorageTexelBuffer" => "&'a Buffer",
+            "UniformBuffer" | "StorageBuffer" | "StorageTexelBuffer" => "&'a Buffer",
             "SampledImage" => "Sampled<'a>",
             _ => "&'a Image",
         };

@@ -70,7 +70,7 @@ impl Descriptor {
         layout: vk::ImageLayout,
     ) -> Result<Self> {
         Ok(match (kind, resource) {
-            (BindingKind::UniformTexelBuffer | BindingKind::StorageTexelBuffer, Resource::Buffer(buffer)) => {
+            (BindingKind::StorageTexelBuffer, Resource::Buffer(buffer)) => {
                 assert!(buffer.view != vk::BufferView::null(), "a texel buffer needs `Buffer::texels`");
                 Self::Texels(buffer.view)
             }

@@ -42,7 +42,7 @@ impl Buffer {
         Self::create(device, name, bytes, place, None)
     }
 
-    /// A buffer whose elements shaders also fetch as texels of `format`: `imageBuffer`, `samplerBuffer`.
+    /// A buffer whose elements shaders also fetch as texels of `format`: `imageBuffer`.
     ///
     /// # Errors
     /// When it has more texels than the device allows, or memory is short.
@@ -77,7 +77,7 @@ impl Buffer {
             | vk::BufferUsageFlags::TRANSFER_SRC
             | vk::BufferUsageFlags::TRANSFER_DST;
         if texels.is_some() {
-            usage |= vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER | vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER;
+            usage |= vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER;
         }
         let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
         let location = match place {

@@ -187,12 +187,7 @@ impl Device {
             vk::DynamicState::FRONT_FACE,
             vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE,
         ];
-        // A fragment-only program without streams still has the dynamic stride state, which then sets nothing.
-        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(if program.inputs.is_empty() {
-            &dynamic[..4]
-        } else {
-            &dynamic
-        });
+        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
         let mut rendering = vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&raster.colors);
         if let Some((format, _)) = raster.depth {
             rendering = rendering.depth_attachment_format(format);

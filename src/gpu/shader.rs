@@ -64,8 +64,6 @@ pub enum BindingKind {
     SampledImage,
     /// `image2D` and its kin.
     StorageImage,
-    /// `samplerBuffer`.
-    UniformTexelBuffer,
     /// `imageBuffer`: the fastest fetch on lavapipe.
     StorageTexelBuffer,
 }
@@ -79,7 +77,6 @@ impl BindingKind {
             Self::StorageBuffer => vk::DescriptorType::STORAGE_BUFFER,
             Self::SampledImage => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
             Self::StorageImage => vk::DescriptorType::STORAGE_IMAGE,
-            Self::UniformTexelBuffer => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
             Self::StorageTexelBuffer => vk::DescriptorType::STORAGE_TEXEL_BUFFER,
         }
     }

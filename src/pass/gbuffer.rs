@@ -19,7 +19,7 @@ pub struct GBuffer {
     /// Reversed depth; 0 where nothing was drawn.
     pub depth: Image,
     /// The same depth as a texel buffer, row by row: what the lighting reads. On lavapipe a texel buffer is fetched inline
-    /// where a sampled image is a call that spills; the copy costs 1 ms.
+    /// where a sampled image is a call that spills; the copy costs half a millisecond at 1280x720.
     pub depth_texels: Buffer,
     /// Base colour and metallic texels.
     pub base: Image,

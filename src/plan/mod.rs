@@ -85,7 +85,7 @@ fn has_layers(material: &Material) -> bool {
     .any(Option::is_some)
 }
 
-/// Below this many local lights a tile list costs more than it saves (measured on lavapipe: docs/decisions/light-lists.md).
+/// From this many point and spot lights on, tiles list them (docs/decisions/light-lists.md).
 const TILES_FROM: u32 = 16;
 
 impl Plan {
