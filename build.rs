@@ -4,10 +4,17 @@
 //!    (crate shaderc): without optimisation for reflection, which needs the names, and with it for shipping.
 //! 2. rspirv reads the bindings, their access (`readonly`/`writeonly` survive as NonWritable/NonReadable), push
 //!    constants, specialization constants, vertex inputs and local size.
-//! 3. `shaders.rs` gets, per program, a `Program` and a struct with one named field per binding, so that a forgotten
+//! 3. Every function of `shaders/lib/` tagged `@eq` gets a probe, a program that evaluates it (`build/equations.rs`), and
+//!    its SPIR-V is held to a contract (`build/contract.rs`).
+//! 4. `shaders.rs` gets, per program, a `Program` and a struct with one named field per binding, so that a forgotten
 //!    binding does not compile, and `const` asserts that hold `src/share.rs` to the layout of `shaders/share/`.
 //!
 //! Errors are printed as `file:line: message` by the compiler itself.
+
+#[path = "build/contract.rs"]
+mod contract;
+#[path = "build/equations.rs"]
+mod equations;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write as _;
@@ -19,6 +26,7 @@ use rspirv::spirv::{Decoration, Dim, ExecutionMode, Op, StorageClass};
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-changed=build");
     println!("cargo:rerun-if-changed=shaders");
     if let Err(message) = run() {
         eprintln!("{message}");
@@ -38,7 +46,8 @@ fn run() -> Result<()> {
         programs.entry(stem(&path)).or_default().push(stage);
     }
     let shared = shared_structs(&root.join("share"))?;
-    let code = generate(&programs, &shared)?;
+    let mut code = generate(&programs, &shared)?;
+    code += &probes(&compiler, root)?;
     fs::write(out_dir.join("shaders.rs"), code).map_err(|e| format!("writing shaders.rs: {e}"))
 }
 
@@ -69,7 +78,16 @@ fn compile(compiler: &shaderc::Compiler, root: &Path, path: &Path) -> Result<Sta
         _ => return Err(format!("{}: expected .vert, .frag or .comp", path.display())),
     };
     let source = fs::read_to_string(path).map_err(|e| format!("reading {}: {e}", path.display()))?;
-    let name = path.display().to_string();
+    compile_source(compiler, root, kind, path.display().to_string(), &source)
+}
+
+fn compile_source(
+    compiler: &shaderc::Compiler,
+    root: &Path,
+    kind: shaderc::ShaderKind,
+    name: String,
+    source: &str,
+) -> Result<Stage> {
     let build = |level, version| -> Result<Vec<u32>> {
         let mut options = shaderc::CompileOptions::new().map_err(|e| format!("shaderc: {e}"))?;
         options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
@@ -83,7 +101,7 @@ fn compile(compiler: &shaderc::Compiler, root: &Path, path: &Path) -> Result<Sta
             Ok(shaderc::ResolvedInclude { resolved_name: resolved.display().to_string(), content })
         });
         let artifact =
-            compiler.compile_into_spirv(&source, kind, &name, "main", Some(&options)).map_err(|e| match e {
+            compiler.compile_into_spirv(source, kind, &name, "main", Some(&options)).map_err(|e| match e {
                 shaderc::Error::CompilationError(_, log) => log,
                 other => format!("{name}: {other}"),
             })?;
@@ -94,6 +112,32 @@ fn compile(compiler: &shaderc::Compiler, root: &Path, path: &Path) -> Result<Sta
         .map_err(|e| format!("{name}: reflection: {e:?}"))?;
     let words = build(shaderc::OptimizationLevel::Performance, shaderc::SpirvVersion::V1_6)?;
     Ok(Stage { kind, module, words, path: name })
+}
+
+/// The table of equations, each with its probe. All probes bind the same two buffers: `src/shader.rs` has one struct.
+fn probes(compiler: &shaderc::Compiler, root: &Path) -> Result<String> {
+    let library = equations::library(&root.join("lib"))?;
+    let mut table = String::new();
+    for equation in &library.equations {
+        let name = format!("probe/{}", equation.name);
+        let stage = compile_source(compiler, root, shaderc::ShaderKind::Compute, name.clone(), &equation.probe)?;
+        let facts = contract::check(&name, &stage.module, &stage.words, &library.functions)?;
+        let program = program_literal(&name, std::slice::from_ref(&stage))?;
+        let equations::Equation { function, name, ids, formula, subject, inputs, outputs, .. } = equation;
+        let [fast, stable, compensated] = facts.builtins.each_ref().map(contract::list);
+        table += &format!(
+            "    Probe {{
+        name: {name:?}, function: {function:?}, subject: {subject:?}, formula: {formula:?},
+        ids: {}, inputs: {}, outputs: {}, builtins: [{fast}, {stable}, {compensated}], loop_heads: {},
+        program: {{ static PROGRAM: Program = {program}; &PROGRAM }},
+    }},\n",
+            contract::list(ids),
+            contract::list(inputs),
+            contract::list(outputs),
+            facts.heads,
+        );
+    }
+    Ok(format!("/// Every tagged equation, by file and place.\npub static PROBES: &[Probe] = &[\n{table}];\n"))
 }
 
 // ---------------------------------------------------------------------------------------------------------------------
@@ -396,22 +440,20 @@ fn generate(programs: &BTreeMap<String, Vec<Stage>>, shared: &BTreeSet<String>) 
     Ok(code)
 }
 
-fn program(code: &mut String, name: &str, stages: &[Stage]) -> Result<()> {
-    let compute = stages.len() == 1 && stages[0].kind == shaderc::ShaderKind::Compute;
-    let raster = stages.iter().any(|s| s.kind == shaderc::ShaderKind::Vertex)
-        && stages.iter().any(|s| s.kind == shaderc::ShaderKind::Fragment)
-        && stages.len() == 2;
-    if !compute && !raster {
-        return Err(format!("shaders/pass/{name}: a program is one .comp, or a .vert with a .frag"));
-    }
-    let mut all_bindings: BTreeMap<u32, Binding> = BTreeMap::new();
-    let mut all_constants = BTreeMap::new();
-    let mut inputs = BTreeMap::new();
-    let mut push = 0;
+/// What the stages of one program declare together.
+struct Declared {
+    bindings: BTreeMap<u32, Binding>,
+    constants: BTreeMap<u32, (String, &'static str, String)>,
+    inputs: BTreeMap<u32, (String, u32)>,
+    push: u32,
+}
+
+fn declared(stages: &[Stage]) -> Result<Declared> {
+    let mut all = Declared { bindings: BTreeMap::new(), constants: BTreeMap::new(), inputs: BTreeMap::new(), push: 0 };
     for stage in stages {
         let names = Names::new(&stage.module);
         for binding in bindings(stage, &names)? {
-            match all_bindings.get_mut(&binding.slot) {
+            match all.bindings.get_mut(&binding.slot) {
                 Some(known)
                     if (&known.name, known.kind, known.access) == (&binding.name, binding.kind, binding.access) =>
                 {
@@ -423,54 +465,32 @@ fn program(code: &mut String, name: &str, stages: &[Stage]) -> Result<()> {
                         stage.path, binding.slot, binding.name, known.name
                     ));
                 }
-                None => drop(all_bindings.insert(binding.slot, binding)),
+                None => drop(all.bindings.insert(binding.slot, binding)),
             }
         }
-        all_constants.extend(constants(&names).map_err(|e| format!("{}: {e}", stage.path))?);
-        push = push.max(push_bytes(&names)?);
+        all.constants.extend(constants(&names).map_err(|e| format!("{}: {e}", stage.path))?);
+        all.push = all.push.max(push_bytes(&names)?);
         if stage.kind == shaderc::ShaderKind::Vertex {
-            inputs = vertex_inputs(stage, &names)?;
+            all.inputs = vertex_inputs(stage, &names)?;
         }
     }
+    Ok(all)
+}
 
-    let mut fields = String::new();
+/// A `Program` as a Rust expression.
+fn program_literal(name: &str, stages: &[Stage]) -> Result<String> {
+    let all = declared(stages)?;
     let mut table = String::new();
-    let mut resources = String::new();
-    for binding in all_bindings.values() {
-        let ty = match binding.kind {
-            "UniformBuffer" | "StorageBuffer" | "StorageTexelBuffer" => "&'a Buffer",
-            "SampledImage" => "Sampled<'a>",
-            _ => "&'a Image",
-        };
-        let stage_flags = binding
-            .stages
-            .iter()
-            .map(|s| format!("vk::ShaderStageFlags::{s}.as_raw()"))
-            .collect::<Vec<_>>()
-            .join(" | ");
-        let Binding { name, slot, kind, access, .. } = binding;
-        fields += &format!("        /// {kind}, {access}.\n        pub {name}: {ty},\n");
+    for Binding { name, slot, kind, access, stages } in all.bindings.values() {
+        let flags: Vec<_> = stages.iter().map(|s| format!("vk::ShaderStageFlags::{s}.as_raw()")).collect();
+        let flags = flags.join(" | ");
         table += &format!(
             "            Binding {{ name: \"{name}\", slot: {slot}, kind: BindingKind::{kind}, access: Access::{access}, \
-             stages: vk::ShaderStageFlags::from_raw({stage_flags}) }},\n"
+             stages: vk::ShaderStageFlags::from_raw({flags}) }},\n"
         );
-        resources += &format!("                Resource::from(self.{name}),\n");
-    }
-    let mut spec_fields = String::new();
-    let mut spec_defaults = String::new();
-    let mut spec_words = String::new();
-    for (id, (constant, ty, default)) in &all_constants {
-        spec_fields += &format!("        /// Specialization constant {id}.\n        pub {constant}: {ty},\n");
-        spec_defaults += &format!("                {constant}: {default},\n");
-        let bits = match *ty {
-            "f32" => format!("self.{constant}.to_bits()"),
-            "u32" => format!("self.{constant}"),
-            _ => format!("self.{constant} as u32"),
-        };
-        spec_words += &format!("                ({id}, {bits}),\n");
     }
     let mut vertex = String::new();
-    for (location, (input, components)) in &inputs {
+    for (location, (input, components)) in &all.inputs {
         vertex += &format!(
             "            VertexInput {{ name: \"{input}\", location: {location}, components: {components} }},\n"
         );
@@ -484,15 +504,8 @@ fn program(code: &mut String, name: &str, stages: &[Stage]) -> Result<()> {
         );
     }
     let [x, y, z] = local_size(&stages[0].module);
-    let life = if all_bindings.is_empty() { "" } else { "<'a>" };
-    write!(
-        code,
-        "/// `shaders/pass/{name}`.
-#[allow(clippy::derivable_impls, missing_docs, reason = \"generated\")]
-pub mod {name} {{
-    use super::*;
-    /// The program.
-    pub static PROGRAM: Program = Program {{
+    Ok(format!(
+        "Program {{
         name: \"{name}\",
         stages: &[
 {stage_table}        ],
@@ -500,9 +513,56 @@ pub mod {name} {{
 {table}        ],
         inputs: &[
 {vertex}        ],
-        push_bytes: {push},
+        push_bytes: {},
         local_size: [{x}, {y}, {z}],
-    }};
+    }}",
+        all.push
+    ))
+}
+
+fn program(code: &mut String, name: &str, stages: &[Stage]) -> Result<()> {
+    let compute = stages.len() == 1 && stages[0].kind == shaderc::ShaderKind::Compute;
+    let raster = stages.iter().any(|s| s.kind == shaderc::ShaderKind::Vertex)
+        && stages.iter().any(|s| s.kind == shaderc::ShaderKind::Fragment)
+        && stages.len() == 2;
+    if !compute && !raster {
+        return Err(format!("shaders/pass/{name}: a program is one .comp, or a .vert with a .frag"));
+    }
+    let all = declared(stages)?;
+    let mut fields = String::new();
+    let mut resources = String::new();
+    for Binding { name, kind, access, .. } in all.bindings.values() {
+        let ty = match *kind {
+            "UniformBuffer" | "StorageBuffer" | "StorageTexelBuffer" => "&'a Buffer",
+            "SampledImage" => "Sampled<'a>",
+            _ => "&'a Image",
+        };
+        fields += &format!("        /// {kind}, {access}.\n        pub {name}: {ty},\n");
+        resources += &format!("                Resource::from(self.{name}),\n");
+    }
+    let mut spec_fields = String::new();
+    let mut spec_defaults = String::new();
+    let mut spec_words = String::new();
+    for (id, (constant, ty, default)) in &all.constants {
+        spec_fields += &format!("        /// Specialization constant {id}.\n        pub {constant}: {ty},\n");
+        spec_defaults += &format!("                {constant}: {default},\n");
+        let bits = match *ty {
+            "f32" => format!("self.{constant}.to_bits()"),
+            "u32" => format!("self.{constant}"),
+            _ => format!("self.{constant} as u32"),
+        };
+        spec_words += &format!("                ({id}, {bits}),\n");
+    }
+    let literal = program_literal(name, stages)?;
+    let life = if all.bindings.is_empty() { "" } else { "<'a>" };
+    write!(
+        code,
+        "/// `shaders/pass/{name}`.
+#[allow(clippy::derivable_impls, missing_docs, reason = \"generated\")]
+pub mod {name} {{
+    use super::*;
+    /// The program.
+    pub static PROGRAM: Program = {literal};
     /// One field per binding.
     #[derive(Clone, Copy)]
     pub struct Bind{life} {{

@@ -52,4 +52,8 @@ pub mod study;
 
 pub mod image;
 
+pub mod optics;
+
+pub mod verify;
+
 pub mod cli;

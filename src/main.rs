@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use etalon::cli::options::When;
 use etalon::cli::unbuilt::UnbuiltCommand;
-use etalon::cli::{devices, diff, render};
+use etalon::cli::{devices, diff, render, verify};
 
 /// A Vulkan renderer written directly against ash: glTF in, radiance out.
 #[derive(Parser)]
@@ -30,14 +30,13 @@ enum Command {
     Render(Box<render::RenderArgs>),
     Diff(diff::DiffArgs),
     Devices(devices::DevicesArgs),
+    Verify(verify::VerifyArgs),
     #[command(hide = true)]
     View(UnbuiltCommand),
     #[command(hide = true)]
     Plan(UnbuiltCommand),
     #[command(hide = true)]
     Cost(UnbuiltCommand),
-    #[command(hide = true)]
-    Verify(UnbuiltCommand),
 }
 
 fn main() -> ExitCode {
@@ -67,7 +66,7 @@ fn main() -> ExitCode {
         Command::View(args) => args.refuse("view"),
         Command::Plan(args) => args.refuse("plan"),
         Command::Cost(args) => args.refuse("cost"),
-        Command::Verify(args) => args.refuse("verify"),
+        Command::Verify(args) => verify::run(args, arguments.quiet),
     };
     result.unwrap_or_else(|error| {
         let label = if color { "\x1b[1;31merror:\x1b[0m" } else { "error:" };

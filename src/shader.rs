@@ -1,4 +1,5 @@
-//! The programs under `shaders/pass/`, as build.rs describes them: one module each with `PROGRAM`, `Bind`, `Constants`.
+//! The programs under `shaders/pass/`, as build.rs describes them: one module each with `PROGRAM`, `Bind`, `Constants`;
+//! and the equations tagged in `shaders/lib/`, each with a program that evaluates it.
 
 use ash::vk;
 
@@ -7,3 +8,54 @@ use crate::gpu::{
 };
 
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+
+/// A tagged function of `shaders/lib/` with the program that evaluates it, one case per invocation.
+#[derive(Debug)]
+pub struct Probe {
+    /// Name in tables and vector files.
+    pub name: &'static str,
+    /// Name of the GLSL function.
+    pub function: &'static str,
+    /// File under `shaders/lib/`, without `.glsl`.
+    pub subject: &'static str,
+    /// The formula, in one line.
+    pub formula: &'static str,
+    /// Ids of the lecture, and rows of docs/numerics.md as `N` and a number.
+    pub ids: &'static [&'static str],
+    /// Input columns: the function's parameters in order.
+    pub inputs: &'static [&'static str],
+    /// Output columns: the members of its result.
+    pub outputs: &'static [&'static str],
+    /// Built-ins whose precision is the device's own (and `/`), reached in the tiers fast, stable, compensated.
+    pub builtins: [&'static [&'static str]; 3],
+    /// Most evaluations of loop heads in one call.
+    pub loop_heads: u32,
+    /// The program.
+    pub program: &'static Program,
+}
+
+impl Probe {
+    /// Specialization constant `ARITHMETIC` of `shaders/lib/arithmetic.glsl`.
+    pub const ARITHMETIC: u32 = 30;
+}
+
+/// What every probe binds: columns of f32, one after the other.
+#[derive(Clone, Copy)]
+pub struct ProbeBind<'a> {
+    /// Which.
+    pub probe: &'static Probe,
+    /// [`Probe::inputs`] columns.
+    pub inputs: &'a Buffer,
+    /// [`Probe::outputs`] columns.
+    pub outputs: &'a Buffer,
+}
+
+impl<'a> Bindings<'a> for ProbeBind<'a> {
+    fn program(&self) -> &'static Program {
+        self.probe.program
+    }
+
+    fn resources(&self) -> Vec<Resource<'a>> {
+        vec![Resource::from(self.inputs), Resource::from(self.outputs)]
+    }
+}

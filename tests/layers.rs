@@ -10,12 +10,14 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("scene", &["scene", "image"]),
     ("study", &["study", "scene"]),
     ("plan", &["plan", "scene"]),
+    ("optics", &["optics"]),
+    ("verify", &["verify", "optics", "shader", "gpu"]),
     ("share", &["share"]),
     ("gpu", &["gpu"]),
     ("shader", &["shader", "gpu", "share"]),
     ("pass", &["pass", "gpu", "scene", "plan", "image", "shader", "share"]),
     ("frame", &["frame", "pass", "gpu", "scene", "plan", "image", "share"]),
-    ("cli", &["cli", "frame", "pass", "gpu", "scene", "plan", "image", "study", "share", "shader"]),
+    ("cli", &["cli", "verify", "optics", "frame", "pass", "gpu", "scene", "plan", "image", "study", "share", "shader"]),
 ];
 
 /// Modules that may name `ash`.

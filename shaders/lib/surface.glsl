@@ -67,17 +67,17 @@ Surface surface_from_texels(Material m, vec3 base, float metallic, float roughne
 
 // Reflectance of the dielectric part.
 vec3 fresnel_of_dielectric(Surface s, float cos_in) {
-    if (FRESNEL == 0) return fresnel_schlick(s.f0_dielectric, s.f90_dielectric, cos_in);
+    if (FRESNEL == 0) return schlick(s.f0_dielectric, s.f90_dielectric, cos_in);
     // F0 may be tinted by KHR_materials_specular, so the exact curve is carried over as its share between F0 and 1.
     float r0 = (s.ior - 1.0) / (s.ior + 1.0);
     r0 *= r0;
-    float share = clamp((fresnel_dielectric(s.ior, cos_in) - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
+    float share = clamp((fresnel_dielectric(cos_in, s.ior).F - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
     return s.f0_dielectric + (vec3(s.f90_dielectric) - s.f0_dielectric) * share;
 }
 
 // Reflectance of the mixture. Metals given by a colour alone have no n and κ: Schlick on every rung.
 vec3 fresnel(Surface s, float cos_in) {
-    return mix(fresnel_of_dielectric(s, cos_in), fresnel_schlick(s.base, 1.0, cos_in), s.metallic);
+    return mix(fresnel_of_dielectric(s, cos_in), schlick(s.base, 1.0, cos_in), s.metallic);
 }
 
 float largest(vec3 v) {
@@ -117,7 +117,7 @@ vec3 reflected(Surface s, vec3 l) {
         }
     }
     if (CLEARCOAT) {
-        float f = s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, cos_d).x;
+        float f = s.clearcoat * schlick(vec3(0.04), 1.0, cos_d).x;
         float coat_l = max(dot(s.n_coat, l), 0.0);
         float d = ggx_distribution(s.n_coat, h, s.clearcoat_alpha);
         float vis = ggx_visibility(coat_l, max(dot(s.n_coat, s.v), 1e-4), s.clearcoat_alpha);
@@ -128,6 +128,6 @@ vec3 reflected(Surface s, vec3 l) {
 
 // What the clear coat lets through to the eye.
 float under_coat(Surface s) {
-    return 1.0 - s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, clamp(dot(s.n_coat, s.v), 0.0, 1.0)).x;
+    return 1.0 - s.clearcoat * schlick(vec3(0.04), 1.0, clamp(dot(s.n_coat, s.v), 0.0, 1.0)).x;
 }
 #endif

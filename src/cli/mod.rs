@@ -6,6 +6,7 @@ pub mod options;
 pub mod render;
 pub mod report;
 pub mod unbuilt;
+pub mod verify;
 
 use std::io::{self, Write as _};
 

@@ -44,6 +44,7 @@ impl Lighting<'_> {
         composite::Constants {
             brdf: self.knobs.index("brdf"),
             fresnel: self.knobs.index("fresnel"),
+            arithmetic: self.knobs.index("arithmetic"),
             clearcoat: self.plan.clearcoat,
             directional_lights: self.plan.directional_lights,
             local_lights: self.local_lights(),
@@ -72,6 +73,7 @@ pub fn light<'a>(
         has_layers: plan.layers,
         brdf: lighting.knobs.index("brdf"),
         fresnel: lighting.knobs.index("fresnel"),
+        arithmetic: lighting.knobs.index("arithmetic"),
         clearcoat: plan.clearcoat,
         directional_lights: plan.directional_lights,
         local_lights: lighting.local_lights(),

@@ -79,10 +79,10 @@ pub static KNOBS: &[Knob] = &[
     Knob { name: "colour", rungs: &["rgb"], unbuilt: &["spectral"], default: "rgb", about: "wavelengths (C1–C3)" },
     Knob {
         name: "arithmetic",
-        rungs: &["stable"],
-        unbuilt: &["fast", "compensated"],
+        rungs: &["fast", "stable", "compensated"],
+        unbuilt: &[],
         default: "stable",
-        about: "form of the formulas",
+        about: "form of the formulas (docs/numerics.md)",
     },
     Knob {
         name: "normals",

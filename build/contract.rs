@@ -1,0 +1,160 @@
+//! What the SPIR-V of an equation must be: checked at every build, on what reflection sees and on what ships.
+//!
+//! - no RelaxedPrecision: every value has 32 bits;
+//! - NoContraction wherever the source says `precise`, or compensated sums return zero residuals (docs/numerics.md 2);
+//! - loop heads stay below what lavapipe evaluates: it ends all loops of an invocation in silence after 65,535;
+//! - which built-ins with loose precision each tier reaches, as a list for docs/equations.md.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rspirv::dr::{Function, Module, Operand};
+use rspirv::spirv::{Decoration, GlslStd450Op as GLOp, Op};
+
+use crate::equations::Source;
+use crate::{Names, Result, word};
+
+/// Loop heads that one call may evaluate.
+const HEADS: u32 = 60_000;
+
+/// What an equation's code turned out to be.
+pub(crate) struct Facts {
+    /// Extended instructions reached in each tier: fast, stable, compensated.
+    pub(crate) builtins: [BTreeSet<String>; 3],
+    /// Most evaluations of loop heads in one call.
+    pub(crate) heads: u32,
+}
+
+pub(crate) fn check(name: &str, module: &Module, shipped: &[u32], sources: &BTreeMap<String, Source>) -> Result<Facts> {
+    let names = Names::new(module);
+    let functions: BTreeMap<u32, &Function> =
+        module.functions.iter().filter_map(|f| Some((f.def.as_ref()?.result_id?, f))).collect();
+    let relaxed = |d: u32| d == Decoration::RelaxedPrecision as u32;
+    if shipped_decorations(shipped).any(relaxed) {
+        return Err(format!("{name}: RelaxedPrecision in what ships"));
+    }
+    let own_name = |id: u32| names.name(id).split('(').next().unwrap_or_default().to_owned();
+    let mut any_precise = false;
+    let mut loops: BTreeMap<String, usize> = BTreeMap::new();
+    let mut marked: BTreeMap<String, bool> = BTreeMap::new();
+    for (&id, function) in &functions {
+        let lines = || function.blocks.iter().flat_map(|block| &block.instructions);
+        let contracted =
+            lines().filter_map(|line| line.result_id).any(|r| names.decorated(r, Decoration::NoContraction).is_some());
+        *loops.entry(own_name(id)).or_default() += lines().filter(|line| line.class.opcode == Op::LoopMerge).count();
+        *marked.entry(own_name(id)).or_default() |= contracted;
+        any_precise |= contracted;
+    }
+    for (function, source) in sources {
+        if source.precise && marked.get(function) == Some(&false) {
+            return Err(format!("{name}: `precise` in {function} left no NoContraction"));
+        }
+        if loops.get(function).is_some_and(|&found| found != source.heads.len()) {
+            let (stated, found) = (source.heads.len(), loops[function]);
+            return Err(format!("{name}: {function} has {found} loops and states `@heads` of {stated}"));
+        }
+    }
+    if any_precise && !shipped_decorations(shipped).any(|d| d == Decoration::NoContraction as u32) {
+        return Err(format!("{name}: optimisation dropped NoContraction"));
+    }
+    let mut facts = Facts { builtins: Default::default(), heads: 0 };
+    let entry = module.entry_points.first().map_or(0, |line| word(&line.operands[1]));
+    for tier in 0..3 {
+        let mut heads = 0;
+        reach(
+            entry,
+            tier,
+            &names,
+            &functions,
+            &mut |function| {
+                heads += sources.get(&own_name(function)).map_or(0, |source| source.heads.iter().sum());
+            },
+            &mut facts.builtins[tier as usize],
+        );
+        facts.heads = facts.heads.max(heads);
+    }
+    if facts.heads > HEADS {
+        return Err(format!("{name}: {} loop heads in one call, more than {HEADS}", facts.heads));
+    }
+    Ok(facts)
+}
+
+/// Decorations in SPIR-V of any version: rspirv 0.13 cannot load what ships.
+fn shipped_decorations(words: &[u32]) -> impl Iterator<Item = u32> {
+    let mut at = 5;
+    std::iter::from_fn(move || {
+        while at < words.len() {
+            let (op, length) = (words[at] & 0xffff, (words[at] >> 16) as usize);
+            let found = (op == Op::Decorate as u32).then(|| words[at + 2]);
+            at += length.max(1);
+            if found.is_some() {
+                return found;
+            }
+        }
+        None
+    })
+}
+
+/// Walks the blocks of `function` that the tier reaches, and the functions they call, each call anew.
+fn reach(
+    function: u32,
+    tier: u32,
+    names: &Names,
+    functions: &BTreeMap<u32, &Function>,
+    enter: &mut impl FnMut(u32),
+    builtins: &mut BTreeSet<String>,
+) {
+    enter(function);
+    let Some(body) = functions.get(&function) else { return };
+    let blocks: BTreeMap<u32, _> = body.blocks.iter().filter_map(|b| Some((b.label.as_ref()?.result_id?, b))).collect();
+    let mut seen = BTreeSet::new();
+    let mut open: Vec<u32> = body.blocks.first().and_then(|b| b.label.as_ref()?.result_id).into_iter().collect();
+    while let Some(id) = open.pop() {
+        if !seen.insert(id) {
+            continue;
+        }
+        for line in &blocks[&id].instructions {
+            match line.class.opcode {
+                Op::ExtInst => {
+                    if let Operand::LiteralExtInstInteger(number) = line.operands[1] {
+                        let name = GLOp::from_u32(number).map_or(format!("#{number}"), |op| format!("{op:?}"));
+                        builtins.insert(name);
+                    }
+                }
+                Op::FDiv => drop(builtins.insert("/".to_owned())),
+                Op::FunctionCall => reach(word(&line.operands[0]), tier, names, functions, enter, builtins),
+                Op::Branch => open.push(word(&line.operands[0])),
+                Op::BranchConditional => {
+                    let [condition, yes, no] = [0, 1, 2].map(|k| word(&line.operands[k]));
+                    match decided(condition, tier, names) {
+                        Some(true) => open.push(yes),
+                        Some(false) => open.push(no),
+                        None => open.extend([yes, no]),
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// The value of `ARITHMETIC == constant` or `ARITHMETIC != constant` in a tier.
+fn decided(condition: u32, tier: u32, names: &Names) -> Option<bool> {
+    let line = names.types.get(&condition).filter(|line| line.class.opcode == Op::SpecConstantOp)?;
+    let [Operand::LiteralSpecConstantOpInteger(op), left, right] = &line.operands[..] else { return None };
+    let value = |operand: &Operand| {
+        let id = word(operand);
+        let named = names.decorated(id, Decoration::SpecId).is_some() && names.name(id) == "ARITHMETIC";
+        if named { tier } else { names.constant(id) }
+    };
+    match op {
+        Op::IEqual => Some(value(left) == value(right)),
+        Op::INotEqual => Some(value(left) != value(right)),
+        _ => None,
+    }
+}
+
+/// A list of names as a Rust array.
+pub(crate) fn list<'a>(names: impl IntoIterator<Item = &'a String>) -> String {
+    let quoted: Vec<_> = names.into_iter().map(|name| format!("{name:?}")).collect();
+    format!("&[{}]", quoted.join(", "))
+}

@@ -1,0 +1,350 @@
+// Sums and products without their rounding, and exp, log, pow and the arc functions to a few units in the last place
+// (ULP), which Vulkan's built-ins are not (numerics.md 2). Twins: src/optics/arithmetic.rs.
+//
+// From + − × / √ and bit patterns alone, so that every device that rounds to nearest gives the same bits; `precise`
+// everywhere: without it a compiler may fuse or reassociate, and a residual is then 0. Never `fma`: it may be a
+// multiplication and an addition. Polynomials are minimax fits (Lawson's reweighted least squares), their coefficients
+// rounded to f32 one after the other and the rest fitted again.
+#ifndef ARITHMETIC_GLSL
+#define ARITHMETIC_GLSL
+
+// The knob `arithmetic`: 0 the formulas of the textbook and the built-ins, 1 rewritten so that nothing cancels,
+// 2 with sums and products in pairs of floats where that still gains.
+layout(constant_id = 30) const uint ARITHMETIC = 1;
+const uint FAST = 0;
+const uint STABLE = 1;
+const uint COMPENSATED = 2;
+
+const float LARGEST = 3.402823466e38;
+const float SMALLEST_NORMAL = 1.175494351e-38;
+
+// k · LN2_HI is exact for every exponent k.
+const float LN2_HI = 0.693359375;
+const float LN2_LO = -2.121944401e-4;
+const float LOG2_E = 1.44269504;
+// 1, 2 and 4 times EIGHTH_HI are exact, and 3 times as well.
+const float EIGHTH_HI = 0.785398483276;  // π/4, an eighth of a turn
+const float EIGHTH_LO = -3.19878919e-7;
+const float TAN_PI_8 = 0.414213562;
+
+float plus_infinity() {
+    return uintBitsToFloat(0x7f800000u);
+}
+
+// 2^n, n in [-126, 127].
+float power_of_two(int n) {
+    return intBitsToFloat((n + 127) << 23);
+}
+
+// --------------------------------------------------------------------------------------------------------------------
+// Pairs of floats: the value is hi + lo, |lo| ≤ ULP(hi)/2. Where hi overflows, lo is 0 and not ∞ − ∞.
+//
+// glslang never ends if a `precise` value comes from a member of a variable that is assigned from its own member:
+// `s = two_sum(s.hi, x); precise float r = s.lo + y;`. A new variable each time; in loops whole pairs, `s = df_add(s, t)`,
+// or plain floats, `DoubleFloat t = two_sum(sum, x); rest += t.lo; sum = t.hi;`.
+
+struct DoubleFloat {
+    float hi;
+    float lo;
+};
+
+// @eq N11 N25 N30: hi + lo = a + b exactly, hi = fl(a + b)
+// Knuth: no condition on the magnitudes.
+DoubleFloat two_sum(float a, float b) {
+    precise float s = a + b;
+    precise float b_in_s = s - a;
+    precise float a_in_s = s - b_in_s;
+    precise float rest = (a - a_in_s) + (b - b_in_s);
+    return DoubleFloat(s, abs(s) <= LARGEST ? rest : 0.0);
+}
+
+// @eq N11 N25 N30: hi + lo = a + b exactly, for |a| ≥ |b| or a = 0
+// Dekker: half of Knuth's operations. If |a| < |b|, lo may lack the last bits.
+DoubleFloat quick_two_sum(float a, float b) {
+    precise float s = a + b;
+    precise float b_in_s = s - a;
+    precise float rest = b - b_in_s;
+    return DoubleFloat(s, abs(s) <= LARGEST ? rest : 0.0);
+}
+
+// The leading 12 of 24 bits. Veltkamp's split, 4097·a − (4097·a − a), costs twice as much and overflows above 8e34.
+float leading_half(float a) {
+    return uintBitsToFloat(floatBitsToUint(a) & 0xfffff000u);
+}
+
+// @eq N11 N25 N28: hi + lo = a·b exactly, hi = fl(a·b)
+// Dekker: halves of 12 bits have exact products, and each partial sum below fits into 24 bits. Where |a·b| < 2^-102 the
+// rest is below the normal range and lo is rounded or 0.
+DoubleFloat two_product(float a, float b) {
+    precise float p = a * b;
+    precise float a_hi = leading_half(a);
+    precise float a_lo = a - a_hi;
+    precise float b_hi = leading_half(b);
+    precise float b_lo = b - b_hi;
+    precise float rest = (((a_hi * b_hi - p) + a_hi * b_lo) + a_lo * b_hi) + a_lo * b_lo;
+    return DoubleFloat(p, abs(p) <= LARGEST ? rest : 0.0);
+}
+
+// @eq N11: a + b, relative error 3·2^-48
+// The accurate variant (both pairs of parts by two_sum): the bound holds whatever cancels.
+DoubleFloat df_add(DoubleFloat a, DoubleFloat b) {
+    DoubleFloat s = two_sum(a.hi, b.hi);
+    DoubleFloat t = two_sum(a.lo, b.lo);
+    precise float rest = s.lo + t.hi;
+    DoubleFloat u = quick_two_sum(s.hi, rest);
+    precise float last = u.lo + t.lo;
+    return quick_two_sum(u.hi, last);
+}
+
+// −a, exactly
+DoubleFloat df_negate(DoubleFloat a) {
+    return DoubleFloat(-a.hi, -a.lo);
+}
+
+// a·s, exactly, for s a power of two
+DoubleFloat df_scale(DoubleFloat a, float s) {
+    return DoubleFloat(a.hi * s, a.lo * s);
+}
+
+// @eq N11: a·b, relative error 6·2^-48
+DoubleFloat df_mul(DoubleFloat a, DoubleFloat b) {
+    DoubleFloat p = two_product(a.hi, b.hi);
+    precise float rest = p.lo + (a.hi * b.lo + a.lo * b.hi);
+    return quick_two_sum(p.hi, abs(p.hi) <= LARGEST ? rest : 0.0);
+}
+
+// @eq N11: a/b, relative error 2^-44
+// One Newton step from fl(a_hi/b_hi), whose own error does not matter. 0/0 is 0, a/0 is ±∞.
+DoubleFloat df_div(DoubleFloat a, DoubleFloat b) {
+    precise float q = a.hi == 0.0 ? 0.0 : a.hi / b.hi;
+    DoubleFloat p = two_product(q, b.hi);
+    precise float rest = (((a.hi - p.hi) - p.lo) + (a.lo - q * b.lo)) / b.hi;
+    return quick_two_sum(q, abs(q) <= LARGEST && q != 0.0 ? rest : 0.0);
+}
+
+// @eq N11: √a, relative error 2^-44; 0 for a ≤ 0
+// One Newton step from fl(√a_hi), whose own error does not matter.
+DoubleFloat df_sqrt(DoubleFloat a) {
+    bool positive = a.hi > 0.0;
+    precise float root = positive ? sqrt(a.hi) : 0.0;
+    DoubleFloat p = two_product(root, root);
+    precise float rest = (((a.hi - p.hi) - p.lo) + a.lo) / (2.0 * root);
+    return quick_two_sum(root, positive ? rest : 0.0);
+}
+
+// @eq N11 N25: a_x b_x + a_y b_y + a_z b_z as if in twice the precision
+// Ogita, Rump and Oishi: exact products and sums, their rests added in f32. Components below 1e19: products overflow above.
+DoubleFloat dot2(vec3 a, vec3 b) {
+    DoubleFloat x = two_product(a.x, b.x);
+    DoubleFloat y = two_product(a.y, b.y);
+    DoubleFloat z = two_product(a.z, b.z);
+    DoubleFloat s = two_sum(x.hi, y.hi);
+    DoubleFloat t = two_sum(s.hi, z.hi);
+    precise float rest = ((x.lo + y.lo) + (s.lo + z.lo)) + t.lo;
+    return two_sum(t.hi, rest);
+}
+
+// --------------------------------------------------------------------------------------------------------------------
+// Exponential
+
+// e^(x + lo) for |lo| ≤ ULP(x): x = k ln 2 + r, |r| ≤ ln(2)/2, e^r = 1 + r + r²P(r). Selects, not clamp: NaN stays NaN.
+float exp_pair(float x, float lo) {
+    precise float c = x > 89.0 ? 89.0 : x;
+    c = c < -104.0 ? -104.0 : c;
+    precise float k = floor(c * LOG2_E + 0.5);
+    precise float r = ((c - k * LN2_HI) - k * LN2_LO) + lo;
+    precise float p = ((((1.38198258e-3 * r + 8.36868677e-3) * r + 4.16682772e-2) * r + 0.166665211) * r + 0.49999994);
+    precise float y = (p * (r * r) + r) + 1.0;
+    // 2^k in two steps: 2^128 and what is below 2^-126 are no floats, results near them are.
+    int n = int(k);
+    int half_n = n >> 1;
+    precise float scaled = y * power_of_two(half_n) * power_of_two(n - half_n);
+    return scaled;
+}
+
+// @eq N28: e^x
+// @out y
+// +∞ above 88.72284; 0, or a denormal where the device keeps them, below -87.34.
+float expf(float x) {
+    if (ARITHMETIC == FAST) return exp(x);
+    return exp_pair(x, 0.0);
+}
+
+// @eq N27: e^x − 1
+// @out y
+// 2^k (e^r − 1) + (2^k − 1), in halves so that k = 128 does not overflow early; for k = 0 the first term alone.
+float expm1f(float x) {
+    if (ARITHMETIC == FAST) return exp(x) - 1.0;
+    precise float c = x > 89.0 ? 89.0 : x;
+    c = c < -18.0 ? -18.0 : c;
+    precise float k = floor(c * LOG2_E + 0.5);
+    precise float r = (c - k * LN2_HI) - k * LN2_LO;
+    precise float p = ((((1.38707086e-3 * r + 8.36627278e-3) * r + 4.16674353e-2) * r + 0.166665465) * r + 0.49999997);
+    precise float y = p * (r * r) + r;
+    float scale = power_of_two(int(k) - 1);
+    precise float sum = 2.0 * (scale * y + (scale - 0.5));
+    return k == 0.0 ? y : sum;
+}
+
+// --------------------------------------------------------------------------------------------------------------------
+// Logarithm
+
+struct Reduced {
+    float k;
+    float f;
+};
+
+// x = 2^k (1 + f), 1 + f in [√½, √2), for x a positive normal number.
+Reduced log_reduced(float x) {
+    int i = floatBitsToInt(x) - 0x3f3504f3;  // √½
+    return Reduced(float(i >> 23), intBitsToFloat((i & 0x7fffff) + 0x3f3504f3) - 1.0);
+}
+
+// Positive numbers below the normal range are scaled into it. Where the device reads them as 0, the logarithm is -∞.
+float log_scaled(float x) {
+    return x < SMALLEST_NORMAL ? x * 33554432.0 : x;
+}
+
+float log_scale(float x) {
+    return x < SMALLEST_NORMAL ? 25.0 : 0.0;
+}
+
+// k ln 2 + ln(1 + f), ln(1 + f) = f − f²/2 + f³P(f).
+float log_sum(float k, float f) {
+    precise float p = (((-7.63643906e-2 * f + 0.127622172) * f - 0.131596103) * f + 0.1420158) * f - 0.166234091;
+    p = ((p * f + 0.200012416) * f - 0.250008196) * f + 0.333333313;
+    precise float f2 = f * f;
+    precise float small = (p * (f2 * f) + k * LN2_LO) - 0.5 * f2;
+    precise float y = (f + small) + k * LN2_HI;
+    return y;
+}
+
+// @eq N17 N44: ln x
+// @out y
+// -∞ for x ≤ 0.
+float logf(float x) {
+    if (ARITHMETIC == FAST) return log(x);
+    Reduced m = log_reduced(log_scaled(x));
+    float y = log_sum(m.k - log_scale(x), m.f);
+    y = x <= LARGEST ? y : x;
+    return x <= 0.0 ? -plus_infinity() : y;
+}
+
+// @eq N17: ln(1 + x)
+// @out y
+// 1 + x = 2^k (1 + f), f taken from fl(1 + x) and corrected by what that rounding lost; for k = 0 f is x. -∞ for x ≤ -1.
+float log1pf(float x) {
+    if (ARITHMETIC == FAST) return log(1.0 + x);
+    DoubleFloat u = two_sum(1.0, x);
+    Reduced m = log_reduced(u.hi);
+    precise float f = m.f + u.lo * intBitsToFloat((127 - int(m.k)) << 23);
+    float y = log_sum(m.k, f);
+    y = x <= LARGEST ? y : x;
+    return x <= -1.0 ? -plus_infinity() : y;
+}
+
+// ln x to 2^-30 of itself, near 1 as well: ln(1 + f) = 2 artanh(s), s = f/(2 + f). (-∞, 0) for x ≤ 0.
+DoubleFloat df_log(float x) {
+    Reduced m = log_reduced(log_scaled(x));
+    precise float k = m.k - log_scale(x);
+    DoubleFloat d = quick_two_sum(2.0, m.f);
+    precise float s = m.f / d.hi;
+    DoubleFloat p = two_product(s, d.hi);
+    precise float s_lo = (((m.f - p.hi) - p.lo) - s * d.lo) / d.hi;
+    precise float z = s * s;
+    precise float series = ((0.298714608 * z + 0.399775684) * z + 0.666667759) * z;
+    DoubleFloat sum = quick_two_sum(k * LN2_HI, 2.0 * s);
+    precise float rest = sum.lo + ((s * series + 2.0 * s_lo) + k * LN2_LO);
+    DoubleFloat y = quick_two_sum(sum.hi, rest);
+    bool finite = x > 0.0 && x <= LARGEST;
+    float end = x <= 0.0 ? -plus_infinity() : x;
+    return DoubleFloat(finite ? y.hi : end, finite ? y.lo : 0.0);
+}
+
+// @eq N17 N44: x^y = e^(y ln x)
+// @out z
+// ln x and the product as pairs: the built-in's y log2 x loses every bit for x near 1 and y of 1e7. For x ≤ 0, where the
+// power is that of 0: 0 if y > 0, 1 if y = 0, +∞ if y < 0.
+float powf(float x, float y) {
+    if (ARITHMETIC == FAST) return pow(x, y);
+    DoubleFloat l = df_log(x);
+    DoubleFloat p = two_product(y, l.hi);
+    precise float lo = p.lo + y * l.lo;
+    // Beyond ±110 the power is 0 or +∞ whatever lo is.
+    float power = exp_pair(p.hi, abs(p.hi) < 110.0 ? lo : 0.0);
+    return y == 0.0 ? 1.0 : power;
+}
+
+// --------------------------------------------------------------------------------------------------------------------
+// Arcs
+
+// arcsin(s)/s − 1 of z = s² ≤ 1/4.
+float asin_series(float z) {
+    precise float p = (((4.22197208e-2 * z + 2.41481625e-2) * z + 4.54766564e-2) * z + 7.49524906e-2) * z + 0.166667536;
+    precise float y = p * z;
+    return y;
+}
+
+// k π/4 + m (s + rest), where s + rest would round once more than need be.
+float arc_sum(float k, float m, float s, float rest) {
+    precise float y = (k * EIGHTH_HI + m * s) + (m * rest + k * EIGHTH_LO);
+    return y;
+}
+
+float with_sign_of(float magnitude, float x) {
+    return uintBitsToFloat(floatBitsToUint(magnitude) | (floatBitsToUint(x) & 0x80000000u));
+}
+
+// @eq N10: arcsin x
+// @out y
+// Above 1/2 by the half angle: π/2 − 2 arcsin √((1 − x)/2), whose difference is exact. Beyond ±1 the value at ±1.
+float asinf(float x) {
+    if (ARITHMETIC == FAST) return asin(x);
+    float a = abs(x) > 1.0 ? 1.0 : abs(x);
+    bool high = a > 0.5;
+    precise float z = high ? 0.5 - 0.5 * a : a * a;
+    precise float s = high ? sqrt(z) : a;
+    precise float rest = s * asin_series(z);
+    return with_sign_of(arc_sum(high ? 2.0 : 0.0, high ? -2.0 : 1.0, s, rest), x);
+}
+
+// @eq N10: arccos x
+// @out y
+// Near 1 by the half angle, 2 arcsin √((1 − x)/2), near -1 by π less that. Beyond ±1 the value at ±1.
+float acosf(float x) {
+    if (ARITHMETIC == FAST) return acos(x);
+    float a = abs(x) > 1.0 ? 1.0 : abs(x);
+    bool high = a > 0.5;
+    precise float z = high ? 0.5 - 0.5 * a : a * a;
+    precise float s = high ? sqrt(z) : a;
+    precise float rest = s * asin_series(z);
+    float k = high ? (x < 0.0 ? 4.0 : 0.0) : 2.0;
+    float m = high ? 2.0 : -1.0;
+    return arc_sum(k, x < 0.0 && high ? -2.0 : x < 0.0 ? 1.0 : m, s, rest);
+}
+
+// @eq N10: the angle of (x, y) from +x
+// @out angle
+// arctan of the smaller over the larger, or by a turn of π/4 of (a − b)/(a + b), so that |t| ≤ tan(π/8). 0 for (0, 0).
+float atan2f(float y, float x) {
+    if (ARITHMETIC == FAST) return atan(y, x);
+    float ax = abs(x);
+    float ay = abs(y);
+    bool steep = ay > ax;
+    float large = steep ? ay : ax;
+    // Away from both ends of the range of floats, so that neither the sum nor the quotient leaves it.
+    float scale = large > 1.15292150e18 ? 0.0625 : 16777216.0;
+    precise float a = (steep ? ax : ay) * scale;
+    precise float b = large * scale;
+    bool turned = a > TAN_PI_8 * b;
+    precise float num = turned ? a - b : a;
+    precise float den = turned ? a + b : b;
+    precise float t = num / (den < SMALLEST_NORMAL ? 1.0 : den);
+    precise float z = t * t;
+    precise float p = (((-6.09186068e-2 * z + 0.105998456) * z - 0.142444715) * z + 0.19998531) * z - 0.333333164;
+    float k = turned ? 1.0 : 0.0;
+    k = steep ? 2.0 - k : k;
+    k = x < 0.0 ? 4.0 - k : k;
+    return with_sign_of(arc_sum(k, steep != (x < 0.0) ? -1.0 : 1.0, t, t * (z * p)), y);
+}
+#endif

@@ -1,0 +1,235 @@
+//! What the catalogue says of an equation: its twin, where it is tested, what error is allowed.
+
+use glam::DVec3;
+
+/// Rungs of the knob `arithmetic`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Tier {
+    /// The formula as on the slide. No bound is promised.
+    Fast,
+    /// Rewritten so that nothing cancels, at the same class of cost.
+    Stable,
+    /// Sums and products in double-float where that is what is left to gain.
+    Compensated,
+}
+
+impl Tier {
+    /// All, cheapest first.
+    pub const ALL: [Self; 3] = [Self::Fast, Self::Stable, Self::Compensated];
+
+    /// As on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Stable => "stable",
+            Self::Compensated => "compensated",
+        }
+    }
+}
+
+/// One equation.
+#[derive(Debug)]
+pub struct Equation {
+    /// Name in tables and vector files; the shader's tag has the same.
+    pub name: &'static str,
+    /// Input columns to output columns, exact as far as f64 goes. NaN where the output has no meaning.
+    pub twin: fn(&[f64]) -> Vec<f64>,
+    /// Where it is tested.
+    pub regions: &'static [Region],
+    /// Bounds, in the order of the output columns.
+    pub outputs: &'static [Output],
+    /// What its error is plotted against.
+    pub axis: Axis,
+    /// The largest magnitude at which it must still answer without a NaN, sense or no sense.
+    pub extreme: f32,
+}
+
+/// A part of the domain with a way to draw inputs from it.
+#[derive(Debug)]
+pub struct Region {
+    /// What is special about it.
+    pub name: &'static str,
+    /// Its part of the cases, relative to the others.
+    pub share: u32,
+    /// One case: input columns, each a value of f32.
+    pub draw: fn(&mut Draw) -> Vec<f32>,
+}
+
+/// One output column and what is promised for it.
+#[derive(Debug)]
+pub struct Output {
+    /// Column name.
+    pub name: &'static str,
+    /// The promise in words.
+    pub bound: &'static str,
+    /// The largest absolute error allowed in a case; infinite where nothing is promised.
+    pub allowed: fn(&Case<'_>) -> f64,
+}
+
+/// A case as a bound sees it.
+#[derive(Debug, Clone, Copy)]
+pub struct Case<'a> {
+    /// Stable or compensated: fast has no bounds.
+    pub tier: Tier,
+    /// Input columns.
+    pub inputs: &'a [f64],
+    /// Exact output columns.
+    pub exact: &'a [f64],
+    /// The column in question.
+    pub column: usize,
+}
+
+impl Case<'_> {
+    /// The exact value.
+    #[must_use]
+    pub fn x(&self) -> f64 {
+        self.exact[self.column]
+    }
+
+    /// `count` units in the last place of the exact value.
+    #[must_use]
+    pub fn ulps(&self, count: f64) -> f64 {
+        count * ulp(self.x())
+    }
+
+    /// `part` of the exact value's size.
+    #[must_use]
+    pub fn rel(&self, part: f64) -> f64 {
+        part * self.x().abs()
+    }
+
+    /// One or the other by tier.
+    #[must_use]
+    pub fn tiered(&self, stable: f64, compensated: f64) -> f64 {
+        if self.tier == Tier::Compensated { compensated } else { stable }
+    }
+}
+
+/// The quantity that errors are plotted against.
+#[derive(Debug, Clone, Copy)]
+pub struct Axis {
+    /// Its name with the unit.
+    pub name: &'static str,
+    /// Whether the plot is logarithmic in it.
+    pub log: bool,
+    /// It, from the input columns.
+    pub of: fn(&[f64]) -> f64,
+    /// The output column whose error is plotted.
+    pub column: usize,
+}
+
+/// Distance between neighbouring values of f32 at `x`.
+#[must_use]
+pub fn ulp(x: f64) -> f64 {
+    let size = x.abs();
+    if !size.is_finite() || size > f64::from(f32::MAX) {
+        return 2_f64.powi(104);
+    }
+    // f64's own exponent is that of f32 but for what lies below its normal range.
+    let exponent = ((size.to_bits() >> 52) as i32 - 1023).max(-126);
+    2_f64.powi(exponent - 23)
+}
+
+/// Random numbers of one seed: SplitMix64 (Steele, Lea, Flood 2014), the same on every machine.
+#[derive(Debug, Clone)]
+pub struct Draw(u64);
+
+impl Draw {
+    /// The stream of `seed`.
+    #[must_use]
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    /// 64 random bits.
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// Uniform in [0, 1).
+    pub fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 * 2_f64.powi(-53)
+    }
+
+    /// Uniform in [a, b).
+    pub fn between(&mut self, a: f64, b: f64) -> f64 {
+        a + (b - a) * self.unit()
+    }
+
+    /// Log-uniform in [a, b), both positive.
+    pub fn log(&mut self, a: f64, b: f64) -> f64 {
+        (a.ln() + (b / a).ln() * self.unit()).exp()
+    }
+
+    /// 1 or −1.
+    pub fn sign(&mut self) -> f64 {
+        if self.bits() & 1 == 0 { 1.0 } else { -1.0 }
+    }
+
+    /// An integer in [0, count).
+    pub fn below(&mut self, count: usize) -> usize {
+        (self.unit() * count as f64) as usize
+    }
+
+    /// One of `values`, or a neighbour at most three floats away.
+    pub fn near(&mut self, values: &[f32]) -> f32 {
+        let value = values[self.below(values.len())];
+        let steps = self.below(7) as i32 - 3;
+        let mut moved = value;
+        for _ in 0..steps.abs() {
+            moved = if steps > 0 { moved.next_up() } else { moved.next_down() };
+        }
+        moved
+    }
+
+    /// A uniformly distributed direction, exact in f64.
+    pub fn direction(&mut self) -> DVec3 {
+        let z = self.between(-1.0, 1.0);
+        let phi = self.between(0.0, std::f64::consts::TAU);
+        let r = (1.0 - z * z).max(0.0).sqrt();
+        DVec3::new(r * phi.cos(), r * phi.sin(), z)
+    }
+
+    /// A direction at `angle` radians from the unit vector `from`, anywhere around it.
+    pub fn at_angle(&mut self, from: DVec3, angle: f64) -> DVec3 {
+        let across = self.perpendicular(from);
+        from * angle.cos() + across * angle.sin()
+    }
+
+    /// A unit vector perpendicular to `to`.
+    pub fn perpendicular(&mut self, to: DVec3) -> DVec3 {
+        loop {
+            let across = to.cross(self.direction());
+            if across.length() > 0.1 {
+                return across.normalize();
+            }
+        }
+    }
+}
+
+/// Columns of vectors, rounded to f32.
+#[must_use]
+pub fn columns(vectors: &[DVec3]) -> Vec<f32> {
+    vectors.iter().flat_map(|v| [v.x as f32, v.y as f32, v.z as f32]).collect()
+}
+
+/// The vector in three columns from `first` on.
+#[must_use]
+pub fn vector(inputs: &[f64], first: usize) -> DVec3 {
+    DVec3::from_slice(&inputs[first..first + 3])
+}
+
+/// 1 for true.
+#[must_use]
+pub fn flag(set: bool) -> f64 {
+    f64::from(u8::from(set))
+}
+
+/// Bound of flags and of values that must be exact.
+pub const EXACT: fn(&Case<'_>) -> f64 = |_| 0.0;

@@ -1,0 +1,353 @@
+//! Reflectance of smooth surfaces, as textbooks write it (lecture F2, F3; Born & Wolf, Principles of Optics, 1.5.2 and
+//! 14.2). n is n_transmitted / n_incident.
+
+use super::catalogue::{Axis, Case, Draw, Equation, Output, Region, flag};
+
+/// @eq F2: Schlick's approximation: F0, F.
+#[must_use]
+pub fn fresnel_schlick(cos_in: f64, n: f64, kappa: f64) -> [f64; 2] {
+    let f0 = ((n - 1.0).powi(2) + kappa * kappa) / ((n + 1.0).powi(2) + kappa * kappa);
+    [f0, f0 + (1.0 - f0) * (1.0 - cos_in).powi(5)]
+}
+
+/// n cosθ_t squared; products of f32 are exact in f64, so only the sum rounds.
+fn refracted_square(cos_in: f64, n: f64) -> f64 {
+    // The sum in the order that leaves the small difference for last.
+    let (c2, n2) = (cos_in * cos_in, n * n);
+    if n2 > c2 { (n2 - 1.0) + c2 } else { (c2 - 1.0) + n2 }
+}
+
+/// @eq F3: exact reflectance of a dielectric: F, r_s, r_p, cosθ_t, total reflection.
+#[must_use]
+pub fn fresnel_dielectric(cos_in: f64, n: f64) -> [f64; 5] {
+    let cos2_t = refracted_square(cos_in, n) / (n * n);
+    if n < 1.0 && cos2_t <= 0.0 {
+        return [1.0, 1.0, 1.0, 0.0, 1.0];
+    }
+    let cos_t = cos2_t.max(0.0).sqrt();
+    if cos_in == 0.0 {
+        return [1.0, -1.0, -1.0, cos_t, 0.0];
+    }
+    let rs = (cos_in - n * cos_t) / (cos_in + n * cos_t);
+    let rp = (n * cos_in - cos_t) / (n * cos_in + cos_t);
+    [0.5 * (rs * rs + rp * rp), rs, rp, cos_t, 0.0]
+}
+
+/// @eq F3: transmitted power by polarisation and in the mean: the ratio of the refracted beam's to the incident one's.
+#[must_use]
+pub fn dielectric_transmitted(cos_in: f64, n: f64) -> [f64; 3] {
+    let cos2_t = refracted_square(cos_in, n) / (n * n);
+    if cos_in == 0.0 || cos2_t <= 0.0 {
+        return [0.0; 3];
+    }
+    let cos_t = cos2_t.sqrt();
+    let beam = n * cos_t / cos_in;
+    let ts = 2.0 * cos_in / (cos_in + n * cos_t);
+    let tp = 2.0 * cos_in / (n * cos_in + cos_t);
+    [beam * ts * ts, beam * tp * tp, 0.5 * beam * (ts * ts + tp * tp)]
+}
+
+/// @eq F2: reflectance at normal incidence between two media.
+#[must_use]
+pub fn nested_f0(n1: f64, n2: f64) -> f64 {
+    ((n2 - n1) / (n2 + n1)).powi(2)
+}
+
+/// A complex number.
+type Complex = [f64; 2];
+
+fn mul([a, b]: Complex, [c, d]: Complex) -> Complex {
+    [a * c - b * d, a * d + b * c]
+}
+
+fn div([a, b]: Complex, [c, d]: Complex) -> Complex {
+    let size = c * c + d * d;
+    [(a * c + b * d) / size, (b * c - a * d) / size]
+}
+
+fn root([re, im]: Complex) -> Complex {
+    let size = re.hypot(im);
+    // The larger part first; the other from 2pq = im.
+    if re >= 0.0 {
+        let p = (0.5 * (size + re)).sqrt();
+        [p, if p > 0.0 { 0.5 * im / p } else { 0.0 }]
+    } else {
+        let q = (0.5 * (size - re)).sqrt();
+        [0.5 * im / q, q]
+    }
+}
+
+/// Amplitudes r_s and r_p of a conductor, and g = √(m² − sin²θ).
+fn conductor(cos_in: f64, n: f64, kappa: f64) -> (Complex, Complex, Complex) {
+    let m2 = [n * n - kappa * kappa, 2.0 * n * kappa];
+    let g = root([refracted_square(cos_in, n) - kappa * kappa, m2[1]]);
+    let m2c = mul(m2, [cos_in, 0.0]);
+    let rs = div([cos_in - g[0], -g[1]], [cos_in + g[0], g[1]]);
+    let rp = div([m2c[0] - g[0], m2c[1] - g[1]], [m2c[0] + g[0], m2c[1] + g[1]]);
+    (rs, rp, g)
+}
+
+/// @eq F3 F8: exact reflectance of a conductor: F, R_s, R_p.
+#[must_use]
+pub fn fresnel_conductor(cos_in: f64, n: f64, kappa: f64) -> [f64; 3] {
+    if cos_in == 0.0 {
+        return [1.0; 3];
+    }
+    let (rs, rp, _) = conductor(cos_in, n, kappa);
+    let (s, p) = (rs[0].powi(2) + rs[1].powi(2), rp[0].powi(2) + rp[1].powi(2));
+    [0.5 * (s + p), s, p]
+}
+
+/// @eq F3: what a conductor keeps: A_s, A_p, A, as the flux that enters it: Re g |t_s|²/c with t_s = 1 + r_s, and
+/// Re(g/m²) |1 + r_p|²/c for the magnetic amplitude.
+#[must_use]
+pub fn conductor_absorbed(cos_in: f64, n: f64, kappa: f64) -> [f64; 3] {
+    if cos_in == 0.0 {
+        return [0.0; 3];
+    }
+    let m2 = [n * n - kappa * kappa, 2.0 * n * kappa];
+    let (_, _, g) = conductor(cos_in, n, kappa);
+    let ts = div([2.0 * cos_in, 0.0], [cos_in + g[0], g[1]]);
+    let m2c = mul(m2, [cos_in, 0.0]);
+    let tp = div([2.0 * m2c[0], 2.0 * m2c[1]], [m2c[0] + g[0], m2c[1] + g[1]]);
+    let s = g[0] * (ts[0].powi(2) + ts[1].powi(2)) / cos_in;
+    let p = div(g, m2)[0] * (tp[0].powi(2) + tp[1].powi(2)) / cos_in;
+    [s, p, 0.5 * (s + p)]
+}
+
+/// A cosine: uniform, grazing, nearly normal, or a special one.
+fn cosine(d: &mut Draw) -> f64 {
+    match d.below(8) {
+        0..4 => d.unit(),
+        4..6 => d.log(1e-8, 1.0),
+        6 => 1.0 - d.log(1e-7, 0.1),
+        _ => f64::from(d.near(&[1.0, 0.5, 0.25, 1e-8]).clamp(0.0, 1.0)),
+    }
+}
+
+fn log_index(d: &mut Draw) -> f64 {
+    match d.below(8) {
+        0 => f64::from(d.near(&[1.0, 1.2, 1.333, 1.5, 2.42, 0.5, 1.0 / 1.5])),
+        1..3 => d.between(1.0, 3.0),
+        _ => d.log(0.05, 20.0),
+    }
+}
+
+const NEAR_ONE: Region = Region {
+    name: "n → 1",
+    share: 3,
+    draw: |d| {
+        let offset = d.sign() * d.log(6e-8, 0.1);
+        vec![cosine(d) as f32, (1.0 + offset) as f32]
+    },
+};
+
+const CRITICAL: Region = Region {
+    name: "near the critical angle",
+    share: 3,
+    draw: |d| {
+        let n = (if d.below(3) == 0 { 1.0 - d.log(1e-6, 0.5) } else { d.between(0.05, 0.999) }) as f32;
+        let c = (1.0 - f64::from(n).powi(2)).sqrt() * (1.0 + d.sign() * d.log(1e-8, 0.1));
+        vec![c.min(1.0) as f32, n]
+    },
+};
+
+const ANYWHERE: Region =
+    Region { name: "0.05 < n < 20", share: 4, draw: |d| vec![cosine(d) as f32, log_index(d) as f32] };
+
+/// What the rounding of g² = c² + n² − 1 leaves: relative to g it is `error / g²`. The stable tier rounds terms of at most
+/// 1 three times, but for n < 0.7, where they are at most n²; the compensated one rounds once.
+fn critical_slack(case: &Case<'_>) -> f64 {
+    let (c, n) = (case.inputs[0], case.inputs[1]);
+    let rounding = if n * n < 0.5 { 2.5e-7 * n * n } else { 2.5e-7 };
+    if n >= 1.0 { 0.0 } else { case.tiered((0.5 * rounding / refracted_square(c, n).abs()).min(1.0), 0.0) }
+}
+
+/// Relative change of r, T and F for a relative change of g. dr/dg · g = −2 c g/(c + g)² for s: at most 1/2.
+fn fresnel_allowed(case: &Case<'_>, ulps: f64) -> f64 {
+    let (c, n) = (case.inputs[0], case.inputs[1]);
+    let g = refracted_square(c, n).max(0.0).sqrt();
+    let through_g = critical_slack(case) * 4.0 * (c * g / (c + g).powi(2)).max(n * n * c * g / (n * n * c + g).powi(2));
+    case.ulps(ulps) + through_g
+}
+
+/// The equations of this file.
+pub(super) const EQUATIONS: &[Equation] = &[
+    Equation {
+        name: "fresnel_schlick",
+        twin: |x| fresnel_schlick(x[0], x[1], x[2]).to_vec(),
+        regions: &[
+            Region { name: "dielectrics", share: 2, draw: |d| vec![cosine(d) as f32, log_index(d) as f32, 0.0] },
+            Region {
+                name: "metals",
+                share: 2,
+                draw: |d| vec![cosine(d) as f32, log_index(d) as f32, d.log(1e-6, 1e9) as f32],
+            },
+            Region {
+                name: "n → 1",
+                share: 1,
+                draw: |d| {
+                    let n = 1.0 + d.sign() * d.log(6e-8, 0.1);
+                    vec![cosine(d) as f32, n as f32, if d.below(2) == 0 { 0.0 } else { d.log(1e-8, 1e-2) as f32 }]
+                },
+            },
+        ],
+        outputs: &[
+            Output { name: "F0", bound: "8 ulp", allowed: |c| c.ulps(8.0) },
+            Output { name: "F", bound: "8 ulp", allowed: |c| c.ulps(8.0) },
+        ],
+        axis: Axis { name: "1 − cosθ", log: true, of: |x| 1.0 - x[0], column: 1 },
+        extreme: 1e38,
+    },
+    Equation {
+        name: "fresnel_dielectric",
+        twin: |x| fresnel_dielectric(x[0], x[1]).to_vec(),
+        regions: &[ANYWHERE, NEAR_ONE, CRITICAL],
+        outputs: &[
+            Output {
+                name: "F",
+                bound: "12 ulp or 2e-7; stable near the critical angle 5e-3 of F",
+                allowed: |c| fresnel_allowed(c, 12.0).max(2e-7).min(c.ulps(12.0).max(c.rel(5e-3))),
+            },
+            Output { name: "rs", bound: "12 ulp + δg", allowed: |c| fresnel_allowed(c, 12.0) },
+            Output {
+                name: "rp",
+                bound: "12 ulp + δg; near Brewster 3e-7 |n² − 1|/(n²c + g)²",
+                allowed: |c| {
+                    let (cos, n) = (c.inputs[0], c.inputs[1]);
+                    let g = refracted_square(cos, n).max(0.0).sqrt();
+                    let part = (n - 1.0).abs() * (n + 1.0) / (n * n * cos + g).powi(2);
+                    let term = (n * n * cos * cos + cos * cos).max(if n < 1.0 { n.powi(4) } else { 1.0 });
+                    fresnel_allowed(c, 12.0) + c.tiered(3e-7 * part * term, 0.0)
+                },
+            },
+            Output { name: "cos_t", bound: "4 ulp + δg", allowed: |c| c.ulps(4.0) + critical_slack(c) * c.x() },
+            Output {
+                name: "tir",
+                bound: "exact; stable within 2.5e-7 of critical either",
+                allowed: |c| {
+                    let (cos, n) = (c.inputs[0], c.inputs[1]);
+                    flag(c.tiered(refracted_square(cos, n).abs(), 1.0) < 1.2e-7)
+                },
+            },
+        ],
+        axis: Axis {
+            name: "distance of cos²θ from the critical one, relative (n < 1)",
+            log: true,
+            of: |x| if x[1] < 1.0 { refracted_square(x[0], x[1]) / (1.0 - x[1] * x[1]) } else { f64::NAN },
+            column: 0,
+        },
+        extreme: 1e38,
+    },
+    Equation {
+        name: "dielectric_transmitted",
+        twin: |x| dielectric_transmitted(x[0], x[1]).to_vec(),
+        regions: &[ANYWHERE, NEAR_ONE, CRITICAL],
+        outputs: &[
+            Output { name: "Ts", bound: "6 ulp + δg", allowed: |c| c.ulps(6.0) + critical_slack(c) * c.x() },
+            Output { name: "Tp", bound: "6 ulp + δg", allowed: |c| c.ulps(6.0) + critical_slack(c) * c.x() },
+            Output { name: "T", bound: "6 ulp + δg", allowed: |c| c.ulps(6.0) + critical_slack(c) * c.x() },
+        ],
+        axis: Axis { name: "cosθ", log: true, of: |x| x[0], column: 2 },
+        extreme: 1e38,
+    },
+    Equation {
+        name: "nested_f0",
+        twin: |x| vec![nested_f0(x[0], x[1])],
+        regions: &[
+            Region {
+                name: "glasses",
+                share: 1,
+                draw: |d| vec![d.between(1.0, 3.0) as f32, d.between(1.0, 3.0) as f32],
+            },
+            Region {
+                name: "nearly equal",
+                share: 1,
+                draw: |d| {
+                    let n = d.between(1.0, 3.0);
+                    vec![n as f32, (n * (1.0 + d.sign() * d.log(1e-7, 0.1))) as f32]
+                },
+            },
+        ],
+        outputs: &[Output { name: "F0", bound: "4 ulp", allowed: |c| c.ulps(4.0) }],
+        axis: Axis { name: "|n2/n1 − 1|", log: true, of: |x| (x[1] / x[0] - 1.0).abs(), column: 0 },
+        extreme: 1e38,
+    },
+    Equation {
+        name: "fresnel_conductor",
+        twin: |x| fresnel_conductor(x[0], x[1], x[2]).to_vec(),
+        regions: CONDUCTORS,
+        outputs: &[
+            Output {
+                name: "F",
+                bound: "8 ulp for metals; 1e-5 for κ → 0, critical angle 2.4e-2",
+                allowed: conductor_allowed,
+            },
+            Output { name: "Rs", bound: "as F", allowed: conductor_allowed },
+            Output {
+                name: "Rp",
+                bound: "as F; abs 2e-7 at Brewster",
+                allowed: |c| {
+                    if is_metal(c.inputs) { c.ulps(8.0) } else { conductor_allowed(c).max(2e-7) }
+                },
+            },
+        ],
+        axis: Axis { name: "κ", log: true, of: |x| x[2], column: 0 },
+        extreme: 1e38,
+    },
+    Equation {
+        name: "conductor_absorbed",
+        twin: |x| conductor_absorbed(x[0], x[1], x[2]).to_vec(),
+        regions: &[METALS],
+        outputs: &[
+            Output { name: "As", bound: "6 ulp", allowed: |c| c.ulps(6.0) },
+            Output { name: "Ap", bound: "6 ulp", allowed: |c| c.ulps(6.0) },
+            Output { name: "A", bound: "6 ulp", allowed: |c| c.ulps(6.0) },
+        ],
+        axis: Axis { name: "cosθ", log: true, of: |x| x[0], column: 2 },
+        extreme: 1e38,
+    },
+];
+
+const METALS: Region = Region {
+    name: "metals",
+    share: 3,
+    draw: |d| vec![cosine(d) as f32, d.log(0.03, 8.0) as f32, d.log(1.0, 10.0) as f32],
+};
+
+const CONDUCTORS: &[Region] = &[
+    METALS,
+    Region {
+        name: "κ → 0",
+        share: 2,
+        draw: |d| {
+            let k = if d.below(4) == 0 { 0.0 } else { d.log(1e-9, 1.0) };
+            vec![cosine(d) as f32, log_index(d) as f32, k as f32]
+        },
+    },
+    Region {
+        name: "n → 1 and κ → 0",
+        share: 2,
+        draw: |d| {
+            let n = 1.0 + d.sign() * d.log(6e-8, 0.1);
+            vec![cosine(d) as f32, n as f32, d.log(1e-9, 0.1) as f32]
+        },
+    },
+    Region {
+        name: "large κ",
+        share: 1,
+        draw: |d| vec![cosine(d) as f32, d.log(0.05, 20.0) as f32, d.log(10.0, 1e9) as f32],
+    },
+];
+
+fn is_metal(x: &[f64]) -> bool {
+    x[2] > 0.25 * x[1].max(1.0)
+}
+
+fn conductor_allowed(case: &Case<'_>) -> f64 {
+    if is_metal(case.inputs) {
+        return case.ulps(8.0);
+    }
+    let away = refracted_square(case.inputs[0], case.inputs[1]).abs() >= 1e-2;
+    case.rel(if away { 1e-5 } else { case.tiered(2.4e-2, 1e-5) })
+}

@@ -1,0 +1,94 @@
+//! Vector files: CSV whose header names inputs, and expected outputs with a leading `=`.
+
+use std::path::Path;
+
+use anyhow::{Context as _, Result, bail, ensure};
+
+use super::{Cases, Entry, find};
+
+/// Reads the file and finds its function: `function`, or the file's stem. Cells of expected outputs that are empty or `nan`
+/// expect nothing.
+///
+/// # Errors
+/// One sentence with file and line: an unreadable file, an unknown function, columns that it does not have or that are
+/// missing, twice or of uneven length, cells that are no numbers, inputs that are not finite values of f32.
+pub fn load(path: &Path, function: Option<&str>) -> Result<(Entry, Cases)> {
+    let text = std::fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))?;
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    read(&text, function.unwrap_or(&stem)).with_context(|| format!("reading {}", path.display()))
+}
+
+/// What a column of the file holds.
+enum Column {
+    Input(usize),
+    Expected(usize),
+}
+
+fn read(text: &str, function: &str) -> Result<(Entry, Cases)> {
+    let entry = find(function)?;
+    let probe = entry.probe;
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
+    let header = reader.headers().context("its header")?.clone();
+    let mut columns = Vec::new();
+    for (at, name) in header.iter().enumerate() {
+        ensure!(header.iter().take(at).all(|other| other != name), "the column \"{name}\" is there twice");
+        columns.push(match name.strip_prefix('=') {
+            Some(output) => Column::Expected(place(probe.outputs, output).with_context(|| {
+                format!("{function} has no output \"{output}\", it has {}", probe.outputs.join(" "))
+            })?),
+            None => {
+                Column::Input(place(probe.inputs, name).with_context(|| {
+                    format!("{function} has no input \"{name}\", it has {}", probe.inputs.join(" "))
+                })?)
+            }
+        });
+    }
+    for (at, name) in probe.inputs.iter().enumerate() {
+        let found = columns.iter().any(|column| matches!(column, Column::Input(place) if *place == at));
+        ensure!(found, "the input \"{name}\" of {function} has no column");
+    }
+    let expects = columns.iter().any(|column| matches!(column, Column::Expected(_)));
+    ensure!(expects, "no column is an expected output (a name of {} with a leading =)", probe.outputs.join(" "));
+
+    let mut rows = Vec::new();
+    let mut given = Vec::new();
+    for record in reader.records() {
+        let record = record?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let mut row = vec![0.0_f32; probe.inputs.len()];
+        let mut outputs = vec![f64::NAN; probe.outputs.len()];
+        for ((column, name), cell) in columns.iter().zip(&header).zip(&record) {
+            let broken = || format!("line {line}: {name} is \"{cell}\", no number");
+            match *column {
+                Column::Input(at) => {
+                    row[at] = cell.parse().with_context(broken)?;
+                    ensure!(row[at].is_finite(), "line {line}: {name} is \"{cell}\": inputs are finite values of f32");
+                }
+                Column::Expected(_) if cell.is_empty() => {}
+                Column::Expected(at) => outputs[at] = cell.parse().with_context(broken)?,
+            }
+        }
+        rows.push(row);
+        given.push(outputs);
+    }
+    if rows.is_empty() {
+        bail!("it has no rows");
+    }
+    let mut cases = Cases::from_rows(&entry, &rows);
+    // Bounds look at all outputs of a case; a column that the file does not have stays the twin's and is not judged.
+    let judged = |at: usize| columns.iter().any(|column| matches!(column, Column::Expected(place) if *place == at));
+    let width = probe.outputs.len();
+    for (row, outputs) in given.iter().enumerate() {
+        for (at, &value) in outputs.iter().enumerate() {
+            if judged(at) {
+                cases.exact[row * width + at] = value;
+            }
+        }
+    }
+    cases.judged = (0..width).map(judged).collect();
+    Ok((entry, cases))
+}
+
+fn place(names: &[&str], name: &str) -> Option<usize> {
+    names.iter().position(|known| *known == name)
+}
