@@ -6,6 +6,7 @@
 #include "lib/arithmetic.glsl"
 
 const float LARGEST_INDEX = 1e9;
+const float SMALLEST = 1.17549435e-38; // normal number: a smaller cosine may be flushed to 0 by some operations
 
 // (1 − cosθ)⁵. Multiplied out: exact powers, and no NaN where a rounded dot product exceeds 1, which one in five does.
 float schlick_weight(float cos_in) {
@@ -35,15 +36,24 @@ FresnelSchlick fresnel_schlick(float cos_in, float n, float kappa) {
     return FresnelSchlick(F0, F0 + (1.0 - F0) * schlick_weight(cos_in));
 }
 
-// c² + n² − 1 = (n cosθ_t)². Two forms of the same sum, each with the small rounding errors on its own side:
-// c² + (n − 1)(n + 1) is exact for n → 1, n² − (1 − c)(1 + c) for small n. Compensated: the sum in double-float, which
-// is what is left to gain near the critical angle, where everything cancels (numerics.md 4).
+// g² = (n cosθ_t)² = c² + n² − 1 to 2^-34 of what cancels, for the price of a rewrite. With a and b the larger and the
+// smaller of c and n, and e = 1 − a (exact near the critical angle, where a > 1/√2): g² = b² − 2e + e². The squares of the
+// leading halves of b and e are exact, and where everything cancels their sum is too (Sterbenz).
+// Plain f32 was measured first: c² + (n − 1)(n + 1) missed total reflection in 3 of 2000 cases within a few ULP of
+// critical. Compensated: in double-float.
 float refracted_square(float c, float n) {
     float sum;
     if (ARITHMETIC == COMPENSATED) {
         sum = df_add(df_add(two_product(n, n), DoubleFloat(-1.0, 0.0)), two_product(c, c)).hi;
     } else {
-        sum = n < 0.70710678 ? n * n - (1.0 - c) * (1.0 + c) : c * c + (n - 1.0) * (n + 1.0);
+        precise float b = min(c, n);
+        precise float e = 1.0 - max(c, n);
+        precise float b_half = leading_half(b);
+        precise float e_half = leading_half(e);
+        precise float coarse = (b_half * b_half - 2.0 * e) + e_half * e_half;
+        precise float rest = (b + b_half) * (b - b_half) + (e + e_half) * (e - e_half);
+        precise float all = coarse + rest;
+        sum = all;
     }
     return sum;
 }
@@ -94,7 +104,7 @@ FresnelDielectric fresnel_dielectric(float cos_in, float n) {
             float difference = (index - 1.0) * (index + 1.0);
             float s = c + g;
             float p = index * index * c + g;
-            bool grazes = c == 0.0;
+            bool grazes = c < SMALLEST;
             r.tir = false;
             r.cos_t = min(g / index, 1.0);
             r.rs = grazes ? -1.0 : -difference / s / s;
@@ -114,61 +124,92 @@ struct Transmitted {
 // @eq F3 N3: T_s = 4cg/(c + g)², T_p = 4n²cg/(n²c + g)², T = (T_s + T_p)/2 = 1 − F
 // 1 − F loses every digit at grazing incidence, where F → 1.
 Transmitted dielectric_transmitted(float cos_in, float n) {
+    Transmitted t = Transmitted(0.0, 0.0, 0.0);
     if (ARITHMETIC == FAST) {
         FresnelDielectric r = fresnel_dielectric(cos_in, n);
-        return Transmitted(1.0 - r.rs * r.rs, 1.0 - r.rp * r.rp, 1.0 - r.F);
+        t = Transmitted(1.0 - r.rs * r.rs, 1.0 - r.rp * r.rp, 1.0 - r.F);
+    } else {
+        float c = clamp(cos_in, 0.0, 1.0);
+        float index = clamp(n, 0.0, LARGEST_INDEX);
+        float g2 = refracted_square(c, index);
+        if (c >= SMALLEST && index > 0.0 && g2 > 0.0) {
+            float g = sqrt(g2);
+            float s = c + g;
+            float p = index * index * c + g;
+            t.Ts = 4.0 * (c / s) * (g / s);
+            t.Tp = 4.0 * (index * c / p) * (index * g / p);
+            t.T = 0.5 * (t.Ts + t.Tp);
+        }
     }
-    float c = clamp(cos_in, 0.0, 1.0);
-    float index = clamp(n, 0.0, LARGEST_INDEX);
-    float g2 = refracted_square(c, index);
-    if (c == 0.0 || index == 0.0 || g2 <= 0.0) return Transmitted(0.0, 0.0, 0.0);
-    float g = sqrt(g2);
-    float s = c + g;
-    float p = index * index * c + g;
-    float Ts = 4.0 * (c / s) * (g / s);
-    float Tp = 4.0 * (index * c / p) * (index * g / p);
-    return Transmitted(Ts, Tp, 0.5 * (Ts + Tp));
+    return t;
 }
 
 // @eq F2 N47: F0 = ((n2 − n1)/(n2 + n1))²
 // Between two media of nearly one index: their quotient rounds the difference away, the indices themselves do not.
 // @out F0
 float nested_f0(float n1, float n2) {
+    float r;
     if (ARITHMETIC == FAST) {
         float e = n2 / n1;
-        float r = (e - 1.0) / (e + 1.0);
-        return r * r;
+        r = (e - 1.0) / (e + 1.0);
+    } else {
+        float sum = n2 + n1;
+        r = sum > 0.0 ? clamp((n2 - n1) / sum, -1.0, 1.0) : 0.0;
     }
-    float sum = n2 + n1;
-    float r = sum > 0.0 ? (n2 - n1) / sum : 0.0;
-    return min(r * r, 1.0);
+    return r * r;
 }
 
 float abs2(vec2 z) {
     return dot(z, z);
 }
 
-// The root with positive parts of a number with imaginary part ≥ 0: the smaller part by division, not by the difference
-// |z| − |x| that cancels.
-vec2 complex_root(vec2 z) {
-    // length() of lavapipe squares without scaling: fine below 1e19, and z is at most 2e18.
-    float larger = sqrt(0.5 * (sqrt(abs2(z)) + abs(z.x)));
-    float smaller = larger > 0.0 ? 0.5 * z.y / larger : 0.0;
-    return z.x >= 0.0 ? vec2(larger, smaller) : vec2(smaller, larger);
-}
+// What both polarisations of a conductor need: m² = (n + iκ)², g = √(m² − sin²θ) = m cosθ_t, and the denominators
+// |c + g|² and |m²c + g|², summed from positive parts: |g|² = |g²| and Re(m² ḡ) = Re g (|g²| + sin²θ).
+struct ConductorTerms {
+    vec2 m2;
+    vec2 g;
+    float mg;
+    float s2;
+    float p2;
+};
 
-// m² = (n + iκ)² and g = √(m² − sin²θ) = m cosθ_t of a conductor.
-void conductor_terms(float c, float n, float k, out vec2 m2, out vec2 g) {
-    m2 = vec2((n - k) * (n + k), 2.0 * n * k);
+ConductorTerms conductor_terms(float c, float n, float k) {
+    ConductorTerms t;
+    t.m2 = vec2((n - k) * (n + k), 2.0 * n * k);
     float real;
     if (ARITHMETIC == COMPENSATED) {
         DoubleFloat sum = df_add(df_add(two_product(n, n), DoubleFloat(-1.0, 0.0)), two_product(c, c));
-        DoubleFloat k2 = two_product(k, k);
-        real = df_add(sum, DoubleFloat(-k2.hi, -k2.lo)).hi;
+        real = df_add(sum, df_negate(two_product(k, k))).hi;
     } else {
-        real = k > 0.25 ? m2.x - (1.0 - c) * (1.0 + c) : refracted_square(c, n) - k * k;
+        real = k > 0.5 * max(n, 1.0) ? t.m2.x - (1.0 - c) * (1.0 + c) : refracted_square(c, n) - k * k;
     }
-    g = complex_root(vec2(real, m2.y));
+    // The root with positive parts: the smaller part by division, not by the difference |g²| − |x|, which cancels.
+    // Squares are at most 4e36, n and κ at most 1e9.
+    float size = sqrt(real * real + t.m2.y * t.m2.y);
+    float larger = sqrt(0.5 * (size + abs(real)));
+    float smaller = larger > 0.0 ? 0.5 * t.m2.y / larger : 0.0;
+    t.g = real >= 0.0 ? vec2(larger, smaller) : vec2(smaller, larger);
+    float m2_size = n * n + k * k;
+    t.s2 = (size + 2.0 * c * t.g.x) + c * c;
+    t.mg = t.g.x * (size + (1.0 - c) * (1.0 + c));
+    t.p2 = (c * m2_size) * (c * m2_size) + (2.0 * c * t.mg + size);
+    return t;
+}
+
+// m² − 1 and c²(m² + 1) − 1, each zero where a dielectric reflects nothing.
+void conductor_differences(float c, float n, float k, float im_m2, out vec2 difference, out vec2 brewster) {
+    if (ARITHMETIC == COMPENSATED) {
+        DoubleFloat c2 = two_product(c, c);
+        DoubleFloat re_m2 = df_add(two_product(n, n), df_negate(two_product(k, k)));
+        DoubleFloat minus_one = DoubleFloat(-1.0, 0.0);
+        difference.x = df_add(re_m2, minus_one).hi;
+        brewster.x = df_add(df_add(df_mul(c2, re_m2), minus_one), c2).hi;
+    } else {
+        difference.x = (n - 1.0) * (n + 1.0) - k * k;
+        brewster.x = brewster_term(c, n, refracted_square(c, n)) - c * c * k * k;
+    }
+    difference.y = im_m2;
+    brewster.y = c * c * im_m2;
 }
 
 struct FresnelConductor {
@@ -182,52 +223,38 @@ struct FresnelConductor {
 //   r_s = −(m² − 1)/(c + g)²,   r_p = (m² − 1)(c²(m² + 1) − 1)/(m²c + g)²
 // take over, divided twice so that no fourth power is formed. Grazing with n = 1, κ = 0: 1, as for a dielectric.
 FresnelConductor fresnel_conductor(float cos_in, float n, float kappa) {
+    FresnelConductor r = FresnelConductor(1.0, 1.0, 1.0);
     if (ARITHMETIC == FAST) {
-        float s2 = 1.0 - cos_in * cos_in;
+        float c2 = cos_in * cos_in;
+        float s2 = 1.0 - c2;
         float t0 = n * n - kappa * kappa - s2;
         float a2b2 = sqrt(t0 * t0 + 4.0 * n * n * kappa * kappa);
-        float t1 = a2b2 + cos_in * cos_in;
+        float t1 = a2b2 + c2;
         float t2 = 2.0 * cos_in * sqrt(0.5 * (a2b2 + t0));
-        float Rs = (t1 - t2) / (t1 + t2);
-        float t3 = cos_in * cos_in * a2b2 + s2 * s2;
+        float t3 = c2 * a2b2 + s2 * s2;
         float t4 = t2 * s2;
-        float Rp = Rs * (t3 - t4) / (t3 + t4);
-        return FresnelConductor(0.5 * (Rs + Rp), Rs, Rp);
-    }
-    float c = clamp(cos_in, 0.0, 1.0);
-    float index = clamp(n, 0.0, LARGEST_INDEX);
-    float k = clamp(kappa, 0.0, LARGEST_INDEX);
-    vec2 m2, g;
-    conductor_terms(c, index, k, m2, g);
-    vec2 s = g + vec2(c, 0.0);
-    vec2 p = m2 * c + g;
-    float s2 = abs2(s);
-    float p2 = abs2(p);
-    if (c == 0.0 || s2 == 0.0 || p2 == 0.0) return FresnelConductor(1.0, 1.0, 1.0);
-    float Rs, Rp;
-    if (k > 0.25 * max(index, 1.0)) {
-        Rs = abs2(vec2(c, 0.0) - g) / s2;
-        Rp = abs2(m2 * c - g) / p2;
+        r.Rs = (t1 - t2) / (t1 + t2);
+        r.Rp = r.Rs * (t3 - t4) / (t3 + t4);
+        r.F = 0.5 * (r.Rs + r.Rp);
     } else {
-        vec2 difference = vec2((index - 1.0) * (index + 1.0) - k * k, m2.y);
-        float bracket;
-        if (ARITHMETIC == COMPENSATED) {
-            DoubleFloat c2 = two_product(c, c);
-            DoubleFloat n2 = two_product(index, index);
-            DoubleFloat k2 = two_product(k, k);
-            DoubleFloat real_m2 = df_add(n2, DoubleFloat(-k2.hi, -k2.lo));
-            difference.x = df_add(real_m2, DoubleFloat(-1.0, 0.0)).hi;
-            bracket = df_add(df_add(df_mul(c2, real_m2), DoubleFloat(-1.0, 0.0)), c2).hi;
-        } else {
-            bracket = brewster_term(c, index, refracted_square(c, index)) - c * c * k * k;
+        float c = clamp(cos_in, 0.0, 1.0);
+        float index = clamp(n, 0.0, LARGEST_INDEX);
+        float k = clamp(kappa, 0.0, LARGEST_INDEX);
+        ConductorTerms t = conductor_terms(c, index, k);
+        if (c >= SMALLEST && t.s2 > 0.0 && t.p2 > 0.0) {
+            if (k > 0.5 * max(index, 1.0)) {
+                r.Rs = min(abs2(vec2(c, 0.0) - t.g) / t.s2, 1.0);
+                r.Rp = min(abs2(t.m2 * c - t.g) / t.p2, 1.0);
+            } else {
+                vec2 difference, brewster;
+                conductor_differences(c, index, k, t.m2.y, difference, brewster);
+                r.Rs = min(abs2(difference) / t.s2 / t.s2, 1.0);
+                r.Rp = min((abs2(difference) / t.p2) * (abs2(brewster) / t.p2), 1.0);
+            }
+            r.F = 0.5 * (r.Rs + r.Rp);
         }
-        vec2 brewster = vec2(bracket, c * c * m2.y);
-        Rs = abs2(difference) / s2 / s2;
-        Rp = (abs2(difference) / p2) * (abs2(brewster) / p2);
     }
-    Rs = min(Rs, 1.0);
-    Rp = min(Rp, 1.0);
-    return FresnelConductor(0.5 * (Rs + Rp), Rs, Rp);
+    return r;
 }
 
 struct Absorbed {
@@ -236,23 +263,22 @@ struct Absorbed {
     float A;
 };
 
-// @eq F3 N7: A_s = 4c Re g/|c + g|², A_p = 4c(Re m² Re g + Im m² Im g)/|m²c + g|², A = (A_s + A_p)/2 = 1 − F
+// @eq F3 N7: A_s = 4c Re g/|c + g|², A_p = 4c Re(m² ḡ)/|m²c + g|², A = (A_s + A_p)/2 = 1 − F
 // What a metal keeps. 1 − F loses every digit at grazing incidence.
 Absorbed conductor_absorbed(float cos_in, float n, float kappa) {
+    Absorbed r = Absorbed(0.0, 0.0, 0.0);
     if (ARITHMETIC == FAST) {
-        FresnelConductor r = fresnel_conductor(cos_in, n, kappa);
-        return Absorbed(1.0 - r.Rs, 1.0 - r.Rp, 1.0 - r.F);
+        FresnelConductor reflected = fresnel_conductor(cos_in, n, kappa);
+        r = Absorbed(1.0 - reflected.Rs, 1.0 - reflected.Rp, 1.0 - reflected.F);
+    } else {
+        float c = clamp(cos_in, 0.0, 1.0);
+        ConductorTerms t = conductor_terms(c, clamp(n, 0.0, LARGEST_INDEX), clamp(kappa, 0.0, LARGEST_INDEX));
+        if (c >= SMALLEST && t.s2 > 0.0 && t.p2 > 0.0) {
+            r.As = clamp(4.0 * c * t.g.x / t.s2, 0.0, 1.0);
+            r.Ap = clamp(4.0 * c * (t.mg / t.p2), 0.0, 1.0);
+            r.A = 0.5 * (r.As + r.Ap);
+        }
     }
-    float c = clamp(cos_in, 0.0, 1.0);
-    float index = clamp(n, 0.0, LARGEST_INDEX);
-    float k = clamp(kappa, 0.0, LARGEST_INDEX);
-    vec2 m2, g;
-    conductor_terms(c, index, k, m2, g);
-    float s2 = abs2(g + vec2(c, 0.0));
-    float p2 = abs2(m2 * c + g);
-    if (c == 0.0 || s2 == 0.0 || p2 == 0.0) return Absorbed(0.0, 0.0, 0.0);
-    float As = clamp(4.0 * c * g.x / s2, 0.0, 1.0);
-    float Ap = clamp(4.0 * c * (dot(m2, g) / p2), 0.0, 1.0);
-    return Absorbed(As, Ap, 0.5 * (As + Ap));
+    return r;
 }
 #endif

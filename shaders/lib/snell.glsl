@@ -6,10 +6,18 @@
 #include "lib/arithmetic.glsl"
 #include "lib/constants.glsl"
 
-// Divided by its length; the zero vector stays. For vectors of about unit length (lib/frame.glsl has the general one).
+// Divided by its length; the zero vector, and what is far from unit length, gives zero (lib/frame.glsl has the general one).
 vec3 renormalised(vec3 v) {
     float v2 = dot(v, v);
-    return v2 > 0.0 ? v / sqrt(v2) : vec3(0.0);
+    return v2 > 1e-30 && v2 < 1e30 ? v / sqrt(v2) : vec3(0.0);
+}
+
+// a × b with each component's products exact before their difference.
+vec3 cross2(vec3 a, vec3 b) {
+    DoubleFloat x = df_add(two_product(a.y, b.z), df_negate(two_product(a.z, b.y)));
+    DoubleFloat y = df_add(two_product(a.z, b.x), df_negate(two_product(a.x, b.z)));
+    DoubleFloat z = df_add(two_product(a.x, b.y), df_negate(two_product(a.y, b.x)));
+    return vec3(x.hi, y.hi, z.hi);
 }
 
 struct Reflection {
@@ -21,10 +29,16 @@ struct Reflection {
 // Renormalised: the length of a chain of 256 reflections drifts by 8.5e-6 otherwise. Divided by |N|², so that a rounded
 // N does not tilt the result.
 Reflection reflect_ray(vec3 v, vec3 N) {
-    if (ARITHMETIC == FAST) return Reflection(v - 2.0 * N * dot(N, v));
-    float n2 = dot(N, N);
-    if (n2 == 0.0) return Reflection(vec3(0.0));
-    return Reflection(renormalised(v - N * (2.0 * dot(N, v) / n2)));
+    vec3 r;
+    if (ARITHMETIC == FAST) {
+        r = v - 2.0 * N * dot(N, v);
+    } else {
+        float n2 = dot(N, N);
+        vec3 mirrored = v - N * (2.0 * dot(N, v) / n2);
+        // Also vectors whose squares leave f32's range have no direction here.
+        r = renormalised(n2 > 1e-30 && n2 < 1e30 ? mirrored : vec3(0.0));
+    }
+    return Reflection(r);
 }
 
 struct Refraction {
@@ -34,37 +48,49 @@ struct Refraction {
 };
 
 // @eq F1 F5 N11 N13: T = v/n + N(cosα/n − cosβ), disc = cos²β = 1 − sin²α/n²; disc < 0 is total internal reflection
-// With s = |N × v| (1 − cos² would lose small angles) and g = n cosβ = √((n − s)(n + s)), cosα − g = (1 − n²)/(cosα + g):
-// nothing cancels, and N⊥ = (v + N cosα)/sinα, 0/0 at normal incidence, is never formed. Compensated: cosα and the
-// lengths of v and N by dot2, g² in double-float. On total reflection T is the zero vector and `tir` says so.
+// @name refract
+// Stable: with s = |N × v| (1 − cos² would lose small angles) and g = n cosβ = √((n − s)(n + s)),
+// T = (v + N(cosα − g))/n, cosα − g = (1 − n²)/(cosα + g): nothing cancels, and N⊥ = (v + N cosα)/sinα, 0/0 at normal
+// incidence, is never formed. Within the rounding of v and N of the critical angle (g² > −2^-22) the ray grazes: T is
+// tangential and no total reflection is reported.
+// Compensated: cosα and the lengths of v and N by dot2, g² in double-float, the tangential part as (N × v) × N from exact
+// products. On total reflection T is the zero vector and `tir` says so; so it is for n ≤ 0 and for zero vectors.
 Refraction refract_ray(vec3 v, vec3 N, float n) {
+    Refraction r = Refraction(vec3(0.0), true, 0.0);
     if (ARITHMETIC == FAST) {
         float cos_in = -dot(v, N);
-        float disc = 1.0 - (1.0 - cos_in * cos_in) / (n * n);
-        if (disc < 0.0) return Refraction(vec3(0.0), true, disc);
-        return Refraction(v / n + N * (cos_in / n - sqrt(disc)), false, disc);
-    }
-    float c, g2;
-    if (ARITHMETIC == COMPENSATED) {
-        DoubleFloat cosine = dot2(N, v);
-        DoubleFloat lengths = df_mul(dot2(N, N), dot2(v, v));
-        if (!(lengths.hi > 0.0 && n > 0.0)) return Refraction(vec3(0.0), true, 0.0);
-        DoubleFloat c2 = df_div(df_mul(cosine, cosine), lengths);
-        g2 = df_add(df_add(two_product(n, n), DoubleFloat(-1.0, 0.0)), c2).hi;
-        c = sqrt(c2.hi);
+        r.disc = 1.0 - (1.0 - cos_in * cos_in) / (n * n);
+        r.tir = r.disc < 0.0;
+        if (!r.tir) r.T = v / n + N * (cos_in / n - sqrt(r.disc));
     } else {
-        vec3 across = cross(N, v);
-        float lengths = dot(N, N) * dot(v, v);
-        if (!(lengths > 0.0 && n > 0.0)) return Refraction(vec3(0.0), true, 0.0);
-        float s = sqrt(dot(across, across));
-        g2 = (n - s) * (n + s);
-        c = abs(dot(N, v));
+        // Beyond f32's reach: no direction.
+        vec3 largest = max(abs(v), abs(N));
+        bool valid = n > 0.0 && max(largest.x, max(largest.y, largest.z)) < 1e9 && n < 1e9;
+        if (ARITHMETIC == COMPENSATED) {
+            DoubleFloat cosine = dot2(N, v);
+            DoubleFloat n2 = dot2(N, N);
+            DoubleFloat lengths = df_mul(n2, dot2(v, v));
+            if (valid && lengths.hi > 1e-30) {
+                DoubleFloat c2 = df_div(df_mul(cosine, cosine), lengths);
+                float g2 = df_add(df_add(two_product(n, n), DoubleFloat(-1.0, 0.0)), c2).hi;
+                r.disc = g2 / n / n;
+                r.tir = g2 < 0.0;
+                vec3 tangent = cross2(cross2(N, v), N) / sqrt(lengths.hi);
+                if (!r.tir) r.T = renormalised((tangent / sqrt(n2.hi) - N * sqrt(g2 / n2.hi)));
+            }
+        } else {
+            vec3 across = cross(N, v);
+            float s = sqrt(dot(across, across));
+            if (valid && dot(N, N) * dot(v, v) > 1e-30) {
+                float g2 = (n - s) * (n + s);
+                r.disc = g2 / n / n;
+                r.tir = g2 < -2.384185791e-7;
+                float sum = abs(dot(N, v)) + sqrt(max(g2, 0.0));
+                if (!r.tir) r.T = renormalised(v + N * (sum > 0.0 ? (1.0 - n) * (1.0 + n) / sum : 0.0));
+            }
+        }
     }
-    float disc = g2 / n / n;
-    if (g2 < 0.0) return Refraction(vec3(0.0), true, disc);
-    float g = sqrt(g2);
-    float lift = c + g > 0.0 ? (1.0 - n) * (1.0 + n) / (c + g) : 0.0;
-    return Refraction(renormalised(v + N * lift), false, disc);
+    return r;
 }
 
 struct CriticalAngle {
@@ -78,14 +104,18 @@ struct CriticalAngle {
 // Not Brewster's angle. Taken as an arc tangent of sine and cosine: the cosine √((n_in − n_out)(n_in + n_out))/n_in keeps
 // its digits for nearly equal indices, where the arc sine has none. Without one: 90°, cosine 0.
 CriticalAngle critical_angle(float n_in, float n_out) {
-    if (!(n_in > n_out && n_out >= 0.0)) return CriticalAngle(false, 0.5 * PI, 90.0, 0.0);
-    if (ARITHMETIC == FAST) {
-        float theta = asin(n_out / n_in);
-        return CriticalAngle(true, theta, theta * (180.0 / PI), cos(theta));
+    CriticalAngle r = CriticalAngle(n_in > n_out && n_out >= 0.0, 0.5 * PI, 90.0, 0.0);
+    if (r.exists) {
+        if (ARITHMETIC == FAST) {
+            r.theta_rad = asin(n_out / n_in);
+            r.cos_theta = cos(r.theta_rad);
+        } else {
+            r.cos_theta = sqrt((n_in - n_out) / n_in) * sqrt((n_in + n_out) / n_in);
+            r.theta_rad = atan2f(n_out / n_in, r.cos_theta);
+        }
+        r.theta_deg = r.theta_rad * (180.0 / PI);
     }
-    float cosine = sqrt((n_in - n_out) / n_in) * sqrt((n_in + n_out) / n_in);
-    float theta = atan2f(n_out / n_in, cosine);
-    return CriticalAngle(true, theta, theta * (180.0 / PI), cosine);
+    return r;
 }
 
 struct BrewsterAngle {
@@ -96,14 +126,19 @@ struct BrewsterAngle {
 // @eq F6: θ_B = arctan(n_out/n_in), where r_p = 0; it exists on both sides
 // Index 0 on both sides: 0.
 BrewsterAngle brewster_angle(float n_in, float n_out) {
+    BrewsterAngle r = BrewsterAngle(0.0, 1.0);
     float larger = max(abs(n_in), abs(n_out));
-    if (larger == 0.0) return BrewsterAngle(0.0, 1.0);
-    float a = abs(n_in) / larger;
-    float b = abs(n_out) / larger;
-    if (ARITHMETIC == FAST) {
-        float theta = atan(n_out / n_in);
-        return BrewsterAngle(theta, cos(theta));
+    if (larger > 0.0) {
+        if (ARITHMETIC == FAST) {
+            r.theta_rad = atan(n_out / n_in);
+            r.cos_theta = cos(r.theta_rad);
+        } else {
+            float a = abs(n_in) / larger;
+            float b = abs(n_out) / larger;
+            r.theta_rad = atan2f(b, a);
+            r.cos_theta = a / sqrt(a * a + b * b);
+        }
     }
-    return BrewsterAngle(atan2f(b, a), a / sqrt(a * a + b * b));
+    return r;
 }
 #endif

@@ -235,6 +235,7 @@ pub fn judge(entry: &Entry, tier: Tier, cases: &Cases, outputs: &[f32]) -> Vec<F
             // The tier fast promises nothing; its worst case is the one farthest beyond the stable tier's bound.
             let judged = if tier == Tier::Fast { Tier::Stable } else { tier };
             let allowed = (output.allowed)(&Case { tier: judged, inputs: &inputs, exact, column });
+            assert!(!allowed.is_nan(), "the bound of {}.{} at {inputs:?} is no number", entry.probe.name, output.name);
             let excess = match (error.is_nan(), error <= allowed) {
                 (true, _) => f64::INFINITY,
                 (_, true) if allowed == 0.0 => 0.0,
