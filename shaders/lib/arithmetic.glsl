@@ -40,8 +40,8 @@ float power_of_two(int n) {
 // Pairs of floats: the value is hi + lo, |lo| ≤ ULP(hi)/2. Where hi overflows, lo is 0 and not ∞ − ∞.
 //
 // glslang never ends if a `precise` value comes from a member of a variable that is assigned from its own member:
-// `s = two_sum(s.hi, x); precise float r = s.lo + y;`. A new variable each time; in loops whole pairs, `s = df_add(s, t)`,
-// or plain floats, `DoubleFloat t = two_sum(sum, x); rest += t.lo; sum = t.hi;`.
+// `s = two_sum(s.hi, x); precise float r = s.lo + y;`. A new variable each time; in loops either whole pairs,
+// `s = df_add(s, t)`, or plain floats, `DoubleFloat t = two_sum(sum, x); rest += t.lo; sum = t.hi;`.
 
 struct DoubleFloat {
     float hi;
@@ -133,7 +133,8 @@ DoubleFloat df_sqrt(DoubleFloat a) {
 }
 
 // @eq N11 N25: a_x b_x + a_y b_y + a_z b_z as if in twice the precision
-// Ogita, Rump and Oishi: exact products and sums, their rests added in f32. Components below 1e19: products overflow above.
+// Ogita, Rump and Oishi: exact products and sums, their rests added in f32. Error 2^-46 of the sum of magnitudes.
+// Components below 1e19: the products overflow above.
 DoubleFloat dot2(vec3 a, vec3 b) {
     DoubleFloat x = two_product(a.x, b.x);
     DoubleFloat y = two_product(a.y, b.y);
@@ -232,29 +233,39 @@ float logf(float x) {
 
 // @eq N17: ln(1 + x)
 // @out y
-// 1 + x = 2^k (1 + f), f taken from fl(1 + x) and corrected by what that rounding lost; for k = 0 f is x. -∞ for x ≤ -1.
+// 1 + x = 2^k (1 + f), f taken from fl(1 + x) and corrected by what that rounding lost; for k = 0 f is x.
+// -∞ for x ≤ -1.
 float log1pf(float x) {
     if (ARITHMETIC == FAST) return log(1.0 + x);
     DoubleFloat u = two_sum(1.0, x);
     Reduced m = log_reduced(u.hi);
-    precise float f = m.f + u.lo * intBitsToFloat((127 - int(m.k)) << 23);
+    // Beyond 2^100 the rest is 0 or too small, and 2^-k no normal number.
+    precise float f = m.f + u.lo * power_of_two(-min(int(m.k), 100));
     float y = log_sum(m.k, f);
     y = x <= LARGEST ? y : x;
     return x <= -1.0 ? -plus_infinity() : y;
 }
 
-// ln x to 2^-30 of itself, near 1 as well: ln(1 + f) = 2 artanh(s), s = f/(2 + f). (-∞, 0) for x ≤ 0.
+// ln x to 2^-30 of itself, near 1 as well. (-∞, 0) for x ≤ 0.
+// x = 2^k m, ln m = ln c + 2 artanh(s), s = (m − c)/(m + c), c the nearest of three numbers, so that s², and with it
+// the part that f32 must carry, stays below 0.0035. ln c is a multiple of 1/512, as LN2_HI is, and some 1e-8.
 DoubleFloat df_log(float x) {
     Reduced m = log_reduced(log_scaled(x));
     precise float k = m.k - log_scale(x);
-    DoubleFloat d = quick_two_sum(2.0, m.f);
-    precise float s = m.f / d.hi;
+    bool low = m.f < -0.1088;
+    bool high = m.f > 0.1221;
+    float c = low ? 0.79416126 : high ? 1.25919008 : 1.0;
+    float ln_c_hi = low ? -0.23046875 : high ? 0.23046875 : 0.0;
+    float ln_c_lo = low ? 1.00413228e-8 : high ? -2.73426691e-8 : 0.0;
+    precise float from_c = (m.f + 1.0) - c;
+    DoubleFloat d = quick_two_sum(2.0 * c, from_c);
+    precise float s = from_c / d.hi;
     DoubleFloat p = two_product(s, d.hi);
-    precise float s_lo = (((m.f - p.hi) - p.lo) - s * d.lo) / d.hi;
+    precise float s_lo = (((from_c - p.hi) - p.lo) - s * d.lo) / d.hi;
     precise float z = s * s;
-    precise float series = ((0.298714608 * z + 0.399775684) * z + 0.666667759) * z;
-    DoubleFloat sum = quick_two_sum(k * LN2_HI, 2.0 * s);
-    precise float rest = sum.lo + ((s * series + 2.0 * s_lo) + k * LN2_LO);
+    precise float series = (0.401403874 * z + 0.666665137) * z;
+    DoubleFloat sum = quick_two_sum(k * LN2_HI + ln_c_hi, 2.0 * s);
+    precise float rest = sum.lo + ((s * series + 2.0 * s_lo) + (k * LN2_LO + ln_c_lo));
     DoubleFloat y = quick_two_sum(sum.hi, rest);
     bool finite = x > 0.0 && x <= LARGEST;
     float end = x <= 0.0 ? -plus_infinity() : x;
@@ -263,8 +274,8 @@ DoubleFloat df_log(float x) {
 
 // @eq N17 N44: x^y = e^(y ln x)
 // @out z
-// ln x and the product as pairs: the built-in's y log2 x loses every bit for x near 1 and y of 1e7. For x ≤ 0, where the
-// power is that of 0: 0 if y > 0, 1 if y = 0, +∞ if y < 0.
+// ln x and the product as pairs: the built-in's y log2 x loses every bit for x near 1 and y of 1e7. For x ≤ 0 the power
+// of 0: 0 if y > 0, 1 if y = 0, +∞ if y < 0.
 float powf(float x, float y) {
     if (ARITHMETIC == FAST) return pow(x, y);
     DoubleFloat l = df_log(x);

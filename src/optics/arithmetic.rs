@@ -5,10 +5,10 @@ use glam::DVec3;
 
 use super::catalogue::{Axis, Draw, EXACT, Equation, Output, Region, columns, ulp, vector};
 
-/// hi + lo = `value` + `rest`, with hi an f32 value.
+/// hi + lo = `value` + `rest`, with hi an f32 value; lo is 0 where hi is beyond f32.
 fn pair(value: f64, rest: f64) -> [f64; 2] {
     let hi = f64::from(value as f32);
-    [hi, (value - hi) + rest]
+    [hi, if hi.is_finite() { (value - hi) + rest } else { 0.0 }]
 }
 
 /// a + b = s + rest exactly (Knuth).
