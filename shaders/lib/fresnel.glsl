@@ -36,7 +36,7 @@ FresnelSchlick fresnel_schlick(float cos_in, float n, float kappa) {
     return FresnelSchlick(F0, F0 + (1.0 - F0) * schlick_weight(cos_in));
 }
 
-// g² = (n cosθ_t)² = c² + n² − 1 to 2^-34 of what cancels, for the price of a rewrite. With a and b the larger and the
+// g² = (n cosθ_t)² = c² + n² − 1 to 2^-32 of what cancels, for the price of a rewrite. With a and b the larger and the
 // smaller of c and n, and e = 1 − a (exact near the critical angle, where a > 1/√2): g² = b² − 2e + e². The squares of the
 // leading halves of b and e are exact, and where everything cancels their sum is too (Sterbenz).
 // Plain f32 was measured first: c² + (n − 1)(n + 1) missed total reflection in 3 of 2000 cases within a few ULP of
@@ -109,7 +109,9 @@ FresnelDielectric fresnel_dielectric(float cos_in, float n) {
             r.cos_t = min(g / index, 1.0);
             r.rs = grazes ? -1.0 : -difference / s / s;
             r.rp = grazes ? -1.0 : (difference / p) * (brewster_term(c, index, g2) / p);
-            r.F = min(0.5 * (r.rs * r.rs + r.rp * r.rp), 1.0);
+            // 1 − T where little is transmitted: its error is that of T times T.
+            float T = 2.0 * (c * g) * (1.0 / s / s + index / p * (index / p));
+            r.F = grazes ? 1.0 : T < 0.5 ? 1.0 - T : min(0.5 * (r.rs * r.rs + r.rp * r.rp), 1.0);
         }
     }
     return r;
@@ -136,8 +138,12 @@ Transmitted dielectric_transmitted(float cos_in, float n) {
             float g = sqrt(g2);
             float s = c + g;
             float p = index * index * c + g;
-            t.Ts = 4.0 * (c / s) * (g / s);
-            t.Tp = 4.0 * (index * c / p) * (index * g / p);
+            // 1 − r² where little is reflected: its error is that of r² times r².
+            float difference = (index - 1.0) * (index + 1.0);
+            float rs = difference / s / s;
+            float rp = (difference / p) * (brewster_term(c, index, g2) / p);
+            t.Ts = rs * rs < 0.5 ? 1.0 - rs * rs : 4.0 * (c / s) * (g / s);
+            t.Tp = rp * rp < 0.5 ? 1.0 - rp * rp : 4.0 * (index * c / p) * (index * g / p);
             t.T = 0.5 * (t.Ts + t.Tp);
         }
     }
@@ -181,7 +187,7 @@ ConductorTerms conductor_terms(float c, float n, float k) {
         DoubleFloat sum = df_add(df_add(two_product(n, n), DoubleFloat(-1.0, 0.0)), two_product(c, c));
         real = df_add(sum, df_negate(two_product(k, k))).hi;
     } else {
-        real = k > 0.5 * max(n, 1.0) ? t.m2.x - (1.0 - c) * (1.0 + c) : refracted_square(c, n) - k * k;
+        real = k > max(n, 0.5) ? t.m2.x - (1.0 - c) * (1.0 + c) : refracted_square(c, n) - k * k;
     }
     // The root with positive parts: the smaller part by division, not by the difference |g²| − |x|, which cancels.
     // Squares are at most 4e36, n and κ at most 1e9.
@@ -242,9 +248,12 @@ FresnelConductor fresnel_conductor(float cos_in, float n, float kappa) {
         float k = clamp(kappa, 0.0, LARGEST_INDEX);
         ConductorTerms t = conductor_terms(c, index, k);
         if (c >= SMALLEST && t.s2 > 0.0 && t.p2 > 0.0) {
-            if (k > 0.5 * max(index, 1.0)) {
-                r.Rs = min(abs2(vec2(c, 0.0) - t.g) / t.s2, 1.0);
-                r.Rp = min(abs2(t.m2 * c - t.g) / t.p2, 1.0);
+            if (k > max(index, 0.5)) {
+                // 1 − A where little is kept: its error is that of A times A.
+                float As = 4.0 * c * t.g.x / t.s2;
+                float Ap = 4.0 * c * (t.mg / t.p2);
+                r.Rs = clamp(As < 0.5 ? 1.0 - As : abs2(vec2(c, 0.0) - t.g) / t.s2, 0.0, 1.0);
+                r.Rp = clamp(Ap < 0.5 ? 1.0 - Ap : abs2(t.m2 * c - t.g) / t.p2, 0.0, 1.0);
             } else {
                 vec2 difference, brewster;
                 conductor_differences(c, index, k, t.m2.y, difference, brewster);
