@@ -1,0 +1,180 @@
+//! Every equation of the shaders against its f64 twin, on the device: the bound of each output over its domain, no NaN
+//! outside of it, and the vector files that were computed at 50 digits by a program that knows neither.
+
+#[path = "support/gpu.rs"]
+mod gpu;
+#[path = "support/probe.rs"]
+mod probe;
+
+use std::path::{Path, PathBuf};
+
+use etalon::optics::{Draw, Tier, ulp};
+use etalon::verify::{self, Cases, Entry, catalogue, vectors};
+use gpu::Gpu;
+use probe::{PROMISING, evaluate};
+
+const CASES: usize = 100_000;
+
+/// What a set of cases breaks, one sentence per output.
+fn broken(gpu: &Gpu, entry: &Entry, tier: Tier, cases: &Cases) -> Vec<String> {
+    let outputs = verify::evaluate(&gpu.device, entry.probe, tier, &cases.inputs, cases.count).expect("it runs").outputs;
+    let figures = verify::judge(entry, tier, cases, &outputs);
+    let failed = entry.equation.outputs.iter().zip(figures).filter(|(_, figures)| !figures.pass);
+    failed
+        .map(|(output, figures)| {
+            format!(
+                "{} ({}), {}, {}: bound {}, {:?}",
+                entry.probe.name,
+                entry.probe.ids.join(" "),
+                output.name,
+                tier.name(),
+                output.bound,
+                figures.worst
+            )
+        })
+        .collect()
+}
+
+#[test]
+fn every_output_of_every_equation_is_within_its_bound() {
+    let gpu = Gpu::new();
+    let mut wrong = Vec::new();
+    for entry in catalogue() {
+        let cases = Cases::draw(&entry, CASES, 7);
+        assert_eq!(cases.count, CASES);
+        for tier in PROMISING {
+            wrong.extend(broken(&gpu, &entry, tier, &cases));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn inputs_from_outside_every_domain_never_give_nan() {
+    let gpu = Gpu::new();
+    let mut wrong = Vec::new();
+    for entry in catalogue() {
+        for tier in PROMISING {
+            let (count, first) = verify::nan_of_hostile(&gpu.device, &entry, tier, 20_000, 3).expect("it runs");
+            if count > 0 {
+                let (name, ids) = (entry.probe.name, entry.probe.ids.join(" "));
+                wrong.push(format!("{name} ({ids}), {}: {count} NaN, first for {first:?}", tier.name()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// The committed vector files.
+fn files() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/vectors");
+    let entries = std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("an entry").path());
+    let mut files: Vec<_> = entries.filter(|path| path.extension().is_some_and(|e| e == "csv")).collect();
+    files.sort();
+    assert_eq!(files.len(), 20, "a file for each name of the contract");
+    files
+}
+
+#[test]
+fn vector_files_of_50_digits_hold() {
+    let gpu = Gpu::new();
+    let mut wrong = Vec::new();
+    for file in files() {
+        let (entry, cases) = vectors::load(&file, None).expect("a vector file");
+        for tier in PROMISING {
+            wrong.extend(broken(&gpu, &entry, tier, &cases));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn twins_agree_with_the_vector_files() {
+    let mut wrong = Vec::new();
+    for file in files() {
+        let (entry, cases) = vectors::load(&file, None).expect("a vector file");
+        let width = entry.probe.outputs.len();
+        for row in 0..cases.count {
+            let inputs = cases.row(row);
+            let twin = (entry.equation.twin)(&inputs);
+            for (column, name) in entry.probe.outputs.iter().enumerate() {
+                let exact = cases.exact[row * width + column];
+                let size = exact.abs().min(f64::from(f32::MAX));
+                // A hundredth of what f32 resolves: the twin is a ruler with finer marks than what it measures. Where the
+                // exact value is 0 or nearly so, its marks are those of numbers of size 1.
+                let slack = (0.01 * ulp(size)).max(1e-14);
+                let far = (twin[column] - exact).abs() > slack && !(exact.abs() > size && twin[column].abs() > size);
+                if !exact.is_nan() && far {
+                    wrong.push(format!("{} {name}, {inputs:?}: {} is {exact}", entry.probe.name, twin[column]));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{} values, first {}", wrong.len(), wrong[..wrong.len().min(12)].join("\n"));
+}
+
+#[test]
+fn double_floats_keep_44_bits() {
+    let gpu = Gpu::new();
+    let mut draw = Draw::new(5);
+    let mut pair = || {
+        let exact = draw.sign() * draw.log(1e-3, 1e3);
+        let hi = exact as f32;
+        [hi, (exact - f64::from(hi)) as f32]
+    };
+    let rows: Vec<Vec<f32>> = (0..CASES).map(|_| [pair(), pair()].concat()).collect();
+    let sum = |pair: &[f32]| f64::from(pair[0]) + f64::from(pair[1]);
+    let operations: [(&str, fn(f64, f64) -> f64); 4] = [
+        ("df_add", |a, b| a + b),
+        ("df_mul", |a, b| a * b),
+        ("df_div", |a, b| a / b),
+        ("df_sqrt", |a, _| a.abs().sqrt()),
+    ];
+    for (name, exact) in operations {
+        let inputs: Vec<Vec<f32>> = match name {
+            "df_sqrt" => rows.iter().map(|row| vec![row[0].abs(), row[1] * row[0].signum()]).collect(),
+            _ => rows.clone(),
+        };
+        for (row, got) in rows.iter().zip(evaluate(&gpu, name, Tier::Compensated, &inputs)) {
+            let (a, b) = (sum(&row[..2]), sum(&row[2..]));
+            let want = exact(a, b);
+            let error = (sum(&got) - want).abs();
+            assert!(error <= 2_f64.powi(-44) * want.abs(), "{name} of {a:e}, {b:e}: {:e}, not {want:e}", sum(&got));
+        }
+    }
+}
+
+/// Largest relative (or absolute) error of an output over its domain.
+fn largest(gpu: &Gpu, name: &str, output: &str, tier: Tier, relative: bool) -> f64 {
+    let entry = probe::entry(name);
+    let cases = Cases::draw(&entry, CASES, 11);
+    let outputs = verify::evaluate(&gpu.device, entry.probe, tier, &cases.inputs, CASES).expect("it runs").outputs;
+    let figures = verify::judge(&entry, tier, &cases, &outputs).swap_remove(probe::column(name, output));
+    match (relative, figures.non_finite) {
+        (_, 1..) => f64::INFINITY,
+        (true, _) => figures.max_rel,
+        (false, _) => figures.max_abs,
+    }
+}
+
+#[test]
+fn the_textbook_form_is_worse_where_numerics_says_so() {
+    let gpu = Gpu::new();
+    // Row of docs/numerics.md, output, and the error that the textbook form reaches at least.
+    let claims: &[(&str, &str, &str, bool, f64)] = &[
+        ("N2", "fresnel_dielectric", "rs", true, 0.1),
+        ("N4", "fresnel_dielectric", "F", false, 4e-3),
+        ("N3", "dielectric_transmitted", "T", true, 0.5),
+        ("N6", "fresnel_conductor", "F", true, 100.0),
+        ("N7", "conductor_absorbed", "A", true, 0.9),
+        ("N11", "refract", "Tx", false, 1e-4),
+        ("N27", "expm1f", "y", true, 0.9),
+        ("N47", "nested_f0", "F0", true, 0.1),
+    ];
+    for &(row, name, output, relative, least) in claims {
+        let fast = largest(&gpu, name, output, Tier::Fast, relative);
+        let stable = largest(&gpu, name, output, Tier::Stable, relative);
+        assert!(fast >= least, "{row}: {name}.{output} is off by {fast:e} in the textbook form, not by {least:e}");
+        assert!(stable * 10.0 < fast, "{row}: {name}.{output}: stable {stable:e}, textbook {fast:e}");
+    }
+}
