@@ -1,30 +1,513 @@
-// Reflection models (lecture B1, B4, B5, B6). N, L, V, H are unit vectors; α = roughness².
+// Reflection models (lecture B1–B6, B9), their parts and how to sample them. N, L, V, H are unit vectors as 32 bits hold
+// them, L and V point away from the surface; α = roughness². Out of domain: α is clamped to [1e-5, 1], shine < 0 is 0, F0
+// is clamped to [0, 1]; a zero vector makes a right angle with everything, and so does one too long for its square.
 #ifndef BRDF_GLSL
 #define BRDF_GLSL
+#include "lib/arithmetic.glsl"
 #include "lib/constants.glsl"
+#include "lib/fresnel.glsl"
 
-// GGX distribution of microfacet normals, D = (α / (cos²θ_h α² + sin²θ_h))² / π (Walter et al. 2007). sin²θ_h comes from
-// the cross product with H − N, which is exact where H is near N: 1 − cos² loses everything there (numerics.md 9, 20).
-float ggx_distribution(vec3 n, vec3 h, float alpha) {
-    float cos_h = dot(n, h);
-    if (cos_h <= 0.0) return 0.0;
-    vec3 s = cross(n, h - n);
-    float k = alpha / (cos_h * cos_h * alpha * alpha + dot(s, s));
-    return k * k * INV_PI;
+const float SMALLEST_ALPHA = 1e-5;
+
+float alpha_in_domain(float alpha) {
+    return clamp(alpha, SMALLEST_ALPHA, 1.0);
 }
 
-// Height-correlated Smith visibility G₂ / (4 cosθ_l cosθ_v) (Heitz 2014), in a form without division by the cosines
-// (numerics.md 23).
-float ggx_visibility(float cos_l, float cos_v, float alpha) {
-    float a2 = alpha * alpha;
-    float rest = (1.0 - alpha) * (1.0 + alpha);
-    float l = cos_v * sqrt(a2 + rest * cos_l * cos_l);
-    float v = cos_l * sqrt(a2 + rest * cos_v * cos_v);
-    return 0.5 / max(l + v, 1e-30);
+// --------------------------------------------------------------------------------------------------------------------
+// Angles
+
+// Cosine between two directions. A plain sum is good to 2e-7, lengths of rounded unit vectors included: nothing near 90°,
+// where it is all error. Compensated: the sum of exact products, over the lengths.
+float cosine(vec3 a, vec3 b) {
+    float c;
+    if (ARITHMETIC == COMPENSATED) {
+        float lengths = sqrt(dot(a, a) * dot(b, b));
+        c = lengths > 0.0 ? dot2(a, b).hi / lengths : 0.0;
+    } else {
+        c = dot(a, b);
+    }
+    return c;
+}
+
+// A cosine in its range; 0 for NaN and infinities.
+float cosine_in_range(float c) {
+    return abs(c) <= LARGEST ? clamp(c, -1.0, 1.0) : 0.0;
+}
+
+// ab − cd, as if in twice the precision.
+float difference_of_products(float a, float b, float c, float d) {
+    DoubleFloat p = two_product(a, b);
+    DoubleFloat q = two_product(c, d);
+    DoubleFloat s = two_sum(p.hi, -q.hi);
+    precise float rest = s.lo + (p.lo - q.lo);
+    precise float sum = s.hi + rest;
+    return sum;
+}
+
+vec3 cross2(vec3 a, vec3 b) {
+    return vec3(difference_of_products(a.y, b.z, a.z, b.y), difference_of_products(a.z, b.x, a.x, b.z),
+                difference_of_products(a.x, b.y, a.y, b.x));
+}
+
+// sin² between two directions. 1 − cos² loses small angles, and so does the cross product N × H of rounded products;
+// H − N is exact where H is near N, and N × (H − N) has nothing to lose (numerics.md 9).
+float sine_squared(vec3 N, vec3 H) {
+    float sin2;
+    if (ARITHMETIC == FAST) {
+        float c = dot(N, H);
+        sin2 = 1.0 - c * c;
+    } else if (ARITHMETIC == COMPENSATED) {
+        vec3 s = cross2(N, H);
+        float lengths = dot(N, N) * dot(H, H);
+        sin2 = lengths > 0.0 ? dot(s, s) / lengths : 1.0;
+    } else {
+        vec3 s = cross(N, H - N);
+        sin2 = dot(s, s);
+    }
+    return sin2;
+}
+
+// The angle of N and H = (L + V)/|L + V|.
+struct HalfAngle {
+    float cos_h;
+    float sin2_h;
+    float cos_d;  // of H and V: |L + V|/2
+    float sum2;   // (L + V)²; 0 for L = −V, where there is no H, cos_h is 0 and sin2_h 1
+};
+
+// Where L is near −V their sum is exact, but not the sum of two vectors of one length: lengths that differ by 1e-7 turn
+// it. It has to be perpendicular to D = L − V, so what it has along D goes: (L² − V²)/4 D. 2(1 + L·V) would lose (L + V)²
+// altogether (numerics.md 18). Compensated: both sums in pairs, N × (L + V) and N·(L + V) of exact products.
+HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
+    HalfAngle r = HalfAngle(0.0, 1.0, 0.0, 0.0);
+    if (ARITHMETIC == FAST) {
+        vec3 H = normalize(L + V);
+        r.cos_h = dot(N, H);
+        r.sin2_h = sine_squared(N, H);
+        r.cos_d = dot(V, H);
+        r.sum2 = 2.0 * (1.0 + dot(L, V));
+    } else if (ARITHMETIC == COMPENSATED) {
+        DoubleFloat sx = two_sum(L.x, V.x);
+        DoubleFloat sy = two_sum(L.y, V.y);
+        DoubleFloat sz = two_sum(L.z, V.z);
+        DoubleFloat dx = two_sum(L.x, -V.x);
+        DoubleFloat dy = two_sum(L.y, -V.y);
+        DoubleFloat dz = two_sum(L.z, -V.z);
+        vec3 S = vec3(sx.hi, sy.hi, sz.hi);
+        vec3 S_lo = vec3(sx.lo, sy.lo, sz.lo);
+        vec3 D = vec3(dx.hi, dy.hi, dz.hi);
+        vec3 D_lo = vec3(dx.lo, dy.lo, dz.lo);
+        DoubleFloat along = dot2(S, D);
+        precise float turn = 0.25 * (along.hi + (along.lo + (dot(S_lo, D) + dot(S, D_lo))));
+        DoubleFloat tx = two_sum(S.x, -turn * D.x);
+        DoubleFloat ty = two_sum(S.y, -turn * D.y);
+        DoubleFloat tz = two_sum(S.z, -turn * D.z);
+        vec3 T = vec3(tx.hi, ty.hi, tz.hi);
+        precise vec3 T_lo = S_lo + vec3(tx.lo, ty.lo, tz.lo);
+        DoubleFloat l2 = dot2(L, L);
+        DoubleFloat v2 = dot2(V, V);
+        precise float longer = ((l2.hi - 1.0) + l2.lo) + ((v2.hi - 1.0) + v2.lo);
+        float t2 = dot(T, T) + 2.0 * dot(T, T_lo);
+        float lengths = t2 * dot(N, N);
+        if (lengths >= SMALLEST_NORMAL) {
+            vec3 across = cross2(N, T) + cross(N, T_lo);
+            DoubleFloat c = dot2(N, T);
+            precise float cos_sum = c.hi + (c.lo + dot(N, T_lo));
+            r.cos_h = cos_sum / sqrt(lengths);
+            r.sin2_h = dot(across, across) / lengths;
+            r.sum2 = t2 - t2 * (0.5 * longer);
+            r.cos_d = min(0.5 * sqrt(r.sum2), 1.0);
+        }
+    } else {
+        vec3 S = L + V;
+        vec3 D = L - V;
+        S -= D * (0.25 * dot(S, D));
+        float s2 = dot(S, S);
+        if (s2 >= SMALLEST_NORMAL) {
+            vec3 H = S * inversesqrt(s2);
+            r.cos_h = dot(N, H);
+            r.sin2_h = sine_squared(N, H);
+            r.cos_d = min(0.5 * sqrt(s2), 1.0);
+            r.sum2 = s2;
+        }
+    }
+    return r;
+}
+
+// The same without NaN and infinities.
+HalfAngle half_angle_in_range(HalfAngle a) {
+    bool good = abs(a.cos_h) <= LARGEST && a.sin2_h <= LARGEST && a.sum2 <= LARGEST;
+    return HalfAngle(good ? clamp(a.cos_h, -1.0, 1.0) : 0.0, good ? min(a.sin2_h, 1.0) : 1.0,
+                     good ? clamp(a.cos_d, 0.0, 1.0) : 0.0, good ? a.sum2 : 0.0);
+}
+
+// --------------------------------------------------------------------------------------------------------------------
+// The lecture's empirical models
+
+struct Lambert {
+    float cos_plus;
+    float Lref;
+};
+
+// @eq B2 B4 B9 N25: L = L_in k_d cos⁺θ, cosθ = N·L
+Lambert lambert(vec3 N, vec3 L, float Lin, float kd) {
+    float c = cosine(N, L);
+    float cos_plus = ARITHMETIC == FAST ? max(c, 0.0) : max(cosine_in_range(c), 0.0);
+    return Lambert(cos_plus, Lin * (kd * cos_plus));
+}
+
+// cos^shine of the angle, 0 from 90° on and for L = −V. cos^shine = e^(shine/2 ln(1 − sin²)): for a shine of 1e7 cosδ is
+// 1 − 1e-6 and has one digit left of δ, sin²δ has them all; pow on top loses the rest (numerics.md 17). Beyond 45° by the
+// cosine itself.
+float phong_lobe(HalfAngle a, float shine) {
+    float lobe;
+    if (ARITHMETIC == FAST) {
+        lobe = pow(max(a.cos_h, 0.0), shine);
+    } else {
+        bool narrow = a.sin2_h < 0.5;
+        DoubleFloat below = quick_two_sum(1.0, -a.sin2_h);
+        float base = narrow ? below.hi : max(a.cos_h, SMALLEST_NORMAL);
+        Reduced m = log_reduced(base);
+        float f = m.f + (narrow ? below.lo * intBitsToFloat((127 - int(m.k)) << 23) : 0.0);
+        float exponent = shine * log_sum(m.k, f);
+        lobe = a.cos_h > 0.0 ? exp_pair(narrow ? 0.5 * exponent : exponent, 0.0) : 0.0;
+    }
+    return lobe;
+}
+
+// The lobe over (L + V)² (lecture B6); 0 for L = −V.
+float reciprocal_lobe(HalfAngle a, float lobe) {
+    return ARITHMETIC == FAST || a.sum2 > 0.0 ? lobe / a.sum2 : 0.0;
+}
+
+struct BlinnPhong {
+    float cos_in;
+    float cos_delta;
+    float sin2_delta;
+    float spec;
+    float Lref;
+};
+
+// @eq B5 B9 N9 N17 N19: L = L_in (k_d cos⁺θ + k_s (cos⁺δ)^shine), cosδ = N·H, H = (L + V)/|L + V|
+// Self-shadow: spec and L are 0 for cosθ < 0, not for cosθ = 0. V may be anywhere, as in the lecture's shade().
+BlinnPhong blinn_phong(vec3 N, vec3 L, vec3 V, float Lin, float kd, float ks, float shine) {
+    BlinnPhong r;
+    HalfAngle a = half_angle(N, L, V);
+    if (ARITHMETIC == FAST) {
+        r.cos_in = dot(N, L);
+        r.spec = r.cos_in < 0.0 ? 0.0 : phong_lobe(a, shine);
+        r.Lref = r.cos_in < 0.0 ? 0.0 : Lin * kd * r.cos_in + Lin * ks * r.spec;
+    } else {
+        a = half_angle_in_range(a);
+        r.cos_in = cosine_in_range(cosine(N, L));
+        r.spec = r.cos_in < 0.0 ? 0.0 : phong_lobe(a, max(shine, 0.0));
+        r.Lref = r.cos_in < 0.0 ? 0.0 : Lin * (kd * r.cos_in + ks * r.spec);
+    }
+    r.cos_delta = a.cos_h;
+    r.sin2_delta = a.sin2_h;
+    return r;
+}
+
+struct ReciprocalPhong {
+    float LV2;
+    float fr_spec;
+    float Lref;
+};
+
+// @eq B6 N17 N18: L = L_in (k_d + f_s) cos⁺θ, f_s = k_s (cos⁺δ)^shine/(L + V)²
+// The BRDF is symmetric in L and V; f_s is 0 for cosθ < 0, as is L.
+ReciprocalPhong reciprocal_phong(vec3 N, vec3 L, vec3 V, float Lin, float kd, float ks, float shine) {
+    HalfAngle a = half_angle(N, L, V);
+    float c = cosine(N, L);
+    ReciprocalPhong r;
+    if (ARITHMETIC == FAST) {
+        r.fr_spec = c < 0.0 ? 0.0 : ks * reciprocal_lobe(a, phong_lobe(a, shine));
+        r.Lref = c < 0.0 ? 0.0 : Lin * (kd + r.fr_spec) * c;
+    } else {
+        a = half_angle_in_range(a);
+        c = cosine_in_range(c);
+        r.fr_spec = c < 0.0 ? 0.0 : ks * reciprocal_lobe(a, phong_lobe(a, max(shine, 0.0)));
+        r.Lref = c < 0.0 ? 0.0 : Lin * (clamp(kd + r.fr_spec, -LARGEST, LARGEST) * c);
+    }
+    r.LV2 = a.sum2;
+    return r;
 }
 
 // Shininess whose Blinn–Phong lobe has the width of a GGX lobe (Walter et al. 2007): α² = 2 / (shine + 2).
 float shine_from_alpha(float alpha) {
     return max(2.0 / (alpha * alpha) - 2.0, 0.0);
+}
+
+// --------------------------------------------------------------------------------------------------------------------
+// GGX microfacets
+
+// D of cosine and sine (Walter et al. 2007). c²(α² − 1) + 1 cancels to nothing at the peak of a narrow lobe; c²α² + s²
+// is a sum (numerics.md 20).
+float ggx_distribution(float cos_h, float sin2_h, float alpha) {
+    float D;
+    if (ARITHMETIC == FAST) {
+        float t = cos_h * cos_h * (alpha * alpha - 1.0) + 1.0;
+        D = alpha * alpha / (PI * t * t);
+    } else {
+        float k = alpha / (cos_h * cos_h * alpha * alpha + sin2_h);
+        D = k * k * INV_PI;
+    }
+    return cos_h > 0.0 ? D : 0.0;
+}
+
+float ggx_distribution(vec3 N, vec3 H, float alpha) {
+    return ggx_distribution(cosine(N, H), sine_squared(N, H), alpha);
+}
+
+struct GgxD {
+    float cos_h;
+    float sin2_h;
+    float D;
+};
+
+// @eq B1 N9 N20: D = α²/(π (cos²θ_h α² + sin²θ_h)²), 0 for cosθ_h ≤ 0
+GgxD ggx_d(vec3 N, vec3 H, float alpha) {
+    float cos_h = cosine(N, H);
+    float sin2_h = sine_squared(N, H);
+    float a = alpha;
+    if (ARITHMETIC != FAST) {
+        cos_h = cosine_in_range(cos_h);
+        sin2_h = sin2_h <= 1.0 ? sin2_h : 1.0;
+        a = alpha_in_domain(alpha);
+    }
+    return GgxD(cos_h, sin2_h, ggx_distribution(cos_h, sin2_h, a));
+}
+
+// √(cos² + α² sin²), which is cosθ (1 + 2Λ), in a form that is a sum for every α ≤ 1.
+float smith_root(float c, float alpha) {
+    return sqrt(alpha * alpha + (1.0 - alpha) * (1.0 + alpha) * (c * c));
+}
+
+// @eq B1 N22: Λ = (√(1 + α² tan²θ) − 1)/2
+// @out lambda
+// With q = α² sin²θ and s = √(cos²θ + q), (s − c)/(2c) = q/(2c (s + c)). +∞ at 90°.
+float ggx_lambda(float cos_v, float alpha) {
+    float lambda;
+    if (ARITHMETIC == FAST) {
+        float tan2 = (1.0 - cos_v * cos_v) / (cos_v * cos_v);
+        lambda = 0.5 * (sqrt(1.0 + alpha * alpha * tan2) - 1.0);
+    } else {
+        float c = clamp(cos_v, 0.0, 1.0);
+        float a = alpha_in_domain(alpha);
+        float q = a * a * (1.0 - c) * (1.0 + c);
+        float s = sqrt(c * c + q);
+        lambda = c >= SMALLEST_NORMAL ? 0.5 * q / (s + c) / c : plus_infinity();
+    }
+    return lambda;
+}
+
+// Height-correlated Smith visibility G₂/(4 cosθ_l cosθ_v) (Heitz 2014), without division by the cosines (numerics.md 23).
+// Both 0: a large number, not infinity.
+float ggx_visibility(float cos_l, float cos_v, float alpha) {
+    float Vis;
+    if (ARITHMETIC == FAST) {
+        float G2 = 1.0 / (1.0 + ggx_lambda(cos_l, alpha) + ggx_lambda(cos_v, alpha));
+        Vis = G2 / (4.0 * cos_l * cos_v);
+    } else {
+        float l = cos_v * smith_root(cos_l, alpha);
+        float v = cos_l * smith_root(cos_v, alpha);
+        Vis = 0.5 / max(l + v, SMALLEST_NORMAL);
+    }
+    return Vis;
+}
+
+struct GgxG {
+    float G1_L;
+    float G1_V;
+    float G2;
+    float Vis;
+};
+
+// @eq B1 N23: G₁ = 1/(1 + Λ), G₂ = 1/(1 + Λ_l + Λ_v), Vis = G₂/(4 N·L N·V)
+// Λ → ∞ at 90°, where G₁ = 2c/(c + √(c² + α² sin²)) goes to 0 in all its digits. Cosines are clamped to [0, 1].
+GgxG ggx_g(float NoL, float NoV, float alpha) {
+    GgxG r;
+    if (ARITHMETIC == FAST) {
+        float l = ggx_lambda(NoL, alpha);
+        float v = ggx_lambda(NoV, alpha);
+        r = GgxG(1.0 / (1.0 + l), 1.0 / (1.0 + v), 1.0 / (1.0 + l + v), ggx_visibility(NoL, NoV, alpha));
+    } else {
+        float a = alpha_in_domain(alpha);
+        float cl = clamp(NoL, 0.0, 1.0);
+        float cv = clamp(NoV, 0.0, 1.0);
+        float ql = smith_root(cl, a);
+        float qv = smith_root(cv, a);
+        r.G1_L = 2.0 * cl / (cl + ql);
+        r.G1_V = 2.0 * cv / (cv + qv);
+        // Divided, not multiplied out: the product of two cosines of 1e-30 is no float.
+        bool lit = min(cl, cv) >= SMALLEST_NORMAL;
+        r.G2 = lit ? 2.0 / (ql / cl + qv / cv) : 0.0;
+        r.Vis = ggx_visibility(cl, cv, a);
+    }
+    return r;
+}
+
+// @eq F2 N1: F = F0 + (1 − F0)(1 − V·H)⁵
+// @out F
+float ggx_f(float F0, float VoH) {
+    float f0 = ARITHMETIC == FAST ? F0 : clamp(F0, 0.0, 1.0);
+    return f0 + (1.0 - f0) * schlick_weight(VoH);
+}
+
+struct Ggx {
+    float D;
+    float G2;
+    float F;
+    float fr;
+    float fr_cos;
+};
+
+// @eq B1 B2 B3: f_r = D G₂ F/(4 N·L N·V)
+// V·H is |L + V|/2. f_r is 0 where L or V is not above the surface.
+Ggx ggx(vec3 N, vec3 L, vec3 V, float alpha, float F0) {
+    HalfAngle h = half_angle(N, L, V);
+    float NoL = cosine(N, L);
+    float NoV = cosine(N, V);
+    float a = alpha;
+    if (ARITHMETIC != FAST) {
+        h = half_angle_in_range(h);
+        NoL = cosine_in_range(NoL);
+        NoV = cosine_in_range(NoV);
+        a = alpha_in_domain(alpha);
+    }
+    GgxG G = ggx_g(NoL, NoV, a);
+    Ggx r;
+    r.D = ggx_distribution(h.cos_h, h.sin2_h, a);
+    r.G2 = G.G2;
+    r.F = ggx_f(F0, h.cos_d);
+    if (ARITHMETIC == FAST) {
+        r.fr = r.D * r.G2 * r.F / (4.0 * NoL * NoV);
+    } else {
+        r.fr = NoL > 0.0 && NoV > 0.0 ? min(r.D * G.Vis, LARGEST) * r.F : 0.0;
+    }
+    r.fr_cos = r.fr * NoL;
+    return r;
+}
+
+// What the lobe of a white metal keeps of the light, over what it reflects: (1 − E)/E.
+float ggx_missing(float albedo) {
+    float E = clamp(albedo, 1.0 / 1024.0, 1.0);
+    return ARITHMETIC == FAST ? 1.0 / albedo - 1.0 : (1.0 - E) / E;
+}
+
+// @eq B1: factor = 1 + F0 (1/E − 1)
+// @out factor
+// Light that leaves the microsurface after more than one reflection keeps the shape of the lobe: scaled so that a white
+// metal reflects all it receives (Turquin 2019). E is the directional albedo of the lobe with F = 1, clamped to
+// [1/1024, 1]; that of GGX is above 0.3.
+float ggx_compensation(float F0, float albedo) {
+    return 1.0 + F0 * ggx_missing(albedo);
+}
+
+vec3 ggx_compensation(vec3 F0, float albedo) {
+    return 1.0 + F0 * ggx_missing(albedo);
+}
+
+// --------------------------------------------------------------------------------------------------------------------
+// Sampling
+
+struct GgxSample {
+    float sin_h;
+    float cos_h;
+};
+
+// @eq B1 N21: tan²θ_h = α² u/(1 − u): half vectors of density D cosθ_h
+// sin = α√u/√((1 − u) + α²u): √(1 − cos²) is 0 for narrow lobes.
+GgxSample ggx_sample(float u, float alpha) {
+    GgxSample r;
+    if (ARITHMETIC == FAST) {
+        r.cos_h = sqrt((1.0 - u) / (1.0 + (alpha * alpha - 1.0) * u));
+        r.sin_h = sqrt(1.0 - r.cos_h * r.cos_h);
+    } else {
+        float x = clamp(u, 0.0, 1.0);
+        float a = alpha_in_domain(alpha);
+        float root = sqrt((1.0 - x) + a * a * x);
+        r = GgxSample(a * sqrt(x) / root, sqrt(1.0 - x) / root);
+    }
+    return r;
+}
+
+struct GgxPdf {
+    float pdf_h;
+    float pdf_l;
+};
+
+// @eq B1: p(H) = D cosθ_h, p(L) = p(H)/(4 V·H), per solid angle
+// Of ggx_sample, and of V mirrored at its half vectors. 0 for L = −V.
+GgxPdf ggx_pdf(vec3 N, vec3 L, vec3 V, float alpha) {
+    HalfAngle h = half_angle(N, L, V);
+    float a = alpha;
+    if (ARITHMETIC != FAST) {
+        h = half_angle_in_range(h);
+        a = alpha_in_domain(alpha);
+    }
+    float pdf_h = ggx_distribution(h.cos_h, h.sin2_h, a) * h.cos_h;
+    return GgxPdf(pdf_h, ARITHMETIC == FAST || h.cos_d > 0.0 ? pdf_h / (4.0 * h.cos_d) : 0.0);
+}
+
+// (cos, sin) of 2πu. Turns reduce exactly: the nearest quarter is taken off, the rest is within ±π/4. The built-ins
+// promise no more than 2^-11.
+vec2 circle(float u) {
+    vec2 r;
+    if (ARITHMETIC == FAST) {
+        r = vec2(cos(2.0 * PI * u), sin(2.0 * PI * u));
+    } else {
+        float turn = u - floor(u);
+        float quarter = floor(4.0 * turn + 0.5);
+        float x = (turn - 0.25 * quarter) * (2.0 * PI);
+        float z = x * x;
+        // Cephes sinf and cosf.
+        float s = ((-1.9515295891e-4 * z + 8.3321608736e-3) * z - 1.6666654611e-1) * z * x + x;
+        float c = ((2.443315711809948e-5 * z - 1.388731625493765e-3) * z + 4.166664568298827e-2) * z * z - 0.5 * z + 1.0;
+        bool odd = quarter == 1.0 || quarter == 3.0;
+        vec2 turned = odd ? vec2(s, c) : vec2(c, s);
+        r = turned * vec2(quarter == 1.0 || quarter == 2.0 ? -1.0 : 1.0, quarter == 2.0 || quarter == 3.0 ? -1.0 : 1.0);
+    }
+    return r;
+}
+
+struct CosineSample {
+    vec3 L;
+    float pdf;
+};
+
+// @eq B4 N49: L = (√u₁ cos 2πu₂, √u₁ sin 2πu₂, √(1 − u₁)), p(L) = cosθ/π
+// About the z axis. z from 1 − u₁, not from 1 − x² − y², which may be below 0. u₁ is clamped to [0, 1 − 2^-24], so that no
+// direction lies in the surface and has a density of 0.
+CosineSample cosine_sample(float u1, float u2) {
+    CosineSample r;
+    if (ARITHMETIC == FAST) {
+        vec2 p = sqrt(u1) * circle(u2);
+        r.L = vec3(p, sqrt(1.0 - p.x * p.x - p.y * p.y));
+    } else {
+        float u = clamp(u1, 0.0, 0.999999940395355);
+        r.L = vec3(sqrt(u) * circle(u2), sqrt(1.0 - u));
+    }
+    r.pdf = r.L.z * INV_PI;
+    return r;
+}
+
+// @eq N24: w = p²/(p² + q²), the power heuristic for a sample of density p that q might have drawn
+// @out w
+// By the quotient of the smaller over the larger, whose square may vanish but never overflows (Veach 1997). Densities
+// below 0 count as 0; w is 0 for p = 0 and 1 for p = ∞.
+float mis_weight(float p, float q) {
+    float w;
+    if (ARITHMETIC == FAST) {
+        w = p * p / (p * p + q * q);
+    } else {
+        float a = max(p, 0.0);
+        float b = max(q, 0.0);
+        float ratio = a < b ? a / b : b / a;
+        float r2 = ratio * ratio;
+        w = a < b ? r2 / (1.0 + r2) : 1.0 / (1.0 + r2);
+        w = a == 0.0 ? 0.0 : a > LARGEST ? 1.0 : w;
+    }
+    return w;
 }
 #endif

@@ -114,10 +114,8 @@ vec3 environment_light(Surface s) {
 
 vec3 radiance_to_eye(Surface s, ivec2 pixel, uint tiles_across) {
     if (BRDF == 3) {
-        // Light that leaves the microsurface after more than one reflection keeps the shape of the lobe: scaled so that a
-        // white metal reflects all it receives (Turquin 2019).
         vec2 ab = textureLod(reflectance, vec2(clamp(dot(s.n, s.v), 0.0, 1.0), s.roughness), 0.0).rg;
-        s.compensation = 1.0 + s.f0 * (1.0 / (ab.x + ab.y) - 1.0);
+        s.compensation = ggx_compensation(s.f0, ab.x + ab.y);
     }
     vec3 result = punctual_light(s, pixel, tiles_across);
     if (AMBIENT || REFLECTION) result += environment_light(s);

@@ -86,41 +86,38 @@ float largest(vec3 v) {
 
 // BRDF times cosθ_l for light from the unit direction l (lecture B2): what irradiance perpendicular to l becomes.
 vec3 reflected(Surface s, vec3 l) {
-    float cos_l = dot(s.n, l);
-    float cos_v = max(dot(s.n, s.v), 1e-4);
-    vec3 sum = l + s.v;
-    float sum2 = dot(sum, sum);
-    vec3 h = sum2 > 0.0 ? sum * inversesqrt(sum2) : s.n;
-    float cos_d = clamp(dot(s.v, h), 0.0, 1.0);
+    float cos_l = cosine(s.n, l);
+    float cos_v = max(cosine(s.n, s.v), 1e-4);
+    HalfAngle h = half_angle(s.n, l, s.v);
     vec3 result = vec3(0.0);
     // Self-shadow (lecture B9).
     if (cos_l > 0.0) {
         if (BRDF <= 1) {
             float shine = shine_from_alpha(s.alpha);
-            float lobe = pow(max(dot(s.n, h), 0.0), shine);
+            float lobe = phong_lobe(h, shine);
             // k_s such that the lobe of B6 reflects F0 of the light at normal incidence (lecture B6).
             vec3 ks = s.f0 * ((shine + 2.0) * 0.5 * INV_PI);
             if (BRDF == 0) {
                 // B5: the lobe is not multiplied by cosθ_l.
                 result = s.diffuse * INV_PI * cos_l + ks * (lobe * 0.25);
             } else {
-                // B6: the reciprocal form; (L + V)² is taken from the components (numerics.md 18).
-                result = (s.diffuse * INV_PI + (sum2 > 0.0 ? ks * (lobe / sum2) : vec3(0.0))) * cos_l;
+                result = (s.diffuse * INV_PI + ks * reciprocal_lobe(h, lobe)) * cos_l;
             }
         } else {
             // What the dielectric's surface reflects does not reach its diffuse ground; its largest component, so that a
             // tinted F0 gives no complementary colour (KHR_materials_specular).
-            float enters = 1.0 - largest(fresnel_of_dielectric(s, cos_d));
-            float d = ggx_distribution(s.n, h, s.alpha);
+            float enters = 1.0 - largest(fresnel_of_dielectric(s, h.cos_d));
+            float d = ggx_distribution(h.cos_h, h.sin2_h, s.alpha);
             float vis = ggx_visibility(cos_l, cos_v, s.alpha);
-            result = (s.diffuse * (INV_PI * enters) + fresnel(s, cos_d) * s.compensation * (d * vis)) * cos_l;
+            result = (s.diffuse * (INV_PI * enters) + fresnel(s, h.cos_d) * s.compensation * (d * vis)) * cos_l;
         }
     }
     if (CLEARCOAT) {
-        float f = s.clearcoat * schlick(vec3(0.04), 1.0, cos_d).x;
-        float coat_l = max(dot(s.n_coat, l), 0.0);
-        float d = ggx_distribution(s.n_coat, h, s.clearcoat_alpha);
-        float vis = ggx_visibility(coat_l, max(dot(s.n_coat, s.v), 1e-4), s.clearcoat_alpha);
+        HalfAngle coat = half_angle(s.n_coat, l, s.v);
+        float f = s.clearcoat * schlick(vec3(0.04), 1.0, coat.cos_d).x;
+        float coat_l = max(cosine(s.n_coat, l), 0.0);
+        float d = ggx_distribution(coat.cos_h, coat.sin2_h, s.clearcoat_alpha);
+        float vis = ggx_visibility(coat_l, max(cosine(s.n_coat, s.v), 1e-4), s.clearcoat_alpha);
         result = result * (1.0 - f) + f * d * vis * coat_l;
     }
     return result;

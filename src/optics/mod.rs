@@ -8,12 +8,14 @@
 pub mod catalogue;
 
 pub mod arithmetic;
+pub mod brdf;
 pub mod fresnel;
+pub mod light;
 pub mod snell;
 
 pub use catalogue::{Axis, Case, Draw, Equation, Output, Region, Tier, ulp};
 
 /// Every equation, by subject.
 pub fn equations() -> impl Iterator<Item = &'static Equation> {
-    [arithmetic::EQUATIONS, fresnel::EQUATIONS, snell::EQUATIONS].into_iter().flatten()
+    [arithmetic::EQUATIONS, brdf::EQUATIONS, fresnel::EQUATIONS, light::EQUATIONS, snell::EQUATIONS].into_iter().flatten()
 }
