@@ -8,12 +8,16 @@
 pub mod catalogue;
 
 pub mod arithmetic;
+pub mod colour;
 pub mod fresnel;
+pub mod medium;
 pub mod snell;
 
 pub use catalogue::{Axis, Case, Draw, Equation, Output, Region, Tier, ulp};
 
 /// Every equation, by subject.
 pub fn equations() -> impl Iterator<Item = &'static Equation> {
-    [arithmetic::EQUATIONS, fresnel::EQUATIONS, snell::EQUATIONS].into_iter().flatten()
+    [arithmetic::EQUATIONS, colour::EQUATIONS, fresnel::EQUATIONS, medium::EQUATIONS, snell::EQUATIONS]
+        .into_iter()
+        .flatten()
 }
