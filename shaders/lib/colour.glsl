@@ -1,11 +1,241 @@
-// From scene-linear Rec. 709 radiance to display values (lecture C4). Twins: src/image/tone.rs.
+// Spectra to colour (lecture C1–C3), dispersion and black bodies, and from scene-linear Rec. 709 radiance to display
+// values (C4). Twins: src/optics/colour.rs; of the tone curves src/image/tone.rs. Nothing is clipped to a gamut here: a
+// colour outside it has a negative component.
 #ifndef COLOUR_GLSL
 #define COLOUR_GLSL
+#include "lib/arithmetic.glsl"
+#include "lib/matching_functions.glsl"
 
-// IEC 61966-2-1; `x` in [0, 1].
-float srgb_encode(float x) {
-    return x <= 0.0031308 ? 12.92 * x : min(1.055 * pow(x, 1.0 / 2.4) - 0.055, 1.0);
+// --------------------------------------------------------------------------------------------------------------------
+// Matching
+
+// By the four-digit matrix of IEC 61966-2-1.
+vec3 linear_srgb(vec3 xyz) {
+    return mat3(3.2406, -0.9689, 0.0557, -1.5372, 1.8758, -0.2040, -0.4986, 0.0415, 1.0570) * xyz;
 }
+
+struct XyzToSrgb {
+    float sR;
+    float sG;
+    float sB;
+};
+
+// @eq C2: linear sRGB of X, Y, Z, white at D65, by the four-digit matrix of IEC 61966-2-1
+// X, Y and Z below 5e37, or the sums overflow.
+XyzToSrgb xyz_to_srgb(float X, float Y, float Z) {
+    vec3 rgb = linear_srgb(vec3(X, Y, Z));
+    return XyzToSrgb(rgb.r, rgb.g, rgb.b);
+}
+
+struct CmfIntegral {
+    float X;
+    float Y;
+    float Z;
+    float sR;
+    float sG;
+    float sB;
+    float r10;
+    float g10;
+    float b10;
+};
+
+// @eq C1 C2 N50: X = ∫S x̄ dλ as 5 nm sums over 380 … 780 nm, r10 g10 b10 the three lamps of Stiles & Burch that match
+// Plain sums: 81 terms cost 81 roundings at worst. Samples below 1e34 in size, or the sums overflow.
+CmfIntegral cmf_integral(float s[81]) {
+    vec3 xyz = vec3(0.0);
+    vec3 rgb10 = vec3(0.0);
+    // @heads 82
+    for (uint i = 0u; i < 81u; ++i) {
+        xyz += s[i] * CIE_1931_2DEG[i];
+        rgb10 += s[i] * STILES_BURCH_1959_10DEG[i];
+    }
+    xyz *= 5.0;
+    rgb10 *= 5.0;
+    vec3 rgb = linear_srgb(xyz);
+    return CmfIntegral(xyz.x, xyz.y, xyz.z, rgb.r, rgb.g, rgb.b, rgb10.r, rgb10.g, rgb10.b);
+}
+
+struct CmfGaussian {
+    float X;
+    float Y;
+    float Z;
+    float r10;
+    float g10;
+    float b10;
+};
+
+// ((λ − μ)/w)²/2, `scale` 1/(2w²): in pairs, because its rounding error times itself is the exponential's.
+float gaussian(float lambda, float mu, DoubleFloat scale) {
+    DoubleFloat off = two_sum(lambda, -mu);
+    DoubleFloat x = df_mul(df_mul(off, off), scale);
+    return exp_pair(-x.hi, x.hi < 110.0 ? -x.lo : 0.0);
+}
+
+// @eq C1 C2: as cmf_integral, of S = A e^(−((λ − μ)/w)²/2) at the same wavelengths
+// |μ| is cut to 1e6 nm, |w| to [1e-6, 1e6] nm; |A| below 1e34, or the sums overflow.
+CmfGaussian cmf_gaussian(float A, float mu_nm, float width_nm) {
+    float mu = clamp(mu_nm, -1e6, 1e6);
+    float w = clamp(abs(width_nm), 1e-6, 1e6);
+    DoubleFloat scale = df_div(DoubleFloat(0.5, 0.0), two_product(w, w));
+    vec3 xyz = vec3(0.0);
+    vec3 rgb10 = vec3(0.0);
+    // @heads 82
+    for (uint i = 0u; i < 81u; ++i) {
+        float lambda = 380.0 + 5.0 * float(i);
+        float S;
+        if (ARITHMETIC == FAST) {
+            float t = (lambda - mu) / w;
+            S = A * exp(-0.5 * t * t);
+        } else {
+            S = A * gaussian(lambda, mu, scale);
+        }
+        xyz += S * CIE_1931_2DEG[i];
+        rgb10 += S * STILES_BURCH_1959_10DEG[i];
+    }
+    xyz *= 5.0;
+    rgb10 *= 5.0;
+    return CmfGaussian(xyz.x, xyz.y, xyz.z, rgb10.r, rgb10.g, rgb10.b);
+}
+
+// --------------------------------------------------------------------------------------------------------------------
+// Reflectance from three numbers
+
+// @eq C3: S(x) = 1/2 + x/(2√(1 + x²))
+// @out S
+// For x < 0 as 1/(2√(1 + x²)(√(1 + x²) − x)): the difference loses what is left of S. |x| is cut to 1e18.
+float spectrum_sigmoid(float x) {
+    float c = clamp(x, -1e18, 1e18);
+    float root = sqrt(1.0 + c * c);
+    float S;
+    if (ARITHMETIC == FAST) {
+        S = 0.5 + x / (2.0 * sqrt(1.0 + x * x));
+    } else {
+        float tail = 0.5 / root / (root + abs(c));
+        S = c < 0.0 ? tail : 1.0 - tail;
+    }
+    return S;
+}
+
+// @eq C3: ρ(λ) = S((c0 λ + c1) λ + c2), λ in nm
+// @out rho
+// Jakob and Hanika 2019: a smooth reflectance in (0, 1) for every colour. Compensated: the polynomial, whose terms of
+// several hundred cancel to a few, in pairs. λ is cut to [0, 1e6] nm, coefficients to ±1e20.
+float upsampled_reflectance(float lambda_nm, float c0, float c1, float c2) {
+    float lambda = clamp(lambda_nm, 0.0, 1e6);
+    vec3 c = clamp(vec3(c0, c1, c2), -1e20, 1e20);
+    float x;
+    if (ARITHMETIC == COMPENSATED) {
+        DoubleFloat slope = df_add(two_product(c.x, lambda), DoubleFloat(c.y, 0.0));
+        x = df_add(df_mul(slope, DoubleFloat(lambda, 0.0)), DoubleFloat(c.z, 0.0)).hi;
+    } else {
+        x = (c.x * lambda + c.y) * lambda + c.z;
+    }
+    return spectrum_sigmoid(x);
+}
+
+// --------------------------------------------------------------------------------------------------------------------
+// Dispersion
+
+struct Sellmeier {
+    float n;
+    float n_minus_1;
+};
+
+// @eq F1 N46: n² − 1 = t = Σ B λ²/(λ² − C), λ in µm; n − 1 = t/(√(1 + t) + 1)
+// Four terms, of which glasses use three (B.w = 0). λ is cut to [1e-6, 1e9] µm, B, C and each λ²/(λ² − C) to ±1e18; a
+// term at its own resonance is 0; t < −1, inside an absorption band, is n = 0.
+Sellmeier sellmeier(float lambda_um, vec4 B, vec4 C) {
+    float lambda = clamp(lambda_um, 1e-6, 1e9);
+    DoubleFloat l2 = two_product(lambda, lambda);
+    vec4 b = clamp(B, -1e18, 1e18);
+    vec4 c = clamp(C, -1e18, 1e18);
+    vec4 d = vec4(l2.hi) - c;
+    if (ARITHMETIC != FAST) d += l2.lo;
+    vec4 part = mix(clamp(l2.hi / d, -1e18, 1e18), vec4(0.0), equal(d, vec4(0.0)));
+    float t = max(dot(b, part), -1.0);
+    float root = sqrt(1.0 + t);
+    return Sellmeier(root, ARITHMETIC == FAST ? root - 1.0 : t / (root + 1.0));
+}
+
+// @eq F1: n = A + B/λ², λ in µm
+// @out n
+// A knob, not data. λ is cut to [1e-6, 1e9] µm, n to [0, 1e9].
+float cauchy(float lambda_um, float A, float B) {
+    float lambda = clamp(lambda_um, 1e-6, 1e9);
+    return clamp(A + B / (lambda * lambda), 0.0, 1e9);
+}
+
+// --------------------------------------------------------------------------------------------------------------------
+// Black bodies
+
+// @eq N48: 1/(e^x − 1), x = hc/(λkT)
+// @out y
+// 0 from 88 on, where e^x leaves the range; 2^126 for x → 0 and x ≤ 0.
+float planck(float x) {
+    float y;
+    if (ARITHMETIC == FAST) {
+        y = 1.0 / (exp(x) - 1.0);
+    } else {
+        y = x < 88.0 ? 1.0 / max(expm1f(x), SMALLEST_NORMAL) : 0.0;
+    }
+    return y;
+}
+
+const float RADIATION_1 = 1.191042972e8;  // 2hc², W µm⁴/(m² sr)
+const float RADIATION_2_HI = 14387.769;  // hc/k, µm K
+const float RADIATION_2_LO = 2.2035184e-4;
+
+// @eq N48: L = 2hc²/λ⁵ /(e^(hc/(λkT)) − 1) in W/(m² sr µm), λ in µm, T in K
+// @out L
+// hc/(λkT) as a pair: its rounding times itself, up to 88, is the exponential's. λ is cut to [1e-3, 1e4] µm, T to
+// [1e-3, 1e9] K. 0 where the exponent exceeds 88.
+float blackbody(float lambda_um, float T) {
+    float lambda = clamp(lambda_um, 1e-3, 1e4);
+    float kelvin = clamp(T, 1e-3, 1e9);
+    float l2 = lambda * lambda;
+    float power = RADIATION_1 / (l2 * l2 * lambda);
+    float L;
+    if (ARITHMETIC == FAST) {
+        L = power / (exp(RADIATION_2_HI / (lambda * kelvin)) - 1.0);
+    } else {
+        DoubleFloat x = df_div(DoubleFloat(RADIATION_2_HI, RADIATION_2_LO), two_product(lambda, kelvin));
+        float below = expm1f(min(x.hi, 88.0));
+        L = x.hi < 88.0 ? power / (below + (below + 1.0) * x.lo) : 0.0;
+    }
+    return L;
+}
+
+// --------------------------------------------------------------------------------------------------------------------
+// Display
+
+struct Srgb {
+    float encode;
+    float decode;
+};
+
+// The standard's transfer function, at most 1 up to 1. 0.0031308 lies below its f32: that one is above the threshold.
+float srgb_encode(float x) {
+    float y = 1.055 * powf(x, 1.0 / 2.4) - 0.055;
+    y = x <= 1.0 ? min(y, 1.0) : y;
+    return x < 0.0031308 ? 12.92 * max(x, 0.0) : y;
+}
+
+// v^2.4 as v² v^0.4: the nearest f32 to 0.4 is nearer than that to 2.4. 0.04045 lies above its f32.
+float srgb_decode(float x) {
+    float v = (x + 0.055) / 1.055;
+    float power = ARITHMETIC == FAST ? pow(v, 2.4) : v * v * powf(v, 0.4);
+    return x <= 0.04045 ? max(x, 0.0) / 12.92 : power;
+}
+
+// @eq C4 N44 N45: IEC 61966-2-1: encode 12.92 x or 1.055 x^(1/2.4) − 0.055, decode its inverse
+// Negative is 0; above 1 the power goes on. The textbook's 2.2 is another curve, off by 0.034: fast has the same
+// formula, of built-in powers, so that it does not change what a picture looks like.
+Srgb srgb(float x) {
+    return Srgb(srgb_encode(x), srgb_decode(x));
+}
+
+// --------------------------------------------------------------------------------------------------------------------
+// Tone curves. Their pow and log2 are the built-ins: what those lose, 33 ULP at worst, is far below a display's step.
 
 vec3 tone_reinhard(vec3 x) {
     return x / (1.0 + x);
@@ -49,12 +279,14 @@ vec3 tone_khronos_neutral(vec3 x) {
     float offset = low < 0.08 ? low - 6.25 * low * low : 0.04;
     x -= offset;
     float peak = max(x.r, max(x.g, x.b));
-    if (peak < start) return x;
-    float d = 1.0 - start;
-    float new_peak = 1.0 - d * d / (peak + d - start);
-    x *= new_peak / peak;
-    float g = 1.0 - 1.0 / (desaturation * (peak - new_peak) + 1.0);
-    return mix(x, vec3(new_peak), g);
+    if (peak >= start) {
+        float d = 1.0 - start;
+        float new_peak = 1.0 - d * d / (peak + d - start);
+        x *= new_peak / peak;
+        float g = 1.0 - 1.0 / (desaturation * (peak - new_peak) + 1.0);
+        x = mix(x, vec3(new_peak), g);
+    }
+    return x;
 }
 
 // `curve`: 0 linear, 1 reinhard, 2 aces, 3 agx, 4 khronos-neutral. Result in [0, 1], display-linear.

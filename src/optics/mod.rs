@@ -9,13 +9,24 @@ pub mod catalogue;
 
 pub mod arithmetic;
 pub mod brdf;
+pub mod colour;
 pub mod fresnel;
 pub mod light;
+pub mod medium;
 pub mod snell;
 
 pub use catalogue::{Axis, Case, Draw, Equation, Output, Region, Tier, ulp};
 
 /// Every equation, by subject.
 pub fn equations() -> impl Iterator<Item = &'static Equation> {
-    [arithmetic::EQUATIONS, brdf::EQUATIONS, fresnel::EQUATIONS, light::EQUATIONS, snell::EQUATIONS].into_iter().flatten()
+    let subjects = [
+        arithmetic::EQUATIONS,
+        brdf::EQUATIONS,
+        colour::EQUATIONS,
+        fresnel::EQUATIONS,
+        light::EQUATIONS,
+        medium::EQUATIONS,
+        snell::EQUATIONS,
+    ];
+    subjects.into_iter().flatten()
 }

@@ -65,7 +65,7 @@ pub fn tonemap<'a>(
     let push = [r, g, b, a, exposure.exp2()];
     let bind = tonemap::Bind { film, display: &display.pixels, counts: &display.counts };
     let size = [film.desc().width, film.desc().height];
-    let constants = tonemap::Constants { curve }.words();
+    let constants = tonemap::Constants { curve, ..Default::default() }.words();
     frame.compute_over("tone map", &bind, constants, bytemuck::cast_slice(&push), size)?;
     frame.read_back(&display.pixels);
     frame.read_back(&display.counts);

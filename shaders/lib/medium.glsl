@@ -1,0 +1,167 @@
+// Absorption along a path (lecture A1, A2): σ in 1/m times a length in m is the optical depth τ, and e^(−τ) of the
+// radiance is left. Out of domain: a negative σ, length or κ counts as 0.
+#ifndef MEDIUM_GLSL
+#define MEDIUM_GLSL
+#include "lib/arithmetic.glsl"
+#include "lib/constants.glsl"
+
+// e^(−τ). Beyond 110 it is 0 whatever the rest is, and the rest may be larger than exp_pair takes.
+float transmittance(DoubleFloat tau) {
+    return exp_pair(-tau.hi, tau.hi < 110.0 ? -tau.lo : 0.0);
+}
+
+// 1 − e^(−τ), T = e^(−τ): what T itself has no digits for where little is absorbed.
+float absorptance(DoubleFloat tau, float T) {
+    return T * (tau.hi < 110.0 ? tau.lo : 0.0) - expm1f(-tau.hi);
+}
+
+struct BeerLambert {
+    float tau;
+    float T;
+    float one_minus_T;
+    float L;
+};
+
+// @eq A1 N27 N28 N29: L = L0 e^(−τ), τ = σd; one_minus_T = 1 − e^(−τ)
+// The rounding of σd alone costs T τ/2 ULP: its rest goes into the exponential. τ = 0 for σ = 0 or d = 0, whatever the
+// other is; +∞ where it exceeds the range. L as (L0 e^(−τ/2)) e^(−τ/2) where T leaves the range and L may not.
+BeerLambert beer_lambert(float L0, float sigma, float d) {
+    BeerLambert r;
+    if (ARITHMETIC == FAST) {
+        r.tau = sigma * d;
+        r.T = exp(-r.tau);
+        r.one_minus_T = 1.0 - r.T;
+        r.L = L0 * r.T;
+    } else {
+        DoubleFloat product = two_product(sigma, d);
+        bool absorbs = sigma > 0.0 && d > 0.0;
+        DoubleFloat tau = DoubleFloat(absorbs ? product.hi : 0.0, absorbs ? product.lo : 0.0);
+        float half_T = transmittance(df_scale(tau, 0.5));
+        r.tau = tau.hi;
+        r.T = transmittance(tau);
+        r.one_minus_T = absorptance(tau, r.T);
+        r.L = r.T >= SMALLEST_NORMAL ? L0 * r.T : L0 * half_T * half_T;
+    }
+    return r;
+}
+
+// @eq A1: σ = 4πκ/λ, λ in m in the vacuum
+// @out sigma
+// κ has no unit. At most the largest float; 0 for λ ≤ 0.
+float sigma_from_kappa(float kappa, float wavelength_m) {
+    float k = max(kappa, 0.0);
+    bool open = k > 0.0 && wavelength_m >= SMALLEST_NORMAL;
+    return open ? min(4.0 * PI * (k / wavelength_m), LARGEST) : 0.0;
+}
+
+// --------------------------------------------------------------------------------------------------------------------
+// Sums over steps
+
+// Adds one step's σ to the sum + rest of those before. Rests may be added in any order: no `precise`, of which glslang
+// would never end here.
+void add_absorption(inout float sum, inout float rest, float sigma) {
+    if (ARITHMETIC == FAST) {
+        sum += sigma;
+    } else {
+        DoubleFloat t = two_sum(sum, sigma);
+        sum = t.hi;
+        rest += t.lo;
+    }
+}
+
+// 1 + m·2^-23, m the leading 23 bits of the word: a float in [1, 2) of any digits.
+float scrambled(uint word) {
+    return uintBitsToFloat(0x3f800000u | (word >> 9));
+}
+
+const uint GOLDEN = 2654435761u;  // 2^32 over the golden ratio
+const uint MOST_STEPS = 2097152u;  // 2^21
+
+struct BeerLambertSum {
+    float tau;
+    float T;
+    float one_minus_T;
+};
+
+// As it says: the statement so many times. Written out because lavapipe ends all loops of an invocation after 65,535
+// evaluations of their heads.
+#define TIMES_8(statement) statement statement statement statement statement statement statement statement
+#define TIMES_64(statement) TIMES_8(TIMES_8(statement))
+
+// @eq A2 N30: τ = Σ σ_i Δs, σ_i = s0(1 + m_i 2^-23), m_i the leading 23 bits of (2654435761 i + seed) mod 2^32
+// A running sum of n floats loses n/2 ULP at worst: summed in pairs here, with s0 and Δs, common to all steps, multiplied
+// in once. More than 2^21 steps are not taken: as for n = 0.
+BeerLambertSum beer_lambert_sum(uint n, float s0, float ds, uint seed) {
+    uint steps = n <= MOST_STEPS ? n : 0u;
+    uint word = seed;
+    float sum = 0.0;
+    float rest = 0.0;
+    float factor = ARITHMETIC == FAST ? s0 : 1.0;
+    float width = ARITHMETIC == FAST ? ds : 1.0;
+    // @heads 32769
+    for (uint block = 0u; block < steps / 64u; ++block) {
+        TIMES_64(add_absorption(sum, rest, factor * scrambled(word) * width); word += GOLDEN;)
+        // The rest stays so small that its own rounding does not matter.
+        DoubleFloat t = quick_two_sum(sum, rest);
+        sum = t.hi;
+        rest = t.lo;
+    }
+    // @heads 64
+    for (uint i = 0u; i < steps % 64u; ++i) {
+        add_absorption(sum, rest, factor * scrambled(word) * width);
+        word += GOLDEN;
+    }
+    BeerLambertSum r;
+    if (ARITHMETIC == FAST) {
+        r.tau = sum;
+        r.T = exp(-sum);
+        r.one_minus_T = 1.0 - r.T;
+    } else {
+        DoubleFloat tau = df_mul(quick_two_sum(sum, rest), two_product(max(s0, 0.0), max(ds, 0.0)));
+        r.tau = tau.hi;
+        r.T = transmittance(tau);
+        r.one_minus_T = absorptance(tau, r.T);
+    }
+    return r;
+}
+
+const uint QUADRATURE_LEFT = 0;
+const uint QUADRATURE_MIDPOINT = 1;
+const uint QUADRATURE_SIMPSON = 2;
+
+// ∫σ ds ≈ Δs/w Σ (x σ(s_i) + y σ(s_i + Δs/2)) + Δs/w z (σ(S) − σ(0)), for weights (x, y, z, w): of first, second and
+// fourth order. Simpson's sum with each step's end counted as the start of the next one.
+vec4 quadrature_weights(uint rule) {
+    return rule == QUADRATURE_LEFT ? vec4(1.0, 0.0, 0.0, 1.0)
+        : rule == QUADRATURE_MIDPOINT ? vec4(0.0, 1.0, 0.0, 1.0)
+        : vec4(2.0, 4.0, 1.0, 6.0);
+}
+
+const uint MOST_MARCHED = 4096u;
+
+struct MarchOpticalDepth {
+    float tau;
+    float T;
+};
+
+// @eq A2 N31: τ ≈ Σ σ(s_i) Δs of σ(s) = σ0 e^(−falloff s), 0 ≤ s ≤ d; rule 0 left (the slide's), 1 midpoint, 2 Simpson
+// An atmosphere's density, whose integral σ0 (1 − e^(−falloff d))/falloff tells each rule's error. Steps are cut to
+// [1, 4096]; τ is at most the largest float. A negative falloff is a density that grows.
+MarchOpticalDepth march_optical_depth(float sigma0, float falloff, float d, uint steps, uint rule) {
+    uint n = clamp(steps, 1u, MOST_MARCHED);
+    float S = max(d, 0.0);
+    float ds = S / float(n);
+    vec4 w = quadrature_weights(rule);
+    float sum = 0.0;
+    float rest = 0.0;
+    // @heads 4097
+    for (uint i = 0u; i < n; ++i) {
+        if (w.x != 0.0) add_absorption(sum, rest, w.x * expf(-falloff * (float(i) * ds)));
+        if (w.y != 0.0) add_absorption(sum, rest, w.y * expf(-falloff * ((float(i) + 0.5) * ds)));
+    }
+    if (w.z != 0.0) add_absorption(sum, rest, w.z * expm1f(-falloff * S));
+    float mean = min((sum + rest) / w.w, LARGEST);
+    float tau = min(max(sigma0, 0.0) * min(mean * ds, LARGEST), LARGEST);
+    return MarchOpticalDepth(tau, expf(-tau));
+}
+#endif
