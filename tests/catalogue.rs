@@ -155,7 +155,9 @@ fn no_statement_of_the_lecture_and_no_hard_case_is_forgotten() {
     let rows: BTreeSet<_> = ids_of(hard, "N").into_iter().filter(|id| !id.starts_with("NS")).collect();
     assert!(lecture.len() >= 30, "{lecture:?}");
     assert_eq!(rows.len(), 50, "{rows:?}");
-    let all: BTreeSet<_> = lecture.union(&rows).cloned().collect();
+    let mut all: BTreeSet<_> = lecture.union(&rows).cloned().collect();
+    // The quiz's fifth question needs a function that nothing else does.
+    all.insert("Q5".to_owned());
     let tagged: BTreeSet<String> = PROBES.iter().flat_map(|probe| probe.ids).map(|id| (*id).to_owned()).collect();
     let elsewhere: BTreeSet<String> =
         NOT_A_FUNCTION.iter().chain(NOT_A_ROW).map(|(id, _)| (*id).to_owned()).collect();
