@@ -1,5 +1,5 @@
 // Reflection models (lecture B1–B6, B9), their parts and how to sample them. N, L, V, H are unit vectors as 32 bits hold
-// them, L and V point away from the surface; α = roughness². Out of domain: α is clamped to [1e-5, 1], shine < 0 is 0, F0
+// them, L and V point away from the surface; α = roughness². Out of domain: α is clamped to [1e-9, 1], shine < 0 is 0, F0
 // is clamped to [0, 1]; a zero vector makes a right angle with everything, and so does one too long for its square.
 #ifndef BRDF_GLSL
 #define BRDF_GLSL
@@ -7,7 +7,7 @@
 #include "lib/constants.glsl"
 #include "lib/fresnel.glsl"
 
-const float SMALLEST_ALPHA = 1e-5;
+const float SMALLEST_ALPHA = 1e-9;
 
 float alpha_in_domain(float alpha) {
     return clamp(alpha, SMALLEST_ALPHA, 1.0);
@@ -58,8 +58,8 @@ float sine_squared(vec3 N, vec3 H) {
         sin2 = 1.0 - c * c;
     } else if (ARITHMETIC == COMPENSATED) {
         vec3 s = cross2(N, H);
-        float lengths = dot(N, N) * dot(H, H);
-        sin2 = lengths > 0.0 ? dot(s, s) / lengths : 1.0;
+        DoubleFloat lengths = df_mul(dot2(N, N), dot2(H, H));
+        sin2 = lengths.hi > 0.0 ? df_div(dot2(s, s), lengths).hi : 1.0;
     } else {
         vec3 s = cross(N, H - N);
         sin2 = dot(s, s);
@@ -97,16 +97,22 @@ HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
         vec3 S_lo = vec3(sx.lo, sy.lo, sz.lo);
         vec3 D = vec3(dx.hi, dy.hi, dz.hi);
         vec3 D_lo = vec3(dx.lo, dy.lo, dz.lo);
-        DoubleFloat along = dot2(S, D);
-        precise float turn = 0.25 * (along.hi + (along.lo + (dot(S_lo, D) + dot(S, D_lo))));
-        DoubleFloat tx = two_sum(S.x, -turn * D.x);
-        DoubleFloat ty = two_sum(S.y, -turn * D.y);
-        DoubleFloat tz = two_sum(S.z, -turn * D.z);
-        vec3 T = vec3(tx.hi, ty.hi, tz.hi);
-        precise vec3 T_lo = S_lo + vec3(tx.lo, ty.lo, tz.lo);
         DoubleFloat l2 = dot2(L, L);
         DoubleFloat v2 = dot2(V, V);
         precise float longer = ((l2.hi - 1.0) + l2.lo) + ((v2.hi - 1.0) + v2.lo);
+        // Divided by (|L| + |V|)², which is 2L² + 2V² to 1e-14: |L + V| may be as small as the correction itself.
+        DoubleFloat products = dot2(S, D);
+        precise float along_lo = products.lo + (dot(S_lo, D) + dot(S, D_lo));
+        DoubleFloat turn = df_div(quick_two_sum(products.hi, along_lo), df_scale(df_add(l2, v2), 2.0));
+        DoubleFloat px = two_product(turn.hi, D.x);
+        DoubleFloat py = two_product(turn.hi, D.y);
+        DoubleFloat pz = two_product(turn.hi, D.z);
+        precise vec3 turned_lo = vec3(px.lo, py.lo, pz.lo) + (turn.hi * D_lo + turn.lo * D);
+        DoubleFloat tx = two_sum(S.x, -px.hi);
+        DoubleFloat ty = two_sum(S.y, -py.hi);
+        DoubleFloat tz = two_sum(S.z, -pz.hi);
+        vec3 T = vec3(tx.hi, ty.hi, tz.hi);
+        precise vec3 T_lo = (S_lo + vec3(tx.lo, ty.lo, tz.lo)) - turned_lo;
         float t2 = dot(T, T) + 2.0 * dot(T, T_lo);
         float lengths = t2 * dot(N, N);
         if (lengths >= SMALLEST_NORMAL) {
@@ -268,7 +274,7 @@ struct GgxD {
 // @eq B1 N9 N20: D = α²/(π (cos²θ_h α² + sin²θ_h)²), 0 for cosθ_h ≤ 0
 GgxD ggx_d(vec3 N, vec3 H, float alpha) {
     float cos_h = cosine(N, H);
-    float sin2_h = sine_squared(N, H);
+    float sin2_h = sine_squared(ARITHMETIC == STABLE && cos_h < 0.0 ? -N : N, H);
     float a = alpha;
     if (ARITHMETIC != FAST) {
         cos_h = cosine_in_range(cos_h);

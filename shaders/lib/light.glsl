@@ -10,8 +10,8 @@
 // stays finite. It is part of point_falloff, not of light_point, which is I/r² and says +∞.
 const float LIGHT_RADIUS = 1e-6;
 
-// Power of two that brings the largest component of v into [2, 4): its square neither overflows nor vanishes. Powers as
-// exponents n of 2^n, from -126 to 127; 127 for the zero vector and for those that even that leaves below 2.
+// n, from -126 to 127, for which the largest component of 2^n v is in [2, 4): its square neither overflows nor vanishes.
+// 127 for the zero vector, and where even that is below 2.
 int scale_exponent(vec3 v) {
     float largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
     int exponent = (floatBitsToInt(largest) >> 23) & 255;
@@ -86,7 +86,9 @@ LightPoint light_point(vec3 P, vec3 Q, vec3 N, float I) {
         r.r2 = d2 * back * back;
         r.cos_plus = max(cosine_in_range(c), 0.0);
         r.E_perp = d2 > 0.0 ? over_square(I, d2, f) : I > 0.0 ? plus_infinity() : 0.0;
-        r.irradiance = r.cos_plus > 0.0 ? over_square(I * r.cos_plus, d2, f) : 0.0;
+        // E_⊥ may exceed the range of floats and E not.
+        bool far = abs(r.E_perp) <= LARGEST;
+        r.irradiance = r.cos_plus == 0.0 ? 0.0 : far ? r.E_perp * r.cos_plus : over_square(I * r.cos_plus, d2, f);
     }
     return r;
 }

@@ -14,7 +14,8 @@ pub fn light_directional(n: DVec3, l: DVec3, e: f64) -> [f64; 2] {
     [cos_plus, e * cos_plus]
 }
 
-/// @eq R4: r², cos⁺θ, I/r², I/r² cos⁺θ. At r = 0: 0, 0, ∞ for I > 0, 0.
+/// @eq R4: r², cos⁺θ, I/r², I/r² cos⁺θ. At r = 0: 0, 0, ∞ for I > 0, 0. NaN for the last where the rounding of the
+/// cosine decides whether f32 holds it.
 #[must_use]
 pub fn light_point(p: DVec3, q: DVec3, n: DVec3, intensity: f64) -> [f64; 4] {
     let l = q - p;
@@ -23,7 +24,10 @@ pub fn light_point(p: DVec3, q: DVec3, n: DVec3, intensity: f64) -> [f64; 4] {
         return [0.0, 0.0, if intensity > 0.0 { f64::INFINITY } else { 0.0 }, 0.0];
     }
     let cos_plus = cosine(n, l).max(0.0);
-    [r2, cos_plus, intensity / r2, intensity / r2 * cos_plus]
+    let e = intensity / r2;
+    let fits = |cos_plus: f64| e * cos_plus <= f64::from(f32::MAX);
+    let decided = fits(cos_plus - 3e-7) == fits(cos_plus + 3e-7);
+    [r2, cos_plus, e, if decided { e * cos_plus } else { f64::NAN }]
 }
 
 /// Least distance of a point light, m (shaders/lib/light.glsl).
@@ -118,13 +122,13 @@ pub(super) const EQUATIONS: &[Equation] = &[
         outputs: &[
             Output {
                 name: "cos_plus",
-                bound: "1e-7 + 1.04e-7 |cos|; compensated 32 ulp",
-                allowed: |c| cosine_allowed(c, c.x()),
+                bound: "1e-7 + 1.6e-7 |cos|; compensated 32 ulp",
+                allowed: |c| scaled_cosine_allowed(c, c.x()),
             },
             Output {
                 name: "irradiance",
                 bound: "E times that + 1 ulp",
-                allowed: |c| c.inputs[6] * cosine_allowed(c, c.exact[0]) + c.ulps(1.0),
+                allowed: |c| c.inputs[6] * scaled_cosine_allowed(c, c.exact[0]) + c.ulps(1.0),
             },
         ],
         axis: Axis { name: "|L|", log: true, of: |x| vector(x, 3).length(), column: 0 },
@@ -250,7 +254,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             bound: "of the ramp 1.2e-7 (scale cosθ + 1); compensated 4 ulp",
             allowed: |c| {
                 let (ramp, product) = (c.x().sqrt(), (c.inputs[0] * c.inputs[1]).abs());
-                let error = c.tiered(0.5 * ulp(product) + 0.5 * ulp(ramp), 0.0);
+                let error = c.tiered(0.51 * ulp(product) + 0.51 * ulp(ramp), 0.0);
                 c.ulps(4.0) + (2.0 * ramp + error) * error
             },
         }],
@@ -325,4 +329,9 @@ pub(super) const EQUATIONS: &[Equation] = &[
 /// Q − P has rounded once more than a given direction: 2^-24 of each component.
 fn point_cosine_allowed(case: &Case<'_>, exact: f64) -> f64 {
     cosine_allowed(case, exact) + case.tiered(6e-8, 0.0)
+}
+
+/// |L| and the division by it round to 1.2e-7; the length of N is off by 5.2e-8.
+fn scaled_cosine_allowed(case: &Case<'_>, exact: f64) -> f64 {
+    cosine_allowed(case, exact) + case.tiered(6e-8 * exact.abs(), 0.0)
 }
