@@ -117,7 +117,9 @@ BeerLambertSum beer_lambert_sum(uint n, float s0, float ds, uint seed) {
         r.T = exp(-sum);
         r.one_minus_T = 1.0 - r.T;
     } else {
-        DoubleFloat tau = df_mul(quick_two_sum(sum, rest), two_product(max(s0, 0.0), max(ds, 0.0)));
+        DoubleFloat product = df_mul(quick_two_sum(sum, rest), two_product(s0, ds));
+        bool absorbs = steps > 0u && s0 > 0.0 && ds > 0.0;
+        DoubleFloat tau = DoubleFloat(absorbs ? product.hi : 0.0, absorbs ? product.lo : 0.0);
         r.tau = tau.hi;
         r.T = transmittance(tau);
         r.one_minus_T = absorptance(tau, r.T);
