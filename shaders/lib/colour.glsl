@@ -142,9 +142,9 @@ struct Sellmeier {
 };
 
 // @eq F1 N46: n² − 1 = t = Σ B λ²/(λ² − C), λ in µm; n − 1 = t/(√(1 + t) + 1)
-// Four terms, of which glasses use three (B.w = 0). λ²/(λ² − C) = 1 + C/(λ² − C) in whichever form does not cancel. λ is
-// cut to [1e-6, 1e9] µm, B, C and the quotients to ±1e18; a term at its own resonance is 0; t < −1, inside an absorption
-// band, is n = 0.
+// Four terms, of which glasses use three (B.w = 0). λ²/(λ² − C) = 1 + C/(λ² − C) in whichever form does not cancel. λ
+// is cut to [1e-6, 1e9] µm, B, C and the quotients to ±1e18; a term at its own resonance is 0; t < −1, inside an
+// absorption band, is n = 0.
 Sellmeier sellmeier(float lambda_um, vec4 B, vec4 C) {
     float lambda = clamp(lambda_um, 1e-6, 1e9);
     float l2 = lambda * lambda;
@@ -246,7 +246,8 @@ vec3 tone_reinhard(vec3 x) {
 // Stephen Hill's fit of the ACES reference rendering and sRGB output transforms.
 vec3 tone_aces(vec3 x) {
     const mat3 aces_from_linear = mat3(0.59719, 0.07600, 0.02840, 0.35458, 0.90834, 0.13383, 0.04823, 0.01566, 0.83777);
-    const mat3 linear_from_aces = mat3(1.60475, -0.10208, -0.00327, -0.53108, 1.10813, -0.07276, -0.07367, -0.00605, 1.07602);
+    const mat3 linear_from_aces =
+        mat3(1.60475, -0.10208, -0.00327, -0.53108, 1.10813, -0.07276, -0.07367, -0.00605, 1.07602);
     vec3 v = aces_from_linear * x;
     v = (v * (v + 0.0245786) - 0.000090537) / (v * (0.983729 * v + 0.4329510) + 0.238081);
     return linear_from_aces * v;

@@ -167,8 +167,8 @@ fn gaussian_allowed(case: &Case<'_>) -> f64 {
         + magnitude(&[lost; SAMPLES], functions)[case.column % 3]
 }
 
-/// The polynomial's rounding, 3 units of 2^-24 of its terms' sizes, times the sigmoid's slope, and 5 ulp; compensated the
-/// latter alone.
+/// The polynomial's rounding, 3 units of 2^-24 of its terms' sizes, times the sigmoid's slope, and 5 ulp; compensated
+/// the latter alone.
 fn upsampled_allowed(case: &Case<'_>) -> f64 {
     let [lambda, c0, c1, c2] = [case.inputs[0], case.inputs[1], case.inputs[2], case.inputs[3]];
     let x = (c0 * lambda + c1) * lambda + c2;
