@@ -89,7 +89,7 @@ struct BeerLambertSum {
 #define TIMES_64(statement) TIMES_8(TIMES_8(statement))
 
 // @eq A2 N30: τ = Σ σ_i Δs, σ_i = s0(1 + m_i 2^-23), m_i the leading 23 bits of (2654435761 i + seed) mod 2^32
-// A running sum of n floats loses n/2 ULP at worst: summed in pairs here; s0 and Δs, common to all steps, are multiplied
+// A running sum of n floats loses n/2 ULP at worst: summed in pairs here; s0 and Δs, common to all steps, multiplied
 // in once. More than 2^21 steps are not taken: as for n = 0.
 BeerLambertSum beer_lambert_sum(uint n, float s0, float ds, uint seed) {
     uint steps = n <= MOST_STEPS ? n : 0u;
