@@ -102,16 +102,16 @@ CmfGaussian cmf_gaussian(float A, float mu_nm, float width_nm) {
 
 // @eq C3: S(x) = 1/2 + x/(2√(1 + x²))
 // @out S
-// For x < 0 as 1/(2√(1 + x²)(√(1 + x²) − x)): the difference loses what is left of S. |x| is cut to 1e18.
+// For x < 0 as 1/(2(1 + x² − x√(1 + x²))): the difference loses what is left of S. |x| is cut to 1e18.
 float spectrum_sigmoid(float x) {
-    float c = clamp(x, -1e18, 1e18);
-    float root = sqrt(1.0 + c * c);
     float S;
     if (ARITHMETIC == FAST) {
         S = 0.5 + x / (2.0 * sqrt(1.0 + x * x));
     } else {
-        float tail = 0.5 / root / (root + abs(c));
-        S = c < 0.0 ? tail : 1.0 - tail;
+        float size = min(abs(x), 1e18);
+        float square = 1.0 + size * size;
+        float tail = 0.5 / (square + size * sqrt(square));
+        S = x < 0.0 ? tail : 1.0 - tail;
     }
     return S;
 }
@@ -142,16 +142,18 @@ struct Sellmeier {
 };
 
 // @eq F1 N46: n² − 1 = t = Σ B λ²/(λ² − C), λ in µm; n − 1 = t/(√(1 + t) + 1)
-// Four terms, of which glasses use three (B.w = 0). λ is cut to [1e-6, 1e9] µm, B, C and each λ²/(λ² − C) to ±1e18; a
-// term at its own resonance is 0; t < −1, inside an absorption band, is n = 0.
+// Four terms, of which glasses use three (B.w = 0). λ²/(λ² − C) = 1 + C/(λ² − C) in whichever form does not cancel. λ
+// is cut to [1e-6, 1e9] µm, B, C and the quotients to ±1e18; a term at its own resonance is 0; t < −1, inside an
+// absorption band, is n = 0.
 Sellmeier sellmeier(float lambda_um, vec4 B, vec4 C) {
     float lambda = clamp(lambda_um, 1e-6, 1e9);
-    DoubleFloat l2 = two_product(lambda, lambda);
+    float l2 = lambda * lambda;
     vec4 b = clamp(B, -1e18, 1e18);
     vec4 c = clamp(C, -1e18, 1e18);
-    vec4 d = vec4(l2.hi) - c;
-    if (ARITHMETIC != FAST) d += l2.lo;
-    vec4 part = mix(clamp(l2.hi / d, -1e18, 1e18), vec4(0.0), equal(d, vec4(0.0)));
+    vec4 d = vec4(l2) - c;
+    vec4 part = l2 / d;
+    if (ARITHMETIC != FAST) part = mix(part, 1.0 + c / d, lessThan(abs(c), vec4(0.5 * l2)));
+    part = mix(clamp(part, -1e18, 1e18), vec4(0.0), equal(d, vec4(0.0)));
     float t = max(dot(b, part), -1.0);
     float root = sqrt(1.0 + t);
     return Sellmeier(root, ARITHMETIC == FAST ? root - 1.0 : t / (root + 1.0));
@@ -188,10 +190,10 @@ const float RADIATION_2_LO = 2.2035184e-4;
 // @eq N48: L = 2hc²/λ⁵ /(e^(hc/(λkT)) − 1) in W/(m² sr µm), λ in µm, T in K
 // @out L
 // hc/(λkT) as a pair: its rounding times itself, up to 88, is the exponential's. λ is cut to [1e-3, 1e4] µm, T to
-// [1e-3, 1e9] K. 0 where the exponent exceeds 88.
+// [1e-3, 1e12] K. 0 where the exponent exceeds 88.
 float blackbody(float lambda_um, float T) {
     float lambda = clamp(lambda_um, 1e-3, 1e4);
-    float kelvin = clamp(T, 1e-3, 1e9);
+    float kelvin = clamp(T, 1e-3, 1e12);
     float l2 = lambda * lambda;
     float power = RADIATION_1 / (l2 * l2 * lambda);
     float L;
@@ -244,7 +246,8 @@ vec3 tone_reinhard(vec3 x) {
 // Stephen Hill's fit of the ACES reference rendering and sRGB output transforms.
 vec3 tone_aces(vec3 x) {
     const mat3 aces_from_linear = mat3(0.59719, 0.07600, 0.02840, 0.35458, 0.90834, 0.13383, 0.04823, 0.01566, 0.83777);
-    const mat3 linear_from_aces = mat3(1.60475, -0.10208, -0.00327, -0.53108, 1.10813, -0.07276, -0.07367, -0.00605, 1.07602);
+    const mat3 linear_from_aces =
+        mat3(1.60475, -0.10208, -0.00327, -0.53108, 1.10813, -0.07276, -0.07367, -0.00605, 1.07602);
     vec3 v = aces_from_linear * x;
     v = (v * (v + 0.0245786) - 0.000090537) / (v * (0.983729 * v + 0.4329510) + 0.238081);
     return linear_from_aces * v;

@@ -89,7 +89,7 @@ struct BeerLambertSum {
 #define TIMES_64(statement) TIMES_8(TIMES_8(statement))
 
 // @eq A2 N30: τ = Σ σ_i Δs, σ_i = s0(1 + m_i 2^-23), m_i the leading 23 bits of (2654435761 i + seed) mod 2^32
-// A running sum of n floats loses n/2 ULP at worst: summed in pairs here, with s0 and Δs, common to all steps, multiplied
+// A running sum of n floats loses n/2 ULP at worst: summed in pairs here; s0 and Δs, common to all steps, multiplied
 // in once. More than 2^21 steps are not taken: as for n = 0.
 BeerLambertSum beer_lambert_sum(uint n, float s0, float ds, uint seed) {
     uint steps = n <= MOST_STEPS ? n : 0u;
@@ -117,7 +117,9 @@ BeerLambertSum beer_lambert_sum(uint n, float s0, float ds, uint seed) {
         r.T = exp(-sum);
         r.one_minus_T = 1.0 - r.T;
     } else {
-        DoubleFloat tau = df_mul(quick_two_sum(sum, rest), two_product(max(s0, 0.0), max(ds, 0.0)));
+        DoubleFloat product = df_mul(quick_two_sum(sum, rest), two_product(s0, ds));
+        bool absorbs = steps > 0u && s0 > 0.0 && ds > 0.0;
+        DoubleFloat tau = DoubleFloat(absorbs ? product.hi : 0.0, absorbs ? product.lo : 0.0);
         r.tau = tau.hi;
         r.T = transmittance(tau);
         r.one_minus_T = absorptance(tau, r.T);
@@ -144,8 +146,8 @@ struct MarchOpticalDepth {
     float T;
 };
 
-// @eq A2 N31: τ ≈ Σ σ(s_i) Δs of σ(s) = σ0 e^(−falloff s), 0 ≤ s ≤ d; rule 0 left (the slide's), 1 midpoint, 2 Simpson
-// An atmosphere's density, whose integral σ0 (1 − e^(−falloff d))/falloff tells each rule's error. Steps are cut to
+// @eq A2 N31: τ ≈ Σ σ(s_i) Δs of σ(s) = σ0 e^(−falloff s), s in [0, d]; rule 0 left (slide), 1 midpoint, 2 Simpson
+// An atmosphere's density: its integral σ0 (1 − e^(−falloff d))/falloff tells each rule's error. Steps are cut to
 // [1, 4096]; τ is at most the largest float. A negative falloff is a density that grows.
 MarchOpticalDepth march_optical_depth(float sigma0, float falloff, float d, uint steps, uint rule) {
     uint n = clamp(steps, 1u, MOST_MARCHED);

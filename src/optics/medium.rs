@@ -76,8 +76,8 @@ fn medium(d: &mut Draw, rule: f32) -> Vec<f32> {
     let length = d.log(1e-2, 1e4);
     let falloff = match d.below(8) {
         0 => 0.0,
-        1 => -d.log(1e-3, 10.0) / length,
-        _ => d.log(1e-3, 30.0) / length,
+        1 => -d.log(1e-3, 3.0) / length,
+        _ => d.log(1e-3, 12.0) / length,
     };
     let sigma = d.log(1e-3, 12.0) / length;
     vec![sigma as f32, falloff as f32, length as f32, d.log(1.0, 4096.9).floor() as f32, rule]
@@ -158,7 +158,8 @@ pub(super) const EQUATIONS: &[Equation] = &[
                 name: "up to 1000 steps",
                 share: 399,
                 draw: |d| {
-                    let (n, tau) = (d.log(1.0, 1e3), if d.below(2) == 0 { d.log(1e-6, 1.0) } else { d.between(0.0, 60.0) });
+                    let (n, tau) =
+                        (d.log(1.0, 1e3), if d.below(2) == 0 { d.log(1e-6, 1.0) } else { d.between(0.0, 60.0) });
                     steps(d, n, tau)
                 },
             },
