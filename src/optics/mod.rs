@@ -8,12 +8,24 @@
 pub mod catalogue;
 
 pub mod arithmetic;
+pub mod encode;
+pub mod frame;
 pub mod fresnel;
+pub mod ray;
 pub mod snell;
 
 pub use catalogue::{Axis, Case, Draw, Equation, Output, Region, Tier, ulp};
 
 /// Every equation, by subject.
 pub fn equations() -> impl Iterator<Item = &'static Equation> {
-    [arithmetic::EQUATIONS, fresnel::EQUATIONS, snell::EQUATIONS].into_iter().flatten()
+    [
+        arithmetic::EQUATIONS,
+        encode::EQUATIONS,
+        frame::EQUATIONS,
+        fresnel::EQUATIONS,
+        ray::EQUATIONS,
+        snell::EQUATIONS,
+    ]
+    .into_iter()
+    .flatten()
 }
