@@ -25,11 +25,7 @@ const CONTRACT: &[(&str, &str, &str)] = &[
     ("refract", "vx vy vz Nx Ny Nz n", "Tx Ty Tz tir disc"),
     ("critical_angle", "n_in n_out", "exists theta_rad theta_deg cos_theta"),
     ("lambert", "Nx Ny Nz Lx Ly Lz Lin kd", "cos_plus Lref"),
-    (
-        "blinn_phong",
-        "Nx Ny Nz Lx Ly Lz Vx Vy Vz Lin kd ks shine",
-        "cos_in cos_delta sin2_delta spec Lref",
-    ),
+    ("blinn_phong", "Nx Ny Nz Lx Ly Lz Vx Vy Vz Lin kd ks shine", "cos_in cos_delta sin2_delta spec Lref"),
     ("reciprocal_phong", "Nx Ny Nz Lx Ly Lz Vx Vy Vz Lin kd ks shine", "LV2 fr_spec Lref"),
     ("ggx_d", "Nx Ny Nz Hx Hy Hz alpha", "cos_h sin2_h D"),
     ("ggx_g", "NoL NoV alpha", "G1_L G1_V G2 Vis"),
@@ -110,7 +106,9 @@ fn twins_carry_ids_of_their_functions() {
     let mut wrong = Vec::new();
     for probe in PROBES {
         match tags_of_twins(probe.subject).get(probe.name) {
-            None => wrong.push(format!("{}: no `pub fn` with `/// @eq` in src/optics/{}.rs", probe.name, probe.subject)),
+            None => {
+                wrong.push(format!("{}: no `pub fn` with `/// @eq` in src/optics/{}.rs", probe.name, probe.subject))
+            }
             Some(ids) => {
                 for id in ids {
                     if !probe.ids.contains(&id.as_str()) {
@@ -159,8 +157,7 @@ fn no_statement_of_the_lecture_and_no_hard_case_is_forgotten() {
     // The quiz's fifth question needs a function that nothing else does.
     all.insert("Q5".to_owned());
     let tagged: BTreeSet<String> = PROBES.iter().flat_map(|probe| probe.ids).map(|id| (*id).to_owned()).collect();
-    let elsewhere: BTreeSet<String> =
-        NOT_A_FUNCTION.iter().chain(NOT_A_ROW).map(|(id, _)| (*id).to_owned()).collect();
+    let elsewhere: BTreeSet<String> = NOT_A_FUNCTION.iter().chain(NOT_A_ROW).map(|(id, _)| (*id).to_owned()).collect();
     let unknown: Vec<_> = tagged.difference(&all).collect();
     assert!(unknown.is_empty(), "tagged with ids that the pages do not have: {unknown:?}");
     let forgotten: Vec<_> = all.iter().filter(|id| !tagged.contains(*id) && !elsewhere.contains(*id)).collect();

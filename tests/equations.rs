@@ -17,7 +17,8 @@ const CASES: usize = 100_000;
 
 /// What a set of cases breaks, one sentence per output.
 fn broken(gpu: &Gpu, entry: &Entry, tier: Tier, cases: &Cases) -> Vec<String> {
-    let outputs = verify::evaluate(&gpu.device, entry.probe, tier, &cases.inputs, cases.count).expect("it runs").outputs;
+    let outputs =
+        verify::evaluate(&gpu.device, entry.probe, tier, &cases.inputs, cases.count).expect("it runs").outputs;
     let figures = verify::judge(entry, tier, cases, &outputs);
     let failed = entry.equation.outputs.iter().zip(figures).filter(|(_, figures)| !figures.pass);
     failed

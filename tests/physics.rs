@@ -30,15 +30,14 @@ fn above(draw: &mut Draw, n: DVec3, least: f64) -> DVec3 {
 fn reflected_and_transmitted_power_are_one() {
     let gpu = Gpu::new();
     let mut draw = Draw::new(1);
-    let dielectrics: Vec<Vec<f32>> =
-        (0..CASES).map(|_| vec![draw.unit() as f32, draw.log(0.2, 5.0) as f32]).collect();
-    let metals: Vec<Vec<f32>> = (0..CASES)
-        .map(|_| vec![draw.unit() as f32, draw.log(0.05, 5.0) as f32, draw.log(0.5, 8.0) as f32])
-        .collect();
+    let dielectrics: Vec<Vec<f32>> = (0..CASES).map(|_| vec![draw.unit() as f32, draw.log(0.2, 5.0) as f32]).collect();
+    let metals: Vec<Vec<f32>> =
+        (0..CASES).map(|_| vec![draw.unit() as f32, draw.log(0.05, 5.0) as f32, draw.log(0.5, 8.0) as f32]).collect();
     for tier in PROMISING {
-        for (rows, reflected, kept) in
-            [(&dielectrics, "fresnel_dielectric", "dielectric_transmitted"), (&metals, "fresnel_conductor", "conductor_absorbed")]
-        {
+        for (rows, reflected, kept) in [
+            (&dielectrics, "fresnel_dielectric", "dielectric_transmitted"),
+            (&metals, "fresnel_conductor", "conductor_absorbed"),
+        ] {
             let f = evaluate(&gpu, reflected, tier, rows);
             let t = evaluate(&gpu, kept, tier, rows);
             for ((row, f), t) in rows.iter().zip(&f).zip(&t) {
@@ -129,8 +128,7 @@ fn a_chain_of_reflections_keeps_its_length() {
         let mut directions: Vec<DVec3> = (0..1000).map(|_| draw.direction()).collect();
         let mut longest: f64 = 0.0;
         for _ in 0..256 {
-            let rows: Vec<Vec<f32>> =
-                directions.iter().map(|v| columns(&[*v, draw.direction()])).collect();
+            let rows: Vec<Vec<f32>> = directions.iter().map(|v| columns(&[*v, draw.direction()])).collect();
             directions = evaluate(&gpu, "reflect", tier, &rows).iter().map(|r| vector(&wide(r), 0)).collect();
             longest = directions.iter().fold(longest, |all, v| all.max((v.length() - 1.0).abs()));
         }
@@ -169,10 +167,9 @@ fn brdfs_that_claim_reciprocity_have_it() {
     let phong = |draw: &mut Draw| vec![1.0, 0.1, 0.5, draw.log(1.0, 1e4) as f32];
     let ggx = |draw: &mut Draw| vec![draw.log(1e-3, 1.0) as f32, draw.unit() as f32];
     for tier in PROMISING {
-        for (name, output, [a, b]) in [
-            ("reciprocal_phong", "fr_spec", exchanged(4, phong)),
-            ("ggx", "fr", exchanged(5, ggx)),
-        ] {
+        for (name, output, [a, b]) in
+            [("reciprocal_phong", "fr_spec", exchanged(4, phong)), ("ggx", "fr", exchanged(5, ggx))]
+        {
             let at = column(name, output);
             let (there, back) = (evaluate(&gpu, name, tier, &a), evaluate(&gpu, name, tier, &b));
             for ((row, x), y) in a.iter().zip(&there).zip(&back) {
@@ -188,10 +185,8 @@ fn blinn_phong_is_not_reciprocal_by_the_ratio_of_the_cosines() {
     let gpu = Gpu::new();
     let [a, b] = exchanged(6, |draw| vec![1.0, 0.0, 1.0, draw.between(1.0, 20.0) as f32]);
     let (radiance, cos) = (column("blinn_phong", "Lref"), column("blinn_phong", "cos_in"));
-    let (there, back) = (
-        evaluate(&gpu, "blinn_phong", Tier::Stable, &a),
-        evaluate(&gpu, "blinn_phong", Tier::Stable, &b),
-    );
+    let (there, back) =
+        (evaluate(&gpu, "blinn_phong", Tier::Stable, &a), evaluate(&gpu, "blinn_phong", Tier::Stable, &b));
     let mut broken = 0;
     for (x, y) in there.iter().zip(&back) {
         // f_r = L_ref / (L_in cosθ_in); k_d = 0 and L_in = 1.
@@ -287,7 +282,8 @@ fn the_quiz_comes_out_of_the_shaders() {
         close(x / y, 1.0, "Q5");
         close(z / x, -2.0 / 3.0, "Q5, the third component");
         // Q6: irradiance of a point source falls with 1/r², and F lies in [0, 1].
-        let at = |r: f32| value(&gpu, "light_point", tier, &[0.0, 0.0, 0.0, 0.0, 0.0, r, 0.0, 0.0, 1.0, 5.0], "irradiance");
+        let at =
+            |r: f32| value(&gpu, "light_point", tier, &[0.0, 0.0, 0.0, 0.0, 0.0, r, 0.0, 0.0, 1.0, 5.0], "irradiance");
         close(at(2.0) / at(6.0), 9.0, "Q6");
     }
 }

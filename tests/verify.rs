@@ -95,7 +95,11 @@ fn a_vector_file_is_judged_by_what_it_expects() {
 fn bad_vector_files_get_a_sentence() {
     let bad: &[(&str, &str, &str)] = &[
         ("fresnel_dielectric.csv", "cos_in,=F\n1,0.04\n", "the input \"n\" of fresnel_dielectric has no column"),
-        ("fresnel_dielectric.csv", "cos_in,n,m,=F\n1,1,1,1\n", "fresnel_dielectric has no input \"m\", it has cos_in n"),
+        (
+            "fresnel_dielectric.csv",
+            "cos_in,n,m,=F\n1,1,1,1\n",
+            "fresnel_dielectric has no input \"m\", it has cos_in n",
+        ),
         ("fresnel_dielectric.csv", "cos_in,n,=G\n1,1,1\n", "fresnel_dielectric has no output \"G\", it has F rs"),
         ("fresnel_dielectric.csv", "cos_in,n,n,=F\n1,1,1,1\n", "the column \"n\" is there twice"),
         ("fresnel_dielectric.csv", "cos_in,n\n1,1\n", "no column is an expected output"),

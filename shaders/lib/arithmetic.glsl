@@ -132,6 +132,22 @@ DoubleFloat df_sqrt(DoubleFloat a) {
     return quick_two_sum(root, positive ? rest : 0.0);
 }
 
+// ab − cd, as if in twice the precision.
+float difference_of_products(float a, float b, float c, float d) {
+    DoubleFloat p = two_product(a, b);
+    DoubleFloat q = two_product(c, d);
+    DoubleFloat s = two_sum(p.hi, -q.hi);
+    precise float rest = s.lo + (p.lo - q.lo);
+    precise float sum = s.hi + rest;
+    return sum;
+}
+
+// a × b, each component as if in twice the precision.
+vec3 cross2(vec3 a, vec3 b) {
+    return vec3(difference_of_products(a.y, b.z, a.z, b.y), difference_of_products(a.z, b.x, a.x, b.z),
+                difference_of_products(a.x, b.y, a.y, b.x));
+}
+
 // @eq N11 N25: a_x b_x + a_y b_y + a_z b_z as if in twice the precision
 // Ogita, Rump and Oishi: exact products and sums, their rests added in f32. Error 2^-46 of the sum of magnitudes.
 // Components below 1e19: the products overflow above.

@@ -34,21 +34,6 @@ float cosine_in_range(float c) {
     return abs(c) <= LARGEST ? clamp(c, -1.0, 1.0) : 0.0;
 }
 
-// ab − cd, as if in twice the precision.
-float difference_of_products(float a, float b, float c, float d) {
-    DoubleFloat p = two_product(a, b);
-    DoubleFloat q = two_product(c, d);
-    DoubleFloat s = two_sum(p.hi, -q.hi);
-    precise float rest = s.lo + (p.lo - q.lo);
-    precise float sum = s.hi + rest;
-    return sum;
-}
-
-vec3 cross2(vec3 a, vec3 b) {
-    return vec3(difference_of_products(a.y, b.z, a.z, b.y), difference_of_products(a.z, b.x, a.x, b.z),
-                difference_of_products(a.x, b.y, a.y, b.x));
-}
-
 // sin² between two directions. 1 − cos² loses small angles, and so does the cross product N × H of rounded products;
 // H − N is exact where H is near N, and N × (H − N) has nothing to lose (numerics.md 9).
 float sine_squared(vec3 N, vec3 H) {

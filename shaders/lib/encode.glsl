@@ -1,7 +1,9 @@
-// How quantities are stored: normals as octahedra, numbers as parts of words.
+// How quantities are stored: normals as octahedra, numbers as parts of words, depths, directions on a map. Twins of the
+// tagged functions: src/optics/encode.rs.
 #ifndef ENCODE_GLSL
 #define ENCODE_GLSL
 #include "lib/constants.glsl"
+#include "lib/frame.glsl"
 
 // Octahedral map of a unit vector to [−1, 1]² (Cigolle et al., JCGT 3(2) 2014). In 2x16 bits the largest error is
 // 3.7e-3 degrees (numerics.md 16).
@@ -24,6 +26,87 @@ vec3 unit_from_octahedral(vec2 p) {
     return normalize(n);
 }
 
+struct OctahedralRoundTrip {
+    vec3 d;
+    float error_deg;
+};
+
+// Steps of a signed normalised number of `bits` bits on each side of 0.
+float snorm_steps(uint bits) {
+    return float((1u << (clamp(bits, 2u, 24u) - 1u)) - 1u);
+}
+
+// What the round trips below read: +Z for the zero vector.
+vec3 unit_or_z(vec3 n) {
+    SafeNormalized unit = safe_normalize(n);
+    return unit.is_zero ? vec3(0.0, 0.0, 1.0) : unit.n;
+}
+
+// @eq N16: d = decode(round(encode(n)·m)/m), m = 2^(bits − 1) − 1
+// Each component to the nearest step, as a texture unit stores it. bits is clamped to [2, 24].
+OctahedralRoundTrip octahedral_round_trip(vec3 n, uint bits) {
+    vec3 unit = unit_or_z(n);
+    float steps = snorm_steps(bits);
+    vec3 d = unit_from_octahedral(floor(octahedral_from_unit(unit) * steps + 0.5) / steps);
+    return OctahedralRoundTrip(d, angle_between(unit, d) * (180.0 / PI));
+}
+
+// @eq N16: the best of the four steps around encode(n)·m
+// A third less error for four decodings. "Best" is the smallest |d − n|²: at 16 bits the cosines of all four are 1.
+OctahedralRoundTrip octahedral_round_trip_precise(vec3 n, uint bits) {
+    vec3 unit = unit_or_z(n);
+    float steps = snorm_steps(bits);
+    vec2 p = octahedral_from_unit(unit) * steps;
+    // The nearest step and the next on the other side of p, within the square.
+    vec2 near_step = floor(p + 0.5);
+    vec2 next_step = near_step + vec2(p.x >= near_step.x ? 1.0 : -1.0, p.y >= near_step.y ? 1.0 : -1.0);
+    next_step = clamp(next_step, vec2(-steps), vec2(steps));
+    vec3 d = unit_from_octahedral(near_step / steps);
+    if (ARITHMETIC != FAST) {
+        vec3 right = unit_from_octahedral(vec2(next_step.x, near_step.y) / steps);
+        vec3 above = unit_from_octahedral(vec2(near_step.x, next_step.y) / steps);
+        vec3 both = unit_from_octahedral(next_step / steps);
+        float least = dot(d - unit, d - unit);
+        float distance2 = dot(right - unit, right - unit);
+        d = distance2 < least ? right : d;
+        least = min(least, distance2);
+        distance2 = dot(above - unit, above - unit);
+        d = distance2 < least ? above : d;
+        least = min(least, distance2);
+        d = dot(both - unit, both - unit) < least ? both : d;
+    }
+    return OctahedralRoundTrip(d, angle_between(unit, d) * (180.0 / PI));
+}
+
+const float LARGEST_HALF = 65504.0;
+
+// @eq N43: the half-precision number next to min(|x|, 65504), with the sign of x
+// @out y
+// Clamped first: from 65520 on a conversion gives ∞, which every later sum keeps.
+float half_round_trip(float x) {
+    float stored = ARITHMETIC == FAST ? x : clamp(x, -LARGEST_HALF, LARGEST_HALF);
+    return unpackHalf2x16(packHalf2x16(vec2(stored, 0.0))).x;
+}
+
+// @eq N42: d = near/z in f32, z = near/d
+// @out z_back
+// Reversed infinite depth: the floats of d lie as densely, relative to it, at every distance. The tier fast is the
+// standard depth d = far (z − near)/(z (far − near)), which is nearly 1 for most z; `far` is of use to it alone. What is
+// nearer than `near` > 0 comes back at it, and at infinity where near/z is 0; near ≤ 0: 0.
+float depth_round_trip(float z, float near, float far) {
+    float z_back;
+    if (ARITHMETIC == FAST) {
+        float d = far / (far - near) * (1.0 - near / z);
+        z_back = near * far / (far - d * (far - near));
+    } else {
+        // `precise`: no division of the quotient into z.
+        precise float d = near / max(z, near);
+        z_back = d >= SMALLEST_NORMAL ? near / d : plus_infinity();
+        z_back = near > 0.0 ? z_back : 0.0;
+    }
+    return z_back;
+}
+
 // Clear-coat strength and roughness as the two bytes of one 16-bit number, specular strength, and the coat's normal: for
 // four unorm16 components.
 vec4 packed_layers(vec3 coat_roughness_specular, vec3 n_coat) {
@@ -41,9 +124,19 @@ vec3 coat_normal_from_packed(vec4 packed_value) {
     return unit_from_octahedral(packed_value.zw * 2.0 - 1.0);
 }
 
-// Equirectangular coordinates of a unit direction (README, "Conventions"): u to the right, v down from the top.
+// @eq N10: u = 1/2 + φ/2π, v = 1/2 − elevation/π; φ = atan2(d_z, d_x), elevation = atan2(d_y, √(d_x² + d_z²))
+// @out uv
+// Equirectangular coordinates of a direction (README, "Conventions"): u to the right, v down from the top. The elevation
+// as an arc tangent: the arc sine turns the rounding of d_y into 3e-4 rad at the poles. The zero vector: (1/2, 1/2).
 vec2 equirectangular_from_direction(vec3 d) {
-    return vec2(atan(d.z, d.x) * (0.5 * INV_PI) + 0.5, 0.5 - asin(clamp(d.y, -1.0, 1.0)) * INV_PI);
+    vec2 uv;
+    if (ARITHMETIC == FAST) {
+        uv = vec2(atan(d.z, d.x) * (0.5 * INV_PI) + 0.5, 0.5 - asin(clamp(d.y, -1.0, 1.0)) * INV_PI);
+    } else {
+        float across = sqrt(d.x * d.x + d.z * d.z);
+        uv = vec2(atan2f(d.z, d.x) * (0.5 * INV_PI) + 0.5, 0.5 - atan2f(d.y, across) * INV_PI);
+    }
+    return uv;
 }
 
 // A direction turned about +Y.
@@ -51,9 +144,36 @@ vec3 turned(vec3 d, float cos_angle, float sin_angle) {
     return vec3(cos_angle * d.x - sin_angle * d.z, d.y, sin_angle * d.x + cos_angle * d.z);
 }
 
+// (cos, sin) of 2π·turns. Reduced in turns, where multiples of a quarter are exact; series on [−π/4, π/4] as in Cephes.
+// Beyond 2^22 turns, where floats are no finer than a quarter turn: (1, 0).
+vec2 cos_sin_of_turns(float turns) {
+    precise float quarters = 4.0 * (abs(turns) < 4194304.0 ? turns : 0.0);
+    precise float whole = floor(quarters + 0.5);
+    precise float x = (quarters - whole) * (0.5 * PI);
+    precise float z = x * x;
+    precise float s = ((-1.95152959e-4 * z + 8.33216087e-3) * z - 0.166666546) * (z * x) + x;
+    precise float c = (((2.44331571e-5 * z - 1.38873163e-3) * z + 4.16666457e-2) * (z * z) - 0.5 * z) + 1.0;
+    int quadrant = int(whole) & 3;
+    vec2 r = (quadrant & 1) == 0 ? vec2(c, s) : vec2(-s, c);
+    return quadrant < 2 ? r : -r;
+}
+
+// @eq N10: d = (cos e cos φ, sin e, cos e sin φ), φ = 2π(u − 1/2), e = π(1/2 − v)
+// @out d
+// By arcs of turns: Vulkan promises its sine to 2^-11 only. u has period 1, v stays in its range by the caller.
 vec3 direction_from_equirectangular(vec2 uv) {
-    float phi = (uv.x - 0.5) * 2.0 * PI;
-    float elevation = (0.5 - uv.y) * PI;
-    return vec3(cos(elevation) * cos(phi), sin(elevation), cos(elevation) * sin(phi));
+    vec3 d;
+    if (ARITHMETIC == FAST) {
+        float phi = (uv.x - 0.5) * 2.0 * PI;
+        float elevation = (0.5 - uv.y) * PI;
+        d = vec3(cos(elevation) * cos(phi), sin(elevation), cos(elevation) * sin(phi));
+    } else {
+        // φ half a turn early: both signs change. Polar angle from the top instead of the elevation: no difference to
+        // round near v = 0.
+        vec2 around = -cos_sin_of_turns(uv.x);
+        vec2 polar = cos_sin_of_turns(0.5 * uv.y);
+        d = vec3(polar.y * around.x, polar.x, polar.y * around.y);
+    }
+    return d;
 }
 #endif

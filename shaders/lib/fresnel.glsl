@@ -144,7 +144,8 @@ Transmitted dielectric_transmitted(float cos_in, float n) {
             float rp = (difference / p) * (brewster_term(c, index, g2) / p);
             t.Ts = rs * rs < 0.5 ? 1.0 - rs * rs : 4.0 * (c / s) * (g / s);
             t.Tp = rp * rp < 0.5 ? 1.0 - rp * rp : 4.0 * (index * c / p) * (index * g / p);
-            t.T = 0.5 * (t.Ts + t.Tp);
+            float F = 0.5 * (rs * rs + rp * rp);
+            t.T = F < 0.5 ? 1.0 - F : 0.5 * (t.Ts + t.Tp);
         }
     }
     return t;
@@ -283,8 +284,11 @@ Absorbed conductor_absorbed(float cos_in, float n, float kappa) {
         float c = clamp(cos_in, 0.0, 1.0);
         ConductorTerms t = conductor_terms(c, clamp(n, 0.0, LARGEST_INDEX), clamp(kappa, 0.0, LARGEST_INDEX));
         if (c >= SMALLEST && t.s2 > 0.0 && t.p2 > 0.0) {
-            r.As = clamp(4.0 * c * t.g.x / t.s2, 0.0, 1.0);
-            r.Ap = clamp(4.0 * c * (t.mg / t.p2), 0.0, 1.0);
+            // 1 − R where little is reflected, as fresnel_conductor takes 1 − A where little is kept.
+            float As = 4.0 * c * t.g.x / t.s2;
+            float Ap = 4.0 * c * (t.mg / t.p2);
+            r.As = clamp(As > 0.5 ? 1.0 - abs2(vec2(c, 0.0) - t.g) / t.s2 : As, 0.0, 1.0);
+            r.Ap = clamp(Ap > 0.5 ? 1.0 - abs2(t.m2 * c - t.g) / t.p2 : Ap, 0.0, 1.0);
             r.A = 0.5 * (r.As + r.Ap);
         }
     }

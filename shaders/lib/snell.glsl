@@ -12,14 +12,6 @@ vec3 renormalised(vec3 v) {
     return v2 > 1e-30 && v2 < 1e30 ? v / sqrt(v2) : vec3(0.0);
 }
 
-// a × b with each component's products exact before their difference.
-vec3 cross2(vec3 a, vec3 b) {
-    DoubleFloat x = df_add(two_product(a.y, b.z), df_negate(two_product(a.z, b.y)));
-    DoubleFloat y = df_add(two_product(a.z, b.x), df_negate(two_product(a.x, b.z)));
-    DoubleFloat z = df_add(two_product(a.x, b.y), df_negate(two_product(a.y, b.x)));
-    return vec3(x.hi, y.hi, z.hi);
-}
-
 struct Reflection {
     vec3 R;
 };

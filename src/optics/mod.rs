@@ -10,9 +10,12 @@ pub mod catalogue;
 pub mod arithmetic;
 pub mod brdf;
 pub mod colour;
+pub mod encode;
+pub mod frame;
 pub mod fresnel;
 pub mod light;
 pub mod medium;
+pub mod ray;
 pub mod snell;
 
 pub use catalogue::{Axis, Case, Draw, Equation, Output, Region, Tier, ulp};
@@ -23,9 +26,12 @@ pub fn equations() -> impl Iterator<Item = &'static Equation> {
         arithmetic::EQUATIONS,
         brdf::EQUATIONS,
         colour::EQUATIONS,
+        encode::EQUATIONS,
+        frame::EQUATIONS,
         fresnel::EQUATIONS,
         light::EQUATIONS,
         medium::EQUATIONS,
+        ray::EQUATIONS,
         snell::EQUATIONS,
     ];
     subjects.into_iter().flatten()

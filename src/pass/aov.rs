@@ -32,7 +32,7 @@ pub fn aov<'a>(
         pixels,
     };
     let size = gbuffer.depth.desc();
-    let constants = aov::Constants { has_emissive: plan.emissive }.words();
+    let constants = aov::Constants { has_emissive: plan.emissive, ..Default::default() }.words();
     frame.compute_over("AOVs", &bind, constants, bytemuck::cast_slice(&rows), [size.width, rows[1] - rows[0]])?;
     frame.read_back(pixels);
     Ok(())

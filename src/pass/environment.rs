@@ -15,7 +15,6 @@ use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, Place, Sampled, Sample
 use crate::image::file;
 use crate::plan::Plan;
 use crate::scene::environment::Environment;
-use crate::optics::Tier;
 use crate::shader::prefilter;
 use crate::share;
 
@@ -192,7 +191,7 @@ fn prefilter(device: &Arc<Device>, sky: &Image, chain: &Levels) -> Result<Levels
         let bind = prefilter::Bind { environment_map: map, level: &level };
         let alpha = NARROWEST as f32 / w as f32;
         let push = [w, h, alpha.to_bits(), (chain[0].0 as f32).to_bits()];
-        let constants = prefilter::Constants { arithmetic: Tier::Stable as u32 }.words();
+        let constants = prefilter::Constants::default().words();
         frame.compute_over("prefilter environment", &bind, constants, bytemuck::cast_slice(&push), [w, h])?;
         frame.read_back(&level);
         frame.finish()?;

@@ -290,6 +290,7 @@ impl SceneOnDevice {
             has_coat_normal: textured(10) && mesh.has_tangents,
             has_color: mesh.has_colors,
             masked: matches!(material.alpha_mode, AlphaMode::Mask(_)),
+            ..Default::default()
         };
         Draw {
             binding: self.page_of_material[mesh.material],

@@ -3,7 +3,7 @@
 use anyhow::{Result, anyhow};
 use plotters::prelude::*;
 
-use super::{Cases, Entry};
+use super::{Cases, Entry, error};
 use crate::optics::Tier;
 
 const SIZE: (u32, u32) = (760, 440);
@@ -26,8 +26,7 @@ fn series(entry: &Entry, cases: &Cases, outputs: &[f32], range: (f64, f64)) -> V
         }
         let part = if axis.log { (at / low).ln() / (high / low).ln() } else { (at - low) / (high - low) };
         let bin: &mut Option<f64> = &mut bins[((part * BINS as f64) as usize).min(BINS - 1)];
-        let got = f64::from(outputs[axis.column * cases.count + row]);
-        let error = ((got - exact) / exact).abs();
+        let error = error(outputs[axis.column * cases.count + row], exact) / exact.abs();
         let error = if error.is_finite() { error.clamp(FLOOR, CEILING) } else { CEILING };
         *bin = Some(bin.map_or(error, |known| known.max(error)));
     }
@@ -89,6 +88,7 @@ pub fn svg(entry: &Entry, cases: &Cases, tiers: &[(Tier, &[f32])]) -> Result<Opt
                 }
                 chart
                     .configure_series_labels()
+                    .position(SeriesLabelPosition::UpperRight)
                     .background_style(WHITE.mix(0.8))
                     .border_style(BLACK.mix(0.3))
                     .draw()

@@ -1,0 +1,190 @@
+// Directions: unit vectors of any length, angles, frames around a normal, normals of triangles and of their images.
+// Twins: src/optics/frame.rs.
+#ifndef FRAME_GLSL
+#define FRAME_GLSL
+#include "lib/arithmetic.glsl"
+
+float largest_component(vec3 v) {
+    return max(abs(v.x), max(abs(v.y), abs(v.z)));
+}
+
+// The power of two that brings a size into [1, 2), above 2^127 into [2, 4), exactly; 1 for what is below the normal
+// range and counts as 0. Squares of the scaled size neither overflow nor vanish. Its reciprocal is a normal number too.
+float scale_to_one(float size) {
+    int exponent = int(floatBitsToUint(size) >> 23) - 127;
+    return size < SMALLEST_NORMAL ? 1.0 : power_of_two(-min(exponent, 126));
+}
+
+// The same for sizes that could not be squared; 1 between 1e-9 and 1e9, so that differences of two vectors of about one
+// length stay what they are.
+float scale_if_extreme(float size) {
+    return size > 1e9 || size < 1e-9 ? scale_to_one(size) : 1.0;
+}
+
+// |v|, for every v whose length is a float
+float vector_length(vec3 v) {
+    float scale = scale_to_one(largest_component(v));
+    vec3 w = v * scale;
+    return sqrt(dot(w, w)) * (1.0 / scale);
+}
+
+struct SafeNormalized {
+    vec3 n;
+    bool is_zero;
+};
+
+// @eq N14: n = v/|v|
+// |v|² of components below 1e-19 is 0, of those above 1e19 ∞: v is scaled first by the power of two of its largest
+// component, which rounds nothing. A vector below the normal range of floats has no direction: the zero vector, and a flag.
+SafeNormalized safe_normalize(vec3 v) {
+    SafeNormalized r = SafeNormalized(vec3(0.0), false);
+    if (ARITHMETIC == FAST) {
+        r.n = v * inversesqrt(dot(v, v));
+    } else {
+        float size = largest_component(v);
+        vec3 w = v * scale_to_one(size);
+        r.is_zero = size < SMALLEST_NORMAL;
+        r.n = r.is_zero ? vec3(0.0) : w / sqrt(dot(w, w));
+    }
+    return r;
+}
+
+// u × v for two unit vectors, as u × (v ∓ u): the difference of nearly equal, or the sum of nearly opposite, vectors is
+// exact, the products of the plain cross product are not and leave little of a small difference.
+vec3 cross_of_units(vec3 u, vec3 v) {
+    return cross(u, dot(u, v) < 0.0 ? v + u : v - u);
+}
+
+// @eq N10: θ = atan2(|u × v|, u·v)
+// @out angle
+// arccos(u·v) has no digits left for small angles. Both arguments are scaled by |u||v| alike, so that rounded lengths
+// do not matter; Kahan's 2 atan2(|u − v|, |u + v|) is sensitive to them. Lengths of about 1; a zero vector: 0.
+float angle_between(vec3 u, vec3 v) {
+    float angle;
+    if (ARITHMETIC == FAST) {
+        angle = acos(dot(u, v));
+    } else {
+        vec3 a = u * scale_if_extreme(largest_component(u));
+        vec3 b = v * scale_if_extreme(largest_component(v));
+        vec3 across = cross_of_units(a, b);
+        angle = atan2f(sqrt(dot(across, across)), dot(a, b));
+    }
+    return angle;
+}
+
+// @eq N9: sin²θ = |N × (H − N)|²/(|N|²|H|²)
+// @out sin2
+// 1 − cos²θ has no digits left below 3e-4 rad, |N × H|² few. Divided by the squared lengths: rounded ones cost 2 ULP
+// otherwise. Lengths of about 1; a zero vector: 0.
+float sin2_between(vec3 N, vec3 H) {
+    float sin2;
+    if (ARITHMETIC == FAST) {
+        float c = dot(N, H);
+        sin2 = 1.0 - c * c;
+    } else {
+        vec3 a = N * scale_if_extreme(largest_component(N));
+        vec3 b = H * scale_if_extreme(largest_component(H));
+        vec3 across = cross_of_units(a, b);
+        float lengths = dot(a, a) * dot(b, b);
+        sin2 = lengths > 0.0 ? min(dot(across, across) / lengths, 1.0) : 0.0;
+    }
+    return sin2;
+}
+
+struct OrthonormalBasis {
+    vec3 t;
+    vec3 b;
+};
+
+// @eq N15: t = (1 + s a n_x², s a n_x n_y, −s n_x), b = (a n_x n_y, s + a n_y², −n_y), a = −1/(s + n_z), s = sign n_z
+// Duff et al., JCGT 6(1) 2017. Frisvad's basis (s = 1 everywhere, the tier fast) has no denominator left at n_z = −1;
+// for n_z < 0 it is another basis than this one, which is a choice and no error. (t, b, n) is right-handed.
+OrthonormalBasis orthonormal_basis(vec3 n) {
+    float s = ARITHMETIC != FAST && n.z < 0.0 ? -1.0 : 1.0;
+    float a = -1.0 / (s + n.z);
+    float b = (n.x * a) * n.y;
+    return OrthonormalBasis(vec3(1.0 + s * (n.x * a) * n.x, s * b, -s * n.x), vec3(b, s + (n.y * a) * n.y, -n.y));
+}
+
+// @eq N15: the largest of |t·t − 1|, |b·b − 1|, |t·b|, |t·n|, |b·n|
+// @out gram
+// How far a basis is from orthonormal, by exact products. A NaN in it counts as 3e38, so that a maximum cannot hide it.
+float basis_gram(vec3 n) {
+    OrthonormalBasis basis = orthonormal_basis(n);
+    float tt = df_add(dot2(basis.t, basis.t), DoubleFloat(-1.0, 0.0)).hi;
+    float bb = df_add(dot2(basis.b, basis.b), DoubleFloat(-1.0, 0.0)).hi;
+    vec3 mixed = vec3(dot2(basis.t, basis.b).hi, dot2(basis.t, n).hi, dot2(basis.b, n).hi);
+    float sum = abs(tt) + abs(bb) + abs(mixed.x) + abs(mixed.y) + abs(mixed.z);
+    float most = max(max(abs(tt), abs(bb)), largest_component(mixed));
+    return sum <= LARGEST ? most : LARGEST;
+}
+
+// @eq N41: N = sign(det M) (b × c, c × a, a × b) n, normalised; M = (a, b, c)
+// @out N
+// A normal under the linear map with columns a, b, c. The cofactor matrix is det(M) times the inverse transpose, without
+// the division by a determinant that is 0 for lengths of 1e-14 already. Its sign keeps mirrored fronts in front. Each
+// column is scaled by a power of two of its own; what that does to the cofactors is undone at the components of n.
+// Where M or n leaves no direction: the zero vector.
+vec3 transformed_normal(vec3 a, vec3 b, vec3 c, vec3 n) {
+    vec3 N;
+    if (ARITHMETIC == FAST) {
+        N = normalize(transpose(inverse(mat3(a, b, c))) * n);
+    } else {
+        vec3 scales = vec3(scale_to_one(largest_component(a)), scale_to_one(largest_component(b)),
+                           scale_to_one(largest_component(c)));
+        vec3 u = a * scales.x;
+        vec3 v = b * scales.y;
+        vec3 w = c * scales.z;
+        vec3 bc = cross(v, w);
+        // Relative to the largest of the three, so that none overflows.
+        vec3 weights = scales * (1.0 / max(scales.x, max(scales.y, scales.z)));
+        vec3 m = n * scale_to_one(largest_component(n)) * weights;
+        m *= scale_to_one(largest_component(m));
+        vec3 sum = bc * m.x + cross(w, u) * m.y + cross(u, v) * m.z;
+        N = safe_normalize(dot(u, bc) < 0.0 ? -sum : sum).n;
+    }
+    return N;
+}
+
+// x y − z w rounded once, of pairs
+float df_difference_of_products(DoubleFloat x, DoubleFloat y, DoubleFloat z, DoubleFloat w) {
+    return df_add(df_mul(x, y), df_negate(df_mul(z, w))).hi;
+}
+
+struct TriangleNormal {
+    vec3 n;
+    bool degenerate;
+};
+
+// @eq N40: n = (b − a) × (c − a), normalised
+// Compensated: the edges as pairs, so that they are exact, and the six products too: the area of a sliver is a small
+// difference of large products of rounded edges otherwise. (a × b + b × c + c × a by dot2 does the same near the origin,
+// and loses digits with the distance from it.) No area: the zero vector, and a flag.
+TriangleNormal triangle_normal(vec3 a, vec3 b, vec3 c) {
+    TriangleNormal r;
+    if (ARITHMETIC == FAST) {
+        r = TriangleNormal(normalize(cross(b - a, c - a)), false);
+    } else if (ARITHMETIC == COMPENSATED) {
+        float s = scale_to_one(largest_component(b - a));
+        float t = scale_to_one(largest_component(c - a));
+        DoubleFloat ux = df_scale(two_sum(b.x, -a.x), s);
+        DoubleFloat uy = df_scale(two_sum(b.y, -a.y), s);
+        DoubleFloat uz = df_scale(two_sum(b.z, -a.z), s);
+        DoubleFloat vx = df_scale(two_sum(c.x, -a.x), t);
+        DoubleFloat vy = df_scale(two_sum(c.y, -a.y), t);
+        DoubleFloat vz = df_scale(two_sum(c.z, -a.z), t);
+        vec3 doubled = vec3(df_difference_of_products(uy, vz, uz, vy), df_difference_of_products(uz, vx, ux, vz),
+                            df_difference_of_products(ux, vy, uy, vx));
+        SafeNormalized unit = safe_normalize(doubled);
+        r = TriangleNormal(unit.n, unit.is_zero);
+    } else {
+        vec3 u = b - a;
+        vec3 v = c - a;
+        u *= scale_to_one(largest_component(u));
+        v *= scale_to_one(largest_component(v));
+        SafeNormalized unit = safe_normalize(cross(u, v));
+        r = TriangleNormal(unit.n, unit.is_zero);
+    }
+    return r;
+}
+#endif

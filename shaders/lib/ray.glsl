@@ -1,0 +1,239 @@
+// Rays against spheres, boxes and triangles, and where a ray begins and ends. A ray is origin + t direction, t ≥ 0, and
+// its direction has any length. Twins: src/optics/ray.rs.
+#ifndef RAY_GLSL
+#define RAY_GLSL
+#include "lib/arithmetic.glsl"
+#include "lib/frame.glsl"
+
+struct RaySphere {
+    bool hit;
+    float t0;
+    float t1;
+};
+
+// x² + y² + z² − r², rounded once
+float squares_less(DoubleFloat x, DoubleFloat y, DoubleFloat z, float r) {
+    DoubleFloat r2 = two_product(r, r);
+    return df_add(df_add(df_add(df_mul(x, x), df_negate(r2)), df_mul(y, y)), df_mul(z, z)).hi;
+}
+
+DoubleFloat times(DoubleFloat a, float s) {
+    return df_mul(a, DoubleFloat(s, 0.0));
+}
+
+// @eq N34 N35: f = origin − center, b = −f·d, D = r² − |f + (b/d²) d|², q = b ± √(d² D), t = (f² − r²)/q and q/d²
+// Haines et al., Ray Tracing Gems 7. b² − d²(f² − r²) is a small difference of large squares for a sphere far away; the
+// distance of its center from the line is not. Of b ± √… only the sum is formed, the other root is Vieta's. t0 ≤ t1 are
+// the crossings of the whole line, negative ones behind the origin. Compensated: f, f² − r² and the point next to
+// the center by pairs, for origins near the surface and rays that graze a distant sphere. No hit, or direction 0: 0, 0.
+RaySphere ray_sphere(vec3 origin, vec3 direction, vec3 center, float radius) {
+    RaySphere r = RaySphere(false, 0.0, 0.0);
+    if (ARITHMETIC == FAST) {
+        vec3 f = origin - center;
+        float a = dot(direction, direction);
+        float b = dot(f, direction);
+        float disc = b * b - a * (dot(f, f) - radius * radius);
+        r.hit = disc >= 0.0;
+        r.t0 = r.hit ? (-b - sqrt(disc)) / a : 0.0;
+        r.t1 = r.hit ? (-b + sqrt(disc)) / a : 0.0;
+    } else {
+        vec3 f = origin - center;
+        float scale = scale_to_one(max(largest_component(f), abs(radius)));
+        float scale_d = scale_to_one(largest_component(direction));
+        vec3 d = direction * scale_d;
+        float R = radius * scale;
+        f *= scale;
+        float d2 = dot(d, d);
+        bool moves = d2 > 0.5;
+        d2 = moves ? d2 : 1.0;
+        float b = -dot(f, d);
+        float c, disc;
+        if (ARITHMETIC == COMPENSATED) {
+            DoubleFloat x = df_scale(two_sum(origin.x, -center.x), scale);
+            DoubleFloat y = df_scale(two_sum(origin.y, -center.y), scale);
+            DoubleFloat z = df_scale(two_sum(origin.z, -center.z), scale);
+            c = squares_less(x, y, z, R);
+            b = -df_add(df_add(times(x, d.x), times(y, d.y)), times(z, d.z)).hi;
+            d2 = moves ? dot2(d, d).hi : 1.0;
+            // Any point h of the line near the foot of the perpendicular will do, if it lies exactly on the line: what
+            // is left of it along the line is taken off again.
+            float s = b / d2;
+            DoubleFloat hx = df_add(x, two_product(s, d.x));
+            DoubleFloat hy = df_add(y, two_product(s, d.y));
+            DoubleFloat hz = df_add(z, two_product(s, d.z));
+            float along = dot(vec3(hx.hi, hy.hi, hz.hi), d);
+            disc = along * along / d2 - squares_less(hx, hy, hz, R);
+        } else {
+            c = dot(f, f) - R * R;
+            vec3 h = f + (b / d2) * d;
+            disc = R * R - dot(h, h);
+        }
+        r.hit = moves && disc >= 0.0;
+        float root = sqrt(max(disc, 0.0) * d2);
+        float q = b < 0.0 ? b - root : b + root;
+        float by_q = q == 0.0 ? 0.0 : c / q;
+        float by_d = q / d2;
+        float unscale = scale_d * (1.0 / scale);
+        r.t0 = r.hit ? (b < 0.0 ? by_d : by_q) * unscale : 0.0;
+        r.t1 = r.hit ? (b < 0.0 ? by_q : by_d) * unscale : 0.0;
+    }
+    return r;
+}
+
+struct Slab {
+    bool hit;
+    float t_near;
+    float t_far;
+};
+
+// @eq N36: t_near = max(0, near_i), t_far = min(t_max, far_i (1 + 6·2^-24)), i = x, y, z; hit where t_near ≤ t_far
+// near and far of an axis are (box − origin)·inv_direction, the smaller and the larger. Where the ray is parallel to a
+// plane (inv_direction infinite) and starts in it that is 0·∞: the axis then does not bound the ray. Ize, JCGT 2(2) 2013:
+// the factor makes up for the roundings, so that no box that is hit is missed. Found by comparison, not by isnan():
+// a device need not keep NaN.
+Slab slab(vec3 origin, vec3 inv_direction, vec3 box_min, vec3 box_max, float t_max) {
+    vec3 to_min = box_min - origin;
+    vec3 to_max = box_max - origin;
+    vec3 t_min = to_min * inv_direction;
+    vec3 t_plane = to_max * inv_direction;
+    Slab r;
+    if (ARITHMETIC == FAST) {
+        vec3 near = min(t_min, t_plane);
+        vec3 far = max(t_min, t_plane);
+        r.t_near = max(max(near.x, near.y), max(near.z, 0.0));
+        r.t_far = min(min(far.x, far.y), min(far.z, t_max));
+    } else {
+        bvec3 parallel = greaterThan(abs(inv_direction), vec3(LARGEST));
+        bvec3 at_min = equal(to_min, vec3(0.0));
+        bvec3 at_max = equal(to_max, vec3(0.0));
+        bvec3 in_min = bvec3(parallel.x && at_min.x, parallel.y && at_min.y, parallel.z && at_min.z);
+        bvec3 in_max = bvec3(parallel.x && at_max.x, parallel.y && at_max.y, parallel.z && at_max.z);
+        // ∞ with the sign that opens the interval on its own side.
+        vec3 near = min(mix(t_min, vec3(-plus_infinity()), in_min), mix(t_plane, vec3(-plus_infinity()), in_max));
+        vec3 far = max(mix(t_min, vec3(plus_infinity()), in_min), mix(t_plane, vec3(plus_infinity()), in_max));
+        r.t_near = max(max(near.x, near.y), max(near.z, 0.0));
+        r.t_far = min(min(min(far.x, far.y), far.z) * (1.0 + 6.0 / 16777216.0), t_max);
+    }
+    r.hit = r.t_near <= r.t_far;
+    return r;
+}
+
+struct RayTriangle {
+    bool hit;
+    float t;
+    float u;
+    float v;
+};
+
+// Coordinates in the order that puts the axis k last.
+vec3 axis_last(vec3 p, int k) {
+    return k == 0 ? p.yzx : k == 1 ? p.zxy : p;
+}
+
+// a.x b.y − a.y b.x, and exactly the negative with a and b exchanged: an edge has one value in both its triangles.
+float edge_function(vec3 a, vec3 b) {
+    precise float e = a.x * b.y - a.y * b.x;
+    return e;
+}
+
+// p with its last axis along the ray.
+vec3 sheared(vec3 p, vec2 shear) {
+    precise vec2 across = p.xy - shear * p.z;
+    return vec3(across, p.z);
+}
+
+// @eq N37: point = origin + t direction = a + u (b − a) + v (c − a), u, v, 1 − u − v ≥ 0, t ≥ 0
+// Woop, Benthin and Wald, JCGT 2(1) 2013: the vertices are sheared so that the ray is the last axis; on which side of an
+// edge it passes depends on that edge alone, so that no ray slips between two triangles. Both sides are hit. Vertices and
+// direction are scaled by powers of two, which rounds nothing. Miss, edge-on or direction 0: all 0.
+RayTriangle ray_triangle(vec3 origin, vec3 direction, vec3 a, vec3 b, vec3 c) {
+    RayTriangle r = RayTriangle(false, 0.0, 0.0, 0.0);
+    if (ARITHMETIC == FAST) {
+        // Möller and Trumbore 1997.
+        vec3 ab = b - a;
+        vec3 ac = c - a;
+        vec3 p = cross(direction, ac);
+        float det = dot(ab, p);
+        vec3 s = origin - a;
+        vec3 q = cross(s, ab);
+        float u = dot(s, p) / det;
+        float v = dot(direction, q) / det;
+        float t = dot(ac, q) / det;
+        if (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= 0.0) r = RayTriangle(true, t, u, v);
+    } else {
+        float size_d = largest_component(direction);
+        int k = abs(direction.x) == size_d ? 0 : abs(direction.y) == size_d ? 1 : 2;
+        float scale_d = scale_to_one(size_d);
+        vec3 d = axis_last(direction, k) * scale_d;
+        bool moves = size_d >= SMALLEST_NORMAL;
+        precise float dz = moves ? d.z : 1.0;
+        precise vec2 shear = d.xy / dz;
+        precise vec3 pa = axis_last(a - origin, k);
+        precise vec3 pb = axis_last(b - origin, k);
+        precise vec3 pc = axis_last(c - origin, k);
+        float scale = scale_to_one(max(largest_component(pa), max(largest_component(pb), largest_component(pc))));
+        vec3 qa = sheared(pa * scale, shear);
+        vec3 qb = sheared(pb * scale, shear);
+        vec3 qc = sheared(pc * scale, shear);
+        // Weights of a, b and c, times twice the projected area.
+        float wa = edge_function(qc, qb);
+        float wb = edge_function(qa, qc);
+        float wc = edge_function(qb, qa);
+        float det = wa + wb + wc;
+        bool inside = min(wa, min(wb, wc)) >= 0.0 || max(wa, max(wb, wc)) <= 0.0;
+        float whole = det == 0.0 ? 1.0 : det;
+        float t = (wa * qa.z + wb * qb.z + wc * qc.z) / whole / dz;
+        if (inside && moves && det != 0.0 && t >= 0.0) {
+            r = RayTriangle(true, t * scale_d * (1.0 / scale), wb / whole, wc / whole);
+        }
+    }
+    return r;
+}
+
+struct OffsetOrigin {
+    vec3 p_offset;
+    float shift;
+};
+
+// @eq N38: each coordinate moved along n by 256 |n_i| floats, near 0 by n_i/65536; shift = |p_offset − p|
+// Wächter and Binder, Ray Tracing Gems 6: a point of a surface moved off it by as much as its coordinates are rounded.
+// A fixed distance (fast: 1e-4) is too small for coordinates of 1e3 and too large for small scenes. n is a unit vector:
+// its components are clamped to [−1, 1].
+OffsetOrigin offset_origin(vec3 p, vec3 n) {
+    vec3 moved;
+    if (ARITHMETIC == FAST) {
+        moved = p + 1e-4 * n;
+    } else {
+        vec3 unit = clamp(n, -1.0, 1.0);
+        ivec3 steps = ivec3(256.0 * unit);
+        steps = mix(steps, -steps, lessThan(p, vec3(0.0)));
+        vec3 by_floats = intBitsToFloat(floatBitsToInt(p) + steps);
+        moved = mix(by_floats, p + unit * (1.0 / 65536.0), lessThan(abs(p), vec3(1.0 / 32.0)));
+    }
+    return OffsetOrigin(moved, vector_length(moved - p));
+}
+
+// @eq N39: P = a + u (b − a) + v (c − a)
+// @out P
+// Where a ray meets a triangle. origin + t direction (fast) carries the rounding of t, which is that of the distance to
+// the origin; the barycentrics' is that of the triangle's size.
+vec3 hit_point(vec3 origin, vec3 direction, float t, vec3 a, vec3 b, vec3 c, float u, float v) {
+    return ARITHMETIC == FAST ? origin + t * direction : a + (u * (b - a) + v * (c - a));
+}
+
+// @eq N33: p_rel = (p_hi + p_lo) − (eye_hi + eye_lo)
+// @out p_rel
+// Positions as pairs of floats, 1e-7 m apart at the Earth's radius; their difference is rounded once. Plain floats (the
+// tier fast takes the hi parts) are 6 cm apart at 1e6 m.
+vec3 camera_relative(vec3 p_hi, vec3 p_lo, vec3 eye_hi, vec3 eye_lo) {
+    vec3 p_rel;
+    if (ARITHMETIC == FAST) {
+        p_rel = p_hi - eye_hi;
+    } else {
+        p_rel = vec3(df_add(DoubleFloat(p_hi.x, p_lo.x), DoubleFloat(-eye_hi.x, -eye_lo.x)).hi,
+                     df_add(DoubleFloat(p_hi.y, p_lo.y), DoubleFloat(-eye_hi.y, -eye_lo.y)).hi,
+                     df_add(DoubleFloat(p_hi.z, p_lo.z), DoubleFloat(-eye_hi.z, -eye_lo.z)).hi);
+    }
+    return p_rel;
+}
+#endif
