@@ -3,7 +3,9 @@
 //! glTF (and OBJ/MTL) in, radiance out: raster G-buffer → deferred lighting → tone map, written directly against `ash`.
 //!
 //! ```text
-//! cli ─► study ─► scene        what to draw: data, no Vulkan
+//! cli ─► verify ─► optics      the formulas in f64, and the shaders held against them
+//!  │
+//!  ├───► study ─► scene        what to draw: data, no Vulkan
 //!  │                ▲
 //!  ▼                │
 //! frame ─► pass ─► plan        what it calls for, and why
@@ -28,6 +30,9 @@
 //! [`plan::Plan`] is made before any Vulkan object from the scene's values and the [`plan::Knobs`]: a pass, an image or a piece of
 //! shader code exists only if it says so. [`scene`] reads files that are not trusted; [`study`] generates scenes without files;
 //! [`image`] keeps and compares pictures; [`cli`] is the program.
+//!
+//! Each formula of `shaders/lib/` that is tagged `@eq` has a twin in [`optics`], under its name and in f64, with a bound;
+//! [`verify`] runs the shader's on the device and compares.
 //!
 //! Lengths are metres, the world is right-handed with +Y up. On the device positions are relative to the eye (`p_rel`);
 //! differences are taken in f64. Depth is reversed. `unsafe` is allowed in [`gpu`] alone.
