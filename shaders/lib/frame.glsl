@@ -35,7 +35,8 @@ struct SafeNormalized {
 
 // @eq N14: n = v/|v|
 // |v|² of components below 1e-19 is 0, of those above 1e19 ∞: v is scaled first by the power of two of its largest
-// component, which rounds nothing. A vector below the normal range of floats has no direction: the zero vector, and a flag.
+// component, which rounds nothing. A vector below the normal range of floats has no direction: the zero vector, and a
+// flag.
 SafeNormalized safe_normalize(vec3 v) {
     SafeNormalized r = SafeNormalized(vec3(0.0), false);
     if (ARITHMETIC == FAST) {
@@ -121,9 +122,10 @@ float basis_gram(vec3 n) {
 
 // @eq N41: N = sign(det M) (b × c, c × a, a × b) n, normalised; M = (a, b, c)
 // @out N
-// A normal under the linear map with columns a, b, c. The cofactor matrix is det(M) times the inverse transpose, without
-// the division by a determinant that is 0 for lengths of 1e-14 already. Its sign keeps mirrored fronts in front. Each
-// column is scaled by a power of two of its own; what that does to the cofactors is undone at the components of n.
+// A normal under the linear map with columns a, b, c. The cofactor matrix is det(M) times the inverse transpose,
+// without the division by a determinant that is 0 for lengths of 1e-14 already. Its sign keeps mirrored fronts in
+// front. Each column is scaled by a power of two of its own; what that does to the cofactors is undone at the components
+// of n.
 // Where M or n leaves no direction: the zero vector.
 vec3 transformed_normal(vec3 a, vec3 b, vec3 c, vec3 n) {
     vec3 N;
@@ -158,8 +160,8 @@ struct TriangleNormal {
 
 // @eq N40: n = (b − a) × (c − a), normalised
 // Compensated: the edges as pairs, so that they are exact, and the six products too: the area of a sliver is a small
-// difference of large products of rounded edges otherwise. (a × b + b × c + c × a by dot2 does the same near the origin,
-// and loses digits with the distance from it.) No area: the zero vector, and a flag.
+// difference of large products of rounded edges otherwise. (a × b + b × c + c × a by dot2 does the same near the
+// origin, and loses digits with the distance from it.) No area: the zero vector, and a flag.
 TriangleNormal triangle_normal(vec3 a, vec3 b, vec3 c) {
     TriangleNormal r;
     if (ARITHMETIC == FAST) {

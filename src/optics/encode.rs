@@ -143,11 +143,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
         name: "depth_round_trip",
         twin: |x| vec![depth_round_trip(x[0], x[1])],
         regions: &[
-            Region {
-                name: "near 0.1, z to 1e6",
-                share: 2,
-                draw: |d| vec![d.log(0.1, 1e6) as f32, 0.1, 1e6],
-            },
+            Region { name: "near 0.1, z to 1e6", share: 2, draw: |d| vec![d.log(0.1, 1e6) as f32, 0.1, 1e6] },
             Region {
                 name: "near 1e-4 … 1, z to 1e9",
                 share: 1,

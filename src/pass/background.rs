@@ -28,6 +28,7 @@ pub fn background<'a>(
         sky: lighting.environment.sky(),
         work: &work.sizes,
     };
-    let constants = background::Constants { sky: lighting.plan.sky, arithmetic: lighting.knobs.index("arithmetic") }.words();
+    let constants =
+        background::Constants { sky: lighting.plan.sky, arithmetic: lighting.knobs.index("arithmetic") }.words();
     frame.compute_indirect("background", &bind, constants, &[], &work.sizes, WORK_BYTES)
 }
