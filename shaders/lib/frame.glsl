@@ -50,10 +50,12 @@ SafeNormalized safe_normalize(vec3 v) {
     return r;
 }
 
-// u × v for two unit vectors, as u × (v ∓ u): the difference of nearly equal, or the sum of nearly opposite, vectors is
-// exact, the products of the plain cross product are not and leave little of a small difference.
+// u × v for two unit vectors. Nearly parallel as u × (v ∓ u): the difference of nearly equal, or the sum of nearly
+// opposite, vectors is exact, the products of the plain cross product are not and leave little of a small difference.
 vec3 cross_of_units(vec3 u, vec3 v) {
-    return cross(u, dot(u, v) < 0.0 ? v + u : v - u);
+    float cosine = dot(u, v);
+    float parallel = cosine > 0.5 ? 1.0 : cosine < -0.5 ? -1.0 : 0.0;
+    return cross(u, v - parallel * u);
 }
 
 // @eq N10: θ = atan2(|u × v|, u·v)
