@@ -91,8 +91,8 @@ float half_round_trip(float x) {
 // @eq N42: d = near/z in f32, z = near/d
 // @out z_back
 // Reversed infinite depth: the floats of d lie as densely, relative to it, at every distance. The tier fast is the
-// standard depth d = far (z − near)/(z (far − near)), which is nearly 1 for most z; `far` is of use to it alone. What is
-// nearer than `near` > 0 comes back at it, and at infinity where near/z is 0; near ≤ 0: 0.
+// standard depth d = far (z − near)/(z (far − near)), which is nearly 1 for most z; `far` is of use to it alone. What
+// is nearer than `near` > 0 comes back at it, what has near/z = 0 at infinity; near ≤ 0: 0.
 float depth_round_trip(float z, float near, float far) {
     float z_back;
     if (ARITHMETIC == FAST) {
@@ -126,8 +126,8 @@ vec3 coat_normal_from_packed(vec4 packed_value) {
 
 // @eq N10: u = 1/2 + φ/2π, v = 1/2 − elevation/π; φ = atan2(d_z, d_x), elevation = atan2(d_y, √(d_x² + d_z²))
 // @out uv
-// Equirectangular coordinates of a direction (README, "Conventions"): u to the right, v down from the top. The elevation
-// as an arc tangent: the arc sine turns the rounding of d_y into 3e-4 rad at the poles. The zero vector: (1/2, 1/2).
+// Equirectangular coordinates of a direction (README, "Conventions"): u to the right, v down from the top. The
+// elevation as an arc tangent: the arc sine turns the rounding of d_y into 3e-4 rad at the poles. Zero: (1/2, 1/2).
 vec2 equirectangular_from_direction(vec3 d) {
     vec2 uv;
     if (ARITHMETIC == FAST) {

@@ -35,7 +35,8 @@ struct SafeNormalized {
 
 // @eq N14: n = v/|v|
 // |v|² of components below 1e-19 is 0, of those above 1e19 ∞: v is scaled first by the power of two of its largest
-// component, which rounds nothing. A vector below the normal range of floats has no direction: the zero vector, and a flag.
+// component, which rounds nothing. A vector below the normal range of floats has no direction: the zero vector, and a
+// flag.
 SafeNormalized safe_normalize(vec3 v) {
     SafeNormalized r = SafeNormalized(vec3(0.0), false);
     if (ARITHMETIC == FAST) {
@@ -49,10 +50,12 @@ SafeNormalized safe_normalize(vec3 v) {
     return r;
 }
 
-// u × v for two unit vectors, as u × (v ∓ u): the difference of nearly equal, or the sum of nearly opposite, vectors is
-// exact, the products of the plain cross product are not and leave little of a small difference.
+// u × v for two unit vectors. Nearly parallel as u × (v ∓ u): the difference of nearly equal, or the sum of nearly
+// opposite, vectors is exact, the products of the plain cross product are not and leave little of a small difference.
 vec3 cross_of_units(vec3 u, vec3 v) {
-    return cross(u, dot(u, v) < 0.0 ? v + u : v - u);
+    float cosine = dot(u, v);
+    float parallel = cosine > 0.5 ? 1.0 : cosine < -0.5 ? -1.0 : 0.0;
+    return cross(u, v - parallel * u);
 }
 
 // @eq N10: θ = atan2(|u × v|, u·v)
@@ -121,9 +124,10 @@ float basis_gram(vec3 n) {
 
 // @eq N41: N = sign(det M) (b × c, c × a, a × b) n, normalised; M = (a, b, c)
 // @out N
-// A normal under the linear map with columns a, b, c. The cofactor matrix is det(M) times the inverse transpose, without
-// the division by a determinant that is 0 for lengths of 1e-14 already. Its sign keeps mirrored fronts in front. Each
-// column is scaled by a power of two of its own; what that does to the cofactors is undone at the components of n.
+// A normal under the linear map with columns a, b, c. The cofactor matrix is det(M) times the inverse transpose,
+// without the division by a determinant that is 0 for lengths of 1e-14 already. Its sign keeps mirrored fronts in
+// front. Each column is scaled by a power of two of its own; what that does to the cofactors is undone at the components
+// of n.
 // Where M or n leaves no direction: the zero vector.
 vec3 transformed_normal(vec3 a, vec3 b, vec3 c, vec3 n) {
     vec3 N;
@@ -158,8 +162,8 @@ struct TriangleNormal {
 
 // @eq N40: n = (b − a) × (c − a), normalised
 // Compensated: the edges as pairs, so that they are exact, and the six products too: the area of a sliver is a small
-// difference of large products of rounded edges otherwise. (a × b + b × c + c × a by dot2 does the same near the origin,
-// and loses digits with the distance from it.) No area: the zero vector, and a flag.
+// difference of large products of rounded edges otherwise. (a × b + b × c + c × a by dot2 does the same near the
+// origin, and loses digits with the distance from it.) No area: the zero vector, and a flag.
 TriangleNormal triangle_normal(vec3 a, vec3 b, vec3 c) {
     TriangleNormal r;
     if (ARITHMETIC == FAST) {
@@ -186,5 +190,18 @@ TriangleNormal triangle_normal(vec3 a, vec3 b, vec3 c) {
         r = TriangleNormal(unit.n, unit.is_zero);
     }
     return r;
+}
+
+// @eq Q5: N = (a x, b y, c z)/|…|, half the gradient of a x² + b y² + c z²
+// @out N
+// The normal of a level surface is the gradient of its function. At its centre: the zero vector.
+vec3 quadric_normal(vec3 p, vec3 k) {
+    vec3 n;
+    if (ARITHMETIC == FAST) {
+        n = normalize(k * p);
+    } else {
+        n = safe_normalize((k * scale_to_one(largest_component(k))) * (p * scale_to_one(largest_component(p)))).n;
+    }
+    return n;
 }
 #endif

@@ -5,6 +5,14 @@
 #include "lib/arithmetic.glsl"
 #include "lib/frame.glsl"
 
+// t of a ray whose direction and lengths were scaled. One after the other: the quotient of the scales may be ∞, and
+// t be 0.
+float unscaled(float t, float scale_of_direction, float scale_of_lengths) {
+    precise float by_direction = t * scale_of_direction;
+    precise float whole = by_direction * (1.0 / scale_of_lengths);
+    return whole;
+}
+
 struct RaySphere {
     bool hit;
     float t0;
@@ -73,9 +81,8 @@ RaySphere ray_sphere(vec3 origin, vec3 direction, vec3 center, float radius) {
         float q = b < 0.0 ? b - root : b + root;
         float by_q = q == 0.0 ? 0.0 : c / q;
         float by_d = q / d2;
-        float unscale = scale_d * (1.0 / scale);
-        r.t0 = r.hit ? (b < 0.0 ? by_d : by_q) * unscale : 0.0;
-        r.t1 = r.hit ? (b < 0.0 ? by_q : by_d) * unscale : 0.0;
+        r.t0 = r.hit ? unscaled(b < 0.0 ? by_d : by_q, scale_d, scale) : 0.0;
+        r.t1 = r.hit ? unscaled(b < 0.0 ? by_q : by_d, scale_d, scale) : 0.0;
     }
     return r;
 }
@@ -88,9 +95,9 @@ struct Slab {
 
 // @eq N36: t_near = max(0, near_i), t_far = min(t_max, far_i (1 + 6·2^-24)), i = x, y, z; hit where t_near ≤ t_far
 // near and far of an axis are (box − origin)·inv_direction, the smaller and the larger. Where the ray is parallel to a
-// plane (inv_direction infinite) and starts in it that is 0·∞: the axis then does not bound the ray. Ize, JCGT 2(2) 2013:
-// the factor makes up for the roundings, so that no box that is hit is missed. Found by comparison, not by isnan():
-// a device need not keep NaN.
+// plane (inv_direction infinite) and starts in it that is 0·∞: the axis then does not bound the ray. That is found by
+// comparison, not by isnan(): a device need not keep NaN. Ize, JCGT 2(2) 2013: the factor makes up for the roundings,
+// so that no box that is hit is missed.
 Slab slab(vec3 origin, vec3 inv_direction, vec3 box_min, vec3 box_max, float t_max) {
     vec3 to_min = box_min - origin;
     vec3 to_max = box_max - origin;
@@ -143,9 +150,9 @@ vec3 sheared(vec3 p, vec2 shear) {
 }
 
 // @eq N37: point = origin + t direction = a + u (b − a) + v (c − a), u, v, 1 − u − v ≥ 0, t ≥ 0
-// Woop, Benthin and Wald, JCGT 2(1) 2013: the vertices are sheared so that the ray is the last axis; on which side of an
-// edge it passes depends on that edge alone, so that no ray slips between two triangles. Both sides are hit. Vertices and
-// direction are scaled by powers of two, which rounds nothing. Miss, edge-on or direction 0: all 0.
+// Woop, Benthin and Wald, JCGT 2(1) 2013: the vertices are sheared so that the ray is the last axis; on which side of
+// an edge it passes depends on that edge alone, so that no ray slips between two triangles. Both sides are hit.
+// Vertices and direction are scaled by powers of two, which rounds nothing. Miss, edge-on or direction 0: all 0.
 RayTriangle ray_triangle(vec3 origin, vec3 direction, vec3 a, vec3 b, vec3 c) {
     RayTriangle r = RayTriangle(false, 0.0, 0.0, 0.0);
     if (ARITHMETIC == FAST) {
@@ -184,7 +191,7 @@ RayTriangle ray_triangle(vec3 origin, vec3 direction, vec3 a, vec3 b, vec3 c) {
         float whole = det == 0.0 ? 1.0 : det;
         float t = (wa * qa.z + wb * qb.z + wc * qc.z) / whole / dz;
         if (inside && moves && det != 0.0 && t >= 0.0) {
-            r = RayTriangle(true, t * scale_d * (1.0 / scale), wb / whole, wc / whole);
+            r = RayTriangle(true, unscaled(t, scale_d, scale), wb / whole, wc / whole);
         }
     }
     return r;
@@ -216,9 +223,10 @@ OffsetOrigin offset_origin(vec3 p, vec3 n) {
 // @eq N39: P = a + u (b − a) + v (c − a)
 // @out P
 // Where a ray meets a triangle. origin + t direction (fast) carries the rounding of t, which is that of the distance to
-// the origin; the barycentrics' is that of the triangle's size.
+// the origin; the barycentrics' is that of the triangle's size. u and v are clamped to [0, 1].
 vec3 hit_point(vec3 origin, vec3 direction, float t, vec3 a, vec3 b, vec3 c, float u, float v) {
-    return ARITHMETIC == FAST ? origin + t * direction : a + (u * (b - a) + v * (c - a));
+    vec2 uv = clamp(vec2(u, v), 0.0, 1.0);
+    return ARITHMETIC == FAST ? origin + t * direction : a + (uv.x * (b - a) + uv.y * (c - a));
 }
 
 // @eq N33: p_rel = (p_hi + p_lo) − (eye_hi + eye_lo)

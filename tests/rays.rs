@@ -1,0 +1,125 @@
+//! Rays on the device where they are most likely to leak: aimed at an edge that two triangles share, and started from a
+//! surface.
+
+#[path = "support/gpu.rs"]
+mod gpu;
+
+use etalon::optics::catalogue::{Draw, columns, vector};
+use etalon::optics::{Tier, ray};
+use etalon::verify;
+use glam::DVec3;
+use gpu::Gpu;
+
+const RAYS: usize = 200_000;
+
+/// Output columns of a function for these rows of inputs, one row per case.
+fn evaluated(gpu: &Gpu, name: &str, tier: Tier, rows: &[Vec<f32>]) -> Vec<Vec<f32>> {
+    let entry = verify::find(name).expect("a function");
+    let width = entry.probe.inputs.len();
+    let inputs: Vec<f32> = (0..width).flat_map(|column| rows.iter().map(move |row| row[column])).collect();
+    let outputs = verify::evaluate(&gpu.device, entry.probe, tier, &inputs, rows.len()).expect("outputs").outputs;
+    (0..rows.len()).map(|row| (0..entry.probe.outputs.len()).map(|k| outputs[k * rows.len() + row]).collect()).collect()
+}
+
+fn exact(row: &[f32]) -> Vec<f64> {
+    row.iter().map(|&x| f64::from(x)).collect()
+}
+
+/// Triangles abc and bad on both sides of the edge ab as the ray sees them, and the ray, aimed at the edge; a third of
+/// the pairs nearly edge-on. Columns of two `ray_triangle` cases.
+fn at_shared_edge(d: &mut Draw) -> [Vec<f32>; 2] {
+    loop {
+        let [a, b] = [0; 2].map(|_| d.direction());
+        let target = a.lerp(b, d.between(0.1, 0.9));
+        let origin = target + d.direction() * d.log(0.1, 100.0);
+        let direction = (target - origin) * d.log(0.01, 100.0);
+        // A corner on either side of the plane of ray and edge; near that plane the triangle is seen edge-on.
+        let side = (b - a).cross(direction).normalize();
+        let mut corner = |sign: f64| {
+            let lift = if d.below(3) == 0 { d.log(1e-6, 0.1) } else { d.between(0.1, 1.0) };
+            target
+                + side * (sign * lift)
+                + (b - a) * d.between(-0.5, 0.5)
+                + direction.normalize() * d.between(-1.0, 1.0)
+        };
+        let (c, e) = (corner(1.0), corner(-1.0));
+        let ray = columns(&[origin, direction]);
+        let rows = [[a, b, c], [b, a, e]].map(|triangle| [ray.clone(), columns(&triangle)].concat());
+        // What was rounded to f32 must still be so: both seen from one side, not edge-on, and one of them hit.
+        let facing = rows.each_ref().map(|row| {
+            let x = exact(row);
+            let [d, a, b, c] = [3, 6, 9, 12].map(|k| vector(&x, k));
+            let n = (b - a).cross(c - a);
+            n.dot(d) / (n.length() * d.length())
+        });
+        let hit = rows.iter().any(|row| {
+            let x = exact(row);
+            let [o, d, a, b, c] = [0, 3, 6, 9, 12].map(|k| vector(&x, k));
+            ray::ray_triangle(o, d, a, b, c)[0] == 1.0
+        });
+        if facing[0] * facing[1] > 0.0 && facing.iter().all(|cos| cos.abs() > 1e-6) && hit {
+            return rows;
+        }
+    }
+}
+
+#[test]
+fn no_ray_passes_between_two_triangles_with_a_common_edge() {
+    let gpu = Gpu::new();
+    let mut draw = Draw::new(37);
+    let pairs: Vec<[Vec<f32>; 2]> = (0..RAYS).map(|_| at_shared_edge(&mut draw)).collect();
+    let leaks = |tier| {
+        let [first, second] = [0, 1].map(|k| {
+            let rows: Vec<Vec<f32>> = pairs.iter().map(|pair| pair[k].clone()).collect();
+            evaluated(&gpu, "ray_triangle", tier, &rows)
+        });
+        first.iter().zip(&second).filter(|(one, other)| one[0] == 0.0 && other[0] == 0.0).count()
+    };
+    let [fast, stable, compensated] = Tier::ALL.map(leaks);
+    println!("leaks of {RAYS} rays: fast {fast}, stable {stable}, compensated {compensated}");
+    assert_eq!(stable, 0, "leaks in the tier stable");
+    assert_eq!(compensated, 0, "leaks in the tier compensated");
+    assert!(fast > 1000, "Möller and Trumbore's test leaks at shared edges: {fast} of {RAYS}");
+    assert!(gpu.errors().is_empty(), "{:?}", gpu.errors());
+}
+
+/// A triangle with coordinates of about `size` and a place on it.
+fn hit_on_triangle(d: &mut Draw, size: f64) -> Vec<f32> {
+    let place = DVec3::from_array([0; 3].map(|_| d.sign() * size * d.between(0.1, 1.0)));
+    let extent = size * d.log(1e-3, 1.0);
+    let [a, b, c] = [0; 3].map(|_| place + d.direction() * extent);
+    let (u, v) = (d.unit(), d.unit());
+    let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+    [vec![0.0; 7], columns(&[a, b, c]), vec![u as f32, v as f32]].concat()
+}
+
+/// Hit points of triangles, moved off them, as `ray.glsl` and `frame.glsl` do it: how many are not strictly on the side
+/// of the normal, and the largest shift.
+fn moved_off(gpu: &Gpu, offset: Tier, hits: &[Vec<f32>]) -> (usize, f32) {
+    let points = evaluated(gpu, "hit_point", Tier::Stable, hits);
+    let corners: Vec<Vec<f32>> = hits.iter().map(|hit| hit[7..16].to_vec()).collect();
+    let normals = evaluated(gpu, "triangle_normal", Tier::Compensated, &corners);
+    let rows: Vec<Vec<f32>> = points.iter().zip(&normals).map(|(p, n)| [&p[..], &n[..3]].concat()).collect();
+    let moved = evaluated(gpu, "offset_origin", offset, &rows);
+    let wrong = moved.iter().zip(&corners).filter(|(moved, corners)| {
+        let (x, p) = (exact(corners), vector(&exact(moved), 0));
+        let [a, b, c] = [0, 3, 6].map(|k| vector(&x, k));
+        (b - a).cross(c - a).dot(p - a) <= 0.0
+    });
+    (wrong.count(), moved.iter().fold(0.0, |most: f32, moved| most.max(moved[3])))
+}
+
+#[test]
+fn a_ray_starts_on_the_right_side_of_its_surface() {
+    let gpu = Gpu::new();
+    let mut draw = Draw::new(38);
+    for (size, fixed_fails) in [(1e-2, false), (1.0, false), (1e2, false), (1e3, true), (1e4, true), (1e5, true)] {
+        let hits: Vec<Vec<f32>> = (0..20_000).map(|_| hit_on_triangle(&mut draw, size)).collect();
+        let (wrong, shift) = moved_off(&gpu, Tier::Stable, &hits);
+        let (fixed, _) = moved_off(&gpu, Tier::Fast, &hits);
+        println!("coordinates {size:e}: {wrong} of 20000 behind, largest shift {shift:e}; by a fixed 1e-4: {fixed}");
+        assert_eq!(wrong, 0, "of 20,000 points with coordinates of {size:e} are behind their triangles");
+        assert!((fixed > 0) == fixed_fails, "a fixed offset at coordinates of {size:e}: {fixed} behind");
+    }
+    assert!(gpu.errors().is_empty(), "{:?}", gpu.errors());
+}
