@@ -113,16 +113,19 @@ HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
         DoubleFloat tz = two_sum(S.z, -pz.hi);
         vec3 T = vec3(tx.hi, ty.hi, tz.hi);
         precise vec3 T_lo = (S_lo + vec3(tx.lo, ty.lo, tz.lo)) - turned_lo;
-        float t2 = dot(T, T) + 2.0 * dot(T, T_lo);
-        float lengths = t2 * dot(N, N);
-        if (lengths >= SMALLEST_NORMAL) {
+        DoubleFloat t2 = dot2(T, T);
+        precise float t2_lo = t2.lo + 2.0 * dot(T, T_lo);
+        DoubleFloat s2 = quick_two_sum(t2.hi, t2_lo);
+        DoubleFloat lengths = df_mul(s2, dot2(N, N));
+        if (lengths.hi >= SMALLEST_NORMAL) {
             vec3 across = cross2(N, T) + cross(N, T_lo);
             DoubleFloat c = dot2(N, T);
             precise float cos_sum = c.hi + (c.lo + dot(N, T_lo));
-            r.cos_h = cos_sum / sqrt(lengths);
-            r.sin2_h = dot(across, across) / lengths;
-            r.sum2 = t2 - t2 * (0.5 * longer);
-            r.cos_d = min(0.5 * sqrt(r.sum2), 1.0);
+            r.cos_h = cos_sum / sqrt(lengths.hi);
+            r.sin2_h = df_div(dot2(across, across), lengths).hi;
+            float sum2 = s2.hi - s2.hi * (0.5 * longer);
+            r.cos_d = min(0.5 * sqrt(sum2), 1.0);
+            r.sum2 = sum2;
         }
     } else {
         vec3 S = L + V;
@@ -247,15 +250,15 @@ float shine_from_alpha(float alpha) {
 // --------------------------------------------------------------------------------------------------------------------
 // GGX microfacets
 
-// D of cosine and sine (Walter et al. 2007). c²(α² − 1) + 1 cancels to nothing at the peak of a narrow lobe; c²α² + s²
-// is a sum (numerics.md 20).
+// D of cosine and sine (Walter et al. 2007). c²(α² − 1) + 1 cancels to nothing at the peak of a narrow lobe; with
+// c² = 1 − s² it is α² + s²(1 − α²), a sum, and all that is left of the cosine is its sign (numerics.md 20).
 float ggx_distribution(float cos_h, float sin2_h, float alpha) {
     float D;
     if (ARITHMETIC == FAST) {
         float t = cos_h * cos_h * (alpha * alpha - 1.0) + 1.0;
         D = alpha * alpha / (PI * t * t);
     } else {
-        float k = alpha / (cos_h * cos_h * alpha * alpha + sin2_h);
+        float k = alpha / (alpha * alpha + sin2_h * ((1.0 - alpha) * (1.0 + alpha)));
         D = k * k * INV_PI;
     }
     return cos_h > 0.0 ? D : 0.0;

@@ -367,8 +367,7 @@ fn grazing(case: &Case<'_>) -> f64 {
 fn d_part(case: &Case<'_>, alpha: f64) -> f64 {
     let (_, cos_h, sin2_h, _) = phong_vectors(case.inputs);
     let denominator = cos_h * cos_h * alpha * alpha + sin2_h;
-    2.0 * (sin2_allowed(case, sin2_h, 0.0) + 2.0 * alpha * alpha * cos_h * half_cosine_allowed(case, cos_h))
-        / denominator
+    2.0 * (sin2_allowed(case, sin2_h, 0.0)) / denominator
 }
 
 /// The equations of this file.
@@ -458,7 +457,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
         twin: |x| reciprocal_phong(vector(x, 0), vector(x, 3), vector(x, 6), [x[9], x[10], x[11], x[12]]).to_vec(),
         regions: PHONG,
         outputs: &[
-            Output { name: "LV2", bound: "4 ulp", allowed: |c| lv2_allowed(c) },
+            Output { name: "LV2", bound: "5 ulp; compensated 4 ulp", allowed: lv2_allowed },
             Output {
                 name: "fr_spec",
                 bound: "k_s/(L + V)² times blinn_phong's spec + 6 ulp",
@@ -525,8 +524,8 @@ pub(super) const EQUATIONS: &[Equation] = &[
                 allowed: |c| cosine_allowed(c, c.x()),
             },
             Output { name: "sin2_h", bound: "8 ulp", allowed: |c| c.ulps(8.0) },
-            // Both lengths to the fourth power are 7 of the stable tier's, sin² twice is 6.
-            Output { name: "D", bound: "14 ulp; compensated 12 ulp", allowed: |c| c.ulps(c.tiered(14.0, 12.0)) },
+            // Both lengths to the fourth power are 7 of the stable tier's, sin² twice is 9.
+            Output { name: "D", bound: "18 ulp; compensated 12 ulp", allowed: |c| c.ulps(c.tiered(18.0, 12.0)) },
         ],
         axis: Axis { name: "α", log: true, of: |x| x[6], column: 2 },
         extreme: 1e38,
@@ -609,8 +608,8 @@ pub(super) const EQUATIONS: &[Equation] = &[
         outputs: &[
             Output {
                 name: "D",
-                bound: "12 ulp + a turn of 1.4e-7 rad, compensated 1e-13 rad",
-                allowed: |c| c.ulps(12.0) + c.rel(d_part(c, c.inputs[9])),
+                bound: "14 ulp + a turn of 1.4e-7 rad, compensated 1e-13 rad",
+                allowed: |c| c.ulps(14.0) + c.rel(d_part(c, c.inputs[9])),
             },
             Output {
                 name: "G2",
@@ -749,11 +748,11 @@ pub(super) const EQUATIONS: &[Equation] = &[
     },
 ];
 
-/// Relative error of (L + V)². Stable: of two rounded lengths and their sum; where only the lengths differ, the removal of
-/// that leaves 2^-24 of it.
+/// Relative error of (L + V)². Stable: of two rounded lengths (1.7 ulp), of their sum twice, of its square; where only the
+/// lengths differ, the removal of that leaves 2^-24 of it.
 fn lv2_part(case: &Case<'_>, s2: f64) -> f64 {
     let (l, v) = (vector(case.inputs, 3).length(), vector(case.inputs, 6).length());
-    4.0 * ulp(s2) / s2 + case.tiered(4.8e-7 * (l - v).abs() / s2.sqrt(), 0.0)
+    case.tiered(5.0, 4.0) * ulp(s2) / s2 + case.tiered(4.8e-7 * (l - v).abs() / s2.sqrt(), 0.0)
 }
 
 fn lv2_allowed(case: &Case<'_>) -> f64 {
