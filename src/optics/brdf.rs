@@ -332,9 +332,9 @@ fn phong_vectors(x: &[f64]) -> (f64, f64, f64, f64) {
     (cosine(n, l), cos_delta, sin2_delta, s2)
 }
 
-/// Error of the lobe (numerics.md 17). Stable: d ln f = −shine tanδ dδ = √(2 shine |ln f|) dδ, with the turn of the half
-/// vector for dδ and 1e-5 for exp and log: 4e-7 √shine for |ln f| = 4; wider than 45° that of the cosine. Compensated
-/// (8 + 6 |ln f|) ulp.
+/// Error of the lobe (numerics.md 17). Stable: d ln f = −shine tanδ dδ, with the turn of the half vector for dδ and 1e-5
+/// for exp and log. For narrow lobes that is √(2 shine |ln f|) dδ, 4e-7 √shine at |ln f| = 4. Beyond 45° that of the
+/// cosine. Compensated (8 + 6 |ln f|) ulp.
 fn lobe_allowed(case: &Case<'_>) -> f64 {
     let (_, cos_delta, sin2_delta, _) = phong_vectors(case.inputs);
     let shine = case.inputs[12];
@@ -343,7 +343,7 @@ fn lobe_allowed(case: &Case<'_>) -> f64 {
         return case.tiered(lobe(2e-7, shine), 0.0);
     }
     let depth = -spec.ln();
-    let stable = (2.0 * shine * depth).sqrt() * TURN + shine * TURN * TURN + 1e-5;
+    let stable = shine * (sin2_delta.sqrt() / cos_delta * TURN + TURN * TURN) + 1e-5;
     let wide = if sin2_delta > 0.45 { shine * 2e-7 / cos_delta } else { 0.0 };
     case.tiered((stable + wide) * spec, (8.0 + 6.0 * depth) * ulp(spec))
 }
@@ -434,7 +434,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             },
             Output {
                 name: "spec",
-                bound: "√(2 shine |ln f|) 1.4e-7 + 1e-5 (beyond 45° that of cosδ); compensated (8 + 6 |ln f|) ulp",
+                bound: "shine tanδ 1.4e-7 + 1e-5 (beyond 45° that of cosδ); compensated (8 + 6 |ln f|) ulp",
                 allowed: |c| if at_terminator(c, c.exact[0]) { f64::INFINITY } else { lobe_allowed(c) },
             },
             Output {
