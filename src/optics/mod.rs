@@ -17,5 +17,7 @@ pub use catalogue::{Axis, Case, Draw, Equation, Output, Region, Tier, ulp};
 
 /// Every equation, by subject.
 pub fn equations() -> impl Iterator<Item = &'static Equation> {
-    [arithmetic::EQUATIONS, brdf::EQUATIONS, fresnel::EQUATIONS, light::EQUATIONS, snell::EQUATIONS].into_iter().flatten()
+    [arithmetic::EQUATIONS, brdf::EQUATIONS, fresnel::EQUATIONS, light::EQUATIONS, snell::EQUATIONS]
+        .into_iter()
+        .flatten()
 }
