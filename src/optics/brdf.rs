@@ -576,8 +576,9 @@ pub(super) const EQUATIONS: &[Equation] = &[
         outputs: &[
             Output { name: "G1_L", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
             Output { name: "G1_V", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
-            Output { name: "G2", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
-            Output { name: "Vis", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
+            // Two roots of 2 ulp each, their quotients or products, the sum, the division; 4.1 in a million cases.
+            Output { name: "G2", bound: "5 ulp", allowed: |c| c.ulps(5.0) },
+            Output { name: "Vis", bound: "5 ulp", allowed: |c| c.ulps(5.0) },
         ],
         axis: Axis { name: "N·L", log: true, of: |x| x[0], column: 0 },
         extreme: 1e38,
@@ -614,8 +615,8 @@ pub(super) const EQUATIONS: &[Equation] = &[
             },
             Output {
                 name: "G2",
-                bound: "4 ulp + δcos/cos of L and V",
-                allowed: |c| c.ulps(4.0) + c.rel(grazing(c)).min(1.0),
+                bound: "5 ulp + δcos/cos of L and V",
+                allowed: |c| c.ulps(5.0) + c.rel(grazing(c)).min(1.0),
             },
             Output {
                 name: "F", bound: "8 ulp + 5 (1 − F0) (1 − V·H)⁴ 2e-7", allowed: |c| c.ulps(8.0) + f_error(c)
