@@ -42,8 +42,7 @@ fn reflected_and_transmitted_power_are_one() {
             let t = evaluate(&gpu, kept, tier, rows);
             for ((row, f), t) in rows.iter().zip(&f).zip(&t) {
                 let sum = f64::from(f[0]) + f64::from(t[2]);
-                // The bounds of both: 2e-7 and 8 ulp of what is at most 1.
-                assert!((sum - 1.0).abs() <= 7e-7, "{reflected} + {kept} at {row:?}: {sum}");
+                assert!((sum - 1.0).abs() <= 2e-7, "{reflected} + {kept} at {row:?}: {sum}");
                 assert!((0.0..=1.0).contains(&f[0]), "{reflected} at {row:?}: {}", f[0]);
             }
         }
@@ -258,7 +257,8 @@ fn the_quiz_comes_out_of_the_shaders() {
     let gpu = Gpu::new();
     for tier in Tier::ALL {
         let close = |found: f64, want: f64, what: &str| {
-            let slack = if tier == Tier::Fast { 2e-4 } else { 4e-7 };
+            // 1.2 is no f32, and F0 changes 4δn/(n² − 1) with n: 4.4e-7.
+            let slack = if tier == Tier::Fast { 2e-4 } else { 1e-6 };
             assert!((found - want).abs() <= slack * want.abs(), "{what}, {}: {found}, not {want}", tier.name());
         };
         // Q1: n = 1.2 at normal incidence.

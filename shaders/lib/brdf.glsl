@@ -1,6 +1,7 @@
-// Reflection models (lecture B1–B6, B9), their parts and how to sample them. N, L, V, H are unit vectors as 32 bits hold
-// them, L and V point away from the surface; α = roughness². Out of domain: α is clamped to [1e-9, 1], shine < 0 is 0, F0
-// is clamped to [0, 1]; a zero vector makes a right angle with everything, and so does one too long for its square.
+// Reflection models (lecture B1–B6, B9), their parts and how to sample them. N, L, V, H are unit vectors as 32 bits
+// hold them, L and V point away from the surface; α = roughness². Out of domain: α is clamped to [1e-9, 1], shine < 0
+// is 0, F0 is clamped to [0, 1]; a zero vector makes a right angle with everything, and so does one too long for its
+// square.
 #ifndef BRDF_GLSL
 #define BRDF_GLSL
 #include "lib/arithmetic.glsl"
@@ -16,8 +17,8 @@ float alpha_in_domain(float alpha) {
 // --------------------------------------------------------------------------------------------------------------------
 // Angles
 
-// Cosine between two directions. A plain sum is good to 2e-7, lengths of rounded unit vectors included: nothing near 90°,
-// where it is all error. Compensated: the sum of exact products, over the lengths.
+// Cosine between two directions. A plain sum is good to 2e-7, lengths of rounded unit vectors included: nothing near
+// 90°, where it is all error. Compensated: the sum of exact products, over the lengths.
 float cosine(vec3 a, vec3 b) {
     float c;
     if (ARITHMETIC == COMPENSATED) {
@@ -61,8 +62,8 @@ struct HalfAngle {
 };
 
 // Where L is near −V their sum is exact, but not the sum of two vectors of one length: lengths that differ by 1e-7 turn
-// it. It has to be perpendicular to D = L − V, so what it has along D goes: (L² − V²)/4 D. 2(1 + L·V) would lose (L + V)²
-// altogether (numerics.md 18). Compensated: both sums in pairs, N × (L + V) and N·(L + V) of exact products.
+// it. It has to be perpendicular to D = L − V, so what it has along D goes: (L² − V²)/4 D. 2(1 + L·V) would lose (L +
+// V)² altogether (numerics.md 18). Compensated: both sums in pairs, N × (L + V) and N·(L + V) of exact products.
 HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
     HalfAngle r = HalfAngle(0.0, 1.0, 0.0, 0.0);
     if (ARITHMETIC == FAST) {
@@ -98,16 +99,19 @@ HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
         DoubleFloat tz = two_sum(S.z, -pz.hi);
         vec3 T = vec3(tx.hi, ty.hi, tz.hi);
         precise vec3 T_lo = (S_lo + vec3(tx.lo, ty.lo, tz.lo)) - turned_lo;
-        float t2 = dot(T, T) + 2.0 * dot(T, T_lo);
-        float lengths = t2 * dot(N, N);
-        if (lengths >= SMALLEST_NORMAL) {
+        DoubleFloat t2 = dot2(T, T);
+        precise float t2_lo = t2.lo + 2.0 * dot(T, T_lo);
+        DoubleFloat s2 = quick_two_sum(t2.hi, t2_lo);
+        DoubleFloat lengths = df_mul(s2, dot2(N, N));
+        if (lengths.hi >= SMALLEST_NORMAL) {
             vec3 across = cross2(N, T) + cross(N, T_lo);
             DoubleFloat c = dot2(N, T);
             precise float cos_sum = c.hi + (c.lo + dot(N, T_lo));
-            r.cos_h = cos_sum / sqrt(lengths);
-            r.sin2_h = dot(across, across) / lengths;
-            r.sum2 = t2 - t2 * (0.5 * longer);
-            r.cos_d = min(0.5 * sqrt(r.sum2), 1.0);
+            r.cos_h = cos_sum / sqrt(lengths.hi);
+            r.sin2_h = df_div(dot2(across, across), lengths).hi;
+            float sum2 = s2.hi - s2.hi * (0.5 * longer);
+            r.cos_d = min(0.5 * sqrt(sum2), 1.0);
+            r.sum2 = sum2;
         }
     } else {
         vec3 S = L + V;
@@ -147,9 +151,9 @@ Lambert lambert(vec3 N, vec3 L, float Lin, float kd) {
     return Lambert(cos_plus, Lin * (kd * cos_plus));
 }
 
-// cos^shine of the angle, 0 from 90° on and for L = −V. cos^shine = e^(shine/2 ln(1 − sin²)): for a shine of 1e7 cosδ is
-// 1 − 1e-6 and has one digit left of δ, sin²δ has them all; pow on top loses the rest (numerics.md 17). Beyond 45° by the
-// cosine itself.
+// cos^shine of the angle, 0 from 90° on and for L = −V. cos^shine = e^(shine/2 ln(1 − sin²)): for a shine of 1e7 cosδ
+// is 1 − 1e-6 and has one digit left of δ, sin²δ has them all; pow on top loses the rest (numerics.md 17). Beyond 45°
+// by the cosine itself.
 float phong_lobe(HalfAngle a, float shine) {
     float lobe;
     if (ARITHMETIC == FAST) {
@@ -232,15 +236,15 @@ float shine_from_alpha(float alpha) {
 // --------------------------------------------------------------------------------------------------------------------
 // GGX microfacets
 
-// D of cosine and sine (Walter et al. 2007). c²(α² − 1) + 1 cancels to nothing at the peak of a narrow lobe; c²α² + s²
-// is a sum (numerics.md 20).
+// D of cosine and sine (Walter et al. 2007). c²(α² − 1) + 1 cancels to nothing at the peak of a narrow lobe; with
+// c² = 1 − s² it is α² + s²(1 − α²), a sum, and all that is left of the cosine is its sign (numerics.md 20).
 float ggx_distribution(float cos_h, float sin2_h, float alpha) {
     float D;
     if (ARITHMETIC == FAST) {
         float t = cos_h * cos_h * (alpha * alpha - 1.0) + 1.0;
         D = alpha * alpha / (PI * t * t);
     } else {
-        float k = alpha / (cos_h * cos_h * alpha * alpha + sin2_h);
+        float k = alpha / (alpha * alpha + sin2_h * ((1.0 - alpha) * (1.0 + alpha)));
         D = k * k * INV_PI;
     }
     return cos_h > 0.0 ? D : 0.0;
@@ -292,8 +296,8 @@ float ggx_lambda(float cos_v, float alpha) {
     return lambda;
 }
 
-// Height-correlated Smith visibility G₂/(4 cosθ_l cosθ_v) (Heitz 2014), without division by the cosines (numerics.md 23).
-// Both 0: a large number, not infinity.
+// Height-correlated Smith visibility G₂/(4 cosθ_l cosθ_v) (Heitz 2014), without division by the cosines (numerics.md
+// 23). Both 0: a large number, not infinity.
 float ggx_visibility(float cos_l, float cos_v, float alpha) {
     float Vis;
     if (ARITHMETIC == FAST) {
@@ -454,7 +458,7 @@ vec2 circle(float u) {
         float z = x * x;
         // Cephes sinf and cosf.
         float s = ((-1.9515295891e-4 * z + 8.3321608736e-3) * z - 1.6666654611e-1) * z * x + x;
-        float c = ((2.443315711809948e-5 * z - 1.388731625493765e-3) * z + 4.166664568298827e-2) * z * z - 0.5 * z + 1.0;
+        float c = ((2.443315712e-5 * z - 1.388731625e-3) * z + 4.166664568e-2) * z * z - 0.5 * z + 1.0;
         bool odd = quarter == 1.0 || quarter == 3.0;
         vec2 turned = odd ? vec2(s, c) : vec2(c, s);
         r = turned * vec2(quarter == 1.0 || quarter == 2.0 ? -1.0 : 1.0, quarter == 2.0 || quarter == 3.0 ? -1.0 : 1.0);
@@ -468,8 +472,8 @@ struct CosineSample {
 };
 
 // @eq B4 N49: L = (√u₁ cos 2πu₂, √u₁ sin 2πu₂, √(1 − u₁)), p(L) = cosθ/π
-// About the z axis. z from 1 − u₁, not from 1 − x² − y², which may be below 0. u₁ is clamped to [0, 1 − 2^-24], so that no
-// direction lies in the surface and has a density of 0.
+// About the z axis. z from 1 − u₁, not from 1 − x² − y², which may be below 0. u₁ is clamped to [0, 1 − 2^-24], so that
+// no direction lies in the surface and has a density of 0.
 CosineSample cosine_sample(float u1, float u2) {
     CosineSample r;
     if (ARITHMETIC == FAST) {

@@ -1,17 +1,17 @@
-// Light that arrives at a surface (lecture R2–R4; KHR_lights_punctual) and the solid angles that lights fill. N is a unit
-// vector as 32 bits hold it. A zero vector is at a right angle to everything: no light.
+// Light that arrives at a surface (lecture R2–R4; KHR_lights_punctual) and the solid angles that lights fill. N is a
+// unit vector as 32 bits hold it. A zero vector is at a right angle to everything: no light.
 #ifndef LIGHT_GLSL
 #define LIGHT_GLSL
 #include "lib/arithmetic.glsl"
 #include "lib/brdf.glsl"
 #include "lib/constants.glsl"
 
-// The renderer's rule for r → 0 (numerics.md 32): a point light is never nearer than this, in metres, so that irradiance
-// stays finite. It is part of point_falloff, not of light_point, which is I/r² and says +∞.
+// The renderer's rule for r → 0 (numerics.md 32): a point light is never nearer than this, in metres, so that
+// irradiance stays finite. It is part of point_falloff, not of light_point, which is I/r² and says +∞.
 const float LIGHT_RADIUS = 1e-6;
 
-// n, from -126 to 127, for which the largest component of 2^n v is in [2, 4): its square neither overflows nor vanishes.
-// 127 for the zero vector, and where even that is below 2.
+// n, from -126 to 127, for which the largest component of 2^n v is in [2, 4): its square neither overflows nor
+// vanishes. 127 for the zero vector, and where even that is below 2.
 int scale_exponent(vec3 v) {
     float largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
     int exponent = (floatBitsToInt(largest) >> 23) & 255;
@@ -51,8 +51,8 @@ struct LightPoint {
 };
 
 // @eq R4 N32 N33: E_⊥ = I/r², E = E_⊥ cos⁺θ, of a light at Q with radiant intensity I on a surface at P
-// No smallest radius here: what exceeds the range of floats is +∞, never NaN. P = Q: r² = 0, cos⁺ = 0, E = 0, and E_⊥ is
-// +∞ for I > 0, 0 otherwise. Q − P rounds once (and not at all nearby); compensated: it does not round.
+// No smallest radius here: what exceeds the range of floats is +∞, never NaN. P = Q: r² = 0, cos⁺ = 0, E = 0, and E_⊥
+// is +∞ for I > 0, 0 otherwise. Q − P rounds once (and not at all nearby); compensated: it does not round.
 LightPoint light_point(vec3 P, vec3 Q, vec3 N, float I) {
     LightPoint r;
     if (ARITHMETIC == FAST) {
@@ -95,7 +95,8 @@ LightPoint light_point(vec3 P, vec3 Q, vec3 N, float I) {
 
 // @eq R4 N32: E/I = max(min(1 − (r/range)⁴, 1), 0)/r², r at least LIGHT_RADIUS
 // @out falloff
-// On a surface that faces the light, ended smoothly at `range` (KHR_lights_punctual). inv_range2 = 1/range², 0 for none.
+// On a surface that faces the light, ended smoothly at `range` (KHR_lights_punctual). inv_range2 = 1/range², 0 for
+// none.
 float point_falloff(float r2, float inv_range2) {
     float x = r2 * inv_range2;
     float window = clamp(1.0 - x * x, 0.0, 1.0);
@@ -124,8 +125,8 @@ struct SphereCone {
 };
 
 // @eq R2 N26: 1 − cosθ = q²/(1 + √((1 − q)(1 + q))), q = radius/distance; Ω = 2π (1 − cosθ)
-// The cone of a sphere of that radius around a point at that distance from it; (1 − q)(1 + q) from distance ± radius, since
-// q has rounded. Inside the sphere is all around: 2 and 4π. A radius ≤ 0 fills nothing.
+// The cone of a sphere of that radius around a point at that distance from it; (1 − q)(1 + q) from distance ± radius,
+// since q has rounded. Inside the sphere is all around: 2 and 4π. A radius ≤ 0 fills nothing.
 SphereCone sphere_cone(float radius, float distance) {
     float one_minus_cos;
     if (ARITHMETIC == FAST) {
@@ -152,9 +153,9 @@ DoubleFloat triple_product(DoubleFloat p[3], DoubleFloat q[3], DoubleFloat r[3])
 
 // @eq R2: tan(Ω/2) = a·(b × c)/(|a||b||c| + (a·b)|c| + (b·c)|a| + (c·a)|b|)
 // @out omega
-// Solid angle of a triangle with corners at a, b, c from the point (van Oosterom and Strackee 1983), in [0, 2π]. The volume
-// from the edges, a·((b − a) × (c − a)): edges of small triangles are exact, a·(b × c) is all error there. A corner at the
-// point: 0. All corners are scaled together by a power of two.
+// Solid angle of a triangle with corners at a, b, c from the point (van Oosterom and Strackee 1983), in [0, 2π]. The
+// volume from the edges, a·((b − a) × (c − a)): edges of small triangles are exact, a·(b × c) is all error there. A
+// corner at the point: 0. All corners are scaled together by a power of two.
 float triangle_solid_angle(vec3 a, vec3 b, vec3 c) {
     float numerator, denominator;
     if (ARITHMETIC == FAST) {

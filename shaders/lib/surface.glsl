@@ -104,8 +104,8 @@ vec3 reflected(Surface s, vec3 l) {
                 result = (s.diffuse * INV_PI + ks * reciprocal_lobe(h, lobe)) * cos_l;
             }
         } else {
-            // What the dielectric's surface reflects does not reach its diffuse ground; its largest component, so that a
-            // tinted F0 gives no complementary colour (KHR_materials_specular).
+            // What the dielectric's surface reflects does not reach its diffuse ground; its largest component, so that
+            // a tinted F0 gives no complementary colour (KHR_materials_specular).
             float enters = 1.0 - largest(fresnel_of_dielectric(s, h.cos_d));
             float d = ggx_distribution(h.cos_h, h.sin2_h, s.alpha);
             float vis = ggx_visibility(cos_l, cos_v, s.alpha);

@@ -311,8 +311,8 @@ pub(super) fn cosine_allowed(case: &Case<'_>, exact: f64) -> f64 {
     case.tiered(1.0e-7 + 1.04e-7 * exact.abs(), 32.0 * ulp(exact) + 1e-14)
 }
 
-/// Turn of the half vector by rounding, in radians: L + V to 2^-24 of its size, N × (H − N) as much.
-const TURN: f64 = 1.4e-7;
+/// Turn of the half vector by rounding, in radians: L + V, less its part along L − V, and H each to 2^-24 of a component.
+const TURN: f64 = 2e-7;
 
 /// Error of the cosine of the half vector, whose length inversesqrt leaves off by 2 ulp.
 fn half_cosine_allowed(case: &Case<'_>, exact: f64) -> f64 {
@@ -332,9 +332,9 @@ fn phong_vectors(x: &[f64]) -> (f64, f64, f64, f64) {
     (cosine(n, l), cos_delta, sin2_delta, s2)
 }
 
-/// Error of the lobe (numerics.md 17). Stable: d ln f = −shine tanδ dδ = √(2 shine |ln f|) dδ, with the turn of the half
-/// vector for dδ and 1e-5 for exp and log: 4e-7 √shine for |ln f| = 4; wider than 45° that of the cosine. Compensated
-/// (8 + 6 |ln f|) ulp.
+/// Error of the lobe (numerics.md 17). Stable: d ln f = −shine tanδ dδ, with the turn of the half vector for dδ and 1e-5
+/// for exp and log. For narrow lobes that is √(2 shine |ln f|) dδ, 4e-7 √shine at |ln f| = 2. Beyond 45° that of the
+/// cosine. Compensated (8 + 6 |ln f|) ulp.
 fn lobe_allowed(case: &Case<'_>) -> f64 {
     let (_, cos_delta, sin2_delta, _) = phong_vectors(case.inputs);
     let shine = case.inputs[12];
@@ -343,9 +343,10 @@ fn lobe_allowed(case: &Case<'_>) -> f64 {
         return case.tiered(lobe(2e-7, shine), 0.0);
     }
     let depth = -spec.ln();
-    let stable = (2.0 * shine * depth).sqrt() * TURN + shine * TURN * TURN + 1e-5;
+    let stable = shine * (sin2_delta.sqrt() / cos_delta * TURN + TURN * TURN) + 1e-5;
     let wide = if sin2_delta > 0.45 { shine * 2e-7 / cos_delta } else { 0.0 };
-    case.tiered((stable + wide) * spec, (8.0 + 6.0 * depth) * ulp(spec))
+    // A lobe below the normal range has no digits, whatever it is divided by later.
+    case.tiered((stable + wide) * spec, (8.0 + 6.0 * depth) * ulp(spec)) + f64::from(f32::MIN_POSITIVE)
 }
 
 /// Where the sign of N·L is the rounding's.
@@ -367,8 +368,7 @@ fn grazing(case: &Case<'_>) -> f64 {
 fn d_part(case: &Case<'_>, alpha: f64) -> f64 {
     let (_, cos_h, sin2_h, _) = phong_vectors(case.inputs);
     let denominator = cos_h * cos_h * alpha * alpha + sin2_h;
-    2.0 * (sin2_allowed(case, sin2_h, 0.0) + 2.0 * alpha * alpha * cos_h * half_cosine_allowed(case, cos_h))
-        / denominator
+    2.0 * (sin2_allowed(case, sin2_h, 0.0)) / denominator
 }
 
 /// The equations of this file.
@@ -425,17 +425,17 @@ pub(super) const EQUATIONS: &[Equation] = &[
             },
             Output {
                 name: "cos_delta",
-                bound: "1e-7 + 1.6e-7 |cos| + a turn of 1.4e-7 rad; compensated 32 ulp",
+                bound: "1e-7 + 1.6e-7 |cos| + a turn of 2e-7 rad; compensated 32 ulp",
                 allowed: |c| half_cosine_allowed(c, c.x()),
             },
             Output {
                 name: "sin2_delta",
-                bound: "8 ulp + a turn of 1.4e-7 rad, compensated 1e-13 rad",
+                bound: "8 ulp + a turn of 2e-7 rad, compensated 1e-13 rad",
                 allowed: |c| sin2_allowed(c, c.x(), 8.0),
             },
             Output {
                 name: "spec",
-                bound: "√(2 shine |ln f|) 1.4e-7 + 1e-5 (beyond 45° that of cosδ); compensated (8 + 6 |ln f|) ulp",
+                bound: "shine tanδ 2e-7 + 1e-5 (beyond 45° that of cosδ); compensated (8 + 6 |ln f|) ulp",
                 allowed: |c| if at_terminator(c, c.exact[0]) { f64::INFINITY } else { lobe_allowed(c) },
             },
             Output {
@@ -445,7 +445,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
                     let [lin, kd, ks] = [c.inputs[9], c.inputs[10], c.inputs[11]];
                     let (cos_in, cos_delta, ..) = phong_vectors(c.inputs);
                     let jump = if at_terminator(c, cos_in) { lin * ks * lobe(cos_delta, c.inputs[12]) } else { 0.0 };
-                    let lit = if cos_in < 0.0 { 0.0 } else { ks * lobe_allowed(c) };
+                    let lit = if cos_in < 0.0 && jump == 0.0 { 0.0 } else { ks * lobe_allowed(c) };
                     lin * (kd * cosine_allowed(c, cos_in) + lit) + jump + c.ulps(3.0)
                 },
             },
@@ -458,7 +458,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
         twin: |x| reciprocal_phong(vector(x, 0), vector(x, 3), vector(x, 6), [x[9], x[10], x[11], x[12]]).to_vec(),
         regions: PHONG,
         outputs: &[
-            Output { name: "LV2", bound: "4 ulp", allowed: |c| lv2_allowed(c) },
+            Output { name: "LV2", bound: "5 ulp; compensated 4 ulp", allowed: lv2_allowed },
             Output {
                 name: "fr_spec",
                 bound: "k_s/(L + V)² times blinn_phong's spec + 6 ulp",
@@ -525,8 +525,8 @@ pub(super) const EQUATIONS: &[Equation] = &[
                 allowed: |c| cosine_allowed(c, c.x()),
             },
             Output { name: "sin2_h", bound: "8 ulp", allowed: |c| c.ulps(8.0) },
-            // Both lengths to the fourth power are 7 of the stable tier's, sin² twice is 6.
-            Output { name: "D", bound: "14 ulp; compensated 12 ulp", allowed: |c| c.ulps(c.tiered(14.0, 12.0)) },
+            // Both lengths to the fourth power are 7 of the stable tier's, sin² twice is 9.
+            Output { name: "D", bound: "18 ulp; compensated 12 ulp", allowed: |c| c.ulps(c.tiered(18.0, 12.0)) },
         ],
         axis: Axis { name: "α", log: true, of: |x| x[6], column: 2 },
         extreme: 1e38,
@@ -576,8 +576,9 @@ pub(super) const EQUATIONS: &[Equation] = &[
         outputs: &[
             Output { name: "G1_L", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
             Output { name: "G1_V", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
-            Output { name: "G2", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
-            Output { name: "Vis", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
+            // Two roots of 2 ulp each, their quotients or products, the sum, the division; 4.1 in a million cases.
+            Output { name: "G2", bound: "5 ulp", allowed: |c| c.ulps(5.0) },
+            Output { name: "Vis", bound: "5 ulp", allowed: |c| c.ulps(5.0) },
         ],
         axis: Axis { name: "N·L", log: true, of: |x| x[0], column: 0 },
         extreme: 1e38,
@@ -609,13 +610,13 @@ pub(super) const EQUATIONS: &[Equation] = &[
         outputs: &[
             Output {
                 name: "D",
-                bound: "12 ulp + a turn of 1.4e-7 rad, compensated 1e-13 rad",
-                allowed: |c| c.ulps(12.0) + c.rel(d_part(c, c.inputs[9])),
+                bound: "14 ulp + a turn of 2e-7 rad, compensated 1e-13 rad",
+                allowed: |c| c.ulps(14.0) + c.rel(d_part(c, c.inputs[9])),
             },
             Output {
                 name: "G2",
-                bound: "4 ulp + δcos/cos of L and V",
-                allowed: |c| c.ulps(4.0) + c.rel(grazing(c)).min(1.0),
+                bound: "5 ulp + δcos/cos of L and V",
+                allowed: |c| c.ulps(5.0) + c.rel(grazing(c)).min(1.0),
             },
             Output {
                 name: "F", bound: "8 ulp + 5 (1 − F0) (1 − V·H)⁴ 2e-7", allowed: |c| c.ulps(8.0) + f_error(c)
@@ -688,7 +689,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
         outputs: &[
             Output {
                 name: "pdf_h",
-                bound: "14 ulp + a turn of 1.4e-7 rad, compensated 1e-13 rad",
+                bound: "14 ulp + a turn of 2e-7 rad, compensated 1e-13 rad",
                 allowed: |c| pdf_allowed(c, 14.0),
             },
             Output { name: "pdf_l", bound: "as pdf_h, 18 ulp", allowed: |c| pdf_allowed(c, 18.0) },
@@ -741,19 +742,19 @@ pub(super) const EQUATIONS: &[Equation] = &[
         ],
         outputs: &[Output {
             name: "w",
-            bound: "1e-7 and 4 ulp, exact for 0",
-            allowed: |c| if c.inputs[0] == 0.0 { EXACT(c) } else { c.ulps(4.0).min(1e-7) },
+            bound: "1e-7 and 5 ulp, exact for 0",
+            allowed: |c| if c.inputs[0] == 0.0 { EXACT(c) } else { c.ulps(5.0).min(1e-7) },
         }],
         axis: Axis { name: "q/p", log: true, of: |x| x[1] / x[0], column: 0 },
         extreme: 1e38,
     },
 ];
 
-/// Relative error of (L + V)². Stable: of two rounded lengths and their sum; where only the lengths differ, the removal of
-/// that leaves 2^-24 of it.
+/// Relative error of (L + V)². Stable: of two rounded lengths (1.7 ulp), of their sum twice, of its square; where only the
+/// lengths differ, the removal of that leaves 2^-24 of it.
 fn lv2_part(case: &Case<'_>, s2: f64) -> f64 {
     let (l, v) = (vector(case.inputs, 3).length(), vector(case.inputs, 6).length());
-    4.0 * ulp(s2) / s2 + case.tiered(4.8e-7 * (l - v).abs() / s2.sqrt(), 0.0)
+    case.tiered(5.0, 4.0) * ulp(s2) / s2 + case.tiered(4.8e-7 * (l - v).abs() / s2.sqrt(), 0.0)
 }
 
 fn lv2_allowed(case: &Case<'_>) -> f64 {

@@ -54,14 +54,13 @@ pub fn sphere_cone(radius: f64, distance: f64) -> [f64; 2] {
     [one_minus_cos, TAU * one_minus_cos]
 }
 
-/// @eq R2: solid angle of a triangle, by L'Huilier's theorem from its sides on the unit sphere.
+/// @eq R2: solid angle of a triangle (van Oosterom and Strackee 1983). The volume from the edges, as in the shader: of
+/// slivers L'Huilier's theorem and a·(b × c) leave four digits in f64 as well.
 #[must_use]
 pub fn triangle_solid_angle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
-    let side = |p: DVec3, q: DVec3| p.cross(q).length().atan2(p.dot(q));
-    let (x, y, z) = (side(b, c), side(c, a), side(a, b));
-    let s = 0.5 * (x + y + z);
-    let product = (0.5 * s).tan() * (0.5 * (s - x)).tan() * (0.5 * (s - y)).tan() * (0.5 * (s - z)).tan();
-    4.0 * product.max(0.0).sqrt().atan()
+    let volume = a.dot((b - a).cross(c - a)).abs();
+    let (la, lb, lc) = (a.length(), b.length(), c.length());
+    2.0 * volume.atan2(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb)
 }
 
 fn point_row(p: DVec3, l: DVec3, n: DVec3, intensity: f64) -> Vec<f32> {
