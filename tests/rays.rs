@@ -88,7 +88,7 @@ fn no_ray_passes_between_two_triangles_with_a_common_edge() {
     // f32 coordinates are known to 6e-8 of their distance: what is seen narrower than a few of that may be turned over.
     let [fast, all, wide] = [(Tier::Fast, 0.0), (Tier::Stable, 0.0), (Tier::Stable, 2.5e-7)].map(|(t, w)| leaks(t, w));
     let compensated = leaks(Tier::Compensated, 0.0);
-    println!(
+    eprintln!(
         "leaks of {RAYS} rays: fast {fast}, stable {all}, {wide} of them wider than 2.5e-7, compensated {compensated}"
     );
     assert_eq!(wide, 0, "leaks in the tier stable");
@@ -131,7 +131,7 @@ fn a_ray_starts_on_the_right_side_of_its_surface() {
         let hits: Vec<Vec<f32>> = (0..20_000).map(|_| hit_on_triangle(&mut draw, size)).collect();
         let (wrong, shift) = moved_off(&gpu, Tier::Stable, &hits);
         let (fixed, _) = moved_off(&gpu, Tier::Fast, &hits);
-        println!("coordinates {size:e}: {wrong} of 20000 behind, largest shift {shift:e}; by a fixed 1e-4: {fixed}");
+        eprintln!("coordinates {size:e}: {wrong} of 20000 behind, largest shift {shift:e}; by a fixed 1e-4: {fixed}");
         assert_eq!(wrong, 0, "of 20,000 points with coordinates of {size:e} are behind their triangles");
         assert!((fixed > 0) == fixed_fails, "a fixed offset at coordinates of {size:e}: {fixed} behind");
     }
