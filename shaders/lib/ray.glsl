@@ -138,21 +138,41 @@ vec3 axis_last(vec3 p, int k) {
 }
 
 // a.x b.y − a.y b.x, and exactly the negative with a and b exchanged: an edge has one value in both its triangles.
-float edge_function(vec3 a, vec3 b) {
+float edge_function(vec2 a, vec2 b) {
     precise float e = a.x * b.y - a.y * b.x;
     return e;
 }
 
-// p with its last axis along the ray.
-vec3 sheared(vec3 p, vec2 shear) {
+// Where p is across a ray along its last axis.
+vec2 sheared(vec3 p, vec2 shear) {
     precise vec2 across = p.xy - shear * p.z;
-    return vec3(across, p.z);
+    return across;
+}
+
+struct PairOfAxes {
+    DoubleFloat x;
+    DoubleFloat y;
+};
+
+// (p − origin)·scale, sheared, in pairs
+PairOfAxes sheared_pair(vec3 p, vec3 origin, float scale, DoubleFloat shear_x, DoubleFloat shear_y) {
+    DoubleFloat x = df_scale(two_sum(p.x, -origin.x), scale);
+    DoubleFloat y = df_scale(two_sum(p.y, -origin.y), scale);
+    DoubleFloat z = df_scale(two_sum(p.z, -origin.z), scale);
+    return PairOfAxes(df_add(x, df_negate(df_mul(shear_x, z))), df_add(y, df_negate(df_mul(shear_y, z))));
+}
+
+// The edge function of pairs: exactly the negative with a and b exchanged, too.
+DoubleFloat edge_of_pairs(PairOfAxes a, PairOfAxes b) {
+    return df_add(df_mul(a.x, b.y), df_negate(df_mul(a.y, b.x)));
 }
 
 // @eq N37: point = origin + t direction = a + u (b − a) + v (c − a), u, v, 1 − u − v ≥ 0, t ≥ 0
 // Woop, Benthin and Wald, JCGT 2(1) 2013: the vertices are sheared so that the ray is the last axis; on which side of
-// an edge it passes depends on that edge alone, so that no ray slips between two triangles. Both sides are hit.
-// Vertices and direction are scaled by powers of two, which rounds nothing. Miss, edge-on or direction 0: all 0.
+// an edge it passes depends on that edge alone, so that no ray slips between two triangles: unless one of
+// them is seen under less than 2.5e-7 rad, which is how coarse sheared coordinates are, and rounding turns it over.
+// Compensated: pairs, 1e-14 rad. Both sides are hit. Miss, edge-on or direction 0: all 0. Vertices and direction are
+// scaled by powers of two, which rounds nothing.
 RayTriangle ray_triangle(vec3 origin, vec3 direction, vec3 a, vec3 b, vec3 c) {
     RayTriangle r = RayTriangle(false, 0.0, 0.0, 0.0);
     if (ARITHMETIC == FAST) {
@@ -179,17 +199,34 @@ RayTriangle ray_triangle(vec3 origin, vec3 direction, vec3 a, vec3 b, vec3 c) {
         precise vec3 pb = axis_last(b - origin, k);
         precise vec3 pc = axis_last(c - origin, k);
         float scale = scale_to_one(max(largest_component(pa), max(largest_component(pb), largest_component(pc))));
-        vec3 qa = sheared(pa * scale, shear);
-        vec3 qb = sheared(pb * scale, shear);
-        vec3 qc = sheared(pc * scale, shear);
         // Weights of a, b and c, times twice the projected area.
-        float wa = edge_function(qc, qb);
-        float wb = edge_function(qa, qc);
-        float wc = edge_function(qb, qa);
-        float det = wa + wb + wc;
+        float wa, wb, wc, det;
+        if (ARITHMETIC == COMPENSATED) {
+            vec3 o = axis_last(origin, k);
+            DoubleFloat shear_x = df_div(DoubleFloat(d.x, 0.0), DoubleFloat(dz, 0.0));
+            DoubleFloat shear_y = df_div(DoubleFloat(d.y, 0.0), DoubleFloat(dz, 0.0));
+            PairOfAxes qa = sheared_pair(axis_last(a, k), o, scale, shear_x, shear_y);
+            PairOfAxes qb = sheared_pair(axis_last(b, k), o, scale, shear_x, shear_y);
+            PairOfAxes qc = sheared_pair(axis_last(c, k), o, scale, shear_x, shear_y);
+            DoubleFloat by_a = edge_of_pairs(qc, qb);
+            DoubleFloat by_b = edge_of_pairs(qa, qc);
+            DoubleFloat by_c = edge_of_pairs(qb, qa);
+            wa = by_a.hi;
+            wb = by_b.hi;
+            wc = by_c.hi;
+            det = df_add(df_add(by_a, by_b), by_c).hi;
+        } else {
+            vec2 qa = sheared(pa * scale, shear);
+            vec2 qb = sheared(pb * scale, shear);
+            vec2 qc = sheared(pc * scale, shear);
+            wa = edge_function(qc, qb);
+            wb = edge_function(qa, qc);
+            wc = edge_function(qb, qa);
+            det = wa + wb + wc;
+        }
         bool inside = min(wa, min(wb, wc)) >= 0.0 || max(wa, max(wb, wc)) <= 0.0;
         float whole = det == 0.0 ? 1.0 : det;
-        float t = (wa * qa.z + wb * qb.z + wc * qc.z) / whole / dz;
+        float t = (wa * (pa.z * scale) + wb * (pb.z * scale) + wc * (pc.z * scale)) / whole / dz;
         if (inside && moves && det != 0.0 && t >= 0.0) {
             r = RayTriangle(true, unscaled(t, scale_d, scale), wb / whole, wc / whole);
         }

@@ -197,13 +197,15 @@ fn toward_triangle(d: &mut Draw, distance: f64, scale: f64) -> Vec<f32> {
 }
 
 /// What the rounding of sheared coordinates does to u, v and 1 − u − v, and to t.
-fn triangle_errors(x: &[f64]) -> [f64; 2] {
+fn triangle_errors(case: &Case<'_>) -> [f64; 2] {
+    let x = case.inputs;
     let [o, d, a, b, c] = [0, 3, 6, 9, 12].map(|k| vector(x, k));
     let corners = [a - o, b - o, c - o];
     let reach = corners.iter().fold(0.0, |m: f64, p| m.max(p.length()));
     let across = corners.iter().fold(0.0, |m: f64, p| m.max(p.cross(d).length() / d.length()));
     let doubled = (b - a).cross(c - a).dot(d).abs() / d.length();
-    let weights = 16.0 * 2_f64.powi(-24) * reach * across / doubled;
+    let rounding = case.tiered(2_f64.powi(-20), 2_f64.powi(-40));
+    let weights = rounding * reach * across / doubled;
     let k = if d.x.abs() == d.abs().max_element() {
         0
     } else if d.y.abs() == d.abs().max_element() {
@@ -214,19 +216,20 @@ fn triangle_errors(x: &[f64]) -> [f64; 2] {
     let t = corners.map(|p| p[k] / d[k]);
     let most = t.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
     let spread = (t[0] - t[1]).abs().max((t[1] - t[2]).abs()).max((t[2] - t[0]).abs());
-    [weights, 2.0 * weights * spread + 4.0 * 2_f64.powi(-24) * most]
+    [weights, 2.0 * weights * spread + 8.0 * 2_f64.powi(-24) * most]
 }
 
 /// Whether rounding may decide that the ray misses.
-fn undecided(x: &[f64]) -> bool {
+fn undecided(case: &Case<'_>) -> bool {
+    let x = case.inputs;
     let [o, d, a, b, c] = [0, 3, 6, 9, 12].map(|k| vector(x, k));
     let [t, u, v] = plane_meeting(o, d, a, b, c);
-    let [weights, by_t] = triangle_errors(x);
-    u.min(v).min(1.0 - u - v).abs() <= weights || t.abs() <= by_t || !(weights < 1.0)
+    let [weights, by_t] = triangle_errors(case);
+    u.min(v).min(1.0 - u - v).abs() <= weights || t.abs() <= by_t || weights.is_nan() || weights >= 1.0
 }
 
 fn weight_allowed(case: &Case<'_>) -> f64 {
-    if undecided(case.inputs) { f64::INFINITY } else { triangle_errors(case.inputs)[0] + 2_f64.powi(-23) }
+    if undecided(case) { f64::INFINITY } else { triangle_errors(case)[0] + 2e-7 }
 }
 
 fn cosine_to_triangle(x: &[f64]) -> f64 {
@@ -379,16 +382,16 @@ pub(super) const EQUATIONS: &[Equation] = &[
         outputs: &[
             Output {
                 name: "hit",
-                bound: "exact where the weights are farther from 0 than δ = 16·2^-24 reach·across/2 area",
-                allowed: |c| flag(undecided(c.inputs)),
+                bound: "exact where the weights are farther from 0 than δ = 2^-20 reach·across/2 area; compensated 2^-40",
+                allowed: |c| flag(undecided(c)),
             },
             Output {
                 name: "t",
-                bound: "2δ of the vertices' spread in t + 4·2^-24 of the largest of them",
-                allowed: |c| if undecided(c.inputs) { f64::INFINITY } else { triangle_errors(c.inputs)[1] },
+                bound: "2δ of the vertices' spread in t + 2^-21 of the largest of them",
+                allowed: |c| if undecided(c) { f64::INFINITY } else { triangle_errors(c)[1] },
             },
-            Output { name: "u", bound: "δ + 1.2e-7", allowed: weight_allowed },
-            Output { name: "v", bound: "δ + 1.2e-7", allowed: weight_allowed },
+            Output { name: "u", bound: "δ + 2e-7", allowed: weight_allowed },
+            Output { name: "v", bound: "δ + 2e-7", allowed: weight_allowed },
         ],
         axis: Axis { name: "|cos| of ray and normal", log: true, of: cosine_to_triangle, column: 1 },
         extreme: 1e38,
