@@ -106,8 +106,8 @@ HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
         if (lengths.hi >= SMALLEST_NORMAL) {
             vec3 across = cross2(N, T) + cross(N, T_lo);
             DoubleFloat c = dot2(N, T);
-            precise float cos_sum = c.hi + (c.lo + dot(N, T_lo));
-            r.cos_h = cos_sum / sqrt(lengths.hi);
+            precise float c_lo = c.lo + dot(N, T_lo);
+            r.cos_h = df_div(quick_two_sum(c.hi, c_lo), df_sqrt(lengths)).hi;
             r.sin2_h = df_div(dot2(across, across), lengths).hi;
             float sum2 = s2.hi - s2.hi * (0.5 * longer);
             r.cos_d = min(0.5 * sqrt(sum2), 1.0);
