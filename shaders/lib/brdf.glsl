@@ -17,17 +17,17 @@ float alpha_in_domain(float alpha) {
 // --------------------------------------------------------------------------------------------------------------------
 // Angles
 
+// Cosine between two directions to 32 ulp down to 1e-8: exact products, over the lengths. What the functions below return
+// as a cosine; `cosine` is enough for the terms of a microfacet model, which are smooth in it.
+float grazing_cosine(vec3 a, vec3 b) {
+    float lengths = sqrt(dot(a, a) * dot(b, b));
+    return ARITHMETIC == FAST ? dot(a, b) : lengths > 0.0 ? dot2(a, b).hi / lengths : 0.0;
+}
+
 // Cosine between two directions. A plain sum is good to 2e-7, lengths of rounded unit vectors included: nothing near
 // 90°, where it is all error. Compensated: the sum of exact products, over the lengths.
 float cosine(vec3 a, vec3 b) {
-    float c;
-    if (ARITHMETIC == COMPENSATED) {
-        float lengths = sqrt(dot(a, a) * dot(b, b));
-        c = lengths > 0.0 ? dot2(a, b).hi / lengths : 0.0;
-    } else {
-        c = dot(a, b);
-    }
-    return c;
+    return ARITHMETIC == COMPENSATED ? grazing_cosine(a, b) : dot(a, b);
 }
 
 // A cosine in its range; 0 for NaN and infinities.
@@ -129,6 +129,20 @@ HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
     return r;
 }
 
+// The same for a lobe that may be wide: for a shine of 1 it is the cosine, and near 90° that has no digits in a plain sum.
+HalfAngle phong_half_angle(vec3 N, vec3 L, vec3 V) {
+    HalfAngle r = half_angle(N, L, V);
+    if (ARITHMETIC == STABLE) {
+        DoubleFloat l2 = dot2(L, L);
+        DoubleFloat v2 = dot2(V, V);
+        precise float longer = (l2.hi - v2.hi) + (l2.lo - v2.lo);
+        float turn = 0.25 * longer * dot(N, L - V);
+        DoubleFloat sum = df_add(df_add(dot2(N, L), dot2(N, V)), DoubleFloat(-turn, 0.0));
+        r.cos_h = r.sum2 > 0.0 ? sum.hi / sqrt(r.sum2 * dot(N, N)) : 0.0;
+    }
+    return r;
+}
+
 // The same without NaN and infinities.
 HalfAngle half_angle_in_range(HalfAngle a) {
     bool good = abs(a.cos_h) <= LARGEST && a.sin2_h <= LARGEST && a.sum2 <= LARGEST;
@@ -146,7 +160,7 @@ struct Lambert {
 
 // @eq B2 B4 B9 N25: L = L_in k_d cos⁺θ, cosθ = N·L
 Lambert lambert(vec3 N, vec3 L, float Lin, float kd) {
-    float c = cosine(N, L);
+    float c = grazing_cosine(N, L);
     float cos_plus = ARITHMETIC == FAST ? max(c, 0.0) : max(cosine_in_range(c), 0.0);
     return Lambert(cos_plus, Lin * (kd * cos_plus));
 }
@@ -187,14 +201,14 @@ struct BlinnPhong {
 // Self-shadow: spec and L are 0 for cosθ < 0, not for cosθ = 0. V may be anywhere, as in the lecture's shade().
 BlinnPhong blinn_phong(vec3 N, vec3 L, vec3 V, float Lin, float kd, float ks, float shine) {
     BlinnPhong r;
-    HalfAngle a = half_angle(N, L, V);
+    HalfAngle a = phong_half_angle(N, L, V);
     if (ARITHMETIC == FAST) {
         r.cos_in = dot(N, L);
         r.spec = r.cos_in < 0.0 ? 0.0 : phong_lobe(a, shine);
         r.Lref = r.cos_in < 0.0 ? 0.0 : Lin * kd * r.cos_in + Lin * ks * r.spec;
     } else {
         a = half_angle_in_range(a);
-        r.cos_in = cosine_in_range(cosine(N, L));
+        r.cos_in = cosine_in_range(grazing_cosine(N, L));
         r.spec = r.cos_in < 0.0 ? 0.0 : phong_lobe(a, max(shine, 0.0));
         r.Lref = r.cos_in < 0.0 ? 0.0 : Lin * (kd * r.cos_in + ks * r.spec);
     }
@@ -212,8 +226,8 @@ struct ReciprocalPhong {
 // @eq B6 N17 N18: L = L_in (k_d + f_s) cos⁺θ, f_s = k_s (cos⁺δ)^shine/(L + V)²
 // The BRDF is symmetric in L and V; f_s is 0 for cosθ < 0, as is L.
 ReciprocalPhong reciprocal_phong(vec3 N, vec3 L, vec3 V, float Lin, float kd, float ks, float shine) {
-    HalfAngle a = half_angle(N, L, V);
-    float c = cosine(N, L);
+    HalfAngle a = phong_half_angle(N, L, V);
+    float c = grazing_cosine(N, L);
     ReciprocalPhong r;
     if (ARITHMETIC == FAST) {
         r.fr_spec = c < 0.0 ? 0.0 : ks * reciprocal_lobe(a, phong_lobe(a, shine));

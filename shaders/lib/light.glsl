@@ -31,9 +31,7 @@ LightDirectional light_directional(vec3 N, vec3 L, float E) {
         cos_plus = max(dot(N, normalize(L)), 0.0);
     } else {
         vec3 l = L * power_of_two(scale_exponent(L));
-        float l2 = dot(l, l);
-        float c = ARITHMETIC == COMPENSATED ? cosine(N, l) : l2 > 0.0 ? dot(N, l) / sqrt(l2) : 0.0;
-        cos_plus = max(cosine_in_range(c), 0.0);
+        cos_plus = max(cosine_in_range(grazing_cosine(N, l)), 0.0);
     }
     return LightDirectional(cos_plus, E * cos_plus);
 }
@@ -52,7 +50,7 @@ struct LightPoint {
 
 // @eq R4 N32 N33: E_⊥ = I/r², E = E_⊥ cos⁺θ, of a light at Q with radiant intensity I on a surface at P
 // No smallest radius here: what exceeds the range of floats is +∞, never NaN. P = Q: r² = 0, cos⁺ = 0, E = 0, and E_⊥
-// is +∞ for I > 0, 0 otherwise. Q − P rounds once (and not at all nearby); compensated: it does not round.
+// is +∞ for I > 0, 0 otherwise. Q − P in pairs: it does not round.
 LightPoint light_point(vec3 P, vec3 Q, vec3 N, float I) {
     LightPoint r;
     if (ARITHMETIC == FAST) {
@@ -72,14 +70,10 @@ LightPoint light_point(vec3 P, vec3 Q, vec3 N, float I) {
         float d2 = dot(d, d);
         float c = 0.0;
         if (d2 > 0.0) {
-            if (ARITHMETIC == COMPENSATED) {
-                DoubleFloat sum = dot2(N, d);
-                precise float lo = sum.lo + dot(N, vec3(dx.lo, dy.lo, dz.lo) * f);
-                float lengths = sqrt(d2 * dot(N, N));
-                c = lengths > 0.0 ? (sum.hi + lo) / lengths : 0.0;
-            } else {
-                c = dot(N, d) / sqrt(d2);
-            }
+            DoubleFloat sum = dot2(N, d);
+            precise float lo = sum.lo + dot(N, vec3(dx.lo, dy.lo, dz.lo) * f);
+            float lengths = sqrt(d2 * dot(N, N));
+            c = lengths > 0.0 ? (sum.hi + lo) / lengths : 0.0;
         }
         // 2^-127 is not a normal number: where it would be the factor, r² is 0 either way.
         float back = power_of_two(max(-n, -126));

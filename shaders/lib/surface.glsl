@@ -88,7 +88,7 @@ float largest(vec3 v) {
 vec3 reflected(Surface s, vec3 l) {
     float cos_l = cosine(s.n, l);
     float cos_v = max(cosine(s.n, s.v), 1e-4);
-    HalfAngle h = half_angle(s.n, l, s.v);
+    HalfAngle h = BRDF <= 1 ? phong_half_angle(s.n, l, s.v) : half_angle(s.n, l, s.v);
     vec3 result = vec3(0.0);
     // Self-shadow (lecture B9).
     if (cos_l > 0.0) {

@@ -173,8 +173,8 @@ const ROUNDED_PAIR: &[Output] = &[
     Output { name: "lo", bound: "1.5 ulp of hi", allowed: |c| 1.5 * ulp(c.exact[0]) },
 ];
 
-const SIZE_OF_SUM: Axis = Axis { name: "|a + b|", log: true, of: |x| (x[0] + x[1]).abs(), column: 0 };
-const SIZE: Axis = Axis { name: "|x|", log: true, of: |x| x[0].abs(), column: 0 };
+const SIZE_OF_SUM: Axis = Axis { name: "|a + b|", log: true, of: |x| (x[0] + x[1]).abs(), column: 0, relative: true };
+const SIZE: Axis = Axis { name: "|x|", log: true, of: |x| x[0].abs(), column: 0, relative: true };
 
 /// The equations of this file.
 pub(super) const EQUATIONS: &[Equation] = &[
@@ -214,7 +214,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
         twin: |x| df_add([x[0], x[1]], [x[2], x[3]]).to_vec(),
         regions: DOUBLES,
         outputs: ROUNDED_PAIR,
-        axis: Axis { name: "|a + b|", log: true, of: |x| (x[0] + x[2]).abs(), column: 0 },
+        axis: Axis { name: "|a + b|", log: true, of: |x| (x[0] + x[2]).abs(), column: 0, relative: true },
         extreme: 1e17,
     },
     Equation {
@@ -275,7 +275,13 @@ pub(super) const EQUATIONS: &[Equation] = &[
                 },
             },
         ],
-        axis: Axis { name: "|a·b|", log: true, of: |x| vector(x, 0).dot(vector(x, 3)).abs(), column: 0 },
+        axis: Axis {
+            name: "|a·b|",
+            log: true,
+            of: |x| vector(x, 0).dot(vector(x, 3)).abs(),
+            column: 0,
+            relative: true,
+        },
         extreme: 1e17,
     },
     Equation {
@@ -308,7 +314,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Region { name: "near 1", share: 2, draw: |d| vec![(1.0 + d.sign() * d.log(6e-8, 0.5)) as f32] },
         ],
         outputs: &[Output { name: "y", bound: "1 ulp", allowed: |c| c.ulps(1.0) }],
-        axis: Axis { name: "|x − 1|", log: true, of: |x| (x[0] - 1.0).abs(), column: 0 },
+        axis: Axis { name: "|x − 1|", log: true, of: |x| (x[0] - 1.0).abs(), column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -346,7 +352,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             },
         ],
         outputs: &[Output { name: "z", bound: "4 ulp", allowed: |c| c.ulps(4.0) }],
-        axis: Axis { name: "|y|", log: true, of: |x| x[1].abs(), column: 0 },
+        axis: Axis { name: "|y|", log: true, of: |x| x[1].abs(), column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -362,7 +368,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
         twin: |x| vec![acosf(x[0])],
         regions: ARC,
         outputs: &[Output { name: "y", bound: "3 ulp", allowed: |c| c.ulps(3.0) }],
-        axis: Axis { name: "1 − |x|", log: true, of: |x| 1.0 - x[0].abs(), column: 0 },
+        axis: Axis { name: "1 − |x|", log: true, of: |x| 1.0 - x[0].abs(), column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -374,7 +380,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             draw: |d| vec![(d.sign() * d.log(1e-9, 1e9)) as f32, (d.sign() * d.log(1e-9, 1e9)) as f32],
         }],
         outputs: &[Output { name: "angle", bound: "3 ulp", allowed: |c| c.ulps(3.0) }],
-        axis: Axis { name: "|y/x|", log: true, of: |x| (x[0] / x[1]).abs(), column: 0 },
+        axis: Axis { name: "|y/x|", log: true, of: |x| (x[0] / x[1]).abs(), column: 0, relative: true },
         extreme: 1e38,
     },
 ];

@@ -307,6 +307,11 @@ fn ggx_row(vectors: [DVec3; 3], alpha: f64, d: &mut Draw) -> Vec<f32> {
 
 /// Error of a cosine. Stable: three products and two sums round to 1e-7 at most, and the two lengths, which the plain sum
 /// does not divide by, are off by 5.2e-8 each where the components are alike. Compensated: numerics.md 25.
+pub(super) fn grazing_allowed(exact: f64) -> f64 {
+    32.0 * ulp(exact) + 1e-14
+}
+
+/// A plain sum of rounded products, lengths of rounded unit vectors included.
 pub(super) fn cosine_allowed(case: &Case<'_>, exact: f64) -> f64 {
     case.tiered(1.0e-7 + 1.04e-7 * exact.abs(), 32.0 * ulp(exact) + 1e-14)
 }
@@ -350,8 +355,8 @@ fn lobe_allowed(case: &Case<'_>) -> f64 {
 }
 
 /// Where the sign of N·L is the rounding's.
-fn at_terminator(case: &Case<'_>, cos_in: f64) -> bool {
-    cos_in.abs() < case.tiered(1.2e-7, 1e-14)
+fn at_terminator(cos_in: f64) -> bool {
+    cos_in.abs() < 1e-14
 }
 
 /// G₂ and G₂/(4 cosθ_l cosθ_v) of cosines that are off by `error` at most: relative to a cosine, and no further than all.
@@ -399,18 +404,14 @@ pub(super) const EQUATIONS: &[Equation] = &[
             },
         ],
         outputs: &[
-            Output {
-                name: "cos_plus",
-                bound: "1e-7 + 1.04e-7 |cos|; compensated 32 ulp",
-                allowed: |c| cosine_allowed(c, c.x()),
-            },
+            Output { name: "cos_plus", bound: "32 ulp + 1e-14", allowed: |c| grazing_allowed(c.x()) },
             Output {
                 name: "Lref",
                 bound: "L_in k_d times that + 2 ulp",
-                allowed: |c| c.inputs[6] * c.inputs[7] * cosine_allowed(c, c.exact[0]) + c.ulps(2.0),
+                allowed: |c| c.inputs[6] * c.inputs[7] * grazing_allowed(c.exact[0]) + c.ulps(2.0),
             },
         ],
-        axis: Axis { name: "cosθ", log: true, of: |x| cosine(vector(x, 0), vector(x, 3)), column: 0 },
+        axis: Axis { name: "cosθ", log: true, of: |x| cosine(vector(x, 0), vector(x, 3)), column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -418,11 +419,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
         twin: |x| blinn_phong(vector(x, 0), vector(x, 3), vector(x, 6), [x[9], x[10], x[11], x[12]]).to_vec(),
         regions: PHONG,
         outputs: &[
-            Output {
-                name: "cos_in",
-                bound: "1e-7 + 1.04e-7 |cos|; compensated 32 ulp",
-                allowed: |c| cosine_allowed(c, c.x()),
-            },
+            Output { name: "cos_in", bound: "32 ulp + 1e-14", allowed: |c| grazing_allowed(c.x()) },
             Output {
                 name: "cos_delta",
                 bound: "1e-7 + 1.6e-7 |cos| + a turn of 2e-7 rad; compensated 32 ulp",
@@ -436,7 +433,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output {
                 name: "spec",
                 bound: "shine tanδ 2e-7 + 1e-5 (beyond 45° that of cosδ); compensated (8 + 6 |ln f|) ulp",
-                allowed: |c| if at_terminator(c, c.exact[0]) { f64::INFINITY } else { lobe_allowed(c) },
+                allowed: |c| if at_terminator(c.exact[0]) { f64::INFINITY } else { lobe_allowed(c) },
             },
             Output {
                 name: "Lref",
@@ -444,13 +441,13 @@ pub(super) const EQUATIONS: &[Equation] = &[
                 allowed: |c| {
                     let [lin, kd, ks] = [c.inputs[9], c.inputs[10], c.inputs[11]];
                     let (cos_in, cos_delta, ..) = phong_vectors(c.inputs);
-                    let jump = if at_terminator(c, cos_in) { lin * ks * lobe(cos_delta, c.inputs[12]) } else { 0.0 };
+                    let jump = if at_terminator(cos_in) { lin * ks * lobe(cos_delta, c.inputs[12]) } else { 0.0 };
                     let lit = if cos_in < 0.0 && jump == 0.0 { 0.0 } else { ks * lobe_allowed(c) };
-                    lin * (kd * cosine_allowed(c, cos_in) + lit) + jump + c.ulps(3.0)
+                    lin * (kd * grazing_allowed(cos_in) + lit) + jump + c.ulps(3.0)
                 },
             },
         ],
-        axis: Axis { name: "shine", log: true, of: |x| x[12], column: 3 },
+        axis: Axis { name: "shine", log: true, of: |x| x[12], column: 3, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -466,7 +463,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
                     let s2 = c.exact[0].max(f64::MIN_POSITIVE);
                     let lobe = c.inputs[11] * lobe_allowed(c) / s2;
                     let (cos_in, ..) = phong_vectors(c.inputs);
-                    if at_terminator(c, cos_in) { f64::INFINITY } else { lobe + c.ulps(2.0) + c.rel(lv2_part(c, s2)) }
+                    if at_terminator(cos_in) { f64::INFINITY } else { lobe + c.ulps(2.0) + c.rel(lv2_part(c, s2)) }
                 },
             },
             Output {
@@ -478,11 +475,11 @@ pub(super) const EQUATIONS: &[Equation] = &[
                     let s2 = s2.max(f64::MIN_POSITIVE);
                     let fr_spec = ks * lobe(cos_delta, c.inputs[12]) / s2;
                     let part = ks * lobe_allowed(c) / s2 + fr_spec * lv2_part(c, s2);
-                    lin * (cos_in.max(0.0) * part + (kd + fr_spec + part) * cosine_allowed(c, cos_in)) + c.ulps(3.0)
+                    lin * (cos_in.max(0.0) * part + (kd + fr_spec + part) * grazing_allowed(cos_in)) + c.ulps(3.0)
                 },
             },
         ],
-        axis: Axis { name: "|L + V|", log: true, of: |x| phong_vectors(x).3.sqrt(), column: 0 },
+        axis: Axis { name: "|L + V|", log: true, of: |x| phong_vectors(x).3.sqrt(), column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -528,7 +525,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             // Both lengths to the fourth power are 7 of the stable tier's, sin² twice is 9.
             Output { name: "D", bound: "18 ulp; compensated 12 ulp", allowed: |c| c.ulps(c.tiered(18.0, 12.0)) },
         ],
-        axis: Axis { name: "α", log: true, of: |x| x[6], column: 2 },
+        axis: Axis { name: "α", log: true, of: |x| x[6], column: 2, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -546,7 +543,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             },
         ],
         outputs: &[Output { name: "lambda", bound: "6 ulp", allowed: |c| c.ulps(6.0) }],
-        axis: Axis { name: "cosθ", log: true, of: |x| x[0], column: 0 },
+        axis: Axis { name: "cosθ", log: true, of: |x| x[0], column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -580,7 +577,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "G2", bound: "5 ulp", allowed: |c| c.ulps(5.0) },
             Output { name: "Vis", bound: "5 ulp", allowed: |c| c.ulps(5.0) },
         ],
-        axis: Axis { name: "N·L", log: true, of: |x| x[0], column: 0 },
+        axis: Axis { name: "N·L", log: true, of: |x| x[0], column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -600,7 +597,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             },
         ],
         outputs: &[Output { name: "F", bound: "8 ulp", allowed: |c| c.ulps(8.0) }],
-        axis: Axis { name: "1 − V·H", log: true, of: |x| 1.0 - x[1], column: 0 },
+        axis: Axis { name: "1 − V·H", log: true, of: |x| 1.0 - x[1], column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -628,7 +625,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
                 allowed: |c| c.ulps(30.0) + c.rel(2.0 * factors(c)),
             },
         ],
-        axis: Axis { name: "α", log: true, of: |x| x[9], column: 0 },
+        axis: Axis { name: "α", log: true, of: |x| x[9], column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -639,7 +636,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Region { name: "almost 1", share: 1, draw: |d| vec![d.unit() as f32, (1.0 - d.log(1e-7, 0.1)) as f32] },
         ],
         outputs: &[Output { name: "factor", bound: "2 ulp", allowed: |c| c.ulps(2.0) }],
-        axis: Axis { name: "E", log: false, of: |x| x[1], column: 0 },
+        axis: Axis { name: "E", log: false, of: |x| x[1], column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -654,7 +651,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "sin_h", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
             Output { name: "cos_h", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
         ],
-        axis: Axis { name: "sinθ_h", log: true, of: |x| ggx_sample(x[0], x[1])[0], column: 0 },
+        axis: Axis { name: "sinθ_h", log: true, of: |x| ggx_sample(x[0], x[1])[0], column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -694,7 +691,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             },
             Output { name: "pdf_l", bound: "as pdf_h, 18 ulp", allowed: |c| pdf_allowed(c, 18.0) },
         ],
-        axis: Axis { name: "α", log: true, of: |x| x[9], column: 0 },
+        axis: Axis { name: "α", log: true, of: |x| x[9], column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -715,7 +712,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "Lz", bound: "1 ulp", allowed: |c| c.ulps(1.0) },
             Output { name: "pdf", bound: "3 ulp", allowed: |c| c.ulps(3.0) },
         ],
-        axis: Axis { name: "1 − u₁", log: true, of: |x| 1.0 - x[0], column: 2 },
+        axis: Axis { name: "1 − u₁", log: true, of: |x| 1.0 - x[0], column: 2, relative: false },
         extreme: 1e38,
     },
     Equation {
@@ -745,7 +742,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             bound: "1e-7 and 5 ulp, exact for 0",
             allowed: |c| if c.inputs[0] == 0.0 { EXACT(c) } else { c.ulps(5.0).min(1e-7) },
         }],
-        axis: Axis { name: "q/p", log: true, of: |x| x[1] / x[0], column: 0 },
+        axis: Axis { name: "q/p", log: true, of: |x| x[1] / x[0], column: 0, relative: true },
         extreme: 1e38,
     },
 ];

@@ -118,6 +118,8 @@ pub struct Axis {
     pub of: fn(&[f64]) -> f64,
     /// The output column whose error is plotted.
     pub column: usize,
+    /// Whether the error is plotted relative to the exact value: not that of a vector's component, which may be near 0.
+    pub relative: bool,
 }
 
 /// Distance between neighbouring values of f32 at `x`.

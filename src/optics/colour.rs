@@ -234,7 +234,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "sG", bound: "as sR", allowed: product_allowed },
             Output { name: "sB", bound: "as sR", allowed: product_allowed },
         ],
-        axis: Axis { name: "Y/X", log: true, of: |x| (x[1] / x[0]).abs(), column: 0 },
+        axis: Axis { name: "Y/X", log: true, of: |x| (x[1] / x[0]).abs(), column: 0, relative: true },
         extreme: 5e37,
     },
     Equation {
@@ -252,7 +252,13 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "g10", bound: "as X", allowed: integral_allowed },
             Output { name: "b10", bound: "as X", allowed: integral_allowed },
         ],
-        axis: Axis { name: "largest sample", log: true, of: |x| x.iter().copied().fold(0.0, f64::max), column: 1 },
+        axis: Axis {
+            name: "largest sample",
+            log: true,
+            of: |x| x.iter().copied().fold(0.0, f64::max),
+            column: 1,
+            relative: true,
+        },
         extreme: 1e34,
     },
     Equation {
@@ -278,7 +284,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "g10", bound: "as X", allowed: gaussian_allowed },
             Output { name: "b10", bound: "as X", allowed: gaussian_allowed },
         ],
-        axis: Axis { name: "width, nm", log: true, of: |x| x[2], column: 1 },
+        axis: Axis { name: "width, nm", log: true, of: |x| x[2], column: 1, relative: true },
         extreme: 1e34,
     },
     Equation {
@@ -289,7 +295,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Region { name: "far below 0", share: 1, draw: |d| vec![-d.log(1.0, 1e17) as f32] },
         ],
         outputs: &[Output { name: "S", bound: "4 ulp", allowed: |c| c.ulps(4.0) }],
-        axis: Axis { name: "−x", log: true, of: |x| -x[0], column: 0 },
+        axis: Axis { name: "−x", log: true, of: |x| -x[0], column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -301,7 +307,13 @@ pub(super) const EQUATIONS: &[Equation] = &[
             bound: "3·2^-24 Σ|c λ^k| dS/dx + 5 ulp; compensated 5 ulp",
             allowed: upsampled_allowed,
         }],
-        axis: Axis { name: "ρ", log: true, of: |x| upsampled_reflectance(x[0], [x[1], x[2], x[3]]), column: 0 },
+        axis: Axis {
+            name: "ρ",
+            log: true,
+            of: |x| upsampled_reflectance(x[0], [x[1], x[2], x[3]]),
+            column: 0,
+            relative: true,
+        },
         extreme: 1e38,
     },
     Equation {
@@ -330,7 +342,13 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "n", bound: "2 ulp", allowed: |c| c.ulps(2.0) },
             Output { name: "n_minus_1", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
         ],
-        axis: Axis { name: "n − 1", log: true, of: |x| sellmeier(x[0], &x[1..5], &x[5..9])[1], column: 1 },
+        axis: Axis {
+            name: "n − 1",
+            log: true,
+            of: |x| sellmeier(x[0], &x[1..5], &x[5..9])[1],
+            column: 1,
+            relative: true,
+        },
         extreme: 1e38,
     },
     Equation {
@@ -342,7 +360,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             draw: |d| vec![d.between(0.36, 0.83) as f32, d.between(1.3, 2.4) as f32, d.log(1e-4, 0.05) as f32],
         }],
         outputs: &[Output { name: "n", bound: "2 ulp", allowed: |c| c.ulps(2.0) }],
-        axis: Axis { name: "B, µm²", log: true, of: |x| x[2], column: 0 },
+        axis: Axis { name: "B, µm²", log: true, of: |x| x[2], column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -353,7 +371,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Region { name: "about 1 and above", share: 1, draw: |d| vec![d.between(0.5, 88.0) as f32] },
         ],
         outputs: &[Output { name: "y", bound: "4 ulp", allowed: |c| c.ulps(4.0) }],
-        axis: Axis { name: "x", log: true, of: |x| x[0], column: 0 },
+        axis: Axis { name: "x", log: true, of: |x| x[0], column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -380,7 +398,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             // Beyond, what is left is below 1e-38 of 2hc²/λ⁵.
             allowed: |c| if quantum(c.inputs[0], c.inputs[1]) < 87.0 { c.ulps(6.0) } else { c.x() },
         }],
-        axis: Axis { name: "hc/(λkT)", log: true, of: |x| quantum(x[0], x[1]), column: 0 },
+        axis: Axis { name: "hc/(λkT)", log: true, of: |x| quantum(x[0], x[1]), column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -405,7 +423,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             },
             Output { name: "decode", bound: "8 ulp", allowed: |c| c.ulps(8.0) },
         ],
-        axis: Axis { name: "x", log: true, of: |x| x[0], column: 0 },
+        axis: Axis { name: "x", log: true, of: |x| x[0], column: 0, relative: true },
         extreme: 1e38,
     },
 ];

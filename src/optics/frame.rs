@@ -36,6 +36,12 @@ pub fn orthonormal_basis(n: DVec3) -> (DVec3, DVec3) {
     (t, b)
 }
 
+/// @eq N15: how far a frame is from orthonormal: not at all.
+#[must_use]
+pub fn basis_gram(_n: DVec3) -> f64 {
+    0.0
+}
+
 /// @eq N41: the normal n under the linear map with columns a, b, c, by the inverse transpose.
 #[must_use]
 pub fn transformed_normal(a: DVec3, b: DVec3, c: DVec3, n: DVec3) -> DVec3 {
@@ -212,7 +218,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "nz", bound: "abs 2e-7", allowed: |_| 2e-7 },
             Output { name: "is_zero", bound: "exact", allowed: EXACT },
         ],
-        axis: Axis { name: "|v|", log: true, of: |x| vector(x, 0).length(), column: 0 },
+        axis: Axis { name: "|v|", log: true, of: |x| vector(x, 0).length(), column: 0, relative: false },
         extreme: 1e38,
     },
     Equation {
@@ -220,7 +226,13 @@ pub(super) const EQUATIONS: &[Equation] = &[
         twin: |x| vec![angle_between(vector(x, 0), vector(x, 3))],
         regions: ANGLES,
         outputs: &[Output { name: "angle", bound: "rel 6e-7", allowed: |c| c.rel(6e-7) }],
-        axis: Axis { name: "θ, rad", log: true, of: |x| angle_between(vector(x, 0), vector(x, 3)), column: 0 },
+        axis: Axis {
+            name: "θ, rad",
+            log: true,
+            of: |x| angle_between(vector(x, 0), vector(x, 3)),
+            column: 0,
+            relative: true,
+        },
         extreme: 1e38,
     },
     Equation {
@@ -228,7 +240,13 @@ pub(super) const EQUATIONS: &[Equation] = &[
         twin: |x| vec![sin2_between(vector(x, 0), vector(x, 3))],
         regions: ANGLES,
         outputs: &[Output { name: "sin2", bound: "8 ulp", allowed: |c| c.ulps(8.0) }],
-        axis: Axis { name: "θ, rad", log: true, of: |x| angle_between(vector(x, 0), vector(x, 3)), column: 0 },
+        axis: Axis {
+            name: "θ, rad",
+            log: true,
+            of: |x| angle_between(vector(x, 0), vector(x, 3)),
+            column: 0,
+            relative: true,
+        },
         extreme: 1e38,
     },
     Equation {
@@ -246,15 +264,15 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "by", bound: "abs 2e-7", allowed: |_| 2e-7 },
             Output { name: "bz", bound: "abs 2e-7", allowed: |_| 2e-7 },
         ],
-        axis: Axis { name: "1 + n_z", log: true, of: |x| 1.0 + x[2], column: 0 },
+        axis: Axis { name: "1 + n_z", log: true, of: |x| 1.0 + x[2], column: 0, relative: false },
         extreme: 1e38,
     },
     Equation {
         name: "basis_gram",
-        twin: |_| vec![0.0],
+        twin: |x| vec![basis_gram(vector(x, 0))],
         regions: NORMALS,
         outputs: &[Output { name: "gram", bound: "2e-7", allowed: |_| 2e-7 }],
-        axis: Axis { name: "1 + n_z", log: true, of: |x| 1.0 + x[2], column: 0 },
+        axis: Axis { name: "1 + n_z", log: true, of: |x| 1.0 + x[2], column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -300,7 +318,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "Ny", bound: "as Nx", allowed: map_allowed },
             Output { name: "Nz", bound: "as Nx", allowed: map_allowed },
         ],
-        axis: Axis { name: "|a|", log: true, of: |x| vector(x, 0).length(), column: 0 },
+        axis: Axis { name: "|a|", log: true, of: |x| vector(x, 0).length(), column: 0, relative: false },
         extreme: 1e38,
     },
     Equation {
@@ -355,7 +373,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "nz", bound: "as nx", allowed: normal_allowed },
             Output { name: "degenerate", bound: "exact", allowed: EXACT },
         ],
-        axis: Axis { name: "|ab||ac|/|ab × ac|", log: true, of: sliver, column: 0 },
+        axis: Axis { name: "|ab||ac|/|ab × ac|", log: true, of: sliver, column: 0, relative: false },
         extreme: 1e38,
     },
     Equation {
@@ -375,7 +393,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "Ny", bound: "abs 2e-7", allowed: |_| 2e-7 },
             Output { name: "Nz", bound: "abs 2e-7", allowed: |_| 2e-7 },
         ],
-        axis: Axis { name: "|p|", log: true, of: |x| vector(x, 0).length(), column: 0 },
+        axis: Axis { name: "|p|", log: true, of: |x| vector(x, 0).length(), column: 0, relative: false },
         extreme: 1e38,
     },
 ];

@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::DVec3;
 
-use super::brdf::{at_cosine, cosine, cosine_allowed, cosine_in, normal};
+use super::brdf::{at_cosine, cosine, cosine_in, grazing_allowed, normal};
 use super::catalogue::{Axis, Case, Draw, Equation, Output, Region, columns, ulp, vector};
 
 /// @eq R3: cos⁺θ, E cos⁺θ.
@@ -119,18 +119,14 @@ pub(super) const EQUATIONS: &[Equation] = &[
             },
         ],
         outputs: &[
-            Output {
-                name: "cos_plus",
-                bound: "1e-7 + 1.6e-7 |cos|; compensated 32 ulp",
-                allowed: |c| scaled_cosine_allowed(c, c.x()),
-            },
+            Output { name: "cos_plus", bound: "32 ulp + 1e-14", allowed: |c| grazing_allowed(c.x()) },
             Output {
                 name: "irradiance",
                 bound: "E times that + 1 ulp",
-                allowed: |c| c.inputs[6] * scaled_cosine_allowed(c, c.exact[0]) + c.ulps(1.0),
+                allowed: |c| c.inputs[6] * grazing_allowed(c.exact[0]) + c.ulps(1.0),
             },
         ],
-        axis: Axis { name: "|L|", log: true, of: |x| vector(x, 3).length(), column: 0 },
+        axis: Axis { name: "|L|", log: true, of: |x| vector(x, 3).length(), column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -180,23 +176,25 @@ pub(super) const EQUATIONS: &[Equation] = &[
         ],
         outputs: &[
             Output { name: "r2", bound: "5 ulp", allowed: |c| c.ulps(5.0) },
-            Output {
-                name: "cos_plus",
-                bound: "1.6e-7 + 1.04e-7 |cos|; compensated 32 ulp",
-                allowed: |c| point_cosine_allowed(c, c.x()),
-            },
+            Output { name: "cos_plus", bound: "32 ulp + 1e-14", allowed: |c| grazing_allowed(c.x()) },
             Output { name: "E_perp", bound: "6 ulp", allowed: |c| c.ulps(6.0) },
             Output {
                 name: "irradiance",
                 bound: "E_⊥ times that of cos⁺ + 8 ulp",
                 allowed: |c| {
                     let at_light = c.exact[0] == 0.0;
-                    let part = if at_light { 0.0 } else { c.exact[2] * point_cosine_allowed(c, c.exact[1]) };
+                    let part = if at_light { 0.0 } else { c.exact[2] * grazing_allowed(c.exact[1]) };
                     c.ulps(8.0) + part
                 },
             },
         ],
-        axis: Axis { name: "r, m", log: true, of: |x| (vector(x, 3) - vector(x, 0)).length(), column: 2 },
+        axis: Axis {
+            name: "r, m",
+            log: true,
+            of: |x| (vector(x, 3) - vector(x, 0)).length(),
+            column: 2,
+            relative: true,
+        },
         extreme: 1e38,
     },
     Equation {
@@ -230,7 +228,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
                 c.ulps(2.5) + window / c.inputs[0].max(LIGHT_RADIUS * LIGHT_RADIUS)
             },
         }],
-        axis: Axis { name: "r/range", log: true, of: |x| (x[0] * x[1]).sqrt(), column: 0 },
+        axis: Axis { name: "r/range", log: true, of: |x| (x[0] * x[1]).sqrt(), column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -257,7 +255,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
                 c.ulps(4.0) + (2.0 * ramp + error) * error
             },
         }],
-        axis: Axis { name: "scale cosθ + offset", log: true, of: |x| x[0] * x[1] + x[2], column: 0 },
+        axis: Axis { name: "scale cosθ + offset", log: true, of: |x| x[0] * x[1] + x[2], column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -285,7 +283,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "one_minus_cos", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
             Output { name: "omega", bound: "6 ulp", allowed: |c| c.ulps(6.0) },
         ],
-        axis: Axis { name: "radius/distance", log: true, of: |x| x[0] / x[1], column: 0 },
+        axis: Axis { name: "radius/distance", log: true, of: |x| x[0] / x[1], column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -320,17 +318,8 @@ pub(super) const EQUATIONS: &[Equation] = &[
             log: true,
             of: |x| triangle_solid_angle(vector(x, 0), vector(x, 3), vector(x, 6)),
             column: 0,
+            relative: true,
         },
         extreme: 1e38,
     },
 ];
-
-/// Q − P has rounded once more than a given direction: 2^-24 of each component.
-fn point_cosine_allowed(case: &Case<'_>, exact: f64) -> f64 {
-    cosine_allowed(case, exact) + case.tiered(6e-8, 0.0)
-}
-
-/// |L| and the division by it round to 1.2e-7; the length of N is off by 5.2e-8.
-fn scaled_cosine_allowed(case: &Case<'_>, exact: f64) -> f64 {
-    cosine_allowed(case, exact) + case.tiered(6e-8 * exact.abs(), 0.0)
-}

@@ -135,7 +135,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
                 allowed: |c| c.ulps(if c.exact[1] < f64::from(f32::MIN_POSITIVE) { 5.0 } else { 3.0 }),
             },
         ],
-        axis: Axis { name: "τ", log: true, of: |x| x[1] * x[2], column: 2 },
+        axis: Axis { name: "τ", log: true, of: |x| x[1] * x[2], column: 2, relative: true },
         extreme: f32::MAX,
     },
     Equation {
@@ -147,7 +147,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             draw: |d| vec![d.log(1e-12, 10.0) as f32, d.log(1e-8, 1e-4) as f32],
         }],
         outputs: &[Output { name: "sigma", bound: "3 ulp", allowed: |c| c.ulps(3.0) }],
-        axis: Axis { name: "κ", log: true, of: |x| x[0], column: 0 },
+        axis: Axis { name: "κ", log: true, of: |x| x[0], column: 0, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -177,7 +177,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "T", bound: "2 ulp", allowed: |c| c.ulps(2.0) },
             Output { name: "one_minus_T", bound: "3 ulp", allowed: |c| c.ulps(3.0) },
         ],
-        axis: Axis { name: "steps", log: true, of: |x| x[0], column: 1 },
+        axis: Axis { name: "steps", log: true, of: |x| x[0], column: 1, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -200,7 +200,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
                 allowed: |c| (march_allowed(c).exp_m1() * c.x()).min(1.0) + c.ulps(2.0),
             },
         ],
-        axis: Axis { name: "falloff · Δs", log: true, of: |x| x[1] * x[2] / x[3], column: 0 },
+        axis: Axis { name: "falloff · Δs", log: true, of: |x| x[1] * x[2] / x[3], column: 0, relative: true },
         extreme: 1e38,
     },
 ];

@@ -316,6 +316,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             log: true,
             of: |x| (vector(x, 0) - vector(x, 6)).length() / x[9],
             column: 1,
+            relative: true,
         },
         extreme: 1e38,
     },
@@ -338,7 +339,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "t_near", bound: "2 ulp", allowed: |c| c.ulps(2.0) },
             Output { name: "t_far", bound: "rel 6e-7, 4e-7 of it the factor", allowed: |c| c.rel(6e-7) },
         ],
-        axis: Axis { name: "t_near", log: true, of: |x| box_of(x)[0], column: 1 },
+        axis: Axis { name: "t_near", log: true, of: |x| box_of(x)[0], column: 1, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -393,7 +394,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "u", bound: "δ + 2e-7", allowed: weight_allowed },
             Output { name: "v", bound: "δ + 2e-7", allowed: weight_allowed },
         ],
-        axis: Axis { name: "|cos| of ray and normal", log: true, of: cosine_to_triangle, column: 1 },
+        axis: Axis { name: "|cos| of ray and normal", log: true, of: cosine_to_triangle, column: 1, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -424,7 +425,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "p_offsetz", bound: "exact", allowed: EXACT },
             Output { name: "shift", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
         ],
-        axis: Axis { name: "|p|", log: true, of: |x| vector(x, 0).length(), column: 3 },
+        axis: Axis { name: "|p|", log: true, of: |x| vector(x, 0).length(), column: 3, relative: false },
         extreme: 1e38,
     },
     Equation {
@@ -438,7 +439,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "Py", bound: "as Px", allowed: point_allowed },
             Output { name: "Pz", bound: "as Px", allowed: point_allowed },
         ],
-        axis: Axis { name: "t", log: true, of: |x| x[6], column: 0 },
+        axis: Axis { name: "t", log: true, of: |x| x[6], column: 0, relative: false },
         extreme: 1e38,
     },
     Equation {
@@ -461,7 +462,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "p_rely", bound: "1 ulp", allowed: |c| c.ulps(1.0) },
             Output { name: "p_relz", bound: "1 ulp", allowed: |c| c.ulps(1.0) },
         ],
-        axis: Axis { name: "|eye|, m", log: true, of: |x| vector(x, 6).length(), column: 0 },
+        axis: Axis { name: "|eye|, m", log: true, of: |x| vector(x, 6).length(), column: 0, relative: false },
         extreme: 1e38,
     },
 ];

@@ -102,7 +102,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "Ry", bound: "abs 3e-7", allowed: |_| 3e-7 },
             Output { name: "Rz", bound: "abs 3e-7", allowed: |_| 3e-7 },
         ],
-        axis: Axis { name: "angle of incidence, rad", log: true, of: incidence, column: 0 },
+        axis: Axis { name: "angle of incidence, rad", log: true, of: incidence, column: 0, relative: false },
         extreme: 1e38,
     },
     Equation {
@@ -182,6 +182,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             log: true,
             of: |x| refract(vector(x, 0), vector(x, 3), x[6]).2,
             column: 0,
+            relative: false,
         },
         extreme: 1e38,
     },
@@ -210,7 +211,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "theta_deg", bound: "5 ulp: the angle's and one product's", allowed: |c| c.ulps(5.0) },
             Output { name: "cos_theta", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
         ],
-        axis: Axis { name: "n_in/n_out − 1", log: true, of: |x| x[0] / x[1] - 1.0, column: 3 },
+        axis: Axis { name: "n_in/n_out − 1", log: true, of: |x| x[0] / x[1] - 1.0, column: 3, relative: true },
         extreme: 1e38,
     },
     Equation {
@@ -225,7 +226,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "theta_rad", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
             Output { name: "cos_theta", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
         ],
-        axis: Axis { name: "n_out/n_in", log: true, of: |x| x[1] / x[0], column: 0 },
+        axis: Axis { name: "n_out/n_in", log: true, of: |x| x[1] / x[0], column: 0, relative: true },
         extreme: 1e38,
     },
 ];

@@ -13,7 +13,6 @@ use rayon::prelude::*;
 
 use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, Place, Sampled, SamplerDesc};
 use crate::image::file;
-use crate::optics::Tier;
 use crate::plan::Plan;
 use crate::scene::environment::Environment;
 use crate::shader::prefilter;

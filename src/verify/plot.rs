@@ -8,11 +8,11 @@ use crate::optics::Tier;
 
 const SIZE: (u32, u32) = (760, 440);
 const BINS: usize = 96;
-/// Relative errors below this are drawn on the floor: an eighth of an ulp.
+/// Errors below this are drawn on the floor: an eighth of an ulp.
 const FLOOR: f64 = 7.45e-9;
 const CEILING: f64 = 1e3;
 
-/// Largest relative error of the plotted column in each bin of the axis: (axis value, error).
+/// Largest error of the plotted column in each bin of the axis: (axis value, error).
 fn series(entry: &Entry, cases: &Cases, outputs: &[f32], range: (f64, f64)) -> Vec<Option<f64>> {
     let axis = entry.equation.axis;
     let width = entry.equation.outputs.len();
@@ -21,12 +21,13 @@ fn series(entry: &Entry, cases: &Cases, outputs: &[f32], range: (f64, f64)) -> V
     for row in 0..cases.count {
         let at = (axis.of)(&cases.row(row));
         let exact = cases.exact[row * width + axis.column];
-        if !at.is_finite() || !exact.is_finite() || exact == 0.0 || (axis.log && at <= 0.0) {
+        if !at.is_finite() || !exact.is_finite() || (axis.relative && exact == 0.0) || (axis.log && at <= 0.0) {
             continue;
         }
         let part = if axis.log { (at / low).ln() / (high / low).ln() } else { (at - low) / (high - low) };
         let bin: &mut Option<f64> = &mut bins[((part * BINS as f64) as usize).min(BINS - 1)];
-        let error = error(outputs[axis.column * cases.count + row], exact) / exact.abs();
+        let error =
+            error(outputs[axis.column * cases.count + row], exact) / if axis.relative { exact.abs() } else { 1.0 };
         let error = if error.is_finite() { error.clamp(FLOOR, CEILING) } else { CEILING };
         *bin = Some(bin.map_or(error, |known| known.max(error)));
     }
@@ -49,7 +50,8 @@ pub fn svg(entry: &Entry, cases: &Cases, tiers: &[(Tier, &[f32])]) -> Result<Opt
     let drawn: Vec<_> =
         tiers.iter().map(|&(tier, outputs)| (tier, series(entry, cases, outputs, (low, high)))).collect();
     let mut text = String::new();
-    let title = format!("{}: relative error of {}", entry.probe.name, entry.equation.outputs[axis.column].name);
+    let kind = if axis.relative { "relative" } else { "absolute" };
+    let title = format!("{}: {kind} error of {}", entry.probe.name, entry.equation.outputs[axis.column].name);
     let failed = |error: &dyn std::fmt::Display| anyhow!("drawing the plot of {}: {error}", entry.probe.name);
     {
         let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
@@ -63,7 +65,7 @@ pub fn svg(entry: &Entry, cases: &Cases, tiers: &[(Tier, &[f32])]) -> Result<Opt
                 chart
                     .configure_mesh()
                     .x_desc(axis.name)
-                    .y_desc("largest relative error")
+                    .y_desc(format!("largest {kind} error"))
                     .x_label_formatter(&|x| format!("{x:.3e}").replace(".000", ""))
                     .y_label_formatter(&|y| format!("{y:.0e}"))
                     .light_line_style(WHITE)
