@@ -75,25 +75,6 @@ float angle_between(vec3 u, vec3 v) {
     return angle;
 }
 
-// @eq N9: sin²θ = |N × (H − N)|²/(|N|²|H|²)
-// @out sin2
-// 1 − cos²θ has no digits left below 3e-4 rad, |N × H|² few. Divided by the squared lengths: rounded ones cost 2 ULP
-// otherwise. Lengths of about 1; a zero vector: 0.
-float sin2_between(vec3 N, vec3 H) {
-    float sin2;
-    if (ARITHMETIC == FAST) {
-        float c = dot(N, H);
-        sin2 = 1.0 - c * c;
-    } else {
-        vec3 a = N * scale_if_extreme(largest_component(N));
-        vec3 b = H * scale_if_extreme(largest_component(H));
-        vec3 across = cross_of_units(a, b);
-        float lengths = dot(a, a) * dot(b, b);
-        sin2 = lengths > 0.0 ? min(dot(across, across) / lengths, 1.0) : 0.0;
-    }
-    return sin2;
-}
-
 struct OrthonormalBasis {
     vec3 t;
     vec3 b;

@@ -6,7 +6,6 @@
 #include "lib/arithmetic.glsl"
 
 const float LARGEST_INDEX = 1e9;
-const float SMALLEST = 1.17549435e-38; // normal number: a smaller cosine may be flushed to 0 by some operations
 
 // (1 − cosθ)⁵. Multiplied out: exact powers, and no NaN where a rounded dot product exceeds 1, which one in five does.
 float schlick_weight(float cos_in) {
@@ -104,7 +103,8 @@ FresnelDielectric fresnel_dielectric(float cos_in, float n) {
             float difference = (index - 1.0) * (index + 1.0);
             float s = c + g;
             float p = index * index * c + g;
-            bool grazes = c < SMALLEST;
+            // Below the normal range some operations flush the cosine to 0, others do not.
+            bool grazes = c < SMALLEST_NORMAL;
             r.tir = false;
             r.cos_t = min(g / index, 1.0);
             r.rs = grazes ? -1.0 : -difference / s / s;
@@ -134,7 +134,7 @@ Transmitted dielectric_transmitted(float cos_in, float n) {
         float c = clamp(cos_in, 0.0, 1.0);
         float index = clamp(n, 0.0, LARGEST_INDEX);
         float g2 = refracted_square(c, index);
-        if (c >= SMALLEST && index > 0.0 && g2 > 0.0) {
+        if (c >= SMALLEST_NORMAL && index > 0.0 && g2 > 0.0) {
             float g = sqrt(g2);
             float s = c + g;
             float p = index * index * c + g;
@@ -248,7 +248,7 @@ FresnelConductor fresnel_conductor(float cos_in, float n, float kappa) {
         float index = clamp(n, 0.0, LARGEST_INDEX);
         float k = clamp(kappa, 0.0, LARGEST_INDEX);
         ConductorTerms t = conductor_terms(c, index, k);
-        if (c >= SMALLEST && t.s2 > 0.0 && t.p2 > 0.0) {
+        if (c >= SMALLEST_NORMAL && t.s2 > 0.0 && t.p2 > 0.0) {
             if (k > max(index, 0.5)) {
                 // 1 − A where little is kept: its error is that of A times A.
                 float As = 4.0 * c * t.g.x / t.s2;
@@ -283,7 +283,7 @@ Absorbed conductor_absorbed(float cos_in, float n, float kappa) {
     } else {
         float c = clamp(cos_in, 0.0, 1.0);
         ConductorTerms t = conductor_terms(c, clamp(n, 0.0, LARGEST_INDEX), clamp(kappa, 0.0, LARGEST_INDEX));
-        if (c >= SMALLEST && t.s2 > 0.0 && t.p2 > 0.0) {
+        if (c >= SMALLEST_NORMAL && t.s2 > 0.0 && t.p2 > 0.0) {
             // 1 − R where little is reflected, as fresnel_conductor takes 1 − A where little is kept.
             float As = 4.0 * c * t.g.x / t.s2;
             float Ap = 4.0 * c * (t.mg / t.p2);

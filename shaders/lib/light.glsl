@@ -5,18 +5,11 @@
 #include "lib/arithmetic.glsl"
 #include "lib/brdf.glsl"
 #include "lib/constants.glsl"
+#include "lib/frame.glsl"
 
 // The renderer's rule for r → 0 (numerics.md 32): a point light is never nearer than this, in metres, so that
 // irradiance stays finite. It is part of point_falloff, not of light_point, which is I/r² and says +∞.
 const float LIGHT_RADIUS = 1e-6;
-
-// n, from -126 to 127, for which the largest component of 2^n v is in [2, 4): its square neither overflows nor
-// vanishes. 127 for the zero vector, and where even that is below 2.
-int scale_exponent(vec3 v) {
-    float largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
-    int exponent = (floatBitsToInt(largest) >> 23) & 255;
-    return 128 - clamp(exponent, 1, 254);
-}
 
 struct LightDirectional {
     float cos_plus;
@@ -30,7 +23,7 @@ LightDirectional light_directional(vec3 N, vec3 L, float E) {
     if (ARITHMETIC == FAST) {
         cos_plus = max(dot(N, normalize(L)), 0.0);
     } else {
-        vec3 l = L * power_of_two(scale_exponent(L));
+        vec3 l = L * scale_to_one(largest_component(L));
         cos_plus = max(cosine_in_range(grazing_cosine(N, l)), 0.0);
     }
     return LightDirectional(cos_plus, E * cos_plus);
@@ -64,8 +57,7 @@ LightPoint light_point(vec3 P, vec3 Q, vec3 N, float I) {
         DoubleFloat dy = two_sum(Q.y, -P.y);
         DoubleFloat dz = two_sum(Q.z, -P.z);
         vec3 d = vec3(dx.hi, dy.hi, dz.hi);
-        int n = scale_exponent(d);
-        float f = power_of_two(n);
+        float f = scale_to_one(largest_component(d));
         d *= f;
         float d2 = dot(d, d);
         float c = 0.0;
@@ -75,8 +67,7 @@ LightPoint light_point(vec3 P, vec3 Q, vec3 N, float I) {
             float lengths = sqrt(d2 * dot(N, N));
             c = lengths > 0.0 ? (sum.hi + lo) / lengths : 0.0;
         }
-        // 2^-127 is not a normal number: where it would be the factor, r² is 0 either way.
-        float back = power_of_two(max(-n, -126));
+        float back = 1.0 / f;
         r.r2 = d2 * back * back;
         r.cos_plus = max(cosine_in_range(c), 0.0);
         r.E_perp = d2 > 0.0 ? over_square(I, d2, f) : I > 0.0 ? plus_infinity() : 0.0;
@@ -159,7 +150,7 @@ float triangle_solid_angle(vec3 a, vec3 b, vec3 c) {
         numerator = abs(dot(a, cross(b, c)));
         denominator = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
     } else {
-        float f = power_of_two(scale_exponent(max(max(abs(a), abs(b)), abs(c))));
+        float f = scale_to_one(largest_component(max(max(abs(a), abs(b)), abs(c))));
         vec3 p = a * f;
         vec3 q = b * f;
         vec3 r = c * f;

@@ -6,6 +6,7 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "lib/brdf.glsl"
 #include "lib/encode.glsl"
+#include "lib/frame.glsl"
 
 layout(set = 0, binding = 0) uniform sampler2D environment_map;
 layout(scalar, set = 0, binding = 1) writeonly buffer Level { vec4 level[]; };
@@ -16,22 +17,15 @@ void main() {
     uvec2 at = gl_GlobalInvocationID.xy;
     if (any(greaterThanEqual(at, size))) return;
     vec3 n = direction_from_equirectangular((vec2(at) + 0.5) / vec2(size));
-    // Orthonormal basis without a branch (Duff et al., JCGT 6(1) 2017).
-    float side = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (side + n.z);
-    float b = n.x * n.y * a;
-    vec3 t = vec3(1.0 + side * n.x * n.x * a, side * b, -side * n.x);
-    vec3 u = vec3(b, side + n.y * n.y * a, -n.y);
+    OrthonormalBasis frame = orthonormal_basis(n);
     vec3 sum = vec3(0.0);
     float weight = 0.0;
     float texel = 4.0 * PI / (base_width * base_width * 0.5); // solid angle of a texel at the equator, roughly
     for (uint i = 0; i < SAMPLES; i++) {
         float x = (float(i) + 0.5) / float(SAMPLES);
         float phi = 2.0 * PI * float(bitfieldReverse(i)) * 2.3283064365386963e-10;
-        // GGX half vector: tan²θ = α² x / (1 − x).
-        float cos_h = sqrt((1.0 - x) / (1.0 + (alpha * alpha - 1.0) * x));
-        float sin_h = sqrt(max(1.0 - cos_h * cos_h, 0.0));
-        vec3 h = t * (sin_h * cos(phi)) + u * (sin_h * sin(phi)) + n * cos_h;
+        GgxSample m = ggx_sample(x, alpha);
+        vec3 h = (frame.t * cos(phi) + frame.b * sin(phi)) * m.sin_h + n * m.cos_h;
         vec3 l = 2.0 * dot(n, h) * h - n;
         float cos_l = dot(n, l);
         if (cos_l > 0.0) {

@@ -18,12 +18,6 @@ pub fn angle_between(u: DVec3, v: DVec3) -> f64 {
     u.cross(v).length().atan2(u.dot(v))
 }
 
-/// @eq N9: sin² of that angle.
-#[must_use]
-pub fn sin2_between(n: DVec3, h: DVec3) -> f64 {
-    n.cross(h).length_squared() / (n.length_squared() * h.length_squared())
-}
-
 /// @eq N15: two unit vectors t, b such that (t, b, n) is a right-handed orthonormal frame: those of Duff et al.
 #[must_use]
 pub fn orthonormal_basis(n: DVec3) -> (DVec3, DVec3) {
@@ -236,20 +230,6 @@ pub(super) const EQUATIONS: &[Equation] = &[
         extreme: 1e38,
     },
     Equation {
-        name: "sin2_between",
-        twin: |x| vec![sin2_between(vector(x, 0), vector(x, 3))],
-        regions: ANGLES,
-        outputs: &[Output { name: "sin2", bound: "8 ulp", allowed: |c| c.ulps(8.0) }],
-        axis: Axis {
-            name: "θ, rad",
-            log: true,
-            of: |x| angle_between(vector(x, 0), vector(x, 3)),
-            column: 0,
-            relative: true,
-        },
-        extreme: 1e38,
-    },
-    Equation {
         name: "orthonormal_basis",
         twin: |x| {
             let (t, b) = orthonormal_basis(vector(x, 0));
@@ -272,7 +252,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
         twin: |x| vec![basis_gram(vector(x, 0))],
         regions: NORMALS,
         outputs: &[Output { name: "gram", bound: "2e-7", allowed: |_| 2e-7 }],
-        axis: Axis { name: "1 + n_z", log: true, of: |x| 1.0 + x[2], column: 0, relative: true },
+        axis: Axis { name: "1 + n_z", log: true, of: |x| 1.0 + x[2], column: 0, relative: false },
         extreme: 1e38,
     },
     Equation {

@@ -77,13 +77,20 @@ pub fn svg(entry: &Entry, cases: &Cases, tiers: &[(Tier, &[f32])]) -> Result<Opt
                         Tier::Stable => RGBColor(0, 114, 178),
                         Tier::Compensated => RGBColor(0, 158, 115),
                     };
-                    let points = bins.iter().enumerate().filter_map(|(bin, error)| {
-                        let part = (bin as f64 + 0.5) / BINS as f64;
-                        let at = if axis.log { low * (high / low).powf(part) } else { low + (high - low) * part };
-                        error.map(|error| (at, error))
-                    });
+                    let edge = |bin: usize| {
+                        let part = bin as f64 / BINS as f64;
+                        if axis.log { low * (high / low).powf(part) } else { low + (high - low) * part }
+                    };
+                    let step = |(bin, error): (usize, f64)| [(edge(bin), error), (edge(bin + 1), error)];
+                    // One line per run of bins with cases: nothing is drawn across a gap.
+                    let known: Vec<(usize, f64)> =
+                        bins.iter().enumerate().filter_map(|(bin, error)| Some((bin, (*error)?))).collect();
+                    for run in known.chunk_by(|a, b| b.0 == a.0 + 1) {
+                        let points = run.iter().copied().flat_map(step);
+                        chart.draw_series(LineSeries::new(points, color.stroke_width(2))).map_err(|e| failed(&e))?;
+                    }
                     chart
-                        .draw_series(LineSeries::new(points, color.stroke_width(2)))
+                        .draw_series(std::iter::empty::<PathElement<(f64, f64)>>())
                         .map_err(|e| failed(&e))?
                         .label(tier.name())
                         .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], color.stroke_width(2)));
