@@ -43,11 +43,12 @@ fn run() -> Result<()> {
     let compiler = shaderc::Compiler::new().map_err(|e| format!("shaderc: {e}"))?;
     for path in files(&root.join("pass"))? {
         let stage = compile(&compiler, root, &path)?;
+        contract::decorations(&stage.path, contract::is_precise(&stage.module), &stage.words)?;
         programs.entry(stem(&path)).or_default().push(stage);
     }
     let shared = shared_structs(&root.join("share"))?;
     let mut code = generate(&programs, &shared)?;
-    code += &probes(&compiler, root)?;
+    code += &probes(&compiler, root, &programs)?;
     fs::write(out_dir.join("shaders.rs"), code).map_err(|e| format!("writing shaders.rs: {e}"))
 }
 
@@ -115,7 +116,7 @@ fn compile_source(
 }
 
 /// The table of equations, each with its probe. All probes bind the same two buffers: `src/shader.rs` has one struct.
-fn probes(compiler: &shaderc::Compiler, root: &Path) -> Result<String> {
+fn probes(compiler: &shaderc::Compiler, root: &Path, programs: &BTreeMap<String, Vec<Stage>>) -> Result<String> {
     let library = equations::library(&root.join("lib"))?;
     let mut table = String::new();
     for equation in &library.equations {
@@ -123,18 +124,24 @@ fn probes(compiler: &shaderc::Compiler, root: &Path) -> Result<String> {
         let stage = compile_source(compiler, root, shaderc::ShaderKind::Compute, name.clone(), &equation.probe)?;
         let facts = contract::check(&name, &stage.module, &stage.words, &library.functions)?;
         let program = program_literal(&name, std::slice::from_ref(&stage))?;
+        let users: Vec<String> = programs
+            .iter()
+            .filter(|(_, stages)| contract::calls(stages, &equation.function))
+            .map(|(p, _)| p.clone())
+            .collect();
         let equations::Equation { function, name, ids, formula, subject, inputs, outputs, .. } = equation;
         let [fast, stable, compensated] = facts.builtins.each_ref().map(contract::list);
         table += &format!(
             "    Probe {{
         name: {name:?}, function: {function:?}, subject: {subject:?}, formula: {formula:?},
-        ids: {}, inputs: {}, outputs: {}, builtins: [{fast}, {stable}, {compensated}], loop_heads: {},
+        ids: {}, inputs: {}, outputs: {}, builtins: [{fast}, {stable}, {compensated}], loop_heads: {}, passes: {},
         program: {{ static PROGRAM: Program = {program}; &PROGRAM }},
     }},\n",
             contract::list(ids),
             contract::list(inputs),
             contract::list(outputs),
             facts.heads,
+            contract::list(&users),
         );
     }
     Ok(format!("/// Every tagged equation, by file and place.\npub static PROBES: &[Probe] = &[\n{table}];\n"))

@@ -11,7 +11,7 @@ use rspirv::dr::{Function, Module, Operand};
 use rspirv::spirv::{Decoration, GlslStd450Op as GLOp, Op};
 
 use crate::equations::Source;
-use crate::{Names, Result, word};
+use crate::{Names, Result, Stage, word};
 
 /// Loop heads that one call may evaluate.
 const HEADS: u32 = 60_000;
@@ -28,10 +28,6 @@ pub(crate) fn check(name: &str, module: &Module, shipped: &[u32], sources: &BTre
     let names = Names::new(module);
     let functions: BTreeMap<u32, &Function> =
         module.functions.iter().filter_map(|f| Some((f.def.as_ref()?.result_id?, f))).collect();
-    let relaxed = |d: u32| d == Decoration::RelaxedPrecision as u32;
-    if shipped_decorations(shipped).any(relaxed) {
-        return Err(format!("{name}: RelaxedPrecision in what ships"));
-    }
     let own_name = |id: u32| names.name(id).split('(').next().unwrap_or_default().to_owned();
     let mut any_precise = false;
     let mut loops: BTreeMap<String, usize> = BTreeMap::new();
@@ -48,14 +44,17 @@ pub(crate) fn check(name: &str, module: &Module, shipped: &[u32], sources: &BTre
         if source.precise && marked.get(function) == Some(&false) {
             return Err(format!("{name}: `precise` in {function} left no NoContraction"));
         }
+        if calls_in_loops(function, &functions, &own_name, sources) {
+            return Err(format!(
+                "{name}: a loop of {function} calls a function that loops: heads multiply, unroll one"
+            ));
+        }
         if loops.get(function).is_some_and(|&found| found != source.heads.len()) {
             let (stated, found) = (source.heads.len(), loops[function]);
             return Err(format!("{name}: {function} has {found} loops and states `@heads` of {stated}"));
         }
     }
-    if any_precise && !shipped_decorations(shipped).any(|d| d == Decoration::NoContraction as u32) {
-        return Err(format!("{name}: optimisation dropped NoContraction"));
-    }
+    decorations(name, any_precise, shipped)?;
     let mut facts = Facts { builtins: Default::default(), heads: 0 };
     let entry = module.entry_points.first().map_or(0, |line| word(&line.operands[1]));
     for tier in 0..3 {
@@ -77,6 +76,75 @@ pub(crate) fn check(name: &str, module: &Module, shipped: &[u32], sources: &BTre
     }
     Ok(facts)
 }
+
+/// What ships has no RelaxedPrecision anywhere, and keeps NoContraction where the source asked for it.
+pub(crate) fn decorations(name: &str, any_precise: bool, shipped: &[u32]) -> Result<()> {
+    if shipped_decorations(shipped).any(|d| d == Decoration::RelaxedPrecision as u32) {
+        return Err(format!("{name}: RelaxedPrecision in what ships"));
+    }
+    if any_precise && !shipped_decorations(shipped).any(|d| d == Decoration::NoContraction as u32) {
+        return Err(format!("{name}: optimisation dropped NoContraction"));
+    }
+    Ok(())
+}
+
+/// Whether a stage of a program calls the function (glslang leaves out what is never called).
+pub(crate) fn calls(stages: &[Stage], function: &str) -> bool {
+    stages.iter().any(|stage| {
+        let names = Names::new(&stage.module);
+        let called = |f: &Function| {
+            let id = f.def.as_ref().and_then(|line| line.result_id).unwrap_or(0);
+            names.name(id).split('(').next() == Some(function)
+        };
+        stage.module.functions.iter().any(called)
+    })
+}
+
+/// Whether the module decorates anything with NoContraction.
+pub(crate) fn is_precise(module: &Module) -> bool {
+    let contracted = |operand: &Operand| matches!(operand, Operand::Decoration(Decoration::NoContraction));
+    module.annotations.iter().any(|line| line.operands.iter().any(contracted))
+}
+
+/// Whether a function that loops calls another one that does. Stricter than a call inside the loop: which blocks belong to
+/// a loop is not looked at.
+fn calls_in_loops(
+    function: &str,
+    functions: &BTreeMap<u32, &Function>,
+    own_name: &impl Fn(u32) -> String,
+    sources: &BTreeMap<String, Source>,
+) -> bool {
+    let loops = |name: &str| sources.get(name).is_some_and(|source| !source.heads.is_empty());
+    let bodies = functions.iter().filter(|(id, _)| own_name(**id) == function);
+    loops(function)
+        && bodies
+            .flat_map(|(_, body)| body.blocks.iter().flat_map(|block| &block.instructions))
+            .filter(|line| line.class.opcode == Op::FunctionCall)
+            .any(|line| loops(&own_name(word(&line.operands[0]))))
+}
+
+/// Extended instructions that are exact on every device.
+const EXACT: &[GLOp] = &[
+    GLOp::FAbs,
+    GLOp::SAbs,
+    GLOp::FSign,
+    GLOp::SSign,
+    GLOp::Floor,
+    GLOp::Ceil,
+    GLOp::Trunc,
+    GLOp::RoundEven,
+    GLOp::FMin,
+    GLOp::UMin,
+    GLOp::SMin,
+    GLOp::FMax,
+    GLOp::UMax,
+    GLOp::SMax,
+    GLOp::FClamp,
+    GLOp::UClamp,
+    GLOp::SClamp,
+    GLOp::Ldexp,
+    GLOp::FindILsb,
+];
 
 /// Decorations in SPIR-V of any version: rspirv 0.13 cannot load what ships.
 fn shipped_decorations(words: &[u32]) -> impl Iterator<Item = u32> {
@@ -116,11 +184,14 @@ fn reach(
             match line.class.opcode {
                 Op::ExtInst => {
                     if let Operand::LiteralExtInstInteger(number) = line.operands[1] {
-                        let name = GLOp::from_u32(number).map_or(format!("#{number}"), |op| format!("{op:?}"));
-                        builtins.insert(name);
+                        let known = GLOp::from_u32(number);
+                        if !known.is_some_and(|op| EXACT.contains(&op)) {
+                            builtins.insert(known.map_or(format!("#{number}"), |op| format!("{op:?}")));
+                        }
                     }
                 }
                 Op::FDiv => drop(builtins.insert("/".to_owned())),
+                Op::Dot => drop(builtins.insert("Dot".to_owned())),
                 Op::FunctionCall => reach(word(&line.operands[0]), tier, names, functions, enter, builtins),
                 Op::Branch => open.push(word(&line.operands[0])),
                 Op::BranchConditional => {

@@ -119,6 +119,11 @@ fn head(text: &str) -> Option<Head> {
     Some(Head { returns, name, parameters: parameters.collect::<Option<_>>()? })
 }
 
+/// Whether a line without its comment begins a function: a word in the first column, a parenthesis, no assignment.
+fn is_head(line: &str) -> bool {
+    line.starts_with(|c: char| c.is_ascii_alphabetic()) && line.contains('(') && !line.contains('=')
+}
+
 /// Functions start in the first column; their bodies end with `}` in the first column.
 fn read(path: &Path, text: &str, structs: &Structs, library: &mut Library) -> Result<()> {
     let lines: Vec<&str> = text.lines().collect();
@@ -136,10 +141,12 @@ fn read(path: &Path, text: &str, structs: &Structs, library: &mut Library) -> Re
             }
             tag = Some((at, ids.split_whitespace().map(str::to_owned).collect(), formula.to_owned()));
         } else if let Some(name) = line.strip_prefix("// @name ") {
+            tag.as_ref().ok_or_else(|| format!("{}: `@name` without an `@eq` above it", place()))?;
             renamed = Some(name.to_owned());
         } else if let Some(name) = line.strip_prefix("// @out ") {
+            tag.as_ref().ok_or_else(|| format!("{}: `@out` without an `@eq` above it", place()))?;
             out = Some(name.to_owned());
-        } else if line.starts_with(|c: char| c.is_ascii_alphabetic()) && line.contains('(') && !line.contains('=') {
+        } else if is_head(without_comment(line)) {
             let mut joined = String::new();
             let mut end = at;
             while end < lines.len() && !joined.contains('{') {
@@ -197,6 +204,9 @@ fn equation(
     if let Some(members) = structs.get(&head.returns) {
         for (ty, name) in members {
             store(ty, name, &format!("result.{name}"), &mut outputs, &mut stores)?;
+        }
+        if out.is_some() {
+            return Err(format!("{}: the members of {} name the outputs, not `@out`", head.name, head.returns));
         }
     } else {
         let name = out.ok_or("a plain result needs `@out NAME`")?;
@@ -256,7 +266,8 @@ fn argument(ty: &str, name: &str, structs: &Structs, inputs: &mut Vec<String>) -
             let values: Vec<_> = "xyzw"[..count].chars().map(|axis| fetch(format!("{name}{axis}"))).collect();
             Ok(format!("{ty}({})", values.join(", ")))
         }
-        ("uint" | "int", _) => Ok(format!("{ty}({})", fetch(name.to_owned()))),
+        // A conversion of what the type does not hold is undefined.
+        ("uint", _) => Ok(format!("uint(clamp({}, 0.0, 4294967040.0))", fetch(name.to_owned()))),
         ("bool", _) => Ok(format!("{} != 0.0", fetch(name.to_owned()))),
         _ => Err(format!("parameter {name}: no columns for the type {ty}")),
     }
@@ -277,7 +288,7 @@ fn store(ty: &str, name: &str, value: &str, outputs: &mut Vec<String>, stores: &
             line(format!("{name}lo"), format!("{value}.lo"));
         }
         ("bool", _) => line(name.to_owned(), format!("{value} ? 1.0 : 0.0")),
-        ("uint" | "int", _) => line(name.to_owned(), format!("float({value})")),
+        ("uint", _) => line(name.to_owned(), format!("float({value})")),
         _ => return Err(format!("result {name}: no columns for the type {ty}")),
     }
     Ok(())

@@ -26,10 +26,12 @@ pub struct Probe {
     pub inputs: &'static [&'static str],
     /// Output columns: the members of its result.
     pub outputs: &'static [&'static str],
-    /// Built-ins whose precision is the device's own (and `/`), reached in the tiers fast, stable, compensated.
+    /// Built-ins and operations whose precision is the device's own, reached in the tiers fast, stable, compensated.
     pub builtins: [&'static [&'static str]; 3],
     /// Most evaluations of loop heads in one call.
     pub loop_heads: u32,
+    /// Programs of `shaders/pass/` that call the function; none where a later pass will.
+    pub passes: &'static [&'static str],
     /// The program.
     pub program: &'static Program,
 }

@@ -375,8 +375,8 @@ struct Ggx {
 // V·H is |L + V|/2. f_r is 0 where L or V is not above the surface.
 Ggx ggx(vec3 N, vec3 L, vec3 V, float alpha, float F0) {
     HalfAngle h = half_angle(N, L, V);
-    float NoL = cosine(N, L);
-    float NoV = cosine(N, V);
+    float NoL = grazing_cosine(N, L);
+    float NoV = grazing_cosine(N, V);
     float a = alpha;
     if (ARITHMETIC != FAST) {
         h = half_angle_in_range(h);

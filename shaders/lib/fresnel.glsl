@@ -70,6 +70,11 @@ float brewster_term(float c, float n, float g2) {
     return term;
 }
 
+// T = 2cg(1/s² + n²/p²), s = c + g, p = n²c + g: one sum, so that reflected and transmitted power are 1 to 2e-7.
+float transmitted_part(float c, float g, float n, float s, float p) {
+    return 2.0 * (c * g) * (1.0 / s / s + n / p * (n / p));
+}
+
 struct FresnelDielectric {
     float F;
     float rs;
@@ -110,7 +115,7 @@ FresnelDielectric fresnel_dielectric(float cos_in, float n) {
             r.rs = grazes ? -1.0 : -difference / s / s;
             r.rp = grazes ? -1.0 : (difference / p) * (brewster_term(c, index, g2) / p);
             // 1 − T where little is transmitted: its error is that of T times T.
-            float T = 2.0 * (c * g) * (1.0 / s / s + index / p * (index / p));
+            float T = transmitted_part(c, g, index, s, p);
             r.F = grazes ? 1.0 : T < 0.5 ? 1.0 - T : min(0.5 * (r.rs * r.rs + r.rp * r.rp), 1.0);
         }
     }
@@ -145,7 +150,7 @@ Transmitted dielectric_transmitted(float cos_in, float n) {
             t.Ts = rs * rs < 0.5 ? 1.0 - rs * rs : 4.0 * (c / s) * (g / s);
             t.Tp = rp * rp < 0.5 ? 1.0 - rp * rp : 4.0 * (index * c / p) * (index * g / p);
             float F = 0.5 * (rs * rs + rp * rp);
-            t.T = F < 0.5 ? 1.0 - F : 0.5 * (t.Ts + t.Tp);
+            t.T = F < 0.5 ? 1.0 - F : transmitted_part(c, g, index, s, p);
         }
     }
     return t;

@@ -3,6 +3,7 @@
 #define LIGHTING_GLSL
 #include "lib/encode.glsl"
 #include "lib/light.glsl"
+#include "lib/snell.glsl"
 #include "lib/surface.glsl"
 #include "share/environment.glsl"
 
@@ -94,7 +95,7 @@ vec3 environment_irradiance(vec3 n) {
 // directional reflectance of the lobe (split sum, Karis 2013) on the specular part.
 vec3 environment_light(Surface s) {
     float cos_v = clamp(dot(s.n, s.v), 0.0, 1.0);
-    vec3 r = 2.0 * dot(s.n, s.v) * s.n - s.v;
+    vec3 r = reflect_ray(-s.v, s.n).R;
     vec2 ab = textureLod(reflectance, vec2(cos_v, s.roughness), 0.0).rg;
     vec3 result = vec3(0.0);
     if (AMBIENT) {
@@ -103,7 +104,7 @@ vec3 environment_light(Surface s) {
     }
     if (REFLECTION) result += (s.f0 * ab.x + s.f90 * ab.y) * s.compensation * prefiltered_radiance(r, s.alpha);
     if (CLEARCOAT) {
-        vec3 coat_r = 2.0 * dot(s.n_coat, s.v) * s.n_coat - s.v;
+        vec3 coat_r = reflect_ray(-s.v, s.n_coat).R;
         vec2 coat_at = vec2(clamp(dot(s.n_coat, s.v), 0.0, 1.0), s.clearcoat_roughness);
         vec2 coat = textureLod(reflectance, coat_at, 0.0).rg;
         result *= under_coat(s);

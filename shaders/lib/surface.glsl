@@ -69,8 +69,7 @@ Surface surface_from_texels(Material m, vec3 base, float metallic, float roughne
 vec3 fresnel_of_dielectric(Surface s, float cos_in) {
     if (FRESNEL == 0) return schlick(s.f0_dielectric, s.f90_dielectric, cos_in);
     // F0 may be tinted by KHR_materials_specular, so the exact curve is carried over as its share between F0 and 1.
-    float r0 = (s.ior - 1.0) / (s.ior + 1.0);
-    r0 *= r0;
+    float r0 = nested_f0(1.0, s.ior);
     float share = clamp((fresnel_dielectric(cos_in, s.ior).F - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
     return s.f0_dielectric + (vec3(s.f90_dielectric) - s.f0_dielectric) * share;
 }

@@ -59,6 +59,9 @@ impl UnbuiltCommand {
     /// # Errors
     /// Always: one sentence.
     pub fn refuse(&self, name: &str) -> Result<std::process::ExitCode> {
-        bail!("etalon {name} {}: this command is not built yet; render, diff and devices are", self.rest.join(" "))
+        bail!(
+            "etalon {name} {}: this command is not built yet; render, verify, diff and devices are",
+            self.rest.join(" ")
+        )
     }
 }

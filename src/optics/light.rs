@@ -119,7 +119,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             },
         ],
         outputs: &[
-            Output { name: "cos_plus", bound: "32 ulp + 1e-14", allowed: |c| grazing_allowed(c.x()) },
+            Output { name: "cos_plus", bound: "8 ulp + 1e-14", allowed: |c| grazing_allowed(c.x()) },
             Output {
                 name: "irradiance",
                 bound: "E times that + 1 ulp",
@@ -176,7 +176,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
         ],
         outputs: &[
             Output { name: "r2", bound: "5 ulp", allowed: |c| c.ulps(5.0) },
-            Output { name: "cos_plus", bound: "32 ulp + 1e-14", allowed: |c| grazing_allowed(c.x()) },
+            Output { name: "cos_plus", bound: "8 ulp + 1e-14", allowed: |c| grazing_allowed(c.x()) },
             Output { name: "E_perp", bound: "6 ulp", allowed: |c| c.ulps(6.0) },
             Output {
                 name: "irradiance",

@@ -128,7 +128,7 @@ fn root_allowed(case: &Case<'_>) -> f64 {
     // f² − r² near the surface: each square is rounded. In the root of larger size it does not occur.
     let smaller = case.x().abs() * vector(case.inputs, 3).length() < 0.999 * a.q;
     let part =
-        if smaller { case.tiered(6.0 * 2_f64.powi(-24) * (a.f * a.f + a.r * a.r) / a.c.abs(), 0.0) } else { 0.0 };
+        if smaller { case.tiered(8.0 * 2_f64.powi(-24) * (a.f * a.f + a.r * a.r) / a.c.abs(), 0.0) } else { 0.0 };
     let by_root = root_error(&a) / a.q.max(root_error(&a));
     case.ulps(5.0).max(case.rel(part)) + case.rel(by_root)
 }
@@ -306,7 +306,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             },
             Output {
                 name: "t0",
-                bound: "5 ulp + δ/2√(r² − l²); stable near the surface 6·2^-24 (f² + r²)/|f² − r²|",
+                bound: "5 ulp + δ/2√(r² − l²); stable near the surface 8·2^-24 (f² + r²)/|f² − r²|",
                 allowed: root_allowed,
             },
             Output { name: "t1", bound: "as t0", allowed: root_allowed },

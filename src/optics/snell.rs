@@ -76,7 +76,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
                 name: "every angle",
                 share: 2,
                 draw: |d| {
-                    let angle = d.between(0.0, 1.57079);
+                    let angle = d.between(0.0, 1.57);
                     columns(&incident(d, angle))
                 },
             },
@@ -116,7 +116,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
                 name: "every angle",
                 share: 2,
                 draw: |d| {
-                    let (angle, n) = (d.between(0.0, 1.57079), d.log(0.3, 3.0));
+                    let (angle, n) = (d.between(0.0, 1.57), d.log(0.3, 3.0));
                     with_index(d, angle, n)
                 },
             },

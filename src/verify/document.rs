@@ -12,7 +12,8 @@ pub fn equations() -> String {
          Written by a test (`tests/catalogue.rs`) from the tags in `shaders/lib/` and the bounds in `src/optics/`.\n\
          Ids are those of [lecture.md](lecture.md); N and a number is a row of [numerics.md](numerics.md).\n\
          `etalon verify` judges the bounds on a device; the tier `fast` has none. Built-ins are those whose precision\n\
-         is the device's own (Vulkan, \"Precision of Individual Operations\"), by tier where they differ.\n",
+         is the device's own (Vulkan, \"Precision of Individual Operations\"), by tier where they differ. Functions that\n\
+         no pass calls yet wait for the passes that trace rays.\n",
     );
     let mut subject = "";
     for entry in catalogue() {
@@ -38,6 +39,9 @@ pub fn equations() -> String {
             regions.join("; "),
             builtins(probe.builtins),
         );
+        if !probe.passes.is_empty() {
+            let _ = writeln!(page, "- called by: `{}`", probe.passes.join("`, `"));
+        }
         if probe.loop_heads > 0 {
             let _ = writeln!(page, "- loop heads in one call: at most {}", probe.loop_heads);
         }
