@@ -66,6 +66,69 @@ fn inputs_from_outside_every_domain_never_give_nan() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// What the comments in shaders/lib/ say of inputs outside a domain: function, inputs, output, value.
+const OUT_OF_DOMAIN: &[(&str, &[f32], &str, f32)] = &[
+    ("expf", &[1e30], "y", f32::INFINITY),
+    ("expf", &[-1e30], "y", 0.0),
+    ("logf", &[0.0], "y", f32::NEG_INFINITY),
+    ("logf", &[-3.0], "y", f32::NEG_INFINITY),
+    ("log1pf", &[-2.0], "y", f32::NEG_INFINITY),
+    ("powf", &[-1.0, 2.0], "z", 0.0),
+    ("powf", &[0.0, 0.0], "z", 1.0),
+    ("powf", &[0.0, -1.0], "z", f32::INFINITY),
+    ("asinf", &[2.0], "y", std::f32::consts::FRAC_PI_2),
+    ("acosf", &[2.0], "y", 0.0),
+    ("atan2f", &[0.0, 0.0], "angle", 0.0),
+    ("df_div", &[0.0, 0.0, 0.0, 0.0], "hi", 0.0),
+    ("df_sqrt", &[-1.0, 0.0], "hi", 0.0),
+    ("fresnel_schlick", &[1.5, 1.5, 0.0], "F", 0.04),
+    ("fresnel_schlick", &[-1.0, 1.5, 0.0], "F", 1.0),
+    ("fresnel_dielectric", &[0.5, 0.0], "F", 1.0),
+    ("fresnel_dielectric", &[-0.5, 1.5], "F", 1.0),
+    ("fresnel_dielectric", &[0.0, 1.0], "F", 1.0),
+    ("dielectric_transmitted", &[0.5, 0.0], "T", 0.0),
+    ("fresnel_conductor", &[0.0, 1.0, 0.0], "F", 1.0),
+    ("fresnel_conductor", &[1.0, 1.0, 1e20], "F", 1.0),
+    ("reflect", &[0.6, 0.0, -0.8, 0.0, 0.0, 0.0], "Rz", 0.0),
+    ("refract", &[0.6, 0.0, -0.8, 0.0, 0.0, 1.0, 0.0], "tir", 1.0),
+    ("refract", &[0.8, 0.0, -0.6, 0.0, 0.0, 1.0, 0.5], "Tx", 0.0),
+    ("critical_angle", &[1.0, 1.5], "theta_deg", 90.0),
+    ("brewster_angle", &[0.0, 0.0], "theta_rad", 0.0),
+    ("lambert", &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 4.0, 0.1], "Lref", 0.0),
+    ("lambert", &[0.0, 0.0, 1.0, 0.0, 0.0, -1.0, 4.0, 0.1], "Lref", 0.0),
+    ("blinn_phong", &[0.0, 0.0, 1.0, 0.0, 0.6, -0.8, 0.0, 0.6, 0.8, 1.0, 1.0, 1.0, 3.0], "spec", 0.0),
+    ("blinn_phong", &[0.0, 0.0, 1.0, 0.0, 0.6, 0.8, 0.0, 0.6, 0.8, 1.0, 0.0, 1.0, -5.0], "spec", 1.0),
+    ("blinn_phong", &[0.0, 0.0, 1.0, 0.0, 0.6, 0.8, 0.0, -0.6, -0.8, 1.0, 0.0, 1.0, 3.0], "spec", 0.0),
+    ("reciprocal_phong", &[0.0, 0.0, 1.0, 0.0, 0.6, 0.8, 0.0, -0.6, -0.8, 1.0, 0.0, 1.0, 3.0], "fr_spec", 0.0),
+    ("ggx", &[0.0, 0.0, 1.0, 0.0, 0.6, -0.8, 0.0, 0.6, 0.8, 0.5, 0.04], "fr", 0.0),
+    ("beer_lambert", &[1.0, 0.0, 1e38], "T", 1.0),
+    ("srgb", &[-0.5], "encode", 0.0),
+    ("srgb", &[1.0], "encode", 1.0),
+    ("light_directional", &[0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 5.0], "irradiance", 0.0),
+    ("light_point", &[1.0, 2.0, 3.0, 1.0, 2.0, 3.0, 0.0, 0.0, 1.0, 5.0], "E_perp", f32::INFINITY),
+    ("light_point", &[1.0, 2.0, 3.0, 1.0, 2.0, 3.0, 0.0, 0.0, 1.0, 5.0], "irradiance", 0.0),
+    ("mis_weight", &[0.0, 0.0], "w", 0.0),
+    ("half_round_trip", &[1e6], "y", 65504.0),
+    ("safe_normalize", &[0.0, 0.0, 0.0], "is_zero", 1.0),
+    ("triangle_normal", &[1.0, 2.0, 3.0, 1.0, 2.0, 3.0, 4.0, 4.0, 4.0], "degenerate", 1.0),
+];
+
+#[test]
+fn out_of_domain_values_are_the_documented_ones() {
+    let gpu = Gpu::new();
+    let mut wrong = Vec::new();
+    for &(name, inputs, output, value) in OUT_OF_DOMAIN {
+        for tier in PROMISING {
+            let got = evaluate(&gpu, name, tier, &[inputs.to_vec()])[0][probe::column(name, output)];
+            let near = (got - value).abs() <= 2.0 * ulp(f64::from(value)) as f32;
+            if got != value && !near {
+                wrong.push(format!("{name} {inputs:?}, {}: {output} is {got}, not {value}", tier.name()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
 /// The committed vector files.
 fn files() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/vectors");

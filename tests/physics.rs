@@ -34,15 +34,15 @@ fn reflected_and_transmitted_power_are_one() {
     let metals: Vec<Vec<f32>> =
         (0..CASES).map(|_| vec![draw.unit() as f32, draw.log(0.05, 5.0) as f32, draw.log(0.5, 8.0) as f32]).collect();
     for tier in PROMISING {
-        for (rows, reflected, kept) in [
-            (&dielectrics, "fresnel_dielectric", "dielectric_transmitted"),
-            (&metals, "fresnel_conductor", "conductor_absorbed"),
-        ] {
+        // A metal's two numbers come from different sums, each good to 8 ulp of what is at most 1/2 or off 1 by that.
+        let dielectrics = (&dielectrics, "fresnel_dielectric", "dielectric_transmitted", 2e-7);
+        let metals = (&metals, "fresnel_conductor", "conductor_absorbed", 5e-7);
+        for (rows, reflected, kept, slack) in [dielectrics, metals] {
             let f = evaluate(&gpu, reflected, tier, rows);
             let t = evaluate(&gpu, kept, tier, rows);
             for ((row, f), t) in rows.iter().zip(&f).zip(&t) {
                 let sum = f64::from(f[0]) + f64::from(t[2]);
-                assert!((sum - 1.0).abs() <= 2e-7, "{reflected} + {kept} at {row:?}: {sum}");
+                assert!((sum - 1.0).abs() <= slack, "{reflected} + {kept} at {row:?}: {sum}");
                 assert!((0.0..=1.0).contains(&f[0]), "{reflected} at {row:?}: {}", f[0]);
             }
         }
@@ -200,22 +200,26 @@ fn blinn_phong_is_not_reciprocal_by_the_ratio_of_the_cosines() {
     assert!(broken > CASES / 2, "B5 must fail: only {broken} of {CASES} do");
 }
 
-/// Directional albedo for a viewer at `angle`: the integral of f_r cosθ over the hemisphere by the midpoint rule, from
-/// what the device evaluates.
-fn albedo(gpu: &Gpu, name: &str, output: &str, angle: f64, parameters: &[f32], cosine: bool) -> f64 {
-    let side = 512;
+/// Directional albedo for a viewer at `angle`: the integral of f_r cosθ, which is the output for unit light, over the
+/// hemisphere by the midpoint rule; and what the rule is off by, its change from half as many places a side.
+fn albedo(gpu: &Gpu, name: &str, output: &str, angle: f64, parameters: &[f32]) -> (f64, f64) {
+    let [coarse, fine] = [256, 512].map(|side| quadrature(gpu, name, output, angle, parameters, side));
+    (fine, (fine - coarse).abs())
+}
+
+fn quadrature(gpu: &Gpu, name: &str, output: &str, angle: f64, parameters: &[f32], side: u32) -> f64 {
     let n = DVec3::Z;
     let v = DVec3::new(angle.sin(), 0.0, angle.cos());
     let mut rows = Vec::new();
     let mut weights = Vec::new();
     for i in 0..side {
-        // θ² spacing near the horizon and the pole alike: u = sin²θ is uniform, dω cosθ = du dφ / 2.
+        // u = sin²θ is uniform: dω cosθ = du dφ / 2.
         let u = (f64::from(i) + 0.5) / f64::from(side);
         let (sin, cos) = (u.sqrt(), (1.0 - u).sqrt());
         for j in 0..side {
             let phi = (f64::from(j) + 0.5) / f64::from(side) * 2.0 * PI;
             rows.push(configuration(n, DVec3::new(sin * phi.cos(), sin * phi.sin(), cos), v, parameters));
-            weights.push(PI / f64::from(side * side) / if cosine { 1.0 } else { cos });
+            weights.push(PI / f64::from(side * side) / cos);
         }
     }
     let at = column(name, output);
@@ -230,25 +234,25 @@ fn the_furnace_gives_back_no_more_than_it_gets() {
     for angle in angles {
         // Lambert with k_d = 1/π reflects everything: L_ref is f cosθ, so the weight is without the cosine.
         let row = [1.0, std::f32::consts::FRAC_1_PI, 0.0, 1.0];
-        let lambert = albedo(&gpu, "reciprocal_phong", "Lref", angle, &row, false);
-        assert!((lambert - 1.0).abs() < 1e-5, "Lambert: {lambert}");
+        let (lambert, _) = albedo(&gpu, "reciprocal_phong", "Lref", angle, &row);
+        assert!((lambert - 1.0).abs() < 1e-6, "Lambert: {lambert}");
         for shine in [1.0_f32, 3.0, 10.0, 100.0] {
             // The limit of B6 with half of the light for the diffuse part.
             let kd = 0.5 / PI;
             let ks = (f64::from(shine) + 2.0) / (2.0 * PI) * (1.0 - PI * kd);
             let row = [1.0, kd as f32, ks as f32, shine];
-            let found = albedo(&gpu, "reciprocal_phong", "Lref", angle, &row, false);
-            assert!(found <= 1.0 + 1e-6 + 2e-4, "B6, shine {shine}, {:.0}°: {found}", angle.to_degrees());
+            let (found, off) = albedo(&gpu, "reciprocal_phong", "Lref", angle, &row);
+            assert!(found <= 1.0 + 1e-6 + off, "B6, shine {shine}, {:.0}°: {found} ± {off:e}", angle.to_degrees());
         }
         for alpha in [0.1_f32, 0.3, 0.6, 1.0] {
-            let found = albedo(&gpu, "ggx", "fr_cos", angle, &[alpha, 1.0], false);
+            let (found, off) = albedo(&gpu, "ggx", "fr_cos", angle, &[alpha, 1.0]);
             eprintln!("GGX, α {alpha}, {:.0}°: white furnace {found:.4}", angle.to_degrees());
-            assert!(found <= 1.0 + 2e-3, "GGX, α {alpha}, {:.0}°: {found}", angle.to_degrees());
+            assert!(found <= 1.0 + 1e-6 + off, "GGX, α {alpha}, {:.0}°: {found} ± {off:e}", angle.to_degrees());
             assert!(found > 0.3, "GGX, α {alpha}, {:.0}°: {found}", angle.to_degrees());
         }
     }
     // Beyond the limit B6 does make light: k_s = 1, shine 3 at 89° reflects 1.18 (docs/numerics.md S13).
-    let beyond = albedo(&gpu, "reciprocal_phong", "Lref", 89_f64.to_radians(), &[1.0, 0.0, 1.0, 3.0], false);
+    let (beyond, _) = albedo(&gpu, "reciprocal_phong", "Lref", 89_f64.to_radians(), &[1.0, 0.0, 1.0, 3.0]);
     assert!((beyond - 1.18).abs() < 0.01, "{beyond}");
 }
 
@@ -285,6 +289,22 @@ fn the_quiz_comes_out_of_the_shaders() {
         let at =
             |r: f32| value(&gpu, "light_point", tier, &[0.0, 0.0, 0.0, 0.0, 0.0, r, 0.0, 0.0, 1.0, 5.0], "irradiance");
         close(at(2.0) / at(6.0), 9.0, "Q6");
+    }
+}
+
+#[test]
+fn solid_angles_of_known_triangles() {
+    let gpu = Gpu::new();
+    for tier in PROMISING {
+        let omega = |corners: [[f32; 3]; 3]| value(&gpu, "triangle_solid_angle", tier, &corners.concat(), "omega");
+        let octant = omega([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]]);
+        assert!((octant - PI / 2.0).abs() < 4e-7, "an octant, {}: {octant}", tier.name());
+        // Half a face of a cube seen from its middle: an eighth of a third of the sphere.
+        let half = omega([[-1.0, -1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, 1.0]]);
+        assert!((half - PI / 3.0).abs() < 4e-7, "half a face, {}: {half}", tier.name());
+        // Far away it is area over distance squared, less 1.5 (size/distance)².
+        let far = omega([[0.0, 0.0, 1000.0], [1.0, 0.0, 1000.0], [0.0, 1.0, 1000.0]]);
+        assert!((far / 0.5e-6 - 1.0).abs() < 2e-6, "far, {}: {far:e}", tier.name());
     }
 }
 

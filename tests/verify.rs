@@ -92,6 +92,21 @@ fn a_vector_file_is_judged_by_what_it_expects() {
 }
 
 #[test]
+fn documented_values_out_of_domain_may_be_expected() {
+    // Bounds have no number there; exactly the documented value passes.
+    let files = [
+        ("refract", "vx,vy,vz,Nx,Ny,Nz,n,=Tx\n0.9,0,-0.43588989,0,0,1,0.5,0\n"),
+        ("ggx", "Nx,Ny,Nz,Lx,Ly,Lz,Vx,Vy,Vz,alpha,F0,=fr\n0,0,1,0,0.6,-0.8,0,0.6,0.8,0.5,0.04,0\n"),
+        ("triangle_solid_angle", "ax,ay,az,bx,by,bz,cx,cy,cz,=omega\n0,0,0,1,0,0,0,1,0,0\n"),
+    ];
+    for (name, content) in files {
+        vectors(&format!("{name}.csv"), content, &[]).succeeded();
+        let wrong = content.strip_suffix("0\n").expect("a zero").to_owned() + "0.5\n";
+        assert_eq!(vectors(&format!("{name}.csv"), &wrong, &[]).code, Some(1), "{name}");
+    }
+}
+
+#[test]
 fn bad_vector_files_get_a_sentence() {
     let bad: &[(&str, &str, &str)] = &[
         ("fresnel_dielectric.csv", "cos_in,=F\n1,0.04\n", "the input \"n\" of fresnel_dielectric has no column"),
@@ -108,6 +123,7 @@ fn bad_vector_files_get_a_sentence() {
         ("fresnel_dielectric.csv", "cos_in,n,=F\n1,x,1\n", "line 2: n is \"x\", no number"),
         ("fresnel_dielectric.csv", "cos_in,n,=F\n1,1.5\n", "line: 2"),
         ("fresnel_dielectric.csv", "cos_in,n,=F\n", "it has no rows"),
+        ("fresnel_dielectric.csv", "cos_in,n,=F\n1,1.5,\n", "no cell of its expected outputs holds a number"),
         ("fresnel_dielectric.csv", "", "the input \"cos_in\" of fresnel_dielectric has no column"),
         ("nothing.csv", "x,=y\n1,1\n", "no function is called \"nothing\"; there are two_sum"),
     ];

@@ -17,8 +17,8 @@ float alpha_in_domain(float alpha) {
 // --------------------------------------------------------------------------------------------------------------------
 // Angles
 
-// Cosine between two directions to 32 ulp down to 1e-8: exact products, over the lengths. What the functions below return
-// as a cosine; `cosine` is enough for the terms of a microfacet model, which are smooth in it.
+// Cosine between two directions to 32 ulp down to 1e-8: exact products, over the lengths. What the functions below
+// return as a cosine; `cosine` is enough for the terms of a microfacet model, which are smooth in it.
 float grazing_cosine(vec3 a, vec3 b) {
     float lengths = sqrt(dot(a, a) * dot(b, b));
     return ARITHMETIC == FAST ? dot(a, b) : lengths > 0.0 ? dot2(a, b).hi / lengths : 0.0;
@@ -129,7 +129,8 @@ HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
     return r;
 }
 
-// The same for a lobe that may be wide: for a shine of 1 it is the cosine, and near 90° that has no digits in a plain sum.
+// The same for a lobe that may be wide: for a shine of 1 it is the cosine, and near 90° that has no digits in a plain
+// sum.
 HalfAngle phong_half_angle(vec3 N, vec3 L, vec3 V) {
     HalfAngle r = half_angle(N, L, V);
     if (ARITHMETIC == STABLE) {

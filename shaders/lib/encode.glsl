@@ -107,8 +107,8 @@ float depth_round_trip(float z, float near, float far) {
     return z_back;
 }
 
-// Clear-coat strength and roughness as the two bytes of one 16-bit number, specular strength, and the coat's normal: for
-// four unorm16 components.
+// Clear-coat strength and roughness as the two bytes of one 16-bit number, specular strength, and the coat's normal:
+// for four unorm16 components.
 vec4 packed_layers(vec3 coat_roughness_specular, vec3 n_coat) {
     vec2 bytes = floor(clamp(coat_roughness_specular.xy, 0.0, 1.0) * 255.0 + 0.5);
     float both = (bytes.x * 256.0 + bytes.y) * (1.0 / 65535.0);

@@ -1,4 +1,5 @@
-// Reflectance of smooth surfaces (lecture F2, F3). n is n_transmitted / n_incident, cosines are of angles to the normal;
+// Reflectance of smooth surfaces (lecture F2, F3). n is n_transmitted / n_incident, cosines are of angles to the
+// normal;
 // F is the unpolarised power reflectance. Out of domain: cosines are clamped to [0, 1], n to [0, 1e9], κ to [0, 1e9]
 // (its square times n² still fits in 32 bits); n = 0 reflects everything.
 #ifndef FRESNEL_GLSL
@@ -36,8 +37,8 @@ FresnelSchlick fresnel_schlick(float cos_in, float n, float kappa) {
 }
 
 // g² = (n cosθ_t)² = c² + n² − 1 to 2^-32 of what cancels, for the price of a rewrite. With a and b the larger and the
-// smaller of c and n, and e = 1 − a (exact near the critical angle, where a > 1/√2): g² = b² − 2e + e². The squares of the
-// leading halves of b and e are exact, and where everything cancels their sum is too (Sterbenz).
+// smaller of c and n, and e = 1 − a (exact near the critical angle, where a > 1/√2): g² = b² − 2e + e². The squares of
+// the leading halves of b and e are exact, and where everything cancels their sum is too (Sterbenz).
 // Plain f32 was measured first: c² + (n − 1)(n + 1) missed total reflection in 3 of 2000 cases within a few ULP of
 // critical. Compensated: in double-float.
 float refracted_square(float c, float n) {

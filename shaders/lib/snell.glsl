@@ -1,4 +1,5 @@
-// Directions at a smooth surface (lecture F1, F4–F6). v points to the surface, N to the side that v comes from, both unit
+// Directions at a smooth surface (lecture F1, F4–F6). v points to the surface, N to the side that v comes from, both
+// unit
 // vectors as 32 bits hold them; n is n_transmitted / n_incident. Results have unit length. A zero v or N gives the zero
 // vector: no direction. N is taken as given: it is the caller's business to turn it to the ray's side.
 #ifndef SNELL_GLSL
@@ -6,7 +7,8 @@
 #include "lib/arithmetic.glsl"
 #include "lib/constants.glsl"
 
-// Divided by its length; the zero vector, and what is far from unit length, gives zero (lib/frame.glsl has the general one).
+// Divided by its length; the zero vector, and what is far from unit length, gives zero (lib/frame.glsl has the general
+// one).
 vec3 renormalised(vec3 v) {
     float v2 = dot(v, v);
     return v2 > 1e-30 && v2 < 1e30 ? v / sqrt(v2) : vec3(0.0);
@@ -45,8 +47,8 @@ struct Refraction {
 // N⊥ = (v + N cosα)/sinα, 0/0 at normal incidence, is never formed. cos²α and the lengths of v and N, whose rounding
 // decides near the critical angle, come from dot2 and g² is summed in double-float: g² = n² − |N × v|² in plain f32
 // costs four fifths of it and reported total reflection for rays up to 3e-7 on the wrong side.
-// Compensated: also the tangential part, as (N × v) × N from exact products. On total reflection T is the zero vector and
-// `tir` says so; so it is for n ≤ 0, for zero vectors and for any beyond 1e9.
+// Compensated: also the tangential part, as (N × v) × N from exact products. On total reflection T is the zero vector
+// and `tir` says so; so it is for n ≤ 0, for zero vectors and for any beyond 1e9.
 Refraction refract_ray(vec3 v, vec3 N, float n) {
     Refraction r = Refraction(vec3(0.0), true, 0.0);
     if (ARITHMETIC == FAST) {
@@ -87,8 +89,8 @@ struct CriticalAngle {
 };
 
 // @eq F6: θ_c = arcsin(n_out/n_in), from the dense side: it exists for n_in > n_out
-// Not Brewster's angle. Taken as an arc tangent of sine and cosine: the cosine √((n_in − n_out)(n_in + n_out))/n_in keeps
-// its digits for nearly equal indices, where the arc sine has none. Without one: 90°, cosine 0.
+// Not Brewster's angle. Taken as an arc tangent of sine and cosine: the cosine √((n_in − n_out)(n_in + n_out))/n_in
+// keeps its digits for nearly equal indices, where the arc sine has none. Without one: 90°, cosine 0.
 CriticalAngle critical_angle(float n_in, float n_out) {
     CriticalAngle r = CriticalAngle(n_in > n_out && n_out >= 0.0, 0.5 * PI, 90.0, 0.0);
     if (r.exists) {
@@ -110,7 +112,7 @@ struct BrewsterAngle {
 };
 
 // @eq F6: θ_B = arctan(n_out/n_in), where r_p = 0; it exists on both sides
-// Index 0 on both sides: 0.
+// By the sizes of the indices; 0 on both sides: 0.
 BrewsterAngle brewster_angle(float n_in, float n_out) {
     BrewsterAngle r = BrewsterAngle(0.0, 1.0);
     float larger = max(abs(n_in), abs(n_out));

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context as _, Result, bail, ensure};
+use anyhow::{Context as _, Result, ensure};
 
 use super::{Cases, Entry, find};
 
@@ -71,9 +71,9 @@ fn read(text: &str, function: &str) -> Result<(Entry, Cases)> {
         rows.push(row);
         given.push(outputs);
     }
-    if rows.is_empty() {
-        bail!("it has no rows");
-    }
+    ensure!(!rows.is_empty(), "it has no rows");
+    let any = given.iter().flatten().any(|value| !value.is_nan());
+    ensure!(any, "no cell of its expected outputs holds a number");
     let mut cases = Cases::from_rows(&entry, &rows);
     // Bounds look at all outputs of a case; a column that the file does not have stays the twin's and is not judged.
     let judged = |at: usize| columns.iter().any(|column| matches!(column, Column::Expected(place) if *place == at));
