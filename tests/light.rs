@@ -18,7 +18,7 @@ use etalon::scene::{LightKind, Material, Scene};
 use etalon::study::shape::Shape;
 use etalon::study::{self, generate};
 use glam::{DAffine3, DVec3, Vec3};
-use gpu::{Gpu, settings};
+use gpu::{Gpu, bits, knobs, largest_difference, settings};
 use made::{Made, Random, at, lambert, unlit};
 
 const SIZE: [u32; 2] = [64, 36];
@@ -544,4 +544,25 @@ fn light_through_both_sides_of_a_sheet() {
     made.light([50.0; 3], LightKind::Directional { direction: DVec3::Z });
     let film = gpu.film(&made.0, settings(SIZE));
     assert!(film.rgba.iter().all(|p| (p[0] - 1.0).abs() < 1e-6), "{:?}", film.rgba[0]);
+}
+
+#[test]
+fn no_tier_of_arithmetic_makes_nan_of_a_scene() {
+    let gpu = Gpu::new();
+    for name in ["materials", "lamps"] {
+        let scene = study::load(name).expect("a study scene");
+        for brdf in ["ggx", "blinn-phong-reciprocal"] {
+            let [fast, stable, compensated] = ["fast", "stable", "compensated"].map(|tier| {
+                let choices = ["samples=1", &format!("brdf={brdf}"), &format!("arithmetic={tier}")];
+                let chosen = Settings { knobs: knobs(&choices), ..settings([64, 36]) };
+                let (rendered, film) = gpu.shot(&scene, None, chosen);
+                assert_eq!((rendered.counts.nan, rendered.counts.inf), (0, 0), "{name}, {brdf}, {tier}");
+                film
+            });
+            // Away from the hard cases the tiers are one formula.
+            assert!(largest_difference(&stable, &compensated, 1.0) < 2e-3, "{name}, {brdf}");
+            let differ = bits(&fast).iter().zip(bits(&stable)).filter(|(a, b)| **a != *b).count();
+            assert!(differ > 0, "{name}, {brdf}: the knob changes nothing");
+        }
+    }
 }

@@ -117,7 +117,9 @@ vec3 reflected(Surface s, vec3 l) {
         float coat_l = max(cosine(s.n_coat, l), 0.0);
         float d = ggx_distribution(coat.cos_h, coat.sin2_h, s.clearcoat_alpha);
         float vis = ggx_visibility(coat_l, max(cosine(s.n_coat, s.v), 1e-4), s.clearcoat_alpha);
-        result = result * (1.0 - f) + f * d * vis * coat_l;
+        // Selected, not multiplied by 0: the textbook form of `vis` is no number at the horizon.
+        float lobe = coat_l > 0.0 ? d * vis * coat_l : 0.0;
+        result = result * (1.0 - f) + f * lobe;
     }
     return result;
 }
