@@ -379,7 +379,8 @@ fn conductor_slack(case: &Case<'_>) -> f64 {
 }
 
 /// What rounding leaves of R_p near Brewster's angle, where r_p = (m² − 1)(c²(m² + 1) − 1)/(m²c + g)² is a small
-/// difference: 2|r_p|δ + δ² with δ for 12 ulp of the terms. Compensated the real part is summed exactly.
+/// difference: 2|r_p|δ + δ² with δ an eighth of 12 ulp of the terms; they are summed in pairs, what is left is R_p's
+/// own smallness.
 fn conductor_brewster(case: &Case<'_>) -> f64 {
     let (c, n, k) = (case.inputs[0], case.inputs[1], case.inputs[2]);
     if is_metal(case.inputs) || c == 0.0 {
@@ -389,6 +390,6 @@ fn conductor_brewster(case: &Case<'_>) -> f64 {
     let (_, _, g) = conductor(c, n, k);
     let p = (m2[0] * c + g[0]).powi(2) + (m2[1] * c + g[1]).powi(2);
     let terms = 1_f64.max(c * c * (n * n + k * k + 1.0));
-    let delta = 12.0 * case.tiered(2_f64.powi(-23), 2_f64.powi(-26)) * (m2[0] - 1.0).hypot(m2[1]) / p * terms;
+    let delta = 12.0 * 2_f64.powi(-26) * (m2[0] - 1.0).hypot(m2[1]) / p * terms;
     2.0 * case.exact[2].sqrt() * delta + delta * delta
 }
