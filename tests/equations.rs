@@ -286,3 +286,23 @@ fn the_textbook_form_is_worse_where_numerics_says_so() {
         assert!(stable * 10.0 < fast, "{row}: {name}.{output}: stable {stable:e}, textbook {fast:e}");
     }
 }
+
+#[test]
+fn the_judge_sees_nan_infinity_and_what_is_beyond_a_bound() {
+    let entry = probe::entry("fresnel_schlick");
+    let cases = Cases::from_rows(&entry, &[vec![1.0, 1.5, 0.0], vec![0.5, 1.5, 0.0]]);
+    let right: Vec<f32> = (0..2).flat_map(|c| [cases.exact[c] as f32, cases.exact[2 + c] as f32]).collect();
+    let judged = |at: usize, value: f32| {
+        let mut outputs = right.clone();
+        outputs[at] = value;
+        verify::judge(&entry, Tier::Stable, &cases, &outputs)
+    };
+    assert!(judged(0, right[0]).iter().all(|figures| figures.pass && figures.non_finite == 0));
+    for (value, non_finite) in [(f32::NAN, 1), (f32::INFINITY, 1), (0.05, 0)] {
+        let found = judged(3, value);
+        assert!(found[0].pass, "the other output is right");
+        assert_eq!((found[1].pass, found[1].non_finite), (false, non_finite), "{value}");
+        assert_eq!(found[1].worst.as_ref().map(|worst| worst.row), Some(1), "{value}");
+        assert!(verify::judge(&entry, Tier::Fast, &cases, &right).iter().all(|figures| figures.pass));
+    }
+}
