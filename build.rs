@@ -43,7 +43,7 @@ fn run() -> Result<()> {
     let compiler = shaderc::Compiler::new().map_err(|e| format!("shaderc: {e}"))?;
     for path in files(&root.join("pass"))? {
         let stage = compile(&compiler, root, &path)?;
-        contract::decorations(&stage.path, contract::is_precise(&stage.module), &stage.words)?;
+        contract::decorations(&stage.path, &stage.module, &stage.words)?;
         programs.entry(stem(&path)).or_default().push(stage);
     }
     let shared = shared_structs(&root.join("share"))?;
@@ -129,11 +129,11 @@ fn probes(compiler: &shaderc::Compiler, root: &Path, programs: &BTreeMap<String,
             .filter(|(_, stages)| contract::calls(stages, &equation.function))
             .map(|(p, _)| p.clone())
             .collect();
-        let equations::Equation { function, name, ids, formula, subject, inputs, outputs, .. } = equation;
+        let equations::Equation { name, ids, formula, subject, inputs, outputs, .. } = equation;
         let [fast, stable, compensated] = facts.builtins.each_ref().map(contract::list);
         table += &format!(
             "    Probe {{
-        name: {name:?}, function: {function:?}, subject: {subject:?}, formula: {formula:?},
+        name: {name:?}, subject: {subject:?}, formula: {formula:?},
         ids: {}, inputs: {}, outputs: {}, builtins: [{fast}, {stable}, {compensated}], loop_heads: {}, passes: {},
         program: {{ static PROGRAM: Program = {program}; &PROGRAM }},
     }},\n",

@@ -29,7 +29,6 @@ pub(crate) fn check(name: &str, module: &Module, shipped: &[u32], sources: &BTre
     let functions: BTreeMap<u32, &Function> =
         module.functions.iter().filter_map(|f| Some((f.def.as_ref()?.result_id?, f))).collect();
     let own_name = |id: u32| names.name(id).split('(').next().unwrap_or_default().to_owned();
-    let mut any_precise = false;
     let mut loops: BTreeMap<String, usize> = BTreeMap::new();
     let mut marked: BTreeMap<String, bool> = BTreeMap::new();
     for (&id, function) in &functions {
@@ -38,7 +37,6 @@ pub(crate) fn check(name: &str, module: &Module, shipped: &[u32], sources: &BTre
             lines().filter_map(|line| line.result_id).any(|r| names.decorated(r, Decoration::NoContraction).is_some());
         *loops.entry(own_name(id)).or_default() += lines().filter(|line| line.class.opcode == Op::LoopMerge).count();
         *marked.entry(own_name(id)).or_default() |= contracted;
-        any_precise |= contracted;
     }
     for (function, source) in sources {
         if source.precise && marked.get(function) == Some(&false) {
@@ -54,7 +52,7 @@ pub(crate) fn check(name: &str, module: &Module, shipped: &[u32], sources: &BTre
             return Err(format!("{name}: {function} has {found} loops and states `@heads` of {stated}"));
         }
     }
-    decorations(name, any_precise, shipped)?;
+    decorations(name, module, shipped)?;
     let mut facts = Facts { builtins: Default::default(), heads: 0 };
     let entry = module.entry_points.first().map_or(0, |line| word(&line.operands[1]));
     for tier in 0..3 {
@@ -78,11 +76,13 @@ pub(crate) fn check(name: &str, module: &Module, shipped: &[u32], sources: &BTre
 }
 
 /// What ships has no RelaxedPrecision anywhere, and keeps NoContraction where the source asked for it.
-pub(crate) fn decorations(name: &str, any_precise: bool, shipped: &[u32]) -> Result<()> {
+pub(crate) fn decorations(name: &str, module: &Module, shipped: &[u32]) -> Result<()> {
     if shipped_decorations(shipped).any(|d| d == Decoration::RelaxedPrecision as u32) {
         return Err(format!("{name}: RelaxedPrecision in what ships"));
     }
-    if any_precise && !shipped_decorations(shipped).any(|d| d == Decoration::NoContraction as u32) {
+    let contracted = |operand: &Operand| matches!(operand, Operand::Decoration(Decoration::NoContraction));
+    let asked = module.annotations.iter().any(|line| line.operands.iter().any(contracted));
+    if asked && !shipped_decorations(shipped).any(|d| d == Decoration::NoContraction as u32) {
         return Err(format!("{name}: optimisation dropped NoContraction"));
     }
     Ok(())
@@ -98,12 +98,6 @@ pub(crate) fn calls(stages: &[Stage], function: &str) -> bool {
         };
         stage.module.functions.iter().any(called)
     })
-}
-
-/// Whether the module decorates anything with NoContraction.
-pub(crate) fn is_precise(module: &Module) -> bool {
-    let contracted = |operand: &Operand| matches!(operand, Operand::Decoration(Decoration::NoContraction));
-    module.annotations.iter().any(|line| line.operands.iter().any(contracted))
 }
 
 /// Whether a function that loops calls another one that does. Stricter than a call inside the loop: which blocks belong to

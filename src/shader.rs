@@ -14,8 +14,6 @@ include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 pub struct Probe {
     /// Name in tables and vector files.
     pub name: &'static str,
-    /// Name of the GLSL function.
-    pub function: &'static str,
     /// File under `shaders/lib/`, without `.glsl`.
     pub subject: &'static str,
     /// The formula, in one line.

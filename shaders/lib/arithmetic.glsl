@@ -132,6 +132,11 @@ DoubleFloat df_sqrt(DoubleFloat a) {
     return quick_two_sum(root, positive ? rest : 0.0);
 }
 
+// n² − 1
+DoubleFloat df_square_minus_one(float n) {
+    return df_add(two_product(n, n), DoubleFloat(-1.0, 0.0));
+}
+
 // ab − cd, as if in twice the precision.
 float difference_of_products(float a, float b, float c, float d) {
     DoubleFloat p = two_product(a, b);

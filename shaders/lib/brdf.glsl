@@ -6,6 +6,7 @@
 #define BRDF_GLSL
 #include "lib/arithmetic.glsl"
 #include "lib/constants.glsl"
+#include "lib/frame.glsl"
 #include "lib/fresnel.glsl"
 
 const float SMALLEST_ALPHA = 1e-9;
@@ -16,42 +17,6 @@ float alpha_in_domain(float alpha) {
 
 // --------------------------------------------------------------------------------------------------------------------
 // Angles
-
-// Cosine between two directions to 32 ulp down to 1e-8: exact products, over the lengths. What the functions below
-// return as a cosine; `cosine` is enough for the terms of a microfacet model, which are smooth in it.
-float grazing_cosine(vec3 a, vec3 b) {
-    float lengths = sqrt(dot(a, a) * dot(b, b));
-    return ARITHMETIC == FAST ? dot(a, b) : lengths > 0.0 ? dot2(a, b).hi / lengths : 0.0;
-}
-
-// Cosine between two directions. A plain sum is good to 2e-7, lengths of rounded unit vectors included: nothing near
-// 90°, where it is all error. Compensated: the sum of exact products, over the lengths.
-float cosine(vec3 a, vec3 b) {
-    return ARITHMETIC == COMPENSATED ? grazing_cosine(a, b) : dot(a, b);
-}
-
-// A cosine in its range; 0 for NaN and infinities.
-float cosine_in_range(float c) {
-    return abs(c) <= LARGEST ? clamp(c, -1.0, 1.0) : 0.0;
-}
-
-// sin² between two directions. 1 − cos² loses small angles, and so does the cross product N × H of rounded products;
-// H − N is exact where H is near N, and N × (H − N) has nothing to lose (numerics.md 9).
-float sine_squared(vec3 N, vec3 H) {
-    float sin2;
-    if (ARITHMETIC == FAST) {
-        float c = dot(N, H);
-        sin2 = 1.0 - c * c;
-    } else if (ARITHMETIC == COMPENSATED) {
-        vec3 s = cross2(N, H);
-        DoubleFloat lengths = df_mul(dot2(N, N), dot2(H, H));
-        sin2 = lengths.hi > 0.0 ? df_div(dot2(s, s), lengths).hi : 1.0;
-    } else {
-        vec3 s = cross(N, H - N);
-        sin2 = dot(s, s);
-    }
-    return sin2;
-}
 
 // The angle of N and H = (L + V)/|L + V|.
 struct HalfAngle {

@@ -1,7 +1,6 @@
 // Reflectance of smooth surfaces (lecture F2, F3). n is n_transmitted / n_incident, cosines are of angles to the
-// normal;
-// F is the unpolarised power reflectance. Out of domain: cosines are clamped to [0, 1], n to [0, 1e9], κ to [0, 1e9]
-// (its square times n² still fits in 32 bits); n = 0 reflects everything.
+// normal; F is the unpolarised power reflectance. Out of domain: cosines are clamped to [0, 1], n to [0, 1e9], κ to
+// [0, 1e9] (its square times n² still fits in 32 bits); n = 0 reflects everything.
 #ifndef FRESNEL_GLSL
 #define FRESNEL_GLSL
 #include "lib/arithmetic.glsl"
@@ -44,7 +43,7 @@ FresnelSchlick fresnel_schlick(float cos_in, float n, float kappa) {
 float refracted_square(float c, float n) {
     float sum;
     if (ARITHMETIC == COMPENSATED) {
-        sum = df_add(df_add(two_product(n, n), DoubleFloat(-1.0, 0.0)), two_product(c, c)).hi;
+        sum = df_add(df_square_minus_one(n), two_product(c, c)).hi;
     } else {
         precise float b = min(c, n);
         precise float e = 1.0 - max(c, n);
@@ -181,20 +180,25 @@ float abs2(vec2 z) {
 struct ConductorTerms {
     vec2 m2;
     vec2 g;
-    float mg;
-    float s2;
-    float p2;
+    float mg;  // Re(m² ḡ)
+    float s2;  // |c + g|²
+    float p2;  // |m²c + g|²
 };
+
+// κ well above 0: nothing cancels in the reflectances as written.
+bool is_metallic(float n, float k) {
+    return k > max(n, 0.5);
+}
 
 ConductorTerms conductor_terms(float c, float n, float k) {
     ConductorTerms t;
     t.m2 = vec2((n - k) * (n + k), 2.0 * n * k);
     float real;
     if (ARITHMETIC == COMPENSATED) {
-        DoubleFloat sum = df_add(df_add(two_product(n, n), DoubleFloat(-1.0, 0.0)), two_product(c, c));
+        DoubleFloat sum = df_add(df_square_minus_one(n), two_product(c, c));
         real = df_add(sum, df_negate(two_product(k, k))).hi;
     } else {
-        real = k > max(n, 0.5) ? t.m2.x - (1.0 - c) * (1.0 + c) : refracted_square(c, n) - k * k;
+        real = is_metallic(n, k) ? t.m2.x - (1.0 - c) * (1.0 + c) : refracted_square(c, n) - k * k;
     }
     // The root with positive parts: the smaller part by division, not by the difference |g²| − |x|, which cancels.
     // Squares are at most 4e36, n and κ at most 1e9.
@@ -250,7 +254,7 @@ FresnelConductor fresnel_conductor(float cos_in, float n, float kappa) {
         float k = clamp(kappa, 0.0, LARGEST_INDEX);
         ConductorTerms t = conductor_terms(c, index, k);
         if (c >= SMALLEST_NORMAL && t.s2 > 0.0 && t.p2 > 0.0) {
-            if (k > max(index, 0.5)) {
+            if (is_metallic(index, k)) {
                 // 1 − A where little is kept: its error is that of A times A.
                 float As = 4.0 * c * t.g.x / t.s2;
                 float Ap = 4.0 * c * (t.mg / t.p2);

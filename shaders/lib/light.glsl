@@ -3,7 +3,6 @@
 #ifndef LIGHT_GLSL
 #define LIGHT_GLSL
 #include "lib/arithmetic.glsl"
-#include "lib/brdf.glsl"
 #include "lib/constants.glsl"
 #include "lib/frame.glsl"
 

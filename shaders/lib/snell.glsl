@@ -1,7 +1,6 @@
-// Directions at a smooth surface (lecture F1, F4–F6). v points to the surface, N to the side that v comes from, both
-// unit
-// vectors as 32 bits hold them; n is n_transmitted / n_incident. Results have unit length. A zero v or N gives the zero
-// vector: no direction. N is taken as given: it is the caller's business to turn it to the ray's side.
+// Directions at a smooth surface (lecture F1, F4–F6). v points to the surface, N to the side that v comes from, both unit
+// vectors as 32 bits hold them; n is n_transmitted / n_incident. Results have unit length. A zero v or N gives the
+// zero vector: no direction. N is taken as given: it is the caller's business to turn it to the ray's side.
 #ifndef SNELL_GLSL
 #define SNELL_GLSL
 #include "lib/arithmetic.glsl"
@@ -46,7 +45,7 @@ struct Refraction {
 // With g = n cosβ = √(cos²α + n² − 1), T = (v + N(cosα − g))/n and cosα − g = (1 − n²)/(cosα + g): nothing cancels, and
 // N⊥ = (v + N cosα)/sinα, 0/0 at normal incidence, is never formed. cos²α and the lengths of v and N, whose rounding
 // decides near the critical angle, come from dot2 and g² is summed in double-float: g² = n² − |N × v|² in plain f32
-// costs four fifths of it and reported total reflection for rays up to 3e-7 on the wrong side.
+// reported total reflection for rays up to 3e-7 on the wrong side.
 // Compensated: also the tangential part, as (N × v) × N from exact products. On total reflection T is the zero vector
 // and `tir` says so; so it is for n ≤ 0, for zero vectors and for any beyond 1e9.
 Refraction refract_ray(vec3 v, vec3 N, float n) {
@@ -64,7 +63,7 @@ Refraction refract_ray(vec3 v, vec3 N, float n) {
         DoubleFloat lengths = df_mul(n2, dot2(v, v));
         if (valid && lengths.hi > 1e-30) {
             DoubleFloat c2 = df_div(df_mul(cosine, cosine), lengths);
-            float g2 = df_add(df_add(two_product(n, n), DoubleFloat(-1.0, 0.0)), c2).hi;
+            float g2 = df_add(df_square_minus_one(n), c2).hi;
             r.disc = g2 / n / n;
             r.tir = g2 < 0.0;
             float g = sqrt(max(g2, 0.0));

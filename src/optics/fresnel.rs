@@ -156,12 +156,18 @@ const CRITICAL: Region = Region {
 const ANYWHERE: Region =
     Region { name: "0.05 < n < 20", share: 4, draw: |d| vec![cosine(d) as f32, log_index(d) as f32] };
 
-/// Absolute error of g = √(c² + n² − 1) where the sum cancels: what cancels is summed to 2^-32 in the stable tier,
-/// the terms themselves to 2^-46 in the compensated one.
-fn error_of_g(case: &Case<'_>) -> f64 {
+/// Rounding of g² = c² + n² − 1: what cancels is summed to 2^-32 in the stable tier, the terms themselves to 2^-46 in the
+/// compensated one.
+fn rounding_of_g2(case: &Case<'_>) -> f64 {
     let (c, n) = (case.inputs[0], case.inputs[1]);
     let terms = c.min(n).powi(2) + (1.0 - c.max(n)).powi(2);
-    let rounding = case.tiered(2_f64.powi(-32) * terms, 2_f64.powi(-46) * c.max(n).max(1.0).powi(2));
+    case.tiered(2_f64.powi(-32) * terms, 2_f64.powi(-46) * c.max(n).max(1.0).powi(2))
+}
+
+/// Absolute error of g that this leaves.
+fn error_of_g(case: &Case<'_>) -> f64 {
+    let (c, n) = (case.inputs[0], case.inputs[1]);
+    let rounding = rounding_of_g2(case);
     let g2 = refracted_square(c, n);
     (g2 + rounding).max(0.0).sqrt() - (g2 - rounding).max(0.0).sqrt()
 }

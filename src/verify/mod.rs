@@ -207,7 +207,7 @@ pub struct Worst {
 
 /// Absolute error of `got`: 0 where a value too small for f32's normal numbers came out as zero or as a denormal, which
 /// every Vulkan device may do, and where one too large came out as infinity or as the largest number.
-fn error(got: f32, exact: f64) -> f64 {
+fn absolute_error(got: f32, exact: f64) -> f64 {
     let value = f64::from(got);
     if exact.abs() >= f64::from(f32::MAX) && value.abs() >= f64::from(f32::MAX) && value.signum() == exact.signum() {
         return 0.0;
@@ -231,7 +231,7 @@ pub fn judge(entry: &Entry, tier: Tier, cases: &Cases, outputs: &[f32]) -> Vec<F
             }
             let got = outputs[column * cases.count + row];
             let inputs = cases.row(row);
-            let error = error(got, exact[column]);
+            let error = absolute_error(got, exact[column]);
             // The tier fast promises nothing; its worst case is the one farthest beyond the stable tier's bound.
             let judged = if tier == Tier::Fast { Tier::Stable } else { tier };
             let allowed = (output.allowed)(&Case { tier: judged, inputs: &inputs, exact, column });
@@ -294,8 +294,7 @@ fn merge(a: Figures, b: Figures) -> Figures {
 }
 
 /// Inputs from outside every domain: zeros, ones, denormals, huge numbers of either sign, in any mixture.
-#[must_use]
-pub fn hostile(entry: &Entry, count: usize, seed: u64) -> Vec<f32> {
+fn hostile(entry: &Entry, count: usize, seed: u64) -> Vec<f32> {
     let huge = entry.equation.extreme;
     let values =
         [0.0, -0.0, 1.0, -1.0, 0.5, -2.0, 1e-6, -1e-6, 1e-20, -1e-20, 1e-38, 1e-44, 1e10, huge, -huge, huge * 0.1];

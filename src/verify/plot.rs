@@ -3,7 +3,7 @@
 use anyhow::{Result, anyhow};
 use plotters::prelude::*;
 
-use super::{Cases, Entry, error};
+use super::{Cases, Entry, absolute_error};
 use crate::optics::Tier;
 
 const SIZE: (u32, u32) = (760, 440);
@@ -26,8 +26,8 @@ fn series(entry: &Entry, cases: &Cases, outputs: &[f32], range: (f64, f64)) -> V
         }
         let part = if axis.log { (at / low).ln() / (high / low).ln() } else { (at - low) / (high - low) };
         let bin: &mut Option<f64> = &mut bins[((part * BINS as f64) as usize).min(BINS - 1)];
-        let error =
-            error(outputs[axis.column * cases.count + row], exact) / if axis.relative { exact.abs() } else { 1.0 };
+        let scale = if axis.relative { exact.abs() } else { 1.0 };
+        let error = absolute_error(outputs[axis.column * cases.count + row], exact) / scale;
         let error = if error.is_finite() { error.clamp(FLOOR, CEILING) } else { CEILING };
         *bin = Some(bin.map_or(error, |known| known.max(error)));
     }
