@@ -69,6 +69,9 @@ pub struct Material {
     pub clearcoat_normal_texture: Option<TextureRef>,
     /// Abbe-like dispersion 20/V_d (KHR_materials_dispersion).
     pub dispersion: f32,
+    /// Which solid's medium fills the place where transmissive solids overlap: that of the higher priority, and on a tie
+    /// that of the one entered last.
+    pub priority: i32,
     /// The raw Phong numbers of an OBJ/MTL material, for the passes that show that model as it was written.
     pub phong: Option<Phong>,
 }
@@ -181,6 +184,7 @@ impl Default for Material {
             clearcoat_roughness_texture: None,
             clearcoat_normal_texture: None,
             dispersion: 0.0,
+            priority: 0,
             phong: None,
         }
     }

@@ -15,6 +15,7 @@ pub mod material;
 mod nodes;
 mod obj;
 mod pictures;
+pub mod solid;
 mod thin;
 
 use std::path::Path;

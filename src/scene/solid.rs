@@ -1,0 +1,179 @@
+//! Which meshes are bodies that light passes through, and which of them contain a point.
+//!
+//! A ray that refracts has to know when it is inside. That question has an answer only where the surface separates an
+//! inside from an outside, so a transmissive mesh is a solid when it is closed, and a thin sheet otherwise.
+
+use std::collections::HashMap;
+
+use glam::{DVec3, Vec3};
+
+use super::{Bounds, Instance, Mesh, Scene};
+
+/// Below this share of the sum of its parts' magnitudes a volume is rounding: a mesh of a million triangles adds up
+/// errors of 1e-16 each.
+const NO_VOLUME: f64 = 1e-12;
+
+/// What the transmissive instances of a scene are; one entry per instance.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Solids {
+    /// Transmissive, and to be read as a thin sheet of its nominal thickness: thickness 0, or a mesh that bounds no
+    /// volume. False for surfaces that transmit nothing.
+    pub sheet: Vec<bool>,
+    /// A transmissive solid whose triangles are wound the wrong way round, seen in object space: the front of each
+    /// looks inwards. A mirrored placement does not count.
+    pub flipped: Vec<bool>,
+    /// One sentence for each mesh that is not what its material says.
+    pub warnings: Vec<String>,
+}
+
+/// Whether a mesh separates an inside from an outside: every directed edge has as many opposite ones.
+///
+/// Vertices are the same when their positions are, to the last bit (and −0 is 0): normals and texture coordinates part
+/// vertices along seams that are no gaps. Triangles with two corners in one place have no part in this. Surfaces may
+/// touch or cross themselves, and several may make up one mesh. A mesh without triangles is not closed.
+#[must_use]
+pub fn is_closed(mesh: &Mesh) -> bool {
+    let mut names = HashMap::with_capacity(mesh.positions.len());
+    let welded: Vec<u32> = mesh
+        .positions
+        .iter()
+        .map(|p| {
+            let next = names.len() as u32;
+            *names.entry(p.map(|x| (x + 0.0).to_bits())).or_insert(next)
+        })
+        .collect();
+    let mut edges = Vec::with_capacity(mesh.indices.len());
+    for triangle in mesh.indices.as_chunks::<3>().0 {
+        let [a, b, c] = triangle.map(|i| welded[i as usize]);
+        if a != b && b != c && c != a {
+            edges.extend([(a, b), (b, c), (c, a)].map(|(p, q)| (p.min(q), p.max(q), if p < q { 1 } else { -1 })));
+        }
+    }
+    edges.sort_unstable();
+    let ends = |edge: &(u32, u32, i64)| (edge.0, edge.1);
+    !edges.is_empty()
+        && edges.chunk_by(|e, f| ends(e) == ends(f)).all(|same| same.iter().map(|e| e.2).sum::<i64>() == 0)
+}
+
+fn corners(mesh: &Mesh) -> impl Iterator<Item = [DVec3; 3]> {
+    let at = |i: u32| Vec3::from(mesh.positions[i as usize]).as_dvec3();
+    mesh.indices.as_chunks::<3>().0.iter().map(move |triangle| triangle.map(at))
+}
+
+/// The volume that a closed mesh bounds in object space: positive when its fronts look outwards, 0 when it is rounding.
+fn signed_volume(mesh: &Mesh) -> f64 {
+    let all = || mesh.positions.iter().map(|&p| Vec3::from(p).as_dvec3());
+    // About the mesh's own middle: far from its origin the tetrahedra would be large and cancel.
+    let middle = (all().fold(DVec3::INFINITY, DVec3::min) + all().fold(DVec3::NEG_INFINITY, DVec3::max)) * 0.5;
+    let (mut sum, mut magnitude) = (0.0, 0.0);
+    for [a, b, c] in corners(mesh) {
+        let six = (a - middle).dot((b - middle).cross(c - middle));
+        sum += six;
+        magnitude += six.abs();
+    }
+    if sum.abs() > NO_VOLUME * magnitude { sum / 6.0 } else { 0.0 }
+}
+
+/// What a mesh with a thickness turns out to be.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Body {
+    Solid,
+    InsideOut,
+    Open,
+    Empty,
+}
+
+fn body(mesh: &Mesh) -> Body {
+    if !is_closed(mesh) {
+        return Body::Open;
+    }
+    match signed_volume(mesh) {
+        v if v > 0.0 => Body::Solid,
+        v if v < 0.0 => Body::InsideOut,
+        _ => Body::Empty,
+    }
+}
+
+/// Tells solids from sheets among the transmissive instances; each mesh is looked at once.
+#[must_use]
+pub fn solids(scene: &Scene) -> Solids {
+    let mut warnings = Vec::new();
+    let mut bodies: Vec<Option<Body>> = vec![None; scene.meshes.len()];
+    let (mut sheet, mut flipped) = (Vec::new(), Vec::new());
+    for instance in &scene.instances {
+        let mesh = &scene.meshes[instance.mesh];
+        let material = &scene.materials[mesh.material];
+        if material.transmission <= 0.0 || material.thickness <= 0.0 {
+            sheet.push(material.transmission > 0.0);
+            flipped.push(false);
+            continue;
+        }
+        let body = *bodies[instance.mesh].get_or_insert_with(|| {
+            let body = body(mesh);
+            let what = match body {
+                Body::Solid => return body,
+                Body::InsideOut => "is inside out: its faces are turned",
+                Body::Open => "is not closed: read as a thin sheet of its nominal thickness",
+                Body::Empty => "bounds no volume: read as a thin sheet of its nominal thickness",
+            };
+            warnings.push(format!("mesh \"{}\" transmits light and {what}", mesh.name));
+            body
+        });
+        sheet.push(matches!(body, Body::Open | Body::Empty));
+        flipped.push(body == Body::InsideOut);
+    }
+    Solids { sheet, flipped, warnings }
+}
+
+/// The transmissive solids that contain a point, as indices of instances, the one with the largest box first: for
+/// bodies inside one another that is from the outside in.
+///
+/// A body contains the point when the surface winds around it: the sum of the signed solid angles under which its
+/// triangles are seen is ±4π inside and 0 outside, whatever the winding and however the placement mirrors. On the
+/// surface itself the answer is either.
+#[must_use]
+pub fn media_at(scene: &Scene, solids: &Solids, p_world: DVec3) -> Vec<usize> {
+    let mut media = Vec::new();
+    for (i, instance) in scene.instances.iter().enumerate() {
+        let mesh = &scene.meshes[instance.mesh];
+        if scene.materials[mesh.material].transmission <= 0.0 || solids.sheet[i] {
+            continue;
+        }
+        let bounds = seen_from(mesh, instance, p_world);
+        let is_near = bounds.min.cmple(DVec3::ZERO).all() && bounds.max.cmpge(DVec3::ZERO).all();
+        if is_near && winding_number(mesh, instance, p_world).abs() > 0.5 {
+            let size = bounds.max - bounds.min;
+            media.push((size.x * size.y * size.z, i));
+        }
+    }
+    media.sort_by(|a, b| b.0.total_cmp(&a.0));
+    media.into_iter().map(|(_, i)| i).collect()
+}
+
+/// The box around an instance in world axes, relative to a point.
+fn seen_from(mesh: &Mesh, instance: &Instance, p_world: DVec3) -> Bounds {
+    let linear = instance.world_from_object.matrix3;
+    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for &position in &mesh.positions {
+        let p = linear * Vec3::from(position).as_dvec3();
+        (min, max) = (min.min(p), max.max(p));
+    }
+    let offset = instance.world_from_object.translation - p_world;
+    Bounds { min: min + offset, max: max + offset }
+}
+
+/// How often a placed mesh winds around a point: the signed solid angles of its triangles over 4π.
+///
+/// tan(Ω/2) = a·(b×c) / (|a||b||c| + (a·b)|c| + (b·c)|a| + (c·a)|b|) for corners a, b, c seen from the point
+/// (van Oosterom & Strackee, "The solid angle of a plane triangle", IEEE Trans. Biomed. Eng. 30, 125, 1983).
+fn winding_number(mesh: &Mesh, instance: &Instance, p_world: DVec3) -> f64 {
+    let linear = instance.world_from_object.matrix3;
+    let offset = instance.world_from_object.translation - p_world;
+    let half_angles = corners(mesh).map(|triangle| {
+        let [a, b, c] = triangle.map(|p| linear * p + offset);
+        let [la, lb, lc] = [a, b, c].map(DVec3::length);
+        let cosine = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+        a.dot(b.cross(c)).atan2(cosine)
+    });
+    half_angles.sum::<f64>() / std::f64::consts::TAU
+}
