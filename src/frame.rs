@@ -12,18 +12,21 @@ use crate::image::{Picture, png};
 use crate::pass::accumulate::accumulate;
 use crate::pass::aov::aov;
 use crate::pass::background::background;
-use crate::pass::classify::{WorkLists, classify};
+use crate::pass::classify::{RayTiles, WorkLists, classify};
 use crate::pass::composite::composite;
 use crate::pass::environment::{EnvironmentOnDevice, Turn};
 use crate::pass::fragments::{FragmentLists, fragments};
 use crate::pass::gbuffer::{GBuffer, gbuffer};
+use crate::pass::interact::interact;
 use crate::pass::light::{Lighting, light};
+use crate::pass::rays::{BvhFacts, RaysOnDevice, Traversal};
 use crate::pass::scene::SceneOnDevice;
 use crate::pass::tiles::{Tiles, tiles};
 use crate::pass::tonemap::{Counts, Display, tonemap};
 use crate::pass::view::{View, jitter};
 use crate::plan::{Knobs, Plan, Surroundings};
 use crate::scene::environment::Environment;
+use crate::scene::solid::solids;
 use crate::scene::{Camera, Scene};
 use crate::share::{self, AovPixel};
 
@@ -66,6 +69,8 @@ pub struct Settings {
     pub environment_intensity: f32,
     /// Turns the environment about +Y, in degrees.
     pub environment_rotation: f32,
+    /// The way rays go through the scene; `None`: what suits the device and the scene.
+    pub traversal: Option<Traversal>,
 }
 
 impl Default for Settings {
@@ -78,6 +83,7 @@ impl Default for Settings {
             background: Background::default(),
             environment_intensity: 1.0,
             environment_rotation: 0.0,
+            traversal: None,
         }
     }
 }
@@ -93,8 +99,45 @@ pub struct Rendered {
     /// Pixels whose list of see-through fragments was too long for one invocation, in the worst sample: their farthest
     /// were left out.
     pub dropped: u32,
+    /// What the rays did, summed over the samples.
+    pub work: Work,
     /// GPU time per pass, summed over the samples, in the order of the frame.
     pub passes: Vec<PassTime>,
+}
+
+/// Work counts of a picture: the same on every machine that goes through the tree in the same way.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Work {
+    /// Rays sent for a mirror image.
+    pub reflection: u64,
+    /// Rays sent through a surface.
+    pub refraction: u64,
+    /// Rays sent to lights.
+    pub shadow: u64,
+    /// Nodes met.
+    pub node_visits: u64,
+    /// Triangles tested.
+    pub triangle_tests: u64,
+    /// Boundaries of transparent bodies left without having been entered.
+    pub stray_interfaces: u64,
+    /// Share of a pixel's light that was not followed: the mean over all pixels …
+    pub mean_lost: f64,
+    /// … and the largest.
+    pub most_lost: f32,
+}
+
+impl Work {
+    fn add(&mut self, counts: &share::WorkCounts, pixels_and_samples: f64) {
+        let sum = |[low, high]: [u32; 2]| u64::from(high) << 32 | u64::from(low);
+        self.reflection += sum(counts.reflection);
+        self.refraction += sum(counts.refraction);
+        self.shadow += sum(counts.shadow);
+        self.node_visits += sum(counts.node_visits);
+        self.triangle_tests += sum(counts.triangle_tests);
+        self.stray_interfaces += sum(counts.stray_interfaces);
+        self.mean_lost += sum(counts.lost) as f64 / 65536.0 / pixels_and_samples;
+        self.most_lost = self.most_lost.max(f32::from_bits(counts.most_lost));
+    }
 }
 
 /// A scene on a device, ready to be drawn from any camera.
@@ -102,8 +145,12 @@ pub struct Renderer {
     device: Arc<Device>,
     /// What will be done and why.
     pub plan: Plan,
+    /// What rays find odd about the scene, a sentence each.
+    pub warnings: Vec<String>,
     settings: Settings,
     scene: SceneOnDevice,
+    rays: RaysOnDevice,
+    ray_tiles: RayTiles,
     environment: EnvironmentOnDevice,
     gbuffer: GBuffer,
     tiles: Tiles,
@@ -153,6 +200,12 @@ impl Renderer {
         if device.limits_loops() && scene.lights.len() > most {
             bail!("{}: {} lights, a software device lights with at most {most} such", scene.name, scene.lights.len());
         }
+        let solids = solids(&scene);
+        let mut warnings = if plan.rays.is_some_and(|rays| rays.refraction) { solids.warnings.clone() } else { Vec::new() };
+        let rays = RaysOnDevice::new(device, &plan, &scene, &solids, settings.traversal)?;
+        if let Some(bvh) = rays.facts.filter(|bvh| bvh.dropped > 0) {
+            warnings.push(format!("{} triangles without area are left out for rays", bvh.dropped));
+        }
         let turn = Turn { intensity: settings.environment_intensity, rotation: settings.environment_rotation };
         let target = |name| {
             let usage = vk::ImageUsageFlags::STORAGE;
@@ -160,7 +213,9 @@ impl Renderer {
         };
         Ok(Self {
             environment: EnvironmentOnDevice::new(device, &plan, environment, turn)?,
-            scene: SceneOnDevice::new(device, scene, &settings.knobs)?,
+            scene: SceneOnDevice::new(device, scene, &plan, &settings.knobs, &solids)?,
+            rays,
+            ray_tiles: RayTiles::new(device, size)?,
             gbuffer: GBuffer::new(device, &plan, size)?,
             tiles: Tiles::new(device, &plan, size)?,
             work: WorkLists::new(device, size)?,
@@ -171,6 +226,7 @@ impl Renderer {
             camera: Buffer::new(device, "camera", size_of::<share::Camera>() as u64, Place::Upload)?,
             device: device.clone(),
             plan,
+            warnings,
             settings,
         })
     }
@@ -185,6 +241,8 @@ impl Renderer {
         let mut times = Times::default();
         let count = self.plan.samples;
         let mut dropped = 0;
+        let mut work = Work::default();
+        let pixels = f64::from(self.settings.size[0]) * f64::from(self.settings.size[1]);
         for index in 0..count {
             // A frame whose see-through fragments did not fit is drawn again with more room.
             loop {
@@ -197,6 +255,9 @@ impl Renderer {
                     times.add(passes);
                     break;
                 }
+            }
+            if self.plan.rays.is_some() {
+                work.add(&self.rays.counted(), pixels * f64::from(count));
             }
             if let Some(film) = &self.film {
                 let mut frame = Frame::new(&self.device);
@@ -216,6 +277,7 @@ impl Renderer {
             has_alpha,
             counts: self.display.counts(),
             dropped,
+            work,
             passes: times.list(),
         })
     }
@@ -223,7 +285,8 @@ impl Renderer {
     /// One sample of every pixel: the frame, pass by pass.
     fn sample(&mut self, view: &View, index: u32, count: u32) -> Result<Vec<PassTime>> {
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(index, count))));
-        let Self { device, plan, scene, camera, gbuffer: g, tiles: lists_of_lights, work, lists, radiance, .. } =
+        self.rays.look_from(view, index, count);
+        let Self { device, plan, scene, rays, camera, gbuffer: g, tiles: lists_of_lights, work, lists, radiance, .. } =
             &*self;
         // With n samples a pixel each one stands for 1/n of its area: textures are read that much sharper.
         let lod_bias = -0.5 * (count as f32).log2();
@@ -231,6 +294,7 @@ impl Renderer {
             plan,
             knobs: &self.settings.knobs,
             scene,
+            rays,
             tiles: lists_of_lights,
             environment: &self.environment,
             camera,
@@ -238,13 +302,19 @@ impl Renderer {
         };
 
         let mut frame = Frame::new(device);
-        gbuffer(&mut frame, scene, camera, g, lod_bias)?;
+        if plan.rays.is_some() {
+            rays.reset(&mut frame);
+        }
+        gbuffer(&mut frame, scene, camera, g, lod_bias, rays.inside())?;
         if plan.tiles {
             tiles(&mut frame, plan, scene, camera, g, lists_of_lights)?;
         }
         classify(&mut frame, g, work)?;
         light(&mut frame, lighting, g, work, radiance)?;
         background(&mut frame, lighting, g, work, radiance)?;
+        if let Some(with) = plan.rays.filter(|rays| rays.mirrors || rays.refraction) {
+            interact(&mut frame, lighting, with, g, &self.ray_tiles, radiance)?;
+        }
         if let Some(lists) = lists {
             frame.fill("reset fragment counters", &lists.counters, 0);
             frame.fill("reset dropped fragments", &lists.dropped, 0);
@@ -254,6 +324,9 @@ impl Renderer {
             }
             frame.read_back(&lists.counters);
             frame.read_back(&lists.dropped);
+        }
+        if plan.rays.is_some() {
+            frame.read_back(&rays.counts);
         }
         frame.finish()
     }
@@ -308,7 +381,7 @@ impl Renderer {
         self.scene.look_from(&view);
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(0, 1))));
         let mut frame = Frame::new(&self.device);
-        gbuffer(&mut frame, &self.scene, &self.camera, &self.gbuffer, 0.0)?;
+        gbuffer(&mut frame, &self.scene, &self.camera, &self.gbuffer, 0.0, self.rays.inside())?;
         frame.finish()?;
         // As many rows at a time as one storage buffer holds.
         let row_bytes = u64::from(width) * size_of::<AovPixel>() as u64;
@@ -324,6 +397,12 @@ impl Renderer {
             all.extend(pixels.read(|words| bytemuck::pod_collect_to_vec::<u8, AovPixel>(&words[..bytes])));
         }
         Ok((all, view))
+    }
+
+    /// The hierarchy that rays go through, if there is one.
+    #[must_use]
+    pub fn bvh(&self) -> Option<BvhFacts> {
+        self.rays.facts
     }
 
     /// The device it draws on.

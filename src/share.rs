@@ -28,6 +28,13 @@ pub struct Instance {
     pub handedness: f32,
     pub material: u32,
     pub scale: f32,
+    pub flags: u32,
+    pub first_triangle: u32,
+}
+
+impl Instance {
+    /// Transmits light and is no closed solid: read as a thin sheet.
+    pub const SHEET: u32 = 1;
 }
 
 /// `shaders/share/scene.glsl`.
@@ -49,6 +56,23 @@ pub struct Material {
     pub clearcoat: f32,
     pub clearcoat_roughness: f32,
     pub flags: u32,
+    pub sigma: [f32; 3],
+    pub medium: u32,
+    pub n_metal: [f32; 3],
+    pub unused_n: f32,
+    pub kappa_metal: [f32; 3],
+    pub unused_kappa: f32,
+}
+
+impl Material {
+    /// Shown as it is.
+    pub const UNLIT: u32 = 1;
+    /// Alpha is coverage.
+    pub const BLENDED: u32 = 2;
+    /// `n_metal` and `kappa_metal` tell its reflectance.
+    pub const CONDUCTOR: u32 = 4;
+    /// Reflects anything at all at its surface.
+    pub const MIRRORS: u32 = 8;
 }
 
 /// `shaders/share/environment.glsl`.
@@ -77,4 +101,35 @@ pub struct AovPixel {
     pub emissive: [f32; 3],
     pub material: u32,
     pub instance: u32,
+}
+
+/// `shaders/share/trace.glsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct TraceTerms {
+    pub bvh_from_rel: [f32; 3],
+    pub offset: f32,
+    pub grid_origin: [f32; 3],
+    pub nodes: u32,
+    pub grid_unit: [f32; 3],
+    pub samples: u32,
+    pub camera_media: [u32; 4],
+    pub pixel_angle: f32,
+    pub lod_bias: f32,
+    pub sample_index: u32,
+    pub interfaces: u32,
+}
+
+/// `shaders/share/work.glsl`. Sums are pairs of words, the low one first.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct WorkCounts {
+    pub reflection: [u32; 2],
+    pub refraction: [u32; 2],
+    pub shadow: [u32; 2],
+    pub node_visits: [u32; 2],
+    pub triangle_tests: [u32; 2],
+    pub stray_interfaces: [u32; 2],
+    pub lost: [u32; 2],
+    pub most_lost: u32,
 }

@@ -51,7 +51,7 @@ fn degrees(a: DVec3, b: DVec3) -> f64 {
 fn without_see_through(scene: &Scene) -> Scene {
     let mut opaque = scene.clone();
     for mesh in &mut opaque.meshes {
-        if is_see_through(&scene.materials[mesh.material]) {
+        if is_see_through(&scene.materials[mesh.material], false) {
             mesh.indices.clear();
         }
     }

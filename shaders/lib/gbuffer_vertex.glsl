@@ -17,7 +17,7 @@ layout(location = 1) out vec3 n_rel;
 layout(location = 2) out vec4 t_rel;
 layout(location = 3) out vec4 uv;
 layout(location = 4) out vec4 vertex_color;
-layout(location = 5) flat out uvec2 ids; // instance, material
+layout(location = 5) flat out uvec3 ids; // instance, material, first triangle of the instance
 
 void main() {
     Instance instance = instances[gl_InstanceIndex];
@@ -26,6 +26,6 @@ void main() {
     t_rel = HAS_NORMAL || HAS_COAT_NORMAL ? vec4(mat3(instance.rel_from_object) * tangent.xyz, tangent.w * instance.handedness) : vec4(0);
     uv = HAS_TEXTURES ? vec4(uv0, uv1) : vec4(0);
     vertex_color = HAS_COLOR ? color : vec4(1);
-    ids = uvec2(gl_InstanceIndex, instance.material);
+    ids = uvec3(gl_InstanceIndex, instance.material, instance.first_triangle);
     gl_Position = camera_block.clip_from_rel * vec4(p_rel, 1.0);
 }

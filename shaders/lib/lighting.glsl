@@ -3,6 +3,7 @@
 #define LIGHTING_GLSL
 #include "lib/encode.glsl"
 #include "lib/light.glsl"
+#include "lib/shadow.glsl"
 #include "lib/snell.glsl"
 #include "lib/surface.glsl"
 #include "share/environment.glsl"
@@ -21,46 +22,61 @@ layout(scalar, set = 0, binding = 22) uniform Environment { EnvironmentTerms env
 layout(set = 0, binding = 23) uniform sampler2D prefiltered;
 layout(set = 0, binding = 24) uniform sampler2D reflectance;
 
-vec3 local_light(Surface s, uint index) {
+// Light `index` of the table on a surface, as far as it is visible from there.
+vec3 light_on(Surface s, uint index) {
     vec4 place = imageLoad(lights, int(index * 4));
     vec4 color = imageLoad(lights, int(index * 4 + 1));
     vec4 axis = imageLoad(lights, int(index * 4 + 2));
     float spot_offset = imageLoad(lights, int(index * 4 + 3)).x;
-    vec3 to_light = place.xyz - s.p_rel;
+    bool directional = index < DIRECTIONAL_LIGHTS;
+    vec3 to_light = directional ? place.xyz : place.xyz - s.p_rel;
     float r2 = dot(to_light, to_light);
-    vec3 l = to_light * inversesqrt(max(r2, 1e-30));
+    vec3 l = directional ? place.xyz : to_light * inversesqrt(max(r2, 1e-30));
     float falloff = point_falloff(r2, color.w) * spot_share(-dot(axis.xyz, l), axis.w, spot_offset);
-    return reflected(s, l) * color.rgb * falloff;
+    vec3 arriving = color.rgb * (directional ? 1.0 : falloff);
+    vec3 result = reflected(s, l) * arriving;
+    if (SHADOWS != 0) {
+        result *= terminator(s.n, s.n_triangle, l);
+        bool wanted = largest(result) > 0.0;
+        result *= visibility(s.p_bvh, s.n_triangle, s.v, s.triangle, s.media, directional ? l : to_light,
+                             directional ? LARGEST : 1.0, wanted);
+    }
+    return result;
 }
 
-// Evaluations of loop heads so far: lavapipe ends all loops of an invocation in silence after 65,535 of them.
-uint loop_heads = 0;
+// The part of the lights that one dispatch goes through: indices of the table, and words of the tiles' masks.
+struct LightRange {
+    uint first;
+    uint end;
+    uint first_word;
+    uint end_word;
+};
 
-vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across) {
+vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across, LightRange range) {
     vec3 sum = vec3(0.0);
-    loop_heads += DIRECTIONAL_LIGHTS + LOCAL_LIGHTS + 2;
-    for (uint i = 0; i < DIRECTIONAL_LIGHTS; i++) {
-        sum += reflected(s, imageLoad(lights, int(i * 4)).xyz) * imageLoad(lights, int(i * 4 + 1)).rgb;
-    }
-    for (uint i = 0; i < LOCAL_LIGHTS; i++) sum += local_light(s, DIRECTIONAL_LIGHTS + i);
-    if (TILE_WORDS > 0) {
-        // Lights of the tile as a bit mask, in ascending order whatever built it. Empty words are skipped in a loop of
-        // their own: lavapipe goes through a loop's body at least once, and a light is a long body.
-        int tile = int((uint(pixel.y) / TILE * tiles_across + uint(pixel.x) / TILE) * TILE_WORDS);
-        uint word = 0;
-        uint bits = imageLoad(tile_lights, tile).x;
-        while (true) {
-            loop_heads += 2;
-            while (bits == 0 && word + 1 < TILE_WORDS) {
+    if (DIRECTIONAL_LIGHTS + LOCAL_LIGHTS + TILE_WORDS == 0) return sum;
+    // Lights of the tile as a bit mask, in ascending order whatever built it. Empty words are skipped in a loop of
+    // their own: lavapipe goes through a loop's body at least once, and a light is a long body.
+    int tile = int((uint(pixel.y) / TILE * tiles_across + uint(pixel.x) / TILE) * TILE_WORDS);
+    uint next = range.first;
+    uint word = range.first_word;
+    uint bits = TILE_WORDS > 0 && word < range.end_word ? imageLoad(tile_lights, tile + int(word)).x : 0u;
+    while (true) {
+        loop_heads++;
+        bool listed = next >= range.end;
+        if (TILE_WORDS > 0) {
+            loop_heads++;
+            while (listed && bits == 0 && word + 1 < range.end_word) {
                 loop_heads++;
                 word++;
                 bits = imageLoad(tile_lights, tile + int(word)).x;
             }
-            if (bits == 0) break;
-            uint bit = uint(findLSB(bits));
-            bits &= bits - 1;
-            sum += local_light(s, DIRECTIONAL_LIGHTS + word * 32 + bit);
         }
+        if (listed && bits == 0) break;
+        uint index = listed ? DIRECTIONAL_LIGHTS + word * 32 + uint(findLSB(bits)) : next;
+        bits = listed ? bits & (bits - 1) : bits;
+        next += listed ? 0 : 1;
+        sum += light_on(s, index);
     }
     return sum;
 }
@@ -102,25 +118,27 @@ vec3 environment_light(Surface s) {
         float enters = 1.0 - largest(s.f0_dielectric * ab.x + s.f90_dielectric * ab.y);
         result += s.diffuse * (INV_PI * enters) * environment_irradiance(s.n);
     }
-    if (REFLECTION) result += (s.f0 * ab.x + s.f90 * ab.y) * s.compensation * prefiltered_radiance(r, s.alpha);
+    if (REFLECTION && !s.base_traced) result += (s.f0 * ab.x + s.f90 * ab.y) * s.compensation * prefiltered_radiance(r, s.alpha);
     if (CLEARCOAT) {
         vec3 coat_r = reflect_ray(-s.v, s.n_coat).R;
         vec2 coat_at = vec2(clamp(dot(s.n_coat, s.v), 0.0, 1.0), s.clearcoat_roughness);
         vec2 coat = textureLod(reflectance, coat_at, 0.0).rg;
         result *= under_coat(s);
-        if (REFLECTION) result += s.clearcoat * (0.04 * coat.x + coat.y) * prefiltered_radiance(coat_r, s.clearcoat_alpha);
+        if (REFLECTION && !s.coat_traced) result += s.clearcoat * (0.04 * coat.x + coat.y) * prefiltered_radiance(coat_r, s.clearcoat_alpha);
     }
     return result * s.occlusion;
 }
 
-vec3 radiance_to_eye(Surface s, ivec2 pixel, uint tiles_across) {
+// Light from `range`, and with `all_around` what does not come from lights as well.
+vec3 radiance_to_eye(Surface s, ivec2 pixel, uint tiles_across, LightRange range, bool all_around) {
     if (BRDF == 3) {
         vec2 ab = textureLod(reflectance, vec2(clamp(dot(s.n, s.v), 0.0, 1.0), s.roughness), 0.0).rg;
         s.compensation = ggx_compensation(s.f0, ab.x + ab.y);
     }
-    vec3 result = punctual_light(s, pixel, tiles_across);
-    if (AMBIENT || REFLECTION) result += environment_light(s);
-    result += CLEARCOAT ? s.emissive * under_coat(s) : s.emissive;
-    return s.unlit ? s.base : result;
+    vec3 result = punctual_light(s, pixel, tiles_across, range);
+    vec3 around = CLEARCOAT ? s.emissive * under_coat(s) : s.emissive;
+    if (AMBIENT || REFLECTION) around += environment_light(s);
+    result += all_around ? around : vec3(0.0);
+    return s.unlit ? all_around ? s.base : vec3(0.0) : result;
 }
 #endif

@@ -137,16 +137,68 @@ vec3 axis_last(vec3 p, int k) {
     return k == 0 ? p.yzx : k == 1 ? p.zxy : p;
 }
 
+// The axis along which a direction is longest.
+int longest_axis(vec3 direction) {
+    float size = largest_component(direction);
+    return abs(direction.x) == size ? 0 : abs(direction.y) == size ? 1 : 2;
+}
+
+// The shear that makes a ray the last axis, as rows of a matrix: of their entries two are 0 and 1, so that a product with
+// one rounds as x − s z does, and no coordinates need to be exchanged, which costs lavapipe two selects each.
+struct Shear {
+    vec3 x;
+    vec3 y;
+    vec3 z;
+    float dz;  // of the direction along the row z, never 0
+};
+
+Shear ray_shear(vec3 direction) {
+    int k = longest_axis(direction);
+    vec3 d = axis_last(direction, k);
+    precise float dz = d.z == 0.0 ? 1.0 : d.z;
+    precise vec2 shear = d.xy / dz;
+    vec3 e = vec3(k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0);
+    // The axis after k is e turned once, the one after that turned twice.
+    return Shear(e.zxy - shear.x * e, e.yzx - shear.y * e, e, dz);
+}
+
+float along(vec3 row, vec3 p) {
+    precise float sum = row.x * p.x + row.y * p.y + row.z * p.z;
+    return sum;
+}
+
 // a.x b.y − a.y b.x, and exactly the negative with a and b exchanged: an edge has one value in both its triangles.
 float edge_function(vec2 a, vec2 b) {
     precise float e = a.x * b.y - a.y * b.x;
     return e;
 }
 
-// Where p is across a ray along its last axis.
-vec2 sheared(vec3 p, vec2 shear) {
-    precise vec2 across = p.xy - shear * p.z;
-    return across;
+// On which side of the edge from a to b the ray passes: the sign of its edge function, and where that is 0 the sign it
+// has for a ray moved by (ε, ε²). A ray that meets an edge or a corner thus meets one of the triangles there, not none
+// and not two, and crosses a closed surface an even number of times.
+float side_of_edge(float edge, vec2 a, vec2 b) {
+    return edge != 0.0 ? edge : a.y != b.y ? a.y - b.y : b.x - a.x;
+}
+
+struct ShearedTriangle {
+    bool inside;  // by side_of_edge
+    vec3 weights; // of the corners, times det
+    float det;    // twice the area across the ray
+    float depth;  // det times dz times the ray's parameter
+};
+
+// Woop, Benthin and Wald, JCGT 2(1) 2013. Corners relative to the ray's origin.
+ShearedTriangle sheared_triangle(Shear s, vec3 a, vec3 b, vec3 c) {
+    vec2 qa = vec2(along(s.x, a), along(s.y, a));
+    vec2 qb = vec2(along(s.x, b), along(s.y, b));
+    vec2 qc = vec2(along(s.x, c), along(s.y, c));
+    ShearedTriangle r;
+    r.weights = vec3(edge_function(qc, qb), edge_function(qa, qc), edge_function(qb, qa));
+    vec3 side = vec3(side_of_edge(r.weights.x, qc, qb), side_of_edge(r.weights.y, qa, qc), side_of_edge(r.weights.z, qb, qa));
+    r.inside = min(side.x, min(side.y, side.z)) > 0.0 || max(side.x, max(side.y, side.z)) < 0.0;
+    r.det = r.weights.x + r.weights.y + r.weights.z;
+    r.depth = r.weights.x * along(s.z, a) + r.weights.y * along(s.z, b) + r.weights.z * along(s.z, c);
+    return r;
 }
 
 struct PairOfAxes {
@@ -189,22 +241,26 @@ RayTriangle ray_triangle(vec3 origin, vec3 direction, vec3 a, vec3 b, vec3 c) {
         if (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= 0.0) r = RayTriangle(true, t, u, v);
     } else {
         float size_d = largest_component(direction);
-        int k = abs(direction.x) == size_d ? 0 : abs(direction.y) == size_d ? 1 : 2;
         float scale_d = scale_to_one(size_d);
-        vec3 d = axis_last(direction, k) * scale_d;
         bool moves = size_d >= SMALLEST_NORMAL;
-        precise float dz = moves ? d.z : 1.0;
-        precise vec2 shear = d.xy / dz;
-        precise vec3 pa = axis_last(a - origin, k);
-        precise vec3 pb = axis_last(b - origin, k);
-        precise vec3 pc = axis_last(c - origin, k);
+        precise vec3 pa = a - origin;
+        precise vec3 pb = b - origin;
+        precise vec3 pc = c - origin;
         float scale = scale_to_one(max(largest_component(pa), max(largest_component(pb), largest_component(pc))));
+        Shear shear = ray_shear(direction * scale_d);
+        ShearedTriangle s = sheared_triangle(shear, pa * scale, pb * scale, pc * scale);
         // Weights of a, b and c, times twice the projected area.
-        float wa, wb, wc, det;
+        float wa = s.weights.x;
+        float wb = s.weights.y;
+        float wc = s.weights.z;
+        float det = s.det;
+        float depth = s.depth;
         if (ARITHMETIC == COMPENSATED) {
+            int k = longest_axis(direction);
             vec3 o = axis_last(origin, k);
-            DoubleFloat shear_x = df_div(DoubleFloat(d.x, 0.0), DoubleFloat(dz, 0.0));
-            DoubleFloat shear_y = df_div(DoubleFloat(d.y, 0.0), DoubleFloat(dz, 0.0));
+            vec3 d = axis_last(direction, k) * scale_d;
+            DoubleFloat shear_x = df_div(DoubleFloat(d.x, 0.0), DoubleFloat(shear.dz, 0.0));
+            DoubleFloat shear_y = df_div(DoubleFloat(d.y, 0.0), DoubleFloat(shear.dz, 0.0));
             PairOfAxes qa = sheared_pair(axis_last(a, k), o, scale, shear_x, shear_y);
             PairOfAxes qb = sheared_pair(axis_last(b, k), o, scale, shear_x, shear_y);
             PairOfAxes qc = sheared_pair(axis_last(c, k), o, scale, shear_x, shear_y);
@@ -215,18 +271,11 @@ RayTriangle ray_triangle(vec3 origin, vec3 direction, vec3 a, vec3 b, vec3 c) {
             wb = by_b.hi;
             wc = by_c.hi;
             det = df_add(df_add(by_a, by_b), by_c).hi;
-        } else {
-            vec2 qa = sheared(pa * scale, shear);
-            vec2 qb = sheared(pb * scale, shear);
-            vec2 qc = sheared(pc * scale, shear);
-            wa = edge_function(qc, qb);
-            wb = edge_function(qa, qc);
-            wc = edge_function(qb, qa);
-            det = wa + wb + wc;
+            depth = wa * along(shear.z, pa * scale) + wb * along(shear.z, pb * scale) + wc * along(shear.z, pc * scale);
         }
         bool inside = min(wa, min(wb, wc)) >= 0.0 || max(wa, max(wb, wc)) <= 0.0;
         float whole = det == 0.0 ? 1.0 : det;
-        float t = (wa * (pa.z * scale) + wb * (pb.z * scale) + wc * (pc.z * scale)) / whole / dz;
+        float t = depth / whole / shear.dz;
         if (inside && moves && det != 0.0 && t >= 0.0) {
             r = RayTriangle(true, unscaled(t, scale_d, scale), wb / whole, wc / whole);
         }

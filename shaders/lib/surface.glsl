@@ -3,12 +3,16 @@
 #define SURFACE_GLSL
 #include "lib/brdf.glsl"
 #include "lib/fresnel.glsl"
-#include "share/scene.glsl"
+#include "lib/material.glsl"
 
 // The knobs `brdf` and `fresnel` (src/plan/knobs.rs): one formula each, chosen when the pipeline is made.
 layout(constant_id = 10) const uint BRDF = 2;    // 0 blinn-phong, 1 blinn-phong-reciprocal, 2 ggx, 3 ggx-multi
 layout(constant_id = 11) const uint FRESNEL = 0; // 0 schlick, 1 exact
 layout(constant_id = 12) const bool CLEARCOAT = false;
+layout(constant_id = 19) const bool CONDUCTORS = false; // some metal is given by its n and κ
+// Smooth enough surfaces are mirrored by rays, rougher ones by the prefiltered environment (knob `reflection`).
+layout(constant_id = 20) const bool MIRROR_RAYS = false;
+const float ROUGHEST_MIRROR = 0.2;
 
 struct Surface {
     vec3 p_rel;
@@ -32,10 +36,24 @@ struct Surface {
     float clearcoat_roughness;
     bool unlit;
     vec3 base;
+    vec3 n_metal;        // index and extinction of a metal per channel; index 0 where a colour is all that is known
+    vec3 kappa_metal;
+    bool base_traced;    // mirrored by rays, not by the prefiltered environment
+    bool coat_traced;
+    vec3 p_bvh;          // the same point where rays live (share/trace.glsl)
+    vec3 n_triangle;     // geometric normal, to the viewer
+    uint triangle;       // which, or 0xffffffff
+    uvec4 media;         // those the viewer's side lies in (lib/media.glsl)
 };
 
 // Roughness below this is a mirror to 16-bit normals; the lobe stays finite (numerics.md 20 holds from α = 1e-5).
 const float MIN_ROUGHNESS = 0.01;
+
+// F0 of a metal, per channel (lecture F2).
+vec3 normal_reflectance(vec3 n, vec3 kappa) {
+    vec3 k2 = kappa * kappa;
+    return ((n - 1.0) * (n - 1.0) + k2) / ((n + 1.0) * (n + 1.0) + k2);
+}
 
 Surface surface_from_texels(Material m, vec3 base, float metallic, float roughness, float occlusion, vec3 emissive,
                             vec3 layers, vec3 n, vec3 n_coat, vec3 v, vec3 p_rel) {
@@ -50,7 +68,17 @@ Surface surface_from_texels(Material m, vec3 base, float metallic, float roughne
     s.metallic = metal;
     s.f0_dielectric = m.f0 * layers.z;
     s.f90_dielectric = m.f90 * layers.z;
-    s.f0 = mix(s.f0_dielectric, s.base, metal);
+    s.n_metal = vec3(0.0);
+    s.kappa_metal = vec3(0.0);
+    vec3 metal_f0 = s.base;
+    if (CONDUCTORS) {
+        if ((m.flags & MATERIAL_CONDUCTOR) != 0) {
+            s.n_metal = m.n_metal;
+            s.kappa_metal = m.kappa_metal;
+            metal_f0 *= normal_reflectance(s.n_metal, s.kappa_metal);
+        }
+    }
+    s.f0 = mix(s.f0_dielectric, metal_f0, metal);
     s.f90 = mix(s.f90_dielectric, 1.0, metal);
     s.ior = m.ior;
     s.compensation = vec3(1.0);
@@ -61,7 +89,13 @@ Surface surface_from_texels(Material m, vec3 base, float metallic, float roughne
     s.clearcoat = layers.x * m.clearcoat;
     s.clearcoat_roughness = max(layers.y * m.clearcoat_roughness, MIN_ROUGHNESS);
     s.clearcoat_alpha = s.clearcoat_roughness * s.clearcoat_roughness;
-    s.unlit = (m.flags & 1u) != 0;
+    s.base_traced = MIRROR_RAYS && s.roughness <= ROUGHEST_MIRROR;
+    s.coat_traced = MIRROR_RAYS && s.clearcoat_roughness <= ROUGHEST_MIRROR;
+    s.p_bvh = p_rel;
+    s.n_triangle = n;
+    s.triangle = 0xffffffffu;
+    s.media = uvec4(0);
+    s.unlit = (m.flags & MATERIAL_UNLIT) != 0;
     return s;
 }
 
@@ -74,9 +108,25 @@ vec3 fresnel_of_dielectric(Surface s, float cos_in) {
     return s.f0_dielectric + (vec3(s.f90_dielectric) - s.f0_dielectric) * share;
 }
 
-// Reflectance of the mixture. Metals given by a colour alone have no n and κ: Schlick on every rung.
+// Reflectance of the metallic part. Metals given by a colour alone have no n and κ: Schlick on every rung.
+vec3 fresnel_of_metal(Surface s, float cos_in) {
+    vec3 f = schlick(s.base, 1.0, cos_in);
+    if (CONDUCTORS) {
+        if (s.n_metal.x > 0.0) {
+            f = s.base * schlick(normal_reflectance(s.n_metal, s.kappa_metal), 1.0, cos_in);
+            if (FRESNEL == 1) {
+                f = s.base * vec3(fresnel_conductor(cos_in, s.n_metal.r, s.kappa_metal.r).F,
+                                  fresnel_conductor(cos_in, s.n_metal.g, s.kappa_metal.g).F,
+                                  fresnel_conductor(cos_in, s.n_metal.b, s.kappa_metal.b).F);
+            }
+        }
+    }
+    return f;
+}
+
+// Reflectance of the mixture.
 vec3 fresnel(Surface s, float cos_in) {
-    return mix(fresnel_of_dielectric(s, cos_in), schlick(s.base, 1.0, cos_in), s.metallic);
+    return mix(fresnel_of_dielectric(s, cos_in), fresnel_of_metal(s, cos_in), s.metallic);
 }
 
 float largest(vec3 v) {
@@ -105,10 +155,12 @@ vec3 reflected(Surface s, vec3 l) {
         } else {
             // What the dielectric's surface reflects does not reach its diffuse ground; its largest component, so that
             // a tinted F0 gives no complementary colour (KHR_materials_specular).
-            float enters = 1.0 - largest(fresnel_of_dielectric(s, h.cos_d));
+            vec3 f_dielectric = fresnel_of_dielectric(s, h.cos_d);
+            float enters = 1.0 - largest(f_dielectric);
+            vec3 f = mix(f_dielectric, fresnel_of_metal(s, h.cos_d), s.metallic);
             float d = ggx_distribution(h.cos_h, h.sin2_h, s.alpha);
             float vis = ggx_visibility(cos_l, cos_v, s.alpha);
-            result = (s.diffuse * (INV_PI * enters) + fresnel(s, h.cos_d) * s.compensation * (d * vis)) * cos_l;
+            result = (s.diffuse * (INV_PI * enters) + f * s.compensation * (d * vis)) * cos_l;
         }
     }
     if (CLEARCOAT) {

@@ -27,7 +27,7 @@ layout(location = 1) in vec3 n_rel;
 layout(location = 2) in vec4 t_rel;
 layout(location = 3) in vec4 uv;
 layout(location = 4) in vec4 vertex_color;
-layout(location = 5) flat in uvec2 ids;
+layout(location = 5) flat in uvec3 ids;
 
 layout(push_constant, scalar) uniform Push { float lod_bias; uint strip; };
 

@@ -5,12 +5,11 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "lib/camera.glsl"
 #include "lib/encode.glsl"
-#include "share/scene.glsl"
+#include "lib/material.glsl"
 #include "share/aov.glsl"
 
 layout(constant_id = 0) const bool HAS_EMISSIVE = false;
 layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
-layout(scalar, set = 0, binding = 1) readonly buffer Materials { Material materials[]; };
 layout(set = 0, binding = 2, r32f) readonly uniform imageBuffer depth;
 layout(set = 0, binding = 3, rgba16f) readonly uniform image2D base;
 layout(set = 0, binding = 4, rgba16_snorm) readonly uniform image2D normals;
@@ -28,7 +27,7 @@ void main() {
         uvec2 id = imageLoad(ids, pixel).xy;
         vec4 texel = imageLoad(base, pixel);
         vec4 octahedral = imageLoad(normals, pixel);
-        Material m = materials[id.x & 0xffffu];
+        Material m = material_at(id.x & 0xffffu);
         result.p_rel = rel_from_pixel(camera, pixel, z);
         result.normal = unit_from_octahedral(octahedral.xy);
         result.geometric_normal = unit_from_octahedral(octahedral.zw);
@@ -39,7 +38,7 @@ void main() {
         result.emissive = (HAS_EMISSIVE ? imageLoad(emissive, pixel).rgb : vec3(1.0)) * m.emissive;
         // 0 is "nothing": ids count from 1.
         result.material = 1 + (id.x & 0xffffu);
-        result.instance = 1 + (id.y & 0xffffffu);
+        result.instance = 1 + (id.y & INSTANCE_BITS);
     }
     pixels[(pixel.y - first_row) * camera.size.x + pixel.x] = result;
 }

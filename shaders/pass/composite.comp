@@ -4,19 +4,22 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
 layout(local_size_x = 8, local_size_y = 8) in;
-#include "lib/camera.glsl"
 #include "lib/fragment_list.glsl"
-#include "lib/lighting.glsl"
-#include "lib/work_tile.glsl"
+#include "lib/camera.glsl"
+#include "lib/surface.glsl"
 
 layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
-layout(scalar, set = 0, binding = 1) readonly buffer Materials { Material materials[]; };
-layout(set = 0, binding = 2, r32ui) readonly uniform uimage2D heads;
-layout(scalar, set = 0, binding = 3) readonly buffer Nodes { uint nodes[]; };
-layout(set = 0, binding = 4, rgba32f) uniform image2D radiance;
-layout(scalar, set = 0, binding = 5) buffer Dropped { uint dropped; };
-layout(scalar, set = 0, binding = 6) readonly buffer Instances { Instance instances[]; };
+layout(scalar, set = 0, binding = 2) readonly buffer Instances { Instance instances[]; };
+#include "lib/lighting.glsl"
+#include "lib/work_count.glsl"
+#include "lib/work_tile.glsl"
+
+layout(set = 0, binding = 3, r32ui) readonly uniform uimage2D heads;
+layout(scalar, set = 0, binding = 4) readonly buffer Nodes { uint nodes[]; };
+layout(set = 0, binding = 5, rgba32f) uniform image2D radiance;
+layout(scalar, set = 0, binding = 6) buffer Dropped { uint dropped; };
 layout(scalar, set = 0, binding = 7) readonly buffer Tiles { uint fragment_tiles[]; };
 layout(scalar, set = 0, binding = 8) readonly buffer Sizes { WorkSize tiles_size; } work;
 layout(push_constant, scalar) uniform Push { uint end_row; };
@@ -44,6 +47,7 @@ void main() {
     vec3 sum = vec3(0.0);
     vec3 through = vec3(1.0);
     uvec3 last = uvec3(0xffffffffu);
+    LightRange all = LightRange(0, DIRECTIONAL_LIGHTS + LOCAL_LIGHTS, 0, TILE_WORDS);
     uint per_fragment = 0; // loop heads of the last fragment: its neighbours in the list see the same lights
     while (true) {
         uint best = END_OF_LIST;
@@ -67,7 +71,7 @@ void main() {
         last = best_key;
         uint at = best * NODE_WORDS;
         uint word = nodes[at + 4];
-        Material m = materials[word & 0xffffu];
+        Material m = material_at(word & 0xffffu);
         vec2 blue_metal = unpackHalf2x16(nodes[at + 6]);
         vec2 blue_alpha = unpackHalf2x16(nodes[at + 9]);
         vec4 layer = unpackUnorm4x8(nodes[at + 10]);
@@ -81,17 +85,22 @@ void main() {
                                         unit_from_octahedral(unpackSnorm2x16(nodes[at + 12])), -direction, p);
         // Refraction `off`: what is not reflected goes straight on, tinted by the base colour and by absorption through
         // the nominal thickness (A1).
+        s.p_bvh = p + trace_terms.bvh_from_rel;
+        s.base_traced = false;
+        s.coat_traced = false;
+        s.media = trace_terms.camera_media;
         float transmits = m.transmission * layer.a * (1.0 - blue_metal.y * m.metallic);
         vec3 f = fresnel(s, clamp(dot(s.n, s.v), 0.0, 1.0));
         vec3 passes = transmits * s.base * exp(-m.sigma_thickness * (occlusion_thickness.y * instances[nodes[at + 2]].scale)) * (1.0 - f);
         if (CLEARCOAT) passes *= under_coat(s);
         s.diffuse *= 1.0 - transmits;
         float alpha = blue_alpha.y;
-        sum += through * alpha * radiance_to_eye(s, pixel, tiles_across);
+        sum += through * alpha * radiance_to_eye(s, pixel, tiles_across, all, true);
         through *= 1.0 - alpha + alpha * passes;
         per_fragment = loop_heads - before;
     }
     vec4 behind = imageLoad(radiance, pixel);
     float coverage = 1.0 - (through.r + through.g + through.b) * (1.0 / 3.0) * (1.0 - behind.a);
     imageStore(radiance, pixel, vec4(sum + through * behind.rgb, coverage));
+    if (SHADOWS != 0) count_rays(0, 0, 0.0);
 }

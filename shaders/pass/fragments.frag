@@ -14,7 +14,7 @@ layout(scalar, set = 0, binding = 17) writeonly buffer Nodes { uint nodes[]; };
 void main() {
     SurfaceFragment s = surface_fragment();
     float alpha = s.base.a * materials[ids.y].base_color.a;
-    bool covers = (materials[ids.y].flags & 2u) != 0;
+    bool covers = (materials[ids.y].flags & MATERIAL_BLENDED) != 0;
     if (!covers) alpha = 1.0;
     if (MASKED && s.base.a * materials[ids.y].base_color.a < materials[ids.y].alpha_cutoff) return;
     // A fragment without coverage leaves no trace; NaN coverage must not vanish here, it is counted later.

@@ -8,9 +8,10 @@
 
 layout(location = 0) out vec4 out_base;     // RGBA16F: base colour, metallic
 layout(location = 1) out vec4 out_normals;  // RGBA16_SNORM: octahedral shading normal, octahedral geometric normal
-layout(location = 2) out uvec2 out_ids;     // RG32UI: material | roughness << 16, instance | occlusion << 24
-layout(location = 3) out vec4 out_emissive; // RGBA16F, where the plan has it
-layout(location = 4) out vec4 out_layers;   // RGBA16, where the plan has it: lib/encode.glsl, packed_layers
+layout(location = 2) out uvec2 out_ids;     // RG32UI: material | roughness << 16, instance | back face << 23 | occlusion << 24
+layout(location = 3) out uint out_triangle; // R32UI, where the plan has rays: the triangle of the scene
+layout(location = 4) out vec4 out_emissive; // RGBA16F, where the plan has it: and the transmission texel
+layout(location = 5) out vec4 out_layers;   // RGBA16, where the plan has it: lib/encode.glsl, packed_layers
 
 void main() {
     SurfaceFragment s = surface_fragment();
@@ -19,7 +20,8 @@ void main() {
     out_normals = vec4(octahedral_from_unit(s.n_shading), octahedral_from_unit(s.n_geometric));
     uint roughness = uint(clamp(s.roughness, 0.0, 1.0) * 65535.0 + 0.5);
     uint occlusion = uint(clamp(s.occlusion, 0.0, 1.0) * 255.0 + 0.5);
-    out_ids = uvec2(ids.y | roughness << 16, ids.x | occlusion << 24);
-    out_emissive = vec4(s.emissive, 1.0);
+    out_ids = uvec2(ids.y | roughness << 16, ids.x | occlusion << 24 | (gl_FrontFacing ? 0u : BACK_FACE));
+    out_triangle = ids.z + uint(gl_PrimitiveID);
+    out_emissive = vec4(s.emissive, s.layers.w);
     out_layers = packed_layers(s.layers.xyz, s.n_coat);
 }

@@ -6,9 +6,13 @@ struct Instance {
     float handedness;        // sign of the determinant: −1 mirrors
     uint material;
     float scale;             // cube root of |determinant|: how long a metre of the object is in the world
+    uint flags;              // INSTANCE_SHEET
+    uint first_triangle;     // of the scene's, instances counted
 };
+const uint INSTANCE_SHEET = 1; // transmits light and is no closed solid: read as a thin sheet
 
-// What is constant over a material, in full f32: the G-buffer holds only what varies over it.
+// What is constant over a material, in full f32: the G-buffer holds only what varies over it. Also read as texels of
+// four words (lib/material.glsl).
 struct Material {
     vec4 base_color;
     vec3 emissive;
@@ -24,5 +28,19 @@ struct Material {
     float transmission;
     float clearcoat;
     float clearcoat_roughness;
-    uint flags;               // bit 0: unlit; bit 1: alpha is coverage
+    uint flags;               // MATERIAL_...
+    vec3 sigma;               // absorption of the medium inside, 1/m
+    uint medium;              // as an entry of lib/media.glsl
+    vec3 n_metal;             // index of refraction and extinction of a metal per channel, where flagged
+    float unused_n;
+    vec3 kappa_metal;
+    float unused_kappa;
 };
+const uint MATERIAL_UNLIT = 1;
+const uint MATERIAL_BLENDED = 2;   // alpha is coverage
+const uint MATERIAL_CONDUCTOR = 4; // n_metal and kappa_metal tell its reflectance
+const uint MATERIAL_MIRRORS = 8;   // reflects anything at all at its surface
+
+// The G-buffer's second id: instance, which side of it, and occlusion in the leading byte.
+const uint INSTANCE_BITS = 0x7fffffu;
+const uint BACK_FACE = 0x800000u;

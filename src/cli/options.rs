@@ -9,7 +9,7 @@ use glam::DVec3;
 use crate::frame::{Background, Settings};
 use crate::gpu::DeviceChoice;
 use crate::image::tone::ToneMap;
-use crate::plan::Knobs;
+use crate::plan::{Knobs, Model};
 use crate::scene::camera::{Camera, DEFAULT_FOV_Y};
 use crate::scene::environment::Environment;
 use crate::scene::{LoadOptions, Scene};
@@ -23,17 +23,6 @@ pub enum When {
     Always,
     /// Never.
     Never,
-}
-
-/// The lecture's three models (R6).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Model {
-    /// Direct light, and the environment as ambient and mirrored light.
-    Local,
-    /// Plus traced reflection and refraction; not built yet.
-    Recursive,
-    /// Global illumination; not built yet.
-    Global,
 }
 
 /// What to draw, and from where.
@@ -81,7 +70,7 @@ pub struct PictureOptions {
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
     pub size: [u32; 2],
     /// How much light transport is simulated
-    #[arg(long, value_enum, default_value_t = Model::Local)]
+    #[arg(long, value_enum, default_value_t = Model::default())]
     pub model: Model,
     /// Choose a knob's rung, for example samples=16; repeatable
     #[arg(long = "set", value_name = "KNOB=RUNG")]
@@ -224,11 +213,10 @@ impl PictureOptions {
     /// # Errors
     /// One sentence for a model, knob or rung that does not exist or is not built yet.
     pub fn knobs(&self) -> Result<Knobs> {
-        if self.model != Model::Local {
-            let name = self.model.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default();
-            bail!("--model {name}: only the local model is built so far");
+        if self.model == Model::Global {
+            bail!("--model global: only the local and the recursive model are built so far");
         }
-        let mut knobs = Knobs::default();
+        let mut knobs = Knobs::of(self.model);
         for choice in &self.set {
             knobs.set(choice)?;
         }
@@ -254,6 +242,7 @@ impl PictureOptions {
             background: scene.background.unwrap_or_default(),
             environment_intensity: scene.env_intensity,
             environment_rotation: scene.env_rotation,
+            traversal: None,
         })
     }
 }

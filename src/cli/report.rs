@@ -4,8 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::frame::Work;
 use crate::gpu::{Created, Device, DeviceInfo, Message, Severity};
 use crate::image::Statistics;
+use crate::pass::rays::{BvhFacts, Traversal};
 use crate::plan::{Effect, Knobs, Plan};
 use crate::shader::PROGRAMS;
 
@@ -24,11 +26,14 @@ pub struct Report {
     pub plan: PlanFacts,
     /// GPU time per pass over the repeats.
     pub passes: Vec<PassFacts>,
-    /// Wall time of each phase in milliseconds. `bvh` is 0, none is built; `pipelines` is 0, they are made inside `upload`
+    /// Wall time of each phase in milliseconds. `bvh` is a part of `upload`; `pipelines` is 0, they are made inside `upload`
     /// and `frame`, where the driver compiles them at their first use.
     pub phases_ms: BTreeMap<&'static str, f64>,
     /// Work counts: the same on every machine.
-    pub work: Work,
+    pub work: WorkFacts,
+    /// What rays went through; absent where none were sent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bvh: Option<BvhReport>,
     /// Pipelines made.
     pub pipelines: PipelineFacts,
     /// Peak memory.
@@ -154,20 +159,80 @@ impl Spread {
 
 /// Exact counts.
 #[derive(Debug, Serialize)]
-pub struct Work {
+pub struct WorkFacts {
     /// Rays by kind; primary visibility is rasterised.
     pub rays: BTreeMap<&'static str, u64>,
     /// BVH nodes visited.
     pub node_visits: u64,
     /// Triangles tested by rays.
     pub triangle_tests: u64,
+    /// Boundaries of transparent bodies that were left without having been entered: open or crossing shells.
+    pub stray_interfaces: u64,
+    /// Share of a pixel's light that was not followed because a path met too many surfaces or had become too faint.
+    pub cut_off: CutOff,
 }
 
-impl Default for Work {
-    /// No rays: primary visibility is rasterised, and nothing is traced yet.
-    fn default() -> Self {
-        let kinds = ["primary", "reflection", "refraction", "shadow", "indirect"];
-        Self { rays: kinds.into_iter().map(|kind| (kind, 0)).collect(), node_visits: 0, triangle_tests: 0 }
+/// Throughput that was not followed. What it would have found is at most as bright as the brightest thing in the scene,
+/// so that no pixel misses more than this share of that.
+#[derive(Debug, Serialize)]
+pub struct CutOff {
+    /// Over all pixels.
+    pub mean: f64,
+    /// Of the worst pixel.
+    pub max: f32,
+}
+
+impl From<&Work> for WorkFacts {
+    fn from(work: &Work) -> Self {
+        let rays = [
+            ("primary", 0),
+            ("reflection", work.reflection),
+            ("refraction", work.refraction),
+            ("shadow", work.shadow),
+            ("indirect", 0),
+        ];
+        Self {
+            rays: rays.into_iter().collect(),
+            node_visits: work.node_visits,
+            triangle_tests: work.triangle_tests,
+            stray_interfaces: work.stray_interfaces,
+            cut_off: CutOff { mean: work.mean_lost, max: work.most_lost },
+        }
+    }
+}
+
+/// The hierarchy that rays went through.
+#[derive(Debug, Serialize)]
+pub struct BvhReport {
+    /// Milliseconds to build and check it.
+    pub build_ms: f64,
+    /// And to lay it out for the device.
+    pub layout_ms: f64,
+    /// Triangles in it.
+    pub triangles: usize,
+    /// Triangles left out: without area or not finite.
+    pub dropped: usize,
+    /// Nodes.
+    pub nodes: usize,
+    /// Edges from the root to the deepest leaf.
+    pub depth: u32,
+    /// Expected nodes and triangles met by a line through the root's box.
+    pub sah: f64,
+    /// How it was gone through: `links16`, `links32` or `stack`.
+    pub traversal: &'static str,
+    /// Bytes on the device.
+    pub bytes: u64,
+}
+
+impl From<BvhFacts> for BvhReport {
+    fn from(bvh: BvhFacts) -> Self {
+        let traversal = match bvh.traversal {
+            Traversal::Links16 => "links16",
+            Traversal::Links32 => "links32",
+            Traversal::Stack => "stack",
+        };
+        let BvhFacts { build_ms, layout_ms, triangles, dropped, nodes, depth, sah, bytes, .. } = bvh;
+        Self { build_ms, layout_ms, triangles, dropped, nodes, depth, sah, traversal, bytes }
     }
 }
 

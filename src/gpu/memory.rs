@@ -178,7 +178,7 @@ impl Drop for Buffer {
 /// Size of the texels of a buffer.
 fn texel_bytes(format: vk::Format) -> u64 {
     match format {
-        vk::Format::R32G32B32A32_SFLOAT => 16,
+        vk::Format::R32G32B32A32_SFLOAT | vk::Format::R32G32B32A32_UINT => 16,
         vk::Format::R32G32_SFLOAT => 8,
         _ => 4,
     }

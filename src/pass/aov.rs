@@ -23,7 +23,7 @@ pub fn aov<'a>(
 ) -> Result<()> {
     let bind = aov::Bind {
         camera_block: camera,
-        materials: &scene.materials,
+        material_texels: &scene.materials,
         depth: &gbuffer.depth_texels,
         base: &gbuffer.base,
         normals: &gbuffer.normals,

@@ -6,8 +6,10 @@ use std::sync::Arc;
 use anyhow::Result;
 
 use super::gbuffer::GBuffer;
+use super::light::Lighting;
 use crate::gpu::{Buffer, Device, Frame, Image, Place};
-use crate::shader::{classify, classify_fragments};
+use crate::plan::Rays;
+use crate::shader::{classify, classify_fragments, classify_rays as ray_program};
 
 const TILE: u32 = 8;
 
@@ -115,4 +117,59 @@ pub fn classify<'a>(frame: &mut Frame<'a>, gbuffer: &'a GBuffer, lists: &'a Work
     let groups = rows_of(tiles.div_ceil(classify::PROGRAM.local_size[0]));
     let constants = classify::Constants {}.words();
     frame.compute("classify tiles", &bind, constants, bytemuck::cast_slice(&lists.size), groups)
+}
+
+/// The tiles that hold surfaces which send rays.
+pub struct RayTiles {
+    /// One `WorkSize`.
+    pub sizes: Buffer,
+    empty: Buffer,
+    /// The tiles.
+    pub tiles: Buffer,
+}
+
+impl RayTiles {
+    /// A list for a picture of `size` pixels.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn new(device: &Arc<Device>, size: [u32; 2]) -> Result<Self> {
+        let bytes = 4 * u64::from(size[0].div_ceil(TILE)) * u64::from(size[1].div_ceil(TILE));
+        Ok(Self {
+            sizes: Buffer::new(device, "ray work size", WORK_BYTES, Place::Device)?,
+            empty: Buffer::with_data(device, "empty ray work size", &EMPTY)?,
+            tiles: Buffer::new(device, "ray tiles", bytes, Place::Device)?,
+        })
+    }
+}
+
+/// Lists the tiles of the G-buffer whose surfaces send rays (shaders/pass/classify_rays.comp).
+///
+/// # Errors
+/// When the driver refuses the pipeline.
+pub fn classify_rays<'a>(
+    frame: &mut Frame<'a>,
+    lighting: Lighting<'a>,
+    with: Rays,
+    gbuffer: &'a GBuffer,
+    list: &'a RayTiles,
+) -> Result<()> {
+    frame.copy_buffer("reset ray work size", &list.empty, &list.sizes, WORK_BYTES);
+    let bind = ray_program::Bind {
+        material_texels: &lighting.scene.materials,
+        depth: &gbuffer.depth_texels,
+        ids: &gbuffer.ids,
+        sizes: &list.sizes,
+        ray_tiles: &list.tiles,
+    };
+    let size = lighting.size;
+    let tiles = size[0].div_ceil(TILE) * size[1].div_ceil(TILE);
+    let groups = rows_of(tiles.div_ceil(ray_program::PROGRAM.local_size[0]));
+    let constants = ray_program::Constants {
+        clearcoat: lighting.plan.clearcoat,
+        mirror_rays: with.mirrors,
+        transmissive: with.refraction,
+        ..Default::default()
+    };
+    frame.compute("classify ray tiles", &bind, constants.words(), bytemuck::cast_slice(&size), groups)
 }

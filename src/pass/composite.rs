@@ -4,6 +4,7 @@ use anyhow::Result;
 
 use super::fragments::FragmentLists;
 use super::light::Lighting;
+use super::rays::LOOP_BUDGET;
 use crate::gpu::{Frame, Image};
 use crate::shader::composite;
 
@@ -18,25 +19,54 @@ pub fn composite<'a>(
     radiance: &'a Image,
     rows: [u32; 2],
 ) -> Result<()> {
-    let Lighting { scene, environment, camera, .. } = lighting;
+    let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
+    let planned = plan.rays;
+    let constants = composite::Constants {
+        brdf: lighting.knobs.index("brdf"),
+        fresnel: lighting.knobs.index("fresnel"),
+        arithmetic: lighting.knobs.index("arithmetic"),
+        clearcoat: plan.clearcoat,
+        conductors: plan.conductors,
+        mirror_rays: planned.is_some_and(|rays| rays.mirrors),
+        directional_lights: plan.directional_lights,
+        local_lights: lighting.unlisted_lights(),
+        ambient: plan.ambient,
+        reflection: plan.reflection,
+        traversal: rays.constants.traversal,
+        octants: rays.constants.octants,
+        stack_size: rays.constants.stack_size,
+        hit_textures: rays.constants.hit_textures,
+        shadows: u32::from(lighting.shadows()),
+        filters: planned.is_some_and(|rays| rays.filters),
+        absorption: planned.map_or(0, |rays| rays.absorption),
+        tile_words: lighting.tiles.words(),
+        loop_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
+    };
     let bind = composite::Bind {
         camera_block: camera,
-        materials: &scene.materials,
+        instances: &scene.instances,
         heads: &lists.heads,
         nodes: &lists.nodes,
         radiance,
         dropped: &lists.dropped,
-        instances: &scene.instances,
+        tiles: &lists.work.tiles,
+        work: &lists.work.sizes,
         lights: &scene.lights,
         tile_lights: &lighting.tiles.masks,
         environment: &environment.terms,
-        tiles: &lists.work.tiles,
-        work: &lists.work.sizes,
         prefiltered: environment.prefiltered(),
         reflectance: environment.reflectance(),
+        bvh_nodes: &rays.nodes,
+        bvh_triangles: &rays.triangles,
+        trace_block: &rays.terms,
+        material_texels: &scene.materials,
+        hit_corners: &rays.corners,
+        texels: &scene.texels,
+        texel_slots: &scene.texel_slots,
+        hit_slots: &scene.slots,
+        work_done: &rays.counts,
     };
     let push = [rows[1]];
-    let constants = lighting.composite_constants().words();
     let push = bytemuck::cast_slice(&push);
-    frame.compute_indirect("see-through lighting", &bind, constants, push, &lists.work.sizes, 0)
+    frame.compute_indirect("see-through lighting", &bind, constants.words(), push, &lists.work.sizes, 0)
 }

@@ -54,7 +54,7 @@ impl EnvironmentOnDevice {
     /// # Errors
     /// When memory is short.
     pub fn new(device: &Arc<Device>, plan: &Plan, environment: Option<&Environment>, turn: Turn) -> Result<Self> {
-        let lights = plan.ambient || plan.reflection;
+        let lights = plan.ambient || plan.reflection || plan.rays.is_some();
         let black = || vec![(1, 1, vec![[0.0; 4]])];
         let chain = match environment {
             Some(environment) if lights || plan.sky => box_chain(environment),

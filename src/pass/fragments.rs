@@ -187,6 +187,6 @@ pub fn fragments<'a>(
         size: lists.size,
         rows: strip.rows,
     };
-    frame.raster(&raster, &fragments::PROGRAM, &bindings, bytemuck::cast_slice(&push), scene.draws(true))?;
+    frame.raster(&raster, &fragments::PROGRAM, &bindings, bytemuck::cast_slice(&push), scene.draws(true, false))?;
     classify_fragments(frame, &lists.heads, &lists.work, strip.rows)
 }

@@ -1,7 +1,8 @@
 //! Raster G-buffer: the nearest opaque surface of every pixel (shaders/pass/gbuffer.*).
 //!
 //! 24 bytes a pixel beside depth: RGBA16F base colour and metallic, RGBA16_SNORM two octahedral normals, RG32UI ids,
-//! roughness and occlusion; 8 more for emissive textures and 16 for layers where the plan has them. docs/decisions/gbuffer.md has
+//! roughness and occlusion; 4 more for triangles where there are rays, 8 for emissive textures and 16 for layers where the
+//! plan has them. docs/decisions/gbuffer.md has
 //! what narrower and wider choices cost.
 
 use std::sync::Arc;
@@ -27,12 +28,14 @@ pub struct GBuffer {
     pub normals: Image,
     /// Material, roughness, instance, occlusion.
     pub ids: Image,
+    /// Triangle of the scene; one pixel where the plan has no rays.
+    pub triangles: Image,
     /// Emissive texels; one pixel where the plan has none.
     pub emissive: Image,
     /// Layer texels; one pixel where the plan has none.
     pub layers: Image,
     size: [u32; 2],
-    with: [bool; 2],
+    with: [bool; 3],
 }
 
 impl GBuffer {
@@ -46,6 +49,9 @@ impl GBuffer {
             let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::STORAGE;
             Image::new(device, name, ImageDesc::flat(format, width, height, usage))
         };
+        // What a transmission texture lets through is kept beside the emissive texel.
+        let with =
+            [plan.rays.is_some(), plan.emissive || plan.rays.is_some_and(|rays| rays.refraction), plan.layers];
         let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
         Ok(Self {
             depth: Image::new(
@@ -63,15 +69,16 @@ impl GBuffer {
             base: target("G-buffer base colour", vk::Format::R16G16B16A16_SFLOAT, true)?,
             normals: target("G-buffer normals", vk::Format::R16G16B16A16_SNORM, true)?,
             ids: target("G-buffer ids", vk::Format::R32G32_UINT, true)?,
-            emissive: target("G-buffer emissive", vk::Format::R16G16B16A16_SFLOAT, plan.emissive || plan.layers)?,
-            layers: target("G-buffer layers", vk::Format::R16G16B16A16_UNORM, plan.layers)?,
+            triangles: target("G-buffer triangles", vk::Format::R32_UINT, with.contains(&true))?,
+            emissive: target("G-buffer emissive", vk::Format::R16G16B16A16_SFLOAT, with[1] || with[2])?,
+            layers: target("G-buffer layers", vk::Format::R16G16B16A16_UNORM, with[2])?,
             size,
-            with: [plan.emissive, plan.layers],
+            with,
         })
     }
 }
 
-/// Draws every opaque and masked surface.
+/// Draws every opaque and masked surface, and those that refract; `inside` one of those, their back faces as well.
 ///
 /// # Errors
 /// When the driver refuses a pipeline.
@@ -81,15 +88,20 @@ pub fn gbuffer<'a>(
     camera: &'a Buffer,
     target: &'a GBuffer,
     lod_bias: f32,
+    inside: bool,
 ) -> Result<()> {
     // Only depth is cleared: the other targets are read where depth says that something was drawn.
     let color = |image| ColorTarget { image, clear: None };
-    // Locations are attachment indices: layers at 4 need something at 3.
+    // Locations are attachment indices: layers at 5 need something at 4 and at 3.
     let mut colors = vec![color(&target.base), color(&target.normals), color(&target.ids)];
-    if target.with[0] || target.with[1] {
+    let [_, emissive, layers] = target.with;
+    if target.with.contains(&true) {
+        colors.push(color(&target.triangles));
+    }
+    if emissive || layers {
         colors.push(color(&target.emissive));
     }
-    if target.with[1] {
+    if layers {
         colors.push(color(&target.layers));
     }
     let bindings: Vec<_> = scene
@@ -137,7 +149,7 @@ pub fn gbuffer<'a>(
         rows: [0, target.size[1]],
     };
     let push = [lod_bias.to_bits(), 0];
-    frame.raster(&raster, &gbuffer::PROGRAM, &bindings, bytemuck::cast_slice(&push), scene.draws(false))?;
+    frame.raster(&raster, &gbuffer::PROGRAM, &bindings, bytemuck::cast_slice(&push), scene.draws(false, inside))?;
     frame.download("copy depth", &target.depth, &target.depth_texels);
     Ok(())
 }

@@ -1,20 +1,22 @@
-//! Deferred lighting of the opaque surfaces (shaders/pass/light.comp).
+//! Deferred lighting of the nearest surfaces (shaders/pass/light.comp).
 
 use anyhow::Result;
 
 use super::classify::WorkLists;
 use super::environment::EnvironmentOnDevice;
 use super::gbuffer::GBuffer;
+use super::rays::RaysOnDevice;
 use super::scene::SceneOnDevice;
 use super::tiles::Tiles;
 use crate::gpu::{Buffer, Frame, Image};
 use crate::plan::{Knobs, Plan};
-use crate::shader::{composite, light};
+use crate::shader::light;
 
-/// Loop heads that one invocation of the see-through pass may evaluate where the driver limits them.
-const LOOP_BUDGET: u32 = 40_000;
+/// Lights of one dispatch where each sends a ray: a traversal evaluates some 20 to 200 loop heads, of 65,535 that lavapipe
+/// grants an invocation.
+const LIGHTS_AT_ONCE: u32 = 64;
 
-/// What both lighting passes need beside their surfaces.
+/// What all passes that light surfaces need beside them.
 #[derive(Clone, Copy)]
 pub struct Lighting<'a> {
     /// Which code.
@@ -23,6 +25,8 @@ pub struct Lighting<'a> {
     pub knobs: &'a Knobs,
     /// Materials, lights, instances.
     pub scene: &'a SceneOnDevice,
+    /// What rays go through.
+    pub rays: &'a RaysOnDevice,
     /// Light lists.
     pub tiles: &'a Tiles,
     /// Light from all around.
@@ -33,26 +37,32 @@ pub struct Lighting<'a> {
     pub size: [u32; 2],
 }
 
+/// Lights of the table from, up to; words of the tiles' masks from, up to.
+type Range = [u32; 4];
+
 impl Lighting<'_> {
-    fn local_lights(&self) -> u32 {
+    /// Lights beside directional ones that every pixel goes through: all or, where tiles list them, none.
+    #[must_use]
+    pub fn unlisted_lights(&self) -> u32 {
         if self.plan.tiles { 0 } else { self.plan.local_lights }
     }
 
-    /// Specialization constants of the fragment-list pass.
+    /// Whether lights are looked for.
     #[must_use]
-    pub fn composite_constants(&self) -> composite::Constants {
-        composite::Constants {
-            brdf: self.knobs.index("brdf"),
-            fresnel: self.knobs.index("fresnel"),
-            arithmetic: self.knobs.index("arithmetic"),
-            clearcoat: self.plan.clearcoat,
-            directional_lights: self.plan.directional_lights,
-            local_lights: self.local_lights(),
-            tile_words: self.tiles.words(),
-            ambient: self.plan.ambient,
-            reflection: self.plan.reflection,
-            loop_budget: if self.scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
+    pub fn shadows(&self) -> bool {
+        self.plan.rays.is_some_and(|rays| rays.shadows)
+    }
+
+    /// What each dispatch goes through: everything at once, or a few lights at a time where each sends a ray.
+    fn ranges(&self) -> Vec<Range> {
+        let (lights, words) = (self.plan.directional_lights + self.unlisted_lights(), self.tiles.words());
+        if !self.shadows() {
+            return vec![[0, lights, 0, words]];
         }
+        let parts = |count: u32, of: u32| (0..count).step_by(of as usize).map(move |i| [i, (i + of).min(count)]);
+        let plain = parts(lights, LIGHTS_AT_ONCE).map(|[from, to]| [from, to, 0, 0]);
+        let listed = parts(words, LIGHTS_AT_ONCE / 32).map(|[from, to]| [0, 0, from, to]);
+        plain.chain(listed).collect()
     }
 }
 
@@ -67,29 +77,42 @@ pub fn light<'a>(
     work: &'a WorkLists,
     radiance: &'a Image,
 ) -> Result<()> {
-    let Lighting { plan, scene, environment, camera, .. } = lighting;
+    let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
+    let planned = plan.rays;
     let constants = light::Constants {
         has_emissive: plan.emissive,
         has_layers: plan.layers,
+        has_triangles: planned.is_some(),
+        has_transmission: planned.is_some_and(|rays| rays.refraction),
         brdf: lighting.knobs.index("brdf"),
         fresnel: lighting.knobs.index("fresnel"),
         arithmetic: lighting.knobs.index("arithmetic"),
         clearcoat: plan.clearcoat,
+        conductors: plan.conductors,
+        mirror_rays: planned.is_some_and(|rays| rays.mirrors),
         directional_lights: plan.directional_lights,
-        local_lights: lighting.local_lights(),
+        local_lights: lighting.unlisted_lights(),
         tile_words: lighting.tiles.words(),
         ambient: plan.ambient,
         reflection: plan.reflection,
+        traversal: rays.constants.traversal,
+        octants: rays.constants.octants,
+        stack_size: rays.constants.stack_size,
+        hit_textures: rays.constants.hit_textures,
+        shadows: u32::from(lighting.shadows()),
+        filters: planned.is_some_and(|rays| rays.filters),
+        absorption: planned.map_or(0, |rays| rays.absorption),
     };
     let bind = light::Bind {
         camera_block: camera,
-        materials: &scene.materials,
+        instances: &scene.instances,
         depth: &gbuffer.depth_texels,
         base: &gbuffer.base,
         normals: &gbuffer.normals,
         ids: &gbuffer.ids,
         emissive: &gbuffer.emissive,
         layers: &gbuffer.layers,
+        triangles: &gbuffer.triangles,
         radiance,
         surface_tiles: &work.surface,
         work: &work.sizes,
@@ -98,6 +121,21 @@ pub fn light<'a>(
         environment: &environment.terms,
         prefiltered: environment.prefiltered(),
         reflectance: environment.reflectance(),
+        bvh_nodes: &rays.nodes,
+        bvh_triangles: &rays.triangles,
+        trace_block: &rays.terms,
+        material_texels: &scene.materials,
+        hit_corners: &rays.corners,
+        leaf_places: &rays.leaf_places,
+        texels: &scene.texels,
+        texel_slots: &scene.texel_slots,
+        hit_slots: &scene.slots,
+        work_done: &rays.counts,
     };
-    frame.compute_indirect("lighting", &bind, constants.words(), &[], &work.sizes, 0)
+    for (index, range) in lighting.ranges().into_iter().enumerate() {
+        let [first, end, first_word, end_word] = range;
+        let push = [first, end, first_word, end_word, u32::from(index == 0)];
+        frame.compute_indirect("lighting", &bind, constants.words(), bytemuck::cast_slice(&push), &work.sizes, 0)?;
+    }
+    Ok(())
 }

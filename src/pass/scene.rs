@@ -6,10 +6,11 @@ use anyhow::{Result, bail};
 use ash::vk;
 use glam::{DMat3, DVec3};
 
-use super::texture::{Meaning, Textures};
+use super::texture::{Meaning, Texels, Textures};
 use super::view::View;
 use crate::gpu::{Buffer, Device, Draw, Frame, Place, Sampled, VertexStream};
-use crate::plan::{Knobs, is_see_through};
+use crate::plan::{Knobs, Plan, is_see_through, mirrors};
+use crate::scene::solid::Solids;
 use crate::scene::{AlphaMode, Bounds, Light, LightKind, Material, Scene, TextureRef};
 use crate::shader::gbuffer;
 use crate::share;
@@ -31,6 +32,16 @@ struct MeshRange {
 struct Placement {
     world_from_object: glam::DAffine3,
     mesh: usize,
+    /// A transparent body whose triangles are wound the wrong way round.
+    flipped: bool,
+    sheet: bool,
+    first_triangle: u32,
+}
+
+impl Placement {
+    fn mirrors(&self) -> bool {
+        (self.world_from_object.matrix3.determinant() < 0.0) != self.flipped
+    }
 }
 
 /// One concatenated attribute of all meshes that have it; others read the fallback with stride 0.
@@ -65,11 +76,16 @@ pub struct SceneOnDevice {
     pub materials: Buffer,
     /// Eleven texture slots per material.
     pub slots: Buffer,
+    /// For rays: the texels of all textures.
+    pub texels: Buffer,
+    /// For rays: where each slot's lie.
+    pub texel_slots: Buffer,
     /// Instances relative to the eye of the current view.
     pub instances: Buffer,
     /// Lights relative to the eye of the current view: directional first, four texels each.
     pub lights: Buffer,
     lights_cpu: Vec<Light>,
+    refraction: bool,
     textures: Textures,
     /// Materials by index → place in [`SceneOnDevice::page_sets`].
     page_of_material: Vec<usize>,
@@ -79,7 +95,8 @@ pub struct SceneOnDevice {
 }
 
 /// The slots of a material with their meanings.
-fn texture_slots(m: &Material) -> [(Option<TextureRef>, Meaning); SLOTS] {
+#[must_use]
+pub fn texture_slots(m: &Material) -> [(Option<TextureRef>, Meaning); SLOTS] {
     [
         (m.base_color_texture, Meaning::Color),
         (m.metallic_roughness_texture, Meaning::Data),
@@ -96,7 +113,10 @@ fn texture_slots(m: &Material) -> [(Option<TextureRef>, Meaning); SLOTS] {
 }
 
 /// A buffer with `data` where the device reads it fastest: written in place on a CPU device, staged on others.
-fn upload<T: bytemuck::NoUninit>(
+///
+/// # Errors
+/// When it does not fit the device.
+pub fn upload<T: bytemuck::NoUninit>(
     device: &Arc<Device>,
     name: &str,
     data: &[T],
@@ -105,7 +125,7 @@ fn upload<T: bytemuck::NoUninit>(
     let bytes: &[u8] = bytemuck::cast_slice(data);
     let place = if device.info().kind == "cpu" { Place::Upload } else { Place::Device };
     let size = bytes.len() as u64;
-    if size > device.max_storage_bytes() {
+    if texels.is_none() && size > device.max_storage_bytes() {
         bail!("{name} need {size} bytes, the device binds at most {} at once", device.max_storage_bytes());
     }
     let mut buffer = match texels {
@@ -143,10 +163,10 @@ impl SceneOnDevice {
     ///
     /// # Errors
     /// When the scene does not fit the device.
-    pub fn new(device: &Arc<Device>, mut scene: Scene, knobs: &Knobs) -> Result<Self> {
-        if scene.materials.len() > 0xffff || scene.instances.len() > 0xff_ffff {
+    pub fn new(device: &Arc<Device>, mut scene: Scene, plan: &Plan, knobs: &Knobs, solids: &Solids) -> Result<Self> {
+        if scene.materials.len() > 0xffff || scene.instances.len() > 0x7f_ffff {
             bail!(
-                "{}: {} materials and {} instances, the G-buffer's ids hold 65535 and 16777215",
+                "{}: {} materials and {} instances, the G-buffer's ids hold 65535 and 8388607",
                 scene.name,
                 scene.materials.len(),
                 scene.instances.len()
@@ -184,15 +204,18 @@ impl SceneOnDevice {
         }
         wanted.sort_unstable();
         wanted.dedup();
-        let textures = Textures::new(device, &mut scene, &wanted)?;
+        let mut texels = Texels::default();
+        let textures = Textures::new(device, &mut scene, &wanted, plan.rays.is_some().then_some(&mut texels))?;
 
-        let table: Vec<_> = scene.materials.iter().map(|m| shared_material(m, knobs)).collect();
+        let table: Vec<_> = scene.materials.iter().enumerate().map(|(i, m)| shared_material(m, i, knobs)).collect();
         let mut slot_table = Vec::with_capacity(scene.materials.len() * SLOTS);
+        let mut texel_slots = Vec::with_capacity(scene.materials.len() * SLOTS);
         let mut page_of_material = Vec::with_capacity(scene.materials.len());
         let mut page_materials: Vec<usize> = Vec::new();
         for (index, material) in scene.materials.iter().enumerate() {
             for (texture, meaning) in texture_slots(material) {
                 slot_table.push(shared_slot(texture, &textures, meaning));
+                texel_slots.push(texels.slot(texture, meaning));
             }
             // Materials that read the same pages through the same samplers share a set of descriptors.
             let same = |&other: &usize| same_pages(&textures, material, &scene.materials[other]);
@@ -206,11 +229,22 @@ impl SceneOnDevice {
         let mut lights_cpu = std::mem::take(&mut scene.lights);
         lights_cpu.sort_by_key(|light| !matches!(light.kind, LightKind::Directional { .. }));
 
+        let mut triangles = 0;
+        let first_triangles: Vec<u32> = scene
+            .instances
+            .iter()
+            .map(|i| {
+                triangles += meshes[i.mesh].index_count / 3;
+                triangles - meshes[i.mesh].index_count / 3
+            })
+            .collect();
         let instance_bytes = (scene.instances.len() * size_of::<share::Instance>()) as u64;
         let light_bytes = (lights_cpu.len() * 64) as u64;
         Ok(Self {
-            materials: upload(device, "materials", &table, None)?,
+            materials: upload(device, "materials", &table, Some(vk::Format::R32G32B32A32_UINT))?,
             slots: upload(device, "texture slots", &slot_table, Some(vk::Format::R32G32B32A32_SFLOAT))?,
+            texels: upload(device, "texels for rays", &texels.texels, Some(vk::Format::R32_UINT))?,
+            texel_slots: upload(device, "texel slots", &texel_slots, Some(vk::Format::R32G32B32A32_UINT))?,
             instances: Buffer::new(device, "instances", instance_bytes, Place::Upload)?,
             lights: Buffer::texels(device, "lights", light_bytes, Place::Upload, vk::Format::R32G32B32A32_SFLOAT)?,
             fallback: upload(device, "attribute fallback", &[0.0_f32, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0], None)?,
@@ -225,10 +259,18 @@ impl SceneOnDevice {
             placements: scene
                 .instances
                 .iter()
-                .map(|i| Placement { world_from_object: i.world_from_object, mesh: i.mesh })
+                .enumerate()
+                .map(|(index, i)| Placement {
+                    first_triangle: first_triangles[index],
+                    world_from_object: i.world_from_object,
+                    mesh: i.mesh,
+                    flipped: solids.flipped[index],
+                    sheet: solids.sheet[index] || !plan.rays.is_some_and(|rays| rays.refraction),
+                })
                 .collect(),
             materials_cpu: scene.materials,
             lights_cpu,
+            refraction: plan.rays.is_some_and(|rays| rays.refraction),
             textures,
             page_of_material,
             page_materials,
@@ -263,19 +305,20 @@ impl SceneOnDevice {
             .collect()
     }
 
-    /// The draws of all instances whose material is see-through or not, in the order of the file.
+    /// The draws of all instances whose material is see-through or not, in the order of the file; from inside a
+    /// transparent body its back faces as well.
     #[must_use]
-    pub fn draws(&self, see_through: bool) -> Vec<Draw<'_>> {
+    pub fn draws(&self, see_through: bool, inside: bool) -> Vec<Draw<'_>> {
         self.placements
             .iter()
             .enumerate()
-            .filter(|(_, p)| is_see_through(&self.materials_cpu[self.meshes[p.mesh].material]) == see_through)
+            .filter(|(_, p)| is_see_through(&self.materials_cpu[self.meshes[p.mesh].material], self.refraction) == see_through)
             .filter(|(_, p)| self.meshes[p.mesh].index_count > 0)
-            .map(|(instance, placement)| self.draw(instance as u32, placement))
+            .map(|(instance, placement)| self.draw(instance as u32, placement, inside))
             .collect()
     }
 
-    fn draw(&self, instance: u32, placement: &Placement) -> Draw<'_> {
+    fn draw(&self, instance: u32, placement: &Placement, inside: bool) -> Draw<'_> {
         let mesh = &self.meshes[placement.mesh];
         let material = &self.materials_cpu[mesh.material];
         let fallback = |offset| VertexStream { buffer: &self.fallback, offset, stride: 0 };
@@ -308,8 +351,9 @@ impl SceneOnDevice {
             index_count: mesh.index_count,
             instance,
             // A volume's boundary is crossed once: KHR_materials_volume gives double sidedness no effect.
-            cull_back: !material.double_sided || material.thickness > 0.0,
-            clockwise: placement.world_from_object.matrix3.determinant() < 0.0,
+            cull_back: (!material.double_sided || (material.thickness > 0.0 && !placement.sheet))
+                && !(inside && self.refraction && material.transmission > 0.0),
+            clockwise: placement.mirrors(),
         }
     }
 }
@@ -331,25 +375,28 @@ fn shared_slot(texture: Option<TextureRef>, textures: &Textures, meaning: Meanin
 
 /// The constants of a material. F0 of a dielectric is ((n − 1) / (n + 1))² tinted and scaled by KHR_materials_specular;
 /// the optical depth is −ln(attenuation colour) · thickness / attenuation distance (lecture A1, KHR_materials_volume).
-fn shared_material(m: &Material, knobs: &Knobs) -> share::Material {
+fn shared_material(m: &Material, index: usize, knobs: &Knobs) -> share::Material {
     let r = (m.ior - 1.0) / (m.ior + 1.0);
     let absorbs = knobs.rung("absorption") != "off";
-    let depth = |color: f32| {
+    // attenuationDistance is in metres of the world, thickness in metres of the object.
+    let sigma = m.attenuation_color.map(|color| {
         let sigma = -color.max(1e-6).ln() / m.attenuation_distance;
-        if absorbs && m.thickness > 0.0 && sigma > 0.0 { sigma * m.thickness } else { 0.0 }
-    };
+        if absorbs && m.thickness > 0.0 && sigma > 0.0 { sigma } else { 0.0 }
+    });
     let (alpha_cutoff, coverage) = match m.alpha_mode {
         AlphaMode::Mask(cutoff) => (cutoff, 0),
-        AlphaMode::Blend => (0.0, 2),
+        AlphaMode::Blend => (0.0, share::Material::BLENDED),
         AlphaMode::Opaque => (0.0, 0),
     };
+    let flag = |is: bool, flag: u32| if is { flag } else { 0 };
+    let metal = m.conductor.unwrap_or_default();
     share::Material {
         base_color: m.base_color,
         emissive: m.emissive,
         metallic: m.metallic,
         f0: m.specular_color.map(|c| (r * r * c).min(1.0) * m.specular),
         roughness: m.roughness,
-        sigma_thickness: m.attenuation_color.map(depth),
+        sigma_thickness: sigma.map(|sigma| sigma * m.thickness),
         f90: m.specular,
         ior: m.ior,
         occlusion_strength: m.occlusion_strength,
@@ -358,7 +405,16 @@ fn shared_material(m: &Material, knobs: &Knobs) -> share::Material {
         transmission: m.transmission,
         clearcoat: m.clearcoat,
         clearcoat_roughness: m.clearcoat_roughness,
-        flags: u32::from(m.unlit) | coverage,
+        sigma,
+        medium: super::rays::medium(m, index),
+        n_metal: metal.map(|[n, _]| n),
+        flags: flag(m.unlit, share::Material::UNLIT)
+            | coverage
+            | flag(m.conductor.is_some(), share::Material::CONDUCTOR)
+            | flag(mirrors(m) && !m.unlit, share::Material::MIRRORS),
+        unused_n: 0.0,
+        kappa_metal: metal.map(|[_, kappa]| kappa),
+        unused_kappa: 0.0,
     }
 }
 
@@ -367,7 +423,7 @@ fn shared_material(m: &Material, knobs: &Knobs) -> share::Material {
 fn shared_instance(placement: &Placement, eye: DVec3, material: usize) -> share::Instance {
     let m = placement.world_from_object.matrix3;
     let determinant = m.determinant();
-    let sign = if determinant < 0.0 { -1.0 } else { 1.0 };
+    let sign = if placement.mirrors() { -1.0 } else { 1.0 };
     let cofactors = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
     let largest = cofactors.to_cols_array().iter().fold(0.0_f64, |a, b| a.max(b.abs()));
     let scale = if largest > 0.0 { sign * (-largest.log2().floor()).exp2() } else { 1.0 };
@@ -384,6 +440,8 @@ fn shared_instance(placement: &Placement, eye: DVec3, material: usize) -> share:
         handedness: sign as f32,
         material: material as u32,
         scale: determinant.abs().cbrt() as f32,
+        flags: if placement.sheet { share::Instance::SHEET } else { 0 },
+        first_triangle: placement.first_triangle,
     }
 }
 
@@ -433,7 +491,7 @@ mod tests {
                 DQuat::from_rotation_y(0.7),
                 DVec3::new(1e7, 0.0, 0.0),
             );
-            let instance = shared_instance(&Placement { world_from_object, mesh: 0 }, DVec3::new(1e7, 1.0, 0.0), 3);
+            let instance = shared_instance(&Placement { world_from_object, mesh: 0, flipped: false, sheet: false, first_triangle: 0 }, DVec3::new(1e7, 1.0, 0.0), 3);
             let columns = instance.normal_from_object.map(|c| glam::Vec3::from(c).as_dvec3());
             let n = (columns[0] * normal.x + columns[1] * normal.y + columns[2] * normal.z).normalize();
             for t in tangents {

@@ -31,12 +31,17 @@ pub struct Textures {
 }
 
 impl Textures {
-    /// Uploads the images that `wanted` names; their pixels are taken out of the scene, image by image, so that only one
+    /// Uploads the images that `wanted` names, and keeps a copy of all levels `for_rays`; their pixels are taken out of the scene, image by image, so that only one
     /// decoded image exists twice at a time.
     ///
     /// # Errors
     /// When memory is short or an image is larger than the device allows.
-    pub fn new(device: &Arc<Device>, scene: &mut Scene, wanted: &[(usize, Meaning)]) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        scene: &mut Scene,
+        wanted: &[(usize, Meaning)],
+        mut for_rays: Option<&mut Texels>,
+    ) -> Result<Self> {
         // Images whose alpha hides texels: only there does it weigh them.
         let faded: BTreeSet<usize> = scene
             .materials
@@ -87,6 +92,9 @@ impl Textures {
                     places.insert((image, meaning), (pages.len(), layer));
                     let mut staging = Buffer::new(device, "staging", chain.len() as u64, Place::Upload)?;
                     staging.write(&chain);
+                    if let Some(texels) = &mut for_rays {
+                        texels.add((image, meaning), [width, height], levels, &chain);
+                    }
                     drop(chain);
                     let mut frame = Frame::new(device);
                     frame.upload("upload texture", &staging, &page, layer, &level_offsets(width, height, levels));
@@ -133,6 +141,40 @@ impl Textures {
     #[must_use]
     pub fn layer(&self, texture: TextureRef, meaning: Meaning) -> u32 {
         self.places.get(&(texture.image, meaning)).map_or(0, |&(_, layer)| layer)
+    }
+}
+
+/// All levels of all textures one after the other, for shaders that choose a texture by an index (shaders/lib/hit.glsl).
+#[derive(Default)]
+pub struct Texels {
+    /// RGBA in bytes.
+    pub texels: Vec<u32>,
+    places: BTreeMap<(usize, Meaning), [u32; 3]>,
+}
+
+impl Texels {
+    fn add(&mut self, key: (usize, Meaning), [width, height]: [u32; 2], levels: u32, chain: &[u8]) {
+        self.places.insert(key, [self.texels.len() as u32, width | height << 16, levels]);
+        let words = chain.as_chunks::<4>().0;
+        self.texels.extend(words.iter().map(|bytes| u32::from_le_bytes(*bytes)));
+    }
+
+    /// A slot of a material: first texel | width, height | levels, flags << 8 | unused; zeros without a texture.
+    #[must_use]
+    pub fn slot(&self, texture: Option<TextureRef>, meaning: Meaning) -> [u32; 4] {
+        let place = texture.and_then(|t| self.places.get(&(t.image, meaning)).map(|place| (t.sampler, place)));
+        let Some((sampler, &[first, size, levels])) = place else { return [0; 4] };
+        let wrap = |wrap| match wrap {
+            Wrap::Repeat => 0,
+            Wrap::Mirror => 1,
+            Wrap::Clamp => 2,
+        };
+        let flags = u32::from(meaning == Meaning::Color)
+            | u32::from(sampler.mag_nearest) << 1
+            | wrap(sampler.wrap_u) << 2
+            | wrap(sampler.wrap_v) << 4;
+        let levels = if sampler.mips { levels } else { 1 };
+        [first, size, levels | flags << 8, 0]
     }
 }
 

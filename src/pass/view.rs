@@ -47,6 +47,12 @@ impl View {
         }
     }
 
+    /// How wide a pixel is at distance 1, or at any distance where the camera is orthographic.
+    #[must_use]
+    pub fn pixel_angle(&self) -> f64 {
+        2.0 * self.half.y / f64::from(self.size[1])
+    }
+
     /// What the shaders get, for a sample `jitter` pixels off the pixel centres.
     #[must_use]
     pub fn shared(&self, jitter: DVec2) -> share::Camera {

@@ -11,8 +11,8 @@ pub struct Knob {
     pub rungs: &'static [&'static str],
     /// Planned rungs that are not built yet.
     pub unbuilt: &'static [&'static str],
-    /// What the presets choose.
-    pub default: &'static str,
+    /// What the presets `local`, `recursive` and `global` choose, as far as it is built.
+    pub presets: [&'static str; 3],
     /// What it approximates, with the lecture's ids.
     pub about: &'static str,
 }
@@ -21,77 +21,102 @@ pub struct Knob {
 pub static KNOBS: &[Knob] = &[
     Knob {
         name: "shadows",
-        rungs: &["off"],
-        unbuilt: &["map", "ray"],
-        default: "off",
+        rungs: &["off", "ray"],
+        unbuilt: &["map"],
+        presets: ["off", "ray", "ray"],
         about: "visibility of lights (R5)",
     },
     Knob {
         name: "fresnel",
         rungs: &["schlick", "exact"],
         unbuilt: &[],
-        default: "schlick",
+        presets: ["schlick", "exact", "exact"],
         about: "Fresnel curve (F2, F3)",
     },
     Knob {
         name: "brdf",
         rungs: &["blinn-phong", "blinn-phong-reciprocal", "ggx", "ggx-multi"],
         unbuilt: &[],
-        default: "ggx",
+        presets: ["ggx", "ggx", "ggx-multi"],
         about: "rough reflection (B1, B5, B6)",
     },
     Knob {
         name: "reflection",
-        rungs: &["off", "environment"],
-        unbuilt: &["screen", "ray"],
-        default: "environment",
+        rungs: &["off", "environment", "ray"],
+        unbuilt: &["screen"],
+        presets: ["environment", "ray", "ray"],
         about: "what a surface mirrors (F4)",
     },
     Knob {
         name: "refraction",
-        rungs: &["off"],
-        unbuilt: &["screen", "ray"],
-        default: "off",
+        rungs: &["off", "ray"],
+        unbuilt: &["screen"],
+        presets: ["off", "ray", "ray"],
         about: "bent transmission (F5)",
     },
     Knob {
+        name: "interfaces",
+        rungs: &["1", "2", "4", "8", "16", "32"],
+        unbuilt: &[],
+        presets: ["8", "8", "32"],
+        about: "surfaces that a path of rays may meet (R6)",
+    },
+    Knob {
         name: "absorption",
-        rungs: &["off", "thickness"],
-        unbuilt: &["path", "march"],
-        default: "thickness",
+        rungs: &["off", "thickness", "path"],
+        unbuilt: &["march"],
+        presets: ["thickness", "path", "path"],
         about: "light lost inside media (A1, A2)",
     },
     Knob {
         name: "indirect",
         rungs: &["off", "ambient"],
         unbuilt: &["path"],
-        default: "ambient",
+        presets: ["ambient", "ambient", "ambient"],
         about: "diffuse light from all around (R6)",
     },
-    Knob { name: "lights", rungs: &["points"], unbuilt: &["area"], default: "points", about: "extent of lights (R2)" },
+    Knob {
+        name: "lights",
+        rungs: &["points"],
+        unbuilt: &["area"],
+        presets: ["points", "points", "points"],
+        about: "extent of lights (R2)",
+    },
     Knob {
         name: "samples",
         rungs: &["1", "4", "16", "64", "256", "1024"],
         unbuilt: &[],
-        default: "4",
+        presets: ["4", "4", "64"],
         about: "samples per pixel",
     },
-    Knob { name: "colour", rungs: &["rgb"], unbuilt: &["spectral"], default: "rgb", about: "wavelengths (C1–C3)" },
+    Knob {
+        name: "colour",
+        rungs: &["rgb"],
+        unbuilt: &["spectral"],
+        presets: ["rgb", "rgb", "rgb"],
+        about: "wavelengths (C1–C3)",
+    },
     Knob {
         name: "arithmetic",
         rungs: &["fast", "stable", "compensated"],
         unbuilt: &[],
-        default: "stable",
+        presets: ["stable", "stable", "stable"],
         about: "form of the formulas (docs/numerics.md)",
     },
     Knob {
         name: "normals",
         rungs: &["oct32"],
         unbuilt: &["oct16", "oct24", "f32"],
-        default: "oct32",
+        presets: ["oct32", "oct32", "oct32"],
         about: "stored normals",
     },
-    Knob { name: "position", rungs: &["depth"], unbuilt: &["stored"], default: "depth", about: "stored positions" },
+    Knob {
+        name: "position",
+        rungs: &["depth"],
+        unbuilt: &["stored"],
+        presets: ["depth", "depth", "depth"],
+        about: "stored positions",
+    },
 ];
 
 /// A rung for every knob.
@@ -100,14 +125,32 @@ pub struct Knobs {
     rungs: Vec<usize>,
 }
 
+/// The lecture's three models (R6): presets of all knobs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub enum Model {
+    /// Direct light, and the environment as ambient and mirrored light.
+    Local,
+    /// Plus rays for shadows, mirrors and what lets light through.
+    #[default]
+    Recursive,
+    /// Global illumination; not built yet.
+    Global,
+}
+
 impl Default for Knobs {
     fn default() -> Self {
-        let rung = |knob: &Knob| knob.rungs.iter().position(|r| *r == knob.default).unwrap_or_default();
-        Self { rungs: KNOBS.iter().map(rung).collect() }
+        Self::of(Model::default())
     }
 }
 
 impl Knobs {
+    /// The rungs of a model.
+    #[must_use]
+    pub fn of(model: Model) -> Self {
+        let rung = |knob: &Knob| knob.rungs.iter().position(|r| *r == knob.presets[model as usize]).unwrap_or_default();
+        Self { rungs: KNOBS.iter().map(rung).collect() }
+    }
+
     /// Applies one `KNOB=RUNG`.
     ///
     /// # Errors
@@ -151,6 +194,12 @@ impl Knobs {
         self.rungs[index] as u32
     }
 
+    /// Surfaces that a path may meet.
+    #[must_use]
+    pub fn interfaces(&self) -> u32 {
+        1 << self.index("interfaces")
+    }
+
     /// Samples per pixel.
     #[must_use]
     pub fn samples(&self) -> u32 {
@@ -169,8 +218,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn samples_are_powers_of_four_as_named() {
+    fn numbers_are_as_named() {
         let mut knobs = Knobs::default();
+        for rung in ["1", "2", "4", "8", "16", "32"] {
+            knobs.set(&format!("interfaces={rung}")).unwrap();
+            assert_eq!(knobs.interfaces().to_string(), rung);
+        }
         for rung in ["1", "4", "16", "64", "256", "1024"] {
             knobs.set(&format!("samples={rung}")).unwrap();
             assert_eq!(knobs.samples().to_string(), rung);
@@ -180,7 +233,7 @@ mod tests {
     #[test]
     fn defaults_exist_and_names_are_unique() {
         for (i, knob) in KNOBS.iter().enumerate() {
-            assert!(knob.rungs.contains(&knob.default), "{}", knob.name);
+            assert!(knob.presets.iter().all(|preset| knob.rungs.contains(preset)), "{}", knob.name);
             assert!(KNOBS[..i].iter().all(|other| other.name != knob.name), "{}", knob.name);
         }
     }
@@ -189,7 +242,7 @@ mod tests {
     fn wrong_choices_say_what_there_is() {
         let mut knobs = Knobs::default();
         for (choice, said) in [
-            ("shadows=ray", "not built yet"),
+            ("shadows=map", "not built yet"),
             ("absorption=march:8", "not built yet"),
             ("brdf=oren", "no rung"),
             ("gloss=1", "no knob"),

@@ -2,7 +2,7 @@
 
 mod knobs;
 
-pub use knobs::{KNOBS, Knob, Knobs};
+pub use knobs::{KNOBS, Knob, Knobs, Model};
 
 use std::collections::BTreeMap;
 
@@ -19,6 +19,8 @@ pub struct Plan {
     pub layers: bool,
     /// Code for the clear coat.
     pub clearcoat: bool,
+    /// Code for metals given by n and κ.
+    pub conductors: bool,
     /// The environment is seen in surfaces.
     pub reflection: bool,
     /// The environment's irradiance lights diffuse surfaces.
@@ -35,12 +37,37 @@ pub struct Plan {
     pub tiles: bool,
     /// The table of directional reflectance: for an environment, or to make up for single scattering.
     pub reflectance: bool,
+    /// Rays, and the hierarchy of the scene's triangles that they go through; `None` where nothing sends any.
+    pub rays: Option<Rays>,
     /// Samples per pixel.
     pub samples: u32,
     /// Every effect with its reason.
     pub effects: Vec<Effect>,
     /// What the chosen rungs leave out of this scene, a sentence each.
     pub warnings: Vec<String>,
+}
+
+/// What sends rays and what they may meet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Rays {
+    /// Lights are looked for.
+    pub shadows: bool,
+    /// Smooth surfaces mirror the scene.
+    pub mirrors: bool,
+    /// Transmissive surfaces refract; they are in the G-buffer.
+    pub refraction: bool,
+    /// Transmissive surfaces may be hit.
+    pub transmissive: bool,
+    /// Surfaces with holes may be hit.
+    pub masked: bool,
+    /// Masked, blended or transmissive surfaces may lie before a light.
+    pub filters: bool,
+    /// Some surface that sends rays is rough: they are drawn from its lobe.
+    pub rough: bool,
+    /// Absorption: 0 off, 1 by the nominal thickness, 2 along the path.
+    pub absorption: u32,
+    /// Surfaces that a path may meet.
+    pub interfaces: u32,
 }
 
 /// One effect, kept or not, and why.
@@ -67,11 +94,22 @@ pub struct Surroundings {
     pub sky: bool,
 }
 
-/// Whether a surface lets what lies behind it through.
+/// Whether a surface is laid over what lies behind it, in passes of its own: blended surfaces, and transmissive ones where
+/// they do not refract.
 #[must_use]
-pub fn is_see_through(material: &Material) -> bool {
-    material.alpha_mode == AlphaMode::Blend || material.transmission > 0.0
+pub fn is_see_through(material: &Material, refraction: bool) -> bool {
+    material.alpha_mode == AlphaMode::Blend || (material.transmission > 0.0 && !refraction)
 }
+
+/// Whether anything is mirrored at a surface.
+#[must_use]
+pub fn mirrors(material: &Material) -> bool {
+    material.metallic > 0.0 || material.specular > 0.0
+}
+
+/// Perceptual roughness up to which surfaces are mirrored by rays: `ROUGHEST_MIRROR` of shaders/lib/surface.glsl. A texture
+/// only lowers the factor.
+const ROUGHEST_MIRROR: f32 = 0.2;
 
 fn has_layers(material: &Material) -> bool {
     [
@@ -118,7 +156,12 @@ impl Plan {
         let clearcoat = decide("clear coat", "", cause, true);
         let found = find(&|m| has_layers(m) || m.clearcoat > 0.0);
         let layers = decide("layers", "", material(found, &|_| "has a coat or layer textures".to_owned()), true);
-        let cause = material(find(&is_see_through), &|m| match m.alpha_mode {
+        let cause = material(find(&|m| m.conductor.is_some()), &|_| "is a metal with n and kappa".to_owned());
+        let conductors = decide("metals by n and kappa", "", cause, true);
+        let refracts = |m: &Material| m.transmission > 0.0 && m.alpha_mode != AlphaMode::Blend;
+        let cause = material(find(&refracts), &|m| format!("has transmission {}, n = {}", m.transmission, m.ior));
+        let refraction = decide("refraction", "refraction", cause, knobs.rung("refraction") == "ray");
+        let cause = material(find(&|m| is_see_through(m, refraction)), &|m| match m.alpha_mode {
             AlphaMode::Blend => "is alpha-blended".to_owned(),
             _ => format!("has transmission {}", m.transmission),
         });
@@ -129,6 +172,18 @@ impl Plan {
             false => Err("there is no environment"),
         };
         let reflection = decide("mirrored environment", "reflection", environment(), knobs.rung("reflection") != "off");
+        let smooth = |m: &Material| {
+            let base = mirrors(m) && (m.roughness <= ROUGHEST_MIRROR || m.metallic_roughness_texture.is_some());
+            let coat = m.clearcoat > 0.0
+                && (m.clearcoat_roughness <= ROUGHEST_MIRROR || m.clearcoat_roughness_texture.is_some());
+            !m.unlit && (base || coat)
+        };
+        let cause = material(find(&smooth), &|m| match (mirrors(m) && m.roughness <= ROUGHEST_MIRROR, m.clearcoat > 0.0) {
+            (true, _) => format!("has roughness {}", m.roughness),
+            (false, true) => format!("has a coat of roughness {}", m.clearcoat_roughness),
+            (false, false) => "has a roughness texture".to_owned(),
+        });
+        let mirror_rays = decide("mirrors", "reflection", cause, knobs.rung("reflection") == "ray");
         let ambient = decide("ambient light", "indirect", environment(), knobs.rung("indirect") != "off");
 
         let count = |test: &dyn Fn(&LightKind) -> bool| scene.lights.iter().filter(|l| test(&l.kind)).count() as u32;
@@ -149,7 +204,23 @@ impl Plan {
                 Ok((reason, evidence.clone()))
             }
         };
-        decide("punctual lights", "lights", cause, true);
+        decide("punctual lights", "lights", cause.clone(), true);
+        let shadows = decide("shadows", "shadows", cause, knobs.rung("shadows") == "ray");
+        let rays = (shadows || mirror_rays || refraction).then(|| {
+            let any = |test: &dyn Fn(&Material) -> bool| used.iter().any(|m| test(m));
+            let masked = any(&|m| matches!(m.alpha_mode, AlphaMode::Mask(_)));
+            Rays {
+                shadows,
+                mirrors: mirror_rays,
+                refraction,
+                transmissive: any(&|m| m.transmission > 0.0),
+                masked,
+                filters: masked || any(&|m| is_see_through(m, false)),
+                rough: any(&|m| m.roughness > 0.0 && ((mirror_rays && smooth(m)) || (refraction && m.transmission > 0.0))),
+                absorption: knobs.index("absorption"),
+                interfaces: knobs.interfaces(),
+            }
+        });
         let cause = match (local_lights >= TILES_FROM, ranged > 0) {
             (false, _) => Err("few point and spot lights"),
             (_, false) => Err("no light has a range"),
@@ -160,6 +231,7 @@ impl Plan {
             emissive,
             layers,
             clearcoat,
+            conductors,
             reflection,
             ambient,
             sky: surroundings.sky,
@@ -168,23 +240,25 @@ impl Plan {
             local_lights,
             tiles,
             reflectance: reflection || ambient || knobs.rung("brdf") == "ggx-multi",
+            rays,
             samples: knobs.samples(),
             effects,
-            warnings: left_out(&used),
+            warnings: left_out(&used, refraction),
         }
     }
 }
 
 /// What no rung that is built can show of these materials.
-fn left_out(used: &[&Material]) -> Vec<String> {
+fn left_out(used: &[&Material], refraction: bool) -> Vec<String> {
     let mut warnings = Vec::new();
     let mut say = |test: &dyn Fn(&Material) -> bool, what: &str| {
         if let Some(material) = used.iter().find(|material| test(material)) {
             warnings.push(format!("material \"{}\" {what}", material.name));
         }
     };
-    say(&|m| m.transmission > 0.0, "transmits light: it goes straight on, refraction is not built");
-    say(&|m| m.transmission > 0.0 && m.roughness > 0.1, "transmits through a rough surface: shown clear");
+    let straight = |m: &Material| m.transmission > 0.0 && !(refraction && m.alpha_mode != AlphaMode::Blend);
+    say(&straight, "transmits light that goes straight on: refraction is off, or the material is blended");
+    say(&|m| straight(m) && m.roughness > 0.1, "transmits through a rough surface: shown clear");
     say(&|m| m.dispersion > 0.0, "has dispersion, which is not built");
     warnings
 }

@@ -11,6 +11,8 @@ pub mod generate;
 mod lamps;
 mod materials;
 mod metals;
+mod nested;
+mod pool;
 mod radiance;
 pub mod shape;
 
@@ -19,10 +21,11 @@ use anyhow::{Result, bail};
 use crate::scene::Scene;
 
 /// Study scenes that can be loaded, the default one first.
-pub const NAMES: &[&str] = &["etalon", "materials", "lamps", "radiance", "cornell", "metals", "blend"];
+pub const NAMES: &[&str] =
+    &["etalon", "materials", "lamps", "radiance", "cornell", "metals", "blend", "pool", "nested"];
 
 /// Announced names whose scenes do not exist yet: asking for one is no typing mistake.
-const PLANNED: &[&str] = &["pool", "golden-bridge", "prism", "absorber", "metamers", "nested", "torture"];
+const PLANNED: &[&str] = &["golden-bridge", "prism", "absorber", "metamers", "torture"];
 
 /// Generates the study scene `name`, as in `study:NAME` without the prefix.
 pub fn load(name: &str) -> Result<Scene> {
@@ -34,6 +37,8 @@ pub fn load(name: &str) -> Result<Scene> {
         "cornell" => cornell::scene(),
         "metals" => metals::scene(),
         "blend" => blend::scene(),
+        "pool" => pool::scene(),
+        "nested" => nested::scene(),
         _ if PLANNED.contains(&name) => {
             bail!("the study scene `{name}` is not built yet; these are: {}", NAMES.join(", "))
         }

@@ -234,6 +234,43 @@ impl Shape {
         shape
     }
 
+    /// A rectangular tub, open above: the cavity is `inner` wide, deep (Y) and long, the walls around it `wall` and the
+    /// floor below it `floor` thick. The origin is the middle of the opening. Texture coordinates are in metres, counted
+    /// from the corners of the cavity.
+    #[must_use]
+    pub fn tub(inner: DVec3, wall: f64, floor: f64) -> Self {
+        let mut shape = Self::default();
+        // Corners of a level rectangle, clockwise seen from above.
+        let ring = |x: f64, y: f64, z: f64| [(-x, -z), (x, -z), (x, z), (-x, z)].map(|(x, z)| DVec3::new(x, y, z));
+        let (x, z) = (inner.x * 0.5, inner.z * 0.5);
+        let foot = ring(x + wall, -inner.y - floor, z + wall);
+        let top = ring(x + wall, 0.0, z + wall);
+        let edge = ring(x, 0.0, z);
+        let bottom = ring(x, -inner.y, z);
+        let mut face = |corners: [DVec3; 4]| {
+            let n = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
+            let corners = corners.map(|p| {
+                let from_corner = p + DVec3::new(x, 0.0, z);
+                let uv = if n.y.abs() > 0.5 {
+                    DVec2::new(from_corner.x, from_corner.z * n.y)
+                } else {
+                    DVec2::new(from_corner.x * n.z - from_corner.z * n.x, -p.y)
+                };
+                shape.push(p, n, uv)
+            });
+            shape.quad(corners);
+        };
+        for i in 0..4 {
+            let j = (i + 1) % 4;
+            face([foot[i], top[i], top[j], foot[j]]);
+            face([top[i], edge[i], edge[j], top[j]]);
+            face([edge[i], bottom[i], bottom[j], edge[j]]);
+        }
+        face(foot);
+        face([bottom[0], bottom[3], bottom[2], bottom[1]]);
+        shape
+    }
+
     /// The back of a photographer's sweep: from the floor's end at z = `back` it bends up, with radius `bend`, into a
     /// wall that ends at y = `top`; `width` across. Texture coordinates are in metres.
     #[must_use]

@@ -9,7 +9,7 @@ use etalon::frame::{Rendered, Renderer, Settings};
 use etalon::gpu::{Device, DeviceChoice, Severity};
 use etalon::image::Picture;
 use etalon::pass::view::View;
-use etalon::plan::Knobs;
+use etalon::plan::{Knobs, Model};
 use etalon::scene::environment::Environment;
 use etalon::scene::{Camera, Scene};
 use etalon::share::AovPixel;
@@ -75,8 +75,9 @@ pub fn settings(size: [u32; 2]) -> Settings {
     Settings { size, knobs: knobs(&["samples=1"]), ..Settings::default() }
 }
 
+/// The local model with some other rungs.
 pub fn knobs(choices: &[&str]) -> Knobs {
-    let mut knobs = Knobs::default();
+    let mut knobs = Knobs::of(Model::Local);
     for choice in choices {
         knobs.set(choice).expect("a rung");
     }
