@@ -1,0 +1,242 @@
+// What lies where a ray hits: the surface, from the same vertices and textures that the G-buffer is drawn with.
+#ifndef HIT_GLSL
+#define HIT_GLSL
+#include "lib/slots.glsl"
+#include "lib/surface.glsl"
+#include "lib/trace.glsl"
+
+// Bit i: some material that rays may hit has a texture in slot i; bit 11: some mesh has colours; bit 12: some texture
+// reads the second coordinates.
+layout(constant_id = 43) const uint HIT_TEXTURES = 0;
+const bool HIT_COLORS = (HIT_TEXTURES & (1u << 11)) != 0;
+const bool HIT_UVS = (HIT_TEXTURES & 0x7ffu) != 0;
+const bool HIT_SECOND_UVS = (HIT_TEXTURES & (1u << 12)) != 0;
+const bool HIT_TANGENTS = (HIT_TEXTURES & (1u << SLOT_NORMAL | 1u << SLOT_CLEARCOAT_NORMAL)) != 0;
+
+// What lies at the corners of the triangles, in world axes, in the order of the leaves. Three texels per triangle:
+//   normal of a, material | SHEET_TRIANGLE   normal of b, world length of a metre of the object   normal of c, texture
+//   coordinates per metre
+// then, where HIT_TEXTURES says so, two of the first texture coordinates, two of the second, three of tangents with
+// their handedness, and two of colours as halves.
+layout(set = 0, binding = 34, rgba32ui) readonly uniform uimageBuffer hit_corners;
+const uint SHEET_TRIANGLE = 0x10000u;
+const int UV0_AT = 3;
+const int UV1_AT = UV0_AT + (HIT_UVS ? 2 : 0);
+const int TANGENTS_AT = UV1_AT + (HIT_SECOND_UVS ? 2 : 0);
+const int COLORS_AT = TANGENTS_AT + (HIT_TANGENTS ? 3 : 0);
+const int CORNER_TEXELS = COLORS_AT + (HIT_COLORS ? 2 : 0);
+
+// All levels of all images, RGBA in bytes, and per material and slot: first texel | width, height | levels, flags. A
+// texel buffer can be read at any place by any lane, where sampled images cannot be chosen by an index.
+layout(set = 0, binding = 40, r32ui) readonly uniform uimageBuffer texels;
+layout(set = 0, binding = 41, rgba32ui) readonly uniform uimageBuffer texel_slots;
+// Two texels per material and slot: row of u, layer | row of v, coordinate set.
+layout(set = 0, binding = 42, rgba32f) readonly uniform imageBuffer hit_slots;
+
+const uint TEXELS_SRGB = 1;
+const uint TEXELS_NEAREST = 2;
+// Bits 2 and 3, 4 and 5: wrap of u and v: 0 repeat, 1 mirror, 2 clamp.
+
+// An sRGB byte as a linear number (IEC 61966-2-1), x^2.4 as x² P(⁴√x): within 2e-6 of itself.
+vec3 linear_from_srgb(vec3 x) {
+    vec3 t = (x + 0.055) / 1.055;
+    vec3 q = sqrt(sqrt(t));
+    vec3 p = (((4.466797411e-2 * q - 0.231552169) * q + 0.908784986) * q + 0.298558623) * q - 2.045780234e-2;
+    return mix(t * t * p, x / 12.92, lessThanEqual(x, vec3(0.04045)));
+}
+
+int wrapped(int i, int size, uint mode) {
+    int period = mode == 1 ? 2 * size : size;
+    int repeated = i - int(floor(float(i) / float(period))) * period;
+    int mirrored = repeated < size ? repeated : period - 1 - repeated;
+    return mode == 2 ? clamp(i, 0, size - 1) : clamp(mode == 1 ? mirrored : repeated, 0, size - 1);
+}
+
+vec4 texel_at(uint first, ivec2 size, ivec2 at, uint flags) {
+    int x = wrapped(at.x, size.x, flags >> 2 & 3u);
+    int y = wrapped(at.y, size.y, flags >> 4 & 3u);
+    vec4 value = unpackUnorm4x8(imageLoad(texels, int(first) + y * size.x + x).x);
+    return (flags & TEXELS_SRGB) != 0 ? vec4(linear_from_srgb(value.rgb), value.a) : value;
+}
+
+// A texture of a material at coordinates uv, at the level whose texels are `footprint` wide in units of the
+// coordinates: bilinear in it.
+vec4 hit_texture(uint material, uint slot, vec4 uv_sets, float footprint) {
+    int row = int(material * SLOTS + slot);
+    vec4 u_row = imageLoad(hit_slots, row * 2);
+    vec4 v_row = imageLoad(hit_slots, row * 2 + 1);
+    uvec4 place = imageLoad(texel_slots, row);
+    vec3 set = vec3(v_row.w == 0.0 ? uv_sets.xy : uv_sets.zw, 1.0);
+    vec2 uv = vec2(dot(u_row.xyz, set), dot(v_row.xyz, set));
+    ivec2 size = ivec2(place.y & 0xffffu, place.y >> 16);
+    uint levels = place.z & 0xffu;
+    uint flags = place.z >> 8;
+    // The coordinate's transform may scale; its determinant is its area.
+    float stretch = sqrt(abs(u_row.x * v_row.y - u_row.y * v_row.x));
+    float across = footprint * stretch * float(max(size.x, size.y));
+    int level = clamp(int(floor(log2(max(across, 1.0)) + 0.5)), 0, int(levels) - 1);
+    uint first = place.x;
+    // Sizes of the levels above: their sum has no closed form where sides are odd.
+    for (int i = 0; i < level; i++) {
+        first += uint(size.x * size.y);
+        size = max(size >> 1, ivec2(1));
+    }
+    bool nearest = (flags & TEXELS_NEAREST) != 0;
+    vec2 at = uv * vec2(size) - (nearest ? 0.0 : 0.5);
+    // Far coordinates have no fraction left: keep the integers in range.
+    at = clamp(at, -1e9, 1e9);
+    ivec2 corner = ivec2(floor(at));
+    vec2 share = nearest ? vec2(0.0) : at - floor(at);
+    vec4 top = mix(texel_at(first, size, corner, flags), texel_at(first, size, corner + ivec2(1, 0), flags), share.x);
+    vec4 bottom = mix(texel_at(first, size, corner + ivec2(0, 1), flags), texel_at(first, size, corner + ivec2(1), flags), share.x);
+    return mix(top, bottom, share.y);
+}
+
+vec4 hit_texture_or(uint material, uint slot, vec4 uv_sets, float footprint, vec4 otherwise) {
+    if ((HIT_TEXTURES & (1u << slot)) == 0) return otherwise;
+    return imageLoad(texel_slots, int(material * SLOTS + slot)).z != 0 ? hit_texture(material, slot, uv_sets, footprint) : otherwise;
+}
+
+// The point and the frame of a hit.
+struct HitPoint {
+    vec3 p;         // bvh space
+    vec3 n;         // unit normal of the triangle, on the side of its front
+    vec3 n_smooth;  // unit interpolated normal, on the same side
+    vec4 t_smooth;  // interpolated tangent and its handedness
+    vec4 uvs;
+    vec4 color;
+    float uv_per_metre; // how dense texture coordinates are
+    float scale;    // how long a metre of the object is in the world
+    bool sheet;     // transmits light and encloses nothing
+    uint material;
+    uint triangle;
+};
+
+vec4 corner_texel(uint triangle, int i) {
+    return uintBitsToFloat(imageLoad(hit_corners, int(triangle) * CORNER_TEXELS + i));
+}
+
+HitPoint hit_point_of(Hit hit, vec3 origin, vec3 direction) {
+    int first = int(hit.triangle * 3);
+    vec3 a = uintBitsToFloat(imageLoad(bvh_triangles, first).xyz);
+    vec3 b = uintBitsToFloat(imageLoad(bvh_triangles, first + 1).xyz);
+    vec3 c = uintBitsToFloat(imageLoad(bvh_triangles, first + 2).xyz);
+    vec4 ta = corner_texel(hit.triangle, 0);
+    vec4 tb = corner_texel(hit.triangle, 1);
+    vec4 tc = corner_texel(hit.triangle, 2);
+    vec3 w = vec3(1.0 - hit.u - hit.v, hit.u, hit.v);
+    HitPoint r;
+    r.p = hit_point(origin, direction, hit.t, a, b, c, hit.u, hit.v);
+    r.material = floatBitsToUint(ta.w) & 0xffffu;
+    r.sheet = (floatBitsToUint(ta.w) & SHEET_TRIANGLE) != 0;
+    r.scale = tb.w;
+    r.triangle = hit.triangle;
+    r.uv_per_metre = tc.w;
+    // Corners run counter-clockwise around the front, whatever mirrored the object.
+    vec3 across = cross(b - a, c - a);
+    r.n = normalize(across * scale_to_one(largest_component(across)));
+    vec3 smooth_sum = ta.xyz * w.x + tb.xyz * w.y + tc.xyz * w.z;
+    float length2 = dot(smooth_sum, smooth_sum);
+    r.n_smooth = length2 > 0.0 ? smooth_sum * inversesqrt(length2) : r.n;
+    r.n_smooth = dot(r.n_smooth, r.n) < 0.0 ? -r.n_smooth : r.n_smooth;
+    r.t_smooth = vec4(0.0);
+    if (HIT_TANGENTS) {
+        vec4 t = corner_texel(hit.triangle, TANGENTS_AT);
+        r.t_smooth.xyz = t.xyz * w.x + corner_texel(hit.triangle, TANGENTS_AT + 1).xyz * w.y +
+                         corner_texel(hit.triangle, TANGENTS_AT + 2).xyz * w.z;
+        r.t_smooth.w = t.w;
+    }
+    r.uvs = vec4(0.0);
+    if (HIT_UVS) {
+        vec4 ab = corner_texel(hit.triangle, UV0_AT);
+        r.uvs.xy = ab.xy * w.x + ab.zw * w.y + corner_texel(hit.triangle, UV0_AT + 1).xy * w.z;
+    }
+    if (HIT_SECOND_UVS) {
+        vec4 ab = corner_texel(hit.triangle, UV1_AT);
+        r.uvs.zw = ab.xy * w.x + ab.zw * w.y + corner_texel(hit.triangle, UV1_AT + 1).xy * w.z;
+    }
+    r.color = vec4(1.0);
+    if (HIT_COLORS) {
+        uvec4 ab = floatBitsToUint(corner_texel(hit.triangle, COLORS_AT));
+        uvec2 of_c = floatBitsToUint(corner_texel(hit.triangle, COLORS_AT + 1).xy);
+        r.color = vec4(unpackHalf2x16(ab.x), unpackHalf2x16(ab.y)) * w.x + vec4(unpackHalf2x16(ab.z), unpackHalf2x16(ab.w)) * w.y +
+                  vec4(unpackHalf2x16(of_c.x), unpackHalf2x16(of_c.y)) * w.z;
+    }
+    return r;
+}
+
+// A tangent-space normal in the frame of n and t, as in lib/surface_fragment.glsl.
+vec3 bent(vec3 n, vec4 tangent, vec3 texel) {
+    vec3 t = tangent.xyz - n * dot(n, tangent.xyz);
+    float t2 = dot(t, t);
+    vec3 t_unit = t2 > 0.0 ? t * inversesqrt(t2) : vec3(0.0);
+    vec3 v = t_unit * texel.x + cross(n, t_unit) * (tangent.w * texel.y) + n * texel.z;
+    float v2 = dot(v, v);
+    return t2 > 0.0 && v2 > 0.0 ? v * inversesqrt(v2) : n;
+}
+
+// How much of the surface there is where its texel and colour have this alpha: 0 in the holes of a mask, coverage where
+// it is blended, else 1.
+float coverage_of(Material m, float texel_alpha) {
+    float alpha = texel_alpha * m.base_color.a;
+    bool blended = (m.flags & MATERIAL_BLENDED) != 0;
+    return blended ? clamp(alpha, 0.0, 1.0) : m.alpha_cutoff > 0.0 && alpha < m.alpha_cutoff ? 0.0 : 1.0;
+}
+
+float hit_coverage(HitPoint point) {
+    vec4 texel = hit_texture_or(point.material, SLOT_BASE, point.uvs, 0.0, vec4(1.0));
+    return coverage_of(material_at(point.material), point.color.a * texel.a);
+}
+
+struct HitSurface {
+    Surface s;
+    vec3 n;          // of the triangle, on the viewer's side
+    bool front;
+    float coverage;
+    float transmits; // share of what enters that goes through
+    float thickness; // texel, times how long a metre of the object is in the world
+    bool sheet;      // transmits light and encloses nothing
+    uint material;
+};
+
+// The surface as seen along `direction`, by a ray that is as wide as `width` there.
+HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
+    HitSurface r;
+    uint id = point.material;
+    Material m = material_at(id);
+    float cos_v = abs(dot(point.n, direction));
+    float footprint = width * point.uv_per_metre / max(cos_v, 0.05);
+    vec4 base = point.color * hit_texture_or(id, SLOT_BASE, point.uvs, footprint, vec4(1.0));
+    vec4 metallic_roughness = hit_texture_or(id, SLOT_METALLIC_ROUGHNESS, point.uvs, footprint, vec4(1.0));
+    float occlusion = hit_texture_or(id, SLOT_OCCLUSION, point.uvs, footprint, vec4(1.0)).r;
+    vec3 glow = hit_texture_or(id, SLOT_EMISSIVE, point.uvs, footprint, vec4(1.0)).rgb;
+    vec3 layers = vec3(hit_texture_or(id, SLOT_CLEARCOAT, point.uvs, footprint, vec4(1.0)).r,
+                       hit_texture_or(id, SLOT_CLEARCOAT_ROUGHNESS, point.uvs, footprint, vec4(1.0)).g,
+                       hit_texture_or(id, SLOT_SPECULAR, point.uvs, footprint, vec4(1.0)).a);
+    r.transmits = m.transmission * hit_texture_or(id, SLOT_TRANSMISSION, point.uvs, footprint, vec4(1.0)).r;
+    r.thickness = point.scale * hit_texture_or(id, SLOT_THICKNESS, point.uvs, footprint, vec4(1.0)).g;
+    vec3 n = point.n_smooth;
+    vec3 n_coat = n;
+    if ((HIT_TEXTURES & (1u << SLOT_NORMAL)) != 0) {
+        vec3 texel = hit_texture_or(id, SLOT_NORMAL, point.uvs, footprint, vec4(0.5, 0.5, 1.0, 1.0)).xyz * 2.0 - 1.0;
+        n = bent(point.n_smooth, point.t_smooth, vec3(texel.xy * m.normal_scale, texel.z));
+    }
+    if ((HIT_TEXTURES & (1u << SLOT_CLEARCOAT_NORMAL)) != 0) {
+        n_coat = bent(point.n_smooth, point.t_smooth,
+                      hit_texture_or(id, SLOT_CLEARCOAT_NORMAL, point.uvs, footprint, vec4(0.5, 0.5, 1.0, 1.0)).xyz * 2.0 - 1.0);
+    }
+    r.front = dot(point.n, direction) <= 0.0;
+    float side = r.front ? 1.0 : -1.0;
+    r.n = side * point.n;
+    r.coverage = coverage_of(m, base.a);
+    r.sheet = point.sheet;
+    r.material = id;
+    r.s = surface_from_texels(m, base.rgb, metallic_roughness.b, metallic_roughness.g, occlusion, glow, layers,
+                              side * n, side * n_coat, -direction, point.p - trace_terms.bvh_from_rel);
+    r.s.p_bvh = point.p;
+    r.s.n_triangle = r.n;
+    r.s.triangle = point.triangle;
+    r.transmits *= 1.0 - r.s.metallic;
+    return r;
+}
+#endif

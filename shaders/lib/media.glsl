@@ -1,0 +1,45 @@
+// Which transparent media a point lies in. Solids may overlap, as water does with the wall of its glass: of the media
+// entered and not left, the one of the highest priority is there, of several the one entered last (Schmidt and Budge,
+// Journal of Graphics Tools 7(2) 2002, who let the lowest number win). Up to four, the last entered first; outside of
+// all is a vacuum. An entry is (priority + 2^15) << 16 | material + 1; 0 is none.
+#ifndef MEDIA_GLSL
+#define MEDIA_GLSL
+#include "lib/material.glsl"
+#include "lib/medium.glsl"
+
+uint displacing(uint a, uint b) {
+    return b >> 16 > a >> 16 ? b : a;
+}
+
+uint present_medium(uvec4 media) {
+    return displacing(displacing(displacing(media.x, media.y), media.z), media.w);
+}
+
+uvec4 entered(uvec4 media, uint medium) {
+    return uvec4(medium, media.xyz);
+}
+
+bool inside(uvec4 media, uint medium) {
+    return any(equal(media, uvec4(medium)));
+}
+
+// Without the last entry of this medium; unchanged where there is none.
+uvec4 left(uvec4 media, uint medium) {
+    bool x = media.x == medium;
+    bool y = x || media.y == medium;
+    bool z = y || media.z == medium;
+    bool w = z || media.w == medium;
+    return uvec4(x ? media.y : media.x, y ? media.z : media.y, z ? media.w : media.z, w ? 0u : media.w);
+}
+
+float index_of(uint medium) {
+    return medium == 0 ? 1.0 : material_ior((medium & 0xffffu) - 1);
+}
+
+// What is left of light after a length in a medium (lecture A1).
+vec3 absorbed(uint medium, float distance) {
+    vec3 sigma = medium == 0 ? vec3(0.0) : material_sigma((medium & 0xffffu) - 1);
+    return vec3(beer_lambert(1.0, sigma.r, distance).T, beer_lambert(1.0, sigma.g, distance).T,
+                beer_lambert(1.0, sigma.b, distance).T);
+}
+#endif

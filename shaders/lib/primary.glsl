@@ -1,0 +1,96 @@
+// The nearest surface of a pixel, out of the G-buffer. Expects `instances` and `camera`.
+#ifndef PRIMARY_GLSL
+#define PRIMARY_GLSL
+#include "lib/camera.glsl"
+#include "lib/encode.glsl"
+#include "lib/hit.glsl"
+
+layout(constant_id = 0) const bool HAS_EMISSIVE = false;
+layout(constant_id = 1) const bool HAS_LAYERS = false;
+layout(constant_id = 3) const bool HAS_TRIANGLES = false;
+layout(constant_id = 2) const bool HAS_TRANSMISSION = false; // transmissive surfaces are in the G-buffer
+
+layout(set = 0, binding = 3, r32f) readonly uniform imageBuffer depth;
+layout(set = 0, binding = 4, rgba16f) readonly uniform image2D base;
+layout(set = 0, binding = 5, rgba16_snorm) readonly uniform image2D normals;
+layout(set = 0, binding = 6, rg32ui) readonly uniform uimage2D ids;
+layout(set = 0, binding = 7, rgba16f) readonly uniform image2D emissive;
+layout(set = 0, binding = 8, rgba16) readonly uniform image2D layers;
+layout(set = 0, binding = 9, r32ui) readonly uniform uimage2D triangles;
+// Places among the leaves of the scene's triangles.
+layout(set = 0, binding = 35, r32ui) readonly uniform uimageBuffer leaf_places;
+
+struct Primary {
+    bool drawn;
+    HitSurface hit;
+};
+
+// Where the ray of a pixel meets the plane of the triangle that was drawn there. The depth of a large triangle is only good
+// to some 1e-5, and its stored normal to 3e-5: rays that start from there would meet what they start from.
+void on_triangle(inout Surface s, uint leaf, vec3 direction) {
+    vec3 a = uintBitsToFloat(imageLoad(bvh_triangles, int(leaf) * 3).xyz);
+    vec3 b = uintBitsToFloat(imageLoad(bvh_triangles, int(leaf) * 3 + 1).xyz);
+    vec3 c = uintBitsToFloat(imageLoad(bvh_triangles, int(leaf) * 3 + 2).xyz);
+    // Parallel rays come from the pixel's point, all others from the eye.
+    vec3 origin = camera.orthographic != 0 ? s.p_bvh : trace_terms.bvh_from_rel;
+    precise vec3 to_a = a - origin;
+    precise vec3 to_b = b - origin;
+    precise vec3 to_c = c - origin;
+    ShearedTriangle t = sheared_triangle(ray_shear(direction), to_a, to_b, to_c);
+    if (t.det == 0.0) return;
+    HitPoint point = hit_point_of(Hit(0.0, leaf, t.weights.y / t.det, t.weights.z / t.det), s.p_bvh, vec3(0.0));
+    float side = dot(point.n, direction) <= 0.0 ? 1.0 : -1.0;
+    s.p_bvh = point.p;
+    s.triangle = leaf;
+    s.n_triangle = side * point.n;
+    // The exact normal where no texture has bent it.
+    vec3 smooth_n = side * point.n_smooth;
+    vec3 off = s.n - smooth_n;
+    vec3 off_coat = s.n_coat - smooth_n;
+    s.n = dot(off, off) < 1e-7 ? smooth_n : s.n;
+    s.n_coat = dot(off_coat, off_coat) < 1e-7 ? smooth_n : s.n_coat;
+}
+
+Primary primary_surface(ivec2 pixel) {
+    Primary r;
+    float z = imageLoad(depth, pixel.y * int(camera.size.x) + pixel.x).x;
+    r.drawn = z != 0.0;
+    uvec2 id = imageLoad(ids, pixel).xy;
+    uint material = r.drawn ? id.x & 0xffffu : 0u;
+    vec4 texel = imageLoad(base, pixel);
+    vec4 glow = HAS_EMISSIVE || HAS_TRANSMISSION ? imageLoad(emissive, pixel) : vec4(1.0);
+    vec4 octahedral = imageLoad(normals, pixel);
+    vec3 n = unit_from_octahedral(octahedral.xy);
+    vec3 layer = vec3(1.0);
+    vec3 n_coat = n;
+    if (HAS_LAYERS) {
+        vec4 packed_value = imageLoad(layers, pixel);
+        layer = layers_from_packed(packed_value);
+        n_coat = coat_normal_from_packed(packed_value);
+    }
+    float roughness = float(id.x >> 16) * (1.0 / 65535.0);
+    float occlusion = float(id.y >> 24) * (1.0 / 255.0);
+    Material m = material_at(material);
+    vec3 p_rel = rel_from_pixel(camera, pixel, r.drawn ? z : 1.0);
+    Surface s = surface_from_texels(m, texel.rgb, texel.a, roughness, occlusion, HAS_EMISSIVE ? glow.rgb : vec3(1.0), layer, n, n_coat,
+                                    -view_direction(camera, pixel), p_rel);
+    s.p_bvh = p_rel + trace_terms.bvh_from_rel;
+    s.n_triangle = unit_from_octahedral(octahedral.zw);
+    s.media = trace_terms.camera_media;
+    if (HAS_TRIANGLES) {
+        uint leaf = r.drawn ? imageLoad(leaf_places, int(imageLoad(triangles, pixel).x)).x : NO_TRIANGLE;
+        if (leaf != NO_TRIANGLE) on_triangle(s, leaf, -s.v);
+    }
+    r.hit.s = s;
+    r.hit.n = s.n_triangle;
+    r.hit.front = (id.y & BACK_FACE) == 0;
+    r.hit.coverage = 1.0;
+    // The emissive target's fourth component is how much the texture lets through.
+    r.hit.transmits = HAS_TRANSMISSION ? m.transmission * glow.a * (1.0 - s.metallic) : 0.0;
+    uint instance = r.drawn ? id.y & INSTANCE_BITS : 0u;
+    r.hit.sheet = (instances[instance].flags & INSTANCE_SHEET) != 0;
+    r.hit.thickness = instances[instance].scale;
+    r.hit.material = material;
+    return r;
+}
+#endif

@@ -1,0 +1,310 @@
+// Rays through the scene's bounding volume hierarchy: the nearest hit, or whether there is any. One interface, `trace`,
+// and three ways through the tree that return the same hits: along skip links with nodes of 16 bytes or of 32, or with
+// a stack (docs/decisions/traversal.md). Triangles are in the order of the leaves, whatever the way.
+#ifndef TRACE_GLSL
+#define TRACE_GLSL
+#include "lib/ray.glsl"
+#include "share/trace.glsl"
+
+layout(constant_id = 40) const uint TRAVERSAL = 0;
+const uint LINKS_16 = 0; // boxes in steps of a grid over the scene
+const uint LINKS_32 = 1; // boxes of floats
+const uint STACK = 2;
+// Lists of nodes ordered for each octant of directions, before the one for any hit, which is the only one without.
+layout(constant_id = 41) const bool OCTANTS = false;
+
+layout(set = 0, binding = 30, rgba32ui) readonly uniform uimageBuffer bvh_nodes;
+// Three texels per triangle: corner, and: classes | instance | triangle of its mesh.
+layout(set = 0, binding = 31, rgba32ui) readonly uniform uimageBuffer bvh_triangles;
+layout(scalar, set = 0, binding = 32) uniform TraceBlock { TraceTerms trace_terms; };
+
+// What a ray stops at.
+const uint OPAQUE = 1;
+const uint FILTER = 2; // masked, blended or transmissive: what is seen there decides
+const uint NO_TRIANGLE = 0xffffffffu;
+
+struct Hit {
+    float t;
+    uint triangle; // in the order of the leaves, or NO_TRIANGLE
+    float u;
+    float v;
+};
+
+// Bit 30 of a link or of a reference to a node: there are triangles of the class FILTER below. A ray that looks for those
+// alone passes the others by.
+const int HOLDS_FILTERS = 1 << 30;
+const int PLACE = HOLDS_FILTERS - 1;
+
+// Work done so far by this invocation.
+uint node_visits = 0;
+uint triangle_tests = 0;
+// Evaluations of loop heads so far: lavapipe ends all loops of an invocation in silence after 65,535 of them.
+uint loop_heads = 0;
+
+// The one place where a ray leaves a surface: moved off it along n, the geometric normal on the side it leaves to, by
+// `offset`, 32 roundings of the largest coordinate in the scene. A hit is as far off the plane of its triangle as its
+// coordinates round, some 2 to 4 of these, and another triangle in the same plane is found as far off again
+// (tests/traversal.rs counts self-hits). And as far along `free`, a direction known to be free: back to where the
+// surface was seen from. A point in a corner may else lie behind the other wall. No length of its own: scenes of any
+// size and place are treated alike.
+vec3 ray_origin(vec3 p, vec3 n, vec3 free) {
+    return p + (n + free) * trace_terms.offset;
+}
+
+// A ray as boxes see it: near and far of a box are centre·inverse + start ∓ half·extent.
+struct BoxRay {
+    vec3 inverse;
+    vec3 start_near;
+    vec3 start_far;
+    vec3 extent;
+    int base; // first texel of the list of nodes
+    int end;  // place of the sentinel
+};
+
+int octant(vec3 d) {
+    return (d.x < 0.0 ? 1 : 0) | (d.y < 0.0 ? 2 : 0) | (d.z < 0.0 ? 4 : 0);
+}
+
+BoxRay box_ray(vec3 origin, vec3 direction, bool any_hit) {
+    BoxRay r;
+    // Beyond 1e20 a direction is parallel to the planes as far as any scene goes, and 0·∞ does not happen.
+    vec3 inverse = clamp(1.0 / direction, -1e20, 1e20);
+    r.end = int(trace_terms.nodes);
+    int list = any_hit || !OCTANTS ? OCTANTS ? 8 : 0 : octant(direction);
+    r.base = list * (r.end + 1);
+    if (TRAVERSAL == LINKS_16) {
+        // Boxes are a grid unit larger than need be on each side, 1.5e-5 of the scene: more than the roundings here as
+        // long as the origin is within 80 times its extent.
+        r.inverse = inverse * trace_terms.grid_unit;
+        r.start_near = (trace_terms.grid_origin - origin) * inverse;
+        r.start_far = r.start_near;
+    } else {
+        vec3 pad = abs(origin) * (8.0 / 16777216.0) * abs(inverse) + abs(inverse) * trace_terms.offset;
+        r.inverse = inverse;
+        r.start_near = -origin * inverse - pad;
+        r.start_far = -origin * inverse + pad;
+    }
+    r.extent = abs(r.inverse);
+    return r;
+}
+
+// Whether a ray meets a box within [t_min, t_max], t_min ≥ 0, in integers: floats order as their bits do where they are positive, a
+// negative far end loses in any case, and min and max of integers are one instruction each where those of floats
+// are three.
+bool meets(vec3 near, vec3 far, float t_min, float t_max) {
+    ivec3 n = floatBitsToInt(near);
+    ivec3 f = floatBitsToInt(far);
+    return max(max(n.x, n.y), max(n.z, floatBitsToInt(t_min))) <= min(min(f.x, f.y), min(f.z, floatBitsToInt(t_max)));
+}
+
+// One way through the tree, ready to go on.
+struct Walk {
+    int node;  // the next node, or BoxRay.end
+    int leaf;  // triangles found and not tested yet, ~(first · 8 + count − 1); 0: none
+    Hit hit;
+};
+
+bool walking(Walk w, BoxRay r) {
+    return w.node != r.end || w.leaf != 0;
+}
+
+// One node: to its children, which follow it, or along its link. A leaf is kept for later; if one is being kept
+// already, the walk waits. Selections only: lavapipe runs both sides of a branch.
+void visit(inout Walk w, BoxRay r, float t_min, uint classes) {
+    node_visits += w.node != r.end ? 1u : 0u;
+    vec3 near, far;
+    int word;
+    if (TRAVERSAL == LINKS_16) {
+        uvec4 node = imageLoad(bvh_nodes, r.base + w.node);
+        vec3 center = vec3(ivec3(node.xyz >> 16u));
+        vec3 half_extent = vec3(ivec3(node.xyz & 0xffffu));
+        vec3 t = center * r.inverse + r.start_near;
+        vec3 e = half_extent * r.extent;
+        near = t - e;
+        far = t + e;
+        word = int(node.w);
+    } else {
+        uvec4 node = imageLoad(bvh_nodes, (r.base + w.node) * 2);
+        vec3 t = uintBitsToFloat(node.xyz) * r.inverse;
+        vec3 e = uintBitsToFloat(imageLoad(bvh_nodes, (r.base + w.node) * 2 + 1).xyz) * r.extent;
+        near = t + r.start_near - e;
+        far = t + r.start_far + e;
+        word = int(node.w);
+    }
+    bool leaf = word < 0;
+    bool hit = meets(near, far, t_min, w.hit.t) && (classes != FILTER || leaf || (word & HOLDS_FILTERS) != 0);
+    bool keep = hit && leaf && w.leaf == 0;
+    bool wait = hit && leaf && w.leaf != 0;
+    int next = hit || leaf ? w.node + 1 : word & PLACE;
+    next = wait ? w.node : next;
+    // The sentinel is a box as well, and may be hit.
+    w.node = min(next, r.end);
+    w.leaf = keep ? word : w.leaf;
+}
+
+// A ray as triangles see it.
+struct TriangleRay {
+    vec3 origin;
+    Shear shear;
+    float after;         // hits at this t or before do not count,
+    uint after_triangle; // but those of later triangles at the same t
+    uint self;           // the triangle it leaves, which it cannot meet again
+};
+
+// One triangle of the leaf that is kept. The nearest counts, of two at the same t the first: any order of the tree finds
+// the same.
+void test_triangle(inout Walk w, TriangleRay r, BoxRay b, uint classes, bool any_hit) {
+    bool pending = w.leaf != 0;
+    triangle_tests += pending ? 1u : 0u;
+    int place = ~w.leaf;
+    int triangle = pending ? place >> 3 : 0;
+    uvec4 ta = imageLoad(bvh_triangles, triangle * 3);
+    uvec4 tb = imageLoad(bvh_triangles, triangle * 3 + 1);
+    uvec4 tc = imageLoad(bvh_triangles, triangle * 3 + 2);
+    precise vec3 a = uintBitsToFloat(ta.xyz) - r.origin;
+    precise vec3 b_rel = uintBitsToFloat(tb.xyz) - r.origin;
+    precise vec3 c = uintBitsToFloat(tc.xyz) - r.origin;
+    ShearedTriangle s = sheared_triangle(r.shear, a, b_rel, c);
+    float inverse = 1.0 / s.det;
+    float t = s.depth * inverse / r.shear.dz;
+    uint index = uint(triangle);
+    bool hit = pending && s.inside && s.det != 0.0 && (ta.w & classes) != 0 && index != r.self;
+    hit = hit && (t > r.after || (t == r.after && index > r.after_triangle));
+    hit = hit && (t < w.hit.t || (t == w.hit.t && index < w.hit.triangle));
+    w.hit.t = hit ? t : w.hit.t;
+    w.hit.triangle = hit ? index : w.hit.triangle;
+    w.hit.u = hit ? s.weights.y * inverse : w.hit.u;
+    w.hit.v = hit ? s.weights.z * inverse : w.hit.v;
+    // The next triangle of the leaf: first + 1, count − 1.
+    int rest = (place & 7) == 0 ? 0 : ~(place + 7);
+    w.leaf = pending ? rest : 0;
+    bool ended = any_hit && hit;
+    w.node = ended ? b.end : w.node;
+    w.leaf = ended ? 0 : w.leaf;
+}
+
+Hit walk_links(TriangleRay r, vec3 direction, float t_max, uint classes, bool any_hit) {
+    BoxRay b = box_ray(r.origin, direction, any_hit);
+    Walk w = Walk(t_max > 0.0 ? 0 : b.end, 0, Hit(t_max, NO_TRIANGLE, 0.0, 0.0));
+    // lavapipe goes through a loop's body at least once and through both sides of each branch in it: a fixed number of
+    // nodes, then one triangle, and one way out at the end.
+    do {
+        loop_heads++;
+        visit(w, b, r.after, classes);
+        visit(w, b, r.after, classes);
+        visit(w, b, r.after, classes);
+        visit(w, b, r.after, classes);
+        visit(w, b, r.after, classes);
+        test_triangle(w, r, b, classes, any_hit);
+    } while (walking(w, b));
+    return w.hit;
+}
+
+struct HitPair {
+    Hit a;
+    Hit b;
+};
+
+// Two rays at once, turn about: what one waits for, the other computes. A node is a chain of fetch, conversion, comparison
+// and selection in which most of a processor idles.
+HitPair walk_links_twice(TriangleRay ra, vec3 da, float ta, TriangleRay rb, vec3 db, float tb, uint classes, bool any_hit) {
+    BoxRay ba = box_ray(ra.origin, da, any_hit);
+    BoxRay bb = box_ray(rb.origin, db, any_hit);
+    Walk a = Walk(ta > 0.0 ? 0 : ba.end, 0, Hit(ta, NO_TRIANGLE, 0.0, 0.0));
+    Walk b = Walk(tb > 0.0 ? 0 : bb.end, 0, Hit(tb, NO_TRIANGLE, 0.0, 0.0));
+    do {
+        loop_heads++;
+        visit(a, ba, 0.0, classes);
+        visit(b, bb, 0.0, classes);
+        visit(a, ba, 0.0, classes);
+        visit(b, bb, 0.0, classes);
+        visit(a, ba, 0.0, classes);
+        visit(b, bb, 0.0, classes);
+        visit(a, ba, 0.0, classes);
+        visit(b, bb, 0.0, classes);
+        visit(a, ba, 0.0, classes);
+        visit(b, bb, 0.0, classes);
+        test_triangle(a, ra, ba, classes, any_hit);
+        test_triangle(b, rb, bb, classes, any_hit);
+    } while (walking(a, ba) || walking(b, bb));
+    return HitPair(a.hit, b.hit);
+}
+
+layout(constant_id = 42) const uint STACK_SIZE = 1; // entries: the depth of the tree, at least 1
+
+// The tree with both children's boxes in the parent, the nearer child first, the other on a stack.
+Hit walk_stack(TriangleRay r, vec3 direction, float t_max, uint classes, bool any_hit) {
+    BoxRay b = box_ray(r.origin, direction, any_hit);
+    // A reference is a node, or a leaf as in Walk; the sentinel ends the walk.
+    b.end = 0x7fffffff;
+    Walk w = Walk(t_max > 0.0 ? 0 : b.end, 0, Hit(t_max, NO_TRIANGLE, 0.0, 0.0));
+    int stack[STACK_SIZE];
+    int entries = 0;
+    do {
+        loop_heads++;
+        for (int i = 0; i < 2; i++) {
+            // A leaf waits for its turn while another is being tested.
+            bool at_leaf = w.node < 0;
+            bool keep = at_leaf && w.leaf == 0;
+            w.leaf = keep ? w.node : w.leaf;
+            bool inner = w.node >= 0 && w.node != b.end;
+            int at = inner ? (w.node & PLACE) * 4 : 0;
+            node_visits += inner ? 1u : 0u;
+            uvec4 left = imageLoad(bvh_nodes, at);
+            uvec4 left_half = imageLoad(bvh_nodes, at + 1);
+            uvec4 right = imageLoad(bvh_nodes, at + 2);
+            uvec4 right_half = imageLoad(bvh_nodes, at + 3);
+            vec3 tl = uintBitsToFloat(left.xyz) * b.inverse;
+            vec3 el = uintBitsToFloat(left_half.xyz) * b.extent;
+            vec3 tr = uintBitsToFloat(right.xyz) * b.inverse;
+            vec3 er = uintBitsToFloat(right_half.xyz) * b.extent;
+            vec3 near_l = tl + b.start_near - el;
+            vec3 near_r = tr + b.start_near - er;
+            bool all = classes != FILTER;
+            bool wants_l = all || int(left.w) < 0 || (int(left.w) & HOLDS_FILTERS) != 0;
+            bool wants_r = all || int(left_half.w) < 0 || (int(left_half.w) & HOLDS_FILTERS) != 0;
+            bool hit_l = inner && wants_l && meets(near_l, tl + b.start_far + el, r.after, w.hit.t);
+            bool hit_r = inner && wants_r && meets(near_r, tr + b.start_far + er, r.after, w.hit.t);
+            float enter_l = max(near_l.x, max(near_l.y, near_l.z));
+            float enter_r = max(near_r.x, max(near_r.y, near_r.z));
+            bool swap = enter_r < enter_l;
+            int first = swap ? int(left_half.w) : int(left.w);
+            int second = swap ? int(left.w) : int(left_half.w);
+            bool both = hit_l && hit_r;
+            int one = hit_l ? int(left.w) : int(left_half.w);
+            // Written whatever comes: only where the next entry goes is decided.
+            stack[min(entries, int(STACK_SIZE) - 1)] = second;
+            entries += both ? 1 : 0;
+            bool pop = keep || (inner && !hit_l && !hit_r);
+            entries -= pop ? 1 : 0;
+            int popped = entries >= 0 ? stack[max(entries, 0)] : b.end;
+            entries = max(entries, 0);
+            w.node = inner && !pop ? (both ? first : one) : pop ? popped : w.node;
+        }
+        test_triangle(w, r, b, classes, any_hit);
+    } while (walking(w, b));
+    return w.hit;
+}
+
+// The nearest hit of a triangle of these classes along origin + t direction that comes after the hit `after` and not
+// after t_max; or, with any_hit, any such hit, of which only that there is one is the same every way. A negative t_max asks
+// for nothing and costs next to nothing. `self` is the triangle that the origin lies in, or NO_TRIANGLE: along a sliver t
+// rounds by more than any offset, 1e-6 m for 7 m by 2 cm.
+Hit trace(vec3 origin, vec3 direction, uint self, Hit after, float t_max, uint classes, bool any_hit) {
+    TriangleRay r = TriangleRay(origin, ray_shear(direction), after.t, after.triangle, self);
+    return TRAVERSAL == STACK ? walk_stack(r, direction, t_max, classes, any_hit)
+                              : walk_links(r, direction, t_max, classes, any_hit);
+}
+
+// Two rays at once.
+HitPair trace_pair(vec3 oa, vec3 da, uint self_a, float ta, vec3 ob, vec3 db, uint self_b, float tb, uint classes,
+                   bool any_hit) {
+    TriangleRay ra = TriangleRay(oa, ray_shear(da), 0.0, NO_TRIANGLE, self_a);
+    TriangleRay rb = TriangleRay(ob, ray_shear(db), 0.0, NO_TRIANGLE, self_b);
+    if (TRAVERSAL != STACK) return walk_links_twice(ra, da, ta, rb, db, tb, classes, any_hit);
+    return HitPair(walk_stack(ra, da, ta, classes, any_hit), walk_stack(rb, db, tb, classes, any_hit));
+}
+
+// To begin with: t > 0.
+const Hit FROM_ORIGIN = Hit(0.0, NO_TRIANGLE, 0.0, 0.0);
+#endif

@@ -1,0 +1,68 @@
+// Rays out of a buffer, hits into a buffer: the traversal alone, for its tests and its measurements. An invocation takes
+// one ray, or two that lie 8 apart, so that neighbours stay together in a group of 8.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+layout(local_size_x = 64) in;
+#include "lib/trace.glsl"
+#include "share/work.glsl"
+
+layout(constant_id = 0) const bool ANY_HIT = false;
+layout(constant_id = 1) const bool PAIRS = false;
+layout(constant_id = 2) const bool COUNT = false;
+layout(set = 0, binding = 0, rgba32ui) readonly uniform uimageBuffer rays; // origin, t_max | direction, the triangle it leaves
+layout(scalar, set = 0, binding = 1) writeonly buffer Hits { Hit hits[]; };
+layout(scalar, set = 0, binding = 2) buffer WorkDone { WorkCounts counts; };
+// Workgroups are cut into one contiguous piece per thread on lavapipe; blocks of 32 of them are dealt out in turn.
+layout(push_constant, scalar) uniform Push { uint count; uint blocks; };
+
+struct RayRead {
+    vec3 origin;
+    vec3 direction;
+    uint self;
+    float t_max;
+};
+
+RayRead read_ray(uint i) {
+    uvec4 o = imageLoad(rays, int(min(i, count - 1) * 2));
+    uvec4 d = imageLoad(rays, int(min(i, count - 1) * 2 + 1));
+    return RayRead(uintBitsToFloat(o.xyz), uintBitsToFloat(d.xyz), d.w, i < count ? uintBitsToFloat(o.w) : -1.0);
+}
+
+uint dealt(uint group) {
+    uint block = group / 32;
+    uint half_of = (blocks + 1) / 2;
+    uint place = block < half_of ? 2 * block : 2 * (block - half_of) + 1;
+    return place * 32 + group % 32;
+}
+
+void main() {
+    uint group = dealt(gl_WorkGroupID.x);
+    uint lane = gl_LocalInvocationID.x;
+    if (PAIRS) {
+        uint a = group * 128 + (lane / 8) * 16 + lane % 8;
+        uint b = a + 8;
+        RayRead ra = read_ray(a);
+        RayRead rb = read_ray(b);
+        HitPair hit = trace_pair(ra.origin, ra.direction, ra.self, ra.t_max, rb.origin, rb.direction, rb.self, rb.t_max,
+                                 OPAQUE | FILTER, ANY_HIT);
+        if (a < count) hits[a] = hit.a;
+        if (b < count) hits[b] = hit.b;
+    } else {
+        uint a = group * 64 + lane;
+        RayRead r = read_ray(a);
+        Hit hit = trace(r.origin, r.direction, r.self, FROM_ORIGIN, r.t_max, OPAQUE | FILTER, ANY_HIT);
+        if (a < count) hits[a] = hit;
+    }
+    if (COUNT) {
+        uint visits = subgroupAdd(node_visits);
+        uint tests = subgroupAdd(triangle_tests);
+        if (subgroupElect()) {
+            uint old = atomicAdd(counts.node_visits[0], visits);
+            if (old + visits < old) atomicAdd(counts.node_visits[1], 1u);
+            old = atomicAdd(counts.triangle_tests[0], tests);
+            if (old + tests < old) atomicAdd(counts.triangle_tests[1], 1u);
+        }
+    }
+}

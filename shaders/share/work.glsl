@@ -1,0 +1,11 @@
+// What the passes that send rays count. Twin: src/share.rs (build.rs compares the layouts). Sums are pairs: low, high.
+struct WorkCounts {
+    uint reflection[2];
+    uint refraction[2];
+    uint shadow[2];
+    uint node_visits[2];
+    uint triangle_tests[2];
+    uint stray_interfaces[2]; // left without having been entered
+    uint lost[2];             // throughput that was not followed, in steps of 2^-16, summed over pixels
+    uint most_lost;           // the largest of a pixel, as the bits of a float
+};

@@ -1,0 +1,92 @@
+//! Reflection and refraction by rays, over the tiles that call for them (shaders/pass/interact.comp).
+
+use anyhow::Result;
+
+use super::classify::{RayTiles, classify_rays};
+use super::gbuffer::GBuffer;
+use super::light::Lighting;
+use super::rays::LOOP_BUDGET;
+use crate::gpu::{Frame, Image};
+use crate::plan::Rays;
+use crate::shader::interact;
+
+/// Branches of a path that can wait: one for each surface before, and one more where a surface sends three.
+const SPARE_BRANCHES: u32 = 4;
+
+/// Adds to `radiance` what the surfaces of the G-buffer mirror and what is seen through them.
+///
+/// # Errors
+/// When the driver refuses a pipeline.
+pub fn interact<'a>(
+    frame: &mut Frame<'a>,
+    lighting: Lighting<'a>,
+    with: Rays,
+    gbuffer: &'a GBuffer,
+    tiles: &'a RayTiles,
+    radiance: &'a Image,
+) -> Result<()> {
+    classify_rays(frame, lighting, with, gbuffer, tiles)?;
+    let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
+    let planned = Some(with);
+    let constants = interact::Constants {
+        has_emissive: plan.emissive,
+        has_layers: plan.layers,
+        has_triangles: true,
+        has_transmission: with.refraction,
+        brdf: lighting.knobs.index("brdf"),
+        fresnel: lighting.knobs.index("fresnel"),
+        arithmetic: lighting.knobs.index("arithmetic"),
+        clearcoat: plan.clearcoat,
+        conductors: plan.conductors,
+        mirror_rays: planned.is_some_and(|rays| rays.mirrors),
+        directional_lights: plan.directional_lights,
+        local_lights: plan.local_lights,
+        ambient: plan.ambient,
+        reflection: plan.reflection,
+        traversal: rays.constants.traversal,
+        octants: rays.constants.octants,
+        stack_size: rays.constants.stack_size,
+        hit_textures: rays.constants.hit_textures,
+        shadows: u32::from(lighting.shadows()),
+        filters: planned.is_some_and(|rays| rays.filters),
+        absorption: planned.map_or(0, |rays| rays.absorption),
+        tile_words: 0,
+        transmissive: with.transmissive,
+        rough: with.rough,
+        sky: plan.sky,
+        masked_hits: with.masked,
+        loop_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
+        pending: with.interfaces + SPARE_BRANCHES,
+    };
+    let bind = interact::Bind {
+        camera_block: camera,
+        instances: &scene.instances,
+        depth: &gbuffer.depth_texels,
+        base: &gbuffer.base,
+        normals: &gbuffer.normals,
+        ids: &gbuffer.ids,
+        emissive: &gbuffer.emissive,
+        layers: &gbuffer.layers,
+        triangles: &gbuffer.triangles,
+        radiance,
+        ray_tiles: &tiles.tiles,
+        work: &tiles.sizes,
+        lights: &scene.lights,
+        tile_lights: &lighting.tiles.masks,
+        environment: &environment.terms,
+        prefiltered: environment.prefiltered(),
+        reflectance: environment.reflectance(),
+        sky: environment.sky(),
+        bvh_nodes: &rays.nodes,
+        bvh_triangles: &rays.triangles,
+        trace_block: &rays.terms,
+        material_texels: &scene.materials,
+        hit_corners: &rays.corners,
+        leaf_places: &rays.leaf_places,
+        texels: &scene.texels,
+        texel_slots: &scene.texel_slots,
+        hit_slots: &scene.slots,
+        work_done: &rays.counts,
+    };
+    frame.compute_indirect("reflection and refraction", &bind, constants.words(), &[], &tiles.sizes, 0)
+}

@@ -1,0 +1,472 @@
+//! What rays go through on the device: the bounding volume hierarchy, its triangles, and what their surfaces look like
+//! (shaders/lib/trace.glsl, hit.glsl).
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use ash::vk;
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+use super::scene::{texture_slots, upload};
+use super::view::View;
+use crate::gpu::{Buffer, Device, Frame, Place};
+use crate::plan::{Plan, Rays};
+use crate::scene::bvh::{Bvh, Format, Order, Triangle};
+use crate::scene::solid::{Solids, media_at};
+use crate::scene::{Material, Mesh, Scene};
+use crate::share::{TraceTerms, WorkCounts};
+
+/// Rays start this many roundings of the largest coordinate off their surface (shaders/lib/trace.glsl, `ray_origin`).
+const OFFSET_ROUNDINGS: f64 = 32.0;
+
+/// Lists in eight orders beside the one for any hit, as long as they take no more bytes than this: beyond, their
+/// misses of the cache cost more than their order gains (docs/decisions/traversal.md).
+const MOST_ORDERED_BYTES: usize = 100 << 20;
+
+/// Loop heads that one invocation of the tree of rays may evaluate where the driver limits them.
+pub const LOOP_BUDGET: u32 = 40_000;
+
+/// How the hierarchy is gone through: `TRAVERSAL` of shaders/lib/trace.glsl.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Traversal {
+    /// Skip links between nodes of 16 bytes.
+    Links16,
+    /// Skip links between nodes of 32 bytes, for scenes whose boxes are too small for a grid of 16 bits.
+    Links32,
+    /// Nodes of 64 bytes with both children's boxes, and a stack.
+    Stack,
+}
+
+/// What the report says of the hierarchy.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BvhFacts {
+    /// Milliseconds to build and check it.
+    pub build_ms: f64,
+    /// And to lay it out for the device.
+    pub layout_ms: f64,
+    /// Triangles in it.
+    pub triangles: usize,
+    /// Triangles left out: without area or not finite.
+    pub dropped: usize,
+    /// Nodes.
+    pub nodes: usize,
+    /// Edges from the root to the deepest leaf.
+    pub depth: u32,
+    /// Expected nodes and triangles met by a line through the root's box.
+    pub sah: f64,
+    /// How it is gone through.
+    pub traversal: Traversal,
+    /// Bytes on the device.
+    pub bytes: u64,
+}
+
+/// Specialization constants of every pass that includes shaders/lib/trace.glsl.
+#[derive(Debug, Clone, Copy)]
+pub struct TraceConstants {
+    /// [`Traversal`].
+    pub traversal: u32,
+    /// Ordered lists for nearest hits.
+    pub octants: bool,
+    /// Entries.
+    pub stack_size: u32,
+    /// Which texture slots hits read.
+    pub hit_textures: u32,
+}
+
+/// Tables of a scene for rays; next to nothing where the plan sends none.
+pub struct RaysOnDevice {
+    /// Nodes in all lists.
+    pub nodes: Buffer,
+    /// Three texels per triangle.
+    pub triangles: Buffer,
+    /// What lies at their corners.
+    pub corners: Buffer,
+    /// The place among the leaves of each triangle of the scene, in the order of instances.
+    pub leaf_places: Buffer,
+    /// [`TraceTerms`].
+    pub terms: Buffer,
+    /// [`WorkCounts`].
+    pub counts: Buffer,
+    /// Specialization.
+    pub constants: TraceConstants,
+    /// For the report; `None` without rays.
+    pub facts: Option<BvhFacts>,
+    fixed: TraceTerms,
+    anchor: DVec3,
+    /// The transparent bodies alone, to find those that the eye is in.
+    bodies: Scene,
+    solids: Solids,
+}
+
+impl RaysOnDevice {
+    /// Builds the hierarchy as far as the plan asks for it.
+    ///
+    /// # Errors
+    /// When the scene does not fit the device.
+    pub fn new(
+        device: &Arc<Device>,
+        plan: &Plan,
+        scene: &Scene,
+        solids: &Solids,
+        traversal: Option<Traversal>,
+    ) -> Result<Self> {
+        let Some(rays) = plan.rays else { return Self::none(device) };
+        let start = std::time::Instant::now();
+        let bvh = Bvh::build(scene)?;
+        let build_ms = start.elapsed().as_secs_f64() * 1e3;
+        let start = std::time::Instant::now();
+        let by_links = if bvh.fits_grid() { Traversal::Links16 } else { Traversal::Links32 };
+        let default = if device.limits_loops() { by_links } else { Traversal::Stack };
+        let traversal = traversal.unwrap_or(default);
+        let ordered = 8 * bvh.nodes.len() * if traversal == Traversal::Links32 { 32 } else { 16 };
+        let octants = traversal != Traversal::Stack && ordered <= MOST_ORDERED_BYTES;
+        let filter: Vec<bool> = scene.meshes.iter().map(|mesh| is_filter(&scene.materials[mesh.material])).collect();
+        let filters: Vec<bool> =
+            bvh.triangles.iter().map(|t| filter[scene.instances[t.instance as usize].mesh]).collect();
+        let nodes = match traversal {
+            Traversal::Stack => {
+                let mut nodes = bvh.stack_nodes();
+                mark_references(&mut nodes, &filters);
+                nodes
+            }
+            Traversal::Links16 | Traversal::Links32 => {
+                let format = if traversal == Traversal::Links16 { Format::Quantised } else { Format::Float };
+                let orders = (0..if octants { 8 } else { 0 }).map(Order::Octant).chain([Order::AnyHit]);
+                let orders: Vec<_> = orders.collect();
+                let list = |&order: &Order| {
+                    let mut links = bvh.links(order, format);
+                    mark_links(&mut links, if format == Format::Float { 2 } else { 1 }, &filters);
+                    links
+                };
+                orders.par_iter().map(list).collect::<Vec<_>>().concat()
+            }
+        };
+        let corners = Corners::of(scene, solids, rays.refraction);
+        let triangles: Vec<[[u32; 4]; 3]> = bvh
+            .triangles
+            .par_iter()
+            .zip(&filters)
+            .map(|(t, &is_filter)| {
+                let [a, b, c] = corners.order(t).map(|i| t.corners[i].map(f32::to_bits));
+                let class = if is_filter { FILTER } else { OPAQUE };
+                [[a[0], a[1], a[2], class], [b[0], b[1], b[2], t.instance], [c[0], c[1], c[2], t.primitive]]
+            })
+            .collect();
+        let mut first = 0_u32;
+        let first_triangle: Vec<u32> = scene
+            .instances
+            .iter()
+            .map(|i| {
+                first += (scene.meshes[i.mesh].indices.len() / 3) as u32;
+                first - (scene.meshes[i.mesh].indices.len() / 3) as u32
+            })
+            .collect();
+        let mut leaf_places = vec![u32::MAX; first as usize];
+        for (place, t) in bvh.triangles.iter().enumerate() {
+            leaf_places[(first_triangle[t.instance as usize] + t.primitive) as usize] = place as u32;
+        }
+        let hit_corners: Vec<[u32; 4]> = bvh.triangles.par_iter().flat_map_iter(|t| corners.texels(t)).collect();
+        let layout_ms = start.elapsed().as_secs_f64() * 1e3;
+        let extent = bvh.triangles.iter().flat_map(|t| t.corners.iter().flatten()).fold(0.0_f32, |m, x| m.max(x.abs()));
+        let grid = bvh.grid();
+        let format = Some(vk::Format::R32G32B32A32_UINT);
+        let nodes_buffer = upload(device, "BVH nodes", &nodes, format)?;
+        let triangle_buffer = upload(device, "BVH triangles", &triangles, format)?;
+        let corner_buffer = upload(device, "corners for rays", &hit_corners, format)?;
+        let fixed = TraceTerms {
+            offset: (OFFSET_ROUNDINGS * f64::from(extent) * 2.0_f64.powi(-24)) as f32,
+            grid_origin: grid.origin,
+            grid_unit: grid.unit,
+            nodes: bvh.nodes.len() as u32,
+            interfaces: rays.interfaces,
+            ..bytemuck::Zeroable::zeroed()
+        };
+        Ok(Self {
+            terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,
+            counts: Buffer::new(device, "work counts", size_of::<WorkCounts>() as u64, Place::Readback)?,
+            constants: TraceConstants {
+                traversal: traversal as u32,
+                octants,
+                stack_size: bvh.depth.max(1),
+                hit_textures: corners.contents,
+            },
+            facts: Some(BvhFacts {
+                build_ms,
+                layout_ms,
+                triangles: bvh.triangles.len(),
+                dropped: bvh.dropped,
+                nodes: bvh.nodes.len(),
+                depth: bvh.depth,
+                sah: bvh.sah,
+                traversal,
+                bytes: nodes_buffer.bytes() + triangle_buffer.bytes() + corner_buffer.bytes(),
+            }),
+            nodes: nodes_buffer,
+            triangles: triangle_buffer,
+            corners: corner_buffer,
+            leaf_places: upload(device, "leaf places", &leaf_places, Some(vk::Format::R32_UINT))?,
+            fixed,
+            anchor: bvh.anchor,
+            solids: solids.clone(),
+            bodies: bodies(scene, solids, rays),
+        })
+    }
+
+    fn none(device: &Arc<Device>) -> Result<Self> {
+        let empty = |name| Buffer::texels(device, name, 0, Place::Device, vk::Format::R32G32B32A32_UINT);
+        Ok(Self {
+            nodes: empty("no BVH nodes")?,
+            triangles: empty("no BVH triangles")?,
+            corners: empty("no corners for rays")?,
+            leaf_places: Buffer::texels(device, "no leaf places", 0, Place::Device, vk::Format::R32_UINT)?,
+            terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,
+            counts: Buffer::new(device, "work counts", size_of::<WorkCounts>() as u64, Place::Readback)?,
+            constants: TraceConstants { traversal: 0, octants: false, stack_size: 1, hit_textures: 0 },
+            facts: None,
+            fixed: bytemuck::Zeroable::zeroed(),
+            anchor: DVec3::ZERO,
+            bodies: Scene::default(),
+            solids: Solids::default(),
+        })
+    }
+
+    /// What rays need to know of one sample of a view.
+    pub fn look_from(&mut self, view: &View, sample_index: u32, samples: u32) {
+        let eye = view.eye - self.anchor;
+        let mut camera_media = [0; 4];
+        if sample_index == 0 {
+            for &instance in &media_at(&self.bodies, &self.solids, view.eye) {
+                let material = self.bodies.meshes[self.bodies.instances[instance].mesh].material;
+                camera_media.copy_within(0..3, 1);
+                camera_media[0] = medium(&self.bodies.materials[material], material);
+            }
+            self.fixed.camera_media = camera_media;
+        }
+        let terms = TraceTerms {
+            bvh_from_rel: eye.as_vec3().to_array(),
+            samples,
+            sample_index,
+            pixel_angle: view.pixel_angle() as f32,
+            lod_bias: -0.5 * (samples as f32).log2(),
+            ..self.fixed
+        };
+        self.terms.write(bytemuck::bytes_of(&terms));
+    }
+
+    /// What rays need to know where there is no view.
+    pub fn write_fixed(&mut self) {
+        self.terms.write(bytemuck::bytes_of(&self.fixed));
+    }
+
+    /// The world's position of the origin that rays are told from.
+    #[must_use]
+    pub fn anchor(&self) -> DVec3 {
+        self.anchor
+    }
+
+    /// How far rays start off a surface that the scene itself is seen from, in metres.
+    #[must_use]
+    pub fn offset(&self) -> f32 {
+        self.fixed.offset
+    }
+
+    /// Whether the eye of the last view is inside a transparent body.
+    #[must_use]
+    pub fn inside(&self) -> bool {
+        self.fixed.camera_media[0] != 0
+    }
+
+    /// What the sample that has just finished counted.
+    #[must_use]
+    pub fn counted(&self) -> WorkCounts {
+        self.counts.read(|bytes| bytemuck::pod_read_unaligned(&bytes[..size_of::<WorkCounts>()]))
+    }
+
+    /// Sets the counts to 0.
+    pub fn reset<'a>(&'a self, frame: &mut Frame<'a>) {
+        frame.fill("reset work counts", &self.counts, 0);
+    }
+}
+
+/// Whether what lies behind such a surface may be seen through it.
+fn is_filter(material: &Material) -> bool {
+    crate::plan::is_see_through(material, false) || matches!(material.alpha_mode, crate::scene::AlphaMode::Mask(_))
+}
+
+/// A medium as rays keep it (shaders/lib/media.glsl): its priority, and which material it is.
+#[must_use]
+pub fn medium(material: &Material, index: usize) -> u32 {
+    let priority = (material.priority.clamp(-0x7fff, 0x7fff) + 0x8000) as u32;
+    priority << 16 | (index as u32 + 1)
+}
+
+/// Classes of triangles: shaders/lib/trace.glsl.
+const OPAQUE: u32 = 1;
+const FILTER: u32 = 2;
+/// Of a link or a reference to a node: filters lie below.
+const HOLDS_FILTERS: u32 = 1 << 30;
+
+/// Whether any triangle of a leaf word, ~(first · 8 + count − 1), is a filter.
+fn leaf_holds(word: u32, filters: &[bool]) -> bool {
+    let place = !word;
+    filters[(place >> 3) as usize..][..(place as usize & 7) + 1].contains(&true)
+}
+
+fn is_leaf(word: u32) -> bool {
+    word >> 31 != 0
+}
+
+/// Marks the links of a list that pass filters by. Below a node are those between it and its link.
+fn mark_links(list: &mut [[u32; 4]], texels: usize, filters: &[bool]) {
+    let nodes = list.len() / texels - 1;
+    // Filters' leaves before each node.
+    let mut before = vec![0_u32; nodes + 1];
+    for i in 0..nodes {
+        let word = list[i * texels][3];
+        before[i + 1] = before[i] + u32::from(is_leaf(word) && leaf_holds(word, filters));
+    }
+    for i in 0..nodes {
+        let word = &mut list[i * texels][3];
+        if !is_leaf(*word) && before[*word as usize] > before[i] {
+            *word |= HOLDS_FILTERS;
+        }
+    }
+}
+
+/// The same for references between nodes with a stack; children come after their parents.
+fn mark_references(nodes: &mut [[u32; 4]], filters: &[bool]) {
+    let count = nodes.len() / 4;
+    let mut holds = vec![false; count];
+    for i in (0..count).rev() {
+        for texel in [i * 4, i * 4 + 1] {
+            let word = nodes[texel][3];
+            let found = if is_leaf(word) { leaf_holds(word, filters) } else { holds[word as usize] };
+            holds[i] |= found;
+            if !is_leaf(word) && found {
+                nodes[texel][3] |= HOLDS_FILTERS;
+            }
+        }
+    }
+}
+
+/// What lies at the corners of triangles, as shaders/lib/hit.glsl reads it.
+struct Corners<'a> {
+    scene: &'a Scene,
+    solids: &'a Solids,
+    /// Transmissive bodies refract; else all of them are sheets.
+    refraction: bool,
+    /// Cofactors of each instance with the sign that keeps normals outside.
+    cofactors: Vec<DMat3>,
+    mirrored: Vec<bool>,
+    scales: Vec<f32>,
+    /// `HIT_TEXTURES` of the shader.
+    contents: u32,
+}
+
+impl<'a> Corners<'a> {
+    fn of(scene: &'a Scene, solids: &'a Solids, refraction: bool) -> Self {
+        let mut contents = 0;
+        for instance in &scene.instances {
+            let mesh = &scene.meshes[instance.mesh];
+            for (slot, (texture, _)) in texture_slots(&scene.materials[mesh.material]).iter().enumerate() {
+                contents |= u32::from(texture.is_some()) << slot;
+                contents |= u32::from(texture.is_some_and(|t| t.uv_set == 1)) << 12;
+            }
+            contents |= u32::from(!mesh.colors.is_empty()) << 11;
+        }
+        let (mut cofactors, mut mirrored, mut scales) = (Vec::new(), Vec::new(), Vec::new());
+        for (instance, &flipped) in scene.instances.iter().zip(&solids.flipped) {
+            let m = instance.world_from_object.matrix3;
+            let determinant = m.determinant();
+            let turned = (determinant < 0.0) != flipped;
+            let c = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+            cofactors.push(if turned { -c } else { c });
+            mirrored.push(turned);
+            scales.push(determinant.abs().cbrt() as f32);
+        }
+        Self { scene, solids, refraction, cofactors, mirrored, scales, contents }
+    }
+
+    /// The order of a triangle's corners that runs counter-clockwise around its front.
+    fn order(&self, t: &Triangle) -> [usize; 3] {
+        if self.mirrored[t.instance as usize] { [0, 2, 1] } else { [0, 1, 2] }
+    }
+
+    fn texels(&self, t: &Triangle) -> Vec<[u32; 4]> {
+        let i = t.instance as usize;
+        let instance = &self.scene.instances[i];
+        let mesh = &self.scene.meshes[instance.mesh];
+        let vertices = self.order(t).map(|k| mesh.indices[t.primitive as usize * 3 + k] as usize);
+        let material = &self.scene.materials[mesh.material];
+        let sheet = material.transmission > 0.0 && (self.solids.sheet[i] || !self.refraction);
+        let normals = vertices.map(|v| {
+            let n = self.cofactors[i] * glam::Vec3::from(mesh.normals[v]).as_dvec3();
+            n.try_normalize().unwrap_or(DVec3::ZERO).as_vec3().to_array()
+        });
+        let uvs = |set: usize| vertices.map(|v| mesh.uvs[set].get(v).copied().unwrap_or_default());
+        let [a, b, c] = uvs(0).map(|uv| glam::Vec2::from(uv).as_dvec2());
+        let [p, q, r] = t.corners.map(|corner| glam::Vec3::from(corner).as_dvec3());
+        let area = (q - p).cross(r - p).length();
+        let density = if area > 0.0 { ((b - a).perp_dot(c - a).abs() / area).sqrt() as f32 } else { 0.0 };
+        let words = [mesh.material as u32 | if sheet { SHEET } else { 0 }, self.scales[i].to_bits(), density.to_bits()];
+        let mut texels = Vec::with_capacity(12);
+        for (n, word) in normals.iter().zip(words) {
+            texels.push([n[0].to_bits(), n[1].to_bits(), n[2].to_bits(), word]);
+        }
+        let mut pairs = |[a, b, c]: [[f32; 2]; 3]| {
+            texels.push([a[0], a[1], b[0], b[1]].map(f32::to_bits));
+            texels.push([c[0], c[1], 0.0, 0.0].map(f32::to_bits));
+        };
+        if self.contents & 0x7ff != 0 {
+            pairs(uvs(0));
+        }
+        if self.contents & 1 << 12 != 0 {
+            pairs(uvs(1));
+        }
+        if self.contents & (1 << 2 | 1 << 10) != 0 {
+            let linear = instance.world_from_object.matrix3;
+            let side = if self.mirrored[i] { -1.0 } else { 1.0 };
+            for v in vertices {
+                let [x, y, z, w] = mesh.tangents.get(v).copied().unwrap_or_default();
+                let t = (linear * DVec3::new(x.into(), y.into(), z.into())).as_vec3();
+                texels.push([t.x, t.y, t.z, w * side].map(f32::to_bits));
+            }
+        }
+        if self.contents & 1 << 11 != 0 {
+            let half = |x: f32| u32::from(half::f16::from_f32(x).to_bits());
+            let colors = vertices.map(|v| {
+                let [r, g, b, a] = mesh.colors.get(v).copied().unwrap_or([1.0; 4]).map(half);
+                [r | g << 16, b | a << 16]
+            });
+            let [a, b, c] = colors;
+            texels.push([a[0], a[1], b[0], b[1]]);
+            texels.push([c[0], c[1], 0, 0]);
+        }
+        texels
+    }
+}
+
+/// Of a triangle's material word: transmits light and encloses nothing.
+const SHEET: u32 = 1 << 16;
+
+/// The geometry of the instances that are transparent bodies, under the same indices; the others have no triangles.
+fn bodies(scene: &Scene, solids: &Solids, rays: Rays) -> Scene {
+    let mut wanted = vec![false; scene.meshes.len()];
+    for (instance, &sheet) in scene.instances.iter().zip(&solids.sheet) {
+        let transmits = scene.materials[scene.meshes[instance.mesh].material].transmission > 0.0;
+        wanted[instance.mesh] |= rays.refraction && transmits && !sheet;
+    }
+    let mesh = |(mesh, &wanted): (&Mesh, &bool)| Mesh {
+        positions: if wanted { mesh.positions.clone() } else { Vec::new() },
+        indices: if wanted { mesh.indices.clone() } else { Vec::new() },
+        material: mesh.material,
+        ..Mesh::default()
+    };
+    Scene {
+        meshes: scene.meshes.iter().zip(&wanted).map(mesh).collect(),
+        instances: scene.instances.clone(),
+        materials: scene.materials.clone(),
+        ..Scene::default()
+    }
+}

@@ -1,0 +1,130 @@
+//! Rays alone: what the tests of the traversal and its measurements send (shaders/pass/trace_rays.comp).
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+
+use super::rays::{RaysOnDevice, Traversal};
+use crate::gpu::{Buffer, Device, Frame, Place};
+use crate::plan::{Knobs, Plan, Surroundings};
+use crate::scene::Scene;
+use crate::scene::solid::solids;
+use crate::shader::trace_rays;
+use crate::share::WorkCounts;
+
+/// A ray in the space of the hierarchy: world axes, metres, from the anchor.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Ray {
+    /// Where it begins.
+    pub origin: [f32; 3],
+    /// Hits beyond do not count; a negative one asks for nothing.
+    pub t_max: f32,
+    /// Of any length.
+    pub direction: [f32; 3],
+    /// The triangle it leaves, which it cannot meet again, or [`Hit::NONE`].
+    pub from: u32,
+}
+
+/// What a ray met.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Hit {
+    /// Where along it.
+    pub t: f32,
+    /// Place among the triangles of the hierarchy; [`Hit::NONE`] for nothing.
+    pub triangle: u32,
+    /// Barycentric coordinate of the second corner.
+    pub u: f32,
+    /// Of the third.
+    pub v: f32,
+}
+
+impl Hit {
+    /// No triangle.
+    pub const NONE: u32 = u32::MAX;
+}
+
+/// How rays are sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Mode {
+    /// Any hit will do.
+    pub any_hit: bool,
+    /// Two rays in an invocation.
+    pub pairs: bool,
+    /// Count nodes and triangles.
+    pub count: bool,
+}
+
+/// A scene that rays can be sent through.
+pub struct Tracer {
+    device: Arc<Device>,
+    rays: RaysOnDevice,
+}
+
+impl Tracer {
+    /// Builds the hierarchy of a scene.
+    ///
+    /// # Errors
+    /// When it does not fit the device.
+    pub fn new(device: &Arc<Device>, scene: &Scene, traversal: Option<Traversal>) -> Result<Self> {
+        let surroundings = Surroundings { environment: false, sky: false };
+        let mut plan = Plan::new(scene, surroundings, &Knobs::default());
+        plan.rays = Some(crate::plan::Rays::default());
+        Ok(Self { device: device.clone(), rays: RaysOnDevice::new(device, &plan, scene, &solids(scene), traversal)? })
+    }
+
+    /// The hierarchy and its tables.
+    #[must_use]
+    pub fn rays(&self) -> &RaysOnDevice {
+        &self.rays
+    }
+
+    /// Sends rays `repeats` times: what they met, the work of one time, and the milliseconds of each.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn trace(&mut self, rays: &[Ray], mode: Mode, repeats: u32) -> Result<(Vec<Hit>, WorkCounts, Vec<f64>)> {
+        self.rays.write_fixed();
+        let bytes = std::mem::size_of_val(rays) as u64;
+        let format = vk::Format::R32G32B32A32_UINT;
+        let mut input = Buffer::texels(&self.device, "rays", bytes, Place::Upload, format)?;
+        input.write(bytemuck::cast_slice(rays));
+        let bytes = std::mem::size_of::<Hit>() as u64 * rays.len() as u64;
+        let output = Buffer::new(&self.device, "hits", bytes, Place::Readback)?;
+        let per_group = if mode.pairs { 128 } else { 64 };
+        let blocks = (rays.len() as u32).div_ceil(per_group).div_ceil(32);
+        let constants = trace_rays::Constants {
+            any_hit: mode.any_hit,
+            pairs: mode.pairs,
+            count: mode.count,
+            traversal: self.rays.constants.traversal,
+            octants: self.rays.constants.octants,
+            stack_size: self.rays.constants.stack_size,
+            ..Default::default()
+        };
+        let mut times = Vec::new();
+        for _ in 0..repeats {
+            let mut frame = Frame::new(&self.device);
+            self.rays.reset(&mut frame);
+            let bind = trace_rays::Bind {
+                rays: &input,
+                hits: &output,
+                work_done: &self.rays.counts,
+                bvh_nodes: &self.rays.nodes,
+                bvh_triangles: &self.rays.triangles,
+                trace_block: &self.rays.terms,
+            };
+            let push = [rays.len() as u32, blocks];
+            frame.compute("rays", &bind, constants.words(), bytemuck::cast_slice(&push), [blocks * 32, 1, 1])?;
+            frame.read_back(&output);
+            frame.read_back(&self.rays.counts);
+            let passes = frame.finish()?;
+            times.extend(passes.iter().filter(|p| p.name == "rays").map(|p| p.ms));
+        }
+        let hits = output.read(|all| bytemuck::pod_collect_to_vec(&all[..bytes as usize]));
+        Ok((hits, self.rays.counted(), times))
+    }
+}
