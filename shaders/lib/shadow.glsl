@@ -8,7 +8,6 @@
 layout(constant_id = 44) const uint SHADOWS = 0;     // 0 off, 1 ray
 layout(constant_id = 45) const bool FILTERS = false; // something masked, blended or transmissive is in the scene
 layout(constant_id = 46) const uint ABSORPTION = 0;  // 0 off, 1 by the nominal thickness, 2 along the path
-const uint MOST_FILTERS = 64;
 
 uint shadow_rays = 0;
 
@@ -51,6 +50,16 @@ vec3 filtered(HitPoint point, vec3 direction, inout uvec4 media) {
     return 1.0 - coverage + coverage * through;
 }
 
+// A hit that is known, with its barycentrics.
+Hit hit_again(vec3 origin, vec3 direction, float t, uint triangle) {
+    precise vec3 a = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3).xyz) - origin;
+    precise vec3 b = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 1).xyz) - origin;
+    precise vec3 c = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 2).xyz) - origin;
+    ShearedTriangle s = sheared_triangle(ray_shear(direction), a, b, c);
+    float inverse = 1.0 / s.det;
+    return Hit(t, triangle, s.weights.y * inverse, s.weights.z * inverse);
+}
+
 // p in bvh space, n the normal of its triangle `self`, v to the viewer, `media` those on the light's side. The light is at p + to_light, or
 // in that direction where t_max is larger than 1.
 vec3 visibility(vec3 p, vec3 n, vec3 v, uint self, uvec4 media, vec3 to_light, float t_max, bool wanted) {
@@ -59,28 +68,37 @@ vec3 visibility(vec3 p, vec3 n, vec3 v, uint self, uvec4 media, vec3 to_light, f
     // What touches the light itself does not shadow it: t is a few roundings off.
     float end = t_max == 1.0 ? 1.0 - 4.0 / 16777216.0 : t_max;
     shadow_rays += wanted ? 1u : 0u;
-    bool blocked = trace(origin, to_light, self, FROM_ORIGIN, wanted ? end : -1.0, OPAQUE, true).triangle != NO_TRIANGLE;
-    vec3 through = blocked || !wanted ? vec3(0.0) : vec3(1.0);
-    if (FILTERS) {
-        Hit last = FROM_ORIGIN;
-        uint filters = 0;
-        bool goes_on = wanted && !blocked;
+    vec3 through = vec3(wanted ? 1.0 : 0.0);
+    if (!FILTERS) {
+        bool blocked = trace(origin, to_light, self, FROM_ORIGIN, wanted ? end : -1.0, OPAQUE, true).triangle != NO_TRIANGLE;
+        return blocked ? vec3(0.0) : through;
+    }
+    // Four filters at a time.
+    Hit last = FROM_ORIGIN;
+    bool goes_on = wanted;
+    do {
+        loop_heads++;
+        Filters filters;
+        bool blocked = trace_to_light(origin, to_light, self, last, goes_on ? end : -1.0, filters);
+        through = blocked ? vec3(0.0) : through;
+        goes_on = goes_on && !blocked && filters.triangles.w != NO_TRIANGLE;
+        bool found = !blocked && filters.triangles.x != NO_TRIANGLE;
         do {
             loop_heads++;
-            Hit hit = trace(origin, to_light, self, last, goes_on ? end : -1.0, FILTER, false);
-            bool found = goes_on && hit.triangle != NO_TRIANGLE;
-            if (ABSORPTION == 2 && goes_on && present_medium(media) != 0) {
-                float reached = found ? hit.t : end;
-                through *= absorbed(present_medium(media), (reached - last.t) * length_of_direction);
-            }
             if (found) {
+                Hit hit = hit_again(origin, to_light, filters.t.x, filters.triangles.x);
+                uint medium = present_medium(media);
+                if (ABSORPTION == 2 && medium != 0) through *= absorbed(medium, (hit.t - last.t) * length_of_direction);
                 through *= filtered(hit_point_of(hit, origin, to_light), to_light / length_of_direction, media);
                 last = hit;
             }
-            filters++;
-            goes_on = found && filters < MOST_FILTERS && largest_component(through) > 0.0;
-        } while (goes_on);
-    }
+            filters = Filters(vec4(filters.t.yzw, LARGEST), uvec4(filters.triangles.yzw, NO_TRIANGLE));
+            found = found && filters.triangles.x != NO_TRIANGLE;
+        } while (found);
+        goes_on = goes_on && largest_component(through) > 0.0;
+    } while (goes_on);
+    uint medium = present_medium(media);
+    if (ABSORPTION == 2 && medium != 0 && t_max == 1.0) through *= absorbed(medium, (1.0 - last.t) * length_of_direction);
     return through;
 }
 

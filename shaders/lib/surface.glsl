@@ -70,15 +70,13 @@ Surface surface_from_texels(Material m, vec3 base, float metallic, float roughne
     s.f90_dielectric = m.f90 * layers.z;
     s.n_metal = vec3(0.0);
     s.kappa_metal = vec3(0.0);
-    vec3 metal_f0 = s.base;
     if (CONDUCTORS) {
         if ((m.flags & MATERIAL_CONDUCTOR) != 0) {
             s.n_metal = m.n_metal;
             s.kappa_metal = m.kappa_metal;
-            metal_f0 *= normal_reflectance(s.n_metal, s.kappa_metal);
         }
     }
-    s.f0 = mix(s.f0_dielectric, metal_f0, metal);
+    s.f0 = mix(s.f0_dielectric, s.base, metal);
     s.f90 = mix(s.f90_dielectric, 1.0, metal);
     s.ior = m.ior;
     s.compensation = vec3(1.0);
@@ -108,17 +106,16 @@ vec3 fresnel_of_dielectric(Surface s, float cos_in) {
     return s.f0_dielectric + (vec3(s.f90_dielectric) - s.f0_dielectric) * share;
 }
 
-// Reflectance of the metallic part. Metals given by a colour alone have no n and κ: Schlick on every rung.
+// Reflectance of the metallic part. Metals given by a colour alone have no n and κ: Schlick on every rung. Of those that
+// have them the colour is F0, and what a texture does to it tints the exact curve.
 vec3 fresnel_of_metal(Surface s, float cos_in) {
     vec3 f = schlick(s.base, 1.0, cos_in);
-    if (CONDUCTORS) {
+    if (CONDUCTORS && FRESNEL == 1) {
         if (s.n_metal.x > 0.0) {
-            f = s.base * schlick(normal_reflectance(s.n_metal, s.kappa_metal), 1.0, cos_in);
-            if (FRESNEL == 1) {
-                f = s.base * vec3(fresnel_conductor(cos_in, s.n_metal.r, s.kappa_metal.r).F,
-                                  fresnel_conductor(cos_in, s.n_metal.g, s.kappa_metal.g).F,
-                                  fresnel_conductor(cos_in, s.n_metal.b, s.kappa_metal.b).F);
-            }
+            vec3 tint = s.base / normal_reflectance(s.n_metal, s.kappa_metal);
+            f = tint * vec3(fresnel_conductor(cos_in, s.n_metal.r, s.kappa_metal.r).F,
+                            fresnel_conductor(cos_in, s.n_metal.g, s.kappa_metal.g).F,
+                            fresnel_conductor(cos_in, s.n_metal.b, s.kappa_metal.b).F);
         }
     }
     return f;

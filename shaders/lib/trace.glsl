@@ -30,11 +30,6 @@ struct Hit {
     float v;
 };
 
-// Bit 30 of a link or of a reference to a node: there are triangles of the class FILTER below. A ray that looks for those
-// alone passes the others by.
-const int HOLDS_FILTERS = 1 << 30;
-const int PLACE = HOLDS_FILTERS - 1;
-
 // Work done so far by this invocation.
 uint node_visits = 0;
 uint triangle_tests = 0;
@@ -65,12 +60,12 @@ int octant(vec3 d) {
     return (d.x < 0.0 ? 1 : 0) | (d.y < 0.0 ? 2 : 0) | (d.z < 0.0 ? 4 : 0);
 }
 
-BoxRay box_ray(vec3 origin, vec3 direction, bool any_hit) {
+BoxRay box_ray(vec3 origin, vec3 direction, bool any_order) {
     BoxRay r;
     // Beyond 1e20 a direction is parallel to the planes as far as any scene goes, and 0·∞ does not happen.
     vec3 inverse = clamp(1.0 / direction, -1e20, 1e20);
     r.end = int(trace_terms.nodes);
-    int list = any_hit || !OCTANTS ? OCTANTS ? 8 : 0 : octant(direction);
+    int list = any_order || !OCTANTS ? OCTANTS ? 8 : 0 : octant(direction);
     r.base = list * (r.end + 1);
     if (TRAVERSAL == LINKS_16) {
         // Boxes are a grid unit larger than need be on each side, 1.5e-5 of the scene: more than the roundings here as
@@ -110,7 +105,7 @@ bool walking(Walk w, BoxRay r) {
 
 // One node: to its children, which follow it, or along its link. A leaf is kept for later; if one is being kept
 // already, the walk waits. Selections only: lavapipe runs both sides of a branch.
-void visit(inout Walk w, BoxRay r, float t_min, uint classes) {
+void visit(inout Walk w, BoxRay r, float t_min) {
     node_visits += w.node != r.end ? 1u : 0u;
     vec3 near, far;
     int word;
@@ -132,10 +127,10 @@ void visit(inout Walk w, BoxRay r, float t_min, uint classes) {
         word = int(node.w);
     }
     bool leaf = word < 0;
-    bool hit = meets(near, far, t_min, w.hit.t) && (classes != FILTER || leaf || (word & HOLDS_FILTERS) != 0);
+    bool hit = meets(near, far, t_min, w.hit.t);
     bool keep = hit && leaf && w.leaf == 0;
     bool wait = hit && leaf && w.leaf != 0;
-    int next = hit || leaf ? w.node + 1 : word & PLACE;
+    int next = hit || leaf ? w.node + 1 : word;
     next = wait ? w.node : next;
     // The sentinel is a box as well, and may be hit.
     w.node = min(next, r.end);
@@ -151,9 +146,39 @@ struct TriangleRay {
     uint self;           // the triangle it leaves, which it cannot meet again
 };
 
+// The nearest four filters on the way to a light, in order; LARGEST where there are fewer.
+struct Filters {
+    vec4 t;
+    uvec4 triangles;
+};
+const Filters NO_FILTERS = Filters(vec4(LARGEST), uvec4(NO_TRIANGLE));
+
+void exchange(inout float t, inout uint triangle, inout float other_t, inout uint other) {
+    bool nearer = t < other_t || (t == other_t && triangle < other);
+    float t_old = other_t;
+    uint old = other;
+    other_t = nearer ? t : other_t;
+    other = nearer ? triangle : other;
+    t = nearer ? t_old : t;
+    triangle = nearer ? old : triangle;
+}
+
+// Into its place, all in registers; the fifth falls off the end.
+void insert(inout Filters f, float t, uint triangle) {
+    exchange(t, triangle, f.t.x, f.triangles.x);
+    exchange(t, triangle, f.t.y, f.triangles.y);
+    exchange(t, triangle, f.t.z, f.triangles.z);
+    exchange(t, triangle, f.t.w, f.triangles.w);
+}
+
+// What a walk is for.
+const uint NEAREST = 0;
+const uint ANY = 1;
+const uint TO_LIGHT = 2; // any opaque triangle ends it, filters are collected
+
 // One triangle of the leaf that is kept. The nearest counts, of two at the same t the first: any order of the tree finds
 // the same.
-void test_triangle(inout Walk w, TriangleRay r, BoxRay b, uint classes, bool any_hit) {
+void test_triangle(inout Walk w, inout Filters f, TriangleRay r, BoxRay b, uint classes, uint purpose) {
     bool pending = w.leaf != 0;
     triangle_tests += pending ? 1u : 0u;
     int place = ~w.leaf;
@@ -171,6 +196,11 @@ void test_triangle(inout Walk w, TriangleRay r, BoxRay b, uint classes, bool any
     bool hit = pending && s.inside && s.det != 0.0 && (ta.w & classes) != 0 && index != r.self;
     hit = hit && (t > r.after || (t == r.after && index > r.after_triangle));
     hit = hit && (t < w.hit.t || (t == w.hit.t && index < w.hit.triangle));
+    if (purpose == TO_LIGHT) {
+        bool is_filter = hit && (ta.w & FILTER) != 0;
+        insert(f, is_filter ? t : LARGEST, is_filter ? index : NO_TRIANGLE);
+        hit = hit && !is_filter;
+    }
     w.hit.t = hit ? t : w.hit.t;
     w.hit.triangle = hit ? index : w.hit.triangle;
     w.hit.u = hit ? s.weights.y * inverse : w.hit.u;
@@ -178,24 +208,24 @@ void test_triangle(inout Walk w, TriangleRay r, BoxRay b, uint classes, bool any
     // The next triangle of the leaf: first + 1, count − 1.
     int rest = (place & 7) == 0 ? 0 : ~(place + 7);
     w.leaf = pending ? rest : 0;
-    bool ended = any_hit && hit;
+    bool ended = purpose != NEAREST && hit;
     w.node = ended ? b.end : w.node;
     w.leaf = ended ? 0 : w.leaf;
 }
 
-Hit walk_links(TriangleRay r, vec3 direction, float t_max, uint classes, bool any_hit) {
-    BoxRay b = box_ray(r.origin, direction, any_hit);
+Hit walk_links(TriangleRay r, vec3 direction, float t_max, uint classes, uint purpose, inout Filters f) {
+    BoxRay b = box_ray(r.origin, direction, purpose != NEAREST);
     Walk w = Walk(t_max > 0.0 ? 0 : b.end, 0, Hit(t_max, NO_TRIANGLE, 0.0, 0.0));
     // lavapipe goes through a loop's body at least once and through both sides of each branch in it: a fixed number of
     // nodes, then one triangle, and one way out at the end.
     do {
         loop_heads++;
-        visit(w, b, r.after, classes);
-        visit(w, b, r.after, classes);
-        visit(w, b, r.after, classes);
-        visit(w, b, r.after, classes);
-        visit(w, b, r.after, classes);
-        test_triangle(w, r, b, classes, any_hit);
+        visit(w, b, r.after);
+        visit(w, b, r.after);
+        visit(w, b, r.after);
+        visit(w, b, r.after);
+        visit(w, b, r.after);
+        test_triangle(w, f, r, b, classes, purpose);
     } while (walking(w, b));
     return w.hit;
 }
@@ -207,25 +237,26 @@ struct HitPair {
 
 // Two rays at once, turn about: what one waits for, the other computes. A node is a chain of fetch, conversion, comparison
 // and selection in which most of a processor idles.
-HitPair walk_links_twice(TriangleRay ra, vec3 da, float ta, TriangleRay rb, vec3 db, float tb, uint classes, bool any_hit) {
-    BoxRay ba = box_ray(ra.origin, da, any_hit);
-    BoxRay bb = box_ray(rb.origin, db, any_hit);
+HitPair walk_links_twice(TriangleRay ra, vec3 da, float ta, TriangleRay rb, vec3 db, float tb, uint classes, uint purpose) {
+    BoxRay ba = box_ray(ra.origin, da, purpose != NEAREST);
+    BoxRay bb = box_ray(rb.origin, db, purpose != NEAREST);
+    Filters none;
     Walk a = Walk(ta > 0.0 ? 0 : ba.end, 0, Hit(ta, NO_TRIANGLE, 0.0, 0.0));
     Walk b = Walk(tb > 0.0 ? 0 : bb.end, 0, Hit(tb, NO_TRIANGLE, 0.0, 0.0));
     do {
         loop_heads++;
-        visit(a, ba, 0.0, classes);
-        visit(b, bb, 0.0, classes);
-        visit(a, ba, 0.0, classes);
-        visit(b, bb, 0.0, classes);
-        visit(a, ba, 0.0, classes);
-        visit(b, bb, 0.0, classes);
-        visit(a, ba, 0.0, classes);
-        visit(b, bb, 0.0, classes);
-        visit(a, ba, 0.0, classes);
-        visit(b, bb, 0.0, classes);
-        test_triangle(a, ra, ba, classes, any_hit);
-        test_triangle(b, rb, bb, classes, any_hit);
+        visit(a, ba, 0.0);
+        visit(b, bb, 0.0);
+        visit(a, ba, 0.0);
+        visit(b, bb, 0.0);
+        visit(a, ba, 0.0);
+        visit(b, bb, 0.0);
+        visit(a, ba, 0.0);
+        visit(b, bb, 0.0);
+        visit(a, ba, 0.0);
+        visit(b, bb, 0.0);
+        test_triangle(a, none, ra, ba, classes, purpose);
+        test_triangle(b, none, rb, bb, classes, purpose);
     } while (walking(a, ba) || walking(b, bb));
     return HitPair(a.hit, b.hit);
 }
@@ -233,8 +264,8 @@ HitPair walk_links_twice(TriangleRay ra, vec3 da, float ta, TriangleRay rb, vec3
 layout(constant_id = 42) const uint STACK_SIZE = 1; // entries: the depth of the tree, at least 1
 
 // The tree with both children's boxes in the parent, the nearer child first, the other on a stack.
-Hit walk_stack(TriangleRay r, vec3 direction, float t_max, uint classes, bool any_hit) {
-    BoxRay b = box_ray(r.origin, direction, any_hit);
+Hit walk_stack(TriangleRay r, vec3 direction, float t_max, uint classes, uint purpose, inout Filters f) {
+    BoxRay b = box_ray(r.origin, direction, purpose != NEAREST);
     // A reference is a node, or a leaf as in Walk; the sentinel ends the walk.
     b.end = 0x7fffffff;
     Walk w = Walk(t_max > 0.0 ? 0 : b.end, 0, Hit(t_max, NO_TRIANGLE, 0.0, 0.0));
@@ -248,7 +279,7 @@ Hit walk_stack(TriangleRay r, vec3 direction, float t_max, uint classes, bool an
             bool keep = at_leaf && w.leaf == 0;
             w.leaf = keep ? w.node : w.leaf;
             bool inner = w.node >= 0 && w.node != b.end;
-            int at = inner ? (w.node & PLACE) * 4 : 0;
+            int at = inner ? w.node * 4 : 0;
             node_visits += inner ? 1u : 0u;
             uvec4 left = imageLoad(bvh_nodes, at);
             uvec4 left_half = imageLoad(bvh_nodes, at + 1);
@@ -260,11 +291,8 @@ Hit walk_stack(TriangleRay r, vec3 direction, float t_max, uint classes, bool an
             vec3 er = uintBitsToFloat(right_half.xyz) * b.extent;
             vec3 near_l = tl + b.start_near - el;
             vec3 near_r = tr + b.start_near - er;
-            bool all = classes != FILTER;
-            bool wants_l = all || int(left.w) < 0 || (int(left.w) & HOLDS_FILTERS) != 0;
-            bool wants_r = all || int(left_half.w) < 0 || (int(left_half.w) & HOLDS_FILTERS) != 0;
-            bool hit_l = inner && wants_l && meets(near_l, tl + b.start_far + el, r.after, w.hit.t);
-            bool hit_r = inner && wants_r && meets(near_r, tr + b.start_far + er, r.after, w.hit.t);
+            bool hit_l = inner && meets(near_l, tl + b.start_far + el, r.after, w.hit.t);
+            bool hit_r = inner && meets(near_r, tr + b.start_far + er, r.after, w.hit.t);
             float enter_l = max(near_l.x, max(near_l.y, near_l.z));
             float enter_r = max(near_r.x, max(near_r.y, near_r.z));
             bool swap = enter_r < enter_l;
@@ -281,9 +309,14 @@ Hit walk_stack(TriangleRay r, vec3 direction, float t_max, uint classes, bool an
             entries = max(entries, 0);
             w.node = inner && !pop ? (both ? first : one) : pop ? popped : w.node;
         }
-        test_triangle(w, r, b, classes, any_hit);
+        test_triangle(w, f, r, b, classes, purpose);
     } while (walking(w, b));
     return w.hit;
+}
+
+Hit walk(TriangleRay r, vec3 direction, float t_max, uint classes, uint purpose, inout Filters f) {
+    return TRAVERSAL == STACK ? walk_stack(r, direction, t_max, classes, purpose, f)
+                              : walk_links(r, direction, t_max, classes, purpose, f);
 }
 
 // The nearest hit of a triangle of these classes along origin + t direction that comes after the hit `after` and not
@@ -291,9 +324,16 @@ Hit walk_stack(TriangleRay r, vec3 direction, float t_max, uint classes, bool an
 // for nothing and costs next to nothing. `self` is the triangle that the origin lies in, or NO_TRIANGLE: along a sliver t
 // rounds by more than any offset, 1e-6 m for 7 m by 2 cm.
 Hit trace(vec3 origin, vec3 direction, uint self, Hit after, float t_max, uint classes, bool any_hit) {
+    Filters none;
+    return walk(TriangleRay(origin, ray_shear(direction), after.t, after.triangle, self), direction, t_max, classes,
+                any_hit ? ANY : NEAREST, none);
+}
+
+// Whether anything opaque lies on the way, and the nearest four filters after `after`.
+bool trace_to_light(vec3 origin, vec3 direction, uint self, Hit after, float t_max, out Filters filters) {
+    filters = NO_FILTERS;
     TriangleRay r = TriangleRay(origin, ray_shear(direction), after.t, after.triangle, self);
-    return TRAVERSAL == STACK ? walk_stack(r, direction, t_max, classes, any_hit)
-                              : walk_links(r, direction, t_max, classes, any_hit);
+    return walk(r, direction, t_max, OPAQUE | FILTER, TO_LIGHT, filters).triangle != NO_TRIANGLE;
 }
 
 // Two rays at once.
@@ -301,8 +341,10 @@ HitPair trace_pair(vec3 oa, vec3 da, uint self_a, float ta, vec3 ob, vec3 db, ui
                    bool any_hit) {
     TriangleRay ra = TriangleRay(oa, ray_shear(da), 0.0, NO_TRIANGLE, self_a);
     TriangleRay rb = TriangleRay(ob, ray_shear(db), 0.0, NO_TRIANGLE, self_b);
-    if (TRAVERSAL != STACK) return walk_links_twice(ra, da, ta, rb, db, tb, classes, any_hit);
-    return HitPair(walk_stack(ra, da, ta, classes, any_hit), walk_stack(rb, db, tb, classes, any_hit));
+    uint purpose = any_hit ? ANY : NEAREST;
+    if (TRAVERSAL != STACK) return walk_links_twice(ra, da, ta, rb, db, tb, classes, purpose);
+    Filters none;
+    return HitPair(walk_stack(ra, da, ta, classes, purpose, none), walk_stack(rb, db, tb, classes, purpose, none));
 }
 
 // To begin with: t > 0.

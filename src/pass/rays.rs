@@ -125,21 +125,12 @@ impl RaysOnDevice {
         let filters: Vec<bool> =
             bvh.triangles.iter().map(|t| filter[scene.instances[t.instance as usize].mesh]).collect();
         let nodes = match traversal {
-            Traversal::Stack => {
-                let mut nodes = bvh.stack_nodes();
-                mark_references(&mut nodes, &filters);
-                nodes
-            }
+            Traversal::Stack => bvh.stack_nodes(),
             Traversal::Links16 | Traversal::Links32 => {
                 let format = if traversal == Traversal::Links16 { Format::Quantised } else { Format::Float };
                 let orders = (0..if octants { 8 } else { 0 }).map(Order::Octant).chain([Order::AnyHit]);
                 let orders: Vec<_> = orders.collect();
-                let list = |&order: &Order| {
-                    let mut links = bvh.links(order, format);
-                    mark_links(&mut links, if format == Format::Float { 2 } else { 1 }, &filters);
-                    links
-                };
-                orders.par_iter().map(list).collect::<Vec<_>>().concat()
+                orders.par_iter().map(|&order| bvh.links(order, format)).collect::<Vec<_>>().concat()
             }
         };
         let corners = Corners::of(scene, solids, rays.refraction);
@@ -304,52 +295,6 @@ pub fn medium(material: &Material, index: usize) -> u32 {
 /// Classes of triangles: shaders/lib/trace.glsl.
 const OPAQUE: u32 = 1;
 const FILTER: u32 = 2;
-/// Of a link or a reference to a node: filters lie below.
-const HOLDS_FILTERS: u32 = 1 << 30;
-
-/// Whether any triangle of a leaf word, ~(first · 8 + count − 1), is a filter.
-fn leaf_holds(word: u32, filters: &[bool]) -> bool {
-    let place = !word;
-    filters[(place >> 3) as usize..][..(place as usize & 7) + 1].contains(&true)
-}
-
-fn is_leaf(word: u32) -> bool {
-    word >> 31 != 0
-}
-
-/// Marks the links of a list that pass filters by. Below a node are those between it and its link.
-fn mark_links(list: &mut [[u32; 4]], texels: usize, filters: &[bool]) {
-    let nodes = list.len() / texels - 1;
-    // Filters' leaves before each node.
-    let mut before = vec![0_u32; nodes + 1];
-    for i in 0..nodes {
-        let word = list[i * texels][3];
-        before[i + 1] = before[i] + u32::from(is_leaf(word) && leaf_holds(word, filters));
-    }
-    for i in 0..nodes {
-        let word = &mut list[i * texels][3];
-        if !is_leaf(*word) && before[*word as usize] > before[i] {
-            *word |= HOLDS_FILTERS;
-        }
-    }
-}
-
-/// The same for references between nodes with a stack; children come after their parents.
-fn mark_references(nodes: &mut [[u32; 4]], filters: &[bool]) {
-    let count = nodes.len() / 4;
-    let mut holds = vec![false; count];
-    for i in (0..count).rev() {
-        for texel in [i * 4, i * 4 + 1] {
-            let word = nodes[texel][3];
-            let found = if is_leaf(word) { leaf_holds(word, filters) } else { holds[word as usize] };
-            holds[i] |= found;
-            if !is_leaf(word) && found {
-                nodes[texel][3] |= HOLDS_FILTERS;
-            }
-        }
-    }
-}
-
 /// What lies at the corners of triangles, as shaders/lib/hit.glsl reads it.
 struct Corners<'a> {
     scene: &'a Scene,
