@@ -8,6 +8,7 @@ pub mod camera;
 mod container;
 pub mod environment;
 mod geometry;
+mod gltf_extras;
 mod gltf_import;
 mod gltf_material;
 pub mod light;
@@ -16,6 +17,7 @@ mod nodes;
 mod obj;
 mod pictures;
 pub mod solid;
+pub(crate) mod substance;
 mod thin;
 
 use std::path::Path;
