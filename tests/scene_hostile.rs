@@ -51,7 +51,8 @@ fn rich() -> Builder {
     b.push(
         "materials",
         json!({ "normalTexture": { "index": 0 }, "extensions": {
-        "KHR_materials_clearcoat": { "clearcoatFactor": 1, "clearcoatNormalTexture": { "index": 0 } } } }),
+        "KHR_materials_clearcoat": { "clearcoatFactor": 1, "clearcoatNormalTexture": { "index": 0 } } },
+        "extras": { "etalon": { "priority": 1, "preset": "gold", "n": 0.2, "kappa": [3, 2, 2] }, "other": 1 } }),
     );
     let bent = json!({ "attributes": { "POSITION": position, "NORMAL": normal, "TEXCOORD_0": uv, "JOINTS_0": joints, "WEIGHTS_0": weights },
         "indices": indices, "material": 0, "targets": [{ "POSITION": delta }] });
@@ -404,6 +405,53 @@ fn a_picture_of_absurd_size_is_refused() {
     let view = b.view(&png(16_385, 1, [0; 4]), None);
     b.json["images"][0]["bufferView"] = view.into();
     assert_refused(&b, "image 0");
+}
+
+#[test]
+fn etalon_extras_that_cannot_be_meant_are_refused_by_material_and_key() {
+    for (etalon, expected) in [
+        (json!(3), "extras.etalon is not an object"),
+        (json!("x"), "extras.etalon is not an object"),
+        (json!({ "priority": 1.5 }), "extras.etalon priority: 1.5 is not a whole number"),
+        (json!({ "priority": "1" }), "extras.etalon priority: \"1\" is not a whole number"),
+        (json!({ "priority": 2_147_483_648_u64 }), "extras.etalon priority: 2147483648 is not a whole number"),
+        (json!({ "preset": "aluminum" }), "extras.etalon preset: \"aluminum\" is no preset; these are: gold, silver"),
+        (json!({ "preset": 1 }), "extras.etalon preset: 1 is no preset"),
+        (json!({ "n": 0 }), "extras.etalon n: an index of refraction lies above 0"),
+        (json!({ "n": [1, 1e-60, 1] }), "extras.etalon n: an index of refraction lies above 0"),
+        (json!({ "n": -1.5 }), "extras.etalon n: -1.5 is negative"),
+        (json!({ "n": [1, 2] }), "extras.etalon n: [1,2] is neither a number nor three numbers"),
+        (json!({ "n": [1, 2, null] }), "extras.etalon n: [1,2,null] is neither a number nor three numbers"),
+        (json!({ "n": "1.5" }), "extras.etalon n: \"1.5\" is neither a number nor three numbers"),
+        (json!({ "n": 1, "kappa": [0, 0, -1e-9] }), "extras.etalon kappa: [0,0,-1e-9] is negative"),
+        (json!({ "kappa": true }), "extras.etalon kappa: true is neither a number nor three numbers"),
+        (json!({ "n": vec![1; 100_000] }), "extras.etalon n: [1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1… is neither"),
+        (json!({ "preset": "two\nlines" }), "extras.etalon preset: \"two\\nlines\" is no preset"),
+        (json!({ "kappa": 2 }), "extras.etalon kappa: a metal has an n too"),
+    ] {
+        let mut b = rich();
+        b.json["materials"][0]["name"] = "odd".into();
+        b.json["materials"][0]["extras"]["etalon"] = etalon;
+        assert_refused(&b, &format!("material 0 \"odd\": {expected}"));
+    }
+    // Numbers that JSON can spell and f64 cannot hold, and nesting without end.
+    let folder = tempfile::tempdir().unwrap();
+    for (text, expected) in [
+        ("\"n\":1e400".to_owned(), "extras.etalon n: number out of range"),
+        (format!("\"n\":{}", "[".repeat(500) + &"]".repeat(500)), "extras.etalon n: recursion limit exceeded"),
+        ("\"n\":1,\"n\":2,\"kappa\":-1".to_owned(), "extras.etalon kappa: -1 is negative"),
+    ] {
+        let mut b = rich();
+        b.json["materials"][0]["extras"]["etalon"] = json!({ "here": 0 });
+        let path = b.save_gltf(folder.path(), &b.data_uri());
+        fs::write(&path, fs::read_to_string(&path).unwrap().replace("\"here\":0", &text)).unwrap();
+        let found = refuse(&path);
+        assert!(found.contains(&format!("material 0: {expected}")), "{found}");
+    }
+    let mut b = rich();
+    b.json["materials"][0]["extensions"]["KHR_materials_transmission"] = json!({ "transmissionFactor": 0.5 });
+    b.json["extensionsUsed"].as_array_mut().unwrap().push("KHR_materials_transmission".into());
+    assert_refused(&b, "material 0: extras.etalon kappa: with a kappa above 0 light ends");
 }
 
 #[test]

@@ -469,6 +469,134 @@ fn only_pictures_of_materials_are_decoded_and_out_of_range_factors_are_reported(
     assert!(scene.warnings[0].starts_with("scene.glb: ") && scene.warnings[0].contains("VENDOR_sparkle"));
 }
 
+/// One triangle under a material with this in `extras.etalon`, and with these extensions.
+fn with_etalon(etalon: serde_json::Value, extensions: serde_json::Value) -> Builder {
+    let material = json!({ "name": "odd", "extensions": extensions, "extras": { "other": [1], "etalon": etalon } });
+    textured(material, &["KHR_materials_ior", "KHR_materials_transmission"])
+}
+
+#[test]
+fn presets_carry_the_indices_of_their_substance() {
+    // n_d of the catalogues, and F0 as published beside the tables of the metals.
+    for (name, n) in [("water", 1.333), ("bk7", 1.5168), ("sf10", 1.728_25), ("diamond", 2.4175)] {
+        let m = &load(&with_etalon(json!({ "preset": name }), json!({}))).materials[0];
+        assert_eq!((m.ior, m.conductor, m.base_color), (n, None, [1.0; 4]), "{name}");
+    }
+    for (name, f0) in [
+        ("gold", [0.953, 0.674, 0.408]),
+        ("silver", [0.989, 0.983, 0.980]),
+        ("copper", [0.931, 0.597, 0.533]),
+        ("aluminium", [0.906, 0.917, 0.922]),
+    ] {
+        let scene = load(&with_etalon(json!({ "preset": name }), json!({})));
+        assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+        let m = &scene.materials[0];
+        let index = m.conductor.unwrap();
+        for c in 0..3 {
+            let [n, k] = index[c];
+            let reflectance = ((n - 1.0).powi(2) + k * k) / ((n + 1.0).powi(2) + k * k);
+            assert!((reflectance - f0[c]).abs() < 1e-3 && (m.base_color[c] - f0[c]).abs() < 1e-3, "{name}: {m:?}");
+        }
+        assert_eq!((m.metallic, m.ior), (1.0, 1.5), "{name}");
+    }
+}
+
+#[test]
+fn etalon_extras_are_read_into_the_material() {
+    let m = &load(&with_etalon(json!({ "priority": -3, "n": 1.25 }), json!({}))).materials[0];
+    assert_eq!((m.priority, m.ior, m.conductor), (-3, 1.25, None));
+    let metal = json!({ "n": [0.5, 2, 4], "kappa": 0.25 });
+    let m = &load(&with_etalon(metal, json!({}))).materials[0];
+    assert_eq!(m.conductor, Some([[0.5, 0.25], [2.0, 0.25], [4.0, 0.25]]));
+    // (n, κ) = (4, 0.25): (9 + 1/16) / (25 + 1/16).
+    assert!((m.base_color[2] - 145.0 / 401.0).abs() < 1e-6, "{:?}", m.base_color);
+    // Numbers beside a preset replace its own, and a kappa of 0 makes no metal.
+    let m = &load(&with_etalon(json!({ "preset": "gold", "kappa": [3, 2, 1] }), json!({}))).materials[0];
+    assert_eq!(m.conductor, Some([[0.1635, 3.0], [0.5828, 2.0], [1.4022, 1.0]]));
+    let m = &load(&with_etalon(json!({ "preset": "water", "n": 1.34 }), json!({}))).materials[0];
+    assert_eq!((m.ior, m.conductor), (1.34, None));
+    let m = &load(&with_etalon(json!({ "n": [1.4, 1.4, 1.4], "kappa": 0 }), json!({}))).materials[0];
+    assert_eq!((m.ior, m.conductor), (1.4, None));
+    let transmission = json!({ "KHR_materials_transmission": { "transmissionFactor": 0.5 } });
+    let scene = load(&with_etalon(json!({ "preset": "diamond", "priority": 7 }), transmission));
+    assert_eq!((scene.materials[0].ior, scene.materials[0].priority), (2.4175, 7));
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    // Materials that say nothing of it.
+    for extras in [json!(5), json!("etalon"), json!([{ "etalon": 1 }]), json!({}), json!({ "etalon": null })] {
+        let scene = load(&textured(json!({ "extras": extras }), &[]));
+        assert_eq!((scene.materials[0].priority, scene.materials[0].conductor), (0, None));
+        assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    }
+}
+
+#[test]
+fn what_etalon_extras_say_in_vain_is_a_warning_that_names_material_and_key() {
+    let warned = |etalon: serde_json::Value, extensions: serde_json::Value, expected: &[&str]| {
+        let scene = load(&with_etalon(etalon, extensions));
+        assert_eq!(scene.warnings.len(), expected.len(), "{:?}", scene.warnings);
+        for (warning, expected) in scene.warnings.iter().zip(expected) {
+            assert_eq!(*warning, format!("scene.glb: material 0 \"odd\": {expected}"));
+        }
+        scene.materials[0].clone()
+    };
+    warned(
+        json!({ "Priority": 1, "a\nb": 2 }),
+        json!({}),
+        &["extras.etalon has no key \"Priority\"; it is ignored", "extras.etalon has no key \"a\\nb\"; it is ignored"],
+    );
+    for key in ["brdf", "kd", "ks", "shine", "sellmeier", "cauchy", "sigma"] {
+        warned(json!({ key: [1, "x"] }), json!({}), &[&format!("extras.etalon {key} is not read yet")]);
+    }
+    let m = warned(
+        json!({ "n": [1.4, 1.5, 1.6] }),
+        json!({}),
+        &["extras.etalon n of each colour is read for metals only; green's 1.5 is taken"],
+    );
+    assert_eq!(m.ior, 1.5);
+    let ior = json!({ "KHR_materials_ior": { "ior": 1.25 } });
+    let m = warned(json!({ "n": 2 }), ior.clone(), &["extras.etalon n 2 replaces the 1.25 of KHR_materials_ior"]);
+    assert_eq!(m.ior, 2.0);
+    warned(json!({ "n": 1.25 }), ior, &[]);
+    let m = warned(json!({ "n": 1e9 }), json!({}), &["extras.etalon n 1e9 is clamped to 1e6"]);
+    assert_eq!(m.ior, 1e6);
+    let m = warned(json!({ "n": 0.5 }), json!({}), &["the index of refraction 0.5 is below 1, that of a vacuum"]);
+    assert_eq!(m.ior, 0.5);
+    let mut b = with_etalon(json!({ "preset": "silver" }), json!({}));
+    b.json["materials"][0]["pbrMetallicRoughness"] = json!({ "metallicFactor": 0, "baseColorFactor": [1, 1, 1, 0.5] });
+    let scene = load(&b);
+    assert!(scene.warnings.len() == 1 && scene.warnings[0].contains("metallic factor 0 is read as 1"));
+    assert_eq!((scene.materials[0].metallic, scene.materials[0].base_color[3]), (1.0, 0.5));
+}
+
+#[test]
+fn indices_of_refraction_that_let_no_light_in_are_refused_where_light_is_transmitted() {
+    let with = |ior: f64, transmission: f64| {
+        let mut b = textured(
+            json!({ "extensions": { "KHR_materials_ior": { "ior": ior },
+                "KHR_materials_transmission": { "transmissionFactor": transmission } } }),
+            &["KHR_materials_ior", "KHR_materials_transmission"],
+        );
+        b.json["materials"][0]["name"] = "odd".into();
+        b
+    };
+    for (ior, transmission, expected, warnings) in [
+        (1.0, 1.0, 1.0, 0),
+        (0.75, 1.0, 0.75, 1),
+        (0.75, 0.0, 0.75, 1),
+        (1e30, 1.0, 1e6, 1),
+        (0.0, 0.0, 1e6, 1),
+        (-2.0, 0.0, 1.0, 1),
+    ] {
+        let scene = load(&with(ior, transmission));
+        assert_eq!((scene.materials[0].ior, scene.warnings.len()), (expected, warnings), "{ior}: {:?}", scene.warnings);
+    }
+    for ior in [0.0, -0.5] {
+        let text = sentence(&with(ior, 0.25));
+        let expected = format!("material 0 \"odd\": n = {ior} in KHR_materials_ior");
+        assert!(text.contains(&expected) && text.contains("0.25") && !text.contains('\n'), "{text}");
+    }
+}
+
 #[test]
 fn texture_transforms_turn_as_the_extension_says() {
     let transform = json!({ "KHR_texture_transform": { "offset": [0.5, 0.25], "rotation": FRAC_PI_2, "scale": [2, 3], "texCoord": 1 } });

@@ -389,8 +389,10 @@ fn metals_have_the_reflectance_of_their_index() {
     let scene = study::load("metals").unwrap();
     for (name, f0) in expected {
         let material = scene.materials.iter().find(|m| m.name == name).unwrap();
-        for (got, want) in material.base_color.iter().zip(f0) {
+        for ((got, want), [n, k]) in material.base_color.iter().zip(f0).zip(material.conductor.unwrap()) {
             assert!((got - want).abs() < 1e-3, "{name}: {got} instead of {want}");
+            let of_index = ((n - 1.0).powi(2) + k * k) / ((n + 1.0).powi(2) + k * k);
+            assert!((of_index - got).abs() < 1e-6, "{name}: {of_index} instead of {got}");
         }
     }
 }

@@ -16,11 +16,11 @@ use serde_json::{Map, Value};
 use super::{
     AlphaMode, Image, Material, Sampler, TextureRef, Wrap,
     container::{Document, short_uri},
-    pictures,
+    gltf_extras, pictures,
 };
 
 /// The index of refraction that stands for "infinite" (KHR_materials_ior, value 0): F0 is within 4e-6 of 1.
-const INFINITE_IOR: f32 = 1.0e6;
+pub(crate) const INFINITE_IOR: f32 = 1.0e6;
 
 /// Materials of the whole file and the pictures they use.
 pub(crate) struct Materials {
@@ -172,6 +172,13 @@ impl Reader<'_, '_, '_> {
         if let Some(extensions) = &json.extensions {
             self.extensions(&mut m, extensions)?;
         }
+        let file_ior = json.extensions.as_ref().and_then(|e| e.ior.as_ref()).map(|ior| ior.ior.0);
+        for warning in gltf_extras::apply(&json.extras, file_ior, &mut m)? {
+            self.warn(&warning);
+        }
+        if m.ior < 1.0 {
+            self.warn(&format!("the index of refraction {} is below 1, that of a vacuum", m.ior));
+        }
         Ok(m)
     }
 
@@ -180,9 +187,6 @@ impl Reader<'_, '_, '_> {
         if let Some(strength) = &json.emissive_strength {
             let strength = self.positive(strength.emissive_strength.0, "the emissive strength");
             m.emissive = m.emissive.map(|e| (e * strength).min(f32::MAX));
-        }
-        if let Some(ior) = &json.ior {
-            m.ior = self.ior(ior.ior.0);
         }
         if let Some(specular) = &json.specular {
             m.specular = self.unit(specular.specular_factor.0, "the specular factor");
@@ -196,6 +200,9 @@ impl Reader<'_, '_, '_> {
         if let Some(transmission) = &json.transmission {
             m.transmission = self.unit(transmission.transmission_factor.0, "the transmission factor");
             m.transmission_texture = self.texture(transmission.transmission_texture.as_ref())?;
+        }
+        if let Some(ior) = &json.ior {
+            m.ior = self.ior(ior.ior.0, m.transmission)?;
         }
         if let Some(volume) = &json.volume {
             m.thickness = self.positive(volume.thickness_factor.0, "the thickness");
@@ -225,16 +232,22 @@ impl Reader<'_, '_, '_> {
         Ok(())
     }
 
-    /// KHR_materials_ior allows 0 ("infinite": a perfect reflector) and everything from 1 on.
-    fn ior(&mut self, ior: f32) -> f32 {
+    /// KHR_materials_ior allows 0 ("infinite": a perfect reflector) and everything from 1 on. A medium may have less
+    /// than 1, too; no light gets into one of 0.
+    fn ior(&mut self, ior: f32, transmission: f32) -> Result<f32> {
+        ensure!(
+            ior > 0.0 || transmission == 0.0,
+            "n = {ior} in KHR_materials_ior: light that is transmitted ({transmission}) needs an index above 0"
+        );
         if ior == 0.0 {
             self.warn(&format!("the index of refraction 0 means infinite and is read as {INFINITE_IOR:e}"));
-            return INFINITE_IOR;
+            return Ok(INFINITE_IOR);
         }
-        if !(1.0..=INFINITE_IOR).contains(&ior) {
-            self.warn(&format!("the index of refraction {ior} is not possible and is clamped"));
+        let possible = if ior > 0.0 { ior.min(INFINITE_IOR) } else { 1.0 };
+        if possible != ior {
+            self.warn(&format!("the index of refraction {ior} is not possible and is read as {possible}"));
         }
-        ior.clamp(1.0, INFINITE_IOR)
+        Ok(possible)
     }
 
     fn texture(&mut self, info: Option<&json::texture::Info>) -> Result<Option<TextureRef>> {

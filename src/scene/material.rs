@@ -37,6 +37,9 @@ pub struct Material {
     pub unlit: bool,
     /// Index of refraction n (KHR_materials_ior); 1.5 unless the file says otherwise.
     pub ior: f32,
+    /// Complex index [n, κ] of the metallic part, red first, where it is known; `base_color` holds its reflectance at
+    /// normal incidence then. Not beside transmission.
+    pub conductor: Option<[[f32; 2]; 3]>,
     /// Strength of the dielectric specular reflection (KHR_materials_specular).
     pub specular: f32,
     /// Specular strength in A (linear).
@@ -171,6 +174,7 @@ impl Default for Material {
             double_sided: false,
             unlit: false,
             ior: 1.5,
+            conductor: None,
             specular: 1.0,
             specular_texture: None,
             specular_color: [1.0; 3],

@@ -9,6 +9,7 @@ pub mod camera;
 mod container;
 pub mod environment;
 mod geometry;
+mod gltf_extras;
 mod gltf_import;
 mod gltf_material;
 pub mod light;
@@ -18,6 +19,7 @@ mod obj;
 mod pictures;
 mod ploc;
 pub mod solid;
+pub(crate) mod substance;
 mod thin;
 
 use std::path::Path;

@@ -3,6 +3,7 @@
 use glam::{Affine2, DAffine3, DMat3, DVec3};
 
 use super::shape::Shape;
+use crate::scene::substance::{self, ComplexIndex};
 use crate::scene::{Camera, Image, Instance, Light, LightKind, Material, Mesh, Projection, Sampler, Scene, TextureRef};
 
 /// A scene in the making.
@@ -117,6 +118,11 @@ pub(super) fn dielectric(name: &str, color: [f32; 3], roughness: f32) -> Materia
 /// A metal whose reflectance at normal incidence is `f0`.
 pub(super) fn metal(name: &str, f0: [f32; 3], roughness: f32) -> Material {
     Material { metallic: 1.0, ..dielectric(name, f0, roughness) }
+}
+
+/// A metal of known complex index.
+pub(super) fn conductor(name: &str, index: ComplexIndex, roughness: f32) -> Material {
+    Material { conductor: Some(substance::conductor(index)), ..metal(name, substance::f0(index), roughness) }
 }
 
 /// A clear body of index `ior`. Its true surfaces bound it, so any thickness above zero says "a volume".

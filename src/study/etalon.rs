@@ -3,9 +3,9 @@
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use super::build::{Builder, at, dielectric, emitter, facing, glass, metal};
-use super::metals;
+use super::build::{Builder, at, conductor, dielectric, emitter, facing, glass, metal};
 use super::shape::{Shape, arc, line};
+use crate::scene::substance::GOLD;
 use crate::scene::{LightKind, Material, Scene};
 
 pub(super) fn scene() -> Scene {
@@ -13,7 +13,7 @@ pub(super) fn scene() -> Scene {
     table(&mut b);
     plates(&mut b);
 
-    let gold = b.material(metal("gold", metals::f0(metals::GOLD), 0.06));
+    let gold = b.material(conductor("gold", GOLD, 0.06));
     b.add("gold ball", Shape::sphere(0.07, 48), gold, at(-0.16, 0.07, 0.03, 0.0));
 
     let crown = b.material(glass("crown glass", 1.517, 0.16));

@@ -3,9 +3,9 @@
 
 use glam::DVec3;
 
-use super::build::{Builder, at, dielectric, emitter, metal};
-use super::metals;
+use super::build::{Builder, at, conductor, dielectric, emitter};
 use super::shape::Shape;
+use crate::scene::substance::GOLD;
 use crate::scene::{LightKind, Material, Scene};
 
 /// Balls in a row.
@@ -17,14 +17,13 @@ pub(super) fn scene() -> Scene {
     let wall = b.material(Material { base_color_texture: Some(checker), ..dielectric("wall", [1.0; 3], 1.0) });
     b.add("wall", Shape::panel(9.0, 5.5).repeat_uv(4.5, 2.75), wall, at(0.0, 0.0, -0.6, 0.0));
 
-    let gold = metals::f0(metals::GOLD);
     for column in 0..COLUMNS {
         let step = column as f32 / (COLUMNS - 1) as f32;
         // A quarter of white at the left, eight times white at the right.
         let glow = 0.25 * 2.0_f32.powf(5.0 * step);
         let rows = [
             dielectric(&format!("dielectric {column}"), [0.72, 0.10, 0.08], step),
-            metal(&format!("metal {column}"), gold, step),
+            conductor(&format!("metal {column}"), GOLD, step),
             Material {
                 clearcoat: 1.0,
                 clearcoat_roughness: step,

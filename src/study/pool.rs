@@ -32,6 +32,8 @@ pub(super) fn scene() -> Scene {
     sky(&mut b);
     lamps(&mut b);
     let swimmer = DVec3::new(-1.4, -1.5, -0.8);
+    // The dome as ambient light, for what the lamps do not reach.
+    b.studio(0.3);
     b.camera("swimmer", swimmer, swimmer + DVec3::Y, 115.0);
     b.camera("surface", DVec3::new(4.6, 3.2, 7.4), DVec3::new(-0.5, -0.5, -0.3), 42.0);
     b.finish()
