@@ -73,9 +73,6 @@ pub struct Material {
     /// Which solid's medium fills the place where transmissive solids overlap: that of the higher priority, and on a tie
     /// the one entered last (`extras.etalon.priority`).
     pub priority: i32,
-    /// Index of refraction n and extinction κ of a metal per channel (`extras.etalon`), where more is known of it than its
-    /// colour.
-    pub conductor: Option<[[f32; 2]; 3]>,
     /// Abbe-like dispersion 20/V_d (KHR_materials_dispersion).
     pub dispersion: f32,
     /// The raw Phong numbers of an OBJ/MTL material, for the passes that show that model as it was written.
@@ -191,7 +188,6 @@ impl Default for Material {
             clearcoat_roughness_texture: None,
             clearcoat_normal_texture: None,
             priority: 0,
-            conductor: None,
             dispersion: 0.0,
             phong: None,
         }
