@@ -109,7 +109,7 @@ struct HitPoint {
     float scale;    // how long a metre of the object is in the world
     bool sheet;     // transmits light and encloses nothing
     uint material;
-    uint triangle;
+    uint face;      // flat face of the triangle
 };
 
 vec4 corner_texel(uint triangle, int i) {
@@ -119,7 +119,9 @@ vec4 corner_texel(uint triangle, int i) {
 HitPoint hit_point_of(Hit hit, vec3 origin, vec3 direction) {
     int first = int(hit.triangle * 3);
     vec3 a = uintBitsToFloat(imageLoad(bvh_triangles, first).xyz);
-    vec3 b = uintBitsToFloat(imageLoad(bvh_triangles, first + 1).xyz);
+    uvec4 b_face = imageLoad(bvh_triangles, first + 1);
+    vec3 b = uintBitsToFloat(b_face.xyz);
+    uint face = b_face.w;
     vec3 c = uintBitsToFloat(imageLoad(bvh_triangles, first + 2).xyz);
     vec4 ta = corner_texel(hit.triangle, 0);
     vec4 tb = corner_texel(hit.triangle, 1);
@@ -130,7 +132,7 @@ HitPoint hit_point_of(Hit hit, vec3 origin, vec3 direction) {
     r.material = floatBitsToUint(ta.w) & 0xffffu;
     r.sheet = (floatBitsToUint(ta.w) & SHEET_TRIANGLE) != 0;
     r.scale = tb.w;
-    r.triangle = hit.triangle;
+    r.face = face;
     r.uv_per_metre = tc.w;
     // Corners run counter-clockwise around the front, whatever mirrored the object.
     vec3 across = cross(b - a, c - a);
@@ -235,7 +237,7 @@ HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
                               side * n, side * n_coat, -direction, point.p - trace_terms.bvh_from_rel);
     r.s.p_bvh = point.p;
     r.s.n_triangle = r.n;
-    r.s.triangle = point.triangle;
+    r.s.face = point.face;
     r.transmits *= 1.0 - r.s.metallic;
     return r;
 }

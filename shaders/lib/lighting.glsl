@@ -38,7 +38,7 @@ vec3 light_on(Surface s, uint index) {
     if (SHADOWS != 0) {
         result *= terminator(s.n, s.n_triangle, l);
         bool wanted = largest(result) > 0.0;
-        result *= visibility(s.p_bvh, s.n_triangle, s.v, s.triangle, s.media, directional ? l : to_light,
+        result *= visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, directional ? l : to_light,
                              directional ? LARGEST : 1.0, wanted);
     }
     return result;

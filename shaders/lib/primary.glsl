@@ -26,29 +26,20 @@ struct Primary {
 };
 
 // Where the ray of a pixel meets the plane of the triangle that was drawn there. The depth of a large triangle is only good
-// to some 1e-5, and its stored normal to 3e-5: rays that start from there would meet what they start from.
-void on_triangle(inout Surface s, uint leaf, vec3 direction) {
+// to some 1e-5, and its stored normal to 3e-5: rays that start from there would meet what they start from. Not into a
+// Surface at once: glslang never ends where a `precise` value comes from a struct that is assigned from itself.
+HitPoint on_triangle(uint leaf, vec3 p_bvh, vec3 direction) {
     vec3 a = uintBitsToFloat(imageLoad(bvh_triangles, int(leaf) * 3).xyz);
     vec3 b = uintBitsToFloat(imageLoad(bvh_triangles, int(leaf) * 3 + 1).xyz);
     vec3 c = uintBitsToFloat(imageLoad(bvh_triangles, int(leaf) * 3 + 2).xyz);
     // Parallel rays come from the pixel's point, all others from the eye.
-    vec3 origin = camera.orthographic != 0 ? s.p_bvh : trace_terms.bvh_from_rel;
+    vec3 origin = camera.orthographic != 0 ? p_bvh : trace_terms.bvh_from_rel;
     precise vec3 to_a = a - origin;
     precise vec3 to_b = b - origin;
     precise vec3 to_c = c - origin;
     ShearedTriangle t = sheared_triangle(ray_shear(direction), to_a, to_b, to_c);
-    if (t.det == 0.0) return;
-    HitPoint point = hit_point_of(Hit(0.0, leaf, t.weights.y / t.det, t.weights.z / t.det), s.p_bvh, vec3(0.0));
-    float side = dot(point.n, direction) <= 0.0 ? 1.0 : -1.0;
-    s.p_bvh = point.p;
-    s.triangle = leaf;
-    s.n_triangle = side * point.n;
-    // The exact normal where no texture has bent it.
-    vec3 smooth_n = side * point.n_smooth;
-    vec3 off = s.n - smooth_n;
-    vec3 off_coat = s.n_coat - smooth_n;
-    s.n = dot(off, off) < 1e-7 ? smooth_n : s.n;
-    s.n_coat = dot(off_coat, off_coat) < 1e-7 ? smooth_n : s.n_coat;
+    float whole = t.det == 0.0 ? 1.0 : t.det;
+    return hit_point_of(Hit(0.0, leaf, t.weights.y / whole, t.weights.z / whole), p_bvh, vec3(0.0));
 }
 
 Primary primary_surface(ivec2 pixel) {
@@ -74,12 +65,23 @@ Primary primary_surface(ivec2 pixel) {
     vec3 p_rel = rel_from_pixel(camera, pixel, r.drawn ? z : 1.0);
     Surface s = surface_from_texels(m, texel.rgb, texel.a, roughness, occlusion, HAS_EMISSIVE ? glow.rgb : vec3(1.0), layer, n, n_coat,
                                     -view_direction(camera, pixel), p_rel);
-    s.p_bvh = p_rel + trace_terms.bvh_from_rel;
+    vec3 p_bvh = p_rel + trace_terms.bvh_from_rel;
+    s.p_bvh = p_bvh;
     s.n_triangle = unit_from_octahedral(octahedral.zw);
     s.media = trace_terms.camera_media;
     if (HAS_TRIANGLES) {
         uint leaf = r.drawn ? imageLoad(leaf_places, int(imageLoad(triangles, pixel).x)).x : NO_TRIANGLE;
-        if (leaf != NO_TRIANGLE) on_triangle(s, leaf, -s.v);
+        if (leaf != NO_TRIANGLE) {
+            HitPoint point = on_triangle(leaf, p_bvh, view_direction(camera, pixel));
+            float side = dot(point.n, view_direction(camera, pixel)) <= 0.0 ? 1.0 : -1.0;
+            s.p_bvh = point.p;
+            s.face = point.face;
+            s.n_triangle = side * point.n;
+            // The exact normal where no texture has bent it.
+            vec3 smooth_n = side * point.n_smooth;
+            s.n = dot(n - smooth_n, n - smooth_n) < 1e-7 ? smooth_n : n;
+            s.n_coat = dot(n_coat - smooth_n, n_coat - smooth_n) < 1e-7 ? smooth_n : n_coat;
+        }
     }
     r.hit.s = s;
     r.hit.n = s.n_triangle;

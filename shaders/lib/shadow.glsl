@@ -60,7 +60,7 @@ Hit hit_again(vec3 origin, vec3 direction, float t, uint triangle) {
     return Hit(t, triangle, s.weights.y * inverse, s.weights.z * inverse);
 }
 
-// p in bvh space, n the normal of its triangle `self`, v to the viewer, `media` those on the light's side. The light is at p + to_light, or
+// p in bvh space, n the normal of its triangle, `self` its flat face, v to the viewer, `media` those on the light's side. The light is at p + to_light, or
 // in that direction where t_max is larger than 1.
 vec3 visibility(vec3 p, vec3 n, vec3 v, uint self, uvec4 media, vec3 to_light, float t_max, bool wanted) {
     vec3 origin = ray_origin(p, n, v);

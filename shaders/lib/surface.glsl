@@ -42,7 +42,7 @@ struct Surface {
     bool coat_traced;
     vec3 p_bvh;          // the same point where rays live (share/trace.glsl)
     vec3 n_triangle;     // geometric normal, to the viewer
-    uint triangle;       // which, or 0xffffffff
+    uint face;           // the flat face it lies in, which rays from it cannot meet
     uvec4 media;         // those the viewer's side lies in (lib/media.glsl)
 };
 
@@ -91,7 +91,7 @@ Surface surface_from_texels(Material m, vec3 base, float metallic, float roughne
     s.coat_traced = MIRROR_RAYS && s.clearcoat_roughness <= ROUGHEST_MIRROR;
     s.p_bvh = p_rel;
     s.n_triangle = n;
-    s.triangle = 0xffffffffu;
+    s.face = 0xffffffffu;
     s.media = uvec4(0);
     s.unlit = (m.flags & MATERIAL_UNLIT) != 0;
     return s;

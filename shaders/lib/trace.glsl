@@ -14,7 +14,7 @@ const uint STACK = 2;
 layout(constant_id = 41) const bool OCTANTS = false;
 
 layout(set = 0, binding = 30, rgba32ui) readonly uniform uimageBuffer bvh_nodes;
-// Three texels per triangle: corner, and: classes | instance | triangle of its mesh.
+// Three texels per triangle: corner, and: class | flat face that it is part of | nothing.
 layout(set = 0, binding = 31, rgba32ui) readonly uniform uimageBuffer bvh_triangles;
 layout(scalar, set = 0, binding = 32) uniform TraceBlock { TraceTerms trace_terms; };
 
@@ -22,6 +22,7 @@ layout(scalar, set = 0, binding = 32) uniform TraceBlock { TraceTerms trace_term
 const uint OPAQUE = 1;
 const uint FILTER = 2; // masked, blended or transmissive: what is seen there decides
 const uint NO_TRIANGLE = 0xffffffffu;
+const uint NO_FACE = 0xffffffffu;
 
 struct Hit {
     float t;
@@ -143,7 +144,7 @@ struct TriangleRay {
     Shear shear;
     float after;         // hits at this t or before do not count,
     uint after_triangle; // but those of later triangles at the same t
-    uint self;           // the triangle it leaves, which it cannot meet again
+    uint self;           // the flat face it leaves, which it cannot meet again
 };
 
 // The nearest four filters on the way to a light, in order; LARGEST where there are fewer.
@@ -193,7 +194,7 @@ void test_triangle(inout Walk w, inout Filters f, TriangleRay r, BoxRay b, uint 
     float inverse = 1.0 / s.det;
     float t = s.depth * inverse / r.shear.dz;
     uint index = uint(triangle);
-    bool hit = pending && s.inside && s.det != 0.0 && (ta.w & classes) != 0 && index != r.self;
+    bool hit = pending && s.inside && s.det != 0.0 && (ta.w & classes) != 0 && tb.w != r.self;
     hit = hit && (t > r.after || (t == r.after && index > r.after_triangle));
     hit = hit && (t < w.hit.t || (t == w.hit.t && index < w.hit.triangle));
     if (purpose == TO_LIGHT) {
@@ -261,7 +262,7 @@ HitPair walk_links_twice(TriangleRay ra, vec3 da, float ta, TriangleRay rb, vec3
     return HitPair(a.hit, b.hit);
 }
 
-layout(constant_id = 42) const uint STACK_SIZE = 1; // entries: the depth of the tree, at least 1
+layout(constant_id = 42) const uint STACK_SIZE = 1; // one more than the depth of the tree: the entry above the last is written, too
 
 // The tree with both children's boxes in the parent, the nearer child first, the other on a stack.
 Hit walk_stack(TriangleRay r, vec3 direction, float t_max, uint classes, uint purpose, inout Filters f) {
@@ -321,8 +322,8 @@ Hit walk(TriangleRay r, vec3 direction, float t_max, uint classes, uint purpose,
 
 // The nearest hit of a triangle of these classes along origin + t direction that comes after the hit `after` and not
 // after t_max; or, with any_hit, any such hit, of which only that there is one is the same every way. A negative t_max asks
-// for nothing and costs next to nothing. `self` is the triangle that the origin lies in, or NO_TRIANGLE: along a sliver t
-// rounds by more than any offset, 1e-6 m for 7 m by 2 cm.
+// for nothing and costs next to nothing. `self` is the flat face that the origin lies in, or NO_FACE: along a sliver of 7 m
+// by 2 cm t rounds by 1e-6 m, and by any amount where a triangle is seen edge-on.
 Hit trace(vec3 origin, vec3 direction, uint self, Hit after, float t_max, uint classes, bool any_hit) {
     Filters none;
     return walk(TriangleRay(origin, ray_shear(direction), after.t, after.triangle, self), direction, t_max, classes,

@@ -41,7 +41,7 @@ const uint BY_REFRACTION = 1; // or straight through
 struct Branch {
     vec3 origin;      // bvh space
     vec3 direction;
-    uint self;        // the triangle it leaves
+    uint self;        // the flat face it leaves
     vec3 throughput;
     uvec4 media;
     float width;      // of the ray at its origin, for the level of textures
@@ -152,7 +152,7 @@ void split(HitSurface hit, Branch ray, float cone, uvec2 pixel) {
     float n2 = boundary.solid ? index_of(boundary.there) : s.ior;
     stray_interfaces += boundary.stray ? 1u : 0u;
     Branch next;
-    next.self = s.triangle;
+    next.self = s.face;
     next.media = ray.media;
     next.width = cone;
     next.spread = ray.spread;

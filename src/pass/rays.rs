@@ -82,6 +82,8 @@ pub struct RaysOnDevice {
     pub triangles: Buffer,
     /// What lies at their corners.
     pub corners: Buffer,
+    /// The flat face of each triangle in the order of the leaves.
+    pub faces: Vec<u32>,
     /// The place among the leaves of each triangle of the scene, in the order of instances.
     pub leaf_places: Buffer,
     /// [`TraceTerms`].
@@ -133,17 +135,6 @@ impl RaysOnDevice {
                 orders.par_iter().map(|&order| bvh.links(order, format)).collect::<Vec<_>>().concat()
             }
         };
-        let corners = Corners::of(scene, solids, rays.refraction);
-        let triangles: Vec<[[u32; 4]; 3]> = bvh
-            .triangles
-            .par_iter()
-            .zip(&filters)
-            .map(|(t, &is_filter)| {
-                let [a, b, c] = corners.order(t).map(|i| t.corners[i].map(f32::to_bits));
-                let class = if is_filter { FILTER } else { OPAQUE };
-                [[a[0], a[1], a[2], class], [b[0], b[1], b[2], t.instance], [c[0], c[1], c[2], t.primitive]]
-            })
-            .collect();
         let mut first = 0_u32;
         let first_triangle: Vec<u32> = scene
             .instances
@@ -151,6 +142,26 @@ impl RaysOnDevice {
             .map(|i| {
                 first += (scene.meshes[i.mesh].indices.len() / 3) as u32;
                 first - (scene.meshes[i.mesh].indices.len() / 3) as u32
+            })
+            .collect();
+        let faces_of_meshes: Vec<Vec<u32>> = scene.meshes.par_iter().map(flat_faces).collect();
+        let faces: Vec<u32> = bvh
+            .triangles
+            .iter()
+            .map(|t| {
+                let local = &faces_of_meshes[scene.instances[t.instance as usize].mesh];
+                first_triangle[t.instance as usize] + local[t.primitive as usize]
+            })
+            .collect();
+        let corners = Corners::of(scene, solids, rays.refraction);
+        let triangles: Vec<[[u32; 4]; 3]> = bvh
+            .triangles
+            .par_iter()
+            .zip(filters.par_iter().zip(&faces))
+            .map(|(t, (&is_filter, &face))| {
+                let [a, b, c] = corners.order(t).map(|i| t.corners[i].map(f32::to_bits));
+                let class = if is_filter { FILTER } else { OPAQUE };
+                [[a[0], a[1], a[2], class], [b[0], b[1], b[2], face], [c[0], c[1], c[2], 0]]
             })
             .collect();
         let mut leaf_places = vec![u32::MAX; first as usize];
@@ -179,7 +190,7 @@ impl RaysOnDevice {
             constants: TraceConstants {
                 traversal: traversal as u32,
                 octants,
-                stack_size: bvh.depth.max(1),
+                stack_size: bvh.depth + 1,
                 hit_textures: corners.contents,
             },
             facts: Some(BvhFacts {
@@ -196,6 +207,7 @@ impl RaysOnDevice {
             nodes: nodes_buffer,
             triangles: triangle_buffer,
             corners: corner_buffer,
+            faces,
             leaf_places: upload(device, "leaf places", &leaf_places, Some(vk::Format::R32_UINT))?,
             fixed,
             anchor: bvh.anchor,
@@ -210,6 +222,7 @@ impl RaysOnDevice {
             nodes: empty("no BVH nodes")?,
             triangles: empty("no BVH triangles")?,
             corners: empty("no corners for rays")?,
+            faces: Vec::new(),
             leaf_places: Buffer::texels(device, "no leaf places", 0, Place::Device, vk::Format::R32_UINT)?,
             terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,
             counts: Buffer::new(device, "work counts", size_of::<WorkCounts>() as u64, Place::Readback)?,
@@ -290,6 +303,32 @@ fn is_filter(material: &Material) -> bool {
 pub fn medium(material: &Material, index: usize) -> u32 {
     let priority = (material.priority.clamp(-0x7fff, 0x7fff) + 0x8000) as u32;
     priority << 16 | (index as u32 + 1)
+}
+
+/// Which flat face each triangle of a mesh is part of, named after its first triangle: triangles that follow each other,
+/// share an edge and lie in one plane as far as its coordinates can tell. A ray that leaves such a face cannot meet it again,
+/// which no test of the other half of a quad could tell as surely where it is seen edge-on.
+fn flat_faces(mesh: &Mesh) -> Vec<u32> {
+    let at = |i: u32| glam::Vec3::from(mesh.positions[i as usize]).as_dvec3();
+    let mut faces: Vec<u32> = Vec::with_capacity(mesh.indices.len() / 3);
+    let mut before: [DVec3; 3] = [DVec3::INFINITY; 3];
+    let mut plane = (DVec3::ZERO, DVec3::ZERO);
+    for (i, &triangle) in mesh.indices.as_chunks::<3>().0.iter().enumerate() {
+        let corners = triangle.map(at);
+        let shared = corners.iter().filter(|corner| before.contains(corner)).count();
+        let size = corners.iter().fold(0.0_f64, |m, c| m.max(c.abs().max_element()));
+        let (point, normal) = plane;
+        let flat = corners.iter().all(|&c| (c - point).dot(normal).abs() <= 2.0_f64.powi(-22) * size);
+        if shared >= 2 && flat && normal != DVec3::ZERO {
+            faces.push(faces[i - 1]);
+        } else {
+            let [a, b, c] = corners;
+            plane = (a, (b - a).cross(c - a).normalize_or_zero());
+            faces.push(i as u32);
+        }
+        before = corners;
+    }
+    faces
 }
 
 /// Classes of triangles: shaders/lib/trace.glsl.

@@ -24,7 +24,7 @@ pub struct Ray {
     pub t_max: f32,
     /// Of any length.
     pub direction: [f32; 3],
-    /// The triangle it leaves, which it cannot meet again, or [`Hit::NONE`].
+    /// The flat face it leaves ([`Tracer::face`]), which it cannot meet again, or [`Hit::NONE`].
     pub from: u32,
 }
 
@@ -80,6 +80,12 @@ impl Tracer {
     #[must_use]
     pub fn rays(&self) -> &RaysOnDevice {
         &self.rays
+    }
+
+    /// The flat face that a triangle is part of, by its place in the hierarchy.
+    #[must_use]
+    pub fn face(&self, triangle: u32) -> u32 {
+        self.rays.faces[triangle as usize]
     }
 
     /// Sends rays `repeats` times: what they met, the work of one time, and the milliseconds of each.
