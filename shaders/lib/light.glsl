@@ -8,7 +8,7 @@
 
 // The renderer's rule for r → 0 (numerics.md 32): a point light is never nearer than this, in metres, so that
 // irradiance stays finite. It is part of point_falloff, not of light_point, which is I/r² and says +∞.
-const float LIGHT_RADIUS = 1e-6;
+const float LIGHT_RADIUS = 1e-12;
 
 struct LightDirectional {
     float cos_plus;

@@ -31,7 +31,7 @@ pub fn light_point(p: DVec3, q: DVec3, n: DVec3, intensity: f64) -> [f64; 4] {
 }
 
 /// Least distance of a point light, m (shaders/lib/light.glsl).
-pub const LIGHT_RADIUS: f64 = 1e-6;
+pub const LIGHT_RADIUS: f64 = 1e-12;
 
 /// @eq R4: irradiance per intensity of a point light with a range (KHR_lights_punctual).
 #[must_use]
