@@ -4,6 +4,7 @@
 //! the passes upload it. Lengths are metres, the world is right-handed with +Y up as in glTF 2.0 section 3.4.
 
 mod accessor;
+pub mod bvh;
 pub mod camera;
 mod container;
 pub mod environment;
@@ -15,6 +16,7 @@ pub mod material;
 mod nodes;
 mod obj;
 mod pictures;
+mod ploc;
 mod thin;
 
 use std::path::Path;
