@@ -130,9 +130,8 @@ impl RaysOnDevice {
             Traversal::Stack => bvh.stack_nodes(),
             Traversal::Links16 | Traversal::Links32 => {
                 let format = if traversal == Traversal::Links16 { Format::Quantised } else { Format::Float };
-                let orders = (0..if octants { 8 } else { 0 }).map(Order::Octant).chain([Order::AnyHit]);
-                let orders: Vec<_> = orders.collect();
-                orders.par_iter().map(|&order| bvh.links(order, format)).collect::<Vec<_>>().concat()
+                let ordered: &[Order] = if octants { &Order::OCTANTS } else { &[] };
+                bvh.lists(&[ordered, &[Order::AnyHit]].concat(), format).concat()
             }
         };
         let mut first = 0_u32;

@@ -207,8 +207,9 @@ impl Grid {
     fn encode(&self, bounds: &Aabb) -> [u32; 3] {
         [0, 1, 2].map(|axis| {
             let (origin, unit) = (f64::from(self.origin[axis]), f64::from(self.unit[axis]));
-            let low = ((f64::from(bounds.min[axis]) - origin) / unit - SPARE_UNITS).floor() as u32;
-            let high = ((f64::from(bounds.max[axis]) - origin) / unit + SPARE_UNITS).ceil() as u32;
+            // Both are positive: conversion rounds down.
+            let low = ((f64::from(bounds.min[axis]) - origin) / unit - SPARE_UNITS) as u32;
+            let high = ((f64::from(bounds.max[axis]) - origin) / unit + SPARE_UNITS) as u32 + 1;
             let center = (low + high) / 2;
             center << 16 | (high - center)
         })
@@ -246,7 +247,7 @@ impl Bvh {
         let (placed, dropped) = place(scene, anchor);
         let mut bvh = Self { anchor, triangles: Vec::new(), nodes: Vec::new(), depth: 0, sah: 0.0, dropped };
         if !placed.is_empty() {
-            let boxes: Vec<Aabb> = placed.iter().map(Triangle::bounds).collect();
+            let boxes: Vec<Aabb> = placed.par_iter().map(Triangle::bounds).collect();
             bvh.unfold(&ploc::arrange(&boxes), &placed);
             bvh.sah = bvh.cost();
         }
@@ -383,14 +384,18 @@ impl Bvh {
         Grid { origin, unit }
     }
 
-    /// Whether 16 bits are fine enough: half of the leaves' boxes are at least four units of the grid long.
+    /// Whether 16 bits are fine enough: at least half of the leaves' boxes are four units of the grid long, or more, along
+    /// the axis in which they are longest.
     #[must_use]
     pub fn fits_grid(&self) -> bool {
         let unit = self.grid().unit;
-        let longest = |bounds: &Aabb| (0..3).map(|i| bounds.size(i) / f64::from(unit[i])).fold(0.0, f64::max);
+        let fits = |bounds: &Aabb| {
+            let axis = (1..3).fold(0, |best, i| if bounds.size(i) > bounds.size(best) { i } else { best });
+            bounds.size(axis) >= 4.0 * f64::from(unit[axis])
+        };
         let leaves = self.nodes.iter().filter(|node| matches!(node, Node::Leaf { .. }));
-        let (count, fitting) = leaves
-            .fold((0, 0), |(count, fitting), leaf| (count + 1, fitting + usize::from(longest(leaf.bounds()) >= 4.0)));
+        let (count, fitting) =
+            leaves.fold((0, 0), |(count, fitting), leaf| (count + 1, fitting + usize::from(fits(leaf.bounds()))));
         fitting * 2 >= count
     }
 
@@ -558,22 +563,22 @@ fn anchor(scene: &Scene) -> DVec3 {
 
 /// Triangles of all instances in bvh space, and how many were left out.
 fn place(scene: &Scene, anchor: DVec3) -> (Vec<Triangle>, usize) {
-    let of_instance = |(instance, placed): (usize, &super::Instance)| -> Vec<Triangle> {
+    let count = scene.triangles();
+    let mut triangles = Vec::with_capacity(count);
+    for (instance, placed) in scene.instances.iter().enumerate() {
         let mesh = &scene.meshes[placed.mesh];
         let p_bvh = |position: &[f32; 3]| {
             let p_world = placed.world_from_object.transform_point3(Vec3::from(*position).as_dvec3());
             (p_world - anchor).as_vec3().to_array()
         };
         let positions: Vec<[f32; 3]> = mesh.positions.iter().map(p_bvh).collect();
-        let triangles = mesh.indices.as_chunks::<3>().0.iter().enumerate().map(|(primitive, corners)| Triangle {
+        let all = mesh.indices.as_chunks::<3>().0.iter().enumerate().map(|(primitive, corners)| Triangle {
             corners: corners.map(|i| positions[i as usize]),
             instance: instance as u32,
             primitive: primitive as u32,
         });
-        triangles.filter(Triangle::is_solid).collect()
-    };
-    let parts: Vec<Vec<Triangle>> = scene.instances.par_iter().enumerate().map(of_instance).collect();
-    let triangles = parts.concat();
-    let dropped = scene.triangles() - triangles.len();
+        triangles.extend(all.filter(Triangle::is_solid));
+    }
+    let dropped = count - triangles.len();
     (triangles, dropped)
 }

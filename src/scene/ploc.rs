@@ -4,10 +4,10 @@
 //! few places whose common box has the smallest surface, pairs that chose each other become one, until one is left.
 //! Reinsertion (Meister and Bittner 2018) then moves subtrees to where they cost less, and small subtrees become leaves.
 //!
-//! The clustering is here and not the crate's, because that one ends only when pairs agree, and there are scenes in
-//! which one pair a round does: 20 000 equal boxes in a row, such as the posts of a fence, took it 6.3 s and 20 000
-//! boxes inside each other 12.7 s, both growing with the square. Here equal costs are decided by which both sides see
-//! alike, and a round that does too little pairs the rest by order.
+//! The clustering is here and not the crate's, because there a round joins only pairs that agree, and in some scenes one
+//! pair a round does: 20 000 equal boxes in a row, such as the posts of a fence, took it 6.3 s and 20 000 boxes inside
+//! each other 12.7 s, both growing with the square. Here both sides of a pair decide equal costs in the same way, and a
+//! round in which too few agree joins pairs by order.
 
 use obvhs::bvh2::leaf_collapser::collapse;
 use obvhs::bvh2::node::Bvh2Node;
@@ -18,20 +18,24 @@ use rayon::prelude::*;
 
 use super::bvh::Aabb;
 
-/// Neighbours looked at on either side. At a million triangles of one surface: 8 and 14 give the same cost (9.23),
-/// clustering takes 0.27 s and 0.37 s; in a building of 390 000, 14 is 1.8 % cheaper for 0.03 s more.
+/// Neighbours looked at on either side. With 14 a million triangles of one surface take 0.1 s longer and cost the same;
+/// a building of 390 000 costs 0.3 to 1.8 % less.
 const RADIUS: usize = 8;
 
-/// A round that joins fewer than one in so many joins by order instead. Real scenes join one in three or four, until a
-/// few hundred clusters are left.
+/// A round with fewer than one pair in so many clusters pairs by order instead. Of a million triangles one pair in two to
+/// six clusters agrees until ten thousand are left; the first round by order comes below two thousand.
 const STALLED: usize = 16;
 
-/// Part of the nodes that reinsertion looks at in its first turn, before and after leaves are made. 0.1 before costs
+/// Part of the nodes that reinsertion looks at in its first turn, before and after leaves are made. 0.1 before takes
 /// 120 ms more at a million triangles and gains 0.4 %.
 const REINSERTED: [f32; 2] = [0.05, 0.1];
 
 /// Largest leaf that is made.
 const LEAF: u32 = 4;
+
+/// What a step to an inner node costs in triangles of a leaf, when leaves are made. At 2 a third of the nodes goes; a ray
+/// takes 3 % fewer steps and tests 30 to 40 % more triangles.
+const STEP: f32 = 1.0;
 
 /// A tree with one leaf entry for each of `boxes`, at least one, all finite and not all of them one point.
 ///
@@ -39,13 +43,12 @@ const LEAF: u32 = 4;
 /// they are scaled.
 pub(super) fn arrange(boxes: &[Aabb]) -> Bvh2 {
     let (mut tree, by_order) = cluster(boxes);
-    // Where most pairs came from the order alone, boxes lie inside each other: reinsertion then compares all with all
-    // (200 000: 4.3 s) and gains nothing.
+    // Where many pairs came from the order alone, boxes lie inside each other. Reinsertion then takes a time that grows
+    // with the square (200 000: 4.3 s), gains nothing and makes the tree deep (14 000 levels in place of 26).
     let reinserted = if by_order * 4 > boxes.len() { [0.0; 2] } else { REINSERTED };
     let mut reinsertion = ReinsertionOptimizer::default();
     reinsertion.run(&mut tree, reinserted[0], None);
-    // A leaf's triangle counts as much as a step to an inner node.
-    collapse(&mut tree, LEAF, 1.0);
+    collapse(&mut tree, LEAF, STEP);
     reinsertion.run(&mut tree, reinserted[1], None);
     tree
 }
@@ -155,32 +158,64 @@ mod tests {
         deepest
     }
 
+    fn row(count: u32) -> Vec<Aabb> {
+        boxes(count, |x| ([x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]))
+    }
+
+    fn pile(count: u32) -> Vec<Aabb> {
+        boxes(count, |_| ([-1.0; 3], [1.0; 3]))
+    }
+
+    /// Equal squares side by side: many equal costs.
+    fn grid(count: u32) -> Vec<Aabb> {
+        boxes(count, |i| {
+            let (x, z) = (i % 77.0, (i / 77.0).floor());
+            ([x, 0.0, z], [x + 1.0, 0.0, z + 1.0])
+        })
+    }
+
+    /// All of a tree but its boxes.
+    fn shape(tree: Bvh2) -> (Vec<(u32, u32)>, Vec<u32>) {
+        (tree.nodes.iter().map(|n| (n.prim_count, n.first_index)).collect(), tree.primitive_indices)
+    }
+
     /// One pair a round would make these as deep as they have boxes, in a time that grows with the square.
     #[test]
     fn rows_piles_and_nests_of_boxes_give_flat_trees() {
         let n = 4096;
-        let row = boxes(n, |x| ([x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]));
-        let pile = boxes(n, |_| ([-1.0; 3], [1.0; 3]));
         let nest = boxes(n, |x| ([-x - 1.0; 3], [x + 1.0; 3]));
         let corner = boxes(n, |x| ([0.0; 3], [x + 1.0; 3]));
-        for (name, boxes) in [("row", row), ("pile", pile), ("nest", nest), ("corner", corner)] {
+        for (name, boxes) in [("row", row(n)), ("pile", pile(n)), ("nest", nest), ("corner", corner)] {
             let depth = depth(&arrange(&boxes));
             assert!((10..=24).contains(&depth), "{name}: {depth}");
         }
     }
 
+    /// Pairs by order take no notice of what is where.
+    #[test]
+    fn equal_costs_need_no_pairs_by_order() {
+        for boxes in [row(5000), pile(5000), grid(5000)] {
+            assert_eq!(cluster(&boxes).1, 0);
+        }
+    }
+
+    #[test]
+    fn the_unit_of_length_changes_nothing() {
+        let in_metres = grid(3000);
+        let expected = shape(arrange(&in_metres));
+        for power in [-100, -30, 30, 100] {
+            let scale = |corner: [f32; 3]| corner.map(|x| x * 2.0_f32.powi(power));
+            let scaled: Vec<Aabb> = in_metres.iter().map(|b| Aabb { min: scale(b.min), max: scale(b.max) }).collect();
+            assert!(shape(arrange(&scaled)) == expected, "2^{power}");
+        }
+    }
+
     #[test]
     fn the_number_of_threads_changes_nothing() {
-        // Many equal costs: a grid of equal squares.
-        let grid = boxes(6000, |i| {
-            let (x, z) = (i % 77.0, (i / 77.0).floor());
-            ([x, 0.0, z], [x + 1.0, 0.0, z + 1.0])
-        });
+        let boxes = grid(6000);
         let build = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let tree = pool.install(|| arrange(&grid));
-            let nodes: Vec<(u32, u32)> = tree.nodes.iter().map(|n| (n.prim_count, n.first_index)).collect();
-            (nodes, tree.primitive_indices)
+            shape(pool.install(|| arrange(&boxes)))
         };
         let one = build(1);
         assert!([2, 3, 7].iter().all(|&threads| build(threads) == one));
