@@ -446,6 +446,33 @@ vec2 circle(float u) {
     return r;
 }
 
+// A half vector drawn among those the viewer sees (Heitz, JCGT 7(4) 2018), v and h in the frame of the normal.
+vec3 visible_half_vector(vec3 v, float alpha, vec2 u) {
+    vec3 stretched = normalize(vec3(alpha * v.xy, v.z));
+    float across2 = dot(stretched.xy, stretched.xy);
+    vec3 t = across2 > 0.0 ? vec3(-stretched.y, stretched.x, 0.0) * inversesqrt(across2) : vec3(1.0, 0.0, 0.0);
+    vec3 b = cross(stretched, t);
+    vec2 disk = sqrt(u.x) * circle(u.y);
+    float s = 0.5 * (1.0 + stretched.z);
+    disk.y = (1.0 - s) * sqrt(max(1.0 - disk.x * disk.x, 0.0)) + s * disk.y;
+    vec3 h = disk.x * t + disk.y * b + sqrt(max(1.0 - dot(disk, disk), 0.0)) * stretched;
+    return normalize(vec3(alpha * h.xy, max(h.z, 0.0)));
+}
+
+// The half vector of one event, and what masking leaves of light along l: G2/G1.
+vec3 half_vector(vec3 n, vec3 v, float alpha, vec2 u) {
+    OrthonormalBasis frame = orthonormal_basis(n);
+    vec3 local = vec3(dot(v, frame.t), dot(v, frame.b), max(dot(v, n), 1e-4));
+    vec3 h = visible_half_vector(local, alpha, u);
+    return frame.t * h.x + frame.b * h.y + n * h.z;
+}
+
+float unmasked(float cos_v, float cos_l, float alpha) {
+    float lambda_v = ggx_lambda(max(abs(cos_v), 1e-4), alpha);
+    float lambda_l = ggx_lambda(max(abs(cos_l), 1e-4), alpha);
+    return (1.0 + lambda_v) / (1.0 + lambda_v + lambda_l);
+}
+
 struct CosineSample {
     vec3 L;
     float pdf;

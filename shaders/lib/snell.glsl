@@ -34,6 +34,11 @@ Reflection reflect_ray(vec3 v, vec3 N) {
     return Reflection(r);
 }
 
+// A direction that a smooth normal has sent to the wrong side of the triangle, mirrored in it.
+vec3 on_side(vec3 direction, vec3 n) {
+    return direction - n * (2.0 * min(dot(direction, n), 0.0));
+}
+
 struct Refraction {
     vec3 T;
     bool tir;

@@ -126,6 +126,18 @@ vec3 fresnel(Surface s, float cos_in) {
     return mix(fresnel_of_dielectric(s, cos_in), fresnel_of_metal(s, cos_in), s.metallic);
 }
 
+// Reflectance of the boundary from n1 to n2 as its share between that at normal and that at grazing incidence: 1 where the
+// reflection is total.
+float boundary_share(float cos_in, float n1, float n2) {
+    if (FRESNEL == 1) {
+        float r0 = nested_f0(n1, n2);
+        return clamp((fresnel_dielectric(cos_in, n2 / n1).F - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
+    }
+    float sin2 = max(1.0 - cos_in * cos_in, 0.0) * (n1 / n2) * (n1 / n2);
+    float cos_thin = n1 > n2 ? sqrt(max(1.0 - sin2, 0.0)) : cos_in;
+    return n1 > n2 && sin2 >= 1.0 ? 1.0 : schlick(vec3(0.0), 1.0, cos_thin).x;
+}
+
 float largest(vec3 v) {
     return max(v.x, max(v.y, v.z));
 }

@@ -73,50 +73,6 @@ void send(Branch branch) {
     }
 }
 
-// Reflectance of the boundary from n1 to n2 as its share between that at normal and that at grazing incidence: 1 where the
-// reflection is total.
-float boundary_share(float cos_in, float n1, float n2) {
-    if (FRESNEL == 1) {
-        float r0 = nested_f0(n1, n2);
-        return clamp((fresnel_dielectric(cos_in, n2 / n1).F - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
-    }
-    float sin2 = max(1.0 - cos_in * cos_in, 0.0) * (n1 / n2) * (n1 / n2);
-    float cos_thin = n1 > n2 ? sqrt(max(1.0 - sin2, 0.0)) : cos_in;
-    return n1 > n2 && sin2 >= 1.0 ? 1.0 : schlick(vec3(0.0), 1.0, cos_thin).x;
-}
-
-// A direction that a smooth normal has sent to the wrong side of the triangle, mirrored in it.
-vec3 on_side(vec3 direction, vec3 n) {
-    return direction - n * (2.0 * min(dot(direction, n), 0.0));
-}
-
-// A half vector drawn among those the viewer sees (Heitz, JCGT 7(4) 2018), v and h in the frame of the normal.
-vec3 visible_half_vector(vec3 v, float alpha, vec2 u) {
-    vec3 stretched = normalize(vec3(alpha * v.xy, v.z));
-    float across2 = dot(stretched.xy, stretched.xy);
-    vec3 t = across2 > 0.0 ? vec3(-stretched.y, stretched.x, 0.0) * inversesqrt(across2) : vec3(1.0, 0.0, 0.0);
-    vec3 b = cross(stretched, t);
-    vec2 disk = sqrt(u.x) * circle(u.y);
-    float s = 0.5 * (1.0 + stretched.z);
-    disk.y = (1.0 - s) * sqrt(max(1.0 - disk.x * disk.x, 0.0)) + s * disk.y;
-    vec3 h = disk.x * t + disk.y * b + sqrt(max(1.0 - dot(disk, disk), 0.0)) * stretched;
-    return normalize(vec3(alpha * h.xy, max(h.z, 0.0)));
-}
-
-// The half vector of one event, and what masking leaves of light along l: G2/G1.
-vec3 half_vector(vec3 n, vec3 v, float alpha, vec2 u) {
-    OrthonormalBasis frame = orthonormal_basis(n);
-    vec3 local = vec3(dot(v, frame.t), dot(v, frame.b), max(dot(v, n), 1e-4));
-    vec3 h = visible_half_vector(local, alpha, u);
-    return frame.t * h.x + frame.b * h.y + n * h.z;
-}
-
-float unmasked(float cos_v, float cos_l, float alpha) {
-    float lambda_v = ggx_lambda(max(abs(cos_v), 1e-4), alpha);
-    float lambda_l = ggx_lambda(max(abs(cos_l), 1e-4), alpha);
-    return (1.0 + lambda_v) / (1.0 + lambda_v + lambda_l);
-}
-
 // What a surface separates, for a ray that comes through `media`.
 struct Boundary {
     bool sheet;  // transmits light and encloses nothing
