@@ -12,8 +12,9 @@ layout(constant_id = 46) const uint ABSORPTION = 0;  // 0 off, 1 by the nominal 
 uint shadow_rays = 0;
 
 // Reflectance of the boundary between two media for light that does not bend: by the angle in the thinner one, so that
-// there is no total reflection on a straight line.
+// there is no total reflection on a straight line. Equal indices reflect nothing, Schlick's curve or not.
 float straight_reflectance(float cos_v, float n1, float n2) {
+    if (n1 == n2) return 0.0;
     float ratio = max(n1, n2) / min(n1, n2);
     return FRESNEL == 0 ? schlick(vec3(nested_f0(1.0, ratio)), 1.0, cos_v).x : fresnel_dielectric(cos_v, ratio).F;
 }

@@ -127,8 +127,9 @@ vec3 fresnel(Surface s, float cos_in) {
 }
 
 // Reflectance of the boundary from n1 to n2 as its share between that at normal and that at grazing incidence: 1 where the
-// reflection is total.
+// reflection is total, 0 where the indices are equal: Schlick's curve rises at grazing incidence whatever they are.
 float boundary_share(float cos_in, float n1, float n2) {
+    if (n1 == n2) return 0.0;
     if (FRESNEL == 1) {
         float r0 = nested_f0(n1, n2);
         return clamp((fresnel_dielectric(cos_in, n2 / n1).F - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);

@@ -342,6 +342,8 @@ struct Corners<'a> {
     /// Cofactors of each instance with the sign that keeps normals outside.
     cofactors: Vec<DMat3>,
     mirrored: Vec<bool>,
+    /// Whether the normals had to be turned over: tangents change hands with them.
+    normals_mirrored: Vec<bool>,
     scales: Vec<f32>,
     /// `HIT_TEXTURES` of the shader.
     contents: u32,
@@ -358,17 +360,19 @@ impl<'a> Corners<'a> {
             }
             contents |= u32::from(!mesh.colors.is_empty()) << 11;
         }
-        let (mut cofactors, mut mirrored, mut scales) = (Vec::new(), Vec::new(), Vec::new());
-        for (instance, &flipped) in scene.instances.iter().zip(&solids.flipped) {
+        let (mut cofactors, mut mirrored, mut normals_mirrored, mut scales) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for (i, instance) in scene.instances.iter().enumerate() {
             let m = instance.world_from_object.matrix3;
             let determinant = m.determinant();
-            let turned = (determinant < 0.0) != flipped;
+            let turned = |flipped: bool| (determinant < 0.0) != flipped;
             let c = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
-            cofactors.push(if turned { -c } else { c });
-            mirrored.push(turned);
+            let inwards = turned(solids.normals_flipped[i]);
+            cofactors.push(if inwards { -c } else { c });
+            normals_mirrored.push(inwards);
+            mirrored.push(turned(solids.flipped[i]));
             scales.push(determinant.abs().cbrt() as f32);
         }
-        Self { scene, solids, refraction, cofactors, mirrored, scales, contents }
+        Self { scene, solids, refraction, cofactors, mirrored, normals_mirrored, scales, contents }
     }
 
     /// The order of a triangle's corners that runs counter-clockwise around its front.
@@ -409,7 +413,7 @@ impl<'a> Corners<'a> {
         }
         if self.contents & (1 << 2 | 1 << 10) != 0 {
             let linear = instance.world_from_object.matrix3;
-            let side = if self.mirrored[i] { -1.0 } else { 1.0 };
+            let side = if self.normals_mirrored[i] { -1.0 } else { 1.0 };
             for v in vertices {
                 let [x, y, z, w] = mesh.tangents.get(v).copied().unwrap_or_default();
                 let t = (linear * DVec3::new(x.into(), y.into(), z.into())).as_vec3();

@@ -34,6 +34,8 @@ struct Placement {
     mesh: usize,
     /// A transparent body whose triangles are wound the wrong way round.
     flipped: bool,
+    /// And whose normals look inwards with them.
+    normals_flipped: bool,
     sheet: bool,
     first_triangle: u32,
 }
@@ -265,6 +267,7 @@ impl SceneOnDevice {
                     world_from_object: i.world_from_object,
                     mesh: i.mesh,
                     flipped: solids.flipped[index],
+                    normals_flipped: solids.normals_flipped[index],
                     sheet: solids.sheet[index] || !plan.rays.is_some_and(|rays| rays.refraction),
                 })
                 .collect(),
@@ -423,7 +426,7 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs) -> share::Material
 fn shared_instance(placement: &Placement, eye: DVec3, material: usize) -> share::Instance {
     let m = placement.world_from_object.matrix3;
     let determinant = m.determinant();
-    let sign = if placement.mirrors() { -1.0 } else { 1.0 };
+    let sign = if (determinant < 0.0) != placement.normals_flipped { -1.0 } else { 1.0 };
     let cofactors = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
     let largest = cofactors.to_cols_array().iter().fold(0.0_f64, |a, b| a.max(b.abs()));
     let scale = if largest > 0.0 { sign * (-largest.log2().floor()).exp2() } else { 1.0 };
@@ -491,7 +494,7 @@ mod tests {
                 DQuat::from_rotation_y(0.7),
                 DVec3::new(1e7, 0.0, 0.0),
             );
-            let instance = shared_instance(&Placement { world_from_object, mesh: 0, flipped: false, sheet: false, first_triangle: 0 }, DVec3::new(1e7, 1.0, 0.0), 3);
+            let instance = shared_instance(&Placement { world_from_object, mesh: 0, flipped: false, normals_flipped: false, sheet: false, first_triangle: 0 }, DVec3::new(1e7, 1.0, 0.0), 3);
             let columns = instance.normal_from_object.map(|c| glam::Vec3::from(c).as_dvec3());
             let n = (columns[0] * normal.x + columns[1] * normal.y + columns[2] * normal.z).normalize();
             for t in tangents {

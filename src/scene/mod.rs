@@ -152,7 +152,7 @@ impl Bounds {
 }
 
 impl Scene {
-    /// World-space box around every drawn vertex; `None` for a scene without triangles.
+    /// World-space box around every vertex that has a finite place; `None` for a scene without any.
     #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {
         let mut bounds: Option<Bounds> = None;
@@ -160,6 +160,9 @@ impl Scene {
             let mesh = &self.meshes[instance.mesh];
             for &position in &mesh.positions {
                 let p_world = instance.world_from_object.transform_point3(glam::Vec3::from(position).as_dvec3());
+                if !p_world.is_finite() {
+                    continue;
+                }
                 bounds = Some(bounds.map_or(Bounds { min: p_world, max: p_world }, |b| Bounds {
                     min: b.min.min(p_world),
                     max: b.max.max(p_world),

@@ -22,6 +22,8 @@ pub struct Solids {
     /// A transmissive solid whose triangles are wound the wrong way round, seen in object space: the front of each
     /// looks inwards. A mirrored placement does not count.
     pub flipped: Vec<bool>,
+    /// Such a solid whose vertex normals look inwards with them. Normals may be right where the winding is not.
+    pub normals_flipped: Vec<bool>,
     /// One sentence for each mesh that is not what its material says.
     pub warnings: Vec<String>,
 }
@@ -74,6 +76,15 @@ fn signed_volume(mesh: &Mesh) -> f64 {
     if sum.abs() > NO_VOLUME * magnitude { sum / 6.0 } else { 0.0 }
 }
 
+/// Whether the vertex normals of a mesh lie, on the whole, on the front side of its triangles.
+fn normals_follow_faces(mesh: &Mesh) -> bool {
+    let agreement = mesh.indices.as_chunks::<3>().0.iter().zip(corners(mesh)).map(|(triangle, [a, b, c])| {
+        let smooth: DVec3 = triangle.iter().map(|&i| Vec3::from(mesh.normals[i as usize]).as_dvec3()).sum();
+        (b - a).cross(c - a).dot(smooth)
+    });
+    agreement.filter(|x| x.is_finite()).sum::<f64>() >= 0.0
+}
+
 /// What a mesh with a thickness turns out to be.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Body {
@@ -99,13 +110,14 @@ fn body(mesh: &Mesh) -> Body {
 pub fn solids(scene: &Scene) -> Solids {
     let mut warnings = Vec::new();
     let mut bodies: Vec<Option<Body>> = vec![None; scene.meshes.len()];
-    let (mut sheet, mut flipped) = (Vec::new(), Vec::new());
+    let (mut sheet, mut flipped, mut normals_flipped) = (Vec::new(), Vec::new(), Vec::new());
     for instance in &scene.instances {
         let mesh = &scene.meshes[instance.mesh];
         let material = &scene.materials[mesh.material];
         if material.transmission <= 0.0 || material.thickness <= 0.0 {
             sheet.push(material.transmission > 0.0);
             flipped.push(false);
+            normals_flipped.push(false);
             continue;
         }
         let body = *bodies[instance.mesh].get_or_insert_with(|| {
@@ -121,8 +133,9 @@ pub fn solids(scene: &Scene) -> Solids {
         });
         sheet.push(matches!(body, Body::Open | Body::Empty));
         flipped.push(body == Body::InsideOut);
+        normals_flipped.push(body == Body::InsideOut && normals_follow_faces(mesh));
     }
-    Solids { sheet, flipped, warnings }
+    Solids { sheet, flipped, normals_flipped, warnings }
 }
 
 /// The transmissive solids that contain a point, as indices of instances, the one with the largest box first: for
