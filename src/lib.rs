@@ -1,6 +1,7 @@
 //! # Etalon: an explicit Vulkan renderer
 //!
-//! glTF (and OBJ/MTL) in, radiance out: raster G-buffer → deferred lighting → tone map, written directly against `ash`.
+//! glTF (and OBJ/MTL) in, radiance out: raster G-buffer → deferred lighting → reflection and refraction by rays → tone map,
+//! written directly against `ash`.
 //!
 //! ```text
 //! cli ─► verify ─► optics      the formulas in f64, and the shaders held against them
@@ -21,6 +22,9 @@
 //! 2. `shaders/pass/light.comp`: fetches, calls, stores;
 //! 3. `shaders/lib/lighting.glsl`, `surface.glsl`, `brdf.glsl`: the equations;
 //! 4. [`gpu::sync::barriers`]: the barriers of the whole frame, as a pure function of what the passes declare.
+//!
+//! Rays go through [`scene::bvh`], laid out by [`pass::rays`], along `shaders/lib/trace.glsl`; `shaders/pass/interact.comp` is
+//! the tree of reflection and refraction, `shaders/lib/shadow.glsl` the way to a light.
 //!
 //! A pass declares nothing by hand. build.rs reads `readonly` and `writeonly` out of the compiled GLSL and writes, per program, a
 //! module in [`shader`]: `PROGRAM` with the access of each binding, `Bind` with one named field per binding, `Constants`.
