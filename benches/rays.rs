@@ -179,7 +179,9 @@ fn main() -> Result<()> {
     }
     let scenes: Vec<Scene> = match files.is_empty() {
         true => vec![generated(70_000), generated(1_000_000)],
-        false => files.iter().map(|f| etalon::scene::load(Path::new(f), &LoadOptions::default())).collect::<Result<_>>()?,
+        false => {
+            files.iter().map(|f| etalon::scene::load(Path::new(f), &LoadOptions::default())).collect::<Result<_>>()?
+        }
     };
     for scene in &scenes {
         let bvh = Bvh::build(scene)?;
@@ -210,7 +212,10 @@ fn main() -> Result<()> {
                 true,
             ),
         ];
-        println!("  {:8} {:>10} {:>8} {:>9} {:>9} {:>7}  Mrays/s, CPU time / {threads}", "rays", "way", "pairs", "ours", "Embree", "ratio");
+        println!(
+            "  {:8} {:>10} {:>8} {:>9} {:>9} {:>7}  Mrays/s, CPU time / {threads}",
+            "rays", "way", "pairs", "ours", "Embree", "ratio"
+        );
         for way in [Traversal::Links16, Traversal::Links32, Traversal::Stack] {
             let mut tracer = Tracer::new(&device, scene, Some(way))?;
             for (name, rays, any) in &sets {
@@ -231,7 +236,10 @@ fn main() -> Result<()> {
                         let ratio = seconds / best;
                         let differ = mine.abs_diff(theirs);
                         let (a, b) = (rate(best), rate(seconds));
-                        println!("  {name:8} {:>10} {pairs:>8} {a:9.2} {b:9.2} {ratio:7.2}  hits differ by {differ}", format!("{way:?}"));
+                        println!(
+                            "  {name:8} {:>10} {pairs:>8} {a:9.2} {b:9.2} {ratio:7.2}  hits differ by {differ}",
+                            format!("{way:?}")
+                        );
                     }
                     Err(_) => println!("  {name:8} {:>10} {pairs:>8} {:9.2}", format!("{way:?}"), rate(best)),
                 }

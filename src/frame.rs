@@ -201,7 +201,8 @@ impl Renderer {
             bail!("{}: {} lights, a software device lights with at most {most} such", scene.name, scene.lights.len());
         }
         let solids = solids(&scene);
-        let mut warnings = if plan.rays.is_some_and(|rays| rays.refraction) { solids.warnings.clone() } else { Vec::new() };
+        let mut warnings =
+            if plan.rays.is_some_and(|rays| rays.refraction) { solids.warnings.clone() } else { Vec::new() };
         let rays = RaysOnDevice::new(device, &plan, &scene, &solids, settings.traversal)?;
         if let Some(bvh) = rays.facts.filter(|bvh| bvh.dropped > 0) {
             warnings.push(format!("{} triangles without area are left out for rays", bvh.dropped));
@@ -286,8 +287,9 @@ impl Renderer {
     fn sample(&mut self, view: &View, index: u32, count: u32) -> Result<Vec<PassTime>> {
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(index, count))));
         self.rays.look_from(view, index, count);
-        let Self { device, plan, scene, rays, camera, gbuffer: g, tiles: lists_of_lights, work, lists, radiance, .. } =
-            &*self;
+        let Self {
+            device, plan, scene, rays, camera, gbuffer: g, tiles: lists_of_lights, work, lists, radiance, ..
+        } = &*self;
         // With n samples a pixel each one stands for 1/n of its area: textures are read that much sharper.
         let lod_bias = -0.5 * (count as f32).log2();
         let lighting = Lighting {

@@ -35,7 +35,7 @@ fn differing(a: &Picture, b: &Picture, bound: f32) -> usize {
     sorted.sort_by(f32::total_cmp);
     let bright = sorted[sorted.len() * 99 / 100];
     assert!(bright > 0.05, "nothing is lit");
-    let differs = |a: f32, b: f32| !((a - b).abs() <= bound * a.abs().max(0.01 * bright));
+    let differs = |a: f32, b: f32| a.is_nan() || b.is_nan() || (a - b).abs() > bound * a.abs().max(0.01 * bright);
     a.rgba.iter().zip(&b.rgba).filter(|(a, b)| (0..4).any(|c| differs(a[c], b[c]))).count()
 }
 

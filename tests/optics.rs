@@ -435,7 +435,8 @@ fn a_wedge_absorbs_by_the_length_of_each_path() {
     let depth = 0.4;
     let color = [0.3, 0.6, 0.9_f32];
     for scale in [1.0, 2.0] {
-        let frame = DAffine3::from_rotation_y(0.4) * DAffine3::from_rotation_x(0.3) * DAffine3::from_scale(DVec3::splat(scale));
+        let frame =
+            DAffine3::from_rotation_y(0.4) * DAffine3::from_rotation_x(0.3) * DAffine3::from_scale(DVec3::splat(scale));
         let mut made = Made::new("wedge");
         let body = Material { attenuation_color: color, attenuation_distance: 1.0, thickness: 0.3, ..glass(1.0) };
         made.add(Shape::prism(&corners, depth), body, frame);
@@ -518,7 +519,10 @@ fn a_ball_of_nothing_is_invisible_and_so_is_its_shadow() {
                 through += usize::from(a != b);
                 worst = worst.max(if e > 1e-4 { 0.0 } else { e });
             }
-            eprintln!("{camera}, {fresnel}: {worst:e}, {through} pixels differ, {off} of them are others, {:?}", rendered.work);
+            eprintln!(
+                "{camera}, {fresnel}: {worst:e}, {through} pixels differ, {off} of them are others, {:?}",
+                rendered.work
+            );
             assert!(rendered.work.refraction > 1000);
             // Seen through the ball a surface is hit by a ray, 1e-6 m beside where the G-buffer has it, and its colours
             // are no halves: edges may fall to the other side in a few pixels of a few hundred along edges.
@@ -593,7 +597,8 @@ fn beyond_the_critical_angle_all_light_stays_inside() {
             } else if angle < critical - 1e-6 {
                 let want = fresnel_dielectric(d.y, 1.0 / f64::from(n))[0];
                 // Towards the critical angle F rises ever steeper: two roundings of the cosine count as much as it says.
-                let beside = [-1.2e-7, 1.2e-7].map(|e| (fresnel_dielectric(d.y + e, 1.0 / f64::from(n))[0] - want).abs());
+                let beside =
+                    [-1.2e-7, 1.2e-7].map(|e| (fresnel_dielectric(d.y + e, 1.0 / f64::from(n))[0] - want).abs());
                 let bound = 2e-6 * want + beside[0].max(beside[1]);
                 let error = (f64::from(pixel[0]) - want).abs();
                 assert!(error < bound, "n = {n} at {:.3}°: {} for {want}, {bound:e}", angle.to_degrees(), pixel[0]);
@@ -765,7 +770,13 @@ fn turned(x: f64, y: f64, z: f64, axis: DVec3, angle: f64) -> DAffine3 {
 #[test]
 fn paths_through_bodies_in_one_another_are_those_of_the_media_that_win() {
     let gpu = Gpu::new();
-    let block = Body { frame: turned(0.0, 0.0, 0.0, DVec3::new(1.0, 2.0, 0.5), 0.4), edges: DVec3::splat(1.2), n: 1.5, priority: 0, material: 0 };
+    let block = Body {
+        frame: turned(0.0, 0.0, 0.0, DVec3::new(1.0, 2.0, 0.5), 0.4),
+        edges: DVec3::splat(1.2),
+        n: 1.5,
+        priority: 0,
+        material: 0,
+    };
     let water = |priority| Body {
         frame: turned(0.25, 0.1, 0.05, DVec3::new(-1.0, 0.6, 0.3), 0.5),
         edges: DVec3::new(1.1, 0.8, 0.9),
@@ -902,7 +913,11 @@ fn against_shares(gpu: &Gpu, made: &Made, bound: f64, want: impl Fn(DVec3, DVec3
         for c in 0..3 {
             let got = f64::from(film.rgba[i][c]) / f64::from(lit.rgba[i][c]);
             let error = (got - share[c]).abs();
-            assert!(error < bound + 1.5 * (raised[c] - share[c]).abs(), "{:?}, {p}: {got} of the light for {share}, channel {c}", made.0.lights[0].kind);
+            assert!(
+                error < bound + 1.5 * (raised[c] - share[c]).abs(),
+                "{:?}, {p}: {got} of the light for {share}, channel {c}",
+                made.0.lights[0].kind
+            );
         }
         (least, most) = (least.min(share.x), most.max(share.x));
     }
@@ -915,12 +930,22 @@ fn an_opaque_body_casts_its_shadow_where_f64_has_it() {
     let gpu = Gpu::new();
     for kind in lights() {
         let mut made = lit_wall(kind);
-        let body = Body { frame: turned(BETWEEN.x, BETWEEN.y, BETWEEN.z, DVec3::ONE, 0.6), edges: DVec3::new(0.4, 0.3, 0.35), n: 1.0, priority: 0, material: 0 };
+        let body = Body {
+            frame: turned(BETWEEN.x, BETWEEN.y, BETWEEN.z, DVec3::ONE, 0.6),
+            edges: DVec3::new(0.4, 0.3, 0.35),
+            n: 1.0,
+            priority: 0,
+            material: 0,
+        };
         made.add(Shape::cuboid(body.edges), lambert([0.5; 3]), body.frame);
         // Beyond the light, or behind the wall, nothing shadows.
         let (d, length) = to_light(&kind, DVec3::ZERO);
         if length.is_finite() {
-            made.add(Shape::cuboid(DVec3::splat(0.5)), lambert([0.5; 3]), DAffine3::from_translation(d * (length + 1.0)));
+            made.add(
+                Shape::cuboid(DVec3::splat(0.5)),
+                lambert([0.5; 3]),
+                DAffine3::from_translation(d * (length + 1.0)),
+            );
         }
         made.add(Shape::cuboid(DVec3::splat(0.5)), lambert([0.5; 3]), DAffine3::from_translation(d * -1.0));
         let faces = body.faces();
@@ -957,13 +982,15 @@ fn coloured_sheets_and_bodies_colour_the_light_that_passes_them() {
         // A body: the root of its colour at each surface, both boundaries, and what is absorbed on the straight line.
         let mut made = lit_wall(kind);
         let dye = [0.3, 0.8, 0.6_f32];
-        let tinted = Material {
-            base_color: [r, g, b, 1.0],
-            attenuation_color: dye,
-            attenuation_distance: 0.25,
-            ..glass(1.5)
+        let tinted =
+            Material { base_color: [r, g, b, 1.0], attenuation_color: dye, attenuation_distance: 0.25, ..glass(1.5) };
+        let body = Body {
+            frame: turned(BETWEEN.x, BETWEEN.y, BETWEEN.z, DVec3::ONE, 0.6),
+            edges: DVec3::new(0.4, 0.3, 0.35),
+            n: 1.5,
+            priority: 0,
+            material: 0,
         };
-        let body = Body { frame: turned(BETWEEN.x, BETWEEN.y, BETWEEN.z, DVec3::ONE, 0.6), edges: DVec3::new(0.4, 0.3, 0.35), n: 1.5, priority: 0, material: 0 };
         made.add(Shape::cuboid(body.edges), tinted, body.frame);
         let faces = body.faces();
         let [least, most] = against_shares(&gpu, &made, 1e-5, |p, d, _| {
@@ -987,11 +1014,8 @@ fn light_passes_the_holes_of_a_mask() {
         made.0.images.push(Image { name: "mask".to_owned(), width: 8, height: 8, rgba });
         let sampler = Sampler { mag_nearest: true, min_nearest: true, mips: false, ..Sampler::default() };
         let texture = TextureRef { image: 0, uv_set: 0, uv_transform: glam::Affine2::IDENTITY, sampler };
-        let mask = Material {
-            alpha_mode: AlphaMode::Mask(0.5),
-            base_color_texture: Some(texture),
-            ..lambert([1.0; 3])
-        };
+        let mask =
+            Material { alpha_mode: AlphaMode::Mask(0.5), base_color_texture: Some(texture), ..lambert([1.0; 3]) };
         let frame = turned(BETWEEN.x, BETWEEN.y, BETWEEN.z, DVec3::new(0.2, 1.0, 0.1), 1.1);
         made.add(Shape::panel(0.6, 0.4), mask, frame);
         let n = frame.transform_vector3(DVec3::Z);
@@ -1030,7 +1054,10 @@ fn in_a_furnace(gpu: &Gpu, made: &mut Made, fresnel: &str) -> (Rendered, Vec<Str
     // What is missing is what was not followed, which is counted in steps of 2^-16 rounded up.
     let counted = rendered.work.mean_lost;
     assert!(mean < counted + 4e-6 && mean > counted - 2e-5, "{}: {mean} for {counted}", made.0.name);
-    eprintln!("{}, {fresnel}: {lost} lost at most, {mean:e} in the mean, {} stray", made.0.name, rendered.work.stray_interfaces);
+    eprintln!(
+        "{}, {fresnel}: {lost} lost at most, {mean:e} in the mean, {} stray",
+        made.0.name, rendered.work.stray_interfaces
+    );
     (rendered, renderer.warnings.clone(), lost)
 }
 
@@ -1061,7 +1088,11 @@ fn flawed_glass_gives_a_defined_picture_and_is_named() {
 
             let turned_over = |m: &mut Mesh| m.indices.chunks_exact_mut(3).for_each(|t| t.swap(1, 2));
             let flipped = in_a_furnace(&gpu, &mut flawed("turned one", n, turned_over), fresnel);
-            assert!(flipped.1.iter().any(|w| w.contains("\"turned one\"") && w.contains("inside out")), "{:?}", flipped.1);
+            assert!(
+                flipped.1.iter().any(|w| w.contains("\"turned one\"") && w.contains("inside out")),
+                "{:?}",
+                flipped.1
+            );
             assert_eq!(flipped.0.work.stray_interfaces, 0, "turned back, it is sound");
             assert!((flipped.0.work.refraction as f64 / sound.0.work.refraction as f64 - 1.0).abs() < 0.01);
 
@@ -1121,7 +1152,8 @@ fn turned_over_glass_looks_as_it_would_the_right_way_round() {
         });
         if mirrored {
             // The ball is its own mirror image.
-            made.0.instances[0].world_from_object = made.0.instances[0].world_from_object * DAffine3::from_scale(DVec3::new(1.0, -1.0, 1.0));
+            made.0.instances[0].world_from_object =
+                made.0.instances[0].world_from_object * DAffine3::from_scale(DVec3::new(1.0, -1.0, 1.0));
         }
         card(&mut made, 4.0, at(0.0, 0.0, -1.5));
         gpu.shot(&made.0, None, optics([80, 80], &[]))
@@ -1145,7 +1177,9 @@ fn turned_over_glass_looks_as_it_would_the_right_way_round() {
 #[test]
 fn bodies_that_share_a_face_lose_no_light() {
     let gpu = Gpu::new();
-    for (name, gap, n) in [("touching", 0.0, [1.5, 1.333]), ("twins", -0.6, [1.5, 1.5]), ("far apart", 0.5, [1.5, 1.333])] {
+    for (name, gap, n) in
+        [("touching", 0.0, [1.5, 1.333]), ("twins", -0.6, [1.5, 1.5]), ("far apart", 0.5, [1.5, 1.333])]
+    {
         let mut made = Made::new(name);
         let turn = turned(0.0, 0.0, 0.0, DVec3::new(0.3, 1.0, 0.2), 0.5);
         for (n, x) in [(n[0], -0.3 - 0.5 * gap), (n[1], 0.3 + 0.5 * gap)] {
@@ -1161,7 +1195,11 @@ fn bodies_that_share_a_face_lose_no_light() {
 fn an_eye_on_the_glass_sees() {
     let gpu = Gpu::new();
     // On the front face of a block, in its plane to the last bit, looking in, out and along it; and on an edge and a corner.
-    for (name, eye) in [("on a face", DVec3::new(0.1, 0.2, 0.5)), ("on an edge", DVec3::new(0.1, 0.5, 0.5)), ("on a corner", DVec3::splat(0.5))] {
+    for (name, eye) in [
+        ("on a face", DVec3::new(0.1, 0.2, 0.5)),
+        ("on an edge", DVec3::new(0.1, 0.5, 0.5)),
+        ("on a corner", DVec3::splat(0.5)),
+    ] {
         for towards in [DVec3::NEG_Z, DVec3::Z, DVec3::X, DVec3::new(0.1, -0.3, -1.0)] {
             let mut made = Made::new(name);
             made.add(Shape::cuboid(DVec3::ONE), glass(1.5), DAffine3::IDENTITY);
@@ -1211,7 +1249,10 @@ fn what_is_not_followed_is_reported() {
                 assert!(more.work == less.work || mean > 1e-4, "{mean}: more surfaces show more; {last:?}");
             }
         }
-        eprintln!("{} reflections: {} lost at most, {} in the mean", less.work.reflection, less.work.most_lost, less.work.mean_lost);
+        eprintln!(
+            "{} reflections: {} lost at most, {} in the mean",
+            less.work.reflection, less.work.most_lost, less.work.mean_lost
+        );
         // Each mirror more takes a tenth of what is left.
         assert!(less.work.mean_lost < before && less.work.mean_lost > 0.0);
         before = less.work.mean_lost;

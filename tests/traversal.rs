@@ -265,7 +265,7 @@ fn rays_neither_meet_what_they_leave_nor_slip_out() {
                 let inwards = leaving(&bvh, &tracer, count, false, &mut random);
                 let (hits, ..) = tracer.trace(&inwards, Mode::default(), 1).expect("hits");
                 let lost = tally(&hits, |h| h.triangle == Hit::NONE);
-                println!("{name} at {scale:e}, {way:?}: self-hits {met:?}, leaks {lost:?} of {count} each");
+                eprintln!("{name} at {scale:e}, {way:?}: self-hits {met:?}, leaks {lost:?} of {count} each");
                 assert_eq!((met[0], lost), (0, [0, 0]), "{name} at {scale:e}, {way:?}");
                 assert!(met[1] * 1000 <= count, "{name} at {scale:e}, {way:?}: {met:?}");
             }

@@ -360,7 +360,8 @@ impl<'a> Corners<'a> {
             }
             contents |= u32::from(!mesh.colors.is_empty()) << 11;
         }
-        let (mut cofactors, mut mirrored, mut normals_mirrored, mut scales) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (mut cofactors, mut mirrored, mut normals_mirrored, mut scales) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (i, instance) in scene.instances.iter().enumerate() {
             let m = instance.world_from_object.matrix3;
             let determinant = m.determinant();

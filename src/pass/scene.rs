@@ -315,7 +315,9 @@ impl SceneOnDevice {
         self.placements
             .iter()
             .enumerate()
-            .filter(|(_, p)| is_see_through(&self.materials_cpu[self.meshes[p.mesh].material], self.refraction) == see_through)
+            .filter(|(_, p)| {
+                is_see_through(&self.materials_cpu[self.meshes[p.mesh].material], self.refraction) == see_through
+            })
             .filter(|(_, p)| self.meshes[p.mesh].index_count > 0)
             .map(|(instance, placement)| self.draw(instance as u32, placement, inside))
             .collect()
@@ -494,7 +496,18 @@ mod tests {
                 DQuat::from_rotation_y(0.7),
                 DVec3::new(1e7, 0.0, 0.0),
             );
-            let instance = shared_instance(&Placement { world_from_object, mesh: 0, flipped: false, normals_flipped: false, sheet: false, first_triangle: 0 }, DVec3::new(1e7, 1.0, 0.0), 3);
+            let instance = shared_instance(
+                &Placement {
+                    world_from_object,
+                    mesh: 0,
+                    flipped: false,
+                    normals_flipped: false,
+                    sheet: false,
+                    first_triangle: 0,
+                },
+                DVec3::new(1e7, 1.0, 0.0),
+                3,
+            );
             let columns = instance.normal_from_object.map(|c| glam::Vec3::from(c).as_dvec3());
             let n = (columns[0] * normal.x + columns[1] * normal.y + columns[2] * normal.z).normalize();
             for t in tangents {

@@ -178,11 +178,12 @@ impl Plan {
                 && (m.clearcoat_roughness <= ROUGHEST_MIRROR || m.clearcoat_roughness_texture.is_some());
             !m.unlit && (base || coat)
         };
-        let cause = material(find(&smooth), &|m| match (mirrors(m) && m.roughness <= ROUGHEST_MIRROR, m.clearcoat > 0.0) {
-            (true, _) => format!("has roughness {}", m.roughness),
-            (false, true) => format!("has a coat of roughness {}", m.clearcoat_roughness),
-            (false, false) => "has a roughness texture".to_owned(),
-        });
+        let cause =
+            material(find(&smooth), &|m| match (mirrors(m) && m.roughness <= ROUGHEST_MIRROR, m.clearcoat > 0.0) {
+                (true, _) => format!("has roughness {}", m.roughness),
+                (false, true) => format!("has a coat of roughness {}", m.clearcoat_roughness),
+                (false, false) => "has a roughness texture".to_owned(),
+            });
         let mirror_rays = decide("mirrors", "reflection", cause, knobs.rung("reflection") == "ray");
         let ambient = decide("ambient light", "indirect", environment(), knobs.rung("indirect") != "off");
 
@@ -216,7 +217,9 @@ impl Plan {
                 transmissive: any(&|m| m.transmission > 0.0),
                 masked,
                 filters: masked || any(&|m| is_see_through(m, false)),
-                rough: any(&|m| m.roughness > 0.0 && ((mirror_rays && smooth(m)) || (refraction && m.transmission > 0.0))),
+                rough: any(&|m| {
+                    m.roughness > 0.0 && ((mirror_rays && smooth(m)) || (refraction && m.transmission > 0.0))
+                }),
                 absorption: knobs.index("absorption"),
                 interfaces: knobs.interfaces(),
             }
