@@ -3,7 +3,7 @@
 //! work on the machine does to wall time does not count.
 //!
 //! `./x bench --bench rays [-- FILE.glb ...]`; without files two generated scenes of 70 thousand and a million triangles.
-#![allow(missing_docs, reason = "a program, not a library")]
+#![allow(missing_docs, clippy::print_stdout, reason = "a program whose figures go to standard output")]
 
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
