@@ -9,10 +9,10 @@ use glam::{DMat3, DVec3};
 use super::texture::{Meaning, Texels, Textures};
 use super::view::View;
 use crate::gpu::{Buffer, Device, Draw, Frame, Place, Sampled, VertexStream};
-use crate::plan::{Knobs, Plan, is_see_through, mirrors};
+use crate::plan::{Knobs, Plan, casts_in_maps, is_see_through, mirrors};
 use crate::scene::solid::Solids;
 use crate::scene::{AlphaMode, Bounds, Light, LightKind, Material, Scene, TextureRef};
-use crate::shader::gbuffer;
+use crate::shader::{gbuffer, shadow_map};
 use crate::share;
 
 /// Texture slots of a material, in the order of `shaders/lib/gbuffer_interface.glsl`.
@@ -280,14 +280,25 @@ impl SceneOnDevice {
 
     /// Moves instances and lights to the eye of `view`: differences in f64, stored in f32.
     pub fn look_from(&mut self, view: &View) {
-        let table: Vec<_> = self
-            .placements
-            .iter()
-            .map(|placement| shared_instance(placement, view.eye, self.meshes[placement.mesh].material))
-            .collect();
+        let table = self.instances_around(view.eye);
         self.instances.write(bytemuck::cast_slice(&table));
         let table: Vec<[[f32; 4]; 4]> = self.lights_cpu.iter().map(|light| shared_light(light, view.eye)).collect();
         self.lights.write(bytemuck::cast_slice(&table));
+    }
+
+    /// The table of instances relative to a point of the world.
+    #[must_use]
+    pub fn instances_around(&self, origin: DVec3) -> Vec<share::Instance> {
+        self.placements
+            .iter()
+            .map(|placement| shared_instance(placement, origin, self.meshes[placement.mesh].material))
+            .collect()
+    }
+
+    /// The lights in the order of their table: directional ones first.
+    #[must_use]
+    pub fn lights_in_order(&self) -> &[Light] {
+        &self.lights_cpu
     }
 
     /// The device that holds it.
@@ -315,6 +326,35 @@ impl SceneOnDevice {
             .filter(|(_, p)| is_see_through(&self.materials_cpu[self.meshes[p.mesh].material], self.refraction) == see_through)
             .filter(|(_, p)| self.meshes[p.mesh].index_count > 0)
             .map(|(instance, placement)| self.draw(instance as u32, placement, inside))
+            .collect()
+    }
+
+    /// The draws of all surfaces that shadow maps hold, from both sides: a ray to a light stops at either.
+    #[must_use]
+    pub fn casters(&self) -> Vec<Draw<'_>> {
+        let material = |p: &Placement| &self.materials_cpu[self.meshes[p.mesh].material];
+        self.placements
+            .iter()
+            .enumerate()
+            .filter(|(_, p)| casts_in_maps(material(p)) && self.meshes[p.mesh].index_count > 0)
+            .map(|(instance, placement)| {
+                let masked = matches!(material(placement).alpha_mode, AlphaMode::Mask(_));
+                let mesh = &self.meshes[placement.mesh];
+                let constants = shadow_map::Constants {
+                    masked,
+                    has_base: masked && material(placement).base_color_texture.is_some(),
+                    has_color: masked && mesh.has_colors,
+                };
+                let draw = self.draw(instance as u32, placement, false);
+                Draw {
+                    binding: if masked { draw.binding } else { 0 },
+                    constants: constants.words(),
+                    // Position, both texture coordinates, colour.
+                    streams: [0, 3, 4, 5].map(|i| draw.streams[i]).to_vec(),
+                    cull_back: false,
+                    ..draw
+                }
+            })
             .collect()
     }
 
