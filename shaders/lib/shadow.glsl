@@ -12,7 +12,7 @@ layout(constant_id = 45) const bool FILTERS = false; // something masked, blende
 layout(constant_id = 46) const uint ABSORPTION = 0;  // 0 off, 1 by the nominal thickness, 2 along the path
 
 // Maps of all lights in one image (pass/shadow_map.rs), and their table: a texel per light, with the first texel of its
-// first map and their number; then five per map: first texel across and down and texels a side, and the rows that lead from
+// first map, their number, and whether their depth is told from the light; then five per map: first texel across and down and texels a side, and the rows that lead from
 // bvh space to texels across and down of the image, depth, and 1, all times w.
 layout(set = 0, binding = 36) uniform sampler2D shadow_depth;
 layout(set = 0, binding = 37, rgba32f) readonly uniform imageBuffer shadow_faces;
@@ -78,7 +78,7 @@ int cube_face(vec3 d) {
 }
 
 // Share of light `index` that arrives at p, in bvh space, by its map: n is the normal of p's surface on the side of the
-// light, to_light leads to it where it is local, and p was computed from numbers as large as `size`.
+// light, to_light leads to it or is its direction, and p was computed from numbers as large as `size`.
 //
 // The four texels whose centres lie around p, less than a texel away across and down, are compared and the results
 // interpolated. Depth d is reversed: nearer to the light is larger. In texels and d, a plane is a plane.
@@ -96,9 +96,9 @@ int cube_face(vec3 d) {
 // Roundings, in units of 2^-24: p is the middle of a pixel, with an error along the eye's ray. A triangle's depth 1/z
 // is interpolated to some 4 of its largest value in sight, 1/z_n, which is 4 z/z_n of z; seen at an angle it counts along the
 // normal, and h/z ≥ cos is the plane's distance over p's: 4 h z/z_n ≤ 4 z/cos of the frustum's corner: 8 of |p_rel|. The
-// map's depth likewise, 8 of the distance to a local light, 8 of the scene's extent for a directional one, and that again for
+// map's depth likewise, 8 of the distance to a light near the scene, 8 of the scene's extent for others, and that again for
 // the products here. All of it is an offset along n, by `size` with 32: half of that, and as much to spare.
-float map_visibility(vec3 p, vec3 n, vec3 to_light, bool directional, uint index, float size) {
+float map_visibility(vec3 p, vec3 n, vec3 to_light, uint index, float size) {
     vec4 light = imageLoad(shadow_faces, int(index));
     int first = int(light.x) + (light.y > 1.0 ? cube_face(-to_light) * 5 : 0);
     vec4 square = imageLoad(shadow_faces, first);
@@ -106,7 +106,7 @@ float map_visibility(vec3 p, vec3 n, vec3 to_light, bool directional, uint index
     vec4 row_v = imageLoad(shadow_faces, first + 2);
     vec4 row_d = imageLoad(shadow_faces, first + 3);
     vec4 row_w = imageLoad(shadow_faces, first + 4);
-    float distance = directional ? 0.0 : vector_length(to_light);
+    float distance = light.z > 0.0 ? vector_length(to_light) : 0.0;
     vec4 q = vec4(p + n * (trace_terms.offset + (size + distance) * SHADOW_ROUNDINGS), 1.0);
     float w = dot(row_w, q);
     vec3 at = vec3(dot(row_u, q), dot(row_v, q), dot(row_d, q)) / w;

@@ -12,33 +12,34 @@ use ash::vk;
 use glam::{DVec3, DVec4};
 
 use super::scene::SceneOnDevice;
-use crate::gpu::{
-    Buffer, DepthTarget, Device, Frame, Image, ImageDesc, PassTime, Place, Raster, Sampled, SamplerDesc,
-};
+use crate::gpu::{Buffer, DepthTarget, Device, Frame, Image, ImageDesc, PassTime, Place, Raster, Sampled, SamplerDesc};
 use crate::plan::Plan;
 use crate::scene::{Bounds, Light, LightKind};
 use crate::shader::shadow_map;
 
 /// Texels a side of the image that holds all maps, at most: what every device allows, and 64 MiB of depth.
 const ATLAS: u32 = 4096;
-/// Texels a side of the map of a directional light, or of a spot light's cone, where there is room …
+/// Texels a side of a light's only map where there is room …
 const FLAT: u32 = 2048;
-/// … and of each of the six of a point light: of the six four go once around, which is the same again twice.
+/// … and of each of six: of those four go once around.
 const CUBE: u32 = FLAT / 2;
 /// The smallest of the six. A texel is 1.4° then; coarser ones would show blots for shadows.
 const SMALLEST_CUBE: u32 = 64;
 /// Texels around what a map has to show, for its filter: 2x2 texels around a point, and one for its rounding.
 const BORDER: f64 = 2.0;
-/// Spot lights up to this half angle have one map; a plane stretches as the tangent's square towards its edge, and wider
-/// ones have six as a point light has.
+/// Half angle up to which a light has one map, of a spot light's cone or of the scene seen from outside; a plane stretches
+/// as the tangent's square towards its edge, and wider ones have six, all around.
 const WIDEST_CONE: f64 = FRAC_PI_3;
+/// From how many radii of the scene on it is seen from so far that depth is told across the scene and not from the light:
+/// numbers as large as the distance then hide nothing of it.
+const FAR: f64 = 4.0;
 /// Texels of the table per map: shaders/lib/shadow.glsl.
 const FACE_TEXELS: usize = 5;
 
 /// The maps; next to nothing where the plan has none.
 pub struct ShadowMaps {
     depth: Image,
-    /// One texel per light: first texel of its first map, how many maps. Then five per map: its square, and the rows of
+    /// One texel per light: first texel of its first map, how many maps, whether their depth is told from the light. Then five per map: its square, and the rows of
     /// its matrix.
     pub faces: Buffer,
     /// GPU time of the drawing.
@@ -70,7 +71,7 @@ impl ShadowMaps {
             return Ok(Self { depth: image(1, 1)?, faces, times: Vec::new() });
         };
         let lights = scene.lights_in_order();
-        let cubes = lights.iter().filter(|light| is_cube(light)).count();
+        let cubes = lights.iter().filter(|light| cone(light, bounds).is_none()).count();
         let Some([flat, cube]) = sides(lights.len() - cubes, cubes) else {
             bail!(
                 "{name}: {} lights need {} shadow maps, more than {ATLAS}x{ATLAS} texels hold: choose shadows=ray or \
@@ -81,12 +82,15 @@ impl ShadowMaps {
         };
         let mut faces: Vec<Face> = Vec::new();
         let mut first = vec![0; lights.len()];
+        let mut told = vec![0.0; lights.len()];
         // Large squares first: what follows along the curve then starts at a multiple of its own size.
         let mut next = 0;
         for large in [true, false] {
-            for (index, light) in lights.iter().enumerate().filter(|(_, light)| is_cube(light) != large) {
+            for (index, light) in lights.iter().enumerate().filter(|(_, light)| cone(light, bounds).is_some() == large)
+            {
                 first[index] = faces.len();
                 let side = if large { flat } else { cube };
+                told[index] = f32::from(u8::from(is_told_from_light(light, bounds, anchor)));
                 for clip in clip_rows(light, side, bounds, anchor) {
                     let [x, y] = along_curve(next);
                     faces.push(Face { clip, square: [x, y, side] });
@@ -96,10 +100,10 @@ impl ShadowMaps {
         }
         let mut table: Vec<[f32; 4]> = lights
             .iter()
-            .zip(first)
-            .map(|(light, first)| {
+            .zip(first.into_iter().zip(told))
+            .map(|(light, (first, told))| {
                 let texel = lights.len() + first * FACE_TEXELS;
-                [texel as f32, if is_cube(light) { 6.0 } else { 1.0 }, 0.0, 0.0]
+                [texel as f32, if cone(light, bounds).is_some() { 1.0 } else { 6.0 }, told, 0.0]
             })
             .collect();
         table.extend(faces.iter().flat_map(Face::texels));
@@ -168,11 +172,32 @@ fn draw(
     frame.finish()
 }
 
-fn is_cube(light: &Light) -> bool {
+/// Axis and half angle of the cone that one map of a light shows: of the light's own and the one around the scene the
+/// narrower. `None` where that is too wide for one. A directional light's has no angle.
+fn cone(light: &Light, bounds: Bounds) -> Option<(DVec3, f64)> {
+    let around = |position: DVec3| {
+        let to_middle = bounds.center() - position;
+        let sine = bounds.radius() / to_middle.length();
+        if sine < 1.0 { (to_middle.normalize(), sine.asin()) } else { (DVec3::Z, std::f64::consts::PI) }
+    };
+    let (axis, half) = match light.kind {
+        LightKind::Directional { direction } => (direction, 0.0),
+        LightKind::Point { position, .. } => around(position),
+        LightKind::Spot { position, direction, outer, .. } => {
+            let around = around(position);
+            if around.1 < outer { around } else { (direction, outer) }
+        }
+    };
+    (half <= WIDEST_CONE).then_some((axis, half))
+}
+
+/// Whether a map's depth is 1/z of the light, and not across the scene.
+fn is_told_from_light(light: &Light, bounds: Bounds, anchor: DVec3) -> bool {
     match light.kind {
         LightKind::Directional { .. } => false,
-        LightKind::Point { .. } => true,
-        LightKind::Spot { outer, .. } => outer > WIDEST_CONE,
+        LightKind::Point { position, .. } | LightKind::Spot { position, .. } => {
+            cone(light, bounds).is_none_or(|(axis, _)| (anchor - position).dot(axis) < FAR * bounds.radius())
+        }
     }
 }
 
@@ -204,14 +229,19 @@ fn clip_rows(light: &Light, side: u32, bounds: Bounds, anchor: DVec3) -> Vec<[DV
         let near = (0.5 * outside).max(1e-5 * radius) / slant;
         let row = |axis: DVec3, scale: f64| (axis * scale).extend(-axis.dot(eye) * scale);
         let down = forward.cross(right);
-        [row(right, 1.0 / tan), row(down, 1.0 / tan), DVec4::W * near, row(forward, 1.0)]
+        let depth = if is_told_from_light(light, bounds, anchor) {
+            DVec4::W * near
+        } else {
+            // Over z: 1 at the near end of the sphere around the scene, 0 at the far one.
+            let reach = radius * (1.0 + 2.0_f64.powi(-8));
+            (-forward).extend(reach) * ((-forward.dot(eye) - reach) / (2.0 * reach))
+        };
+        [row(right, 1.0 / tan), row(down, 1.0 / tan), depth, row(forward, 1.0)]
     };
     let cube = |position: DVec3| {
         // As `cube_face` in shaders/lib/shadow.glsl counts them: +x, −x, +y, −y, +z, −z.
         let axes = [DVec3::X, DVec3::Y, DVec3::Z];
-        (0..6)
-            .map(|i| from(position, axes[i / 2] * [1.0, -1.0][i % 2], axes[(i / 2 + 1) % 3], widen))
-            .collect()
+        (0..6).map(|i| from(position, axes[i / 2] * [1.0, -1.0][i % 2], axes[(i / 2 + 1) % 3], widen)).collect()
     };
     match light.kind {
         LightKind::Directional { direction } => {
@@ -226,11 +256,10 @@ fn clip_rows(light: &Light, side: u32, bounds: Bounds, anchor: DVec3) -> Vec<[DV
             let depth = row(-direction, 0.5 * (1.0 - 2.0_f64.powi(-16)) / reach(direction)) + DVec4::W * 0.5;
             vec![[row(right, 1.0 / (widen * reach(right))), row(down, 1.0 / (widen * reach(down))), depth, DVec4::W]]
         }
-        LightKind::Point { position, .. } => cube(position),
-        LightKind::Spot { position, .. } if is_cube(light) => cube(position),
-        LightKind::Spot { position, direction, outer, .. } => {
-            vec![from(position, direction, direction.any_orthonormal_vector(), outer.tan() * widen)]
-        }
+        LightKind::Point { position, .. } | LightKind::Spot { position, .. } => match cone(light, bounds) {
+            Some((axis, half)) => vec![from(position, axis, axis.any_orthonormal_vector(), half.tan() * widen)],
+            None => cube(position),
+        },
     }
 }
 
