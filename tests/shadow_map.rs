@@ -489,3 +489,23 @@ fn many_lights_stay_within_the_budget() {
     let text = format!("{error:#}");
     assert!(text.contains("1000 lights") && text.contains("shadows=ray") && text.contains("shadows=off"), "{text}");
 }
+
+/// Triangles far smaller than texels, whose slopes the rasteriser tells badly: still nothing lit is dark. Each is met by
+/// a texel's centre now and then alone.
+#[test]
+fn meshes_finer_than_texels_are_not_spotted() {
+    let gpu = Gpu::new();
+    for (name, kind) in
+        [("sun", sun(35.0, 150.0)), ("low sun", sun(6.0, 150.0)), ("lamp", point(DVec3::new(-4.0, 2.0, 5.0)))]
+    {
+        let mut made = Made::new("fine");
+        made.add(Shape::plane(60.0, 60.0, 1), lambert([1.0; 3]), DAffine3::IDENTITY);
+        made.add(faceted(&Shape::sphere(0.6, 128)), lambert([1.0; 3]), at(0.0, 0.5, 0.0));
+        made.light([10.0; 3], kind);
+        made.camera(DVec3::new(2.0, 1.5, 2.5), DVec3::new(0.0, 0.4, 0.0), made::perspective(42.0));
+        let wrong = wrong(&made.0, &shares(&gpu, &made.0, SIZE), BAND);
+        eprintln!("{name}: {wrong:?}");
+        assert!(wrong.dark + wrong.lit == 0, "{name}: {wrong:?}");
+        assert!(wrong.judged[0] > 1000 && wrong.judged[1] > 100, "{name}: {wrong:?}");
+    }
+}

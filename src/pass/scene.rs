@@ -26,6 +26,8 @@ struct MeshRange {
     has_tangents: bool,
     has_uvs: [bool; 2],
     has_colors: bool,
+    /// Middle and half extent of its box.
+    extent: [DVec3; 2],
 }
 
 /// An instance as it was read, for every frame's eye.
@@ -143,6 +145,13 @@ pub fn upload<T: bytemuck::NoUninit>(
     Ok(buffer)
 }
 
+fn extent(positions: &[[f32; 3]]) -> [DVec3; 2] {
+    let mut all = positions.iter().map(|&p| glam::Vec3::from(p).as_dvec3());
+    let first = all.next().unwrap_or_default();
+    let (min, max) = all.fold((first, first), |(min, max), p| (min.min(p), max.max(p)));
+    [(min + max) * 0.5, (max - min) * 0.5]
+}
+
 fn stream<T: bytemuck::NoUninit>(
     device: &Arc<Device>,
     name: &str,
@@ -191,6 +200,7 @@ impl SceneOnDevice {
                 has_tangents: !mesh.tangents.is_empty(),
                 has_uvs: [!mesh.uvs[0].is_empty(), !mesh.uvs[1].is_empty()],
                 has_colors: !mesh.colors.is_empty(),
+                extent: extent(&mesh.positions),
             });
             all_indices.extend_from_slice(&mesh.indices);
         }
@@ -329,14 +339,20 @@ impl SceneOnDevice {
             .collect()
     }
 
-    /// The draws of all surfaces that shadow maps hold, from both sides: a ray to a light stops at either.
+    /// The draws of all surfaces that shadow maps hold, from both sides, as a ray to a light stops at either: those whose box
+    /// is seen, by its middle and half extent in the world.
     #[must_use]
-    pub fn casters(&self) -> Vec<Draw<'_>> {
+    pub fn casters(&self, is_seen: impl Fn(DVec3, DVec3) -> bool) -> Vec<Draw<'_>> {
         let material = |p: &Placement| &self.materials_cpu[self.meshes[p.mesh].material];
         self.placements
             .iter()
             .enumerate()
             .filter(|(_, p)| casts_in_maps(material(p)) && self.meshes[p.mesh].index_count > 0)
+            .filter(|(_, p)| {
+                let ([middle, half], m) = (self.meshes[p.mesh].extent, p.world_from_object.matrix3);
+                let half = m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z;
+                is_seen(p.world_from_object.transform_point3(middle), half)
+            })
             .map(|(instance, placement)| {
                 let masked = matches!(material(placement).alpha_mode, AlphaMode::Mask(_));
                 let mesh = &self.meshes[placement.mesh];

@@ -131,6 +131,16 @@ impl Face {
         [[x as f32, y as f32, side as f32, 0.0], row(across), row(down), row(cz), row(cw)]
     }
 
+    /// Whether anything of a box may lie within the map: it is not wholly on the wrong side of one of its planes. What is
+    /// no number is drawn.
+    fn sees(&self, middle: DVec3, half: DVec3) -> bool {
+        let [x, y, z, w] = self.clip;
+        ![w + x, w - x, w + y, w - y, w - z].iter().any(|plane| {
+            let (n, d) = (plane.truncate(), plane.w);
+            n.dot(middle) + d < -n.abs().dot(half)
+        })
+    }
+
     fn clip_from_scene(&self) -> [[f32; 4]; 4] {
         [0, 1, 2, 3].map(|column| self.clip.map(|row| row[column] as f32))
     }
@@ -167,7 +177,8 @@ fn draw(
             rows: [0, side],
         };
         let push = face.clip_from_scene();
-        frame.raster(&raster, &shadow_map::PROGRAM, &bindings, bytemuck::cast_slice(&push), scene.casters())?;
+        let casters = scene.casters(|middle, half| face.sees(middle - anchor, half));
+        frame.raster(&raster, &shadow_map::PROGRAM, &bindings, bytemuck::cast_slice(&push), casters)?;
     }
     frame.finish()
 }
