@@ -21,6 +21,7 @@ use crate::pass::interact::interact;
 use crate::pass::light::{Lighting, light};
 use crate::pass::rays::{BvhFacts, RaysOnDevice, Traversal};
 use crate::pass::scene::SceneOnDevice;
+use crate::pass::shadow_map::ShadowMaps;
 use crate::pass::tiles::{Tiles, tiles};
 use crate::pass::tonemap::{Counts, Display, tonemap};
 use crate::pass::view::{View, jitter};
@@ -151,6 +152,7 @@ pub struct Renderer {
     scene: SceneOnDevice,
     rays: RaysOnDevice,
     ray_tiles: RayTiles,
+    shadow_maps: ShadowMaps,
     environment: EnvironmentOnDevice,
     gbuffer: GBuffer,
     tiles: Tiles,
@@ -208,13 +210,16 @@ impl Renderer {
             warnings.push(format!("{} triangles without area are left out for rays", bvh.dropped));
         }
         let turn = Turn { intensity: settings.environment_intensity, rotation: settings.environment_rotation };
+        let name = scene.name.clone();
+        let scene = SceneOnDevice::new(device, scene, &plan, &settings.knobs, &solids)?;
         let target = |name| {
             let usage = vk::ImageUsageFlags::STORAGE;
             Image::new(device, name, ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], usage))
         };
         Ok(Self {
             environment: EnvironmentOnDevice::new(device, &plan, environment, turn)?,
-            scene: SceneOnDevice::new(device, scene, &plan, &settings.knobs, &solids)?,
+            shadow_maps: ShadowMaps::new(device, &plan, &name, &scene, rays.anchor())?,
+            scene,
             rays,
             ray_tiles: RayTiles::new(device, size)?,
             gbuffer: GBuffer::new(device, &plan, size)?,
@@ -240,6 +245,8 @@ impl Renderer {
         let view = View::new(camera, self.settings.size, self.scene.bounds);
         self.scene.look_from(&view);
         let mut times = Times::default();
+        // Drawn once, before the first picture.
+        times.add(std::mem::take(&mut self.shadow_maps.times));
         let count = self.plan.samples;
         let mut dropped = 0;
         let mut work = Work::default();
@@ -297,6 +304,7 @@ impl Renderer {
             knobs: &self.settings.knobs,
             scene,
             rays,
+            shadow_maps: &self.shadow_maps,
             tiles: lists_of_lights,
             environment: &self.environment,
             camera,

@@ -38,6 +38,10 @@ vec3 light_on(Surface s, uint index) {
     if (SHADOWS != 0) {
         result *= terminator(s.n, s.n_triangle, l);
         bool wanted = largest(result) > 0.0;
+        if (SHADOWS == SHADOW_MAP) {
+            float share = map_visibility(s.p_bvh, s.n_triangle, to_light, index, largest_component(s.p_rel));
+            return wanted ? result * share : vec3(0.0);
+        }
         result *= visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, directional ? l : to_light,
                              directional ? LARGEST : 1.0, wanted);
     }

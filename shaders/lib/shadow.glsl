@@ -5,9 +5,19 @@
 #include "lib/hit.glsl"
 #include "lib/media.glsl"
 
-layout(constant_id = 44) const uint SHADOWS = 0;     // 0 off, 1 ray
+layout(constant_id = 44) const uint SHADOWS = 0;     // rungs of the knob: 0 off, 1 map, 2 ray
+const uint SHADOW_MAP = 1;
+const uint SHADOW_RAY = 2;
 layout(constant_id = 45) const bool FILTERS = false; // something masked, blended or transmissive is in the scene
 layout(constant_id = 46) const uint ABSORPTION = 0;  // 0 off, 1 by the nominal thickness, 2 along the path
+
+// Maps of all lights in one image (pass/shadow_map.rs), and their table: a texel per light, with the first texel of its
+// first map, their number, and whether their depth is told from the light; then five per map: first texel across and down and texels a side, and the rows that lead from
+// bvh space to texels across and down of the image, depth, and 1, all times w.
+layout(set = 0, binding = 36) uniform sampler2D shadow_depth;
+layout(set = 0, binding = 37, rgba32f) readonly uniform imageBuffer shadow_faces;
+// Of the numbers that a map's comparison rests on; see below.
+const float SHADOW_ROUNDINGS = 32.0 / 16777216.0;
 
 uint shadow_rays = 0;
 
@@ -59,6 +69,66 @@ Hit hit_again(vec3 origin, vec3 direction, float t, uint triangle) {
     ShearedTriangle s = sheared_triangle(ray_shear(direction), a, b, c);
     float inverse = 1.0 / s.det;
     return Hit(t, triangle, s.weights.y * inverse, s.weights.z * inverse);
+}
+
+// Which of six maps along ±x, ±y, ±z shows what lies in direction d from the light.
+int cube_face(vec3 d) {
+    vec3 a = abs(d);
+    int axis = a.x >= max(a.y, a.z) ? 0 : a.y >= a.z ? 1 : 2;
+    return 2 * axis + (d[axis] < 0.0 ? 1 : 0);
+}
+
+// Share of light `index` that arrives at p, in bvh space, by its map: n is the normal of p's surface on the side of the
+// light, to_light leads to it or is its direction, and p was computed from numbers as large as `size`.
+//
+// The four texels whose centres lie around p, less than a texel away across and down, are compared and the results
+// interpolated. Depth d is reversed: nearer to the light is larger. In texels and d, a plane is a plane.
+//
+// What must not happen is that p is dark by a surface that it is on, or that it meets: light reaches both. At a centre c,
+// - a plane through p has the depth d_c = d_p + g·(c − p), g its slope. Of a convex body all the rest is behind it, and p is
+//   lit where d_c is no less than what is stored.
+// - What p's plane meets in a hollow may stand before it at c: say a plane of slope h, which has passed p's depth somewhere
+//   between p and c. Then its depth at p, d' + h·(p − c), is not before p's: d_p ≥ d' − (|h_x| + |h_y|). So that is what
+//   the map stores, d' less its change over a texel (pass/shadow_map.frag), and p is lit where d_p is no less than that.
+// Whichever is more favourable counts: max(d_c, d_p) ≥ stored. Both are shifts along a surface by up to a texel across and
+// down; so a shadow's edge lies within two texels (each way) of where it belongs, also where the surfaces touch.
+// What bends twice within a texel is not told from an edge.
+//
+// Roundings, in units of 2^-24: p is the middle of a pixel, with an error along the eye's ray. A triangle's depth 1/z
+// is interpolated to some 4 of its largest value in sight, 1/z_n, which is 4 z/z_n of z; seen at an angle it counts along the
+// normal, and h/z ≥ cos is the plane's distance over p's: 4 h z/z_n ≤ 4 z/cos of the frustum's corner: 8 of |p_rel|. The
+// map's depth likewise, 8 of the distance to a light near the scene, 8 of the scene's extent for others, and that again for
+// the products here. All of it is an offset along n, by `size` with 32: half of that, and as much to spare.
+float map_visibility(vec3 p, vec3 n, vec3 to_light, uint index, float size) {
+    vec4 light = imageLoad(shadow_faces, int(index));
+    int first = int(light.x) + (light.y > 1.0 ? cube_face(-to_light) * 5 : 0);
+    vec4 square = imageLoad(shadow_faces, first);
+    vec4 row_u = imageLoad(shadow_faces, first + 1);
+    vec4 row_v = imageLoad(shadow_faces, first + 2);
+    vec4 row_d = imageLoad(shadow_faces, first + 3);
+    vec4 row_w = imageLoad(shadow_faces, first + 4);
+    float distance = light.z > 0.0 ? vector_length(to_light) : 0.0;
+    vec4 q = vec4(p + n * (trace_terms.offset + (size + distance) * SHADOW_ROUNDINGS), 1.0);
+    float w = dot(row_w, q);
+    vec3 at = vec3(dot(row_u, q), dot(row_v, q), dot(row_d, q)) / w;
+    // Gradients of across, down and depth in space, times w. On the plane, ∇d = g_x ∇u + g_y ∇v + a multiple of n.
+    vec3 grad_u = row_u.xyz - at.x * row_w.xyz;
+    vec3 grad_v = row_v.xyz - at.y * row_w.xyz;
+    vec3 grad_d = row_d.xyz - at.z * row_w.xyz;
+    vec3 v_n = cross(grad_v, n);
+    float area = dot(grad_u, v_n);
+    vec2 slope = area != 0.0 ? vec2(dot(grad_d, v_n), dot(grad_d, cross(n, grad_u))) / area : vec2(0.0);
+    // Nothing beyond the border is asked for but where there is no light.
+    at.xy = clamp(at.xy, square.xy + 1.0, square.xy + square.z - 1.0);
+    vec2 corner = floor(at.xy - 0.5) + 1.0;
+    vec2 share = at.xy - 0.5 - floor(at.xy - 0.5);
+    vec4 stored = textureGather(shadow_depth, corner / vec2(textureSize(shadow_depth, 0)));
+    // In the order of textureGather: left below, right below, right above, left above.
+    vec4 across = corner.x + vec4(-0.5, 0.5, 0.5, -0.5) - at.x;
+    vec4 down = corner.y + vec4(0.5, 0.5, -0.5, -0.5) - at.y;
+    vec4 plane = at.z + max(slope.x * across + slope.y * down, 0.0);
+    vec4 lit = vec4(greaterThanEqual(plane, stored));
+    return mix(mix(lit.w, lit.z, share.x), mix(lit.x, lit.y, share.x), share.y);
 }
 
 // p in bvh space, n the normal of its triangle, `self` its flat face, v to the viewer, `media` those on the light's side. The light is at p + to_light, or

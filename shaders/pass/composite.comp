@@ -102,5 +102,5 @@ void main() {
     vec4 behind = imageLoad(radiance, pixel);
     float coverage = 1.0 - (through.r + through.g + through.b) * (1.0 / 3.0) * (1.0 - behind.a);
     imageStore(radiance, pixel, vec4(sum + through * behind.rgb, coverage));
-    if (SHADOWS != 0) count_rays(0, 0, 0.0);
+    if (SHADOWS == SHADOW_RAY) count_rays(0, 0, 0.0);
 }

@@ -34,5 +34,5 @@ void main() {
     vec3 result = radiance_to_eye(s, pixel, tiles_across, range, first_dispatch != 0);
     if (first_dispatch == 0) result += imageLoad(radiance, pixel).rgb;
     imageStore(radiance, pixel, vec4(result, 1.0));
-    if (SHADOWS != 0) count_rays(0, 0, 0.0);
+    if (SHADOWS == SHADOW_RAY) count_rays(0, 0, 0.0);
 }

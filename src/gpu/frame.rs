@@ -88,9 +88,11 @@ pub struct Raster<'a> {
     pub colors: Vec<ColorTarget<'a>>,
     /// Depth attachment.
     pub depth: Option<DepthTarget<'a>>,
+    /// First pixel of the viewport: several pictures may share one image.
+    pub origin: [u32; 2],
     /// Size of the viewport in pixels.
     pub size: [u32; 2],
-    /// Rows drawn: from, up to.
+    /// Rows of the viewport that are cleared and drawn: from, up to.
     pub rows: [u32; 2],
 }
 
@@ -314,7 +316,7 @@ impl<'a> Frame<'a> {
             };
             (d.image.view, d.clear, layout)
         });
-        let ([width, height], [from, to]) = (raster.size, raster.rows);
+        let ([left, top], [width, height], [from, to]) = (raster.origin, raster.size, raster.rows);
         let push = push.to_vec();
         let record = move |device: &Device, commands: vk::CommandBuffer| {
             let color_infos: Vec<_> = colors
@@ -332,7 +334,7 @@ impl<'a> Frame<'a> {
                 if read_only { info.store_op(vk::AttachmentStoreOp::NONE) } else { info }
             });
             let area = vk::Rect2D {
-                offset: vk::Offset2D { x: 0, y: from as i32 },
+                offset: vk::Offset2D { x: left as i32, y: (top + from) as i32 },
                 extent: vk::Extent2D { width, height: to - from },
             };
             let mut info =
@@ -341,8 +343,8 @@ impl<'a> Frame<'a> {
                 info = info.depth_attachment(depth);
             }
             let viewport = vk::Viewport {
-                x: 0.0,
-                y: 0.0,
+                x: left as f32,
+                y: top as f32,
                 width: width as f32,
                 height: height as f32,
                 min_depth: 0.0,

@@ -135,6 +135,7 @@ pub fn fragments<'a>(
         name: "clear fragment lists",
         colors: vec![ColorTarget { image: &lists.heads, clear: Some([u32::MAX; 4]) }],
         depth: None,
+        origin: [0, 0],
         size: lists.size,
         rows: strip.rows,
     };
@@ -184,6 +185,7 @@ pub fn fragments<'a>(
         name: "see-through fragments",
         colors: Vec::new(),
         depth: Some(DepthTarget { image: &gbuffer.depth, clear: false, write: false }),
+        origin: [0, 0],
         size: lists.size,
         rows: strip.rows,
     };

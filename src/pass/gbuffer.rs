@@ -144,6 +144,7 @@ pub fn gbuffer<'a>(
         name: "G-buffer",
         colors,
         depth: Some(DepthTarget { image: &target.depth, clear: true, write: true }),
+        origin: [0, 0],
         size: target.size,
         rows: [0, target.size[1]],
     };

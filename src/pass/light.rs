@@ -7,6 +7,7 @@ use super::environment::EnvironmentOnDevice;
 use super::gbuffer::GBuffer;
 use super::rays::RaysOnDevice;
 use super::scene::SceneOnDevice;
+use super::shadow_map::ShadowMaps;
 use super::tiles::Tiles;
 use crate::gpu::{Buffer, Frame, Image};
 use crate::plan::{Knobs, Plan};
@@ -15,6 +16,10 @@ use crate::shader::light;
 /// Lights of one dispatch where each sends a ray: a traversal evaluates some 20 to 200 loop heads, of 65,535 that lavapipe
 /// grants an invocation.
 const LIGHTS_AT_ONCE: u32 = 64;
+
+/// `SHADOWS` of shaders/lib/shadow.glsl: places of the rungs in the knob `shadows`.
+const SHADOW_MAP: u32 = 1;
+const SHADOW_RAY: u32 = 2;
 
 /// What all passes that light surfaces need beside them.
 #[derive(Clone, Copy)]
@@ -27,6 +32,8 @@ pub struct Lighting<'a> {
     pub scene: &'a SceneOnDevice,
     /// What rays go through.
     pub rays: &'a RaysOnDevice,
+    /// What lights see.
+    pub shadow_maps: &'a ShadowMaps,
     /// Light lists.
     pub tiles: &'a Tiles,
     /// Light from all around.
@@ -47,16 +54,21 @@ impl Lighting<'_> {
         if self.plan.tiles { 0 } else { self.plan.local_lights }
     }
 
-    /// Whether lights are looked for.
+    /// How lights are looked for: `SHADOWS` of shaders/lib/shadow.glsl.
     #[must_use]
-    pub fn shadows(&self) -> bool {
+    pub fn shadows(&self) -> u32 {
+        if self.plan.shadow_maps { SHADOW_MAP } else { u32::from(self.shadow_rays()) * SHADOW_RAY }
+    }
+
+    /// Whether rays look for lights.
+    fn shadow_rays(&self) -> bool {
         self.plan.rays.is_some_and(|rays| rays.shadows)
     }
 
     /// What each dispatch goes through: everything at once, or a few lights at a time where each sends a ray.
     fn ranges(&self) -> Vec<Range> {
         let (lights, words) = (self.plan.directional_lights + self.unlisted_lights(), self.tiles.words());
-        if !self.shadows() {
+        if !self.shadow_rays() {
             return vec![[0, lights, 0, words]];
         }
         let parts = |count: u32, of: u32| (0..count).step_by(of as usize).map(move |i| [i, (i + of).min(count)]);
@@ -99,7 +111,7 @@ pub fn light<'a>(
         octants: rays.constants.octants,
         stack_size: rays.constants.stack_size,
         hit_textures: rays.constants.hit_textures,
-        shadows: u32::from(lighting.shadows()),
+        shadows: lighting.shadows(),
         filters: planned.is_some_and(|rays| rays.filters),
         absorption: planned.map_or(0, |rays| rays.absorption),
     };
@@ -121,6 +133,8 @@ pub fn light<'a>(
         environment: &environment.terms,
         prefiltered: environment.prefiltered(),
         reflectance: environment.reflectance(),
+        shadow_depth: lighting.shadow_maps.depth(),
+        shadow_faces: &lighting.shadow_maps.faces,
         bvh_nodes: &rays.nodes,
         bvh_triangles: &rays.triangles,
         trace_block: &rays.terms,

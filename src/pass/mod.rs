@@ -14,6 +14,7 @@ pub mod interact;
 pub mod light;
 pub mod rays;
 pub mod scene;
+pub mod shadow_map;
 pub mod texture;
 pub mod tiles;
 pub mod tonemap;

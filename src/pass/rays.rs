@@ -113,7 +113,7 @@ impl RaysOnDevice {
         solids: &Solids,
         traversal: Option<Traversal>,
     ) -> Result<Self> {
-        let Some(rays) = plan.rays else { return Self::none(device) };
+        let Some(rays) = plan.rays else { return Self::none(device, scene) };
         let start = std::time::Instant::now();
         let bvh = Bvh::build(scene)?;
         let build_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -215,7 +215,10 @@ impl RaysOnDevice {
         })
     }
 
-    fn none(device: &Arc<Device>) -> Result<Self> {
+    /// Without rays there still is the space they would live in: shadow maps share it.
+    fn none(device: &Arc<Device>, scene: &Scene) -> Result<Self> {
+        let (anchor, half) =
+            scene.bounds().map_or_else(Default::default, |b| (b.center(), (b.max - b.min).max_element() * 0.5));
         let empty = |name| Buffer::texels(device, name, 0, Place::Device, vk::Format::R32G32B32A32_UINT);
         Ok(Self {
             nodes: empty("no BVH nodes")?,
@@ -227,8 +230,11 @@ impl RaysOnDevice {
             counts: Buffer::new(device, "work counts", size_of::<WorkCounts>() as u64, Place::Readback)?,
             constants: TraceConstants { traversal: 0, octants: false, stack_size: 1, hit_textures: 0 },
             facts: None,
-            fixed: bytemuck::Zeroable::zeroed(),
-            anchor: DVec3::ZERO,
+            fixed: TraceTerms {
+                offset: (OFFSET_ROUNDINGS * half * 2.0_f64.powi(-24)) as f32,
+                ..bytemuck::Zeroable::zeroed()
+            },
+            anchor,
             bodies: Scene::default(),
             solids: Solids::default(),
         })

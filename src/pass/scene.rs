@@ -9,10 +9,10 @@ use glam::{DMat3, DVec3};
 use super::texture::{Meaning, Texels, Textures};
 use super::view::View;
 use crate::gpu::{Buffer, Device, Draw, Frame, Place, Sampled, VertexStream};
-use crate::plan::{Knobs, Plan, is_see_through, mirrors};
+use crate::plan::{Knobs, Plan, casts_in_maps, is_see_through, mirrors};
 use crate::scene::solid::Solids;
 use crate::scene::{AlphaMode, Bounds, Light, LightKind, Material, Scene, TextureRef};
-use crate::shader::gbuffer;
+use crate::shader::{gbuffer, shadow_map};
 use crate::share;
 
 /// Texture slots of a material, in the order of `shaders/lib/gbuffer_interface.glsl`.
@@ -26,6 +26,8 @@ struct MeshRange {
     has_tangents: bool,
     has_uvs: [bool; 2],
     has_colors: bool,
+    /// Middle and half extent of its box.
+    extent: [DVec3; 2],
 }
 
 /// An instance as it was read, for every frame's eye.
@@ -145,6 +147,13 @@ pub fn upload<T: bytemuck::NoUninit>(
     Ok(buffer)
 }
 
+fn extent(positions: &[[f32; 3]]) -> [DVec3; 2] {
+    let mut all = positions.iter().map(|&p| glam::Vec3::from(p).as_dvec3());
+    let first = all.next().unwrap_or_default();
+    let (min, max) = all.fold((first, first), |(min, max), p| (min.min(p), max.max(p)));
+    [(min + max) * 0.5, (max - min) * 0.5]
+}
+
 fn stream<T: bytemuck::NoUninit>(
     device: &Arc<Device>,
     name: &str,
@@ -193,6 +202,7 @@ impl SceneOnDevice {
                 has_tangents: !mesh.tangents.is_empty(),
                 has_uvs: [!mesh.uvs[0].is_empty(), !mesh.uvs[1].is_empty()],
                 has_colors: !mesh.colors.is_empty(),
+                extent: extent(&mesh.positions),
             });
             all_indices.extend_from_slice(&mesh.indices);
         }
@@ -283,14 +293,25 @@ impl SceneOnDevice {
 
     /// Moves instances and lights to the eye of `view`: differences in f64, stored in f32.
     pub fn look_from(&mut self, view: &View) {
-        let table: Vec<_> = self
-            .placements
-            .iter()
-            .map(|placement| shared_instance(placement, view.eye, self.meshes[placement.mesh].material))
-            .collect();
+        let table = self.instances_around(view.eye);
         self.instances.write(bytemuck::cast_slice(&table));
         let table: Vec<[[f32; 4]; 4]> = self.lights_cpu.iter().map(|light| shared_light(light, view.eye)).collect();
         self.lights.write(bytemuck::cast_slice(&table));
+    }
+
+    /// The table of instances relative to a point of the world.
+    #[must_use]
+    pub fn instances_around(&self, origin: DVec3) -> Vec<share::Instance> {
+        self.placements
+            .iter()
+            .map(|placement| shared_instance(placement, origin, self.meshes[placement.mesh].material))
+            .collect()
+    }
+
+    /// The lights in the order of their table: directional ones first.
+    #[must_use]
+    pub fn lights_in_order(&self) -> &[Light] {
+        &self.lights_cpu
     }
 
     /// The device that holds it.
@@ -320,6 +341,41 @@ impl SceneOnDevice {
             })
             .filter(|(_, p)| self.meshes[p.mesh].index_count > 0)
             .map(|(instance, placement)| self.draw(instance as u32, placement, inside))
+            .collect()
+    }
+
+    /// The draws of all surfaces that shadow maps hold, from both sides, as a ray to a light stops at either: those whose box
+    /// is seen, by its middle and half extent in the world.
+    #[must_use]
+    pub fn casters(&self, is_seen: impl Fn(DVec3, DVec3) -> bool) -> Vec<Draw<'_>> {
+        let material = |p: &Placement| &self.materials_cpu[self.meshes[p.mesh].material];
+        self.placements
+            .iter()
+            .enumerate()
+            .filter(|(_, p)| casts_in_maps(material(p)) && self.meshes[p.mesh].index_count > 0)
+            .filter(|(_, p)| {
+                let ([middle, half], m) = (self.meshes[p.mesh].extent, p.world_from_object.matrix3);
+                let half = m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z;
+                is_seen(p.world_from_object.transform_point3(middle), half)
+            })
+            .map(|(instance, placement)| {
+                let masked = matches!(material(placement).alpha_mode, AlphaMode::Mask(_));
+                let mesh = &self.meshes[placement.mesh];
+                let constants = shadow_map::Constants {
+                    masked,
+                    has_base: masked && material(placement).base_color_texture.is_some(),
+                    has_color: masked && mesh.has_colors,
+                };
+                let draw = self.draw(instance as u32, placement, false);
+                Draw {
+                    binding: if masked { draw.binding } else { 0 },
+                    constants: constants.words(),
+                    // Position, both texture coordinates, colour.
+                    streams: [0, 3, 4, 5].map(|i| draw.streams[i]).to_vec(),
+                    cull_back: false,
+                    ..draw
+                }
+            })
             .collect()
     }
 

@@ -21,9 +21,9 @@ pub struct Knob {
 pub static KNOBS: &[Knob] = &[
     Knob {
         name: "shadows",
-        rungs: &["off", "ray"],
-        unbuilt: &["map"],
-        presets: ["off", "ray", "ray"],
+        rungs: &["off", "map", "ray"],
+        unbuilt: &[],
+        presets: ["map", "ray", "ray"],
         about: "visibility of lights (R5)",
     },
     Knob {
@@ -128,7 +128,7 @@ pub struct Knobs {
 /// The lecture's three models (R6): presets of all knobs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
 pub enum Model {
-    /// Direct light, and the environment as ambient and mirrored light.
+    /// Direct light with shadow maps, and the environment as ambient and mirrored light.
     Local,
     /// Plus rays for shadows, mirrors and what lets light through.
     #[default]
@@ -242,7 +242,7 @@ mod tests {
     fn wrong_choices_say_what_there_is() {
         let mut knobs = Knobs::default();
         for (choice, said) in [
-            ("shadows=map", "not built yet"),
+            ("reflection=screen", "not built yet"),
             ("absorption=march:8", "not built yet"),
             ("brdf=oren", "no rung"),
             ("gloss=1", "no knob"),

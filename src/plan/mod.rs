@@ -37,6 +37,8 @@ pub struct Plan {
     pub tiles: bool,
     /// The table of directional reflectance: for an environment, or to make up for single scattering.
     pub reflectance: bool,
+    /// Lights are looked for in depth maps drawn from where they are.
+    pub shadow_maps: bool,
     /// Rays, and the hierarchy of the scene's triangles that they go through; `None` where nothing sends any.
     pub rays: Option<Rays>,
     /// Samples per pixel.
@@ -50,7 +52,7 @@ pub struct Plan {
 /// What sends rays and what they may meet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Rays {
-    /// Lights are looked for.
+    /// Lights are looked for by rays.
     pub shadows: bool,
     /// Smooth surfaces mirror the scene.
     pub mirrors: bool,
@@ -99,6 +101,12 @@ pub struct Surroundings {
 #[must_use]
 pub fn is_see_through(material: &Material, refraction: bool) -> bool {
     material.alpha_mode == AlphaMode::Blend || (material.transmission > 0.0 && !refraction)
+}
+
+/// Whether a surface is drawn into shadow maps. What lets light through does not stop it there: it passes unweakened.
+#[must_use]
+pub fn casts_in_maps(material: &Material) -> bool {
+    !is_see_through(material, false)
 }
 
 /// Whether anything is mirrored at a surface.
@@ -206,7 +214,9 @@ impl Plan {
             }
         };
         decide("punctual lights", "lights", cause.clone(), true);
-        let shadows = decide("shadows", "shadows", cause, knobs.rung("shadows") == "ray");
+        let shadowed = decide("shadows", "shadows", cause, knobs.rung("shadows") != "off");
+        let shadow_maps = shadowed && knobs.rung("shadows") == "map";
+        let shadows = shadowed && !shadow_maps;
         let rays = (shadows || mirror_rays || refraction).then(|| {
             let any = |test: &dyn Fn(&Material) -> bool| used.iter().any(|m| test(m));
             let masked = any(&|m| matches!(m.alpha_mode, AlphaMode::Mask(_)));
@@ -243,16 +253,17 @@ impl Plan {
             local_lights,
             tiles,
             reflectance: reflection || ambient || knobs.rung("brdf") == "ggx-multi",
+            shadow_maps,
             rays,
             samples: knobs.samples(),
             effects,
-            warnings: left_out(&used, refraction),
+            warnings: left_out(&used, refraction, shadow_maps),
         }
     }
 }
 
 /// What no rung that is built can show of these materials.
-fn left_out(used: &[&Material], refraction: bool) -> Vec<String> {
+fn left_out(used: &[&Material], refraction: bool, shadow_maps: bool) -> Vec<String> {
     let mut warnings = Vec::new();
     let mut say = |test: &dyn Fn(&Material) -> bool, what: &str| {
         if let Some(material) = used.iter().find(|material| test(material)) {
@@ -262,6 +273,8 @@ fn left_out(used: &[&Material], refraction: bool) -> Vec<String> {
     let straight = |m: &Material| m.transmission > 0.0 && !(refraction && m.alpha_mode != AlphaMode::Blend);
     say(&straight, "transmits light that goes straight on: refraction is off, or the material is blended");
     say(&|m| straight(m) && m.roughness > 0.1, "transmits through a rough surface: shown clear");
+    let casts = |m: &Material| !shadow_maps || casts_in_maps(m);
+    say(&|m| !casts(m), "casts no shadow: the maps of shadows=map hold opaque and masked surfaces alone");
     say(&|m| m.dispersion > 0.0, "has dispersion, which is not built");
     warnings
 }

@@ -75,9 +75,11 @@ pub fn settings(size: [u32; 2]) -> Settings {
     Settings { size, knobs: knobs(&["samples=1"]), ..Settings::default() }
 }
 
-/// The local model with some other rungs.
+/// The local model without shadows, and with some other rungs.
 pub fn knobs(choices: &[&str]) -> Knobs {
     let mut knobs = Knobs::of(Model::Local);
+    // What most tests compare with has no shadows.
+    knobs.set("shadows=off").expect("a rung");
     for choice in choices {
         knobs.set(choice).expect("a rung");
     }

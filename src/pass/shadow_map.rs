@@ -1,0 +1,302 @@
+//! What lights see: depth maps from where they are, drawn once per scene (shaders/pass/shadow_map.*, lib/shadow.glsl).
+//!
+//! Neither lights nor geometry depend on the eye, so nor do the maps: they live in the space of rays, whose origin is the
+//! middle of the scene, and pictures from other cameras cost nothing more. All maps are squares of one image, an atlas:
+//! layers of an array would have to be of one size. docs/decisions/shadow-maps.md says how sizes and bias were chosen.
+
+use std::f64::consts::FRAC_PI_3;
+use std::sync::Arc;
+
+use anyhow::{Result, bail};
+use ash::vk;
+use glam::{DVec3, DVec4};
+
+use super::scene::SceneOnDevice;
+use crate::gpu::{Buffer, DepthTarget, Device, Frame, Image, ImageDesc, PassTime, Place, Raster, Sampled, SamplerDesc};
+use crate::plan::Plan;
+use crate::scene::{Bounds, Light, LightKind};
+use crate::shader::shadow_map;
+
+/// Texels a side of the image that holds all maps, at most: what every device allows, and 64 MiB of depth.
+const ATLAS: u32 = 4096;
+/// Texels a side of a light's only map where there is room …
+const FLAT: u32 = 2048;
+/// … and of each of six: of those four go once around.
+const CUBE: u32 = FLAT / 2;
+/// The smallest of the six. A texel is 1.4° then; coarser ones would show blots for shadows.
+const SMALLEST_CUBE: u32 = 64;
+/// Texels around what a map has to show, for its filter: 2x2 texels around a point, and one for its rounding.
+const BORDER: f64 = 2.0;
+/// Half angle up to which a light has one map, of a spot light's cone or of the scene seen from outside; a plane stretches
+/// as the tangent's square towards its edge, and wider ones have six, all around.
+const WIDEST_CONE: f64 = FRAC_PI_3;
+/// From how many radii of the scene on it is seen from so far that depth is told across the scene and not from the light:
+/// numbers as large as the distance then hide nothing of it.
+const FAR: f64 = 4.0;
+/// Texels of the table per map: shaders/lib/shadow.glsl.
+const FACE_TEXELS: usize = 5;
+
+/// The maps; next to nothing where the plan has none.
+pub struct ShadowMaps {
+    depth: Image,
+    /// One texel per light: first texel of its first map, how many maps, whether their depth is told from the light. Then five per map: its square, and the rows of
+    /// its matrix.
+    pub faces: Buffer,
+    /// GPU time of the drawing.
+    pub times: Vec<PassTime>,
+}
+
+/// One map: rows of clip_from_scene, where `scene` is the space of rays.
+#[derive(Debug, Clone, Copy)]
+struct Face {
+    clip: [DVec4; 4],
+    /// First texel across and down, and texels a side.
+    square: [u32; 3],
+}
+
+impl ShadowMaps {
+    /// Draws the maps of all lights.
+    ///
+    /// # Errors
+    /// When there are too many lights, or memory is short.
+    pub fn new(device: &Arc<Device>, plan: &Plan, name: &str, scene: &SceneOnDevice, anchor: DVec3) -> Result<Self> {
+        let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
+        let image = |width, height| {
+            Image::new(device, "shadow maps", ImageDesc::flat(vk::Format::D32_SFLOAT, width, height, usage))
+        };
+        let bounds = scene.bounds.filter(|_| plan.shadow_maps);
+        let format = vk::Format::R32G32B32A32_SFLOAT;
+        let Some(bounds) = bounds else {
+            let faces = Buffer::texels(device, "no shadow maps", 0, Place::Device, format)?;
+            return Ok(Self { depth: image(1, 1)?, faces, times: Vec::new() });
+        };
+        let lights = scene.lights_in_order();
+        let cubes = lights.iter().filter(|light| cone(light, bounds).is_none()).count();
+        let Some([flat, cube]) = sides(lights.len() - cubes, cubes) else {
+            bail!(
+                "{name}: {} lights need {} shadow maps, more than {ATLAS}x{ATLAS} texels hold: choose shadows=ray or \
+                 shadows=off",
+                lights.len(),
+                lights.len() + 5 * cubes
+            );
+        };
+        let mut faces: Vec<Face> = Vec::new();
+        let mut first = vec![0; lights.len()];
+        let mut told = vec![0.0; lights.len()];
+        // Large squares first: what follows along the curve then starts at a multiple of its own size.
+        let mut next = 0;
+        for large in [true, false] {
+            for (index, light) in lights.iter().enumerate().filter(|(_, light)| cone(light, bounds).is_some() == large)
+            {
+                first[index] = faces.len();
+                let side = if large { flat } else { cube };
+                told[index] = f32::from(u8::from(is_told_from_light(light, bounds, anchor)));
+                for clip in clip_rows(light, side, bounds, anchor) {
+                    let [x, y] = along_curve(next);
+                    faces.push(Face { clip, square: [x, y, side] });
+                    next += (side / SMALLEST_CUBE) * (side / SMALLEST_CUBE);
+                }
+            }
+        }
+        let mut table: Vec<[f32; 4]> = lights
+            .iter()
+            .zip(first.into_iter().zip(told))
+            .map(|(light, (first, told))| {
+                let texel = lights.len() + first * FACE_TEXELS;
+                [texel as f32, if cone(light, bounds).is_some() { 1.0 } else { 6.0 }, told, 0.0]
+            })
+            .collect();
+        table.extend(faces.iter().flat_map(Face::texels));
+        let extent = |axis: usize| faces.iter().map(|f| f.square[axis] + f.square[2]).max().unwrap_or(1);
+        let depth = image(extent(0), extent(1))?;
+        let times = draw(device, scene, anchor, &faces, &depth)?;
+        Ok(Self { depth, faces: super::scene::upload(device, "shadow maps' table", &table, Some(format))?, times })
+    }
+
+    /// All maps: reversed depth, 0 where nothing was drawn.
+    #[must_use]
+    pub fn depth(&self) -> Sampled<'_> {
+        Sampled { image: &self.depth, sampler: SamplerDesc::NEAREST }
+    }
+}
+
+impl Face {
+    /// Its square, and the rows that lead to (across, down, depth, 1) times w, in texels of the atlas.
+    fn texels(&self) -> [[f32; 4]; FACE_TEXELS] {
+        let [x, y, side] = self.square.map(f64::from);
+        let [cx, cy, cz, cw] = self.clip;
+        let across = cx * (0.5 * side) + cw * (x + 0.5 * side);
+        let down = cy * (0.5 * side) + cw * (y + 0.5 * side);
+        let row = |v: DVec4| v.as_vec4().to_array();
+        [[x as f32, y as f32, side as f32, 0.0], row(across), row(down), row(cz), row(cw)]
+    }
+
+    /// Whether anything of a box may lie within the map: it is not wholly on the wrong side of one of its planes. What is
+    /// no number is drawn.
+    fn sees(&self, middle: DVec3, half: DVec3) -> bool {
+        let [x, y, z, w] = self.clip;
+        ![w + x, w - x, w + y, w - y, w - z].iter().any(|plane| {
+            let (n, d) = (plane.truncate(), plane.w);
+            n.dot(middle) + d < -n.abs().dot(half)
+        })
+    }
+
+    fn clip_from_scene(&self) -> [[f32; 4]; 4] {
+        [0, 1, 2, 3].map(|column| self.clip.map(|row| row[column] as f32))
+    }
+}
+
+/// Draws every caster into every map.
+fn draw(
+    device: &Arc<Device>,
+    scene: &SceneOnDevice,
+    anchor: DVec3,
+    faces: &[Face],
+    depth: &Image,
+) -> Result<Vec<PassTime>> {
+    let instances = Buffer::with_data(device, "instances around the scene", &scene.instances_around(anchor))?;
+    let bindings: Vec<_> = scene
+        .page_sets()
+        .into_iter()
+        .map(|[base, ..]| shadow_map::Bind {
+            instances: &instances,
+            materials: &scene.materials,
+            slots: &scene.slots,
+            base_page: base,
+        })
+        .collect();
+    let mut frame = Frame::new(device);
+    for face in faces {
+        let [x, y, side] = face.square;
+        let raster = Raster {
+            name: "shadow maps",
+            colors: Vec::new(),
+            depth: Some(DepthTarget { image: depth, clear: true, write: true }),
+            origin: [x, y],
+            size: [side; 2],
+            rows: [0, side],
+        };
+        let push = face.clip_from_scene();
+        let casters = scene.casters(|middle, half| face.sees(middle - anchor, half));
+        frame.raster(&raster, &shadow_map::PROGRAM, &bindings, bytemuck::cast_slice(&push), casters)?;
+    }
+    frame.finish()
+}
+
+/// Axis and half angle of the cone that one map of a light shows: of the light's own and the one around the scene the
+/// narrower. `None` where that is too wide for one. A directional light's has no angle.
+fn cone(light: &Light, bounds: Bounds) -> Option<(DVec3, f64)> {
+    let around = |position: DVec3| {
+        let to_middle = bounds.center() - position;
+        let sine = bounds.radius() / to_middle.length();
+        if sine < 1.0 { (to_middle.normalize(), sine.asin()) } else { (DVec3::Z, std::f64::consts::PI) }
+    };
+    let (axis, half) = match light.kind {
+        LightKind::Directional { direction } => (direction, 0.0),
+        LightKind::Point { position, .. } => around(position),
+        LightKind::Spot { position, direction, outer, .. } => {
+            let around = around(position);
+            if around.1 < outer { around } else { (direction, outer) }
+        }
+    };
+    (half <= WIDEST_CONE).then_some((axis, half))
+}
+
+/// Whether a map's depth is 1/z of the light, and not across the scene.
+fn is_told_from_light(light: &Light, bounds: Bounds, anchor: DVec3) -> bool {
+    match light.kind {
+        LightKind::Directional { .. } => false,
+        LightKind::Point { position, .. } | LightKind::Spot { position, .. } => {
+            cone(light, bounds).is_none_or(|(axis, _)| (anchor - position).dot(axis) < FAR * bounds.radius())
+        }
+    }
+}
+
+/// Texels a side of the maps of lights with one, and of those with six: as many as there is room for.
+fn sides(flats: usize, cubes: usize) -> Option<[u32; 2]> {
+    let fits = |&[flat, cube]: &[u32; 2]| {
+        let area = |side: u32, count: usize| u64::from(side) * u64::from(side) * count as u64;
+        area(flat, flats) + area(cube, 6 * cubes) <= u64::from(ATLAS) * u64::from(ATLAS)
+    };
+    (0..).map(|halved| [FLAT >> halved, CUBE >> halved]).take_while(|&[_, cube]| cube >= SMALLEST_CUBE).find(fits)
+}
+
+/// The square number `index` of the smallest along Morton's curve, which fills squares one after the other.
+fn along_curve(index: u32) -> [u32; 2] {
+    let every_second = |bits: u32| (0..16).fold(0, |sum, i| sum | (bits >> (2 * i) & 1) << i);
+    [every_second(index) * SMALLEST_CUBE, every_second(index >> 1) * SMALLEST_CUBE]
+}
+
+/// Rows of clip_from_scene of a light's maps of `side` texels.
+fn clip_rows(light: &Light, side: u32, bounds: Bounds, anchor: DVec3) -> Vec<[DVec4; 4]> {
+    let widen = f64::from(side) / (f64::from(side) - 2.0 * BORDER);
+    let radius = bounds.radius().max(f64::MIN_POSITIVE);
+    let from = |position: DVec3, forward: DVec3, right: DVec3, tan: f64| {
+        let eye = position - anchor;
+        let outside = (position - position.clamp(bounds.min, bounds.max)).length();
+        // A corner's ray is this much longer than its depth.
+        let slant = (1.0 + 2.0 * tan * tan).sqrt();
+        // Reversed floating depth has the same relative precision for every near distance (numerics.md 42).
+        let near = (0.5 * outside).max(1e-5 * radius) / slant;
+        let row = |axis: DVec3, scale: f64| (axis * scale).extend(-axis.dot(eye) * scale);
+        let down = forward.cross(right);
+        let depth = if is_told_from_light(light, bounds, anchor) {
+            DVec4::W * near
+        } else {
+            // Over z: 1 at the near end of the sphere around the scene, 0 at the far one.
+            let reach = radius * (1.0 + 2.0_f64.powi(-8));
+            (-forward).extend(reach) * ((-forward.dot(eye) - reach) / (2.0 * reach))
+        };
+        [row(right, 1.0 / tan), row(down, 1.0 / tan), depth, row(forward, 1.0)]
+    };
+    let cube = |position: DVec3| {
+        // As `cube_face` in shaders/lib/shadow.glsl counts them: +x, −x, +y, −y, +z, −z.
+        let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+        (0..6).map(|i| from(position, axes[i / 2] * [1.0, -1.0][i % 2], axes[(i / 2 + 1) % 3], widen)).collect()
+    };
+    match light.kind {
+        LightKind::Directional { direction } => {
+            let right = direction.any_orthonormal_vector();
+            let down = direction.cross(right);
+            // The box around the scene as the light sees it: its middle is the anchor, but for a scene with vertices that
+            // are nowhere.
+            let (middle, half) = (bounds.center() - anchor, (bounds.max - bounds.min) * 0.5);
+            let reach = |axis: DVec3| axis.abs().dot(half).max(1e-6 * radius);
+            let row = |axis: DVec3, scale: f64| (axis * scale).extend(-axis.dot(middle) * scale);
+            // Depth 1 − a where the scene begins and a where it ends: roundings neither clip it nor make it nothing.
+            let depth = row(-direction, 0.5 * (1.0 - 2.0_f64.powi(-16)) / reach(direction)) + DVec4::W * 0.5;
+            vec![[row(right, 1.0 / (widen * reach(right))), row(down, 1.0 / (widen * reach(down))), depth, DVec4::W]]
+        }
+        LightKind::Point { position, .. } | LightKind::Spot { position, .. } => match cone(light, bounds) {
+            Some((axis, half)) => vec![from(position, axis, axis.any_orthonormal_vector(), half.tan() * widen)],
+            None => cube(position),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn squares_do_not_overlap_and_fit() {
+        for (flats, cubes) in [(1, 0), (4, 0), (5, 0), (2, 1), (0, 1), (3, 7), (0, 682), (1024, 0), (100, 300)] {
+            let [flat, cube] = sides(flats, cubes).expect("room");
+            let mut taken = vec![false; ((ATLAS / SMALLEST_CUBE) * (ATLAS / SMALLEST_CUBE)) as usize];
+            let mut next = 0;
+            for side in std::iter::repeat_n(flat, flats).chain(std::iter::repeat_n(cube, 6 * cubes)) {
+                let [x, y] = along_curve(next);
+                let cells = side / SMALLEST_CUBE;
+                next += cells * cells;
+                assert!(x % side == 0 && y % side == 0 && x + side <= ATLAS && y + side <= ATLAS, "{x} {y} {side}");
+                for (i, j) in (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j))) {
+                    let cell = (y / SMALLEST_CUBE + j) * (ATLAS / SMALLEST_CUBE) + x / SMALLEST_CUBE + i;
+                    assert!(!std::mem::replace(&mut taken[cell as usize], true), "{flats} {cubes}: {x} {y}");
+                }
+            }
+        }
+        assert_eq!(sides(1, 0), Some([FLAT, CUBE]));
+        assert_eq!(sides(0, 683), None);
+        assert_eq!(sides(1025, 0), None);
+    }
+}
