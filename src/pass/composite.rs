@@ -3,20 +3,24 @@
 use anyhow::Result;
 
 use super::fragments::FragmentLists;
+use super::gbuffer::GBuffer;
 use super::light::Lighting;
 use super::rays::LOOP_BUDGET;
-use crate::gpu::{Frame, Image};
+use crate::gpu::{Buffer, Frame, Image};
 use crate::shader::composite;
 
-/// Adds the fragments of one strip to `radiance`, nearest first.
+/// Adds the fragments of one strip to `radiance`, nearest first. What they show of the screen is looked up in
+/// `seen`, the radiance of the opaque surfaces.
 ///
 /// # Errors
 /// When the driver refuses the pipeline.
 pub fn composite<'a>(
     frame: &mut Frame<'a>,
     lighting: Lighting<'a>,
+    gbuffer: &'a GBuffer,
     lists: &'a FragmentLists,
     radiance: &'a Image,
+    seen: &'a Buffer,
     rows: [u32; 2],
 ) -> Result<()> {
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
@@ -41,6 +45,8 @@ pub fn composite<'a>(
         absorption: planned.map_or(0, |rays| rays.absorption),
         tile_words: lighting.tiles.words(),
         loop_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
+        bends: plan.screen.refraction,
+        mirrors: plan.screen.see_through_mirrors,
     };
     let bind = composite::Bind {
         camera_block: camera,
@@ -48,6 +54,9 @@ pub fn composite<'a>(
         heads: &lists.heads,
         nodes: &lists.nodes,
         radiance,
+        depth: &gbuffer.depth_texels,
+        normals: &gbuffer.normals,
+        seen,
         dropped: &lists.dropped,
         tiles: &lists.work.tiles,
         work: &lists.work.sizes,

@@ -50,8 +50,7 @@ impl GBuffer {
             Image::new(device, name, ImageDesc::flat(format, width, height, usage))
         };
         // What a transmission texture lets through is kept beside the emissive texel.
-        let with =
-            [plan.rays.is_some(), plan.emissive || plan.rays.is_some_and(|rays| rays.refraction), plan.layers];
+        let with = [plan.rays.is_some(), plan.emissive || plan.rays.is_some_and(|rays| rays.refraction), plan.layers];
         let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
         Ok(Self {
             depth: Image::new(

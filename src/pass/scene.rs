@@ -265,7 +265,8 @@ impl SceneOnDevice {
                     world_from_object: i.world_from_object,
                     mesh: i.mesh,
                     flipped: solids.flipped[index],
-                    sheet: solids.sheet[index] || !plan.rays.is_some_and(|rays| rays.refraction),
+                    sheet: solids.sheet[index]
+                        || !(plan.screen.refraction || plan.rays.is_some_and(|rays| rays.refraction)),
                 })
                 .collect(),
             materials_cpu: scene.materials,
@@ -312,7 +313,9 @@ impl SceneOnDevice {
         self.placements
             .iter()
             .enumerate()
-            .filter(|(_, p)| is_see_through(&self.materials_cpu[self.meshes[p.mesh].material], self.refraction) == see_through)
+            .filter(|(_, p)| {
+                is_see_through(&self.materials_cpu[self.meshes[p.mesh].material], self.refraction) == see_through
+            })
             .filter(|(_, p)| self.meshes[p.mesh].index_count > 0)
             .map(|(instance, placement)| self.draw(instance as u32, placement, inside))
             .collect()
@@ -412,7 +415,7 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs) -> share::Material
             | coverage
             | flag(m.conductor.is_some(), share::Material::CONDUCTOR)
             | flag(mirrors(m) && !m.unlit, share::Material::MIRRORS),
-        unused_n: 0.0,
+        thickness: m.thickness,
         kappa_metal: metal.map(|[_, kappa]| kappa),
         unused_kappa: 0.0,
     }
@@ -491,7 +494,11 @@ mod tests {
                 DQuat::from_rotation_y(0.7),
                 DVec3::new(1e7, 0.0, 0.0),
             );
-            let instance = shared_instance(&Placement { world_from_object, mesh: 0, flipped: false, sheet: false, first_triangle: 0 }, DVec3::new(1e7, 1.0, 0.0), 3);
+            let instance = shared_instance(
+                &Placement { world_from_object, mesh: 0, flipped: false, sheet: false, first_triangle: 0 },
+                DVec3::new(1e7, 1.0, 0.0),
+                3,
+            );
             let columns = instance.normal_from_object.map(|c| glam::Vec3::from(c).as_dvec3());
             let n = (columns[0] * normal.x + columns[1] * normal.y + columns[2] * normal.z).normalize();
             for t in tangents {
