@@ -19,13 +19,13 @@ use crate::pass::fragments::{FragmentLists, fragments};
 use crate::pass::gbuffer::{GBuffer, gbuffer};
 use crate::pass::interact::interact;
 use crate::pass::light::{Lighting, light};
-use crate::pass::mirror::mirror;
+use crate::pass::mirror::{OnScreen, mirror, screen_tiles};
 use crate::pass::rays::{BvhFacts, RaysOnDevice, Traversal};
 use crate::pass::scene::SceneOnDevice;
 use crate::pass::tiles::{Tiles, tiles};
 use crate::pass::tonemap::{Counts, Display, tonemap};
 use crate::pass::view::{View, jitter};
-use crate::plan::{Knobs, Plan, Screen, Surroundings};
+use crate::plan::{Knobs, Plan, Surroundings};
 use crate::scene::environment::Environment;
 use crate::scene::solid::solids;
 use crate::scene::{Camera, Scene};
@@ -158,8 +158,7 @@ pub struct Renderer {
     work: WorkLists,
     lists: Option<FragmentLists>,
     radiance: Image,
-    /// A copy of it as a texel buffer, row by row, to look up while it is written; next to nothing where the plan does not.
-    seen: Buffer,
+    screen: OnScreen,
     /// The mean of the samples, where there is more than one.
     film: Option<Image>,
     display: Display,
@@ -225,13 +224,7 @@ impl Renderer {
             work: WorkLists::new(device, size)?,
             lists: if plan.see_through { Some(FragmentLists::new(device, size)?) } else { None },
             radiance: target("radiance")?,
-            seen: Buffer::texels(
-                device,
-                "radiance on the screen",
-                if plan.screen == Screen::default() { 0 } else { 16 * pixels },
-                Place::Device,
-                vk::Format::R32G32B32A32_SFLOAT,
-            )?,
+            screen: OnScreen::new(device, &plan, size)?,
             film: if plan.samples > 1 { Some(target("film")?) } else { None },
             display: Display::new(device, size)?,
             camera: Buffer::new(device, "camera", size_of::<share::Camera>() as u64, Place::Upload)?,
@@ -298,7 +291,7 @@ impl Renderer {
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(index, count))));
         self.rays.look_from(view, index, count);
         let Self { device, plan, scene, rays, camera, gbuffer: g, tiles: lists_of_lights, work, lists, .. } = &*self;
-        let Self { radiance, seen, .. } = &*self;
+        let Self { radiance, screen, .. } = &*self;
         // With n samples a pixel each one stands for 1/n of its area: textures are read that much sharper.
         let lod_bias = -0.5 * (count as f32).log2();
         let lighting = Lighting {
@@ -326,19 +319,22 @@ impl Renderer {
         if let Some(with) = plan.rays.filter(|rays| rays.mirrors || rays.refraction) {
             interact(&mut frame, lighting, with, g, &self.ray_tiles, radiance)?;
         }
+        if plan.screen.mirrors || plan.screen.see_through_mirrors {
+            screen_tiles(&mut frame, lighting, g, screen)?;
+        }
         if plan.screen.mirrors {
-            frame.download("copy radiance", radiance, seen);
-            mirror(&mut frame, lighting, g, &self.ray_tiles, seen, radiance)?;
+            frame.download("copy radiance", radiance, &screen.seen);
+            mirror(&mut frame, lighting, g, &self.ray_tiles, screen, radiance)?;
         }
         if plan.screen.refraction || plan.screen.see_through_mirrors {
-            frame.download("copy radiance", radiance, seen);
+            frame.download("copy radiance", radiance, &screen.seen);
         }
         if let Some(lists) = lists {
             frame.fill("reset fragment counters", &lists.counters, 0);
             frame.fill("reset dropped fragments", &lists.dropped, 0);
             for strip in lists.strips() {
                 fragments(&mut frame, scene, camera, g, lists, strip, lod_bias)?;
-                composite(&mut frame, lighting, g, lists, radiance, seen, strip.rows)?;
+                composite(&mut frame, lighting, g, lists, radiance, screen, strip.rows)?;
             }
             frame.read_back(&lists.counters);
             frame.read_back(&lists.dropped);

@@ -1,10 +1,11 @@
 // The picture as a scene: a ray marched through the G-buffer's depth, pixel by pixel (McGuire and Mara, JCGT 3(4) 2014).
-// Expects `camera`, the G-buffer's `depth` and `normals`, and the radiance of its surfaces, `seen`.
+// Expects `camera`, the G-buffer's `depth` and `normals`, the radiance of its surfaces, `seen`, and the nearest z of each
+// work tile, `nearest_pieces` (pass/screen_tiles.comp).
 #ifndef SCREEN_GLSL
 #define SCREEN_GLSL
-#include "lib/camera.glsl"
-#include "lib/encode.glsl"
 #include "lib/lighting.glsl"
+#include "lib/screen_piece.glsl"
+#include "lib/work_tile.glsl"
 
 // A step is a pixel along the longer axis, so the longer side of a picture bounds them: 16,384 where loops are limited to
 // 65,535 heads, and a surface marches twice at most, for its base and its coat.
@@ -19,12 +20,11 @@ float until_negative(float a, float b) {
 // Pixel (row by row) where a ray from a surface first meets one that the picture shows, or -1: where it leaves the picture
 // or the depth range, passes behind everything, or meets a surface from the side that is turned away.
 //
-// Reversed depth is 1/w times a constant, or linear where the view is parallel, so ray and planes are straight in x, y and z
-// of the screen. A pixel holds a piece of a plane, by its depth and the normal of its triangle; the ray meets it where its
-// distance in front of that plane falls through 0 within the step. Pieces of a curved surface do not join: between two steps
-// the ray may pass from the front of one to behind the next, which counts where they differ by no more than the width of a
-// pixel and what the slope of the second makes of it. That is all the thickness there is: how deep a surface goes the picture
-// does not tell, and a ray that comes to lie behind it without having met it passes.
+// The ray is a straight line in x, y and z of the screen. It meets the piece of a plane that a pixel holds where its distance
+// in front of that falls through 0 within the step. Pieces of a curved surface do not join: between two steps the ray may pass
+// from the front of one to behind the next, which counts where they differ by no more than the width of a pixel and what the
+// flatter one's slope makes of it. That is all the thickness there is: how deep a surface goes the picture does not tell, and
+// a ray that comes to lie behind it without having met it passes. Tiles that lie behind the ray are crossed in one step.
 int met_on_screen(vec3 p_rel, vec3 direction) {
     vec4 from = camera.clip_from_rel * vec4(p_rel, 1.0);
     vec4 along = camera.clip_from_rel * vec4(direction, 0.0);
@@ -39,39 +39,45 @@ int met_on_screen(vec3 p_rel, vec3 direction) {
     // Less than a pixel: towards the eye or away from it.
     vec3 by = way / max(steps, 1.0);
     float last = steps >= 1.0 ? min(ceil(steps), MOST_PIXELS) : 0.0;
-    bool parallel = camera.orthographic != 0;
-    float pixel_width = length(camera.up) / half_size.y;
+    int tiles_across = int(camera.size.x + WORK_TILE - 1) / int(WORK_TILE);
+    vec2 pixels_by = by.xy * half_size;
     float last_front = 0.0; // of the piece before, at the end of its step
+    float last_thickness = 0.0;
     bool behind = false;    // and farther than the thickness
     bool ends = false;
     int met = -1;
-    for (float i = 1.0; i <= last && !ends; i += 1.0) {
+    float i = 1.0;
+    while (i <= last && !ends) {
         loop_heads++;
         vec3 at = start + by * i;
-        ivec2 pixel = clamp(ivec2(floor((at.xy + 1.0) * half_size)), ivec2(0), ivec2(camera.size) - 1);
-        int index = pixel.y * int(camera.size.x) + pixel.x;
-        float z = imageLoad(depth, index).x;
-        vec3 n = unit_from_octahedral(imageLoad(normals, pixel).zw);
-        // How z of the piece grows with x and y: the viewing ray through (x, y) meets its plane at 1/w ~ n·v(x, y).
-        vec2 ndc = ndc_from_pixel(camera, pixel);
-        vec3 v = parallel ? camera.forward : camera.forward + camera.right * ndc.x - camera.up * ndc.y;
-        float scale = parallel ? 1.0 / (camera.far - camera.near) : z;
-        vec2 slope = vec2(dot(n, camera.right), -dot(n, camera.up)) * (scale / min(dot(n, v), -1e-6));
-        vec2 centre = (vec2(pixel) + 0.5) / half_size - 1.0;
-        float front = at.z - z - dot(slope, at.xy - centre);
-        float rise = by.z - dot(slope, by.xy);
+        vec2 place = (at.xy + 1.0) * half_size;
+        ivec2 pixel = clamp(ivec2(floor(place)), ivec2(0), ivec2(camera.size) - 1);
         // A step is half a pixel to either side; the first one begins where the ray does.
-        float before = front - (i == 1.0 ? 1.0 : 0.5) * rise;
+        float begins = i == 1.0 ? 1.0 : 0.5;
+
+        ivec2 tile = pixel / int(WORK_TILE);
+        vec2 edge = vec2(tile * int(WORK_TILE)) + mix(vec2(0.0), vec2(WORK_TILE), greaterThan(pixels_by, vec2(0.0)));
+        vec2 to_edge = mix(vec2(LARGEST), (edge - place) / pixels_by, greaterThan(abs(pixels_by), vec2(1e-6)));
+        float more = clamp(floor(min(to_edge.x, to_edge.y)), 0.0, float(WORK_TILE));
+        float farthest = min(at.z - by.z * begins, at.z + by.z * (more + 0.5));
+        bool free = farthest > imageLoad(nearest_pieces, tile.y * tiles_across + tile.x).x;
+
+        ScreenPiece piece = screen_piece(pixel);
+        vec2 centre = (vec2(pixel) + 0.5) / half_size - 1.0;
+        float front = at.z - piece.z - dot(piece.slope, at.xy - centre);
+        float rise = by.z - dot(piece.slope, by.xy);
+        float before = front - begins * rise;
         float after = front + 0.5 * rise;
-        float thickness = abs(slope.x) / half_size.x + abs(slope.y) / half_size.y + scale * pixel_width;
-        bool drawn = z > 0.0;
-        bool joins = before < 0.0 && last_front >= 0.0 && last_front - before <= thickness;
+        bool drawn = piece.z > 0.0 && !free;
+        bool joins = before < 0.0 && last_front >= 0.0 && last_front - before <= min(piece.thickness, last_thickness);
         bool hits = drawn && rise < 0.0 && after <= 0.0 && (before >= 0.0 || joins);
         bool from_behind = drawn && behind && before < 0.0 && after >= 0.0;
-        met = hits ? index : -1;
+        met = hits ? pixel.y * int(camera.size.x) + pixel.x : -1;
         ends = hits || from_behind;
-        behind = drawn && after < -thickness;
-        last_front = drawn ? after : LARGEST;
+        behind = drawn && after < -piece.thickness;
+        last_front = after;
+        last_thickness = drawn ? piece.thickness : 0.0;
+        i += free ? more + 1.0 : 1.0;
     }
     return met;
 }

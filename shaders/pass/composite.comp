@@ -27,6 +27,7 @@ layout(scalar, set = 0, binding = 8) readonly buffer Sizes { WorkSize tiles_size
 layout(set = 0, binding = 9, r32f) readonly uniform imageBuffer depth;
 layout(set = 0, binding = 10, rgba32f) readonly uniform imageBuffer seen;
 layout(set = 0, binding = 11, rgba16_snorm) readonly uniform image2D normals;
+layout(set = 0, binding = 12, r32f) readonly uniform imageBuffer nearest_pieces;
 #include "lib/screen.glsl"
 layout(push_constant, scalar) uniform Push { uint end_row; };
 

@@ -17,6 +17,7 @@ layout(set = 0, binding = 10, rgba32f) uniform image2D radiance;
 layout(scalar, set = 0, binding = 11) readonly buffer MirrorTiles { uint mirror_tiles[]; };
 layout(scalar, set = 0, binding = 12) readonly buffer Sizes { WorkSize mirrors_size; } work;
 layout(set = 0, binding = 25, rgba32f) readonly uniform imageBuffer seen; // radiance before, pixel by pixel
+layout(set = 0, binding = 26, r32f) readonly uniform imageBuffer nearest_pieces;
 #include "lib/screen.glsl"
 
 void main() {

@@ -10,7 +10,8 @@ use super::light::Lighting;
 use crate::gpu::{Buffer, Device, Frame, Image, Place};
 use crate::shader::{classify, classify_fragments, classify_rays as ray_program};
 
-const TILE: u32 = 8;
+/// Pixels a side.
+pub const TILE: u32 = 8;
 
 /// Bytes of one `WorkSize` of shaders/lib/work_tile.glsl: a VkDispatchIndirectCommand and a count.
 pub const WORK_BYTES: u64 = 16;

@@ -5,12 +5,13 @@ use anyhow::Result;
 use super::fragments::FragmentLists;
 use super::gbuffer::GBuffer;
 use super::light::Lighting;
+use super::mirror::OnScreen;
 use super::rays::LOOP_BUDGET;
-use crate::gpu::{Buffer, Frame, Image};
+use crate::gpu::{Frame, Image};
 use crate::shader::composite;
 
-/// Adds the fragments of one strip to `radiance`, nearest first. What they show of the screen is looked up in
-/// `seen`, the radiance of the opaque surfaces.
+/// Adds the fragments of one strip to `radiance`, nearest first. What they show of the screen is the opaque
+/// surfaces.
 ///
 /// # Errors
 /// When the driver refuses the pipeline.
@@ -20,7 +21,7 @@ pub fn composite<'a>(
     gbuffer: &'a GBuffer,
     lists: &'a FragmentLists,
     radiance: &'a Image,
-    seen: &'a Buffer,
+    screen: &'a OnScreen,
     rows: [u32; 2],
 ) -> Result<()> {
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
@@ -56,7 +57,8 @@ pub fn composite<'a>(
         radiance,
         depth: &gbuffer.depth_texels,
         normals: &gbuffer.normals,
-        seen,
+        seen: &screen.seen,
+        nearest_pieces: &screen.nearest_pieces,
         dropped: &lists.dropped,
         tiles: &lists.work.tiles,
         work: &lists.work.sizes,

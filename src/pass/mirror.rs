@@ -1,14 +1,66 @@
 //! Mirror images of what is on the screen, over the tiles that call for them (shaders/pass/mirror.comp).
 
-use anyhow::Result;
+use std::sync::Arc;
 
-use super::classify::{Calls, RayTiles, classify_rays};
+use anyhow::Result;
+use ash::vk;
+
+use super::classify::{Calls, RayTiles, TILE, classify_rays, rows_of};
 use super::gbuffer::GBuffer;
 use super::light::Lighting;
-use crate::gpu::{Buffer, Frame, Image};
-use crate::shader::mirror;
+use crate::gpu::{Buffer, Device, Frame, Image, Place};
+use crate::plan::{Plan, Screen};
+use crate::shader::{mirror, screen_tiles as tiles_program};
 
-/// Puts the radiance in `seen` in the place of the environment's where a mirrored ray meets it.
+/// The picture as something to be looked up; next to nothing where the plan does not.
+pub struct OnScreen {
+    /// A copy of the radiance as a texel buffer, row by row, to be read while that is written.
+    pub seen: Buffer,
+    /// How near the surfaces of each 8x8 tile come, as reversed depth.
+    pub nearest_pieces: Buffer,
+}
+
+impl OnScreen {
+    /// Buffers for a picture of `size` pixels.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn new(device: &Arc<Device>, plan: &Plan, size: [u32; 2]) -> Result<Self> {
+        let called_for = u64::from(plan.screen != Screen::default());
+        let pixels = u64::from(size[0]) * u64::from(size[1]) * called_for;
+        let tiles = u64::from(size[0].div_ceil(TILE)) * u64::from(size[1].div_ceil(TILE)) * called_for;
+        let texels = |name, bytes, format| Buffer::texels(device, name, bytes, Place::Device, format);
+        Ok(Self {
+            seen: texels("radiance on the screen", 16 * pixels, vk::Format::R32G32B32A32_SFLOAT)?,
+            nearest_pieces: texels("nearest pieces of tiles", 4 * tiles, vk::Format::R32_SFLOAT)?,
+        })
+    }
+}
+
+/// Finds how near the surfaces of each tile come (shaders/pass/screen_tiles.comp).
+///
+/// # Errors
+/// When the driver refuses the pipeline.
+pub fn screen_tiles<'a>(
+    frame: &mut Frame<'a>,
+    lighting: Lighting<'a>,
+    gbuffer: &'a GBuffer,
+    screen: &'a OnScreen,
+) -> Result<()> {
+    let bind = tiles_program::Bind {
+        camera_block: lighting.camera,
+        depth: &gbuffer.depth_texels,
+        normals: &gbuffer.normals,
+        nearest_pieces: &screen.nearest_pieces,
+    };
+    let [width, height] = lighting.size;
+    let tiles = width.div_ceil(TILE) * height.div_ceil(TILE);
+    let groups = rows_of(tiles.div_ceil(tiles_program::PROGRAM.local_size[0]));
+    let constants = tiles_program::Constants { arithmetic: lighting.knobs.index("arithmetic") };
+    frame.compute("nearest pieces of tiles", &bind, constants.words(), &[], groups)
+}
+
+/// Puts the radiance on the screen in the place of the environment's where a mirrored ray meets it.
 ///
 /// # Errors
 /// When the driver refuses a pipeline.
@@ -17,7 +69,7 @@ pub fn mirror<'a>(
     lighting: Lighting<'a>,
     gbuffer: &'a GBuffer,
     tiles: &'a RayTiles,
-    seen: &'a Buffer,
+    screen: &'a OnScreen,
     radiance: &'a Image,
 ) -> Result<()> {
     classify_rays(frame, lighting, Calls { mirrors: true, transmissive: false }, gbuffer, tiles)?;
@@ -54,7 +106,8 @@ pub fn mirror<'a>(
         radiance,
         mirror_tiles: &tiles.tiles,
         work: &tiles.sizes,
-        seen,
+        seen: &screen.seen,
+        nearest_pieces: &screen.nearest_pieces,
         lights: &scene.lights,
         tile_lights: &lighting.tiles.masks,
         environment: &environment.terms,
