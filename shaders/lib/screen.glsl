@@ -23,8 +23,9 @@ float until_negative(float a, float b) {
 // The ray is a straight line in x, y and z of the screen. It meets the piece of a plane that a pixel holds where its distance
 // in front of that falls through 0 within the step. Pieces of a curved surface do not join: between two steps the ray may pass
 // from the front of one to behind the next, which counts where they differ by no more than the width of a pixel and what the
-// flatter one's slope makes of it. That is all the thickness there is: how deep a surface goes the picture does not tell, and
-// a ray that comes to lie behind it without having met it passes. Tiles that lie behind the ray are crossed in one step.
+// flatter one's slope makes of it. A piece that does not join the one before is an outline: it goes no deeper than the pixel
+// is wide, whatever its slope. That is all the thickness there is: how deep a surface goes the picture does not tell, and a
+// ray that comes to lie behind it without having met it passes. Tiles that lie behind the ray are crossed in two steps.
 int met_on_screen(vec3 p_rel, vec3 direction) {
     vec4 from = camera.clip_from_rel * vec4(p_rel, 1.0);
     vec4 along = camera.clip_from_rel * vec4(direction, 0.0);
@@ -60,7 +61,7 @@ int met_on_screen(vec3 p_rel, vec3 direction) {
         vec2 to_edge = mix(vec2(LARGEST), (edge - place) / pixels_by, greaterThan(abs(pixels_by), vec2(1e-6)));
         float more = clamp(floor(min(to_edge.x, to_edge.y)), 0.0, float(WORK_TILE));
         float farthest = min(at.z - by.z * begins, at.z + by.z * (more + 0.5));
-        bool free = farthest > imageLoad(nearest_pieces, tile.y * tiles_across + tile.x).x;
+        bool free = more >= 1.0 && farthest > imageLoad(nearest_pieces, tile.y * tiles_across + tile.x).x;
 
         ScreenPiece piece = screen_piece(pixel);
         vec2 centre = (vec2(pixel) + 0.5) / half_size - 1.0;
@@ -69,15 +70,17 @@ int met_on_screen(vec3 p_rel, vec3 direction) {
         float before = front - begins * rise;
         float after = front + 0.5 * rise;
         bool drawn = piece.z > 0.0 && !free;
-        bool joins = before < 0.0 && last_front >= 0.0 && last_front - before <= min(piece.thickness, last_thickness);
-        bool hits = drawn && rise < 0.0 && after <= 0.0 && (before >= 0.0 || joins);
+        bool joins = last_front >= 0.0 && abs(last_front - before) <= min(piece.thickness, last_thickness);
+        float z_met = at.z + by.z * (before / max(before - after, 1e-30) * (begins + 0.5) - begins);
+        bool outline = before >= 0.0 && abs(z_met - piece.z) <= piece.width;
+        bool hits = drawn && rise < 0.0 && after <= 0.0 && (joins || outline);
         bool from_behind = drawn && behind && before < 0.0 && after >= 0.0;
         met = hits ? pixel.y * int(camera.size.x) + pixel.x : -1;
         ends = hits || from_behind;
         behind = drawn && after < -piece.thickness;
         last_front = after;
         last_thickness = drawn ? piece.thickness : 0.0;
-        i += free ? more + 1.0 : 1.0;
+        i += free ? more : 1.0;
     }
     return met;
 }

@@ -7,7 +7,8 @@
 struct ScreenPiece {
     float z;         // reversed depth at the pixel's centre; 0 where nothing was drawn
     vec2 slope;      // how it grows with x and y of the screen
-    float thickness; // what it spans over a pixel, and a pixel's width on top of that
+    float width;     // of the pixel there
+    float thickness; // that and what the plane spans over the pixel
 };
 
 // Reversed depth is 1/w times a constant, or linear where the view is parallel, so planes are planes in x, y and z of the
@@ -22,7 +23,8 @@ ScreenPiece screen_piece(ivec2 pixel) {
     float scale = parallel ? 1.0 / (camera.far - camera.near) : r.z;
     r.slope = vec2(dot(n, camera.right), -dot(n, camera.up)) * (scale / min(dot(n, v), -1e-6));
     vec2 per_pixel = 2.0 / vec2(camera.size);
-    r.thickness = dot(abs(r.slope), per_pixel) + scale * (length(camera.up) * per_pixel.y);
+    r.width = scale * (length(camera.up) * per_pixel.y);
+    r.thickness = r.width + dot(abs(r.slope), per_pixel);
     return r;
 }
 #endif
