@@ -78,7 +78,7 @@ fn main() -> Result<()> {
     for (knob, rungs) in [
         ("fresnel", &["schlick", "exact"][..]),
         ("brdf", &["blinn-phong", "blinn-phong-reciprocal", "ggx", "ggx-multi"][..]),
-        ("reflection", &["off", "environment"][..]),
+        ("reflection", &["off", "environment", "screen"][..]),
     ] {
         let rows = rungs
             .iter()

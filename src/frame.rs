@@ -19,6 +19,7 @@ use crate::pass::fragments::{FragmentLists, fragments};
 use crate::pass::gbuffer::{GBuffer, gbuffer};
 use crate::pass::interact::interact;
 use crate::pass::light::{Lighting, light};
+use crate::pass::mirror::{OnScreen, mirror, screen_tiles};
 use crate::pass::rays::{BvhFacts, RaysOnDevice, Traversal};
 use crate::pass::scene::SceneOnDevice;
 use crate::pass::shadow_map::ShadowMaps;
@@ -159,6 +160,7 @@ pub struct Renderer {
     work: WorkLists,
     lists: Option<FragmentLists>,
     radiance: Image,
+    screen: OnScreen,
     /// The mean of the samples, where there is more than one.
     film: Option<Image>,
     display: Display,
@@ -203,8 +205,8 @@ impl Renderer {
             bail!("{}: {} lights, a software device lights with at most {most} such", scene.name, scene.lights.len());
         }
         let solids = solids(&scene);
-        let mut warnings =
-            if plan.rays.is_some_and(|rays| rays.refraction) { solids.warnings.clone() } else { Vec::new() };
+        let refracts = plan.screen.refraction || plan.rays.is_some_and(|rays| rays.refraction);
+        let mut warnings = if refracts { solids.warnings.clone() } else { Vec::new() };
         let rays = RaysOnDevice::new(device, &plan, &scene, &solids, settings.traversal)?;
         if let Some(bvh) = rays.facts.filter(|bvh| bvh.dropped > 0) {
             warnings.push(format!("{} triangles without area are left out for rays", bvh.dropped));
@@ -227,6 +229,7 @@ impl Renderer {
             work: WorkLists::new(device, size)?,
             lists: if plan.see_through { Some(FragmentLists::new(device, size)?) } else { None },
             radiance: target("radiance")?,
+            screen: OnScreen::new(device, &plan, size)?,
             film: if plan.samples > 1 { Some(target("film")?) } else { None },
             display: Display::new(device, size)?,
             camera: Buffer::new(device, "camera", size_of::<share::Camera>() as u64, Place::Upload)?,
@@ -295,7 +298,7 @@ impl Renderer {
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(index, count))));
         self.rays.look_from(view, index, count);
         let Self {
-            device, plan, scene, rays, camera, gbuffer: g, tiles: lists_of_lights, work, lists, radiance, ..
+            device, plan, scene, rays, camera, gbuffer: g, tiles: lists_of_lights, work, lists, radiance, screen, ..
         } = &*self;
         // With n samples a pixel each one stands for 1/n of its area: textures are read that much sharper.
         let lod_bias = -0.5 * (count as f32).log2();
@@ -325,12 +328,22 @@ impl Renderer {
         if let Some(with) = plan.rays.filter(|rays| rays.mirrors || rays.refraction) {
             interact(&mut frame, lighting, with, g, &self.ray_tiles, radiance)?;
         }
+        if plan.screen.mirrors || plan.screen.see_through_mirrors {
+            screen_tiles(&mut frame, lighting, g, screen)?;
+        }
+        if plan.screen.mirrors {
+            frame.download("copy radiance", radiance, &screen.seen);
+            mirror(&mut frame, lighting, g, &self.ray_tiles, screen, radiance)?;
+        }
+        if plan.screen.refraction || plan.screen.see_through_mirrors {
+            frame.download("copy radiance", radiance, &screen.seen);
+        }
         if let Some(lists) = lists {
             frame.fill("reset fragment counters", &lists.counters, 0);
             frame.fill("reset dropped fragments", &lists.dropped, 0);
             for strip in lists.strips() {
                 fragments(&mut frame, scene, camera, g, lists, strip, lod_bias)?;
-                composite(&mut frame, lighting, lists, radiance, strip.rows)?;
+                composite(&mut frame, lighting, g, lists, radiance, screen, strip.rows)?;
             }
             frame.read_back(&lists.counters);
             frame.read_back(&lists.dropped);

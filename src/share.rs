@@ -59,7 +59,7 @@ pub struct Material {
     pub sigma: [f32; 3],
     pub medium: u32,
     pub n_metal: [f32; 3],
-    pub unused_n: f32,
+    pub thickness: f32,
     pub kappa_metal: [f32; 3],
     pub unused_kappa: f32,
 }

@@ -111,34 +111,54 @@ vec3 environment_irradiance(vec3 n) {
     return max(e, 0.0) * environment.intensity;
 }
 
-// Light from all around: irradiance on the diffuse part, the prefiltered map in the mirror direction times the
-// directional reflectance of the lobe (split sum, Karis 2013) on the specular part.
+// F0 and F90 factors of the directional reflectance of a surface's lobe.
+vec2 lobe_reflectance(Surface s) {
+    return textureLod(reflectance, vec2(clamp(dot(s.n, s.v), 0.0, 1.0), s.roughness), 0.0).rg;
+}
+
+// Directional reflectance of the lobe: what the base sends to the eye of the light in the mirror direction (split sum,
+// Karis 2013).
+vec3 mirrored_by_base(Surface s) {
+    vec2 ab = lobe_reflectance(s);
+    return (s.f0 * ab.x + s.f90 * ab.y) * s.compensation;
+}
+
+float mirrored_by_coat(Surface s) {
+    vec2 coat_at = vec2(clamp(dot(s.n_coat, s.v), 0.0, 1.0), s.clearcoat_roughness);
+    vec2 coat = textureLod(reflectance, coat_at, 0.0).rg;
+    return s.clearcoat * (0.04 * coat.x + coat.y);
+}
+
+// Light from all around: irradiance on the diffuse part, the prefiltered map in the mirror direction on the specular
+// part.
 vec3 environment_light(Surface s) {
-    float cos_v = clamp(dot(s.n, s.v), 0.0, 1.0);
     vec3 r = reflect_ray(-s.v, s.n).R;
-    vec2 ab = textureLod(reflectance, vec2(cos_v, s.roughness), 0.0).rg;
+    vec2 ab = lobe_reflectance(s);
     vec3 result = vec3(0.0);
     if (AMBIENT) {
         float enters = 1.0 - largest(s.f0_dielectric * ab.x + s.f90_dielectric * ab.y);
         result += s.diffuse * (INV_PI * enters) * environment_irradiance(s.n);
     }
-    if (REFLECTION && !s.base_traced) result += (s.f0 * ab.x + s.f90 * ab.y) * s.compensation * prefiltered_radiance(r, s.alpha);
+    if (REFLECTION && !s.base_traced) result += mirrored_by_base(s) * prefiltered_radiance(r, s.alpha);
     if (CLEARCOAT) {
         vec3 coat_r = reflect_ray(-s.v, s.n_coat).R;
-        vec2 coat_at = vec2(clamp(dot(s.n_coat, s.v), 0.0, 1.0), s.clearcoat_roughness);
-        vec2 coat = textureLod(reflectance, coat_at, 0.0).rg;
         result *= under_coat(s);
-        if (REFLECTION && !s.coat_traced) result += s.clearcoat * (0.04 * coat.x + coat.y) * prefiltered_radiance(coat_r, s.clearcoat_alpha);
+        if (REFLECTION && !s.coat_traced) result += mirrored_by_coat(s) * prefiltered_radiance(coat_r, s.clearcoat_alpha);
     }
     return result * s.occlusion;
 }
 
-// Light from `range`, and with `all_around` what does not come from lights as well.
-vec3 radiance_to_eye(Surface s, ivec2 pixel, uint tiles_across, LightRange range, bool all_around) {
+// Makes up for what single scattering loses, where the knob `brdf` says so.
+void compensate(inout Surface s) {
     if (BRDF == 3) {
-        vec2 ab = textureLod(reflectance, vec2(clamp(dot(s.n, s.v), 0.0, 1.0), s.roughness), 0.0).rg;
+        vec2 ab = lobe_reflectance(s);
         s.compensation = ggx_compensation(s.f0, ab.x + ab.y);
     }
+}
+
+// Light from `range`, and with `all_around` what does not come from lights as well.
+vec3 radiance_to_eye(Surface s, ivec2 pixel, uint tiles_across, LightRange range, bool all_around) {
+    compensate(s);
     vec3 result = punctual_light(s, pixel, tiles_across, range);
     vec3 around = CLEARCOAT ? s.emissive * under_coat(s) : s.emissive;
     if (AMBIENT || REFLECTION) around += environment_light(s);

@@ -8,6 +8,7 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "lib/fragment_list.glsl"
 #include "lib/camera.glsl"
+#include "lib/bent_view.glsl"
 #include "lib/surface.glsl"
 
 layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
@@ -22,11 +23,19 @@ layout(set = 0, binding = 5, rgba32f) uniform image2D radiance;
 layout(scalar, set = 0, binding = 6) buffer Dropped { uint dropped; };
 layout(scalar, set = 0, binding = 7) readonly buffer Tiles { uint fragment_tiles[]; };
 layout(scalar, set = 0, binding = 8) readonly buffer Sizes { WorkSize tiles_size; } work;
+// The opaque surfaces and, pixel by pixel, their radiance: for the rungs `screen`.
+layout(set = 0, binding = 9, r32f) readonly uniform imageBuffer depth;
+layout(set = 0, binding = 10, rgba32f) readonly uniform imageBuffer seen;
+layout(set = 0, binding = 11, rgba16_snorm) readonly uniform image2D normals;
+layout(set = 0, binding = 12, r32f) readonly uniform imageBuffer nearest_pieces;
+#include "lib/screen.glsl"
 layout(push_constant, scalar) uniform Push { uint end_row; };
 
 // Evaluations of loop heads that an invocation may spend. Eight pixels share lavapipe's 65,535, and the longest of them
 // counts in every loop: 40,000 of one's own leaves them room.
 layout(constant_id = 18) const uint LOOP_BUDGET = 40000;
+layout(constant_id = 51) const bool BENDS = false;   // knob `refraction`: screen
+layout(constant_id = 52) const bool MIRRORS = false; // knob `reflection`: screen
 
 // Whether key a comes after key b: farther (smaller depth); of coplanar ones the later drawn lies on top.
 bool after(uvec3 a, uvec3 b) {
@@ -48,6 +57,9 @@ void main() {
     vec3 through = vec3(1.0);
     uvec3 last = uvec3(0xffffffffu);
     LightRange all = LightRange(0, DIRECTIONAL_LIGHTS + LOCAL_LIGHTS, 0, TILE_WORDS);
+    vec2 shift = vec2(0.0); // of what lies behind, in pixels
+    bool nearest = true;
+    float entry = 0.0;      // depth of the nearest body
     uint per_fragment = 0; // loop heads of the last fragment: its neighbours in the list see the same lights
     while (true) {
         uint best = END_OF_LIST;
@@ -83,23 +95,40 @@ void main() {
         Surface s = surface_from_texels(m, base, blue_metal.y, float(word >> 16) * (1.0 / 65535.0),
                                         occlusion_thickness.x, glow, layer.rgb, n,
                                         unit_from_octahedral(unpackSnorm2x16(nodes[at + 12])), -direction, p);
-        // Refraction `off`: what is not reflected goes straight on, tinted by the base colour and by absorption through
-        // the nominal thickness (A1).
+        // What is not reflected goes through, tinted by the base colour and by absorption through the nominal thickness
+        // (A1): straight on, and with refraction `screen` bent where a body is entered.
         s.p_bvh = p + trace_terms.bvh_from_rel;
         s.base_traced = false;
         s.coat_traced = false;
         s.media = trace_terms.camera_media;
         float transmits = m.transmission * layer.a * (1.0 - blue_metal.y * m.metallic);
         vec3 f = fresnel(s, clamp(dot(s.n, s.v), 0.0, 1.0));
-        vec3 passes = transmits * s.base * exp(-m.sigma_thickness * (occlusion_thickness.y * instances[nodes[at + 2]].scale)) * (1.0 - f);
+        float scale = occlusion_thickness.y * instances[nodes[at + 2]].scale;
+        vec3 passes = transmits * s.base * exp(-m.sigma_thickness * scale) * (1.0 - f);
+        if (BENDS) {
+            bool body = (instances[nodes[at + 2]].flags & INSTANCE_SHEET) == 0 && m.transmission > 0.0 &&
+                        (m.flags & MATERIAL_BLENDED) == 0;
+            shift += body ? bent_shift(camera, pixel, p, direction, s.n, m.ior, m.thickness * scale) : vec2(0.0);
+            entry = max(entry, body ? uintBitsToFloat(nodes[at + 1]) : 0.0);
+        }
         if (CLEARCOAT) passes *= under_coat(s);
         s.diffuse *= 1.0 - transmits;
         float alpha = blue_alpha.y;
-        sum += through * alpha * radiance_to_eye(s, pixel, tiles_across, all, true);
+        vec3 shown = radiance_to_eye(s, pixel, tiles_across, all, true);
+        // The nearest one alone: a march may take as many steps as the picture is wide.
+        if (MIRRORS) shown = not_negative(shown + mirrored_on_screen(s, nearest));
+        nearest = false;
+        sum += through * alpha * shown;
         through *= 1.0 - alpha + alpha * passes;
         per_fragment = loop_heads - before;
     }
     vec4 behind = imageLoad(radiance, pixel);
+    if (BENDS) {
+        // The nearest pixel of the picture; what lies in front of a body is not seen through them.
+        ivec2 bent = clamp(pixel + ivec2(floor(shift + 0.5)), ivec2(0), ivec2(camera.size) - 1);
+        int from = bent.y * int(camera.size.x) + bent.x;
+        if (imageLoad(depth, from).x < entry) behind = imageLoad(seen, from);
+    }
     float coverage = 1.0 - (through.r + through.g + through.b) * (1.0 / 3.0) * (1.0 - behind.a);
     imageStore(radiance, pixel, vec4(sum + through * behind.rgb, coverage));
     if (SHADOWS == SHADOW_RAY) count_rays(0, 0, 0.0);

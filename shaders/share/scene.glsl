@@ -32,7 +32,7 @@ struct Material {
     vec3 sigma;               // absorption of the medium inside, 1/m
     uint medium;              // as an entry of lib/media.glsl
     vec3 n_metal;             // index of refraction and extinction of a metal per channel, where flagged
-    float unused_n;
+    float thickness;          // nominal, in metres of the object
     vec3 kappa_metal;
     float unused_kappa;
 };

@@ -8,10 +8,10 @@ use anyhow::Result;
 use super::gbuffer::GBuffer;
 use super::light::Lighting;
 use crate::gpu::{Buffer, Device, Frame, Image, Place};
-use crate::plan::Rays;
 use crate::shader::{classify, classify_fragments, classify_rays as ray_program};
 
-const TILE: u32 = 8;
+/// Pixels a side.
+pub const TILE: u32 = 8;
 
 /// Bytes of one `WorkSize` of shaders/lib/work_tile.glsl: a VkDispatchIndirectCommand and a count.
 pub const WORK_BYTES: u64 = 16;
@@ -119,7 +119,16 @@ pub fn classify<'a>(frame: &mut Frame<'a>, gbuffer: &'a GBuffer, lists: &'a Work
     frame.compute("classify tiles", &bind, constants, bytemuck::cast_slice(&lists.size), groups)
 }
 
-/// The tiles that hold surfaces which send rays.
+/// Which surfaces are looked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Calls {
+    /// Those smooth enough for a mirror image.
+    pub mirrors: bool,
+    /// Those that transmit light.
+    pub transmissive: bool,
+}
+
+/// The tiles that hold surfaces which send rays, or march them over the screen.
 pub struct RayTiles {
     /// One `WorkSize`.
     pub sizes: Buffer,
@@ -150,7 +159,7 @@ impl RayTiles {
 pub fn classify_rays<'a>(
     frame: &mut Frame<'a>,
     lighting: Lighting<'a>,
-    with: Rays,
+    calls: Calls,
     gbuffer: &'a GBuffer,
     list: &'a RayTiles,
 ) -> Result<()> {
@@ -167,8 +176,8 @@ pub fn classify_rays<'a>(
     let groups = rows_of(tiles.div_ceil(ray_program::PROGRAM.local_size[0]));
     let constants = ray_program::Constants {
         clearcoat: lighting.plan.clearcoat,
-        mirror_rays: with.mirrors,
-        transmissive: with.refraction,
+        mirror_rays: calls.mirrors,
+        transmissive: calls.transmissive,
         ..Default::default()
     };
     frame.compute("classify ray tiles", &bind, constants.words(), bytemuck::cast_slice(&size), groups)

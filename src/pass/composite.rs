@@ -3,20 +3,25 @@
 use anyhow::Result;
 
 use super::fragments::FragmentLists;
+use super::gbuffer::GBuffer;
 use super::light::Lighting;
+use super::mirror::OnScreen;
 use super::rays::LOOP_BUDGET;
 use crate::gpu::{Frame, Image};
 use crate::shader::composite;
 
-/// Adds the fragments of one strip to `radiance`, nearest first.
+/// Adds the fragments of one strip to `radiance`, nearest first. What they show of the screen is the opaque
+/// surfaces.
 ///
 /// # Errors
 /// When the driver refuses the pipeline.
 pub fn composite<'a>(
     frame: &mut Frame<'a>,
     lighting: Lighting<'a>,
+    gbuffer: &'a GBuffer,
     lists: &'a FragmentLists,
     radiance: &'a Image,
+    screen: &'a OnScreen,
     rows: [u32; 2],
 ) -> Result<()> {
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
@@ -41,6 +46,8 @@ pub fn composite<'a>(
         absorption: planned.map_or(0, |rays| rays.absorption),
         tile_words: lighting.tiles.words(),
         loop_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
+        bends: plan.screen.refraction,
+        mirrors: plan.screen.see_through_mirrors,
     };
     let bind = composite::Bind {
         camera_block: camera,
@@ -48,6 +55,10 @@ pub fn composite<'a>(
         heads: &lists.heads,
         nodes: &lists.nodes,
         radiance,
+        depth: &gbuffer.depth_texels,
+        normals: &gbuffer.normals,
+        seen: &screen.seen,
+        nearest_pieces: &screen.nearest_pieces,
         dropped: &lists.dropped,
         tiles: &lists.work.tiles,
         work: &lists.work.sizes,

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 
-use super::classify::{RayTiles, classify_rays};
+use super::classify::{Calls, RayTiles, classify_rays};
 use super::gbuffer::GBuffer;
 use super::light::Lighting;
 use super::rays::LOOP_BUDGET;
@@ -25,7 +25,8 @@ pub fn interact<'a>(
     tiles: &'a RayTiles,
     radiance: &'a Image,
 ) -> Result<()> {
-    classify_rays(frame, lighting, with, gbuffer, tiles)?;
+    let calls = Calls { mirrors: with.mirrors, transmissive: with.refraction };
+    classify_rays(frame, lighting, calls, gbuffer, tiles)?;
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
     let planned = Some(with);
     let constants = interact::Constants {

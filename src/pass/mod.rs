@@ -12,6 +12,7 @@ pub mod fragments;
 pub mod gbuffer;
 pub mod interact;
 pub mod light;
+pub mod mirror;
 pub mod rays;
 pub mod scene;
 pub mod shadow_map;

@@ -278,7 +278,8 @@ impl SceneOnDevice {
                     mesh: i.mesh,
                     flipped: solids.flipped[index],
                     normals_flipped: solids.normals_flipped[index],
-                    sheet: solids.sheet[index] || !plan.rays.is_some_and(|rays| rays.refraction),
+                    sheet: solids.sheet[index]
+                        || !(plan.screen.refraction || plan.rays.is_some_and(|rays| rays.refraction)),
                 })
                 .collect(),
             materials_cpu: scene.materials,
@@ -473,7 +474,7 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs) -> share::Material
             | coverage
             | flag(m.conductor.is_some(), share::Material::CONDUCTOR)
             | flag(mirrors(m) && !m.unlit, share::Material::MIRRORS),
-        unused_n: 0.0,
+        thickness: m.thickness,
         kappa_metal: metal.map(|[_, kappa]| kappa),
         unused_kappa: 0.0,
     }

@@ -42,17 +42,17 @@ pub static KNOBS: &[Knob] = &[
     },
     Knob {
         name: "reflection",
-        rungs: &["off", "environment", "ray"],
-        unbuilt: &["screen"],
+        rungs: &["off", "environment", "screen", "ray"],
+        unbuilt: &[],
         presets: ["environment", "ray", "ray"],
-        about: "what a surface mirrors (F4)",
+        about: "what a surface mirrors (F4): nothing, what is infinitely far, what is on the screen, the scene",
     },
     Knob {
         name: "refraction",
-        rungs: &["off", "ray"],
-        unbuilt: &["screen"],
+        rungs: &["off", "screen", "ray"],
+        unbuilt: &[],
         presets: ["off", "ray", "ray"],
-        about: "bent transmission (F5)",
+        about: "bent transmission (F5): none, one bend and a look at the screen, every bend",
     },
     Knob {
         name: "interfaces",

@@ -41,6 +41,8 @@ pub struct Plan {
     pub shadow_maps: bool,
     /// Rays, and the hierarchy of the scene's triangles that they go through; `None` where nothing sends any.
     pub rays: Option<Rays>,
+    /// What is looked up in the picture itself.
+    pub screen: Screen,
     /// Samples per pixel.
     pub samples: u32,
     /// Every effect with its reason.
@@ -72,6 +74,17 @@ pub struct Rays {
     pub interfaces: u32,
 }
 
+/// What is looked up in the picture of the opaque surfaces: the rungs `screen` of `reflection` and `refraction`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Screen {
+    /// Smooth opaque surfaces mirror what is on it …
+    pub mirrors: bool,
+    /// … and so do the nearest see-through ones.
+    pub see_through_mirrors: bool,
+    /// Transmissive bodies show what lies on it where a bent ray leaves them; they are see-through surfaces.
+    pub refraction: bool,
+}
+
 /// One effect, kept or not, and why.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Effect {
@@ -97,10 +110,10 @@ pub struct Surroundings {
 }
 
 /// Whether a surface is laid over what lies behind it, in passes of its own: blended surfaces, and transmissive ones where
-/// they do not refract.
+/// no rays refract in them (`refracting_rays`).
 #[must_use]
-pub fn is_see_through(material: &Material, refraction: bool) -> bool {
-    material.alpha_mode == AlphaMode::Blend || (material.transmission > 0.0 && !refraction)
+pub fn is_see_through(material: &Material, refracting_rays: bool) -> bool {
+    material.alpha_mode == AlphaMode::Blend || (material.transmission > 0.0 && !refracting_rays)
 }
 
 /// Whether a surface is drawn into shadow maps. What lets light through does not stop it there: it passes unweakened.
@@ -115,7 +128,7 @@ pub fn mirrors(material: &Material) -> bool {
     material.metallic > 0.0 || material.specular > 0.0
 }
 
-/// Perceptual roughness up to which surfaces are mirrored by rays: `ROUGHEST_MIRROR` of shaders/lib/surface.glsl. A texture
+/// Perceptual roughness up to which surfaces are mirrored by rays or on the screen: `ROUGHEST_MIRROR` of shaders/lib/surface.glsl. A texture
 /// only lowers the factor.
 const ROUGHEST_MIRROR: f32 = 0.2;
 
@@ -168,7 +181,8 @@ impl Plan {
         let conductors = decide("metals by n and kappa", "", cause, true);
         let refracts = |m: &Material| m.transmission > 0.0 && m.alpha_mode != AlphaMode::Blend;
         let cause = material(find(&refracts), &|m| format!("has transmission {}, n = {}", m.transmission, m.ior));
-        let refraction = decide("refraction", "refraction", cause, knobs.rung("refraction") == "ray");
+        let refracts = decide("refraction", "refraction", cause, knobs.rung("refraction") != "off");
+        let refraction = refracts && knobs.rung("refraction") == "ray";
         let cause = material(find(&|m| is_see_through(m, refraction)), &|m| match m.alpha_mode {
             AlphaMode::Blend => "is alpha-blended".to_owned(),
             _ => format!("has transmission {}", m.transmission),
@@ -192,7 +206,17 @@ impl Plan {
                 (false, true) => format!("has a coat of roughness {}", m.clearcoat_roughness),
                 (false, false) => "has a roughness texture".to_owned(),
             });
-        let mirror_rays = decide("mirrors", "reflection", cause, knobs.rung("reflection") == "ray");
+        let mirrored = decide("mirrors", "reflection", cause, matches!(knobs.rung("reflection"), "screen" | "ray"));
+        let mirror_rays = mirrored && knobs.rung("reflection") == "ray";
+        let on_screen = |see_through| {
+            let found = find(&|m| smooth(m) && is_see_through(m, refraction) == see_through);
+            mirrored && !mirror_rays && found.is_some()
+        };
+        let screen = Screen {
+            mirrors: on_screen(false),
+            see_through_mirrors: on_screen(true),
+            refraction: refracts && !refraction,
+        };
         let ambient = decide("ambient light", "indirect", environment(), knobs.rung("indirect") != "off");
 
         let count = |test: &dyn Fn(&LightKind) -> bool| scene.lights.iter().filter(|l| test(&l.kind)).count() as u32;
@@ -252,27 +276,29 @@ impl Plan {
             directional_lights,
             local_lights,
             tiles,
-            reflectance: reflection || ambient || knobs.rung("brdf") == "ggx-multi",
+            reflectance: reflection || ambient || screen != Screen::default() || knobs.rung("brdf") == "ggx-multi",
             shadow_maps,
             rays,
+            screen,
             samples: knobs.samples(),
             effects,
-            warnings: left_out(&used, refraction, shadow_maps),
+            warnings: left_out(&used, refracts, refraction, shadow_maps),
         }
     }
 }
 
 /// What no rung that is built can show of these materials.
-fn left_out(used: &[&Material], refraction: bool, shadow_maps: bool) -> Vec<String> {
+fn left_out(used: &[&Material], refracts: bool, by_rays: bool, shadow_maps: bool) -> Vec<String> {
     let mut warnings = Vec::new();
     let mut say = |test: &dyn Fn(&Material) -> bool, what: &str| {
         if let Some(material) = used.iter().find(|material| test(material)) {
             warnings.push(format!("material \"{}\" {what}", material.name));
         }
     };
-    let straight = |m: &Material| m.transmission > 0.0 && !(refraction && m.alpha_mode != AlphaMode::Blend);
+    let straight = |m: &Material| m.transmission > 0.0 && !(refracts && m.alpha_mode != AlphaMode::Blend);
+    let clear = |m: &Material| straight(m) || (m.transmission > 0.0 && !by_rays);
     say(&straight, "transmits light that goes straight on: refraction is off, or the material is blended");
-    say(&|m| straight(m) && m.roughness > 0.1, "transmits through a rough surface: shown clear");
+    say(&|m| clear(m) && m.roughness > 0.1, "transmits through a rough surface: shown clear");
     let casts = |m: &Material| !shadow_maps || casts_in_maps(m);
     say(&|m| !casts(m), "casts no shadow: the maps of shadows=map hold opaque and masked surfaces alone");
     say(&|m| m.dispersion > 0.0, "has dispersion, which is not built");

@@ -1,0 +1,34 @@
+// Mirror images of what the picture shows, over the tiles that have smooth surfaces: where the mirrored ray meets something
+// on the screen, its radiance takes the place of the environment's, which the lighting has put there.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+layout(local_size_x = 8, local_size_y = 8) in;
+#include "lib/camera.glsl"
+#include "lib/surface.glsl"
+
+layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
+layout(scalar, set = 0, binding = 2) readonly buffer Instances { Instance instances[]; };
+#include "lib/lighting.glsl"
+#include "lib/primary.glsl"
+#include "lib/work_tile.glsl"
+
+layout(set = 0, binding = 10, rgba32f) uniform image2D radiance;
+layout(scalar, set = 0, binding = 11) readonly buffer MirrorTiles { uint mirror_tiles[]; };
+layout(scalar, set = 0, binding = 12) readonly buffer Sizes { WorkSize mirrors_size; } work;
+layout(set = 0, binding = 25, rgba32f) readonly uniform imageBuffer seen; // radiance before, pixel by pixel
+layout(set = 0, binding = 26, r32f) readonly uniform imageBuffer nearest_pieces;
+#include "lib/screen.glsl"
+
+void main() {
+    uint place = listed_tile(gl_WorkGroupID);
+    if (place >= work.mirrors_size.count) return;
+    ivec2 pixel = first_pixel(mirror_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
+    if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
+    Primary primary = primary_surface(pixel);
+    if (!primary.drawn) return;
+    vec3 changed = mirrored_on_screen(primary.hit.s, true);
+    if (changed == vec3(0.0)) return;
+    vec4 before = imageLoad(radiance, pixel);
+    imageStore(radiance, pixel, vec4(not_negative(before.rgb + changed), before.a));
+}

@@ -1,0 +1,30 @@
+// How near the surfaces of each 8x8 tile come: rays over the screen cross in one step what lies behind them.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+layout(local_size_x = 64) in;
+#include "lib/camera.glsl"
+#include "lib/work_tile.glsl"
+
+layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
+layout(set = 0, binding = 1, r32f) readonly uniform imageBuffer depth;
+layout(set = 0, binding = 2, rgba16_snorm) readonly uniform image2D normals;
+layout(scalar, set = 0, binding = 3) writeonly buffer NearestPieces { float nearest_pieces[]; };
+#include "lib/screen_piece.glsl"
+
+void main() {
+    uvec2 tiles = (camera.size + WORK_TILE - 1) / WORK_TILE;
+    uint tile = listed_tile(gl_WorkGroupID) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+    if (tile >= tiles.x * tiles.y) return;
+    uvec2 first = uvec2(tile % tiles.x, tile / tiles.x) * WORK_TILE;
+    uvec2 last = min(first + WORK_TILE, camera.size);
+    float nearest = 0.0;
+    for (uint y = first.y; y < last.y; y++) {
+        for (uint x = first.x; x < last.x; x++) {
+            ScreenPiece piece = screen_piece(ivec2(x, y));
+            // Half a pixel to every side, and as much again as the next tile's pieces may differ by.
+            nearest = max(nearest, piece.z > 0.0 ? piece.z + 2.0 * piece.thickness : 0.0);
+        }
+    }
+    nearest_pieces[tile] = nearest;
+}
