@@ -298,7 +298,18 @@ impl Renderer {
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(index, count))));
         self.rays.look_from(view, index, count);
         let Self {
-            device, plan, scene, rays, camera, gbuffer: g, tiles: lists_of_lights, work, lists, radiance, screen, ..
+            device,
+            plan,
+            scene,
+            rays,
+            camera,
+            gbuffer: g,
+            tiles: lists_of_lights,
+            work,
+            lists,
+            radiance,
+            screen,
+            ..
         } = &*self;
         // With n samples a pixel each one stands for 1/n of its area: textures are read that much sharper.
         let lod_bias = -0.5 * (count as f32).log2();

@@ -713,7 +713,7 @@ impl<'a> Paths<'a> {
         let relative = self.index(there) / self.index(here);
         let f = fresnel_dielectric(-n.dot(d), relative)[0];
         let mut send = |d: DVec3, weight: f64, media: &[usize]| {
-            if met + 1 <= self.interfaces && weight > FAINTEST * 0.9999 {
+            if met < self.interfaces && weight > FAINTEST * 0.9999 {
                 self.follow(p, d, weight, sure && weight > FAINTEST * 1.0001, media, met + 1);
             }
         };
@@ -1152,8 +1152,7 @@ fn turned_over_glass_looks_as_it_would_the_right_way_round() {
         });
         if mirrored {
             // The ball is its own mirror image.
-            made.0.instances[0].world_from_object =
-                made.0.instances[0].world_from_object * DAffine3::from_scale(DVec3::new(1.0, -1.0, 1.0));
+            made.0.instances[0].world_from_object *= DAffine3::from_scale(DVec3::new(1.0, -1.0, 1.0));
         }
         card(&mut made, 4.0, at(0.0, 0.0, -1.5));
         gpu.shot(&made.0, None, optics([80, 80], &[]))
