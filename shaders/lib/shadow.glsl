@@ -1,5 +1,6 @@
 // How much of a light arrives at a point: what lies between stops it, or, where it is transparent, attenuates and colours
-// it on a straight line (lecture R5; a stated approximation: refraction would focus the light elsewhere).
+// it on a straight line (lecture R5; a stated approximation: refraction would focus the light elsewhere). By rays; maps know
+// what stops light alone.
 #ifndef SHADOW_GLSL
 #define SHADOW_GLSL
 #include "lib/hit.glsl"
