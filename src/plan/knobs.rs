@@ -242,7 +242,7 @@ mod tests {
     fn wrong_choices_say_what_there_is() {
         let mut knobs = Knobs::default();
         for (choice, said) in [
-            ("reflection=screen", "not built yet"),
+            ("indirect=path", "not built yet"),
             ("absorption=march:8", "not built yet"),
             ("brdf=oren", "no rung"),
             ("gloss=1", "no knob"),
