@@ -89,7 +89,8 @@ fn the_order_of_triangles_does_not_show() {
             mesh.indices = triangles.concat();
         }
         let there = gpu.film(&shuffled, settings());
-        compare(&here, &there, 0.0, 50, &format!("{} shuffled", scene.name));
+        let most = if scene.name.contains("pool") { 25 } else { 0 };
+        compare(&here, &there, 0.0, most, &format!("{} shuffled", scene.name));
     }
 }
 

@@ -1,6 +1,7 @@
 // What lies where a ray hits: the surface, from the same vertices and textures that the G-buffer is drawn with.
 #ifndef HIT_GLSL
 #define HIT_GLSL
+#include "lib/bent_normal.glsl"
 #include "lib/slots.glsl"
 #include "lib/surface.glsl"
 #include "lib/trace.glsl"
@@ -167,16 +168,6 @@ HitPoint hit_point_of(Hit hit, vec3 origin, vec3 direction) {
     return r;
 }
 
-// A tangent-space normal in the frame of n and t, as in lib/surface_fragment.glsl.
-vec3 bent(vec3 n, vec4 tangent, vec3 texel) {
-    vec3 t = tangent.xyz - n * dot(n, tangent.xyz);
-    float t2 = dot(t, t);
-    vec3 t_unit = t2 > 0.0 ? t * inversesqrt(t2) : vec3(0.0);
-    vec3 v = t_unit * texel.x + cross(n, t_unit) * (tangent.w * texel.y) + n * texel.z;
-    float v2 = dot(v, v);
-    return t2 > 0.0 && v2 > 0.0 ? v * inversesqrt(v2) : n;
-}
-
 // How much of the surface there is where its texel and colour have this alpha: 0 in the holes of a mask, coverage where
 // it is blended, else 1.
 float coverage_of(Material m, float texel_alpha) {
@@ -221,10 +212,10 @@ HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
     vec3 n_coat = n;
     if ((HIT_TEXTURES & (1u << SLOT_NORMAL)) != 0) {
         vec3 texel = hit_texture_or(id, SLOT_NORMAL, point.uvs, footprint, vec4(0.5, 0.5, 1.0, 1.0)).xyz * 2.0 - 1.0;
-        n = bent(point.n_smooth, point.t_smooth, vec3(texel.xy * m.normal_scale, texel.z));
+        n = bent_normal(point.n_smooth, point.t_smooth, vec3(texel.xy * m.normal_scale, texel.z));
     }
     if ((HIT_TEXTURES & (1u << SLOT_CLEARCOAT_NORMAL)) != 0) {
-        n_coat = bent(point.n_smooth, point.t_smooth,
+        n_coat = bent_normal(point.n_smooth, point.t_smooth,
                       hit_texture_or(id, SLOT_CLEARCOAT_NORMAL, point.uvs, footprint, vec4(0.5, 0.5, 1.0, 1.0)).xyz * 2.0 - 1.0);
     }
     r.front = dot(point.n, direction) <= 0.0;

@@ -25,9 +25,9 @@ struct Primary {
     HitSurface hit;
 };
 
-// Where the ray of a pixel meets the plane of the triangle that was drawn there. The depth of a large triangle is only good
-// to some 1e-5, and its stored normal to 3e-5: rays that start from there would meet what they start from. Not into a
-// Surface at once: glslang never ends where a `precise` value comes from a struct that is assigned from itself.
+// Where the ray of a pixel meets the plane of the triangle that was drawn there. What depth and stored normal tell of
+// the point has roundings of its own, off the plane that rays meet. Not into a Surface at once: glslang never ends
+// where a `precise` value comes from a struct that is assigned from itself.
 HitPoint on_triangle(uint leaf, vec3 p_bvh, vec3 direction) {
     vec3 a = uintBitsToFloat(imageLoad(bvh_triangles, int(leaf) * 3).xyz);
     vec3 b = uintBitsToFloat(imageLoad(bvh_triangles, int(leaf) * 3 + 1).xyz);

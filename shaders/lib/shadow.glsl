@@ -12,9 +12,10 @@ const uint SHADOW_RAY = 2;
 layout(constant_id = 45) const bool FILTERS = false; // something masked, blended or transmissive is in the scene
 layout(constant_id = 46) const uint ABSORPTION = 0;  // 0 off, 1 by the nominal thickness, 2 along the path
 
-// Maps of all lights in one image (pass/shadow_map.rs), and their table: a texel per light, with the first texel of its
-// first map, their number, and whether their depth is told from the light; then five per map: first texel across and down and texels a side, and the rows that lead from
-// bvh space to texels across and down of the image, depth, and 1, all times w.
+// Maps of all lights in one image (pass/shadow_map.rs), and their table: a texel per light, with the first texel of
+// its first map, their number, and whether their depth is told from the light; then five per map: first texel across
+// and down and texels a side, and the rows that lead from bvh space to texels across and down of the image, depth,
+// and 1, all times w.
 layout(set = 0, binding = 36) uniform sampler2D shadow_depth;
 layout(set = 0, binding = 37, rgba32f) readonly uniform imageBuffer shadow_faces;
 // Of the numbers that a map's comparison rests on; see below.
@@ -132,8 +133,8 @@ float map_visibility(vec3 p, vec3 n, vec3 to_light, uint index, float size) {
     return mix(mix(lit.w, lit.z, share.x), mix(lit.x, lit.y, share.x), share.y);
 }
 
-// p in bvh space, n the normal of its triangle, `self` its flat face, v to the viewer, `media` those on the light's side. The light is at p + to_light, or
-// in that direction where t_max is larger than 1.
+// p in bvh space, n the normal of its triangle, `self` its flat face, v to the viewer, `media` those on the light's
+// side. The light is at p + to_light, or in that direction where t_max is larger than 1.
 vec3 visibility(vec3 p, vec3 n, vec3 v, uint self, uvec4 media, vec3 to_light, float t_max, bool wanted) {
     vec3 origin = ray_origin(p, n, v);
     float length_of_direction = vector_length(to_light);

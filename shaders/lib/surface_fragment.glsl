@@ -2,6 +2,7 @@
 // the fragment list of see-through surfaces, which store the same quantities.
 #ifndef SURFACE_FRAGMENT_GLSL
 #define SURFACE_FRAGMENT_GLSL
+#include "lib/bent_normal.glsl"
 #include "lib/gbuffer_interface.glsl"
 #include "share/camera.glsl"
 
@@ -53,16 +54,6 @@ vec4 read(sampler2DArray page, uint slot_index) {
     return texture(page, vec3(dot(u_layer.xyz, set), dot(v_set.xyz, set), u_layer.w), lod_bias);
 }
 
-// A tangent-space normal in the frame of the interpolated normal and tangent; the normal itself where that is no frame.
-vec3 bent_normal(vec3 n, vec3 texel) {
-    vec3 t = t_rel.xyz - n * dot(n, t_rel.xyz);
-    float t2 = dot(t, t);
-    vec3 t_unit = t2 > 0.0 ? t * inversesqrt(t2) : vec3(0.0);
-    vec3 bent = t_unit * texel.x + cross(n, t_unit) * (t_rel.w * texel.y) + n * texel.z;
-    float bent2 = dot(bent, bent);
-    return bent2 > 0.0 ? bent * inversesqrt(bent2) : n;
-}
-
 SurfaceFragment surface_fragment() {
     SurfaceFragment s;
     // Not the varying's constant: perspective interpolation makes 0.99999994 of 1, which a half rounds to 0.9995.
@@ -100,9 +91,9 @@ SurfaceFragment surface_fragment() {
     s.n_coat = n;
     if (HAS_NORMAL) {
         vec3 texel = read(normal_page, SLOT_NORMAL).xyz * 2.0 - 1.0;
-        s.n_shading = bent_normal(n, vec3(texel.xy * materials[ids.y].normal_scale, texel.z));
+        s.n_shading = bent_normal(n, t_rel, vec3(texel.xy * materials[ids.y].normal_scale, texel.z));
     }
-    if (HAS_COAT_NORMAL) s.n_coat = bent_normal(n, read(coat_normal_page, SLOT_CLEARCOAT_NORMAL).xyz * 2.0 - 1.0);
+    if (HAS_COAT_NORMAL) s.n_coat = bent_normal(n, t_rel, read(coat_normal_page, SLOT_CLEARCOAT_NORMAL).xyz * 2.0 - 1.0);
     // From behind, the mapped normal is reversed as a whole (glTF 2.0 section 3.9.5, double sided).
     if (!gl_FrontFacing) {
         s.n_shading = -s.n_shading;

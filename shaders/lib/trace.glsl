@@ -1,6 +1,6 @@
 // Rays through the scene's bounding volume hierarchy: the nearest hit, or whether there is any. One interface, `trace`,
 // and three ways through the tree that return the same hits: along skip links with nodes of 16 bytes or of 32, or with
-// a stack (docs/decisions/traversal.md). Triangles are in the order of the leaves, whatever the way.
+// a stack (docs/decisions/rays.md). Triangles are in the order of the leaves, whatever the way.
 #ifndef TRACE_GLSL
 #define TRACE_GLSL
 #include "lib/ray.glsl"
@@ -22,7 +22,6 @@ layout(scalar, set = 0, binding = 32) uniform TraceBlock { TraceTerms trace_term
 const uint OPAQUE = 1;
 const uint FILTER = 2; // masked, blended or transmissive: what is seen there decides
 const uint NO_TRIANGLE = 0xffffffffu;
-const uint NO_FACE = 0xffffffffu;
 
 struct Hit {
     float t;
@@ -38,11 +37,10 @@ uint triangle_tests = 0;
 uint loop_heads = 0;
 
 // The one place where a ray leaves a surface: moved off it along n, the geometric normal on the side it leaves to, by
-// `offset`, 32 roundings of the largest coordinate in the scene. A hit is as far off the plane of its triangle as its
-// coordinates round, some 2 to 4 of these, and another triangle in the same plane is found as far off again
-// (tests/traversal.rs counts self-hits). And as far along `free`, a direction known to be free: back to where the
-// surface was seen from. A point in a corner may else lie behind the other wall. No length of its own: scenes of any
-// size and place are treated alike.
+// `offset`, 32 roundings of the largest coordinate in the scene: a hit is off the plane of its triangle by a few of
+// them, and another surface there is found by a few off its own (tests/traversal.rs counts self-hits). And as far
+// along `free`, a direction known to be free: back to where the surface was seen from. A point in a corner may else
+// lie behind the other wall. No length of its own: scenes of any size and place are treated alike.
 vec3 ray_origin(vec3 p, vec3 n, vec3 free) {
     return p + (n + free) * trace_terms.offset;
 }
@@ -322,8 +320,8 @@ Hit walk(TriangleRay r, vec3 direction, float t_max, uint classes, uint purpose,
 
 // The nearest hit of a triangle of these classes along origin + t direction that comes after the hit `after` and not
 // after t_max; or, with any_hit, any such hit, of which only that there is one is the same every way. A negative t_max asks
-// for nothing and costs next to nothing. `self` is the flat face that the origin lies in, or NO_FACE: along a sliver of 7 m
-// by 2 cm t rounds by 1e-6 m, and by any amount where a triangle is seen edge-on.
+// for nothing and costs next to nothing. `self` is the flat face that the origin lies in, or 0xffffffff: slivers of 7 m were
+// met again up to 7e-6 m away, and what is seen edge-on may be met at any t.
 Hit trace(vec3 origin, vec3 direction, uint self, Hit after, float t_max, uint classes, bool any_hit) {
     Filters none;
     return walk(TriangleRay(origin, ray_shear(direction), after.t, after.triangle, self), direction, t_max, classes,

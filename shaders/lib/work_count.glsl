@@ -3,24 +3,12 @@
 #define WORK_COUNT_GLSL
 #include "lib/shadow.glsl"
 
-// Twin: src/share.rs.
-#include "share/work.glsl"
+#include "lib/add_work.glsl"
 
 layout(scalar, set = 0, binding = 43) buffer WorkDone { WorkCounts counts; };
 
 // Boundaries that were left without having been entered.
 uint stray_interfaces = 0;
-
-// One addition per subgroup; the sum of a subgroup fits into a word. An atomic's old value tells whether the low word
-// ran over.
-#define ADD_WORK(member, value) \
-    { \
-        uint total = subgroupAdd(value); \
-        if (subgroupElect() && total > 0) { \
-            uint old = atomicAdd(counts.member[0], total); \
-            if (old + total < old) atomicAdd(counts.member[1], 1u); \
-        } \
-    }
 
 void count_rays(uint reflection, uint refraction, float lost) {
     ADD_WORK(reflection, reflection)

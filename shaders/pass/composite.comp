@@ -98,8 +98,6 @@ void main() {
         // What is not reflected goes through, tinted by the base colour and by absorption through the nominal thickness
         // (A1): straight on, and with refraction `screen` bent where a body is entered.
         s.p_bvh = p + trace_terms.bvh_from_rel;
-        s.base_traced = false;
-        s.coat_traced = false;
         s.media = trace_terms.camera_media;
         float transmits = m.transmission * layer.a * (1.0 - blue_metal.y * m.metallic);
         vec3 f = fresnel(s, clamp(dot(s.n, s.v), 0.0, 1.0));

@@ -6,7 +6,7 @@
 #extension GL_KHR_shader_subgroup_arithmetic : require
 layout(local_size_x = 64) in;
 #include "lib/trace.glsl"
-#include "share/work.glsl"
+#include "lib/add_work.glsl"
 
 layout(constant_id = 0) const bool ANY_HIT = false;
 layout(constant_id = 1) const bool PAIRS = false;
@@ -56,13 +56,7 @@ void main() {
         if (a < count) hits[a] = hit;
     }
     if (COUNT) {
-        uint visits = subgroupAdd(node_visits);
-        uint tests = subgroupAdd(triangle_tests);
-        if (subgroupElect()) {
-            uint old = atomicAdd(counts.node_visits[0], visits);
-            if (old + visits < old) atomicAdd(counts.node_visits[1], 1u);
-            old = atomicAdd(counts.triangle_tests[0], tests);
-            if (old + tests < old) atomicAdd(counts.triangle_tests[1], 1u);
-        }
+        ADD_WORK(node_visits, node_visits)
+        ADD_WORK(triangle_tests, triangle_tests)
     }
 }

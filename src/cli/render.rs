@@ -283,7 +283,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
             passes: pass_facts(&rounds),
             phases_ms: phases.all,
             work: (&rendered.work).into(),
-            bvh: renderer.bvh().map(Into::into),
+            bvh: renderer.bvh(),
             pipelines: PipelineFacts { count, spirv_bytes },
             memory: MemoryFacts::now(&device),
             image: film.statistics(),

@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::frame::Work;
 use crate::gpu::{Created, Device, DeviceInfo, Message, Severity};
 use crate::image::Statistics;
-use crate::pass::rays::{BvhFacts, Traversal};
+use crate::pass::rays::BvhFacts;
 use crate::plan::{Effect, Knobs, Plan};
 use crate::shader::PROGRAMS;
 
@@ -33,7 +33,7 @@ pub struct Report {
     pub work: WorkFacts,
     /// What rays went through; absent where none were sent.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub bvh: Option<BvhReport>,
+    pub bvh: Option<BvhFacts>,
     /// Pipelines made.
     pub pipelines: PipelineFacts,
     /// Peak memory.
@@ -198,41 +198,6 @@ impl From<&Work> for WorkFacts {
             stray_interfaces: work.stray_interfaces,
             cut_off: CutOff { mean: work.mean_lost, max: work.most_lost },
         }
-    }
-}
-
-/// The hierarchy that rays went through.
-#[derive(Debug, Serialize)]
-pub struct BvhReport {
-    /// Milliseconds to build and check it.
-    pub build_ms: f64,
-    /// And to lay it out for the device.
-    pub layout_ms: f64,
-    /// Triangles in it.
-    pub triangles: usize,
-    /// Triangles left out: without area or not finite.
-    pub dropped: usize,
-    /// Nodes.
-    pub nodes: usize,
-    /// Edges from the root to the deepest leaf.
-    pub depth: u32,
-    /// Expected nodes and triangles met by a line through the root's box.
-    pub sah: f64,
-    /// How it was gone through: `links16`, `links32` or `stack`.
-    pub traversal: &'static str,
-    /// Bytes on the device.
-    pub bytes: u64,
-}
-
-impl From<BvhFacts> for BvhReport {
-    fn from(bvh: BvhFacts) -> Self {
-        let traversal = match bvh.traversal {
-            Traversal::Links16 => "links16",
-            Traversal::Links32 => "links32",
-            Traversal::Stack => "stack",
-        };
-        let BvhFacts { build_ms, layout_ms, triangles, dropped, nodes, depth, sah, bytes, .. } = bvh;
-        Self { build_ms, layout_ms, triangles, dropped, nodes, depth, sah, traversal, bytes }
     }
 }
 

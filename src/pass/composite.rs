@@ -32,7 +32,8 @@ pub fn composite<'a>(
         arithmetic: lighting.knobs.index("arithmetic"),
         clearcoat: plan.clearcoat,
         conductors: plan.conductors,
-        mirror_rays: planned.is_some_and(|rays| rays.mirrors),
+        // What is mirrored here is the environment: rays are sent from the G-buffer alone.
+        mirror_rays: false,
         directional_lights: plan.directional_lights,
         local_lights: lighting.unlisted_lights(),
         ambient: plan.ambient,

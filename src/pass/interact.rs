@@ -10,7 +10,8 @@ use crate::gpu::{Frame, Image};
 use crate::plan::Rays;
 use crate::shader::interact;
 
-/// Branches of a path that can wait: one for each surface before, and one more where a surface sends three.
+/// Branches that can wait beside one for each surface of a path: a surface may send four. What finds no place is counted as
+/// not followed.
 const SPARE_BRANCHES: u32 = 4;
 
 /// Adds to `radiance` what the surfaces of the G-buffer mirror and what is seen through them.
@@ -28,7 +29,6 @@ pub fn interact<'a>(
     let calls = Calls { mirrors: with.mirrors, transmissive: with.refraction };
     classify_rays(frame, lighting, calls, gbuffer, tiles)?;
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
-    let planned = Some(with);
     let constants = interact::Constants {
         has_emissive: plan.emissive,
         has_layers: plan.layers,
@@ -39,7 +39,7 @@ pub fn interact<'a>(
         arithmetic: lighting.knobs.index("arithmetic"),
         clearcoat: plan.clearcoat,
         conductors: plan.conductors,
-        mirror_rays: planned.is_some_and(|rays| rays.mirrors),
+        mirror_rays: with.mirrors,
         directional_lights: plan.directional_lights,
         local_lights: plan.local_lights,
         ambient: plan.ambient,
@@ -49,8 +49,8 @@ pub fn interact<'a>(
         stack_size: rays.constants.stack_size,
         hit_textures: rays.constants.hit_textures,
         shadows: lighting.shadows(),
-        filters: planned.is_some_and(|rays| rays.filters),
-        absorption: planned.map_or(0, |rays| rays.absorption),
+        filters: with.filters,
+        absorption: with.absorption,
         tile_words: 0,
         transmissive: with.transmissive,
         rough: with.rough,

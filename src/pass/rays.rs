@@ -7,8 +7,9 @@ use anyhow::Result;
 use ash::vk;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+use serde::Serialize;
 
-use super::scene::{texture_slots, upload};
+use super::scene::{cofactors as cofactors_of, texture_slots, upload};
 use super::view::View;
 use crate::gpu::{Buffer, Device, Frame, Place};
 use crate::plan::{Plan, Rays};
@@ -20,15 +21,16 @@ use crate::share::{TraceTerms, WorkCounts};
 /// Rays start this many roundings of the largest coordinate off their surface (shaders/lib/trace.glsl, `ray_origin`).
 const OFFSET_ROUNDINGS: f64 = 32.0;
 
-/// Lists in eight orders beside the one for any hit, as long as they take no more bytes than this: beyond, their
-/// misses of the cache cost more than their order gains (docs/decisions/traversal.md).
+/// Lists in eight orders beside the one for any hit, as long as they take no more bytes than this, some 800,000 nodes of 16
+/// bytes: they are as many copies of the tree.
 const MOST_ORDERED_BYTES: usize = 100 << 20;
 
 /// Loop heads that one invocation of the tree of rays may evaluate where the driver limits them.
 pub const LOOP_BUDGET: u32 = 40_000;
 
 /// How the hierarchy is gone through: `TRAVERSAL` of shaders/lib/trace.glsl.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Traversal {
     /// Skip links between nodes of 16 bytes.
     Links16,
@@ -39,7 +41,7 @@ pub enum Traversal {
 }
 
 /// What the report says of the hierarchy.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct BvhFacts {
     /// Milliseconds to build and check it.
     pub build_ms: f64,
@@ -134,15 +136,7 @@ impl RaysOnDevice {
                 bvh.lists(&[ordered, &[Order::AnyHit]].concat(), format).concat()
             }
         };
-        let mut first = 0_u32;
-        let first_triangle: Vec<u32> = scene
-            .instances
-            .iter()
-            .map(|i| {
-                first += (scene.meshes[i.mesh].indices.len() / 3) as u32;
-                first - (scene.meshes[i.mesh].indices.len() / 3) as u32
-            })
-            .collect();
+        let first_triangle = scene.first_triangles();
         let faces_of_meshes: Vec<Vec<u32>> = scene.meshes.par_iter().map(flat_faces).collect();
         let faces: Vec<u32> = bvh
             .triangles
@@ -163,7 +157,7 @@ impl RaysOnDevice {
                 [[a[0], a[1], a[2], class], [b[0], b[1], b[2], face], [c[0], c[1], c[2], 0]]
             })
             .collect();
-        let mut leaf_places = vec![u32::MAX; first as usize];
+        let mut leaf_places = vec![u32::MAX; scene.triangles()];
         for (place, t) in bvh.triangles.iter().enumerate() {
             leaf_places[(first_triangle[t.instance as usize] + t.primitive) as usize] = place as u32;
         }
@@ -372,7 +366,7 @@ impl<'a> Corners<'a> {
             let m = instance.world_from_object.matrix3;
             let determinant = m.determinant();
             let turned = |flipped: bool| (determinant < 0.0) != flipped;
-            let c = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+            let c = cofactors_of(m);
             let inwards = turned(solids.normals_flipped[i]);
             cofactors.push(if inwards { -c } else { c });
             normals_mirrored.push(inwards);

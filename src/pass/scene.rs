@@ -206,6 +206,7 @@ impl SceneOnDevice {
             });
             all_indices.extend_from_slice(&mesh.indices);
         }
+        let first_triangles = scene.first_triangles();
         scene.meshes = Vec::new();
         let indices = upload(device, "indices", &all_indices, None)?;
         drop(all_indices);
@@ -241,15 +242,6 @@ impl SceneOnDevice {
         let mut lights_cpu = std::mem::take(&mut scene.lights);
         lights_cpu.sort_by_key(|light| !matches!(light.kind, LightKind::Directional { .. }));
 
-        let mut triangles = 0;
-        let first_triangles: Vec<u32> = scene
-            .instances
-            .iter()
-            .map(|i| {
-                triangles += meshes[i.mesh].index_count / 3;
-                triangles - meshes[i.mesh].index_count / 3
-            })
-            .collect();
         let instance_bytes = (scene.instances.len() * size_of::<share::Instance>()) as u64;
         let light_bytes = (lights_cpu.len() * 64) as u64;
         Ok(Self {
@@ -480,13 +472,19 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs) -> share::Material
     }
 }
 
+/// The matrix of cofactors: what carries normals, up to its sign, without a division.
+#[must_use]
+pub fn cofactors(m: DMat3) -> DMat3 {
+    DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
+}
+
 /// Normals transform by the cofactor matrix, which needs no division and survives a singular matrix; the sign of the
 /// determinant keeps them outside of mirrored objects, and a power of two keeps them in range (numerics.md 41).
 fn shared_instance(placement: &Placement, eye: DVec3, material: usize) -> share::Instance {
     let m = placement.world_from_object.matrix3;
     let determinant = m.determinant();
     let sign = if (determinant < 0.0) != placement.normals_flipped { -1.0 } else { 1.0 };
-    let cofactors = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+    let cofactors = cofactors(m);
     let largest = cofactors.to_cols_array().iter().fold(0.0_f64, |a, b| a.max(b.abs()));
     let scale = if largest > 0.0 { sign * (-largest.log2().floor()).exp2() } else { 1.0 };
     let normals = cofactors * scale;

@@ -31,8 +31,8 @@ pub struct Textures {
 }
 
 impl Textures {
-    /// Uploads the images that `wanted` names, and keeps a copy of all levels `for_rays`; their pixels are taken out of the scene, image by image, so that only one
-    /// decoded image exists twice at a time.
+    /// Uploads the images that `wanted` names, and keeps a copy of all levels `for_rays`; their pixels are taken out of
+    /// the scene, image by image, so that only one decoded image exists twice at a time.
     ///
     /// # Errors
     /// When memory is short or an image is larger than the device allows.

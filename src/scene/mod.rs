@@ -172,6 +172,13 @@ impl Scene {
         bounds
     }
 
+    /// The place of each instance's first triangle among those of the scene, instance by instance.
+    #[must_use]
+    pub fn first_triangles(&self) -> Vec<u32> {
+        let counts = self.instances.iter().map(|i| (self.meshes[i.mesh].indices.len() / 3) as u32);
+        counts.scan(0, |next, count| Some(std::mem::replace(next, *next + count))).collect()
+    }
+
     /// Triangles as drawn: instances counted.
     #[must_use]
     pub fn triangles(&self) -> usize {

@@ -1,0 +1,14 @@
+#ifndef BENT_NORMAL_GLSL
+#define BENT_NORMAL_GLSL
+
+// A tangent-space normal in the frame of an interpolated normal and tangent, whose w is the handedness; the normal itself
+// where that is no frame.
+vec3 bent_normal(vec3 n, vec4 tangent, vec3 texel) {
+    vec3 t = tangent.xyz - n * dot(n, tangent.xyz);
+    float t2 = dot(t, t);
+    vec3 t_unit = t2 > 0.0 ? t * inversesqrt(t2) : vec3(0.0);
+    vec3 bent = t_unit * texel.x + cross(n, t_unit) * (tangent.w * texel.y) + n * texel.z;
+    float bent2 = dot(bent, bent);
+    return bent2 > 0.0 ? bent * inversesqrt(bent2) : n;
+}
+#endif
