@@ -109,7 +109,7 @@ pub struct AovPixel {
 pub struct TraceTerms {
     pub bvh_from_rel: [f32; 3],
     pub offset: f32,
-    pub grid_origin: [f32; 3],
+    pub grid_middle: [f32; 3],
     pub nodes: u32,
     pub grid_unit: [f32; 3],
     pub samples: u32,

@@ -121,11 +121,11 @@ fn floats(texel: [u32; 4]) -> [f64; 3] {
 }
 
 fn read(list: &[[u32; 4]], format: Format, grid: &Grid) -> Vec<Read> {
-    let along = |i: usize, k: u32| f64::from(k) * f64::from(grid.unit[i]);
+    let along = |i: usize, k: f64| k * f64::from(grid.unit[i]);
     let node = |texels: &[[u32; 4]]| match format {
         Format::Quantised => Read {
-            center: [0, 1, 2].map(|i| f64::from(grid.origin[i]) + along(i, texels[0][i] >> 16)),
-            half: [0, 1, 2].map(|i| along(i, texels[0][i] & 0xffff)),
+            center: [0, 1, 2].map(|i| f64::from(grid.middle[i]) + along(i, f64::from(texels[0][i] as i32) / 65536.0)),
+            half: [0, 1, 2].map(|i| along(i, f64::from(texels[0][i] & 0xffff))),
             word: texels[0][3],
         },
         Format::Float => Read { center: floats(texels[0]), half: floats(texels[1]), word: texels[0][3] },
@@ -319,7 +319,7 @@ fn assert_room(name: &str, bvh: &Bvh) {
             let of_stack: BTreeSet<_> = children.map(|(c, h)| ([c[0], c[1], c[2]], [h[0], h[1], h[2]])).collect();
             let inside = &list.as_chunks::<2>().0[1..nodes.len() - 1];
             let of_list: BTreeSet<_> = inside.iter().map(|[c, h]| ([c[0], c[1], c[2]], [h[0], h[1], h[2]])).collect();
-            assert_eq!(of_stack, of_list, "{name}");
+            assert!(of_list.is_subset(&of_stack) && !of_list.is_empty(), "{name}");
         }
     }
 }
@@ -377,9 +377,9 @@ fn links_lead_forwards_to_the_sentinel() {
                 let list = bvh.links(order, format);
                 let nodes = read(&list, format, &bvh.grid());
                 let name = format!("{}, {order:?}, {format:?}", scene.name);
-                assert_eq!(nodes.len(), bvh.nodes.len() + 1, "{name}");
-                let sentinel = bvh.nodes.len() as u32;
-                let end = &list[bvh.nodes.len() * format.texels()..];
+                assert!(nodes.len() <= bvh.nodes.len() + 1, "{name}");
+                let sentinel = nodes.len() as u32 - 1;
+                let end = &list[sentinel as usize * format.texels()..];
                 assert_eq!(end[0], [0, 0, 0, sentinel], "{name}");
                 assert!(end[1..].iter().all(|texel| *texel == [0; 4]), "{name}");
                 // Subtrees lie inside each other: the ends of those that are open.
@@ -400,12 +400,39 @@ fn links_lead_forwards_to_the_sentinel() {
     }
 }
 
-/// Pairs of siblings in a list, first and second, with the nodes in their subtrees.
+#[test]
+fn boxes_that_save_no_tests_are_not_listed() {
+    let mut left_out = 0;
+    for (scene, bvh) in built() {
+        let area = |half: [f64; 3]| half[0] * half[1] + half[1] * half[2] + half[2] * half[0];
+        let nodes = read(&bvh.links(Order::AnyHit, Format::Float), Format::Float, &bvh.grid());
+        // A node is tested by the rays that meet the nearest listed one around it.
+        let mut open: Vec<(usize, f64)> = Vec::new();
+        let mut listed = 0.0;
+        for (i, node) in nodes[..nodes.len() - 1].iter().enumerate() {
+            while open.last().is_some_and(|(end, _)| *end == i) {
+                open.pop();
+            }
+            listed += open.last().map_or(0.0, |(_, area)| *area);
+            if node.leaf().is_none() {
+                open.push((node.word as usize, area(node.half)));
+            }
+        }
+        let inner = bvh.nodes.iter().filter(|node| matches!(node, Node::Inner { .. }));
+        // Halves of extents make a quarter of the area; the list has some room around each box.
+        let all: f64 = inner.map(|node| 2.0 * node.bounds().half_area() / 4.0).sum();
+        assert!(listed <= all * 1.001, "{}: {listed} {all}", scene.name);
+        left_out += bvh.nodes.len() + 1 - nodes.len();
+    }
+    assert!(left_out > 200, "{left_out}");
+}
+
+/// Pairs of siblings in a list that have no others, first and second, with the nodes in their subtrees.
 fn siblings(nodes: &[Read]) -> Vec<[(&Read, usize); 2]> {
     let end = |i: usize| if nodes[i].leaf().is_some() { i + 1 } else { nodes[i].word as usize };
     let inner = (0..nodes.len() - 1).filter(|&i| nodes[i].leaf().is_none());
-    let children = inner.map(|i| [i + 1, end(i + 1)]);
-    children.map(|pair| pair.map(|i| (&nodes[i], end(i) - i))).collect()
+    let children = inner.map(|i| (i, [i + 1, end(i + 1)])).filter(|&(i, [_, b])| end(b) == end(i));
+    children.map(|(_, pair)| pair.map(|i| (&nodes[i], end(i) - i))).collect()
 }
 
 #[test]
@@ -429,7 +456,7 @@ fn near_children_come_first() {
             }
         }
     }
-    assert!(compared > 5000 && swapped * 2 == compared, "{compared} {swapped}");
+    assert!(compared > 3000 && swapped * 2 == compared, "{compared} {swapped}");
 }
 
 #[test]
@@ -505,7 +532,7 @@ fn what_no_ray_can_meet_is_dropped_and_counted() {
     let near = scene("near", &[good], &[DAffine3::from_scale(DVec3::splat(8e37))]);
     let bvh = Bvh::build(&near).unwrap();
     assert_eq!((bvh.triangles.len(), bvh.dropped), (1, 0));
-    assert!(bvh.sah == 1.0 && bvh.grid().origin.iter().all(|x| x.is_finite()));
+    assert!(bvh.sah == 1.0 && bvh.grid().middle.iter().all(|x| x.is_finite()));
 
     for empty in [scene("dropped", &bad, &[DAffine3::IDENTITY]), Scene::default()] {
         let bvh = Bvh::build(&empty).unwrap();

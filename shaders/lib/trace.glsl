@@ -69,16 +69,18 @@ BoxRay box_ray(vec3 origin, vec3 direction, bool any_order) {
     if (TRAVERSAL == LINKS_16) {
         // Boxes are a grid unit larger than need be on each side, 1.5e-5 of the scene: more than the roundings here as
         // long as the origin is within 80 times its extent.
-        r.inverse = inverse * trace_terms.grid_unit;
-        r.start_near = (trace_terms.grid_origin - origin) * inverse;
+        vec3 unit = inverse * trace_terms.grid_unit;
+        r.inverse = unit * (1.0 / 65536.0);
+        r.start_near = (trace_terms.grid_middle - origin) * inverse;
         r.start_far = r.start_near;
+        r.extent = abs(unit);
     } else {
         vec3 pad = abs(origin) * (8.0 / 16777216.0) * abs(inverse) + abs(inverse) * trace_terms.offset;
         r.inverse = inverse;
         r.start_near = -origin * inverse - pad;
         r.start_far = -origin * inverse + pad;
+        r.extent = abs(inverse);
     }
-    r.extent = abs(r.inverse);
     return r;
 }
 
@@ -110,9 +112,9 @@ void visit(inout Walk w, BoxRay r, float t_min) {
     int word;
     if (TRAVERSAL == LINKS_16) {
         uvec4 node = imageLoad(bvh_nodes, r.base + w.node);
-        vec3 center = vec3(ivec3(node.xyz >> 16u));
+        // The whole word is the centre, times 65536.
         vec3 half_extent = vec3(ivec3(node.xyz & 0xffffu));
-        vec3 t = center * r.inverse + r.start_near;
+        vec3 t = vec3(ivec3(node.xyz)) * r.inverse + r.start_near;
         vec3 e = half_extent * r.extent;
         near = t - e;
         far = t + e;

@@ -4,7 +4,7 @@
 struct TraceTerms {
     vec3 bvh_from_rel;
     float offset;         // how far rays start off a surface, in metres (lib/trace.glsl, ray_origin)
-    vec3 grid_origin;     // of the boxes of 16-bit nodes: their coordinates count grid_unit from here
+    vec3 grid_middle;     // of the boxes of 16-bit nodes: their coordinates count grid_unit from here
     uint nodes;           // in one list, which is also the place of its sentinel
     vec3 grid_unit;
     uint samples;         // of a pixel, a power of four

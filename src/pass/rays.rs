@@ -21,9 +21,9 @@ use crate::share::{TraceTerms, WorkCounts};
 /// Rays start this many roundings of the largest coordinate off their surface (shaders/lib/trace.glsl, `ray_origin`).
 const OFFSET_ROUNDINGS: f64 = 32.0;
 
-/// Lists in eight orders beside the one for any hit, as long as they take no more bytes than this, some 800,000 nodes of 16
-/// bytes: they are as many copies of the tree.
-const MOST_ORDERED_BYTES: usize = 100 << 20;
+/// Lists in eight orders beside the one for any hit, as long as they take no more bytes than this, some two million nodes of
+/// 16 bytes: they are as many copies of the tree.
+const MOST_ORDERED_BYTES: usize = 256 << 20;
 
 /// Loop heads that one invocation of the tree of rays may evaluate where the driver limits them.
 pub const LOOP_BUDGET: u32 = 40_000;
@@ -128,12 +128,13 @@ impl RaysOnDevice {
         let filter: Vec<bool> = scene.meshes.iter().map(|mesh| is_filter(&scene.materials[mesh.material])).collect();
         let filters: Vec<bool> =
             bvh.triangles.iter().map(|t| filter[scene.instances[t.instance as usize].mesh]).collect();
-        let nodes = match traversal {
-            Traversal::Stack => bvh.stack_nodes(),
+        let (nodes, sentinel) = match traversal {
+            Traversal::Stack => (bvh.stack_nodes(), 0),
             Traversal::Links16 | Traversal::Links32 => {
                 let format = if traversal == Traversal::Links16 { Format::Quantised } else { Format::Float };
                 let ordered: &[Order] = if octants { &Order::OCTANTS } else { &[] };
-                bvh.lists(&[ordered, &[Order::AnyHit]].concat(), format).concat()
+                let lists = bvh.lists(&[ordered, &[Order::AnyHit]].concat(), format);
+                (lists.concat(), lists[0].len() / format.texels() - 1)
             }
         };
         let first_triangle = scene.first_triangles();
@@ -171,9 +172,9 @@ impl RaysOnDevice {
         let corner_buffer = upload(device, "corners for rays", &hit_corners, format)?;
         let fixed = TraceTerms {
             offset: (OFFSET_ROUNDINGS * f64::from(extent) * 2.0_f64.powi(-24)) as f32,
-            grid_origin: grid.origin,
+            grid_middle: grid.middle,
             grid_unit: grid.unit,
-            nodes: bvh.nodes.len() as u32,
+            nodes: sentinel as u32,
             interfaces: rays.interfaces,
             ..bytemuck::Zeroable::zeroed()
         };
