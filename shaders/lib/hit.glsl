@@ -34,6 +34,7 @@ layout(set = 0, binding = 41, rgba32ui) readonly uniform uimageBuffer texel_slot
 // Two texels per material and slot: row of u, layer | row of v, coordinate set.
 layout(set = 0, binding = 42, rgba32f) readonly uniform imageBuffer hit_slots;
 
+const int MOST_LEVELS = 15; // above the first, of a picture of 32768 texels
 const uint TEXELS_SRGB = 1;
 const uint TEXELS_NEAREST = 2;
 // Bits 2 and 3, 4 and 5: wrap of u and v: 0 repeat, 1 mirror, 2 clamp.
@@ -78,9 +79,11 @@ vec4 hit_texture(uint material, uint slot, vec4 uv_sets, float footprint) {
     int level = clamp(int(floor(log2(max(across, 1.0)) + 0.5)), 0, int(levels) - 1);
     uint first = place.x;
     // Sizes of the levels above: their sum has no closed form where sides are odd.
-    for (int i = 0; i < level; i++) {
-        first += uint(size.x * size.y);
-        size = max(size >> 1, ivec2(1));
+    // As many turns for every lane: where the level ended the loop, lavapipe read other texels in whole groups of lanes.
+    for (int i = 0; i < MOST_LEVELS; i++) {
+        bool above = i < level;
+        first += above ? uint(size.x * size.y) : 0u;
+        size = above ? max(size >> 1, ivec2(1)) : size;
     }
     bool nearest = (flags & TEXELS_NEAREST) != 0;
     vec2 at = uv * vec2(size) - (nearest ? 0.0 : 0.5);
@@ -115,6 +118,20 @@ struct HitPoint {
 
 vec4 corner_texel(uint triangle, int i) {
     return uintBitsToFloat(imageLoad(hit_corners, int(triangle) * CORNER_TEXELS + i));
+}
+
+// Its material | SHEET_TRIANGLE.
+uint hit_material(uint triangle) {
+    return floatBitsToUint(corner_texel(triangle, 0).w);
+}
+
+// Across a triangle, on the side of its front, as long as twice its area.
+vec3 hit_normal(uint triangle) {
+    vec3 a = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3).xyz);
+    vec3 b = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 1).xyz);
+    vec3 c = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 2).xyz);
+    // Corners run counter-clockwise around the front, whatever mirrored the object.
+    return cross(b - a, c - a);
 }
 
 HitPoint hit_point_of(Hit hit, vec3 origin, vec3 direction) {

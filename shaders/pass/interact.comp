@@ -29,6 +29,7 @@ layout(constant_id = 52) const bool SKY = false;        // the environment is se
 layout(constant_id = 53) const bool MASKED_HITS = false; // some surface has holes
 layout(constant_id = 54) const uint LOOP_BUDGET = 40000;
 layout(constant_id = 55) const uint PENDING = 1;         // branches that can wait at once
+layout(constant_id = 56) const bool TOUCHING = false;    // some transparent body lies against another surface
 const bool ENVIRONMENT = AMBIENT || REFLECTION;
 // A branch that would add less than this share of what it meets is not followed. The sum of all that is cut off is
 // counted.
@@ -48,29 +49,82 @@ struct Branch {
     float spread;     // and what it grows by per metre
     uint events;      // surfaces met before | what it was sent for << 8 | only let through so far << 9
 };
+// What a surface has sent, the last one first, in registers: an array that is indexed is memory, which lavapipe writes word
+// by word and lane by lane, and most surfaces send one or two. The last one is followed next, the others wait in memory.
+const int MOST_SENT = 4;
+Branch sent[MOST_SENT];
+uint sent_now = 0;
 Branch pending[PENDING];
 uint waiting = 0;
+// Directions in which the environment is to be looked at, with what it is weighted by.
+vec3 looks_at[MOST_SENT + 1];
+vec3 looks_with[MOST_SENT + 1];
+uint looks = 0;
 vec3 sum = vec3(0.0);
 float escaped = 0.0; // share of the pixel where nothing lies behind what is transparent
 float lost = 0.0;
 uint reflection_rays = 0;
 uint refraction_rays = 0;
 
-vec3 environment_seen(vec3 direction) {
-    vec2 at = equirectangular_from_direction(into_environment(direction));
-    return ENVIRONMENT ? textureLod(sky, at, 0.0).rgb * environment.intensity : vec3(0.0);
+void look(vec3 direction, vec3 throughput) {
+    for (int i = MOST_SENT; i > 0; i--) {
+        looks_at[i] = looks_at[i - 1];
+        looks_with[i] = looks_with[i - 1];
+    }
+    looks_at[0] = direction;
+    looks_with[0] = throughput;
+    looks++;
+}
+
+// All looks so far, in one place: a sampled image is a call that spills every register.
+void see_environment() {
+    do {
+        loop_heads++;
+        vec2 at = equirectangular_from_direction(into_environment(looks_at[0]));
+        vec3 seen = ENVIRONMENT ? textureLod(sky, at, 0.0).rgb * environment.intensity : vec3(0.0);
+        sum += looks > 0 ? looks_with[0] * seen : vec3(0.0);
+        for (int i = 0; i < MOST_SENT; i++) {
+            looks_at[i] = looks_at[i + 1];
+            looks_with[i] = looks_with[i + 1];
+        }
+        looks -= looks > 0 ? 1 : 0;
+    } while (looks > 0);
 }
 
 void send(Branch branch) {
     float weight = largest(branch.throughput);
-    bool follows = (branch.events & 0xffu) <= trace_terms.interfaces && weight >= FAINTEST && waiting < PENDING;
-    if (weight > 0.0 && follows) pending[min(waiting, PENDING - 1)] = branch;
-    waiting += weight > 0.0 && follows ? 1 : 0;
+    bool follows = (branch.events & 0xffu) <= trace_terms.interfaces && weight >= FAINTEST && waiting + sent_now < PENDING;
+    if (weight > 0.0 && follows) {
+        for (int i = MOST_SENT - 1; i > 0; i--) sent[i] = sent[i - 1];
+        sent[0] = branch;
+        sent_now++;
+    }
     // What is not followed sees the environment: nearer than nothing to what would have been found.
     if (weight > 0.0 && !follows) {
         lost += weight;
-        sum += branch.throughput * environment_seen(branch.direction);
+        look(branch.direction, branch.throughput);
     }
+}
+
+// The branch to follow: the last one sent, or else the last one that waits.
+Branch next_branch() {
+    do {
+        loop_heads++;
+        bool waits = sent_now > 1;
+        Branch oldest = sent[1];
+        for (int i = 2; i < MOST_SENT; i++) {
+            if (sent_now > i) oldest = sent[i];
+        }
+        if (waits) pending[min(waiting, PENDING - 1)] = oldest;
+        waiting += waits ? 1 : 0;
+        sent_now -= waits ? 1 : 0;
+    } while (sent_now > 1);
+    bool from_memory = sent_now == 0;
+    waiting -= from_memory && waiting > 0 ? 1 : 0;
+    Branch next = pending[min(waiting, PENDING - 1)];
+    if (!from_memory) next = sent[0];
+    sent_now = 0;
+    return next;
 }
 
 // What a surface separates, for a ray that comes through `media`.
@@ -79,12 +133,38 @@ struct Boundary {
     bool solid;  // the surface of a transparent body
     bool hidden; // a body of higher priority displaces it: nothing changes here
     bool stray;  // left without having been entered: the shell is open, or another one crosses it
+    bool against; // something that is no body lies against it: it is met next, as if it were in the medium before
     uint here;   // the medium before
     uint there;  // and behind
     uvec4 beyond; // all media behind
 };
 
-Boundary boundary_at(HitSurface hit, uvec4 media) {
+// Where bodies touch there is one boundary, from the one to the other, and where something opaque lies against a body there
+// is none: what is within the offset behind a surface is crossed with it, since a ray that goes on starts behind it. Looked
+// for along the ray, with a cosine of at least 1/16: beyond that, faces apart by a part of the offset are missed.
+void cross_what_touches(inout Boundary r, HitSurface hit, vec3 direction) {
+    vec3 origin = ray_origin(hit.s.p_bvh, hit.n, vec3(0.0));
+    float end = 2.0 * trace_terms.offset / max(-dot(hit.n, direction), 1.0 / 16.0);
+    Hit last = FROM_ORIGIN;
+    bool goes_on = r.solid;
+    do {
+        loop_heads++;
+        last = trace(origin, direction, hit.s.face, last, goes_on ? end : -1.0, OPAQUE | FILTER, false);
+        goes_on = goes_on && last.triangle != NO_TRIANGLE;
+        if (goes_on) {
+            uint material = hit_material(last.triangle);
+            Material m = material_at(material & 0xffffu);
+            bool solid = m.transmission > 0.0 && (material & SHEET_TRIANGLE) == 0;
+            bool front = dot(hit_normal(last.triangle), direction) <= 0.0;
+            r.beyond = front ? entered(r.beyond, m.medium) : left(r.beyond, m.medium);
+            r.against = !solid;
+            goes_on = solid;
+        }
+    } while (goes_on);
+}
+
+// `direction` is the ray's.
+Boundary boundary_at(HitSurface hit, uvec4 media, vec3 direction) {
     Boundary r;
     Material m = material_at(hit.material);
     uint medium = m.medium;
@@ -94,15 +174,22 @@ Boundary boundary_at(HitSurface hit, uvec4 media) {
     r.beyond = hit.front ? entered(media, medium) : left(media, medium);
     r.stray = r.solid && !hit.front && !inside(media, medium);
     r.here = r.stray ? medium : present_medium(media);
-    r.there = present_medium(r.beyond);
+    r.against = false;
+    if (TOUCHING) cross_what_touches(r, hit, direction);
+    if (r.against) r.beyond = media;
+    r.there = r.against ? r.here : present_medium(r.beyond);
     r.hidden = r.solid && r.here == r.there;
     return r;
 }
 
+// Whether a ray is sent to see what the base of a surface mirrors: inside a body there is no environment.
+bool mirrored_by_ray(HitSurface hit, Boundary boundary) {
+    return hit.s.base_traced || (boundary.solid && boundary.here != 0);
+}
+
 // Sends what a ray along `direction` is split into at a surface.
-void split(HitSurface hit, Branch ray, float cone, uvec2 pixel) {
+void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixel) {
     Surface s = hit.s;
-    Boundary boundary = boundary_at(hit, ray.media);
     vec3 direction = ray.direction;
     float n1 = index_of(boundary.here);
     float n2 = boundary.solid ? index_of(boundary.there) : s.ior;
@@ -117,7 +204,7 @@ void split(HitSurface hit, Branch ray, float cone, uvec2 pixel) {
     uint only_through = ray.events & 0x200u;
 
     // Straight on: past what is not covered, and through a boundary that another medium displaces.
-    next.origin = ray_origin(s.p_bvh, -hit.n, vec3(0.0));
+    next.origin = ray_origin(s.p_bvh, boundary.against ? hit.n : -hit.n, vec3(0.0));
     next.direction = direction;
     next.media = boundary.hidden ? boundary.beyond : ray.media;
     next.events = (boundary.hidden ? count - 1 : count) | BY_REFRACTION << 8 | only_through;
@@ -137,7 +224,8 @@ void split(HitSurface hit, Branch ray, float cone, uvec2 pixel) {
         weight *= under_coat(s);
     }
 
-    bool rough = ROUGH && s.roughness > MIN_ROUGHNESS;
+    // Where nothing is bent, nothing is scattered either.
+    bool rough = ROUGH && s.roughness > MIN_ROUGHNESS && !(boundary.solid && n1 == n2);
     vec3 h = s.n;
     if (ROUGH) {
         vec2 u = random_point(pixel, reflection_rays + refraction_rays, trace_terms.sample_index, trace_terms.samples);
@@ -162,8 +250,7 @@ void split(HitSurface hit, Branch ray, float cone, uvec2 pixel) {
     next.origin = ray_origin(s.p_bvh, hit.n, s.v);
     next.media = ray.media;
     next.events = count | BY_REFLECTION << 8;
-    bool mirrors = s.base_traced || (boundary.solid && boundary.here != 0);
-    next.throughput = mirrors ? weight * f * s.compensation * masking : vec3(0.0);
+    next.throughput = mirrored_by_ray(hit, boundary) ? weight * f * s.compensation * masking : vec3(0.0);
     next.spread = ray.spread + (rough ? s.alpha : 0.0);
     send(next);
 
@@ -211,20 +298,20 @@ void main() {
     ray.spread = camera.orthographic != 0 ? 0.0 : trace_terms.pixel_angle;
     ray.events = 0x200u;
     float cone = camera.orthographic != 0 ? trace_terms.pixel_angle : trace_terms.pixel_angle * length(hit.s.p_rel);
-    bool at_surface = true;
-    bool goes_on;
+    Boundary boundary = boundary_at(hit, ray.media, ray.direction);
+    split(hit, boundary, ray, cone, uvec2(pixel));
+    bool more = sent_now > 0;
     do {
         loop_heads++;
-        if (at_surface) split(hit, ray, cone, uvec2(pixel));
-        goes_on = waiting > 0 && loop_heads < LOOP_BUDGET;
-        waiting -= goes_on ? 1 : 0;
-        if (goes_on) ray = pending[min(waiting, PENDING - 1)];
+        bool goes_on = more;
+        ray = next_branch();
         bool reflected_ray = (ray.events >> 8 & 1u) == BY_REFLECTION;
         reflection_rays += goes_on && reflected_ray ? 1u : 0u;
         refraction_rays += goes_on && !reflected_ray ? 1u : 0u;
         // Holes of masks are passed by.
         Hit found = FROM_ORIGIN;
         HitPoint point;
+        bool at_surface;
         bool hole;
         do {
             loop_heads++;
@@ -240,18 +327,26 @@ void main() {
                 cone = ray.width + ray.spread * found.t;
                 hit = hit_surface(point, ray.direction, cone * exp2(trace_terms.lod_bias));
                 hit.s.media = ray.media;
+                boundary = boundary_at(hit, ray.media, ray.direction);
                 Surface s = hit.s;
                 s.diffuse *= 1.0 - hit.transmits;
+                // What a ray is sent for is not looked up as well.
+                s.base_traced = mirrored_by_ray(hit, boundary);
                 LightRange all = LightRange(0, DIRECTIONAL_LIGHTS + LOCAL_LIGHTS, 0, 0);
-                if (!boundary_at(hit, ray.media).hidden) sum += ray.throughput * hit.coverage * radiance_to_eye(s, pixel, 0, all, true);
+                if (!boundary.hidden) sum += ray.throughput * hit.coverage * radiance_to_eye(s, pixel, 0, all, true);
+                split(hit, boundary, ray, cone, uvec2(pixel));
             } else {
                 bool clear = (ray.events & 0x200u) != 0 && !SKY;
-                sum += clear ? vec3(0.0) : ray.throughput * environment_seen(ray.direction);
+                if (!clear) look(ray.direction, ray.throughput);
                 escaped += clear ? (ray.throughput.r + ray.throughput.g + ray.throughput.b) * (1.0 / 3.0) : 0.0;
             }
         }
-    } while (goes_on);
+        see_environment();
+        more = sent_now > 0 || waiting > 0;
+        more = more && loop_heads < LOOP_BUDGET;
+    } while (more);
     // Out of steps: what waits is not followed.
+    for (int i = 0; i < MOST_SENT; i++) lost += sent_now > i ? largest(sent[i].throughput) : 0.0;
     while (waiting > 0) {
         waiting--;
         lost += largest(pending[waiting].throughput);

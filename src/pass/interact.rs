@@ -58,6 +58,7 @@ pub fn interact<'a>(
         masked_hits: with.masked,
         loop_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
         pending: with.interfaces + SPARE_BRANCHES,
+        touching: rays.constants.touching,
     };
     let bind = interact::Bind {
         camera_block: camera,

@@ -14,6 +14,7 @@ use super::view::View;
 use crate::gpu::{Buffer, Device, Frame, Place};
 use crate::plan::{Plan, Rays};
 use crate::scene::bvh::{Bvh, Format, Order, Triangle};
+use crate::scene::contact::bodies_touch;
 use crate::scene::solid::{Solids, media_at};
 use crate::scene::{Material, Mesh, Scene};
 use crate::share::{TraceTerms, WorkCounts};
@@ -59,6 +60,8 @@ pub struct BvhFacts {
     pub sah: f64,
     /// How it is gone through.
     pub traversal: Traversal,
+    /// Some transparent body lies against another surface: what touches is crossed together.
+    pub touching: bool,
     /// Bytes on the device.
     pub bytes: u64,
 }
@@ -74,6 +77,8 @@ pub struct TraceConstants {
     pub stack_size: u32,
     /// Which texture slots hits read.
     pub hit_textures: u32,
+    /// [`BvhFacts::touching`].
+    pub touching: bool,
 }
 
 /// Tables of a scene for rays; next to nothing where the plan sends none.
@@ -165,13 +170,15 @@ impl RaysOnDevice {
         let hit_corners: Vec<[u32; 4]> = bvh.triangles.par_iter().flat_map_iter(|t| corners.texels(t)).collect();
         let layout_ms = start.elapsed().as_secs_f64() * 1e3;
         let extent = bvh.triangles.iter().flat_map(|t| t.corners.iter().flatten()).fold(0.0_f32, |m, x| m.max(x.abs()));
+        let offset = OFFSET_ROUNDINGS * f64::from(extent) * 2.0_f64.powi(-24);
+        let touching = rays.refraction && bodies_touch(&bvh, &solids.solid, offset);
         let grid = bvh.grid();
         let format = Some(vk::Format::R32G32B32A32_UINT);
         let nodes_buffer = upload(device, "BVH nodes", &nodes, format)?;
         let triangle_buffer = upload(device, "BVH triangles", &triangles, format)?;
         let corner_buffer = upload(device, "corners for rays", &hit_corners, format)?;
         let fixed = TraceTerms {
-            offset: (OFFSET_ROUNDINGS * f64::from(extent) * 2.0_f64.powi(-24)) as f32,
+            offset: offset as f32,
             grid_middle: grid.middle,
             grid_unit: grid.unit,
             nodes: sentinel as u32,
@@ -186,6 +193,7 @@ impl RaysOnDevice {
                 octants,
                 stack_size: bvh.depth + 1,
                 hit_textures: corners.contents,
+                touching,
             },
             facts: Some(BvhFacts {
                 build_ms,
@@ -196,6 +204,7 @@ impl RaysOnDevice {
                 depth: bvh.depth,
                 sah: bvh.sah,
                 traversal,
+                touching,
                 bytes: nodes_buffer.bytes() + triangle_buffer.bytes() + corner_buffer.bytes(),
             }),
             nodes: nodes_buffer,
@@ -223,7 +232,7 @@ impl RaysOnDevice {
             leaf_places: Buffer::texels(device, "no leaf places", 0, Place::Device, vk::Format::R32_UINT)?,
             terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,
             counts: Buffer::new(device, "work counts", size_of::<WorkCounts>() as u64, Place::Readback)?,
-            constants: TraceConstants { traversal: 0, octants: false, stack_size: 1, hit_textures: 0 },
+            constants: TraceConstants { traversal: 0, octants: false, stack_size: 1, hit_textures: 0, touching: false },
             facts: None,
             fixed: TraceTerms {
                 offset: (OFFSET_ROUNDINGS * half * 2.0_f64.powi(-24)) as f32,
@@ -442,9 +451,8 @@ const SHEET: u32 = 1 << 16;
 /// The geometry of the instances that are transparent bodies, under the same indices; the others have no triangles.
 fn bodies(scene: &Scene, solids: &Solids, rays: Rays) -> Scene {
     let mut wanted = vec![false; scene.meshes.len()];
-    for (instance, &sheet) in scene.instances.iter().zip(&solids.sheet) {
-        let transmits = scene.materials[scene.meshes[instance.mesh].material].transmission > 0.0;
-        wanted[instance.mesh] |= rays.refraction && transmits && !sheet;
+    for (instance, &solid) in scene.instances.iter().zip(&solids.solid) {
+        wanted[instance.mesh] |= rays.refraction && solid;
     }
     let mesh = |(mesh, &wanted): (&Mesh, &bool)| Mesh {
         positions: if wanted { mesh.positions.clone() } else { Vec::new() },

@@ -6,6 +6,7 @@
 mod accessor;
 pub mod bvh;
 pub mod camera;
+pub mod contact;
 mod container;
 pub mod environment;
 mod geometry;

@@ -16,6 +16,8 @@ const NO_VOLUME: f64 = 1e-12;
 /// What the transmissive instances of a scene are; one entry per instance.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Solids {
+    /// Transmissive bodies.
+    pub solid: Vec<bool>,
     /// Transmissive, and to be read as a thin sheet of its nominal thickness: thickness 0, or a mesh that bounds no
     /// volume. False for surfaces that transmit nothing.
     pub sheet: Vec<bool>,
@@ -110,11 +112,12 @@ fn body(mesh: &Mesh) -> Body {
 pub fn solids(scene: &Scene) -> Solids {
     let mut warnings = Vec::new();
     let mut bodies: Vec<Option<Body>> = vec![None; scene.meshes.len()];
-    let (mut sheet, mut flipped, mut normals_flipped) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut solid, mut sheet, mut flipped, mut normals_flipped) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for instance in &scene.instances {
         let mesh = &scene.meshes[instance.mesh];
         let material = &scene.materials[mesh.material];
         if material.transmission <= 0.0 || material.thickness <= 0.0 {
+            solid.push(false);
             sheet.push(material.transmission > 0.0);
             flipped.push(false);
             normals_flipped.push(false);
@@ -131,11 +134,12 @@ pub fn solids(scene: &Scene) -> Solids {
             warnings.push(format!("mesh \"{}\" transmits light and {what}", mesh.name));
             body
         });
+        solid.push(matches!(body, Body::Solid | Body::InsideOut));
         sheet.push(matches!(body, Body::Open | Body::Empty));
         flipped.push(body == Body::InsideOut);
         normals_flipped.push(body == Body::InsideOut && normals_follow_faces(mesh));
     }
-    Solids { sheet, flipped, normals_flipped, warnings }
+    Solids { solid, sheet, flipped, normals_flipped, warnings }
 }
 
 /// The transmissive solids that contain a point, as indices of instances, the one with the largest box first: for
@@ -149,7 +153,7 @@ pub fn media_at(scene: &Scene, solids: &Solids, p_world: DVec3) -> Vec<usize> {
     let mut media = Vec::new();
     for (i, instance) in scene.instances.iter().enumerate() {
         let mesh = &scene.meshes[instance.mesh];
-        if scene.materials[mesh.material].transmission <= 0.0 || solids.sheet[i] {
+        if !solids.solid[i] {
             continue;
         }
         let bounds = seen_from(mesh, instance, p_world);
