@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use glam::DVec3;
 use gltf::json;
 use serde::Deserialize;
@@ -127,7 +127,10 @@ fn grid(text: &str) -> Result<SigmaGrid> {
         min: Option<[f64; 3]>,
         max: Option<[f64; 3]>,
     }
-    let Grid { size, values, min, max } = serde_json::from_str(text)?;
+    let Grid { size, values, min, max } = serde_json::from_str(text).map_err(|error| {
+        // It repeats what it finds, as long as it may be and with its line breaks.
+        anyhow!("{}", error.to_string().replace(char::is_control, " ").chars().take(120).collect::<String>())
+    })?;
     ensure!(min.is_some() == max.is_some(), "of a box there are both corners, min and max, or none");
     let bounds = min.zip(max).map(|(min, max)| [DVec3::from(min), DVec3::from(max)]);
     SigmaGrid::new(size, values, bounds)
