@@ -185,10 +185,10 @@ fn sums_are_those_of_f64_and_midpoints_are_exact_where_sigma_is_linear() {
                     continue;
                 }
                 steepest = steepest.min(-d.z);
-                for c in 0..3 {
+                for (c, &got) in pixel[..3].iter().enumerate() {
                     let k = if channels == 1 { 0 } else { c };
                     let (length, sum) = ((to - from).length(), body.depth(from, to, k, steps, rule));
-                    let got = f64::from(pixel[c]);
+                    let got = f64::from(got);
                     worst = worst.max((got / (-sum).exp() - 1.0).abs());
                     // ∫σ from the values at both sides alone; a left sum lacks half a step of their difference.
                     let lacks = if rule == "left" { 0.5 * (high[k] - low[k]) / steps as f64 } else { 0.0 };
