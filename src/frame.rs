@@ -28,6 +28,7 @@ use crate::pass::tonemap::{Counts, Display, tonemap};
 use crate::pass::view::{View, jitter};
 use crate::plan::{Knobs, Plan, Surroundings};
 use crate::scene::environment::Environment;
+use crate::scene::sigma::one_medium_each;
 use crate::scene::solid::solids;
 use crate::scene::{Camera, Scene};
 use crate::share::{self, AovPixel};
@@ -174,10 +175,11 @@ impl Renderer {
     /// When the scene has nothing to draw, the size is out of range, or it does not fit the device.
     pub fn new(
         device: &Arc<Device>,
-        scene: Scene,
+        mut scene: Scene,
         environment: Option<&Environment>,
         settings: Settings,
     ) -> Result<Self> {
+        one_medium_each(&mut scene);
         let size = settings.size;
         let limit = device.max_image_size();
         if size.contains(&0) || size.iter().any(|&side| side > limit) {
@@ -213,7 +215,7 @@ impl Renderer {
         }
         let turn = Turn { intensity: settings.environment_intensity, rotation: settings.environment_rotation };
         let name = scene.name.clone();
-        let scene = SceneOnDevice::new(device, scene, &plan, &settings.knobs, &solids)?;
+        let scene = SceneOnDevice::new(device, scene, &plan, &settings.knobs, &solids, rays.anchor())?;
         let target = |name| {
             let usage = vk::ImageUsageFlags::STORAGE;
             Image::new(device, name, ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], usage))

@@ -61,7 +61,7 @@ pub struct Material {
     pub n_metal: [f32; 3],
     pub thickness: f32,
     pub kappa_metal: [f32; 3],
-    pub unused_kappa: f32,
+    pub grid: u32,
 }
 
 impl Material {

@@ -407,6 +407,14 @@ fn a_picture_of_absurd_size_is_refused() {
     assert_refused(&b, "image 0");
 }
 
+fn grid(size: [u64; 3], values: &[f64]) -> Value {
+    json!({ "sigma": { "size": size, "values": values } })
+}
+
+fn boxed(min: Value, max: Value) -> Value {
+    json!({ "sigma": { "size": [1, 2, 2], "values": [1, 2, 3, 4], "min": min, "max": max } })
+}
+
 #[test]
 fn etalon_extras_that_cannot_be_meant_are_refused_by_material_and_key() {
     for (etalon, expected) in [
@@ -428,6 +436,54 @@ fn etalon_extras_that_cannot_be_meant_are_refused_by_material_and_key() {
         (json!({ "n": vec![1; 100_000] }), "extras.etalon n: [1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1… is neither"),
         (json!({ "preset": "two\nlines" }), "extras.etalon preset: \"two\\nlines\" is no preset"),
         (json!({ "kappa": 2 }), "extras.etalon kappa: a metal has an n too"),
+        (json!({ "sigma": 3 }), "extras.etalon sigma: invalid type"),
+        (json!({ "sigma": { "size": [1, 1, 1] } }), "extras.etalon sigma: missing field `values`"),
+        (json!({ "sigma": { "size": [1, 1], "values": [1] } }), "extras.etalon sigma: invalid length 2"),
+        (json!({ "sigma": { "size": [1, 1, -1], "values": [1] } }), "extras.etalon sigma: invalid value: integer `-1`"),
+        (
+            json!({ "sigma": { "size": [1, 1, 1.5], "values": [1] } }),
+            "extras.etalon sigma: invalid type: floating point",
+        ),
+        (
+            json!({ "sigma": { "size": [1, 0, 1], "values": [] } }),
+            "extras.etalon sigma: a grid of 1 x 0 x 1 points has none",
+        ),
+        (
+            grid([2, 2, 1], &[1.0; 3]),
+            "extras.etalon sigma: 2 x 2 x 1 points have 4 values, or 12 of three channels, not 3",
+        ),
+        (
+            grid([2, 2, 1], &[1.0; 8]),
+            "extras.etalon sigma: 2 x 2 x 1 points have 4 values, or 12 of three channels, not 8",
+        ),
+        (
+            grid([1 << 32, 1 << 32, 1], &[1.0]),
+            "extras.etalon sigma: 4294967296 x 4294967296 x 1 points are more than 16777216",
+        ),
+        (grid([1 << 12, 1 << 12, 2], &[1.0]), "extras.etalon sigma: 4096 x 4096 x 2 points are more than 16777216"),
+        (grid([2, 1, 1], &[1.0, -1e-9]), "extras.etalon sigma: value 1, -0.000000001, is negative"),
+        (grid([2, 1, 1], &[1e39, 0.0]), "extras.etalon sigma: value 0 is not a finite number of 32 bits"),
+        (
+            json!({ "sigma": { "size": [1, 1, 1], "values": [null] } }),
+            "extras.etalon sigma: invalid type: null, expected f32",
+        ),
+        (
+            boxed(json!([0, 0, 0]), json!([1, 1, 0])),
+            "extras.etalon sigma: the box [0, 0, 0] to [1, 1, 0] has no extent along z",
+        ),
+        (
+            boxed(json!([0, 2, 0]), json!([1, 1, 1])),
+            "extras.etalon sigma: the box [0, 2, 0] to [1, 1, 1] has no extent along y",
+        ),
+        (
+            boxed(json!([0, 0, 0]), json!(null)),
+            "extras.etalon sigma: of a box there are both corners, min and max, or none",
+        ),
+        (
+            json!({ "sigma": { "size": "x\ny".repeat(1000), "values": [1] } }),
+            "extras.etalon sigma: invalid type: string \"x\\ny",
+        ),
+        (json!({ "sigma": { "mi\nn": 1 } }), "extras.etalon sigma: unknown field `mi n`"),
     ] {
         let mut b = rich();
         b.json["materials"][0]["name"] = "odd".into();
@@ -439,6 +495,7 @@ fn etalon_extras_that_cannot_be_meant_are_refused_by_material_and_key() {
     for (text, expected) in [
         ("\"n\":1e400".to_owned(), "extras.etalon n: number out of range"),
         (format!("\"n\":{}", "[".repeat(500) + &"]".repeat(500)), "extras.etalon n: recursion limit exceeded"),
+        (r#""sigma":{"size":[1,1,1],"values":[1e400]}"#.to_owned(), "extras.etalon sigma: number out of range"),
         ("\"n\":1,\"n\":2,\"kappa\":-1".to_owned(), "extras.etalon kappa: -1 is negative"),
     ] {
         let mut b = rich();

@@ -530,6 +530,28 @@ fn etalon_extras_are_read_into_the_material() {
 }
 
 #[test]
+fn a_grid_of_sigma_is_read_and_each_node_gets_a_medium_of_its_own() {
+    let fog = json!({ "name": "fog", "extensions": {
+        "KHR_materials_transmission": { "transmissionFactor": 1 }, "KHR_materials_volume": { "thicknessFactor": 1 } },
+        "extras": { "etalon": { "sigma": { "size": [2, 1, 2], "values": [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11.5],
+                                           "min": [0, 0, 0], "max": [2, 0, 1] } } } });
+    let mut b = textured(fog, &["KHR_materials_transmission", "KHR_materials_volume"]);
+    let node = b.json["nodes"][0].clone();
+    b.root(node);
+    let scene = load(&b);
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let materials: Vec<_> = scene.instances.iter().map(|i| scene.meshes[i.mesh].material).collect();
+    assert_eq!(materials, [0, 1]);
+    let [first, second] = [0, 1].map(|i| scene.materials[i].marched_sigma().unwrap());
+    assert_eq!(first, second);
+    assert_eq!((first.size(), first.channels()), ([2, 1, 2], 3));
+    // x fastest, then y, then z; red, green and blue of a point together.
+    assert_eq!((first.at([1, 0, 0], 0), first.at([0, 0, 1], 2), first.at([1, 0, 1], 2)), (3.0, 8.0, 11.5));
+    let place = first.grid_from_object(&scene.meshes[0]).transform_point3(DVec3::new(0.5, 7.0, 0.25));
+    assert_eq!(place, DVec3::new(0.25, 0.0, 0.25));
+}
+
+#[test]
 fn what_etalon_extras_say_in_vain_is_a_warning_that_names_material_and_key() {
     let warned = |etalon: serde_json::Value, extensions: serde_json::Value, expected: &[&str]| {
         let scene = load(&with_etalon(etalon, extensions));
@@ -544,8 +566,19 @@ fn what_etalon_extras_say_in_vain_is_a_warning_that_names_material_and_key() {
         json!({}),
         &["extras.etalon has no key \"Priority\"; it is ignored", "extras.etalon has no key \"a\\nb\"; it is ignored"],
     );
-    for key in ["brdf", "kd", "ks", "shine", "sellmeier", "cauchy", "sigma"] {
+    for key in ["brdf", "kd", "ks", "shine", "sellmeier", "cauchy"] {
         warned(json!({ key: [1, "x"] }), json!({}), &[&format!("extras.etalon {key} is not read yet")]);
+    }
+    for (extensions, lacks) in [
+        (json!({}), "transmits nothing"),
+        (json!({ "KHR_materials_transmission": { "transmissionFactor": 0.5 } }), "is a thin sheet, of thickness 0"),
+    ] {
+        let m = warned(
+            json!({ "sigma": { "size": [1, 1, 1], "values": [1] } }),
+            extensions,
+            &[&format!("extras.etalon sigma is seen inside of bodies, and the material {lacks}")],
+        );
+        assert!(m.sigma.is_some() && m.marched_sigma().is_none());
     }
     let m = warned(
         json!({ "n": [1.4, 1.5, 1.6] }),

@@ -22,7 +22,7 @@ Material material_at(uint id) {
     vec4 t7 = material_texel(id, 7);
     vec4 t8 = material_texel(id, 8);
     return Material(t0, t1.xyz, t1.w, t2.xyz, t2.w, t3.xyz, t3.w, t4.x, t4.y, t4.z, t4.w, t5.x, t5.y, t5.z,
-                    floatBitsToUint(t5.w), t6.xyz, floatBitsToUint(t6.w), t7.xyz, t7.w, t8.xyz, t8.w);
+                    floatBitsToUint(t5.w), t6.xyz, floatBitsToUint(t6.w), t7.xyz, t7.w, t8.xyz, floatBitsToUint(t8.w));
 }
 
 float material_ior(uint id) {
@@ -31,5 +31,10 @@ float material_ior(uint id) {
 
 vec3 material_sigma(uint id) {
     return material_texel(id, 6).xyz;
+}
+
+// Of its grid of σ (lib/sigma_grid.glsl) the first texel + 1; 0 where none is marched.
+uint material_grid(uint id) {
+    return imageLoad(material_texels, int(id) * MATERIAL_TEXELS + 8).w;
 }
 #endif

@@ -6,6 +6,7 @@
 #define MEDIA_GLSL
 #include "lib/material.glsl"
 #include "lib/medium.glsl"
+#include "lib/sigma_grid.glsl"
 
 uint displacing(uint a, uint b) {
     return b >> 16 > a >> 16 ? b : a;
@@ -36,9 +37,13 @@ float index_of(uint medium) {
     return medium == 0 ? 1.0 : material_ior((medium & 0xffffu) - 1);
 }
 
-// What is left of light after a length in a medium (lecture A1).
-vec3 absorbed(uint medium, float distance) {
+// What is left of light after a length in a medium, from p along a unit direction (lecture A1, A2).
+vec3 absorbed(uint medium, vec3 p, vec3 direction, float distance) {
     vec3 sigma = medium == 0 ? vec3(0.0) : material_sigma((medium & 0xffffu) - 1);
+    if (MARCH_STEPS != 0) {
+        uint grid = medium == 0 ? 0 : material_grid((medium & 0xffffu) - 1);
+        if (grid != 0 && distance > 0.0) sigma += mean_sigma(grid - 1, p, direction, distance);
+    }
     return vec3(beer_lambert(1.0, sigma.r, distance).T, beer_lambert(1.0, sigma.g, distance).T,
                 beer_lambert(1.0, sigma.b, distance).T);
 }

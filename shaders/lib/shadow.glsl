@@ -161,7 +161,9 @@ vec3 visibility(vec3 p, vec3 n, vec3 v, uint self, uvec4 media, vec3 to_light, f
             if (found) {
                 Hit hit = hit_again(origin, to_light, filters.t.x, filters.triangles.x);
                 uint medium = present_medium(media);
-                if (ABSORPTION == 2 && medium != 0) through *= absorbed(medium, (hit.t - last.t) * length_of_direction);
+                if (ABSORPTION == 2 && medium != 0) {
+                    through *= absorbed(medium, origin + to_light * last.t, to_light / length_of_direction, (hit.t - last.t) * length_of_direction);
+                }
                 through *= filtered(hit_point_of(hit, origin, to_light), to_light / length_of_direction, media);
                 last = hit;
             }
@@ -171,7 +173,9 @@ vec3 visibility(vec3 p, vec3 n, vec3 v, uint self, uvec4 media, vec3 to_light, f
         goes_on = goes_on && largest_component(through) > 0.0;
     } while (goes_on);
     uint medium = present_medium(media);
-    if (ABSORPTION == 2 && medium != 0 && t_max == 1.0) through *= absorbed(medium, (1.0 - last.t) * length_of_direction);
+    if (ABSORPTION == 2 && medium != 0 && t_max == 1.0) {
+        through *= absorbed(medium, origin + to_light * last.t, to_light / length_of_direction, (1.0 - last.t) * length_of_direction);
+    }
     return through;
 }
 

@@ -322,7 +322,7 @@ void main() {
         } while (hole);
         if (goes_on) {
             uint medium = present_medium(ray.media);
-            if (ABSORPTION == 2 && medium != 0) ray.throughput *= absorbed(medium, at_surface ? found.t : 0.0);
+            if (ABSORPTION == 2 && medium != 0) ray.throughput *= absorbed(medium, ray.origin, ray.direction, at_surface ? found.t : 0.0);
             if (at_surface) {
                 cone = ray.width + ray.spread * found.t;
                 hit = hit_surface(point, ray.direction, cone * exp2(trace_terms.lod_bias));

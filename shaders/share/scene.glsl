@@ -29,12 +29,12 @@ struct Material {
     float clearcoat;
     float clearcoat_roughness;
     uint flags;               // MATERIAL_...
-    vec3 sigma;               // absorption of the medium inside, 1/m
+    vec3 sigma;               // absorption of the medium inside, 1/m, beside that of its grid
     uint medium;              // as an entry of lib/media.glsl
     vec3 n_metal;             // index of refraction and extinction of a metal per channel, where flagged
     float thickness;          // nominal, in metres of the object
     vec3 kappa_metal;
-    float unused_kappa;
+    uint grid;                // of σ, as lib/material.glsl says
 };
 const uint MATERIAL_UNLIT = 1;
 const uint MATERIAL_BLENDED = 2;   // alpha is coverage

@@ -45,6 +45,10 @@ pub fn composite<'a>(
         shadows: lighting.shadows(),
         filters: planned.is_some_and(|rays| rays.filters),
         absorption: planned.map_or(0, |rays| rays.absorption),
+        march_steps: plan.march().steps,
+        quadrature: plan.march().rule,
+        march_colours: plan.march().colours,
+        march_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
         tile_words: lighting.tiles.words(),
         loop_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
         bends: plan.screen.refraction,
@@ -78,6 +82,7 @@ pub fn composite<'a>(
         texels: &scene.texels,
         texel_slots: &scene.texel_slots,
         hit_slots: &scene.slots,
+        sigma_grids: &scene.grids.texels,
         work_done: &rays.counts,
     };
     let push = [rows[1]];

@@ -51,6 +51,10 @@ pub fn interact<'a>(
         shadows: lighting.shadows(),
         filters: with.filters,
         absorption: with.absorption,
+        march_steps: with.march.steps,
+        quadrature: with.march.rule,
+        march_colours: with.march.colours,
+        march_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
         tile_words: 0,
         transmissive: with.transmissive,
         rough: with.rough,
@@ -90,6 +94,7 @@ pub fn interact<'a>(
         texels: &scene.texels,
         texel_slots: &scene.texel_slots,
         hit_slots: &scene.slots,
+        sigma_grids: &scene.grids.texels,
         work_done: &rays.counts,
     };
     frame.compute_indirect("reflection and refraction", &bind, constants.words(), &[], &tiles.sizes, 0)

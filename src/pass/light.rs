@@ -5,7 +5,7 @@ use anyhow::Result;
 use super::classify::WorkLists;
 use super::environment::EnvironmentOnDevice;
 use super::gbuffer::GBuffer;
-use super::rays::RaysOnDevice;
+use super::rays::{LOOP_BUDGET, RaysOnDevice};
 use super::scene::SceneOnDevice;
 use super::shadow_map::ShadowMaps;
 use super::tiles::Tiles;
@@ -114,6 +114,10 @@ pub fn light<'a>(
         shadows: lighting.shadows(),
         filters: planned.is_some_and(|rays| rays.filters),
         absorption: planned.map_or(0, |rays| rays.absorption),
+        march_steps: plan.march().steps,
+        quadrature: plan.march().rule,
+        march_colours: plan.march().colours,
+        march_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
     };
     let bind = light::Bind {
         camera_block: camera,
@@ -144,6 +148,7 @@ pub fn light<'a>(
         texels: &scene.texels,
         texel_slots: &scene.texel_slots,
         hit_slots: &scene.slots,
+        sigma_grids: &scene.grids.texels,
         work_done: &rays.counts,
     };
     for (index, range) in lighting.ranges().into_iter().enumerate() {

@@ -124,6 +124,7 @@ pub fn mirror<'a>(
         texels: &scene.texels,
         texel_slots: &scene.texel_slots,
         hit_slots: &scene.slots,
+        sigma_grids: &scene.grids.texels,
     };
     frame.compute_indirect("mirror images on the screen", &bind, constants.words(), &[], &tiles.sizes, 0)
 }

@@ -16,6 +16,7 @@ pub mod mirror;
 pub mod rays;
 pub mod scene;
 pub mod shadow_map;
+pub mod sigma_grid;
 pub mod texture;
 pub mod tiles;
 pub mod tonemap;

@@ -6,6 +6,7 @@ use anyhow::{Result, bail};
 use ash::vk;
 use glam::{DMat3, DVec3};
 
+use super::sigma_grid::SigmaGrids;
 use super::texture::{Meaning, Texels, Textures};
 use super::view::View;
 use crate::gpu::{Buffer, Device, Draw, Frame, Place, Sampled, VertexStream};
@@ -84,6 +85,8 @@ pub struct SceneOnDevice {
     pub texels: Buffer,
     /// For rays: where each slot's lie.
     pub texel_slots: Buffer,
+    /// For rays: media that vary.
+    pub grids: SigmaGrids,
     /// Instances relative to the eye of the current view.
     pub instances: Buffer,
     /// Lights relative to the eye of the current view: directional first, four texels each.
@@ -170,11 +173,18 @@ fn stream<T: bytemuck::NoUninit>(
 }
 
 impl SceneOnDevice {
-    /// Uploads a scene; decoded images and geometry are taken out of it.
+    /// Uploads a scene; decoded images and geometry are taken out of it. `anchor` is what rays are told from.
     ///
     /// # Errors
     /// When the scene does not fit the device.
-    pub fn new(device: &Arc<Device>, mut scene: Scene, plan: &Plan, knobs: &Knobs, solids: &Solids) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        mut scene: Scene,
+        plan: &Plan,
+        knobs: &Knobs,
+        solids: &Solids,
+        anchor: DVec3,
+    ) -> Result<Self> {
         if scene.materials.len() > 0xffff || scene.instances.len() > 0x7f_ffff {
             bail!(
                 "{}: {} materials and {} instances, the G-buffer's ids hold 65535 and 8388607",
@@ -206,6 +216,7 @@ impl SceneOnDevice {
             });
             all_indices.extend_from_slice(&mesh.indices);
         }
+        let grids = SigmaGrids::new(device, plan, &scene, anchor)?;
         let first_triangles = scene.first_triangles();
         scene.meshes = Vec::new();
         let indices = upload(device, "indices", &all_indices, None)?;
@@ -220,7 +231,8 @@ impl SceneOnDevice {
         let mut texels = Texels::default();
         let textures = Textures::new(device, &mut scene, &wanted, plan.rays.is_some().then_some(&mut texels))?;
 
-        let table: Vec<_> = scene.materials.iter().enumerate().map(|(i, m)| shared_material(m, i, knobs)).collect();
+        let table: Vec<_> =
+            scene.materials.iter().enumerate().map(|(i, m)| shared_material(m, i, knobs, grids.places[i])).collect();
         let mut slot_table = Vec::with_capacity(scene.materials.len() * SLOTS);
         let mut texel_slots = Vec::with_capacity(scene.materials.len() * SLOTS);
         let mut page_of_material = Vec::with_capacity(scene.materials.len());
@@ -248,6 +260,7 @@ impl SceneOnDevice {
             materials: upload(device, "materials", &table, Some(vk::Format::R32G32B32A32_UINT))?,
             slots: upload(device, "texture slots", &slot_table, Some(vk::Format::R32G32B32A32_SFLOAT))?,
             texels: upload(device, "texels for rays", &texels.texels, Some(vk::Format::R32_UINT))?,
+            grids,
             texel_slots: upload(device, "texel slots", &texel_slots, Some(vk::Format::R32G32B32A32_UINT))?,
             instances: Buffer::new(device, "instances", instance_bytes, Place::Upload)?,
             lights: Buffer::texels(device, "lights", light_bytes, Place::Upload, vk::Format::R32G32B32A32_SFLOAT)?,
@@ -428,8 +441,9 @@ fn shared_slot(texture: Option<TextureRef>, textures: &Textures, meaning: Meanin
 }
 
 /// The constants of a material. F0 of a dielectric is ((n − 1) / (n + 1))² tinted and scaled by KHR_materials_specular;
-/// the optical depth is −ln(attenuation colour) · thickness / attenuation distance (lecture A1, KHR_materials_volume).
-fn shared_material(m: &Material, index: usize, knobs: &Knobs) -> share::Material {
+/// the optical depth is −ln(attenuation colour) · thickness / attenuation distance (lecture A1, KHR_materials_volume). A
+/// grid of σ that is not marched, whose place is 0, adds its mean.
+fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32) -> share::Material {
     let r = (m.ior - 1.0) / (m.ior + 1.0);
     let absorbs = knobs.rung("absorption") != "off";
     // attenuationDistance is in metres of the world, thickness in metres of the object.
@@ -437,6 +451,8 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs) -> share::Material
         let sigma = -color.max(1e-6).ln() / m.attenuation_distance;
         if absorbs && m.thickness > 0.0 && sigma > 0.0 { sigma } else { 0.0 }
     });
+    let mean = m.marched_sigma().filter(|_| absorbs).map_or([0.0; 3], |grid| grid.mean().map(|x| x as f32));
+    let of_grid = |share: f32| [0, 1, 2].map(|i| sigma[i] + share * mean[i]);
     let (alpha_cutoff, coverage) = match m.alpha_mode {
         AlphaMode::Mask(cutoff) => (cutoff, 0),
         AlphaMode::Blend => (0.0, share::Material::BLENDED),
@@ -450,7 +466,7 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs) -> share::Material
         metallic: m.metallic,
         f0: m.specular_color.map(|c| (r * r * c).min(1.0) * m.specular),
         roughness: m.roughness,
-        sigma_thickness: sigma.map(|sigma| sigma * m.thickness),
+        sigma_thickness: of_grid(1.0).map(|sigma| sigma * m.thickness),
         f90: m.specular,
         ior: m.ior,
         occlusion_strength: m.occlusion_strength,
@@ -459,7 +475,7 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs) -> share::Material
         transmission: m.transmission,
         clearcoat: m.clearcoat,
         clearcoat_roughness: m.clearcoat_roughness,
-        sigma,
+        sigma: of_grid(if grid == 0 { 1.0 } else { 0.0 }),
         medium: super::rays::medium(m, index),
         n_metal: metal.map(|[n, _]| n),
         flags: flag(m.unlit, share::Material::UNLIT)
@@ -468,7 +484,7 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs) -> share::Material
             | flag(mirrors(m) && !m.unlit, share::Material::MIRRORS),
         thickness: m.thickness,
         kappa_metal: metal.map(|[_, kappa]| kappa),
-        unused_kappa: 0.0,
+        grid,
     }
 }
 

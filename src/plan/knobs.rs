@@ -63,10 +63,17 @@ pub static KNOBS: &[Knob] = &[
     },
     Knob {
         name: "absorption",
-        rungs: &["off", "thickness", "path"],
-        unbuilt: &["march"],
-        presets: ["thickness", "path", "path"],
-        about: "light lost inside media (A1, A2)",
+        rungs: &["off", "thickness", "path", "march:4", "march:8", "march:16", "march:32", "march:64"],
+        unbuilt: &[],
+        presets: ["thickness", "path", "march:32"],
+        about: "light lost inside media (A1, A2); march:N goes through grids of sigma in N steps of each segment",
+    },
+    Knob {
+        name: "quadrature",
+        rungs: &["left", "midpoint", "simpson"],
+        unbuilt: &[],
+        presets: ["midpoint", "midpoint", "midpoint"],
+        about: "rule of the sum over those steps (A2), of order 1, 2 and 4",
     },
     Knob {
         name: "indirect",
@@ -200,6 +207,12 @@ impl Knobs {
         1 << self.index("interfaces")
     }
 
+    /// Steps of each segment through a medium that varies; 0: none is marched.
+    #[must_use]
+    pub fn march_steps(&self) -> u32 {
+        self.rung("absorption").strip_prefix("march:").and_then(|n| n.parse().ok()).unwrap_or(0)
+    }
+
     /// Samples per pixel.
     #[must_use]
     pub fn samples(&self) -> u32 {
@@ -224,6 +237,11 @@ mod tests {
             knobs.set(&format!("interfaces={rung}")).unwrap();
             assert_eq!(knobs.interfaces().to_string(), rung);
         }
+        assert_eq!(knobs.march_steps(), 0);
+        for steps in [4, 8, 16, 32, 64] {
+            knobs.set(&format!("absorption=march:{steps}")).unwrap();
+            assert_eq!(knobs.march_steps(), steps);
+        }
         for rung in ["1", "4", "16", "64", "256", "1024"] {
             knobs.set(&format!("samples={rung}")).unwrap();
             assert_eq!(knobs.samples().to_string(), rung);
@@ -243,7 +261,9 @@ mod tests {
         let mut knobs = Knobs::default();
         for (choice, said) in [
             ("indirect=path", "not built yet"),
-            ("absorption=march:8", "not built yet"),
+            ("absorption=march:7", "it has off, thickness, path, march:4, march:8, march:16, march:32, march:64"),
+            ("absorption=march", "no rung"),
+            ("quadrature=right", "it has left, midpoint, simpson"),
             ("brdf=oren", "no rung"),
             ("gloss=1", "no knob"),
             ("samples", "KNOB=RUNG"),

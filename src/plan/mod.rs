@@ -70,8 +70,21 @@ pub struct Rays {
     pub rough: bool,
     /// Absorption: 0 off, 1 by the nominal thickness, 2 along the path.
     pub absorption: u32,
+    /// How media that vary are gone through.
+    pub march: March,
     /// Surfaces that a path may meet.
     pub interfaces: u32,
+}
+
+/// How segments of paths go through grids of σ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct March {
+    /// Steps of each segment, a multiple of 4; 0: no grid is marched.
+    pub steps: u32,
+    /// Place of the rung in the knob `quadrature`: `QUADRATURE_…` of shaders/lib/medium.glsl.
+    pub rule: u32,
+    /// Some grid has values for red, green and blue.
+    pub colours: bool,
 }
 
 /// What is looked up in the picture of the opaque surfaces: the rungs `screen` of `reflection` and `refraction`.
@@ -188,6 +201,30 @@ impl Plan {
             _ => format!("has transmission {}", m.transmission),
         });
         let see_through = decide("see-through surfaces", "", cause, true);
+        let found = find(&|m| m.marched_sigma().is_some());
+        let size =
+            |m: &Material| m.sigma.as_ref().map_or([0; 3], |grid| grid.size()).map(|n| n.to_string()).join(" x ");
+        let cause = material(found, &|m| format!("has a grid of {} values of sigma", size(m)));
+        let cause = cause.map(|(reason, mut evidence)| {
+            evidence.extend(found.map(|m| ("grid", size(m))));
+            (reason, evidence)
+        });
+        // Without rays that refract all that is transparent is a sheet.
+        let (knob, allowed) = match refraction {
+            true => ("absorption", knobs.march_steps() > 0),
+            false => ("refraction", false),
+        };
+        let marched = decide("media that vary", knob, cause, allowed);
+        let cause = match marched {
+            true => Ok((format!("{} steps of each segment", knobs.march_steps()), BTreeMap::new())),
+            false => Err("no medium is marched"),
+        };
+        decide("quadrature", "quadrature", cause, true);
+        let march = March {
+            steps: if marched { knobs.march_steps() } else { 0 },
+            rule: knobs.index("quadrature"),
+            colours: used.iter().any(|m| m.marched_sigma().is_some_and(|grid| grid.channels() > 1)),
+        };
 
         let environment = || match surroundings.environment {
             true => Ok(("there is an environment".to_owned(), BTreeMap::new())),
@@ -254,7 +291,8 @@ impl Plan {
                 rough: any(&|m| {
                     m.roughness > 0.0 && ((mirror_rays && smooth(m)) || (refraction && m.transmission > 0.0))
                 }),
-                absorption: knobs.index("absorption"),
+                absorption: knobs.index("absorption").min(PATH),
+                march: if marched { march } else { March::default() },
                 interfaces: knobs.interfaces(),
             }
         });
@@ -282,13 +320,22 @@ impl Plan {
             screen,
             samples: knobs.samples(),
             effects,
-            warnings: left_out(&used, refracts, refraction, shadow_maps),
+            warnings: left_out(&used, knobs, refracts, refraction, shadow_maps),
         }
+    }
+
+    /// How segments go through grids of σ.
+    #[must_use]
+    pub fn march(&self) -> March {
+        self.rays.map_or_else(March::default, |rays| rays.march)
     }
 }
 
+/// Place of the rung `path` in the knob `absorption`; the rungs `march` do as it does where nothing varies.
+const PATH: u32 = 2;
+
 /// What no rung that is built can show of these materials.
-fn left_out(used: &[&Material], refracts: bool, by_rays: bool, shadow_maps: bool) -> Vec<String> {
+fn left_out(used: &[&Material], knobs: &Knobs, refracts: bool, by_rays: bool, shadow_maps: bool) -> Vec<String> {
     let mut warnings = Vec::new();
     let mut say = |test: &dyn Fn(&Material) -> bool, what: &str| {
         if let Some(material) = used.iter().find(|material| test(material)) {
@@ -301,7 +348,19 @@ fn left_out(used: &[&Material], refracts: bool, by_rays: bool, shadow_maps: bool
     say(&|m| clear(m) && m.roughness > 0.1, "transmits through a rough surface: shown clear");
     let casts = |m: &Material| !shadow_maps || casts_in_maps(m);
     say(&|m| !casts(m), "casts no shadow: the maps of shadows=map hold opaque and masked surfaces alone");
+    let (absorption, marches) = (knobs.rung("absorption"), by_rays && knobs.march_steps() > 0);
+    let varies = |m: &Material| m.marched_sigma().is_some();
+    let instead = format!(
+        "has a grid of sigma, of which absorption={absorption} with refraction={} takes the mean; refraction=ray with \
+         absorption=march:4 to march:64 goes through it",
+        knobs.rung("refraction")
+    );
+    say(&|m| varies(m) && !marches && absorption != "off", &instead);
     say(&|m| m.dispersion > 0.0, "has dispersion, which is not built");
+    let rule = knobs.rung("quadrature");
+    if rule != "midpoint" && !(marches && used.iter().any(|m| varies(m))) {
+        warnings.push(format!("quadrature={rule} changes nothing: no medium is marched"));
+    }
     warnings
 }
 

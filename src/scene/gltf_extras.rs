@@ -1,20 +1,21 @@
 //! `extras.etalon` of a glTF material: what the standard's extensions have no word for.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use glam::DVec3;
 use gltf::json;
 use serde::Deserialize;
 use serde_json::{Value, value::RawValue};
 
 use super::{
-    Material,
+    Material, SigmaGrid,
     gltf_material::INFINITE_IOR,
     substance::{self, SUBSTANCES, Substance},
 };
 
 /// Keys that are planned and that nothing looks at yet.
-const NOT_READ_YET: &[&str] = &["brdf", "kd", "ks", "shine", "sellmeier", "cauchy", "sigma"];
+const NOT_READ_YET: &[&str] = &["brdf", "kd", "ks", "shine", "sellmeier", "cauchy"];
 
 /// The part of `extras` that is ours.
 #[derive(Deserialize)]
@@ -41,12 +42,17 @@ pub(crate) fn apply(extras: &json::Extras, file_ior: Option<f32>, m: &mut Materi
         let blame = || format!("extras.etalon {key}");
         match key.as_str() {
             "priority" => m.priority = read().and_then(|v| integer(&v)).with_context(blame)?,
+            "sigma" => m.sigma = Some(Arc::new(grid(text.get()).with_context(blame)?)),
             "preset" => preset = Some(read().and_then(|v| substance(&v)).with_context(blame)?),
             "n" => n = Some(read().and_then(|v| index(&v, key, &mut warnings)).with_context(blame)?),
             "kappa" => kappa = Some(read().and_then(|v| index(&v, key, &mut warnings)).with_context(blame)?),
             _ if NOT_READ_YET.contains(&key.as_str()) => warnings.push(format!("extras.etalon {key} is not read yet")),
             _ => warnings.push(format!("extras.etalon has no key {:?}; it is ignored", shortened(key))),
         }
+    }
+    if m.sigma.is_some() && (m.transmission == 0.0 || m.thickness == 0.0) {
+        let lacks = if m.transmission == 0.0 { "transmits nothing" } else { "is a thin sheet, of thickness 0" };
+        warnings.push(format!("extras.etalon sigma is seen inside of bodies, and the material {lacks}"));
     }
     if let Some(n) = n {
         ensure!(n.iter().all(|&x| x > 0.0), "extras.etalon n: an index of refraction lies above 0");
@@ -108,6 +114,26 @@ fn integer(value: &Value) -> Result<i32> {
         .as_i64()
         .and_then(|i| i32::try_from(i).ok())
         .with_context(|| format!("{} is not a whole number of 32 bits", shown(value)))
+}
+
+/// Numbers go from the text into their list: as values of any kind they would take ten times as much memory.
+fn grid(text: &str) -> Result<SigmaGrid> {
+    // An unknown key is an error here: a misspelt `min` would move the grid.
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Grid {
+        size: [u64; 3],
+        values: Vec<f32>,
+        min: Option<[f64; 3]>,
+        max: Option<[f64; 3]>,
+    }
+    let Grid { size, values, min, max } = serde_json::from_str(text).map_err(|error| {
+        // It repeats what it finds, as long as it may be and with its line breaks.
+        anyhow!("{}", error.to_string().replace(char::is_control, " ").chars().take(120).collect::<String>())
+    })?;
+    ensure!(min.is_some() == max.is_some(), "of a box there are both corners, min and max, or none");
+    let bounds = min.zip(max).map(|(min, max)| [DVec3::from(min), DVec3::from(max)]);
+    SigmaGrid::new(size, values, bounds)
 }
 
 fn substance(value: &Value) -> Result<Substance> {

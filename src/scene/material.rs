@@ -1,6 +1,10 @@
 //! Materials: the glTF 2.0 metallic-roughness model with its extensions, and OBJ/MTL folded into the same fields.
 
+use std::sync::Arc;
+
 use glam::Affine2;
+
+use super::SigmaGrid;
 
 /// One surface description. Factors are linear Rec. 709; a texture multiplies its factor.
 #[derive(Debug, Clone)]
@@ -60,6 +64,8 @@ pub struct Material {
     pub attenuation_distance: f32,
     /// See `attenuation_distance`.
     pub attenuation_color: [f32; 3],
+    /// Absorption that varies inside the body, beside what `attenuation_distance` says (`extras.etalon.sigma`).
+    pub sigma: Option<Arc<SigmaGrid>>,
     /// Strength of a clear coat of n = 1.5 (KHR_materials_clearcoat).
     pub clearcoat: f32,
     /// Clear-coat strength in R (linear).
@@ -77,6 +83,14 @@ pub struct Material {
     pub dispersion: f32,
     /// The raw Phong numbers of an OBJ/MTL material, for the passes that show that model as it was written.
     pub phong: Option<Phong>,
+}
+
+impl Material {
+    /// The grid of σ of a body that light enters.
+    #[must_use]
+    pub fn marched_sigma(&self) -> Option<&SigmaGrid> {
+        self.sigma.as_deref().filter(|_| self.transmission > 0.0 && self.thickness > 0.0)
+    }
 }
 
 /// What an MTL file says, before it is folded into the fields above.
@@ -182,6 +196,7 @@ impl Default for Material {
             thickness_texture: None,
             attenuation_distance: f32::INFINITY,
             attenuation_color: [1.0; 3],
+            sigma: None,
             clearcoat: 0.0,
             clearcoat_texture: None,
             clearcoat_roughness: 0.0,

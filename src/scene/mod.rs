@@ -19,6 +19,7 @@ mod nodes;
 mod obj;
 mod pictures;
 mod ploc;
+pub mod sigma;
 pub mod solid;
 pub(crate) mod substance;
 mod thin;
@@ -31,6 +32,7 @@ use glam::{DAffine3, DVec3};
 pub use camera::{Camera, Projection};
 pub use light::{Light, LightKind};
 pub use material::{AlphaMode, Material, Phong, Sampler, TextureRef, Wrap};
+pub use sigma::SigmaGrid;
 
 /// What [`load`] may be told.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -54,7 +56,9 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
             bail!("loading {}: only .gltf, .glb and .obj files are supported", path.display())
         }
     };
-    scene.with_context(|| format!("loading {}", path.display()))
+    let mut scene = scene.with_context(|| format!("loading {}", path.display()))?;
+    sigma::one_medium_each(&mut scene);
+    Ok(scene)
 }
 
 /// Everything a picture is made from.

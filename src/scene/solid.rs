@@ -131,7 +131,12 @@ pub fn solids(scene: &Scene) -> Solids {
                 Body::Open => "is not closed: read as a thin sheet of its nominal thickness",
                 Body::Empty => "bounds no volume: read as a thin sheet of its nominal thickness",
             };
-            warnings.push(format!("mesh \"{}\" transmits light and {what}", mesh.name));
+            let grid = if material.sigma.is_some() && body != Body::InsideOut {
+                ", its grid of sigma by its mean"
+            } else {
+                ""
+            };
+            warnings.push(format!("mesh \"{}\" transmits light and {what}{grid}", mesh.name));
             body
         });
         solid.push(matches!(body, Body::Solid | Body::InsideOut));

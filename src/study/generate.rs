@@ -115,6 +115,9 @@ pub fn at_scale(mut scene: Scene, factor: f64, offset: DVec3) -> Scene {
     for material in &mut scene.materials {
         // Thickness is in object space and grows with the placement; this one is in the world.
         material.attenuation_distance *= factor as f32;
+        if let Some(grid) = &mut material.sigma {
+            std::sync::Arc::make_mut(grid).scale(1.0 / factor as f32);
+        }
     }
     for light in &mut scene.lights {
         match &mut light.kind {

@@ -8,6 +8,7 @@ mod build;
 mod cornell;
 mod etalon;
 pub mod generate;
+mod haze;
 mod lamps;
 mod materials;
 mod metals;
@@ -22,7 +23,7 @@ use crate::scene::Scene;
 
 /// Study scenes that can be loaded, the default one first.
 pub const NAMES: &[&str] =
-    &["etalon", "materials", "lamps", "radiance", "cornell", "metals", "blend", "pool", "nested"];
+    &["etalon", "materials", "lamps", "radiance", "cornell", "metals", "blend", "pool", "nested", "haze"];
 
 /// Announced names whose scenes do not exist yet: asking for one is no typing mistake.
 const PLANNED: &[&str] = &["golden-bridge", "prism", "absorber", "metamers", "torture"];
@@ -39,6 +40,7 @@ pub fn load(name: &str) -> Result<Scene> {
         "blend" => blend::scene(),
         "pool" => pool::scene(),
         "nested" => nested::scene(),
+        "haze" => haze::scene(),
         _ if PLANNED.contains(&name) => {
             bail!("the study scene `{name}` is not built yet; these are: {}", NAMES.join(", "))
         }

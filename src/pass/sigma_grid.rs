@@ -1,0 +1,77 @@
+//! Grids of σ on the device (shaders/lib/sigma_grid.glsl).
+
+use std::sync::Arc;
+
+use anyhow::{Result, ensure};
+use ash::vk;
+use glam::{DAffine3, DVec3};
+
+use super::scene::upload;
+use crate::gpu::{Buffer, Device};
+use crate::plan::Plan;
+use crate::scene::{Scene, SigmaGrid};
+
+/// Texels of all grids: places in them are kept as f32.
+const MOST_TEXELS: usize = 1 << 24;
+
+/// Texels before the values of a grid.
+const HEADER: usize = 5;
+
+/// The grids that are marched; next to nothing where none is.
+pub struct SigmaGrids {
+    /// As shaders/lib/sigma_grid.glsl reads them.
+    pub texels: Buffer,
+    /// Per material the first texel of its grid + 1, or 0.
+    pub places: Vec<u32>,
+}
+
+impl SigmaGrids {
+    /// Uploads the grids of a scene each of whose instances has a medium of its own; rays are told from `anchor`.
+    ///
+    /// # Errors
+    /// When they do not fit the device.
+    pub fn new(device: &Arc<Device>, plan: &Plan, scene: &Scene, anchor: DVec3) -> Result<Self> {
+        let mut texels: Vec<[f32; 4]> = Vec::new();
+        let mut places = vec![0; scene.materials.len()];
+        for instance in scene.instances.iter().filter(|_| plan.march().steps > 0) {
+            let mesh = &scene.meshes[instance.mesh];
+            let material = &scene.materials[mesh.material];
+            let Some(grid) = material.marched_sigma() else { continue };
+            places[mesh.material] = texels.len() as u32 + 1;
+            let object_from_bvh = instance.world_from_object.inverse() * DAffine3::from_translation(anchor);
+            append(&mut texels, grid, grid.grid_from_object(mesh) * object_from_bvh);
+            ensure!(
+                texels.len() <= MOST_TEXELS,
+                "uploading the sigma of material \"{}\": all grids together need more than {MOST_TEXELS} texels",
+                material.name
+            );
+        }
+        let texels = upload(device, "grids of sigma", &texels, Some(vk::Format::R32G32B32A32_SFLOAT))?;
+        Ok(Self { texels, places })
+    }
+}
+
+fn append(texels: &mut Vec<[f32; 4]>, grid: &SigmaGrid, grid_from_bvh: DAffine3) {
+    // A body scaled flat has no inside, and no inverse.
+    let place = if grid_from_bvh.is_finite() { grid_from_bvh } else { DAffine3::ZERO };
+    let (m, t) = (place.matrix3.transpose(), place.translation);
+    for (row, shift) in [m.x_axis, m.y_axis, m.z_axis].into_iter().zip(t.to_array()) {
+        texels.push(row.extend(shift).as_vec4().to_array());
+    }
+    let [nx, ny, nz] = grid.size();
+    let cells = [nx, ny].map(|n| (n - 1).max(1));
+    let colours = grid.channels() > 1;
+    let first = texels.len() + HEADER - 3;
+    texels.push([nx - 1, ny - 1, nz - 1, first].map(|n| n as f32));
+    texels.push([if colours { cells[0] * cells[1] * nz } else { 0 } as f32, 0.0, 0.0, 0.0]);
+    for channel in 0..grid.channels() {
+        for z in 0..nz {
+            for y in 0..cells[1] {
+                for x in 0..cells[0] {
+                    let at = |dx: usize, dy: usize| grid.at([(x + dx).min(nx - 1), (y + dy).min(ny - 1), z], channel);
+                    texels.push([at(0, 0), at(1, 0), at(0, 1), at(1, 1)]);
+                }
+            }
+        }
+    }
+}
