@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 use ash::vk;
 
 use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, PassTime, Place};
@@ -123,6 +123,8 @@ pub struct Work {
     pub triangle_tests: u64,
     /// Boundaries of transparent bodies left without having been entered.
     pub stray_interfaces: u64,
+    /// Surfaces at which not all lights were gone through, because the driver would have ended the loop over them.
+    pub unlit: u64,
     /// Share of a pixel's light that was not followed: the mean over all pixels …
     pub mean_lost: f64,
     /// … and the largest.
@@ -138,6 +140,7 @@ impl Work {
         self.node_visits += sum(counts.node_visits);
         self.triangle_tests += sum(counts.triangle_tests);
         self.stray_interfaces += sum(counts.stray_interfaces);
+        self.unlit += sum(counts.unlit);
         self.mean_lost += sum(counts.lost) as f64 / 65536.0 / pixels_and_samples;
         self.most_lost = self.most_lost.max(f32::from_bits(counts.most_lost));
     }
@@ -271,6 +274,13 @@ impl Renderer {
             }
             if self.plan.rays.is_some() {
                 work.add(&self.rays.counted(), pixels * f64::from(count));
+                ensure!(
+                    work.unlit == 0,
+                    "rays met {} surfaces at which {} lights with a ray each are more than the driver's loops allow: \
+                     draw with shadows=map, fewer lights, or on a device without that limit",
+                    work.unlit,
+                    self.plan.directional_lights + self.plan.local_lights
+                );
             }
             if let Some(film) = &self.film {
                 let mut frame = Frame::new(&self.device);

@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 
 use etalon::frame::{Background, Renderer, Settings};
 use etalon::image::Picture;
-use etalon::scene::environment::Environment;
+use etalon::scene::environment::{self, Environment};
 use etalon::scene::{LightKind, Material, Scene};
 use etalon::study::shape::Shape;
 use etalon::study::{self, generate};
@@ -306,6 +306,29 @@ fn more_lights_than_a_loop_can_run_over_are_refused() {
 }
 
 #[test]
+fn more_lights_than_the_loops_of_rays_allow_are_an_error() {
+    let gpu = Gpu::new();
+    let shot = |count: u32| {
+        let mut made = wall([0.5; 3]);
+        let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness: 0.0, ..Material::default() };
+        let place = DAffine3::from_translation(DVec3::new(0.0, 0.0, 2.0)) * DAffine3::from_rotation_y(2.6);
+        made.add(Shape::panel(2.0, 2.0), metal, place);
+        for i in 0..count {
+            let position = DVec3::new(f64::from(i % 40) * 0.1 - 2.0, f64::from(i / 40) * 0.02 - 1.0, 1.5);
+            made.light([1.0; 3], LightKind::Point { position, range: None });
+        }
+        made.camera(DVec3::new(0.0, 0.0, 1.0), DVec3::new(0.3, 0.0, 2.0), made::perspective(60.0));
+        let settings = Settings { knobs: knobs(&["reflection=ray", "shadows=ray", "samples=1"]), ..settings([16, 9]) };
+        let mut renderer = gpu.renderer(&made.0, None, settings);
+        renderer.render(&made.0.cameras[1], &mut |_, _| ()).map(|rendered| rendered.work)
+    };
+    let work = shot(40).expect("a picture of 40 lights");
+    assert!(work.reflection > 0 && work.shadow > 40);
+    let error = shot(20_000).expect_err("20,000 rays to lights at one surface").to_string();
+    assert!(error.contains("20000 lights") && error.contains("shadows=map"), "{error}");
+}
+
+#[test]
 fn all_kinds_of_light_on_study_scenes_agree_with_the_formulas() {
     let gpu = Gpu::new();
     for name in ["lamps", "materials", "metals", "cornell"] {
@@ -532,6 +555,61 @@ fn a_turned_environment_lights_as_the_turned_map_does() {
     assert!(error < 1e-3, "{error:e}");
     let (_, unturned) = gpu.shot(&scene, Some(&environment), settings(SIZE));
     assert!(gpu::largest_difference(&a, &unturned, 1.0) > 0.5, "the turn shows");
+}
+
+#[test]
+fn a_rough_metal_mirrors_the_lobe_of_what_is_around() {
+    let gpu = Gpu::new();
+    // A lamp of 12° in a dim room; the map is as fine as its prefiltered levels.
+    let lamp = DVec3::new(0.5, 0.35, 1.0).normalize();
+    let texel = |i: u32| environment::direction((f64::from(i % 256) + 0.5) / 256.0, (f64::from(i / 256) + 0.5) / 128.0);
+    let radiance = |i: u32| if texel(i).dot(lamp) > 12_f64.to_radians().cos() { [50.0_f32; 3] } else { [0.25; 3] };
+    let room = Environment {
+        name: "lamp".to_owned(),
+        width: 256,
+        height: 128,
+        radiance: (0..256 * 128).map(radiance).collect(),
+    };
+    let white = Environment { radiance: vec![[1.0; 3]; 256 * 128], ..room.clone() };
+    for alpha in [0.125_f64, 0.25, 0.5] {
+        let roughness = alpha.sqrt() as f32;
+        let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness, ..Material::default() };
+        let mut made = Made::new("metal wall");
+        made.add(Shape::panel(40.0, 40.0), metal, DAffine3::IDENTITY);
+        made.camera(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, made::perspective(70.0));
+        let shot = |environment| gpu.shot(&made.0, Some(environment), settings(SIZE)).1;
+        let (of_room, of_white) = (shot(&room), shot(&white));
+        let tan = 35_f64.to_radians().tan();
+        let (mut worst, mut brightest) = (0.0_f64, 0.0_f64);
+        for i in (0..of_room.rgba.len()).step_by(7) {
+            let (x, y) = (i as u32 % SIZE[0], i as u32 / SIZE[0]);
+            let across = (f64::from(x) + 0.5) / f64::from(SIZE[0]) * 2.0 - 1.0;
+            let down = (f64::from(y) + 0.5) / f64::from(SIZE[1]) * 2.0 - 1.0;
+            let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
+            let n = DVec3::new(across * tan * aspect, -down * tan, 1.0).normalize();
+            // ∫ L D(h) G1(l) dω over the same with L = 1, for n = v = r.
+            let (mut sum, mut whole) = (0.0, 0.0);
+            for t in 0..256 * 128 {
+                let l = texel(t);
+                let cos_l = n.dot(l);
+                if cos_l > 0.0 {
+                    let cos_h2 = 0.5 * (1.0 + cos_l);
+                    let d = (cos_h2 * (alpha * alpha - 1.0) + 1.0).powi(-2);
+                    let g1 = 2.0 / (1.0 + (1.0 + alpha * alpha * (cos_l.powi(-2) - 1.0)).sqrt());
+                    let weight = d * g1 * (1.0 - l.y * l.y).sqrt();
+                    sum += weight * f64::from(room.radiance[t as usize][0]);
+                    whole += weight;
+                }
+            }
+            let want = sum / whole;
+            let found = f64::from(of_room.rgba[i][0]) / f64::from(of_white.rgba[i][0]);
+            worst = worst.max((found - want).abs());
+            brightest = brightest.max(want);
+        }
+        eprintln!("alpha {alpha}: {worst} of {brightest}");
+        // A sample stands for a texel of a box-filtered level, and those of a level are interpolated.
+        assert!(worst < 0.05 * brightest, "alpha {alpha}: {worst} of {brightest}");
+    }
 }
 
 #[test]

@@ -56,6 +56,10 @@ struct LightRange {
     uint end_word;
 };
 
+// Loop heads from which on no light is begun: one takes a few hundred at most.
+layout(constant_id = 27) const uint LIGHT_BUDGET = 0xffffffffu;
+uint unlit = 0; // surfaces whose lights were not all gone through for that
+
 vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across, LightRange range) {
     vec3 sum = vec3(0.0);
     if (DIRECTIONAL_LIGHTS + LOCAL_LIGHTS + TILE_WORDS == 0) return sum;
@@ -76,7 +80,9 @@ vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across, LightRange range)
                 bits = imageLoad(tile_lights, tile + int(word)).x;
             }
         }
-        if (listed && bits == 0) break;
+        bool out_of_steps = loop_heads > LIGHT_BUDGET && !(listed && bits == 0);
+        unlit += out_of_steps ? 1u : 0u;
+        if (out_of_steps || (listed && bits == 0)) break;
         uint index = listed ? DIRECTIONAL_LIGHTS + word * 32 + uint(findLSB(bits)) : next;
         bits = listed ? bits & (bits - 1) : bits;
         next += listed ? 0 : 1;

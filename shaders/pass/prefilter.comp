@@ -1,5 +1,6 @@
 // One level of the environment prefiltered with the GGX lobe of α = 16 / width of the level: the lobe is the same
-// number of texels wide on every level, so the same number of samples serves them all. N = V = R as in Karis 2013.
+// number of texels wide on every level, so the same number of samples serves them all. N = V = R as in Karis 2013, where f cos / pdf of a
+// sample is F G1(l).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -11,7 +12,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 0) uniform sampler2D environment_map;
 layout(scalar, set = 0, binding = 1) writeonly buffer Level { vec4 level[]; };
 layout(push_constant, scalar) uniform Push { uvec2 size; float alpha; float base_width; };
-const uint SAMPLES = 64;
+const uint SAMPLES = 128;
 
 void main() {
     uvec2 at = gl_GlobalInvocationID.xy;
@@ -31,9 +32,10 @@ void main() {
         if (cos_l > 0.0) {
             // Each sample stands for 1 / (N pdf) of solid angle: read the level whose texels are that large.
             float pdf = ggx_distribution(n, h, alpha) * 0.25;
-            float lod = 0.5 * log2(1.0 / (float(SAMPLES) * pdf * texel)) + 1.0;
-            sum += textureLod(environment_map, equirectangular_from_direction(l), max(lod, 0.0)).rgb * cos_l;
-            weight += cos_l;
+            float lod = 0.5 * log2(1.0 / (float(SAMPLES) * pdf * texel));
+            float masking = unmasked(1.0, cos_l, alpha);
+            sum += textureLod(environment_map, equirectangular_from_direction(l), max(lod, 0.0)).rgb * masking;
+            weight += masking;
         }
     }
     level[at.y * size.x + at.x] = vec4(sum / max(weight, 1e-6), 1.0);

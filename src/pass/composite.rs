@@ -27,6 +27,7 @@ pub fn composite<'a>(
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
     let planned = plan.rays;
     let constants = composite::Constants {
+        light_budget: u32::MAX,
         brdf: lighting.knobs.index("brdf"),
         fresnel: lighting.knobs.index("fresnel"),
         arithmetic: lighting.knobs.index("arithmetic"),

@@ -5,7 +5,7 @@ use anyhow::Result;
 use super::classify::{Calls, RayTiles, classify_rays};
 use super::gbuffer::GBuffer;
 use super::light::Lighting;
-use super::rays::LOOP_BUDGET;
+use super::rays::{LIGHT_BUDGET, LOOP_BUDGET};
 use crate::gpu::{Frame, Image};
 use crate::plan::Rays;
 use crate::shader::interact;
@@ -61,6 +61,7 @@ pub fn interact<'a>(
         sky: plan.sky,
         masked_hits: with.masked,
         loop_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
+        light_budget: if scene.device().limits_loops() { LIGHT_BUDGET } else { u32::MAX },
         pending: with.interfaces + SPARE_BRANCHES,
         touching: rays.constants.touching,
     };

@@ -92,6 +92,7 @@ pub fn light<'a>(
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
     let planned = plan.rays;
     let constants = light::Constants {
+        light_budget: u32::MAX,
         has_emissive: plan.emissive,
         has_layers: plan.layers,
         has_triangles: planned.is_some(),
