@@ -467,7 +467,8 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32) -> shar
         f0: m.specular_color.map(|c| (r * r * c).min(1.0) * m.specular),
         roughness: m.roughness,
         sigma_thickness: of_grid(1.0).map(|sigma| sigma * m.thickness),
-        f90: m.specular,
+        // What bends nothing mirrors nothing, at no angle.
+        f90: if m.ior == 1.0 { 0.0 } else { m.specular },
         ior: m.ior,
         occlusion_strength: m.occlusion_strength,
         normal_scale: m.normal_scale,
