@@ -1355,3 +1355,41 @@ fn what_lies_against_a_body_is_seen_through_it() {
         assert!(error < 0.03 && a[2] > 0.5, "{error}: {a:?} {b:?}");
     }
 }
+
+#[test]
+fn every_level_of_a_texture_is_read_where_it_lies() {
+    let gpu = Gpu::new();
+    // Half black, half white: on every level, but near the edge. The tilted wall is seen in a mirror from 4 to 12 m.
+    let texels = 1024_u32;
+    let rgba =
+        (0..texels * texels).flat_map(|i| if i % texels < texels / 2 { [0, 0, 0, 255] } else { [255; 4] }).collect();
+    let mut made = Made::new("two halves");
+    made.0.images.push(Image { name: "halves".to_owned(), width: texels, height: texels, rgba });
+    let sampler = Sampler { mips: true, ..Sampler::default() };
+    let texture = TextureRef { image: 0, uv_set: 0, uv_transform: glam::Affine2::IDENTITY, sampler };
+    made.add(Shape::panel(6.0, 6.0), mirror(1.0), at(0.0, 0.0, -2.0));
+    let frame = at(0.0, 0.0, 4.0) * DAffine3::from_rotation_y(std::f64::consts::PI) * DAffine3::from_rotation_x(0.8);
+    let wall = Material { base_color_texture: Some(texture), ..unlit([1.0; 3]) };
+    made.add(Shape::panel(12.0, 12.0), wall, frame);
+    made.camera(DVec3::new(0.4, 0.0, 1.0), DVec3::new(0.0, 0.0, -2.0), perspective(60.0));
+    let size = [70, 40];
+    let film = gpu.film(&made.0, optics(size, &[]));
+    let n = frame.transform_vector3(DVec3::Z);
+    let (mut black, mut white) = (0, 0);
+    for (i, pixel) in film.rgba.iter().enumerate() {
+        let (o, d) = ray(&made.0.cameras[0], size, i, DVec2::ZERO);
+        let p = o + d * ((-2.0 - o.z) / d.z);
+        let r = DVec3::new(d.x, d.y, -d.z);
+        let t = n.dot(frame.translation - p) / n.dot(r);
+        let local = frame.inverse().transform_point3(p + r * t);
+        let on_mirror = p.x.abs() < 2.9 && p.y.abs() < 2.9;
+        // A pixel is at most 0.4 m wide there.
+        if on_mirror && t > 0.0 && local.y.abs() < 5.5 && (0.6..5.5).contains(&local.x.abs()) {
+            let want = if local.x > 0.0 { 1.0 } else { 0.0 };
+            assert!((pixel[0] - want).abs() < 1e-3, "pixel {i}: {pixel:?}, not {want}, at {local}");
+            black += usize::from(want == 0.0);
+            white += usize::from(want == 1.0);
+        }
+    }
+    assert!(black > 200 && white > 200, "{black} {white}");
+}
