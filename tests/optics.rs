@@ -1393,3 +1393,36 @@ fn every_level_of_a_texture_is_read_where_it_lies() {
     }
     assert!(black > 200 && white > 200, "{black} {white}");
 }
+
+#[test]
+fn light_to_an_eye_inside_a_body_is_absorbed_on_its_way() {
+    let gpu = Gpu::new();
+    let color = [0.3, 0.6, 0.9_f32];
+    for (projection, moved) in [(perspective(60.0), 0.0), (orthographic(1.5), 900.0)] {
+        let mut made = Made::new("under water");
+        let x = DVec3::new(moved, 0.0, 0.0);
+        let body = Material { attenuation_color: color, attenuation_distance: 2.0, ..glass(1.0) };
+        made.add(Shape::cuboid(DVec3::new(8.0, 8.0, 6.0)), body, DAffine3::from_translation(x));
+        // Something inside, and something behind it.
+        made.add(Shape::panel(1.0, 8.0), unlit([1.0; 3]), at(moved - 1.5, 0.0, -2.0));
+        made.add(Shape::panel(30.0, 30.0), unlit([1.0; 3]), at(moved, 0.0, -5.0));
+        made.camera(x + DVec3::new(0.0, 0.0, 1.0), x, projection);
+        let size = [48, 36];
+        let (mut worst, mut within) = (0.0_f64, 0);
+        for (i, pixel) in gpu.film(&made.0, optics(size, &["reflection=off"])).rgba.iter().enumerate() {
+            let (o, d) = ray(&made.0.cameras[0], size, i, DVec2::ZERO);
+            let on_panel = o + d * ((-2.0 - o.z) / d.z) - x + DVec3::new(1.5, 0.0, 0.0);
+            if (on_panel.x.abs() - 0.5).abs() < 0.1 {
+                continue;
+            }
+            let end = if on_panel.x.abs() < 0.5 { -2.0 } else { -3.0 };
+            within += usize::from(end == -2.0);
+            for c in 0..3 {
+                let want = f64::from(color[c]).powf(0.5 * (end - o.z) / d.z);
+                worst = worst.max((f64::from(pixel[c]) / want - 1.0).abs());
+            }
+        }
+        eprintln!("{worst:e}, {within} within");
+        assert!(worst < 1e-5 && within > 50, "{worst:e}, {within}");
+    }
+}

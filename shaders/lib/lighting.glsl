@@ -22,6 +22,10 @@ layout(scalar, set = 0, binding = 22) uniform Environment { EnvironmentTerms env
 layout(set = 0, binding = 23) uniform sampler2D prefiltered;
 layout(set = 0, binding = 24) uniform sampler2D reflectance;
 
+// Reflected radiance over irradiance below which a light is not looked for, and not shown either: the far ends of lobes on
+// polished surfaces, a ten-thousandth of what a grey one reflects.
+const float FAINTEST_LOBE = 1.0 / 131072.0;
+
 // Light `index` of the table on a surface, as far as it is visible from there.
 vec3 light_on(Surface s, uint index) {
     vec4 place = imageLoad(lights, int(index * 4));
@@ -37,7 +41,7 @@ vec3 light_on(Surface s, uint index) {
     vec3 result = reflected(s, l) * arriving;
     if (SHADOWS != 0) {
         result *= terminator(s.n, s.n_triangle, l);
-        bool wanted = largest(result) > 0.0;
+        bool wanted = largest(result) > FAINTEST_LOBE * largest(arriving);
         if (SHADOWS == SHADOW_MAP) {
             float share = map_visibility(s.p_bvh, s.n_triangle, to_light, index, largest_component(s.p_rel));
             return wanted ? result * share : vec3(0.0);

@@ -4,6 +4,7 @@
 #include "lib/camera.glsl"
 #include "lib/encode.glsl"
 #include "lib/hit.glsl"
+#include "lib/shadow.glsl"
 
 layout(constant_id = 0) const bool HAS_EMISSIVE = false;
 layout(constant_id = 1) const bool HAS_LAYERS = false;
@@ -20,10 +21,22 @@ layout(set = 0, binding = 9, r32ui) readonly uniform uimage2D triangles;
 // Places among the leaves of the scene's triangles.
 layout(set = 0, binding = 35, r32ui) readonly uniform uimageBuffer leaf_places;
 
+layout(constant_id = 4) const bool IN_MEDIUM = false; // the eye is inside a transparent body
+
 struct Primary {
     bool drawn;
     HitSurface hit;
 };
+
+// What is left of the light from the nearest surface at the eye.
+vec3 left_at_eye(Surface s) {
+    vec3 left = vec3(1.0);
+    if (IN_MEDIUM && ABSORPTION == 2) {
+        float distance = camera.orthographic != 0 ? dot(s.p_rel, camera.forward) : length(s.p_rel);
+        left = absorbed(present_medium(trace_terms.camera_media), s.p_bvh + s.v * distance, -s.v, distance);
+    }
+    return left;
+}
 
 // Where the ray of a pixel meets the plane of the triangle that was drawn there. What depth and stored normal tell of
 // the point has roundings of its own, off the plane that rays meet. Not into a Surface at once: glslang never ends

@@ -292,7 +292,7 @@ void main() {
     Branch ray;
     ray.origin = vec3(0.0);
     ray.direction = -hit.s.v;
-    ray.throughput = vec3(1.0);
+    ray.throughput = left_at_eye(hit.s);
     ray.media = trace_terms.camera_media;
     ray.width = 0.0;
     ray.spread = camera.orthographic != 0 ? 0.0 : trace_terms.pixel_angle;

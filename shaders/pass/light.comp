@@ -31,7 +31,7 @@ void main() {
     Surface s = primary.hit.s;
     s.diffuse *= 1.0 - primary.hit.transmits;
     uint tiles_across = (camera.size.x + TILE - 1) / TILE;
-    vec3 result = radiance_to_eye(s, pixel, tiles_across, range, first_dispatch != 0);
+    vec3 result = radiance_to_eye(s, pixel, tiles_across, range, first_dispatch != 0) * left_at_eye(s);
     if (first_dispatch == 0) result += imageLoad(radiance, pixel).rgb;
     imageStore(radiance, pixel, vec4(result, 1.0));
     if (SHADOWS == SHADOW_RAY) count_rays(0, 0, 0.0);

@@ -61,6 +61,7 @@ pub fn interact<'a>(
         sky: plan.sky,
         masked_hits: with.masked,
         loop_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
+        in_medium: rays.inside(),
         light_budget: if scene.device().limits_loops() { LIGHT_BUDGET } else { u32::MAX },
         pending: with.interfaces + SPARE_BRANCHES,
         touching: rays.constants.touching,

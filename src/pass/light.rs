@@ -93,6 +93,7 @@ pub fn light<'a>(
     let planned = plan.rays;
     let constants = light::Constants {
         light_budget: u32::MAX,
+        in_medium: rays.inside(),
         has_emissive: plan.emissive,
         has_layers: plan.layers,
         has_triangles: planned.is_some(),
