@@ -13,13 +13,15 @@ use crate::pass::accumulate::accumulate;
 use crate::pass::aov::aov;
 use crate::pass::background::background;
 use crate::pass::classify::{RayTiles, WorkLists, classify};
-use crate::pass::composite::composite;
+use crate::pass::composite::{composite, composite_part};
 use crate::pass::environment::{EnvironmentOnDevice, Turn};
 use crate::pass::fragments::{FragmentLists, fragments};
 use crate::pass::gbuffer::{GBuffer, gbuffer};
-use crate::pass::interact::interact;
+use crate::pass::interact::{interact, interact_part};
 use crate::pass::light::{Lighting, light};
 use crate::pass::mirror::{OnScreen, mirror, screen_tiles};
+pub use crate::pass::part::Part;
+use crate::pass::part::PartOnDevice;
 use crate::pass::rays::{BvhFacts, RaysOnDevice, Traversal};
 use crate::pass::scene::SceneOnDevice;
 use crate::pass::shadow_map::ShadowMaps;
@@ -74,6 +76,8 @@ pub struct Settings {
     pub environment_rotation: f32,
     /// The way rays go through the scene; `None`: what suits the device and the scene.
     pub traversal: Option<Traversal>,
+    /// Which parts of the picture are kept beside it, each for the price of following all rays once more.
+    pub parts: Vec<Part>,
 }
 
 impl Default for Settings {
@@ -87,6 +91,7 @@ impl Default for Settings {
             environment_intensity: 1.0,
             environment_rotation: 0.0,
             traversal: None,
+            parts: Vec::new(),
         }
     }
 }
@@ -167,6 +172,7 @@ pub struct Renderer {
     screen: OnScreen,
     /// The mean of the samples, where there is more than one.
     film: Option<Image>,
+    parts: Vec<PartOnDevice>,
     display: Display,
     camera: Buffer,
 }
@@ -205,6 +211,8 @@ impl Renderer {
         }
         let surroundings = Surroundings { environment: environment.is_some(), sky };
         let plan = Plan::new(&scene, surroundings, &settings.knobs);
+        let part = |&part: &Part| PartOnDevice::new(device, &plan, &settings.knobs, part, size);
+        let parts = settings.parts.iter().map(part).collect::<Result<_>>()?;
         let most = if plan.tiles { MOST_LISTED_LIGHTS } else { MOST_LIGHTS };
         if device.limits_loops() && scene.lights.len() > most {
             bail!("{}: {} lights, a software device lights with at most {most} such", scene.name, scene.lights.len());
@@ -215,6 +223,9 @@ impl Renderer {
         let rays = RaysOnDevice::new(device, &plan, &scene, &solids, settings.traversal)?;
         if let Some(bvh) = rays.facts.filter(|bvh| bvh.dropped > 0) {
             warnings.push(format!("{} triangles without area are left out for rays", bvh.dropped));
+        }
+        for part in settings.parts.iter().filter(|part| !part.called_for(&plan)) {
+            warnings.push(format!("--aov {}: no surface of this scene sends such rays, the layer is 0", part.name()));
         }
         let turn = Turn { intensity: settings.environment_intensity, rotation: settings.environment_rotation };
         let name = scene.name.clone();
@@ -236,6 +247,7 @@ impl Renderer {
             radiance: target("radiance")?,
             screen: OnScreen::new(device, &plan, size)?,
             film: if plan.samples > 1 { Some(target("film")?) } else { None },
+            parts,
             display: Display::new(device, size)?,
             camera: Buffer::new(device, "camera", size_of::<share::Camera>() as u64, Place::Upload)?,
             device: device.clone(),
@@ -285,6 +297,9 @@ impl Renderer {
             if let Some(film) = &self.film {
                 let mut frame = Frame::new(&self.device);
                 accumulate(&mut frame, &self.radiance, film, index, count)?;
+                for part in &self.parts {
+                    accumulate(&mut frame, &part.radiance, part.film(), index, count)?;
+                }
                 times.add(frame.finish()?);
             }
             dropped = dropped.max(self.lists.as_ref().map_or(0, FragmentLists::dropped));
@@ -320,6 +335,7 @@ impl Renderer {
             work,
             lists,
             radiance,
+            parts,
             screen,
             ..
         } = &*self;
@@ -351,6 +367,15 @@ impl Renderer {
         if let Some(with) = plan.rays.filter(|rays| rays.mirrors || rays.refraction) {
             interact(&mut frame, lighting, with, g, &self.ray_tiles, radiance)?;
         }
+        for part in parts {
+            frame.clear("reset part", &part.radiance);
+            if let Some(with) = plan.rays.filter(|_| part.part.called_for(plan)) {
+                interact_part(&mut frame, lighting, with, g, &self.ray_tiles, part)?;
+            }
+            if plan.screen.refraction {
+                frame.download("copy part", &part.radiance, &part.seen);
+            }
+        }
         if plan.screen.mirrors || plan.screen.see_through_mirrors {
             screen_tiles(&mut frame, lighting, g, screen)?;
         }
@@ -367,6 +392,9 @@ impl Renderer {
             for strip in lists.strips() {
                 fragments(&mut frame, scene, camera, g, lists, strip, lod_bias)?;
                 composite(&mut frame, lighting, g, lists, radiance, screen, strip.rows)?;
+                for part in parts {
+                    composite_part(&mut frame, lighting, g, lists, part, screen, strip.rows)?;
+                }
             }
             frame.read_back(&lists.counters);
             frame.read_back(&lists.dropped);
@@ -395,18 +423,10 @@ impl Renderer {
     /// # Errors
     /// When the driver fails.
     pub fn film(&self) -> Result<Picture> {
-        let [width, height] = self.settings.size;
-        let film = self.film.as_ref().unwrap_or(&self.radiance);
-        let bytes = 16 * u64::from(width) * u64::from(height);
-        let target = Buffer::new(&self.device, "film read back", bytes, Place::Readback)?;
-        let mut frame = Frame::new(&self.device);
-        frame.download("read film", film, &target);
-        frame.read_back(&target);
-        frame.finish()?;
-        let mut rgba: Vec<[f32; 4]> = target.read(|all| bytemuck::pod_collect_to_vec(&all[..bytes as usize]));
+        let mut picture = self.read(self.film.as_ref().unwrap_or(&self.radiance))?;
         if let Background::Color(color) = self.settings.background {
             let behind = color.map(|byte| crate::image::tone::srgb_decode(f64::from(byte) / 255.0) as f32);
-            for pixel in &mut rgba {
+            for pixel in &mut picture.rgba {
                 let rest = 1.0 - pixel[3];
                 for (value, behind) in pixel.iter_mut().zip(behind) {
                     *value += rest * behind;
@@ -414,6 +434,26 @@ impl Renderer {
                 pixel[3] = 1.0;
             }
         }
+        Ok(picture)
+    }
+
+    /// A part of the film of the last render; `None` where [`Settings::parts`] does not name it. Its alpha means nothing.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn part(&self, part: Part) -> Result<Option<Picture>> {
+        self.parts.iter().find(|kept| kept.part == part).map(|kept| self.read(kept.film())).transpose()
+    }
+
+    fn read(&self, film: &Image) -> Result<Picture> {
+        let [width, height] = self.settings.size;
+        let bytes = 16 * u64::from(width) * u64::from(height);
+        let target = Buffer::new(&self.device, "film read back", bytes, Place::Readback)?;
+        let mut frame = Frame::new(&self.device);
+        frame.download("read film", film, &target);
+        frame.read_back(&target);
+        frame.finish()?;
+        let rgba = target.read(|all| bytemuck::pod_collect_to_vec(&all[..bytes as usize]));
         Ok(Picture { width, height, rgba })
     }
 

@@ -92,7 +92,12 @@ fn mistakes_end_in_one_sentence_and_no_file() {
         (vec!["scene.glb", "--time", "noon"], 1, "--time noon"),
         (vec!["scene.glb", "--aov", "normal"], 1, "--aov"),
         (vec!["scene.glb", "--aov", "beauty"], 2, "--aov"),
-        (vec!["scene.glb", "--aov", "reflection", "-o", "out.exr"], 1, "not built yet"),
+        (vec!["scene.glb", "--aov", "reflection", "-o", "out.exr", "--model", "local"], 1, "--set reflection=ray"),
+        (
+            vec!["scene.glb", "--aov", "refraction", "-o", "out.exr", "--set", "refraction=screen"],
+            1,
+            "refraction=screen",
+        ),
         (vec!["scene.glb", "--repeat", "0"], 2, "--repeat"),
         (vec!["scene.glb", "-o", "out.jpg"], 1, "only .png and .exr"),
         (vec!["scene.glb", "-o", "out"], 1, "only .png and .exr"),
@@ -314,4 +319,43 @@ fn layers_come_with_the_exr() {
     ] {
         assert!(names.iter().any(|n| n == name), "{name} is not in {names:?}");
     }
+}
+
+#[test]
+fn parts_of_the_picture_are_layers() {
+    let folder = folder();
+    let (beside, alone) = ("reflection,normal,refraction", "refraction");
+    let run = |out: &str, rest: &[&str]| {
+        let all = ["render", "study:etalon", "--size", "32x18", "--device", "cpu", "-o", out];
+        etalon(folder.path(), &[&all[..], rest].concat(), &[])
+    };
+    run("none.exr", &["--report", "none.json"]).succeeded();
+    run("both.exr", &["--report", "both.json", "--aov", beside]).succeeded();
+    run("one.exr", &["--aov", alone]).succeeded();
+    let channels = |name: &str| {
+        let image = exr::prelude::read_first_flat_layer_from_file(folder.path().join(name)).expect("an EXR");
+        let list = image.layer_data.channel_data.list;
+        let all = list.into_iter().map(|c| (c.name.to_string(), c.sample_data.values_as_f32().collect::<Vec<_>>()));
+        all.collect::<std::collections::BTreeMap<_, _>>()
+    };
+    let (none, both, one) = (channels("none.exr"), channels("both.exr"), channels("one.exr"));
+    for color in ["R", "G", "B"] {
+        assert_eq!(none[color], both[color], "{color} of the picture");
+        let [reflection, refraction] = ["reflection", "refraction"].map(|part| &both[&format!("{part}.{color}")]);
+        assert!(reflection.iter().sum::<f32>() > 1.0 && refraction.iter().sum::<f32>() > 1.0, "{color}");
+        assert_eq!(*refraction, one[&format!("refraction.{color}")]);
+        for ((film, a), b) in none[color].iter().zip(reflection).zip(refraction) {
+            assert!(*a >= 0.0 && *b >= 0.0 && a + b <= film * (1.0 + 1e-5) + 1e-6, "{film} of {a} and {b}");
+        }
+    }
+    assert!(!one.contains_key("reflection.R"));
+    let work = |name: &str| {
+        let bytes = std::fs::read(folder.path().join(name)).expect("a report");
+        serde_json::from_slice::<Value>(&bytes).expect("JSON")["work"].clone()
+    };
+    assert_eq!(work("none.json"), work("both.json"));
+    // Nothing there mirrors: a layer of zeros, and that is said.
+    let run = render(folder.path(), &["-o", "zero.exr", "--aov", "refraction"]).succeeded();
+    assert!(run.stderr.contains("the layer is 0"), "{run:?}");
+    assert!(channels("zero.exr")["refraction.G"].iter().all(|value| *value == 0.0));
 }

@@ -36,6 +36,7 @@ layout(push_constant, scalar) uniform Push { uint end_row; };
 layout(constant_id = 18) const uint LOOP_BUDGET = 40000;
 layout(constant_id = 51) const bool BENDS = false;   // knob `refraction`: screen
 layout(constant_id = 52) const bool MIRRORS = false; // knob `reflection`: screen
+layout(constant_id = 53) const bool BEHIND_ALONE = false; // what comes through is kept, and nothing added
 
 // Whether key a comes after key b: farther (smaller depth); of coplanar ones the later drawn lies on top.
 bool after(uvec3 a, uvec3 b) {
@@ -77,7 +78,7 @@ void main() {
         }
         if (best == END_OF_LIST) break;
         if (loop_heads + per_fragment > LOOP_BUDGET) {
-            atomicAdd(dropped, 1u);
+            if (!BEHIND_ALONE) atomicAdd(dropped, 1u);
             break;
         }
         last = best_key;
@@ -128,6 +129,6 @@ void main() {
         if (imageLoad(depth, from).x < entry) behind = imageLoad(seen, from);
     }
     float coverage = 1.0 - (through.r + through.g + through.b) * (1.0 / 3.0) * (1.0 - behind.a);
-    imageStore(radiance, pixel, vec4(sum + through * behind.rgb, coverage));
-    if (SHADOWS == SHADOW_RAY) count_rays(0, 0, 0.0);
+    imageStore(radiance, pixel, vec4((BEHIND_ALONE ? vec3(0.0) : sum) + through * behind.rgb, coverage));
+    if (SHADOWS == SHADOW_RAY && !BEHIND_ALONE) count_rays(0, 0, 0.0);
 }

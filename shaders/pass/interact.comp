@@ -30,6 +30,9 @@ layout(constant_id = 53) const bool MASKED_HITS = false; // some surface has hol
 layout(constant_id = 54) const uint LOOP_BUDGET = 40000;
 layout(constant_id = 55) const uint PENDING = 1;         // branches that can wait at once
 layout(constant_id = 56) const bool TOUCHING = false;    // some transparent body lies against another surface
+// Of all that is followed, what is added: 0 all, 1 what the first surface mirrored, 2 what it let through. Nothing is left
+// out for that: which ray is followed next, and which random numbers it has, depends on all that were before.
+layout(constant_id = 59) const uint FIRST_EVENT = 0;
 const bool ENVIRONMENT = AMBIENT || REFLECTION;
 // A branch that would add less than this share of what it meets is not followed. The sum of all that is cut off is
 // counted.
@@ -47,7 +50,7 @@ struct Branch {
     uvec4 media;
     float width;      // of the ray at its origin, for the level of textures
     float spread;     // and what it grows by per metre
-    uint events;      // surfaces met before | what it was sent for << 8 | only let through so far << 9
+    uint events;      // surfaces met before | what it was sent for << 8 | only let through so far << 9 | first event << 10
 };
 // What a surface has sent, the last one first, in registers: an array that is indexed is memory, which lavapipe writes word
 // by word and lane by lane, and most surfaces send one or two. The last one is followed next, the others wait in memory.
@@ -65,6 +68,11 @@ float escaped = 0.0; // share of the pixel where nothing lies behind what is tra
 float lost = 0.0;
 uint reflection_rays = 0;
 uint refraction_rays = 0;
+uint first_event = 0; // of the branch that is followed, as FIRST_EVENT has it; 0 at the first surface
+
+vec3 wanted(uint events, vec3 light) {
+    return FIRST_EVENT == 0 || events >> 10 == FIRST_EVENT ? light : vec3(0.0);
+}
 
 void look(vec3 direction, vec3 throughput) {
     for (int i = MOST_SENT; i > 0; i--) {
@@ -92,6 +100,7 @@ void see_environment() {
 }
 
 void send(Branch branch) {
+    if (FIRST_EVENT != 0) branch.events |= (first_event == 0 ? 1 + (branch.events >> 8 & 1u) : first_event) << 10;
     float weight = largest(branch.throughput);
     bool follows = (branch.events & 0xffu) <= trace_terms.interfaces && weight >= FAINTEST && waiting + sent_now < PENDING;
     if (weight > 0.0 && follows) {
@@ -102,7 +111,7 @@ void send(Branch branch) {
     // What is not followed sees the environment: nearer than nothing to what would have been found.
     if (weight > 0.0 && !follows) {
         lost += weight;
-        look(branch.direction, branch.throughput);
+        look(branch.direction, wanted(branch.events, branch.throughput));
     }
 }
 
@@ -305,6 +314,7 @@ void main() {
         loop_heads++;
         bool goes_on = more;
         ray = next_branch();
+        if (FIRST_EVENT != 0) first_event = ray.events >> 10;
         bool reflected_ray = (ray.events >> 8 & 1u) == BY_REFLECTION;
         reflection_rays += goes_on && reflected_ray ? 1u : 0u;
         refraction_rays += goes_on && !reflected_ray ? 1u : 0u;
@@ -333,11 +343,12 @@ void main() {
                 // What a ray is sent for is not looked up as well.
                 s.base_traced = mirrored_by_ray(hit, boundary);
                 LightRange all = LightRange(0, DIRECTIONAL_LIGHTS + LOCAL_LIGHTS, 0, 0);
-                if (!boundary.hidden) sum += ray.throughput * hit.coverage * radiance_to_eye(s, pixel, 0, all, true);
+                vec3 weight = ray.throughput * hit.coverage;
+                if (!boundary.hidden) sum += wanted(ray.events, weight * radiance_to_eye(s, pixel, 0, all, true));
                 split(hit, boundary, ray, cone, uvec2(pixel));
             } else {
                 bool clear = (ray.events & 0x200u) != 0 && !SKY;
-                if (!clear) look(ray.direction, ray.throughput);
+                if (!clear) look(ray.direction, wanted(ray.events, ray.throughput));
                 escaped += clear ? (ray.throughput.r + ray.throughput.g + ray.throughput.b) * (1.0 / 3.0) : 0.0;
             }
         }
@@ -353,5 +364,5 @@ void main() {
     }
     vec4 before = imageLoad(radiance, pixel);
     imageStore(radiance, pixel, vec4(before.rgb + sum, before.a * (1.0 - min(escaped, 1.0))));
-    count_rays(reflection_rays, refraction_rays, lost);
+    if (FIRST_EVENT == 0) count_rays(reflection_rays, refraction_rays, lost);
 }

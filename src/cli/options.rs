@@ -243,6 +243,7 @@ impl PictureOptions {
             environment_intensity: scene.env_intensity,
             environment_rotation: scene.env_rotation,
             traversal: None,
+            parts: Vec::new(),
         })
     }
 }

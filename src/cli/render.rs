@@ -17,7 +17,7 @@ use super::report::{
     MemoryFacts, Output, PassFacts, PipelineFacts, PlanFacts, Report, SceneFacts, Spread, Validation, knob_map,
 };
 use super::unbuilt::UnbuiltOptions;
-use crate::frame::{Rendered, Renderer};
+use crate::frame::{Part, Rendered, Renderer};
 use crate::gpu::{Device, Severity};
 use crate::image::{Aov, AovData, Picture, exr, file};
 use crate::pass::view::View;
@@ -36,7 +36,8 @@ pub struct RenderArgs {
     picture: PictureOptions,
     #[command(flatten)]
     device: DeviceOptions,
-    /// Further layers of the EXR: the nearest opaque surface at the pixel centres
+    /// Further layers of the EXR: the nearest opaque surface at the pixel centres; and, of the picture itself, the light
+    /// that rays brought which were first mirrored (reflection) or first went through (refraction)
     #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,...")]
     aov: Vec<AovName>,
     /// Draw N times and fail unless all are bit-identical
@@ -78,10 +79,21 @@ pub enum AovName {
     Material,
     /// Index of the instance, counted from 1; 0 is nothing.
     Instance,
-    /// Not built yet.
+    /// Radiance by rays that the nearest surface mirrored.
     Reflection,
-    /// Not built yet.
+    /// Radiance by rays that went through it.
     Refraction,
+}
+
+impl AovName {
+    /// Of the picture, not of the surfaces.
+    fn part(self) -> Option<Part> {
+        match self {
+            Self::Reflection => Some(Part::Reflection),
+            Self::Refraction => Some(Part::Refraction),
+            _ => None,
+        }
+    }
 }
 
 /// What an output path asks for.
@@ -178,6 +190,11 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     args.unbuilt.refuse()?;
     let outputs = outputs(args)?;
     let mut settings = args.picture.settings(&args.scene)?;
+    for part in args.aov.iter().filter_map(|name| name.part()) {
+        if !settings.parts.contains(&part) {
+            settings.parts.push(part);
+        }
+    }
     let steps = Steps::new(args.progress, quiet);
     phases.end("start");
 
@@ -328,12 +345,6 @@ fn outputs(args: &RenderArgs) -> Result<Vec<(PathBuf, Format)>> {
     if !args.aov.is_empty() && !all.iter().any(|(_, format)| *format == Format::Exr) {
         bail!("--aov: layers go into an EXR; add -o FILE.exr");
     }
-    for name in [AovName::Reflection, AovName::Refraction] {
-        if args.aov.contains(&name) {
-            let name = name.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default();
-            bail!("--aov {name}: this layer is not built yet");
-        }
-    }
     Ok(all)
 }
 
@@ -401,7 +412,20 @@ fn pass_facts(rounds: &[Vec<crate::gpu::PassTime>]) -> Vec<PassFacts> {
 /// The asked layers in the order asked.
 fn layers(renderer: &mut Renderer, camera: &Camera, names: &[AovName]) -> Result<Vec<Aov>> {
     let (pixels, view) = renderer.aovs(camera).context("reading the G-buffer")?;
-    Ok(names.iter().map(|&name| layer(&pixels, &view, name)).collect())
+    let of = |&name: &AovName| match name.part() {
+        Some(part) => layer_of_part(renderer, part),
+        None => Ok(layer(&pixels, &view, name)),
+    };
+    names.iter().map(of).collect()
+}
+
+fn layer_of_part(renderer: &Renderer, part: Part) -> Result<Aov> {
+    let picture = renderer.part(part)?.ok_or_else(|| anyhow!("--aov {}: this layer was not drawn", part.name()))?;
+    Ok(Aov {
+        name: part.name().to_owned(),
+        channels: ["R", "G", "B"].map(str::to_owned).into(),
+        samples: AovData::F32(picture.rgba.iter().flat_map(|&[r, g, b, _]| [r, g, b]).collect()),
+    })
 }
 
 fn layer(pixels: &[AovPixel], view: &View, name: AovName) -> Aov {
@@ -429,7 +453,7 @@ fn layer(pixels: &[AovPixel], view: &View, name: AovName) -> Aov {
         AovName::Emissive => ("emissive", rgb, vectors(&|p| p.emissive)),
         AovName::Material => ("material", &["id"][..], AovData::U32(pixels.iter().map(|p| p.material).collect())),
         AovName::Instance => ("instance", &["id"][..], AovData::U32(pixels.iter().map(|p| p.instance).collect())),
-        AovName::Reflection | AovName::Refraction => unreachable!("refused by `outputs`"),
+        AovName::Reflection | AovName::Refraction => unreachable!("parts of the picture"),
     };
     Aov { name: title.to_owned(), channels: channels.iter().map(|c| (*c).to_owned()).collect(), samples }
 }

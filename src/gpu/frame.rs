@@ -409,6 +409,25 @@ impl<'a> Frame<'a> {
         });
     }
 
+    /// Sets every component of a colour image to 0.
+    pub fn clear(&mut self, name: &str, image: &'a Image) {
+        let mut uses = Vec::new();
+        self.use_image(&mut uses, image, Access::TransferDst, vk::ShaderStageFlags::empty());
+        let (raw, range) = (image.raw, image.range());
+        self.passes.push(Pass {
+            name: name.to_owned(),
+            uses,
+            record: Box::new(move |device, commands| {
+                let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+                // SAFETY: as above.
+                unsafe {
+                    let black = vk::ClearColorValue::default();
+                    device.raw.cmd_clear_color_image(commands, raw, layout, &black, &[range]);
+                }
+            }),
+        });
+    }
+
     /// Copies tightly packed texels to one layer: `levels` holds the byte offset of each mip level.
     pub fn upload(&mut self, name: &str, from: &'a Buffer, to: &'a Image, layer: u32, levels: &[u64]) {
         let mut uses = Vec::new();

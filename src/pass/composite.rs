@@ -6,8 +6,9 @@ use super::fragments::FragmentLists;
 use super::gbuffer::GBuffer;
 use super::light::Lighting;
 use super::mirror::OnScreen;
+use super::part::PartOnDevice;
 use super::rays::LOOP_BUDGET;
-use crate::gpu::{Frame, Image};
+use crate::gpu::{Buffer, Frame, Image};
 use crate::shader::composite;
 
 /// Adds the fragments of one strip to `radiance`, nearest first. What they show of the screen is the opaque
@@ -23,6 +24,39 @@ pub fn composite<'a>(
     radiance: &'a Image,
     screen: &'a OnScreen,
     rows: [u32; 2],
+) -> Result<()> {
+    lay_over(frame, "see-through lighting", lighting, gbuffer, lists, radiance, screen, &screen.seen, rows, false)
+}
+
+/// Weakens a part of the picture as the fragments of one strip do that lie before it.
+///
+/// # Errors
+/// When the driver refuses the pipeline.
+pub fn composite_part<'a>(
+    frame: &mut Frame<'a>,
+    lighting: Lighting<'a>,
+    gbuffer: &'a GBuffer,
+    lists: &'a FragmentLists,
+    part: &'a PartOnDevice,
+    screen: &'a OnScreen,
+    rows: [u32; 2],
+) -> Result<()> {
+    let name = format!("see-through over {}", part.part.name());
+    lay_over(frame, &name, lighting, gbuffer, lists, &part.radiance, screen, &part.seen, rows, true)
+}
+
+#[expect(clippy::too_many_arguments, reason = "the two ways to call it have names")]
+fn lay_over<'a>(
+    frame: &mut Frame<'a>,
+    name: &str,
+    lighting: Lighting<'a>,
+    gbuffer: &'a GBuffer,
+    lists: &'a FragmentLists,
+    radiance: &'a Image,
+    screen: &'a OnScreen,
+    seen: &'a Buffer,
+    rows: [u32; 2],
+    behind_alone: bool,
 ) -> Result<()> {
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
     let planned = plan.rays;
@@ -54,6 +88,7 @@ pub fn composite<'a>(
         loop_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
         bends: plan.screen.refraction,
         mirrors: plan.screen.see_through_mirrors,
+        behind_alone,
     };
     let bind = composite::Bind {
         camera_block: camera,
@@ -63,7 +98,7 @@ pub fn composite<'a>(
         radiance,
         depth: &gbuffer.depth_texels,
         normals: &gbuffer.normals,
-        seen: &screen.seen,
+        seen,
         nearest_pieces: &screen.nearest_pieces,
         dropped: &lists.dropped,
         tiles: &lists.work.tiles,
@@ -88,5 +123,5 @@ pub fn composite<'a>(
     };
     let push = [rows[1]];
     let push = bytemuck::cast_slice(&push);
-    frame.compute_indirect("see-through lighting", &bind, constants.words(), push, &lists.work.sizes, 0)
+    frame.compute_indirect(name, &bind, constants.words(), push, &lists.work.sizes, 0)
 }

@@ -5,6 +5,7 @@ use anyhow::Result;
 use super::classify::{Calls, RayTiles, classify_rays};
 use super::gbuffer::GBuffer;
 use super::light::Lighting;
+use super::part::{Part, PartOnDevice};
 use super::rays::{LIGHT_BUDGET, LOOP_BUDGET};
 use crate::gpu::{Frame, Image};
 use crate::plan::Rays;
@@ -28,6 +29,36 @@ pub fn interact<'a>(
 ) -> Result<()> {
     let calls = Calls { mirrors: with.mirrors, transmissive: with.refraction };
     classify_rays(frame, lighting, calls, gbuffer, tiles)?;
+    follow(frame, "reflection and refraction", lighting, with, gbuffer, tiles, radiance, None)
+}
+
+/// Adds to a part of the picture what of that belongs to it: all rays are followed once more, over the same tiles.
+///
+/// # Errors
+/// When the driver refuses a pipeline.
+pub fn interact_part<'a>(
+    frame: &mut Frame<'a>,
+    lighting: Lighting<'a>,
+    with: Rays,
+    gbuffer: &'a GBuffer,
+    tiles: &'a RayTiles,
+    part: &'a PartOnDevice,
+) -> Result<()> {
+    let name = format!("{} alone", part.part.name());
+    follow(frame, &name, lighting, with, gbuffer, tiles, &part.radiance, Some(part.part))
+}
+
+#[expect(clippy::too_many_arguments, reason = "the two ways to call it have names")]
+fn follow<'a>(
+    frame: &mut Frame<'a>,
+    name: &str,
+    lighting: Lighting<'a>,
+    with: Rays,
+    gbuffer: &'a GBuffer,
+    tiles: &'a RayTiles,
+    radiance: &'a Image,
+    part: Option<Part>,
+) -> Result<()> {
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
     let constants = interact::Constants {
         has_emissive: plan.emissive,
@@ -65,6 +96,7 @@ pub fn interact<'a>(
         light_budget: if scene.device().limits_loops() { LIGHT_BUDGET } else { u32::MAX },
         pending: with.interfaces + SPARE_BRANCHES,
         touching: rays.constants.touching,
+        first_event: part.map_or(0, |part| part as u32),
     };
     let bind = interact::Bind {
         camera_block: camera,
@@ -99,5 +131,5 @@ pub fn interact<'a>(
         sigma_grids: &scene.grids.texels,
         work_done: &rays.counts,
     };
-    frame.compute_indirect("reflection and refraction", &bind, constants.words(), &[], &tiles.sizes, 0)
+    frame.compute_indirect(name, &bind, constants.words(), &[], &tiles.sizes, 0)
 }

@@ -13,6 +13,7 @@ pub mod gbuffer;
 pub mod interact;
 pub mod light;
 pub mod mirror;
+pub mod part;
 pub mod rays;
 pub mod scene;
 pub mod shadow_map;
