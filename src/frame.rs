@@ -129,7 +129,7 @@ pub struct Work {
     /// Boundaries of transparent bodies left without having been entered.
     pub stray_interfaces: u64,
     /// Surfaces at which not all lights were gone through, because the driver would have ended the loop over them.
-    pub unlit: u64,
+    pub lights_cut_off: u64,
     /// Share of a pixel's light that was not followed: the mean over all pixels …
     pub mean_lost: f64,
     /// … and the largest.
@@ -145,7 +145,7 @@ impl Work {
         self.node_visits += sum(counts.node_visits);
         self.triangle_tests += sum(counts.triangle_tests);
         self.stray_interfaces += sum(counts.stray_interfaces);
-        self.unlit += sum(counts.unlit);
+        self.lights_cut_off += sum(counts.lights_cut_off);
         self.mean_lost += sum(counts.lost) as f64 / 65536.0 / pixels_and_samples;
         self.most_lost = self.most_lost.max(f32::from_bits(counts.most_lost));
     }
@@ -287,11 +287,11 @@ impl Renderer {
             if self.plan.rays.is_some() {
                 work.add(&self.rays.counted(), pixels * f64::from(count));
                 ensure!(
-                    work.unlit == 0,
-                    "rays met {} surfaces at which {} lights with a ray each are more than the driver's loops allow: \
-                     draw with shadows=map, fewer lights, or on a device without that limit",
-                    work.unlit,
-                    self.plan.directional_lights + self.plan.local_lights
+                    work.lights_cut_off == 0,
+                    "lighting what rays meet ({} lights, at {} surfaces) takes longer loops than the driver allows: draw \
+                     with shadows=map, fewer lights, fewer interfaces, or on a device without that limit",
+                    self.plan.directional_lights + self.plan.local_lights,
+                    work.lights_cut_off
                 );
             }
             if let Some(film) = &self.film {

@@ -130,7 +130,7 @@ pub struct WorkCounts {
     pub node_visits: [u32; 2],
     pub triangle_tests: [u32; 2],
     pub stray_interfaces: [u32; 2],
-    pub unlit: [u32; 2],
+    pub lights_cut_off: [u32; 2],
     pub lost: [u32; 2],
     pub most_lost: u32,
 }

@@ -308,24 +308,31 @@ fn more_lights_than_a_loop_can_run_over_are_refused() {
 #[test]
 fn more_lights_than_the_loops_of_rays_allow_are_an_error() {
     let gpu = Gpu::new();
-    let shot = |count: u32| {
+    let shot = |first: u32, end: u32| {
         let mut made = wall([0.5; 3]);
         let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness: 0.0, ..Material::default() };
         let place = DAffine3::from_translation(DVec3::new(0.0, 0.0, 2.0)) * DAffine3::from_rotation_y(2.6);
         made.add(Shape::panel(2.0, 2.0), metal, place);
-        for i in 0..count {
+        for i in first..end {
             let position = DVec3::new(f64::from(i % 40) * 0.1 - 2.0, f64::from(i / 40) * 0.02 - 1.0, 1.5);
             made.light([1.0; 3], LightKind::Point { position, range: None });
         }
         made.camera(DVec3::new(0.0, 0.0, 1.0), DVec3::new(0.3, 0.0, 2.0), made::perspective(60.0));
         let settings = Settings { knobs: knobs(&["reflection=ray", "shadows=ray", "samples=1"]), ..settings([16, 9]) };
         let mut renderer = gpu.renderer(&made.0, None, settings);
-        renderer.render(&made.0.cameras[1], &mut |_, _| ()).map(|rendered| rendered.work)
+        let work = renderer.render(&made.0.cameras[1], &mut |_, _| ())?.work;
+        anyhow::Ok((work, renderer.film()?))
     };
-    let work = shot(40).expect("a picture of 40 lights");
-    assert!(work.reflection > 0 && work.shadow > 40);
-    let error = shot(20_000).expect_err("20,000 rays to lights at one surface").to_string();
-    assert!(error.contains("20000 lights") && error.contains("shadows=map"), "{error}");
+    let all = shot(0, 1200).expect("a picture of 1200 lights");
+    // Light adds up: what a loop had lost would be missing.
+    let parts: Vec<_> = (0..12).map(|i| shot(i * 100, (i + 1) * 100).expect("a picture of 100 lights")).collect();
+    for (i, pixel) in all.1.rgba.iter().enumerate() {
+        let sum: f64 = parts.iter().map(|part| f64::from(part.1.rgba[i][1])).sum();
+        assert!((f64::from(pixel[1]) - sum).abs() <= 1e-4 * sum, "pixel {i}: {} {sum}", pixel[1]);
+    }
+    assert!(all.0.reflection > 0 && all.0.shadow > 10_000);
+    let error = shot(0, 20_000).map(|_| ()).expect_err("20,000 rays to lights at one surface").to_string();
+    assert!(error.contains("(20000 lights") && error.contains("shadows=map"), "{error}");
 }
 
 #[test]

@@ -125,6 +125,11 @@ uint hit_material(uint triangle) {
     return floatBitsToUint(corner_texel(triangle, 0).w);
 }
 
+// OPAQUE or FILTER.
+uint hit_class(uint triangle) {
+    return imageLoad(bvh_triangles, int(triangle * 3)).w;
+}
+
 // Across a triangle, on the side of its front, as long as twice its area.
 vec3 hit_normal(uint triangle) {
     vec3 a = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3).xyz);

@@ -22,8 +22,8 @@ layout(scalar, set = 0, binding = 22) uniform Environment { EnvironmentTerms env
 layout(set = 0, binding = 23) uniform sampler2D prefiltered;
 layout(set = 0, binding = 24) uniform sampler2D reflectance;
 
-// Reflected radiance over irradiance below which a light is not looked for, and not shown either: the far ends of lobes on
-// polished surfaces, a ten-thousandth of what a grey one reflects.
+// Reflected radiance over irradiance below which a light with a shadow is not looked for, and not shown either: the far
+// ends of lobes on polished surfaces, a ten-thousandth of what a grey one reflects.
 const float FAINTEST_LOBE = 1.0 / 131072.0;
 
 // Light `index` of the table on a surface, as far as it is visible from there.
@@ -60,9 +60,9 @@ struct LightRange {
     uint end_word;
 };
 
-// Loop heads from which on no light is begun: one takes a few hundred at most.
+// Loop heads after which no further light is begun.
 layout(constant_id = 27) const uint LIGHT_BUDGET = 0xffffffffu;
-uint unlit = 0; // surfaces whose lights were not all gone through for that
+uint lights_cut_off = 0; // surfaces whose lights were not all gone through for that
 
 vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across, LightRange range) {
     vec3 sum = vec3(0.0);
@@ -85,7 +85,7 @@ vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across, LightRange range)
             }
         }
         bool out_of_steps = loop_heads > LIGHT_BUDGET && !(listed && bits == 0);
-        unlit += out_of_steps ? 1u : 0u;
+        lights_cut_off += out_of_steps ? 1u : 0u;
         if (out_of_steps || (listed && bits == 0)) break;
         uint index = listed ? DIRECTIONAL_LIGHTS + word * 32 + uint(findLSB(bits)) : next;
         bits = listed ? bits & (bits - 1) : bits;

@@ -17,7 +17,7 @@ void count_rays(uint reflection, uint refraction, float lost) {
     ADD_WORK(node_visits, node_visits)
     ADD_WORK(triangle_tests, triangle_tests)
     ADD_WORK(stray_interfaces, stray_interfaces)
-    ADD_WORK(unlit, unlit)
+    ADD_WORK(lights_cut_off, lights_cut_off)
     // Steps of 2^-16, rounded up: what is counted is not less than what was lost.
     ADD_WORK(lost, lost > 0.0 ? uint(min(lost, 1e3) * 65536.0) + 1u : 0u)
     uint most = subgroupMax(floatBitsToUint(lost));

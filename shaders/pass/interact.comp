@@ -48,6 +48,7 @@ struct Branch {
     uint self;        // the flat face it leaves
     vec3 throughput;
     uvec4 media;
+    float from;       // nothing up to this t is met
     float width;      // of the ray at its origin, for the level of textures
     float spread;     // and what it grows by per metre
     uint events;      // surfaces met before | what it was sent for << 8 | only let through so far << 9 | first event << 10
@@ -59,9 +60,11 @@ Branch sent[MOST_SENT];
 uint sent_now = 0;
 Branch pending[PENDING];
 uint waiting = 0;
-// Directions in which the environment is to be looked at, with what it is weighted by.
-vec3 looks_at[MOST_SENT + 1];
-vec3 looks_with[MOST_SENT + 1];
+// Directions in which the environment is to be looked at, with what it is weighted by: those of the first surface wait for
+// those of the second.
+const int MOST_LOOKS = 2 * MOST_SENT;
+vec3 looks_at[MOST_LOOKS];
+vec3 looks_with[MOST_LOOKS];
 uint looks = 0;
 vec3 sum = vec3(0.0);
 float escaped = 0.0; // share of the pixel where nothing lies behind what is transparent
@@ -75,7 +78,7 @@ vec3 wanted(uint events, vec3 light) {
 }
 
 void look(vec3 direction, vec3 throughput) {
-    for (int i = MOST_SENT; i > 0; i--) {
+    for (int i = MOST_LOOKS - 1; i > 0; i--) {
         looks_at[i] = looks_at[i - 1];
         looks_with[i] = looks_with[i - 1];
     }
@@ -91,7 +94,7 @@ void see_environment() {
         vec2 at = equirectangular_from_direction(into_environment(looks_at[0]));
         vec3 seen = ENVIRONMENT ? textureLod(sky, at, 0.0).rgb * environment.intensity : vec3(0.0);
         sum += looks > 0 ? looks_with[0] * seen : vec3(0.0);
-        for (int i = 0; i < MOST_SENT; i++) {
+        for (int i = 0; i < MOST_LOOKS - 1; i++) {
             looks_at[i] = looks_at[i + 1];
             looks_with[i] = looks_with[i + 1];
         }
@@ -142,7 +145,8 @@ struct Boundary {
     bool solid;  // the surface of a transparent body
     bool hidden; // a body of higher priority displaces it: nothing changes here
     bool stray;  // left without having been entered: the shell is open, or another one crosses it
-    bool against; // something that is no body lies against it: it is met next, as if it were in the medium before
+    bool against; // something opaque lies against it: it is met next, as if it were in the medium before
+    float opaque_at; // where, along the ray from before the boundary
     uint here;   // the medium before
     uint there;  // and behind
     uvec4 beyond; // all media behind
@@ -150,10 +154,11 @@ struct Boundary {
 
 // Where bodies touch there is one boundary, from the one to the other, and where something opaque lies against a body there
 // is none: what is within the offset behind a surface is crossed with it, since a ray that goes on starts behind it. Looked
-// for along the ray, with a cosine of at least 1/16: beyond that, faces apart by a part of the offset are missed.
+// for along the ray from before the surface: as deep as the offset behind it down to a cosine of 1/16, less deep beyond.
 void cross_what_touches(inout Boundary r, HitSurface hit, vec3 direction) {
     vec3 origin = ray_origin(hit.s.p_bvh, hit.n, vec3(0.0));
-    float end = 2.0 * trace_terms.offset / max(-dot(hit.n, direction), 1.0 / 16.0);
+    float cos_v = max(-dot(hit.n, direction), 1e-6);
+    float end = trace_terms.offset / cos_v + trace_terms.offset / max(cos_v, 1.0 / 16.0);
     Hit last = FROM_ORIGIN;
     bool goes_on = r.solid;
     do {
@@ -163,11 +168,15 @@ void cross_what_touches(inout Boundary r, HitSurface hit, vec3 direction) {
         if (goes_on) {
             uint material = hit_material(last.triangle);
             Material m = material_at(material & 0xffffu);
-            bool solid = m.transmission > 0.0 && (material & SHEET_TRIANGLE) == 0;
-            bool front = dot(hit_normal(last.triangle), direction) <= 0.0;
-            r.beyond = front ? entered(r.beyond, m.medium) : left(r.beyond, m.medium);
-            r.against = !solid;
-            goes_on = solid;
+            if (hit_class(last.triangle) == OPAQUE) {
+                r.against = true;
+                // A few roundings before it: what is crossed lies there or before.
+                r.opaque_at = intBitsToFloat(floatBitsToInt(last.t) - 4);
+                goes_on = false;
+            } else if (m.transmission > 0.0 && (material & SHEET_TRIANGLE) == 0) {
+                bool front = dot(hit_normal(last.triangle), direction) <= 0.0;
+                r.beyond = front ? entered(r.beyond, m.medium) : left(r.beyond, m.medium);
+            }
         }
     } while (goes_on);
 }
@@ -184,6 +193,7 @@ Boundary boundary_at(HitSurface hit, uvec4 media, vec3 direction) {
     r.stray = r.solid && !hit.front && !inside(media, medium);
     r.here = r.stray ? medium : present_medium(media);
     r.against = false;
+    r.opaque_at = 0.0;
     if (TOUCHING) cross_what_touches(r, hit, direction);
     if (r.against) r.beyond = media;
     r.there = r.against ? r.here : present_medium(r.beyond);
@@ -209,6 +219,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     next.width = cone;
     next.spread = ray.spread;
     next.throughput = vec3(0.0);
+    next.from = 0.0;
     uint count = (ray.events & 0xffu) + 1;
     uint only_through = ray.events & 0x200u;
 
@@ -216,9 +227,11 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     next.origin = ray_origin(s.p_bvh, boundary.against ? hit.n : -hit.n, vec3(0.0));
     next.direction = direction;
     next.media = boundary.hidden ? boundary.beyond : ray.media;
-    next.events = (boundary.hidden ? count - 1 : count) | BY_REFRACTION << 8 | only_through;
+    next.events = (boundary.hidden && !boundary.against ? count - 1 : count) | BY_REFRACTION << 8 | only_through;
     next.throughput = boundary.hidden ? ray.throughput : ray.throughput * (1.0 - hit.coverage);
+    next.from = boundary.against ? boundary.opaque_at : 0.0;
     if (boundary.hidden || hit.coverage < 1.0) send(next);
+    next.from = 0.0;
     vec3 weight = boundary.hidden || s.unlit ? vec3(0.0) : ray.throughput * hit.coverage;
 
     // The coat.
@@ -315,11 +328,8 @@ void main() {
         bool goes_on = more;
         ray = next_branch();
         if (FIRST_EVENT != 0) first_event = ray.events >> 10;
-        bool reflected_ray = (ray.events >> 8 & 1u) == BY_REFLECTION;
-        reflection_rays += goes_on && reflected_ray ? 1u : 0u;
-        refraction_rays += goes_on && !reflected_ray ? 1u : 0u;
         // Holes of masks are passed by.
-        Hit found = FROM_ORIGIN;
+        Hit found = Hit(TOUCHING ? ray.from : 0.0, NO_TRIANGLE, 0.0, 0.0);
         HitPoint point;
         bool at_surface;
         bool hole;
@@ -330,7 +340,12 @@ void main() {
             if (at_surface) point = hit_point_of(found, ray.origin, ray.direction);
             hole = MASKED_HITS && at_surface && loop_heads < LOOP_BUDGET && hit_coverage(point) == 0.0;
         } while (hole);
+        // What outlives the loop is assigned under a condition: lavapipe goes on with lanes that are through, and what it
+        // computes for them then is nothing.
         if (goes_on) {
+            bool reflected_ray = (ray.events >> 8 & 1u) == BY_REFLECTION;
+            reflection_rays += reflected_ray ? 1u : 0u;
+            refraction_rays += reflected_ray ? 0u : 1u;
             uint medium = present_medium(ray.media);
             if (ABSORPTION == 2 && medium != 0) ray.throughput *= absorbed(medium, ray.origin, ray.direction, at_surface ? found.t : 0.0);
             if (at_surface) {
@@ -352,7 +367,7 @@ void main() {
                 escaped += clear ? (ray.throughput.r + ray.throughput.g + ray.throughput.b) * (1.0 / 3.0) : 0.0;
             }
         }
-        see_environment();
+        if (goes_on || looks > 0) see_environment();
         more = sent_now > 0 || waiting > 0;
         more = more && loop_heads < LOOP_BUDGET;
     } while (more);

@@ -30,8 +30,18 @@ void main() {
     if (!primary.drawn) return;
     Surface s = primary.hit.s;
     s.diffuse *= 1.0 - primary.hit.transmits;
+    bool hidden = false;
+    if (IN_MEDIUM && primary.hit.transmits > 0.0 && !primary.hit.sheet) {
+        // As interact.comp has it: from inside a body mirror images are sent for, and a body of higher priority has no
+        // boundary here.
+        s.base_traced = true;
+        uint medium = material_at(primary.hit.material).medium;
+        uvec4 beyond = primary.hit.front ? entered(s.media, medium) : left(s.media, medium);
+        hidden = present_medium(beyond) == present_medium(s.media);
+    }
     uint tiles_across = (camera.size.x + TILE - 1) / TILE;
     vec3 result = radiance_to_eye(s, pixel, tiles_across, range, first_dispatch != 0) * left_at_eye(s);
+    if (hidden) result = vec3(0.0);
     if (first_dispatch == 0) result += imageLoad(radiance, pixel).rgb;
     imageStore(radiance, pixel, vec4(result, 1.0));
     if (SHADOWS == SHADOW_RAY) count_rays(0, 0, 0.0);

@@ -274,7 +274,7 @@ impl Instance {
             }
         }
         for (has, needed, what) in [
-            (limits.max_per_stage_descriptor_storage_images, 20, "storage images in a shader"),
+            (limits.max_per_stage_descriptor_storage_images, 22, "storage images in a shader"),
             (limits.max_per_stage_descriptor_storage_buffers, 8, "storage buffers in a shader"),
             (limits.max_color_attachments, 6, "colour targets"),
             (limits.max_texel_buffer_elements, 1 << 22, "texels in a buffer"),

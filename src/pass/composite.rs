@@ -7,7 +7,6 @@ use super::gbuffer::GBuffer;
 use super::light::Lighting;
 use super::mirror::OnScreen;
 use super::part::PartOnDevice;
-use super::rays::LOOP_BUDGET;
 use crate::gpu::{Buffer, Frame, Image};
 use crate::shader::composite;
 
@@ -61,7 +60,8 @@ fn lay_over<'a>(
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
     let planned = plan.rays;
     let constants = composite::Constants {
-        light_budget: u32::MAX,
+        // Without rays a light is a single turn of a loop, and what may be too many is refused before.
+        light_budget: if lighting.shadow_rays() { lighting.loop_budget() } else { u32::MAX },
         brdf: lighting.knobs.index("brdf"),
         fresnel: lighting.knobs.index("fresnel"),
         arithmetic: lighting.knobs.index("arithmetic"),
@@ -83,9 +83,9 @@ fn lay_over<'a>(
         march_steps: plan.march().steps,
         quadrature: plan.march().rule,
         march_colours: plan.march().colours,
-        march_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
+        march_budget: lighting.loop_budget(),
         tile_words: lighting.tiles.words(),
-        loop_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
+        loop_budget: lighting.loop_budget(),
         bends: plan.screen.refraction,
         mirrors: plan.screen.see_through_mirrors,
         behind_alone,

@@ -6,7 +6,6 @@ use super::classify::{Calls, RayTiles, classify_rays};
 use super::gbuffer::GBuffer;
 use super::light::Lighting;
 use super::part::{Part, PartOnDevice};
-use super::rays::{LIGHT_BUDGET, LOOP_BUDGET};
 use crate::gpu::{Frame, Image};
 use crate::plan::Rays;
 use crate::shader::interact;
@@ -85,15 +84,15 @@ fn follow<'a>(
         march_steps: with.march.steps,
         quadrature: with.march.rule,
         march_colours: with.march.colours,
-        march_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
+        march_budget: lighting.loop_budget(),
         tile_words: 0,
         transmissive: with.transmissive,
         rough: with.rough,
         sky: plan.sky,
         masked_hits: with.masked,
-        loop_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
+        loop_budget: lighting.loop_budget(),
         in_medium: rays.inside(),
-        light_budget: if scene.device().limits_loops() { LIGHT_BUDGET } else { u32::MAX },
+        light_budget: lighting.loop_budget(),
         pending: with.interfaces + SPARE_BRANCHES,
         touching: rays.constants.touching,
         first_event: part.map_or(0, |part| part as u32),

@@ -60,8 +60,14 @@ impl Lighting<'_> {
         if self.plan.shadow_maps { SHADOW_MAP } else { u32::from(self.shadow_rays()) * SHADOW_RAY }
     }
 
+    /// Loop heads that one invocation may evaluate.
+    #[must_use]
+    pub fn loop_budget(&self) -> u32 {
+        if self.scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX }
+    }
+
     /// Whether rays look for lights.
-    fn shadow_rays(&self) -> bool {
+    pub(super) fn shadow_rays(&self) -> bool {
         self.plan.rays.is_some_and(|rays| rays.shadows)
     }
 
@@ -119,7 +125,7 @@ pub fn light<'a>(
         march_steps: plan.march().steps,
         quadrature: plan.march().rule,
         march_colours: plan.march().colours,
-        march_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
+        march_budget: lighting.loop_budget(),
     };
     let bind = light::Bind {
         camera_block: camera,

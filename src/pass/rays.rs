@@ -29,9 +29,6 @@ const MOST_ORDERED_BYTES: usize = 256 << 20;
 /// Loop heads that one invocation of the tree of rays may evaluate where the driver limits them.
 pub const LOOP_BUDGET: u32 = 40_000;
 
-/// And loop heads after which it begins with no light of a surface any more: of the 65,535 there are.
-pub const LIGHT_BUDGET: u32 = 60_000;
-
 /// How the hierarchy is gone through: `TRAVERSAL` of shaders/lib/trace.glsl.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
