@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use super::classify::{WORK_BYTES, WorkLists};
 use super::gbuffer::GBuffer;
-use super::light::Lighting;
+use super::lighting::Lighting;
 use crate::gpu::{Frame, Image};
 use crate::shader::background;
 

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use anyhow::Result;
 
 use super::gbuffer::GBuffer;
-use super::light::Lighting;
+use super::lighting::Lighting;
+use super::rows::rows_of;
 use crate::gpu::{Buffer, Device, Frame, Image, Place};
 use crate::shader::{classify, classify_fragments, classify_rays as ray_program};
 
@@ -15,14 +16,6 @@ pub const TILE: u32 = 8;
 
 /// Bytes of one `WorkSize` of shaders/lib/work_tile.glsl: a VkDispatchIndirectCommand and a count.
 pub const WORK_BYTES: u64 = 16;
-/// Workgroups along x before a dispatch goes on along y: `ROW` of shaders/lib/work_tile.glsl.
-const ROW: u32 = 32768;
-
-/// A dispatch of `count` workgroups in rows; the shader takes its place from `listed_tile`.
-#[must_use]
-pub fn rows_of(count: u32) -> [u32; 3] {
-    [count.min(ROW), count.div_ceil(ROW), 1]
-}
 
 /// A dispatch of nothing.
 const EMPTY: [u32; 4] = [0, 1, 1, 0];

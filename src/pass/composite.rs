@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use super::fragments::FragmentLists;
 use super::gbuffer::GBuffer;
-use super::light::Lighting;
+use super::lighting::Lighting;
 use super::mirror::OnScreen;
 use super::part::PartOnDevice;
 use crate::gpu::{Buffer, Frame, Image};

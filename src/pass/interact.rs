@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use super::classify::{Calls, RayTiles, classify_rays};
 use super::gbuffer::GBuffer;
-use super::light::Lighting;
+use super::lighting::Lighting;
 use super::part::{Part, PartOnDevice};
 use crate::gpu::{Frame, Image};
 use crate::plan::Rays;

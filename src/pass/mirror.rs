@@ -5,9 +5,10 @@ use std::sync::Arc;
 use anyhow::Result;
 use ash::vk;
 
-use super::classify::{Calls, RayTiles, TILE, classify_rays, rows_of};
+use super::classify::{Calls, RayTiles, TILE, classify_rays};
 use super::gbuffer::GBuffer;
-use super::light::Lighting;
+use super::lighting::Lighting;
+use super::rows::rows_of;
 use crate::gpu::{Buffer, Device, Frame, Image, Place};
 use crate::plan::{Plan, Screen};
 use crate::shader::{mirror, screen_tiles as tiles_program};

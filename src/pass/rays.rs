@@ -9,7 +9,8 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::scene::{cofactors as cofactors_of, texture_slots, upload};
+use super::scene::{cofactors as cofactors_of, medium, texture_slots};
+use super::upload::upload;
 use super::view::View;
 use crate::gpu::{Buffer, Device, Frame, Place};
 use crate::plan::{Plan, Rays};
@@ -305,13 +306,6 @@ impl RaysOnDevice {
 /// Whether what lies behind such a surface may be seen through it.
 fn is_filter(material: &Material) -> bool {
     crate::plan::is_see_through(material, false) || matches!(material.alpha_mode, crate::scene::AlphaMode::Mask(_))
-}
-
-/// A medium as rays keep it (shaders/lib/media.glsl): its priority, and which material it is.
-#[must_use]
-pub fn medium(material: &Material, index: usize) -> u32 {
-    let priority = (material.priority.clamp(-0x7fff, 0x7fff) + 0x8000) as u32;
-    priority << 16 | (index as u32 + 1)
 }
 
 /// Which flat face each triangle of a mesh is part of, named after its first triangle: triangles that follow each other,

@@ -8,8 +8,9 @@ use glam::{DMat3, DVec3};
 
 use super::sigma_grid::SigmaGrids;
 use super::texture::{Meaning, Texels, Textures};
+use super::upload::upload;
 use super::view::View;
-use crate::gpu::{Buffer, Device, Draw, Frame, Place, Sampled, VertexStream};
+use crate::gpu::{Buffer, Device, Draw, Place, Sampled, VertexStream};
 use crate::plan::{Knobs, Plan, casts_in_maps, is_see_through, mirrors};
 use crate::scene::solid::Solids;
 use crate::scene::{AlphaMode, Bounds, Light, LightKind, Material, Scene, TextureRef};
@@ -117,37 +118,6 @@ pub fn texture_slots(m: &Material) -> [(Option<TextureRef>, Meaning); SLOTS] {
         (m.thickness_texture, Meaning::Data),
         (m.clearcoat_normal_texture, Meaning::Data),
     ]
-}
-
-/// A buffer with `data` where the device reads it fastest: written in place on a CPU device, staged on others.
-///
-/// # Errors
-/// When it does not fit the device.
-pub fn upload<T: bytemuck::NoUninit>(
-    device: &Arc<Device>,
-    name: &str,
-    data: &[T],
-    texels: Option<vk::Format>,
-) -> Result<Buffer> {
-    let bytes: &[u8] = bytemuck::cast_slice(data);
-    let place = if device.info().kind == "cpu" { Place::Upload } else { Place::Device };
-    let size = bytes.len() as u64;
-    if texels.is_none() && size > device.max_storage_bytes() {
-        bail!("{name} need {size} bytes, the device binds at most {} at once", device.max_storage_bytes());
-    }
-    let mut buffer = match texels {
-        Some(format) => Buffer::texels(device, name, size, place, format)?,
-        None => Buffer::new(device, name, size, place)?,
-    };
-    if place == Place::Upload {
-        buffer.write(bytes);
-    } else if size > 0 {
-        let staging = Buffer::with_data(device, "staging", bytes)?;
-        let mut frame = Frame::new(device);
-        frame.copy_buffer("upload", &staging, &buffer, size);
-        frame.finish()?;
-    }
-    Ok(buffer)
 }
 
 fn extent(positions: &[[f32; 3]]) -> [DVec3; 2] {
@@ -477,7 +447,7 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32) -> shar
         clearcoat: m.clearcoat,
         clearcoat_roughness: m.clearcoat_roughness,
         sigma: of_grid(if grid == 0 { 1.0 } else { 0.0 }),
-        medium: super::rays::medium(m, index),
+        medium: medium(m, index),
         n_metal: metal.map(|[n, _]| n),
         flags: flag(m.unlit, share::Material::UNLIT)
             | coverage
@@ -592,4 +562,11 @@ mod tests {
             assert_eq!(instance.handedness < 0.0, scale.x * scale.y * scale.z < 0.0);
         }
     }
+}
+
+/// A medium as rays keep it (shaders/lib/media.glsl): its priority, and which material it is.
+#[must_use]
+pub fn medium(material: &Material, index: usize) -> u32 {
+    let priority = (material.priority.clamp(-0x7fff, 0x7fff) + 0x8000) as u32;
+    priority << 16 | (index as u32 + 1)
 }

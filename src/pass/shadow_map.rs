@@ -110,7 +110,7 @@ impl ShadowMaps {
         let extent = |axis: usize| faces.iter().map(|f| f.square[axis] + f.square[2]).max().unwrap_or(1);
         let depth = image(extent(0), extent(1))?;
         let times = draw(device, scene, anchor, &faces, &depth)?;
-        Ok(Self { depth, faces: super::scene::upload(device, "shadow maps' table", &table, Some(format))?, times })
+        Ok(Self { depth, faces: super::upload::upload(device, "shadow maps' table", &table, Some(format))?, times })
     }
 
     /// All maps: reversed depth, 0 where nothing was drawn.

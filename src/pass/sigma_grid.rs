@@ -6,7 +6,7 @@ use anyhow::{Result, ensure};
 use ash::vk;
 use glam::{DAffine3, DVec3};
 
-use super::scene::upload;
+use super::upload::upload;
 use crate::gpu::{Buffer, Device};
 use crate::plan::Plan;
 use crate::scene::{Scene, SigmaGrid};

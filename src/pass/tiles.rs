@@ -5,8 +5,8 @@ use std::sync::Arc;
 use anyhow::Result;
 use ash::vk;
 
-use super::classify::rows_of;
 use super::gbuffer::GBuffer;
+use super::rows::rows_of;
 use super::scene::SceneOnDevice;
 use crate::gpu::{Buffer, Device, Frame, Place};
 use crate::plan::Plan;

@@ -21,6 +21,7 @@ use glam::{DVec3, Vec3};
 use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
+pub use super::aabb::Aabb;
 use super::{Scene, ploc};
 
 /// Most triangles of one tree: a leaf's word holds the first triangle times 8 plus a count in 31 bits.
@@ -48,53 +49,6 @@ const WORTH_TESTING: f64 = 0.6;
 /// Unit of the grid along an axis in which the scene has no extent, as a part of the farthest coordinate: 16 roundings of
 /// f32.
 const LEAST_UNIT: f64 = 1.0 / 1_048_576.0;
-
-/// An axis-aligned box in bvh space.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Aabb {
-    /// Smallest corner.
-    pub min: [f32; 3],
-    /// Largest corner.
-    pub max: [f32; 3],
-}
-
-impl Aabb {
-    /// The box of nothing: a union with it changes nothing.
-    pub const EMPTY: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
-
-    /// The smallest box around both.
-    #[must_use]
-    pub fn union(&self, other: &Self) -> Self {
-        Self {
-            min: std::array::from_fn(|i| self.min[i].min(other.min[i])),
-            max: std::array::from_fn(|i| self.max[i].max(other.max[i])),
-        }
-    }
-
-    /// Whether every point of `other` is in this box.
-    #[must_use]
-    pub fn contains(&self, other: &Self) -> bool {
-        (0..3).all(|i| self.min[i] <= other.min[i] && other.max[i] <= self.max[i])
-    }
-
-    /// Extent along an axis.
-    #[must_use]
-    pub fn size(&self, axis: usize) -> f64 {
-        f64::from(self.max[axis]) - f64::from(self.min[axis])
-    }
-
-    /// Half the surface.
-    #[must_use]
-    pub fn half_area(&self) -> f64 {
-        let [x, y, z] = [0, 1, 2].map(|axis| self.size(axis));
-        x * y + y * z + z * x
-    }
-
-    /// Twice the middle, which is exact in f64 for coordinates of like size.
-    fn double_center(&self, axis: usize) -> f64 {
-        f64::from(self.min[axis]) + f64::from(self.max[axis])
-    }
-}
 
 /// A triangle as rays meet it.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -10,8 +10,7 @@ use serde_json::{Value, value::RawValue};
 
 use super::{
     Material, SigmaGrid,
-    gltf_material::INFINITE_IOR,
-    substance::{self, SUBSTANCES, Substance},
+    substance::{self, INFINITE_IOR, SUBSTANCES, Substance},
 };
 
 /// Keys that are planned and that nothing looks at yet.

@@ -13,14 +13,12 @@ use rayon::prelude::*;
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
+use super::substance::INFINITE_IOR;
 use super::{
     AlphaMode, Image, Material, Sampler, TextureRef, Wrap,
     container::{Document, short_uri},
     gltf_extras, pictures,
 };
-
-/// The index of refraction that stands for "infinite" (KHR_materials_ior, value 0): F0 is within 4e-6 of 1.
-pub(crate) const INFINITE_IOR: f32 = 1.0e6;
 
 /// Materials of the whole file and the pictures they use.
 pub(crate) struct Materials {

@@ -3,6 +3,7 @@
 //! Nothing here knows Vulkan. A [`Scene`] comes from [`load`] (glTF, OBJ) or from [`crate::study`];
 //! the passes upload it. Lengths are metres, the world is right-handed with +Y up as in glTF 2.0 section 3.4.
 
+mod aabb;
 mod accessor;
 pub mod bvh;
 pub mod camera;

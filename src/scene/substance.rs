@@ -1,5 +1,8 @@
 //! Indices of refraction of real substances (lecture F1), by the names that files may use.
 
+/// The index of refraction that stands for "infinite" (KHR_materials_ior, value 0): F0 is within 4e-6 of 1.
+pub(crate) const INFINITE_IOR: f32 = 1.0e6;
+
 /// Complex index (n, κ) of a metal at 645.16, 526.32 and 444.44 nm: the three lamps of lecture C1, red first.
 pub(crate) type ComplexIndex = [(f64, f64); 3];
 

@@ -1,0 +1,39 @@
+//! How tables of a scene come to the device.
+
+use std::sync::Arc;
+
+use anyhow::{Result, bail};
+use ash::vk;
+
+use crate::gpu::{Buffer, Device, Frame, Place};
+
+/// A buffer with `data` where the device reads it fastest: written in place on a CPU device, staged on others.
+///
+/// # Errors
+/// When it does not fit the device.
+pub fn upload<T: bytemuck::NoUninit>(
+    device: &Arc<Device>,
+    name: &str,
+    data: &[T],
+    texels: Option<vk::Format>,
+) -> Result<Buffer> {
+    let bytes: &[u8] = bytemuck::cast_slice(data);
+    let place = if device.info().kind == "cpu" { Place::Upload } else { Place::Device };
+    let size = bytes.len() as u64;
+    if texels.is_none() && size > device.max_storage_bytes() {
+        bail!("{name} need {size} bytes, the device binds at most {} at once", device.max_storage_bytes());
+    }
+    let mut buffer = match texels {
+        Some(format) => Buffer::texels(device, name, size, place, format)?,
+        None => Buffer::new(device, name, size, place)?,
+    };
+    if place == Place::Upload {
+        buffer.write(bytes);
+    } else if size > 0 {
+        let staging = Buffer::with_data(device, "staging", bytes)?;
+        let mut frame = Frame::new(device);
+        frame.copy_buffer("upload", &staging, &buffer, size);
+        frame.finish()?;
+    }
+    Ok(buffer)
+}
