@@ -522,6 +522,13 @@ fn shared_light(light: &Light, eye: DVec3) -> [[f32; 4]; 4] {
     }
 }
 
+/// A medium as rays keep it (shaders/lib/media.glsl): its priority, and which material it is.
+#[must_use]
+pub fn medium(material: &Material, index: usize) -> u32 {
+    let priority = (material.priority.clamp(-0x7fff, 0x7fff) + 0x8000) as u32;
+    priority << 16 | (index as u32 + 1)
+}
+
 #[cfg(test)]
 mod tests {
     use glam::{DAffine3, DQuat};
@@ -562,11 +569,4 @@ mod tests {
             assert_eq!(instance.handedness < 0.0, scale.x * scale.y * scale.z < 0.0);
         }
     }
-}
-
-/// A medium as rays keep it (shaders/lib/media.glsl): its priority, and which material it is.
-#[must_use]
-pub fn medium(material: &Material, index: usize) -> u32 {
-    let priority = (material.priority.clamp(-0x7fff, 0x7fff) + 0x8000) as u32;
-    priority << 16 | (index as u32 + 1)
 }
