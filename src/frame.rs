@@ -222,9 +222,7 @@ impl Renderer {
         let refracts = plan.screen.refraction || plan.rays.is_some_and(|rays| rays.refraction);
         let mut warnings = if refracts { solids.warnings.clone() } else { Vec::new() };
         let rays = RaysOnDevice::new(device, &plan, &scene, &solids, settings.traversal)?;
-        if let Some(bvh) = rays.facts.filter(|bvh| bvh.dropped > 0) {
-            warnings.push(format!("{} triangles without area are left out for rays", bvh.dropped));
-        }
+        warnings.extend(rays.warnings.iter().cloned());
         for part in settings.parts.iter().filter(|part| !part.called_for(&plan)) {
             warnings.push(format!("--aov {}: no surface of this scene sends such rays, the layer is 0", part.name()));
         }

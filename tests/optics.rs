@@ -1439,3 +1439,26 @@ fn light_to_an_eye_inside_a_body_is_absorbed_on_its_way() {
         assert!(worst < 1e-5 && within > 50, "{worst:e}, {within}");
     }
 }
+
+#[test]
+fn triangles_that_are_there_twice_are_named() {
+    let gpu = Gpu::new();
+    let warnings = |twice: Material| {
+        let mut made = Made::new("twice");
+        made.add(Shape::panel(2.0, 2.0), mirror(0.9), at(0.0, 0.0, -3.0));
+        for name in ["one", "other"] {
+            let mesh = made.mesh(Shape::cuboid(DVec3::ONE), twice.clone());
+            made.0.meshes[mesh].name = name.to_owned();
+            made.place(mesh, DAffine3::IDENTITY);
+        }
+        made.camera(DVec3::Z * 4.0, DVec3::ZERO, perspective(40.0));
+        gpu.renderer(&made.0, None, optics([16, 9], &[])).warnings
+    };
+    let said = warnings(lambert([0.5; 3]));
+    assert!(
+        said.len() == 1 && said[0].contains("12 triangles of mesh \"other\"") && said[0].contains("\"one\""),
+        "{said:?}"
+    );
+    // Bodies that touch are no mistake.
+    assert_eq!(warnings(glass(1.5)), Vec::<String>::new());
+}

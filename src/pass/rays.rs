@@ -15,7 +15,7 @@ use super::view::View;
 use crate::gpu::{Buffer, Device, Frame, Place};
 use crate::plan::{Plan, Rays};
 use crate::scene::bvh::{Bvh, Format, Order, Triangle};
-use crate::scene::contact::bodies_touch;
+use crate::scene::contact::{bodies_touch, twins};
 use crate::scene::solid::{Solids, media_at};
 use crate::scene::{Material, Mesh, Scene};
 use crate::share::{TraceTerms, WorkCounts};
@@ -102,6 +102,8 @@ pub struct RaysOnDevice {
     pub constants: TraceConstants,
     /// For the report; `None` without rays.
     pub facts: Option<BvhFacts>,
+    /// What is odd about the triangles, a sentence each.
+    pub warnings: Vec<String>,
     fixed: TraceTerms,
     anchor: DVec3,
     /// The transparent bodies alone, to find those that the eye is in.
@@ -208,6 +210,7 @@ impl RaysOnDevice {
                 touching,
                 bytes: nodes_buffer.bytes() + triangle_buffer.bytes() + corner_buffer.bytes(),
             }),
+            warnings: odd_triangles(scene, &bvh, solids),
             nodes: nodes_buffer,
             triangles: triangle_buffer,
             corners: corner_buffer,
@@ -235,6 +238,7 @@ impl RaysOnDevice {
             counts: Buffer::new(device, "work counts", size_of::<WorkCounts>() as u64, Place::Readback)?,
             constants: TraceConstants { traversal: 0, octants: false, stack_size: 1, hit_textures: 0, touching: false },
             facts: None,
+            warnings: Vec::new(),
             fixed: TraceTerms {
                 offset: (OFFSET_ROUNDINGS * half * 2.0_f64.powi(-24)) as f32,
                 ..bytemuck::Zeroable::zeroed()
@@ -306,6 +310,30 @@ impl RaysOnDevice {
 /// Whether what lies behind such a surface may be seen through it.
 fn is_filter(material: &Material) -> bool {
     crate::plan::is_see_through(material, false) || matches!(material.alpha_mode, crate::scene::AlphaMode::Mask(_))
+}
+
+/// What is left out, and what is there twice: of that only one is seen, unless bodies touch there.
+fn odd_triangles(scene: &Scene, bvh: &Bvh, solids: &Solids) -> Vec<String> {
+    const MOST: usize = 4;
+    let mut warnings = Vec::new();
+    if bvh.dropped > 0 {
+        warnings.push(format!("{} triangles without area are left out for rays", bvh.dropped));
+    }
+    let name = |instance: u32| &scene.meshes[scene.instances[instance as usize].mesh].name;
+    let is_body = |instance: u32| solids.solid[instance as usize];
+    let mut pairs = twins(bvh).into_iter().filter(|([a, b], _)| a == b || !(is_body(*a) || is_body(*b)));
+    warnings.extend(pairs.by_ref().take(MOST).map(|([a, b], count)| {
+        format!(
+            "{count} triangles of mesh \"{}\" lie exactly in triangles of mesh \"{}\": one of each is seen",
+            name(b),
+            name(a)
+        )
+    }));
+    let more = pairs.count();
+    if more > 0 {
+        warnings.push(format!("triangles of {more} more pairs of meshes lie exactly in each other"));
+    }
+    warnings
 }
 
 /// Which flat face each triangle of a mesh is part of, named after its first triangle: triangles that follow each other,
