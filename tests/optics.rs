@@ -1486,3 +1486,32 @@ fn mirrors_between_glass_vanish_in_a_white_furnace() {
         assert!(worst < 2e-6 && rendered.work.reflection > 1000, "{interfaces}: {worst:e}");
     }
 }
+
+#[test]
+fn what_lies_behind_the_holes_of_masks_is_seen_in_mirrors() {
+    let gpu = Gpu::new();
+    // Fine holes before a card: neighbouring lanes end at the first, second or third mask, or behind them.
+    let mut made = Made::new("holes");
+    let texel = |i: u32| if (i + i / 8) % 2 == 0 { [255; 4] } else { [255, 255, 255, 0] };
+    made.0.images.push(Image { name: "mask".to_owned(), width: 8, height: 8, rgba: (0..64).flat_map(texel).collect() });
+    let sampler = Sampler { mag_nearest: true, min_nearest: true, mips: false, ..Sampler::default() };
+    made.add(Shape::panel(6.0, 6.0), mirror(1.0), at(0.0, 0.0, -2.0));
+    let back = DAffine3::from_rotation_y(std::f64::consts::PI);
+    for i in 0..4 {
+        let texture = TextureRef { image: 0, uv_set: 0, uv_transform: glam::Affine2::IDENTITY, sampler };
+        let mask = Material { alpha_mode: AlphaMode::Mask(0.5), base_color_texture: Some(texture), ..unlit([1.0; 3]) };
+        let turn = DAffine3::from_rotation_z(0.3 * f64::from(i));
+        made.add(Shape::panel(5.0, 5.0), mask, at(0.0, 0.0, 4.0 + 0.3 * f64::from(i)) * back * turn);
+    }
+    made.add(Shape::panel(40.0, 40.0), unlit([0.5; 3]), at(0.0, 0.0, 6.0) * back);
+    made.camera(DVec3::new(0.3, 0.2, 1.0), DVec3::new(0.0, 0.0, -2.0), perspective(50.0));
+    let film = gpu.film(&made.0, optics([96, 54], &[]));
+    let near = |c: f32, want: f32| (c - want).abs() < 1e-4;
+    let (mut masks, mut card) = (0, 0);
+    for (i, pixel) in film.rgba.iter().enumerate() {
+        assert!(near(pixel[0], 1.0) || near(pixel[0], 0.5), "pixel {i}: {pixel:?}");
+        masks += usize::from(near(pixel[0], 1.0));
+        card += usize::from(near(pixel[0], 0.5));
+    }
+    assert!(masks > 500 && card > 50, "{masks} {card}");
+}
