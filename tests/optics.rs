@@ -1515,3 +1515,36 @@ fn what_lies_behind_the_holes_of_masks_is_seen_in_mirrors() {
     }
     assert!(masks > 500 && card > 50, "{masks} {card}");
 }
+
+#[test]
+fn a_light_behind_many_sheets_is_as_dark_beside_them_as_a_blocked_one() {
+    let gpu = Gpu::new();
+    // Strips finer than a group of lanes, opaque and not, over eleven sheets: one lane is through at once, the next one goes
+    // on behind the fourth sheet and the eighth.
+    let mut made = Made::new("comb");
+    made.add(Shape::panel(20.0, 20.0), lambert([0.5; 3]), DAffine3::IDENTITY);
+    let clear = Material { thickness: 0.0, specular: 0.0, base_color: [0.95, 0.95, 0.95, 1.0], ..glass(1.0) };
+    for i in 0..11 {
+        made.add(Shape::panel(20.0, 20.0), clear.clone(), at(0.0, 0.0, 12.0 + 0.1 * f64::from(i)));
+    }
+    for i in -40..40 {
+        made.add(Shape::panel(0.1, 20.0), lambert([0.0; 3]), at(0.2 * f64::from(i), 0.0, 14.0));
+    }
+    made.light([1.0; 3], LightKind::Directional { direction: DVec3::NEG_Z });
+    made.front(1.0);
+    let size = [94, 52];
+    let film = gpu.film(&made.0, optics(size, &["shadows=ray"]));
+    let (mut dark, mut lit) = (0, 0);
+    for (i, pixel) in film.rgba.iter().enumerate() {
+        let (o, _) = ray(&made.0.cameras[0], size, i, DVec2::ZERO);
+        let from_edge = (o.x / 0.1 + 0.5).rem_euclid(2.0);
+        if (from_edge - from_edge.round()).abs() < 0.02 {
+            continue;
+        }
+        let want = if from_edge < 1.0 { 0.0 } else { 0.5 / std::f64::consts::PI * 0.95_f64.powi(11) };
+        assert!((f64::from(pixel[0]) - want).abs() < 1e-4, "pixel {i}: {pixel:?}, {want}");
+        dark += usize::from(want == 0.0);
+        lit += usize::from(want > 0.0);
+    }
+    assert!(dark > 1000 && lit > 1000, "{dark} {lit}");
+}
