@@ -1492,7 +1492,7 @@ fn what_lies_behind_the_holes_of_masks_is_seen_in_mirrors() {
     let gpu = Gpu::new();
     // Fine holes before a card: neighbouring lanes end at the first, second or third mask, or behind them.
     let mut made = Made::new("holes");
-    let texel = |i: u32| if (i + i / 8) % 2 == 0 { [255; 4] } else { [255, 255, 255, 0] };
+    let texel = |i: u32| if (i + i / 8).is_multiple_of(2) { [255; 4] } else { [255, 255, 255, 0] };
     made.0.images.push(Image { name: "mask".to_owned(), width: 8, height: 8, rgba: (0..64).flat_map(texel).collect() });
     let sampler = Sampler { mag_nearest: true, min_nearest: true, mips: false, ..Sampler::default() };
     made.add(Shape::panel(6.0, 6.0), mirror(1.0), at(0.0, 0.0, -2.0));
