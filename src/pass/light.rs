@@ -22,6 +22,7 @@ pub fn light<'a>(
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
     let planned = plan.rays;
     let constants = light::Constants {
+        // Ranges of lights are short enough.
         light_budget: u32::MAX,
         in_medium: rays.inside(),
         has_emissive: plan.emissive,
