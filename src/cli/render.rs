@@ -290,7 +290,8 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     if let (Some(path), Some(film)) = (&args.report, &film) {
         let total = phases.start.elapsed().as_secs_f64() * 1e3;
         phases.all.insert("total", total);
-        let (count, spirv_bytes) = device.pipelines();
+        let (count, spirv_bytes, making_ms) = device.pipelines();
+        phases.all.insert("pipelines", making_ms);
         let report = Report {
             schema: "etalon.report/1",
             device: info,

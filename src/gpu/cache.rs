@@ -4,6 +4,8 @@ use std::collections::HashMap;
 
 use ash::vk;
 
+use super::shader::Program;
+
 /// How an image is sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct SamplerDesc {
@@ -38,7 +40,7 @@ impl SamplerDesc {
 /// Everything that decides which pipeline a draw or dispatch needs.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct PipelineKey {
-    pub(super) program: &'static str,
+    pub(super) program: &'static Program,
     pub(super) constants: Vec<(u32, u32)>,
     pub(super) raster: Option<RasterKey>,
 }
@@ -62,6 +64,7 @@ pub(super) struct Caches {
     pub(super) pipelines: HashMap<PipelineKey, vk::Pipeline>,
     pub(super) samplers: HashMap<SamplerDesc, vk::Sampler>,
     pub(super) spirv_bytes: usize,
+    pub(super) making_ms: f64,
 }
 
 impl Caches {

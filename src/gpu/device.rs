@@ -478,6 +478,11 @@ impl Device {
         &self.info
     }
 
+    /// Whether the validation layer listens.
+    pub(super) fn validates(&self) -> bool {
+        self.instance.debug.is_some()
+    }
+
     /// What the validation layer has said so far.
     #[must_use]
     pub fn messages(&self) -> Vec<Message> {

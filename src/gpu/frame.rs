@@ -1,7 +1,8 @@
 //! A frame: passes in reading order, barriers derived from what they declare, a timestamp pair around each.
 //!
-//! Passes are plain data (`Vec<Pass>`) until [`Frame::finish`] records them in the order they were written, submits once,
-//! and waits. Labels, object names, timestamps and barriers come by themselves.
+//! Passes are plain data (`Vec<Pass>`) until [`Frame::finish`] records them in the order they were written, submits them,
+//! and waits. Labels, object names, timestamps and barriers come by themselves, and so do pipelines: those that are new are
+//! made on another thread, and while a pass waits for its own the device goes on with the passes before.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -96,11 +97,13 @@ pub struct Raster<'a> {
     pub rows: [u32; 2],
 }
 
-type Record<'a> = Box<dyn FnOnce(&Device, vk::CommandBuffer) + 'a>;
+type Record<'a> = Box<dyn FnOnce(&Device, vk::CommandBuffer, &[vk::Pipeline]) + 'a>;
 
 struct Pass<'a> {
     name: String,
     uses: Vec<Use>,
+    /// Handed to `record` in this order.
+    pipelines: Vec<PipelineKey>,
     record: Record<'a>,
 }
 
@@ -225,15 +228,15 @@ impl<'a> Frame<'a> {
             self.use_buffer(&mut uses, sizes, Access::IndirectRead, vk::ShaderStageFlags::empty());
         }
         let layout = self.device.layout(program)?;
-        let pipeline = self.device.pipeline(program, PipelineKey { program: program.name, constants, raster: None })?;
         let push = push.to_vec();
         self.passes.push(Pass {
             name: name.to_owned(),
             uses,
-            record: Box::new(move |device, commands| {
+            pipelines: vec![PipelineKey { program, constants, raster: None }],
+            record: Box::new(move |device, commands, pipelines| {
                 // SAFETY: the command buffer is recording; handles are alive until the frame has finished.
                 unsafe {
-                    device.raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline);
+                    device.raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipelines[0]);
                     push_descriptors(device, commands, vk::PipelineBindPoint::COMPUTE, layout, program, &descriptors);
                     push_constants(device, commands, layout, program, &push);
                     match groups {
@@ -301,8 +304,7 @@ impl<'a> Frame<'a> {
             }
             self.use_buffer(&mut uses, draw.indices, Access::IndexRead, none);
             let constants = draw.constants.clone();
-            let key = PipelineKey { program: program.name, constants, raster: Some(key.clone()) };
-            pipelines.push(self.device.pipeline(program, key)?);
+            pipelines.push(PipelineKey { program, constants, raster: Some(key.clone()) });
         }
         uses.sort_by_key(|u| (u.resource, u.access as u32));
         uses.dedup();
@@ -318,7 +320,7 @@ impl<'a> Frame<'a> {
         });
         let ([left, top], [width, height], [from, to]) = (raster.origin, raster.size, raster.rows);
         let push = push.to_vec();
-        let record = move |device: &Device, commands: vk::CommandBuffer| {
+        let record = move |device: &Device, commands: vk::CommandBuffer, pipelines: &[vk::Pipeline]| {
             let color_infos: Vec<_> = colors
                 .iter()
                 .map(|&(view, clear)| {
@@ -357,7 +359,7 @@ impl<'a> Frame<'a> {
                 device.raw.cmd_set_scissor(commands, 0, &[area]);
                 push_constants(device, commands, layout, program, &push);
                 let mut bound = (vk::Pipeline::null(), usize::MAX);
-                for (draw, pipeline) in draws.iter().zip(pipelines) {
+                for (draw, &pipeline) in draws.iter().zip(pipelines) {
                     if bound.0 != pipeline {
                         device.raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, pipeline);
                         bound.0 = pipeline;
@@ -372,7 +374,7 @@ impl<'a> Frame<'a> {
                 device.raw.cmd_end_rendering(commands);
             }
         };
-        self.passes.push(Pass { name: raster.name.to_owned(), uses, record: Box::new(record) });
+        self.passes.push(Pass { name: raster.name.to_owned(), uses, pipelines, record: Box::new(record) });
         Ok(())
     }
 
@@ -387,8 +389,9 @@ impl<'a> Frame<'a> {
         self.passes.push(Pass {
             name: name.to_owned(),
             uses,
+            pipelines: Vec::new(),
             // SAFETY: the command buffer is recording; handles are alive until the frame has finished.
-            record: Box::new(move |device, commands| unsafe {
+            record: Box::new(move |device, commands, _| unsafe {
                 device.raw.cmd_copy_buffer(commands, from, to, &[region]);
             }),
         });
@@ -402,8 +405,9 @@ impl<'a> Frame<'a> {
         self.passes.push(Pass {
             name: name.to_owned(),
             uses,
+            pipelines: Vec::new(),
             // SAFETY: as above.
-            record: Box::new(move |device, commands| unsafe {
+            record: Box::new(move |device, commands, _| unsafe {
                 device.raw.cmd_fill_buffer(commands, raw, 0, vk::WHOLE_SIZE, word);
             }),
         });
@@ -417,7 +421,8 @@ impl<'a> Frame<'a> {
         self.passes.push(Pass {
             name: name.to_owned(),
             uses,
-            record: Box::new(move |device, commands| {
+            pipelines: Vec::new(),
+            record: Box::new(move |device, commands, _| {
                 let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
                 // SAFETY: as above.
                 unsafe {
@@ -447,7 +452,8 @@ impl<'a> Frame<'a> {
         self.passes.push(Pass {
             name: name.to_owned(),
             uses,
-            record: Box::new(move |device, commands| {
+            pipelines: Vec::new(),
+            record: Box::new(move |device, commands, _| {
                 let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
                 // SAFETY: as above.
                 unsafe { device.raw.cmd_copy_buffer_to_image(commands, from, to, layout, &regions) };
@@ -467,7 +473,8 @@ impl<'a> Frame<'a> {
         self.passes.push(Pass {
             name: name.to_owned(),
             uses,
-            record: Box::new(move |device, commands| {
+            pipelines: Vec::new(),
+            record: Box::new(move |device, commands, _| {
                 let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
                 // SAFETY: as above.
                 unsafe { device.raw.cmd_copy_image_to_buffer(commands, from, layout, to, &[region]) };
@@ -479,7 +486,12 @@ impl<'a> Frame<'a> {
     pub fn read_back(&mut self, buffer: &'a Buffer) {
         let mut uses = Vec::new();
         self.use_buffer(&mut uses, buffer, Access::HostRead, vk::ShaderStageFlags::empty());
-        self.passes.push(Pass { name: "read back".to_owned(), uses, record: Box::new(|_, _| {}) });
+        self.passes.push(Pass {
+            name: "read back".to_owned(),
+            uses,
+            pipelines: Vec::new(),
+            record: Box::new(|_, _, _| {}),
+        });
     }
 
     /// Records, submits, waits, and returns the time of each pass in order.
@@ -511,57 +523,57 @@ impl<'a> Frame<'a> {
         let timed = device.limits.timestamp_compute_and_graphics == vk::TRUE && !passes.is_empty();
         let queries = 2 * passes.len() as u32;
         let names: Vec<String> = passes.iter().map(|pass| pass.name.clone()).collect();
-        let all = vk::PipelineStageFlags2::ALL_COMMANDS;
-        // SAFETY: one command buffer, recorded here, submitted once and waited for before anything is freed. Every handle
-        // in it is borrowed for `'a`, which ends after this function.
+        let wanted: Vec<Vec<PipelineKey>> = passes.iter().map(|pass| pass.pipelines.clone()).collect();
+        let keys: Vec<&PipelineKey> = wanted.iter().flatten().collect();
+        // SAFETY: command buffers that are recorded here, submitted once and waited for before anything is freed. Every
+        // handle in them is borrowed for `'a`, which ends after this function.
         unsafe {
             let raw = &device.raw;
-            let pool =
+            let info =
                 vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(queries.max(1));
-            let pool = raw.create_query_pool(&pool, None).context("creating timestamps")?;
-            let info = vk::CommandBufferAllocateInfo::default()
-                .command_pool(device.commands)
-                .level(vk::CommandBufferLevel::PRIMARY)
-                .command_buffer_count(1);
-            let commands = raw.allocate_command_buffers(&info).context("allocating a command buffer")?[0];
-            let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-            raw.begin_command_buffer(commands, &begin).context("recording a frame")?;
-            raw.cmd_reset_query_pool(commands, pool, 0, queries.max(1));
-            for (index, (pass, barriers)) in passes.into_iter().zip(&barriers).enumerate() {
-                record_barriers(&device, commands, barriers, &targets, without_barriers);
-                label(&device, commands, Some(&pass.name));
-                if timed {
-                    raw.cmd_write_timestamp2(commands, all, pool, 2 * index as u32);
-                    // lavapipe takes a timestamp only when it next flushes, which would be after a dispatch that it runs at
-                    // once (measured: 0.05 ms for a tone map of 7.5 ms). A barrier flushes; one between no stages
-                    // is no dependency, so it hides no hazard from validation and costs nothing on a GPU.
-                    let nothing = [vk::MemoryBarrier2::default()];
-                    raw.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().memory_barriers(&nothing));
+            let pool = raw.create_query_pool(&info, None).context("creating timestamps")?;
+            let mut used = vec![begin(&device)?];
+            raw.cmd_reset_query_pool(used[0], pool, 0, queries.max(1));
+            let recorded = device.with_pipelines(&keys, |pipelines| {
+                for (index, (pass, barriers)) in passes.into_iter().zip(&barriers).enumerate() {
+                    // Validation sees hazards within a command buffer alone: it gets all passes in one.
+                    if !device.validates() && !pipelines.ready(&wanted[index]) {
+                        submit(&device, used[used.len() - 1])?;
+                        used.push(begin(&device)?);
+                    }
+                    let made = pipelines.wait_for(&wanted[index])?;
+                    let commands = used[used.len() - 1];
+                    record_barriers(&device, commands, barriers, &targets, without_barriers);
+                    label(&device, commands, Some(&pass.name));
+                    if timed {
+                        raw.cmd_write_timestamp2(commands, ALL, pool, 2 * index as u32);
+                        // lavapipe takes a timestamp only when it next flushes, which would be after a dispatch that it
+                        // runs at once (measured: 0.05 ms for a tone map of 7.5 ms). A barrier flushes; one between no
+                        // stages is no dependency, so it hides no hazard from validation and costs nothing on a GPU.
+                        let nothing = [vk::MemoryBarrier2::default()];
+                        raw.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().memory_barriers(&nothing));
+                    }
+                    (pass.record)(&device, commands, &made);
+                    if timed {
+                        raw.cmd_write_timestamp2(commands, ALL, pool, 2 * index as u32 + 1);
+                    }
+                    label(&device, commands, None);
                 }
-                (pass.record)(&device, commands);
-                if timed {
-                    raw.cmd_write_timestamp2(commands, all, pool, 2 * index as u32 + 1);
-                }
-                label(&device, commands, None);
-            }
-            raw.end_command_buffer(commands).context("recording a frame")?;
-
-            let done = device.submitted.fetch_add(1, Ordering::Relaxed) + 1;
-            let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
-            let signals = [vk::SemaphoreSubmitInfo::default().semaphore(device.timeline).value(done).stage_mask(all)];
-            let submit = vk::SubmitInfo2::default().command_buffer_infos(&buffers).signal_semaphore_infos(&signals);
-            raw.queue_submit2(device.queue, &[submit], vk::Fence::null()).context("submitting a frame")?;
-            let (semaphores, values) = ([device.timeline], [done]);
+                submit(&device, used[used.len() - 1])
+            });
+            // What has been submitted is waited for also where the rest could not be.
+            let (semaphores, values) = ([device.timeline], [device.submitted.load(Ordering::Relaxed)]);
             let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
             raw.wait_semaphores(&wait, u64::MAX)
                 .with_context(|| format!("waiting for a frame of passes {}", names.join(", ")))?;
+            recorded?;
 
             let mut ticks = vec![0_u64; queries as usize];
             if timed {
                 let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
                 raw.get_query_pool_results(pool, 0, &mut ticks, flags).context("reading timestamps")?;
             }
-            raw.free_command_buffers(device.commands, &[commands]);
+            raw.free_command_buffers(device.commands, &used);
             raw.destroy_query_pool(pool, None);
             let period = f64::from(device.limits.timestamp_period) * 1e-6;
             Ok(names
@@ -571,6 +583,38 @@ impl<'a> Frame<'a> {
                 .collect())
         }
     }
+}
+
+const ALL: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::ALL_COMMANDS;
+
+/// A command buffer that is being recorded.
+unsafe fn begin(device: &Device) -> Result<vk::CommandBuffer> {
+    let info = vk::CommandBufferAllocateInfo::default()
+        .command_pool(device.commands)
+        .level(vk::CommandBufferLevel::PRIMARY)
+        .command_buffer_count(1);
+    let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+    // SAFETY: valid infos.
+    unsafe {
+        let commands = device.raw.allocate_command_buffers(&info).context("allocating a command buffer")?[0];
+        device.raw.begin_command_buffer(commands, &begin).context("recording a frame")?;
+        Ok(commands)
+    }
+}
+
+/// Ends a command buffer and hands it to the device; the timeline counts when it is done.
+unsafe fn submit(device: &Device, commands: vk::CommandBuffer) -> Result<()> {
+    let done = device.submitted.load(Ordering::Relaxed) + 1;
+    let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
+    let signals = [vk::SemaphoreSubmitInfo::default().semaphore(device.timeline).value(done).stage_mask(ALL)];
+    let info = vk::SubmitInfo2::default().command_buffer_infos(&buffers).signal_semaphore_infos(&signals);
+    // SAFETY: the command buffer is recording; whoever calls waits for it before anything it uses is freed.
+    unsafe {
+        device.raw.end_command_buffer(commands).context("recording a frame")?;
+        device.raw.queue_submit2(device.queue, &[info], vk::Fence::null()).context("submitting a frame")?;
+    }
+    device.submitted.store(done, Ordering::Relaxed);
+    Ok(())
 }
 
 fn attachment<'x>(view: vk::ImageView, layout: vk::ImageLayout, clear: bool) -> vk::RenderingAttachmentInfo<'x> {

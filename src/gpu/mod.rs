@@ -13,6 +13,7 @@ mod frame;
 mod memory;
 mod pipeline;
 mod shader;
+mod specialize;
 pub mod sync;
 
 pub use access::Access;
@@ -22,3 +23,4 @@ pub use device::{Candidate, Created, Device, DeviceChoice, DeviceInfo, Message, 
 pub use frame::{ColorTarget, DepthTarget, Draw, Frame, PassTime, Raster, VertexStream};
 pub use memory::{Buffer, Image, ImageDesc, Place};
 pub use shader::{Binding, BindingKind, Program, Stage, VertexInput};
+pub use specialize::specialized;

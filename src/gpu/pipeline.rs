@@ -1,25 +1,53 @@
 //! Pipelines, layouts and samplers, made once per distinct description.
 
+use std::collections::HashMap;
+use std::sync::OnceLock;
+use std::time::Instant;
+
 use anyhow::{Context as _, Result};
 use ash::vk;
 
 use super::cache::{Layout, PipelineKey, SamplerDesc};
 use super::device::{Device, lock};
 use super::shader::Program;
+use super::specialize::specialized;
+
+/// Pipelines, some of which are still being made.
+pub(super) struct Pipelines<'k> {
+    slots: HashMap<&'k PipelineKey, OnceLock<Result<vk::Pipeline, vk::Result>>>,
+}
+
+impl Pipelines<'_> {
+    /// Whether all of `keys` are there.
+    pub(super) fn ready(&self, keys: &[PipelineKey]) -> bool {
+        keys.iter().all(|key| self.slots[key].get().is_some())
+    }
+
+    /// The pipelines of `keys`, as soon as they are there.
+    ///
+    /// # Errors
+    /// When the driver refuses one.
+    pub(super) fn wait_for(&self, keys: &[PipelineKey]) -> Result<Vec<vk::Pipeline>> {
+        let one = |key: &PipelineKey| {
+            self.slots[key].wait().with_context(|| format!("creating pipeline \"{}\"", key.program.name))
+        };
+        keys.iter().map(one).collect()
+    }
+}
 
 impl Device {
-    /// (pipelines made, bytes of SPIR-V in them).
+    /// (pipelines made, bytes of SPIR-V that ship for them, milliseconds that making them took).
     #[must_use]
-    pub fn pipelines(&self) -> (usize, usize) {
+    pub fn pipelines(&self) -> (usize, usize, f64) {
         let caches = lock(&self.caches);
-        (caches.pipelines.len(), caches.spirv_bytes)
+        (caches.pipelines.len(), caches.spirv_bytes, caches.making_ms)
     }
 
     /// Every pipeline by program name and specialization constants, sorted.
     #[must_use]
     pub fn pipeline_list(&self) -> Vec<(&'static str, Vec<(u32, u32)>)> {
         let mut list: Vec<_> =
-            lock(&self.caches).pipelines.keys().map(|key| (key.program, key.constants.clone())).collect();
+            lock(&self.caches).pipelines.keys().map(|key| (key.program.name, key.constants.clone())).collect();
         list.sort();
         list
     }
@@ -78,61 +106,96 @@ impl Device {
         Ok(layout)
     }
 
-    pub(super) fn pipeline(&self, program: &'static Program, key: PipelineKey) -> Result<vk::Pipeline> {
-        if let Some(&pipeline) = lock(&self.caches).pipelines.get(&key) {
-            return Ok(pipeline);
+    /// Runs `meanwhile` while the pipelines of `keys` that do not exist yet are made on another thread, in their order.
+    ///
+    /// One thread, not several: docs/decisions/specialization.md.
+    ///
+    /// # Errors
+    /// Those of `meanwhile`, which is told of those of the driver when it asks for a pipeline.
+    pub(super) fn with_pipelines<T>(
+        &self,
+        keys: &[&PipelineKey],
+        meanwhile: impl FnOnce(&Pipelines<'_>) -> Result<T>,
+    ) -> Result<T> {
+        let mut pipelines = Pipelines { slots: HashMap::new() };
+        let mut missing = Vec::new();
+        for &key in keys {
+            pipelines.slots.entry(key).or_insert_with(|| {
+                let made = lock(&self.caches).pipelines.get(key).copied();
+                if made.is_none() {
+                    missing.push(key);
+                }
+                made.map_or_else(OnceLock::new, |pipeline| OnceLock::from(Ok(pipeline)))
+            });
         }
-        let layout = self.layout(program)?;
-        let entries: Vec<_> = key
-            .constants
-            .iter()
-            .enumerate()
-            .map(|(i, &(id, _))| vk::SpecializationMapEntry { constant_id: id, offset: 4 * i as u32, size: 4 })
-            .collect();
-        let values: Vec<u32> = key.constants.iter().map(|&(_, value)| value).collect();
-        let special = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&values));
+        if missing.is_empty() {
+            return meanwhile(&pipelines);
+        }
+        let result = std::thread::scope(|scope| {
+            scope.spawn(|| {
+                let start = Instant::now();
+                for &key in &missing {
+                    let _ = pipelines.slots[key].set(self.make(key));
+                }
+                lock(&self.caches).making_ms += start.elapsed().as_secs_f64() * 1e3;
+            });
+            meanwhile(&pipelines)
+        });
+        let mut caches = lock(&self.caches);
+        for key in missing {
+            if let Some(&Ok(pipeline)) = pipelines.slots[key].get() {
+                self.note("pipeline", key.program.name, 0);
+                caches.spirv_bytes += key.program.spirv_bytes();
+                caches.pipelines.insert(key.clone(), pipeline);
+            }
+        }
+        result
+    }
+
+    fn make(&self, key: &PipelineKey) -> Result<vk::Pipeline, vk::Result> {
         let mut modules = Vec::new();
-        let pipeline = self.build(program, &key, layout, &special, &mut modules);
+        let pipeline = self.build(key, &mut modules);
         for module in modules {
             // SAFETY: modules are only needed while pipelines are created.
             unsafe { self.raw.destroy_shader_module(module, None) };
         }
-        let pipeline = pipeline.with_context(|| format!("creating pipeline \"{}\"", program.name))?;
-        self.note("pipeline", program.name, 0);
-        self.name(pipeline, program.name);
-        let mut caches = lock(&self.caches);
-        caches.spirv_bytes += program.spirv_bytes();
-        caches.pipelines.insert(key, pipeline);
-        Ok(pipeline)
+        self.name(pipeline?, key.program.name);
+        pipeline
     }
 
-    fn build(
-        &self,
-        program: &'static Program,
-        key: &PipelineKey,
-        layout: Layout,
-        special: &vk::SpecializationInfo<'_>,
-        modules: &mut Vec<vk::ShaderModule>,
-    ) -> Result<vk::Pipeline> {
+    /// Hands SPIR-V to the driver and takes it back, for tests of what validation says.
+    ///
+    /// # Errors
+    /// When the driver refuses it.
+    #[doc(hidden)]
+    pub fn try_module(&self, words: &[u32]) -> Result<()> {
+        let info = vk::ShaderModuleCreateInfo::default().code(words);
+        // SAFETY: a valid create info; nobody else has the module.
+        unsafe {
+            let module = self.raw.create_shader_module(&info, None).context("creating a shader module")?;
+            self.raw.destroy_shader_module(module, None);
+        }
+        Ok(())
+    }
+
+    fn build(&self, key: &PipelineKey, modules: &mut Vec<vk::ShaderModule>) -> Result<vk::Pipeline, vk::Result> {
+        let program = key.program;
+        // Made when the pass was described.
+        let layout = lock(&self.caches).layouts[program.name].pipeline;
         let mut stages = Vec::new();
         for stage in program.stages {
-            let info = vk::ShaderModuleCreateInfo::default().code(stage.words);
+            let words = specialized(stage.words, &key.constants);
+            let info = vk::ShaderModuleCreateInfo::default().code(&words);
             // SAFETY: the words come from glslang.
             let module = unsafe { self.raw.create_shader_module(&info, None) }?;
             modules.push(module);
-            stages.push(
-                vk::PipelineShaderStageCreateInfo::default()
-                    .stage(stage.flag)
-                    .module(module)
-                    .name(c"main")
-                    .specialization_info(special),
-            );
+            stages.push(vk::PipelineShaderStageCreateInfo::default().stage(stage.flag).module(module).name(c"main"));
         }
         let Some(raster) = &key.raster else {
-            let info = vk::ComputePipelineCreateInfo::default().stage(stages[0]).layout(layout.pipeline);
+            let info = vk::ComputePipelineCreateInfo::default().stage(stages[0]).layout(layout);
             // SAFETY: a valid create info whose pointees outlive the call.
             let made = unsafe { self.raw.create_compute_pipelines(vk::PipelineCache::null(), &[info], None) };
-            return made.map(|p| p[0]).map_err(|(_, error)| error.into());
+            return made.map(|p| p[0]).map_err(|(_, error)| error);
         };
         let formats = [
             vk::Format::UNDEFINED,
@@ -202,10 +265,10 @@ impl Device {
             .depth_stencil_state(&depth)
             .color_blend_state(&blend)
             .dynamic_state(&dynamic)
-            .layout(layout.pipeline)
+            .layout(layout)
             .push_next(&mut rendering);
         // SAFETY: a valid create info whose pointees outlive the call.
         let made = unsafe { self.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
-        made.map(|p| p[0]).map_err(|(_, error)| error.into())
+        made.map(|p| p[0]).map_err(|(_, error)| error)
     }
 }

@@ -21,6 +21,21 @@ pub struct Program {
     pub local_size: [u32; 3],
 }
 
+/// Programs are told apart by their names.
+impl PartialEq for Program {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl Eq for Program {}
+
+impl std::hash::Hash for Program {
+    fn hash<H: std::hash::Hasher>(&self, state: &mut H) {
+        self.name.hash(state);
+    }
+}
+
 impl Program {
     /// Bytes of SPIR-V that ship.
     #[must_use]
