@@ -166,9 +166,8 @@ void compensate(inout Surface s) {
     }
 }
 
-// Light from `range`, and with `all_around` what does not come from lights as well.
+// Light from `range`, and with `all_around` what does not come from lights as well; of a surface that is compensated.
 vec3 radiance_to_eye(Surface s, ivec2 pixel, uint tiles_across, LightRange range, bool all_around) {
-    compensate(s);
     vec3 result = punctual_light(s, pixel, tiles_across, range);
     vec3 around = CLEARCOAT ? s.emissive * under_coat(s) : s.emissive;
     if (AMBIENT || REFLECTION) around += environment_light(s);

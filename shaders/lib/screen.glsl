@@ -96,7 +96,6 @@ vec3 screen_instead(Surface s, vec3 n, float alpha, vec3 share) {
 
 // What `environment_light` mirrors, corrected where the surface is smooth and the mirrored ray meets something.
 vec3 mirrored_on_screen(Surface s, bool wanted) {
-    compensate(s);
     float shown = wanted && !s.unlit ? s.occlusion : 0.0;
     float by_base = s.roughness <= ROUGHEST_MIRROR ? (CLEARCOAT ? under_coat(s) : 1.0) * shown : 0.0;
     vec3 result = screen_instead(s, s.n, s.alpha, mirrored_by_base(s) * by_base);

@@ -10,9 +10,9 @@ layout(constant_id = 10) const uint BRDF = 2;    // 0 blinn-phong, 1 blinn-phong
 layout(constant_id = 11) const uint FRESNEL = 0; // 0 schlick, 1 exact
 layout(constant_id = 12) const bool CLEARCOAT = false;
 layout(constant_id = 19) const bool CONDUCTORS = false; // some metal is given by its n and κ
-// Smooth enough surfaces are mirrored by rays, rougher ones by the prefiltered environment (knob `reflection`).
+// Smooth enough surfaces are mirrored by rays, rougher ones by the prefiltered environment (knobs `reflection`, `lobes`).
 layout(constant_id = 20) const bool MIRROR_RAYS = false;
-const float ROUGHEST_MIRROR = 0.2;
+layout(constant_id = 21) const float ROUGHEST_MIRROR = 0.0;
 
 struct Surface {
     vec3 p_rel;

@@ -113,6 +113,7 @@ void main() {
         if (CLEARCOAT) passes *= under_coat(s);
         s.diffuse *= 1.0 - transmits;
         float alpha = blue_alpha.y;
+        compensate(s);
         vec3 shown = radiance_to_eye(s, pixel, tiles_across, all, true);
         // The nearest one alone: a march may take as many steps as the picture is wide.
         if (MIRRORS) shown = not_negative(shown + mirrored_on_screen(s, nearest));

@@ -206,6 +206,16 @@ bool mirrored_by_ray(HitSurface hit, Boundary boundary) {
     return hit.s.base_traced || (boundary.solid && boundary.here != 0);
 }
 
+// What masking leaves along r, mirrored at a half vector drawn for v: nothing below the surface, which is n's, or below its
+// triangle, which is n_triangle's.
+float left_of_lobe(vec3 n, vec3 v, vec3 r, vec3 n_triangle, float alpha) {
+    float cos_r = dot(r, n);
+    return dot(r, n_triangle) > 0.0 && cos_r > 0.0 ? unmasked(dot(n, v), cos_r, alpha) : 0.0;
+}
+
+// Of the numbers that random points are drawn by, those of coats.
+const uint COAT_EVENT = 0x80000000u;
+
 // Sends what a ray along `direction` is split into at a surface.
 void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixel) {
     Surface s = hit.s;
@@ -235,13 +245,23 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     vec3 weight = boundary.hidden || s.unlit ? vec3(0.0) : ray.throughput * hit.coverage;
 
     // The coat.
+    uint event = reflection_rays + refraction_rays;
     if (CLEARCOAT) {
-        vec3 r = reflect_ray(direction, s.n_coat).R;
+        bool rough = ROUGH && s.clearcoat_roughness > MIN_ROUGHNESS;
+        vec3 h = s.n_coat;
+        if (ROUGH) {
+            vec2 u = random_point(pixel, event | COAT_EVENT, trace_terms.sample_index, trace_terms.samples);
+            h = rough ? half_vector(s.n_coat, s.v, s.clearcoat_alpha, u) : h;
+        }
+        vec3 r = reflect_ray(direction, h).R;
+        float masking = rough ? left_of_lobe(s.n_coat, s.v, r, hit.n, s.clearcoat_alpha) : 1.0;
+        float f = s.clearcoat * schlick(vec3(0.04), 1.0, clamp(dot(h, s.v), 0.0, 1.0)).x;
         next.direction = on_side(r, hit.n);
         next.origin = ray_origin(s.p_bvh, hit.n, s.v);
         next.media = ray.media;
         next.events = count | BY_REFLECTION << 8;
-        next.throughput = s.coat_traced ? weight * (1.0 - under_coat(s)) : vec3(0.0);
+        next.throughput = s.coat_traced ? weight * (f * masking) : vec3(0.0);
+        next.spread = ray.spread + (rough ? s.clearcoat_alpha : 0.0);
         send(next);
         weight *= under_coat(s);
     }
@@ -250,7 +270,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     bool rough = ROUGH && s.roughness > MIN_ROUGHNESS && !(boundary.solid && n1 == n2);
     vec3 h = s.n;
     if (ROUGH) {
-        vec2 u = random_point(pixel, reflection_rays + refraction_rays, trace_terms.sample_index, trace_terms.samples);
+        vec2 u = random_point(pixel, event, trace_terms.sample_index, trace_terms.samples);
         h = rough ? half_vector(s.n, s.v, s.alpha, u) : h;
     }
     float cos_h = clamp(dot(h, s.v), 0.0, 1.0);
@@ -266,8 +286,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     // The mirror image.
     vec3 r = reflect_ray(direction, h).R;
     float cos_r = dot(r, s.n);
-    bool above = dot(r, hit.n) > 0.0;
-    float masking = rough ? (above && cos_r > 0.0 ? unmasked(cos_v, cos_r, s.alpha) : 0.0) : 1.0;
+    float masking = rough ? left_of_lobe(s.n, s.v, r, hit.n, s.alpha) : 1.0;
     next.direction = on_side(r, hit.n);
     next.origin = ray_origin(s.p_bvh, hit.n, s.v);
     next.media = ray.media;
@@ -320,6 +339,8 @@ void main() {
     ray.spread = camera.orthographic != 0 ? 0.0 : trace_terms.pixel_angle;
     ray.events = 0x200u;
     float cone = camera.orthographic != 0 ? trace_terms.pixel_angle : trace_terms.pixel_angle * length(hit.s.p_rel);
+
+    compensate(hit.s);
     Boundary boundary = boundary_at(hit, ray.media, ray.direction);
     split(hit, boundary, ray, cone, uvec2(pixel));
     bool more = sent_now > 0;
@@ -352,6 +373,7 @@ void main() {
                 cone = ray.width + ray.spread * found.t;
                 hit = hit_surface(point, ray.direction, cone * exp2(trace_terms.lod_bias));
                 hit.s.media = ray.media;
+                compensate(hit.s);
                 boundary = boundary_at(hit, ray.media, ray.direction);
                 Surface s = hit.s;
                 s.diffuse *= 1.0 - hit.transmits;

@@ -39,6 +39,7 @@ void main() {
         uvec4 beyond = primary.hit.front ? entered(s.media, medium) : left(s.media, medium);
         hidden = present_medium(beyond) == present_medium(s.media);
     }
+    compensate(s);
     uint tiles_across = (camera.size.x + TILE - 1) / TILE;
     vec3 result = radiance_to_eye(s, pixel, tiles_across, range, first_dispatch != 0) * left_at_eye(s);
     if (hidden) result = vec3(0.0);

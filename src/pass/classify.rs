@@ -170,6 +170,7 @@ pub fn classify_rays<'a>(
     let constants = ray_program::Constants {
         clearcoat: lighting.plan.clearcoat,
         mirror_rays: calls.mirrors,
+        roughest_mirror: lighting.plan.roughest_mirror,
         transmissive: calls.transmissive,
         ..Default::default()
     };

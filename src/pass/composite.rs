@@ -69,6 +69,7 @@ fn lay_over<'a>(
         conductors: plan.conductors,
         // What is mirrored here is the environment: rays are sent from the G-buffer alone.
         mirror_rays: false,
+        roughest_mirror: plan.roughest_mirror,
         directional_lights: plan.directional_lights,
         local_lights: lighting.unlisted_lights(),
         ambient: plan.ambient,

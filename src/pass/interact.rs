@@ -70,6 +70,7 @@ fn follow<'a>(
         clearcoat: plan.clearcoat,
         conductors: plan.conductors,
         mirror_rays: with.mirrors,
+        roughest_mirror: plan.roughest_mirror,
         directional_lights: plan.directional_lights,
         local_lights: plan.local_lights,
         ambient: plan.ambient,

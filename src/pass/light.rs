@@ -35,6 +35,7 @@ pub fn light<'a>(
         clearcoat: plan.clearcoat,
         conductors: plan.conductors,
         mirror_rays: planned.is_some_and(|rays| rays.mirrors),
+        roughest_mirror: plan.roughest_mirror,
         directional_lights: plan.directional_lights,
         local_lights: lighting.unlisted_lights(),
         tile_words: lighting.tiles.words(),

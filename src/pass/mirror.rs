@@ -86,6 +86,7 @@ pub fn mirror<'a>(
         arithmetic: lighting.knobs.index("arithmetic"),
         clearcoat: plan.clearcoat,
         conductors: plan.conductors,
+        roughest_mirror: plan.roughest_mirror,
         ambient: plan.ambient,
         reflection: plan.reflection,
         traversal: rays.constants.traversal,

@@ -48,6 +48,13 @@ pub static KNOBS: &[Knob] = &[
         about: "what a surface mirrors (F4): nothing, what is infinitely far, what is on the screen, the scene",
     },
     Knob {
+        name: "lobes",
+        rungs: &["0.2", "0.5", "1"],
+        unbuilt: &[],
+        presets: ["0.2", "0.2", "1"],
+        about: "roughness up to which rays sample what a surface mirrors, one direction of its lobe for each of the samples (B6)",
+    },
+    Knob {
         name: "refraction",
         rungs: &["off", "screen", "ray"],
         unbuilt: &[],
@@ -207,6 +214,15 @@ impl Knobs {
         1 << self.index("interfaces")
     }
 
+    /// Perceptual roughness up to which rays sample what a surface mirrors.
+    ///
+    /// # Panics
+    /// When the table has a rung that is no number: our mistake.
+    #[must_use]
+    pub fn roughest_lobe(&self) -> f32 {
+        self.rung("lobes").parse().expect("a number")
+    }
+
     /// Steps of each segment through a medium that varies; 0: none is marched.
     #[must_use]
     pub fn march_steps(&self) -> u32 {
@@ -236,6 +252,10 @@ mod tests {
         for rung in ["1", "2", "4", "8", "16", "32"] {
             knobs.set(&format!("interfaces={rung}")).unwrap();
             assert_eq!(knobs.interfaces().to_string(), rung);
+        }
+        for rung in ["0.2", "0.5", "1"] {
+            knobs.set(&format!("lobes={rung}")).unwrap();
+            assert_eq!(knobs.roughest_lobe().to_string(), rung);
         }
         assert_eq!(knobs.march_steps(), 0);
         for steps in [4, 8, 16, 32, 64] {

@@ -43,6 +43,9 @@ pub struct Plan {
     pub rays: Option<Rays>,
     /// What is looked up in the picture itself.
     pub screen: Screen,
+    /// Perceptual roughness up to which surfaces are mirrored by rays or on the screen, and not by the prefiltered
+    /// environment.
+    pub roughest_mirror: f32,
     /// Samples per pixel.
     pub samples: u32,
     /// Every effect with its reason.
@@ -56,7 +59,7 @@ pub struct Plan {
 pub struct Rays {
     /// Lights are looked for by rays.
     pub shadows: bool,
-    /// Smooth surfaces mirror the scene.
+    /// Surfaces up to [`Plan::roughest_mirror`] mirror the scene.
     pub mirrors: bool,
     /// Transmissive surfaces refract; they are in the G-buffer.
     pub refraction: bool,
@@ -141,9 +144,8 @@ pub fn mirrors(material: &Material) -> bool {
     material.metallic > 0.0 || material.specular > 0.0
 }
 
-/// Perceptual roughness up to which surfaces are mirrored by rays or on the screen: `ROUGHEST_MIRROR` of shaders/lib/surface.glsl. A texture
-/// only lowers the factor.
-const ROUGHEST_MIRROR: f32 = 0.2;
+/// Perceptual roughness up to which surfaces are mirrored on the screen.
+const ROUGHEST_ON_SCREEN: f32 = 0.2;
 
 fn has_layers(material: &Material) -> bool {
     [
@@ -231,14 +233,17 @@ impl Plan {
             false => Err("there is no environment"),
         };
         let reflection = decide("mirrored environment", "reflection", environment(), knobs.rung("reflection") != "off");
+        // A texture only lowers the factor.
+        let roughest_mirror =
+            if knobs.rung("reflection") == "ray" { knobs.roughest_lobe() } else { ROUGHEST_ON_SCREEN };
         let smooth = |m: &Material| {
-            let base = mirrors(m) && (m.roughness <= ROUGHEST_MIRROR || m.metallic_roughness_texture.is_some());
+            let base = mirrors(m) && (m.roughness <= roughest_mirror || m.metallic_roughness_texture.is_some());
             let coat = m.clearcoat > 0.0
-                && (m.clearcoat_roughness <= ROUGHEST_MIRROR || m.clearcoat_roughness_texture.is_some());
+                && (m.clearcoat_roughness <= roughest_mirror || m.clearcoat_roughness_texture.is_some());
             !m.unlit && (base || coat)
         };
         let cause =
-            material(find(&smooth), &|m| match (mirrors(m) && m.roughness <= ROUGHEST_MIRROR, m.clearcoat > 0.0) {
+            material(find(&smooth), &|m| match (mirrors(m) && m.roughness <= roughest_mirror, m.clearcoat > 0.0) {
                 (true, _) => format!("has roughness {}", m.roughness),
                 (false, true) => format!("has a coat of roughness {}", m.clearcoat_roughness),
                 (false, false) => "has a roughness texture".to_owned(),
@@ -289,7 +294,9 @@ impl Plan {
                 masked,
                 filters: masked || any(&|m| is_see_through(m, false)),
                 rough: any(&|m| {
-                    m.roughness > 0.0 && ((mirror_rays && smooth(m)) || (refraction && m.transmission > 0.0))
+                    let coat = m.clearcoat > 0.0 && m.clearcoat_roughness > 0.0;
+                    (mirror_rays && smooth(m) && (m.roughness > 0.0 || coat))
+                        || (refraction && m.transmission > 0.0 && m.roughness > 0.0)
                 }),
                 absorption: knobs.index("absorption").min(PATH),
                 march: if marched { march } else { March::default() },
@@ -318,6 +325,7 @@ impl Plan {
             shadow_maps,
             rays,
             screen,
+            roughest_mirror,
             samples: knobs.samples(),
             effects,
             warnings: left_out(&used, knobs, refracts, refraction, shadow_maps),
