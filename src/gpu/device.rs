@@ -504,6 +504,11 @@ impl Device {
     /// Whether the driver ends all loops of an invocation, in silence, after 65,535 evaluations of their heads: lavapipe.
     #[must_use]
     pub fn limits_loops(&self) -> bool {
+        self.is_software()
+    }
+
+    /// Whether the device is the processor itself: its memory is the process's own.
+    pub(super) fn is_software(&self) -> bool {
         self.info.kind == "cpu"
     }
 

@@ -32,6 +32,46 @@ pub struct Buffer {
     device: Arc<Device>,
 }
 
+/// Memory for a resource; `linear` for buffers.
+fn allocate(
+    device: &Device,
+    name: &str,
+    requirements: vk::MemoryRequirements,
+    location: MemoryLocation,
+    linear: bool,
+) -> Result<Allocation> {
+    let allocation = lock(&device.allocator).allocate(&AllocationCreateDesc {
+        name,
+        requirements,
+        location,
+        linear,
+        allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+    })?;
+    #[cfg(target_os = "linux")]
+    if device.is_software() {
+        prefer_large_pages(&allocation);
+    }
+    Ok(allocation)
+}
+
+/// Asks Linux for pages of 2 MiB under the memory of a software device, from the start of the block that an allocation lies
+/// in to its end: docs/decisions/large-pages.md.
+#[cfg(target_os = "linux")]
+fn prefer_large_pages(allocation: &Allocation) {
+    let Some(start) = allocation.mapped_ptr() else { return };
+    let page = rustix::param::page_size();
+    let first = (start.as_ptr() as usize - allocation.offset() as usize) / page * page;
+    let end = (start.as_ptr() as usize + allocation.size() as usize).next_multiple_of(page);
+    // SAFETY: advice changes nothing but how fast memory is. A kernel that does not take it is none the worse.
+    let _ = unsafe {
+        rustix::mm::madvise(
+            std::ptr::with_exposed_provenance_mut(first),
+            end - first,
+            rustix::mm::Advice::LinuxHugepage,
+        )
+    };
+}
+
 impl Buffer {
     /// A buffer of `bytes` bytes (at least 16, so that an empty list still binds), usable for everything a shader or
     /// copy does.
@@ -89,14 +129,7 @@ impl Buffer {
         unsafe {
             let raw = device.raw.create_buffer(&info, None).with_context(creating)?;
             let requirements = device.raw.get_buffer_memory_requirements(raw);
-            let allocation = lock(&device.allocator).allocate(&AllocationCreateDesc {
-                name,
-                requirements,
-                location,
-                linear: true,
-                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
-            });
-            let allocation = match allocation {
+            let allocation = match allocate(device, name, requirements, location, true) {
                 Ok(allocation) => allocation,
                 Err(error) => {
                     device.raw.destroy_buffer(raw, None);
@@ -248,14 +281,7 @@ impl Image {
         unsafe {
             let raw = device.raw.create_image(&info, None).with_context(creating)?;
             let requirements = device.raw.get_image_memory_requirements(raw);
-            let allocation = lock(&device.allocator).allocate(&AllocationCreateDesc {
-                name,
-                requirements,
-                location: MemoryLocation::GpuOnly,
-                linear: false,
-                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
-            });
-            let allocation = match allocation {
+            let allocation = match allocate(device, name, requirements, MemoryLocation::GpuOnly, false) {
                 Ok(allocation) => allocation,
                 Err(error) => {
                     device.raw.destroy_image(raw, None);

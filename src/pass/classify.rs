@@ -7,7 +7,7 @@ use anyhow::Result;
 
 use super::gbuffer::GBuffer;
 use super::lighting::Lighting;
-use super::rows::rows_of;
+use super::rows::{leap, rows_of};
 use crate::gpu::{Buffer, Device, Frame, Image, Place};
 use crate::shader::{classify, classify_fragments, classify_rays as ray_program};
 
@@ -59,10 +59,10 @@ pub fn classify_fragments<'a>(
     frame.copy_buffer("reset fragment work size", &list.empty, &list.sizes, WORK_BYTES);
     let bind = classify_fragments::Bind { heads, sizes: &list.sizes, tiles: &list.tiles };
     let tiles = list.width.div_ceil(TILE) * (rows[1] - rows[0]).div_ceil(TILE);
-    let groups = rows_of(tiles.div_ceil(classify_fragments::PROGRAM.local_size[0]));
-    let push = [list.width, rows[0], rows[1]];
+    let groups = tiles.div_ceil(classify_fragments::PROGRAM.local_size[0]);
+    let push = [list.width, rows[0], rows[1], leap(groups)];
     let constants = classify_fragments::Constants {}.words();
-    frame.compute("classify fragment tiles", &bind, constants, bytemuck::cast_slice(&push), groups)
+    frame.compute("classify fragment tiles", &bind, constants, bytemuck::cast_slice(&push), rows_of(groups))
 }
 
 /// Lists of tiles and the sizes of the dispatches over them.
@@ -107,9 +107,10 @@ pub fn classify<'a>(frame: &mut Frame<'a>, gbuffer: &'a GBuffer, lists: &'a Work
         background_tiles: &lists.background,
     };
     let tiles = lists.size[0].div_ceil(TILE) * lists.size[1].div_ceil(TILE);
-    let groups = rows_of(tiles.div_ceil(classify::PROGRAM.local_size[0]));
+    let groups = tiles.div_ceil(classify::PROGRAM.local_size[0]);
+    let push = [lists.size[0], lists.size[1], leap(groups)];
     let constants = classify::Constants {}.words();
-    frame.compute("classify tiles", &bind, constants, bytemuck::cast_slice(&lists.size), groups)
+    frame.compute("classify tiles", &bind, constants, bytemuck::cast_slice(&push), rows_of(groups))
 }
 
 /// Which surfaces are looked for.
@@ -166,7 +167,7 @@ pub fn classify_rays<'a>(
     };
     let size = lighting.size;
     let tiles = size[0].div_ceil(TILE) * size[1].div_ceil(TILE);
-    let groups = rows_of(tiles.div_ceil(ray_program::PROGRAM.local_size[0]));
+    let groups = tiles.div_ceil(ray_program::PROGRAM.local_size[0]);
     let constants = ray_program::Constants {
         clearcoat: lighting.plan.clearcoat,
         mirror_rays: calls.mirrors,
@@ -174,5 +175,6 @@ pub fn classify_rays<'a>(
         transmissive: calls.transmissive,
         ..Default::default()
     };
-    frame.compute("classify ray tiles", &bind, constants.words(), bytemuck::cast_slice(&size), groups)
+    let push = [size[0], size[1], leap(groups)];
+    frame.compute("classify ray tiles", &bind, constants.words(), bytemuck::cast_slice(&push), rows_of(groups))
 }
