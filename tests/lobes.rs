@@ -8,6 +8,7 @@ mod made;
 
 use etalon::frame::Settings;
 use etalon::optics::brdf;
+use etalon::scene::environment::Environment;
 use etalon::scene::{Material, Scene};
 use etalon::study::shape::Shape;
 use glam::{DAffine3, DVec3};
@@ -144,5 +145,21 @@ fn what_is_rougher_is_left_to_the_environment() {
         let scene = before_a_card(metal(roughness));
         let film = gpu.film(&scene, settings(&[lobes, "samples=1"]));
         assert_eq!(film.rgba.iter().any(|pixel| pixel[0] > 0.0), glows, "roughness {roughness}, {lobes}");
+    }
+}
+
+/// The table of directional reflectance at its edge: the roughest metal in a white furnace, without rays. The table's sum is
+/// good to 4e-3 (src/pass/environment.rs).
+#[test]
+fn the_roughest_metal_loses_in_a_furnace_what_the_integral_says() {
+    let gpu = Gpu::new();
+    let mut made = Made::new("furnace");
+    let white = Material { base_color: [1.0; 4], metallic: 1.0, roughness: 1.0, ..Material::default() };
+    made.add(Shape::panel(8.0, 8.0), white, DAffine3::IDENTITY);
+    made.camera(V * 10.0, DVec3::ZERO, orthographic(0.5));
+    let (_, film) = gpu.shot(&made.0, Some(&Environment::constant([1.0; 3])), settings(&["samples=1"]));
+    let expected = albedo(1.0);
+    for pixel in &film.rgba {
+        assert!((f64::from(pixel[0]) - expected).abs() < 4e-3, "{} instead of {expected}", pixel[0]);
     }
 }

@@ -121,9 +121,15 @@ vec3 environment_irradiance(vec3 n) {
     return max(e, 0.0) * environment.intensity;
 }
 
-// F0 and F90 factors of the directional reflectance of a surface's lobe.
+// F0 and F90 factors of the directional reflectance of a lobe: the table's first and last texels are 0 and 1.
+vec2 reflectance_of_lobe(float cos_v, float roughness) {
+    vec2 side = vec2(textureSize(reflectance, 0));
+    return textureLod(reflectance, (vec2(clamp(cos_v, 0.0, 1.0), roughness) * (side - 1.0) + 0.5) / side, 0.0).rg;
+}
+
+// The same of a surface's base.
 vec2 lobe_reflectance(Surface s) {
-    return textureLod(reflectance, vec2(clamp(dot(s.n, s.v), 0.0, 1.0), s.roughness), 0.0).rg;
+    return reflectance_of_lobe(dot(s.n, s.v), s.roughness);
 }
 
 // Directional reflectance of the lobe: what the base sends to the eye of the light in the mirror direction (split sum,
@@ -134,8 +140,7 @@ vec3 mirrored_by_base(Surface s) {
 }
 
 float mirrored_by_coat(Surface s) {
-    vec2 coat_at = vec2(clamp(dot(s.n_coat, s.v), 0.0, 1.0), s.clearcoat_roughness);
-    vec2 coat = textureLod(reflectance, coat_at, 0.0).rg;
+    vec2 coat = reflectance_of_lobe(dot(s.n_coat, s.v), s.clearcoat_roughness);
     return s.clearcoat * (0.04 * coat.x + coat.y);
 }
 

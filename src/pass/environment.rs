@@ -231,8 +231,9 @@ fn reflectance_table() -> Vec<Texel> {
     (0..side * side)
         .into_par_iter()
         .map(|i| {
-            let center = |i: usize| (i as f64 + 0.5) / side as f64;
-            let [a, b] = directional_reflectance(center(i % side), center(i / side));
+            // From 0 to 1 with both; of the horizon, where nothing is visible, its limit.
+            let at = |i: usize| i as f64 / (side - 1) as f64;
+            let [a, b] = directional_reflectance(at(i % side).max(1e-4), at(i / side));
             [a as f32, b as f32, 0.0, 1.0]
         })
         .collect()
