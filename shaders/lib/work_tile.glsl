@@ -33,11 +33,11 @@ uint listed_tile(uvec3 workgroup) {
     return workgroup.y * ROW + workgroup.x;
 }
 
-// The tile of `tiles` that an invocation sorts into lists, or one beyond them: workgroups go over the picture in leaps
+// The tile of `tiles` that an invocation sorts into lists, or one beyond them: workgroups go over the picture in strides
 // (src/pass/rows.rs), so that any contiguous piece of a list has tiles from everywhere.
-uint scattered_tile(uint tiles, uint leap) {
+uint scattered_tile(uint tiles, uint stride) {
     uint groups = (tiles + gl_WorkGroupSize.x - 1) / gl_WorkGroupSize.x;
     uint group = listed_tile(gl_WorkGroupID);
-    return group < groups ? group * leap % groups * gl_WorkGroupSize.x + gl_LocalInvocationID.x : tiles;
+    return group < groups ? group * stride % groups * gl_WorkGroupSize.x + gl_LocalInvocationID.x : tiles;
 }
 #endif

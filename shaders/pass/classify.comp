@@ -11,11 +11,11 @@ layout(set = 0, binding = 0, r32f) readonly uniform imageBuffer depth;
 layout(scalar, set = 0, binding = 1) buffer Sizes { WorkSize surface_size; WorkSize background_size; };
 layout(scalar, set = 0, binding = 2) writeonly buffer SurfaceTiles { uint surface_tiles[]; };
 layout(scalar, set = 0, binding = 3) writeonly buffer BackgroundTiles { uint background_tiles[]; };
-layout(push_constant, scalar) uniform Push { uvec2 size; uint leap; };
+layout(push_constant, scalar) uniform Push { uvec2 size; uint stride; };
 
 void main() {
     uvec2 tiles = (size + WORK_TILE - 1) / WORK_TILE;
-    uint tile = scattered_tile(tiles.x * tiles.y, leap);
+    uint tile = scattered_tile(tiles.x * tiles.y, stride);
     if (tile >= tiles.x * tiles.y) return;
     uvec2 first = uvec2(tile % tiles.x, tile / tiles.x) * WORK_TILE;
     uvec2 last = min(first + WORK_TILE, size);

@@ -9,12 +9,12 @@ layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, r32ui) readonly uniform uimage2D heads;
 layout(scalar, set = 0, binding = 1) buffer Sizes { WorkSize tiles_size; };
 layout(scalar, set = 0, binding = 2) writeonly buffer Tiles { uint fragment_tiles[]; };
-layout(push_constant, scalar) uniform Push { uint width; uint first_row; uint end_row; uint leap; };
+layout(push_constant, scalar) uniform Push { uint width; uint first_row; uint end_row; uint stride; };
 
 void main() {
     uvec2 size = uvec2(width, end_row - first_row);
     uvec2 tiles = (size + WORK_TILE - 1) / WORK_TILE;
-    uint tile = scattered_tile(tiles.x * tiles.y, leap);
+    uint tile = scattered_tile(tiles.x * tiles.y, stride);
     if (tile >= tiles.x * tiles.y) return;
     uvec2 first = uvec2(tile % tiles.x, tile / tiles.x) * WORK_TILE + uvec2(0, first_row);
     uvec2 last = min(first + WORK_TILE, uvec2(width, end_row));

@@ -13,11 +13,11 @@ layout(set = 0, binding = 1, r32f) readonly uniform imageBuffer depth;
 layout(set = 0, binding = 2, rg32ui) readonly uniform uimage2D ids;
 layout(scalar, set = 0, binding = 3) buffer Sizes { WorkSize rays_size; };
 layout(scalar, set = 0, binding = 4) writeonly buffer RayTiles { uint ray_tiles[]; };
-layout(push_constant, scalar) uniform Push { uvec2 size; uint leap; };
+layout(push_constant, scalar) uniform Push { uvec2 size; uint stride; };
 
 void main() {
     uvec2 tiles = (size + WORK_TILE - 1) / WORK_TILE;
-    uint tile = scattered_tile(tiles.x * tiles.y, leap);
+    uint tile = scattered_tile(tiles.x * tiles.y, stride);
     if (tile >= tiles.x * tiles.y) return;
     uvec2 first = uvec2(tile % tiles.x, tile / tiles.x) * WORK_TILE;
     uvec2 last = min(first + WORK_TILE, size);

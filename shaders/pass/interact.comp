@@ -206,9 +206,9 @@ bool mirrored_by_ray(HitSurface hit, Boundary boundary) {
     return hit.s.base_traced || (boundary.solid && boundary.here != 0);
 }
 
-// What masking leaves along r, mirrored at a half vector drawn for v: nothing below the surface, which is n's, or below its
-// triangle, which is n_triangle's.
-float left_of_lobe(vec3 n, vec3 v, vec3 r, vec3 n_triangle, float alpha) {
+// Weight G2/G1 of r, mirrored at a half vector drawn for v: 0 below the surface, which is n's, or below its triangle, which
+// is n_triangle's.
+float lobe_weight(vec3 n, vec3 v, vec3 r, vec3 n_triangle, float alpha) {
     float cos_r = dot(r, n);
     return dot(r, n_triangle) > 0.0 && cos_r > 0.0 ? unmasked(dot(n, v), cos_r, alpha) : 0.0;
 }
@@ -254,7 +254,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
             h = rough ? half_vector(s.n_coat, s.v, s.clearcoat_alpha, u) : h;
         }
         vec3 r = reflect_ray(direction, h).R;
-        float masking = rough ? left_of_lobe(s.n_coat, s.v, r, hit.n, s.clearcoat_alpha) : 1.0;
+        float masking = rough ? lobe_weight(s.n_coat, s.v, r, hit.n, s.clearcoat_alpha) : 1.0;
         float f = s.clearcoat * schlick(vec3(0.04), 1.0, clamp(dot(h, s.v), 0.0, 1.0)).x;
         next.direction = on_side(r, hit.n);
         next.origin = ray_origin(s.p_bvh, hit.n, s.v);
@@ -286,7 +286,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     // The mirror image.
     vec3 r = reflect_ray(direction, h).R;
     float cos_r = dot(r, s.n);
-    float masking = rough ? left_of_lobe(s.n, s.v, r, hit.n, s.alpha) : 1.0;
+    float masking = rough ? lobe_weight(s.n, s.v, r, hit.n, s.alpha) : 1.0;
     next.direction = on_side(r, hit.n);
     next.origin = ray_origin(s.p_bvh, hit.n, s.v);
     next.media = ray.media;

@@ -181,7 +181,7 @@ impl<'a> Frame<'a> {
     /// One dispatch of `groups` workgroups.
     ///
     /// # Errors
-    /// When the driver refuses the pipeline.
+    /// When the driver refuses what the pipeline binds.
     ///
     /// # Panics
     /// When the push constants are not of the size that the shader declares: our mistake.
@@ -268,7 +268,7 @@ impl<'a> Frame<'a> {
     /// A raster pass: `draws` in order, each with one of `bindings`.
     ///
     /// # Errors
-    /// When the driver refuses a pipeline.
+    /// When the driver refuses what a pipeline binds.
     pub fn raster<B: Bindings<'a>>(
         &mut self,
         raster: &Raster<'a>,
@@ -497,9 +497,9 @@ impl<'a> Frame<'a> {
     /// Records, submits, waits, and returns the time of each pass in order.
     ///
     /// # Errors
-    /// When the driver fails: out of memory, or a lost device.
+    /// When the driver refuses a pipeline or fails: out of memory, or a lost device.
     pub fn finish(self) -> Result<Vec<PassTime>> {
-        let Self { device, passes, targets, without_barriers } = self;
+        let Self { device, mut passes, targets, without_barriers } = self;
         let uses: Vec<Vec<Use>> = passes.iter().map(|pass| pass.uses.clone()).collect();
         let mut states: HashMap<ResourceId, State> = targets
             .iter()
@@ -512,18 +512,10 @@ impl<'a> Frame<'a> {
             })
             .collect();
         let barriers = sync::barriers(&uses, &mut states);
-        for (id, target) in &targets {
-            let state = states.get(id).copied().unwrap_or_default();
-            match target {
-                Target::Buffer(buffer) => *lock(&buffer.state) = state,
-                Target::Image(image) => *lock(&image.state) = state,
-            }
-        }
-
         let timed = device.limits.timestamp_compute_and_graphics == vk::TRUE && !passes.is_empty();
         let queries = 2 * passes.len() as u32;
         let names: Vec<String> = passes.iter().map(|pass| pass.name.clone()).collect();
-        let wanted: Vec<Vec<PipelineKey>> = passes.iter().map(|pass| pass.pipelines.clone()).collect();
+        let wanted: Vec<_> = passes.iter_mut().map(|pass| std::mem::take(&mut pass.pipelines)).collect();
         let keys: Vec<&PipelineKey> = wanted.iter().flatten().collect();
         // SAFETY: command buffers that are recorded here, submitted once and waited for before anything is freed. Every
         // handle in them is borrowed for `'a`, which ends after this function.
@@ -537,7 +529,7 @@ impl<'a> Frame<'a> {
             let recorded = device.with_pipelines(&keys, |pipelines| {
                 for (index, (pass, barriers)) in passes.into_iter().zip(&barriers).enumerate() {
                     // Validation sees hazards within a command buffer alone: it gets all passes in one.
-                    if !device.validates() && !pipelines.ready(&wanted[index]) {
+                    if index > 0 && !device.validates() && !pipelines.ready(&wanted[index]) {
                         submit(&device, used[used.len() - 1])?;
                         used.push(begin(&device)?);
                     }
@@ -564,17 +556,27 @@ impl<'a> Frame<'a> {
             // What has been submitted is waited for also where the rest could not be.
             let (semaphores, values) = ([device.timeline], [device.submitted.load(Ordering::Relaxed)]);
             let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
-            raw.wait_semaphores(&wait, u64::MAX)
-                .with_context(|| format!("waiting for a frame of passes {}", names.join(", ")))?;
-            recorded?;
-
+            let waited = raw.wait_semaphores(&wait, u64::MAX);
+            let waited = waited.with_context(|| format!("waiting for a frame of passes {}", names.join(", ")));
             let mut ticks = vec![0_u64; queries as usize];
-            if timed {
+            let outcome = recorded.and(waited).and_then(|()| {
                 let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-                raw.get_query_pool_results(pool, 0, &mut ticks, flags).context("reading timestamps")?;
-            }
+                match timed {
+                    true => raw.get_query_pool_results(pool, 0, &mut ticks, flags).context("reading timestamps"),
+                    false => Ok(()),
+                }
+            });
             raw.free_command_buffers(device.commands, &used);
             raw.destroy_query_pool(pool, None);
+            for (id, target) in &targets {
+                // What a frame that failed has left behind is not known.
+                let state = if outcome.is_ok() { states.get(id).copied() } else { None }.unwrap_or_default();
+                match target {
+                    Target::Buffer(buffer) => *lock(&buffer.state) = state,
+                    Target::Image(image) => *lock(&image.state) = state,
+                }
+            }
+            outcome?;
             let period = f64::from(device.limits.timestamp_period) * 1e-6;
             Ok(names
                 .into_iter()

@@ -55,14 +55,15 @@ fn allocate(
 }
 
 /// Asks Linux for pages of 2 MiB under the memory of a software device, from the start of the block that an allocation lies
-/// in to its end: docs/decisions/large-pages.md.
+/// in to the allocation's own end: docs/decisions/large-pages.md.
 #[cfg(target_os = "linux")]
 fn prefer_large_pages(allocation: &Allocation) {
     let Some(start) = allocation.mapped_ptr() else { return };
     let page = rustix::param::page_size();
     let first = (start.as_ptr() as usize - allocation.offset() as usize) / page * page;
     let end = (start.as_ptr() as usize + allocation.size() as usize).next_multiple_of(page);
-    // SAFETY: advice changes nothing but how fast memory is. A kernel that does not take it is none the worse.
+    // SAFETY: advice changes nothing but how fast memory is: not what lies in it, nor in the rest of its first and last page,
+    // and it may outlive the block. A kernel that does not take it is none the worse.
     let _ = unsafe {
         rustix::mm::madvise(
             std::ptr::with_exposed_provenance_mut(first),

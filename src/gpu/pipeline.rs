@@ -17,6 +17,17 @@ pub(super) struct Pipelines<'k> {
     slots: HashMap<&'k PipelineKey, OnceLock<Result<vk::Pipeline, vk::Result>>>,
 }
 
+/// Whoever waits for a pipeline gets an answer, also where the thread that makes it panics.
+struct Settled<'p, 'k>(&'p Pipelines<'k>);
+
+impl Drop for Settled<'_, '_> {
+    fn drop(&mut self) {
+        for slot in self.0.slots.values() {
+            let _ = slot.set(Err(vk::Result::ERROR_UNKNOWN));
+        }
+    }
+}
+
 impl Pipelines<'_> {
     /// Whether all of `keys` are there.
     pub(super) fn ready(&self, keys: &[PipelineKey]) -> bool {
@@ -133,6 +144,7 @@ impl Device {
         }
         let result = std::thread::scope(|scope| {
             scope.spawn(|| {
+                let _end = Settled(&pipelines);
                 let start = Instant::now();
                 for &key in &missing {
                     let _ = pipelines.slots[key].set(self.make(key));
@@ -163,14 +175,18 @@ impl Device {
         pipeline
     }
 
-    /// Hands SPIR-V to the driver and takes it back, for tests of what validation says.
+    /// Shows SPIR-V to the validation layer, for tests of what it says.
     ///
     /// # Errors
     /// When the driver refuses it.
+    ///
+    /// # Panics
+    /// Without validation.
     #[doc(hidden)]
     pub fn try_module(&self, words: &[u32]) -> Result<()> {
+        assert!(self.validates(), "a driver trusts what it is given");
         let info = vk::ShaderModuleCreateInfo::default().code(words);
-        // SAFETY: a valid create info; nobody else has the module.
+        // SAFETY: the layer refuses what is not valid before the driver sees it; nobody else has the module.
         unsafe {
             let module = self.raw.create_shader_module(&info, None).context("creating a shader module")?;
             self.raw.destroy_shader_module(module, None);

@@ -131,8 +131,8 @@ impl Module<'_> {
             Some(Op::ConstantTrue) => Some(1),
             Some(Op::ConstantFalse) => Some(0),
             Some(Op::Constant) => Some(words[3]),
-            Some(Op::SpecConstantTrue) => Some(told.unwrap_or(1)),
-            Some(Op::SpecConstantFalse) => Some(told.unwrap_or(0)),
+            Some(Op::SpecConstantTrue) => Some(u32::from(told != Some(0))),
+            Some(Op::SpecConstantFalse) => Some(u32::from(told.unwrap_or(0) != 0)),
             Some(Op::SpecConstant) => Some(told.unwrap_or(words[3])),
             Some(Op::SpecConstantOp) => Op::from_u32(words[3]).and_then(|operation| self.value(operation, &words[4..])),
             Some(operation) => self.value(operation, &words[3..]),
@@ -145,10 +145,11 @@ impl Module<'_> {
 /// `words` with the constants of `constants` (id, value) and those they leave at their defaults in place, and without the
 /// blocks that nothing leads to then.
 ///
-/// What is left is what a driver would be left with that specialises: no instruction is changed but branches.
+/// What is left computes what a driver would that specialises. Constants become ordinary ones, branches that are decided
+/// become jumps, and what comes together where nothing comes any more loses that; all else stays as it is.
 ///
 /// # Panics
-/// When the words are no SPIR-V: ours come from glslang.
+/// When the words are no SPIR-V, or have constants of other than 32 bits: ours come from glslang and have none.
 #[must_use]
 pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
     let places = instructions(words);
@@ -210,6 +211,7 @@ pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
                 out.extend([3 << 16 | constant as u32, instruction[1], instruction[2]]);
             }
             Some(Op::SpecConstant) => {
+                assert_eq!(instruction.len(), 4, "constants have 32 bits");
                 let value = told.get(&instruction[2]).copied().unwrap_or(instruction[3]);
                 out.extend([4 << 16 | Op::Constant as u32, instruction[1], instruction[2], value]);
             }
@@ -225,6 +227,8 @@ pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
 struct Function {
     blocks: Vec<Block>,
     index: HashMap<u32, usize>,
+    /// Blocks that are led to from within constructs.
+    exits: HashSet<u32>,
     reached: Vec<bool>,
 }
 
@@ -255,12 +259,19 @@ impl Function {
                     block.end = place.clone();
                     blocks.extend(current.take());
                 }
-                _ => block.body.push(place.clone()),
+                other => {
+                    assert_ne!(other, Some(Op::Label), "a block ends in one of the branches above");
+                    block.body.push(place.clone());
+                }
             }
         }
+        // Branches without a merge of their own leave a construct: what they lead to must stay the end of one.
+        let exits = blocks.iter().filter(|block| block.merge.is_none());
+        let exits = exits.filter(|block| op(words, &block.end) == Some(Op::BranchConditional));
+        let exits = exits.flat_map(|block| words[block.end.start + 2..block.end.start + 4].iter().copied()).collect();
         let index = blocks.iter().enumerate().map(|(i, block)| (block.label, i)).collect();
         let reached = vec![true; blocks.len()];
-        Self { blocks, index, reached }
+        Self { blocks, index, exits, reached }
     }
 
     /// Finds the blocks that are reached, until nothing more is learnt of what decides that.
@@ -296,11 +307,17 @@ impl Function {
         self.reached[from] && self.targets(module, from).contains(&to.label)
     }
 
-    /// Where a block leads: the end of a loop's body always to its start, as a loop without that is none.
+    /// Where a block leads: the end of a loop's body always to its start, as a loop without that is none, and a selection that
+    /// is left from within always both ways.
     fn targets(&self, module: &Module<'_>, block: usize) -> Vec<u32> {
         let block = &self.blocks[block];
         let words = &module.words[block.end.clone()];
         if op(module.words, &block.end) == Some(Op::BranchConditional) {
+            if let (Some(merge), None) = block.merges(module.words)
+                && self.exits.contains(&merge)
+            {
+                return vec![words[2], words[3]];
+            }
             let goes_back = |label: u32| {
                 let target = &self.blocks[self.index[&label]];
                 target.merges(module.words).1.is_some() && self.index[&label] <= self.index[&block.label]

@@ -8,7 +8,7 @@ use crate::shader::accumulate;
 /// Adds `radiance` to `film`; after sample `index` of `count` the film is their mean.
 ///
 /// # Errors
-/// When the driver refuses the pipeline.
+/// When the driver refuses what a pipeline binds.
 pub fn accumulate<'a>(
     frame: &mut Frame<'a>,
     radiance: &'a Image,

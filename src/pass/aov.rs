@@ -11,7 +11,7 @@ use crate::shader::aov;
 /// Writes one [`crate::share::AovPixel`] per pixel of the rows from `rows[0]` up to `rows[1]`.
 ///
 /// # Errors
-/// When the driver refuses the pipeline.
+/// When the driver refuses what a pipeline binds.
 pub fn aov<'a>(
     frame: &mut Frame<'a>,
     plan: &Plan,

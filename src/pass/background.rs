@@ -11,7 +11,7 @@ use crate::shader::background;
 /// Writes `radiance` where no surface was drawn.
 ///
 /// # Errors
-/// When the driver refuses the pipeline.
+/// When the driver refuses what a pipeline binds.
 pub fn background<'a>(
     frame: &mut Frame<'a>,
     lighting: Lighting<'a>,

@@ -7,7 +7,7 @@ use anyhow::Result;
 
 use super::gbuffer::GBuffer;
 use super::lighting::Lighting;
-use super::rows::{leap, rows_of};
+use super::rows::{rows_of, stride};
 use crate::gpu::{Buffer, Device, Frame, Image, Place};
 use crate::shader::{classify, classify_fragments, classify_rays as ray_program};
 
@@ -49,7 +49,7 @@ impl FragmentTiles {
 /// Lists the tiles of rows `rows[0]` up to `rows[1]` that hold see-through fragments.
 ///
 /// # Errors
-/// When the driver refuses the pipeline.
+/// When the driver refuses what a pipeline binds.
 pub fn classify_fragments<'a>(
     frame: &mut Frame<'a>,
     heads: &'a Image,
@@ -60,7 +60,7 @@ pub fn classify_fragments<'a>(
     let bind = classify_fragments::Bind { heads, sizes: &list.sizes, tiles: &list.tiles };
     let tiles = list.width.div_ceil(TILE) * (rows[1] - rows[0]).div_ceil(TILE);
     let groups = tiles.div_ceil(classify_fragments::PROGRAM.local_size[0]);
-    let push = [list.width, rows[0], rows[1], leap(groups)];
+    let push = [list.width, rows[0], rows[1], stride(groups)];
     let constants = classify_fragments::Constants {}.words();
     frame.compute("classify fragment tiles", &bind, constants, bytemuck::cast_slice(&push), rows_of(groups))
 }
@@ -97,7 +97,7 @@ impl WorkLists {
 /// Sorts the tiles of the G-buffer into the lists.
 ///
 /// # Errors
-/// When the driver refuses the pipeline.
+/// When the driver refuses what a pipeline binds.
 pub fn classify<'a>(frame: &mut Frame<'a>, gbuffer: &'a GBuffer, lists: &'a WorkLists) -> Result<()> {
     frame.copy_buffer("reset work sizes", &lists.empty, &lists.sizes, 2 * WORK_BYTES);
     let bind = classify::Bind {
@@ -108,7 +108,7 @@ pub fn classify<'a>(frame: &mut Frame<'a>, gbuffer: &'a GBuffer, lists: &'a Work
     };
     let tiles = lists.size[0].div_ceil(TILE) * lists.size[1].div_ceil(TILE);
     let groups = tiles.div_ceil(classify::PROGRAM.local_size[0]);
-    let push = [lists.size[0], lists.size[1], leap(groups)];
+    let push = [lists.size[0], lists.size[1], stride(groups)];
     let constants = classify::Constants {}.words();
     frame.compute("classify tiles", &bind, constants, bytemuck::cast_slice(&push), rows_of(groups))
 }
@@ -149,7 +149,7 @@ impl RayTiles {
 /// Lists the tiles of the G-buffer whose surfaces send rays (shaders/pass/classify_rays.comp).
 ///
 /// # Errors
-/// When the driver refuses the pipeline.
+/// When the driver refuses what a pipeline binds.
 pub fn classify_rays<'a>(
     frame: &mut Frame<'a>,
     lighting: Lighting<'a>,
@@ -175,6 +175,6 @@ pub fn classify_rays<'a>(
         transmissive: calls.transmissive,
         ..Default::default()
     };
-    let push = [size[0], size[1], leap(groups)];
+    let push = [size[0], size[1], stride(groups)];
     frame.compute("classify ray tiles", &bind, constants.words(), bytemuck::cast_slice(&push), rows_of(groups))
 }

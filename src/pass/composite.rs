@@ -14,7 +14,7 @@ use crate::shader::composite;
 /// surfaces.
 ///
 /// # Errors
-/// When the driver refuses the pipeline.
+/// When the driver refuses what a pipeline binds.
 pub fn composite<'a>(
     frame: &mut Frame<'a>,
     lighting: Lighting<'a>,
@@ -30,7 +30,7 @@ pub fn composite<'a>(
 /// Weakens a part of the picture as the fragments of one strip do that lie before it.
 ///
 /// # Errors
-/// When the driver refuses the pipeline.
+/// When the driver refuses what a pipeline binds.
 pub fn composite_part<'a>(
     frame: &mut Frame<'a>,
     lighting: Lighting<'a>,

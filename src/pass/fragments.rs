@@ -120,7 +120,7 @@ impl FragmentLists {
 /// Draws every see-through surface in front of the opaque ones into the lists of one strip.
 ///
 /// # Errors
-/// When the driver refuses a pipeline.
+/// When the driver refuses what a pipeline binds.
 pub fn fragments<'a>(
     frame: &mut Frame<'a>,
     scene: &'a SceneOnDevice,

@@ -80,7 +80,7 @@ impl GBuffer {
 /// Draws every opaque and masked surface, and those that refract; `inside` one of those, their back faces as well.
 ///
 /// # Errors
-/// When the driver refuses a pipeline.
+/// When the driver refuses what a pipeline binds.
 pub fn gbuffer<'a>(
     frame: &mut Frame<'a>,
     scene: &'a SceneOnDevice,

@@ -17,7 +17,7 @@ const SPARE_BRANCHES: u32 = 4;
 /// Adds to `radiance` what the surfaces of the G-buffer mirror and what is seen through them.
 ///
 /// # Errors
-/// When the driver refuses a pipeline.
+/// When the driver refuses what a pipeline binds.
 pub fn interact<'a>(
     frame: &mut Frame<'a>,
     lighting: Lighting<'a>,
@@ -34,7 +34,7 @@ pub fn interact<'a>(
 /// Adds to a part of the picture what of that belongs to it: all rays are followed once more, over the same tiles.
 ///
 /// # Errors
-/// When the driver refuses a pipeline.
+/// When the driver refuses what a pipeline binds.
 pub fn interact_part<'a>(
     frame: &mut Frame<'a>,
     lighting: Lighting<'a>,

@@ -11,7 +11,7 @@ use crate::shader::light;
 /// Writes `radiance` where the G-buffer holds a surface.
 ///
 /// # Errors
-/// When the driver refuses the pipeline.
+/// When the driver refuses what a pipeline binds.
 pub fn light<'a>(
     frame: &mut Frame<'a>,
     lighting: Lighting<'a>,

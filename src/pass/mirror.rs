@@ -41,7 +41,7 @@ impl OnScreen {
 /// Finds how near the surfaces of each tile come (shaders/pass/screen_tiles.comp).
 ///
 /// # Errors
-/// When the driver refuses the pipeline.
+/// When the driver refuses what a pipeline binds.
 pub fn screen_tiles<'a>(
     frame: &mut Frame<'a>,
     lighting: Lighting<'a>,
@@ -64,7 +64,7 @@ pub fn screen_tiles<'a>(
 /// Puts the radiance on the screen in the place of the environment's where a mirrored ray meets it.
 ///
 /// # Errors
-/// When the driver refuses a pipeline.
+/// When the driver refuses what a pipeline binds.
 pub fn mirror<'a>(
     frame: &mut Frame<'a>,
     lighting: Lighting<'a>,

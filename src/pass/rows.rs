@@ -9,13 +9,13 @@ pub fn rows_of(count: u32) -> [u32; 3] {
     [count.min(ROW), count.div_ceil(ROW), 1]
 }
 
-/// Workgroups of `count` that lie between one and the next in the order in which a picture is gone over: lavapipe gives each
-/// of its threads one contiguous piece of a dispatch, and what costs most is often in one part of the picture.
+/// Stride in which `count` workgroups go over a picture, around its end: lavapipe gives each of its threads one contiguous
+/// piece of a dispatch, and what costs most is often in one part of the picture.
 ///
 /// About the golden section of `count`, which spreads any number of workgroups evenly; without a divisor in common, so that
 /// each has its turn; and the product with any turn fits 32 bits.
 #[must_use]
-pub fn leap(count: u32) -> u32 {
+pub fn stride(count: u32) -> u32 {
     let gcd = |mut a: u32, mut b: u32| {
         while b != 0 {
             (a, b) = (b, a % b);
@@ -24,7 +24,7 @@ pub fn leap(count: u32) -> u32 {
     };
     let golden = (f64::from(count) * 0.618_033_988_749_895) as u32;
     let most = golden.min(u32::MAX / count.max(1));
-    (1..=most).rev().find(|&leap| gcd(leap, count) == 1).unwrap_or(1)
+    (1..=most).rev().find(|&stride| gcd(stride, count) == 1).unwrap_or(1)
 }
 
 #[cfg(test)]
@@ -32,9 +32,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn leaps_reach_every_workgroup_and_any_piece_is_from_everywhere() {
+    fn strides_reach_every_workgroup_and_any_piece_is_from_everywhere() {
         for count in [1, 2, 3, 4, 6, 12, 30, 225, 900, 2310, 8160, 65_536] {
-            let place = |turn: u32| turn.checked_mul(leap(count)).expect("32 bits") % count;
+            let place = |turn: u32| turn.checked_mul(stride(count)).expect("32 bits") % count;
             let mut places: Vec<u32> = (0..count).map(place).collect();
             // Of the first half of the turns, a half lies in each half of the picture: the discrepancy of the golden
             // section grows with the logarithm.

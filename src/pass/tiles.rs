@@ -58,7 +58,7 @@ impl Tiles {
 /// Fills the masks for what the G-buffer holds.
 ///
 /// # Errors
-/// When the driver refuses a pipeline.
+/// When the driver refuses what a pipeline binds.
 pub fn tiles<'a>(
     frame: &mut Frame<'a>,
     plan: &Plan,

@@ -51,7 +51,7 @@ impl Display {
 /// alpha 1, or all 0 to keep transparency.
 ///
 /// # Errors
-/// When the driver refuses the pipeline.
+/// When the driver refuses what a pipeline binds.
 pub fn tonemap<'a>(
     frame: &mut Frame<'a>,
     film: &'a Image,

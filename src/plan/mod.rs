@@ -365,6 +365,10 @@ fn left_out(used: &[&Material], knobs: &Knobs, refracts: bool, by_rays: bool, sh
     );
     say(&|m| varies(m) && !marches && absorption != "off", &instead);
     say(&|m| m.dispersion > 0.0, "has dispersion, which is not built");
+    let (lobes, reflection) = (knobs.rung("lobes"), knobs.rung("reflection"));
+    if lobes != "0.2" && reflection != "ray" {
+        warnings.push(format!("lobes={lobes} changes nothing: reflection={reflection} sends no rays"));
+    }
     let rule = knobs.rung("quadrature");
     if rule != "midpoint" && !(marches && used.iter().any(|m| varies(m))) {
         warnings.push(format!("quadrature={rule} changes nothing: no medium is marched"));
