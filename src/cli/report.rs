@@ -26,8 +26,8 @@ pub struct Report {
     pub plan: PlanFacts,
     /// GPU time per pass over the repeats.
     pub passes: Vec<PassFacts>,
-    /// Wall time of each phase in milliseconds. `bvh` is a part of `upload`; `pipelines` is 0, they are made inside `upload`
-    /// and `frame`, where the driver compiles them at their first use.
+    /// Wall time of each phase in milliseconds. `bvh` is a part of `upload`; `pipelines` of `upload` and `frame`, beside
+    /// what else goes on there: they are made on a thread of their own, and the driver compiles them at their first use.
     pub phases_ms: BTreeMap<&'static str, f64>,
     /// Work counts: the same on every machine.
     pub work: WorkFacts,
