@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::{Result, bail, ensure};
 use ash::vk;
 
-use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, PassTime, Place};
+use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, PassPlan, PassTime, Place};
 use crate::image::tone::ToneMap;
 use crate::image::{Picture, png};
 use crate::pass::accumulate::accumulate;
@@ -273,7 +273,8 @@ impl Renderer {
         for index in 0..count {
             // A frame whose see-through fragments did not fit is drawn again with more room.
             loop {
-                let passes = self.sample(&view, index, count)?;
+                self.look(&view, index, count);
+                let passes = self.sample(count)?.finish()?;
                 let fitted = match &mut self.lists {
                     Some(lists) => lists.fitted()?,
                     None => true,
@@ -293,25 +294,16 @@ impl Renderer {
                     work.lights_cut_off
                 );
             }
-            if let Some(film) = &self.film {
-                let mut frame = Frame::new(&self.device);
-                accumulate(&mut frame, &self.radiance, film, index, count)?;
-                for part in &self.parts {
-                    accumulate(&mut frame, &part.radiance, part.film(), index, count)?;
-                }
-                times.add(frame.finish()?);
+            if self.film.is_some() {
+                times.add(self.add(index, count)?.finish()?);
             }
             dropped = dropped.max(self.lists.as_ref().map_or(0, FragmentLists::dropped));
             progress(index + 1, count);
         }
-        let (background, has_alpha) = self.display_background();
-        let mut frame = Frame::new(&self.device);
-        let film = self.film.as_ref().unwrap_or(&self.radiance);
-        tonemap(&mut frame, film, &self.display, self.settings.tonemap as u32, self.settings.exposure, background)?;
-        times.add(frame.finish()?);
+        times.add(self.show()?.finish()?);
         Ok(Rendered {
             display: self.display.pixels.read(<[u8]>::to_vec),
-            has_alpha,
+            has_alpha: self.display_background().1,
             counts: self.display.counts(),
             dropped,
             work,
@@ -319,10 +311,14 @@ impl Renderer {
         })
     }
 
-    /// One sample of every pixel: the frame, pass by pass.
-    fn sample(&mut self, view: &View, index: u32, count: u32) -> Result<Vec<PassTime>> {
+    /// Where the next sample is seen from.
+    fn look(&mut self, view: &View, index: u32, count: u32) {
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(index, count))));
         self.rays.look_from(view, index, count);
+    }
+
+    /// One sample of every pixel: the frame, pass by pass.
+    fn sample(&self, count: u32) -> Result<Frame<'_>> {
         let Self {
             device,
             plan,
@@ -337,7 +333,7 @@ impl Renderer {
             parts,
             screen,
             ..
-        } = &*self;
+        } = self;
         // With n samples a pixel each one stands for 1/n of its area: textures are read that much sharper.
         let lod_bias = -0.5 * (count as f32).log2();
         let lighting = Lighting {
@@ -401,7 +397,44 @@ impl Renderer {
         if plan.rays.is_some() {
             frame.read_back(&rays.counts);
         }
-        frame.finish()
+        Ok(frame)
+    }
+
+    /// Adds the sample to the film, where there is more than one.
+    fn add(&self, index: u32, count: u32) -> Result<Frame<'_>> {
+        let mut frame = Frame::new(&self.device);
+        if let Some(film) = &self.film {
+            accumulate(&mut frame, &self.radiance, film, index, count)?;
+            for part in &self.parts {
+                accumulate(&mut frame, &part.radiance, part.film(), index, count)?;
+            }
+        }
+        Ok(frame)
+    }
+
+    /// The film as a display shows it.
+    fn show(&self) -> Result<Frame<'_>> {
+        let mut frame = Frame::new(&self.device);
+        let film = self.film.as_ref().unwrap_or(&self.radiance);
+        let (background, _) = self.display_background();
+        let Settings { tonemap: curve, exposure, .. } = self.settings;
+        tonemap(&mut frame, film, &self.display, curve as u32, exposure, background)?;
+        Ok(frame)
+    }
+
+    /// The passes of a first picture from a camera, without drawing it: those before all samples, with the pipelines that exist
+    /// already, those of one sample, and those after.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn passes(&mut self, camera: &Camera) -> Result<Vec<PassPlan>> {
+        let view = View::new(camera, self.settings.size, self.scene.bounds);
+        self.scene.look_from(&view);
+        let count = self.plan.samples;
+        self.look(&view, 0, count);
+        let done =
+            self.shadow_maps.times.iter().map(|pass| PassPlan { name: pass.name.clone(), pipelines: Vec::new() });
+        Ok([done.collect(), self.sample(count)?.plan(), self.add(0, count)?.plan(), self.show()?.plan()].concat())
     }
 
     /// Display-linear colour behind the scene with alpha 1, or all 0, and whether the display output is transparent.

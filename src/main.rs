@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use etalon::cli::options::When;
 use etalon::cli::unbuilt::UnbuiltCommand;
-use etalon::cli::{devices, diff, render, verify};
+use etalon::cli::{devices, diff, plan, render, verify};
 
 /// A Vulkan renderer written directly against ash: glTF in, radiance out.
 #[derive(Parser)]
@@ -28,13 +28,12 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::RenderArgs>),
+    Plan(Box<plan::PlanArgs>),
     Diff(diff::DiffArgs),
     Devices(devices::DevicesArgs),
     Verify(verify::VerifyArgs),
     #[command(hide = true)]
     View(UnbuiltCommand),
-    #[command(hide = true)]
-    Plan(UnbuiltCommand),
     #[command(hide = true)]
     Cost(UnbuiltCommand),
 }
@@ -64,7 +63,7 @@ fn main() -> ExitCode {
         Command::Diff(args) => diff::run(args),
         Command::Devices(args) => devices::run(args),
         Command::View(args) => args.refuse("view"),
-        Command::Plan(args) => args.refuse("plan"),
+        Command::Plan(args) => plan::run(args),
         Command::Cost(args) => args.refuse("cost"),
         Command::Verify(args) => verify::run(args, arguments.quiet),
     };

@@ -3,8 +3,10 @@
 pub mod devices;
 pub mod diff;
 pub mod options;
+pub mod plan;
 pub mod render;
 pub mod report;
+pub mod setup;
 pub mod unbuilt;
 pub mod verify;
 

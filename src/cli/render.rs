@@ -16,9 +16,10 @@ use super::print;
 use super::report::{
     MemoryFacts, Output, PassFacts, PipelineFacts, PlanFacts, Report, SceneFacts, Spread, Validation, knob_map,
 };
+use super::setup::Setup;
 use super::unbuilt::UnbuiltOptions;
 use crate::frame::{Part, Rendered, Renderer};
-use crate::gpu::{Device, Severity};
+use crate::gpu::Severity;
 use crate::image::{Aov, AovData, Picture, exr, file};
 use crate::pass::view::View;
 use crate::scene::{Camera, Scene};
@@ -198,37 +199,23 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let steps = Steps::new(args.progress, quiet);
     phases.end("start");
 
-    // The device opens and the environment is read while the scene loads: three things that do not wait for each other.
     steps.step(&format!("loading {}", args.scene.scene), 1);
-    let (device, scene, environment) = std::thread::scope(|scope| {
-        let device = scope.spawn(|| Device::open(&args.device.choice(), args.device.validate));
-        let environment = scope.spawn(|| args.scene.load_environment());
-        let scene = args.scene.load();
-        let join = |_| anyhow!("a loading thread failed");
-        (device.join().map_err(join), scene, environment.join().map_err(join))
-    });
-    let scene = scene?;
-    let (environment, environment_warnings) = environment??;
-    let device = device??;
+    let setup = Setup::load(&args.scene, &args.device)?;
     phases.end("load");
+    let device = setup.device.clone();
     let info = device.info().clone();
     if !quiet {
         let software = if info.kind == "cpu" { ", a software device" } else { "" };
         steps.say(&format!("drawing on {} ({}{software})", info.name, info.driver));
     }
-    for warning in scene.warnings.iter().chain(&environment_warnings) {
+    for warning in &setup.warnings {
         tracing::warn!("{warning}");
     }
-    let share = args.scene.environment_share(&scene);
-    let environment = environment.filter(|_| share.is_some());
-    settings.environment_intensity *= share.unwrap_or(1.0);
-    let camera = args.scene.choose_camera(&scene, settings.size)?;
-    let facts = facts(&scene);
+    let facts = facts(&setup.scene);
 
     steps.step("uploading", 1);
     let knobs = settings.knobs.clone();
-    let mut renderer = Renderer::new(&device, scene, environment.as_ref(), settings)?;
-    drop(environment);
+    let (mut renderer, camera) = setup.renderer(&args.scene, settings)?;
     phases.end("upload");
     phases.all.insert("bvh", renderer.bvh().map_or(0.0, |bvh| bvh.build_ms + bvh.layout_ms));
     for warning in &renderer.warnings {
@@ -290,19 +277,21 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     if let (Some(path), Some(film)) = (&args.report, &film) {
         let total = phases.start.elapsed().as_secs_f64() * 1e3;
         phases.all.insert("total", total);
-        let (count, spirv_bytes, making_ms) = device.pipelines();
-        phases.all.insert("pipelines", making_ms);
+        phases.all.insert("pipelines", device.pipelines_ms());
+        let passes = rendered.passes.iter().map(|p| p.name.clone()).collect();
+        let plan = PlanFacts::of(&renderer.plan, &device, passes, device.pipelines());
+        let spirv_bytes = plan.pipelines.iter().map(|pipeline| pipeline.spirv_bytes).sum();
         let report = Report {
             schema: "etalon.report/1",
             device: info,
             scene: facts,
             knobs: knob_map(&knobs),
-            plan: PlanFacts::of(&renderer.plan, &device, rendered.passes.iter().map(|p| p.name.clone()).collect()),
+            plan,
             passes: pass_facts(&rounds),
             phases_ms: phases.all,
             work: (&rendered.work).into(),
             bvh: renderer.bvh(),
-            pipelines: PipelineFacts { count, spirv_bytes },
+            pipelines: PipelineFacts { count: device.pipelines().len(), spirv_bytes },
             memory: MemoryFacts::now(&device),
             image: film.statistics(),
             validation,

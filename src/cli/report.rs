@@ -5,11 +5,10 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::frame::Work;
-use crate::gpu::{Created, Device, DeviceInfo, Message, Severity};
+use crate::gpu::{Created, Device, DeviceInfo, Message, Program, Severity};
 use crate::image::Statistics;
 use crate::pass::rays::BvhFacts;
 use crate::plan::{Effect, Knobs, Plan};
-use crate::shader::PROGRAMS;
 
 /// The document.
 #[derive(Debug, Serialize)]
@@ -76,7 +75,7 @@ pub struct PlanFacts {
     pub samples: u32,
     /// Passes of a frame in order.
     pub passes: Vec<String>,
-    /// Pipelines that were made.
+    /// Pipelines.
     pub pipelines: Vec<PipelineFact>,
     /// Buffers and images that outlive a frame or feed one, by label.
     pub buffers: Vec<Created>,
@@ -91,26 +90,32 @@ pub struct PipelineFact {
     pub name: &'static str,
     /// Specialization constants by number, as 32-bit words.
     pub constants: BTreeMap<u32, u32>,
-    /// SPIR-V that ships for the program.
+    /// SPIR-V that the driver is given for these constants.
     pub spirv_bytes: usize,
 }
 
 impl PlanFacts {
-    /// What was planned, and what the device made of it in the passes of a frame.
+    /// What was planned, with the passes and the pipelines that it takes, and what exists on the device for it.
     #[must_use]
-    pub fn of(plan: &Plan, device: &Device, passes: Vec<String>) -> Self {
-        let bytes = |name| PROGRAMS.iter().find(|p| p.name == name).map_or(0, |p| p.spirv_bytes());
-        let pipelines = device.pipeline_list().into_iter();
+    pub fn of(
+        plan: &Plan,
+        device: &Device,
+        passes: Vec<String>,
+        mut pipelines: Vec<(&'static Program, Vec<(u32, u32)>)>,
+    ) -> Self {
+        pipelines.sort_by(|a, b| (a.0.name, &a.1).cmp(&(b.0.name, &b.1)));
+        pipelines.dedup();
         Self {
             schema: "etalon.plan/1",
             effects: plan.effects.clone(),
             samples: plan.samples,
             passes,
             pipelines: pipelines
-                .map(|(name, constants)| PipelineFact {
-                    name,
+                .into_iter()
+                .map(|(program, constants)| PipelineFact {
+                    name: program.name,
+                    spirv_bytes: program.spirv_bytes(&constants),
                     constants: constants.into_iter().collect(),
-                    spirv_bytes: bytes(name),
                 })
                 .collect(),
             buffers: device
@@ -206,7 +211,7 @@ impl From<&Work> for WorkFacts {
 pub struct PipelineFacts {
     /// How many.
     pub count: usize,
-    /// SPIR-V in them.
+    /// SPIR-V that the driver was given for them.
     pub spirv_bytes: usize,
 }
 

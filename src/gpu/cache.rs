@@ -63,7 +63,6 @@ pub(super) struct Caches {
     pub(super) layouts: HashMap<&'static str, Layout>,
     pub(super) pipelines: HashMap<PipelineKey, vk::Pipeline>,
     pub(super) samplers: HashMap<SamplerDesc, vk::Sampler>,
-    pub(super) spirv_bytes: usize,
     pub(super) making_ms: f64,
 }
 

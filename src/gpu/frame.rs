@@ -121,6 +121,15 @@ enum Target<'a> {
     Image(&'a Image),
 }
 
+/// A pass of a frame that has been described, before anything is made for it.
+#[derive(Debug, Clone)]
+pub struct PassPlan {
+    /// Name of the pass.
+    pub name: String,
+    /// Its pipelines: programs with their specialization constants.
+    pub pipelines: Vec<(&'static Program, Vec<(u32, u32)>)>,
+}
+
 /// A frame being described.
 pub struct Frame<'a> {
     device: Arc<Device>,
@@ -492,6 +501,15 @@ impl<'a> Frame<'a> {
             pipelines: Vec::new(),
             record: Box::new(|_, _, _| {}),
         });
+    }
+
+    /// The passes so far, in order.
+    #[must_use]
+    pub fn plan(&self) -> Vec<PassPlan> {
+        let of = |key: &PipelineKey| (key.program, key.constants.clone());
+        let plan =
+            |pass: &Pass<'_>| PassPlan { name: pass.name.clone(), pipelines: pass.pipelines.iter().map(of).collect() };
+        self.passes.iter().map(plan).collect()
     }
 
     /// Records, submits, waits, and returns the time of each pass in order.

@@ -47,20 +47,16 @@ impl Pipelines<'_> {
 }
 
 impl Device {
-    /// (pipelines made, bytes of SPIR-V that ship for them, milliseconds that making them took).
+    /// Milliseconds that making pipelines has taken.
     #[must_use]
-    pub fn pipelines(&self) -> (usize, usize, f64) {
-        let caches = lock(&self.caches);
-        (caches.pipelines.len(), caches.spirv_bytes, caches.making_ms)
+    pub fn pipelines_ms(&self) -> f64 {
+        lock(&self.caches).making_ms
     }
 
-    /// Every pipeline by program name and specialization constants, sorted.
+    /// Every pipeline made so far: programs with their specialization constants, in no order.
     #[must_use]
-    pub fn pipeline_list(&self) -> Vec<(&'static str, Vec<(u32, u32)>)> {
-        let mut list: Vec<_> =
-            lock(&self.caches).pipelines.keys().map(|key| (key.program.name, key.constants.clone())).collect();
-        list.sort();
-        list
+    pub fn pipelines(&self) -> Vec<(&'static Program, Vec<(u32, u32)>)> {
+        lock(&self.caches).pipelines.keys().map(|key| (key.program, key.constants.clone())).collect()
     }
 
     pub(super) fn sampler(&self, desc: SamplerDesc) -> Result<vk::Sampler> {
@@ -157,7 +153,6 @@ impl Device {
         for key in missing {
             if let Some(&Ok(pipeline)) = pipelines.slots[key].get() {
                 self.note("pipeline", key.program.name, 0);
-                caches.spirv_bytes += key.program.spirv_bytes();
                 caches.pipelines.insert(key.clone(), pipeline);
             }
         }

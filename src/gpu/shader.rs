@@ -3,6 +3,7 @@
 use ash::vk;
 
 use super::access::Access;
+use super::specialize::specialized;
 
 /// One program: a compute shader, or a vertex shader with its fragment shader.
 #[derive(Debug)]
@@ -37,10 +38,10 @@ impl std::hash::Hash for Program {
 }
 
 impl Program {
-    /// Bytes of SPIR-V that ship.
+    /// Bytes of SPIR-V that the driver is given for these specialization constants.
     #[must_use]
-    pub fn spirv_bytes(&self) -> usize {
-        self.stages.iter().map(|s| s.words.len() * 4).sum()
+    pub fn spirv_bytes(&self, constants: &[(u32, u32)]) -> usize {
+        self.stages.iter().map(|stage| specialized(stage.words, constants).len() * 4).sum()
     }
 }
 

@@ -212,7 +212,7 @@ impl Plan {
             (reason, evidence)
         });
         // Without rays that refract all that is transparent is a sheet.
-        let (knob, allowed) = match refraction {
+        let (knob, allowed) = match knobs.rung("refraction") == "ray" {
             true => ("absorption", knobs.march_steps() > 0),
             false => ("refraction", false),
         };

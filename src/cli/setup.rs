@@ -1,0 +1,56 @@
+//! What every command that knows a scene begins with.
+
+use std::sync::Arc;
+
+use anyhow::{Result, anyhow};
+
+use super::options::{DeviceOptions, SceneOptions};
+use crate::frame::{Renderer, Settings};
+use crate::gpu::Device;
+use crate::scene::environment::Environment;
+use crate::scene::{Camera, Scene};
+
+/// A scene, what lies around it, and what it will be drawn on.
+pub struct Setup {
+    /// The device.
+    pub device: Arc<Device>,
+    /// The scene.
+    pub scene: Scene,
+    /// The environment that was asked for, or would be used if the scene has no lights.
+    environment: Option<Environment>,
+    /// What was read around, in the scene's file and in the environment's.
+    pub warnings: Vec<String>,
+}
+
+impl Setup {
+    /// Opens the device and reads the environment while the scene loads: three things that do not wait for each other.
+    ///
+    /// # Errors
+    /// One sentence with file, place and cause; that of the scene first.
+    pub fn load(scene: &SceneOptions, device: &DeviceOptions) -> Result<Self> {
+        let (device, loaded, environment) = std::thread::scope(|scope| {
+            let device = scope.spawn(|| Device::open(&device.choice(), device.validate));
+            let environment = scope.spawn(|| scene.load_environment());
+            let loaded = scene.load();
+            let join = |_| anyhow!("a loading thread failed");
+            (device.join().map_err(join), loaded, environment.join().map_err(join))
+        });
+        let scene = loaded?;
+        let (environment, environment_warnings) = environment??;
+        let warnings = scene.warnings.iter().cloned().chain(environment_warnings).collect();
+        Ok(Self { device: device??, scene, environment, warnings })
+    }
+
+    /// Plans and uploads; the renderer, and the camera to draw from.
+    ///
+    /// # Errors
+    /// When there is no such camera, the scene has nothing to draw, or it does not fit the device.
+    pub fn renderer(self, options: &SceneOptions, mut settings: Settings) -> Result<(Renderer, Camera)> {
+        let Self { device, scene, environment, .. } = self;
+        let share = options.environment_share(&scene);
+        let environment = environment.filter(|_| share.is_some());
+        settings.environment_intensity *= share.unwrap_or(1.0);
+        let camera = options.choose_camera(&scene, settings.size)?;
+        Ok((Renderer::new(&device, scene, environment.as_ref(), settings)?, camera))
+    }
+}
