@@ -212,6 +212,8 @@ impl Renderer {
         }
         let surroundings = Surroundings { environment: environment.is_some(), sky };
         let plan = Plan::new(&scene, surroundings, &settings.knobs);
+        // What adds nothing takes no turn of any loop.
+        scene.lights.retain(|light| plan.directional_lights + plan.local_lights > 0 && light.shines());
         let part = |&part: &Part| PartOnDevice::new(device, &plan, &settings.knobs, part, size);
         let parts = settings.parts.iter().map(part).collect::<Result<_>>()?;
         let most = if plan.tiles { MOST_LISTED_LIGHTS } else { MOST_LIGHTS };

@@ -144,6 +144,14 @@ pub fn mirrors(material: &Material) -> bool {
     material.metallic > 0.0 || material.specular > 0.0
 }
 
+/// Whether some of the light that a surface receives leaves it in all directions.
+fn scatters(material: &Material) -> bool {
+    !material.unlit
+        && (material.metallic < 1.0 || material.metallic_roughness_texture.is_some())
+        && (material.transmission < 1.0 || material.transmission_texture.is_some())
+        && material.base_color[..3] != [0.0; 3]
+}
+
 /// Perceptual roughness up to which surfaces are mirrored on the screen.
 const ROUGHEST_ON_SCREEN: f32 = 0.2;
 
@@ -228,11 +236,16 @@ impl Plan {
             colours: used.iter().any(|m| m.marched_sigma().is_some_and(|grid| grid.channels() > 1)),
         };
 
-        let environment = || match surroundings.environment {
-            true => Ok(("there is an environment".to_owned(), BTreeMap::new())),
-            false => Err("there is no environment"),
+        let environment = |shows: bool, else_reason: &'static str| match (surroundings.environment, shows) {
+            (true, true) => Ok(("there is an environment".to_owned(), BTreeMap::new())),
+            (true, false) => Err(else_reason),
+            (false, _) => Err("there is no environment"),
         };
-        let reflection = decide("mirrored environment", "reflection", environment(), knobs.rung("reflection") != "off");
+        let any = |test: &dyn Fn(&Material) -> bool| used.iter().any(|m| test(m));
+        // What lets light through shows the environment behind it, whether or not it mirrors.
+        let shiny = any(&|m| !m.unlit && (mirrors(m) || m.clearcoat > 0.0 || m.transmission > 0.0));
+        let cause = environment(shiny, "no material in use mirrors anything or lets light through");
+        let reflection = decide("mirrored environment", "reflection", cause, knobs.rung("reflection") != "off");
         // A texture only lowers the factor.
         let roughest_mirror =
             if knobs.rung("reflection") == "ray" { knobs.roughest_lobe() } else { ROUGHEST_ON_SCREEN };
@@ -259,11 +272,17 @@ impl Plan {
             see_through_mirrors: on_screen(true),
             refraction: refracts && !refraction,
         };
-        let ambient = decide("ambient light", "indirect", environment(), knobs.rung("indirect") != "off");
+        let cause = environment(any(&scatters), "no material in use scatters light");
+        let ambient = decide("ambient light", "indirect", cause, knobs.rung("indirect") != "off");
 
-        let count = |test: &dyn Fn(&LightKind) -> bool| scene.lights.iter().filter(|l| test(&l.kind)).count() as u32;
+        let shining = || scene.lights.iter().filter(|light| light.shines());
+        let lit = any(&|m| !m.unlit);
+        let count = |test: &dyn Fn(&LightKind) -> bool| match lit {
+            true => shining().filter(|light| test(&light.kind)).count() as u32,
+            false => 0,
+        };
         let directional_lights = count(&|kind| matches!(kind, LightKind::Directional { .. }));
-        let local_lights = scene.lights.len() as u32 - directional_lights;
+        let local_lights = count(&|kind| !matches!(kind, LightKind::Directional { .. }));
         let ranged = count(&|kind| {
             matches!(kind, LightKind::Point { range: Some(_), .. } | LightKind::Spot { range: Some(_), .. })
         });
@@ -271,10 +290,13 @@ impl Plan {
             ("directional", directional_lights.to_string()),
             ("local", local_lights.to_string()),
             ("with a range", ranged.to_string()),
+            ("dark", (scene.lights.len() - shining().count()).to_string()),
         ]);
-        let cause = match scene.lights.is_empty() {
-            true => Err("the scene has no lights"),
-            false => {
+        let cause = match (shining().next(), lit) {
+            (None, _) if scene.lights.is_empty() => Err("the scene has no lights"),
+            (None, _) => Err("all lights of the scene are dark"),
+            (_, false) => Err("all materials in use are unlit"),
+            _ => {
                 let reason = format!("{directional_lights} directional, {local_lights} point and spot lights");
                 Ok((reason, evidence.clone()))
             }
@@ -284,7 +306,6 @@ impl Plan {
         let shadow_maps = shadowed && knobs.rung("shadows") == "map";
         let shadows = shadowed && !shadow_maps;
         let rays = (shadows || mirror_rays || refraction).then(|| {
-            let any = |test: &dyn Fn(&Material) -> bool| used.iter().any(|m| test(m));
             let masked = any(&|m| matches!(m.alpha_mode, AlphaMode::Mask(_)));
             Rays {
                 shadows,

@@ -14,6 +14,14 @@ pub struct Light {
     pub kind: LightKind,
 }
 
+impl Light {
+    /// Whether any light comes from it.
+    #[must_use]
+    pub fn shines(&self) -> bool {
+        self.color != [0.0; 3]
+    }
+}
+
 /// Geometry of a light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LightKind {
