@@ -30,6 +30,7 @@ use crate::pass::tiles::{Tiles, tiles};
 use crate::pass::tonemap::{Counts, Display, tonemap};
 use crate::pass::view::{View, jitter};
 use crate::plan::{Knobs, Plan, Surroundings};
+use crate::scene::black::without_black_textures;
 use crate::scene::environment::Environment;
 use crate::scene::sigma::one_medium_each;
 use crate::scene::solid::solids;
@@ -190,6 +191,7 @@ impl Renderer {
         settings: Settings,
     ) -> Result<Self> {
         one_medium_each(&mut scene);
+        without_black_textures(&mut scene);
         let size = settings.size;
         let limit = device.max_image_size();
         if size.contains(&0) || size.iter().any(|&side| side > limit) {

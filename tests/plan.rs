@@ -10,13 +10,20 @@ use etalon::frame::Settings;
 use etalon::image::Picture;
 use etalon::plan::{Knobs, Plan};
 use etalon::scene::environment::Environment;
-use etalon::scene::{LightKind, Material, Scene};
+use etalon::scene::material::{Sampler, TextureRef};
+use etalon::scene::{Image, LightKind, Material, Scene};
 use etalon::study::shape::Shape;
 use glam::DVec3;
 use gpu::{Gpu, bits};
 use made::{Made, at, lambert, orthographic, unlit};
 
 const SIZE: [u32; 2] = [48, 36];
+
+/// A texture of 4x4 texels of one colour, the only one of its scene.
+fn one_colour(made: &mut Made, rgba: [u8; 4]) -> TextureRef {
+    made.0.images = vec![Image { name: "texels".to_owned(), width: 4, height: 4, rgba: rgba.repeat(16) }];
+    TextureRef { image: 0, uv_set: 0, uv_transform: glam::Affine2::IDENTITY, sampler: Sampler::default() }
+}
 
 /// A ball of one material before a darker one, and inside the first a small card of another.
 fn ball(surface: Material, hidden: Option<Material>) -> Made {
@@ -100,6 +107,55 @@ fn unlit_surfaces_call_for_no_lights_and_no_rays() {
     assert_eq!(state(&without.plan, "punctual lights").1, reason);
     assert!(without.plan.rays.is_none() && with.plan.rays.is_some());
     assert!((without.bytes)("BVH nodes") == 0 && (with.bytes)("BVH nodes") > 0);
+}
+
+/// What has a black texture for a factor is drawn as if the factor were 0, with a plan as if there were neither.
+#[test]
+fn black_textures_call_for_nothing() {
+    let environment = Environment::studio();
+    let plain = Material { base_color: [0.5, 0.6, 0.7, 1.0], roughness: 0.6, metallic: 0.0, ..Material::default() };
+    type Change = fn(&mut Material, TextureRef);
+    let changes: [(&str, [u8; 4], Change); 4] = [
+        ("emissive textures", [0, 0, 0, 255], |m, t| (m.emissive, m.emissive_texture) = ([5.0; 3], Some(t))),
+        ("refraction", [0, 255, 255, 255], |m, t| (m.transmission, m.transmission_texture) = (1.0, Some(t))),
+        ("clear coat", [0, 255, 255, 255], |m, t| (m.clearcoat, m.clearcoat_texture) = (1.0, Some(t))),
+        ("mirrors", [255, 255, 0, 255], |m, t| {
+            (m.metallic, m.specular, m.metallic_roughness_texture) = (1.0, 0.0, Some(t));
+        }),
+    ];
+    for (effect, texel, change) in changes {
+        let drawn = |texel: Option<[u8; 4]>| {
+            let mut made = ball(plain.clone(), None);
+            let texture = one_colour(&mut made, texel.unwrap_or([255; 4]));
+            for material in &mut made.0.materials {
+                change(material, texture);
+                if texel.is_none() {
+                    // The same material by its factors.
+                    *material = plain_of(material);
+                }
+            }
+            draw(&made.0, Some(&environment), &[])
+        };
+        let (black, without) = (drawn(Some(texel)), drawn(None));
+        assert_eq!(state(&without.plan, effect).0, "not called for", "{effect}");
+        assert_eq!(state(&black.plan, effect).0, "not called for", "{effect}");
+        assert!(bits(&black.film) == bits(&without.film), "{effect}: the pictures differ");
+    }
+}
+
+/// Without what its textures multiply.
+fn plain_of(material: &Material) -> Material {
+    Material {
+        emissive: [0.0; 3],
+        emissive_texture: None,
+        transmission: 0.0,
+        transmission_texture: None,
+        clearcoat: 0.0,
+        clearcoat_texture: None,
+        metallic: 0.0,
+        metallic_roughness_texture: None,
+        ..material.clone()
+    }
 }
 
 #[test]

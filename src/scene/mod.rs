@@ -5,6 +5,7 @@
 
 mod aabb;
 mod accessor;
+pub mod black;
 pub mod bvh;
 pub mod camera;
 pub mod contact;
