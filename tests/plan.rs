@@ -89,7 +89,7 @@ fn metals_call_for_no_ambient_light() {
 fn chalk_calls_for_no_mirrored_environment() {
     let environment = Environment::studio();
     let with = ball(lambert([0.5; 3]), Some(metal(0.5)));
-    let reason = "no material in use mirrors anything or lets light through";
+    let reason = "no material in use mirrors anything";
     let without = ball(lambert([0.5; 3]), None);
     let [without, with] = is_absent("mirrored environment", reason, without, with, Some(&environment));
     let name = "prefiltered environment";
@@ -107,6 +107,23 @@ fn unlit_surfaces_call_for_no_lights_and_no_rays() {
     assert_eq!(state(&without.plan, "punctual lights").1, reason);
     assert!(without.plan.rays.is_none() && with.plan.rays.is_some());
     assert!((without.bytes)("BVH nodes") == 0 && (with.bytes)("BVH nodes") > 0);
+}
+
+/// Neither mirrors nor scattered light are needed for what is seen through glass: all that enters a ball leaves it, which at
+/// the middle is 1 − F0 of a white environment; the rest is mirrored.
+#[test]
+fn glass_shows_the_environment_whatever_surfaces_do() {
+    let environment = Environment::constant([1.0; 3]);
+    let glass = Material { transmission: 1.0, thickness: 1.0, roughness: 0.0, ior: 1.5, ..Material::default() };
+    let mut made = Made::new("glass");
+    made.add(Shape::sphere(1.0, 32), Material { metallic: 0.0, ..glass }, at(0.0, 0.0, 0.0));
+    made.camera(DVec3::Z * 10.0, DVec3::ZERO, orthographic(1.5));
+    for choices in [&["reflection=off"][..], &["reflection=off", "indirect=off"], &["indirect=off"]] {
+        let drawn = draw(&made.0, Some(&environment), choices);
+        let middle = drawn.film.rgba[(SIZE[1] / 2 * SIZE[0] + SIZE[0] / 2) as usize];
+        let expected = if choices.contains(&"reflection=off") { 0.96 } else { 1.0 };
+        assert!((middle[0] - expected).abs() < 1e-4, "{choices:?}: {middle:?}");
+    }
 }
 
 /// What has a black texture for a factor is drawn as if the factor were 0, with a plan as if there were neither.

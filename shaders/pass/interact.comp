@@ -33,7 +33,7 @@ layout(constant_id = 56) const bool TOUCHING = false;    // some transparent bod
 // Of all that is followed, what is added: 0 all, 1 what the first surface mirrored, 2 what it let through. Nothing is left
 // out for that: which ray is followed next, and which random numbers it has, depends on all that were before.
 layout(constant_id = 59) const uint FIRST_EVENT = 0;
-const bool ENVIRONMENT = AMBIENT || REFLECTION;
+layout(constant_id = 57) const bool ENVIRONMENT = false; // there is one, for rays that leave the scene
 // A branch that would add less than this share of what it meets is not followed. The sum of all that is cut off is
 // counted.
 const float FAINTEST = 1.0 / 512.0;

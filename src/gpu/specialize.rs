@@ -385,9 +385,9 @@ impl Function {
                     .flatten()
                     .copied()
                     .collect();
-                if let Some(stub) = goes_on {
+                if let Some(unreached) = goes_on {
                     undefined.extend([3 << 16 | Op::Undef as u32, words[phi.start + 1], *bound]);
-                    pairs.extend([*bound, self.blocks[stub].label]);
+                    pairs.extend([*bound, self.blocks[unreached].label]);
                     *bound += 1;
                 }
                 out.push((3 + pairs.len() as u32) << 16 | Op::Phi as u32);

@@ -89,6 +89,7 @@ fn follow<'a>(
         tile_words: 0,
         transmissive: with.transmissive,
         rough: with.rough,
+        environment: plan.environment,
         sky: plan.sky,
         masked_hits: with.masked,
         loop_budget: lighting.loop_budget(),

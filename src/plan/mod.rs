@@ -21,6 +21,8 @@ pub struct Plan {
     pub clearcoat: bool,
     /// Code for metals given by n and κ.
     pub conductors: bool,
+    /// There is an environment: rays that leave the scene see it, whatever surfaces do.
+    pub environment: bool,
     /// The environment is seen in surfaces.
     pub reflection: bool,
     /// The environment's irradiance lights diffuse surfaces.
@@ -242,9 +244,8 @@ impl Plan {
             (false, _) => Err("there is no environment"),
         };
         let any = |test: &dyn Fn(&Material) -> bool| used.iter().any(|m| test(m));
-        // What lets light through shows the environment behind it, whether or not it mirrors.
-        let shiny = any(&|m| !m.unlit && (mirrors(m) || m.clearcoat > 0.0 || m.transmission > 0.0));
-        let cause = environment(shiny, "no material in use mirrors anything or lets light through");
+        let shiny = any(&|m| !m.unlit && (mirrors(m) || m.clearcoat > 0.0));
+        let cause = environment(shiny, "no material in use mirrors anything");
         let reflection = decide("mirrored environment", "reflection", cause, knobs.rung("reflection") != "off");
         // A texture only lowers the factor.
         let roughest_mirror =
@@ -335,6 +336,7 @@ impl Plan {
             layers,
             clearcoat,
             conductors,
+            environment: surroundings.environment,
             reflection,
             ambient,
             sky: surroundings.sky,
