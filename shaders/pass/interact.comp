@@ -30,10 +30,10 @@ layout(constant_id = 53) const bool MASKED_HITS = false; // some surface has hol
 layout(constant_id = 54) const uint LOOP_BUDGET = 40000;
 layout(constant_id = 55) const uint PENDING = 1;         // branches that can wait at once
 layout(constant_id = 56) const bool TOUCHING = false;    // some transparent body lies against another surface
+layout(constant_id = 57) const bool ENVIRONMENT = false; // there is one, for rays that leave the scene
 // Of all that is followed, what is added: 0 all, 1 what the first surface mirrored, 2 what it let through. Nothing is left
 // out for that: which ray is followed next, and which random numbers it has, depends on all that were before.
 layout(constant_id = 59) const uint FIRST_EVENT = 0;
-layout(constant_id = 57) const bool ENVIRONMENT = false; // there is one, for rays that leave the scene
 // A branch that would add less than this share of what it meets is not followed. The sum of all that is cut off is
 // counted.
 const float FAINTEST = 1.0 / 512.0;

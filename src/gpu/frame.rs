@@ -387,6 +387,16 @@ impl<'a> Frame<'a> {
         Ok(())
     }
 
+    /// A pass that takes no pipeline.
+    fn transfer(&mut self, name: &str, uses: Vec<Use>, record: impl FnOnce(&Device, vk::CommandBuffer) + 'a) {
+        self.passes.push(Pass {
+            name: name.to_owned(),
+            uses,
+            pipelines: Vec::new(),
+            record: Box::new(move |device, commands, _| record(device, commands)),
+        });
+    }
+
     /// Copies a buffer to the start of another.
     pub fn copy_buffer(&mut self, name: &str, from: &'a Buffer, to: &'a Buffer, bytes: u64) {
         let mut uses = Vec::new();
@@ -395,14 +405,9 @@ impl<'a> Frame<'a> {
         self.use_buffer(&mut uses, to, Access::TransferDst, none);
         let region = vk::BufferCopy { src_offset: 0, dst_offset: 0, size: bytes };
         let (from, to) = (from.raw, to.raw);
-        self.passes.push(Pass {
-            name: name.to_owned(),
-            uses,
-            pipelines: Vec::new(),
-            // SAFETY: the command buffer is recording; handles are alive until the frame has finished.
-            record: Box::new(move |device, commands, _| unsafe {
-                device.raw.cmd_copy_buffer(commands, from, to, &[region]);
-            }),
+        // SAFETY: the command buffer is recording; handles are alive until the frame has finished.
+        self.transfer(name, uses, move |device, commands| unsafe {
+            device.raw.cmd_copy_buffer(commands, from, to, &[region]);
         });
     }
 
@@ -411,14 +416,9 @@ impl<'a> Frame<'a> {
         let mut uses = Vec::new();
         self.use_buffer(&mut uses, buffer, Access::TransferDst, vk::ShaderStageFlags::empty());
         let raw = buffer.raw;
-        self.passes.push(Pass {
-            name: name.to_owned(),
-            uses,
-            pipelines: Vec::new(),
-            // SAFETY: as above.
-            record: Box::new(move |device, commands, _| unsafe {
-                device.raw.cmd_fill_buffer(commands, raw, 0, vk::WHOLE_SIZE, word);
-            }),
+        // SAFETY: as above.
+        self.transfer(name, uses, move |device, commands| unsafe {
+            device.raw.cmd_fill_buffer(commands, raw, 0, vk::WHOLE_SIZE, word);
         });
     }
 
@@ -427,18 +427,13 @@ impl<'a> Frame<'a> {
         let mut uses = Vec::new();
         self.use_image(&mut uses, image, Access::TransferDst, vk::ShaderStageFlags::empty());
         let (raw, range) = (image.raw, image.range());
-        self.passes.push(Pass {
-            name: name.to_owned(),
-            uses,
-            pipelines: Vec::new(),
-            record: Box::new(move |device, commands, _| {
-                let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-                // SAFETY: as above.
-                unsafe {
-                    let black = vk::ClearColorValue::default();
-                    device.raw.cmd_clear_color_image(commands, raw, layout, &black, &[range]);
-                }
-            }),
+        self.transfer(name, uses, move |device, commands| {
+            let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+            // SAFETY: as above.
+            unsafe {
+                let black = vk::ClearColorValue::default();
+                device.raw.cmd_clear_color_image(commands, raw, layout, &black, &[range]);
+            }
         });
     }
 
@@ -458,15 +453,10 @@ impl<'a> Frame<'a> {
             })
             .collect();
         let (from, to) = (from.raw, to.raw);
-        self.passes.push(Pass {
-            name: name.to_owned(),
-            uses,
-            pipelines: Vec::new(),
-            record: Box::new(move |device, commands, _| {
-                let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-                // SAFETY: as above.
-                unsafe { device.raw.cmd_copy_buffer_to_image(commands, from, to, layout, &regions) };
-            }),
+        self.transfer(name, uses, move |device, commands| {
+            let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+            // SAFETY: as above.
+            unsafe { device.raw.cmd_copy_buffer_to_image(commands, from, to, layout, &regions) };
         });
     }
 
@@ -479,15 +469,10 @@ impl<'a> Frame<'a> {
         let desc = from.desc();
         let region = region(0, from.aspect(), 0, 0, [desc.width, desc.height]);
         let (from, to) = (from.raw, to.raw);
-        self.passes.push(Pass {
-            name: name.to_owned(),
-            uses,
-            pipelines: Vec::new(),
-            record: Box::new(move |device, commands, _| {
-                let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
-                // SAFETY: as above.
-                unsafe { device.raw.cmd_copy_image_to_buffer(commands, from, layout, to, &[region]) };
-            }),
+        self.transfer(name, uses, move |device, commands| {
+            let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+            // SAFETY: as above.
+            unsafe { device.raw.cmd_copy_image_to_buffer(commands, from, layout, to, &[region]) };
         });
     }
 
