@@ -55,7 +55,9 @@ HitPoint on_triangle(uint leaf, vec3 p_bvh, vec3 direction) {
     return hit_point_of(Hit(0.0, leaf, t.weights.y / whole, t.weights.z / whole), p_bvh, vec3(0.0));
 }
 
-Primary primary_surface(ivec2 pixel) {
+// With `exact_normals`, the triangle's own where no texture has bent them: for rays that leave the surface. Light that is
+// looked up at the surface has the stored ones, which are there whether or not the scene calls for rays.
+Primary primary_surface(ivec2 pixel, bool exact_normals) {
     Primary r;
     float z = imageLoad(depth, pixel.y * int(camera.size.x) + pixel.x).x;
     r.drawn = z != 0.0;
@@ -86,14 +88,15 @@ Primary primary_surface(ivec2 pixel) {
         uint leaf = r.drawn ? imageLoad(leaf_places, int(imageLoad(triangles, pixel).x)).x : NO_TRIANGLE;
         if (leaf != NO_TRIANGLE) {
             HitPoint point = on_triangle(leaf, p_bvh, view_direction(camera, pixel));
-            float side = dot(point.n, view_direction(camera, pixel)) <= 0.0 ? 1.0 : -1.0;
             s.p_bvh = point.p;
             s.face = point.face;
-            s.n_triangle = side * point.n;
-            // The exact normal where no texture has bent it.
-            vec3 smooth_n = side * point.n_smooth;
-            s.n = dot(n - smooth_n, n - smooth_n) < 1e-7 ? smooth_n : n;
-            s.n_coat = dot(n_coat - smooth_n, n_coat - smooth_n) < 1e-7 ? smooth_n : n_coat;
+            if (exact_normals) {
+                float side = dot(point.n, view_direction(camera, pixel)) <= 0.0 ? 1.0 : -1.0;
+                s.n_triangle = side * point.n;
+                vec3 smooth_n = side * point.n_smooth;
+                s.n = dot(n - smooth_n, n - smooth_n) < 1e-7 ? smooth_n : n;
+                s.n_coat = dot(n_coat - smooth_n, n_coat - smooth_n) < 1e-7 ? smooth_n : n_coat;
+            }
         }
     }
     r.hit.s = s;

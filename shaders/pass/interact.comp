@@ -327,7 +327,7 @@ void main() {
     if (place >= work.rays_size.count) return;
     ivec2 pixel = first_pixel(ray_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
-    Primary primary = primary_surface(pixel);
+    Primary primary = primary_surface(pixel, true);
     if (!primary.drawn) return;
     HitSurface hit = primary.hit;
     Branch ray;

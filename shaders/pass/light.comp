@@ -26,7 +26,7 @@ void main() {
     if (place >= work.surface_size.count) return;
     ivec2 pixel = first_pixel(surface_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
-    Primary primary = primary_surface(pixel);
+    Primary primary = primary_surface(pixel, false);
     if (!primary.drawn) return;
     Surface s = primary.hit.s;
     s.diffuse *= 1.0 - primary.hit.transmits;

@@ -25,7 +25,7 @@ void main() {
     if (place >= work.mirrors_size.count) return;
     ivec2 pixel = first_pixel(mirror_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
-    Primary primary = primary_surface(pixel);
+    Primary primary = primary_surface(pixel, false);
     if (!primary.drawn) return;
     compensate(primary.hit.s);
     vec3 changed = mirrored_on_screen(primary.hit.s, true);

@@ -27,7 +27,7 @@ pub fn light<'a>(
         in_medium: rays.inside(),
         has_emissive: plan.emissive,
         has_layers: plan.layers,
-        has_triangles: planned.is_some(),
+        has_triangles: lighting.shadow_rays() || rays.inside(),
         has_transmission: planned.is_some_and(|rays| rays.refraction),
         brdf: lighting.knobs.index("brdf"),
         fresnel: lighting.knobs.index("fresnel"),
