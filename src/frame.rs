@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use anyhow::{Result, bail, ensure};
 use ash::vk;
+use glam::DVec3;
 
 use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, PassPlan, PassTime, Place};
 use crate::image::tone::ToneMap;
@@ -29,12 +30,12 @@ use crate::pass::shadow_map::ShadowMaps;
 use crate::pass::tiles::{Tiles, tiles};
 use crate::pass::tonemap::{Counts, Display, tonemap};
 use crate::pass::view::{View, jitter};
-use crate::plan::{Knobs, Plan, Surroundings};
-use crate::scene::black::without_black_textures;
+use crate::plan::{Demand, Facts, Knobs, Plan, Surroundings, needs_lights};
 use crate::scene::environment::Environment;
+use crate::scene::normal_form::normalise;
+use crate::scene::reads::forget_unread;
 use crate::scene::sigma::one_medium_each;
-use crate::scene::solid::solids;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Ambience, Bounds, Camera, Light, LightKind, Reads, Scene};
 use crate::share::{self, AovPixel};
 
 /// What lies behind the scene.
@@ -78,6 +79,8 @@ pub struct Settings {
     pub environment_rotation: f32,
     /// The way rays go through the scene; `None`: what suits the device and the scene.
     pub traversal: Option<Traversal>,
+    /// What is planned although the scene does not call for it.
+    pub demand: Demand,
     /// Which parts of the picture are kept beside it, each for the price of following all rays once more.
     pub parts: Vec<Part>,
 }
@@ -93,6 +96,7 @@ impl Default for Settings {
             environment_intensity: 1.0,
             environment_rotation: 0.0,
             traversal: None,
+            demand: Demand::default(),
             parts: Vec::new(),
         }
     }
@@ -191,7 +195,11 @@ impl Renderer {
         settings: Settings,
     ) -> Result<Self> {
         one_medium_each(&mut scene);
-        without_black_textures(&mut scene);
+        if settings.demand != Demand::Full {
+            let lit = environment.is_some() && settings.knobs.use_ambience();
+            forget_unread(&mut scene, Reads::Visible(if lit { Ambience::Present } else { Ambience::Absent }));
+        }
+        let form = normalise(&mut scene);
         let size = settings.size;
         let limit = device.max_image_size();
         if size.contains(&0) || size.iter().any(|&side| side > limit) {
@@ -212,24 +220,34 @@ impl Renderer {
         if settings.background == Background::Environment && environment.is_none() {
             bail!("--background env: there is no environment (--env none, or the scene has lights of its own)");
         }
-        let surroundings = Surroundings { environment: environment.is_some(), sky };
-        let plan = Plan::new(&scene, surroundings, &settings.knobs);
+        if needs_lights(settings.demand) && scene.lights.is_empty() {
+            add_dark_lights(&mut scene);
+        }
+        let facts = Facts::of(&scene, form);
+        let surroundings = Surroundings { environment: environment.is_some(), sky, demand: settings.demand };
+        let mut plan = Plan::new(&scene, &facts, surroundings, &settings.knobs);
         // What adds nothing takes no turn of any loop.
-        scene.lights.retain(|light| plan.directional_lights + plan.local_lights > 0 && light.shines());
+        let mut kept = plan.lights.iter();
+        scene.lights.retain(|_| kept.next().copied().unwrap_or_default());
         let part = |&part: &Part| PartOnDevice::new(device, &plan, &settings.knobs, part, size);
         let parts = settings.parts.iter().map(part).collect::<Result<_>>()?;
         let most = if plan.tiles { MOST_LISTED_LIGHTS } else { MOST_LIGHTS };
         if device.limits_loops() && scene.lights.len() > most {
             bail!("{}: {} lights, a software device lights with at most {most} such", scene.name, scene.lights.len());
         }
-        let solids = solids(&scene);
+        let solids = facts.solids;
         let refracts = plan.screen.refraction || plan.rays.is_some_and(|rays| rays.refraction);
         let mut warnings = if refracts { solids.warnings.clone() } else { Vec::new() };
         let rays = RaysOnDevice::new(device, &plan, &scene, &solids, settings.traversal)?;
         warnings.extend(rays.warnings.iter().cloned());
+        if let Some(bvh) = rays.facts.filter(|_| plan.rays.is_some_and(|rays| rays.refraction)) {
+            plan.found_touching(bvh.touching);
+        }
         for part in settings.parts.iter().filter(|part| !part.called_for(&plan)) {
             warnings.push(format!("--aov {}: no surface of this scene sends such rays, the layer is 0", part.name()));
         }
+        // What stands for an environment that is asked for and is not there.
+        let dark = (plan.environment && environment.is_none()).then(Environment::dark);
         let turn = Turn { intensity: settings.environment_intensity, rotation: settings.environment_rotation };
         let name = scene.name.clone();
         let scene = SceneOnDevice::new(device, scene, &plan, &settings.knobs, &solids, rays.anchor())?;
@@ -238,7 +256,7 @@ impl Renderer {
             Image::new(device, name, ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], usage))
         };
         Ok(Self {
-            environment: EnvironmentOnDevice::new(device, &plan, environment, turn)?,
+            environment: EnvironmentOnDevice::new(device, &plan, environment.or(dark.as_ref()), turn)?,
             shadow_maps: ShadowMaps::new(device, &plan, &name, &scene, rays.anchor())?,
             scene,
             rays,
@@ -541,6 +559,14 @@ impl Renderer {
         let [width, height] = self.settings.size;
         png::encode_png(width, height, &rendered.display, rendered.has_alpha)
     }
+}
+
+/// Lights of both kinds that do not shine: loops over lights then have a turn to take.
+fn add_dark_lights(scene: &mut Scene) {
+    let bounds = scene.bounds().unwrap_or(Bounds { min: DVec3::ZERO, max: DVec3::ONE });
+    let dark = |kind| Light { name: "dark".to_owned(), color: [0.0; 3], kind };
+    let point = LightKind::Point { position: bounds.max, range: Some(2.0 * bounds.radius()) };
+    scene.lights.extend([dark(LightKind::Directional { direction: DVec3::NEG_Y }), dark(point)]);
 }
 
 /// Pass times summed by name, in order of first appearance.

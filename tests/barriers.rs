@@ -9,7 +9,7 @@ use etalon::gpu::{Buffer, Frame, Image, ImageDesc, Place};
 use etalon::pass::classify::{WorkLists, classify};
 use etalon::pass::gbuffer::GBuffer;
 use etalon::pass::tonemap::{Display, tonemap};
-use etalon::plan::{Knobs, Plan, Surroundings};
+use etalon::plan::{Demand, Facts, Knobs, Plan, Surroundings};
 use etalon::scene::Scene;
 use gpu::Gpu;
 
@@ -39,7 +39,8 @@ struct Things {
 impl Things {
     fn new(gpu: &Gpu) -> Self {
         let size = [64, 36];
-        let plan = Plan::new(&Scene::default(), Surroundings { environment: false, sky: false }, &Knobs::default());
+        let surroundings = Surroundings { environment: false, sky: false, demand: Demand::Scene };
+        let plan = Plan::new(&Scene::default(), &Facts::default(), surroundings, &Knobs::default());
         let desc = ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], vk::ImageUsageFlags::STORAGE);
         let buffer = |name| Buffer::new(&gpu.device, name, 256, Place::Device).expect("a buffer");
         Self {

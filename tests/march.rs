@@ -14,7 +14,8 @@ use std::sync::Arc;
 
 use etalon::frame::Settings;
 use etalon::pass::rays::Traversal;
-use etalon::plan::{Knobs, Model, Plan, Surroundings};
+use etalon::plan::{Demand, Facts, Knobs, Model, Plan, Surroundings};
+use etalon::scene::normal_form::NormalForm;
 use etalon::scene::{Camera, LightKind, Material, Scene, SigmaGrid};
 use etalon::study::shape::Shape;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
@@ -518,7 +519,8 @@ fn light_reaches_into_a_body_through_its_grid() {
 fn planned(scene: &Scene, choices: &[&str]) -> Plan {
     let mut knobs = Knobs::of(Model::Recursive);
     choices.iter().for_each(|choice| knobs.set(choice).expect("a rung"));
-    Plan::new(scene, Surroundings { environment: false, sky: false }, &knobs)
+    let surroundings = Surroundings { environment: false, sky: false, demand: Demand::Scene };
+    Plan::new(scene, &Facts::of(scene, NormalForm::default()), surroundings, &knobs)
 }
 
 #[test]
@@ -549,7 +551,7 @@ fn the_plan_says_which_grid_is_marched_and_what_is_not_said_in_vain() {
 
     made.0.materials[0].sigma = None;
     let plan = planned(&made.0, &["absorption=march:8", "quadrature=left"]);
-    assert_eq!((plan.march().steps, plan.rays.map(|rays| rays.absorption)), (0, Some(2)));
+    assert_eq!((plan.march().steps, plan.rays.map(|rays| rays.absorption)), (0, Some(0)));
     assert!(warned(&plan, &["quadrature=left changes nothing"]), "{:?}", plan.warnings);
     assert!(planned(&made.0, &[]).warnings.is_empty());
 }

@@ -11,7 +11,7 @@ use gltf_builder::{Builder, FLOAT, UNSIGNED_BYTE, UNSIGNED_INT, f32s, png, u16s}
 use serde_json::{Value, json};
 
 fn refuse(path: &Path) -> String {
-    match scene::load(path, &LoadOptions { time: Some(0.5) }) {
+    match scene::load(path, &LoadOptions { time: Some(0.5), ..LoadOptions::default() }) {
         Ok(_) => panic!("{} was read", path.display()),
         Err(error) => {
             let text = format!("{error:#}");
@@ -94,7 +94,10 @@ impl Numbers {
 
 /// Loads and reports a panic with the seed that led to it; any other outcome will do.
 fn survives(path: &Path, seed: u64) -> bool {
-    let load = || scene::load(path, &LoadOptions { time: Some(0.5) }).map(|s| (s.bounds(), s.triangles()));
+    let load = || {
+        scene::load(path, &LoadOptions { time: Some(0.5), ..LoadOptions::default() })
+            .map(|s| (s.bounds(), s.triangles()))
+    };
     match std::panic::catch_unwind(AssertUnwindSafe(load)) {
         Ok(outcome) => outcome.is_ok(),
         Err(_) => panic!("seed {seed} made the importer panic"),
@@ -104,7 +107,9 @@ fn survives(path: &Path, seed: u64) -> bool {
 #[test]
 fn the_rich_file_is_sound_before_it_is_broken() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = scene::load(&rich().save_glb(folder.path()), &LoadOptions { time: Some(0.5) }).unwrap();
+    let scene =
+        scene::load(&rich().save_glb(folder.path()), &LoadOptions { time: Some(0.5), ..LoadOptions::default() })
+            .unwrap();
     assert_eq!((scene.triangles(), scene.cameras.len(), scene.lights.len()), (1 + 36, 1, 1));
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
 }

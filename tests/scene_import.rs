@@ -14,7 +14,7 @@ use serde_json::json;
 fn load_at(builder: &Builder, time: Option<f64>) -> Scene {
     let folder = tempfile::tempdir().unwrap();
     let path = builder.save_glb(folder.path());
-    scene::load(&path, &LoadOptions { time }).unwrap_or_else(|e| panic!("{e:#}"))
+    scene::load(&path, &LoadOptions { time, ..LoadOptions::default() }).unwrap_or_else(|e| panic!("{e:#}"))
 }
 
 fn load(builder: &Builder) -> Scene {

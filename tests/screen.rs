@@ -387,7 +387,9 @@ fn a_ball_bends_every_ray_by_its_own_normal() {
 fn sheets_shift_nothing() {
     let gpu = Gpu::new();
     let panel = Shape::panel(6.0, 6.0);
-    let blended = Material { alpha_mode: etalon::scene::AlphaMode::Blend, ..glass(0.4) };
+    // With an alpha of 1 it would be glass as any other.
+    let mut blended = Material { alpha_mode: etalon::scene::AlphaMode::Blend, ..glass(0.4) };
+    blended.base_color[3] = 0.9;
     let body = Shape::cuboid(DVec3::new(6.0, 6.0, 0.4));
     for (shape, material) in
         [(panel.clone(), glass(0.0)), (panel, glass(0.4)), (body.clone(), glass(0.0)), (body, blended)]
@@ -395,7 +397,7 @@ fn sheets_shift_nothing() {
         let mut made = plate(shape, material, 40.0, 10.0);
         made.front(0.5);
         let [screen, off] = ["refraction=screen", "refraction=off"].map(|rung| gpu.film(&made.0, on(&[rung])));
-        assert_eq!(bits(&screen), bits(&off));
+        assert!(bits(&screen) == bits(&off));
     }
 }
 

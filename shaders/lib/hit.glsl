@@ -96,9 +96,13 @@ vec4 hit_texture(uint material, uint slot, vec4 uv_sets, float footprint) {
     return mix(top, bottom, share.y);
 }
 
+bool has_hit_texture(uint material, uint slot) {
+    return (HIT_TEXTURES & (1u << slot)) != 0 && imageLoad(texel_slots, int(material * SLOTS + slot)).z != 0;
+}
+
 vec4 hit_texture_or(uint material, uint slot, vec4 uv_sets, float footprint, vec4 otherwise) {
     if ((HIT_TEXTURES & (1u << slot)) == 0) return otherwise;
-    return imageLoad(texel_slots, int(material * SLOTS + slot)).z != 0 ? hit_texture(material, slot, uv_sets, footprint) : otherwise;
+    return has_hit_texture(material, slot) ? hit_texture(material, slot, uv_sets, footprint) : otherwise;
 }
 
 // The point and the frame of a hit.
@@ -184,8 +188,10 @@ HitPoint hit_point_of(Hit hit, vec3 origin, vec3 direction) {
     if (HIT_COLORS) {
         uvec4 ab = floatBitsToUint(corner_texel(hit.triangle, COLORS_AT));
         uvec2 of_c = floatBitsToUint(corner_texel(hit.triangle, COLORS_AT + 1).xy);
-        r.color = vec4(unpackHalf2x16(ab.x), unpackHalf2x16(ab.y)) * w.x + vec4(unpackHalf2x16(ab.z), unpackHalf2x16(ab.w)) * w.y +
-                  vec4(unpackHalf2x16(of_c.x), unpackHalf2x16(of_c.y)) * w.z;
+        // White stays white to the last bit: the weights' sum need not be 1.
+        vec4 first = vec4(unpackHalf2x16(ab.x), unpackHalf2x16(ab.y));
+        r.color = first + (vec4(unpackHalf2x16(ab.z), unpackHalf2x16(ab.w)) - first) * w.y +
+                  (vec4(unpackHalf2x16(of_c.x), unpackHalf2x16(of_c.y)) - first) * w.z;
     }
     return r;
 }
@@ -201,6 +207,11 @@ float coverage_of(Material m, float texel_alpha) {
 float hit_coverage(HitPoint point) {
     vec4 texel = hit_texture_or(point.material, SLOT_BASE, point.uvs, 0.0, vec4(1.0));
     return coverage_of(material_at(point.material), point.color.a * texel.a);
+}
+
+// Whether there is no surface: in the holes of masks. What blends is there, however little of it.
+bool hit_is_hole(HitPoint point) {
+    return hit_coverage(point) == 0.0 && (material_at(point.material).flags & MATERIAL_BLENDED) == 0;
 }
 
 struct HitSurface {
@@ -234,11 +245,13 @@ HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
     vec3 n_coat = n;
     if ((HIT_TEXTURES & (1u << SLOT_NORMAL)) != 0) {
         vec3 texel = hit_texture_or(id, SLOT_NORMAL, point.uvs, footprint, vec4(0.5, 0.5, 1.0, 1.0)).xyz * 2.0 - 1.0;
-        n = bent_normal(point.n_smooth, point.t_smooth, vec3(texel.xy * m.normal_scale, texel.z));
+        vec3 bent = bent_normal(point.n_smooth, point.t_smooth, vec3(texel.xy * m.normal_scale, texel.z));
+        n = has_hit_texture(id, SLOT_NORMAL) ? bent : n;
     }
     if ((HIT_TEXTURES & (1u << SLOT_CLEARCOAT_NORMAL)) != 0) {
-        n_coat = bent_normal(point.n_smooth, point.t_smooth,
-                      hit_texture_or(id, SLOT_CLEARCOAT_NORMAL, point.uvs, footprint, vec4(0.5, 0.5, 1.0, 1.0)).xyz * 2.0 - 1.0);
+        vec3 texel = hit_texture_or(id, SLOT_CLEARCOAT_NORMAL, point.uvs, footprint, vec4(0.5, 0.5, 1.0, 1.0)).xyz * 2.0 - 1.0;
+        vec3 bent = bent_normal(point.n_smooth, point.t_smooth, texel);
+        n_coat = has_hit_texture(id, SLOT_CLEARCOAT_NORMAL) ? bent : n_coat;
     }
     r.front = dot(point.n, direction) <= 0.0;
     float side = r.front ? 1.0 : -1.0;

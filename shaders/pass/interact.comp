@@ -359,7 +359,7 @@ void main() {
             found = trace(ray.origin, ray.direction, ray.self, found, goes_on ? LARGEST : -1.0, OPAQUE | FILTER, false);
             at_surface = goes_on && found.triangle != NO_TRIANGLE;
             if (at_surface) point = hit_point_of(found, ray.origin, ray.direction);
-            hole = MASKED_HITS && at_surface && loop_heads < LOOP_BUDGET && hit_coverage(point) == 0.0;
+            hole = MASKED_HITS && at_surface && loop_heads < LOOP_BUDGET && hit_is_hole(point);
         } while (hole);
         // What outlives the loop is assigned under a condition: lavapipe goes on with lanes that are through, and what it
         // computes for them then is nothing.

@@ -9,10 +9,10 @@ use glam::DVec3;
 use crate::frame::{Background, Settings};
 use crate::gpu::DeviceChoice;
 use crate::image::tone::ToneMap;
-use crate::plan::{Knobs, Model};
+use crate::plan::{Demand, Knobs, Model};
 use crate::scene::camera::{Camera, DEFAULT_FOV_Y};
 use crate::scene::environment::Environment;
-use crate::scene::{LoadOptions, Scene};
+use crate::scene::{Ambience, LoadOptions, Reads, Scene};
 
 /// When to show something.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -23,6 +23,24 @@ pub enum When {
     Always,
     /// Never.
     Never,
+}
+
+/// How much is planned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Extent {
+    /// What the scene calls for.
+    Scene,
+    /// Every effect that the knobs allow.
+    Full,
+}
+
+impl Extent {
+    fn demand(self) -> Demand {
+        match self {
+            Self::Scene => Demand::Scene,
+            Self::Full => Demand::Full,
+        }
+    }
 }
 
 /// What to draw, and from where.
@@ -75,6 +93,9 @@ pub struct PictureOptions {
     /// Choose a knob's rung, for example samples=16; repeatable
     #[arg(long = "set", value_name = "KNOB=RUNG")]
     pub set: Vec<String>,
+    /// What is planned: what the scene calls for, or every effect that the knobs allow, for the same picture
+    #[arg(long, value_enum, value_name = "scene|full", default_value_t = Extent::Scene)]
+    pub plan: Extent,
     /// Exposure in stops, display outputs only
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_hyphen_values = true)]
     pub exposure: f32,
@@ -129,7 +150,7 @@ impl SceneOptions {
     ///
     /// # Errors
     /// One sentence with file, place and cause.
-    pub fn load(&self) -> Result<Scene> {
+    pub fn load(&self, reads: Reads) -> Result<Scene> {
         let time = match self.time.as_str() {
             "none" => None,
             text => match text.parse::<f64>() {
@@ -140,7 +161,7 @@ impl SceneOptions {
         match self.scene.strip_prefix("study:") {
             Some(_) if time.is_some() => bail!("--time: {} has no animation", self.scene),
             Some(name) => crate::study::load(name),
-            None => crate::scene::load(&PathBuf::from(&self.scene), &LoadOptions { time }),
+            None => crate::scene::load(&PathBuf::from(&self.scene), &LoadOptions { time, reads }),
         }
     }
 
@@ -223,6 +244,19 @@ impl PictureOptions {
         Ok(knobs)
     }
 
+    /// What the picture may depend on, as far as that can be told before the scene is read.
+    #[must_use]
+    pub fn reads(&self, scene: &SceneOptions, knobs: &Knobs) -> Reads {
+        let asked = scene.background == Some(Background::Environment);
+        match (self.plan, scene.env.as_deref()) {
+            (Extent::Full, _) => Reads::Everything,
+            _ if !knobs.use_ambience() => Reads::Visible(Ambience::Absent),
+            (_, Some("none")) => Reads::Visible(Ambience::Absent),
+            (_, None) if !asked => Reads::Visible(Ambience::WithoutLights),
+            _ => Reads::Visible(Ambience::Present),
+        }
+    }
+
     /// Everything the renderer needs to know.
     ///
     /// # Errors
@@ -243,6 +277,7 @@ impl PictureOptions {
             environment_intensity: scene.env_intensity,
             environment_rotation: scene.env_rotation,
             traversal: None,
+            demand: self.plan.demand(),
             parts: Vec::new(),
         })
     }

@@ -32,7 +32,7 @@ pub struct PlanArgs {
 /// One sentence with what was being done, to what, and the cause.
 pub fn run(args: &PlanArgs) -> Result<ExitCode> {
     let settings = args.picture.settings(&args.scene)?;
-    let setup = Setup::load(&args.scene, &args.device)?;
+    let setup = Setup::load(&args.scene, args.picture.reads(&args.scene, &settings.knobs), &args.device)?;
     let mut warnings = setup.warnings.clone();
     let (mut renderer, camera) = setup.renderer(&args.scene, settings)?;
     warnings.extend(renderer.warnings.iter().cloned());

@@ -200,7 +200,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     phases.end("start");
 
     steps.step(&format!("loading {}", args.scene.scene), 1);
-    let setup = Setup::load(&args.scene, &args.device)?;
+    let setup = Setup::load(&args.scene, args.picture.reads(&args.scene, &settings.knobs), &args.device)?;
     phases.end("load");
     let device = setup.device.clone();
     let info = device.info().clone();

@@ -79,6 +79,8 @@ pub struct PlanFacts {
     pub pipelines: Vec<PipelineFact>,
     /// Buffers and images that outlive a frame or feed one, by label.
     pub buffers: Vec<Created>,
+    /// Textures and texture coordinates of the scene that are neither decoded nor uploaded, with the reason.
+    pub unread: Vec<String>,
     /// What the chosen rungs leave out.
     pub warnings: Vec<String>,
 }
@@ -123,6 +125,7 @@ impl PlanFacts {
                 .into_iter()
                 .filter(|made| matches!(made.kind, "buffer" | "image") && made.name != "staging")
                 .collect(),
+            unread: plan.unread.clone(),
             warnings: plan.warnings.clone(),
         }
     }

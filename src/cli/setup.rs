@@ -8,7 +8,7 @@ use super::options::{DeviceOptions, SceneOptions};
 use crate::frame::{Renderer, Settings};
 use crate::gpu::Device;
 use crate::scene::environment::Environment;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Reads, Scene};
 
 /// A scene, what lies around it, and what it will be drawn on.
 pub struct Setup {
@@ -27,11 +27,11 @@ impl Setup {
     ///
     /// # Errors
     /// One sentence with file, place and cause; that of the scene first.
-    pub fn load(scene: &SceneOptions, device: &DeviceOptions) -> Result<Self> {
+    pub fn load(scene: &SceneOptions, reads: Reads, device: &DeviceOptions) -> Result<Self> {
         let (device, loaded, environment) = std::thread::scope(|scope| {
             let device = scope.spawn(|| Device::open(&device.choice(), device.validate));
             let environment = scope.spawn(|| scene.load_environment());
-            let loaded = scene.load();
+            let loaded = scene.load(reads);
             let join = |_| anyhow!("a loading thread failed");
             (device.join().map_err(join), loaded, environment.join().map_err(join))
         });

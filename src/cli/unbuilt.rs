@@ -18,8 +18,6 @@ pub struct UnbuiltOptions {
     shard: Option<String>,
     #[arg(long, hide = true, value_name = "N")]
     seed: Option<String>,
-    #[arg(long, hide = true, value_name = "scene|full")]
-    plan: Option<String>,
 }
 
 impl UnbuiltOptions {
@@ -35,7 +33,6 @@ impl UnbuiltOptions {
             ("--fps", &self.fps),
             ("--shard", &self.shard),
             ("--seed", &self.seed),
-            ("--plan", &self.plan),
         ];
         for (name, value) in all {
             if let Some(value) = value {

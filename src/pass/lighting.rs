@@ -39,6 +39,23 @@ pub struct Lighting<'a> {
     pub size: [u32; 2],
 }
 
+/// Directional lights in parts, local ones in parts, the last of the former with the first of the latter. Local lights are
+/// divided at the same ones whether or not tiles list them: sums are the same to the last bit then.
+fn parts(directional: u32, local: u32, words: u32) -> Vec<Range> {
+    let of = |count: u32, most: u32| (0..count).step_by(most as usize).map(move |i| [i, (i + most).min(count)]);
+    let mut parts: Vec<Range> = of(directional, LIGHTS_AT_ONCE).map(|[from, to]| [from, to, 0, 0]).collect();
+    let mut rest: Vec<Range> = of(local, LIGHTS_AT_ONCE)
+        .map(|[from, to]| [directional + from, directional + to, 0, 0])
+        .chain(of(words, LIGHTS_AT_ONCE / 32).map(|[from, to]| [directional, directional, from, to]))
+        .collect();
+    if let (Some(last), Some(first)) = (parts.last_mut(), rest.first()) {
+        *last = [last[0], first[1], first[2], first[3]];
+        rest.remove(0);
+    }
+    parts.append(&mut rest);
+    parts
+}
+
 /// Lights of the table from, up to; words of the tiles' masks from, up to.
 pub type Range = [u32; 4];
 
@@ -74,9 +91,21 @@ impl Lighting<'_> {
         if !self.shadow_rays() {
             return vec![[0, lights, 0, words]];
         }
-        let parts = |count: u32, of: u32| (0..count).step_by(of as usize).map(move |i| [i, (i + of).min(count)]);
-        let plain = parts(lights, LIGHTS_AT_ONCE).map(|[from, to]| [from, to, 0, 0]);
-        let listed = parts(words, LIGHTS_AT_ONCE / 32).map(|[from, to]| [0, 0, from, to]);
-        plain.chain(listed).collect()
+        parts(self.plan.directional_lights, lights - self.plan.directional_lights, words)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lights_are_divided_at_the_same_ones_with_and_without_lists() {
+        assert_eq!(parts(1, 3, 0), [[0, 4, 0, 0]]);
+        assert_eq!(parts(1, 0, 1), [[0, 1, 0, 1]]);
+        assert_eq!(parts(0, 70, 0), [[0, 64, 0, 0], [64, 70, 0, 0]]);
+        assert_eq!(parts(0, 0, 3), [[0, 0, 0, 2], [0, 0, 2, 3]]);
+        assert_eq!(parts(65, 130, 0), [[0, 64, 0, 0], [64, 129, 0, 0], [129, 193, 0, 0], [193, 195, 0, 0]]);
+        assert_eq!(parts(65, 0, 5), [[0, 64, 0, 0], [64, 65, 0, 2], [65, 65, 2, 4], [65, 65, 4, 5]]);
     }
 }

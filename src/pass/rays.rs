@@ -155,7 +155,7 @@ impl RaysOnDevice {
                 first_triangle[t.instance as usize] + local[t.primitive as usize]
             })
             .collect();
-        let corners = Corners::of(scene, solids, rays.refraction);
+        let corners = Corners::of(scene, solids, rays);
         let triangles: Vec<[[u32; 4]; 3]> = bvh
             .triangles
             .par_iter()
@@ -365,6 +365,8 @@ fn flat_faces(mesh: &Mesh) -> Vec<u32> {
 /// Classes of triangles: shaders/lib/trace.glsl.
 const OPAQUE: u32 = 1;
 const FILTER: u32 = 2;
+/// Every bit of `HIT_TEXTURES`.
+const EVERYTHING: u32 = 0x1fff;
 /// What lies at the corners of triangles, as shaders/lib/hit.glsl reads it.
 struct Corners<'a> {
     scene: &'a Scene,
@@ -382,8 +384,8 @@ struct Corners<'a> {
 }
 
 impl<'a> Corners<'a> {
-    fn of(scene: &'a Scene, solids: &'a Solids, refraction: bool) -> Self {
-        let mut contents = 0;
+    fn of(scene: &'a Scene, solids: &'a Solids, rays: Rays) -> Self {
+        let mut contents = if rays.textures { EVERYTHING } else { 0 };
         for instance in &scene.instances {
             let mesh = &scene.meshes[instance.mesh];
             for (slot, (texture, _)) in texture_slots(&scene.materials[mesh.material]).iter().enumerate() {
@@ -405,7 +407,7 @@ impl<'a> Corners<'a> {
             mirrored.push(turned(solids.flipped[i]));
             scales.push(determinant.abs().cbrt() as f32);
         }
-        Self { scene, solids, refraction, cofactors, mirrored, normals_mirrored, scales, contents }
+        Self { scene, solids, refraction: rays.refraction, cofactors, mirrored, normals_mirrored, scales, contents }
     }
 
     /// The order of a triangle's corners that runs counter-clockwise around its front.

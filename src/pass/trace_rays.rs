@@ -8,9 +8,9 @@ use bytemuck::{Pod, Zeroable};
 
 use super::rays::{RaysOnDevice, Traversal};
 use crate::gpu::{Buffer, Device, Frame, Place};
-use crate::plan::{Knobs, Plan, Surroundings};
+use crate::plan::{Demand, Facts, Knobs, Plan, Surroundings};
 use crate::scene::Scene;
-use crate::scene::solid::solids;
+use crate::scene::normal_form::NormalForm;
 use crate::shader::trace_rays;
 use crate::share::WorkCounts;
 
@@ -70,10 +70,11 @@ impl Tracer {
     /// # Errors
     /// When it does not fit the device.
     pub fn new(device: &Arc<Device>, scene: &Scene, traversal: Option<Traversal>) -> Result<Self> {
-        let surroundings = Surroundings { environment: false, sky: false };
-        let mut plan = Plan::new(scene, surroundings, &Knobs::default());
+        let surroundings = Surroundings { environment: false, sky: false, demand: Demand::Scene };
+        let facts = Facts::of(scene, NormalForm::default());
+        let mut plan = Plan::new(scene, &facts, surroundings, &Knobs::default());
         plan.rays = Some(crate::plan::Rays::default());
-        Ok(Self { device: device.clone(), rays: RaysOnDevice::new(device, &plan, scene, &solids(scene), traversal)? })
+        Ok(Self { device: device.clone(), rays: RaysOnDevice::new(device, &plan, scene, &facts.solids, traversal)? })
     }
 
     /// The hierarchy and its tables.

@@ -229,6 +229,12 @@ impl Knobs {
         self.rung("absorption").strip_prefix("march:").and_then(|n| n.parse().ok()).unwrap_or(0)
     }
 
+    /// Whether light from all around, where there is any, is seen on surfaces.
+    #[must_use]
+    pub fn use_ambience(&self) -> bool {
+        self.rung("indirect") != "off" || self.rung("reflection") != "off"
+    }
+
     /// Samples per pixel.
     #[must_use]
     pub fn samples(&self) -> u32 {

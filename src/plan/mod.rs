@@ -1,14 +1,21 @@
 //! The plan: what a scene calls for, with the reason, before any Vulkan object exists. Pure and printable.
 
+mod effect;
 mod knobs;
+mod left_out;
+mod surfaces;
 
+pub use effect::{Demand, Effect, Evidence};
 pub use knobs::{KNOBS, Knob, Knobs, Model};
+pub use surfaces::{casts_in_maps, is_see_through, mirrors};
 
-use std::collections::BTreeMap;
+use effect::{Cause, Decisions};
+use left_out::left_out;
+use surfaces::{Surfaces, has_layers, refracts, scatters};
 
-use serde::Serialize;
-
-use crate::scene::{AlphaMode, LightKind, Material, Scene};
+use crate::scene::normal_form::NormalForm;
+use crate::scene::solid::{Solids, solids};
+use crate::scene::{AlphaMode, Light, LightKind, Material, Scene};
 
 /// Which passes and which code a scene needs under the chosen knobs.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,6 +28,8 @@ pub struct Plan {
     pub clearcoat: bool,
     /// Code for metals given by n and κ.
     pub conductors: bool,
+    /// What was asked for beside what the scene calls for.
+    pub demand: Demand,
     /// There is an environment: rays that leave the scene see it, whatever surfaces do.
     pub environment: bool,
     /// The environment is seen in surfaces.
@@ -31,7 +40,9 @@ pub struct Plan {
     pub sky: bool,
     /// Passes for alpha-blended and transmissive surfaces.
     pub see_through: bool,
-    /// Directional lights.
+    /// Which lights of the scene there are.
+    pub lights: Vec<bool>,
+    /// Directional ones among them.
     pub directional_lights: u32,
     /// Point and spot lights.
     pub local_lights: u32,
@@ -52,6 +63,8 @@ pub struct Plan {
     pub samples: u32,
     /// Every effect with its reason.
     pub effects: Vec<Effect>,
+    /// Textures and texture coordinates of the scene that are neither decoded nor uploaded, and why, a sentence each.
+    pub unread: Vec<String>,
     /// What the chosen rungs leave out of this scene, a sentence each.
     pub warnings: Vec<String>,
 }
@@ -79,6 +92,8 @@ pub struct Rays {
     pub march: March,
     /// Surfaces that a path may meet.
     pub interfaces: u32,
+    /// Textures, coordinates and colours are kept for what rays meet, whether or not there are any.
+    pub textures: bool,
 }
 
 /// How segments of paths go through grids of σ.
@@ -103,19 +118,21 @@ pub struct Screen {
     pub refraction: bool,
 }
 
-/// One effect, kept or not, and why.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Effect {
-    /// What it is.
-    pub name: &'static str,
-    /// `kept`, `dropped` (a knob says so) or `not called for` (the scene does).
-    pub state: &'static str,
-    /// The rung of its knob.
-    pub rung: &'static str,
-    /// One sentence.
-    pub reason: String,
-    /// What the reason rests on.
-    pub evidence: BTreeMap<&'static str, String>,
+/// What is known of a scene beside what it says.
+#[derive(Debug, Clone, Default)]
+pub struct Facts {
+    /// Which surfaces enclose a medium.
+    pub solids: Solids,
+    /// What was said more simply.
+    pub form: NormalForm,
+}
+
+impl Facts {
+    /// Of a scene in normal form.
+    #[must_use]
+    pub fn of(scene: &Scene, form: NormalForm) -> Self {
+        Self { solids: solids(scene), form }
+    }
 }
 
 /// What is known beside the scene.
@@ -125,233 +142,70 @@ pub struct Surroundings {
     pub environment: bool,
     /// It is also the background.
     pub sky: bool,
-}
-
-/// Whether a surface is laid over what lies behind it, in passes of its own: blended surfaces, and transmissive ones where
-/// no rays refract in them (`refracting_rays`).
-#[must_use]
-pub fn is_see_through(material: &Material, refracting_rays: bool) -> bool {
-    material.alpha_mode == AlphaMode::Blend || (material.transmission > 0.0 && !refracting_rays)
-}
-
-/// Whether a surface is drawn into shadow maps. What lets light through does not stop it there: it passes unweakened.
-#[must_use]
-pub fn casts_in_maps(material: &Material) -> bool {
-    !is_see_through(material, false)
-}
-
-/// Whether anything is mirrored at a surface.
-#[must_use]
-pub fn mirrors(material: &Material) -> bool {
-    material.metallic > 0.0 || material.specular > 0.0
-}
-
-/// Whether some of the light that a surface receives leaves it in all directions.
-fn scatters(material: &Material) -> bool {
-    !material.unlit
-        && (material.metallic < 1.0 || material.metallic_roughness_texture.is_some())
-        && (material.transmission < 1.0 || material.transmission_texture.is_some())
-        && material.base_color[..3] != [0.0; 3]
+    /// What is asked for beside what the scene calls for.
+    pub demand: Demand,
 }
 
 /// Perceptual roughness up to which surfaces are mirrored on the screen.
 const ROUGHEST_ON_SCREEN: f32 = 0.2;
 
-fn has_layers(material: &Material) -> bool {
-    [
-        material.clearcoat_texture,
-        material.clearcoat_roughness_texture,
-        material.specular_texture,
-        material.transmission_texture,
-        material.thickness_texture,
-    ]
-    .iter()
-    .any(Option::is_some)
-}
-
 /// From this many point and spot lights on, tiles list them (docs/decisions/light-lists.md).
 const TILES_FROM: u32 = 16;
 
+/// Place of the rung `path` in the knob `absorption`; the rungs `march` do as it does where nothing varies.
+const PATH: u32 = 2;
+
+/// What all parts of a plan are decided from.
+struct Planner<'a> {
+    scene: &'a Scene,
+    surfaces: Surfaces<'a>,
+    knobs: &'a Knobs,
+    surroundings: Surroundings,
+    decisions: Decisions<'a>,
+}
+
 impl Plan {
-    /// Decides from values, not names.
+    /// Decides from values, not names. `scene` is in normal form, and `facts` are of it.
     #[must_use]
-    pub fn new(scene: &Scene, surroundings: Surroundings, knobs: &Knobs) -> Self {
-        let used = used_materials(scene);
-        let find = |test: &dyn Fn(&Material) -> bool| used.iter().copied().find(|m| test(m));
-        let mut effects = Vec::new();
-        let mut decide = |name, knob: &'static str, cause: Cause, allowed: bool| {
-            let rung = if knob.is_empty() { "" } else { knobs.rung(knob) };
-            let (state, reason, evidence) = match cause {
-                Err(reason) => ("not called for", reason.to_owned(), BTreeMap::new()),
-                Ok((_, evidence)) if !allowed => ("dropped", format!("{knob}={rung}"), evidence),
-                Ok((reason, evidence)) => ("kept", reason, evidence),
-            };
-            effects.push(Effect { name, state, rung, reason, evidence });
-            state == "kept"
-        };
-        let material = |found: Option<&Material>, says: &dyn Fn(&Material) -> String| {
-            let found = found.ok_or("no material in use has it")?;
-            let evidence = BTreeMap::from([("material", found.name.clone())]);
-            Ok((format!("material \"{}\" {}", found.name, says(found)), evidence))
-        };
-
-        let found = find(&|m| m.emissive_texture.is_some() && m.emissive != [0.0; 3]);
-        let cause = material(found, &|_| "has an emissive texture".to_owned());
-        let emissive = decide("emissive textures", "", cause, true);
-        let cause = material(find(&|m| m.clearcoat > 0.0), &|m| format!("has clearcoat {}", m.clearcoat));
-        let clearcoat = decide("clear coat", "", cause, true);
-        let found = find(&|m| has_layers(m) || m.clearcoat > 0.0);
-        let layers = decide("layers", "", material(found, &|_| "has a coat or layer textures".to_owned()), true);
-        let cause = material(find(&|m| m.conductor.is_some()), &|_| "is a metal with n and kappa".to_owned());
-        let conductors = decide("metals by n and kappa", "", cause, true);
-        let refracts = |m: &Material| m.transmission > 0.0 && m.alpha_mode != AlphaMode::Blend;
-        let cause = material(find(&refracts), &|m| format!("has transmission {}, n = {}", m.transmission, m.ior));
-        let refracts = decide("refraction", "refraction", cause, knobs.rung("refraction") != "off");
-        let refraction = refracts && knobs.rung("refraction") == "ray";
-        let cause = material(find(&|m| is_see_through(m, refraction)), &|m| match m.alpha_mode {
-            AlphaMode::Blend => "is alpha-blended".to_owned(),
-            _ => format!("has transmission {}", m.transmission),
-        });
-        let see_through = decide("see-through surfaces", "", cause, true);
-        let found = find(&|m| m.marched_sigma().is_some());
-        let size =
-            |m: &Material| m.sigma.as_ref().map_or([0; 3], |grid| grid.size()).map(|n| n.to_string()).join(" x ");
-        let cause = material(found, &|m| format!("has a grid of {} values of sigma", size(m)));
-        let cause = cause.map(|(reason, mut evidence)| {
-            evidence.extend(found.map(|m| ("grid", size(m))));
-            (reason, evidence)
-        });
-        // Without rays that refract all that is transparent is a sheet.
-        let (knob, allowed) = match knobs.rung("refraction") == "ray" {
-            true => ("absorption", knobs.march_steps() > 0),
-            false => ("refraction", false),
-        };
-        let marched = decide("media that vary", knob, cause, allowed);
-        let cause = match marched {
-            true => Ok((format!("{} steps of each segment", knobs.march_steps()), BTreeMap::new())),
-            false => Err("no medium is marched"),
-        };
-        decide("quadrature", "quadrature", cause, true);
-        let march = March {
-            steps: if marched { knobs.march_steps() } else { 0 },
-            rule: knobs.index("quadrature"),
-            colours: used.iter().any(|m| m.marched_sigma().is_some_and(|grid| grid.channels() > 1)),
-        };
-
-        let environment = |shows: bool, else_reason: &'static str| match (surroundings.environment, shows) {
-            (true, true) => Ok(("there is an environment".to_owned(), BTreeMap::new())),
-            (true, false) => Err(else_reason),
-            (false, _) => Err("there is no environment"),
-        };
-        let any = |test: &dyn Fn(&Material) -> bool| used.iter().any(|m| test(m));
-        let shiny = any(&|m| !m.unlit && (mirrors(m) || m.clearcoat > 0.0));
-        let cause = environment(shiny, "no material in use mirrors anything");
-        let reflection = decide("mirrored environment", "reflection", cause, knobs.rung("reflection") != "off");
-        // A texture only lowers the factor.
-        let roughest_mirror =
-            if knobs.rung("reflection") == "ray" { knobs.roughest_lobe() } else { ROUGHEST_ON_SCREEN };
-        let smooth = |m: &Material| {
-            let base = mirrors(m) && (m.roughness <= roughest_mirror || m.metallic_roughness_texture.is_some());
-            let coat = m.clearcoat > 0.0
-                && (m.clearcoat_roughness <= roughest_mirror || m.clearcoat_roughness_texture.is_some());
-            !m.unlit && (base || coat)
-        };
-        let cause =
-            material(find(&smooth), &|m| match (mirrors(m) && m.roughness <= roughest_mirror, m.clearcoat > 0.0) {
-                (true, _) => format!("has roughness {}", m.roughness),
-                (false, true) => format!("has a coat of roughness {}", m.clearcoat_roughness),
-                (false, false) => "has a roughness texture".to_owned(),
-            });
-        let mirrored = decide("mirrors", "reflection", cause, matches!(knobs.rung("reflection"), "screen" | "ray"));
-        let mirror_rays = mirrored && knobs.rung("reflection") == "ray";
-        let on_screen = |see_through| {
-            let found = find(&|m| smooth(m) && is_see_through(m, refraction) == see_through);
-            mirrored && !mirror_rays && found.is_some()
-        };
-        let screen = Screen {
-            mirrors: on_screen(false),
-            see_through_mirrors: on_screen(true),
-            refraction: refracts && !refraction,
-        };
-        let cause = environment(any(&scatters), "no material in use scatters light");
-        let ambient = decide("ambient light", "indirect", cause, knobs.rung("indirect") != "off");
-
-        let shining = || scene.lights.iter().filter(|light| light.shines());
-        let lit = any(&|m| !m.unlit);
-        let count = |test: &dyn Fn(&LightKind) -> bool| match lit {
-            true => shining().filter(|light| test(&light.kind)).count() as u32,
-            false => 0,
-        };
-        let directional_lights = count(&|kind| matches!(kind, LightKind::Directional { .. }));
-        let local_lights = count(&|kind| !matches!(kind, LightKind::Directional { .. }));
-        let ranged = count(&|kind| {
-            matches!(kind, LightKind::Point { range: Some(_), .. } | LightKind::Spot { range: Some(_), .. })
-        });
-        let evidence = BTreeMap::from([
-            ("directional", directional_lights.to_string()),
-            ("local", local_lights.to_string()),
-            ("with a range", ranged.to_string()),
-            ("dark", (scene.lights.len() - shining().count()).to_string()),
-        ]);
-        let cause = match (shining().next(), lit) {
-            (None, _) if scene.lights.is_empty() => Err("the scene has no lights"),
-            (None, _) => Err("all lights of the scene are dark"),
-            (_, false) => Err("all materials in use are unlit"),
-            _ => {
-                let reason = format!("{directional_lights} directional, {local_lights} point and spot lights");
-                Ok((reason, evidence.clone()))
-            }
-        };
-        decide("punctual lights", "lights", cause.clone(), true);
-        let shadowed = decide("shadows", "shadows", cause, knobs.rung("shadows") != "off");
-        let shadow_maps = shadowed && knobs.rung("shadows") == "map";
-        let shadows = shadowed && !shadow_maps;
-        let rays = (shadows || mirror_rays || refraction).then(|| {
-            let masked = any(&|m| matches!(m.alpha_mode, AlphaMode::Mask(_)));
-            Rays {
-                shadows,
-                mirrors: mirror_rays,
-                refraction,
-                transmissive: any(&|m| m.transmission > 0.0),
-                masked,
-                filters: masked || any(&|m| is_see_through(m, false)),
-                rough: any(&|m| {
-                    let coat = m.clearcoat > 0.0 && m.clearcoat_roughness > 0.0;
-                    (mirror_rays && smooth(m) && (m.roughness > 0.0 || coat))
-                        || (refraction && m.transmission > 0.0 && m.roughness > 0.0)
-                }),
-                absorption: knobs.index("absorption").min(PATH),
-                march: if marched { march } else { March::default() },
-                interfaces: knobs.interfaces(),
-            }
-        });
-        let cause = match (local_lights >= TILES_FROM, ranged > 0) {
-            (false, _) => Err("few point and spot lights"),
-            (_, false) => Err("no light has a range"),
-            _ => Ok((format!("{ranged} of {local_lights} point and spot lights have a range"), evidence)),
-        };
-        let tiles = decide("light lists per tile", "", cause, true);
+    pub fn new(scene: &Scene, facts: &Facts, surroundings: Surroundings, knobs: &Knobs) -> Self {
+        let surfaces = Surfaces::of(scene, facts);
+        let decisions = Decisions { knobs, demand: surroundings.demand, effects: Vec::new() };
+        let mut planner = Planner { scene, surfaces, knobs, surroundings, decisions };
+        let layers = planner.layers();
+        let transmission = planner.transmission();
+        let images = planner.mirror_images(&transmission);
+        let lights = planner.lights();
+        let rays = planner.rays(&transmission, &images, &lights);
+        let shadow_maps = lights.shadows && knobs.rung("shadows") == "map";
+        let Planner { surfaces, decisions, .. } = planner;
         Self {
-            emissive,
-            layers,
-            clearcoat,
-            conductors,
-            environment: surroundings.environment,
-            reflection,
-            ambient,
+            emissive: layers.emissive,
+            layers: layers.layers,
+            clearcoat: layers.clearcoat,
+            conductors: layers.conductors,
+            demand: surroundings.demand,
+            environment: images.environment,
+            reflection: images.prefiltered,
+            ambient: images.ambient,
             sky: surroundings.sky,
-            see_through,
-            directional_lights,
-            local_lights,
-            tiles,
-            reflectance: reflection || ambient || screen != Screen::default() || knobs.rung("brdf") == "ggx-multi",
+            see_through: transmission.see_through,
+            directional_lights: lights.directional,
+            local_lights: lights.local,
+            tiles: lights.tiles,
+            reflectance: images.prefiltered
+                || images.ambient
+                || images.screen != Screen::default()
+                || surroundings.demand == Demand::Full
+                || knobs.rung("brdf") == "ggx-multi",
             shadow_maps,
+            lights: lights.kept,
             rays,
-            screen,
-            roughest_mirror,
+            screen: images.screen,
+            roughest_mirror: images.roughest,
             samples: knobs.samples(),
-            effects,
-            warnings: left_out(&used, knobs, refracts, refraction, shadow_maps),
+            effects: decisions.effects,
+            unread: scene.unread.clone(),
+            warnings: left_out(&surfaces, knobs, &transmission, shadow_maps),
         }
     }
 
@@ -360,52 +214,251 @@ impl Plan {
     pub fn march(&self) -> March {
         self.rays.map_or_else(March::default, |rays| rays.march)
     }
+
+    /// Enters into the account what only the hierarchy of triangles tells: whether transparent bodies lie against other
+    /// surfaces. No demand includes that: what touches is another picture.
+    pub fn found_touching(&mut self, touching: bool) {
+        self.effects.push(Effect {
+            name: "bodies that touch",
+            state: if touching { "kept" } else { "not called for" },
+            rung: "",
+            reason: match touching {
+                true => "some transparent body lies against another surface",
+                false => "no transparent body lies against another surface",
+            }
+            .to_owned(),
+            evidence: Evidence::new(),
+        });
+    }
 }
 
-/// Place of the rung `path` in the knob `absorption`; the rungs `march` do as it does where nothing varies.
-const PATH: u32 = 2;
+struct Layers {
+    emissive: bool,
+    clearcoat: bool,
+    layers: bool,
+    conductors: bool,
+}
 
-/// What no rung that is built can show of these materials.
-fn left_out(used: &[&Material], knobs: &Knobs, refracts: bool, by_rays: bool, shadow_maps: bool) -> Vec<String> {
-    let mut warnings = Vec::new();
-    let mut say = |test: &dyn Fn(&Material) -> bool, what: &str| {
-        if let Some(material) = used.iter().find(|material| test(material)) {
-            warnings.push(format!("material \"{}\" {what}", material.name));
+/// What lets light through, and how.
+struct Transmission {
+    /// A knob shows it bent …
+    bends: bool,
+    /// … by rays.
+    by_rays: bool,
+    see_through: bool,
+    march: March,
+}
+
+struct MirrorImages {
+    environment: bool,
+    prefiltered: bool,
+    ambient: bool,
+    roughest: f32,
+    by_rays: bool,
+    screen: Screen,
+}
+
+struct Lights {
+    kept: Vec<bool>,
+    directional: u32,
+    local: u32,
+    shadows: bool,
+    tiles: bool,
+}
+
+impl Planner<'_> {
+    fn layers(&mut self) -> Layers {
+        let Self { surfaces, decisions, .. } = self;
+        let emits = |m: &Material| m.emissive_texture.is_some() && m.emissive != [0.0; 3];
+        let cause = surfaces.cause(emits, |_| "has an emissive texture".to_owned());
+        let emissive = decisions.decide("emissive textures", cause);
+        let cause = surfaces.cause(|m| m.clearcoat > 0.0, |m| format!("has clearcoat {}", m.clearcoat));
+        let clearcoat = decisions.decide("clear coat", cause);
+        let cause =
+            surfaces.cause(|m| has_layers(m) || m.clearcoat > 0.0, |_| "has a coat or layer textures".to_owned());
+        let layers = decisions.decide("layers", cause);
+        let cause = surfaces.cause(|m| m.conductor.is_some(), |_| "is a metal with n and kappa".to_owned());
+        let conductors = decisions.decide("metals by n and kappa", cause);
+        // A coat's numbers lie in the layers.
+        Layers { emissive, clearcoat, layers: layers || clearcoat, conductors }
+    }
+
+    fn transmission(&mut self) -> Transmission {
+        let Self { surfaces, decisions, knobs, surroundings, .. } = self;
+        let rung = knobs.rung("refraction");
+        let cause = surfaces.cause(refracts, |m| surfaces.body(m));
+        let bends = decisions.decide_with("refraction", "refraction", rung != "off", cause);
+        let by_rays = bends && rung == "ray";
+        let cause = surfaces.cause(
+            |m| is_see_through(m, by_rays),
+            |m| match m.alpha_mode {
+                AlphaMode::Blend => format!("is alpha-blended, {} opaque at most", m.base_color[3]),
+                _ => format!("has transmission {}", m.transmission),
+            },
+        );
+        let see_through = decisions.decide("see-through surfaces", cause);
+        let size =
+            |m: &Material| m.sigma.as_ref().map_or([0; 3], |grid| grid.size()).map(|n| n.to_string()).join(" x ");
+        let cause =
+            surfaces.cause(|m| m.marched_sigma().is_some(), |m| format!("has a grid of {} values of sigma", size(m)));
+        let grid = surfaces.find(|m| m.marched_sigma().is_some()).map(size);
+        let cause = cause.with_some("grid", grid.as_slice());
+        // Without rays that refract all that is transparent is a sheet.
+        let (knob, allowed) = match rung == "ray" {
+            true => ("absorption", knobs.march_steps() > 0),
+            false => ("refraction", false),
+        };
+        let marched = decisions.decide_with("media that vary", knob, allowed, cause) && by_rays;
+        let steps = if marched { knobs.march_steps() } else { 0 };
+        let cause = Cause::when(marched, format!("{steps} steps of each segment"), "no medium is marched");
+        decisions.decide_with("quadrature", "quadrature", true, cause);
+        let colours = surroundings.demand == Demand::Full
+            || surfaces.any(|m| m.marched_sigma().is_some_and(|grid| grid.channels() > 1));
+        let march = March { steps, rule: knobs.index("quadrature"), colours: marched && colours };
+        Transmission { bends, by_rays, see_through, march: if marched { march } else { March::default() } }
+    }
+
+    fn mirror_images(&mut self, transmission: &Transmission) -> MirrorImages {
+        let Self { surfaces, decisions, knobs, surroundings, .. } = self;
+        let there_is = surroundings.environment;
+        let cause = Cause::when(there_is, "there is an environment", "there is no environment");
+        let environment = decisions.decide("environment", cause);
+        let shown = |called_for: bool, against: &str| match there_is {
+            true => Cause::when(called_for, "there is an environment", against),
+            false => Cause::against("there is no environment"),
+        };
+        let rung = knobs.rung("reflection");
+        let shiny = surfaces.any(|m| !m.unlit && (mirrors(m) || m.clearcoat > 0.0));
+        let cause = shown(shiny, "no material in use mirrors anything");
+        let prefiltered = decisions.decide_with("mirrored environment", "reflection", rung != "off", cause);
+        // A texture only lowers the factor.
+        let roughest = if rung == "ray" { knobs.roughest_lobe() } else { ROUGHEST_ON_SCREEN };
+        let smooth = |m: &Material| surfaces::is_smooth(m, roughest);
+        let cause = surfaces.cause(smooth, |m| match (mirrors(m) && m.roughness <= roughest, m.clearcoat > 0.0) {
+            (true, _) => format!("has roughness {}", m.roughness),
+            (false, true) => format!("has a coat of roughness {}", m.clearcoat_roughness),
+            (false, false) => "has a roughness texture".to_owned(),
+        });
+        let mirrored = decisions.decide_with("mirrors", "reflection", matches!(rung, "screen" | "ray"), cause);
+        let by_rays = mirrored && rung == "ray";
+        let demanded = surroundings.demand.includes("mirrors");
+        let on_screen = |see_through: bool| {
+            let found = surfaces.any(|m| smooth(m) && is_see_through(m, transmission.by_rays) == see_through);
+            mirrored && !by_rays && (found || demanded)
+        };
+        let screen = Screen {
+            mirrors: on_screen(false),
+            see_through_mirrors: on_screen(true) && transmission.see_through,
+            refraction: transmission.bends && !transmission.by_rays,
+        };
+        let cause = shown(surfaces.any(scatters), "no material in use scatters light");
+        let ambient = decisions.decide_with("ambient light", "indirect", knobs.rung("indirect") != "off", cause);
+        let environment = environment || prefiltered || ambient;
+        MirrorImages { environment, prefiltered, ambient, roughest, by_rays, screen }
+    }
+
+    fn lights(&mut self) -> Lights {
+        let Self { scene, surfaces, decisions, knobs, surroundings } = self;
+        let lit = surfaces.any(|m| !m.unlit);
+        let bounds = scene.bounds();
+        let reaches = |light: &Light| bounds.is_none_or(|bounds| light.reaches(&bounds));
+        let useful = |light: &Light| light.shines() && reaches(light);
+        let useful_lights = scene.lights.iter().filter(|light| useful(light)).count();
+        // Dark ones stand for those that are asked for and not there. Beside others they would take room in shadow maps.
+        let stand_in = needs_lights(surroundings.demand) && useful_lights == 0;
+        let keeps = |light: &Light| stand_in || (useful(light) && (lit || needs_lights(surroundings.demand)));
+        let kept: Vec<bool> = scene.lights.iter().map(keeps).collect();
+        let count = |test: &dyn Fn(&LightKind) -> bool| {
+            scene.lights.iter().zip(&kept).filter(|(light, kept)| **kept && test(&light.kind)).count() as u32
+        };
+        let directional = count(&|kind| matches!(kind, LightKind::Directional { .. }));
+        let local = count(&|kind| !matches!(kind, LightKind::Directional { .. }));
+        let ranged = count(&|kind| {
+            matches!(kind, LightKind::Point { range: Some(_), .. } | LightKind::Spot { range: Some(_), .. })
+        });
+        let dark = scene.lights.iter().filter(|light| !light.shines()).count();
+        let cause = match (scene.lights.is_empty(), useful_lights > 0, lit) {
+            (true, ..) => Cause::against("the scene has no lights"),
+            (_, false, _) if dark == scene.lights.len() => Cause::against("all lights of the scene are dark"),
+            (_, false, _) => Cause::against("no light of the scene reaches anything"),
+            (.., false) => Cause::against("all materials in use are unlit"),
+            _ => Cause::of(format!("{directional} directional, {local} point and spot lights")),
+        };
+        let counts = |cause: Cause| match scene.lights.is_empty() {
+            true => cause,
+            false => cause
+                .with("directional", directional)
+                .with("local", local)
+                .with("with a range", ranged)
+                .with("dark", dark)
+                .with("out of range", scene.lights.len() - dark - useful_lights),
+        };
+        decisions.decide("punctual lights", counts(cause.clone()));
+        let shadows = decisions.decide_with("shadows", "shadows", knobs.rung("shadows") != "off", counts(cause));
+        let cause = match (local >= TILES_FROM, ranged > 0) {
+            (false, _) => Cause::against("few point and spot lights"),
+            (_, false) => Cause::against("no light has a range"),
+            _ => counts(Cause::of(format!("{ranged} of {local} point and spot lights have a range"))),
+        };
+        let tiles = decisions.decide(LIGHT_LISTS, cause);
+        Lights { kept, directional, local, shadows, tiles }
+    }
+
+    /// What sends rays, and the code for what they may meet.
+    fn rays(&mut self, transmission: &Transmission, images: &MirrorImages, lights: &Lights) -> Option<Rays> {
+        let Self { surfaces, decisions, knobs, surroundings, .. } = self;
+        let shadows = lights.shadows && knobs.rung("shadows") == "ray";
+        let (refraction, mirrors) = (transmission.by_rays, images.by_rays);
+        if !(shadows || mirrors || refraction) {
+            return None;
         }
-    };
-    let straight = |m: &Material| m.transmission > 0.0 && !(refracts && m.alpha_mode != AlphaMode::Blend);
-    let clear = |m: &Material| straight(m) || (m.transmission > 0.0 && !by_rays);
-    say(&straight, "transmits light that goes straight on: refraction is off, or the material is blended");
-    say(&|m| clear(m) && m.roughness > 0.1, "transmits through a rough surface: shown clear");
-    let casts = |m: &Material| !shadow_maps || casts_in_maps(m);
-    say(&|m| !casts(m), "casts no shadow: the maps of shadows=map hold opaque and masked surfaces alone");
-    let (absorption, marches) = (knobs.rung("absorption"), by_rays && knobs.march_steps() > 0);
-    let varies = |m: &Material| m.marched_sigma().is_some();
-    let instead = format!(
-        "has a grid of sigma, of which absorption={absorption} with refraction={} takes the mean; refraction=ray with \
-         absorption=march:4 to march:64 goes through it",
-        knobs.rung("refraction")
-    );
-    say(&|m| varies(m) && !marches && absorption != "off", &instead);
-    say(&|m| m.dispersion > 0.0, "has dispersion, which is not built");
-    let (lobes, reflection) = (knobs.rung("lobes"), knobs.rung("reflection"));
-    if lobes != "0.2" && reflection != "ray" {
-        warnings.push(format!("lobes={lobes} changes nothing: reflection={reflection} sends no rays"));
+        let holes = |m: &Material| matches!(m.alpha_mode, AlphaMode::Mask(_));
+        let masked = decisions.decide("holes before rays", surfaces.cause(holes, |_| "has holes".to_owned()));
+        let lets_through = |m: &Material| holes(m) || is_see_through(m, false);
+        let cause = match shadows {
+            true => surfaces.cause(lets_through, |_| "lets light through".to_owned()),
+            false => Cause::against("no rays look for lights"),
+        };
+        let filters = decisions.decide("light through surfaces", cause);
+        let cause = surfaces.cause(|m| m.transmission > 0.0, |m| format!("has transmission {}", m.transmission));
+        let transmissive = decisions.decide("transmission before rays", cause);
+        let rough = |m: &Material| {
+            let coat = m.clearcoat > 0.0 && m.clearcoat_roughness > 0.0;
+            (mirrors && surfaces::is_smooth(m, images.roughest) && (m.roughness > 0.0 || coat))
+                || (refraction && m.transmission > 0.0 && m.roughness > 0.0)
+        };
+        let rough = decisions
+            .decide("rays by lobes", surfaces.cause(rough, |m| format!("sends rays at roughness {}", m.roughness)));
+        let absorbs = |m: &Material| m.absorbs() && m.transmission > 0.0 && m.thickness > 0.0;
+        let absorption = decisions.decide_with(
+            "absorption",
+            "absorption",
+            knobs.rung("absorption") != "off",
+            surfaces.cause(absorbs, |m| match m.marched_sigma() {
+                Some(_) => "has a grid of sigma".to_owned(),
+                None => format!("has attenuation distance {} m", m.attenuation_distance),
+            }),
+        );
+        Some(Rays {
+            shadows,
+            mirrors,
+            refraction,
+            transmissive,
+            masked,
+            filters,
+            rough,
+            absorption: if absorption { knobs.index("absorption").min(PATH) } else { 0 },
+            march: transmission.march,
+            interfaces: knobs.interfaces(),
+            textures: surroundings.demand == Demand::Full,
+        })
     }
-    let rule = knobs.rung("quadrature");
-    if rule != "midpoint" && !(marches && used.iter().any(|m| varies(m))) {
-        warnings.push(format!("quadrature={rule} changes nothing: no medium is marched"));
-    }
-    warnings
 }
 
-/// Why a scene calls for an effect, with what that rests on; or why it does not.
-type Cause = Result<(String, BTreeMap<&'static str, String>), &'static str>;
+const LIGHT_LISTS: &str = "light lists per tile";
 
-fn used_materials(scene: &Scene) -> Vec<&Material> {
-    let mut used = vec![false; scene.materials.len()];
-    for instance in &scene.instances {
-        used[scene.meshes[instance.mesh].material] = true;
-    }
-    scene.materials.iter().zip(used).filter_map(|(material, used)| used.then_some(material)).collect()
+/// Whether effects are asked for that need lights: dark ones, where the scene has none.
+#[must_use]
+pub fn needs_lights(demand: Demand) -> bool {
+    ["punctual lights", "shadows", LIGHT_LISTS].iter().any(|name| demand.includes(name))
 }

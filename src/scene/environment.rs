@@ -77,6 +77,13 @@ impl Environment {
         Self { name: "constant".into(), width: 4, height: 2, radiance: vec![rgb; 8] }
     }
 
+    /// Nothing from anywhere, in as many texels as the studio has: what takes its place costs as much.
+    #[must_use]
+    pub fn dark() -> Self {
+        let (width, height) = (512_u32, 256_u32);
+        Self { name: "dark".into(), width, height, radiance: vec![[0.0; 3]; (width * height) as usize] }
+    }
+
     /// The built-in light for a scene that has none: a neutral photographic studio, 512x256.
     ///
     /// A bluish-white sky over a darker grey floor, and three soft boxes: the key from the upper left in front (seen

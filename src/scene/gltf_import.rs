@@ -4,7 +4,11 @@
 //! between nodes unless a skin or a morph bends it. Files are not trusted: every index is checked before use and
 //! every failure is a sentence.
 
-use std::{collections::HashMap, fs, path::Path};
+use std::{
+    collections::{HashMap, HashSet},
+    fs,
+    path::Path,
+};
 
 use anyhow::{Context, Result, ensure};
 use glam::{DAffine3, DMat3, DMat4, DVec3, Mat4, Vec3};
@@ -23,6 +27,7 @@ use super::{
     container::Document,
     geometry, gltf_material,
     nodes::{Nodes, label},
+    reads::{Coordinates, forget_textures, unread_coordinates},
     thin::{self, Stroke},
 };
 
@@ -34,19 +39,23 @@ pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let nodes = Nodes::new(&document, options.time, &mut warnings)?;
     let mut materials = gltf_material::read(&document, &mut warnings)?;
     check_unseen_meshes(&document)?;
-    let (meshes, instances) = Placing::new(&document, &nodes, &mut materials.materials, &mut warnings).run()?;
-    let cameras = cameras(&document, &nodes, &mut warnings)?;
     let lights = lights(&document, &nodes, &mut warnings)?;
+    let mut placing = Placing::new(&document, &nodes, &mut materials.materials, &mut warnings)?;
+    let unread = placing.forget_unread(options.reads.ambience(lights.len()));
+    let (meshes, instances) = placing.run()?;
+    let images = materials.decode(&document)?;
+    let cameras = cameras(&document, &nodes, &mut warnings)?;
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     Ok(Scene {
         name: path.display().to_string(),
         meshes,
         instances,
         materials: materials.materials,
-        images: materials.images,
+        images,
         lights,
         studio: None,
         cameras,
+        unread,
         warnings: warnings.into_iter().map(|w| format!("{file}: {w}")).collect(),
     })
 }
@@ -139,6 +148,9 @@ struct Placing<'d, 'b, 'w> {
     nodes: &'d Nodes,
     materials: &'w mut Vec<Material>,
     warnings: &'w mut Vec<String>,
+    jobs: Vec<Job>,
+    /// Attributes that nothing reads are read nevertheless.
+    everything: bool,
 }
 
 impl<'d, 'b, 'w> Placing<'d, 'b, 'w> {
@@ -147,26 +159,53 @@ impl<'d, 'b, 'w> Placing<'d, 'b, 'w> {
         nodes: &'d Nodes,
         materials: &'w mut Vec<Material>,
         warnings: &'w mut Vec<String>,
-    ) -> Self {
-        Self { document, nodes, materials, warnings }
+    ) -> Result<Self> {
+        let mut placing = Self { document, nodes, materials, warnings, jobs: Vec::new(), everything: true };
+        placing.jobs = placing.jobs()?;
+        if placing.jobs.iter().any(|job| placing.material(job).is_none()) {
+            placing.materials.push(Material::default());
+        }
+        Ok(placing)
+    }
+
+    fn material(&self, job: &Job) -> Option<usize> {
+        self.document.root.meshes[job.mesh].primitives[job.primitive].material.map(|m| m.value())
+    }
+
+    /// Takes from the materials what cannot be seen; `None` for `ambience` keeps it all.
+    fn forget_unread(&mut self, ambience: Option<bool>) -> Vec<String> {
+        let Some(ambience) = ambience else { return Vec::new() };
+        self.everything = false;
+        let used: HashSet<usize> = self.jobs.iter().filter_map(|job| self.material(job)).collect();
+        let materials = self.materials.iter_mut().enumerate();
+        let mut unread: Vec<String> =
+            materials.flat_map(|(i, m)| forget_textures(m, used.contains(&i), ambience)).collect();
+        for job in &self.jobs {
+            let read = self.material(job).map_or([false; 2], |i| Coordinates::of(&self.materials[i]).sets);
+            let json = &self.document.root.meshes[job.mesh].primitives[job.primitive];
+            let there = |set: usize| json.attributes.contains_key(&Checked::Valid(Semantic::TexCoords(set as u32)));
+            let name = self.document.root.meshes[job.mesh].name.clone().unwrap_or_else(|| format!("mesh {}", job.mesh));
+            unread.extend((0..2).filter(|&set| there(set) && !read[set]).map(|set| unread_coordinates(&name, set)));
+        }
+        unread.dedup();
+        unread
     }
 
     fn run(self) -> Result<(Vec<Mesh>, Vec<Instance>)> {
-        let jobs = self.jobs()?;
-        let root = &self.document.root;
-        if jobs.iter().any(|j| root.meshes[j.mesh].primitives[j.primitive].material.is_none()) {
-            self.materials.push(Material::default());
-        }
         let (document, materials): (_, &[Material]) = (self.document, self.materials);
+        let (jobs, everything) = (&self.jobs, self.everything);
         let built = jobs
             .par_iter()
-            .map(|job| build(document, materials, job).with_context(|| place(document, job.mesh, job.primitive)))
+            .map(|job| {
+                build(document, materials, job, everything).with_context(|| place(document, job.mesh, job.primitive))
+            })
             .collect::<Result<Vec<_>>>()?;
         let mut meshes: Vec<Mesh> = Vec::with_capacity(built.len());
         let mut instances = Vec::new();
         let mut strokes = Vec::new();
+        let mut warnings = Vec::new();
         for (job, built) in jobs.iter().zip(built) {
-            self.warnings.extend(built.warnings);
+            warnings.extend(built.warnings);
             let placements: Vec<_> = job.nodes.iter().map(|&node| (node, self.placement(job, node))).collect();
             if !built.strokes.is_empty() {
                 let placements = placements.into_iter().map(|(node, world)| (self.node_name(node), world)).collect();
@@ -178,13 +217,14 @@ impl<'d, 'b, 'w> Placing<'d, 'b, 'w> {
             }
             for (node, world_from_object) in placements {
                 if cofactors(&world_from_object.matrix3) == DMat3::ZERO {
-                    self.warnings.push(format!("{} is scaled to nothing and is left out", label(document, node)));
+                    warnings.push(format!("{} is scaled to nothing and is left out", label(document, node)));
                     continue;
                 }
                 instances.push((node, Instance { name: self.node_name(node), mesh: meshes.len(), world_from_object }));
             }
             meshes.push(built.mesh);
         }
+        self.warnings.append(&mut warnings);
         instances.sort_by_key(|(node, _)| *node);
         let mut instances = instances.into_iter().map(|(_, instance)| instance).collect();
         thin::add(&strokes, &mut meshes, &mut instances);
@@ -278,37 +318,7 @@ fn cofactors(m: &DMat3) -> DMat3 {
     DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b))
 }
 
-/// The uv sets and tangents that a material needs.
-struct Needs {
-    sets: [bool; 2],
-    tangent_set: Option<usize>,
-}
-
-fn needs(material: &Material) -> Needs {
-    let mut sets = [false; 2];
-    let m = material;
-    let textures = [
-        m.base_color_texture,
-        m.metallic_roughness_texture,
-        m.normal_texture,
-        m.occlusion_texture,
-        m.emissive_texture,
-        m.specular_texture,
-        m.specular_color_texture,
-        m.transmission_texture,
-        m.thickness_texture,
-        m.clearcoat_texture,
-        m.clearcoat_roughness_texture,
-        m.clearcoat_normal_texture,
-    ];
-    for texture in textures.into_iter().flatten() {
-        sets[texture.uv_set as usize & 1] = true;
-    }
-    let tangent_set = m.normal_texture.or(m.clearcoat_normal_texture).map(|t| t.uv_set as usize & 1);
-    Needs { sets, tangent_set }
-}
-
-fn build(document: &Document<'_>, materials: &[Material], job: &Job) -> Result<Built> {
+fn build(document: &Document<'_>, materials: &[Material], job: &Job, everything: bool) -> Result<Built> {
     let root = &document.root;
     let json = &root.meshes[job.mesh].primitives[job.primitive];
     let place = place(document, job.mesh, job.primitive);
@@ -324,25 +334,26 @@ fn build(document: &Document<'_>, materials: &[Material], job: &Job) -> Result<B
     let name = root.meshes[job.mesh].name.clone().unwrap_or_else(|| format!("mesh {}", job.mesh));
     // Primitives without a material get glTF's default one, which is the last.
     let material = json.material.map_or(materials.len() - 1, |m| m.value());
-    let needs = needs(&materials[material]);
+    let read = Coordinates::of(&materials[material]);
+    let uvs = |set: usize| match get(Semantic::TexCoords(set as u32))? {
+        Some(accessor) if everything || read.sets[set] => accessor.floats::<2>(),
+        _ => Ok(Vec::new()),
+    };
     let mut mesh = Mesh {
         name: if many { format!("{name} primitive {}", job.primitive) } else { name },
         positions,
         normals: get(Semantic::Normals)?.map_or(Ok(Vec::new()), |a| a.floats::<3>())?,
-        tangents: match needs.tangent_set {
+        tangents: match read.tangents {
             Some(_) => get(Semantic::Tangents)?.map_or(Ok(Vec::new()), |a| a.floats::<4>())?,
             None => Vec::new(),
         },
-        uvs: [
-            get(Semantic::TexCoords(0))?.map_or(Ok(Vec::new()), |a| a.floats::<2>())?,
-            get(Semantic::TexCoords(1))?.map_or(Ok(Vec::new()), |a| a.floats::<2>())?,
-        ],
+        uvs: [uvs(0)?, uvs(1)?],
         colors: get(Semantic::Colors(0))?.map_or(Ok(Vec::new()), |a| a.colors())?,
         indices: Vec::new(),
         material,
     };
     for set in 0..2 {
-        if needs.sets[set] && mesh.uvs[set].is_empty() {
+        if read.sets[set] && mesh.uvs[set].is_empty() {
             warnings.push(format!("{place}: a texture uses TEXCOORD_{set}, which is missing; (0, 0) is taken"));
             mesh.uvs[set] = vec![[0.0; 2]; mesh.positions.len()];
         }
@@ -393,7 +404,7 @@ fn build(document: &Document<'_>, materials: &[Material], job: &Job) -> Result<B
     if mirrored {
         mesh.indices.as_chunks_mut::<3>().0.iter_mut().for_each(|t| t.swap(1, 2));
     }
-    let repairs = geometry::finish(&mut mesh, needs.tangent_set);
+    let repairs = geometry::finish(&mut mesh, read.tangents);
     warnings.extend(repairs.sentences(&place));
     Ok(Built { mesh, strokes: Vec::new(), warnings })
 }

@@ -20,10 +20,11 @@ use super::{
     gltf_extras, pictures,
 };
 
-/// Materials of the whole file and the pictures they use.
+/// Materials of the whole file, and which of its images their textures are of.
 pub(crate) struct Materials {
     pub(crate) materials: Vec<Material>,
-    pub(crate) images: Vec<Image>,
+    /// By [`TextureRef::image`], until [`Materials::decode`].
+    files: Vec<usize>,
 }
 
 /// KHR_materials_clearcoat, which the `gltf` crate does not know.
@@ -61,7 +62,7 @@ struct Reader<'d, 'b, 'w> {
     place: String,
 }
 
-/// Reads every material of the file, and decodes the pictures they use in parallel.
+/// Reads every material of the file.
 pub(crate) fn read(document: &Document<'_>, warnings: &mut Vec<String>) -> Result<Materials> {
     let root = &document.root;
     let mut reader = Reader {
@@ -79,13 +80,26 @@ pub(crate) fn read(document: &Document<'_>, warnings: &mut Vec<String>) -> Resul
         };
         materials.push(reader.material(index, json).with_context(|| reader.place.clone())?);
     }
-    let (used, slots) = (reader.used_images, reader.image_slots);
-    let images = used.par_iter().map(|&i| decode(document, i)).collect::<Result<Vec<_>>>()?;
-    // Pictures that no material uses are opened as far as their header, so that a broken file is not called sound.
-    for (i, _) in slots.iter().enumerate().filter(|(_, slot)| slot.is_none()) {
-        with_bytes(document, i, |_, bytes| pictures::probe(bytes))?;
+    Ok(Materials { materials, files: reader.used_images })
+}
+
+impl Materials {
+    /// Decodes, in parallel, the pictures that the materials still name. The others are opened as far as their header, so
+    /// that a broken file is not called sound.
+    pub(crate) fn decode(&mut self, document: &Document<'_>) -> Result<Vec<Image>> {
+        let mut places = vec![None; self.files.len()];
+        let mut wanted = Vec::new();
+        for texture in self.materials.iter_mut().flat_map(Material::textures_mut).flatten() {
+            texture.image = *places[texture.image].get_or_insert_with(|| {
+                wanted.push(self.files[texture.image]);
+                wanted.len() - 1
+            });
+        }
+        for i in (0..document.root.images.len()).filter(|i| !wanted.contains(i)) {
+            with_bytes(document, i, |_, bytes| pictures::probe(bytes))?;
+        }
+        wanted.par_iter().map(|&i| decode(document, i)).collect()
     }
-    Ok(Materials { materials, images })
 }
 
 /// Hands the encoded bytes of image `index` and its name to `then`, and puts the name into what goes wrong.

@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use super::Bounds;
+
 /// A light without extent.
 #[derive(Debug, Clone)]
 pub struct Light {
@@ -19,6 +21,17 @@ impl Light {
     #[must_use]
     pub fn shines(&self) -> bool {
         self.color != [0.0; 3]
+    }
+
+    /// Whether some of it reaches a box; true where its range leaves that open.
+    #[must_use]
+    pub fn reaches(&self, bounds: &Bounds) -> bool {
+        let (LightKind::Point { position, range } | LightKind::Spot { position, range, .. }) = self.kind else {
+            return true;
+        };
+        let distance = (position - position.clamp(bounds.min, bounds.max)).length();
+        // Distances on the device have roundings, of 1e-7 of the coordinates about the eye.
+        range.is_none_or(|range| distance < range * (1.0 + 1e-3))
     }
 }
 

@@ -86,10 +86,53 @@ pub struct Material {
 }
 
 impl Material {
+    /// Every texture that it may have.
+    pub(crate) fn textures(&self) -> [Option<TextureRef>; 12] {
+        [
+            self.base_color_texture,
+            self.metallic_roughness_texture,
+            self.normal_texture,
+            self.occlusion_texture,
+            self.emissive_texture,
+            self.specular_texture,
+            self.specular_color_texture,
+            self.transmission_texture,
+            self.thickness_texture,
+            self.clearcoat_texture,
+            self.clearcoat_roughness_texture,
+            self.clearcoat_normal_texture,
+        ]
+    }
+
+    /// The same, to be changed.
+    pub(crate) fn textures_mut(&mut self) -> [&mut Option<TextureRef>; 12] {
+        [
+            &mut self.base_color_texture,
+            &mut self.metallic_roughness_texture,
+            &mut self.normal_texture,
+            &mut self.occlusion_texture,
+            &mut self.emissive_texture,
+            &mut self.specular_texture,
+            &mut self.specular_color_texture,
+            &mut self.transmission_texture,
+            &mut self.thickness_texture,
+            &mut self.clearcoat_texture,
+            &mut self.clearcoat_roughness_texture,
+            &mut self.clearcoat_normal_texture,
+        ]
+    }
+
+    /// Whether light is lost on its way through the medium.
+    #[must_use]
+    pub fn absorbs(&self) -> bool {
+        (self.attenuation_distance.is_finite() && self.attenuation_color.iter().any(|&c| c < 1.0))
+            || self.marched_sigma().is_some()
+    }
+
     /// The grid of σ of a body that light enters.
     #[must_use]
     pub fn marched_sigma(&self) -> Option<&SigmaGrid> {
-        self.sigma.as_deref().filter(|_| self.transmission > 0.0 && self.thickness > 0.0)
+        self.sigma.as_deref().filter(|grid| self.transmission > 0.0 && self.thickness > 0.0 && !grid.is_zero())
     }
 }
 

@@ -5,7 +5,6 @@
 
 mod aabb;
 mod accessor;
-pub mod black;
 pub mod bvh;
 pub mod camera;
 pub mod contact;
@@ -18,9 +17,11 @@ mod gltf_material;
 pub mod light;
 pub mod material;
 mod nodes;
+pub mod normal_form;
 mod obj;
 mod pictures;
 mod ploc;
+pub mod reads;
 pub mod sigma;
 pub mod solid;
 pub(crate) mod substance;
@@ -34,6 +35,7 @@ use glam::{DAffine3, DVec3};
 pub use camera::{Camera, Projection};
 pub use light::{Light, LightKind};
 pub use material::{AlphaMode, Material, Phong, Sampler, TextureRef, Wrap};
+pub use reads::{Ambience, Reads};
 pub use sigma::SigmaGrid;
 
 /// What [`load`] may be told.
@@ -43,6 +45,8 @@ pub struct LoadOptions {
     /// channel clamped to its own range. `None` is the rest pose stored in the file: node transforms and default
     /// weights as written, skins evaluated with them.
     pub time: Option<f64>,
+    /// What is read of it.
+    pub reads: Reads,
 }
 
 /// Reads a scene from a glTF 2.0 file (`.gltf`, `.glb`) or a Wavefront file (`.obj`).
@@ -53,7 +57,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let scene = match extension.as_str() {
         "gltf" | "glb" => gltf_import::load(path, options),
-        "obj" => obj::load(path),
+        "obj" => obj::load(path, options.reads),
         _ => {
             bail!("loading {}: only .gltf, .glb and .obj files are supported", path.display())
         }
@@ -83,6 +87,8 @@ pub struct Scene {
     pub studio: Option<f32>,
     /// Cameras in world space, in the order of the file's nodes.
     pub cameras: Vec<Camera>,
+    /// Textures and texture coordinates that are not read, with the reason, a sentence each.
+    pub unread: Vec<String>,
     /// Things that were read around: each one sentence that names the file, the place and the consequence.
     pub warnings: Vec<String>,
 }

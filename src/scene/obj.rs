@@ -4,7 +4,7 @@
 
 use std::{
     borrow::Cow,
-    collections::HashMap,
+    collections::{HashMap, HashSet},
     fs,
     hash::{BuildHasherDefault, Hasher},
     path::{Path, PathBuf},
@@ -17,6 +17,7 @@ use rayon::prelude::*;
 
 use super::{
     AlphaMode, Image, Instance, Material, Mesh, Phong, Sampler, Scene, TextureRef, Wrap, geometry, pictures,
+    reads::{Reads, forget_textures},
     thin::{self, Stroke},
 };
 
@@ -24,7 +25,7 @@ use super::{
 const MAX_EARS: usize = 2_000;
 
 /// Reads an `.obj` file and the material libraries it names.
-pub(crate) fn load(path: &Path) -> Result<Scene> {
+pub(crate) fn load(path: &Path, reads: Reads) -> Result<Scene> {
     let bytes = fs::read(path).context("the file cannot be read")?;
     let text = String::from_utf8_lossy(&bytes);
     let mut reader = Reader {
@@ -35,7 +36,7 @@ pub(crate) fn load(path: &Path) -> Result<Scene> {
     for (number, line) in logical_lines(&text) {
         reader.line(&line).with_context(|| format!("line {number}"))?;
     }
-    let mut scene = reader.finish()?;
+    let mut scene = reader.finish(reads)?;
     scene.name = path.display().to_string();
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     scene.warnings.iter_mut().for_each(|w| *w = format!("{file}: {w}"));
@@ -338,8 +339,7 @@ impl Reader {
         })
     }
 
-    fn finish(mut self) -> Result<Scene> {
-        let images = self.pictures.par_iter().map(decode).collect::<Result<Vec<_>>>()?;
+    fn finish(mut self, reads: Reads) -> Result<Scene> {
         if self.groups.iter().any(|g| g.material.is_none()) {
             let grey = Mtl { kd: Some([0.8; 3]), ..Mtl::default() };
             for group in self.groups.iter_mut().filter(|g| g.material.is_none()) {
@@ -348,8 +348,10 @@ impl Reader {
             self.materials.push(grey.fold("default"));
         }
         let groups = std::mem::take(&mut self.groups);
+        let unread = self.forget_unread(reads, &groups);
+        let images = self.decode()?;
         let built: Vec<(Mesh, Vec<Stroke>, Vec<String>)> = groups.into_par_iter().map(|g| self.build(g)).collect();
-        let mut scene = Scene { images, warnings: self.warnings, ..Scene::default() };
+        let mut scene = Scene { images, unread, warnings: self.warnings, ..Scene::default() };
         let mut strokes = Vec::new();
         for (mesh, lines, warnings) in built {
             scene.warnings.extend(warnings);
@@ -364,6 +366,27 @@ impl Reader {
         thin::add(&strokes, &mut scene.meshes, &mut scene.instances);
         scene.materials = self.materials;
         Ok(scene)
+    }
+
+    /// Takes from the materials what cannot be seen. There are no lights in such a file.
+    fn forget_unread(&mut self, reads: Reads, groups: &[Group]) -> Vec<String> {
+        let Some(ambience) = reads.ambience(0) else { return Vec::new() };
+        let used: HashSet<usize> = groups.iter().filter_map(|group| group.material).collect();
+        let materials = self.materials.iter_mut().enumerate();
+        materials.flat_map(|(i, m)| forget_textures(m, used.contains(&i), ambience)).collect()
+    }
+
+    /// Decodes, in parallel, the pictures that the materials still name.
+    fn decode(&mut self) -> Result<Vec<Image>> {
+        let mut places = vec![None; self.pictures.len()];
+        let mut wanted = Vec::new();
+        for texture in self.materials.iter_mut().flat_map(Material::textures_mut).flatten() {
+            texture.image = *places[texture.image].get_or_insert_with(|| {
+                wanted.push(&self.pictures[texture.image]);
+                wanted.len() - 1
+            });
+        }
+        wanted.par_iter().map(|&picture| decode(picture)).collect()
     }
 
     fn build(&self, group: Group) -> (Mesh, Vec<Stroke>, Vec<String>) {

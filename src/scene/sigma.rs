@@ -77,6 +77,12 @@ impl SigmaGrid {
         self.values[point * channels + channel.min(channels - 1)]
     }
 
+    /// Whether nothing is absorbed anywhere.
+    #[must_use]
+    pub fn is_zero(&self) -> bool {
+        self.values.iter().all(|&v| v == 0.0)
+    }
+
     /// Multiplies all values.
     pub fn scale(&mut self, factor: f32) {
         self.values.iter_mut().for_each(|v| *v *= factor);

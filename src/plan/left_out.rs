@@ -1,0 +1,45 @@
+//! What the chosen rungs leave out of a scene.
+
+use super::surfaces::{Surfaces, casts_in_maps};
+use super::{Knobs, Transmission};
+use crate::scene::{AlphaMode, Material};
+
+/// A sentence for each thing that the chosen rungs do not show of these surfaces, and for each rung that changes nothing.
+pub(super) fn left_out(
+    surfaces: &Surfaces,
+    knobs: &Knobs,
+    transmission: &Transmission,
+    shadow_maps: bool,
+) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let mut say = |test: &dyn Fn(&Material) -> bool, what: &str| {
+        if let Some(material) = surfaces.find(test) {
+            warnings.push(format!("material \"{}\" {what}", material.name));
+        }
+    };
+    let by_rays = transmission.by_rays;
+    let straight = |m: &Material| m.transmission > 0.0 && !(transmission.bends && m.alpha_mode != AlphaMode::Blend);
+    let clear = |m: &Material| straight(m) || (m.transmission > 0.0 && !by_rays);
+    say(&straight, "transmits light that goes straight on: refraction is off, or the material is blended");
+    say(&|m| clear(m) && m.roughness > 0.1, "transmits through a rough surface: shown clear");
+    let casts = |m: &Material| !shadow_maps || casts_in_maps(m);
+    say(&|m| !casts(m), "casts no shadow: the maps of shadows=map hold opaque and masked surfaces alone");
+    let (absorption, marches) = (knobs.rung("absorption"), by_rays && knobs.march_steps() > 0);
+    let varies = |m: &Material| m.marched_sigma().is_some();
+    let instead = format!(
+        "has a grid of sigma, of which absorption={absorption} with refraction={} takes the mean; refraction=ray with \
+         absorption=march:4 to march:64 goes through it",
+        knobs.rung("refraction")
+    );
+    say(&|m| varies(m) && !marches && absorption != "off", &instead);
+    say(&|m| m.dispersion > 0.0, "has dispersion, which is not built");
+    let (lobes, reflection) = (knobs.rung("lobes"), knobs.rung("reflection"));
+    if lobes != "0.2" && reflection != "ray" {
+        warnings.push(format!("lobes={lobes} changes nothing: reflection={reflection} sends no rays"));
+    }
+    let rule = knobs.rung("quadrature");
+    if rule != "midpoint" && !(marches && surfaces.any(varies)) {
+        warnings.push(format!("quadrature={rule} changes nothing: no medium is marched"));
+    }
+    warnings
+}

@@ -1,0 +1,130 @@
+//! What materials in use mean for a plan.
+
+use super::Facts;
+use super::effect::Cause;
+use crate::scene::{AlphaMode, Material, Scene};
+
+/// Whether a surface is laid over what lies behind it, in passes of its own: blended surfaces, and transmissive ones where
+/// no rays refract in them (`refracting_rays`).
+#[must_use]
+pub fn is_see_through(material: &Material, refracting_rays: bool) -> bool {
+    material.alpha_mode == AlphaMode::Blend || (material.transmission > 0.0 && !refracting_rays)
+}
+
+/// Whether a surface is drawn into shadow maps. What lets light through does not stop it there: it passes unweakened.
+#[must_use]
+pub fn casts_in_maps(material: &Material) -> bool {
+    !is_see_through(material, false)
+}
+
+/// Whether anything is mirrored at a surface. What bends nothing mirrors nothing.
+#[must_use]
+pub fn mirrors(material: &Material) -> bool {
+    material.metallic > 0.0 || (material.specular > 0.0 && material.ior != 1.0)
+}
+
+/// Whether some of the light that a surface receives leaves it in all directions.
+pub(super) fn scatters(material: &Material) -> bool {
+    !material.unlit
+        && (material.metallic < 1.0 || material.metallic_roughness_texture.is_some())
+        && (material.transmission < 1.0 || material.transmission_texture.is_some())
+        && material.base_color[..3] != [0.0; 3]
+}
+
+/// Whether a surface bends light.
+pub(super) fn refracts(material: &Material) -> bool {
+    material.transmission > 0.0 && material.alpha_mode != AlphaMode::Blend
+}
+
+/// Whether a surface or its coat mirrors, with a perceptual roughness up to `roughest`.
+pub(super) fn is_smooth(m: &Material, roughest: f32) -> bool {
+    let base = mirrors(m) && (m.roughness <= roughest || m.metallic_roughness_texture.is_some());
+    let coat = m.clearcoat > 0.0 && (m.clearcoat_roughness <= roughest || m.clearcoat_roughness_texture.is_some());
+    !m.unlit && (base || coat)
+}
+
+pub(super) fn has_layers(material: &Material) -> bool {
+    [
+        material.clearcoat_texture,
+        material.clearcoat_roughness_texture,
+        material.specular_texture,
+        material.transmission_texture,
+        material.thickness_texture,
+    ]
+    .iter()
+    .any(Option::is_some)
+}
+
+/// The materials of what is drawn, with what is known of their surfaces.
+pub(super) struct Surfaces<'a> {
+    used: Vec<Used<'a>>,
+    facts: &'a Facts,
+}
+
+struct Used<'a> {
+    index: usize,
+    material: &'a Material,
+    /// Of its instances those that enclose a medium, and all.
+    closed: usize,
+    instances: usize,
+}
+
+impl<'a> Surfaces<'a> {
+    pub(super) fn of(scene: &'a Scene, facts: &'a Facts) -> Self {
+        let mut used: Vec<_> = scene
+            .materials
+            .iter()
+            .enumerate()
+            .map(|(index, material)| Used { index, material, closed: 0, instances: 0 })
+            .collect();
+        for (i, instance) in scene.instances.iter().enumerate() {
+            let mesh = &scene.meshes[instance.mesh];
+            if !mesh.indices.is_empty() {
+                let of = &mut used[mesh.material];
+                of.instances += 1;
+                of.closed += usize::from(facts.solids.solid[i]);
+            }
+        }
+        used.retain(|used| used.instances > 0);
+        Self { used, facts }
+    }
+
+    pub(super) fn any(&self, test: impl Fn(&Material) -> bool) -> bool {
+        self.used.iter().any(|used| test(used.material))
+    }
+
+    pub(super) fn find(&self, test: impl Fn(&Material) -> bool) -> Option<&'a Material> {
+        self.used.iter().map(|used| used.material).find(|material| test(material))
+    }
+
+    /// For an effect, where a material in use passes a test; with the first one that does.
+    pub(super) fn cause(&self, test: impl Fn(&Material) -> bool, says: impl Fn(&Material) -> String) -> Cause {
+        let mut found = self.used.iter().filter(|used| test(used.material));
+        let Some(first) = found.next() else {
+            let form = &self.facts.form;
+            return Cause::against("no material in use has it")
+                .with_some("black textures", &form.black)
+                .with_some("alpha 1 everywhere", &form.opaque)
+                .with_some("alpha 0 everywhere", &form.unseen);
+        };
+        let name = &first.material.name;
+        Cause::of(format!("material {} \"{name}\" {}", first.index, says(first.material)))
+            .with("material", name)
+            .with("materials", found.count() + 1)
+    }
+
+    /// A sentence's end about a material that lets light through.
+    pub(super) fn body(&self, material: &Material) -> String {
+        let used = self.used.iter().find(|used| std::ptr::eq(used.material, material));
+        let closed = match used.map(|used| (used.closed, used.instances)) {
+            Some((closed, all)) if closed == all => "closed".to_owned(),
+            Some((closed, all)) if closed > 0 => format!("closed in {closed} of {all} places"),
+            _ => "a sheet".to_owned(),
+        };
+        let bends = if material.ior == 1.0 { ", which bends nothing" } else { "" };
+        format!(
+            "has transmission {}, thickness {} m, n = {}{bends}; {closed}",
+            material.transmission, material.thickness, material.ior
+        )
+    }
+}
