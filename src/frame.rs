@@ -224,7 +224,12 @@ impl Renderer {
             add_dark_lights(&mut scene);
         }
         let facts = Facts::of(&scene, form);
-        let surroundings = Surroundings { environment: environment.is_some(), sky, demand: settings.demand };
+        let surroundings = Surroundings {
+            environment: environment.is_some(),
+            constant: environment.is_some_and(Environment::is_constant),
+            sky,
+            demand: settings.demand,
+        };
         let mut plan = Plan::new(&scene, &facts, surroundings, &settings.knobs);
         // What adds nothing takes no turn of any loop.
         let mut kept = plan.lights.iter();
@@ -260,7 +265,7 @@ impl Renderer {
             shadow_maps: ShadowMaps::new(device, &plan, &name, &scene, rays.anchor())?,
             scene,
             rays,
-            ray_tiles: RayTiles::new(device, size)?,
+            ray_tiles: RayTiles::new(device, &plan, size)?,
             gbuffer: GBuffer::new(device, &plan, size)?,
             tiles: Tiles::new(device, &plan, size)?,
             work: WorkLists::new(device, size)?,

@@ -1,6 +1,7 @@
 // One level of the environment prefiltered with the GGX lobe of α = 16 / width of the level: the lobe is the same
 // number of texels wide on every level, so the same number of samples serves them all. N = V = R as in Karis 2013, where f cos / pdf of a
-// sample is F G1(l).
+// sample is F G1(l). Summed as differences from what lies in the middle of the lobe: a map that is the same everywhere
+// stays so to the last bit.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -19,6 +20,7 @@ void main() {
     if (any(greaterThanEqual(at, size))) return;
     vec3 n = direction_from_equirectangular((vec2(at) + 0.5) / vec2(size));
     OrthonormalBasis frame = orthonormal_basis(n);
+    vec3 middle = textureLod(environment_map, equirectangular_from_direction(n), 0.0).rgb;
     vec3 sum = vec3(0.0);
     float weight = 0.0;
     float texel = 4.0 * PI / (base_width * base_width * 0.5); // solid angle of a texel at the equator, roughly
@@ -34,9 +36,11 @@ void main() {
             float pdf = ggx_distribution(n, h, alpha) * 0.25;
             float lod = 0.5 * log2(1.0 / (float(SAMPLES) * pdf * texel));
             float masking = unmasked(1.0, cos_l, alpha);
-            sum += textureLod(environment_map, equirectangular_from_direction(l), max(lod, 0.0)).rgb * masking;
+            vec3 seen = textureLod(environment_map, equirectangular_from_direction(l), max(lod, 0.0)).rgb;
+            sum += (seen - middle) * masking;
             weight += masking;
         }
     }
-    level[at.y * size.x + at.x] = vec4(sum / max(weight, 1e-6), 1.0);
+    // Their rounding is that of the middle: below 0 by as much.
+    level[at.y * size.x + at.x] = vec4(max(middle + sum / max(weight, 1e-6), 0.0), 1.0);
 }

@@ -74,8 +74,8 @@ fn prefer_large_pages(allocation: &Allocation) {
 }
 
 impl Buffer {
-    /// A buffer of `bytes` bytes (at least 16, so that an empty list still binds), usable for everything a shader or
-    /// copy does.
+    /// A buffer of `bytes` bytes, usable for everything a shader or copy does. Of 0 bytes it is something to bind where
+    /// nothing is read, and is called [`NOTHING`].
     ///
     /// # Errors
     /// When memory is short.
@@ -102,6 +102,7 @@ impl Buffer {
     }
 
     fn create(device: &Arc<Device>, name: &str, bytes: u64, place: Place, texels: Option<vk::Format>) -> Result<Self> {
+        let name = if bytes == 0 { NOTHING } else { name };
         let creating = || format!("creating buffer \"{name}\" of {bytes} bytes");
         let bytes = bytes.max(16);
         let most = u64::from(device.limits.max_texel_buffer_elements);
@@ -245,6 +246,9 @@ impl ImageDesc {
     }
 }
 
+/// What is bound where a shader's layout has a place and a plan has nothing to put there.
+pub const NOTHING: &str = "nothing";
+
 /// An image with a view of all of it.
 pub struct Image {
     pub(super) raw: vk::Image,
@@ -312,6 +316,14 @@ impl Image {
             device.name(raw, name);
             Ok(image)
         }
+    }
+
+    /// One texel that is never read: [`NOTHING`].
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn nothing(device: &Arc<Device>, format: vk::Format, usage: vk::ImageUsageFlags) -> Result<Self> {
+        Self::new(device, NOTHING, ImageDesc::flat(format, 1, 1, usage))
     }
 
     /// Its shape.

@@ -8,7 +8,8 @@ use anyhow::Result;
 use super::gbuffer::GBuffer;
 use super::lighting::Lighting;
 use super::rows::{rows_of, stride};
-use crate::gpu::{Buffer, Device, Frame, Image, Place};
+use crate::gpu::{Buffer, Device, Frame, Image, NOTHING, Place};
+use crate::plan::Plan;
 use crate::shader::{classify, classify_fragments, classify_rays as ray_program};
 
 /// Pixels a side.
@@ -132,11 +133,15 @@ pub struct RayTiles {
 }
 
 impl RayTiles {
-    /// A list for a picture of `size` pixels.
+    /// A list for a picture of `size` pixels, where the plan has something that is done in those tiles.
     ///
     /// # Errors
     /// When memory is short.
-    pub fn new(device: &Arc<Device>, size: [u32; 2]) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, plan: &Plan, size: [u32; 2]) -> Result<Self> {
+        if !(plan.screen.mirrors || plan.rays.is_some_and(|rays| rays.mirrors || rays.refraction)) {
+            let nothing = || Buffer::new(device, NOTHING, 0, Place::Device);
+            return Ok(Self { sizes: nothing()?, empty: nothing()?, tiles: nothing()? });
+        }
         let bytes = 4 * u64::from(size[0].div_ceil(TILE)) * u64::from(size[1].div_ceil(TILE));
         Ok(Self {
             sizes: Buffer::new(device, "ray work size", WORK_BYTES, Place::Device)?,

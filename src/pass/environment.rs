@@ -55,18 +55,22 @@ impl EnvironmentOnDevice {
     /// When memory is short.
     pub fn new(device: &Arc<Device>, plan: &Plan, environment: Option<&Environment>, turn: Turn) -> Result<Self> {
         let lights = plan.ambient || plan.reflection || plan.rays.is_some();
-        let black = || vec![(1, 1, vec![[0.0; 4]])];
         let chain = match environment {
-            Some(environment) if lights || plan.sky => box_chain(environment),
-            _ => black(),
+            Some(environment) if lights || plan.sky => match plan.prefilter || !environment.is_constant() {
+                true => box_chain(environment),
+                false => one_texel(environment),
+            },
+            _ => Vec::new(),
         };
-        let sky = image(device, "environment", &chain, vk::Format::R32G32B32A32_SFLOAT)?;
-        let levels = if plan.reflection { prefilter(device, &sky, &chain)? } else { black() };
-        let prefiltered = image(device, "prefiltered environment", &levels, vk::Format::R32G32B32A32_SFLOAT)?;
-        let table = if plan.reflectance { reflectance_table() } else { vec![[0.0; 4]] };
-        let side = if plan.reflectance { REFLECTANCE } else { 1 };
-        let table = vec![(side, side, table)];
-        let reflectance = image(device, "directional reflectance", &table, vk::Format::R32G32B32A32_SFLOAT)?;
+        let sky = image(device, "environment", &chain)?;
+        let levels = match (plan.prefilter, plan.reflection) {
+            (true, _) => prefilter(device, &sky, &chain)?,
+            (false, true) => chain.clone(),
+            (false, false) => Vec::new(),
+        };
+        let prefiltered = image(device, "prefiltered environment", &levels)?;
+        let table = plan.reflectance.then(|| (REFLECTANCE, REFLECTANCE, reflectance_table()));
+        let reflectance = image(device, "directional reflectance", &table.into_iter().collect())?;
         let mut irradiance = [[0.0; 3]; 9];
         if let (true, Some(environment)) = (plan.ambient, environment) {
             // The cosine lobe of Ramamoorthi & Hanrahan 2001 by band.
@@ -81,7 +85,7 @@ impl EnvironmentOnDevice {
             cos_rotation: cos as f32,
             sin_rotation: sin as f32,
             intensity: turn.intensity,
-            width: levels[0].0 as f32,
+            width: levels.first().map_or(1.0, |level| level.0 as f32),
             levels: levels.len() as f32,
         };
         Ok(Self { sky, prefiltered, reflectance, terms: Buffer::with_data(device, "environment terms", &[terms])? })
@@ -106,12 +110,11 @@ impl EnvironmentOnDevice {
     }
 }
 
-fn image(device: &Arc<Device>, name: &str, levels: &Levels, format: vk::Format) -> Result<Image> {
-    let (width, height, _) = levels[0];
-    let desc = ImageDesc {
-        levels: levels.len() as u32,
-        ..ImageDesc::flat(format, width, height, vk::ImageUsageFlags::SAMPLED)
-    };
+/// An image of these levels; without any, something to bind.
+fn image(device: &Arc<Device>, name: &str, levels: &Levels) -> Result<Image> {
+    let (format, usage) = (vk::Format::R32G32B32A32_SFLOAT, vk::ImageUsageFlags::SAMPLED);
+    let Some(&(width, height, _)) = levels.first() else { return Image::nothing(device, format, usage) };
+    let desc = ImageDesc { levels: levels.len() as u32, ..ImageDesc::flat(format, width, height, usage) };
     let image = Image::new(device, name, desc)?;
     let mut offsets = Vec::with_capacity(levels.len());
     let mut texels: Vec<Texel> = Vec::new();
@@ -124,6 +127,11 @@ fn image(device: &Arc<Device>, name: &str, levels: &Levels, format: vk::Format) 
     frame.upload("upload environment", &staging, &image, 0, &offsets);
     frame.finish()?;
     Ok(image)
+}
+
+/// What stands for a map that is the same everywhere.
+fn one_texel(environment: &Environment) -> Levels {
+    environment.radiance.first().map(|&[r, g, b]| (1, 1, vec![[r, g, b, 1.0]])).into_iter().collect()
 }
 
 /// The map and its averages by twos, down to a single texel.

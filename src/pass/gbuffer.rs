@@ -45,9 +45,11 @@ impl GBuffer {
     /// When memory is short.
     pub fn new(device: &Arc<Device>, plan: &Plan, size: [u32; 2]) -> Result<Self> {
         let target = |name, format, exists: bool| {
-            let [width, height] = if exists { size } else { [1, 1] };
             let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::STORAGE;
-            Image::new(device, name, ImageDesc::flat(format, width, height, usage))
+            match exists {
+                true => Image::new(device, name, ImageDesc::flat(format, size[0], size[1], usage)),
+                false => Image::nothing(device, format, usage),
+            }
         };
         // What a transmission texture lets through is kept beside the emissive texel.
         let with = [plan.rays.is_some(), plan.emissive || plan.rays.is_some_and(|rays| rays.refraction), plan.layers];

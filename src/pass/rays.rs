@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::scene::{cofactors as cofactors_of, medium, texture_slots};
 use super::upload::upload;
 use super::view::View;
-use crate::gpu::{Buffer, Device, Frame, Place};
+use crate::gpu::{Buffer, Device, Frame, NOTHING, Place};
 use crate::plan::{Plan, Rays};
 use crate::scene::bvh::{Bvh, Format, Order, Triangle};
 use crate::scene::contact::{bodies_touch, twins};
@@ -227,15 +227,15 @@ impl RaysOnDevice {
     fn none(device: &Arc<Device>, scene: &Scene) -> Result<Self> {
         let (anchor, half) =
             scene.bounds().map_or_else(Default::default, |b| (b.center(), (b.max - b.min).max_element() * 0.5));
-        let empty = |name| Buffer::texels(device, name, 0, Place::Device, vk::Format::R32G32B32A32_UINT);
+        let nothing = |format| Buffer::texels(device, NOTHING, 0, Place::Device, format);
         Ok(Self {
-            nodes: empty("no BVH nodes")?,
-            triangles: empty("no BVH triangles")?,
-            corners: empty("no corners for rays")?,
+            nodes: nothing(vk::Format::R32G32B32A32_UINT)?,
+            triangles: nothing(vk::Format::R32G32B32A32_UINT)?,
+            corners: nothing(vk::Format::R32G32B32A32_UINT)?,
             faces: Vec::new(),
-            leaf_places: Buffer::texels(device, "no leaf places", 0, Place::Device, vk::Format::R32_UINT)?,
+            leaf_places: nothing(vk::Format::R32_UINT)?,
             terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,
-            counts: Buffer::new(device, "work counts", size_of::<WorkCounts>() as u64, Place::Readback)?,
+            counts: Buffer::new(device, NOTHING, 0, Place::Readback)?,
             constants: TraceConstants { traversal: 0, octants: false, stack_size: 1, hit_textures: 0, touching: false },
             facts: None,
             warnings: Vec::new(),

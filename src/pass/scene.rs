@@ -207,10 +207,11 @@ impl SceneOnDevice {
         let mut texel_slots = Vec::with_capacity(scene.materials.len() * SLOTS);
         let mut page_of_material = Vec::with_capacity(scene.materials.len());
         let mut page_materials: Vec<usize> = Vec::new();
+        let textured = !wanted.is_empty() || plan.rays.is_some_and(|rays| rays.textures);
         for (index, material) in scene.materials.iter().enumerate() {
-            for (texture, meaning) in texture_slots(material) {
+            for (texture, meaning) in texture_slots(material).into_iter().filter(|_| textured) {
                 slot_table.push(shared_slot(texture, &textures, meaning));
-                texel_slots.push(texels.slot(texture, meaning));
+                texel_slots.extend(plan.rays.map(|_| texels.slot(texture, meaning)));
             }
             // Materials that read the same pages through the same samplers share a set of descriptors.
             let same = |&other: &usize| same_pages(&textures, material, &scene.materials[other]);

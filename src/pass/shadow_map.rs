@@ -12,7 +12,9 @@ use ash::vk;
 use glam::{DVec3, DVec4};
 
 use super::scene::SceneOnDevice;
-use crate::gpu::{Buffer, DepthTarget, Device, Frame, Image, ImageDesc, PassTime, Place, Raster, Sampled, SamplerDesc};
+use crate::gpu::{
+    Buffer, DepthTarget, Device, Frame, Image, ImageDesc, NOTHING, PassTime, Place, Raster, Sampled, SamplerDesc,
+};
 use crate::plan::Plan;
 use crate::scene::{Bounds, Light, LightKind};
 use crate::shader::shadow_map;
@@ -67,8 +69,9 @@ impl ShadowMaps {
         let bounds = scene.bounds.filter(|_| plan.shadow_maps);
         let format = vk::Format::R32G32B32A32_SFLOAT;
         let Some(bounds) = bounds else {
-            let faces = Buffer::texels(device, "no shadow maps", 0, Place::Device, format)?;
-            return Ok(Self { depth: image(1, 1)?, faces, times: Vec::new() });
+            let depth = Image::nothing(device, vk::Format::D32_SFLOAT, usage)?;
+            let faces = Buffer::texels(device, NOTHING, 0, Place::Device, format)?;
+            return Ok(Self { depth, faces, times: Vec::new() });
         };
         let lights = scene.lights_in_order();
         let cubes = lights.iter().filter(|light| cone(light, bounds).is_none()).count();

@@ -34,6 +34,8 @@ pub struct Plan {
     pub environment: bool,
     /// The environment is seen in surfaces.
     pub reflection: bool,
+    /// It is not the same everywhere: its averages over lobes are made beforehand.
+    pub prefilter: bool,
     /// The environment's irradiance lights diffuse surfaces.
     pub ambient: bool,
     /// The environment is seen behind it.
@@ -140,6 +142,8 @@ impl Facts {
 pub struct Surroundings {
     /// There is an environment that lights the scene.
     pub environment: bool,
+    /// The same light comes from everywhere.
+    pub constant: bool,
     /// It is also the background.
     pub sky: bool,
     /// What is asked for beside what the scene calls for.
@@ -185,14 +189,15 @@ impl Plan {
             conductors: layers.conductors,
             demand: surroundings.demand,
             environment: images.environment,
-            reflection: images.prefiltered,
+            reflection: images.mirrored,
+            prefilter: images.prefilter,
             ambient: images.ambient,
             sky: surroundings.sky,
             see_through: transmission.see_through,
             directional_lights: lights.directional,
             local_lights: lights.local,
             tiles: lights.tiles,
-            reflectance: images.prefiltered
+            reflectance: images.mirrored
                 || images.ambient
                 || images.screen != Screen::default()
                 || surroundings.demand == Demand::Full
@@ -251,7 +256,8 @@ struct Transmission {
 
 struct MirrorImages {
     environment: bool,
-    prefiltered: bool,
+    mirrored: bool,
+    prefilter: bool,
     ambient: bool,
     roughest: f32,
     by_rays: bool,
@@ -330,7 +336,12 @@ impl Planner<'_> {
         let rung = knobs.rung("reflection");
         let shiny = surfaces.any(|m| !m.unlit && (mirrors(m) || m.clearcoat > 0.0));
         let cause = shown(shiny, "no material in use mirrors anything");
-        let prefiltered = decisions.decide_with("mirrored environment", "reflection", rung != "off", cause);
+        let reflection = decisions.decide_with("mirrored environment", "reflection", rung != "off", cause);
+        let cause = match reflection {
+            true => Cause::when(!surroundings.constant, "the environment varies", "the environment is the same everywhere"),
+            false => Cause::against("no environment is mirrored"),
+        };
+        let prefilter = decisions.decide("prefiltered environment", cause) && reflection;
         // A texture only lowers the factor.
         let roughest = if rung == "ray" { knobs.roughest_lobe() } else { ROUGHEST_ON_SCREEN };
         let smooth = |m: &Material| surfaces::is_smooth(m, roughest);
@@ -353,8 +364,8 @@ impl Planner<'_> {
         };
         let cause = shown(surfaces.any(scatters), "no material in use scatters light");
         let ambient = decisions.decide_with("ambient light", "indirect", knobs.rung("indirect") != "off", cause);
-        let environment = environment || prefiltered || ambient;
-        MirrorImages { environment, prefiltered, ambient, roughest, by_rays, screen }
+        let environment = environment || reflection || ambient;
+        MirrorImages { environment, mirrored: reflection, prefilter, ambient, roughest, by_rays, screen }
     }
 
     fn lights(&mut self) -> Lights {

@@ -77,6 +77,12 @@ impl Environment {
         Self { name: "constant".into(), width: 4, height: 2, radiance: vec![rgb; 8] }
     }
 
+    /// Whether the same light comes from everywhere.
+    #[must_use]
+    pub fn is_constant(&self) -> bool {
+        self.radiance.iter().all(|texel| Some(texel) == self.radiance.first())
+    }
+
     /// Nothing from anywhere, in as many texels as the studio has: what takes its place costs as much.
     #[must_use]
     pub fn dark() -> Self {
