@@ -502,6 +502,11 @@ fn program_literal(name: &str, stages: &[Stage]) -> Result<String> {
             "            VertexInput {{ name: \"{input}\", location: {location}, components: {components} }},\n"
         );
     }
+    let mut constants = String::new();
+    for (id, (constant, ty, _)) in &all.constants {
+        let float = *ty == "f32";
+        constants += &format!("            Constant {{ id: {id}, name: \"{constant}\", float: {float} }},\n");
+    }
     let mut stage_table = String::new();
     for stage in stages {
         let words = stage.words.iter().map(|w| format!("{w:#x}")).collect::<Vec<_>>().join(",");
@@ -520,6 +525,8 @@ fn program_literal(name: &str, stages: &[Stage]) -> Result<String> {
 {table}        ],
         inputs: &[
 {vertex}        ],
+        constants: &[
+{constants}        ],
         push_bytes: {},
         local_size: [{x}, {y}, {z}],
     }}",

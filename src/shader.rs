@@ -4,7 +4,7 @@
 use ash::vk;
 
 use crate::gpu::{
-    Access, Binding, BindingKind, Bindings, Buffer, Image, Program, Resource, Sampled, Stage, VertexInput,
+    Access, Binding, BindingKind, Bindings, Buffer, Constant, Image, Program, Resource, Sampled, Stage, VertexInput,
 };
 
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));

@@ -6,12 +6,16 @@ mod gpu;
 #[path = "support/made.rs"]
 mod made;
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
 use etalon::frame::Settings;
+use etalon::gpu::NOTHING;
 use etalon::image::Picture;
 use etalon::plan::{Knobs, Plan};
 use etalon::scene::environment::Environment;
 use etalon::scene::material::{Sampler, TextureRef};
-use etalon::scene::{Image, LightKind, Material, Scene};
+use etalon::scene::{AlphaMode, Image, LightKind, Material, Scene, SigmaGrid};
 use etalon::study::shape::Shape;
 use glam::DVec3;
 use gpu::{Gpu, bits};
@@ -25,13 +29,13 @@ fn one_colour(made: &mut Made, rgba: [u8; 4]) -> TextureRef {
     TextureRef { image: 0, uv_set: 0, uv_transform: glam::Affine2::IDENTITY, sampler: Sampler::default() }
 }
 
-/// A ball of one material before a darker one, and inside the first a small card of another.
+/// A ball of one material before a darker one, and inside the first a small cube of another.
 fn ball(surface: Material, hidden: Option<Material>) -> Made {
     let mut made = Made::new("plan");
     made.add(Shape::sphere(1.0, 16), surface.clone(), at(0.0, 0.0, 0.0));
     made.add(Shape::sphere(0.4, 12), Material { base_color: [0.4, 0.2, 0.1, 1.0], ..surface }, at(0.9, 0.5, 1.2));
     if let Some(hidden) = hidden {
-        made.add(Shape::panel(0.1, 0.1), hidden, at(0.0, 0.0, 0.0));
+        made.add(Shape::cuboid(DVec3::splat(0.1)), hidden, at(0.0, 0.0, 0.0));
     }
     made.camera(DVec3::Z * 10.0, DVec3::ZERO, orthographic(1.5));
     made
@@ -44,8 +48,11 @@ fn metal(roughness: f32) -> Material {
 struct Drawn {
     plan: Plan,
     film: Picture,
-    /// Bytes of a buffer or an image by its name.
-    bytes: Box<dyn Fn(&str) -> u64>,
+    /// Buffers and images that hold something, by name.
+    objects: BTreeMap<String, u64>,
+    passes: BTreeSet<String>,
+    /// Per program and constant all values that some pipeline has.
+    code: BTreeMap<String, BTreeSet<u32>>,
 }
 
 fn draw(scene: &Scene, environment: Option<&Environment>, choices: &[&str]) -> Drawn {
@@ -55,11 +62,24 @@ fn draw(scene: &Scene, environment: Option<&Environment>, choices: &[&str]) -> D
         knobs.set(choice).expect("a rung");
     }
     let mut renderer = gpu.renderer(scene, environment, Settings { size: SIZE, knobs, ..Settings::default() });
-    renderer.render(&scene.cameras[0], &mut |_, _| ()).expect("a picture");
+    let rendered = renderer.render(&scene.cameras[0], &mut |_, _| ()).expect("a picture");
     let film = renderer.film().expect("the film");
-    let created = gpu.device.created();
-    let bytes = move |name: &str| created.iter().find(|made| made.name == name).map_or(0, |made| made.bytes);
-    Drawn { plan: renderer.plan.clone(), film, bytes: Box::new(bytes) }
+    // Pages of textures and staging come with textures, whatever they are for.
+    let shared =
+        |name: &str| [NOTHING, "staging", "film read back"].contains(&name) || name.starts_with("texture page");
+    let created = gpu.device.created().into_iter().filter(|made| matches!(made.kind, "buffer" | "image"));
+    let objects = created.map(|made| (made.name, made.bytes)).filter(|(name, _)| !shared(name)).collect();
+    let mut code: BTreeMap<String, BTreeSet<u32>> = BTreeMap::new();
+    // What the cache of prefiltered environments holds takes no pipeline.
+    for (program, constants) in gpu.device.pipelines().into_iter().filter(|(program, _)| program.name != "prefilter") {
+        code.entry(program.name.to_owned()).or_default();
+        for (id, value) in constants {
+            let name = program.constants.iter().find(|constant| constant.id == id).expect("a constant").name;
+            code.entry(format!("{}.{name}", program.name)).or_default().insert(value);
+        }
+    }
+    let passes = rendered.passes.into_iter().map(|pass| pass.name).collect();
+    Drawn { plan: renderer.plan.clone(), film, objects, passes, code }
 }
 
 fn state(plan: &Plan, name: &str) -> (&'static str, String) {
@@ -67,46 +87,353 @@ fn state(plan: &Plan, name: &str) -> (&'static str, String) {
     (effect.state, effect.reason.clone())
 }
 
-/// Two pictures, without and with what calls for an effect: not called for and kept, and the same to the last bit.
-fn is_absent(effect: &str, reason: &str, without: Made, with: Made, environment: Option<&Environment>) -> [Drawn; 2] {
-    let [without, with] = [without, with].map(|made| draw(&made.0, environment, &[]));
-    assert_eq!(state(&without.plan, effect), ("not called for", reason.to_owned()));
-    assert_eq!(state(&with.plan, effect).0, "kept");
-    assert!(bits(&without.film) == bits(&with.film), "{effect}: the pictures differ");
-    assert!(without.film.rgba.iter().any(|pixel| pixel[0] > 0.1), "{effect}: something is seen");
-    [without, with]
+/// Scenes without and with what calls for an effect.
+struct Case {
+    effect: &'static str,
+    /// Why it is not called for.
+    reason: &'static str,
+    scenes: [Made; 2],
+    environments: [Option<Environment>; 2],
+    choices: &'static [&'static str],
+    /// What it brings: `image or buffer`, `[pass]`, `program`, `program.constant`; nothing else may come or go. Programs
+    /// that are new bring their constants.
+    brings: &'static [&'static [&'static str]],
+    /// The pictures are the same to the last bit: what calls for the effect cannot be seen.
+    same: bool,
+}
+
+impl Case {
+    fn new(effect: &'static str, reason: &'static str, without: Made, with: Made) -> Self {
+        let environments = [Some(Environment::studio()), Some(Environment::studio())];
+        Self { effect, reason, scenes: [without, with], environments, choices: &[], brings: &[], same: true }
+    }
+
+    /// A ball of one material, and one more surface inside of it that nobody sees.
+    fn hidden(effect: &'static str, reason: &'static str, ball_of: Material, with: Material) -> Self {
+        Self::new(effect, reason, ball(ball_of.clone(), None), ball(ball_of, Some(with)))
+    }
+
+    fn check(self) -> [Drawn; 2] {
+        let Self { effect, reason, scenes, environments, choices, brings, same } = self;
+        let [without, with] = [0, 1].map(|i| draw(&scenes[i].0, environments[i].as_ref(), choices));
+        assert_eq!(state(&without.plan, effect), ("not called for", reason.to_owned()), "{effect}");
+        assert_eq!(state(&with.plan, effect).0, "kept", "{effect}: {}", state(&with.plan, effect).1);
+        let mut brings: Vec<&str> = brings.concat();
+        brings.sort_unstable();
+        assert_eq!(came(&without, &with), brings, "{effect}");
+        assert_eq!(
+            came(&with, &without).iter().filter(|name| !name.contains('.')).count(),
+            0,
+            "{effect}: nothing goes"
+        );
+        assert!(!same || bits(&without.film) == bits(&with.film), "{effect}: the pictures differ");
+        assert!(without.film.rgba.iter().any(|pixel| pixel[0] > 0.1), "{effect}: something is seen");
+        [without, with]
+    }
+}
+
+/// What the one has beside the other, as [`Case::brings`] names it.
+fn came(before: &Drawn, after: &Drawn) -> Vec<String> {
+    let mut all: Vec<String> =
+        after.objects.keys().filter(|name| !before.objects.contains_key(*name)).cloned().collect();
+    all.extend(after.passes.difference(&before.passes).map(|pass| format!("[{pass}]")));
+    for (name, values) in &after.code {
+        let program = name.split('.').next().expect("a name");
+        let changed = match before.code.get(name) {
+            None => !name.contains('.') || before.code.contains_key(program),
+            // The G-buffer has a pipeline for each kind of material: what matters is a value that none had.
+            Some(known) => !values.is_subset(known),
+        };
+        if changed {
+            all.push(name.clone());
+        }
+    }
+    all.sort_unstable();
+    all
+}
+
+/// What rays go through.
+const HIERARCHY: &[&str] = &[
+    "BVH nodes",
+    "BVH triangles",
+    "G-buffer triangles",
+    "corners for rays",
+    "leaf places",
+    "work counts",
+    "[reset work counts]",
+];
+/// The tiles in which something is mirrored or refracted.
+const TILES: &[&str] = &[
+    "empty ray work size",
+    "ray tiles",
+    "ray work size",
+    "[classify ray tiles]",
+    "[reset ray work size]",
+    "classify_rays",
+];
+/// Lists of what is laid over the picture.
+const FRAGMENTS: &[&str] = &[
+    "dropped fragments",
+    "empty fragment work size",
+    "fragment counters",
+    "fragment list heads",
+    "fragment list nodes",
+    "fragment tiles",
+    "fragment work size",
+    "[classify fragment tiles]",
+    "[clear fragment lists]",
+    "[reset dropped fragments]",
+    "[reset fragment counters]",
+    "[reset fragment work size]",
+    "[see-through fragments]",
+    "[see-through lighting]",
+    "classify_fragments",
+    "composite",
+    "fragments",
+];
+/// A copy of the picture to look up.
+const SCREEN: &[&str] = &[
+    "nearest pieces of tiles",
+    "radiance on the screen",
+    "[copy radiance]",
+    "[nearest pieces of tiles]",
+    "screen_tiles",
+];
+const TEXTURES: &[&str] = &["texture coordinates 0", "texture slots"];
+
+fn chalk() -> Material {
+    lambert([0.5, 0.6, 0.7])
+}
+
+fn glass() -> Material {
+    Material {
+        metallic: 0.0,
+        roughness: 0.0,
+        transmission: 1.0,
+        thickness: 0.1,
+        double_sided: true,
+        ..Material::default()
+    }
+}
+
+const NONE: &str = "no material in use has it";
+
+#[test]
+fn surfaces_bring_their_targets() {
+    let mut with = ball(chalk(), Some(chalk()));
+    let texture = one_colour(&mut with, [9, 9, 9, 255]);
+    with.0.materials[2].emissive = [1.0; 3];
+    with.0.materials[2].emissive_texture = Some(texture);
+    let case = Case::new("emissive textures", NONE, ball(chalk(), None), with);
+    Case { brings: &[TEXTURES, &["G-buffer emissive", "gbuffer.has_emissive", "light.has_emissive"]], ..case }.check();
+
+    let coated = Material { clearcoat: 0.5, clearcoat_roughness: 0.5, ..metal(0.5) };
+    Case {
+        brings: &[&["G-buffer layers", "light.clearcoat", "light.has_layers"]],
+        ..Case::hidden("clear coat", NONE, metal(0.5), coated)
+    }
+    .check();
+
+    let mut with = ball(metal(0.5), Some(metal(0.5)));
+    let texture = one_colour(&mut with, [9, 9, 9, 9]);
+    with.0.materials[2].specular_texture = Some(texture);
+    Case {
+        brings: &[TEXTURES, &["G-buffer layers", "gbuffer.has_layers", "light.has_layers"]],
+        ..Case::new("layers", NONE, ball(metal(0.5), None), with)
+    }
+    .check();
+
+    let gold = Material { conductor: Some([[0.2, 3.1]; 3]), ..metal(0.5) };
+    Case { brings: &[&["light.conductors"]], ..Case::hidden("metals by n and kappa", NONE, metal(0.5), gold) }.check();
 }
 
 #[test]
-fn metals_call_for_no_ambient_light() {
-    let environment = Environment::studio();
-    let with = ball(metal(0.5), Some(lambert([0.5; 3])));
-    let reason = "no material in use scatters light";
-    is_absent("ambient light", reason, ball(metal(0.5), None), with, Some(&environment));
+fn what_lets_light_through_brings_its_passes() {
+    Case {
+        brings: &[
+            HIERARCHY,
+            TILES,
+            &[
+                "G-buffer emissive",
+                "[reflection and refraction]",
+                "interact",
+                "light.has_transmission",
+                "light.mirror_rays",
+            ],
+        ],
+        ..Case::hidden("refraction", NONE, metal(0.5), glass())
+    }
+    .check();
+    let screen = &["refraction=screen", "reflection=screen"];
+    Case { choices: screen, brings: &[FRAGMENTS, SCREEN], ..Case::hidden("refraction", NONE, metal(0.5), glass()) }
+        .check();
+    let veil = Material { base_color: [1.0, 1.0, 1.0, 0.5], alpha_mode: AlphaMode::Blend, ..metal(0.5) };
+    Case { brings: &[FRAGMENTS], ..Case::hidden("see-through surfaces", NONE, metal(0.5), veil) }.check();
 }
 
 #[test]
-fn chalk_calls_for_no_mirrored_environment() {
-    let environment = Environment::studio();
-    let with = ball(lambert([0.5; 3]), Some(metal(0.5)));
-    let reason = "no material in use mirrors anything";
-    let without = ball(lambert([0.5; 3]), None);
-    let [without, with] = is_absent("mirrored environment", reason, without, with, Some(&environment));
-    let name = "prefiltered environment";
-    assert!((without.bytes)(name) < 1000 && (with.bytes)(name) > 10_000, "{} bytes", (without.bytes)(name));
+fn media_bring_their_code() {
+    let fog = SigmaGrid::new([2, 2, 2], vec![0.1; 8], None).expect("a grid");
+    let fog = Material { sigma: Some(Arc::new(fog)), ..glass() };
+    let tinted = || Material { attenuation_color: [0.5; 3], attenuation_distance: 0.1, ..glass() };
+    let march = Case::new("media that vary", NONE, ball(metal(0.5), Some(tinted())), ball(metal(0.5), Some(fog)));
+    Case {
+        choices: &["absorption=march:4"],
+        brings: &[&["grids of sigma", "interact.march_steps", "interact.quadrature"]],
+        ..march
+    }
+    .check();
+    let absorbs = Case::new("absorption", NONE, ball(metal(0.5), Some(glass())), ball(metal(0.5), Some(tinted())));
+    Case { brings: &[&["interact.absorption"]], ..absorbs }.check();
+    let slabs = |gap: f64| {
+        let mut made = ball(metal(0.5), Some(glass()));
+        made.add(Shape::cuboid(DVec3::splat(0.1)), glass(), at(0.1 + gap, 0.0, 0.0));
+        made
+    };
+    let reason = "no transparent body lies against another surface";
+    Case { brings: &[&["interact.touching"]], ..Case::new("bodies that touch", reason, slabs(0.01), slabs(0.0)) }
+        .check();
 }
 
 #[test]
-fn unlit_surfaces_call_for_no_lights_and_no_rays() {
-    let lamp = LightKind::Point { position: DVec3::new(1.0, 2.0, 3.0), range: None };
-    let [mut without, mut with] = [None, Some(lambert([0.5; 3]))].map(|hidden| ball(unlit([0.5, 0.6, 0.7]), hidden));
-    without.light([10.0; 3], lamp);
-    with.light([10.0; 3], lamp);
+fn light_from_all_around_is_there_where_it_is_seen() {
+    let scatters = "no material in use scatters light";
+    Case { brings: &[&["light.ambient"]], ..Case::hidden("ambient light", scatters, metal(0.5), chalk()) }.check();
+    let mirrors = "no material in use mirrors anything";
+    Case {
+        brings: &[&["prefiltered environment", "light.reflection"]],
+        ..Case::hidden("mirrored environment", mirrors, chalk(), metal(0.5))
+    }
+    .check();
+    // What is made of glass that bends nothing mirrors nothing.
+    let air = Material { ior: 1.0, specular: 1.0, ..chalk() };
+    Case {
+        brings: &[&["prefiltered environment", "light.reflection"]],
+        ..Case::hidden("mirrored environment", mirrors, air, metal(0.5))
+    }
+    .check();
+    let around =
+        Case::new("environment", "there is no environment", ball(unlit([0.5; 3]), None), ball(unlit([0.5; 3]), None));
+    Case {
+        environments: [None, Some(Environment::studio())],
+        same: false,
+        brings: &[&["environment", "background.sky"]],
+        ..around
+    }
+    .check();
+    let even = "the environment is the same everywhere";
+    let prefiltered = Case::new("prefiltered environment", even, ball(metal(0.5), None), ball(metal(0.5), None));
+    let environments = [Some(Environment::constant([0.3, 0.4, 0.5])), Some(Environment::studio())];
+    let [without, with] = Case { environments, same: false, brings: &[], ..prefiltered }.check();
+    let bytes = |drawn: &Drawn| drawn.objects["prefiltered environment"];
+    assert!(bytes(&without) < 1000 && bytes(&with) > 1_000_000, "{}, {}", bytes(&without), bytes(&with));
+}
+
+#[test]
+fn mirrors_bring_rays_and_rays_what_they_may_meet() {
+    Case {
+        brings: &[HIERARCHY, TILES, &["[reflection and refraction]", "interact", "light.mirror_rays"]],
+        ..Case::hidden("mirrors", NONE, metal(0.5), metal(0.0))
+    }
+    .check();
+    let screen = &["reflection=screen"];
+    Case {
+        choices: screen,
+        brings: &[TILES, SCREEN, &["[mirror images on the screen]", "mirror"]],
+        ..Case::hidden("mirrors", NONE, metal(0.5), metal(0.0))
+    }
+    .check();
+    Case { brings: &[&["interact.rough"]], ..Case::hidden("rays by lobes", NONE, metal(0.0), metal(0.1)) }.check();
+    let holes = Material { base_color: [1.0, 1.0, 1.0, 0.5], alpha_mode: AlphaMode::Mask(0.5), ..metal(0.5) };
+    Case {
+        brings: &[&["gbuffer.masked", "interact.masked_hits"]],
+        ..Case::hidden("holes before rays", NONE, metal(0.0), holes)
+    }
+    .check();
+    let sheet = Material { thickness: 0.0, ..glass() };
+    let off = &["refraction=off"];
+    Case {
+        choices: off,
+        brings: &[FRAGMENTS, &["interact.transmissive"]],
+        ..Case::hidden("transmission before rays", NONE, metal(0.0), sheet)
+    }
+    .check();
+}
+
+#[test]
+fn lights_are_there_where_something_is_lit() {
+    let lamp = LightKind::Point { position: DVec3::new(1.0, 2.0, 3.0), range: Some(10.0) };
+    let lit = |mut made: Made, count: usize| {
+        (0..count).for_each(|_| made.light([10.0 / count as f32; 3], lamp));
+        made
+    };
+    let dark = || [None, None];
+    let gray = || unlit([0.5, 0.6, 0.7]);
     let reason = "all materials in use are unlit";
-    let [without, with] = is_absent("shadows", reason, without, with, None);
-    assert_eq!(state(&without.plan, "punctual lights").1, reason);
-    assert!(without.plan.rays.is_none() && with.plan.rays.is_some());
-    assert!((without.bytes)("BVH nodes") == 0 && (with.bytes)("BVH nodes") > 0);
+    let scenes = || [lit(ball(gray(), None), 1), lit(ball(gray(), Some(chalk())), 1)];
+    let [without, with] = scenes();
+    let off = &["shadows=off"];
+    Case {
+        environments: dark(),
+        choices: off,
+        brings: &[&["lights", "light.local_lights"]],
+        ..Case::new("punctual lights", reason, without, with)
+    }
+    .check();
+    let [without, with] = scenes();
+    Case {
+        environments: dark(),
+        brings: &[
+            HIERARCHY,
+            &["lights", "light.has_triangles", "light.local_lights", "light.octants", "light.shadows"],
+        ],
+        ..Case::new("shadows", reason, without, with)
+    }
+    .check();
+    let [without, with] = scenes();
+    let map = &["shadows=map"];
+    Case {
+        environments: dark(),
+        choices: map,
+        brings: &[&[
+            "instances around the scene",
+            "lights",
+            "shadow maps",
+            "shadow maps' table",
+            "[shadow maps]",
+            "light.local_lights",
+            "light.shadows",
+            "shadow_map",
+        ]],
+        ..Case::new("shadows", reason, without, with)
+    }
+    .check();
+    let veil = Material { base_color: [1.0, 1.0, 1.0, 0.5], alpha_mode: AlphaMode::Blend, ..chalk() };
+    let (without, with) = (lit(ball(chalk(), None), 1), lit(ball(chalk(), Some(veil)), 1));
+    Case {
+        environments: dark(),
+        brings: &[FRAGMENTS, &["light.filters"]],
+        ..Case::new("light through surfaces", NONE, without, with)
+    }
+    .check();
+    let (without, with) = (lit(ball(chalk(), None), 15), lit(ball(chalk(), None), 16));
+    let lists = Case::new("light lists per tile", "few point and spot lights", without, with);
+    Case {
+        environments: dark(),
+        same: false,
+        brings: &[&[
+            "tile depths",
+            "tile light masks",
+            "[light lists]",
+            "[tile depths]",
+            "light.local_lights",
+            "light.tile_words",
+            "tile_depth",
+            "tiles",
+        ]],
+        ..lists
+    }
+    .check();
 }
 
 /// Neither mirrors nor scattered light are needed for what is seen through glass: all that enters a ball leaves it, which at

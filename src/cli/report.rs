@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use crate::frame::Work;
 use crate::gpu::{Created, Device, DeviceInfo, Message, Program, Severity};
@@ -90,8 +91,8 @@ pub struct PlanFacts {
 pub struct PipelineFact {
     /// Its program.
     pub name: &'static str,
-    /// Specialization constants by number, as 32-bit words.
-    pub constants: BTreeMap<u32, u32>,
+    /// Specialization constants; what is true is 1.
+    pub constants: BTreeMap<&'static str, Value>,
     /// SPIR-V that the driver is given for these constants.
     pub spirv_bytes: usize,
 }
@@ -117,7 +118,7 @@ impl PlanFacts {
                 .map(|(program, constants)| PipelineFact {
                     name: program.name,
                     spirv_bytes: program.spirv_bytes(&constants),
-                    constants: constants.into_iter().collect(),
+                    constants: named(program, &constants),
                 })
                 .collect(),
             buffers: device
@@ -129,6 +130,12 @@ impl PlanFacts {
             warnings: plan.warnings.clone(),
         }
     }
+}
+
+/// Constants by name: numbers as the shader has them.
+fn named(program: &Program, constants: &[(u32, u32)]) -> BTreeMap<&'static str, Value> {
+    let known = constants.iter().filter_map(|&(id, word)| Some((program.constants.iter().find(|c| c.id == id)?, word)));
+    known.map(|(c, word)| (c.name, if c.float { json!(f32::from_bits(word)) } else { json!(word) })).collect()
 }
 
 /// One pass.

@@ -85,8 +85,8 @@ pub struct Draw<'a> {
 pub struct Raster<'a> {
     /// Name in labels and timings.
     pub name: &'a str,
-    /// Colour attachments in location order.
-    pub colors: Vec<ColorTarget<'a>>,
+    /// Colour attachments in location order; what is written to `None` is lost.
+    pub colors: Vec<Option<ColorTarget<'a>>>,
     /// Depth attachment.
     pub depth: Option<DepthTarget<'a>>,
     /// First pixel of the viewport: several pictures may share one image.
@@ -289,7 +289,7 @@ impl<'a> Frame<'a> {
         assert_eq!(push.len(), program.push_bytes as usize, "push constants of \"{}\"", program.name);
         let mut uses = Vec::new();
         let none = vk::ShaderStageFlags::empty();
-        for color in &raster.colors {
+        for color in raster.colors.iter().flatten() {
             self.use_image(&mut uses, color.image, Access::ColorTarget, none);
         }
         if let Some(depth) = raster.depth {
@@ -303,7 +303,7 @@ impl<'a> Frame<'a> {
         }
         let layout = self.device.layout(program)?;
         let key = RasterKey {
-            colors: raster.colors.iter().map(|c| c.image.desc().format).collect(),
+            colors: raster.colors.iter().map(|c| c.map_or(vk::Format::UNDEFINED, |c| c.image.desc().format)).collect(),
             depth: raster.depth.map(|d| (d.image.desc().format, d.write)),
         };
         let mut pipelines = Vec::with_capacity(draws.len());
@@ -318,7 +318,11 @@ impl<'a> Frame<'a> {
         uses.sort_by_key(|u| (u.resource, u.access as u32));
         uses.dedup();
 
-        let colors: Vec<_> = raster.colors.iter().map(|c| (c.image.view, c.clear)).collect();
+        let colors: Vec<_> = raster
+            .colors
+            .iter()
+            .map(|c| c.map_or((vk::ImageView::null(), None), |c| (c.image.view, c.clear)))
+            .collect();
         let depth = raster.depth.map(|d| {
             let layout = if d.write || d.clear {
                 vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL

@@ -22,5 +22,5 @@ pub use cache::SamplerDesc;
 pub use device::{Candidate, Created, Device, DeviceChoice, DeviceInfo, Message, Severity, candidates};
 pub use frame::{ColorTarget, DepthTarget, Draw, Frame, PassPlan, PassTime, Raster, VertexStream};
 pub use memory::{Buffer, Image, ImageDesc, NOTHING, Place};
-pub use shader::{Binding, BindingKind, Program, Stage, VertexInput};
+pub use shader::{Binding, BindingKind, Constant, Program, Stage, VertexInput};
 pub use specialize::specialized;

@@ -16,10 +16,23 @@ pub struct Program {
     pub bindings: &'static [Binding],
     /// Vertex attributes, each its own tightly packed stream of f32.
     pub inputs: &'static [VertexInput],
+    /// Specialization constants in the order of their numbers.
+    pub constants: &'static [Constant],
     /// Size of the push constants.
     pub push_bytes: u32,
     /// Workgroup size of a compute shader.
     pub local_size: [u32; 3],
+}
+
+/// A specialization constant.
+#[derive(Debug, Clone, Copy)]
+pub struct Constant {
+    /// Its number.
+    pub id: u32,
+    /// Its name, in lower case.
+    pub name: &'static str,
+    /// Its word is a float.
+    pub float: bool,
 }
 
 /// Programs are told apart by their names.

@@ -133,7 +133,7 @@ pub fn fragments<'a>(
     // An empty raster pass clears the heads; one that draws could not, it exchanges them atomically.
     let clear = Raster {
         name: "clear fragment lists",
-        colors: vec![ColorTarget { image: &lists.heads, clear: Some([u32::MAX; 4]) }],
+        colors: vec![Some(ColorTarget { image: &lists.heads, clear: Some([u32::MAX; 4]) })],
         depth: None,
         origin: [0, 0],
         size: lists.size,

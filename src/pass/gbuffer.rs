@@ -70,8 +70,8 @@ impl GBuffer {
             base: target("G-buffer base colour", vk::Format::R16G16B16A16_SFLOAT, true)?,
             normals: target("G-buffer normals", vk::Format::R16G16B16A16_SNORM, true)?,
             ids: target("G-buffer ids", vk::Format::R32G32_UINT, true)?,
-            triangles: target("G-buffer triangles", vk::Format::R32_UINT, with.contains(&true))?,
-            emissive: target("G-buffer emissive", vk::Format::R16G16B16A16_SFLOAT, with[1] || with[2])?,
+            triangles: target("G-buffer triangles", vk::Format::R32_UINT, with[0])?,
+            emissive: target("G-buffer emissive", vk::Format::R16G16B16A16_SFLOAT, with[1])?,
             layers: target("G-buffer layers", vk::Format::R16G16B16A16_UNORM, with[2])?,
             size,
             with,
@@ -92,18 +92,14 @@ pub fn gbuffer<'a>(
     inside: bool,
 ) -> Result<()> {
     // Only depth is cleared: the other targets are read where depth says that something was drawn.
-    let color = |image| ColorTarget { image, clear: None };
-    // Locations are attachment indices: layers at 5 need something at 4 and at 3.
+    let color = |image| Some(ColorTarget { image, clear: None });
+    let [triangles, emissive, layers] = target.with;
     let mut colors = vec![color(&target.base), color(&target.normals), color(&target.ids)];
-    let [_, emissive, layers] = target.with;
-    if target.with.contains(&true) {
-        colors.push(color(&target.triangles));
+    for (image, exists) in [(&target.triangles, triangles), (&target.emissive, emissive), (&target.layers, layers)] {
+        colors.push(color(image).filter(|_| exists));
     }
-    if emissive || layers {
-        colors.push(color(&target.emissive));
-    }
-    if layers {
-        colors.push(color(&target.layers));
+    while colors.last().is_some_and(Option::is_none) {
+        colors.pop();
     }
     let bindings: Vec<_> = scene
         .page_sets()

@@ -5,7 +5,9 @@ use anyhow::Result;
 use super::classify::WorkLists;
 use super::gbuffer::GBuffer;
 use super::lighting::Lighting;
+use super::rays::TraceConstants;
 use crate::gpu::{Frame, Image};
+use crate::plan::March;
 use crate::shader::light;
 
 /// Writes `radiance` where the G-buffer holds a surface.
@@ -21,6 +23,10 @@ pub fn light<'a>(
 ) -> Result<()> {
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
     let planned = plan.rays;
+    // Only rays to lights are sent from here.
+    let trace = if lighting.shadow_rays() { rays.constants } else { TraceConstants::default() };
+    let through_media = planned.filter(|_| lighting.shadow_rays() || rays.inside());
+    let march = through_media.map_or_else(March::default, |rays| rays.march);
     let constants = light::Constants {
         // Ranges of lights are short enough.
         light_budget: u32::MAX,
@@ -41,16 +47,16 @@ pub fn light<'a>(
         tile_words: lighting.tiles.words(),
         ambient: plan.ambient,
         reflection: plan.reflection,
-        traversal: rays.constants.traversal,
-        octants: rays.constants.octants,
-        stack_size: rays.constants.stack_size,
-        hit_textures: rays.constants.hit_textures,
+        traversal: trace.traversal,
+        octants: trace.octants,
+        stack_size: trace.stack_size,
+        hit_textures: trace.hit_textures,
         shadows: lighting.shadows(),
-        filters: planned.is_some_and(|rays| rays.filters),
-        absorption: planned.map_or(0, |rays| rays.absorption),
-        march_steps: plan.march().steps,
-        quadrature: plan.march().rule,
-        march_colours: plan.march().colours,
+        filters: planned.is_some_and(|rays| rays.shadows && rays.filters),
+        absorption: through_media.map_or(0, |rays| rays.absorption),
+        march_steps: march.steps,
+        quadrature: march.rule,
+        march_colours: march.colours,
         march_budget: lighting.loop_budget(),
     };
     let bind = light::Bind {

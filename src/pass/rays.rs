@@ -82,6 +82,13 @@ pub struct TraceConstants {
     pub touching: bool,
 }
 
+impl Default for TraceConstants {
+    /// Of shaders that send none.
+    fn default() -> Self {
+        Self { traversal: 0, octants: false, stack_size: 1, hit_textures: 0, touching: false }
+    }
+}
+
 /// Tables of a scene for rays; next to nothing where the plan sends none.
 pub struct RaysOnDevice {
     /// Nodes in all lists.
@@ -194,7 +201,7 @@ impl RaysOnDevice {
             constants: TraceConstants {
                 traversal: traversal as u32,
                 octants,
-                stack_size: bvh.depth + 1,
+                stack_size: if traversal == Traversal::Stack { bvh.depth + 1 } else { 1 },
                 hit_textures: corners.contents,
                 touching,
             },
@@ -236,7 +243,7 @@ impl RaysOnDevice {
             leaf_places: nothing(vk::Format::R32_UINT)?,
             terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,
             counts: Buffer::new(device, NOTHING, 0, Place::Readback)?,
-            constants: TraceConstants { traversal: 0, octants: false, stack_size: 1, hit_textures: 0, touching: false },
+            constants: TraceConstants::default(),
             facts: None,
             warnings: Vec::new(),
             fixed: TraceTerms {

@@ -338,7 +338,9 @@ impl Planner<'_> {
         let cause = shown(shiny, "no material in use mirrors anything");
         let reflection = decisions.decide_with("mirrored environment", "reflection", rung != "off", cause);
         let cause = match reflection {
-            true => Cause::when(!surroundings.constant, "the environment varies", "the environment is the same everywhere"),
+            true => {
+                Cause::when(!surroundings.constant, "the environment varies", "the environment is the same everywhere")
+            }
             false => Cause::against("no environment is mirrored"),
         };
         let prefilter = decisions.decide("prefiltered environment", cause) && reflection;
