@@ -1,0 +1,470 @@
+//! Every plan once: tiny scenes for all ways in which lights are looked for, surfaces mirror and let light through, and
+//! everything else so spread over them that any two things meet. Each is drawn under core and synchronization validation.
+
+#[path = "support/gpu.rs"]
+mod gpu;
+#[path = "support/made.rs"]
+mod made;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use etalon::frame::{Background, Part, Settings};
+use etalon::pass::rays::Traversal;
+use etalon::plan::{Demand, Facts, Knobs, Plan, Surroundings};
+use etalon::scene::environment::Environment;
+use etalon::scene::material::{Sampler, TextureRef};
+use etalon::scene::normal_form::normalise;
+use etalon::scene::reads::forget_unread;
+use etalon::scene::{AlphaMode, Ambience, Image, LightKind, Material, Reads, SigmaGrid};
+use etalon::study::shape::Shape;
+use glam::DVec3;
+use gpu::Gpu;
+use made::{Made, Random, at, lambert, orthographic, perspective, unlit};
+
+const SIZE: [u32; 2] = [16, 16];
+
+/// The ways through a frame: their product is the list of passes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Ways {
+    shadows: &'static str,
+    mirrors: &'static str,
+    transmission: &'static str,
+    blended: bool,
+    listed: bool,
+}
+
+const SHADOWS: [&str; 3] = ["off", "map", "ray"];
+const MIRRORS: [&str; 3] = ["off", "screen", "ray"];
+const TRANSMISSION: [&str; 4] = ["none", "off", "screen", "ray"];
+
+fn all_ways() -> Vec<Ways> {
+    let mut all = Vec::new();
+    for shadows in SHADOWS {
+        for mirrors in MIRRORS {
+            for transmission in TRANSMISSION {
+                for (blended, listed) in [(false, false), (false, true), (true, false), (true, true)] {
+                    all.push(Ways { shadows, mirrors, transmission, blended, listed });
+                }
+            }
+        }
+    }
+    all
+}
+
+impl Ways {
+    /// What a plan says of them.
+    fn of(plan: &Plan) -> Self {
+        let rays = plan.rays.unwrap_or_default();
+        let effect = |name: &str| plan.effects.iter().find(|effect| effect.name == name).expect("an effect");
+        let pick =
+            |cases: &[(bool, &'static str)], otherwise| cases.iter().find(|(is, _)| *is).map_or(otherwise, |c| c.1);
+        let transmits = effect("refraction").state != "not called for";
+        Self {
+            shadows: pick(&[(plan.shadow_maps, "map"), (rays.shadows, "ray")], "off"),
+            mirrors: pick(&[(plan.screen.mirrors, "screen"), (rays.mirrors, "ray")], "off"),
+            transmission: pick(
+                &[(plan.screen.refraction, "screen"), (rays.refraction, "ray"), (transmits, "off")],
+                "none",
+            ),
+            blended: plan.see_through
+                && (!transmits || rays.refraction || effect("see-through surfaces").reason.contains("veil")),
+            listed: plan.tiles,
+        }
+    }
+}
+
+/// Something that a scene, a knob or a setting may have more than one of.
+struct Factor {
+    name: &'static str,
+    levels: &'static [&'static str],
+}
+
+/// Each level of the knobs among them is set as it is; the others are things in the scene.
+const FACTORS: &[Factor] = &[
+    // The rung of `reflection` where nothing mirrors what is near.
+    Factor { name: "far mirrors", levels: &["environment", "off"] },
+    Factor { name: "samples", levels: &["1", "4"] },
+    Factor { name: "fresnel", levels: &["schlick", "exact"] },
+    Factor { name: "brdf", levels: &["blinn-phong", "blinn-phong-reciprocal", "ggx", "ggx-multi"] },
+    Factor { name: "lobes", levels: &["0.2", "1"] },
+    Factor { name: "interfaces", levels: &["1", "8"] },
+    Factor { name: "absorption", levels: &["off", "thickness", "path", "march:4"] },
+    Factor { name: "quadrature", levels: &["left", "midpoint", "simpson"] },
+    Factor { name: "indirect", levels: &["off", "ambient"] },
+    Factor { name: "arithmetic", levels: &["fast", "stable", "compensated"] },
+    Factor { name: "environment", levels: &["none", "constant", "studio"] },
+    Factor { name: "background", levels: &["default", "transparent"] },
+    Factor { name: "traversal", levels: &["links16", "links32", "stack"] },
+    Factor { name: "projection", levels: &["perspective", "orthographic"] },
+    Factor { name: "parts", levels: &["none", "both"] },
+    Factor { name: "emissive texture", levels: &["no", "yes"] },
+    Factor { name: "layers", levels: &["no", "yes"] },
+    Factor { name: "coat", levels: &["no", "yes"] },
+    Factor { name: "metal", levels: &["none", "colour", "n and kappa"] },
+    Factor { name: "holes", levels: &["no", "yes"] },
+    Factor { name: "bent normals", levels: &["no", "yes"] },
+    Factor { name: "vertex colours", levels: &["no", "yes"] },
+    Factor { name: "medium", levels: &["clear", "tinted", "grid"] },
+    Factor { name: "bodies", levels: &["apart", "touch", "nested"] },
+    Factor { name: "glass", levels: &["smooth", "rough"] },
+    Factor { name: "eye", levels: &["outside", "in glass"] },
+    Factor { name: "chalk", levels: &["no", "yes"] },
+];
+
+/// A level of each factor.
+type Choice = Vec<usize>;
+
+fn level(choice: &Choice, name: &str) -> &'static str {
+    let index = FACTORS.iter().position(|factor| factor.name == name).expect("a factor");
+    FACTORS[index].levels[choice[index]]
+}
+
+/// Pairs of levels of two factors, and of a factor and a way.
+fn pairs(ways: &Ways, choice: &Choice) -> BTreeSet<String> {
+    let named = |i: usize| format!("{}={}", FACTORS[i].name, FACTORS[i].levels[choice[i]]);
+    let mut all = BTreeSet::new();
+    for i in 0..choice.len() {
+        for j in i + 1..choice.len() {
+            all.insert(format!("{} {}", named(i), named(j)));
+        }
+        for way in [
+            format!("shadows={}", ways.shadows),
+            format!("mirrors={}", ways.mirrors),
+            format!("transmission={}", ways.transmission),
+            format!("blended={}", ways.blended),
+            format!("listed={}", ways.listed),
+        ] {
+            all.insert(format!("{way} {}", named(i)));
+        }
+    }
+    all
+}
+
+/// Of any two effects, which are kept.
+fn effect_pairs(plan: &Plan) -> BTreeSet<String> {
+    let kept = |name: &str| plan.effects.iter().any(|effect| effect.name == name && effect.state == "kept");
+    let states: Vec<String> = NAMES.iter().map(|name| format!("({name}: {})", kept(name))).collect();
+    let pair = |i: usize| states[i + 1..].iter().map(move |b| (i, b));
+    (0..states.len()).flat_map(pair).map(|(i, b)| format!("{} {b}", states[i])).collect()
+}
+
+/// Levels for all ways, chosen among a few random ones for the most pairs that are new.
+fn spread() -> Vec<(Ways, Choice)> {
+    let mut random = Random(5);
+    let mut seen = BTreeSet::new();
+    let mut all = Vec::new();
+    for ways in all_ways() {
+        let mut candidate = || -> Choice {
+            FACTORS.iter().map(|factor| (random.unit() * factor.levels.len() as f64) as usize).collect()
+        };
+        let all_pairs = |choice: &Choice| {
+            let mut all = pairs(&ways, choice);
+            all.extend(effect_pairs(&planned(&ways, choice)));
+            all
+        };
+        let best = (0..24).map(|_| candidate()).max_by_key(|choice| all_pairs(choice).difference(&seen).count());
+        let best = best.expect("a candidate");
+        seen.extend(all_pairs(&best));
+        all.push((ways, best));
+    }
+    all
+}
+
+fn scene(ways: &Ways, choice: &Choice) -> Made {
+    let is = |name: &str, wanted: &str| level(choice, name) == wanted;
+    let mut made = Made::new("lattice");
+    made.0.images.push(Image {
+        name: "texels".to_owned(),
+        width: 4,
+        height: 4,
+        rgba: (0..64).map(|i| i * 4 + 3).collect(),
+    });
+    let texture =
+        TextureRef { image: 0, uv_set: 0, uv_transform: glam::Affine2::IDENTITY, sampler: Sampler::default() };
+    let place = |i: usize| at(0.5 * (i % 5) as f64 - 1.0, 0.45 * (i / 5) as f64 - 0.9, 0.0);
+    let mut next = 0;
+    let mut add = |made: &mut Made, name: &str, material: Material| {
+        made.add(Shape::sphere(0.2, 6), Material { name: name.to_owned(), ..material }, place(next));
+        next += 1;
+    };
+    // Unlit where nothing else is called for, so that each thing comes with its own surface.
+    made.add(Shape::panel(4.0, 4.0), unlit([0.3, 0.4, 0.5]), at(0.0, 0.0, -1.5));
+    let rough = Material { metallic: 0.0, roughness: 0.9, ..Material::default() };
+    add(&mut made, "lit", rough.clone());
+    if ways.mirrors != "off" {
+        add(&mut made, "mirror", Material { metallic: 1.0, roughness: 0.05, ..Material::default() });
+    }
+    if ways.blended {
+        let veil = Material { base_color: [0.2, 0.9, 0.3, 0.5], alpha_mode: AlphaMode::Blend, ..rough.clone() };
+        // First among the see-through ones.
+        made.0.materials.insert(0, Material { name: "veil".to_owned(), ..veil });
+        made.0.meshes.iter_mut().for_each(|mesh| mesh.material += 1);
+        let mesh = made.mesh(Shape::panel(1.0, 1.0), rough.clone());
+        made.0.materials.pop();
+        made.0.meshes[mesh].material = 0;
+        made.place(mesh, at(0.0, 0.0, 0.6));
+    }
+    if ways.transmission != "none" {
+        let sigma = SigmaGrid::new([2, 2, 2], (0..24).map(|i| 0.1 * i as f32).collect(), None).expect("a grid");
+        let tinted = is("medium", "tinted");
+        let glass = Material {
+            name: "glass".to_owned(),
+            metallic: 0.0,
+            roughness: if is("glass", "rough") { 0.3 } else { 0.0 },
+            transmission: 0.9,
+            thickness: 0.3,
+            ior: 1.4,
+            attenuation_color: if tinted { [0.5, 0.7, 0.9] } else { [1.0; 3] },
+            attenuation_distance: if tinted { 0.2 } else { f32::INFINITY },
+            sigma: is("medium", "grid").then(|| Arc::new(sigma)),
+            ..Material::default()
+        };
+        let cube = |size: f64| Shape::cuboid(DVec3::splat(size));
+        made.add(cube(0.4), glass.clone(), at(-0.5, 0.8, 0.3));
+        let other = match level(choice, "bodies") {
+            "touch" => (0.4, -0.1),
+            "nested" => (0.2, -0.5),
+            _ => (0.3, 0.5),
+        };
+        made.add(cube(other.0), Material { ior: 1.2, priority: 1, ..glass.clone() }, at(other.1, 0.8, 0.3));
+        if is("eye", "in glass") {
+            made.add(cube(0.5), glass, at(0.0, 0.0, 3.0));
+        }
+    }
+    if is("emissive texture", "yes") {
+        add(&mut made, "lamp", Material { emissive: [1.0; 3], emissive_texture: Some(texture), ..unlit([0.5; 3]) });
+        made.0.materials.last_mut().expect("a material").unlit = false;
+    }
+    if is("layers", "yes") {
+        add(&mut made, "layered", Material { specular_texture: Some(texture), ..rough.clone() });
+    }
+    if is("coat", "yes") {
+        add(&mut made, "coated", Material { clearcoat: 1.0, clearcoat_roughness: 0.9, ..rough.clone() });
+    }
+    if !is("metal", "none") {
+        let conductor = is("metal", "n and kappa").then_some([[0.2, 3.1], [0.4, 2.4], [1.4, 1.9]]);
+        add(&mut made, "metal", Material { metallic: 1.0, roughness: 0.9, conductor, ..Material::default() });
+    }
+    if is("holes", "yes") {
+        let holes = Material { alpha_mode: AlphaMode::Mask(0.5), base_color_texture: Some(texture), ..rough.clone() };
+        add(&mut made, "holes", holes);
+    }
+    if is("bent normals", "yes") {
+        add(&mut made, "bent", Material { normal_texture: Some(texture), ..rough.clone() });
+        let mesh = made.0.meshes.last_mut().expect("a mesh");
+        mesh.tangents = vec![[1.0, 0.0, 0.0, 1.0]; mesh.positions.len()];
+    }
+    if is("vertex colours", "yes") {
+        add(&mut made, "coloured", rough);
+        let mesh = made.0.meshes.last_mut().expect("a mesh");
+        mesh.colors = mesh.positions.iter().map(|p| [p[0].abs(), 0.5, 0.5, 1.0]).collect();
+    }
+    if is("chalk", "yes") {
+        add(&mut made, "chalk", lambert([0.7; 3]));
+    }
+    let lamps = if ways.listed { 16 } else { usize::from(ways.shadows != "off") };
+    for i in 0..lamps {
+        let position = DVec3::new(i as f64 * 0.3 - 2.0, 2.0, 2.0);
+        made.light([3.0; 3], LightKind::Point { position, range: Some(6.0) });
+    }
+    if ways.shadows != "off" {
+        made.light([1.0; 3], LightKind::Directional { direction: DVec3::new(0.3, -1.0, -0.4).normalize() });
+    }
+    let projection = if is("projection", "perspective") { perspective(40.0) } else { orthographic(1.3) };
+    made.camera(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, projection);
+    made
+}
+
+fn knobs(ways: &Ways, choice: &Choice) -> Knobs {
+    let mut knobs = Knobs::default();
+    let mut set = |knob: &str, rung: &str| knobs.set(&format!("{knob}={rung}")).expect("a rung");
+    set("shadows", ways.shadows);
+    set("reflection", if ways.mirrors == "off" { level(choice, "far mirrors") } else { ways.mirrors });
+    set("refraction", if ways.transmission == "none" { "ray" } else { ways.transmission });
+    for factor in FACTORS.iter().filter(|factor| etalon::plan::KNOBS.iter().any(|knob| knob.name == factor.name)) {
+        set(factor.name, level(choice, factor.name));
+    }
+    knobs
+}
+
+/// Draws one plan of all.
+fn drawn(gpu: &Gpu, ways: &Ways, choice: &Choice) -> Plan {
+    let made = scene(ways, choice);
+    let environment = match level(choice, "environment") {
+        "none" => None,
+        "constant" => Some(Environment::constant([0.4, 0.5, 0.6])),
+        _ => Some(Environment::studio()),
+    };
+    let by_ray = |rung: &str| rung == "ray" && level(choice, "parts") == "both";
+    let mut parts = Vec::new();
+    parts.extend(by_ray(ways.mirrors).then_some(Part::Reflection));
+    parts.extend((ways.transmission == "none" || by_ray(ways.transmission)).then_some(Part::Refraction));
+    let settings = Settings {
+        size: SIZE,
+        knobs: knobs(ways, choice),
+        background: match level(choice, "background") {
+            "transparent" => Background::Transparent,
+            _ => Background::Default,
+        },
+        traversal: Some(match level(choice, "traversal") {
+            "links16" => Traversal::Links16,
+            "links32" => Traversal::Links32,
+            _ => Traversal::Stack,
+        }),
+        parts,
+        ..Settings::default()
+    };
+    let mut renderer = gpu.renderer(&made.0, environment.as_ref(), settings);
+    let rendered = renderer.render(&made.0.cameras[0], &mut |_, _| ()).expect("a picture");
+    assert_eq!((rendered.counts.nan, rendered.counts.inf), (0, 0), "{ways:?} {choice:?}");
+    let seen = renderer.film().expect("the film").rgba.iter().filter(|pixel| pixel[0] > 0.0).count();
+    assert!(seen > 50, "{ways:?} {choice:?}: {seen} pixels are lit");
+    renderer.plan.clone()
+}
+
+/// Draws each of the ways `share` of three, and looks that it is the one that was meant.
+fn draw_all(share: &str) {
+    let gpu = Gpu::new();
+    for (ways, choice) in spread().iter().filter(|(ways, _)| ways.shadows == share) {
+        let plan = drawn(&gpu, ways, choice);
+        assert_eq!(Ways::of(&plan), *ways, "{choice:?}: {:#?}", plan.effects);
+    }
+    assert!(gpu.errors().is_empty(), "{:?}", gpu.errors());
+}
+
+#[test]
+fn plans_without_shadows() {
+    draw_all("off");
+}
+
+#[test]
+fn plans_with_shadow_maps() {
+    draw_all("map");
+}
+
+#[test]
+fn plans_with_shadow_rays() {
+    draw_all("ray");
+}
+
+#[test]
+fn any_two_things_meet() {
+    let all = spread();
+    let reached: BTreeSet<String> = all.iter().flat_map(|(ways, choice)| pairs(ways, choice)).collect();
+    let levels = |factor: &Factor| factor.levels.iter().map(|level| format!("{}={level}", factor.name)).collect();
+    let named: Vec<Vec<String>> = FACTORS.iter().map(levels).collect();
+    let of_ways = |name: &str, levels: &[&str]| levels.iter().map(|level| format!("{name}={level}")).collect();
+    let ways: [Vec<String>; 5] = [
+        of_ways("shadows", &SHADOWS),
+        of_ways("mirrors", &MIRRORS),
+        of_ways("transmission", &TRANSMISSION),
+        of_ways("blended", &["false", "true"]),
+        of_ways("listed", &["false", "true"]),
+    ];
+    let mut expected = BTreeSet::new();
+    for (i, these) in named.iter().enumerate() {
+        for others in named[i + 1..].iter() {
+            expected.extend(these.iter().flat_map(|a| others.iter().map(move |b| format!("{a} {b}"))));
+        }
+        for others in &ways {
+            expected.extend(others.iter().flat_map(|a| these.iter().map(move |b| format!("{a} {b}"))));
+        }
+    }
+    let missed: Vec<_> = expected.difference(&reached).collect();
+    assert!(expected.len() > 1500 && missed.is_empty(), "never drawn together: {missed:?}");
+}
+
+/// The plan as the renderer makes it, without a device.
+fn planned(ways: &Ways, choice: &Choice) -> Plan {
+    let Made(mut scene) = scene(ways, choice);
+    let environment = level(choice, "environment");
+    let ambience = if environment == "none" { Ambience::Absent } else { Ambience::Present };
+    forget_unread(&mut scene, Reads::Visible(ambience));
+    let form = normalise(&mut scene);
+    let surroundings = Surroundings {
+        environment: environment != "none",
+        constant: environment == "constant",
+        sky: environment != "none",
+        demand: Demand::Scene,
+    };
+    Plan::new(&scene, &Facts::of(&scene, form), surroundings, &knobs(ways, choice))
+}
+
+/// Effects that are only kept where another one is, and so where those are that it needs.
+const NEEDS: &[(&str, &str)] = &[
+    ("absorption", "transmission before rays"),
+    ("ambient light", "environment"),
+    ("clear coat", "layers"),
+    ("light lists per tile", "punctual lights"),
+    ("light through surfaces", "shadows"),
+    ("media that vary", "absorption"),
+    ("media that vary", "refraction"),
+    ("mirrored environment", "environment"),
+    ("prefiltered environment", "mirrored environment"),
+    ("quadrature", "media that vary"),
+    ("shadows", "punctual lights"),
+];
+
+fn needs(a: &str, b: &str) -> bool {
+    a == b || NEEDS.iter().any(|(x, y)| *x == a && needs(y, b))
+}
+
+/// Every effect is kept in some plan and not called for in another, and any two are kept together, and each without the other
+/// unless it needs it.
+#[test]
+fn any_two_effects_are_kept_together_and_apart() {
+    let mut states: BTreeMap<&'static str, BTreeSet<&'static str>> = BTreeMap::new();
+    let mut seen = BTreeSet::new();
+    for (ways, choice) in spread() {
+        let plan = planned(&ways, &choice);
+        for a in &plan.effects {
+            states.entry(a.name).or_default().insert(a.state);
+        }
+        seen.extend(effect_pairs(&plan));
+    }
+    assert_eq!(states.keys().copied().collect::<Vec<_>>(), NAMES);
+    for (name, states) in &states {
+        assert!(states.contains("kept") && states.contains("not called for"), "{name}: only {states:?}");
+    }
+    let mut missed = Vec::new();
+    for (i, a) in NAMES.iter().enumerate() {
+        for b in &NAMES[i + 1..] {
+            for (x, y) in [(true, true), (true, false), (false, true)] {
+                // Where a medium is marched there is a rule for it.
+                let marched = [*a, *b] == ["media that vary", "quadrature"] && x != y;
+                let impossible = marched || (x && !y && needs(a, b)) || (y && !x && needs(b, a));
+                let pair = format!("({a}: {x}) ({b}: {y})");
+                if seen.contains(&pair) == impossible {
+                    missed.push(pair);
+                }
+            }
+        }
+    }
+    assert!(missed.is_empty(), "never planned, or planned although impossible: {missed:#?}");
+}
+
+/// Every effect but the one that only the hierarchy of triangles tells.
+const NAMES: [&str; 21] = [
+    "absorption",
+    "ambient light",
+    "clear coat",
+    "emissive textures",
+    "environment",
+    "holes before rays",
+    "layers",
+    "light lists per tile",
+    "light through surfaces",
+    "media that vary",
+    "metals by n and kappa",
+    "mirrored environment",
+    "mirrors",
+    "prefiltered environment",
+    "punctual lights",
+    "quadrature",
+    "rays by lobes",
+    "refraction",
+    "see-through surfaces",
+    "shadows",
+    "transmission before rays",
+];
