@@ -30,7 +30,7 @@ use crate::pass::shadow_map::ShadowMaps;
 use crate::pass::tiles::{Tiles, tiles};
 use crate::pass::tonemap::{Counts, Display, tonemap};
 use crate::pass::view::{View, jitter};
-use crate::plan::{Demand, Facts, Knobs, Plan, Surroundings, needs_lights};
+use crate::plan::{Ability, Demand, Facts, Knobs, Plan, Surroundings, needs_lights};
 use crate::scene::environment::Environment;
 use crate::scene::normal_form::normalise;
 use crate::scene::reads::forget_unread;
@@ -231,6 +231,11 @@ impl Renderer {
             demand: settings.demand,
         };
         let mut plan = Plan::new(&scene, &facts, surroundings, &settings.knobs);
+        plan.check(&Ability {
+            device: device.info().name.clone(),
+            adds_in_subgroups: device.adds_in_subgroups(),
+            storage_images: device.storage_images(),
+        })?;
         // What adds nothing takes no turn of any loop.
         let mut kept = plan.lights.iter();
         scene.lights.retain(|_| kept.next().copied().unwrap_or_default());

@@ -81,6 +81,11 @@ fn what_constants_rule_out_is_gone() {
     assert!(left.len() * 10 < words.len(), "{} of {} words", left.len(), words.len());
     let loops = |words: &[u32]| instructions(words).iter().filter(|one| op(one) == Op::LoopMerge).count();
     assert_eq!(loops(&left), 0);
+    let adds = |words: &[u32]| {
+        let capability = spirv::Capability::GroupNonUniformArithmetic as u32;
+        instructions(words).iter().any(|one| op(one) == Op::Capability && one[1] == capability)
+    };
+    assert!(adds(words) && !adds(&left));
     assert!(loops(words) > 10);
 }
 

@@ -238,9 +238,7 @@ impl PictureOptions {
             bail!("--model global: only the local and the recursive model are built so far");
         }
         let mut knobs = Knobs::of(self.model);
-        for choice in &self.set {
-            knobs.set(choice)?;
-        }
+        knobs.set_all(&self.set)?;
         Ok(knobs)
     }
 

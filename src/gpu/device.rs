@@ -274,7 +274,7 @@ impl Instance {
             }
         }
         for (has, needed, what) in [
-            (limits.max_per_stage_descriptor_storage_images, 22, "storage images in a shader"),
+            (limits.max_per_stage_descriptor_storage_images, 20, "storage images in a shader"),
             (limits.max_per_stage_descriptor_storage_buffers, 8, "storage buffers in a shader"),
             (limits.max_color_attachments, 6, "colour targets"),
             (limits.max_texel_buffer_elements, 1 << 22, "texels in a buffer"),
@@ -378,6 +378,7 @@ pub struct Device {
     pub(super) allocator: Mutex<ManuallyDrop<Allocator>>,
     pub(super) caches: Mutex<Caches>,
     pub(super) limits: vk::PhysicalDeviceLimits,
+    adds_in_subgroups: bool,
     pub(super) submitted: AtomicU64,
     next_id: AtomicU64,
     created: Mutex<Vec<Created>>,
@@ -441,6 +442,12 @@ impl Device {
             allocation_sizes: gpu_allocator::AllocationSizes::new(16 << 20, 8 << 20),
         })
         .with_context(opening)?;
+        let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
+        let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut v11);
+        // SAFETY: a plain query; the chain outlives the call.
+        unsafe { instance.raw.get_physical_device_properties2(physical, &mut all) };
+        let adds_in_subgroups = v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
+            && v11.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::ARITHMETIC);
         // SAFETY: the family was created above; the create infos outlive the calls.
         let (queue, commands, timeline) = unsafe {
             let pool = vk::CommandPoolCreateInfo::default()
@@ -464,6 +471,7 @@ impl Device {
             allocator: Mutex::new(ManuallyDrop::new(allocator)),
             caches: Mutex::default(),
             limits: properties.limits,
+            adds_in_subgroups,
             submitted: AtomicU64::new(0),
             next_id: AtomicU64::new(1),
             created: Mutex::default(),
@@ -522,6 +530,18 @@ impl Device {
     #[must_use]
     pub fn max_storage_bytes(&self) -> u64 {
         u64::from(self.limits.max_storage_buffer_range)
+    }
+
+    /// Images and texel buffers that one shader may read and write without a sampler.
+    #[must_use]
+    pub fn storage_images(&self) -> u32 {
+        self.limits.max_per_stage_descriptor_storage_images
+    }
+
+    /// Whether invocations of a compute shader add up numbers among them, a subgroup at a time.
+    #[must_use]
+    pub fn adds_in_subgroups(&self) -> bool {
+        self.adds_in_subgroups
     }
 
     pub(super) fn note(&self, kind: &'static str, name: &str, bytes: u64) {

@@ -23,10 +23,10 @@ fn op(words: &[u32], at: &Place) -> Option<Op> {
     Op::from_u32(words[at.start] & 0xffff)
 }
 
-/// The instructions of a module.
-fn instructions(words: &[u32]) -> Vec<Place> {
+/// The instructions from a word on.
+fn instructions(words: &[u32], first: usize) -> Vec<Place> {
     let mut places = Vec::with_capacity(words.len() / 4);
-    let mut at = HEADER;
+    let mut at = first;
     while at < words.len() {
         let length = (words[at] >> 16) as usize;
         places.push(at..at + length);
@@ -152,7 +152,7 @@ impl Module<'_> {
 /// When the words are no SPIR-V, or have constants of other than 32 bits: ours come from glslang and have none.
 #[must_use]
 pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
-    let places = instructions(words);
+    let places = instructions(words, HEADER);
     let mut module = Module { words, types: HashSet::new(), scalars: HashSet::new(), known: HashMap::new() };
     let mut told = HashMap::new();
     let first_function =
@@ -200,9 +200,13 @@ pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
         at = end + 1;
     }
 
+    // A device without it may still draw what adds nothing.
+    let adds = Op::GroupNonUniformIAdd as u32..=Op::GroupNonUniformLogicalXor as u32;
+    let adds = instructions(&bodies, 0).iter().any(|place| adds.contains(&(bodies[place.start] & 0xffff)));
     for place in &places[..first_function] {
         let instruction = &words[place.clone()];
         match op(words, place) {
+            Some(Op::Capability) if !adds && instruction[1] == spirv::Capability::GroupNonUniformArithmetic as u32 => {}
             Some(Op::Decorate) if instruction[2] == spirv::Decoration::SpecId as u32 => {}
             Some(Op::Decorate | Op::Name) if removed.contains(&instruction[1]) => {}
             Some(Op::SpecConstantTrue | Op::SpecConstantFalse) => {

@@ -181,11 +181,36 @@ impl Knobs {
             self.rungs[index] = found;
             return Ok(());
         }
+        if let (Ok(wanted), Some(nearest)) = (rung.parse::<f64>(), nearest(knob.rungs, rung)) {
+            bail!(
+                "--set {choice}: {name} has no rung {wanted}, it has {}; the nearest is {nearest}",
+                knob.rungs.join(", ")
+            );
+        }
         let stem = rung.split(':').next().unwrap_or(rung);
         if knob.unbuilt.contains(&stem) {
             bail!("--set {choice}: the rung \"{rung}\" is not built yet; {name} has {}", knob.rungs.join(", "));
         }
         bail!("--set {choice}: {name} has no rung \"{rung}\", it has {}", knob.rungs.join(", "));
+    }
+
+    /// Applies several, in order. What two of them or a model say against each other is told with both.
+    ///
+    /// # Errors
+    /// As [`Knobs::set`], and one sentence for choices that contradict.
+    pub fn set_all(&mut self, choices: &[String]) -> Result<()> {
+        let (none, others): (Vec<&String>, Vec<&String>) =
+            choices.iter().partition(|choice| choice.as_str() == "interfaces=0");
+        others.into_iter().try_for_each(|choice| self.set(choice))?;
+        let sends = ["refraction", "reflection"].into_iter().find(|knob| self.rung(knob) == "ray");
+        match (none.first(), sends) {
+            (None, _) => Ok(()),
+            (Some(choice), None) => self.set(choice),
+            (Some(choice), Some(knob)) => bail!(
+                "--set {choice} contradicts {knob}=ray, whose rays meet at least one surface; the nearest choice is \
+                 interfaces=1, or {knob}=screen"
+            ),
+        }
     }
 
     /// The chosen rung of a knob.
@@ -248,6 +273,14 @@ impl Knobs {
     }
 }
 
+/// Of rungs that are numbers the one whose ratio to a number is nearest to 1.
+fn nearest(rungs: &'static [&'static str], wanted: &str) -> Option<&'static str> {
+    let wanted: f64 = wanted.parse().ok().filter(|number: &f64| number.is_finite())?;
+    let number = |rung: &&&str| rung.parse::<f64>().ok();
+    let far = |rung: &&str| (rung.parse::<f64>().unwrap_or(f64::NAN).ln() - wanted.max(1e-9).ln()).abs();
+    rungs.iter().filter(|rung| number(rung).is_some()).min_by(|a, b| far(a).total_cmp(&far(b))).copied()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -283,6 +316,21 @@ mod tests {
     }
 
     #[test]
+    fn contradictions_name_both_sides() {
+        let set = |choices: &[&str]| {
+            let choices: Vec<String> = choices.iter().map(|&choice| choice.to_owned()).collect();
+            Knobs::default().set_all(&choices).map_err(|e| e.to_string())
+        };
+        let said = set(&["interfaces=0", "refraction=ray"]).unwrap_err();
+        assert!(said.contains("interfaces=0 contradicts refraction=ray") && said.contains("interfaces=1"), "{said}");
+        let said = set(&["interfaces=0", "refraction=off"]).unwrap_err();
+        assert!(said.contains("interfaces=0 contradicts reflection=ray"), "{said}");
+        let said = set(&["reflection=off", "interfaces=0", "refraction=off"]).unwrap_err();
+        assert!(said.contains("no rung 0") && said.contains("nearest is 1"), "{said}");
+        assert!(set(&["reflection=off", "samples=16"]).is_ok());
+    }
+
+    #[test]
     fn wrong_choices_say_what_there_is() {
         let mut knobs = Knobs::default();
         for (choice, said) in [
@@ -291,6 +339,11 @@ mod tests {
             ("absorption=march", "no rung"),
             ("quadrature=right", "it has left, midpoint, simpson"),
             ("brdf=oren", "no rung"),
+            ("samples=5", "the nearest is 4"),
+            ("samples=100000", "the nearest is 1024"),
+            ("interfaces=0", "the nearest is 1"),
+            ("lobes=0.4", "the nearest is 0.5"),
+            ("fresnel=3", "no rung \"3\""),
             ("gloss=1", "no knob"),
             ("samples", "KNOB=RUNG"),
         ] {

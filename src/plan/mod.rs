@@ -1,10 +1,12 @@
 //! The plan: what a scene calls for, with the reason, before any Vulkan object exists. Pure and printable.
 
+mod ability;
 mod effect;
 mod knobs;
 mod left_out;
 mod surfaces;
 
+pub use ability::Ability;
 pub use effect::{Demand, Effect, Evidence};
 pub use knobs::{KNOBS, Knob, Knobs, Model};
 pub use surfaces::{casts_in_maps, is_see_through, mirrors};

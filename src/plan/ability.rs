@@ -1,0 +1,90 @@
+//! What a device must be able to do for a plan.
+
+use anyhow::{Result, bail};
+
+use super::{KNOBS, Plan};
+
+/// What rungs ask of a device, beyond what every plan does.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Ability {
+    /// Name of the device.
+    pub device: String,
+    /// Compute shaders add within subgroups: how rays count their work.
+    pub adds_in_subgroups: bool,
+    /// Storage images and texel buffers of one shader.
+    pub storage_images: u32,
+}
+
+/// Those of the shader that marches over the screen.
+const SCREEN_IMAGES: u32 = 22;
+
+impl Plan {
+    /// Refuses a plan that the device cannot draw.
+    ///
+    /// # Errors
+    /// One sentence with the rung, the device and the nearest rung.
+    pub fn check(&self, ability: &Ability) -> Result<()> {
+        let rays = self.rays.unwrap_or_default();
+        let counts = (!ability.adds_in_subgroups)
+            .then(|| "has no addition within subgroups of compute shaders, by which rays count their work".to_owned());
+        let images = (ability.storage_images < SCREEN_IMAGES)
+            .then(|| format!("has {} storage images for one shader, of {SCREEN_IMAGES}", ability.storage_images));
+        for (asked, knob, rung, lacks) in [
+            (rays.shadows, "shadows", "ray", &counts),
+            (rays.mirrors, "reflection", "ray", &counts),
+            (rays.refraction, "refraction", "ray", &counts),
+            (self.screen.mirrors, "reflection", "screen", &images),
+        ] {
+            if let (true, Some(lacks)) = (asked, lacks) {
+                bail!(
+                    "{knob}={rung}: the device \"{}\" {lacks}; the nearest choice is {knob}={}",
+                    ability.device,
+                    below(knob, rung)
+                );
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The next cheaper rung.
+fn below(knob: &str, rung: &str) -> &'static str {
+    let rungs = KNOBS.iter().find(|known| known.name == knob).map_or(&[][..], |known| known.rungs);
+    let place = rungs.iter().position(|known| *known == rung).unwrap_or_default();
+    rungs.get(place.saturating_sub(1)).copied().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::{Demand, Facts, Knobs, Surroundings};
+    use crate::scene::Scene;
+
+    #[test]
+    fn what_a_device_cannot_do_is_said_with_the_nearest_choice() {
+        let able = Ability { device: "toy".to_owned(), adds_in_subgroups: true, storage_images: 22 };
+        let plan = |choices: &[&str]| {
+            let mut knobs = Knobs::default();
+            choices.iter().for_each(|choice| knobs.set(choice).unwrap());
+            let surroundings = Surroundings { environment: true, constant: false, sky: true, demand: Demand::Full };
+            Plan::new(&Scene::default(), &Facts::default(), surroundings, &knobs)
+        };
+        let refused = |choices: &[&str], ability: &Ability| plan(choices).check(ability).map_err(|e| e.to_string());
+        assert!(refused(&[], &able).is_ok() && refused(&["reflection=screen"], &able).is_ok());
+        let few = Ability { storage_images: 21, ..able.clone() };
+        assert!(refused(&[], &few).is_ok());
+        let said = refused(&["reflection=screen"], &few).unwrap_err();
+        assert!(said.contains("reflection=screen: the device \"toy\" has 21 storage images"), "{said}");
+        assert!(said.ends_with("the nearest choice is reflection=environment"), "{said}");
+        let still = Ability { adds_in_subgroups: false, ..able };
+        for (choices, asked, nearest) in [
+            (&[][..], "shadows=ray", "shadows=map"),
+            (&["shadows=map"], "reflection=ray", "reflection=screen"),
+            (&["shadows=map", "reflection=off"], "refraction=ray", "refraction=screen"),
+        ] {
+            let said = refused(choices, &still).unwrap_err();
+            assert!(said.starts_with(asked) && said.ends_with(nearest), "{said}");
+        }
+        assert!(refused(&["shadows=off", "reflection=off", "refraction=off"], &still).is_ok());
+    }
+}
