@@ -384,7 +384,7 @@ impl Renderer {
         if plan.rays.is_some() {
             rays.reset(&mut frame);
         }
-        gbuffer(&mut frame, scene, camera, g, lod_bias, rays.inside())?;
+        gbuffer(&mut frame, scene, camera, g, lod_bias, scene.draws(false, rays.inside()))?;
         if plan.tiles {
             tiles(&mut frame, plan, scene, camera, g, lists_of_lights)?;
         }
@@ -526,12 +526,37 @@ impl Renderer {
     /// # Errors
     /// When the driver fails.
     pub fn aovs(&mut self, camera: &Camera) -> Result<(Vec<AovPixel>, View)> {
+        self.surfaces(camera, false)
+    }
+
+    /// For each material of the scene, the pixels whose centre shows it nearest, whatever it lets through.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn pixels_by_material(&mut self, camera: &Camera) -> Result<Vec<u64>> {
+        let (surfaces, _) = self.surfaces(camera, true)?;
+        let mut counts = Vec::new();
+        for material in surfaces.iter().filter_map(|pixel| (pixel.material as usize).checked_sub(1)) {
+            if counts.len() <= material {
+                counts.resize(material + 1, 0);
+            }
+            counts[material] += 1;
+        }
+        Ok(counts)
+    }
+
+    /// What lies at the pixel centres; with `all`, what is laid over the picture as well.
+    fn surfaces(&mut self, camera: &Camera, all: bool) -> Result<(Vec<AovPixel>, View)> {
         let [width, height] = self.settings.size;
         let view = View::new(camera, self.settings.size, self.scene.bounds);
         self.scene.look_from(&view);
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(0, 1))));
         let mut frame = Frame::new(&self.device);
-        gbuffer(&mut frame, &self.scene, &self.camera, &self.gbuffer, 0.0, self.rays.inside())?;
+        let mut draws = self.scene.draws(false, self.rays.inside());
+        if all {
+            draws.extend(self.scene.draws(true, self.rays.inside()));
+        }
+        gbuffer(&mut frame, &self.scene, &self.camera, &self.gbuffer, 0.0, draws)?;
         frame.finish()?;
         // As many rows at a time as one storage buffer holds.
         let row_bytes = u64::from(width) * size_of::<AovPixel>() as u64;

@@ -43,6 +43,7 @@
 //!
 //! The modules below are in reading order. `docs/tour.md` goes through them room by room, `docs/frame.md` through the passes.
 
+pub mod cost;
 pub mod frame;
 
 pub mod pass;

@@ -17,7 +17,14 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("shader", &["shader", "gpu", "share"]),
     ("pass", &["pass", "gpu", "scene", "plan", "image", "shader", "share"]),
     ("frame", &["frame", "pass", "gpu", "scene", "plan", "image", "share"]),
-    ("cli", &["cli", "verify", "optics", "frame", "pass", "gpu", "scene", "plan", "image", "study", "share", "shader"]),
+    ("cost", &["cost", "frame", "gpu", "plan", "scene"]),
+    (
+        "cli",
+        &[
+            "cli", "cost", "verify", "optics", "frame", "pass", "gpu", "scene", "plan", "image", "study", "share",
+            "shader",
+        ],
+    ),
 ];
 
 /// Modules that may name `ash`.

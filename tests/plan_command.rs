@@ -37,9 +37,15 @@ fn a_plan_is_what_is_then_done() {
         etalon(at, &render, &[]).succeeded();
         let report = std::fs::read(at.join("report.json")).expect("a report");
         let report: Value = serde_json::from_slice(&report).expect("JSON");
-        for part in ["schema", "effects", "samples", "passes", "pipelines"] {
+        for part in ["schema", "samples", "passes", "pipelines", "unread"] {
             assert_eq!(plan[part], report["plan"][part], "{arguments:?}: {part}");
         }
+        // Pixels are counted where nothing is drawn.
+        let mut effects = plan["effects"].clone();
+        for effect in effects.as_array_mut().expect("a list") {
+            effect["evidence"].as_object_mut().expect("an object").remove("pixels");
+        }
+        assert_eq!(effects, report["plan"]["effects"], "{arguments:?}");
         let buffers = |of: &Value| of["buffers"].as_array().cloned().expect("a list");
         let (before, after) = (buffers(&plan), buffers(&report["plan"]));
         assert!(before.len() > 10, "{arguments:?}");
@@ -62,6 +68,77 @@ fn a_plan_can_be_read() {
     assert!(!folder.path().join("pool.png").exists());
 }
 
+/// Evidence from a camera: pixels of what calls for an effect, and surfaces on the lines of sight.
+#[test]
+fn a_plan_knows_what_the_camera_sees() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let plan = planned(at, &["study:nested"]).0;
+    let effect = |plan: &Value, name: &str| {
+        let all = plan["effects"].as_array().expect("a list");
+        all.iter().find(|effect| effect["name"] == name).expect("an effect").clone()
+    };
+    let pixels = |plan: &Value, name: &str| {
+        let pixels = effect(plan, name)["evidence"]["pixels"].as_str().expect("pixels").to_owned();
+        pixels.parse::<u64>().expect("a number")
+    };
+    let glass = pixels(&plan, "refraction");
+    assert!(glass > 100 && glass < 48 * 27, "{glass}");
+    assert!(effect(&plan, "refraction")["reason"].as_str().expect("a reason").ends_with("closed"), "{plan}");
+    let expected = &plan["expected"];
+    let most = expected["interfaces"].as_u64().expect("a number");
+    assert!(most > 8, "{most}");
+    assert_eq!(expected["ray_rounds"], 8);
+    let lost = |rung: &str| expected["lost"][rung].as_f64().expect("a share");
+    assert!(lost("1") > lost("4") && lost("4") > 0.5 && lost("32") == 0.0, "{expected}");
+    let warned = |plan: &Value, said: &str| {
+        plan["warnings"].as_array().expect("a list").iter().any(|w| w.as_str().is_some_and(|w| w.contains(said)))
+    };
+    assert!(warned(&plan, &format!("up to {most} transparent surfaces: interfaces=8 loses up to")), "{plan}");
+    let enough = planned(at, &["study:nested", "--set", "interfaces=16"]).0;
+    assert!(!warned(&enough, "transparent surfaces") && enough["expected"]["ray_rounds"] == most);
+    // From behind, nothing of it is seen.
+    let away = ["study:nested", "--eye", "0,50,0", "--target", "0,100,0", "--up", "1,0,0"];
+    assert_eq!(pixels(&planned(at, &away).0, "refraction"), 0);
+}
+
+#[test]
+fn what_is_left_out_has_a_price() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plan = planned(folder.path(), &["study:radiance", "--set", "shadows=off", "--plan", "explain-cost"]).0;
+    let costs = plan["costs"].as_array().expect("a list");
+    let of = |name: &str| costs.iter().find(|cost| cost["effect"] == name).expect("a price");
+    let not_kept = plan["effects"].as_array().expect("a list").iter().filter(|effect| effect["state"] != "kept");
+    assert_eq!(costs.len(), not_kept.count());
+    assert!(of("layers")["bytes"].as_i64() > Some(48 * 27 * 8), "{costs:?}");
+    assert!(of("see-through surfaces")["pipelines"].as_i64() > Some(1), "{costs:?}");
+    assert!(of("mirrors")["spirv_bytes"].as_i64() > Some(10_000), "{costs:?}");
+    assert!(costs.iter().all(|cost| cost["frame_ms"].is_f64() && cost["by"] == "asked for"), "{costs:?}");
+    let lean = planned(folder.path(), &["study:radiance"]).0;
+    assert!(lean.get("costs").is_none());
+    // What a knob drops is planned with another rung.
+    let arguments = ["study:metals", "--set", "shadows=off", "--plan", "explain-cost"];
+    let plan = planned(folder.path(), &arguments).0;
+    let shadows = plan["costs"].as_array().expect("a list").iter().find(|cost| cost["effect"] == "shadows");
+    assert_eq!(shadows.expect("a price")["by"], "shadows=ray");
+}
+
+#[test]
+fn everything_can_be_planned() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plan = |extent: &str| planned(folder.path(), &["study:radiance", "--plan", extent]).0;
+    let (lean, full) = (plan("scene"), plan("full"));
+    let count = |plan: &Value, state: &str| {
+        plan["effects"].as_array().expect("a list").iter().filter(|effect| effect["state"] == state).count()
+    };
+    assert!(count(&lean, "not called for") > 10);
+    // Bodies that touch are another picture.
+    assert_eq!(count(&full, "not called for"), 1);
+    let reasons = full["effects"].to_string();
+    assert!(reasons.contains("asked for, although no material in use has it"), "{reasons}");
+    assert!(full["pipelines"].as_array().expect("a list").len() > lean["pipelines"].as_array().expect("a list").len());
+}
+
 #[test]
 fn what_cannot_be_planned_is_an_error() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -71,4 +148,6 @@ fn what_cannot_be_planned_is_an_error() {
     failed(&["missing.glb"], "missing.glb");
     failed(&["study:etalon", "--set", "gloss=1"], "no knob is called \"gloss\"");
     failed(&["study:etalon", "--camera", "nobody"], "nobody");
+    failed(&["study:etalon", "--set", "interfaces=0"], "interfaces=0 contradicts refraction=ray");
+    failed(&["study:etalon", "--set", "samples=5"], "the nearest is 4");
 }

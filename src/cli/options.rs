@@ -32,12 +32,14 @@ pub enum Extent {
     Scene,
     /// Every effect that the knobs allow.
     Full,
+    /// What the scene calls for, and what each of the others would have cost, measured.
+    ExplainCost,
 }
 
 impl Extent {
     fn demand(self) -> Demand {
         match self {
-            Self::Scene => Demand::Scene,
+            Self::Scene | Self::ExplainCost => Demand::Scene,
             Self::Full => Demand::Full,
         }
     }
@@ -93,8 +95,9 @@ pub struct PictureOptions {
     /// Choose a knob's rung, for example samples=16; repeatable
     #[arg(long = "set", value_name = "KNOB=RUNG")]
     pub set: Vec<String>,
-    /// What is planned: what the scene calls for, or every effect that the knobs allow, for the same picture
-    #[arg(long, value_enum, value_name = "scene|full", default_value_t = Extent::Scene)]
+    /// What is planned: what the scene calls for; or every effect that the knobs allow, for the same picture; or what the
+    /// scene calls for, with a table of what each other effect would have cost here
+    #[arg(long, value_enum, value_name = "scene|full|explain-cost", default_value_t = Extent::Scene)]
     pub plan: Extent,
     /// Exposure in stops, display outputs only
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_hyphen_values = true)]

@@ -7,10 +7,14 @@ use anyhow::Result;
 use clap::Args;
 use comfy_table::{ContentArrangement, Table, presets};
 
-use super::options::{DeviceOptions, PictureOptions, SceneOptions};
+use super::options::{DeviceOptions, Extent, PictureOptions, SceneOptions};
 use super::print;
-use super::report::PlanFacts;
+use super::report::{Expected, PlanFacts};
 use super::setup::Setup;
+use crate::cost::explain::Price;
+use crate::frame::Renderer;
+use crate::plan::KNOBS;
+use crate::scene::sight::{Sight, along_lines};
 
 /// Say what a scene calls for, with reasons, and what drawing it takes
 #[derive(Debug, Clone, Args)]
@@ -34,6 +38,11 @@ pub fn run(args: &PlanArgs) -> Result<ExitCode> {
     let settings = args.picture.settings(&args.scene)?;
     let setup = Setup::load(&args.scene, args.picture.reads(&args.scene, &settings.knobs), &args.device)?;
     let mut warnings = setup.warnings.clone();
+    let camera = args.scene.choose_camera(&setup.scene, settings.size)?;
+    let transmits = setup.scene.materials.iter().any(|material| material.transmission > 0.0);
+    let sight = transmits.then(|| along_lines(&setup.scene, &camera, settings.size)).transpose()?;
+    let interfaces = settings.knobs.interfaces();
+    let explained = (args.picture.plan == Extent::ExplainCost).then(|| (setup.clone(), settings.clone()));
     let (mut renderer, camera) = setup.renderer(&args.scene, settings)?;
     warnings.extend(renderer.warnings.iter().cloned());
     let passes = renderer.passes(&camera)?;
@@ -46,7 +55,31 @@ pub fn run(args: &PlanArgs) -> Result<ExitCode> {
         }
     }
     let mut facts = PlanFacts::of(&renderer.plan, renderer.device(), names, pipelines);
+    // After the account of what there is: counting takes a pipeline and a buffer of its own.
+    let pixels = renderer.pixels_by_material(&camera)?;
+    for effect in facts.effects.iter_mut().filter(|effect| !effect.materials.is_empty()) {
+        let seen: u64 = effect.materials.iter().filter_map(|&material| pixels.get(material)).sum();
+        effect.evidence.insert("pixels", seen.to_string());
+    }
+    let rays = renderer.plan.rays.unwrap_or_default();
+    let sight = sight.filter(|_| rays.refraction);
+    if let Some(sight) = sight.as_ref().filter(|sight| sight.most > interfaces) {
+        warnings.push(format!(
+            "lines of sight go through up to {} transparent surfaces: interfaces={interfaces} loses up to {:.1} % of a \
+             pixel's light, --set interfaces={} follows them",
+            sight.most,
+            100.0 * sight.lost(interfaces),
+            sight.most.next_power_of_two().min(32)
+        ));
+    }
+    facts.expected = Some(expected(&facts, &renderer, sight.as_ref(), interfaces));
     facts.warnings.splice(0..0, warnings);
+    if let Some((setup, settings)) = explained {
+        drop(renderer);
+        facts.costs = setup.prices(&args.scene, &args.device, settings, &facts.effects, &mut |effect| {
+            eprintln!("measuring what \"{effect}\" would cost");
+        })?;
+    }
     if args.json {
         print(&serde_json::to_string_pretty(&facts)?)?;
     } else {
@@ -55,15 +88,60 @@ pub fn run(args: &PlanArgs) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+fn expected(facts: &PlanFacts, renderer: &Renderer, sight: Option<&Sight>, interfaces: u32) -> Expected {
+    let rays = renderer.plan.rays.unwrap_or_default();
+    let rungs = KNOBS.iter().find(|knob| knob.name == "interfaces").map_or(&[][..], |knob| knob.rungs);
+    let lost = |rung: &&'static str| Some((*rung, sight?.lost(rung.parse().ok()?)));
+    Expected {
+        bytes: facts.buffers.iter().map(|made| made.bytes).sum(),
+        shadow_rounds: if rays.shadows { facts.passes.iter().filter(|pass| *pass == "lighting").count() } else { 0 },
+        ray_rounds: sight.map_or(0, |sight| sight.most).max(u32::from(rays.mirrors || rays.refraction)).min(interfaces),
+        interfaces: sight.map_or(0, |sight| sight.most),
+        lost: rungs.iter().filter_map(lost).collect(),
+    }
+}
+
+fn table(header: &[&str]) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic).set_header(header);
+    table
+}
+
+/// What the effects that are left out would have cost.
+pub(super) fn cost_table(prices: &[Price]) -> Table {
+    let mut costs = table(&[
+        "would cost",
+        "by",
+        "first picture",
+        "a sample",
+        "from … to",
+        "of a sample",
+        "pipelines",
+        "KB of SPIR-V",
+        "MB",
+    ]);
+    for price in prices {
+        let [low, high] = price.frame_range_ms;
+        costs.add_row([
+            price.effect.to_owned(),
+            price.by.clone(),
+            format!("{:+.0} ms", price.start_ms),
+            format!("{:+.2} ms", price.frame_ms),
+            format!("{low:+.2} … {high:+.2}"),
+            format!("{:+.1} %", 100.0 * price.frame_share),
+            format!("{:+}", price.pipelines),
+            format!("{:+.1}", price.spirv_bytes as f64 / 1e3),
+            format!("{:+.2}", price.bytes as f64 / 1e6),
+        ]);
+    }
+    costs
+}
+
 fn text(facts: &PlanFacts) -> String {
-    let table = |header: &[&str]| {
-        let mut table = Table::new();
-        table.load_preset(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic).set_header(header);
-        table
-    };
-    let mut effects = table(&["effect", "state", "rung", "reason"]);
+    let mut effects = table(&["effect", "state", "rung", "pixels", "reason"]);
     for effect in &facts.effects {
-        effects.add_row([effect.name, effect.state, effect.rung, &effect.reason]);
+        let pixels = effect.evidence.get("pixels").map_or("", String::as_str);
+        effects.add_row([effect.name, effect.state, effect.rung, pixels, &effect.reason]);
     }
     // Many draws share a program: they are told apart by constants alone, which --json has.
     let mut programs: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
@@ -76,12 +154,25 @@ fn text(facts: &PlanFacts) -> String {
     for (name, (count, bytes)) in &programs {
         pipelines.add_row([(*name).to_owned(), count.to_string(), format!("{:.1}", *bytes as f64 / 1e3)]);
     }
-    let bytes: u64 = facts.buffers.iter().map(|made| made.bytes).sum();
+    let (bytes, rounds) = facts.expected.as_ref().map_or((0, 0), |expected| (expected.bytes, expected.ray_rounds));
     let spirv: usize = facts.pipelines.iter().map(|pipeline| pipeline.spirv_bytes).sum();
+    let loses: Vec<String> = facts
+        .expected
+        .iter()
+        .flat_map(|expected| &expected.lost)
+        .filter(|(_, lost)| **lost > 0.0)
+        .map(|(rung, lost)| format!("interfaces={rung} would lose up to {:.1} %", 100.0 * lost))
+        .collect();
+    let sight = match facts.expected.as_ref().map_or(0, |expected| expected.interfaces) {
+        0 => String::new(),
+        most => format!("lines of sight go through up to {most} transparent surfaces; {}\n", loses.join(", ")),
+    };
+    let unread: String = facts.unread.iter().map(|unread| format!("not read: {unread}\n")).collect();
+    let costs = if facts.costs.is_empty() { String::new() } else { format!("{}\n", cost_table(&facts.costs)) };
     let warnings: String = facts.warnings.iter().map(|warning| format!("warning: {warning}\n")).collect();
     format!(
         "{effects}\n\n{} samples per pixel, each by the passes {}\n\n{pipelines}\n\n{} pipelines of {:.0} KB of SPIR-V; {} buffers \
-         and images of {:.1} MB\n{warnings}",
+         and images of {:.1} MB; {rounds} rounds of rays or more\n{sight}{unread}{costs}{warnings}",
         facts.samples,
         facts.passes.join(", "),
         facts.pipelines.len(),

@@ -11,7 +11,8 @@ use clap::{Args, ValueEnum};
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::options::{DeviceOptions, PictureOptions, SceneOptions, When};
+use super::options::{DeviceOptions, Extent, PictureOptions, SceneOptions, When};
+use super::plan::cost_table;
 use super::print;
 use super::report::{
     MemoryFacts, Output, PassFacts, PipelineFacts, PlanFacts, Report, SceneFacts, Spread, Validation, knob_map,
@@ -215,6 +216,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
 
     steps.step("uploading", 1);
     let knobs = settings.knobs.clone();
+    let explained = (args.picture.plan == Extent::ExplainCost).then(|| (setup.clone(), settings.clone()));
     let (mut renderer, camera) = setup.renderer(&args.scene, settings)?;
     phases.end("upload");
     phases.all.insert("bvh", renderer.bvh().map_or(0.0, |bvh| bvh.build_ms + bvh.layout_ms));
@@ -272,6 +274,17 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         steps.at(index as u32 + 1);
     }
     phases.end("encode");
+    let costs = match &explained {
+        Some((setup, settings)) => {
+            let effects = &renderer.plan.effects;
+            let prices = setup.prices(&args.scene, &args.device, settings.clone(), effects, &mut |effect| {
+                steps.step(&format!("measuring what \"{effect}\" would cost"), 1);
+            })?;
+            steps.say(&cost_table(&prices).to_string());
+            prices
+        }
+        None => Vec::new(),
+    };
     let validation = Validation::of(&device, args.device.validate);
     let failed = validation.messages.iter().find(|m| m.severity == Severity::Error).map(|m| m.text.clone());
     if let (Some(path), Some(film)) = (&args.report, &film) {
@@ -279,7 +292,8 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         phases.all.insert("total", total);
         phases.all.insert("pipelines", device.pipelines_ms());
         let passes = rendered.passes.iter().map(|p| p.name.clone()).collect();
-        let plan = PlanFacts::of(&renderer.plan, &device, passes, device.pipelines());
+        let mut plan = PlanFacts::of(&renderer.plan, &device, passes, device.pipelines());
+        plan.costs = costs;
         let spirv_bytes = plan.pipelines.iter().map(|pipeline| pipeline.spirv_bytes).sum();
         let report = Report {
             schema: "etalon.report/1",

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use crate::cost::explain::Price;
 use crate::frame::Work;
 use crate::gpu::{Created, Device, DeviceInfo, Message, Program, Severity};
 use crate::image::Statistics;
@@ -82,8 +83,29 @@ pub struct PlanFacts {
     pub buffers: Vec<Created>,
     /// Textures and texture coordinates of the scene that are neither decoded nor uploaded, with the reason.
     pub unread: Vec<String>,
+    /// What can be told of a picture that is not drawn; of one that is, there are the counts themselves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub expected: Option<Expected>,
+    /// What the effects that are left out would have cost, where that was asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub costs: Vec<Price>,
     /// What the chosen rungs leave out.
     pub warnings: Vec<String>,
+}
+
+/// What a picture from a camera will take.
+#[derive(Debug, Serialize)]
+pub struct Expected {
+    /// Bytes of all buffers and images.
+    pub bytes: u64,
+    /// Dispatches that send rays to lights, in each sample.
+    pub shadow_rounds: usize,
+    /// Rays that a path sends one after another, at least: along straight lines, and no more than `interfaces` allows.
+    pub ray_rounds: u32,
+    /// The most transparent surfaces on a line of sight.
+    pub interfaces: u32,
+    /// By rungs of `interfaces`, the largest share of a pixel's light that they lose on those lines.
+    pub lost: BTreeMap<&'static str, f64>,
 }
 
 /// One pipeline.
@@ -127,6 +149,8 @@ impl PlanFacts {
                 .filter(|made| matches!(made.kind, "buffer" | "image") && made.name != "staging")
                 .collect(),
             unread: plan.unread.clone(),
+            expected: None,
+            costs: Vec::new(),
             warnings: plan.warnings.clone(),
         }
     }

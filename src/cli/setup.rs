@@ -5,12 +5,15 @@ use std::sync::Arc;
 use anyhow::{Result, anyhow};
 
 use super::options::{DeviceOptions, SceneOptions};
+use crate::cost::explain::{Price, Subject};
 use crate::frame::{Renderer, Settings};
 use crate::gpu::Device;
+use crate::plan::Effect;
 use crate::scene::environment::Environment;
 use crate::scene::{Camera, Reads, Scene};
 
 /// A scene, what lies around it, and what it will be drawn on.
+#[derive(Clone)]
 pub struct Setup {
     /// The device.
     pub device: Arc<Device>,
@@ -39,6 +42,31 @@ impl Setup {
         let (environment, environment_warnings) = environment??;
         let warnings = scene.warnings.iter().cloned().chain(environment_warnings).collect();
         Ok(Self { device: device??, scene, environment, warnings })
+    }
+
+    /// What the effects that a plan leaves out would cost.
+    ///
+    /// # Errors
+    /// When something cannot be drawn.
+    pub fn prices(
+        &self,
+        options: &SceneOptions,
+        device: &DeviceOptions,
+        mut settings: Settings,
+        effects: &[Effect],
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<Vec<Price>> {
+        let share = options.environment_share(&self.scene);
+        settings.environment_intensity *= share.unwrap_or(1.0);
+        let camera = options.choose_camera(&self.scene, settings.size)?;
+        let subject = Subject {
+            device: &device.choice(),
+            scene: &self.scene,
+            environment: self.environment.as_ref().filter(|_| share.is_some()),
+            settings,
+            camera: &camera,
+        };
+        subject.prices(effects, progress)
     }
 
     /// Plans and uploads; the renderer, and the camera to draw from.

@@ -11,7 +11,7 @@ use anyhow::Result;
 use ash::vk;
 
 use super::scene::SceneOnDevice;
-use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Frame, Image, ImageDesc, Place, Raster};
+use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Draw, Frame, Image, ImageDesc, Place, Raster};
 use crate::plan::Plan;
 use crate::shader::gbuffer;
 
@@ -79,7 +79,7 @@ impl GBuffer {
     }
 }
 
-/// Draws every opaque and masked surface, and those that refract; `inside` one of those, their back faces as well.
+/// Draws surfaces: the nearest of each pixel stays.
 ///
 /// # Errors
 /// When the driver refuses what a pipeline binds.
@@ -89,7 +89,7 @@ pub fn gbuffer<'a>(
     camera: &'a Buffer,
     target: &'a GBuffer,
     lod_bias: f32,
-    inside: bool,
+    draws: Vec<Draw<'a>>,
 ) -> Result<()> {
     // Only depth is cleared: the other targets are read where depth says that something was drawn.
     let color = |image| Some(ColorTarget { image, clear: None });
@@ -147,7 +147,7 @@ pub fn gbuffer<'a>(
         rows: [0, target.size[1]],
     };
     let push = [lod_bias.to_bits(), 0];
-    frame.raster(&raster, &gbuffer::PROGRAM, &bindings, bytemuck::cast_slice(&push), scene.draws(false, inside))?;
+    frame.raster(&raster, &gbuffer::PROGRAM, &bindings, bytemuck::cast_slice(&push), draws)?;
     frame.download("copy depth", &target.depth, &target.depth_texels);
     Ok(())
 }

@@ -19,6 +19,9 @@ pub struct Effect {
     pub reason: String,
     /// What the reason rests on.
     pub evidence: Evidence,
+    /// The materials that call for it, as indices of the scene's.
+    #[serde(skip)]
+    pub materials: Vec<usize>,
 }
 
 /// What a reason rests on, by name.
@@ -54,15 +57,16 @@ pub(super) struct Cause {
     pub(super) called_for: bool,
     pub(super) reason: String,
     pub(super) evidence: Evidence,
+    pub(super) materials: Vec<usize>,
 }
 
 impl Cause {
     pub(super) fn against(reason: impl Into<String>) -> Self {
-        Self { called_for: false, reason: reason.into(), evidence: Evidence::new() }
+        Self { called_for: false, reason: reason.into(), evidence: Evidence::new(), materials: Vec::new() }
     }
 
     pub(super) fn of(reason: impl Into<String>) -> Self {
-        Self { called_for: true, reason: reason.into(), evidence: Evidence::new() }
+        Self { called_for: true, reason: reason.into(), evidence: Evidence::new(), materials: Vec::new() }
     }
 
     /// For it if `called_for`, with the one reason or the other.
@@ -97,7 +101,7 @@ impl Decisions<'_> {
     /// An effect that a knob allows or not: if not, its rung is the reason.
     pub(super) fn decide_with(&mut self, name: &'static str, knob: &'static str, allowed: bool, cause: Cause) -> bool {
         let rung = if knob.is_empty() { "" } else { self.knobs.rung(knob) };
-        let Cause { called_for, mut reason, evidence } = cause;
+        let Cause { called_for, mut reason, evidence, materials } = cause;
         let demanded = !called_for && self.demand.includes(name);
         let state = match (called_for || demanded, allowed) {
             (false, _) => "not called for",
@@ -109,7 +113,7 @@ impl Decisions<'_> {
         } else if demanded {
             reason = format!("asked for, although {reason}");
         }
-        self.effects.push(Effect { name, state, rung, reason, evidence });
+        self.effects.push(Effect { name, state, rung, reason, evidence, materials });
         state == "kept"
     }
 }

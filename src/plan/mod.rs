@@ -235,6 +235,7 @@ impl Plan {
             }
             .to_owned(),
             evidence: Evidence::new(),
+            materials: Vec::new(),
         });
     }
 }

@@ -99,8 +99,8 @@ impl<'a> Surfaces<'a> {
 
     /// For an effect, where a material in use passes a test; with the first one that does.
     pub(super) fn cause(&self, test: impl Fn(&Material) -> bool, says: impl Fn(&Material) -> String) -> Cause {
-        let mut found = self.used.iter().filter(|used| test(used.material));
-        let Some(first) = found.next() else {
+        let found: Vec<&Used> = self.used.iter().filter(|used| test(used.material)).collect();
+        let Some(first) = found.first() else {
             let form = &self.facts.form;
             return Cause::against("no material in use has it")
                 .with_some("black textures", &form.black)
@@ -108,9 +108,10 @@ impl<'a> Surfaces<'a> {
                 .with_some("alpha 0 everywhere", &form.unseen);
         };
         let name = &first.material.name;
-        Cause::of(format!("material {} \"{name}\" {}", first.index, says(first.material)))
+        let cause = Cause::of(format!("material {} \"{name}\" {}", first.index, says(first.material)));
+        Cause { materials: found.iter().map(|used| used.index).collect(), ..cause }
             .with("material", name)
-            .with("materials", found.count() + 1)
+            .with("materials", found.len())
     }
 
     /// A sentence's end about a material that lets light through.

@@ -22,6 +22,7 @@ mod obj;
 mod pictures;
 mod ploc;
 pub mod reads;
+pub mod sight;
 pub mod sigma;
 pub mod solid;
 pub(crate) mod substance;

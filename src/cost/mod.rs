@@ -1,0 +1,3 @@
+//! What approximations and effects cost, measured on the user's scene and device.
+
+pub mod explain;
