@@ -28,11 +28,15 @@ fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=build");
     println!("cargo:rerun-if-changed=shaders");
+    println!("cargo:rerun-if-env-changed={WITHOUT}");
     if let Err(message) = run() {
         eprintln!("{message}");
         process::exit(1);
     }
 }
+
+/// Names of specialization constants whose code is not built at all: what `./x bench --bench price` compares with.
+const WITHOUT: &str = "ETALON_WITHOUT";
 
 type Result<T> = std::result::Result<T, String>;
 
@@ -43,7 +47,9 @@ fn run() -> Result<()> {
     let compiler = shaderc::Compiler::new().map_err(|e| format!("shaderc: {e}"))?;
     for path in files(&root.join("pass"))? {
         let stage = compile(&compiler, root, &path)?;
-        contract::decorations(&stage.path, &stage.module, &stage.words)?;
+        if env::var(WITHOUT).is_err() {
+            contract::decorations(&stage.path, &stage.module, &stage.words)?;
+        }
         programs.entry(stem(&path)).or_default().push(stage);
     }
     let shared = shared_structs(&root.join("share"))?;
@@ -89,7 +95,9 @@ fn compile_source(
     name: String,
     source: &str,
 ) -> Result<Stage> {
-    let build = |level, version| -> Result<Vec<u32>> {
+    let without = env::var(WITHOUT).unwrap_or_default();
+    let build = |level, version, without: &str| -> Result<Vec<u32>> {
+        let without: Vec<&str> = without.split(',').filter(|name| !name.is_empty()).collect();
         let mut options = shaderc::CompileOptions::new().map_err(|e| format!("shaderc: {e}"))?;
         options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
         options.set_target_spirv(version);
@@ -99,20 +107,33 @@ fn compile_source(
         options.set_include_callback(|wanted, _, from, _| {
             let resolved = root.join(wanted);
             let content = fs::read_to_string(&resolved).map_err(|e| format!("{from} includes \"{wanted}\": {e}"))?;
+            let content = ruled_out(&content, &without);
             Ok(shaderc::ResolvedInclude { resolved_name: resolved.display().to_string(), content })
         });
-        let artifact =
-            compiler.compile_into_spirv(source, kind, &name, "main", Some(&options)).map_err(|e| match e {
-                shaderc::Error::CompilationError(_, log) => log,
-                other => format!("{name}: {other}"),
-            })?;
+        let artifact = compiler
+            .compile_into_spirv(&ruled_out(source, &without), kind, &name, "main", Some(&options))
+            .map_err(|e| match e {
+            shaderc::Error::CompilationError(_, log) => log,
+            other => format!("{name}: {other}"),
+        })?;
         Ok(artifact.as_binary().to_vec())
     };
     // rspirv 0.13 cannot load SPIR-V 1.6's OpExecutionModeId; the declarations are the same in 1.5.
-    let module = rspirv::dr::load_words(build(shaderc::OptimizationLevel::Zero, shaderc::SpirvVersion::V1_5)?)
+    let module = rspirv::dr::load_words(build(shaderc::OptimizationLevel::Zero, shaderc::SpirvVersion::V1_5, "")?)
         .map_err(|e| format!("{name}: reflection: {e:?}"))?;
-    let words = build(shaderc::OptimizationLevel::Performance, shaderc::SpirvVersion::V1_6)?;
+    let words = build(shaderc::OptimizationLevel::Performance, shaderc::SpirvVersion::V1_6, &without)?;
     Ok(Stage { kind, module, words, path: name })
+}
+
+/// Shader text in which some specialization constants are ordinary ones, false or 0: the compiler leaves out what they guard.
+fn ruled_out(source: &str, without: &[&str]) -> String {
+    let line = |line: &str| {
+        let (_, rest) = line.split_once(") const ").filter(|_| line.starts_with("layout(constant_id"))?;
+        let (kind, name) = rest.split_once(" = ")?.0.split_once(' ')?;
+        let value = if kind == "bool" { "false" } else { "0" };
+        without.contains(&name).then(|| format!("const {kind} {name} = {value};"))
+    };
+    source.lines().map(|text| line(text).unwrap_or_else(|| text.to_owned()) + "\n").collect()
 }
 
 /// The table of equations, each with its probe. All probes bind the same two buffers: `src/shader.rs` has one struct.
