@@ -12,7 +12,7 @@ use anyhow::{Context as _, Result, ensure};
 use serde_json::Value;
 
 /// Pairs of runs.
-const PAIRS: usize = 9;
+const PAIRS: usize = 5;
 /// Pictures of each run; the first is the start.
 const PICTURES: &str = "8";
 
