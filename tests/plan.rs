@@ -522,3 +522,62 @@ fn dark_lights_are_no_lights() {
     assert!(dark.plan.rays.is_none());
     assert!(dark.film.rgba.iter().all(|pixel| pixel[..3] == [0.0; 3]));
 }
+
+/// Lights that reach nothing are no lights, like dark ones.
+#[test]
+fn lights_out_of_range_are_no_lights() {
+    let lamp = |x, range| LightKind::Point { position: DVec3::new(x, 0.0, 0.0), range: Some(range) };
+    let near = |made: &mut Made| made.light([10.0; 3], lamp(3.0, 10.0));
+    let mut alone = ball(chalk(), None);
+    near(&mut alone);
+    let mut both = ball(chalk(), None);
+    near(&mut both);
+    // The scene reaches from -1 to 1.3 along x.
+    both.light([10.0; 3], lamp(-12.0, 10.9));
+    let [alone, both] = [alone, both].map(|made| draw(&made.0, None, &[]));
+    assert_eq!((alone.plan.local_lights, both.plan.local_lights), (1, 1));
+    assert!(bits(&alone.film) == bits(&both.film));
+    let shadows = both.plan.effects.iter().find(|effect| effect.name == "shadows").expect("an effect");
+    assert_eq!(shadows.evidence["out of range"], "1");
+
+    let mut far = ball(chalk(), None);
+    far.light([10.0; 3], lamp(-12.0, 10.9));
+    let far = draw(&far.0, None, &[]);
+    assert_eq!(state(&far.plan, "shadows"), ("not called for", "no light of the scene reaches anything".to_owned()));
+    assert!(far.plan.rays.is_none());
+    // As far as it says, and a little more, it is one.
+    let mut touching = ball(chalk(), None);
+    touching.light([10.0; 3], lamp(-12.0, 11.1));
+    assert_eq!(draw(&touching.0, None, &[]).plan.local_lights, 1);
+}
+
+/// What alpha says by its values: a surface that blends with an alpha of 1 is planned and drawn as an opaque one, one with 0
+/// as none.
+#[test]
+fn alpha_calls_for_what_it_does() {
+    let environment = Environment::studio();
+    let hidden = |alpha_mode, alpha: f32| {
+        let mut made = ball(metal(0.0), None);
+        let material = Material { alpha_mode, base_color: [0.8, 0.5, 0.3, alpha], ..metal(0.6) };
+        made.add(Shape::cuboid(DVec3::splat(0.6)), material, at(-0.8, 0.7, 1.0));
+        made
+    };
+    let drawn = |mode, alpha| draw(&hidden(mode, alpha).0, Some(&environment), &[]);
+    let (blended, masked, opaque) =
+        (drawn(AlphaMode::Blend, 1.0), drawn(AlphaMode::Mask(0.5), 1.0), drawn(AlphaMode::Opaque, 1.0));
+    for same in [&blended, &masked] {
+        assert!(came(&opaque, same).is_empty() && came(same, &opaque).is_empty());
+        assert!(bits(&same.film) == bits(&opaque.film));
+    }
+    let see_through = blended.plan.effects.iter().find(|effect| effect.name == "see-through surfaces").expect("one");
+    assert_eq!(see_through.evidence.get("alpha 1 everywhere").map(String::as_str), Some("default"));
+
+    let none = draw(&ball(metal(0.0), None).0, Some(&environment), &[]);
+    for (mode, alpha) in [(AlphaMode::Blend, 0.0), (AlphaMode::Mask(0.5), 0.4)] {
+        let unseen = drawn(mode, alpha);
+        assert!(came(&none, &unseen).is_empty(), "{:?}", came(&none, &unseen));
+        assert!(bits(&unseen.film) == bits(&none.film));
+    }
+    let veil = drawn(AlphaMode::Blend, 0.5);
+    assert!(bits(&veil.film) != bits(&opaque.film) && veil.plan.see_through);
+}

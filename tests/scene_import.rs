@@ -6,7 +6,7 @@ mod gltf_builder;
 
 use std::{f64::consts::FRAC_PI_2, fs, path::Path};
 
-use etalon::scene::{self, AlphaMode, LightKind, LoadOptions, Projection, Scene, Wrap};
+use etalon::scene::{self, AlphaMode, Ambience, LightKind, LoadOptions, Projection, Reads, Scene, Wrap};
 use glam::{DVec3, Vec2, Vec3};
 use gltf_builder::{BYTE, Builder, FLOAT, SHORT, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT, f32s, png, u16s};
 use serde_json::json;
@@ -1055,4 +1055,61 @@ fn wavefront_mistakes_name_their_line() {
 fn other_endings_are_refused_by_name() {
     let error = format!("{:#}", scene::load(Path::new("a.fbx"), &LoadOptions::default()).unwrap_err());
     assert_eq!(error, "loading a.fbx: only .gltf, .glb and .obj files are supported");
+}
+
+/// What no picture depends on is neither decoded nor kept, and each is named with its reason; read for everything, all is there.
+#[test]
+fn what_cannot_be_seen_is_not_read() {
+    let read = |material: serde_json::Value, reads| {
+        let builder = textured(material, &["KHR_materials_unlit", "KHR_materials_clearcoat"]);
+        let folder = tempfile::tempdir().unwrap();
+        let path = builder.save_glb(folder.path());
+        scene::load(&path, &LoadOptions { reads, ..LoadOptions::default() }).unwrap()
+    };
+    let visible = |ambience| Reads::Visible(ambience);
+    let material = json!({
+        "name": "m",
+        "occlusionTexture": { "index": 0 },
+        "emissiveTexture": { "index": 1 },
+        "extensions": { "KHR_materials_clearcoat": { "clearcoatFactor": 0, "clearcoatTexture": { "index": 1 } } },
+    });
+    let all = read(material.clone(), Reads::Everything);
+    assert_eq!((all.images.len(), all.unread.len(), all.meshes[0].uvs[0].is_empty()), (2, 0, false));
+    // Occlusion is seen in light from all around, which there is where the scene has no lights.
+    for ambience in [Ambience::Present, Ambience::WithoutLights] {
+        let some = read(material.clone(), visible(ambience));
+        assert_eq!((some.images.len(), some.meshes[0].uvs[0].is_empty()), (1, false));
+        assert_eq!(
+            some.unread,
+            ["emissive texture of \"m\": nothing is emitted", "clear coat texture of \"m\": there is no coat"]
+        );
+        assert!(some.materials[0].occlusion_texture.is_some_and(|texture| texture.image == 0));
+    }
+    let none = read(material, visible(Ambience::Absent));
+    assert_eq!((none.images.len(), none.meshes[0].uvs[0].is_empty()), (0, true));
+    assert_eq!(none.unread.len(), 4, "{:?}", none.unread);
+    assert!(none.unread[1].ends_with("no light comes from all around"), "{:?}", none.unread);
+    assert!(none.unread[3].starts_with("texture coordinates 0 of mesh"), "{:?}", none.unread);
+
+    let unlit = json!({
+        "pbrMetallicRoughness": { "baseColorTexture": { "index": 1 } },
+        "occlusionTexture": { "index": 0 },
+        "extensions": { "KHR_materials_unlit": {} },
+    });
+    let unlit = read(unlit, visible(Ambience::Present));
+    assert_eq!((unlit.images.len(), unlit.images[0].width), (1, 3));
+    assert_eq!(unlit.unread, ["occlusion texture of \"material 0\": the material is unlit"]);
+}
+
+/// A picture that nothing reads is still looked at as far as its header.
+#[test]
+fn a_broken_picture_that_nothing_reads_is_an_error() {
+    let mut builder = textured(json!({ "emissiveTexture": { "index": 0 } }), &[]);
+    let view = builder.view(b"no picture at all", None);
+    builder.json["images"][0]["bufferView"] = view.into();
+    let folder = tempfile::tempdir().unwrap();
+    let path = builder.save_glb(folder.path());
+    let reads = Reads::Visible(Ambience::Present);
+    let error = scene::load(&path, &LoadOptions { reads, ..LoadOptions::default() }).unwrap_err();
+    assert!(format!("{error:#}").contains("not PNG, JPEG or WebP"), "{error:#}");
 }
