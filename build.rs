@@ -42,6 +42,7 @@ type Result<T> = std::result::Result<T, String>;
 
 fn run() -> Result<()> {
     let root = Path::new("shaders");
+    known_names(root)?;
     let out_dir = PathBuf::from(env::var("OUT_DIR").map_err(|e| e.to_string())?);
     let mut programs: BTreeMap<String, Vec<Stage>> = BTreeMap::new();
     let compiler = shaderc::Compiler::new().map_err(|e| format!("shaderc: {e}"))?;
@@ -123,6 +124,22 @@ fn compile_source(
         .map_err(|e| format!("{name}: reflection: {e:?}"))?;
     let words = build(shaderc::OptimizationLevel::Performance, shaderc::SpirvVersion::V1_6, &without)?;
     Ok(Stage { kind, module, words, path: name })
+}
+
+/// Refuses names to build without that no shader has.
+fn known_names(root: &Path) -> Result<()> {
+    let without = env::var(WITHOUT).unwrap_or_default();
+    let mut text = String::new();
+    for folder in ["lib", "pass"] {
+        for path in files(&root.join(folder))? {
+            text += &fs::read_to_string(&path).map_err(|e| format!("reading {}: {e}", path.display()))?;
+        }
+    }
+    let known = |name: &str| ["bool", "uint"].iter().any(|kind| text.contains(&format!("const {kind} {name} = ")));
+    match without.split(',').find(|name| !name.is_empty() && !known(name)) {
+        Some(name) => Err(format!("{WITHOUT}: no shader has a constant {name}")),
+        None => Ok(()),
+    }
 }
 
 /// Shader text in which some specialization constants are ordinary ones, false or 0: the compiler leaves out what they guard.

@@ -1,7 +1,8 @@
-//! Whether an effect that a scene does not call for costs anything: the program as it is beside one built without the code
-//! of that effect, in turns. Prints ratios of time, and the SPIR-V that the driver is given.
+//! What the plan saves, and whether what it leaves out costs anything: five scenes with the plan of what they call for and
+//! with that of everything, in turns; and for each effect the program as it is beside one built without the effect's code,
+//! on a scene that does not call for it.
 //!
-//! `./x bench --bench price [EFFECT ...]`: builds the program once for each effect, some minutes.
+//! `./x bench --bench price [-- saved | EFFECT ...]`: builds the program once for each effect, half an hour in all.
 #![allow(missing_docs, clippy::print_stdout, reason = "a program whose figures go to standard output")]
 
 use std::path::{Path, PathBuf};
@@ -39,9 +40,15 @@ const EFFECTS: &[(&str, &str, &[&str])] = &[
     ),
 ];
 
+/// Where the programs are built: none of them ever lies where the real one does.
+fn target() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("target/price")
+}
+
 fn build(without: &str) -> Result<()> {
     let mut cargo = Command::new(std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned()));
-    cargo.args(["build", "--release", "--quiet", "--offline", "--bin", "etalon"]);
+    cargo.args(["build", "--release", "--quiet", "--offline", "--bin", "etalon", "--target-dir"]);
+    cargo.arg(target());
     match without {
         "" => cargo.env_remove("ETALON_WITHOUT"),
         names => cargo.env("ETALON_WITHOUT", names),
@@ -50,11 +57,16 @@ fn build(without: &str) -> Result<()> {
     Ok(())
 }
 
-/// One run: milliseconds of the process, of a picture's passes, and bytes of SPIR-V.
+/// Scenes that call for little, for some things and for much.
+const SCENES: [&str; 5] = ["study:radiance", "study:metals", "study:cornell", "study:blend", "study:etalon"];
+
+/// One run: milliseconds of the process and of a picture's passes, pipelines, bytes of SPIR-V and of buffers and images.
 struct Run {
     process: f64,
     passes: f64,
+    pipelines: u64,
     spirv: u64,
+    memory: u64,
 }
 
 fn run(program: &Path, scene: &[&str], folder: &Path, cold: bool) -> Result<Run> {
@@ -74,7 +86,55 @@ fn run(program: &Path, scene: &[&str], folder: &Path, cold: bool) -> Result<Run>
     let report: Value = serde_json::from_slice(&std::fs::read(&report)?)?;
     let passes = report["passes"].as_array().context("passes")?.iter();
     let passes = passes.filter_map(|pass| pass["gpu_ms"]["median"].as_f64()).sum();
-    Ok(Run { process, passes, spirv: report["pipelines"]["spirv_bytes"].as_u64().context("bytes")? })
+    let number = |value: &Value| value.as_u64().context("a number");
+    Ok(Run {
+        process,
+        passes,
+        pipelines: number(&report["pipelines"]["count"])?,
+        spirv: number(&report["pipelines"]["spirv_bytes"])?,
+        memory: report["plan"]["buffers"]
+            .as_array()
+            .context("buffers")?
+            .iter()
+            .filter_map(|b| b["bytes"].as_u64())
+            .sum(),
+    })
+}
+
+/// The plan of what a scene calls for beside that of everything.
+fn saved(program: &Path, folder: &Path) -> Result<()> {
+    println!(
+        "plan=scene / plan=full: medians of {PAIRS} pairs; the start is a process that draws once, with a cold driver"
+    );
+    println!(
+        "{:16} {:>20} {:>20} {:>10} {:>16} {:>16}",
+        "scene", "start, ms", "a sample, ms", "pipelines", "SPIR-V, KB", "memory, MB"
+    );
+    for scene in SCENES {
+        let mut all: [Vec<(Run, Run)>; 2] = [Vec::new(), Vec::new()];
+        for i in 0..=PAIRS {
+            for j in [i % 2, 1 - i % 2] {
+                let arguments = [scene, "--plan", ["scene", "full"][j]];
+                let runs = (run(program, &arguments, folder, false)?, run(program, &arguments, folder, true)?);
+                if i > 0 {
+                    all[j].push(runs);
+                }
+            }
+        }
+        let median =
+            |of: &dyn Fn(&(Run, Run)) -> f64| all.each_ref().map(|runs| spread(runs.iter().map(of).collect())[1]);
+        let pair = |[scene, full]: [f64; 2], digits: usize| format!("{scene:.digits$} / {full:.digits$}");
+        println!(
+            "{scene:16} {:>20} {:>20} {:>10} {:>16} {:>16}",
+            pair(median(&|(_, cold)| cold.process), 0),
+            pair(median(&|(warm, _)| warm.passes), 1),
+            pair(median(&|(warm, _)| warm.pipelines as f64), 0),
+            pair(median(&|(warm, _)| warm.spirv as f64 / 1e3), 0),
+            pair(median(&|(warm, _)| warm.memory as f64 / 1e6), 1),
+        );
+    }
+    println!();
+    Ok(())
 }
 
 /// Median, and the middle half's ends.
@@ -86,7 +146,7 @@ fn spread(mut ratios: Vec<f64>) -> [f64; 3] {
 fn main() -> Result<()> {
     let wanted: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
     let folder = tempfile::tempdir()?;
-    let built = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/release/etalon");
+    let built = target().join("release/etalon");
     let keep = |name: &str| -> Result<PathBuf> {
         let path = folder.path().join(name);
         std::fs::copy(&built, &path)?;
@@ -94,6 +154,12 @@ fn main() -> Result<()> {
     };
     build("")?;
     let whole = keep("whole")?;
+    if wanted.is_empty() || wanted.iter().any(|name| name == "saved") {
+        saved(&whole, folder.path())?;
+    }
+    if wanted == ["saved"] {
+        return Ok(());
+    }
     println!("with the code that nothing calls for, over without it: median (middle half) of {PAIRS} pairs");
     println!("{:32} {:>24} {:>24} {:>16}", "effect", "passes of a picture", "start, cold driver", "SPIR-V, bytes");
     for (effect, constants, scene) in EFFECTS {
@@ -127,5 +193,5 @@ fn main() -> Result<()> {
         };
         println!("{effect:32} {:>24} {:>24} {:>8} {:>7}", shown(pictures), shown(starts), bytes[0], bytes[1]);
     }
-    build("")
+    Ok(())
 }

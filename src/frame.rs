@@ -195,11 +195,16 @@ impl Renderer {
         settings: Settings,
     ) -> Result<Self> {
         one_medium_each(&mut scene);
-        if settings.demand != Demand::Full {
-            let lit = environment.is_some() && settings.knobs.use_ambience();
-            forget_unread(&mut scene, Reads::Visible(if lit { Ambience::Present } else { Ambience::Absent }));
-        }
+        let triangles = scene.triangles();
+        let shown = settings.knobs.show_occlusion(environment.is_some());
+        let reads = match settings.demand {
+            Demand::Full => Reads::Everything,
+            _ => Reads::Visible(if shown { Ambience::Present } else { Ambience::Absent }),
+        };
+        // Once more after the normal form, which leaves less to be read.
+        forget_unread(&mut scene, reads);
         let form = normalise(&mut scene);
+        forget_unread(&mut scene, reads);
         let size = settings.size;
         let limit = device.max_image_size();
         if size.contains(&0) || size.iter().any(|&side| side > limit) {
@@ -211,7 +216,8 @@ impl Renderer {
             bail!("--size {}x{}: this device holds at most {most} pixels in one picture", size[0], size[1]);
         }
         if scene.triangles() == 0 {
-            bail!("{}: there is nothing to draw, the scene has 0 triangles", scene.name);
+            let why = if triangles == 0 { "the scene has 0 triangles" } else { "alpha leaves nothing of its surfaces" };
+            bail!("{}: there is nothing to draw, {why}", scene.name);
         }
         let sky = match settings.background {
             Background::Default | Background::Environment => environment.is_some(),

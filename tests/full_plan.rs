@@ -2,6 +2,8 @@
 
 #[path = "support/gpu.rs"]
 mod gpu;
+#[path = "support/made.rs"]
+mod made;
 
 use std::path::{Path, PathBuf};
 
@@ -10,9 +12,12 @@ use etalon::image::Picture;
 use etalon::plan::{Demand, Effect, Knobs, Model};
 use etalon::scene::camera::DEFAULT_FOV_Y;
 use etalon::scene::environment::Environment;
-use etalon::scene::{Ambience, Camera, LoadOptions, Reads, Scene};
-use etalon::study;
+use etalon::scene::material::{Sampler, TextureRef};
+use etalon::scene::{AlphaMode, Ambience, Camera, Image, LightKind, LoadOptions, Material, Reads, Scene};
+use etalon::study::{self, shape::Shape};
+use glam::DVec3;
 use gpu::{Gpu, bits};
+use made::{Made, at, lambert, perspective};
 
 const SIZE: [u32; 2] = [48, 27];
 
@@ -85,6 +90,81 @@ fn studies_on_the_screen() {
 #[test]
 fn studies_with_some_rays() {
     studies(&knobs(Model::Recursive, &["samples=1", "shadows=map", "refraction=off", "brdf=blinn-phong"]));
+}
+
+/// Each effect alone, where nothing calls for it.
+#[test]
+fn each_effect_alone() {
+    let gpu = Gpu::new();
+    let knobs = knobs(Model::Recursive, &["samples=1", "absorption=march:4"]);
+    for name in ["radiance", "metals"] {
+        let scene = study::load(name).expect("a scene");
+        let (planned, effects) = draw(&gpu, &scene, &knobs, Demand::Scene);
+        for effect in effects.iter().filter(|effect| effect.state == "not called for") {
+            let (with, account) = draw(&gpu, &scene, &knobs, Demand::With(effect.name));
+            assert!(bits(&planned) == bits(&with), "{name}: {}", effect.name);
+            let kept = account.iter().filter(|kept| kept.name == effect.name && kept.state == "kept").count();
+            assert_eq!(kept, usize::from(effect.name != "bodies that touch"), "{name}: {}", effect.name);
+        }
+    }
+}
+
+fn texture() -> TextureRef {
+    TextureRef { image: 0, uv_set: 0, uv_transform: glam::Affine2::IDENTITY, sampler: Sampler::default() }
+}
+
+/// A ball of one material on a panel of another, seen from the front, with a lamp.
+fn pair(ball: Material, panel: Material) -> Made {
+    let mut made = Made::new("pair");
+    let texels = (0..64_u32).map(|i| (i * 37 % 256) as u8).collect();
+    made.0.images.push(Image { name: "texels".to_owned(), width: 4, height: 4, rgba: texels });
+    made.add(Shape::sphere(0.7, 16), ball, at(0.2, 0.1, 1.0));
+    made.add(Shape::panel(4.0, 4.0), panel, at(0.0, 0.0, 0.0));
+    let lamp = LightKind::Point { position: DVec3::new(1.0, 2.0, 3.0), range: None };
+    made.light([20.0; 3], lamp);
+    made.camera(DVec3::new(0.5, 0.5, 4.0), DVec3::ZERO, perspective(40.0));
+    made
+}
+
+/// What one surface has is not seen on another: cases in which it once was.
+#[test]
+fn surfaces_leave_each_other_alone() {
+    let gpu = Gpu::new();
+    let mirror = || Material { metallic: 1.0, roughness: 0.0, ..Material::default() };
+    let glass = || Material { metallic: 0.0, roughness: 0.5, transmission: 1.0, thickness: 0.1, ..Material::default() };
+    let is_same = |what: &str, made: &Made, choices: &[&str]| {
+        let knobs = knobs(Model::Recursive, &[&["samples=1"], choices].concat());
+        is_the_same(&gpu, what, [&made.0, &made.0], &knobs);
+    };
+    // Occlusion is seen on mirror images of the screen, without light from all around too.
+    let occluded = Material { occlusion_texture: Some(texture()), roughness: 0.1, ..mirror() };
+    is_same("occlusion", &pair(lambert([0.5; 3]), occluded), &["reflection=screen", "shadows=off"]);
+    // How dense the texels of the second coordinates are is told by the first ones.
+    let second = Material { base_color_texture: Some(TextureRef { uv_set: 1, ..texture() }), ..lambert([1.0; 3]) };
+    let mut made = pair(second, mirror());
+    made.0.meshes[0].uvs[1] = made.0.meshes[0].uvs[0].iter().map(|[u, v]| [9.0 * u, 9.0 * v]).collect();
+    is_same("second coordinates", &made, &[]);
+    // What blends is no body.
+    let veil =
+        Material { alpha_mode: AlphaMode::Blend, base_color: [1.0, 0.5, 0.5, 0.5], double_sided: true, ..glass() };
+    is_same("blended body", &pair(veil, mirror()), &[]);
+    // A rough sheet is as rough beside smooth mirrors as beside rough ones.
+    is_same("rough sheet", &pair(Material { thickness: 0.0, ..glass() }, mirror()), &["refraction=off"]);
+    is_same("rough glass", &pair(glass(), mirror()), &[]);
+    // Metal transmits nothing, the rest scatters.
+    let mut half = pair(Material { metallic: 0.5, ..glass() }, mirror());
+    half.0.studio = Some(1.0);
+    is_same("half metal", &half, &[]);
+    // Coats and bodies below a black texture leave no layers.
+    let black = Image { name: "black".to_owned(), width: 1, height: 1, rgba: vec![0, 0, 0, 255] };
+    let none = Some(TextureRef { image: 1, ..texture() });
+    let coat =
+        Material { clearcoat: 1.0, clearcoat_texture: none, clearcoat_roughness_texture: Some(texture()), ..mirror() };
+    let mut made = pair(coat, lambert([0.5; 3]));
+    made.0.images.push(black);
+    is_same("black coat", &made, &[]);
+    let (_, effects) = draw(&gpu, &made.0, &knobs(Model::Recursive, &["samples=1"]), Demand::Scene);
+    assert!(effects.iter().any(|effect| effect.name == "layers" && effect.state == "not called for"));
 }
 
 /// Files of a folder and those below it that can be loaded.

@@ -1,6 +1,6 @@
 //! What is a solid, and which solids a point lies in: against closed forms.
 
-use etalon::scene::solid::{Solids, is_closed, media_at, solids};
+use etalon::scene::solid::{Solids, deepest_nesting, is_closed, media_at, solids};
 use etalon::scene::{Instance, Material, Mesh, Scene};
 use etalon::study::{self, shape::Shape};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
@@ -200,6 +200,21 @@ fn nested_cubes_are_listed_from_the_outside_in() {
     assert_eq!(at(1.5), [2]);
     assert_eq!(at(2.5), [0; 0]);
     assert_eq!(at(10.2), [3]);
+}
+
+#[test]
+fn bodies_in_each_other_are_counted_by_their_boxes() {
+    let place = |x: f64| DAffine3::from_translation(DVec3::new(x, 0.0, 0.0));
+    let deepest = |parts: &[(f64, f64)]| {
+        let scene = scene_of(parts.iter().map(|&(edge, x)| (cube("cube", edge), place(x))).collect());
+        deepest_nesting(&scene, &solids(&scene))
+    };
+    assert_eq!(deepest(&[]), 0);
+    assert_eq!(deepest(&[(1.0, 0.0), (1.0, 2.0), (1.0, -7.0)]), 1);
+    // A chain of three of which two meet at a time, in any order.
+    assert_eq!(deepest(&[(1.0, 0.0), (1.0, 0.75), (1.0, 1.5)]), 2);
+    assert_eq!(deepest(&[(1.0, 1.5), (1.0, 0.0), (1.0, 0.75)]), 2);
+    assert_eq!(deepest(&[(4.0, 0.0), (2.0, 0.1), (1.0, 0.2), (0.5, 10.0)]), 3);
 }
 
 #[test]

@@ -204,14 +204,11 @@ float coverage_of(Material m, float texel_alpha) {
     return blended ? clamp(alpha, 0.0, 1.0) : m.alpha_cutoff > 0.0 && alpha < m.alpha_cutoff ? 0.0 : 1.0;
 }
 
-float hit_coverage(HitPoint point) {
-    vec4 texel = hit_texture_or(point.material, SLOT_BASE, point.uvs, 0.0, vec4(1.0));
-    return coverage_of(material_at(point.material), point.color.a * texel.a);
-}
-
 // Whether there is no surface: in the holes of masks. What blends is there, however little of it.
 bool hit_is_hole(HitPoint point) {
-    return hit_coverage(point) == 0.0 && (material_at(point.material).flags & MATERIAL_BLENDED) == 0;
+    Material m = material_at(point.material);
+    vec4 texel = hit_texture_or(point.material, SLOT_BASE, point.uvs, 0.0, vec4(1.0));
+    return coverage_of(m, point.color.a * texel.a) == 0.0 && (m.flags & MATERIAL_BLENDED) == 0;
 }
 
 struct HitSurface {

@@ -251,7 +251,8 @@ impl PictureOptions {
         let asked = scene.background == Some(Background::Environment);
         match (self.plan, scene.env.as_deref()) {
             (Extent::Full, _) => Reads::Everything,
-            _ if !knobs.use_ambience() => Reads::Visible(Ambience::Absent),
+            _ if !knobs.show_occlusion(true) => Reads::Visible(Ambience::Absent),
+            _ if knobs.show_occlusion(false) => Reads::Visible(Ambience::Present),
             (_, Some("none")) => Reads::Visible(Ambience::Absent),
             (_, None) if !asked => Reads::Visible(Ambience::WithoutLights),
             _ => Reads::Visible(Ambience::Present),

@@ -14,6 +14,7 @@ use super::setup::Setup;
 use crate::cost::explain::Price;
 use crate::frame::Renderer;
 use crate::plan::KNOBS;
+use crate::scene::normal_form::normalise;
 use crate::scene::sight::{Sight, along_lines};
 
 /// Say what a scene calls for, with reasons, and what drawing it takes
@@ -40,7 +41,12 @@ pub fn run(args: &PlanArgs) -> Result<ExitCode> {
     let mut warnings = setup.warnings.clone();
     let camera = args.scene.choose_camera(&setup.scene, settings.size)?;
     let transmits = setup.scene.materials.iter().any(|material| material.transmission > 0.0);
-    let sight = transmits.then(|| along_lines(&setup.scene, &camera, settings.size)).transpose()?;
+    let sight = transmits.then(|| {
+        let mut scene = setup.scene.clone();
+        normalise(&mut scene);
+        along_lines(&scene, &camera, settings.size)
+    });
+    let sight = sight.transpose()?;
     let interfaces = settings.knobs.interfaces();
     let explained = (args.picture.plan == Extent::ExplainCost).then(|| (setup.clone(), settings.clone()));
     let (mut renderer, camera) = setup.renderer(&args.scene, settings)?;
@@ -48,6 +54,7 @@ pub fn run(args: &PlanArgs) -> Result<ExitCode> {
     let passes = renderer.passes(&camera)?;
     let mut pipelines = renderer.device().pipelines();
     pipelines.extend(passes.iter().flat_map(|pass| pass.pipelines.iter().cloned()));
+    let lighting = passes.iter().filter(|pass| pass.name == "lighting").count();
     let mut names: Vec<String> = Vec::new();
     for pass in passes {
         if !names.contains(&pass.name) {
@@ -64,15 +71,18 @@ pub fn run(args: &PlanArgs) -> Result<ExitCode> {
     let rays = renderer.plan.rays.unwrap_or_default();
     let sight = sight.filter(|_| rays.refraction);
     if let Some(sight) = sight.as_ref().filter(|sight| sight.most > interfaces) {
+        let more = match sight.most {
+            0..=32 => format!("--set interfaces={} follows them", sight.most.next_power_of_two()),
+            _ => "no rung follows them all".to_owned(),
+        };
         warnings.push(format!(
             "lines of sight go through up to {} transparent surfaces: interfaces={interfaces} loses up to {:.1} % of a \
-             pixel's light, --set interfaces={} follows them",
+             pixel's light, {more}",
             sight.most,
-            100.0 * sight.lost(interfaces),
-            sight.most.next_power_of_two().min(32)
+            100.0 * sight.lost(interfaces)
         ));
     }
-    facts.expected = Some(expected(&facts, &renderer, sight.as_ref(), interfaces));
+    facts.expected = Some(expected(&facts, &renderer, sight.as_ref(), [interfaces, lighting as u32]));
     facts.warnings.splice(0..0, warnings);
     if let Some((setup, settings)) = explained {
         drop(renderer);
@@ -88,13 +98,18 @@ pub fn run(args: &PlanArgs) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn expected(facts: &PlanFacts, renderer: &Renderer, sight: Option<&Sight>, interfaces: u32) -> Expected {
+fn expected(
+    facts: &PlanFacts,
+    renderer: &Renderer,
+    sight: Option<&Sight>,
+    [interfaces, lighting]: [u32; 2],
+) -> Expected {
     let rays = renderer.plan.rays.unwrap_or_default();
     let rungs = KNOBS.iter().find(|knob| knob.name == "interfaces").map_or(&[][..], |knob| knob.rungs);
     let lost = |rung: &&'static str| Some((*rung, sight?.lost(rung.parse().ok()?)));
     Expected {
         bytes: facts.buffers.iter().map(|made| made.bytes).sum(),
-        shadow_rounds: if rays.shadows { facts.passes.iter().filter(|pass| *pass == "lighting").count() } else { 0 },
+        shadow_rounds: if rays.shadows { lighting } else { 0 },
         ray_rounds: sight.map_or(0, |sight| sight.most).max(u32::from(rays.mirrors || rays.refraction)).min(interfaces),
         interfaces: sight.map_or(0, |sight| sight.most),
         lost: rungs.iter().filter_map(lost).collect(),
@@ -121,6 +136,10 @@ pub(super) fn cost_table(prices: &[Price]) -> Table {
         "MB",
     ]);
     for price in prices {
+        if let Some(fails) = &price.fails {
+            costs.add_row([price.effect, &price.by, &format!("cannot be drawn: {fails}")]);
+            continue;
+        }
         let [low, high] = price.frame_range_ms;
         costs.add_row([
             price.effect.to_owned(),

@@ -99,7 +99,7 @@ pub struct Expected {
     /// Bytes of all buffers and images.
     pub bytes: u64,
     /// Dispatches that send rays to lights, in each sample.
-    pub shadow_rounds: usize,
+    pub shadow_rounds: u32,
     /// Rays that a path sends one after another, at least: along straight lines, and no more than `interfaces` allows.
     pub ray_rounds: u32,
     /// The most transparent surfaces on a line of sight.

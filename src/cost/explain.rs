@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use anyhow::{Context as _, Result};
+use anyhow::Result;
 use serde::Serialize;
 
 use crate::frame::{Renderer, Settings};
@@ -21,8 +21,11 @@ pub struct Price {
     pub effect: &'static str,
     /// `not called for`: the picture would be the same. `dropped`: it would be that of another rung.
     pub state: &'static str,
-    /// How it was planned: `asked for`, or the rung that allows it.
+    /// How it was planned: `asked for`, or the rungs that allow it.
     pub by: String,
+    /// Why it could not be drawn, if so: no figure says anything then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fails: Option<String>,
     /// Milliseconds more for the first picture, with everything made anew: caches of the driver may be warm.
     pub start_ms: f64,
     /// Milliseconds more for a sample of each pixel: the middle of the differences between pictures drawn in turns …
@@ -53,8 +56,26 @@ pub struct Subject<'a> {
     pub camera: &'a Camera,
 }
 
-/// A plan that draws.
-struct Plan {
+impl Price {
+    fn nothing(effect: &Effect) -> Self {
+        Self {
+            effect: effect.name,
+            state: effect.state,
+            by: String::new(),
+            fails: None,
+            start_ms: 0.0,
+            frame_ms: 0.0,
+            frame_range_ms: [0.0; 2],
+            frame_share: 0.0,
+            pipelines: 0,
+            spirv_bytes: 0,
+            bytes: 0,
+        }
+    }
+}
+
+/// A plan that has been drawn once.
+struct Drawn {
     renderer: Renderer,
     start_ms: f64,
     pipelines: i64,
@@ -68,49 +89,58 @@ impl Subject<'_> {
     /// # Errors
     /// When something cannot be drawn.
     pub fn prices(&self, effects: &[Effect], progress: &mut dyn FnMut(&str)) -> Result<Vec<Price>> {
-        let mut plain = self.plan(Demand::Scene, None)?;
+        let mut plain = self.plan(Demand::Scene, &[])?;
         let mut prices = Vec::new();
         for effect in effects.iter().filter(|effect| effect.state != "kept") {
             progress(effect.name);
-            let other_rung = (effect.state == "dropped").then(|| allowing(effect)).flatten();
-            if effect.state == "dropped" && other_rung.is_none() {
-                continue;
-            }
-            let by = other_rung.clone().unwrap_or_else(|| "asked for".to_owned());
-            let demand = if other_rung.is_some() { Demand::Scene } else { Demand::With(effect.name) };
-            let measuring = || format!("measuring what \"{}\" would cost", effect.name);
-            let mut with = self.plan(demand, other_rung.as_deref()).with_context(measuring)?;
-            let mut pairs = Vec::new();
-            for _ in 0..ROUNDS {
-                pairs.push((self.draw(&mut plain.renderer)?, self.draw(&mut with.renderer).with_context(measuring)?));
-            }
-            let mut differences: Vec<f64> = pairs.iter().map(|(plain, with)| with - plain).collect();
-            let mut plain_ms: Vec<f64> = pairs.iter().map(|(plain, _)| *plain).collect();
-            differences.sort_by(f64::total_cmp);
-            plain_ms.sort_by(f64::total_cmp);
-            let frame_ms = differences[ROUNDS / 2];
-            prices.push(Price {
-                effect: effect.name,
-                state: effect.state,
-                by,
-                start_ms: with.start_ms - plain.start_ms,
-                frame_ms,
-                frame_range_ms: [differences[0], differences[ROUNDS - 1]],
-                frame_share: frame_ms / plain_ms[ROUNDS / 2],
-                pipelines: with.pipelines - plain.pipelines,
-                spirv_bytes: with.spirv_bytes - plain.spirv_bytes,
-                bytes: with.bytes - plain.bytes,
-            });
+            let rungs = if effect.state == "dropped" { allowing(effect) } else { Vec::new() };
+            let (demand, by) = match rungs.is_empty() {
+                true => (Demand::With(effect.name), "asked for".to_owned()),
+                false => (Demand::Scene, rungs.join(", ")),
+            };
+            let price = match self.plan(demand, &rungs).and_then(|mut with| self.price(effect, &mut plain, &mut with)) {
+                Ok(price) => price.map(|price| Price { by, ..price }),
+                Err(error) => Some(Price { by, fails: Some(format!("{error:#}")), ..Price::nothing(effect) }),
+            };
+            prices.extend(price);
         }
         Ok(prices)
     }
 
+    /// Draws both in turns. `None`: nothing is planned otherwise, since the effect needs others that are left out too.
+    fn price(&self, effect: &Effect, plain: &mut Drawn, with: &mut Drawn) -> Result<Option<Price>> {
+        if plain.renderer.plan.draws_as(&with.renderer.plan) {
+            return Ok(None);
+        }
+        let (mut plain_ms, mut differences) = (Vec::new(), Vec::new());
+        for round in 0..ROUNDS {
+            let first = if round % 2 == 1 { Some(self.draw(&mut with.renderer)?) } else { None };
+            let ms = self.draw(&mut plain.renderer)?;
+            let with_ms = first.map_or_else(|| self.draw(&mut with.renderer), Ok)?;
+            plain_ms.push(ms);
+            differences.push(with_ms - ms);
+        }
+        differences.sort_by(f64::total_cmp);
+        plain_ms.sort_by(f64::total_cmp);
+        let frame_ms = differences[ROUNDS / 2];
+        Ok(Some(Price {
+            start_ms: with.start_ms - plain.start_ms,
+            frame_ms,
+            frame_range_ms: [differences[0], differences[ROUNDS - 1]],
+            frame_share: frame_ms / plain_ms[ROUNDS / 2],
+            pipelines: with.pipelines - plain.pipelines,
+            spirv_bytes: with.spirv_bytes - plain.spirv_bytes,
+            bytes: with.bytes - plain.bytes,
+            ..Price::nothing(effect)
+        }))
+    }
+
     /// Makes everything for a plan, on a device that has made nothing yet, and draws once.
-    fn plan(&self, demand: Demand, rung: Option<&str>) -> Result<Plan> {
+    fn plan(&self, demand: Demand, rungs: &[String]) -> Result<Drawn> {
         let device = Device::open(self.device, false)?;
         let mut settings = Settings { demand, ..self.settings.clone() };
         settings.knobs.set("samples=1")?;
-        rung.map_or(Ok(()), |rung| settings.knobs.set(rung))?;
+        settings.knobs.set_all(rungs)?;
         let start = Instant::now();
         let mut renderer = Renderer::new(&device, self.scene.clone(), self.environment, settings)?;
         self.draw(&mut renderer)?;
@@ -118,7 +148,7 @@ impl Subject<'_> {
         let pipelines = device.pipelines();
         let spirv: usize = pipelines.iter().map(|(program, constants)| program.spirv_bytes(constants)).sum();
         let bytes: u64 = device.created().iter().filter(|made| made.name != "staging").map(|made| made.bytes).sum();
-        Ok(Plan {
+        Ok(Drawn {
             renderer,
             start_ms,
             pipelines: pipelines.len() as i64,
@@ -134,9 +164,12 @@ impl Subject<'_> {
     }
 }
 
-/// The rung of the recursive model that allows an effect which a knob has dropped.
-fn allowing(effect: &Effect) -> Option<String> {
-    let (knob, _) = effect.reason.split_once('=')?;
-    let known = Knobs::of(Model::Recursive).list().into_iter().find(|(name, _)| *name == knob)?;
-    (known.1 != effect.rung).then(|| format!("{knob}={}", known.1))
+/// The rungs that allow an effect which a knob has dropped: those of the recursive model.
+fn allowing(effect: &Effect) -> Vec<String> {
+    if effect.name == "media that vary" {
+        return ["refraction=ray", "absorption=march:32"].map(str::to_owned).into();
+    }
+    let knob = effect.reason.split_once('=').map(|(knob, _)| knob);
+    let known = Knobs::of(Model::Recursive).list().into_iter().find(|(name, _)| Some(*name) == knob);
+    known.map(|(knob, rung)| format!("{knob}={rung}")).into_iter().collect()
 }

@@ -25,7 +25,7 @@ const NARROWEST: u32 = 16;
 /// Side of the table of directional reflectance, over cosθ and perceptual roughness.
 const REFLECTANCE: u32 = 32;
 
-/// The environment's images and terms; one black texel where the plan has none.
+/// The environment's images and terms; a texel that is never read where the plan has none.
 pub struct EnvironmentOnDevice {
     sky: Image,
     prefiltered: Image,

@@ -1,7 +1,7 @@
 //! Raster G-buffer: the nearest opaque surface of every pixel (shaders/pass/gbuffer.*).
 //!
 //! 24 bytes a pixel beside depth: RGBA16F base colour and metallic, RGBA16_SNORM two octahedral normals, RG32UI ids,
-//! roughness and occlusion; 4 more for triangles where there are rays, 8 for emissive textures and 16 for layers where the
+//! roughness and occlusion; 4 more for triangles where there are rays, 8 each for emissive textures and layers where the
 //! plan has them. docs/decisions/gbuffer.md has
 //! what narrower and wider choices cost.
 

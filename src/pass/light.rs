@@ -23,8 +23,8 @@ pub fn light<'a>(
 ) -> Result<()> {
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
     let planned = plan.rays;
-    // Only rays to lights are sent from here.
-    let trace = if lighting.shadow_rays() { rays.constants } else { TraceConstants::default() };
+    // Only rays to lights are sent from here; an eye in a medium needs to know where on its triangle a point lies.
+    let trace = if lighting.shadow_rays() || rays.inside() { rays.constants } else { TraceConstants::default() };
     let through_media = planned.filter(|_| lighting.shadow_rays() || rays.inside());
     let march = through_media.map_or_else(March::default, |rays| rays.march);
     let constants = light::Constants {

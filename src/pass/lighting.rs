@@ -39,20 +39,23 @@ pub struct Lighting<'a> {
     pub size: [u32; 2],
 }
 
-/// Directional lights in parts, local ones in parts, the last of the former with the first of the latter. Local lights are
-/// divided at the same ones whether or not tiles list them: sums are the same to the last bit then.
-fn parts(directional: u32, local: u32, words: u32) -> Vec<Range> {
-    let of = |count: u32, most: u32| (0..count).step_by(most as usize).map(move |i| [i, (i + most).min(count)]);
-    let mut parts: Vec<Range> = of(directional, LIGHTS_AT_ONCE).map(|[from, to]| [from, to, 0, 0]).collect();
-    let mut rest: Vec<Range> = of(local, LIGHTS_AT_ONCE)
-        .map(|[from, to]| [directional + from, directional + to, 0, 0])
-        .chain(of(words, LIGHTS_AT_ONCE / 32).map(|[from, to]| [directional, directional, from, to]))
-        .collect();
-    if let (Some(last), Some(first)) = (parts.last_mut(), rest.first()) {
-        *last = [last[0], first[1], first[2], first[3]];
-        rest.remove(0);
+/// Directional lights in parts and local ones in parts, of which one dispatch takes the last of the former with the first of the
+/// latter if both are few. Local lights are divided at the same ones whether or not tiles list them: sums are the same to
+/// the last bit then.
+fn parts(directional: u32, local: u32, listed: bool) -> Vec<Range> {
+    let of =
+        |count: u32| (0..count).step_by(LIGHTS_AT_ONCE as usize).map(move |i| [i, (i + LIGHTS_AT_ONCE).min(count)]);
+    let mut parts: Vec<Range> = of(directional).map(|[from, to]| [from, to, 0, 0]).collect();
+    for [from, to] in of(local) {
+        let [lights, words] = match listed {
+            true => [[directional; 2], [from / 32, to.div_ceil(32)]],
+            false => [[directional + from, directional + to], [0; 2]],
+        };
+        match parts.last_mut().filter(|last| from == 0 && last[1] - last[0] + to <= LIGHTS_AT_ONCE) {
+            Some(last) => *last = [last[0], lights[1], words[0], words[1]],
+            None => parts.push([lights[0], lights[1], words[0], words[1]]),
+        }
     }
-    parts.append(&mut rest);
     parts
 }
 
@@ -87,11 +90,11 @@ impl Lighting<'_> {
     /// What each dispatch goes through: everything at once, or a few lights at a time where each sends a ray.
     #[must_use]
     pub fn ranges(&self) -> Vec<Range> {
-        let (lights, words) = (self.plan.directional_lights + self.unlisted_lights(), self.tiles.words());
-        if !self.shadow_rays() {
-            return vec![[0, lights, 0, words]];
+        let Plan { directional_lights, local_lights, tiles, .. } = *self.plan;
+        match self.shadow_rays() {
+            true => parts(directional_lights, local_lights, tiles),
+            false => vec![[0, directional_lights + self.unlisted_lights(), 0, self.tiles.words()]],
         }
-        parts(self.plan.directional_lights, lights - self.plan.directional_lights, words)
     }
 }
 
@@ -101,11 +104,14 @@ mod tests {
 
     #[test]
     fn lights_are_divided_at_the_same_ones_with_and_without_lists() {
-        assert_eq!(parts(1, 3, 0), [[0, 4, 0, 0]]);
-        assert_eq!(parts(1, 0, 1), [[0, 1, 0, 1]]);
-        assert_eq!(parts(0, 70, 0), [[0, 64, 0, 0], [64, 70, 0, 0]]);
-        assert_eq!(parts(0, 0, 3), [[0, 0, 0, 2], [0, 0, 2, 3]]);
-        assert_eq!(parts(65, 130, 0), [[0, 64, 0, 0], [64, 129, 0, 0], [129, 193, 0, 0], [193, 195, 0, 0]]);
-        assert_eq!(parts(65, 0, 5), [[0, 64, 0, 0], [64, 65, 0, 2], [65, 65, 2, 4], [65, 65, 4, 5]]);
+        assert_eq!(parts(1, 3, false), [[0, 4, 0, 0]]);
+        assert_eq!(parts(1, 3, true), [[0, 1, 0, 1]]);
+        assert_eq!(parts(0, 70, false), [[0, 64, 0, 0], [64, 70, 0, 0]]);
+        assert_eq!(parts(0, 70, true), [[0, 0, 0, 2], [0, 0, 2, 3]]);
+        assert_eq!(parts(65, 63, false), [[0, 64, 0, 0], [64, 128, 0, 0]]);
+        assert_eq!(parts(65, 63, true), [[0, 64, 0, 0], [64, 65, 0, 2]]);
+        // Too many for one dispatch.
+        assert_eq!(parts(2, 130, false), [[0, 2, 0, 0], [2, 66, 0, 0], [66, 130, 0, 0], [130, 132, 0, 0]]);
+        assert_eq!(parts(2, 130, true), [[0, 2, 0, 0], [2, 2, 0, 2], [2, 2, 2, 4], [2, 2, 4, 5]]);
     }
 }

@@ -79,7 +79,7 @@ pub fn mirror<'a>(
     let constants = mirror::Constants {
         has_emissive: plan.emissive,
         has_layers: plan.layers,
-        has_triangles: plan.rays.is_some(),
+        has_triangles: false,
         has_transmission: plan.rays.is_some_and(|rays| rays.refraction),
         brdf: lighting.knobs.index("brdf"),
         fresnel: lighting.knobs.index("fresnel"),

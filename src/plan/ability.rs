@@ -36,10 +36,13 @@ impl Plan {
             (self.screen.mirrors, "reflection", "screen", &images),
         ] {
             if let (true, Some(lacks)) = (asked, lacks) {
+                let nearest = match (knob, below(knob, rung)) {
+                    ("reflection", "screen") if images.is_some() => below(knob, "screen"),
+                    (_, nearest) => nearest,
+                };
                 bail!(
-                    "{knob}={rung}: the device \"{}\" {lacks}; the nearest choice is {knob}={}",
-                    ability.device,
-                    below(knob, rung)
+                    "{knob}={rung}: the device \"{}\" {lacks}; the nearest choice is {knob}={nearest}",
+                    ability.device
                 );
             }
         }
@@ -85,6 +88,8 @@ mod tests {
             let said = refused(choices, &still).unwrap_err();
             assert!(said.starts_with(asked) && said.ends_with(nearest), "{said}");
         }
+        let neither = Ability { storage_images: 21, ..still.clone() };
+        assert!(refused(&["shadows=off"], &neither).unwrap_err().ends_with("reflection=environment"));
         assert!(refused(&["shadows=off", "reflection=off", "refraction=off"], &still).is_ok());
     }
 }

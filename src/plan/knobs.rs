@@ -254,10 +254,11 @@ impl Knobs {
         self.rung("absorption").strip_prefix("march:").and_then(|n| n.parse().ok()).unwrap_or(0)
     }
 
-    /// Whether light from all around, where there is any, is seen on surfaces.
+    /// Whether occlusion may be seen: on light from all around, if there is any, and on mirror images of the screen.
     #[must_use]
-    pub fn use_ambience(&self) -> bool {
-        self.rung("indirect") != "off" || self.rung("reflection") != "off"
+    pub fn show_occlusion(&self, environment: bool) -> bool {
+        let around = self.rung("indirect") != "off" || self.rung("reflection") != "off";
+        self.rung("reflection") == "screen" || (environment && around)
     }
 
     /// Samples per pixel.

@@ -16,7 +16,7 @@ use left_out::left_out;
 use surfaces::{Surfaces, has_layers, refracts, scatters};
 
 use crate::scene::normal_form::NormalForm;
-use crate::scene::solid::{Solids, solids};
+use crate::scene::solid::{Solids, deepest_nesting, solids};
 use crate::scene::{AlphaMode, Light, LightKind, Material, Scene};
 
 /// Which passes and which code a scene needs under the chosen knobs.
@@ -127,6 +127,8 @@ pub struct Screen {
 pub struct Facts {
     /// Which surfaces enclose a medium.
     pub solids: Solids,
+    /// How many of those one point may be in, at most.
+    pub nesting: usize,
     /// What was said more simply.
     pub form: NormalForm,
 }
@@ -135,7 +137,8 @@ impl Facts {
     /// Of a scene in normal form.
     #[must_use]
     pub fn of(scene: &Scene, form: NormalForm) -> Self {
-        Self { solids: solids(scene), form }
+        let solids = solids(scene);
+        Self { nesting: deepest_nesting(scene, &solids), solids, form }
     }
 }
 
@@ -164,6 +167,7 @@ const PATH: u32 = 2;
 /// What all parts of a plan are decided from.
 struct Planner<'a> {
     scene: &'a Scene,
+    facts: &'a Facts,
     surfaces: Surfaces<'a>,
     knobs: &'a Knobs,
     surroundings: Surroundings,
@@ -176,7 +180,7 @@ impl Plan {
     pub fn new(scene: &Scene, facts: &Facts, surroundings: Surroundings, knobs: &Knobs) -> Self {
         let surfaces = Surfaces::of(scene, facts);
         let decisions = Decisions { knobs, demand: surroundings.demand, effects: Vec::new() };
-        let mut planner = Planner { scene, surfaces, knobs, surroundings, decisions };
+        let mut planner = Planner { scene, facts, surfaces, knobs, surroundings, decisions };
         let layers = planner.layers();
         let transmission = planner.transmission();
         let images = planner.mirror_images(&transmission);
@@ -220,6 +224,19 @@ impl Plan {
     #[must_use]
     pub fn march(&self) -> March {
         self.rays.map_or_else(March::default, |rays| rays.march)
+    }
+
+    /// Whether the same is done for both, whatever their reasons.
+    #[must_use]
+    pub fn draws_as(&self, other: &Self) -> bool {
+        let work = |plan: &Self| Self {
+            demand: Demand::Scene,
+            lights: Vec::new(),
+            effects: Vec::new(),
+            warnings: Vec::new(),
+            ..plan.clone()
+        };
+        work(self) == work(other)
     }
 
     /// Enters into the account what only the hierarchy of triangles tells: whether transparent bodies lie against other
@@ -286,16 +303,18 @@ impl Planner<'_> {
         let cause =
             surfaces.cause(|m| has_layers(m) || m.clearcoat > 0.0, |_| "has a coat or layer textures".to_owned());
         let layers = decisions.decide("layers", cause);
-        let cause = surfaces.cause(|m| m.conductor.is_some(), |_| "is a metal with n and kappa".to_owned());
+        let cause =
+            surfaces.cause(|m| m.conductor.is_some() && m.metallic > 0.0, |_| "is a metal with n and kappa".to_owned());
         let conductors = decisions.decide("metals by n and kappa", cause);
         // A coat's numbers lie in the layers.
         Layers { emissive, clearcoat, layers: layers || clearcoat, conductors }
     }
 
     fn transmission(&mut self) -> Transmission {
-        let Self { surfaces, decisions, knobs, surroundings, .. } = self;
+        let Self { facts, surfaces, decisions, knobs, surroundings, .. } = self;
         let rung = knobs.rung("refraction");
         let cause = surfaces.cause(refracts, |m| surfaces.body(m));
+        let cause = if cause.called_for { cause.with("bodies in each other at most", facts.nesting) } else { cause };
         let bends = decisions.decide_with("refraction", "refraction", rung != "off", cause);
         let by_rays = bends && rung == "ray";
         let cause = surfaces.cause(
@@ -340,11 +359,12 @@ impl Planner<'_> {
         let shiny = surfaces.any(|m| !m.unlit && (mirrors(m) || m.clearcoat > 0.0));
         let cause = shown(shiny, "no material in use mirrors anything");
         let reflection = decisions.decide_with("mirrored environment", "reflection", rung != "off", cause);
-        let cause = match reflection {
-            true => {
+        let cause = match (reflection, there_is) {
+            (false, _) => Cause::against("no environment is mirrored"),
+            (_, false) => Cause::against("there is no environment"),
+            _ => {
                 Cause::when(!surroundings.constant, "the environment varies", "the environment is the same everywhere")
             }
-            false => Cause::against("no environment is mirrored"),
         };
         let prefilter = decisions.decide("prefiltered environment", cause) && reflection;
         // A texture only lowers the factor.
@@ -374,16 +394,17 @@ impl Planner<'_> {
     }
 
     fn lights(&mut self) -> Lights {
-        let Self { scene, surfaces, decisions, knobs, surroundings } = self;
+        let Self { scene, surfaces, decisions, knobs, surroundings, .. } = self;
         let lit = surfaces.any(|m| !m.unlit);
         let bounds = scene.bounds();
         let reaches = |light: &Light| bounds.is_none_or(|bounds| light.reaches(&bounds));
         let useful = |light: &Light| light.shines() && reaches(light);
         let useful_lights = scene.lights.iter().filter(|light| useful(light)).count();
         // Dark ones stand for those that are asked for and not there. Beside others they would take room in shadow maps.
-        let stand_in = needs_lights(surroundings.demand) && useful_lights == 0;
-        let keeps = |light: &Light| stand_in || (useful(light) && (lit || needs_lights(surroundings.demand)));
-        let kept: Vec<bool> = scene.lights.iter().map(keeps).collect();
+        let demanded = needs_lights(surroundings.demand);
+        let stand_in = demanded && useful_lights == 0;
+        let keeps = |(i, light): (usize, &Light)| (stand_in && i < 2) || (useful(light) && (lit || demanded));
+        let kept: Vec<bool> = scene.lights.iter().enumerate().map(keeps).collect();
         let count = |test: &dyn Fn(&LightKind) -> bool| {
             scene.lights.iter().zip(&kept).filter(|(light, kept)| **kept && test(&light.kind)).count() as u32
         };
@@ -441,7 +462,7 @@ impl Planner<'_> {
         let rough = |m: &Material| {
             let coat = m.clearcoat > 0.0 && m.clearcoat_roughness > 0.0;
             (mirrors && surfaces::is_smooth(m, images.roughest) && (m.roughness > 0.0 || coat))
-                || (refraction && m.transmission > 0.0 && m.roughness > 0.0)
+                || (m.transmission > 0.0 && m.roughness > 0.0)
         };
         let rough = decisions
             .decide("rays by lobes", surfaces.cause(rough, |m| format!("sends rays at roughness {}", m.roughness)));

@@ -27,7 +27,8 @@ pub fn mirrors(material: &Material) -> bool {
 pub(super) fn scatters(material: &Material) -> bool {
     !material.unlit
         && (material.metallic < 1.0 || material.metallic_roughness_texture.is_some())
-        && (material.transmission < 1.0 || material.transmission_texture.is_some())
+        // Metal transmits nothing.
+        && (material.transmission < 1.0 || material.metallic > 0.0 || material.transmission_texture.is_some())
         && material.base_color[..3] != [0.0; 3]
 }
 

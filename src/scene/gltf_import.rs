@@ -181,7 +181,7 @@ impl<'d, 'b, 'w> Placing<'d, 'b, 'w> {
         let mut unread: Vec<String> =
             materials.flat_map(|(i, m)| forget_textures(m, used.contains(&i), ambience)).collect();
         for job in &self.jobs {
-            let read = self.material(job).map_or([false; 2], |i| Coordinates::of(&self.materials[i]).sets);
+            let read = self.material(job).map_or([false; 2], |i| Coordinates::of(&self.materials[i]).kept);
             let json = &self.document.root.meshes[job.mesh].primitives[job.primitive];
             let there = |set: usize| json.attributes.contains_key(&Checked::Valid(Semantic::TexCoords(set as u32)));
             let name = self.document.root.meshes[job.mesh].name.clone().unwrap_or_else(|| format!("mesh {}", job.mesh));
@@ -336,7 +336,7 @@ fn build(document: &Document<'_>, materials: &[Material], job: &Job, everything:
     let material = json.material.map_or(materials.len() - 1, |m| m.value());
     let read = Coordinates::of(&materials[material]);
     let uvs = |set: usize| match get(Semantic::TexCoords(set as u32))? {
-        Some(accessor) if everything || read.sets[set] => accessor.floats::<2>(),
+        Some(accessor) if everything || read.kept[set] => accessor.floats::<2>(),
         _ => Ok(Vec::new()),
     };
     let mut mesh = Mesh {

@@ -1,5 +1,5 @@
 //! The same scene said more simply: what texels and vertices make of the factors of its materials. Nothing that is seen
-//! changes.
+//! changes, but that what covers wholly is opaque in every respect: it casts shadows in maps, and bends what it transmits.
 
 use super::material::TextureRef;
 use super::{AlphaMode, Image, Material, Mesh, Scene};
@@ -74,8 +74,9 @@ fn settle_alpha(index: usize, material: &mut Material, meshes: &mut [Mesh], imag
         alphas
             .fold([1.0_f32, 0.0], |[least, most], a| [least.min(f32::from(a) / 255.0), most.max(f32::from(a) / 255.0)])
     });
-    let mut covers = true;
+    let (mut covers, mut used) = (true, false);
     for mesh in meshes.iter_mut().filter(|mesh| mesh.material == index && !mesh.indices.is_empty()) {
+        used = true;
         let of_vertices = |first: f32, pick: fn(f32, f32) -> f32| {
             mesh.colors.iter().map(|color| color[3]).reduce(pick).unwrap_or(first)
         };
@@ -92,9 +93,10 @@ fn settle_alpha(index: usize, material: &mut Material, meshes: &mut [Mesh], imag
             *mesh = Mesh { name: std::mem::take(&mut mesh.name), material: index, ..Mesh::default() };
         }
     }
+    // What no mesh has is not called anything, and does not weigh the texels that it shares.
     if covers {
         material.alpha_mode = AlphaMode::Opaque;
-        form.opaque.push(material.name.clone());
+        form.opaque.extend(used.then(|| material.name.clone()));
     }
 }
 

@@ -83,9 +83,11 @@ pub(crate) fn forget_textures(m: &mut Material, used: bool, ambience: bool) -> V
     unread
 }
 
-/// Sets of texture coordinates that the textures of a material read, and that which tangents follow.
+/// Sets of texture coordinates that the textures of a material read, those that are kept, and that which tangents follow.
 pub(crate) struct Coordinates {
     pub(crate) sets: [bool; 2],
+    /// With the first set where there is any texture: it tells rays how dense texels are.
+    pub(crate) kept: [bool; 2],
     pub(crate) tangents: Option<usize>,
 }
 
@@ -94,7 +96,7 @@ impl Coordinates {
         let textures = m.textures();
         let reads = |set| textures.iter().flatten().any(|t| t.uv_set as usize & 1 == set);
         let tangents = m.normal_texture.or(m.clearcoat_normal_texture).map(|t| t.uv_set as usize & 1);
-        Self { sets: [reads(0), reads(1)], tangents }
+        Self { sets: [reads(0), reads(1)], kept: [reads(0) || reads(1), reads(1)], tangents }
     }
 }
 
@@ -112,7 +114,7 @@ pub fn forget_unread(scene: &mut Scene, reads: Reads) {
     for mesh in &mut scene.meshes {
         let read = Coordinates::of(&scene.materials[mesh.material]);
         for (set, uvs) in mesh.uvs.iter_mut().enumerate() {
-            if !read.sets[set] && !uvs.is_empty() {
+            if !read.kept[set] && !uvs.is_empty() {
                 scene.unread.push(unread_coordinates(&mesh.name, set));
                 *uvs = Vec::new();
             }

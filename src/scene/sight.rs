@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::bvh::{Bvh, Node};
-use super::{Camera, Projection, Scene};
+use super::{AlphaMode, Camera, Projection, Scene};
 
 /// Lines across the picture; as many down as its shape gives.
 const LINES: u32 = 160;
@@ -73,7 +73,7 @@ fn line(camera: &Camera, aspect: f64, at: DVec2) -> (DVec3, DVec3) {
 /// What is left of the light along a line behind each transparent surface before the first opaque one. `origin` is in bvh
 /// space.
 fn shares(scene: &Scene, bvh: &Bvh, origin: DVec3, direction: DVec3) -> Vec<f64> {
-    let mut found: Vec<(f64, f64)> = Vec::new();
+    let mut found: Vec<(f64, u32, f64)> = Vec::new();
     let mut opaque = f64::INFINITY;
     let mut open = if bvh.nodes.is_empty() { Vec::new() } else { vec![0_u32] };
     let inverse = direction.recip();
@@ -97,7 +97,9 @@ fn shares(scene: &Scene, bvh: &Bvh, origin: DVec3, direction: DVec3) -> Vec<f64>
                     if material.transmission > 0.0 {
                         // Along a line that is not bent as much as at normal incidence is mirrored, or more.
                         let f0 = ((f64::from(material.ior) - 1.0) / (f64::from(material.ior) + 1.0)).powi(2);
-                        found.push((t, f64::from(material.transmission) * (1.0 - f0)));
+                        found.push((t, triangle.instance, f64::from(material.transmission) * (1.0 - f0)));
+                    } else if material.alpha_mode == AlphaMode::Blend {
+                        found.push((t, triangle.instance, 1.0 - f64::from(material.base_color[3])));
                     } else {
                         opaque = opaque.min(t);
                     }
@@ -105,11 +107,13 @@ fn shares(scene: &Scene, bvh: &Bvh, origin: DVec3, direction: DVec3) -> Vec<f64>
             }
         }
     }
-    found.retain(|(t, _)| *t < opaque);
+    found.retain(|(t, ..)| *t < opaque);
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // On an edge both triangles are met, of one surface.
+    found.dedup_by(|b, a| a.1 == b.1 && b.0 - a.0 <= 1e-9 * b.0);
     found
         .iter()
-        .scan(1.0, |left, (_, share)| {
+        .scan(1.0, |left, (.., share)| {
             *left *= share;
             Some(*left)
         })

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 
-use super::{Bounds, Instance, Mesh, Scene};
+use super::{AlphaMode, Bounds, Instance, Mesh, Scene};
 
 /// Below this share of the sum of its parts' magnitudes a volume is rounding: a mesh of a million triangles adds up
 /// errors of 1e-16 each.
@@ -18,7 +18,7 @@ const NO_VOLUME: f64 = 1e-12;
 pub struct Solids {
     /// Transmissive bodies.
     pub solid: Vec<bool>,
-    /// Transmissive, and to be read as a thin sheet of its nominal thickness: thickness 0, or a mesh that bounds no
+    /// Transmissive, and to be read as a thin sheet of its nominal thickness: blended, thickness 0, or a mesh that bounds no
     /// volume. False for surfaces that transmit nothing.
     pub sheet: Vec<bool>,
     /// A transmissive solid whose triangles are wound the wrong way round, seen in object space: the front of each
@@ -116,7 +116,9 @@ pub fn solids(scene: &Scene) -> Solids {
     for instance in &scene.instances {
         let mesh = &scene.meshes[instance.mesh];
         let material = &scene.materials[mesh.material];
-        if material.transmission <= 0.0 || material.thickness <= 0.0 {
+        // What blends lets light straight through.
+        let blends = material.alpha_mode == AlphaMode::Blend;
+        if material.transmission <= 0.0 || material.thickness <= 0.0 || blends {
             solid.push(false);
             sheet.push(material.transmission > 0.0);
             flipped.push(false);
@@ -170,6 +172,19 @@ pub fn media_at(scene: &Scene, solids: &Solids, p_world: DVec3) -> Vec<usize> {
     }
     media.sort_by(|a, b| b.0.total_cmp(&a.0));
     media.into_iter().map(|(_, i)| i).collect()
+}
+
+/// How many bodies one point may be in at most, as far as their boxes in world axes tell.
+#[must_use]
+pub fn deepest_nesting(scene: &Scene, solids: &Solids) -> usize {
+    let bodies = scene.instances.iter().zip(&solids.solid).filter(|(_, solid)| **solid);
+    let mut boxes: Vec<Bounds> =
+        bodies.map(|(instance, _)| seen_from(&scene.meshes[instance.mesh], instance, DVec3::ZERO)).collect();
+    boxes.sort_by(|a, b| a.min.x.total_cmp(&b.min.x));
+    let meet = |a: &Bounds, b: &Bounds| a.min.cmple(b.max).all() && b.min.cmple(a.max).all();
+    // Of boxes that have a point in common the one that begins last along x meets all the others.
+    let met = |i: usize| boxes[..i].iter().filter(|other| meet(&boxes[i], other)).count() + 1;
+    (0..boxes.len()).map(met).max().unwrap_or_default()
 }
 
 /// The box around an instance in world axes, relative to a point.
