@@ -6,8 +6,11 @@
 //! ```text
 //! cli ─► verify ─► optics      the formulas in f64, and the shaders held against them
 //!  │
+//!  ├───► cost ──► frame        what effects cost, drawn in turns
+//!  │
 //!  ├───► study ─► scene        what to draw: data, no Vulkan
 //!  │                ▲
+//!  │                │
 //!  ▼                │
 //! frame ─► pass ─► plan        what it calls for, and why
 //!           │
@@ -31,7 +34,7 @@
 //! [`gpu::Access`] is the one table that turns an access into Vulkan's stages, accesses and layouts. Structs that both sides
 //! know are in [`share`], and differences from their GLSL twins do not compile.
 //!
-//! [`plan::Plan`] is made before any Vulkan object from the scene's values and the [`plan::Knobs`]: a pass, an image or a piece of
+//! [`cost`] prices what a plan leaves out. [`plan::Plan`] is made before any Vulkan object from the scene's values and the [`plan::Knobs`]: a pass, an image or a piece of
 //! shader code exists only if it says so. [`scene`] reads files that are not trusted; [`study`] generates scenes without files;
 //! [`image`] keeps and compares pictures; [`cli`] is the program.
 //!
