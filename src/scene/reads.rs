@@ -13,7 +13,7 @@ pub enum Reads {
     Visible(Ambience),
 }
 
-/// When there is light from all around, which is what occlusion takes from.
+/// When occlusion may be seen: it takes from light that comes from all around, and from mirror images of the screen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ambience {
     /// Never.
@@ -37,7 +37,7 @@ impl Reads {
 }
 
 /// Takes the textures from a material that nothing of the picture depends on, and says of each which and why. `used`: some
-/// mesh that is drawn has it. `ambience`: there may be light from all around.
+/// mesh that is drawn has it. `ambience`: occlusion may be seen.
 pub(crate) fn forget_textures(m: &mut Material, used: bool, ambience: bool) -> Vec<String> {
     let mut unread = Vec::new();
     let name = m.name.clone();
@@ -50,36 +50,24 @@ pub(crate) fn forget_textures(m: &mut Material, used: bool, ambience: bool) -> V
         }
     };
     let unless = |seen: bool, why: &'static str| if seen { None } else { Some(why) };
-    let or = |first: Option<&'static str>, second: Option<&'static str>| first.or(second);
     let lit = unless(!m.unlit, "the material is unlit");
-    let coat = or(lit, unless(m.clearcoat > 0.0, "there is no coat"));
+    let coat = lit.or(unless(m.clearcoat > 0.0, "there is no coat"));
     let transmits = unless(m.transmission > 0.0, "nothing is transmitted");
     forget(&mut m.base_color_texture, "base colour", None);
     forget(&mut m.metallic_roughness_texture, "metallic and roughness", None);
     forget(&mut m.normal_texture, "normal", None);
     forget(&mut m.emissive_texture, "emissive", unless(m.emissive != [0.0; 3], "nothing is emitted"));
-    forget(
-        &mut m.occlusion_texture,
-        "occlusion",
-        or(
-            lit,
-            or(
-                unless(m.occlusion_strength > 0.0, "its strength is 0"),
-                unless(ambience, "no light comes from all around"),
-            ),
-        ),
-    );
+    let occludes =
+        unless(m.occlusion_strength > 0.0, "its strength is 0").or(unless(ambience, "no light comes from all around"));
+    forget(&mut m.occlusion_texture, "occlusion", lit.or(occludes));
     forget(&mut m.clearcoat_texture, "clear coat", coat);
     forget(&mut m.clearcoat_roughness_texture, "clear coat roughness", coat);
     forget(&mut m.clearcoat_normal_texture, "clear coat normal", coat);
-    forget(
-        &mut m.specular_texture,
-        "specular",
-        or(lit, unless(m.specular > 0.0, "no dielectric part of it mirrors anything")),
-    );
+    let mirrors = unless(m.specular > 0.0, "no dielectric part of it mirrors anything");
+    forget(&mut m.specular_texture, "specular", lit.or(mirrors));
     forget(&mut m.specular_color_texture, "specular colour", Some("this texture is not supported"));
     forget(&mut m.transmission_texture, "transmission", transmits);
-    forget(&mut m.thickness_texture, "thickness", or(transmits, unless(m.thickness > 0.0, "the thickness is 0")));
+    forget(&mut m.thickness_texture, "thickness", transmits.or(unless(m.thickness > 0.0, "the thickness is 0")));
     unread
 }
 
