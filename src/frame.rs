@@ -24,6 +24,7 @@ use crate::pass::lighting::Lighting;
 use crate::pass::mirror::{OnScreen, mirror, screen_tiles};
 pub use crate::pass::part::Part;
 use crate::pass::part::PartOnDevice;
+use crate::pass::path::{PathsOnDevice, paths};
 use crate::pass::rays::{BvhFacts, RaysOnDevice, Traversal};
 use crate::pass::scene::SceneOnDevice;
 use crate::pass::shadow_map::ShadowMaps;
@@ -31,6 +32,7 @@ use crate::pass::tiles::{Tiles, tiles};
 use crate::pass::tonemap::{Counts, Display, tonemap};
 use crate::pass::view::{View, jitter};
 use crate::plan::{Ability, Demand, Facts, Knobs, Plan, Surroundings, needs_lights};
+use crate::scene::emitters::Emitters;
 use crate::scene::environment::Environment;
 use crate::scene::normal_form::normalise;
 use crate::scene::reads::forget_unread;
@@ -77,6 +79,10 @@ pub struct Settings {
     pub environment_intensity: f32,
     /// Turns the environment about +Y, in degrees.
     pub environment_rotation: f32,
+    /// Chooses the random numbers.
+    pub seed: u32,
+    /// Paths take all their bounces in one dispatch: the same film, for comparison.
+    pub paths_at_once: bool,
     /// The way rays go through the scene; `None`: what suits the device and the scene.
     pub traversal: Option<Traversal>,
     /// What is planned although the scene does not call for it.
@@ -95,6 +101,8 @@ impl Default for Settings {
             background: Background::default(),
             environment_intensity: 1.0,
             environment_rotation: 0.0,
+            seed: 0,
+            paths_at_once: false,
             traversal: None,
             demand: Demand::default(),
             parts: Vec::new(),
@@ -128,6 +136,8 @@ pub struct Work {
     pub refraction: u64,
     /// Rays sent to lights.
     pub shadow: u64,
+    /// Rays of paths.
+    pub indirect: u64,
     /// Nodes met.
     pub node_visits: u64,
     /// Triangles tested.
@@ -148,6 +158,7 @@ impl Work {
         self.reflection += sum(counts.reflection);
         self.refraction += sum(counts.refraction);
         self.shadow += sum(counts.shadow);
+        self.indirect += sum(counts.indirect);
         self.node_visits += sum(counts.node_visits);
         self.triangle_tests += sum(counts.triangle_tests);
         self.stray_interfaces += sum(counts.stray_interfaces);
@@ -179,6 +190,7 @@ pub struct Renderer {
     /// The mean of the samples, where there is more than one.
     film: Option<Image>,
     parts: Vec<PartOnDevice>,
+    paths: Option<PathsOnDevice>,
     display: Display,
     camera: Buffer,
 }
@@ -237,6 +249,9 @@ impl Renderer {
             demand: settings.demand,
         };
         let mut plan = Plan::new(&scene, &facts, surroundings, &settings.knobs);
+        if let Some(paths) = &mut plan.paths {
+            paths.at_once = settings.paths_at_once;
+        }
         plan.check(&Ability {
             device: device.info().name.clone(),
             adds_in_subgroups: device.adds_in_subgroups(),
@@ -254,7 +269,12 @@ impl Renderer {
         let solids = facts.solids;
         let refracts = plan.screen.refraction || plan.rays.is_some_and(|rays| rays.refraction);
         let mut warnings = if refracts { solids.warnings.clone() } else { Vec::new() };
-        let rays = RaysOnDevice::new(device, &plan, &scene, &solids, settings.traversal)?;
+        // Directional ones first: loops over lights count on it, and so does the table of what paths draw light from.
+        scene.lights.sort_by_key(|light| !matches!(light.kind, LightKind::Directional { .. }));
+        let emitters = plan.paths.map_or_else(Emitters::default, |paths| {
+            Emitters::of(&scene, environment.map(|map| (map, settings.environment_intensity)), paths.emitting)
+        });
+        let rays = RaysOnDevice::new(device, &plan, &scene, &solids, &emitters, settings.traversal)?;
         warnings.extend(rays.warnings.iter().cloned());
         if let Some(bvh) = rays.facts.filter(|_| plan.rays.is_some_and(|rays| rays.refraction)) {
             plan.found_touching(bvh.touching);
@@ -267,6 +287,10 @@ impl Renderer {
         let turn = Turn { intensity: settings.environment_intensity, rotation: settings.environment_rotation };
         let name = scene.name.clone();
         let scene = SceneOnDevice::new(device, scene, &plan, &settings.knobs, &solids, rays.anchor())?;
+        let paths = plan
+            .paths
+            .map(|paths| PathsOnDevice::new(device, paths, &plan, rays.constants.touching, size))
+            .transpose()?;
         let target = |name| {
             let usage = vk::ImageUsageFlags::STORAGE;
             Image::new(device, name, ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], usage))
@@ -285,6 +309,7 @@ impl Renderer {
             screen: OnScreen::new(device, &plan, size)?,
             film: if plan.samples > 1 { Some(target("film")?) } else { None },
             parts,
+            paths,
             display: Display::new(device, size)?,
             camera: Buffer::new(device, "camera", size_of::<share::Camera>() as u64, Place::Upload)?,
             device: device.clone(),
@@ -352,7 +377,7 @@ impl Renderer {
     /// Where the next sample is seen from.
     fn look(&mut self, view: &View, index: u32, count: u32) {
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(index, count))));
-        self.rays.look_from(view, index, count);
+        self.rays.look_from(view, index, count, self.settings.seed);
     }
 
     /// One sample of every pixel: the frame, pass by pass.
@@ -389,6 +414,11 @@ impl Renderer {
         let mut frame = Frame::new(device);
         if plan.rays.is_some() {
             rays.reset(&mut frame);
+        }
+        if let Some(with) = &self.paths {
+            paths(&mut frame, lighting, with, radiance)?;
+            frame.read_back(&rays.counts);
+            return Ok(frame);
         }
         gbuffer(&mut frame, scene, camera, g, lod_bias, scene.draws(false, rays.inside()))?;
         if plan.tiles {
@@ -605,7 +635,7 @@ impl Renderer {
 /// Lights of both kinds that do not shine: loops over lights then have a turn to take.
 fn add_dark_lights(scene: &mut Scene) {
     let bounds = scene.bounds().unwrap_or(Bounds { min: DVec3::ZERO, max: DVec3::ONE });
-    let dark = |kind| Light { name: "dark".to_owned(), color: [0.0; 3], kind };
+    let dark = |kind| Light { name: "dark".to_owned(), color: [0.0; 3], kind, stand_in: false };
     let point = LightKind::Point { position: bounds.max, range: Some(2.0 * bounds.radius()) };
     scene.lights.extend([dark(LightKind::Directional { direction: DVec3::NEG_Y }), dark(point)]);
 }

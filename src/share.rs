@@ -112,7 +112,7 @@ pub struct TraceTerms {
     pub grid_middle: [f32; 3],
     pub nodes: u32,
     pub grid_unit: [f32; 3],
-    pub samples: u32,
+    pub seed: u32,
     pub camera_media: [u32; 4],
     pub pixel_angle: f32,
     pub lod_bias: f32,
@@ -133,4 +133,9 @@ pub struct WorkCounts {
     pub lights_cut_off: [u32; 2],
     pub lost: [u32; 2],
     pub most_lost: u32,
+    pub indirect: [u32; 2],
+    pub not_finite: u32,
+    pub not_finite_event: u32,
+    pub not_finite_pixel: u32,
+    pub not_finite_material: u32,
 }

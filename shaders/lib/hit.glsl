@@ -15,12 +15,13 @@ const bool HIT_SECOND_UVS = (HIT_TEXTURES & (1u << 12)) != 0;
 const bool HIT_TANGENTS = (HIT_TEXTURES & (1u << SLOT_NORMAL | 1u << SLOT_CLEARCOAT_NORMAL)) != 0;
 
 // What lies at the corners of the triangles, in world axes, in the order of the leaves. Three texels per triangle:
-//   normal of a, material | SHEET_TRIANGLE   normal of b, world length of a metre of the object   normal of c, texture
+//   normal of a, material | ..._TRIANGLE   normal of b, world length of a metre of the object   normal of c, texture
 //   coordinates per metre
 // then, where HIT_TEXTURES says so, two of the first texture coordinates, two of the second, three of tangents with
 // their handedness, and two of colours as halves.
 layout(set = 0, binding = 34, rgba32ui) readonly uniform uimageBuffer hit_corners;
 const uint SHEET_TRIANGLE = 0x10000u;
+const uint ONE_SIDED_TRIANGLE = 0x20000u;
 const int UV0_AT = 3;
 const int UV1_AT = UV0_AT + (HIT_UVS ? 2 : 0);
 const int TANGENTS_AT = UV1_AT + (HIT_SECOND_UVS ? 2 : 0);
@@ -124,7 +125,7 @@ vec4 corner_texel(uint triangle, int i) {
     return uintBitsToFloat(imageLoad(hit_corners, int(triangle) * CORNER_TEXELS + i));
 }
 
-// Its material | SHEET_TRIANGLE.
+// Its material | ..._TRIANGLE.
 uint hit_material(uint triangle) {
     return floatBitsToUint(corner_texel(triangle, 0).w);
 }

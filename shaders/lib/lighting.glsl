@@ -2,25 +2,21 @@
 #ifndef LIGHTING_GLSL
 #define LIGHTING_GLSL
 #include "lib/encode.glsl"
-#include "lib/light.glsl"
+#include "lib/environment.glsl"
+#include "lib/punctual.glsl"
+#include "lib/reflectance.glsl"
 #include "lib/shadow.glsl"
 #include "lib/snell.glsl"
 #include "lib/surface.glsl"
-#include "share/environment.glsl"
 
-layout(constant_id = 13) const uint DIRECTIONAL_LIGHTS = 0; // lights [0, this) of the table
 layout(constant_id = 14) const uint LOCAL_LIGHTS = 0;       // point and spot lights after them; 0 where tiles list them
 layout(constant_id = 15) const uint TILE_WORDS = 0;         // words of a tile's bit mask; 0 without lists
 layout(constant_id = 16) const bool AMBIENT = false;        // irradiance of the environment on diffuse surfaces
 layout(constant_id = 17) const bool REFLECTION = false;     // the prefiltered environment in specular ones
 const uint TILE = 16;                                       // pixels a side
 
-// Four texels per light: position (or direction to it), unused | colour, 1 / range² | axis, spot scale | spot offset.
-layout(set = 0, binding = 20, rgba32f) readonly uniform imageBuffer lights;
 layout(set = 0, binding = 21, r32ui) readonly uniform uimageBuffer tile_lights;
-layout(scalar, set = 0, binding = 22) uniform Environment { EnvironmentTerms environment; };
 layout(set = 0, binding = 23) uniform sampler2D prefiltered;
-layout(set = 0, binding = 24) uniform sampler2D reflectance;
 
 // Reflected radiance over irradiance below which a light with a shadow is not looked for, and not shown either: the far
 // ends of lobes on polished surfaces, a ten-thousandth of what a grey one reflects.
@@ -28,26 +24,17 @@ const float FAINTEST_LOBE = 1.0 / 131072.0;
 
 // Light `index` of the table on a surface, as far as it is visible from there.
 vec3 light_on(Surface s, uint index) {
-    vec4 place = imageLoad(lights, int(index * 4));
-    vec4 color = imageLoad(lights, int(index * 4 + 1));
-    vec4 axis = imageLoad(lights, int(index * 4 + 2));
-    float spot_offset = imageLoad(lights, int(index * 4 + 3)).x;
-    bool directional = index < DIRECTIONAL_LIGHTS;
-    vec3 to_light = directional ? place.xyz : place.xyz - s.p_rel;
-    float r2 = dot(to_light, to_light);
-    vec3 l = directional ? place.xyz : to_light * inversesqrt(max(r2, 1e-30));
-    float falloff = point_falloff(r2, color.w) * spot_share(-dot(axis.xyz, l), axis.w, spot_offset);
-    vec3 arriving = color.rgb * (directional ? 1.0 : falloff);
-    vec3 result = reflected(s, l) * arriving;
+    PunctualLight light = punctual_light_at(index, s.p_rel);
+    vec3 result = reflected(s, light.l) * light.arriving;
     if (SHADOWS != 0) {
-        result *= terminator(s.n, s.n_triangle, l);
-        bool wanted = largest(result) > FAINTEST_LOBE * largest(arriving);
+        result *= terminator(s.n, s.n_triangle, light.l);
+        bool wanted = largest(result) > FAINTEST_LOBE * largest(light.arriving);
         if (SHADOWS == SHADOW_MAP) {
-            float share = map_visibility(s.p_bvh, s.n_triangle, to_light, index, largest_component(s.p_rel));
+            float share = map_visibility(s.p_bvh, s.n_triangle, light.to_light, index, largest_component(s.p_rel));
             return wanted ? result * share : vec3(0.0);
         }
-        result *= visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, directional ? l : to_light,
-                             directional ? LARGEST : 1.0, wanted);
+        result *= visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, light.to_light,
+                             light.directional ? LARGEST : 1.0, wanted);
     }
     return result;
 }
@@ -62,7 +49,6 @@ struct LightRange {
 
 // Loop heads after which no further light is begun.
 layout(constant_id = 27) const uint LIGHT_BUDGET = 0xffffffffu;
-uint lights_cut_off = 0; // surfaces whose lights were not all gone through for that
 
 vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across, LightRange range) {
     vec3 sum = vec3(0.0);
@@ -95,10 +81,6 @@ vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across, LightRange range)
     return sum;
 }
 
-vec3 into_environment(vec3 d) {
-    return turned(d, environment.cos_rotation, environment.sin_rotation);
-}
-
 // Level of the prefiltered map whose texels are 1/16 of the lobe: α = 16 / width (pass/prefilter.comp).
 float prefiltered_level(float alpha) {
     float first = environment.width * alpha * 0.0625;
@@ -119,17 +101,6 @@ vec3 environment_irradiance(vec3 n) {
     e += environment.irradiance[6] * (0.315392 * (3.0 * d.z * d.z - 1.0));
     e += environment.irradiance[8] * (0.546274 * (d.x * d.x - d.y * d.y));
     return max(e, 0.0) * environment.intensity;
-}
-
-// F0 and F90 factors of the directional reflectance of a lobe: the table's first and last texels are 0 and 1.
-vec2 reflectance_of_lobe(float cos_v, float roughness) {
-    vec2 side = vec2(textureSize(reflectance, 0));
-    return textureLod(reflectance, (vec2(clamp(cos_v, 0.0, 1.0), roughness) * (side - 1.0) + 0.5) / side, 0.0).rg;
-}
-
-// The same of a surface's base.
-vec2 lobe_reflectance(Surface s) {
-    return reflectance_of_lobe(dot(s.n, s.v), s.roughness);
 }
 
 // Directional reflectance of the lobe: what the base sends to the eye of the light in the mirror direction (split sum,
@@ -161,14 +132,6 @@ vec3 environment_light(Surface s) {
         if (REFLECTION && !s.coat_traced) result += mirrored_by_coat(s) * prefiltered_radiance(coat_r, s.clearcoat_alpha);
     }
     return result * s.occlusion;
-}
-
-// Makes up for what single scattering loses, where the knob `brdf` says so.
-void compensate(inout Surface s) {
-    if (BRDF == 3) {
-        vec2 ab = lobe_reflectance(s);
-        s.compensation = ggx_compensation(s.f0, ab.x + ab.y);
-    }
 }
 
 // Light from `range`, and with `all_around` what does not come from lights as well; of a surface that is compensated.

@@ -19,24 +19,41 @@ float unit_float(uint word) {
     return float(word >> 8) * (1.0 / 16777216.0);
 }
 
-// Second dimension of Sobol's sequence: Pascal's triangle mod 2, row by row. `index` below 2^10.
-uint sobol_second(uint index) {
-    uint result = 0;
-    uint direction = 0x80000000u;
-    for (uint i = 0; i < 10; i++) {
-        result ^= (index >> i & 1u) != 0 ? direction : 0u;
-        direction ^= direction >> 1;
-    }
-    return result;
+// Owen's scrambling in base 2, of a word whose first digit is the last bit: each bit is flipped or not by a hash of those
+// after it (Laine and Karras, EGSR 2011, with the constants of Vegdahl, "Building a better LK hash", 2021).
+uint scrambled_backwards(uint x, uint seed) {
+    x ^= x * 0x3d20adeau;
+    x += seed;
+    x *= (seed >> 16) | 1u;
+    x ^= x * 0x05526c56u;
+    x ^= x * 0x53a22864u;
+    return x;
 }
 
-// A point in the unit square for one event of one sample of a pixel: of `samples` of them, a power of two, each
-// elementary interval gets its share ((0, 2)-sequence, scrambled by exclusive or). Each event has its own order.
-vec2 random_point(uvec2 pixel, uint event, uint index, uint samples) {
-    uint seed = hash(uvec3(pixel.x | pixel.y << 16, event, 0x68bc21ebu));
-    uint place = index ^ (seed & (samples - 1));
-    uint x = bitfieldReverse(place) ^ pcg(seed);
-    uint y = sobol_second(place) ^ pcg(seed ^ 0x9e3779b9u);
-    return vec2(unit_float(x), unit_float(y));
+// Second dimension of Sobol's sequence, its first digit in the last bit: digit j is the sum mod 2 of C(i, j) times digit i
+// of the index. C(i, j) is odd where the bits of j are among those of i (Lucas), so five sums over one bit each do.
+uint sobol_second_backwards(uint index) {
+    index ^= index >> 1 & 0x55555555u;
+    index ^= index >> 2 & 0x33333333u;
+    index ^= index >> 4 & 0x0f0f0f0fu;
+    index ^= index >> 8 & 0x00ff00ffu;
+    index ^= index >> 16 & 0x0000ffffu;
+    return index;
+}
+
+// A point in the unit square, as words, for one event of one sample of a pixel: the (0, 2)-sequence of Sobol, of which any 2^k
+// samples from a multiple of 2^k on have their share in each elementary interval, in an order and with a scrambling of their
+// own for each pixel, event and seed (Burley, JCGT 9(4) 2020).
+uvec2 random_words(uvec2 pixel, uint event, uint seed, uint index) {
+    uint key = hash(uvec3(pixel.x | pixel.y << 16, event, seed ^ 0x68bc21ebu));
+    uint place = bitfieldReverse(scrambled_backwards(bitfieldReverse(index), key));
+    uint x = scrambled_backwards(place, pcg(key));
+    uint y = scrambled_backwards(sobol_second_backwards(place), pcg(key ^ 0x9e3779b9u));
+    return uvec2(bitfieldReverse(x), bitfieldReverse(y));
+}
+
+vec2 random_point(uvec2 pixel, uint event, uint seed, uint index) {
+    uvec2 words = random_words(pixel, event, seed, index);
+    return vec2(unit_float(words.x), unit_float(words.y));
 }
 #endif

@@ -22,6 +22,7 @@ layout(set = 0, binding = 37, rgba32f) readonly uniform imageBuffer shadow_faces
 const float SHADOW_ROUNDINGS = 32.0 / 16777216.0;
 
 uint shadow_rays = 0;
+uint lights_cut_off = 0; // surfaces whose lights were not all gone through, for want of steps
 
 // Reflectance of the boundary between two media for light that does not bend: by the angle in the thinner one, so that
 // there is no total reflection on a straight line. Equal indices reflect nothing, Schlick's curve or not.

@@ -14,7 +14,8 @@ const uint STACK = 2;
 layout(constant_id = 41) const bool OCTANTS = false;
 
 layout(set = 0, binding = 30, rgba32ui) readonly uniform uimageBuffer bvh_nodes;
-// Three texels per triangle: corner, and: class | flat face that it is part of | nothing.
+// Three texels per triangle: corner, and: class | flat face that it is part of | probability per area with which paths draw
+// it as a light (lib/emitters.glsl).
 layout(set = 0, binding = 31, rgba32ui) readonly uniform uimageBuffer bvh_triangles;
 layout(scalar, set = 0, binding = 32) uniform TraceBlock { TraceTerms trace_terms; };
 
@@ -346,15 +347,24 @@ bool trace_to_light(vec3 origin, vec3 direction, uint self, Hit after, float t_m
     return walk(r, direction, t_max, OPAQUE | FILTER, TO_LIGHT, filters).triangle != NO_TRIANGLE;
 }
 
+// One of two rays: nothing up to `after` is met.
+struct PairedRay {
+    vec3 origin;
+    vec3 direction;
+    uint self;
+    float after;
+    float t_max;
+};
+
 // Two rays at once.
-HitPair trace_pair(vec3 oa, vec3 da, uint self_a, float ta, vec3 ob, vec3 db, uint self_b, float tb, uint classes,
-                   bool any_hit) {
-    TriangleRay ra = TriangleRay(oa, ray_shear(da), 0.0, NO_TRIANGLE, self_a);
-    TriangleRay rb = TriangleRay(ob, ray_shear(db), 0.0, NO_TRIANGLE, self_b);
+HitPair trace_pair(PairedRay a, PairedRay b, uint classes, bool any_hit) {
+    TriangleRay ra = TriangleRay(a.origin, ray_shear(a.direction), a.after, NO_TRIANGLE, a.self);
+    TriangleRay rb = TriangleRay(b.origin, ray_shear(b.direction), b.after, NO_TRIANGLE, b.self);
     uint purpose = any_hit ? ANY : NEAREST;
-    if (TRAVERSAL != STACK) return walk_links_twice(ra, da, ta, rb, db, tb, classes, purpose);
+    if (TRAVERSAL != STACK) return walk_links_twice(ra, a.direction, a.t_max, rb, b.direction, b.t_max, classes, purpose);
     Filters none;
-    return HitPair(walk_stack(ra, da, ta, classes, purpose, none), walk_stack(rb, db, tb, classes, purpose, none));
+    return HitPair(walk_stack(ra, a.direction, a.t_max, classes, purpose, none),
+                   walk_stack(rb, b.direction, b.t_max, classes, purpose, none));
 }
 
 // To begin with: t > 0.

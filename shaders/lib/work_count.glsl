@@ -23,4 +23,9 @@ void count_rays(uint reflection, uint refraction, float lost) {
     uint most = subgroupMax(floatBitsToUint(lost));
     if (subgroupElect() && most > 0) atomicMax(counts.most_lost, most);
 }
+
+void count_paths(uint rays, float lost) {
+    ADD_WORK(indirect, rays)
+    count_rays(0, 0, lost);
+}
 #endif

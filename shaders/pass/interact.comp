@@ -11,6 +11,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
 layout(scalar, set = 0, binding = 2) readonly buffer Instances { Instance instances[]; };
+#include "lib/boundary.glsl"
 #include "lib/encode.glsl"
 #include "lib/lighting.glsl"
 #include "lib/primary.glsl"
@@ -23,13 +24,11 @@ layout(scalar, set = 0, binding = 11) readonly buffer RayTiles { uint ray_tiles[
 layout(scalar, set = 0, binding = 12) readonly buffer Sizes { WorkSize rays_size; } work;
 layout(set = 0, binding = 25) uniform sampler2D sky;
 
-layout(constant_id = 50) const bool TRANSMISSIVE = false; // some material lets light through
 layout(constant_id = 51) const bool ROUGH = false;      // some surface that sends rays is rough
 layout(constant_id = 52) const bool SKY = false;        // the environment is seen behind the scene
 layout(constant_id = 53) const bool MASKED_HITS = false; // some surface has holes
 layout(constant_id = 54) const uint LOOP_BUDGET = 40000;
 layout(constant_id = 55) const uint PENDING = 1;         // branches that can wait at once
-layout(constant_id = 56) const bool TOUCHING = false;    // some transparent body lies against another surface
 layout(constant_id = 57) const bool ENVIRONMENT = false; // there is one, for rays that leave the scene
 // Of all that is followed, what is added: 0 all, 1 what the first surface mirrored, 2 what it let through. Nothing is left
 // out for that: which ray is followed next, and which random numbers it has, depends on all that were before.
@@ -139,68 +138,6 @@ Branch next_branch() {
     return next;
 }
 
-// What a surface separates, for a ray that comes through `media`.
-struct Boundary {
-    bool sheet;  // transmits light and encloses nothing
-    bool solid;  // the surface of a transparent body
-    bool hidden; // a body of higher priority displaces it: nothing changes here
-    bool stray;  // left without having been entered: the shell is open, or another one crosses it
-    bool against; // something opaque lies against it: it is met next, as if it were in the medium before
-    float opaque_at; // where, along the ray from before the boundary
-    uint here;   // the medium before
-    uint there;  // and behind
-    uvec4 beyond; // all media behind
-};
-
-// Where bodies touch there is one boundary, from the one to the other, and where something opaque lies against a body there
-// is none: what is within the offset behind a surface is crossed with it, since a ray that goes on starts behind it. Looked
-// for along the ray from before the surface: as deep as the offset behind it down to a cosine of 1/16, less deep beyond.
-void cross_what_touches(inout Boundary r, HitSurface hit, vec3 direction) {
-    vec3 origin = ray_origin(hit.s.p_bvh, hit.n, vec3(0.0));
-    float cos_v = max(-dot(hit.n, direction), 1e-6);
-    float end = trace_terms.offset / cos_v + trace_terms.offset / max(cos_v, 1.0 / 16.0);
-    Hit last = FROM_ORIGIN;
-    bool goes_on = r.solid;
-    do {
-        loop_heads++;
-        last = trace(origin, direction, hit.s.face, last, goes_on ? end : -1.0, OPAQUE | FILTER, false);
-        goes_on = goes_on && last.triangle != NO_TRIANGLE;
-        if (goes_on) {
-            uint material = hit_material(last.triangle);
-            Material m = material_at(material & 0xffffu);
-            if (hit_class(last.triangle) == OPAQUE) {
-                r.against = true;
-                // A few roundings before it: what is crossed lies there or before.
-                r.opaque_at = intBitsToFloat(floatBitsToInt(last.t) - 4);
-                goes_on = false;
-            } else if (m.transmission > 0.0 && (material & SHEET_TRIANGLE) == 0) {
-                bool front = dot(hit_normal(last.triangle), direction) <= 0.0;
-                r.beyond = front ? entered(r.beyond, m.medium) : left(r.beyond, m.medium);
-            }
-        }
-    } while (goes_on);
-}
-
-// `direction` is the ray's.
-Boundary boundary_at(HitSurface hit, uvec4 media, vec3 direction) {
-    Boundary r;
-    Material m = material_at(hit.material);
-    uint medium = m.medium;
-    bool transmissive = TRANSMISSIVE && m.transmission > 0.0;
-    r.sheet = transmissive && hit.sheet;
-    r.solid = transmissive && !r.sheet;
-    r.beyond = hit.front ? entered(media, medium) : left(media, medium);
-    r.stray = r.solid && !hit.front && !inside(media, medium);
-    r.here = r.stray ? medium : present_medium(media);
-    r.against = false;
-    r.opaque_at = 0.0;
-    if (TOUCHING) cross_what_touches(r, hit, direction);
-    if (r.against) r.beyond = media;
-    r.there = r.against ? r.here : present_medium(r.beyond);
-    r.hidden = r.solid && r.here == r.there;
-    return r;
-}
-
 // Whether a ray is sent to see what the base of a surface mirrors: inside a body there is no environment.
 bool mirrored_by_ray(HitSurface hit, Boundary boundary) {
     return hit.s.base_traced || (boundary.solid && boundary.here != 0);
@@ -250,7 +187,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
         bool rough = ROUGH && s.clearcoat_roughness > MIN_ROUGHNESS;
         vec3 h = s.n_coat;
         if (ROUGH) {
-            vec2 u = random_point(pixel, event | COAT_EVENT, trace_terms.sample_index, trace_terms.samples);
+            vec2 u = random_point(pixel, event | COAT_EVENT, trace_terms.seed, trace_terms.sample_index);
             h = rough ? half_vector(s.n_coat, s.v, s.clearcoat_alpha, u) : h;
         }
         vec3 r = reflect_ray(direction, h).R;
@@ -270,17 +207,13 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     bool rough = ROUGH && s.roughness > MIN_ROUGHNESS && !(boundary.solid && n1 == n2);
     vec3 h = s.n;
     if (ROUGH) {
-        vec2 u = random_point(pixel, event, trace_terms.sample_index, trace_terms.samples);
+        vec2 u = random_point(pixel, event, trace_terms.seed, trace_terms.sample_index);
         h = rough ? half_vector(s.n, s.v, s.alpha, u) : h;
     }
     float cos_h = clamp(dot(h, s.v), 0.0, 1.0);
     float cos_v = dot(s.n, s.v);
-    // What tints the reflectance of the surface in air (KHR_materials_specular) tints that between two media.
-    float share = boundary_share(cos_h, n1, n2);
-    float in_air = nested_f0(1.0, s.ior);
-    vec3 f0 = boundary.solid ? s.f0_dielectric * (in_air > 0.0 ? nested_f0(n1, n2) / in_air : 0.0) : s.f0_dielectric;
-    bool total = boundary.solid && share >= 1.0;
-    vec3 f_dielectric = total ? vec3(1.0) : f0 + (vec3(s.f90_dielectric) - f0) * share;
+    bool total;
+    vec3 f_dielectric = reflectance_between(s, boundary.solid, n1, n2, cos_h, total);
     vec3 f = mix(f_dielectric, fresnel_of_metal(s, cos_h), s.metallic);
 
     // The mirror image.
@@ -297,7 +230,6 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
 
     // What goes through.
     if (TRANSMISSIVE) {
-        Material m = material_at(hit.material);
         Refraction t = refract_ray(direction, h, n2 / n1);
         // Equal indices bend nothing, not even by a rounding.
         vec3 bent_ray = n1 == n2 ? direction : t.T;
@@ -308,11 +240,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
         bool passes = dot(next.direction, hit.n) < 0.0 && !(boundary.solid && (total || t.tir));
         masking = rough ? unmasked(cos_v, dot(next.direction, s.n), s.alpha) : 1.0;
         if (rough && boundary.sheet) masking = cos_r > 0.0 ? masking : 0.0;
-        vec3 tint = boundary.sheet ? s.base : sqrt(s.base);
-        if (ABSORPTION != 0) {
-            bool nominal = boundary.sheet || (ABSORPTION == 1 && hit.front);
-            tint *= nominal ? exp(-m.sigma_thickness * hit.thickness) : vec3(1.0);
-        }
+        vec3 tint = tint_through(hit, boundary.sheet);
         next.origin = ray_origin(s.p_bvh, -hit.n, vec3(0.0));
         next.media = boundary.solid ? boundary.beyond : ray.media;
         next.events = count | BY_REFRACTION << 8 | only_through;

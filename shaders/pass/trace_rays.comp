@@ -45,8 +45,8 @@ void main() {
         uint b = a + 8;
         RayRead ra = read_ray(a);
         RayRead rb = read_ray(b);
-        HitPair hit = trace_pair(ra.origin, ra.direction, ra.self, ra.t_max, rb.origin, rb.direction, rb.self, rb.t_max,
-                                 OPAQUE | FILTER, ANY_HIT);
+        HitPair hit = trace_pair(PairedRay(ra.origin, ra.direction, ra.self, 0.0, ra.t_max),
+                                 PairedRay(rb.origin, rb.direction, rb.self, 0.0, rb.t_max), OPAQUE | FILTER, ANY_HIT);
         if (a < count) hits[a] = hit.a;
         if (b < count) hits[b] = hit.b;
     } else {

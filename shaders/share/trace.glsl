@@ -7,7 +7,7 @@ struct TraceTerms {
     vec3 grid_middle;     // of the boxes of 16-bit nodes: their coordinates count grid_unit from here
     uint nodes;           // in one list, which is also the place of its sentinel
     vec3 grid_unit;
-    uint samples;         // of a pixel, a power of four
+    uint seed;            // of random numbers
     uvec4 camera_media;   // the media the eye is in (lib/media.glsl)
     float pixel_angle;    // what a pixel covers at distance 1, or everywhere where the camera is orthographic
     float lod_bias;

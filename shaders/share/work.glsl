@@ -9,4 +9,9 @@ struct WorkCounts {
     uint lights_cut_off[2];   // surfaces at which the loop over lights was left before its end
     uint lost[2];             // throughput that was not followed, in steps of 2^-16, summed over pixels
     uint most_lost;           // the largest of a pixel, as the bits of a float
+    uint indirect[2];         // rays of paths
+    uint not_finite;          // estimates of paths that were no numbers, and left out
+    uint not_finite_event;    // where the first of them was met: the surface of its path, counted from 1
+    uint not_finite_pixel;    // x | y << 16
+    uint not_finite_material;
 };

@@ -99,6 +99,9 @@ pub struct PictureOptions {
     /// scene calls for, with a table of what each other effect would have cost here
     #[arg(long, value_enum, value_name = "scene|full|explain-cost", default_value_t = Extent::Scene)]
     pub plan: Extent,
+    /// Chooses the random numbers: another one, another noise
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u32,
     /// Exposure in stops, display outputs only
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_hyphen_values = true)]
     pub exposure: f32,
@@ -237,9 +240,6 @@ impl PictureOptions {
     /// # Errors
     /// One sentence for a model, knob or rung that does not exist or is not built yet.
     pub fn knobs(&self) -> Result<Knobs> {
-        if self.model == Model::Global {
-            bail!("--model global: only the local and the recursive model are built so far");
-        }
         let mut knobs = Knobs::of(self.model);
         knobs.set_all(&self.set)?;
         Ok(knobs)
@@ -278,6 +278,8 @@ impl PictureOptions {
             background: scene.background.unwrap_or_default(),
             environment_intensity: scene.env_intensity,
             environment_rotation: scene.env_rotation,
+            seed: self.seed,
+            paths_at_once: false,
             traversal: None,
             demand: self.plan.demand(),
             parts: Vec::new(),

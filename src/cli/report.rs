@@ -228,7 +228,7 @@ impl From<&Work> for WorkFacts {
             ("reflection", work.reflection),
             ("refraction", work.refraction),
             ("shadow", work.shadow),
-            ("indirect", 0),
+            ("indirect", work.indirect),
         ];
         Self {
             rays: rays.into_iter().collect(),

@@ -16,8 +16,6 @@ pub struct UnbuiltOptions {
     fps: Option<String>,
     #[arg(long, hide = true, value_name = "I/N")]
     shard: Option<String>,
-    #[arg(long, hide = true, value_name = "N")]
-    seed: Option<String>,
 }
 
 impl UnbuiltOptions {
@@ -32,7 +30,6 @@ impl UnbuiltOptions {
             ("--frames", &self.frames),
             ("--fps", &self.fps),
             ("--shard", &self.shard),
-            ("--seed", &self.seed),
         ];
         for (name, value) in all {
             if let Some(value) = value {

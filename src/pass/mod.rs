@@ -15,6 +15,7 @@ pub mod light;
 pub mod lighting;
 pub mod mirror;
 pub mod part;
+pub mod path;
 pub mod rays;
 pub mod rows;
 pub mod scene;

@@ -9,6 +9,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::path::EmittersOnDevice;
 use super::scene::{cofactors as cofactors_of, medium, texture_slots};
 use super::upload::upload;
 use super::view::View;
@@ -17,7 +18,8 @@ use crate::plan::{Plan, Rays};
 use crate::scene::bvh::{Bvh, Format, Order, Triangle};
 use crate::scene::contact::{bodies_touch, twins};
 use crate::scene::solid::{Solids, media_at};
-use crate::scene::{Material, Mesh, Scene};
+use crate::scene::emitters::{Emitters, Source};
+use crate::scene::{AlphaMode, Mesh, Scene};
 use crate::share::{TraceTerms, WorkCounts};
 
 /// Rays start this many roundings of the largest coordinate off their surface (shaders/lib/trace.glsl, `ray_origin`).
@@ -101,6 +103,8 @@ pub struct RaysOnDevice {
     pub faces: Vec<u32>,
     /// The place among the leaves of each triangle of the scene, in the order of instances.
     pub leaf_places: Buffer,
+    /// What paths draw light from, and how.
+    pub emitters: EmittersOnDevice,
     /// [`TraceTerms`].
     pub terms: Buffer,
     /// [`WorkCounts`].
@@ -128,6 +132,7 @@ impl RaysOnDevice {
         plan: &Plan,
         scene: &Scene,
         solids: &Solids,
+        emitters: &Emitters,
         traversal: Option<Traversal>,
     ) -> Result<Self> {
         let Some(rays) = plan.rays else { return Self::none(device, scene) };
@@ -140,9 +145,8 @@ impl RaysOnDevice {
         let traversal = traversal.unwrap_or(default);
         let ordered = 8 * bvh.nodes.len() * if traversal == Traversal::Links32 { 32 } else { 16 };
         let octants = traversal != Traversal::Stack && ordered <= MOST_ORDERED_BYTES;
-        let filter: Vec<bool> = scene.meshes.iter().map(|mesh| is_filter(&scene.materials[mesh.material])).collect();
-        let filters: Vec<bool> =
-            bvh.triangles.iter().map(|t| filter[scene.instances[t.instance as usize].mesh]).collect();
+        let filter: Vec<bool> = (0..scene.instances.len()).map(|i| is_filter(scene, solids, plan, i)).collect();
+        let filters: Vec<bool> = bvh.triangles.iter().map(|t| filter[t.instance as usize]).collect();
         let (nodes, sentinel) = match traversal {
             Traversal::Stack => (bvh.stack_nodes(), 0),
             Traversal::Links16 | Traversal::Links32 => {
@@ -162,7 +166,13 @@ impl RaysOnDevice {
                 first_triangle[t.instance as usize] + local[t.primitive as usize]
             })
             .collect();
-        let corners = Corners::of(scene, solids, rays);
+        let corners = Corners::of(scene, solids, rays, plan.paths.is_some());
+        let mut picked = vec![0_u32; scene.triangles()];
+        for emitter in &emitters.list {
+            if let Source::Triangle { index, area, .. } = emitter.source {
+                picked[index as usize] = ((emitter.probability / area) as f32).to_bits();
+            }
+        }
         let triangles: Vec<[[u32; 4]; 3]> = bvh
             .triangles
             .par_iter()
@@ -170,7 +180,8 @@ impl RaysOnDevice {
             .map(|(t, (&is_filter, &face))| {
                 let [a, b, c] = corners.order(t).map(|i| t.corners[i].map(f32::to_bits));
                 let class = if is_filter { FILTER } else { OPAQUE };
-                [[a[0], a[1], a[2], class], [b[0], b[1], b[2], face], [c[0], c[1], c[2], 0]]
+                let picked = picked[(first_triangle[t.instance as usize] + t.primitive) as usize];
+                [[a[0], a[1], a[2], class], [b[0], b[1], b[2], face], [c[0], c[1], c[2], picked]]
             })
             .collect();
         let mut leaf_places = vec![u32::MAX; scene.triangles()];
@@ -222,6 +233,7 @@ impl RaysOnDevice {
             triangles: triangle_buffer,
             corners: corner_buffer,
             faces,
+            emitters: EmittersOnDevice::new(device, emitters, &leaf_places)?,
             leaf_places: upload(device, "leaf places", &leaf_places, Some(vk::Format::R32_UINT))?,
             fixed,
             anchor: bvh.anchor,
@@ -241,6 +253,7 @@ impl RaysOnDevice {
             corners: nothing(vk::Format::R32G32B32A32_UINT)?,
             faces: Vec::new(),
             leaf_places: nothing(vk::Format::R32_UINT)?,
+            emitters: EmittersOnDevice::new(device, &Emitters::default(), &[])?,
             terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,
             counts: Buffer::new(device, NOTHING, 0, Place::Readback)?,
             constants: TraceConstants::default(),
@@ -257,7 +270,7 @@ impl RaysOnDevice {
     }
 
     /// What rays need to know of one sample of a view.
-    pub fn look_from(&mut self, view: &View, sample_index: u32, samples: u32) {
+    pub fn look_from(&mut self, view: &View, sample_index: u32, samples: u32, seed: u32) {
         let eye = view.eye - self.anchor;
         let mut camera_media = [0; 4];
         if sample_index == 0 {
@@ -270,7 +283,7 @@ impl RaysOnDevice {
         }
         let terms = TraceTerms {
             bvh_from_rel: eye.as_vec3().to_array(),
-            samples,
+            seed,
             sample_index,
             pixel_angle: view.pixel_angle() as f32,
             lod_bias: -0.5 * (samples as f32).log2(),
@@ -314,9 +327,14 @@ impl RaysOnDevice {
     }
 }
 
-/// Whether what lies behind such a surface may be seen through it.
-fn is_filter(material: &Material) -> bool {
-    crate::plan::is_see_through(material, false) || matches!(material.alpha_mode, crate::scene::AlphaMode::Mask(_))
+/// Whether what lies behind an instance's surface may be seen through it: for paths, on a straight line.
+fn is_filter(scene: &Scene, solids: &Solids, plan: &Plan, instance: usize) -> bool {
+    let material = &scene.materials[scene.meshes[scene.instances[instance].mesh].material];
+    let straight = plan.paths.is_none() || solids.sheet[instance] || material.ior == 1.0;
+    match material.alpha_mode {
+        AlphaMode::Opaque => material.transmission > 0.0 && straight,
+        AlphaMode::Mask(_) | AlphaMode::Blend => true,
+    }
 }
 
 /// What is left out, and what is there twice: of that only one is seen, unless bodies touch there.
@@ -380,6 +398,8 @@ struct Corners<'a> {
     solids: &'a Solids,
     /// Transmissive bodies refract; else all of them are sheets.
     refraction: bool,
+    /// The eye passes by the backs of surfaces that have one side only.
+    one_sided: bool,
     /// Cofactors of each instance with the sign that keeps normals outside.
     cofactors: Vec<DMat3>,
     mirrored: Vec<bool>,
@@ -391,7 +411,7 @@ struct Corners<'a> {
 }
 
 impl<'a> Corners<'a> {
-    fn of(scene: &'a Scene, solids: &'a Solids, rays: Rays) -> Self {
+    fn of(scene: &'a Scene, solids: &'a Solids, rays: Rays, one_sided: bool) -> Self {
         let mut contents = if rays.textures { EVERYTHING } else { 0 };
         for instance in &scene.instances {
             let mesh = &scene.meshes[instance.mesh];
@@ -414,7 +434,7 @@ impl<'a> Corners<'a> {
             mirrored.push(turned(solids.flipped[i]));
             scales.push(determinant.abs().cbrt() as f32);
         }
-        Self { scene, solids, refraction: rays.refraction, cofactors, mirrored, normals_mirrored, scales, contents }
+        Self { scene, solids, refraction: rays.refraction, one_sided, cofactors, mirrored, normals_mirrored, scales, contents }
     }
 
     /// The order of a triangle's corners that runs counter-clockwise around its front.
@@ -438,7 +458,9 @@ impl<'a> Corners<'a> {
         let [p, q, r] = t.corners.map(|corner| glam::Vec3::from(corner).as_dvec3());
         let area = (q - p).cross(r - p).length();
         let density = if area > 0.0 { ((b - a).perp_dot(c - a).abs() / area).sqrt() as f32 } else { 0.0 };
-        let words = [mesh.material as u32 | if sheet { SHEET } else { 0 }, self.scales[i].to_bits(), density.to_bits()];
+        let one_sided = self.one_sided && !material.double_sided;
+        let flags = if sheet { SHEET } else { 0 } | if one_sided { ONE_SIDED } else { 0 };
+        let words = [mesh.material as u32 | flags, self.scales[i].to_bits(), density.to_bits()];
         let mut texels = Vec::with_capacity(12);
         for (n, word) in normals.iter().zip(words) {
             texels.push([n[0].to_bits(), n[1].to_bits(), n[2].to_bits(), word]);
@@ -478,6 +500,8 @@ impl<'a> Corners<'a> {
 
 /// Of a triangle's material word: transmits light and encloses nothing.
 const SHEET: u32 = 1 << 16;
+/// And: its back is neither seen by the eye nor emits.
+const ONE_SIDED: u32 = 1 << 17;
 
 /// The geometry of the instances that are transparent bodies, under the same indices; the others have no triangles.
 fn bodies(scene: &Scene, solids: &Solids, rays: Rays) -> Scene {

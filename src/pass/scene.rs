@@ -221,9 +221,7 @@ impl SceneOnDevice {
             });
             page_of_material.push(set);
         }
-        // Directional lights first: the shader runs them in a loop of their own.
-        let mut lights_cpu = std::mem::take(&mut scene.lights);
-        lights_cpu.sort_by_key(|light| !matches!(light.kind, LightKind::Directional { .. }));
+        let lights_cpu = std::mem::take(&mut scene.lights);
 
         let instance_bytes = (scene.instances.len() * size_of::<share::Instance>()) as u64;
         let light_bytes = (lights_cpu.len() * 64) as u64;

@@ -10,6 +10,7 @@ use super::rays::{RaysOnDevice, Traversal};
 use crate::gpu::{Buffer, Device, Frame, Place};
 use crate::plan::{Demand, Facts, Knobs, Plan, Surroundings};
 use crate::scene::Scene;
+use crate::scene::emitters::Emitters;
 use crate::scene::normal_form::NormalForm;
 use crate::shader::trace_rays;
 use crate::share::WorkCounts;
@@ -74,7 +75,7 @@ impl Tracer {
         let facts = Facts::of(scene, NormalForm::default());
         let mut plan = Plan::new(scene, &facts, surroundings, &Knobs::default());
         plan.rays = Some(crate::plan::Rays::default());
-        Ok(Self { device: device.clone(), rays: RaysOnDevice::new(device, &plan, scene, &facts.solids, traversal)? })
+        Ok(Self { device: device.clone(), rays: RaysOnDevice::new(device, &plan, scene, &facts.solids, &Emitters::default(), traversal)? })
     }
 
     /// The hierarchy and its tables.

@@ -84,17 +84,17 @@ pub static KNOBS: &[Knob] = &[
     },
     Knob {
         name: "indirect",
-        rungs: &["off", "ambient"],
-        unbuilt: &["path"],
-        presets: ["ambient", "ambient", "ambient"],
-        about: "diffuse light from all around (R6)",
+        rungs: &["off", "ambient", "path"],
+        unbuilt: &[],
+        presets: ["ambient", "ambient", "path"],
+        about: "light from all around: none, the environment as if nothing stood before it, paths from surface to surface (R6)",
     },
     Knob {
         name: "lights",
-        rungs: &["points"],
+        rungs: &["points", "area:1"],
         unbuilt: &["area"],
-        presets: ["points", "points", "points"],
-        about: "extent of lights (R2)",
+        presets: ["points", "points", "area:1"],
+        about: "extent of lights (R2): with area:N surfaces that emit light others, by N places on them at each surface of a path",
     },
     Knob {
         name: "samples",
@@ -147,7 +147,7 @@ pub enum Model {
     /// Plus rays for shadows, mirrors and what lets light through.
     #[default]
     Recursive,
-    /// Global illumination; not built yet.
+    /// Paths from surface to surface: rough ones, too, light others.
     Global,
 }
 
@@ -202,6 +202,23 @@ impl Knobs {
         let (none, others): (Vec<&String>, Vec<&String>) =
             choices.iter().partition(|choice| choice.as_str() == "interfaces=0");
         others.into_iter().try_for_each(|choice| self.set(choice))?;
+        if self.rung("indirect") == "path" {
+            let other = ["shadows", "reflection", "refraction"].into_iter().find(|knob| self.rung(knob) != "ray");
+            if let Some(knob) = other {
+                bail!(
+                    "--set {knob}={} contradicts indirect=path, whose paths meet every surface by rays; the nearest choice is \
+                     {knob}=ray, or indirect=ambient",
+                    self.rung(knob)
+                );
+            }
+        } else if self.rung("lights") != "points" {
+            bail!(
+                "--set lights={} contradicts indirect={}: surfaces light others along paths; the nearest choice is \
+                 indirect=path, or lights=points",
+                self.rung("lights"),
+                self.rung("indirect")
+            );
+        }
         let sends = ["refraction", "reflection"].into_iter().find(|knob| self.rung(knob) == "ray");
         match (none.first(), sends) {
             (None, _) => Ok(()),
@@ -335,7 +352,7 @@ mod tests {
     fn wrong_choices_say_what_there_is() {
         let mut knobs = Knobs::default();
         for (choice, said) in [
-            ("indirect=path", "not built yet"),
+            ("lights=area:4", "not built yet"),
             ("absorption=march:7", "it has off, thickness, path, march:4, march:8, march:16, march:32, march:64"),
             ("absorption=march", "no rung"),
             ("quadrature=right", "it has left, midpoint, simpson"),

@@ -34,8 +34,11 @@ pub(super) fn left_out(
     say(&|m| varies(m) && !marches && absorption != "off", &instead);
     say(&|m| m.dispersion > 0.0, "has dispersion, which is not built");
     let (lobes, reflection) = (knobs.rung("lobes"), knobs.rung("reflection"));
+    let by_paths = knobs.rung("indirect") == "path";
     if lobes != "0.2" && reflection != "ray" {
         warnings.push(format!("lobes={lobes} changes nothing: reflection={reflection} sends no rays"));
+    } else if lobes != "1" && by_paths {
+        warnings.push(format!("lobes={lobes} changes nothing: indirect=path draws from every lobe"));
     }
     let rule = knobs.rung("quadrature");
     if rule != "midpoint" && !(marches && surfaces.any(varies)) {

@@ -58,6 +58,9 @@ pub struct Plan {
     pub shadow_maps: bool,
     /// Rays, and the hierarchy of the scene's triangles that they go through; `None` where nothing sends any.
     pub rays: Option<Rays>,
+    /// Paths of light, which take the place of all other passes that light surfaces; `None`: light comes straight from lights,
+    /// and by rays from what is smooth.
+    pub paths: Option<Paths>,
     /// What is looked up in the picture itself.
     pub screen: Screen,
     /// Perceptual roughness up to which surfaces are mirrored by rays or on the screen, and not by the prefiltered
@@ -98,6 +101,15 @@ pub struct Rays {
     pub interfaces: u32,
     /// Textures, coordinates and colours are kept for what rays meet, whether or not there are any.
     pub textures: bool,
+}
+
+/// How paths of light go on (knob `indirect`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Paths {
+    /// What emits lights the scene (knob `lights`); else it is only seen.
+    pub emitting: bool,
+    /// All bounces in one dispatch: the same film, for comparison.
+    pub at_once: bool,
 }
 
 /// How segments of paths go through grids of σ.
@@ -172,6 +184,8 @@ struct Planner<'a> {
     knobs: &'a Knobs,
     surroundings: Surroundings,
     decisions: Decisions<'a>,
+    /// Paths take the place of what else lights surfaces.
+    paths: bool,
 }
 
 impl Plan {
@@ -180,13 +194,15 @@ impl Plan {
     pub fn new(scene: &Scene, facts: &Facts, surroundings: Surroundings, knobs: &Knobs) -> Self {
         let surfaces = Surfaces::of(scene, facts);
         let decisions = Decisions { knobs, demand: surroundings.demand, effects: Vec::new() };
-        let mut planner = Planner { scene, facts, surfaces, knobs, surroundings, decisions };
+        let paths = knobs.rung("indirect") == "path";
+        let mut planner = Planner { scene, facts, surfaces, knobs, surroundings, decisions, paths };
         let layers = planner.layers();
         let transmission = planner.transmission();
         let images = planner.mirror_images(&transmission);
-        let lights = planner.lights();
+        let paths = planner.paths();
+        let lights = planner.lights(paths);
         let rays = planner.rays(&transmission, &images, &lights);
-        let shadow_maps = lights.shadows && knobs.rung("shadows") == "map";
+        let shadow_maps = lights.shadows && knobs.rung("shadows") == "map" && paths.is_none();
         let Planner { surfaces, decisions, .. } = planner;
         Self {
             emissive: layers.emissive,
@@ -206,11 +222,12 @@ impl Plan {
             reflectance: images.mirrored
                 || images.ambient
                 || images.screen != Screen::default()
-                || surroundings.demand == Demand::Full
+                || (surroundings.demand == Demand::Full && paths.is_none())
                 || knobs.rung("brdf") == "ggx-multi",
             shadow_maps,
             lights: lights.kept,
             rays,
+            paths,
             screen: images.screen,
             roughest_mirror: images.roughest,
             samples: knobs.samples(),
@@ -311,7 +328,7 @@ impl Planner<'_> {
     }
 
     fn transmission(&mut self) -> Transmission {
-        let Self { facts, surfaces, decisions, knobs, surroundings, .. } = self;
+        let Self { facts, surfaces, decisions, knobs, surroundings, paths, .. } = self;
         let rung = knobs.rung("refraction");
         let cause = surfaces.cause(refracts, |m| surfaces.body(m));
         let cause = if cause.called_for { cause.with("bodies in each other at most", facts.nesting) } else { cause };
@@ -324,7 +341,8 @@ impl Planner<'_> {
                 _ => format!("has transmission {}", m.transmission),
             },
         );
-        let see_through = decisions.decide("see-through surfaces", cause);
+        let cause = if *paths { Cause::against("paths meet them") } else { cause };
+        let see_through = decisions.decide("see-through surfaces", cause) && !*paths;
         let size =
             |m: &Material| m.sigma.as_ref().map_or([0; 3], |grid| grid.size()).map(|n| n.to_string()).join(" x ");
         let cause =
@@ -348,17 +366,19 @@ impl Planner<'_> {
 
     fn mirror_images(&mut self, transmission: &Transmission) -> MirrorImages {
         let Self { surfaces, decisions, knobs, surroundings, .. } = self;
+        let paths = self.paths;
         let there_is = surroundings.environment;
         let cause = Cause::when(there_is, "there is an environment", "there is no environment");
         let environment = decisions.decide("environment", cause);
-        let shown = |called_for: bool, against: &str| match there_is {
-            true => Cause::when(called_for, "there is an environment", against),
-            false => Cause::against("there is no environment"),
+        let shown = |called_for: bool, against: &str| match (there_is, paths) {
+            (true, true) => Cause::against("paths find the environment"),
+            (true, false) => Cause::when(called_for, "there is an environment", against),
+            (false, _) => Cause::against("there is no environment"),
         };
         let rung = knobs.rung("reflection");
         let shiny = surfaces.any(|m| !m.unlit && (mirrors(m) || m.clearcoat > 0.0));
         let cause = shown(shiny, "no material in use mirrors anything");
-        let reflection = decisions.decide_with("mirrored environment", "reflection", rung != "off", cause);
+        let reflection = decisions.decide_with("mirrored environment", "reflection", rung != "off", cause) && !paths;
         let cause = match (reflection, there_is) {
             (false, _) => Cause::against("no environment is mirrored"),
             (_, false) => Cause::against("there is no environment"),
@@ -375,7 +395,8 @@ impl Planner<'_> {
             (false, true) => format!("has a coat of roughness {}", m.clearcoat_roughness),
             (false, false) => "has a roughness texture".to_owned(),
         });
-        let mirrored = decisions.decide_with("mirrors", "reflection", matches!(rung, "screen" | "ray"), cause);
+        let cause = if paths { Cause::against("paths leave every surface") } else { cause };
+        let mirrored = decisions.decide_with("mirrors", "reflection", matches!(rung, "screen" | "ray"), cause) && !paths;
         let by_rays = mirrored && rung == "ray";
         let demanded = surroundings.demand.includes("mirrors");
         let on_screen = |see_through: bool| {
@@ -388,17 +409,19 @@ impl Planner<'_> {
             refraction: transmission.bends && !transmission.by_rays,
         };
         let cause = shown(surfaces.any(scatters), "no material in use scatters light");
-        let ambient = decisions.decide_with("ambient light", "indirect", knobs.rung("indirect") != "off", cause);
+        let ambient = decisions.decide_with("ambient light", "indirect", knobs.rung("indirect") != "off", cause) && !paths;
         let environment = environment || reflection || ambient;
         MirrorImages { environment, mirrored: reflection, prefilter, ambient, roughest, by_rays, screen }
     }
 
-    fn lights(&mut self) -> Lights {
-        let Self { scene, surfaces, decisions, knobs, surroundings, .. } = self;
+    fn lights(&mut self, followed: Option<Paths>) -> Lights {
+        let Self { scene, surfaces, decisions, knobs, surroundings, paths, .. } = self;
         let lit = surfaces.any(|m| !m.unlit);
         let bounds = scene.bounds();
         let reaches = |light: &Light| bounds.is_none_or(|bounds| light.reaches(&bounds));
-        let useful = |light: &Light| light.shines() && reaches(light);
+        // The surfaces that it stands for light the scene themselves.
+        let replaced = |light: &Light| light.stand_in && followed.is_some_and(|paths| paths.emitting);
+        let useful = |light: &Light| light.shines() && reaches(light) && !replaced(light);
         let useful_lights = scene.lights.iter().filter(|light| useful(light)).count();
         // Dark ones stand for those that are asked for and not there. Beside others they would take room in shadow maps.
         let demanded = needs_lights(surroundings.demand);
@@ -414,8 +437,10 @@ impl Planner<'_> {
             matches!(kind, LightKind::Point { range: Some(_), .. } | LightKind::Spot { range: Some(_), .. })
         });
         let dark = scene.lights.iter().filter(|light| !light.shines()).count();
+        let stand_ins = scene.lights.iter().filter(|light| light.shines() && replaced(light)).count();
         let cause = match (scene.lights.is_empty(), useful_lights > 0, lit) {
             (true, ..) => Cause::against("the scene has no lights"),
+            (_, false, _) if stand_ins > 0 => Cause::against("surfaces light in place of the lights that stand for them"),
             (_, false, _) if dark == scene.lights.len() => Cause::against("all lights of the scene are dark"),
             (_, false, _) => Cause::against("no light of the scene reaches anything"),
             (.., false) => Cause::against("all materials in use are unlit"),
@@ -428,31 +453,48 @@ impl Planner<'_> {
                 .with("local", local)
                 .with("with a range", ranged)
                 .with("dark", dark)
-                .with("out of range", scene.lights.len() - dark - useful_lights),
+                .with("out of range", scene.lights.len() - dark - stand_ins - useful_lights),
         };
         decisions.decide("punctual lights", counts(cause.clone()));
         let shadows = decisions.decide_with("shadows", "shadows", knobs.rung("shadows") != "off", counts(cause));
         let cause = match (local >= TILES_FROM, ranged > 0) {
+            _ if *paths => Cause::against("paths draw one light at a time"),
             (false, _) => Cause::against("few point and spot lights"),
             (_, false) => Cause::against("no light has a range"),
             _ => counts(Cause::of(format!("{ranged} of {local} point and spot lights have a range"))),
         };
-        let tiles = decisions.decide(LIGHT_LISTS, cause);
+        let tiles = decisions.decide(LIGHT_LISTS, cause) && !*paths;
         Lights { kept, directional, local, shadows, tiles }
+    }
+
+    /// Light from surface to surface.
+    fn paths(&mut self) -> Option<Paths> {
+        let Self { surfaces, decisions, knobs, paths, .. } = self;
+        let allowed = |wanted: bool| if wanted { Cause::of("light goes from surface to surface") } else { Cause::against("no surface in use sends light") };
+        let kept = decisions.decide_with("paths", "indirect", *paths, allowed(surfaces.any(|m| !m.unlit)));
+        let cause = match kept {
+            true => surfaces.cause(|m| m.emissive != [0.0; 3] && !m.unlit, |_| "emits".to_owned()),
+            false => Cause::against("no paths are followed"),
+        };
+        let emitting = decisions.decide_with("surfaces that light", "lights", knobs.rung("lights") != "points", cause);
+        paths.then_some(Paths { emitting, at_once: false })
     }
 
     /// What sends rays, and the code for what they may meet.
     fn rays(&mut self, transmission: &Transmission, images: &MirrorImages, lights: &Lights) -> Option<Rays> {
-        let Self { surfaces, decisions, knobs, surroundings, .. } = self;
+        let Self { surfaces, decisions, knobs, surroundings, paths, .. } = self;
         let shadows = lights.shadows && knobs.rung("shadows") == "ray";
         let (refraction, mirrors) = (transmission.by_rays, images.by_rays);
-        if !(shadows || mirrors || refraction) {
+        if !(shadows || mirrors || refraction || *paths) {
             return None;
         }
         let holes = |m: &Material| matches!(m.alpha_mode, AlphaMode::Mask(_));
         let masked = decisions.decide("holes before rays", surfaces.cause(holes, |_| "has holes".to_owned()));
-        let lets_through = |m: &Material| holes(m) || is_see_through(m, false);
-        let cause = match shadows {
+        // Paths that bend are no straight way to a light.
+        let lets_through = |m: &Material| {
+            holes(m) || m.alpha_mode == AlphaMode::Blend || (m.transmission > 0.0 && (!*paths || m.ior == 1.0 || surfaces.is_sheet(m)))
+        };
+        let cause = match shadows || *paths {
             true => surfaces.cause(lets_through, |_| "lets light through".to_owned()),
             false => Cause::against("no rays look for lights"),
         };

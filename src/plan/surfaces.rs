@@ -115,6 +115,12 @@ impl<'a> Surfaces<'a> {
             .with("materials", found.len())
     }
 
+    /// Whether a material that lets light through encloses nothing, at least in one place.
+    pub(super) fn is_sheet(&self, material: &Material) -> bool {
+        let used = self.used.iter().find(|used| std::ptr::eq(used.material, material));
+        used.is_some_and(|used| used.closed < used.instances)
+    }
+
     /// A sentence's end about a material that lets light through.
     pub(super) fn body(&self, material: &Material) -> String {
         let used = self.used.iter().find(|used| std::ptr::eq(used.material, material));

@@ -653,7 +653,7 @@ fn lights(document: &Document<'_>, nodes: &Nodes, warnings: &mut Vec<String>) ->
             warnings.push(format!("{place}: its colour or strength is negative or infinite and is clamped"));
         }
         let name = json.name.clone().or_else(|| root.nodes[node].name.clone());
-        lights.push(Light { name: name.unwrap_or_else(|| format!("light {index}")), color, kind });
+        lights.push(Light { name: name.unwrap_or_else(|| format!("light {index}")), color, kind, stand_in: false });
     }
     Ok(lights)
 }

@@ -14,6 +14,8 @@ pub struct Light {
     pub color: [f32; 3],
     /// What kind, with its geometry.
     pub kind: LightKind,
+    /// Stands for a surface that emits, where such surfaces light nothing (`extras.etalon.stand_in`): where they do, it is dark.
+    pub stand_in: bool,
 }
 
 impl Light {

@@ -9,6 +9,7 @@ pub mod bvh;
 pub mod camera;
 pub mod contact;
 mod container;
+pub mod emitters;
 pub mod environment;
 mod geometry;
 mod gltf_extras;

@@ -73,7 +73,12 @@ impl Builder {
     }
 
     pub(super) fn light(&mut self, name: &str, color: [f32; 3], kind: LightKind) {
-        self.scene.lights.push(Light { name: name.to_owned(), color, kind });
+        self.scene.lights.push(Light { name: name.to_owned(), color, kind, stand_in: false });
+    }
+
+    /// A light that stands for an emitting surface where such surfaces light nothing.
+    pub(super) fn stand_in(&mut self, name: &str, color: [f32; 3], kind: LightKind) {
+        self.scene.lights.push(Light { name: name.to_owned(), color, kind, stand_in: true });
     }
 
     /// A pinhole camera with a vertical field of view in degrees; the near distance is left to the renderer.

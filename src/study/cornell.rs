@@ -43,7 +43,7 @@ pub(super) fn scene() -> Scene {
     let glow = b.material(emitter("lamp", [12.0, 12.0, 12.0]));
     let lamp = DVec3::new(0.0, HEIGHT - 0.01, -2.795);
     b.add("ceiling panel", Shape::panel(1.3, 1.05), glow, facing(lamp, DVec3::NEG_Y));
-    b.light("ceiling lamp", [16.4; 3], LightKind::Point { position: lamp - DVec3::Y * 0.05, range: None });
+    b.stand_in("ceiling lamp", [16.4; 3], LightKind::Point { position: lamp - DVec3::Y * 0.05, range: None });
     // From further away than the original's 8 m the room still fills the height of a wide picture.
     b.camera("front", DVec3::new(0.0, HEIGHT * 0.5, 8.0), middle, 39.3);
     b.finish()

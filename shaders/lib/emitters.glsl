@@ -1,0 +1,186 @@
+// What light comes from, drawn in proportion to its power: punctual lights, triangles that emit, the environment (lecture R2–R4).
+#ifndef EMITTERS_GLSL
+#define EMITTERS_GLSL
+#include "lib/environment.glsl"
+#include "lib/hit.glsl"
+#include "lib/punctual.glsl"
+#include "lib/random.glsl"
+
+layout(constant_id = 60) const uint EMITTERS = 0;
+layout(constant_id = 61) const uint EMITTER_STEPS = 0;           // halvings that single one of them out
+layout(constant_id = 67) const bool PUNCTUAL_EMITTERS = false;   // some of them are lights without extent
+layout(constant_id = 62) const bool EMITTING_TRIANGLES = false;  // some of them are triangles
+layout(constant_id = 63) const bool EMITTING_SKY = false;        // one is the environment
+layout(constant_id = 64) const uint SKY_COLUMNS = 0;             // cells of its table
+layout(constant_id = 65) const uint SKY_ROWS = 0;
+layout(constant_id = 66) const uint SKY_STEPS = 0;               // halvings that single out a row, or a column
+
+// A texel each: first word of its share of all words | probability | EMITTER_..., two-sided | light, or place of the triangle.
+layout(set = 0, binding = 50, rgba32ui) readonly uniform uimageBuffer emitters;
+// First words of the rows' shares; then, row by row, those of the columns'.
+layout(set = 0, binding = 51, r32ui) readonly uniform uimageBuffer sky_shares;
+const uint EMITTER_PUNCTUAL = 0;
+const uint EMITTER_TRIANGLE = 1;
+const uint EMITTER_SKY = 2;
+const uint EMITTER_TWO_SIDED = 4;
+
+// Light that may arrive at a point from one place.
+struct LightSample {
+    vec3 to_light; // from the point; a unit vector to what is infinitely far
+    float t_max;   // of to_light: 1, or LARGEST
+    vec3 arriving; // radiance over density, or irradiance perpendicular to to_light over probability
+    float pdf;     // per solid angle; 0 where nothing but this could have drawn it
+};
+
+// Of a word that lies in the share [first, next) of all words, where in it: in [0, 1). A share of 0 is all of them.
+float place_in_share(uint word, uint first, uint next) {
+    uint size = next - first;
+    float place = size == 0u ? float(word) * (1.0 / 4294967296.0) : float(word - first) / float(size);
+    return min(place, 0.999999940395355);
+}
+
+// Size of a share of all words, as a probability.
+float probability_of_share(uint first, uint next) {
+    return next == first ? 1.0 : float(next - first) * (1.0 / 4294967296.0);
+}
+
+// Where the share lies in which a word is, among `count` from `base` on.
+uint share_of_sky(uint base, uint count, uint word) {
+    uint found = 0;
+    for (uint step = SKY_STEPS; step > 0; step--) {
+        loop_heads++;
+        uint next = found + (1u << (step - 1));
+        uint first = imageLoad(sky_shares, int(base + min(next, count - 1))).x;
+        found = next < count && first <= word ? next : found;
+    }
+    return found;
+}
+
+uint sky_share(uint base, uint count, uint i) {
+    return i < count ? imageLoad(sky_shares, int(base + i)).x : 0u;
+}
+
+// Density per solid angle of the cell at `at`, whose polar angle has this sine.
+float sky_cell_pdf(float p_row, float p_column, float sin_theta) {
+    return p_row * p_column * float(SKY_ROWS * SKY_COLUMNS) / (2.0 * PI * PI * max(sin_theta, 1e-6));
+}
+
+// Density of a direction, in the world, among all that light is drawn from.
+float sky_pdf(vec3 direction) {
+    if (!EMITTING_SKY) return 0.0;
+    vec3 d = into_environment(direction);
+    vec2 at = equirectangular_from_direction(d);
+    uint row = min(uint(max(at.y, 0.0) * float(SKY_ROWS)), SKY_ROWS - 1);
+    uint column = min(uint(max(at.x, 0.0) * float(SKY_COLUMNS)), SKY_COLUMNS - 1);
+    uint columns = SKY_ROWS + row * SKY_COLUMNS;
+    float p_row = probability_of_share(sky_share(0, SKY_ROWS, row), sky_share(0, SKY_ROWS, row + 1));
+    float p_column = probability_of_share(sky_share(columns, SKY_COLUMNS, column), sky_share(columns, SKY_COLUMNS, column + 1));
+    // The environment is the first of the emitters.
+    float picked = uintBitsToFloat(imageLoad(emitters, 0).y);
+    return picked * sky_cell_pdf(p_row, p_column, sqrt(d.x * d.x + d.z * d.z));
+}
+
+struct SkySample {
+    vec3 direction;
+    float pdf;
+};
+
+SkySample sample_sky(uint word_x, uint word_y) {
+    uint row = share_of_sky(0, SKY_ROWS, word_y);
+    uint row_first = sky_share(0, SKY_ROWS, row);
+    uint row_next = sky_share(0, SKY_ROWS, row + 1);
+    uint columns = SKY_ROWS + row * SKY_COLUMNS;
+    uint column = share_of_sky(columns, SKY_COLUMNS, word_x);
+    uint first = sky_share(columns, SKY_COLUMNS, column);
+    uint next = sky_share(columns, SKY_COLUMNS, column + 1);
+    float u = (float(column) + place_in_share(word_x, first, next)) / float(SKY_COLUMNS);
+    float v = (float(row) + place_in_share(word_y, row_first, row_next)) / float(SKY_ROWS);
+    // The inverse of equirectangular_from_direction.
+    float polar = PI * (0.5 - v);
+    float longitude = 2.0 * PI * (u - 0.5);
+    float across = cos(polar);
+    vec3 d = vec3(across * cos(longitude), sin(polar), across * sin(longitude));
+    float pdf = sky_cell_pdf(probability_of_share(row_first, row_next), probability_of_share(first, next), across);
+    return SkySample(turned(d, environment.cos_rotation, -environment.sin_rotation), pdf);
+}
+
+// Twice the area of a triangle, times the unit normal of its front.
+vec3 doubled_area(uint triangle, out vec3 a, out vec3 ab, out vec3 ac) {
+    a = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3).xyz);
+    ab = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 1).xyz) - a;
+    ac = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 2).xyz) - a;
+    return cross(ab, ac);
+}
+
+// Radiance that a triangle sends from the place with these barycentrics.
+vec3 emission_at(uint triangle, float u, float v) {
+    uint material = hit_material(triangle) & 0xffffu;
+    vec3 radiance = material_at(material).emissive;
+    if ((HIT_TEXTURES & (1u << SLOT_EMISSIVE)) != 0) {
+        HitPoint point = hit_point_of(Hit(0.0, triangle, u, v), vec3(0.0), vec3(0.0));
+        radiance *= hit_texture_or(material, SLOT_EMISSIVE, point.uvs, 0.0, vec4(1.0)).rgb;
+    }
+    return radiance;
+}
+
+// Probability per area with which a triangle is drawn; 0 where it is none of the emitters.
+float picked_per_area(uint triangle) {
+    return uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 2).w);
+}
+
+// One place that light comes from, for a point at `origin` in bvh space. `arriving` of the environment is 1 over the density:
+// what it shows is the caller's to look up.
+LightSample sample_light(vec3 origin, uvec2 words) {
+    LightSample r = LightSample(vec3(0.0, 1.0, 0.0), -1.0, vec3(0.0), 0.0);
+    uint found = 0;
+    for (uint step = EMITTER_STEPS; step > 0; step--) {
+        loop_heads++;
+        uint next = found + (1u << (step - 1));
+        uint first = imageLoad(emitters, int(min(next, EMITTERS - 1))).x;
+        found = next < EMITTERS && first <= words.x ? next : found;
+    }
+    uvec4 emitter = imageLoad(emitters, int(found));
+    uint next_first = found + 1 < EMITTERS ? imageLoad(emitters, int(found + 1)).x : 0u;
+    float probability = uintBitsToFloat(emitter.y);
+    float x = place_in_share(words.x, emitter.x, next_first);
+    uint kind = emitter.z & 3u;
+    if (PUNCTUAL_EMITTERS) {
+        if (kind == EMITTER_PUNCTUAL) {
+            PunctualLight light = punctual_light_at(emitter.w, origin - trace_terms.bvh_from_rel);
+            r = LightSample(light.directional ? light.l : light.to_light, light.directional ? LARGEST : 1.0,
+                            light.arriving / probability, 0.0);
+        }
+    }
+    if (EMITTING_SKY) {
+        if (kind == EMITTER_SKY) {
+            SkySample sky = sample_sky(uint(x * 4294967040.0), words.y);
+            float pdf = probability * sky.pdf;
+            r = LightSample(sky.direction, LARGEST, vec3(1.0 / pdf), pdf);
+        }
+    }
+    if (EMITTING_TRIANGLES) {
+        if (kind == EMITTER_TRIANGLE) {
+            // The unit square onto a triangle, with little distortion (Heitz 2019): halves along the diagonal.
+            float y = unit_float(words.y);
+            vec2 w = y > x ? vec2(0.5 * x, y - 0.5 * x) : vec2(x - 0.5 * y, 0.5 * y);
+            vec3 a, ab, ac;
+            vec3 doubled = doubled_area(emitter.w, a, ab, ac);
+            float size = vector_length(doubled);
+            vec3 n = doubled / size;
+            vec3 p = a + w.x * ab + w.y * ac;
+            vec3 to_light = p - origin;
+            float side = dot(n, to_light) < 0.0 ? 1.0 : -1.0;
+            bool shows = side > 0.0 || (emitter.z & EMITTER_TWO_SIDED) != 0;
+            // A point of the air before the triangle: the triangle itself is not met.
+            to_light += n * (side * trace_terms.offset);
+            float r2 = dot(to_light, to_light);
+            float cos_light = -side * dot(n, to_light) * inversesqrt(r2);
+            float pdf = probability * 2.0 / size * r2 / cos_light;
+            bool lights = shows && r2 > 0.0 && cos_light > 0.0 && pdf <= LARGEST;
+            vec3 radiance = emission_at(emitter.w, w.x, w.y);
+            r = LightSample(to_light, 1.0, lights ? radiance / pdf : vec3(0.0), lights ? pdf : 0.0);
+        }
+    }
+    return r;
+}
+#endif

@@ -1,0 +1,37 @@
+// Where paths begin: at the eye, through a point of the pixel.
+#ifndef PATH_BEGIN_GLSL
+#define PATH_BEGIN_GLSL
+#include "lib/camera.glsl"
+#include "lib/path_ray.glsl"
+
+layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
+
+// The pixel that stands at a place of the first queue: tiles of 8x8 in strides over the picture, since lavapipe gives each of
+// its threads one contiguous piece of a dispatch; within a tile in Morton order, so that neighbours in a queue are neighbours
+// in the picture. One outside of the picture where a tile juts out.
+uvec2 pixel_at(uint place, uint stride) {
+    uvec2 tiles = (camera.size + 7) / 8;
+    uint tile = place / 64 * stride % (tiles.x * tiles.y);
+    uint lane = place % 64;
+    uvec2 within = uvec2(lane & 1u | lane >> 1 & 2u | lane >> 2 & 4u, lane >> 1 & 1u | lane >> 2 & 2u | lane >> 3 & 4u);
+    return uvec2(tile % tiles.x, tile / tiles.x) * 8 + within;
+}
+
+Path path_through(uvec2 pixel) {
+    Camera c = camera;
+    uvec2 words = draw_words(pixel, 0, DRAW_PIXEL);
+    c.jitter = vec2(unit_float(words.x), unit_float(words.y)) - 0.5;
+    Path p;
+    p.origin = trace_terms.bvh_from_rel;
+    if (camera.orthographic != 0) p.origin += rel_from_pixel(c, ivec2(pixel), 1.0);
+    p.direction = view_direction(c, ivec2(pixel));
+    p.self = 0xffffffffu;
+    p.pdf = 0.0;
+    p.throughput = vec3(1.0);
+    p.state = PATH_ALIVE | PATH_CLEAR | PATH_STRAIGHT;
+    p.media = trace_terms.camera_media;
+    p.travelled = 0.0;
+    p.after = 0.0;
+    return p;
+}
+#endif

@@ -1,0 +1,39 @@
+// All bounces of two paths in one invocation: the film that the queues make, to the last bit, without any state in memory. What
+// tests hold them to.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+layout(local_size_x = 64) in;
+#include "lib/path.glsl"
+#include "lib/path_begin.glsl"
+#include "lib/work_tile.glsl"
+
+layout(set = 0, binding = 10, rgba32f) writeonly uniform image2D radiance;
+layout(push_constant) uniform Push { uint places; uint stride; };
+
+void main() {
+    uint lane = gl_LocalInvocationID.x;
+    uint place = listed_tile(gl_WorkGroupID) * 128 + (lane >> 3) * 16 + (lane & 7u);
+    uvec2 pixel_a = pixel_at(place, stride);
+    uvec2 pixel_b = pixel_at(place + 8, stride);
+    bool inside_a = place < places && all(lessThan(pixel_a, camera.size));
+    bool inside_b = place + 8 < places && all(lessThan(pixel_b, camera.size));
+    Path a = path_through(pixel_a);
+    Path b = path_through(pixel_b);
+    if (!inside_a) a.state = 0;
+    if (!inside_b) b.state = 0;
+    vec4 sum_a = vec4(0.0, 0.0, 0.0, 1.0);
+    vec4 sum_b = sum_a;
+    bool more;
+    do {
+        loop_heads++;
+        Gathered g = bounce(a, b, pixel_a, pixel_b);
+        sum_a += g.a;
+        sum_b += g.b;
+        more = ((a.state | b.state) & PATH_ALIVE) != 0 && loop_heads < LOOP_BUDGET;
+    } while (more);
+    if (inside_a) imageStore(radiance, ivec2(pixel_a), sum_a);
+    if (inside_b) imageStore(radiance, ivec2(pixel_b), sum_b);
+    count_paths(path_rays, lost);
+}

@@ -1,0 +1,22 @@
+// How many paths go on, in each chunk of a queue.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+layout(local_size_x = 64) in;
+#include "lib/queue.glsl"
+
+layout(set = 0, binding = 0, r32ui) readonly uniform uimageBuffer queue;
+layout(scalar, set = 0, binding = 1) readonly buffer Sizes { QueueSize size; };
+layout(set = 0, binding = 2, r32ui) writeonly uniform uimageBuffer chunks;
+
+void main() {
+    uint chunk = listed_tile(gl_WorkGroupID) * 64 + gl_LocalInvocationID.x;
+    if (chunk * CHUNK >= size.paths.count) return;
+    uint going_on = 0;
+    for (uint i = 0; i < CHUNK; i++) {
+        uint place = chunk * CHUNK + i;
+        uint entry = place < size.paths.count ? imageLoad(queue, int(place)).x : ENDED;
+        going_on += (entry & ENDED) == 0 ? 1u : 0u;
+    }
+    imageStore(chunks, int(chunk), uvec4(going_on));
+}

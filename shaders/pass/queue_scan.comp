@@ -1,0 +1,37 @@
+// Where the paths of each chunk stand in the next queue, and how long that is: running sums, by one workgroup.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+layout(local_size_x = 256) in;
+#include "lib/queue.glsl"
+
+layout(scalar, set = 0, binding = 0) readonly buffer Sizes { QueueSize size; };
+layout(set = 0, binding = 1, r32ui) uniform uimageBuffer chunks;
+layout(scalar, set = 0, binding = 2) writeonly buffer NextSizes { QueueSize next_size; };
+
+shared uint sums[256];
+
+void main() {
+    uint lane = gl_LocalInvocationID.x;
+    uint all_chunks = (size.paths.count + CHUNK - 1) / CHUNK;
+    uint share = (all_chunks + 255) / 256;
+    uint first = min(lane * share, all_chunks);
+    uint end = min(first + share, all_chunks);
+    uint sum = 0;
+    for (uint i = first; i < end; i++) sum += imageLoad(chunks, int(i)).x;
+    sums[lane] = sum;
+    barrier();
+    uint before = 0;
+    for (uint i = 0; i < lane; i++) before += sums[i];
+    for (uint i = first; i < end; i++) {
+        uint here = imageLoad(chunks, int(i)).x;
+        imageStore(chunks, int(i), uvec4(before));
+        before += here;
+    }
+    if (lane == 255) {
+        uint groups = (before + PATHS_IN_GROUP - 1) / PATHS_IN_GROUP;
+        uint chunk_groups = ((before + CHUNK - 1) / CHUNK + 63) / 64;
+        next_size.paths = WorkSize(min(groups, ROW), (groups + ROW - 1) / ROW, 1, before);
+        next_size.chunks = WorkSize(min(chunk_groups, ROW), (chunk_groups + ROW - 1) / ROW, 1, 0);
+    }
+}

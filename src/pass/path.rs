@@ -1,0 +1,294 @@
+//! Paths of light: a wavefront of one bounce after the other over queues of pixels (shaders/pass/path.comp), or all bounces in
+//! one dispatch (path_at_once.comp), which tests compare it with.
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use ash::vk;
+
+use super::lighting::Lighting;
+use super::rows::{rows_of, stride};
+use super::upload::upload;
+use crate::gpu::{Buffer, Device, Frame, Image, NOTHING, Place};
+use crate::plan::{Paths, Plan, Rays};
+use crate::scene::emitters::{Emitters, Source};
+use crate::shader::{path, path_at_once, path_begin, queue_count, queue_next, queue_scan};
+
+/// Pixels a side of the tiles that the first queue is made of.
+const TILE: u32 = 8;
+/// Two `WorkSize` of shaders/lib/work_tile.glsl.
+const SIZE_BYTES: u64 = 32;
+/// Offset of the second.
+const CHUNKS_AT: u64 = 16;
+/// Entries of a queue that one invocation counts: `CHUNK` of shaders/lib/queue.glsl.
+const CHUNK: u32 = 16;
+/// Paths of a workgroup, two in each invocation: `PATHS_IN_GROUP`.
+const PATHS_IN_GROUP: u32 = 128;
+
+/// Kinds of emitters and a flag: shaders/lib/emitters.glsl.
+const PUNCTUAL: u32 = 0;
+const TRIANGLE: u32 = 1;
+const SKY: u32 = 2;
+const TWO_SIDED: u32 = 4;
+
+/// What paths draw light from; next to nothing without any.
+pub struct EmittersOnDevice {
+    /// A texel each.
+    pub table: Buffer,
+    /// Shares of the environment's cells.
+    pub sky: Buffer,
+    count: u32,
+    punctual: bool,
+    triangles: bool,
+    columns: u32,
+    rows: u32,
+}
+
+impl EmittersOnDevice {
+    /// `leaf_places` are those of the scene's triangles in the hierarchy.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn new(device: &Arc<Device>, emitters: &Emitters, leaf_places: &[u32]) -> Result<Self> {
+        let texel = |emitter: &crate::scene::emitters::Emitter| {
+            let (kind, place) = match emitter.source {
+                Source::Sky => (SKY, 0),
+                Source::Punctual(light) => (PUNCTUAL, light),
+                Source::Triangle { index, two_sided, .. } => {
+                    (TRIANGLE | if two_sided { TWO_SIDED } else { 0 }, leaf_places[index as usize])
+                }
+            };
+            [emitter.first, (emitter.probability as f32).to_bits(), kind, place]
+        };
+        // A triangle that rays leave out is not among the leaves; nothing would be seen of what was drawn on it.
+        let list: Vec<[u32; 4]> = emitters.list.iter().map(texel).collect();
+        let any = |test: fn(&Source) -> bool| emitters.list.iter().any(|emitter| test(&emitter.source));
+        let name = |named: &'static str, empty: bool| if empty { NOTHING } else { named };
+        Ok(Self {
+            table: upload(device, name("emitters", list.is_empty()), &list, Some(vk::Format::R32G32B32A32_UINT))?,
+            sky: upload(
+                device,
+                name("shares of the environment", emitters.sky.words.is_empty()),
+                &emitters.sky.words,
+                Some(vk::Format::R32_UINT),
+            )?,
+            count: list.len() as u32,
+            punctual: any(|source| matches!(source, Source::Punctual(_))),
+            triangles: any(|source| matches!(source, Source::Triangle { .. })),
+            columns: emitters.sky.columns,
+            rows: emitters.sky.rows,
+        })
+    }
+}
+
+/// Halvings that single out one of `count`.
+fn halvings(count: u32) -> u32 {
+    count.next_power_of_two().trailing_zeros()
+}
+
+/// Paths between two dispatches.
+pub struct PathsOnDevice {
+    /// What is done at their surfaces.
+    pub with: Paths,
+    states: Buffer,
+    queues: [Buffer; 2],
+    sizes: [Buffer; 2],
+    first_size: Buffer,
+    chunks: Buffer,
+    size: [u32; 2],
+}
+
+impl PathsOnDevice {
+    /// For a picture of `size` pixels.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn new(device: &Arc<Device>, with: Paths, plan: &Plan, touching: bool, size: [u32; 2]) -> Result<Self> {
+        let rays = plan.rays.unwrap_or_default();
+        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        let texels = 3 + u64::from(rays.transmissive) + u64::from(rays.filters || touching);
+        let places = places(size);
+        let texel_buffer =
+            |name, bytes, format| Buffer::texels(device, name, bytes, Place::Device, format);
+        let queue = || texel_buffer("queue of paths", 4 * u64::from(places), vk::Format::R32_UINT);
+        let queue_size = || Buffer::new(device, "queue size", SIZE_BYTES, Place::Device);
+        let [groups, rows, _] = rows_of(places.div_ceil(PATHS_IN_GROUP));
+        let [chunk_groups, chunk_rows, _] = rows_of(places.div_ceil(CHUNK).div_ceil(queue_count::PROGRAM.local_size[0]));
+        let first_size = [groups, rows, 1, places, chunk_groups, chunk_rows, 1, 0];
+        Ok(Self {
+            with,
+            states: texel_buffer("paths", 16 * texels * pixels, vk::Format::R32G32B32A32_UINT)?,
+            queues: [queue()?, queue()?],
+            sizes: [queue_size()?, queue_size()?],
+            first_size: Buffer::with_data(device, "first queue size", &first_size)?,
+            chunks: texel_buffer("chunks of a queue", 4 * u64::from(places.div_ceil(CHUNK)), vk::Format::R32_UINT)?,
+            size,
+        })
+    }
+}
+
+/// Entries of the first queue: all pixels of the tiles that the picture touches.
+fn places(size: [u32; 2]) -> u32 {
+    size[0].div_ceil(TILE) * size[1].div_ceil(TILE) * TILE * TILE
+}
+
+/// One sample of every pixel into `radiance`.
+///
+/// # Errors
+/// When the driver refuses what a pipeline binds.
+pub fn paths<'a>(
+    frame: &mut Frame<'a>,
+    lighting: Lighting<'a>,
+    paths: &'a PathsOnDevice,
+    radiance: &'a Image,
+) -> Result<()> {
+    let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
+    let Some(with) = plan.rays else { return Ok(()) };
+    let [width, height] = paths.size;
+    let places = places(paths.size);
+    let tiles = places / (TILE * TILE);
+    if paths.with.at_once {
+        let bind = path_at_once::Bind {
+            camera_block: camera,
+            radiance,
+            lights: &scene.lights,
+            environment: &environment.terms,
+            reflectance: environment.reflectance(),
+            sky: environment.sky(),
+            bvh_nodes: &rays.nodes,
+            bvh_triangles: &rays.triangles,
+            trace_block: &rays.terms,
+            material_texels: &scene.materials,
+            hit_corners: &rays.corners,
+            shadow_depth: lighting.shadow_maps.depth(),
+            shadow_faces: &lighting.shadow_maps.faces,
+            sigma_grids: &scene.grids.texels,
+            texels: &scene.texels,
+            texel_slots: &scene.texel_slots,
+            hit_slots: &scene.slots,
+            work_done: &rays.counts,
+            emitters: &rays.emitters.table,
+            sky_shares: &rays.emitters.sky,
+        };
+        let push = [places, stride(tiles)];
+        let groups = rows_of(places.div_ceil(PATHS_IN_GROUP));
+        let constants = Constants::of(lighting, with, paths.with);
+        return frame.compute("paths at once", &bind, constants.at_once(), bytemuck::cast_slice(&push), groups);
+    }
+    frame.copy_buffer("reset queue size", &paths.first_size, &paths.sizes[0], SIZE_BYTES);
+    let constants = Constants::of(lighting, with, paths.with);
+    let bind = path_begin::Bind {
+        camera_block: camera,
+        radiance,
+        queue: &paths.queues[0],
+        path_states: &paths.states,
+        bvh_nodes: &rays.nodes,
+        bvh_triangles: &rays.triangles,
+        trace_block: &rays.terms,
+    };
+    let push = [places, stride(tiles)];
+    frame.compute("paths begin", &bind, constants.begin(), bytemuck::cast_slice(&push), rows_of(tiles))?;
+    for bounce in 0..with.interfaces + 1 {
+        let [from, to] = if bounce % 2 == 0 { [0, 1] } else { [1, 0] };
+        let bind = path::Bind {
+            radiance,
+            lights: &scene.lights,
+            environment: &environment.terms,
+            reflectance: environment.reflectance(),
+            sky: environment.sky(),
+            bvh_nodes: &rays.nodes,
+            bvh_triangles: &rays.triangles,
+            trace_block: &rays.terms,
+            material_texels: &scene.materials,
+            hit_corners: &rays.corners,
+            shadow_depth: lighting.shadow_maps.depth(),
+            shadow_faces: &lighting.shadow_maps.faces,
+            sigma_grids: &scene.grids.texels,
+            texels: &scene.texels,
+            texel_slots: &scene.texel_slots,
+            hit_slots: &scene.slots,
+            work_done: &rays.counts,
+            emitters: &rays.emitters.table,
+            sky_shares: &rays.emitters.sky,
+            path_states: &paths.states,
+            queue: &paths.queues[from],
+            sizes: &paths.sizes[from],
+        };
+        let push = [width, width * height];
+        frame.compute_indirect("paths", &bind, constants.bounce(), bytemuck::cast_slice(&push), &paths.sizes[from], 0)?;
+        if bounce < with.interfaces {
+            compact(frame, paths, from, to)?;
+        }
+    }
+    Ok(())
+}
+
+/// The next queue: entries that go on, in their order.
+fn compact<'a>(frame: &mut Frame<'a>, paths: &'a PathsOnDevice, from: usize, to: usize) -> Result<()> {
+    let (queue, sizes, chunks) = (&paths.queues[from], &paths.sizes[from], &paths.chunks);
+    let bind = queue_count::Bind { queue, sizes, chunks };
+    frame.compute_indirect("count paths", &bind, queue_count::Constants {}.words(), &[], sizes, CHUNKS_AT)?;
+    let bind = queue_scan::Bind { sizes, chunks, next_sizes: &paths.sizes[to] };
+    frame.compute("sum up paths", &bind, queue_scan::Constants {}.words(), &[], [1, 1, 1])?;
+    let bind = queue_next::Bind { queue, sizes, chunks, next_queue: &paths.queues[to] };
+    frame.compute_indirect("next queue", &bind, queue_next::Constants {}.words(), &[], sizes, CHUNKS_AT)
+}
+
+/// Constants of all programs of paths, by the one that has them all.
+struct Constants(path::Constants);
+
+impl Constants {
+    fn of(lighting: Lighting, with: Rays, paths: Paths) -> Self {
+        let Lighting { plan, knobs, rays, .. } = lighting;
+        let emitters = &rays.emitters;
+        Self(path::Constants {
+            brdf: knobs.index("brdf"),
+            fresnel: knobs.index("fresnel"),
+            arithmetic: knobs.index("arithmetic"),
+            clearcoat: plan.clearcoat,
+            conductors: plan.conductors,
+            traversal: rays.constants.traversal,
+            octants: rays.constants.octants,
+            stack_size: rays.constants.stack_size,
+            hit_textures: rays.constants.hit_textures,
+            filters: with.filters,
+            absorption: with.absorption,
+            march_steps: with.march.steps,
+            quadrature: with.march.rule,
+            march_colours: with.march.colours,
+            march_budget: lighting.loop_budget(),
+            transmissive: with.transmissive,
+            touching: rays.constants.touching,
+            environment: plan.environment,
+            sky: plan.sky,
+            loop_budget: lighting.loop_budget(),
+            directional_lights: plan.directional_lights,
+            lighting_surfaces: paths.emitting,
+            emitters: emitters.count,
+            emitter_steps: halvings(emitters.count),
+            punctual_emitters: emitters.punctual,
+            emitting_triangles: emitters.triangles,
+            emitting_sky: emitters.rows > 0,
+            sky_columns: emitters.columns,
+            sky_rows: emitters.rows,
+            keeps_media: with.transmissive,
+            keeps_way: with.filters || rays.constants.touching,
+            sky_steps: halvings(emitters.columns.max(emitters.rows)),
+            ..Default::default()
+        })
+    }
+
+    fn bounce(&self) -> Vec<(u32, u32)> {
+        self.0.words()
+    }
+
+    /// The same numbers name the same constants in all of them.
+    fn at_once(&self) -> Vec<(u32, u32)> {
+        self.0.words()
+    }
+
+    fn begin(&self) -> Vec<(u32, u32)> {
+        let known = path_begin::PROGRAM.constants;
+        self.0.words().into_iter().filter(|(id, _)| known.iter().any(|constant| constant.id == *id)).collect()
+    }
+}

@@ -1,0 +1,211 @@
+//! Paths of light against truth: furnaces, rooms whose light is known in closed form, and the same film whatever the order of
+//! the work.
+
+#[path = "support/gpu.rs"]
+mod gpu;
+#[path = "support/made.rs"]
+mod made;
+
+use etalon::frame::Settings;
+use etalon::image::Picture;
+use etalon::plan::{Knobs, Model};
+use etalon::scene::environment::Environment;
+use etalon::scene::{LightKind, Material, Projection, Scene};
+use etalon::study::shape::Shape;
+use glam::{DAffine3, DVec3};
+use gpu::{Gpu, bits};
+use made::{Made, at, lambert, orthographic, perspective};
+
+fn settings(size: [u32; 2], choices: &[&str]) -> Settings {
+    let mut knobs = Knobs::of(Model::Global);
+    let choices: Vec<String> = choices.iter().map(|&choice| choice.to_owned()).collect();
+    knobs.set_all(&choices).expect("rungs");
+    Settings { size, knobs, ..Settings::default() }
+}
+
+fn draw(gpu: &Gpu, scene: &Scene, environment: Option<&Environment>, settings: Settings) -> Picture {
+    gpu.shot(scene, environment, settings).1
+}
+
+/// Mean of a channel over a picture, its standard error as pixels tell it, and the largest value.
+fn spread(picture: &Picture, channel: usize) -> [f64; 3] {
+    let all: Vec<f64> = picture.rgba.iter().map(|pixel| f64::from(pixel[channel])).collect();
+    let n = all.len() as f64;
+    let mean = all.iter().sum::<f64>() / n;
+    let variance = all.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n - 1.0);
+    [mean, (variance / n).sqrt(), all.iter().copied().fold(f64::MIN, f64::max)]
+}
+
+/// A cube of one material that fills a parallel view, turned so that three of its faces are seen.
+fn cube(material: Material) -> Scene {
+    let mut made = Made::new("cube");
+    let turn = DAffine3::from_rotation_x(0.5) * DAffine3::from_rotation_y(0.6);
+    made.add(Shape::cuboid(DVec3::splat(2.0)), material, turn);
+    made.front(0.8);
+    made.0
+}
+
+fn white_metal(roughness: f32) -> Material {
+    Material { metallic: 1.0, roughness, specular: 1.0, ..lambert([1.0; 3]) }
+}
+
+#[test]
+fn nothing_white_shows_before_light_from_everywhere() {
+    let gpu = Gpu::new();
+    let sky = Environment::constant([1.0; 3]);
+    let glass = Material { transmission: 1.0, ior: 1.5, thickness: 1.0, specular: 1.0, roughness: 0.0, ..lambert([1.0; 3]) };
+    // Where each path's light is 1, nothing is left to chance; what rough metals keep has the table's error.
+    for (name, material, exact) in [
+        ("lambert", lambert([1.0; 3]), 1e-5),
+        ("mirror", white_metal(0.0), 1e-5),
+        ("glass", glass, 1e-5),
+        ("metal 0.3", white_metal(0.3), 2e-3),
+        ("metal 0.6", white_metal(0.6), 2e-3),
+        ("metal 1", white_metal(1.0), 2e-3),
+    ] {
+        let picture = draw(&gpu, &cube(material), Some(&sky), settings([24, 24], &["samples=64"]));
+        let [mean, error, _] = spread(&picture, 0);
+        assert!((mean - 1.0).abs() <= exact + 4.0 * error, "{name}: {mean} ± {error}");
+    }
+}
+
+/// The inside of a cube whose walls emit `glow` and reflect `albedo`.
+fn room(albedo: f32, glow: f32) -> Scene {
+    let mut made = Made::new("room");
+    made.add(Shape::cuboid(DVec3::splat(2.0)), Material { emissive: [glow; 3], ..lambert([albedo; 3]) }, DAffine3::IDENTITY);
+    made.camera(DVec3::new(0.1, -0.2, 0.3), DVec3::new(-0.4, 0.3, -0.9), perspective(90.0));
+    made.0
+}
+
+#[test]
+fn a_room_is_as_bright_as_its_walls_emit_and_keep() {
+    let gpu = Gpu::new();
+    // L = E/(1 − ρ) everywhere.
+    for (albedo, glow) in [(0.5, 0.5), (0.8, 0.2), (0.0, 1.0)] {
+        let picture = draw(&gpu, &room(albedo, glow), None, settings([16, 16], &["samples=256"]));
+        let [mean, error, _] = spread(&picture, 1);
+        assert!((mean - 1.0).abs() <= 1e-5 + 4.0 * error && error < 5e-3, "{albedo}: {mean} ± {error}");
+    }
+}
+
+/// A unit square of radiance 1 above a Lambert square of albedo 1, seen from between them.
+fn parallel_squares(distance: f64) -> Scene {
+    let mut made = Made::new("squares");
+    let lamp = Material { emissive: [1.0; 3], ..lambert([0.0; 3]) };
+    let down = DAffine3::from_rotation_x(std::f64::consts::FRAC_PI_2);
+    let up = DAffine3::from_rotation_x(-std::f64::consts::FRAC_PI_2);
+    made.add(Shape::panel(1.0, 1.0), lamp, at(0.0, distance, 0.0) * down);
+    made.add(Shape::panel(1.0, 1.0), lambert([1.0; 3]), up);
+    let near = 0.5 * distance;
+    made.camera(DVec3::Y * (0.75 * distance), DVec3::ZERO, Projection::Orthographic { half_height: 0.5, near: 0.5 * near, far: 10.0 });
+    made.0
+}
+
+#[test]
+fn squares_light_each_other_by_their_form_factor() {
+    let gpu = Gpu::new();
+    // Of parallel unit squares at a distance of 1, 0.5 and 2 (Howell, catalogue of configuration factors, C-11).
+    let form_factor = |c: f64| {
+        let x = 1.0 / c;
+        let root = (1.0 + x * x).sqrt();
+        let a = ((1.0 + x * x).powi(2) / (1.0 + 2.0 * x * x)).sqrt().ln();
+        let b = x * root * (x / root).atan() * 2.0;
+        2.0 / (std::f64::consts::PI * x * x) * (a + b - 2.0 * x * x.atan())
+    };
+    assert!((form_factor(1.0) - 0.199_824_89).abs() < 1e-7);
+    for distance in [1.0, 0.5, 2.0] {
+        let scene = parallel_squares(distance);
+        let picture = draw(&gpu, &scene, None, settings([24, 24], &["samples=64"]));
+        let [mean, _, _] = spread(&picture, 2);
+        // Pixels differ in truth as well: the error is that of another seed.
+        let other = draw(&gpu, &scene, None, Settings { seed: 1, ..settings([24, 24], &["samples=64"]) });
+        let noise: f64 = (mean - spread(&other, 2)[0]).abs().max(2e-4);
+        assert!((mean - form_factor(distance)).abs() < 4.0 * noise, "{distance}: {mean} for {}", form_factor(distance));
+    }
+}
+
+#[test]
+fn a_bright_spot_of_the_sky_is_found() {
+    let gpu = Gpu::new();
+    let mut sky = Environment::constant([0.2; 3]);
+    (sky.width, sky.height) = (64, 32);
+    sky.radiance = vec![[0.2; 3]; 64 * 32];
+    for (x, y) in [(40, 6), (41, 6), (40, 7), (10, 12)] {
+        sky.radiance[y * 64 + x] = [300.0, 200.0, 100.0];
+    }
+    let mut made = Made::new("floor");
+    made.add(Shape::panel(4.0, 4.0), lambert([0.8; 3]), DAffine3::from_rotation_x(-std::f64::consts::FRAC_PI_2));
+    made.camera(DVec3::Y * 5.0, DVec3::ZERO, orthographic(1.0));
+    // E = ∫ L cosθ dω over the upper half, by the midpoint rule in f64.
+    let (n, m) = (2000, 500);
+    let mut irradiance = [0.0; 3];
+    for i in 0..m {
+        for j in 0..n {
+            let theta = (f64::from(i) + 0.5) / f64::from(m) * std::f64::consts::FRAC_PI_2;
+            let phi = (f64::from(j) + 0.5) / f64::from(n) * std::f64::consts::TAU;
+            let d = DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
+            let weight = theta.sin() * theta.cos() * std::f64::consts::FRAC_PI_2 / f64::from(m) * std::f64::consts::TAU / f64::from(n);
+            let radiance = sky.sample(d);
+            irradiance.iter_mut().zip(radiance).for_each(|(sum, l)| *sum += l * weight);
+        }
+    }
+    let picture = draw(&gpu, &made.0, Some(&sky), settings([16, 16], &["samples=64"]));
+    for channel in 0..3 {
+        let wanted = irradiance[channel] * 0.8 / std::f64::consts::PI;
+        let [mean, error, _] = spread(&picture, channel);
+        assert!((mean - wanted).abs() < 4.0 * error + 2e-3 * wanted, "{channel}: {mean} ± {error} for {wanted}");
+        assert!(error < 0.01 * wanted, "{channel}: {mean} ± {error}");
+    }
+}
+
+#[test]
+fn light_from_points_and_from_afar_is_what_the_local_model_says() {
+    let gpu = Gpu::new();
+    let mut made = Made::new("lit floor");
+    let floor = Material { roughness: 0.5, specular: 1.0, ..lambert([0.6, 0.4, 0.2]) };
+    made.add(Shape::panel(4.0, 4.0), floor, DAffine3::from_rotation_x(-std::f64::consts::FRAC_PI_2));
+    made.light([20.0, 10.0, 5.0], LightKind::Point { position: DVec3::new(0.5, 2.0, 0.3), range: Some(9.0) });
+    made.light([1.0, 2.0, 3.0], LightKind::Directional { direction: DVec3::new(0.3, -1.0, 0.2).normalize() });
+    made.camera(DVec3::new(0.0, 3.0, 3.0), DVec3::ZERO, perspective(20.0));
+    let choices = &["samples=64", "brdf=ggx", "fresnel=exact"][..];
+    let paths = draw(&gpu, &made.0, None, settings([16, 16], choices));
+    let mut knobs = Knobs::of(Model::Recursive);
+    choices.iter().for_each(|choice| knobs.set(choice).expect("a rung"));
+    let local = draw(&gpu, &made.0, None, Settings { size: [16, 16], knobs, ..Settings::default() });
+    for channel in 0..3 {
+        let [mean, error, _] = spread(&paths, channel);
+        let [wanted, _, _] = spread(&local, channel);
+        assert!((mean - wanted).abs() < 5e-3 * wanted, "{channel}: {mean} ± {error} for {wanted}");
+    }
+}
+
+#[test]
+fn queues_and_one_dispatch_make_the_same_film() {
+    let gpu = Gpu::new();
+    for name in ["etalon", "cornell", "blend", "nested", "haze", "lamps", "materials", "metals", "pool", "radiance"] {
+        let scene = etalon::study::load(name).unwrap();
+        let sky = Environment::studio();
+        let sky = scene.studio.map(|_| &sky);
+        let of = |at_once: bool, seed: u32| {
+            let settings = Settings { seed, paths_at_once: at_once, ..settings([44, 29], &["samples=4"]) };
+            bits(&draw(&gpu, &scene, sky, settings))
+        };
+        let film = of(false, 0);
+        assert!(film == of(true, 0), "{name}: one dispatch makes another film");
+        assert!(film == of(false, 0), "{name}: another film the second time");
+        assert!(name == "radiance" || film != of(false, 1), "{name}: the seed changes nothing");
+    }
+}
+
+#[test]
+fn what_emits_lights_only_where_a_knob_says_so() {
+    let gpu = Gpu::new();
+    let scene = parallel_squares(1.0);
+    let picture = draw(&gpu, &scene, None, settings([8, 8], &["samples=4", "lights=points"]));
+    assert_eq!(spread(&picture, 0)[2], 0.0);
+    // It is seen all the same.
+    let mut turned = scene;
+    turned.cameras[0] = etalon::scene::Camera { projection: perspective(20.0), ..made::looking(DVec3::new(0.0, 0.3, 0.0), DVec3::Y) };
+    let picture = draw(&gpu, &turned, None, settings([8, 8], &["samples=4", "lights=points"]));
+    assert!((spread(&picture, 0)[0] - 1.0).abs() < 1e-6);
+}
