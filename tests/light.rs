@@ -443,7 +443,7 @@ fn compensation_is_for_lights_too() {
     let direction = DVec3::new(0.0, -0.3, -1.0).normalize();
     scene.lights.push(etalon::scene::Light {
         stand_in: false,
-            name: "sun".to_owned(),
+        name: "sun".to_owned(),
         color: [1.0; 3],
         kind: LightKind::Directional { direction },
     });

@@ -53,7 +53,8 @@ fn white_metal(roughness: f32) -> Material {
 fn nothing_white_shows_before_light_from_everywhere() {
     let gpu = Gpu::new();
     let sky = Environment::constant([1.0; 3]);
-    let glass = Material { transmission: 1.0, ior: 1.5, thickness: 1.0, specular: 1.0, roughness: 0.0, ..lambert([1.0; 3]) };
+    let glass =
+        Material { transmission: 1.0, ior: 1.5, thickness: 1.0, specular: 1.0, roughness: 0.0, ..lambert([1.0; 3]) };
     // Where each path's light is 1, nothing is left to chance; what rough metals keep has the table's error.
     for (name, material, exact) in [
         ("lambert", lambert([1.0; 3]), 1e-5),
@@ -72,7 +73,11 @@ fn nothing_white_shows_before_light_from_everywhere() {
 /// The inside of a cube whose walls emit `glow` and reflect `albedo`.
 fn room(albedo: f32, glow: f32) -> Scene {
     let mut made = Made::new("room");
-    made.add(Shape::cuboid(DVec3::splat(2.0)), Material { emissive: [glow; 3], ..lambert([albedo; 3]) }, DAffine3::IDENTITY);
+    made.add(
+        Shape::cuboid(DVec3::splat(2.0)),
+        Material { emissive: [glow; 3], ..lambert([albedo; 3]) },
+        DAffine3::IDENTITY,
+    );
     made.camera(DVec3::new(0.1, -0.2, 0.3), DVec3::new(-0.4, 0.3, -0.9), perspective(90.0));
     made.0
 }
@@ -97,7 +102,11 @@ fn parallel_squares(distance: f64) -> Scene {
     made.add(Shape::panel(1.0, 1.0), lamp, at(0.0, distance, 0.0) * down);
     made.add(Shape::panel(1.0, 1.0), lambert([1.0; 3]), up);
     let near = 0.5 * distance;
-    made.camera(DVec3::Y * (0.75 * distance), DVec3::ZERO, Projection::Orthographic { half_height: 0.5, near: 0.5 * near, far: 10.0 });
+    made.camera(
+        DVec3::Y * (0.75 * distance),
+        DVec3::ZERO,
+        Projection::Orthographic { half_height: 0.5, near: 0.5 * near, far: 10.0 },
+    );
     made.0
 }
 
@@ -144,7 +153,8 @@ fn a_bright_spot_of_the_sky_is_found() {
             let theta = (f64::from(i) + 0.5) / f64::from(m) * std::f64::consts::FRAC_PI_2;
             let phi = (f64::from(j) + 0.5) / f64::from(n) * std::f64::consts::TAU;
             let d = DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
-            let weight = theta.sin() * theta.cos() * std::f64::consts::FRAC_PI_2 / f64::from(m) * std::f64::consts::TAU / f64::from(n);
+            let weight = theta.sin() * theta.cos() * std::f64::consts::FRAC_PI_2 / f64::from(m) * std::f64::consts::TAU
+                / f64::from(n);
             let radiance = sky.sample(d);
             irradiance.iter_mut().zip(radiance).for_each(|(sum, l)| *sum += l * weight);
         }
@@ -205,7 +215,8 @@ fn what_emits_lights_only_where_a_knob_says_so() {
     assert_eq!(spread(&picture, 0)[2], 0.0);
     // It is seen all the same.
     let mut turned = scene;
-    turned.cameras[0] = etalon::scene::Camera { projection: perspective(20.0), ..made::looking(DVec3::new(0.0, 0.3, 0.0), DVec3::Y) };
+    turned.cameras[0] =
+        etalon::scene::Camera { projection: perspective(20.0), ..made::looking(DVec3::new(0.0, 0.3, 0.0), DVec3::Y) };
     let picture = draw(&gpu, &turned, None, settings([8, 8], &["samples=4", "lights=points"]));
     assert!((spread(&picture, 0)[0] - 1.0).abs() < 1e-6);
 }

@@ -53,9 +53,8 @@ void cross_what_touches(inout Boundary r, HitSurface hit, vec3 direction) {
 // `direction` is the ray's.
 Boundary boundary_at(HitSurface hit, uvec4 media, vec3 direction) {
     Boundary r;
-    Material m = material_at(hit.material);
-    uint medium = m.medium;
-    bool transmissive = TRANSMISSIVE && m.transmission > 0.0;
+    uint medium = hit.medium;
+    bool transmissive = TRANSMISSIVE && hit.transmission > 0.0;
     r.sheet = transmissive && hit.sheet;
     r.solid = transmissive && !r.sheet;
     r.beyond = hit.front ? entered(media, medium) : left(media, medium);
@@ -85,7 +84,7 @@ vec3 tint_through(HitSurface hit, bool sheet) {
     vec3 tint = sheet ? hit.s.base : sqrt(hit.s.base);
     if (ABSORPTION != 0) {
         bool nominal = sheet || (ABSORPTION == 1 && hit.front);
-        tint *= nominal ? exp(-material_at(hit.material).sigma_thickness * hit.thickness) : vec3(1.0);
+        tint *= nominal ? exp(-hit.sigma_thickness * hit.thickness) : vec3(1.0);
     }
     return tint;
 }

@@ -6,6 +6,9 @@
 #include "lib/reflectance.glsl"
 #include "lib/snell.glsl"
 
+layout(constant_id = 51) const bool ROUGH = false;   // some lobe is rough
+layout(constant_id = 71) const bool FROSTED = false; // some surface that lets light through is
+
 struct Bsdf {
     Surface s;       // compensated; its diffuse albedo without what goes through
     vec3 n;          // of the triangle, on the viewer's side
@@ -20,6 +23,9 @@ struct Bsdf {
     float transmits;
     float enters;    // what the base's lobe leaves to what lies below it, where that does not depend on the light's direction
     float under;     // what a sharp coat lets through
+    vec3 f_dielectric; // reflectance at the viewer's angle: of the dielectric part …
+    vec3 f_sharp;    // … and of the mixture
+    bool total;
     vec4 shares;     // probabilities of coat, lobe, diffuse ground, through; their sum is 1, or 0 where nothing is scattered
 };
 
@@ -30,10 +36,6 @@ float mean(vec3 v) {
 // Below the lobe light is only lost to it: for a sharp one by its reflectance at the viewer's angle, for `ggx-multi` by its
 // directional reflectance there, so that no surface sends more than it receives. The other models have 1 − F(V·H), as the
 // deferred pass does, which at grazing angles is more than the lobe leaves.
-bool enters_by_view(Bsdf b) {
-    return b.sharp || BRDF == 3;
-}
-
 Bsdf bsdf_of(HitSurface hit, Boundary boundary) {
     Bsdf b;
     b.s = hit.s;
@@ -45,14 +47,13 @@ Bsdf bsdf_of(HitSurface hit, Boundary boundary) {
     b.n1 = index_of(boundary.here);
     b.n2 = boundary.solid ? index_of(boundary.there) : b.s.ior;
     // Where nothing is bent, nothing is spread either.
-    b.sharp = b.s.roughness <= MIN_ROUGHNESS || (b.solid && b.n1 == b.n2);
-    b.coat_sharp = b.s.clearcoat_roughness <= MIN_ROUGHNESS;
+    b.sharp = !ROUGH || b.s.roughness <= MIN_ROUGHNESS || (b.solid && b.n1 == b.n2);
+    b.coat_sharp = !ROUGH || b.s.clearcoat_roughness <= MIN_ROUGHNESS;
     if (!b.sharp) compensate(b.s);
-    bool total;
-    vec3 f_dielectric = reflectance_between(b.s, b.solid, b.n1, b.n2, b.cos_v, total);
-    vec3 f = mix(f_dielectric, fresnel_of_metal(b.s, b.cos_v), b.s.metallic) * b.s.compensation;
-    b.enters = 1.0 - largest(f_dielectric);
-    if (BRDF == 3 && !b.sharp) {
+    b.f_dielectric = reflectance_between(b.s, b.solid, b.n1, b.n2, b.cos_v, b.total);
+    b.f_sharp = mix(b.f_dielectric, fresnel_of_metal(b.s, b.cos_v), b.s.metallic);
+    b.enters = 1.0 - largest(b.f_dielectric);
+    if (ROUGH && BRDF == 3 && !b.sharp) {
         vec2 ab = lobe_reflectance(b.s);
         b.enters = 1.0 - min(largest((b.s.f0_dielectric * ab.x + b.s.f90_dielectric * ab.y) * b.s.compensation), 1.0);
     }
@@ -65,8 +66,8 @@ Bsdf bsdf_of(HitSurface hit, Boundary boundary) {
         coat = 1.0 - under_coat(b.s);
         b.under = b.coat_sharp ? 1.0 - coat : 1.0;
     }
-    float below = 1.0 - largest(f_dielectric);
-    b.shares = vec4(coat, vec3(1.0 - coat) * vec3(mean(f), mean(b.s.diffuse) * b.enters, mean(b.tint) * b.transmits * below));
+    float below = 1.0 - largest(b.f_dielectric);
+    b.shares = vec4(coat, vec3(1.0 - coat) * vec3(mean(b.f_sharp * b.s.compensation), mean(b.s.diffuse) * b.enters, mean(b.tint) * b.transmits * below));
     float sum = dot(b.shares, vec4(1.0));
     b.shares = sum > 0.0 ? b.shares / sum : vec4(0.0);
     return b;
@@ -74,10 +75,8 @@ Bsdf bsdf_of(HitSurface hit, Boundary boundary) {
 
 // What goes straight through a sharp surface that bends nothing: a sheet, or a boundary between equal indices.
 vec3 straight_through(Bsdf b) {
-    bool total;
-    vec3 f = reflectance_between(b.s, b.solid, b.n1, b.n2, b.cos_v, total);
     bool straight = b.sharp && (b.sheet || (b.solid && b.n1 == b.n2));
-    return straight ? b.tint * (b.transmits * (1.0 - largest(f)) * b.under) : vec3(0.0);
+    return straight ? b.tint * (b.transmits * (1.0 - largest(b.f_dielectric)) * b.under) : vec3(0.0);
 }
 
 struct Scattered {
@@ -98,29 +97,32 @@ Scattered scattered(Bsdf b, vec3 l) {
     float cos_l = dot(s.n, l);
     bool above = dot(b.n, l) > 0.0;
     if (above && cos_l > 0.0) {
-        HalfAngle h = BRDF <= 1 ? phong_half_angle(s.n, l, s.v) : half_angle(s.n, l, s.v);
-        bool total;
-        vec3 f_dielectric = reflectance_between(s, b.solid, b.n1, b.n2, h.cos_d, total);
         vec3 lobe = vec3(0.0);
-        float enters = enters_by_view(b) || BRDF <= 1 ? b.enters : 1.0 - largest(f_dielectric);
-        if (!b.sharp) {
-            if (BRDF <= 1) {
-                float shine = shine_from_alpha(s.alpha);
-                vec3 ks = s.f0 * ((shine + 2.0) * 0.5 * INV_PI);
-                float cosine_power = phong_lobe(h, shine);
-                lobe = BRDF == 0 ? ks * (cosine_power * 0.25) : ks * (reciprocal_lobe(h, cosine_power) * cos_l);
-                enters = 1.0;
-            } else {
-                vec3 f = mix(f_dielectric, fresnel_of_metal(s, h.cos_d), s.metallic);
-                float d = ggx_distribution(h.cos_h, h.sin2_h, s.alpha);
-                lobe = f * s.compensation * (d * ggx_visibility(cos_l, b.cos_v, s.alpha) * cos_l);
+        float enters = b.enters;
+        if (ROUGH) {
+            HalfAngle h = BRDF <= 1 ? phong_half_angle(s.n, l, s.v) : half_angle(s.n, l, s.v);
+            if (!b.sharp) {
+                if (BRDF <= 1) {
+                    float shine = shine_from_alpha(s.alpha);
+                    vec3 ks = s.f0 * ((shine + 2.0) * 0.5 * INV_PI);
+                    float cosine_power = phong_lobe(h, shine);
+                    lobe = BRDF == 0 ? ks * (cosine_power * 0.25) : ks * (reciprocal_lobe(h, cosine_power) * cos_l);
+                    enters = 1.0;
+                } else {
+                    bool total;
+                    vec3 f_dielectric = reflectance_between(s, b.solid, b.n1, b.n2, h.cos_d, total);
+                    vec3 f = mix(f_dielectric, fresnel_of_metal(s, h.cos_d), s.metallic);
+                    float d = ggx_distribution(h.cos_h, h.sin2_h, s.alpha);
+                    lobe = f * s.compensation * (d * ggx_visibility(cos_l, b.cos_v, s.alpha) * cos_l);
+                    if (BRDF == 2) enters = 1.0 - largest(f_dielectric);
+                }
+                r.pdf += b.shares.y * mirrored_pdf(b.cos_v, h, s.alpha);
             }
-            r.pdf += b.shares.y * mirrored_pdf(b.cos_v, h, s.alpha);
         }
         r.f_cos = s.diffuse * (INV_PI * enters * cos_l) + lobe;
         r.pdf += b.shares.z * cos_l * INV_PI;
     }
-    if (TRANSMISSIVE) {
+    if (TRANSMISSIVE && FROSTED) {
         bool below = dot(b.n, l) < 0.0 && cos_l < 0.0 && !b.sharp && b.transmits > 0.0;
         if (below) {
             // A sheet spreads as its mirror image does, to the other side. Between two media the half vector that bends v
@@ -147,7 +149,8 @@ Scattered scattered(Bsdf b, vec3 l) {
             }
         }
     }
-    if (CLEARCOAT) {
+    if (CLEARCOAT && !ROUGH) r.f_cos *= b.under;
+    if (CLEARCOAT && ROUGH) {
         HalfAngle h = half_angle(s.n_coat, l, s.v);
         float coat_l = dot(s.n_coat, l);
         float coat_v = max(dot(s.n_coat, s.v), 1e-4);
@@ -155,7 +158,7 @@ Scattered scattered(Bsdf b, vec3 l) {
         bool on_coat = above && coat_l > 0.0 && !b.coat_sharp;
         float d = ggx_distribution(h.cos_h, h.sin2_h, s.clearcoat_alpha);
         float lobe = on_coat ? d * ggx_visibility(coat_l, coat_v, s.clearcoat_alpha) * coat_l : 0.0;
-        r.f_cos = r.f_cos * (b.coat_sharp || !above ? under_coat(s) : 1.0 - f) + f * lobe;
+        r.f_cos = r.f_cos * (b.coat_sharp ? b.under : above ? 1.0 - f : under_coat(s)) + f * lobe;
         r.pdf += on_coat ? b.shares.x * mirrored_pdf(coat_v, h, s.clearcoat_alpha) : 0.0;
     }
     return r;
@@ -182,8 +185,7 @@ Drawn draw_direction(Bsdf b, vec3 direction, float x, vec2 u) {
     bool sharp = coat ? b.coat_sharp : b.sharp;
     vec3 n = coat ? s.n_coat : s.n;
     vec3 h = n;
-    if (!sharp) h = half_vector(n, s.v, coat ? s.clearcoat_alpha : s.alpha, u);
-    float cos_h = clamp(dot(h, s.v), 0.0, 1.0);
+    if (ROUGH && !sharp) h = half_vector(n, s.v, coat ? s.clearcoat_alpha : s.alpha, u);
     vec3 mirrored = reflect_ray(direction, h).R;
     r.sharp = sharp && !diffuse;
     r.direction = r.sharp ? on_side(mirrored, b.n) : mirrored;
@@ -192,12 +194,9 @@ Drawn draw_direction(Bsdf b, vec3 direction, float x, vec2 u) {
         vec3 l = cosine_sample(u.x, u.y).L;
         r.direction = frame.t * l.x + frame.b * l.y + s.n * l.z;
     }
-    bool total;
-    vec3 f_dielectric = reflectance_between(s, b.solid, b.n1, b.n2, cos_h, total);
     if (r.sharp) {
-        vec3 f = mix(f_dielectric, fresnel_of_metal(s, cos_h), s.metallic) * b.under;
         float f_coat = CLEARCOAT ? 1.0 - under_coat(s) : 0.0;
-        r.weight = coat ? vec3(f_coat / b.shares.x) : b.shares.y > 0.0 ? f / b.shares.y : vec3(0.0);
+        r.weight = coat ? vec3(f_coat / b.shares.x) : b.shares.y > 0.0 ? b.f_sharp * (b.under / b.shares.y) : vec3(0.0);
     }
     if (through) {
         Refraction t = refract_ray(direction, h, b.n2 / b.n1);
@@ -208,8 +207,9 @@ Drawn draw_direction(Bsdf b, vec3 direction, float x, vec2 u) {
         r.direction = b.sharp ? -on_side(-l, b.n) : l;
         r.through = true;
         r.straight = b.sharp && (b.sheet || b.n1 == b.n2);
-        bool passes = !(b.solid && (total || t.tir)) || r.straight;
-        r.weight = b.sharp && passes ? b.tint * (b.transmits * (1.0 - largest(f_dielectric)) * b.under / b.shares.w) : vec3(0.0);
+        bool passes = !(b.solid && ((b.sharp && b.total) || t.tir)) || r.straight;
+        float enters = b.transmits * (1.0 - largest(b.f_dielectric));
+        r.weight = b.sharp && passes ? b.tint * (enters * b.under / b.shares.w) : vec3(0.0);
         r.sharp = r.sharp || !passes;
     }
     return r;

@@ -115,7 +115,7 @@ vec3 doubled_area(uint triangle, out vec3 a, out vec3 ab, out vec3 ac) {
 // Radiance that a triangle sends from the place with these barycentrics.
 vec3 emission_at(uint triangle, float u, float v) {
     uint material = hit_material(triangle) & 0xffffu;
-    vec3 radiance = material_at(material).emissive;
+    vec3 radiance = material_emissive(material);
     if ((HIT_TEXTURES & (1u << SLOT_EMISSIVE)) != 0) {
         HitPoint point = hit_point_of(Hit(0.0, triangle, u, v), vec3(0.0), vec3(0.0));
         radiance *= hit_texture_or(material, SLOT_EMISSIVE, point.uvs, 0.0, vec4(1.0)).rgb;

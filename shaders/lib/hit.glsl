@@ -221,6 +221,10 @@ struct HitSurface {
     float thickness; // texel, times how long a metre of the object is in the world
     bool sheet;      // transmits light and encloses nothing
     uint material;
+    // Of its material.
+    float transmission;
+    uint medium;
+    vec3 sigma_thickness;
 };
 
 // The surface as seen along `direction`, by a ray that is as wide as `width` there.
@@ -257,6 +261,9 @@ HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
     r.coverage = coverage_of(m, base.a);
     r.sheet = point.sheet;
     r.material = id;
+    r.transmission = m.transmission;
+    r.medium = m.medium;
+    r.sigma_thickness = m.sigma_thickness;
     r.s = surface_from_texels(m, base.rgb, metallic_roughness.b, metallic_roughness.g, occlusion, glow, layers,
                               side * n, side * n_coat, -direction, point.p - trace_terms.bvh_from_rel);
     r.s.p_bvh = point.p;

@@ -25,6 +25,10 @@ Material material_at(uint id) {
                     floatBitsToUint(t5.w), t6.xyz, floatBitsToUint(t6.w), t7.xyz, t7.w, t8.xyz, floatBitsToUint(t8.w));
 }
 
+vec3 material_emissive(uint id) {
+    return material_texel(id, 1).xyz;
+}
+
 float material_ior(uint id) {
     return material_texel(id, 4).x;
 }

@@ -113,11 +113,10 @@ vec3 light_that_arrives(LightTask task) {
     return result;
 }
 
-// What a path meets: light that this sends along it, and the path as it goes on. `gathered.w` is −1 where nothing lies behind
-// all that it went through.
-vec4 meet(inout Path p, Hit found, uvec2 pixel, out LightTask task) {
+// What a path meets: light that this sends along it, and the path as it goes on.
+vec3 meet(inout Path p, Hit found, uvec2 pixel, out LightTask task) {
     task = LightTask(p.origin, vec3(0.0, 1.0, 0.0), -1.0, p.self, p.media, vec3(0.0));
-    vec4 gathered = vec4(0.0);
+    vec3 gathered = vec3(0.0);
     bool at_surface = found.triangle != NO_TRIANGLE;
     uint met_before = p.state & PATH_SURFACES;
     uint medium = present_medium(p.media);
@@ -144,11 +143,11 @@ vec4 meet(inout Path p, Hit found, uvec2 pixel, out LightTask task) {
         vec3 seen = textureLod(sky, equirectangular_from_direction(into_environment(towards)), 0.0).rgb * environment.intensity;
         bool clear = (p.state & PATH_CLEAR) != 0 && !SKY;
         float w = p.pdf > 0.0 ? mis_weight(p.pdf, sky_pdf(p.direction)) : 1.0;
-        if (!at_surface && !clear) gathered.rgb = p.throughput * seen * w;
+        if (!at_surface && !clear) gathered = p.throughput * seen * w;
         if (EMITTING_SKY && light.pdf > 0.0 && light.t_max == LARGEST) light.arriving *= seen;
     }
     bool ends = !at_surface;
-    if (!at_surface && !SKY && (p.state & PATH_CLEAR) != 0) gathered.w = -1.0;
+    bool open = !at_surface && !SKY && (p.state & PATH_CLEAR) != 0;
 
     // What the surface itself sends.
     if (at_surface && !passed_by) {
@@ -162,7 +161,7 @@ vec4 meet(inout Path p, Hit found, uvec2 pixel, out LightTask task) {
             float drawn = picked_per_area(place) * (r * r) / cos_light;
             w = p.pdf > 0.0 && drawn > 0.0 ? mis_weight(p.pdf, drawn) : 1.0;
         }
-        gathered.rgb = shows ? p.throughput * emits * w : vec3(0.0);
+        gathered = shows ? p.throughput * emits * w : vec3(0.0);
         ends = ends || hit.s.unlit;
     }
 
@@ -225,25 +224,24 @@ vec4 meet(inout Path p, Hit found, uvec2 pixel, out LightTask task) {
     }
     p.throughput = only_finite(p.throughput, pixel, hit.material, met_before);
     task.contribution = only_finite(task.contribution, pixel, hit.material, met_before);
-    gathered.rgb = only_finite(gathered.rgb, pixel, hit.material, met_before);
+    gathered = only_finite(gathered, pixel, hit.material, met_before);
+    flags |= open ? PATH_OPEN : 0u;
     p.state = met_now | flags | (!ends && largest(p.throughput) > 0.0 ? PATH_ALIVE : 0u);
     return gathered;
 }
 
 // Two paths at once: rays are traced in pairs, surfaces one after the other, in code that is there once.
-struct Gathered {
-    vec4 a;
-    vec4 b;
-};
-
-Gathered bounce(inout Path a, inout Path b, uvec2 pixel_a, uvec2 pixel_b) {
+void bounce(inout Path a, inout Path b, uvec2 pixel_a, uvec2 pixel_b) {
     bool there_a = (a.state & PATH_ALIVE) != 0;
     bool there_b = (b.state & PATH_ALIVE) != 0;
     HitPair found = trace_pair(PairedRay(a.origin, a.direction, a.self, TOUCHING ? a.after : 0.0, there_a ? LARGEST : -1.0),
                                PairedRay(b.origin, b.direction, b.self, TOUCHING ? b.after : 0.0, there_b ? LARGEST : -1.0),
                                OPAQUE | FILTER, false);
     path_rays += (there_a ? 1u : 0u) + (there_b ? 1u : 0u);
-    Gathered g = Gathered(vec4(0.0), vec4(0.0));
+    vec3 sum_a = a.sum;
+    vec3 sum_b = b.sum;
+    vec3 gathered_a = vec3(0.0);
+    vec3 gathered_b = vec3(0.0);
     LightTask of_a, of_b;
     for (int i = 0; i < 2; i++) {
         loop_heads++;
@@ -256,15 +254,15 @@ Gathered bounce(inout Path a, inout Path b, uvec2 pixel_a, uvec2 pixel_b) {
             pixel = pixel_b;
         }
         LightTask task;
-        vec4 now = meet(p, hit, pixel, task);
+        vec3 now = meet(p, hit, pixel, task);
         if (i == 0) {
             a = p;
             of_a = task;
-            g.a = now;
+            gathered_a = now;
         } else {
             b = p;
             of_b = task;
-            g.b = now;
+            gathered_b = now;
         }
     }
     if (EMITTERS > 0) {
@@ -289,11 +287,10 @@ Gathered bounce(inout Path a, inout Path b, uvec2 pixel_a, uvec2 pixel_b) {
             arrives_a *= blocked.a.triangle == NO_TRIANGLE ? left_of_light(of_a) : vec3(0.0);
             arrives_b *= blocked.b.triangle == NO_TRIANGLE ? left_of_light(of_b) : vec3(0.0);
         }
-        g.a.rgb += of_a.contribution * arrives_a;
-        g.b.rgb += of_b.contribution * arrives_b;
+        gathered_a += of_a.contribution * arrives_a;
+        gathered_b += of_b.contribution * arrives_b;
     }
-    if (!there_a) g.a = vec4(0.0);
-    if (!there_b) g.b = vec4(0.0);
-    return g;
+    a.sum = there_a ? sum_a + gathered_a : sum_a;
+    b.sum = there_b ? sum_b + gathered_b : sum_b;
 }
 #endif

@@ -32,6 +32,7 @@ Path path_through(uvec2 pixel) {
     p.media = trace_terms.camera_media;
     p.travelled = 0.0;
     p.after = 0.0;
+    p.sum = vec3(0.0);
     return p;
 }
 #endif

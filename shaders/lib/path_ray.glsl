@@ -14,11 +14,13 @@ struct Path {
     uvec4 media;
     float travelled;  // since that surface
     float after;      // nothing up to here is met
+    vec3 sum;         // light so far
 };
 const uint PATH_ALIVE = 0x100u;
 const uint PATH_CLEAR = 0x200u;    // only let through so far
 const uint PATH_STRAIGHT = 0x400u; // nothing has happened to it since the eye
 const uint PATH_SPREAD = 0x800u;   // some surface has spread it
+const uint PATH_OPEN = 0x1000u;    // nothing lay behind all that it went through
 const uint PATH_SURFACES = 0xffu;
 
 // Pairs of random numbers of one surface.
@@ -30,5 +32,10 @@ const uint DRAW_PIXEL = 3;
 
 uvec2 draw_words(uvec2 pixel, uint surface, uint draw) {
     return random_words(pixel, surface * DRAWS + draw, trace_terms.seed, trace_terms.sample_index);
+}
+
+// What the film gets of a path that is through.
+vec4 radiance_of(Path p) {
+    return vec4(p.sum, (p.state & PATH_OPEN) != 0 ? 0.0 : 1.0);
 }
 #endif

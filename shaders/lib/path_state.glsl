@@ -1,18 +1,24 @@
-// Paths between two dispatches: by pixel, whatever their place in a queue.
+// Paths between two dispatches: by pixel, whatever their place in a queue. Four words at a time in buffers of their own: what
+// neighbours read lies together, and large pictures fit what one binding holds.
 #ifndef PATH_STATE_GLSL
 #define PATH_STATE_GLSL
 #include "lib/path_ray.glsl"
 
 layout(constant_id = 69) const bool KEEPS_MEDIA = false; // paths go through media
-layout(constant_id = 70) const bool KEEPS_WAY = false;   // or through what lets them straight on
+layout(constant_id = 70) const bool KEEPS_AFTER = false; // something opaque lies against some of them
 
-// Texels of a path lie as far from each other as there are pixels: those of neighbours are beside each other.
-layout(set = 0, binding = 52, rgba32ui) uniform uimageBuffer path_states;
+layout(scalar, set = 0, binding = 52) buffer Origins { uvec4 origins[]; };          // and self
+layout(scalar, set = 0, binding = 53) buffer Directions { uvec4 directions[]; };    // and pdf
+layout(scalar, set = 0, binding = 54) buffer Throughputs { uvec4 throughputs[]; };  // and state
+layout(scalar, set = 0, binding = 55) buffer Sums { uvec4 sums[]; };                // and travelled
+layout(scalar, set = 0, binding = 56) buffer Media { uvec4 media[]; };
+layout(scalar, set = 0, binding = 57) buffer Afters { float afters[]; };
 
-Path path_of(uint pixel, uint pixels) {
-    uvec4 a = imageLoad(path_states, int(pixel));
-    uvec4 b = imageLoad(path_states, int(pixels + pixel));
-    uvec4 c = imageLoad(path_states, int(2 * pixels + pixel));
+Path path_of(uint pixel) {
+    uvec4 a = origins[pixel];
+    uvec4 b = directions[pixel];
+    uvec4 c = throughputs[pixel];
+    uvec4 d = sums[pixel];
     Path p;
     p.origin = uintBitsToFloat(a.xyz);
     p.self = a.w;
@@ -20,26 +26,21 @@ Path path_of(uint pixel, uint pixels) {
     p.pdf = uintBitsToFloat(b.w);
     p.throughput = uintBitsToFloat(c.xyz);
     p.state = c.w;
+    p.sum = uintBitsToFloat(d.xyz);
+    p.travelled = uintBitsToFloat(d.w);
     p.media = trace_terms.camera_media;
-    if (KEEPS_MEDIA) p.media = imageLoad(path_states, int(3 * pixels + pixel));
-    p.travelled = 0.0;
+    if (KEEPS_MEDIA) p.media = media[pixel];
     p.after = 0.0;
-    if (KEEPS_WAY) {
-        uvec4 d = imageLoad(path_states, int((KEEPS_MEDIA ? 4 : 3) * pixels + pixel));
-        p.travelled = uintBitsToFloat(d.x);
-        p.after = uintBitsToFloat(d.y);
-    }
+    if (KEEPS_AFTER) p.after = afters[pixel];
     return p;
 }
 
-void store_path(Path p, uint pixel, uint pixels) {
-    imageStore(path_states, int(pixel), uvec4(floatBitsToUint(p.origin), p.self));
-    imageStore(path_states, int(pixels + pixel), uvec4(floatBitsToUint(p.direction), floatBitsToUint(p.pdf)));
-    imageStore(path_states, int(2 * pixels + pixel), uvec4(floatBitsToUint(p.throughput), p.state));
-    if (KEEPS_MEDIA) imageStore(path_states, int(3 * pixels + pixel), p.media);
-    if (KEEPS_WAY) {
-        uvec4 d = uvec4(floatBitsToUint(p.travelled), floatBitsToUint(p.after), 0, 0);
-        imageStore(path_states, int((KEEPS_MEDIA ? 4 : 3) * pixels + pixel), d);
-    }
+void store_path(Path p, uint pixel) {
+    origins[pixel] = uvec4(floatBitsToUint(p.origin), p.self);
+    directions[pixel] = uvec4(floatBitsToUint(p.direction), floatBitsToUint(p.pdf));
+    throughputs[pixel] = uvec4(floatBitsToUint(p.throughput), p.state);
+    sums[pixel] = uvec4(floatBitsToUint(p.sum), floatBitsToUint(p.travelled));
+    if (KEEPS_MEDIA) media[pixel] = p.media;
+    if (KEEPS_AFTER) afters[pixel] = p.after;
 }
 #endif

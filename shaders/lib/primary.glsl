@@ -109,6 +109,9 @@ Primary primary_surface(ivec2 pixel, bool exact_normals) {
     r.hit.sheet = (instances[instance].flags & INSTANCE_SHEET) != 0;
     r.hit.thickness = instances[instance].scale;
     r.hit.material = material;
+    r.hit.transmission = m.transmission;
+    r.hit.medium = m.medium;
+    r.hit.sigma_thickness = m.sigma_thickness;
     return r;
 }
 #endif

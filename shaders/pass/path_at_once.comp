@@ -23,17 +23,13 @@ void main() {
     Path b = path_through(pixel_b);
     if (!inside_a) a.state = 0;
     if (!inside_b) b.state = 0;
-    vec4 sum_a = vec4(0.0, 0.0, 0.0, 1.0);
-    vec4 sum_b = sum_a;
     bool more;
     do {
         loop_heads++;
-        Gathered g = bounce(a, b, pixel_a, pixel_b);
-        sum_a += g.a;
-        sum_b += g.b;
+        bounce(a, b, pixel_a, pixel_b);
         more = ((a.state | b.state) & PATH_ALIVE) != 0 && loop_heads < LOOP_BUDGET;
     } while (more);
-    if (inside_a) imageStore(radiance, ivec2(pixel_a), sum_a);
-    if (inside_b) imageStore(radiance, ivec2(pixel_b), sum_b);
+    if (inside_a) imageStore(radiance, ivec2(pixel_a), radiance_of(a));
+    if (inside_b) imageStore(radiance, ivec2(pixel_b), radiance_of(b));
     count_paths(path_rays, lost);
 }

@@ -5,9 +5,9 @@
 layout(local_size_x = 64) in;
 #include "lib/queue.glsl"
 
-layout(set = 0, binding = 0, r32ui) readonly uniform uimageBuffer queue;
+layout(scalar, set = 0, binding = 0) readonly buffer Queue { uint queue[]; };
 layout(scalar, set = 0, binding = 1) readonly buffer Sizes { QueueSize size; };
-layout(set = 0, binding = 2, r32ui) writeonly uniform uimageBuffer chunks;
+layout(scalar, set = 0, binding = 2) writeonly buffer Chunks { uint chunks[]; };
 
 void main() {
     uint chunk = listed_tile(gl_WorkGroupID) * 64 + gl_LocalInvocationID.x;
@@ -15,8 +15,8 @@ void main() {
     uint going_on = 0;
     for (uint i = 0; i < CHUNK; i++) {
         uint place = chunk * CHUNK + i;
-        uint entry = place < size.paths.count ? imageLoad(queue, int(place)).x : ENDED;
+        uint entry = place < size.paths.count ? queue[place] : ENDED;
         going_on += (entry & ENDED) == 0 ? 1u : 0u;
     }
-    imageStore(chunks, int(chunk), uvec4(going_on));
+    chunks[chunk] = going_on;
 }

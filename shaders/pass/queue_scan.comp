@@ -6,7 +6,7 @@ layout(local_size_x = 256) in;
 #include "lib/queue.glsl"
 
 layout(scalar, set = 0, binding = 0) readonly buffer Sizes { QueueSize size; };
-layout(set = 0, binding = 1, r32ui) uniform uimageBuffer chunks;
+layout(scalar, set = 0, binding = 1) buffer Chunks { uint chunks[]; };
 layout(scalar, set = 0, binding = 2) writeonly buffer NextSizes { QueueSize next_size; };
 
 shared uint sums[256];
@@ -18,14 +18,14 @@ void main() {
     uint first = min(lane * share, all_chunks);
     uint end = min(first + share, all_chunks);
     uint sum = 0;
-    for (uint i = first; i < end; i++) sum += imageLoad(chunks, int(i)).x;
+    for (uint i = first; i < end; i++) sum += chunks[i];
     sums[lane] = sum;
     barrier();
     uint before = 0;
     for (uint i = 0; i < lane; i++) before += sums[i];
     for (uint i = first; i < end; i++) {
-        uint here = imageLoad(chunks, int(i)).x;
-        imageStore(chunks, int(i), uvec4(before));
+        uint here = chunks[i];
+        chunks[i] = before;
         before += here;
     }
     if (lane == 255) {

@@ -90,7 +90,7 @@ fn halvings(count: u32) -> u32 {
 pub struct PathsOnDevice {
     /// What is done at their surfaces.
     pub with: Paths,
-    states: Buffer,
+    states: [Buffer; 6],
     queues: [Buffer; 2],
     sizes: [Buffer; 2],
     first_size: Buffer,
@@ -106,22 +106,31 @@ impl PathsOnDevice {
     pub fn new(device: &Arc<Device>, with: Paths, plan: &Plan, touching: bool, size: [u32; 2]) -> Result<Self> {
         let rays = plan.rays.unwrap_or_default();
         let pixels = u64::from(size[0]) * u64::from(size[1]);
-        let texels = 3 + u64::from(rays.transmissive) + u64::from(rays.filters || touching);
         let places = places(size);
-        let texel_buffer =
-            |name, bytes, format| Buffer::texels(device, name, bytes, Place::Device, format);
-        let queue = || texel_buffer("queue of paths", 4 * u64::from(places), vk::Format::R32_UINT);
+        let words = |name, wanted: bool, words: u64| {
+            let (name, bytes) = if wanted { (name, 4 * words) } else { (NOTHING, 0) };
+            Buffer::new(device, name, bytes, Place::Device)
+        };
+        let queue = || words("queue of paths", true, u64::from(places));
         let queue_size = || Buffer::new(device, "queue size", SIZE_BYTES, Place::Device);
         let [groups, rows, _] = rows_of(places.div_ceil(PATHS_IN_GROUP));
-        let [chunk_groups, chunk_rows, _] = rows_of(places.div_ceil(CHUNK).div_ceil(queue_count::PROGRAM.local_size[0]));
+        let [chunk_groups, chunk_rows, _] =
+            rows_of(places.div_ceil(CHUNK).div_ceil(queue_count::PROGRAM.local_size[0]));
         let first_size = [groups, rows, 1, places, chunk_groups, chunk_rows, 1, 0];
         Ok(Self {
             with,
-            states: texel_buffer("paths", 16 * texels * pixels, vk::Format::R32G32B32A32_UINT)?,
+            states: [
+                words("origins of paths", true, 4 * pixels)?,
+                words("directions of paths", true, 4 * pixels)?,
+                words("throughputs of paths", true, 4 * pixels)?,
+                words("light of paths", true, 4 * pixels)?,
+                words("media of paths", rays.transmissive, 4 * pixels)?,
+                words("what paths are after", touching, pixels)?,
+            ],
             queues: [queue()?, queue()?],
             sizes: [queue_size()?, queue_size()?],
             first_size: Buffer::with_data(device, "first queue size", &first_size)?,
-            chunks: texel_buffer("chunks of a queue", 4 * u64::from(places.div_ceil(CHUNK)), vk::Format::R32_UINT)?,
+            chunks: words("chunks of a queue", true, u64::from(places.div_ceil(CHUNK)))?,
             size,
         })
     }
@@ -144,7 +153,8 @@ pub fn paths<'a>(
 ) -> Result<()> {
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
     let Some(with) = plan.rays else { return Ok(()) };
-    let [width, height] = paths.size;
+    let width = paths.size[0];
+    let [origins, directions, throughputs, sums, media, afters] = &paths.states;
     let places = places(paths.size);
     let tiles = places / (TILE * TILE);
     if paths.with.at_once {
@@ -179,9 +189,13 @@ pub fn paths<'a>(
     let constants = Constants::of(lighting, with, paths.with);
     let bind = path_begin::Bind {
         camera_block: camera,
-        radiance,
         queue: &paths.queues[0],
-        path_states: &paths.states,
+        origins,
+        directions,
+        throughputs,
+        sums,
+        media,
+        afters,
         bvh_nodes: &rays.nodes,
         bvh_triangles: &rays.triangles,
         trace_block: &rays.terms,
@@ -210,12 +224,24 @@ pub fn paths<'a>(
             work_done: &rays.counts,
             emitters: &rays.emitters.table,
             sky_shares: &rays.emitters.sky,
-            path_states: &paths.states,
+            origins,
+            directions,
+            throughputs,
+            sums,
+            media,
+            afters,
             queue: &paths.queues[from],
             sizes: &paths.sizes[from],
         };
-        let push = [width, width * height];
-        frame.compute_indirect("paths", &bind, constants.bounce(), bytemuck::cast_slice(&push), &paths.sizes[from], 0)?;
+        let push = [width];
+        frame.compute_indirect(
+            "paths",
+            &bind,
+            constants.bounce(),
+            bytemuck::cast_slice(&push),
+            &paths.sizes[from],
+            0,
+        )?;
         if bounce < with.interfaces {
             compact(frame, paths, from, to)?;
         }
@@ -258,6 +284,8 @@ impl Constants {
             march_colours: with.march.colours,
             march_budget: lighting.loop_budget(),
             transmissive: with.transmissive,
+            rough: with.rough,
+            frosted: with.frosted,
             touching: rays.constants.touching,
             environment: plan.environment,
             sky: plan.sky,
@@ -272,7 +300,7 @@ impl Constants {
             sky_columns: emitters.columns,
             sky_rows: emitters.rows,
             keeps_media: with.transmissive,
-            keeps_way: with.filters || rays.constants.touching,
+            keeps_after: rays.constants.touching,
             sky_steps: halvings(emitters.columns.max(emitters.rows)),
             ..Default::default()
         })

@@ -17,8 +17,8 @@ use crate::gpu::{Buffer, Device, Frame, NOTHING, Place};
 use crate::plan::{Plan, Rays};
 use crate::scene::bvh::{Bvh, Format, Order, Triangle};
 use crate::scene::contact::{bodies_touch, twins};
-use crate::scene::solid::{Solids, media_at};
 use crate::scene::emitters::{Emitters, Source};
+use crate::scene::solid::{Solids, media_at};
 use crate::scene::{AlphaMode, Mesh, Scene};
 use crate::share::{TraceTerms, WorkCounts};
 
@@ -434,7 +434,17 @@ impl<'a> Corners<'a> {
             mirrored.push(turned(solids.flipped[i]));
             scales.push(determinant.abs().cbrt() as f32);
         }
-        Self { scene, solids, refraction: rays.refraction, one_sided, cofactors, mirrored, normals_mirrored, scales, contents }
+        Self {
+            scene,
+            solids,
+            refraction: rays.refraction,
+            one_sided,
+            cofactors,
+            mirrored,
+            normals_mirrored,
+            scales,
+            contents,
+        }
     }
 
     /// The order of a triangle's corners that runs counter-clockwise around its front.

@@ -75,7 +75,10 @@ impl Tracer {
         let facts = Facts::of(scene, NormalForm::default());
         let mut plan = Plan::new(scene, &facts, surroundings, &Knobs::default());
         plan.rays = Some(crate::plan::Rays::default());
-        Ok(Self { device: device.clone(), rays: RaysOnDevice::new(device, &plan, scene, &facts.solids, &Emitters::default(), traversal)? })
+        Ok(Self {
+            device: device.clone(),
+            rays: RaysOnDevice::new(device, &plan, scene, &facts.solids, &Emitters::default(), traversal)?,
+        })
     }
 
     /// The hierarchy and its tables.

@@ -93,6 +93,8 @@ pub struct Rays {
     pub filters: bool,
     /// Some surface that sends rays is rough: they are drawn from its lobe.
     pub rough: bool,
+    /// Some surface that paths go through is rough.
+    pub frosted: bool,
     /// Absorption: 0 off, 1 by the nominal thickness, 2 along the path.
     pub absorption: u32,
     /// How media that vary are gone through.
@@ -172,6 +174,9 @@ const ROUGHEST_ON_SCREEN: f32 = 0.2;
 
 /// From this many point and spot lights on, tiles list them (docs/decisions/light-lists.md).
 const TILES_FROM: u32 = 16;
+
+/// Perceptual roughness up to which paths are not spread: `MIN_ROUGHNESS` of shaders/lib/surface.glsl.
+const SMOOTHEST: f32 = 0.01;
 
 /// Place of the rung `path` in the knob `absorption`; the rungs `march` do as it does where nothing varies.
 const PATH: u32 = 2;
@@ -396,7 +401,8 @@ impl Planner<'_> {
             (false, false) => "has a roughness texture".to_owned(),
         });
         let cause = if paths { Cause::against("paths leave every surface") } else { cause };
-        let mirrored = decisions.decide_with("mirrors", "reflection", matches!(rung, "screen" | "ray"), cause) && !paths;
+        let mirrored =
+            decisions.decide_with("mirrors", "reflection", matches!(rung, "screen" | "ray"), cause) && !paths;
         let by_rays = mirrored && rung == "ray";
         let demanded = surroundings.demand.includes("mirrors");
         let on_screen = |see_through: bool| {
@@ -409,7 +415,8 @@ impl Planner<'_> {
             refraction: transmission.bends && !transmission.by_rays,
         };
         let cause = shown(surfaces.any(scatters), "no material in use scatters light");
-        let ambient = decisions.decide_with("ambient light", "indirect", knobs.rung("indirect") != "off", cause) && !paths;
+        let ambient =
+            decisions.decide_with("ambient light", "indirect", knobs.rung("indirect") != "off", cause) && !paths;
         let environment = environment || reflection || ambient;
         MirrorImages { environment, mirrored: reflection, prefilter, ambient, roughest, by_rays, screen }
     }
@@ -440,7 +447,9 @@ impl Planner<'_> {
         let stand_ins = scene.lights.iter().filter(|light| light.shines() && replaced(light)).count();
         let cause = match (scene.lights.is_empty(), useful_lights > 0, lit) {
             (true, ..) => Cause::against("the scene has no lights"),
-            (_, false, _) if stand_ins > 0 => Cause::against("surfaces light in place of the lights that stand for them"),
+            (_, false, _) if stand_ins > 0 => {
+                Cause::against("surfaces light in place of the lights that stand for them")
+            }
             (_, false, _) if dark == scene.lights.len() => Cause::against("all lights of the scene are dark"),
             (_, false, _) => Cause::against("no light of the scene reaches anything"),
             (.., false) => Cause::against("all materials in use are unlit"),
@@ -470,7 +479,13 @@ impl Planner<'_> {
     /// Light from surface to surface.
     fn paths(&mut self) -> Option<Paths> {
         let Self { surfaces, decisions, knobs, paths, .. } = self;
-        let allowed = |wanted: bool| if wanted { Cause::of("light goes from surface to surface") } else { Cause::against("no surface in use sends light") };
+        let allowed = |wanted: bool| {
+            if wanted {
+                Cause::of("light goes from surface to surface")
+            } else {
+                Cause::against("no surface in use sends light")
+            }
+        };
         let kept = decisions.decide_with("paths", "indirect", *paths, allowed(surfaces.any(|m| !m.unlit)));
         let cause = match kept {
             true => surfaces.cause(|m| m.emissive != [0.0; 3] && !m.unlit, |_| "emits".to_owned()),
@@ -492,7 +507,9 @@ impl Planner<'_> {
         let masked = decisions.decide("holes before rays", surfaces.cause(holes, |_| "has holes".to_owned()));
         // Paths that bend are no straight way to a light.
         let lets_through = |m: &Material| {
-            holes(m) || m.alpha_mode == AlphaMode::Blend || (m.transmission > 0.0 && (!*paths || m.ior == 1.0 || surfaces.is_sheet(m)))
+            holes(m)
+                || m.alpha_mode == AlphaMode::Blend
+                || (m.transmission > 0.0 && (!*paths || m.ior == 1.0 || surfaces.is_sheet(m)))
         };
         let cause = match shadows || *paths {
             true => surfaces.cause(lets_through, |_| "lets light through".to_owned()),
@@ -503,11 +520,22 @@ impl Planner<'_> {
         let transmissive = decisions.decide("transmission before rays", cause);
         let rough = |m: &Material| {
             let coat = m.clearcoat > 0.0 && m.clearcoat_roughness > 0.0;
+            if *paths {
+                let coat = m.clearcoat > 0.0 && m.clearcoat_roughness > SMOOTHEST;
+                return !m.unlit
+                    && (coat || (m.roughness > SMOOTHEST && (surfaces::mirrors(m) || m.transmission > 0.0)));
+            }
             (mirrors && surfaces::is_smooth(m, images.roughest) && (m.roughness > 0.0 || coat))
                 || (m.transmission > 0.0 && m.roughness > 0.0)
         };
         let rough = decisions
             .decide("rays by lobes", surfaces.cause(rough, |m| format!("sends rays at roughness {}", m.roughness)));
+        let frosted = |m: &Material| m.transmission > 0.0 && m.roughness > SMOOTHEST;
+        let cause = match *paths {
+            true => surfaces.cause(frosted, |m| format!("lets light through with roughness {}", m.roughness)),
+            false => Cause::against("no paths are followed"),
+        };
+        let frosted = decisions.decide("frosted surfaces", cause);
         let absorbs = |m: &Material| m.absorbs() && m.transmission > 0.0 && m.thickness > 0.0;
         let absorption = decisions.decide_with(
             "absorption",
@@ -526,6 +554,7 @@ impl Planner<'_> {
             masked,
             filters,
             rough,
+            frosted,
             absorption: if absorption { knobs.index("absorption").min(PATH) } else { 0 },
             march: transmission.march,
             interfaces: knobs.interfaces(),

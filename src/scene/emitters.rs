@@ -123,7 +123,11 @@ impl Emitters {
             }
         }
         let shares = shares(&weights);
-        let list = sources.into_iter().zip(shares).map(|(source, (first, probability))| Emitter { source, first, probability });
+        let list = sources.into_iter().zip(shares).map(|(source, (first, probability))| Emitter {
+            source,
+            first,
+            probability,
+        });
         Self { list: list.collect(), sky }
     }
 }
@@ -146,7 +150,9 @@ fn triangles(scene: &Scene) -> Vec<(Source, f64)> {
         .materials
         .iter()
         .map(|material| match is_emitter(material) {
-            true => mean(material.emissive) * material.emissive_texture.map_or(1.0, |t| mean_of(&scene.images[t.image])),
+            true => {
+                mean(material.emissive) * material.emissive_texture.map_or(1.0, |t| mean_of(&scene.images[t.image]))
+            }
             false => 0.0,
         })
         .collect();
