@@ -66,7 +66,7 @@ fn main() -> Result<()> {
         )?;
         let (mut classify, mut rays, mut frame) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
         for _ in 0..=ROUNDS {
-            let passes = renderer.render(&scene.cameras[0], &mut |_, _| ())?.passes;
+            let passes = renderer.render(&scene.cameras[0], &mut |_| ())?.passes;
             let of = |name: &str| passes.iter().filter(|p| p.name == name).map(|p| p.ms).sum::<f64>();
             classify = classify.min(of("classify ray tiles"));
             rays = rays.min(of("reflection and refraction"));

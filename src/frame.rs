@@ -8,6 +8,7 @@ use ash::vk;
 use glam::DVec3;
 
 use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, PassPlan, PassTime, Place};
+use crate::image::halves::{SampleError, error_of_halves};
 use crate::image::tone::ToneMap;
 use crate::image::{Picture, png};
 use crate::pass::accumulate::accumulate;
@@ -18,6 +19,7 @@ use crate::pass::composite::{composite, composite_part};
 use crate::pass::environment::{EnvironmentOnDevice, Turn};
 use crate::pass::fragments::{FragmentLists, fragments};
 use crate::pass::gbuffer::{GBuffer, gbuffer};
+use crate::pass::halves::{Halves, add_to_half, join_halves};
 use crate::pass::interact::{interact, interact_part};
 use crate::pass::light::light;
 use crate::pass::lighting::Lighting;
@@ -62,6 +64,9 @@ const MOST_LIGHTS: usize = 60_000;
 /// … and two each, besides one a word of 32, where tiles list them.
 const MOST_LISTED_LIGHTS: usize = 30_000;
 
+/// Samples of each pixel after which a picture whose error is the end is given up.
+const MOST_SAMPLES: u32 = 1 << 16;
+
 /// How a picture is made; everything that does not change between the frames of a sequence.
 #[derive(Debug, Clone)]
 pub struct Settings {
@@ -81,6 +86,8 @@ pub struct Settings {
     pub environment_rotation: f32,
     /// Chooses the random numbers.
     pub seed: u32,
+    /// Samples are drawn until the root of [`SampleError::relmse`] is no more than this, whatever the knob says.
+    pub max_error: Option<f64>,
     /// Paths take all their bounces in one dispatch: the same film, for comparison.
     pub paths_at_once: bool,
     /// The way rays go through the scene; `None`: what suits the device and the scene.
@@ -102,6 +109,7 @@ impl Default for Settings {
             environment_intensity: 1.0,
             environment_rotation: 0.0,
             seed: 0,
+            max_error: None,
             paths_at_once: false,
             traversal: None,
             demand: Demand::default(),
@@ -125,6 +133,21 @@ pub struct Rendered {
     pub work: Work,
     /// GPU time per pass, summed over the samples, in the order of the frame.
     pub passes: Vec<PassTime>,
+    /// Samples of each pixel.
+    pub samples: u32,
+    /// What halves of the samples said of the picture's error, at powers of two and at the end; of pictures by paths.
+    pub errors: Vec<SampleError>,
+}
+
+/// How far a picture is.
+#[derive(Debug, Clone, Copy)]
+pub struct Progress {
+    /// Samples drawn.
+    pub done: u32,
+    /// Of so many, or fewer where an error is the end.
+    pub of: u32,
+    /// The picture's error, where it has just been estimated.
+    pub error: Option<SampleError>,
 }
 
 /// Work counts of a picture: the same on every machine that goes through the tree in the same way.
@@ -144,6 +167,10 @@ pub struct Work {
     pub triangle_tests: u64,
     /// Boundaries of transparent bodies left without having been entered.
     pub stray_interfaces: u64,
+    /// Estimates of paths that were no numbers, and left out …
+    pub not_finite: u64,
+    /// … and where the first of them was met.
+    pub first_not_finite: Option<NotFinite>,
     /// Surfaces at which not all lights were gone through, because the driver would have ended the loop over them.
     pub lights_cut_off: u64,
     /// Share of a pixel's light that was not followed: the mean over all pixels …
@@ -152,8 +179,19 @@ pub struct Work {
     pub most_lost: f32,
 }
 
+/// Where light came out as no number.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct NotFinite {
+    /// Across and down.
+    pub pixel: [u32; 2],
+    /// Index of the scene's.
+    pub material: u32,
+    /// Which surface of its path it was, counted from 1.
+    pub event: u32,
+}
+
 impl Work {
-    fn add(&mut self, counts: &share::WorkCounts, pixels_and_samples: f64) {
+    fn add(&mut self, counts: &share::WorkCounts, pixels: f64) {
         let sum = |[low, high]: [u32; 2]| u64::from(high) << 32 | u64::from(low);
         self.reflection += sum(counts.reflection);
         self.refraction += sum(counts.refraction);
@@ -163,7 +201,15 @@ impl Work {
         self.triangle_tests += sum(counts.triangle_tests);
         self.stray_interfaces += sum(counts.stray_interfaces);
         self.lights_cut_off += sum(counts.lights_cut_off);
-        self.mean_lost += sum(counts.lost) as f64 / 65536.0 / pixels_and_samples;
+        self.mean_lost += sum(counts.lost) as f64 / 65536.0 / pixels;
+        self.not_finite += u64::from(counts.not_finite);
+        if self.first_not_finite.is_none() && counts.not_finite > 0 {
+            self.first_not_finite = Some(NotFinite {
+                pixel: [counts.not_finite_pixel & 0xffff, counts.not_finite_pixel >> 16],
+                material: counts.not_finite_material,
+                event: counts.not_finite_event,
+            });
+        }
         self.most_lost = self.most_lost.max(f32::from_bits(counts.most_lost));
     }
 }
@@ -191,6 +237,8 @@ pub struct Renderer {
     film: Option<Image>,
     parts: Vec<PartOnDevice>,
     paths: Option<PathsOnDevice>,
+    /// Of pictures by paths, where there is more than one sample.
+    halves: Option<Halves>,
     display: Display,
     camera: Buffer,
 }
@@ -249,8 +297,13 @@ impl Renderer {
             demand: settings.demand,
         };
         let mut plan = Plan::new(&scene, &facts, surroundings, &settings.knobs);
-        if let Some(paths) = &mut plan.paths {
-            paths.at_once = settings.paths_at_once;
+        match (&mut plan.paths, settings.max_error) {
+            (Some(paths), wanted) => {
+                paths.at_once = settings.paths_at_once;
+                plan.samples = if wanted.is_some() { MOST_SAMPLES } else { plan.samples };
+            }
+            (None, Some(wanted)) => bail!("--max-error {wanted}: only paths tell their error; add --model global"),
+            (None, None) => {}
         }
         plan.check(&Ability {
             device: device.info().name.clone(),
@@ -309,6 +362,7 @@ impl Renderer {
             screen: OnScreen::new(device, &plan, size)?,
             film: if plan.samples > 1 { Some(target("film")?) } else { None },
             parts,
+            halves: if paths.is_some() && plan.samples > 1 { Some(Halves::new(device, size)?) } else { None },
             paths,
             display: Display::new(device, size)?,
             camera: Buffer::new(device, "camera", size_of::<share::Camera>() as u64, Place::Upload)?,
@@ -323,7 +377,7 @@ impl Renderer {
     ///
     /// # Errors
     /// When the driver fails.
-    pub fn render(&mut self, camera: &Camera, progress: &mut dyn FnMut(u32, u32)) -> Result<Rendered> {
+    pub fn render(&mut self, camera: &Camera, progress: &mut dyn FnMut(Progress)) -> Result<Rendered> {
         let view = View::new(camera, self.settings.size, self.scene.bounds);
         self.scene.look_from(&view);
         let mut times = Times::default();
@@ -332,6 +386,8 @@ impl Renderer {
         let count = self.plan.samples;
         let mut dropped = 0;
         let mut work = Work::default();
+        let mut errors = Vec::new();
+        let mut samples = count;
         let pixels = f64::from(self.settings.size[0]) * f64::from(self.settings.size[1]);
         for index in 0..count {
             // A frame whose see-through fragments did not fit is drawn again with more room.
@@ -348,7 +404,7 @@ impl Renderer {
                 }
             }
             if self.plan.rays.is_some() {
-                work.add(&self.rays.counted(), pixels * f64::from(count));
+                work.add(&self.rays.counted(), pixels);
                 ensure!(
                     work.lights_cut_off == 0,
                     "lighting what rays meet ({} lights, at {} surfaces) takes longer loops than the driver allows: draw \
@@ -361,7 +417,35 @@ impl Renderer {
                 times.add(self.add(index, count)?.finish()?);
             }
             dropped = dropped.max(self.lists.as_ref().map_or(0, FragmentLists::dropped));
-            progress(index + 1, count);
+            let done = index + 1;
+            let error = match &self.halves {
+                Some(halves) if (done.is_power_of_two() && done > 1) || done == count => {
+                    Some(self.error(halves, done)?)
+                }
+                _ => None,
+            };
+            errors.extend(error);
+            progress(Progress { done, of: count, error });
+            let limit = self.settings.max_error.unwrap_or(0.0);
+            if error.is_some_and(|error| limit > 0.0 && error.relmse.sqrt() <= limit) {
+                samples = done;
+                break;
+            }
+        }
+        work.mean_lost /= f64::from(samples);
+        if let Some(error) =
+            errors.last().filter(|error| self.settings.max_error.is_some_and(|e| error.relmse.sqrt() > e))
+        {
+            bail!(
+                "--max-error {}: after {samples} samples the error is still {:.4}",
+                self.settings.max_error.unwrap_or_default(),
+                error.relmse.sqrt()
+            );
+        }
+        if let (Some(halves), Some(film)) = (&self.halves, &self.film) {
+            let mut frame = Frame::new(&self.device);
+            join_halves(&mut frame, halves, film, samples)?;
+            times.add(frame.finish()?);
         }
         times.add(self.show()?.finish()?);
         Ok(Rendered {
@@ -371,13 +455,17 @@ impl Renderer {
             dropped,
             work,
             passes: times.list(),
+            samples,
+            errors,
         })
     }
 
     /// Where the next sample is seen from.
     fn look(&mut self, view: &View, index: u32, count: u32) {
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(index, count))));
-        self.rays.look_from(view, index, count, self.settings.seed);
+        // Halves of a picture by paths have random numbers of their own.
+        let [at, half] = if self.halves.is_some() { [index / 2, index % 2] } else { [index, 0] };
+        self.rays.look_from(view, at, count, self.settings.seed.wrapping_mul(2).wrapping_add(half));
     }
 
     /// One sample of every pixel: the frame, pass by pass.
@@ -471,7 +559,9 @@ impl Renderer {
     /// Adds the sample to the film, where there is more than one.
     fn add(&self, index: u32, count: u32) -> Result<Frame<'_>> {
         let mut frame = Frame::new(&self.device);
-        if let Some(film) = &self.film {
+        if let Some(halves) = &self.halves {
+            add_to_half(&mut frame, &self.radiance, halves, index)?;
+        } else if let Some(film) = &self.film {
             accumulate(&mut frame, &self.radiance, film, index, count)?;
             for part in &self.parts {
                 accumulate(&mut frame, &part.radiance, part.film(), index, count)?;
@@ -543,6 +633,27 @@ impl Renderer {
     /// When the driver fails.
     pub fn part(&self, part: Part) -> Result<Option<Picture>> {
         self.parts.iter().find(|kept| kept.part == part).map(|kept| self.read(kept.film())).transpose()
+    }
+
+    /// What the halves say of the picture's error after so many samples.
+    fn error(&self, halves: &Halves, samples: u32) -> Result<SampleError> {
+        let [a, b] = [self.read(&halves.sums[0])?, self.read(&halves.sums[1])?];
+        Ok(error_of_halves([&a.rgba, &b.rgba], samples))
+    }
+
+    /// The means of the two halves of the last render's samples; `None` where it has none.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn halves(&self, samples: u32) -> Result<Option<[Picture; 2]>> {
+        let Some(halves) = &self.halves else { return Ok(None) };
+        let mean = |sum: &Image| -> Result<Picture> {
+            let mut picture = self.read(sum)?;
+            let scale = 2.0 / samples as f32;
+            picture.rgba.iter_mut().flatten().for_each(|value| *value *= scale);
+            Ok(picture)
+        };
+        Ok(Some([mean(&halves.sums[0])?, mean(&halves.sums[1])?]))
     }
 
     fn read(&self, film: &Image) -> Result<Picture> {

@@ -21,7 +21,7 @@ fn a_picture_is_drawn_the_same_again() {
         let settings = Settings { knobs: knobs(&["samples=4"]), ..settings([96, 54]) };
         let mut renderer = gpu.renderer(&scene, Some(&environment), settings.clone());
         let mut draw = || {
-            let rendered = renderer.render(&scene.cameras[0], &mut |_, _| ()).expect("a picture");
+            let rendered = renderer.render(&scene.cameras[0], &mut |_| ()).expect("a picture");
             (rendered.display, bits(&renderer.film().expect("the film")))
         };
         let first = draw();
@@ -43,7 +43,7 @@ fn other_cameras_leave_no_trace() {
         etalon::scene::Camera::looking_at(glam::DVec3::new(30.0, 5.0, 0.0), glam::DVec3::ZERO, glam::DVec3::Y, 1.0)
             .expect("a camera");
     let mut draw = |camera| {
-        renderer.render(camera, &mut |_, _| ()).expect("a picture");
+        renderer.render(camera, &mut |_| ()).expect("a picture");
         bits(&renderer.film().expect("the film"))
     };
     let first = draw(&front);

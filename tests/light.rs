@@ -320,7 +320,7 @@ fn more_lights_than_the_loops_of_rays_allow_are_an_error() {
         made.camera(DVec3::new(0.0, 0.0, 1.0), DVec3::new(0.3, 0.0, 2.0), made::perspective(60.0));
         let settings = Settings { knobs: knobs(&["reflection=ray", "shadows=ray", "samples=1"]), ..settings([16, 9]) };
         let mut renderer = gpu.renderer(&made.0, None, settings);
-        let work = renderer.render(&made.0.cameras[1], &mut |_, _| ())?.work;
+        let work = renderer.render(&made.0.cameras[1], &mut |_| ())?.work;
         anyhow::Ok((work, renderer.film()?))
     };
     let all = shot(0, 1200).expect("a picture of 1200 lights");
@@ -514,7 +514,7 @@ fn behind_the_scene_is_the_environment_turned_as_asked() {
             ..settings(SIZE)
         };
         let mut renderer = gpu.renderer(&scene, Some(&environment), settings);
-        renderer.render(&camera, &mut |_, _| ()).expect("a picture");
+        renderer.render(&camera, &mut |_| ()).expect("a picture");
         let film = renderer.film().expect("the film");
         let (aovs, view) = renderer.aovs(&camera).expect("the G-buffer");
         let turn = f64::from(degrees).to_radians();

@@ -1052,7 +1052,7 @@ fn in_a_furnace(gpu: &Gpu, made: &mut Made, fresnel: &str) -> (Rendered, Vec<Str
     glowing_room(made, 8.0);
     let settings = optics([80, 45], &["interfaces=16", fresnel]);
     let mut renderer = gpu.renderer(&made.0, None, settings);
-    let rendered = renderer.render(&made.0.cameras[0], &mut |_, _| ()).expect("a picture");
+    let rendered = renderer.render(&made.0.cameras[0], &mut |_| ()).expect("a picture");
     let film = renderer.film().expect("the film");
     let lost = f64::from(rendered.work.most_lost);
     let mut mean = 0.0;

@@ -33,7 +33,7 @@ struct Shot {
 
 fn shot(gpu: &Gpu, scene: &Scene, environment: Option<&Environment>, settings: Settings, parts: &[Part]) -> Shot {
     let mut renderer = gpu.renderer(scene, environment, Settings { parts: parts.to_vec(), ..settings });
-    let rendered = renderer.render(&scene.cameras[0], &mut |_, _| ()).expect("a picture");
+    let rendered = renderer.render(&scene.cameras[0], &mut |_| ()).expect("a picture");
     Shot {
         film: renderer.film().expect("the film"),
         parts: BOTH.map(|part| renderer.part(part).expect("a part")),

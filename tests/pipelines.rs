@@ -22,7 +22,7 @@ fn a_frame_that_waits_for_its_pipelines_is_the_same() {
         for round in 0..ROUNDS {
             let device = Device::open(&DeviceChoice::Cpu, false).expect("the software device");
             let mut renderer = Renderer::new(&device, scene.clone(), None, settings.clone()).expect("a renderer");
-            let piecewise = renderer.render(&scene.cameras[0], &mut |_, _| ()).expect("a picture");
+            let piecewise = renderer.render(&scene.cameras[0], &mut |_| ()).expect("a picture");
             assert!(piecewise.display == whole.display, "{study}, round {round}");
             assert!(piecewise.display.iter().any(|&byte| byte > 0), "{study}: something is seen");
         }

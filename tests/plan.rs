@@ -62,7 +62,7 @@ fn draw(scene: &Scene, environment: Option<&Environment>, choices: &[&str]) -> D
         knobs.set(choice).expect("a rung");
     }
     let mut renderer = gpu.renderer(scene, environment, Settings { size: SIZE, knobs, ..Settings::default() });
-    let rendered = renderer.render(&scene.cameras[0], &mut |_, _| ()).expect("a picture");
+    let rendered = renderer.render(&scene.cameras[0], &mut |_| ()).expect("a picture");
     let film = renderer.film().expect("the film");
     // Pages of textures and staging come with textures, whatever they are for.
     let shared =

@@ -322,7 +322,7 @@ fn drawn(gpu: &Gpu, ways: &Ways, choice: &Choice, demand: Demand) -> (Plan, Pict
         ..Settings::default()
     };
     let mut renderer = gpu.renderer(&made.0, environment.as_ref(), settings);
-    let rendered = renderer.render(&made.0.cameras[0], &mut |_, _| ()).expect("a picture");
+    let rendered = renderer.render(&made.0.cameras[0], &mut |_| ()).expect("a picture");
     assert_eq!((rendered.counts.nan, rendered.counts.inf), (0, 0), "{ways:?} {choice:?}");
     let film = renderer.film().expect("the film");
     let seen = film.rgba.iter().filter(|pixel| pixel[0] > 0.0).count();

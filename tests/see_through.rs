@@ -329,7 +329,7 @@ fn what_one_invocation_cannot_sort_is_counted() {
         let settings = Settings { knobs: knobs(&[samples]), ..settings([32, 16]) };
         let mut renderer = gpu.renderer(&made.0, None, settings);
         for picture in 1..=2 {
-            let rendered = renderer.render(&made.0.cameras[0], &mut |_, _| ()).expect("a picture");
+            let rendered = renderer.render(&made.0.cameras[0], &mut |_| ()).expect("a picture");
             let covered = renderer.film().expect("the film").rgba.iter().filter(|p| p[3] > 0.0).count();
             eprintln!("{samples}, picture {picture}: {} dropped, {covered} covered", rendered.dropped);
             // Edges lie between pixels: every sample of a covered pixel is covered.
@@ -450,7 +450,7 @@ fn a_sample_that_is_drawn_again_counts_once() {
     let settings = Settings { knobs: knobs(&["samples=4"]), ..settings(size) };
     let mut renderer = gpu.renderer(&made.0, None, settings);
     let mut film = || {
-        renderer.render(&made.0.cameras[0], &mut |_, _| ()).expect("a picture");
+        renderer.render(&made.0.cameras[0], &mut |_| ()).expect("a picture");
         renderer.film().expect("a film")
     };
     let (first, second) = (film(), film());

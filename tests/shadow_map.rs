@@ -476,7 +476,7 @@ fn other_views_cost_nothing() {
     other.world_from_camera.translation += DVec3::new(0.5, 1.0, 0.0);
     let mut films = Vec::new();
     for (camera, drawn) in [(&made.0.cameras[0], true), (&other, false), (&made.0.cameras[0], false)] {
-        let rendered = renderer.render(camera, &mut |_, _| ()).expect("a picture");
+        let rendered = renderer.render(camera, &mut |_| ()).expect("a picture");
         assert_eq!(rendered.passes.iter().any(|pass| pass.name == "shadow maps"), drawn);
         films.push(bits(&renderer.film().expect("the film")));
     }

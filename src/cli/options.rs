@@ -102,6 +102,10 @@ pub struct PictureOptions {
     /// Chooses the random numbers: another one, another noise
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u32,
+    /// With --model global, draw samples until the picture's relative error, which it estimates itself, is no more than this, for
+    /// example 0.02 or 2%
+    #[arg(long, value_name = "E")]
+    pub max_error: Option<String>,
     /// Exposure in stops, display outputs only
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_hyphen_values = true)]
     pub exposure: f32,
@@ -245,6 +249,20 @@ impl PictureOptions {
         Ok(knobs)
     }
 
+    /// The error that is the end of sampling, as a share.
+    fn max_error(&self) -> Result<Option<f64>> {
+        let Some(text) = &self.max_error else { return Ok(None) };
+        let (number, scale) = text.strip_suffix('%').map_or((text.as_str(), 1.0), |number| (number, 0.01));
+        let error = number.trim().parse::<f64>().ok().map(|number| number * scale);
+        let Some(error) = error.filter(|error| *error > 0.0 && error.is_finite()) else {
+            bail!("--max-error {text}: expected a share above 0, for example 0.02 or 2%");
+        };
+        if self.set.iter().any(|choice| choice.starts_with("samples=")) {
+            bail!("--max-error {text} contradicts --set samples: the one or the other ends the sampling");
+        }
+        Ok(Some(error))
+    }
+
     /// What the picture may depend on, as far as that can be told before the scene is read.
     #[must_use]
     pub fn reads(&self, scene: &SceneOptions, knobs: &Knobs) -> Reads {
@@ -279,6 +297,7 @@ impl PictureOptions {
             environment_intensity: scene.env_intensity,
             environment_rotation: scene.env_rotation,
             seed: self.seed,
+            max_error: self.max_error()?,
             paths_at_once: false,
             traversal: None,
             demand: self.plan.demand(),

@@ -15,11 +15,12 @@ use super::options::{DeviceOptions, Extent, PictureOptions, SceneOptions, When};
 use super::plan::cost_table;
 use super::print;
 use super::report::{
-    MemoryFacts, Output, PassFacts, PipelineFacts, PlanFacts, Report, SceneFacts, Spread, Validation, knob_map,
+    MemoryFacts, Output, PassFacts, PipelineFacts, PlanFacts, Report, Sampling, SceneFacts, Spread, Validation,
+    knob_map,
 };
 use super::setup::Setup;
 use super::unbuilt::UnbuiltOptions;
-use crate::frame::{Part, Rendered, Renderer};
+use crate::frame::{Part, Progress, Rendered, Renderer};
 use crate::gpu::Severity;
 use crate::image::{Aov, AovData, Picture, exr, file};
 use crate::pass::view::View;
@@ -85,6 +86,12 @@ pub enum AovName {
     Reflection,
     /// Radiance by rays that went through it.
     Refraction,
+    /// Of a picture by paths, the variance of each pixel that its halves tell.
+    Variance,
+    /// The mean of its even samples.
+    HalfA,
+    /// The mean of its odd samples, whose random numbers have nothing in common with those of the even ones.
+    HalfB,
 }
 
 impl AovName {
@@ -95,6 +102,11 @@ impl AovName {
             Self::Refraction => Some(Part::Refraction),
             _ => None,
         }
+    }
+
+    /// Told by the halves of a picture's samples.
+    fn of_halves(self) -> bool {
+        matches!(self, Self::Variance | Self::HalfA | Self::HalfB)
     }
 }
 
@@ -140,7 +152,7 @@ impl Steps {
         let shown = !quiet && progress != When::Never;
         let bar = (shown && (terminal || progress == When::Always)).then(|| {
             let bar = ProgressBar::with_draw_target(Some(1), ProgressDrawTarget::stderr());
-            let style = ProgressStyle::with_template("{msg:<24} {wide_bar} {pos}/{len} {elapsed}");
+            let style = ProgressStyle::with_template("{msg:<24} {wide_bar} {pos}/{len} {elapsed}, {eta} left");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             bar
         });
@@ -155,6 +167,22 @@ impl Steps {
         }
         if self.lines {
             eprintln!("{message}");
+        }
+    }
+
+    /// How far a picture is. Where there is no bar, a line at powers of two, no more often than once a second.
+    fn sampled(&self, progress: Progress, begun: Instant, last: &mut Instant) {
+        self.at(progress.done);
+        let Some(error) = progress.error else { return };
+        let relative = error.relmse.sqrt() * 100.0;
+        if let Some(bar) = &self.bar {
+            bar.set_message(format!("drawing, error {relative:.2} %"));
+        }
+        if self.lines && last.elapsed().as_secs() >= 1 {
+            *last = Instant::now();
+            let left =
+                begun.elapsed().as_secs_f64() / f64::from(progress.done) * f64::from(progress.of - progress.done);
+            eprintln!("{} of {} samples, error {relative:.2} %, {left:.0} s left at most", progress.done, progress.of);
         }
     }
 
@@ -195,6 +223,15 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     for part in args.aov.iter().filter_map(|name| name.part()) {
         if !settings.parts.contains(&part) {
             settings.parts.push(part);
+        }
+    }
+    if let Some(name) = args.aov.iter().find(|name| name.of_halves()) {
+        let name = name.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+        if settings.knobs.rung("indirect") != "path" {
+            bail!("--aov {name}: only paths tell their error; add --model global");
+        }
+        if settings.knobs.samples() == 1 && settings.max_error.is_none() {
+            bail!("--aov {name}: one sample has no halves; add --set samples=4");
         }
     }
     let steps = Steps::new(args.progress, quiet);
@@ -239,7 +276,9 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         args.report.is_some() || outputs.iter().any(|(_, format)| *format == Format::Exr) || args.repeat > 1;
     for round in 0..args.repeat {
         steps.step("drawing", samples);
-        let rendered = renderer.render(&camera, &mut |done, _| steps.at(done))?;
+        let mut clock = Instant::now();
+        let begun = clock;
+        let rendered = renderer.render(&camera, &mut |progress| steps.sampled(progress, begun, &mut clock))?;
         phases.end("frame");
         let film = if needs_film { Some(renderer.film()?) } else { None };
         phases.end("readback");
@@ -258,7 +297,8 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         }
     }
     let (rendered, film) = first.ok_or_else(|| anyhow!("nothing was drawn"))?;
-    let aovs = if args.aov.is_empty() { Vec::new() } else { layers(&mut renderer, &camera, &args.aov)? };
+    let aovs =
+        if args.aov.is_empty() { Vec::new() } else { layers(&mut renderer, &camera, &args.aov, rendered.samples)? };
     phases.end("readback");
     warn_about(&rendered, settings_size(&args.picture));
 
@@ -304,6 +344,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
             passes: pass_facts(&rounds),
             phases_ms: phases.all,
             work: (&rendered.work).into(),
+            sampling: Sampling::of(&rendered),
             bvh: renderer.bvh(),
             pipelines: PipelineFacts { count: device.pipelines().len(), spirv_bytes },
             memory: MemoryFacts::now(&device),
@@ -380,6 +421,17 @@ fn warn_about(rendered: &Rendered, pixels: u64) {
         }
     }
     let work = &rendered.work;
+    if let Some(first) = work.first_not_finite {
+        tracing::warn!(
+            "{} estimates of paths were no finite numbers and were left out; the first at pixel {},{}, surface {} of its path, \
+             material {}",
+            work.not_finite,
+            first.pixel[0],
+            first.pixel[1],
+            first.event,
+            first.material
+        );
+    }
     if work.stray_interfaces > 0 {
         tracing::warn!(
             "{} rays left a transparent body that they had not entered: shells that are open, turned or cross without \
@@ -414,10 +466,11 @@ fn pass_facts(rounds: &[Vec<crate::gpu::PassTime>]) -> Vec<PassFacts> {
 }
 
 /// The asked layers in the order asked.
-fn layers(renderer: &mut Renderer, camera: &Camera, names: &[AovName]) -> Result<Vec<Aov>> {
+fn layers(renderer: &mut Renderer, camera: &Camera, names: &[AovName], samples: u32) -> Result<Vec<Aov>> {
     let (pixels, view) = renderer.aovs(camera).context("reading the G-buffer")?;
     let of = |&name: &AovName| match name.part() {
         Some(part) => layer_of_part(renderer, part),
+        None if name.of_halves() => layer_of_halves(renderer, name, samples),
         None => Ok(layer(&pixels, &view, name)),
     };
     names.iter().map(of).collect()
@@ -429,6 +482,23 @@ fn layer_of_part(renderer: &Renderer, part: Part) -> Result<Aov> {
         name: part.name().to_owned(),
         channels: ["R", "G", "B"].map(str::to_owned).into(),
         samples: AovData::F32(picture.rgba.iter().flat_map(|&[r, g, b, _]| [r, g, b]).collect()),
+    })
+}
+
+fn layer_of_halves(renderer: &Renderer, name: AovName, samples: u32) -> Result<Aov> {
+    let halves = renderer.halves(samples)?;
+    let [a, b] = halves.ok_or_else(|| anyhow!("--aov: variance and halves are those of several samples by paths"))?;
+    let colors = |picture: &Picture| -> Vec<f32> { picture.rgba.iter().flat_map(|&[r, g, b, _]| [r, g, b]).collect() };
+    let variance = |(a, b): (&f32, &f32)| (0.5 * (a - b)).powi(2);
+    let (title, samples) = match name {
+        AovName::HalfA => ("half_a", colors(&a)),
+        AovName::HalfB => ("half_b", colors(&b)),
+        _ => ("variance", colors(&a).iter().zip(&colors(&b)).map(variance).collect()),
+    };
+    Ok(Aov {
+        name: title.to_owned(),
+        channels: ["R", "G", "B"].map(str::to_owned).into(),
+        samples: AovData::F32(samples),
     })
 }
 
@@ -457,7 +527,9 @@ fn layer(pixels: &[AovPixel], view: &View, name: AovName) -> Aov {
         AovName::Emissive => ("emissive", rgb, vectors(&|p| p.emissive)),
         AovName::Material => ("material", &["id"][..], AovData::U32(pixels.iter().map(|p| p.material).collect())),
         AovName::Instance => ("instance", &["id"][..], AovData::U32(pixels.iter().map(|p| p.instance).collect())),
-        AovName::Reflection | AovName::Refraction => unreachable!("parts of the picture"),
+        AovName::Reflection | AovName::Refraction | AovName::Variance | AovName::HalfA | AovName::HalfB => {
+            unreachable!("of the picture")
+        }
     };
     Aov { name: title.to_owned(), channels: channels.iter().map(|c| (*c).to_owned()).collect(), samples }
 }

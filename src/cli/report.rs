@@ -6,9 +6,10 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::cost::explain::Price;
-use crate::frame::Work;
+use crate::frame::{NotFinite, Rendered, Work};
 use crate::gpu::{Created, Device, DeviceInfo, Message, Program, Severity};
 use crate::image::Statistics;
+use crate::image::halves::{SampleError, slope};
 use crate::pass::rays::BvhFacts;
 use crate::plan::{Effect, Knobs, Plan};
 
@@ -32,6 +33,8 @@ pub struct Report {
     pub phases_ms: BTreeMap<&'static str, f64>,
     /// Work counts: the same on every machine.
     pub work: WorkFacts,
+    /// Samples, and what they say of the picture's error.
+    pub sampling: Sampling,
     /// What rays went through; absent where none were sent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bvh: Option<BvhFacts>,
@@ -45,6 +48,27 @@ pub struct Report {
     pub validation: Validation,
     /// Files written, with hashes of their bytes.
     pub outputs: Vec<Output>,
+}
+
+/// Samples, and what they say of the picture's error where it is estimated: of pictures by paths.
+#[derive(Debug, Serialize)]
+pub struct Sampling {
+    /// Of each pixel.
+    pub samples: u32,
+    /// At powers of two and at the end.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub errors: Vec<SampleError>,
+    /// Slope of the logarithm of the relative error over that of samples; −0.5 where samples do not depend on each other.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slope: Option<f64>,
+}
+
+impl Sampling {
+    /// Of a picture.
+    #[must_use]
+    pub fn of(rendered: &Rendered) -> Self {
+        Self { samples: rendered.samples, errors: rendered.errors.clone(), slope: slope(&rendered.errors) }
+    }
 }
 
 /// What was drawn.
@@ -207,6 +231,11 @@ pub struct WorkFacts {
     pub triangle_tests: u64,
     /// Boundaries of transparent bodies that were left without having been entered: open or crossing shells.
     pub stray_interfaces: u64,
+    /// Estimates of paths that were no finite numbers and left out of the picture, and where the first was met.
+    pub not_finite: u64,
+    /// See `not_finite`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_not_finite: Option<NotFinite>,
     /// Share of a pixel's light that was not followed because a path met too many surfaces or had become too faint.
     pub cut_off: CutOff,
 }
@@ -235,6 +264,8 @@ impl From<&Work> for WorkFacts {
             node_visits: work.node_visits,
             triangle_tests: work.triangle_tests,
             stray_interfaces: work.stray_interfaces,
+            not_finite: work.not_finite,
+            first_not_finite: work.first_not_finite,
             cut_off: CutOff { mean: work.mean_lost, max: work.most_lost },
         }
     }

@@ -159,7 +159,7 @@ impl Subject<'_> {
 
     fn draw(&self, renderer: &mut Renderer) -> Result<f64> {
         let start = Instant::now();
-        renderer.render(self.camera, &mut |_, _| ())?;
+        renderer.render(self.camera, &mut |_| ())?;
         Ok(start.elapsed().as_secs_f64() * 1e3)
     }
 }

@@ -10,6 +10,7 @@ pub mod composite;
 pub mod environment;
 pub mod fragments;
 pub mod gbuffer;
+pub mod halves;
 pub mod interact;
 pub mod light;
 pub mod lighting;

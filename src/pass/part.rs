@@ -55,6 +55,11 @@ impl PartOnDevice {
     /// When no ray makes this part under the chosen rungs, or memory is short.
     pub fn new(device: &Arc<Device>, plan: &Plan, knobs: &Knobs, part: Part, size: [u32; 2]) -> Result<Self> {
         let name = part.name();
+        if plan.paths.is_some() {
+            bail!(
+                "--aov {name}: this layer is what single rays bring, and indirect=path follows paths instead; add --set indirect=ambient"
+            );
+        }
         let rung = knobs.rung(name);
         if rung != "ray" {
             bail!("--aov {name}: this layer is what rays bring, and {name}={rung} sends none; add --set {name}=ray");

@@ -98,7 +98,7 @@ pub static KNOBS: &[Knob] = &[
     },
     Knob {
         name: "samples",
-        rungs: &["1", "4", "16", "64", "256", "1024"],
+        rungs: &["1", "4", "16", "64", "256", "1024", "4096"],
         unbuilt: &[],
         presets: ["4", "4", "64"],
         about: "samples per pixel",
@@ -319,7 +319,7 @@ mod tests {
             knobs.set(&format!("absorption=march:{steps}")).unwrap();
             assert_eq!(knobs.march_steps(), steps);
         }
-        for rung in ["1", "4", "16", "64", "256", "1024"] {
+        for rung in ["1", "4", "16", "64", "256", "1024", "4096"] {
             knobs.set(&format!("samples={rung}")).unwrap();
             assert_eq!(knobs.samples().to_string(), rung);
         }
@@ -358,7 +358,7 @@ mod tests {
             ("quadrature=right", "it has left, midpoint, simpson"),
             ("brdf=oren", "no rung"),
             ("samples=5", "the nearest is 4"),
-            ("samples=100000", "the nearest is 1024"),
+            ("samples=100000", "the nearest is 4096"),
             ("interfaces=0", "the nearest is 1"),
             ("lobes=0.4", "the nearest is 0.5"),
             ("fresnel=3", "no rung \"3\""),

@@ -45,7 +45,7 @@ impl Gpu {
 
     pub fn shot(&self, scene: &Scene, environment: Option<&Environment>, settings: Settings) -> (Rendered, Picture) {
         let mut renderer = self.renderer(scene, environment, settings);
-        let rendered = renderer.render(&scene.cameras[0], &mut |_, _| ()).expect("a picture");
+        let rendered = renderer.render(&scene.cameras[0], &mut |_| ()).expect("a picture");
         let film = renderer.film().expect("the film");
         (rendered, film)
     }
@@ -53,7 +53,7 @@ impl Gpu {
     /// Picture, G-buffer and view of one renderer.
     pub fn all(&self, scene: &Scene, camera: &Camera, settings: Settings) -> (Picture, Vec<AovPixel>, View) {
         let mut renderer = self.renderer(scene, None, settings);
-        renderer.render(camera, &mut |_, _| ()).expect("a picture");
+        renderer.render(camera, &mut |_| ()).expect("a picture");
         let film = renderer.film().expect("the film");
         let (aovs, view) = renderer.aovs(camera).expect("the G-buffer");
         (film, aovs, view)

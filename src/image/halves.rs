@@ -1,0 +1,72 @@
+//! What two halves of a picture's samples, drawn with random numbers that have nothing in common, say of its error.
+
+use serde::Serialize;
+
+/// The error of a mean of samples, estimated from its halves.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SampleError {
+    /// Samples of each pixel.
+    pub samples: u32,
+    /// Mean over pixels and colours of squared error over squared value plus 0.01, as `diff --metric relmse` has it.
+    pub relmse: f64,
+    /// Root of the mean squared error.
+    pub rmse: f64,
+}
+
+/// Of sums of `samples / 2` samples each. Their means a and b have errors of the same variance that do not depend on each
+/// other, so that (a − b)²/4 is the variance of the picture (a + b)/2 in the mean.
+#[must_use]
+pub fn error_of_halves(sums: [&[[f32; 4]]; 2], samples: u32) -> SampleError {
+    let scale = 1.0 / f64::from(samples);
+    let (mut relative, mut squared, mut count) = (0.0, 0.0, 0.0);
+    for (a, b) in sums[0].iter().zip(sums[1]) {
+        for (a, b) in a[..3].iter().zip(&b[..3]) {
+            let (a, b) = (f64::from(*a) * scale, f64::from(*b) * scale);
+            let (value, variance) = (a + b, (a - b) * (a - b));
+            relative += variance / (value * value + 0.01);
+            squared += variance;
+            count += 1.0;
+        }
+    }
+    SampleError { samples, relmse: relative / count, rmse: (squared / count).sqrt() }
+}
+
+/// Slope of the logarithm of the root of `relmse` over that of samples, by least squares: −0.5 where samples do not depend on
+/// each other. `None` for fewer than two.
+#[must_use]
+pub fn slope(errors: &[SampleError]) -> Option<f64> {
+    let points: Vec<(f64, f64)> =
+        errors.iter().filter(|e| e.relmse > 0.0).map(|e| (f64::from(e.samples).ln(), 0.5 * e.relmse.ln())).collect();
+    let n = points.len() as f64;
+    let (x, y) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
+    let across: f64 = points.iter().map(|p| (p.0 - x) * (p.0 - x)).sum();
+    (across > 0.0).then(|| points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>() / across)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halves_tell_the_error_of_their_mean() {
+        // Each half has errors of ±0.2 about 1: so has their mean ±0.1√2 in the root mean square.
+        let half = |signs: [f32; 4]| -> Vec<[f32; 4]> { signs.iter().map(|s| [8.0 * (1.0 + 0.2 * s); 4]).collect() };
+        let (a, b) = (half([1.0, 1.0, -1.0, -1.0]), half([1.0, -1.0, 1.0, -1.0]));
+        let error = error_of_halves([&a, &b], 16);
+        assert!((error.rmse - 0.2 / 2.0_f64.sqrt()).abs() < 1e-7, "{error:?}");
+        let same = error_of_halves([&a, &a], 16);
+        assert_eq!((same.rmse, same.relmse), (0.0, 0.0));
+    }
+
+    #[test]
+    fn slopes_are_those_of_powers() {
+        let of = |power: f64| -> Vec<SampleError> {
+            [2, 4, 64, 1024]
+                .map(|n| SampleError { samples: n, relmse: 3.0 * f64::from(n).powf(2.0 * power), rmse: 0.0 })
+                .into()
+        };
+        assert!((slope(&of(-0.5)).unwrap() + 0.5).abs() < 1e-12);
+        assert!((slope(&of(-0.75)).unwrap() + 0.75).abs() < 1e-12);
+        assert!(slope(&of(-0.5)[..1]).is_none() && slope(&[]).is_none());
+    }
+}

@@ -1,0 +1,53 @@
+//! Two halves of the samples, each with random numbers of its own: what they differ by is the picture's error
+//! (shaders/pass/join_halves.comp).
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use ash::vk;
+
+use crate::gpu::{Device, Frame, Image, ImageDesc};
+use crate::shader::{accumulate, join_halves};
+
+/// Sums of the even and of the odd samples.
+pub struct Halves {
+    /// The two.
+    pub sums: [Image; 2],
+}
+
+impl Halves {
+    /// For a picture of `size` pixels.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn new(device: &Arc<Device>, size: [u32; 2]) -> Result<Self> {
+        let usage = vk::ImageUsageFlags::STORAGE;
+        let sum =
+            |name| Image::new(device, name, ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], usage));
+        Ok(Self { sums: [sum("sum of even samples")?, sum("sum of odd samples")?] })
+    }
+}
+
+/// Adds sample `index` to its half.
+///
+/// # Errors
+/// When the driver refuses what a pipeline binds.
+pub fn add_to_half<'a>(frame: &mut Frame<'a>, radiance: &'a Image, halves: &'a Halves, index: u32) -> Result<()> {
+    let film = &halves.sums[index as usize % 2];
+    let push = [u32::from(index < 2), 1.0_f32.to_bits()];
+    let size = [film.desc().width, film.desc().height];
+    let bind = accumulate::Bind { radiance, film };
+    frame.compute_over("accumulate", &bind, accumulate::Constants {}.words(), bytemuck::cast_slice(&push), size)
+}
+
+/// Writes the mean of `count` samples, an even number, into `film`.
+///
+/// # Errors
+/// When the driver refuses what a pipeline binds.
+pub fn join_halves<'a>(frame: &mut Frame<'a>, halves: &'a Halves, film: &'a Image, count: u32) -> Result<()> {
+    let [half_a, half_b] = &halves.sums;
+    let size = [film.desc().width, film.desc().height];
+    let bind = join_halves::Bind { half_a, half_b, film };
+    let push = [(1.0 / count as f32).to_bits()];
+    frame.compute_over("join halves", &bind, join_halves::Constants {}.words(), bytemuck::cast_slice(&push), size)
+}
