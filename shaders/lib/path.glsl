@@ -238,8 +238,6 @@ void bounce(inout Path a, inout Path b, uvec2 pixel_a, uvec2 pixel_b) {
                                PairedRay(b.origin, b.direction, b.self, TOUCHING ? b.after : 0.0, there_b ? LARGEST : -1.0),
                                OPAQUE | FILTER, false);
     path_rays += (there_a ? 1u : 0u) + (there_b ? 1u : 0u);
-    vec3 sum_a = a.sum;
-    vec3 sum_b = b.sum;
     vec3 gathered_a = vec3(0.0);
     vec3 gathered_b = vec3(0.0);
     LightTask of_a, of_b;
@@ -256,11 +254,11 @@ void bounce(inout Path a, inout Path b, uvec2 pixel_a, uvec2 pixel_b) {
         LightTask task;
         vec3 now = meet(p, hit, pixel, task);
         if (i == 0) {
-            a = p;
+            if (there_a) a = p;
             of_a = task;
             gathered_a = now;
         } else {
-            b = p;
+            if (there_b) b = p;
             of_b = task;
             gathered_b = now;
         }
@@ -290,7 +288,7 @@ void bounce(inout Path a, inout Path b, uvec2 pixel_a, uvec2 pixel_b) {
         gathered_a += of_a.contribution * arrives_a;
         gathered_b += of_b.contribution * arrives_b;
     }
-    a.sum = there_a ? sum_a + gathered_a : sum_a;
-    b.sum = there_b ? sum_b + gathered_b : sum_b;
+    if (there_a) a.sum += gathered_a;
+    if (there_b) b.sum += gathered_b;
 }
 #endif

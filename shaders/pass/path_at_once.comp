@@ -23,11 +23,13 @@ void main() {
     Path b = path_through(pixel_b);
     if (!inside_a) a.state = 0;
     if (!inside_b) b.state = 0;
+    // Once more when both are through: where lanes end at different times, lavapipe forgets what the last turn of those that
+    // are through has assigned.
     bool more;
     do {
         loop_heads++;
-        bounce(a, b, pixel_a, pixel_b);
         more = ((a.state | b.state) & PATH_ALIVE) != 0 && loop_heads < LOOP_BUDGET;
+        bounce(a, b, pixel_a, pixel_b);
     } while (more);
     if (inside_a) imageStore(radiance, ivec2(pixel_a), radiance_of(a));
     if (inside_b) imageStore(radiance, ivec2(pixel_b), radiance_of(b));
