@@ -33,6 +33,9 @@ float mean(vec3 v) {
     return (v.x + v.y + v.z) * (1.0 / 3.0);
 }
 
+// Of the probability of a rough lobe, beside albedos.
+const float LEAST_SHARE = 0.1;
+
 // Below the lobe light is only lost to it: for a sharp one by its reflectance at the viewer's angle, for `ggx-multi` by its
 // directional reflectance there, so that no surface sends more than it receives. The other models have 1 − F(V·H), as the
 // deferred pass does, which at grazing angles is more than the lobe leaves.
@@ -53,11 +56,15 @@ Bsdf bsdf_of(HitSurface hit, Boundary boundary) {
     b.f_dielectric = reflectance_between(b.s, b.solid, b.n1, b.n2, b.cos_v, b.total);
     b.f_sharp = mix(b.f_dielectric, fresnel_of_metal(b.s, b.cos_v), b.s.metallic);
     b.enters = 1.0 - largest(b.f_dielectric);
+    float mirrors = mean(b.f_sharp);
+    // Half vectors away from the normal see more of it than the viewer's angle tells: what little a lobe reflects at normal
+    // incidence may be ten times as much there, and is drawn often enough for that.
+    if (!b.sharp && mirrors > 0.0) mirrors = max(mirrors * mean(b.s.compensation), LEAST_SHARE);
     if (ROUGH && BRDF == 3 && !b.sharp) {
         vec2 ab = lobe_reflectance(b.s);
         b.enters = 1.0 - min(largest((b.s.f0_dielectric * ab.x + b.s.f90_dielectric * ab.y) * b.s.compensation), 1.0);
     }
-    b.transmits = TRANSMISSIVE ? hit.transmits : 0.0;
+    b.transmits = TRANSMISSIVE ? hit.transmits * (1.0 - hit.s.metallic) : 0.0;
     b.tint = vec3(0.0);
     if (TRANSMISSIVE) b.tint = tint_through(hit, boundary.sheet);
     b.under = 1.0;
@@ -66,8 +73,10 @@ Bsdf bsdf_of(HitSurface hit, Boundary boundary) {
         coat = 1.0 - under_coat(b.s);
         b.under = b.coat_sharp ? 1.0 - coat : 1.0;
     }
+    // Some facets let through what the viewer's angle would reflect altogether.
     float below = 1.0 - largest(b.f_dielectric);
-    b.shares = vec4(coat, vec3(1.0 - coat) * vec3(mean(b.f_sharp * b.s.compensation), mean(b.s.diffuse) * b.enters, mean(b.tint) * b.transmits * below));
+    below = b.sharp ? below : max(below, LEAST_SHARE);
+    b.shares = vec4(coat, vec3(1.0 - coat) * vec3(mirrors, mean(b.s.diffuse) * b.enters, mean(b.tint) * b.transmits * below));
     float sum = dot(b.shares, vec4(1.0));
     b.shares = sum > 0.0 ? b.shares / sum : vec4(0.0);
     return b;

@@ -217,7 +217,7 @@ struct HitSurface {
     vec3 n;          // of the triangle, on the viewer's side
     bool front;
     float coverage;
-    float transmits; // share of what enters that goes through
+    float transmits; // share of what enters its dielectric part that goes through
     float thickness; // texel, times how long a metre of the object is in the world
     bool sheet;      // transmits light and encloses nothing
     uint material;
@@ -269,7 +269,6 @@ HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
     r.s.p_bvh = point.p;
     r.s.n_triangle = r.n;
     r.s.face = point.face;
-    r.transmits *= 1.0 - r.s.metallic;
     return r;
 }
 #endif

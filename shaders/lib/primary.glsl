@@ -104,7 +104,7 @@ Primary primary_surface(ivec2 pixel, bool exact_normals) {
     r.hit.front = (id.y & BACK_FACE) == 0;
     r.hit.coverage = 1.0;
     // The emissive target's fourth component is how much the texture lets through.
-    r.hit.transmits = HAS_TRANSMISSION ? m.transmission * glow.a * (1.0 - s.metallic) : 0.0;
+    r.hit.transmits = HAS_TRANSMISSION ? m.transmission * glow.a : 0.0;
     uint instance = r.drawn ? id.y & INSTANCE_BITS : 0u;
     r.hit.sheet = (instances[instance].flags & INSTANCE_SHEET) != 0;
     r.hit.thickness = instances[instance].scale;

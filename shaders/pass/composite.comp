@@ -100,7 +100,8 @@ void main() {
         // (A1): straight on, and with refraction `screen` bent where a body is entered.
         s.p_bvh = p + trace_terms.bvh_from_rel;
         s.media = trace_terms.camera_media;
-        float transmits = m.transmission * layer.a * (1.0 - blue_metal.y * m.metallic);
+        float transmission = m.transmission * layer.a;
+        float transmits = transmission * (1.0 - blue_metal.y * m.metallic);
         vec3 f = fresnel(s, clamp(dot(s.n, s.v), 0.0, 1.0));
         float scale = occlusion_thickness.y * instances[nodes[at + 2]].scale;
         vec3 passes = transmits * s.base * exp(-m.sigma_thickness * scale) * (1.0 - f);
@@ -111,7 +112,7 @@ void main() {
             entry = max(entry, body ? uintBitsToFloat(nodes[at + 1]) : 0.0);
         }
         if (CLEARCOAT) passes *= under_coat(s);
-        s.diffuse *= 1.0 - transmits;
+        s.diffuse *= 1.0 - transmission;
         float alpha = blue_alpha.y;
         compensate(s);
         vec3 shown = radiance_to_eye(s, pixel, tiles_across, all, true);

@@ -244,7 +244,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
         next.origin = ray_origin(s.p_bvh, -hit.n, vec3(0.0));
         next.media = boundary.solid ? boundary.beyond : ray.media;
         next.events = count | BY_REFRACTION << 8 | only_through;
-        next.throughput = passes ? weight * tint * (hit.transmits * (1.0 - largest(f_dielectric)) * masking) : vec3(0.0);
+        next.throughput = passes ? weight * tint * (hit.transmits * (1.0 - s.metallic) * (1.0 - largest(f_dielectric)) * masking) : vec3(0.0);
         next.spread = ray.spread + (rough ? s.alpha : 0.0);
         send(next);
     }

@@ -31,7 +31,7 @@ void main() {
     Surface s = primary.hit.s;
     s.diffuse *= 1.0 - primary.hit.transmits;
     bool hidden = false;
-    if (IN_MEDIUM && primary.hit.transmits > 0.0 && !primary.hit.sheet) {
+    if (IN_MEDIUM && primary.hit.transmits > 0.0 && s.metallic < 1.0 && !primary.hit.sheet) {
         // As interact.comp has it: from inside a body mirror images are sent for, and a body of higher priority has no
         // boundary here.
         s.base_traced = true;

@@ -103,7 +103,7 @@ fn lamp(b: &mut Builder) {
     let glow = b.material(emitter("lamp glow", [14.0, 8.4, 3.6]));
     b.add("lamp ball", Shape::sphere(radius, 32), glow, at(x, height, z, 0.0));
     let position = DVec3::new(x - 0.02, height - 0.06, z + 0.035);
-    b.light("lamp", [0.60, 0.36, 0.15], LightKind::Point { position, range: Some(1.1) });
+    b.stand_in("lamp", [0.60, 0.36, 0.15], LightKind::Point { position, range: Some(1.1) });
 }
 
 /// Two soft boxes, for the shine on glass and metal, and the lights that stand for them where only points light.
@@ -125,7 +125,7 @@ fn studio(b: &mut Builder) {
         inner: 30.0_f64.to_radians(),
         outer: 62.0_f64.to_radians(),
     };
-    b.light("key", [15.0, 15.0, 15.0], kind);
+    b.stand_in("key", [15.0, 15.0, 15.0], kind);
     let position = rim_at + (middle - rim_at).normalize() * 0.05;
-    b.light("fill", [1.3, 1.5, 1.8], LightKind::Point { position, range: None });
+    b.stand_in("fill", [1.3, 1.5, 1.8], LightKind::Point { position, range: None });
 }
