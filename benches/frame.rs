@@ -38,7 +38,7 @@ fn measure(out: &mut impl std::io::Write, title: &str, mut rows: Vec<Row>) -> Re
     // The first round compiles the pipelines and is thrown away.
     for round in 0..=ROUNDS {
         for row in &mut rows {
-            let rendered = row.renderer.render(&row.camera, &mut |_, _| {})?;
+            let rendered = row.renderer.render(&row.camera, &mut |_| {})?;
             if round > 0 {
                 row.times.push(rendered.passes.iter().map(|pass| pass.ms).sum());
             }

@@ -286,7 +286,7 @@ impl Renderer {
         if settings.background == Background::Environment && environment.is_none() {
             bail!("--background env: there is no environment (--env none, or the scene has lights of its own)");
         }
-        if needs_lights(settings.demand) && scene.lights.is_empty() {
+        if needs_lights(settings.demand) && scene.lights.iter().all(|light| light.stand_in) {
             add_dark_lights(&mut scene);
         }
         let facts = Facts::of(&scene, form);

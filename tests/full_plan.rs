@@ -88,6 +88,11 @@ fn studies_on_the_screen() {
 }
 
 #[test]
+fn studies_by_paths() {
+    studies(&knobs(Model::Global, &["samples=1", "absorption=march:4"]));
+}
+
+#[test]
 fn studies_with_some_rays() {
     studies(&knobs(Model::Recursive, &["samples=1", "shadows=map", "refraction=off", "brdf=blinn-phong"]));
 }

@@ -9,6 +9,7 @@ mod made;
 use etalon::frame::Settings;
 use etalon::image::Picture;
 use etalon::plan::{Knobs, Model};
+use etalon::scene::emitters::{Emitters, Source};
 use etalon::scene::environment::Environment;
 use etalon::scene::{LightKind, Material, Projection, Scene};
 use etalon::study::shape::Shape;
@@ -160,8 +161,8 @@ fn a_bright_spot_of_the_sky_is_found() {
         }
     }
     let picture = draw(&gpu, &made.0, Some(&sky), settings([16, 16], &["samples=64"]));
-    for channel in 0..3 {
-        let wanted = irradiance[channel] * 0.8 / std::f64::consts::PI;
+    for (channel, irradiance) in irradiance.into_iter().enumerate() {
+        let wanted = irradiance * 0.8 / std::f64::consts::PI;
         let [mean, error, _] = spread(&picture, channel);
         assert!((mean - wanted).abs() < 4.0 * error + 2e-3 * wanted, "{channel}: {mean} ± {error} for {wanted}");
         assert!(error < 0.01 * wanted, "{channel}: {mean} ± {error}");
@@ -221,4 +222,26 @@ fn what_emits_lights_only_where_a_knob_says_so() {
         etalon::scene::Camera { projection: perspective(20.0), ..made::looking(DVec3::new(0.0, 0.3, 0.0), DVec3::Y) };
     let picture = draw(&gpu, &turned, None, settings([8, 8], &["samples=4", "lights=points"]));
     assert!((spread(&picture, 0)[0] - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn a_lamp_is_drawn_by_its_power_and_the_sky_where_it_is_bright() {
+    let scene = etalon::study::load("cornell").unwrap();
+    let emitters = Emitters::of(&scene, None, true);
+    // The point light, which the plan takes out, and the two triangles of the panel, 1.3 m by 1.05 m of radiance 12.
+    let [point, one, other] = emitters.list[..] else { panic!("{emitters:?}") };
+    assert_eq!(point.source, Source::Punctual(0));
+    assert!((one.probability - other.probability).abs() < 1e-9);
+    let (panel, lamp) = (1.3 * 1.05 * 12.0 * std::f64::consts::PI, 16.4 * 4.0 * std::f64::consts::PI);
+    assert!((point.probability - lamp / (lamp + panel)).abs() < 1e-6, "{point:?}");
+    assert_eq!(Emitters::of(&scene, None, false).list.len(), 1);
+    let mut map = Environment::dark();
+    map.radiance[(64 * map.width + 100) as usize] = [100.0; 3];
+    let sky = Emitters::of(&Scene::default(), Some((&map, 1.0)), true).sky;
+    // The three rows around that texel share all but what every other has at least.
+    let share = |row: usize| sky.words[row + 1].wrapping_sub(sky.words[row]);
+    assert!(share(63) > 1 << 30 && share(64) > 1 << 30 && share(65) > 1 << 30);
+    assert!((0..63).chain(66..255).all(|row| share(row) == 1));
+    let none = Emitters::of(&Scene::default(), Some((&Environment::constant([1.0; 3]), 1.0)), true);
+    assert_eq!(none, Emitters::default());
 }

@@ -165,7 +165,7 @@ fn spread() -> Vec<(Ways, Choice)> {
         };
         let all_pairs = |choice: &Choice| {
             let mut all = pairs(&ways, choice);
-            all.extend(effect_pairs(&planned(&ways, choice)));
+            all.extend(effect_pairs(&planned(&ways, choice, knobs(&ways, choice))));
             all
         };
         let best = (0..24).map(|_| candidate()).max_by_key(|choice| all_pairs(choice).difference(&seen).count());
@@ -294,20 +294,32 @@ fn knobs(ways: &Ways, choice: &Choice) -> Knobs {
 }
 
 /// Draws one plan of all.
-fn drawn(gpu: &Gpu, ways: &Ways, choice: &Choice, demand: Demand) -> (Plan, Picture) {
+/// The same with paths, which need rays for everything.
+fn knobs_of_paths(ways: &Ways, choice: &Choice) -> Knobs {
+    let mut knobs = knobs(ways, choice);
+    // From inside glass, one surface is not enough to see anything.
+    for choice in ["shadows=ray", "reflection=ray", "refraction=ray", "indirect=path", "lights=area:1", "interfaces=8"]
+    {
+        knobs.set(choice).expect("a rung");
+    }
+    knobs
+}
+
+fn drawn(gpu: &Gpu, ways: &Ways, choice: &Choice, demand: Demand, by_paths: bool) -> (Plan, Picture) {
     let made = scene(ways, choice);
     let environment = match level(choice, "environment") {
         "none" => None,
         "constant" => Some(Environment::constant([0.4, 0.5, 0.6])),
         _ => Some(Environment::studio()),
     };
-    let by_ray = |rung: &str| rung == "ray" && level(choice, "parts") == "both";
+    let by_ray = |rung: &str| !by_paths && rung == "ray" && level(choice, "parts") == "both";
     let mut parts = Vec::new();
     parts.extend(by_ray(ways.mirrors).then_some(Part::Reflection));
-    parts.extend((ways.transmission == "none" || by_ray(ways.transmission)).then_some(Part::Refraction));
+    let of_nothing = ways.transmission == "none" && !by_paths;
+    parts.extend((of_nothing || by_ray(ways.transmission)).then_some(Part::Refraction));
     let settings = Settings {
         size: SIZE,
-        knobs: knobs(ways, choice),
+        knobs: if by_paths { knobs_of_paths(ways, choice) } else { knobs(ways, choice) },
         background: match level(choice, "background") {
             "transparent" => Background::Transparent,
             _ => Background::Default,
@@ -334,12 +346,12 @@ fn drawn(gpu: &Gpu, ways: &Ways, choice: &Choice, demand: Demand) -> (Plan, Pict
 fn draw_all(share: &str) {
     let gpu = Gpu::new();
     for (i, (ways, choice)) in spread().iter().enumerate().filter(|(_, (ways, _))| ways.shadows == share) {
-        let (plan, film) = drawn(&gpu, ways, choice, Demand::Scene);
+        let (plan, film) = drawn(&gpu, ways, choice, Demand::Scene, false);
         assert_eq!(Ways::of(&plan), *ways, "{choice:?}: {:#?}", plan.effects);
         // The pictures of everything take as long again: a sixth of them. All 144 were compared once: 143 were the same to the
         // last bit, one differed in one pixel by two roundings, with no single effect at fault.
         if i % 6 == 0 {
-            let (_, full) = drawn(&gpu, ways, choice, Demand::Full);
+            let (_, full) = drawn(&gpu, ways, choice, Demand::Full, false);
             let named: Vec<_> = FACTORS.iter().zip(choice).map(|(f, &c)| (f.name, f.levels[c])).collect();
             assert!(bits(&film) == bits(&full), "{ways:?} {named:?}");
         }
@@ -360,6 +372,53 @@ fn plans_with_shadow_maps() {
 #[test]
 fn plans_with_shadow_rays() {
     draw_all("ray");
+}
+
+/// Paths through an eighth of the scenes, with both plans.
+#[test]
+fn plans_with_paths() {
+    let gpu = Gpu::new();
+    for (i, (ways, choice)) in spread().iter().enumerate().filter(|(i, _)| i % 8 == 0) {
+        let (plan, film) = drawn(&gpu, ways, choice, Demand::Scene, true);
+        assert!(plan.paths.is_some() && !plan.tiles && !plan.see_through && !plan.shadow_maps, "{ways:?}");
+        let (_, full) = drawn(&gpu, ways, choice, Demand::Full, true);
+        let named: Vec<_> = FACTORS.iter().zip(choice).map(|(f, &c)| (f.name, f.levels[c])).collect();
+        let different = bits(&film).iter().zip(bits(&full)).filter(|(a, b)| *a != b).count();
+        assert!(different == 0, "{i}: {different} pixels differ: {ways:?} {named:?}");
+    }
+    assert!(gpu.errors().is_empty(), "{:?}", gpu.errors());
+}
+
+/// What paths may meet is planned where it is, and not where it is not; and nothing that they take the place of.
+#[test]
+fn paths_call_for_what_they_may_meet() {
+    let mut states: BTreeMap<&'static str, BTreeSet<&'static str>> = BTreeMap::new();
+    for (ways, choice) in spread() {
+        let plan = planned(&ways, &choice, knobs_of_paths(&ways, &choice));
+        for effect in &plan.effects {
+            states.entry(effect.name).or_default().insert(effect.state);
+        }
+    }
+    let of = |name: &str| states[name].iter().copied().collect::<Vec<_>>();
+    for name in [
+        "absorption",
+        "clear coat",
+        "environment",
+        "frosted surfaces",
+        "holes before rays",
+        "light through surfaces",
+        "media that vary",
+        "metals by n and kappa",
+        "punctual lights",
+        "transmission before rays",
+    ] {
+        assert!(of(name).contains(&"kept") && of(name).contains(&"not called for"), "{name}: {:?}", of(name));
+    }
+    for name in ["ambient light", "light lists per tile", "mirrored environment", "mirrors", "see-through surfaces"] {
+        assert_eq!(of(name), ["dropped", "not called for"], "{name}");
+    }
+    // Some surface of each scene is rough, and one is shown as it is.
+    assert_eq!([of("paths"), of("rays by lobes"), of("surfaces that light")], [["kept"]; 3]);
 }
 
 #[test]
@@ -392,7 +451,7 @@ fn any_two_things_meet() {
 }
 
 /// The plan as the renderer makes it, without a device.
-fn planned(ways: &Ways, choice: &Choice) -> Plan {
+fn planned(ways: &Ways, choice: &Choice, knobs: Knobs) -> Plan {
     let Made(mut scene) = scene(ways, choice);
     let environment = level(choice, "environment");
     let ambience = if environment == "none" { Ambience::Absent } else { Ambience::Present };
@@ -404,7 +463,7 @@ fn planned(ways: &Ways, choice: &Choice) -> Plan {
         sky: environment != "none",
         demand: Demand::Scene,
     };
-    Plan::new(&scene, &Facts::of(&scene, form), surroundings, &knobs(ways, choice))
+    Plan::new(&scene, &Facts::of(&scene, form), surroundings, &knobs)
 }
 
 /// Effects that are only kept where another one is, and so where those are that it needs.
@@ -433,8 +492,8 @@ fn any_two_effects_are_kept_together_and_apart() {
     let mut states: BTreeMap<&'static str, BTreeSet<&'static str>> = BTreeMap::new();
     let mut seen = BTreeSet::new();
     for (ways, choice) in spread() {
-        let plan = planned(&ways, &choice);
-        for a in &plan.effects {
+        let plan = planned(&ways, &choice, knobs(&ways, &choice));
+        for a in plan.effects.iter().filter(|effect| !OF_PATHS.contains(&effect.name)) {
             states.entry(a.name).or_default().insert(a.state);
         }
         seen.extend(effect_pairs(&plan));
@@ -460,7 +519,10 @@ fn any_two_effects_are_kept_together_and_apart() {
     assert!(missed.is_empty(), "never planned, or planned although impossible: {missed:#?}");
 }
 
-/// Every effect but the one that only the hierarchy of triangles tells.
+/// Effects of paths: kept nowhere without them.
+const OF_PATHS: [&str; 3] = ["frosted surfaces", "paths", "surfaces that light"];
+
+/// Every other effect but the one that only the hierarchy of triangles tells.
 const NAMES: [&str; 21] = [
     "absorption",
     "ambient light",

@@ -152,8 +152,9 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, out LightTask task) {
     // What the surface itself sends.
     if (at_surface && !passed_by) {
         vec3 emits = hit.s.unlit ? hit.s.base : hit.s.emissive * (CLEARCOAT ? under_coat(hit.s) : 1.0);
-        bool shows = hit.front || (hit_material(place) & ONE_SIDED_TRIANGLE) == 0 || hit.s.unlit;
-        shows = shows && (LIGHTING_SURFACES || (p.state & PATH_SPREAD) == 0);
+        // One side may be dark.
+        bool shows = LIGHTING_SURFACES || (p.state & PATH_SPREAD) == 0;
+        shows = shows && (hit.s.unlit || hit.front || (hit_material(place) & ONE_SIDED_TRIANGLE) == 0);
         float w = 1.0;
         if (EMITTING_TRIANGLES) {
             float r = p.travelled + found.t;

@@ -164,10 +164,16 @@ impl Subject<'_> {
     }
 }
 
-/// The rungs that allow an effect which a knob has dropped: those of the recursive model.
+/// The rungs that allow an effect which a knob has dropped: those of the recursive model, and those that paths need.
 fn allowing(effect: &Effect) -> Vec<String> {
     if effect.name == "media that vary" {
         return ["refraction=ray", "absorption=march:32"].map(str::to_owned).into();
+    }
+    const PATHS: [&str; 5] = ["shadows=ray", "reflection=ray", "refraction=ray", "indirect=path", "lights=area:1"];
+    match effect.name {
+        "paths" => return PATHS[..4].iter().map(|&rung| rung.to_owned()).collect(),
+        "surfaces that light" => return PATHS.map(str::to_owned).into(),
+        _ => {}
     }
     let knob = effect.reason.split_once('=').map(|(knob, _)| knob);
     let known = Knobs::of(Model::Recursive).list().into_iter().find(|(name, _)| Some(*name) == knob);

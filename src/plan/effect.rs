@@ -98,6 +98,18 @@ impl Decisions<'_> {
         self.decide_with(name, "", true, cause)
     }
 
+    /// An effect whose place paths take, where they do; else one that a knob allows or not, or that only the scene decides on.
+    pub(super) fn decide_without(
+        &mut self,
+        paths: bool,
+        name: &'static str,
+        (knob, allowed): (&'static str, bool),
+        cause: Cause,
+    ) -> bool {
+        let (knob, allowed) = if paths { ("indirect", false) } else { (knob, allowed) };
+        self.decide_with(name, knob, allowed, cause)
+    }
+
     /// An effect that a knob allows or not: if not, its rung is the reason.
     pub(super) fn decide_with(&mut self, name: &'static str, knob: &'static str, allowed: bool, cause: Cause) -> bool {
         let rung = if knob.is_empty() { "" } else { self.knobs.rung(knob) };

@@ -346,8 +346,7 @@ impl Planner<'_> {
                 _ => format!("has transmission {}", m.transmission),
             },
         );
-        let cause = if *paths { Cause::against("paths meet them") } else { cause };
-        let see_through = decisions.decide("see-through surfaces", cause) && !*paths;
+        let see_through = decisions.decide_without(*paths, "see-through surfaces", ("", true), cause);
         let size =
             |m: &Material| m.sigma.as_ref().map_or([0; 3], |grid| grid.size()).map(|n| n.to_string()).join(" x ");
         let cause =
@@ -375,15 +374,14 @@ impl Planner<'_> {
         let there_is = surroundings.environment;
         let cause = Cause::when(there_is, "there is an environment", "there is no environment");
         let environment = decisions.decide("environment", cause);
-        let shown = |called_for: bool, against: &str| match (there_is, paths) {
-            (true, true) => Cause::against("paths find the environment"),
-            (true, false) => Cause::when(called_for, "there is an environment", against),
-            (false, _) => Cause::against("there is no environment"),
+        let shown = |called_for: bool, against: &str| match there_is {
+            true => Cause::when(called_for, "there is an environment", against),
+            false => Cause::against("there is no environment"),
         };
         let rung = knobs.rung("reflection");
         let shiny = surfaces.any(|m| !m.unlit && (mirrors(m) || m.clearcoat > 0.0));
         let cause = shown(shiny, "no material in use mirrors anything");
-        let reflection = decisions.decide_with("mirrored environment", "reflection", rung != "off", cause) && !paths;
+        let reflection = decisions.decide_without(paths, "mirrored environment", ("reflection", rung != "off"), cause);
         let cause = match (reflection, there_is) {
             (false, _) => Cause::against("no environment is mirrored"),
             (_, false) => Cause::against("there is no environment"),
@@ -400,9 +398,8 @@ impl Planner<'_> {
             (false, true) => format!("has a coat of roughness {}", m.clearcoat_roughness),
             (false, false) => "has a roughness texture".to_owned(),
         });
-        let cause = if paths { Cause::against("paths leave every surface") } else { cause };
-        let mirrored =
-            decisions.decide_with("mirrors", "reflection", matches!(rung, "screen" | "ray"), cause) && !paths;
+        let by_rung = ("reflection", matches!(rung, "screen" | "ray"));
+        let mirrored = decisions.decide_without(paths, "mirrors", by_rung, cause);
         let by_rays = mirrored && rung == "ray";
         let demanded = surroundings.demand.includes("mirrors");
         let on_screen = |see_through: bool| {
@@ -415,8 +412,8 @@ impl Planner<'_> {
             refraction: transmission.bends && !transmission.by_rays,
         };
         let cause = shown(surfaces.any(scatters), "no material in use scatters light");
-        let ambient =
-            decisions.decide_with("ambient light", "indirect", knobs.rung("indirect") != "off", cause) && !paths;
+        let by_rung = ("indirect", knobs.rung("indirect") != "off");
+        let ambient = decisions.decide_without(paths, "ambient light", by_rung, cause);
         let environment = environment || reflection || ambient;
         MirrorImages { environment, mirrored: reflection, prefilter, ambient, roughest, by_rays, screen }
     }
@@ -433,8 +430,11 @@ impl Planner<'_> {
         // Dark ones stand for those that are asked for and not there. Beside others they would take room in shadow maps.
         let demanded = needs_lights(surroundings.demand);
         let stand_in = demanded && useful_lights == 0;
-        let keeps = |(i, light): (usize, &Light)| (stand_in && i < 2) || (useful(light) && (lit || demanded));
-        let kept: Vec<bool> = scene.lights.iter().enumerate().map(keeps).collect();
+        // Of those, the first two.
+        let free: Vec<&Light> = scene.lights.iter().filter(|light| stand_in && !replaced(light)).take(2).collect();
+        let keeps =
+            |light: &Light| free.iter().any(|kept| std::ptr::eq(*kept, light)) || (useful(light) && (lit || demanded));
+        let kept: Vec<bool> = scene.lights.iter().map(keeps).collect();
         let count = |test: &dyn Fn(&LightKind) -> bool| {
             scene.lights.iter().zip(&kept).filter(|(light, kept)| **kept && test(&light.kind)).count() as u32
         };
@@ -467,12 +467,11 @@ impl Planner<'_> {
         decisions.decide("punctual lights", counts(cause.clone()));
         let shadows = decisions.decide_with("shadows", "shadows", knobs.rung("shadows") != "off", counts(cause));
         let cause = match (local >= TILES_FROM, ranged > 0) {
-            _ if *paths => Cause::against("paths draw one light at a time"),
             (false, _) => Cause::against("few point and spot lights"),
             (_, false) => Cause::against("no light has a range"),
             _ => counts(Cause::of(format!("{ranged} of {local} point and spot lights have a range"))),
         };
-        let tiles = decisions.decide(LIGHT_LISTS, cause) && !*paths;
+        let tiles = decisions.decide_without(*paths, LIGHT_LISTS, ("", true), cause);
         Lights { kept, directional, local, shadows, tiles }
     }
 
@@ -487,8 +486,12 @@ impl Planner<'_> {
             }
         };
         let kept = decisions.decide_with("paths", "indirect", *paths, allowed(surfaces.any(|m| !m.unlit)));
+        let sends_light = |m: &Material| match m.unlit {
+            true => m.base_color[..3] != [0.0; 3],
+            false => m.emissive != [0.0; 3],
+        };
         let cause = match kept {
-            true => surfaces.cause(|m| m.emissive != [0.0; 3] && !m.unlit, |_| "emits".to_owned()),
+            true => surfaces.cause(sends_light, |m| if m.unlit { "is shown as it is" } else { "emits" }.to_owned()),
             false => Cause::against("no paths are followed"),
         };
         let emitting = decisions.decide_with("surfaces that light", "lights", knobs.rung("lights") != "points", cause);
