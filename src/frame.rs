@@ -271,8 +271,10 @@ impl Renderer {
             bail!("--size {}x{}: a picture has 1 to {limit} pixels a side on this device", size[0], size[1]);
         }
         let pixels = u64::from(size[0]) * u64::from(size[1]);
-        if pixels * 4 > device.max_storage_bytes() {
-            let most = device.max_storage_bytes() / 4;
+        // Paths keep four words of a pixel in one buffer, all else one.
+        let bytes = if settings.knobs.rung("indirect") == "path" { 16 } else { 4 };
+        if pixels * bytes > device.max_storage_bytes() {
+            let most = device.max_storage_bytes() / bytes;
             bail!("--size {}x{}: this device holds at most {most} pixels in one picture", size[0], size[1]);
         }
         if scene.triangles() == 0 {

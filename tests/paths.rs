@@ -64,6 +64,7 @@ fn nothing_white_shows_before_light_from_everywhere() {
         ("metal 0.3", white_metal(0.3), 2e-3),
         ("metal 0.6", white_metal(0.6), 2e-3),
         ("metal 1", white_metal(1.0), 2e-3),
+        ("rough coat on a mirror", Material { clearcoat: 1.0, clearcoat_roughness: 0.5, ..white_metal(0.0) }, 4e-3),
     ] {
         let picture = draw(&gpu, &cube(material), Some(&sky), settings([24, 24], &["samples=64"]));
         let [mean, error, _] = spread(&picture, 0);
@@ -208,6 +209,19 @@ fn queues_and_one_dispatch_make_the_same_film() {
         assert!(film == of(false, 0), "{name}: another film the second time");
         assert!(name == "radiance" || film != of(false, 1), "{name}: the seed changes nothing");
     }
+}
+
+#[test]
+fn what_lies_behind_tinted_glass_is_weakened_in_alpha() {
+    let gpu = Gpu::new();
+    let mut made = Made::new("pane");
+    let pane = Material { transmission: 1.0, roughness: 0.0, specular: 0.0, ..lambert([0.1, 0.2, 0.3]) };
+    made.add(Shape::panel(4.0, 4.0), pane, DAffine3::IDENTITY);
+    made.front(0.5);
+    let picture = draw(&gpu, &made.0, None, settings([8, 8], &["samples=64"]));
+    // A sheet that reflects nothing leaves its colour of what lies behind: 0.2 in the mean.
+    let [alpha, _, _] = spread(&picture, 3);
+    assert!((alpha - 0.8).abs() < 1e-5, "{alpha}");
 }
 
 #[test]

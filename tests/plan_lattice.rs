@@ -374,11 +374,11 @@ fn plans_with_shadow_rays() {
     draw_all("ray");
 }
 
-/// Paths through an eighth of the scenes, with both plans.
+/// Paths through some of the scenes, with both plans.
 #[test]
 fn plans_with_paths() {
     let gpu = Gpu::new();
-    for (i, (ways, choice)) in spread().iter().enumerate().filter(|(i, _)| i % 8 == 0) {
+    for (i, (ways, choice)) in spread().iter().enumerate().filter(|(i, _)| i % 24 == 0) {
         let (plan, film) = drawn(&gpu, ways, choice, Demand::Scene, true);
         assert!(plan.paths.is_some() && !plan.tiles && !plan.see_through && !plan.shadow_maps, "{ways:?}");
         let (_, full) = drawn(&gpu, ways, choice, Demand::Full, true);

@@ -22,7 +22,7 @@ struct Bsdf {
     vec3 tint;       // of what goes through
     float transmits;
     float enters;    // what the base's lobe leaves to what lies below it, where that does not depend on the light's direction
-    float under;     // what a sharp coat lets through
+    float under;     // what the coat lets through, by the viewer's angle
     vec3 f_dielectric; // reflectance at the viewer's angle: of the dielectric part …
     vec3 f_sharp;    // … and of the mixture
     bool total;
@@ -71,7 +71,12 @@ Bsdf bsdf_of(HitSurface hit, Boundary boundary) {
     float coat = 0.0;
     if (CLEARCOAT) {
         coat = 1.0 - under_coat(b.s);
-        b.under = b.coat_sharp ? 1.0 - coat : 1.0;
+        if (ROUGH && BRDF == 3 && !b.coat_sharp) {
+            vec2 ab = reflectance_of_lobe(dot(b.s.n_coat, b.s.v), b.s.clearcoat_roughness);
+            coat = b.s.clearcoat * min(0.04 * ab.x + ab.y, 1.0);
+        }
+        b.under = 1.0 - coat;
+        if (!b.coat_sharp && coat > 0.0) coat = max(coat, LEAST_SHARE);
     }
     // Some facets let through what the viewer's angle would reflect altogether.
     float below = 1.0 - largest(b.f_dielectric);
@@ -167,7 +172,7 @@ Scattered scattered(Bsdf b, vec3 l) {
         bool on_coat = above && coat_l > 0.0 && !b.coat_sharp;
         float d = ggx_distribution(h.cos_h, h.sin2_h, s.clearcoat_alpha);
         float lobe = on_coat ? d * ggx_visibility(coat_l, coat_v, s.clearcoat_alpha) * coat_l : 0.0;
-        r.f_cos = r.f_cos * (b.coat_sharp ? b.under : above ? 1.0 - f : under_coat(s)) + f * lobe;
+        r.f_cos = r.f_cos * (b.coat_sharp || BRDF == 3 || !above ? b.under : 1.0 - f) + f * lobe;
         r.pdf += on_coat ? b.shares.x * mirrored_pdf(coat_v, h, s.clearcoat_alpha) : 0.0;
     }
     return r;

@@ -22,6 +22,7 @@ layout(set = 0, binding = 51, r32ui) readonly uniform uimageBuffer sky_shares;
 const uint EMITTER_PUNCTUAL = 0;
 const uint EMITTER_TRIANGLE = 1;
 const uint EMITTER_SKY = 2;
+// 3: nothing after all.
 const uint EMITTER_TWO_SIDED = 4;
 
 // Light that may arrive at a point from one place.

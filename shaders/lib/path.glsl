@@ -19,6 +19,7 @@ const uint ROULETTE_FROM = 4;
 const float MOST_LIKELY = 0.95;
 
 float lost = 0.0;
+float most_lost = 0.0;
 uint path_rays = 0;
 
 // A light that is looked for.
@@ -103,7 +104,8 @@ vec3 light_that_arrives(LightTask task) {
                 Met met = met_at(hit_point_of(found, task.origin, task.to_light), media, direction);
                 vec3 passes = straight_through(bsdf_of(met.hit, met.boundary));
                 through *= met.boundary.hidden ? vec3(1.0) : 1.0 - met.hit.coverage + met.hit.coverage * passes;
-                media = met.boundary.solid ? met.boundary.beyond : media;
+                bool enters = met.boundary.solid && (met.boundary.hidden || met.hit.coverage > 0.0);
+                media = enters ? met.boundary.beyond : media;
             }
             last = found;
         }
@@ -144,9 +146,14 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, out LightTask task) {
         bool clear = (p.state & PATH_CLEAR) != 0 && !SKY;
         float w = p.pdf > 0.0 ? mis_weight(p.pdf, sky_pdf(p.direction)) : 1.0;
         if (!at_surface && !clear) gathered = p.throughput * seen * w;
-        if (EMITTING_SKY && light.pdf > 0.0 && light.t_max == LARGEST) light.arriving *= seen;
+        if (EMITTING_SKY && light.pdf > 0.0 && light.t_max == LARGEST) {
+            // Straight ahead there is the background, whatever lights the scene.
+            bool hidden = clear && dot(hit.n, light.to_light) < 0.0;
+            light.arriving *= hidden ? vec3(0.0) : seen;
+        }
     }
     bool ends = !at_surface;
+    float behind_all = mean(p.throughput);
     bool open = !at_surface && !SKY && (p.state & PATH_CLEAR) != 0;
 
     // What the surface itself sends.
@@ -170,6 +177,7 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, out LightTask task) {
     uint met_now = met_before + 1;
     if (!ends && met_now > trace_terms.interfaces) {
         lost += largest(p.throughput);
+        most_lost = max(most_lost, largest(p.throughput));
         ends = true;
     }
     uvec2 words = draw_words(pixel, met_before, DRAW_DIRECTION);
@@ -203,7 +211,7 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, out LightTask task) {
     // Only what filters light lets the search for lights pass as well.
     bool straight = (passed_by || drawn.straight) && hit_class(place) == FILTER;
     p.throughput *= weight;
-    p.travelled = straight ? p.travelled + found.t : 0.0;
+    p.travelled = open ? behind_all : straight ? p.travelled + found.t : 0.0;
     p.pdf = straight ? p.pdf : passed_by || drawn.sharp ? 0.0 : on_path.pdf;
     bool behind = passed_by || drawn.through;
     bool into = passed_by ? met.boundary.hidden : drawn.through && met.boundary.solid;

@@ -22,8 +22,8 @@ Path path_through(uvec2 pixel) {
     uvec2 words = draw_words(pixel, 0, DRAW_PIXEL);
     c.jitter = vec2(unit_float(words.x), unit_float(words.y)) - 0.5;
     Path p;
-    p.origin = trace_terms.bvh_from_rel;
-    if (camera.orthographic != 0) p.origin += rel_from_pixel(c, ivec2(pixel), 1.0);
+    // From the near plane, as what is rasterised; what lies beyond an orthographic camera's far one is seen all the same.
+    p.origin = trace_terms.bvh_from_rel + rel_from_pixel(c, ivec2(pixel), 1.0);
     p.direction = view_direction(c, ivec2(pixel));
     p.self = 0xffffffffu;
     p.pdf = 0.0;

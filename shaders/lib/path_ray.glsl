@@ -34,8 +34,9 @@ uvec2 draw_words(uvec2 pixel, uint surface, uint draw) {
     return random_words(pixel, surface * DRAWS + draw, trace_terms.seed, trace_terms.sample_index);
 }
 
-// What the film gets of a path that is through.
+// What the film gets of a path that is through. Where nothing lay behind what it went through, `travelled` is what that has left
+// of the background: for one path this may be more than 1, in the mean it is a share.
 vec4 radiance_of(Path p) {
-    return vec4(p.sum, (p.state & PATH_OPEN) != 0 ? 0.0 : 1.0);
+    return vec4(p.sum, (p.state & PATH_OPEN) != 0 ? 1.0 - p.travelled : 1.0);
 }
 #endif

@@ -10,7 +10,8 @@ layout(scalar, set = 0, binding = 43) buffer WorkDone { WorkCounts counts; };
 // Boundaries that were left without having been entered.
 uint stray_interfaces = 0;
 
-void count_rays(uint reflection, uint refraction, float lost) {
+// `lost` of all pixels of the invocation, and of the worst.
+void count_rays(uint reflection, uint refraction, float lost, float most_lost) {
     ADD_WORK(reflection, reflection)
     ADD_WORK(refraction, refraction)
     ADD_WORK(shadow, shadow_rays)
@@ -20,12 +21,12 @@ void count_rays(uint reflection, uint refraction, float lost) {
     ADD_WORK(lights_cut_off, lights_cut_off)
     // Steps of 2^-16, rounded up: what is counted is not less than what was lost.
     ADD_WORK(lost, lost > 0.0 ? uint(min(lost, 1e3) * 65536.0) + 1u : 0u)
-    uint most = subgroupMax(floatBitsToUint(lost));
+    uint most = subgroupMax(floatBitsToUint(most_lost));
     if (subgroupElect() && most > 0) atomicMax(counts.most_lost, most);
 }
 
-void count_paths(uint rays, float lost) {
+void count_paths(uint rays, float lost, float most_lost) {
     ADD_WORK(indirect, rays)
-    count_rays(0, 0, lost);
+    count_rays(0, 0, lost, most_lost);
 }
 #endif

@@ -132,5 +132,5 @@ void main() {
     }
     float coverage = 1.0 - (through.r + through.g + through.b) * (1.0 / 3.0) * (1.0 - behind.a);
     imageStore(radiance, pixel, vec4((BEHIND_ALONE ? vec3(0.0) : sum) + through * behind.rgb, coverage));
-    if (SHADOWS == SHADOW_RAY && !BEHIND_ALONE) count_rays(0, 0, 0.0);
+    if (SHADOWS == SHADOW_RAY && !BEHIND_ALONE) count_rays(0, 0, 0.0, 0.0);
 }

@@ -329,5 +329,5 @@ void main() {
     }
     vec4 before = imageLoad(radiance, pixel);
     imageStore(radiance, pixel, vec4(before.rgb + sum, before.a * (1.0 - min(escaped, 1.0))));
-    if (FIRST_EVENT == 0) count_rays(reflection_rays, refraction_rays, lost);
+    if (FIRST_EVENT == 0) count_rays(reflection_rays, refraction_rays, lost, lost);
 }

@@ -45,5 +45,5 @@ void main() {
     if (hidden) result = vec3(0.0);
     if (first_dispatch == 0) result += imageLoad(radiance, pixel).rgb;
     imageStore(radiance, pixel, vec4(result, 1.0));
-    if (SHADOWS == SHADOW_RAY) count_rays(0, 0, 0.0);
+    if (SHADOWS == SHADOW_RAY) count_rays(0, 0, 0.0, 0.0);
 }

@@ -11,7 +11,7 @@ layout(local_size_x = 64) in;
 
 layout(set = 0, binding = 10, rgba32f) writeonly uniform image2D radiance;
 layout(scalar, set = 0, binding = 58) buffer Queue { uint queue[]; };
-layout(scalar, set = 0, binding = 59) readonly buffer Sizes { QueueSize size; };
+layout(scalar, set = 0, binding = 59) uniform Sizes { QueueSize size; };
 layout(push_constant) uniform Push { uint width; };
 
 void end_of(Path p, uint place, uint pixel) {
@@ -40,5 +40,5 @@ void main() {
     bounce(a, b, uvec2(pixel_a % width, pixel_a / width), uvec2(pixel_b % width, pixel_b / width));
     if (there_a) end_of(a, place, pixel_a);
     if (there_b) end_of(b, place + 8, pixel_b);
-    count_paths(path_rays, lost);
+    count_paths(path_rays, lost, most_lost);
 }

@@ -33,5 +33,5 @@ void main() {
     } while (more);
     if (inside_a) imageStore(radiance, ivec2(pixel_a), radiance_of(a));
     if (inside_b) imageStore(radiance, ivec2(pixel_b), radiance_of(b));
-    count_paths(path_rays, lost);
+    count_paths(path_rays, lost, most_lost);
 }

@@ -100,7 +100,7 @@ pub struct PictureOptions {
     #[arg(long, value_enum, value_name = "scene|full|explain-cost", default_value_t = Extent::Scene)]
     pub plan: Extent,
     /// Chooses the random numbers: another one, another noise
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..1 << 31))]
     pub seed: u32,
     /// With --model global, draw samples until the picture's relative error, which it estimates itself, is no more than this, for
     /// example 0.02 or 2%

@@ -24,6 +24,7 @@ use crate::frame::{Part, Progress, Rendered, Renderer};
 use crate::gpu::Severity;
 use crate::image::{Aov, AovData, Picture, exr, file};
 use crate::pass::view::View;
+use crate::plan::Knobs;
 use crate::scene::{Camera, Scene};
 use crate::share::AovPixel;
 
@@ -300,7 +301,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let aovs =
         if args.aov.is_empty() { Vec::new() } else { layers(&mut renderer, &camera, &args.aov, rendered.samples)? };
     phases.end("readback");
-    warn_about(&rendered, settings_size(&args.picture));
+    warn_about(&rendered, settings_size(&args.picture), &knobs);
 
     steps.step("encoding", outputs.len() as u32);
     let mut written = Vec::new();
@@ -413,7 +414,7 @@ fn metadata(args: &RenderArgs) -> Vec<(String, String)> {
     ]
 }
 
-fn warn_about(rendered: &Rendered, pixels: u64) {
+fn warn_about(rendered: &Rendered, pixels: u64, knobs: &Knobs) {
     let counts = rendered.counts;
     for (count, what) in [(counts.nan, "NaN"), (counts.inf, "infinite"), (counts.negative, "negative")] {
         if count > 0 {
@@ -441,9 +442,10 @@ fn warn_about(rendered: &Rendered, pixels: u64) {
     }
     if work.mean_lost > 0.01 {
         tracing::warn!(
-            "{:.1} % of the light was not followed to its end, in the worst pixel {:.0} %: --set interfaces=32 follows more",
+            "{:.1} % of the light was not followed to its end, in the worst pixel {:.0} %{}",
             work.mean_lost * 100.0,
-            work.most_lost * 100.0
+            work.most_lost * 100.0,
+            if knobs.interfaces() < 32 { ": --set interfaces=32 follows more" } else { "" }
         );
     }
     if rendered.dropped > 0 {

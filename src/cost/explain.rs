@@ -139,6 +139,7 @@ impl Subject<'_> {
     fn plan(&self, demand: Demand, rungs: &[String]) -> Result<Drawn> {
         let device = Device::open(self.device, false)?;
         let mut settings = Settings { demand, ..self.settings.clone() };
+        settings.max_error = None;
         settings.knobs.set("samples=1")?;
         settings.knobs.set_all(rungs)?;
         let start = Instant::now();
@@ -173,6 +174,9 @@ fn allowing(effect: &Effect) -> Vec<String> {
     match effect.name {
         "paths" => return PATHS[..4].iter().map(|&rung| rung.to_owned()).collect(),
         "surfaces that light" => return PATHS.map(str::to_owned).into(),
+        _ if effect.reason == "indirect=path" => {
+            return ["indirect=ambient", "lights=points"].map(str::to_owned).into();
+        }
         _ => {}
     }
     let knob = effect.reason.split_once('=').map(|(knob, _)| knob);

@@ -57,7 +57,7 @@ impl PartOnDevice {
         let name = part.name();
         if plan.paths.is_some() {
             bail!(
-                "--aov {name}: this layer is what single rays bring, and indirect=path follows paths instead; add --set indirect=ambient"
+                "--aov {name}: this layer is what single rays bring, and indirect=path follows paths instead; add --set indirect=ambient --set lights=points"
             );
         }
         let rung = knobs.rung(name);

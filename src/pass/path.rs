@@ -29,6 +29,7 @@ const PATHS_IN_GROUP: u32 = 128;
 const PUNCTUAL: u32 = 0;
 const TRIANGLE: u32 = 1;
 const SKY: u32 = 2;
+const NOWHERE: u32 = 3;
 const TWO_SIDED: u32 = 4;
 
 /// What paths draw light from; next to nothing without any.
@@ -55,12 +56,15 @@ impl EmittersOnDevice {
                 Source::Sky => (SKY, 0),
                 Source::Punctual(light) => (PUNCTUAL, light),
                 Source::Triangle { index, two_sided, .. } => {
-                    (TRIANGLE | if two_sided { TWO_SIDED } else { 0 }, leaf_places[index as usize])
+                    match leaf_places[index as usize] {
+                        // Rays leave it out, and so do the lights.
+                        u32::MAX => (NOWHERE, 0),
+                        place => (TRIANGLE | if two_sided { TWO_SIDED } else { 0 }, place),
+                    }
                 }
             };
             [emitter.first, (emitter.probability as f32).to_bits(), kind, place]
         };
-        // A triangle that rays leave out is not among the leaves; nothing would be seen of what was drawn on it.
         let list: Vec<[u32; 4]> = emitters.list.iter().map(texel).collect();
         let any = |test: fn(&Source) -> bool| emitters.list.iter().any(|emitter| test(&emitter.source));
         let name = |named: &'static str, empty: bool| if empty { NOTHING } else { named };

@@ -30,6 +30,7 @@ impl Plan {
         let images = (ability.storage_images < SCREEN_IMAGES)
             .then(|| format!("has {} storage images for one shader, of {SCREEN_IMAGES}", ability.storage_images));
         for (asked, knob, rung, lacks) in [
+            (self.paths.is_some(), "indirect", "path", &counts),
             (rays.shadows, "shadows", "ray", &counts),
             (rays.mirrors, "reflection", "ray", &counts),
             (rays.refraction, "refraction", "ray", &counts),

@@ -207,7 +207,7 @@ impl Knobs {
             if let Some(knob) = other {
                 bail!(
                     "--set {knob}={} contradicts indirect=path, whose paths meet every surface by rays; the nearest choice is \
-                     {knob}=ray, or indirect=ambient",
+                     {knob}=ray, or indirect=ambient with lights=points",
                     self.rung(knob)
                 );
             }
@@ -274,6 +274,10 @@ impl Knobs {
     /// Whether occlusion may be seen: on light from all around, if there is any, and on mirror images of the screen.
     #[must_use]
     pub fn show_occlusion(&self, environment: bool) -> bool {
+        // Paths find what is occluded themselves.
+        if self.rung("indirect") == "path" {
+            return false;
+        }
         let around = self.rung("indirect") != "off" || self.rung("reflection") != "off";
         self.rung("reflection") == "screen" || (environment && around)
     }

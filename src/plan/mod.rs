@@ -478,14 +478,11 @@ impl Planner<'_> {
     /// Light from surface to surface.
     fn paths(&mut self) -> Option<Paths> {
         let Self { surfaces, decisions, knobs, paths, .. } = self;
-        let allowed = |wanted: bool| {
-            if wanted {
-                Cause::of("light goes from surface to surface")
-            } else {
-                Cause::against("no surface in use sends light")
-            }
+        let cause = match surfaces.any(|m| !m.unlit) {
+            true => Cause::of("light goes from surface to surface"),
+            false => Cause::when(*paths, "the knob says so", "no surface in use sends light"),
         };
-        let kept = decisions.decide_with("paths", "indirect", *paths, allowed(surfaces.any(|m| !m.unlit)));
+        let kept = decisions.decide_with("paths", "indirect", *paths, cause);
         let sends_light = |m: &Material| match m.unlit {
             true => m.base_color[..3] != [0.0; 3],
             false => m.emissive != [0.0; 3],

@@ -14,7 +14,7 @@ pub struct Light {
     pub color: [f32; 3],
     /// What kind, with its geometry.
     pub kind: LightKind,
-    /// Stands for a surface that emits, where such surfaces light nothing (`extras.etalon.stand_in`): where they do, it is dark.
+    /// Stands for a surface that emits, where such surfaces light nothing: where they do, it is dark. In study scenes; no file says it.
     pub stand_in: bool,
 }
 
