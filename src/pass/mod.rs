@@ -7,6 +7,7 @@ pub mod aov;
 pub mod background;
 pub mod classify;
 pub mod composite;
+pub mod emitters;
 pub mod environment;
 pub mod fragments;
 pub mod gbuffer;

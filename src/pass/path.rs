@@ -4,14 +4,11 @@
 use std::sync::Arc;
 
 use anyhow::Result;
-use ash::vk;
 
 use super::lighting::Lighting;
 use super::rows::{rows_of, stride};
-use super::upload::upload;
 use crate::gpu::{Buffer, Device, Frame, Image, NOTHING, Place};
 use crate::plan::{Paths, Plan, Rays};
-use crate::scene::emitters::{Emitters, Source};
 use crate::shader::{path, path_at_once, path_begin, queue_count, queue_next, queue_scan};
 
 /// Pixels a side of the tiles that the first queue is made of.
@@ -24,66 +21,6 @@ const CHUNKS_AT: u64 = 16;
 const CHUNK: u32 = 16;
 /// Paths of a workgroup, two in each invocation: `PATHS_IN_GROUP`.
 const PATHS_IN_GROUP: u32 = 128;
-
-/// Kinds of emitters and a flag: shaders/lib/emitters.glsl.
-const PUNCTUAL: u32 = 0;
-const TRIANGLE: u32 = 1;
-const SKY: u32 = 2;
-const NOWHERE: u32 = 3;
-const TWO_SIDED: u32 = 4;
-
-/// What paths draw light from; next to nothing without any.
-pub struct EmittersOnDevice {
-    /// A texel each.
-    pub table: Buffer,
-    /// Shares of the environment's cells.
-    pub sky: Buffer,
-    count: u32,
-    punctual: bool,
-    triangles: bool,
-    columns: u32,
-    rows: u32,
-}
-
-impl EmittersOnDevice {
-    /// `leaf_places` are those of the scene's triangles in the hierarchy.
-    ///
-    /// # Errors
-    /// When memory is short.
-    pub fn new(device: &Arc<Device>, emitters: &Emitters, leaf_places: &[u32]) -> Result<Self> {
-        let texel = |emitter: &crate::scene::emitters::Emitter| {
-            let (kind, place) = match emitter.source {
-                Source::Sky => (SKY, 0),
-                Source::Punctual(light) => (PUNCTUAL, light),
-                Source::Triangle { index, two_sided, .. } => {
-                    match leaf_places[index as usize] {
-                        // Rays leave it out, and so do the lights.
-                        u32::MAX => (NOWHERE, 0),
-                        place => (TRIANGLE | if two_sided { TWO_SIDED } else { 0 }, place),
-                    }
-                }
-            };
-            [emitter.first, (emitter.probability as f32).to_bits(), kind, place]
-        };
-        let list: Vec<[u32; 4]> = emitters.list.iter().map(texel).collect();
-        let any = |test: fn(&Source) -> bool| emitters.list.iter().any(|emitter| test(&emitter.source));
-        let name = |named: &'static str, empty: bool| if empty { NOTHING } else { named };
-        Ok(Self {
-            table: upload(device, name("emitters", list.is_empty()), &list, Some(vk::Format::R32G32B32A32_UINT))?,
-            sky: upload(
-                device,
-                name("shares of the environment", emitters.sky.words.is_empty()),
-                &emitters.sky.words,
-                Some(vk::Format::R32_UINT),
-            )?,
-            count: list.len() as u32,
-            punctual: any(|source| matches!(source, Source::Punctual(_))),
-            triangles: any(|source| matches!(source, Source::Triangle { .. })),
-            columns: emitters.sky.columns,
-            rows: emitters.sky.rows,
-        })
-    }
-}
 
 /// Halvings that single out one of `count`.
 fn halvings(count: u32) -> u32 {

@@ -9,7 +9,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::path::EmittersOnDevice;
+use super::emitters::EmittersOnDevice;
 use super::scene::{cofactors as cofactors_of, medium, texture_slots};
 use super::upload::upload;
 use super::view::View;

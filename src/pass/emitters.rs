@@ -1,0 +1,75 @@
+//! What paths draw light from, as tables on the device (shaders/lib/emitters.glsl).
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use ash::vk;
+
+use super::upload::upload;
+use crate::gpu::{Buffer, Device, NOTHING};
+use crate::scene::emitters::{Emitter, Emitters, Source};
+
+/// Kinds of emitters and a flag: shaders/lib/emitters.glsl.
+const PUNCTUAL: u32 = 0;
+const TRIANGLE: u32 = 1;
+const SKY: u32 = 2;
+const NOWHERE: u32 = 3;
+const TWO_SIDED: u32 = 4;
+
+/// What paths draw light from; next to nothing without any.
+pub struct EmittersOnDevice {
+    /// A texel each.
+    pub table: Buffer,
+    /// Shares of the environment's cells.
+    pub sky: Buffer,
+    /// How many.
+    pub count: u32,
+    /// Some are lights without extent.
+    pub punctual: bool,
+    /// Some are triangles.
+    pub triangles: bool,
+    /// Cells of the environment across; 0 where it is none of them.
+    pub columns: u32,
+    /// And down.
+    pub rows: u32,
+}
+
+impl EmittersOnDevice {
+    /// `leaf_places` are those of the scene's triangles in the hierarchy.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn new(device: &Arc<Device>, emitters: &Emitters, leaf_places: &[u32]) -> Result<Self> {
+        let texel = |emitter: &Emitter| {
+            let (kind, place) = match emitter.source {
+                Source::Sky => (SKY, 0),
+                Source::Punctual(light) => (PUNCTUAL, light),
+                Source::Triangle { index, two_sided, .. } => {
+                    match leaf_places[index as usize] {
+                        // Rays leave it out, and so do the lights.
+                        u32::MAX => (NOWHERE, 0),
+                        place => (TRIANGLE | if two_sided { TWO_SIDED } else { 0 }, place),
+                    }
+                }
+            };
+            [emitter.first, (emitter.probability as f32).to_bits(), kind, place]
+        };
+        let list: Vec<[u32; 4]> = emitters.list.iter().map(texel).collect();
+        let any = |test: fn(&Source) -> bool| emitters.list.iter().any(|emitter| test(&emitter.source));
+        let name = |named: &'static str, empty: bool| if empty { NOTHING } else { named };
+        Ok(Self {
+            table: upload(device, name("emitters", list.is_empty()), &list, Some(vk::Format::R32G32B32A32_UINT))?,
+            sky: upload(
+                device,
+                name("shares of the environment", emitters.sky.words.is_empty()),
+                &emitters.sky.words,
+                Some(vk::Format::R32_UINT),
+            )?,
+            count: list.len() as u32,
+            punctual: any(|source| matches!(source, Source::Punctual(_))),
+            triangles: any(|source| matches!(source, Source::Triangle { .. })),
+            columns: emitters.sky.columns,
+            rows: emitters.sky.rows,
+        })
+    }
+}
