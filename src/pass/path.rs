@@ -94,10 +94,11 @@ pub fn paths<'a>(
 ) -> Result<()> {
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
     let Some(with) = plan.rays else { return Ok(()) };
-    let width = paths.size[0];
     let [origins, directions, throughputs, sums, media, afters] = &paths.states;
     let places = places(paths.size);
     let tiles = places / (TILE * TILE);
+    let constants = constants(lighting, with, paths.with);
+    let first = [places, stride(tiles)];
     if paths.with.at_once {
         let bind = path_at_once::Bind {
             camera_block: camera,
@@ -121,13 +122,10 @@ pub fn paths<'a>(
             emitters: &rays.emitters.table,
             sky_shares: &rays.emitters.sky,
         };
-        let push = [places, stride(tiles)];
         let groups = rows_of(places.div_ceil(PATHS_IN_GROUP));
-        let constants = Constants::of(lighting, with, paths.with);
-        return frame.compute("paths at once", &bind, constants.at_once(), bytemuck::cast_slice(&push), groups);
+        return frame.compute("paths at once", &bind, constants, bytemuck::cast_slice(&first), groups);
     }
     frame.copy_buffer("reset queue size", &paths.first_size, &paths.sizes[0], SIZE_BYTES);
-    let constants = Constants::of(lighting, with, paths.with);
     let bind = path_begin::Bind {
         camera_block: camera,
         queue: &paths.queues[0],
@@ -141,8 +139,7 @@ pub fn paths<'a>(
         bvh_triangles: &rays.triangles,
         trace_block: &rays.terms,
     };
-    let push = [places, stride(tiles)];
-    frame.compute("paths begin", &bind, constants.begin(), bytemuck::cast_slice(&push), rows_of(tiles))?;
+    frame.compute("paths begin", &bind, of_begin(&constants), bytemuck::cast_slice(&first), rows_of(tiles))?;
     for bounce in 0..with.interfaces + 1 {
         let [from, to] = if bounce % 2 == 0 { [0, 1] } else { [1, 0] };
         let bind = path::Bind {
@@ -174,11 +171,11 @@ pub fn paths<'a>(
             queue: &paths.queues[from],
             sizes: &paths.sizes[from],
         };
-        let push = [width];
+        let push = [paths.size[0]];
         frame.compute_indirect(
             "paths",
             &bind,
-            constants.bounce(),
+            constants.clone(),
             bytemuck::cast_slice(&push),
             &paths.sizes[from],
             0,
@@ -201,63 +198,52 @@ fn compact<'a>(frame: &mut Frame<'a>, paths: &'a PathsOnDevice, from: usize, to:
     frame.compute_indirect("next queue", &bind, queue_next::Constants {}.words(), &[], sizes, CHUNKS_AT)
 }
 
-/// Constants of all programs of paths, by the one that has them all.
-struct Constants(path::Constants);
+/// Constants of all programs of paths: the same numbers name the same ones in each.
+fn constants(lighting: Lighting, with: Rays, paths: Paths) -> Vec<(u32, u32)> {
+    let Lighting { plan, knobs, rays, .. } = lighting;
+    let emitters = &rays.emitters;
+    let all = path::Constants {
+        brdf: knobs.index("brdf"),
+        fresnel: knobs.index("fresnel"),
+        arithmetic: knobs.index("arithmetic"),
+        clearcoat: plan.clearcoat,
+        conductors: plan.conductors,
+        traversal: rays.constants.traversal,
+        octants: rays.constants.octants,
+        stack_size: rays.constants.stack_size,
+        hit_textures: rays.constants.hit_textures,
+        filters: with.filters,
+        absorption: with.absorption,
+        march_steps: with.march.steps,
+        quadrature: with.march.rule,
+        march_colours: with.march.colours,
+        march_budget: lighting.loop_budget(),
+        transmissive: with.transmissive,
+        rough: with.rough,
+        frosted: with.frosted,
+        touching: rays.constants.touching,
+        environment: plan.environment,
+        sky: plan.sky,
+        loop_budget: lighting.loop_budget(),
+        directional_lights: plan.directional_lights,
+        lighting_surfaces: paths.emitting,
+        emitters: emitters.count,
+        emitter_steps: halvings(emitters.count),
+        punctual_emitters: emitters.punctual,
+        emitting_triangles: emitters.triangles,
+        emitting_sky: emitters.rows > 0,
+        sky_columns: emitters.columns,
+        sky_rows: emitters.rows,
+        keeps_media: with.transmissive,
+        keeps_after: rays.constants.touching,
+        sky_steps: halvings(emitters.columns.max(emitters.rows)),
+        ..Default::default()
+    };
+    all.words()
+}
 
-impl Constants {
-    fn of(lighting: Lighting, with: Rays, paths: Paths) -> Self {
-        let Lighting { plan, knobs, rays, .. } = lighting;
-        let emitters = &rays.emitters;
-        Self(path::Constants {
-            brdf: knobs.index("brdf"),
-            fresnel: knobs.index("fresnel"),
-            arithmetic: knobs.index("arithmetic"),
-            clearcoat: plan.clearcoat,
-            conductors: plan.conductors,
-            traversal: rays.constants.traversal,
-            octants: rays.constants.octants,
-            stack_size: rays.constants.stack_size,
-            hit_textures: rays.constants.hit_textures,
-            filters: with.filters,
-            absorption: with.absorption,
-            march_steps: with.march.steps,
-            quadrature: with.march.rule,
-            march_colours: with.march.colours,
-            march_budget: lighting.loop_budget(),
-            transmissive: with.transmissive,
-            rough: with.rough,
-            frosted: with.frosted,
-            touching: rays.constants.touching,
-            environment: plan.environment,
-            sky: plan.sky,
-            loop_budget: lighting.loop_budget(),
-            directional_lights: plan.directional_lights,
-            lighting_surfaces: paths.emitting,
-            emitters: emitters.count,
-            emitter_steps: halvings(emitters.count),
-            punctual_emitters: emitters.punctual,
-            emitting_triangles: emitters.triangles,
-            emitting_sky: emitters.rows > 0,
-            sky_columns: emitters.columns,
-            sky_rows: emitters.rows,
-            keeps_media: with.transmissive,
-            keeps_after: rays.constants.touching,
-            sky_steps: halvings(emitters.columns.max(emitters.rows)),
-            ..Default::default()
-        })
-    }
-
-    fn bounce(&self) -> Vec<(u32, u32)> {
-        self.0.words()
-    }
-
-    /// The same numbers name the same constants in all of them.
-    fn at_once(&self) -> Vec<(u32, u32)> {
-        self.0.words()
-    }
-
-    fn begin(&self) -> Vec<(u32, u32)> {
-        let known = path_begin::PROGRAM.constants;
-        self.0.words().into_iter().filter(|(id, _)| known.iter().any(|constant| constant.id == *id)).collect()
-    }
+/// Those of them that the first queue is made with.
+fn of_begin(constants: &[(u32, u32)]) -> Vec<(u32, u32)> {
+    let known = path_begin::PROGRAM.constants;
+    constants.iter().copied().filter(|(id, _)| known.iter().any(|constant| constant.id == *id)).collect()
 }
