@@ -231,7 +231,8 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, out LightTask task) {
         ends = ends || unit_float(event.y) >= survives;
         p.throughput /= max(survives, 1e-6);
     }
-    p.throughput = only_finite(p.throughput, pixel, hit.material, met_before);
+    // What a path that has met nothing computes for a surface does not count.
+    p.throughput = only_finite(ends ? vec3(0.0) : p.throughput, pixel, hit.material, met_before);
     task.contribution = only_finite(task.contribution, pixel, hit.material, met_before);
     gathered = only_finite(gathered, pixel, hit.material, met_before);
     flags |= open ? PATH_OPEN : 0u;
