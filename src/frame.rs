@@ -19,7 +19,7 @@ use crate::pass::composite::{composite, composite_part};
 use crate::pass::environment::{EnvironmentOnDevice, Turn};
 use crate::pass::fragments::{FragmentLists, fragments};
 use crate::pass::gbuffer::{GBuffer, gbuffer};
-use crate::pass::halves::{Halves, add_to_half, join_halves};
+use crate::pass::halves::{Halves, join_halves};
 use crate::pass::interact::{interact, interact_part};
 use crate::pass::light::light;
 use crate::pass::lighting::Lighting;
@@ -39,8 +39,10 @@ use crate::scene::environment::Environment;
 use crate::scene::normal_form::normalise;
 use crate::scene::reads::forget_unread;
 use crate::scene::sigma::one_medium_each;
+use crate::scene::wavelengths::Slice;
 use crate::scene::{Ambience, Bounds, Camera, Light, LightKind, Reads, Scene};
 use crate::share::{self, AovPixel};
+use crate::spectra::VISIBLE;
 
 /// What lies behind the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -66,6 +68,9 @@ const MOST_LISTED_LIGHTS: usize = 30_000;
 
 /// Samples of each pixel after which a picture whose error is the end is given up.
 const MOST_SAMPLES: u32 = 1 << 16;
+
+/// Parts of a band that the samples of a picture go through, where wavelengths go different ways.
+const MOST_PARTS: u32 = 64;
 
 /// How a picture is made; everything that does not change between the frames of a sequence.
 #[derive(Debug, Clone)]
@@ -295,6 +300,7 @@ impl Renderer {
         let surroundings = Surroundings {
             environment: environment.is_some(),
             constant: environment.is_some_and(Environment::is_constant),
+            grey: environment.is_some_and(Environment::is_grey),
             sky,
             demand: settings.demand,
         };
@@ -362,7 +368,7 @@ impl Renderer {
             lists: if plan.see_through { Some(FragmentLists::new(device, size)?) } else { None },
             radiance: target("radiance")?,
             screen: OnScreen::new(device, &plan, size)?,
-            film: if plan.samples > 1 { Some(target("film")?) } else { None },
+            film: if plan.samples > 1 || plan.bands > 0 { Some(target("film")?) } else { None },
             parts,
             halves: if paths.is_some() && plan.samples > 1 { Some(Halves::new(device, size)?) } else { None },
             paths,
@@ -392,31 +398,34 @@ impl Renderer {
         let mut samples = count;
         let pixels = f64::from(self.settings.size[0]) * f64::from(self.settings.size[1]);
         for index in 0..count {
-            // A frame whose see-through fragments did not fit is drawn again with more room.
-            loop {
-                self.look(&view, index, count);
-                let passes = self.sample(count)?.finish()?;
-                let fitted = match &mut self.lists {
-                    Some(lists) => lists.fitted()?,
-                    None => true,
-                };
-                if fitted {
-                    times.add(passes);
-                    break;
+            for band in 0..self.plan.bands.max(1) {
+                self.show_band(band, index, count);
+                // A frame whose see-through fragments did not fit is drawn again with more room.
+                loop {
+                    self.look(&view, index, count, band);
+                    let passes = self.sample(count, band)?.finish()?;
+                    let fitted = match &mut self.lists {
+                        Some(lists) => lists.fitted()?,
+                        None => true,
+                    };
+                    if fitted {
+                        times.add(passes);
+                        break;
+                    }
                 }
-            }
-            if self.plan.rays.is_some() {
-                work.add(&self.rays.counted(), pixels);
-                ensure!(
-                    work.lights_cut_off == 0,
-                    "lighting what rays meet ({} lights, at {} surfaces) takes longer loops than the driver allows: draw \
-                     with shadows=map, fewer lights, fewer interfaces, or on a device without that limit",
-                    self.plan.directional_lights + self.plan.local_lights,
-                    work.lights_cut_off
-                );
-            }
-            if self.film.is_some() {
-                times.add(self.add(index, count)?.finish()?);
+                if self.plan.rays.is_some() {
+                    work.add(&self.rays.counted(), pixels);
+                    ensure!(
+                        work.lights_cut_off == 0,
+                        "lighting what rays meet ({} lights, at {} surfaces) takes longer loops than the driver allows: \
+                         draw with shadows=map, fewer lights, fewer interfaces, or on a device without that limit",
+                        self.plan.directional_lights + self.plan.local_lights,
+                        work.lights_cut_off
+                    );
+                }
+                if self.film.is_some() {
+                    times.add(self.add(index, count, band)?.finish()?);
+                }
             }
             dropped = dropped.max(self.lists.as_ref().map_or(0, FragmentLists::dropped));
             let done = index + 1;
@@ -434,7 +443,7 @@ impl Renderer {
                 break;
             }
         }
-        work.mean_lost /= f64::from(samples);
+        work.mean_lost /= f64::from(samples) * f64::from(self.plan.bands.max(1));
         if let Some(error) =
             errors.last().filter(|error| self.settings.max_error.is_some_and(|e| error.relmse.sqrt() > e))
         {
@@ -462,16 +471,35 @@ impl Renderer {
         })
     }
 
-    /// Where the next sample is seen from.
-    fn look(&mut self, view: &View, index: u32, count: u32) {
+    /// Where the next frame is seen from.
+    fn look(&mut self, view: &View, index: u32, count: u32, band: u32) {
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(index, count))));
-        // Halves of a picture by paths have random numbers of their own.
+        // Halves of a picture by paths have random numbers of their own, and so has each band: what is noise in one is none in
+        // another, and their sum has less of it.
         let [at, half] = if self.halves.is_some() { [index / 2, index % 2] } else { [index, 0] };
-        self.rays.look_from(view, at, count, self.settings.seed.wrapping_mul(2).wrapping_add(half));
+        let seed = self.settings.seed.wrapping_mul(2).wrapping_add(half).wrapping_add(band.wrapping_mul(0x9e37_79b9));
+        self.rays.look_from(view, at, count, seed);
     }
 
-    /// One sample of every pixel: the frame, pass by pass.
-    fn sample(&self, count: u32) -> Result<Frame<'_>> {
+    /// The wavelengths of the next frame, where the picture is drawn by them.
+    fn show_band(&mut self, band: u32, index: u32, count: u32) {
+        let Plan { bands, disperses, .. } = self.plan;
+        if bands == 0 {
+            return;
+        }
+        let band = VISIBLE.part(band, bands);
+        // What goes another way for each wavelength is drawn for parts of the band, one for each sample of a half: as many as
+        // there are, in an order that spreads them.
+        let halves = if self.halves.is_some() { 2 } else { 1 };
+        let most = if disperses { (count / halves).clamp(1, MOST_PARTS) } else { 1 };
+        let parts = 1 << most.ilog2();
+        let at = (index / halves) % parts;
+        let part = if parts > 1 { at.reverse_bits() >> (32 - parts.ilog2()) } else { 0 };
+        self.scene.show(Some(&Slice { band, part: band.part(part, parts) }));
+    }
+
+    /// One sample of every pixel, or one band of it: the frame, pass by pass.
+    fn sample(&self, count: u32, band: u32) -> Result<Frame<'_>> {
         let Self {
             device,
             plan,
@@ -510,11 +538,14 @@ impl Renderer {
             frame.read_back(&rays.counts);
             return Ok(frame);
         }
-        gbuffer(&mut frame, scene, camera, g, lod_bias, scene.draws(false, rays.inside()))?;
-        if plan.tiles {
-            tiles(&mut frame, plan, scene, camera, g, lists_of_lights)?;
+        // What is where is the same in all bands.
+        if band == 0 {
+            gbuffer(&mut frame, scene, camera, g, lod_bias, scene.draws(false, rays.inside()))?;
+            if plan.tiles {
+                tiles(&mut frame, plan, scene, camera, g, lists_of_lights)?;
+            }
+            classify(&mut frame, g, work)?;
         }
-        classify(&mut frame, g, work)?;
         light(&mut frame, lighting, g, work, radiance)?;
         background(&mut frame, lighting, g, work, radiance)?;
         if let Some(with) = plan.rays.filter(|rays| rays.mirrors || rays.refraction) {
@@ -558,15 +589,19 @@ impl Renderer {
         Ok(frame)
     }
 
-    /// Adds the sample to the film, where there is more than one.
-    fn add(&self, index: u32, count: u32) -> Result<Frame<'_>> {
+    /// Adds the sample, or one band of it, to the film, where there is more than one.
+    fn add(&self, index: u32, count: u32, band: u32) -> Result<Frame<'_>> {
         let mut frame = Frame::new(&self.device);
+        let bands = self.plan.bands;
         if let Some(halves) = &self.halves {
-            add_to_half(&mut frame, &self.radiance, halves, index)?;
+            let (round, half) = (index / 2, index as usize % 2);
+            accumulate(&mut frame, &self.radiance, &halves.sums[half], round == 0 && band == 0, 1.0, bands)?;
         } else if let Some(film) = &self.film {
-            accumulate(&mut frame, &self.radiance, film, index, count)?;
+            let (first, last) = (index == 0 && band == 0, index + 1 == count && band + 1 == bands.max(1));
+            let scale = if last { 1.0 / count as f32 } else { 1.0 };
+            accumulate(&mut frame, &self.radiance, film, first, scale, bands)?;
             for part in &self.parts {
-                accumulate(&mut frame, &part.radiance, part.film(), index, count)?;
+                accumulate(&mut frame, &part.radiance, part.film(), first, scale, bands)?;
             }
         }
         Ok(frame)
@@ -591,10 +626,10 @@ impl Renderer {
         let view = View::new(camera, self.settings.size, self.scene.bounds);
         self.scene.look_from(&view);
         let count = self.plan.samples;
-        self.look(&view, 0, count);
+        self.look(&view, 0, count, 0);
         let done =
             self.shadow_maps.times.iter().map(|pass| PassPlan { name: pass.name.clone(), pipelines: Vec::new() });
-        Ok([done.collect(), self.sample(count)?.plan(), self.add(0, count)?.plan(), self.show()?.plan()].concat())
+        Ok([done.collect(), self.sample(count, 0)?.plan(), self.add(0, count, 0)?.plan(), self.show()?.plan()].concat())
     }
 
     /// Display-linear colour behind the scene with alpha 1, or all 0, and whether the display output is transparent.
@@ -699,6 +734,7 @@ impl Renderer {
         let [width, height] = self.settings.size;
         let view = View::new(camera, self.settings.size, self.scene.bounds);
         self.scene.look_from(&view);
+        self.scene.show(None);
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(0, 1))));
         let mut frame = Frame::new(&self.device);
         let mut draws = self.scene.draws(false, self.rays.inside());
@@ -748,7 +784,7 @@ impl Renderer {
 /// Lights of both kinds that do not shine: loops over lights then have a turn to take.
 fn add_dark_lights(scene: &mut Scene) {
     let bounds = scene.bounds().unwrap_or(Bounds { min: DVec3::ZERO, max: DVec3::ONE });
-    let dark = |kind| Light { name: "dark".to_owned(), color: [0.0; 3], kind, stand_in: false };
+    let dark = |kind| Light { name: "dark".to_owned(), color: [0.0; 3], spectrum: None, kind, stand_in: false };
     let point = LightKind::Point { position: bounds.max, range: Some(2.0 * bounds.radius()) };
     scene.lights.extend([dark(LightKind::Directional { direction: DVec3::NEG_Y }), dark(point)]);
 }

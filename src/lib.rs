@@ -65,6 +65,8 @@ pub mod study;
 
 pub mod image;
 
+pub mod spectra;
+
 pub mod optics;
 
 pub mod verify;

@@ -73,6 +73,10 @@ impl Material {
     pub const CONDUCTOR: u32 = 4;
     /// Reflects anything at all at its surface.
     pub const MIRRORS: u32 = 8;
+    /// In a band of wavelengths, `base_color` is red, green and blue all the same.
+    pub const BASE_RGB: u32 = 16;
+    /// In a band of wavelengths, `emissive` is red, green and blue all the same.
+    pub const EMISSIVE_RGB: u32 = 32;
 }
 
 /// `shaders/share/environment.glsl`.

@@ -7,16 +7,17 @@ use std::path::{Path, PathBuf};
 /// What each top-level module may name with `crate::`.
 const MAY_USE: &[(&str, &[&str])] = &[
     ("image", &["image"]),
-    ("scene", &["scene", "image"]),
-    ("study", &["study", "scene"]),
+    ("spectra", &["spectra", "optics"]),
+    ("scene", &["scene", "image", "spectra"]),
+    ("study", &["study", "scene", "spectra"]),
     ("plan", &["plan", "scene"]),
     ("optics", &["optics"]),
     ("verify", &["verify", "optics", "shader", "gpu"]),
     ("share", &["share"]),
     ("gpu", &["gpu"]),
     ("shader", &["shader", "gpu", "share"]),
-    ("pass", &["pass", "gpu", "scene", "plan", "image", "shader", "share"]),
-    ("frame", &["frame", "pass", "gpu", "scene", "plan", "image", "share"]),
+    ("pass", &["pass", "gpu", "scene", "plan", "image", "shader", "share", "spectra"]),
+    ("frame", &["frame", "pass", "gpu", "scene", "plan", "image", "share", "spectra"]),
     ("cost", &["cost", "frame", "gpu", "plan", "scene"]),
     (
         "cli",

@@ -443,6 +443,7 @@ fn compensation_is_for_lights_too() {
     let direction = DVec3::new(0.0, -0.3, -1.0).normalize();
     scene.lights.push(etalon::scene::Light {
         stand_in: false,
+        spectrum: None,
         name: "sun".to_owned(),
         color: [1.0; 3],
         kind: LightKind::Directional { direction },
@@ -470,6 +471,7 @@ fn exact_fresnel_of_a_half_metal_lies_between() {
         let mut scene = ball(material);
         scene.lights.push(etalon::scene::Light {
             stand_in: false,
+            spectrum: None,
             name: "sun".to_owned(),
             color: [1.0; 3],
             kind: LightKind::Directional { direction: DVec3::new(0.9, -0.1, 0.4).normalize() },

@@ -519,7 +519,8 @@ fn light_reaches_into_a_body_through_its_grid() {
 fn planned(scene: &Scene, choices: &[&str]) -> Plan {
     let mut knobs = Knobs::of(Model::Recursive);
     choices.iter().for_each(|choice| knobs.set(choice).expect("a rung"));
-    let surroundings = Surroundings { environment: false, constant: false, sky: false, demand: Demand::Scene };
+    let surroundings =
+        Surroundings { environment: false, constant: false, grey: false, sky: false, demand: Demand::Scene };
     Plan::new(scene, &Facts::of(scene, NormalForm::default()), surroundings, &knobs)
 }
 

@@ -460,6 +460,7 @@ fn planned(ways: &Ways, choice: &Choice, knobs: Knobs) -> Plan {
     let surroundings = Surroundings {
         environment: environment != "none",
         constant: environment == "constant",
+        grey: false,
         sky: environment != "none",
         demand: Demand::Scene,
     };

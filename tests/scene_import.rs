@@ -421,7 +421,7 @@ fn every_material_field_is_read() {
     assert_eq!((m.alpha_mode, m.double_sided, m.unlit), (AlphaMode::Mask(0.3), true, true));
     assert_eq!((m.ior, m.specular, m.specular_color), (1.33, 0.45, [0.1, 1.0, 2.0]));
     assert_eq!((m.transmission, m.thickness, m.attenuation_distance), (0.55, 0.65, 4.0));
-    assert_eq!((m.attenuation_color, m.dispersion), ([0.2, 0.3, 0.4], 0.35));
+    assert_eq!((m.attenuation_color, m.dispersion), ([0.2, 0.3, 0.4], Dispersion::Abbe(f64::from(0.35_f32))));
     assert_eq!((m.clearcoat, m.clearcoat_roughness), (0.9, 0.15));
     let present = [
         m.base_color_texture,

@@ -29,6 +29,10 @@ vec3 material_emissive(uint id) {
     return material_texel(id, 1).xyz;
 }
 
+uint material_flags(uint id) {
+    return floatBitsToUint(material_texel(id, 5).w);
+}
+
 float material_ior(uint id) {
     return material_texel(id, 4).x;
 }

@@ -142,7 +142,7 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, out LightTask task) {
     if (EMITTERS > 0) light = sample_light(front_origin, draw_words(pixel, met_before, DRAW_LIGHT));
     if (ENVIRONMENT) {
         vec3 towards = at_surface ? light.to_light : p.direction;
-        vec3 seen = textureLod(sky, equirectangular_from_direction(into_environment(towards)), 0.0).rgb * environment.intensity;
+        vec3 seen = environment_light(textureLod(sky, equirectangular_from_direction(into_environment(towards)), 0.0).rgb);
         bool clear = (p.state & PATH_CLEAR) != 0 && !SKY;
         float w = p.pdf > 0.0 ? mis_weight(p.pdf, sky_pdf(p.direction)) : 1.0;
         if (!at_surface && !clear) gathered = p.throughput * seen * w;

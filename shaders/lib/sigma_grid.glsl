@@ -3,6 +3,7 @@
 #ifndef SIGMA_GRID_GLSL
 #define SIGMA_GRID_GLSL
 #include "lib/medium.glsl"
+#include "lib/spectrum.glsl"
 #include "lib/trace.glsl"
 
 layout(constant_id = 31) const uint MARCH_STEPS = 0;        // of each segment, a multiple of 4; 0: no grid is marched
@@ -42,8 +43,8 @@ vec3 sigma_at(SigmaGrid grid, vec3 place) {
     int next_layer = grid.last.z > 0.0 ? layer : 0;
     float red = sigma_in_cell(texel, next_layer, at - cell);
     if (!MARCH_COLOURS) return vec3(red);
-    return vec3(red, sigma_in_cell(texel + grid.channel, next_layer, at - cell),
-                sigma_in_cell(texel + 2 * grid.channel, next_layer, at - cell));
+    return sum_of_rgb(vec3(red, sigma_in_cell(texel + grid.channel, next_layer, at - cell),
+                           sigma_in_cell(texel + 2 * grid.channel, next_layer, at - cell)));
 }
 
 void add_sigma(inout vec3 sum, inout vec3 rest, vec3 sigma) {

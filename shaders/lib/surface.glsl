@@ -4,6 +4,7 @@
 #include "lib/brdf.glsl"
 #include "lib/fresnel.glsl"
 #include "lib/material.glsl"
+#include "lib/spectrum.glsl"
 
 // The knobs `brdf` and `fresnel` (src/plan/knobs.rs): one formula each, chosen when the pipeline is made.
 layout(constant_id = 10) const uint BRDF = 2;    // 0 blinn-phong, 1 blinn-phong-reciprocal, 2 ggx, 3 ggx-multi
@@ -62,7 +63,15 @@ Surface surface_from_texels(Material m, vec3 base, float metallic, float roughne
     s.v = v;
     s.n = n;
     s.n_coat = n_coat;
+    s.unlit = (m.flags & MATERIAL_UNLIT) != 0;
     s.base = base * m.base_color.rgb;
+    if (SPECTRAL) {
+        if (s.unlit) {
+            s.base = light_of_rgb(s.base);
+        } else if ((m.flags & MATERIAL_BASE_RGB) != 0) {
+            s.base = reflectance_of_rgb(s.base);
+        }
+    }
     float metal = metallic * m.metallic;
     s.diffuse = s.base * (1.0 - metal);
     s.metallic = metal;
@@ -84,6 +93,7 @@ Surface surface_from_texels(Material m, vec3 base, float metallic, float roughne
     s.alpha = s.roughness * s.roughness;
     s.occlusion = 1.0 + m.occlusion_strength * (occlusion - 1.0);
     s.emissive = emissive * m.emissive;
+    if (SPECTRAL && (m.flags & MATERIAL_EMISSIVE_RGB) != 0) s.emissive = light_of_rgb(s.emissive);
     s.clearcoat = layers.x * m.clearcoat;
     s.clearcoat_roughness = max(layers.y * m.clearcoat_roughness, MIN_ROUGHNESS);
     s.clearcoat_alpha = s.clearcoat_roughness * s.clearcoat_roughness;
@@ -93,7 +103,6 @@ Surface surface_from_texels(Material m, vec3 base, float metallic, float roughne
     s.n_triangle = n;
     s.face = 0xffffffffu;
     s.media = uvec4(0);
-    s.unlit = (m.flags & MATERIAL_UNLIT) != 0;
     return s;
 }
 

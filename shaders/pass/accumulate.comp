@@ -1,14 +1,18 @@
-// Adds one sample of every pixel to the film; the last one divides by their number.
+// Adds one sample of every pixel to the film; the last one divides by their number. Of a picture by wavelengths a sample is the
+// sum of its bands, X, Y and Z each.
 #version 460
+#extension GL_EXT_scalar_block_layout : require
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 0, rgba32f) readonly uniform image2D radiance;
 layout(set = 0, binding = 1, rgba32f) uniform image2D film;
-layout(push_constant) uniform Push { uint first; float scale; };
+layout(constant_id = 72) const bool SPECTRAL = false;
+layout(push_constant, scalar) uniform Push { uint first; float scale; float bands; mat3 rgb_from_xyz; };
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(film)))) return;
     vec4 sum = imageLoad(radiance, pixel);
+    if (SPECTRAL) sum = vec4(rgb_from_xyz * sum.rgb, sum.a / bands);
     if (first == 0) sum += imageLoad(film, pixel);
     imageStore(film, pixel, sum * scale);
 }

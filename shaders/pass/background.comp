@@ -5,6 +5,7 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "lib/camera.glsl"
 #include "lib/encode.glsl"
+#include "lib/spectrum.glsl"
 #include "lib/work_tile.glsl"
 #include "share/environment.glsl"
 
@@ -27,7 +28,7 @@ void main() {
     vec4 result = vec4(0.0);
     if (SKY) {
         vec3 d = turned(view_direction(camera, pixel), environment.cos_rotation, environment.sin_rotation);
-        result = vec4(textureLod(sky, equirectangular_from_direction(d), 0.0).rgb * environment.intensity, 1.0);
+        result = vec4(light_of_rgb(textureLod(sky, equirectangular_from_direction(d), 0.0).rgb * environment.intensity), 1.0);
     }
     imageStore(radiance, pixel, result);
 }

@@ -44,7 +44,8 @@ fn magnitude(spectrum: &[f64], functions: &[[f64; 3]; SAMPLES]) -> [f64; 3] {
 }
 
 /// XYZ to linear sRGB, rows (IEC 61966-2-1, four digits).
-const XYZ_TO_SRGB: [[f64; 3]; 3] = [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]];
+pub const XYZ_TO_SRGB: [[f64; 3]; 3] =
+    [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]];
 
 fn times(rows: &[[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
     rows.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])

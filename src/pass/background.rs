@@ -5,6 +5,7 @@ use anyhow::Result;
 use super::classify::{WORK_BYTES, WorkLists};
 use super::gbuffer::GBuffer;
 use super::lighting::Lighting;
+use super::spectrum::SpectrumConstants;
 use crate::gpu::{Frame, Image};
 use crate::shader::background;
 
@@ -25,10 +26,12 @@ pub fn background<'a>(
         radiance,
         background_tiles: &work.background,
         environment: &lighting.environment.terms,
+        spectrum: &lighting.scene.spectrum.texels,
         sky: lighting.environment.sky(),
         work: &work.sizes,
     };
-    let constants =
-        background::Constants { sky: lighting.plan.sky, arithmetic: lighting.knobs.index("arithmetic") }.words();
+    let SpectrumConstants { spectral, grid_side } = lighting.scene.colours();
+    let arithmetic = lighting.knobs.index("arithmetic");
+    let constants = background::Constants { sky: lighting.plan.sky, arithmetic, spectral, grid_side }.words();
     frame.compute_indirect("background", &bind, constants, &[], &work.sizes, WORK_BYTES)
 }

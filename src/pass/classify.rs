@@ -165,6 +165,7 @@ pub fn classify_rays<'a>(
     frame.copy_buffer("reset ray work size", &list.empty, &list.sizes, WORK_BYTES);
     let bind = ray_program::Bind {
         material_texels: &lighting.scene.materials,
+        spectrum: &lighting.scene.spectrum.texels,
         depth: &gbuffer.depth_texels,
         ids: &gbuffer.ids,
         sizes: &list.sizes,

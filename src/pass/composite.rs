@@ -60,6 +60,8 @@ fn lay_over<'a>(
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
     let planned = plan.rays;
     let constants = composite::Constants {
+        spectral: scene.colours().spectral,
+        grid_side: scene.colours().grid_side,
         // Without rays a light is a single turn of a loop, and what may be too many is refused before.
         light_budget: if lighting.shadow_rays() { lighting.loop_budget() } else { u32::MAX },
         brdf: lighting.knobs.index("brdf"),
@@ -115,6 +117,7 @@ fn lay_over<'a>(
         bvh_triangles: &rays.triangles,
         trace_block: &rays.terms,
         material_texels: &scene.materials,
+        spectrum: &scene.spectrum.texels,
         hit_corners: &rays.corners,
         texels: &scene.texels,
         texel_slots: &scene.texel_slots,

@@ -7,7 +7,7 @@ use anyhow::Result;
 use ash::vk;
 
 use crate::gpu::{Device, Frame, Image, ImageDesc};
-use crate::shader::{accumulate, join_halves};
+use crate::shader::join_halves;
 
 /// Sums of the even and of the odd samples.
 pub struct Halves {
@@ -26,18 +26,6 @@ impl Halves {
             |name| Image::new(device, name, ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], usage));
         Ok(Self { sums: [sum("sum of even samples")?, sum("sum of odd samples")?] })
     }
-}
-
-/// Adds sample `index` to its half.
-///
-/// # Errors
-/// When the driver refuses what a pipeline binds.
-pub fn add_to_half<'a>(frame: &mut Frame<'a>, radiance: &'a Image, halves: &'a Halves, index: u32) -> Result<()> {
-    let film = &halves.sums[index as usize % 2];
-    let push = [u32::from(index < 2), 1.0_f32.to_bits()];
-    let size = [film.desc().width, film.desc().height];
-    let bind = accumulate::Bind { radiance, film };
-    frame.compute_over("accumulate", &bind, accumulate::Constants {}.words(), bytemuck::cast_slice(&push), size)
 }
 
 /// Writes the mean of `count` samples, an even number, into `film`.

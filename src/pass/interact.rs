@@ -60,6 +60,8 @@ fn follow<'a>(
 ) -> Result<()> {
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
     let constants = interact::Constants {
+        spectral: scene.colours().spectral,
+        grid_side: scene.colours().grid_side,
         has_emissive: plan.emissive,
         has_layers: plan.layers,
         has_triangles: true,
@@ -124,6 +126,7 @@ fn follow<'a>(
         bvh_triangles: &rays.triangles,
         trace_block: &rays.terms,
         material_texels: &scene.materials,
+        spectrum: &scene.spectrum.texels,
         hit_corners: &rays.corners,
         leaf_places: &rays.leaf_places,
         texels: &scene.texels,

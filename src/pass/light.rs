@@ -28,6 +28,8 @@ pub fn light<'a>(
     let through_media = planned.filter(|_| lighting.shadow_rays() || rays.inside());
     let march = through_media.map_or_else(March::default, |rays| rays.march);
     let constants = light::Constants {
+        spectral: scene.colours().spectral,
+        grid_side: scene.colours().grid_side,
         // Ranges of lights are short enough.
         light_budget: u32::MAX,
         in_medium: rays.inside(),
@@ -83,6 +85,7 @@ pub fn light<'a>(
         bvh_triangles: &rays.triangles,
         trace_block: &rays.terms,
         material_texels: &scene.materials,
+        spectrum: &scene.spectrum.texels,
         hit_corners: &rays.corners,
         leaf_places: &rays.leaf_places,
         texels: &scene.texels,

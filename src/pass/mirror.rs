@@ -77,6 +77,8 @@ pub fn mirror<'a>(
     let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
     // The surfaces are those of the lighting, to the last bit: what it has added is taken away.
     let constants = mirror::Constants {
+        spectral: lighting.scene.colours().spectral,
+        grid_side: lighting.scene.colours().grid_side,
         has_emissive: plan.emissive,
         has_layers: plan.layers,
         has_triangles: false,
@@ -119,6 +121,7 @@ pub fn mirror<'a>(
         bvh_triangles: &rays.triangles,
         trace_block: &rays.terms,
         material_texels: &scene.materials,
+        spectrum: &scene.spectrum.texels,
         hit_corners: &rays.corners,
         leaf_places: &rays.leaf_places,
         shadow_depth: lighting.shadow_maps.depth(),

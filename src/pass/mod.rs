@@ -23,6 +23,7 @@ pub mod rows;
 pub mod scene;
 pub mod shadow_map;
 pub mod sigma_grid;
+pub mod spectrum;
 pub mod texture;
 pub mod tiles;
 pub mod tonemap;

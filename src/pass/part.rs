@@ -75,7 +75,7 @@ impl PartOnDevice {
             part,
             radiance: target("radiance")?,
             seen: Buffer::texels(device, "part on the screen", seen, Place::Device, format)?,
-            film: if plan.samples > 1 { Some(target("film")?) } else { None },
+            film: if plan.samples > 1 || plan.bands > 0 { Some(target("film")?) } else { None },
         })
     }
 

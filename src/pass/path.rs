@@ -111,6 +111,7 @@ pub fn paths<'a>(
             bvh_triangles: &rays.triangles,
             trace_block: &rays.terms,
             material_texels: &scene.materials,
+            spectrum: &scene.spectrum.texels,
             hit_corners: &rays.corners,
             shadow_depth: lighting.shadow_maps.depth(),
             shadow_faces: &lighting.shadow_maps.faces,
@@ -152,6 +153,7 @@ pub fn paths<'a>(
             bvh_triangles: &rays.triangles,
             trace_block: &rays.terms,
             material_texels: &scene.materials,
+            spectrum: &scene.spectrum.texels,
             hit_corners: &rays.corners,
             shadow_depth: lighting.shadow_maps.depth(),
             shadow_faces: &lighting.shadow_maps.faces,
@@ -200,9 +202,11 @@ fn compact<'a>(frame: &mut Frame<'a>, paths: &'a PathsOnDevice, from: usize, to:
 
 /// Constants of all programs of paths: the same numbers name the same ones in each.
 fn constants(lighting: Lighting, with: Rays, paths: Paths) -> Vec<(u32, u32)> {
-    let Lighting { plan, knobs, rays, .. } = lighting;
+    let Lighting { plan, knobs, scene, rays, .. } = lighting;
     let emitters = &rays.emitters;
     let all = path::Constants {
+        spectral: scene.colours().spectral,
+        grid_side: scene.colours().grid_side,
         brdf: knobs.index("brdf"),
         fresnel: knobs.index("fresnel"),
         arithmetic: knobs.index("arithmetic"),

@@ -7,15 +7,18 @@ use ash::vk;
 use glam::{DMat3, DVec3};
 
 use super::sigma_grid::SigmaGrids;
+use super::spectrum::{SpectrumConstants, SpectrumOnDevice};
 use super::texture::{Meaning, Texels, Textures};
 use super::upload::upload;
 use super::view::View;
 use crate::gpu::{Buffer, Device, Draw, Place, Sampled, VertexStream};
 use crate::plan::{Knobs, Plan, casts_in_maps, is_see_through, mirrors};
 use crate::scene::solid::Solids;
-use crate::scene::{AlphaMode, Bounds, Light, LightKind, Material, Scene, TextureRef};
+use crate::scene::wavelengths::{Banded, Slice, Wavelengths};
+use crate::scene::{AlphaMode, Bounds, Light, LightKind, Material, Scene, SigmaGrid, TextureRef};
 use crate::shader::{gbuffer, shadow_map};
 use crate::share;
+use crate::spectra::{self, Upsampling};
 
 /// Texture slots of a material, in the order of `shaders/lib/gbuffer_interface.glsl`.
 pub const SLOTS: usize = 11;
@@ -78,8 +81,14 @@ pub struct SceneOnDevice {
     meshes: Vec<MeshRange>,
     placements: Vec<Placement>,
     materials_cpu: Vec<Material>,
-    /// The table of materials.
+    /// The table of materials, in the slice of wavelengths that is shown.
     pub materials: Buffer,
+    /// What that slice is to colours.
+    pub spectrum: SpectrumOnDevice,
+    /// What materials are by wavelength; `None` where the picture is made of three colours.
+    wavelengths: Option<Wavelengths>,
+    knobs: Knobs,
+    eye: DVec3,
     /// Eleven texture slots per material.
     pub slots: Buffer,
     /// For rays: the texels of all textures.
@@ -201,8 +210,16 @@ impl SceneOnDevice {
         let mut texels = Texels::default();
         let textures = Textures::new(device, &mut scene, &wanted, plan.rays.is_some().then_some(&mut texels))?;
 
-        let table: Vec<_> =
-            scene.materials.iter().enumerate().map(|(i, m)| shared_material(m, i, knobs, grids.places[i])).collect();
+        let spectral = plan.bands > 0;
+        let wavelengths = spectral.then(|| Wavelengths::new(&scene, upsampling(knobs)));
+        let fitted =
+            wavelengths.as_ref().is_some_and(|known| known.vary) && upsampling(knobs) == Upsampling::JakobHanika;
+        let table: Vec<_> = scene
+            .materials
+            .iter()
+            .enumerate()
+            .map(|(i, m)| shared_material(m, i, knobs, grids.places[i], None))
+            .collect();
         let mut slot_table = Vec::with_capacity(scene.materials.len() * SLOTS);
         let mut texel_slots = Vec::with_capacity(scene.materials.len() * SLOTS);
         let mut page_of_material = Vec::with_capacity(scene.materials.len());
@@ -226,7 +243,18 @@ impl SceneOnDevice {
         let instance_bytes = (scene.instances.len() * size_of::<share::Instance>()) as u64;
         let light_bytes = (lights_cpu.len() * 64) as u64;
         Ok(Self {
-            materials: upload(device, "materials", &table, Some(vk::Format::R32G32B32A32_UINT))?,
+            materials: match spectral {
+                // Written anew for each slice.
+                true => {
+                    let bytes = size_of_val(table.as_slice()) as u64;
+                    Buffer::texels(device, "materials", bytes, Place::Upload, vk::Format::R32G32B32A32_UINT)?
+                }
+                false => upload(device, "materials", &table, Some(vk::Format::R32G32B32A32_UINT))?,
+            },
+            spectrum: SpectrumOnDevice::new(device, spectral, fitted)?,
+            wavelengths,
+            knobs: knobs.clone(),
+            eye: DVec3::ZERO,
             slots: upload(device, "texture slots", &slot_table, Some(vk::Format::R32G32B32A32_SFLOAT))?,
             texels: upload(device, "texels for rays", &texels.texels, Some(vk::Format::R32_UINT))?,
             grids,
@@ -268,10 +296,42 @@ impl SceneOnDevice {
 
     /// Moves instances and lights to the eye of `view`: differences in f64, stored in f32.
     pub fn look_from(&mut self, view: &View) {
+        self.eye = view.eye;
         let table = self.instances_around(view.eye);
         self.instances.write(bytemuck::cast_slice(&table));
-        let table: Vec<[[f32; 4]; 4]> = self.lights_cpu.iter().map(|light| shared_light(light, view.eye)).collect();
+        self.write_lights(None);
+    }
+
+    fn write_lights(&mut self, slice: Option<&Slice>) {
+        let color = |light: &Light| slice.map_or(light.color, |slice| slice.light(light));
+        let table: Vec<_> = self.lights_cpu.iter().map(|light| shared_light(light, color(light), self.eye)).collect();
         self.lights.write(bytemuck::cast_slice(&table));
+    }
+
+    /// Makes materials and lights those of a slice of wavelengths, or of three colours, where the picture is drawn by wavelengths.
+    pub fn show(&mut self, slice: Option<&Slice>) {
+        let Some(wavelengths) = &self.wavelengths else { return };
+        let shared = |(i, m): (usize, &Material)| {
+            let place = self.grids.places[i];
+            let Some(slice) = slice else { return shared_material(m, i, &self.knobs, place, None) };
+            let Banded { material, base_rgb, emissive_rgb } = wavelengths.material(i, m, slice);
+            let mut shared = shared_material(&material, i, &self.knobs, place, Some(spectra::shares(&slice.band)));
+            shared.flags |= if base_rgb { share::Material::BASE_RGB } else { 0 };
+            shared.flags |= if emissive_rgb { share::Material::EMISSIVE_RGB } else { 0 };
+            shared
+        };
+        let table: Vec<share::Material> = self.materials_cpu.iter().enumerate().map(shared).collect();
+        self.materials.write(bytemuck::cast_slice(&table));
+        if let Some(slice) = slice {
+            self.spectrum.show(slice);
+        }
+        self.write_lights(slice);
+    }
+
+    /// What programs that see colours are specialised by.
+    #[must_use]
+    pub fn colours(&self) -> SpectrumConstants {
+        self.spectrum.constants(self.wavelengths.is_some())
     }
 
     /// The table of instances relative to a point of the world.
@@ -409,10 +469,15 @@ fn shared_slot(texture: Option<TextureRef>, textures: &Textures, meaning: Meanin
     [[m.x_axis.x, m.y_axis.x, t.x, layer], [m.x_axis.y, m.y_axis.y, t.y, texture.uv_set as f32]]
 }
 
+/// The rung of the knob.
+fn upsampling(knobs: &Knobs) -> Upsampling {
+    if knobs.rung("upsampling") == "jakob-hanika" { Upsampling::JakobHanika } else { Upsampling::MallettYuksel }
+}
+
 /// The constants of a material. F0 of a dielectric is ((n − 1) / (n + 1))² tinted and scaled by KHR_materials_specular;
 /// the optical depth is −ln(attenuation colour) · thickness / attenuation distance (lecture A1, KHR_materials_volume). A
-/// grid of σ that is not marched, whose place is 0, adds its mean.
-fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32) -> share::Material {
+/// grid of σ that is not marched, whose place is 0, adds its mean. In a band `shares` are those of red, green and blue in it.
+fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32, shares: Option<[f64; 3]>) -> share::Material {
     let r = (m.ior - 1.0) / (m.ior + 1.0);
     let absorbs = knobs.rung("absorption") != "off";
     // attenuationDistance is in metres of the world, thickness in metres of the object.
@@ -420,7 +485,8 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32) -> shar
         let sigma = -color.max(1e-6).ln() / m.attenuation_distance;
         if absorbs && m.thickness > 0.0 && sigma > 0.0 { sigma } else { 0.0 }
     });
-    let mean = m.marched_sigma().filter(|_| absorbs).map_or([0.0; 3], |grid| grid.mean().map(|x| x as f32));
+    let mean = m.marched_sigma().filter(|_| absorbs).map_or([0.0; 3], SigmaGrid::mean);
+    let mean = shares.map_or(mean, |shares| [(0..3).map(|i| shares[i] * mean[i]).sum(); 3]).map(|x| x as f32);
     let of_grid = |share: f32| [0, 1, 2].map(|i| sigma[i] + share * mean[i]);
     let (alpha_cutoff, coverage) = match m.alpha_mode {
         AlphaMode::Mask(cutoff) => (cutoff, 0),
@@ -492,8 +558,7 @@ fn shared_instance(placement: &Placement, eye: DVec3, material: usize) -> share:
 }
 
 /// Four texels: see `shaders/lib/lighting.glsl`.
-fn shared_light(light: &Light, eye: DVec3) -> [[f32; 4]; 4] {
-    let [r, g, b] = light.color;
+fn shared_light(light: &Light, [r, g, b]: [f32; 3], eye: DVec3) -> [[f32; 4]; 4] {
     let local = |position: DVec3, range: Option<f64>| {
         let p = (position - eye).as_vec3();
         let inv_range2 = range.map_or(0.0, |range| (1.0 / (range * range)) as f32);

@@ -71,7 +71,8 @@ impl Tracer {
     /// # Errors
     /// When it does not fit the device.
     pub fn new(device: &Arc<Device>, scene: &Scene, traversal: Option<Traversal>) -> Result<Self> {
-        let surroundings = Surroundings { environment: false, constant: false, sky: false, demand: Demand::Scene };
+        let surroundings =
+            Surroundings { environment: false, constant: false, grey: false, sky: false, demand: Demand::Scene };
         let facts = Facts::of(scene, NormalForm::default());
         let mut plan = Plan::new(scene, &facts, surroundings, &Knobs::default());
         plan.rays = Some(crate::plan::Rays::default());

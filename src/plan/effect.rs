@@ -112,9 +112,24 @@ impl Decisions<'_> {
 
     /// An effect that a knob allows or not: if not, its rung is the reason.
     pub(super) fn decide_with(&mut self, name: &'static str, knob: &'static str, allowed: bool, cause: Cause) -> bool {
+        self.decide_as(name, (knob, allowed), cause, self.demand)
+    }
+
+    /// The same of one that no demand includes: even where nothing calls for it, it is a picture with other roundings.
+    pub(super) fn decide_apart(&mut self, name: &'static str, by: (&'static str, bool), cause: Cause) -> bool {
+        self.decide_as(name, by, cause, Demand::Scene)
+    }
+
+    fn decide_as(
+        &mut self,
+        name: &'static str,
+        (knob, allowed): (&'static str, bool),
+        cause: Cause,
+        demand: Demand,
+    ) -> bool {
         let rung = if knob.is_empty() { "" } else { self.knobs.rung(knob) };
         let Cause { called_for, mut reason, evidence, materials } = cause;
-        let demanded = !called_for && self.demand.includes(name);
+        let demanded = !called_for && demand.includes(name);
         let state = match (called_for || demanded, allowed) {
             (false, _) => "not called for",
             (true, false) => "dropped",

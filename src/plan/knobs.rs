@@ -105,10 +105,17 @@ pub static KNOBS: &[Knob] = &[
     },
     Knob {
         name: "colour",
-        rungs: &["rgb"],
-        unbuilt: &["spectral"],
+        rungs: &["rgb", "spectral:8", "spectral:16", "spectral:32"],
+        unbuilt: &[],
         presets: ["rgb", "rgb", "rgb"],
-        about: "wavelengths (C1–C3)",
+        about: "wavelengths (C1–C3): three colours, or so many bands of 380 to 780 nm, each a picture of its own",
+    },
+    Knob {
+        name: "upsampling",
+        rungs: &["mallett-yuksel", "jakob-hanika"],
+        unbuilt: &[],
+        presets: ["jakob-hanika", "jakob-hanika", "jakob-hanika"],
+        about: "reflectance by wavelength of what is told as a colour (C3): a sum of three curves, a fitted sigmoid",
     },
     Knob {
         name: "arithmetic",
@@ -280,6 +287,12 @@ impl Knobs {
         }
         let around = self.rung("indirect") != "off" || self.rung("reflection") != "off";
         self.rung("reflection") == "screen" || (environment && around)
+    }
+
+    /// Bands of wavelengths; 0: three colours.
+    #[must_use]
+    pub fn bands(&self) -> u32 {
+        self.rung("colour").strip_prefix("spectral:").and_then(|n| n.parse().ok()).unwrap_or(0)
     }
 
     /// Samples per pixel.

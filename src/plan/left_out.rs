@@ -32,7 +32,12 @@ pub(super) fn left_out(
         knobs.rung("refraction")
     );
     say(&|m| varies(m) && !marches && absorption != "off", &instead);
-    say(&|m| m.dispersion > 0.0, "has dispersion, which is not built");
+    if knobs.bands() == 0 {
+        say(
+            &|m| transmission.bends && m.disperses(),
+            "has dispersion, which colour=rgb does not show; colour=spectral:16 does",
+        );
+    }
     let (lobes, reflection) = (knobs.rung("lobes"), knobs.rung("reflection"));
     let by_paths = knobs.rung("indirect") == "path";
     if lobes != "0.2" && reflection != "ray" {

@@ -13,7 +13,7 @@ pub use surfaces::{casts_in_maps, is_see_through, mirrors};
 
 use effect::{Cause, Decisions};
 use left_out::left_out;
-use surfaces::{Surfaces, has_layers, refracts, scatters};
+use surfaces::{Surfaces, by_wavelength, has_layers, refracts, scatters};
 
 use crate::scene::normal_form::NormalForm;
 use crate::scene::solid::{Solids, deepest_nesting, solids};
@@ -66,6 +66,10 @@ pub struct Plan {
     /// Perceptual roughness up to which surfaces are mirrored by rays or on the screen, and not by the prefiltered
     /// environment.
     pub roughest_mirror: f32,
+    /// Bands of wavelengths that the picture is drawn in, one after the other; 0: red, green and blue at once.
+    pub bands: u32,
+    /// Rays of different wavelengths go different ways: the samples go through parts of each band.
+    pub disperses: bool,
     /// Samples per pixel.
     pub samples: u32,
     /// Every effect with its reason.
@@ -163,6 +167,8 @@ pub struct Surroundings {
     pub environment: bool,
     /// The same light comes from everywhere.
     pub constant: bool,
+    /// All its light is grey.
+    pub grey: bool,
     /// It is also the background.
     pub sky: bool,
     /// What is asked for beside what the scene calls for.
@@ -207,6 +213,7 @@ impl Plan {
         let paths = planner.paths();
         let lights = planner.lights(paths);
         let rays = planner.rays(&transmission, &images, &lights);
+        let (bands, disperses) = planner.wavelengths(&transmission);
         let shadow_maps = lights.shadows && knobs.rung("shadows") == "map" && paths.is_none();
         let Planner { surfaces, decisions, .. } = planner;
         Self {
@@ -235,6 +242,8 @@ impl Plan {
             paths,
             screen: images.screen,
             roughest_mirror: images.roughest,
+            bands,
+            disperses,
             samples: knobs.samples(),
             effects: decisions.effects,
             unread: scene.unread.clone(),
@@ -493,6 +502,41 @@ impl Planner<'_> {
         };
         let emitting = decisions.decide_with("surfaces that light", "lights", knobs.rung("lights") != "points", cause);
         paths.then_some(Paths { emitting, at_once: false })
+    }
+
+    /// Bands of wavelengths, and whether rays split by them.
+    fn wavelengths(&mut self, transmission: &Transmission) -> (u32, bool) {
+        let Self { scene, surfaces, decisions, knobs, surroundings, .. } = self;
+        let bands = knobs.bands();
+        let differ = |rgb: &[f32]| rgb[0] != rgb[1] || rgb[1] != rgb[2];
+        let light =
+            scene.lights.iter().find(|light| light.shines() && (light.spectrum.is_some() || differ(&light.color)));
+        let cause = surfaces.cause(by_wavelength, |m| {
+            match (&m.reflectance, &m.emission, &m.conductor) {
+                (Some(_), ..) => "has a reflectance by wavelength",
+                (_, Some(_), _) => "has a spectrum of its own",
+                (.., Some(_)) => "is a metal with n and kappa",
+                _ if m.dispersion.disperses(f64::from(m.ior)) => "has dispersion",
+                _ => "is coloured",
+            }
+            .to_owned()
+        });
+        let cause = match (cause.called_for, light, surroundings.environment && !surroundings.grey) {
+            (true, ..) => cause,
+            (_, Some(light), _) => Cause::of(format!("light \"{}\" is coloured", light.name)),
+            (.., true) => Cause::of("the environment is coloured"),
+            _ => Cause::against("everything is grey: all wavelengths make the same picture"),
+        };
+        let spectral = decisions.decide_apart("bands of wavelengths", ("colour", bands > 0), cause);
+        let cause = match transmission.bends {
+            true => surfaces.cause(Material::disperses, |m| {
+                let n = |nm| m.dispersion.index(f64::from(m.ior), nm);
+                format!("has n {:.4} at 450 nm and {:.4} at 650 nm", n(450.0), n(650.0))
+            }),
+            false => Cause::against("nothing is bent"),
+        };
+        let disperses = decisions.decide_apart("dispersion", ("colour", bands > 0), cause);
+        (if spectral { bands } else { 0 }, disperses && spectral)
     }
 
     /// What sends rays, and the code for what they may meet.

@@ -32,6 +32,22 @@ pub(super) fn scatters(material: &Material) -> bool {
         && material.base_color[..3] != [0.0; 3]
 }
 
+/// Whether a surface treats wavelengths differently.
+pub(super) fn by_wavelength(m: &Material) -> bool {
+    let differ = |rgb: &[f32]| rgb[0] != rgb[1] || rgb[1] != rgb[2];
+    differ(&m.base_color[..3])
+        || differ(&m.emissive)
+        || differ(&m.specular_color)
+        || (m.attenuation_distance.is_finite() && differ(&m.attenuation_color))
+        || m.base_color_texture.is_some()
+        || m.emissive_texture.is_some()
+        || m.reflectance.is_some()
+        || m.emission.is_some()
+        || m.conductor.is_some()
+        || m.dispersion.disperses(f64::from(m.ior))
+        || m.marched_sigma().is_some_and(|grid| grid.channels() > 1)
+}
+
 /// Whether a surface bends light.
 pub(super) fn refracts(material: &Material) -> bool {
     material.transmission > 0.0 && material.alpha_mode != AlphaMode::Blend

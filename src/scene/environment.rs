@@ -83,6 +83,12 @@ impl Environment {
         self.radiance.iter().all(|texel| Some(texel) == self.radiance.first())
     }
 
+    /// Whether all its light is grey.
+    #[must_use]
+    pub fn is_grey(&self) -> bool {
+        self.radiance.iter().all(|[r, g, b]| r == g && g == b)
+    }
+
     /// Nothing from anywhere, in as many texels as the studio has: what takes its place costs as much.
     #[must_use]
     pub fn dark() -> Self {

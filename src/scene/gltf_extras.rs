@@ -1,4 +1,4 @@
-//! `extras.etalon` of a glTF material: what the standard's extensions have no word for.
+//! `extras.etalon` of glTF materials and lights: what the standard's extensions have no word for.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -10,11 +10,16 @@ use serde_json::{Value, value::RawValue};
 
 use super::{
     Material, SigmaGrid,
-    substance::{self, INFINITE_IOR, SUBSTANCES, Substance},
+    light::Light,
+    substance::{self, INFINITE_IOR, Medium, SUBSTANCES, Substance},
 };
+use crate::spectra::{self, Dispersion, Emission, Spectrum};
 
 /// Keys that are planned and that nothing looks at yet.
-const NOT_READ_YET: &[&str] = &["brdf", "kd", "ks", "shine", "sellmeier", "cauchy"];
+const NOT_READ_YET: &[&str] = &["brdf", "kd", "ks", "shine"];
+
+/// Wavelengths that a spectrum may tell of, nm: those that the CIE has matching functions for.
+const SEEN: [f64; 2] = [360.0, 830.0];
 
 /// The part of `extras` that is ours.
 #[derive(Deserialize)]
@@ -26,16 +31,10 @@ struct Extras {
 /// Puts what `extras.etalon` says into a material whose extensions have been read; `file_ior` is the index that
 /// KHR_materials_ior gave. Returns what is worth a warning.
 pub(crate) fn apply(extras: &json::Extras, file_ior: Option<f32>, m: &mut Material) -> Result<Vec<String>> {
-    // Other programs may keep anything in `extras`; only an object can have our key.
-    let Some(text) = extras.as_ref().map(|raw| raw.get()).filter(|text| text.starts_with('{')) else {
-        return Ok(Vec::new());
-    };
-    let Some(ours) = serde_json::from_str::<Extras>(text).context("extras")?.etalon else { return Ok(Vec::new()) };
-    ensure!(ours.get().starts_with('{'), "extras.etalon is not an object");
-    let entries: BTreeMap<String, Box<RawValue>> = serde_json::from_str(ours.get()).context("extras.etalon")?;
-
+    let entries = entries(extras)?;
     let mut warnings = Vec::new();
     let (mut preset, mut n, mut kappa) = (None, None, None);
+    let (mut sellmeier, mut cauchy) = (None, None);
     for (key, text) in &entries {
         let read = || -> Result<Value> { Ok(serde_json::from_str(text.get())?) };
         let blame = || format!("extras.etalon {key}");
@@ -45,6 +44,13 @@ pub(crate) fn apply(extras: &json::Extras, file_ior: Option<f32>, m: &mut Materi
             "preset" => preset = Some(read().and_then(|v| substance(&v)).with_context(blame)?),
             "n" => n = Some(read().and_then(|v| index(&v, key, &mut warnings)).with_context(blame)?),
             "kappa" => kappa = Some(read().and_then(|v| index(&v, key, &mut warnings)).with_context(blame)?),
+            "sellmeier" => sellmeier = Some(sellmeier_of(text.get()).with_context(blame)?),
+            "cauchy" => cauchy = Some(cauchy_of(text.get()).with_context(blame)?),
+            "reflectance" => m.reflectance = Some(reflectance(text.get(), &mut warnings).with_context(blame)?),
+            "emission" => {
+                let spectrum = light_spectrum(text.get(), &mut warnings).with_context(blame)?;
+                m.emission = Some(Emission::new(spectrum, m.emissive));
+            }
             _ if NOT_READ_YET.contains(&key.as_str()) => warnings.push(format!("extras.etalon {key} is not read yet")),
             _ => warnings.push(format!("extras.etalon has no key {:?}; it is ignored", shortened(key))),
         }
@@ -58,14 +64,22 @@ pub(crate) fn apply(extras: &json::Extras, file_ior: Option<f32>, m: &mut Materi
     }
     // Numbers beside a preset replace its own.
     let (preset_n, preset_kappa) = match preset {
-        Some(Substance::Metal(index)) => (Some(index.map(|i| i.0 as f32)), index.map(|i| i.1 as f32)),
-        Some(Substance::Dielectric(n)) => (Some([n as f32; 3]), [0.0; 3]),
+        Some(Substance::Metal(metal)) => {
+            let index = metal.index();
+            (Some(index.map(|[n, _]| n)), index.map(|[_, kappa]| kappa))
+        }
+        Some(Substance::Dielectric(Medium { n, .. })) => (Some([n as f32; 3]), [0.0; 3]),
         None => (None, [0.0; 3]),
+    };
+    let by_wavelength = match preset {
+        Some(Substance::Metal(metal)) if n.is_none() && kappa.is_none() => metal.spectra(),
+        _ => None,
     };
     let (n, kappa) = (n.or(preset_n), kappa.unwrap_or(preset_kappa));
     if kappa.iter().any(|&k| k > 0.0) {
         let n = n.context("extras.etalon kappa: a metal has an n too, and there is none")?;
         conductor(m, [0, 1, 2].map(|i| [n[i], kappa[i]]), &mut warnings)?;
+        m.conductor_spectra = by_wavelength;
     } else if let Some([red, green, blue]) = n {
         if red != green || green != blue {
             warnings.push(format!("extras.etalon n of each colour is read for metals only; green's {green} is taken"));
@@ -74,8 +88,183 @@ pub(crate) fn apply(extras: &json::Extras, file_ior: Option<f32>, m: &mut Materi
             warnings.push(format!("extras.etalon n {green} replaces the {ior} of KHR_materials_ior"));
         }
         m.ior = green;
+        m.dispersion = match preset {
+            Some(Substance::Dielectric(Medium { n, dispersion })) if n as f32 == green => dispersion,
+            _ => m.dispersion,
+        };
+    }
+    ensure!(
+        sellmeier.is_none() || cauchy.is_none(),
+        "extras.etalon has both sellmeier and cauchy: one tells the index"
+    );
+    if let Some(dispersion) = sellmeier.or(cauchy) {
+        let yellow = dispersion.index(0.0, spectra::FRAUNHOFER_D) as f32;
+        if let Some(other) = n.map(|[_, green, _]| green).or(file_ior).filter(|other| (other - yellow).abs() > 1e-3) {
+            warnings.push(format!("extras.etalon: n = {yellow} of the dispersion formula replaces {other}"));
+        }
+        (m.ior, m.dispersion) = (yellow, dispersion);
+    }
+    if let Some(reflectance) = &m.reflectance {
+        ensure!(
+            m.base_color_texture.is_none(),
+            "extras.etalon reflectance tells the base by wavelength, and so does a base colour texture: one of them must go"
+        );
+        let [r, g, b] = reflectance.reflectance_rgb().map(|x| x.clamp(0.0, 1.0) as f32);
+        m.base_color = [r, g, b, m.base_color[3]];
+    }
+    if let Some(emission) = &m.emission {
+        ensure!(
+            m.emissive_texture.is_none(),
+            "extras.etalon emission tells the light by wavelength, and so does an emissive texture: one of them must go"
+        );
+        if emission.luminance == 0.0 {
+            warnings.push(
+                "extras.etalon emission is seen where there is an emissive factor; it is 0, so it is dark".to_owned(),
+            );
+        }
+        m.emissive = emission.rgb();
     }
     Ok(warnings)
+}
+
+/// Puts what `extras.etalon` says into a light. Returns what is worth a warning.
+pub(crate) fn apply_to_light(extras: &json::Extras, light: &mut Light) -> Result<Vec<String>> {
+    let mut warnings = Vec::new();
+    for (key, text) in &entries(extras)? {
+        if key == "spectrum" {
+            let spectrum = light_spectrum(text.get(), &mut warnings).context("extras.etalon spectrum")?;
+            let emission = Emission::new(spectrum, light.color);
+            light.color = emission.rgb();
+            light.spectrum = Some(emission);
+        } else {
+            warnings.push(format!("extras.etalon of a light has no key {:?}; it is ignored", shortened(key)));
+        }
+    }
+    Ok(warnings)
+}
+
+/// The entries of `extras.etalon`; none where there is no such thing.
+fn entries(extras: &json::Extras) -> Result<BTreeMap<String, Box<RawValue>>> {
+    // Other programs may keep anything in `extras`; only an object can have our key.
+    let Some(text) = extras.as_ref().map(|raw| raw.get()).filter(|text| text.starts_with('{')) else {
+        return Ok(BTreeMap::new());
+    };
+    let Some(ours) = serde_json::from_str::<Extras>(text).context("extras")?.etalon else { return Ok(BTreeMap::new()) };
+    ensure!(ours.get().starts_with('{'), "extras.etalon is not an object");
+    serde_json::from_str(ours.get()).context("extras.etalon")
+}
+
+/// What a parser says, which repeats what it finds, as long as it may be and with its line breaks.
+fn told(error: &serde_json::Error) -> anyhow::Error {
+    anyhow!("{}", error.to_string().replace(char::is_control, " ").chars().take(120).collect::<String>())
+}
+
+/// The spectrum of a light: a name, `{"blackbody": kelvin}` or `{"table": [[nm, value], …]}`.
+fn light_spectrum(text: &str, warnings: &mut Vec<String>) -> Result<Spectrum> {
+    #[derive(Deserialize)]
+    #[serde(rename_all = "lowercase", deny_unknown_fields)]
+    enum Told {
+        Blackbody(f64),
+        Table(Vec<[f64; 2]>),
+    }
+    let spectrum = if let Ok(name) = serde_json::from_str::<String>(text) {
+        spectra::illuminant(&name).with_context(|| {
+            format!("{:?} is no illuminant; these are: {}", shortened(&name), spectra::LIGHTS.join(", "))
+        })?
+    } else {
+        match serde_json::from_str(text).map_err(|error| told(&error))? {
+            Told::Blackbody(kelvin) => {
+                ensure!(
+                    (500.0..=1e6).contains(&kelvin),
+                    "a black body of {kelvin} K: those of 500 to 1000000 K shine visibly"
+                );
+                Spectrum::BlackBody(kelvin)
+            }
+            Told::Table(rows) => {
+                check_table(&rows, warnings)?;
+                Spectrum::light_table(&rows)
+            }
+        }
+    };
+    let luminance = spectrum.light_in(&spectra::VISIBLE)[1];
+    ensure!(
+        luminance > 0.0,
+        "the spectrum has no light between {} and {} nm",
+        spectra::VISIBLE.from,
+        spectra::VISIBLE.to
+    );
+    Ok(spectrum)
+}
+
+/// `{"table": [[nm, value], …]}` with values in [0, 1].
+fn reflectance(text: &str, warnings: &mut Vec<String>) -> Result<Spectrum> {
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Told {
+        table: Vec<[f64; 2]>,
+    }
+    let mut rows = serde_json::from_str::<Told>(text).map_err(|error| told(&error))?.table;
+    check_table(&rows, warnings)?;
+    let most = rows.iter().map(|row| row[1]).fold(0.0, f64::max);
+    if most > 1.0 {
+        warnings.push(format!("a reflectance of {most} sends back more light than there is; it is read as 1"));
+        rows.iter_mut().for_each(|row| row[1] = row[1].min(1.0));
+    }
+    Ok(Spectrum::Table(rows.into()))
+}
+
+/// Wavelengths ascend, values are finite and never negative.
+fn check_table(rows: &[[f64; 2]], warnings: &mut Vec<String>) -> Result<()> {
+    ensure!(!rows.is_empty(), "the table has no rows");
+    ensure!(rows.as_flattened().iter().all(|x| x.is_finite()), "the table has a number that is not finite");
+    if let Some(pair) = rows.windows(2).find(|pair| pair[0][0] >= pair[1][0]) {
+        bail!("wavelengths ascend in a table, and {} nm comes before {} nm", pair[0][0], pair[1][0]);
+    }
+    if let Some([nm, value]) = rows.iter().find(|row| row[1] < 0.0) {
+        bail!("the value at {nm} nm, {value}, is negative");
+    }
+    if let Some([nm, _]) = rows.iter().find(|row| row[0] < SEEN[0] || row[0] > SEEN[1]) {
+        warnings.push(format!(
+            "a spectrum tells of {nm} nm, which nobody sees: what is not in {} to {} nm changes nothing",
+            SEEN[0], SEEN[1]
+        ));
+    }
+    Ok(())
+}
+
+/// `{"b": […], "c": […]}`, up to four terms each.
+fn sellmeier_of(text: &str) -> Result<Dispersion> {
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Told {
+        b: Vec<f64>,
+        c: Vec<f64>,
+    }
+    let Told { b, c } = serde_json::from_str(text).map_err(|error| told(&error))?;
+    ensure!(
+        b.len() == c.len() && (1..=4).contains(&b.len()),
+        "{} B and {} C; there are as many of both, 1 to 4",
+        b.len(),
+        c.len()
+    );
+    let four = |list: &[f64]| std::array::from_fn(|i| list.get(i).copied().unwrap_or(0.0));
+    check_index(Dispersion::Sellmeier { b: four(&b), c: four(&c) })
+}
+
+/// `[A, B]`, B in µm².
+fn cauchy_of(text: &str) -> Result<Dispersion> {
+    let [a, b] = serde_json::from_str(text).map_err(|error| told(&error))?;
+    check_index(Dispersion::Cauchy { a, b })
+}
+
+/// A formula that gives an index everywhere.
+fn check_index(dispersion: Dispersion) -> Result<Dispersion> {
+    let visible = spectra::VISIBLE;
+    for nm in (visible.from as u32..=visible.to as u32).map(f64::from) {
+        let n = dispersion.index(1.0, nm);
+        ensure!(n.is_finite() && n > 1.0 && n < 100.0, "the formula gives n = {n} at {nm} nm, which is no medium's");
+    }
+    Ok(dispersion)
 }
 
 /// Makes a material a metal of that index. Its base colour becomes the reflectance at normal incidence, so that models
@@ -126,10 +315,7 @@ fn grid(text: &str) -> Result<SigmaGrid> {
         min: Option<[f64; 3]>,
         max: Option<[f64; 3]>,
     }
-    let Grid { size, values, min, max } = serde_json::from_str(text).map_err(|error| {
-        // It repeats what it finds, as long as it may be and with its line breaks.
-        anyhow!("{}", error.to_string().replace(char::is_control, " ").chars().take(120).collect::<String>())
-    })?;
+    let Grid { size, values, min, max } = serde_json::from_str(text).map_err(|error| told(&error))?;
     ensure!(min.is_some() == max.is_some(), "of a box there are both corners, min and max, or none");
     let bounds = min.zip(max).map(|(min, max)| [DVec3::from(min), DVec3::from(max)]);
     SigmaGrid::new(size, values, bounds)

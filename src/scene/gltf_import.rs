@@ -25,7 +25,7 @@ use super::{
     Camera, Instance, Light, LightKind, LoadOptions, Material, Mesh, Projection, Scene,
     accessor::Accessor,
     container::Document,
-    geometry, gltf_material,
+    geometry, gltf_extras, gltf_material,
     nodes::{Nodes, label},
     reads::{Coordinates, forget_textures, unread_coordinates},
     thin::{self, Stroke},
@@ -653,7 +653,11 @@ fn lights(document: &Document<'_>, nodes: &Nodes, warnings: &mut Vec<String>) ->
             warnings.push(format!("{place}: its colour or strength is negative or infinite and is clamped"));
         }
         let name = json.name.clone().or_else(|| root.nodes[node].name.clone());
-        lights.push(Light { name: name.unwrap_or_else(|| format!("light {index}")), color, kind, stand_in: false });
+        let name = name.unwrap_or_else(|| format!("light {index}"));
+        let mut light = Light { name, color, spectrum: None, kind, stand_in: false };
+        let found = gltf_extras::apply_to_light(&json.extras, &mut light).with_context(|| place.clone())?;
+        warnings.extend(found.into_iter().map(|warning| format!("{place}: {warning}")));
+        lights.push(light);
     }
     Ok(lights)
 }

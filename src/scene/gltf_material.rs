@@ -19,6 +19,7 @@ use super::{
     container::{Document, short_uri},
     gltf_extras, pictures,
 };
+use crate::spectra;
 
 /// Materials of the whole file, and which of its images their textures are of.
 pub(crate) struct Materials {
@@ -239,7 +240,8 @@ impl Reader<'_, '_, '_> {
             }
         }
         if let Some(dispersion) = parse::<Dispersion>(&json.others, "KHR_materials_dispersion")? {
-            m.dispersion = self.positive(dispersion.dispersion, "the dispersion");
+            let abbe = f64::from(self.positive(dispersion.dispersion, "the dispersion"));
+            m.dispersion = if abbe > 0.0 { spectra::Dispersion::Abbe(abbe) } else { spectra::Dispersion::None };
         }
         Ok(())
     }

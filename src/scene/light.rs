@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::Bounds;
+use crate::spectra::Emission;
 
 /// A light without extent.
 #[derive(Debug, Clone)]
@@ -12,6 +13,8 @@ pub struct Light {
     /// Linear Rec. 709 colour times strength: radiant intensity I (cd) for point and spot lights,
     /// perpendicular irradiance E (lx) for directional ones. Never negative.
     pub color: [f32; 3],
+    /// Its light by wavelength, whose colour `color` is then; `None`: that of D65 behind a coloured glass.
+    pub spectrum: Option<Emission>,
     /// What kind, with its geometry.
     pub kind: LightKind,
     /// Stands for a surface that emits, where such surfaces light nothing: where they do, it is dark. In study scenes; no file says it.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::Affine2;
 
 use super::SigmaGrid;
+use crate::spectra::{Dispersion, Emission, Spectrum};
 
 /// One surface description. Factors are linear Rec. 709; a texture multiplies its factor.
 #[derive(Debug, Clone)]
@@ -79,8 +80,14 @@ pub struct Material {
     /// Which solid's medium fills the place where transmissive solids overlap: that of the higher priority, and on a tie
     /// the one entered last (`extras.etalon.priority`).
     pub priority: i32,
-    /// Abbe-like dispersion 20/V_d (KHR_materials_dispersion).
-    pub dispersion: f32,
+    /// How n varies over visible light (KHR_materials_dispersion, `extras.etalon`); `ior` is that of yellow light.
+    pub dispersion: Dispersion,
+    /// Reflectance by wavelength of the base, whose colour `base_color` is then; without a base colour texture.
+    pub reflectance: Option<Spectrum>,
+    /// What it emits by wavelength, whose colour `emissive` is then; without an emissive texture.
+    pub emission: Option<Emission>,
+    /// n and κ of the metallic part by wavelength, beside `conductor`.
+    pub conductor_spectra: Option<[Spectrum; 2]>,
     /// The raw Phong numbers of an OBJ/MTL material, for the passes that show that model as it was written.
     pub phong: Option<Phong>,
 }
@@ -127,6 +134,12 @@ impl Material {
     pub fn absorbs(&self) -> bool {
         (self.attenuation_distance.is_finite() && self.attenuation_color.iter().any(|&c| c < 1.0))
             || self.marched_sigma().is_some()
+    }
+
+    /// Whether light of different wavelengths goes different ways through it.
+    #[must_use]
+    pub fn disperses(&self) -> bool {
+        self.transmission > 0.0 && self.dispersion.disperses(f64::from(self.ior))
     }
 
     /// The grid of σ of a body that light enters.
@@ -246,7 +259,10 @@ impl Default for Material {
             clearcoat_roughness_texture: None,
             clearcoat_normal_texture: None,
             priority: 0,
-            dispersion: 0.0,
+            dispersion: Dispersion::None,
+            reflectance: None,
+            emission: None,
+            conductor_spectra: None,
             phong: None,
         }
     }

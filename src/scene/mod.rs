@@ -28,6 +28,7 @@ pub mod sigma;
 pub mod solid;
 pub(crate) mod substance;
 mod thin;
+pub mod wavelengths;
 
 use std::path::Path;
 

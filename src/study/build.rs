@@ -3,7 +3,7 @@
 use glam::{Affine2, DAffine3, DMat3, DVec3};
 
 use super::shape::Shape;
-use crate::scene::substance::{self, ComplexIndex};
+use crate::scene::substance::{Medium, Metal};
 use crate::scene::{Camera, Image, Instance, Light, LightKind, Material, Mesh, Projection, Sampler, Scene, TextureRef};
 
 /// A scene in the making.
@@ -73,12 +73,17 @@ impl Builder {
     }
 
     pub(super) fn light(&mut self, name: &str, color: [f32; 3], kind: LightKind) {
-        self.scene.lights.push(Light { name: name.to_owned(), color, kind, stand_in: false });
+        self.scene.lights.push(Light { name: name.to_owned(), color, spectrum: None, kind, stand_in: false });
+    }
+
+    /// A light with everything about it.
+    pub(super) fn shine(&mut self, light: Light) {
+        self.scene.lights.push(light);
     }
 
     /// A light that stands for an emitting surface where such surfaces light nothing.
     pub(super) fn stand_in(&mut self, name: &str, color: [f32; 3], kind: LightKind) {
-        self.scene.lights.push(Light { name: name.to_owned(), color, kind, stand_in: true });
+        self.scene.lights.push(Light { name: name.to_owned(), color, spectrum: None, kind, stand_in: true });
     }
 
     /// A pinhole camera with a vertical field of view in degrees; the near distance is left to the renderer.
@@ -126,8 +131,17 @@ pub(super) fn metal(name: &str, f0: [f32; 3], roughness: f32) -> Material {
 }
 
 /// A metal of known complex index.
-pub(super) fn conductor(name: &str, index: ComplexIndex, roughness: f32) -> Material {
-    Material { conductor: Some(substance::conductor(index)), ..metal(name, substance::f0(index), roughness) }
+pub(super) fn conductor(name: &str, known: Metal, roughness: f32) -> Material {
+    Material {
+        conductor: Some(known.index()),
+        conductor_spectra: known.spectra(),
+        ..metal(name, known.f0(), roughness)
+    }
+}
+
+/// A smooth non-metal of a known medium.
+pub(super) fn medium(name: &str, known: Medium) -> Material {
+    Material { ior: known.n as f32, dispersion: known.dispersion, ..dielectric(name, [1.0; 3], 0.0) }
 }
 
 /// A clear body of index `ior`. Its true surfaces bound it, so any thickness above zero says "a volume".

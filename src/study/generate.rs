@@ -129,6 +129,9 @@ pub fn at_scale(mut scene: Scene, factor: f64, offset: DVec3) -> Scene {
             }
         }
         light.color = light.color.map(|c| (f64::from(c) * factor * factor) as f32);
+        if let Some(emission) = &mut light.spectrum {
+            emission.luminance *= factor * factor;
+        }
     }
     for camera in &mut scene.cameras {
         camera.world_from_camera.translation = moved(camera.world_from_camera.translation);

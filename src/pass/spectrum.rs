@@ -1,0 +1,86 @@
+//! The band of wavelengths that a frame shows (shaders/lib/spectrum.glsl).
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use ash::vk;
+
+use crate::gpu::{Buffer, Device, NOTHING, Place};
+use crate::scene::wavelengths::Slice;
+use crate::spectra::{Band, Grid, RGB_FROM_XYZ, light_from_rgb, shares};
+
+/// Texels before the grid.
+const HEADER: usize = 4;
+
+/// What a band is to colours; a texel that is never read where a picture is made of three colours.
+pub struct SpectrumOnDevice {
+    /// As shaders/lib/spectrum.glsl reads it.
+    pub texels: Buffer,
+    grid: Option<Grid>,
+    /// The grid's texels for each band that was shown, so that each is averaged once.
+    known: Vec<(Band, Vec<[f32; 4]>)>,
+}
+
+/// What all programs that see colours are specialised by.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SpectrumConstants {
+    /// The picture is drawn band by band.
+    pub spectral: bool,
+    /// Corners a side of the grid; 0: there is none.
+    pub grid_side: u32,
+}
+
+impl SpectrumOnDevice {
+    /// Of a picture that is drawn by wavelengths or not; with a grid where reflectances are fitted to what varies.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn new(device: &Arc<Device>, spectral: bool, fitted: bool) -> Result<Self> {
+        let grid = (spectral && fitted).then(Grid::fitted);
+        let cells = grid.as_ref().map_or(0, |grid| (grid.side - 1) * (grid.side - 1) * grid.side) as usize;
+        let (name, texels) = if spectral { ("spectrum", HEADER + cells) } else { (NOTHING, 0) };
+        let format = vk::Format::R32G32B32A32_SFLOAT;
+        let texels = Buffer::texels(device, name, 16 * texels as u64, Place::Upload, format)?;
+        Ok(Self { texels, grid, known: Vec::new() })
+    }
+
+    /// For [`SpectrumConstants`].
+    #[must_use]
+    pub fn constants(&self, spectral: bool) -> SpectrumConstants {
+        SpectrumConstants { spectral, grid_side: self.grid.as_ref().map_or(0, |grid| grid.side) }
+    }
+
+    /// Writes what colours are in a slice.
+    pub fn show(&mut self, slice: &Slice) {
+        let (band, weight) = (&slice.band, slice.weight());
+        let column = |v: [f64; 3]| [v[0] as f32, v[1] as f32, v[2] as f32, 0.0];
+        let [red, green, blue] = light_from_rgb(&slice.part).map(|light| column(light.map(|x| x * weight)));
+        self.texels.write_at(0, bytemuck::cast_slice(&[red, green, blue, column(shares(band))]));
+        let Some(grid) = &self.grid else { return };
+        if !self.known.iter().any(|(known, _)| known == band) {
+            self.known.push((*band, cells(grid.side, &grid.roots(band))));
+        }
+        let cells = self.known.iter().find(|(known, _)| known == band).map_or(&[][..], |(_, cells)| cells);
+        self.texels.write_at(16 * HEADER, bytemuck::cast_slice(cells));
+    }
+}
+
+/// The corners of each cell's side of least blue.
+fn cells(side: u32, corners: &[f32]) -> Vec<[f32; 4]> {
+    let at = |r: u32, g: u32, b: u32| corners[((b * side + g) * side + r) as usize];
+    let mut cells = Vec::with_capacity((side * (side - 1) * (side - 1)) as usize);
+    for b in 0..side {
+        for g in 0..side - 1 {
+            for r in 0..side - 1 {
+                cells.push([at(r, g, b), at(r + 1, g, b), at(r, g + 1, b), at(r + 1, g + 1, b)]);
+            }
+        }
+    }
+    cells
+}
+
+/// Columns of what makes linear Rec. 709 of X, Y, Z, for a push constant.
+#[must_use]
+pub fn rgb_from_xyz() -> [f32; 9] {
+    std::array::from_fn(|i| RGB_FROM_XYZ[i % 3][i / 3] as f32)
+}
