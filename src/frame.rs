@@ -613,7 +613,7 @@ impl Renderer {
         let film = self.film.as_ref().unwrap_or(&self.radiance);
         let (background, _) = self.display_background();
         let Settings { tonemap: curve, exposure, .. } = self.settings;
-        tonemap(&mut frame, film, &self.display, curve as u32, exposure, background)?;
+        tonemap(&mut frame, film, &self.display, curve as u32, exposure, background, self.plan.bands > 0)?;
         Ok(frame)
     }
 

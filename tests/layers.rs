@@ -22,8 +22,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "cli",
         &[
-            "cli", "cost", "verify", "optics", "frame", "pass", "gpu", "scene", "plan", "image", "study", "share",
-            "shader",
+            "cli", "cost", "verify", "optics", "spectra", "frame", "pass", "gpu", "scene", "plan", "image", "study",
+            "share", "shader",
         ],
     ),
 ];

@@ -7,6 +7,7 @@ mod gltf_builder;
 use std::{f64::consts::FRAC_PI_2, fs, path::Path};
 
 use etalon::scene::{self, AlphaMode, Ambience, LightKind, LoadOptions, Projection, Reads, Scene, Wrap};
+use etalon::spectra::{Dispersion, Spectrum};
 use glam::{DVec3, Vec2, Vec3};
 use gltf_builder::{BYTE, Builder, FLOAT, SHORT, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT, f32s, png, u16s};
 use serde_json::json;
@@ -530,6 +531,98 @@ fn etalon_extras_are_read_into_the_material() {
 }
 
 #[test]
+fn etalon_extras_tell_of_wavelengths() {
+    let one = |etalon: serde_json::Value| {
+        let mut b = with_etalon(etalon, json!({}));
+        b.json["materials"][0]["emissiveFactor"] = json!([1, 1, 1]);
+        let scene = load(&b);
+        assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+        scene.materials[0].clone()
+    };
+    let m = one(json!({ "preset": "sf10" }));
+    assert!((m.dispersion.index(1.0, 444.44) - 1.758_835).abs() < 1e-5 && m.ior == 1.728_25);
+    assert!(matches!(one(json!({ "preset": "water", "n": 1.4 })).dispersion, Dispersion::None));
+    let m = one(json!({ "sellmeier": { "b": [1.5], "c": [0.01] } }));
+    let n = |nm: f64| (1.0 + 1.5 * (nm * 1e-3).powi(2) / ((nm * 1e-3).powi(2) - 0.01)).sqrt();
+    assert!((m.dispersion.index(1.0, 500.0) - n(500.0)).abs() < 1e-12 && (f64::from(m.ior) - n(587.5618)).abs() < 1e-7);
+    let m = one(json!({ "cauchy": [1.5, 0.004] }));
+    assert!((m.dispersion.index(1.0, 500.0) - 1.516).abs() < 1e-12);
+    let m = one(json!({ "reflectance": { "table": [[400, 0.1], [700, 0.7]] } }));
+    assert!(m.reflectance.as_ref().is_some_and(|s| (s.at(500.0) - 0.3).abs() < 1e-12));
+    assert!(m.base_color[0] > m.base_color[2], "more red than blue: {:?}", m.base_color);
+    let m = one(json!({ "preset": "copper" }));
+    assert!(m.conductor_spectra.is_some());
+    assert!(one(json!({ "preset": "copper", "kappa": 2 })).conductor_spectra.is_none());
+    for (emission, spectrum) in
+        [(json!("a"), Spectrum::IlluminantA), (json!({ "blackbody": 3000 }), Spectrum::BlackBody(3000.0))]
+    {
+        let m = one(json!({ "emission": emission }));
+        let emission = m.emission.expect("an emission");
+        assert_eq!(emission.spectrum, spectrum);
+        assert!((emission.luminance - 1.0).abs() < 1e-6 && m.emissive[0] > m.emissive[2]);
+    }
+    // Lights, too.
+    let mut b = textured(json!({}), &[]);
+    b.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+    b.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [
+        { "type": "point", "intensity": 4, "extras": { "etalon": { "spectrum": { "table": [[500, 1], [510, 3]] }, "b": 1 } } }] } });
+    b.root(json!({ "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
+    let scene = load(&b);
+    let emission = scene.lights[0].spectrum.clone().expect("a spectrum");
+    assert!((emission.luminance - 4.0).abs() < 1e-6);
+    assert_eq!([499.0, 505.0, 511.0].map(|nm| emission.spectrum.at(nm)), [0.0, 2.0, 0.0]);
+    assert_eq!(scene.warnings.len(), 1);
+    assert!(
+        scene.warnings[0].ends_with("extras.etalon of a light has no key \"b\"; it is ignored"),
+        "{:?}",
+        scene.warnings
+    );
+}
+
+#[test]
+fn spectra_that_cannot_be_meant_are_told_by_name() {
+    for (etalon, said) in [
+        (json!({ "emission": "sun" }), "\"sun\" is no illuminant; these are: a, d65, e, f2, f11"),
+        (json!({ "emission": { "blackbody": 20 } }), "a black body of 20 K"),
+        (json!({ "emission": { "table": [[500, 1], [500, 2]] } }), "500 nm comes before 500 nm"),
+        (json!({ "emission": { "table": [[500, -1]] } }), "the value at 500 nm, -1, is negative"),
+        (json!({ "emission": { "table": [] } }), "no rows"),
+        (json!({ "emission": { "table": [[100, 1], [200, 1]] } }), "no light between 380 and 780 nm"),
+        (json!({ "reflectance": { "rows": [] } }), "unknown field"),
+        (json!({ "sellmeier": { "b": [1], "c": [] } }), "1 B and 0 C"),
+        (json!({ "sellmeier": { "b": [1], "c": [0.25] } }), "which is no medium's"),
+        (json!({ "cauchy": [0.5, 0] }), "which is no medium's"),
+        (json!({ "cauchy": [1.5, 0], "sellmeier": { "b": [1], "c": [0] } }), "both sellmeier and cauchy"),
+    ] {
+        let text = sentence(&with_etalon(etalon, json!({})));
+        assert!(text.contains("material 0 \"odd\"") && text.contains("extras.etalon") && text.contains(said), "{text}");
+    }
+    for (etalon, said) in [
+        (
+            json!({ "reflectance": { "table": [[500, 1.5]] } }),
+            "a reflectance of 1.5 sends back more light than there is",
+        ),
+        (json!({ "reflectance": { "table": [[300, 0.5], [900, 0.5]] } }), "300 nm, which nobody sees"),
+        (json!({ "emission": "d65" }), "it is 0, so it is dark"),
+    ] {
+        let warnings = load(&with_etalon(etalon, json!({}))).warnings;
+        assert!(warnings.len() == 1 && warnings[0].contains(said), "{warnings:?}");
+    }
+    for (key, slot, value) in [
+        ("reflectance", "baseColorTexture", json!({ "table": [[500, 0.5]] })),
+        ("emission", "emissiveTexture", json!("a")),
+    ] {
+        let mut b = with_etalon(json!({ key: value }), json!({}));
+        let texture = json!({ "index": 0 });
+        match slot {
+            "baseColorTexture" => b.json["materials"][0]["pbrMetallicRoughness"] = json!({ slot: texture }),
+            _ => b.json["materials"][0][slot] = texture,
+        }
+        assert!(sentence(&b).contains("one of them must go"), "{}", sentence(&b));
+    }
+}
+
+#[test]
 fn a_grid_of_sigma_is_read_and_each_node_gets_a_medium_of_its_own() {
     let fog = json!({ "name": "fog", "extensions": {
         "KHR_materials_transmission": { "transmissionFactor": 1 }, "KHR_materials_volume": { "thicknessFactor": 1 } },
@@ -566,7 +659,7 @@ fn what_etalon_extras_say_in_vain_is_a_warning_that_names_material_and_key() {
         json!({}),
         &["extras.etalon has no key \"Priority\"; it is ignored", "extras.etalon has no key \"a\\nb\"; it is ignored"],
     );
-    for key in ["brdf", "kd", "ks", "shine", "sellmeier", "cauchy"] {
+    for key in ["brdf", "kd", "ks", "shine"] {
         warned(json!({ key: [1, "x"] }), json!({}), &[&format!("extras.etalon {key} is not read yet")]);
     }
     for (extensions, lacks) in [

@@ -10,7 +10,7 @@ mod made;
 use ash::vk;
 use etalon::frame::{Background, NEUTRAL_GREY, Settings};
 use etalon::gpu::{Buffer, Frame, Image, ImageDesc};
-use etalon::image::tone::{ToneMap, quantise, srgb_decode, srgb_encode};
+use etalon::image::tone::{ToneMap, desaturated, quantise, srgb_decode, srgb_encode};
 use etalon::pass::tonemap::{Counts, Display, tonemap};
 use etalon::scene::LightKind;
 use etalon::study::shape::Shape;
@@ -29,6 +29,19 @@ fn display(
     exposure: f32,
     background: [f32; 4],
 ) -> (Vec<[u8; 4]>, Counts) {
+    shown(gpu, rgba, width, curve, exposure, background, false)
+}
+
+/// The same, with or without colours outside of Rec. 709.
+fn shown(
+    gpu: &Gpu,
+    rgba: &[[f32; 4]],
+    width: u32,
+    curve: ToneMap,
+    exposure: f32,
+    background: [f32; 4],
+    desaturates: bool,
+) -> (Vec<[u8; 4]>, Counts) {
     let height = rgba.len() as u32 / width;
     let desc = ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, width, height, vk::ImageUsageFlags::STORAGE);
     let film = Image::new(&gpu.device, "film of a test", desc).expect("an image");
@@ -36,7 +49,7 @@ fn display(
     let target = Display::new(&gpu.device, [width, height]).expect("a display");
     let mut frame = Frame::new(&gpu.device);
     frame.upload("upload film", &staging, &film, 0, &[0]);
-    tonemap(&mut frame, &film, &target, curve as u32, exposure, background).expect("the pass");
+    tonemap(&mut frame, &film, &target, curve as u32, exposure, background, desaturates).expect("the pass");
     frame.finish().expect("a frame");
     let bytes = target.pixels.read(|all| all[..rgba.len() * 4].as_chunks::<4>().0.to_vec());
     (bytes, target.counts())
@@ -213,5 +226,31 @@ fn light_beyond_f32_is_counted_as_infinite() {
             film.rgba.iter().zip(rendered.display.chunks(4)).filter(|(f, _)| f[0].is_infinite()).collect();
         // 65504 / 65505 of Reinhard is the last to reach the byte: 1.5e-5 below 1, half a byte is 2e-3.
         assert!(white.iter().all(|(_, bytes)| **bytes == [255; 4]), "{tonemap:?}: {:?}", white[0].1);
+    }
+}
+
+#[test]
+fn colours_outside_of_the_gamut_keep_their_luminance() {
+    let gpu = Gpu::new();
+    let mut random = Random(5);
+    let film: Vec<[f32; 4]> = (0..64 * 16)
+        .map(|_| {
+            let [r, g, b] = [0; 3].map(|_| random.between(-0.3, 0.9) as f32);
+            [r, g, b, 1.0]
+        })
+        .collect();
+    let (bytes, counts) = shown(&gpu, &film, 64, ToneMap::Linear, 0.0, [0.0; 4], true);
+    let outside = film.iter().filter(|pixel| pixel[..3].iter().any(|&x| x < 0.0)).count();
+    assert_eq!(counts.negative as usize, outside);
+    assert!(outside > 300);
+    for (pixel, got) in film.iter().zip(bytes) {
+        let rgb = [0, 1, 2].map(|k| f64::from(pixel[k]));
+        let expected = desaturated(rgb);
+        let luminance = |[r, g, b]: [f64; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
+        assert!((luminance(expected) - luminance(rgb).max(0.0)).abs() < 1e-12, "{rgb:?}");
+        for k in 0..3 {
+            let display = srgb_encode(expected[k].min(1.0));
+            assert!(is_right(got[k], display, 1e-3), "{pixel:?}: {got:?}, expected {expected:?}");
+        }
     }
 }

@@ -292,6 +292,15 @@ vec3 tone_khronos_neutral(vec3 x) {
     return x;
 }
 
+// Towards the grey of the same luminance (of Rec. 709's primaries), until nothing is negative: what a spectrum may be and a display
+// cannot show. Without luminance: black.
+vec3 desaturated(vec3 x) {
+    float y = dot(vec3(0.2126, 0.7152, 0.0722), x);
+    float least = min(x.r, min(x.g, x.b));
+    vec3 inside = y > 0.0 ? y + (x - y) * (y / (y - least)) : vec3(0.0);
+    return least < 0.0 ? max(inside, 0.0) : x;
+}
+
 // `curve`: 0 linear, 1 reinhard, 2 aces, 3 agx, 4 khronos-neutral. Result in [0, 1], display-linear.
 vec3 tone(uint curve, vec3 x) {
     // Cut where a half float ends: a curve that divides would make NaN, shown black, of the brightest pixels.

@@ -34,9 +34,17 @@ vec3 reflectance_of_rgb(vec3 rgb) {
     int texel = GRID_AT + (i.z * cells + i.y) * cells + i.x;
     vec4 low = imageLoad(spectrum, texel);
     vec4 high = imageLoad(spectrum, texel + cells * cells);
-    vec4 across = mix(low, high, share.z);
-    vec2 along = mix(across.xy, across.zw, share.y);
-    float root = mix(along.x, along.y, share.x);
+    // In the tetrahedron that goes from the least corner first along the largest share: a grey lies on the diagonal, between
+    // greys, and stays one.
+    bool red = share.r >= share.g && share.r >= share.b;
+    bool green = !red && share.g >= share.b;
+    float one = red ? low.y : green ? low.z : high.x;
+    float two = red ? share.g >= share.b ? low.w : high.y : green ? share.r >= share.b ? low.w : high.z
+        : share.r >= share.g ? high.y : high.z;
+    float most = max(share.r, max(share.g, share.b));
+    float least = min(share.r, min(share.g, share.b));
+    float middle = share.r + share.g + share.b - most - least;
+    float root = low.x + (one - low.x) * most + (two - one) * middle + (high.w - two) * least;
     return vec3(root * root);
 }
 #endif

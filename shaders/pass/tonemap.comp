@@ -6,6 +6,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "lib/colour.glsl"
 
 layout(constant_id = 0) const uint CURVE = 0;
+layout(constant_id = 1) const bool DESATURATES = false; // colours outside of Rec. 709 lose saturation, not their luminance
 layout(set = 0, binding = 0, rgba32f) readonly uniform image2D film;
 layout(scalar, set = 0, binding = 1) writeonly buffer Display { uint display[]; };
 layout(scalar, set = 0, binding = 2) buffer Counts { uint nan; uint inf; uint negative; };
@@ -26,7 +27,7 @@ void main() {
     if (any(isinf(value))) atomicAdd(inf, 1u);
     if (any(lessThan(value, vec4(0.0)))) atomicAdd(negative, 1u);
     float alpha = clamp(value.a, 0.0, 1.0);
-    vec3 linear = alpha > 0.0 ? tone(CURVE, value.rgb / alpha * exposure) : vec3(0.0);
+    vec3 linear = alpha > 0.0 ? tone(CURVE, (DESATURATES ? desaturated(value.rgb) : value.rgb) / alpha * exposure) : vec3(0.0);
     if (background.a > 0.0) {
         linear = mix(background.rgb, linear, alpha);
         alpha = 1.0;

@@ -239,6 +239,16 @@ impl SceneOptions {
 }
 
 impl PictureOptions {
+    /// Draws a scene by wavelengths whose glass sends them different ways, where the model is the one of paths and nobody chose.
+    ///
+    /// # Errors
+    /// Never: the rung exists.
+    pub fn colour_of(&self, scene: &Scene, knobs: &mut Knobs) -> Result<()> {
+        let chosen = self.set.iter().any(|choice| choice.starts_with("colour="));
+        let disperses = || scene.meshes.iter().any(|mesh| scene.materials[mesh.material].disperses());
+        if self.model == Model::Global && !chosen && disperses() { knobs.set("colour=spectral:16") } else { Ok(()) }
+    }
+
     /// The knobs as set.
     ///
     /// # Errors

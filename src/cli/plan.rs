@@ -36,8 +36,9 @@ pub struct PlanArgs {
 /// # Errors
 /// One sentence with what was being done, to what, and the cause.
 pub fn run(args: &PlanArgs) -> Result<ExitCode> {
-    let settings = args.picture.settings(&args.scene)?;
+    let mut settings = args.picture.settings(&args.scene)?;
     let setup = Setup::load(&args.scene, args.picture.reads(&args.scene, &settings.knobs), &args.device)?;
+    args.picture.colour_of(&setup.scene, &mut settings.knobs)?;
     let mut warnings = setup.warnings.clone();
     let camera = args.scene.choose_camera(&setup.scene, settings.size)?;
     let transmits = setup.scene.materials.iter().any(|material| material.transmission > 0.0);

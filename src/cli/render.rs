@@ -15,8 +15,8 @@ use super::options::{DeviceOptions, Extent, PictureOptions, SceneOptions, When};
 use super::plan::cost_table;
 use super::print;
 use super::report::{
-    MemoryFacts, Output, PassFacts, PipelineFacts, PlanFacts, Report, Sampling, SceneFacts, Spread, Validation,
-    knob_map,
+    ColourFacts, MemoryFacts, Output, PassFacts, PipelineFacts, PlanFacts, Report, Sampling, SceneFacts, Spread,
+    Validation, knob_map,
 };
 use super::setup::Setup;
 use super::unbuilt::UnbuiltOptions;
@@ -24,9 +24,10 @@ use crate::frame::{Part, Progress, Rendered, Renderer};
 use crate::gpu::Severity;
 use crate::image::{Aov, AovData, Picture, exr, file};
 use crate::pass::view::View;
-use crate::plan::Knobs;
+use crate::plan::{Knobs, Plan};
 use crate::scene::{Camera, Scene};
 use crate::share::AovPixel;
+use crate::spectra;
 
 /// Draw a picture of a scene.
 #[derive(Debug, Clone, Args)]
@@ -240,6 +241,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
 
     steps.step(&format!("loading {}", args.scene.scene), 1);
     let setup = Setup::load(&args.scene, args.picture.reads(&args.scene, &settings.knobs), &args.device)?;
+    args.picture.colour_of(&setup.scene, &mut settings.knobs)?;
     phases.end("load");
     let device = setup.device.clone();
     let info = device.info().clone();
@@ -301,13 +303,13 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let aovs =
         if args.aov.is_empty() { Vec::new() } else { layers(&mut renderer, &camera, &args.aov, rendered.samples)? };
     phases.end("readback");
-    warn_about(&rendered, settings_size(&args.picture), &knobs);
+    warn_about(&rendered, settings_size(&args.picture), &knobs, renderer.plan.bands);
 
     steps.step("encoding", outputs.len() as u32);
     let mut written = Vec::new();
     for (index, (path, format)) in outputs.iter().enumerate() {
         let bytes = match (format, &film) {
-            (Format::Exr, Some(film)) => exr::encode_exr(film, &aovs, &metadata(args))?,
+            (Format::Exr, Some(film)) => exr::encode_exr(film, &aovs, &metadata(args, &renderer.plan))?,
             _ => renderer.png(&rendered)?,
         };
         file::write(path, &bytes)?;
@@ -346,6 +348,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
             phases_ms: phases.all,
             work: (&rendered.work).into(),
             sampling: Sampling::of(&rendered),
+            colour: ColourFacts::of(&renderer.plan, &rendered),
             bvh: renderer.bvh(),
             pipelines: PipelineFacts { count: device.pipelines().len(), spirv_bytes },
             memory: MemoryFacts::now(&device),
@@ -407,16 +410,28 @@ fn facts(scene: &Scene) -> SceneFacts {
 }
 
 /// What the EXR says of its making.
-fn metadata(args: &RenderArgs) -> Vec<(String, String)> {
-    vec![
+fn metadata(args: &RenderArgs, plan: &Plan) -> Vec<(String, String)> {
+    let mut all = vec![
         ("software".to_owned(), format!("etalon {}", env!("CARGO_PKG_VERSION"))),
         ("scene".to_owned(), args.scene.scene.clone()),
-    ]
+    ];
+    if plan.bands > 0 {
+        all.push(("observer".to_owned(), spectra::OBSERVER.to_owned()));
+    }
+    all
 }
 
-fn warn_about(rendered: &Rendered, pixels: u64, knobs: &Knobs) {
+fn warn_about(rendered: &Rendered, pixels: u64, knobs: &Knobs, bands: u32) {
     let counts = rendered.counts;
-    for (count, what) in [(counts.nan, "NaN"), (counts.inf, "infinite"), (counts.negative, "negative")] {
+    let negative = if bands > 0 { 0 } else { counts.negative };
+    if bands > 0 && counts.negative > 0 {
+        tracing::warn!(
+            "{} of {pixels} pixels have colours outside of Rec. 709: shown less saturated at the same luminance, negative in \
+             an EXR",
+            counts.negative
+        );
+    }
+    for (count, what) in [(counts.nan, "NaN"), (counts.inf, "infinite"), (negative, "negative")] {
         if count > 0 {
             tracing::warn!("{count} of {pixels} pixels hold {what} radiance, shown as black or white");
         }

@@ -12,6 +12,7 @@ use crate::image::Statistics;
 use crate::image::halves::{SampleError, slope};
 use crate::pass::rays::BvhFacts;
 use crate::plan::{Effect, Knobs, Plan};
+use crate::spectra;
 
 /// The document.
 #[derive(Debug, Serialize)]
@@ -35,6 +36,9 @@ pub struct Report {
     pub work: WorkFacts,
     /// Samples, and what they say of the picture's error.
     pub sampling: Sampling,
+    /// Of a picture by wavelengths.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub colour: Option<ColourFacts>,
     /// What rays went through; absent where none were sent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bvh: Option<BvhFacts>,
@@ -48,6 +52,38 @@ pub struct Report {
     pub validation: Validation,
     /// Files written, with hashes of their bytes.
     pub outputs: Vec<Output>,
+}
+
+/// How wavelengths became colours.
+#[derive(Debug, Serialize)]
+pub struct ColourFacts {
+    /// Whose matching functions.
+    pub observer: &'static str,
+    /// Of equal width, each drawn for itself.
+    pub bands: u32,
+    /// What they divide, nm.
+    pub wavelengths: [f64; 2],
+    /// Samples go through parts of each band, because wavelengths go different ways.
+    pub disperses: bool,
+    /// Pixels whose colour lies outside of Rec. 709.
+    pub outside_gamut: u32,
+    /// What becomes of them on a display; an EXR has them as they are.
+    pub outside_gamut_rule: &'static str,
+}
+
+impl ColourFacts {
+    /// Of a picture; `None` where it is made of three colours.
+    #[must_use]
+    pub fn of(plan: &Plan, rendered: &Rendered) -> Option<Self> {
+        (plan.bands > 0).then_some(Self {
+            observer: spectra::OBSERVER,
+            bands: plan.bands,
+            wavelengths: [spectra::VISIBLE.from, spectra::VISIBLE.to],
+            disperses: plan.disperses,
+            outside_gamut: rendered.counts.negative,
+            outside_gamut_rule: "desaturated at constant luminance",
+        })
+    }
 }
 
 /// Samples, and what they say of the picture's error where it is estimated: of pictures by paths.

@@ -140,6 +140,18 @@ pub fn khronos_neutral(rgb: [f64; 3]) -> [f64; 3] {
     unit(rgb.map(|x| x * (new_peak / peak)).map(|x| x * (1.0 - g) + new_peak * g))
 }
 
+/// Towards the grey of the same luminance, until nothing is negative: a colour outside of Rec. 709 as a display shows it.
+#[must_use]
+pub fn desaturated(rgb: [f64; 3]) -> [f64; 3] {
+    let luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+    let least = rgb.iter().copied().fold(f64::INFINITY, f64::min);
+    match (least < 0.0, luminance > 0.0) {
+        (false, _) => rgb,
+        (true, false) => [0.0; 3],
+        (true, true) => rgb.map(|x| (luminance + (x - luminance) * luminance / (luminance - least)).max(0.0)),
+    }
+}
+
 /// sRGB transfer of IEC 61966-2-1: linear light in 0..=1 (cut outside, NaN as 0) to a display value in 0..=1.
 pub fn srgb_encode(light: f64) -> f64 {
     let light = usable(light).min(1.0);

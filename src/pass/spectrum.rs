@@ -16,7 +16,7 @@ const HEADER: usize = 4;
 pub struct SpectrumOnDevice {
     /// As shaders/lib/spectrum.glsl reads it.
     pub texels: Buffer,
-    grid: Option<Grid>,
+    grid: Option<&'static Grid>,
     /// The grid's texels for each band that was shown, so that each is averaged once.
     known: Vec<(Band, Vec<[f32; 4]>)>,
 }
@@ -56,7 +56,7 @@ impl SpectrumOnDevice {
         let column = |v: [f64; 3]| [v[0] as f32, v[1] as f32, v[2] as f32, 0.0];
         let [red, green, blue] = light_from_rgb(&slice.part).map(|light| column(light.map(|x| x * weight)));
         self.texels.write_at(0, bytemuck::cast_slice(&[red, green, blue, column(shares(band))]));
-        let Some(grid) = &self.grid else { return };
+        let Some(grid) = self.grid else { return };
         if !self.known.iter().any(|(known, _)| known == band) {
             self.known.push((*band, cells(grid.side, &grid.roots(band))));
         }

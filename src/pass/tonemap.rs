@@ -48,7 +48,7 @@ impl Display {
 }
 
 /// Exposes by `exposure` stops, bends by tone curve number `curve`, and encodes; `background` is display-linear with
-/// alpha 1, or all 0 to keep transparency.
+/// alpha 1, or all 0 to keep transparency. With `desaturates` colours outside of Rec. 709 keep their luminance.
 ///
 /// # Errors
 /// When the driver refuses what a pipeline binds.
@@ -59,13 +59,14 @@ pub fn tonemap<'a>(
     curve: u32,
     exposure: f32,
     background: [f32; 4],
+    desaturates: bool,
 ) -> Result<()> {
     frame.fill("reset counts", &display.counts, 0);
     let [r, g, b, a] = background;
     let push = [r, g, b, a, exposure.exp2()];
     let bind = tonemap::Bind { film, display: &display.pixels, counts: &display.counts };
     let size = [film.desc().width, film.desc().height];
-    let constants = tonemap::Constants { curve, ..Default::default() }.words();
+    let constants = tonemap::Constants { curve, desaturates, ..Default::default() }.words();
     frame.compute_over("tone map", &bind, constants, bytemuck::cast_slice(&push), size)?;
     frame.read_back(&display.pixels);
     frame.read_back(&display.counts);
