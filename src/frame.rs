@@ -784,7 +784,8 @@ impl Renderer {
 /// Lights of both kinds that do not shine: loops over lights then have a turn to take.
 fn add_dark_lights(scene: &mut Scene) {
     let bounds = scene.bounds().unwrap_or(Bounds { min: DVec3::ZERO, max: DVec3::ONE });
-    let dark = |kind| Light { name: "dark".to_owned(), color: [0.0; 3], spectrum: None, kind, stand_in: false };
+    let dark =
+        |kind| Light { name: "dark".to_owned(), color: [0.0; 3], spectrum: None, extent: None, kind, stand_in: false };
     let point = LightKind::Point { position: bounds.max, range: Some(2.0 * bounds.radius()) };
     scene.lights.extend([dark(LightKind::Directional { direction: DVec3::NEG_Y }), dark(point)]);
 }

@@ -29,6 +29,9 @@
 //! Rays go through [`scene::bvh`], laid out by [`pass::rays`], along `shaders/lib/trace.glsl`; `shaders/pass/interact.comp` is
 //! the tree of reflection and refraction, `shaders/lib/shadow.glsl` the way to a light.
 //!
+//! [`spectra`] has what light and matter are by wavelength; [`scene::wavelengths`] makes of a scene the same scene in one band of
+//! them, and frames know no more of it than that.
+//!
 //! A pass declares nothing by hand. build.rs reads `readonly` and `writeonly` out of the compiled GLSL and writes, per program, a
 //! module in [`shader`]: `PROGRAM` with the access of each binding, `Bind` with one named field per binding, `Constants`.
 //! [`gpu::Access`] is the one table that turns an access into Vulkan's stages, accesses and layouts. Structs that both sides

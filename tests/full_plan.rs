@@ -40,13 +40,15 @@ fn draw(gpu: &Gpu, scene: &Scene, knobs: &Knobs, demand: Demand) -> (Picture, Ve
     (renderer.film().expect("the film"), renderer.plan.effects.clone())
 }
 
-/// Both plans of a scene as it was loaded for each. Everything is kept in the one but what a knob drops, and bodies that
-/// touch.
+/// Effects that no demand includes: each makes another picture, or one with other roundings, wherever it is.
+const APART: [&str; 3] = ["bodies that touch", "bands of wavelengths", "dispersion"];
+
+/// Both plans of a scene as it was loaded for each. Everything is kept in the one but what a knob drops, and what stands apart.
 fn is_the_same(gpu: &Gpu, name: &str, [lean, full]: [&Scene; 2], knobs: &Knobs) {
     let (planned, _) = draw(gpu, lean, knobs, Demand::Scene);
     let (everything, effects) = draw(gpu, full, knobs, Demand::Full);
     for effect in effects.iter().filter(|effect| effect.state == "not called for") {
-        assert_eq!(effect.name, "bodies that touch", "{name}: {}", effect.reason);
+        assert!(APART.contains(&effect.name), "{name}: {}: {}", effect.name, effect.reason);
     }
     let different = bits(&planned).iter().zip(bits(&everything)).filter(|(a, b)| *a != b).count();
     assert_eq!(different, 0, "{name}: pixels that differ");
@@ -59,8 +61,12 @@ fn knobs(model: Model, choices: &[&str]) -> Knobs {
 }
 
 fn studies(knobs: &Knobs) {
+    some_studies(study::NAMES, knobs);
+}
+
+fn some_studies(names: &[&str], knobs: &Knobs) {
     let gpu = Gpu::new();
-    for name in study::NAMES {
+    for name in names {
         let scene = study::load(name).expect("a scene");
         is_the_same(&gpu, name, [&scene, &scene], knobs);
     }
@@ -73,7 +79,10 @@ fn studies_by_rays() {
 
 #[test]
 fn studies_by_rays_that_march_and_sample_lobes() {
-    studies(&knobs(Model::Recursive, &["samples=1", "absorption=march:4", "lobes=1", "brdf=ggx-multi"]));
+    some_studies(
+        &study::NAMES[..10],
+        &knobs(Model::Recursive, &["samples=1", "absorption=march:4", "lobes=1", "brdf=ggx-multi"]),
+    );
 }
 
 #[test]
@@ -84,7 +93,7 @@ fn studies_by_the_local_model() {
 #[test]
 fn studies_on_the_screen() {
     let choices = ["samples=1", "reflection=screen", "refraction=screen", "indirect=off", "fresnel=exact"];
-    studies(&knobs(Model::Local, &choices));
+    some_studies(&study::NAMES[..10], &knobs(Model::Local, &choices));
 }
 
 #[test]
@@ -92,9 +101,19 @@ fn studies_by_paths() {
     studies(&knobs(Model::Global, &["samples=1", "absorption=march:4"]));
 }
 
+/// Band by band: what varies, disperses, marches, and lights of many spectra.
+#[test]
+fn studies_by_wavelengths() {
+    let knobs = knobs(Model::Recursive, &["samples=1", "colour=spectral:8", "absorption=march:4"]);
+    some_studies(&["materials", "prism", "metamers", "haze"], &knobs);
+}
+
 #[test]
 fn studies_with_some_rays() {
-    studies(&knobs(Model::Recursive, &["samples=1", "shadows=map", "refraction=off", "brdf=blinn-phong"]));
+    some_studies(
+        &study::NAMES[..10],
+        &knobs(Model::Recursive, &["samples=1", "shadows=map", "refraction=off", "brdf=blinn-phong"]),
+    );
 }
 
 /// Each effect alone, where nothing calls for it.
@@ -109,8 +128,9 @@ fn each_effect_alone() {
             let (with, account) = draw(&gpu, &scene, &knobs, Demand::With(effect.name));
             assert!(bits(&planned) == bits(&with), "{name}: {}", effect.name);
             let kept = account.iter().filter(|kept| kept.name == effect.name && kept.state == "kept").count();
-            // Surfaces light others along paths alone.
-            let kept_alone = !matches!(effect.name, "bodies that touch" | "surfaces that light");
+            // Surfaces light others along paths alone, and so do lights with a shape.
+            let needs_paths = ["surfaces that light", "lights with a shape"].contains(&effect.name);
+            let kept_alone = !needs_paths && !APART.contains(&effect.name);
             assert_eq!(kept, usize::from(kept_alone), "{name}: {}", effect.name);
         }
     }

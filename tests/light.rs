@@ -444,6 +444,7 @@ fn compensation_is_for_lights_too() {
     scene.lights.push(etalon::scene::Light {
         stand_in: false,
         spectrum: None,
+        extent: None,
         name: "sun".to_owned(),
         color: [1.0; 3],
         kind: LightKind::Directional { direction },
@@ -472,6 +473,7 @@ fn exact_fresnel_of_a_half_metal_lies_between() {
         scene.lights.push(etalon::scene::Light {
             stand_in: false,
             spectrum: None,
+            extent: None,
             name: "sun".to_owned(),
             color: [1.0; 3],
             kind: LightKind::Directional { direction: DVec3::new(0.9, -0.1, 0.4).normalize() },

@@ -11,7 +11,7 @@ use etalon::image::Picture;
 use etalon::plan::{Knobs, Model};
 use etalon::scene::emitters::{Emitters, Source};
 use etalon::scene::environment::Environment;
-use etalon::scene::{LightKind, Material, Projection, Scene};
+use etalon::scene::{Extent, Light, LightKind, Material, Projection, Scene};
 use etalon::study::shape::Shape;
 use glam::{DAffine3, DVec3};
 use gpu::{Gpu, bits};
@@ -48,6 +48,92 @@ fn cube(material: Material) -> Scene {
 
 fn white_metal(roughness: f32) -> Material {
     Material { metallic: 1.0, roughness, specular: 1.0, ..lambert([1.0; 3]) }
+}
+
+/// A matt floor a metre below a light with a shape, and what it must be: E/π times the floor's 0.5.
+fn under(light: Light, expected: f64) -> (Scene, f64) {
+    let mut made = Made::new("floor");
+    made.add(Shape::panel(0.02, 0.02), lambert([0.5; 3]), DAffine3::IDENTITY);
+    made.0.lights.push(light);
+    made.front(0.008);
+    (made.0, 0.5 * expected / std::f64::consts::PI)
+}
+
+#[test]
+fn lights_with_a_shape_light_as_their_form_factors_say() {
+    let gpu = Gpu::new();
+    let light = |extent: Option<Extent>, kind: LightKind| Light {
+        name: "lamp".to_owned(),
+        color: [2.0; 3],
+        spectrum: None,
+        extent,
+        kind,
+        stand_in: false,
+    };
+    let position = DVec3::Z;
+    let point = LightKind::Point { position, range: None };
+    // A step at a right angle: all that a sheet of paper sends.
+    let right = std::f64::consts::FRAC_PI_2;
+    let face = |direction: DVec3| LightKind::Spot { position, direction, range: None, inner: right, outer: right };
+    // π r²/(1 + r²) over the disk's area times its intensity.
+    let disk = |r: f64| 2.0 / (1.0 + r * r);
+    // Of a rectangle before the middle of a plane, four quarters a by b (Howell, A Catalog of Radiation Heat Transfer Configuration
+    // Factors, B-3): E = L/2 (A atan(b/√(1 + a²)) + …), L = I/(4ab).
+    let rectangle = |a: f64, b: f64| {
+        let (ra, rb) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
+        let quarter = 0.5 * (a / ra * (b / ra).atan() + b / rb * (a / rb).atan());
+        4.0 * quarter * 2.0 / (4.0 * a * b)
+    };
+    for (what, extent, kind, expected) in [
+        // Of a ball above the horizon any radius lights alike.
+        ("small ball", Extent::Sphere { radius: 0.01 }, point, 2.0),
+        ("ball", Extent::Sphere { radius: 0.7 }, point, 2.0),
+        ("disk", Extent::Disk { radius: 0.6 }, face(DVec3::NEG_Z), disk(0.6)),
+        ("disk seen from behind", Extent::Disk { radius: 0.6 }, face(DVec3::Z), 0.0),
+        (
+            "rectangle",
+            Extent::Rectangle { across: DVec3::X * 0.8, half_height: 0.3 },
+            face(DVec3::NEG_Z),
+            rectangle(0.8, 0.3),
+        ),
+        ("ball around it", Extent::Sphere { radius: 1.5 }, point, 0.0),
+    ] {
+        let (scene, radiance) = under(light(Some(extent), kind), expected);
+        let film = draw(&gpu, &scene, None, settings([16, 16], &["samples=64"]));
+        let [mean, deviation, _] = spread(&film, 1);
+        eprintln!("{what}: {mean:.6} ± {deviation:.6}, expected {radiance:.6}");
+        // Neighbouring pixels have points of their own; the floor reaches 0.01 m from its middle.
+        assert!((mean - radiance).abs() <= 4.0 * deviation + 2e-4 * radiance, "{what}: {mean}, not {radiance}");
+        // The rung `points` knows no shapes.
+        let film = draw(&gpu, &scene, None, settings([4, 4], &["samples=1", "lights=points"]));
+        let mut bare = scene.clone();
+        bare.lights[0].extent = None;
+        let point = draw(&gpu, &bare, None, settings([4, 4], &["samples=1", "lights=points"]));
+        assert!(bits(&film) == bits(&point), "{what}");
+    }
+}
+
+/// Half of a shape hidden by a wall gives half of its light.
+#[test]
+fn shapes_cast_soft_shadows() {
+    let gpu = Gpu::new();
+    let position = DVec3::Z;
+    let right = std::f64::consts::FRAC_PI_2;
+    let kind = LightKind::Spot { position, direction: DVec3::NEG_Z, range: None, inner: right, outer: right };
+    let extent = Some(Extent::Rectangle { across: DVec3::X * 0.5, half_height: 0.5 });
+    let light = Light { name: "lamp".to_owned(), color: [2.0; 3], spectrum: None, extent, kind, stand_in: false };
+    let (mut scene, _) = under(light, 0.0);
+    let open = draw(&gpu, &scene, None, settings([8, 8], &["samples=256"]));
+    let mut made = Made(scene.clone());
+    // Black, half way up, over all of one side.
+    made.add(Shape::panel(4.0, 4.0), lambert([0.0; 3]), at(2.0, 0.0, 0.5));
+    scene = made.0;
+    // The eye is below the wall.
+    scene.cameras[0].world_from_camera.translation.z = 0.4;
+    scene.cameras[0].projection = Projection::Orthographic { half_height: 0.008, near: 0.1, far: 2.0 };
+    let half = draw(&gpu, &scene, None, settings([8, 8], &["samples=256"]));
+    let ([open, ..], [half, deviation, _]) = (spread(&open, 1), spread(&half, 1));
+    assert!((half - 0.5 * open).abs() < 4.0 * deviation + 1e-3 * open, "{half} of {open}");
 }
 
 #[test]

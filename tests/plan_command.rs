@@ -115,12 +115,16 @@ fn what_is_left_out_has_a_price() {
         .filter(|effect| effect["state"] != "kept" && !priced(&effect["name"]))
         .map(|e| e["name"].clone())
         .collect();
-    assert_eq!(without, ["media that vary", "quadrature", "prefiltered environment", "surfaces that light"]);
+    let mut alone = vec!["media that vary", "quadrature", "prefiltered environment", "surfaces that light"];
+    alone.extend(["lights with a shape", "dispersion"]);
+    assert_eq!(without, alone);
     assert!(of("layers")["bytes"].as_i64() > Some(48 * 27 * 8), "{costs:?}");
     assert!(of("see-through surfaces")["pipelines"].as_i64() > Some(1), "{costs:?}");
     assert!(of("mirrors")["spirv_bytes"].as_i64() > Some(10_000), "{costs:?}");
     assert!(costs.iter().all(|cost| cost["frame_ms"].is_f64()), "{costs:?}");
-    let by = |cost: &Value| cost["effect"] == "paths" || cost["by"] == "asked for";
+    let by = |cost: &Value| {
+        ["paths", "bands of wavelengths"].iter().any(|name| cost["effect"] == *name) || cost["by"] == "asked for"
+    };
     assert!(costs.iter().all(by), "{costs:?}");
     assert_eq!(of("paths")["by"], "shadows=ray, reflection=ray, refraction=ray, indirect=path");
     let lean = planned(folder.path(), &["study:radiance"]).0;
@@ -141,8 +145,8 @@ fn everything_can_be_planned() {
         plan["effects"].as_array().expect("a list").iter().filter(|effect| effect["state"] == state).count()
     };
     assert!(count(&lean, "not called for") > 10);
-    // Bodies that touch are another picture.
-    assert_eq!(count(&full, "not called for"), 1);
+    // Bodies that touch are another picture, and so is dispersion.
+    assert_eq!(count(&full, "not called for"), 2);
     let reasons = full["effects"].to_string();
     assert!(reasons.contains("asked for, although no material in use has it"), "{reasons}");
     assert!(full["pipelines"].as_array().expect("a list").len() > lean["pipelines"].as_array().expect("a list").len());

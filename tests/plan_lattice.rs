@@ -494,7 +494,8 @@ fn any_two_effects_are_kept_together_and_apart() {
     let mut seen = BTreeSet::new();
     for (ways, choice) in spread() {
         let plan = planned(&ways, &choice, knobs(&ways, &choice));
-        for a in plan.effects.iter().filter(|effect| !OF_PATHS.contains(&effect.name)) {
+        let elsewhere = [OF_PATHS.as_slice(), &OF_WAVELENGTHS].concat();
+        for a in plan.effects.iter().filter(|effect| !elsewhere.contains(&effect.name)) {
             states.entry(a.name).or_default().insert(a.state);
         }
         seen.extend(effect_pairs(&plan));
@@ -521,7 +522,10 @@ fn any_two_effects_are_kept_together_and_apart() {
 }
 
 /// Effects of paths: kept nowhere without them.
-const OF_PATHS: [&str; 3] = ["frosted surfaces", "paths", "surfaces that light"];
+const OF_PATHS: [&str; 4] = ["frosted surfaces", "lights with a shape", "paths", "surfaces that light"];
+
+/// Effects of another rung of `colour`: tests/spectra.rs has them.
+const OF_WAVELENGTHS: [&str; 2] = ["bands of wavelengths", "dispersion"];
 
 /// Every other effect but the one that only the hierarchy of triangles tells.
 const NAMES: [&str; 21] = [

@@ -164,6 +164,7 @@ fn lit_chart(light: &str, by_wavelength: bool) -> Scene {
         spectrum: Some(emission),
         kind: LightKind::Directional { direction: DVec3::NEG_Z },
         stand_in: false,
+        extent: None,
     });
     made.front(2.0);
     made.0

@@ -9,6 +9,7 @@
 layout(constant_id = 60) const uint EMITTERS = 0;
 layout(constant_id = 61) const uint EMITTER_STEPS = 0;           // halvings that single one of them out
 layout(constant_id = 67) const bool PUNCTUAL_EMITTERS = false;   // some of them are lights without extent
+layout(constant_id = 74) const bool SHAPED_EMITTERS = false;     // some of those have a shape after all
 layout(constant_id = 62) const bool EMITTING_TRIANGLES = false;  // some of them are triangles
 layout(constant_id = 63) const bool EMITTING_SKY = false;        // one is the environment
 layout(constant_id = 64) const uint SKY_COLUMNS = 0;             // cells of its table
@@ -148,7 +149,9 @@ LightSample sample_light(vec3 origin, uvec2 words) {
     uint kind = emitter.z & 3u;
     if (PUNCTUAL_EMITTERS) {
         if (kind == EMITTER_PUNCTUAL) {
-            PunctualLight light = punctual_light_at(emitter.w, origin - trace_terms.bvh_from_rel);
+            vec3 p_rel = origin - trace_terms.bvh_from_rel;
+            PunctualLight light = SHAPED_EMITTERS ? shaped_light_at(emitter.w, p_rel, vec2(x, unit_float(words.y)))
+                : punctual_light_at(emitter.w, p_rel);
             r = LightSample(light.directional ? light.l : light.to_light, light.directional ? LARGEST : 1.0,
                             light.arriving / probability, 0.0);
         }

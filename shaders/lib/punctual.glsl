@@ -2,10 +2,10 @@
 #ifndef PUNCTUAL_GLSL
 #define PUNCTUAL_GLSL
 #include "lib/light.glsl"
+#include "lib/light_texels.glsl"
 
 layout(constant_id = 13) const uint DIRECTIONAL_LIGHTS = 0; // lights [0, this) of the table
 
-// Four texels per light: position (or direction to it), unused | colour, 1 / range² | axis, spot scale | spot offset.
 layout(set = 0, binding = 20, rgba32f) readonly uniform imageBuffer lights;
 
 struct PunctualLight {
@@ -17,10 +17,10 @@ struct PunctualLight {
 
 // Light `index` of the table as a point sees it.
 PunctualLight punctual_light_at(uint index, vec3 p_rel) {
-    vec4 place = imageLoad(lights, int(index * 4));
-    vec4 color = imageLoad(lights, int(index * 4 + 1));
-    vec4 axis = imageLoad(lights, int(index * 4 + 2));
-    float spot_offset = imageLoad(lights, int(index * 4 + 3)).x;
+    vec4 place = imageLoad(lights, int(index) * LIGHT_TEXELS);
+    vec4 color = imageLoad(lights, int(index) * LIGHT_TEXELS + 1);
+    vec4 axis = imageLoad(lights, int(index) * LIGHT_TEXELS + 2);
+    float spot_offset = imageLoad(lights, int(index) * LIGHT_TEXELS + 3).x;
     PunctualLight r;
     r.directional = index < DIRECTIONAL_LIGHTS;
     r.to_light = r.directional ? place.xyz : place.xyz - p_rel;
@@ -28,6 +28,50 @@ PunctualLight punctual_light_at(uint index, vec3 p_rel) {
     r.l = r.directional ? place.xyz : r.to_light * inversesqrt(max(r2, 1e-30));
     float falloff = point_falloff(r2, color.w) * spot_share(-dot(axis.xyz, r.l), axis.w, spot_offset);
     r.arriving = color.rgb * (r.directional ? 1.0 : falloff);
+    return r;
+}
+
+// Light that may arrive from one place of a light with a shape, told apart by a point of the unit square. It shines as evenly as
+// paper, with I along its axis from afar: L = I/(πr²) of balls and disks, I/A of rectangles, so that what is seen of a face is
+// I cosθ_light/r² however large it is.
+PunctualLight shaped_light_at(uint index, vec3 p_rel, vec2 x) {
+    PunctualLight r = punctual_light_at(index, p_rel);
+    vec4 shape = imageLoad(lights, int(index) * LIGHT_TEXELS + 3);
+    uint kind = uint(shape.y);
+    if (kind == SHAPE_NONE) return r;
+    vec4 color = imageLoad(lights, int(index) * LIGHT_TEXELS + 1);
+    vec4 axis = imageLoad(lights, int(index) * LIGHT_TEXELS + 2);
+    vec3 middle = r.to_light;
+    float window = point_falloff(dot(middle, middle), color.w) * dot(middle, middle);
+    float around = 2.0 * PI * x.y;
+    if (kind == SHAPE_SPHERE) {
+        // A direction of the cone in which the ball is seen, each as likely as any other (PBRT 4, section 6.2.4).
+        float d2 = dot(middle, middle);
+        float sin2_most = shape.z * shape.z / d2;
+        float lost = sin2_most / (1.0 + sqrt(max(1.0 - sin2_most, 0.0))); // 1 − cosθ
+        float cos_theta = 1.0 - x.x * lost;
+        float sin2 = max(x.x * lost * (2.0 - x.x * lost), 0.0);
+        OrthonormalBasis b = orthonormal_basis(r.l);
+        vec3 l = r.l * cos_theta + (b.t * cos(around) + b.b * sin(around)) * sqrt(sin2);
+        float reach = sqrt(d2) * cos_theta - sqrt(max(shape.z * shape.z - d2 * sin2, 0.0));
+        r.to_light = l * reach;
+        r.l = l;
+        // Ω L = 2π(1 − cosθ) I/(πr²). From inside nothing is seen of it.
+        r.arriving = d2 > shape.z * shape.z ? color.rgb * (window * 2.0 * lost / (shape.z * shape.z)) : vec3(0.0);
+        return r;
+    }
+    vec3 across = imageLoad(lights, int(index) * LIGHT_TEXELS + 4).xyz;
+    if (kind == SHAPE_DISK) {
+        OrthonormalBasis b = orthonormal_basis(axis.xyz);
+        r.to_light = middle + (b.t * cos(around) + b.b * sin(around)) * (shape.z * sqrt(x.x));
+    } else {
+        vec3 up = normalize(cross(axis.xyz, across)) * shape.z;
+        r.to_light = middle + across * (2.0 * x.x - 1.0) + up * (2.0 * x.y - 1.0);
+    }
+    float r2 = max(dot(r.to_light, r.to_light), LIGHT_RADIUS * LIGHT_RADIUS);
+    r.l = r.to_light * inversesqrt(r2);
+    float cos_light = -dot(axis.xyz, r.l);
+    r.arriving = color.rgb * (cos_light > 0.0 ? window * cos_light / r2 * spot_share(cos_light, axis.w, shape.x) : 0.0);
     return r;
 }
 #endif

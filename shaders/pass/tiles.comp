@@ -5,6 +5,7 @@
 #extension GL_EXT_scalar_block_layout : require
 layout(local_size_x = 64) in;
 #include "lib/camera.glsl"
+#include "lib/light_texels.glsl"
 #include "lib/work_tile.glsl"
 
 layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
@@ -36,7 +37,7 @@ void main() {
         for (uint i = 0; i < 32; i++) {
             uint index = word * 32 + i;
             if (index >= count) break;
-            vec4 place = imageLoad(lights, int((first + index) * 4));
+            vec4 place = imageLoad(lights, int(first + index) * LIGHT_TEXELS);
             float radius = place.w; // the light's range; negative: unlimited
             bool hit = radius < 0.0;
             if (!hit) {

@@ -173,7 +173,8 @@ fn allowing(effect: &Effect) -> Vec<String> {
     const PATHS: [&str; 5] = ["shadows=ray", "reflection=ray", "refraction=ray", "indirect=path", "lights=area:1"];
     match effect.name {
         "paths" => return PATHS[..4].iter().map(|&rung| rung.to_owned()).collect(),
-        "surfaces that light" => return PATHS.map(str::to_owned).into(),
+        "bands of wavelengths" | "dispersion" => return vec!["colour=spectral:16".to_owned()],
+        "surfaces that light" | "lights with a shape" => return PATHS.map(str::to_owned).into(),
         _ if effect.reason == "indirect=path" => {
             return ["indirect=ambient", "lights=points"].map(str::to_owned).into();
         }

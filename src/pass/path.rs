@@ -235,6 +235,7 @@ fn constants(lighting: Lighting, with: Rays, paths: Paths) -> Vec<(u32, u32)> {
         emitter_steps: halvings(emitters.count),
         punctual_emitters: emitters.punctual,
         emitting_triangles: emitters.triangles,
+        shaped_emitters: paths.shaped && emitters.punctual,
         emitting_sky: emitters.rows > 0,
         sky_columns: emitters.columns,
         sky_rows: emitters.rows,

@@ -15,7 +15,7 @@ use crate::gpu::{Buffer, Device, Draw, Place, Sampled, VertexStream};
 use crate::plan::{Knobs, Plan, casts_in_maps, is_see_through, mirrors};
 use crate::scene::solid::Solids;
 use crate::scene::wavelengths::{Banded, Slice, Wavelengths};
-use crate::scene::{AlphaMode, Bounds, Light, LightKind, Material, Scene, SigmaGrid, TextureRef};
+use crate::scene::{AlphaMode, Bounds, Extent, Light, LightKind, Material, Scene, SigmaGrid, TextureRef};
 use crate::shader::{gbuffer, shadow_map};
 use crate::share;
 use crate::spectra::{self, Upsampling};
@@ -99,7 +99,7 @@ pub struct SceneOnDevice {
     pub grids: SigmaGrids,
     /// Instances relative to the eye of the current view.
     pub instances: Buffer,
-    /// Lights relative to the eye of the current view: directional first, four texels each.
+    /// Lights relative to the eye of the current view: directional first, [`LIGHT_TEXELS`] each.
     pub lights: Buffer,
     lights_cpu: Vec<Light>,
     refraction: bool,
@@ -241,7 +241,7 @@ impl SceneOnDevice {
         let lights_cpu = std::mem::take(&mut scene.lights);
 
         let instance_bytes = (scene.instances.len() * size_of::<share::Instance>()) as u64;
-        let light_bytes = (lights_cpu.len() * 64) as u64;
+        let light_bytes = (lights_cpu.len() * LIGHT_TEXELS * 16) as u64;
         Ok(Self {
             materials: match spectral {
                 // Written anew for each slice.
@@ -557,8 +557,20 @@ fn shared_instance(placement: &Placement, eye: DVec3, material: usize) -> share:
     }
 }
 
-/// Four texels: see `shaders/lib/lighting.glsl`.
-fn shared_light(light: &Light, [r, g, b]: [f32; 3], eye: DVec3) -> [[f32; 4]; 4] {
+/// Texels of a light: `LIGHT_TEXELS` of shaders/lib/light_texels.glsl.
+const LIGHT_TEXELS: usize = 5;
+
+/// As shaders/lib/light_texels.glsl says.
+fn shared_light(light: &Light, [r, g, b]: [f32; 3], eye: DVec3) -> [[f32; 4]; LIGHT_TEXELS] {
+    // Kind of the shape, its radius or half its height; half its side across.
+    let (shape, across) = match light.extent {
+        None => ([0.0; 2], DVec3::ZERO),
+        Some(Extent::Sphere { radius }) => ([1.0, radius as f32], DVec3::ZERO),
+        Some(Extent::Disk { radius }) => ([2.0, radius as f32], DVec3::ZERO),
+        Some(Extent::Rectangle { across, half_height }) => ([3.0, half_height as f32], across),
+    };
+    let side = across.as_vec3().extend(0.0).to_array();
+    let shaped = |offset: f32| [offset, shape[0], shape[1], 0.0];
     let local = |position: DVec3, range: Option<f64>| {
         let p = (position - eye).as_vec3();
         let inv_range2 = range.map_or(0.0, |range| (1.0 / (range * range)) as f32);
@@ -568,11 +580,11 @@ fn shared_light(light: &Light, [r, g, b]: [f32; 3], eye: DVec3) -> [[f32; 4]; 4]
     match light.kind {
         LightKind::Directional { direction } => {
             let to = (-direction).as_vec3();
-            [[to.x, to.y, to.z, 0.0], [r, g, b, 0.0], [0.0; 4], [0.0; 4]]
+            [[to.x, to.y, to.z, 0.0], [r, g, b, 0.0], [0.0; 4], [0.0; 4], [0.0; 4]]
         }
         LightKind::Point { position, range } => {
             let (place, color) = local(position, range);
-            [place, color, [0.0; 4], [1.0, 0.0, 0.0, 0.0]]
+            [place, color, [0.0; 4], shaped(1.0), side]
         }
         LightKind::Spot { position, direction, range, inner, outer } => {
             let (place, color) = local(position, range);
@@ -581,7 +593,7 @@ fn shared_light(light: &Light, [r, g, b]: [f32; 3], eye: DVec3) -> [[f32; 4]; 4]
             // Equal cones are a step, which a ramp of 1e-7 is to f32.
             let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-7);
             let offset = -outer.cos() * scale;
-            [place, color, [axis.x, axis.y, axis.z, scale as f32], [offset as f32, 0.0, 0.0, 0.0]]
+            [place, color, [axis.x, axis.y, axis.z, scale as f32], shaped(offset as f32), side]
         }
     }
 }

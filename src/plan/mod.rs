@@ -114,6 +114,8 @@ pub struct Rays {
 pub struct Paths {
     /// What emits lights the scene (knob `lights`); else it is only seen.
     pub emitting: bool,
+    /// Some light has a shape.
+    pub shaped: bool,
     /// All bounces in one dispatch: the same film, for comparison.
     pub at_once: bool,
 }
@@ -486,7 +488,7 @@ impl Planner<'_> {
 
     /// Light from surface to surface.
     fn paths(&mut self) -> Option<Paths> {
-        let Self { surfaces, decisions, knobs, paths, .. } = self;
+        let Self { scene, surfaces, decisions, knobs, paths, .. } = self;
         let cause = match surfaces.any(|m| !m.unlit) {
             true => Cause::of("light goes from surface to surface"),
             false => Cause::when(*paths, "the knob says so", "no surface in use sends light"),
@@ -501,7 +503,14 @@ impl Planner<'_> {
             false => Cause::against("no paths are followed"),
         };
         let emitting = decisions.decide_with("surfaces that light", "lights", knobs.rung("lights") != "points", cause);
-        paths.then_some(Paths { emitting, at_once: false })
+        let shaped = scene.lights.iter().find(|light| light.shines() && light.extent.is_some());
+        let cause = match (kept, shaped) {
+            (false, _) => Cause::against("no paths are followed"),
+            (_, None) => Cause::against("no light has a shape"),
+            (_, Some(light)) => Cause::of(format!("light \"{}\" has a shape", light.name)),
+        };
+        let shaped = decisions.decide_with("lights with a shape", "lights", knobs.rung("lights") != "points", cause);
+        paths.then_some(Paths { emitting, shaped, at_once: false })
     }
 
     /// Bands of wavelengths, and whether rays split by them.

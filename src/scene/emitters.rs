@@ -88,6 +88,7 @@ fn power(light: &Light, radius: f64) -> f64 {
     use std::f64::consts::PI;
     let towards = match light.kind {
         LightKind::Directional { .. } => PI * radius * radius,
+        LightKind::Spot { .. } if light.extent.is_some() => PI,
         LightKind::Spot { outer, .. } => 2.0 * PI * (1.0 - outer.cos()),
         LightKind::Point { .. } => 4.0 * PI,
     };

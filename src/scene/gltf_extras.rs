@@ -10,7 +10,7 @@ use serde_json::{Value, value::RawValue};
 
 use super::{
     Material, SigmaGrid,
-    light::Light,
+    light::{Extent, Light, LightKind},
     substance::{self, INFINITE_IOR, Medium, SUBSTANCES, Substance},
 };
 use crate::spectra::{self, Dispersion, Emission, Spectrum};
@@ -128,10 +128,15 @@ pub(crate) fn apply(extras: &json::Extras, file_ior: Option<f32>, m: &mut Materi
 }
 
 /// Puts what `extras.etalon` says into a light. Returns what is worth a warning.
-pub(crate) fn apply_to_light(extras: &json::Extras, light: &mut Light) -> Result<Vec<String>> {
+/// `across` is the direction of the first side of a rectangle.
+pub(crate) fn apply_to_light(extras: &json::Extras, light: &mut Light, across: DVec3) -> Result<Vec<String>> {
     let mut warnings = Vec::new();
     for (key, text) in &entries(extras)? {
-        if key == "spectrum" {
+        if ["sphere", "disk", "rectangle"].contains(&key.as_str()) {
+            ensure!(light.extent.is_none(), "extras.etalon: a light has one shape, sphere, disk or rectangle");
+            let extent = extent(key, text.get(), light, across).with_context(|| format!("extras.etalon {key}"))?;
+            light.extent = Some(extent);
+        } else if key == "spectrum" {
             let spectrum = light_spectrum(text.get(), &mut warnings).context("extras.etalon spectrum")?;
             let emission = Emission::new(spectrum, light.color);
             light.color = emission.rgb();
@@ -141,6 +146,25 @@ pub(crate) fn apply_to_light(extras: &json::Extras, light: &mut Light) -> Result
         }
     }
     Ok(warnings)
+}
+
+/// The shape of a light: radius of a ball or a disk, width and height of a rectangle, in metres of the world.
+fn extent(key: &str, text: &str, light: &Light, across: DVec3) -> Result<Extent> {
+    let lengths = match key {
+        "rectangle" => serde_json::from_str::<[f64; 2]>(text),
+        _ => serde_json::from_str::<f64>(text).map(|radius| [radius; 2]),
+    };
+    let [a, b] = lengths.map_err(|error| told(&error))?;
+    ensure!(a.is_finite() && b.is_finite() && a > 0.0 && b > 0.0, "{} is no length above 0", shortened(text));
+    match (key, light.kind) {
+        ("sphere", LightKind::Point { .. }) => Ok(Extent::Sphere { radius: a }),
+        ("disk", LightKind::Spot { .. }) => Ok(Extent::Disk { radius: a }),
+        ("rectangle", LightKind::Spot { .. }) => {
+            Ok(Extent::Rectangle { across: 0.5 * a * across, half_height: 0.5 * b })
+        }
+        ("sphere", _) => bail!("a ball is the shape of a point light, and this one is of another type"),
+        _ => bail!("a face is the shape of a spot light, and this one is of another type"),
+    }
 }
 
 /// The entries of `extras.etalon`; none where there is no such thing.

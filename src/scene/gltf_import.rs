@@ -654,8 +654,9 @@ fn lights(document: &Document<'_>, nodes: &Nodes, warnings: &mut Vec<String>) ->
         }
         let name = json.name.clone().or_else(|| root.nodes[node].name.clone());
         let name = name.unwrap_or_else(|| format!("light {index}"));
-        let mut light = Light { name, color, spectrum: None, kind, stand_in: false };
-        let found = gltf_extras::apply_to_light(&json.extras, &mut light).with_context(|| place.clone())?;
+        let mut light = Light { name, color, spectrum: None, extent: None, kind, stand_in: false };
+        let found = gltf_extras::apply_to_light(&json.extras, &mut light, world.matrix3.x_axis.normalize_or(DVec3::X))
+            .with_context(|| place.clone())?;
         warnings.extend(found.into_iter().map(|warning| format!("{place}: {warning}")));
         lights.push(light);
     }

@@ -15,6 +15,8 @@ pub struct Light {
     pub color: [f32; 3],
     /// Its light by wavelength, whose colour `color` is then; `None`: that of D65 behind a coloured glass.
     pub spectrum: Option<Emission>,
+    /// Its shape, where it has one (knob `lights`); its colour is then the intensity along its axis, or of the whole of a ball.
+    pub extent: Option<Extent>,
     /// What kind, with its geometry.
     pub kind: LightKind,
     /// Stands for a surface that emits, where such surfaces light nothing: where they do, it is dark. In study scenes; no file says it.
@@ -38,6 +40,28 @@ impl Light {
         // Distances on the device have roundings, of 1e-7 of the coordinates about the eye.
         range.is_none_or(|range| distance < range * (1.0 + 1e-3))
     }
+}
+
+/// Shape of a light that shines as evenly as paper: the same radiance from every place in every direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Extent {
+    /// A ball about a point light.
+    Sphere {
+        /// Metres.
+        radius: f64,
+    },
+    /// A round face about a spot light, which looks along its axis.
+    Disk {
+        /// Metres.
+        radius: f64,
+    },
+    /// A rectangular one.
+    Rectangle {
+        /// Half of its first side, metres.
+        across: DVec3,
+        /// Half the length of its second, which is at right angles to the first and to the axis.
+        half_height: f64,
+    },
 }
 
 /// Geometry of a light.

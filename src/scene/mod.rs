@@ -36,7 +36,7 @@ use anyhow::{Context, Result, bail};
 use glam::{DAffine3, DVec3};
 
 pub use camera::{Camera, Projection};
-pub use light::{Light, LightKind};
+pub use light::{Extent, Light, LightKind};
 pub use material::{AlphaMode, Material, Phong, Sampler, TextureRef, Wrap};
 pub use reads::{Ambience, Reads};
 pub use sigma::SigmaGrid;

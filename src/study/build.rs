@@ -73,7 +73,14 @@ impl Builder {
     }
 
     pub(super) fn light(&mut self, name: &str, color: [f32; 3], kind: LightKind) {
-        self.scene.lights.push(Light { name: name.to_owned(), color, spectrum: None, kind, stand_in: false });
+        self.scene.lights.push(Light {
+            name: name.to_owned(),
+            color,
+            spectrum: None,
+            extent: None,
+            kind,
+            stand_in: false,
+        });
     }
 
     /// A light with everything about it.
@@ -83,7 +90,14 @@ impl Builder {
 
     /// A light that stands for an emitting surface where such surfaces light nothing.
     pub(super) fn stand_in(&mut self, name: &str, color: [f32; 3], kind: LightKind) {
-        self.scene.lights.push(Light { name: name.to_owned(), color, spectrum: None, kind, stand_in: true });
+        self.scene.lights.push(Light {
+            name: name.to_owned(),
+            color,
+            spectrum: None,
+            extent: None,
+            kind,
+            stand_in: true,
+        });
     }
 
     /// A pinhole camera with a vertical field of view in degrees; the near distance is left to the renderer.

@@ -29,7 +29,8 @@ pub(super) fn scene() -> Scene {
             let measured =
                 b.material(Material { reflectance: Some(reflectance), ..matt(&format!("{name}, measured"), color) });
             let matched = b.material(matt(&format!("{name}, matched"), color));
-            [measured, matched].map(|material| b.mesh(&name, Shape::panel(0.04, 0.08), material))
+            [("measured", measured), ("matched", matched)]
+                .map(|(how, material)| b.mesh(&format!("{name}, {how}"), Shape::panel(0.04, 0.08), material))
         })
         .collect();
     for (booth, name) in LIGHTS.into_iter().enumerate() {
@@ -37,14 +38,14 @@ pub(super) fn scene() -> Scene {
         b.place(&format!("{name} back"), back, at(x, 0.0, -0.01, 0.0));
         for hand in [-1.0, 1.0] {
             // A wall on each side keeps the lights apart.
-            b.place(&format!("{name} side"), side, at(x + hand * 0.355, 0.0, 0.14, -90.0 * hand));
+            b.place(&format!("{name} side {hand}"), side, at(x + hand * 0.355, 0.0, 0.14, -90.0 * hand));
         }
         for (i, patch) in halves.iter().enumerate() {
             let (column, row) = (i % COLUMNS, i / COLUMNS);
             let y = (1.5 - row as f64) * PITCH;
             for (j, mesh) in patch.iter().enumerate() {
                 let x = x + (column as f64 - 2.5) * PITCH + (j as f64 - 0.5) * 0.04;
-                b.place(&format!("{name} patch {i}"), *mesh, at(x, y, 0.0, 0.0));
+                b.place(&format!("{name} patch {i}.{j}"), *mesh, at(x, y, 0.0, 0.0));
             }
         }
         let emission = illuminant(name).map(|spectrum| Emission { spectrum, luminance: 3.0 });
@@ -55,6 +56,7 @@ pub(super) fn scene() -> Scene {
             spectrum: emission,
             kind: LightKind::Spot { position, direction: DVec3::NEG_Z, range: None, inner: 0.44, outer: 0.47 },
             stand_in: false,
+            extent: None,
         });
     }
     b.camera("front", DVec3::new(0.0, 0.0, 8.0), DVec3::ZERO, 8.8);

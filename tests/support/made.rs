@@ -37,7 +37,14 @@ impl Made {
     }
 
     pub fn light(&mut self, color: [f32; 3], kind: LightKind) {
-        self.0.lights.push(Light { name: "made".to_owned(), color, spectrum: None, kind, stand_in: false });
+        self.0.lights.push(Light {
+            name: "made".to_owned(),
+            color,
+            spectrum: None,
+            extent: None,
+            kind,
+            stand_in: false,
+        });
     }
 
     /// From `eye` to `target`; the picture is `half_height` high either way where it is orthographic.
