@@ -71,6 +71,8 @@ const MOST_SAMPLES: u32 = 1 << 16;
 
 /// Parts of a band that the samples of a picture go through, where wavelengths go different ways.
 const MOST_PARTS: u32 = 64;
+/// And where the picture's error is to end them.
+const PARTS_BEFORE_AN_END: u32 = 8;
 
 /// How a picture is made; everything that does not change between the frames of a sequence.
 #[derive(Debug, Clone)]
@@ -438,7 +440,9 @@ impl Renderer {
             errors.extend(error);
             progress(Progress { done, of: count, error });
             let limit = self.settings.max_error.unwrap_or(0.0);
-            if error.is_some_and(|error| limit > 0.0 && error.relmse.sqrt() <= limit) {
+            // Before all parts of the bands were drawn, halves do not know what is missing.
+            let whole = done >= 2 * self.parts(count);
+            if error.is_some_and(|error| whole && limit > 0.0 && error.relmse.sqrt() <= limit) {
                 samples = done;
                 break;
             }
@@ -481,21 +485,27 @@ impl Renderer {
         self.rays.look_from(view, at, count, seed);
     }
 
+    /// What goes another way for each wavelength is drawn for parts of each band, one for each sample of a half: as many as there
+    /// are, up to a limit; where an error is the end, so few that it may be told early.
+    fn parts(&self, count: u32) -> u32 {
+        let halves = if self.halves.is_some() { 2 } else { 1 };
+        let limit = if self.settings.max_error.is_some() { PARTS_BEFORE_AN_END } else { MOST_PARTS };
+        let most = if self.plan.disperses { (count / halves).clamp(1, limit) } else { 1 };
+        1 << most.ilog2()
+    }
+
     /// The wavelengths of the next frame, where the picture is drawn by them.
     fn show_band(&mut self, band: u32, index: u32, count: u32) {
-        let Plan { bands, disperses, .. } = self.plan;
+        let bands = self.plan.bands;
         if bands == 0 {
             return;
         }
         let band = VISIBLE.part(band, bands);
-        // What goes another way for each wavelength is drawn for parts of the band, one for each sample of a half: as many as
-        // there are, in an order that spreads them.
+        let parts = self.parts(count);
         let halves = if self.halves.is_some() { 2 } else { 1 };
-        let most = if disperses { (count / halves).clamp(1, MOST_PARTS) } else { 1 };
-        let parts = 1 << most.ilog2();
         let at = (index / halves) % parts;
         let part = if parts > 1 { at.reverse_bits() >> (32 - parts.ilog2()) } else { 0 };
-        self.scene.show(Some(&Slice { band, part: band.part(part, parts) }));
+        self.scene.show(Some(&Slice::new(band, band.part(part, parts))));
     }
 
     /// One sample of every pixel, or one band of it: the frame, pass by pass.

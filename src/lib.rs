@@ -8,7 +8,7 @@
 //!  │
 //!  ├───► cost ──► frame        what effects cost, drawn in turns
 //!  │
-//!  ├───► study ─► scene        what to draw: data, no Vulkan
+//!  ├───► study ─► scene ─► spectra ─► optics    what to draw: data, no Vulkan
 //!  │                ▲
 //!  │                │
 //!  ▼                │

@@ -75,6 +75,8 @@ impl Material {
     pub const MIRRORS: u32 = 8;
     /// In a band of wavelengths, `base_color` is red, green and blue all the same.
     pub const BASE_RGB: u32 = 16;
+    /// In a band of wavelengths, what varies over its surface is red, green and blue, and `base_color` a number.
+    pub const VARIES_RGB: u32 = 64;
     /// In a band of wavelengths, `emissive` is red, green and blue all the same.
     pub const EMISSIVE_RGB: u32 = 32;
 }

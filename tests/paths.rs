@@ -113,6 +113,35 @@ fn lights_with_a_shape_light_as_their_form_factors_say() {
     }
 }
 
+/// However many places are looked for, the light is the same, and there is less noise; queues and one dispatch agree to the last bit.
+#[test]
+fn more_places_on_lights_are_the_same_light_with_less_noise() {
+    let gpu = Gpu::new();
+    let mut scene = etalon::study::load("cornell").expect("a scene");
+    scene.lights.clear();
+    let mut noise = Vec::new();
+    let mut means = Vec::new();
+    for places in ["area:1", "area:4", "area:16"] {
+        let rung = format!("lights={places}");
+        // One surface after the eye's: what N places tell apart is direct light.
+        let film = draw(&gpu, &scene, None, settings([32, 18], &["samples=16", "interfaces=1", &rung]));
+        let halves = |k: usize| film.rgba.iter().map(|p| f64::from(p[k])).collect::<Vec<_>>();
+        let green = halves(1);
+        means.push(green.iter().sum::<f64>() / green.len() as f64);
+        // Neighbours on the plain back wall and floor differ by noise and a smooth gradient.
+        let step = |i: usize| (green[i] - green[i + 1]).powi(2);
+        let rows = (3..15).flat_map(|y| (4..8).map(move |x| y * 32 + x));
+        noise.push(rows.map(step).sum::<f64>());
+        let mut at_once = settings([32, 18], &["samples=4", "interfaces=4", &rung]);
+        let queues = draw(&gpu, &scene, None, at_once.clone());
+        at_once.paths_at_once = true;
+        assert!(bits(&queues) == bits(&draw(&gpu, &scene, None, at_once)), "{places}");
+    }
+    eprintln!("{means:?} {noise:?}");
+    assert!(means.iter().all(|mean| (mean / means[2] - 1.0).abs() < 0.02), "{means:?}");
+    assert!(noise[2] < noise[0], "{noise:?}");
+}
+
 /// Half of a shape hidden by a wall gives half of its light.
 #[test]
 fn shapes_cast_soft_shadows() {

@@ -585,8 +585,9 @@ fn spectra_that_cannot_be_meant_are_told_by_name() {
         (json!({ "emission": "sun" }), "\"sun\" is no illuminant; these are: a, d65, e, f2, f11"),
         (json!({ "emission": { "blackbody": 20 } }), "a black body of 20 K"),
         (json!({ "emission": { "table": [[500, 1], [500, 2]] } }), "500 nm comes before 500 nm"),
-        (json!({ "emission": { "table": [[500, -1]] } }), "the value at 500 nm, -1, is negative"),
-        (json!({ "emission": { "table": [] } }), "no rows"),
+        (json!({ "emission": { "table": [[500, -1], [510, 1]] } }), "the value at 500 nm, -1, is negative"),
+        (json!({ "emission": { "table": [] } }), "0 rows"),
+        (json!({ "preset": "gold", "reflectance": { "table": [[400, 1], [500, 1]] } }), "one of them tells the base"),
         (json!({ "emission": { "table": [[100, 1], [200, 1]] } }), "no light between 380 and 780 nm"),
         (json!({ "reflectance": { "rows": [] } }), "unknown field"),
         (json!({ "sellmeier": { "b": [1], "c": [] } }), "1 B and 0 C"),
@@ -599,7 +600,7 @@ fn spectra_that_cannot_be_meant_are_told_by_name() {
     }
     for (etalon, said) in [
         (
-            json!({ "reflectance": { "table": [[500, 1.5]] } }),
+            json!({ "reflectance": { "table": [[500, 1.5], [510, 0.5]] } }),
             "a reflectance of 1.5 sends back more light than there is",
         ),
         (json!({ "reflectance": { "table": [[300, 0.5], [900, 0.5]] } }), "300 nm, which nobody sees"),
@@ -609,7 +610,7 @@ fn spectra_that_cannot_be_meant_are_told_by_name() {
         assert!(warnings.len() == 1 && warnings[0].contains(said), "{warnings:?}");
     }
     for (key, slot, value) in [
-        ("reflectance", "baseColorTexture", json!({ "table": [[500, 0.5]] })),
+        ("reflectance", "baseColorTexture", json!({ "table": [[500, 0.5], [510, 0.5]] })),
         ("emission", "emissiveTexture", json!("a")),
     ] {
         let mut b = with_etalon(json!({ key: value }), json!({}));

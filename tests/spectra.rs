@@ -157,7 +157,7 @@ fn lit_chart(light: &str, by_wavelength: bool) -> Scene {
         let place = at((i % 6) as f64 - 2.5, 1.5 - (i / 6) as f64, 0.0);
         made.add(Shape::panel(1.0, 1.0), Material { reflectance, ..lambert(color) }, place);
     }
-    let emission = Emission { spectrum: illuminant(light).expect("a light"), luminance: std::f64::consts::PI };
+    let emission = Emission::of_luminance(illuminant(light).expect("a light"), std::f64::consts::PI);
     made.0.lights.push(Light {
         name: light.to_owned(),
         color: emission.rgb(),
@@ -245,7 +245,7 @@ fn what_varies_is_upsampled_like_what_does_not() {
 /// A line of 2 nm.
 fn line(nm: f64) -> Emission {
     let spectrum = Spectrum::light_table(&[[nm - 1.0, 0.0], [nm, 1.0], [nm + 1.0, 0.0]]);
-    Emission { spectrum, luminance: 1.0 }
+    Emission::of_luminance(spectrum, 1.0)
 }
 
 /// n of dense flint SF10 by the catalogue's formula.
@@ -377,7 +377,7 @@ fn without_dispersion_there_are_no_fringes() {
         assert!((got - expected).abs() < 0.5, "{got}, not {expected}");
     }
     // White light, which is drawn in bands because daylight is told by wavelength here.
-    let white = Emission { spectrum: illuminant("d65").expect("daylight"), luminance: 6.0 };
+    let white = Emission::of_luminance(illuminant("d65").expect("daylight"), 6.0);
     let film =
         gpu.film(&prism(Some(white), Some(Dispersion::None)), recursive(&["samples=4", "colour=spectral:16"], PRISM));
     let most = film.rgba.iter().map(|p| p[1]).fold(0.0, f32::max);
@@ -524,4 +524,103 @@ fn paths_disperse_as_the_tree_of_rays_does() {
         eprintln!("channel {k}: {a} {b}");
         assert!((a - b).abs() < 0.03 * a, "channel {k}: {a} by rays, {b} by paths");
     }
+}
+
+/// A board behind panes, under a sun and a lamp: `told` says how its colours are told.
+fn board(told: impl Fn(&mut Made, Shape, Material, [f32; 3], f64)) -> Scene {
+    let mut made = Made::new("told");
+    told(&mut made, Shape::panel(1.0, 2.0), lambert([1.0; 3]), [0.8, 0.3, 0.1], -1.5);
+    let gold = Material { metallic: 1.0, roughness: 0.4, ..lambert([0.9, 0.7, 0.3]) };
+    told(&mut made, Shape::panel(1.0, 2.0), gold, [1.0; 3], -0.5);
+    let shiny = Material { specular: 1.0, specular_color: [12.0; 3], roughness: 0.3, ..lambert([0.2; 3]) };
+    told(&mut made, Shape::panel(1.0, 2.0), shiny, [0.5; 3], 0.5);
+    made.add(Shape::panel(1.0, 2.0), lambert([0.7; 3]), at(1.5, 0.0, 0.0));
+    // Above the last one, out of sight, a pane of coloured glass that the sun shines through.
+    let pane = Material { transmission: 1.0, roughness: 0.0, specular: 1.0, ..lambert([1.0; 3]) };
+    told(&mut made, Shape::panel(1.0, 2.0), pane, [0.2, 0.7, 0.4], 10.5);
+    let direction = DVec3::new(-0.9, 0.0, -0.9).normalize();
+    made.0.instances.last_mut().expect("the pane").world_from_object.translation.z = 9.0;
+    made.light([3.0, 2.8, 2.5], LightKind::Directional { direction });
+    made.front(1.0);
+    made.0.cameras[0].projection = made::orthographic(1.0);
+    made.0
+}
+
+/// Vertex colours, texels and factors say the same: what lets light through, what mirrors, what is brighter than white.
+#[test]
+fn colours_are_the_same_however_they_are_told() {
+    let gpu = Gpu::new();
+    let times = |m: &Material, rgb: [f32; 3]| {
+        let [r, g, b, a] = m.base_color;
+        [r * rgb[0], g * rgb[1], b * rgb[2], a]
+    };
+    let factors = board(|made, shape, m, rgb, x| {
+        made.add(shape, Material { base_color: times(&m, rgb), ..m }, at(x, 0.0, 0.0));
+    });
+    let vertices = board(|made, shape, m, rgb, x| {
+        let mesh = made.mesh(shape, m);
+        let corners = made.0.meshes[mesh].positions.len();
+        made.0.meshes[mesh].colors = vec![[rgb[0], rgb[1], rgb[2], 1.0]; corners];
+        made.place(mesh, at(x, 0.0, 0.0));
+    });
+    let texels = board(|made, shape, m, rgb, x| {
+        let byte = |c: f32| (etalon::image::tone::srgb_encode(f64::from(c)) * 255.0).round() as u8;
+        made.0.images.push(etalon::scene::Image {
+            name: "texel".to_owned(),
+            width: 1,
+            height: 1,
+            rgba: vec![byte(rgb[0]), byte(rgb[1]), byte(rgb[2]), 255],
+        });
+        let image = made.0.images.len() - 1;
+        let sampler = etalon::scene::Sampler::default();
+        let texture = TextureRef { image, uv_set: 0, uv_transform: glam::Affine2::IDENTITY, sampler };
+        made.add(shape, Material { base_color_texture: Some(texture), ..m }, at(x, 0.0, 0.0));
+    });
+    for model in [Model::Local, Model::Recursive, Model::Global] {
+        let draw = |scene: &Scene, rung: &str| {
+            let mut knobs = Knobs::of(model);
+            knobs.set_all(&["samples=1".to_owned(), rung.to_owned()]).expect("rungs");
+            gpu.film(scene, Settings { size: [8, 4], knobs, ..Settings::default() })
+        };
+        let expected = draw(&factors, "colour=spectral:16");
+        for (how, scene) in [("vertices", &vertices), ("texels", &texels)] {
+            let got = draw(scene, "colour=spectral:16");
+            // Half a unit of eight bits of a texel, and the grid.
+            let error = gpu::largest_difference(&got, &expected, 1.0);
+            eprintln!("{model:?} {how}: {error}");
+            assert!(error < 6e-3, "{model:?}, {how}: {error}");
+        }
+        // The colours are those of a picture in three colours, about: under white light, one reflection.
+        let rgb = draw(&factors, "colour=rgb");
+        let error = gpu::largest_difference(&rgb, &expected, 1.0);
+        eprintln!("{model:?} rgb: {error}");
+        assert!(error < 0.12, "{model:?}, rgb: {error}");
+    }
+}
+
+/// Holes of a masked surface let light through in shadow maps, which are drawn before any band is.
+#[test]
+fn holes_cast_no_shadow_in_bands() {
+    let gpu = Gpu::new();
+    let mut made = Made::new("holes");
+    made.add(Shape::panel(4.0, 4.0), lambert([0.8, 0.5, 0.2]), at(0.0, 0.0, 0.0));
+    let mut hole = lambert([0.2, 0.8, 0.3]);
+    hole.alpha_mode = etalon::scene::AlphaMode::Mask(0.5);
+    hole.base_color[3] = 0.4;
+    let mesh = made.mesh(Shape::panel(4.0, 4.0), hole);
+    // Half of it is no hole: alpha varies, so that it is not said more simply.
+    let corners = made.0.meshes[mesh].positions.len();
+    made.0.meshes[mesh].colors = (0..corners).map(|i| [1.0, 1.0, 1.0, if i == 0 { 1.3 } else { 1.0 }]).collect();
+    made.place(mesh, at(0.0, 0.0, 12.0));
+    made.light([3.0; 3], LightKind::Directional { direction: DVec3::NEG_Z });
+    made.front(1.0);
+    let draw = |rung: &str| {
+        let mut knobs = Knobs::of(Model::Local);
+        knobs.set_all(&["samples=1".to_owned(), rung.to_owned()]).expect("rungs");
+        gpu.film(&made.0, Settings { size: [8, 8], knobs, ..Settings::default() })
+    };
+    let (rgb, bands) = (draw("colour=rgb"), draw("colour=spectral:8"));
+    let lit = |film: &Picture| film.rgba.iter().map(|p| p[0] > 0.1).collect::<Vec<_>>();
+    assert!(lit(&rgb).contains(&true));
+    assert_eq!(lit(&rgb), lit(&bands));
 }

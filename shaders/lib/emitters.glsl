@@ -8,8 +8,8 @@
 
 layout(constant_id = 60) const uint EMITTERS = 0;
 layout(constant_id = 61) const uint EMITTER_STEPS = 0;           // halvings that single one of them out
-layout(constant_id = 67) const bool PUNCTUAL_EMITTERS = false;   // some of them are lights without extent
-layout(constant_id = 74) const bool SHAPED_EMITTERS = false;     // some of those have a shape after all
+layout(constant_id = 67) const bool PUNCTUAL_EMITTERS = false;   // some of them are lights of the table
+layout(constant_id = 74) const bool SHAPED_EMITTERS = false;     // some of those have a shape
 layout(constant_id = 62) const bool EMITTING_TRIANGLES = false;  // some of them are triangles
 layout(constant_id = 63) const bool EMITTING_SKY = false;        // one is the environment
 layout(constant_id = 64) const uint SKY_COLUMNS = 0;             // cells of its table

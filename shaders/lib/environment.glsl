@@ -12,7 +12,7 @@ vec3 into_environment(vec3 d) {
 }
 
 // Light of the environment, from its map or what was made of it.
-vec3 environment_light(vec3 rgb) {
+vec3 light_of_environment(vec3 rgb) {
     return light_of_rgb(rgb * environment.intensity);
 }
 #endif

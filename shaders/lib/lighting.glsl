@@ -89,7 +89,7 @@ float prefiltered_level(float alpha) {
 
 vec3 prefiltered_radiance(vec3 direction, float alpha) {
     vec2 at = equirectangular_from_direction(into_environment(direction));
-    return environment_light(textureLod(prefiltered, at, prefiltered_level(alpha)).rgb);
+    return light_of_environment(textureLod(prefiltered, at, prefiltered_level(alpha)).rgb);
 }
 
 // Irradiance from nine spherical-harmonic coefficients.
@@ -100,7 +100,7 @@ vec3 environment_irradiance(vec3 n) {
     e += (environment.irradiance[4] * (d.x * d.y) + environment.irradiance[5] * (d.y * d.z) + environment.irradiance[7] * (d.x * d.z)) * 1.092548;
     e += environment.irradiance[6] * (0.315392 * (3.0 * d.z * d.z - 1.0));
     e += environment.irradiance[8] * (0.546274 * (d.x * d.x - d.y * d.y));
-    return environment_light(max(e, 0.0));
+    return light_of_environment(max(e, 0.0));
 }
 
 // Directional reflectance of the lobe: what the base sends to the eye of the light in the mirror direction (split sum,

@@ -12,6 +12,7 @@ layout(constant_id = 52) const bool SKY = false;         // the environment is s
 layout(constant_id = 57) const bool ENVIRONMENT = false; // there is one
 layout(constant_id = 54) const uint LOOP_BUDGET = 40000;
 layout(constant_id = 68) const bool LIGHTING_SURFACES = false; // what emits lights the scene, and is not only seen
+layout(constant_id = 75) const uint LIGHT_PLACES = 1; // places on lights that are looked for at each surface
 layout(set = 0, binding = 25) uniform sampler2D sky;
 
 // From this surface on a path goes on with a probability that falls with its throughput.
@@ -115,8 +116,30 @@ vec3 light_that_arrives(LightTask task) {
     return result;
 }
 
+// A light to be looked for from a surface, drawn from as many places as are looked for: what of it would go along the path.
+LightTask task_of(Path p, Met met, bool spreads, vec3 front_origin, LightSample light, Scattered towards) {
+    LightTask task;
+    float w = light.pdf > 0.0 ? mis_weight(light.pdf * float(LIGHT_PLACES), towards.pdf) : 1.0;
+    vec3 contribution = p.throughput * towards.f_cos * light.arriving * (w / float(LIGHT_PLACES));
+    bool wanted = spreads && largest(contribution) > 0.0;
+    bool behind = dot(met.hit.n, light.to_light) < 0.0;
+    task.origin = behind ? ray_origin(met.hit.s.p_bvh, -met.hit.n, vec3(0.0)) : front_origin;
+    // Both ends are as they were drawn, wherever the ray starts.
+    task.to_light = light.t_max == 1.0 ? light.to_light + (front_origin - task.origin) : light.to_light;
+    task.t_max = wanted ? light.t_max : -1.0;
+    task.self = met.hit.s.face;
+    task.media = behind && met.boundary.solid ? met.boundary.beyond : p.media;
+    task.contribution = wanted ? contribution : vec3(0.0);
+    return task;
+}
+
+// What the environment shows in a direction.
+vec3 sky_towards(vec3 direction) {
+    return light_of_environment(textureLod(sky, equirectangular_from_direction(into_environment(direction)), 0.0).rgb);
+}
+
 // What a path meets: light that this sends along it, and the path as it goes on.
-vec3 meet(inout Path p, Hit found, uvec2 pixel, out LightTask task) {
+vec3 meet(inout Path p, Hit found, uvec2 pixel, bool there, out LightTask task) {
     task = LightTask(p.origin, vec3(0.0, 1.0, 0.0), -1.0, p.self, p.media, vec3(0.0));
     vec3 gathered = vec3(0.0);
     bool at_surface = found.triangle != NO_TRIANGLE;
@@ -139,12 +162,12 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, out LightTask task) {
     LightSample light = LightSample(p.direction, -1.0, vec3(0.0), 0.0);
     bool spreads = at_surface && !passed_by && !hit.s.unlit && (!b.sharp || b.shares.z > 0.0 || (CLEARCOAT && !b.coat_sharp));
     vec3 front_origin = ray_origin(hit.s.p_bvh, hit.n, hit.s.v);
-    if (EMITTERS > 0) light = sample_light(front_origin, draw_words(pixel, met_before, DRAW_LIGHT));
+    if (EMITTERS > 0) light = sample_light(front_origin, draw_words_of(pixel, met_before, DRAW_LIGHT, 0, LIGHT_PLACES));
     if (ENVIRONMENT) {
         vec3 towards = at_surface ? light.to_light : p.direction;
-        vec3 seen = environment_light(textureLod(sky, equirectangular_from_direction(into_environment(towards)), 0.0).rgb);
+        vec3 seen = sky_towards(towards);
         bool clear = (p.state & PATH_CLEAR) != 0 && !SKY;
-        float w = p.pdf > 0.0 ? mis_weight(p.pdf, sky_pdf(p.direction)) : 1.0;
+        float w = p.pdf > 0.0 ? mis_weight(p.pdf, float(LIGHT_PLACES) * sky_pdf(p.direction)) : 1.0;
         if (!at_surface && !clear) gathered = p.throughput * seen * w;
         if (EMITTING_SKY && light.pdf > 0.0 && light.t_max == LARGEST) {
             // Straight ahead there is the background, whatever lights the scene.
@@ -167,7 +190,7 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, out LightTask task) {
             float r = p.travelled + found.t;
             float cos_light = max(abs(dot(hit.n, p.direction)), 1e-9);
             float drawn = picked_per_area(place) * (r * r) / cos_light;
-            w = p.pdf > 0.0 && drawn > 0.0 ? mis_weight(p.pdf, drawn) : 1.0;
+            w = p.pdf > 0.0 && drawn > 0.0 ? mis_weight(p.pdf, float(LIGHT_PLACES) * drawn) : 1.0;
         }
         gathered = shows ? p.throughput * emits * w : vec3(0.0);
         ends = ends || hit.s.unlit;
@@ -193,17 +216,23 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, out LightTask task) {
         on_path = now;
     }
     if (EMITTERS > 0) {
-        float w = light.pdf > 0.0 ? mis_weight(light.pdf, towards_light.pdf) : 1.0;
-        vec3 contribution = p.throughput * towards_light.f_cos * light.arriving * w;
-        bool wanted = spreads && largest(contribution) > 0.0;
-        bool behind = dot(hit.n, light.to_light) < 0.0;
-        task.origin = behind ? ray_origin(hit.s.p_bvh, -hit.n, vec3(0.0)) : front_origin;
-        // Both ends are as they were drawn, wherever the ray starts.
-        task.to_light = light.t_max == 1.0 ? light.to_light + (front_origin - task.origin) : light.to_light;
-        task.t_max = wanted ? light.t_max : -1.0;
-        task.self = hit.s.face;
-        task.media = behind && met.boundary.solid ? met.boundary.beyond : p.media;
-        task.contribution = wanted ? contribution : vec3(0.0);
+        task = task_of(p, met, spreads, front_origin, light, towards_light);
+    }
+    if (LIGHT_PLACES > 1) {
+        // The others are looked for here, one after the other.
+        for (uint i = 1; i < LIGHT_PLACES; i++) {
+            loop_heads++;
+            LightSample other = sample_light(front_origin, draw_words_of(pixel, met_before, DRAW_LIGHT, i, LIGHT_PLACES));
+            if (EMITTING_SKY && other.pdf > 0.0 && other.t_max == LARGEST) {
+                bool hidden = (p.state & PATH_CLEAR) != 0 && !SKY && dot(hit.n, other.to_light) < 0.0;
+                other.arriving *= hidden ? vec3(0.0) : sky_towards(other.to_light);
+            }
+            LightTask one = task_of(p, met, spreads, front_origin, other, scattered(b, normalize(other.to_light)));
+            one.t_max = there ? one.t_max : -1.0;
+            shadow_rays += one.t_max > 0.0 ? 1u : 0u;
+            vec3 arrives = light_that_arrives(one);
+            if (one.t_max > 0.0) gathered += only_finite(one.contribution, pixel, hit.material, met_before) * arrives;
+        }
     }
     vec3 weight = drawn.sharp ? drawn.weight : on_path.pdf > 0.0 ? on_path.f_cos / on_path.pdf : vec3(0.0);
     bool on_right_side = drawn.through == (dot(drawn.direction, hit.n) < 0.0);
@@ -256,13 +285,15 @@ void bounce(inout Path a, inout Path b, uvec2 pixel_a, uvec2 pixel_b) {
         Path p = a;
         Hit hit = found.a;
         uvec2 pixel = pixel_a;
+        bool there = there_a;
         if (i == 1) {
             p = b;
             hit = found.b;
             pixel = pixel_b;
+            there = there_b;
         }
         LightTask task;
-        vec3 now = meet(p, hit, pixel, task);
+        vec3 now = meet(p, hit, pixel, there, task);
         if (i == 0) {
             if (there_a) a = p;
             of_a = task;

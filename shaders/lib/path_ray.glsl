@@ -34,6 +34,11 @@ uvec2 draw_words(uvec2 pixel, uint surface, uint draw) {
     return random_words(pixel, surface * DRAWS + draw, trace_terms.seed, trace_terms.sample_index);
 }
 
+// Of several points of one draw the one numbered `i` of `count`: neighbours in the sequence, which fill the square evenly together.
+uvec2 draw_words_of(uvec2 pixel, uint surface, uint draw, uint i, uint count) {
+    return random_words(pixel, surface * DRAWS + draw, trace_terms.seed, trace_terms.sample_index * count + i);
+}
+
 // What the film gets of a path that is through. Where nothing lay behind what it went through, `travelled` is what that has left
 // of the background: for one path this may be more than 1, in the mean it is a share.
 vec4 radiance_of(Path p) {

@@ -1,4 +1,4 @@
-// Lights without extent, out of their table.
+// Lights out of their table: points, and shapes about them.
 #ifndef PUNCTUAL_GLSL
 #define PUNCTUAL_GLSL
 #include "lib/light.glsl"
@@ -47,17 +47,23 @@ PunctualLight shaped_light_at(uint index, vec3 p_rel, vec2 x) {
     if (kind == SHAPE_SPHERE) {
         // A direction of the cone in which the ball is seen, each as likely as any other (PBRT 4, section 6.2.4).
         float d2 = dot(middle, middle);
+        if (d2 <= shape.z * shape.z) {
+            // From inside nothing is seen of it.
+            r.arriving = vec3(0.0);
+            return r;
+        }
         float sin2_most = shape.z * shape.z / d2;
         float lost = sin2_most / (1.0 + sqrt(max(1.0 - sin2_most, 0.0))); // 1 − cosθ
         float cos_theta = 1.0 - x.x * lost;
         float sin2 = max(x.x * lost * (2.0 - x.x * lost), 0.0);
         OrthonormalBasis b = orthonormal_basis(r.l);
         vec3 l = r.l * cos_theta + (b.t * cos(around) + b.b * sin(around)) * sqrt(sin2);
-        float reach = sqrt(d2) * cos_theta - sqrt(max(shape.z * shape.z - d2 * sin2, 0.0));
+        // On the ball itself all of this cancels.
+        float reach = max(sqrt(d2) * cos_theta - sqrt(max(shape.z * shape.z - d2 * sin2, 0.0)), 1e-6 * sqrt(d2));
         r.to_light = l * reach;
         r.l = l;
-        // Ω L = 2π(1 − cosθ) I/(πr²). From inside nothing is seen of it.
-        r.arriving = d2 > shape.z * shape.z ? color.rgb * (window * 2.0 * lost / (shape.z * shape.z)) : vec3(0.0);
+        // Ω L = 2π(1 − cosθ) I/(πr²).
+        r.arriving = color.rgb * (window * 2.0 * lost / (shape.z * shape.z));
         return r;
     }
     vec3 across = imageLoad(lights, int(index) * LIGHT_TEXELS + 4).xyz;

@@ -35,10 +35,11 @@ float straight_reflectance(float cos_v, float n1, float n2) {
 // What one surface lets through of light along `direction`, with the media before and after it.
 vec3 filtered(HitPoint point, vec3 direction, inout uvec4 media) {
     Material m = material_at(point.material);
-    vec4 base = vec4(m.base_color.rgb, 1.0) * hit_texture_or(point.material, SLOT_BASE, point.uvs, 0.0, vec4(1.0)) * point.color;
+    vec4 varies = hit_texture_or(point.material, SLOT_BASE, point.uvs, 0.0, vec4(1.0)) * point.color;
+    vec3 base = base_from_texel(m, varies.rgb);
     float transmits = m.transmission * hit_texture_or(point.material, SLOT_TRANSMISSION, point.uvs, 0.0, vec4(1.0)).r;
     transmits *= 1.0 - m.metallic * hit_texture_or(point.material, SLOT_METALLIC_ROUGHNESS, point.uvs, 0.0, vec4(1.0)).b;
-    float coverage = coverage_of(m, base.a);
+    float coverage = coverage_of(m, varies.a);
     float cos_v = abs(dot(point.n_smooth, direction));
     uvec4 after = media;
     float n1 = 1.0;
@@ -55,7 +56,7 @@ vec3 filtered(HitPoint point, vec3 direction, inout uvec4 media) {
     }
     media = after;
     // A solid is entered and left: each takes the root of its colour.
-    vec3 tint = point.sheet ? base.rgb : sqrt(base.rgb);
+    vec3 tint = point.sheet ? base : sqrt(base);
     if (point.sheet && ABSORPTION != 0) {
         float thickness = hit_texture_or(point.material, SLOT_THICKNESS, point.uvs, 0.0, vec4(1.0)).g;
         tint *= exp(-m.sigma_thickness * (thickness * point.scale));

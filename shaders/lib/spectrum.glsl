@@ -1,5 +1,6 @@
 // One band of wavelengths (lecture C3): what reflects, transmits or bends is a number there, the same in all three components,
-// and light is the X, Y, Z of what it sends in the band. Nothing below this file knows which of the two a picture is made of.
+// and light is the X, Y, Z of what it sends in the band. Beside this file only what reads a colour of a material asks
+// which of the two a picture is made of.
 #ifndef SPECTRUM_GLSL
 #define SPECTRUM_GLSL
 

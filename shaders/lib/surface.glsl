@@ -56,6 +56,21 @@ vec3 normal_reflectance(vec3 n, vec3 kappa) {
     return ((n - 1.0) * (n - 1.0) + k2) / ((n + 1.0) * (n + 1.0) + k2);
 }
 
+// Base colour, where texels and vertices say `varies`; in a band of wavelengths a number, and light of what is unlit.
+vec3 base_from_texel(Material m, vec3 varies) {
+    vec3 base = varies * m.base_color.rgb;
+    if (SPECTRAL) {
+        if ((m.flags & MATERIAL_UNLIT) != 0) {
+            base = light_of_rgb(base);
+        } else if ((m.flags & (MATERIAL_BASE_RGB | MATERIAL_VARIES_RGB)) != 0) {
+            bool number = (m.flags & MATERIAL_VARIES_RGB) != 0;
+            vec3 found = reflectance_of_rgb(number ? varies : base);
+            base = number ? found * m.base_color.rgb : found;
+        }
+    }
+    return base;
+}
+
 Surface surface_from_texels(Material m, vec3 base, float metallic, float roughness, float occlusion, vec3 emissive,
                             vec3 layers, vec3 n, vec3 n_coat, vec3 v, vec3 p_rel) {
     Surface s;
@@ -64,14 +79,7 @@ Surface surface_from_texels(Material m, vec3 base, float metallic, float roughne
     s.n = n;
     s.n_coat = n_coat;
     s.unlit = (m.flags & MATERIAL_UNLIT) != 0;
-    s.base = base * m.base_color.rgb;
-    if (SPECTRAL) {
-        if (s.unlit) {
-            s.base = light_of_rgb(s.base);
-        } else if ((m.flags & MATERIAL_BASE_RGB) != 0) {
-            s.base = reflectance_of_rgb(s.base);
-        }
-    }
+    s.base = base_from_texel(m, base);
     float metal = metallic * m.metallic;
     s.diffuse = s.base * (1.0 - metal);
     s.metallic = metal;

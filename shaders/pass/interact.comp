@@ -91,7 +91,7 @@ void see_environment() {
     do {
         loop_heads++;
         vec2 at = equirectangular_from_direction(into_environment(looks_at[0]));
-        vec3 seen = ENVIRONMENT ? environment_light(textureLod(sky, at, 0.0).rgb) : vec3(0.0);
+        vec3 seen = ENVIRONMENT ? light_of_environment(textureLod(sky, at, 0.0).rgb) : vec3(0.0);
         sum += looks > 0 ? looks_with[0] * seen : vec3(0.0);
         for (int i = 0; i < MOST_LOOKS - 1; i++) {
             looks_at[i] = looks_at[i + 1];

@@ -42,6 +42,7 @@ const uint MATERIAL_CONDUCTOR = 4; // n_metal and kappa_metal tell its reflectan
 const uint MATERIAL_MIRRORS = 8;   // reflects anything at all at its surface
 // In a band of wavelengths, where colours are numbers (lib/spectrum.glsl), these are still red, green and blue:
 const uint MATERIAL_BASE_RGB = 16;     // base_color, times what varies over the surface
+const uint MATERIAL_VARIES_RGB = 64;   // or that alone: base_color is a number
 const uint MATERIAL_EMISSIVE_RGB = 32; // emissive
 
 // The G-buffer's second id: instance, which side of it, and occlusion in the leading byte.

@@ -231,6 +231,7 @@ fn constants(lighting: Lighting, with: Rays, paths: Paths) -> Vec<(u32, u32)> {
         loop_budget: lighting.loop_budget(),
         directional_lights: plan.directional_lights,
         lighting_surfaces: paths.emitting,
+        light_places: knobs.light_places(),
         emitters: emitters.count,
         emitter_steps: halvings(emitters.count),
         punctual_emitters: emitters.punctual,

@@ -197,6 +197,8 @@ impl SceneOnDevice {
         }
         let grids = SigmaGrids::new(device, plan, &scene, anchor)?;
         let first_triangles = scene.first_triangles();
+        let spectral = plan.bands > 0;
+        let wavelengths = spectral.then(|| Wavelengths::new(&scene, upsampling(knobs)));
         scene.meshes = Vec::new();
         let indices = upload(device, "indices", &all_indices, None)?;
         drop(all_indices);
@@ -210,8 +212,6 @@ impl SceneOnDevice {
         let mut texels = Texels::default();
         let textures = Textures::new(device, &mut scene, &wanted, plan.rays.is_some().then_some(&mut texels))?;
 
-        let spectral = plan.bands > 0;
-        let wavelengths = spectral.then(|| Wavelengths::new(&scene, upsampling(knobs)));
         let fitted =
             wavelengths.as_ref().is_some_and(|known| known.vary) && upsampling(knobs) == Upsampling::JakobHanika;
         let table: Vec<_> = scene
@@ -246,8 +246,10 @@ impl SceneOnDevice {
             materials: match spectral {
                 // Written anew for each slice.
                 true => {
-                    let bytes = size_of_val(table.as_slice()) as u64;
-                    Buffer::texels(device, "materials", bytes, Place::Upload, vk::Format::R32G32B32A32_UINT)?
+                    let (bytes, format) = (size_of_val(table.as_slice()) as u64, vk::Format::R32G32B32A32_UINT);
+                    let mut buffer = Buffer::texels(device, "materials", bytes, Place::Upload, format)?;
+                    buffer.write(bytemuck::cast_slice(&table));
+                    buffer
                 }
                 false => upload(device, "materials", &table, Some(vk::Format::R32G32B32A32_UINT))?,
             },
@@ -314,9 +316,10 @@ impl SceneOnDevice {
         let shared = |(i, m): (usize, &Material)| {
             let place = self.grids.places[i];
             let Some(slice) = slice else { return shared_material(m, i, &self.knobs, place, None) };
-            let Banded { material, base_rgb, emissive_rgb } = wavelengths.material(i, m, slice);
+            let Banded { material, base_rgb, varies_rgb, emissive_rgb } = wavelengths.material(i, m, slice);
             let mut shared = shared_material(&material, i, &self.knobs, place, Some(spectra::shares(&slice.band)));
             shared.flags |= if base_rgb { share::Material::BASE_RGB } else { 0 };
+            shared.flags |= if varies_rgb { share::Material::VARIES_RGB } else { 0 };
             shared.flags |= if emissive_rgb { share::Material::EMISSIVE_RGB } else { 0 };
             shared
         };

@@ -7,7 +7,7 @@ use ash::vk;
 
 use crate::gpu::{Buffer, Device, NOTHING, Place};
 use crate::scene::wavelengths::Slice;
-use crate::spectra::{Band, Grid, RGB_FROM_XYZ, light_from_rgb, shares};
+use crate::spectra::{Band, Grid, RGB_FROM_XYZ, shares};
 
 /// Texels before the grid.
 const HEADER: usize = 4;
@@ -52,9 +52,9 @@ impl SpectrumOnDevice {
 
     /// Writes what colours are in a slice.
     pub fn show(&mut self, slice: &Slice) {
-        let (band, weight) = (&slice.band, slice.weight());
+        let band = &slice.band;
         let column = |v: [f64; 3]| [v[0] as f32, v[1] as f32, v[2] as f32, 0.0];
-        let [red, green, blue] = light_from_rgb(&slice.part).map(|light| column(light.map(|x| x * weight)));
+        let [red, green, blue] = slice.light_from_rgb.map(column);
         self.texels.write_at(0, bytemuck::cast_slice(&[red, green, blue, column(shares(band))]));
         let Some(grid) = self.grid else { return };
         if !self.known.iter().any(|(known, _)| known == band) {

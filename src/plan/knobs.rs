@@ -91,8 +91,8 @@ pub static KNOBS: &[Knob] = &[
     },
     Knob {
         name: "lights",
-        rungs: &["points", "area:1"],
-        unbuilt: &["area"],
+        rungs: &["points", "area:1", "area:4", "area:16"],
+        unbuilt: &[],
         presets: ["points", "points", "area:1"],
         about: "extent of lights (R2): with area:N surfaces that emit light others, by N places on them at each surface of a path",
     },
@@ -272,6 +272,12 @@ impl Knobs {
         self.rung("lobes").parse().expect("a number")
     }
 
+    /// Places on lights that are looked for at each surface of a path.
+    #[must_use]
+    pub fn light_places(&self) -> u32 {
+        self.rung("lights").strip_prefix("area:").and_then(|n| n.parse().ok()).unwrap_or(1)
+    }
+
     /// Steps of each segment through a medium that varies; 0: none is marched.
     #[must_use]
     pub fn march_steps(&self) -> u32 {
@@ -369,7 +375,8 @@ mod tests {
     fn wrong_choices_say_what_there_is() {
         let mut knobs = Knobs::default();
         for (choice, said) in [
-            ("lights=area:4", "not built yet"),
+            ("normals=f32", "not built yet"),
+            ("lights=area:5", "it has points, area:1, area:4, area:16"),
             ("absorption=march:7", "it has off, thickness, path, march:4, march:8, march:16, march:32, march:64"),
             ("absorption=march", "no rung"),
             ("quadrature=right", "it has left, midpoint, simpson"),

@@ -532,6 +532,7 @@ impl Planner<'_> {
         });
         let cause = match (cause.called_for, light, surroundings.environment && !surroundings.grey) {
             (true, ..) => cause,
+            _ if surfaces.with_colours().is_some() => Cause::of("vertices are coloured"),
             (_, Some(light), _) => Cause::of(format!("light \"{}\" is coloured", light.name)),
             (.., true) => Cause::of("the environment is coloured"),
             _ => Cause::against("everything is grey: all wavelengths make the same picture"),

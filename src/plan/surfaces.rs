@@ -84,6 +84,8 @@ struct Used<'a> {
     /// Of its instances those that enclose a medium, and all.
     closed: usize,
     instances: usize,
+    /// Some mesh has colours.
+    coloured: bool,
 }
 
 impl<'a> Surfaces<'a> {
@@ -92,13 +94,14 @@ impl<'a> Surfaces<'a> {
             .materials
             .iter()
             .enumerate()
-            .map(|(index, material)| Used { index, material, closed: 0, instances: 0 })
+            .map(|(index, material)| Used { index, material, closed: 0, instances: 0, coloured: false })
             .collect();
         for (i, instance) in scene.instances.iter().enumerate() {
             let mesh = &scene.meshes[instance.mesh];
             if !mesh.indices.is_empty() {
                 let of = &mut used[mesh.material];
                 of.instances += 1;
+                of.coloured |= mesh.colors.iter().any(|[r, g, b, _]| r != g || g != b);
                 of.closed += usize::from(facts.solids.solid[i]);
             }
         }
@@ -108,6 +111,11 @@ impl<'a> Surfaces<'a> {
 
     pub(super) fn any(&self, test: impl Fn(&Material) -> bool) -> bool {
         self.used.iter().any(|used| test(used.material))
+    }
+
+    /// The first material in use on a mesh whose vertices are coloured.
+    pub(super) fn with_colours(&self) -> Option<&'a Material> {
+        self.used.iter().find(|used| used.coloured).map(|used| used.material)
     }
 
     pub(super) fn find(&self, test: impl Fn(&Material) -> bool) -> Option<&'a Material> {

@@ -109,6 +109,13 @@ pub(crate) fn apply(extras: &json::Extras, file_ior: Option<f32>, m: &mut Materi
             m.base_color_texture.is_none(),
             "extras.etalon reflectance tells the base by wavelength, and so does a base colour texture: one of them must go"
         );
+        ensure!(
+            m.conductor.is_none(),
+            "extras.etalon reflectance beside a metal's n and kappa: one of them tells the base"
+        );
+        if m.unlit {
+            warnings.push("extras.etalon reflectance: an unlit material is shown as its colour".to_owned());
+        }
         let [r, g, b] = reflectance.reflectance_rgb().map(|x| x.clamp(0.0, 1.0) as f32);
         m.base_color = [r, g, b, m.base_color[3]];
     }
@@ -239,7 +246,7 @@ fn reflectance(text: &str, warnings: &mut Vec<String>) -> Result<Spectrum> {
 
 /// Wavelengths ascend, values are finite and never negative.
 fn check_table(rows: &[[f64; 2]], warnings: &mut Vec<String>) -> Result<()> {
-    ensure!(!rows.is_empty(), "the table has no rows");
+    ensure!(rows.len() > 1, "the table has {} rows, a spectrum at least two", rows.len());
     ensure!(rows.as_flattened().iter().all(|x| x.is_finite()), "the table has a number that is not finite");
     if let Some(pair) = rows.windows(2).find(|pair| pair[0][0] >= pair[1][0]) {
         bail!("wavelengths ascend in a table, and {} nm comes before {} nm", pair[0][0], pair[1][0]);

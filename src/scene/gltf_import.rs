@@ -655,12 +655,18 @@ fn lights(document: &Document<'_>, nodes: &Nodes, warnings: &mut Vec<String>) ->
         let name = json.name.clone().or_else(|| root.nodes[node].name.clone());
         let name = name.unwrap_or_else(|| format!("light {index}"));
         let mut light = Light { name, color, spectrum: None, extent: None, kind, stand_in: false };
-        let found = gltf_extras::apply_to_light(&json.extras, &mut light, world.matrix3.x_axis.normalize_or(DVec3::X))
+        let found = gltf_extras::apply_to_light(&json.extras, &mut light, side(world.matrix3.x_axis, direction))
             .with_context(|| place.clone())?;
         warnings.extend(found.into_iter().map(|warning| format!("{place}: {warning}")));
         lights.push(light);
     }
     Ok(lights)
+}
+
+/// A unit vector at right angles to a unit axis, as near to another as can be.
+fn side(x: DVec3, axis: DVec3) -> DVec3 {
+    let x = x.normalize_or_zero();
+    (x - axis * x.dot(axis)).try_normalize().unwrap_or_else(|| axis.any_orthonormal_vector())
 }
 
 /// Cone angles with `0 ≤ inner < outer ≤ π/2`.

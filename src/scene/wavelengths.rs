@@ -13,9 +13,12 @@ pub struct Wavelengths {
 
 /// Of one material.
 struct Curves {
-    /// `None`: its base varies over the surface, and is found for the colour of each place.
+    /// `None`: it is found for the colour of each place.
     base: Option<Spectrum>,
-    specular: Spectrum,
+    /// What texels and vertices say multiplies the base.
+    varies: bool,
+    /// Of at most 1, and what it is multiplied by.
+    specular: (Spectrum, f32),
     /// What is left after the attenuation distance.
     attenuation: Spectrum,
     /// n and κ.
@@ -29,9 +32,18 @@ pub struct Slice {
     pub band: Band,
     /// All of the band, or a part of it that stands for all: light is that of the part, and so is what bends it.
     pub part: Band,
+    /// X, Y, Z of light that is red, green, blue.
+    pub light_from_rgb: [[f64; 3]; 3],
 }
 
 impl Slice {
+    /// Of a part of a band.
+    #[must_use]
+    pub fn new(band: Band, part: Band) -> Self {
+        let weight = (band.to - band.from) / (part.to - part.from);
+        Self { band, part, light_from_rgb: light_from_rgb(&part).map(|light| light.map(|x| x * weight)) }
+    }
+
     /// How many of such parts the band has.
     #[must_use]
     pub fn weight(&self) -> f64 {
@@ -41,14 +53,12 @@ impl Slice {
     /// X, Y, Z of a light, in its own unit.
     #[must_use]
     pub fn light(&self, light: &Light) -> [f32; 3] {
+        let of_rgb = |k: usize| (0..3).map(|i| f64::from(light.color[i]) * self.light_from_rgb[i][k]).sum::<f64>();
         let xyz = match &light.spectrum {
-            Some(emission) => emission.in_band(&self.part),
-            None => {
-                let columns = light_from_rgb(&self.part);
-                [0, 1, 2].map(|k| (0..3).map(|i| f64::from(light.color[i]) * columns[i][k]).sum())
-            }
+            Some(emission) => emission.in_band(&self.part).map(|x| x * self.weight()),
+            None => [0, 1, 2].map(of_rgb),
         };
-        xyz.map(|x| (x * self.weight()) as f32)
+        xyz.map(|x| x as f32)
     }
 }
 
@@ -58,6 +68,8 @@ pub struct Banded {
     pub material: Material,
     /// `base_color` is: texels or vertices multiply it.
     pub base_rgb: bool,
+    /// What texels or vertices say is, and `base_color` is a number.
+    pub varies_rgb: bool,
     /// `emissive` is: as all light that has no spectrum of its own.
     pub emissive_rgb: bool,
 }
@@ -73,16 +85,21 @@ impl Wavelengths {
         }
         let of = |(m, coloured): (&Material, bool)| {
             let [r, g, b, _] = m.base_color;
-            let varies = m.unlit || m.base_color_texture.is_some() || coloured;
+            let varies = m.base_color_texture.is_some() || coloured;
+            let told = m.reflectance.clone().or_else(|| m.conductor.map(|_| Spectrum::Constant(1.0)));
+            let found = || (!varies).then(|| spectrum([r, g, b]));
+            // F0 is multiplied by it before it is cut to 1.
+            let most = m.specular_color.iter().copied().fold(1.0, f32::max);
             Curves {
-                base: (!varies).then(|| m.reflectance.clone().unwrap_or_else(|| spectrum([r, g, b]))),
-                specular: spectrum(m.specular_color),
+                base: if m.unlit { None } else { told.or_else(found) },
+                varies,
+                specular: (spectrum(m.specular_color.map(|c| c / most)), most),
                 attenuation: spectrum(m.attenuation_color),
                 metal: m.conductor_spectra.clone().or_else(|| m.conductor.map(between_lamps)),
             }
         };
         let curves: Vec<Curves> = scene.materials.iter().zip(coloured).map(of).collect();
-        let vary = scene.materials.iter().zip(&curves).any(|(m, curves)| curves.base.is_none() && !m.unlit);
+        let vary = scene.materials.iter().zip(&curves).any(|(m, curves)| curves.varies && !m.unlit);
         Self { curves, vary }
     }
 
@@ -93,7 +110,7 @@ impl Wavelengths {
         let band = &slice.band;
         let mean = |spectrum: &Spectrum| band.mean(|nm| spectrum.at(nm)) as f32;
         let mut material = Material {
-            specular_color: [mean(&curves.specular); 3],
+            specular_color: [mean(&curves.specular.0) * curves.specular.1; 3],
             attenuation_color: [mean(&curves.attenuation); 3],
             ior: m.dispersion.index(f64::from(m.ior), slice.part.middle()) as f32,
             ..m.clone()
@@ -104,16 +121,15 @@ impl Wavelengths {
         }
         if let Some([n, kappa]) = &curves.metal {
             let [n, kappa] = [mean(n), mean(kappa)];
+            let f0 = ((n - 1.0).powi(2) + kappa * kappa) / ((n + 1.0).powi(2) + kappa * kappa);
             material.conductor = Some([[n, kappa]; 3]);
-            if curves.base.is_some() {
-                let f0 = ((n - 1.0).powi(2) + kappa * kappa) / ((n + 1.0).powi(2) + kappa * kappa);
-                material.base_color = [f0, f0, f0, m.base_color[3]];
-            }
+            material.base_color = [f0, f0, f0, m.base_color[3]];
         }
         if let Some(emission) = &m.emission {
             material.emissive = emission.in_band(&slice.part).map(|part| (part * slice.weight()) as f32);
         }
-        Banded { material, base_rgb: curves.base.is_none(), emissive_rgb: m.emission.is_none() }
+        let (told, varies) = (curves.base.is_some(), curves.varies);
+        Banded { material, base_rgb: !told, varies_rgb: told && varies, emissive_rgb: m.emission.is_none() }
     }
 }
 

@@ -23,6 +23,9 @@ pub const VISIBLE: Band = Band { from: 380.0, to: 780.0 };
 /// Integrals are sums over steps of this length, nm, or shorter ones: the data are linear over ten of them.
 const STEP: f64 = 0.5;
 
+/// Of lines this wide, nm, and wider, no light is lost.
+const NARROWEST: f64 = 0.05;
+
 /// Wavelengths from … to, nm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Band {
@@ -52,7 +55,11 @@ impl Band {
     }
 
     fn mean_of<const N: usize>(&self, f: impl Fn(f64) -> [f64; N]) -> [f64; N] {
-        let steps = ((self.to - self.from) / STEP).ceil().max(1.0) as u32;
+        self.mean_by(STEP, f)
+    }
+
+    fn mean_by<const N: usize>(&self, step: f64, f: impl Fn(f64) -> [f64; N]) -> [f64; N] {
+        let steps = ((self.to - self.from) / step).ceil().max(1.0) as u32;
         let mut sum = [0.0; N];
         for i in 0..steps {
             let values = f(self.part(i, steps).middle());
@@ -109,8 +116,16 @@ impl Spectrum {
 
     /// ∫ S (x̄, ȳ, z̄) dλ over a band.
     fn integral(&self, band: &Band) -> [f64; 3] {
-        let mean = band.mean_of(|nm| matching(nm).map(|cmf| self.at(nm) * cmf));
+        let mean = band.mean_by(self.step(), |nm| matching(nm).map(|cmf| self.at(nm) * cmf));
         mean.map(|mean| mean * (band.to - band.from))
+    }
+
+    /// Steps of integrals, nm: an eighth of the narrowest that a table tells apart.
+    fn step(&self) -> f64 {
+        let Self::Table(rows) = self else { return STEP };
+        // Of two rows at one place, as at the ends of a light's table, the width is none.
+        let widths = rows.windows(2).map(|pair| pair[1][0] - pair[0][0]).filter(|&width| width > 1e-3);
+        (widths.fold(f64::INFINITY, f64::min) / 8.0).clamp(NARROWEST / 8.0, STEP)
     }
 
     /// X, Y, Z of what light of this spectrum sends in a band, where its luminance Y over all bands is 1.
@@ -159,6 +174,8 @@ pub struct Emission {
     pub spectrum: Spectrum,
     /// Y of all of it, in the unit of the quantity that it is of.
     pub luminance: f64,
+    /// ∫ S ȳ dλ.
+    whole: f64,
 }
 
 impl Emission {
@@ -166,13 +183,21 @@ impl Emission {
     #[must_use]
     pub fn new(spectrum: Spectrum, rgb: [f32; 3]) -> Self {
         let [r, g, b] = rgb.map(f64::from);
-        Self { spectrum, luminance: 0.2126 * r + 0.7152 * g + 0.0722 * b }
+        Self::of_luminance(spectrum, 0.2126 * r + 0.7152 * g + 0.0722 * b)
+    }
+
+    /// Of a spectrum, and Y of all of it.
+    #[must_use]
+    pub fn of_luminance(spectrum: Spectrum, luminance: f64) -> Self {
+        let whole = spectrum.integral(&VISIBLE)[1];
+        Self { spectrum, luminance, whole }
     }
 
     /// X, Y, Z of what it sends in a band.
     #[must_use]
     pub fn in_band(&self, band: &Band) -> [f64; 3] {
-        self.spectrum.light_in(band).map(|part| part * self.luminance)
+        let scale = if self.whole > 0.0 { self.luminance / self.whole } else { 0.0 };
+        self.spectrum.integral(band).map(|part| part * scale)
     }
 
     /// Linear Rec. 709, what lies outside of it cut off.
@@ -339,11 +364,11 @@ mod tests {
     #[test]
     fn bands_add_up_and_lines_are_not_missed() {
         // A line of 1 nm, anywhere.
-        for nm in [404.7, 435.8, 546.1, 555.0, 611.5] {
-            let line = Spectrum::light_table(&[[nm - 0.5, 0.0], [nm, 1.0], [nm + 0.5, 0.0]]);
-            for bands in [8, 16, 32] {
+        for (nm, width) in [(404.7, 0.5), (435.8, 0.05), (546.1, 0.1), (555.0, 1.0), (611.5, 2.0)] {
+            let line = Spectrum::light_table(&[[nm - width, 0.0], [nm, 1.0], [nm + width, 0.0]]);
+            for bands in [8, 16, 32, 32 * 64] {
                 let sum: f64 = (0..bands).map(|i| line.light_in(&VISIBLE.part(i, bands))[1]).sum();
-                assert!((sum - 1.0).abs() < 1e-12, "{nm} in {bands} bands: {sum}");
+                assert!((sum - 1.0).abs() < 2e-2, "{nm} in {bands} bands: {sum}");
             }
         }
     }

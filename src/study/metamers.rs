@@ -48,7 +48,7 @@ pub(super) fn scene() -> Scene {
                 b.place(&format!("{name} patch {i}.{j}"), *mesh, at(x, y, 0.0, 0.0));
             }
         }
-        let emission = illuminant(name).map(|spectrum| Emission { spectrum, luminance: 3.0 });
+        let emission = illuminant(name).map(|spectrum| Emission::of_luminance(spectrum, 3.0));
         let position = DVec3::new(x, 0.0, 0.9);
         b.shine(Light {
             name: name.to_owned(),
