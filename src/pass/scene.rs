@@ -99,7 +99,7 @@ pub struct SceneOnDevice {
     pub grids: SigmaGrids,
     /// Instances relative to the eye of the current view.
     pub instances: Buffer,
-    /// Lights relative to the eye of the current view: directional first, [`LIGHT_TEXELS`] each.
+    /// Lights relative to the eye of the current view: directional first, `LIGHT_TEXELS` each.
     pub lights: Buffer,
     lights_cpu: Vec<Light>,
     refraction: bool,
