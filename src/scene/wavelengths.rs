@@ -40,8 +40,10 @@ impl Slice {
     /// Of a part of a band.
     #[must_use]
     pub fn new(band: Band, part: Band) -> Self {
-        let weight = (band.to - band.from) / (part.to - part.from);
-        Self { band, part, light_from_rgb: light_from_rgb(&part).map(|light| light.map(|x| x * weight)) }
+        let mut slice = Self { band, part, light_from_rgb: light_from_rgb(&part) };
+        let weight = slice.weight();
+        slice.light_from_rgb.as_flattened_mut().iter_mut().for_each(|x| *x *= weight);
+        slice
     }
 
     /// How many of such parts the band has.

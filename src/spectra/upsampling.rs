@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use rayon::prelude::*;
 
-use super::{Band, Spectrum, VISIBLE, illuminant, matching, rgb_from_xyz};
+use super::{Band, Spectrum, VISIBLE, d65, matching, rgb_from_xyz};
 use crate::optics::colour::{SAMPLES, upsampled_reflectance, wavelength};
 
 /// How a reflectance is found for a colour.
@@ -33,7 +33,7 @@ impl Upsampling {
 
 /// 5 nm weights that make X, Y, Z of a reflectance under D65, whose own Y is 1.
 static WEIGHTS: LazyLock<[[f64; 3]; SAMPLES]> = LazyLock::new(|| {
-    let d65 = illuminant("d65").unwrap_or(Spectrum::Constant(1.0));
+    let d65 = d65();
     let mut weights = [[0.0; 3]; SAMPLES];
     // Each step's weight goes to the samples on both sides.
     let steps = 800;
@@ -101,7 +101,7 @@ fn xyz_of_rgb(rgb: [f64; 3]) -> [f64; 3] {
 }
 
 /// L*a*b* relative to D65 (CIE 15).
-pub(crate) fn lab(xyz: [f64; 3]) -> [f64; 3] {
+fn lab(xyz: [f64; 3]) -> [f64; 3] {
     let [x, y, z] = lab_terms(xyz).map(|(f, _)| f);
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }

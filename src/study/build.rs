@@ -73,14 +73,7 @@ impl Builder {
     }
 
     pub(super) fn light(&mut self, name: &str, color: [f32; 3], kind: LightKind) {
-        self.scene.lights.push(Light {
-            name: name.to_owned(),
-            color,
-            spectrum: None,
-            extent: None,
-            kind,
-            stand_in: false,
-        });
+        self.shine(Light { name: name.to_owned(), color, spectrum: None, extent: None, kind, stand_in: false });
     }
 
     /// A light with everything about it.
@@ -90,14 +83,7 @@ impl Builder {
 
     /// A light that stands for an emitting surface where such surfaces light nothing.
     pub(super) fn stand_in(&mut self, name: &str, color: [f32; 3], kind: LightKind) {
-        self.scene.lights.push(Light {
-            name: name.to_owned(),
-            color,
-            spectrum: None,
-            extent: None,
-            kind,
-            stand_in: true,
-        });
+        self.shine(Light { name: name.to_owned(), color, spectrum: None, extent: None, kind, stand_in: true });
     }
 
     /// A pinhole camera with a vertical field of view in degrees; the near distance is left to the renderer.
