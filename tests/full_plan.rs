@@ -65,7 +65,7 @@ fn studies(knobs: &Knobs) {
 }
 
 fn some_studies(names: &[&str], knobs: &Knobs) {
-    let gpu = Gpu::new();
+    let gpu = Gpu::hasty();
     for name in names {
         let scene = study::load(name).expect("a scene");
         is_the_same(&gpu, name, [&scene, &scene], knobs);
@@ -119,7 +119,7 @@ fn studies_with_some_rays() {
 /// Each effect alone, where nothing calls for it.
 #[test]
 fn each_effect_alone() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::hasty();
     let knobs = knobs(Model::Recursive, &["samples=1", "absorption=march:4"]);
     for name in ["radiance", "metals"] {
         let scene = study::load(name).expect("a scene");
@@ -156,7 +156,7 @@ fn pair(ball: Material, panel: Material) -> Made {
 /// What one surface has is not seen on another: cases in which it once was.
 #[test]
 fn surfaces_leave_each_other_alone() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::hasty();
     let mirror = || Material { metallic: 1.0, roughness: 0.0, ..Material::default() };
     let glass = || Material { metallic: 0.0, roughness: 0.5, transmission: 1.0, thickness: 0.1, ..Material::default() };
     let is_same = |what: &str, made: &Made, choices: &[&str]| {
@@ -217,7 +217,7 @@ fn models_of_the_shared_assets() {
     let mut all = Vec::new();
     files(&folder, &mut all);
     assert!(all.len() >= 33, "{} models", all.len());
-    let gpu = Gpu::new();
+    let gpu = Gpu::hasty();
     let knobs = knobs(Model::Recursive, &["samples=1"]);
     for path in all {
         let load = |reads| etalon::scene::load(&path, &LoadOptions { reads, ..LoadOptions::default() });

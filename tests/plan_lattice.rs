@@ -344,7 +344,7 @@ fn drawn(gpu: &Gpu, ways: &Ways, choice: &Choice, demand: Demand, by_paths: bool
 
 /// Draws each of the ways `share` of three, and looks that it is the one that was meant.
 fn draw_all(share: &str) {
-    let gpu = Gpu::new();
+    let gpu = Gpu::hasty();
     for (i, (ways, choice)) in spread().iter().enumerate().filter(|(_, (ways, _))| ways.shadows == share) {
         let (plan, film) = drawn(&gpu, ways, choice, Demand::Scene, false);
         assert_eq!(Ways::of(&plan), *ways, "{choice:?}: {:#?}", plan.effects);
@@ -377,7 +377,7 @@ fn plans_with_shadow_rays() {
 /// Paths through some of the scenes, with both plans.
 #[test]
 fn plans_with_paths() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::hasty();
     for (i, (ways, choice)) in spread().iter().enumerate().filter(|(i, _)| i % 24 == 0) {
         let (plan, film) = drawn(&gpu, ways, choice, Demand::Scene, true);
         assert!(plan.paths.is_some() && !plan.tiles && !plan.see_through && !plan.shadow_maps, "{ways:?}");

@@ -3,7 +3,7 @@
 //! Core and synchronization validation are on; an error message fails the test that owns the [`Gpu`] when it ends.
 #![allow(dead_code, unreachable_pub, reason = "each test program includes this file and uses its own part of it")]
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError};
 
 use etalon::frame::{Rendered, Renderer, Settings};
 use etalon::gpu::{Device, DeviceChoice, Severity};
@@ -38,6 +38,18 @@ impl Gpu {
         let mut gpu = Self::new();
         gpu.turn = Some(turn);
         gpu
+    }
+
+    /// The same for programs that make hundreds of pipelines for a few pixels each: lavapipe compiles them without LLVM's
+    /// optimisations, to the same bits (`study:etalon` and `study:cornell` along paths were compared) in 0.6 of the time.
+    #[allow(unsafe_code, reason = "the driver takes this setting from the environment alone")]
+    pub fn hasty() -> Self {
+        static SET: Once = Once::new();
+        SET.call_once(|| {
+            // SAFETY: every test of such a program begins here, and nothing has read the environment but Rust's own start.
+            unsafe { std::env::set_var("GALLIVM_PERF", "nopt") }
+        });
+        Self::new()
     }
 
     /// What validation calls errors, so far.
