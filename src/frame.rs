@@ -34,7 +34,7 @@ use crate::pass::tiles::{Tiles, tiles};
 use crate::pass::tonemap::{Counts, Display, tonemap};
 use crate::pass::view::{View, jitter};
 use crate::plan::{Ability, Demand, Facts, Knobs, Plan, Surroundings, needs_lights};
-use crate::scene::emitters::Emitters;
+use crate::scene::emitters::{Emitters, Sky};
 use crate::scene::environment::Environment;
 use crate::scene::normal_form::normalise;
 use crate::scene::reads::forget_unread;
@@ -335,7 +335,8 @@ impl Renderer {
         // Directional ones first: loops over lights count on it, and so does the table of what paths draw light from.
         scene.lights.sort_by_key(|light| !matches!(light.kind, LightKind::Directional { .. }));
         let emitters = plan.paths.map_or_else(Emitters::default, |paths| {
-            Emitters::of(&scene, environment.map(|map| (map, settings.environment_intensity)), paths.emitting)
+            let Settings { environment_intensity: intensity, environment_rotation: rotation, .. } = settings;
+            Emitters::of(&scene, environment.map(|map| Sky { map, intensity, rotation }), paths.emitting)
         });
         let rays = RaysOnDevice::new(device, &plan, &scene, &solids, &emitters, settings.traversal)?;
         warnings.extend(rays.warnings.iter().cloned());

@@ -129,7 +129,7 @@ fn each_effect_alone() {
             assert!(bits(&planned) == bits(&with), "{name}: {}", effect.name);
             let kept = account.iter().filter(|kept| kept.name == effect.name && kept.state == "kept").count();
             // Surfaces light others along paths alone, and so do lights with a shape.
-            let needs_paths = ["surfaces that light", "lights with a shape"].contains(&effect.name);
+            let needs_paths = ["aims", "surfaces that light", "lights with a shape"].contains(&effect.name);
             let kept_alone = !needs_paths && !APART.contains(&effect.name);
             assert_eq!(kept, usize::from(kept_alone), "{name}: {}", effect.name);
         }

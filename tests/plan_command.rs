@@ -116,7 +116,7 @@ fn what_is_left_out_has_a_price() {
         .map(|e| e["name"].clone())
         .collect();
     let mut alone = vec!["media that vary", "quadrature", "prefiltered environment", "surfaces that light"];
-    alone.extend(["lights with a shape", "dispersion"]);
+    alone.extend(["lights with a shape", "aims", "dispersion"]);
     assert_eq!(without, alone);
     assert!(of("layers")["bytes"].as_i64() > Some(48 * 27 * 8), "{costs:?}");
     assert!(of("see-through surfaces")["pipelines"].as_i64() > Some(1), "{costs:?}");

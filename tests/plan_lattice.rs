@@ -522,7 +522,7 @@ fn any_two_effects_are_kept_together_and_apart() {
 }
 
 /// Effects of paths: kept nowhere without them.
-const OF_PATHS: [&str; 4] = ["frosted surfaces", "lights with a shape", "paths", "surfaces that light"];
+const OF_PATHS: [&str; 5] = ["aims", "frosted surfaces", "lights with a shape", "paths", "surfaces that light"];
 
 /// Effects of another rung of `colour`: tests/spectra.rs has them.
 const OF_WAVELENGTHS: [&str; 2] = ["bands of wavelengths", "dispersion"];

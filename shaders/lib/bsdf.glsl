@@ -2,6 +2,7 @@
 // base's lobe, the diffuse ground and what goes through. A lobe of roughness up to MIN_ROUGHNESS is one direction.
 #ifndef BSDF_GLSL
 #define BSDF_GLSL
+#include "lib/aims.glsl"
 #include "lib/boundary.glsl"
 #include "lib/reflectance.glsl"
 #include "lib/snell.glsl"
@@ -27,6 +28,9 @@ struct Bsdf {
     vec3 f_sharp;    // … and of the mixture
     bool total;
     vec4 shares;     // probabilities of coat, lobe, diffuse ground, through; their sum is 1, or 0 where nothing is scattered
+    float aimed;     // share of the diffuse ground's directions that are aimed
+    Aims aims;
+    vec3 p_bvh;      // where from
 };
 
 float mean(vec3 v) {
@@ -84,7 +88,16 @@ Bsdf bsdf_of(HitSurface hit, Boundary boundary) {
     b.shares = vec4(coat, vec3(1.0 - coat) * vec3(mirrors, mean(b.s.diffuse) * b.enters, mean(b.tint) * b.transmits * below));
     float sum = dot(b.shares, vec4(1.0));
     b.shares = sum > 0.0 ? b.shares / sum : vec4(0.0);
+    b.aimed = 0.0;
+    b.aims = Aims(0, 0, 0.0);
+    b.p_bvh = b.s.p_bvh;
     return b;
+}
+
+// The same, for a path that goes on from there: towards what mirrors or bends light, too.
+void aim(inout Bsdf b) {
+    b.aims = aims_at(b.p_bvh);
+    b.aimed = b.aims.count > 0 ? AIMED_SHARE : 0.0;
 }
 
 // What goes straight through a sharp surface that bends nothing: a sheet, or a boundary between equal indices.
@@ -96,6 +109,7 @@ vec3 straight_through(Bsdf b) {
 struct Scattered {
     vec3 f_cos; // BSDF times |cosθ|, of all lobes that are not sharp
     float pdf;  // with which they are drawn, per solid angle
+    float plain_pdf; // and would be if nothing were aimed at
 };
 
 // Density of a direction mirrored at a half vector drawn among those that the viewer sees, G₁ D/(4 cosθ_v) (Heitz 2018).
@@ -107,7 +121,7 @@ float mirrored_pdf(float cos_v, HalfAngle h, float alpha) {
 // For light from the unit direction l, on whichever side.
 Scattered scattered(Bsdf b, vec3 l) {
     Surface s = b.s;
-    Scattered r = Scattered(vec3(0.0), 0.0);
+    Scattered r = Scattered(vec3(0.0), 0.0, 0.0);
     float cos_l = dot(s.n, l);
     bool above = dot(b.n, l) > 0.0;
     if (above && cos_l > 0.0) {
@@ -175,6 +189,12 @@ Scattered scattered(Bsdf b, vec3 l) {
         r.f_cos = r.f_cos * (b.coat_sharp || BRDF == 3 || !above ? b.under : 1.0 - f) + f * lobe;
         r.pdf += on_coat ? b.shares.x * mirrored_pdf(coat_v, h, s.clearcoat_alpha) : 0.0;
     }
+    r.plain_pdf = r.pdf;
+    if (AIMED) {
+        float instead = b.aimed * b.shares.z;
+        bool aims = above && cos_l > 0.0 && instead > 0.0;
+        if (aims) r.pdf += instead * (aimed_pdf(b.aims, b.p_bvh, l) - cos_l * INV_PI);
+    }
     return r;
 }
 
@@ -205,8 +225,14 @@ Drawn draw_direction(Bsdf b, vec3 direction, float x, vec2 u) {
     r.direction = r.sharp ? on_side(mirrored, b.n) : mirrored;
     if (diffuse) {
         OrthonormalBasis frame = orthonormal_basis(s.n);
-        vec3 l = cosine_sample(u.x, u.y).L;
+        // Parts of an even set of points in an interval are as even: which directions are aimed is for `u` to say.
+        bool aimed = AIMED && u.x < b.aimed;
+        float across = AIMED && !aimed ? (u.x - b.aimed) / (1.0 - b.aimed) : u.x;
+        vec3 l = cosine_sample(across, u.y).L;
         r.direction = frame.t * l.x + frame.b * l.y + s.n * l.z;
+        if (AIMED) {
+            if (aimed) r.direction = aimed_direction(b.aims, b.p_bvh, vec2(u.x / b.aimed, u.y));
+        }
     }
     if (r.sharp) {
         float f_coat = CLEARCOAT ? 1.0 - under_coat(s) : 0.0;

@@ -151,6 +151,7 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, bool there, out LightTask task) 
     Met met = met_at(point, p.media, p.direction);
     HitSurface hit = met.hit;
     Bsdf b = bsdf_of(hit, met.boundary);
+    if (AIMED) aim(b);
     uvec2 event = draw_words(pixel, met_before, DRAW_EVENT);
     float x = unit_float(event.x);
     // The back of what has one side only is not there for the eye.
@@ -207,8 +208,8 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, bool there, out LightTask task) 
     Drawn drawn = draw_direction(b, p.direction, x, vec2(unit_float(words.x), unit_float(words.y)));
     // One evaluation for the light's direction, one for that which was drawn: the same code, once.
     vec3 along = normalize(light.to_light);
-    Scattered towards_light = Scattered(vec3(0.0), 0.0);
-    Scattered on_path = Scattered(vec3(0.0), 0.0);
+    Scattered towards_light = Scattered(vec3(0.0), 0.0, 0.0);
+    Scattered on_path = Scattered(vec3(0.0), 0.0, 0.0);
     for (int i = 0; i < 2; i++) {
         loop_heads++;
         Scattered now = scattered(b, i == 0 ? along : drawn.direction);
@@ -254,7 +255,15 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, bool there, out LightTask task) 
     flags &= behind ? ~0u : ~PATH_CLEAR;
     flags &= passed_by || drawn.straight ? ~0u : ~PATH_STRAIGHT;
     flags |= !passed_by && !drawn.sharp ? PATH_SPREAD : 0u;
+    // Less is left of a path that was aimed than of another, and that is no reason to end it: roulette asks what would be left if
+    // nothing were aimed at, or it would undo what aims are for.
     float most = largest(p.throughput);
+    if (AIMED) {
+        bool spread = !passed_by && !drawn.sharp && on_path.plain_pdf > 0.0;
+        float aimed = aimed_before(p) * (spread ? on_path.pdf / on_path.plain_pdf : 1.0);
+        flags |= packHalf2x16(vec2(0.0, min(aimed, 60000.0)));
+        most *= aimed;
+    }
     if (met_now >= ROULETTE_FROM && !passed_by) {
         float survives = min(most, MOST_LIKELY);
         ends = ends || unit_float(event.y) >= survives;

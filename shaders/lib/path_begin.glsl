@@ -28,7 +28,7 @@ Path path_through(uvec2 pixel) {
     p.self = 0xffffffffu;
     p.pdf = 0.0;
     p.throughput = vec3(1.0);
-    p.state = PATH_ALIVE | PATH_CLEAR | PATH_STRAIGHT;
+    p.state = PATH_ALIVE | PATH_CLEAR | PATH_STRAIGHT | packHalf2x16(vec2(0.0, 1.0));
     p.media = trace_terms.camera_media;
     p.travelled = 0.0;
     p.after = 0.0;

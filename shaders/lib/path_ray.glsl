@@ -10,7 +10,7 @@ struct Path {
     vec3 direction;
     float pdf;        // of the direction at the surface that spread it last; 0 where no place on an emitter could have been drawn instead
     vec3 throughput;
-    uint state;       // surfaces met | PATH_...
+    uint state;       // surfaces met | PATH_... | AIMED: density with which it went where it did over that without aims, as a half
     uvec4 media;
     float travelled;  // since that surface
     float after;      // nothing up to here is met
@@ -22,6 +22,10 @@ const uint PATH_STRAIGHT = 0x400u; // nothing has happened to it since the eye
 const uint PATH_SPREAD = 0x800u;   // some surface has spread it
 const uint PATH_OPEN = 0x1000u;    // nothing lay behind all that it went through
 const uint PATH_SURFACES = 0xffu;
+
+float aimed_before(Path p) {
+    return unpackHalf2x16(p.state).y;
+}
 
 // Pairs of random numbers of one surface.
 const uint DRAWS = 4;

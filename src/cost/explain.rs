@@ -170,13 +170,14 @@ fn allowing(effect: &Effect) -> Vec<String> {
     if effect.name == "media that vary" {
         return ["refraction=ray", "absorption=march:32"].map(str::to_owned).into();
     }
-    const PATHS: [&str; 5] = ["shadows=ray", "reflection=ray", "refraction=ray", "indirect=path", "lights=area:1"];
+    const PATHS: [&str; 6] =
+        ["shadows=ray", "reflection=ray", "refraction=ray", "indirect=path", "lights=area:1", "guiding=aims"];
     match effect.name {
         "paths" => return PATHS[..4].iter().map(|&rung| rung.to_owned()).collect(),
         "bands of wavelengths" | "dispersion" => return vec!["colour=spectral:16".to_owned()],
-        "surfaces that light" | "lights with a shape" => return PATHS.map(str::to_owned).into(),
+        "surfaces that light" | "lights with a shape" | "aims" => return PATHS.map(str::to_owned).into(),
         _ if effect.reason == "indirect=path" => {
-            return ["indirect=ambient", "lights=points"].map(str::to_owned).into();
+            return ["indirect=ambient", "lights=points", "guiding=off"].map(str::to_owned).into();
         }
         _ => {}
     }

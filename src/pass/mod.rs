@@ -3,6 +3,7 @@
 //! A pass takes what it reads, writes what its name says, and contains no formula: those are in `shaders/lib/`.
 
 pub mod accumulate;
+pub mod aims;
 pub mod aov;
 pub mod background;
 pub mod classify;

@@ -122,6 +122,8 @@ pub fn paths<'a>(
             work_done: &rays.counts,
             emitters: &rays.emitters.table,
             sky_shares: &rays.emitters.sky,
+            aim_cells: &rays.aims.cells,
+            aims: &rays.aims.balls,
         };
         let groups = rows_of(places.div_ceil(PATHS_IN_GROUP));
         return frame.compute("paths at once", &bind, constants, bytemuck::cast_slice(&first), groups);
@@ -164,6 +166,8 @@ pub fn paths<'a>(
             work_done: &rays.counts,
             emitters: &rays.emitters.table,
             sky_shares: &rays.emitters.sky,
+            aim_cells: &rays.aims.cells,
+            aims: &rays.aims.balls,
             origins,
             directions,
             throughputs,
@@ -240,6 +244,7 @@ fn constants(lighting: Lighting, with: Rays, paths: Paths) -> Vec<(u32, u32)> {
         emitting_sky: emitters.rows > 0,
         sky_columns: emitters.columns,
         sky_rows: emitters.rows,
+        aimed: paths.aimed,
         keeps_media: with.transmissive,
         keeps_after: rays.constants.touching,
         sky_steps: halvings(emitters.columns.max(emitters.rows)),

@@ -9,6 +9,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::aims::AimsOnDevice;
 use super::emitters::EmittersOnDevice;
 use super::scene::{cofactors as cofactors_of, medium, texture_slots};
 use super::upload::upload;
@@ -16,6 +17,7 @@ use super::view::View;
 use crate::gpu::{Buffer, Device, Frame, NOTHING, Place};
 use crate::plan::{Plan, Rays};
 use crate::scene::bvh::{Bvh, Format, Order, Triangle};
+use crate::scene::caustics::Aims;
 use crate::scene::contact::{bodies_touch, twins};
 use crate::scene::emitters::{Emitters, Source};
 use crate::scene::solid::{Solids, media_at};
@@ -105,6 +107,8 @@ pub struct RaysOnDevice {
     pub leaf_places: Buffer,
     /// What paths draw light from, and how.
     pub emitters: EmittersOnDevice,
+    /// What they aim at.
+    pub aims: AimsOnDevice,
     /// [`TraceTerms`].
     pub terms: Buffer,
     /// [`WorkCounts`].
@@ -234,6 +238,10 @@ impl RaysOnDevice {
             corners: corner_buffer,
             faces,
             emitters: EmittersOnDevice::new(device, emitters, &leaf_places)?,
+            aims: match plan.paths.is_some_and(|paths| paths.aimed) {
+                true => AimsOnDevice::new(device, &Aims::of(scene, solids, &bvh, emitters))?,
+                false => AimsOnDevice::none(device)?,
+            },
             leaf_places: upload(device, "leaf places", &leaf_places, Some(vk::Format::R32_UINT))?,
             fixed,
             anchor: bvh.anchor,
@@ -254,6 +262,7 @@ impl RaysOnDevice {
             faces: Vec::new(),
             leaf_places: nothing(vk::Format::R32_UINT)?,
             emitters: EmittersOnDevice::new(device, &Emitters::default(), &[])?,
+            aims: AimsOnDevice::none(device)?,
             terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,
             counts: Buffer::new(device, NOTHING, 0, Place::Readback)?,
             constants: TraceConstants::default(),

@@ -97,6 +97,13 @@ pub static KNOBS: &[Knob] = &[
         about: "extent of lights (R2): with area:N surfaces that emit light others, by N places on them at each surface of a path",
     },
     Knob {
+        name: "guiding",
+        rungs: &["off", "aims"],
+        unbuilt: &[],
+        presets: ["off", "off", "aims"],
+        about: "where paths go (R6): as surfaces scatter, or also where photons came from by way of mirrors and lenses; the same mean",
+    },
+    Knob {
         name: "samples",
         rungs: &["1", "4", "16", "64", "256", "1024", "4096"],
         unbuilt: &[],
@@ -223,6 +230,13 @@ impl Knobs {
                 "--set lights={} contradicts indirect={}: surfaces light others along paths; the nearest choice is \
                  indirect=path, or lights=points",
                 self.rung("lights"),
+                self.rung("indirect")
+            );
+        } else if self.rung("guiding") != "off" {
+            bail!(
+                "--set guiding={} contradicts indirect={}: only paths are guided; the nearest choice is indirect=path, or \
+                 guiding=off",
+                self.rung("guiding"),
                 self.rung("indirect")
             );
         }

@@ -15,6 +15,7 @@ use effect::{Cause, Decisions};
 use left_out::left_out;
 use surfaces::{Surfaces, by_wavelength, has_layers, refracts, scatters};
 
+use crate::scene::caustics::{SMOOTHEST, is_smooth};
 use crate::scene::normal_form::NormalForm;
 use crate::scene::solid::{Solids, deepest_nesting, solids};
 use crate::scene::{AlphaMode, Light, LightKind, Material, Scene};
@@ -116,6 +117,8 @@ pub struct Paths {
     pub emitting: bool,
     /// Some light has a shape.
     pub shaped: bool,
+    /// They aim at what light left last before it came to where they are.
+    pub aimed: bool,
     /// All bounces in one dispatch: the same film, for comparison.
     pub at_once: bool,
 }
@@ -182,9 +185,6 @@ const ROUGHEST_ON_SCREEN: f32 = 0.2;
 
 /// From this many point and spot lights on, tiles list them (docs/decisions/light-lists.md).
 const TILES_FROM: u32 = 16;
-
-/// Perceptual roughness up to which paths are not spread: `MIN_ROUGHNESS` of shaders/lib/surface.glsl.
-const SMOOTHEST: f32 = 0.01;
 
 /// Place of the rung `path` in the knob `absorption`; the rungs `march` do as it does where nothing varies.
 const PATH: u32 = 2;
@@ -488,7 +488,7 @@ impl Planner<'_> {
 
     /// Light from surface to surface.
     fn paths(&mut self) -> Option<Paths> {
-        let Self { scene, surfaces, decisions, knobs, paths, .. } = self;
+        let Self { scene, surfaces, decisions, knobs, surroundings, paths, .. } = self;
         let cause = match surfaces.any(|m| !m.unlit) {
             true => Cause::of("light goes from surface to surface"),
             false => Cause::when(*paths, "the knob says so", "no surface in use sends light"),
@@ -510,7 +510,18 @@ impl Planner<'_> {
             (_, Some(light)) => Cause::of(format!("light \"{}\" has a shape", light.name)),
         };
         let shaped = decisions.decide_with("lights with a shape", "lights", knobs.rung("lights") != "points", cause);
-        paths.then_some(Paths { emitting, shaped, at_once: false })
+        let smooth = surfaces.cause(is_smooth, |m| {
+            let does = if m.transmission > 0.0 { "bends" } else { "mirrors" };
+            format!("{does} light without spreading it")
+        });
+        let around = surroundings.environment && !surroundings.constant;
+        let cause = match (kept, emitting || around) {
+            (false, _) => Cause::against("no paths are followed"),
+            (_, false) => Cause::against("paths meet no light by chance"),
+            _ => smooth,
+        };
+        let aimed = decisions.decide_with("aims", "guiding", knobs.rung("guiding") != "off", cause);
+        paths.then_some(Paths { emitting, shaped, aimed, at_once: false })
     }
 
     /// Bands of wavelengths, and whether rays split by them.

@@ -1,6 +1,8 @@
 //! What light comes from, with the probability that a path looks there (lecture R2–R4): in proportion to power.
 
-use super::environment::Environment;
+use glam::{DMat3, DVec3};
+
+use super::environment::{Environment, direction};
 use super::{AlphaMode, Image, Light, LightKind, Material, Scene};
 use crate::image::tone::srgb_decode;
 
@@ -51,6 +53,19 @@ pub struct SkyShares {
     pub rows: u32,
     /// First words.
     pub words: Vec<u32>,
+    /// By how much it is turned about +Y, degrees.
+    pub rotation: f64,
+}
+
+/// An environment that lights a scene.
+#[derive(Debug, Clone, Copy)]
+pub struct Sky<'a> {
+    /// What it shows.
+    pub map: &'a Environment,
+    /// Multiplies its radiance.
+    pub intensity: f32,
+    /// Degrees about +Y.
+    pub rotation: f32,
 }
 
 /// First words of shares of all 32-bit words in proportion to weights, none of them empty; and their sizes over 2³².
@@ -98,17 +113,18 @@ fn power(light: &Light, radius: f64) -> f64 {
 impl Emitters {
     /// Of a scene, its environment times an intensity, and, with `surfaces`, what emits in it.
     #[must_use]
-    pub fn of(scene: &Scene, environment: Option<(&Environment, f32)>, surfaces: bool) -> Self {
+    pub fn of(scene: &Scene, environment: Option<Sky>, surfaces: bool) -> Self {
         use std::f64::consts::PI;
         let radius = scene.bounds().map_or(1.0, |bounds| bounds.radius());
         let mut sources = Vec::new();
         let mut weights = Vec::new();
         let mut sky = SkyShares::default();
         // One that is the same everywhere is found as well by the direction that is followed anyway.
-        if let Some((map, intensity)) = environment.filter(|(map, intensity)| !map.is_constant() && *intensity > 0.0) {
-            let radiance = map.mean().iter().sum::<f64>() / 3.0 * f64::from(intensity);
+        if let Some(around) = environment.filter(|sky| !sky.map.is_constant() && sky.intensity > 0.0) {
+            let radiance = around.map.mean().iter().sum::<f64>() / 3.0 * f64::from(around.intensity);
             if radiance > 0.0 {
-                sky = SkyShares::of(map);
+                sky = SkyShares::of(around.map);
+                sky.rotation = f64::from(around.rotation);
                 sources.push(Source::Sky);
                 weights.push(PI * radius * radius * 4.0 * PI * radiance);
             }
@@ -221,7 +237,18 @@ impl SkyShares {
         for row in cells.chunks(columns as usize) {
             words.extend(shares(row).into_iter().map(|(first, _)| first));
         }
-        Self { columns, rows, words }
+        Self { columns, rows, words, rotation: 0.0 }
+    }
+
+    /// A direction of the world drawn by two words: `sample_sky` of shaders/lib/emitters.glsl, but for where in a cell.
+    #[must_use]
+    pub fn direction(&self, words: [u32; 2]) -> DVec3 {
+        let (columns, rows) = (self.columns as usize, self.rows as usize);
+        let row = self.words[..rows].partition_point(|&first| first <= words[1]) - 1;
+        let of_row = &self.words[rows + row * columns..][..columns];
+        let column = of_row.partition_point(|&first| first <= words[0]) - 1;
+        let middle = |i: usize, of: usize| (i as f64 + 0.5) / of as f64;
+        DMat3::from_rotation_y(self.rotation.to_radians()) * direction(middle(column, columns), middle(row, rows))
     }
 }
 

@@ -4,7 +4,8 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::bvh::{Bvh, Node};
+use super::bvh::Bvh;
+use super::line::{self, Crossing};
 use super::{AlphaMode, Camera, Projection, Scene};
 
 /// Lines across the picture; as many down as its shape gives.
@@ -41,7 +42,7 @@ pub fn along_lines(scene: &Scene, camera: &Camera, size: [u32; 2]) -> anyhow::Re
         .map(|i| {
             let at =
                 [(i % LINES, LINES), (i / LINES, down)].map(|(i, of)| (f64::from(i) + 0.5) / f64::from(of) * 2.0 - 1.0);
-            let (origin, direction) = line(camera, aspect, DVec2::new(at[0], -at[1]));
+            let (origin, direction) = line_through(camera, aspect, DVec2::new(at[0], -at[1]));
             shares(scene, &bvh, origin - bvh.anchor, direction)
         })
         .collect();
@@ -55,7 +56,7 @@ pub fn along_lines(scene: &Scene, camera: &Camera, size: [u32; 2]) -> anyhow::Re
 }
 
 /// The line of sight through a place of the picture, −1 … 1 to the right and up: its origin and unit direction.
-fn line(camera: &Camera, aspect: f64, at: DVec2) -> (DVec3, DVec3) {
+fn line_through(camera: &Camera, aspect: f64, at: DVec2) -> (DVec3, DVec3) {
     let m = camera.world_from_camera.matrix3;
     let eye = camera.world_from_camera.translation;
     let (right, up, forward) = (m.x_axis.normalize(), m.y_axis.normalize(), -m.z_axis.normalize());
@@ -75,38 +76,19 @@ fn line(camera: &Camera, aspect: f64, at: DVec2) -> (DVec3, DVec3) {
 fn shares(scene: &Scene, bvh: &Bvh, origin: DVec3, direction: DVec3) -> Vec<f64> {
     let mut found: Vec<(f64, u32, f64)> = Vec::new();
     let mut opaque = f64::INFINITY;
-    let mut open = if bvh.nodes.is_empty() { Vec::new() } else { vec![0_u32] };
-    let inverse = direction.recip();
-    while let Some(node) = open.pop() {
-        let node = &bvh.nodes[node as usize];
-        let bounds = node.bounds();
-        let [low, high] =
-            [bounds.min, bounds.max].map(|corner| (DVec3::from(corner.map(f64::from)) - origin) * inverse);
-        let (near, far) = (low.min(high).max_element(), low.max(high).min_element());
-        // A line within a side of a box gives NaN, which opens it.
-        if far < 0.0 || near > far || near > opaque {
-            continue;
+    line::walk(bvh, origin, direction, 0.0, |Crossing { triangle, t, .. }| {
+        let material = &scene.materials[scene.meshes[scene.instances[triangle.instance as usize].mesh].material];
+        if material.transmission > 0.0 {
+            // Along a line that is not bent as much as at normal incidence is mirrored, or more.
+            let f0 = ((f64::from(material.ior) - 1.0) / (f64::from(material.ior) + 1.0)).powi(2);
+            found.push((t, triangle.instance, f64::from(material.transmission) * (1.0 - f0)));
+        } else if material.alpha_mode == AlphaMode::Blend {
+            found.push((t, triangle.instance, 1.0 - f64::from(material.base_color[3])));
+        } else {
+            opaque = opaque.min(t);
         }
-        match node {
-            Node::Inner { children, .. } => open.extend(children),
-            Node::Leaf { first, count, .. } => {
-                for triangle in &bvh.triangles[*first as usize..(*first + *count) as usize] {
-                    let Some(t) = meets(triangle.corners, origin, direction) else { continue };
-                    let mesh = &scene.meshes[scene.instances[triangle.instance as usize].mesh];
-                    let material = &scene.materials[mesh.material];
-                    if material.transmission > 0.0 {
-                        // Along a line that is not bent as much as at normal incidence is mirrored, or more.
-                        let f0 = ((f64::from(material.ior) - 1.0) / (f64::from(material.ior) + 1.0)).powi(2);
-                        found.push((t, triangle.instance, f64::from(material.transmission) * (1.0 - f0)));
-                    } else if material.alpha_mode == AlphaMode::Blend {
-                        found.push((t, triangle.instance, 1.0 - f64::from(material.base_color[3])));
-                    } else {
-                        opaque = opaque.min(t);
-                    }
-                }
-            }
-        }
-    }
+        opaque
+    });
     found.retain(|(t, ..)| *t < opaque);
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     // On an edge both triangles are met, of one surface.
@@ -118,20 +100,6 @@ fn shares(scene: &Scene, bvh: &Bvh, origin: DVec3, direction: DVec3) -> Vec<f64>
             Some(*left)
         })
         .collect()
-}
-
-/// Where a line meets a triangle before its origin's front (Möller and Trumbore 1997).
-fn meets(corners: [[f32; 3]; 3], origin: DVec3, direction: DVec3) -> Option<f64> {
-    let [a, b, c] = corners.map(|corner| DVec3::from(corner.map(f64::from)));
-    let (ab, ac) = (b - a, c - a);
-    let p = direction.cross(ac);
-    let inverse = ab.dot(p).recip();
-    let from = origin - a;
-    let u = from.dot(p) * inverse;
-    let q = from.cross(ab);
-    let v = direction.dot(q) * inverse;
-    let t = ac.dot(q) * inverse;
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some(t)
 }
 
 #[cfg(test)]

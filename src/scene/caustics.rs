@@ -1,0 +1,338 @@
+//! Where light comes from by way of what mirrors and bends it: places that paths aim at. A path that goes on from a wall in any
+//! direction hardly ever meets the small part of a ball in which the lamp is seen, and is very bright when it does. Light
+//! is therefore sent the other way first, a little of it, and what it last left before each part of the scene is kept.
+//!
+//! Aims only say where paths go more often (photon maps as densities: Jensen, "Importance driven path tracing using the photon
+//! map", 1995). They are weighted by the density with which they are drawn, so that however few or wrong they are, the
+//! picture is the same in the mean.
+
+use std::collections::HashMap;
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::bvh::Bvh;
+use super::emitters::{Emitter, Emitters, Source};
+use super::line::{self, Crossing};
+use super::material::Material;
+use super::solid::Solids;
+use super::{AlphaMode, Scene};
+use crate::optics::fresnel::fresnel_dielectric;
+use crate::optics::snell::{reflect, refract};
+
+/// Photons that are sent.
+const PHOTONS: u64 = 1 << 19;
+/// Surfaces that one of them may meet.
+const MOST_SURFACES: usize = 12;
+/// Cells along the longest side of the scene.
+const CELLS: f64 = 32.0;
+/// Aims of one cell: what shaders/lib/aims.glsl goes through twice for each surface of a path.
+pub const MOST_AIMS: usize = 8;
+/// Photons that the aims of one cell are made from.
+const MOST_PHOTONS: usize = 96;
+/// Radii of what is aimed at, in cells.
+const RADII: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
+/// Around them: few photons do not tell where what they stand for ends.
+const MARGIN: f64 = 1.2;
+/// Least share over the largest of its cell.
+const WORTH_AIMING: f64 = 0.05;
+
+/// Index of refraction of coats (`KHR_materials_clearcoat`).
+const COAT_INDEX: f64 = 1.5;
+
+/// Perceptual roughness up to which paths are not spread: `MIN_ROUGHNESS` of shaders/lib/surface.glsl.
+pub const SMOOTHEST: f32 = 0.01;
+
+/// Balls around what light last left, for each cell of a grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Aims {
+    /// Least corner of the grid, in bvh space.
+    pub corner: DVec3,
+    /// Length of a cell's sides, metres.
+    pub cell: f64,
+    /// How many cells there are along x, y and z; x varies fastest.
+    pub cells: [u32; 3],
+    /// For each cell the place of its first aim times 16, plus how many it has.
+    pub firsts: Vec<u32>,
+    /// What is aimed at from the cells, one cell after the other.
+    pub aims: Vec<Ball>,
+}
+
+/// What paths aim at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ball {
+    /// In bvh space.
+    pub middle: DVec3,
+    /// Metres.
+    pub radius: f64,
+    /// Of the aims of its cell.
+    pub share: f64,
+}
+
+/// Light that arrived at a surface that spreads it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Photon {
+    at: DVec3,
+    /// Where it left the surface before.
+    from: DVec3,
+}
+
+/// Whether the base of a surface, and its coat, mirror or bend light without spreading it.
+fn smooth_layers(material: &Material) -> (bool, bool) {
+    let smooth = |roughness: f32, textured: bool| roughness <= SMOOTHEST && !textured;
+    let coat = smooth(material.clearcoat_roughness, material.clearcoat_roughness_texture.is_some());
+    (smooth(material.roughness, material.metallic_roughness_texture.is_some()), material.clearcoat > 0.0 && coat)
+}
+
+/// Whether a surface mirrors or bends light without spreading all of it.
+#[must_use]
+pub fn is_smooth(material: &Material) -> bool {
+    !material.unlit && material.alpha_mode == AlphaMode::Opaque && smooth_layers(material) != (false, false)
+}
+
+/// What photons go through.
+struct World<'a> {
+    scene: &'a Scene,
+    solids: &'a Solids,
+    bvh: &'a Bvh,
+    emitters: &'a Emitters,
+    /// First triangle of each instance.
+    firsts: Vec<u32>,
+    middle: DVec3,
+    radius: f64,
+}
+
+/// Numbers in [0, 1) (splitmix64; Steele, Lea and Flood 2014).
+struct Random(u64);
+
+impl Random {
+    fn word(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn unit(&mut self) -> f64 {
+        (self.word() >> 11) as f64 / 9_007_199_254_740_992.0
+    }
+
+    /// In the unit circle, evenly.
+    fn disk(&mut self) -> DVec2 {
+        let radius = self.unit().sqrt();
+        DVec2::from_angle(std::f64::consts::TAU * self.unit()) * radius
+    }
+
+    /// A unit direction by its cosine with n.
+    fn above(&mut self, n: DVec3) -> DVec3 {
+        let (across, up) = n.any_orthonormal_pair();
+        let at = self.disk();
+        across * at.x + up * at.y + n * (1.0 - at.length_squared()).max(0.0).sqrt()
+    }
+}
+
+impl World<'_> {
+    /// A line along which light is sent, by what sends most.
+    fn start(&self, random: &mut Random) -> Option<(DVec3, DVec3)> {
+        let word = (random.word() >> 32) as u32;
+        let list = &self.emitters.list;
+        let found = list.partition_point(|emitter| emitter.first <= word).checked_sub(1)?;
+        let Emitter { source, .. } = list[found];
+        match source {
+            // No ray meets them.
+            Source::Punctual(_) => None,
+            Source::Sky => {
+                let towards = self.emitters.sky.direction([(); 2].map(|()| (random.word() >> 32) as u32));
+                let (across, up) = towards.any_orthonormal_pair();
+                let at = random.disk();
+                Some((self.middle + self.radius * (towards + across * at.x + up * at.y), -towards))
+            }
+            Source::Triangle { index, two_sided, .. } => {
+                let instance = self.firsts.partition_point(|&first| first <= index) - 1;
+                let placed = &self.scene.instances[instance];
+                let mesh = &self.scene.meshes[placed.mesh];
+                let first = 3 * (index - self.firsts[instance]) as usize;
+                let [a, b, c] = [0, 1, 2].map(|k| {
+                    let p = glam::Vec3::from(mesh.positions[mesh.indices[first + k] as usize]).as_dvec3();
+                    placed.world_from_object.transform_point3(p) - self.bvh.anchor
+                });
+                let (x, y) = (random.unit().sqrt(), random.unit());
+                let n = (b - a).cross(c - a).normalize();
+                let mirrored = placed.world_from_object.matrix3.determinant() < 0.0;
+                let back = (two_sided && random.unit() < 0.5) != mirrored;
+                let direction = random.above(if back { -n } else { n });
+                Some((a + (b - a) * (x * (1.0 - y)) + (c - a) * (x * y), direction))
+            }
+        }
+    }
+
+    /// Follows one photon to the first surface that spreads it after some surface has mirrored or bent it, and to the next from
+    /// there: spots of such light are small and bright, and light others.
+    fn follow(&self, number: u64) -> impl Iterator<Item = Photon> {
+        let mut found = [None; 2];
+        let mut random = Random(number);
+        let mut next = self.start(&mut random);
+        let mut from = None;
+        for _ in 0..MOST_SURFACES {
+            let Some((origin, direction)) = next else { break };
+            let Some(met) = line::nearest(self.bvh, origin, direction, 1e-6 * self.radius) else { break };
+            let at = origin + direction * met.t;
+            let goes_on = self.goes_on(&met, direction, &mut random);
+            if let Some(towards) = goes_on {
+                // What goes straight on is found by the search for lights.
+                if towards != direction {
+                    from = Some(at);
+                }
+                next = Some((at, towards));
+                continue;
+            }
+            let Some(left) = from else { break };
+            if found[0].is_some() {
+                found[1] = Some(Photon { at, from: left });
+                break;
+            }
+            found[0] = Some(Photon { at, from: left });
+            from = Some(at);
+            next = self.spread(&met, direction, &mut random).map(|towards| (at, towards));
+        }
+        found.into_iter().flatten()
+    }
+
+    /// A direction in which a surface spreads light, by the cosine, as often as its colour says.
+    fn spread(&self, met: &Crossing, direction: DVec3, random: &mut Random) -> Option<DVec3> {
+        let mesh = &self.scene.meshes[self.scene.instances[met.triangle.instance as usize].mesh];
+        let colour = self.scene.materials[mesh.material].base_color;
+        let [a, b, c] = met.triangle.corners.map(|corner| DVec3::from(corner.map(f64::from)));
+        let n = (b - a).cross(c - a).normalize();
+        let n = if n.dot(direction) < 0.0 { n } else { -n };
+        let goes_on = random.unit() < f64::from(colour[0] + colour[1] + colour[2]) / 3.0;
+        goes_on.then(|| random.above(n))
+    }
+
+    /// Where a surface sends light from `direction` on, unless it spreads it.
+    fn goes_on(&self, met: &Crossing, direction: DVec3, random: &mut Random) -> Option<DVec3> {
+        let instance = met.triangle.instance as usize;
+        let placed = &self.scene.instances[instance];
+        let mesh = &self.scene.meshes[placed.mesh];
+        let material = &self.scene.materials[mesh.material];
+        if material.alpha_mode != AlphaMode::Opaque {
+            return Some(direction);
+        }
+        if !is_smooth(material) {
+            return None;
+        }
+        let first = 3 * met.triangle.primitive as usize;
+        let [u, v] = met.uv;
+        let n: DVec3 = [1.0 - u - v, u, v]
+            .into_iter()
+            .zip(&mesh.indices[first..first + 3])
+            .map(|(weight, &i)| glam::Vec3::from(mesh.normals[i as usize]).as_dvec3() * weight)
+            .sum();
+        let n = (placed.world_from_object.matrix3.inverse().transpose() * n).normalize();
+        let cos = -direction.dot(n);
+        if !cos.is_finite() || cos == 0.0 {
+            return None;
+        }
+        // Normals of bodies look outwards, but where solids say otherwise.
+        let enters = (cos > 0.0) != self.solids.normals_flipped[instance];
+        let n = n * cos.signum();
+        let ior = f64::from(material.ior);
+        let ratio = if enters { ior } else { ior.recip() };
+        let mirrored = Some(reflect(direction, n));
+        let (base, coat) = smooth_layers(material);
+        if coat && random.unit() < f64::from(material.clearcoat) * fresnel_dielectric(cos.abs(), COAT_INDEX)[0] {
+            return mirrored;
+        }
+        if !base {
+            return None;
+        }
+        if material.metallic >= 0.5 || random.unit() < fresnel_dielectric(cos.abs(), ratio)[0] {
+            return mirrored;
+        }
+        match material.transmission > 0.0 {
+            true if self.solids.solid[instance] => Some(refract(direction, n, ratio).0),
+            true => Some(direction),
+            false => None,
+        }
+    }
+}
+
+impl Aims {
+    /// For paths through a scene.
+    #[must_use]
+    pub fn of(scene: &Scene, solids: &Solids, bvh: &Bvh, emitters: &Emitters) -> Self {
+        let Some(bounds) = bvh.nodes.first().map(|root| *root.bounds()) else {
+            return Self { corner: DVec3::ZERO, cell: 1.0, cells: [1; 3], firsts: vec![0], aims: Vec::new() };
+        };
+        let corner = DVec3::from(bounds.min.map(f64::from));
+        let size = DVec3::from(bounds.max.map(f64::from)) - corner;
+        let world = World {
+            scene,
+            solids,
+            bvh,
+            emitters,
+            firsts: scene.first_triangles(),
+            middle: corner + size * 0.5,
+            radius: 0.5 * size.length(),
+        };
+        let photons: Vec<Photon> = (0..PHOTONS).into_par_iter().flat_map_iter(|i| world.follow(i)).collect();
+        Self::around(corner, size, &photons)
+    }
+
+    fn around(corner: DVec3, size: DVec3, photons: &[Photon]) -> Self {
+        let cell = size.max_element() / CELLS;
+        // What bounds the scene lies well within the outermost cells.
+        let corner = corner - 0.5 * cell;
+        let cells = (size / cell).to_array().map(|n| n.ceil() as u32 + 1);
+        // Photons of the cells beside a cell count as its own: paths meet surfaces between them, too.
+        let mut found: HashMap<u32, Vec<DVec3>> = HashMap::new();
+        for photon in photons {
+            let at = ((photon.at - corner) / cell).floor();
+            for i in 0..27 {
+                let step = DVec3::new(f64::from(i % 3), f64::from(i / 3 % 3), f64::from(i / 9)) - 1.0;
+                let place = at + step;
+                if place.cmpge(DVec3::ZERO).all() && place.cmplt(DVec3::from(cells.map(f64::from))).all() {
+                    let [x, y, z] = place.to_array().map(|n| n as u32);
+                    let of_cell = found.entry(x + cells[0] * (y + cells[1] * z)).or_default();
+                    if of_cell.len() < MOST_PHOTONS {
+                        of_cell.push(photon.from);
+                    }
+                }
+            }
+        }
+        let mut order: Vec<(u32, Vec<DVec3>)> = found.into_iter().collect();
+        order.sort_unstable_by_key(|(place, _)| *place);
+        let of_cells: Vec<(u32, Vec<Ball>)> =
+            order.into_par_iter().map(|(place, from)| (place, balls(&from, cell))).collect();
+        let mut firsts = vec![0; cells.iter().product::<u32>() as usize];
+        let mut aims = Vec::new();
+        for (place, balls) in of_cells {
+            firsts[place as usize] = (aims.len() * 16 + balls.len()) as u32;
+            aims.extend(balls);
+        }
+        Self { corner, cell, cells, firsts, aims }
+    }
+}
+
+/// At most [`MOST_AIMS`] balls around points, of few sizes: one by one that which holds most of what is left, as light falls on it
+/// unevenly. What a ball of radius r holds is missed by a path that does not aim with a variance of (points)²/r²; aims are
+/// shared out by its root.
+fn balls(points: &[DVec3], cell: f64) -> Vec<Ball> {
+    let mut left = points.to_vec();
+    let mut found: Vec<Ball> = Vec::new();
+    while found.len() < MOST_AIMS && !left.is_empty() {
+        let held =
+            |middle: DVec3, radius: f64| left.iter().filter(|p| p.distance_squared(middle) <= radius * radius).count();
+        let candidates = left.iter().flat_map(|&middle| RADII.map(|radius| (middle, radius * cell)));
+        let scored = candidates.map(|(middle, radius)| ((held(middle, radius) as f64 - 0.5) / radius, middle, radius));
+        let Some((score, middle, radius)) = scored.max_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+        if found.first().is_some_and(|first| score < WORTH_AIMING * first.share) {
+            break;
+        }
+        found.push(Ball { middle, radius: MARGIN * radius, share: score });
+        left.retain(|p| p.distance_squared(middle) > radius * radius);
+    }
+    let sum: f64 = found.iter().map(|ball| ball.share).sum();
+    found.iter_mut().for_each(|ball| ball.share /= sum);
+    found
+}
