@@ -2,9 +2,12 @@
 //! with that of everything, in turns; and for each effect the program as it is beside one built without the effect's code,
 //! on a scene that does not call for it.
 //!
-//! `./x bench --bench price [-- saved | EFFECT ...]`: builds the program once for each effect, half an hour in all.
+//! `./x bench --bench price [-- saved | timed | counted] [EFFECT ...]`: builds the program once for each effect, half an hour in all.
+//! Times of one program scatter by 5 % from process to process on a shared machine; `counted` takes instructions instead, which
+//! valgrind counts to a ten-thousandth.
 #![allow(missing_docs, clippy::print_stdout, reason = "a program whose figures go to standard output")]
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
@@ -32,6 +35,10 @@ const EFFECTS: &[(&str, &str, &[&str])] = &[
     ("shadows", "SHADOWS", &["study:lamps", "--set", "shadows=off"]),
     ("light lists per tile", "TILE_WORDS", &["study:cornell"]),
     ("light from all around", "AMBIENT,REFLECTION", &["study:cornell", "--env", "none"]),
+    ("bands of wavelengths", "SPECTRAL", &["study:metals"]),
+    ("frosted surfaces", "FROSTED", &["study:metals", "--model", "global"]),
+    ("lights with a shape", "SHAPED_EMITTERS", &["study:lamps", "--model", "global"]),
+    ("aims", "AIMED", &["study:metals", "--model", "global"]),
     (
         "all of a local model's scene",
         "CLEARCOAT,HAS_LAYERS,CONDUCTORS,MASKED_HITS,FILTERS,TRANSMISSIVE,HAS_TRANSMISSION,ABSORPTION,MARCH_STEPS,\
@@ -143,8 +150,68 @@ fn spread(mut ratios: Vec<f64>) -> [f64; 3] {
     [ratios.len() / 4, ratios.len() / 2, ratios.len() * 3 / 4].map(|i| ratios[i])
 }
 
+/// Millions of instructions of a program that draws so many pictures, counted by valgrind on one thread; other load does not
+/// touch them.
+fn instructions(program: &Path, scene: &[&str], picture: &Path, pictures: u32, cold: bool) -> Result<f64> {
+    let mut command = Command::new("valgrind");
+    command.args(["--tool=cachegrind", "--cache-sim=no", "--cachegrind-out-file=/dev/null"]).arg(program);
+    command.args(["-q", "render"]).args(scene).args(["--size", "192x108", "--set", "samples=1", "-o"]).arg(picture);
+    command.args(["--repeat", &pictures.to_string()]).env("LP_NUM_THREADS", "1");
+    if cold {
+        command.env("MESA_SHADER_CACHE_DISABLE", "true");
+    }
+    let output = command.output().context("running valgrind")?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    ensure!(output.status.success(), "{said}");
+    let total = said.lines().find_map(|line| line.split_once("refs:")).context("valgrind tells no instructions")?;
+    Ok(total.1.trim().replace(',', "").parse::<f64>()? / 1e6)
+}
+
+/// Those of a picture and of a start with a cold driver; and the picture.
+fn count(program: &Path, scene: &[&str], folder: &Path) -> Result<([f64; 2], Vec<u8>)> {
+    let [warm_out, cold_out] = ["warm.exr", "cold.exr"].map(|name| folder.join(name));
+    let warm = || -> Result<f64> {
+        // The first run fills the driver's cache.
+        instructions(program, scene, &warm_out, 1, false)?;
+        let [one, five] = [1, 5].map(|pictures| instructions(program, scene, &warm_out, pictures, false));
+        Ok((five? - one?) / 4.0)
+    };
+    let cold = || instructions(program, scene, &cold_out, 1, true);
+    let (warm, cold) = std::thread::scope(|scope| {
+        let cold = scope.spawn(cold);
+        (warm(), cold.join().expect("a thread that counts"))
+    });
+    Ok(([warm?, cold?], std::fs::read(&warm_out)?))
+}
+
+/// Instructions of each effect's scene, beside those of a program without its code.
+fn counted(whole: &Path, folder: &Path, wanted: impl Fn(&str) -> bool) -> Result<()> {
+    println!("instructions with the code that nothing calls for, over without it, 192x108; millions of them");
+    println!("{:32} {:>28} {:>28}", "effect", "a picture", "start, cold driver");
+    let mut known = BTreeMap::new();
+    for (effect, constants, scene) in EFFECTS.iter().filter(|(effect, ..)| wanted(effect)) {
+        build(constants)?;
+        if !known.contains_key(scene) {
+            known.insert(*scene, count(whole, scene, folder)?);
+        }
+        let (with, picture) = &known[scene];
+        let (without, same) = count(&target().join("release/etalon"), scene, folder)?;
+        ensure!(*picture == same, "{effect}: the scene calls for it, its picture is another without");
+        let shown = |k: usize| format!("{:.4} ({:.1}, {:.1})", with[k] / without[k], with[k], without[k]);
+        println!("{effect:32} {:>28} {:>28}", shown(0), shown(1));
+    }
+    Ok(())
+}
+
 fn main() -> Result<()> {
-    let wanted: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
+    let mut wanted: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
+    let modes = ["saved", "timed", "counted"];
+    let mode = wanted.first().filter(|first| modes.contains(&first.as_str())).cloned();
+    if mode.is_some() {
+        wanted.remove(0);
+    }
+    let does = |what: &str| mode.as_deref().is_none_or(|mode| mode == what);
+    let asked = |effect: &str| wanted.is_empty() || wanted.iter().any(|name| effect.contains(name.as_str()));
     let folder = tempfile::tempdir()?;
     let built = target().join("release/etalon");
     let keep = |name: &str| -> Result<PathBuf> {
@@ -154,18 +221,18 @@ fn main() -> Result<()> {
     };
     build("")?;
     let whole = keep("whole")?;
-    if wanted.is_empty() || wanted.iter().any(|name| name == "saved") {
+    if does("saved") && wanted.is_empty() {
         saved(&whole, folder.path())?;
     }
-    if wanted == ["saved"] {
+    if mode.as_deref() == Some("counted") {
+        return counted(&whole, folder.path(), asked);
+    }
+    if !does("timed") {
         return Ok(());
     }
     println!("with the code that nothing calls for, over without it: the least of {PAIRS} runs (middle half of pairs)");
     println!("{:32} {:>24} {:>24} {:>16}", "effect", "passes of a picture", "start, cold driver", "SPIR-V, bytes");
-    for (effect, constants, scene) in EFFECTS {
-        if !wanted.is_empty() && !wanted.iter().any(|name| effect.contains(name.as_str())) {
-            continue;
-        }
+    for (effect, constants, scene) in EFFECTS.iter().filter(|(effect, ..)| asked(effect)) {
         build(constants)?;
         let without = keep("without")?;
         let (mut pictures, mut starts) = (Vec::new(), Vec::new());

@@ -329,6 +329,17 @@ fn light_from_all_around_is_there_where_it_is_seen() {
     assert!(bytes(&without) < 1000 && bytes(&with) > 1_000_000, "{}, {}", bytes(&without), bytes(&with));
 }
 
+/// No photon reaches what is hidden: aims are there, and nothing is aimed at.
+#[test]
+fn aims() {
+    Case {
+        choices: &["indirect=path", "lights=area:1", "guiding=aims"],
+        brings: &[&["aims", "cells of aims", "path.aimed"]],
+        ..Case::hidden("aims", NONE, metal(0.3), metal(0.0))
+    }
+    .check();
+}
+
 #[test]
 fn mirrors_bring_rays_and_rays_what_they_may_meet() {
     Case {
