@@ -354,7 +354,8 @@ fn aims_are_where_light_is_mirrored() {
     let word = aims.firsts[(floor.x + aims.cells[0] * (floor.y + aims.cells[1] * floor.z)) as usize];
     let balls = &aims.aims[(word >> 4) as usize..][..(word & 15) as usize];
     assert!(!balls.is_empty());
-    assert!((balls.iter().map(|ball| ball.share).sum::<f64>() - 1.0).abs() < 1e-12);
+    assert!(balls.iter().map(|ball| ball.share).sum::<f64>() == 1.0 && balls.iter().all(|ball| ball.share > 0.0));
+    assert!(balls.iter().all(|ball| half::f16::from_f64(ball.share).to_f64() == ball.share), "{balls:?}");
     // The lamp's middle is seen at two thirds of the way to its image.
     let seen = DVec3::new(0.8, 0.0, 1.0) - bvh.anchor;
     assert!(balls.iter().any(|ball| ball.middle.distance(seen) < ball.radius), "{balls:?}, not {seen}");

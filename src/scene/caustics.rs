@@ -34,6 +34,8 @@ const MOST_PHOTONS: usize = 96;
 const RADII: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 /// Around them: few photons do not tell where what they stand for ends.
 const MARGIN: f64 = 1.2;
+/// Steps of shares.
+const SHARES: f64 = 1024.0;
 /// Least share over the largest of its cell.
 const WORTH_AIMING: f64 = 0.05;
 
@@ -332,7 +334,12 @@ fn balls(points: &[DVec3], cell: f64) -> Vec<Ball> {
         found.push(Ball { middle, radius: MARGIN * radius, share: score });
         left.retain(|p| p.distance_squared(middle) > radius * radius);
     }
+    // In steps that a half holds exactly: what is drawn by shares that do not add up to 1 is drawn by another density.
     let sum: f64 = found.iter().map(|ball| ball.share).sum();
-    found.iter_mut().for_each(|ball| ball.share /= sum);
+    found.iter_mut().for_each(|ball| ball.share = (ball.share / sum * SHARES).floor().max(1.0) / SHARES);
+    let others: f64 = found.iter().skip(1).map(|ball| ball.share).sum();
+    if let Some(first) = found.first_mut() {
+        first.share = 1.0 - others;
+    }
     found
 }
