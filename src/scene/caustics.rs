@@ -26,15 +26,15 @@ const PHOTONS: u64 = 1 << 19;
 const MOST_SURFACES: usize = 12;
 /// Cells along the longest side of the scene.
 const CELLS: f64 = 32.0;
-/// Aims of one cell: what shaders/lib/aims.glsl goes through twice for each surface of a path.
-pub const MOST_AIMS: usize = 8;
+/// Aims of one cell, at most 15: what shaders/lib/aims.glsl goes through for each direction that it weighs.
+const MOST_AIMS: usize = 8;
 /// Photons that the aims of one cell are made from.
 const MOST_PHOTONS: usize = 96;
 /// Radii of what is aimed at, in cells.
 const RADII: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 /// Around them: few photons do not tell where what they stand for ends.
 const MARGIN: f64 = 1.2;
-/// Steps of shares.
+/// Steps of shares in 1: no more than a half holds exactly.
 const SHARES: f64 = 1024.0;
 /// Least share over the largest of its cell.
 const WORTH_AIMING: f64 = 0.05;
