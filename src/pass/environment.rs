@@ -248,9 +248,10 @@ fn reflectance_table() -> Vec<Texel> {
 }
 
 /// Half vectors are drawn from those visible to V (Heitz 2018): each sample's weight is G₂ / G₁(V), at most 1, so that
-/// 128 of them are good to 4e-3 and never sum to more than the light received. Drawing from D alone needs 4096.
+/// they never sum to more than the light received. 512 of them are good to 3e-3 and to 6e-4 of a table's texel in the mean; with
+/// 128 white metals of roughness 0.5 sent 1.002 of what they received. Drawing from D alone needs 4096 for 4e-3.
 fn directional_reflectance(cos_v: f64, roughness: f64) -> [f64; 2] {
-    const SAMPLES: u32 = 128;
+    const SAMPLES: u32 = 512;
     let alpha = roughness * roughness;
     let a2 = alpha * alpha;
     let root = |c: f64| (a2 + (1.0 - a2) * c * c).sqrt();
@@ -330,7 +331,7 @@ mod tests {
             }
             let table = directional_reflectance(cos_v, roughness);
             for (table, truth) in table.iter().zip(truth) {
-                assert!((table - truth).abs() < 4e-3, "{cos_v} {roughness}: {table} {truth}");
+                assert!((table - truth).abs() < 3e-3, "{cos_v} {roughness}: {table} {truth}");
             }
         }
     }
