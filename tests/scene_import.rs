@@ -1146,6 +1146,30 @@ fn wavefront_mistakes_name_their_line() {
 }
 
 #[test]
+fn mtl_materials_beyond_nature_are_drawn_with_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let warned = |mtl: &str| {
+        save(folder.path(), "m.mtl", &format!("newmtl m\n{mtl}"));
+        let path = save(folder.path(), "m.obj", "mtllib m.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+        scene::load(&path, &LoadOptions::default()).unwrap().warnings
+    };
+    for (mtl, expected) in [
+        ("Kd 1.5 0 0\n", "material \"m\": Kd 1.5 would send more light than there is"),
+        ("Ks 0 -0.5 0\n", "Ks -0.5 is negative"),
+        ("Ke 0 0 -1\n", "Ke -1 would take light away"),
+        ("Kd 0.8 0.8 0.8\nKs 0.1 0.5 0.1\n", "Kd + Ks is 1.30"),
+    ] {
+        let found = warned(mtl);
+        assert!(found.len() == 1 && found[0].contains(expected), "{mtl}: {found:?}");
+    }
+    for sound in
+        ["Kd 0.8 0.8 0.8\nKs 0.2 0.2 0.2\n", "Kd 1 1 1\nKs 1 1 1\nillum 1\n", "Kd 1 1 1\nKs 1 1 1\nillum 7\nNi 1.5\n"]
+    {
+        assert!(warned(sound).is_empty(), "{sound}");
+    }
+}
+
+#[test]
 fn other_endings_are_refused_by_name() {
     let error = format!("{:#}", scene::load(Path::new("a.fbx"), &LoadOptions::default()).unwrap_err());
     assert_eq!(error, "loading a.fbx: only .gltf, .glb and .obj files are supported");

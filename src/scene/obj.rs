@@ -324,6 +324,9 @@ impl Reader {
         if let Some(map) = &mtl.norm {
             material.normal_texture = Some(plain(self, map));
         }
+        for warning in mtl.beyond_nature() {
+            self.warn(format!("material \"{name}\": {warning}"));
+        }
         for ignored in &mtl.ignored {
             self.warn(format!("material \"{name}\": {ignored} is not supported and is ignored"));
         }
@@ -634,6 +637,32 @@ impl Mtl {
             _ => {}
         }
         Ok(())
+    }
+
+    /// What no surface does, and what is drawn instead.
+    fn beyond_nature(&self) -> Vec<String> {
+        let mut said = Vec::new();
+        for (keyword, share) in [("Kd", self.kd), ("Ks", self.ks), ("Tf", self.tf)] {
+            if let Some(&out) = share.iter().flatten().find(|x| !(0.0..=1.0).contains(*x)) {
+                let makes = if out > 1.0 { "would send more light than there is" } else { "is negative" };
+                said.push(format!("{keyword} {out} {makes} and is clamped to 0 … 1"));
+            }
+        }
+        if let Some(out) = self.ke.iter().flatten().find(|x| **x < 0.0) {
+            said.push(format!("Ke {out} would take light away and is read as 0"));
+        }
+        // Lecture B6's bound k_s ≤ (shine + 2)/2π (1 − π k_d) with what MTL files mean: Kd = π k_d is an albedo, and Ks the
+        // lobe's share, 2π k_s/(shine + 2).
+        if let (false, Some(kd), Some(ks)) = (matches!(self.illum, Some(0 | 1 | 4 | 6 | 7 | 9)), self.kd, self.ks) {
+            let most = (0..3).map(|i| kd[i].clamp(0.0, 1.0) + ks[i].clamp(0.0, 1.0)).fold(0.0, f32::max);
+            // Two decimals that round up to 1 in the sum are nobody's mistake.
+            if most > 1.005 {
+                said.push(format!(
+                    "Kd + Ks is {most:.2}, more light than there is; of Kd the share is drawn that Ks lets into the surface"
+                ));
+            }
+        }
+        said
     }
 
     fn fold(&self, name: &str) -> Material {
