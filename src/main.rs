@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use etalon::cli::options::When;
 use etalon::cli::unbuilt::UnbuiltCommand;
-use etalon::cli::{devices, diff, plan, render, verify};
+use etalon::cli::{cost, devices, diff, plan, render, verify};
 
 /// A Vulkan renderer written directly against ash: glTF in, radiance out.
 #[derive(Parser)]
@@ -34,8 +34,7 @@ enum Command {
     Verify(verify::VerifyArgs),
     #[command(hide = true)]
     View(UnbuiltCommand),
-    #[command(hide = true)]
-    Cost(UnbuiltCommand),
+    Cost(Box<cost::CostArgs>),
 }
 
 fn main() -> ExitCode {
@@ -64,7 +63,7 @@ fn main() -> ExitCode {
         Command::Devices(args) => devices::run(args),
         Command::View(args) => args.refuse("view"),
         Command::Plan(args) => plan::run(args),
-        Command::Cost(args) => args.refuse("cost"),
+        Command::Cost(args) => cost::run(args, arguments.quiet),
         Command::Verify(args) => verify::run(args, arguments.quiet),
     };
     result.unwrap_or_else(|error| {

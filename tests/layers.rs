@@ -18,7 +18,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("shader", &["shader", "gpu", "share"]),
     ("pass", &["pass", "gpu", "scene", "plan", "image", "shader", "share", "spectra"]),
     ("frame", &["frame", "pass", "gpu", "scene", "plan", "image", "share", "spectra"]),
-    ("cost", &["cost", "frame", "gpu", "plan", "scene"]),
+    ("cost", &["cost", "frame", "gpu", "plan", "scene", "image"]),
     (
         "cli",
         &[

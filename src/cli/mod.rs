@@ -1,9 +1,11 @@
 //! The commands of the program, one module each.
 
+pub mod cost;
 pub mod devices;
 pub mod diff;
 pub mod options;
 pub mod plan;
+mod progress;
 pub mod render;
 pub mod report;
 pub mod setup;

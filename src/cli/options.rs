@@ -155,7 +155,46 @@ fn background(text: &str) -> Result<Background, String> {
     }
 }
 
+/// One word of a command line as a shell reads it.
+fn word(text: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=+%".contains(c);
+    if !text.is_empty() && text.chars().all(plain) {
+        text.to_owned()
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    }
+}
+
 impl SceneOptions {
+    /// What was chosen, as words of a command line.
+    #[must_use]
+    pub fn words(&self) -> Vec<String> {
+        let point = |p: DVec3| format!("{},{},{}", p.x, p.y, p.z);
+        let mut all = vec![word(&self.scene)];
+        let mut option = |name: &str, value: Option<String>| {
+            all.extend(value.map(|value| format!("--{name} {}", word(&value))));
+        };
+        option("camera", self.camera.clone());
+        option("eye", self.eye.map(point));
+        option("target", self.target.map(point));
+        option("up", self.up.map(point));
+        option("fov", self.fov.map(|fov| fov.to_string()));
+        option("time", (self.time != "none").then(|| self.time.clone()));
+        option("env", self.env.clone());
+        option("env-intensity", (self.env_intensity != 1.0).then(|| self.env_intensity.to_string()));
+        option("env-rotation", (self.env_rotation != 0.0).then(|| self.env_rotation.to_string()));
+        option(
+            "background",
+            self.background.and_then(|background| match background {
+                Background::Default => None,
+                Background::Environment => Some("env".to_owned()),
+                Background::Transparent => Some("transparent".to_owned()),
+                Background::Color([r, g, b]) => Some(format!("#{r:02x}{g:02x}{b:02x}")),
+            }),
+        );
+        all
+    }
+
     /// Loads the scene at the asked time.
     ///
     /// # Errors
@@ -239,6 +278,20 @@ impl SceneOptions {
 }
 
 impl PictureOptions {
+    /// What was chosen beside model, knobs and seed, as words of a command line.
+    #[must_use]
+    pub fn words(&self) -> Vec<String> {
+        let mut all = vec![format!("--size {}x{}", self.size[0], self.size[1])];
+        if self.exposure != 0.0 {
+            all.push(format!("--exposure {}", self.exposure));
+        }
+        if self.tonemap != ToneMap::default() {
+            let name = self.tonemap.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+            all.push(format!("--tonemap {name}"));
+        }
+        all
+    }
+
     /// Draws a scene by wavelengths whose glass sends them different ways, where the model is the one of paths and nobody chose.
     ///
     /// # Errors
@@ -317,6 +370,12 @@ impl PictureOptions {
 }
 
 impl DeviceOptions {
+    /// What was chosen, as words of a command line.
+    #[must_use]
+    pub fn words(&self) -> Vec<String> {
+        self.device.iter().map(|device| format!("--device {}", word(device))).collect()
+    }
+
     /// Which device is meant.
     #[must_use]
     pub fn choice(&self) -> DeviceChoice {

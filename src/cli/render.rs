@@ -1,7 +1,6 @@
 //! `etalon render`: one picture, or a sequence of them.
 
 use std::collections::BTreeMap;
-use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -9,18 +8,18 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::options::{DeviceOptions, Extent, PictureOptions, SceneOptions, When};
 use super::plan::cost_table;
 use super::print;
+use super::progress::Steps;
 use super::report::{
     ColourFacts, MemoryFacts, Output, PassFacts, PipelineFacts, PlanFacts, Report, Sampling, SceneFacts, Spread,
     Validation, knob_map,
 };
 use super::setup::Setup;
 use super::unbuilt::UnbuiltOptions;
-use crate::frame::{Part, Progress, Rendered, Renderer};
+use crate::frame::{Part, Rendered, Renderer};
 use crate::gpu::Severity;
 use crate::image::{Aov, AovData, Picture, exr, file};
 use crate::pass::view::View;
@@ -139,75 +138,6 @@ impl Phases {
         let now = Instant::now();
         *self.all.entry(name).or_default() += (now - self.last).as_secs_f64() * 1e3;
         self.last = now;
-    }
-}
-
-/// Steps as a bar on a terminal, as lines elsewhere, or not at all.
-struct Steps {
-    bar: Option<ProgressBar>,
-    lines: bool,
-}
-
-impl Steps {
-    fn new(progress: When, quiet: bool) -> Self {
-        let terminal = std::io::stderr().is_terminal();
-        let shown = !quiet && progress != When::Never;
-        let bar = (shown && (terminal || progress == When::Always)).then(|| {
-            let bar = ProgressBar::with_draw_target(Some(1), ProgressDrawTarget::stderr());
-            let style = ProgressStyle::with_template("{msg:<24} {wide_bar} {pos}/{len} {elapsed}, {eta} left");
-            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-            bar
-        });
-        Self { lines: shown && bar.is_none(), bar }
-    }
-
-    fn step(&self, message: &str, of: u32) {
-        if let Some(bar) = &self.bar {
-            bar.set_message(message.to_owned());
-            bar.set_length(u64::from(of));
-            bar.set_position(0);
-        }
-        if self.lines {
-            eprintln!("{message}");
-        }
-    }
-
-    /// How far a picture is. Where there is no bar, a line at powers of two, no more often than once a second.
-    fn sampled(&self, progress: Progress, begun: Instant, last: &mut Instant) {
-        self.at(progress.done);
-        let Some(error) = progress.error else { return };
-        let relative = error.relmse.sqrt() * 100.0;
-        if let Some(bar) = &self.bar {
-            bar.set_message(format!("drawing, error {relative:.2} %"));
-        }
-        if self.lines && last.elapsed().as_secs() >= 1 {
-            *last = Instant::now();
-            let left =
-                begun.elapsed().as_secs_f64() / f64::from(progress.done) * f64::from(progress.of - progress.done);
-            eprintln!("{} of {} samples, error {relative:.2} %, {left:.0} s left at most", progress.done, progress.of);
-        }
-    }
-
-    fn at(&self, position: u32) {
-        if let Some(bar) = &self.bar {
-            bar.set_position(u64::from(position));
-        }
-    }
-
-    /// A line that stays, whatever the bar does.
-    fn say(&self, line: &str) {
-        match &self.bar {
-            Some(bar) => bar.suspend(|| eprintln!("{line}")),
-            None => eprintln!("{line}"),
-        }
-    }
-}
-
-impl Drop for Steps {
-    fn drop(&mut self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
     }
 }
 

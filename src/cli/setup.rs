@@ -6,6 +6,7 @@ use anyhow::{Result, anyhow};
 
 use super::options::{DeviceOptions, SceneOptions};
 use crate::cost::explain::{Price, Subject};
+use crate::cost::sitting::Bench;
 use crate::frame::{Renderer, Settings};
 use crate::gpu::Device;
 use crate::plan::Effect;
@@ -67,6 +68,28 @@ impl Setup {
             camera: &camera,
         };
         subject.prices(effects, progress)
+    }
+
+    /// Lends everything to something that draws many pictures.
+    ///
+    /// # Errors
+    /// When there is no such camera, and whatever goes wrong there.
+    pub fn bench<T>(
+        &self,
+        options: &SceneOptions,
+        mut settings: Settings,
+        draw: impl FnOnce(Bench<'_>) -> Result<T>,
+    ) -> Result<T> {
+        let share = options.environment_share(&self.scene);
+        settings.environment_intensity *= share.unwrap_or(1.0);
+        let camera = options.choose_camera(&self.scene, settings.size)?;
+        draw(Bench {
+            device: &self.device,
+            scene: &self.scene,
+            environment: self.environment.as_ref().filter(|_| share.is_some()),
+            settings,
+            camera: &camera,
+        })
     }
 
     /// Plans and uploads; the renderer, and the camera to draw from.

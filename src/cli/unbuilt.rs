@@ -47,7 +47,7 @@ impl UnbuiltCommand {
     /// Always: one sentence.
     pub fn refuse(&self, name: &str) -> Result<std::process::ExitCode> {
         bail!(
-            "etalon {name} {}: this command is not built yet; render, plan, verify, diff and devices are",
+            "etalon {name} {}: this command is not built yet; render, plan, cost, verify, diff and devices are",
             self.rest.join(" ")
         )
     }

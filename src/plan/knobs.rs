@@ -13,7 +13,13 @@ pub struct Knob {
     pub unbuilt: &'static [&'static str],
     /// What the presets `local`, `recursive` and `global` choose, as far as it is built.
     pub presets: [&'static str; 3],
-    /// What it approximates, with the lecture's ids.
+    /// The rung that approximates least, as far as it is built.
+    pub exact: &'static str,
+    /// The lecture's statements that it is about.
+    pub lecture: &'static [&'static str],
+    /// The plan's effects that it shapes; none: every surface of every scene.
+    pub effects: &'static [&'static str],
+    /// What it approximates.
     pub about: &'static str,
 }
 
@@ -24,90 +30,129 @@ pub static KNOBS: &[Knob] = &[
         rungs: &["off", "map", "ray"],
         unbuilt: &[],
         presets: ["map", "ray", "ray"],
-        about: "visibility of lights (R5)",
+        exact: "ray",
+        lecture: &["R5"],
+        effects: &["shadows"],
+        about: "visibility of lights",
     },
     Knob {
         name: "fresnel",
         rungs: &["schlick", "exact"],
         unbuilt: &[],
         presets: ["schlick", "exact", "exact"],
-        about: "Fresnel curve (F2, F3)",
+        exact: "exact",
+        lecture: &["F2", "F3"],
+        effects: &[],
+        about: "Fresnel curve",
     },
     Knob {
         name: "brdf",
         rungs: &["blinn-phong", "blinn-phong-reciprocal", "ggx", "ggx-multi"],
         unbuilt: &[],
         presets: ["ggx", "ggx", "ggx-multi"],
-        about: "rough reflection (B1, B5, B6)",
+        exact: "ggx-multi",
+        lecture: &["B1", "B5", "B6"],
+        effects: &[],
+        about: "rough reflection",
     },
     Knob {
         name: "reflection",
         rungs: &["off", "environment", "screen", "ray"],
         unbuilt: &[],
         presets: ["environment", "ray", "ray"],
-        about: "what a surface mirrors (F4): nothing, what is infinitely far, what is on the screen, the scene",
+        exact: "ray",
+        lecture: &["F4"],
+        effects: &["mirrors", "mirrored environment"],
+        about: "what a surface mirrors: nothing, what is infinitely far, what is on the screen, the scene",
     },
     Knob {
         name: "lobes",
         rungs: &["0.2", "0.5", "1"],
         unbuilt: &[],
         presets: ["0.2", "0.2", "1"],
-        about: "roughness up to which rays sample what a surface mirrors, one direction of its lobe for each of the samples (B6)",
+        exact: "1",
+        lecture: &["B6"],
+        effects: &["rays by lobes"],
+        about: "roughness up to which rays sample what a surface mirrors, one direction of its lobe for each of the samples",
     },
     Knob {
         name: "refraction",
         rungs: &["off", "screen", "ray"],
         unbuilt: &[],
         presets: ["off", "ray", "ray"],
-        about: "bent transmission (F5): none, one bend and a look at the screen, every bend",
+        exact: "ray",
+        lecture: &["F5"],
+        effects: &["refraction"],
+        about: "bent transmission: none, one bend and a look at the screen, every bend",
     },
     Knob {
         name: "interfaces",
         rungs: &["1", "2", "4", "8", "16", "32"],
         unbuilt: &[],
         presets: ["8", "8", "32"],
-        about: "surfaces that a path of rays may meet (R6)",
+        exact: "32",
+        lecture: &["R6"],
+        effects: &["refraction", "mirrors", "paths"],
+        about: "surfaces that a path of rays may meet",
     },
     Knob {
         name: "absorption",
         rungs: &["off", "thickness", "path", "march:4", "march:8", "march:16", "march:32", "march:64"],
         unbuilt: &[],
         presets: ["thickness", "path", "march:32"],
-        about: "light lost inside media (A1, A2); march:N goes through grids of sigma in N steps of each segment",
+        exact: "march:64",
+        lecture: &["A1", "A2"],
+        effects: &["absorption", "media that vary"],
+        about: "light lost inside media; march:N goes through grids of sigma in N steps of each segment",
     },
     Knob {
         name: "quadrature",
         rungs: &["left", "midpoint", "simpson"],
         unbuilt: &[],
         presets: ["midpoint", "midpoint", "midpoint"],
-        about: "rule of the sum over those steps (A2), of order 1, 2 and 4",
+        exact: "simpson",
+        lecture: &["A2"],
+        effects: &["quadrature"],
+        about: "rule of the sum over those steps, of order 1, 2 and 4",
     },
     Knob {
         name: "indirect",
         rungs: &["off", "ambient", "path"],
         unbuilt: &[],
         presets: ["ambient", "ambient", "path"],
-        about: "light from all around: none, the environment as if nothing stood before it, paths from surface to surface (R6)",
+        exact: "path",
+        lecture: &["R6"],
+        effects: &["paths", "ambient light"],
+        about: "light from all around: none, the environment as if nothing stood before it, paths from surface to surface",
     },
     Knob {
         name: "lights",
         rungs: &["points", "area:1", "area:4", "area:16"],
         unbuilt: &[],
         presets: ["points", "points", "area:1"],
-        about: "extent of lights (R2): with area:N surfaces that emit light others, by N places on them at each surface of a path",
+        exact: "area:1",
+        lecture: &["R2"],
+        effects: &["surfaces that light", "lights with a shape"],
+        about: "extent of lights: with area:N surfaces that emit light others, by N places on them at each surface of a path",
     },
     Knob {
         name: "guiding",
         rungs: &["off", "aims"],
         unbuilt: &[],
         presets: ["off", "off", "aims"],
-        about: "where paths go (R6): as surfaces scatter, or also where photons came from by way of mirrors and lenses; the same mean",
+        exact: "aims",
+        lecture: &["R6"],
+        effects: &["aims"],
+        about: "where paths go: as surfaces scatter, or also where photons came from by way of mirrors and lenses; the same mean",
     },
     Knob {
         name: "samples",
         rungs: &["1", "4", "16", "64", "256", "1024", "4096"],
         unbuilt: &[],
         presets: ["4", "4", "64"],
+        exact: "64",
+        lecture: &[],
+        effects: &[],
         about: "samples per pixel",
     },
     Knob {
@@ -115,20 +160,29 @@ pub static KNOBS: &[Knob] = &[
         rungs: &["rgb", "spectral:8", "spectral:16", "spectral:32"],
         unbuilt: &[],
         presets: ["rgb", "rgb", "rgb"],
-        about: "wavelengths (C1–C3): three colours, or so many bands of 380 to 780 nm, each a picture of its own",
+        exact: "spectral:32",
+        lecture: &["C1", "C2", "C3"],
+        effects: &["bands of wavelengths"],
+        about: "wavelengths: three colours, or so many bands of 380 to 780 nm, each a picture of its own",
     },
     Knob {
         name: "upsampling",
         rungs: &["mallett-yuksel", "jakob-hanika"],
         unbuilt: &[],
         presets: ["jakob-hanika", "jakob-hanika", "jakob-hanika"],
-        about: "reflectance by wavelength of what is told as a colour (C3): a sum of three curves, a fitted sigmoid",
+        exact: "jakob-hanika",
+        lecture: &["C3"],
+        effects: &["bands of wavelengths"],
+        about: "reflectance by wavelength of what is told as a colour: a sum of three curves, a fitted sigmoid",
     },
     Knob {
         name: "arithmetic",
         rungs: &["fast", "stable", "compensated"],
         unbuilt: &[],
         presets: ["stable", "stable", "stable"],
+        exact: "compensated",
+        lecture: &[],
+        effects: &[],
         about: "form of the formulas (docs/numerics.md)",
     },
     Knob {
@@ -136,6 +190,9 @@ pub static KNOBS: &[Knob] = &[
         rungs: &["oct32"],
         unbuilt: &["oct16", "oct24", "f32"],
         presets: ["oct32", "oct32", "oct32"],
+        exact: "oct32",
+        lecture: &[],
+        effects: &[],
         about: "stored normals",
     },
     Knob {
@@ -143,6 +200,9 @@ pub static KNOBS: &[Knob] = &[
         rungs: &["depth"],
         unbuilt: &["stored"],
         presets: ["depth", "depth", "depth"],
+        exact: "depth",
+        lecture: &[],
+        effects: &[],
         about: "stored positions",
     },
 ];
@@ -216,6 +276,23 @@ impl Knobs {
         let (none, others): (Vec<&String>, Vec<&String>) =
             choices.iter().partition(|choice| choice.as_str() == "interfaces=0");
         others.into_iter().try_for_each(|choice| self.set(choice))?;
+        self.check()?;
+        let sends = ["refraction", "reflection"].into_iter().find(|knob| self.rung(knob) == "ray");
+        match (none.first(), sends) {
+            (None, _) => Ok(()),
+            (Some(choice), None) => self.set(choice),
+            (Some(choice), Some(knob)) => bail!(
+                "--set {choice} contradicts {knob}=ray, whose rays meet at least one surface; the nearest choice is \
+                 interfaces=1, or {knob}=screen"
+            ),
+        }
+    }
+
+    /// Says whether two rungs contradict.
+    ///
+    /// # Errors
+    /// One sentence with both and the nearest choice.
+    pub fn check(&self) -> Result<()> {
         if self.rung("indirect") == "path" {
             let other = ["shadows", "reflection", "refraction"].into_iter().find(|knob| self.rung(knob) != "ray");
             if let Some(knob) = other {
@@ -240,15 +317,23 @@ impl Knobs {
                 self.rung("indirect")
             );
         }
-        let sends = ["refraction", "reflection"].into_iter().find(|knob| self.rung(knob) == "ray");
-        match (none.first(), sends) {
-            (None, _) => Ok(()),
-            (Some(choice), None) => self.set(choice),
-            (Some(choice), Some(knob)) => bail!(
-                "--set {choice} contradicts {knob}=ray, whose rays meet at least one surface; the nearest choice is \
-                 interfaces=1, or {knob}=screen"
-            ),
-        }
+        Ok(())
+    }
+
+    /// The rungs of paths that approximate least, with the samples of `global`.
+    #[must_use]
+    pub fn exact() -> Self {
+        let rung = |knob: &Knob| knob.rungs.iter().position(|r| *r == knob.exact).unwrap_or_default();
+        Self { rungs: KNOBS.iter().map(rung).collect() }
+    }
+
+    /// The same with another rung of one knob; `None` where there is no such rung or it contradicts another.
+    #[must_use]
+    pub fn with(&self, knob: &str, rung: &str) -> Option<Self> {
+        let mut changed = self.clone();
+        changed.set(&format!("{knob}={rung}")).ok()?;
+        changed.check().ok()?;
+        Some(changed)
     }
 
     /// The chosen rung of a knob.

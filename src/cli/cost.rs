@@ -1,0 +1,141 @@
+//! `etalon cost`: error against time for every rung that a scene calls for.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context as _, Result, bail, ensure};
+use clap::Args;
+
+use super::options::{DeviceOptions, Extent as Planned, PictureOptions, SceneOptions, When};
+use super::print;
+use super::progress::Steps;
+use super::setup::Setup;
+use crate::cost::report;
+use crate::cost::sweep::{Extent, Step, Sweep};
+use crate::cost::table::Table;
+use crate::image::file;
+use crate::plan::Model;
+use crate::scene::Reads;
+
+/// Price every approximation on a scene: error against the scene's own reference, beside GPU time
+#[derive(Debug, Clone, Args)]
+pub struct CostArgs {
+    #[command(flatten)]
+    scene: SceneOptions,
+    /// Folder for report.html, cost.json, cost.csv and the pictures; a run that was interrupted there goes on
+    #[arg(short, long, value_name = "DIR", required_unless_present = "compare")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    picture: PictureOptions,
+    #[command(flatten)]
+    device: DeviceOptions,
+    /// Seconds to be spent, about: they decide how many samples the reference has
+    #[arg(long, value_name = "SECONDS", default_value_t = 240, value_parser = clap::value_parser!(u32).range(1..))]
+    budget: u32,
+    /// Samples of the reference, whatever the budget
+    #[arg(long, value_name = "N")]
+    reference_samples: Option<u32>,
+    /// Draw only the I-th of N parts; each part needs a folder of its own, and --merge joins them
+    #[arg(long, value_name = "I/N", value_parser = shard, requires = "reference_samples")]
+    shard: Option<[u32; 2]>,
+    /// Join the parts of a run, in these folders, instead of measuring
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["shard", "reference_samples", "compare"])]
+    merge: Vec<PathBuf>,
+    /// Price one approximation only: two pictures in turns, two lines and a verdict
+    #[arg(long, value_name = "KNOB=A,B", conflicts_with_all = ["shard", "reference_samples"])]
+    compare: Option<String>,
+    /// Print cost.json as well
+    #[arg(long)]
+    json: bool,
+    /// Progress: a bar on a terminal, a line per step elsewhere
+    #[arg(long, value_enum, default_value_t = When::Auto)]
+    progress: When,
+}
+
+fn shard(text: &str) -> Result<[u32; 2], String> {
+    let parts = text.split_once('/').and_then(|(i, n)| Some([i.parse().ok()?, n.parse().ok()?]));
+    match parts {
+        Some([i, n]) if i >= 1 && i <= n => Ok([i, n]),
+        _ => Err("expected I/N with I from 1 to N, for example 2/3".to_owned()),
+    }
+}
+
+impl CostArgs {
+    /// All that a picture depends on beside its knobs, as words of a command line.
+    fn words(&self) -> String {
+        [self.scene.words(), self.picture.words(), self.device.words()].concat().join(" ")
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// One sentence with what was being done, to what, and the cause.
+pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
+    let output = args.output.clone().unwrap_or_default();
+    if !args.merge.is_empty() {
+        let read = |folder: &PathBuf| -> Result<Table> {
+            let path = folder.join("cost.json");
+            serde_json::from_slice(&file::read(&path)?).with_context(|| format!("reading {}", path.display()))
+        };
+        let table = Table::merge(args.merge.iter().map(read).collect::<Result<_>>()?)?;
+        let pictures = output.join("pictures");
+        std::fs::create_dir_all(&pictures).with_context(|| format!("making the folder {}", pictures.display()))?;
+        for folder in &args.merge {
+            for entry in folder.join("pictures").read_dir().with_context(|| format!("reading {}", folder.display()))? {
+                let from = entry?.path();
+                let to = pictures.join(from.file_name().unwrap_or_default());
+                file::write(&to, &file::read(&from)?)?;
+            }
+        }
+        return write(args, &output, &table);
+    }
+    let settings = args.picture.settings(&args.scene)?;
+    let compared = args.compare.is_some();
+    if !compared && (!args.picture.set.is_empty() || args.picture.model != Model::default()) {
+        bail!(
+            "--model and --set: cost chooses the rungs itself; with --compare KNOB=A,B they are those of all other knobs"
+        );
+    }
+    ensure!(args.picture.plan == Planned::Scene, "--plan: cost plans what the scene calls for");
+    ensure!(settings.max_error.is_none(), "--max-error: cost draws a reference and many pictures; it has none to end");
+    let steps = Steps::new(args.progress, quiet);
+    steps.step(&format!("loading {}", args.scene.scene), 1);
+    let setup = Setup::load(&args.scene, Reads::Everything, &args.device)?;
+    for warning in &setup.warnings {
+        tracing::warn!("{warning}");
+    }
+    let command = format!("etalon render {}", args.words());
+    let table = setup.bench(&args.scene, settings, |bench| {
+        let samples = args.reference_samples;
+        if let Some(samples) =
+            samples.filter(|n| !n.is_power_of_two() || n.trailing_zeros() % 2 == 1 || *n < 4 || *n > 4096)
+        {
+            bail!("--reference-samples {samples}: expected 4, 16, 64, 256, 1024 or 4096");
+        }
+        let sweep = Sweep {
+            bench,
+            folder: &output,
+            extent: Extent { budget_s: args.budget, reference_samples: samples, shard: args.shard.unwrap_or([1, 1]) },
+            command: &command,
+            scene: &args.scene.scene,
+        };
+        sweep.run(&mut |step: Step<'_>| steps.of(step.name, step.done, step.of, step.left_s))
+    })?;
+    drop(steps);
+    write(args, &output, &table)
+}
+
+fn write(args: &CostArgs, output: &std::path::Path, table: &Table) -> Result<ExitCode> {
+    file::write(&output.join("cost.csv"), &table.csv()?)?;
+    file::write(&output.join("report.html"), report::page(table, &output.join("pictures"))?.as_bytes())?;
+    // Last: a folder with this file is a finished run.
+    let json = serde_json::to_string_pretty(table)?;
+    file::write(&output.join("cost.json"), json.as_bytes())?;
+    if args.json {
+        print(&json)?;
+    } else {
+        print(&output.join("report.html").display().to_string())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
