@@ -10,6 +10,7 @@ use super::options::{DeviceOptions, Extent as Planned, PictureOptions, SceneOpti
 use super::print;
 use super::progress::Steps;
 use super::setup::Setup;
+use crate::cost::compare::{Compared, compare_rungs};
 use crate::cost::report;
 use crate::cost::sweep::{Extent, Step, Sweep};
 use crate::cost::table::Table;
@@ -98,6 +99,7 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
         );
     }
     ensure!(args.picture.plan == Planned::Scene, "--plan: cost plans what the scene calls for");
+    ensure!(compared || args.output.is_some(), "--output: name a folder for the report");
     ensure!(settings.max_error.is_none(), "--max-error: cost draws a reference and many pictures; it has none to end");
     let steps = Steps::new(args.progress, quiet);
     steps.step(&format!("loading {}", args.scene.scene), 1);
@@ -106,6 +108,12 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
         tracing::warn!("{warning}");
     }
     let command = format!("etalon render {}", args.words());
+    if let Some(wanted) = &args.compare {
+        let knobs = settings.knobs.clone();
+        let compared = setup.bench(&args.scene, settings, |bench| compare_rungs(&bench, &knobs, wanted))?;
+        drop(steps);
+        return say(args, &compared);
+    }
     let table = setup.bench(&args.scene, settings, |bench| {
         let samples = args.reference_samples;
         if let Some(samples) =
@@ -124,6 +132,29 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
     })?;
     drop(steps);
     write(args, &output, &table)
+}
+
+/// Two lines and a verdict.
+fn say(args: &CostArgs, compared: &Compared) -> Result<ExitCode> {
+    if args.json {
+        print(&serde_json::to_string_pretty(compared)?)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let Compared { knob, rungs, gpu_ms, price, worst_pixel } = compared;
+    let width = rungs.map(str::len).into_iter().max().unwrap_or_default();
+    for (rung, ms) in rungs.iter().zip(gpu_ms) {
+        let error = if *rung == price.to {
+            let error = 100.0 * price.shown_delta.median.max(0.0).sqrt();
+            format!("{error:.3} % of what is shown, FLIP {:.4}", price.flip_between)
+        } else {
+            "compared with".to_owned()
+        };
+        print(&format!("{knob}={rung:width$}  {:8.2} ms ({:.2} … {:.2})  {error}", ms.median, ms.low, ms.high))?;
+    }
+    let worst =
+        if price.same { String::new() } else { format!("; most of it at pixel {},{}", worst_pixel.x, worst_pixel.y) };
+    print(&format!("{knob}={} instead of {} {}{worst}", price.to, price.from, price.verdict))?;
+    Ok(ExitCode::SUCCESS)
 }
 
 fn write(args: &CostArgs, output: &std::path::Path, table: &Table) -> Result<ExitCode> {

@@ -10,6 +10,7 @@ use super::table::{Errors, Interval, WorstPixel};
 use crate::image::Picture;
 use crate::image::metric::{AnyPicture, Comparison, Metric, compare};
 use crate::image::png::Display;
+use crate::image::tone::{self, ToneMap};
 
 /// Added to squares that are divided by, as everywhere.
 const FLOOR: f64 = 0.01;
@@ -89,19 +90,64 @@ fn delta_e(a: &Display, b: &Display) -> f64 {
     sum / a.rgba.len().max(1) as f64
 }
 
-/// The relative mean squared difference of what two pictures converge to. Their halves A and B share no random numbers, so that
-/// the product of both differences is the square without noise in the mean; the spread over pixels says how well that is known.
+/// Displayed values 0 to 1 of a half of a picture's samples, channel by channel.
+pub type Shown = Vec<[f32; 3]>;
+
+/// What a display shows of radiance.
 #[must_use]
-pub fn without_noise(a: &[Picture; 2], b: &[Picture; 2], reference: &Picture) -> Interval {
-    let n = reference.rgba.len() as f64;
-    let (mut sum, mut squares) = (0.0, 0.0);
-    for (i, r) in reference.rgba.iter().enumerate() {
-        let product = relative(minus(a[0].rgba[i], b[0].rgba[i]), minus(a[1].rgba[i], b[1].rgba[i]), *r);
-        sum += product;
-        squares += product * product;
-    }
-    let mean = sum / n;
-    Interval::around(mean, ((squares / n - mean * mean).max(0.0) / n).sqrt())
+pub fn shown(picture: &Picture, tonemap: ToneMap, exposure: f32) -> Shown {
+    let scale = f64::from(exposure).exp2();
+    let one = |pixel: &[f32; 4]| {
+        let curve = tonemap.apply([0, 1, 2].map(|c| f64::from(pixel[c]) * scale));
+        curve.map(|light| tone::srgb_encode(light.clamp(0.0, 1.0)) as f32)
+    };
+    picture.rgba.par_iter().map(one).collect()
+}
+
+/// The mean squared difference of displayed values of what two pictures converge to, in squares of `side` by `side` pixels. Their
+/// halves A and B share no random numbers, so that the product of both differences is the square without noise in the mean; the
+/// spread over the squares says how well that is known. Displayed values are bounded: single pixels that are far too bright count as
+/// much as others. Larger squares have less noise, and see no difference that is finer than they are.
+#[must_use]
+pub fn without_noise(a: &[Shown; 2], b: &[Shown; 2], width: usize, side: usize) -> Interval {
+    let across = width / side;
+    let down = a[0].len() / width.max(1) / side;
+    let mean = |half: usize, x: usize, y: usize, c: usize| -> f64 {
+        let rows = y * side..(y + 1) * side;
+        let all = rows.flat_map(|row| row * width + x * side..row * width + (x + 1) * side);
+        let sum: f64 = all.map(|i| f64::from(a[half][i][c]) - f64::from(b[half][i][c])).sum();
+        sum / (side * side) as f64
+    };
+    let products: Vec<f64> = (0..across * down)
+        .into_par_iter()
+        .map(|i| {
+            let (x, y) = (i % across, i / across);
+            (0..3).map(|c| mean(0, x, y, c) * mean(1, x, y, c)).sum::<f64>() / 3.0
+        })
+        .collect();
+    let n = products.len().max(1) as f64;
+    let middle = products.iter().sum::<f64>() / n;
+    let spread = products.iter().map(|p| (p - middle) * (p - middle)).sum::<f64>() / n;
+    Interval::around(middle, (spread / n).sqrt())
+}
+
+/// The same, as fine as noise allows, with the side of the squares.
+#[must_use]
+pub fn told_apart(a: &[Shown; 2], b: &[Shown; 2], width: usize) -> (Interval, u32) {
+    let fine = without_noise(a, b, width, 1);
+    let coarse = [4, 16].map(|side| (without_noise(a, b, width, side), side as u32));
+    // What is told apart by finer squares is told better.
+    let told = coarse.into_iter().find(|(found, _)| found.low > 0.0).filter(|_| fine.low <= 0.0);
+    told.unwrap_or((fine, 1))
+}
+
+/// Mean squared difference of displayed values 0 to 1.
+#[must_use]
+pub fn display_mse(a: &Display, b: &Display) -> f64 {
+    let square = |(a, b): (&[u8; 4], &[u8; 4])| {
+        (0..3).map(|c| ((f64::from(a[c]) - f64::from(b[c])) / 255.0).powi(2)).sum::<f64>() / 3.0
+    };
+    a.rgba.iter().zip(&b.rgba).map(square).sum::<f64>() / a.rgba.len().max(1) as f64
 }
 
 #[cfg(test)]
@@ -140,7 +186,7 @@ mod tests {
 
     #[test]
     fn a_noisy_reference_takes_nothing_from_an_error() {
-        let (a, b) = (picture(|i| 0.5 + 0.1 * noise(i)), picture(|i| 0.5 + 0.1 * noise(i + 100_000)));
+        let (a, b) = (picture(|i| 0.5 + 0.02 * noise(i)), picture(|i| 0.5 + 0.02 * noise(i + 100_000)));
         let film = picture(|i| 0.5 * (a.rgba[i][0] + b.rgba[i][0]));
         let truth = Truth { display: shown(&film), film, half: a };
         // Off by 0.05 everywhere: 0.0025 / (0.25 + 0.01).
@@ -156,14 +202,28 @@ mod tests {
 
     #[test]
     fn differences_of_noisy_pictures_are_those_of_their_means() {
-        let half = |seed: usize, off: f32| picture(move |i| 0.5 + off + 0.2 * noise(i + seed * 100_000));
+        let half = |seed: usize, off: f32| -> Shown {
+            (0..64 * 64).map(|i| [0.5 + off + 0.2 * noise(i + seed * 100_000); 3]).collect()
+        };
         let (a, same) = ([half(1, 0.0), half(2, 0.0)], [half(3, 0.0), half(4, 0.0)]);
-        let reference = picture(|_| 0.5);
-        let nothing = without_noise(&a, &same, &reference);
+        let nothing = without_noise(&a, &same, 64, 1);
         assert!(nothing.low < 0.0 && nothing.high > 0.0 && nothing.high < 2e-3, "{nothing:?}");
         let other = [half(3, 0.05), half(4, 0.05)];
-        let found = without_noise(&a, &other, &reference);
-        let expected = 0.0025 / 0.26;
-        assert!(found.low < expected && expected < found.high && found.low > 0.0, "{found:?}");
+        let found = without_noise(&a, &other, 64, 1);
+        assert!(found.low < 0.0025 && 0.0025 < found.high && found.low > 0.0, "{found:?}");
+        // Too little for pixels, but not for squares.
+        let little = [half(3, 0.02), half(4, 0.02)];
+        let (found, side) = told_apart(&a, &little, 64);
+        assert!(side > 1 && found.low < 4e-4 && found.high > 4e-4, "{side} {found:?}");
+        assert_eq!(told_apart(&a, &other, 64).1, 1);
+        let (found, _) = told_apart(&a, &same, 64);
+        assert!(found.low < 0.0, "{found:?}");
+    }
+
+    #[test]
+    fn what_is_shown_is_bounded() {
+        let bright = Picture { width: 1, height: 1, rgba: vec![[1e6, 0.25, -1.0, 1.0]] };
+        let [[r, g, b]] = super::shown(&bright, ToneMap::Linear, 1.0)[..] else { panic!("one pixel") };
+        assert!(r == 1.0 && b == 0.0 && (f64::from(g) - tone::srgb_encode(0.5)).abs() < 1e-6, "{r} {g} {b}");
     }
 }

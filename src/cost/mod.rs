@@ -3,6 +3,8 @@
 //! [`sweep::Sweep`] draws the scene's reference, every rung alone and some combinations; [`table::Table`] is what it found,
 //! [`report`] the page that shows it. [`explain`] prices effects that a plan leaves out.
 
+pub mod choose;
+pub mod compare;
 pub mod difference;
 pub mod explain;
 pub mod report;

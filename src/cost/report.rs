@@ -158,7 +158,7 @@ pub fn page(table: &Table, pictures: &Path) -> Result<String> {
                         div.pair {
                             figure {
                                 img src=(reference) alt={ "The reference picture of " (table.scene) };
-                                figcaption { (table.reference.samples) " samples of each pixel, own error " (percent(table.reference.own_error)) }
+                                figcaption { (table.reference.samples) " samples of each pixel, own FLIP " (digits(table.reference.own_flip)) }
                             }
                             (facts(table))
                         }
@@ -168,7 +168,7 @@ pub fn page(table: &Table, pictures: &Path) -> Result<String> {
                     }
                     section #frontier {
                         h2 { "Error against time" }
-                        p { "Each point is a picture: GPU time across, relative error (root of relMSE) up, both logarithmic. On the line lies what nothing beats in both. Point at one, or step through them with Tab." }
+                        p { "Each point is a picture: GPU time across, FLIP's mean error up, both logarithmic. On the line lies what nothing beats in both; the broken line is the reference's own error, below which nothing is known. Point at a point, or step through them with Tab." }
                         div.chart-and-card {
                             (chart(table))
                             aside #card aria-live="polite" { p.quiet { "Point at a point." } }
@@ -177,7 +177,7 @@ pub fn page(table: &Table, pictures: &Path) -> Result<String> {
                     }
                     section #prices {
                         h2 { "Price of each rung alone" }
-                        p { "One knob changed, all others as in " em { "local" } " or as in the reference (" em { "exact" } "). Sorted by error bought per millisecond." }
+                        p { "One knob changed, all others as in " em { "local" } " or as in the reference (" em { "exact" } "). Sorted by error bought per millisecond. Error is the root mean square of displayed values, in percent of their range: against the reference from " em { "local" } ", without the noise of paths from " em { "exact" } "." }
                         (prices(table))
                     }
                     section #tornado {
@@ -234,12 +234,12 @@ const SECTIONS: &[(&str, &str)] = &[
 fn summary(table: &Table) -> String {
     let called: Vec<&str> = table.knobs.iter().filter(|k| k.called_for).map(|k| k.knob.as_str()).collect();
     let free: Vec<&str> = called.iter().copied().filter(|knob| harmless(table, knob)).collect();
-    let seen = |price: &&Price| price.flip_between >= 0.002;
-    if !table.prices.iter().any(|price| seen(&price)) {
+    if !table.prices.iter().any(Price::is_seen) {
         return "This scene calls for nothing that can be seen: no rung of any knob changes its picture visibly."
             .to_owned();
     }
-    let worst = table.prices.iter().max_by(|a, b| a.flip_between.total_cmp(&b.flip_between));
+    let worst =
+        table.prices.iter().filter(|price| price.is_seen()).max_by(|a, b| a.flip_between.total_cmp(&b.flip_between));
     let mut text = format!("Of {} knobs the scene calls for {}.", table.knobs.len(), called.len());
     if let Some(worst) = worst {
         text += &format!(
@@ -259,7 +259,7 @@ fn summary(table: &Table) -> String {
 /// Whether it was priced and no rung of it can be seen.
 fn harmless(table: &Table, knob: &str) -> bool {
     let mut all = table.prices.iter().filter(|price| price.knob == knob).peekable();
-    all.peek().is_some() && all.all(|price| price.flip_between < 0.002)
+    all.peek().is_some() && !all.any(Price::is_seen)
 }
 
 fn facts(table: &Table) -> Markup {
@@ -271,7 +271,7 @@ fn facts(table: &Table) -> Markup {
                 tr { th scope="row" { "Device" } td { (t.device.name) " (" (t.device.kind) ")" } }
                 tr { th scope="row" { "Driver" } td { (t.device.driver) " " (t.device.version) } }
                 tr { th scope="row" { "Reference" } td { (t.reference.samples) " samples, " (digits(t.reference.gpu_ms)) " ms of GPU time" } }
-                tr { th scope="row" { "Its own error" } td { (percent(t.reference.own_error)) @if !t.reference.converged { ", not converged" } } }
+                tr { th scope="row" { "Its own error" } td { "FLIP " (digits(t.reference.own_flip)) ", √relMSE " (percent(t.reference.own_error)) @if !t.reference.converged { ", not converged" } } }
                 tr { th scope="row" { "Made by" } td { code { (t.reference.command) } } }
             }
         }
@@ -292,15 +292,15 @@ fn chart(table: &Table) -> Markup {
     let [left, right, top, bottom] = MARGIN;
     let visible = || table.points.iter().filter(|p| p.error() > 0.0 && p.gpu_ms.median > 0.0);
     let x = Axis::around(visible().map(|p| p.gpu_ms.median), left, width - right);
-    let y = Axis::around(visible().map(|p| 100.0 * p.error()), height - bottom, top);
+    let y = Axis::around(visible().map(Point::error), height - bottom, top);
     let line: Vec<String> = table
         .frontier
         .iter()
         .filter_map(|&i| table.points.get(i))
-        .map(|p| format!("{:.1},{:.1}", x.at(p.gpu_ms.median), y.at(100.0 * p.error())))
+        .map(|p| format!("{:.1},{:.1}", x.at(p.gpu_ms.median), y.at(p.error())))
         .collect();
     html! {
-        svg.chart viewBox=(format!("0 0 {width} {height}")) role="group" aria-label="Relative error against GPU time" {
+        svg.chart viewBox=(format!("0 0 {width} {height}")) role="group" aria-label="FLIP against GPU time" {
             @for tick in x.ticks() {
                 line.grid x1=(x.at(tick)) x2=(x.at(tick)) y1=(top) y2=(height - bottom) {}
                 text.tick x=(x.at(tick)) y=(height - bottom + 16.0) text-anchor="middle" { (digits(tick)) }
@@ -310,16 +310,15 @@ fn chart(table: &Table) -> Markup {
                 text.tick x=(left - 8.0) y=(y.at(tick) + 4.0) text-anchor="end" { (digits(tick)) }
             }
             text.axis x=((left + width - right) * 0.5) y=(height - 8.0) text-anchor="middle" { "GPU time of a picture, ms" }
-            text.axis transform=(format!("translate(14 {}) rotate(-90)", (top + height - bottom) * 0.5)) text-anchor="middle" { "relative error, %" }
+            text.axis transform=(format!("translate(14 {}) rotate(-90)", (top + height - bottom) * 0.5)) text-anchor="middle" { "FLIP, mean" }
+            line.own x1=(left) x2=(width - right) y1=(y.at(table.reference.own_flip)) y2=(y.at(table.reference.own_flip)) {}
             polyline.pareto points=(line.join(" ")) {}
             @for (index, p) in table.points.iter().enumerate() {
                 @let on = table.frontier.contains(&index);
-                @let [cx, cy] = [x.at(p.gpu_ms.median), y.at(100.0 * p.error())];
-                @let [low, high] = [p.errors.relmse.low, p.errors.relmse.high].map(|e| y.at(100.0 * e.max(0.0).sqrt()));
+                @let [cx, cy] = [x.at(p.gpu_ms.median), y.at(p.error())];
                 line.bar x1=(x.at(p.gpu_ms.low)) x2=(x.at(p.gpu_ms.high)) y1=(cy) y2=(cy) {}
-                line.bar x1=(cx) x2=(cx) y1=(low.min(height - bottom)) y2=(high) {}
                 a.point href={ "#p-" (p.picture) } data-point=(p.picture) {
-                    title { (p.name) ": " (digits(p.gpu_ms.median)) " ms, " (percent(p.error())) }
+                    title { (p.name) ": " (digits(p.gpu_ms.median)) " ms, FLIP " (digits(p.error())) }
                     circle class={ (class(p.family)) @if on { " on" } } cx=(cx) cy=(cy) r=(if on { 6.0 } else { 4.0 }) {}
                     // A finger's width.
                     circle.touch cx=(cx) cy=(cy) r="11" {}
@@ -342,7 +341,7 @@ fn labels(table: &Table, x: &Axis, y: &Axis) -> Vec<(usize, [f64; 2])> {
     let mut placed: Vec<(usize, [f64; 2])> = Vec::new();
     for &i in &table.frontier {
         let p = &table.points[i];
-        let at = [x.at(p.gpu_ms.median), y.at(100.0 * p.error()) - 10.0];
+        let at = [x.at(p.gpu_ms.median), y.at(p.error()) - 10.0];
         let at = if at[0] > CHART[0] * 0.7 { [at[0] - 8.0, at[1]] } else { [at[0] + 8.0, at[1]] };
         if placed.iter().all(|(_, other)| (other[1] - at[1]).abs() > 13.0 || (other[0] - at[0]).abs() > 170.0) {
             placed.push((i, at));
@@ -356,14 +355,14 @@ fn choices(table: &Table) -> Markup {
     html! {
         div.scroll { table {
             caption { "The frontier, from the quickest to the most exact" }
-            thead { tr { th scope="col" { "picture" } th.number scope="col" { "GPU ms" } th.number scope="col" { "error" } th.number scope="col" { "FLIP" } th.number scope="col" { "ΔE2000" } th scope="col" { "given up" } } }
+            thead { tr { th scope="col" { "picture" } th.number scope="col" { "GPU ms" } th.number scope="col" { "FLIP" } th.number scope="col" { "√relMSE" } th.number scope="col" { "ΔE2000" } th scope="col" { "given up" } } }
             tbody {
                 @for p in table.frontier.iter().filter_map(|&i| table.points.get(i)) {
                     tr {
                         th scope="row" { a href={ "#p-" (p.picture) } { (p.name) } }
                         td.number { (digits(p.gpu_ms.median)) }
-                        td.number { (percent(p.error())) }
-                        td.number { @if p.name == "reference" { "–" } @else { (digits(p.errors.flip_mean)) } }
+                        td.number { (digits(p.error())) }
+                        td.number { (percent(p.errors.relmse.median.max(0.0).sqrt())) }
                         td.number { @if p.name == "reference" { "–" } @else { (digits(p.errors.delta_e_mean)) } }
                         td.knobs { (given_up(p, table)) }
                     }
@@ -388,7 +387,7 @@ fn given_up(point: &Point, table: &Table) -> String {
 
 /// Error that a price changes, without a sign.
 fn bought(price: &Price) -> f64 {
-    price.relmse_delta.median.abs().sqrt()
+    price.shown_delta.median.abs().sqrt()
 }
 
 fn prices(table: &Table) -> Markup {
@@ -405,7 +404,7 @@ fn prices(table: &Table) -> Markup {
             } }
             tbody {
                 @for price in all {
-                    @let sign = if price.relmse_delta.median < 0.0 { "−" } else { "+" };
+                    @let sign = if price.shown_delta.median < 0.0 { "−" } else { "+" };
                     tr {
                         th scope="row" { (price.knob) }
                         td { a href={ "#p-" (point_of(table, price)) } { (price.from) " → " (price.to) } }
@@ -448,12 +447,12 @@ fn tornado(table: &Table) -> Markup {
                 text.tick x="0" y=(y + 13.0) { (price.knob) "=" (price.to) " (" (class(price.base)) ")" }
                 rect class=(if price.share < 0.0 { "saves" } else { "takes" }) x=(middle - w) y=(y) width=(w) height=(row - 5.0) {}
                 text.tick x=(middle - w - 5.0) y=(y + 13.0) text-anchor="end" { (format!("{:+.0} %", 100.0 * price.share)) }
-                rect.seen x=(middle) y=(y) width=(seen) height=(row - 5.0) {}
+                rect class=(if price.is_seen() { "seen" } else { "seen noise" }) x=(middle) y=(y) width=(seen) height=(row - 5.0) {}
                 text.tick x=(middle + seen + 5.0) y=(y + 13.0) { (digits(price.flip_between)) }
             }
             line.grid x1=(middle) x2=(middle) y1="20" y2=(height) {}
         } }
-        p.legend { span { i.key.saves {} "saves time" } span { i.key.takes {} "takes time" } span { i.key.seen {} "seen" } }
+        p.legend { span { i.key.saves {} "saves time" } span { i.key.takes {} "takes time" } span { i.key.seen {} "seen" } span { i.key.seen.noise {} "noise, or too little to be seen" } }
     }
 }
 
@@ -517,10 +516,10 @@ fn knobs(table: &Table) -> Markup {
 fn search(table: &Table) -> Markup {
     html! {
         div.scroll { table {
-            thead { tr { th scope="col" { "change" } th.number scope="col" { "promised error" } th.number scope="col" { "found" } th scope="col" { "kept" } } }
+            thead { tr { th scope="col" { "change" } th.number scope="col" { "promised FLIP" } th.number scope="col" { "found" } th scope="col" { "kept" } } }
             tbody {
                 @for tried in &table.search {
-                    tr { th scope="row" { (tried.change) } td.number { (percent(tried.promised)) } td.number { (percent(tried.found)) } td { @if tried.kept { "yes" } @else { "no" } } }
+                    tr { th scope="row" { (tried.change) } td.number { (digits(tried.promised)) } td.number { (digits(tried.found)) } td { @if tried.kept { "yes" } @else { "no" } } }
                 }
             }
         } }
@@ -543,7 +542,7 @@ fn shown(point: &Point, table: &Table, pictures: &Path) -> Result<Markup> {
             }
             p.figures {
                 span { b { (digits(point.gpu_ms.median)) " ms" } " (" (digits(point.gpu_ms.low)) " to " (digits(point.gpu_ms.high)) ", " (point.timed) " timed)" }
-                span { b { (percent(point.error())) } " error" (noise.unwrap_or_default()) }
+                span { "√relMSE " b { (percent(e.relmse.median.max(0.0).sqrt())) } (noise.unwrap_or_default()) }
                 span { "FLIP " b { (digits(e.flip_mean)) } ", 95 of 100 pixels below " (digits(e.flip_p95)) }
                 span { "ΔE2000 " b { (digits(e.delta_e_mean)) } }
             }

@@ -6,6 +6,8 @@ use std::time::Instant;
 
 use anyhow::Result;
 
+use super::difference::{Shown, shown};
+use super::table::Interval;
 use crate::frame::{Rendered, Renderer, Settings, Work};
 use crate::gpu::Device;
 use crate::image::Picture;
@@ -47,8 +49,8 @@ pub struct Sitting {
 pub struct Taken {
     /// Radiance.
     pub film: Picture,
-    /// The means of both halves of its samples, of pictures by paths.
-    pub halves: Option<[Picture; 2]>,
+    /// Both halves of its samples as they would be shown, of pictures by paths.
+    pub halves: Option<[Shown; 2]>,
     /// Relative mean squared error by chance, which those tell.
     pub noise: Option<f64>,
     /// As it is shown.
@@ -132,7 +134,7 @@ impl Bench<'_> {
         let rendered = sitting.renderer.render(self.camera, &mut |_| ())?;
         let film = sitting.renderer.film()?;
         let halves = sitting.renderer.halves(rendered.samples)?;
-        let [width, height] = self.settings.size;
+        let Settings { size: [width, height], tonemap, exposure, .. } = self.settings;
         let mut ms = vec![total(&rendered)];
         let mut others_ms = Vec::new();
         let mut passes: Vec<(String, Vec<f64>)> =
@@ -152,7 +154,7 @@ impl Bench<'_> {
         }
         Ok(Taken {
             film,
-            halves,
+            halves: halves.map(|halves| halves.map(|half| shown(&half, tonemap, exposure))),
             noise: rendered.errors.last().map(|error| error.relmse),
             png: sitting.renderer.png(&rendered)?,
             display: Display {
@@ -162,7 +164,7 @@ impl Bench<'_> {
             },
             ms,
             others_ms,
-            passes: passes.into_iter().map(|(name, ms)| (name, super::table::Interval::of(&ms).median)).collect(),
+            passes: passes.into_iter().map(|(name, ms)| (name, Interval::of(&ms).median)).collect(),
             work: counts(&rendered.work),
             samples: rendered.samples,
         })

@@ -7,14 +7,16 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
-use super::difference::{Truth, without_noise};
+use super::difference::{Truth, display_mse, shown, told_apart};
 use super::sitting::{Bench, Sitting, Taken};
 use super::table::{
-    CONVERGED, DeviceName, Errors, Family, Interval, KnobState, Point, Price, Reference, Table, Tried, WorstPixel,
-    frontier,
+    CONVERGED, DeviceName, Errors, Family, Interval, KnobState, Point, Price, REFERENCE, Reference, Table, Tried,
+    WorstPixel, frontier,
 };
+use crate::frame::Settings;
 use crate::image::metric::{AnyPicture, Comparison, Metric, compare, map_rgba};
-use crate::image::{Aov, AovData, Picture, exr, file, png};
+use crate::image::png::Display;
+use crate::image::{Aov, AovData, Picture, exr, file, png, tone};
 use crate::plan::{KNOBS, Knob, Knobs, Model, Plan};
 
 /// Shares of the budget: for the reference, and for what is priced from it.
@@ -22,8 +24,8 @@ const REFERENCE_SHARE: f64 = 0.3;
 const EXACT_SHARE: f64 = 0.4;
 /// Pictures that the search may draw.
 const SEARCH: usize = 8;
-/// FLIP below which nobody sees a difference: half of a step of eight bits.
-const INVISIBLE: f64 = 0.002;
+/// Mean squared difference of displayed values below which the search leaves out what it pays for: a thousandth of their range.
+const NOTHING: f64 = 1e-6;
 /// Half of the side of what is shown of the worst pixel.
 const AROUND: i64 = 20;
 
@@ -309,13 +311,25 @@ impl<'a> Run<'a> {
             };
             let png = sitting.renderer.png(&rendered)?;
             let own = rendered.errors.last().map_or(f64::INFINITY, |error| error.relmse.sqrt());
+            let Settings { tonemap, exposure, .. } = sweep.bench.settings;
+            let display = |picture: &Picture| {
+                let bytes = |v: [f32; 3]| v.map(|v| tone::quantise(f64::from(v)));
+                let pixel = |v| {
+                    let [r, g, b] = bytes(v);
+                    [r, g, b, 255]
+                };
+                let rgba = shown(picture, tonemap, exposure).into_iter().map(pixel).collect();
+                AnyPicture::Display(Display { width: picture.width, height: picture.height, rgba })
+            };
+            let own_flip = compare(Metric::Flip, &display(&film), &display(&half))?.value;
             let reference = Reference {
                 knobs: named(&knobs),
                 samples: rendered.samples,
                 priced_samples: priced,
                 gpu_ms: rendered.passes.iter().map(|pass| pass.ms).sum(),
                 own_error: own,
-                converged: own <= CONVERGED,
+                own_flip,
+                converged: own_flip <= CONVERGED,
                 command: format!(
                     "{} --seed {} {} -o reference.png",
                     sweep.command,
@@ -602,12 +616,12 @@ impl<'a> Run<'a> {
         let between = compare(Metric::Flip, &shown(base), &shown(taken))?.value;
         let (base_errors, _) = truth.errors(&base.film, &base.display)?;
         let same = bytemuck::cast_slice::<_, u8>(&taken.film.rgba) == bytemuck::cast_slice::<_, u8>(&base.film.rgba);
-        let relmse_delta = match (&taken.halves, &base.halves) {
-            (Some(a), Some(b)) => without_noise(a, b, &truth.film),
+        let (shown_delta, squares) = match (&taken.halves, &base.halves) {
+            (Some(a), Some(b)) => told_apart(a, b, taken.film.width as usize),
+            // The reference's noise is in both.
             _ => {
-                let [a, b] = [point.errors.relmse, base_errors.relmse];
-                // The reference's noise is in both.
-                Interval { median: a.median - b.median, low: a.low - b.high, high: a.high - b.low }
+                let mse = |taken: &Taken| display_mse(&truth.display, &taken.display);
+                (Interval::around(mse(taken) - mse(base), 0.0), 1)
             }
         };
         let mut price = Price {
@@ -620,7 +634,8 @@ impl<'a> Run<'a> {
             share: if base_ms > 0.0 { gpu_ms_delta.median / base_ms } else { 0.0 },
             flip_between: between,
             flip_delta: point.errors.flip_mean - base_errors.flip_mean,
-            relmse_delta,
+            shown_delta,
+            squares,
             same,
             called_for: true,
             verdict: String::new(),
@@ -643,7 +658,7 @@ impl<'a> Run<'a> {
             self.done += SEARCH;
             return Ok(());
         }
-        // What each rung adds to the squared error and the time of `local`.
+        // What each rung adds to the error and the time of `local`.
         let base_ms = self.records.iter().find(|r| r.point.name == "local").map_or(0.0, |r| r.point.gpu_ms.median);
         let mut rungs: Vec<(&Change, f64, f64)> = Vec::new();
         for change in changes {
@@ -653,7 +668,7 @@ impl<'a> Run<'a> {
                 .filter_map(|r| r.price.as_ref())
                 .find(|p| p.base == Family::Local && p.knob == change.knob.name && p.to == change.to);
             if let Some(price) = price.filter(|price| !price.same) {
-                rungs.push((change, price.relmse_delta.median, price.share * base_ms));
+                rungs.push((change, price.flip_delta, price.share * base_ms));
             }
         }
         let mut knobs = local.clone();
@@ -666,6 +681,7 @@ impl<'a> Run<'a> {
                 knobs = changed;
             }
         }
+        let end = self.done + SEARCH - 1;
         let Some(mut current) = self.point("search: quickest", &knobs, base, progress)? else {
             return Ok(());
         };
@@ -701,12 +717,7 @@ impl<'a> Run<'a> {
                 break;
             };
             let kept = found.error() < current.error();
-            self.search.push(Tried {
-                change,
-                promised: (current.errors.relmse.median - gain).max(0.0).sqrt(),
-                found: found.error(),
-                kept,
-            });
+            self.search.push(Tried { change, promised: (current.error() - gain).max(0.0), found: found.error(), kept });
             if kept {
                 knobs = changed;
                 current = found;
@@ -714,6 +725,7 @@ impl<'a> Run<'a> {
                 refused.push((knob.name, rung));
             }
         }
+        self.of -= end.saturating_sub(self.done);
         Ok(())
     }
 
@@ -728,7 +740,7 @@ impl<'a> Run<'a> {
             else {
                 continue;
             };
-            let nothing = price.same || price.relmse_delta.high < 1e-5;
+            let nothing = !price.is_seen() && price.shown_delta.high < NOTHING;
             let changed = knobs.with(change.knob.name, change.to);
             if let (true, true, Some(changed)) = (nothing, price.gpu_ms_delta.high < 0.0, changed) {
                 saved.push(format!("{}={}", change.knob.name, change.to));
@@ -736,6 +748,7 @@ impl<'a> Run<'a> {
             }
         }
         if saved.is_empty() {
+            self.of -= 1;
             return Ok(());
         }
         let before = self.records.iter().find(|r| r.point.name == "exact").map(|r| r.point.error());
@@ -757,10 +770,9 @@ impl<'a> Run<'a> {
         let reference = self.reference.take().context("there is no reference")?;
         if !reference.converged {
             self.warnings.push(format!(
-                "the reference's own error is {:.2} % after {} samples, more than {} %: no error below that is known well",
-                100.0 * reference.own_error,
-                reference.samples,
-                100.0 * CONVERGED
+                "the reference has not converged: its own FLIP is {:.3} after {} samples, more than {CONVERGED}, and no error below \
+                 that is known",
+                reference.own_flip, reference.samples
             ));
         }
         if self.exact != self.plain {
@@ -827,7 +839,7 @@ fn even_out(records: &mut [Record]) {
 fn the_reference(reference: &Reference) -> Point {
     let relmse = reference.own_error * reference.own_error;
     Point {
-        name: "reference".to_owned(),
+        name: REFERENCE.to_owned(),
         family: Family::Exact,
         knobs: reference.knobs.clone(),
         gpu_ms: Interval { median: reference.gpu_ms, low: reference.gpu_ms, high: reference.gpu_ms },
@@ -835,7 +847,7 @@ fn the_reference(reference: &Reference) -> Point {
         start_ms: 0.0,
         passes: Vec::new(),
         errors: Errors {
-            flip_mean: 0.0,
+            flip_mean: reference.own_flip,
             flip_p95: 0.0,
             relmse: Interval { median: relmse, low: relmse, high: relmse },
             rmse: 0.0,
@@ -861,7 +873,8 @@ fn device_name(sweep: &Sweep<'_>) -> DeviceName {
 }
 
 /// What a price says, in a sentence.
-fn verdict(price: &Price) -> String {
+#[must_use]
+pub fn verdict(price: &Price) -> String {
     let Interval { median, low, high } = price.gpu_ms_delta;
     let time = if low > 0.0 {
         format!("takes {median:.1} ms longer ({:+.0} %)", 100.0 * price.share)
@@ -870,26 +883,21 @@ fn verdict(price: &Price) -> String {
     } else {
         "takes the same time as far as can be told".to_owned()
     };
-    let error = price.relmse_delta;
+    let flip = price.flip_between;
+    let error = price.shown_delta;
     let seen = if price.same {
         "the picture is the same to the last bit".to_owned()
-    } else if price.flip_between < INVISIBLE {
-        format!("nobody sees it (FLIP {:.4} between both)", price.flip_between)
+    } else if flip < super::table::INVISIBLE {
+        format!("nobody sees it (FLIP {flip:.4} between both)")
     } else if error.low > 0.0 {
         let more = if price.base == Family::Exact { "an error of" } else { "more error by" };
-        format!(
-            "{more} {:.2} % of the light (FLIP {:.3} between both)",
-            100.0 * error.median.sqrt(),
-            price.flip_between
-        )
+        let squares =
+            if price.squares > 1 { format!(" in squares of {} pixels", price.squares) } else { String::new() };
+        format!("{more} {:.2} % of what is shown{squares} (FLIP {flip:.3} between both)", 100.0 * error.median.sqrt())
     } else if error.high < 0.0 {
-        format!(
-            "less error by {:.2} % of the light (FLIP {:.3} between both)",
-            100.0 * (-error.median).sqrt(),
-            price.flip_between
-        )
+        format!("less error by {:.2} % of what is shown (FLIP {flip:.3} between both)", 100.0 * (-error.median).sqrt())
     } else {
-        format!("no error beyond noise (FLIP {:.3} between both)", price.flip_between)
+        format!("no error beyond noise (FLIP {flip:.3} between both)")
     };
     format!("{time}; {seen}")
 }

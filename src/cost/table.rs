@@ -67,6 +67,9 @@ pub struct Reference {
     pub gpu_ms: f64,
     /// Root of its relative mean squared error against what it converges to, which its halves tell.
     pub own_error: f64,
+    /// Mean of FLIP's error against what it converges to: that of one half of its samples against all, whose difference is as
+    /// large as that error.
+    pub own_flip: f64,
     /// Whether that is at most [`CONVERGED`].
     pub converged: bool,
     /// Makes it again.
@@ -75,7 +78,7 @@ pub struct Reference {
     pub image: String,
 }
 
-/// Relative error up to which a reference is called converged.
+/// FLIP up to which a reference is called converged.
 pub const CONVERGED: f64 = 0.02;
 
 /// A knob in this scene.
@@ -199,10 +202,10 @@ pub struct Point {
 }
 
 impl Point {
-    /// Root of the relative mean squared error: what the frontier is drawn by.
+    /// What the frontier is drawn by: FLIP's mean. Squares of radiance would be those of a few pixels that paths make far too bright.
     #[must_use]
     pub fn error(&self) -> f64 {
-        self.errors.relmse.median.max(0.0).sqrt()
+        self.errors.flip_mean
     }
 }
 
@@ -227,9 +230,12 @@ pub struct Price {
     pub flip_between: f64,
     /// More of FLIP's mean error against the reference.
     pub flip_delta: f64,
-    /// More of the relative mean squared error against the reference; from `exact` the square of the difference of what both
-    /// converge to, of which halves give a mean without noise. Two standard errors either way.
-    pub relmse_delta: Interval,
+    /// More of the mean squared error of displayed values 0 to 1 against the reference; from `exact` the mean squared difference of
+    /// what both pictures converge to, of which halves give a mean without noise, with two standard errors either way.
+    pub shown_delta: Interval,
+    /// Side in pixels of the squares over which displayed values were averaged for that: 1, or more where single pixels are too noisy
+    /// to tell anything.
+    pub squares: u32,
     /// Whether the pictures are the same to the last bit.
     pub same: bool,
     /// Whether the scene calls for the knob.
@@ -238,12 +244,24 @@ pub struct Price {
     pub verdict: String,
 }
 
+/// FLIP below which nobody sees a difference: half of a step of eight bits.
+pub const INVISIBLE: f64 = 0.002;
+
+impl Price {
+    /// Whether an eye sees it, and it is more than the noise of paths that went apart.
+    #[must_use]
+    pub fn is_seen(&self) -> bool {
+        let beyond_noise = self.base != Family::Exact || self.shown_delta.low > 0.0;
+        !self.same && self.flip_between >= INVISIBLE && beyond_noise
+    }
+}
+
 /// A step of the search.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Tried {
     /// What was changed.
     pub change: String,
-    /// Relative error that single prices promised.
+    /// FLIP's mean that single prices promised.
     pub promised: f64,
     /// And what was found.
     pub found: f64,
@@ -251,21 +269,28 @@ pub struct Tried {
     pub kept: bool,
 }
 
-/// Places of the points that no other beats in time and error at once, the quickest first. Of equal ones the first.
+/// Places of the points that no other beats in time and error at once, the quickest first; of equal ones the first. Nothing is
+/// known to be nearer to the truth than the reference is: it is the last, and what comes within its own error ties with it.
 #[must_use]
 pub fn frontier(points: &[Point]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..points.len()).collect();
-    let key = |&i: &usize| (points[i].gpu_ms.median, points[i].error());
-    order.sort_by(|a, b| key(a).0.total_cmp(&key(b).0).then(key(a).1.total_cmp(&key(b).1)));
+    let reference = points.iter().position(|point| point.name == REFERENCE);
+    let floor = reference.map_or(0.0, |i| points[i].error());
+    let error = |i: usize| points[i].error().max(floor);
+    let mut order: Vec<usize> = (0..points.len()).filter(|i| Some(*i) != reference).collect();
+    let time = |i: usize| points[i].gpu_ms.median;
+    order.sort_by(|&a, &b| time(a).total_cmp(&time(b)).then(error(a).total_cmp(&error(b))));
     let mut best = f64::INFINITY;
-    order.retain(|i| {
-        let error = points[*i].error();
-        let better = error < best;
-        best = best.min(error);
+    order.retain(|&i| {
+        let better = error(i) < best;
+        best = best.min(error(i));
         better
     });
+    order.extend(reference);
     order
 }
+
+/// Name of the reference among the points.
+pub const REFERENCE: &str = "reference";
 
 impl Table {
     /// The points as comma-separated values, a line each.
