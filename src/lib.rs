@@ -6,7 +6,7 @@
 //! ```text
 //! cli ─► verify ─► optics      the formulas in f64, and the shaders held against them
 //!  │
-//!  ├───► cost ──► frame        what effects cost, drawn in turns
+//!  ├───► cost ──► frame        what rungs and effects cost, drawn in turns
 //!  │
 //!  ├───► study ─► scene ─► spectra ─► optics    what to draw: data, no Vulkan
 //!  │                ▲
@@ -37,7 +37,7 @@
 //! [`gpu::Access`] is the one table that turns an access into Vulkan's stages, accesses and layouts. Structs that both sides
 //! know are in [`share`], and differences from their GLSL twins do not compile.
 //!
-//! [`cost`] prices what a plan leaves out. [`plan::Plan`] is made before any Vulkan object from the scene's values and the [`plan::Knobs`]: a pass, an image or a piece of
+//! [`cost`] prices every rung against the scene's own reference, and what a plan leaves out. [`plan::Plan`] is made before any Vulkan object from the scene's values and the [`plan::Knobs`]: a pass, an image or a piece of
 //! shader code exists only if it says so. [`scene`] reads files that are not trusted; [`study`] generates scenes without files;
 //! [`image`] keeps and compares pictures; [`cli`] is the program.
 //!

@@ -87,6 +87,33 @@ fn a_run_is_what_its_commands_draw() {
     );
     assert!(list(&table, "prices").iter().all(|price| price["knob"] != "refraction"));
 
+    // The table serves budgets of the same picture; nothing is measured again.
+    let render = |more: &[&str]| {
+        let all = [
+            &["render", "study:radiance", "--size", "40x24", "--device", "cpu", "-o", "w.png", "--report", "w.json"],
+            more,
+        ];
+        etalon(at, &all.concat(), &HASTY)
+    };
+    let budget = |more: &[&str]| -> Value {
+        let run = render(more).succeeded();
+        assert!(!run.stderr.contains("measuring") && run.stderr.contains("given up"), "{run:?}");
+        let report = std::fs::read(at.join("w.json")).expect("a report");
+        serde_json::from_slice::<Value>(&report).expect("JSON")["budget"].clone()
+    };
+    let chosen = budget(&["--within", "1000000"]);
+    let least = points.iter().map(|p| number(&p["flip_mean"])).fold(f64::INFINITY, f64::min);
+    assert_eq!(number(&chosen["flip_mean"]), least);
+    let chosen = budget(&["--max-error", "100%"]);
+    assert_eq!((&chosen["point"], number(&chosen["gpu_ms"]["median"])), (&frontier[0]["name"], quickest));
+    // The picture is the one that was measured.
+    assert!((number(&chosen["found_flip"]) - number(&chosen["flip_mean"])).abs() < 1e-9, "{chosen}");
+    render(&["--within", "0.0001"]).failed(1, "the nearest choice is --within");
+    render(&["--max-error", "0.0000001"]).failed(1, "the nearest choice is --model global");
+    render(&["--within", "8", "--set", "samples=1"]).failed(1, "contradicts --model and --set");
+    render(&["--within", "8", "--max-error", "2%"]).failed(1, "contradicts --max-error");
+    render(&["--within", "soon"]).failed(1, "expected milliseconds");
+
     // Without cost.json a folder is that of a run that was interrupted: what it has is not drawn again.
     for file in ["cost.json", "points/local-shadows-ray.json", "points/exact-fresnel-schlick.json"] {
         std::fs::remove_file(at.join("a").join(file)).expect("a file");

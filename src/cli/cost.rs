@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
 
+use super::budget::{command, keep};
 use super::options::{DeviceOptions, Extent as Planned, PictureOptions, SceneOptions, When};
 use super::print;
 use super::progress::Steps;
@@ -61,13 +62,6 @@ fn shard(text: &str) -> Result<[u32; 2], String> {
     }
 }
 
-impl CostArgs {
-    /// All that a picture depends on beside its knobs, as words of a command line.
-    fn words(&self) -> String {
-        [self.scene.words(), self.picture.words(), self.device.words()].concat().join(" ")
-    }
-}
-
 /// Runs the command.
 ///
 /// # Errors
@@ -107,7 +101,7 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
     for warning in &setup.warnings {
         tracing::warn!("{warning}");
     }
-    let command = format!("etalon render {}", args.words());
+    let command = command(&args.scene, &args.picture, &args.device);
     if let Some(wanted) = &args.compare {
         let knobs = settings.knobs.clone();
         let compared = setup.bench(&args.scene, settings, |bench| compare_rungs(&bench, &knobs, wanted))?;
@@ -131,7 +125,11 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
         sweep.run(&mut |step: Step<'_>| steps.of(step.name, step.done, step.of, step.left_s))
     })?;
     drop(steps);
-    write(args, &output, &table)
+    let done = write(args, &output, &table)?;
+    if args.shard.is_none() {
+        keep(&args.scene, &command, &setup, &output);
+    }
+    Ok(done)
 }
 
 /// Two lines and a verdict.

@@ -1,5 +1,6 @@
 //! The commands of the program, one module each.
 
+mod budget;
 pub mod cost;
 pub mod devices;
 pub mod diff;

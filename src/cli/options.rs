@@ -102,8 +102,9 @@ pub struct PictureOptions {
     /// Chooses the random numbers: another one, another noise
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..1 << 31))]
     pub seed: u32,
-    /// With --model global, draw samples until the picture's relative error, which it estimates itself, is no more than this, for
-    /// example 0.02 or 2%
+    /// Choose the quickest rungs whose FLIP against the scene's own reference is no more than this, for example 0.02 or 2%, out
+    /// of what `cost` measured or is measured first. With --model global: draw samples until the picture's relative error, which
+    /// it estimates itself, is no more than this
     #[arg(long, value_name = "E")]
     pub max_error: Option<String>,
     /// Exposure in stops, display outputs only
@@ -313,7 +314,7 @@ impl PictureOptions {
     }
 
     /// The error that is the end of sampling, as a share.
-    fn max_error(&self) -> Result<Option<f64>> {
+    pub(super) fn max_error(&self) -> Result<Option<f64>> {
         let Some(text) = &self.max_error else { return Ok(None) };
         let (number, scale) = text.strip_suffix('%').map_or((text.as_str(), 1.0), |number| (number, 0.01));
         let error = number.trim().parse::<f64>().ok().map(|number| number * scale);

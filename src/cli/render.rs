@@ -8,7 +8,9 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
+use serde_json::json;
 
+use super::budget::{Budget, Chosen, command};
 use super::options::{DeviceOptions, Extent, PictureOptions, SceneOptions, When};
 use super::plan::cost_table;
 use super::print;
@@ -24,7 +26,7 @@ use crate::gpu::Severity;
 use crate::image::{Aov, AovData, Picture, exr, file};
 use crate::pass::view::View;
 use crate::plan::{Knobs, Plan};
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Reads, Scene};
 use crate::share::AovPixel;
 use crate::spectra;
 
@@ -38,6 +40,10 @@ pub struct RenderArgs {
     output: Vec<PathBuf>,
     #[command(flatten)]
     picture: PictureOptions,
+    /// Choose the rungs with the least error that take no more GPU time than this, out of what `cost` measured of the same picture
+    /// on this device or is measured first
+    #[arg(long, value_name = "MS")]
+    within: Option<String>,
     #[command(flatten)]
     device: DeviceOptions,
     /// Further layers of the EXR: the nearest opaque surface at the pixel centres; and, of the picture itself, the light
@@ -151,6 +157,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         Phases { start: now, last: now, all: BTreeMap::from(["bvh", "pipelines"].map(|name| (name, 0.0))) };
     args.unbuilt.refuse()?;
     let outputs = outputs(args)?;
+    let budget = Budget::of(args.within.as_deref(), &args.picture)?;
     let mut settings = args.picture.settings(&args.scene)?;
     for part in args.aov.iter().filter_map(|name| name.part()) {
         if !settings.parts.contains(&part) {
@@ -170,9 +177,20 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     phases.end("start");
 
     steps.step(&format!("loading {}", args.scene.scene), 1);
-    let setup = Setup::load(&args.scene, args.picture.reads(&args.scene, &settings.knobs), &args.device)?;
-    args.picture.colour_of(&setup.scene, &mut settings.knobs)?;
+    let reads = if budget.is_some() { Reads::Everything } else { args.picture.reads(&args.scene, &settings.knobs) };
+    let setup = Setup::load(&args.scene, reads, &args.device)?;
     phases.end("load");
+    let mut chosen = None;
+    if let Some(budget) = budget {
+        let command = command(&args.scene, &args.picture, &args.device);
+        let found = budget.choose([&args.scene.scene, &command], &args.scene, &setup, &settings, &steps)?;
+        settings.max_error = None;
+        settings.knobs = found.knobs.clone();
+        chosen = Some(found);
+        phases.end("choose");
+    } else {
+        args.picture.colour_of(&setup.scene, &mut settings.knobs)?;
+    }
     let device = setup.device.clone();
     let info = device.info().clone();
     if !quiet {
@@ -205,6 +223,13 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let samples = renderer.plan.samples;
     let mut rounds = Vec::new();
     let mut first: Option<(Rendered, Option<Picture>)> = None;
+    if chosen.is_some() {
+        // A budget is that of a picture with everything compiled, as tables are.
+        renderer.plan.samples = samples.min(2);
+        renderer.render(&camera, &mut |_| ())?;
+        renderer.plan.samples = samples;
+        phases.end("frame");
+    }
     let needs_film =
         args.report.is_some() || outputs.iter().any(|(_, format)| *format == Format::Exr) || args.repeat > 1;
     for round in 0..args.repeat {
@@ -230,6 +255,9 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         }
     }
     let (rendered, film) = first.ok_or_else(|| anyhow!("nothing was drawn"))?;
+    if let Some(chosen) = &mut chosen {
+        chosen.check(&rendered, args.picture.size)?;
+    }
     let aovs =
         if args.aov.is_empty() { Vec::new() } else { layers(&mut renderer, &camera, &args.aov, rendered.samples)? };
     phases.end("readback");
@@ -285,12 +313,16 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
             image: film.statistics(),
             validation,
             outputs: written,
+            budget: chosen.clone().map(|chosen| json!(chosen)),
         };
         file::write(path, serde_json::to_string_pretty(&report)?.as_bytes())?;
     }
     drop(steps);
     for (path, _) in &outputs {
         print(&path.display().to_string())?;
+    }
+    if let Some(text) = chosen.as_ref().and_then(Chosen::broken) {
+        bail!("{text}");
     }
     if let Some(text) = failed {
         bail!("validation: {text}");

@@ -52,6 +52,9 @@ pub struct Report {
     pub validation: Validation,
     /// Files written, with hashes of their bytes.
     pub outputs: Vec<Output>,
+    /// Rungs chosen for `--within` or `--max-error`, and how the budget was kept.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub budget: Option<Value>,
 }
 
 /// How wavelengths became colours.

@@ -6,8 +6,6 @@ use clap::Args;
 /// Options of `render` to come.
 #[derive(Debug, Clone, Args)]
 pub struct UnbuiltOptions {
-    #[arg(long, hide = true, value_name = "MS")]
-    within: Option<String>,
     #[arg(long, hide = true, value_name = "A..B")]
     frames: Option<String>,
     #[arg(long, hide = true, value_name = "N")]
@@ -22,8 +20,7 @@ impl UnbuiltOptions {
     /// # Errors
     /// One sentence with the option and its value.
     pub fn refuse(&self) -> Result<()> {
-        let all =
-            [("--within", &self.within), ("--frames", &self.frames), ("--fps", &self.fps), ("--shard", &self.shard)];
+        let all = [("--frames", &self.frames), ("--fps", &self.fps), ("--shard", &self.shard)];
         for (name, value) in all {
             if let Some(value) = value {
                 bail!("{name} {value}: this option is not built yet");

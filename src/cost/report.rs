@@ -364,25 +364,12 @@ fn choices(table: &Table) -> Markup {
                         td.number { (digits(p.error())) }
                         td.number { (percent(p.errors.relmse.median.max(0.0).sqrt())) }
                         td.number { @if p.name == "reference" { "–" } @else { (digits(p.errors.delta_e_mean)) } }
-                        td.knobs { (given_up(p, table)) }
+                        td.knobs { (table.given_up(p)) }
                     }
                 }
             }
         } }
     }
-}
-
-fn given_up(point: &Point, table: &Table) -> String {
-    let others: Vec<String> = table
-        .knobs
-        .iter()
-        .filter(|knob| knob.called_for)
-        .filter_map(|knob| {
-            let [now, exact] = [&point.knobs, &table.reference.knobs].map(|knobs| knobs.get(&knob.knob));
-            (now != exact).then(|| format!("{}={}", knob.knob, now.map_or("", String::as_str)))
-        })
-        .collect();
-    if others.is_empty() { "nothing".to_owned() } else { others.join(", ") }
 }
 
 /// Error that a price changes, without a sign.
@@ -546,7 +533,7 @@ fn shown(point: &Point, table: &Table, pictures: &Path) -> Result<Markup> {
                 span { "FLIP " b { (digits(e.flip_mean)) } ", 95 of 100 pixels below " (digits(e.flip_p95)) }
                 span { "ΔE2000 " b { (digits(e.delta_e_mean)) } }
             }
-            p.given { "Given up: " (given_up(point, table)) }
+            p.given { "Given up: " (table.given_up(point)) }
             p { code { (point.command) } }
         }
     })

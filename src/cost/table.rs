@@ -293,6 +293,17 @@ pub fn frontier(points: &[Point]) -> Vec<usize> {
 pub const REFERENCE: &str = "reference";
 
 impl Table {
+    /// The knobs that the scene calls for and that a point has on other rungs than the reference.
+    #[must_use]
+    pub fn given_up(&self, point: &Point) -> String {
+        let other = |knob: &KnobState| {
+            let [now, exact] = [&point.knobs, &self.reference.knobs].map(|knobs| knobs.get(&knob.knob));
+            (now != exact).then(|| format!("{}={}", knob.knob, now.map_or("", String::as_str)))
+        };
+        let all: Vec<String> = self.knobs.iter().filter(|knob| knob.called_for).filter_map(other).collect();
+        if all.is_empty() { "nothing".to_owned() } else { all.join(", ") }
+    }
+
     /// The points as comma-separated values, a line each.
     ///
     /// # Errors

@@ -118,6 +118,13 @@ fn beside(target: &Path) -> Result<NamedTempFile> {
     })
 }
 
+/// Where the program keeps what it can make again: `etalon` in `$XDG_CACHE_HOME` or `~/.cache`.
+pub fn cache_folder() -> Option<PathBuf> {
+    let home = || std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cache"));
+    let folder = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).or_else(home);
+    folder.map(|folder| folder.join("etalon"))
+}
+
 /// Hash of an output as 32 hexadecimal digits: XXH3 with 128 bits, seed 0, most significant digit first.
 ///
 /// The same bytes give the same digits on every machine and in every version; it tells files apart and proves nothing

@@ -221,15 +221,13 @@ const HASH_BYTES: usize = 32;
 
 /// Where the prefiltered levels of this map are kept: named by the map's texels, the shader's words and the device.
 fn cache_file(device: &Device, chain: &Levels) -> Option<PathBuf> {
-    let folder = std::env::var_os("XDG_CACHE_HOME")
-        .map(PathBuf::from)
-        .or_else(|| std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cache")))?;
+    let folder = file::cache_folder()?;
     let map = file::hash(bytemuck::cast_slice(&chain[0].2));
     let words: &[u8] = bytemuck::cast_slice(prefilter::PROGRAM.stages[0].words);
     let info = device.info();
     let maker = file::hash(&[words, info.name.as_bytes(), info.driver.as_bytes(), info.version.as_bytes()].concat());
     let (width, height, _) = chain[0];
-    Some(folder.join("etalon").join(format!("environment-{map}-{maker}-{width}x{height}")))
+    Some(folder.join(format!("environment-{map}-{maker}-{width}x{height}")))
 }
 
 /// Directional reflectance of the GGX lobe, split into the factors of F0 and F90 (Karis 2013):
