@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::difference::{display_mse, told_apart};
 use super::sitting::Bench;
-use super::sweep::verdict;
+use super::sweep::{by_chance, verdict};
 use super::table::{Family, Interval, Price, WorstPixel};
 use crate::image::metric::{AnyPicture, Metric, compare};
 use crate::plan::{KNOBS, Knobs};
@@ -70,6 +70,10 @@ pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<C
         flip_delta: flip.value,
         shown_delta,
         squares,
+        noise_ratio: match (by_chance(knob, last.rung(knob.name), first.rung(knob.name)), taken.noise, truth.noise) {
+            (true, Some(noise), Some(before)) if before > 0.0 => Some(noise / before),
+            _ => None,
+        },
         same: bytemuck::cast_slice::<_, u8>(&taken.film.rgba) == bytemuck::cast_slice::<_, u8>(&truth.film.rgba),
         called_for: true,
         verdict: String::new(),

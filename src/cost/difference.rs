@@ -137,7 +137,7 @@ pub fn told_apart(a: &[Shown; 2], b: &[Shown; 2], width: usize) -> (Interval, u3
     let fine = without_noise(a, b, width, 1);
     let coarse = [4, 16].map(|side| (without_noise(a, b, width, side), side as u32));
     // What is told apart by finer squares is told better.
-    let told = coarse.into_iter().find(|(found, _)| found.low > 0.0).filter(|_| fine.low <= 0.0);
+    let told = coarse.into_iter().find(|(found, _)| found.surely() > 0.0).filter(|_| fine.surely() <= 0.0);
     told.unwrap_or((fine, 1))
 }
 

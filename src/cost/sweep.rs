@@ -636,6 +636,10 @@ impl<'a> Run<'a> {
             flip_delta: point.errors.flip_mean - base_errors.flip_mean,
             shown_delta,
             squares,
+            noise_ratio: match (by_chance(change.knob, change.from, change.to), taken.noise, base.noise) {
+                (true, Some(noise), Some(before)) if before > 0.0 => Some(noise / before),
+                _ => None,
+            },
             same,
             called_for: true,
             verdict: String::new(),
@@ -872,6 +876,15 @@ fn device_name(sweep: &Sweep<'_>) -> DeviceName {
     }
 }
 
+/// Whether a change is one of chance alone: the light is the same in the mean.
+pub(super) fn by_chance(knob: &Knob, from: &str, to: &str) -> bool {
+    match knob.name {
+        "guiding" => true,
+        "lights" => from != "points" && to != "points",
+        _ => false,
+    }
+}
+
 /// What a price says, in a sentence.
 #[must_use]
 pub fn verdict(price: &Price) -> String {
@@ -887,18 +900,25 @@ pub fn verdict(price: &Price) -> String {
     let error = price.shown_delta;
     let seen = if price.same {
         "the picture is the same to the last bit".to_owned()
+    } else if let Some(ratio) = price.noise_ratio {
+        format!("the same light, {:.2} times the noise", ratio.sqrt())
     } else if flip < super::table::INVISIBLE {
         format!("nobody sees it (FLIP {flip:.4} between both)")
-    } else if error.low > 0.0 {
+    } else if price.base != Family::Exact && error.median < 0.0 {
+        format!("less error by {:.2} % of what is shown (FLIP {flip:.3} between both)", 100.0 * (-error.median).sqrt())
+    } else if price.is_seen() {
         let more = if price.base == Family::Exact { "an error of" } else { "more error by" };
         let squares =
             if price.squares > 1 { format!(" in squares of {} pixels", price.squares) } else { String::new() };
         format!("{more} {:.2} % of what is shown{squares} (FLIP {flip:.3} between both)", 100.0 * error.median.sqrt())
-    } else if error.high < 0.0 {
-        format!("less error by {:.2} % of what is shown (FLIP {flip:.3} between both)", 100.0 * (-error.median).sqrt())
     } else {
         format!("no error beyond noise (FLIP {flip:.3} between both)")
     };
+    let better =
+        price.noise_ratio.is_some_and(|ratio| ratio < 1.0) || (price.base != Family::Exact && error.median < 0.0);
+    if low > 0.0 && !better && !price.is_seen() {
+        return format!("{time}; {seen}: wasted here");
+    }
     format!("{time}; {seen}")
 }
 

@@ -137,6 +137,13 @@ impl Interval {
     pub fn around(value: f64, deviation: f64) -> Self {
         Self { median: value, low: value - 2.0 * deviation, high: value + 2.0 * deviation }
     }
+
+    /// Three standard errors below a value that [`Interval::around`] made: dozens of prices are told, of which two standard errors
+    /// would call some by mistake.
+    #[must_use]
+    pub fn surely(&self) -> f64 {
+        self.median - 1.5 * (self.median - self.low)
+    }
 }
 
 /// Place and size of the largest error.
@@ -236,6 +243,9 @@ pub struct Price {
     /// Side in pixels of the squares over which displayed values were averaged for that: 1, or more where single pixels are too noisy
     /// to tell anything.
     pub squares: u32,
+    /// Of a knob that changes chance alone: its relative mean squared error by chance over that of the base.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_ratio: Option<f64>,
     /// Whether the pictures are the same to the last bit.
     pub same: bool,
     /// Whether the scene calls for the knob.
@@ -251,8 +261,8 @@ impl Price {
     /// Whether an eye sees it, and it is more than the noise of paths that went apart.
     #[must_use]
     pub fn is_seen(&self) -> bool {
-        let beyond_noise = self.base != Family::Exact || self.shown_delta.low > 0.0;
-        !self.same && self.flip_between >= INVISIBLE && beyond_noise
+        let beyond_noise = self.base != Family::Exact || self.shown_delta.surely() > 0.0;
+        !self.same && self.noise_ratio.is_none() && self.flip_between >= INVISIBLE && beyond_noise
     }
 }
 
