@@ -62,7 +62,6 @@ fn mistakes_end_in_one_sentence_and_no_file() {
         (vec!["empty.gltf"], 1, "nothing to draw"),
         (vec!["loop.gltf"], 1, "loop.gltf"),
         (vec!["study:nothing"], 1, "study:"),
-        (vec!["study:torture"], 1, "not built yet"),
         (vec!["scene.glb", "--size", "0x0"], 1, "at least one pixel"),
         (vec!["scene.glb", "--size", "0x10"], 1, "at least one pixel"),
         (vec!["scene.glb", "--size", "wide"], 2, "WIDTHxHEIGHT"),

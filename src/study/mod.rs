@@ -20,6 +20,7 @@ mod pool;
 mod prism;
 mod radiance;
 pub mod shape;
+mod torture;
 
 use anyhow::{Result, bail};
 
@@ -41,10 +42,8 @@ pub const NAMES: &[&str] = &[
     "metamers",
     "absorber",
     "golden-bridge",
+    "torture",
 ];
-
-/// Announced names whose scenes do not exist yet: asking for one is no typing mistake.
-const PLANNED: &[&str] = &["torture"];
 
 /// Generates the study scene `name`, as in `study:NAME` without the prefix.
 pub fn load(name: &str) -> Result<Scene> {
@@ -63,9 +62,7 @@ pub fn load(name: &str) -> Result<Scene> {
         "metamers" => metamers::scene(),
         "absorber" => absorber::scene(),
         "golden-bridge" => golden_bridge::scene(),
-        _ if PLANNED.contains(&name) => {
-            bail!("the study scene `{name}` is not built yet; these are: {}", NAMES.join(", "))
-        }
+        "torture" => torture::scene(),
         _ => bail!("there is no study scene `{name}`; there are: {}", NAMES.join(", ")),
     })
 }
