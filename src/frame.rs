@@ -662,6 +662,12 @@ impl Renderer {
     /// When the driver fails.
     pub fn film(&self) -> Result<Picture> {
         let mut picture = self.read(self.film.as_ref().unwrap_or(&self.radiance))?;
+        self.lay_behind(&mut picture);
+        Ok(picture)
+    }
+
+    /// Puts a background colour behind what lets it through.
+    fn lay_behind(&self, picture: &mut Picture) {
         if let Background::Color(color) = self.settings.background {
             let behind = color.map(|byte| crate::image::tone::srgb_decode(f64::from(byte) / 255.0) as f32);
             for pixel in &mut picture.rgba {
@@ -672,7 +678,6 @@ impl Renderer {
                 pixel[3] = 1.0;
             }
         }
-        Ok(picture)
     }
 
     /// A part of the film of the last render; `None` where [`Settings::parts`] does not name it. Its alpha means nothing.
@@ -699,6 +704,7 @@ impl Renderer {
             let mut picture = self.read(sum)?;
             let scale = 2.0 / samples as f32;
             picture.rgba.iter_mut().flatten().for_each(|value| *value *= scale);
+            self.lay_behind(&mut picture);
             Ok(picture)
         };
         Ok(Some([mean(&halves.sums[0])?, mean(&halves.sums[1])?]))

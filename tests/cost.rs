@@ -35,7 +35,7 @@ fn named<'a>(table: &'a Value, name: &str) -> &'a Value {
 fn a_run_is_what_its_commands_draw() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
-    let table = run(at, "study:radiance", "a", &[]);
+    let table = run(at, "study:lamps", "a", &[]);
     assert_eq!(table["schema"], "etalon.cost/1");
     let points = list(&table, "points");
     let frontier: Vec<&Value> =
@@ -90,7 +90,7 @@ fn a_run_is_what_its_commands_draw() {
     // The table serves budgets of the same picture; nothing is measured again.
     let render = |more: &[&str]| {
         let all = [
-            &["render", "study:radiance", "--size", "40x24", "--device", "cpu", "-o", "w.png", "--report", "w.json"],
+            &["render", "study:lamps", "--size", "40x24", "--device", "cpu", "-o", "w.png", "--report", "w.json"],
             more,
         ];
         etalon(at, &all.concat(), &HASTY)
@@ -120,7 +120,7 @@ fn a_run_is_what_its_commands_draw() {
     }
     let record = at.join("a/points/recursive.json");
     let before = std::fs::read(&record).expect("a record");
-    let again = run(at, "study:radiance", "a", &[]);
+    let again = run(at, "study:lamps", "a", &[]);
     assert_eq!(std::fs::read(&record).expect("a record"), before);
     for point in points {
         let name = point["name"].as_str().expect("a name");
@@ -129,7 +129,7 @@ fn a_run_is_what_its_commands_draw() {
             assert_eq!(named(&again, name)["image"], point["image"], "{name}");
         }
     }
-    let other = etalon(at, &[&["cost", "study:lamps", "-o", "a"], &COMMON[..]].concat(), &HASTY);
+    let other = etalon(at, &[&["cost", "study:radiance", "-o", "a"], &COMMON[..]].concat(), &HASTY);
     other.failed(1, "holds another run");
 }
 
@@ -150,6 +150,8 @@ fn parts_make_the_whole() {
     named(&table, "recursive");
     assert!(at.join("all/report.html").exists());
     etalon(at, &["cost", "--merge", "p1", "all/pictures", "-o", "b"], &[]).failed(1, "cost.json");
+    etalon(at, &["cost", "--merge", "p2", "-o", "b"], &[]).failed(1, "part 1/2 is missing");
+    assert!(!at.join("b/cost.json").exists());
 }
 
 #[test]

@@ -15,11 +15,13 @@ use crate::frame::{Rendered, Settings};
 use crate::image::file;
 use crate::image::metric::{AnyPicture, Metric, compare};
 use crate::image::png::{Display, read_display};
-use crate::plan::{Knobs, Model};
+use crate::plan::{Demand, Knobs, Model};
 
 /// Seconds for a table that nobody has asked for, and samples of its reference.
 const QUICK_S: u32 = 10;
 const QUICK_SAMPLES: u32 = 16;
+/// Rungs are chosen by what is drawn with these random numbers, whatever the picture's own.
+const SEED: u32 = 0;
 /// What is written of a run for later budgets; the table last.
 const KEPT: [&str; 3] = ["reference.png", "reference.json", "cost.json"];
 
@@ -56,7 +58,7 @@ pub(super) struct Chosen {
     #[serde(skip)]
     pub(super) knobs: Knobs,
     #[serde(skip)]
-    reference: PathBuf,
+    reference: Display,
 }
 
 /// All that a picture depends on beside its knobs, as a command line.
@@ -64,23 +66,17 @@ pub(super) fn command(scene: &SceneOptions, picture: &PictureOptions, device: &D
     format!("etalon render {}", [scene.words(), picture.words(), device.words()].concat().join(" "))
 }
 
-/// Where tables of this picture on this device are kept: named by the command, the scene's file, the device and the program.
-fn folder(scene: &SceneOptions, command: &str, setup: &Setup) -> Result<Option<PathBuf>> {
-    let Some(cache) = file::cache_folder() else { return Ok(None) };
-    let mut known = vec![env!("CARGO_PKG_VERSION").to_owned(), command.to_owned()];
-    for path in [Some(&scene.scene), scene.env.as_ref()].into_iter().flatten() {
-        if !path.starts_with("study:") && path != "none" {
-            known.push(file::hash(&file::read(Path::new(path))?));
-        }
-    }
+/// Where tables of this picture on this device are kept: named by the command, all that is drawn, the device and the program.
+fn folder(command: &str, setup: &Setup) -> Option<PathBuf> {
     let info = setup.device.info();
-    known.extend([info.name.clone(), info.driver.clone(), info.version.clone()]);
-    Ok(Some(cache.join(format!("cost-{}", file::hash(known.join("\n").as_bytes())))))
+    let version = env!("CARGO_PKG_VERSION");
+    let known = [version, command, &setup.contents(), &info.name, &info.driver, &info.version].join("\n");
+    Some(file::cache_folder()?.join(format!("cost-{}", file::hash(known.as_bytes()))))
 }
 
 /// Keeps a finished run's table for later budgets; a cache that cannot be written costs time later, nothing else.
-pub(super) fn keep(scene: &SceneOptions, command: &str, setup: &Setup, from: &Path) {
-    let Ok(Some(to)) = folder(scene, command, setup) else { return };
+pub(super) fn keep(command: &str, setup: &Setup, from: &Path) {
+    let Some(to) = folder(command, setup) else { return };
     let copy = || -> Result<()> {
         // A quick run's own account would not be that of this table.
         let _ = std::fs::remove_dir_all(&to);
@@ -102,7 +98,7 @@ impl Budget {
     /// # Errors
     /// One sentence for a number that is none, and for what contradicts it.
     pub(super) fn of(within: Option<&str>, picture: &PictureOptions) -> Result<Option<Self>> {
-        let chosen = !picture.set.is_empty() || picture.model != Model::default();
+        let chosen = !picture.set.is_empty() || picture.model.is_some();
         if let Some(text) = within {
             let number = text.strip_suffix("ms").unwrap_or(text).trim().parse::<f64>().ok();
             let Some(ms) = number.filter(|ms| *ms > 0.0 && ms.is_finite()) else {
@@ -133,28 +129,38 @@ impl Budget {
         settings: &Settings,
         steps: &Steps,
     ) -> Result<Chosen> {
-        let settings = Settings { max_error: None, ..settings.clone() };
-        let kept = folder(options, command, setup)?;
+        // What no table depends on: parts beside the picture, effects that are not called for, other noise.
+        let demand = Demand::Scene;
+        let settings = Settings { max_error: None, demand, parts: Vec::new(), seed: SEED, ..settings.clone() };
         let temporary = tempfile::tempdir().context("making a folder")?;
+        let kept = folder(command, setup).filter(|kept| std::fs::create_dir_all(kept).is_ok());
         let folder = kept.unwrap_or_else(|| temporary.path().join("cost"));
-        let path = folder.join("cost.json");
-        if !path.exists() {
-            steps.say(
-                "nothing was measured of this picture on this device yet: measuring (etalon cost measures better)",
-            );
-            if let Some(parent) = folder.parent() {
-                std::fs::create_dir_all(parent).with_context(|| format!("making the folder {}", parent.display()))?;
+        let read = || -> Result<(Table, Display)> {
+            let table = serde_json::from_slice(&file::read(&folder.join("cost.json"))?)?;
+            Ok((table, read_display(&folder.join("reference.png"))?))
+        };
+        let (table, reference) = match read() {
+            Ok(known) => known,
+            Err(_) => {
+                steps.tell(
+                    "nothing was measured of this picture on this device yet: measuring (etalon cost measures better)",
+                );
+                if !folder.join("run.json").exists() {
+                    // What is left of something that was not finished.
+                    let _ = std::fs::remove_dir_all(&folder);
+                }
+                let table = setup.bench(options, settings, |bench| {
+                    let extent = Extent { budget_s: QUICK_S, reference_samples: Some(QUICK_SAMPLES), shard: [1, 1] };
+                    let contents = setup.contents();
+                    let sweep = Sweep { bench, folder: &folder, extent, command, scene, contents: &contents };
+                    sweep.run(&mut |step| steps.of(step.name, step.done, step.of, step.left_s))
+                })?;
+                let reference = file::read(&folder.join("pictures/reference.png"))?;
+                file::write(&folder.join("reference.png"), &reference)?;
+                file::write(&folder.join("cost.json"), serde_json::to_string_pretty(&table)?.as_bytes())?;
+                (table, read_display(&folder.join("reference.png"))?)
             }
-            let table = setup.bench(options, settings, |bench| {
-                let extent = Extent { budget_s: QUICK_S, reference_samples: Some(QUICK_SAMPLES), shard: [1, 1] };
-                let sweep = Sweep { bench, folder: &folder, extent, command, scene };
-                sweep.run(&mut |step| steps.of(step.name, step.done, step.of, step.left_s))
-            })?;
-            file::write(&folder.join("reference.png"), &file::read(&folder.join("pictures/reference.png"))?)?;
-            file::write(&path, serde_json::to_string_pretty(&table)?.as_bytes())?;
-        }
-        let table: Table =
-            serde_json::from_slice(&file::read(&path)?).with_context(|| format!("reading {}", path.display()))?;
+        };
         let (budget, limit) = match self {
             Self::Within(ms) => ("within", ms),
             Self::MaxError(error) => ("max-error", error),
@@ -197,9 +203,9 @@ impl Budget {
             took_ms: None,
             found_flip: None,
             knobs,
-            reference: folder.join("reference.png"),
+            reference,
         };
-        steps.say(&format!(
+        steps.tell(&format!(
             "{budget} {limit}: \"{}\" took {:.1} ms ({:.1} … {:.1}) with FLIP {:.4} ± {:.4} against the reference; given up: {}",
             chosen.point,
             chosen.gpu_ms.median,
@@ -222,8 +228,8 @@ impl Chosen {
         self.took_ms = Some(rendered.passes.iter().map(|pass| pass.ms).sum());
         let rgba = rendered.display.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect();
         let picture = Display { width: size[0], height: size[1], rgba };
-        let reference = read_display(&self.reference)?;
-        let flip = compare(Metric::Flip, &AnyPicture::Display(reference), &AnyPicture::Display(picture))?;
+        let reference = AnyPicture::Display(self.reference.clone());
+        let flip = compare(Metric::Flip, &reference, &AnyPicture::Display(picture))?;
         self.found_flip = Some(flip.value);
         Ok(())
     }

@@ -15,8 +15,8 @@ use crate::cost::compare::{Compared, compare_rungs};
 use crate::cost::report;
 use crate::cost::sweep::{Extent, Step, Sweep};
 use crate::cost::table::Table;
+use crate::gpu::Severity;
 use crate::image::file;
-use crate::plan::Model;
 use crate::scene::Reads;
 
 /// Price every approximation on a scene: error against the scene's own reference, beside GPU time
@@ -44,7 +44,7 @@ pub struct CostArgs {
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["shard", "reference_samples", "compare"])]
     merge: Vec<PathBuf>,
     /// Price one approximation only: two pictures in turns, two lines and a verdict
-    #[arg(long, value_name = "KNOB=A,B", conflicts_with_all = ["shard", "reference_samples"])]
+    #[arg(long, value_name = "KNOB=A,B", conflicts_with_all = ["shard", "reference_samples", "output", "budget"])]
     compare: Option<String>,
     /// Print cost.json as well
     #[arg(long)]
@@ -87,7 +87,7 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
     }
     let settings = args.picture.settings(&args.scene)?;
     let compared = args.compare.is_some();
-    if !compared && (!args.picture.set.is_empty() || args.picture.model != Model::default()) {
+    if !compared && (!args.picture.set.is_empty() || args.picture.model.is_some()) {
         bail!(
             "--model and --set: cost chooses the rungs itself; with --compare KNOB=A,B they are those of all other knobs"
         );
@@ -103,11 +103,14 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
     }
     let command = command(&args.scene, &args.picture, &args.device);
     if let Some(wanted) = &args.compare {
-        let knobs = settings.knobs.clone();
+        let mut knobs = settings.knobs.clone();
+        args.picture.colour_of(&setup.scene, &mut knobs)?;
         let compared = setup.bench(&args.scene, settings, |bench| compare_rungs(&bench, &knobs, wanted))?;
         drop(steps);
+        validated(&setup)?;
         return say(args, &compared);
     }
+    let contents = setup.contents();
     let table = setup.bench(&args.scene, settings, |bench| {
         let samples = args.reference_samples;
         if let Some(samples) =
@@ -121,15 +124,25 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
             extent: Extent { budget_s: args.budget, reference_samples: samples, shard: args.shard.unwrap_or([1, 1]) },
             command: &command,
             scene: &args.scene.scene,
+            contents: &contents,
         };
         sweep.run(&mut |step: Step<'_>| steps.of(step.name, step.done, step.of, step.left_s))
     })?;
     drop(steps);
+    validated(&setup)?;
     let done = write(args, &output, &table)?;
     if args.shard.is_none() {
-        keep(&args.scene, &command, &setup, &output);
+        keep(&command, &setup, &output);
     }
     Ok(done)
+}
+
+/// What the validation layer calls an error fails the run.
+fn validated(setup: &Setup) -> Result<()> {
+    match setup.device.messages().into_iter().find(|message| message.severity == Severity::Error) {
+        Some(message) => bail!("validation: {}", message.text),
+        None => Ok(()),
+    }
 }
 
 /// Two lines and a verdict.

@@ -89,9 +89,9 @@ pub struct PictureOptions {
     /// Pixels across and down
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
     pub size: [u32; 2],
-    /// How much light transport is simulated
-    #[arg(long, value_enum, default_value_t = Model::default())]
-    pub model: Model,
+    /// How much light transport is simulated [default: recursive]
+    #[arg(long, value_enum)]
+    pub model: Option<Model>,
     /// Choose a knob's rung, for example samples=16; repeatable
     #[arg(long = "set", value_name = "KNOB=RUNG")]
     pub set: Vec<String>,
@@ -300,7 +300,11 @@ impl PictureOptions {
     pub fn colour_of(&self, scene: &Scene, knobs: &mut Knobs) -> Result<()> {
         let chosen = self.set.iter().any(|choice| choice.starts_with("colour="));
         let disperses = || scene.meshes.iter().any(|mesh| scene.materials[mesh.material].disperses());
-        if self.model == Model::Global && !chosen && disperses() { knobs.set("colour=spectral:16") } else { Ok(()) }
+        if self.model == Some(Model::Global) && !chosen && disperses() {
+            knobs.set("colour=spectral:16")
+        } else {
+            Ok(())
+        }
     }
 
     /// The knobs as set.
@@ -308,7 +312,7 @@ impl PictureOptions {
     /// # Errors
     /// One sentence for a model, knob or rung that does not exist or is not built yet.
     pub fn knobs(&self) -> Result<Knobs> {
-        let mut knobs = Knobs::of(self.model);
+        let mut knobs = Knobs::of(self.model.unwrap_or_default());
         knobs.set_all(&self.set)?;
         Ok(knobs)
     }

@@ -73,6 +73,13 @@ impl Steps {
         }
     }
 
+    /// The same, unless nothing is to be said.
+    pub(super) fn tell(&self, line: &str) {
+        if self.bar.is_some() || self.lines {
+            self.say(line);
+        }
+    }
+
     /// A line that stays, whatever the bar does.
     pub(super) fn say(&self, line: &str) {
         match &self.bar {

@@ -164,15 +164,6 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
             settings.parts.push(part);
         }
     }
-    if let Some(name) = args.aov.iter().find(|name| name.of_halves()) {
-        let name = name.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
-        if settings.knobs.rung("indirect") != "path" {
-            bail!("--aov {name}: only paths tell their error; add --model global");
-        }
-        if settings.knobs.samples() == 1 && settings.max_error.is_none() {
-            bail!("--aov {name}: one sample has no halves; add --set samples=4");
-        }
-    }
     let steps = Steps::new(args.progress, quiet);
     phases.end("start");
 
@@ -202,6 +193,15 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     }
     let facts = facts(&setup.scene);
 
+    if let Some(name) = args.aov.iter().find(|name| name.of_halves()) {
+        let name = name.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+        if settings.knobs.rung("indirect") != "path" {
+            bail!("--aov {name}: only paths tell their error; add --model global");
+        }
+        if settings.knobs.samples() == 1 && settings.max_error.is_none() {
+            bail!("--aov {name}: one sample has no halves; add --set samples=4");
+        }
+    }
     steps.step("uploading", 1);
     let knobs = settings.knobs.clone();
     let explained = (args.picture.plan == Extent::ExplainCost).then(|| (setup.clone(), settings.clone()));

@@ -70,6 +70,30 @@ impl Setup {
         subject.prices(effects, progress)
     }
 
+    /// Hash of all that is drawn, whatever files it came from.
+    pub fn contents(&self) -> String {
+        let mut all = xxhash_rust::xxh3::Xxh3::new();
+        for mesh in &self.scene.meshes {
+            all.update(bytemuck::cast_slice(&mesh.positions));
+            all.update(bytemuck::cast_slice(&mesh.normals));
+            all.update(bytemuck::cast_slice(&mesh.tangents));
+            all.update(bytemuck::cast_slice(&mesh.colors));
+            all.update(bytemuck::cast_slice(&mesh.indices));
+            mesh.uvs.iter().for_each(|set| all.update(bytemuck::cast_slice(set)));
+            all.update(&mesh.material.to_le_bytes());
+        }
+        for image in &self.scene.images {
+            all.update(&image.width.to_le_bytes());
+            all.update(&image.rgba);
+        }
+        let Scene { instances, materials, lights, cameras, studio, .. } = &self.scene;
+        all.update(format!("{instances:?}{materials:?}{lights:?}{cameras:?}{studio:?}").as_bytes());
+        if let Some(environment) = &self.environment {
+            all.update(bytemuck::cast_slice(&environment.radiance));
+        }
+        format!("{:032x}", all.digest128())
+    }
+
     /// Lends everything to something that draws many pictures.
     ///
     /// # Errors

@@ -12,11 +12,14 @@ pub fn within(table: &Table, ms: f64) -> Option<&Point> {
     table.points.iter().filter(fits).min_by(|a, b| a.error().total_cmp(&b.error()))
 }
 
-/// The quickest point whose relative error is no more than this, as far as it is known.
+/// The quickest point whose FLIP against the reference is no more than this.
 #[must_use]
 pub fn at_most(table: &Table, error: f64) -> Option<&Point> {
-    let good = |point: &&Point| point.errors.relmse.high.max(0.0).sqrt() <= error;
-    table.points.iter().filter(good).min_by(|a, b| a.gpu_ms.median.total_cmp(&b.gpu_ms.median))
+    table
+        .points
+        .iter()
+        .filter(|point| point.error() <= error)
+        .min_by(|a, b| a.gpu_ms.median.total_cmp(&b.gpu_ms.median))
 }
 
 /// The quickest of all.

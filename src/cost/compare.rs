@@ -68,6 +68,7 @@ pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<C
         share: gpu_ms_delta.median / gpu_ms[1].median.max(1e-9),
         flip_between: flip.value,
         flip_delta: flip.value,
+        turns: differences.len(),
         shown_delta,
         squares,
         noise_ratio: match (by_chance(knob, last.rung(knob.name), first.rung(knob.name)), taken.noise, truth.noise) {

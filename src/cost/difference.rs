@@ -15,6 +15,9 @@ use crate::image::tone::{self, ToneMap};
 /// Added to squares that are divided by, as everywhere.
 const FLOOR: f64 = 0.01;
 
+/// Squares of which a spread can be told.
+const FEWEST: usize = 16;
+
 /// What errors are errors against.
 pub struct Truth {
     /// Radiance.
@@ -55,6 +58,9 @@ impl Truth {
         let n = film.rgba.len() as f64;
         let (mut raw, mut own, mut spread, mut squares) = (0.0, 0.0, 0.0, 0.0);
         for ((x, r), half) in film.rgba.iter().zip(&self.film.rgba).zip(&self.half.rgba) {
+            if [x, r, half].iter().any(|pixel| pixel.iter().any(|value| !value.is_finite())) {
+                continue;
+            }
             let (d, e) = (minus(*x, *r), minus(*half, *r));
             let (d2, e2) = (relative(d, d, *r), relative(e, e, *r));
             raw += d2;
@@ -127,7 +133,11 @@ pub fn without_noise(a: &[Shown; 2], b: &[Shown; 2], width: usize, side: usize) 
         .collect();
     let n = products.len().max(1) as f64;
     let middle = products.iter().sum::<f64>() / n;
-    let spread = products.iter().map(|p| (p - middle) * (p - middle)).sum::<f64>() / n;
+    if products.len() < FEWEST {
+        // Of displayed values no mean square is above 1: nothing is known.
+        return Interval::around(middle, 1.0);
+    }
+    let spread = products.iter().map(|p| (p - middle) * (p - middle)).sum::<f64>() / (n - 1.0);
     Interval::around(middle, (spread / n).sqrt())
 }
 

@@ -10,7 +10,7 @@ use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::table::{Family, Point, Price, Table};
+use super::table::{Family, INVISIBLE, Point, Price, REFERENCE, Table};
 use crate::image::png::{Display, encode_png, read_display};
 
 const STYLE: &str = include_str!("report.css");
@@ -19,7 +19,7 @@ const SCRIPT: &str = include_str!("report.js");
 /// Width and height of the charts, in their own units.
 const CHART: [f64; 2] = [760.0, 420.0];
 /// Room for labels: left, right, top, bottom.
-const MARGIN: [f64; 4] = [64.0, 16.0, 12.0, 44.0];
+const MARGIN: [f64; 4] = [64.0, 16.0, 32.0, 44.0];
 /// Quality of the pictures in the page; the folder `pictures` has them as they are.
 const QUALITY: u8 = 82;
 /// Colours of causes and passes, told apart by those who see few of them (Okabe and Ito 2008).
@@ -90,8 +90,8 @@ struct Axis {
 impl Axis {
     /// Around some numbers above 0, in whole steps of 1, 2 and 5.
     fn around(values: impl Iterator<Item = f64> + Clone, from: f64, to: f64) -> Self {
-        let low = values.clone().fold(f64::INFINITY, f64::min).max(1e-9);
-        let high = values.fold(0.0, f64::max).max(low);
+        let high = values.clone().fold(1e-9, f64::max);
+        let low = values.fold(high, f64::min).max(1e-9);
         Self { low: low / 1.4, high: high * 1.4, from, to }
     }
 
@@ -127,7 +127,7 @@ pub fn page(table: &Table, pictures: &Path) -> Result<String> {
     let gallery = table
         .points
         .iter()
-        .filter(|point| point.name != "reference")
+        .filter(|point| point.name != REFERENCE)
         .map(|point| shown(point, table, pictures))
         .collect::<Result<Vec<_>>>()?;
     let causes = causes(table, pictures)?;
@@ -148,7 +148,7 @@ pub fn page(table: &Table, pictures: &Path) -> Result<String> {
                     p.lead { (summary(table)) }
                     nav aria-label="Sections" {
                         @for (id, name) in SECTIONS {
-                            @if *id != "causes" || causes.is_some() { a href={ "#" (id) } { (name) } }
+                            @if (*id != "causes" || causes.is_some()) && (*id != "search" || !table.search.is_empty()) { a href={ "#" (id) } { (name) } }
                         }
                     }
                 }
@@ -228,13 +228,15 @@ const SECTIONS: &[(&str, &str)] = &[
     ("causes", "Causes"),
     ("passes", "Passes"),
     ("knobs", "Called for"),
+    ("search", "Search"),
     ("pictures", "Pictures"),
 ];
 
 fn summary(table: &Table) -> String {
     let called: Vec<&str> = table.knobs.iter().filter(|k| k.called_for).map(|k| k.knob.as_str()).collect();
     let free: Vec<&str> = called.iter().copied().filter(|knob| harmless(table, knob)).collect();
-    if !table.prices.iter().any(Price::is_seen) {
+    let visible = |price: &Price| !price.same && price.flip_between >= INVISIBLE;
+    if !table.prices.iter().any(visible) {
         return "This scene calls for nothing that can be seen: no rung of any knob changes its picture visibly."
             .to_owned();
     }
@@ -259,7 +261,7 @@ fn summary(table: &Table) -> String {
 /// Whether it was priced and no rung of it can be seen.
 fn harmless(table: &Table, knob: &str) -> bool {
     let mut all = table.prices.iter().filter(|price| price.knob == knob).peekable();
-    all.peek().is_some() && !all.any(Price::is_seen)
+    all.peek().is_some() && all.all(|price| price.same || price.flip_between < INVISIBLE)
 }
 
 fn facts(table: &Table) -> Markup {
@@ -276,6 +278,11 @@ fn facts(table: &Table) -> Markup {
             }
         }
     }
+}
+
+/// Where the page shows a point.
+fn anchor(point: &Point) -> String {
+    if point.name == REFERENCE { "#reference".to_owned() } else { format!("#p-{}", point.picture) }
 }
 
 fn class(family: Family) -> &'static str {
@@ -310,14 +317,14 @@ fn chart(table: &Table) -> Markup {
                 text.tick x=(left - 8.0) y=(y.at(tick) + 4.0) text-anchor="end" { (digits(tick)) }
             }
             text.axis x=((left + width - right) * 0.5) y=(height - 8.0) text-anchor="middle" { "GPU time of a picture, ms" }
-            text.axis transform=(format!("translate(14 {}) rotate(-90)", (top + height - bottom) * 0.5)) text-anchor="middle" { "FLIP, mean" }
+            text.axis x="8" y="20" { "FLIP, mean" }
             line.own x1=(left) x2=(width - right) y1=(y.at(table.reference.own_flip)) y2=(y.at(table.reference.own_flip)) {}
             polyline.pareto points=(line.join(" ")) {}
             @for (index, p) in table.points.iter().enumerate() {
                 @let on = table.frontier.contains(&index);
                 @let [cx, cy] = [x.at(p.gpu_ms.median), y.at(p.error())];
                 line.bar x1=(x.at(p.gpu_ms.low)) x2=(x.at(p.gpu_ms.high)) y1=(cy) y2=(cy) {}
-                a.point href={ "#p-" (p.picture) } data-point=(p.picture) {
+                a.point href=(anchor(p)) data-point=(p.picture) {
                     title { (p.name) ": " (digits(p.gpu_ms.median)) " ms, FLIP " (digits(p.error())) }
                     circle class={ (class(p.family)) @if on { " on" } } cx=(cx) cy=(cy) r=(if on { 6.0 } else { 4.0 }) {}
                     // A finger's width.
@@ -359,11 +366,11 @@ fn choices(table: &Table) -> Markup {
             tbody {
                 @for p in table.frontier.iter().filter_map(|&i| table.points.get(i)) {
                     tr {
-                        th scope="row" { a href={ "#p-" (p.picture) } { (p.name) } }
+                        th scope="row" { a href=(anchor(p)) { (p.name) } }
                         td.number { (digits(p.gpu_ms.median)) }
                         td.number { (digits(p.error())) }
                         td.number { (percent(p.errors.relmse.median.max(0.0).sqrt())) }
-                        td.number { @if p.name == "reference" { "–" } @else { (digits(p.errors.delta_e_mean)) } }
+                        td.number { @if p.name == REFERENCE { "–" } @else { (digits(p.errors.delta_e_mean)) } }
                         td.knobs { (table.given_up(p)) }
                     }
                 }
@@ -458,7 +465,7 @@ fn passes(table: &Table) -> Markup {
     names.truncate(COLOURS.len() - 1);
     let place = |name: &str| names.iter().position(|known| *known == name).unwrap_or(COLOURS.len() - 1);
     html! {
-        p { "Shares of GPU time of the frontier's pictures by pass; beside them the wall time of a start, most of which is uploading and the driver's compilation, and what share of start and one picture that is." }
+        p { "Shares of GPU time of the frontier's pictures by pass; beside them the wall time of a start (uploading, and compiling what no picture before had compiled), and what share of start and one picture that is." }
         div.bars {
             @for point in &points {
                 @let all: f64 = point.passes.iter().map(|(_, ms)| ms).sum();
@@ -570,7 +577,8 @@ fn causes(table: &Table, pictures: &Path) -> Result<Option<Markup>> {
         }
     }
     let total: f64 = before.iter().sum::<f64>().max(1e-9);
-    let mut order: Vec<usize> = (0..others.len()).filter(|&i| gains[i] > 0.0).collect();
+    // What takes away less than half a percent has no colour.
+    let mut order: Vec<usize> = (0..others.len()).filter(|&i| gains[i] > 0.005 * total).collect();
     order.sort_by(|&a, &b| gains[b].total_cmp(&gains[a]));
     order.truncate(COLOURS.len() - 1);
     let rgba: Vec<u8> = best

@@ -64,6 +64,8 @@ pub struct Sweep<'a> {
     pub command: &'a str,
     /// What the scene is called.
     pub scene: &'a str,
+    /// Hash of all that is drawn: a file may change under its name.
+    pub contents: &'a str,
 }
 
 /// What is written beside each picture, so that an interrupted run goes on where it was.
@@ -84,6 +86,8 @@ struct Identity {
     command: String,
     device: DeviceName,
     extent: Extent,
+    contents: String,
+    seed: u32,
 }
 
 /// A rung that one knob is set to.
@@ -95,9 +99,16 @@ struct Change {
     knobs: Knobs,
 }
 
+/// Random numbers of the reference, which nobody chooses by chance: what shares some of them is nearer to it than to the truth.
+fn other_seed(sweep: &Sweep<'_>) -> u32 {
+    sweep.bench.settings.seed ^ 0x2a2a_2a2a
+}
+
 fn told_by_wavelength(bench: &Bench<'_>) -> bool {
     let used = bench.scene.meshes.iter().map(|mesh| &bench.scene.materials[mesh.material]);
-    let materials = used.into_iter().any(|m| m.reflectance.is_some() || m.conductor.is_some() || m.disperses());
+    let materials = used
+        .into_iter()
+        .any(|m| m.reflectance.is_some() || m.emission.is_some() || m.conductor.is_some() || m.disperses());
     materials || bench.scene.lights.iter().any(|light| light.spectrum.is_some())
 }
 
@@ -114,7 +125,9 @@ fn set(knobs: &Knobs, knob: &str, rung: &str) -> Result<Knobs> {
 pub fn arguments(knobs: &Knobs) -> String {
     let rest = |model: Model| -> Vec<String> {
         let preset = Knobs::of(model).list();
-        let others = knobs.list().into_iter().zip(preset).filter(|(a, b)| a != b);
+        // Of glass that disperses the model of paths takes bands of wavelengths, unless told otherwise.
+        let said = |knob: &str| model == Model::Global && knob == "colour";
+        let others = knobs.list().into_iter().zip(preset).filter(|(a, b)| a != b || said(a.0));
         others.map(|((knob, rung), _)| format!("--set {knob}={rung}")).collect()
     };
     let all = [(Model::Local, "local"), (Model::Recursive, "recursive"), (Model::Global, "global")];
@@ -217,6 +230,8 @@ impl<'a> Run<'a> {
             command: sweep.command.to_owned(),
             device: device_name(sweep),
             extent: sweep.extent.clone(),
+            contents: sweep.contents.to_owned(),
+            seed: sweep.bench.settings.seed,
         };
         let path = sweep.folder.join("run.json");
         let making = |folder: &Path| {
@@ -228,9 +243,14 @@ impl<'a> Run<'a> {
                 .with_context(|| format!("reading {}: it is not that of a run of cost", path.display()))?;
             ensure!(
                 known == identity,
-                "{} holds another run ({} on {}): name another folder, or remove it",
+                "{} holds another run (`{}` with seed {}, a budget of {} s, part {}/{}, on {}), or one of a scene that has changed \
+                 since: name another folder, or remove it",
                 sweep.folder.display(),
                 known.command,
+                known.seed,
+                known.extent.budget_s,
+                known.extent.shard[0],
+                known.extent.shard[1],
                 known.device.name
             );
         } else {
@@ -302,8 +322,7 @@ impl<'a> Run<'a> {
         let film_path = sweep.folder.join("reference.exr");
         self.reference = self.read_reference()?;
         if self.reference.is_none() {
-            // Random numbers of its own: what shares some of them is nearer to it than to the truth.
-            let mut sitting = sweep.bench.sit_with(&knobs, sweep.bench.settings.seed + 1)?;
+            let mut sitting = sweep.bench.sit_with(&knobs, other_seed(sweep))?;
             let rendered = sitting.renderer.render(sweep.bench.camera, &mut |_| ())?;
             let film = sitting.renderer.film()?;
             let Some([half, _]) = sitting.renderer.halves(rendered.samples)? else {
@@ -333,7 +352,7 @@ impl<'a> Run<'a> {
                 command: format!(
                     "{} --seed {} {} -o reference.png",
                     sweep.command,
-                    sweep.bench.settings.seed + 1,
+                    other_seed(sweep),
                     arguments(&knobs)
                 ),
                 image: file::hash(&png),
@@ -380,8 +399,8 @@ impl<'a> Run<'a> {
                     continue;
                 }
                 // What the plan does not tell apart is told apart by constants: those of every surface.
-                let shaped = knob.effects.is_empty() || knob.name == "upsampling";
-                if !shaped && self.sweep.bench.renderer(&knobs)?.plan.draws_as(plan) {
+                let shaped = knob.effects.is_empty() || matches!(knob.name, "upsampling" | "lights" | "absorption");
+                if !shaped && self.sweep.bench.renderer(&knobs).is_ok_and(|other| other.plan.draws_as(plan)) {
                     continue;
                 }
                 all.push(Change { knob, from, to, knobs });
@@ -480,14 +499,20 @@ impl<'a> Run<'a> {
         self.done += 1;
     }
 
-    fn known(&self, name: &str) -> Result<Option<Record>> {
+    /// What an interrupted run has found of the same rungs under this name.
+    fn known(&self, name: &str, knobs: &Knobs) -> Result<Option<Record>> {
         let path = self.sweep.path("points", &format!("{}.json", stem(name)));
         if !path.exists() {
             return Ok(None);
         }
         let record: Record =
             serde_json::from_slice(&file::read(&path)?).with_context(|| format!("reading {}", path.display()))?;
-        Ok(Some(record))
+        Ok(Some(record).filter(|record| record.point.knobs == named(knobs)))
+    }
+
+    /// A rung that cannot be drawn is told, and the others are drawn.
+    fn fails(&mut self, name: &str, error: &anyhow::Error) {
+        self.warnings.push(format!("\"{name}\" cannot be drawn here: {error:#}"));
     }
 
     /// A base that others are compared with: drawn anew in every run, because they are drawn in turns with it.
@@ -520,14 +545,23 @@ impl<'a> Run<'a> {
         if elsewhere {
             return Ok(None);
         }
-        if let Some(record) = self.known(name)? {
+        if let Some(record) = self.known(name, knobs)? {
             let point = record.point.clone();
             self.records.push(record);
             return Ok(Some(point));
         }
         let begun = Instant::now();
-        let mut sitting = self.sweep.bench.sit(knobs)?;
-        let taken = self.sweep.bench.take(&mut sitting, Some(base))?;
+        let drawn = self.sweep.bench.sit(knobs).and_then(|mut sitting| {
+            let taken = self.sweep.bench.take(&mut sitting, Some(base))?;
+            Ok((sitting, taken))
+        });
+        let (sitting, taken) = match drawn {
+            Ok(drawn) => drawn,
+            Err(error) => {
+                self.fails(name, &error);
+                return Ok(None);
+            }
+        };
         let family = if name.starts_with("search") { Family::Search } else { Family::Preset };
         let point = self.keep(name, family, knobs, sitting.start_ms, &taken, None)?;
         self.drawn = (self.drawn.0 + 1, self.drawn.1 + begun.elapsed().as_secs_f64());
@@ -550,13 +584,22 @@ impl<'a> Run<'a> {
         if elsewhere {
             return Ok(());
         }
-        if let Some(record) = self.known(&name)? {
+        if let Some(record) = self.known(&name, &change.knobs)? {
             self.records.push(record);
             return Ok(());
         }
         let begun = Instant::now();
-        let mut sitting = self.sweep.bench.sit(&change.knobs)?;
-        let taken = self.sweep.bench.take(&mut sitting, Some(base))?;
+        let drawn = self.sweep.bench.sit(&change.knobs).and_then(|mut sitting| {
+            let taken = self.sweep.bench.take(&mut sitting, Some(base))?;
+            Ok((sitting, taken))
+        });
+        let (sitting, taken) = match drawn {
+            Ok(drawn) => drawn,
+            Err(error) => {
+                self.fails(&name, &error);
+                return Ok(());
+            }
+        };
         self.keep(&name, family, &change.knobs, sitting.start_ms, &taken, Some((change, base_taken)))?;
         self.drawn = (self.drawn.0 + 1, self.drawn.1 + begun.elapsed().as_secs_f64());
         Ok(())
@@ -634,6 +677,7 @@ impl<'a> Run<'a> {
             share: if base_ms > 0.0 { gpu_ms_delta.median / base_ms } else { 0.0 },
             flip_between: between,
             flip_delta: point.errors.flip_mean - base_errors.flip_mean,
+            turns: differences.len(),
             shown_delta,
             squares,
             noise_ratio: match (by_chance(change.knob, change.from, change.to), taken.noise, base.noise) {
@@ -736,17 +780,23 @@ impl<'a> Run<'a> {
     /// The exact rungs less all that cost time and changed nothing that is seen: whether it is still so together.
     fn trimmed(&mut self, changes: &[Change], base: &mut Sitting, progress: &mut dyn FnMut(Step<'_>)) -> Result<()> {
         let mut knobs = self.plain.clone();
-        let mut saved = Vec::new();
-        for change in changes {
+        // Of each knob the rung that saves most of those that change nothing.
+        let mut best: BTreeMap<&str, (&Change, f64)> = BTreeMap::new();
+        for change in changes.iter().filter(|_| self.sweep.extent.shard == [1, 1]) {
             let prices = self.records.iter().filter_map(|r| r.price.as_ref());
-            let Some(price) =
-                prices.into_iter().find(|p| p.base == Family::Exact && p.knob == change.knob.name && p.to == change.to)
-            else {
-                continue;
-            };
-            let nothing = !price.is_seen() && price.shown_delta.high < NOTHING;
-            let changed = knobs.with(change.knob.name, change.to);
-            if let (true, true, Some(changed)) = (nothing, price.gpu_ms_delta.high < 0.0, changed) {
+            let this = |p: &&Price| p.base == Family::Exact && p.knob == change.knob.name && p.to == change.to;
+            let Some(price) = prices.into_iter().find(this) else { continue };
+            let nothing =
+                price.same || (!price.is_seen() && price.shown_delta.high < NOTHING && price.noise_ratio.is_none());
+            let saved = -price.gpu_ms_delta.median;
+            let known = best.get(change.knob.name).map_or(0.0, |(_, saved)| *saved);
+            if nothing && price.saves() && saved > known {
+                best.insert(change.knob.name, (change, saved));
+            }
+        }
+        let mut saved = Vec::new();
+        for (change, _) in best.into_values() {
+            if let Some(changed) = knobs.with(change.knob.name, change.to) {
                 saved.push(format!("{}={}", change.knob.name, change.to));
                 knobs = changed;
             }
@@ -806,6 +856,7 @@ impl<'a> Run<'a> {
             prices: self.records.into_iter().filter_map(|record| record.price).collect(),
             search: self.search,
             warnings: self.warnings,
+            shard: self.sweep.extent.shard,
             budget_s: f64::from(self.sweep.extent.budget_s),
             took_s: self.start.elapsed().as_secs_f64(),
         })
@@ -888,10 +939,11 @@ pub(super) fn by_chance(knob: &Knob, from: &str, to: &str) -> bool {
 /// What a price says, in a sentence.
 #[must_use]
 pub fn verdict(price: &Price) -> String {
-    let Interval { median, low, high } = price.gpu_ms_delta;
-    let time = if low > 0.0 {
+    let median = price.gpu_ms_delta.median;
+    let (longer, shorter) = (price.takes_longer(), price.saves());
+    let time = if longer {
         format!("takes {median:.1} ms longer ({:+.0} %)", 100.0 * price.share)
-    } else if high < 0.0 {
+    } else if shorter {
         format!("saves {:.1} ms ({:+.0} %)", -median, 100.0 * price.share)
     } else {
         "takes the same time as far as can be told".to_owned()
@@ -907,7 +959,12 @@ pub fn verdict(price: &Price) -> String {
     } else if price.base != Family::Exact && error.median < 0.0 {
         format!("less error by {:.2} % of what is shown (FLIP {flip:.3} between both)", 100.0 * (-error.median).sqrt())
     } else if price.is_seen() {
-        let more = if price.base == Family::Exact { "an error of" } else { "more error by" };
+        // From the reference's rungs a cheaper one is wrong; a dearer one says what they leave out.
+        let more = match (price.base, price.to_more_exact()) {
+            (Family::Exact, false) => "an error of",
+            (Family::Exact, true) => "another picture by",
+            _ => "more error by",
+        };
         let squares =
             if price.squares > 1 { format!(" in squares of {} pixels", price.squares) } else { String::new() };
         format!("{more} {:.2} % of what is shown{squares} (FLIP {flip:.3} between both)", 100.0 * error.median.sqrt())
@@ -916,7 +973,7 @@ pub fn verdict(price: &Price) -> String {
     };
     let better =
         price.noise_ratio.is_some_and(|ratio| ratio < 1.0) || (price.base != Family::Exact && error.median < 0.0);
-    if low > 0.0 && !better && !price.is_seen() {
+    if longer && !better && !price.is_seen() {
         return format!("{time}; {seen}: wasted here");
     }
     format!("{time}; {seen}")

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 use serde::{Deserialize, Serialize};
+
+use crate::plan::KNOBS;
 
 /// The document.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -34,6 +36,8 @@ pub struct Table {
     pub search: Vec<Tried>,
     /// What is worth knowing before a figure is believed.
     pub warnings: Vec<String>,
+    /// Which part of how many, counted from 1.
+    pub shard: [u32; 2],
     /// Seconds that were given, and taken.
     pub budget_s: f64,
     /// See `budget_s`; those of an interrupted run are not known to the one that went on with it.
@@ -231,6 +235,8 @@ pub struct Price {
     pub point: String,
     /// Milliseconds of GPU time more: the middle and both ends of pictures drawn in turns.
     pub gpu_ms_delta: Interval,
+    /// How many turns.
+    pub turns: usize,
     /// The same as a share of the base's.
     pub share: f64,
     /// FLIP between the two pictures; from `exact` with the same random numbers, so that noise is in both alike.
@@ -258,6 +264,31 @@ pub struct Price {
 pub const INVISIBLE: f64 = 0.002;
 
 impl Price {
+    /// Whether a time is more than chance: all turns say so, of which there are five, or fewer and it is more than a twentieth.
+    fn is_sure(&self) -> bool {
+        self.turns >= 5 || self.share.abs() > 0.05
+    }
+
+    /// Whether it takes longer than the base.
+    #[must_use]
+    pub fn takes_longer(&self) -> bool {
+        self.gpu_ms_delta.low > 0.0 && self.is_sure()
+    }
+
+    /// Whether it takes less time than the base.
+    #[must_use]
+    pub fn saves(&self) -> bool {
+        self.gpu_ms_delta.high < 0.0 && self.is_sure()
+    }
+
+    /// Whether it went to a rung further on in its knob's list.
+    #[must_use]
+    pub fn to_more_exact(&self) -> bool {
+        let knob = KNOBS.iter().find(|knob| knob.name == self.knob);
+        let place = |rung: &str| knob.and_then(|knob| knob.rungs.iter().position(|known| *known == rung));
+        place(&self.to) > place(&self.from)
+    }
+
     /// Whether an eye sees it, and it is more than the noise of paths that went apart.
     #[must_use]
     pub fn is_seen(&self) -> bool {
@@ -288,6 +319,8 @@ pub fn frontier(points: &[Point]) -> Vec<usize> {
     let error = |i: usize| points[i].error().max(floor);
     let mut order: Vec<usize> = (0..points.len()).filter(|i| Some(*i) != reference).collect();
     let time = |i: usize| points[i].gpu_ms.median;
+    // What takes longer and is no better is beaten by the reference itself.
+    order.retain(|&i| reference.is_none_or(|r| time(i) < time(r)));
     order.sort_by(|&a, &b| time(a).total_cmp(&time(b)).then(error(a).total_cmp(&error(b))));
     let mut best = f64::INFINITY;
     order.retain(|&i| {
@@ -377,7 +410,9 @@ impl Table {
     /// When they are not of one scene, one reference and one kind of device.
     pub fn merge(parts: Vec<Self>) -> Result<Self> {
         let mut parts = parts.into_iter();
-        let Some(mut all) = parts.next() else { anyhow::bail!("merging: there is nothing to merge") };
+        let Some(mut all) = parts.next() else { bail!("merging: there is nothing to merge") };
+        let of = all.shard[1];
+        let mut drawn = vec![all.shard[0]];
         for part in parts {
             for (what, a, b) in [
                 ("programs", &all.program, &part.program),
@@ -390,6 +425,8 @@ impl Table {
             if all.device != part.device {
                 all.warnings.push(format!("times are those of {} and {}", all.device.name, part.device.name));
             }
+            ensure!(part.shard[1] == of, "merging: two parts are of {of} and of {}", part.shard[1]);
+            drawn.push(part.shard[0]);
             for point in part.points {
                 if all.points.iter().all(|known| known.name != point.name) {
                     all.points.push(point);
@@ -408,6 +445,12 @@ impl Table {
             }
             all.took_s = all.took_s.max(part.took_s);
         }
+        if let Some(missing) = (1..=of).find(|i| !drawn.contains(i)) {
+            bail!("merging: part {missing}/{of} is missing");
+        }
+        all.shard = [1, 1];
+        // The reference is the last.
+        all.points.sort_by_key(|point| point.name == REFERENCE);
         all.frontier = frontier(&all.points);
         Ok(all)
     }
