@@ -7,6 +7,7 @@ pub mod choose;
 pub mod compare;
 pub mod difference;
 pub mod explain;
+pub mod forecast;
 pub mod report;
 pub mod sitting;
 pub mod sweep;

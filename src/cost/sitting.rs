@@ -23,6 +23,14 @@ const ENOUGH_MS: f64 = 1000.0;
 /// … unless one takes so long.
 const LONG_MS: f64 = 6000.0;
 
+/// How many pictures that take so long are timed.
+pub(super) fn turns(ms: f64) -> usize {
+    match ms {
+        ms if ms >= LONG_MS => 1,
+        ms => ((ENOUGH_MS / ms.max(1e-3)).ceil() as usize).clamp(2, MOST),
+    }
+}
+
 /// What is drawn, from where, on what.
 pub struct Bench<'a> {
     /// The device.
@@ -142,7 +150,7 @@ impl Bench<'_> {
         if let Some(other) = &mut other {
             others_ms.push(self.time(other)?);
         }
-        while ms.len() < MOST && (ms.iter().sum::<f64>() < ENOUGH_MS || ms.len() < 2) && ms[0] < LONG_MS {
+        while ms.len() < turns(ms[0]) {
             let again = sitting.renderer.render(self.camera, &mut |_| ())?;
             ms.push(total(&again));
             for (pass, known) in again.passes.iter().zip(&mut passes) {

@@ -8,6 +8,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::difference::{Truth, display_mse, shown, told_apart};
+use super::forecast::Forecast;
 use super::sitting::{Bench, Sitting, Taken};
 use super::table::{
     CONVERGED, DeviceName, Errors, Family, Interval, KnobState, Point, Price, REFERENCE, Reference, Table, Tried,
@@ -22,6 +23,8 @@ use crate::plan::{KNOBS, Knob, Knobs, Model, Plan};
 /// Shares of the budget: for the reference, and for what is priced from it.
 const REFERENCE_SHARE: f64 = 0.3;
 const EXACT_SHARE: f64 = 0.4;
+/// What comes after the reference, as far as can be told before.
+const AFTER_SHARE: f64 = 0.3;
 /// Pictures that the search may draw.
 const SEARCH: usize = 8;
 /// Mean squared difference of displayed values below which the search leaves out what it pays for: a thousandth of their range.
@@ -179,7 +182,7 @@ impl Sweep<'_> {
     pub fn run(&self, progress: &mut dyn FnMut(Step<'_>)) -> Result<Table> {
         let mut run = Run::begin(self)?;
         run.state = self.states()?;
-        run.reference()?;
+        run.reference(progress)?;
         run.all(progress)?;
         run.finish()
     }
@@ -218,8 +221,7 @@ struct Run<'a> {
     warnings: Vec<String>,
     done: usize,
     of: usize,
-    /// Pictures that were drawn in this run, and the seconds for them.
-    drawn: (usize, f64),
+    forecast: Forecast,
 }
 
 impl<'a> Run<'a> {
@@ -279,7 +281,7 @@ impl<'a> Run<'a> {
             warnings,
             done: 0,
             of: 0,
-            drawn: (0, 0.0),
+            forecast: Forecast::default(),
         })
     }
 
@@ -288,7 +290,7 @@ impl<'a> Run<'a> {
     }
 
     /// Chooses its samples and draws it, or reads it where an interrupted run has drawn it already.
-    fn reference(&mut self) -> Result<()> {
+    fn reference(&mut self, progress: &mut dyn FnMut(Step<'_>)) -> Result<()> {
         let sweep = self.sweep;
         let spectral = told_by_wavelength(&sweep.bench) && self.calls_for("colour");
         let mut exact = Knobs::exact();
@@ -323,7 +325,15 @@ impl<'a> Run<'a> {
         self.reference = self.read_reference()?;
         if self.reference.is_none() {
             let mut sitting = sweep.bench.sit_with(&knobs, other_seed(sweep))?;
-            let rendered = sitting.renderer.render(sweep.bench.camera, &mut |_| ())?;
+            let (begun, mut last) = (Instant::now(), Instant::now());
+            let rendered = sitting.renderer.render(sweep.bench.camera, &mut |at| {
+                if last.elapsed().as_secs() >= 1 {
+                    last = Instant::now();
+                    let each_s = begun.elapsed().as_secs_f64() / f64::from(at.done);
+                    let left_s = each_s * f64::from(at.of - at.done) + AFTER_SHARE * f64::from(sweep.extent.budget_s);
+                    progress(Step { name: "reference", done: at.done as usize, of: at.of as usize, left_s });
+                }
+            })?;
             let film = sitting.renderer.film()?;
             let Some([half, _]) = sitting.renderer.halves(rendered.samples)? else {
                 bail!("the reference has no halves: our mistake")
@@ -458,7 +468,28 @@ impl<'a> Run<'a> {
         let dear = wavelengths.len() + ladder.len();
         self.of = 2 + local_changes.len() + presets.len() + exact_changes.len() + dear + SEARCH;
 
+        let plain = self.plain.clone();
+        let [width, height] = bench.settings.size;
+        let bands = f64::from(self.exact.bands().max(1));
+        self.forecast.path_ms = reference.gpu_ms / f64::from(reference.samples) / bands;
+        // 8 ms for 640x360 on two cores, until it is known.
+        self.forecast.raster_ms = 3.5e-5 * f64::from(width) * f64::from(height);
         let mut base = bench.sit(&local)?;
+        self.forecast.raster_ms = self.forecast.raster_ms.min(bench.time(&mut base)? / f64::from(local.samples()));
+        self.forecast.expect(&local, &local);
+        local_changes.iter().for_each(|change| self.forecast.expect(&change.knobs, &local));
+        presets.iter().for_each(|(_, knobs)| self.forecast.expect(knobs, &local));
+        (0..SEARCH - 1).for_each(|_| self.forecast.expect(&local, &local));
+        self.forecast.expect(&plain, &plain);
+        exact_changes.iter().for_each(|change| self.forecast.expect(&change.knobs, &plain));
+        let mut by_wavelength = Vec::new();
+        for &to in &wavelengths {
+            by_wavelength.push((to, set(&plain, "colour", to)?));
+        }
+        by_wavelength.iter().for_each(|(_, knobs)| self.forecast.expect(knobs, &plain));
+        ladder.iter().for_each(|(_, knobs)| self.forecast.expect(knobs, &local));
+        self.forecast.expect(&plain, &local);
+
         let taken = self.base("local", Family::Preset, &local, &mut base, progress)?;
         for change in &local_changes {
             self.single(Family::Local, change, &mut base, &taken, progress)?;
@@ -468,15 +499,14 @@ impl<'a> Run<'a> {
         }
         self.search(&local, &local_changes, &mut base, progress)?;
 
-        let plain = self.plain.clone();
         let mut exact = bench.sit(&plain)?;
         let taken = self.base("exact", Family::Exact, &plain, &mut exact, progress)?;
         for change in &exact_changes {
             self.single(Family::Exact, change, &mut exact, &taken, progress)?;
         }
-        for to in wavelengths {
+        for (to, knobs) in by_wavelength {
             let knob = KNOBS.iter().find(|knob| knob.name == "colour").context("the knob colour")?;
-            let change = Change { knob, from: "rgb", to, knobs: set(&plain, "colour", to)? };
+            let change = Change { knob, from: "rgb", to, knobs };
             self.single(Family::Exact, &change, &mut exact, &taken, progress)?;
         }
         for (name, knobs) in &ladder {
@@ -491,12 +521,11 @@ impl<'a> Run<'a> {
         self.done as u32 % of != shard - 1
     }
 
-    fn tell(&mut self, name: &str, progress: &mut dyn FnMut(Step<'_>)) {
-        let (count, seconds) = self.drawn;
-        let left = self.of.saturating_sub(self.done);
-        let each = if count > 0 { seconds / count as f64 } else { 3.0 };
-        progress(Step { name, done: self.done, of: self.of, left_s: each * left as f64 });
+    /// The next picture begins: the seconds that are expected of it.
+    fn tell(&mut self, name: &str, progress: &mut dyn FnMut(Step<'_>)) -> f64 {
+        progress(Step { name, done: self.done, of: self.of, left_s: self.forecast.left() });
         self.done += 1;
+        self.forecast.begin()
     }
 
     /// What an interrupted run has found of the same rungs under this name.
@@ -524,11 +553,11 @@ impl<'a> Run<'a> {
         sitting: &mut Sitting,
         progress: &mut dyn FnMut(Step<'_>),
     ) -> Result<Taken> {
-        self.tell(name, progress);
+        let expected = self.tell(name, progress);
         let begun = Instant::now();
         let taken = self.sweep.bench.take(sitting, None)?;
         self.keep(name, family, knobs, sitting.start_ms, &taken, None)?;
-        self.drawn = (self.drawn.0 + 1, self.drawn.1 + begun.elapsed().as_secs_f64());
+        self.forecast.took(expected, begun.elapsed().as_secs_f64());
         Ok(taken)
     }
 
@@ -541,7 +570,7 @@ impl<'a> Run<'a> {
         progress: &mut dyn FnMut(Step<'_>),
     ) -> Result<Option<Point>> {
         let elsewhere = self.elsewhere();
-        self.tell(name, progress);
+        let expected = self.tell(name, progress);
         if elsewhere {
             return Ok(None);
         }
@@ -564,7 +593,7 @@ impl<'a> Run<'a> {
         };
         let family = if name.starts_with("search") { Family::Search } else { Family::Preset };
         let point = self.keep(name, family, knobs, sitting.start_ms, &taken, None)?;
-        self.drawn = (self.drawn.0 + 1, self.drawn.1 + begun.elapsed().as_secs_f64());
+        self.forecast.took(expected, begun.elapsed().as_secs_f64());
         Ok(Some(point))
     }
 
@@ -580,7 +609,7 @@ impl<'a> Run<'a> {
         let word = if family == Family::Local { "local" } else { "exact" };
         let name = format!("{word} {}={}", change.knob.name, change.to);
         let elsewhere = self.elsewhere();
-        self.tell(&name, progress);
+        let expected = self.tell(&name, progress);
         if elsewhere {
             return Ok(());
         }
@@ -601,7 +630,7 @@ impl<'a> Run<'a> {
             }
         };
         self.keep(&name, family, &change.knobs, sitting.start_ms, &taken, Some((change, base_taken)))?;
-        self.drawn = (self.drawn.0 + 1, self.drawn.1 + begun.elapsed().as_secs_f64());
+        self.forecast.took(expected, begun.elapsed().as_secs_f64());
         Ok(())
     }
 
@@ -703,7 +732,8 @@ impl<'a> Run<'a> {
     ) -> Result<()> {
         if self.sweep.extent.shard != [1, 1] {
             self.warnings.push("a part of a run does not search for combinations".to_owned());
-            self.done += SEARCH;
+            self.of -= SEARCH - 1;
+            self.forecast.skip(SEARCH - 1);
             return Ok(());
         }
         // What each rung adds to the error and the time of `local`.
@@ -773,7 +803,9 @@ impl<'a> Run<'a> {
                 refused.push((knob.name, rung));
             }
         }
-        self.of -= end.saturating_sub(self.done);
+        let unused = end.saturating_sub(self.done);
+        self.of -= unused;
+        self.forecast.skip(unused);
         Ok(())
     }
 
