@@ -3,10 +3,9 @@
 use anyhow::{Context as _, Result, bail, ensure};
 use serde::Serialize;
 
-use super::difference::{display_mse, told_apart};
+use super::price::price;
 use super::sitting::Bench;
-use super::sweep::{by_chance, verdict};
-use super::table::{Family, Interval, Price, WorstPixel};
+use super::table::{Interval, Price, WorstPixel};
 use crate::image::metric::{AnyPicture, Metric, compare};
 use crate::plan::{KNOBS, Knobs};
 
@@ -51,38 +50,12 @@ pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<C
     let taken = bench.take(&mut sitting, Some(&mut exact))?;
     let shown = |display: &crate::image::png::Display| AnyPicture::Display(display.clone());
     let flip = compare(Metric::Flip, &shown(&truth.display), &shown(&taken.display))?;
-    let differences: Vec<f64> = taken.ms.iter().zip(&taken.others_ms).map(|(a, b)| a - b).collect();
-    let gpu_ms_delta = Interval::of(&differences);
     let gpu_ms = [Interval::of(&taken.ms), Interval::of(&taken.others_ms)];
-    let ((shown_delta, squares), base) = match (&taken.halves, &truth.halves) {
-        (Some(a), Some(b)) => (told_apart(a, b, taken.film.width as usize), Family::Exact),
-        _ => ((Interval::around(display_mse(&truth.display, &taken.display), 0.0), 1), Family::Local),
-    };
-    let mut price = Price {
-        knob: knob.name.to_owned(),
-        from: last.rung(knob.name).to_owned(),
-        to: first.rung(knob.name).to_owned(),
-        base,
-        point: String::new(),
-        gpu_ms_delta,
-        share: gpu_ms_delta.median / gpu_ms[1].median.max(1e-9),
-        flip_between: flip.value,
-        flip_delta: flip.value,
-        turns: differences.len(),
-        shown_delta,
-        squares,
-        noise_ratio: match (by_chance(knob, last.rung(knob.name), first.rung(knob.name)), taken.noise, truth.noise) {
-            (true, Some(noise), Some(before)) if before > 0.0 => Some(noise / before),
-            _ => None,
-        },
-        same: bytemuck::cast_slice::<_, u8>(&taken.film.rgba) == bytemuck::cast_slice::<_, u8>(&truth.film.rgba),
-        called_for: true,
-        verdict: String::new(),
-    };
-    price.verdict = verdict(&price);
+    let rungs = [first.rung(knob.name), last.rung(knob.name)];
+    let price = price(knob, [rungs[1], rungs[0]], &taken, &truth, &truth.display)?;
     Ok(Compared {
         knob: knob.name,
-        rungs: [first.rung(knob.name), last.rung(knob.name)],
+        rungs,
         gpu_ms,
         price,
         worst_pixel: WorstPixel { x: flip.worst[0], y: flip.worst[1], error: flip.worst_error },

@@ -8,6 +8,7 @@ pub mod compare;
 pub mod difference;
 pub mod explain;
 pub mod forecast;
+mod price;
 pub mod report;
 pub mod sitting;
 pub mod sweep;

@@ -7,8 +7,9 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
-use super::difference::{Truth, display_mse, shown, told_apart};
+use super::difference::{Truth, shown};
 use super::forecast::Forecast;
+use super::price::price;
 use super::sitting::{Bench, Sitting, Taken};
 use super::table::{
     CONVERGED, DeviceName, Errors, Family, Interval, KnobState, Point, Price, REFERENCE, Reference, Table, Tried,
@@ -679,46 +680,16 @@ impl<'a> Run<'a> {
         Ok(point)
     }
 
+    /// What a change cost and bought beside its base, which is among the records.
     fn price(&self, point: &Point, change: &Change, taken: &Taken, base: &Taken) -> Result<Price> {
         let truth = self.truth.as_ref().context("there is no reference yet")?;
-        let differences: Vec<f64> = taken.ms.iter().zip(&taken.others_ms).map(|(a, b)| a - b).collect();
-        let gpu_ms_delta = Interval::of(&differences);
-        let base_ms = Interval::of(&taken.others_ms).median;
-        let shown = |taken: &Taken| AnyPicture::Display(taken.display.clone());
-        let between = compare(Metric::Flip, &shown(base), &shown(taken))?.value;
-        let (base_errors, _) = truth.errors(&base.film, &base.display)?;
-        let same = bytemuck::cast_slice::<_, u8>(&taken.film.rgba) == bytemuck::cast_slice::<_, u8>(&base.film.rgba);
-        let (shown_delta, squares) = match (&taken.halves, &base.halves) {
-            (Some(a), Some(b)) => told_apart(a, b, taken.film.width as usize),
-            // The reference's noise is in both.
-            _ => {
-                let mse = |taken: &Taken| display_mse(&truth.display, &taken.display);
-                (Interval::around(mse(taken) - mse(base), 0.0), 1)
-            }
-        };
-        let mut price = Price {
-            knob: change.knob.name.to_owned(),
-            from: change.from.to_owned(),
-            to: change.to.to_owned(),
-            base: point.family,
+        let name = if point.family == Family::Local { "local" } else { "exact" };
+        let known = self.records.iter().find(|record| record.point.name == name).context("a base is drawn first")?;
+        Ok(Price {
             point: point.name.clone(),
-            gpu_ms_delta,
-            share: if base_ms > 0.0 { gpu_ms_delta.median / base_ms } else { 0.0 },
-            flip_between: between,
-            flip_delta: point.errors.flip_mean - base_errors.flip_mean,
-            turns: differences.len(),
-            shown_delta,
-            squares,
-            noise_ratio: match (by_chance(change.knob, change.from, change.to), taken.noise, base.noise) {
-                (true, Some(noise), Some(before)) if before > 0.0 => Some(noise / before),
-                _ => None,
-            },
-            same,
-            called_for: true,
-            verdict: String::new(),
-        };
-        price.verdict = verdict(&price);
-        Ok(price)
+            flip_delta: point.error() - known.point.error(),
+            ..price(change.knob, [change.from, change.to], taken, base, &truth.display)?
+        })
     }
 
     /// From the quickest rungs towards less error, a change at a time: that which single prices promise most of for its time, and
@@ -957,58 +928,6 @@ fn device_name(sweep: &Sweep<'_>) -> DeviceName {
         version: info.version.clone(),
         kind: info.kind.to_owned(),
     }
-}
-
-/// Whether a change is one of chance alone: the light is the same in the mean.
-pub(super) fn by_chance(knob: &Knob, from: &str, to: &str) -> bool {
-    match knob.name {
-        "guiding" => true,
-        "lights" => from != "points" && to != "points",
-        _ => false,
-    }
-}
-
-/// What a price says, in a sentence.
-#[must_use]
-pub fn verdict(price: &Price) -> String {
-    let median = price.gpu_ms_delta.median;
-    let (longer, shorter) = (price.takes_longer(), price.saves());
-    let time = if longer {
-        format!("takes {median:.1} ms longer ({:+.0} %)", 100.0 * price.share)
-    } else if shorter {
-        format!("saves {:.1} ms ({:+.0} %)", -median, 100.0 * price.share)
-    } else {
-        "takes the same time as far as can be told".to_owned()
-    };
-    let flip = price.flip_between;
-    let error = price.shown_delta;
-    let seen = if price.same {
-        "the picture is the same to the last bit".to_owned()
-    } else if let Some(ratio) = price.noise_ratio {
-        format!("the same light, {:.2} times the noise", ratio.sqrt())
-    } else if flip < super::table::INVISIBLE {
-        format!("nobody sees it (FLIP {flip:.4} between both)")
-    } else if price.base != Family::Exact && error.median < 0.0 {
-        format!("less error by {:.2} % of what is shown (FLIP {flip:.3} between both)", 100.0 * (-error.median).sqrt())
-    } else if price.is_seen() {
-        // From the reference's rungs a cheaper one is wrong; a dearer one says what they leave out.
-        let more = match (price.base, price.to_more_exact()) {
-            (Family::Exact, false) => "an error of",
-            (Family::Exact, true) => "another picture by",
-            _ => "more error by",
-        };
-        let squares =
-            if price.squares > 1 { format!(" in squares of {} pixels", price.squares) } else { String::new() };
-        format!("{more} {:.2} % of what is shown{squares} (FLIP {flip:.3} between both)", 100.0 * error.median.sqrt())
-    } else {
-        format!("no error beyond noise (FLIP {flip:.3} between both)")
-    };
-    let better =
-        price.noise_ratio.is_some_and(|ratio| ratio < 1.0) || (price.base != Family::Exact && error.median < 0.0);
-    if longer && !better && !price.is_seen() {
-        return format!("{time}; {seen}: wasted here");
-    }
-    format!("{time}; {seen}")
 }
 
 /// The mean of one half, as it lies beside the film.
