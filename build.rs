@@ -359,6 +359,10 @@ fn bindings(stage: &Stage, names: &Names) -> Result<Vec<Binding>> {
             // A block without an instance name is known by its own.
             name = snake(names.name(pointee));
         }
+        // NAME_as_FORMAT is the binding NAME, read in another format.
+        if let Some((of, _)) = name.split_once("_as_") {
+            name = of.to_owned();
+        }
         found.push(Binding { name, slot, kind, access, stages: BTreeSet::from([stage_name]) });
     }
     Ok(found)

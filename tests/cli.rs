@@ -68,7 +68,7 @@ fn mistakes_end_in_one_sentence_and_no_file() {
         (vec!["scene.glb", "--size", "100000x100000"], 1, "--size 100000x100000"),
         (vec!["scene.glb", "--set", "gloss=1"], 1, "no knob is called \"gloss\""),
         (vec!["scene.glb", "--set", "samples=5"], 1, "no rung"),
-        (vec!["scene.glb", "--set", "normals=f32"], 1, "not built yet"),
+        (vec!["scene.glb", "--set", "normals=f16"], 1, "it has oct16, oct24, oct32, f32"),
         (vec!["scene.glb", "--model", "global", "--set", "reflection=off"], 1, "contradicts indirect=path"),
         (vec!["scene.glb", "--set", "lights=area:1"], 1, "contradicts indirect=ambient"),
         (vec!["scene.glb", "--model", "local", "--max-error", "2%"], 1, "only paths tell their error"),

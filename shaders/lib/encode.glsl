@@ -26,6 +26,11 @@ vec3 unit_from_octahedral(vec2 p) {
     return normalize(n);
 }
 
+// To the nearest of so many steps on each side of 0; 0: as it is.
+vec2 in_steps(vec2 p, uint steps) {
+    return steps == 0 ? p : floor(p * float(steps) + 0.5) / float(steps);
+}
+
 struct OctahedralRoundTrip {
     vec3 d;
     float error_deg;

@@ -14,6 +14,7 @@ layout(constant_id = 5) const bool HAS_LAYERS = false;
 layout(constant_id = 6) const bool HAS_COLOR = false;
 layout(constant_id = 7) const bool MASKED = false;
 layout(constant_id = 8) const bool HAS_COAT_NORMAL = false;
+layout(constant_id = 77) const uint NORMAL_STEPS = 0; // that stored normals are rounded to; 0: what they are stored in decides
 const bool HAS_TEXTURES = HAS_BASE || HAS_METALLIC_ROUGHNESS || HAS_NORMAL || HAS_OCCLUSION || HAS_EMISSIVE || HAS_LAYERS ||
                           HAS_COAT_NORMAL;
 

@@ -11,9 +11,10 @@ layout(constant_id = 1) const bool HAS_LAYERS = false;
 layout(constant_id = 3) const bool HAS_TRIANGLES = false;
 layout(constant_id = 2) const bool HAS_TRANSMISSION = false; // transmissive surfaces are in the G-buffer
 
-layout(set = 0, binding = 3, r32f) readonly uniform imageBuffer depth;
 layout(set = 0, binding = 4, rgba16f) readonly uniform image2D base;
-layout(set = 0, binding = 5, rgba16_snorm) readonly uniform image2D normals;
+#define DEPTH_BINDING 3
+#define NORMALS_BINDING 5
+#include "lib/stored.glsl"
 layout(set = 0, binding = 6, rg32ui) readonly uniform uimage2D ids;
 layout(set = 0, binding = 7, rgba16f) readonly uniform image2D emissive;
 layout(set = 0, binding = 8, rgba16) readonly uniform image2D layers;
@@ -21,6 +22,7 @@ layout(set = 0, binding = 9, r32ui) readonly uniform uimage2D triangles;
 // Places among the leaves of the scene's triangles.
 layout(set = 0, binding = 35, r32ui) readonly uniform uimageBuffer leaf_places;
 
+layout(constant_id = 79) const float NORMAL_ERROR2 = 1e-7; // |n − stored n|² that storing accounts for
 layout(constant_id = 4) const bool IN_MEDIUM = false; // the eye is inside a transparent body
 
 struct Primary {
@@ -59,13 +61,14 @@ HitPoint on_triangle(uint leaf, vec3 p_bvh, vec3 direction) {
 // looked up at the surface has the stored ones, which are there whether or not the scene calls for rays.
 Primary primary_surface(ivec2 pixel, bool exact_normals) {
     Primary r;
-    float z = imageLoad(depth, pixel.y * int(camera.size.x) + pixel.x).x;
+    vec4 z_position = stored_depth(pixel.y * int(camera.size.x) + pixel.x);
+    float z = z_position.x;
     r.drawn = z != 0.0;
     uvec2 id = imageLoad(ids, pixel).xy;
     uint material = r.drawn ? id.x & 0xffffu : 0u;
     vec4 texel = imageLoad(base, pixel);
     vec4 glow = HAS_EMISSIVE || HAS_TRANSMISSION ? imageLoad(emissive, pixel) : vec4(1.0);
-    vec4 octahedral = imageLoad(normals, pixel);
+    vec4 octahedral = stored_normals(pixel);
     vec3 n = unit_from_octahedral(octahedral.xy);
     vec3 layer = vec3(1.0);
     vec3 n_coat = n;
@@ -77,7 +80,7 @@ Primary primary_surface(ivec2 pixel, bool exact_normals) {
     float roughness = float(id.x >> 16) * (1.0 / 65535.0);
     float occlusion = float(id.y >> 24) * (1.0 / 255.0);
     Material m = material_at(material);
-    vec3 p_rel = rel_from_pixel(camera, pixel, r.drawn ? z : 1.0);
+    vec3 p_rel = POSITIONS && r.drawn ? z_position.yzw : rel_from_pixel(camera, pixel, r.drawn ? z : 1.0);
     Surface s = surface_from_texels(m, texel.rgb, texel.a, roughness, occlusion, HAS_EMISSIVE ? glow.rgb : vec3(1.0), layer, n, n_coat,
                                     -view_direction(camera, pixel), p_rel);
     vec3 p_bvh = p_rel + trace_terms.bvh_from_rel;
@@ -94,7 +97,7 @@ Primary primary_surface(ivec2 pixel, bool exact_normals) {
                 float side = dot(point.n, view_direction(camera, pixel)) <= 0.0 ? 1.0 : -1.0;
                 s.n_triangle = side * point.n;
                 vec3 smooth_n = side * point.n_smooth;
-                s.n = dot(n - smooth_n, n - smooth_n) < 1e-7 ? smooth_n : n;
+                s.n = dot(n - smooth_n, n - smooth_n) < NORMAL_ERROR2 ? smooth_n : n;
                 s.n_coat = dot(n_coat - smooth_n, n_coat - smooth_n) < 1e-7 ? smooth_n : n_coat;
             }
         }

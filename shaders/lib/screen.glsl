@@ -1,5 +1,5 @@
 // The picture as a scene: a ray marched through the G-buffer's depth, pixel by pixel (McGuire and Mara, JCGT 3(4) 2014).
-// Expects `camera`, the G-buffer's `depth` and `normals`, the radiance of its surfaces, `seen`, and the nearest z of each
+// Expects `camera`, `lib/stored.glsl` with the G-buffer's depth and normals, the radiance of its surfaces, `seen`, and the nearest z of each
 // work tile, `nearest_pieces` (pass/screen_tiles.comp).
 #ifndef SCREEN_GLSL
 #define SCREEN_GLSL

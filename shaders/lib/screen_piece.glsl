@@ -1,8 +1,9 @@
-// A pixel of the G-buffer as a piece of a plane on the screen. Expects `camera`, `depth` and `normals`.
+// A pixel of the G-buffer as a piece of a plane on the screen. Expects `camera`.
 #ifndef SCREEN_PIECE_GLSL
 #define SCREEN_PIECE_GLSL
 #include "lib/camera.glsl"
 #include "lib/encode.glsl"
+#include "lib/stored.glsl"
 
 struct ScreenPiece {
     float z;         // reversed depth at the pixel's centre; 0 where nothing was drawn
@@ -15,8 +16,8 @@ struct ScreenPiece {
 // screen: the viewing ray through (x, y) meets this one at 1/w ~ n·v(x, y).
 ScreenPiece screen_piece(ivec2 pixel) {
     ScreenPiece r;
-    r.z = imageLoad(depth, pixel.y * int(camera.size.x) + pixel.x).x;
-    vec3 n = unit_from_octahedral(imageLoad(normals, pixel).zw);
+    r.z = stored_depth(pixel.y * int(camera.size.x) + pixel.x).x;
+    vec3 n = unit_from_octahedral(stored_normals(pixel).zw);
     bool parallel = camera.orthographic != 0;
     vec2 ndc = ndc_from_pixel(camera, pixel);
     vec3 v = parallel ? camera.forward : camera.forward + camera.right * ndc.x - camera.up * ndc.y;

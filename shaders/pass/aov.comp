@@ -10,9 +10,10 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(constant_id = 0) const bool HAS_EMISSIVE = false;
 layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
-layout(set = 0, binding = 2, r32f) readonly uniform imageBuffer depth;
 layout(set = 0, binding = 3, rgba16f) readonly uniform image2D base;
-layout(set = 0, binding = 4, rgba16_snorm) readonly uniform image2D normals;
+#define DEPTH_BINDING 2
+#define NORMALS_BINDING 4
+#include "lib/stored.glsl"
 layout(set = 0, binding = 5, rg32ui) readonly uniform uimage2D ids;
 layout(set = 0, binding = 6, rgba16f) readonly uniform image2D emissive;
 layout(scalar, set = 0, binding = 7) writeonly buffer Pixels { AovPixel pixels[]; };
@@ -21,14 +22,15 @@ layout(push_constant, scalar) uniform Push { uint first_row; uint end_row; };
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, first_row);
     if (any(greaterThanEqual(uvec2(pixel), uvec2(camera.size.x, end_row)))) return;
-    float z = imageLoad(depth, pixel.y * int(camera.size.x) + pixel.x).x;
+    vec4 z_position = stored_depth(pixel.y * int(camera.size.x) + pixel.x);
+    float z = z_position.x;
     AovPixel result = AovPixel(vec3(0), vec3(0), vec3(0), vec3(0), 0, 0, 0, vec3(0), 0, 0);
     if (z > 0.0) {
         uvec2 id = imageLoad(ids, pixel).xy;
         vec4 texel = imageLoad(base, pixel);
-        vec4 octahedral = imageLoad(normals, pixel);
+        vec4 octahedral = stored_normals(pixel);
         Material m = material_at(id.x & 0xffffu);
-        result.p_rel = rel_from_pixel(camera, pixel, z);
+        result.p_rel = POSITIONS ? z_position.yzw : rel_from_pixel(camera, pixel, z);
         result.normal = unit_from_octahedral(octahedral.xy);
         result.geometric_normal = unit_from_octahedral(octahedral.zw);
         result.albedo = texel.rgb * m.base_color.rgb;

@@ -24,9 +24,10 @@ layout(scalar, set = 0, binding = 6) buffer Dropped { uint dropped; };
 layout(scalar, set = 0, binding = 7) readonly buffer Tiles { uint fragment_tiles[]; };
 layout(scalar, set = 0, binding = 8) readonly buffer Sizes { WorkSize tiles_size; } work;
 // The opaque surfaces and, pixel by pixel, their radiance: for the rungs `screen`.
-layout(set = 0, binding = 9, r32f) readonly uniform imageBuffer depth;
 layout(set = 0, binding = 10, rgba32f) readonly uniform imageBuffer seen;
-layout(set = 0, binding = 11, rgba16_snorm) readonly uniform image2D normals;
+#define DEPTH_BINDING 9
+#define NORMALS_BINDING 11
+#include "lib/stored.glsl"
 layout(set = 0, binding = 12, r32f) readonly uniform imageBuffer nearest_pieces;
 #include "lib/screen.glsl"
 layout(push_constant, scalar) uniform Push { uint end_row; };

@@ -30,7 +30,7 @@ void main() {
     nodes[at + 4] = ids.y | uint(clamp(s.roughness, 0.0, 1.0) * 65535.0 + 0.5) << 16;
     nodes[at + 5] = packHalf2x16(s.base.rg);
     nodes[at + 6] = packHalf2x16(vec2(s.base.b, s.metallic));
-    nodes[at + 7] = packSnorm2x16(octahedral_from_unit(s.n_shading));
+    nodes[at + 7] = packSnorm2x16(in_steps(octahedral_from_unit(s.n_shading), NORMAL_STEPS));
     nodes[at + 8] = packHalf2x16(s.emissive.rg);
     nodes[at + 9] = packHalf2x16(vec2(s.emissive.b, alpha));
     nodes[at + 10] = packUnorm4x8(s.layers);

@@ -7,8 +7,9 @@ layout(local_size_x = 64) in;
 #include "lib/work_tile.glsl"
 
 layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
-layout(set = 0, binding = 1, r32f) readonly uniform imageBuffer depth;
-layout(set = 0, binding = 2, rgba16_snorm) readonly uniform image2D normals;
+#define DEPTH_BINDING 1
+#define NORMALS_BINDING 2
+#include "lib/stored.glsl"
 layout(scalar, set = 0, binding = 3) writeonly buffer NearestPieces { float nearest_pieces[]; };
 #include "lib/screen_piece.glsl"
 

@@ -310,7 +310,7 @@ impl PictureOptions {
     /// The knobs as set.
     ///
     /// # Errors
-    /// One sentence for a model, knob or rung that does not exist or is not built yet.
+    /// One sentence for a model, knob or rung that does not exist.
     pub fn knobs(&self) -> Result<Knobs> {
         let mut knobs = Knobs::of(self.model.unwrap_or_default());
         knobs.set_all(&self.set)?;

@@ -8,6 +8,7 @@ pub mod compare;
 pub mod difference;
 pub mod explain;
 pub mod forecast;
+pub mod orders;
 mod price;
 pub mod report;
 pub mod sitting;

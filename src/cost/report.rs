@@ -1,6 +1,6 @@
 //! `report.html`: one file that shows a [`Table`], with its pictures in it and nothing loaded from anywhere.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
@@ -10,6 +10,7 @@ use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+use super::orders::Order;
 use super::table::{Family, INVISIBLE, Point, Price, REFERENCE, Table};
 use crate::image::png::{Display, encode_png, read_display};
 
@@ -148,7 +149,7 @@ pub fn page(table: &Table, pictures: &Path) -> Result<String> {
                     p.lead { (summary(table)) }
                     nav aria-label="Sections" {
                         @for (id, name) in SECTIONS {
-                            @if (*id != "causes" || causes.is_some()) && (*id != "search" || !table.search.is_empty()) { a href={ "#" (id) } { (name) } }
+                            @if has(table, id) && (*id != "causes" || causes.is_some()) { a href={ "#" (id) } { (name) } }
                         }
                     }
                 }
@@ -192,6 +193,13 @@ pub fn page(table: &Table, pictures: &Path) -> Result<String> {
                             (causes)
                         }
                     }
+                    @if !table.orders.is_empty() {
+                        section #orders {
+                            h2 { "Orders of quadrature" }
+                            p { "The error of the sum through media that vary, by its steps: rays with one sample, so that no noise is in it, against " em { "simpson" } " with 64 steps; root mean square, as a share of the picture's. Both logarithmic: the slope is the order." }
+                            (orders(table))
+                        }
+                    }
                     section #passes {
                         h2 { "Where the time goes" }
                         (passes(table))
@@ -226,11 +234,21 @@ const SECTIONS: &[(&str, &str)] = &[
     ("prices", "Prices"),
     ("tornado", "Knobs that matter"),
     ("causes", "Causes"),
+    ("orders", "Orders"),
     ("passes", "Passes"),
     ("knobs", "Called for"),
     ("search", "Search"),
     ("pictures", "Pictures"),
 ];
+
+/// Whether there is anything to be told in a section.
+fn has(table: &Table, section: &str) -> bool {
+    match section {
+        "search" => !table.search.is_empty(),
+        "orders" => !table.orders.is_empty(),
+        _ => true,
+    }
+}
 
 fn summary(table: &Table) -> String {
     let called: Vec<&str> = table.knobs.iter().filter(|k| k.called_for).map(|k| k.knob.as_str()).collect();
@@ -447,6 +465,61 @@ fn tornado(table: &Table) -> Markup {
             line.grid x1=(middle) x2=(middle) y1="20" y2=(height) {}
         } }
         p.legend { span { i.key.saves {} "saves time" } span { i.key.takes {} "takes time" } span { i.key.seen {} "seen" } span { i.key.seen.noise {} "noise, or too little to be seen" } }
+    }
+}
+
+/// Error by steps, a line for each rule, and the same as a table.
+fn orders(table: &Table) -> Markup {
+    let ([width, height], [left, right, top, bottom]) = (CHART, MARGIN);
+    let all = || table.orders.iter().flat_map(|order| order.errors.iter().copied().filter(|error| *error > 0.0));
+    let steps = || table.orders.iter().flat_map(|order| order.steps.iter().map(|&n| f64::from(n)));
+    let (x, y) = (Axis::around(steps(), left, width - right), Axis::around(all(), height - bottom, top));
+    let told: BTreeSet<u32> = table.orders.iter().flat_map(|order| order.steps.iter().copied()).collect();
+    let place = |order: &Order, i: usize| [x.at(f64::from(order.steps[i])), y.at(order.errors[i])];
+    let line = |order: &Order| -> String {
+        let points: Vec<_> = (0..order.steps.len()).map(|i| place(order, i)).collect();
+        points.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect::<Vec<_>>().join(" ")
+    };
+    let name = |order: &Order| order.order.map_or_else(String::new, |p| format!(", order {p:.1}"));
+    html! {
+        svg.chart viewBox=(format!("0 0 {width} {height}")) role="img" aria-label="Error against steps" {
+            @for &tick in &told {
+                line.grid x1=(x.at(tick.into())) x2=(x.at(tick.into())) y1=(top) y2=(height - bottom) {}
+                text.tick x=(x.at(tick.into())) y=(height - bottom + 16.0) text-anchor="middle" { (tick) }
+            }
+            @for tick in y.ticks() {
+                line.grid x1=(left) x2=(width - right) y1=(y.at(tick)) y2=(y.at(tick)) {}
+                text.tick x=(left - 8.0) y=(y.at(tick) + 4.0) text-anchor="end" { (digits(tick)) }
+            }
+            text.axis x=((left + width - right) * 0.5) y=(height - 8.0) text-anchor="middle" { "steps of each segment" }
+            text.axis x="8" y="20" { "error" }
+            @for order in &table.orders {
+                polyline.pareto points=(line(order)) {}
+                @for i in 0..order.steps.len() {
+                    circle class="local" cx=(place(order, i)[0]) cy=(place(order, i)[1]) r="4" {
+                        title { (order.rule) ", " (order.steps[i]) " steps: " (digits(order.errors[i])) ", " (digits(order.gpu_ms[i])) " ms" }
+                    }
+                }
+                text.label x=(place(order, 0)[0] + 10.0) y=(place(order, 0)[1] - 8.0) { (order.rule) (name(order)) }
+            }
+        }
+        div.scroll {
+            table {
+                thead { tr { th { "rule" } @for n in &told { th.number { (n) " steps" } } th.number { "order" } } }
+                tbody {
+                    @for order in &table.orders {
+                        tr {
+                            th scope="row" { (order.rule) }
+                            @for n in &told {
+                                @let place = order.steps.iter().position(|known| known == n);
+                                td.number { @if let Some(i) = place { (digits(order.errors[i])) ", " (digits(order.gpu_ms[i])) " ms" } }
+                            }
+                            td.number { (order.order.map_or_else(|| "hidden by rounding".to_owned(), |p| format!("{p:.2}"))) }
+                        }
+                    }
+                }
+            }
+        }
     }
 }
 

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::difference::{Truth, shown};
 use super::forecast::Forecast;
+use super::orders::{self, Order};
 use super::price::price;
 use super::sitting::{Bench, Sitting, Taken};
 use super::table::{
@@ -219,6 +220,7 @@ struct Run<'a> {
     plain: Knobs,
     records: Vec<Record>,
     search: Vec<Tried>,
+    orders: Vec<Order>,
     warnings: Vec<String>,
     done: usize,
     of: usize,
@@ -279,6 +281,7 @@ impl<'a> Run<'a> {
             plain: Knobs::exact(),
             records: Vec::new(),
             search: Vec::new(),
+            orders: Vec::new(),
             warnings,
             done: 0,
             of: 0,
@@ -409,9 +412,11 @@ impl<'a> Run<'a> {
                 if knob.name == "upsampling" && knobs.bands() == 0 {
                     continue;
                 }
-                // What the plan does not tell apart is told apart by constants: those of every surface.
-                let shaped = knob.effects.is_empty() || matches!(knob.name, "upsampling" | "lights" | "absorption");
-                if !shaped && self.sweep.bench.renderer(&knobs).is_ok_and(|other| other.plan.draws_as(plan)) {
+                // What the plan does not tell apart is told apart by constants.
+                let by_constants = ["fresnel", "brdf", "arithmetic", "upsampling", "lights", "absorption"];
+                if !by_constants.contains(&knob.name)
+                    && self.sweep.bench.renderer(&knobs).is_ok_and(|other| other.plan.draws_as(plan))
+                {
                     continue;
                 }
                 all.push(Change { knob, from, to, knobs });
@@ -467,7 +472,9 @@ impl<'a> Run<'a> {
             .map(|n| Ok((format!("exact samples={n}"), set(&self.exact, "samples", &n.to_string())?)))
             .collect::<Result<_>>()?;
         let dear = wavelengths.len() + ladder.len();
-        self.of = 2 + local_changes.len() + presets.len() + exact_changes.len() + dear + SEARCH;
+        let with_orders = self.calls_for("quadrature") && self.sweep.extent.shard[0] == 1;
+        let for_orders = if with_orders { orders::PICTURES } else { 0 };
+        self.of = 2 + local_changes.len() + presets.len() + exact_changes.len() + dear + for_orders + SEARCH;
 
         let plain = self.plain.clone();
         let [width, height] = bench.settings.size;
@@ -489,6 +496,7 @@ impl<'a> Run<'a> {
         }
         by_wavelength.iter().for_each(|(_, knobs)| self.forecast.expect(knobs, &plain));
         ladder.iter().for_each(|(_, knobs)| self.forecast.expect(knobs, &local));
+        (0..for_orders).for_each(|_| self.forecast.expect(&local, &local));
         self.forecast.expect(&plain, &local);
 
         let taken = self.base("local", Family::Preset, &local, &mut base, progress)?;
@@ -513,7 +521,42 @@ impl<'a> Run<'a> {
         for (name, knobs) in &ladder {
             self.point(name, knobs, &mut base, progress)?;
         }
+        self.orders(progress)?;
         self.trimmed(&exact_changes, &mut base, progress)
+    }
+
+    /// Orders of the rules of quadrature: one part of a run in shards draws them.
+    fn orders(&mut self, progress: &mut dyn FnMut(Step<'_>)) -> Result<()> {
+        if !self.calls_for("quadrature") || self.sweep.extent.shard[0] != 1 {
+            return Ok(());
+        }
+        let path = self.sweep.folder.join("orders.json");
+        if path.exists() {
+            self.orders =
+                serde_json::from_slice(&file::read(&path)?).with_context(|| format!("reading {}", path.display()))?;
+            self.of -= orders::PICTURES;
+            self.forecast.skip(orders::PICTURES);
+            return Ok(());
+        }
+        let bench = &self.sweep.bench;
+        let mut under_way: Option<(f64, Instant)> = None;
+        let (forecast, done, of) = (&mut self.forecast, &mut self.done, self.of);
+        let found = orders::orders(bench, &mut |name| {
+            if let Some((expected, begun)) = under_way {
+                forecast.took(expected, begun.elapsed().as_secs_f64());
+            }
+            progress(Step { name, done: *done, of, left_s: forecast.left() });
+            *done += 1;
+            under_way = Some((forecast.begin(), Instant::now()));
+        });
+        match found {
+            Ok(orders) => {
+                file::write(&path, serde_json::to_string_pretty(&orders)?.as_bytes())?;
+                self.orders = orders;
+            }
+            Err(error) => self.fails("orders", &error),
+        }
+        Ok(())
     }
 
     /// Whether another shard draws this.
@@ -858,6 +901,7 @@ impl<'a> Run<'a> {
             points,
             prices: self.records.into_iter().filter_map(|record| record.price).collect(),
             search: self.search,
+            orders: self.orders,
             warnings: self.warnings,
             shard: self.sweep.extent.shard,
             budget_s: f64::from(self.sweep.extent.budget_s),
@@ -867,24 +911,28 @@ impl<'a> Run<'a> {
 }
 
 /// Times as if the machine had been as quick all along: each is told as so many times the base's that was drawn in turns with it,
-/// and the base's is the middle of all of its own.
+/// and the base's is the middle of all of its own. Whoever draws the picture again finds the machine somewhere else: the ends are
+/// as far apart as those of the turns and those of the base over the whole run together.
 fn even_out(records: &mut [Record]) {
     let exact = |record: &Record| record.point.family == Family::Exact && record.point.name != "exact";
     for (of_exact, name) in [(true, "exact"), (false, "local")] {
-        let all: Vec<Interval> = records
-            .iter()
-            .filter(|record| exact(record) == of_exact && !record.others_ms.is_empty())
-            .map(|record| Interval::of(&record.others_ms))
-            .collect();
+        let in_turns = |record: &Record| exact(record) == of_exact && !record.others_ms.is_empty();
+        let all: Vec<f64> = records.iter().filter(|r| in_turns(r)).flat_map(|r| r.others_ms.iter().copied()).collect();
         if all.is_empty() {
             continue;
         }
-        let base = Interval::of(&all.iter().map(|times| times.median).collect::<Vec<_>>());
+        let medians: Vec<f64> =
+            records.iter().filter(|r| in_turns(r)).map(|r| Interval::of(&r.others_ms).median).collect();
+        let base = Interval { median: Interval::of(&medians).median, ..Interval::of(&all) };
         for record in records.iter_mut() {
-            if exact(record) == of_exact && !record.others_ms.is_empty() {
-                let ratios: Vec<f64> =
-                    record.ms.iter().zip(&record.others_ms).map(|(ms, other)| ms / other * base.median).collect();
-                record.point.gpu_ms = Interval::of(&ratios);
+            if in_turns(record) {
+                let ratios: Vec<f64> = record.ms.iter().zip(&record.others_ms).map(|(ms, other)| ms / other).collect();
+                let ratios = Interval::of(&ratios);
+                record.point.gpu_ms = Interval {
+                    median: ratios.median * base.median,
+                    low: ratios.low * base.low,
+                    high: ratios.high * base.high,
+                };
             } else if record.point.name == name {
                 record.point.gpu_ms = base;
                 record.point.timed = all.len();

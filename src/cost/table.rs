@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use anyhow::{Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
+use super::orders::Order;
 use crate::plan::KNOBS;
 
 /// The document.
@@ -34,6 +35,9 @@ pub struct Table {
     pub prices: Vec<Price>,
     /// How the search for better combinations went, a step each.
     pub search: Vec<Tried>,
+    /// How the rules of quadrature come near to the integral, where media vary.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub orders: Vec<Order>,
     /// What is worth knowing before a figure is believed.
     pub warnings: Vec<String>,
     /// Which part of how many, counted from 1.
@@ -438,6 +442,9 @@ impl Table {
                 }
             }
             all.search.extend(part.search);
+            if all.orders.is_empty() {
+                all.orders = part.orders;
+            }
             for warning in part.warnings {
                 if !all.warnings.contains(&warning) {
                     all.warnings.push(warning);

@@ -276,7 +276,7 @@ impl Instance {
         for (has, needed, what) in [
             (limits.max_per_stage_descriptor_storage_images, 20, "storage images in a shader"),
             (limits.max_per_stage_descriptor_storage_buffers, 8, "storage buffers in a shader"),
-            (limits.max_color_attachments, 6, "colour targets"),
+            (limits.max_color_attachments, 7, "colour targets"),
             (limits.max_texel_buffer_elements, 1 << 22, "texels in a buffer"),
         ] {
             if has < needed {

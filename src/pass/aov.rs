@@ -24,7 +24,7 @@ pub fn aov<'a>(
     let bind = aov::Bind {
         camera_block: camera,
         material_texels: &scene.materials,
-        depth: &gbuffer.depth_texels,
+        depth: gbuffer.places(),
         base: &gbuffer.base,
         normals: &gbuffer.normals,
         ids: &gbuffer.ids,
@@ -32,7 +32,13 @@ pub fn aov<'a>(
         pixels,
     };
     let size = gbuffer.depth.desc();
-    let constants = aov::Constants { has_emissive: plan.emissive, ..Default::default() }.words();
+    let constants = aov::Constants {
+        has_emissive: plan.emissive,
+        positions: plan.stored.positions,
+        normals: plan.stored.normals as u32,
+        ..Default::default()
+    }
+    .words();
     frame.compute_over("AOVs", &bind, constants, bytemuck::cast_slice(&rows), [size.width, rows[1] - rows[0]])?;
     frame.read_back(pixels);
     Ok(())

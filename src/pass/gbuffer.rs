@@ -1,7 +1,7 @@
 //! Raster G-buffer: the nearest opaque surface of every pixel (shaders/pass/gbuffer.*).
 //!
-//! 24 bytes a pixel beside depth: RGBA16F base colour and metallic, RGBA16_SNORM two octahedral normals, RG32UI ids,
-//! roughness and occlusion; 4 more for triangles where there are rays, 8 each for emissive textures and layers where the
+//! 24 bytes a pixel beside depth: RGBA16F base colour and metallic, two octahedral normals (RGBA16_SNORM, or as the knob
+//! `normals` says), RG32UI ids, roughness and occlusion; 16 more for positions where the knob `position` stores them; 4 more for triangles where there are rays, 8 each for emissive textures and layers where the
 //! plan has them. docs/decisions/gbuffer.md has
 //! what narrower and wider choices cost.
 
@@ -12,20 +12,34 @@ use ash::vk;
 
 use super::scene::SceneOnDevice;
 use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Draw, Frame, Image, ImageDesc, Place, Raster};
-use crate::plan::Plan;
+use crate::plan::{Normals, Plan};
 use crate::shader::gbuffer;
+
+const POSITION: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
+
+/// Four components: two octahedral normals. Nothing that can be drawn to has four of 12 bits: `oct24` leaves four of each 16
+/// empty, and costs what `oct32` does.
+fn normal_format(normals: Normals) -> vk::Format {
+    match normals {
+        Normals::Oct16 => vk::Format::R8G8B8A8_SNORM,
+        Normals::Oct24 | Normals::Oct32 => vk::Format::R16G16B16A16_SNORM,
+        Normals::F32 => vk::Format::R32G32B32A32_SFLOAT,
+    }
+}
 
 /// The images of the G-buffer.
 pub struct GBuffer {
     /// Reversed depth; 0 where nothing was drawn.
     pub depth: Image,
-    /// The same depth as a texel buffer, row by row: what the lighting reads. On lavapipe a texel buffer is fetched inline
+    /// The same depth as a texel buffer, row by row: what the passes after it read. On lavapipe a texel buffer is fetched inline
     /// where a sampled image is a call that spills; the copy costs half a millisecond at 1280x720.
     pub depth_texels: Buffer,
     /// Base colour and metallic texels.
     pub base: Image,
     /// Shading and geometric normal.
     pub normals: Image,
+    /// Depth and position, where positions are stored, and the same as a texel buffer.
+    positions: Option<(Image, Buffer)>,
     /// Material, roughness, instance, occlusion.
     pub ids: Image,
     /// Triangle of the scene; one pixel where the plan has no rays.
@@ -53,6 +67,12 @@ impl GBuffer {
         };
         // What a transmission texture lets through is kept beside the emissive texel.
         let with = [plan.rays.is_some(), plan.emissive || plan.rays.is_some_and(|rays| rays.refraction), plan.layers];
+        let positions = plan.stored.positions.then(|| -> Result<_> {
+            let bytes = 16 * u64::from(size[0]) * u64::from(size[1]);
+            let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC;
+            let image = Image::new(device, "G-buffer positions", ImageDesc::flat(POSITION, size[0], size[1], usage))?;
+            Ok((image, Buffer::texels(device, "G-buffer position texels", bytes, Place::Device, POSITION)?))
+        });
         let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
         Ok(Self {
             depth: Image::new(
@@ -68,7 +88,8 @@ impl GBuffer {
                 vk::Format::R32_SFLOAT,
             )?,
             base: target("G-buffer base colour", vk::Format::R16G16B16A16_SFLOAT, true)?,
-            normals: target("G-buffer normals", vk::Format::R16G16B16A16_SNORM, true)?,
+            normals: target("G-buffer normals", normal_format(plan.stored.normals), true)?,
+            positions: positions.transpose()?,
             ids: target("G-buffer ids", vk::Format::R32G32_UINT, true)?,
             triangles: target("G-buffer triangles", vk::Format::R32_UINT, with[0])?,
             emissive: target("G-buffer emissive", vk::Format::R16G16B16A16_SFLOAT, with[1])?,
@@ -76,6 +97,12 @@ impl GBuffer {
             size,
             with,
         })
+    }
+
+    /// Where surfaces are, as texels row by row: depth, or depth and position.
+    #[must_use]
+    pub fn places(&self) -> &Buffer {
+        self.positions.as_ref().map_or(&self.depth_texels, |(_, texels)| texels)
     }
 }
 
@@ -98,6 +125,8 @@ pub fn gbuffer<'a>(
     for (image, exists) in [(&target.triangles, triangles), (&target.emissive, emissive), (&target.layers, layers)] {
         colors.push(color(image).filter(|_| exists));
     }
+    // What is read of pixels that nothing was drawn at is their depth.
+    colors.push(target.positions.as_ref().map(|(image, _)| ColorTarget { image, clear: Some([0; 4]) }));
     while colors.last().is_some_and(Option::is_none) {
         colors.pop();
     }
@@ -149,5 +178,8 @@ pub fn gbuffer<'a>(
     let push = [lod_bias.to_bits(), 0];
     frame.raster(&raster, &gbuffer::PROGRAM, &bindings, bytemuck::cast_slice(&push), draws)?;
     frame.download("copy depth", &target.depth, &target.depth_texels);
+    if let Some((image, texels)) = &target.positions {
+        frame.download("copy positions", image, texels);
+    }
     Ok(())
 }

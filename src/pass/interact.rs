@@ -64,6 +64,9 @@ fn follow<'a>(
         grid_side: scene.colours().grid_side,
         has_emissive: plan.emissive,
         has_layers: plan.layers,
+        positions: plan.stored.positions,
+        normals: plan.stored.normals as u32,
+        normal_error2: plan.stored.normals.error2(),
         has_triangles: true,
         has_transmission: with.refraction,
         brdf: lighting.knobs.index("brdf"),
@@ -104,7 +107,7 @@ fn follow<'a>(
     let bind = interact::Bind {
         camera_block: camera,
         instances: &scene.instances,
-        depth: &gbuffer.depth_texels,
+        depth: gbuffer.places(),
         base: &gbuffer.base,
         normals: &gbuffer.normals,
         ids: &gbuffer.ids,

@@ -35,6 +35,9 @@ pub fn light<'a>(
         in_medium: rays.inside(),
         has_emissive: plan.emissive,
         has_layers: plan.layers,
+        positions: plan.stored.positions,
+        normals: plan.stored.normals as u32,
+        normal_error2: plan.stored.normals.error2(),
         has_triangles: lighting.shadow_rays() || rays.inside(),
         has_transmission: planned.is_some_and(|rays| rays.refraction),
         brdf: lighting.knobs.index("brdf"),
@@ -64,7 +67,7 @@ pub fn light<'a>(
     let bind = light::Bind {
         camera_block: camera,
         instances: &scene.instances,
-        depth: &gbuffer.depth_texels,
+        depth: gbuffer.places(),
         base: &gbuffer.base,
         normals: &gbuffer.normals,
         ids: &gbuffer.ids,

@@ -50,14 +50,18 @@ pub fn screen_tiles<'a>(
 ) -> Result<()> {
     let bind = tiles_program::Bind {
         camera_block: lighting.camera,
-        depth: &gbuffer.depth_texels,
+        depth: gbuffer.places(),
         normals: &gbuffer.normals,
         nearest_pieces: &screen.nearest_pieces,
     };
     let [width, height] = lighting.size;
     let tiles = width.div_ceil(TILE) * height.div_ceil(TILE);
     let groups = rows_of(tiles.div_ceil(tiles_program::PROGRAM.local_size[0]));
-    let constants = tiles_program::Constants { arithmetic: lighting.knobs.index("arithmetic") };
+    let constants = tiles_program::Constants {
+        arithmetic: lighting.knobs.index("arithmetic"),
+        positions: lighting.plan.stored.positions,
+        normals: lighting.plan.stored.normals as u32,
+    };
     frame.compute("nearest pieces of tiles", &bind, constants.words(), &[], groups)
 }
 
@@ -81,6 +85,9 @@ pub fn mirror<'a>(
         grid_side: lighting.scene.colours().grid_side,
         has_emissive: plan.emissive,
         has_layers: plan.layers,
+        positions: plan.stored.positions,
+        normals: plan.stored.normals as u32,
+        normal_error2: plan.stored.normals.error2(),
         has_triangles: false,
         has_transmission: plan.rays.is_some_and(|rays| rays.refraction),
         brdf: lighting.knobs.index("brdf"),
@@ -100,7 +107,7 @@ pub fn mirror<'a>(
     let bind = mirror::Bind {
         camera_block: camera,
         instances: &scene.instances,
-        depth: &gbuffer.depth_texels,
+        depth: gbuffer.places(),
         base: &gbuffer.base,
         normals: &gbuffer.normals,
         ids: &gbuffer.ids,

@@ -103,6 +103,7 @@ pub struct SceneOnDevice {
     pub lights: Buffer,
     lights_cpu: Vec<Light>,
     refraction: bool,
+    normal_steps: u32,
     textures: Textures,
     /// Materials by index → place in [`SceneOnDevice::page_sets`].
     page_of_material: Vec<usize>,
@@ -289,6 +290,7 @@ impl SceneOnDevice {
             materials_cpu: scene.materials,
             lights_cpu,
             refraction: plan.rays.is_some_and(|rays| rays.refraction),
+            normal_steps: plan.stored.normals.steps(),
             textures,
             page_of_material,
             page_materials,
@@ -432,6 +434,7 @@ impl SceneOnDevice {
             has_coat_normal: textured(10) && mesh.has_tangents,
             has_color: mesh.has_colors,
             masked: matches!(material.alpha_mode, AlphaMode::Mask(_)),
+            normal_steps: self.normal_steps,
             ..Default::default()
         };
         Draw {

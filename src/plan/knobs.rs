@@ -1,4 +1,4 @@
-//! Knobs as data: each approximation's rungs, which of them exist in this build, and what they are called.
+//! Knobs as data: each approximation's rungs and what they are called.
 
 use anyhow::{Result, bail};
 
@@ -9,11 +9,9 @@ pub struct Knob {
     pub name: &'static str,
     /// Rungs that can be chosen, cheap to exact; `*` stands for a power of four.
     pub rungs: &'static [&'static str],
-    /// Planned rungs that are not built yet.
-    pub unbuilt: &'static [&'static str],
-    /// What the presets `local`, `recursive` and `global` choose, as far as it is built.
+    /// What the presets `local`, `recursive` and `global` choose.
     pub presets: [&'static str; 3],
-    /// The rung that approximates least, as far as it is built.
+    /// The rung that approximates least.
     pub exact: &'static str,
     /// The lecture's statements that it is about.
     pub lecture: &'static [&'static str],
@@ -28,7 +26,6 @@ pub static KNOBS: &[Knob] = &[
     Knob {
         name: "shadows",
         rungs: &["off", "map", "ray"],
-        unbuilt: &[],
         presets: ["map", "ray", "ray"],
         exact: "ray",
         lecture: &["R5"],
@@ -38,7 +35,6 @@ pub static KNOBS: &[Knob] = &[
     Knob {
         name: "fresnel",
         rungs: &["schlick", "exact"],
-        unbuilt: &[],
         presets: ["schlick", "exact", "exact"],
         exact: "exact",
         lecture: &["F2", "F3"],
@@ -48,7 +44,6 @@ pub static KNOBS: &[Knob] = &[
     Knob {
         name: "brdf",
         rungs: &["blinn-phong", "blinn-phong-reciprocal", "ggx", "ggx-multi"],
-        unbuilt: &[],
         presets: ["ggx", "ggx", "ggx-multi"],
         exact: "ggx-multi",
         lecture: &["B1", "B5", "B6"],
@@ -58,7 +53,6 @@ pub static KNOBS: &[Knob] = &[
     Knob {
         name: "reflection",
         rungs: &["off", "environment", "screen", "ray"],
-        unbuilt: &[],
         presets: ["environment", "ray", "ray"],
         exact: "ray",
         lecture: &["F4"],
@@ -68,7 +62,6 @@ pub static KNOBS: &[Knob] = &[
     Knob {
         name: "lobes",
         rungs: &["0.2", "0.5", "1"],
-        unbuilt: &[],
         presets: ["0.2", "0.2", "1"],
         exact: "1",
         lecture: &["B6"],
@@ -78,7 +71,6 @@ pub static KNOBS: &[Knob] = &[
     Knob {
         name: "refraction",
         rungs: &["off", "screen", "ray"],
-        unbuilt: &[],
         presets: ["off", "ray", "ray"],
         exact: "ray",
         lecture: &["F5"],
@@ -88,7 +80,6 @@ pub static KNOBS: &[Knob] = &[
     Knob {
         name: "interfaces",
         rungs: &["1", "2", "4", "8", "16", "32"],
-        unbuilt: &[],
         presets: ["8", "8", "32"],
         exact: "32",
         lecture: &["R6"],
@@ -98,7 +89,6 @@ pub static KNOBS: &[Knob] = &[
     Knob {
         name: "absorption",
         rungs: &["off", "thickness", "path", "march:4", "march:8", "march:16", "march:32", "march:64"],
-        unbuilt: &[],
         presets: ["thickness", "path", "march:32"],
         exact: "march:64",
         lecture: &["A1", "A2"],
@@ -108,7 +98,6 @@ pub static KNOBS: &[Knob] = &[
     Knob {
         name: "quadrature",
         rungs: &["left", "midpoint", "simpson"],
-        unbuilt: &[],
         presets: ["midpoint", "midpoint", "midpoint"],
         exact: "simpson",
         lecture: &["A2"],
@@ -118,7 +107,6 @@ pub static KNOBS: &[Knob] = &[
     Knob {
         name: "indirect",
         rungs: &["off", "ambient", "path"],
-        unbuilt: &[],
         presets: ["ambient", "ambient", "path"],
         exact: "path",
         lecture: &["R6"],
@@ -128,7 +116,6 @@ pub static KNOBS: &[Knob] = &[
     Knob {
         name: "lights",
         rungs: &["points", "area:1", "area:4", "area:16"],
-        unbuilt: &[],
         presets: ["points", "points", "area:1"],
         exact: "area:1",
         lecture: &["R2"],
@@ -138,7 +125,6 @@ pub static KNOBS: &[Knob] = &[
     Knob {
         name: "guiding",
         rungs: &["off", "aims"],
-        unbuilt: &[],
         presets: ["off", "off", "aims"],
         exact: "aims",
         lecture: &["R6"],
@@ -148,7 +134,6 @@ pub static KNOBS: &[Knob] = &[
     Knob {
         name: "samples",
         rungs: &["1", "4", "16", "64", "256", "1024", "4096"],
-        unbuilt: &[],
         presets: ["4", "4", "64"],
         exact: "64",
         lecture: &[],
@@ -158,7 +143,6 @@ pub static KNOBS: &[Knob] = &[
     Knob {
         name: "colour",
         rungs: &["rgb", "spectral:8", "spectral:16", "spectral:32"],
-        unbuilt: &[],
         presets: ["rgb", "rgb", "rgb"],
         exact: "spectral:32",
         lecture: &["C1", "C2", "C3"],
@@ -168,7 +152,6 @@ pub static KNOBS: &[Knob] = &[
     Knob {
         name: "upsampling",
         rungs: &["mallett-yuksel", "jakob-hanika"],
-        unbuilt: &[],
         presets: ["jakob-hanika", "jakob-hanika", "jakob-hanika"],
         exact: "jakob-hanika",
         lecture: &["C3"],
@@ -178,7 +161,6 @@ pub static KNOBS: &[Knob] = &[
     Knob {
         name: "arithmetic",
         rungs: &["fast", "stable", "compensated"],
-        unbuilt: &[],
         presets: ["stable", "stable", "stable"],
         exact: "compensated",
         lecture: &[],
@@ -187,23 +169,21 @@ pub static KNOBS: &[Knob] = &[
     },
     Knob {
         name: "normals",
-        rungs: &["oct32"],
-        unbuilt: &["oct16", "oct24", "f32"],
+        rungs: &["oct16", "oct24", "oct32", "f32"],
         presets: ["oct32", "oct32", "oct32"],
-        exact: "oct32",
+        exact: "f32",
         lecture: &[],
         effects: &[],
-        about: "stored normals",
+        about: "normals in the G-buffer: as octahedra in so many bits each, or in floats",
     },
     Knob {
         name: "position",
-        rungs: &["depth"],
-        unbuilt: &["stored"],
+        rungs: &["depth", "stored"],
         presets: ["depth", "depth", "depth"],
         exact: "depth",
         lecture: &[],
         effects: &[],
-        about: "stored positions",
+        about: "positions of the G-buffer's surfaces: from their depth, or stored themselves",
     },
 ];
 
@@ -242,7 +222,7 @@ impl Knobs {
     /// Applies one `KNOB=RUNG`.
     ///
     /// # Errors
-    /// One sentence when there is no such knob or rung, or it is not built yet.
+    /// One sentence when there is no such knob or rung.
     pub fn set(&mut self, choice: &str) -> Result<()> {
         let Some((name, rung)) = choice.split_once('=') else {
             bail!("--set {choice}: expected KNOB=RUNG, for example samples=16");
@@ -260,10 +240,6 @@ impl Knobs {
                 "--set {choice}: {name} has no rung {wanted}, it has {}; the nearest is {nearest}",
                 knob.rungs.join(", ")
             );
-        }
-        let stem = rung.split(':').next().unwrap_or(rung);
-        if knob.unbuilt.contains(&stem) {
-            bail!("--set {choice}: the rung \"{rung}\" is not built yet; {name} has {}", knob.rungs.join(", "));
         }
         bail!("--set {choice}: {name} has no rung \"{rung}\", it has {}", knob.rungs.join(", "));
     }
@@ -474,7 +450,7 @@ mod tests {
     fn wrong_choices_say_what_there_is() {
         let mut knobs = Knobs::default();
         for (choice, said) in [
-            ("normals=f32", "not built yet"),
+            ("normals=f16", "it has oct16, oct24, oct32, f32"),
             ("lights=area:5", "it has points, area:1, area:4, area:16"),
             ("absorption=march:7", "it has off, thickness, path, march:4, march:8, march:16, march:32, march:64"),
             ("absorption=march", "no rung"),

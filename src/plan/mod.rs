@@ -71,6 +71,8 @@ pub struct Plan {
     pub bands: u32,
     /// Rays of different wavelengths go different ways: the samples go through parts of each band.
     pub disperses: bool,
+    /// How the G-buffer keeps what is lit out of it; paths light nothing out of it.
+    pub stored: Stored,
     /// Samples per pixel.
     pub samples: u32,
     /// Every effect with its reason.
@@ -108,6 +110,64 @@ pub struct Rays {
     pub interfaces: u32,
     /// Textures, coordinates and colours are kept for what rays meet, whether or not there are any.
     pub textures: bool,
+}
+
+/// How the G-buffer keeps normals and positions (knobs `normals` and `position`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Stored {
+    /// As octahedra of so many bits, or in floats.
+    pub normals: Normals,
+    /// Positions themselves, and not their depth alone.
+    pub positions: bool,
+}
+
+impl Stored {
+    fn of(knobs: &Knobs) -> Self {
+        let normals = match knobs.rung("normals") {
+            "oct16" => Normals::Oct16,
+            "oct24" => Normals::Oct24,
+            "f32" => Normals::F32,
+            _ => Normals::Oct32,
+        };
+        Self { normals, positions: knobs.rung("position") == "stored" }
+    }
+}
+
+/// The rungs of the knob `normals`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Normals {
+    /// 2 x 8 bits each.
+    Oct16,
+    /// 2 x 12 bits each.
+    Oct24,
+    /// 2 x 16 bits each.
+    #[default]
+    Oct32,
+    /// Two floats each.
+    F32,
+}
+
+impl Normals {
+    /// Steps on each side of 0 that octahedra are rounded to before they are stored; 0: what they are stored in decides.
+    #[must_use]
+    pub fn steps(self) -> u32 {
+        match self {
+            Self::Oct16 => (1 << 7) - 1,
+            Self::Oct24 => (1 << 11) - 1,
+            Self::Oct32 | Self::F32 => 0,
+        }
+    }
+
+    /// |n − stored n|² that storing accounts for, at least twice the largest (numerics 16: 0.95°, 0.059°, 0.0037°): what a normal
+    /// texture bends less than that is lost.
+    #[must_use]
+    pub fn error2(self) -> f32 {
+        match self {
+            Self::Oct16 => 1e-3,
+            Self::Oct24 => 4e-6,
+            Self::Oct32 | Self::F32 => 1e-7,
+        }
+    }
 }
 
 /// How paths of light go on (knob `indirect`).
@@ -217,6 +277,7 @@ impl Plan {
         let rays = planner.rays(&transmission, &images, &lights);
         let (bands, disperses) = planner.wavelengths(&transmission);
         let shadow_maps = lights.shadows && knobs.rung("shadows") == "map" && paths.is_none();
+        let stored = if paths.is_some() { Stored::default() } else { Stored::of(knobs) };
         let Planner { surfaces, decisions, .. } = planner;
         Self {
             emissive: layers.emissive,
@@ -246,6 +307,7 @@ impl Plan {
             roughest_mirror: images.roughest,
             bands,
             disperses,
+            stored,
             samples: knobs.samples(),
             effects: decisions.effects,
             unread: scene.unread.clone(),
