@@ -44,6 +44,22 @@ use crate::scene::{Ambience, Bounds, Camera, Light, LightKind, Reads, Scene};
 use crate::share::{self, AovPixel};
 use crate::spectra::VISIBLE;
 
+/// Refuses what no image or buffer of the device can hold.
+fn check_size(device: &Device, knobs: &Knobs, size: [u32; 2]) -> Result<()> {
+    let limit = device.max_image_size();
+    if size.contains(&0) || size.iter().any(|&side| side > limit) {
+        bail!("--size {}x{}: a picture has 1 to {limit} pixels a side on this device", size[0], size[1]);
+    }
+    let pixels = u64::from(size[0]) * u64::from(size[1]);
+    // Paths keep four words of a pixel in one buffer, all else one.
+    let bytes = if knobs.rung("indirect") == "path" { 16 } else { 4 };
+    if pixels * bytes > device.max_storage_bytes() {
+        let most = device.max_storage_bytes() / bytes;
+        bail!("--size {}x{}: this device holds at most {most} pixels in one picture", size[0], size[1]);
+    }
+    Ok(())
+}
+
 /// What lies behind the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Background {
@@ -231,9 +247,15 @@ pub struct Renderer {
     settings: Settings,
     scene: SceneOnDevice,
     rays: RaysOnDevice,
-    ray_tiles: RayTiles,
     shadow_maps: ShadowMaps,
     environment: EnvironmentOnDevice,
+    targets: Targets,
+    camera: Buffer,
+}
+
+/// All that is as large as the picture.
+struct Targets {
+    ray_tiles: RayTiles,
     gbuffer: GBuffer,
     tiles: Tiles,
     work: WorkLists,
@@ -247,7 +269,58 @@ pub struct Renderer {
     /// Of pictures by paths, where there is more than one sample.
     halves: Option<Halves>,
     display: Display,
-    camera: Buffer,
+}
+
+impl Targets {
+    fn new(device: &Arc<Device>, plan: &Plan, settings: &Settings, touching: bool) -> Result<Self> {
+        let size = settings.size;
+        let target = |name| {
+            let usage = vk::ImageUsageFlags::STORAGE;
+            Image::new(device, name, ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], usage))
+        };
+        let part = |&part: &Part| PartOnDevice::new(device, plan, &settings.knobs, part, size);
+        Ok(Self {
+            ray_tiles: RayTiles::new(device, plan, size)?,
+            gbuffer: GBuffer::new(device, plan, size)?,
+            tiles: Tiles::new(device, plan, size)?,
+            work: WorkLists::new(device, size)?,
+            lists: if plan.see_through { Some(FragmentLists::new(device, size)?) } else { None },
+            radiance: target("radiance")?,
+            screen: OnScreen::new(device, plan, size)?,
+            film: if plan.samples > 1 || plan.bands > 0 { Some(target("film")?) } else { None },
+            parts: settings.parts.iter().map(part).collect::<Result<_>>()?,
+            paths: plan.paths.map(|paths| PathsOnDevice::new(device, paths, plan, touching, size)).transpose()?,
+            halves: if plan.paths.is_some() && plan.samples > 1 { Some(Halves::new(device, size)?) } else { None },
+            display: Display::new(device, size)?,
+        })
+    }
+}
+
+/// A picture under way.
+pub struct Drawing {
+    view: View,
+    /// The sample and the band of it that come next, and of how many samples.
+    next: [u32; 2],
+    count: u32,
+    times: Times,
+    dropped: u32,
+    work: Work,
+    errors: Vec<SampleError>,
+    enough: bool,
+}
+
+impl Drawing {
+    /// Samples drawn.
+    #[must_use]
+    pub fn samples(&self) -> u32 {
+        self.next[0]
+    }
+
+    /// Whether nothing is left to be drawn.
+    #[must_use]
+    pub fn is_done(&self) -> bool {
+        self.enough || self.next[0] == self.count
+    }
 }
 
 impl Renderer {
@@ -272,18 +345,7 @@ impl Renderer {
         forget_unread(&mut scene, reads);
         let form = normalise(&mut scene);
         forget_unread(&mut scene, reads);
-        let size = settings.size;
-        let limit = device.max_image_size();
-        if size.contains(&0) || size.iter().any(|&side| side > limit) {
-            bail!("--size {}x{}: a picture has 1 to {limit} pixels a side on this device", size[0], size[1]);
-        }
-        let pixels = u64::from(size[0]) * u64::from(size[1]);
-        // Paths keep four words of a pixel in one buffer, all else one.
-        let bytes = if settings.knobs.rung("indirect") == "path" { 16 } else { 4 };
-        if pixels * bytes > device.max_storage_bytes() {
-            let most = device.max_storage_bytes() / bytes;
-            bail!("--size {}x{}: this device holds at most {most} pixels in one picture", size[0], size[1]);
-        }
+        check_size(device, &settings.knobs, settings.size)?;
         if scene.triangles() == 0 {
             let why = if triangles == 0 { "the scene has 0 triangles" } else { "alpha leaves nothing of its surfaces" };
             bail!("{}: there is nothing to draw, {why}", scene.name);
@@ -323,8 +385,6 @@ impl Renderer {
         // What adds nothing takes no turn of any loop.
         let mut kept = plan.lights.iter();
         scene.lights.retain(|_| kept.next().copied().unwrap_or_default());
-        let part = |&part: &Part| PartOnDevice::new(device, &plan, &settings.knobs, part, size);
-        let parts = settings.parts.iter().map(part).collect::<Result<_>>()?;
         let most = if plan.tiles { MOST_LISTED_LIGHTS } else { MOST_LIGHTS };
         if device.limits_loops() && scene.lights.len() > most {
             bail!("{}: {} lights, a software device lights with at most {most} such", scene.name, scene.lights.len());
@@ -351,31 +411,13 @@ impl Renderer {
         let turn = Turn { intensity: settings.environment_intensity, rotation: settings.environment_rotation };
         let name = scene.name.clone();
         let scene = SceneOnDevice::new(device, scene, &plan, &settings.knobs, &solids, rays.anchor())?;
-        let paths = plan
-            .paths
-            .map(|paths| PathsOnDevice::new(device, paths, &plan, rays.constants.touching, size))
-            .transpose()?;
-        let target = |name| {
-            let usage = vk::ImageUsageFlags::STORAGE;
-            Image::new(device, name, ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], usage))
-        };
+        let touching = rays.constants.touching;
         Ok(Self {
             environment: EnvironmentOnDevice::new(device, &plan, environment.or(dark.as_ref()), turn)?,
             shadow_maps: ShadowMaps::new(device, &plan, &name, &scene, rays.anchor())?,
             scene,
             rays,
-            ray_tiles: RayTiles::new(device, &plan, size)?,
-            gbuffer: GBuffer::new(device, &plan, size)?,
-            tiles: Tiles::new(device, &plan, size)?,
-            work: WorkLists::new(device, size)?,
-            lists: if plan.see_through { Some(FragmentLists::new(device, size)?) } else { None },
-            radiance: target("radiance")?,
-            screen: OnScreen::new(device, &plan, size)?,
-            film: if plan.samples > 1 || plan.bands > 0 { Some(target("film")?) } else { None },
-            parts,
-            halves: if paths.is_some() && plan.samples > 1 { Some(Halves::new(device, size)?) } else { None },
-            paths,
-            display: Display::new(device, size)?,
+            targets: Targets::new(device, &plan, &settings, touching)?,
             camera: Buffer::new(device, "camera", size_of::<share::Camera>() as u64, Place::Upload)?,
             device: device.clone(),
             plan,
@@ -389,91 +431,140 @@ impl Renderer {
     /// # Errors
     /// When the driver fails.
     pub fn render(&mut self, camera: &Camera, progress: &mut dyn FnMut(Progress)) -> Result<Rendered> {
+        let mut drawing = self.begin(camera);
+        while !drawing.is_done() {
+            let known = drawing.errors.len();
+            self.step(&mut drawing)?;
+            if drawing.next[1] == 0 {
+                progress(Progress {
+                    done: drawing.samples(),
+                    of: drawing.count,
+                    error: drawing.errors[known..].first().copied(),
+                });
+            }
+        }
+        let wanted = self.settings.max_error.unwrap_or(f64::INFINITY);
+        if let Some(error) = drawing.errors.last().filter(|error| error.relmse.sqrt() > wanted) {
+            let (samples, error) = (drawing.samples(), error.relmse.sqrt());
+            bail!("--max-error {wanted}: after {samples} samples the error is still {error:.4}");
+        }
+        self.picture(&drawing)
+    }
+
+    /// A picture from a camera, of which nothing is drawn yet.
+    pub fn begin(&mut self, camera: &Camera) -> Drawing {
         let view = View::new(camera, self.settings.size, self.scene.bounds);
         self.scene.look_from(&view);
         let mut times = Times::default();
         // Drawn once, before the first picture.
         times.add(std::mem::take(&mut self.shadow_maps.times));
-        let count = self.plan.samples;
-        let mut dropped = 0;
-        let mut work = Work::default();
-        let mut errors = Vec::new();
-        let mut samples = count;
-        let pixels = f64::from(self.settings.size[0]) * f64::from(self.settings.size[1]);
-        for index in 0..count {
-            for band in 0..self.plan.bands.max(1) {
-                self.show_band(band, index, count);
-                // A frame whose see-through fragments did not fit is drawn again with more room.
-                loop {
-                    self.look(&view, index, count, band);
-                    let passes = self.sample(count, band)?.finish()?;
-                    let fitted = match &mut self.lists {
-                        Some(lists) => lists.fitted()?,
-                        None => true,
-                    };
-                    if fitted {
-                        times.add(passes);
-                        break;
-                    }
-                }
-                if self.plan.rays.is_some() {
-                    work.add(&self.rays.counted(), pixels);
-                    ensure!(
-                        work.lights_cut_off == 0,
-                        "lighting what rays meet ({} lights, at {} surfaces) takes longer loops than the driver allows: \
-                         draw with shadows=map, fewer lights, fewer interfaces, or on a device without that limit",
-                        self.plan.directional_lights + self.plan.local_lights,
-                        work.lights_cut_off
-                    );
-                }
-                if self.film.is_some() {
-                    times.add(self.add(index, count, band)?.finish()?);
-                }
-            }
-            dropped = dropped.max(self.lists.as_ref().map_or(0, FragmentLists::dropped));
-            let done = index + 1;
-            let error = match &self.halves {
-                Some(halves) if (done.is_power_of_two() && done > 1) || done == count => {
-                    Some(self.error(halves, done)?)
-                }
-                _ => None,
+        Drawing {
+            view,
+            next: [0, 0],
+            count: self.plan.samples,
+            times,
+            dropped: 0,
+            work: Work::default(),
+            errors: Vec::new(),
+            enough: false,
+        }
+    }
+
+    /// Draws one more sample of every pixel, or one band of it.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn step(&mut self, drawing: &mut Drawing) -> Result<()> {
+        let ([index, band], count) = (drawing.next, drawing.count);
+        self.show_band(band, index, count);
+        // A frame whose see-through fragments did not fit is drawn again with more room.
+        loop {
+            self.look(&drawing.view, index, count, band);
+            let passes = self.sample(count, band)?.finish()?;
+            let fitted = match &mut self.targets.lists {
+                Some(lists) => lists.fitted()?,
+                None => true,
             };
-            errors.extend(error);
-            progress(Progress { done, of: count, error });
-            let limit = self.settings.max_error.unwrap_or(0.0);
-            // Before all parts of the bands were drawn, halves do not know what is missing.
-            let whole = done >= 2 * self.parts(count);
-            if error.is_some_and(|error| whole && limit > 0.0 && error.relmse.sqrt() <= limit) {
-                samples = done;
+            if fitted {
+                drawing.times.add(passes);
                 break;
             }
         }
-        work.mean_lost /= f64::from(samples) * f64::from(self.plan.bands.max(1));
-        if let Some(error) =
-            errors.last().filter(|error| self.settings.max_error.is_some_and(|e| error.relmse.sqrt() > e))
-        {
-            bail!(
-                "--max-error {}: after {samples} samples the error is still {:.4}",
-                self.settings.max_error.unwrap_or_default(),
-                error.relmse.sqrt()
+        if self.plan.rays.is_some() {
+            let pixels = f64::from(self.settings.size[0]) * f64::from(self.settings.size[1]);
+            drawing.work.add(&self.rays.counted(), pixels);
+            ensure!(
+                drawing.work.lights_cut_off == 0,
+                "lighting what rays meet ({} lights, at {} surfaces) takes longer loops than the driver allows: \
+                 draw with shadows=map, fewer lights, fewer interfaces, or on a device without that limit",
+                self.plan.directional_lights + self.plan.local_lights,
+                drawing.work.lights_cut_off
             );
         }
-        if let (Some(halves), Some(film)) = (&self.halves, &self.film) {
+        if self.targets.film.is_some() {
+            drawing.times.add(self.add(index, count, band)?.finish()?);
+        }
+        drawing.next = if band + 1 < self.plan.bands { [index, band + 1] } else { [index + 1, 0] };
+        if drawing.next[1] > 0 {
+            return Ok(());
+        }
+        drawing.dropped = drawing.dropped.max(self.targets.lists.as_ref().map_or(0, FragmentLists::dropped));
+        let done = index + 1;
+        let error = match &self.targets.halves {
+            Some(halves) if (done.is_power_of_two() && done > 1) || done == count => Some(self.error(halves, done)?),
+            _ => None,
+        };
+        drawing.errors.extend(error);
+        let limit = self.settings.max_error.unwrap_or(0.0);
+        // Before all parts of the bands were drawn, halves do not know what is missing.
+        let whole = done >= 2 * self.parts(count);
+        drawing.enough = error.is_some_and(|error| whole && limit > 0.0 && error.relmse.sqrt() <= limit);
+        Ok(())
+    }
+
+    /// What is there of a picture: the mean of the samples drawn, at least one.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn picture(&mut self, drawing: &Drawing) -> Result<Rendered> {
+        let samples = drawing.samples();
+        let mut times = drawing.times.clone();
+        if let (Some(halves), Some(film), true) = (&self.targets.halves, &self.targets.film, samples > 1) {
             let mut frame = Frame::new(&self.device);
             join_halves(&mut frame, halves, film, samples)?;
             times.add(frame.finish()?);
         }
-        times.add(self.show()?.finish()?);
+        times.add(self.show(samples, drawing.count)?.finish()?);
+        let mut work = drawing.work;
+        work.mean_lost /= f64::from(samples) * f64::from(self.plan.bands.max(1));
         Ok(Rendered {
-            display: self.display.pixels.read(<[u8]>::to_vec),
+            display: self.targets.display.pixels.read(<[u8]>::to_vec),
             has_alpha: self.display_background().1,
-            counts: self.display.counts(),
-            dropped,
+            counts: self.targets.display.counts(),
+            dropped: drawing.dropped,
             work,
             passes: times.list(),
             samples,
-            errors,
+            errors: drawing.errors.clone(),
         })
+    }
+
+    /// Another size for the pictures to come.
+    ///
+    /// # Errors
+    /// When the size is out of range, or memory is short: the old size stays.
+    pub fn resize(&mut self, size: [u32; 2]) -> Result<()> {
+        check_size(&self.device, &self.settings.knobs, size)?;
+        let settings = Settings { size, ..self.settings.clone() };
+        self.targets = Targets::new(&self.device, &self.plan, &settings, self.rays.constants.touching)?;
+        self.settings = settings;
+        Ok(())
+    }
+
+    /// Tone curve and exposure of what is shown from now on.
+    pub fn develop(&mut self, tonemap: ToneMap, exposure: f32) {
+        self.settings.tonemap = tonemap;
+        self.settings.exposure = exposure;
     }
 
     /// Where the next frame is seen from.
@@ -481,7 +572,7 @@ impl Renderer {
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(index, count))));
         // Halves of a picture by paths have random numbers of their own, and so has each band: what is noise in one is none in
         // another, and their sum has less of it.
-        let [at, half] = if self.halves.is_some() { [index / 2, index % 2] } else { [index, 0] };
+        let [at, half] = if self.targets.halves.is_some() { [index / 2, index % 2] } else { [index, 0] };
         let seed = self.settings.seed.wrapping_mul(2).wrapping_add(half).wrapping_add(band.wrapping_mul(0x9e37_79b9));
         self.rays.look_from(view, at, count, seed);
     }
@@ -489,7 +580,7 @@ impl Renderer {
     /// What goes another way for each wavelength is drawn for parts of each band, one for each sample of a half: as many as there
     /// are, up to a limit; where an error is the end, so few that it may be told early.
     fn parts(&self, count: u32) -> u32 {
-        let halves = if self.halves.is_some() { 2 } else { 1 };
+        let halves = if self.targets.halves.is_some() { 2 } else { 1 };
         let limit = if self.settings.max_error.is_some() { PARTS_BEFORE_AN_END } else { MOST_PARTS };
         let most = if self.plan.disperses { (count / halves).clamp(1, limit) } else { 1 };
         1 << most.ilog2()
@@ -503,7 +594,7 @@ impl Renderer {
         }
         let band = VISIBLE.part(band, bands);
         let parts = self.parts(count);
-        let halves = if self.halves.is_some() { 2 } else { 1 };
+        let halves = if self.targets.halves.is_some() { 2 } else { 1 };
         let at = (index / halves) % parts;
         let part = if parts > 1 { at.reverse_bits() >> (32 - parts.ilog2()) } else { 0 };
         self.scene.show(Some(&Slice::new(band, band.part(part, parts))));
@@ -511,21 +602,8 @@ impl Renderer {
 
     /// One sample of every pixel, or one band of it: the frame, pass by pass.
     fn sample(&self, count: u32, band: u32) -> Result<Frame<'_>> {
-        let Self {
-            device,
-            plan,
-            scene,
-            rays,
-            camera,
-            gbuffer: g,
-            tiles: lists_of_lights,
-            work,
-            lists,
-            radiance,
-            parts,
-            screen,
-            ..
-        } = self;
+        let Self { device, plan, scene, rays, camera, targets, .. } = self;
+        let Targets { gbuffer: g, tiles: lists_of_lights, work, lists, radiance, parts, screen, .. } = targets;
         // With n samples a pixel each one stands for 1/n of its area: textures are read that much sharper.
         let lod_bias = -0.5 * (count as f32).log2();
         let lighting = Lighting {
@@ -544,7 +622,7 @@ impl Renderer {
         if plan.rays.is_some() {
             rays.reset(&mut frame);
         }
-        if let Some(with) = &self.paths {
+        if let Some(with) = &self.targets.paths {
             paths(&mut frame, lighting, with, radiance)?;
             frame.read_back(&rays.counts);
             return Ok(frame);
@@ -560,12 +638,12 @@ impl Renderer {
         light(&mut frame, lighting, g, work, radiance)?;
         background(&mut frame, lighting, g, work, radiance)?;
         if let Some(with) = plan.rays.filter(|rays| rays.mirrors || rays.refraction) {
-            interact(&mut frame, lighting, with, g, &self.ray_tiles, radiance)?;
+            interact(&mut frame, lighting, with, g, &self.targets.ray_tiles, radiance)?;
         }
         for part in parts {
             frame.clear("reset part", &part.radiance);
             if let Some(with) = plan.rays.filter(|_| part.part.called_for(plan)) {
-                interact_part(&mut frame, lighting, with, g, &self.ray_tiles, part)?;
+                interact_part(&mut frame, lighting, with, g, &self.targets.ray_tiles, part)?;
             }
             if plan.screen.refraction {
                 frame.download("copy part", &part.radiance, &part.seen);
@@ -576,7 +654,7 @@ impl Renderer {
         }
         if plan.screen.mirrors {
             frame.download("copy radiance", radiance, &screen.seen);
-            mirror(&mut frame, lighting, g, &self.ray_tiles, screen, radiance)?;
+            mirror(&mut frame, lighting, g, &self.targets.ray_tiles, screen, radiance)?;
         }
         if plan.screen.refraction || plan.screen.see_through_mirrors {
             frame.download("copy radiance", radiance, &screen.seen);
@@ -604,27 +682,33 @@ impl Renderer {
     fn add(&self, index: u32, count: u32, band: u32) -> Result<Frame<'_>> {
         let mut frame = Frame::new(&self.device);
         let bands = self.plan.bands;
-        if let Some(halves) = &self.halves {
+        if let Some(halves) = &self.targets.halves {
             let (round, half) = (index / 2, index as usize % 2);
-            accumulate(&mut frame, &self.radiance, &halves.sums[half], round == 0 && band == 0, 1.0, bands)?;
-        } else if let Some(film) = &self.film {
+            accumulate(&mut frame, &self.targets.radiance, &halves.sums[half], round == 0 && band == 0, 1.0, bands)?;
+        } else if let Some(film) = &self.targets.film {
             let (first, last) = (index == 0 && band == 0, index + 1 == count && band + 1 == bands.max(1));
             let scale = if last { 1.0 / count as f32 } else { 1.0 };
-            accumulate(&mut frame, &self.radiance, film, first, scale, bands)?;
-            for part in &self.parts {
+            accumulate(&mut frame, &self.targets.radiance, film, first, scale, bands)?;
+            for part in &self.targets.parts {
                 accumulate(&mut frame, &part.radiance, part.film(), first, scale, bands)?;
             }
         }
         Ok(frame)
     }
 
-    /// The film as a display shows it.
-    fn show(&self) -> Result<Frame<'_>> {
+    /// The film as a display shows it, after so many of the samples.
+    fn show(&self, samples: u32, count: u32) -> Result<Frame<'_>> {
         let mut frame = Frame::new(&self.device);
-        let film = self.film.as_ref().unwrap_or(&self.radiance);
+        let Targets { radiance, film, halves, display, .. } = &self.targets;
+        // Before the last sample the film is a sum, unless it was joined of halves, of which one sample has but one.
+        let (film, scale) = match (film, halves) {
+            (Some(film), None) => (film, if samples < count { 1.0 / samples as f32 } else { 1.0 }),
+            (Some(film), Some(_)) if samples > 1 => (film, 1.0),
+            _ => (radiance, 1.0),
+        };
         let (background, _) = self.display_background();
         let Settings { tonemap: curve, exposure, .. } = self.settings;
-        tonemap(&mut frame, film, &self.display, curve as u32, exposure, background, self.plan.bands > 0)?;
+        tonemap(&mut frame, (film, scale), display, curve as u32, exposure, background, self.plan.bands > 0)?;
         Ok(frame)
     }
 
@@ -640,7 +724,13 @@ impl Renderer {
         self.look(&view, 0, count, 0);
         let done =
             self.shadow_maps.times.iter().map(|pass| PassPlan { name: pass.name.clone(), pipelines: Vec::new() });
-        Ok([done.collect(), self.sample(count, 0)?.plan(), self.add(0, count, 0)?.plan(), self.show()?.plan()].concat())
+        Ok([
+            done.collect(),
+            self.sample(count, 0)?.plan(),
+            self.add(0, count, 0)?.plan(),
+            self.show(count, count)?.plan(),
+        ]
+        .concat())
     }
 
     /// Display-linear colour behind the scene with alpha 1, or all 0, and whether the display output is transparent.
@@ -661,7 +751,7 @@ impl Renderer {
     /// # Errors
     /// When the driver fails.
     pub fn film(&self) -> Result<Picture> {
-        let mut picture = self.read(self.film.as_ref().unwrap_or(&self.radiance))?;
+        let mut picture = self.read(self.targets.film.as_ref().unwrap_or(&self.targets.radiance))?;
         self.lay_behind(&mut picture);
         Ok(picture)
     }
@@ -685,7 +775,7 @@ impl Renderer {
     /// # Errors
     /// When the driver fails.
     pub fn part(&self, part: Part) -> Result<Option<Picture>> {
-        self.parts.iter().find(|kept| kept.part == part).map(|kept| self.read(kept.film())).transpose()
+        self.targets.parts.iter().find(|kept| kept.part == part).map(|kept| self.read(kept.film())).transpose()
     }
 
     /// What the halves say of the picture's error after so many samples.
@@ -699,7 +789,7 @@ impl Renderer {
     /// # Errors
     /// When the driver fails.
     pub fn halves(&self, samples: u32) -> Result<Option<[Picture; 2]>> {
-        let Some(halves) = &self.halves else { return Ok(None) };
+        let Some(halves) = &self.targets.halves else { return Ok(None) };
         let mean = |sum: &Image| -> Result<Picture> {
             let mut picture = self.read(sum)?;
             let scale = 2.0 / samples as f32;
@@ -758,7 +848,7 @@ impl Renderer {
         if all {
             draws.extend(self.scene.draws(true, self.rays.inside()));
         }
-        gbuffer(&mut frame, &self.scene, &self.camera, &self.gbuffer, 0.0, draws)?;
+        gbuffer(&mut frame, &self.scene, &self.camera, &self.targets.gbuffer, 0.0, draws)?;
         frame.finish()?;
         // As many rows at a time as one storage buffer holds.
         let row_bytes = u64::from(width) * size_of::<AovPixel>() as u64;
@@ -768,7 +858,7 @@ impl Renderer {
         for first in (0..height).step_by(rows as usize) {
             let end = (first + rows).min(height);
             let mut frame = Frame::new(&self.device);
-            aov(&mut frame, &self.plan, &self.scene, &self.camera, &self.gbuffer, &pixels, [first, end])?;
+            aov(&mut frame, &self.plan, &self.scene, &self.camera, &self.targets.gbuffer, &pixels, [first, end])?;
             frame.finish()?;
             let bytes = (row_bytes * u64::from(end - first)) as usize;
             all.extend(pixels.read(|words| bytemuck::pod_collect_to_vec::<u8, AovPixel>(&words[..bytes])));
@@ -808,7 +898,7 @@ fn add_dark_lights(scene: &mut Scene) {
 }
 
 /// Pass times summed by name, in order of first appearance.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Times {
     order: Vec<String>,
     sums: BTreeMap<String, f64>,

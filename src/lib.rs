@@ -6,6 +6,8 @@
 //! ```text
 //! cli ─► verify ─► optics      the formulas in f64, and the shaders held against them
 //!  │
+//!  ├───► viewer ─► frame       a window, panels, a thread that draws
+//!  │
 //!  ├───► cost ──► frame        what rungs and effects cost, drawn in turns
 //!  │
 //!  ├───► study ─► scene ─► spectra ─► optics    what to draw: data, no Vulkan
@@ -73,5 +75,7 @@ pub mod spectra;
 pub mod optics;
 
 pub mod verify;
+
+pub mod viewer;
 
 pub mod cli;

@@ -5,8 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use etalon::cli::options::When;
-use etalon::cli::unbuilt::UnbuiltCommand;
-use etalon::cli::{cost, devices, diff, plan, render, verify};
+use etalon::cli::{cost, devices, diff, plan, render, verify, view};
 
 /// A Vulkan renderer written directly against ash: glTF in, radiance out.
 #[derive(Parser)]
@@ -32,8 +31,7 @@ enum Command {
     Diff(diff::DiffArgs),
     Devices(devices::DevicesArgs),
     Verify(verify::VerifyArgs),
-    #[command(hide = true)]
-    View(UnbuiltCommand),
+    View(Box<view::ViewArgs>),
     Cost(Box<cost::CostArgs>),
 }
 
@@ -61,7 +59,7 @@ fn main() -> ExitCode {
         Command::Render(args) => render::run(args, arguments.quiet),
         Command::Diff(args) => diff::run(args),
         Command::Devices(args) => devices::run(args),
-        Command::View(args) => args.refuse("view"),
+        Command::View(args) => view::run(args),
         Command::Plan(args) => plan::run(args),
         Command::Cost(args) => cost::run(args, arguments.quiet),
         Command::Verify(args) => verify::run(args, arguments.quiet),

@@ -81,7 +81,7 @@ fn sorting_tiles_again_waits_for_the_first_time() {
 fn tone_mapping_waits_for_its_counters() {
     // fill → compute atomics.
     proves("tone map", |things, frame| {
-        tonemap(frame, &things.film, &things.display, 0, 0.0, [0.0; 4], false).expect("the pass");
+        tonemap(frame, (&things.film, 1.0), &things.display, 0, 0.0, [0.0; 4], false).expect("the pass");
     });
 }
 

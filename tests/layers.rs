@@ -19,11 +19,12 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("pass", &["pass", "gpu", "scene", "plan", "image", "shader", "share", "spectra"]),
     ("frame", &["frame", "pass", "gpu", "scene", "plan", "image", "share", "spectra"]),
     ("cost", &["cost", "frame", "gpu", "plan", "scene", "image"]),
+    ("viewer", &["viewer", "cost", "frame", "pass", "gpu", "plan", "scene", "image", "optics", "share"]),
     (
         "cli",
         &[
-            "cli", "cost", "verify", "optics", "spectra", "frame", "pass", "gpu", "scene", "plan", "image", "study",
-            "share", "shader",
+            "cli", "viewer", "cost", "verify", "optics", "spectra", "frame", "pass", "gpu", "scene", "plan", "image",
+            "study", "share", "shader",
         ],
     ),
 ];

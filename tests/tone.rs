@@ -49,7 +49,7 @@ fn shown(
     let target = Display::new(&gpu.device, [width, height]).expect("a display");
     let mut frame = Frame::new(&gpu.device);
     frame.upload("upload film", &staging, &film, 0, &[0]);
-    tonemap(&mut frame, &film, &target, curve as u32, exposure, background, desaturates).expect("the pass");
+    tonemap(&mut frame, (&film, 1.0), &target, curve as u32, exposure, background, desaturates).expect("the pass");
     frame.finish().expect("a frame");
     let bytes = target.pixels.read(|all| all[..rgba.len() * 4].as_chunks::<4>().0.to_vec());
     (bytes, target.counts())

@@ -11,7 +11,7 @@ layout(set = 0, binding = 0, rgba32f) readonly uniform image2D film;
 layout(scalar, set = 0, binding = 1) writeonly buffer Display { uint display[]; };
 layout(scalar, set = 0, binding = 2) buffer Counts { uint nan; uint inf; uint negative; };
 // `background` is display-linear and lies behind what is not covered; its alpha 0 keeps the picture transparent.
-layout(push_constant, scalar) uniform Push { vec4 background; float exposure; };
+layout(push_constant, scalar) uniform Push { vec4 background; float exposure; float scale; };
 
 uint byte_from(float x) {
     return uint(floor(x * 255.0 + 0.5));
@@ -21,7 +21,7 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     ivec2 size = imageSize(film);
     if (any(greaterThanEqual(pixel, size))) return;
-    vec4 value = imageLoad(film, pixel);
+    vec4 value = imageLoad(film, pixel) * scale;
     // Counted before anything clamps: max(NaN, 0) is 0.
     if (any(isnan(value))) atomicAdd(nan, 1u);
     if (any(isinf(value))) atomicAdd(inf, 1u);

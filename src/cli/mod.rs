@@ -12,6 +12,7 @@ pub mod report;
 pub mod setup;
 pub mod unbuilt;
 pub mod verify;
+pub mod view;
 
 use std::io::{self, Write as _};
 

@@ -29,23 +29,3 @@ impl UnbuiltOptions {
         Ok(())
     }
 }
-
-/// Anything after the name of a command to come.
-#[derive(Debug, Clone, Args)]
-pub struct UnbuiltCommand {
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
-    rest: Vec<String>,
-}
-
-impl UnbuiltCommand {
-    /// Refuses the command.
-    ///
-    /// # Errors
-    /// Always: one sentence.
-    pub fn refuse(&self, name: &str) -> Result<std::process::ExitCode> {
-        bail!(
-            "etalon {name} {}: this command is not built yet; render, plan, cost, verify, diff and devices are",
-            self.rest.join(" ")
-        )
-    }
-}

@@ -1,16 +1,17 @@
 //! Instance, choice of a device, and the device with its queue, allocator and caches.
 
-use std::ffi::{CStr, CString, c_void};
+use std::ffi::{CStr, CString, c_char, c_void};
 use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use anyhow::{Context as _, Result, anyhow, bail};
+use anyhow::{Context as _, Result, anyhow, bail, ensure};
 use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use serde::Serialize;
 
 use super::cache::Caches;
+use super::surface::Surface;
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -116,16 +117,16 @@ pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// The instance with everything that hangs on it.
-struct Instance {
-    entry: ash::Entry,
-    raw: ash::Instance,
+pub(super) struct Instance {
+    pub(super) entry: ash::Entry,
+    pub(super) raw: ash::Instance,
     debug: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     has_debug_utils: bool,
     messages: Box<Messages>,
 }
 
 impl Instance {
-    fn new(validate: bool) -> Result<Self> {
+    pub(super) fn new(validate: bool, wanted_extensions: &[*const c_char]) -> Result<Self> {
         // SAFETY: the loader is a shared library that stays loaded as long as `entry` lives.
         let entry = unsafe { ash::Entry::load() }
             .map_err(|e| anyhow!("no Vulkan loader (Debian: libvulkan1, mesa-vulkan-drivers): {e}"))?;
@@ -134,7 +135,12 @@ impl Instance {
             (entry.enumerate_instance_extension_properties(None)?, entry.enumerate_instance_layer_properties()?)
         };
         let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
-        let mut enabled = Vec::new();
+        for &wanted in wanted_extensions {
+            // SAFETY: names out of ash's own tables.
+            let wanted = unsafe { CStr::from_ptr(wanted) };
+            ensure!(has(wanted), "the Vulkan loader cannot show windows here: it lacks {}", wanted.to_string_lossy());
+        }
+        let mut enabled = wanted_extensions.to_vec();
         let mut flags = vk::InstanceCreateFlags::empty();
         let has_debug_utils = has(ext::debug_utils::NAME);
         if has_debug_utils {
@@ -186,13 +192,13 @@ impl Instance {
         Ok(Self { entry, raw, debug, has_debug_utils, messages })
     }
 
-    fn candidates(&self) -> Result<Vec<Candidate>> {
+    fn candidates(&self, surface: Option<&Surface>) -> Result<Vec<Candidate>> {
         // SAFETY: plain queries on a live instance.
         let devices = unsafe { self.raw.enumerate_physical_devices() }.context("listing Vulkan devices")?;
-        Ok(devices.into_iter().map(|physical| self.candidate(physical)).collect())
+        Ok(devices.into_iter().map(|physical| self.candidate(physical, surface)).collect())
     }
 
-    fn candidate(&self, physical: vk::PhysicalDevice) -> Candidate {
+    fn candidate(&self, physical: vk::PhysicalDevice, surface: Option<&Surface>) -> Candidate {
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
         let mut push = vk::PhysicalDevicePushDescriptorPropertiesKHR::default();
         let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut push);
@@ -215,7 +221,12 @@ impl Instance {
             },
             api: version(properties.api_version),
         };
-        let missing = self.missing(physical, properties.api_version, push.max_push_descriptors, properties.limits);
+        let mut missing = self.missing(physical, properties.api_version, push.max_push_descriptors, properties.limits);
+        missing.extend(
+            surface
+                .filter(|surface| !surface.is_shown_by(&self.raw, physical))
+                .map(|_| "a way to show pictures in this window".to_owned()),
+        );
         Candidate { info, missing, physical }
     }
 
@@ -295,7 +306,7 @@ impl Instance {
     }
 }
 
-const QUEUE: vk::QueueFlags =
+pub(super) const QUEUE: vk::QueueFlags =
     vk::QueueFlags::from_raw(vk::QueueFlags::GRAPHICS.as_raw() | vk::QueueFlags::COMPUTE.as_raw());
 
 impl Drop for Instance {
@@ -330,7 +341,7 @@ unsafe extern "system" fn on_message(
 
 /// All devices that Vulkan offers here, in the order of `--device INDEX`.
 pub fn candidates() -> Result<Vec<Candidate>> {
-    Instance::new(false)?.candidates()
+    Instance::new(false, &[])?.candidates(None)
 }
 
 fn choose(all: Vec<Candidate>, choice: &DeviceChoice) -> Result<Candidate> {
@@ -370,8 +381,8 @@ fn choose(all: Vec<Candidate>, choice: &DeviceChoice) -> Result<Candidate> {
 /// A Vulkan device, its one queue, and the caches of what was made on it.
 pub struct Device {
     pub(super) raw: ash::Device,
-    pub(super) queue: vk::Queue,
-    pub(super) commands: vk::CommandPool,
+    pub(super) queue: Mutex<vk::Queue>,
+    pub(super) commands: Mutex<vk::CommandPool>,
     pub(super) timeline: vk::Semaphore,
     pub(super) push: khr::push_descriptor::Device,
     pub(super) debug: Option<ext::debug_utils::Device>,
@@ -383,7 +394,11 @@ pub struct Device {
     next_id: AtomicU64,
     created: Mutex<Vec<Created>>,
     info: DeviceInfo,
-    instance: Instance,
+    pub(super) physical: vk::PhysicalDevice,
+    pub(super) family: u32,
+    /// A window shares its queue.
+    pub(super) shows: bool,
+    pub(super) instance: Instance,
 }
 
 impl Device {
@@ -392,8 +407,12 @@ impl Device {
     /// # Errors
     /// One sentence when there is no loader, no such device, or the device lacks something that Etalon needs.
     pub fn open(choice: &DeviceChoice, validate: bool) -> Result<Arc<Self>> {
-        let instance = Instance::new(validate)?;
-        let Candidate { info, physical, .. } = choose(instance.candidates()?, choice)?;
+        Self::open_on(Instance::new(validate, &[])?, choice, None)
+    }
+
+    /// The same with a surface that it can show pictures on.
+    pub(super) fn open_on(instance: Instance, choice: &DeviceChoice, surface: Option<&Surface>) -> Result<Arc<Self>> {
+        let Candidate { info, physical, .. } = choose(instance.candidates(surface)?, choice)?;
         let opening = || format!("opening device \"{}\"", info.name);
         // SAFETY: plain queries on a live instance.
         let (families, properties, extensions) = unsafe {
@@ -405,12 +424,17 @@ impl Device {
         };
         let family = families
             .iter()
-            .position(|f| f.queue_flags.contains(QUEUE))
+            .enumerate()
+            .position(|(i, f)| {
+                f.queue_flags.contains(QUEUE)
+                    && surface.is_none_or(|surface| surface.is_shown_by_family(physical, i as u32))
+            })
             .ok_or_else(|| anyhow!("no queue with graphics and compute"))
             .with_context(opening)? as u32;
 
         let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
         let mut names = vec![khr::push_descriptor::NAME.as_ptr()];
+        names.extend(surface.map(|_| khr::swapchain::NAME.as_ptr()));
         if extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::portability_subset::NAME)) {
             names.push(khr::portability_subset::NAME.as_ptr());
         }
@@ -465,8 +489,8 @@ impl Device {
             push: khr::push_descriptor::Device::new(&instance.raw, &raw),
             debug: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw)),
             raw,
-            queue,
-            commands,
+            queue: Mutex::new(queue),
+            commands: Mutex::new(commands),
             timeline,
             allocator: Mutex::new(ManuallyDrop::new(allocator)),
             caches: Mutex::default(),
@@ -476,6 +500,9 @@ impl Device {
             next_id: AtomicU64::new(1),
             created: Mutex::default(),
             info,
+            physical,
+            family,
+            shows: surface.is_some(),
             instance,
         }))
     }
@@ -572,7 +599,7 @@ impl Drop for Device {
             lock(&self.caches).destroy(&self.raw);
             ManuallyDrop::drop(&mut lock(&self.allocator));
             self.raw.destroy_semaphore(self.timeline, None);
-            self.raw.destroy_command_pool(self.commands, None);
+            self.raw.destroy_command_pool(*lock(&self.commands), None);
             self.raw.destroy_device(None);
         }
         // `instance` is dropped after this; it keeps `entry`, the loader's library, until then.

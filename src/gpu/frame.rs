@@ -531,14 +531,21 @@ impl<'a> Frame<'a> {
             let info =
                 vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(queries.max(1));
             let pool = raw.create_query_pool(&info, None).context("creating timestamps")?;
-            let mut used = vec![begin(&device)?];
+            // Whoever draws holds the pool until the frame has ended: threads take turns.
+            let from = lock(&device.commands);
+            let mut used = vec![begin(&device, *from)?];
             raw.cmd_reset_query_pool(used[0], pool, 0, queries.max(1));
             let recorded = device.with_pipelines(&keys, |pipelines| {
                 for (index, (pass, barriers)) in passes.into_iter().zip(&barriers).enumerate() {
                     // Validation sees hazards within a command buffer alone: it gets all passes in one.
-                    if index > 0 && !device.validates() && !pipelines.ready(&wanted[index]) {
+                    let alone = device.shows || !pipelines.ready(&wanted[index]);
+                    if index > 0 && !device.validates() && alone {
                         submit(&device, used[used.len() - 1])?;
-                        used.push(begin(&device)?);
+                        // A window asks for its turn between two passes: none of them waits for more than one.
+                        if device.shows {
+                            wait(&device)?;
+                        }
+                        used.push(begin(&device, *from)?);
                     }
                     let made = pipelines.wait_for(&wanted[index])?;
                     let commands = used[used.len() - 1];
@@ -561,10 +568,7 @@ impl<'a> Frame<'a> {
                 submit(&device, used[used.len() - 1])
             });
             // What has been submitted is waited for also where the rest could not be.
-            let (semaphores, values) = ([device.timeline], [device.submitted.load(Ordering::Relaxed)]);
-            let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
-            let waited = raw.wait_semaphores(&wait, u64::MAX);
-            let waited = waited.with_context(|| format!("waiting for a frame of passes {}", names.join(", ")));
+            let waited = wait(&device).with_context(|| format!("waiting for a frame of passes {}", names.join(", ")));
             let mut ticks = vec![0_u64; queries as usize];
             let outcome = recorded.and(waited).and_then(|()| {
                 let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
@@ -573,7 +577,7 @@ impl<'a> Frame<'a> {
                     false => Ok(()),
                 }
             });
-            raw.free_command_buffers(device.commands, &used);
+            raw.free_command_buffers(*from, &used);
             raw.destroy_query_pool(pool, None);
             for (id, target) in &targets {
                 // What a frame that failed has left behind is not known.
@@ -597,9 +601,9 @@ impl<'a> Frame<'a> {
 const ALL: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::ALL_COMMANDS;
 
 /// A command buffer that is being recorded.
-unsafe fn begin(device: &Device) -> Result<vk::CommandBuffer> {
+pub(super) unsafe fn begin(device: &Device, pool: vk::CommandPool) -> Result<vk::CommandBuffer> {
     let info = vk::CommandBufferAllocateInfo::default()
-        .command_pool(device.commands)
+        .command_pool(pool)
         .level(vk::CommandBufferLevel::PRIMARY)
         .command_buffer_count(1);
     let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
@@ -613,6 +617,7 @@ unsafe fn begin(device: &Device) -> Result<vk::CommandBuffer> {
 
 /// Ends a command buffer and hands it to the device; the timeline counts when it is done.
 unsafe fn submit(device: &Device, commands: vk::CommandBuffer) -> Result<()> {
+    let queue = lock(&device.queue);
     let done = device.submitted.load(Ordering::Relaxed) + 1;
     let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
     let signals = [vk::SemaphoreSubmitInfo::default().semaphore(device.timeline).value(done).stage_mask(ALL)];
@@ -620,10 +625,18 @@ unsafe fn submit(device: &Device, commands: vk::CommandBuffer) -> Result<()> {
     // SAFETY: the command buffer is recording; whoever calls waits for it before anything it uses is freed.
     unsafe {
         device.raw.end_command_buffer(commands).context("recording a frame")?;
-        device.raw.queue_submit2(device.queue, &[info], vk::Fence::null()).context("submitting a frame")?;
+        device.raw.queue_submit2(*queue, &[info], vk::Fence::null()).context("submitting a frame")?;
     }
     device.submitted.store(done, Ordering::Relaxed);
     Ok(())
+}
+
+/// Until all that was submitted is done.
+unsafe fn wait(device: &Device) -> Result<()> {
+    let (semaphores, values) = ([device.timeline], [device.submitted.load(Ordering::Relaxed)]);
+    let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+    // SAFETY: a semaphore of this device, which the last submission signals.
+    unsafe { device.raw.wait_semaphores(&info, u64::MAX) }.context("waiting for the device")
 }
 
 fn attachment<'x>(view: vk::ImageView, layout: vk::ImageLayout, clear: bool) -> vk::RenderingAttachmentInfo<'x> {

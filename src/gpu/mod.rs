@@ -12,8 +12,10 @@ mod device;
 mod frame;
 mod memory;
 mod pipeline;
+mod present;
 mod shader;
 mod specialize;
+mod surface;
 pub mod sync;
 
 pub use access::Access;
@@ -22,5 +24,7 @@ pub use cache::SamplerDesc;
 pub use device::{Candidate, Created, Device, DeviceChoice, DeviceInfo, Message, Severity, candidates};
 pub use frame::{ColorTarget, DepthTarget, Draw, Frame, PassPlan, PassTime, Raster, VertexStream};
 pub use memory::{Buffer, Image, ImageDesc, NOTHING, Place};
+pub use present::{Overlay, Placed, Presented, Presenter};
 pub use shader::{Binding, BindingKind, Constant, Program, Stage, VertexInput};
 pub use specialize::specialized;
+pub use surface::Windowed;

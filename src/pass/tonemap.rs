@@ -47,14 +47,14 @@ impl Display {
     }
 }
 
-/// Exposes by `exposure` stops, bends by tone curve number `curve`, and encodes; `background` is display-linear with
+/// Multiplies a film by `scale`, exposes by `exposure` stops, bends by tone curve number `curve`, and encodes; `background` is display-linear with
 /// alpha 1, or all 0 to keep transparency. With `desaturates` colours outside of Rec. 709 keep their luminance.
 ///
 /// # Errors
 /// When the driver refuses what a pipeline binds.
 pub fn tonemap<'a>(
     frame: &mut Frame<'a>,
-    film: &'a Image,
+    (film, scale): (&'a Image, f32),
     display: &'a Display,
     curve: u32,
     exposure: f32,
@@ -63,7 +63,7 @@ pub fn tonemap<'a>(
 ) -> Result<()> {
     frame.fill("reset counts", &display.counts, 0);
     let [r, g, b, a] = background;
-    let push = [r, g, b, a, exposure.exp2()];
+    let push = [r, g, b, a, exposure.exp2(), scale];
     let bind = tonemap::Bind { film, display: &display.pixels, counts: &display.counts };
     let size = [film.desc().width, film.desc().height];
     let constants = tonemap::Constants { curve, desaturates, ..Default::default() }.words();

@@ -1,0 +1,110 @@
+//! `etalon view`: the scene in a window.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+use clap::Args;
+
+use super::options::{DeviceOptions, PictureOptions, SceneOptions};
+use crate::cost::sweep::arguments;
+use crate::gpu::Severity;
+use crate::scene::Reads;
+use crate::viewer::worker::Loaded;
+use crate::viewer::{Start, View, run as run_window};
+
+/// Open a window that shows the scene, and why it looks as it does
+#[derive(Debug, Clone, Args)]
+pub struct ViewArgs {
+    #[command(flatten)]
+    scene: SceneOptions,
+    #[command(flatten)]
+    picture: PictureOptions,
+    #[command(flatten)]
+    device: DeviceOptions,
+    /// Begin without panels: P brings them
+    #[arg(long)]
+    bare: bool,
+}
+
+fn loaded(options: &SceneOptions, size: [u32; 2]) -> Result<Loaded> {
+    let scene = options.load(Reads::Everything)?;
+    let (environment, more) = options.load_environment()?;
+    let share = options.environment_share(&scene);
+    let camera = options.choose_camera(&scene, size)?;
+    let warnings = scene.warnings.iter().cloned().chain(more).collect();
+    Ok(Loaded { name: scene.name.clone(), environment: environment.zip(share), camera, warnings, scene })
+}
+
+/// The same options for another file: what belongs to the first, its cameras and its time, is forgotten.
+fn of_file(options: &SceneOptions, file: Option<&Path>) -> SceneOptions {
+    match file {
+        None => options.clone(),
+        Some(path) => SceneOptions {
+            scene: path.display().to_string(),
+            camera: None,
+            eye: None,
+            target: None,
+            up: None,
+            time: "none".to_owned(),
+            ..options.clone()
+        },
+    }
+}
+
+/// The command that draws a view.
+fn command(args: &ViewArgs, view: &View<'_>) -> String {
+    let mut scene = of_file(&args.scene, view.file);
+    scene.env_rotation = view.settings.environment_rotation;
+    if view.camera.is_some() || view.named.is_some() {
+        (scene.camera, scene.eye, scene.target, scene.up, scene.fov) = (None, None, None, None, None);
+    }
+    scene.camera = view.named.map(str::to_owned).or(scene.camera);
+    let picture = PictureOptions {
+        size: view.settings.size,
+        exposure: view.settings.exposure,
+        tonemap: view.settings.tonemap,
+        ..args.picture.clone()
+    };
+    let seed = (args.picture.seed != 0).then(|| format!("--seed {}", args.picture.seed));
+    let words = [
+        vec!["etalon render".to_owned()],
+        scene.words(),
+        view.camera.clone().into_iter().collect(),
+        picture.words(),
+        seed.into_iter().collect(),
+        vec![arguments(&view.settings.knobs)],
+        args.device.words(),
+        vec!["-o picture.png".to_owned()],
+    ];
+    words.concat().join(" ")
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// One sentence: no display, no device, a file that cannot be read.
+pub fn run(args: &ViewArgs) -> Result<ExitCode> {
+    if let Some(error) = &args.picture.max_error {
+        bail!("--max-error {error}: the viewer draws until its samples are done; `render` has this option");
+    }
+    let settings = args.picture.settings(&args.scene)?;
+    let (first, told) = (args.scene.clone(), args.clone());
+    let messages = run_window(Start {
+        size: args.picture.size,
+        settings,
+        device: args.device.choice(),
+        validate: args.device.validate,
+        panels: !args.bare,
+        open: Box::new(move |file, size| loaded(&of_file(&first, file.map(|path| path.as_path())), size)),
+        command: Box::new(move |view| command(&told, view)),
+        // A terminal that has gone is no reason to close the window.
+        said: Box::new(|command| drop(super::print(command))),
+        prices: None,
+    })?;
+    let errors = messages.iter().filter(|message| message.severity == Severity::Error).count();
+    if errors > 0 {
+        bail!("validation: {errors} errors, the first: {}", messages[0].text);
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,558 @@
+//! Pictures in a window: a swapchain whose ends are states and not errors, and egui over it.
+//!
+//! A picture comes from the host and is blitted to its place, so that its bytes are those of the display output: the swapchain
+//! holds encoded bytes (UNORM) that nothing encodes again. One frame is in flight.
+
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result, anyhow, ensure};
+use ash::{khr, vk};
+use egui_ash_renderer::allocator::DefaultAllocator;
+use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer};
+
+use super::access::Access;
+use super::device::{Device, DeviceChoice, Instance, lock};
+use super::frame::begin;
+use super::memory::{Buffer, Image, ImageDesc, Place};
+use super::surface::{Surface, Windowed, extensions};
+
+/// A picture with its place in the window.
+#[derive(Debug, Clone, Copy)]
+pub struct Placed<'a> {
+    /// RGBA8, sRGB-encoded, rows from the top.
+    pub rgba: &'a [u8],
+    /// Pixels across and down.
+    pub size: [u32; 2],
+    /// Another number: another picture.
+    pub version: u64,
+    /// Left, top, right, bottom in pixels of the window; where it is of another size, pixels are mixed.
+    pub place: [i32; 4],
+}
+
+/// What egui wants to be seen.
+pub struct Overlay {
+    /// Textures that changed.
+    pub textures: egui::TexturesDelta,
+    /// Triangles.
+    pub primitives: Vec<egui::ClippedPrimitive>,
+    /// Pixels of a point.
+    pub pixels_per_point: f32,
+}
+
+/// What became of a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Presented {
+    /// It is seen.
+    Shown,
+    /// The window has no area: minimised.
+    Hidden,
+    /// The window changed meanwhile: once more.
+    Changed,
+}
+
+struct Swapchain {
+    raw: vk::SwapchainKHR,
+    images: Vec<vk::Image>,
+    views: Vec<vk::ImageView>,
+    /// Signalled when the image may be shown.
+    done: Vec<vk::Semaphore>,
+    extent: [u32; 2],
+}
+
+/// A window that pictures are shown in.
+pub struct Presenter {
+    device: Arc<Device>,
+    window: Arc<dyn Windowed>,
+    surface: Surface,
+    calls: khr::swapchain::Device,
+    format: vk::SurfaceFormatKHR,
+    swapchain: Option<Swapchain>,
+    stale: bool,
+    pool: vk::CommandPool,
+    acquired: vk::Semaphore,
+    finished: vk::Fence,
+    commands: Option<vk::CommandBuffer>,
+    picture: Option<(Image, Buffer, u64)>,
+    overlay: Option<Renderer<DefaultAllocator>>,
+    freed: Vec<egui::TextureId>,
+}
+
+impl Presenter {
+    /// Opens a device that shows pictures in the window.
+    ///
+    /// # Errors
+    /// One sentence when there is no loader, no device that can, or the window has no surface.
+    pub fn open(window: Arc<dyn Windowed>, choice: &DeviceChoice, validate: bool) -> Result<(Arc<Device>, Self)> {
+        let instance = Instance::new(validate, extensions(&*window)?)?;
+        let surface = Surface::new(&instance.entry, &instance.raw, &*window)?;
+        let device = Device::open_on(instance, choice, Some(&surface))?;
+        // SAFETY: plain queries of a live surface, and objects of a live device.
+        let (formats, pool, acquired, finished) = unsafe {
+            let pool = vk::CommandPoolCreateInfo::default()
+                .queue_family_index(device.family)
+                .flags(vk::CommandPoolCreateFlags::TRANSIENT);
+            let signalled = vk::FenceCreateInfo::default().flags(vk::FenceCreateFlags::SIGNALED);
+            (
+                surface
+                    .calls
+                    .get_physical_device_surface_formats(device.physical, surface.raw)
+                    .context("asking for formats of the window")?,
+                device.raw.create_command_pool(&pool, None).context("making a command pool")?,
+                device.raw.create_semaphore(&vk::SemaphoreCreateInfo::default(), None).context("making a semaphore")?,
+                device.raw.create_fence(&signalled, None).context("making a fence")?,
+            )
+        };
+        let encoded = |format: &&vk::SurfaceFormatKHR| {
+            matches!(format.format, vk::Format::B8G8R8A8_UNORM | vk::Format::R8G8B8A8_UNORM)
+                && format.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR
+        };
+        let format = *formats
+            .iter()
+            .find(encoded)
+            .ok_or_else(|| anyhow!("device \"{}\" shows no 8-bit sRGB pictures in this window", device.info().name))?;
+        let rendering = DynamicRendering {
+            color_attachment_format: format.format,
+            depth_attachment_format: None,
+            stencil_attachment_format: None,
+        };
+        let overlay = Renderer::with_default_allocator(
+            &device.instance.raw,
+            device.physical,
+            device.raw.clone(),
+            RenderMode::DynamicRendering(rendering),
+            Options::default(),
+        )
+        .context("making what draws the panels")?;
+        let calls = khr::swapchain::Device::new(&device.instance.raw, &device.raw);
+        let presenter = Self {
+            device: device.clone(),
+            window,
+            surface,
+            calls,
+            format,
+            swapchain: None,
+            stale: true,
+            pool,
+            acquired,
+            finished,
+            commands: None,
+            picture: None,
+            overlay: Some(overlay),
+            freed: Vec::new(),
+        };
+        Ok((device, presenter))
+    }
+
+    /// The next picture has another size.
+    pub fn resized(&mut self) {
+        self.stale = true;
+    }
+
+    /// Shows a picture with panels over it in a window of `size` pixels.
+    ///
+    /// # Errors
+    /// When the device is lost or memory is short. A surface that is lost or out of date is made anew.
+    pub fn present(&mut self, size: [u32; 2], picture: Option<Placed<'_>>, mut overlay: Overlay) -> Result<Presented> {
+        let applied = self.wait().and_then(|()| self.apply(&overlay));
+        overlay.textures.clear();
+        applied?;
+        if let Some(picture) = &picture {
+            self.upload(picture)?;
+        }
+        if (self.stale || self.swapchain.is_none()) && !self.recreate(size)? {
+            return Ok(Presented::Hidden);
+        }
+        let Some(swapchain) = &self.swapchain else { return Ok(Presented::Hidden) };
+        // SAFETY: the semaphore is not in use: the frame before has finished.
+        let acquired =
+            unsafe { self.calls.acquire_next_image(swapchain.raw, u64::MAX, self.acquired, vk::Fence::null()) };
+        let index = match acquired {
+            Ok((index, suboptimal)) => {
+                self.stale |= suboptimal;
+                index as usize
+            }
+            Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => {
+                self.stale = true;
+                return Ok(Presented::Changed);
+            }
+            Err(vk::Result::ERROR_SURFACE_LOST_KHR) => {
+                self.renew_surface()?;
+                return Ok(Presented::Changed);
+            }
+            Err(error) => return Err(error).context("asking for the next picture of the window"),
+        };
+        let commands = self.record(index, picture.as_ref(), &overlay)?;
+        self.submit(commands, index)?;
+        let Some(swapchain) = &self.swapchain else { return Ok(Presented::Hidden) };
+        let (swapchains, indices, waits) = ([swapchain.raw], [index as u32], [swapchain.done[index]]);
+        let info =
+            vk::PresentInfoKHR::default().swapchains(&swapchains).image_indices(&indices).wait_semaphores(&waits);
+        let queue = lock(&self.device.queue);
+        // SAFETY: the image was acquired, and is drawn when its semaphore is signalled.
+        let shown = unsafe { self.calls.queue_present(*queue, &info) };
+        drop(queue);
+        match shown {
+            Ok(suboptimal) => self.stale |= suboptimal,
+            Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => self.stale = true,
+            Err(vk::Result::ERROR_SURFACE_LOST_KHR) => self.renew_surface()?,
+            Err(error) => return Err(error).context("showing a picture in the window"),
+        }
+        Ok(Presented::Shown)
+    }
+
+    /// Until the frame before has finished; frees what it used.
+    fn wait(&mut self) -> Result<()> {
+        // SAFETY: the fence is signalled by the last submission, or was made so.
+        unsafe {
+            self.device.raw.wait_for_fences(&[self.finished], true, u64::MAX).context("waiting for the window")?;
+            if let Some(commands) = self.commands.take() {
+                self.device.raw.free_command_buffers(self.pool, &[commands]);
+            }
+        }
+        if let Some(overlay) = &mut self.overlay {
+            for id in self.freed.drain(..) {
+                overlay.free_texture(id).context("freeing a texture of the panels")?;
+            }
+        }
+        Ok(())
+    }
+
+    fn apply(&mut self, overlay: &Overlay) -> Result<()> {
+        let Some(renderer) = &mut self.overlay else { return Ok(()) };
+        // It submits and waits itself.
+        let queue = lock(&self.device.queue);
+        for (id, deltas) in &overlay.textures.set {
+            for delta in deltas {
+                renderer.set_texture(*queue, self.pool, *id, delta).context("uploading a texture of the panels")?;
+            }
+        }
+        self.freed.extend(overlay.textures.free.iter().copied());
+        Ok(())
+    }
+
+    fn upload(&mut self, placed: &Placed<'_>) -> Result<()> {
+        let fits = |known: &(Image, Buffer, u64)| {
+            let desc = known.0.desc();
+            [desc.width, desc.height] == placed.size
+        };
+        if self.picture.as_ref().is_none_or(|known| !fits(known)) {
+            // Every image has a view, and a view is for some shader.
+            let usage =
+                vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
+            let [width, height] = placed.size;
+            let desc = ImageDesc::flat(vk::Format::R8G8B8A8_UNORM, width, height, usage);
+            let image = Image::new(&self.device, "picture in the window", desc)?;
+            let bytes = 4 * u64::from(width) * u64::from(height);
+            let staging = Buffer::new(&self.device, "picture for the window", bytes, Place::Upload)?;
+            self.picture = Some((image, staging, u64::MAX));
+        }
+        if let Some((_, staging, version)) = self.picture.as_mut().filter(|known| known.2 != placed.version) {
+            ensure!(placed.rgba.len() as u64 == staging.bytes(), "a picture of another size than it says: our mistake");
+            staging.write(placed.rgba);
+            *version = placed.version;
+        }
+        Ok(())
+    }
+
+    /// Makes the swapchain anew; false where the window has no area.
+    fn recreate(&mut self, size: [u32; 2]) -> Result<bool> {
+        let making = || format!("making a swapchain of {}x{}", size[0], size[1]);
+        // SAFETY: a plain query.
+        let asked = unsafe {
+            self.surface.calls.get_physical_device_surface_capabilities(self.device.physical, self.surface.raw)
+        };
+        let caps = match asked {
+            Err(vk::Result::ERROR_SURFACE_LOST_KHR) => {
+                self.renew_surface()?;
+                // SAFETY: as above.
+                unsafe {
+                    self.surface.calls.get_physical_device_surface_capabilities(self.device.physical, self.surface.raw)
+                }
+                .with_context(making)?
+            }
+            other => other.with_context(making)?,
+        };
+        // The window's own size, unless it leaves it to us.
+        let extent = match caps.current_extent.width {
+            u32::MAX => [
+                size[0].clamp(caps.min_image_extent.width, caps.max_image_extent.width.max(1)),
+                size[1].clamp(caps.min_image_extent.height, caps.max_image_extent.height.max(1)),
+            ],
+            width => [width, caps.current_extent.height],
+        };
+        if extent.contains(&0) || size.contains(&0) {
+            return Ok(false);
+        }
+        let wanted = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_DST;
+        ensure!(
+            caps.supported_usage_flags.contains(wanted),
+            "device \"{}\" cannot copy pictures to this window",
+            self.device.info().name
+        );
+        let most = if caps.max_image_count == 0 { u32::MAX } else { caps.max_image_count };
+        let opaque = vk::CompositeAlphaFlagsKHR::OPAQUE;
+        let alpha =
+            if caps.supported_composite_alpha.contains(opaque) { opaque } else { vk::CompositeAlphaFlagsKHR::INHERIT };
+        let old = self.swapchain.take();
+        let info = vk::SwapchainCreateInfoKHR::default()
+            .surface(self.surface.raw)
+            .min_image_count((caps.min_image_count + 1).min(most))
+            .image_format(self.format.format)
+            .image_color_space(self.format.color_space)
+            .image_extent(vk::Extent2D { width: extent[0], height: extent[1] })
+            .image_array_layers(1)
+            .image_usage(wanted)
+            .image_sharing_mode(vk::SharingMode::EXCLUSIVE)
+            .pre_transform(caps.current_transform)
+            .composite_alpha(alpha)
+            // Every driver has it, and it does not tear.
+            .present_mode(vk::PresentModeKHR::FIFO)
+            .clipped(true)
+            .old_swapchain(old.as_ref().map_or(vk::SwapchainKHR::null(), |old| old.raw));
+        // SAFETY: the surface is alive, and nothing of the old swapchain is in use once the queue is idle.
+        unsafe {
+            let made = self.calls.create_swapchain(&info, None);
+            if let Some(old) = old {
+                let queue = lock(&self.device.queue);
+                self.device.raw.queue_wait_idle(*queue).context("waiting for the window")?;
+                drop(queue);
+                self.destroy_swapchain(&old);
+            }
+            let mut swapchain = Swapchain {
+                raw: made.with_context(making)?,
+                images: Vec::new(),
+                views: Vec::new(),
+                done: Vec::new(),
+                extent,
+            };
+            swapchain.images = self.calls.get_swapchain_images(swapchain.raw).with_context(making)?;
+            for &image in &swapchain.images {
+                let view = vk::ImageViewCreateInfo::default()
+                    .image(image)
+                    .view_type(vk::ImageViewType::TYPE_2D)
+                    .format(self.format.format)
+                    .subresource_range(WHOLE);
+                swapchain.views.push(self.device.raw.create_image_view(&view, None).with_context(making)?);
+                let semaphore = vk::SemaphoreCreateInfo::default();
+                swapchain.done.push(self.device.raw.create_semaphore(&semaphore, None).with_context(making)?);
+            }
+            self.swapchain = Some(swapchain);
+        }
+        self.stale = false;
+        Ok(true)
+    }
+
+    /// A surface that was lost takes its swapchain with it; the window gives another.
+    fn renew_surface(&mut self) -> Result<()> {
+        if let Some(old) = self.swapchain.take() {
+            let queue = lock(&self.device.queue);
+            // SAFETY: nothing of the swapchain is in use once the queue is idle.
+            unsafe {
+                self.device.raw.queue_wait_idle(*queue).context("waiting for the window")?;
+                self.destroy_swapchain(&old);
+            }
+        }
+        self.surface.destroy();
+        let instance = &self.device.instance;
+        self.surface = Surface::new(&instance.entry, &instance.raw, &*self.window)?;
+        self.stale = true;
+        Ok(())
+    }
+
+    unsafe fn destroy_swapchain(&self, swapchain: &Swapchain) {
+        // SAFETY: the caller knows that nothing of it is in use.
+        unsafe {
+            swapchain.views.iter().for_each(|view| self.device.raw.destroy_image_view(*view, None));
+            swapchain.done.iter().for_each(|semaphore| self.device.raw.destroy_semaphore(*semaphore, None));
+            self.calls.destroy_swapchain(swapchain.raw, None);
+        }
+    }
+
+    /// The commands of a frame: background, picture, panels.
+    fn record(&mut self, index: usize, picture: Option<&Placed<'_>>, overlay: &Overlay) -> Result<vk::CommandBuffer> {
+        let swapchain = self.swapchain.as_ref().context("there is no swapchain: our mistake")?;
+        let (image, view, [width, height]) = (swapchain.images[index], swapchain.views[index], swapchain.extent);
+        let raw = &self.device.raw;
+        // SAFETY: the command buffer is recorded here; every handle in it lives until the fence is signalled.
+        unsafe {
+            let commands = begin(&self.device, self.pool)?;
+            self.commands = Some(commands);
+            change(raw, commands, image, vk::ImageLayout::UNDEFINED, Access::TransferDst);
+            let dark = vk::ClearColorValue { float32: [0.11, 0.11, 0.12, 1.0] };
+            raw.cmd_clear_color_image(commands, image, vk::ImageLayout::TRANSFER_DST_OPTIMAL, &dark, &[WHOLE]);
+            if let (Some(placed), Some((source, staging, _))) = (picture, &self.picture) {
+                change(raw, commands, source.raw, vk::ImageLayout::UNDEFINED, Access::TransferDst);
+                let desc = source.desc();
+                let region = vk::BufferImageCopy::default().image_subresource(LAYER).image_extent(vk::Extent3D {
+                    width: desc.width,
+                    height: desc.height,
+                    depth: 1,
+                });
+                let to = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+                raw.cmd_copy_buffer_to_image(commands, staging.raw, source.raw, to, &[region]);
+                change(raw, commands, source.raw, to, Access::TransferSrc);
+                // The clear before the blit writes the same texels.
+                change(raw, commands, image, to, Access::TransferDst);
+                if let Some([from, to]) = clipped(placed, [width, height]) {
+                    let corner = |[x, y]: [i32; 2], z| vk::Offset3D { x, y, z };
+                    let same = [from[1][0] - from[0][0], from[1][1] - from[0][1]]
+                        == [to[1][0] - to[0][0], to[1][1] - to[0][1]];
+                    let blit = vk::ImageBlit::default()
+                        .src_subresource(LAYER)
+                        .src_offsets([corner(from[0], 0), corner(from[1], 1)])
+                        .dst_subresource(LAYER)
+                        .dst_offsets([corner(to[0], 0), corner(to[1], 1)]);
+                    raw.cmd_blit_image(
+                        commands,
+                        source.raw,
+                        vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+                        image,
+                        vk::ImageLayout::TRANSFER_DST_OPTIMAL,
+                        &[blit],
+                        if same { vk::Filter::NEAREST } else { vk::Filter::LINEAR },
+                    );
+                }
+            }
+            change(raw, commands, image, vk::ImageLayout::TRANSFER_DST_OPTIMAL, Access::ColorTarget);
+            let attachments = [vk::RenderingAttachmentInfo::default()
+                .image_view(view)
+                .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
+                .load_op(vk::AttachmentLoadOp::LOAD)
+                .store_op(vk::AttachmentStoreOp::STORE)];
+            let extent = vk::Extent2D { width, height };
+            let info = vk::RenderingInfo::default()
+                .render_area(vk::Rect2D { offset: vk::Offset2D::default(), extent })
+                .layer_count(1)
+                .color_attachments(&attachments);
+            raw.cmd_begin_rendering(commands, &info);
+            let drawn = self
+                .overlay
+                .as_mut()
+                .map(|renderer| renderer.cmd_draw(commands, extent, overlay.pixels_per_point, &overlay.primitives));
+            raw.cmd_end_rendering(commands);
+            drawn.transpose().context("drawing the panels")?;
+            let shown = vk::ImageMemoryBarrier2::default()
+                .image(image)
+                .subresource_range(WHOLE)
+                .src_stage_mask(vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT)
+                .src_access_mask(vk::AccessFlags2::COLOR_ATTACHMENT_WRITE)
+                .old_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
+                .new_layout(vk::ImageLayout::PRESENT_SRC_KHR);
+            raw.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().image_memory_barriers(&[shown]));
+            raw.end_command_buffer(commands).context("recording a picture of the window")?;
+            Ok(commands)
+        }
+    }
+
+    fn submit(&self, commands: vk::CommandBuffer, index: usize) -> Result<()> {
+        let done = self.swapchain.as_ref().context("there is no swapchain: our mistake")?.done[index];
+        let all = vk::PipelineStageFlags2::ALL_COMMANDS;
+        let semaphore = |raw| [vk::SemaphoreSubmitInfo::default().semaphore(raw).stage_mask(all)];
+        let (waits, signals) = (semaphore(self.acquired), semaphore(done));
+        let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
+        let info = vk::SubmitInfo2::default()
+            .wait_semaphore_infos(&waits)
+            .command_buffer_infos(&buffers)
+            .signal_semaphore_infos(&signals);
+        let queue = lock(&self.device.queue);
+        // SAFETY: the fence is not in use, the command buffer is recorded, and what it uses lives until the fence is signalled.
+        unsafe {
+            self.device.raw.reset_fences(&[self.finished]).context("showing a picture")?;
+            self.device.raw.queue_submit2(*queue, &[info], self.finished).context("showing a picture")
+        }
+    }
+}
+
+impl Drop for Presenter {
+    fn drop(&mut self) {
+        // SAFETY: nothing is in use once the device is idle; the surface goes after its swapchain and before the window.
+        unsafe {
+            let queue = lock(&self.device.queue);
+            let _ = self.device.raw.queue_wait_idle(*queue);
+            drop(queue);
+            drop(self.overlay.take());
+            if let Some(swapchain) = self.swapchain.take() {
+                self.destroy_swapchain(&swapchain);
+            }
+            self.surface.destroy();
+            self.device.raw.destroy_semaphore(self.acquired, None);
+            self.device.raw.destroy_fence(self.finished, None);
+            self.device.raw.destroy_command_pool(self.pool, None);
+        }
+    }
+}
+
+const WHOLE: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
+    aspect_mask: vk::ImageAspectFlags::COLOR,
+    base_mip_level: 0,
+    level_count: 1,
+    base_array_layer: 0,
+    layer_count: 1,
+};
+const LAYER: vk::ImageSubresourceLayers = vk::ImageSubresourceLayers {
+    aspect_mask: vk::ImageAspectFlags::COLOR,
+    mip_level: 0,
+    base_array_layer: 0,
+    layer_count: 1,
+};
+
+/// Brings an image from a layout to what an access takes, after all that was done to it before.
+unsafe fn change(
+    raw: &ash::Device,
+    commands: vk::CommandBuffer,
+    image: vk::Image,
+    from: vk::ImageLayout,
+    access: Access,
+) {
+    let to = access.masks(vk::ShaderStageFlags::empty());
+    let barrier = vk::ImageMemoryBarrier2::default()
+        .image(image)
+        .subresource_range(WHOLE)
+        .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+        .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
+        .dst_stage_mask(to.stages)
+        .dst_access_mask(to.access)
+        .old_layout(from)
+        .new_layout(to.layout);
+    // SAFETY: the command buffer is recording; the image is alive.
+    unsafe { raw.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().image_memory_barriers(&[barrier])) };
+}
+
+/// Corners in the picture and in the window of what is seen of a picture; `None` where that is nothing.
+fn clipped(placed: &Placed<'_>, window: [u32; 2]) -> Option<[[[i32; 2]; 2]; 2]> {
+    let [left, top, right, bottom] = placed.place;
+    let (low, high) = ([left, top], [right, bottom]);
+    let mut corners = [[[0; 2]; 2]; 2];
+    for axis in 0..2 {
+        let (from, to) = (low[axis].max(0), high[axis].min(window[axis] as i32));
+        let whole = high[axis] - low[axis];
+        if from >= to || whole <= 0 {
+            return None;
+        }
+        let texel = |x: i32| {
+            (i64::from(x - low[axis]) * i64::from(placed.size[axis]) / i64::from(whole))
+                .clamp(0, placed.size[axis].into())
+        };
+        let (first, last) = (texel(from) as i32, texel(to) as i32);
+        if first >= last {
+            return None;
+        }
+        (corners[0][0][axis], corners[0][1][axis]) = (first, last);
+        (corners[1][0][axis], corners[1][1][axis]) = (from, to);
+    }
+    Some(corners)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_outside_of_the_window_is_not_copied() {
+        let placed = |place| Placed { rgba: &[], size: [100, 50], version: 0, place };
+        assert_eq!(clipped(&placed([10, 20, 110, 70]), [640, 480]), Some([[[0, 0], [100, 50]], [[10, 20], [110, 70]]]));
+        assert_eq!(clipped(&placed([-30, 0, 70, 50]), [60, 480]), Some([[[30, 0], [90, 50]], [[0, 0], [60, 50]]]));
+        assert_eq!(clipped(&placed([0, 0, 200, 100]), [100, 100]), Some([[[0, 0], [50, 50]], [[0, 0], [100, 100]]]));
+        assert_eq!(clipped(&placed([700, 0, 800, 50]), [640, 480]), None);
+    }
+}

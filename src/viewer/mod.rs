@@ -1,0 +1,447 @@
+//! The desktop viewer: a winit window, egui panels, and a thread that draws.
+//!
+//! [`worker`] loads and draws samples one after the other and looks at what is wanted before each; the window shows what there is and
+//! asks for the rest. It is drawn when something happened, at most once in 16 ms, and not at all otherwise.
+
+pub mod layer;
+pub mod navigation;
+pub mod panels;
+pub mod worker;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context as _, Result, anyhow, bail};
+use winit::application::ApplicationHandler;
+use winit::dpi::PhysicalSize;
+use winit::event::WindowEvent;
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy};
+use winit::window::{Window, WindowId};
+
+use crate::cost::table::Table;
+use crate::frame::Settings;
+use crate::gpu::{DeviceChoice, Message, Overlay, Placed, Presented, Presenter};
+use crate::image::{Picture, exr, file, png};
+use layer::Layer;
+use navigation::Navigation;
+use panels::{Action, State};
+use worker::{Open, Seen, Shared, Wanted, Worker};
+
+/// Between two pictures of the window: a driver's FIFO does not always wait for a screen.
+const FRAME: Duration = Duration::from_millis(16);
+/// After this long without movement the picture is drawn well.
+const STILL: Duration = Duration::from_millis(150);
+
+/// What a command line says of a view.
+pub struct View<'a> {
+    /// The file, where another was opened.
+    pub file: Option<&'a Path>,
+    /// Words for eye, target and field of view.
+    pub camera: Option<String>,
+    /// A camera of the file.
+    pub named: Option<&'a str>,
+    /// How it is drawn.
+    pub settings: &'a Settings,
+}
+
+/// What the viewer begins with.
+pub struct Start {
+    /// Pixels of the window.
+    pub size: [u32; 2],
+    /// How it is drawn.
+    pub settings: Settings,
+    /// On what.
+    pub device: DeviceChoice,
+    /// With core and synchronization validation.
+    pub validate: bool,
+    /// Panels lie beside the picture.
+    pub panels: bool,
+    /// Reads scenes.
+    pub open: Open,
+    /// The command that draws a view.
+    pub command: Box<dyn Fn(&View<'_>) -> String>,
+    /// Hears of each command that is copied.
+    pub said: Box<dyn Fn(&str)>,
+    /// Prices that were measured of the scene.
+    pub prices: Option<Table>,
+}
+
+/// What has happened meanwhile, elsewhere.
+struct Woken;
+
+/// Shows a window until it is closed; what validation said.
+///
+/// # Errors
+/// When there is no display, no device that shows pictures on it, or the device is lost.
+pub fn run(start: Start) -> Result<Vec<Message>> {
+    let named = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    let instead = "without a display `etalon render SCENE -o FILE.png` draws the same picture";
+    if cfg!(all(unix, not(target_os = "macos")))
+        && !["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"].into_iter().any(named)
+    {
+        bail!("opening a window: neither DISPLAY nor WAYLAND_DISPLAY names one; {instead}");
+    }
+    let events = EventLoop::<Woken>::with_user_event()
+        .build()
+        .map_err(|error| anyhow!("opening a window: {error}; {instead}"))?;
+    let proxy = events.create_proxy();
+    let mut viewer = Viewer { start: Some(start), proxy, window: None, failure: None, messages: Vec::new() };
+    events.run_app(&mut viewer).context("running the window")?;
+    match viewer.failure {
+        Some(error) => Err(error),
+        None => Ok(viewer.messages),
+    }
+}
+
+struct Viewer {
+    start: Option<Start>,
+    proxy: EventLoopProxy<Woken>,
+    window: Option<OpenWindow>,
+    failure: Option<anyhow::Error>,
+    messages: Vec<Message>,
+}
+
+/// The window and all that belongs to it.
+struct OpenWindow {
+    window: Arc<Window>,
+    presenter: Presenter,
+    device: Arc<crate::gpu::Device>,
+    shared: Arc<Shared>,
+    worker: Option<JoinHandle<()>>,
+    egui: egui_winit::State,
+    state: State,
+    command: Box<dyn Fn(&View<'_>) -> String>,
+    said: Box<dyn Fn(&str)>,
+    /// Of each scene, by number.
+    files: Vec<Option<PathBuf>>,
+    scene: u64,
+    /// The scene that the navigation belongs to.
+    navigated: u64,
+    sent: Option<Wanted>,
+    moving_until: Option<Instant>,
+    drawn: Instant,
+    dirty: bool,
+    wait_until: Option<Instant>,
+    /// A layer as pixels, and of which picture.
+    layer: Option<(Layer, u64, Arc<Vec<u8>>, u64)>,
+    layers: u64,
+    writes_exr: bool,
+    quits: bool,
+}
+
+impl ApplicationHandler<Woken> for Viewer {
+    fn resumed(&mut self, events: &ActiveEventLoop) {
+        let Some(start) = self.start.take() else { return };
+        match OpenWindow::new(events, start, self.proxy.clone()) {
+            Ok(window) => self.window = Some(window),
+            Err(error) => {
+                self.failure = Some(error);
+                events.exit();
+            }
+        }
+    }
+
+    fn user_event(&mut self, _: &ActiveEventLoop, _: Woken) {
+        if let Some(window) = &mut self.window {
+            window.dirty = true;
+        }
+    }
+
+    fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        let Some(window) = &mut self.window else { return };
+        let answer = window.egui.on_window_event(&window.window, &event);
+        window.dirty |= answer.repaint;
+        match event {
+            WindowEvent::CloseRequested => window.quits = true,
+            WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => {
+                window.presenter.resized();
+                window.dirty = true;
+            }
+            WindowEvent::RedrawRequested => {
+                if let Err(error) = window.draw() {
+                    self.failure = Some(window.last_picture(error));
+                    window.quits = true;
+                }
+            }
+            _ => {}
+        }
+        if window.quits {
+            events.exit();
+        }
+    }
+
+    fn about_to_wait(&mut self, events: &ActiveEventLoop) {
+        let Some(window) = &mut self.window else { return };
+        let now = Instant::now();
+        window.dirty |= window.wait_until.is_some_and(|until| until <= now);
+        let next = window.drawn + FRAME;
+        if window.dirty && next <= now {
+            window.dirty = false;
+            window.wait_until = None;
+            window.window.request_redraw();
+        }
+        let until = if window.dirty { Some(next) } else { window.wait_until };
+        events.set_control_flow(until.map_or(ControlFlow::Wait, ControlFlow::WaitUntil));
+    }
+
+    fn exiting(&mut self, _: &ActiveEventLoop) {
+        if let Some(mut window) = self.window.take() {
+            window.shared.want(|wanted| wanted.quit = true);
+            if window.worker.take().is_some_and(|worker| worker.join().is_err()) && self.failure.is_none() {
+                self.failure = Some(anyhow!("the thread that draws has failed"));
+            }
+            self.messages = window.device.messages();
+        }
+    }
+}
+
+impl OpenWindow {
+    fn new(events: &ActiveEventLoop, start: Start, proxy: EventLoopProxy<Woken>) -> Result<Self> {
+        let Start { size, settings, device: choice, validate, panels, open, command, said, prices } = start;
+        let attributes = Window::default_attributes()
+            .with_title("Etalon")
+            .with_inner_size(PhysicalSize::new(size[0], size[1]))
+            .with_min_inner_size(PhysicalSize::new(160, 120));
+        let window = Arc::new(events.create_window(attributes).context("opening a window")?);
+        let (device, presenter) = Presenter::open(window.clone(), &choice, validate)?;
+        let mut state = State::new(settings.clone(), device.info().clone());
+        (state.panels, state.prices) = (panels, prices);
+        let wanted =
+            Wanted { scene: 0, file: None, camera: None, settings, moving: false, surfaces: false, quit: false };
+        let context = egui::Context::default();
+        let native = Some(window.scale_factor() as f32);
+        let side = device.max_image_size() as usize;
+        let egui =
+            egui_winit::State::new(context, egui::ViewportId::ROOT, &*window, native, window.theme(), Some(side));
+        let shared = Arc::new(Shared::new(wanted));
+        let worker = {
+            let (device, shared) = (device.clone(), shared.clone());
+            let wake = Box::new(move || drop(proxy.send_event(Woken)));
+            std::thread::Builder::new()
+                .name("drawing".to_owned())
+                .spawn(move || Worker::run(device, shared, open, wake))
+                .context("starting the thread that draws")?
+        };
+        Ok(Self {
+            window,
+            presenter,
+            device,
+            shared,
+            worker: Some(worker),
+            egui,
+            state,
+            command,
+            said,
+            files: vec![None],
+            scene: 0,
+            navigated: u64::MAX,
+            sent: None,
+            moving_until: None,
+            drawn: Instant::now() - FRAME,
+            dirty: true,
+            wait_until: None,
+            layer: None,
+            layers: 0,
+            writes_exr: false,
+            quits: false,
+        })
+    }
+
+    /// One picture of the window.
+    fn draw(&mut self) -> Result<()> {
+        self.drawn = Instant::now();
+        let seen = self.shared.seen();
+        if seen.lost {
+            return Err(anyhow!(seen.error.unwrap_or_default()));
+        }
+        self.follow(&seen);
+        let input = self.egui.take_egui_input(&self.window);
+        let mut actions = Vec::new();
+        let context = self.egui.egui_ctx().clone();
+        let output = context.run_ui(input, |root| actions.extend(panels::show(root, &mut self.state, &seen)));
+        self.egui.handle_platform_output(&self.window, output.platform_output);
+        for action in actions {
+            self.act(action, &seen);
+        }
+        self.want();
+        let mut delay =
+            output.viewport_output.values().map(|viewport| viewport.repaint_delay).min().unwrap_or(Duration::MAX);
+        if let Some(until) = self.moving_until {
+            delay = delay.min(until.saturating_duration_since(self.drawn));
+        }
+        self.wait_until = self.drawn.checked_add(delay).filter(|_| delay < Duration::from_secs(3600));
+        let overlay = Overlay {
+            textures: output.textures_delta,
+            primitives: context.tessellate(output.shapes, output.pixels_per_point),
+            pixels_per_point: output.pixels_per_point,
+        };
+        let size = self.window.inner_size();
+        let layer = self.drawn_layer(&seen);
+        let place = self.state.place;
+        let picture = match (&layer, &seen.shown) {
+            (Some((rgba, size, version)), _) => Some(Placed { rgba, size: *size, version: *version, place }),
+            (None, Some(shown)) => {
+                Some(Placed { rgba: &shown.rgba, size: shown.size, version: 2 * shown.version, place })
+            }
+            (None, None) => None,
+        };
+        if self.presenter.present([size.width, size.height], picture, overlay)? == Presented::Changed {
+            self.dirty = true;
+        }
+        Ok(())
+    }
+
+    /// What the chosen layer shows.
+    fn drawn_layer(&mut self, seen: &Seen) -> Option<(Arc<Vec<u8>>, [u32; 2], u64)> {
+        let wanted = self.state.layer;
+        let surfaces = seen.surfaces.as_ref().filter(|_| wanted != Layer::Radiance)?;
+        let known =
+            self.layer.as_ref().is_some_and(|(layer, version, ..)| *layer == wanted && *version == surfaces.version);
+        if !known {
+            self.layers += 1;
+            // Odd: pictures have even ones.
+            let number = 2 * self.layers + 1;
+            self.layer = Some((wanted, surfaces.version, Arc::new(wanted.draw(surfaces)), number));
+        }
+        self.layer.as_ref().map(|(_, _, rgba, number)| (rgba.clone(), surfaces.size, *number))
+    }
+
+    /// Takes over what the worker has found.
+    fn follow(&mut self, seen: &Seen) {
+        if let Some(facts) = seen.facts.as_ref().filter(|facts| facts.scene != self.navigated) {
+            self.navigated = facts.scene;
+            self.state.navigation = Some(Navigation::new(facts.home.clone(), facts.bounds));
+            self.state.camera = None;
+            self.state.picked = None;
+            self.window.set_title(&format!("{} – Etalon", facts.name));
+        }
+        if seen.failed == Some(self.scene) {
+            self.scene = self.navigated;
+        }
+        let shown = seen.shown.as_ref().map(|shown| (shown.version, shown.samples));
+        let ready = seen
+            .surfaces
+            .as_ref()
+            .zip(shown)
+            .is_some_and(|(s, (version, [done, of]))| s.version == version && done == of);
+        if self.writes_exr && ready {
+            self.writes_exr = false;
+            self.state.message = Some(told(self.write_exr(seen)));
+        }
+    }
+
+    fn act(&mut self, action: Action, seen: &Seen) {
+        match action {
+            Action::Open(path) => {
+                self.scene = self.files.len() as u64;
+                self.files.push(Some(path.clone()));
+                self.state.recent.retain(|known| *known != path);
+                self.state.recent.insert(0, path.clone());
+                self.state.recent.truncate(10);
+                self.state.prices = None;
+            }
+            Action::Screenshot => self.state.message = Some(told(self.write_png(seen))),
+            Action::Exr => self.writes_exr = true,
+            Action::CopyCommand => {
+                let command = self.words();
+                self.egui.egui_ctx().copy_text(command.clone());
+                (self.said)(&command);
+                self.state.message = Some(command);
+            }
+            Action::Dismiss => self.shared.dismiss(),
+            Action::Quit => self.quits = true,
+        }
+        self.dirty = true;
+    }
+
+    /// The file of what is seen.
+    fn file(&self) -> Option<&Path> {
+        self.files.get(self.navigated as usize).and_then(|file| file.as_deref())
+    }
+
+    /// The command that draws this view.
+    fn words(&self) -> String {
+        let navigation = self.state.navigation.as_ref();
+        (self.command)(&View {
+            file: self.file(),
+            camera: navigation.and_then(Navigation::words).map(|(_, words)| words),
+            named: self.state.camera.as_deref().filter(|_| navigation.is_some_and(|n| !n.moved())),
+            settings: &self.state.settings,
+        })
+    }
+
+    /// Tells the worker what is to be seen, where that has changed.
+    fn want(&mut self) {
+        let now = Instant::now();
+        if self.state.moved {
+            self.moving_until = Some(now + STILL);
+        }
+        self.moving_until = self.moving_until.filter(|until| *until > now);
+        let belongs = self.navigated == self.scene;
+        let wanted = Wanted {
+            scene: self.scene,
+            file: self.files.get(self.scene as usize).cloned().flatten(),
+            camera: self.state.navigation.as_ref().filter(|_| belongs).map(Navigation::camera),
+            settings: self.state.settings.clone(),
+            moving: self.moving_until.is_some(),
+            surfaces: self.state.wants_surfaces() || self.writes_exr,
+            quit: false,
+        };
+        if self.sent.as_ref().is_none_or(|sent| !same(sent, &wanted)) {
+            self.sent = Some(wanted.clone());
+            self.shared.want(|now| *now = wanted);
+        }
+    }
+
+    /// A name that nothing has yet, in the folder that the program was started in.
+    fn free_name(&self, seen: &Seen, ending: &str) -> PathBuf {
+        let name = seen.facts.as_ref().map_or("scene", |facts| &facts.name);
+        let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+        (1..).map(|i| PathBuf::from(format!("{plain}-{i}.{ending}"))).find(|path| !path.exists()).unwrap_or_default()
+    }
+
+    fn write_png(&self, seen: &Seen) -> Result<PathBuf> {
+        let shown = seen.shown.as_ref().context("there is no picture yet")?;
+        let path = self.free_name(seen, "png");
+        file::write(&path, &png::encode_png(shown.size[0], shown.size[1], &shown.rgba, false)?)?;
+        Ok(path)
+    }
+
+    fn write_exr(&self, seen: &Seen) -> Result<PathBuf> {
+        let surfaces = seen.surfaces.as_ref().context("there is no picture yet")?;
+        let path = self.free_name(seen, "exr");
+        let [width, height] = surfaces.size;
+        let picture = Picture { width, height, rgba: surfaces.radiance.to_vec() };
+        file::write(&path, &exr::encode_exr(&picture, &[], &[])?)?;
+        Ok(path)
+    }
+
+    /// Saves the last picture of a device that is gone, and says so.
+    fn last_picture(&self, error: anyhow::Error) -> anyhow::Error {
+        match self.write_png(&self.shared.seen()) {
+            Ok(path) => error.context(format!("the last picture is saved as {}", path.display())),
+            Err(_) => error,
+        }
+    }
+}
+
+fn told(written: Result<PathBuf>) -> String {
+    match written {
+        Ok(path) => format!("written: {}", path.display()),
+        Err(error) => format!("{error:#}"),
+    }
+}
+
+/// Whether the same is to be seen.
+fn same(a: &Wanted, b: &Wanted) -> bool {
+    let view = |wanted: &Wanted| wanted.camera.as_ref().map(|camera| (camera.world_from_camera, camera.projection));
+    let display = |settings: &Settings| {
+        let Settings { size, tonemap, exposure, environment_rotation, .. } = settings;
+        (*size, *tonemap, *exposure, *environment_rotation)
+    };
+    (a.scene, a.moving, a.surfaces, display(&a.settings), view(a))
+        == (b.scene, b.moving, b.surfaces, display(&b.settings), view(b))
+        && a.settings.knobs == b.settings.knobs
+}

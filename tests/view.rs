@@ -1,0 +1,193 @@
+//! The viewer in a real window on a display of its own, moved by synthetic hands: what it shows is what `render` draws, by the command
+//! that it copies, bit by bit.
+
+#[path = "support/gpu.rs"]
+mod gpu;
+#[path = "support/made.rs"]
+mod made;
+#[path = "support/program.rs"]
+mod program;
+#[path = "support/x11.rs"]
+mod x11;
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::mpsc::channel;
+use std::time::Duration;
+
+use etalon::frame::Settings;
+use etalon::plan::{KNOBS, Knobs, Model};
+use etalon::study;
+use etalon::viewer::worker::{Loaded, Shared, Wanted, Worker};
+use gpu::Gpu;
+use made::Random;
+use x11::{Display, Viewer};
+
+const C: u32 = 0x63;
+const F: u32 = 0x66;
+const Z: u32 = 0x7a;
+const P: u32 = 0x70;
+const ESCAPE: u32 = 0xff1b;
+const CONTROL: u32 = 0xffe3;
+
+/// What a command draws, RGB.
+fn drawn(folder: &Path, command: &str) -> ([u32; 2], Vec<[u8; 3]>) {
+    let words: Vec<&str> = command.split_whitespace().skip(1).collect();
+    program::etalon(folder, &words, &[]).succeeded();
+    let picture = image::open(folder.join("picture.png")).expect("a picture").to_rgb8();
+    let size = [picture.width(), picture.height()];
+    (size, picture.pixels().map(|p| p.0).collect())
+}
+
+/// Waits until the window shows what its own command draws.
+#[track_caller]
+fn shows_its_command(viewer: &mut Viewer<'_>, folder: &Path) -> String {
+    // A wheel is smoothed over some pictures.
+    std::thread::sleep(Duration::from_secs(1));
+    viewer.key(C, None);
+    let command = viewer.line();
+    assert!(command.starts_with("etalon render "), "{command}");
+    viewer.key(ESCAPE, None);
+    let (size, expected) = drawn(folder, &command);
+    let mut last = String::new();
+    viewer.until(&format!("the picture of `{command}`"), |viewer| {
+        let (window, pixels) = viewer.pixels()?;
+        let other = pixels.iter().zip(&expected).filter(|(a, b)| a != b).count();
+        let now = format!("{window:?} of {size:?}, {other} pixels differ");
+        if now != last {
+            eprintln!("{now}");
+            last = now;
+        }
+        (window == size && other == 0).then_some(())
+    });
+    command
+}
+
+const OBJ: &str = "mtllib two.mtl\nv -1 0 0\nv 1 0 0\nv 0 1.5 0\nv 0 0 -1\nusemtl red\nf 1 2 3\nf 2 4 3\nf 4 1 3\n";
+const MTL: &str = "newmtl red\nKd 0.7 0.1 0.1\nKs 0 0 0\n";
+
+#[test]
+fn the_window_shows_what_render_draws() {
+    let Some(display) = Display::start() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let mut viewer = Viewer::open(&display, folder, &["study:cornell", "--size", "320x180", "--bare", "--validate"]);
+    let first = shows_its_command(&mut viewer, folder);
+    assert!(!first.contains("--eye"), "the scene's own camera: {first}");
+
+    viewer.drag(1, [160, 90], [200, 110]);
+    viewer.click(4, [160, 90]);
+    let moved = shows_its_command(&mut viewer, folder);
+    assert!(moved.contains("--eye"), "{moved}");
+    viewer.key(Z, Some(CONTROL));
+    assert_eq!(shows_its_command(&mut viewer, folder), first, "taken back");
+
+    let mut random = Random(7);
+    for _ in 0..200 {
+        viewer.resize([random.between(160.0, 500.0) as u32, random.between(120.0, 400.0) as u32]);
+    }
+    viewer.resize([333, 211]);
+    let resized = shows_its_command(&mut viewer, folder);
+    assert!(resized.contains("--size 333x211"), "{resized}");
+
+    for (name, text) in [("two.obj", OBJ), ("two.mtl", MTL), ("broken.glb", "glTF?")] {
+        std::fs::write(folder.join(name), text).expect("a file");
+    }
+    viewer.drop_file(&folder.join("two.obj"));
+    viewer.until("the second file", |viewer| viewer.title().contains("two").then_some(()));
+    viewer.key(F, None);
+    let second = shows_its_command(&mut viewer, folder);
+    assert!(second.contains("two.obj") && second.contains("--eye"), "{second}");
+    viewer.drop_file(&folder.join("broken.glb"));
+    let shown = viewer.pixels().expect("a window").1;
+    viewer.until("a message", |viewer| (viewer.pixels()?.1 != shown).then_some(()));
+    assert_eq!(shows_its_command(&mut viewer, folder), second, "the old picture stays");
+
+    // Panels make room for themselves, and give it back.
+    viewer.resize([900, 500]);
+    shows_its_command(&mut viewer, folder);
+    viewer.key(P, None);
+    viewer.key(C, None);
+    let beside = viewer.line();
+    assert!(!beside.contains("--size 900x500"), "{beside}");
+    viewer.key(ESCAPE, None);
+    viewer.key(P, None);
+    shows_its_command(&mut viewer, folder);
+
+    let (code, words) = viewer.close();
+    assert_eq!(code, Some(0), "{words}");
+    assert!(!words.contains("Validation") && !words.contains("panicked"), "{words}");
+}
+
+#[test]
+fn without_a_display_there_is_a_sentence() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let nothing = [("DISPLAY", ""), ("WAYLAND_DISPLAY", ""), ("WAYLAND_SOCKET", "")];
+    let run = program::etalon(folder.path(), &["view", "study:cornell"], &nothing);
+    run.failed(1, "etalon render SCENE");
+}
+
+/// The thread that draws, without a window: every rung of every knob one after the other, each wanted while the one before is under
+/// way. What it shows in the end is what a renderer of those rungs draws.
+#[test]
+fn every_knob_turns_while_pictures_are_drawn() {
+    let gpu = Gpu::hasty();
+    let load = || study::load("etalon").expect("a scene");
+    let size = [64, 36];
+    let settings = |knobs: &Knobs| Settings { size, knobs: knobs.clone(), ..Settings::default() };
+    let first = Wanted {
+        scene: 0,
+        file: None,
+        camera: None,
+        settings: settings(&Knobs::of(Model::Local)),
+        moving: false,
+        surfaces: false,
+        quit: false,
+    };
+    let shared = Arc::new(Shared::new(first));
+    let (to, woken) = channel();
+    let open = Box::new(move |_: Option<&std::path::PathBuf>, _: [u32; 2]| {
+        let scene = load();
+        let camera = scene.cameras[0].clone();
+        Ok(Loaded { name: scene.name.clone(), scene, environment: None, camera, warnings: Vec::new() })
+    });
+    let thread = {
+        let (device, shared) = (gpu.device.clone(), shared.clone());
+        std::thread::spawn(move || Worker::run(device, shared, open, Box::new(move || to.send(()).unwrap_or_default())))
+    };
+    let mut turned = 0;
+    for knob in KNOBS.iter().filter(|knob| !["samples", "colour"].contains(&knob.name)) {
+        for (base, rung) in
+            [Model::Local, Model::Recursive].into_iter().flat_map(|m| knob.rungs.iter().map(move |r| (m, r)))
+        {
+            let Some(knobs) = Knobs::of(base).with(knob.name, rung) else { continue };
+            shared.want(|wanted| wanted.settings = settings(&knobs));
+            // Sometimes it is done before the next, sometimes not.
+            if turned % 3 == 0 {
+                woken.recv_timeout(Duration::from_secs(60)).expect("something is shown");
+            }
+            turned += 1;
+        }
+    }
+    assert!(turned > 60, "{turned} rungs");
+    let last = Knobs::of(Model::Recursive).with("samples", "1").expect("rungs");
+    shared.want(|wanted| wanted.settings = settings(&last));
+    let expected = gpu::bits(&gpu.film(&load(), settings(&last)));
+    let begun = std::time::Instant::now();
+    shared.want(|wanted| wanted.surfaces = true);
+    let shown = loop {
+        assert!(begun.elapsed() < Duration::from_secs(120), "{:?}", shared.seen().error);
+        let seen = shared.seen();
+        match (seen.shown, seen.surfaces) {
+            (Some(shown), Some(surfaces)) if shown.samples == [1, 1] && surfaces.version == shown.version => {
+                break surfaces;
+            }
+            _ => drop(woken.recv_timeout(Duration::from_millis(200))),
+        }
+    };
+    let found: Vec<[u32; 4]> = shown.radiance.iter().map(|pixel| pixel.map(f32::to_bits)).collect();
+    assert!(found == expected, "another picture");
+    assert_eq!(shared.seen().error, None);
+    shared.want(|wanted| wanted.quit = true);
+    thread.join().expect("the thread ends");
+}
