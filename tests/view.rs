@@ -16,6 +16,7 @@ use std::sync::mpsc::channel;
 use std::time::Duration;
 
 use etalon::frame::Settings;
+use etalon::gpu::DeviceInfo;
 use etalon::plan::{KNOBS, Knobs, Model};
 use etalon::study;
 use etalon::viewer::worker::{Loaded, Shared, Wanted, Worker};
@@ -98,6 +99,11 @@ fn the_window_shows_what_render_draws() {
     viewer.key(F, None);
     let second = shows_its_command(&mut viewer, folder);
     assert!(second.contains("two.obj") && second.contains("--eye"), "{second}");
+    // A file that changes is read again, from where it was seen.
+    let red = viewer.pixels().expect("a window").1;
+    std::fs::write(folder.join("two.mtl"), MTL.replace("0.7 0.1 0.1", "0.1 0.7 0.2")).expect("a file");
+    viewer.until("another colour", |viewer| (viewer.pixels()?.1 != red).then_some(()));
+    assert_eq!(shows_its_command(&mut viewer, folder), second, "another picture, the same view");
     viewer.drop_file(&folder.join("broken.glb"));
     let shown = viewer.pixels().expect("a window").1;
     viewer.until("a message", |viewer| (viewer.pixels()?.1 != shown).then_some(()));
@@ -146,10 +152,10 @@ fn every_knob_turns_while_pictures_are_drawn() {
     };
     let shared = Arc::new(Shared::new(first));
     let (to, woken) = channel();
-    let open = Box::new(move |_: Option<&std::path::PathBuf>, _: [u32; 2]| {
+    let open = Box::new(move |_: Option<&Path>, _: [u32; 2], _: &DeviceInfo| {
         let scene = load();
         let camera = scene.cameras[0].clone();
-        Ok(Loaded { name: scene.name.clone(), scene, environment: None, camera, warnings: Vec::new() })
+        Ok(Loaded { name: scene.name.clone(), scene, environment: None, camera, warnings: Vec::new(), prices: None })
     });
     let thread = {
         let (device, shared) = (gpu.device.clone(), shared.clone());

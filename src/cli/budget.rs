@@ -12,6 +12,7 @@ use crate::cost::choose::{at_most, most_exact, quickest, within};
 use crate::cost::sweep::{Extent, Sweep};
 use crate::cost::table::{Interval, Table};
 use crate::frame::{Rendered, Settings};
+use crate::gpu::DeviceInfo;
 use crate::image::file;
 use crate::image::metric::{AnyPicture, Metric, compare};
 use crate::image::png::{Display, read_display};
@@ -67,16 +68,21 @@ pub(super) fn command(scene: &SceneOptions, picture: &PictureOptions, device: &D
 }
 
 /// Where tables of this picture on this device are kept: named by the command, all that is drawn, the device and the program.
-fn folder(command: &str, setup: &Setup) -> Option<PathBuf> {
-    let info = setup.device.info();
+fn folder(command: &str, contents: &str, info: &DeviceInfo) -> Option<PathBuf> {
     let version = env!("CARGO_PKG_VERSION");
-    let known = [version, command, &setup.contents(), &info.name, &info.driver, &info.version].join("\n");
+    let known = [version, command, contents, &info.name, &info.driver, &info.version].join("\n");
     Some(file::cache_folder()?.join(format!("cost-{}", file::hash(known.as_bytes()))))
+}
+
+/// What was measured of a picture before; `None` where nothing was.
+pub(super) fn known(command: &str, contents: &str, info: &DeviceInfo) -> Option<Table> {
+    let bytes = file::read(&folder(command, contents, info)?.join("cost.json")).ok()?;
+    serde_json::from_slice(&bytes).ok()
 }
 
 /// Keeps a finished run's table for later budgets; a cache that cannot be written costs time later, nothing else.
 pub(super) fn keep(command: &str, setup: &Setup, from: &Path) {
-    let Some(to) = folder(command, setup) else { return };
+    let Some(to) = folder(command, &setup.contents(), setup.device.info()) else { return };
     let copy = || -> Result<()> {
         // A quick run's own account would not be that of this table.
         let _ = std::fs::remove_dir_all(&to);
@@ -133,7 +139,8 @@ impl Budget {
         let demand = Demand::Scene;
         let settings = Settings { max_error: None, demand, parts: Vec::new(), seed: SEED, ..settings.clone() };
         let temporary = tempfile::tempdir().context("making a folder")?;
-        let kept = folder(command, setup).filter(|kept| std::fs::create_dir_all(kept).is_ok());
+        let kept = folder(command, &setup.contents(), setup.device.info())
+            .filter(|kept| std::fs::create_dir_all(kept).is_ok());
         let folder = kept.unwrap_or_else(|| temporary.path().join("cost"));
         let read = || -> Result<(Table, Display)> {
             let table = serde_json::from_slice(&file::read(&folder.join("cost.json"))?)?;

@@ -72,26 +72,7 @@ impl Setup {
 
     /// Hash of all that is drawn, whatever files it came from.
     pub fn contents(&self) -> String {
-        let mut all = xxhash_rust::xxh3::Xxh3::new();
-        for mesh in &self.scene.meshes {
-            all.update(bytemuck::cast_slice(&mesh.positions));
-            all.update(bytemuck::cast_slice(&mesh.normals));
-            all.update(bytemuck::cast_slice(&mesh.tangents));
-            all.update(bytemuck::cast_slice(&mesh.colors));
-            all.update(bytemuck::cast_slice(&mesh.indices));
-            mesh.uvs.iter().for_each(|set| all.update(bytemuck::cast_slice(set)));
-            all.update(&mesh.material.to_le_bytes());
-        }
-        for image in &self.scene.images {
-            all.update(&image.width.to_le_bytes());
-            all.update(&image.rgba);
-        }
-        let Scene { instances, materials, lights, cameras, studio, .. } = &self.scene;
-        all.update(format!("{instances:?}{materials:?}{lights:?}{cameras:?}{studio:?}").as_bytes());
-        if let Some(environment) = &self.environment {
-            all.update(bytemuck::cast_slice(&environment.radiance));
-        }
-        format!("{:032x}", all.digest128())
+        contents(&self.scene, self.environment.as_ref())
     }
 
     /// Lends everything to something that draws many pictures.
@@ -128,4 +109,29 @@ impl Setup {
         let camera = options.choose_camera(&scene, settings.size)?;
         Ok((Renderer::new(&device, scene, environment.as_ref(), settings)?, camera))
     }
+}
+
+/// Hash of all that is drawn, whatever files it came from.
+#[must_use]
+pub fn contents(scene: &Scene, environment: Option<&Environment>) -> String {
+    let mut all = xxhash_rust::xxh3::Xxh3::new();
+    for mesh in &scene.meshes {
+        all.update(bytemuck::cast_slice(&mesh.positions));
+        all.update(bytemuck::cast_slice(&mesh.normals));
+        all.update(bytemuck::cast_slice(&mesh.tangents));
+        all.update(bytemuck::cast_slice(&mesh.colors));
+        all.update(bytemuck::cast_slice(&mesh.indices));
+        mesh.uvs.iter().for_each(|set| all.update(bytemuck::cast_slice(set)));
+        all.update(&mesh.material.to_le_bytes());
+    }
+    for image in &scene.images {
+        all.update(&image.width.to_le_bytes());
+        all.update(&image.rgba);
+    }
+    let Scene { instances, materials, lights, cameras, studio, .. } = scene;
+    all.update(format!("{instances:?}{materials:?}{lights:?}{cameras:?}{studio:?}").as_bytes());
+    if let Some(environment) = environment {
+        all.update(bytemuck::cast_slice(&environment.radiance));
+    }
+    format!("{:032x}", all.digest128())
 }

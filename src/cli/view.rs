@@ -1,14 +1,16 @@
 //! `etalon view`: the scene in a window.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Result, bail};
 use clap::Args;
 
+use super::budget;
 use super::options::{DeviceOptions, PictureOptions, SceneOptions};
+use super::setup::contents;
 use crate::cost::sweep::arguments;
-use crate::gpu::Severity;
+use crate::gpu::{DeviceInfo, Severity};
 use crate::scene::Reads;
 use crate::viewer::worker::Loaded;
 use crate::viewer::{Start, View, run as run_window};
@@ -27,13 +29,17 @@ pub struct ViewArgs {
     bare: bool,
 }
 
-fn loaded(options: &SceneOptions, size: [u32; 2]) -> Result<Loaded> {
+fn loaded(args: &ViewArgs, file: Option<&Path>, size: [u32; 2], device: &DeviceInfo) -> Result<Loaded> {
+    let options = &of_file(&args.scene, file);
     let scene = options.load(Reads::Everything)?;
     let (environment, more) = options.load_environment()?;
     let share = options.environment_share(&scene);
     let camera = options.choose_camera(&scene, size)?;
     let warnings = scene.warnings.iter().cloned().chain(more).collect();
-    Ok(Loaded { name: scene.name.clone(), environment: environment.zip(share), camera, warnings, scene })
+    // `cost` measures the size of the command line, whatever part of the window the picture has.
+    let priced = budget::command(options, &args.picture, &args.device);
+    let prices = budget::known(&priced, &contents(&scene, environment.as_ref()), device);
+    Ok(Loaded { name: scene.name.clone(), environment: environment.zip(share), camera, warnings, prices, scene })
 }
 
 /// The same options for another file: what belongs to the first, its cameras and its time, is forgotten.
@@ -89,18 +95,19 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode> {
         bail!("--max-error {error}: the viewer draws until its samples are done; `render` has this option");
     }
     let settings = args.picture.settings(&args.scene)?;
-    let (first, told) = (args.scene.clone(), args.clone());
+    let (first, told) = (args.clone(), args.clone());
+    let file = (!args.scene.scene.starts_with("study:")).then(|| PathBuf::from(&args.scene.scene));
     let messages = run_window(Start {
+        file,
         size: args.picture.size,
         settings,
         device: args.device.choice(),
         validate: args.device.validate,
         panels: !args.bare,
-        open: Box::new(move |file, size| loaded(&of_file(&first, file.map(|path| path.as_path())), size)),
+        open: Box::new(move |file, size, device| loaded(&first, file, size, device)),
         command: Box::new(move |view| command(&told, view)),
         // A terminal that has gone is no reason to close the window.
         said: Box::new(|command| drop(super::print(command))),
-        prices: None,
     })?;
     let errors = messages.iter().filter(|message| message.severity == Severity::Error).count();
     if errors > 0 {

@@ -8,8 +8,9 @@ pub mod navigation;
 pub mod panels;
 pub mod worker;
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -20,14 +21,13 @@ use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy};
 use winit::window::{Window, WindowId};
 
-use crate::cost::table::Table;
 use crate::frame::Settings;
 use crate::gpu::{DeviceChoice, Message, Overlay, Placed, Presented, Presenter};
 use crate::image::{Picture, exr, file, png};
 use layer::Layer;
 use navigation::Navigation;
 use panels::{Action, State};
-use worker::{Open, Seen, Shared, Wanted, Worker};
+use worker::{Open, Seen, Shared, Wanted, Worker, lock};
 
 /// Between two pictures of the window: a driver's FIFO does not always wait for a screen.
 const FRAME: Duration = Duration::from_millis(16);
@@ -62,14 +62,24 @@ pub struct Start {
     pub open: Open,
     /// The command that draws a view.
     pub command: Box<dyn Fn(&View<'_>) -> String>,
+    /// The scene's file, where it is one: read again when it changes.
+    pub file: Option<PathBuf>,
     /// Hears of each command that is copied.
     pub said: Box<dyn Fn(&str)>,
-    /// Prices that were measured of the scene.
-    pub prices: Option<Table>,
 }
 
 /// What has happened meanwhile, elsewhere.
-struct Woken;
+enum Woken {
+    /// The thread that draws has something to show.
+    Seen,
+    /// A file beside the scene's has changed, or itself.
+    Changed,
+}
+
+/// Endings of what a scene may be made of.
+const PARTS: [&str; 9] = ["glb", "gltf", "bin", "obj", "mtl", "png", "jpg", "jpeg", "webp"];
+/// After this long without another change a file is read again.
+const SETTLED: Duration = Duration::from_millis(300);
 
 /// Shows a window until it is closed; what validation said.
 ///
@@ -127,6 +137,17 @@ struct OpenWindow {
     /// A layer as pixels, and of which picture.
     layer: Option<(Layer, u64, Arc<Vec<u8>>, u64)>,
     layers: u64,
+    /// Tells of changes in the folder of the scene's file.
+    watcher: Option<notify::RecommendedWatcher>,
+    /// Names of files that were written from here.
+    written: Arc<Mutex<Vec<OsString>>>,
+    proxy: EventLoopProxy<Woken>,
+    /// The file of the command line.
+    first: Option<PathBuf>,
+    /// When the file is read again.
+    reads_at: Option<Instant>,
+    /// The scene that is read again: the camera stays.
+    again: Option<u64>,
     writes_exr: bool,
     quits: bool,
 }
@@ -143,9 +164,14 @@ impl ApplicationHandler<Woken> for Viewer {
         }
     }
 
-    fn user_event(&mut self, _: &ActiveEventLoop, _: Woken) {
-        if let Some(window) = &mut self.window {
-            window.dirty = true;
+    fn user_event(&mut self, _: &ActiveEventLoop, woken: Woken) {
+        let Some(window) = &mut self.window else { return };
+        match woken {
+            Woken::Seen => window.dirty = true,
+            Woken::Changed => {
+                window.reads_at = Some(Instant::now() + SETTLED);
+                window.dirty = true;
+            }
         }
     }
 
@@ -199,7 +225,7 @@ impl ApplicationHandler<Woken> for Viewer {
 
 impl OpenWindow {
     fn new(events: &ActiveEventLoop, start: Start, proxy: EventLoopProxy<Woken>) -> Result<Self> {
-        let Start { size, settings, device: choice, validate, panels, open, command, said, prices } = start;
+        let Start { size, settings, device: choice, validate, panels, open, command, said, file } = start;
         let attributes = Window::default_attributes()
             .with_title("Etalon")
             .with_inner_size(PhysicalSize::new(size[0], size[1]))
@@ -207,7 +233,7 @@ impl OpenWindow {
         let window = Arc::new(events.create_window(attributes).context("opening a window")?);
         let (device, presenter) = Presenter::open(window.clone(), &choice, validate)?;
         let mut state = State::new(settings.clone(), device.info().clone());
-        (state.panels, state.prices) = (panels, prices);
+        state.panels = panels;
         let wanted =
             Wanted { scene: 0, file: None, camera: None, settings, moving: false, surfaces: false, quit: false };
         let context = egui::Context::default();
@@ -218,7 +244,8 @@ impl OpenWindow {
         let shared = Arc::new(Shared::new(wanted));
         let worker = {
             let (device, shared) = (device.clone(), shared.clone());
-            let wake = Box::new(move || drop(proxy.send_event(Woken)));
+            let proxy = proxy.clone();
+            let wake = Box::new(move || drop(proxy.send_event(Woken::Seen)));
             std::thread::Builder::new()
                 .name("drawing".to_owned())
                 .spawn(move || Worker::run(device, shared, open, wake))
@@ -244,6 +271,12 @@ impl OpenWindow {
             wait_until: None,
             layer: None,
             layers: 0,
+            watcher: None,
+            written: Arc::default(),
+            proxy,
+            first: file,
+            reads_at: None,
+            again: None,
             writes_exr: false,
             quits: false,
         })
@@ -257,6 +290,10 @@ impl OpenWindow {
             return Err(anyhow!(seen.error.unwrap_or_default()));
         }
         self.follow(&seen);
+        if self.reads_at.is_some_and(|at| at <= self.drawn) {
+            self.reads_at = None;
+            self.read_again();
+        }
         let input = self.egui.take_egui_input(&self.window);
         let mut actions = Vec::new();
         let context = self.egui.egui_ctx().clone();
@@ -270,6 +307,9 @@ impl OpenWindow {
             output.viewport_output.values().map(|viewport| viewport.repaint_delay).min().unwrap_or(Duration::MAX);
         if let Some(until) = self.moving_until {
             delay = delay.min(until.saturating_duration_since(self.drawn));
+        }
+        if let Some(at) = self.reads_at {
+            delay = delay.min(at.saturating_duration_since(self.drawn));
         }
         self.wait_until = self.drawn.checked_add(delay).filter(|_| delay < Duration::from_secs(3600));
         let overlay = Overlay {
@@ -293,6 +333,48 @@ impl OpenWindow {
         Ok(())
     }
 
+    /// Listens for changes of the file that is seen, and of what lies beside it: buffers and textures.
+    fn watch(&mut self) {
+        self.watcher = None;
+        let Some(path) = self.file().or(self.first.as_deref()) else { return };
+        let (proxy, folder) = (self.proxy.clone(), path.parent().filter(|folder| !folder.as_os_str().is_empty()));
+        let written = self.written.clone();
+        let told = move |event: notify::Result<notify::Event>| {
+            // What this window wrote itself is no part of the scene.
+            let ours = |path: &PathBuf| lock(&written).iter().any(|name| path.file_name() == Some(name));
+            let part = |path: &PathBuf| {
+                let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
+                PARTS.contains(&ending.as_str()) && !ours(path)
+            };
+            let changes = |event: notify::Event| {
+                (event.kind.is_modify() || event.kind.is_create()) && event.paths.iter().any(part)
+            };
+            if event.is_ok_and(changes) {
+                drop(proxy.send_event(Woken::Changed));
+            }
+        };
+        let watching = notify::recommended_watcher(told).and_then(|mut watcher| {
+            notify::Watcher::watch(
+                &mut watcher,
+                folder.unwrap_or(Path::new(".")),
+                notify::RecursiveMode::NonRecursive,
+            )?;
+            Ok(watcher)
+        });
+        match watching {
+            Ok(watcher) => self.watcher = Some(watcher),
+            Err(error) => tracing::info!("changes of {} are not seen: {error}", path.display()),
+        }
+    }
+
+    /// Reads the file again.
+    fn read_again(&mut self) {
+        let same = self.files.get(self.navigated as usize).cloned().flatten();
+        self.scene = self.files.len() as u64;
+        self.again = Some(self.scene);
+        self.files.push(same);
+    }
+
     /// What the chosen layer shows.
     fn drawn_layer(&mut self, seen: &Seen) -> Option<(Arc<Vec<u8>>, [u32; 2], u64)> {
         let wanted = self.state.layer;
@@ -312,9 +394,15 @@ impl OpenWindow {
     fn follow(&mut self, seen: &Seen) {
         if let Some(facts) = seen.facts.as_ref().filter(|facts| facts.scene != self.navigated) {
             self.navigated = facts.scene;
-            self.state.navigation = Some(Navigation::new(facts.home.clone(), facts.bounds));
-            self.state.camera = None;
+            match (&mut self.state.navigation, self.again == Some(facts.scene)) {
+                (Some(navigation), true) => navigation.stay(facts.home.clone(), facts.bounds),
+                _ => {
+                    self.state.navigation = Some(Navigation::new(facts.home.clone(), facts.bounds));
+                    self.state.camera = None;
+                }
+            }
             self.state.picked = None;
+            self.watch();
             self.window.set_title(&format!("{} – Etalon", facts.name));
         }
         if seen.failed == Some(self.scene) {
@@ -340,7 +428,6 @@ impl OpenWindow {
                 self.state.recent.retain(|known| *known != path);
                 self.state.recent.insert(0, path.clone());
                 self.state.recent.truncate(10);
-                self.state.prices = None;
             }
             Action::Screenshot => self.state.message = Some(told(self.write_png(seen))),
             Action::Exr => self.writes_exr = true,
@@ -379,7 +466,8 @@ impl OpenWindow {
             self.moving_until = Some(now + STILL);
         }
         self.moving_until = self.moving_until.filter(|until| *until > now);
-        let belongs = self.navigated == self.scene;
+        // A scene that is read again is seen from where it was.
+        let belongs = self.navigated == self.scene || self.again == Some(self.scene);
         let wanted = Wanted {
             scene: self.scene,
             file: self.files.get(self.scene as usize).cloned().flatten(),
@@ -399,7 +487,10 @@ impl OpenWindow {
     fn free_name(&self, seen: &Seen, ending: &str) -> PathBuf {
         let name = seen.facts.as_ref().map_or("scene", |facts| &facts.name);
         let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
-        (1..).map(|i| PathBuf::from(format!("{plain}-{i}.{ending}"))).find(|path| !path.exists()).unwrap_or_default()
+        let all = (1..).map(|i| PathBuf::from(format!("{plain}-{i}.{ending}")));
+        let free = all.into_iter().find(|path| !path.exists()).unwrap_or_default();
+        lock(&self.written).extend(free.file_name().map(OsString::from));
+        free
     }
 
     fn write_png(&self, seen: &Seen) -> Result<PathBuf> {

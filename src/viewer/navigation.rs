@@ -96,6 +96,11 @@ impl Navigation {
         self.before.push((self.view.clone(), self.distance, self.moved));
     }
 
+    /// The scene has changed under the camera, which stays where it is.
+    pub fn stay(&mut self, home: Camera, bounds: Bounds) {
+        (self.home, self.bounds, self.size) = (home, bounds, bounds.radius().max(1e-6));
+    }
+
     /// Takes the last movement back; false where there is none.
     pub fn undo(&mut self) -> bool {
         let Some((view, distance, moved)) = self.before.pop() else { return false };

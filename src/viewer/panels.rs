@@ -4,12 +4,12 @@ use std::collections::VecDeque;
 use std::path::PathBuf;
 
 use egui::{Color32, Key, Modifiers, PointerButton, RichText, Sense, Ui};
+use egui_file_dialog::FileDialog;
 use glam::{DVec2, DVec3};
 
 use super::layer::{LAYERS, Layer};
 use super::navigation::Navigation;
 use super::worker::{Seen, Surfaces};
-use crate::cost::table::Table;
 use crate::frame::Settings;
 use crate::gpu::{DeviceInfo, PassTime};
 use crate::image::tone::ToneMap;
@@ -73,10 +73,10 @@ pub struct State {
     pub place: [i32; 4],
     /// Files that were opened, the last first.
     pub recent: Vec<PathBuf>,
-    /// Prices of rungs, where they were measured.
-    pub prices: Option<Table>,
     /// The device, and whether nobody asked for it.
     pub device: DeviceInfo,
+    /// To choose a file with.
+    pub dialog: FileDialog,
     /// Pass times of the last pictures.
     pub history: VecDeque<Vec<PassTime>>,
     history_version: u64,
@@ -98,8 +98,10 @@ impl State {
             moved: false,
             place: [0; 4],
             recent: Vec::new(),
-            prices: None,
             device,
+            dialog: FileDialog::new()
+                .add_file_filter_extensions("scenes", vec!["glb", "gltf", "obj"])
+                .default_file_filter("scenes"),
             history: VecDeque::new(),
             history_version: 0,
         }
@@ -138,6 +140,8 @@ pub fn show(root: &mut Ui, state: &mut State, seen: &Seen) -> Vec<Action> {
         });
     }
     picture(root, state);
+    state.dialog.update(root.ctx());
+    actions.extend(state.dialog.take_picked().map(Action::Open));
     notices(root, state, seen);
     if state.help {
         help(root, state);
@@ -148,6 +152,18 @@ pub fn show(root: &mut Ui, state: &mut State, seen: &Seen) -> Vec<Action> {
 /// The file, the device and the picture's state, in a line.
 fn bar(ui: &mut Ui, state: &mut State, seen: &Seen, actions: &mut Vec<Action>) {
     ui.horizontal_wrapped(|ui| {
+        ui.menu_button("Open", |ui| {
+            if ui.button("File … (O)").clicked() {
+                state.dialog.pick_file();
+                ui.close();
+            }
+            for path in &state.recent {
+                if ui.button(path.display().to_string()).clicked() {
+                    actions.push(Action::Open(path.clone()));
+                    ui.close();
+                }
+            }
+        });
         let name = seen.facts.as_ref().map_or("no scene", |facts| &facts.name);
         ui.strong(name);
         if let Some(facts) = &seen.facts {
@@ -172,6 +188,7 @@ fn bar(ui: &mut Ui, state: &mut State, seen: &Seen, actions: &mut Vec<Action>) {
             ui.label(format!("{}×{}{moving}: {done} of {of} samples, {ms:.1} ms each", shown.size[0], shown.size[1]));
         }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            egui::widgets::global_theme_preference_switch(ui);
             if ui.button("Help").on_hover_text("H").clicked() {
                 state.help = !state.help;
             }
@@ -245,7 +262,7 @@ fn how(ui: &mut Ui, state: &mut State, seen: &Seen) {
             egui::ComboBox::from_id_salt(knob.name).width(96.0).selected_text(now).show_ui(ui, |ui| {
                 for rung in knob.rungs {
                     let changed = state.settings.knobs.with(knob.name, rung);
-                    let text = format!("{rung}{}", price(state, knob.name, rung));
+                    let text = format!("{rung}{}", price(seen, knob.name, rung));
                     let button = egui::Button::selectable(*rung == now, text);
                     if ui.add_enabled(changed.is_some() || *rung == now, button).clicked()
                         && let Some(changed) = changed
@@ -254,7 +271,7 @@ fn how(ui: &mut Ui, state: &mut State, seen: &Seen) {
                     }
                 }
             });
-            ui.weak(price(state, knob.name, now));
+            ui.weak(price(seen, knob.name, now));
             ui.end_row();
         }
     });
@@ -269,8 +286,8 @@ fn called_for(seen: &Seen, effects: &[&str]) -> Option<String> {
 }
 
 /// What a rung was measured to cost and to be wrong by, from `local` or the reference's rungs.
-fn price(state: &State, knob: &str, rung: &str) -> String {
-    let Some(table) = &state.prices else { return String::new() };
+fn price(seen: &Seen, knob: &str, rung: &str) -> String {
+    let Some(table) = seen.facts.as_ref().and_then(|facts| facts.prices.as_ref()) else { return String::new() };
     let found = table.prices.iter().find(|price| price.knob == knob && price.to == rung);
     found.map_or_else(String::new, |price| {
         format!("  {:+.1} ms, FLIP {:.3}", price.gpu_ms_delta.median, price.flip_between)
@@ -485,6 +502,7 @@ const KEYS: &[(&str, &str)] = &[
     ("Ctrl+Z", "take the last movement back"),
     ("1 to 9", "cameras of the file"),
     ("Ctrl+click", "ask about a pixel"),
+    ("O", "open a file"),
     ("P", "panels"),
     ("S, E, C", "write PNG, write EXR, copy the command"),
     ("Escape", "away with messages and help"),
@@ -528,6 +546,11 @@ fn keys(ui: &mut Ui, state: &mut State, seen: &Seen, actions: &mut Vec<Action>) 
         if pressed(key) {
             actions.push(action);
         }
+    }
+    if pressed(Key::O) {
+        state.dialog.pick_file();
+        // The letter is no word to search for.
+        ui.input_mut(|input| input.events.retain(|event| !matches!(event, egui::Event::Text(_))));
     }
     if pressed(Key::P) {
         state.panels = !state.panels;

@@ -1,13 +1,14 @@
 //! The thread that loads and draws: it looks at what is wanted before each sample, and shows what it has after some.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
 
+use crate::cost::table::Table;
 use crate::frame::{Drawing, Renderer, Settings};
-use crate::gpu::{Device, PassTime};
+use crate::gpu::{Device, DeviceInfo, PassTime};
 use crate::pass::tonemap::Counts;
 use crate::plan::Effect;
 use crate::scene::environment::Environment;
@@ -33,10 +34,12 @@ pub struct Loaded {
     pub camera: Camera,
     /// What was read around.
     pub warnings: Vec<String>,
+    /// Prices of rungs, where they were measured on this device.
+    pub prices: Option<Table>,
 }
 
-/// Reads a scene: the one of the command line, or another file.
-pub type Open = Box<dyn Fn(Option<&PathBuf>, [u32; 2]) -> Result<Loaded> + Send>;
+/// Reads a scene for pictures of a size on a device: the one of the command line, or another file.
+pub type Open = Box<dyn Fn(Option<&Path>, [u32; 2], &DeviceInfo) -> Result<Loaded> + Send>;
 
 /// What is to be seen.
 #[derive(Clone)]
@@ -78,6 +81,8 @@ pub struct SceneFacts {
     pub instances: Arc<Vec<String>>,
     /// What was read around.
     pub warnings: Vec<String>,
+    /// Prices of rungs, where they were measured.
+    pub prices: Option<Arc<Table>>,
 }
 
 /// A picture, perhaps under way.
@@ -146,7 +151,8 @@ pub struct Shared {
     seen: Mutex<Seen>,
 }
 
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+/// Locks without caring about a panic elsewhere: what is wanted and seen is whole at any time.
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -304,12 +310,13 @@ impl Worker {
     fn load(&mut self, wanted: &Wanted) -> Result<()> {
         let name = wanted.file.as_ref().map_or("the scene".to_owned(), |file| file.display().to_string());
         self.say(|seen| seen.busy = Some(format!("reading {name}")));
-        let loaded = (self.open)(wanted.file.as_ref(), wanted.settings.size);
+        let loaded = (self.open)(wanted.file.as_deref(), wanted.settings.size, self.device.info());
         self.say(|seen| {
             seen.busy = None;
             seen.failed = loaded.is_err().then_some(wanted.scene);
         });
-        let loaded = loaded?;
+        let mut loaded = loaded?;
+        let prices = loaded.prices.take().map(Arc::new);
         let scene = &loaded.scene;
         let bounds = scene.bounds().with_context(|| format!("{}: there is nothing to draw", loaded.name))?;
         let facts = SceneFacts {
@@ -322,6 +329,7 @@ impl Worker {
             materials: Arc::new(scene.materials.clone()),
             instances: Arc::new(scene.instances.iter().map(|instance| instance.name.clone()).collect()),
             warnings: loaded.warnings.clone(),
+            prices,
         };
         self.stage = Some(Stage {
             scene: wanted.scene,
