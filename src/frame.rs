@@ -316,6 +316,12 @@ impl Drawing {
         self.next[0]
     }
 
+    /// Whether no sample is under way, of which some bands were drawn.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        self.next[1] == 0 && self.next[0] > 0
+    }
+
     /// Whether nothing is left to be drawn.
     #[must_use]
     pub fn is_done(&self) -> bool {
@@ -511,7 +517,7 @@ impl Renderer {
         drawing.dropped = drawing.dropped.max(self.targets.lists.as_ref().map_or(0, FragmentLists::dropped));
         let done = index + 1;
         let error = match &self.targets.halves {
-            Some(halves) if (done.is_power_of_two() && done > 1) || done == count => Some(self.error(halves, done)?),
+            Some(halves) if done > 1 && (done.is_power_of_two() || done == count) => Some(self.error(halves, done)?),
             _ => None,
         };
         drawing.errors.extend(error);
@@ -529,7 +535,7 @@ impl Renderer {
     pub fn picture(&mut self, drawing: &Drawing) -> Result<Rendered> {
         let samples = drawing.samples();
         let mut times = drawing.times.clone();
-        if let (Some(halves), Some(film), true) = (&self.targets.halves, &self.targets.film, samples > 1) {
+        if let (Some(halves), Some(film)) = (&self.targets.halves, &self.targets.film) {
             let mut frame = Frame::new(&self.device);
             join_halves(&mut frame, halves, film, samples)?;
             times.add(frame.finish()?);
@@ -700,11 +706,11 @@ impl Renderer {
     fn show(&self, samples: u32, count: u32) -> Result<Frame<'_>> {
         let mut frame = Frame::new(&self.device);
         let Targets { radiance, film, halves, display, .. } = &self.targets;
-        // Before the last sample the film is a sum, unless it was joined of halves, of which one sample has but one.
+        // Before the last sample the film is a sum, unless it was joined of halves.
         let (film, scale) = match (film, halves) {
-            (Some(film), None) => (film, if samples < count { 1.0 / samples as f32 } else { 1.0 }),
-            (Some(film), Some(_)) if samples > 1 => (film, 1.0),
-            _ => (radiance, 1.0),
+            (Some(film), None) if samples < count => (film, 1.0 / samples as f32),
+            (Some(film), _) => (film, 1.0),
+            (None, _) => (radiance, 1.0),
         };
         let (background, _) = self.display_background();
         let Settings { tonemap: curve, exposure, .. } = self.settings;

@@ -19,7 +19,7 @@ use etalon::frame::Settings;
 use etalon::gpu::DeviceInfo;
 use etalon::plan::{KNOBS, Knobs, Model};
 use etalon::study;
-use etalon::viewer::worker::{Loaded, Shared, Wanted, Worker};
+use etalon::viewer::worker::{Loaded, Seen, Shared, Wanted, Worker};
 use gpu::Gpu;
 use made::Random;
 use x11::{Display, Viewer};
@@ -155,7 +155,16 @@ fn every_knob_turns_while_pictures_are_drawn() {
     let open = Box::new(move |_: Option<&Path>, _: [u32; 2], _: &DeviceInfo| {
         let scene = load();
         let camera = scene.cameras[0].clone();
-        Ok(Loaded { name: scene.name.clone(), scene, environment: None, camera, warnings: Vec::new(), prices: None })
+        Ok(Loaded {
+            name: scene.name.clone(),
+            scene,
+            environment: None,
+            camera,
+            warnings: Vec::new(),
+            prices: None,
+            framed: false,
+            knobs: None,
+        })
     });
     let thread = {
         let (device, shared) = (gpu.device.clone(), shared.clone());
@@ -176,24 +185,37 @@ fn every_knob_turns_while_pictures_are_drawn() {
         }
     }
     assert!(turned > 60, "{turned} rungs");
-    let last = Knobs::of(Model::Recursive).with("samples", "1").expect("rungs");
-    shared.want(|wanted| wanted.settings = settings(&last));
-    let expected = gpu::bits(&gpu.film(&load(), settings(&last)));
-    let begun = std::time::Instant::now();
-    shared.want(|wanted| wanted.surfaces = true);
-    let shown = loop {
-        assert!(begun.elapsed() < Duration::from_secs(120), "{:?}", shared.seen().error);
-        let seen = shared.seen();
-        match (seen.shown, seen.surfaces) {
-            (Some(shown), Some(surfaces)) if shown.samples == [1, 1] && surfaces.version == shown.version => {
-                break surfaces;
+    // What cannot be drawn quickly is small while it moves, and whole once it rests.
+    let last = settings(&Knobs::of(Model::Recursive));
+    let last = Settings { size: [480, 270], ..last };
+    shared.want(|wanted| (wanted.settings, wanted.moving) = (last.clone(), true));
+    let wait = |what: &str, is_there: &dyn Fn(&Seen) -> bool| {
+        let begun = std::time::Instant::now();
+        loop {
+            let seen = shared.seen();
+            if is_there(&seen) {
+                return seen;
             }
-            _ => drop(woken.recv_timeout(Duration::from_millis(200))),
+            assert!(begun.elapsed() < Duration::from_secs(120), "{what}: {:?}", seen.error);
+            let _ = woken.recv_timeout(Duration::from_millis(200));
         }
     };
-    let found: Vec<[u32; 4]> = shown.radiance.iter().map(|pixel| pixel.map(f32::to_bits)).collect();
-    assert!(found == expected, "another picture");
-    assert_eq!(shared.seen().error, None);
+    wait("moving", &|seen| seen.shown.as_ref().is_some_and(|shown| shown.moving && shown.size[0] > 64));
+    // By now it is known how long a pixel takes.
+    let mut aside = load().cameras[0].clone();
+    aside.world_from_camera.translation.x += 0.1;
+    shared.want(|wanted| wanted.camera = Some(aside));
+    let small = wait("small", &|seen| {
+        seen.shown.as_ref().is_some_and(|shown| shown.moving && shown.size[0] < 480 && shown.size != size)
+    });
+    assert_eq!(small.shown.expect("a picture").samples, [1, 1]);
+    shared.want(|wanted| (wanted.camera, wanted.moving, wanted.surfaces) = (None, false, true));
+    let seen = wait("whole", &|seen| seen.now().is_some_and(|surfaces| surfaces.size == [480, 270]));
+    assert_eq!(seen.shown.as_ref().map(|shown| shown.samples), Some([4, 4]));
+    let found: Vec<[u32; 4]> =
+        seen.now().expect("surfaces").radiance.iter().map(|pixel| pixel.map(f32::to_bits)).collect();
+    assert!(found == gpu::bits(&gpu.film(&load(), last)), "another picture");
+    assert_eq!(seen.error, None);
     shared.want(|wanted| wanted.quit = true);
     thread.join().expect("the thread ends");
 }

@@ -241,6 +241,12 @@ impl SceneOptions {
         if asked { Some(1.0) } else { scene.studio.or(scene.lights.is_empty().then_some(1.0)) }
     }
 
+    /// Whether the camera is one that frames the scene, for the size that is asked for.
+    #[must_use]
+    pub fn frames(&self, scene: &Scene) -> bool {
+        self.eye.is_none() && self.camera.is_none() && (scene.cameras.is_empty() || self.fov.is_some())
+    }
+
     /// The camera to draw from.
     ///
     /// # Errors

@@ -35,11 +35,24 @@ fn loaded(args: &ViewArgs, file: Option<&Path>, size: [u32; 2], device: &DeviceI
     let (environment, more) = options.load_environment()?;
     let share = options.environment_share(&scene);
     let camera = options.choose_camera(&scene, size)?;
+    let framed = options.frames(&scene);
+    let asked = args.picture.knobs()?;
+    let mut knobs = asked.clone();
+    args.picture.colour_of(&scene, &mut knobs)?;
     let warnings = scene.warnings.iter().cloned().chain(more).collect();
     // `cost` measures the size of the command line, whatever part of the window the picture has.
     let priced = budget::command(options, &args.picture, &args.device);
     let prices = budget::known(&priced, &contents(&scene, environment.as_ref()), device);
-    Ok(Loaded { name: scene.name.clone(), environment: environment.zip(share), camera, warnings, prices, scene })
+    Ok(Loaded {
+        name: scene.name.clone(),
+        environment: environment.zip(share),
+        camera,
+        framed,
+        knobs: (knobs != asked).then_some(knobs),
+        warnings,
+        prices,
+        scene,
+    })
 }
 
 /// The same options for another file: what belongs to the first, its cameras and its time, is forgotten.
@@ -109,9 +122,9 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode> {
         // A terminal that has gone is no reason to close the window.
         said: Box::new(|command| drop(super::print(command))),
     })?;
-    let errors = messages.iter().filter(|message| message.severity == Severity::Error).count();
-    if errors > 0 {
-        bail!("validation: {errors} errors, the first: {}", messages[0].text);
+    let errors: Vec<_> = messages.iter().filter(|message| message.severity == Severity::Error).collect();
+    if let Some(first) = errors.first() {
+        bail!("validation: {} errors, the first: {}", errors.len(), first.text);
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -4,7 +4,7 @@
 //! Drawn with rays, whose pictures with one sample differ by the sum alone: no noise has to be told from the error, as there is in
 //! prices from the reference's rungs.
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::sitting::Bench;
@@ -73,6 +73,8 @@ pub fn orders(bench: &Bench<'_>, tell: &mut dyn FnMut(&str)) -> Result<Vec<Order
         let ms = bench.time(&mut sitting)?;
         films.push((sitting.renderer.film()?, ms));
     }
+    let finite = |(film, _): &(Picture, f64)| film.rgba.iter().flatten().all(|value| value.is_finite());
+    ensure!(films.iter().all(finite), "some picture has values that are no numbers");
     let truth = &films.last().context("there are rules")?.0;
     let whole = mean_square(truth, |i, c| f64::from(truth.rgba[i][c])).sqrt().max(f64::MIN_POSITIVE);
     let of = |rule: usize| {

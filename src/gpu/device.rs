@@ -378,6 +378,12 @@ fn choose(all: Vec<Candidate>, choice: &DeviceChoice) -> Result<Candidate> {
     Ok(best)
 }
 
+/// Whether the device is gone: nothing that it holds can be used again.
+#[must_use]
+pub fn is_lost(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| cause.downcast_ref() == Some(&vk::Result::ERROR_DEVICE_LOST))
+}
+
 /// A Vulkan device, its one queue, and the caches of what was made on it.
 pub struct Device {
     pub(super) raw: ash::Device,
@@ -393,6 +399,7 @@ pub struct Device {
     pub(super) submitted: AtomicU64,
     next_id: AtomicU64,
     created: Mutex<Vec<Created>>,
+    objects: AtomicU64,
     info: DeviceInfo,
     pub(super) physical: vk::PhysicalDevice,
     pub(super) family: u32,
@@ -499,6 +506,7 @@ impl Device {
             submitted: AtomicU64::new(0),
             next_id: AtomicU64::new(1),
             created: Mutex::default(),
+            objects: AtomicU64::new(0),
             info,
             physical,
             family,
@@ -524,7 +532,7 @@ impl Device {
         lock(&self.instance.messages).clone()
     }
 
-    /// Every object created so far, in order.
+    /// Every object created so far, in order; none of a device that shows a window.
     #[must_use]
     pub fn created(&self) -> Vec<Created> {
         lock(&self.created).clone()
@@ -571,7 +579,22 @@ impl Device {
         self.adds_in_subgroups
     }
 
+    /// Buffers, images, pipelines and samplers that there are now.
+    #[must_use]
+    pub fn objects(&self) -> u64 {
+        self.objects.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn gone(&self) {
+        self.objects.fetch_sub(1, Ordering::Relaxed);
+    }
+
     pub(super) fn note(&self, kind: &'static str, name: &str, bytes: u64) {
+        self.objects.fetch_add(1, Ordering::Relaxed);
+        // A window goes on for hours: a list of all that it made would grow as long.
+        if self.shows {
+            return;
+        }
         lock(&self.created).push(Created { kind, name: name.to_owned(), bytes });
     }
 

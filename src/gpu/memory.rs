@@ -207,6 +207,7 @@ impl Drop for Buffer {
             // Freeing fails only for memory of another allocator.
             let _ = lock(&self.device.allocator).free(allocation);
         }
+        self.device.gone();
     }
 }
 
@@ -361,5 +362,6 @@ impl Drop for Image {
             // Freeing fails only for memory of another allocator.
             let _ = lock(&self.device.allocator).free(allocation);
         }
+        self.device.gone();
     }
 }

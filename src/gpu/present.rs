@@ -160,7 +160,8 @@ impl Presenter {
             self.upload(picture)?;
         }
         if (self.stale || self.swapchain.is_none()) && !self.recreate(size)? {
-            return Ok(Presented::Hidden);
+            // A surface that was renewed meanwhile has an area all the same.
+            return Ok(if size.contains(&0) { Presented::Hidden } else { Presented::Changed });
         }
         let Some(swapchain) = &self.swapchain else { return Ok(Presented::Hidden) };
         // SAFETY: the semaphore is not in use: the frame before has finished.
@@ -317,6 +318,10 @@ impl Presenter {
                 self.device.raw.queue_wait_idle(*queue).context("waiting for the window")?;
                 drop(queue);
                 self.destroy_swapchain(&old);
+            }
+            if made == Err(vk::Result::ERROR_SURFACE_LOST_KHR) {
+                self.renew_surface()?;
+                return Ok(false);
             }
             let mut swapchain = Swapchain {
                 raw: made.with_context(making)?,

@@ -28,14 +28,15 @@ impl Halves {
     }
 }
 
-/// Writes the mean of `count` samples, an even number, into `film`.
+/// Writes the mean of `count` samples into `film`; of one alone, which is in the first half.
 ///
 /// # Errors
 /// When the driver refuses what a pipeline binds.
 pub fn join_halves<'a>(frame: &mut Frame<'a>, halves: &'a Halves, film: &'a Image, count: u32) -> Result<()> {
     let [half_a, half_b] = &halves.sums;
+    let (half_b, scale) = if count == 1 { (half_a, 0.5) } else { (half_b, 1.0 / count as f32) };
     let size = [film.desc().width, film.desc().height];
     let bind = join_halves::Bind { half_a, half_b, film };
-    let push = [(1.0 / count as f32).to_bits()];
+    let push = [scale.to_bits()];
     frame.compute_over("join halves", &bind, join_halves::Constants {}.words(), bytemuck::cast_slice(&push), size)
 }

@@ -31,6 +31,8 @@ use worker::{Open, Seen, Shared, Wanted, Worker, lock};
 
 /// Between two pictures of the window: a driver's FIFO does not always wait for a screen.
 const FRAME: Duration = Duration::from_millis(16);
+/// Pictures of the window whose times are kept for the account at its end.
+const REMEMBERED: usize = 100_000;
 /// After this long without movement the picture is drawn well.
 const STILL: Duration = Duration::from_millis(150);
 
@@ -127,13 +129,16 @@ struct OpenWindow {
     /// Of each scene, by number.
     files: Vec<Option<PathBuf>>,
     scene: u64,
-    /// The scene that the navigation belongs to.
-    navigated: u64,
+    /// The scene that the navigation belongs to, once there is one.
+    navigated: Option<u64>,
     sent: Option<Wanted>,
     moving_until: Option<Instant>,
     drawn: Instant,
     dirty: bool,
     wait_until: Option<Instant>,
+    /// Pictures of the window, and milliseconds of the first [`REMEMBERED`] of them.
+    pictures: u64,
+    took: Vec<f32>,
     /// A layer as pixels, and of which picture.
     layer: Option<(Layer, u64, Arc<Vec<u8>>, u64)>,
     layers: u64,
@@ -214,11 +219,15 @@ impl ApplicationHandler<Woken> for Viewer {
 
     fn exiting(&mut self, _: &ActiveEventLoop) {
         if let Some(mut window) = self.window.take() {
+            window.account();
             window.shared.want(|wanted| wanted.quit = true);
             if window.worker.take().is_some_and(|worker| worker.join().is_err()) && self.failure.is_none() {
                 self.failure = Some(anyhow!("the thread that draws has failed"));
             }
-            self.messages = window.device.messages();
+            let device = window.device.clone();
+            // What goes away last has something to say as well.
+            drop(window);
+            self.messages = device.messages();
         }
     }
 }
@@ -263,12 +272,14 @@ impl OpenWindow {
             said,
             files: vec![None],
             scene: 0,
-            navigated: u64::MAX,
+            navigated: None,
             sent: None,
             moving_until: None,
             drawn: Instant::now() - FRAME,
             dirty: true,
             wait_until: None,
+            pictures: 0,
+            took: Vec::new(),
             layer: None,
             layers: 0,
             watcher: None,
@@ -286,6 +297,9 @@ impl OpenWindow {
     fn draw(&mut self) -> Result<()> {
         self.drawn = Instant::now();
         let seen = self.shared.seen();
+        if self.worker.as_ref().is_some_and(JoinHandle::is_finished) && !seen.lost {
+            bail!("the thread that draws has failed");
+        }
         if seen.lost {
             return Err(anyhow!(seen.error.unwrap_or_default()));
         }
@@ -327,8 +341,13 @@ impl OpenWindow {
             }
             (None, None) => None,
         };
+        self.window.pre_present_notify();
         if self.presenter.present([size.width, size.height], picture, overlay)? == Presented::Changed {
             self.dirty = true;
+        }
+        self.pictures += 1;
+        if self.took.len() < REMEMBERED {
+            self.took.push(self.drawn.elapsed().as_secs_f32() * 1e3);
         }
         Ok(())
     }
@@ -369,7 +388,11 @@ impl OpenWindow {
 
     /// Reads the file again.
     fn read_again(&mut self) {
-        let same = self.files.get(self.navigated as usize).cloned().flatten();
+        // Another is being opened, or the first one failed and is tried once more.
+        if self.navigated.is_some_and(|navigated| navigated != self.scene) {
+            return;
+        }
+        let same = self.files.get(self.scene as usize).cloned().flatten();
         self.scene = self.files.len() as u64;
         self.again = Some(self.scene);
         self.files.push(same);
@@ -378,7 +401,7 @@ impl OpenWindow {
     /// What the chosen layer shows.
     fn drawn_layer(&mut self, seen: &Seen) -> Option<(Arc<Vec<u8>>, [u32; 2], u64)> {
         let wanted = self.state.layer;
-        let surfaces = seen.surfaces.as_ref().filter(|_| wanted != Layer::Radiance)?;
+        let surfaces = seen.now().filter(|_| wanted != Layer::Radiance)?;
         let known =
             self.layer.as_ref().is_some_and(|(layer, version, ..)| *layer == wanted && *version == surfaces.version);
         if !known {
@@ -392,13 +415,13 @@ impl OpenWindow {
 
     /// Takes over what the worker has found.
     fn follow(&mut self, seen: &Seen) {
-        if let Some(facts) = seen.facts.as_ref().filter(|facts| facts.scene != self.navigated) {
-            self.navigated = facts.scene;
+        if let Some(facts) = seen.facts.as_ref().filter(|facts| Some(facts.scene) != self.navigated) {
+            self.navigated = Some(facts.scene);
             match (&mut self.state.navigation, self.again == Some(facts.scene)) {
                 (Some(navigation), true) => navigation.stay(facts.home.clone(), facts.bounds),
                 _ => {
-                    self.state.navigation = Some(Navigation::new(facts.home.clone(), facts.bounds));
-                    self.state.camera = None;
+                    self.state.navigation = Some(Navigation::new(facts.home.clone(), facts.bounds, facts.framed));
+                    self.state.settings.knobs = facts.knobs.clone().unwrap_or(self.state.settings.knobs.clone());
                 }
             }
             self.state.picked = None;
@@ -406,9 +429,9 @@ impl OpenWindow {
             self.window.set_title(&format!("{} – Etalon", facts.name));
         }
         if seen.failed == Some(self.scene) {
-            self.scene = self.navigated;
+            self.scene = self.navigated.unwrap_or(self.scene);
         }
-        let shown = seen.shown.as_ref().map(|shown| (shown.version, shown.samples));
+        let shown = seen.shown.as_ref().filter(|shown| !shown.moving).map(|shown| (shown.version, shown.samples));
         let ready = seen
             .surfaces
             .as_ref()
@@ -432,7 +455,13 @@ impl OpenWindow {
             Action::Screenshot => self.state.message = Some(told(self.write_png(seen))),
             Action::Exr => self.writes_exr = true,
             Action::CopyCommand => {
-                let command = self.words();
+                let Some(command) = self.words() else {
+                    self.state.message = Some(
+                        "no command draws this view: of parallel rays, or straight up or down, only the file's own have words"
+                            .to_owned(),
+                    );
+                    return;
+                };
                 self.egui.egui_ctx().copy_text(command.clone());
                 (self.said)(&command);
                 self.state.message = Some(command);
@@ -445,18 +474,21 @@ impl OpenWindow {
 
     /// The file of what is seen.
     fn file(&self) -> Option<&Path> {
-        self.files.get(self.navigated as usize).and_then(|file| file.as_deref())
+        self.files.get(self.navigated? as usize)?.as_deref()
     }
 
-    /// The command that draws this view.
-    fn words(&self) -> String {
+    /// The command that draws this view; `None` where none does.
+    fn words(&self) -> Option<String> {
         let navigation = self.state.navigation.as_ref();
-        (self.command)(&View {
+        let moved = navigation.is_some_and(Navigation::moved);
+        let camera = navigation.and_then(Navigation::words).map(|(_, words)| words);
+        let view = View {
             file: self.file(),
-            camera: navigation.and_then(Navigation::words).map(|(_, words)| words),
-            named: self.state.camera.as_deref().filter(|_| navigation.is_some_and(|n| !n.moved())),
+            named: navigation.and_then(Navigation::named).filter(|_| !moved),
             settings: &self.state.settings,
-        })
+            camera,
+        };
+        (view.camera.is_some() || !moved).then(|| (self.command)(&view))
     }
 
     /// Tells the worker what is to be seen, where that has changed.
@@ -467,7 +499,7 @@ impl OpenWindow {
         }
         self.moving_until = self.moving_until.filter(|until| *until > now);
         // A scene that is read again is seen from where it was.
-        let belongs = self.navigated == self.scene || self.again == Some(self.scene);
+        let belongs = self.navigated == Some(self.scene) || self.again == Some(self.scene);
         let wanted = Wanted {
             scene: self.scene,
             file: self.files.get(self.scene as usize).cloned().flatten(),
@@ -507,6 +539,21 @@ impl OpenWindow {
         let picture = Picture { width, height, rgba: surfaces.radiance.to_vec() };
         file::write(&path, &exr::encode_exr(&picture, &[], &[])?)?;
         Ok(path)
+    }
+
+    /// How the window did.
+    fn account(&self) {
+        let mut sorted = self.took.clone();
+        sorted.sort_by(f32::total_cmp);
+        let at = |share: f64| sorted.get((share * sorted.len() as f64) as usize).copied().unwrap_or_default();
+        tracing::info!(
+            "{} pictures of the window: {:.1} ms in the middle, 95 of 100 below {:.1}, 99 below {:.1}; {} buffers, images and pipelines",
+            self.pictures,
+            at(0.5),
+            at(0.95),
+            at(0.99),
+            self.device.objects()
+        );
     }
 
     /// Saves the last picture of a device that is gone, and says so.

@@ -27,17 +27,30 @@ pub struct Navigation {
     size: f64,
     bounds: Bounds,
     home: Camera,
-    before: Vec<(Camera, f64, bool)>,
-    /// It is no longer the camera that it was set to.
+    before: Vec<(Camera, f64, bool, Option<String>)>,
+    /// It is no longer the camera that it was set to, or that frames the scene for one size alone.
     moved: bool,
+    /// The camera of the file that it was set to; `None`: the first one.
+    named: Option<String>,
+    framed: bool,
 }
 
 impl Navigation {
     /// Begins at a camera, in a scene of that extent.
     #[must_use]
-    pub fn new(home: Camera, bounds: Bounds) -> Self {
+    pub fn new(home: Camera, bounds: Bounds, framed: bool) -> Self {
         let size = bounds.radius().max(1e-6);
-        let mut new = Self { view: home.clone(), distance: size, size, bounds, home, before: Vec::new(), moved: false };
+        let mut new = Self {
+            view: home.clone(),
+            distance: size,
+            size,
+            bounds,
+            home,
+            before: Vec::new(),
+            moved: framed,
+            named: None,
+            framed,
+        };
         new.distance = new.distance_to_middle();
         new
     }
@@ -61,10 +74,16 @@ impl Navigation {
         Some((camera, format!("--eye {} --target {} --fov {degrees}", list(eye), list(target))))
     }
 
-    /// Whether it is the camera that it was set to.
+    /// Whether it is no longer the camera that it was set to.
     #[must_use]
     pub fn moved(&self) -> bool {
         self.moved
+    }
+
+    /// The camera of the file that it was set to; `None`: the first one.
+    #[must_use]
+    pub fn named(&self) -> Option<&str> {
+        self.named.as_deref()
     }
 
     /// The point that it turns about.
@@ -93,31 +112,35 @@ impl Navigation {
         if self.before.len() == HISTORY {
             self.before.remove(0);
         }
-        self.before.push((self.view.clone(), self.distance, self.moved));
+        self.before.push((self.view.clone(), self.distance, self.moved, self.named.clone()));
     }
 
     /// The scene has changed under the camera, which stays where it is.
     pub fn stay(&mut self, home: Camera, bounds: Bounds) {
         (self.home, self.bounds, self.size) = (home, bounds, bounds.radius().max(1e-6));
+        // The file's camera may be another now.
+        self.moved = true;
     }
 
     /// Takes the last movement back; false where there is none.
     pub fn undo(&mut self) -> bool {
-        let Some((view, distance, moved)) = self.before.pop() else { return false };
-        (self.view, self.distance, self.moved) = (view, distance, moved);
+        let Some((view, distance, moved, named)) = self.before.pop() else { return false };
+        (self.view, self.distance, self.moved, self.named) = (view, distance, moved, named);
         true
     }
 
     /// Back to where it began.
     pub fn reset(&mut self) {
-        self.go_to(self.home.clone());
+        self.go_to(self.home.clone(), None);
+        self.moved = self.framed;
     }
 
-    /// To another camera.
-    pub fn go_to(&mut self, camera: Camera) {
+    /// To another camera, of that name in the file.
+    pub fn go_to(&mut self, camera: Camera, name: Option<String>) {
         self.keep();
         self.view = camera;
         self.moved = false;
+        self.named = name;
         self.distance = self.distance_to_middle();
     }
 
@@ -207,7 +230,7 @@ mod tests {
 
     fn navigation() -> Navigation {
         let bounds = Bounds { min: DVec3::new(-1.0, 0.0, -2.0), max: DVec3::new(3.0, 2.0, 1.0) };
-        Navigation::new(Camera::framing(bounds, 1.5, 0.7), bounds)
+        Navigation::new(Camera::framing(bounds, 1.5, 0.7), bounds, false)
     }
 
     fn is_upright(view: &Camera) -> bool {

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::path::PathBuf;
 
 use egui::{Color32, Key, Modifiers, PointerButton, RichText, Sense, Ui};
-use egui_file_dialog::FileDialog;
+use egui_file_dialog::{DialogState, FileDialog};
 use glam::{DVec2, DVec3};
 
 use super::layer::{LAYERS, Layer};
@@ -53,8 +53,6 @@ pub enum Action {
 pub struct State {
     /// Where from; `None` until there is a scene.
     pub navigation: Option<Navigation>,
-    /// Which camera of the file it was set to; `None`: the command line's.
-    pub camera: Option<String>,
     /// How it is drawn; the size is the picture's.
     pub settings: Settings,
     /// What is shown of it.
@@ -88,7 +86,6 @@ impl State {
     pub fn new(settings: Settings, device: DeviceInfo) -> Self {
         Self {
             navigation: None,
-            camera: None,
             settings,
             layer: Layer::Radiance,
             panels: true,
@@ -111,6 +108,11 @@ impl State {
     #[must_use]
     pub fn wants_surfaces(&self) -> bool {
         self.layer != Layer::Radiance || self.picked.is_some()
+    }
+
+    /// Whether a file is being chosen: keys are words then.
+    fn is_asking(&self) -> bool {
+        *self.dialog.state() == DialogState::Open
     }
 
     fn aspect(&self) -> f64 {
@@ -297,7 +299,7 @@ fn price(seen: &Seen, knob: &str, rung: &str) -> String {
 /// What is seen: a picked pixel, times, the plan.
 fn what(ui: &mut Ui, state: &mut State, seen: &Seen) {
     ui.heading("Pixel");
-    match (state.picked, &seen.surfaces) {
+    match (state.picked, seen.now()) {
         (None, _) => {
             ui.weak("Ctrl+click a pixel to ask about it.");
         }
@@ -429,6 +431,7 @@ fn picture(ui: &mut Ui, state: &mut State) {
         let zoom = input.zoom_delta();
         (input.modifiers, input.smooth_scroll_delta(), zoom, input.pointer.latest_pos(), input.stable_dt.min(0.1))
     });
+    let asking = state.is_asking();
     let Some(navigation) = &mut state.navigation else { return };
     if response.drag_started() {
         navigation.keep();
@@ -452,7 +455,7 @@ fn picture(ui: &mut Ui, state: &mut State) {
     let pressed = |key: Key| ui.input(|input| input.key_down(key) && input.modifiers.is_none());
     let axis = |more: Key, less: Key| f64::from(u8::from(pressed(more))) - f64::from(u8::from(pressed(less)));
     let way = DVec3::new(axis(Key::D, Key::A), axis(Key::Q, Key::Z), axis(Key::W, Key::X));
-    if way != DVec3::ZERO && !ui.ctx().text_edit_focused() {
+    if way != DVec3::ZERO && !ui.ctx().text_edit_focused() && !asking {
         navigation.fly(way * (PACE * f64::from(seconds)));
         state.moved = true;
         ui.ctx().request_repaint();
@@ -528,8 +531,7 @@ fn help(ui: &mut Ui, state: &mut State) {
 fn go_to(state: &mut State, seen: &Seen, index: usize) {
     let camera = seen.facts.as_ref().and_then(|facts| facts.cameras.get(index));
     if let (Some(navigation), Some(camera)) = (&mut state.navigation, camera) {
-        navigation.go_to(camera.clone());
-        state.camera = Some(camera.name.clone());
+        navigation.go_to(camera.clone(), Some(camera.name.clone()));
         state.moved = true;
     }
 }
@@ -538,7 +540,7 @@ fn keys(ui: &mut Ui, state: &mut State, seen: &Seen, actions: &mut Vec<Action>) 
     for file in ui.input(|input| input.raw.dropped_files.clone()) {
         actions.push(Action::Open(file.path().to_owned()));
     }
-    if ui.ctx().text_edit_focused() {
+    if ui.ctx().text_edit_focused() || state.is_asking() {
         return;
     }
     let pressed = |key: Key| ui.input_mut(|input| input.consume_key(Modifiers::NONE, key));
@@ -578,7 +580,6 @@ fn keys(ui: &mut Ui, state: &mut State, seen: &Seen, actions: &mut Vec<Action>) 
         }
         if home {
             navigation.reset();
-            state.camera = None;
         }
         state.moved |= fits || home || (undone && navigation.undo());
     }

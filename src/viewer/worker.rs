@@ -8,9 +8,9 @@ use anyhow::{Context as _, Result};
 
 use crate::cost::table::Table;
 use crate::frame::{Drawing, Renderer, Settings};
-use crate::gpu::{Device, DeviceInfo, PassTime};
+use crate::gpu::{Device, DeviceInfo, PassTime, is_lost};
 use crate::pass::tonemap::Counts;
-use crate::plan::Effect;
+use crate::plan::{Effect, Knobs};
 use crate::scene::environment::Environment;
 use crate::scene::{Bounds, Camera, Material, Scene};
 use crate::share::AovPixel;
@@ -36,6 +36,10 @@ pub struct Loaded {
     pub warnings: Vec<String>,
     /// Prices of rungs, where they were measured on this device.
     pub prices: Option<Table>,
+    /// The camera frames the scene for a size: for another it is another.
+    pub framed: bool,
+    /// Rungs that it is drawn with where nobody chose others.
+    pub knobs: Option<Knobs>,
 }
 
 /// Reads a scene for pictures of a size on a device: the one of the command line, or another file.
@@ -71,6 +75,10 @@ pub struct SceneFacts {
     pub bounds: Bounds,
     /// Where it is seen from first.
     pub home: Camera,
+    /// It frames the scene: no words but its own place name it.
+    pub framed: bool,
+    /// Rungs that the scene is drawn with at first.
+    pub knobs: Option<Knobs>,
     /// Those of the file.
     pub cameras: Vec<Camera>,
     /// Triangles, instances, lights.
@@ -144,6 +152,15 @@ pub struct Seen {
     pub lost: bool,
 }
 
+impl Seen {
+    /// Surfaces of the picture that is seen; `None` until they are read.
+    #[must_use]
+    pub fn now(&self) -> Option<&Surfaces> {
+        let version = self.shown.as_ref().map(|shown| shown.version);
+        self.surfaces.as_ref().filter(|surfaces| Some(surfaces.version) == version)
+    }
+}
+
 /// What is wanted and what is seen, between two threads.
 pub struct Shared {
     wanted: Mutex<(Wanted, u64)>,
@@ -187,11 +204,28 @@ impl Shared {
 struct Stage {
     scene: u64,
     loaded: Loaded,
-    renderer: Option<Renderer>,
+    renderer: Renderer,
     /// Of the renderer.
     settings: Settings,
     /// Those that could not be drawn: they are not tried again.
     refused: Option<Settings>,
+}
+
+impl Stage {
+    fn lit(&self, settings: &Settings) -> Settings {
+        lit(&self.loaded, settings)
+    }
+}
+
+/// Settings with the environment as strong as the scene says.
+fn lit(loaded: &Loaded, settings: &Settings) -> Settings {
+    let share = loaded.environment.as_ref().map_or(1.0, |(_, share)| *share);
+    Settings { environment_intensity: settings.environment_intensity * share, ..settings.clone() }
+}
+
+fn renderer(device: &Arc<Device>, loaded: &Loaded, settings: Settings) -> Result<Renderer> {
+    let environment = loaded.environment.as_ref().map(|(environment, _)| environment);
+    Renderer::new(device, loaded.scene.clone(), environment, settings)
 }
 
 /// Whether a renderer for the one draws the other as well.
@@ -245,7 +279,7 @@ impl Worker {
             last = Some(wanted);
             if let Err(error) = result {
                 drawing = None;
-                let lost = error.chain().any(|cause| cause.to_string().to_lowercase().contains("device lost"));
+                let lost = is_lost(&error);
                 worker.say(|seen| {
                     seen.error = Some(format!("{error:#}"));
                     seen.lost |= lost;
@@ -264,30 +298,33 @@ impl Worker {
 
     /// Something else is wanted.
     fn begin(&mut self, wanted: &Wanted, last: Option<&Wanted>, drawing: &mut Option<Drawing>) -> Result<()> {
-        if self.stage.as_ref().map(|stage| stage.scene) != Some(wanted.scene)
-            && last.map(|last| last.scene) != Some(wanted.scene)
-        {
+        let here = self.stage.as_ref().map(|stage| stage.scene);
+        if here != Some(wanted.scene) && last.map(|last| last.scene) != Some(wanted.scene) {
+            *drawing = None;
             self.load(wanted)?;
         }
-        let stage = self.stage.as_mut().context("there is no scene")?;
-        let mut settings = wanted.settings.clone();
-        settings.environment_intensity *= stage.loaded.environment.as_ref().map_or(1.0, |(_, share)| *share);
-        let ready = stage.renderer.is_some() && same_renderer(&stage.settings, &settings);
-        let refused = stage.refused.as_ref().is_some_and(|refused| same_renderer(refused, &settings));
-        if !ready && !refused {
-            self.plan(settings.clone())?;
+        let Some(stage) = &mut self.stage else { return Ok(()) };
+        let settings = stage.lit(&wanted.settings);
+        let ready = same_renderer(&stage.settings, &settings);
+        let refused = stage.refused.as_ref().is_some_and(|r| r.size == settings.size && same_renderer(r, &settings));
+        if ready && stage.refused.take().is_some() {
+            self.say(|seen| seen.error = None);
+        } else if !ready && !refused {
             *drawing = None;
+            self.plan(settings.clone())?;
         }
-        let stage = self.stage.as_mut().context("there is no scene")?;
-        let renderer = stage.renderer.as_mut().context("there is nothing to draw")?;
+        let Some(stage) = &mut self.stage else { return Ok(()) };
+        let renderer = &mut stage.renderer;
         let size = if wanted.moving { smaller(settings.size, self.ns_per_pixel) } else { settings.size };
-        let samples = if wanted.moving { 1 } else { stage.settings.knobs.samples() };
+        let all = stage.settings.knobs.samples();
+        let samples = if wanted.moving { 1 } else { all };
         let developed = (stage.settings.tonemap, stage.settings.exposure) != (settings.tonemap, settings.exposure);
         (stage.settings.tonemap, stage.settings.exposure) = (settings.tonemap, settings.exposure);
         renderer.develop(settings.tonemap, settings.exposure);
-        let resized = stage.settings.size != size;
-        if resized {
+        if stage.settings.size != size {
             *drawing = None;
+            // There is room for the sum of all samples, however many are drawn.
+            renderer.plan.samples = all;
             renderer.resize(size)?;
             stage.settings.size = size;
         }
@@ -298,46 +335,32 @@ impl Worker {
         if !same_view || drawing.is_none() || renderer.plan.samples != samples {
             renderer.plan.samples = samples;
             *drawing = Some(renderer.begin(camera));
-        } else if developed && drawing.as_ref().is_some_and(|drawing| drawing.samples() > 0) {
+        } else if developed && drawing.as_ref().is_some_and(Drawing::is_whole) {
             self.show(wanted, drawing.as_ref(), 0.0)?;
         }
-        if wanted.surfaces && drawing.as_ref().is_some_and(Drawing::is_done) {
+        if wanted.surfaces && !wanted.moving && drawing.as_ref().is_some_and(Drawing::is_done) {
             self.read_surfaces(wanted)?;
         }
         Ok(())
     }
 
+    /// Reads a scene and makes ready to draw it; what cannot be read, or drawn, leaves the one before.
     fn load(&mut self, wanted: &Wanted) -> Result<()> {
         let name = wanted.file.as_ref().map_or("the scene".to_owned(), |file| file.display().to_string());
         self.say(|seen| seen.busy = Some(format!("reading {name}")));
         let loaded = (self.open)(wanted.file.as_deref(), wanted.settings.size, self.device.info());
+        let found = loaded.and_then(|loaded| {
+            self.say(|seen| seen.busy = Some("uploading and compiling".to_owned()));
+            self.ready(wanted, loaded)
+        });
         self.say(|seen| {
             seen.busy = None;
-            seen.failed = loaded.is_err().then_some(wanted.scene);
+            seen.failed = found.is_err().then_some(wanted.scene);
         });
-        let mut loaded = loaded?;
-        let prices = loaded.prices.take().map(Arc::new);
-        let scene = &loaded.scene;
-        let bounds = scene.bounds().with_context(|| format!("{}: there is nothing to draw", loaded.name))?;
-        let facts = SceneFacts {
-            scene: wanted.scene,
-            name: loaded.name.clone(),
-            bounds,
-            home: loaded.camera.clone(),
-            cameras: scene.cameras.clone(),
-            counts: [scene.triangles(), scene.instances.len(), scene.lights.len()],
-            materials: Arc::new(scene.materials.clone()),
-            instances: Arc::new(scene.instances.iter().map(|instance| instance.name.clone()).collect()),
-            warnings: loaded.warnings.clone(),
-            prices,
-        };
-        self.stage = Some(Stage {
-            scene: wanted.scene,
-            loaded,
-            renderer: None,
-            settings: wanted.settings.clone(),
-            refused: None,
-        });
+        let (stage, facts) = found?;
+        self.tell_plan(&stage.renderer);
+        self.ns_per_pixel = 0.0;
+        self.stage = Some(stage);
         self.say(|seen| {
             seen.facts = Some(facts);
             seen.surfaces = None;
@@ -346,42 +369,66 @@ impl Worker {
         Ok(())
     }
 
-    /// Plans and uploads; what cannot be drawn leaves what is there.
+    /// A scene with its renderer, and what there is to be known of it.
+    fn ready(&self, wanted: &Wanted, mut loaded: Loaded) -> Result<(Stage, SceneFacts)> {
+        let scene = &loaded.scene;
+        let bounds = scene.bounds().with_context(|| format!("{}: there is nothing to draw", loaded.name))?;
+        let facts = SceneFacts {
+            scene: wanted.scene,
+            name: loaded.name.clone(),
+            bounds,
+            home: loaded.camera.clone(),
+            framed: loaded.framed,
+            knobs: loaded.knobs.clone(),
+            cameras: scene.cameras.clone(),
+            counts: [scene.triangles(), scene.instances.len(), scene.lights.len()],
+            materials: Arc::new(scene.materials.clone()),
+            instances: Arc::new(scene.instances.iter().map(|instance| instance.name.clone()).collect()),
+            warnings: loaded.warnings.clone(),
+            prices: loaded.prices.take().map(Arc::new),
+        };
+        let settings = lit(&loaded, &wanted.settings);
+        let renderer = renderer(&self.device, &loaded, settings.clone())?;
+        Ok((Stage { scene: wanted.scene, loaded, renderer, settings, refused: None }, facts))
+    }
+
+    /// Plans and uploads for other rungs; those that cannot be drawn leave what is there.
     fn plan(&mut self, settings: Settings) -> Result<()> {
         self.say(|seen| seen.busy = Some("uploading and compiling".to_owned()));
-        let stage = self.stage.as_mut().context("there is no scene")?;
-        let environment = stage.loaded.environment.as_ref().map(|(environment, _)| environment);
-        let made = Renderer::new(&self.device, stage.loaded.scene.clone(), environment, settings.clone());
-        let (plan, result) = match made {
+        let Some(stage) = &mut self.stage else { return Ok(()) };
+        let made = renderer(&self.device, &stage.loaded, settings.clone());
+        let made = match made {
             Ok(renderer) => {
-                let plan = (
-                    renderer.plan.effects.clone(),
-                    [renderer.plan.warnings.clone(), renderer.warnings.clone()].concat(),
-                );
-                stage.renderer = Some(renderer);
-                stage.settings = settings;
-                stage.refused = None;
-                (Some(plan), Ok(()))
+                (stage.renderer, stage.settings, stage.refused) = (renderer, settings, None);
+                Ok(())
             }
             Err(error) => {
                 stage.refused = Some(settings);
-                (None, Err(error))
+                Err(error)
             }
         };
+        // Other rungs take other times: the next sample tells.
+        self.ns_per_pixel = 0.0;
         self.say(|seen| {
             seen.busy = None;
-            if let Some((effects, warnings)) = plan {
-                (seen.effects, seen.warnings) = (effects, warnings);
-                seen.error = None;
-            }
+            seen.error = None;
         });
-        result
+        made?;
+        if let Some(stage) = &self.stage {
+            self.tell_plan(&stage.renderer);
+        }
+        Ok(())
+    }
+
+    fn tell_plan(&self, renderer: &Renderer) {
+        let warnings = [renderer.plan.warnings.clone(), renderer.warnings.clone()].concat();
+        self.say(|seen| (seen.effects, seen.warnings) = (renderer.plan.effects.clone(), warnings));
     }
 
     /// One more sample.
     fn refine(&mut self, wanted: &Wanted, drawing: &mut Option<Drawing>, looked: &mut Instant) -> Result<()> {
         let (Some(stage), Some(under_way)) = (&mut self.stage, drawing.as_mut()) else { return Ok(()) };
-        let Some(renderer) = &mut stage.renderer else { return Ok(()) };
+        let renderer = &mut stage.renderer;
         let begun = Instant::now();
         let before = under_way.samples();
         renderer.step(under_way)?;
@@ -407,7 +454,7 @@ impl Worker {
 
     fn show(&mut self, wanted: &Wanted, drawing: Option<&Drawing>, sample_ms: f64) -> Result<()> {
         let (Some(stage), Some(drawing)) = (&mut self.stage, drawing) else { return Ok(()) };
-        let Some(renderer) = &mut stage.renderer else { return Ok(()) };
+        let renderer = &mut stage.renderer;
         let rendered = renderer.picture(drawing)?;
         self.version += 1;
         let each = f64::from(rendered.samples.max(1));
@@ -427,7 +474,7 @@ impl Worker {
 
     fn read_surfaces(&mut self, wanted: &Wanted) -> Result<()> {
         let Some(stage) = &mut self.stage else { return Ok(()) };
-        let Some(renderer) = &mut stage.renderer else { return Ok(()) };
+        let renderer = &mut stage.renderer;
         let camera = wanted.camera.as_ref().unwrap_or(&stage.loaded.camera);
         let radiance = renderer.film()?.rgba;
         let (pixels, view) = renderer.aovs(camera)?;
