@@ -182,8 +182,10 @@ impl ApplicationHandler<Woken> for Viewer {
 
     fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         let Some(window) = &mut self.window else { return };
-        let answer = window.egui.on_window_event(&window.window, &event);
-        window.dirty |= answer.repaint;
+        // Of a request to draw egui would ask for another: the window would never rest.
+        if event != WindowEvent::RedrawRequested {
+            window.dirty |= window.egui.on_window_event(&window.window, &event).repaint;
+        }
         match event {
             WindowEvent::CloseRequested => window.quits = true,
             WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => {
