@@ -407,7 +407,7 @@ fn times(ui: &mut Ui, state: &State) {
         }
     }
     ui.weak(format!("{:.1} ms of GPU time for a sample, at most {most:.1} here", total(last)));
-    egui::Grid::new("passes").num_columns(3).show(ui, |ui| {
+    egui::Grid::new("passes").num_columns(3).min_col_width(10.0).show(ui, |ui| {
         for (name, ms) in &order {
             let (dot, _) = ui.allocate_exact_size(egui::vec2(10.0, 10.0), Sense::hover());
             ui.painter().rect_filled(dot, 2.0, COLOURS[place(name)]);
@@ -515,7 +515,9 @@ const KEYS: &[(&str, &str)] = &[
 
 fn help(ui: &mut Ui, state: &mut State) {
     let mut open = true;
-    egui::Window::new("Keys").open(&mut open).resizable(false).collapsible(false).show(ui.ctx(), |ui| {
+    let middle = ui.ctx().content_rect().center();
+    let window = egui::Window::new("Keys").pivot(egui::Align2::CENTER_CENTER).default_pos(middle);
+    window.open(&mut open).resizable(false).collapsible(false).show(ui.ctx(), |ui| {
         egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
             for (key, does) in KEYS {
                 ui.strong(*key);
