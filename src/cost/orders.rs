@@ -5,31 +5,15 @@
 //! prices from the reference's rungs.
 
 use anyhow::{Context as _, Result, ensure};
-use serde::{Deserialize, Serialize};
 
 use super::sitting::Bench;
-use super::table::Interval;
+use super::table::{Interval, Order};
 use crate::image::Picture;
 use crate::plan::{Knobs, Model};
 
 /// Steps that are tried; the truth has as many as the last, with Simpson's rule.
 const STEPS: [u32; 5] = [4, 8, 16, 32, 64];
 const RULES: [&str; 3] = ["left", "midpoint", "simpson"];
-
-/// A rule's errors.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Order {
-    /// Rung of the knob `quadrature`.
-    pub rule: String,
-    /// Steps of each segment.
-    pub steps: Vec<u32>,
-    /// Root mean squared difference of radiance to that with most steps, over the root mean square of what is all around.
-    pub errors: Vec<f64>,
-    /// GPU milliseconds of the picture.
-    pub gpu_ms: Vec<f64>,
-    /// p of error ~ steps^−p where rounding does not hide it; `None` where fewer than two errors are left.
-    pub order: Option<f64>,
-}
 
 /// Below this share of the picture an error is that of f32.
 const ROUNDING: f64 = 1e-8;

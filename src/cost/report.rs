@@ -10,8 +10,7 @@ use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::orders::Order;
-use super::table::{Family, INVISIBLE, Point, Price, REFERENCE, Table};
+use super::table::{Family, INVISIBLE, Order, Point, Price, REFERENCE, Table};
 use crate::image::png::{Display, encode_png, read_display};
 
 const STYLE: &str = include_str!("report.css");

@@ -9,12 +9,12 @@ use serde::{Deserialize, Serialize};
 
 use super::difference::{Truth, shown};
 use super::forecast::Forecast;
-use super::orders::{self, Order};
+use super::orders;
 use super::price::price;
 use super::sitting::{Bench, Sitting, Taken};
 use super::table::{
-    CONVERGED, DeviceName, Errors, Family, Interval, KnobState, Point, Price, REFERENCE, Reference, Table, Tried,
-    WorstPixel, frontier,
+    CONVERGED, DeviceName, Errors, Family, Interval, KnobState, Order, Point, Price, REFERENCE, Reference, Table,
+    Tried, WorstPixel, frontier,
 };
 use crate::frame::Settings;
 use crate::image::metric::{AnyPicture, Comparison, Metric, compare, map_rgba};

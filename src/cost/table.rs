@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use anyhow::{Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
-use super::orders::Order;
 use crate::plan::KNOBS;
 
 /// The document.
@@ -299,6 +298,21 @@ impl Price {
         let beyond_noise = self.base != Family::Exact || self.shown_delta.surely() > 0.0;
         !self.same && self.noise_ratio.is_none() && self.flip_between >= INVISIBLE && beyond_noise
     }
+}
+
+/// How a rule of quadrature comes near to the integral (lecture A2).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Order {
+    /// Rung of the knob `quadrature`.
+    pub rule: String,
+    /// Steps of each segment.
+    pub steps: Vec<u32>,
+    /// Root mean squared difference of radiance to that with most steps, over the root mean square of what is all around.
+    pub errors: Vec<f64>,
+    /// GPU milliseconds of the picture.
+    pub gpu_ms: Vec<f64>,
+    /// p of error ~ steps^−p where rounding does not hide it; `None` where fewer than two errors are left.
+    pub order: Option<f64>,
 }
 
 /// A step of the search.
