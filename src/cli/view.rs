@@ -7,7 +7,7 @@ use anyhow::{Result, bail};
 use clap::Args;
 
 use super::budget;
-use super::options::{DeviceOptions, PictureOptions, SceneOptions};
+use super::options::{DeviceOptions, Extent, PictureOptions, SceneOptions};
 use super::setup::contents;
 use crate::cost::sweep::arguments;
 use crate::gpu::{DeviceInfo, Severity};
@@ -106,6 +106,11 @@ fn command(args: &ViewArgs, view: &View<'_>) -> String {
 pub fn run(args: &ViewArgs) -> Result<ExitCode> {
     if let Some(error) = &args.picture.max_error {
         bail!("--max-error {error}: the viewer draws until its samples are done; `render` has this option");
+    }
+    if args.picture.plan == Extent::ExplainCost {
+        bail!(
+            "--plan explain-cost: the viewer measures no effects that are left out; `plan` and `render` have this option"
+        );
     }
     let settings = args.picture.settings(&args.scene)?;
     let (first, told) = (args.clone(), args.clone());

@@ -521,8 +521,8 @@ impl OpenWindow {
     fn free_name(&self, seen: &Seen, ending: &str) -> PathBuf {
         let name = seen.facts.as_ref().map_or("scene", |facts| &facts.name);
         let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
-        let all = (1..).map(|i| PathBuf::from(format!("{plain}-{i}.{ending}")));
-        let free = all.into_iter().find(|path| !path.exists()).unwrap_or_default();
+        let mut all = (1..).map(|i| PathBuf::from(format!("{plain}-{i}.{ending}")));
+        let free = all.find(|path| !path.exists()).unwrap_or_default();
         lock(&self.written).extend(free.file_name().map(OsString::from));
         free
     }

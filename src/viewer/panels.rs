@@ -71,7 +71,7 @@ pub struct State {
     pub place: [i32; 4],
     /// Files that were opened, the last first.
     pub recent: Vec<PathBuf>,
-    /// The device, and whether nobody asked for it.
+    /// What draws.
     pub device: DeviceInfo,
     /// To choose a file with.
     pub dialog: FileDialog,
@@ -188,6 +188,11 @@ fn bar(ui: &mut Ui, state: &mut State, seen: &Seen, actions: &mut Vec<Action>) {
             let ms: f64 = shown.passes.iter().map(|pass| pass.ms).sum();
             let moving = if shown.moving { ", moving" } else { "" };
             ui.label(format!("{}×{}{moving}: {done} of {of} samples, {ms:.1} ms each", shown.size[0], shown.size[1]));
+        }
+        let wrong = seen.shown.as_ref().map_or(0, |shown| shown.counts.nan + shown.counts.inf);
+        if wrong > 0 {
+            ui.colored_label(ui.visuals().error_fg_color, format!("{wrong} pixels are no numbers"))
+                .on_hover_text("shows: NaN and infinity");
         }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             egui::widgets::global_theme_preference_switch(ui);

@@ -110,8 +110,6 @@ pub struct Shown {
     pub passes: Vec<PassTime>,
     /// Values that are no radiances.
     pub counts: Counts,
-    /// Wall milliseconds of the last sample.
-    pub sample_ms: f64,
 }
 
 /// Surfaces at the pixel centres of a picture.
@@ -336,7 +334,7 @@ impl Worker {
             renderer.plan.samples = samples;
             *drawing = Some(renderer.begin(camera));
         } else if developed && drawing.as_ref().is_some_and(Drawing::is_whole) {
-            self.show(wanted, drawing.as_ref(), 0.0)?;
+            self.show(wanted, drawing.as_ref())?;
         }
         if wanted.surfaces && !wanted.moving && drawing.as_ref().is_some_and(Drawing::is_done) {
             self.read_surfaces(wanted)?;
@@ -444,7 +442,7 @@ impl Worker {
         if under_way.is_done() || under_way.samples() == 1 || looked.elapsed() >= LOOK {
             *looked = Instant::now();
             let done = under_way.is_done();
-            self.show(wanted, drawing.as_ref(), took.as_secs_f64() * 1e3)?;
+            self.show(wanted, drawing.as_ref())?;
             if done && wanted.surfaces && !wanted.moving {
                 self.read_surfaces(wanted)?;
             }
@@ -452,7 +450,7 @@ impl Worker {
         Ok(())
     }
 
-    fn show(&mut self, wanted: &Wanted, drawing: Option<&Drawing>, sample_ms: f64) -> Result<()> {
+    fn show(&mut self, wanted: &Wanted, drawing: Option<&Drawing>) -> Result<()> {
         let (Some(stage), Some(drawing)) = (&mut self.stage, drawing) else { return Ok(()) };
         let renderer = &mut stage.renderer;
         let rendered = renderer.picture(drawing)?;
@@ -466,7 +464,6 @@ impl Worker {
             moving: wanted.moving,
             passes: rendered.passes.into_iter().map(|pass| PassTime { ms: pass.ms / each, ..pass }).collect(),
             counts: rendered.counts,
-            sample_ms,
         };
         self.say(|seen| seen.shown = Some(shown));
         Ok(())
