@@ -167,11 +167,11 @@ fn probes(compiler: &shaderc::Compiler, root: &Path, programs: &BTreeMap<String,
             .filter(|(_, stages)| contract::calls(stages, &equation.function))
             .map(|(p, _)| p.clone())
             .collect();
-        let equations::Equation { name, ids, formula, subject, inputs, outputs, .. } = equation;
+        let equations::Equation { name, ids, formula, subject, line, inputs, outputs, .. } = equation;
         let [fast, stable, compensated] = facts.builtins.each_ref().map(contract::list);
         table += &format!(
             "    Probe {{
-        name: {name:?}, subject: {subject:?}, formula: {formula:?},
+        name: {name:?}, subject: {subject:?}, line: {line}, formula: {formula:?},
         ids: {}, inputs: {}, outputs: {}, builtins: [{fast}, {stable}, {compensated}], loop_heads: {}, passes: {},
         program: {{ static PROGRAM: Program = {program}; &PROGRAM }},
     }},\n",

@@ -28,6 +28,8 @@ pub(crate) struct Equation {
     pub(crate) formula: String,
     /// File under `shaders/lib/`, without `.glsl`.
     pub(crate) subject: String,
+    /// Line of its tag there, counted from 1.
+    pub(crate) line: usize,
     pub(crate) inputs: Vec<String>,
     pub(crate) outputs: Vec<String>,
     /// GLSL of its probe.
@@ -170,8 +172,8 @@ fn read(path: &Path, text: &str, structs: &Structs, library: &mut Library) -> Re
                 known.precise |= source.precise;
                 known.loops += source.loops;
                 known.heads.extend(source.heads);
-                if let Some((_, ids, formula)) = tag.take() {
-                    let equation = equation(&stem(path), head, ids, formula, renamed.take(), out.take(), structs);
+                if let Some(tag) = tag.take() {
+                    let equation = equation(&stem(path), head, tag, renamed.take(), out.take(), structs);
                     library.equations.push(equation.map_err(|e| format!("{}: {e}", place()))?);
                 }
                 at = end;
@@ -188,8 +190,7 @@ fn read(path: &Path, text: &str, structs: &Structs, library: &mut Library) -> Re
 fn equation(
     subject: &str,
     head: Head,
-    ids: Vec<String>,
-    formula: String,
+    (at, ids, formula): (usize, Vec<String>, String),
     renamed: Option<String>,
     out: Option<String>,
     structs: &Structs,
@@ -231,7 +232,7 @@ void main() {{
         arguments.join(", ")
     );
     let name = renamed.unwrap_or_else(|| function.clone());
-    Ok(Equation { function, name, ids, formula, subject: subject.to_owned(), inputs, outputs, probe })
+    Ok(Equation { function, name, ids, formula, subject: subject.to_owned(), line: at + 1, inputs, outputs, probe })
 }
 
 fn components(ty: &str) -> Option<usize> {

@@ -16,6 +16,8 @@ pub struct Probe {
     pub name: &'static str,
     /// File under `shaders/lib/`, without `.glsl`.
     pub subject: &'static str,
+    /// Line of its tag in that file.
+    pub line: usize,
     /// The formula, in one line.
     pub formula: &'static str,
     /// Ids of the lecture, and rows of docs/numerics.md as `N` and a number.

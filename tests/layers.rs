@@ -19,7 +19,10 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("pass", &["pass", "gpu", "scene", "plan", "image", "shader", "share", "spectra"]),
     ("frame", &["frame", "pass", "gpu", "scene", "plan", "image", "share", "spectra"]),
     ("cost", &["cost", "frame", "gpu", "plan", "scene", "image"]),
-    ("viewer", &["viewer", "cost", "frame", "pass", "gpu", "plan", "scene", "image", "optics", "share"]),
+    (
+        "viewer",
+        &["viewer", "cost", "frame", "pass", "gpu", "plan", "scene", "image", "optics", "spectra", "shader", "share"],
+    ),
     (
         "cli",
         &[

@@ -15,11 +15,14 @@ use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
+use anyhow::{Result, bail};
 use etalon::frame::Settings;
 use etalon::gpu::DeviceInfo;
 use etalon::plan::{KNOBS, Knobs, Model};
+use etalon::scene::{Camera, Scene};
 use etalon::study;
-use etalon::viewer::worker::{Loaded, Seen, Shared, Wanted, Worker};
+use etalon::viewer::shared::{Asked, Loaded, Seen, Shared, Source, Viewpoint, Wanted};
+use etalon::viewer::worker::Worker;
 use gpu::Gpu;
 use made::Random;
 use x11::{Display, Viewer};
@@ -133,42 +136,46 @@ fn without_a_display_there_is_a_sentence() {
     run.failed(1, "etalon render SCENE");
 }
 
-/// The thread that draws, without a window: every rung of every knob one after the other, each wanted while the one before is under
-/// way. What it shows in the end is what a renderer of those rungs draws.
-#[test]
-fn every_knob_turns_while_pictures_are_drawn() {
-    let gpu = Gpu::hasty();
-    let load = || study::load("etalon").expect("a scene");
-    let size = [64, 36];
-    let settings = |knobs: &Knobs| Settings { size, knobs: knobs.clone(), ..Settings::default() };
-    let first = Wanted {
-        scene: 0,
-        file: None,
-        camera: None,
-        settings: settings(&Knobs::of(Model::Local)),
-        moving: false,
-        surfaces: false,
-        quit: false,
-    };
-    let shared = Arc::new(Shared::new(first));
-    let (to, woken) = channel();
-    let open = Box::new(move |_: Option<&Path>, _: [u32; 2], _: &DeviceInfo| {
-        let scene = load();
-        let camera = scene.cameras[0].clone();
+fn scene() -> Scene {
+    study::load("etalon").expect("a scene")
+}
+
+struct Study;
+
+impl Source for Study {
+    fn open(&self, _: Asked<'_>, _: &DeviceInfo) -> Result<Loaded> {
+        let scene = scene();
         Ok(Loaded {
             name: scene.name.clone(),
+            camera: scene.cameras[0].clone(),
             scene,
             environment: None,
-            camera,
             warnings: Vec::new(),
             prices: None,
             framed: false,
             knobs: None,
         })
-    });
+    }
+
+    fn moment(&self, _: Asked<'_>) -> Result<(Scene, Camera)> {
+        bail!("nothing moves")
+    }
+}
+
+/// The thread that draws, without a window: every rung of every knob one after the other, each wanted while the one before is under
+/// way. What it shows in the end is what a renderer of those rungs draws.
+#[test]
+fn every_knob_turns_while_pictures_are_drawn() {
+    let gpu = Gpu::hasty();
+    let size = [64, 36];
+    let settings = |knobs: &Knobs| Settings { size, knobs: knobs.clone(), ..Settings::default() };
+    let shared = Arc::new(Shared::new(Wanted::new(settings(&Knobs::of(Model::Local)))));
+    let (to, woken) = channel();
     let thread = {
         let (device, shared) = (gpu.device.clone(), shared.clone());
-        std::thread::spawn(move || Worker::run(device, shared, open, Box::new(move || to.send(()).unwrap_or_default())))
+        std::thread::spawn(move || {
+            Worker::run(device, shared, Box::new(Study), Box::new(move || to.send(()).unwrap_or_default()))
+        })
     };
     let mut turned = 0;
     for knob in KNOBS.iter().filter(|knob| !["samples", "colour"].contains(&knob.name)) {
@@ -200,21 +207,21 @@ fn every_knob_turns_while_pictures_are_drawn() {
             let _ = woken.recv_timeout(Duration::from_millis(200));
         }
     };
-    wait("moving", &|seen| seen.shown.as_ref().is_some_and(|shown| shown.moving && shown.size[0] > 64));
+    wait("moving", &|seen| seen.shown().is_some_and(|shown| shown.moving && shown.size[0] > 64));
     // By now it is known how long a pixel takes.
-    let mut aside = load().cameras[0].clone();
+    let mut aside = scene().cameras[0].clone();
     aside.world_from_camera.translation.x += 0.1;
-    shared.want(|wanted| wanted.camera = Some(aside));
+    shared.want(|wanted| wanted.from = Viewpoint::Free(aside));
     let small = wait("small", &|seen| {
-        seen.shown.as_ref().is_some_and(|shown| shown.moving && shown.size[0] < 480 && shown.size != size)
+        seen.shown().is_some_and(|shown| shown.moving && shown.size[0] < 480 && shown.size != size)
     });
-    assert_eq!(small.shown.expect("a picture").samples, [1, 1]);
-    shared.want(|wanted| (wanted.camera, wanted.moving, wanted.surfaces) = (None, false, true));
+    assert_eq!(small.shown().expect("a picture").samples, [1, 1]);
+    shared.want(|wanted| (wanted.from, wanted.moving, wanted.surfaces) = (Viewpoint::Own, false, true));
     let seen = wait("whole", &|seen| seen.now().is_some_and(|surfaces| surfaces.size == [480, 270]));
-    assert_eq!(seen.shown.as_ref().map(|shown| shown.samples), Some([4, 4]));
+    assert_eq!(seen.shown().map(|shown| shown.samples), Some([4, 4]));
     let found: Vec<[u32; 4]> =
-        seen.now().expect("surfaces").radiance.iter().map(|pixel| pixel.map(f32::to_bits)).collect();
-    assert!(found == gpu::bits(&gpu.film(&load(), last)), "another picture");
+        seen.now().expect("surfaces").radiance[0].iter().map(|pixel| pixel.map(f32::to_bits)).collect();
+    assert!(found == gpu::bits(&gpu.film(&scene(), last)), "another picture");
     assert_eq!(seen.error, None);
     shared.want(|wanted| wanted.quit = true);
     thread.join().expect("the thread ends");

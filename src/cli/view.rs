@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use clap::Args;
@@ -11,8 +12,8 @@ use super::options::{DeviceOptions, Extent, PictureOptions, SceneOptions};
 use super::setup::contents;
 use crate::cost::sweep::arguments;
 use crate::gpu::{DeviceInfo, Severity};
-use crate::scene::Reads;
-use crate::viewer::worker::Loaded;
+use crate::scene::{Camera, Reads, Scene};
+use crate::viewer::shared::{Asked, Loaded, Source};
 use crate::viewer::{Start, View, run as run_window};
 
 /// Open a window that shows the scene, and why it looks as it does
@@ -29,35 +30,44 @@ pub struct ViewArgs {
     bare: bool,
 }
 
-fn loaded(args: &ViewArgs, file: Option<&Path>, size: [u32; 2], device: &DeviceInfo) -> Result<Loaded> {
-    let options = &of_file(&args.scene, file);
-    let scene = options.load(Reads::Everything)?;
-    let (environment, more) = options.load_environment()?;
-    let share = options.environment_share(&scene);
-    let camera = options.choose_camera(&scene, size)?;
-    let framed = options.frames(&scene);
-    let asked = args.picture.knobs()?;
-    let mut knobs = asked.clone();
-    args.picture.colour_of(&scene, &mut knobs)?;
-    let warnings = scene.warnings.iter().cloned().chain(more).collect();
-    // `cost` measures the size of the command line, whatever part of the window the picture has.
-    let priced = budget::command(options, &args.picture, &args.device);
-    let prices = budget::known(&priced, &contents(&scene, environment.as_ref()), device);
-    Ok(Loaded {
-        name: scene.name.clone(),
-        environment: environment.zip(share),
-        camera,
-        framed,
-        knobs: (knobs != asked).then_some(knobs),
-        warnings,
-        prices,
-        scene,
-    })
+impl Source for ViewArgs {
+    fn open(&self, asked: Asked<'_>, device: &DeviceInfo) -> Result<Loaded> {
+        let options = &asked_for(&self.scene, asked.file, asked.time);
+        let scene = options.load(Reads::Everything)?;
+        let (environment, more) = options.load_environment()?;
+        let share = options.environment_share(&scene);
+        let camera = options.choose_camera(&scene, asked.size)?;
+        let framed = options.frames(&scene);
+        let chosen = self.picture.knobs()?;
+        let mut knobs = chosen.clone();
+        self.picture.colour_of(&scene, &mut knobs)?;
+        let warnings = scene.warnings.iter().cloned().chain(more).collect();
+        // `cost` measures the size of the command line, whatever part of the window the picture has.
+        let priced = budget::command(options, &self.picture, &self.device);
+        let prices = budget::known(&priced, &contents(&scene, environment.as_ref()), device);
+        Ok(Loaded {
+            name: scene.name.clone(),
+            environment: environment.map(Arc::new).zip(share),
+            camera,
+            framed,
+            knobs: (knobs != chosen).then_some(knobs),
+            warnings,
+            prices: prices.map(Arc::new),
+            scene,
+        })
+    }
+
+    fn moment(&self, asked: Asked<'_>) -> Result<(Scene, Camera)> {
+        let options = asked_for(&self.scene, asked.file, asked.time);
+        let scene = options.load(Reads::Everything)?;
+        let camera = options.choose_camera(&scene, asked.size)?;
+        Ok((scene, camera))
+    }
 }
 
-/// The same options for another file: what belongs to the first, its cameras and its time, is forgotten.
-fn of_file(options: &SceneOptions, file: Option<&Path>) -> SceneOptions {
-    match file {
+/// The same options for another file, or another time: what belongs to the first file, its cameras and its time, is forgotten.
+fn asked_for(options: &SceneOptions, file: Option<&Path>, time: Option<f64>) -> SceneOptions {
+    let options = match file {
         None => options.clone(),
         Some(path) => SceneOptions {
             scene: path.display().to_string(),
@@ -68,12 +78,13 @@ fn of_file(options: &SceneOptions, file: Option<&Path>) -> SceneOptions {
             time: "none".to_owned(),
             ..options.clone()
         },
-    }
+    };
+    SceneOptions { time: time.map_or(options.time, |time| time.to_string()), ..options }
 }
 
 /// The command that draws a view.
 fn command(args: &ViewArgs, view: &View<'_>) -> String {
-    let mut scene = of_file(&args.scene, view.file);
+    let mut scene = asked_for(&args.scene, view.file, view.time);
     scene.env_rotation = view.settings.environment_rotation;
     if view.camera.is_some() || view.named.is_some() {
         (scene.camera, scene.eye, scene.target, scene.up, scene.fov) = (None, None, None, None, None);
@@ -113,7 +124,7 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode> {
         );
     }
     let settings = args.picture.settings(&args.scene)?;
-    let (first, told) = (args.clone(), args.clone());
+    let told = args.clone();
     let file = (!args.scene.scene.starts_with("study:")).then(|| PathBuf::from(&args.scene.scene));
     let messages = run_window(Start {
         file,
@@ -122,7 +133,7 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode> {
         device: args.device.choice(),
         validate: args.device.validate,
         panels: !args.bare,
-        open: Box::new(move |file, size, device| loaded(&first, file, size, device)),
+        source: Box::new(args.clone()),
         command: Box::new(move |view| command(&told, view)),
         // A terminal that has gone is no reason to close the window.
         said: Box::new(|command| drop(super::print(command))),

@@ -27,6 +27,17 @@ pub struct Placed<'a> {
     pub version: u64,
     /// Left, top, right, bottom in pixels of the window; where it is of another size, pixels are mixed.
     pub place: [i32; 4],
+    /// Columns of the window in which it is seen: from, up to.
+    pub columns: [i32; 2],
+}
+
+/// A picture on the device.
+struct Slot {
+    image: Image,
+    staging: Buffer,
+    version: u64,
+    /// It lies in `staging` alone.
+    fresh: bool,
 }
 
 /// What egui wants to be seen.
@@ -72,7 +83,7 @@ pub struct Presenter {
     acquired: vk::Semaphore,
     finished: vk::Fence,
     commands: Option<vk::CommandBuffer>,
-    picture: Option<(Image, Buffer, u64)>,
+    slots: Vec<Slot>,
     overlay: Option<Renderer<DefaultAllocator>>,
     freed: Vec<egui::TextureId>,
 }
@@ -136,7 +147,7 @@ impl Presenter {
             acquired,
             finished,
             commands: None,
-            picture: None,
+            slots: Vec::new(),
             overlay: Some(overlay),
             freed: Vec::new(),
         };
@@ -148,16 +159,17 @@ impl Presenter {
         self.stale = true;
     }
 
-    /// Shows a picture with panels over it in a window of `size` pixels.
+    /// Shows pictures with panels over them in a window of `size` pixels.
     ///
     /// # Errors
     /// When the device is lost or memory is short. A surface that is lost or out of date is made anew.
-    pub fn present(&mut self, size: [u32; 2], picture: Option<Placed<'_>>, mut overlay: Overlay) -> Result<Presented> {
+    pub fn present(&mut self, size: [u32; 2], pictures: &[Placed<'_>], mut overlay: Overlay) -> Result<Presented> {
         let applied = self.wait().and_then(|()| self.apply(&overlay));
         overlay.textures.clear();
         applied?;
-        if let Some(picture) = &picture {
-            self.upload(picture)?;
+        self.slots.truncate(pictures.len());
+        for (index, picture) in pictures.iter().enumerate() {
+            self.upload(index, picture)?;
         }
         if (self.stale || self.swapchain.is_none()) && !self.recreate(size)? {
             // A surface that was renewed meanwhile has an area all the same.
@@ -182,7 +194,7 @@ impl Presenter {
             }
             Err(error) => return Err(error).context("asking for the next picture of the window"),
         };
-        let commands = self.record(index, picture.as_ref(), &overlay)?;
+        let commands = self.record(index, pictures, &overlay)?;
         self.submit(commands, index)?;
         let Some(swapchain) = &self.swapchain else { return Ok(Presented::Hidden) };
         let (swapchains, indices, waits) = ([swapchain.raw], [index as u32], [swapchain.done[index]]);
@@ -231,12 +243,12 @@ impl Presenter {
         Ok(())
     }
 
-    fn upload(&mut self, placed: &Placed<'_>) -> Result<()> {
-        let fits = |known: &(Image, Buffer, u64)| {
-            let desc = known.0.desc();
+    fn upload(&mut self, index: usize, placed: &Placed<'_>) -> Result<()> {
+        let fits = |slot: &Slot| {
+            let desc = slot.image.desc();
             [desc.width, desc.height] == placed.size
         };
-        if self.picture.as_ref().is_none_or(|known| !fits(known)) {
+        if !self.slots.get(index).is_some_and(fits) {
             // Every image has a view, and a view is for some shader.
             let usage =
                 vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
@@ -245,12 +257,15 @@ impl Presenter {
             let image = Image::new(&self.device, "picture in the window", desc)?;
             let bytes = 4 * u64::from(width) * u64::from(height);
             let staging = Buffer::new(&self.device, "picture for the window", bytes, Place::Upload)?;
-            self.picture = Some((image, staging, u64::MAX));
+            self.slots.truncate(index);
+            self.slots.push(Slot { image, staging, version: u64::MAX, fresh: false });
         }
-        if let Some((_, staging, version)) = self.picture.as_mut().filter(|known| known.2 != placed.version) {
-            ensure!(placed.rgba.len() as u64 == staging.bytes(), "a picture of another size than it says: our mistake");
-            staging.write(placed.rgba);
-            *version = placed.version;
+        let slot = &mut self.slots[index];
+        if slot.version != placed.version {
+            let bytes = slot.staging.bytes();
+            ensure!(placed.rgba.len() as u64 == bytes, "a picture of another size than it says: our mistake");
+            slot.staging.write(placed.rgba);
+            (slot.version, slot.fresh) = (placed.version, true);
         }
         Ok(())
     }
@@ -374,7 +389,7 @@ impl Presenter {
     }
 
     /// The commands of a frame: background, picture, panels.
-    fn record(&mut self, index: usize, picture: Option<&Placed<'_>>, overlay: &Overlay) -> Result<vk::CommandBuffer> {
+    fn record(&mut self, index: usize, pictures: &[Placed<'_>], overlay: &Overlay) -> Result<vk::CommandBuffer> {
         let swapchain = self.swapchain.as_ref().context("there is no swapchain: our mistake")?;
         let (image, view, [width, height]) = (swapchain.images[index], swapchain.views[index], swapchain.extent);
         let raw = &self.device.raw;
@@ -385,18 +400,20 @@ impl Presenter {
             change(raw, commands, image, vk::ImageLayout::UNDEFINED, Access::TransferDst);
             let dark = vk::ClearColorValue { float32: [0.11, 0.11, 0.12, 1.0] };
             raw.cmd_clear_color_image(commands, image, vk::ImageLayout::TRANSFER_DST_OPTIMAL, &dark, &[WHOLE]);
-            if let (Some(placed), Some((source, staging, _))) = (picture, &self.picture) {
-                change(raw, commands, source.raw, vk::ImageLayout::UNDEFINED, Access::TransferDst);
-                let desc = source.desc();
-                let region = vk::BufferImageCopy::default().image_subresource(LAYER).image_extent(vk::Extent3D {
-                    width: desc.width,
-                    height: desc.height,
-                    depth: 1,
-                });
+            for (placed, slot) in pictures.iter().zip(&mut self.slots) {
                 let to = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-                raw.cmd_copy_buffer_to_image(commands, staging.raw, source.raw, to, &[region]);
-                change(raw, commands, source.raw, to, Access::TransferSrc);
-                // The clear before the blit writes the same texels.
+                if std::mem::take(&mut slot.fresh) {
+                    change(raw, commands, slot.image.raw, vk::ImageLayout::UNDEFINED, Access::TransferDst);
+                    let [width, height] = placed.size;
+                    let region = vk::BufferImageCopy::default().image_subresource(LAYER).image_extent(vk::Extent3D {
+                        width,
+                        height,
+                        depth: 1,
+                    });
+                    raw.cmd_copy_buffer_to_image(commands, slot.staging.raw, slot.image.raw, to, &[region]);
+                    change(raw, commands, slot.image.raw, to, Access::TransferSrc);
+                }
+                // What was written before the blit, the clear or another picture, are the same texels.
                 change(raw, commands, image, to, Access::TransferDst);
                 if let Some([from, to]) = clipped(placed, [width, height]) {
                     let corner = |[x, y]: [i32; 2], z| vk::Offset3D { x, y, z };
@@ -409,7 +426,7 @@ impl Presenter {
                         .dst_offsets([corner(to[0], 0), corner(to[1], 1)]);
                     raw.cmd_blit_image(
                         commands,
-                        source.raw,
+                        slot.image.raw,
                         vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
                         image,
                         vk::ImageLayout::TRANSFER_DST_OPTIMAL,
@@ -527,9 +544,11 @@ unsafe fn change(
 fn clipped(placed: &Placed<'_>, window: [u32; 2]) -> Option<[[[i32; 2]; 2]; 2]> {
     let [left, top, right, bottom] = placed.place;
     let (low, high) = ([left, top], [right, bottom]);
+    let [first_column, end_column] = placed.columns;
+    let seen = [[first_column.max(0), end_column.min(window[0] as i32)], [0, window[1] as i32]];
     let mut corners = [[[0; 2]; 2]; 2];
     for axis in 0..2 {
-        let (from, to) = (low[axis].max(0), high[axis].min(window[axis] as i32));
+        let (from, to) = (low[axis].max(seen[axis][0]), high[axis].min(seen[axis][1]));
         let whole = high[axis] - low[axis];
         if from >= to || whole <= 0 {
             return None;
@@ -554,10 +573,14 @@ mod tests {
 
     #[test]
     fn what_is_outside_of_the_window_is_not_copied() {
-        let placed = |place| Placed { rgba: &[], size: [100, 50], version: 0, place };
+        let placed = |place| Placed { rgba: &[], size: [100, 50], version: 0, place, columns: [0, i32::MAX] };
         assert_eq!(clipped(&placed([10, 20, 110, 70]), [640, 480]), Some([[[0, 0], [100, 50]], [[10, 20], [110, 70]]]));
         assert_eq!(clipped(&placed([-30, 0, 70, 50]), [60, 480]), Some([[[30, 0], [90, 50]], [[0, 0], [60, 50]]]));
         assert_eq!(clipped(&placed([0, 0, 200, 100]), [100, 100]), Some([[[0, 0], [50, 50]], [[0, 0], [100, 100]]]));
         assert_eq!(clipped(&placed([700, 0, 800, 50]), [640, 480]), None);
+        let part = |columns| Placed { columns, ..placed([10, 20, 110, 70]) };
+        assert_eq!(clipped(&part([0, 40]), [640, 480]), Some([[[0, 0], [30, 50]], [[10, 20], [40, 70]]]));
+        assert_eq!(clipped(&part([40, 640]), [640, 480]), Some([[[30, 0], [100, 50]], [[40, 20], [110, 70]]]));
+        assert_eq!(clipped(&part([0, 10]), [640, 480]), None);
     }
 }

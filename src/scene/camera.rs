@@ -5,7 +5,7 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 use super::Bounds;
 
 /// A camera in the world. It looks along −Z of its frame; +X is right and +Y up in the picture.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
     /// Name from the file, or what made it.
     pub name: String,

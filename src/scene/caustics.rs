@@ -223,14 +223,7 @@ impl World<'_> {
         if !is_smooth(material) {
             return None;
         }
-        let first = 3 * met.triangle.primitive as usize;
-        let [u, v] = met.uv;
-        let n: DVec3 = [1.0 - u - v, u, v]
-            .into_iter()
-            .zip(&mesh.indices[first..first + 3])
-            .map(|(weight, &i)| glam::Vec3::from(mesh.normals[i as usize]).as_dvec3() * weight)
-            .sum();
-        let n = (placed.world_from_object.matrix3.inverse().transpose() * n).normalize();
+        let n = met.normal(self.scene);
         let cos = -direction.dot(n);
         if !cos.is_finite() || cos == 0.0 {
             return None;

@@ -55,6 +55,7 @@ pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
         lights,
         studio: None,
         cameras,
+        duration: nodes.duration,
         unread,
         warnings: warnings.into_iter().map(|w| format!("{file}: {w}")).collect(),
     })

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::Scene;
 use super::bvh::{Bvh, Node, Triangle};
 
 /// Where a line meets a triangle.
@@ -12,6 +13,22 @@ pub(super) struct Crossing<'a> {
     pub(super) t: f64,
     /// Barycentrics of the second and the third corner.
     pub(super) uv: [f64; 2],
+}
+
+impl Crossing<'_> {
+    /// The unit normal that the corners of the triangle give; no number where they cancel.
+    pub(super) fn normal(&self, scene: &Scene) -> DVec3 {
+        let placed = &scene.instances[self.triangle.instance as usize];
+        let mesh = &scene.meshes[placed.mesh];
+        let first = 3 * self.triangle.primitive as usize;
+        let [u, v] = self.uv;
+        let n: DVec3 = [1.0 - u - v, u, v]
+            .into_iter()
+            .zip(&mesh.indices[first..first + 3])
+            .map(|(weight, &i)| glam::Vec3::from(mesh.normals[i as usize]).as_dvec3() * weight)
+            .sum();
+        (placed.world_from_object.matrix3.inverse().transpose() * n).normalize()
+    }
 }
 
 /// Shows `crossed` what a line from `origin`, in bvh space, crosses in (`from`, what `crossed` said last], in no order.

@@ -142,6 +142,26 @@ impl Material {
         self.transmission > 0.0 && self.dispersion.disperses(f64::from(self.ior))
     }
 
+    /// n and κ at a wavelength in nm, of the metal where that is known.
+    #[must_use]
+    pub fn complex_index(&self, nm: f64) -> [f64; 2] {
+        match (&self.conductor_spectra, &self.conductor) {
+            (Some(spectra), _) => spectra.each_ref().map(|spectrum| spectrum.at(nm)),
+            // Three lamps: the nearest.
+            (None, Some([red, green, blue])) => {
+                let lamp = if nm > 585.0 {
+                    red
+                } else if nm > 485.0 {
+                    green
+                } else {
+                    blue
+                };
+                lamp.map(f64::from)
+            }
+            (None, None) => [self.dispersion.index(f64::from(self.ior), nm), 0.0],
+        }
+    }
+
     /// The grid of σ of a body that light enters.
     #[must_use]
     pub fn marched_sigma(&self) -> Option<&SigmaGrid> {

@@ -12,6 +12,7 @@ pub mod contact;
 mod container;
 pub mod emitters;
 pub mod environment;
+pub mod events;
 mod geometry;
 mod gltf_extras;
 mod gltf_import;
@@ -92,6 +93,8 @@ pub struct Scene {
     pub studio: Option<f32>,
     /// Cameras in world space, in the order of the file's nodes.
     pub cameras: Vec<Camera>,
+    /// Seconds after which nothing moves any more; `None` where there is no animation.
+    pub duration: Option<f64>,
     /// Textures and texture coordinates that are not read, with the reason, a sentence each.
     pub unread: Vec<String>,
     /// Things that were read around: each one sentence that names the file, the place and the consequence.

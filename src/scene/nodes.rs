@@ -18,6 +18,8 @@ pub(crate) struct Nodes {
     pub(crate) shown: Vec<usize>,
     /// Morph weights that an animation gives a node.
     pub(crate) animated_weights: Vec<Option<Vec<f32>>>,
+    /// The last keyframe of all animations, in seconds; `None` where there are none.
+    pub(crate) duration: Option<f64>,
 }
 
 /// A local transform, in the form the file gives it.
@@ -59,7 +61,7 @@ impl Nodes {
         let parents = parents(document)?;
         let world_from_node = place(document, &parents, &locals)?;
         let shown = shown(document, &parents, warnings);
-        Ok(Self { world_from_node, shown, animated_weights })
+        Ok(Self { world_from_node, shown, animated_weights, duration: duration(document) })
     }
 }
 
@@ -212,6 +214,14 @@ impl<const N: usize> Track<N> {
             _ => value(key, 0),
         }
     }
+}
+
+/// The last keyframe of all animations; what cannot be read is told when a moment of it is asked for.
+fn duration(document: &Document<'_>) -> Option<f64> {
+    let samplers = document.root.animations.iter().flat_map(|animation| &animation.samplers);
+    let times = samplers.filter_map(|sampler| Accessor::new(document, sampler.input.value()).ok()?.floats::<1>().ok());
+    let ends = times.filter_map(|times| times.last().map(|time| f64::from(time[0])));
+    ends.filter(|end| end.is_finite()).reduce(f64::max)
 }
 
 fn animate(document: &Document<'_>, time: f64, locals: &mut [Local], weights: &mut [Option<Vec<f32>>]) -> Result<()> {

@@ -56,7 +56,7 @@ pub fn along_lines(scene: &Scene, camera: &Camera, size: [u32; 2]) -> anyhow::Re
 }
 
 /// The line of sight through a place of the picture, −1 … 1 to the right and up: its origin and unit direction.
-fn line_through(camera: &Camera, aspect: f64, at: DVec2) -> (DVec3, DVec3) {
+pub(super) fn line_through(camera: &Camera, aspect: f64, at: DVec2) -> (DVec3, DVec3) {
     let m = camera.world_from_camera.matrix3;
     let eye = camera.world_from_camera.translation;
     let (right, up, forward) = (m.x_axis.normalize(), m.y_axis.normalize(), -m.z_axis.normalize());

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::worker::Surfaces;
+use super::shared::Surfaces;
 use crate::share::AovPixel;
 
 /// Something that is known of each pixel.
@@ -98,7 +98,7 @@ impl Layer {
                 Self::Emissive => encoded(p.emissive.into()),
             }
         };
-        surfaces.pixels.iter().zip(surfaces.radiance.iter()).flat_map(pixel).collect()
+        surfaces.pixels.iter().zip(surfaces.radiance[0].iter()).flat_map(pixel).collect()
     }
 }
 
@@ -124,10 +124,10 @@ mod tests {
         let nothing = AovPixel { material: 0, ..pixel };
         let surfaces = Surfaces {
             pixels: Arc::new(vec![pixel, nothing, pixel]),
-            radiance: Arc::new(vec![[f32::NAN, 0.0, 0.0, 1.0], [0.0, f32::INFINITY, 0.0, 1.0], [1.0; 4]]),
+            radiance: vec![Arc::new(vec![[f32::NAN, 0.0, 0.0, 1.0], [0.0, f32::INFINITY, 0.0, 1.0], [1.0; 4]])],
             size: [3, 1],
             eye: glam::DVec3::ZERO,
-            version: 1,
+            versions: [Some(1), None],
         };
         let of = |layer: Layer, i: usize| layer.draw(&surfaces)[4 * i..4 * i + 4].to_vec();
         assert_eq!(of(Layer::NotFinite, 0), [255, 0, 255, 255]);

@@ -3,9 +3,12 @@
 //! [`worker`] loads and draws samples one after the other and looks at what is wanted before each; the window shows what there is and
 //! asks for the rest. It is drawn when something happened, at most once in 16 ms, and not at all otherwise.
 
+pub mod clock;
+pub mod equations;
 pub mod layer;
 pub mod navigation;
 pub mod panels;
+pub mod shared;
 pub mod worker;
 
 use std::ffi::OsString;
@@ -27,7 +30,8 @@ use crate::image::{Picture, exr, file, png};
 use layer::Layer;
 use navigation::Navigation;
 use panels::{Action, State};
-use worker::{Open, Seen, Shared, Wanted, Worker, lock};
+use shared::{Seen, Shared, Source, Viewpoint, Wanted, lock};
+use worker::Worker;
 
 /// Between two pictures of the window: a driver's FIFO does not always wait for a screen.
 const FRAME: Duration = Duration::from_millis(16);
@@ -44,6 +48,8 @@ pub struct View<'a> {
     pub camera: Option<String>,
     /// A camera of the file.
     pub named: Option<&'a str>,
+    /// Seconds, where another time was chosen.
+    pub time: Option<f64>,
     /// How it is drawn.
     pub settings: &'a Settings,
 }
@@ -61,7 +67,7 @@ pub struct Start {
     /// Panels lie beside the picture.
     pub panels: bool,
     /// Reads scenes.
-    pub open: Open,
+    pub source: Box<dyn Source>,
     /// The command that draws a view.
     pub command: Box<dyn Fn(&View<'_>) -> String>,
     /// The scene's file, where it is one: read again when it changes.
@@ -129,8 +135,9 @@ struct OpenWindow {
     /// Of each scene, by number.
     files: Vec<Option<PathBuf>>,
     scene: u64,
-    /// The scene that the navigation belongs to, once there is one.
+    /// The scene that the navigation belongs to, once there is one, and its time.
     navigated: Option<u64>,
+    moment: Option<f64>,
     sent: Option<Wanted>,
     moving_until: Option<Instant>,
     drawn: Instant,
@@ -140,7 +147,7 @@ struct OpenWindow {
     pictures: u64,
     took: Vec<f32>,
     /// A layer as pixels, and of which picture.
-    layer: Option<(Layer, u64, Arc<Vec<u8>>, u64)>,
+    layer: Option<(Layer, [Option<u64>; 2], Arc<Vec<u8>>, u64)>,
     layers: u64,
     /// Tells of changes in the folder of the scene's file.
     watcher: Option<notify::RecommendedWatcher>,
@@ -236,7 +243,7 @@ impl ApplicationHandler<Woken> for Viewer {
 
 impl OpenWindow {
     fn new(events: &ActiveEventLoop, start: Start, proxy: EventLoopProxy<Woken>) -> Result<Self> {
-        let Start { size, settings, device: choice, validate, panels, open, command, said, file } = start;
+        let Start { size, settings, device: choice, validate, panels, source, command, said, file } = start;
         let attributes = Window::default_attributes()
             .with_title("Etalon")
             .with_inner_size(PhysicalSize::new(size[0], size[1]))
@@ -245,8 +252,7 @@ impl OpenWindow {
         let (device, presenter) = Presenter::open(window.clone(), &choice, validate)?;
         let mut state = State::new(settings.clone(), device.info().clone());
         state.panels = panels;
-        let wanted =
-            Wanted { scene: 0, file: None, camera: None, settings, moving: false, surfaces: false, quit: false };
+        let wanted = Wanted::new(settings);
         let context = egui::Context::default();
         let native = Some(window.scale_factor() as f32);
         let side = device.max_image_size() as usize;
@@ -259,7 +265,7 @@ impl OpenWindow {
             let wake = Box::new(move || drop(proxy.send_event(Woken::Seen)));
             std::thread::Builder::new()
                 .name("drawing".to_owned())
-                .spawn(move || Worker::run(device, shared, open, wake))
+                .spawn(move || Worker::run(device, shared, source, wake))
                 .context("starting the thread that draws")?
         };
         Ok(Self {
@@ -275,6 +281,7 @@ impl OpenWindow {
             files: vec![None],
             scene: 0,
             navigated: None,
+            moment: None,
             sent: None,
             moving_until: None,
             drawn: Instant::now() - FRAME,
@@ -336,15 +343,27 @@ impl OpenWindow {
         let size = self.window.inner_size();
         let layer = self.drawn_layer(&seen);
         let place = self.state.place;
-        let picture = match (&layer, &seen.shown) {
-            (Some((rgba, size, version)), _) => Some(Placed { rgba, size: *size, version: *version, place }),
-            (None, Some(shown)) => {
-                Some(Placed { rgba: &shown.rgba, size: shown.size, version: 2 * shown.version, place })
+        let [left, _, right, _] = place;
+        let pictures: Vec<Placed<'_>> = match &layer {
+            Some((rgba, size, version)) => {
+                vec![Placed { rgba, size: *size, version: *version, place, columns: [left, right] }]
             }
-            (None, None) => None,
+            None => {
+                let wipe = seen.sides[1].shown.as_ref().map_or(right, |_| self.state.wipe_column());
+                let columns = [[left, wipe], [wipe, right]];
+                let shown = seen.sides.iter().filter_map(|side| side.shown.as_ref());
+                let placed = shown.zip(columns).map(|(shown, columns)| Placed {
+                    rgba: &shown.rgba,
+                    size: shown.size,
+                    version: 2 * shown.version,
+                    place,
+                    columns,
+                });
+                placed.collect()
+            }
         };
         self.window.pre_present_notify();
-        if self.presenter.present([size.width, size.height], picture, overlay)? == Presented::Changed {
+        if self.presenter.present([size.width, size.height], &pictures, overlay)? == Presented::Changed {
             self.dirty = true;
         }
         self.pictures += 1;
@@ -405,12 +424,12 @@ impl OpenWindow {
         let wanted = self.state.layer;
         let surfaces = seen.now().filter(|_| wanted != Layer::Radiance)?;
         let known =
-            self.layer.as_ref().is_some_and(|(layer, version, ..)| *layer == wanted && *version == surfaces.version);
+            self.layer.as_ref().is_some_and(|(layer, version, ..)| *layer == wanted && *version == surfaces.versions);
         if !known {
             self.layers += 1;
             // Odd: pictures have even ones.
             let number = 2 * self.layers + 1;
-            self.layer = Some((wanted, surfaces.version, Arc::new(wanted.draw(surfaces)), number));
+            self.layer = Some((wanted, surfaces.versions, Arc::new(wanted.draw(surfaces)), number));
         }
         self.layer.as_ref().map(|(_, _, rgba, number)| (rgba.clone(), surfaces.size, *number))
     }
@@ -429,17 +448,16 @@ impl OpenWindow {
             self.state.picked = None;
             self.watch();
             self.window.set_title(&format!("{} – Etalon", facts.name));
+        } else if let (Some(facts), Some(navigation)) = (&seen.facts, &mut self.state.navigation)
+            && facts.time != self.moment
+        {
+            navigation.moment(facts.home.clone(), &facts.cameras);
         }
+        self.moment = seen.facts.as_ref().and_then(|facts| facts.time);
         if seen.failed == Some(self.scene) {
             self.scene = self.navigated.unwrap_or(self.scene);
         }
-        let shown = seen.shown.as_ref().filter(|shown| !shown.moving).map(|shown| (shown.version, shown.samples));
-        let ready = seen
-            .surfaces
-            .as_ref()
-            .zip(shown)
-            .is_some_and(|(s, (version, [done, of]))| s.version == version && done == of);
-        if self.writes_exr && ready {
+        if self.writes_exr && seen.now().is_some() && seen.shown().is_some_and(shared::Shown::is_done) {
             self.writes_exr = false;
             self.state.message = Some(told(self.write_exr(seen)));
         }
@@ -450,6 +468,7 @@ impl OpenWindow {
             Action::Open(path) => {
                 self.scene = self.files.len() as u64;
                 self.files.push(Some(path.clone()));
+                self.state.clock.stop();
                 self.state.recent.retain(|known| *known != path);
                 self.state.recent.insert(0, path.clone());
                 self.state.recent.truncate(10);
@@ -488,6 +507,7 @@ impl OpenWindow {
             file: self.file(),
             named: navigation.and_then(Navigation::named).filter(|_| !moved),
             settings: &self.state.settings,
+            time: self.moment,
             camera,
         };
         (view.camera.is_some() || !moved).then(|| (self.command)(&view))
@@ -502,16 +522,25 @@ impl OpenWindow {
         self.moving_until = self.moving_until.filter(|until| *until > now);
         // A scene that is read again is seen from where it was.
         let belongs = self.navigated == Some(self.scene) || self.again == Some(self.scene);
+        let from = |navigation: &Navigation| match (navigation.moved(), navigation.named()) {
+            (true, _) => Viewpoint::Free(navigation.camera()),
+            (false, Some(name)) => Viewpoint::Named(name.to_owned()),
+            (false, None) => Viewpoint::Own,
+        };
         let wanted = Wanted {
             scene: self.scene,
             file: self.files.get(self.scene as usize).cloned().flatten(),
-            camera: self.state.navigation.as_ref().filter(|_| belongs).map(Navigation::camera),
+            time: self.state.clock.time,
+            from: self.state.navigation.as_ref().filter(|_| belongs).map_or(Viewpoint::Own, from),
             settings: self.state.settings.clone(),
+            other: self.state.other.clone(),
             moving: self.moving_until.is_some(),
             surfaces: self.state.wants_surfaces() || self.writes_exr,
+            picked: self.state.picked,
+            programs: 0,
             quit: false,
         };
-        if self.sent.as_ref().is_none_or(|sent| !same(sent, &wanted)) {
+        if self.sent.as_ref().is_none_or(|sent| !sent.is_as(&wanted)) {
             self.sent = Some(wanted.clone());
             self.shared.want(|now| *now = wanted);
         }
@@ -528,7 +557,7 @@ impl OpenWindow {
     }
 
     fn write_png(&self, seen: &Seen) -> Result<PathBuf> {
-        let shown = seen.shown.as_ref().context("there is no picture yet")?;
+        let shown = seen.shown().context("there is no picture yet")?;
         let path = self.free_name(seen, "png");
         file::write(&path, &png::encode_png(shown.size[0], shown.size[1], &shown.rgba, false)?)?;
         Ok(path)
@@ -538,7 +567,7 @@ impl OpenWindow {
         let surfaces = seen.surfaces.as_ref().context("there is no picture yet")?;
         let path = self.free_name(seen, "exr");
         let [width, height] = surfaces.size;
-        let picture = Picture { width, height, rgba: surfaces.radiance.to_vec() };
+        let picture = Picture { width, height, rgba: surfaces.radiance[0].to_vec() };
         file::write(&path, &exr::encode_exr(&picture, &[], &[])?)?;
         Ok(path)
     }
@@ -572,16 +601,4 @@ fn told(written: Result<PathBuf>) -> String {
         Ok(path) => format!("written: {}", path.display()),
         Err(error) => format!("{error:#}"),
     }
-}
-
-/// Whether the same is to be seen.
-fn same(a: &Wanted, b: &Wanted) -> bool {
-    let view = |wanted: &Wanted| wanted.camera.as_ref().map(|camera| (camera.world_from_camera, camera.projection));
-    let display = |settings: &Settings| {
-        let Settings { size, tonemap, exposure, environment_rotation, .. } = settings;
-        (*size, *tonemap, *exposure, *environment_rotation)
-    };
-    (a.scene, a.moving, a.surfaces, display(&a.settings), view(a))
-        == (b.scene, b.moving, b.surfaces, display(&b.settings), view(b))
-        && a.settings.knobs == b.settings.knobs
 }

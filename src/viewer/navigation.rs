@@ -122,6 +122,19 @@ impl Navigation {
         self.moved = true;
     }
 
+    /// The scene is at another time: a camera of the file has moved with it.
+    pub fn moment(&mut self, home: Camera, cameras: &[Camera]) {
+        if self.framed {
+            return;
+        }
+        self.home = home;
+        if !self.moved {
+            let named = cameras.iter().find(|camera| Some(&camera.name) == self.named.as_ref());
+            self.view = named.unwrap_or(&self.home).clone();
+            self.distance = self.distance_to_middle();
+        }
+    }
+
     /// Takes the last movement back; false where there is none.
     pub fn undo(&mut self) -> bool {
         let Some((view, distance, moved, named)) = self.before.pop() else { return false };

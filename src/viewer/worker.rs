@@ -1,19 +1,17 @@
 //! The thread that loads and draws: it looks at what is wanted before each sample, and shows what it has after some.
 
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
 
-use crate::cost::table::Table;
+use super::shared::{Difference, Loaded, Pick, SceneFacts, Seen, Shared, Shown, Source, Surfaces, Trace, Wanted, lock};
 use crate::frame::{Drawing, Renderer, Settings};
-use crate::gpu::{Device, DeviceInfo, PassTime, is_lost};
-use crate::pass::tonemap::Counts;
-use crate::plan::{Effect, Knobs};
-use crate::scene::environment::Environment;
-use crate::scene::{Bounds, Camera, Material, Scene};
-use crate::share::AovPixel;
+use crate::gpu::{Device, PassTime, is_lost};
+use crate::image::metric::{AnyPicture, Metric, compare};
+use crate::image::png::Display;
+use crate::plan::Knobs;
+use crate::scene::events::{Limits, Tracer};
 
 /// Milliseconds that a picture may take while the view moves: it gets smaller until it does.
 const MOVING_MS: f64 = 40.0;
@@ -21,209 +19,56 @@ const MOVING_MS: f64 = 40.0;
 const SMALLER: [u32; 6] = [1, 2, 3, 4, 6, 8];
 /// Between two looks at a picture under way.
 const LOOK: Duration = Duration::from_millis(100);
+/// Share of a pixel's light below which its ray is not followed.
+const LEAST_SHARE: f64 = 0.002;
 
-/// A scene as it comes out of a file.
-pub struct Loaded {
-    /// Its name.
-    pub name: String,
-    /// The scene.
-    pub scene: Scene,
-    /// What lights it from all around, and how strongly.
-    pub environment: Option<(Environment, f32)>,
-    /// The camera that it begins with, and those of the file.
-    pub camera: Camera,
-    /// What was read around.
-    pub warnings: Vec<String>,
-    /// Prices of rungs, where they were measured on this device.
-    pub prices: Option<Table>,
-    /// The camera frames the scene for a size: for another it is another.
-    pub framed: bool,
-    /// Rungs that it is drawn with where nobody chose others.
-    pub knobs: Option<Knobs>,
-}
-
-/// Reads a scene for pictures of a size on a device: the one of the command line, or another file.
-pub type Open = Box<dyn Fn(Option<&Path>, [u32; 2], &DeviceInfo) -> Result<Loaded> + Send>;
-
-/// What is to be seen.
-#[derive(Clone)]
-pub struct Wanted {
-    /// Another number: another scene.
-    pub scene: u64,
-    /// Its file; `None`: that of the command line.
-    pub file: Option<PathBuf>,
-    /// From where; `None`: the scene's own.
-    pub camera: Option<Camera>,
-    /// How.
-    pub settings: Settings,
-    /// The view moves: quickly, rather than well.
-    pub moving: bool,
-    /// Surfaces at the pixels are wanted, too.
-    pub surfaces: bool,
-    /// Nothing more.
-    pub quit: bool,
-}
-
-/// What there is to be known of a scene.
-#[derive(Clone)]
-pub struct SceneFacts {
-    /// Which scene.
-    pub scene: u64,
-    /// Name.
-    pub name: String,
-    /// Box around it.
-    pub bounds: Bounds,
-    /// Where it is seen from first.
-    pub home: Camera,
-    /// It frames the scene: no words but its own place name it.
-    pub framed: bool,
-    /// Rungs that the scene is drawn with at first.
-    pub knobs: Option<Knobs>,
-    /// Those of the file.
-    pub cameras: Vec<Camera>,
-    /// Triangles, instances, lights.
-    pub counts: [usize; 3],
-    /// Materials.
-    pub materials: Arc<Vec<Material>>,
-    /// Names of instances.
-    pub instances: Arc<Vec<String>>,
-    /// What was read around.
-    pub warnings: Vec<String>,
-    /// Prices of rungs, where they were measured.
-    pub prices: Option<Arc<Table>>,
-}
-
-/// A picture, perhaps under way.
-#[derive(Clone)]
-pub struct Shown {
-    /// Counts up.
-    pub version: u64,
-    /// As a display shows it.
-    pub rgba: Arc<Vec<u8>>,
-    /// Pixels.
-    pub size: [u32; 2],
-    /// Samples of so many.
-    pub samples: [u32; 2],
-    /// Drawn while the view moved.
-    pub moving: bool,
-    /// GPU time of each pass, of a sample.
-    pub passes: Vec<PassTime>,
-    /// Values that are no radiances.
-    pub counts: Counts,
-}
-
-/// Surfaces at the pixel centres of a picture.
-#[derive(Clone)]
-pub struct Surfaces {
-    /// Row by row.
-    pub pixels: Arc<Vec<AovPixel>>,
-    /// Radiance of the same pixels.
-    pub radiance: Arc<Vec<[f32; 4]>>,
-    /// Pixels across and down.
-    pub size: [u32; 2],
-    /// What positions are relative to.
-    pub eye: glam::DVec3,
-    /// The picture that they were read with.
-    pub version: u64,
-}
-
-/// What the worker has to say.
-#[derive(Clone, Default)]
-pub struct Seen {
-    /// The scene.
-    pub facts: Option<SceneFacts>,
-    /// The picture.
-    pub shown: Option<Shown>,
-    /// Every effect with its reason.
-    pub effects: Vec<Effect>,
-    /// What the plan warns of.
-    pub warnings: Vec<String>,
-    /// Surfaces, where they are wanted.
-    pub surfaces: Option<Surfaces>,
-    /// What it is doing, when that takes long.
-    pub busy: Option<String>,
-    /// What went wrong last.
-    pub error: Option<String>,
-    /// A scene that could not be read: the one before stays.
-    pub failed: Option<u64>,
-    /// The device is gone: nothing more will be drawn.
-    pub lost: bool,
-}
-
-impl Seen {
-    /// Surfaces of the picture that is seen; `None` until they are read.
-    #[must_use]
-    pub fn now(&self) -> Option<&Surfaces> {
-        let version = self.shown.as_ref().map(|shown| shown.version);
-        self.surfaces.as_ref().filter(|surfaces| Some(surfaces.version) == version)
-    }
-}
-
-/// What is wanted and what is seen, between two threads.
-pub struct Shared {
-    wanted: Mutex<(Wanted, u64)>,
-    changed: Condvar,
-    seen: Mutex<Seen>,
-}
-
-/// Locks without caring about a panic elsewhere: what is wanted and seen is whole at any time.
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-impl Shared {
-    /// Begins with something wanted.
-    #[must_use]
-    pub fn new(wanted: Wanted) -> Self {
-        Self { wanted: Mutex::new((wanted, 1)), changed: Condvar::new(), seen: Mutex::default() }
-    }
-
-    /// Wants something else.
-    pub fn want(&self, change: impl FnOnce(&mut Wanted)) {
-        let mut wanted = lock(&self.wanted);
-        change(&mut wanted.0);
-        wanted.1 += 1;
-        self.changed.notify_one();
-    }
-
-    /// What there is to be seen.
-    #[must_use]
-    pub fn seen(&self) -> Seen {
-        lock(&self.seen).clone()
-    }
-
-    /// Takes an error off the screen.
-    pub fn dismiss(&self) {
-        lock(&self.seen).error = None;
-    }
-}
-
-/// The scene and its renderer.
-struct Stage {
-    scene: u64,
-    loaded: Loaded,
+/// What draws one side of the window.
+struct Side {
     renderer: Renderer,
     /// Of the renderer.
     settings: Settings,
-    /// Those that could not be drawn: they are not tried again.
-    refused: Option<Settings>,
+    drawing: Option<Drawing>,
+    /// Wall nanoseconds of a pixel of a sample.
+    ns_per_pixel: f64,
+    looked: Instant,
 }
 
-impl Stage {
-    fn lit(&self, settings: &Settings) -> Settings {
-        lit(&self.loaded, settings)
+impl Side {
+    fn new(device: &Arc<Device>, loaded: &Loaded, settings: Settings) -> Result<Self> {
+        let environment = loaded.environment.as_ref().map(|(environment, _)| &**environment);
+        let renderer = Renderer::new(device, loaded.scene.clone(), environment, settings.clone())?;
+        Ok(Self { renderer, settings, drawing: None, ns_per_pixel: 0.0, looked: Instant::now() })
+    }
+
+    fn is_done(&self) -> bool {
+        self.drawing.as_ref().is_none_or(Drawing::is_done)
+    }
+
+    /// How much of its picture is drawn.
+    fn progress(&self) -> f64 {
+        let samples = self.drawing.as_ref().map_or(0, Drawing::samples);
+        f64::from(samples) / f64::from(self.renderer.plan.samples.max(1))
     }
 }
 
-/// Settings with the environment as strong as the scene says.
-fn lit(loaded: &Loaded, settings: &Settings) -> Settings {
-    let share = loaded.environment.as_ref().map_or(1.0, |(_, share)| *share);
-    Settings { environment_intensity: settings.environment_intensity * share, ..settings.clone() }
+/// The scene and what draws it.
+struct Stage {
+    scene: u64,
+    time: Option<f64>,
+    loaded: Loaded,
+    sides: Vec<Side>,
+    /// Settings that could not be drawn: they are not tried again.
+    refused: [Option<Settings>; 2],
+    /// Made when a ray is followed for the first time.
+    tracer: Option<Tracer>,
 }
 
-fn renderer(device: &Arc<Device>, loaded: &Loaded, settings: Settings) -> Result<Renderer> {
-    let environment = loaded.environment.as_ref().map(|(environment, _)| environment);
-    Renderer::new(device, loaded.scene.clone(), environment, settings)
+/// Settings of a side, with the environment as strong as the scene says.
+fn settings_of(loaded: &Loaded, wanted: &Wanted, side: usize) -> Settings {
+    let share = loaded.environment.as_ref().map_or(1.0, |(_, share)| *share);
+    let settings = wanted.settings.clone();
+    let knobs = wanted.other.clone().filter(|_| side == 1).unwrap_or(settings.knobs);
+    Settings { environment_intensity: settings.environment_intensity * share, knobs, ..settings }
 }
 
 /// Whether a renderer for the one draws the other as well.
@@ -240,26 +85,22 @@ fn same_renderer(a: &Settings, b: &Settings) -> bool {
 pub struct Worker {
     device: Arc<Device>,
     shared: Arc<Shared>,
-    open: Open,
+    source: Box<dyn Source>,
     wake: Box<dyn Fn() + Send>,
     stage: Option<Stage>,
     version: u64,
-    /// Wall nanoseconds of a pixel of a sample.
-    ns_per_pixel: f64,
 }
 
 impl Worker {
     /// Loads and draws until nothing more is wanted.
-    pub fn run(device: Arc<Device>, shared: Arc<Shared>, open: Open, wake: Box<dyn Fn() + Send>) {
-        let mut worker = Self { device, shared, open, wake, stage: None, version: 0, ns_per_pixel: 0.0 };
-        let mut drawing: Option<Drawing> = None;
-        let (mut known, mut looked) = (0, Instant::now());
+    pub fn run(device: Arc<Device>, shared: Arc<Shared>, source: Box<dyn Source>, wake: Box<dyn Fn() + Send>) {
+        let mut worker = Self { device, shared, source, wake, stage: None, version: 0 };
+        let mut known = 0;
         let mut last: Option<Wanted> = None;
         loop {
             let (wanted, number) = {
                 let mut wanted = lock(&worker.shared.wanted);
-                let idle = |drawing: &Option<Drawing>| drawing.as_ref().is_none_or(Drawing::is_done);
-                while wanted.1 == known && idle(&drawing) {
+                while wanted.1 == known && worker.is_idle() {
                     wanted = worker.shared.changed.wait(wanted).unwrap_or_else(PoisonError::into_inner);
                 }
                 wanted.clone()
@@ -267,16 +108,13 @@ impl Worker {
             if wanted.quit {
                 return;
             }
-            let result = if number == known {
-                worker.refine(&wanted, &mut drawing, &mut looked)
-            } else {
-                known = number;
-                looked = Instant::now();
-                worker.begin(&wanted, last.as_ref(), &mut drawing)
-            };
+            // A sample is drawn after each change: a scene that never rests is seen, too.
+            let begun = if number == known { Ok(()) } else { worker.begin(&wanted, last.as_ref()) };
+            let result = begun.and_then(|()| worker.refine(&wanted));
+            known = number;
             last = Some(wanted);
             if let Err(error) = result {
-                drawing = None;
+                worker.stage.iter_mut().flat_map(|stage| &mut stage.sides).for_each(|side| side.drawing = None);
                 let lost = is_lost(&error);
                 worker.say(|seen| {
                     seen.error = Some(format!("{error:#}"));
@@ -289,65 +127,69 @@ impl Worker {
         }
     }
 
+    fn is_idle(&self) -> bool {
+        self.stage.as_ref().is_none_or(|stage| stage.sides.iter().all(Side::is_done))
+    }
+
     fn say(&self, change: impl FnOnce(&mut Seen)) {
         change(&mut lock(&self.shared.seen));
         (self.wake)();
     }
 
     /// Something else is wanted.
-    fn begin(&mut self, wanted: &Wanted, last: Option<&Wanted>, drawing: &mut Option<Drawing>) -> Result<()> {
-        let here = self.stage.as_ref().map(|stage| stage.scene);
-        if here != Some(wanted.scene) && last.map(|last| last.scene) != Some(wanted.scene) {
-            *drawing = None;
-            self.load(wanted)?;
+    fn begin(&mut self, wanted: &Wanted, last: Option<&Wanted>) -> Result<()> {
+        let here = self.stage.as_ref().map(|stage| (stage.scene, stage.time));
+        let tried = last.map(|last| (last.scene, last.time));
+        let at = (wanted.scene, wanted.time);
+        if here != Some(at) && tried != Some(at) {
+            let other_scene = here.map(|(scene, _)| scene) != Some(wanted.scene);
+            if other_scene { self.load(wanted)? } else { self.go_to(wanted)? }
         }
+        self.follow_knobs(wanted, last)?;
         let Some(stage) = &mut self.stage else { return Ok(()) };
-        let settings = stage.lit(&wanted.settings);
-        let ready = same_renderer(&stage.settings, &settings);
-        let refused = stage.refused.as_ref().is_some_and(|r| r.size == settings.size && same_renderer(r, &settings));
-        if ready && stage.refused.take().is_some() {
-            self.say(|seen| seen.error = None);
-        } else if !ready && !refused {
-            *drawing = None;
-            self.plan(settings.clone())?;
+        let camera = wanted.from.camera(&stage.loaded)?;
+        let same_view = last.is_some_and(|last| {
+            // What is the scene's own may have moved with its time.
+            (&last.from, last.moving) == (&wanted.from, wanted.moving) && tried == Some(at)
+        });
+        let ns: f64 = stage.sides.iter().map(|side| side.ns_per_pixel).sum();
+        let mut developed = Vec::new();
+        for (index, side) in stage.sides.iter_mut().enumerate() {
+            let Settings { size, tonemap, exposure, .. } = wanted.settings;
+            let size = if wanted.moving { smaller(size, ns) } else { size };
+            let all = side.settings.knobs.samples();
+            let samples = if wanted.moving { 1 } else { all };
+            let same_display = (side.settings.tonemap, side.settings.exposure) == (tonemap, exposure);
+            (side.settings.tonemap, side.settings.exposure) = (tonemap, exposure);
+            side.renderer.develop(tonemap, exposure);
+            if side.settings.size != size {
+                side.drawing = None;
+                // There is room for the sum of all samples, however many are drawn.
+                side.renderer.plan.samples = all;
+                side.renderer.resize(size)?;
+                side.settings.size = size;
+            }
+            if !same_view || side.drawing.is_none() || side.renderer.plan.samples != samples {
+                side.renderer.plan.samples = samples;
+                side.drawing = Some(side.renderer.begin(camera));
+            } else if !same_display && side.drawing.as_ref().is_some_and(Drawing::is_whole) {
+                developed.push(index);
+            }
         }
-        let Some(stage) = &mut self.stage else { return Ok(()) };
-        let renderer = &mut stage.renderer;
-        let size = if wanted.moving { smaller(settings.size, self.ns_per_pixel) } else { settings.size };
-        let all = stage.settings.knobs.samples();
-        let samples = if wanted.moving { 1 } else { all };
-        let developed = (stage.settings.tonemap, stage.settings.exposure) != (settings.tonemap, settings.exposure);
-        (stage.settings.tonemap, stage.settings.exposure) = (settings.tonemap, settings.exposure);
-        renderer.develop(settings.tonemap, settings.exposure);
-        if stage.settings.size != size {
-            *drawing = None;
-            // There is room for the sum of all samples, however many are drawn.
-            renderer.plan.samples = all;
-            renderer.resize(size)?;
-            stage.settings.size = size;
+        for side in developed {
+            self.show(wanted, side)?;
         }
-        let camera = wanted.camera.as_ref().unwrap_or(&stage.loaded.camera);
-        let seen_from =
-            |wanted: &Wanted| wanted.camera.as_ref().map(|camera| (camera.world_from_camera, camera.projection));
-        let same_view = last.is_some_and(|last| seen_from(last) == seen_from(wanted) && last.moving == wanted.moving);
-        if !same_view || drawing.is_none() || renderer.plan.samples != samples {
-            renderer.plan.samples = samples;
-            *drawing = Some(renderer.begin(camera));
-        } else if developed && drawing.as_ref().is_some_and(Drawing::is_whole) {
-            self.show(wanted, drawing.as_ref())?;
+        if self.is_idle() {
+            self.finish(wanted)?;
         }
-        if wanted.surfaces && !wanted.moving && drawing.as_ref().is_some_and(Drawing::is_done) {
-            self.read_surfaces(wanted)?;
-        }
-        Ok(())
+        self.trace(wanted, last)
     }
 
     /// Reads a scene and makes ready to draw it; what cannot be read, or drawn, leaves the one before.
     fn load(&mut self, wanted: &Wanted) -> Result<()> {
         let name = wanted.file.as_ref().map_or("the scene".to_owned(), |file| file.display().to_string());
         self.say(|seen| seen.busy = Some(format!("reading {name}")));
-        let loaded = (self.open)(wanted.file.as_deref(), wanted.settings.size, self.device.info());
-        let found = loaded.and_then(|loaded| {
+        let found = self.source.open(wanted.asked(), self.device.info()).and_then(|loaded| {
             self.say(|seen| seen.busy = Some("uploading and compiling".to_owned()));
             self.ready(wanted, loaded)
         });
@@ -355,135 +197,246 @@ impl Worker {
             seen.busy = None;
             seen.failed = found.is_err().then_some(wanted.scene);
         });
-        let (stage, facts) = found?;
-        self.tell_plan(&stage.renderer);
-        self.ns_per_pixel = 0.0;
-        self.stage = Some(stage);
-        self.say(|seen| {
-            seen.facts = Some(facts);
-            seen.surfaces = None;
-            seen.error = None;
-        });
+        self.take_over(found?);
         Ok(())
     }
 
-    /// A scene with its renderer, and what there is to be known of it.
-    fn ready(&self, wanted: &Wanted, mut loaded: Loaded) -> Result<(Stage, SceneFacts)> {
-        let scene = &loaded.scene;
-        let bounds = scene.bounds().with_context(|| format!("{}: there is nothing to draw", loaded.name))?;
-        let facts = SceneFacts {
-            scene: wanted.scene,
-            name: loaded.name.clone(),
-            bounds,
-            home: loaded.camera.clone(),
-            framed: loaded.framed,
-            knobs: loaded.knobs.clone(),
-            cameras: scene.cameras.clone(),
-            counts: [scene.triangles(), scene.instances.len(), scene.lights.len()],
-            materials: Arc::new(scene.materials.clone()),
-            instances: Arc::new(scene.instances.iter().map(|instance| instance.name.clone()).collect()),
-            warnings: loaded.warnings.clone(),
-            prices: loaded.prices.take().map(Arc::new),
+    /// The same scene at another time.
+    fn go_to(&mut self, wanted: &Wanted) -> Result<()> {
+        let Some(stage) = &self.stage else { return Ok(()) };
+        let (scene, camera) = self.source.moment(wanted.asked())?;
+        let Loaded { name, environment, warnings, prices, framed, knobs, .. } = &stage.loaded;
+        let loaded = Loaded {
+            name: name.clone(),
+            scene,
+            environment: environment.clone(),
+            camera,
+            warnings: warnings.clone(),
+            prices: prices.clone(),
+            framed: *framed,
+            knobs: knobs.clone(),
         };
-        let settings = lit(&loaded, &wanted.settings);
-        let renderer = renderer(&self.device, &loaded, settings.clone())?;
-        Ok((Stage { scene: wanted.scene, loaded, renderer, settings, refused: None }, facts))
+        // Times of samples are much the same from one moment to the next.
+        let ns = self.stage.as_ref().and_then(|stage| stage.sides.first()).map_or(0.0, |side| side.ns_per_pixel);
+        let (mut stage, facts) = self.ready(wanted, loaded)?;
+        stage.sides.iter_mut().for_each(|side| side.ns_per_pixel = ns);
+        self.take_over((stage, facts));
+        Ok(())
     }
 
-    /// Plans and uploads for other rungs; those that cannot be drawn leave what is there.
-    fn plan(&mut self, settings: Settings) -> Result<()> {
+    /// A scene with what draws it, and what there is to be known of it.
+    fn ready(&self, wanted: &Wanted, loaded: Loaded) -> Result<(Stage, SceneFacts)> {
+        let facts = SceneFacts::of(wanted, &loaded)?;
+        let side = Side::new(&self.device, &loaded, settings_of(&loaded, wanted, 0))?;
+        let (scene, time) = (wanted.scene, wanted.time);
+        Ok((Stage { scene, time, loaded, sides: vec![side], refused: [None, None], tracer: None }, facts))
+    }
+
+    fn take_over(&mut self, (stage, facts): (Stage, SceneFacts)) {
+        self.stage = Some(stage);
+        self.tell_plan(0);
+        self.say(|seen| {
+            seen.facts = Some(Arc::new(facts));
+            (seen.surfaces, seen.error) = (None, None);
+        });
+    }
+
+    /// As many sides as are wanted, with their rungs; those that cannot be drawn leave what is there.
+    fn follow_knobs(&mut self, wanted: &Wanted, last: Option<&Wanted>) -> Result<()> {
+        let Some(stage) = &mut self.stage else { return Ok(()) };
+        if wanted.other.is_none() && stage.sides.len() > 1 {
+            stage.sides.truncate(1);
+            self.say(|seen| (seen.sides[1], seen.difference) = Default::default());
+        }
+        // Programs that were compiled anew are for all.
+        let renewed = last.is_some_and(|last| last.programs != wanted.programs);
+        for index in 0..1 + usize::from(wanted.other.is_some()) {
+            let Some(stage) = &mut self.stage else { return Ok(()) };
+            let settings = settings_of(&stage.loaded, wanted, index);
+            let ready = stage.sides.get(index).is_some_and(|side| same_renderer(&side.settings, &settings)) && !renewed;
+            let refused =
+                stage.refused[index].as_ref().is_some_and(|r| r.size == settings.size && same_renderer(r, &settings));
+            if ready && stage.refused[index].take().is_some() {
+                self.say(|seen| seen.error = None);
+            } else if !ready && (!refused || renewed) {
+                self.plan(settings, index)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Plans and uploads one side for other rungs.
+    fn plan(&mut self, settings: Settings, index: usize) -> Result<()> {
         self.say(|seen| seen.busy = Some("uploading and compiling".to_owned()));
         let Some(stage) = &mut self.stage else { return Ok(()) };
-        let made = renderer(&self.device, &stage.loaded, settings.clone());
+        let made = Side::new(&self.device, &stage.loaded, settings.clone());
         let made = match made {
-            Ok(renderer) => {
-                (stage.renderer, stage.settings, stage.refused) = (renderer, settings, None);
+            Ok(side) => {
+                stage.refused[index] = None;
+                // Other rungs take other times: the next sample tells.
+                if index < stage.sides.len() {
+                    stage.sides[index] = side;
+                } else {
+                    stage.sides.push(side);
+                }
                 Ok(())
             }
             Err(error) => {
-                stage.refused = Some(settings);
+                stage.refused[index] = Some(settings);
                 Err(error)
             }
         };
-        // Other rungs take other times: the next sample tells.
-        self.ns_per_pixel = 0.0;
-        self.say(|seen| {
-            seen.busy = None;
-            seen.error = None;
-        });
+        self.say(|seen| (seen.busy, seen.error) = (None, None));
         made?;
-        if let Some(stage) = &self.stage {
-            self.tell_plan(&stage.renderer);
-        }
+        self.tell_plan(index);
         Ok(())
     }
 
-    fn tell_plan(&self, renderer: &Renderer) {
-        let warnings = [renderer.plan.warnings.clone(), renderer.warnings.clone()].concat();
-        self.say(|seen| (seen.effects, seen.warnings) = (renderer.plan.effects.clone(), warnings));
+    fn tell_plan(&self, index: usize) {
+        let Some(side) = self.stage.as_ref().and_then(|stage| stage.sides.get(index)) else { return };
+        let warnings = [side.renderer.plan.warnings.clone(), side.renderer.warnings.clone()].concat();
+        self.say(|seen| {
+            (seen.sides[index].effects, seen.sides[index].warnings) =
+                (side.renderer.plan.effects.clone().into(), warnings.into());
+        });
     }
 
-    /// One more sample.
-    fn refine(&mut self, wanted: &Wanted, drawing: &mut Option<Drawing>, looked: &mut Instant) -> Result<()> {
-        let (Some(stage), Some(under_way)) = (&mut self.stage, drawing.as_mut()) else { return Ok(()) };
-        let renderer = &mut stage.renderer;
+    /// One more sample, or band of it, of the side that is less far.
+    fn refine(&mut self, wanted: &Wanted) -> Result<()> {
+        let Some(stage) = &mut self.stage else { return Ok(()) };
+        let unfinished = stage.sides.iter_mut().enumerate().filter(|(_, side)| !side.is_done());
+        let Some((index, side)) = unfinished.min_by(|a, b| a.1.progress().total_cmp(&b.1.progress())) else {
+            return Ok(());
+        };
+        let Some(drawing) = &mut side.drawing else { return Ok(()) };
         let begun = Instant::now();
-        let before = under_way.samples();
-        renderer.step(under_way)?;
+        let before = drawing.samples();
+        side.renderer.step(drawing)?;
         let took = begun.elapsed();
-        let [width, height] = stage.settings.size;
-        if under_way.samples() == before {
+        if drawing.samples() == before {
             return Ok(());
         }
         // The first sample compiles; what is quicker is believed at once.
+        let [width, height] = side.settings.size;
         let ns = took.as_secs_f64() * 1e9 / f64::from(width) / f64::from(height);
-        let known = self.ns_per_pixel;
-        self.ns_per_pixel = if known == 0.0 || ns < known { ns } else { known + 0.2 * (ns - known) };
-        if under_way.is_done() || under_way.samples() == 1 || looked.elapsed() >= LOOK {
-            *looked = Instant::now();
-            let done = under_way.is_done();
-            self.show(wanted, drawing.as_ref())?;
-            if done && wanted.surfaces && !wanted.moving {
-                self.read_surfaces(wanted)?;
-            }
+        let known = side.ns_per_pixel;
+        side.ns_per_pixel = if known == 0.0 || ns < known { ns } else { known + 0.2 * (ns - known) };
+        if drawing.is_done() || drawing.samples() == 1 || side.looked.elapsed() >= LOOK {
+            side.looked = Instant::now();
+            self.show(wanted, index)?;
         }
-        Ok(())
+        if self.is_idle() { self.finish(wanted) } else { Ok(()) }
     }
 
-    fn show(&mut self, wanted: &Wanted, drawing: Option<&Drawing>) -> Result<()> {
-        let (Some(stage), Some(drawing)) = (&mut self.stage, drawing) else { return Ok(()) };
-        let renderer = &mut stage.renderer;
-        let rendered = renderer.picture(drawing)?;
+    fn show(&mut self, wanted: &Wanted, index: usize) -> Result<()> {
+        let Some(side) = self.stage.as_mut().and_then(|stage| stage.sides.get_mut(index)) else { return Ok(()) };
+        let Some(drawing) = &side.drawing else { return Ok(()) };
+        let rendered = side.renderer.picture(drawing)?;
         self.version += 1;
         let each = f64::from(rendered.samples.max(1));
+        let work = rendered.work;
         let shown = Shown {
             version: self.version,
             rgba: Arc::new(rendered.display),
-            size: stage.settings.size,
-            samples: [rendered.samples, renderer.plan.samples],
+            size: side.settings.size,
+            samples: [rendered.samples, side.renderer.plan.samples],
             moving: wanted.moving,
             passes: rendered.passes.into_iter().map(|pass| PassTime { ms: pass.ms / each, ..pass }).collect(),
+            rays: (work.reflection + work.refraction + work.shadow + work.indirect)
+                / u64::from(rendered.samples.max(1)),
             counts: rendered.counts,
+            error: rendered.errors.last().map(|error| error.relmse.sqrt()),
         };
-        self.say(|seen| seen.shown = Some(shown));
+        self.say(|seen| seen.sides[index].shown = Some(shown));
+        Ok(())
+    }
+
+    /// What is asked of pictures that are finished.
+    fn finish(&mut self, wanted: &Wanted) -> Result<()> {
+        if wanted.moving {
+            return Ok(());
+        }
+        if wanted.surfaces {
+            self.read_surfaces(wanted)?;
+        }
+        let shown = lock(&self.shared.seen).sides.each_ref().map(|side| side.shown.clone());
+        if let ([Some(left), Some(right)], true) = (shown, wanted.other.is_some())
+            && left.is_done()
+            && right.is_done()
+            && left.size == right.size
+        {
+            let picture = |shown: &Shown| {
+                let rgba = shown.rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect();
+                AnyPicture::Display(Display { width: shown.size[0], height: shown.size[1], rgba })
+            };
+            let versions = [left.version, right.version];
+            if lock(&self.shared.seen).difference.is_none_or(|known| known.versions != versions) {
+                let flip = compare(Metric::Flip, &picture(&left), &picture(&right))?.value;
+                self.say(|seen| seen.difference = Some(Difference { versions, flip }));
+            }
+        }
         Ok(())
     }
 
     fn read_surfaces(&mut self, wanted: &Wanted) -> Result<()> {
+        if lock(&self.shared.seen).now().is_some() {
+            return Ok(());
+        }
         let Some(stage) = &mut self.stage else { return Ok(()) };
-        let renderer = &mut stage.renderer;
-        let camera = wanted.camera.as_ref().unwrap_or(&stage.loaded.camera);
-        let radiance = renderer.film()?.rgba;
-        let (pixels, view) = renderer.aovs(camera)?;
-        let surfaces = Surfaces {
-            pixels: Arc::new(pixels),
-            radiance: Arc::new(radiance),
-            size: stage.settings.size,
-            eye: view.eye,
-            version: self.version,
-        };
-        self.say(|seen| seen.surfaces = Some(surfaces));
+        let camera = wanted.from.camera(&stage.loaded)?;
+        let mut radiance = Vec::new();
+        for side in &stage.sides {
+            radiance.push(Arc::new(side.renderer.film()?.rgba));
+        }
+        let Some(left) = stage.sides.first_mut() else { return Ok(()) };
+        let (pixels, view) = left.renderer.aovs(camera)?;
+        let (pixels, size, eye) = (Arc::new(pixels), left.settings.size, view.eye);
+        self.say(|seen| {
+            let versions = seen.versions();
+            seen.surfaces = Some(Surfaces { pixels, radiance, size, eye, versions });
+        });
         Ok(())
+    }
+
+    /// Follows the ray of a pixel that is asked about, seen from where it was asked: whoever moves sees it from elsewhere.
+    fn trace(&mut self, wanted: &Wanted, last: Option<&Wanted>) -> Result<()> {
+        let Some(picked) = wanted.picked else {
+            let known = lock(&self.shared.seen).trace.is_some();
+            if known {
+                self.say(|seen| seen.trace = None);
+            }
+            return Ok(());
+        };
+        let known = lock(&self.shared.seen).trace.clone().filter(|trace| trace.number == picked.number);
+        let same = |last: &Wanted| last.settings.knobs == wanted.settings.knobs && last.time == wanted.time;
+        if known.is_some() && last.is_some_and(same) {
+            return Ok(());
+        }
+        let Some(stage) = &mut self.stage else { return Ok(()) };
+        let (seen_from, size) = match known {
+            Some(known) => (known.seen_from.clone(), known.size),
+            None => (wanted.from.camera(&stage.loaded)?.clone(), wanted.settings.size),
+        };
+        let tracer = match stage.tracer.take() {
+            Some(tracer) => tracer,
+            None => Tracer::new(&stage.loaded.scene).context("following the ray of a pixel")?,
+        };
+        let limits = limits_of(&wanted.settings.knobs);
+        let events = tracer.follow(&stage.loaded.scene, &seen_from, size, picked.pixel, &limits);
+        stage.tracer = Some(tracer);
+        let Pick { number, pixel } = picked;
+        self.say(|seen| seen.trace = Some(Arc::new(Trace { number, pixel, events, seen_from, size })));
+        Ok(())
+    }
+}
+
+/// How far the rays of a picture with these rungs go.
+fn limits_of(knobs: &Knobs) -> Limits {
+    let rays = ["reflection", "refraction"].iter().any(|knob| knobs.rung(knob) == "ray");
+    Limits {
+        surfaces: if rays || knobs.rung("indirect") == "path" { knobs.interfaces() } else { 1 },
+        roughest: f64::from(knobs.roughest_lobe()),
+        least_share: LEAST_SHARE,
     }
 }
 

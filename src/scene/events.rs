@@ -1,0 +1,294 @@
+//! What the ray of a pixel meets, one surface after the other, as the lecture tells it (R1 to R6): the mirrored ray, the bent one, and
+//! from what spreads light a ray to each light. In f64 and by textbook formulas, for whoever asks why a pixel looks as it does; no
+//! picture is made of it. Normals are those of the corners, without textures; media are told for green light.
+
+use glam::{DVec2, DVec3};
+
+use super::bvh::Bvh;
+use super::light::LightKind;
+use super::line::{self, Crossing};
+use super::material::Material;
+use super::sight::line_through;
+use super::solid::{Solids, media_at, solids};
+use super::{AlphaMode, Camera, Scene};
+use crate::optics::fresnel::{fresnel_conductor, fresnel_dielectric, fresnel_schlick};
+use crate::optics::snell::{reflect, refract};
+
+/// Events of one pixel at most: a tree of them grows quickly.
+const MOST_EVENTS: usize = 96;
+/// Lights that a surface is connected with at most.
+const MOST_LIGHTS: usize = 8;
+
+/// How far a ray is followed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Surfaces one behind the other.
+    pub surfaces: u32,
+    /// Perceptual roughness up to which what a surface mirrors, or lets through, is followed.
+    pub roughest: f64,
+    /// Share of the pixel's light below which nothing is followed.
+    pub least_share: f64,
+}
+
+/// What a ray was sent for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// By the eye.
+    Seen,
+    /// For a mirror image (F4).
+    Mirrored,
+    /// Through a boundary of two media (F5).
+    Bent,
+    /// Through a sheet, or where no medium ends.
+    Straight,
+    /// To a light, by its index (R5).
+    ToLight(usize),
+}
+
+/// One ray and where it ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Event {
+    /// Place in the list of the event whose surface it leaves; `None`: the eye's.
+    pub after: Option<usize>,
+    /// What it was sent for.
+    pub way: Way,
+    /// Where it begins, in the world.
+    pub from: DVec3,
+    /// Where it ends; of what leaves the scene, as far away as the scene is large.
+    pub to: DVec3,
+    /// Of the pixel's light, before absorption; of a ray to a light, that of the surface.
+    pub share: f64,
+    /// What it meets; of a ray to a light, what stands before that light.
+    pub met: Option<Met>,
+}
+
+/// A surface that a ray meets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Met {
+    /// Index of the scene's.
+    pub instance: usize,
+    /// Index of the scene's.
+    pub material: usize,
+    /// Unit normal on the side that the ray comes from.
+    pub normal: DVec3,
+    /// Of the angle of incidence.
+    pub cos: f64,
+    /// Index of refraction behind it over that before it.
+    pub ratio: f64,
+    /// Share that is mirrored (F2, F3).
+    pub reflected: f64,
+    /// Nothing goes through (F6).
+    pub total: bool,
+    /// It spreads what it does not mirror, or is too rough to be followed.
+    pub spreads: bool,
+}
+
+/// A scene that rays can be followed through.
+pub struct Tracer {
+    bvh: Bvh,
+    solids: Solids,
+    radius: f64,
+}
+
+/// A ray that is still to be followed.
+struct Pending {
+    after: Option<usize>,
+    way: Way,
+    from: DVec3,
+    direction: DVec3,
+    share: f64,
+    surfaces: u32,
+    /// Bodies that it is in, in the order in which they were entered.
+    inside: Vec<usize>,
+}
+
+/// The index of refraction where several bodies overlap: of the highest priority, on a tie of the last.
+fn medium(scene: &Scene, inside: &[usize]) -> Option<usize> {
+    let priority = |&i: &usize| material(scene, i).priority;
+    inside.iter().copied().max_by_key(priority)
+}
+
+fn material(scene: &Scene, instance: usize) -> &Material {
+    &scene.materials[scene.meshes[scene.instances[instance].mesh].material]
+}
+
+impl Tracer {
+    /// Makes ready.
+    ///
+    /// # Errors
+    /// As [`Bvh::build`].
+    pub fn new(scene: &Scene) -> anyhow::Result<Self> {
+        let radius = scene.bounds().map_or(1.0, |bounds| bounds.radius());
+        Ok(Self { bvh: Bvh::build(scene)?, solids: solids(scene), radius })
+    }
+
+    /// Follows the ray through the middle of a pixel of a picture of `size` that `camera` sees.
+    #[must_use]
+    pub fn follow(
+        &self,
+        scene: &Scene,
+        camera: &Camera,
+        size: [u32; 2],
+        pixel: [u32; 2],
+        limits: &Limits,
+    ) -> Vec<Event> {
+        let at = DVec2::new(
+            (f64::from(pixel[0]) + 0.5) / f64::from(size[0]) * 2.0 - 1.0,
+            1.0 - (f64::from(pixel[1]) + 0.5) / f64::from(size[1]) * 2.0,
+        );
+        let (from, direction) = line_through(camera, f64::from(size[0]) / f64::from(size[1]), at);
+        let inside = media_at(scene, &self.solids, from);
+        let mut open = vec![Pending { after: None, way: Way::Seen, from, direction, share: 1.0, surfaces: 0, inside }];
+        let mut events: Vec<Event> = Vec::new();
+        while let Some(ray) = open.pop() {
+            if events.len() >= MOST_EVENTS {
+                break;
+            }
+            let crossing = self.nearest(ray.from, ray.direction);
+            let index = events.len();
+            let to = ray.from + ray.direction * crossing.map_or(2.0 * self.radius, |crossing| crossing.t);
+            let mut event = Event { after: ray.after, way: ray.way, from: ray.from, to, share: ray.share, met: None };
+            let Some(crossing) = crossing else {
+                events.push(event);
+                continue;
+            };
+            let (met, next) = self.at_surface(scene, &ray, &crossing, limits);
+            event.met = Some(met);
+            events.push(event);
+            if met.spreads {
+                events.extend(self.to_lights(scene, index, to, met, ray.share));
+            }
+            // The strongest is followed first.
+            let mut next: Vec<Pending> = next.into_iter().map(|ray| Pending { after: Some(index), ..ray }).collect();
+            next.retain(|ray| ray.share >= limits.least_share && ray.surfaces < limits.surfaces);
+            next.sort_by(|a, b| a.share.total_cmp(&b.share));
+            open.extend(next);
+        }
+        events
+    }
+
+    fn nearest(&self, from: DVec3, direction: DVec3) -> Option<Crossing<'_>> {
+        line::nearest(&self.bvh, from - self.bvh.anchor, direction, 1e-6 * self.radius)
+    }
+
+    /// What a surface is to a ray, and the rays that leave it.
+    fn at_surface(
+        &self,
+        scene: &Scene,
+        ray: &Pending,
+        crossing: &Crossing<'_>,
+        limits: &Limits,
+    ) -> (Met, Vec<Pending>) {
+        let instance = crossing.triangle.instance as usize;
+        let m = material(scene, instance);
+        let to = ray.from + ray.direction * crossing.t;
+        let n = crossing.normal(scene);
+        let signed = -ray.direction.dot(n);
+        let front = (signed > 0.0) != self.solids.normals_flipped[instance];
+        let (normal, cos) = (n * signed.signum(), signed.abs().min(1.0));
+        let is_body = self.solids.solid[instance];
+        let mut inside = ray.inside.clone();
+        if is_body {
+            match (front, inside.iter().rposition(|&known| known == instance)) {
+                (true, _) => inside.push(instance),
+                (false, Some(place)) => drop(inside.remove(place)),
+                (false, None) => {}
+            }
+        }
+        let index_of =
+            |inside: &[usize]| medium(scene, inside).map_or(1.0, |i| material(scene, i).complex_index(GREEN)[0]);
+        let (before, behind) = (index_of(&ray.inside), index_of(&inside));
+        let changes = !is_body || medium(scene, &ray.inside) != medium(scene, &inside);
+        let ratio = if is_body { behind / before } else { m.complex_index(GREEN)[0] / before };
+        let [of_dielectric, _, _, _, total] = fresnel_dielectric(cos, ratio);
+        let of_metal = match &m.conductor {
+            Some(index) => fresnel_conductor(cos, f64::from(index[1][0]), f64::from(index[1][1]))[0],
+            None => {
+                // Schlick's curve from the base colour: its own F0 is of no index.
+                let f0 = f64::from(m.base_color[1]);
+                let [zero, one] = fresnel_schlick(cos, 1.5, 0.0);
+                f0 + (1.0 - f0) * (one - zero) / (1.0 - zero)
+            }
+        };
+        let metallic = f64::from(m.metallic);
+        let reflected = if changes { of_dielectric + metallic * (of_metal - of_dielectric) } else { 0.0 };
+        let is_thrown_back = total > 0.0 && is_body && changes;
+        let opacity = if m.alpha_mode == AlphaMode::Opaque { 1.0 } else { f64::from(m.base_color[3]) };
+        let smooth = f64::from(m.roughness) <= limits.roughest;
+        let through = f64::from(m.transmission) * (1.0 - metallic);
+        let spreads = !smooth || (through < 1.0 && metallic < 1.0) || m.unlit;
+        let met = Met {
+            instance,
+            material: scene.meshes[scene.instances[instance].mesh].material,
+            normal,
+            cos,
+            ratio,
+            reflected,
+            total: is_thrown_back,
+            spreads: spreads && changes,
+        };
+        let leave = |way, direction, share, inside| Pending {
+            after: None,
+            way,
+            from: to,
+            direction,
+            share: ray.share * share,
+            surfaces: ray.surfaces + 1,
+            inside,
+        };
+        let mut next = Vec::new();
+        if !changes {
+            next.push(leave(Way::Straight, ray.direction, 1.0, inside));
+            return (met, next);
+        }
+        if opacity < 1.0 {
+            next.push(leave(Way::Straight, ray.direction, 1.0 - opacity, ray.inside.clone()));
+        }
+        if smooth && !m.unlit {
+            next.push(leave(Way::Mirrored, reflect(ray.direction, normal), opacity * reflected, ray.inside.clone()));
+            let share = opacity * through * (1.0 - reflected);
+            if is_body && !is_thrown_back {
+                next.push(leave(Way::Bent, refract(ray.direction, normal, ratio).0, share, inside));
+            } else if !is_body {
+                next.push(leave(Way::Straight, ray.direction, share, ray.inside.clone()));
+            }
+        }
+        (met, next)
+    }
+
+    /// A ray to each light, of the first few.
+    fn to_lights(&self, scene: &Scene, after: usize, at: DVec3, met: Met, share: f64) -> Vec<Event> {
+        let lights = scene.lights.iter().enumerate().filter(|(_, light)| light.shines() && !light.stand_in);
+        let towards = lights.map(|(index, light)| match light.kind {
+            LightKind::Directional { direction } => (index, at - direction * 2.0 * self.radius),
+            LightKind::Point { position, .. } | LightKind::Spot { position, .. } => (index, position),
+        });
+        let lit = towards.filter(|(_, place)| (*place - at).dot(met.normal) > 0.0).take(MOST_LIGHTS);
+        lit.map(|(index, place)| {
+            let way = place - at;
+            let direction = way.normalize();
+            let crossing = self.nearest(at, direction).filter(|crossing| crossing.t < way.length());
+            let met = crossing.map(|crossing| {
+                let instance = crossing.triangle.instance as usize;
+                let normal = crossing.normal(scene);
+                let cos = -direction.dot(normal);
+                Met {
+                    instance,
+                    material: scene.meshes[scene.instances[instance].mesh].material,
+                    normal: normal * cos.signum(),
+                    cos: cos.abs(),
+                    ratio: 1.0,
+                    reflected: 0.0,
+                    total: false,
+                    spreads: false,
+                }
+            });
+            let to = crossing.map_or(place, |crossing| at + direction * crossing.t);
+            Event { after: Some(after), way: Way::ToLight(index), from: at, to, share, met }
+        })
+        .collect()
+    }
+}
+
+/// Wavelength for which media are told, nm.
+const GREEN: f64 = 550.0;

@@ -1,0 +1,54 @@
+//! The time of a scene that moves: stopped, played in a circle, or set by hand.
+
+/// Steps of time, seconds: words of a command line stay short.
+const STEP: f64 = 1e-3;
+
+/// A clock that shows the time of a scene.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Clock {
+    /// Seconds; `None`: as the command line says, or at rest.
+    pub time: Option<f64>,
+    /// It goes on by itself.
+    pub playing: bool,
+}
+
+impl Clock {
+    /// Back to what the command line says.
+    pub fn stop(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Goes to a time within what the scene lasts.
+    pub fn set(&mut self, seconds: f64, duration: f64) {
+        let steps = (seconds.clamp(0.0, duration) / STEP).round();
+        self.time = Some(steps / STEP.recip());
+    }
+
+    /// Goes on by some seconds, and begins anew at the end.
+    pub fn advance(&mut self, seconds: f64, duration: f64) {
+        if self.playing && duration > 0.0 {
+            self.set((self.time.unwrap_or_default() + seconds).rem_euclid(duration), duration);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_goes_in_a_circle_and_in_short_words() {
+        let mut clock = Clock::default();
+        clock.advance(0.3, 2.0);
+        assert_eq!(clock.time, None, "it stands");
+        clock.playing = true;
+        (0..7).for_each(|_| clock.advance(0.333_333, 2.0));
+        assert_eq!(clock.time.map(|time| time.to_string()), Some("0.331".to_owned()));
+        clock.set(9.0, 2.0);
+        assert_eq!(clock.time, Some(2.0));
+        clock.advance(0.1, 0.0);
+        assert_eq!(clock.time, Some(2.0), "what lasts no time stands");
+        clock.stop();
+        assert_eq!(clock, Clock::default());
+    }
+}

@@ -1,0 +1,177 @@
+//! Which equations of `shaders/lib/` a pixel is made of, by what its ray meets and the rungs that it is drawn with.
+
+use crate::plan::Knobs;
+use crate::scene::events::{Event, Way};
+use crate::scene::{AlphaMode, Extent, Light, LightKind, Material};
+use crate::shader::{PROBES, Probe};
+use crate::spectra::Dispersion;
+
+/// Names of the equations, in the order in which light needs them, backwards: from the surface to the screen.
+fn names(events: &[Event], materials: &[Material], lights: &[Light], knobs: &Knobs) -> Vec<&'static str> {
+    let is = |knob: &str, rung: &str| knobs.rung(knob) == rung;
+    let mut all = Vec::new();
+    for event in events {
+        match event.way {
+            Way::Mirrored => all.push("reflect"),
+            Way::Bent => all.push("refract"),
+            Way::Seen | Way::Straight => {}
+            Way::ToLight(index) => {
+                if let Some(light) = lights.get(index) {
+                    all.extend(of_light(light, knobs));
+                }
+                continue;
+            }
+        }
+        let Some((met, m)) = event.met.and_then(|met| Some((met, materials.get(met.material)?))) else { continue };
+        if m.unlit {
+            continue;
+        }
+        if met.total {
+            all.push("critical_angle");
+        }
+        let exact = is("fresnel", "exact");
+        if m.metallic < 1.0 {
+            all.push(if exact { "fresnel_dielectric" } else { "fresnel_schlick" });
+        }
+        if m.metallic > 0.0 {
+            all.push(if exact && m.conductor.is_some() { "fresnel_conductor" } else { "ggx_f" });
+        }
+        if met.spreads {
+            all.extend(match knobs.rung("brdf") {
+                "blinn-phong" => &["blinn_phong"][..],
+                "blinn-phong-reciprocal" => &["reciprocal_phong"],
+                "ggx-multi" => &["lambert", "ggx_d", "ggx_g", "ggx_f", "ggx", "ggx_compensation"],
+                _ => &["lambert", "ggx_d", "ggx_g", "ggx_f", "ggx"],
+            });
+        }
+        let lets_through = m.transmission > 0.0 && m.alpha_mode == AlphaMode::Opaque;
+        if lets_through && m.attenuation_distance.is_finite() && !is("absorption", "off") {
+            all.push("beer_lambert");
+        }
+        if lets_through && m.sigma.is_some() && knobs.march_steps() > 0 {
+            all.push("march_optical_depth");
+        }
+        if lets_through && knobs.bands() > 0 {
+            all.extend(match m.dispersion {
+                Dispersion::Sellmeier { .. } => Some("sellmeier"),
+                Dispersion::Cauchy { .. } => Some("cauchy"),
+                Dispersion::None | Dispersion::Abbe(_) => None,
+            });
+        }
+    }
+    if knobs.bands() > 0 {
+        all.extend(["cmf_integral", "xyz_to_srgb"]);
+    }
+    all.push("srgb");
+    all
+}
+
+fn of_light(light: &Light, knobs: &Knobs) -> Vec<&'static str> {
+    let has_shape = knobs.rung("lights") != "points";
+    let mut all = match light.kind {
+        LightKind::Directional { .. } => vec!["light_directional"],
+        LightKind::Point { range, .. } => {
+            let falloff = range.map(|_| "point_falloff");
+            ["light_point"].into_iter().chain(falloff).collect()
+        }
+        LightKind::Spot { .. } => vec!["light_point", "point_falloff", "spot_share"],
+    };
+    if has_shape && matches!(light.extent, Some(Extent::Sphere { .. })) {
+        all.push("sphere_cone");
+    }
+    all
+}
+
+/// The equations, each once.
+#[must_use]
+pub fn used(events: &[Event], materials: &[Material], lights: &[Light], knobs: &Knobs) -> Vec<&'static Probe> {
+    let mut found: Vec<&'static Probe> = Vec::new();
+    for name in names(events, materials, lights, knobs) {
+        let probe = PROBES.iter().find(|probe| probe.name == name);
+        found.extend(probe.filter(|probe| found.iter().all(|known| known.name != probe.name)));
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::{KNOBS, Model};
+    use crate::scene::events::Met;
+    use glam::DVec3;
+
+    /// One event of each kind on each of some materials.
+    fn events(materials: usize) -> Vec<Event> {
+        let ways =
+            [Way::Seen, Way::Mirrored, Way::Bent, Way::Straight, Way::ToLight(0), Way::ToLight(1), Way::ToLight(2)];
+        let met = |material, total| Met {
+            instance: 0,
+            material,
+            normal: DVec3::Y,
+            cos: 1.0,
+            ratio: 1.5,
+            reflected: 0.04,
+            total,
+            spreads: true,
+        };
+        let event = |way, met| Event { after: None, way, from: DVec3::ZERO, to: DVec3::Y, share: 1.0, met };
+        let of = |way| (0..materials).flat_map(move |m| [true, false].map(|total| event(way, Some(met(m, total)))));
+        ways.into_iter().flat_map(of).collect()
+    }
+
+    #[test]
+    fn every_name_is_an_equation() {
+        let metal = Material { metallic: 1.0, conductor: Some([[0.2, 3.0]; 3]), ..Material::default() };
+        let glass = |dispersion| Material {
+            transmission: 1.0,
+            metallic: 0.0,
+            attenuation_distance: 1.0,
+            dispersion,
+            ..Material::default()
+        };
+        let cauchy = Dispersion::Cauchy { a: 1.5, b: 0.004 };
+        let sellmeier = Dispersion::Sellmeier { b: [0.5; 4], c: [0.01; 4] };
+        let materials = [metal, glass(cauchy), glass(sellmeier)];
+        let light = |kind, extent| Light {
+            name: String::new(),
+            color: [1.0; 3],
+            spectrum: None,
+            extent,
+            kind,
+            stand_in: false,
+        };
+        let ball = Some(Extent::Sphere { radius: 0.1 });
+        let (position, direction, range) = (DVec3::Y, DVec3::NEG_Y, Some(2.0));
+        let lights = [
+            light(LightKind::Directional { direction }, None),
+            light(LightKind::Point { position, range }, ball),
+            light(LightKind::Spot { position, direction, range, inner: 0.1, outer: 0.2 }, None),
+        ];
+        let mut seen = 0;
+        for knob in KNOBS {
+            for (model, rung) in
+                [Model::Local, Model::Global].into_iter().flat_map(|m| knob.rungs.iter().map(move |r| (m, r)))
+            {
+                let Some(knobs) = Knobs::of(model).with(knob.name, rung) else { continue };
+                for name in names(&events(materials.len()), &materials, &lights, &knobs) {
+                    assert!(PROBES.iter().any(|probe| probe.name == name), "{name}");
+                    seen += 1;
+                }
+            }
+        }
+        assert!(seen > 1000, "{seen}");
+    }
+
+    #[test]
+    fn rungs_choose_the_curve() {
+        let glass = [Material { transmission: 1.0, metallic: 0.0, ..Material::default() }];
+        let list = |knobs: &Knobs| -> Vec<&str> {
+            used(&events(1), &glass, &[], knobs).iter().map(|probe| probe.name).collect()
+        };
+        let exact = list(&Knobs::of(Model::Recursive));
+        assert!(exact.contains(&"fresnel_dielectric") && !exact.contains(&"fresnel_schlick"), "{exact:?}");
+        let schlick = Knobs::of(Model::Recursive).with("fresnel", "schlick").expect("a rung");
+        assert!(list(&schlick).contains(&"fresnel_schlick"));
+        assert!(!exact.contains(&"fresnel_conductor") && !exact.contains(&"sellmeier"));
+    }
+}
