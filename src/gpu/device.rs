@@ -1,5 +1,6 @@
 //! Instance, choice of a device, and the device with its queue, allocator and caches.
 
+use std::collections::HashMap;
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -12,6 +13,7 @@ use serde::Serialize;
 
 use super::cache::Caches;
 use super::surface::Surface;
+use super::turns::Pace;
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -397,14 +399,18 @@ pub struct Device {
     pub(super) limits: vk::PhysicalDeviceLimits,
     adds_in_subgroups: bool,
     pub(super) submitted: AtomicU64,
+    /// Dispatches that were drawn in more than one piece.
+    pub(super) cut: AtomicU64,
     next_id: AtomicU64,
     created: Mutex<Vec<Created>>,
     objects: AtomicU64,
     info: DeviceInfo,
     pub(super) physical: vk::PhysicalDevice,
     pub(super) family: u32,
-    /// A window shares its queue.
-    pub(super) shows: bool,
+    /// A window shares its queue: nothing that is submitted takes long.
+    pub(super) turns: bool,
+    /// How long passes take, by name, where `turns`.
+    pub(super) paces: Mutex<HashMap<String, Pace>>,
     pub(super) instance: Instance,
 }
 
@@ -414,11 +420,24 @@ impl Device {
     /// # Errors
     /// One sentence when there is no loader, no such device, or the device lacks something that Etalon needs.
     pub fn open(choice: &DeviceChoice, validate: bool) -> Result<Arc<Self>> {
-        Self::open_on(Instance::new(validate, &[])?, choice, None)
+        Self::open_on(Instance::new(validate, &[])?, choice, None, false)
+    }
+
+    /// The same, and what is submitted is cut into short pieces, as beside a window.
+    ///
+    /// # Errors
+    /// As [`Device::open`].
+    pub fn open_taking_turns(choice: &DeviceChoice, validate: bool) -> Result<Arc<Self>> {
+        Self::open_on(Instance::new(validate, &[])?, choice, None, true)
     }
 
     /// The same with a surface that it can show pictures on.
-    pub(super) fn open_on(instance: Instance, choice: &DeviceChoice, surface: Option<&Surface>) -> Result<Arc<Self>> {
+    pub(super) fn open_on(
+        instance: Instance,
+        choice: &DeviceChoice,
+        surface: Option<&Surface>,
+        turns: bool,
+    ) -> Result<Arc<Self>> {
         let Candidate { info, physical, .. } = choose(instance.candidates(surface)?, choice)?;
         let opening = || format!("opening device \"{}\"", info.name);
         // SAFETY: plain queries on a live instance.
@@ -504,13 +523,15 @@ impl Device {
             limits: properties.limits,
             adds_in_subgroups,
             submitted: AtomicU64::new(0),
+            cut: AtomicU64::new(0),
             next_id: AtomicU64::new(1),
             created: Mutex::default(),
             objects: AtomicU64::new(0),
             info,
             physical,
             family,
-            shows: surface.is_some(),
+            turns,
+            paces: Mutex::default(),
             instance,
         }))
     }
@@ -532,7 +553,7 @@ impl Device {
         lock(&self.instance.messages).clone()
     }
 
-    /// Every object created so far, in order; none of a device that shows a window.
+    /// Every object created so far, in order; none of a device that takes turns.
     #[must_use]
     pub fn created(&self) -> Vec<Created> {
         lock(&self.created).clone()
@@ -585,6 +606,12 @@ impl Device {
         self.objects.load(Ordering::Relaxed)
     }
 
+    /// Dispatches so far that were drawn in more than one piece.
+    #[must_use]
+    pub fn cut(&self) -> u64 {
+        self.cut.load(Ordering::Relaxed)
+    }
+
     pub(super) fn gone(&self) {
         self.objects.fetch_sub(1, Ordering::Relaxed);
     }
@@ -592,7 +619,7 @@ impl Device {
     pub(super) fn note(&self, kind: &'static str, name: &str, bytes: u64) {
         self.objects.fetch_add(1, Ordering::Relaxed);
         // A window goes on for hours: a list of all that it made would grow as long.
-        if self.shows {
+        if self.turns {
             return;
         }
         lock(&self.created).push(Created { kind, name: name.to_owned(), bytes });

@@ -16,8 +16,10 @@ use super::bind::{Bindings, Descriptor, Resource};
 use super::cache::{Layout, PipelineKey, RasterKey};
 use super::device::{Device, lock};
 use super::memory::{Buffer, Image};
+use super::pipeline::Pipelines;
 use super::shader::Program;
 use super::sync::{self, Barrier, ResourceId, State, Use};
+use super::turns::Piece;
 
 /// GPU time of one pass.
 #[derive(Debug, Clone, PartialEq)]
@@ -99,24 +101,70 @@ pub struct Raster<'a> {
 
 type Record<'a> = Box<dyn FnOnce(&Device, vk::CommandBuffer, &[vk::Pipeline]) + 'a>;
 
-struct Pass<'a> {
-    name: String,
+pub(super) struct Pass<'a> {
+    pub(super) name: String,
     uses: Vec<Use>,
-    /// Handed to `record` in this order.
-    pipelines: Vec<PipelineKey>,
-    record: Record<'a>,
+    /// Handed to `work` in this order.
+    pub(super) pipelines: Vec<PipelineKey>,
+    pub(super) work: Work<'a>,
+}
+
+/// What a pass does.
+pub(super) enum Work<'a> {
+    /// A dispatch, which may be cut into pieces.
+    Dispatch(Dispatch<'a>),
+    /// Anything else.
+    Record(Record<'a>),
+}
+
+/// One dispatch.
+pub(super) struct Dispatch<'a> {
+    program: &'static Program,
+    descriptors: Vec<Descriptor>,
+    layout: Layout,
+    push: Vec<u8>,
+    pub(super) groups: Groups<'a>,
+}
+
+impl Dispatch<'_> {
+    /// Records it, or a piece of it.
+    ///
+    /// # Safety
+    /// The command buffer is recording, and handles are alive until the frame has finished.
+    pub(super) unsafe fn record(
+        &self,
+        device: &Device,
+        commands: vk::CommandBuffer,
+        pipeline: vk::Pipeline,
+        piece: Option<Piece>,
+    ) {
+        let Self { program, descriptors, layout, push, groups } = self;
+        // SAFETY: as the caller says.
+        unsafe {
+            device.raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline);
+            push_descriptors(device, commands, vk::PipelineBindPoint::COMPUTE, *layout, program, descriptors);
+            push_constants(device, commands, *layout, program, push);
+            match (piece, groups) {
+                (Some(Piece { base: [x, y, z], count: [across, down, deep] }), _) => {
+                    device.raw.cmd_dispatch_base(commands, x, y, z, across, down, deep);
+                }
+                (None, Groups::Count([x, y, z])) => device.raw.cmd_dispatch(commands, *x, *y, *z),
+                (None, Groups::At(sizes, offset)) => device.raw.cmd_dispatch_indirect(commands, sizes.raw, *offset),
+            }
+        }
+    }
 }
 
 /// How many workgroups a dispatch has.
 #[derive(Clone, Copy)]
-enum Groups<'a> {
+pub(super) enum Groups<'a> {
     Count([u32; 3]),
     At(&'a Buffer, u64),
 }
 
 /// A barrier's target.
 #[derive(Clone, Copy)]
-enum Target<'a> {
+pub(super) enum Target<'a> {
     Buffer(&'a Buffer),
     Image(&'a Image),
 }
@@ -237,23 +285,11 @@ impl<'a> Frame<'a> {
             self.use_buffer(&mut uses, sizes, Access::IndirectRead, vk::ShaderStageFlags::empty());
         }
         let layout = self.device.layout(program)?;
-        let push = push.to_vec();
         self.passes.push(Pass {
             name: name.to_owned(),
             uses,
             pipelines: vec![PipelineKey { program, constants, raster: None }],
-            record: Box::new(move |device, commands, pipelines| {
-                // SAFETY: the command buffer is recording; handles are alive until the frame has finished.
-                unsafe {
-                    device.raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipelines[0]);
-                    push_descriptors(device, commands, vk::PipelineBindPoint::COMPUTE, layout, program, &descriptors);
-                    push_constants(device, commands, layout, program, &push);
-                    match groups {
-                        Groups::Count([x, y, z]) => device.raw.cmd_dispatch(commands, x, y, z),
-                        Groups::At(sizes, offset) => device.raw.cmd_dispatch_indirect(commands, sizes.raw, offset),
-                    }
-                }
-            }),
+            work: Work::Dispatch(Dispatch { program, descriptors, layout, push: push.to_vec(), groups }),
         });
         Ok(())
     }
@@ -387,7 +423,7 @@ impl<'a> Frame<'a> {
                 device.raw.cmd_end_rendering(commands);
             }
         };
-        self.passes.push(Pass { name: raster.name.to_owned(), uses, pipelines, record: Box::new(record) });
+        self.passes.push(Pass { name: raster.name.to_owned(), uses, pipelines, work: Work::Record(Box::new(record)) });
         Ok(())
     }
 
@@ -397,7 +433,7 @@ impl<'a> Frame<'a> {
             name: name.to_owned(),
             uses,
             pipelines: Vec::new(),
-            record: Box::new(move |device, commands, _| record(device, commands)),
+            work: Work::Record(Box::new(move |device, commands, _| record(device, commands))),
         });
     }
 
@@ -488,7 +524,7 @@ impl<'a> Frame<'a> {
             name: "read back".to_owned(),
             uses,
             pipelines: Vec::new(),
-            record: Box::new(|_, _, _| {}),
+            work: Work::Record(Box::new(|_, _, _| {})),
         });
     }
 
@@ -506,7 +542,7 @@ impl<'a> Frame<'a> {
     /// # Errors
     /// When the driver refuses a pipeline or fails: out of memory, or a lost device.
     pub fn finish(self) -> Result<Vec<PassTime>> {
-        let Self { device, mut passes, targets, without_barriers } = self;
+        let Self { device, passes, targets, without_barriers } = self;
         let uses: Vec<Vec<Use>> = passes.iter().map(|pass| pass.uses.clone()).collect();
         let mut states: HashMap<ResourceId, State> = targets
             .iter()
@@ -520,85 +556,127 @@ impl<'a> Frame<'a> {
             .collect();
         let barriers = sync::barriers(&uses, &mut states);
         let timed = device.limits.timestamp_compute_and_graphics == vk::TRUE && !passes.is_empty();
-        let queries = 2 * passes.len() as u32;
         let names: Vec<String> = passes.iter().map(|pass| pass.name.clone()).collect();
-        let wanted: Vec<_> = passes.iter_mut().map(|pass| std::mem::take(&mut pass.pipelines)).collect();
-        let keys: Vec<&PipelineKey> = wanted.iter().flatten().collect();
+        let wanted: Vec<PipelineKey> = passes.iter().flat_map(|pass| pass.pipelines.clone()).collect();
+        let keys: Vec<&PipelineKey> = wanted.iter().collect();
+        let count = if device.turns { 2 } else { 2 * passes.len() as u32 };
+        let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(count.max(1));
         // SAFETY: command buffers that are recorded here, submitted once and waited for before anything is freed. Every
         // handle in them is borrowed for `'a`, which ends after this function.
-        unsafe {
-            let raw = &device.raw;
-            let info =
-                vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(queries.max(1));
-            let pool = raw.create_query_pool(&info, None).context("creating timestamps")?;
+        let outcome = unsafe {
+            let made = if timed { device.raw.create_query_pool(&info, None) } else { Ok(vk::QueryPool::null()) };
+            let queries = made.context("creating timestamps")?;
             // Whoever draws holds the pool until the frame has ended: threads take turns.
             let from = lock(&device.commands);
-            let mut used = vec![begin(&device, *from)?];
-            raw.cmd_reset_query_pool(used[0], pool, 0, queries.max(1));
-            let recorded = device.with_pipelines(&keys, |pipelines| {
-                for (index, (pass, barriers)) in passes.into_iter().zip(&barriers).enumerate() {
-                    // Validation sees hazards within a command buffer alone: it gets all passes in one.
-                    let alone = device.shows || !pipelines.ready(&wanted[index]);
-                    if index > 0 && !device.validates() && alone {
-                        submit(&device, used[used.len() - 1])?;
-                        // A window asks for its turn between two passes: none of them waits for more than one.
-                        if device.shows {
-                            wait(&device)?;
-                        }
-                        used.push(begin(&device, *from)?);
-                    }
-                    let made = pipelines.wait_for(&wanted[index])?;
-                    let commands = used[used.len() - 1];
-                    record_barriers(&device, commands, barriers, &targets, without_barriers);
-                    label(&device, commands, Some(&pass.name));
-                    if timed {
-                        raw.cmd_write_timestamp2(commands, ALL, pool, 2 * index as u32);
-                        // lavapipe takes a timestamp only when it next flushes, which would be after a dispatch that it
-                        // runs at once (measured: 0.05 ms for a tone map of 7.5 ms). A barrier flushes; one between no
-                        // stages is no dependency, so it hides no hazard from validation and costs nothing on a GPU.
-                        let nothing = [vk::MemoryBarrier2::default()];
-                        raw.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().memory_barriers(&nothing));
-                    }
-                    (pass.record)(&device, commands, &made);
-                    if timed {
-                        raw.cmd_write_timestamp2(commands, ALL, pool, 2 * index as u32 + 1);
-                    }
-                    label(&device, commands, None);
-                }
-                submit(&device, used[used.len() - 1])
+            let outcome = device.with_pipelines(&keys, |pipelines| {
+                let (device, from, targets) = (&device, *from, &targets);
+                let recording = Recording { device, from, targets, pipelines, queries, without_barriers };
+                if device.turns { recording.in_turns(passes, &barriers) } else { recording.at_once(passes, &barriers) }
             });
-            // What has been submitted is waited for also where the rest could not be.
-            let waited = wait(&device).with_context(|| format!("waiting for a frame of passes {}", names.join(", ")));
-            let mut ticks = vec![0_u64; queries as usize];
-            let outcome = recorded.and(waited).and_then(|()| {
-                let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-                match timed {
-                    true => raw.get_query_pool_results(pool, 0, &mut ticks, flags).context("reading timestamps"),
-                    false => Ok(()),
-                }
-            });
-            raw.free_command_buffers(*from, &used);
-            raw.destroy_query_pool(pool, None);
-            for (id, target) in &targets {
-                // What a frame that failed has left behind is not known.
-                let state = if outcome.is_ok() { states.get(id).copied() } else { None }.unwrap_or_default();
-                match target {
-                    Target::Buffer(buffer) => *lock(&buffer.state) = state,
-                    Target::Image(image) => *lock(&image.state) = state,
-                }
+            device.raw.destroy_query_pool(queries, None);
+            outcome
+        };
+        for (id, target) in &targets {
+            // What a frame that failed has left behind is not known.
+            let state = if outcome.is_ok() { states.get(id).copied() } else { None }.unwrap_or_default();
+            match target {
+                Target::Buffer(buffer) => *lock(&buffer.state) = state,
+                Target::Image(image) => *lock(&image.state) = state,
             }
-            outcome?;
-            let period = f64::from(device.limits.timestamp_period) * 1e-6;
-            Ok(names
-                .into_iter()
-                .zip(ticks.chunks_exact(2))
-                .map(|(name, pair)| PassTime { name, ms: pair[1].saturating_sub(pair[0]) as f64 * period })
-                .collect())
         }
+        Ok(names.into_iter().zip(outcome?).map(|(name, ms)| PassTime { name, ms }).collect())
     }
 }
 
-const ALL: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::ALL_COMMANDS;
+/// What passes are recorded with.
+pub(super) struct Recording<'f> {
+    pub(super) device: &'f Arc<Device>,
+    pub(super) from: vk::CommandPool,
+    pub(super) targets: &'f HashMap<ResourceId, Target<'f>>,
+    pub(super) pipelines: &'f Pipelines<'f>,
+    /// Null where the device takes no times.
+    pub(super) queries: vk::QueryPool,
+    without_barriers: bool,
+}
+
+impl Recording<'_> {
+    /// Records passes into one command buffer, or into more where pipelines are still being made; the milliseconds of each.
+    ///
+    /// # Safety
+    /// Every handle of the passes is alive, and nothing else is recorded with the pool.
+    unsafe fn at_once(&self, passes: Vec<Pass<'_>>, barriers: &[Vec<Barrier>]) -> Result<Vec<f64>> {
+        let &Self { device, from, targets, pipelines, queries, without_barriers } = self;
+        let (raw, timed) = (&device.raw, queries != vk::QueryPool::null());
+        let mut ticks = vec![0_u64; 2 * passes.len()];
+        let names: Vec<String> = passes.iter().map(|pass| pass.name.clone()).collect();
+        // SAFETY: as the caller says.
+        unsafe {
+            let mut used = vec![begin(device, from)?];
+            if timed {
+                raw.cmd_reset_query_pool(used[0], queries, 0, ticks.len() as u32);
+            }
+            let record_all = || {
+                for (index, (pass, barriers)) in passes.into_iter().zip(barriers).enumerate() {
+                    // Validation sees hazards within a command buffer alone: it gets all passes in one.
+                    if index > 0 && !device.validates() && !pipelines.ready(&pass.pipelines) {
+                        submit(device, used[used.len() - 1])?;
+                        used.push(begin(device, from)?);
+                    }
+                    let made = pipelines.wait_for(&pass.pipelines)?;
+                    let commands = used[used.len() - 1];
+                    record_barriers(device, commands, barriers, targets, without_barriers);
+                    label(device, commands, Some(&pass.name));
+                    if timed {
+                        write_first_timestamp(device, commands, queries, 2 * index as u32);
+                    }
+                    match pass.work {
+                        Work::Record(record) => record(device, commands, &made),
+                        Work::Dispatch(work) => work.record(device, commands, made[0], None),
+                    }
+                    if timed {
+                        raw.cmd_write_timestamp2(commands, ALL, queries, 2 * index as u32 + 1);
+                    }
+                    label(device, commands, None);
+                }
+                submit(device, used[used.len() - 1])
+            };
+            let recorded = record_all();
+            // What has been submitted is waited for also where the rest could not be.
+            let waited = wait(device).with_context(|| format!("waiting for a frame of passes {}", names.join(", ")));
+            let outcome = recorded.and(waited).and_then(|()| {
+                let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+                match timed {
+                    true => raw.get_query_pool_results(queries, 0, &mut ticks, flags).context("reading timestamps"),
+                    false => Ok(()),
+                }
+            });
+            raw.free_command_buffers(from, &used);
+            outcome?;
+        }
+        let period = f64::from(device.limits.timestamp_period) * 1e-6;
+        Ok(ticks.chunks_exact(2).map(|pair| pair[1].saturating_sub(pair[0]) as f64 * period).collect())
+    }
+}
+
+/// Takes the time before a pass.
+pub(super) unsafe fn write_first_timestamp(
+    device: &Device,
+    commands: vk::CommandBuffer,
+    queries: vk::QueryPool,
+    index: u32,
+) {
+    // lavapipe takes a timestamp only when it next flushes, which would be after a dispatch that it runs at once (measured:
+    // 0.05 ms for a tone map of 7.5 ms). A barrier flushes; one between no stages is no dependency, so it hides no hazard from
+    // validation and costs nothing on a GPU.
+    let nothing = [vk::MemoryBarrier2::default()];
+    // SAFETY: the command buffer is recording; the pool has the query.
+    unsafe {
+        device.raw.cmd_write_timestamp2(commands, ALL, queries, index);
+        device.raw.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().memory_barriers(&nothing));
+    }
+}
+
+pub(super) const ALL: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::ALL_COMMANDS;
 
 /// A command buffer that is being recorded.
 pub(super) unsafe fn begin(device: &Device, pool: vk::CommandPool) -> Result<vk::CommandBuffer> {
@@ -616,7 +694,7 @@ pub(super) unsafe fn begin(device: &Device, pool: vk::CommandPool) -> Result<vk:
 }
 
 /// Ends a command buffer and hands it to the device; the timeline counts when it is done.
-unsafe fn submit(device: &Device, commands: vk::CommandBuffer) -> Result<()> {
+pub(super) unsafe fn submit(device: &Device, commands: vk::CommandBuffer) -> Result<()> {
     let queue = lock(&device.queue);
     let done = device.submitted.load(Ordering::Relaxed) + 1;
     let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
@@ -632,7 +710,7 @@ unsafe fn submit(device: &Device, commands: vk::CommandBuffer) -> Result<()> {
 }
 
 /// Until all that was submitted is done.
-unsafe fn wait(device: &Device) -> Result<()> {
+pub(super) unsafe fn wait(device: &Device) -> Result<()> {
     let (semaphores, values) = ([device.timeline], [device.submitted.load(Ordering::Relaxed)]);
     let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
     // SAFETY: a semaphore of this device, which the last submission signals.
@@ -665,7 +743,7 @@ fn region(
         .image_extent(vk::Extent3D { width, height, depth: 1 })
 }
 
-unsafe fn label(device: &Device, commands: vk::CommandBuffer, name: Option<&str>) {
+pub(super) unsafe fn label(device: &Device, commands: vk::CommandBuffer, name: Option<&str>) {
     let Some(debug) = &device.debug else { return };
     // SAFETY: the command buffer is recording.
     unsafe {
@@ -679,7 +757,7 @@ unsafe fn label(device: &Device, commands: vk::CommandBuffer, name: Option<&str>
     }
 }
 
-unsafe fn record_barriers(
+pub(super) unsafe fn record_barriers(
     device: &Device,
     commands: vk::CommandBuffer,
     barriers: &[Barrier],

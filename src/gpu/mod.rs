@@ -17,6 +17,7 @@ mod shader;
 mod specialize;
 mod surface;
 pub mod sync;
+mod turns;
 
 pub use access::Access;
 pub use bind::{Bindings, Resource, Sampled};

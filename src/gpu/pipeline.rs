@@ -203,7 +203,9 @@ impl Device {
             stages.push(vk::PipelineShaderStageCreateInfo::default().stage(stage.flag).module(module).name(c"main"));
         }
         let Some(raster) = &key.raster else {
-            let info = vk::ComputePipelineCreateInfo::default().stage(stages[0]).layout(layout);
+            let flags =
+                if self.turns { vk::PipelineCreateFlags::DISPATCH_BASE } else { vk::PipelineCreateFlags::empty() };
+            let info = vk::ComputePipelineCreateInfo::default().flags(flags).stage(stages[0]).layout(layout);
             // SAFETY: a valid create info whose pointees outlive the call.
             let made = unsafe { self.raw.create_compute_pipelines(vk::PipelineCache::null(), &[info], None) };
             return made.map(|p| p[0]).map_err(|(_, error)| error);

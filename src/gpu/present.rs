@@ -96,7 +96,7 @@ impl Presenter {
     pub fn open(window: Arc<dyn Windowed>, choice: &DeviceChoice, validate: bool) -> Result<(Arc<Device>, Self)> {
         let instance = Instance::new(validate, extensions(&*window)?)?;
         let surface = Surface::new(&instance.entry, &instance.raw, &*window)?;
-        let device = Device::open_on(instance, choice, Some(&surface))?;
+        let device = Device::open_on(instance, choice, Some(&surface), true)?;
         // SAFETY: plain queries of a live surface, and objects of a live device.
         let (formats, pool, acquired, finished) = unsafe {
             let pool = vk::CommandPoolCreateInfo::default()

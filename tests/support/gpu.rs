@@ -53,6 +53,13 @@ impl Gpu {
         Self::alone()
     }
 
+    /// The same as [`Gpu::hasty`], on a device that takes turns as beside a window.
+    pub fn taking_turns() -> Self {
+        let mut gpu = Self::hasty();
+        gpu.device = Device::open_taking_turns(&DeviceChoice::Cpu, true).expect("a device");
+        gpu
+    }
+
     /// What validation calls errors, so far.
     pub fn errors(&self) -> Vec<String> {
         let messages = self.device.messages();

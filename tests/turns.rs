@@ -1,0 +1,57 @@
+//! A device that takes turns with a window draws in short pieces what others draw at once: the same picture, bit by bit.
+
+#[path = "support/gpu.rs"]
+mod gpu;
+
+use etalon::frame::Settings;
+use etalon::plan::{Knobs, Model};
+use etalon::scene::environment::Environment;
+use etalon::study;
+use gpu::{Gpu, bits};
+
+/// Scenes with the model that they are drawn by, and rungs.
+const PICTURES: &[(&str, Model, &[&str])] = &[
+    // Lists per tile of 683 lights.
+    ("lamps", Model::Local, &["samples=1"]),
+    // Mirrors on the screen and see-through surfaces.
+    ("blend", Model::Local, &["reflection=screen", "refraction=screen", "samples=1"]),
+    // Rays.
+    ("etalon", Model::Recursive, &["samples=4"]),
+    // Queues of paths.
+    ("cornell", Model::Global, &["samples=4"]),
+];
+
+type Bits = Vec<[u32; 4]>;
+
+/// Films of all pictures, each drawn twice in a row: the second time knows how long passes take.
+fn films(gpu: &Gpu) -> Vec<[Bits; 2]> {
+    let draw = |(name, model, rungs): &(&str, Model, &[&str])| {
+        let scene = study::load(name).expect("a scene");
+        let mut knobs = Knobs::of(*model);
+        rungs.iter().for_each(|rung| knobs.set(rung).expect("a rung"));
+        let settings = Settings { size: [176, 99], knobs, ..Settings::default() };
+        let environment = scene.studio.map(|_| Environment::studio());
+        let mut renderer = gpu.renderer(&scene, environment.as_ref(), settings);
+        [(); 2].map(|()| {
+            renderer.render(&scene.cameras[0], &mut |_| ()).expect("a picture");
+            bits(&renderer.film().expect("a film"))
+        })
+    };
+    PICTURES.iter().map(draw).collect()
+}
+
+#[test]
+fn pieces_are_the_same_picture() {
+    let at_once = {
+        let gpu = Gpu::hasty();
+        films(&gpu)
+    };
+    let gpu = Gpu::taking_turns();
+    let in_turns = films(&gpu);
+    for ((name, ..), (a, b)) in PICTURES.iter().zip(at_once.iter().zip(&in_turns)) {
+        assert!(a[0] == b[0], "{name}: another picture in pieces");
+        assert!(a[1] == b[1], "{name}: another picture in pieces, when it is known how long they take");
+    }
+    let cut = gpu.device.cut();
+    assert!(cut > 20, "{cut} dispatches were cut");
+}
