@@ -3,7 +3,10 @@
 #[path = "support/gpu.rs"]
 mod gpu;
 
+use std::time::Duration;
+
 use etalon::frame::Settings;
+use etalon::gpu::Interrupted;
 use etalon::plan::{Knobs, Model};
 use etalon::scene::environment::Environment;
 use etalon::study;
@@ -54,4 +57,36 @@ fn pieces_are_the_same_picture() {
     }
     let cut = gpu.device.cut();
     assert!(cut > 20, "{cut} dispatches were cut");
+}
+
+/// A frame that is given up leaves the device as it is: the next one is whole.
+#[test]
+fn what_is_interrupted_begins_anew() {
+    let gpu = Gpu::taking_turns();
+    let scene = study::load("etalon").expect("a scene");
+    let settings = Settings { size: [176, 99], knobs: Knobs::of(Model::Recursive), ..Settings::default() };
+    let mut renderer = gpu.renderer(&scene, None, settings);
+    renderer.render(&scene.cameras[0], &mut |_| ()).expect("a picture");
+    let whole = bits(&renderer.film().expect("a film"));
+    let (device, mut interruptions) = (gpu.device.clone(), 0);
+    for i in 0..12 {
+        let mut drawing = renderer.begin(&scene.cameras[0]);
+        let interrupter = {
+            let device = device.clone();
+            std::thread::spawn(move || {
+                std::thread::sleep(Duration::from_millis(3 * i));
+                device.interrupt();
+            })
+        };
+        let drawn = device.interruptible(|| (0..4).try_for_each(|_| renderer.step(&mut drawing)));
+        interrupter.join().expect("it ends");
+        if let Err(error) = drawn {
+            assert!(error.is::<Interrupted>(), "{error:#}");
+            interruptions += 1;
+        }
+        device.resume();
+        renderer.render(&scene.cameras[0], &mut |_| ()).expect("a picture");
+        assert!(bits(&renderer.film().expect("a film")) == whole, "another picture after {} ms", 3 * i);
+    }
+    assert!(interruptions > 4, "{interruptions} of 12");
 }

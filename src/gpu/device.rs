@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::mem::ManuallyDrop;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use anyhow::{Context as _, Result, anyhow, bail, ensure};
@@ -380,6 +380,18 @@ fn choose(all: Vec<Candidate>, choice: &DeviceChoice) -> Result<Candidate> {
     Ok(best)
 }
 
+/// Why a frame was not drawn to its end: somebody wants another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Interrupted;
+
+impl std::fmt::Display for Interrupted {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "the frame was given up for another")
+    }
+}
+
+impl std::error::Error for Interrupted {}
+
 /// Whether the device is gone: nothing that it holds can be used again.
 #[must_use]
 pub fn is_lost(error: &anyhow::Error) -> bool {
@@ -401,6 +413,9 @@ pub struct Device {
     pub(super) submitted: AtomicU64,
     /// Dispatches that were drawn in more than one piece.
     pub(super) cut: AtomicU64,
+    /// Somebody wants what is drawn to be given up, and whoever draws it agrees.
+    interrupted: AtomicBool,
+    interruptible: AtomicBool,
     next_id: AtomicU64,
     created: Mutex<Vec<Created>>,
     objects: AtomicU64,
@@ -524,6 +539,8 @@ impl Device {
             adds_in_subgroups,
             submitted: AtomicU64::new(0),
             cut: AtomicU64::new(0),
+            interrupted: AtomicBool::new(false),
+            interruptible: AtomicBool::new(false),
             next_id: AtomicU64::new(1),
             created: Mutex::default(),
             objects: AtomicU64::new(0),
@@ -604,6 +621,29 @@ impl Device {
     #[must_use]
     pub fn objects(&self) -> u64 {
         self.objects.load(Ordering::Relaxed)
+    }
+
+    /// Gives up what is drawn within [`Device::interruptible`], now or the next time, until [`Device::resume`].
+    pub fn interrupt(&self) {
+        self.interrupted.store(true, Ordering::Relaxed);
+    }
+
+    /// Takes [`Device::interrupt`] back.
+    pub fn resume(&self) {
+        self.interrupted.store(false, Ordering::Relaxed);
+    }
+
+    /// Draws frames that may be given up between two pieces, where the device takes turns: they end with [`Interrupted`].
+    pub fn interruptible<T>(&self, draw: impl FnOnce() -> T) -> T {
+        self.interruptible.store(true, Ordering::Relaxed);
+        let drawn = draw();
+        self.interruptible.store(false, Ordering::Relaxed);
+        drawn
+    }
+
+    pub(super) fn go_on(&self) -> Result<()> {
+        let is_over = self.interruptible.load(Ordering::Relaxed) && self.interrupted.load(Ordering::Relaxed);
+        if is_over { Err(Interrupted.into()) } else { Ok(()) }
     }
 
     /// Dispatches so far that were drawn in more than one piece.

@@ -4,6 +4,7 @@
 //! and waits. Labels, object names, timestamps and barriers come by themselves, and so do pipelines: those that are new are
 //! made on another thread, and while a pass waits for its own the device goes on with the passes before.
 
+use std::cell::Cell;
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -14,7 +15,7 @@ use ash::vk;
 use super::access::Access;
 use super::bind::{Bindings, Descriptor, Resource};
 use super::cache::{Layout, PipelineKey, RasterKey};
-use super::device::{Device, lock};
+use super::device::{Device, Interrupted, lock};
 use super::memory::{Buffer, Image};
 use super::pipeline::Pipelines;
 use super::shader::Program;
@@ -544,7 +545,7 @@ impl<'a> Frame<'a> {
     pub fn finish(self) -> Result<Vec<PassTime>> {
         let Self { device, passes, targets, without_barriers } = self;
         let uses: Vec<Vec<Use>> = passes.iter().map(|pass| pass.uses.clone()).collect();
-        let mut states: HashMap<ResourceId, State> = targets
+        let before: HashMap<ResourceId, State> = targets
             .iter()
             .map(|(&id, target)| {
                 let state = match target {
@@ -554,7 +555,9 @@ impl<'a> Frame<'a> {
                 (id, state)
             })
             .collect();
+        let mut states = before.clone();
         let barriers = sync::barriers(&uses, &mut states);
+        let begun = Cell::new(0);
         let timed = device.limits.timestamp_compute_and_graphics == vk::TRUE && !passes.is_empty();
         let names: Vec<String> = passes.iter().map(|pass| pass.name.clone()).collect();
         let wanted: Vec<PipelineKey> = passes.iter().flat_map(|pass| pass.pipelines.clone()).collect();
@@ -570,15 +573,25 @@ impl<'a> Frame<'a> {
             let from = lock(&device.commands);
             let outcome = device.with_pipelines(&keys, |pipelines| {
                 let (device, from, targets) = (&device, *from, &targets);
-                let recording = Recording { device, from, targets, pipelines, queries, without_barriers };
+                let begun = &begun;
+                let recording = Recording { device, from, targets, pipelines, queries, without_barriers, begun };
                 if device.turns { recording.in_turns(passes, &barriers) } else { recording.at_once(passes, &barriers) }
             });
             device.raw.destroy_query_pool(queries, None);
             outcome
         };
+        let is_known = match &outcome {
+            Ok(_) => true,
+            Err(error) if error.is::<Interrupted>() => {
+                states = before;
+                sync::barriers(&uses[..begun.get()], &mut states);
+                true
+            }
+            Err(_) => false,
+        };
         for (id, target) in &targets {
             // What a frame that failed has left behind is not known.
-            let state = if outcome.is_ok() { states.get(id).copied() } else { None }.unwrap_or_default();
+            let state = if is_known { states.get(id).copied() } else { None }.unwrap_or_default();
             match target {
                 Target::Buffer(buffer) => *lock(&buffer.state) = state,
                 Target::Image(image) => *lock(&image.state) = state,
@@ -597,6 +610,8 @@ pub(super) struct Recording<'f> {
     /// Null where the device takes no times.
     pub(super) queries: vk::QueryPool,
     without_barriers: bool,
+    /// Passes whose barriers are recorded, where they are drawn by turns.
+    pub(super) begun: &'f Cell<usize>,
 }
 
 impl Recording<'_> {
@@ -605,7 +620,7 @@ impl Recording<'_> {
     /// # Safety
     /// Every handle of the passes is alive, and nothing else is recorded with the pool.
     unsafe fn at_once(&self, passes: Vec<Pass<'_>>, barriers: &[Vec<Barrier>]) -> Result<Vec<f64>> {
-        let &Self { device, from, targets, pipelines, queries, without_barriers } = self;
+        let &Self { device, from, targets, pipelines, queries, without_barriers, .. } = self;
         let (raw, timed) = (&device.raw, queries != vk::QueryPool::null());
         let mut ticks = vec![0_u64; 2 * passes.len()];
         let names: Vec<String> = passes.iter().map(|pass| pass.name.clone()).collect();

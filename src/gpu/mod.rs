@@ -22,7 +22,9 @@ mod turns;
 pub use access::Access;
 pub use bind::{Bindings, Resource, Sampled};
 pub use cache::SamplerDesc;
-pub use device::{Candidate, Created, Device, DeviceChoice, DeviceInfo, Message, Severity, candidates, is_lost};
+pub use device::{
+    Candidate, Created, Device, DeviceChoice, DeviceInfo, Interrupted, Message, Severity, candidates, is_lost,
+};
 pub use frame::{ColorTarget, DepthTarget, Draw, Frame, PassPlan, PassTime, Raster, VertexStream};
 pub use memory::{Buffer, Image, ImageDesc, NOTHING, Place};
 pub use present::{Overlay, Placed, Presented, Presenter};

@@ -64,14 +64,13 @@ impl Recording<'_> {
         let made = self.pipelines.wait_for(&pass.pipelines)?;
         // SAFETY: as the caller says.
         unsafe {
-            let first = |commands| record_barriers(self.device, commands, barriers, self.targets, false);
+            let first = |commands| {
+                self.begun.set(self.begun.get() + 1);
+                record_barriers(self.device, commands, barriers, self.targets, false);
+            };
             let work = match pass.work {
                 Work::Record(record) => {
-                    return self.turn(
-                        &pass.name,
-                        |commands| first(commands),
-                        |commands| record(self.device, commands, &made),
-                    );
+                    return self.turn(&pass.name, first, |commands| record(self.device, commands, &made));
                 }
                 Work::Dispatch(work) => work,
             };
@@ -147,6 +146,7 @@ impl Recording<'_> {
         record: impl FnOnce(vk::CommandBuffer),
     ) -> Result<f64> {
         let (device, raw, timed) = (self.device, &self.device.raw, self.queries != vk::QueryPool::null());
+        device.go_on()?;
         // SAFETY: the command buffer is recorded here and waited for before it is freed.
         unsafe {
             let commands = begin(device, self.from)?;

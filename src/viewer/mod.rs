@@ -121,6 +121,17 @@ struct Viewer {
     messages: Vec<Message>,
 }
 
+/// A layer as pixels.
+#[derive(Clone)]
+struct DrawnLayer {
+    layer: Layer,
+    /// Numbers of the pictures that it is of.
+    of: [Option<u64>; 2],
+    rgba: Arc<Vec<u8>>,
+    size: [u32; 2],
+    version: u64,
+}
+
 /// The window and all that belongs to it.
 struct OpenWindow {
     window: Arc<Window>,
@@ -146,8 +157,7 @@ struct OpenWindow {
     /// Pictures of the window, and milliseconds of the first [`REMEMBERED`] of them.
     pictures: u64,
     took: Vec<f32>,
-    /// A layer as pixels, and of which picture.
-    layer: Option<(Layer, [Option<u64>; 2], Arc<Vec<u8>>, u64)>,
+    layer: Option<DrawnLayer>,
     layers: u64,
     /// Tells of changes in the folder of the scene's file.
     watcher: Option<notify::RecommendedWatcher>,
@@ -229,7 +239,10 @@ impl ApplicationHandler<Woken> for Viewer {
     fn exiting(&mut self, _: &ActiveEventLoop) {
         if let Some(mut window) = self.window.take() {
             window.account();
-            window.shared.want(|wanted| wanted.quit = true);
+            window.shared.want(|wanted| {
+                wanted.quit = true;
+                window.device.interrupt();
+            });
             if window.worker.take().is_some_and(|worker| worker.join().is_err()) && self.failure.is_none() {
                 self.failure = Some(anyhow!("the thread that draws has failed"));
             }
@@ -345,7 +358,7 @@ impl OpenWindow {
         let place = self.state.place;
         let [left, _, right, _] = place;
         let pictures: Vec<Placed<'_>> = match &layer {
-            Some((rgba, size, version)) => {
+            Some(DrawnLayer { rgba, size, version, .. }) => {
                 vec![Placed { rgba, size: *size, version: *version, place, columns: [left, right] }]
             }
             None => {
@@ -420,18 +433,18 @@ impl OpenWindow {
     }
 
     /// What the chosen layer shows.
-    fn drawn_layer(&mut self, seen: &Seen) -> Option<(Arc<Vec<u8>>, [u32; 2], u64)> {
-        let wanted = self.state.layer;
-        let surfaces = seen.now().filter(|_| wanted != Layer::Radiance)?;
-        let known =
-            self.layer.as_ref().is_some_and(|(layer, version, ..)| *layer == wanted && *version == surfaces.versions);
-        if !known {
+    fn drawn_layer(&mut self, seen: &Seen) -> Option<DrawnLayer> {
+        let layer = self.state.layer;
+        let surfaces = seen.now().filter(|_| layer != Layer::Radiance)?;
+        let is_drawn = |known: &DrawnLayer| known.layer == layer && known.of == surfaces.versions;
+        if !self.layer.as_ref().is_some_and(is_drawn) {
             self.layers += 1;
             // Odd: pictures have even ones.
-            let number = 2 * self.layers + 1;
-            self.layer = Some((wanted, surfaces.versions, Arc::new(wanted.draw(surfaces)), number));
+            let version = 2 * self.layers + 1;
+            let rgba = Arc::new(layer.draw(surfaces));
+            self.layer = Some(DrawnLayer { layer, of: surfaces.versions, rgba, size: surfaces.size, version });
         }
-        self.layer.as_ref().map(|(_, _, rgba, number)| (rgba.clone(), surfaces.size, *number))
+        self.layer.clone()
     }
 
     /// Takes over what the worker has found.
@@ -541,8 +554,14 @@ impl OpenWindow {
             quit: false,
         };
         if self.sent.as_ref().is_none_or(|sent| !sent.is_as(&wanted)) {
+            let is_over = self.sent.as_ref().is_some_and(|sent| !sent.is_same_picture(&wanted));
             self.sent = Some(wanted.clone());
-            self.shared.want(|now| *now = wanted);
+            self.shared.want(|now| {
+                *now = wanted;
+                if is_over {
+                    self.device.interrupt();
+                }
+            });
         }
     }
 

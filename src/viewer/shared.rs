@@ -148,19 +148,22 @@ impl Wanted {
         Asked { file: self.file.as_deref(), time: self.time, size: self.settings.size }
     }
 
-    /// Whether the same is to be seen.
+    /// Whether the same is to be drawn, however it is shown.
     #[must_use]
-    pub fn is_as(&self, other: &Self) -> bool {
-        let display = |settings: &Settings| {
-            let Settings { size, tonemap, exposure, environment_rotation, .. } = settings;
-            (*size, *tonemap, *exposure, *environment_rotation)
-        };
-        let marks = |w: &Self| (w.scene, w.time, w.moving, w.surfaces, w.picked, w.programs, w.quit);
-        marks(self) == marks(other)
+    pub fn is_same_picture(&self, other: &Self) -> bool {
+        let marks = |w: &Self| (w.scene, w.time, w.moving, w.programs, w.quit);
+        let settings = |w: &Self| (w.settings.size, w.settings.environment_rotation);
+        (marks(self), settings(self)) == (marks(other), settings(other))
             && self.from == other.from
             && self.settings.knobs == other.settings.knobs
             && self.other == other.other
-            && display(&self.settings) == display(&other.settings)
+    }
+
+    /// Whether the same is to be seen.
+    #[must_use]
+    pub fn is_as(&self, other: &Self) -> bool {
+        let marks = |w: &Self| (w.surfaces, w.picked, w.settings.tonemap, w.settings.exposure);
+        self.is_same_picture(other) && marks(self) == marks(other)
     }
 }
 

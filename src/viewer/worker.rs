@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result};
 
 use super::shared::{Difference, Loaded, Pick, SceneFacts, Seen, Shared, Shown, Source, Surfaces, Trace, Wanted, lock};
 use crate::frame::{Drawing, Renderer, Settings};
-use crate::gpu::{Device, PassTime, is_lost};
+use crate::gpu::{Device, Interrupted, PassTime, is_lost};
 use crate::image::metric::{AnyPicture, Metric, compare};
 use crate::image::png::Display;
 use crate::plan::Knobs;
@@ -17,6 +17,8 @@ use crate::scene::events::{Limits, Tracer};
 const MOVING_MS: f64 = 40.0;
 /// Sides of pictures while the view moves: the window's over one of these.
 const SMALLER: [u32; 6] = [1, 2, 3, 4, 6, 8];
+/// The same where nobody knows yet how long a pixel takes.
+const UNKNOWN: u32 = 4;
 /// Between two looks at a picture under way.
 const LOOK: Duration = Duration::from_millis(100);
 /// Share of a pixel's light below which its ray is not followed.
@@ -103,6 +105,8 @@ impl Worker {
                 while wanted.1 == known && worker.is_idle() {
                     wanted = worker.shared.changed.wait(wanted).unwrap_or_else(PoisonError::into_inner);
                 }
+                // Whoever interrupts holds this lock, and wants something else.
+                worker.device.resume();
                 wanted.clone()
             };
             if wanted.quit {
@@ -114,6 +118,9 @@ impl Worker {
             known = number;
             last = Some(wanted);
             if let Err(error) = result {
+                if error.is::<Interrupted>() {
+                    continue;
+                }
                 worker.stage.iter_mut().flat_map(|stage| &mut stage.sides).for_each(|side| side.drawing = None);
                 let lost = is_lost(&error);
                 worker.say(|seen| {
@@ -311,7 +318,15 @@ impl Worker {
         let Some(drawing) = &mut side.drawing else { return Ok(()) };
         let begun = Instant::now();
         let before = drawing.samples();
-        side.renderer.step(drawing)?;
+        // While the view moves each picture is seen: the next is not better.
+        let stepped = match wanted.moving {
+            true => side.renderer.step(drawing),
+            false => self.device.interruptible(|| side.renderer.step(drawing)),
+        };
+        if let Err(error) = stepped {
+            side.drawing = None;
+            return Err(error);
+        }
         let took = begun.elapsed();
         if drawing.samples() == before {
             return Ok(());
@@ -442,6 +457,9 @@ fn limits_of(knobs: &Knobs) -> Limits {
 
 /// The largest of some sizes that takes no longer than a picture may while the view moves.
 fn smaller(size: [u32; 2], ns_per_pixel: f64) -> [u32; 2] {
+    if ns_per_pixel == 0.0 {
+        return size.map(|side| side.div_ceil(UNKNOWN));
+    }
     let pixels = f64::from(size[0]) * f64::from(size[1]);
     let takes = |by: u32| ns_per_pixel * 1e-6 * pixels / f64::from(by * by);
     let by = SMALLER.into_iter().find(|&by| takes(by) <= MOVING_MS).unwrap_or(SMALLER[SMALLER.len() - 1]);
@@ -454,7 +472,7 @@ mod tests {
 
     #[test]
     fn pictures_get_smaller_until_they_are_quick() {
-        assert_eq!(smaller([1280, 720], 0.0), [1280, 720]);
+        assert_eq!(smaller([1280, 720], 0.0), [320, 180]);
         assert_eq!(smaller([1280, 720], 40.0), [1280, 720]);
         // 92 ms whole, 23 at half the side.
         assert_eq!(smaller([1280, 720], 100.0), [640, 360]);
