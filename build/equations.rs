@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use crate::{Result, files, stem};
+use crate::compile::{Result, files, stem};
 
 /// One tagged function.
 pub(crate) struct Equation {

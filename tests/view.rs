@@ -17,7 +17,7 @@ use std::time::Duration;
 
 use anyhow::{Result, bail};
 use etalon::frame::Settings;
-use etalon::gpu::DeviceInfo;
+use etalon::gpu::{DeviceInfo, Replacement};
 use etalon::plan::{KNOBS, Knobs, Model};
 use etalon::scene::{Camera, Scene};
 use etalon::study;
@@ -31,6 +31,8 @@ const C: u32 = 0x63;
 const F: u32 = 0x66;
 const Z: u32 = 0x7a;
 const P: u32 = 0x70;
+const DOWN: u32 = 0xff54;
+const RIGHT: u32 = 0xff53;
 const ESCAPE: u32 = 0xff1b;
 const CONTROL: u32 = 0xffe3;
 
@@ -123,9 +125,59 @@ fn the_window_shows_what_render_draws() {
     viewer.key(P, None);
     shows_its_command(&mut viewer, folder);
 
+    // Once hidden and shown again.
+    viewer.hide();
+    std::thread::sleep(Duration::from_millis(300));
+    viewer.unhide();
+    shows_its_command(&mut viewer, folder);
+    // Nothing happens, nothing is drawn: a third of a core was busy here once.
+    std::thread::sleep(Duration::from_millis(500));
+    let before = viewer.cpu();
+    std::thread::sleep(Duration::from_secs(2));
+    let busy = viewer.cpu() - before;
+    assert!(busy < Duration::from_millis(200), "{busy:?} of two seconds");
+
     let (code, words) = viewer.close();
     assert_eq!(code, Some(0), "{words}");
     assert!(!words.contains("Validation") && !words.contains("panicked"), "{words}");
+}
+
+/// Every knob by the keys of the window, rung by rung, with validation: the command says so, and some pictures are compared.
+#[test]
+fn every_knob_turns_in_the_window() {
+    let Some(display) = Display::start() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    // As on a screen of one and a half points a pixel.
+    let scale = [("WINIT_X11_SCALE_FACTOR", "1.5")];
+    let arguments = ["study:cornell", "--size", "200x130", "--bare", "--validate", "--set", "samples=1"];
+    let mut viewer = Viewer::open_with(&display, folder, &arguments, &scale);
+    let first = shows_its_command(&mut viewer, folder);
+    for knob in KNOBS {
+        viewer.key(DOWN, None);
+        let mut seen = Vec::new();
+        for _ in knob.rungs {
+            viewer.key(RIGHT, None);
+            viewer.key(C, None);
+            let command = viewer.line();
+            let begin = format!("{}=", knob.name);
+            let rung = command.split_whitespace().find_map(|word| word.strip_prefix(&begin)).unwrap_or("the model's");
+            if !seen.contains(&rung.to_owned()) {
+                seen.push(rung.to_owned());
+            }
+        }
+        // Some rungs go with others alone.
+        let turns =
+            knob.rungs.iter().filter(|rung| Knobs::of(Model::Recursive).with(knob.name, rung).is_some()).count();
+        assert!(seen.len() > 1 || turns < 2, "{}: {seen:?}", knob.name);
+        if ["shadows", "fresnel", "brdf", "reflection", "interfaces", "arithmetic"].contains(&knob.name) {
+            shows_its_command(&mut viewer, folder);
+        }
+    }
+    shows_its_command(&mut viewer, folder);
+    let (code, words) = viewer.close();
+    assert_eq!(code, Some(0), "{words}");
+    assert!(!words.contains("Validation Error") && !words.contains("panicked"), "{words}");
 }
 
 #[test]
@@ -223,6 +275,20 @@ fn every_knob_turns_while_pictures_are_drawn() {
         seen.now().expect("surfaces").radiance[0].iter().map(|pixel| pixel.map(f32::to_bits)).collect();
     assert!(found == gpu::bits(&gpu.film(&scene(), last)), "another picture");
     assert_eq!(seen.error, None);
+    // Other code draws another picture, and what was built the same again.
+    let before = seen.shown().expect("a picture").clone();
+    let program = &etalon::shader::tonemap::PROGRAM;
+    let mut words = program.stages[0].words.to_vec();
+    let factor = words.iter().position(|&word| word == 12.92_f32.to_bits()).expect("the slope of sRGB in the dark");
+    words[factor] = 30.0_f32.to_bits();
+    let code = Arc::new(vec![Replacement { program: program.name, stage: 0, words }]);
+    shared.want(|wanted| wanted.code = code);
+    let is_new = |seen: &Seen, version| seen.shown().is_some_and(|shown| shown.is_done() && shown.version > version);
+    let other = wait("other code", &|seen| is_new(seen, before.version)).shown().expect("a picture").clone();
+    assert!(other.rgba != before.rgba, "the same picture by other code");
+    shared.want(|wanted| wanted.code = Arc::default());
+    let again = wait("the code before", &|seen| is_new(seen, other.version));
+    assert!(again.shown().expect("a picture").rgba == before.rgba, "another picture by the same code");
     shared.want(|wanted| wanted.quit = true);
     thread.join().expect("the thread ends");
 }

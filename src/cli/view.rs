@@ -12,6 +12,7 @@ use super::options::{DeviceOptions, Extent, PictureOptions, SceneOptions};
 use super::setup::contents;
 use crate::cost::sweep::arguments;
 use crate::gpu::{DeviceInfo, Severity};
+use crate::image::file;
 use crate::scene::{Camera, Reads, Scene};
 use crate::viewer::shared::{Asked, Loaded, Source};
 use crate::viewer::{Start, View, run as run_window};
@@ -110,6 +111,25 @@ fn command(args: &ViewArgs, view: &View<'_>) -> String {
     words.concat().join(" ")
 }
 
+/// Where files that were opened are noted, a line each.
+fn notes() -> Option<PathBuf> {
+    Some(file::cache_folder()?.join("recent"))
+}
+
+fn recent() -> Vec<PathBuf> {
+    let text = notes().and_then(|path| std::fs::read_to_string(path).ok()).unwrap_or_default();
+    text.lines().map(PathBuf::from).filter(|path| path.is_file()).collect()
+}
+
+/// Notes files for the next time; where that is impossible they are known until the window is closed.
+fn keep(recent: &[PathBuf]) {
+    let text: String = recent.iter().map(|path| format!("{}\n", path.display())).collect();
+    let written = notes().map(|path| file::write(&path, text.as_bytes()));
+    if let Some(Err(error)) = written {
+        tracing::info!("recent files are not kept: {error:#}");
+    }
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -125,9 +145,9 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode> {
     }
     let settings = args.picture.settings(&args.scene)?;
     let told = args.clone();
-    let file = (!args.scene.scene.starts_with("study:")).then(|| PathBuf::from(&args.scene.scene));
+    let first = (!args.scene.scene.starts_with("study:")).then(|| PathBuf::from(&args.scene.scene));
     let messages = run_window(Start {
-        file,
+        file: first,
         size: args.picture.size,
         settings,
         device: args.device.choice(),
@@ -135,6 +155,8 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode> {
         panels: !args.bare,
         source: Box::new(args.clone()),
         command: Box::new(move |view| command(&told, view)),
+        recent: recent(),
+        keep: Box::new(keep),
         // A terminal that has gone is no reason to close the window.
         said: Box::new(|command| drop(super::print(command))),
     })?;

@@ -63,6 +63,8 @@ pub(super) struct Caches {
     pub(super) layouts: HashMap<&'static str, Layout>,
     pub(super) pipelines: HashMap<PipelineKey, vk::Pipeline>,
     pub(super) samplers: HashMap<SamplerDesc, vk::Sampler>,
+    /// Code of stages in place of what was built, by program and stage.
+    pub(super) replaced: HashMap<(&'static str, usize), Vec<u32>>,
     pub(super) making_ms: f64,
 }
 

@@ -28,6 +28,6 @@ pub use device::{
 pub use frame::{ColorTarget, DepthTarget, Draw, Frame, PassPlan, PassTime, Raster, VertexStream};
 pub use memory::{Buffer, Image, ImageDesc, NOTHING, Place};
 pub use present::{Overlay, Placed, Presented, Presenter};
-pub use shader::{Binding, BindingKind, Constant, Program, Stage, VertexInput};
+pub use shader::{Binding, BindingKind, Constant, Program, Replacement, Stage, VertexInput};
 pub use specialize::specialized;
 pub use surface::Windowed;

@@ -9,7 +9,7 @@ use ash::vk;
 
 use super::cache::{Layout, PipelineKey, SamplerDesc};
 use super::device::{Device, lock};
-use super::shader::Program;
+use super::shader::{Program, Replacement};
 use super::specialize::specialized;
 
 /// Pipelines, some of which are still being made.
@@ -159,6 +159,23 @@ impl Device {
         result
     }
 
+    /// Takes other code for some stages, and what was built for all others. No frame may be under way.
+    pub fn replace(&self, replacements: &[Replacement]) {
+        let mut caches = lock(&self.caches);
+        let code: HashMap<(&'static str, usize), Vec<u32>> =
+            replacements.iter().map(|r| ((r.program, r.stage), r.words.clone())).collect();
+        let before = std::mem::replace(&mut caches.replaced, code);
+        let stages = before.keys().chain(caches.replaced.keys());
+        let changed: Vec<&str> =
+            stages.filter(|stage| before.get(stage) != caches.replaced.get(stage)).map(|stage| stage.0).collect();
+        let old = |key: &PipelineKey, _: &mut vk::Pipeline| changed.contains(&key.program.name);
+        for (_, pipeline) in caches.pipelines.extract_if(old) {
+            // SAFETY: every frame has been waited for.
+            unsafe { self.raw.destroy_pipeline(pipeline, None) };
+            self.gone();
+        }
+    }
+
     fn make(&self, key: &PipelineKey) -> Result<vk::Pipeline, vk::Result> {
         let mut modules = Vec::new();
         let pipeline = self.build(key, &mut modules);
@@ -194,8 +211,9 @@ impl Device {
         // Made when the pass was described.
         let layout = lock(&self.caches).layouts[program.name].pipeline;
         let mut stages = Vec::new();
-        for stage in program.stages {
-            let words = specialized(stage.words, &key.constants);
+        for (index, stage) in program.stages.iter().enumerate() {
+            let replaced = lock(&self.caches).replaced.get(&(program.name, index)).cloned();
+            let words = specialized(replaced.as_deref().unwrap_or(stage.words), &key.constants);
             let info = vk::ShaderModuleCreateInfo::default().code(&words);
             // SAFETY: the words come from glslang.
             let module = unsafe { self.raw.create_shader_module(&info, None) }?;

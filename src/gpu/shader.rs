@@ -121,3 +121,14 @@ pub struct VertexInput {
     /// 1 to 4 components of f32.
     pub components: u32,
 }
+
+/// Other code of a stage.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Replacement {
+    /// Name of the program.
+    pub program: &'static str,
+    /// Place in [`Program::stages`].
+    pub stage: usize,
+    /// SPIR-V of the same interface.
+    pub words: Vec<u32>,
+}

@@ -8,6 +8,8 @@ pub mod equations;
 pub mod layer;
 pub mod navigation;
 pub mod panels;
+#[cfg(feature = "reload")]
+pub mod reload;
 pub mod shared;
 pub mod worker;
 
@@ -25,7 +27,7 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy}
 use winit::window::{Window, WindowId};
 
 use crate::frame::Settings;
-use crate::gpu::{DeviceChoice, Message, Overlay, Placed, Presented, Presenter};
+use crate::gpu::{DeviceChoice, Message, Overlay, Placed, Presented, Presenter, Replacement};
 use crate::image::{Picture, exr, file, png};
 use layer::Layer;
 use navigation::Navigation;
@@ -72,6 +74,10 @@ pub struct Start {
     pub command: Box<dyn Fn(&View<'_>) -> String>,
     /// The scene's file, where it is one: read again when it changes.
     pub file: Option<PathBuf>,
+    /// Files that were opened before, the last first.
+    pub recent: Vec<PathBuf>,
+    /// Keeps such files for the next time.
+    pub keep: Box<dyn Fn(&[PathBuf])>,
     /// Hears of each command that is copied.
     pub said: Box<dyn Fn(&str)>,
 }
@@ -82,6 +88,9 @@ enum Woken {
     Seen,
     /// A file beside the scene's has changed, or itself.
     Changed,
+    /// Shaders were compiled again.
+    #[cfg(feature = "reload")]
+    Compiled(reload::Compiled),
 }
 
 /// Endings of what a scene may be made of.
@@ -143,6 +152,7 @@ struct OpenWindow {
     state: State,
     command: Box<dyn Fn(&View<'_>) -> String>,
     said: Box<dyn Fn(&str)>,
+    keep: Box<dyn Fn(&[PathBuf])>,
     /// Of each scene, by number.
     files: Vec<Option<PathBuf>>,
     scene: u64,
@@ -157,6 +167,8 @@ struct OpenWindow {
     /// Pictures of the window, and milliseconds of the first [`REMEMBERED`] of them.
     pictures: u64,
     took: Vec<f32>,
+    /// Buffers, images and pipelines when the first picture was done.
+    objects: Option<u64>,
     layer: Option<DrawnLayer>,
     layers: u64,
     /// Tells of changes in the folder of the scene's file.
@@ -171,6 +183,11 @@ struct OpenWindow {
     /// The scene that is read again: the camera stays.
     again: Option<u64>,
     writes_exr: bool,
+    /// Code of shaders in place of what was built.
+    code: Arc<Vec<Replacement>>,
+    /// Looks at the shaders' files.
+    #[cfg(feature = "reload")]
+    _shaders: notify::RecommendedWatcher,
     quits: bool,
 }
 
@@ -193,6 +210,17 @@ impl ApplicationHandler<Woken> for Viewer {
             Woken::Changed => {
                 window.reads_at = Some(Instant::now() + SETTLED);
                 window.dirty = true;
+            }
+            #[cfg(feature = "reload")]
+            Woken::Compiled(compiled) => {
+                window.dirty = true;
+                window.state.message = Some(match compiled {
+                    Ok(code) => {
+                        window.code = code;
+                        "shaders were compiled again".to_owned()
+                    }
+                    Err(message) => message,
+                });
             }
         }
     }
@@ -256,14 +284,15 @@ impl ApplicationHandler<Woken> for Viewer {
 
 impl OpenWindow {
     fn new(events: &ActiveEventLoop, start: Start, proxy: EventLoopProxy<Woken>) -> Result<Self> {
-        let Start { size, settings, device: choice, validate, panels, source, command, said, file } = start;
+        let Start { size, settings, device: choice, validate, panels, source, command, said, file, recent, keep } =
+            start;
         let attributes = Window::default_attributes()
             .with_title("Etalon")
             .with_inner_size(PhysicalSize::new(size[0], size[1]))
             .with_min_inner_size(PhysicalSize::new(160, 120));
         let window = Arc::new(events.create_window(attributes).context("opening a window")?);
         let (device, presenter) = Presenter::open(window.clone(), &choice, validate)?;
-        let mut state = State::new(settings.clone(), device.info().clone());
+        let mut state = State::new(settings.clone(), device.info().clone(), recent);
         state.panels = panels;
         let wanted = Wanted::new(settings);
         let context = egui::Context::default();
@@ -281,6 +310,12 @@ impl OpenWindow {
                 .spawn(move || Worker::run(device, shared, source, wake))
                 .context("starting the thread that draws")?
         };
+        #[cfg(feature = "reload")]
+        let shaders = {
+            let proxy = proxy.clone();
+            let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
+            reload::watch(&root, move |compiled| drop(proxy.send_event(Woken::Compiled(compiled))))?
+        };
         Ok(Self {
             window,
             presenter,
@@ -291,6 +326,7 @@ impl OpenWindow {
             state,
             command,
             said,
+            keep,
             files: vec![None],
             scene: 0,
             navigated: None,
@@ -302,6 +338,7 @@ impl OpenWindow {
             wait_until: None,
             pictures: 0,
             took: Vec::new(),
+            objects: None,
             layer: None,
             layers: 0,
             watcher: None,
@@ -311,6 +348,9 @@ impl OpenWindow {
             reads_at: None,
             again: None,
             writes_exr: false,
+            code: Arc::default(),
+            #[cfg(feature = "reload")]
+            _shaders: shaders,
             quits: false,
         })
     }
@@ -386,6 +426,17 @@ impl OpenWindow {
         Ok(())
     }
 
+    /// Puts the file that is seen before those that were opened earlier.
+    fn remember(&mut self) {
+        let Some(path) = self.file().or(self.first.as_deref()) else { return };
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        let recent = &mut self.state.recent;
+        recent.retain(|known| *known != path);
+        recent.insert(0, path);
+        recent.truncate(10);
+        (self.keep)(recent);
+    }
+
     /// Listens for changes of the file that is seen, and of what lies beside it: buffers and textures.
     fn watch(&mut self) {
         self.watcher = None;
@@ -459,6 +510,7 @@ impl OpenWindow {
                 }
             }
             self.state.picked = None;
+            self.remember();
             self.watch();
             self.window.set_title(&format!("{} – Etalon", facts.name));
         } else if let (Some(facts), Some(navigation)) = (&seen.facts, &mut self.state.navigation)
@@ -470,6 +522,9 @@ impl OpenWindow {
         if seen.failed == Some(self.scene) {
             self.scene = self.navigated.unwrap_or(self.scene);
         }
+        if self.objects.is_none() && seen.shown().is_some_and(shared::Shown::is_done) {
+            self.objects = Some(self.device.objects());
+        }
         if self.writes_exr && seen.now().is_some() && seen.shown().is_some_and(shared::Shown::is_done) {
             self.writes_exr = false;
             self.state.message = Some(told(self.write_exr(seen)));
@@ -480,11 +535,8 @@ impl OpenWindow {
         match action {
             Action::Open(path) => {
                 self.scene = self.files.len() as u64;
-                self.files.push(Some(path.clone()));
+                self.files.push(Some(path));
                 self.state.clock.stop();
-                self.state.recent.retain(|known| *known != path);
-                self.state.recent.insert(0, path.clone());
-                self.state.recent.truncate(10);
             }
             Action::Screenshot => self.state.message = Some(told(self.write_png(seen))),
             Action::Exr => self.writes_exr = true,
@@ -550,7 +602,7 @@ impl OpenWindow {
             moving: self.moving_until.is_some(),
             surfaces: self.state.wants_surfaces() || self.writes_exr,
             picked: self.state.picked,
-            programs: 0,
+            code: self.code.clone(),
             quit: false,
         };
         if self.sent.as_ref().is_none_or(|sent| !sent.is_as(&wanted)) {
@@ -597,12 +649,13 @@ impl OpenWindow {
         sorted.sort_by(f32::total_cmp);
         let at = |share: f64| sorted.get((share * sorted.len() as f64) as usize).copied().unwrap_or_default();
         tracing::info!(
-            "{} pictures of the window: {:.1} ms in the middle, 95 of 100 below {:.1}, 99 below {:.1}; {} buffers, images and pipelines",
+            "{} pictures of the window: {:.1} ms in the middle, 95 of 100 below {:.1}, 99 below {:.1}; {} buffers, images and pipelines, {} when the first was done",
             self.pictures,
             at(0.5),
             at(0.95),
             at(0.99),
-            self.device.objects()
+            self.device.objects(),
+            self.objects.unwrap_or_default()
         );
     }
 

@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result};
 
 use crate::cost::table::Table;
 use crate::frame::Settings;
-use crate::gpu::{DeviceInfo, PassTime};
+use crate::gpu::{DeviceInfo, PassTime, Replacement};
 use crate::pass::tonemap::Counts;
 use crate::plan::{Effect, Knobs};
 use crate::scene::environment::Environment;
@@ -119,8 +119,8 @@ pub struct Wanted {
     pub surfaces: bool,
     /// A pixel whose ray is to be followed.
     pub picked: Option<Pick>,
-    /// Programs were compiled anew, so often.
-    pub programs: u64,
+    /// Code of shaders in place of what was built.
+    pub code: Arc<Vec<Replacement>>,
     /// Nothing more.
     pub quit: bool,
 }
@@ -139,7 +139,7 @@ impl Wanted {
             moving: false,
             surfaces: false,
             picked: None,
-            programs: 0,
+            code: Arc::default(),
             quit: false,
         }
     }
@@ -151,12 +151,13 @@ impl Wanted {
     /// Whether the same is to be drawn, however it is shown.
     #[must_use]
     pub fn is_same_picture(&self, other: &Self) -> bool {
-        let marks = |w: &Self| (w.scene, w.time, w.moving, w.programs, w.quit);
+        let marks = |w: &Self| (w.scene, w.time, w.moving, w.quit);
         let settings = |w: &Self| (w.settings.size, w.settings.environment_rotation);
         (marks(self), settings(self)) == (marks(other), settings(other))
             && self.from == other.from
             && self.settings.knobs == other.settings.knobs
             && self.other == other.other
+            && Arc::ptr_eq(&self.code, &other.code)
     }
 
     /// Whether the same is to be seen.

@@ -255,8 +255,10 @@ impl Worker {
             stage.sides.truncate(1);
             self.say(|seen| (seen.sides[1], seen.difference) = Default::default());
         }
-        // Programs that were compiled anew are for all.
-        let renewed = last.is_some_and(|last| last.programs != wanted.programs);
+        let renewed = last.is_some_and(|last| !Arc::ptr_eq(&last.code, &wanted.code));
+        if renewed {
+            self.device.replace(&wanted.code);
+        }
         for index in 0..1 + usize::from(wanted.other.is_some()) {
             let Some(stage) = &mut self.stage else { return Ok(()) };
             let settings = settings_of(&stage.loaded, wanted, index);

@@ -68,6 +68,11 @@ pub struct Viewer<'a> {
 
 impl<'a> Viewer<'a> {
     pub fn open(display: &'a Display, folder: &Path, arguments: &[&str]) -> Self {
+        Self::open_with(display, folder, arguments, &[])
+    }
+
+    /// The same with some variables of the environment.
+    pub fn open_with(display: &'a Display, folder: &Path, arguments: &[&str], variables: &[(&str, &str)]) -> Self {
         let mut program = Command::new(env!("CARGO_BIN_EXE_etalon"))
             .arg("view")
             .args(arguments)
@@ -75,6 +80,7 @@ impl<'a> Viewer<'a> {
             .env("DISPLAY", &display.name)
             .env_remove("WAYLAND_DISPLAY")
             .env("XDG_CACHE_HOME", folder.join("cache"))
+            .envs(variables.iter().copied())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
@@ -152,6 +158,25 @@ impl<'a> Viewer<'a> {
     pub fn resize(&self, [width, height]: [u32; 2]) {
         let size = ConfigureWindowAux::new().width(width).height(height);
         self.display.connection.configure_window(self.window, &size).expect("a request").check().expect("a size");
+    }
+
+    /// Takes the window off the screen, and puts it there again.
+    pub fn hide(&self) {
+        self.display.connection.unmap_window(self.window).expect("a request").check().expect("it is hidden");
+    }
+
+    pub fn unhide(&self) {
+        self.display.connection.map_window(self.window).expect("a request").check().expect("it is shown");
+        self.focus();
+    }
+
+    /// Processor time of the program so far.
+    pub fn cpu(&self) -> Duration {
+        let text = std::fs::read_to_string(format!("/proc/{}/stat", self.program.id())).expect("a process");
+        let after_name = text.rsplit(')').next().expect("numbers");
+        let numbers: Vec<i64> = after_name.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+        // Of the process, from the third on: utime and stime are the 14th and 15th, and the state is no number. In ticks of 10 ms.
+        Duration::from_millis(10 * (numbers[10] + numbers[11]) as u64)
     }
 
     fn fake(&self, kind: u8, detail: u8, [x, y]: [i16; 2]) {

@@ -58,9 +58,10 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
     });
     let effects = seen.sides[state.side].effects.clone();
     egui::Grid::new("knobs").num_columns(3).striped(true).show(ui, |ui| {
-        for knob in KNOBS {
+        for (index, knob) in KNOBS.iter().enumerate() {
             let reason = called_for(&effects, knob.effects);
             let label = if reason.is_some() { RichText::new(knob.name).weak() } else { RichText::new(knob.name) };
+            let label = if state.knob == Some(index) { label.underline() } else { label };
             let about = reason
                 .map_or_else(|| knob.about.to_owned(), |reason| format!("{}; not called for: {reason}", knob.about));
             ui.label(label).on_hover_text(about);

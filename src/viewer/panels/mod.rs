@@ -17,7 +17,7 @@ use super::navigation::Navigation;
 use super::shared::{Pick, Seen};
 use crate::frame::Settings;
 use crate::gpu::{DeviceInfo, PassTime};
-use crate::plan::Knobs;
+use crate::plan::{KNOBS, Knobs};
 
 /// Pictures whose pass times are remembered.
 const HISTORY: usize = 120;
@@ -51,6 +51,8 @@ pub struct State {
     pub other: Option<Knobs>,
     /// The side whose rungs are chosen: 0 left, 1 right.
     pub side: usize,
+    /// The knob that arrow keys turn, by its place in the table; `None`: none was turned yet.
+    pub knob: Option<usize>,
     /// Where the wipe is, as a share of the picture's width.
     pub wipe: f32,
     /// Time of the scene.
@@ -89,12 +91,13 @@ pub struct State {
 impl State {
     /// Begins with settings.
     #[must_use]
-    pub fn new(settings: Settings, device: DeviceInfo) -> Self {
+    pub fn new(settings: Settings, device: DeviceInfo, recent: Vec<PathBuf>) -> Self {
         Self {
             navigation: None,
             settings,
             other: None,
             side: 0,
+            knob: None,
             wipe: 0.5,
             clock: Clock::default(),
             layer: Layer::Radiance,
@@ -104,7 +107,7 @@ impl State {
             message: None,
             moved: false,
             place: [0; 4],
-            recent: Vec::new(),
+            recent,
             device,
             dialog: FileDialog::new()
                 .add_file_filter_extensions("scenes", vec!["glb", "gltf", "obj"])
@@ -145,6 +148,33 @@ impl State {
             Some(other) if self.side == 1 => *other = knobs,
             _ => self.settings.knobs = knobs,
         }
+    }
+
+    /// Goes to the next knob or the one before.
+    fn choose_knob(&mut self, by: isize) {
+        let count = KNOBS.len() as isize;
+        let at = self.knob.map_or(if by > 0 { 0 } else { count - 1 }, |at| (at as isize + by).rem_euclid(count));
+        self.knob = Some(at as usize);
+        self.tell_knob();
+    }
+
+    /// Turns the chosen knob to the next rung that goes with the others, or to the one before; in a circle.
+    fn turn_knob(&mut self, forth: bool) {
+        let at = *self.knob.get_or_insert(0);
+        let knob = &KNOBS[at];
+        let now = knob.rungs.iter().position(|rung| *rung == self.knobs().rung(knob.name)).unwrap_or_default();
+        let count = knob.rungs.len();
+        let steps = (1..count).map(|step| if forth { (now + step) % count } else { (now + count - step) % count });
+        let turned = steps.filter_map(|rung| self.knobs().with(knob.name, knob.rungs[rung])).next();
+        if let Some(knobs) = turned {
+            self.set_knobs(knobs);
+        }
+        self.tell_knob();
+    }
+
+    fn tell_knob(&mut self) {
+        let Some(knob) = self.knob.map(|at| &KNOBS[at]) else { return };
+        self.message = Some(format!("{}={}: {}", knob.name, self.knobs().rung(knob.name), knob.about));
     }
 
     /// Whether a file is being chosen: keys are words then.
@@ -295,6 +325,7 @@ const KEYS: &[(&str, &str)] = &[
     ("1 to 9", "cameras of the file"),
     ("Space; comma, full stop", "play; a picture back, forth"),
     ("V", "compare two settings"),
+    ("up, down; left, right", "choose a knob; turn it"),
     ("Ctrl+click", "ask about a pixel, and see its rays"),
     ("O", "open a file"),
     ("P", "panels"),
@@ -357,6 +388,12 @@ fn keys(ui: &mut Ui, state: &mut State, seen: &Seen, actions: &mut Vec<Action>) 
         (state.help, state.message, state.picked) = (false, None, None);
         actions.push(Action::Dismiss);
     }
+    // As often as they were pressed: a slow picture may see several at once.
+    let count = |key: Key| ui.input_mut(|input| input.count_and_consume_key(Modifiers::NONE, key));
+    (0..count(Key::ArrowUp)).for_each(|_| state.choose_knob(-1));
+    (0..count(Key::ArrowDown)).for_each(|_| state.choose_knob(1));
+    (0..count(Key::ArrowLeft)).for_each(|_| state.turn_knob(false));
+    (0..count(Key::ArrowRight)).for_each(|_| state.turn_knob(true));
     if pressed(Key::V) {
         state.compare(state.other.is_none());
     }
