@@ -56,6 +56,9 @@ pub struct View<'a> {
     pub settings: &'a Settings,
 }
 
+/// Keeps names of files.
+pub type Keep = Box<dyn Fn(&[PathBuf])>;
+
 /// What the viewer begins with.
 pub struct Start {
     /// Pixels of the window.
@@ -77,7 +80,7 @@ pub struct Start {
     /// Files that were opened before, the last first.
     pub recent: Vec<PathBuf>,
     /// Keeps such files for the next time.
-    pub keep: Box<dyn Fn(&[PathBuf])>,
+    pub keep: Keep,
     /// Hears of each command that is copied.
     pub said: Box<dyn Fn(&str)>,
 }
@@ -152,7 +155,7 @@ struct OpenWindow {
     state: State,
     command: Box<dyn Fn(&View<'_>) -> String>,
     said: Box<dyn Fn(&str)>,
-    keep: Box<dyn Fn(&[PathBuf])>,
+    keep: Keep,
     /// Of each scene, by number.
     files: Vec<Option<PathBuf>>,
     scene: u64,
