@@ -1,6 +1,8 @@
 //! The viewer in a real window on a display of its own, moved by synthetic hands: what it shows is what `render` draws, by the command
 //! that it copies, bit by bit.
 
+#[path = "support/gltf_builder.rs"]
+mod gltf_builder;
 #[path = "support/gpu.rs"]
 mod gpu;
 #[path = "support/made.rs"]
@@ -10,7 +12,7 @@ mod program;
 #[path = "support/x11.rs"]
 mod x11;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::time::Duration;
@@ -23,15 +25,21 @@ use etalon::scene::{Camera, Scene};
 use etalon::study;
 use etalon::viewer::shared::{Asked, Loaded, Seen, Shared, Source, Viewpoint, Wanted};
 use etalon::viewer::worker::Worker;
+use gltf_builder::{Builder, FLOAT, f32s};
 use gpu::Gpu;
 use made::Random;
+use serde_json::json;
 use x11::{Display, Viewer};
 
 const C: u32 = 0x63;
 const F: u32 = 0x66;
 const Z: u32 = 0x7a;
 const P: u32 = 0x70;
+const V: u32 = 0x76;
+const SPACE: u32 = 0x20;
+const FULL_STOP: u32 = 0x2e;
 const DOWN: u32 = 0xff54;
+const LEFT: u32 = 0xff51;
 const RIGHT: u32 = 0xff53;
 const ESCAPE: u32 = 0xff1b;
 const CONTROL: u32 = 0xffe3;
@@ -142,6 +150,86 @@ fn the_window_shows_what_render_draws() {
     assert!(!words.contains("Validation") && !words.contains("panicked"), "{words}");
 }
 
+/// A triangle that goes to the right for two seconds, seen by a camera of the file that goes with it for one.
+fn animated(folder: &Path) -> PathBuf {
+    let mut b = Builder::new();
+    let positions = b.accessor(&f32s(&[-1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.5, 0.0]), FLOAT, "VEC3", 3);
+    let mesh = b.push("meshes", json!({ "primitives": [{ "attributes": { "POSITION": positions }, "material": 0 }] }));
+    b.push("materials", json!({ "pbrMetallicRoughness": { "metallicFactor": 0.0 } }));
+    b.push("cameras", json!({ "type": "perspective", "perspective": { "yfov": 0.8, "znear": 0.1 } }));
+    b.push("nodes", json!({ "mesh": mesh }));
+    b.push("nodes", json!({ "camera": 0, "name": "eye", "translation": [0, 0.5, 6] }));
+    let times = b.accessor(&f32s(&[0.0, 2.0]), FLOAT, "SCALAR", 2);
+    let short = b.accessor(&f32s(&[0.0, 1.0]), FLOAT, "SCALAR", 2);
+    let places = b.accessor(&f32s(&[0.0, 0.0, 0.0, 2.0, 0.0, 0.0]), FLOAT, "VEC3", 2);
+    let eyes = b.accessor(&f32s(&[0.0, 0.5, 6.0, 1.0, 0.5, 5.0]), FLOAT, "VEC3", 2);
+    let channel =
+        |sampler: usize, node: usize| json!({ "sampler": sampler, "target": { "node": node, "path": "translation" } });
+    b.push(
+        "animations",
+        json!({
+            "samplers": [{ "input": times, "output": places }, { "input": short, "output": eyes }],
+            "channels": [channel(0, 0), channel(1, 1)],
+        }),
+    );
+    b.json["scenes"] = json!([{ "nodes": [0, 1] }]);
+    b.save_glb(folder)
+}
+
+/// Time, by keys: the window is at a time that its command says, and the file's camera goes with it. Then a wipe between two settings:
+/// left of the line is what one command draws, right of it what the other does.
+#[test]
+fn time_passes_and_settings_are_compared() {
+    let Some(display) = Display::start() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let file = animated(folder);
+    let file = file.file_name().and_then(|name| name.to_str()).expect("a name");
+    let mut viewer = Viewer::open(&display, folder, &[file, "--size", "300x260", "--bare", "--validate"]);
+    let at_rest = shows_its_command(&mut viewer, folder);
+    assert!(!at_rest.contains("--time") && !at_rest.contains("--eye"), "{at_rest}");
+    (0..12).for_each(|_| viewer.key(FULL_STOP, None));
+    let half = shows_its_command(&mut viewer, folder);
+    assert!(half.contains("--time 0.5 ") && !half.contains("--eye"), "{half}");
+    viewer.drag(1, [150, 130], [180, 140]);
+    viewer.key(SPACE, None);
+    std::thread::sleep(Duration::from_millis(700));
+    viewer.key(SPACE, None);
+    let played = shows_its_command(&mut viewer, folder);
+    let time =
+        played.split_whitespace().skip_while(|word| *word != "--time").nth(1).and_then(|t| t.parse::<f64>().ok());
+    assert!(time.is_some_and(|time| time != 0.5 && time <= 2.0) && played.contains("--eye"), "{played}");
+
+    viewer.key(V, None);
+    let knob = KNOBS.iter().position(|knob| knob.name == "indirect").expect("a knob");
+    (0..=knob).for_each(|_| viewer.key(DOWN, None));
+    viewer.key(LEFT, None);
+    viewer.key(ESCAPE, None);
+    viewer.key(C, None);
+    let left = viewer.line();
+    viewer.key(ESCAPE, None);
+    assert_eq!(left, played, "the left side is as before");
+    // From the model's ambient light to none.
+    let (size, expected_left) = drawn(folder, &left);
+    let (_, expected_right) = drawn(folder, &left.replace("-o picture.png", "--set indirect=off -o picture.png"));
+    // The first rows and the last are covered by figures.
+    let rows = 60..170;
+    let differ = |found: &[[u8; 3]], expected: &[[u8; 3]], columns: std::ops::Range<u32>| {
+        let places = rows.clone().flat_map(|y| columns.clone().map(move |x| (y * size[0] + x) as usize));
+        places.filter(|&at| found[at] != expected[at]).count()
+    };
+    viewer.until("both sides", |viewer| {
+        let (window, found) = viewer.pixels()?;
+        let both = [differ(&found, &expected_left, 0..145), differ(&found, &expected_right, 155..300)];
+        eprintln!("{window:?} {both:?}");
+        (window == size && both == [0, 0]).then_some(())
+    });
+    assert!(differ(&expected_left, &expected_right, 155..300) > 0, "both are the same");
+    let (code, words) = viewer.close();
+    assert_eq!(code, Some(0), "{words}");
+    assert!(!words.contains("Validation Error") && !words.contains("panicked"), "{words}");
+}
+
 /// Every knob by the keys of the window, rung by rung, with validation: the command says so, and some pictures are compared.
 #[test]
 fn every_knob_turns_in_the_window() {
@@ -152,7 +240,7 @@ fn every_knob_turns_in_the_window() {
     let scale = [("WINIT_X11_SCALE_FACTOR", "1.5")];
     let arguments = ["study:cornell", "--size", "200x130", "--bare", "--validate", "--set", "samples=1"];
     let mut viewer = Viewer::open_with(&display, folder, &arguments, &scale);
-    let first = shows_its_command(&mut viewer, folder);
+    shows_its_command(&mut viewer, folder);
     for knob in KNOBS {
         viewer.key(DOWN, None);
         let mut seen = Vec::new();

@@ -117,9 +117,9 @@ impl Navigation {
 
     /// The scene has changed under the camera, which stays where it is.
     pub fn stay(&mut self, home: Camera, bounds: Bounds) {
+        // A camera of the file that is another now is no longer this one.
+        self.moved |= home != self.home || self.named.is_some();
         (self.home, self.bounds, self.size) = (home, bounds, bounds.radius().max(1e-6));
-        // The file's camera may be another now.
-        self.moved = true;
     }
 
     /// The scene is at another time: a camera of the file has moved with it.
@@ -314,6 +314,25 @@ mod tests {
             assert!(n.undo());
         }
         assert!(!n.undo() && n.eye() != home, "flying was no kept movement");
+    }
+
+    #[test]
+    fn cameras_of_the_file_go_with_its_time_until_they_are_moved() {
+        let mut n = navigation();
+        let at = |x: f64| Camera { world_from_camera: DAffine3::from_translation(DVec3::X * x), ..n.home.clone() };
+        let (first, second, third) = (at(1.0), at(2.0), at(3.0));
+        n.moment(first.clone(), &[]);
+        assert!(n.camera() == first && !n.moved());
+        n.stay(first, n.bounds);
+        assert!(!n.moved(), "a file that is read again with the same camera");
+        n.orbit(DVec2::new(0.1, 0.0));
+        let turned = n.camera();
+        n.moment(second.clone(), &[]);
+        assert!(n.camera() == turned && n.moved());
+        n.reset();
+        assert!(n.camera() == second);
+        n.stay(third, n.bounds);
+        assert!(n.moved() && n.eye() == DVec3::X * 2.0, "it stays where it is, and is no camera of the file");
     }
 
     #[test]

@@ -231,17 +231,21 @@ fn play(ui: &Ui, state: &mut State, seen: &Seen) {
     ui.ctx().request_repaint();
 }
 
-/// The file, the device and the picture's state, in a line.
+/// The file, the device and the picture's state, in a line; where that is short, words make room for buttons.
 fn bar(ui: &mut Ui, state: &mut State, seen: &Seen, actions: &mut Vec<Action>) {
-    ui.horizontal_wrapped(|ui| {
+    let (mut opened, mut asked) = (None, Vec::new());
+    let helps = &mut state.help;
+    let dialog = &mut state.dialog;
+    let (recent, device) = (&state.recent, &state.device);
+    let facts = |ui: &mut Ui| {
         ui.menu_button("Open", |ui| {
             if ui.button("File … (O)").clicked() {
-                state.dialog.pick_file();
+                dialog.pick_file();
                 ui.close();
             }
-            for path in &state.recent {
+            for path in recent {
                 if ui.button(path.display().to_string()).clicked() {
-                    actions.push(Action::Open(path.clone()));
+                    opened = Some(Action::Open(path.clone()));
                     ui.close();
                 }
             }
@@ -253,7 +257,6 @@ fn bar(ui: &mut Ui, state: &mut State, seen: &Seen, actions: &mut Vec<Action>) {
             ui.weak(format!("{triangles} triangles, {instances} instances, {lights} lights"));
         }
         ui.separator();
-        let device = &state.device;
         if device.kind == "cpu" {
             ui.colored_label(ui.visuals().warn_fg_color, "software device, no GPU").on_hover_text(format!(
                 "{} ({}): every pixel is computed by the processor",
@@ -274,22 +277,22 @@ fn bar(ui: &mut Ui, state: &mut State, seen: &Seen, actions: &mut Vec<Action>) {
             ui.colored_label(ui.visuals().error_fg_color, format!("{wrong} pixels are no numbers"))
                 .on_hover_text("shows: NaN and infinity");
         }
-        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            egui::widgets::global_theme_preference_switch(ui);
-            if ui.button("Help").on_hover_text("H").clicked() {
-                state.help = !state.help;
+    };
+    let buttons = |ui: &mut Ui| {
+        egui::widgets::global_theme_preference_switch(ui);
+        if ui.button("Help").on_hover_text("H").clicked() {
+            *helps = !*helps;
+        }
+        for (name, key, action) in
+            [("Copy command", "C", Action::CopyCommand), ("EXR", "E", Action::Exr), ("PNG", "S", Action::Screenshot)]
+        {
+            if ui.button(name).on_hover_text(key).clicked() {
+                asked.push(action);
             }
-            for (name, key, action) in [
-                ("Copy command", "C", Action::CopyCommand),
-                ("EXR", "E", Action::Exr),
-                ("PNG", "S", Action::Screenshot),
-            ] {
-                if ui.button(name).on_hover_text(key).clicked() {
-                    actions.push(action);
-                }
-            }
-        });
-    });
+        }
+    };
+    egui::Sides::new().shrink_left().truncate().show(ui, facts, buttons);
+    actions.extend(opened.into_iter().chain(asked));
 }
 
 /// What went wrong, what takes long, what was done.
@@ -398,10 +401,11 @@ fn keys(ui: &mut Ui, state: &mut State, seen: &Seen, actions: &mut Vec<Action>) 
         state.compare(state.other.is_none());
     }
     if let Some(duration) = seen.facts.as_ref().and_then(|facts| facts.duration) {
-        let step = f64::from(u8::from(pressed(Key::Period))) - f64::from(u8::from(pressed(Key::Comma)));
-        if step != 0.0 {
+        let steps = count(Key::Period) as f64 - count(Key::Comma) as f64;
+        if steps != 0.0 {
             state.clock.playing = false;
-            state.clock.set(state.clock.time.unwrap_or_default() + step * FILM_STEP, duration);
+            let at = (state.clock.time.unwrap_or_default() / FILM_STEP).round();
+            state.clock.set((at + steps) * FILM_STEP, duration);
         }
         if pressed(Key::Space) {
             state.clock.playing = !state.clock.playing;

@@ -1,0 +1,116 @@
+//! What a pixel's ray meets, against what is known of plates, balls, metals and shadows.
+
+#[path = "support/made.rs"]
+mod made;
+
+use etalon::optics::fresnel::fresnel_dielectric;
+use etalon::scene::events::{Event, Limits, Tracer, Way};
+use etalon::scene::{LightKind, Material, Scene};
+use etalon::study::shape::Shape;
+use glam::DVec3;
+use made::{Made, at, lambert, perspective};
+
+const LIMITS: Limits = Limits { surfaces: 8, roughest: 0.2, least_share: 0.01 };
+
+fn glass(ior: f32) -> Material {
+    Material {
+        ior,
+        metallic: 0.0,
+        roughness: 0.0,
+        transmission: 1.0,
+        thickness: 1.0,
+        base_color: [1.0; 4],
+        ..Material::default()
+    }
+}
+
+/// The ray of the middle of a picture of 3x3 pixels.
+fn middle(scene: &Scene) -> Vec<Event> {
+    Tracer::new(scene).expect("a tree").follow(scene, &scene.cameras[0], [3, 3], [1, 1], &LIMITS)
+}
+
+/// The event that goes on from another by a way.
+fn after(events: &[Event], index: Option<usize>, way: Way) -> Option<(usize, Event)> {
+    events.iter().copied().enumerate().find(|(_, event)| event.after == index && event.way == way)
+}
+
+#[test]
+fn a_plate_shifts_a_ray_and_shares_its_light() {
+    let mut made = Made::new("plate");
+    made.add(Shape::cuboid(DVec3::new(4.0, 4.0, 0.5)), glass(1.5), at(0.0, 0.0, 0.0));
+    let direction = DVec3::new(0.6, 0.0, -0.8);
+    made.camera(-direction * 5.0, DVec3::ZERO, perspective(30.0));
+    let events = middle(&made.0);
+    let (first, seen) = after(&events, None, Way::Seen).expect("the plate");
+    let met = seen.met.expect("a surface");
+    let [reflected, ..] = fresnel_dielectric(0.8, 1.5);
+    assert!((met.cos - 0.8).abs() < 1e-6 && (met.ratio - 1.5).abs() < 1e-6 && (met.reflected - reflected).abs() < 1e-6);
+    let (second, inside) = after(&events, Some(first), Way::Bent).expect("it enters");
+    // sin β = 0.6/1.5.
+    let way = (inside.to - inside.from).normalize();
+    assert!((way - DVec3::new(0.4, 0.0, -(1.0 - 0.16_f64).sqrt())).length() < 1e-6, "{way}");
+    assert!((inside.share - (1.0 - reflected)).abs() < 1e-6, "{}", inside.share);
+    let leaves = inside.met.expect("the other side");
+    assert!((leaves.ratio - 1.0 / 1.5).abs() < 1e-6 && !leaves.total);
+    let (_, out) = after(&events, Some(second), Way::Bent).expect("it leaves");
+    assert!(((out.to - out.from).normalize() - direction).length() < 1e-6, "parallel to where it came from");
+    assert!((out.share - (1.0 - reflected).powi(2)).abs() < 1e-6 && out.met.is_none());
+    let (_, mirrored) = after(&events, Some(first), Way::Mirrored).expect("a mirror image");
+    assert!(((mirrored.to - mirrored.from).normalize() - DVec3::new(0.6, 0.0, 0.8)).length() < 1e-6);
+    // Shares of what ends add up to all light but what is too little to be followed.
+    let ends = |index: usize| events.iter().all(|event| event.after != Some(index));
+    let sum: f64 = events.iter().enumerate().filter(|(i, _)| ends(*i)).map(|(_, event)| event.share).sum();
+    assert!(sum > 0.98 && sum <= 1.0 + 1e-9, "{sum}");
+}
+
+#[test]
+fn steep_rays_stay_inside() {
+    let mut made = Made::new("prism");
+    made.add(Shape::cuboid(DVec3::new(2.0, 2.0, 2.0)), glass(1.5), at(0.0, 0.0, 0.0));
+    // Through a side face near its middle, far off the normal of the top.
+    made.camera(DVec3::new(-3.0, -4.5, 0.1), DVec3::new(-1.0, 0.0, 0.1), perspective(30.0));
+    let events = middle(&made.0);
+    let total = events.iter().filter(|event| event.met.is_some_and(|met| met.total)).count();
+    assert!(total > 0, "the top throws all back: {events:?}");
+    for (index, event) in events.iter().enumerate().filter(|(_, event)| event.met.is_some_and(|met| met.total)) {
+        assert!(after(&events, Some(index), Way::Bent).is_none(), "nothing goes on from {event:?}");
+        assert_eq!(event.met.map(|met| met.reflected), Some(1.0));
+    }
+}
+
+#[test]
+fn one_body_in_another_has_the_ratio_of_both() {
+    let mut made = Made::new("nested");
+    made.add(Shape::cuboid(DVec3::splat(4.0)), glass(1.3), at(0.0, 0.0, 0.0));
+    made.add(Shape::cuboid(DVec3::splat(2.0)), glass(1.7), at(0.0, 0.0, 0.0));
+    made.camera(DVec3::Z * 9.0, DVec3::ZERO, perspective(30.0));
+    let events = middle(&made.0);
+    let mut ratios = Vec::new();
+    let mut at = after(&events, None, Way::Seen);
+    while let Some((index, event)) = at {
+        ratios.extend(event.met.map(|met| met.ratio));
+        at = after(&events, Some(index), Way::Bent);
+    }
+    let expected = [1.3, 1.7 / 1.3, 1.3 / 1.7, 1.0 / 1.3];
+    assert_eq!(ratios.len(), 4, "{ratios:?}");
+    assert!(ratios.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6), "{ratios:?}");
+}
+
+#[test]
+fn what_stands_before_a_light_is_told() {
+    let mut made = Made::new("shadow");
+    made.add(Shape::cuboid(DVec3::new(8.0, 0.1, 8.0)), lambert([0.5; 3]), at(0.0, -0.05, 0.0));
+    made.add(Shape::cuboid(DVec3::new(1.0, 0.1, 1.0)), lambert([0.5; 3]), at(0.0, 2.0, 0.0));
+    let lamp = |x: f64, y: f64| LightKind::Point { position: DVec3::new(x, y, 0.0), range: None };
+    for kind in [lamp(0.0, 4.0), lamp(4.0, 4.0), lamp(0.0, -4.0)] {
+        made.light([1.0; 3], kind);
+    }
+    made.camera(DVec3::new(0.0, 1.0, 5.0), DVec3::ZERO, perspective(30.0));
+    let events = middle(&made.0);
+    let (floor, seen) = after(&events, None, Way::Seen).expect("the floor");
+    assert!(seen.met.is_some_and(|met| met.instance == 0 && met.spreads) && seen.to.length() < 1e-6, "{seen:?}");
+    let to = |light: usize| after(&events, Some(floor), Way::ToLight(light)).map(|(_, event)| event);
+    assert_eq!(to(0).and_then(|event| event.met).map(|met| met.instance), Some(1), "the board stands before the first");
+    assert!(to(1).is_some_and(|event| event.met.is_none() && (event.to - DVec3::new(4.0, 4.0, 0.0)).length() < 1e-9));
+    assert!(to(2).is_none(), "the third lies below the floor");
+}
