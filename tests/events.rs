@@ -10,7 +10,7 @@ use etalon::study::shape::Shape;
 use glam::DVec3;
 use made::{Made, at, lambert, perspective};
 
-const LIMITS: Limits = Limits { surfaces: 8, roughest: 0.2, least_share: 0.01 };
+const LIMITS: Limits = Limits { surfaces: 8, roughest: 0.2, least_share: 0.01, stand_ins: true };
 
 fn glass(ior: f32) -> Material {
     Material {

@@ -314,7 +314,7 @@ fn every_knob_turns_while_pictures_are_drawn() {
     let thread = {
         let (device, shared) = (gpu.device.clone(), shared.clone());
         std::thread::spawn(move || {
-            Worker::run(device, shared, Box::new(Study), Box::new(move || to.send(()).unwrap_or_default()))
+            Worker::run(device, shared, Box::new(Study), Arc::new(move || to.send(()).unwrap_or_default()))
         })
     };
     let mut turned = 0;

@@ -28,6 +28,8 @@ pub struct Limits {
     pub roughest: f64,
     /// Share of the pixel's light below which nothing is followed.
     pub least_share: f64,
+    /// Lights shine that stand for surfaces which emit.
+    pub stand_ins: bool,
 }
 
 /// What a ray was sent for.
@@ -156,7 +158,8 @@ impl Tracer {
             event.met = Some(met);
             events.push(event);
             if met.spreads {
-                events.extend(self.to_lights(scene, index, to, met, ray.share));
+                let from = (index, to);
+                events.extend(self.to_lights(scene, from, met, ray.share, limits.stand_ins));
             }
             // The strongest is followed first.
             let mut next: Vec<Pending> = next.into_iter().map(|ray| Pending { after: Some(index), ..ray }).collect();
@@ -257,8 +260,16 @@ impl Tracer {
     }
 
     /// A ray to each light, of the first few.
-    fn to_lights(&self, scene: &Scene, after: usize, at: DVec3, met: Met, share: f64) -> Vec<Event> {
-        let lights = scene.lights.iter().enumerate().filter(|(_, light)| light.shines() && !light.stand_in);
+    fn to_lights(
+        &self,
+        scene: &Scene,
+        (after, at): (usize, DVec3),
+        met: Met,
+        share: f64,
+        stand_ins: bool,
+    ) -> Vec<Event> {
+        let lights =
+            scene.lights.iter().enumerate().filter(|(_, light)| light.shines() && (stand_ins || !light.stand_in));
         let towards = lights.map(|(index, light)| match light.kind {
             LightKind::Directional { direction } => (index, at - direction * 2.0 * self.radius),
             LightKind::Point { position, .. } | LightKind::Spot { position, .. } => (index, position),

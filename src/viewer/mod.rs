@@ -307,7 +307,7 @@ impl OpenWindow {
         let worker = {
             let (device, shared) = (device.clone(), shared.clone());
             let proxy = proxy.clone();
-            let wake = Box::new(move || drop(proxy.send_event(Woken::Seen)));
+            let wake = Arc::new(move || drop(proxy.send_event(Woken::Seen)));
             std::thread::Builder::new()
                 .name("drawing".to_owned())
                 .spawn(move || Worker::run(device, shared, source, wake))

@@ -1,6 +1,6 @@
 //! The thread that loads and draws: it looks at what is wanted before each sample, and shows what it has after some.
 
-use std::sync::{Arc, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
@@ -83,20 +83,25 @@ fn same_renderer(a: &Settings, b: &Settings) -> bool {
         && a.demand == b.demand
 }
 
+/// Says that there is something to be seen.
+pub type Wake = Arc<dyn Fn() + Send + Sync>;
+
 /// What a worker goes through.
 pub struct Worker {
     device: Arc<Device>,
     shared: Arc<Shared>,
     source: Box<dyn Source>,
-    wake: Box<dyn Fn() + Send>,
+    wake: Wake,
     stage: Option<Stage>,
     version: u64,
+    /// Pictures that are compared, or will be next; `None`: nobody compares.
+    comparing: Arc<Mutex<Option<(Shown, Shown)>>>,
 }
 
 impl Worker {
     /// Loads and draws until nothing more is wanted.
-    pub fn run(device: Arc<Device>, shared: Arc<Shared>, source: Box<dyn Source>, wake: Box<dyn Fn() + Send>) {
-        let mut worker = Self { device, shared, source, wake, stage: None, version: 0 };
+    pub fn run(device: Arc<Device>, shared: Arc<Shared>, source: Box<dyn Source>, wake: Wake) {
+        let mut worker = Self { device, shared, source, wake, stage: None, version: 0, comparing: Arc::default() };
         let mut known = 0;
         let mut last: Option<Wanted> = None;
         loop {
@@ -382,17 +387,44 @@ impl Worker {
             && right.is_done()
             && left.size == right.size
         {
+            let versions = [left.version, right.version];
+            if lock(&self.shared.seen).difference.is_none_or(|known| known.versions != versions) {
+                self.compare(left, right);
+            }
+        }
+        Ok(())
+    }
+
+    /// Compares both sides, on a thread of its own: that takes longer than a piece of a pass. Of what is asked meanwhile it does the last.
+    fn compare(&self, left: Shown, right: Shown) {
+        let runs = lock(&self.comparing).replace((left, right)).is_some();
+        if runs {
+            return;
+        }
+        let (shared, wake, comparing) = (self.shared.clone(), self.wake.clone(), self.comparing.clone());
+        let work = move || {
             let picture = |shown: &Shown| {
                 let rgba = shown.rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect();
                 AnyPicture::Display(Display { width: shown.size[0], height: shown.size[1], rgba })
             };
-            let versions = [left.version, right.version];
-            if lock(&self.shared.seen).difference.is_none_or(|known| known.versions != versions) {
-                let flip = compare(Metric::Flip, &picture(&left), &picture(&right))?.value;
-                self.say(|seen| seen.difference = Some(Difference { versions, flip }));
+            loop {
+                let Some((left, right)) = lock(&comparing).clone() else { return };
+                let versions = [left.version, right.version];
+                match compare(Metric::Flip, &picture(&left), &picture(&right)) {
+                    Ok(found) => lock(&shared.seen).difference = Some(Difference { versions, flip: found.value }),
+                    Err(error) => lock(&shared.seen).error = Some(format!("comparing both sides: {error:#}")),
+                }
+                wake();
+                let mut next = lock(&comparing);
+                if next.as_ref().is_some_and(|(a, b)| [a.version, b.version] == versions) {
+                    *next = None;
+                }
             }
+        };
+        if let Err(error) = std::thread::Builder::new().name("comparing".to_owned()).spawn(work) {
+            *lock(&self.comparing) = None;
+            self.say(|seen| seen.error = Some(format!("comparing both sides: {error}")));
         }
-        Ok(())
     }
 
     fn read_surfaces(&mut self, wanted: &Wanted) -> Result<()> {
@@ -450,8 +482,10 @@ impl Worker {
 /// How far the rays of a picture with these rungs go.
 fn limits_of(knobs: &Knobs) -> Limits {
     let rays = ["reflection", "refraction"].iter().any(|knob| knobs.rung(knob) == "ray");
+    let paths = knobs.rung("indirect") == "path";
     Limits {
-        surfaces: if rays || knobs.rung("indirect") == "path" { knobs.interfaces() } else { 1 },
+        surfaces: if rays || paths { knobs.interfaces() } else { 1 },
+        stand_ins: !paths,
         roughest: f64::from(knobs.roughest_lobe()),
         least_share: LEAST_SHARE,
     }

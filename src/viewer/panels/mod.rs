@@ -311,7 +311,12 @@ fn notices(ui: &mut Ui, state: &mut State, seen: &Seen) {
     let said = seen.busy.as_ref().map(|busy| format!("{busy} …")).or_else(|| state.message.clone());
     if let Some(said) = said {
         area("said", -64.0).show(ui.ctx(), |ui| {
-            egui::Frame::popup(ui.style()).show(ui, |ui| ui.label(said));
+            egui::Frame::popup(ui.style()).show(ui, |ui| {
+                // An area is as narrow as its words can be broken, unless it is told.
+                ui.set_min_width((7.0 * said.len() as f32).min(640.0));
+                ui.set_max_width(640.0);
+                ui.label(said)
+            });
         });
     }
 }

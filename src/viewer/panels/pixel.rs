@@ -27,16 +27,19 @@ pub(super) fn incidence(p: &AovPixel) -> f64 {
     (-way.normalize_or_zero().dot(normal)).clamp(-1.0, 1.0)
 }
 
-/// Takes what is known of the pixel, while the scene is seen from where it was asked about.
-fn look(state: &mut State, trace: &Trace, seen: &Seen) {
-    let same_view = state.navigation.as_ref().is_some_and(|navigation| navigation.camera() == trace.seen_from);
-    let Some(surfaces) = seen.now().filter(|surfaces| same_view && surfaces.size == trace.size) else { return };
+/// Takes what is known of the pixel, while the scene is seen from where it was asked about; whether it is.
+fn look(state: &mut State, trace: &Trace, seen: &Seen) -> bool {
+    if state.navigation.as_ref().is_none_or(|navigation| navigation.camera() != trace.seen_from) {
+        return false;
+    }
+    let Some(surfaces) = seen.now().filter(|surfaces| surfaces.size == trace.size) else { return true };
     let ([x, y], [width, height]) = (trace.pixel, surfaces.size);
     if x < width && y < height {
         let at = (y * width + x) as usize;
         let radiance = surfaces.radiance.iter().map(|side| side[at]).collect();
         state.pixel = Some(Facts { surface: surfaces.pixels[at], radiance, eye: surfaces.eye });
     }
+    true
 }
 
 pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
@@ -49,10 +52,11 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
         ui.weak("once the picture is finished …");
         return;
     };
-    look(state, trace, seen);
+    let is_there = look(state, trace, seen);
     match &state.pixel {
         Some(facts) => surface(ui, trace.pixel, facts, scene),
-        None => drop(ui.weak("once the picture is finished …")),
+        None if is_there => drop(ui.weak("once the picture is finished …")),
+        None => drop(ui.weak("the view moved before the picture was finished: Ctrl+Z goes back")),
     }
     ui.separator();
     ui.strong("What its ray meets").on_hover_text(
