@@ -219,7 +219,7 @@ impl Tracer {
         let opacity = if m.alpha_mode == AlphaMode::Opaque { 1.0 } else { f64::from(m.base_color[3]) };
         let smooth = f64::from(m.roughness) <= limits.roughest;
         let through = f64::from(m.transmission) * (1.0 - metallic);
-        let spreads = !smooth || (through < 1.0 && metallic < 1.0) || m.unlit;
+        let spreads = !m.unlit && (!smooth || (through < 1.0 && metallic < 1.0));
         let met = Met {
             instance,
             material: scene.meshes[scene.instances[instance].mesh].material,

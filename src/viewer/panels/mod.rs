@@ -109,7 +109,9 @@ impl State {
             place: [0; 4],
             recent,
             device,
+            // Its field of search is dark on black in a light window (0.15).
             dialog: FileDialog::new()
+                .show_search(false)
                 .add_file_filter_extensions("scenes", vec!["glb", "gltf", "obj"])
                 .default_file_filter("scenes"),
             history: VecDeque::new(),
@@ -383,8 +385,6 @@ fn keys(ui: &mut Ui, state: &mut State, seen: &Seen, actions: &mut Vec<Action>) 
     }
     if pressed(Key::O) {
         state.dialog.pick_file();
-        // The letter is no word to search for.
-        ui.input_mut(|input| input.events.retain(|event| !matches!(event, egui::Event::Text(_))));
     }
     if pressed(Key::P) {
         state.panels = !state.panels;

@@ -54,7 +54,10 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
     };
     let is_there = look(state, trace, seen);
     match &state.pixel {
-        Some(facts) => surface(ui, trace.pixel, facts, scene),
+        Some(facts) => {
+            let met = trace.events.first().and_then(|event| event.met);
+            surface(ui, trace.pixel, facts, scene, met.map_or(1.0, |met| met.ratio));
+        }
         None if is_there => drop(ui.weak("once the picture is finished …")),
         None => drop(ui.weak("the view moved before the picture was finished: Ctrl+Z goes back")),
     }
@@ -77,7 +80,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
 }
 
 /// The surface at the pixel.
-fn surface(ui: &mut Ui, [x, y]: [u32; 2], facts: &Facts, scene: &SceneFacts) {
+fn surface(ui: &mut Ui, [x, y]: [u32; 2], facts: &Facts, scene: &SceneFacts, ratio: f64) {
     let p = &facts.surface;
     let material = (p.material as usize).checked_sub(1).and_then(|index| scene.materials.get(index));
     egui::Grid::new("pixel").num_columns(2).striped(true).show(ui, |ui| {
@@ -108,7 +111,7 @@ fn surface(ui: &mut Ui, [x, y]: [u32; 2], facts: &Facts, scene: &SceneFacts) {
         row("metallic", format!("{:.4}", p.metallic));
         row("incidence", format!("{:.2}°", incidence(p).acos().to_degrees()));
         if let Some(m) = material {
-            fresnel(&mut row, m, incidence(p).max(0.0));
+            fresnel(&mut row, m, incidence(p).max(0.0), ratio);
         }
     });
     if let Some(m) = material.filter(|m| m.conductor_spectra.is_some() || varies(m)) {
@@ -121,11 +124,14 @@ fn varies(m: &Material) -> bool {
     m.conductor.is_none() && m.dispersion.disperses(f64::from(m.ior))
 }
 
-/// n, κ and the share that is mirrored, at three wavelengths where they differ.
-fn fresnel(row: &mut impl FnMut(&str, String), m: &Material, cos: f64) {
+/// n, κ and the share that is mirrored, at three wavelengths where they differ. `ratio` is the index behind the surface over that before it,
+/// for green light: other light has another where the medium on one of its sides disperses.
+fn fresnel(row: &mut impl FnMut(&str, String), m: &Material, cos: f64, ratio: f64) {
+    let [green, _] = m.complex_index(550.0);
     let whole = |nm: f64| {
         let [n, kappa] = m.complex_index(nm);
-        let share = if kappa > 0.0 { fresnel_conductor(cos, n, kappa)[0] } else { fresnel_dielectric(cos, n)[0] };
+        let ratio = if ratio < 1.0 { ratio * green / n } else { ratio * n / green };
+        let share = if kappa > 0.0 { fresnel_conductor(cos, n, kappa)[0] } else { fresnel_dielectric(cos, ratio)[0] };
         (n, kappa, 100.0 * share)
     };
     if m.conductor.is_none() && !varies(m) {
@@ -183,7 +189,11 @@ fn told(ui: &mut Ui, event: &Event, depth: usize, scene: &SceneFacts) -> bool {
             let light = scene.lights.get(index).map_or("", |light| &light.name);
             match met {
                 None => format!("to light {index} {light}: {length:.3} m, free"),
-                Some(met) => format!("to light {index} {light}: {} stands before it", name(met)),
+                Some(met) => {
+                    let lets_through = scene.materials.get(met.material).is_some_and(|m| m.transmission > 0.0);
+                    let how = if lets_through { ", which lets light through, lies" } else { " stands" };
+                    format!("to light {index} {light}: {}{how} before it", name(met))
+                }
             }
         }
         (way, met) => {
@@ -211,7 +221,7 @@ fn told(ui: &mut Ui, event: &Event, depth: usize, scene: &SceneFacts) -> bool {
     ui.horizontal_top(|ui| {
         ui.add_space(8.0 * depth as f32);
         let (dot, _) = ui.allocate_exact_size(egui::vec2(8.0, 14.0), Sense::hover());
-        ui.painter().circle_filled(dot.center(), 3.5, colour(event));
+        ui.painter().circle(dot.center(), 3.5, colour(event), Stroke::new(1.0, Color32::from_gray(90)));
         ui.add(egui::Label::new(text).wrap()).hovered()
     })
     .inner
