@@ -298,6 +298,8 @@ impl Targets {
 
 /// A picture under way.
 pub struct Drawing {
+    /// A sample may be given up before it is added to the others ([`Device::interrupt`]): the next step draws it again.
+    pub interruptible: bool,
     view: View,
     /// The sample and the band of it that come next, and of how many samples.
     next: [u32; 2],
@@ -465,6 +467,7 @@ impl Renderer {
         // Drawn once, before the first picture.
         times.add(std::mem::take(&mut self.shadow_maps.times));
         Drawing {
+            interruptible: false,
             view,
             next: [0, 0],
             count: self.plan.samples,
@@ -486,7 +489,11 @@ impl Renderer {
         // A frame whose see-through fragments did not fit is drawn again with more room.
         loop {
             self.look(&drawing.view, index, count, band);
-            let passes = self.sample(count, band)?.finish()?;
+            let sample = self.sample(count, band)?;
+            let passes = match drawing.interruptible {
+                true => self.device.interruptible(|| sample.finish())?,
+                false => sample.finish()?,
+            };
             let fitted = match &mut self.targets.lists {
                 Some(lists) => lists.fitted()?,
                 None => true,

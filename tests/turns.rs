@@ -59,9 +59,9 @@ fn pieces_are_the_same_picture() {
     assert!(cut > 20, "{cut} dispatches were cut");
 }
 
-/// A frame that is given up leaves the device as it is: the next one is whole.
+/// A frame that is given up leaves the device and the film as they are: the picture goes on, and is whole.
 #[test]
-fn what_is_interrupted_begins_anew() {
+fn what_is_interrupted_goes_on() {
     let gpu = Gpu::taking_turns();
     let scene = study::load("etalon").expect("a scene");
     let settings = Settings { size: [176, 99], knobs: Knobs::of(Model::Recursive), ..Settings::default() };
@@ -71,6 +71,7 @@ fn what_is_interrupted_begins_anew() {
     let (device, mut interruptions) = (gpu.device.clone(), 0);
     for i in 0..12 {
         let mut drawing = renderer.begin(&scene.cameras[0]);
+        drawing.interruptible = true;
         let interrupter = {
             let device = device.clone();
             std::thread::spawn(move || {
@@ -78,14 +79,18 @@ fn what_is_interrupted_begins_anew() {
                 device.interrupt();
             })
         };
-        let drawn = device.interruptible(|| (0..4).try_for_each(|_| renderer.step(&mut drawing)));
+        let drawn = (0..4).try_for_each(|_| renderer.step(&mut drawing));
         interrupter.join().expect("it ends");
         if let Err(error) = drawn {
             assert!(error.is::<Interrupted>(), "{error:#}");
             interruptions += 1;
         }
         device.resume();
-        renderer.render(&scene.cameras[0], &mut |_| ()).expect("a picture");
+        // It goes on with the sample that was given up.
+        while !drawing.is_done() {
+            renderer.step(&mut drawing).expect("a sample");
+        }
+        renderer.picture(&drawing).expect("a picture");
         assert!(bits(&renderer.film().expect("a film")) == whole, "another picture after {} ms", 3 * i);
     }
     assert!(interruptions > 4, "{interruptions} of 12");

@@ -124,7 +124,11 @@ fn recent() -> Vec<PathBuf> {
 /// Notes files for the next time; where that is impossible they are known until the window is closed.
 fn keep(recent: &[PathBuf]) {
     let text: String = recent.iter().map(|path| format!("{}\n", path.display())).collect();
-    let written = notes().map(|path| file::write(&path, text.as_bytes()));
+    let write = |path: PathBuf| {
+        path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
+        file::write(&path, text.as_bytes())
+    };
+    let written = notes().map(write);
     if let Some(Err(error)) = written {
         tracing::info!("recent files are not kept: {error:#}");
     }

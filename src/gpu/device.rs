@@ -13,7 +13,6 @@ use serde::Serialize;
 
 use super::cache::Caches;
 use super::surface::Surface;
-use super::turns::Pace;
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -424,8 +423,8 @@ pub struct Device {
     pub(super) family: u32,
     /// A window shares its queue: nothing that is submitted takes long.
     pub(super) turns: bool,
-    /// How long passes take, by name, where `turns`.
-    pub(super) paces: Mutex<HashMap<String, Pace>>,
+    /// Milliseconds of a group of invocations in the last dispatch of each name, where `turns`.
+    pub(super) paces: Mutex<HashMap<String, f64>>,
     pub(super) instance: Instance,
 }
 

@@ -23,15 +23,6 @@ const FIRST: u64 = 32;
 /// A piece has at most so many times the groups of the one before: that one may have been quick by chance.
 const GROWTH: f64 = 4.0;
 
-/// How quickly a pass went when it was drawn last.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Pace {
-    /// Milliseconds of a group, in its last piece.
-    group_ms: f64,
-    /// Of the whole pass.
-    pass_ms: f64,
-}
-
 /// Groups from `base` on, as many as `count` says along each axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Piece {
@@ -75,16 +66,9 @@ impl Recording<'_> {
                 Work::Dispatch(work) => work,
             };
             let known = lock(&self.device.paces).get(&pass.name).copied();
-            let is_short = known.is_some_and(|pace| pace.pass_ms < PIECE_MS);
             let groups = match work.groups {
-                Groups::Count(groups) => Some(groups),
-                Groups::At(..) if is_short => None,
-                Groups::At(sizes, offset) => Some(self.read_groups(sizes, offset, room)?),
-            };
-            let Some(groups) = groups else {
-                let ms = self.turn(&pass.name, first, |commands| work.record(self.device, commands, made[0], None))?;
-                lock(&self.device.paces).entry(pass.name).or_default().pass_ms = ms;
-                return Ok(ms);
+                Groups::Count(groups) => groups,
+                Groups::At(sizes, offset) => self.read_groups(sizes, offset, room)?,
             };
             self.pieces(&pass.name, &work, made[0], groups, known, first)
         }
@@ -97,15 +81,11 @@ impl Recording<'_> {
         work: &Dispatch<'_>,
         pipeline: vk::Pipeline,
         groups: [u32; 3],
-        known: Option<Pace>,
+        known: Option<f64>,
         first: impl Fn(vk::CommandBuffer),
     ) -> Result<f64> {
         let all: u64 = groups.into_iter().map(u64::from).product();
-        let mut pace = known.filter(|pace| pace.group_ms > 0.0).unwrap_or_default();
-        let mut most = match pace.group_ms {
-            0.0 => all.div_ceil(FIRST) as f64,
-            ms => PIECE_MS / ms,
-        };
+        let mut most = known.filter(|ms| *ms > 0.0).map_or(all.div_ceil(FIRST) as f64, |ms| PIECE_MS / ms);
         let (mut done, mut total) = (0, 0.0);
         // Barriers count, too, where there is nothing to do.
         while done < all || done == 0 {
@@ -130,11 +110,10 @@ impl Recording<'_> {
             }
             self.device.cut.fetch_add(u64::from(done == 0 && count < all), Ordering::Relaxed);
             done += count;
-            pace.group_ms = ms / count as f64;
-            most = (PIECE_MS / pace.group_ms.max(1e-9)).min(GROWTH * count as f64);
+            most = (PIECE_MS * count as f64 / ms.max(1e-9)).min(GROWTH * count as f64);
         }
-        pace.pass_ms = total;
-        lock(&self.device.paces).insert(name.to_owned(), pace);
+        // The mean: some part is always cheap, and the next frame may begin with one that is not.
+        lock(&self.device.paces).insert(name.to_owned(), total / all.max(1) as f64);
         Ok(total)
     }
 

@@ -146,7 +146,7 @@ impl Tracer {
             if events.len() >= MOST_EVENTS {
                 break;
             }
-            let crossing = self.nearest(ray.from, ray.direction);
+            let crossing = self.nearest_seen(scene, ray.from, ray.direction);
             let index = events.len();
             let to = ray.from + ray.direction * crossing.map_or(2.0 * self.radius, |crossing| crossing.t);
             let mut event = Event { after: ray.after, way: ray.way, from: ray.from, to, share: ray.share, met: None };
@@ -174,6 +174,30 @@ impl Tracer {
         line::nearest(&self.bvh, from - self.bvh.anchor, direction, 1e-6 * self.radius)
     }
 
+    /// The nearest surface that is seen: backs of sheets with one side are not.
+    fn nearest_seen(&self, scene: &Scene, from: DVec3, direction: DVec3) -> Option<Crossing<'_>> {
+        let mut behind = 1e-6 * self.radius;
+        loop {
+            let crossing = line::nearest(&self.bvh, from - self.bvh.anchor, direction, behind)?;
+            let instance = crossing.triangle.instance as usize;
+            let is_seen = self.solids.solid[instance] || material(scene, instance).double_sided;
+            if is_seen || self.front(scene, &crossing, direction).0 {
+                return Some(crossing);
+            }
+            behind = crossing.t * (1.0 + 1e-9);
+        }
+    }
+
+    /// Whether the front of a triangle is met, which looks outwards from bodies, and its unit normal on the side that the ray comes from.
+    fn front(&self, scene: &Scene, crossing: &Crossing<'_>, direction: DVec3) -> (bool, DVec3) {
+        let instance = crossing.triangle.instance as usize;
+        let [a, b, c] = crossing.triangle.corners.map(|corner| DVec3::from(corner.map(f64::from)));
+        let n = (b - a).cross(c - a).normalize();
+        let mirrored = scene.instances[instance].world_from_object.matrix3.determinant() < 0.0;
+        let faces = n.dot(direction) < 0.0;
+        ((faces != mirrored) != self.solids.flipped[instance], if faces { n } else { -n })
+    }
+
     /// What a surface is to a ray, and the rays that leave it.
     fn at_surface(
         &self,
@@ -185,10 +209,12 @@ impl Tracer {
         let instance = crossing.triangle.instance as usize;
         let m = material(scene, instance);
         let to = ray.from + ray.direction * crossing.t;
-        let n = crossing.normal(scene);
-        let signed = -ray.direction.dot(n);
-        let front = (signed > 0.0) != self.solids.normals_flipped[instance];
-        let (normal, cos) = (n * signed.signum(), signed.abs().min(1.0));
+        let (front, flat) = self.front(scene, crossing, ray.direction);
+        let shading = crossing.normal(scene);
+        let shading = if shading.dot(flat) < 0.0 { -shading } else { shading };
+        // Where normals of corners look away from the ray, near silhouettes, or are none, the triangle's own is taken.
+        let normal = if -ray.direction.dot(shading) > 0.0 { shading } else { flat };
+        let cos = (-ray.direction.dot(normal)).clamp(0.0, 1.0);
         let is_body = self.solids.solid[instance];
         let mut inside = ray.inside.clone();
         if is_body {
@@ -202,7 +228,7 @@ impl Tracer {
             |inside: &[usize]| medium(scene, inside).map_or(1.0, |i| material(scene, i).complex_index(GREEN)[0]);
         let (before, behind) = (index_of(&ray.inside), index_of(&inside));
         let changes = !is_body || medium(scene, &ray.inside) != medium(scene, &inside);
-        let ratio = if is_body { behind / before } else { m.complex_index(GREEN)[0] / before };
+        let ratio = if is_body { behind / before } else { m.dispersion.index(f64::from(m.ior), GREEN) / before };
         let [of_dielectric, _, _, _, total] = fresnel_dielectric(cos, ratio);
         let of_metal = match &m.conductor {
             Some(index) => fresnel_conductor(cos, f64::from(index[1][0]), f64::from(index[1][1]))[0],
@@ -216,7 +242,11 @@ impl Tracer {
         let metallic = f64::from(m.metallic);
         let reflected = if changes { of_dielectric + metallic * (of_metal - of_dielectric) } else { 0.0 };
         let is_thrown_back = total > 0.0 && is_body && changes;
-        let opacity = if m.alpha_mode == AlphaMode::Opaque { 1.0 } else { f64::from(m.base_color[3]) };
+        let opacity = match m.alpha_mode {
+            AlphaMode::Opaque => 1.0,
+            AlphaMode::Mask(cutoff) => f64::from(u8::from(m.base_color[3] >= cutoff)),
+            AlphaMode::Blend => f64::from(m.base_color[3]),
+        };
         let smooth = f64::from(m.roughness) <= limits.roughest;
         let through = f64::from(m.transmission) * (1.0 - metallic);
         let spreads = !m.unlit && (!smooth || (through < 1.0 && metallic < 1.0));
@@ -228,7 +258,7 @@ impl Tracer {
             ratio,
             reflected,
             total: is_thrown_back,
-            spreads: spreads && changes,
+            spreads: spreads && changes && opacity > 0.0,
         };
         let leave = |way, direction, share, inside| Pending {
             after: None,

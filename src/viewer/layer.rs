@@ -127,6 +127,11 @@ mod tests {
             radiance: vec![Arc::new(vec![[f32::NAN, 0.0, 0.0, 1.0], [0.0, f32::INFINITY, 0.0, 1.0], [1.0; 4]])],
             size: [3, 1],
             eye: glam::DVec3::ZERO,
+            seen_from: crate::scene::Camera::framing(
+                crate::scene::Bounds { min: glam::DVec3::ZERO, max: glam::DVec3::ONE },
+                1.0,
+                1.0,
+            ),
             versions: [Some(1), None],
         };
         let of = |layer: Layer, i: usize| layer.draw(&surfaces)[4 * i..4 * i + 4].to_vec();

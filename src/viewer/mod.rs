@@ -303,6 +303,7 @@ impl OpenWindow {
         let side = device.max_image_size() as usize;
         let egui =
             egui_winit::State::new(context, egui::ViewportId::ROOT, &*window, native, window.theme(), Some(side));
+        let (code, sent) = (wanted.code.clone(), Some(wanted.clone()));
         let shared = Arc::new(Shared::new(wanted));
         let worker = {
             let (device, shared) = (device.clone(), shared.clone());
@@ -319,7 +320,7 @@ impl OpenWindow {
             let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
             reload::watch(&root, move |compiled| drop(proxy.send_event(Woken::Compiled(compiled))))?
         };
-        Ok(Self {
+        let mut new = Self {
             window,
             presenter,
             device,
@@ -334,7 +335,7 @@ impl OpenWindow {
             scene: 0,
             navigated: None,
             moment: None,
-            sent: None,
+            sent,
             moving_until: None,
             drawn: Instant::now() - FRAME,
             dirty: true,
@@ -351,11 +352,13 @@ impl OpenWindow {
             reads_at: None,
             again: None,
             writes_exr: false,
-            code: Arc::default(),
+            code,
             #[cfg(feature = "reload")]
             _shaders: shaders,
             quits: false,
-        })
+        };
+        new.watch();
+        Ok(new)
     }
 
     /// One picture of the window.
@@ -478,6 +481,8 @@ impl OpenWindow {
     fn read_again(&mut self) {
         // Another is being opened, or the first one failed and is tried once more.
         if self.navigated.is_some_and(|navigated| navigated != self.scene) {
+            // Once that is read.
+            self.reads_at = Some(Instant::now() + SETTLED);
             return;
         }
         let same = self.files.get(self.scene as usize).cloned().flatten();

@@ -240,6 +240,10 @@ pub struct Shown {
     pub samples: [u32; 2],
     /// Drawn while the view moved.
     pub moving: bool,
+    /// Time of the scene, as it was wanted.
+    pub time: Option<f64>,
+    /// Rungs that it was drawn with.
+    pub knobs: Knobs,
     /// GPU time of each pass, of a sample.
     pub passes: Vec<PassTime>,
     /// Rays of a sample.
@@ -275,6 +279,8 @@ pub struct Surfaces {
     pub size: [u32; 2],
     /// What positions are relative to.
     pub eye: glam::DVec3,
+    /// From where they are seen.
+    pub seen_from: Camera,
     /// The pictures that they were read with.
     pub versions: [Option<u64>; 2],
 }

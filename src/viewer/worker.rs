@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result};
 
 use super::shared::{Difference, Loaded, Pick, SceneFacts, Seen, Shared, Shown, Source, Surfaces, Trace, Wanted, lock};
 use crate::frame::{Drawing, Renderer, Settings};
-use crate::gpu::{Device, Interrupted, PassTime, is_lost};
+use crate::gpu::{Device, Interrupted, PassTime, Replacement, is_lost};
 use crate::image::metric::{AnyPicture, Metric, compare};
 use crate::image::png::Display;
 use crate::plan::Knobs;
@@ -30,8 +30,8 @@ struct Side {
     /// Of the renderer.
     settings: Settings,
     drawing: Option<Drawing>,
-    /// Wall nanoseconds of a pixel of a sample.
-    ns_per_pixel: f64,
+    /// What the sample under way took so far.
+    spent: Duration,
     looked: Instant,
 }
 
@@ -39,7 +39,7 @@ impl Side {
     fn new(device: &Arc<Device>, loaded: &Loaded, settings: Settings) -> Result<Self> {
         let environment = loaded.environment.as_ref().map(|(environment, _)| &**environment);
         let renderer = Renderer::new(device, loaded.scene.clone(), environment, settings.clone())?;
-        Ok(Self { renderer, settings, drawing: None, ns_per_pixel: 0.0, looked: Instant::now() })
+        Ok(Self { renderer, settings, drawing: None, spent: Duration::ZERO, looked: Instant::now() })
     }
 
     fn is_done(&self) -> bool {
@@ -59,6 +59,8 @@ struct Stage {
     time: Option<f64>,
     loaded: Loaded,
     sides: Vec<Side>,
+    /// Wall nanoseconds of a pixel of a sample, of each side; 0: nobody knows.
+    ns_per_pixel: [f64; 2],
     /// Settings that could not be drawn: they are not tried again.
     refused: [Option<Settings>; 2],
     /// Made when a ray is followed for the first time.
@@ -94,6 +96,8 @@ pub struct Worker {
     wake: Wake,
     stage: Option<Stage>,
     version: u64,
+    /// Code of shaders that is drawn with in place of what was built.
+    code: Arc<Vec<Replacement>>,
     /// Pictures that are compared, or will be next; `None`: nobody compares.
     comparing: Arc<Mutex<Option<(Shown, Shown)>>>,
 }
@@ -101,7 +105,8 @@ pub struct Worker {
 impl Worker {
     /// Loads and draws until nothing more is wanted.
     pub fn run(device: Arc<Device>, shared: Arc<Shared>, source: Box<dyn Source>, wake: Wake) {
-        let mut worker = Self { device, shared, source, wake, stage: None, version: 0, comparing: Arc::default() };
+        let (code, comparing) = (lock(&shared.wanted).0.code.clone(), Arc::default());
+        let mut worker = Self { device, shared, source, wake, stage: None, version: 0, code, comparing };
         let mut known = 0;
         let mut last: Option<Wanted> = None;
         loop {
@@ -150,6 +155,11 @@ impl Worker {
 
     /// Something else is wanted.
     fn begin(&mut self, wanted: &Wanted, last: Option<&Wanted>) -> Result<()> {
+        let renewed = !Arc::ptr_eq(&self.code, &wanted.code);
+        if renewed {
+            self.code = wanted.code.clone();
+            self.device.replace(&wanted.code);
+        }
         let here = self.stage.as_ref().map(|stage| (stage.scene, stage.time));
         let tried = last.map(|last| (last.scene, last.time));
         let at = (wanted.scene, wanted.time);
@@ -157,14 +167,14 @@ impl Worker {
             let other_scene = here.map(|(scene, _)| scene) != Some(wanted.scene);
             if other_scene { self.load(wanted)? } else { self.go_to(wanted)? }
         }
-        self.follow_knobs(wanted, last)?;
+        self.follow_knobs(wanted, renewed)?;
         let Some(stage) = &mut self.stage else { return Ok(()) };
         let camera = wanted.from.camera(&stage.loaded)?;
         let same_view = last.is_some_and(|last| {
             // What is the scene's own may have moved with its time.
             (&last.from, last.moving) == (&wanted.from, wanted.moving) && tried == Some(at)
         });
-        let ns: f64 = stage.sides.iter().map(|side| side.ns_per_pixel).sum();
+        let ns: f64 = stage.ns_per_pixel.iter().take(stage.sides.len()).sum();
         let mut developed = Vec::new();
         for (index, side) in stage.sides.iter_mut().enumerate() {
             let Settings { size, tonemap, exposure, .. } = wanted.settings;
@@ -184,6 +194,7 @@ impl Worker {
             if !same_view || side.drawing.is_none() || side.renderer.plan.samples != samples {
                 side.renderer.plan.samples = samples;
                 side.drawing = Some(side.renderer.begin(camera));
+                side.spent = Duration::ZERO;
             } else if !same_display && side.drawing.as_ref().is_some_and(Drawing::is_whole) {
                 developed.push(index);
             }
@@ -229,9 +240,9 @@ impl Worker {
             knobs: knobs.clone(),
         };
         // Times of samples are much the same from one moment to the next.
-        let ns = self.stage.as_ref().and_then(|stage| stage.sides.first()).map_or(0.0, |side| side.ns_per_pixel);
+        let ns = stage.ns_per_pixel;
         let (mut stage, facts) = self.ready(wanted, loaded)?;
-        stage.sides.iter_mut().for_each(|side| side.ns_per_pixel = ns);
+        stage.ns_per_pixel = ns;
         self.take_over((stage, facts));
         Ok(())
     }
@@ -241,28 +252,31 @@ impl Worker {
         let facts = SceneFacts::of(wanted, &loaded)?;
         let side = Side::new(&self.device, &loaded, settings_of(&loaded, wanted, 0))?;
         let (scene, time) = (wanted.scene, wanted.time);
-        Ok((Stage { scene, time, loaded, sides: vec![side], refused: [None, None], tracer: None }, facts))
+        let sides = vec![side];
+        Ok((Stage { scene, time, loaded, sides, ns_per_pixel: [0.0; 2], refused: [None, None], tracer: None }, facts))
     }
 
     fn take_over(&mut self, (stage, facts): (Stage, SceneFacts)) {
         self.stage = Some(stage);
         self.tell_plan(0);
         self.say(|seen| {
+            if seen.facts.as_ref().is_some_and(|before| before.scene != facts.scene) {
+                (seen.sides[1], seen.difference) = Default::default();
+            }
             seen.facts = Some(Arc::new(facts));
             (seen.surfaces, seen.error) = (None, None);
         });
     }
 
     /// As many sides as are wanted, with their rungs; those that cannot be drawn leave what is there.
-    fn follow_knobs(&mut self, wanted: &Wanted, last: Option<&Wanted>) -> Result<()> {
+    fn follow_knobs(&mut self, wanted: &Wanted, renewed: bool) -> Result<()> {
         let Some(stage) = &mut self.stage else { return Ok(()) };
-        if wanted.other.is_none() && stage.sides.len() > 1 {
+        if wanted.other.is_none() {
             stage.sides.truncate(1);
-            self.say(|seen| (seen.sides[1], seen.difference) = Default::default());
-        }
-        let renewed = last.is_some_and(|last| !Arc::ptr_eq(&last.code, &wanted.code));
-        if renewed {
-            self.device.replace(&wanted.code);
+            let is_seen = lock(&self.shared.seen).sides[1].shown.is_some();
+            if is_seen {
+                self.say(|seen| (seen.sides[1], seen.difference) = Default::default());
+            }
         }
         for index in 0..1 + usize::from(wanted.other.is_some()) {
             let Some(stage) = &mut self.stage else { return Ok(()) };
@@ -284,26 +298,28 @@ impl Worker {
         self.say(|seen| seen.busy = Some("uploading and compiling".to_owned()));
         let Some(stage) = &mut self.stage else { return Ok(()) };
         let made = Side::new(&self.device, &stage.loaded, settings.clone());
-        let made = match made {
+        match made {
             Ok(side) => {
                 stage.refused[index] = None;
-                // Other rungs take other times: the next sample tells.
                 if index < stage.sides.len() {
+                    // Other rungs take other times: the next sample tells.
+                    stage.ns_per_pixel[index] = 0.0;
                     stage.sides[index] = side;
                 } else {
                     stage.sides.push(side);
                 }
+                self.say(|seen| (seen.busy, seen.error) = (None, None));
+                self.tell_plan(index);
                 Ok(())
             }
+            Err(error) if is_lost(&error) => Err(error),
+            // What can be drawn goes on.
             Err(error) => {
                 stage.refused[index] = Some(settings);
-                Err(error)
+                self.say(|seen| (seen.busy, seen.error) = (None, Some(format!("{error:#}"))));
+                Ok(())
             }
-        };
-        self.say(|seen| (seen.busy, seen.error) = (None, None));
-        made?;
-        self.tell_plan(index);
-        Ok(())
+        }
     }
 
     fn tell_plan(&self, index: usize) {
@@ -315,34 +331,29 @@ impl Worker {
         });
     }
 
-    /// One more sample, or band of it, of the side that is less far.
+    /// One more sample, or band of it, of the side that is less far; of both that which was shown longer ago.
     fn refine(&mut self, wanted: &Wanted) -> Result<()> {
         let Some(stage) = &mut self.stage else { return Ok(()) };
         let unfinished = stage.sides.iter_mut().enumerate().filter(|(_, side)| !side.is_done());
-        let Some((index, side)) = unfinished.min_by(|a, b| a.1.progress().total_cmp(&b.1.progress())) else {
-            return Ok(());
-        };
+        let order = |a: &Side, b: &Side| a.progress().total_cmp(&b.progress()).then(a.looked.cmp(&b.looked));
+        let Some((index, side)) = unfinished.min_by(|a, b| order(a.1, b.1)) else { return Ok(()) };
         let Some(drawing) = &mut side.drawing else { return Ok(()) };
-        let begun = Instant::now();
-        let before = drawing.samples();
-        // While the view moves each picture is seen: the next is not better.
-        let stepped = match wanted.moving {
-            true => side.renderer.step(drawing),
-            false => self.device.interruptible(|| side.renderer.step(drawing)),
-        };
-        if let Err(error) = stepped {
-            side.drawing = None;
-            return Err(error);
+        // While the view moves each picture is seen, all its bands: the next is not better.
+        drawing.interruptible = !wanted.moving;
+        let (begun, before) = (Instant::now(), drawing.samples());
+        side.renderer.step(drawing)?;
+        while wanted.moving && drawing.samples() == before {
+            side.renderer.step(drawing)?;
         }
-        let took = begun.elapsed();
+        side.spent += begun.elapsed();
         if drawing.samples() == before {
             return Ok(());
         }
         // The first sample compiles; what is quicker is believed at once.
         let [width, height] = side.settings.size;
-        let ns = took.as_secs_f64() * 1e9 / f64::from(width) / f64::from(height);
-        let known = side.ns_per_pixel;
-        side.ns_per_pixel = if known == 0.0 || ns < known { ns } else { known + 0.2 * (ns - known) };
+        let ns = std::mem::take(&mut side.spent).as_secs_f64() * 1e9 / f64::from(width) / f64::from(height);
+        let known = stage.ns_per_pixel[index];
+        stage.ns_per_pixel[index] = if known == 0.0 || ns < known { ns } else { known + 0.2 * (ns - known) };
         if drawing.is_done() || drawing.samples() == 1 || side.looked.elapsed() >= LOOK {
             side.looked = Instant::now();
             self.show(wanted, index)?;
@@ -363,6 +374,8 @@ impl Worker {
             size: side.settings.size,
             samples: [rendered.samples, side.renderer.plan.samples],
             moving: wanted.moving,
+            time: wanted.time,
+            knobs: side.settings.knobs.clone(),
             passes: rendered.passes.into_iter().map(|pass| PassTime { ms: pass.ms / each, ..pass }).collect(),
             rays: (work.reflection + work.refraction + work.shadow + work.indirect)
                 / u64::from(rendered.samples.max(1)),
@@ -418,6 +431,7 @@ impl Worker {
                 let mut next = lock(&comparing);
                 if next.as_ref().is_some_and(|(a, b)| [a.version, b.version] == versions) {
                     *next = None;
+                    return;
                 }
             }
         };
@@ -432,17 +446,17 @@ impl Worker {
             return Ok(());
         }
         let Some(stage) = &mut self.stage else { return Ok(()) };
-        let camera = wanted.from.camera(&stage.loaded)?;
+        let camera = wanted.from.camera(&stage.loaded)?.clone();
         let mut radiance = Vec::new();
         for side in &stage.sides {
             radiance.push(Arc::new(side.renderer.film()?.rgba));
         }
         let Some(left) = stage.sides.first_mut() else { return Ok(()) };
-        let (pixels, view) = left.renderer.aovs(camera)?;
+        let (pixels, view) = left.renderer.aovs(&camera)?;
         let (pixels, size, eye) = (Arc::new(pixels), left.settings.size, view.eye);
         self.say(|seen| {
             let versions = seen.versions();
-            seen.surfaces = Some(Surfaces { pixels, radiance, size, eye, versions });
+            seen.surfaces = Some(Surfaces { pixels, radiance, size, eye, seen_from: camera, versions });
         });
         Ok(())
     }

@@ -23,7 +23,8 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
         });
         ui.end_row();
         ui.label("environment");
-        ui.add(egui::Slider::new(&mut state.settings.environment_rotation, -180.0..=180.0).suffix("°"));
+        let turned = egui::Slider::new(&mut state.settings.environment_rotation, -180.0..=180.0).suffix("°");
+        state.moved |= ui.add(turned).changed();
         ui.end_row();
         ui.label("shows");
         let name = LAYERS.iter().find(|(layer, _)| *layer == state.layer).map_or("", |(_, name)| name);

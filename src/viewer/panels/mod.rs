@@ -86,6 +86,8 @@ pub struct State {
     pixel: Option<pixel::Facts>,
     /// The event under the pointer.
     pointed: Option<usize>,
+    /// Seconds of the interface when the scene's time went on last.
+    played_at: f64,
 }
 
 impl State {
@@ -119,6 +121,7 @@ impl State {
             picks: 0,
             pixel: None,
             pointed: None,
+            played_at: 0.0,
         }
     }
 
@@ -222,15 +225,20 @@ pub fn show(root: &mut Ui, state: &mut State, seen: &Seen) -> Vec<Action> {
     actions
 }
 
-/// Lets the time of a scene that is played go on.
+/// Lets the time of a scene that is played go on, once the last one is seen: what is drawn slowly is played slowly, and not in jumps.
 fn play(ui: &Ui, state: &mut State, seen: &Seen) {
+    let now = ui.input(|input| input.time);
+    let since = now - std::mem::replace(&mut state.played_at, now);
     let Some(duration) = seen.facts.as_ref().and_then(|facts| facts.duration).filter(|_| state.clock.playing) else {
         return;
     };
-    // What is drawn slowly is played slowly, and not in jumps.
-    state.clock.advance(f64::from(ui.input(|input| input.stable_dt.min(0.1))), duration);
     state.moved = true;
     ui.ctx().request_repaint();
+    match seen.shown().is_some_and(|shown| shown.time == state.clock.time) {
+        true => state.clock.advance(since.min(0.1), duration),
+        // The time goes on counting from the last picture.
+        false => state.played_at = now - since,
+    }
 }
 
 /// The file, the device and the picture's state, in a line; where that is short, words make room for buttons.
@@ -377,7 +385,15 @@ fn keys(ui: &mut Ui, state: &mut State, seen: &Seen, actions: &mut Vec<Action>) 
     if ui.ctx().text_edit_focused() || state.is_asking() {
         return;
     }
-    let pressed = |key: Key| ui.input_mut(|input| input.consume_key(Modifiers::NONE, key));
+    // A key that is held down is pressed once; knobs and times go on.
+    let pressed = |key: Key| {
+        ui.input_mut(|input| {
+            let again =
+                |event: &egui::Event| matches!(event, egui::Event::Key { key: k, repeat: true, .. } if *k == key);
+            let repeats = input.events.iter().any(again);
+            input.consume_key(Modifiers::NONE, key) && !repeats
+        })
+    };
     for (key, action) in [(Key::S, Action::Screenshot), (Key::E, Action::Exr), (Key::C, Action::CopyCommand)] {
         if pressed(key) {
             actions.push(action);

@@ -4,7 +4,6 @@ use egui::{Align2, Color32, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, 
 use glam::{DVec2, DVec3};
 
 use super::State;
-use crate::plan::Knobs;
 use crate::scene::events::{Event, Way};
 use crate::scene::{Camera, Projection};
 use crate::viewer::layer::Layer;
@@ -20,7 +19,8 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
     let corner = |p: egui::Pos2| [(p.x * scale).round() as i32, (p.y * scale).round() as i32];
     let ([left, top], [right, bottom]) = (corner(rect.min), corner(rect.max));
     state.place = [left, top, right, bottom];
-    state.settings.size = [(right - left).max(1) as u32, (bottom - top).max(1) as u32];
+    let size = [(right - left).max(1) as u32, (bottom - top).max(1) as u32];
+    state.moved |= std::mem::replace(&mut state.settings.size, size) != size;
     let response = ui.interact(rect, ui.id().with("picture"), Sense::click_and_drag());
     let (modifiers, scroll, pinch, pointer, seconds) = ui.input(|input| {
         let zoom = input.zoom_delta();
@@ -111,10 +111,8 @@ fn wipe(ui: &mut Ui, rect: Rect, state: &mut State, seen: &Seen) {
     let painter = ui.painter_at(rect);
     painter.vline(x, rect.y_range(), Stroke::new(3.0, Color32::BLACK));
     painter.vline(x, rect.y_range(), Stroke::new(1.0, Color32::WHITE));
-    let Some(other) = &state.other else { return };
     for side in 0..2 {
-        let knobs = if side == 0 { &state.settings.knobs } else { other };
-        let text = account(side, knobs, if side == 0 { other } else { &state.settings.knobs }, seen);
+        let Some(text) = account(side, seen) else { continue };
         let (at, align) = match side {
             0 => (rect.left_bottom() + egui::vec2(8.0, -8.0), Align2::LEFT_BOTTOM),
             _ => (rect.right_bottom() + egui::vec2(-8.0, -8.0), Align2::RIGHT_BOTTOM),
@@ -124,27 +122,26 @@ fn wipe(ui: &mut Ui, rect: Rect, state: &mut State, seen: &Seen) {
 }
 
 /// What one side of the wipe is drawn with, what that took, and how wrong it is.
-fn account(side: usize, knobs: &Knobs, other: &Knobs, seen: &Seen) -> String {
-    let own: Vec<String> = knobs
-        .list()
-        .into_iter()
-        .filter(|(name, rung)| other.rung(name) != *rung)
-        .map(|(name, rung)| format!("{name}={rung}"))
-        .collect();
+fn account(side: usize, seen: &Seen) -> Option<String> {
+    let shown = seen.sides[side].shown.as_ref()?;
+    let other = seen.sides[1 - side].shown.as_ref().map_or(&shown.knobs, |other| &other.knobs);
+    let rungs = shown.knobs.list();
+    let differs = rungs.iter().filter(|(name, rung)| other.rung(name) != *rung);
+    let own: Vec<String> = differs.map(|(name, rung)| format!("{name}={rung}")).collect();
     // All that differs would cover the picture.
     let few = if own.len() > 3 { format!("{} and {} more", own[..3].join(" "), own.len() - 3) } else { own.join(" ") };
-    let mut lines = vec![format!("{}  {few}", ["left", "right"][side])];
-    if let Some(shown) = &seen.sides[side].shown {
-        let [done, of] = shown.samples;
-        lines.push(format!("{:.1} ms, {} rays a sample, {done} of {of}", shown.ms(), shown.rays));
-        lines.extend(shown.error.map(|error| format!("relative error {:.2} % by its own samples", 100.0 * error)));
-    }
+    let [done, of] = shown.samples;
+    let mut lines = vec![
+        format!("{}  {few}", ["left", "right"][side]),
+        format!("{:.1} ms, {} rays a sample, {done} of {of}", shown.ms(), shown.rays),
+    ];
+    lines.extend(shown.error.map(|error| format!("relative error {:.2} % by its own samples", 100.0 * error)));
     let table = seen.facts.as_ref().and_then(|facts| facts.prices.as_ref());
     let known = table.and_then(|table| {
-        table
-            .points
-            .iter()
-            .find(|point| knobs.list().iter().all(|(name, rung)| point.knobs.get(*name).is_some_and(|r| r == rung)))
+        let is_this = |point: &&crate::cost::table::Point| {
+            rungs.iter().all(|(name, rung)| point.knobs.get(*name).is_some_and(|known| known == rung))
+        };
+        table.points.iter().find(is_this)
     });
     lines.extend(known.map(|point| format!("FLIP {:.4} against the reference, by cost", point.error())));
     if side == 1 {
@@ -153,7 +150,7 @@ fn account(side: usize, knobs: &Knobs, other: &Knobs, seen: &Seen) -> String {
             None => "compared when both are done".to_owned(),
         });
     }
-    lines.join("\n")
+    Some(lines.join("\n"))
 }
 
 fn label(painter: &egui::Painter, at: Pos2, align: Align2, text: &str) {

@@ -11,7 +11,7 @@ use crate::scene::events::{Event, Met, Way};
 use crate::share::AovPixel;
 use crate::spectra::VISIBLE;
 use crate::viewer::equations::used;
-use crate::viewer::shared::{SceneFacts, Seen, Trace};
+use crate::viewer::shared::{SceneFacts, Seen, Surfaces, Trace};
 
 /// What lies at a pixel, as it was found when it was asked about.
 pub(super) struct Facts {
@@ -32,7 +32,8 @@ fn look(state: &mut State, trace: &Trace, seen: &Seen) -> bool {
     if state.navigation.as_ref().is_none_or(|navigation| navigation.camera() != trace.seen_from) {
         return false;
     }
-    let Some(surfaces) = seen.now().filter(|surfaces| surfaces.size == trace.size) else { return true };
+    let is_of = |surfaces: &&Surfaces| surfaces.size == trace.size && surfaces.seen_from == trace.seen_from;
+    let Some(surfaces) = seen.now().filter(is_of) else { return true };
     let ([x, y], [width, height]) = (trace.pixel, surfaces.size);
     if x < width && y < height {
         let at = (y * width + x) as usize;
@@ -56,7 +57,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
     match &state.pixel {
         Some(facts) => {
             let met = trace.events.first().and_then(|event| event.met);
-            surface(ui, trace.pixel, facts, scene, met.map_or(1.0, |met| met.ratio));
+            surface(ui, trace.pixel, facts, scene, met);
         }
         None if is_there => drop(ui.weak("once the picture is finished …")),
         None => drop(ui.weak("the view moved before the picture was finished: Ctrl+Z goes back")),
@@ -72,7 +73,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
     }
     ui.separator();
     ui.strong("Its equations").on_hover_text("lines of shaders/lib that hold the formula; point at one to see it");
-    for probe in used(&trace.events, &scene.materials, &scene.lights, state.knobs()) {
+    for probe in used(&trace.events, &scene.materials, &scene.lights, &state.settings.knobs) {
         let ids = probe.ids.join(" ");
         let text = format!("{ids}  {}  {}.glsl:{}", probe.name, probe.subject, probe.line);
         ui.monospace(text).on_hover_text(probe.formula);
@@ -80,7 +81,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
 }
 
 /// The surface at the pixel.
-fn surface(ui: &mut Ui, [x, y]: [u32; 2], facts: &Facts, scene: &SceneFacts, ratio: f64) {
+fn surface(ui: &mut Ui, [x, y]: [u32; 2], facts: &Facts, scene: &SceneFacts, met: Option<Met>) {
     let p = &facts.surface;
     let material = (p.material as usize).checked_sub(1).and_then(|index| scene.materials.get(index));
     egui::Grid::new("pixel").num_columns(2).striped(true).show(ui, |ui| {
@@ -110,8 +111,8 @@ fn surface(ui: &mut Ui, [x, y]: [u32; 2], facts: &Facts, scene: &SceneFacts, rat
         row("roughness", format!("{:.4}", p.roughness));
         row("metallic", format!("{:.4}", p.metallic));
         row("incidence", format!("{:.2}°", incidence(p).acos().to_degrees()));
-        if let Some(m) = material {
-            fresnel(&mut row, m, incidence(p).max(0.0), ratio);
+        if let (Some(m), Some(met)) = (material, met) {
+            indices(&mut row, m, met);
         }
     });
     if let Some(m) = material.filter(|m| m.conductor_spectra.is_some() || varies(m)) {
@@ -124,26 +125,28 @@ fn varies(m: &Material) -> bool {
     m.conductor.is_none() && m.dispersion.disperses(f64::from(m.ior))
 }
 
-/// n, κ and the share that is mirrored, at three wavelengths where they differ. `ratio` is the index behind the surface over that before it,
-/// for green light: other light has another where the medium on one of its sides disperses.
-fn fresnel(row: &mut impl FnMut(&str, String), m: &Material, cos: f64, ratio: f64) {
+/// n and κ, at three wavelengths where they differ, and the share that is mirrored of green light and, where only the index decides, of
+/// the others.
+fn indices(row: &mut impl FnMut(&str, String), m: &Material, met: Met) {
     let [green, _] = m.complex_index(550.0);
-    let whole = |nm: f64| {
-        let [n, kappa] = m.complex_index(nm);
-        let ratio = if ratio < 1.0 { ratio * green / n } else { ratio * n / green };
-        let share = if kappa > 0.0 { fresnel_conductor(cos, n, kappa)[0] } else { fresnel_dielectric(cos, ratio)[0] };
-        (n, kappa, 100.0 * share)
-    };
-    if m.conductor.is_none() && !varies(m) {
-        let (n, _, share) = whole(550.0);
-        row("n", format!("{n:.4}"));
-        row("Fresnel (F3)", format!("{share:.3} % mirrored"));
-        return;
+    if m.metallic >= 1.0 && m.conductor.is_none() {
+        row("n, κ", "not told: base colour is F0".to_owned());
+    } else if m.conductor.is_none() && !varies(m) {
+        row("n", format!("{green:.4}"));
+    } else {
+        for nm in [650.0, 550.0, 450.0] {
+            let [n, kappa] = m.complex_index(nm);
+            // Other light has another ratio where the medium on one of the sides disperses.
+            let ratio = if met.ratio < 1.0 { met.ratio * green / n } else { met.ratio * n / green };
+            let share = if kappa > 0.0 {
+                fresnel_conductor(met.cos, n, kappa)[0]
+            } else {
+                fresnel_dielectric(met.cos, ratio)[0]
+            };
+            row(&format!("n, κ at {nm} nm"), format!("{n:.4} {kappa:.4}, F {:.2} %", 100.0 * share));
+        }
     }
-    for nm in [650.0, 550.0, 450.0] {
-        let (n, kappa, share) = whole(nm);
-        row(&format!("n, κ at {nm} nm"), format!("{n:.4} {kappa:.4}, F {share:.2} %"));
-    }
+    row("Fresnel", format!("{:.3} % mirrored", 100.0 * met.reflected));
 }
 
 /// n and κ over visible light.
