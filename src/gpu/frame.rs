@@ -7,20 +7,18 @@
 use std::cell::Cell;
 use std::collections::HashMap;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result};
 use ash::vk;
 
 use super::access::Access;
 use super::bind::{Bindings, Descriptor, Resource};
-use super::cache::{Layout, PipelineKey, RasterKey};
+use super::cache::{PipelineKey, RasterKey};
 use super::device::{Device, Interrupted, lock};
 use super::memory::{Buffer, Image};
-use super::pipeline::Pipelines;
+use super::recording::{Dispatch, Groups, Pass, Recording, Target, Work, push_constants, push_descriptors};
 use super::shader::Program;
-use super::sync::{self, Barrier, ResourceId, State, Use};
-use super::turns::Piece;
+use super::sync::{self, ResourceId, State, Use};
 
 /// GPU time of one pass.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,76 +96,6 @@ pub struct Raster<'a> {
     pub size: [u32; 2],
     /// Rows of the viewport that are cleared and drawn: from, up to.
     pub rows: [u32; 2],
-}
-
-type Record<'a> = Box<dyn FnOnce(&Device, vk::CommandBuffer, &[vk::Pipeline]) + 'a>;
-
-pub(super) struct Pass<'a> {
-    pub(super) name: String,
-    uses: Vec<Use>,
-    /// Handed to `work` in this order.
-    pub(super) pipelines: Vec<PipelineKey>,
-    pub(super) work: Work<'a>,
-}
-
-/// What a pass does.
-pub(super) enum Work<'a> {
-    /// A dispatch, which may be cut into pieces.
-    Dispatch(Dispatch<'a>),
-    /// Anything else.
-    Record(Record<'a>),
-}
-
-/// One dispatch.
-pub(super) struct Dispatch<'a> {
-    program: &'static Program,
-    descriptors: Vec<Descriptor>,
-    layout: Layout,
-    push: Vec<u8>,
-    pub(super) groups: Groups<'a>,
-}
-
-impl Dispatch<'_> {
-    /// Records it, or a piece of it.
-    ///
-    /// # Safety
-    /// The command buffer is recording, and handles are alive until the frame has finished.
-    pub(super) unsafe fn record(
-        &self,
-        device: &Device,
-        commands: vk::CommandBuffer,
-        pipeline: vk::Pipeline,
-        piece: Option<Piece>,
-    ) {
-        let Self { program, descriptors, layout, push, groups } = self;
-        // SAFETY: as the caller says.
-        unsafe {
-            device.raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline);
-            push_descriptors(device, commands, vk::PipelineBindPoint::COMPUTE, *layout, program, descriptors);
-            push_constants(device, commands, *layout, program, push);
-            match (piece, groups) {
-                (Some(Piece { base: [x, y, z], count: [across, down, deep] }), _) => {
-                    device.raw.cmd_dispatch_base(commands, x, y, z, across, down, deep);
-                }
-                (None, Groups::Count([x, y, z])) => device.raw.cmd_dispatch(commands, *x, *y, *z),
-                (None, Groups::At(sizes, offset)) => device.raw.cmd_dispatch_indirect(commands, sizes.raw, *offset),
-            }
-        }
-    }
-}
-
-/// How many workgroups a dispatch has.
-#[derive(Clone, Copy)]
-pub(super) enum Groups<'a> {
-    Count([u32; 3]),
-    At(&'a Buffer, u64),
-}
-
-/// A barrier's target.
-#[derive(Clone, Copy)]
-pub(super) enum Target<'a> {
-    Buffer(&'a Buffer),
-    Image(&'a Image),
 }
 
 /// A pass of a frame that has been described, before anything is made for it.
@@ -601,137 +529,6 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// What passes are recorded with.
-pub(super) struct Recording<'f> {
-    pub(super) device: &'f Arc<Device>,
-    pub(super) from: vk::CommandPool,
-    pub(super) targets: &'f HashMap<ResourceId, Target<'f>>,
-    pub(super) pipelines: &'f Pipelines<'f>,
-    /// Null where the device takes no times.
-    pub(super) queries: vk::QueryPool,
-    without_barriers: bool,
-    /// Passes whose barriers are recorded, where they are drawn by turns.
-    pub(super) begun: &'f Cell<usize>,
-}
-
-impl Recording<'_> {
-    /// Records passes into one command buffer, or into more where pipelines are still being made; the milliseconds of each.
-    ///
-    /// # Safety
-    /// Every handle of the passes is alive, and nothing else is recorded with the pool.
-    unsafe fn at_once(&self, passes: Vec<Pass<'_>>, barriers: &[Vec<Barrier>]) -> Result<Vec<f64>> {
-        let &Self { device, from, targets, pipelines, queries, without_barriers, .. } = self;
-        let (raw, timed) = (&device.raw, queries != vk::QueryPool::null());
-        let mut ticks = vec![0_u64; 2 * passes.len()];
-        let names: Vec<String> = passes.iter().map(|pass| pass.name.clone()).collect();
-        // SAFETY: as the caller says.
-        unsafe {
-            let mut used = vec![begin(device, from)?];
-            if timed {
-                raw.cmd_reset_query_pool(used[0], queries, 0, ticks.len() as u32);
-            }
-            let record_all = || {
-                for (index, (pass, barriers)) in passes.into_iter().zip(barriers).enumerate() {
-                    // Validation sees hazards within a command buffer alone: it gets all passes in one.
-                    if index > 0 && !device.validates() && !pipelines.ready(&pass.pipelines) {
-                        submit(device, used[used.len() - 1])?;
-                        used.push(begin(device, from)?);
-                    }
-                    let made = pipelines.wait_for(&pass.pipelines)?;
-                    let commands = used[used.len() - 1];
-                    record_barriers(device, commands, barriers, targets, without_barriers);
-                    label(device, commands, Some(&pass.name));
-                    if timed {
-                        write_first_timestamp(device, commands, queries, 2 * index as u32);
-                    }
-                    match pass.work {
-                        Work::Record(record) => record(device, commands, &made),
-                        Work::Dispatch(work) => work.record(device, commands, made[0], None),
-                    }
-                    if timed {
-                        raw.cmd_write_timestamp2(commands, ALL, queries, 2 * index as u32 + 1);
-                    }
-                    label(device, commands, None);
-                }
-                submit(device, used[used.len() - 1])
-            };
-            let recorded = record_all();
-            // What has been submitted is waited for also where the rest could not be.
-            let waited = wait(device).with_context(|| format!("waiting for a frame of passes {}", names.join(", ")));
-            let outcome = recorded.and(waited).and_then(|()| {
-                let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-                match timed {
-                    true => raw.get_query_pool_results(queries, 0, &mut ticks, flags).context("reading timestamps"),
-                    false => Ok(()),
-                }
-            });
-            raw.free_command_buffers(from, &used);
-            outcome?;
-        }
-        let period = f64::from(device.limits.timestamp_period) * 1e-6;
-        Ok(ticks.chunks_exact(2).map(|pair| pair[1].saturating_sub(pair[0]) as f64 * period).collect())
-    }
-}
-
-/// Takes the time before a pass.
-pub(super) unsafe fn write_first_timestamp(
-    device: &Device,
-    commands: vk::CommandBuffer,
-    queries: vk::QueryPool,
-    index: u32,
-) {
-    // lavapipe takes a timestamp only when it next flushes, which would be after a dispatch that it runs at once (measured:
-    // 0.05 ms for a tone map of 7.5 ms). A barrier flushes; one between no stages is no dependency, so it hides no hazard from
-    // validation and costs nothing on a GPU.
-    let nothing = [vk::MemoryBarrier2::default()];
-    // SAFETY: the command buffer is recording; the pool has the query.
-    unsafe {
-        device.raw.cmd_write_timestamp2(commands, ALL, queries, index);
-        device.raw.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().memory_barriers(&nothing));
-    }
-}
-
-pub(super) const ALL: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::ALL_COMMANDS;
-
-/// A command buffer that is being recorded.
-pub(super) unsafe fn begin(device: &Device, pool: vk::CommandPool) -> Result<vk::CommandBuffer> {
-    let info = vk::CommandBufferAllocateInfo::default()
-        .command_pool(pool)
-        .level(vk::CommandBufferLevel::PRIMARY)
-        .command_buffer_count(1);
-    let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-    // SAFETY: valid infos.
-    unsafe {
-        let commands = device.raw.allocate_command_buffers(&info).context("allocating a command buffer")?[0];
-        device.raw.begin_command_buffer(commands, &begin).context("recording a frame")?;
-        Ok(commands)
-    }
-}
-
-/// Ends a command buffer and hands it to the device; the timeline counts when it is done.
-pub(super) unsafe fn submit(device: &Device, commands: vk::CommandBuffer) -> Result<()> {
-    let queue = lock(&device.queue);
-    let done = device.submitted.load(Ordering::Relaxed) + 1;
-    let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
-    let signals = [vk::SemaphoreSubmitInfo::default().semaphore(device.timeline).value(done).stage_mask(ALL)];
-    let info = vk::SubmitInfo2::default().command_buffer_infos(&buffers).signal_semaphore_infos(&signals);
-    // SAFETY: the command buffer is recording; whoever calls waits for it before anything it uses is freed.
-    unsafe {
-        device.raw.end_command_buffer(commands).context("recording a frame")?;
-        device.raw.queue_submit2(*queue, &[info], vk::Fence::null()).context("submitting a frame")?;
-    }
-    device.submitted.store(done, Ordering::Relaxed);
-    Ok(())
-}
-
-/// Until all that was submitted is done.
-pub(super) unsafe fn wait(device: &Device) -> Result<()> {
-    let (semaphores, values) = ([device.timeline], [device.submitted.load(Ordering::Relaxed)]);
-    let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
-    // SAFETY: a semaphore of this device, which the last submission signals.
-    unsafe { device.raw.wait_semaphores(&info, u64::MAX) }.context("waiting for the device")
-}
-
 fn attachment<'x>(view: vk::ImageView, layout: vk::ImageLayout, clear: bool) -> vk::RenderingAttachmentInfo<'x> {
     vk::RenderingAttachmentInfo::default()
         .image_view(view)
@@ -756,126 +553,6 @@ fn region(
             layer_count: 1,
         })
         .image_extent(vk::Extent3D { width, height, depth: 1 })
-}
-
-pub(super) unsafe fn label(device: &Device, commands: vk::CommandBuffer, name: Option<&str>) {
-    let Some(debug) = &device.debug else { return };
-    // SAFETY: the command buffer is recording.
-    unsafe {
-        match name {
-            Some(name) => {
-                let name = std::ffi::CString::new(name).unwrap_or_default();
-                debug.cmd_begin_debug_utils_label(commands, &vk::DebugUtilsLabelEXT::default().label_name(&name));
-            }
-            None => debug.cmd_end_debug_utils_label(commands),
-        }
-    }
-}
-
-pub(super) unsafe fn record_barriers(
-    device: &Device,
-    commands: vk::CommandBuffer,
-    barriers: &[Barrier],
-    targets: &HashMap<ResourceId, Target<'_>>,
-    without_buffers: bool,
-) {
-    let mut images = Vec::new();
-    let mut buffers = Vec::new();
-    for barrier in barriers {
-        match targets[&barrier.resource] {
-            Target::Image(image) => {
-                let (old, new) = barrier.layouts.unwrap_or_default();
-                images.push(
-                    vk::ImageMemoryBarrier2::default()
-                        .image(image.raw)
-                        .subresource_range(image.range())
-                        .src_stage_mask(barrier.src_stages)
-                        .src_access_mask(barrier.src_access)
-                        .dst_stage_mask(barrier.dst_stages)
-                        .dst_access_mask(barrier.dst_access)
-                        .old_layout(old)
-                        .new_layout(new),
-                );
-            }
-            Target::Buffer(buffer) if !without_buffers => buffers.push(
-                vk::BufferMemoryBarrier2::default()
-                    .buffer(buffer.raw)
-                    .size(vk::WHOLE_SIZE)
-                    .src_stage_mask(barrier.src_stages)
-                    .src_access_mask(barrier.src_access)
-                    .dst_stage_mask(barrier.dst_stages)
-                    .dst_access_mask(barrier.dst_access),
-            ),
-            Target::Buffer(_) => {}
-        }
-    }
-    if !images.is_empty() || !buffers.is_empty() {
-        let info = vk::DependencyInfo::default().image_memory_barriers(&images).buffer_memory_barriers(&buffers);
-        // SAFETY: the command buffer is recording; the targets are alive.
-        unsafe { device.raw.cmd_pipeline_barrier2(commands, &info) };
-    }
-}
-
-unsafe fn push_constants(
-    device: &Device,
-    commands: vk::CommandBuffer,
-    layout: Layout,
-    program: &'static Program,
-    push: &[u8],
-) {
-    if !push.is_empty() {
-        let stages = program.stages.iter().fold(vk::ShaderStageFlags::empty(), |all, s| all | s.flag);
-        // SAFETY: the command buffer is recording; the layout has a range of this size.
-        unsafe { device.raw.cmd_push_constants(commands, layout.pipeline, stages, 0, push) };
-    }
-}
-
-unsafe fn push_descriptors(
-    device: &Device,
-    commands: vk::CommandBuffer,
-    point: vk::PipelineBindPoint,
-    layout: Layout,
-    program: &'static Program,
-    descriptors: &[Descriptor],
-) {
-    if descriptors.is_empty() {
-        return;
-    }
-    let mut buffers = Vec::with_capacity(descriptors.len());
-    let mut texels = Vec::with_capacity(descriptors.len());
-    let mut images = Vec::with_capacity(descriptors.len());
-    for descriptor in descriptors {
-        buffers.push(match descriptor {
-            Descriptor::Buffer(info) => *info,
-            _ => vk::DescriptorBufferInfo::default(),
-        });
-        texels.push(match descriptor {
-            Descriptor::Texels(view) => *view,
-            _ => vk::BufferView::null(),
-        });
-        images.push(match descriptor {
-            Descriptor::Image(info) => *info,
-            _ => vk::DescriptorImageInfo::default(),
-        });
-    }
-    let writes: Vec<_> = program
-        .bindings
-        .iter()
-        .zip(descriptors)
-        .enumerate()
-        .map(|(i, (binding, descriptor))| {
-            let write = vk::WriteDescriptorSet::default()
-                .dst_binding(binding.slot)
-                .descriptor_type(binding.kind.descriptor_type());
-            match descriptor {
-                Descriptor::Buffer(_) => write.buffer_info(&buffers[i..=i]),
-                Descriptor::Texels(_) => write.texel_buffer_view(&texels[i..=i]),
-                Descriptor::Image(_) => write.image_info(&images[i..=i]),
-            }
-        })
-        .collect();
-    // SAFETY: the command buffer is recording; the writes match the layout, both come from reflection.
-    unsafe { device.push.cmd_push_descriptor_set(commands, point, layout.pipeline, 0, &writes) };
 }
 
 unsafe fn record_draw(device: &Device, commands: vk::CommandBuffer, draw: &Draw<'_>) {

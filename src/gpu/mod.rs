@@ -13,6 +13,7 @@ mod frame;
 mod memory;
 mod pipeline;
 mod present;
+mod recording;
 mod shader;
 mod specialize;
 mod surface;

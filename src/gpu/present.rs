@@ -12,8 +12,8 @@ use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer};
 
 use super::access::Access;
 use super::device::{Device, DeviceChoice, Instance, lock};
-use super::frame::begin;
 use super::memory::{Buffer, Image, ImageDesc, Place};
+use super::recording::begin;
 use super::surface::{Surface, Windowed, extensions};
 
 /// A picture with its place in the window.

@@ -10,10 +10,11 @@ use anyhow::{Context as _, Result};
 use ash::vk;
 
 use super::device::{Device, lock};
-use super::frame::{
-    ALL, Dispatch, Groups, Pass, Recording, Work, begin, label, record_barriers, submit, wait, write_first_timestamp,
-};
 use super::memory::{Buffer, Place};
+use super::recording::{
+    ALL, Dispatch, Groups, Pass, Piece, Recording, Work, begin, label, record_barriers, submit, wait,
+    write_first_timestamp,
+};
 use super::sync::Barrier;
 
 /// Milliseconds that one submission aims at.
@@ -22,13 +23,6 @@ const PIECE_MS: f64 = 10.0;
 const FIRST: u64 = 32;
 /// A piece has at most so many times the groups of the one before: that one may have been quick by chance.
 const GROWTH: f64 = 4.0;
-
-/// Groups from `base` on, as many as `count` says along each axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Piece {
-    pub(super) base: [u32; 3],
-    pub(super) count: [u32; 3],
-}
 
 /// The piece of at most `most` groups, and at least one, that comes after `done` of them: whole rows, or part of one.
 fn piece(groups: [u32; 3], done: u64, most: u64) -> Piece {

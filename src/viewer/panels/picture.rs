@@ -4,7 +4,8 @@ use egui::{Align2, Color32, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, 
 use glam::{DVec2, DVec3};
 
 use super::State;
-use crate::scene::events::{Event, Way};
+use super::pixel::{colour, incidence};
+use crate::scene::events::Way;
 use crate::scene::{Camera, Projection};
 use crate::viewer::layer::Layer;
 use crate::viewer::shared::{Pick, Seen, Trace};
@@ -175,21 +176,9 @@ fn under_pointer(ui: &Ui, rect: Rect, under: Option<[u32; 2]>, seen: &Seen) {
     }
     let p = &surfaces.pixels[at];
     if p.material != 0 {
-        text += &format!("   {:.1}°", super::pixel::incidence(p).acos().to_degrees());
+        text += &format!("   {:.1}°", incidence(p).acos().to_degrees());
     }
     label(&ui.painter_at(rect), rect.center_top() + egui::vec2(0.0, 8.0), Align2::CENTER_TOP, &text);
-}
-
-/// Colour of a ray.
-pub(super) fn colour(event: &Event) -> Color32 {
-    match (event.way, event.met) {
-        (Way::Seen, _) => Color32::WHITE,
-        (Way::Mirrored, _) => Color32::from_rgb(230, 159, 0),
-        (Way::Bent, _) => Color32::from_rgb(86, 180, 233),
-        (Way::Straight, _) => Color32::from_rgb(170, 170, 170),
-        (Way::ToLight(_), None) => Color32::from_rgb(240, 228, 66),
-        (Way::ToLight(_), Some(_)) => Color32::from_rgb(213, 94, 0),
-    }
 }
 
 /// The rays of a pixel, from wherever the scene is seen now.

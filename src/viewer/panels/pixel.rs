@@ -4,7 +4,6 @@ use egui::{Color32, Pos2, Sense, Stroke, Ui};
 use glam::DVec3;
 
 use super::State;
-use super::picture::colour;
 use crate::optics::fresnel::{fresnel_conductor, fresnel_dielectric};
 use crate::scene::Material;
 use crate::scene::events::{Event, Met, Way};
@@ -176,6 +175,18 @@ fn curves(ui: &mut Ui, m: &Material) {
 /// How many rays led to an event.
 fn depth(events: &[Event], index: usize) -> usize {
     std::iter::successors(events[index].after, |&before| events[before].after).count()
+}
+
+/// Colour of a ray.
+pub(super) fn colour(event: &Event) -> Color32 {
+    match (event.way, event.met) {
+        (Way::Seen, _) => Color32::WHITE,
+        (Way::Mirrored, _) => Color32::from_rgb(230, 159, 0),
+        (Way::Bent, _) => Color32::from_rgb(86, 180, 233),
+        (Way::Straight, _) => Color32::from_rgb(170, 170, 170),
+        (Way::ToLight(_), None) => Color32::from_rgb(240, 228, 66),
+        (Way::ToLight(_), Some(_)) => Color32::from_rgb(213, 94, 0),
+    }
 }
 
 /// One event in words; whether the pointer is on it.
