@@ -19,6 +19,9 @@ const MOST_EVENTS: usize = 96;
 /// Lights that a surface is connected with at most.
 const MOST_LIGHTS: usize = 8;
 
+/// Wavelength for which media are told, nm.
+pub const GREEN: f64 = 550.0;
+
 /// How far a ray is followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
@@ -330,6 +333,3 @@ impl Tracer {
         .collect()
     }
 }
-
-/// Wavelength for which media are told, nm.
-const GREEN: f64 = 550.0;

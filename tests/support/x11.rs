@@ -106,10 +106,6 @@ impl<'a> Viewer<'a> {
         viewer
     }
 
-    pub fn process(&self) -> u32 {
-        self.program.id()
-    }
-
     fn focus(&self) {
         let connection = &self.display.connection;
         connection

@@ -6,7 +6,7 @@ use glam::DVec3;
 use super::State;
 use crate::optics::fresnel::{fresnel_conductor, fresnel_dielectric};
 use crate::scene::Material;
-use crate::scene::events::{Event, Met, Way};
+use crate::scene::events::{Event, GREEN, Met, Way};
 use crate::share::AovPixel;
 use crate::spectra::VISIBLE;
 use crate::viewer::equations::used;
@@ -127,13 +127,13 @@ fn varies(m: &Material) -> bool {
 /// n and κ, at three wavelengths where they differ, and the share that is mirrored of green light and, where only the index decides, of
 /// the others.
 fn indices(row: &mut impl FnMut(&str, String), m: &Material, met: Met) {
-    let [green, _] = m.complex_index(550.0);
+    let [green, _] = m.complex_index(GREEN);
     if m.metallic >= 1.0 && m.conductor.is_none() {
         row("n, κ", "not told: base colour is F0".to_owned());
     } else if m.conductor.is_none() && !varies(m) {
         row("n", format!("{green:.4}"));
     } else {
-        for nm in [650.0, 550.0, 450.0] {
+        for nm in [650.0, GREEN, 450.0] {
             let [n, kappa] = m.complex_index(nm);
             // Other light has another ratio where the medium on one of the sides disperses.
             let ratio = if met.ratio < 1.0 { met.ratio * green / n } else { met.ratio * n / green };
