@@ -220,8 +220,8 @@ fn equation(
 #extension GL_EXT_scalar_block_layout : require
 layout(local_size_x = 64) in;
 #include \"lib/{subject}.glsl\"
-layout(scalar, set = 0, binding = 0) readonly buffer Inputs {{ float inputs[]; }};
-layout(scalar, set = 0, binding = 1) writeonly buffer Outputs {{ float outputs[]; }};
+layout(pass, scalar) readonly buffer Inputs {{ float inputs[]; }};
+layout(pass, scalar) writeonly buffer Outputs {{ float outputs[]; }};
 layout(push_constant, scalar) uniform Push {{ uint cases; }};
 void main() {{
     uint i = gl_GlobalInvocationID.x;

@@ -1,5 +1,7 @@
 //! What compiled shaders declare, by rspirv: bindings with their access (`readonly`/`writeonly` survive as NonWritable/NonReadable),
-//! specialization constants, vertex inputs, push constants and local size.
+//! specialization constants, vertex inputs, push constants, structs and local size.
+//!
+//! Names and types are those of the module without optimisations; a binding or a constant that nothing in what ships reads is none.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -7,10 +9,12 @@ use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{Decoration, Dim, ExecutionMode, Op, StorageClass};
 
 use super::compile::{Result, Stage};
+use super::interface::snake;
 
 #[derive(Clone, PartialEq)]
 pub(crate) struct Binding {
     pub(crate) name: String,
+    pub(crate) set: u32,
     pub(crate) slot: u32,
     pub(crate) kind: &'static str,
     pub(crate) access: &'static str,
@@ -123,11 +127,13 @@ impl<'m> Names<'m> {
         })
     }
 
+    /// Where a member lies: as the module says, or, of what lies in no buffer, under the scalar layout.
     pub(crate) fn offset(&self, block: u32, member: u32) -> Result<u32> {
-        self.member_decorations
-            .get(&(block, member, Decoration::Offset))
-            .and_then(|values| values.first().copied())
-            .ok_or_else(|| format!("{}: member {member} has no offset", self.name(block)))
+        let told = self.member_decorations.get(&(block, member, Decoration::Offset));
+        match told.and_then(|values| values.first().copied()) {
+            Some(offset) => Ok(offset),
+            None => self.types[&block].operands[..member as usize].iter().map(|ty| self.size(word(ty))).sum(),
+        }
     }
 }
 
@@ -141,12 +147,14 @@ pub(crate) fn access(readable: bool, writable: bool) -> &'static str {
 
 pub(crate) fn bindings(stage: &Stage, names: &Names) -> Result<Vec<Binding>> {
     let stage_name = stage_flag(stage.kind);
+    let live = Live::of(&stage.words);
     let mut found = Vec::new();
     for variable in names.module.types_global_values.iter().filter(|line| line.class.opcode == Op::Variable) {
         let Some(id) = variable.result_id else { continue };
         let Some(slot) = names.decorated(id, Decoration::Binding) else { continue };
-        if names.decorated(id, Decoration::DescriptorSet) != Some(0) {
-            return Err(format!("{}: {}: only set 0 is used (push descriptors)", stage.path, names.name(id)));
+        let set = names.decorated(id, Decoration::DescriptorSet).unwrap_or(0);
+        if !live.bindings.contains(&(set, slot)) {
+            continue;
         }
         let pointee = word(&names.types[&variable.result_type.unwrap_or(0)].operands[1]);
         let ty = names.types[&pointee];
@@ -183,20 +191,40 @@ pub(crate) fn bindings(stage: &Stage, names: &Names) -> Result<Vec<Binding>> {
         if let Some((of, _)) = name.split_once("_as_") {
             name = of.to_owned();
         }
-        found.push(Binding { name, slot, kind, access, stages: BTreeSet::from([stage_name]) });
+        found.push(Binding { name, set, slot, kind, access, stages: BTreeSet::from([stage_name]) });
     }
     Ok(found)
 }
 
-pub(crate) fn snake(name: &str) -> String {
-    let mut out = String::new();
-    for (i, c) in name.chars().enumerate() {
-        if c.is_uppercase() && i > 0 {
-            out.push('_');
+/// What is left of the declarations in what ships.
+struct Live {
+    /// Set and slot of each variable.
+    bindings: BTreeSet<(u32, u32)>,
+    constants: BTreeSet<u32>,
+}
+
+impl Live {
+    /// Read by hand: rspirv 0.13 cannot load SPIR-V 1.6.
+    fn of(words: &[u32]) -> Self {
+        let (mut sets, mut slots) = (HashMap::new(), HashMap::new());
+        let mut live = Self { bindings: BTreeSet::new(), constants: BTreeSet::new() };
+        let mut at = 5;
+        while at < words.len() {
+            let (op, length) = (words[at] & 0xffff, ((words[at] >> 16) as usize).max(1));
+            if op == Op::Decorate as u32 && length > 3 {
+                let (target, value) = (words[at + 1], words[at + 3]);
+                match words[at + 2] {
+                    d if d == Decoration::DescriptorSet as u32 => drop(sets.insert(target, value)),
+                    d if d == Decoration::Binding as u32 => drop(slots.insert(target, value)),
+                    d if d == Decoration::SpecId as u32 => drop(live.constants.insert(value)),
+                    _ => {}
+                }
+            }
+            at += length;
         }
-        out.extend(c.to_lowercase());
+        live.bindings = slots.iter().map(|(id, slot)| (sets.get(id).copied().unwrap_or(0), *slot)).collect();
+        live
     }
-    out
 }
 
 pub(crate) fn stage_flag(kind: shaderc::ShaderKind) -> &'static str {
@@ -207,8 +235,20 @@ pub(crate) fn stage_flag(kind: shaderc::ShaderKind) -> &'static str {
     }
 }
 
-/// Specialization constants: id → (name, Rust type, default as a Rust literal).
-pub(crate) fn constants(names: &Names) -> Result<BTreeMap<u32, (String, &'static str, String)>> {
+/// Specialization constants of what ships: id → (name, Rust type, default as a Rust literal).
+pub(crate) fn constants(stage: &Stage, names: &Names) -> Result<BTreeMap<u32, (String, &'static str, String)>> {
+    let live = Live::of(&stage.words);
+    let mut found = spec_constants(names)?;
+    found.retain(|id, _| live.constants.contains(id));
+    Ok(found)
+}
+
+/// All that a module declares: name → (Rust type, default).
+pub(crate) fn all_constants(names: &Names) -> Result<BTreeMap<String, (&'static str, String)>> {
+    Ok(spec_constants(names)?.into_values().map(|(name, ty, default)| (name, (ty, default))).collect())
+}
+
+fn spec_constants(names: &Names) -> Result<BTreeMap<u32, (String, &'static str, String)>> {
     let mut found = BTreeMap::new();
     for line in &names.module.types_global_values {
         let Some(id) = line.result_id else { continue };
@@ -256,10 +296,56 @@ pub(crate) fn vertex_inputs(stage: &Stage, names: &Names) -> Result<BTreeMap<u32
     Ok(found)
 }
 
-pub(crate) fn push_bytes(names: &Names) -> Result<u32> {
+/// The block of push constants: its type.
+pub(crate) fn push_block(names: &Names) -> Option<u32> {
     let mut variables = names.module.types_global_values.iter().filter(|line| line.class.opcode == Op::Variable);
-    let block = variables.find(|line| matches!(line.operands[0], Operand::StorageClass(StorageClass::PushConstant)));
-    block.map_or(Ok(0), |line| names.size(word(&names.types[&line.result_type.unwrap_or(0)].operands[1])))
+    let block = variables.find(|line| matches!(line.operands[0], Operand::StorageClass(StorageClass::PushConstant)))?;
+    Some(word(&names.types[&block.result_type?].operands[1]))
+}
+
+/// A member of a struct, as Rust has it.
+#[derive(Clone, PartialEq)]
+pub(crate) struct Member {
+    pub(crate) name: String,
+    pub(crate) ty: String,
+    pub(crate) offset: u32,
+}
+
+/// A struct that lies in memory.
+#[derive(Clone, PartialEq)]
+pub(crate) struct Struct {
+    pub(crate) name: String,
+    pub(crate) members: Vec<Member>,
+    pub(crate) size: u32,
+}
+
+/// A struct with those it is made of, the innermost first.
+pub(crate) fn structs(names: &Names, id: u32) -> Result<Vec<Struct>> {
+    let mut all = Vec::new();
+    let mut members = Vec::new();
+    for (index, operand) in names.types[&id].operands.iter().enumerate() {
+        let (index, ty) = (index as u32, word(operand));
+        if names.types[&ty].class.opcode == Op::TypeStruct {
+            all.extend(structs(names, ty)?);
+        }
+        let name = names.members.get(&(id, index)).copied().unwrap_or("").to_owned();
+        members.push(Member { name, ty: rust_type(names, ty)?, offset: names.offset(id, index)? });
+    }
+    all.push(Struct { name: names.name(id).to_owned(), members, size: names.size(id)? });
+    Ok(all)
+}
+
+fn rust_type(names: &Names, id: u32) -> Result<String> {
+    let line = names.types[&id];
+    let operand = |i: usize| word(&line.operands[i]);
+    Ok(match line.class.opcode {
+        Op::TypeFloat => "f32".to_owned(),
+        Op::TypeInt => if operand(1) == 1 { "i32" } else { "u32" }.to_owned(),
+        Op::TypeVector | Op::TypeMatrix => format!("[{}; {}]", rust_type(names, operand(0))?, operand(1)),
+        Op::TypeArray => format!("[{}; {}]", rust_type(names, operand(0))?, names.constant(operand(1))),
+        Op::TypeStruct => names.name(id).to_owned(),
+        other => return Err(format!("{}: no type of Rust for {other:?}", names.name(id))),
+    })
 }
 
 pub(crate) fn local_size(module: &Module) -> [u32; 3] {
@@ -275,18 +361,27 @@ pub(crate) fn local_size(module: &Module) -> [u32; 3] {
 
 /// What the stages of one program declare together.
 pub(crate) struct Declared {
-    pub(crate) bindings: BTreeMap<u32, Binding>,
+    /// By set and slot.
+    pub(crate) bindings: BTreeMap<(u32, u32), Binding>,
     pub(crate) constants: BTreeMap<u32, (String, &'static str, String)>,
     pub(crate) inputs: BTreeMap<u32, (String, u32)>,
-    pub(crate) push: u32,
+    /// Push constants, with the structs they are made of; the last one is the block.
+    pub(crate) push: Vec<Struct>,
+}
+
+impl Declared {
+    pub(crate) fn push_bytes(&self) -> u32 {
+        self.push.last().map_or(0, |block| block.size)
+    }
 }
 
 pub(crate) fn declared(stages: &[Stage]) -> Result<Declared> {
-    let mut all = Declared { bindings: BTreeMap::new(), constants: BTreeMap::new(), inputs: BTreeMap::new(), push: 0 };
+    let mut all =
+        Declared { bindings: BTreeMap::new(), constants: BTreeMap::new(), inputs: BTreeMap::new(), push: Vec::new() };
     for stage in stages {
         let names = Names::new(&stage.module);
         for binding in bindings(stage, &names)? {
-            match all.bindings.get_mut(&binding.slot) {
+            match all.bindings.get_mut(&(binding.set, binding.slot)) {
                 Some(known)
                     if (&known.name, known.kind, known.access) == (&binding.name, binding.kind, binding.access) =>
                 {
@@ -298,11 +393,17 @@ pub(crate) fn declared(stages: &[Stage]) -> Result<Declared> {
                         stage.path, binding.slot, binding.name, known.name
                     ));
                 }
-                None => drop(all.bindings.insert(binding.slot, binding)),
+                None => drop(all.bindings.insert((binding.set, binding.slot), binding)),
             }
         }
-        all.constants.extend(constants(&names).map_err(|e| format!("{}: {e}", stage.path))?);
-        all.push = all.push.max(push_bytes(&names)?);
+        all.constants.extend(constants(stage, &names).map_err(|e| format!("{}: {e}", stage.path))?);
+        if let Some(block) = push_block(&names) {
+            let push = structs(&names, block).map_err(|e| format!("{}: push constants: {e}", stage.path))?;
+            if !all.push.is_empty() && all.push != push {
+                return Err(format!("{}: other push constants than in another stage", stage.path));
+            }
+            all.push = push;
+        }
         if stage.kind == shaderc::ShaderKind::Vertex {
             all.inputs = vertex_inputs(stage, &names)?;
         }

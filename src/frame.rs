@@ -7,7 +7,7 @@ use anyhow::{Result, bail, ensure};
 use ash::vk;
 use glam::DVec3;
 
-use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, PassPlan, PassTime, Place};
+use crate::gpu::{Buffer, DescriptorSet, Device, Frame, Image, ImageDesc, PassPlan, PassTime, Place};
 use crate::image::halves::{SampleError, error_of_halves};
 use crate::image::tone::ToneMap;
 use crate::image::{Picture, png};
@@ -30,6 +30,7 @@ use crate::pass::path::{PathsOnDevice, paths};
 use crate::pass::rays::{BvhFacts, RaysOnDevice, Traversal};
 use crate::pass::scene::SceneOnDevice;
 use crate::pass::shadow_map::ShadowMaps;
+use crate::pass::shared::OnDevice;
 use crate::pass::tiles::{Tiles, tiles};
 use crate::pass::tonemap::{Counts, Display, tonemap};
 use crate::pass::view::{View, jitter};
@@ -41,6 +42,7 @@ use crate::scene::reads::forget_unread;
 use crate::scene::sigma::one_medium_each;
 use crate::scene::wavelengths::Slice;
 use crate::scene::{Ambience, Bounds, Camera, Light, LightKind, Reads, Scene};
+use crate::shader::{Library, SCENE};
 use crate::share::{self, AovPixel};
 use crate::spectra::VISIBLE;
 
@@ -251,6 +253,8 @@ pub struct Renderer {
     environment: EnvironmentOnDevice,
     targets: Targets,
     camera: Buffer,
+    /// What all programs read of the scene.
+    set: DescriptorSet,
 }
 
 /// All that is as large as the picture.
@@ -388,7 +392,6 @@ impl Renderer {
         plan.check(&Ability {
             device: device.info().name.clone(),
             adds_in_subgroups: device.adds_in_subgroups(),
-            storage_images: device.storage_images(),
         })?;
         // What adds nothing takes no turn of any loop.
         let mut kept = plan.lights.iter();
@@ -418,15 +421,26 @@ impl Renderer {
         let dark = (plan.environment && environment.is_none()).then(Environment::dark);
         let turn = Turn { intensity: settings.environment_intensity, rotation: settings.environment_rotation };
         let name = scene.name.clone();
-        let scene = SceneOnDevice::new(device, scene, &plan, &settings.knobs, &solids, rays.anchor())?;
+        let mut scene = SceneOnDevice::new(device, scene, &plan, &settings.knobs, &solids, rays.anchor())?;
         let touching = rays.constants.touching;
+        let environment = EnvironmentOnDevice::new(device, &plan, environment.or(dark.as_ref()), turn)?;
+        let shadow_maps = ShadowMaps::new(device, &plan, &name, &mut scene, rays.anchor())?;
+        let camera = Buffer::new(device, "camera", size_of::<share::Camera>() as u64, Place::Upload)?;
+        let on_device = OnDevice {
+            camera: &camera,
+            scene: &scene,
+            rays: &rays,
+            shadow_maps: &shadow_maps,
+            environment: &environment,
+        };
         Ok(Self {
-            environment: EnvironmentOnDevice::new(device, &plan, environment.or(dark.as_ref()), turn)?,
-            shadow_maps: ShadowMaps::new(device, &plan, &name, &scene, rays.anchor())?,
+            set: DescriptorSet::new(device, &SCENE, &on_device.entries())?,
+            environment,
+            shadow_maps,
             scene,
             rays,
             targets: Targets::new(device, &plan, &settings, touching)?,
-            camera: Buffer::new(device, "camera", size_of::<share::Camera>() as u64, Place::Upload)?,
+            camera,
             device: device.clone(),
             plan,
             warnings,
@@ -613,25 +627,31 @@ impl Renderer {
         self.scene.show(Some(&Slice::new(band, band.part(part, parts))));
     }
 
+    fn on_device(&self) -> OnDevice<'_> {
+        let Self { camera, scene, rays, shadow_maps, environment, .. } = self;
+        OnDevice { camera, scene, rays, shadow_maps, environment }
+    }
+
+    /// An empty frame whose programs read the scene.
+    fn frame(&self) -> Frame<'_> {
+        Frame::of(&self.device, self.set.bind(self.on_device().entries()))
+    }
+
+    /// What programs are specialised by.
+    fn library(&self) -> Library {
+        self.on_device().library(&self.plan, &self.settings.knobs, &self.targets.tiles)
+    }
+
     /// One sample of every pixel, or one band of it: the frame, pass by pass.
     fn sample(&self, count: u32, band: u32) -> Result<Frame<'_>> {
-        let Self { device, plan, scene, rays, camera, targets, .. } = self;
+        let Self { plan, scene, rays, targets, .. } = self;
         let Targets { gbuffer: g, tiles: lists_of_lights, work, lists, radiance, parts, screen, .. } = targets;
         // With n samples a pixel each one stands for 1/n of its area: textures are read that much sharper.
         let lod_bias = -0.5 * (count as f32).log2();
-        let lighting = Lighting {
-            plan,
-            knobs: &self.settings.knobs,
-            scene,
-            rays,
-            shadow_maps: &self.shadow_maps,
-            tiles: lists_of_lights,
-            environment: &self.environment,
-            camera,
-            size: self.settings.size,
-        };
+        let library = self.library();
+        let lighting = &Lighting { plan, library, tiles: lists_of_lights, size: self.settings.size };
 
-        let mut frame = Frame::new(device);
+        let mut frame = self.frame();
         if plan.rays.is_some() {
             rays.reset(&mut frame);
         }
@@ -642,11 +662,11 @@ impl Renderer {
         }
         // What is where is the same in all bands.
         if band == 0 {
-            gbuffer(&mut frame, scene, camera, g, lod_bias, scene.draws(false, rays.inside()))?;
+            gbuffer(&mut frame, scene, g, lod_bias, scene.draws(false, rays.inside()))?;
             if plan.tiles {
-                tiles(&mut frame, plan, scene, camera, g, lists_of_lights)?;
+                tiles(&mut frame, plan, library, g, lists_of_lights)?;
             }
-            classify(&mut frame, g, work)?;
+            classify(&mut frame, library, g, work)?;
         }
         light(&mut frame, lighting, g, work, radiance)?;
         background(&mut frame, lighting, g, work, radiance)?;
@@ -676,7 +696,7 @@ impl Renderer {
             frame.fill("reset fragment counters", &lists.counters, 0);
             frame.fill("reset dropped fragments", &lists.dropped, 0);
             for strip in lists.strips() {
-                fragments(&mut frame, scene, camera, g, lists, strip, lod_bias)?;
+                fragments(&mut frame, scene, g, lists, strip, lod_bias)?;
                 composite(&mut frame, lighting, g, lists, radiance, screen, strip.rows)?;
                 for part in parts {
                     composite_part(&mut frame, lighting, g, lists, part, screen, strip.rows)?;
@@ -856,12 +876,12 @@ impl Renderer {
         self.scene.look_from(&view);
         self.scene.show(None);
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(0, 1))));
-        let mut frame = Frame::new(&self.device);
+        let mut frame = self.frame();
         let mut draws = self.scene.draws(false, self.rays.inside());
         if all {
             draws.extend(self.scene.draws(true, self.rays.inside()));
         }
-        gbuffer(&mut frame, &self.scene, &self.camera, &self.targets.gbuffer, 0.0, draws)?;
+        gbuffer(&mut frame, &self.scene, &self.targets.gbuffer, 0.0, draws)?;
         frame.finish()?;
         // As many rows at a time as one storage buffer holds.
         let row_bytes = u64::from(width) * size_of::<AovPixel>() as u64;
@@ -870,8 +890,8 @@ impl Renderer {
         let mut all: Vec<AovPixel> = Vec::with_capacity(width as usize * height as usize);
         for first in (0..height).step_by(rows as usize) {
             let end = (first + rows).min(height);
-            let mut frame = Frame::new(&self.device);
-            aov(&mut frame, &self.plan, &self.scene, &self.camera, &self.targets.gbuffer, &pixels, [first, end])?;
+            let mut frame = self.frame();
+            aov(&mut frame, self.library(), &self.targets.gbuffer, &pixels, [first, end])?;
             frame.finish()?;
             let bytes = (row_bytes * u64::from(end - first)) as usize;
             all.extend(pixels.read(|words| bytemuck::pod_collect_to_vec::<u8, AovPixel>(&words[..bytes])));

@@ -1,10 +1,13 @@
-//! The programs under `shaders/pass/`, as build.rs describes them: one module each with `PROGRAM`, `Bind`, `Constants`;
-//! and the equations tagged in `shaders/lib/`, each with a program that evaluates it.
+//! The programs under `shaders/pass/`, as the build describes them: one module each with `PROGRAM`, `Bind`, `Constants`, `Push`;
+//! what each file of `shaders/lib/` owns ([`lib`], [`Library`]); and the equations tagged in `shaders/lib/`, each with a program that evaluates it.
 
 use ash::vk;
 
+use bytemuck::{Pod, Zeroable};
+
 use crate::gpu::{
-    Access, Binding, BindingKind, Bindings, Buffer, Constant, Image, Program, Resource, Sampled, Stage, VertexInput,
+    Access, Binding, BindingKind, Bindings, Buffer, Constant, Image, Program, Resource, Sampled, SetLayout, SharedSet,
+    Specialization, Stage, VertexInput,
 };
 
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
@@ -36,11 +39,6 @@ pub struct Probe {
     pub program: &'static Program,
 }
 
-impl Probe {
-    /// Specialization constant `ARITHMETIC` of `shaders/lib/arithmetic.glsl`.
-    pub const ARITHMETIC: u32 = 30;
-}
-
 /// What every probe binds: columns of f32, one after the other.
 #[derive(Clone, Copy)]
 pub struct ProbeBind<'a> {
@@ -53,6 +51,10 @@ pub struct ProbeBind<'a> {
 }
 
 impl<'a> Bindings<'a> for ProbeBind<'a> {
+    type Constants = lib::arithmetic::Constants;
+    /// How many cases.
+    type Push = u32;
+
     fn program(&self) -> &'static Program {
         self.probe.program
     }

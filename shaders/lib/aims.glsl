@@ -5,12 +5,12 @@
 #include "lib/encode.glsl"
 #include "lib/trace.glsl"
 
-layout(constant_id = 76) const bool AIMED = false;
+layout(constant) const bool AIMED = false;
 // For each cell the place of its first ball times 16, plus how many it has.
-layout(set = 0, binding = 61, r32ui) readonly uniform uimageBuffer aim_cells;
+layout(scene, scalar) readonly buffer AimCells { uint aim_cells[]; };
 // Corner of the grid in bvh space and cells per metre, cells along x, y and z; then a ball each: middle, and in halves its radius
 // in cells and its share of its cell's aims.
-layout(set = 0, binding = 62, rgba32ui) readonly uniform uimageBuffer aims;
+layout(scene, rgba32ui) readonly uniform uimageBuffer aims;
 
 // Of the directions drawn for a diffuse surface (docs/decisions/paths.md).
 const float AIMED_SHARE = 0.25;
@@ -28,7 +28,7 @@ Aims aims_at(vec3 p) {
     vec3 at = floor((p - uintBitsToFloat(corner.xyz)) * per_metre);
     bool inside = all(greaterThanEqual(at, vec3(0.0))) && all(lessThan(at, vec3(cells)));
     uvec3 c = inside ? uvec3(at) : uvec3(0);
-    uint word = imageLoad(aim_cells, int(c.x + cells.x * (c.y + cells.y * c.z))).x;
+    uint word = aim_cells[c.x + cells.x * (c.y + cells.y * c.z)];
     return Aims(2 + (word >> 4), inside ? word & 15u : 0u, 1.0 / per_metre);
 }
 

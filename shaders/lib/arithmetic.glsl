@@ -10,7 +10,7 @@
 
 // The knob `arithmetic`: 0 the formulas of the textbook and the built-ins, 1 rewritten so that nothing cancels,
 // 2 with sums and products in pairs of floats where that still gains.
-layout(constant_id = 30) const uint ARITHMETIC = 1;
+layout(constant) const uint ARITHMETIC = 1;
 const uint FAST = 0;
 const uint STABLE = 1;
 const uint COMPENSATED = 2;

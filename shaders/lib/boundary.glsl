@@ -5,8 +5,8 @@
 #include "lib/media.glsl"
 #include "lib/shadow.glsl"
 
-layout(constant_id = 50) const bool TRANSMISSIVE = false; // some material lets light through
-layout(constant_id = 56) const bool TOUCHING = false;     // some transparent body lies against another surface
+layout(constant) const bool TRANSMISSIVE = false; // some material lets light through
+layout(constant) const bool TOUCHING = false;     // some transparent body lies against another surface
 
 // What a surface separates, for a ray that comes through `media`.
 struct Boundary {

@@ -7,8 +7,7 @@
 #include "lib/reflectance.glsl"
 #include "lib/snell.glsl"
 
-layout(constant_id = 51) const bool ROUGH = false;   // some lobe is rough
-layout(constant_id = 71) const bool FROSTED = false; // some surface that lets light through is
+layout(constant) const bool FROSTED = false; // some surface that lets light through is
 
 struct Bsdf {
     Surface s;       // compensated; its diffuse albedo without what goes through

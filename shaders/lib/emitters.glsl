@@ -6,24 +6,24 @@
 #include "lib/punctual.glsl"
 #include "lib/random.glsl"
 
-layout(constant_id = 60) const uint EMITTERS = 0;
-layout(constant_id = 61) const uint EMITTER_STEPS = 0;           // halvings that single one of them out
-layout(constant_id = 67) const bool PUNCTUAL_EMITTERS = false;   // some of them are lights of the table
-layout(constant_id = 74) const bool SHAPED_EMITTERS = false;     // some of those have a shape
-layout(constant_id = 62) const bool EMITTING_TRIANGLES = false;  // some of them are triangles
-layout(constant_id = 63) const bool EMITTING_SKY = false;        // one is the environment
-layout(constant_id = 64) const uint SKY_COLUMNS = 0;             // cells of its table
-layout(constant_id = 65) const uint SKY_ROWS = 0;
-layout(constant_id = 66) const uint SKY_STEPS = 0;               // halvings that single out a row, or a column
+layout(constant) const uint EMITTERS = 0;
+layout(constant) const uint EMITTER_STEPS = 0;           // halvings that single one of them out
+layout(constant) const bool PUNCTUAL_EMITTERS = false;   // some of them are lights of the table
+layout(constant) const bool SHAPED_EMITTERS = false;     // some of those have a shape
+layout(constant) const bool EMITTING_TRIANGLES = false;  // some of them are triangles
+layout(constant) const bool EMITTING_SKY = false;        // one is the environment
+layout(constant) const uint SKY_COLUMNS = 0;             // cells of its table
+layout(constant) const uint SKY_ROWS = 0;
+layout(constant) const uint SKY_STEPS = 0;               // halvings that single out a row, or a column
 
 // A texel each: first word of its share of all words | probability | EMITTER_..., two-sided | light, or place of the triangle.
-layout(set = 0, binding = 50, rgba32ui) readonly uniform uimageBuffer emitters;
+layout(scene, rgba32ui) readonly uniform uimageBuffer emitters;
 // First words of the rows' shares; then, row by row, those of the columns'.
-layout(set = 0, binding = 51, r32ui) readonly uniform uimageBuffer sky_shares;
+layout(scene, scalar) readonly buffer SkyShares { uint sky_shares[]; };
 const uint EMITTER_PUNCTUAL = 0;
 const uint EMITTER_TRIANGLE = 1;
 const uint EMITTER_SKY = 2;
-// 3: nothing after all.
+const uint EMITTER_NONE = 3; // nothing after all
 const uint EMITTER_TWO_SIDED = 4;
 
 // Light that may arrive at a point from one place.
@@ -52,14 +52,14 @@ uint share_of_sky(uint base, uint count, uint word) {
     for (uint step = SKY_STEPS; step > 0; step--) {
         loop_heads++;
         uint next = found + (1u << (step - 1));
-        uint first = imageLoad(sky_shares, int(base + min(next, count - 1))).x;
+        uint first = sky_shares[base + min(next, count - 1)];
         found = next < count && first <= word ? next : found;
     }
     return found;
 }
 
 uint sky_share(uint base, uint count, uint i) {
-    return i < count ? imageLoad(sky_shares, int(base + i)).x : 0u;
+    return i < count ? sky_shares[base + i] : 0u;
 }
 
 // Density per solid angle of the cell at `at`, whose polar angle has this sine.

@@ -1,11 +1,15 @@
-// How the environment is turned and scaled.
+// Light from all around: the environment's map, what was made of it, and how it is turned and scaled.
 #ifndef ENVIRONMENT_GLSL
 #define ENVIRONMENT_GLSL
 #include "lib/encode.glsl"
 #include "lib/spectrum.glsl"
 #include "share/environment.glsl"
 
-layout(scalar, set = 0, binding = 22) uniform Environment { EnvironmentTerms environment; };
+layout(constant) const bool SKY = false;         // it is seen behind the scene
+layout(constant) const bool ENVIRONMENT = false; // there is one, for rays that leave the scene
+layout(scene, scalar) uniform Environment { EnvironmentTerms environment; };
+layout(scene) uniform sampler2D sky;
+layout(scene) uniform sampler2D prefiltered; // level by level convolved with wider lobes (pass/prefilter.comp)
 
 vec3 into_environment(vec3 d) {
     return turned(d, environment.cos_rotation, environment.sin_rotation);
@@ -14,5 +18,33 @@ vec3 into_environment(vec3 d) {
 // Light of the environment, from its map or what was made of it.
 vec3 light_of_environment(vec3 rgb) {
     return light_of_rgb(rgb * environment.intensity);
+}
+
+// Radiance that comes from a direction of the world.
+vec3 environment_radiance(vec3 direction) {
+    vec2 at = equirectangular_from_direction(into_environment(direction));
+    return light_of_environment(textureLod(sky, at, 0.0).rgb);
+}
+
+// Level of the prefiltered map whose texels are 1/16 of the lobe: α = 16 / width (pass/prefilter.comp).
+float prefiltered_level(float alpha) {
+    float first = environment.width * alpha * 0.0625;
+    return first >= 2.0 ? min(log2(first), environment.levels - 1.0) : first * 0.5;
+}
+
+vec3 prefiltered_radiance(vec3 direction, float alpha) {
+    vec2 at = equirectangular_from_direction(into_environment(direction));
+    return light_of_environment(textureLod(prefiltered, at, prefiltered_level(alpha)).rgb);
+}
+
+// Irradiance from nine spherical-harmonic coefficients.
+vec3 environment_irradiance(vec3 n) {
+    vec3 d = into_environment(n);
+    vec3 e = environment.irradiance[0] * 0.282095;
+    e += (environment.irradiance[1] * d.y + environment.irradiance[2] * d.z + environment.irradiance[3] * d.x) * 0.488603;
+    e += (environment.irradiance[4] * (d.x * d.y) + environment.irradiance[5] * (d.y * d.z) + environment.irradiance[7] * (d.x * d.z)) * 1.092548;
+    e += environment.irradiance[6] * (0.315392 * (3.0 * d.z * d.z - 1.0));
+    e += environment.irradiance[8] * (0.546274 * (d.x * d.x - d.y * d.y));
+    return light_of_environment(max(e, 0.0));
 }
 #endif

@@ -5,16 +5,16 @@
 #include "lib/slots.glsl"
 #include "share/scene.glsl"
 
-layout(constant_id = 0) const bool HAS_BASE = false;
-layout(constant_id = 1) const bool HAS_METALLIC_ROUGHNESS = false;
-layout(constant_id = 2) const bool HAS_NORMAL = false;
-layout(constant_id = 3) const bool HAS_OCCLUSION = false;
-layout(constant_id = 4) const bool HAS_EMISSIVE = false;
-layout(constant_id = 5) const bool HAS_LAYERS = false;
-layout(constant_id = 6) const bool HAS_COLOR = false;
-layout(constant_id = 7) const bool MASKED = false;
-layout(constant_id = 8) const bool HAS_COAT_NORMAL = false;
-layout(constant_id = 77) const uint NORMAL_STEPS = 0; // that stored normals are rounded to; 0: what they are stored in decides
+layout(constant) const bool HAS_BASE = false;
+layout(constant) const bool HAS_METALLIC_ROUGHNESS = false;
+layout(constant) const bool HAS_NORMAL = false;
+layout(constant) const bool HAS_OCCLUSION = false;
+layout(constant) const bool HAS_EMISSIVE = false;
+layout(constant) const bool HAS_LAYERS = false;
+layout(constant) const bool HAS_COLOR = false;
+layout(constant) const bool MASKED = false;
+layout(constant) const bool HAS_COAT_NORMAL = false;
+layout(constant) const uint NORMAL_STEPS = 0; // that stored normals are rounded to; 0: what they are stored in decides
 const bool HAS_TEXTURES = HAS_BASE || HAS_METALLIC_ROUGHNESS || HAS_NORMAL || HAS_OCCLUSION || HAS_EMISSIVE || HAS_LAYERS ||
                           HAS_COAT_NORMAL;
 

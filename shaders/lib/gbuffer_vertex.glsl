@@ -1,9 +1,7 @@
 // One vertex of a surface: object space to clip space, and what the fragments interpolate.
 #include "lib/gbuffer_interface.glsl"
-#include "share/camera.glsl"
-
-layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera_block; };
-layout(scalar, set = 0, binding = 1) readonly buffer Instances { Instance instances[]; };
+#include "lib/instances.glsl"
+#include "lib/view.glsl"
 
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
@@ -27,5 +25,5 @@ void main() {
     uv = HAS_TEXTURES ? vec4(uv0, uv1) : vec4(0);
     vertex_color = HAS_COLOR ? color : vec4(1);
     ids = uvec3(gl_InstanceIndex, instance.material, instance.first_triangle);
-    gl_Position = camera_block.clip_from_rel * vec4(p_rel, 1.0);
+    gl_Position = camera.clip_from_rel * vec4(p_rel, 1.0);
 }

@@ -8,7 +8,7 @@
 
 // Bit i: some material that rays may hit has a texture in slot i; bit 11: some mesh has colours; bit 12: some texture
 // reads the second coordinates.
-layout(constant_id = 43) const uint HIT_TEXTURES = 0;
+layout(constant) const uint HIT_TEXTURES = 0;
 const bool HIT_COLORS = (HIT_TEXTURES & (1u << 11)) != 0;
 const bool HIT_UVS = (HIT_TEXTURES & 0x7ffu) != 0;
 const bool HIT_SECOND_UVS = (HIT_TEXTURES & (1u << 12)) != 0;
@@ -19,7 +19,7 @@ const bool HIT_TANGENTS = (HIT_TEXTURES & (1u << SLOT_NORMAL | 1u << SLOT_CLEARC
 //   coordinates per metre
 // then, where HIT_TEXTURES says so, two of the first texture coordinates, two of the second, three of tangents with
 // their handedness, and two of colours as halves.
-layout(set = 0, binding = 34, rgba32ui) readonly uniform uimageBuffer hit_corners;
+layout(scene, rgba32ui) readonly uniform uimageBuffer hit_corners;
 const uint SHEET_TRIANGLE = 0x10000u;
 const uint ONE_SIDED_TRIANGLE = 0x20000u;
 const int UV0_AT = 3;
@@ -28,12 +28,9 @@ const int TANGENTS_AT = UV1_AT + (HIT_SECOND_UVS ? 2 : 0);
 const int COLORS_AT = TANGENTS_AT + (HIT_TANGENTS ? 3 : 0);
 const int CORNER_TEXELS = COLORS_AT + (HIT_COLORS ? 2 : 0);
 
-// All levels of all images, RGBA in bytes, and per material and slot: first texel | width, height | levels, flags. A
-// texel buffer can be read at any place by any lane, where sampled images cannot be chosen by an index.
-layout(set = 0, binding = 40, r32ui) readonly uniform uimageBuffer texels;
-layout(set = 0, binding = 41, rgba32ui) readonly uniform uimageBuffer texel_slots;
-// Two texels per material and slot: row of u, layer | row of v, coordinate set.
-layout(set = 0, binding = 42, rgba32f) readonly uniform imageBuffer hit_slots;
+// All levels of all images, RGBA in bytes. A buffer can be read at any place by any lane, where sampled images cannot be chosen
+// by an index.
+layout(scene, scalar) readonly buffer Texels { uint texels[]; };
 
 const int MOST_LEVELS = 15; // above the first, of a picture of 32768 texels
 const uint TEXELS_SRGB = 1;
@@ -58,24 +55,21 @@ int wrapped(int i, int size, uint mode) {
 vec4 texel_at(uint first, ivec2 size, ivec2 at, uint flags) {
     int x = wrapped(at.x, size.x, flags >> 2 & 3u);
     int y = wrapped(at.y, size.y, flags >> 4 & 3u);
-    vec4 value = unpackUnorm4x8(imageLoad(texels, int(first) + y * size.x + x).x);
+    vec4 value = unpackUnorm4x8(texels[int(first) + y * size.x + x]);
     return (flags & TEXELS_SRGB) != 0 ? vec4(linear_from_srgb(value.rgb), value.a) : value;
 }
 
 // A texture of a material at coordinates uv, at the level whose texels are `footprint` wide in units of the
 // coordinates: bilinear in it.
 vec4 hit_texture(uint material, uint slot, vec4 uv_sets, float footprint) {
-    int row = int(material * SLOTS + slot);
-    vec4 u_row = imageLoad(hit_slots, row * 2);
-    vec4 v_row = imageLoad(hit_slots, row * 2 + 1);
-    uvec4 place = imageLoad(texel_slots, row);
-    vec3 set = vec3(v_row.w == 0.0 ? uv_sets.xy : uv_sets.zw, 1.0);
-    vec2 uv = vec2(dot(u_row.xyz, set), dot(v_row.xyz, set));
+    TextureSlot at_slot = texture_slot(material, slot);
+    uvec4 place = material_words(material, at_slot.first);
+    vec2 uv = slot_coordinates(at_slot, uv_sets);
     ivec2 size = ivec2(place.y & 0xffffu, place.y >> 16);
     uint levels = place.z & 0xffu;
     uint flags = place.z >> 8;
     // The coordinate's transform may scale; its determinant is its area.
-    float stretch = sqrt(abs(u_row.x * v_row.y - u_row.y * v_row.x));
+    float stretch = sqrt(abs(at_slot.u_row.x * at_slot.v_row.y - at_slot.u_row.y * at_slot.v_row.x));
     float across = footprint * stretch * float(max(size.x, size.y));
     int level = clamp(int(floor(log2(max(across, 1.0)) + 0.5)), 0, int(levels) - 1);
     uint first = place.x;
@@ -98,7 +92,7 @@ vec4 hit_texture(uint material, uint slot, vec4 uv_sets, float footprint) {
 }
 
 bool has_hit_texture(uint material, uint slot) {
-    return (HIT_TEXTURES & (1u << slot)) != 0 && imageLoad(texel_slots, int(material * SLOTS + slot)).z != 0;
+    return (HIT_TEXTURES & (1u << slot)) != 0 && material_words(material, texture_slot(material, slot).first).z != 0;
 }
 
 vec4 hit_texture_or(uint material, uint slot, vec4 uv_sets, float footprint, vec4 otherwise) {

@@ -3,20 +3,19 @@
 #define LIGHTING_GLSL
 #include "lib/encode.glsl"
 #include "lib/environment.glsl"
+#include "lib/light_tile.glsl"
 #include "lib/punctual.glsl"
 #include "lib/reflectance.glsl"
 #include "lib/shadow.glsl"
 #include "lib/snell.glsl"
 #include "lib/surface.glsl"
 
-layout(constant_id = 14) const uint LOCAL_LIGHTS = 0;       // point and spot lights after them; 0 where tiles list them
-layout(constant_id = 15) const uint TILE_WORDS = 0;         // words of a tile's bit mask; 0 without lists
-layout(constant_id = 16) const bool AMBIENT = false;        // irradiance of the environment on diffuse surfaces
-layout(constant_id = 17) const bool REFLECTION = false;     // the prefiltered environment in specular ones
-const uint TILE = 16;                                       // pixels a side
+layout(constant) const uint LOCAL_LIGHTS = 0;       // point and spot lights after them; 0 where tiles list them
+layout(constant) const uint TILE_WORDS = 0;         // words of a tile's bit mask; 0 without lists
+layout(constant) const bool AMBIENT = false;        // irradiance of the environment on diffuse surfaces
+layout(constant) const bool REFLECTION = false;     // the prefiltered environment in specular ones
 
-layout(set = 0, binding = 21, r32ui) readonly uniform uimageBuffer tile_lights;
-layout(set = 0, binding = 23) uniform sampler2D prefiltered;
+layout(pass, scalar) readonly buffer TileLights { uint tile_lights[]; };
 
 // Reflected radiance over irradiance below which a light with a shadow is not looked for, and not shown either: the far
 // ends of lobes on polished surfaces, a ten-thousandth of what a grey one reflects.
@@ -48,7 +47,7 @@ struct LightRange {
 };
 
 // Loop heads after which no further light is begun.
-layout(constant_id = 27) const uint LIGHT_BUDGET = 0xffffffffu;
+layout(constant) const uint LIGHT_BUDGET = 0xffffffffu;
 
 vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across, LightRange range) {
     vec3 sum = vec3(0.0);
@@ -58,7 +57,7 @@ vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across, LightRange range)
     int tile = int((uint(pixel.y) / TILE * tiles_across + uint(pixel.x) / TILE) * TILE_WORDS);
     uint next = range.first;
     uint word = range.first_word;
-    uint bits = TILE_WORDS > 0 && word < range.end_word ? imageLoad(tile_lights, tile + int(word)).x : 0u;
+    uint bits = TILE_WORDS > 0 && word < range.end_word ? tile_lights[tile + int(word)] : 0u;
     while (true) {
         loop_heads++;
         bool listed = next >= range.end;
@@ -67,7 +66,7 @@ vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across, LightRange range)
             while (listed && bits == 0 && word + 1 < range.end_word) {
                 loop_heads++;
                 word++;
-                bits = imageLoad(tile_lights, tile + int(word)).x;
+                bits = tile_lights[tile + int(word)];
             }
         }
         bool out_of_steps = loop_heads > LIGHT_BUDGET && !(listed && bits == 0);
@@ -79,28 +78,6 @@ vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across, LightRange range)
         sum += light_on(s, index);
     }
     return sum;
-}
-
-// Level of the prefiltered map whose texels are 1/16 of the lobe: α = 16 / width (pass/prefilter.comp).
-float prefiltered_level(float alpha) {
-    float first = environment.width * alpha * 0.0625;
-    return first >= 2.0 ? min(log2(first), environment.levels - 1.0) : first * 0.5;
-}
-
-vec3 prefiltered_radiance(vec3 direction, float alpha) {
-    vec2 at = equirectangular_from_direction(into_environment(direction));
-    return light_of_environment(textureLod(prefiltered, at, prefiltered_level(alpha)).rgb);
-}
-
-// Irradiance from nine spherical-harmonic coefficients.
-vec3 environment_irradiance(vec3 n) {
-    vec3 d = into_environment(n);
-    vec3 e = environment.irradiance[0] * 0.282095;
-    e += (environment.irradiance[1] * d.y + environment.irradiance[2] * d.z + environment.irradiance[3] * d.x) * 0.488603;
-    e += (environment.irradiance[4] * (d.x * d.y) + environment.irradiance[5] * (d.y * d.z) + environment.irradiance[7] * (d.x * d.z)) * 1.092548;
-    e += environment.irradiance[6] * (0.315392 * (3.0 * d.z * d.z - 1.0));
-    e += environment.irradiance[8] * (0.546274 * (d.x * d.x - d.y * d.y));
-    return light_of_environment(max(e, 0.0));
 }
 
 // Directional reflectance of the lobe: what the base sends to the eye of the light in the mirror direction (split sum,

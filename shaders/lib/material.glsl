@@ -2,13 +2,22 @@
 // eight. Words as in share/scene.glsl.
 #ifndef MATERIAL_GLSL
 #define MATERIAL_GLSL
+#include "lib/slots.glsl"
 #include "share/scene.glsl"
 
-layout(set = 0, binding = 33, rgba32ui) readonly uniform uimageBuffer material_texels;
-const int MATERIAL_TEXELS = 9;
+layout(scene, rgba32ui) readonly uniform uimageBuffer material_texels;
+// Of the struct Material; then, slot by slot, those of its textures: row of u, layer | row of v, coordinate set | for rays: first texel,
+// width and height, levels and flags (lib/hit.glsl).
+const int MATERIAL_SLOTS_AT = 9;
+const int SLOT_TEXELS = 3;
+const int MATERIAL_TEXELS = MATERIAL_SLOTS_AT + int(SLOTS) * SLOT_TEXELS;
+
+uvec4 material_words(uint id, int i) {
+    return imageLoad(material_texels, int(id) * MATERIAL_TEXELS + i);
+}
 
 vec4 material_texel(uint id, int i) {
-    return uintBitsToFloat(imageLoad(material_texels, int(id) * MATERIAL_TEXELS + i));
+    return uintBitsToFloat(material_words(id, i));
 }
 
 Material material_at(uint id) {
@@ -23,6 +32,27 @@ Material material_at(uint id) {
     vec4 t8 = material_texel(id, 8);
     return Material(t0, t1.xyz, t1.w, t2.xyz, t2.w, t3.xyz, t3.w, t4.x, t4.y, t4.z, t4.w, t5.x, t5.y, t5.z,
                     floatBitsToUint(t5.w), t6.xyz, floatBitsToUint(t6.w), t7.xyz, t7.w, t8.xyz, floatBitsToUint(t8.w));
+}
+
+// Where a material's texture is read: KHR_texture_transform as two rows, which set of coordinates, and which layer of its page.
+struct TextureSlot {
+    vec3 u_row;
+    vec3 v_row;
+    bool second_set;
+    float layer;
+    int first; // texel of the table where what rays read begins
+};
+
+TextureSlot texture_slot(uint material, uint slot) {
+    int at = MATERIAL_SLOTS_AT + int(slot) * SLOT_TEXELS;
+    vec4 u_layer = material_texel(material, at);
+    vec4 v_set = material_texel(material, at + 1);
+    return TextureSlot(u_layer.xyz, v_set.xyz, v_set.w != 0.0, u_layer.w, at + 2);
+}
+
+vec2 slot_coordinates(TextureSlot at, vec4 uv_sets) {
+    vec3 set = vec3(at.second_set ? uv_sets.zw : uv_sets.xy, 1.0);
+    return vec2(dot(at.u_row, set), dot(at.v_row, set));
 }
 
 vec3 material_emissive(uint id) {
@@ -43,6 +73,6 @@ vec3 material_sigma(uint id) {
 
 // Of its grid of σ (lib/sigma_grid.glsl) the first texel + 1; 0 where none is marched.
 uint material_grid(uint id) {
-    return imageLoad(material_texels, int(id) * MATERIAL_TEXELS + 8).w;
+    return material_words(id, 8).w;
 }
 #endif

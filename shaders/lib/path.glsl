@@ -8,12 +8,8 @@
 #include "lib/path_ray.glsl"
 #include "lib/work_count.glsl"
 
-layout(constant_id = 52) const bool SKY = false;         // the environment is seen behind the scene
-layout(constant_id = 57) const bool ENVIRONMENT = false; // there is one
-layout(constant_id = 54) const uint LOOP_BUDGET = 40000;
-layout(constant_id = 68) const bool LIGHTING_SURFACES = false; // what emits lights the scene, and is not only seen
-layout(constant_id = 75) const uint LIGHT_PLACES = 1; // places on lights that are looked for at each surface
-layout(set = 0, binding = 25) uniform sampler2D sky;
+layout(constant) const bool LIGHTING_SURFACES = false; // what emits lights the scene, and is not only seen
+layout(constant) const uint LIGHT_PLACES = 1; // places on lights that are looked for at each surface
 
 // From this surface on a path goes on with a probability that falls with its throughput.
 const uint ROULETTE_FROM = 4;
@@ -133,11 +129,6 @@ LightTask task_of(Path p, Met met, bool spreads, vec3 front_origin, LightSample 
     return task;
 }
 
-// What the environment shows in a direction.
-vec3 sky_towards(vec3 direction) {
-    return light_of_environment(textureLod(sky, equirectangular_from_direction(into_environment(direction)), 0.0).rgb);
-}
-
 // What a path meets: light that this sends along it, and the path as it goes on.
 vec3 meet(inout Path p, Hit found, uvec2 pixel, bool there, out LightTask task) {
     task = LightTask(p.origin, vec3(0.0, 1.0, 0.0), -1.0, p.self, p.media, vec3(0.0));
@@ -166,7 +157,7 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, bool there, out LightTask task) 
     if (EMITTERS > 0) light = sample_light(front_origin, draw_words_of(pixel, met_before, DRAW_LIGHT, 0, LIGHT_PLACES));
     if (ENVIRONMENT) {
         vec3 towards = at_surface ? light.to_light : p.direction;
-        vec3 seen = sky_towards(towards);
+        vec3 seen = environment_radiance(towards);
         bool clear = (p.state & PATH_CLEAR) != 0 && !SKY;
         float w = p.pdf > 0.0 ? mis_weight(p.pdf, float(LIGHT_PLACES) * sky_pdf(p.direction)) : 1.0;
         if (!at_surface && !clear) gathered = p.throughput * seen * w;
@@ -226,7 +217,7 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, bool there, out LightTask task) 
             LightSample other = sample_light(front_origin, draw_words_of(pixel, met_before, DRAW_LIGHT, i, LIGHT_PLACES));
             if (EMITTING_SKY && other.pdf > 0.0 && other.t_max == LARGEST) {
                 bool hidden = (p.state & PATH_CLEAR) != 0 && !SKY && dot(hit.n, other.to_light) < 0.0;
-                other.arriving *= hidden ? vec3(0.0) : sky_towards(other.to_light);
+                other.arriving *= hidden ? vec3(0.0) : environment_radiance(other.to_light);
             }
             LightTask one = task_of(p, met, spreads, front_origin, other, scattered(b, normalize(other.to_light)));
             one.t_max = there ? one.t_max : -1.0;

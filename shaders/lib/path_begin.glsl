@@ -1,10 +1,9 @@
 // Where paths begin: at the eye, through a point of the pixel.
 #ifndef PATH_BEGIN_GLSL
 #define PATH_BEGIN_GLSL
-#include "lib/camera.glsl"
+#include "lib/view.glsl"
 #include "lib/path_ray.glsl"
 
-layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
 
 // The pixel that stands at a place of the first queue: tiles of 8x8 in strides over the picture, since lavapipe gives each of
 // its threads one contiguous piece of a dispatch; within a tile in Morton order, so that neighbours in a queue are neighbours

@@ -4,15 +4,15 @@
 #define PATH_STATE_GLSL
 #include "lib/path_ray.glsl"
 
-layout(constant_id = 69) const bool KEEPS_MEDIA = false; // paths go through media
-layout(constant_id = 70) const bool KEEPS_AFTER = false; // something opaque lies against some of them
+layout(constant) const bool KEEPS_MEDIA = false; // paths go through media
+layout(constant) const bool KEEPS_AFTER = false; // something opaque lies against some of them
 
-layout(scalar, set = 0, binding = 52) buffer Origins { uvec4 origins[]; };          // and self
-layout(scalar, set = 0, binding = 53) buffer Directions { uvec4 directions[]; };    // and pdf
-layout(scalar, set = 0, binding = 54) buffer Throughputs { uvec4 throughputs[]; };  // and state
-layout(scalar, set = 0, binding = 55) buffer Sums { uvec4 sums[]; };                // and travelled
-layout(scalar, set = 0, binding = 56) buffer Media { uvec4 media[]; };
-layout(scalar, set = 0, binding = 57) buffer Afters { float afters[]; };
+layout(pass, scalar) buffer Origins { uvec4 origins[]; };          // and self
+layout(pass, scalar) buffer Directions { uvec4 directions[]; };    // and pdf
+layout(pass, scalar) buffer Throughputs { uvec4 throughputs[]; };  // and state
+layout(pass, scalar) buffer Sums { uvec4 sums[]; };                // and travelled
+layout(pass, scalar) buffer Media { uvec4 media[]; };
+layout(pass, scalar) buffer Afters { float afters[]; };
 
 Path path_of(uint pixel) {
     uvec4 a = origins[pixel];

@@ -1,29 +1,15 @@
-// The nearest surface of a pixel, out of the G-buffer. Expects `instances` and `camera`.
+// The nearest surface of a pixel, out of the G-buffer.
 #ifndef PRIMARY_GLSL
 #define PRIMARY_GLSL
-#include "lib/camera.glsl"
 #include "lib/encode.glsl"
+#include "lib/gbuffer.glsl"
 #include "lib/hit.glsl"
+#include "lib/instances.glsl"
 #include "lib/shadow.glsl"
 
-layout(constant_id = 0) const bool HAS_EMISSIVE = false;
-layout(constant_id = 1) const bool HAS_LAYERS = false;
-layout(constant_id = 3) const bool HAS_TRIANGLES = false;
-layout(constant_id = 2) const bool HAS_TRANSMISSION = false; // transmissive surfaces are in the G-buffer
-
-layout(set = 0, binding = 4, rgba16f) readonly uniform image2D base;
-#define DEPTH_BINDING 3
-#define NORMALS_BINDING 5
-#include "lib/stored.glsl"
-layout(set = 0, binding = 6, rg32ui) readonly uniform uimage2D ids;
-layout(set = 0, binding = 7, rgba16f) readonly uniform image2D emissive;
-layout(set = 0, binding = 8, rgba16) readonly uniform image2D layers;
-layout(set = 0, binding = 9, r32ui) readonly uniform uimage2D triangles;
+layout(constant) const bool IN_MEDIUM = false; // the eye is inside a transparent body
 // Places among the leaves of the scene's triangles.
-layout(set = 0, binding = 35, r32ui) readonly uniform uimageBuffer leaf_places;
-
-layout(constant_id = 79) const float NORMAL_ERROR2 = 1e-7; // |n − stored n|² that storing accounts for
-layout(constant_id = 4) const bool IN_MEDIUM = false; // the eye is inside a transparent body
+layout(scene, scalar) readonly buffer LeafPlaces { uint leaf_places[]; };
 
 struct Primary {
     bool drawn;
@@ -61,18 +47,17 @@ HitPoint on_triangle(uint leaf, vec3 p_bvh, vec3 direction) {
 // looked up at the surface has the stored ones, which are there whether or not the scene calls for rays.
 Primary primary_surface(ivec2 pixel, bool exact_normals) {
     Primary r;
-    vec4 z_position = stored_depth(pixel.y * int(camera.size.x) + pixel.x);
-    float z = z_position.x;
+    float z = stored_depth(pixel_index(pixel));
     r.drawn = z != 0.0;
     uvec2 id = imageLoad(ids, pixel).xy;
     uint material = r.drawn ? id.x & 0xffffu : 0u;
     vec4 texel = imageLoad(base, pixel);
-    vec4 glow = HAS_EMISSIVE || HAS_TRANSMISSION ? imageLoad(emissive, pixel) : vec4(1.0);
+    vec4 glow = STORED_EMISSIVE || STORED_TRANSMISSION ? imageLoad(emissive, pixel) : vec4(1.0);
     vec4 octahedral = stored_normals(pixel);
     vec3 n = unit_from_octahedral(octahedral.xy);
     vec3 layer = vec3(1.0);
     vec3 n_coat = n;
-    if (HAS_LAYERS) {
+    if (STORED_LAYERS) {
         vec4 packed_value = imageLoad(layers, pixel);
         layer = layers_from_packed(packed_value);
         n_coat = coat_normal_from_packed(packed_value);
@@ -80,15 +65,15 @@ Primary primary_surface(ivec2 pixel, bool exact_normals) {
     float roughness = float(id.x >> 16) * (1.0 / 65535.0);
     float occlusion = float(id.y >> 24) * (1.0 / 255.0);
     Material m = material_at(material);
-    vec3 p_rel = POSITIONS && r.drawn ? z_position.yzw : rel_from_pixel(camera, pixel, r.drawn ? z : 1.0);
-    Surface s = surface_from_texels(m, texel.rgb, texel.a, roughness, occlusion, HAS_EMISSIVE ? glow.rgb : vec3(1.0), layer, n, n_coat,
+    vec3 p_rel = POSITIONS && r.drawn ? stored_position(pixel_index(pixel)) : rel_from_pixel(camera, pixel, r.drawn ? z : 1.0);
+    Surface s = surface_from_texels(m, texel.rgb, texel.a, roughness, occlusion, STORED_EMISSIVE ? glow.rgb : vec3(1.0), layer, n, n_coat,
                                     -view_direction(camera, pixel), p_rel);
     vec3 p_bvh = p_rel + trace_terms.bvh_from_rel;
     s.p_bvh = p_bvh;
     s.n_triangle = unit_from_octahedral(octahedral.zw);
     s.media = trace_terms.camera_media;
-    if (HAS_TRIANGLES) {
-        uint leaf = r.drawn ? imageLoad(leaf_places, int(imageLoad(triangles, pixel).x)).x : NO_TRIANGLE;
+    if (STORED_TRIANGLES) {
+        uint leaf = r.drawn ? leaf_places[r.drawn ? imageLoad(triangles, pixel).x : 0u] : NO_TRIANGLE;
         if (leaf != NO_TRIANGLE) {
             HitPoint point = on_triangle(leaf, p_bvh, view_direction(camera, pixel));
             s.p_bvh = point.p;
@@ -107,7 +92,7 @@ Primary primary_surface(ivec2 pixel, bool exact_normals) {
     r.hit.front = (id.y & BACK_FACE) == 0;
     r.hit.coverage = 1.0;
     // The emissive target's fourth component is how much the texture lets through.
-    r.hit.transmits = HAS_TRANSMISSION ? m.transmission * glow.a : 0.0;
+    r.hit.transmits = STORED_TRANSMISSION ? m.transmission * glow.a : 0.0;
     uint instance = r.drawn ? id.y & INSTANCE_BITS : 0u;
     r.hit.sheet = (instances[instance].flags & INSTANCE_SHEET) != 0;
     r.hit.thickness = instances[instance].scale;

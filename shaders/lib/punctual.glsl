@@ -2,11 +2,9 @@
 #ifndef PUNCTUAL_GLSL
 #define PUNCTUAL_GLSL
 #include "lib/light.glsl"
-#include "lib/light_texels.glsl"
+#include "lib/light_table.glsl"
 
-layout(constant_id = 13) const uint DIRECTIONAL_LIGHTS = 0; // lights [0, this) of the table
-
-layout(set = 0, binding = 20, rgba32f) readonly uniform imageBuffer lights;
+layout(constant) const uint DIRECTIONAL_LIGHTS = 0; // lights [0, this) of the table
 
 struct PunctualLight {
     vec3 to_light;    // from the point, or the direction to what is infinitely far

@@ -6,11 +6,6 @@
 // What follows the pixel of an entry that is through.
 const uint ENDED = 0x80000000u;
 
-// Sizes of the dispatches over a queue.
-struct QueueSize {
-    WorkSize paths;  // two paths in each invocation; `count` is that of entries
-    WorkSize chunks; // an invocation for each chunk of entries
-};
-const uint PATHS_IN_GROUP = 128;
-const uint CHUNK = 16;
+const uint PATHS_IN_GROUP = 128; // two in each invocation
+const uint CHUNK = 16; // entries that one invocation counts
 #endif

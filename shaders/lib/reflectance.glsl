@@ -3,7 +3,7 @@
 #define REFLECTANCE_GLSL
 #include "lib/surface.glsl"
 
-layout(set = 0, binding = 24) uniform sampler2D reflectance;
+layout(scene) uniform sampler2D reflectance;
 
 // F0 and F90 factors of the directional reflectance of a lobe: the table's first and last texels are 0 and 1.
 vec2 reflectance_of_lobe(float cos_v, float roughness) {

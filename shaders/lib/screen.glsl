@@ -1,11 +1,12 @@
 // The picture as a scene: a ray marched through the G-buffer's depth, pixel by pixel (McGuire and Mara, JCGT 3(4) 2014).
-// Expects `camera`, `lib/stored.glsl` with the G-buffer's depth and normals, the radiance of its surfaces, `seen`, and the nearest z of each
-// work tile, `nearest_pieces` (pass/screen_tiles.comp).
 #ifndef SCREEN_GLSL
 #define SCREEN_GLSL
 #include "lib/lighting.glsl"
 #include "lib/screen_piece.glsl"
 #include "lib/work_tile.glsl"
+
+layout(pass, scalar) readonly buffer Seen { vec4 seen[]; };                     // radiance of the surfaces, pixel by pixel
+layout(pass, scalar) readonly buffer NearestPieces { float nearest_pieces[]; }; // nearest z of each work tile (pass/screen_tiles.comp)
 
 // A step is a pixel along the longer axis, so the longer side of a picture bounds them: 16,384 where loops are limited to
 // 65,535 heads, and a surface marches twice at most, for its base and its coat.
@@ -61,7 +62,7 @@ int met_on_screen(vec3 p_rel, vec3 direction) {
         vec2 to_edge = mix(vec2(LARGEST), (edge - place) / pixels_by, greaterThan(abs(pixels_by), vec2(1e-6)));
         float more = clamp(floor(min(to_edge.x, to_edge.y)), 0.0, float(WORK_TILE));
         float farthest = min(at.z - by.z * begins, at.z + by.z * (more + 0.5));
-        bool free = more >= 1.0 && farthest > imageLoad(nearest_pieces, tile.y * tiles_across + tile.x).x;
+        bool free = more >= 1.0 && farthest > nearest_pieces[tile.y * tiles_across + tile.x];
 
         ScreenPiece piece = screen_piece(pixel);
         vec2 centre = (vec2(pixel) + 0.5) / half_size - 1.0;
@@ -91,7 +92,7 @@ vec3 screen_instead(Surface s, vec3 n, float alpha, vec3 share) {
     bool looks = largest(share) > 0.0 && dot(r, s.n_triangle) > 0.0;
     int met = looks ? met_on_screen(s.p_rel, r) : -1;
     vec3 before = REFLECTION ? prefiltered_radiance(r, alpha) : vec3(0.0);
-    return met >= 0 ? share * (imageLoad(seen, met).rgb - before) : vec3(0.0);
+    return met >= 0 ? share * (seen[met].rgb - before) : vec3(0.0);
 }
 
 // What `environment_light` mirrors, corrected where the surface is smooth and the mirrored ray meets something.

@@ -1,9 +1,8 @@
-// A pixel of the G-buffer as a piece of a plane on the screen. Expects `camera`.
+// A pixel of the G-buffer as a piece of a plane on the screen.
 #ifndef SCREEN_PIECE_GLSL
 #define SCREEN_PIECE_GLSL
-#include "lib/camera.glsl"
 #include "lib/encode.glsl"
-#include "lib/stored.glsl"
+#include "lib/gbuffer.glsl"
 
 struct ScreenPiece {
     float z;         // reversed depth at the pixel's centre; 0 where nothing was drawn
@@ -16,7 +15,7 @@ struct ScreenPiece {
 // screen: the viewing ray through (x, y) meets this one at 1/w ~ n·v(x, y).
 ScreenPiece screen_piece(ivec2 pixel) {
     ScreenPiece r;
-    r.z = stored_depth(pixel.y * int(camera.size.x) + pixel.x).x;
+    r.z = stored_depth(pixel_index(pixel));
     vec3 n = unit_from_octahedral(stored_normals(pixel).zw);
     bool parallel = camera.orthographic != 0;
     vec2 ndc = ndc_from_pixel(camera, pixel);

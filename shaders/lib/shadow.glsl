@@ -4,20 +4,18 @@
 #ifndef SHADOW_GLSL
 #define SHADOW_GLSL
 #include "lib/hit.glsl"
+#include "lib/light_table.glsl"
 #include "lib/media.glsl"
 
-layout(constant_id = 44) const uint SHADOWS = 0;     // rungs of the knob: 0 off, 1 map, 2 ray
+layout(constant) const uint SHADOWS = 0;     // rung of the knob `shadows`
+const uint SHADOW_OFF = 0;
 const uint SHADOW_MAP = 1;
 const uint SHADOW_RAY = 2;
-layout(constant_id = 45) const bool FILTERS = false; // something masked, blended or transmissive is in the scene
-layout(constant_id = 46) const uint ABSORPTION = 0;  // 0 off, 1 by the nominal thickness, 2 along the path
+layout(constant) const bool FILTERS = false; // something masked, blended or transmissive is in the scene
+layout(constant) const uint ABSORPTION = 0;  // 0 off, 1 by the nominal thickness, 2 along the path
 
-// Maps of all lights in one image (pass/shadow_map.rs), and their table: a texel per light, with the first texel of
-// its first map, their number, and whether their depth is told from the light; then five per map: first texel across
-// and down and texels a side, and the rows that lead from bvh space to texels across and down of the image, depth,
-// and 1, all times w.
-layout(set = 0, binding = 36) uniform sampler2D shadow_depth;
-layout(set = 0, binding = 37, rgba32f) readonly uniform imageBuffer shadow_faces;
+// Maps of all lights in one image (pass/shadow_map.rs).
+layout(scene) uniform sampler2D shadow_depth;
 // Of the numbers that a map's comparison rests on; see below.
 const float SHADOW_ROUNDINGS = 32.0 / 16777216.0;
 
@@ -104,13 +102,13 @@ int cube_face(vec3 d) {
 // map's depth likewise, 8 of the distance to a light near the scene, 8 of the scene's extent for others, and that again for
 // the products here. All of it is an offset along n, by `size` with 32: half of that, and as much to spare.
 float map_visibility(vec3 p, vec3 n, vec3 to_light, uint index, float size) {
-    vec4 light = imageLoad(shadow_faces, int(index));
-    int first = int(light.x) + (light.y > 1.0 ? cube_face(-to_light) * 5 : 0);
-    vec4 square = imageLoad(shadow_faces, first);
-    vec4 row_u = imageLoad(shadow_faces, first + 1);
-    vec4 row_v = imageLoad(shadow_faces, first + 2);
-    vec4 row_d = imageLoad(shadow_faces, first + 3);
-    vec4 row_w = imageLoad(shadow_faces, first + 4);
+    vec4 light = imageLoad(lights, int(index) * LIGHT_TEXELS + 5);
+    int first = int(light.x) + (light.y > 1.0 ? cube_face(-to_light) * SHADOW_MAP_TEXELS : 0);
+    vec4 square = imageLoad(lights, first);
+    vec4 row_u = imageLoad(lights, first + 1);
+    vec4 row_v = imageLoad(lights, first + 2);
+    vec4 row_d = imageLoad(lights, first + 3);
+    vec4 row_w = imageLoad(lights, first + 4);
     float distance = light.z > 0.0 ? vector_length(to_light) : 0.0;
     vec4 q = vec4(p + n * (trace_terms.offset + (size + distance) * SHADOW_ROUNDINGS), 1.0);
     float w = dot(row_w, q);

@@ -6,16 +6,15 @@
 #include "lib/spectrum.glsl"
 #include "lib/trace.glsl"
 
-layout(constant_id = 31) const uint MARCH_STEPS = 0;        // of each segment, a multiple of 4; 0: no grid is marched
-layout(constant_id = 32) const uint QUADRATURE = QUADRATURE_MIDPOINT;
-layout(constant_id = 33) const bool MARCH_COLOURS = false;  // some grid has values for red, green and blue
-layout(constant_id = 34) const uint MARCH_BUDGET = 40000;   // loop heads after which a segment gets four steps
+layout(constant) const uint MARCH_STEPS = 0;        // of each segment, a multiple of 4; 0: no grid is marched
+layout(constant) const uint QUADRATURE = QUADRATURE_MIDPOINT;
+layout(constant) const bool MARCH_COLOURS = false;  // some grid has values for red, green and blue
 
 // Per grid five texels: three rows that lead from bvh space to places in the grid, 0 at the first point of an axis, 1 at
 // the next; places of the last points, and the first texel of the values; texels per channel, 0 where all are one.
 // Then for each pair of neighbours along x and y, layer by layer: the values at both x of the first y and of the second.
 // Two fetches make a trilinear value so, where a texel a point would take eight.
-layout(set = 0, binding = 38, rgba32f) readonly uniform imageBuffer sigma_grids;
+layout(scene, rgba32f) readonly uniform imageBuffer sigma_grids;
 
 struct SigmaGrid {
     vec3 last;
@@ -63,7 +62,7 @@ vec3 mean_sigma(uint at, vec3 p, vec3 direction, float d) {
     SigmaGrid grid = SigmaGrid(last_first.xyz, int(last_first.w), int(imageLoad(sigma_grids, int(at) + 4).x));
     vec4 from = vec4(p, 1.0);
     vec3 start = vec3(dot(rows[0], from), dot(rows[1], from), dot(rows[2], from));
-    uint steps = loop_heads < MARCH_BUDGET ? MARCH_STEPS : 4u;
+    uint steps = loop_heads < LOOP_BUDGET ? MARCH_STEPS : 4u;
     vec3 along = direction * (d / float(steps));
     vec3 stride = vec3(dot(rows[0].xyz, along), dot(rows[1].xyz, along), dot(rows[2].xyz, along));
     vec4 w = quadrature_weights(QUADRATURE);

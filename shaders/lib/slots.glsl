@@ -1,6 +1,6 @@
+// Order of a material's texture slots.
 #ifndef SLOTS_GLSL
 #define SLOTS_GLSL
-// Order of a material's texture slots.
 const uint SLOT_BASE = 0;
 const uint SLOT_METALLIC_ROUGHNESS = 1;
 const uint SLOT_NORMAL = 2;

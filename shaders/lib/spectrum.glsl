@@ -4,12 +4,12 @@
 #ifndef SPECTRUM_GLSL
 #define SPECTRUM_GLSL
 
-layout(constant_id = 72) const bool SPECTRAL = false; // the picture is drawn band by band
-layout(constant_id = 73) const uint GRID_SIDE = 0;    // corners a side of the grid of reflectances; 0: they are sums
+layout(constant) const bool SPECTRAL = false; // the picture is drawn band by band
+layout(constant) const uint GRID_SIDE = 0;    // corners a side of the grid of reflectances; 0: they are sums
 // Columns of X, Y, Z of light that is red, green, blue | shares of red, green and blue in the band | then
 // the grid over the square roots of red, green and blue, cell by cell, red fastest: square roots of reflectances at a corner, at
 // the next red, the next green, and both.
-layout(set = 0, binding = 60, rgba32f) readonly uniform imageBuffer spectrum;
+layout(scene, rgba32f) readonly uniform imageBuffer spectrum;
 const int SHARES_AT = 3;
 const int GRID_AT = 4;
 

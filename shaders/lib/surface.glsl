@@ -7,13 +7,14 @@
 #include "lib/spectrum.glsl"
 
 // The knobs `brdf` and `fresnel` (src/plan/knobs.rs): one formula each, chosen when the pipeline is made.
-layout(constant_id = 10) const uint BRDF = 2;    // 0 blinn-phong, 1 blinn-phong-reciprocal, 2 ggx, 3 ggx-multi
-layout(constant_id = 11) const uint FRESNEL = 0; // 0 schlick, 1 exact
-layout(constant_id = 12) const bool CLEARCOAT = false;
-layout(constant_id = 19) const bool CONDUCTORS = false; // some metal is given by its n and κ
+layout(constant) const uint BRDF = 2;    // 0 blinn-phong, 1 blinn-phong-reciprocal, 2 ggx, 3 ggx-multi
+layout(constant) const uint FRESNEL = 0; // 0 schlick, 1 exact
+layout(constant) const bool CLEARCOAT = false;
+layout(constant) const bool ROUGH = false; // some surface that rays meet is rough
+layout(constant) const bool CONDUCTORS = false; // some metal is given by its n and κ
 // Smooth enough surfaces are mirrored by rays, rougher ones by the prefiltered environment (knobs `reflection`, `lobes`).
-layout(constant_id = 20) const bool MIRROR_RAYS = false;
-layout(constant_id = 21) const float ROUGHEST_MIRROR = 0.0;
+layout(constant) const bool MIRROR_RAYS = false;
+layout(constant) const float ROUGHEST_MIRROR = 0.0;
 
 struct Surface {
     vec3 p_rel;

@@ -4,24 +4,8 @@
 #define SURFACE_FRAGMENT_GLSL
 #include "lib/bent_normal.glsl"
 #include "lib/gbuffer_interface.glsl"
-#include "share/camera.glsl"
-
-layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera_block; };
-layout(scalar, set = 0, binding = 2) readonly buffer Materials { Material materials[]; };
-// Two texels per slot: row of u, layer | row of v, coordinate set. A texel buffer, not a storage buffer: lavapipe 22.3
-// masks storage-buffer loads of helper invocations to 0, and the texture's level would come out of those coordinates.
-layout(set = 0, binding = 3, rgba32f) readonly uniform imageBuffer slots;
-layout(set = 0, binding = 4) uniform sampler2DArray base_page;
-layout(set = 0, binding = 5) uniform sampler2DArray metallic_roughness_page;
-layout(set = 0, binding = 6) uniform sampler2DArray normal_page;
-layout(set = 0, binding = 7) uniform sampler2DArray occlusion_page;
-layout(set = 0, binding = 8) uniform sampler2DArray emissive_page;
-layout(set = 0, binding = 9) uniform sampler2DArray clearcoat_page;
-layout(set = 0, binding = 10) uniform sampler2DArray clearcoat_roughness_page;
-layout(set = 0, binding = 11) uniform sampler2DArray specular_page;
-layout(set = 0, binding = 12) uniform sampler2DArray transmission_page;
-layout(set = 0, binding = 13) uniform sampler2DArray thickness_page;
-layout(set = 0, binding = 14) uniform sampler2DArray coat_normal_page;
+#include "lib/pages.glsl"
+#include "lib/view.glsl"
 
 layout(location = 0) in vec3 p_rel;
 layout(location = 1) in vec3 n_rel;
@@ -45,13 +29,8 @@ struct SurfaceFragment {
     vec3 n_geometric;   // unit, to the viewer
 };
 
-// The array index is the rounded third coordinate; a layer never bleeds into the next.
-vec4 read(sampler2DArray page, uint slot_index) {
-    int at = int(ids.y * SLOTS + slot_index) * 2;
-    vec4 u_layer = imageLoad(slots, at);
-    vec4 v_set = imageLoad(slots, at + 1);
-    vec3 set = vec3(v_set.w == 0.0 ? uv.xy : uv.zw, 1.0);
-    return texture(page, vec3(dot(u_layer.xyz, set), dot(v_set.xyz, set), u_layer.w), lod_bias);
+vec4 read(sampler2DArray page, uint slot) {
+    return texture(page, page_coordinates(ids.y, slot, uv), lod_bias);
 }
 
 SurfaceFragment surface_fragment() {
@@ -80,7 +59,7 @@ SurfaceFragment surface_fragment() {
 
     // The face's own normal from the positions of neighbouring fragments: they lie in the plane of the triangle.
     vec3 face = cross(dFdx(p_rel), dFdy(p_rel));
-    vec3 view = camera_block.orthographic != 0 ? camera_block.forward : p_rel;
+    vec3 view = camera.orthographic != 0 ? camera.forward : p_rel;
     face = dot(face, view) > 0.0 ? -face : face;
     float size = max(abs(face.x), max(abs(face.y), abs(face.z)));
     // A face seen exactly edge-on has no extent on the screen: any normal to the viewer will do.
@@ -91,9 +70,9 @@ SurfaceFragment surface_fragment() {
     s.n_coat = n;
     if (HAS_NORMAL) {
         vec3 texel = read(normal_page, SLOT_NORMAL).xyz * 2.0 - 1.0;
-        s.n_shading = bent_normal(n, t_rel, vec3(texel.xy * materials[ids.y].normal_scale, texel.z));
+        s.n_shading = bent_normal(n, t_rel, vec3(texel.xy * material_at(ids.y).normal_scale, texel.z));
     }
-    if (HAS_COAT_NORMAL) s.n_coat = bent_normal(n, t_rel, read(coat_normal_page, SLOT_CLEARCOAT_NORMAL).xyz * 2.0 - 1.0);
+    if (HAS_COAT_NORMAL) s.n_coat = bent_normal(n, t_rel, read(clearcoat_normal_page, SLOT_CLEARCOAT_NORMAL).xyz * 2.0 - 1.0);
     // From behind, the mapped normal is reversed as a whole (glTF 2.0 section 3.9.5, double sided).
     if (!gl_FrontFacing) {
         s.n_shading = -s.n_shading;

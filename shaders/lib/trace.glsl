@@ -3,21 +3,22 @@
 // a stack (docs/decisions/rays.md). Triangles are in the order of the leaves, whatever the way.
 #ifndef TRACE_GLSL
 #define TRACE_GLSL
+#include "lib/loops.glsl"
 #include "lib/ray.glsl"
 #include "share/trace.glsl"
 
-layout(constant_id = 40) const uint TRAVERSAL = 0;
+layout(constant) const uint TRAVERSAL = 0;
 const uint LINKS_16 = 0; // boxes in steps of a grid over the scene
 const uint LINKS_32 = 1; // boxes of floats
 const uint STACK = 2;
 // Lists of nodes ordered for each octant of directions, before the one for any hit, which is the only one without.
-layout(constant_id = 41) const bool OCTANTS = false;
+layout(constant) const bool OCTANTS = false;
 
-layout(set = 0, binding = 30, rgba32ui) readonly uniform uimageBuffer bvh_nodes;
+layout(scene, rgba32ui) readonly uniform uimageBuffer bvh_nodes;
 // Three texels per triangle: corner, and: class | flat face that it is part of | probability per area with which paths draw
 // it as a light (lib/emitters.glsl).
-layout(set = 0, binding = 31, rgba32ui) readonly uniform uimageBuffer bvh_triangles;
-layout(scalar, set = 0, binding = 32) uniform TraceBlock { TraceTerms trace_terms; };
+layout(scene, rgba32ui) readonly uniform uimageBuffer bvh_triangles;
+layout(scene, scalar) uniform TraceBlock { TraceTerms trace_terms; };
 
 // What a ray stops at.
 const uint OPAQUE = 1;
@@ -34,8 +35,6 @@ struct Hit {
 // Work done so far by this invocation.
 uint node_visits = 0;
 uint triangle_tests = 0;
-// Evaluations of loop heads so far: lavapipe ends all loops of an invocation in silence after 65,535 of them.
-uint loop_heads = 0;
 
 // The one place where a ray leaves a surface: moved off it along n, the geometric normal on the side it leaves to, by
 // `offset`, 32 roundings of the largest coordinate in the scene: a hit is off the plane of its triangle by a few of
@@ -269,7 +268,7 @@ HitPair walk_links_twice(TriangleRay ra, vec3 da, float ta, TriangleRay rb, vec3
     return HitPair(a.hit, b.hit);
 }
 
-layout(constant_id = 42) const uint STACK_SIZE = 1; // one more than the depth of the tree: the entry above the last is written, too
+layout(constant) const uint STACK_SIZE = 1; // one more than the depth of the tree: the entry above the last is written, too
 
 // The tree with both children's boxes in the parent, the nearer child first, the other on a stack.
 Hit walk_stack(TriangleRay r, vec3 direction, float t_max, uint classes, uint purpose, inout Filters f) {

@@ -1,11 +1,8 @@
 // Work that a pass did, exactly and whatever the order: sums in 64 bits as pairs of words.
 #ifndef WORK_COUNT_GLSL
 #define WORK_COUNT_GLSL
-#include "lib/shadow.glsl"
-
 #include "lib/add_work.glsl"
-
-layout(scalar, set = 0, binding = 43) buffer WorkDone { WorkCounts counts; };
+#include "lib/shadow.glsl"
 
 // Boundaries that were left without having been entered.
 uint stray_interfaces = 0;

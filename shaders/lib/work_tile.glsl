@@ -1,18 +1,11 @@
 // Tiles of 8x8 pixels as units of work: one workgroup each, dispatched indirectly over a list.
 #ifndef WORK_TILE_GLSL
 #define WORK_TILE_GLSL
+#include "share/tiles.glsl"
 
 const uint WORK_TILE = 8;
 
-// A VkDispatchIndirectCommand, and the number of tiles listed: the last row of workgroups may run past it. Every Vulkan
-// device dispatches 65535 workgroups along x; longer lists go on along y.
-struct WorkSize {
-    uint x;
-    uint y;
-    uint z;
-    uint count;
-};
-const uint ROW = 32768;
+const uint ROW = 32768; // workgroups along x; longer lists go on along y
 
 // Grows the dispatch by one tile and gives its place in the list.
 #define APPEND_TILE(size, place) \

@@ -1,11 +1,13 @@
 // Adds one sample of every pixel to the film; the last one divides by their number. Of a picture by wavelengths a sample is the
 // sum of its bands, X, Y and Z each.
 #version 460
+#extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(set = 0, binding = 0, rgba32f) readonly uniform image2D radiance;
-layout(set = 0, binding = 1, rgba32f) uniform image2D film;
-layout(constant_id = 72) const bool SPECTRAL = false;
+#include "lib/spectrum.glsl"
+
+layout(pass, rgba32f) readonly uniform image2D radiance;
+layout(pass, rgba32f) uniform image2D film;
 layout(push_constant, scalar) uniform Push { uint first; float scale; float bands; mat3 rgb_from_xyz; };
 
 void main() {

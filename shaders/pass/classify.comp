@@ -5,25 +5,25 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 layout(local_size_x = 64) in;
+#include "lib/gbuffer.glsl"
 #include "lib/work_tile.glsl"
 
-layout(set = 0, binding = 0, r32f) readonly uniform imageBuffer depth;
-layout(scalar, set = 0, binding = 1) buffer Sizes { WorkSize surface_size; WorkSize background_size; };
-layout(scalar, set = 0, binding = 2) writeonly buffer SurfaceTiles { uint surface_tiles[]; };
-layout(scalar, set = 0, binding = 3) writeonly buffer BackgroundTiles { uint background_tiles[]; };
-layout(push_constant, scalar) uniform Push { uvec2 size; uint stride; };
+layout(pass, scalar) buffer Sizes { WorkSize surface_size; WorkSize background_size; };
+layout(pass, scalar) writeonly buffer SurfaceTiles { uint surface_tiles[]; };
+layout(pass, scalar) writeonly buffer BackgroundTiles { uint background_tiles[]; };
+layout(push_constant, scalar) uniform Push { uint stride; };
 
 void main() {
-    uvec2 tiles = (size + WORK_TILE - 1) / WORK_TILE;
+    uvec2 tiles = (camera.size + WORK_TILE - 1) / WORK_TILE;
     uint tile = scattered_tile(tiles.x * tiles.y, stride);
     if (tile >= tiles.x * tiles.y) return;
     uvec2 first = uvec2(tile % tiles.x, tile / tiles.x) * WORK_TILE;
-    uvec2 last = min(first + WORK_TILE, size);
+    uvec2 last = min(first + WORK_TILE, camera.size);
     float nearest = 0.0;
     float farthest = 1.0;
     for (uint y = first.y; y < last.y; y++) {
         for (uint x = first.x; x < last.x; x++) {
-            float z = imageLoad(depth, int(y * size.x + x)).x;
+            float z = stored_depth(pixel_index(ivec2(x, y)));
             nearest = max(nearest, z);
             farthest = min(farthest, z);
         }

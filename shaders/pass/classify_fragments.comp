@@ -6,9 +6,9 @@ layout(local_size_x = 64) in;
 #include "lib/fragment_list.glsl"
 #include "lib/work_tile.glsl"
 
-layout(set = 0, binding = 0, r32ui) readonly uniform uimage2D heads;
-layout(scalar, set = 0, binding = 1) buffer Sizes { WorkSize tiles_size; };
-layout(scalar, set = 0, binding = 2) writeonly buffer Tiles { uint fragment_tiles[]; };
+layout(pass, r32ui) readonly uniform uimage2D heads;
+layout(pass, scalar) buffer Sizes { WorkSize tiles_size; };
+layout(pass, scalar) writeonly buffer Tiles { uint fragment_tiles[]; };
 layout(push_constant, scalar) uniform Push { uint width; uint first_row; uint end_row; uint stride; };
 
 void main() {

@@ -7,37 +7,24 @@
 #extension GL_KHR_shader_subgroup_arithmetic : require
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "lib/fragment_list.glsl"
-#include "lib/camera.glsl"
 #include "lib/bent_view.glsl"
-#include "lib/surface.glsl"
-
-layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
-layout(scalar, set = 0, binding = 2) readonly buffer Instances { Instance instances[]; };
+#include "lib/instances.glsl"
 #include "lib/lighting.glsl"
+#include "lib/screen.glsl"
 #include "lib/work_count.glsl"
 #include "lib/work_tile.glsl"
 
-layout(set = 0, binding = 3, r32ui) readonly uniform uimage2D heads;
-layout(scalar, set = 0, binding = 4) readonly buffer Nodes { uint nodes[]; };
-layout(set = 0, binding = 5, rgba32f) uniform image2D radiance;
-layout(scalar, set = 0, binding = 6) buffer Dropped { uint dropped; };
-layout(scalar, set = 0, binding = 7) readonly buffer Tiles { uint fragment_tiles[]; };
-layout(scalar, set = 0, binding = 8) readonly buffer Sizes { WorkSize tiles_size; } work;
-// The opaque surfaces and, pixel by pixel, their radiance: for the rungs `screen`.
-layout(set = 0, binding = 10, rgba32f) readonly uniform imageBuffer seen;
-#define DEPTH_BINDING 9
-#define NORMALS_BINDING 11
-#include "lib/stored.glsl"
-layout(set = 0, binding = 12, r32f) readonly uniform imageBuffer nearest_pieces;
-#include "lib/screen.glsl"
+layout(pass, r32ui) readonly uniform uimage2D heads;
+layout(pass, scalar) readonly buffer Nodes { uint nodes[]; };
+layout(pass, rgba32f) uniform image2D radiance;
+layout(pass, scalar) buffer Dropped { uint dropped; };
+layout(pass, scalar) readonly buffer Tiles { uint fragment_tiles[]; };
+layout(pass, scalar) readonly buffer Sizes { WorkSize tiles_size; } work;
 layout(push_constant, scalar) uniform Push { uint end_row; };
 
-// Evaluations of loop heads that an invocation may spend. Eight pixels share lavapipe's 65,535, and the longest of them
-// counts in every loop: 40,000 of one's own leaves them room.
-layout(constant_id = 18) const uint LOOP_BUDGET = 40000;
-layout(constant_id = 51) const bool BENDS = false;   // knob `refraction`: screen
-layout(constant_id = 52) const bool MIRRORS = false; // knob `reflection`: screen
-layout(constant_id = 53) const bool BEHIND_ALONE = false; // what comes through is kept, and nothing added
+layout(constant) const bool BENDS = false;   // knob `refraction`: screen
+layout(constant) const bool MIRRORS = false; // knob `reflection`: screen
+layout(constant) const bool BEHIND_ALONE = false; // what comes through is kept, and nothing added
 
 // Whether key a comes after key b: farther (smaller depth); of coplanar ones the later drawn lies on top.
 bool after(uvec3 a, uvec3 b) {
@@ -129,7 +116,7 @@ void main() {
         // The nearest pixel of the picture; what lies in front of a body is not seen through them.
         ivec2 bent = clamp(pixel + ivec2(floor(shift + 0.5)), ivec2(0), ivec2(camera.size) - 1);
         int from = bent.y * int(camera.size.x) + bent.x;
-        if (imageLoad(depth, from).x < entry) behind = imageLoad(seen, from);
+        if (stored_depth(from) < entry) behind = seen[from];
     }
     float coverage = 1.0 - (through.r + through.g + through.b) * (1.0 / 3.0) * (1.0 - behind.a);
     imageStore(radiance, pixel, vec4((BEHIND_ALONE ? vec3(0.0) : sum) + through * behind.rgb, coverage));

@@ -7,16 +7,17 @@ layout(early_fragment_tests) in;
 #include "lib/encode.glsl"
 #include "lib/fragment_list.glsl"
 
-layout(set = 0, binding = 15, r32ui) uniform uimage2D heads;
-layout(scalar, set = 0, binding = 16) buffer Counters { uint counters[]; };
-layout(scalar, set = 0, binding = 17) writeonly buffer Nodes { uint nodes[]; };
+layout(pass, r32ui) uniform uimage2D heads;
+layout(pass, scalar) buffer Counters { uint counters[]; };
+layout(pass, scalar) writeonly buffer Nodes { uint nodes[]; };
 
 void main() {
     SurfaceFragment s = surface_fragment();
-    float alpha = s.base.a * materials[ids.y].base_color.a;
-    bool covers = (materials[ids.y].flags & MATERIAL_BLENDED) != 0;
+    Material m = material_at(ids.y);
+    float alpha = s.base.a * m.base_color.a;
+    bool covers = (m.flags & MATERIAL_BLENDED) != 0;
     if (!covers) alpha = 1.0;
-    if (MASKED && s.base.a * materials[ids.y].base_color.a < materials[ids.y].alpha_cutoff) return;
+    if (MASKED && s.base.a * m.base_color.a < m.alpha_cutoff) return;
     // A fragment without coverage leaves no trace; NaN coverage must not vanish here, it is counted later.
     if (alpha <= 0.0) return;
     uint slot = atomicAdd(counters[strip], 1u);

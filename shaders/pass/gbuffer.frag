@@ -16,7 +16,7 @@ layout(location = 6) out vec4 out_position; // RGBA32F, where the plan has it: d
 
 void main() {
     SurfaceFragment s = surface_fragment();
-    if (MASKED && s.base.a * materials[ids.y].base_color.a < materials[ids.y].alpha_cutoff) discard;
+    if (MASKED && s.base.a * material_at(ids.y).base_color.a < material_at(ids.y).alpha_cutoff) discard;
     out_base = vec4(s.base.rgb, s.metallic);
     out_normals = vec4(in_steps(octahedral_from_unit(s.n_shading), NORMAL_STEPS), in_steps(octahedral_from_unit(s.n_geometric), NORMAL_STEPS));
     uint roughness = uint(clamp(s.roughness, 0.0, 1.0) * 65535.0 + 0.5);

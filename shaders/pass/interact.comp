@@ -6,11 +6,6 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 layout(local_size_x = 8, local_size_y = 8) in;
-#include "lib/camera.glsl"
-#include "lib/surface.glsl"
-
-layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
-layout(scalar, set = 0, binding = 2) readonly buffer Instances { Instance instances[]; };
 #include "lib/boundary.glsl"
 #include "lib/encode.glsl"
 #include "lib/lighting.glsl"
@@ -19,20 +14,15 @@ layout(scalar, set = 0, binding = 2) readonly buffer Instances { Instance instan
 #include "lib/work_count.glsl"
 #include "lib/work_tile.glsl"
 
-layout(set = 0, binding = 10, rgba32f) uniform image2D radiance;
-layout(scalar, set = 0, binding = 11) readonly buffer RayTiles { uint ray_tiles[]; };
-layout(scalar, set = 0, binding = 12) readonly buffer Sizes { WorkSize rays_size; } work;
-layout(set = 0, binding = 25) uniform sampler2D sky;
+layout(pass, rgba32f) uniform image2D radiance;
+layout(pass, scalar) readonly buffer RayTiles { uint ray_tiles[]; };
+layout(pass, scalar) readonly buffer Sizes { WorkSize rays_size; } work;
 
-layout(constant_id = 51) const bool ROUGH = false;      // some surface that sends rays is rough
-layout(constant_id = 52) const bool SKY = false;        // the environment is seen behind the scene
-layout(constant_id = 53) const bool MASKED_HITS = false; // some surface has holes
-layout(constant_id = 54) const uint LOOP_BUDGET = 40000;
-layout(constant_id = 55) const uint PENDING = 1;         // branches that can wait at once
-layout(constant_id = 57) const bool ENVIRONMENT = false; // there is one, for rays that leave the scene
+layout(constant) const bool MASKED_HITS = false; // some surface has holes
+layout(constant) const uint PENDING = 1;         // branches that can wait at once
 // Of all that is followed, what is added: 0 all, 1 what the first surface mirrored, 2 what it let through. Nothing is left
 // out for that: which ray is followed next, and which random numbers it has, depends on all that were before.
-layout(constant_id = 59) const uint FIRST_EVENT = 0;
+layout(constant) const uint FIRST_EVENT = 0;
 // A branch that would add less than this share of what it meets is not followed. The sum of all that is cut off is
 // counted.
 const float FAINTEST = 1.0 / 512.0;
@@ -90,8 +80,7 @@ void look(vec3 direction, vec3 throughput) {
 void see_environment() {
     do {
         loop_heads++;
-        vec2 at = equirectangular_from_direction(into_environment(looks_at[0]));
-        vec3 seen = ENVIRONMENT ? light_of_environment(textureLod(sky, at, 0.0).rgb) : vec3(0.0);
+        vec3 seen = ENVIRONMENT ? environment_radiance(looks_at[0]) : vec3(0.0);
         sum += looks > 0 ? looks_with[0] * seen : vec3(0.0);
         for (int i = 0; i < MOST_LOOKS - 1; i++) {
             looks_at[i] = looks_at[i + 1];

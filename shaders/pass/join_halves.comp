@@ -1,9 +1,9 @@
 // The film of two halves whose random numbers have nothing in common: the mean of all samples.
 #version 460
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(set = 0, binding = 0, rgba32f) readonly uniform image2D half_a;
-layout(set = 0, binding = 1, rgba32f) readonly uniform image2D half_b;
-layout(set = 0, binding = 2, rgba32f) writeonly uniform image2D film;
+layout(pass, rgba32f) readonly uniform image2D half_a;
+layout(pass, rgba32f) readonly uniform image2D half_b;
+layout(pass, rgba32f) writeonly uniform image2D film;
 layout(push_constant) uniform Push { float scale; };
 
 void main() {

@@ -5,19 +5,14 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 layout(local_size_x = 8, local_size_y = 8) in;
-#include "lib/camera.glsl"
-#include "lib/surface.glsl"
-
-layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
-layout(scalar, set = 0, binding = 2) readonly buffer Instances { Instance instances[]; };
 #include "lib/lighting.glsl"
 #include "lib/primary.glsl"
 #include "lib/work_count.glsl"
 #include "lib/work_tile.glsl"
 
-layout(set = 0, binding = 10, rgba32f) uniform image2D radiance;
-layout(scalar, set = 0, binding = 11) readonly buffer SurfaceTiles { uint surface_tiles[]; };
-layout(scalar, set = 0, binding = 12) readonly buffer Sizes { WorkSize surface_size; WorkSize background_size; } work;
+layout(pass, rgba32f) uniform image2D radiance;
+layout(pass, scalar) readonly buffer SurfaceTiles { uint surface_tiles[]; };
+layout(pass, scalar) readonly buffer Sizes { WorkSize surface_size; WorkSize background_size; } work;
 // Where shadows are rays, lights are divided among dispatches: lavapipe ends long loops (pass/light.rs).
 layout(push_constant, scalar) uniform Push { LightRange range; uint first_dispatch; };
 

@@ -4,21 +4,13 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 layout(local_size_x = 8, local_size_y = 8) in;
-#include "lib/camera.glsl"
-#include "lib/surface.glsl"
-
-layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
-layout(scalar, set = 0, binding = 2) readonly buffer Instances { Instance instances[]; };
-#include "lib/lighting.glsl"
 #include "lib/primary.glsl"
+#include "lib/screen.glsl"
 #include "lib/work_tile.glsl"
 
-layout(set = 0, binding = 10, rgba32f) uniform image2D radiance;
-layout(scalar, set = 0, binding = 11) readonly buffer MirrorTiles { uint mirror_tiles[]; };
-layout(scalar, set = 0, binding = 12) readonly buffer Sizes { WorkSize mirrors_size; } work;
-layout(set = 0, binding = 25, rgba32f) readonly uniform imageBuffer seen; // radiance before, pixel by pixel
-layout(set = 0, binding = 26, r32f) readonly uniform imageBuffer nearest_pieces;
-#include "lib/screen.glsl"
+layout(pass, rgba32f) uniform image2D radiance;
+layout(pass, scalar) readonly buffer MirrorTiles { uint mirror_tiles[]; };
+layout(pass, scalar) readonly buffer Sizes { WorkSize mirrors_size; } work;
 
 void main() {
     uint place = listed_tile(gl_WorkGroupID);

@@ -9,9 +9,9 @@ layout(local_size_x = 64) in;
 #include "lib/path_state.glsl"
 #include "lib/queue.glsl"
 
-layout(set = 0, binding = 10, rgba32f) writeonly uniform image2D radiance;
-layout(scalar, set = 0, binding = 58) buffer Queue { uint queue[]; };
-layout(scalar, set = 0, binding = 59) uniform Sizes { QueueSize size; };
+layout(pass, rgba32f) writeonly uniform image2D radiance;
+layout(pass, scalar) buffer Queue { uint queue[]; };
+layout(pass, scalar) readonly buffer Sizes { QueueSize size; };
 layout(push_constant) uniform Push { uint width; };
 
 void end_of(Path p, uint place, uint pixel) {

@@ -9,7 +9,7 @@ layout(local_size_x = 64) in;
 #include "lib/path_begin.glsl"
 #include "lib/work_tile.glsl"
 
-layout(set = 0, binding = 10, rgba32f) writeonly uniform image2D radiance;
+layout(pass, rgba32f) writeonly uniform image2D radiance;
 layout(push_constant) uniform Push { uint places; uint stride; };
 
 void main() {

@@ -7,7 +7,7 @@ layout(local_size_x = 64) in;
 #include "lib/path_state.glsl"
 #include "lib/queue.glsl"
 
-layout(scalar, set = 0, binding = 58) writeonly buffer Queue { uint queue[]; };
+layout(pass, scalar) writeonly buffer Queue { uint queue[]; };
 layout(push_constant) uniform Push { uint places; uint stride; };
 
 void main() {

@@ -10,8 +10,8 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "lib/encode.glsl"
 #include "lib/frame.glsl"
 
-layout(set = 0, binding = 0) uniform sampler2D environment_map;
-layout(scalar, set = 0, binding = 1) writeonly buffer Level { vec4 level[]; };
+layout(pass) uniform sampler2D environment_map;
+layout(pass, scalar) writeonly buffer Level { vec4 level[]; };
 layout(push_constant, scalar) uniform Push { uvec2 size; float alpha; float base_width; };
 const uint SAMPLES = 128;
 

@@ -5,9 +5,9 @@
 layout(local_size_x = 64) in;
 #include "lib/queue.glsl"
 
-layout(scalar, set = 0, binding = 0) readonly buffer Queue { uint queue[]; };
-layout(scalar, set = 0, binding = 1) readonly buffer Sizes { QueueSize size; };
-layout(scalar, set = 0, binding = 2) writeonly buffer Chunks { uint chunks[]; };
+layout(pass, scalar) readonly buffer Queue { uint queue[]; };
+layout(pass, scalar) readonly buffer Sizes { QueueSize size; };
+layout(pass, scalar) writeonly buffer Chunks { uint chunks[]; };
 
 void main() {
     uint chunk = listed_tile(gl_WorkGroupID) * 64 + gl_LocalInvocationID.x;

@@ -5,10 +5,10 @@
 layout(local_size_x = 64) in;
 #include "lib/queue.glsl"
 
-layout(scalar, set = 0, binding = 0) readonly buffer Queue { uint queue[]; };
-layout(scalar, set = 0, binding = 1) readonly buffer Sizes { QueueSize size; };
-layout(scalar, set = 0, binding = 2) readonly buffer Chunks { uint chunks[]; };
-layout(scalar, set = 0, binding = 3) writeonly buffer NextQueue { uint next_queue[]; };
+layout(pass, scalar) readonly buffer Queue { uint queue[]; };
+layout(pass, scalar) readonly buffer Sizes { QueueSize size; };
+layout(pass, scalar) readonly buffer Chunks { uint chunks[]; };
+layout(pass, scalar) writeonly buffer NextQueue { uint next_queue[]; };
 
 void main() {
     uint chunk = listed_tile(gl_WorkGroupID) * 64 + gl_LocalInvocationID.x;

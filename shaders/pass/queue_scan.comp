@@ -5,9 +5,9 @@
 layout(local_size_x = 256) in;
 #include "lib/queue.glsl"
 
-layout(scalar, set = 0, binding = 0) readonly buffer Sizes { QueueSize size; };
-layout(scalar, set = 0, binding = 1) buffer Chunks { uint chunks[]; };
-layout(scalar, set = 0, binding = 2) writeonly buffer NextSizes { QueueSize next_size; };
+layout(pass, scalar) readonly buffer Sizes { QueueSize size; };
+layout(pass, scalar) buffer Chunks { uint chunks[]; };
+layout(pass, scalar) writeonly buffer NextSizes { QueueSize next_size; };
 
 shared uint sums[256];
 

@@ -3,15 +3,10 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 layout(local_size_x = 64) in;
-#include "lib/camera.glsl"
+#include "lib/screen_piece.glsl"
 #include "lib/work_tile.glsl"
 
-layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
-#define DEPTH_BINDING 1
-#define NORMALS_BINDING 2
-#include "lib/stored.glsl"
-layout(scalar, set = 0, binding = 3) writeonly buffer NearestPieces { float nearest_pieces[]; };
-#include "lib/screen_piece.glsl"
+layout(pass, scalar) writeonly buffer NearestPieces { float nearest_pieces[]; };
 
 void main() {
     uvec2 tiles = (camera.size + WORK_TILE - 1) / WORK_TILE;

@@ -2,16 +2,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
-#include "lib/slots.glsl"
-#include "share/scene.glsl"
-
-layout(constant_id = 0) const bool MASKED = false;
-layout(constant_id = 1) const bool HAS_BASE = false;
-layout(constant_id = 2) const bool HAS_COLOR = false;
-
-layout(scalar, set = 0, binding = 1) readonly buffer Materials { Material materials[]; };
-layout(set = 0, binding = 2, rgba32f) readonly uniform imageBuffer slots;
-layout(set = 0, binding = 3) uniform sampler2DArray base_page;
+#include "lib/gbuffer_interface.glsl"
+#include "lib/pages.glsl"
 
 layout(location = 0) in vec4 uv;
 layout(location = 1) in float alpha;
@@ -21,16 +13,11 @@ void main() {
     float z = gl_FragCoord.z;
     float change = fwidth(z);
     if (MASKED) {
-        float a = materials[material].base_color.a * (HAS_COLOR ? alpha : 1.0);
-        if (HAS_BASE) {
-            int at = int(material * SLOTS + SLOT_BASE) * 2;
-            vec4 u_layer = imageLoad(slots, at);
-            vec4 v_set = imageLoad(slots, at + 1);
-            vec3 set = vec3(v_set.w == 0.0 ? uv.xy : uv.zw, 1.0);
-            // The finest level, as rays to lights read it: a texel of the map tells of its centre, not of its area.
-            a *= textureLod(base_page, vec3(dot(u_layer.xyz, set), dot(v_set.xyz, set), u_layer.w), 0.0).a;
-        }
-        if (a < materials[material].alpha_cutoff) discard;
+        Material m = material_at(material);
+        float a = m.base_color.a * (HAS_COLOR ? alpha : 1.0);
+        // The finest level, as rays to lights read it: a texel of the map tells of its centre, not of its area.
+        if (HAS_BASE) a *= textureLod(base_page, page_coordinates(material, SLOT_BASE, uv), 0.0).a;
+        if (a < m.alpha_cutoff) discard;
     }
     gl_FragDepth = max(z - change, 0.0);
 }

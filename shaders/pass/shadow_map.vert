@@ -5,7 +5,7 @@
 #include "share/scene.glsl"
 
 // Relative to the middle of the scene, not to the eye.
-layout(scalar, set = 0, binding = 0) readonly buffer Instances { Instance instances[]; };
+layout(pass, scalar) readonly buffer Casters { Instance casters[]; };
 layout(push_constant, scalar) uniform Push { mat4 clip_from_scene; };
 
 layout(location = 0) in vec3 position;
@@ -18,7 +18,7 @@ layout(location = 1) out float alpha;
 layout(location = 2) flat out uint material;
 
 void main() {
-    Instance instance = instances[gl_InstanceIndex];
+    Instance instance = casters[gl_InstanceIndex];
     uv = vec4(uv0, uv1);
     alpha = color.a;
     material = instance.material;

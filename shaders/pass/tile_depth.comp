@@ -4,26 +4,24 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 layout(local_size_x = 8, local_size_y = 8) in;
-#include "lib/camera.glsl"
+#include "lib/gbuffer.glsl"
+#include "lib/light_tile.glsl"
 
-layout(constant_id = 0) const bool FROM_CAMERA = false;
-layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
-layout(set = 0, binding = 1, r32f) readonly uniform imageBuffer depth;
-layout(set = 0, binding = 2, rg32f) writeonly uniform imageBuffer tile_depths;
-const int TILE = 16;
+layout(constant) const bool FROM_CAMERA = false;
+layout(pass, rg32f) writeonly uniform imageBuffer tile_depths;
 
 void main() {
     ivec2 tile = ivec2(gl_GlobalInvocationID.xy);
-    ivec2 tiles = (ivec2(camera.size) + TILE - 1) / TILE;
+    ivec2 tiles = (ivec2(camera.size) + int(TILE) - 1) / int(TILE);
     if (any(greaterThanEqual(tile, tiles))) return;
-    ivec2 last = min((tile + 1) * TILE, ivec2(camera.size));
+    ivec2 last = min((tile + 1) * int(TILE), ivec2(camera.size));
     float nearest = 0.0; // reversed depth
     float farthest = 1.0;
     bool drawn = false;
     bool seen_through = false; // some pixel shows the background
-    for (int y = tile.y * TILE; y < last.y; y++) {
-        for (int x = tile.x * TILE; x < last.x; x++) {
-            float z = imageLoad(depth, y * int(camera.size.x) + x).x;
+    for (int y = tile.y * int(TILE); y < last.y; y++) {
+        for (int x = tile.x * int(TILE); x < last.x; x++) {
+            float z = stored_depth(pixel_index(ivec2(x, y)));
             nearest = max(nearest, z);
             if (z > 0.0) {
                 farthest = min(farthest, z);

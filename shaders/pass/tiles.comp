@@ -4,16 +4,14 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 layout(local_size_x = 64) in;
-#include "lib/camera.glsl"
-#include "lib/light_texels.glsl"
+#include "lib/view.glsl"
+#include "lib/light_table.glsl"
+#include "lib/light_tile.glsl"
 #include "lib/work_tile.glsl"
 
-layout(scalar, set = 0, binding = 0) uniform CameraBlock { Camera camera; };
-layout(set = 0, binding = 1, rgba32f) readonly uniform imageBuffer lights;
-layout(set = 0, binding = 2, rg32f) readonly uniform imageBuffer tile_depths;
-layout(set = 0, binding = 3, r32ui) writeonly uniform uimageBuffer tile_lights;
+layout(pass, rg32f) readonly uniform imageBuffer tile_depths;
+layout(pass, scalar) writeonly buffer TileLights { uint tile_lights[]; };
 layout(push_constant, scalar) uniform Push { uint first; uint count; uint words; uint tiles_across; uint tiles; };
-const int TILE = 16;
 
 void main() {
     uint job = listed_tile(gl_WorkGroupID) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
@@ -23,11 +21,11 @@ void main() {
     vec2 range = imageLoad(tile_depths, int(tile)).xy; // nearest and farthest view depth; empty where nothing was drawn
     uint bits = 0;
     if (range.x <= range.y) {
-        ivec2 corner = ivec2(tile % tiles_across, tile / tiles_across) * TILE;
+        ivec2 corner = ivec2(tile % tiles_across, tile / tiles_across) * int(TILE);
         // Ray displacements at the tile's borders, half a pixel wider than any sample of it.
         vec2 scale = 2.0 / vec2(camera.size);
         vec2 low = (vec2(corner) - 0.5) * scale - 1.0;
-        vec2 high = (vec2(corner + TILE) + 0.5) * scale - 1.0;
+        vec2 high = (vec2(corner + int(TILE)) + 0.5) * scale - 1.0;
         bool parallel = camera.orthographic != 0;
         vec3 r = camera.right;
         vec3 u = -camera.up;
@@ -54,5 +52,5 @@ void main() {
             if (hit) bits |= 1u << i;
         }
     }
-    imageStore(tile_lights, int(job), uvec4(bits));
+    tile_lights[job] = bits;
 }

@@ -5,11 +5,11 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "lib/colour.glsl"
 
-layout(constant_id = 0) const uint CURVE = 0;
-layout(constant_id = 1) const bool DESATURATES = false; // colours outside of Rec. 709 lose saturation, not their luminance
-layout(set = 0, binding = 0, rgba32f) readonly uniform image2D film;
-layout(scalar, set = 0, binding = 1) writeonly buffer Display { uint display[]; };
-layout(scalar, set = 0, binding = 2) buffer Counts { uint nan; uint inf; uint negative; };
+layout(constant) const uint CURVE = 0;
+layout(constant) const bool DESATURATES = false; // colours outside of Rec. 709 lose saturation, not their luminance
+layout(pass, rgba32f) readonly uniform image2D film;
+layout(pass, scalar) writeonly buffer Display { uint display[]; };
+layout(pass, scalar) buffer Counts { uint nan; uint inf; uint negative; };
 // `background` is display-linear and lies behind what is not covered; its alpha 0 keeps the picture transparent.
 layout(push_constant, scalar) uniform Push { vec4 background; float exposure; float scale; };
 

@@ -8,12 +8,11 @@ layout(local_size_x = 64) in;
 #include "lib/trace.glsl"
 #include "lib/add_work.glsl"
 
-layout(constant_id = 0) const bool ANY_HIT = false;
-layout(constant_id = 1) const bool PAIRS = false;
-layout(constant_id = 2) const bool COUNT = false;
-layout(set = 0, binding = 0, rgba32ui) readonly uniform uimageBuffer rays; // origin, t_max | direction, the flat face it leaves
-layout(scalar, set = 0, binding = 1) writeonly buffer Hits { Hit hits[]; };
-layout(scalar, set = 0, binding = 2) buffer WorkDone { WorkCounts counts; };
+layout(constant) const bool ANY_HIT = false;
+layout(constant) const bool PAIRS = false;
+layout(constant) const bool COUNT = false;
+layout(pass, rgba32ui) readonly uniform uimageBuffer rays; // origin, t_max | direction, the flat face it leaves
+layout(pass, scalar) writeonly buffer Hits { Hit hits[]; };
 // Workgroups are cut into one contiguous piece per thread on lavapipe; blocks of 32 of them are dealt out in turn.
 layout(push_constant, scalar) uniform Push { uint count; uint blocks; };
 

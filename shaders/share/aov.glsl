@@ -1,4 +1,6 @@
-// One pixel of arbitrary output variables. Twin: src/share.rs (build.rs compares the layouts).
+// One pixel of arbitrary output variables.
+#ifndef SHARE_AOV_GLSL
+#define SHARE_AOV_GLSL
 struct AovPixel {
     vec3 p_rel;            // metres from the eye, world axes
     vec3 normal;           // shading normal
@@ -11,3 +13,4 @@ struct AovPixel {
     uint material;         // index + 1; 0 where nothing was drawn
     uint instance;         // index + 1
 };
+#endif

@@ -1,6 +1,8 @@
-// What the raster and lighting passes know of the camera. Twin: src/share.rs (build.rs compares the layouts).
+// What the raster and lighting passes know of the camera.
 // Positions on the device are relative to the eye ("rel"): world axes, origin at the eye, so that f32 keeps its
 // precision wherever the scene lies (numerics.md 33, 39).
+#ifndef SHARE_CAMERA_GLSL
+#define SHARE_CAMERA_GLSL
 struct Camera {
     mat4 clip_from_rel;  // reversed depth: 1 at `near`, 0 at infinity (perspective) or at `far` (orthographic)
     vec3 right;          // rel displacement for ndc x = 1, at depth 1 (perspective) or at any depth (orthographic)
@@ -12,3 +14,4 @@ struct Camera {
     vec2 jitter;         // sub-pixel offset of this sample, in pixels
     uvec2 size;          // pixels
 };
+#endif

@@ -1,4 +1,6 @@
-// Tables that describe the scene. Twin: src/share.rs (build.rs compares the layouts).
+// Tables that describe the scene.
+#ifndef SHARE_SCENE_GLSL
+#define SHARE_SCENE_GLSL
 
 struct Instance {
     mat4x3 rel_from_object;  // columns; the last is the translation
@@ -48,3 +50,4 @@ const uint MATERIAL_EMISSIVE_RGB = 32; // emissive
 // The G-buffer's second id: instance, which side of it, and occlusion in the leading byte.
 const uint INSTANCE_BITS = 0x7fffffu;
 const uint BACK_FACE = 0x800000u;
+#endif

@@ -1,6 +1,8 @@
-// What rays need to know of the scene. Twin: src/share.rs (build.rs compares the layouts).
+// What rays need to know of the scene.
 // Rays live in a space of their own ("bvh"): world axes, metres, origin at the middle of the scene, the same for every
 // camera. p_bvh = p_rel + bvh_from_rel.
+#ifndef SHARE_TRACE_GLSL
+#define SHARE_TRACE_GLSL
 struct TraceTerms {
     vec3 bvh_from_rel;
     float offset;         // how far rays start off a surface, in metres (lib/trace.glsl, ray_origin)
@@ -14,3 +16,4 @@ struct TraceTerms {
     uint sample_index;
     uint interfaces;      // surfaces that a path may meet
 };
+#endif

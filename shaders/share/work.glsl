@@ -1,4 +1,6 @@
-// What the passes that send rays count. Twin: src/share.rs (build.rs compares the layouts). Sums are pairs: low, high.
+// What the passes that send rays count. Sums are pairs: low, high.
+#ifndef SHARE_WORK_GLSL
+#define SHARE_WORK_GLSL
 struct WorkCounts {
     uint reflection[2];
     uint refraction[2];
@@ -15,3 +17,4 @@ struct WorkCounts {
     uint not_finite_pixel;    // x | y << 16
     uint not_finite_material;
 };
+#endif

@@ -6,7 +6,8 @@ use ash::vk;
 use super::cache::SamplerDesc;
 use super::device::Device;
 use super::memory::{Buffer, Image};
-use super::shader::{BindingKind, Program};
+use super::shader::{Binding, BindingKind, Program, Specialization};
+use super::sync::ResourceId;
 
 /// An image with the sampler it is read through.
 #[derive(Clone, Copy)]
@@ -28,6 +29,16 @@ pub enum Resource<'a> {
     Sampled(Sampled<'a>),
 }
 
+impl Resource<'_> {
+    pub(super) fn id(&self) -> ResourceId {
+        match self {
+            Self::Buffer(buffer) => buffer.id,
+            Self::Image(image) => image.id,
+            Self::Sampled(sampled) => sampled.image.id,
+        }
+    }
+}
+
 impl<'a> From<&'a Buffer> for Resource<'a> {
     fn from(buffer: &'a Buffer) -> Self {
         Self::Buffer(buffer)
@@ -46,8 +57,12 @@ impl<'a> From<Sampled<'a>> for Resource<'a> {
     }
 }
 
-/// A generated struct with one field per binding of a program.
+/// A generated struct with one field per binding that a program has for itself, in set 0.
 pub trait Bindings<'a> {
+    /// Its specialization constants.
+    type Constants: Specialization;
+    /// Its push constants.
+    type Push: bytemuck::NoUninit;
     /// The program the fields belong to.
     fn program(&self) -> &'static Program;
     /// The fields in slot order, parallel to [`Program::bindings`].
@@ -89,5 +104,17 @@ impl Descriptor {
             }),
             _ => unreachable!("build.rs gives each kind of binding its type"),
         })
+    }
+
+    /// Its write to the slot of a binding.
+    pub(super) fn write(&self, binding: &Binding) -> vk::WriteDescriptorSet<'_> {
+        let write = vk::WriteDescriptorSet::default()
+            .dst_binding(binding.slot)
+            .descriptor_type(binding.kind.descriptor_type());
+        match self {
+            Self::Buffer(info) => write.buffer_info(std::slice::from_ref(info)),
+            Self::Texels(view) => write.texel_buffer_view(std::slice::from_ref(view)),
+            Self::Image(info) => write.image_info(std::slice::from_ref(info)),
+        }
     }
 }

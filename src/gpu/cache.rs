@@ -61,6 +61,7 @@ pub(super) struct Layout {
 #[derive(Default)]
 pub(super) struct Caches {
     pub(super) layouts: HashMap<&'static str, Layout>,
+    pub(super) set_layouts: HashMap<&'static str, vk::DescriptorSetLayout>,
     pub(super) pipelines: HashMap<PipelineKey, vk::Pipeline>,
     pub(super) samplers: HashMap<SamplerDesc, vk::Sampler>,
     /// Code of stages in place of what was built, by program and stage.
@@ -80,6 +81,9 @@ impl Caches {
             for layout in self.layouts.drain().map(|(_, l)| l) {
                 raw.destroy_pipeline_layout(layout.pipeline, None);
                 raw.destroy_descriptor_set_layout(layout.set, None);
+            }
+            for layout in self.set_layouts.drain().map(|(_, l)| l) {
+                raw.destroy_descriptor_set_layout(layout, None);
             }
             for sampler in self.samplers.drain().map(|(_, s)| s) {
                 raw.destroy_sampler(sampler, None);

@@ -12,6 +12,7 @@ use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use serde::Serialize;
 
 use super::cache::Caches;
+use super::limits::{PUSH_DESCRIPTORS, STORAGE_BUFFERS, STORAGE_IMAGES};
 use super::surface::Surface;
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
@@ -286,8 +287,8 @@ impl Instance {
             }
         }
         for (has, needed, what) in [
-            (limits.max_per_stage_descriptor_storage_images, 20, "storage images in a shader"),
-            (limits.max_per_stage_descriptor_storage_buffers, 8, "storage buffers in a shader"),
+            (limits.max_per_stage_descriptor_storage_images, STORAGE_IMAGES, "storage images in a shader"),
+            (limits.max_per_stage_descriptor_storage_buffers, STORAGE_BUFFERS, "storage buffers in a shader"),
             (limits.max_color_attachments, 7, "colour targets"),
             (limits.max_texel_buffer_elements, 1 << 22, "texels in a buffer"),
         ] {
@@ -297,8 +298,8 @@ impl Instance {
         }
         if !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::push_descriptor::NAME)) {
             missing.push("extension VK_KHR_push_descriptor (lavapipe: Mesa 20.3 or newer)".to_owned());
-        } else if push_descriptors < 32 {
-            missing.push(format!("32 push descriptors (it has {push_descriptors})"));
+        } else if push_descriptors < PUSH_DESCRIPTORS {
+            missing.push(format!("{PUSH_DESCRIPTORS} push descriptors (it has {push_descriptors})"));
         }
         if !families.iter().any(|f| f.queue_flags.contains(QUEUE)) {
             missing.push("a queue with graphics and compute".to_owned());
@@ -604,11 +605,6 @@ impl Device {
         u64::from(self.limits.max_storage_buffer_range)
     }
 
-    /// Images and texel buffers that one shader may read and write without a sampler.
-    #[must_use]
-    pub fn storage_images(&self) -> u32 {
-        self.limits.max_per_stage_descriptor_storage_images
-    }
 
     /// Whether invocations of a compute shader add up numbers among them, a subgroup at a time.
     #[must_use]

@@ -12,12 +12,15 @@ use anyhow::{Context as _, Result};
 use ash::vk;
 
 use super::access::Access;
-use super::bind::{Bindings, Descriptor, Resource};
+use super::bind::{Bindings, Descriptor, Resource, Sampled};
 use super::cache::{PipelineKey, RasterKey};
 use super::device::{Device, Interrupted, lock};
 use super::memory::{Buffer, Image};
-use super::recording::{Dispatch, Groups, Pass, Recording, Target, Work, push_constants, push_descriptors};
-use super::shader::Program;
+use super::recording::{
+    Dispatch, Groups, Pass, Recording, Target, Work, bind_sets, push_constants, push_descriptors,
+};
+use super::set::BoundSet;
+use super::shader::{Program, SharedSet, Specialization as _};
 use super::sync::{self, ResourceId, State, Use};
 
 /// GPU time of one pass.
@@ -62,8 +65,8 @@ pub struct VertexStream<'a> {
 
 /// One indexed draw.
 pub struct Draw<'a> {
-    /// Index into the pass's list of bindings.
-    pub binding: usize,
+    /// Index into the pass's list of pages.
+    pub pages: usize,
     /// Specialization constants.
     pub constants: Vec<(u32, u32)>,
     /// One stream per vertex input of the program.
@@ -112,6 +115,7 @@ pub struct Frame<'a> {
     device: Arc<Device>,
     passes: Vec<Pass<'a>>,
     targets: HashMap<ResourceId, Target<'a>>,
+    scene: Option<BoundSet<'a>>,
     without_barriers: bool,
 }
 
@@ -119,7 +123,19 @@ impl<'a> Frame<'a> {
     /// An empty frame.
     #[must_use]
     pub fn new(device: &Arc<Device>) -> Self {
-        Self { device: device.clone(), passes: Vec::new(), targets: HashMap::new(), without_barriers: false }
+        Self {
+            device: device.clone(),
+            passes: Vec::new(),
+            targets: HashMap::new(),
+            scene: None,
+            without_barriers: false,
+        }
+    }
+
+    /// An empty frame of a scene: all its programs read the same set.
+    #[must_use]
+    pub fn of(device: &Arc<Device>, scene: BoundSet<'a>) -> Self {
+        Self { scene: Some(scene), ..Self::new(device) }
     }
 
     /// Leaves out every buffer barrier, for the test that validation would notice.
@@ -164,19 +180,43 @@ impl<'a> Frame<'a> {
         Ok(descriptors)
     }
 
+    /// Notes the uses of what a program reads of the sets 1 and 2.
+    ///
+    /// # Panics
+    /// When a set is missing: our mistake.
+    fn shared(
+        &mut self,
+        uses: &mut Vec<Use>,
+        program: &'static Program,
+        pages: Option<&BoundSet<'a>>,
+    ) -> Vec<vk::DescriptorSet> {
+        let mut sets = Vec::with_capacity(program.sets.len());
+        for SharedSet { layout, used } in program.sets {
+            let known = self.scene.iter().chain(pages).find(|set| set.is_of(layout)).cloned();
+            let known = known.unwrap_or_else(|| panic!("\"{}\" reads the {}, and there is none", program.name, layout.name));
+            for binding in *used {
+                match known.resource(binding.slot, binding.name) {
+                    Resource::Buffer(buffer) => self.use_buffer(uses, buffer, binding.access, binding.stages),
+                    Resource::Image(image) | Resource::Sampled(Sampled { image, .. }) => {
+                        self.use_image(uses, image, binding.access, binding.stages);
+                    }
+                }
+            }
+            sets.push(known.set.raw);
+        }
+        sets
+    }
+
     /// One dispatch of `groups` workgroups.
     ///
     /// # Errors
     /// When the driver refuses what the pipeline binds.
-    ///
-    /// # Panics
-    /// When the push constants are not of the size that the shader declares: our mistake.
-    pub fn compute(
+    pub fn compute<B: Bindings<'a>>(
         &mut self,
         name: &str,
-        bindings: &impl Bindings<'a>,
-        constants: Vec<(u32, u32)>,
-        push: &[u8],
+        bindings: &B,
+        constants: &B::Constants,
+        push: &B::Push,
         groups: [u32; 3],
     ) -> Result<()> {
         self.dispatch(name, bindings, constants, push, Groups::Count(groups))
@@ -186,30 +226,30 @@ impl<'a> Frame<'a> {
     ///
     /// # Errors
     /// As [`Frame::compute`].
-    pub fn compute_indirect(
+    pub fn compute_indirect<B: Bindings<'a>>(
         &mut self,
         name: &str,
-        bindings: &impl Bindings<'a>,
-        constants: Vec<(u32, u32)>,
-        push: &[u8],
+        bindings: &B,
+        constants: &B::Constants,
+        push: &B::Push,
         sizes: &'a Buffer,
         offset: u64,
     ) -> Result<()> {
         self.dispatch(name, bindings, constants, push, Groups::At(sizes, offset))
     }
 
-    fn dispatch(
+    fn dispatch<B: Bindings<'a>>(
         &mut self,
         name: &str,
-        bindings: &impl Bindings<'a>,
-        constants: Vec<(u32, u32)>,
-        push: &[u8],
+        bindings: &B,
+        constants: &B::Constants,
+        push: &B::Push,
         groups: Groups<'a>,
     ) -> Result<()> {
         let program = bindings.program();
-        assert_eq!(push.len(), program.push_bytes as usize, "push constants of \"{}\"", program.name);
         let mut uses = Vec::new();
         let descriptors = self.bind(&mut uses, program, &bindings.resources(), None)?;
+        let sets = self.shared(&mut uses, program, None);
         if let Groups::At(sizes, _) = groups {
             self.use_buffer(&mut uses, sizes, Access::IndirectRead, vk::ShaderStageFlags::empty());
         }
@@ -217,8 +257,15 @@ impl<'a> Frame<'a> {
         self.passes.push(Pass {
             name: name.to_owned(),
             uses,
-            pipelines: vec![PipelineKey { program, constants, raster: None }],
-            work: Work::Dispatch(Dispatch { program, descriptors, layout, push: push.to_vec(), groups }),
+            pipelines: vec![PipelineKey { program, constants: constants.words(), raster: None }],
+            work: Work::Dispatch(Dispatch {
+                program,
+                descriptors,
+                sets,
+                layout,
+                push: bytemuck::bytes_of(push).to_vec(),
+                groups,
+            }),
         });
         Ok(())
     }
@@ -227,31 +274,31 @@ impl<'a> Frame<'a> {
     ///
     /// # Errors
     /// As [`Frame::compute`].
-    pub fn compute_over(
+    pub fn compute_over<B: Bindings<'a>>(
         &mut self,
         name: &str,
-        bindings: &impl Bindings<'a>,
-        constants: Vec<(u32, u32)>,
-        push: &[u8],
+        bindings: &B,
+        constants: &B::Constants,
+        push: &B::Push,
         size: [u32; 2],
     ) -> Result<()> {
         let [x, y, _] = bindings.program().local_size;
         self.compute(name, bindings, constants, push, [size[0].div_ceil(x), size[1].div_ceil(y), 1])
     }
 
-    /// A raster pass: `draws` in order, each with one of `bindings`.
+    /// A raster pass: `draws` in order, each with one of `pages`.
     ///
     /// # Errors
     /// When the driver refuses what a pipeline binds.
     pub fn raster<B: Bindings<'a>>(
         &mut self,
         raster: &Raster<'a>,
-        program: &'static Program,
-        bindings: &[B],
-        push: &[u8],
+        bindings: &B,
+        pages: &[BoundSet<'a>],
+        push: &B::Push,
         draws: Vec<Draw<'a>>,
     ) -> Result<()> {
-        assert_eq!(push.len(), program.push_bytes as usize, "push constants of \"{}\"", program.name);
+        let program = bindings.program();
         let mut uses = Vec::new();
         let none = vk::ShaderStageFlags::empty();
         for color in raster.colors.iter().flatten() {
@@ -261,11 +308,11 @@ impl<'a> Frame<'a> {
             let access = if depth.write || depth.clear { Access::DepthTarget } else { Access::DepthRead };
             self.use_image(&mut uses, depth.image, access, none);
         }
-        let mut descriptors = Vec::with_capacity(bindings.len());
-        for binding in bindings {
-            let resources = binding.resources();
-            descriptors.push(self.bind(&mut uses, program, &resources, raster.depth.map(|d| d.image.id))?);
-        }
+        let depth = raster.depth.map(|d| d.image.id);
+        // A pass that draws nothing clears its targets, which no program binds meanwhile.
+        let resources = if draws.is_empty() { Vec::new() } else { bindings.resources() };
+        let descriptors = self.bind(&mut uses, program, &resources, depth)?;
+        let sets: Vec<_> = pages.iter().map(|pages| self.shared(&mut uses, program, Some(pages))).collect();
         let layout = self.device.layout(program)?;
         let key = RasterKey {
             colors: raster.colors.iter().map(|c| c.map_or(vk::Format::UNDEFINED, |c| c.image.desc().format)).collect(),
@@ -297,7 +344,7 @@ impl<'a> Frame<'a> {
             (d.image.view, d.clear, layout)
         });
         let ([left, top], [width, height], [from, to]) = (raster.origin, raster.size, raster.rows);
-        let push = push.to_vec();
+        let push = bytemuck::bytes_of(push).to_vec();
         let record = move |device: &Device, commands: vk::CommandBuffer, pipelines: &[vk::Pipeline]| {
             let color_infos: Vec<_> = colors
                 .iter()
@@ -336,16 +383,17 @@ impl<'a> Frame<'a> {
                 device.raw.cmd_set_viewport(commands, 0, &[viewport]);
                 device.raw.cmd_set_scissor(commands, 0, &[area]);
                 push_constants(device, commands, layout, program, &push);
+                let point = vk::PipelineBindPoint::GRAPHICS;
+                push_descriptors(device, commands, point, layout, program, &descriptors);
                 let mut bound = (vk::Pipeline::null(), usize::MAX);
                 for (draw, &pipeline) in draws.iter().zip(pipelines) {
                     if bound.0 != pipeline {
                         device.raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, pipeline);
                         bound.0 = pipeline;
                     }
-                    if bound.1 != draw.binding {
-                        let point = vk::PipelineBindPoint::GRAPHICS;
-                        push_descriptors(device, commands, point, layout, program, &descriptors[draw.binding]);
-                        bound.1 = draw.binding;
+                    if bound.1 != draw.pages {
+                        bind_sets(device, commands, point, layout, &sets[draw.pages]);
+                        bound.1 = draw.pages;
                     }
                     record_draw(device, commands, draw);
                 }
@@ -471,7 +519,7 @@ impl<'a> Frame<'a> {
     /// # Errors
     /// When the driver refuses a pipeline or fails: out of memory, or a lost device.
     pub fn finish(self) -> Result<Vec<PassTime>> {
-        let Self { device, passes, targets, without_barriers } = self;
+        let Self { device, passes, targets, without_barriers, .. } = self;
         let uses: Vec<Vec<Use>> = passes.iter().map(|pass| pass.uses.clone()).collect();
         let before: HashMap<ResourceId, State> = targets
             .iter()

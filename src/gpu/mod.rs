@@ -10,10 +10,12 @@ mod bind;
 mod cache;
 mod device;
 mod frame;
+mod limits;
 mod memory;
 mod pipeline;
 mod present;
 mod recording;
+mod set;
 mod shader;
 mod specialize;
 mod surface;
@@ -29,6 +31,9 @@ pub use device::{
 pub use frame::{ColorTarget, DepthTarget, Draw, Frame, PassPlan, PassTime, Raster, VertexStream};
 pub use memory::{Buffer, Image, ImageDesc, NOTHING, Place};
 pub use present::{Overlay, Placed, Presented, Presenter};
-pub use shader::{Binding, BindingKind, Constant, Program, Replacement, Stage, VertexInput};
+pub use set::{BoundSet, DescriptorSet};
+pub use shader::{
+    Binding, BindingKind, Constant, Program, Replacement, SetLayout, SharedSet, Specialization, Stage, VertexInput,
+};
 pub use specialize::specialized;
 pub use surface::Windowed;

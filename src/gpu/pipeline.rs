@@ -9,7 +9,7 @@ use ash::vk;
 
 use super::cache::{Layout, PipelineKey, SamplerDesc};
 use super::device::{Device, lock};
-use super::shader::{Program, Replacement};
+use super::shader::{Binding, Program, Replacement, SetLayout};
 use super::specialize::specialized;
 
 /// Pipelines, some of which are still being made.
@@ -78,29 +78,34 @@ impl Device {
         Ok(sampler)
     }
 
+    /// The layout of an ordinary descriptor set.
+    pub(super) fn set_layout(&self, layout: &'static SetLayout) -> Result<vk::DescriptorSetLayout> {
+        if let Some(&known) = lock(&self.caches).set_layouts.get(layout.name) {
+            return Ok(known);
+        }
+        let slots = slots(layout.bindings);
+        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&slots);
+        // SAFETY: a valid create info, taken from reflection.
+        let made = unsafe { self.raw.create_descriptor_set_layout(&info, None) }
+            .with_context(|| format!("creating the layout of the {}", layout.name))?;
+        lock(&self.caches).set_layouts.insert(layout.name, made);
+        Ok(made)
+    }
+
     pub(super) fn layout(&self, program: &'static Program) -> Result<Layout> {
         if let Some(&layout) = lock(&self.caches).layouts.get(program.name) {
             return Ok(layout);
         }
         let creating = || format!("creating the layout of \"{}\"", program.name);
-        let slots: Vec<_> = program
-            .bindings
-            .iter()
-            .map(|binding| {
-                vk::DescriptorSetLayoutBinding::default()
-                    .binding(binding.slot)
-                    .descriptor_type(binding.kind.descriptor_type())
-                    .descriptor_count(1)
-                    .stage_flags(binding.stages)
-            })
-            .collect();
+        let slots = slots(program.bindings);
         let info = vk::DescriptorSetLayoutCreateInfo::default()
             .flags(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR)
             .bindings(&slots);
+        let shared = program.sets.iter().map(|set| self.set_layout(set.layout)).collect::<Result<Vec<_>>>()?;
         // SAFETY: valid create infos, taken from reflection.
         let layout = unsafe {
             let set = self.raw.create_descriptor_set_layout(&info, None).with_context(creating)?;
-            let sets = [set];
+            let sets = [&[set][..], &shared].concat();
             let stages = program.stages.iter().fold(vk::ShaderStageFlags::empty(), |all, s| all | s.flag);
             let ranges = [vk::PushConstantRange { stage_flags: stages, offset: 0, size: program.push_bytes }];
             let mut info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);
@@ -302,4 +307,15 @@ impl Device {
         let made = unsafe { self.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
         made.map(|p| p[0]).map_err(|(_, error)| error)
     }
+}
+
+fn slots(bindings: &[Binding]) -> Vec<vk::DescriptorSetLayoutBinding<'static>> {
+    let slot = |binding: &Binding| {
+        vk::DescriptorSetLayoutBinding::default()
+            .binding(binding.slot)
+            .descriptor_type(binding.kind.descriptor_type())
+            .descriptor_count(1)
+            .stage_flags(binding.stages)
+    };
+    bindings.iter().map(slot).collect()
 }

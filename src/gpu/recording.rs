@@ -38,6 +38,7 @@ pub(super) enum Work<'a> {
 pub(super) struct Dispatch<'a> {
     pub(super) program: &'static Program,
     pub(super) descriptors: Vec<Descriptor>,
+    pub(super) sets: Vec<vk::DescriptorSet>,
     pub(super) layout: Layout,
     pub(super) push: Vec<u8>,
     pub(super) groups: Groups<'a>,
@@ -55,11 +56,12 @@ impl Dispatch<'_> {
         pipeline: vk::Pipeline,
         piece: Option<Piece>,
     ) {
-        let Self { program, descriptors, layout, push, groups } = self;
+        let Self { program, descriptors, sets, layout, push, groups } = self;
         // SAFETY: as the caller says.
         unsafe {
             device.raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline);
             push_descriptors(device, commands, vk::PipelineBindPoint::COMPUTE, *layout, program, descriptors);
+            bind_sets(device, commands, vk::PipelineBindPoint::COMPUTE, *layout, sets);
             push_constants(device, commands, *layout, program, push);
             match (piece, groups) {
                 (Some(Piece { base: [x, y, z], count: [across, down, deep] }), _) => {
@@ -296,6 +298,20 @@ pub(super) unsafe fn push_constants(
     }
 }
 
+/// Binds the sets 1 and 2 of a program.
+pub(super) unsafe fn bind_sets(
+    device: &Device,
+    commands: vk::CommandBuffer,
+    point: vk::PipelineBindPoint,
+    layout: Layout,
+    sets: &[vk::DescriptorSet],
+) {
+    if !sets.is_empty() {
+        // SAFETY: the command buffer is recording; the sets are alive until the frame has finished, and of the layout's.
+        unsafe { device.raw.cmd_bind_descriptor_sets(commands, point, layout.pipeline, 1, sets, &[]) };
+    }
+}
+
 pub(super) unsafe fn push_descriptors(
     device: &Device,
     commands: vk::CommandBuffer,
@@ -307,39 +323,7 @@ pub(super) unsafe fn push_descriptors(
     if descriptors.is_empty() {
         return;
     }
-    let mut buffers = Vec::with_capacity(descriptors.len());
-    let mut texels = Vec::with_capacity(descriptors.len());
-    let mut images = Vec::with_capacity(descriptors.len());
-    for descriptor in descriptors {
-        buffers.push(match descriptor {
-            Descriptor::Buffer(info) => *info,
-            _ => vk::DescriptorBufferInfo::default(),
-        });
-        texels.push(match descriptor {
-            Descriptor::Texels(view) => *view,
-            _ => vk::BufferView::null(),
-        });
-        images.push(match descriptor {
-            Descriptor::Image(info) => *info,
-            _ => vk::DescriptorImageInfo::default(),
-        });
-    }
-    let writes: Vec<_> = program
-        .bindings
-        .iter()
-        .zip(descriptors)
-        .enumerate()
-        .map(|(i, (binding, descriptor))| {
-            let write = vk::WriteDescriptorSet::default()
-                .dst_binding(binding.slot)
-                .descriptor_type(binding.kind.descriptor_type());
-            match descriptor {
-                Descriptor::Buffer(_) => write.buffer_info(&buffers[i..=i]),
-                Descriptor::Texels(_) => write.texel_buffer_view(&texels[i..=i]),
-                Descriptor::Image(_) => write.image_info(&images[i..=i]),
-            }
-        })
-        .collect();
+    let writes: Vec<_> = program.bindings.iter().zip(descriptors).map(|(b, descriptor)| descriptor.write(b)).collect();
     // SAFETY: the command buffer is recording; the writes match the layout, both come from reflection.
     unsafe { device.push.cmd_push_descriptor_set(commands, point, layout.pipeline, 0, &writes) };
 }

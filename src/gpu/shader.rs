@@ -12,8 +12,10 @@ pub struct Program {
     pub name: &'static str,
     /// Optimised SPIR-V per stage.
     pub stages: &'static [Stage],
-    /// Everything it binds, all in set 0, in slot order.
+    /// What is pushed to set 0 with each use of it, in slot order.
     pub bindings: &'static [Binding],
+    /// The sets 1 and 2, as far as it reads them.
+    pub sets: &'static [SharedSet],
     /// Vertex attributes, each its own tightly packed stream of f32.
     pub inputs: &'static [VertexInput],
     /// Specialization constants in the order of their numbers.
@@ -56,6 +58,30 @@ impl Program {
     pub fn spirv_bytes(&self, constants: &[(u32, u32)]) -> usize {
         self.stages.iter().map(|stage| specialized(stage.words, constants).len() * 4).sum()
     }
+}
+
+/// What an ordinary descriptor set holds; one layout, whatever part of it a program reads.
+#[derive(Debug)]
+pub struct SetLayout {
+    /// As the shaders call it: `scene`, `pages`.
+    pub name: &'static str,
+    /// All its bindings, in slot order, with the stages of all programs.
+    pub bindings: &'static [Binding],
+}
+
+/// The part of an ordinary descriptor set that a program reads.
+#[derive(Debug)]
+pub struct SharedSet {
+    /// The whole.
+    pub layout: &'static SetLayout,
+    /// The part.
+    pub used: &'static [Binding],
+}
+
+/// A generated struct of specialization constants.
+pub trait Specialization {
+    /// (id, 32-bit value) pairs for the pipeline.
+    fn words(&self) -> Vec<(u32, u32)>;
 }
 
 /// One stage's code.

@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use super::spectrum::rgb_from_xyz;
 use crate::gpu::{Frame, Image};
-use crate::shader::accumulate;
+use crate::shader::{Library, accumulate, lib};
 
 /// Adds `radiance` to `film`, of which it is the first part or not, and multiplies by `scale`. Of a picture in `bands` of
 /// wavelengths it is one of them, in X, Y and Z.
@@ -19,10 +19,15 @@ pub fn accumulate<'a>(
     scale: f32,
     bands: u32,
 ) -> Result<()> {
-    let numbers = [[scale, bands as f32].as_slice(), &rgb_from_xyz()].concat();
-    let push: Vec<u32> = [u32::from(first)].into_iter().chain(numbers.into_iter().map(f32::to_bits)).collect();
+    let push = accumulate::Push {
+        first: u32::from(first),
+        scale,
+        bands: bands as f32,
+        rgb_from_xyz: rgb_from_xyz(),
+    };
     let size = [film.desc().width, film.desc().height];
     let bind = accumulate::Bind { radiance, film };
-    let constants = accumulate::Constants { spectral: bands > 0 }.words();
-    frame.compute_over("accumulate", &bind, constants, bytemuck::cast_slice(&push), size)
+    let spectrum = lib::spectrum::Constants { spectral: bands > 0, ..Default::default() };
+    let constants = accumulate::Constants { library: Library { spectrum, ..Library::default() } };
+    frame.compute_over("accumulate", &bind, &constants, &push, size)
 }

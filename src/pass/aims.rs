@@ -35,7 +35,7 @@ impl AimsOnDevice {
         let grid = [texel(aims.corner, (aims.cell.recip() as f32).to_bits()), [across, up, deep, 0]];
         let texels: Vec<[u32; 4]> = grid.into_iter().chain(aims.aims.iter().map(ball)).collect();
         Ok(Self {
-            cells: upload(device, "cells of aims", &aims.firsts, Some(vk::Format::R32_UINT))?,
+            cells: upload(device, "cells of aims", &aims.firsts, None)?,
             balls: upload(device, "aims", &texels, Some(vk::Format::R32G32B32A32_UINT))?,
         })
     }
@@ -45,7 +45,10 @@ impl AimsOnDevice {
     /// # Errors
     /// When memory is short.
     pub fn none(device: &Arc<Device>) -> Result<Self> {
-        let nothing = |format| Buffer::texels(device, NOTHING, 0, Place::Device, format);
-        Ok(Self { cells: nothing(vk::Format::R32_UINT)?, balls: nothing(vk::Format::R32G32B32A32_UINT)? })
+        let texels = vk::Format::R32G32B32A32_UINT;
+        Ok(Self {
+            cells: Buffer::new(device, NOTHING, 0, Place::Device)?,
+            balls: Buffer::texels(device, NOTHING, 0, Place::Device, texels)?,
+        })
     }
 }

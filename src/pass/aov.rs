@@ -3,10 +3,8 @@
 use anyhow::Result;
 
 use super::gbuffer::GBuffer;
-use super::scene::SceneOnDevice;
 use crate::gpu::{Buffer, Frame};
-use crate::plan::Plan;
-use crate::shader::aov;
+use crate::shader::{Library, aov};
 
 /// Writes one [`crate::share::AovPixel`] per pixel of the rows from `rows[0]` up to `rows[1]`.
 ///
@@ -14,32 +12,17 @@ use crate::shader::aov;
 /// When the driver refuses what a pipeline binds.
 pub fn aov<'a>(
     frame: &mut Frame<'a>,
-    plan: &Plan,
-    scene: &'a SceneOnDevice,
-    camera: &'a Buffer,
+    library: Library,
     gbuffer: &'a GBuffer,
     pixels: &'a Buffer,
     rows: [u32; 2],
 ) -> Result<()> {
-    let bind = aov::Bind {
-        camera_block: camera,
-        material_texels: &scene.materials,
-        depth: gbuffer.places(),
-        base: &gbuffer.base,
-        normals: &gbuffer.normals,
-        ids: &gbuffer.ids,
-        emissive: &gbuffer.emissive,
-        pixels,
-    };
+    let bind = aov::Bind { gbuffer: gbuffer.bind(), pixels };
     let size = gbuffer.depth.desc();
-    let constants = aov::Constants {
-        has_emissive: plan.emissive,
-        positions: plan.stored.positions,
-        normals: plan.stored.normals as u32,
-        ..Default::default()
-    }
-    .words();
-    frame.compute_over("AOVs", &bind, constants, bytemuck::cast_slice(&rows), [size.width, rows[1] - rows[0]])?;
+    // Of the formulas only how things are stored.
+    let constants = aov::Constants { library: Library { gbuffer: library.gbuffer, ..Library::default() } };
+    let push = aov::Push { first_row: rows[0], end_row: rows[1] };
+    frame.compute_over("AOVs", &bind, &constants, &push, [size.width, rows[1] - rows[0]])?;
     frame.read_back(pixels);
     Ok(())
 }

@@ -10,16 +10,17 @@ use super::lighting::Lighting;
 use super::rows::{rows_of, stride};
 use crate::gpu::{Buffer, Device, Frame, Image, NOTHING, Place};
 use crate::plan::Plan;
-use crate::shader::{classify, classify_fragments, classify_rays as ray_program};
+use crate::shader::{Library, classify, classify_fragments, classify_rays as ray_program, lib};
+use crate::share::WorkSize;
 
 /// Pixels a side.
-pub const TILE: u32 = 8;
+pub const TILE: u32 = lib::work_tile::WORK_TILE;
 
-/// Bytes of one `WorkSize` of shaders/lib/work_tile.glsl: a VkDispatchIndirectCommand and a count.
-pub const WORK_BYTES: u64 = 16;
+/// Bytes of one [`WorkSize`].
+pub const WORK_BYTES: u64 = size_of::<WorkSize>() as u64;
 
 /// A dispatch of nothing.
-const EMPTY: [u32; 4] = [0, 1, 1, 0];
+const EMPTY: WorkSize = WorkSize { x: 0, y: 1, z: 1, count: 0 };
 
 /// The tiles of a strip that hold see-through fragments.
 pub struct FragmentTiles {
@@ -40,7 +41,7 @@ impl FragmentTiles {
         let bytes = 4 * u64::from(size[0].div_ceil(TILE)) * u64::from(size[1].div_ceil(TILE));
         Ok(Self {
             sizes: Buffer::new(device, "fragment work size", WORK_BYTES, Place::Device)?,
-            empty: Buffer::with_data(device, "empty fragment work size", &EMPTY)?,
+            empty: Buffer::with_data(device, "empty fragment work size", &[EMPTY])?,
             tiles: Buffer::new(device, "fragment tiles", bytes, Place::Device)?,
             width: size[0],
         })
@@ -61,9 +62,13 @@ pub fn classify_fragments<'a>(
     let bind = classify_fragments::Bind { heads, sizes: &list.sizes, tiles: &list.tiles };
     let tiles = list.width.div_ceil(TILE) * (rows[1] - rows[0]).div_ceil(TILE);
     let groups = tiles.div_ceil(classify_fragments::PROGRAM.local_size[0]);
-    let push = [list.width, rows[0], rows[1], stride(groups)];
-    let constants = classify_fragments::Constants {}.words();
-    frame.compute("classify fragment tiles", &bind, constants, bytemuck::cast_slice(&push), rows_of(groups))
+    let push = classify_fragments::Push {
+        width: list.width,
+        first_row: rows[0],
+        end_row: rows[1],
+        stride: stride(groups),
+    };
+    frame.compute("classify fragment tiles", &bind, &classify_fragments::Constants {}, &push, rows_of(groups))
 }
 
 /// Lists of tiles and the sizes of the dispatches over them.
@@ -99,19 +104,23 @@ impl WorkLists {
 ///
 /// # Errors
 /// When the driver refuses what a pipeline binds.
-pub fn classify<'a>(frame: &mut Frame<'a>, gbuffer: &'a GBuffer, lists: &'a WorkLists) -> Result<()> {
+pub fn classify<'a>(
+    frame: &mut Frame<'a>,
+    library: Library,
+    gbuffer: &'a GBuffer,
+    lists: &'a WorkLists,
+) -> Result<()> {
     frame.copy_buffer("reset work sizes", &lists.empty, &lists.sizes, 2 * WORK_BYTES);
     let bind = classify::Bind {
-        depth: &gbuffer.depth_texels,
+        gbuffer: gbuffer.bind(),
         sizes: &lists.sizes,
         surface_tiles: &lists.surface,
         background_tiles: &lists.background,
     };
     let tiles = lists.size[0].div_ceil(TILE) * lists.size[1].div_ceil(TILE);
     let groups = tiles.div_ceil(classify::PROGRAM.local_size[0]);
-    let push = [lists.size[0], lists.size[1], stride(groups)];
-    let constants = classify::Constants {}.words();
-    frame.compute("classify tiles", &bind, constants, bytemuck::cast_slice(&push), rows_of(groups))
+    let push = classify::Push { stride: stride(groups) };
+    frame.compute("classify tiles", &bind, &classify::Constants { library }, &push, rows_of(groups))
 }
 
 /// Which surfaces are looked for.
@@ -145,7 +154,7 @@ impl RayTiles {
         let bytes = 4 * u64::from(size[0].div_ceil(TILE)) * u64::from(size[1].div_ceil(TILE));
         Ok(Self {
             sizes: Buffer::new(device, "ray work size", WORK_BYTES, Place::Device)?,
-            empty: Buffer::with_data(device, "empty ray work size", &EMPTY)?,
+            empty: Buffer::with_data(device, "empty ray work size", &[EMPTY])?,
             tiles: Buffer::new(device, "ray tiles", bytes, Place::Device)?,
         })
     }
@@ -157,17 +166,14 @@ impl RayTiles {
 /// When the driver refuses what a pipeline binds.
 pub fn classify_rays<'a>(
     frame: &mut Frame<'a>,
-    lighting: Lighting<'a>,
+    lighting: &Lighting<'a>,
     calls: Calls,
     gbuffer: &'a GBuffer,
     list: &'a RayTiles,
 ) -> Result<()> {
     frame.copy_buffer("reset ray work size", &list.empty, &list.sizes, WORK_BYTES);
     let bind = ray_program::Bind {
-        material_texels: &lighting.scene.materials,
-        spectrum: &lighting.scene.spectrum.texels,
-        depth: &gbuffer.depth_texels,
-        ids: &gbuffer.ids,
+        gbuffer: gbuffer.bind(),
         sizes: &list.sizes,
         ray_tiles: &list.tiles,
     };
@@ -175,12 +181,10 @@ pub fn classify_rays<'a>(
     let tiles = size[0].div_ceil(TILE) * size[1].div_ceil(TILE);
     let groups = tiles.div_ceil(ray_program::PROGRAM.local_size[0]);
     let constants = ray_program::Constants {
-        clearcoat: lighting.plan.clearcoat,
-        mirror_rays: calls.mirrors,
-        roughest_mirror: lighting.plan.roughest_mirror,
-        transmissive: calls.transmissive,
-        ..Default::default()
+        library: lighting.library,
+        find_mirrors: calls.mirrors,
+        find_transmissive: calls.transmissive,
     };
-    let push = [size[0], size[1], stride(groups)];
-    frame.compute("classify ray tiles", &bind, constants.words(), bytemuck::cast_slice(&push), rows_of(groups))
+    let push = ray_program::Push { stride: stride(groups) };
+    frame.compute("classify ray tiles", &bind, &constants, &push, rows_of(groups))
 }

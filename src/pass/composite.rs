@@ -8,7 +8,7 @@ use super::lighting::Lighting;
 use super::mirror::OnScreen;
 use super::part::PartOnDevice;
 use crate::gpu::{Buffer, Frame, Image};
-use crate::shader::composite;
+use crate::shader::{composite, lib};
 
 /// Adds the fragments of one strip to `radiance`, nearest first. What they show of the screen is the opaque
 /// surfaces.
@@ -17,7 +17,7 @@ use crate::shader::composite;
 /// When the driver refuses what a pipeline binds.
 pub fn composite<'a>(
     frame: &mut Frame<'a>,
-    lighting: Lighting<'a>,
+    lighting: &Lighting<'a>,
     gbuffer: &'a GBuffer,
     lists: &'a FragmentLists,
     radiance: &'a Image,
@@ -33,7 +33,7 @@ pub fn composite<'a>(
 /// When the driver refuses what a pipeline binds.
 pub fn composite_part<'a>(
     frame: &mut Frame<'a>,
-    lighting: Lighting<'a>,
+    lighting: &Lighting<'a>,
     gbuffer: &'a GBuffer,
     lists: &'a FragmentLists,
     part: &'a PartOnDevice,
@@ -48,7 +48,7 @@ pub fn composite_part<'a>(
 fn lay_over<'a>(
     frame: &mut Frame<'a>,
     name: &str,
-    lighting: Lighting<'a>,
+    lighting: &Lighting<'a>,
     gbuffer: &'a GBuffer,
     lists: &'a FragmentLists,
     radiance: &'a Image,
@@ -57,77 +57,30 @@ fn lay_over<'a>(
     rows: [u32; 2],
     behind_alone: bool,
 ) -> Result<()> {
-    let Lighting { plan, scene, rays, environment, camera, .. } = lighting;
-    let planned = plan.rays;
+    let mut library = lighting.library;
+    // What is mirrored here is the environment: rays are sent from the G-buffer alone.
+    library.surface.mirror_rays = false;
+    // Without rays a light is a single turn of a loop, and what may be too many is refused before.
+    if lighting.shadow_rays() {
+        library.lighting.light_budget = library.loops.loop_budget;
+    }
     let constants = composite::Constants {
-        spectral: scene.colours().spectral,
-        grid_side: scene.colours().grid_side,
-        // Without rays a light is a single turn of a loop, and what may be too many is refused before.
-        light_budget: if lighting.shadow_rays() { lighting.loop_budget() } else { u32::MAX },
-        brdf: lighting.knobs.index("brdf"),
-        fresnel: lighting.knobs.index("fresnel"),
-        arithmetic: lighting.knobs.index("arithmetic"),
-        clearcoat: plan.clearcoat,
-        conductors: plan.conductors,
-        // What is mirrored here is the environment: rays are sent from the G-buffer alone.
-        mirror_rays: false,
-        roughest_mirror: plan.roughest_mirror,
-        directional_lights: plan.directional_lights,
-        local_lights: lighting.unlisted_lights(),
-        ambient: plan.ambient,
-        reflection: plan.reflection,
-        traversal: rays.constants.traversal,
-        octants: rays.constants.octants,
-        stack_size: rays.constants.stack_size,
-        hit_textures: rays.constants.hit_textures,
-        shadows: lighting.shadows(),
-        filters: planned.is_some_and(|rays| rays.filters),
-        absorption: planned.map_or(0, |rays| rays.absorption),
-        march_steps: plan.march().steps,
-        quadrature: plan.march().rule,
-        march_colours: plan.march().colours,
-        march_budget: lighting.loop_budget(),
-        tile_words: lighting.tiles.words(),
-        loop_budget: lighting.loop_budget(),
-        positions: plan.stored.positions,
-        normals: plan.stored.normals as u32,
-        bends: plan.screen.refraction,
-        mirrors: plan.screen.see_through_mirrors,
+        library,
+        bends: lighting.plan.screen.refraction,
+        mirrors: lighting.plan.screen.see_through_mirrors,
         behind_alone,
     };
     let bind = composite::Bind {
-        camera_block: camera,
-        instances: &scene.instances,
+        gbuffer: gbuffer.bind(),
+        lighting: lighting.tiles.bind(),
+        screen: lib::screen::Bind { seen, nearest_pieces: &screen.nearest_pieces },
         heads: &lists.heads,
         nodes: &lists.nodes,
         radiance,
-        depth: gbuffer.places(),
-        normals: &gbuffer.normals,
-        seen,
-        nearest_pieces: &screen.nearest_pieces,
         dropped: &lists.dropped,
         tiles: &lists.work.tiles,
         work: &lists.work.sizes,
-        lights: &scene.lights,
-        tile_lights: &lighting.tiles.masks,
-        environment: &environment.terms,
-        prefiltered: environment.prefiltered(),
-        reflectance: environment.reflectance(),
-        shadow_depth: lighting.shadow_maps.depth(),
-        shadow_faces: &lighting.shadow_maps.faces,
-        bvh_nodes: &rays.nodes,
-        bvh_triangles: &rays.triangles,
-        trace_block: &rays.terms,
-        material_texels: &scene.materials,
-        spectrum: &scene.spectrum.texels,
-        hit_corners: &rays.corners,
-        texels: &scene.texels,
-        texel_slots: &scene.texel_slots,
-        hit_slots: &scene.slots,
-        sigma_grids: &scene.grids.texels,
-        work_done: &rays.counts,
     };
-    let push = [rows[1]];
-    let push = bytemuck::cast_slice(&push);
-    frame.compute_indirect(name, &bind, constants.words(), push, &lists.work.sizes, 0)
+    let push = composite::Push { end_row: rows[1] };
+    frame.compute_indirect(name, &bind, &constants, &push, &lists.work.sizes, 0)
 }

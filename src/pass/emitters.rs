@@ -9,12 +9,9 @@ use super::upload::upload;
 use crate::gpu::{Buffer, Device, NOTHING};
 use crate::scene::emitters::{Emitter, Emitters, Source};
 
-/// Kinds of emitters and a flag: shaders/lib/emitters.glsl.
-const PUNCTUAL: u32 = 0;
-const TRIANGLE: u32 = 1;
-const SKY: u32 = 2;
-const NOWHERE: u32 = 3;
-const TWO_SIDED: u32 = 4;
+use crate::shader::lib::emitters::{
+    EMITTER_NONE, EMITTER_PUNCTUAL, EMITTER_SKY, EMITTER_TRIANGLE, EMITTER_TWO_SIDED,
+};
 
 /// What paths draw light from; next to nothing without any.
 pub struct EmittersOnDevice {
@@ -42,13 +39,13 @@ impl EmittersOnDevice {
     pub fn new(device: &Arc<Device>, emitters: &Emitters, leaf_places: &[u32]) -> Result<Self> {
         let texel = |emitter: &Emitter| {
             let (kind, place) = match emitter.source {
-                Source::Sky => (SKY, 0),
-                Source::Punctual(light) => (PUNCTUAL, light),
+                Source::Sky => (EMITTER_SKY, 0),
+                Source::Punctual(light) => (EMITTER_PUNCTUAL, light),
                 Source::Triangle { index, two_sided, .. } => {
                     match leaf_places[index as usize] {
                         // Rays leave it out, and so do the lights.
-                        u32::MAX => (NOWHERE, 0),
-                        place => (TRIANGLE | if two_sided { TWO_SIDED } else { 0 }, place),
+                        u32::MAX => (EMITTER_NONE, 0),
+                        place => (EMITTER_TRIANGLE | if two_sided { EMITTER_TWO_SIDED } else { 0 }, place),
                     }
                 }
             };
@@ -63,7 +60,7 @@ impl EmittersOnDevice {
                 device,
                 name("shares of the environment", emitters.sky.words.is_empty()),
                 &emitters.sky.words,
-                Some(vk::Format::R32_UINT),
+                None,
             )?,
             count: list.len() as u32,
             punctual: any(|source| matches!(source, Source::Punctual(_))),

@@ -198,9 +198,8 @@ fn prefilter(device: &Arc<Device>, sky: &Image, chain: &Levels) -> Result<Levels
         let map = Sampled { image: sky, sampler: SamplerDesc::EQUIRECTANGULAR };
         let bind = prefilter::Bind { environment_map: map, level: &level };
         let alpha = NARROWEST as f32 / w as f32;
-        let push = [w, h, alpha.to_bits(), (chain[0].0 as f32).to_bits()];
-        let constants = prefilter::Constants::default().words();
-        frame.compute_over("prefilter environment", &bind, constants, bytemuck::cast_slice(&push), [w, h])?;
+        let push = prefilter::Push { size: [w, h], alpha, base_width: chain[0].0 as f32 };
+        frame.compute_over("prefilter environment", &bind, &prefilter::Constants::default(), &push, [w, h])?;
         frame.read_back(&level);
         frame.finish()?;
         let texels: Vec<Texel> = level.read(|bytes| bytemuck::pod_collect_to_vec(&bytes[..16 * (w * h) as usize]));

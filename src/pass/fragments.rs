@@ -9,10 +9,10 @@ use super::classify::{FragmentTiles, classify_fragments};
 use super::gbuffer::GBuffer;
 use super::scene::SceneOnDevice;
 use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Frame, Image, ImageDesc, Place, Raster};
-use crate::shader::fragments;
+use crate::shader::{fragments, lib};
 
-/// Bytes of one fragment: `NODE_WORDS` of shaders/lib/fragment_list.glsl.
-const NODE_BYTES: u64 = 52;
+/// Bytes of one fragment.
+const NODE_BYTES: u64 = 4 * lib::fragment_list::NODE_WORDS as u64;
 
 /// Lists of see-through fragments, drawn in horizontal strips so that any number of fragments fits the memory of one.
 pub struct FragmentLists {
@@ -124,7 +124,6 @@ impl FragmentLists {
 pub fn fragments<'a>(
     frame: &mut Frame<'a>,
     scene: &'a SceneOnDevice,
-    camera: &'a Buffer,
     gbuffer: &'a GBuffer,
     lists: &'a FragmentLists,
     strip: Strip,
@@ -139,48 +138,9 @@ pub fn fragments<'a>(
         size: lists.size,
         rows: strip.rows,
     };
-    let bindings: Vec<_> = scene
-        .page_sets()
-        .into_iter()
-        .map(
-            |[
-                base,
-                metallic_roughness,
-                normal,
-                occlusion,
-                emissive,
-                clearcoat,
-                coat_roughness,
-                specular,
-                transmission,
-                thickness,
-                coat_normal,
-            ]| {
-                fragments::Bind {
-                    camera_block: camera,
-                    instances: &scene.instances,
-                    materials: &scene.materials,
-                    slots: &scene.slots,
-                    base_page: base,
-                    metallic_roughness_page: metallic_roughness,
-                    normal_page: normal,
-                    occlusion_page: occlusion,
-                    emissive_page: emissive,
-                    clearcoat_page: clearcoat,
-                    clearcoat_roughness_page: coat_roughness,
-                    specular_page: specular,
-                    transmission_page: transmission,
-                    thickness_page: thickness,
-                    coat_normal_page: coat_normal,
-                    heads: &lists.heads,
-                    counters: &lists.counters,
-                    nodes: &lists.nodes,
-                }
-            },
-        )
-        .collect();
-    let push = [lod_bias.to_bits(), strip.index];
-    frame.raster(&clear, &fragments::PROGRAM, &bindings[..0], bytemuck::cast_slice(&push), Vec::new())?;
+    let bind = fragments::Bind { heads: &lists.heads, counters: &lists.counters, nodes: &lists.nodes };
+    let push = fragments::Push { lod_bias, strip: strip.index };
+    frame.raster(&clear, &bind, &[], &push, Vec::new())?;
     let raster = Raster {
         name: "see-through fragments",
         colors: Vec::new(),
@@ -189,6 +149,6 @@ pub fn fragments<'a>(
         size: lists.size,
         rows: strip.rows,
     };
-    frame.raster(&raster, &fragments::PROGRAM, &bindings, bytemuck::cast_slice(&push), scene.draws(true, false))?;
+    frame.raster(&raster, &bind, &scene.pages(), &push, scene.draws(true, false))?;
     classify_fragments(frame, &lists.heads, &lists.work, strip.rows)
 }

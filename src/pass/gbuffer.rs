@@ -13,7 +13,7 @@ use ash::vk;
 use super::scene::SceneOnDevice;
 use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Draw, Frame, Image, ImageDesc, Place, Raster};
 use crate::plan::{Normals, Plan};
-use crate::shader::gbuffer;
+use crate::shader::{gbuffer, lib};
 
 const POSITION: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
@@ -31,14 +31,13 @@ fn normal_format(normals: Normals) -> vk::Format {
 pub struct GBuffer {
     /// Reversed depth; 0 where nothing was drawn.
     pub depth: Image,
-    /// The same depth as a texel buffer, row by row: what the passes after it read. On lavapipe a texel buffer is fetched inline
-    /// where a sampled image is a call that spills; the copy costs half a millisecond at 1280x720.
-    pub depth_texels: Buffer,
+    /// The same depth as a buffer, row by row: what the passes after it read. The copy costs half a millisecond at 1280x720.
+    depth_rows: Buffer,
     /// Base colour and metallic texels.
     pub base: Image,
     /// Shading and geometric normal.
     pub normals: Image,
-    /// Depth and position, where positions are stored, and the same as a texel buffer.
+    /// Depth and position, where positions are stored, and the same as a buffer.
     positions: Option<(Image, Buffer)>,
     /// Material, roughness, instance, occlusion.
     pub ids: Image,
@@ -71,7 +70,7 @@ impl GBuffer {
             let bytes = 16 * u64::from(size[0]) * u64::from(size[1]);
             let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC;
             let image = Image::new(device, "G-buffer positions", ImageDesc::flat(POSITION, size[0], size[1], usage))?;
-            Ok((image, Buffer::texels(device, "G-buffer position texels", bytes, Place::Device, POSITION)?))
+            Ok((image, Buffer::new(device, "G-buffer position rows", bytes, Place::Device)?))
         });
         let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
         Ok(Self {
@@ -80,12 +79,11 @@ impl GBuffer {
                 "G-buffer depth",
                 ImageDesc::flat(vk::Format::D32_SFLOAT, size[0], size[1], usage),
             )?,
-            depth_texels: Buffer::texels(
+            depth_rows: Buffer::new(
                 device,
-                "G-buffer depth texels",
+                "G-buffer depth rows",
                 4 * u64::from(size[0]) * u64::from(size[1]),
                 Place::Device,
-                vk::Format::R32_SFLOAT,
             )?,
             base: target("G-buffer base colour", vk::Format::R16G16B16A16_SFLOAT, true)?,
             normals: target("G-buffer normals", normal_format(plan.stored.normals), true)?,
@@ -99,10 +97,18 @@ impl GBuffer {
         })
     }
 
-    /// Where surfaces are, as texels row by row: depth, or depth and position.
+    /// What passes read of it.
     #[must_use]
-    pub fn places(&self) -> &Buffer {
-        self.positions.as_ref().map_or(&self.depth_texels, |(_, texels)| texels)
+    pub fn bind(&self) -> lib::gbuffer::Bind<'_> {
+        lib::gbuffer::Bind {
+            depths: self.positions.as_ref().map_or(&self.depth_rows, |(_, rows)| rows),
+            base: &self.base,
+            normals: &self.normals,
+            ids: &self.ids,
+            emissive: &self.emissive,
+            layers: &self.layers,
+            triangles: &self.triangles,
+        }
     }
 }
 
@@ -113,7 +119,6 @@ impl GBuffer {
 pub fn gbuffer<'a>(
     frame: &mut Frame<'a>,
     scene: &'a SceneOnDevice,
-    camera: &'a Buffer,
     target: &'a GBuffer,
     lod_bias: f32,
     draws: Vec<Draw<'a>>,
@@ -130,43 +135,6 @@ pub fn gbuffer<'a>(
     while colors.last().is_some_and(Option::is_none) {
         colors.pop();
     }
-    let bindings: Vec<_> = scene
-        .page_sets()
-        .into_iter()
-        .map(
-            |[
-                base,
-                metallic_roughness,
-                normal,
-                occlusion,
-                emissive,
-                clearcoat,
-                coat_roughness,
-                specular,
-                transmission,
-                thickness,
-                coat_normal,
-            ]| {
-                gbuffer::Bind {
-                    camera_block: camera,
-                    instances: &scene.instances,
-                    materials: &scene.materials,
-                    slots: &scene.slots,
-                    base_page: base,
-                    metallic_roughness_page: metallic_roughness,
-                    normal_page: normal,
-                    occlusion_page: occlusion,
-                    emissive_page: emissive,
-                    clearcoat_page: clearcoat,
-                    clearcoat_roughness_page: coat_roughness,
-                    specular_page: specular,
-                    transmission_page: transmission,
-                    thickness_page: thickness,
-                    coat_normal_page: coat_normal,
-                }
-            },
-        )
-        .collect();
     let raster = Raster {
         name: "G-buffer",
         colors,
@@ -175,9 +143,9 @@ pub fn gbuffer<'a>(
         size: target.size,
         rows: [0, target.size[1]],
     };
-    let push = [lod_bias.to_bits(), 0];
-    frame.raster(&raster, &gbuffer::PROGRAM, &bindings, bytemuck::cast_slice(&push), draws)?;
-    frame.download("copy depth", &target.depth, &target.depth_texels);
+    let push = gbuffer::Push { lod_bias, strip: 0 };
+    frame.raster(&raster, &gbuffer::Bind {}, &scene.pages(), &push, draws)?;
+    frame.download("copy depth", &target.depth, &target.depth_rows);
     if let Some((image, texels)) = &target.positions {
         frame.download("copy positions", image, texels);
     }

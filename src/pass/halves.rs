@@ -37,6 +37,5 @@ pub fn join_halves<'a>(frame: &mut Frame<'a>, halves: &'a Halves, film: &'a Imag
     let (half_b, scale) = if count == 1 { (half_a, 0.5) } else { (half_b, 1.0 / count as f32) };
     let size = [film.desc().width, film.desc().height];
     let bind = join_halves::Bind { half_a, half_b, film };
-    let push = [scale.to_bits()];
-    frame.compute_over("join halves", &bind, join_halves::Constants {}.words(), bytemuck::cast_slice(&push), size)
+    frame.compute_over("join halves", &bind, &join_halves::Constants {}, &join_halves::Push { scale }, size)
 }

@@ -1,40 +1,23 @@
 //! What all passes that light surfaces share.
 
-use super::environment::EnvironmentOnDevice;
-use super::rays::{LOOP_BUDGET, RaysOnDevice};
-use super::scene::SceneOnDevice;
-use super::shadow_map::ShadowMaps;
 use super::tiles::Tiles;
-use crate::gpu::Buffer;
-use crate::plan::{Knobs, Plan};
+use crate::plan::Plan;
+use crate::shader::Library;
+use crate::shader::light::LightRange;
 
 /// Lights of one dispatch where each sends a ray: a traversal evaluates some 20 to 200 loop heads, of 65,535 that lavapipe
 /// grants an invocation.
 const LIGHTS_AT_ONCE: u32 = 64;
 
-/// `SHADOWS` of shaders/lib/shadow.glsl: places of the rungs in the knob `shadows`.
-const SHADOW_MAP: u32 = 1;
-const SHADOW_RAY: u32 = 2;
-
-/// What all passes that light surfaces need beside them.
+/// What all passes that light surfaces need.
 #[derive(Clone, Copy)]
 pub struct Lighting<'a> {
     /// Which code.
     pub plan: &'a Plan,
-    /// Which formulas.
-    pub knobs: &'a Knobs,
-    /// Materials, lights, instances.
-    pub scene: &'a SceneOnDevice,
-    /// What rays go through.
-    pub rays: &'a RaysOnDevice,
-    /// What lights see.
-    pub shadow_maps: &'a ShadowMaps,
+    /// What programs are specialised by.
+    pub library: Library,
     /// Light lists.
     pub tiles: &'a Tiles,
-    /// Light from all around.
-    pub environment: &'a EnvironmentOnDevice,
-    /// The camera's buffer.
-    pub camera: &'a Buffer,
     /// Pixels.
     pub size: [u32; 2],
 }
@@ -42,45 +25,25 @@ pub struct Lighting<'a> {
 /// Directional lights in parts and local ones in parts, of which one dispatch takes the last of the former with the first of the
 /// latter if both are few. Local lights are divided at the same ones whether or not tiles list them: sums are the same to
 /// the last bit then.
-fn parts(directional: u32, local: u32, listed: bool) -> Vec<Range> {
+fn parts(directional: u32, local: u32, listed: bool) -> Vec<LightRange> {
     let of =
         |count: u32| (0..count).step_by(LIGHTS_AT_ONCE as usize).map(move |i| [i, (i + LIGHTS_AT_ONCE).min(count)]);
-    let mut parts: Vec<Range> = of(directional).map(|[from, to]| [from, to, 0, 0]).collect();
+    let range = |[first, end]: [u32; 2], [first_word, end_word]: [u32; 2]| LightRange { first, end, first_word, end_word };
+    let mut parts: Vec<LightRange> = of(directional).map(|lights| range(lights, [0; 2])).collect();
     for [from, to] in of(local) {
         let [lights, words] = match listed {
             true => [[directional; 2], [from / 32, to.div_ceil(32)]],
             false => [[directional + from, directional + to], [0; 2]],
         };
-        match parts.last_mut().filter(|last| from == 0 && last[1] - last[0] + to <= LIGHTS_AT_ONCE) {
-            Some(last) => *last = [last[0], lights[1], words[0], words[1]],
-            None => parts.push([lights[0], lights[1], words[0], words[1]]),
+        match parts.last_mut().filter(|last| from == 0 && last.end - last.first + to <= LIGHTS_AT_ONCE) {
+            Some(last) => *last = range([last.first, lights[1]], words),
+            None => parts.push(range(lights, words)),
         }
     }
     parts
 }
 
-/// Lights of the table from, up to; words of the tiles' masks from, up to.
-pub type Range = [u32; 4];
-
 impl Lighting<'_> {
-    /// Lights beside directional ones that every pixel goes through: all or, where tiles list them, none.
-    #[must_use]
-    pub fn unlisted_lights(&self) -> u32 {
-        if self.plan.tiles { 0 } else { self.plan.local_lights }
-    }
-
-    /// How lights are looked for: `SHADOWS` of shaders/lib/shadow.glsl.
-    #[must_use]
-    pub fn shadows(&self) -> u32 {
-        if self.plan.shadow_maps { SHADOW_MAP } else { u32::from(self.shadow_rays()) * SHADOW_RAY }
-    }
-
-    /// Loop heads that one invocation may evaluate.
-    #[must_use]
-    pub fn loop_budget(&self) -> u32 {
-        if self.scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX }
-    }
-
     /// Whether rays look for lights.
     #[must_use]
     pub fn shadow_rays(&self) -> bool {
@@ -89,11 +52,16 @@ impl Lighting<'_> {
 
     /// What each dispatch goes through: everything at once, or a few lights at a time where each sends a ray.
     #[must_use]
-    pub fn ranges(&self) -> Vec<Range> {
+    pub fn ranges(&self) -> Vec<LightRange> {
         let Plan { directional_lights, local_lights, tiles, .. } = *self.plan;
         match self.shadow_rays() {
             true => parts(directional_lights, local_lights, tiles),
-            false => vec![[0, directional_lights + self.unlisted_lights(), 0, self.tiles.words()]],
+            false => vec![LightRange {
+                first: 0,
+                end: directional_lights + self.library.lighting.local_lights,
+                first_word: 0,
+                end_word: self.tiles.words(),
+            }],
         }
     }
 }
@@ -101,6 +69,10 @@ impl Lighting<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn parts(directional: u32, local: u32, listed: bool) -> Vec<[u32; 4]> {
+        super::parts(directional, local, listed).into_iter().map(bytemuck::cast).collect()
+    }
 
     #[test]
     fn lights_are_divided_at_the_same_ones_with_and_without_lists() {

@@ -23,6 +23,7 @@ pub mod rays;
 pub mod rows;
 pub mod scene;
 pub mod shadow_map;
+pub mod shared;
 pub mod sigma_grid;
 pub mod spectrum;
 pub mod texture;

@@ -42,7 +42,7 @@ pub struct PartOnDevice {
     pub part: Part,
     /// Of the sample drawn last.
     pub radiance: Image,
-    /// A copy as a texel buffer for the rung `screen` of `refraction`; next to nothing with another one.
+    /// A copy for the rung `screen` of `refraction`; next to nothing with another one.
     pub seen: Buffer,
     /// The mean of the samples, where there is more than one.
     pub film: Option<Image>,
@@ -69,12 +69,11 @@ impl PartOnDevice {
             let desc = ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], usage);
             Image::new(device, &format!("{what} of the part {name}"), desc)
         };
-        let format = vk::Format::R32G32B32A32_SFLOAT;
         let seen = if plan.screen.refraction { 16 * u64::from(size[0]) * u64::from(size[1]) } else { 0 };
         Ok(Self {
             part,
             radiance: target("radiance")?,
-            seen: Buffer::texels(device, "part on the screen", seen, Place::Device, format)?,
+            seen: Buffer::new(device, "part on the screen", seen, Place::Device)?,
             film: if plan.samples > 1 || plan.bands > 0 { Some(target("film")?) } else { None },
         })
     }

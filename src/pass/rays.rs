@@ -22,6 +22,9 @@ use crate::scene::contact::{bodies_touch, twins};
 use crate::scene::emitters::{Emitters, Source};
 use crate::scene::solid::{Solids, media_at};
 use crate::scene::{AlphaMode, Mesh, Scene};
+use crate::shader::lib;
+use crate::shader::lib::hit::{ONE_SIDED_TRIANGLE, SHEET_TRIANGLE};
+use crate::shader::lib::trace::{FILTER, LINKS_16, LINKS_32, OPAQUE, STACK};
 use crate::share::{TraceTerms, WorkCounts};
 
 /// Rays start this many roundings of the largest coordinate off their surface (shaders/lib/trace.glsl, `ray_origin`).
@@ -34,16 +37,16 @@ const MOST_ORDERED_BYTES: usize = 256 << 20;
 /// Loop heads that one invocation of the tree of rays may evaluate where the driver limits them.
 pub const LOOP_BUDGET: u32 = 40_000;
 
-/// How the hierarchy is gone through: `TRAVERSAL` of shaders/lib/trace.glsl.
+/// How the hierarchy is gone through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Traversal {
     /// Skip links between nodes of 16 bytes.
-    Links16,
+    Links16 = LINKS_16 as isize,
     /// Skip links between nodes of 32 bytes, for scenes whose boxes are too small for a grid of 16 bits.
-    Links32,
+    Links32 = LINKS_32 as isize,
     /// Nodes of 64 bytes with both children's boxes, and a stack.
-    Stack,
+    Stack = STACK as isize,
 }
 
 /// What the report says of the hierarchy.
@@ -242,7 +245,7 @@ impl RaysOnDevice {
                 true => AimsOnDevice::new(device, &Aims::of(scene, solids, &bvh, emitters))?,
                 false => AimsOnDevice::none(device)?,
             },
-            leaf_places: upload(device, "leaf places", &leaf_places, Some(vk::Format::R32_UINT))?,
+            leaf_places: upload(device, "leaf places", &leaf_places, None)?,
             fixed,
             anchor: bvh.anchor,
             solids: solids.clone(),
@@ -260,7 +263,7 @@ impl RaysOnDevice {
             triangles: nothing(vk::Format::R32G32B32A32_UINT)?,
             corners: nothing(vk::Format::R32G32B32A32_UINT)?,
             faces: Vec::new(),
-            leaf_places: nothing(vk::Format::R32_UINT)?,
+            leaf_places: Buffer::new(device, NOTHING, 0, Place::Device)?,
             emitters: EmittersOnDevice::new(device, &Emitters::default(), &[])?,
             aims: AimsOnDevice::none(device)?,
             terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,
@@ -276,6 +279,18 @@ impl RaysOnDevice {
             bodies: Scene::default(),
             solids: Solids::default(),
         })
+    }
+
+    /// What the traversal reads.
+    #[must_use]
+    pub fn trace(&self) -> lib::trace::Scene<'_> {
+        lib::trace::Scene { bvh_nodes: &self.nodes, bvh_triangles: &self.triangles, trace_block: &self.terms }
+    }
+
+    /// Where work is counted.
+    #[must_use]
+    pub fn work(&self) -> lib::add_work::Scene<'_> {
+        lib::add_work::Scene { work_done: &self.counts }
     }
 
     /// What rays need to know of one sample of a view.
@@ -396,9 +411,6 @@ fn flat_faces(mesh: &Mesh) -> Vec<u32> {
     faces
 }
 
-/// Classes of triangles: shaders/lib/trace.glsl.
-const OPAQUE: u32 = 1;
-const FILTER: u32 = 2;
 /// Every bit of `HIT_TEXTURES`.
 const EVERYTHING: u32 = 0x1fff;
 /// What lies at the corners of triangles, as shaders/lib/hit.glsl reads it.
@@ -478,7 +490,7 @@ impl<'a> Corners<'a> {
         let area = (q - p).cross(r - p).length();
         let density = if area > 0.0 { ((b - a).perp_dot(c - a).abs() / area).sqrt() as f32 } else { 0.0 };
         let one_sided = self.one_sided && !material.double_sided;
-        let flags = if sheet { SHEET } else { 0 } | if one_sided { ONE_SIDED } else { 0 };
+        let flags = if sheet { SHEET_TRIANGLE } else { 0 } | if one_sided { ONE_SIDED_TRIANGLE } else { 0 };
         let words = [mesh.material as u32 | flags, self.scales[i].to_bits(), density.to_bits()];
         let mut texels = Vec::with_capacity(12);
         for (n, word) in normals.iter().zip(words) {
@@ -516,11 +528,6 @@ impl<'a> Corners<'a> {
         texels
     }
 }
-
-/// Of a triangle's material word: transmits light and encloses nothing.
-const SHEET: u32 = 1 << 16;
-/// And: its back is neither seen by the eye nor emits.
-const ONE_SIDED: u32 = 1 << 17;
 
 /// The geometry of the instances that are transparent bodies, under the same indices; the others have no triangles.
 fn bodies(scene: &Scene, solids: &Solids, rays: Rays) -> Scene {

@@ -1,7 +1,6 @@
 //! How long lists of workgroups are dispatched.
 
-/// Workgroups along x before a dispatch goes on along y: `ROW` of shaders/lib/work_tile.glsl.
-const ROW: u32 = 32768;
+use crate::shader::lib::work_tile::ROW;
 
 /// A dispatch of `count` workgroups in rows; the shader takes its place from `listed_tile`.
 #[must_use]

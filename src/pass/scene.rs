@@ -11,17 +11,23 @@ use super::spectrum::{SpectrumConstants, SpectrumOnDevice};
 use super::texture::{Meaning, Texels, Textures};
 use super::upload::upload;
 use super::view::View;
-use crate::gpu::{Buffer, Device, Draw, Place, Sampled, VertexStream};
+use crate::gpu::{BoundSet, Buffer, DescriptorSet, Device, Draw, Place, Specialization as _, VertexStream};
 use crate::plan::{Knobs, Plan, casts_in_maps, is_see_through, mirrors};
 use crate::scene::solid::Solids;
 use crate::scene::wavelengths::{Banded, Slice, Wavelengths};
 use crate::scene::{AlphaMode, Bounds, Extent, Light, LightKind, Material, Scene, SigmaGrid, TextureRef};
-use crate::shader::{gbuffer, shadow_map};
+use crate::shader::lib::light_table::{SHAPE_DISK, SHAPE_NONE, SHAPE_RECTANGLE, SHAPE_SPHERE};
+use crate::shader::{PAGES, lib};
 use crate::share;
 use crate::spectra::{self, Upsampling};
 
-/// Texture slots of a material, in the order of `shaders/lib/gbuffer_interface.glsl`.
-pub const SLOTS: usize = 11;
+/// Texture slots of a material.
+pub const SLOTS: usize = lib::slots::SLOTS as usize;
+
+/// Texels of a material: of its constants, then of its texture slots.
+const MATERIAL_TEXELS: usize = lib::material::MATERIAL_SLOTS_AT as usize + SLOTS * lib::material::SLOT_TEXELS as usize;
+/// Texels of a light.
+const LIGHT_TEXELS: usize = lib::light_table::LIGHT_TEXELS as usize;
 
 /// Where a mesh's data lies in the scene's buffers.
 struct MeshRange {
@@ -81,20 +87,17 @@ pub struct SceneOnDevice {
     meshes: Vec<MeshRange>,
     placements: Vec<Placement>,
     materials_cpu: Vec<Material>,
-    /// The table of materials, in the slice of wavelengths that is shown.
+    /// The table of materials with their texture slots, in the slice of wavelengths that is shown.
     pub materials: Buffer,
+    texture_slots: Vec<[u32; 4]>,
     /// What that slice is to colours.
     pub spectrum: SpectrumOnDevice,
     /// What materials are by wavelength; `None` where the picture is made of three colours.
     wavelengths: Option<Wavelengths>,
     knobs: Knobs,
     eye: DVec3,
-    /// Eleven texture slots per material.
-    pub slots: Buffer,
     /// For rays: the texels of all textures.
     pub texels: Buffer,
-    /// For rays: where each slot's lie.
-    pub texel_slots: Buffer,
     /// For rays: media that vary.
     pub grids: SigmaGrids,
     /// Instances relative to the eye of the current view.
@@ -102,12 +105,15 @@ pub struct SceneOnDevice {
     /// Lights relative to the eye of the current view: directional first, `LIGHT_TEXELS` each.
     pub lights: Buffer,
     lights_cpu: Vec<Light>,
+    /// What each light's last texel says of its shadow maps.
+    light_shadows: Vec<[f32; 4]>,
     refraction: bool,
     normal_steps: u32,
     textures: Textures,
-    /// Materials by index → place in [`SceneOnDevice::page_sets`].
+    /// Materials by index → place in [`SceneOnDevice::pages`].
     page_of_material: Vec<usize>,
     page_materials: Vec<usize>,
+    page_sets: Vec<DescriptorSet>,
     /// World-space box of the drawn triangles.
     pub bounds: Option<Bounds>,
 }
@@ -215,21 +221,14 @@ impl SceneOnDevice {
 
         let fitted =
             wavelengths.as_ref().is_some_and(|known| known.vary) && upsampling(knobs) == Upsampling::JakobHanika;
-        let table: Vec<_> = scene
-            .materials
-            .iter()
-            .enumerate()
-            .map(|(i, m)| shared_material(m, i, knobs, grids.places[i], None))
-            .collect();
-        let mut slot_table = Vec::with_capacity(scene.materials.len() * SLOTS);
-        let mut texel_slots = Vec::with_capacity(scene.materials.len() * SLOTS);
+        let mut texture_slots_of = Vec::with_capacity(scene.materials.len() * SLOTS * 3);
         let mut page_of_material = Vec::with_capacity(scene.materials.len());
         let mut page_materials: Vec<usize> = Vec::new();
-        let textured = !wanted.is_empty() || plan.rays.is_some_and(|rays| rays.textures);
         for (index, material) in scene.materials.iter().enumerate() {
-            for (texture, meaning) in texture_slots(material).into_iter().filter(|_| textured) {
-                slot_table.push(shared_slot(texture, &textures, meaning));
-                texel_slots.extend(plan.rays.map(|_| texels.slot(texture, meaning)));
+            for (texture, meaning) in texture_slots(material) {
+                let for_rays = plan.rays.map_or([0; 4], |_| texels.slot(texture, meaning));
+                texture_slots_of.extend(shared_slot(texture, &textures, meaning).map(|texel| texel.map(f32::to_bits)));
+                texture_slots_of.push(for_rays);
             }
             // Materials that read the same pages through the same samplers share a set of descriptors.
             let same = |&other: &usize| same_pages(&textures, material, &scene.materials[other]);
@@ -242,26 +241,35 @@ impl SceneOnDevice {
         let lights_cpu = std::mem::take(&mut scene.lights);
 
         let instance_bytes = (scene.instances.len() * size_of::<share::Instance>()) as u64;
-        let light_bytes = (lights_cpu.len() * LIGHT_TEXELS * 16) as u64;
+        let map_texels = if plan.shadow_maps { 6 * lib::light_table::SHADOW_MAP_TEXELS as usize } else { 0 };
+        let light_bytes = (lights_cpu.len() * (LIGHT_TEXELS + map_texels) * 16) as u64;
+        let shared = |(i, m): (usize, &Material)| shared_material(m, i, knobs, grids.places[i], None);
+        let table = material_table(scene.materials.iter().enumerate().map(shared), &texture_slots_of);
+        let texel_format = vk::Format::R32G32B32A32_UINT;
+        let page_sets = page_materials
+            .iter()
+            .map(|&m| DescriptorSet::new(device, &PAGES, &pages_of(&textures, &scene.materials[m]).entries()))
+            .collect::<Result<_>>()?;
         Ok(Self {
             materials: match spectral {
                 // Written anew for each slice.
                 true => {
-                    let (bytes, format) = (size_of_val(table.as_slice()) as u64, vk::Format::R32G32B32A32_UINT);
-                    let mut buffer = Buffer::texels(device, "materials", bytes, Place::Upload, format)?;
+                    let bytes = size_of_val(table.as_slice()) as u64;
+                    let mut buffer = Buffer::texels(device, "materials", bytes, Place::Upload, texel_format)?;
                     buffer.write(bytemuck::cast_slice(&table));
                     buffer
                 }
-                false => upload(device, "materials", &table, Some(vk::Format::R32G32B32A32_UINT))?,
+                false => upload(device, "materials", &table, Some(texel_format))?,
             },
+            texture_slots: texture_slots_of,
+            page_sets,
+            light_shadows: vec![[0.0; 4]; lights_cpu.len()],
             spectrum: SpectrumOnDevice::new(device, spectral, fitted)?,
             wavelengths,
             knobs: knobs.clone(),
             eye: DVec3::ZERO,
-            slots: upload(device, "texture slots", &slot_table, Some(vk::Format::R32G32B32A32_SFLOAT))?,
-            texels: upload(device, "texels for rays", &texels.texels, Some(vk::Format::R32_UINT))?,
+            texels: upload(device, "texels for rays", &texels.texels, None)?,
             grids,
-            texel_slots: upload(device, "texel slots", &texel_slots, Some(vk::Format::R32G32B32A32_UINT))?,
             instances: Buffer::new(device, "instances", instance_bytes, Place::Upload)?,
             lights: Buffer::texels(device, "lights", light_bytes, Place::Upload, vk::Format::R32G32B32A32_SFLOAT)?,
             fallback: upload(device, "attribute fallback", &[0.0_f32, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0], None)?,
@@ -308,8 +316,15 @@ impl SceneOnDevice {
 
     fn write_lights(&mut self, slice: Option<&Slice>) {
         let color = |light: &Light| slice.map_or(light.color, |slice| slice.light(light));
-        let table: Vec<_> = self.lights_cpu.iter().map(|light| shared_light(light, color(light), self.eye)).collect();
+        let lights = self.lights_cpu.iter().zip(&self.light_shadows);
+        let table: Vec<_> = lights.map(|(light, &shadow)| shared_light(light, color(light), self.eye, shadow)).collect();
         self.lights.write(bytemuck::cast_slice(&table));
+    }
+
+    /// Keeps the table of the shadow maps behind that of the lights.
+    pub(super) fn keep_shadow_maps(&mut self, of_lights: Vec<[f32; 4]>, maps: &[[f32; 4]]) {
+        self.lights.write_at(of_lights.len() * LIGHT_TEXELS * 16, bytemuck::cast_slice(maps));
+        self.light_shadows = of_lights;
     }
 
     /// Makes materials and lights those of a slice of wavelengths, or of three colours, where the picture is drawn by wavelengths.
@@ -320,12 +335,12 @@ impl SceneOnDevice {
             let Some(slice) = slice else { return shared_material(m, i, &self.knobs, place, None) };
             let Banded { material, base_rgb, varies_rgb, emissive_rgb } = wavelengths.material(i, m, slice);
             let mut shared = shared_material(&material, i, &self.knobs, place, Some(spectra::shares(&slice.band)));
-            shared.flags |= if base_rgb { share::Material::BASE_RGB } else { 0 };
-            shared.flags |= if varies_rgb { share::Material::VARIES_RGB } else { 0 };
-            shared.flags |= if emissive_rgb { share::Material::EMISSIVE_RGB } else { 0 };
+            shared.flags |= if base_rgb { share::MATERIAL_BASE_RGB } else { 0 };
+            shared.flags |= if varies_rgb { share::MATERIAL_VARIES_RGB } else { 0 };
+            shared.flags |= if emissive_rgb { share::MATERIAL_EMISSIVE_RGB } else { 0 };
             shared
         };
-        let table: Vec<share::Material> = self.materials_cpu.iter().enumerate().map(shared).collect();
+        let table = material_table(self.materials_cpu.iter().enumerate().map(shared), &self.texture_slots);
         self.materials.write(bytemuck::cast_slice(&table));
         if let Some(slice) = slice {
             self.spectrum.show(slice);
@@ -360,13 +375,11 @@ impl SceneOnDevice {
         &self.device
     }
 
-    /// One set of texture pages per distinct combination, in slot order: what the bindings of a raster pass vary over.
+    /// One set of texture pages per distinct combination: what the draws of a raster pass vary over.
     #[must_use]
-    pub fn page_sets(&self) -> Vec<[Sampled<'_>; SLOTS]> {
-        self.page_materials
-            .iter()
-            .map(|&m| texture_slots(&self.materials_cpu[m]).map(|(t, meaning)| self.textures.sampled(t, meaning)))
-            .collect()
+    pub fn pages(&self) -> Vec<BoundSet<'_>> {
+        let entries = |&m: &usize| pages_of(&self.textures, &self.materials_cpu[m]).entries();
+        self.page_sets.iter().zip(&self.page_materials).map(|(set, m)| set.bind(entries(m))).collect()
     }
 
     /// The draws of all instances whose material is see-through or not, in the order of the file; from inside a
@@ -401,15 +414,16 @@ impl SceneOnDevice {
             .map(|(instance, placement)| {
                 let masked = matches!(material(placement).alpha_mode, AlphaMode::Mask(_));
                 let mesh = &self.meshes[placement.mesh];
-                let constants = shadow_map::Constants {
+                let has = lib::gbuffer_interface::Constants {
                     masked,
                     has_base: masked && material(placement).base_color_texture.is_some(),
                     has_color: masked && mesh.has_colors,
+                    ..Default::default()
                 };
                 let draw = self.draw(instance as u32, placement, false);
                 Draw {
-                    binding: if masked { draw.binding } else { 0 },
-                    constants: constants.words(),
+                    pages: if masked { draw.pages } else { 0 },
+                    constants: has.words(),
                     // Position, both texture coordinates, colour.
                     streams: [0, 3, 4, 5].map(|i| draw.streams[i]).to_vec(),
                     cull_back: false,
@@ -424,7 +438,7 @@ impl SceneOnDevice {
         let material = &self.materials_cpu[mesh.material];
         let fallback = |offset| VertexStream { buffer: &self.fallback, offset, stride: 0 };
         let textured = |slot: usize| texture_slots(material)[slot].0.is_some();
-        let constants = gbuffer::Constants {
+        let has = lib::gbuffer_interface::Constants {
             has_base: textured(0),
             has_metallic_roughness: textured(1),
             has_normal: textured(2) && mesh.has_tangents,
@@ -435,11 +449,10 @@ impl SceneOnDevice {
             has_color: mesh.has_colors,
             masked: matches!(material.alpha_mode, AlphaMode::Mask(_)),
             normal_steps: self.normal_steps,
-            ..Default::default()
         };
         Draw {
-            binding: self.page_of_material[mesh.material],
-            constants: constants.words(),
+            pages: self.page_of_material[mesh.material],
+            constants: has.words(),
             streams: vec![
                 self.positions.of(placement.mesh),
                 self.normals.of(placement.mesh),
@@ -467,7 +480,48 @@ fn same_pages(textures: &Textures, a: &Material, b: &Material) -> bool {
     })
 }
 
-/// Two texels: row of u, layer | row of v, coordinate set (shaders/lib/surface_fragment.glsl).
+/// What a material's textures are bound to.
+fn pages_of<'a>(textures: &'a Textures, material: &Material) -> lib::pages::Pages<'a> {
+    let [
+        base_page,
+        metallic_roughness_page,
+        normal_page,
+        occlusion_page,
+        emissive_page,
+        clearcoat_page,
+        clearcoat_roughness_page,
+        specular_page,
+        transmission_page,
+        thickness_page,
+        clearcoat_normal_page,
+    ] = texture_slots(material).map(|(texture, meaning)| textures.sampled(texture, meaning));
+    lib::pages::Pages {
+        base_page,
+        metallic_roughness_page,
+        normal_page,
+        occlusion_page,
+        emissive_page,
+        clearcoat_page,
+        clearcoat_roughness_page,
+        specular_page,
+        transmission_page,
+        thickness_page,
+        clearcoat_normal_page,
+    }
+}
+
+/// The texels of all materials, as shaders/lib/material.glsl reads them.
+fn material_table(materials: impl Iterator<Item = share::Material>, slots: &[[u32; 4]]) -> Vec<[u32; 4]> {
+    let constants = lib::material::MATERIAL_SLOTS_AT as usize;
+    let mut table = Vec::new();
+    for (material, slots) in materials.zip(slots.chunks_exact(MATERIAL_TEXELS - constants)) {
+        table.extend_from_slice(bytemuck::cast_slice(std::slice::from_ref(&material)));
+        table.extend_from_slice(slots);
+    }
+    table
+}
+
+/// Two texels: row of u, layer | row of v, coordinate set.
 fn shared_slot(texture: Option<TextureRef>, textures: &Textures, meaning: Meaning) -> [[f32; 4]; 2] {
     let Some(texture) = texture else { return [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]] };
     let (m, t) = (texture.uv_transform.matrix2, texture.uv_transform.translation);
@@ -496,7 +550,7 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32, shares:
     let of_grid = |share: f32| [0, 1, 2].map(|i| sigma[i] + share * mean[i]);
     let (alpha_cutoff, coverage) = match m.alpha_mode {
         AlphaMode::Mask(cutoff) => (cutoff, 0),
-        AlphaMode::Blend => (0.0, share::Material::BLENDED),
+        AlphaMode::Blend => (0.0, share::MATERIAL_BLENDED),
         AlphaMode::Opaque => (0.0, 0),
     };
     let flag = |is: bool, flag: u32| if is { flag } else { 0 };
@@ -520,10 +574,10 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32, shares:
         sigma: of_grid(if grid == 0 { 1.0 } else { 0.0 }),
         medium: medium(m, index),
         n_metal: metal.map(|[n, _]| n),
-        flags: flag(m.unlit, share::Material::UNLIT)
+        flags: flag(m.unlit, share::MATERIAL_UNLIT)
             | coverage
-            | flag(m.conductor.is_some(), share::Material::CONDUCTOR)
-            | flag(mirrors(m) && !m.unlit, share::Material::MIRRORS),
+            | flag(m.conductor.is_some(), share::MATERIAL_CONDUCTOR)
+            | flag(mirrors(m) && !m.unlit, share::MATERIAL_MIRRORS),
         thickness: m.thickness,
         kappa_metal: metal.map(|[_, kappa]| kappa),
         grid,
@@ -558,22 +612,19 @@ fn shared_instance(placement: &Placement, eye: DVec3, material: usize) -> share:
         handedness: sign as f32,
         material: material as u32,
         scale: determinant.abs().cbrt() as f32,
-        flags: if placement.sheet { share::Instance::SHEET } else { 0 },
+        flags: if placement.sheet { share::INSTANCE_SHEET } else { 0 },
         first_triangle: placement.first_triangle,
     }
 }
 
-/// Texels of a light: `LIGHT_TEXELS` of shaders/lib/light_texels.glsl.
-const LIGHT_TEXELS: usize = 5;
-
-/// As shaders/lib/light_texels.glsl says.
-fn shared_light(light: &Light, [r, g, b]: [f32; 3], eye: DVec3) -> [[f32; 4]; LIGHT_TEXELS] {
+/// As shaders/lib/light_table.glsl says.
+fn shared_light(light: &Light, [r, g, b]: [f32; 3], eye: DVec3, shadow: [f32; 4]) -> [[f32; 4]; LIGHT_TEXELS] {
     // Kind of the shape, its radius or half its height; half its side across.
     let (shape, across) = match light.extent {
-        None => ([0.0; 2], DVec3::ZERO),
-        Some(Extent::Sphere { radius }) => ([1.0, radius as f32], DVec3::ZERO),
-        Some(Extent::Disk { radius }) => ([2.0, radius as f32], DVec3::ZERO),
-        Some(Extent::Rectangle { across, half_height }) => ([3.0, half_height as f32], across),
+        None => ([SHAPE_NONE as f32, 0.0], DVec3::ZERO),
+        Some(Extent::Sphere { radius }) => ([SHAPE_SPHERE as f32, radius as f32], DVec3::ZERO),
+        Some(Extent::Disk { radius }) => ([SHAPE_DISK as f32, radius as f32], DVec3::ZERO),
+        Some(Extent::Rectangle { across, half_height }) => ([SHAPE_RECTANGLE as f32, half_height as f32], across),
     };
     let side = across.as_vec3().extend(0.0).to_array();
     let shaped = |offset: f32| [offset, shape[0], shape[1], 0.0];
@@ -586,11 +637,11 @@ fn shared_light(light: &Light, [r, g, b]: [f32; 3], eye: DVec3) -> [[f32; 4]; LI
     match light.kind {
         LightKind::Directional { direction } => {
             let to = (-direction).as_vec3();
-            [[to.x, to.y, to.z, 0.0], [r, g, b, 0.0], [0.0; 4], [0.0; 4], [0.0; 4]]
+            [[to.x, to.y, to.z, 0.0], [r, g, b, 0.0], [0.0; 4], [0.0; 4], [0.0; 4], shadow]
         }
         LightKind::Point { position, range } => {
             let (place, color) = local(position, range);
-            [place, color, [0.0; 4], shaped(1.0), side]
+            [place, color, [0.0; 4], shaped(1.0), side, shadow]
         }
         LightKind::Spot { position, direction, range, inner, outer } => {
             let (place, color) = local(position, range);
@@ -599,7 +650,7 @@ fn shared_light(light: &Light, [r, g, b]: [f32; 3], eye: DVec3) -> [[f32; 4]; LI
             // Equal cones are a step, which a ramp of 1e-7 is to f32.
             let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-7);
             let offset = -outer.cos() * scale;
-            [place, color, [axis.x, axis.y, axis.z, scale as f32], shaped(offset as f32), side]
+            [place, color, [axis.x, axis.y, axis.z, scale as f32], shaped(offset as f32), side, shadow]
         }
     }
 }

@@ -13,11 +13,12 @@ use glam::{DVec3, DVec4};
 
 use super::scene::SceneOnDevice;
 use crate::gpu::{
-    Buffer, DepthTarget, Device, Frame, Image, ImageDesc, NOTHING, PassTime, Place, Raster, Sampled, SamplerDesc,
+    Buffer, DepthTarget, DescriptorSet, Device, Frame, Image, ImageDesc, PassTime, Raster, Sampled, SamplerDesc,
 };
 use crate::plan::Plan;
 use crate::scene::{Bounds, Light, LightKind};
-use crate::shader::shadow_map;
+use crate::shader::lib::light_table::{LIGHT_TEXELS, SHADOW_MAP_TEXELS};
+use crate::shader::{SCENE, lib, shadow_map};
 
 /// Texels a side of the image that holds all maps, at most: what every device allows, and 64 MiB of depth.
 const ATLAS: u32 = 4096;
@@ -35,15 +36,12 @@ const WIDEST_CONE: f64 = FRAC_PI_3;
 /// From how many radii of the scene on it is seen from so far that depth is told across the scene and not from the light:
 /// numbers as large as the distance then hide nothing of it.
 const FAR: f64 = 4.0;
-/// Texels of the table per map: shaders/lib/shadow.glsl.
-const FACE_TEXELS: usize = 5;
+/// Texels of the table of lights per map.
+const FACE_TEXELS: usize = SHADOW_MAP_TEXELS as usize;
 
 /// The maps; next to nothing where the plan has none.
 pub struct ShadowMaps {
     depth: Image,
-    /// One texel per light: first texel of its first map, how many maps, whether their depth is told from the light. Then five per map: its square, and the rows of
-    /// its matrix.
-    pub faces: Buffer,
     /// GPU time of the drawing.
     pub times: Vec<PassTime>,
 }
@@ -61,17 +59,21 @@ impl ShadowMaps {
     ///
     /// # Errors
     /// When there are too many lights, or memory is short.
-    pub fn new(device: &Arc<Device>, plan: &Plan, name: &str, scene: &SceneOnDevice, anchor: DVec3) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        plan: &Plan,
+        name: &str,
+        scene: &mut SceneOnDevice,
+        anchor: DVec3,
+    ) -> Result<Self> {
         let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
         let image = |width, height| {
             Image::new(device, "shadow maps", ImageDesc::flat(vk::Format::D32_SFLOAT, width, height, usage))
         };
         let bounds = scene.bounds.filter(|_| plan.shadow_maps);
-        let format = vk::Format::R32G32B32A32_SFLOAT;
         let Some(bounds) = bounds else {
             let depth = Image::nothing(device, vk::Format::D32_SFLOAT, usage)?;
-            let faces = Buffer::texels(device, NOTHING, 0, Place::Device, format)?;
-            return Ok(Self { depth, faces, times: Vec::new() });
+            return Ok(Self { depth, times: Vec::new() });
         };
         let lights = scene.lights_in_order();
         let cubes = lights.iter().filter(|light| cone(light, bounds).is_none()).count();
@@ -101,19 +103,18 @@ impl ShadowMaps {
                 }
             }
         }
-        let mut table: Vec<[f32; 4]> = lights
-            .iter()
-            .zip(first.into_iter().zip(told))
-            .map(|(light, (first, told))| {
-                let texel = lights.len() + first * FACE_TEXELS;
-                [texel as f32, if cone(light, bounds).is_some() { 1.0 } else { 6.0 }, told, 0.0]
-            })
-            .collect();
-        table.extend(faces.iter().flat_map(Face::texels));
+        let maps_at = lights.len() * LIGHT_TEXELS as usize;
+        let of_light = |(light, (first, told)): (&Light, (usize, f32))| {
+            let texel = maps_at + first * FACE_TEXELS;
+            [texel as f32, if cone(light, bounds).is_some() { 1.0 } else { 6.0 }, told, 0.0]
+        };
+        let of_lights = lights.iter().zip(first.into_iter().zip(told)).map(of_light).collect();
+        let table: Vec<[f32; 4]> = faces.iter().flat_map(Face::texels).collect();
         let extent = |axis: usize| faces.iter().map(|f| f.square[axis] + f.square[2]).max().unwrap_or(1);
         let depth = image(extent(0), extent(1))?;
         let times = draw(device, scene, anchor, &faces, &depth)?;
-        Ok(Self { depth, faces: super::upload::upload(device, "shadow maps' table", &table, Some(format))?, times })
+        scene.keep_shadow_maps(of_lights, &table);
+        Ok(Self { depth, times })
     }
 
     /// All maps: reversed depth, 0 where nothing was drawn.
@@ -158,17 +159,10 @@ fn draw(
     depth: &Image,
 ) -> Result<Vec<PassTime>> {
     let instances = Buffer::with_data(device, "instances around the scene", &scene.instances_around(anchor))?;
-    let bindings: Vec<_> = scene
-        .page_sets()
-        .into_iter()
-        .map(|[base, ..]| shadow_map::Bind {
-            instances: &instances,
-            materials: &scene.materials,
-            slots: &scene.slots,
-            base_page: base,
-        })
-        .collect();
-    let mut frame = Frame::new(device);
+    let materials = || lib::material::Scene { material_texels: &scene.materials }.entries();
+    let set = DescriptorSet::new(device, &SCENE, &materials())?;
+    let mut frame = Frame::of(device, set.bind(materials()));
+    let bind = shadow_map::Bind { casters: &instances };
     for face in faces {
         let [x, y, side] = face.square;
         let raster = Raster {
@@ -179,9 +173,9 @@ fn draw(
             size: [side; 2],
             rows: [0, side],
         };
-        let push = face.clip_from_scene();
+        let push = shadow_map::Push { clip_from_scene: face.clip_from_scene() };
         let casters = scene.casters(|middle, half| face.sees(middle - anchor, half));
-        frame.raster(&raster, &shadow_map::PROGRAM, &bindings, bytemuck::cast_slice(&push), casters)?;
+        frame.raster(&raster, &bind, &scene.pages(), &push, casters)?;
     }
     frame.finish()
 }

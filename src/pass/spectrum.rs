@@ -7,10 +7,11 @@ use ash::vk;
 
 use crate::gpu::{Buffer, Device, NOTHING, Place};
 use crate::scene::wavelengths::Slice;
+use crate::shader::lib;
 use crate::spectra::{Band, Grid, RGB_FROM_XYZ, shares};
 
 /// Texels before the grid.
-const HEADER: usize = 4;
+const HEADER: usize = lib::spectrum::GRID_AT as usize;
 
 /// What a band is to colours; a texel that is never read where a picture is made of three colours.
 pub struct SpectrumOnDevice {
@@ -79,8 +80,8 @@ fn cells(side: u32, corners: &[f32]) -> Vec<[f32; 4]> {
     cells
 }
 
-/// Columns of what makes linear Rec. 709 of X, Y, Z, for a push constant.
+/// Columns of what makes linear Rec. 709 of X, Y, Z.
 #[must_use]
-pub fn rgb_from_xyz() -> [f32; 9] {
-    std::array::from_fn(|i| RGB_FROM_XYZ[i % 3][i / 3] as f32)
+pub fn rgb_from_xyz() -> [[f32; 3]; 3] {
+    std::array::from_fn(|column| std::array::from_fn(|row| RGB_FROM_XYZ[row][column] as f32))
 }

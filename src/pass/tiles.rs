@@ -7,18 +7,17 @@ use ash::vk;
 
 use super::gbuffer::GBuffer;
 use super::rows::rows_of;
-use super::scene::SceneOnDevice;
 use crate::gpu::{Buffer, Device, Frame, Place};
 use crate::plan::Plan;
-use crate::shader::{tile_depth, tiles};
+use crate::shader::{Library, lib, tile_depth, tiles};
 
-const TILE: u32 = 16;
+const TILE: u32 = lib::light_tile::TILE;
 
 /// Depth ranges and light masks of the tiles of a picture.
 pub struct Tiles {
     depths: Buffer,
     /// One bit per light, `words` words per tile.
-    pub masks: Buffer,
+    masks: Buffer,
     words: u32,
     across: u32,
     down: u32,
@@ -35,17 +34,17 @@ impl Tiles {
         let count = if plan.tiles { u64::from(across) * u64::from(down) } else { 0 };
         Ok(Self {
             depths: Buffer::texels(device, "tile depths", 8 * count, Place::Device, vk::Format::R32G32_SFLOAT)?,
-            masks: Buffer::texels(
-                device,
-                "tile light masks",
-                4 * count * u64::from(words),
-                Place::Device,
-                vk::Format::R32_UINT,
-            )?,
+            masks: Buffer::new(device, "tile light masks", 4 * count * u64::from(words), Place::Device)?,
             words,
             across,
             down,
         })
+    }
+
+    /// What passes that light surfaces read.
+    #[must_use]
+    pub fn bind(&self) -> lib::lighting::Bind<'_> {
+        lib::lighting::Bind { tile_lights: &self.masks }
     }
 
     /// Words of a tile's mask; 0 without lists.
@@ -62,23 +61,23 @@ impl Tiles {
 pub fn tiles<'a>(
     frame: &mut Frame<'a>,
     plan: &Plan,
-    scene: &'a SceneOnDevice,
-    camera: &'a Buffer,
+    library: Library,
     gbuffer: &'a GBuffer,
     target: &'a Tiles,
 ) -> Result<()> {
-    let bind = tile_depth::Bind { camera_block: camera, depth: &gbuffer.depth_texels, tile_depths: &target.depths };
-    let constants = tile_depth::Constants { from_camera: plan.see_through };
-    frame.compute_over("tile depths", &bind, constants.words(), &[], [target.across, target.down])?;
+    let bind = tile_depth::Bind { gbuffer: gbuffer.bind(), tile_depths: &target.depths };
+    let constants = tile_depth::Constants { library, from_camera: plan.see_through };
+    frame.compute_over("tile depths", &bind, &constants, &(), [target.across, target.down])?;
 
-    let bind = tiles::Bind {
-        camera_block: camera,
-        lights: &scene.lights,
-        tile_depths: &target.depths,
-        tile_lights: &target.masks,
-    };
+    let bind = tiles::Bind { tile_depths: &target.depths, tile_lights: &target.masks };
     let count = target.across * target.down;
-    let push = [plan.directional_lights, plan.local_lights, target.words, target.across, count];
+    let push = tiles::Push {
+        first: plan.directional_lights,
+        count: plan.local_lights,
+        words: target.words,
+        tiles_across: target.across,
+        tiles: count,
+    };
     let groups = rows_of((count * target.words).div_ceil(tiles::PROGRAM.local_size[0]));
-    frame.compute("light lists", &bind, tiles::Constants {}.words(), bytemuck::cast_slice(&push), groups)
+    frame.compute("light lists", &bind, &tiles::Constants {}, &push, groups)
 }

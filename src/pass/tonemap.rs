@@ -62,12 +62,11 @@ pub fn tonemap<'a>(
     desaturates: bool,
 ) -> Result<()> {
     frame.fill("reset counts", &display.counts, 0);
-    let [r, g, b, a] = background;
-    let push = [r, g, b, a, exposure.exp2(), scale];
+    let push = tonemap::Push { background, exposure: exposure.exp2(), scale };
     let bind = tonemap::Bind { film, display: &display.pixels, counts: &display.counts };
     let size = [film.desc().width, film.desc().height];
-    let constants = tonemap::Constants { curve, desaturates, ..Default::default() }.words();
-    frame.compute_over("tone map", &bind, constants, bytemuck::cast_slice(&push), size)?;
+    let constants = tonemap::Constants { curve, desaturates, ..Default::default() };
+    frame.compute_over("tone map", &bind, &constants, &push, size)?;
     frame.read_back(&display.pixels);
     frame.read_back(&display.counts);
     Ok(())

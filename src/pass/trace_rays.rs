@@ -6,13 +6,13 @@ use anyhow::Result;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
-use super::rays::{RaysOnDevice, Traversal};
-use crate::gpu::{Buffer, Device, Frame, Place};
+use super::rays::{RaysOnDevice, TraceConstants, Traversal};
+use crate::gpu::{Buffer, DescriptorSet, Device, Frame, Place};
 use crate::plan::{Demand, Facts, Knobs, Plan, Surroundings};
 use crate::scene::Scene;
 use crate::scene::emitters::Emitters;
 use crate::scene::normal_form::NormalForm;
-use crate::shader::trace_rays;
+use crate::shader::{Library, SCENE, lib, trace_rays};
 use crate::share::WorkCounts;
 
 /// A ray in the space of the hierarchy: world axes, metres, from the anchor.
@@ -108,29 +108,23 @@ impl Tracer {
         let output = Buffer::new(&self.device, "hits", bytes, Place::Readback)?;
         let per_group = if mode.pairs { 128 } else { 64 };
         let blocks = (rays.len() as u32).div_ceil(per_group).div_ceil(32);
+        let TraceConstants { traversal, octants, stack_size, .. } = self.rays.constants;
+        let trace = lib::trace::Constants { traversal, octants, stack_size };
         let constants = trace_rays::Constants {
             any_hit: mode.any_hit,
             pairs: mode.pairs,
             count: mode.count,
-            traversal: self.rays.constants.traversal,
-            octants: self.rays.constants.octants,
-            stack_size: self.rays.constants.stack_size,
-            ..Default::default()
+            library: Library { trace, ..Library::default() },
         };
+        let entries = || [self.rays.trace().entries(), self.rays.work().entries()].concat();
+        let scene = DescriptorSet::new(&self.device, &SCENE, &entries())?;
         let mut times = Vec::new();
         for round in 0..repeats {
-            let mut frame = Frame::new(&self.device);
+            let mut frame = Frame::of(&self.device, scene.bind(entries()));
             self.rays.reset(&mut frame);
-            let bind = trace_rays::Bind {
-                rays: &input,
-                hits: &output,
-                work_done: &self.rays.counts,
-                bvh_nodes: &self.rays.nodes,
-                bvh_triangles: &self.rays.triangles,
-                trace_block: &self.rays.terms,
-            };
-            let push = [rays.len() as u32, blocks];
-            frame.compute("rays", &bind, constants.words(), bytemuck::cast_slice(&push), [blocks * 32, 1, 1])?;
+            let bind = trace_rays::Bind { rays: &input, hits: &output };
+            let push = trace_rays::Push { count: rays.len() as u32, blocks };
+            frame.compute("rays", &bind, &constants, &push, [blocks * 32, 1, 1])?;
             if round + 1 == repeats {
                 frame.read_back(&output);
                 frame.read_back(&self.rays.counts);

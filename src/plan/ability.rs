@@ -11,12 +11,7 @@ pub struct Ability {
     pub device: String,
     /// Compute shaders add within subgroups: how rays count their work.
     pub adds_in_subgroups: bool,
-    /// Storage images and texel buffers of one shader.
-    pub storage_images: u32,
 }
-
-/// Those of the shader that marches over the screen.
-const SCREEN_IMAGES: u32 = 22;
 
 impl Plan {
     /// Refuses a plan that the device cannot draw.
@@ -27,20 +22,14 @@ impl Plan {
         let rays = self.rays.unwrap_or_default();
         let counts = (!ability.adds_in_subgroups)
             .then(|| "has no addition within subgroups of compute shaders, by which rays count their work".to_owned());
-        let images = (ability.storage_images < SCREEN_IMAGES)
-            .then(|| format!("has {} storage images for one shader, of {SCREEN_IMAGES}", ability.storage_images));
         for (asked, knob, rung, lacks) in [
             (self.paths.is_some(), "indirect", "path", &counts),
             (rays.shadows, "shadows", "ray", &counts),
             (rays.mirrors, "reflection", "ray", &counts),
             (rays.refraction, "refraction", "ray", &counts),
-            (self.screen.mirrors, "reflection", "screen", &images),
         ] {
             if let (true, Some(lacks)) = (asked, lacks) {
-                let nearest = match (knob, below(knob, rung)) {
-                    ("reflection", "screen") if images.is_some() => below(knob, "screen"),
-                    (_, nearest) => nearest,
-                };
+                let nearest = below(knob, rung);
                 bail!(
                     "{knob}={rung}: the device \"{}\" {lacks}; the nearest choice is {knob}={nearest}",
                     ability.device
@@ -66,7 +55,7 @@ mod tests {
 
     #[test]
     fn what_a_device_cannot_do_is_said_with_the_nearest_choice() {
-        let able = Ability { device: "toy".to_owned(), adds_in_subgroups: true, storage_images: 22 };
+        let able = Ability { device: "toy".to_owned(), adds_in_subgroups: true };
         let plan = |choices: &[&str]| {
             let mut knobs = Knobs::default();
             choices.iter().for_each(|choice| knobs.set(choice).unwrap());
@@ -76,11 +65,6 @@ mod tests {
         };
         let refused = |choices: &[&str], ability: &Ability| plan(choices).check(ability).map_err(|e| e.to_string());
         assert!(refused(&[], &able).is_ok() && refused(&["reflection=screen"], &able).is_ok());
-        let few = Ability { storage_images: 21, ..able.clone() };
-        assert!(refused(&[], &few).is_ok());
-        let said = refused(&["reflection=screen"], &few).unwrap_err();
-        assert!(said.contains("reflection=screen: the device \"toy\" has 21 storage images"), "{said}");
-        assert!(said.ends_with("the nearest choice is reflection=environment"), "{said}");
         let still = Ability { adds_in_subgroups: false, ..able };
         for (choices, asked, nearest) in [
             (&[][..], "shadows=ray", "shadows=map"),
@@ -90,8 +74,6 @@ mod tests {
             let said = refused(choices, &still).unwrap_err();
             assert!(said.starts_with(asked) && said.ends_with(nearest), "{said}");
         }
-        let neither = Ability { storage_images: 21, ..still.clone() };
-        assert!(refused(&["shadows=off"], &neither).unwrap_err().ends_with("reflection=environment"));
         assert!(refused(&["shadows=off", "reflection=off", "refraction=off"], &still).is_ok());
     }
 }

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::gpu::{Buffer, Device, Frame, Place};
 use crate::optics::{self, Case, Draw, Equation, Tier, ulp};
-use crate::shader::{PROBES, Probe, ProbeBind};
+use crate::shader::{PROBES, Probe, ProbeBind, lib};
 
 /// Written to every output before a probe runs: a NaN that no arithmetic makes.
 const POISON: u32 = 0x7fc0_dead;
@@ -143,13 +143,13 @@ pub fn evaluate(
         let bytes = 4 * length * probe.outputs.len();
         let to = Buffer::new(device, "outputs of a probe", bytes as u64, Place::Readback)?;
         let bind = ProbeBind { probe, inputs: &from, outputs: &to };
-        let constants = vec![(Probe::ARITHMETIC, tier as u32)];
+        let constants = lib::arithmetic::Constants { arithmetic: tier as u32 };
         // The first run compiles; the second is timed.
         for run in 0..2 {
             let mut frame = Frame::new(device);
             frame.fill("poison", &to, POISON);
             let groups = [length.div_ceil(64) as u32, 1, 1];
-            frame.compute(probe.name, &bind, constants.clone(), &(length as u32).to_ne_bytes(), groups)?;
+            frame.compute(probe.name, &bind, &constants, &(length as u32), groups)?;
             frame.read_back(&to);
             let times = frame.finish()?;
             if run == 1 {

@@ -5,6 +5,9 @@
 #[path = "../../build/compile.rs"]
 mod compile;
 #[allow(dead_code, reason = "build.rs uses the rest")]
+#[path = "../../build/interface.rs"]
+mod interface;
+#[allow(dead_code, reason = "build.rs uses the rest")]
 #[path = "../../build/reflect.rs"]
 mod reflect;
 
@@ -112,14 +115,18 @@ fn include(root: &Path, path: PathBuf, parts: &mut BTreeSet<PathBuf>) {
 /// Compiles a program, whose interface has to be the one that it was built with.
 fn compile(root: &Path, program: &'static Program) -> Result<Vec<Stage>, String> {
     let recipe = Recipe::new(root, Vec::new())?;
-    let stages: Vec<Stage> = sources(root, program)?.iter().map(|path| recipe.file(path)).collect::<Result<_, _>>()?;
+    let stages = recipe.program(&sources(root, program)?)?.stages;
     let all = declared(&stages)?;
-    let bindings: Vec<_> =
-        all.bindings.values().map(|b| (b.name.clone(), b.slot, b.kind.to_owned(), b.access.to_owned())).collect();
-    let built: Vec<_> = program
+    let bindings: Vec<_> = all
         .bindings
-        .iter()
-        .map(|b| (b.name.to_owned(), b.slot, format!("{:?}", b.kind), format!("{:?}", b.access)))
+        .values()
+        .map(|b| (b.set, b.name.clone(), b.slot, b.kind.to_owned(), b.access.to_owned()))
+        .collect();
+    let sets = program.sets.iter().map(|set| set.used);
+    let built: Vec<_> = (0..)
+        .zip(std::iter::once(program.bindings).chain(sets))
+        .flat_map(|(set, bindings)| bindings.iter().map(move |b| (set, b)))
+        .map(|(set, b)| (set, b.name.to_owned(), b.slot, format!("{:?}", b.kind), format!("{:?}", b.access)))
         .collect();
     let constants: Vec<(u32, &str)> = all.constants.iter().map(|(id, (name, ..))| (*id, name.as_str())).collect();
     let known: Vec<(u32, &str)> = program.constants.iter().map(|constant| (constant.id, constant.name)).collect();
@@ -129,7 +136,7 @@ fn compile(root: &Path, program: &'static Program) -> Result<Vec<Stage>, String>
     let same = bindings == built
         && constants == known
         && inputs == streams
-        && all.push == program.push_bytes
+        && all.push_bytes() == program.push_bytes
         && local_size(&stages[0].module) == program.local_size;
     match same {
         true => Ok(stages),

@@ -1,0 +1,252 @@
+//! What shaders declare without a number, and the numbers they get.
+//!
+//! ```text
+//! layout(constant) const uint BRDF = 2;                                  specialization constant
+//! layout(pass, rgba32f) uniform image2D radiance;                        set 0: pushed with each dispatch or draw
+//! layout(scene, rgba32f) readonly uniform imageBuffer lights;            set 1: written once per renderer
+//! layout(pages) uniform sampler2DArray base_page;                        set 2: written once per combination of textures
+//! const uint SHAPE_SPHERE = 1;                                           the host's, too
+//! ```
+//!
+//! A declaration stands on one line. Constants, and bindings of the sets `scene` and `pages`, have one number in all programs, and
+//! one file that declares them. Bindings of a pass are numbered from 0 in each program.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::compile::{Result, files, stem};
+
+/// The kinds of descriptor sets, in the order of their numbers.
+pub(crate) const SETS: [&str; 3] = ["pass", "scene", "pages"];
+
+/// A constant that the host shares: `const uint NAME = 3;`.
+pub(crate) struct Shared {
+    pub(crate) name: String,
+    /// As Rust names it.
+    pub(crate) ty: &'static str,
+    pub(crate) value: String,
+    /// The comment behind it.
+    pub(crate) about: String,
+}
+
+/// One line that declares something.
+pub(crate) struct Declaration {
+    /// `constant`, or one of [`SETS`].
+    pub(crate) kind: String,
+    pub(crate) name: String,
+    /// The comment behind it.
+    pub(crate) about: String,
+}
+
+/// What one file declares.
+pub(crate) struct File {
+    pub(crate) stem: String,
+    /// Folder under `shaders/`.
+    pub(crate) folder: &'static str,
+    /// Its first line, without the slashes.
+    pub(crate) about: String,
+    pub(crate) declarations: Vec<Declaration>,
+    pub(crate) shared: Vec<Shared>,
+}
+
+/// What all files declare, with the numbers that hold in every program.
+pub(crate) struct Interface {
+    root: PathBuf,
+    pub(crate) files: Vec<File>,
+    constants: BTreeMap<String, u32>,
+    slots: BTreeMap<String, u32>,
+}
+
+/// The bindings of one program's own set, and the file of each.
+pub(crate) type PassSlots = BTreeMap<String, (u32, String)>;
+
+impl Interface {
+    pub(crate) fn read(root: &Path) -> Result<Self> {
+        let mut all =
+            Self { root: root.to_owned(), files: Vec::new(), constants: BTreeMap::new(), slots: BTreeMap::new() };
+        let mut owners: BTreeMap<String, String> = BTreeMap::new();
+        for folder in ["share", "lib", "pass"] {
+            for path in files(&root.join(folder))? {
+                let text = fs::read_to_string(&path).map_err(|e| format!("reading {}: {e}", path.display()))?;
+                let file = file(&path, folder, &text)?;
+                for Declaration { kind, name, .. } in &file.declarations {
+                    if kind == "pass" {
+                        continue;
+                    }
+                    let place = path.display().to_string();
+                    let known = owners.insert(format!("{kind} {}", base(name)), place.clone());
+                    if let Some(other) = known.filter(|other| *other != place) {
+                        return Err(format!("{place}: {name} is declared in {other} already"));
+                    }
+                    let numbers = if kind == "constant" { &mut all.constants } else { &mut all.slots };
+                    numbers.insert(base(name).to_owned(), 0);
+                }
+                all.files.push(file);
+            }
+        }
+        for (number, id) in all.constants.values_mut().enumerate() {
+            *id = number as u32;
+        }
+        for set in &SETS[1..] {
+            let of_set = |name: &String| owners.contains_key(&format!("{set} {name}"));
+            for (number, (_, slot)) in all.slots.iter_mut().filter(|(name, _)| of_set(name)).enumerate() {
+                *slot = number as u32;
+            }
+        }
+        Ok(all)
+    }
+
+    /// The file that declares a constant or a binding that all programs share.
+    pub(crate) fn owner(&self, kind: &str, name: &str) -> Option<&File> {
+        let declares = |file: &&File| file.declarations.iter().any(|d| d.kind == kind && base(&d.name) == name);
+        self.files.iter().find(declares)
+    }
+
+    /// The number of a specialization constant.
+    pub(crate) fn constant(&self, name: &str) -> u32 {
+        self.constants[name]
+    }
+
+    /// The slot of a binding that all programs share.
+    pub(crate) fn slot(&self, name: &str) -> u32 {
+        self.slots[name]
+    }
+
+    /// Numbers the bindings of a program's own set, by the order in which its texts and what they include declare them.
+    pub(crate) fn pass_slots(&self, texts: &[(String, String)]) -> Result<PassSlots> {
+        let mut slots = PassSlots::new();
+        let mut seen = Vec::new();
+        for (name, text) in texts {
+            self.number(name, text, &mut slots, &mut seen)?;
+        }
+        Ok(slots)
+    }
+
+    fn number(&self, owner: &str, text: &str, slots: &mut PassSlots, seen: &mut Vec<String>) -> Result<()> {
+        for line in text.lines() {
+            if let Some(included) = line.strip_prefix("#include \"").and_then(|rest| rest.split('"').next()) {
+                if seen.iter().any(|known| known == included) {
+                    continue;
+                }
+                seen.push(included.to_owned());
+                let path = self.root.join(included);
+                let text = fs::read_to_string(&path).map_err(|e| format!("{owner} includes \"{included}\": {e}"))?;
+                self.number(&stem(&path), &text, slots, seen)?;
+            }
+            if let Some(Declaration { kind, name, .. }) = declaration(line).filter(|d| d.kind == "pass") {
+                let name = base(&name).to_owned();
+                let next = slots.len() as u32;
+                let (_, known) = slots.entry(name.clone()).or_insert_with(|| (next, owner.to_owned()));
+                if known != owner {
+                    return Err(format!("{owner}: {kind} binding {name} is declared in {known} already"));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A text with its numbers. Constants in `without` are ordinary ones, false or 0: the compiler leaves out what they guard.
+    pub(crate) fn numbered(&self, text: &str, slots: &PassSlots, without: &[String]) -> Result<String> {
+        let mut out = String::with_capacity(text.len() + 1024);
+        for line in text.lines() {
+            match declaration(line) {
+                Some(Declaration { kind, name, .. }) if kind == "constant" => {
+                    let (_, rest) = line.split_once(") ").unwrap_or_default();
+                    if without.contains(&name) {
+                        let (head, _) = rest.split_once(" = ").unwrap_or_default();
+                        let value = if head.starts_with("const bool ") { "false" } else { "0" };
+                        out += &format!("{head} = {value};");
+                    } else {
+                        out += &format!("layout(constant_id = {}) {rest}", self.constants[&name]);
+                    }
+                }
+                Some(Declaration { kind, name, .. }) => {
+                    let set = SETS.iter().position(|set| *set == kind).unwrap_or_default();
+                    let shared = || self.slots.get(base(&name)).copied();
+                    let own = || slots.get(base(&name)).map(|(slot, _)| *slot);
+                    let slot = if set == 0 { own() } else { shared() };
+                    let slot = slot.ok_or_else(|| format!("{name}: a binding that nobody has numbered"))?;
+                    let layout = format!("layout({kind}");
+                    out += &line.replacen(&layout, &format!("layout(set = {set}, binding = {slot}"), 1);
+                }
+                None => out += line,
+            }
+            out.push('\n');
+        }
+        Ok(out)
+    }
+}
+
+/// NAME_as_FORMAT is the binding NAME, read in another format.
+fn base(name: &str) -> &str {
+    name.split_once("_as_").map_or(name, |(of, _)| of)
+}
+
+fn file(path: &Path, folder: &'static str, text: &str) -> Result<File> {
+    let about = text.lines().next().unwrap_or_default().trim_start_matches('/').trim().to_owned();
+    let mut file = File { stem: stem(path), folder, about, declarations: Vec::new(), shared: Vec::new() };
+    for (number, line) in text.lines().enumerate() {
+        if ["set =", "binding =", "constant_id"].iter().any(|word| line.starts_with("layout(") && line.contains(word)) {
+            return Err(format!("{}:{}: numbers of bindings and constants are the build's", path.display(), number + 1));
+        }
+        file.declarations.extend(declaration(line));
+        file.shared.extend(shared(line));
+    }
+    Ok(file)
+}
+
+fn comment(line: &str) -> (&str, String) {
+    line.split_once("//").map_or((line, String::new()), |(code, about)| (code, about.trim().to_owned()))
+}
+
+fn declaration(line: &str) -> Option<Declaration> {
+    let rest = line.strip_prefix("layout(")?;
+    let (inside, _) = rest.split_once(')')?;
+    let kind = inside.split(',').next()?.trim();
+    if kind != "constant" && !SETS.contains(&kind) {
+        return None;
+    }
+    let (code, about) = comment(line);
+    let word = |text: &str| text.rsplit(|c: char| !c.is_alphanumeric() && c != '_').find(|w| !w.is_empty()).map(str::to_owned);
+    let name = if kind == "constant" {
+        word(code.split_once(" = ")?.0)?
+    } else if let Some((block, instance)) = code.split_once('{').zip(code.rsplit_once('}')).map(|(a, b)| (a.0, b.1)) {
+        // A block without an instance name is known by its own.
+        word(instance).or_else(|| Some(snake(&word(block)?)))?
+    } else {
+        word(code.split(';').next()?)?
+    };
+    Some(Declaration { kind: kind.to_owned(), name, about })
+}
+
+/// `SurfaceTiles` as `surface_tiles`.
+pub(crate) fn snake(name: &str) -> String {
+    let mut out = String::new();
+    for (i, c) in name.chars().enumerate() {
+        if c.is_uppercase() && i > 0 {
+            out.push('_');
+        }
+        out.extend(c.to_lowercase());
+    }
+    out
+}
+
+/// A constant with a plain number for its value.
+fn shared(line: &str) -> Option<Shared> {
+    let (code, about) = comment(line);
+    let (head, value) = code.strip_prefix("const ")?.split_once(" = ")?;
+    let (ty, name) = head.split_once(' ')?;
+    let value = value.trim().strip_suffix(';')?.trim_end_matches(['u', 'U']);
+    let integer = |text: &str| match text.strip_prefix("0x") {
+        Some(digits) => u32::from_str_radix(digits, 16).is_ok(),
+        None => text.parse::<i64>().is_ok(),
+    };
+    let ty = match ty {
+        "uint" if integer(value) => "u32",
+        "int" if integer(value) => "i32",
+        "float" if value.parse::<f32>().is_ok() => "f32",
+        _ => return None,
+    };
+    Some(Shared { name: name.to_owned(), ty, value: value.to_owned(), about })
+}

@@ -1,0 +1,55 @@
+// The G-buffer as passes read it: of each pixel its nearest opaque surface (docs/decisions/gbuffer.md).
+//
+// Normals are stored in one of several formats (knob `normals`). Vulkan lets variables of one binding have different formats as
+// long as what is used is what is bound: NAME_as_FORMAT is the binding NAME (build.rs), and specialization leaves one of them. A format
+// told by the image alone is no way: lavapipe 22.3 lacks shaderStorageImageReadWithoutFormat.
+#ifndef GBUFFER_GLSL
+#define GBUFFER_GLSL
+#include "lib/view.glsl"
+
+layout(constant) const uint NORMALS = 2;              // rung of the knob `normals`
+layout(constant) const float NORMAL_ERROR2 = 1e-7;    // |n − stored n|² that storing accounts for
+layout(constant) const bool POSITIONS = false;        // positions are stored beside depth (knob `position`)
+layout(constant) const bool STORED_EMISSIVE = false;
+layout(constant) const bool STORED_LAYERS = false;
+layout(constant) const bool STORED_TRIANGLES = false;
+layout(constant) const bool STORED_TRANSMISSION = false; // transmissive surfaces are in it
+
+// Reversed depth, row by row; where positions are stored, depth and the place relative to the eye. A buffer, not the depth image: on
+// lavapipe it is fetched inline, where a sampled image is a call that spills every register.
+layout(pass, scalar) readonly buffer Depths { float depths[]; };
+layout(pass, rgba16f) readonly uniform image2D base; // base colour and metallic texels
+layout(pass, rgba16_snorm) readonly uniform image2D normals;
+layout(pass, rgba8_snorm) readonly uniform image2D normals_as_rgba8_snorm;
+layout(pass, rgba32f) readonly uniform image2D normals_as_rgba32f;
+layout(pass, rg32ui) readonly uniform uimage2D ids; // material | roughness << 16, instance | back face << 23 | occlusion << 24
+layout(pass, rgba16f) readonly uniform image2D emissive; // texel, and the transmission texel
+layout(pass, rgba16) readonly uniform image2D layers;    // lib/encode.glsl, packed_layers
+layout(pass, r32ui) readonly uniform uimage2D triangles; // of the scene
+
+const uint NORMALS_OCT16 = 0;
+const uint NORMALS_OCT24 = 1;
+const uint NORMALS_OCT32 = 2;
+const uint NORMALS_F32 = 3;
+
+// Octahedral shading normal and geometric normal.
+vec4 stored_normals(ivec2 pixel) {
+    if (NORMALS == NORMALS_OCT16) return imageLoad(normals_as_rgba8_snorm, pixel);
+    if (NORMALS == NORMALS_F32) return imageLoad(normals_as_rgba32f, pixel);
+    return imageLoad(normals, pixel);
+}
+
+int pixel_index(ivec2 pixel) {
+    return pixel.y * int(camera.size.x) + pixel.x;
+}
+
+// Reversed depth; 0 where nothing was drawn.
+float stored_depth(int pixel) {
+    return depths[POSITIONS ? 4 * pixel : pixel];
+}
+
+// Position relative to the eye, where positions are stored.
+vec3 stored_position(int pixel) {
+    return vec3(depths[4 * pixel + 1], depths[4 * pixel + 2], depths[4 * pixel + 3]);
+}
+#endif

@@ -1,0 +1,106 @@
+//! Descriptor sets that are written once: what a scene is, and the textures of its materials.
+
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result};
+use ash::vk;
+
+use super::bind::{Descriptor, Resource};
+use super::device::Device;
+use super::shader::SetLayout;
+use super::sync::ResourceId;
+
+/// A written descriptor set.
+pub struct DescriptorSet {
+    pub(super) raw: vk::DescriptorSet,
+    pool: vk::DescriptorPool,
+    layout: &'static SetLayout,
+    written: Vec<(u32, ResourceId)>,
+    device: Arc<Device>,
+}
+
+impl DescriptorSet {
+    /// Writes a set: slots and what is in them. What is not written no program may read.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn new(device: &Arc<Device>, layout: &'static SetLayout, entries: &[(u32, Resource<'_>)]) -> Result<Self> {
+        let creating = || format!("creating a descriptor set of the {}", layout.name);
+        let sizes: Vec<_> = layout
+            .bindings
+            .iter()
+            .map(|b| vk::DescriptorPoolSize { ty: b.kind.descriptor_type(), descriptor_count: 1 })
+            .collect();
+        let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
+        let layouts = [device.set_layout(layout)?];
+        // SAFETY: valid infos; the pool holds one such set.
+        let (pool, raw) = unsafe {
+            let pool = device.raw.create_descriptor_pool(&info, None).with_context(creating)?;
+            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
+            match device.raw.allocate_descriptor_sets(&info) {
+                Ok(sets) => (pool, sets[0]),
+                Err(error) => {
+                    device.raw.destroy_descriptor_pool(pool, None);
+                    return Err(error).with_context(creating);
+                }
+            }
+        };
+        let set = Self {
+            raw,
+            pool,
+            layout,
+            written: entries.iter().map(|(slot, resource)| (*slot, resource.id())).collect(),
+            device: device.clone(),
+        };
+        for &(slot, resource) in entries {
+            let binding = layout.bindings.iter().find(|b| b.slot == slot);
+            // Declared by a library file, and read by no program.
+            let Some(binding) = binding else { continue };
+            let image_layout = binding.access.masks(binding.stages).layout;
+            let descriptor = Descriptor::new(device, binding.kind, resource, image_layout)?;
+            // SAFETY: nothing uses the set yet; what it points at is alive.
+            unsafe { device.raw.update_descriptor_sets(&[descriptor.write(binding).dst_set(raw)], &[]) };
+        }
+        Ok(set)
+    }
+
+    /// The set with what was written to it, for a frame.
+    ///
+    /// # Panics
+    /// When something else was written: our mistake.
+    #[must_use]
+    pub fn bind<'a>(&'a self, entries: Vec<(u32, Resource<'a>)>) -> BoundSet<'a> {
+        let same = entries.iter().map(|(slot, resource)| (*slot, resource.id())).eq(self.written.iter().copied());
+        assert!(same, "a descriptor set of the {} was written with other resources", self.layout.name);
+        BoundSet { set: self, entries }
+    }
+}
+
+impl Drop for DescriptorSet {
+    fn drop(&mut self) {
+        // SAFETY: every frame has been waited for.
+        unsafe { self.device.raw.destroy_descriptor_pool(self.pool, None) };
+    }
+}
+
+/// A written set in a frame.
+#[derive(Clone)]
+pub struct BoundSet<'a> {
+    pub(super) set: &'a DescriptorSet,
+    entries: Vec<(u32, Resource<'a>)>,
+}
+
+impl<'a> BoundSet<'a> {
+    pub(super) fn is_of(&self, layout: &'static SetLayout) -> bool {
+        std::ptr::eq(self.set.layout, layout)
+    }
+
+    /// What is in a slot.
+    ///
+    /// # Panics
+    /// When nothing was written there: our mistake.
+    pub(super) fn resource(&self, slot: u32, name: &str) -> Resource<'a> {
+        let found = self.entries.iter().find(|(written, _)| *written == slot);
+        found.unwrap_or_else(|| panic!("nothing was written to {name} of the {}", self.set.layout.name)).1
+    }
+}
