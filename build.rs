@@ -94,16 +94,17 @@ fn probes(recipe: &Recipe, programs: &BTreeMap<String, Vec<Stage>>) -> Result<St
             .filter(|(_, stages)| contract::calls(stages, &equation.function))
             .map(|(p, _)| p.clone())
             .collect();
-        let equations::Equation { name, ids, formula, subject, line, inputs, outputs, .. } = equation;
+        let equations::Equation { name, ids, formula, subject, line, inputs, whole, outputs, .. } = equation;
         let [fast, stable, compensated] = facts.builtins.each_ref().map(contract::list);
         table += &format!(
             "    Probe {{
         name: {name:?}, subject: {subject:?}, line: {line}, formula: {formula:?},
-        ids: {}, inputs: {}, outputs: {}, builtins: [{fast}, {stable}, {compensated}], loop_heads: {}, passes: {},
+        ids: {}, inputs: {}, whole: {}, outputs: {}, builtins: [{fast}, {stable}, {compensated}], loop_heads: {}, passes: {},
         program: {{ static PROGRAM: Program = {program}; &PROGRAM }},
     }},\n",
             contract::list(ids),
             contract::list(inputs),
+            contract::list(whole),
             contract::list(outputs),
             facts.heads,
             contract::list(&users),

@@ -8,7 +8,8 @@
 //! ```
 //!
 //! Parameters are the input columns in order, members of the result the output columns. A probe is
-//! `outputs = function(inputs)` for one case per invocation, columns one after the other.
+//! `outputs = function(inputs)` for one case per invocation, columns one after the other. Inputs are words: the bits of
+//! a float, or the whole number that a `uint` is, of which a float would hold 24 bits.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -31,6 +32,8 @@ pub(crate) struct Equation {
     /// Line of its tag there, counted from 1.
     pub(crate) line: usize,
     pub(crate) inputs: Vec<String>,
+    /// Those of the inputs that are whole numbers of 32 bits.
+    pub(crate) whole: Vec<String>,
     pub(crate) outputs: Vec<String>,
     /// GLSL of its probe.
     pub(crate) probe: String,
@@ -195,10 +198,13 @@ fn equation(
     out: Option<String>,
     structs: &Structs,
 ) -> Result<Equation> {
-    let mut inputs = Vec::new();
+    let (mut inputs, mut whole) = (Vec::new(), Vec::new());
     let mut arguments = Vec::new();
     for (ty, name) in &head.parameters {
         arguments.push(argument(ty, name, structs, &mut inputs)?);
+        if ty == "uint" {
+            whole.push(name.clone());
+        }
     }
     let mut outputs = Vec::new();
     let mut stores = String::new();
@@ -220,7 +226,7 @@ fn equation(
 #extension GL_EXT_scalar_block_layout : require
 layout(local_size_x = 64) in;
 #include \"lib/{subject}.glsl\"
-layout(scalar, set = 0, binding = 0) readonly buffer Inputs {{ float inputs[]; }};
+layout(scalar, set = 0, binding = 0) readonly buffer Inputs {{ uint inputs[]; }};
 layout(scalar, set = 0, binding = 1) writeonly buffer Outputs {{ float outputs[]; }};
 layout(push_constant, scalar) uniform Push {{ uint cases; }};
 void main() {{
@@ -232,7 +238,7 @@ void main() {{
         arguments.join(", ")
     );
     let name = renamed.unwrap_or_else(|| function.clone());
-    Ok(Equation { function, name, ids, formula, subject: subject.to_owned(), line: at + 1, inputs, outputs, probe })
+    Ok(Equation { function, name, ids, formula, subject: subject.to_owned(), line: at + 1, inputs, whole, outputs, probe })
 }
 
 fn components(ty: &str) -> Option<usize> {
@@ -247,10 +253,14 @@ fn components(ty: &str) -> Option<usize> {
 
 /// The expression that fetches one parameter; its columns are appended to `inputs`.
 fn argument(ty: &str, name: &str, structs: &Structs, inputs: &mut Vec<String>) -> Result<String> {
-    let mut fetch = |column: String| {
+    let mut word = |column: String| {
         inputs.push(column);
         format!("inputs[{} * cases + i]", inputs.len() - 1)
     };
+    if ty == "uint" {
+        return Ok(word(name.to_owned()));
+    }
+    let mut fetch = |column: String| format!("uintBitsToFloat({})", word(column));
     if let Some((array, rest)) = name.split_once('[') {
         // A spectrum in steps of 5 nm from 380 nm: s380, s385, …
         let count: usize = rest.trim_end_matches(']').parse().map_err(|_| format!("{name}: a literal length"))?;
@@ -267,8 +277,6 @@ fn argument(ty: &str, name: &str, structs: &Structs, inputs: &mut Vec<String>) -
             let values: Vec<_> = "xyzw"[..count].chars().map(|axis| fetch(format!("{name}{axis}"))).collect();
             Ok(format!("{ty}({})", values.join(", ")))
         }
-        // A conversion of what the type does not hold is undefined.
-        ("uint", _) => Ok(format!("uint(clamp({}, 0.0, 4294967040.0))", fetch(name.to_owned()))),
         ("bool", _) => Ok(format!("{} != 0.0", fetch(name.to_owned()))),
         _ => Err(format!("parameter {name}: no columns for the type {ty}")),
     }

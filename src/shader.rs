@@ -24,6 +24,8 @@ pub struct Probe {
     pub ids: &'static [&'static str],
     /// Input columns: the function's parameters in order.
     pub inputs: &'static [&'static str],
+    /// Those of the inputs that are whole numbers of 32 bits.
+    pub whole: &'static [&'static str],
     /// Output columns: the members of its result.
     pub outputs: &'static [&'static str],
     /// Built-ins and operations whose precision is the device's own, reached in the tiers fast, stable, compensated.
@@ -39,14 +41,21 @@ pub struct Probe {
 impl Probe {
     /// Specialization constant `ARITHMETIC` of `shaders/lib/arithmetic.glsl`.
     pub const ARITHMETIC: u32 = 30;
+
+    /// An input as the program gets it: the bits of a float, or a whole number. What is none of 32 bits counts as the
+    /// nearest one.
+    #[must_use]
+    pub fn word(&self, column: usize, value: f64) -> u32 {
+        if self.whole.contains(&self.inputs[column]) { value as u32 } else { (value as f32).to_bits() }
+    }
 }
 
-/// What every probe binds: columns of f32, one after the other.
+/// What every probe binds: columns of 32 bits, one after the other.
 #[derive(Clone, Copy)]
 pub struct ProbeBind<'a> {
     /// Which.
     pub probe: &'static Probe,
-    /// [`Probe::inputs`] columns.
+    /// [`Probe::inputs`] columns of [`Probe::word`]s.
     pub inputs: &'a Buffer,
     /// [`Probe::outputs`] columns.
     pub outputs: &'a Buffer,

@@ -88,6 +88,11 @@ const OUT_OF_DOMAIN: &[(&str, &[f32], &str, f32)] = &[
     ("fresnel_dielectric", &[0.0, 1.0], "F", 1.0),
     ("dielectric_transmitted", &[0.5, 0.0], "T", 0.0),
     ("fresnel_conductor", &[0.0, 1.0, 0.0], "F", 1.0),
+    // No boundary: the squares of such cosines are no floats.
+    ("fresnel_conductor", &[1e-28, 1.0, 0.0], "F", 0.0),
+    ("fresnel_dielectric", &[1e-27, 1.0], "F", 0.0),
+    ("fresnel_dielectric", &[1e-27, 1.0], "cos_t", 1e-27),
+    ("dielectric_transmitted", &[1e-27, 1.0], "T", 1.0),
     ("fresnel_conductor", &[1.0, 1.0, 1e20], "F", 1.0),
     ("reflect", &[0.6, 0.0, -0.8, 0.0, 0.0, 0.0], "Rz", 0.0),
     ("refract", &[0.6, 0.0, -0.8, 0.0, 0.0, 1.0, 0.0], "tir", 1.0),

@@ -87,7 +87,8 @@ struct FresnelDielectric {
 // Near n = 1 both differences cancel. Multiplied by their conjugates they are products:
 //   r_s = −(n² − 1)/(c + g)²,   r_p = (n² − 1)(c²(n² + 1) − 1)/(n²c + g)².
 // Total internal reflection (g² ≤ 0, only for n < 1): F = r_s = r_p = 1, cosθ_t = 0. At c = 0, F = 1 for every n: the
-// limit for n ≠ 1.
+// limit for n ≠ 1. For n = 1 there is no boundary and g is c: its square leaves the range of floats below 1e-19, and
+// cosθ_t = 0, F = 1 came of that.
 FresnelDielectric fresnel_dielectric(float cos_in, float n) {
     FresnelDielectric r = FresnelDielectric(1.0, 1.0, 1.0, 0.0, true);
     if (ARITHMETIC == FAST) {
@@ -104,7 +105,7 @@ FresnelDielectric fresnel_dielectric(float cos_in, float n) {
         float index = clamp(n, 0.0, LARGEST_INDEX);
         float g2 = refracted_square(c, index);
         if (index >= 1.0 || g2 > 0.0 && index > 0.0) {
-            float g = sqrt(max(g2, 0.0));
+            float g = index == 1.0 ? c : sqrt(max(g2, 0.0));
             float difference = (index - 1.0) * (index + 1.0);
             float s = c + g;
             float p = index * index * c + g;
@@ -115,7 +116,7 @@ FresnelDielectric fresnel_dielectric(float cos_in, float n) {
             r.rs = grazes ? -1.0 : -difference / s / s;
             r.rp = grazes ? -1.0 : (difference / p) * (brewster_term(c, index, g2) / p);
             // 1 − T where little is transmitted: its error is that of T times T.
-            float T = transmitted_part(c, g, index, s, p);
+            float T = index == 1.0 ? 1.0 : transmitted_part(c, g, index, s, p);
             r.F = grazes ? 1.0 : T < 0.5 ? 1.0 - T : min(0.5 * (r.rs * r.rs + r.rp * r.rp), 1.0);
         }
     }
@@ -139,8 +140,8 @@ Transmitted dielectric_transmitted(float cos_in, float n) {
         float c = clamp(cos_in, 0.0, 1.0);
         float index = clamp(n, 0.0, LARGEST_INDEX);
         float g2 = refracted_square(c, index);
-        if (c >= SMALLEST_NORMAL && index > 0.0 && g2 > 0.0) {
-            float g = sqrt(g2);
+        if (c >= SMALLEST_NORMAL && index > 0.0 && (g2 > 0.0 || index == 1.0)) {
+            float g = index == 1.0 ? c : sqrt(g2);
             float s = c + g;
             float p = index * index * c + g;
             // 1 − r² where little is reflected: its error is that of r² times r².
@@ -150,7 +151,9 @@ Transmitted dielectric_transmitted(float cos_in, float n) {
             t.Ts = rs * rs < 0.5 ? 1.0 - rs * rs : 4.0 * (c / s) * (g / s);
             t.Tp = rp * rp < 0.5 ? 1.0 - rp * rp : 4.0 * (index * c / p) * (index * g / p);
             float F = 0.5 * (rs * rs + rp * rp);
-            t.T = F < 0.5 ? 1.0 - F : transmitted_part(c, g, index, s, p);
+            // c g would leave the range of floats for cosines below 1e-31; a power of two rounds nothing.
+            float up = c < 1e-20 ? 1.15292150e18 : 1.0;
+            t.T = F < 0.5 ? 1.0 - F : transmitted_part(c * up, g, index, s, p) * (1.0 / up);
         }
     }
     return t;
@@ -233,7 +236,8 @@ struct FresnelConductor {
 // @eq F3 F8 N5 N6 N8: R_s = |c − g|²/|c + g|², R_p = |m²c − g|²/|m²c + g|², g = √(m² − sin²θ), m = n + iκ
 // For κ well above 0 as written. For κ → 0 the differences cancel as a dielectric's do, and the products
 //   r_s = −(m² − 1)/(c + g)²,   r_p = (m² − 1)(c²(m² + 1) − 1)/(m²c + g)²
-// take over, divided twice so that no fourth power is formed. Grazing with n = 1, κ = 0: 1, as for a dielectric.
+// take over, divided twice so that no fourth power is formed. n = 1, κ = 0 is no boundary: 0, and 1 where the ray
+// grazes, as for a dielectric; the squares above leave the range of floats there from 1e-19 on.
 FresnelConductor fresnel_conductor(float cos_in, float n, float kappa) {
     FresnelConductor r = FresnelConductor(1.0, 1.0, 1.0);
     if (ARITHMETIC == FAST) {
@@ -253,7 +257,9 @@ FresnelConductor fresnel_conductor(float cos_in, float n, float kappa) {
         float index = clamp(n, 0.0, LARGEST_INDEX);
         float k = clamp(kappa, 0.0, LARGEST_INDEX);
         ConductorTerms t = conductor_terms(c, index, k);
-        if (c >= SMALLEST_NORMAL && t.s2 > 0.0 && t.p2 > 0.0) {
+        if (c >= SMALLEST_NORMAL && index == 1.0 && k == 0.0) {
+            r = FresnelConductor(0.0, 0.0, 0.0);
+        } else if (c >= SMALLEST_NORMAL && t.s2 > 0.0 && t.p2 > 0.0) {
             if (is_metallic(index, k)) {
                 // 1 − A where little is kept: its error is that of A times A.
                 float As = 4.0 * c * t.g.x / t.s2;

@@ -156,6 +156,16 @@ const CRITICAL: Region = Region {
 const ANYWHERE: Region =
     Region { name: "0.05 < n < 20", share: 4, draw: |d| vec![cosine(d) as f32, log_index(d) as f32] };
 
+/// Cosines whose squares leave the range of f32, half of them where there is no boundary.
+const FAR_GRAZING: Region = Region {
+    name: "cosines to 1e-37, n = 1",
+    share: 1,
+    draw: |d| {
+        let n = if d.below(2) == 0 { 1.0 } else { log_index(d) };
+        vec![d.log(2e-38, 1e-8) as f32, n as f32]
+    },
+};
+
 /// Rounding of g² = c² + n² − 1: what cancels is summed to 2^-32 in the stable tier, the terms themselves to 2^-46 in the
 /// compensated one.
 fn rounding_of_g2(case: &Case<'_>) -> f64 {
@@ -220,7 +230,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
     Equation {
         name: "fresnel_dielectric",
         twin: |x| fresnel_dielectric(x[0], x[1]).to_vec(),
-        regions: &[ANYWHERE, NEAR_ONE, CRITICAL],
+        regions: &[ANYWHERE, NEAR_ONE, CRITICAL, FAR_GRAZING],
         outputs: &[
             Output {
                 name: "F",
@@ -255,7 +265,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
     Equation {
         name: "dielectric_transmitted",
         twin: |x| dielectric_transmitted(x[0], x[1]).to_vec(),
-        regions: &[ANYWHERE, NEAR_ONE, CRITICAL],
+        regions: &[ANYWHERE, NEAR_ONE, CRITICAL, FAR_GRAZING],
         outputs: &[
             Output { name: "Ts", bound: "8 ulp + δg", allowed: |c| c.ulps(8.0) + 2.0 * through_g(c)[0] },
             Output { name: "Tp", bound: "8 ulp + δg", allowed: |c| c.ulps(8.0) + 2.0 * through_g(c)[1] },
@@ -352,6 +362,15 @@ const CONDUCTORS: &[Region] = &[
         draw: |d| {
             let n = 1.0 + d.sign() * d.log(6e-8, 0.1);
             vec![cosine(d) as f32, n as f32, d.log(1e-9, 0.1) as f32]
+        },
+    },
+    Region {
+        name: "cosines to 1e-37, n = 1 and κ = 0",
+        share: 1,
+        draw: |d| {
+            let nothing = d.below(2) == 0;
+            let (n, k) = if nothing { (1.0, 0.0) } else { (log_index(d), d.log(1e-3, 1e3)) };
+            vec![d.log(2e-38, 1e-8) as f32, n as f32, k as f32]
         },
     },
     Region {
