@@ -61,7 +61,7 @@ fn run() -> Result<()> {
     }
     let shared = shared_structs(&root.join("share"))?;
     let mut code = generate(&programs, &shared)?;
-    code += &probes(&recipe, &programs)?;
+    code += &probes(&recipe, &programs, whole)?;
     fs::write(out_dir.join("shaders.rs"), code).map_err(|e| format!("writing shaders.rs: {e}"))
 }
 
@@ -81,25 +81,45 @@ fn known_names(root: &Path, without: &[String]) -> Result<()> {
 }
 
 /// The table of equations, each with its probe. All probes bind the same two buffers: `src/shader.rs` has one struct.
-fn probes(recipe: &Recipe, programs: &BTreeMap<String, Vec<Stage>>) -> Result<String> {
+///
+/// Each function says how it reaches pictures: a pass calls it, or `@host`, or `@lab` a function that a pass calls. What
+/// neither a pass nor a probe reaches is an error, where the `whole` of the shaders is built.
+fn probes(recipe: &Recipe, programs: &BTreeMap<String, Vec<Stage>>, whole: bool) -> Result<String> {
     let library = equations::library(&recipe.root.join("lib"))?;
+    let called: BTreeMap<&String, BTreeSet<String>> =
+        programs.iter().map(|(name, stages)| (name, contract::called(stages))).collect();
+    let mut reached: BTreeSet<String> = called.values().flatten().cloned().collect();
     let mut table = String::new();
     for equation in &library.equations {
         let name = format!("probe/{}", equation.name);
         let stage = recipe.source(shaderc::ShaderKind::Compute, name.clone(), &equation.probe)?;
         let facts = contract::check(&name, &stage.module, &stage.words, &library.functions)?;
         let program = program_literal(&name, std::slice::from_ref(&stage))?;
-        let users: Vec<String> = programs
-            .iter()
-            .filter(|(_, stages)| contract::calls(stages, &equation.function))
-            .map(|(p, _)| p.clone())
-            .collect();
+        reached.extend(contract::called(std::slice::from_ref(&stage)));
+        let users_of = |function: &String| -> Vec<String> {
+            called.iter().filter(|(_, names)| names.contains(function)).map(|(p, _)| (*p).clone()).collect()
+        };
+        let users = users_of(&equation.function);
+        let (host, lab) = (&equation.host, &equation.lab);
+        let ways = [!users.is_empty(), host.is_some(), lab.is_some()];
+        let place = format!("shaders/lib/{}.glsl:{}: {}", equation.subject, equation.line, equation.name);
+        if whole && ways.iter().filter(|way| **way).count() != 1 {
+            let passes = users.join(", ");
+            return Err(format!(
+                "{place}: one of a pass that calls it ({passes}), `@host` and `@lab` says how it reaches pictures"
+            ));
+        }
+        let drawn_by = lab.as_ref().map_or_else(Vec::new, |(draws, _)| users_of(draws));
+        if whole && lab.is_some() && drawn_by.is_empty() {
+            return Err(format!("{place}: `@lab` names a function that no pass calls"));
+        }
         let equations::Equation { name, ids, formula, subject, line, inputs, whole, outputs, .. } = equation;
         let [fast, stable, compensated] = facts.builtins.each_ref().map(contract::list);
         table += &format!(
             "    Probe {{
         name: {name:?}, subject: {subject:?}, line: {line}, formula: {formula:?},
         ids: {}, inputs: {}, whole: {}, outputs: {}, builtins: [{fast}, {stable}, {compensated}], loop_heads: {}, passes: {},
+        host: {host:?}, lab: {lab:?}, drawn_by: {},
         program: {{ static PROGRAM: Program = {program}; &PROGRAM }},
     }},\n",
             contract::list(ids),
@@ -108,7 +128,12 @@ fn probes(recipe: &Recipe, programs: &BTreeMap<String, Vec<Stage>>) -> Result<St
             contract::list(outputs),
             facts.heads,
             contract::list(&users),
+            contract::list(&drawn_by),
         );
+    }
+    let unreached: Vec<_> = library.functions.keys().filter(|name| !reached.contains(*name)).cloned().collect();
+    if whole && !unreached.is_empty() {
+        return Err(format!("shaders/lib: neither a pass nor an equation reaches {}", unreached.join(", ")));
     }
     Ok(format!("/// Every tagged equation, by file and place.\npub static PROBES: &[Probe] = &[\n{table}];\n"))
 }

@@ -32,8 +32,14 @@ pub struct Probe {
     pub builtins: [&'static [&'static str]; 3],
     /// Most evaluations of loop heads in one call.
     pub loop_heads: u32,
-    /// Programs of `shaders/pass/` that call the function; none where a later pass will.
+    /// Programs of `shaders/pass/` that call the function.
     pub passes: &'static [&'static str],
+    /// Where none does, because the host computes it for pictures: file and what for.
+    pub host: Option<(&'static str, &'static str)>,
+    /// Where none does, because it is a laboratory form: the function that draws instead, and the test that both are equal.
+    pub lab: Option<(&'static str, &'static str)>,
+    /// Programs that call the function that draws instead.
+    pub drawn_by: &'static [&'static str],
     /// The program.
     pub program: &'static Program,
 }

@@ -97,7 +97,7 @@ fn documented_values_out_of_domain_may_be_expected() {
     let files = [
         ("refract", "vx,vy,vz,Nx,Ny,Nz,n,=Tx\n0.9,0,-0.43588989,0,0,1,0.5,0\n"),
         ("ggx", "Nx,Ny,Nz,Lx,Ly,Lz,Vx,Vy,Vz,alpha,F0,=fr\n0,0,1,0,0.6,-0.8,0,0.6,0.8,0.5,0.04,0\n"),
-        ("triangle_solid_angle", "ax,ay,az,bx,by,bz,cx,cy,cz,=omega\n0,0,0,1,0,0,0,1,0,0\n"),
+        ("quadric_normal", "px,py,pz,kx,ky,kz,=Nx\n0,0,0,1,0,0,0\n"),
     ];
     for (name, content) in files {
         vectors(&format!("{name}.csv"), content, &[]).succeeded();

@@ -14,9 +14,23 @@ float schlick_weight(float cos_in) {
     return ARITHMETIC == FAST ? pow(1.0 - cos_in, 5.0) : m2 * m2 * m;
 }
 
-// The curve from f0 to f90: of materials that are given by reflectances.
+// @eq F2 N1: F = F0 + (F90 − F0)(1 − cosθ)⁵
+// @out F
+// Of materials that are given by reflectances.
 vec3 schlick(vec3 f0, float f90, float cos_in) {
     return f0 + (vec3(f90) - f0) * schlick_weight(cos_in);
+}
+
+// @eq F2: F0 = ((n − 1)² + κ²)/((n + 1)² + κ²)
+// @out F0
+// n − 1 is exact for n in [1/2, 2] (Sterbenz), so F0 keeps its digits where it vanishes.
+float normal_reflectance(float n, float kappa) {
+    float k2 = kappa * kappa;
+    return ((n - 1.0) * (n - 1.0) + k2) / ((n + 1.0) * (n + 1.0) + k2);
+}
+
+vec3 normal_reflectance(vec3 n, vec3 kappa) {
+    return vec3(normal_reflectance(n.r, kappa.r), normal_reflectance(n.g, kappa.g), normal_reflectance(n.b, kappa.b));
 }
 
 struct FresnelSchlick {
@@ -25,14 +39,12 @@ struct FresnelSchlick {
 };
 
 // @eq F2 N1: F = F0 + (1 − F0)(1 − cosθ)⁵, F0 = ((n − 1)² + κ²)/((n + 1)² + κ²)
-// n − 1 is exact for n in [1/2, 2] (Sterbenz), so F0 keeps its digits where it vanishes.
+// @lab schlick: laboratory_forms_are_made_of_what_draws
 FresnelSchlick fresnel_schlick(float cos_in, float n, float kappa) {
     float index = clamp(n, 0.0, LARGEST_INDEX);
     float k = clamp(kappa, 0.0, LARGEST_INDEX);
-    float below = index - 1.0;
-    float above = index + 1.0;
-    float F0 = (below * below + k * k) / (above * above + k * k);
-    return FresnelSchlick(F0, F0 + (1.0 - F0) * schlick_weight(cos_in));
+    float F0 = normal_reflectance(index, k);
+    return FresnelSchlick(F0, schlick(vec3(F0), 1.0, cos_in).x);
 }
 
 // g² = (n cosθ_t)² = c² + n² − 1 to 2^-32 of what cancels, for the price of a rewrite. With a and b the larger and the
@@ -130,7 +142,8 @@ struct Transmitted {
 };
 
 // @eq F3 N3: T_s = 4cg/(c + g)², T_p = 4n²cg/(n²c + g)², T = (T_s + T_p)/2 = 1 − F
-// 1 − F loses every digit at grazing incidence, where F → 1.
+// 1 − F loses every digit at grazing incidence, where F → 1. Pictures have 1 − F: what is lost there is 1e-7 of the light.
+// @lab fresnel_dielectric: reflected_and_transmitted_power_are_one
 Transmitted dielectric_transmitted(float cos_in, float n) {
     Transmitted t = Transmitted(0.0, 0.0, 0.0);
     if (ARITHMETIC == FAST) {
@@ -286,6 +299,7 @@ struct Absorbed {
 
 // @eq F3 N7: A_s = 4c Re g/|c + g|², A_p = 4c Re(m² ḡ)/|m²c + g|², A = (A_s + A_p)/2 = 1 − F
 // What a metal keeps. 1 − F loses every digit at grazing incidence.
+// @lab fresnel_conductor: reflected_and_transmitted_power_are_one
 Absorbed conductor_absorbed(float cos_in, float n, float kappa) {
     Absorbed r = Absorbed(0.0, 0.0, 0.0);
     if (ARITHMETIC == FAST) {

@@ -326,7 +326,11 @@ fn named(probe: &Probe, values: &[f64]) -> String {
     let shown = 16;
     let one = |(column, (name, &value)): (usize, (&&str, &f64))| {
         let word = probe.word(column, value);
-        if probe.whole.contains(name) { format!("{name} {word}") } else { format!("{name} {:e} (0x{word:08x})", value as f32) }
+        if probe.whole.contains(name) {
+            format!("{name} {word}")
+        } else {
+            format!("{name} {:e} (0x{word:08x})", value as f32)
+        }
     };
     let mut text = probe.inputs.iter().zip(values).enumerate().take(shown).map(one).collect::<Vec<_>>().join(", ");
     if probe.inputs.len() > shown {

@@ -3,12 +3,24 @@
 
 use super::catalogue::{Axis, Case, Draw, Equation, Output, Region, flag};
 
+/// @eq F2: reflectance at normal incidence.
+#[must_use]
+pub fn normal_reflectance(n: f64, kappa: f64) -> f64 {
+    ((n - 1.0).powi(2) + kappa * kappa) / ((n + 1.0).powi(2) + kappa * kappa)
+}
+
+/// @eq F2: Schlick's curve between two reflectances.
+#[must_use]
+pub fn schlick(f0: f64, f90: f64, cos_in: f64) -> f64 {
+    f0 + (f90 - f0) * (1.0 - cos_in).max(0.0).powi(5)
+}
+
 /// @eq F2: Schlick's approximation: F0, F.
 #[must_use]
 pub fn fresnel_schlick(cos_in: f64, n: f64, kappa: f64) -> [f64; 2] {
-    let f0 = ((n - 1.0).powi(2) + kappa * kappa) / ((n + 1.0).powi(2) + kappa * kappa);
+    let f0 = normal_reflectance(n, kappa);
     // A cosine rounded to above 1 is 1.
-    [f0, f0 + (1.0 - f0) * (1.0 - cos_in).max(0.0).powi(5)]
+    [f0, schlick(f0, 1.0, cos_in)]
 }
 
 /// n cosθ_t squared; products of f32 are exact in f64, so only the sum rounds.
@@ -199,8 +211,60 @@ fn through_g(case: &Case<'_>) -> [f64; 2] {
     [slope(c), slope(n * n * c)].map(|slope| slope * error_of_g(case))
 }
 
+const SCHLICK_BOUND: &str = "8 ulp, and 5 of F0 where F90 is less";
+
+fn schlick_allowed(case: &Case<'_>) -> f64 {
+    let (f0, f90) = (case.inputs[case.column], case.inputs[3]);
+    case.ulps(8.0) + if f90 < f0 { 5.0 * super::ulp(f0) } else { 0.0 }
+}
+
 /// The equations of this file.
 pub(super) const EQUATIONS: &[Equation] = &[
+    Equation {
+        name: "schlick",
+        twin: |x| (0..3).map(|k| schlick(x[k], x[3], x[4])).collect(),
+        regions: &[
+            Region {
+                name: "metals and dielectrics",
+                share: 2,
+                draw: |d| {
+                    let f0 = [0; 3].map(|_| if d.below(2) == 0 { d.unit() } else { d.log(1e-6, 1.0) } as f32);
+                    [&f0[..], &[1.0, cosine(d) as f32]].concat()
+                },
+            },
+            Region {
+                name: "any F90",
+                share: 1,
+                draw: |d| {
+                    let f = [0; 4].map(|_| d.unit() as f32);
+                    [&f[..], &[cosine(d) as f32]].concat()
+                },
+            },
+        ],
+        outputs: &[
+            Output { name: "Fx", bound: SCHLICK_BOUND, allowed: schlick_allowed },
+            Output { name: "Fy", bound: "as Fx", allowed: schlick_allowed },
+            Output { name: "Fz", bound: "as Fx", allowed: schlick_allowed },
+        ],
+        axis: Axis { name: "1 − cosθ", log: true, of: |x| 1.0 - x[4], column: 0, relative: true },
+        extreme: 1e37,
+    },
+    Equation {
+        name: "normal_reflectance",
+        twin: |x| vec![normal_reflectance(x[0], x[1])],
+        regions: &[
+            Region { name: "metals", share: 2, draw: |d| vec![log_index(d) as f32, d.log(1e-6, 1e9) as f32] },
+            Region {
+                name: "n → 1",
+                share: 1,
+                draw: |d| vec![(1.0 + d.sign() * d.log(6e-8, 0.1)) as f32, d.log(1e-8, 1e-2) as f32],
+            },
+        ],
+        outputs: &[Output { name: "F0", bound: "8 ulp", allowed: |c| c.ulps(8.0) }],
+        axis: Axis { name: "κ", log: true, of: |x| x[1], column: 0, relative: true },
+        // Only indices of metals of files reach it.
+        extreme: -1.0,
+    },
     Equation {
         name: "fresnel_schlick",
         twin: |x| fresnel_schlick(x[0], x[1], x[2]).to_vec(),

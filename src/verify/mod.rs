@@ -5,6 +5,7 @@
 
 pub mod document;
 pub mod plot;
+pub mod statements;
 pub mod vectors;
 
 use std::sync::Arc;
@@ -327,6 +328,9 @@ pub fn nan_of_hostile(
     count: usize,
     seed: u64,
 ) -> Result<(usize, Option<Vec<f64>>)> {
+    if entry.equation.extreme < 0.0 {
+        return Ok((0, None));
+    }
     let inputs = hostile(entry, count, seed);
     let outputs = evaluate(device, entry.probe, tier, &inputs, count)?.outputs;
     let nan = |row: &usize| (0..entry.probe.outputs.len()).any(|column| outputs[column * count + row].is_nan());
