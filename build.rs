@@ -69,7 +69,7 @@ fn run() -> Result<()> {
         Ok(program)
     })?;
     let mut code = generate::Programs::of(&recipe.interface, &programs)?.rust()?;
-    code += &generate::probes(&recipe, &programs)?;
+    code += &generate::probes(&recipe, &programs, without.is_empty())?;
     let write = |name: &str, text: String| {
         fs::write(out_dir.join(name), text).map_err(|e| format!("writing {name}: {e}"))
     };

@@ -89,16 +89,17 @@ pub(crate) fn decorations(name: &str, module: &Module, shipped: &[u32]) -> Resul
     Ok(())
 }
 
-/// Whether a stage of a program calls the function (glslang leaves out what is never called).
-pub(crate) fn calls(stages: &[Stage], function: &str) -> bool {
-    stages.iter().any(|stage| {
+/// Names of the functions that a program calls (glslang leaves out what is never called).
+pub(crate) fn called(stages: &[Stage]) -> BTreeSet<String> {
+    let of = |stage: &Stage| {
         let names = Names::new(&stage.module);
-        let called = |f: &Function| {
+        let name = |f: &Function| {
             let id = f.def.as_ref().and_then(|line| line.result_id).unwrap_or(0);
-            names.name(id).split('(').next() == Some(function)
+            names.name(id).split('(').next().unwrap_or_default().to_owned()
         };
-        stage.module.functions.iter().any(called)
-    })
+        stage.module.functions.iter().map(name).collect::<Vec<_>>()
+    };
+    stages.iter().flat_map(of).collect()
 }
 
 /// Whether a function that loops calls another one that does. Stricter than a call inside the loop: which blocks belong to

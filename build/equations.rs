@@ -4,11 +4,14 @@
 //! // @eq F3 N2: r_s = −(n² − 1)/(c + g)²
 //! // @name refract          only where the function's own name is a GLSL built-in
 //! // @out F                 only where it returns a plain value
+//! // @host src/FILE: what    where no pass calls it: the host code that computes it for pictures
+//! // @lab FUNCTION: test     where none does either: what draws instead, and the test that they are equal
 //! FresnelDielectric fresnel_dielectric(float cos_in, float n) {
 //! ```
 //!
 //! Parameters are the input columns in order, members of the result the output columns. A probe is
-//! `outputs = function(inputs)` for one case per invocation, columns one after the other.
+//! `outputs = function(inputs)` for one case per invocation, columns one after the other. Inputs are words: the bits of
+//! a float, or the whole number that a `uint` is, of which a float would hold 24 bits.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -31,7 +34,13 @@ pub(crate) struct Equation {
     /// Line of its tag there, counted from 1.
     pub(crate) line: usize,
     pub(crate) inputs: Vec<String>,
+    /// Those of the inputs that are whole numbers of 32 bits.
+    pub(crate) whole: Vec<String>,
     pub(crate) outputs: Vec<String>,
+    /// Host code that computes it for pictures: file, what.
+    pub(crate) host: Option<(String, String)>,
+    /// The function that draws instead, and the test that holds them together.
+    pub(crate) lab: Option<(String, String)>,
     /// GLSL of its probe.
     pub(crate) probe: String,
 }
@@ -126,11 +135,20 @@ fn is_head(line: &str) -> bool {
     line.starts_with(|c: char| c.is_ascii_alphabetic()) && line.contains('(') && !line.contains('=')
 }
 
+/// Lines between a tag and its function.
+#[derive(Default)]
+struct Notes {
+    renamed: Option<String>,
+    out: Option<String>,
+    host: Option<(String, String)>,
+    lab: Option<(String, String)>,
+}
+
 /// Functions start in the first column; their bodies end with `}` in the first column.
 fn read(path: &Path, text: &str, structs: &Structs, library: &mut Library) -> Result<()> {
     let lines: Vec<&str> = text.lines().collect();
     let mut tag: Option<(usize, Vec<String>, String)> = None;
-    let (mut renamed, mut out) = (None, None);
+    let mut notes = Notes::default();
     let mut at = 0;
     while at < lines.len() {
         let line = lines[at];
@@ -144,10 +162,22 @@ fn read(path: &Path, text: &str, structs: &Structs, library: &mut Library) -> Re
             tag = Some((at, ids.split_whitespace().map(str::to_owned).collect(), formula.to_owned()));
         } else if let Some(name) = line.strip_prefix("// @name ") {
             tag.as_ref().ok_or_else(|| format!("{}: `@name` without an `@eq` above it", place()))?;
-            renamed = Some(name.to_owned());
+            notes.renamed = Some(name.to_owned());
         } else if let Some(name) = line.strip_prefix("// @out ") {
             tag.as_ref().ok_or_else(|| format!("{}: `@out` without an `@eq` above it", place()))?;
-            out = Some(name.to_owned());
+            notes.out = Some(name.to_owned());
+        } else if let Some((kind, rest)) =
+            ["host", "lab"].iter().find_map(|kind| Some((*kind, line.strip_prefix(&format!("// @{kind} "))?)))
+        {
+            tag.as_ref().ok_or_else(|| format!("{}: `@{kind}` without an `@eq` above it", place()))?;
+            let (name, what) =
+                rest.split_once(": ").ok_or_else(|| format!("{}: expected `@{kind} NAME: what`", place()))?;
+            let pair = Some((name.to_owned(), what.to_owned()));
+            if kind == "host" {
+                notes.host = pair
+            } else {
+                notes.lab = pair
+            };
         } else if is_head(without_comment(line)) {
             let mut joined = String::new();
             let mut end = at;
@@ -173,7 +203,7 @@ fn read(path: &Path, text: &str, structs: &Structs, library: &mut Library) -> Re
                 known.loops += source.loops;
                 known.heads.extend(source.heads);
                 if let Some(tag) = tag.take() {
-                    let equation = equation(&stem(path), head, tag, renamed.take(), out.take(), structs);
+                    let equation = equation(&stem(path), head, tag, std::mem::take(&mut notes), structs);
                     library.equations.push(equation.map_err(|e| format!("{}: {e}", place()))?);
                 }
                 at = end;
@@ -191,14 +221,17 @@ fn equation(
     subject: &str,
     head: Head,
     (at, ids, formula): (usize, Vec<String>, String),
-    renamed: Option<String>,
-    out: Option<String>,
+    notes: Notes,
     structs: &Structs,
 ) -> Result<Equation> {
-    let mut inputs = Vec::new();
+    let Notes { renamed, out, host, lab } = notes;
+    let (mut inputs, mut whole) = (Vec::new(), Vec::new());
     let mut arguments = Vec::new();
     for (ty, name) in &head.parameters {
         arguments.push(argument(ty, name, structs, &mut inputs)?);
+        if ty == "uint" {
+            whole.push(name.clone());
+        }
     }
     let mut outputs = Vec::new();
     let mut stores = String::new();
@@ -220,7 +253,7 @@ fn equation(
 #extension GL_EXT_scalar_block_layout : require
 layout(local_size_x = 64) in;
 #include \"lib/{subject}.glsl\"
-layout(pass, scalar) readonly buffer Inputs {{ float inputs[]; }};
+layout(pass, scalar) readonly buffer Inputs {{ uint inputs[]; }};
 layout(pass, scalar) writeonly buffer Outputs {{ float outputs[]; }};
 layout(push_constant, scalar) uniform Push {{ uint cases; }};
 void main() {{
@@ -232,7 +265,20 @@ void main() {{
         arguments.join(", ")
     );
     let name = renamed.unwrap_or_else(|| function.clone());
-    Ok(Equation { function, name, ids, formula, subject: subject.to_owned(), line: at + 1, inputs, outputs, probe })
+    Ok(Equation {
+        function,
+        name,
+        ids,
+        formula,
+        subject: subject.to_owned(),
+        line: at + 1,
+        inputs,
+        whole,
+        outputs,
+        host,
+        lab,
+        probe,
+    })
 }
 
 fn components(ty: &str) -> Option<usize> {
@@ -247,10 +293,14 @@ fn components(ty: &str) -> Option<usize> {
 
 /// The expression that fetches one parameter; its columns are appended to `inputs`.
 fn argument(ty: &str, name: &str, structs: &Structs, inputs: &mut Vec<String>) -> Result<String> {
-    let mut fetch = |column: String| {
+    let mut word = |column: String| {
         inputs.push(column);
         format!("inputs[{} * cases + i]", inputs.len() - 1)
     };
+    if ty == "uint" {
+        return Ok(word(name.to_owned()));
+    }
+    let mut fetch = |column: String| format!("uintBitsToFloat({})", word(column));
     if let Some((array, rest)) = name.split_once('[') {
         // A spectrum in steps of 5 nm from 380 nm: s380, s385, …
         let count: usize = rest.trim_end_matches(']').parse().map_err(|_| format!("{name}: a literal length"))?;
@@ -267,8 +317,6 @@ fn argument(ty: &str, name: &str, structs: &Structs, inputs: &mut Vec<String>) -
             let values: Vec<_> = "xyzw"[..count].chars().map(|axis| fetch(format!("{name}{axis}"))).collect();
             Ok(format!("{ty}({})", values.join(", ")))
         }
-        // A conversion of what the type does not hold is undefined.
-        ("uint", _) => Ok(format!("uint(clamp({}, 0.0, 4294967040.0))", fetch(name.to_owned()))),
         ("bool", _) => Ok(format!("{} != 0.0", fetch(name.to_owned()))),
         _ => Err(format!("parameter {name}: no columns for the type {ty}")),
     }

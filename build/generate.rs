@@ -394,7 +394,10 @@ pub(crate) fn literal(name: &str, program: &Program, all: &Declared) -> Result<S
 }
 
 /// The table of equations, each with its probe. All probes bind the same two buffers: `src/shader.rs` has one struct.
-pub(crate) fn probes(recipe: &Recipe, programs: &BTreeMap<String, Program>) -> Result<String> {
+///
+/// Each function says how it reaches pictures: a pass calls it, or `@host`, or `@lab` a function that a pass calls. What
+/// neither a pass nor a probe reaches is an error, where the `whole` of the shaders is built.
+pub(crate) fn probes(recipe: &Recipe, programs: &BTreeMap<String, Program>, whole: bool) -> Result<String> {
     let library = equations::library(&recipe.root.join("lib"))?;
     let work = library.equations.iter().map(|equation| (equation.name.clone(), equation));
     let compiled = on_all_cores(work, || Recipe::new(&recipe.root, Vec::new()), |recipe, equation| {
@@ -402,30 +405,54 @@ pub(crate) fn probes(recipe: &Recipe, programs: &BTreeMap<String, Program>) -> R
         let program = recipe.source(shaderc::ShaderKind::Compute, name.clone(), &equation.probe)?;
         let stage = &program.stages[0];
         let facts = contract::check(&name, &stage.module, &stage.words, &library.functions)?;
-        Ok((literal(&name, &program, &declared(&program.stages)?)?, facts))
+        let literal = literal(&name, &program, &declared(&program.stages)?)?;
+        Ok((literal, facts, contract::called(&program.stages)))
     })?;
+    let called: BTreeMap<&String, BTreeSet<String>> =
+        programs.iter().map(|(name, program)| (name, contract::called(&program.stages))).collect();
+    let probed = compiled.values().flat_map(|(_, _, called)| called);
+    let reached: BTreeSet<&String> = called.values().flatten().chain(probed).collect();
     let mut table = String::new();
     for equation in &library.equations {
-        let (literal, facts) = &compiled[&equation.name];
-        let users: Vec<String> = programs
-            .iter()
-            .filter(|(_, program)| contract::calls(&program.stages, &equation.function))
-            .map(|(p, _)| p.clone())
-            .collect();
-        let equations::Equation { name, ids, formula, subject, line, inputs, outputs, .. } = equation;
+        let (literal, facts, _) = &compiled[&equation.name];
+        let users_of = |function: &String| -> Vec<String> {
+            called.iter().filter(|(_, names)| names.contains(function)).map(|(p, _)| (*p).clone()).collect()
+        };
+        let users = users_of(&equation.function);
+        let (host, lab) = (&equation.host, &equation.lab);
+        let ways = [!users.is_empty(), host.is_some(), lab.is_some()];
+        let place = format!("shaders/lib/{}.glsl:{}: {}", equation.subject, equation.line, equation.name);
+        if whole && ways.iter().filter(|way| **way).count() != 1 {
+            let passes = users.join(", ");
+            return Err(format!(
+                "{place}: one of a pass that calls it ({passes}), `@host` and `@lab` says how it reaches pictures"
+            ));
+        }
+        let drawn_by = lab.as_ref().map_or_else(Vec::new, |(draws, _)| users_of(draws));
+        if whole && lab.is_some() && drawn_by.is_empty() {
+            return Err(format!("{place}: `@lab` names a function that no pass calls"));
+        }
+        let equations::Equation { name, ids, formula, subject, line, inputs, whole, outputs, .. } = equation;
         let [fast, stable, compensated] = facts.builtins.each_ref().map(contract::list);
         table += &format!(
             "    Probe {{
         name: {name:?}, subject: {subject:?}, line: {line}, formula: {formula:?},
-        ids: {}, inputs: {}, outputs: {}, builtins: [{fast}, {stable}, {compensated}], loop_heads: {}, passes: {},
+        ids: {}, inputs: {}, whole: {}, outputs: {}, builtins: [{fast}, {stable}, {compensated}], loop_heads: {}, passes: {},
+        host: {host:?}, lab: {lab:?}, drawn_by: {},
         program: {{ static PROGRAM: Program = {literal}; &PROGRAM }},
     }},\n",
             contract::list(ids),
             contract::list(inputs),
+            contract::list(whole),
             contract::list(outputs),
             facts.heads,
             contract::list(&users),
+            contract::list(&drawn_by),
         );
+    }
+    let unreached: Vec<_> = library.functions.keys().filter(|name| !reached.contains(name)).cloned().collect();
+    if whole && !unreached.is_empty() {
+        return Err(format!("shaders/lib: neither a pass nor an equation reaches {}", unreached.join(", ")));
     }
     Ok(format!("/// Every tagged equation, by file and place.\npub static PROBES: &[Probe] = &[\n{table}];\n"))
 }

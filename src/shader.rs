@@ -27,24 +27,41 @@ pub struct Probe {
     pub ids: &'static [&'static str],
     /// Input columns: the function's parameters in order.
     pub inputs: &'static [&'static str],
+    /// Those of the inputs that are whole numbers of 32 bits.
+    pub whole: &'static [&'static str],
     /// Output columns: the members of its result.
     pub outputs: &'static [&'static str],
     /// Built-ins and operations whose precision is the device's own, reached in the tiers fast, stable, compensated.
     pub builtins: [&'static [&'static str]; 3],
     /// Most evaluations of loop heads in one call.
     pub loop_heads: u32,
-    /// Programs of `shaders/pass/` that call the function; none where a later pass will.
+    /// Programs of `shaders/pass/` that call the function.
     pub passes: &'static [&'static str],
+    /// Where none does, because the host computes it for pictures: file and what for.
+    pub host: Option<(&'static str, &'static str)>,
+    /// Where none does, because it is a laboratory form: the function that draws instead, and the test that both are equal.
+    pub lab: Option<(&'static str, &'static str)>,
+    /// Programs that call the function that draws instead.
+    pub drawn_by: &'static [&'static str],
     /// The program.
     pub program: &'static Program,
 }
 
-/// What every probe binds: columns of f32, one after the other.
+impl Probe {
+    /// An input as the program gets it: the bits of a float, or a whole number. What is none of 32 bits counts as the
+    /// nearest one.
+    #[must_use]
+    pub fn word(&self, column: usize, value: f64) -> u32 {
+        if self.whole.contains(&self.inputs[column]) { value as u32 } else { (value as f32).to_bits() }
+    }
+}
+
+/// What every probe binds: columns of 32 bits, one after the other.
 #[derive(Clone, Copy)]
 pub struct ProbeBind<'a> {
     /// Which.
     pub probe: &'static Probe,
-    /// [`Probe::inputs`] columns.
+    /// [`Probe::inputs`] columns of [`Probe::word`]s.
     pub inputs: &'a Buffer,
     /// [`Probe::outputs`] columns.
     pub outputs: &'a Buffer,

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use etalon::optics;
 use etalon::shader::PROBES;
+use etalon::verify::statements::{By, STATEMENTS};
 use etalon::verify::{catalogue, document};
 
 fn root() -> PathBuf {
@@ -121,17 +122,6 @@ fn twins_carry_ids_of_their_functions() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Statements of the lecture that are no formula of their own, and where they live.
-const NOT_A_FUNCTION: &[(&str, &str)] = &[
-    ("R1", "radiance along a ray is copied, not computed: study scene `radiance` and tests/study_scenes.rs"),
-    ("R5", "visibility is an algorithm: the knob `shadows`"),
-    ("R6", "the three models: the option --model"),
-    ("R7", "wavelengths never mix: there is no function that could"),
-    ("F7", "Snell's window: fresnel_dielectric and critical_angle; the study scene `pool` shows it"),
-    ("B7", "a picture: the study scene `golden-bridge`"),
-    ("B8", "material model: src/scene/material.rs and the study scene `metals`"),
-];
-
 /// First cells of table rows `| ID | …` of a page.
 fn ids_of(page: &str, prefix: &str) -> BTreeSet<String> {
     let cells = page.lines().filter_map(|line| line.strip_prefix("| ")?.split(" |").next());
@@ -152,25 +142,95 @@ fn no_statement_of_the_lecture_and_no_hard_case_is_forgotten() {
     assert!(lecture.len() >= 30, "{lecture:?}");
     assert_eq!(rows.len(), 50, "{rows:?}");
     let mut all: BTreeSet<_> = lecture.union(&rows).cloned().collect();
-    // The quiz's fifth question needs a function that nothing else does.
-    all.insert("Q5".to_owned());
+    all.extend((1..=6).map(|question| format!("Q{question}")));
+    let told: BTreeSet<String> = STATEMENTS.iter().map(|statement| statement.id.to_owned()).collect();
+    assert_eq!(told.len(), STATEMENTS.len(), "an id is there twice");
+    assert_eq!(told, all, "src/verify/statements.rs and the pages differ");
     let tagged: BTreeSet<String> = PROBES.iter().flat_map(|probe| probe.ids).map(|id| (*id).to_owned()).collect();
-    let elsewhere: BTreeSet<String> = NOT_A_FUNCTION.iter().map(|(id, _)| (*id).to_owned()).collect();
     let unknown: Vec<_> = tagged.difference(&all).collect();
     assert!(unknown.is_empty(), "tagged with ids that the pages do not have: {unknown:?}");
-    let forgotten: Vec<_> = all.iter().filter(|id| !tagged.contains(*id) && !elsewhere.contains(*id)).collect();
-    assert!(forgotten.is_empty(), "no function is tagged with {forgotten:?}");
-    let both: Vec<_> = elsewhere.intersection(&tagged).collect();
-    assert!(both.is_empty(), "said to be no function, and tagged: {both:?}");
+    for statement in STATEMENTS {
+        let is_tagged = tagged.contains(statement.id);
+        match statement.by {
+            By::Tags => assert!(is_tagged, "no function is tagged with {}", statement.id),
+            By::Nothing(_) => assert!(!is_tagged, "{} is said to have no function, and one is tagged", statement.id),
+            By::Equations(names) => {
+                let known = |name: &&str| PROBES.iter().any(|probe| probe.name == *name);
+                assert!(!is_tagged && names.iter().all(|name| known(name)), "{}: {names:?}", statement.id);
+            }
+        }
+    }
+}
+
+/// All sources under a folder, as one text.
+fn texts(folder: &str) -> String {
+    let mut all = String::new();
+    let mut open = vec![root().join(folder)];
+    while let Some(path) = open.pop() {
+        if path.is_dir() {
+            open.extend(std::fs::read_dir(path).expect("a folder").map(|entry| entry.expect("an entry").path()));
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            all += &std::fs::read_to_string(path).expect("a source");
+        }
+    }
+    all
+}
+
+#[test]
+fn scenes_tests_and_pages_of_the_table_are_there() {
+    let tests = texts("tests") + &texts("src");
+    let there = |test: &str| tests.contains(&format!("fn {test}()"));
+    for statement in STATEMENTS {
+        assert!(etalon::study::NAMES.contains(&statement.scene), "{}: no scene {}", statement.id, statement.scene);
+        assert!(there(statement.test), "{}: no test {}", statement.id, statement.test);
+        let page = read(format!("docs/{}", statement.page));
+        assert!(page.len() > 200, "{}: {}", statement.id, statement.page);
+    }
+    for probe in PROBES {
+        if let Some((draws, test)) = probe.lab {
+            assert!(there(test), "{}: `@lab {draws}` names a test {test} that is not there", probe.name);
+        }
+    }
+    let empty: Vec<_> = document::verified().lines().filter(|line| line.contains("|  |")).map(str::to_owned).collect();
+    assert!(empty.is_empty(), "{empty:?}");
+}
+
+#[test]
+fn host_code_of_an_equation_uses_its_twin() {
+    for probe in PROBES {
+        let Some((file, _)) = probe.host else { continue };
+        let text = read(file);
+        let path = format!("optics::{}", probe.subject);
+        assert!(text.contains(&path) && text.contains(probe.name), "{file} has no {path}::{}", probe.name);
+    }
+}
+
+/// One of three ways, which the build holds as well.
+#[test]
+fn every_equation_says_how_it_reaches_pictures() {
+    for probe in PROBES {
+        let ways = [!probe.passes.is_empty(), probe.host.is_some(), probe.lab.is_some()];
+        assert_eq!(ways.iter().filter(|way| **way).count(), 1, "{}: {ways:?}", probe.name);
+        assert_eq!(probe.lab.is_some(), !probe.drawn_by.is_empty(), "{}: {:?}", probe.name, probe.lab);
+    }
+}
+
+/// A page of docs/ is what the sources make of it.
+fn says(name: &str, page: &str) {
+    let path = root().join("docs").join(name);
+    if std::env::var_os("ETALON_BLESS").is_some() {
+        std::fs::write(&path, page).expect("a page");
+    }
+    let written = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(written == page, "docs/{name} is old: run ETALON_BLESS=1 ./x test --test catalogue");
 }
 
 #[test]
 fn equations_md_says_what_the_sources_say() {
-    let path = root().join("docs/equations.md");
-    let page = document::equations();
-    if std::env::var_os("ETALON_BLESS").is_some() {
-        std::fs::write(&path, &page).expect("docs/equations.md");
-    }
-    let written = std::fs::read_to_string(&path).unwrap_or_default();
-    assert!(written == page, "docs/equations.md is old: run ETALON_BLESS=1 ./x test --test catalogue");
+    says("equations.md", &document::equations());
+}
+
+#[test]
+fn verified_md_says_what_the_sources_say() {
+    says("verified.md", &document::verified());
 }

@@ -68,16 +68,13 @@ fn inputs_from_outside_every_domain_never_give_nan() {
 
 /// What the comments in shaders/lib/ say of inputs outside a domain: function, inputs, output, value.
 const OUT_OF_DOMAIN: &[(&str, &[f32], &str, f32)] = &[
-    ("expf", &[1e30], "y", f32::INFINITY),
-    ("expf", &[-1e30], "y", 0.0),
-    ("logf", &[0.0], "y", f32::NEG_INFINITY),
-    ("logf", &[-3.0], "y", f32::NEG_INFINITY),
-    ("log1pf", &[-2.0], "y", f32::NEG_INFINITY),
+    ("exp_pair", &[1e30, 0.0], "y", f32::INFINITY),
+    ("exp_pair", &[-1e30, 0.0], "y", 0.0),
+    ("df_log", &[0.0], "hi", f32::NEG_INFINITY),
+    ("df_log", &[-3.0], "hi", f32::NEG_INFINITY),
     ("powf", &[-1.0, 2.0], "z", 0.0),
     ("powf", &[0.0, 0.0], "z", 1.0),
     ("powf", &[0.0, -1.0], "z", f32::INFINITY),
-    ("asinf", &[2.0], "y", std::f32::consts::FRAC_PI_2),
-    ("acosf", &[2.0], "y", 0.0),
     ("atan2f", &[0.0, 0.0], "angle", 0.0),
     ("df_div", &[0.0, 0.0, 0.0, 0.0], "hi", 0.0),
     ("df_sqrt", &[-1.0, 0.0], "hi", 0.0),
@@ -88,6 +85,11 @@ const OUT_OF_DOMAIN: &[(&str, &[f32], &str, f32)] = &[
     ("fresnel_dielectric", &[0.0, 1.0], "F", 1.0),
     ("dielectric_transmitted", &[0.5, 0.0], "T", 0.0),
     ("fresnel_conductor", &[0.0, 1.0, 0.0], "F", 1.0),
+    // No boundary: the squares of such cosines are no floats.
+    ("fresnel_conductor", &[1e-28, 1.0, 0.0], "F", 0.0),
+    ("fresnel_dielectric", &[1e-27, 1.0], "F", 0.0),
+    ("fresnel_dielectric", &[1e-27, 1.0], "cos_t", 1e-27),
+    ("dielectric_transmitted", &[1e-27, 1.0], "T", 1.0),
     ("fresnel_conductor", &[1.0, 1.0, 1e20], "F", 1.0),
     ("reflect", &[0.6, 0.0, -0.8, 0.0, 0.0, 0.0], "Rz", 0.0),
     ("refract", &[0.6, 0.0, -0.8, 0.0, 0.0, 1.0, 0.0], "tir", 1.0),
@@ -108,7 +110,6 @@ const OUT_OF_DOMAIN: &[(&str, &[f32], &str, f32)] = &[
     ("light_point", &[1.0, 2.0, 3.0, 1.0, 2.0, 3.0, 0.0, 0.0, 1.0, 5.0], "E_perp", f32::INFINITY),
     ("light_point", &[1.0, 2.0, 3.0, 1.0, 2.0, 3.0, 0.0, 0.0, 1.0, 5.0], "irradiance", 0.0),
     ("mis_weight", &[0.0, 0.0], "w", 0.0),
-    ("half_round_trip", &[1e6], "y", 65504.0),
     ("safe_normalize", &[0.0, 0.0, 0.0], "is_zero", 1.0),
     ("triangle_normal", &[1.0, 2.0, 3.0, 1.0, 2.0, 3.0, 4.0, 4.0, 4.0], "degenerate", 1.0),
 ];
@@ -211,6 +212,208 @@ fn double_floats_keep_44_bits() {
     }
 }
 
+#[test]
+fn the_logarithm_keeps_30_bits() {
+    let gpu = Gpu::new();
+    let mut draw = Draw::new(6);
+    let rows: Vec<Vec<f32>> = (0..CASES).map(|_| vec![draw.log(1.2e-38, 3e38) as f32]).collect();
+    for (row, got) in rows.iter().zip(evaluate(&gpu, "df_log", Tier::Stable, &rows)) {
+        let want = f64::from(row[0]).ln();
+        let error = (f64::from(got[0]) + f64::from(got[1]) - want).abs();
+        assert!(error <= 2_f64.powi(-30) * want.abs(), "ln {:e} is off by {error:e}", row[0]);
+    }
+}
+
+/// The columns of some output for each row, in f64.
+fn of(gpu: &Gpu, name: &str, tier: Tier, rows: &[Vec<f32>], output: &str) -> Vec<f64> {
+    let column = probe::column(name, output);
+    evaluate(gpu, name, tier, rows).iter().map(|row| f64::from(row[column])).collect()
+}
+
+/// Cases of an equation's own regions.
+fn drawn(name: &str, count: usize) -> Vec<Vec<f32>> {
+    let cases = Cases::draw(&probe::entry(name), count, 17);
+    (0..count).map(|row| cases.row(row).iter().map(|&x| x as f32).collect()).collect()
+}
+
+/// Both columns alike, to `rel` of themselves and `abs`.
+fn alike(what: &str, tier: Tier, form: &[f64], draws: &[f64], rel: f64, abs: f64) {
+    for (row, (a, b)) in form.iter().zip(draws).enumerate() {
+        let same = (a.is_nan() && b.is_nan()) || (a - b).abs() <= rel * a.abs().max(b.abs()) + abs;
+        assert!(same, "{what}, {}, row {row}: {a:e}, what draws {b:e}", tier.name());
+    }
+}
+
+/// The forms of the lecture and of docs/functions.md that no pass calls, against the functions that draw.
+#[test]
+fn laboratory_forms_are_made_of_what_draws() {
+    const ROWS: usize = 20_000;
+    let gpu = Gpu::new();
+    for tier in PROMISING {
+        // B4, B5, B6: a lit surface, as the passes put it together; the albedo is π k_d.
+        let rows: Vec<Vec<f32>> = drawn("blinn_phong", ROWS);
+        let angle = evaluate(&gpu, "half_angle", tier, &rows.iter().map(|r| r[..9].to_vec()).collect::<Vec<_>>());
+        let lit = of(&gpu, "blinn_phong", tier, &rows, "cos_in");
+        let lobes: Vec<Vec<f32>> = angle.iter().zip(&rows).map(|(a, r)| [&a[..], &r[12..13]].concat()).collect();
+        let lobe = of(&gpu, "phong_lobe", tier, &lobes, "lobe");
+        let spec = of(&gpu, "blinn_phong", tier, &rows, "spec");
+        // Of wide lobes the passes take the cosine again (phong_half_angle): those are compared where cosδ has digits.
+        let sharp = |i: &usize| lit[*i] >= 0.0 && angle[*i][1] < 0.45 && angle[*i][0] > 0.0;
+        let some: Vec<usize> = (0..ROWS).filter(sharp).collect();
+        assert!(some.len() > ROWS / 4, "{}", some.len());
+        let pick = |all: &[f64]| some.iter().map(|&i| all[i]).collect::<Vec<_>>();
+        alike("blinn_phong", tier, &pick(&spec), &pick(&lobe), 0.0, 0.0);
+        let parts: Vec<Vec<f32>> = angle.iter().zip(&lobe).map(|(a, l)| [&a[..], &[*l as f32]].concat()).collect();
+        let drawn_fr: Vec<f64> = of(&gpu, "reciprocal_lobe", tier, &parts, "fr")
+            .iter()
+            .zip(&rows)
+            .map(|(fr, r)| fr * f64::from(r[11]))
+            .collect();
+        let fr = of(&gpu, "reciprocal_phong", tier, &rows, "fr_spec");
+        alike("reciprocal_phong", tier, &pick(&fr), &pick(&drawn_fr), 1.2e-7, 1e-37);
+        let rows = drawn("lambert", ROWS);
+        let cosines: Vec<Vec<f32>> = rows.iter().map(|r| r[..6].to_vec()).collect();
+        let one = of(&gpu, "diffuse_brdf", tier, &[vec![1.0]], "fr")[0];
+        let cos = of(&gpu, "cosine", tier, &cosines, "cos");
+        let drawn_l: Vec<f64> = cos
+            .iter()
+            .zip(&rows)
+            .map(|(c, r)| f64::from(r[6]) * f64::from(r[7]) * std::f64::consts::PI * one * c.max(0.0))
+            .collect();
+        let l = of(&gpu, "lambert", tier, &rows, "Lref");
+        // Plain sums, whose cosines are good to 2e-7: 1.3e-7 for the products of the largest, 1e6, light.
+        for ((a, b), row) in l.iter().zip(&drawn_l).zip(&rows) {
+            let slack = f64::from(row[6]) * f64::from(row[7]) * 3e-7;
+            assert!((a - b).abs() <= slack, "lambert at {row:?}: {a:e}, what draws {b:e}");
+        }
+        // B1: D, G and F alone, and their product.
+        let rows = drawn("ggx_d", ROWS);
+        let d = evaluate(&gpu, "ggx_d", tier, &rows);
+        let parts: Vec<Vec<f32>> = d.iter().zip(&rows).map(|(d, r)| vec![d[0], d[1], r[6]]).collect();
+        let d: Vec<f64> = d.iter().map(|d| f64::from(d[2])).collect();
+        alike("ggx_d", tier, &d, &of(&gpu, "ggx_distribution", tier, &parts, "D"), 0.0, 0.0);
+        let rows = drawn("ggx_g", ROWS);
+        let vis = of(&gpu, "ggx_g", tier, &rows, "Vis");
+        alike("ggx_g", tier, &vis, &of(&gpu, "ggx_visibility", tier, &rows, "Vis"), 0.0, 0.0);
+        let rows = drawn("ggx_f", ROWS);
+        let parts: Vec<Vec<f32>> = rows.iter().map(|r| vec![r[0], r[0], r[0], 1.0, r[1]]).collect();
+        let f = of(&gpu, "ggx_f", tier, &rows, "F");
+        alike("ggx_f", tier, &f, &of(&gpu, "schlick", tier, &parts, "Fx"), 0.0, 0.0);
+        let rows = drawn("fresnel_schlick", ROWS);
+        let f = evaluate(&gpu, "fresnel_schlick", tier, &rows);
+        let f0 = of(&gpu, "normal_reflectance", tier, &rows.iter().map(|r| r[1..].to_vec()).collect::<Vec<_>>(), "F0");
+        let parts: Vec<Vec<f32>> = f.iter().zip(&rows).map(|(f, r)| vec![f[0], f[0], f[0], 1.0, r[0]]).collect();
+        let column = |k: usize| f.iter().map(|f| f64::from(f[k])).collect::<Vec<_>>();
+        alike("fresnel_schlick, F0", tier, &column(0), &f0, 0.0, 0.0);
+        alike("fresnel_schlick", tier, &column(1), &of(&gpu, "schlick", tier, &parts, "Fx"), 0.0, 0.0);
+        let rows: Vec<Vec<f32>> = drawn("ggx", ROWS);
+        let g = evaluate(&gpu, "ggx", tier, &rows);
+        let angle = evaluate(&gpu, "half_angle", tier, &rows.iter().map(|r| r[..9].to_vec()).collect::<Vec<_>>());
+        let parts: Vec<Vec<f32>> = angle.iter().zip(&rows).map(|(a, r)| vec![a[0], a[1], r[9]]).collect();
+        let d: Vec<f64> = g.iter().map(|g| f64::from(g[0])).collect();
+        // The form of the laboratory cuts sin² to 1.
+        alike("ggx, D", tier, &d, &of(&gpu, "ggx_distribution", tier, &parts, "D"), 2e-6, 0.0);
+        // C4, and texels.
+        let rows = drawn("srgb", ROWS);
+        let encode = of(&gpu, "srgb", tier, &rows, "encode");
+        alike("srgb, encode", tier, &encode, &of(&gpu, "srgb_encode", tier, &rows, "encode"), 0.0, 0.0);
+        let rows: Vec<Vec<f32>> = (0..256).map(|b| vec![b as f32 / 255.0]).collect();
+        let texels: Vec<Vec<f32>> = rows.iter().map(|r| vec![r[0]; 3]).collect();
+        let decode = of(&gpu, "srgb", tier, &rows, "decode");
+        alike("srgb, decode", tier, &decode, &of(&gpu, "linear_from_srgb", tier, &texels, "lineary"), 2.5e-6, 0.0);
+        // N10, N15: what is measured in the laboratory, of arcs and frames that draw.
+        let turns: Vec<f64> = (0..ROWS).map(|i| (i as f64 + 0.5) / ROWS as f64 * 3.14).collect();
+        let pair: Vec<Vec<f32>> =
+            turns.iter().map(|t| vec![1.0, 0.0, 0.0, t.cos() as f32, t.sin() as f32, 0.0]).collect();
+        let arcs: Vec<Vec<f32>> = pair.iter().map(|p| vec![p[4], p[3]]).collect();
+        let angle = of(&gpu, "angle_between", tier, &pair, "angle");
+        alike("angle_between", tier, &angle, &of(&gpu, "atan2f", tier, &arcs, "angle"), 6e-7, 0.0);
+        let rows = drawn("basis_gram", ROWS);
+        let gram = of(&gpu, "basis_gram", tier, &rows, "gram");
+        let measured = |(row, frame): (&Vec<f32>, Vec<f32>)| {
+            let wide = |v: &[f32]| glam::DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]));
+            let (n, t, b) = (wide(row), wide(&frame[..3]), wide(&frame[3..]));
+            let all = [t.dot(t) - 1.0, b.dot(b) - 1.0, t.dot(b), t.dot(n), b.dot(n)];
+            all.iter().fold(0.0, |most: f64, x| most.max(x.abs()))
+        };
+        let frames = evaluate(&gpu, "orthonormal_basis", tier, &rows);
+        let exact: Vec<f64> = rows.iter().zip(frames).map(measured).collect();
+        alike("basis_gram", tier, &gram, &exact, 1e-6, 1e-12);
+    }
+}
+
+/// Lights as the lecture has them, at a surface, against the light that passes ask the table for.
+#[test]
+fn lights_of_the_lecture_are_those_that_light_pictures() {
+    const ROWS: usize = 20_000;
+    let gpu = Gpu::new();
+    let mut draw = Draw::new(23);
+    let unit = |v: glam::DVec3| [v.x as f32, v.y as f32, v.z as f32];
+    for tier in PROMISING {
+        let all: Vec<_> = (0..ROWS).map(|_| (draw.direction(), draw.direction(), draw.log(1e-2, 1e3))).collect();
+        let n: Vec<[f32; 3]> = all.iter().map(|(n, ..)| unit(*n)).collect();
+        let q: Vec<[f32; 3]> = all.iter().map(|(_, l, r)| unit(*l * *r)).collect();
+        let ends = [0.0, 0.0, 0.0, 1.0, 0.0, 1.0];
+        // R4: the eye is the origin of what is drawn, and P of the lecture's light.
+        let table: Vec<Vec<f32>> = q.iter().map(|q| [&q[..], &[0.0], &ends[..]].concat()).collect();
+        let table: Vec<Vec<f32>> = table
+            .into_iter()
+            .map(|mut row| {
+                row.truncate(10);
+                row
+            })
+            .collect();
+        let lecture: Vec<Vec<f32>> =
+            q.iter().zip(&n).map(|(q, n)| [&[0.0; 3][..], &q[..], &n[..], &[1.0]].concat()).collect();
+        let arriving = evaluate(&gpu, "arriving_light", tier, &table);
+        let share: Vec<f64> = arriving.iter().map(|r| f64::from(r[3])).collect();
+        alike("light_point", tier, &of(&gpu, "light_point", tier, &lecture, "E_perp"), &share, 1e-6, 0.0);
+        let cosines: Vec<Vec<f32>> = arriving.iter().zip(&n).map(|(a, n)| [&n[..], &a[..3]].concat()).collect();
+        let cos: Vec<f64> = of(&gpu, "cosine", tier, &cosines, "cos").iter().map(|c| c.max(0.0)).collect();
+        alike("light_point, cosine", tier, &of(&gpu, "light_point", tier, &lecture, "cos_plus"), &cos, 0.0, 5e-7);
+        // R3.
+        let far: Vec<Vec<f32>> =
+            all.iter().map(|(_, l, _)| [&unit(*l)[..], &[1.0], &ends[..]].concat()[..10].to_vec()).collect();
+        let lecture: Vec<Vec<f32>> =
+            all.iter().zip(&n).map(|((_, l, _), n)| [&n[..], &unit(*l), &[3.0]].concat()).collect();
+        let arriving = evaluate(&gpu, "arriving_light", tier, &far);
+        assert!(arriving.iter().all(|row| row[3] == 1.0));
+        let cosines: Vec<Vec<f32>> = arriving.iter().zip(&n).map(|(a, n)| [&n[..], &a[..3]].concat()).collect();
+        let lit: Vec<f64> = of(&gpu, "cosine", tier, &cosines, "cos").iter().map(|c| 3.0 * c.max(0.0)).collect();
+        alike(
+            "light_directional",
+            tier,
+            &of(&gpu, "light_directional", tier, &lecture, "irradiance"),
+            &lit,
+            0.0,
+            1.5e-6,
+        );
+        // R2: the near side of a ball, and the first root of ray and sphere.
+        let balls: Vec<_> = all.iter().map(|(_, l, r)| (*l, *r, r * draw.log(1e-2, 0.9), draw.unit())).collect();
+        let reach: Vec<Vec<f32>> = balls
+            .iter()
+            .map(|(_, d, radius, x)| {
+                let sin2 = (radius / d).powi(2) * x * 0.9;
+                vec![(d * d) as f32, *radius as f32, (1.0 - sin2).sqrt() as f32, sin2 as f32]
+            })
+            .collect();
+        let rays: Vec<Vec<f32>> = balls
+            .iter()
+            .map(|(l, d, radius, x)| {
+                let sin2 = (radius / d).powi(2) * x * 0.9;
+                let towards = draw.at_angle(*l, sin2.sqrt().asin());
+                [&[0.0; 3][..], &unit(towards), &unit(*l * *d), &[*radius as f32]].concat()
+            })
+            .collect();
+        let t0 = of(&gpu, "ray_sphere", tier, &rays, "t0");
+        let t = of(&gpu, "ball_reach", tier, &reach, "t");
+        for (row, (a, b)) in t0.iter().zip(&t).enumerate() {
+            let (_, d, ..) = balls[row];
+            assert!((a - b).abs() <= 5e-6 * d, "ball of {:?}: {a:e}, what draws {b:e}", reach[row]);
+        }
+    }
+}
+
 /// Largest relative (or absolute) error of an output over its domain.
 fn largest(gpu: &Gpu, name: &str, output: &str, tier: Tier, relative: bool) -> f64 {
     let entry = probe::entry(name);
@@ -224,18 +427,9 @@ fn largest(gpu: &Gpu, name: &str, output: &str, tier: Tier, relative: bool) -> f
     }
 }
 
-/// Outputs that are right in fewer than a fifth of the cases: what a format of few bits stores, and an offset that is
-/// another rule than the fixed one of textbooks.
-const TEXTBOOK_RARELY_RIGHT: &[(&str, &str)] = &[
-    ("octahedral_round_trip", "dx"),
-    ("octahedral_round_trip", "dy"),
-    ("octahedral_round_trip", "dz"),
-    ("octahedral_round_trip_precise", "dx"),
-    ("octahedral_round_trip_precise", "dy"),
-    ("octahedral_round_trip_precise", "dz"),
-    ("half_round_trip", "y"),
-    ("offset_origin", "shift"),
-];
+/// Outputs that are right in fewer than a fifth of the cases: what a format of few bits stores.
+const TEXTBOOK_RARELY_RIGHT: &[(&str, &str)] =
+    &[("octahedral_round_trip", "dx"), ("octahedral_round_trip", "dy"), ("octahedral_round_trip", "dz")];
 
 #[test]
 fn the_textbook_form_is_the_same_formula() {
@@ -283,7 +477,7 @@ fn the_textbook_form_is_worse_where_numerics_says_so() {
         let fast = largest(&gpu, name, output, Tier::Fast, relative);
         let stable = largest(&gpu, name, output, Tier::Stable, relative);
         assert!(fast >= least, "{row}: {name}.{output} is off by {fast:e} in the textbook form, not by {least:e}");
-        assert!(stable * 10.0 < fast, "{row}: {name}.{output}: stable {stable:e}, textbook {fast:e}");
+        assert!(stable * 5.0 < fast, "{row}: {name}.{output}: stable {stable:e}, textbook {fast:e}");
     }
 }
 

@@ -107,20 +107,23 @@ fn hit_on_triangle(d: &mut Draw, size: f64) -> Vec<f32> {
     [vec![0.0; 7], columns(&[a, b, c]), vec![u as f32, v as f32]].concat()
 }
 
-/// Hit points of triangles, moved off them, as `ray.glsl` and `frame.glsl` do it: how many are not strictly on the side
-/// of the normal, and the largest shift.
-fn moved_off(gpu: &Gpu, offset: Tier, hits: &[Vec<f32>]) -> (usize, f32) {
+/// Hit points of triangles, moved off them as rays are, by 32 roundings of the largest coordinate, or by a fixed length: how
+/// many are not strictly on the side of the normal, and the largest shift.
+fn moved_off(gpu: &Gpu, fixed: Option<f32>, hits: &[Vec<f32>], size: f64) -> (usize, f64) {
     let points = evaluated(gpu, "hit_point", Tier::Stable, hits);
     let corners: Vec<Vec<f32>> = hits.iter().map(|hit| hit[7..16].to_vec()).collect();
-    let normals = evaluated(gpu, "triangle_normal", Tier::Compensated, &corners);
-    let rows: Vec<Vec<f32>> = points.iter().zip(&normals).map(|(p, n)| [&p[..], &n[..3]].concat()).collect();
-    let moved = evaluated(gpu, "offset_origin", offset, &rows);
+    let normals = evaluated(gpu, "triangle_normal", Tier::Stable, &corners);
+    let offset = fixed.unwrap_or(2.0 * size as f32 * 32.0 / 16_777_216.0);
+    let rows: Vec<Vec<f32>> =
+        points.iter().zip(&normals).map(|(p, n)| [&p[..], &n[..3], &[0.0; 3], &[offset]].concat()).collect();
+    let moved = evaluated(gpu, "offset_origin", Tier::Stable, &rows);
     let wrong = moved.iter().zip(&corners).filter(|(moved, corners)| {
         let (x, p) = (exact(corners), vector(&exact(moved), 0));
         let [a, b, c] = [0, 3, 6].map(|k| vector(&x, k));
         (b - a).cross(c - a).dot(p - a) <= 0.0
     });
-    (wrong.count(), moved.iter().fold(0.0, |most: f32, moved| most.max(moved[3])))
+    let shift = |(moved, p): (&Vec<f32>, &Vec<f32>)| (vector(&exact(moved), 0) - vector(&exact(p), 0)).length();
+    (wrong.count(), moved.iter().zip(&points).map(shift).fold(0.0, f64::max))
 }
 
 #[test]
@@ -129,8 +132,8 @@ fn a_ray_starts_on_the_right_side_of_its_surface() {
     let mut draw = Draw::new(38);
     for (size, fixed_fails) in [(1e-2, false), (1.0, false), (1e2, false), (1e3, true), (1e4, true), (1e5, true)] {
         let hits: Vec<Vec<f32>> = (0..20_000).map(|_| hit_on_triangle(&mut draw, size)).collect();
-        let (wrong, shift) = moved_off(&gpu, Tier::Stable, &hits);
-        let (fixed, _) = moved_off(&gpu, Tier::Fast, &hits);
+        let (wrong, shift) = moved_off(&gpu, None, &hits, size);
+        let (fixed, _) = moved_off(&gpu, Some(1e-4), &hits, size);
         eprintln!("coordinates {size:e}: {wrong} of 20000 behind, largest shift {shift:e}; by a fixed 1e-4: {fixed}");
         assert_eq!(wrong, 0, "of 20,000 points with coordinates of {size:e} are behind their triangles");
         assert!((fixed > 0) == fixed_fails, "a fixed offset at coordinates of {size:e}: {fixed} behind");

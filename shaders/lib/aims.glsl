@@ -3,6 +3,7 @@
 #ifndef AIMS_GLSL
 #define AIMS_GLSL
 #include "lib/encode.glsl"
+#include "lib/light.glsl"
 #include "lib/trace.glsl"
 
 layout(constant) const bool AIMED = false;
@@ -45,8 +46,7 @@ Cone cone_to(Aims at, uint i, vec3 p) {
     vec2 radius_share = unpackHalf2x16(ball.w);
     float radius = radius_share.x * at.cell;
     float square = max(dot(to, to), 1e-30);
-    float sin2 = min(radius * radius / square, 1.0);
-    return Cone(to * inversesqrt(square), sin2 / (1.0 + sqrt(1.0 - sin2)), radius_share.y);
+    return Cone(to * inversesqrt(square), sphere_cone(radius * radius, square), radius_share.y);
 }
 
 // `u.x` chooses among them, and the place in the cone with what is left of it.

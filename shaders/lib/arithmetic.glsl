@@ -1,4 +1,4 @@
-// Sums and products without their rounding, and exp, log, pow and the arc functions to a few units in the last place
+// Sums and products without their rounding, and exp, log, pow and the arc tangent to a few units in the last place
 // (ULP), which Vulkan's built-ins are not (numerics.md 2). Twins: src/optics/arithmetic.rs.
 //
 // From + − × / √ and bit patterns alone, so that every device that rounds to nearest gives the same bits; `precise`
@@ -169,7 +169,10 @@ DoubleFloat dot2(vec3 a, vec3 b) {
 // --------------------------------------------------------------------------------------------------------------------
 // Exponential
 
-// e^(x + lo) for |lo| ≤ ULP(x): x = k ln 2 + r, |r| ≤ ln(2)/2, e^r = 1 + r + r²P(r). Selects, not clamp: NaN stays NaN.
+// @eq N28: e^(x + lo)
+// @out y
+// |lo| ≤ ULP(x). x = k ln 2 + r, |r| ≤ ln(2)/2, e^r = 1 + r + r²P(r). +∞ above 88.72284; 0, or a denormal where the device
+// keeps them, below -87.34. Selects, not clamp: NaN stays NaN.
 float exp_pair(float x, float lo) {
     precise float c = x > 89.0 ? 89.0 : x;
     c = c < -104.0 ? -104.0 : c;
@@ -184,9 +187,7 @@ float exp_pair(float x, float lo) {
     return scaled;
 }
 
-// @eq N28: e^x
-// @out y
-// +∞ above 88.72284; 0, or a denormal where the device keeps them, below -87.34.
+// e^x
 float expf(float x) {
     if (ARITHMETIC == FAST) return exp(x);
     return exp_pair(x, 0.0);
@@ -241,33 +242,8 @@ float log_sum(float k, float f) {
     return y;
 }
 
-// @eq N17 N44: ln x
-// @out y
-// -∞ for x ≤ 0.
-float logf(float x) {
-    if (ARITHMETIC == FAST) return log(x);
-    Reduced m = log_reduced(log_scaled(x));
-    float y = log_sum(m.k - log_scale(x), m.f);
-    y = x <= LARGEST ? y : x;
-    return x <= 0.0 ? -plus_infinity() : y;
-}
-
-// @eq N17: ln(1 + x)
-// @out y
-// 1 + x = 2^k (1 + f), f taken from fl(1 + x) and corrected by what that rounding lost; for k = 0 f is x.
-// -∞ for x ≤ -1.
-float log1pf(float x) {
-    if (ARITHMETIC == FAST) return log(1.0 + x);
-    DoubleFloat u = two_sum(1.0, x);
-    Reduced m = log_reduced(u.hi);
-    // Beyond 2^100 the rest is 0 or too small, and 2^-k no normal number.
-    precise float f = m.f + u.lo * power_of_two(-min(int(m.k), 100));
-    float y = log_sum(m.k, f);
-    y = x <= LARGEST ? y : x;
-    return x <= -1.0 ? -plus_infinity() : y;
-}
-
-// ln x to 2^-30 of itself, near 1 as well. (-∞, 0) for x ≤ 0.
+// @eq N17 N44: hi + lo = ln x, to 2^-30 of itself
+// Near 1 as well. (-∞, 0) for x ≤ 0.
 // x = 2^k m, ln m = ln c + 2 artanh(s), s = (m − c)/(m + c), c the nearest of three numbers, so that s², and with it
 // the part that f32 must carry, stays below 0.0035. ln c is a multiple of 1/512, as LN2_HI is, and some 1e-8.
 DoubleFloat df_log(float x) {
@@ -308,14 +284,7 @@ float powf(float x, float y) {
 }
 
 // --------------------------------------------------------------------------------------------------------------------
-// Arcs
-
-// arcsin(s)/s − 1 of z = s² ≤ 1/4.
-float asin_series(float z) {
-    precise float p = (((4.22197208e-2 * z + 2.41481625e-2) * z + 4.54766564e-2) * z + 7.49524906e-2) * z + 0.166667536;
-    precise float y = p * z;
-    return y;
-}
+// Arc tangent
 
 // k π/4 + m (s + rest), where s + rest would round once more than need be.
 float arc_sum(float k, float m, float s, float rest) {
@@ -325,34 +294,6 @@ float arc_sum(float k, float m, float s, float rest) {
 
 float with_sign_of(float magnitude, float x) {
     return uintBitsToFloat(floatBitsToUint(magnitude) | (floatBitsToUint(x) & 0x80000000u));
-}
-
-// @eq N10: arcsin x
-// @out y
-// Above 1/2 by the half angle: π/2 − 2 arcsin √((1 − x)/2), whose difference is exact. Beyond ±1 the value at ±1.
-float asinf(float x) {
-    if (ARITHMETIC == FAST) return asin(x);
-    float a = abs(x) > 1.0 ? 1.0 : abs(x);
-    bool high = a > 0.5;
-    precise float z = high ? 0.5 - 0.5 * a : a * a;
-    precise float s = high ? sqrt(z) : a;
-    precise float rest = s * asin_series(z);
-    return with_sign_of(arc_sum(high ? 2.0 : 0.0, high ? -2.0 : 1.0, s, rest), x);
-}
-
-// @eq N10: arccos x
-// @out y
-// Near 1 by the half angle, 2 arcsin √((1 − x)/2), near -1 by π less that. Beyond ±1 the value at ±1.
-float acosf(float x) {
-    if (ARITHMETIC == FAST) return acos(x);
-    float a = abs(x) > 1.0 ? 1.0 : abs(x);
-    bool high = a > 0.5;
-    precise float z = high ? 0.5 - 0.5 * a : a * a;
-    precise float s = high ? sqrt(z) : a;
-    precise float rest = s * asin_series(z);
-    float k = high ? (x < 0.0 ? 4.0 : 0.0) : 2.0;
-    float m = high ? 2.0 : -1.0;
-    return arc_sum(k, x < 0.0 && high ? -2.0 : x < 0.0 ? 1.0 : m, s, rest);
 }
 
 // @eq N10: the angle of (x, y) from +x

@@ -26,6 +26,7 @@ struct HalfAngle {
     float sum2;   // (L + V)²; 0 for L = −V, where there is no H, cos_h is 0 and sin2_h 1
 };
 
+// @eq B1 N9 N18 N19: H = (L + V)/|L + V|, cosθ_h = N·H, cosθ_d = V·H = |L + V|/2
 // Where L is near −V their sum is exact, but not the sum of two vectors of one length: lengths that differ by 1e-7 turn
 // it. It has to be perpendicular to D = L − V, so what it has along D goes: (L² − V²)/4 D. 2(1 + L·V) would lose (L +
 // V)² altogether (numerics.md 18). Compensated: both sums in pairs, N × (L + V) and N·(L + V) of exact products.
@@ -119,19 +120,28 @@ HalfAngle half_angle_in_range(HalfAngle a) {
 // --------------------------------------------------------------------------------------------------------------------
 // The lecture's empirical models
 
+// @eq B4: f_r = k_d = albedo/π, of a white ground that `enters` of the light reaches
+// @out fr
+float diffuse_brdf(float enters) {
+    return INV_PI * enters;
+}
+
 struct Lambert {
     float cos_plus;
     float Lref;
 };
 
 // @eq B2 B4 B9 N25: L = L_in k_d cos⁺θ, cosθ = N·L
+// @lab diffuse_brdf: laboratory_forms_are_made_of_what_draws
 Lambert lambert(vec3 N, vec3 L, float Lin, float kd) {
     float c = grazing_cosine(N, L);
     float cos_plus = ARITHMETIC == FAST ? max(c, 0.0) : max(cosine_in_range(c), 0.0);
     return Lambert(cos_plus, Lin * (kd * cos_plus));
 }
 
-// cos^shine of the angle, 0 from 90° on and for L = −V. cos^shine = e^(shine/2 ln(1 − sin²)): for a shine of 1e7 cosδ
+// @eq B5 N17: (cos⁺δ)^shine
+// @out lobe
+// 0 from 90° on and for L = −V. cos^shine = e^(shine/2 ln(1 − sin²)): for a shine of 1e7 cosδ
 // is 1 − 1e-6 and has one digit left of δ, sin²δ has them all; pow on top loses the rest (numerics.md 17). Beyond 45°
 // by the cosine itself.
 float phong_lobe(HalfAngle a, float shine) {
@@ -150,7 +160,9 @@ float phong_lobe(HalfAngle a, float shine) {
     return lobe;
 }
 
-// The lobe over (L + V)² (lecture B6); 0 for L = −V.
+// @eq B6 N18: the lobe over (L + V)²
+// @out fr
+// 0 for L = −V.
 float reciprocal_lobe(HalfAngle a, float lobe) {
     return ARITHMETIC == FAST || a.sum2 > 0.0 ? lobe / a.sum2 : 0.0;
 }
@@ -165,6 +177,7 @@ struct BlinnPhong {
 
 // @eq B5 B9 N9 N17 N19: L = L_in (k_d cos⁺θ + k_s (cos⁺δ)^shine), cosδ = N·H, H = (L + V)/|L + V|
 // Self-shadow: spec and L are 0 for cosθ < 0, not for cosθ = 0. V may be anywhere, as in the lecture's shade().
+// @lab phong_lobe: laboratory_forms_are_made_of_what_draws
 BlinnPhong blinn_phong(vec3 N, vec3 L, vec3 V, float Lin, float kd, float ks, float shine) {
     BlinnPhong r;
     HalfAngle a = phong_half_angle(N, L, V);
@@ -191,6 +204,7 @@ struct ReciprocalPhong {
 
 // @eq B6 N17 N18: L = L_in (k_d + f_s) cos⁺θ, f_s = k_s (cos⁺δ)^shine/(L + V)²
 // The BRDF is symmetric in L and V; f_s is 0 for cosθ < 0, as is L.
+// @lab reciprocal_lobe: laboratory_forms_are_made_of_what_draws
 ReciprocalPhong reciprocal_phong(vec3 N, vec3 L, vec3 V, float Lin, float kd, float ks, float shine) {
     HalfAngle a = phong_half_angle(N, L, V);
     float c = grazing_cosine(N, L);
@@ -216,7 +230,9 @@ float shine_from_alpha(float alpha) {
 // --------------------------------------------------------------------------------------------------------------------
 // GGX microfacets
 
-// D of cosine and sine (Walter et al. 2007). c²(α² − 1) + 1 cancels to nothing at the peak of a narrow lobe; with
+// @eq B1 N20: D = α²/(π (α² + sin²θ_h (1 − α²))²), 0 for cosθ_h ≤ 0
+// @out D
+// Walter et al. 2007. c²(α² − 1) + 1 cancels to nothing at the peak of a narrow lobe; with
 // c² = 1 − s² it is α² + s²(1 − α²), a sum, and all that is left of the cosine is its sign (numerics.md 20).
 float ggx_distribution(float cos_h, float sin2_h, float alpha) {
     float D;
@@ -241,6 +257,7 @@ struct GgxD {
 };
 
 // @eq B1 N9 N20: D = α²/(π (cos²θ_h α² + sin²θ_h)²), 0 for cosθ_h ≤ 0
+// @lab ggx_distribution: laboratory_forms_are_made_of_what_draws
 GgxD ggx_d(vec3 N, vec3 H, float alpha) {
     float cos_h = cosine(N, H);
     float sin2_h = sine_squared(ARITHMETIC == STABLE && cos_h < 0.0 ? -N : N, H);
@@ -256,6 +273,11 @@ GgxD ggx_d(vec3 N, vec3 H, float alpha) {
 // √(cos² + α² sin²), which is cosθ (1 + 2Λ), in a form that is a sum for every α ≤ 1.
 float smith_root(float c, float alpha) {
     return sqrt(alpha * alpha + (1.0 - alpha) * (1.0 + alpha) * (c * c));
+}
+
+// G₁ = 1/(1 + Λ) without a quotient that is ∞ at 90°.
+float smith_g1(float c, float alpha) {
+    return 2.0 * c / (c + smith_root(c, alpha));
 }
 
 // @eq B1 N22: Λ = (√(1 + α² tan²θ) − 1)/2
@@ -276,8 +298,9 @@ float ggx_lambda(float cos_v, float alpha) {
     return lambda;
 }
 
-// Height-correlated Smith visibility G₂/(4 cosθ_l cosθ_v) (Heitz 2014), without division by the cosines (numerics.md
-// 23). Both 0: a large number, not infinity.
+// @eq B1 N23: Vis = G₂/(4 cosθ_l cosθ_v), height-correlated
+// @out Vis
+// Smith's (Heitz 2014), without division by the cosines. Both 0: a large number, not infinity.
 float ggx_visibility(float cos_l, float cos_v, float alpha) {
     float Vis;
     if (ARITHMETIC == FAST) {
@@ -300,6 +323,7 @@ struct GgxG {
 
 // @eq B1 N23: G₁ = 1/(1 + Λ), G₂ = 1/(1 + Λ_l + Λ_v), Vis = G₂/(4 N·L N·V)
 // Λ → ∞ at 90°, where G₁ = 2c/(c + √(c² + α² sin²)) goes to 0 in all its digits. Cosines are clamped to [0, 1].
+// @lab ggx_visibility: laboratory_forms_are_made_of_what_draws
 GgxG ggx_g(float NoL, float NoV, float alpha) {
     GgxG r;
     if (ARITHMETIC == FAST) {
@@ -324,9 +348,10 @@ GgxG ggx_g(float NoL, float NoV, float alpha) {
 
 // @eq F2 N1: F = F0 + (1 − F0)(1 − V·H)⁵
 // @out F
+// @lab schlick: laboratory_forms_are_made_of_what_draws
 float ggx_f(float F0, float VoH) {
     float f0 = ARITHMETIC == FAST ? F0 : clamp(F0, 0.0, 1.0);
-    return f0 + (1.0 - f0) * schlick_weight(VoH);
+    return schlick(vec3(f0), 1.0, VoH).x;
 }
 
 struct Ggx {
@@ -339,6 +364,7 @@ struct Ggx {
 
 // @eq B1 B2 B3: f_r = D G₂ F/(4 N·L N·V)
 // V·H is |L + V|/2. f_r is 0 where L or V is not above the surface.
+// @lab ggx_distribution: laboratory_forms_are_made_of_what_draws
 Ggx ggx(vec3 N, vec3 L, vec3 V, float alpha, float F0) {
     HalfAngle h = half_angle(N, L, V);
     float NoL = grazing_cosine(N, L);
@@ -372,8 +398,8 @@ float ggx_missing(float albedo) {
 
 // @eq B1: factor = 1 + F0 (1/E − 1)
 // @out factor
-// Light that leaves the microsurface after more than one reflection keeps the shape of the lobe: scaled so that a white
-// metal reflects all it receives (Turquin 2019). E is the directional albedo of the lobe with F = 1, clamped to
+// The lobe scaled so that a white metal reflects all it receives (Turquin 2019). That light keeps the shape of the lobe after
+// more than one reflection is a simplification: it leaves the microsurface about evenly (lecture B1). E is the directional albedo of the lobe with F = 1, clamped to
 // [1/1024, 1]; that of GGX is above 0.3.
 float ggx_compensation(float F0, float albedo) {
     return 1.0 + F0 * ggx_missing(albedo);
@@ -407,22 +433,11 @@ GgxSample ggx_sample(float u, float alpha) {
     return r;
 }
 
-struct GgxPdf {
-    float pdf_h;
-    float pdf_l;
-};
-
-// @eq B1: p(H) = D cosθ_h, p(L) = p(H)/(4 V·H), per solid angle
-// Of ggx_sample, and of V mirrored at its half vectors. 0 for L = −V.
-GgxPdf ggx_pdf(vec3 N, vec3 L, vec3 V, float alpha) {
-    HalfAngle h = half_angle(N, L, V);
-    float a = alpha;
-    if (ARITHMETIC != FAST) {
-        h = half_angle_in_range(h);
-        a = alpha_in_domain(alpha);
-    }
-    float pdf_h = ggx_distribution(h.cos_h, h.sin2_h, a) * h.cos_h;
-    return GgxPdf(pdf_h, ARITHMETIC == FAST || h.cos_d > 0.0 ? pdf_h / (4.0 * h.cos_d) : 0.0);
+// @eq B1: p(L) = G₁ D/(4 cosθ_v) per solid angle: of V mirrored at the half vectors of visible_half_vector
+// @out pdf
+// Heitz 2018.
+float mirrored_pdf(float cos_v, HalfAngle h, float alpha) {
+    return smith_g1(cos_v, alpha) * ggx_distribution(h.cos_h, h.sin2_h, alpha) / (4.0 * cos_v);
 }
 
 // (cos, sin) of 2πu. Turns reduce exactly: the nearest quarter is taken off, the rest is within ±π/4. The built-ins
@@ -446,7 +461,9 @@ vec2 circle(float u) {
     return r;
 }
 
-// A half vector drawn among those the viewer sees (Heitz, JCGT 7(4) 2018), v and h in the frame of the normal.
+// @eq B1: H of density D max(V·H, 0) G₁/cosθ_v: a point of a disk, moved up by what the viewer sees of the hemisphere below
+// @out h
+// Heitz, JCGT 7(4) 2018; v and h in the frame of the normal.
 vec3 visible_half_vector(vec3 v, float alpha, vec2 u) {
     vec3 stretched = normalize(vec3(alpha * v.xy, v.z));
     float across2 = dot(stretched.xy, stretched.xy);
@@ -459,7 +476,7 @@ vec3 visible_half_vector(vec3 v, float alpha, vec2 u) {
     return normalize(vec3(alpha * h.xy, max(h.z, 0.0)));
 }
 
-// The half vector of one event, and what masking leaves of light along l: G2/G1.
+// The half vector of one event.
 vec3 half_vector(vec3 n, vec3 v, float alpha, vec2 u) {
     OrthonormalBasis frame = orthonormal_basis(n);
     vec3 local = vec3(dot(v, frame.t), dot(v, frame.b), max(dot(v, n), 1e-4));
@@ -467,7 +484,10 @@ vec3 half_vector(vec3 n, vec3 v, float alpha, vec2 u) {
     return frame.t * h.x + frame.b * h.y + n * h.z;
 }
 
-float unmasked(float cos_v, float cos_l, float alpha) {
+// @eq B1 N22: G₂/G₁ = (1 + Λ_v)/(1 + Λ_v + Λ_l)
+// @out share
+// What masking leaves of light along l that was mirrored at a half vector the viewer sees; cosines from 1e-4 on.
+float smith_g2_over_g1(float cos_v, float cos_l, float alpha) {
     float lambda_v = ggx_lambda(max(abs(cos_v), 1e-4), alpha);
     float lambda_l = ggx_lambda(max(abs(cos_l), 1e-4), alpha);
     return (1.0 + lambda_v) / (1.0 + lambda_v + lambda_l);

@@ -111,12 +111,6 @@ struct Scattered {
     float plain_pdf; // and would be if nothing were aimed at
 };
 
-// Density of a direction mirrored at a half vector drawn among those that the viewer sees, G₁ D/(4 cosθ_v) (Heitz 2018).
-float mirrored_pdf(float cos_v, HalfAngle h, float alpha) {
-    float g1 = 2.0 * cos_v / (cos_v + smith_root(cos_v, alpha));
-    return g1 * ggx_distribution(h.cos_h, h.sin2_h, alpha) / (4.0 * cos_v);
-}
-
 // For light from the unit direction l, on whichever side.
 Scattered scattered(Bsdf b, vec3 l) {
     Surface s = b.s;
@@ -146,7 +140,7 @@ Scattered scattered(Bsdf b, vec3 l) {
                 r.pdf += b.shares.y * mirrored_pdf(b.cos_v, h, s.alpha);
             }
         }
-        r.f_cos = s.diffuse * (INV_PI * enters * cos_l) + lobe;
+        r.f_cos = s.diffuse * (diffuse_brdf(enters) * cos_l) + lobe;
         r.pdf += b.shares.z * cos_l * INV_PI;
     }
     if (TRANSMISSIVE && FROSTED) {
@@ -165,11 +159,10 @@ Scattered scattered(Bsdf b, vec3 l) {
             float stretch = b.sheet ? 0.25 / max(v_h, 1e-6)
                                     : b.n2 * b.n2 * abs(l_h) / max(denominator * denominator, 1e-12);
             bool meets_facet = v_h > 0.0 && (b.sheet || l_h < 0.0);
-            float g1 = 2.0 * b.cos_v / (b.cos_v + smith_root(b.cos_v, s.alpha));
-            float pdf = g1 * ggx_distribution(s.n, h, s.alpha) * v_h / b.cos_v * stretch;
+            float pdf = smith_g1(b.cos_v, s.alpha) * ggx_distribution(s.n, h, s.alpha) * v_h / b.cos_v * stretch;
             bool total;
             vec3 f_dielectric = reflectance_between(s, b.solid, b.n1, b.n2, v_h, total);
-            float share = b.transmits * (1.0 - largest(f_dielectric)) * unmasked(b.cos_v, cos_l, s.alpha);
+            float share = b.transmits * (1.0 - largest(f_dielectric)) * smith_g2_over_g1(b.cos_v, cos_l, s.alpha);
             if (meets_facet) {
                 r.f_cos = b.tint * (share * pdf);
                 r.pdf = b.shares.w * pdf;

@@ -107,11 +107,11 @@ SkySample sample_sky(uint word_x, uint word_y) {
 }
 
 // Twice the area of a triangle, times the unit normal of its front.
-vec3 doubled_area(uint triangle, out vec3 a, out vec3 ab, out vec3 ac) {
+vec3 doubled_area_of(uint triangle, out vec3 a, out vec3 ab, out vec3 ac) {
     a = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3).xyz);
     ab = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 1).xyz) - a;
     ac = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 2).xyz) - a;
-    return cross(ab, ac);
+    return doubled_area(ab, ac);
 }
 
 // Radiance that a triangle sends from the place with these barycentrics.
@@ -169,7 +169,7 @@ LightSample sample_light(vec3 origin, uvec2 words) {
             float y = unit_float(words.y);
             vec2 w = y > x ? vec2(0.5 * x, y - 0.5 * x) : vec2(x - 0.5 * y, 0.5 * y);
             vec3 a, ab, ac;
-            vec3 doubled = doubled_area(emitter.w, a, ab, ac);
+            vec3 doubled = doubled_area_of(emitter.w, a, ab, ac);
             float size = vector_length(doubled);
             vec3 n = doubled / size;
             vec3 p = a + w.x * ab + w.y * ac;
@@ -180,7 +180,7 @@ LightSample sample_light(vec3 origin, uvec2 words) {
             to_light += n * (side * trace_terms.offset);
             float r2 = dot(to_light, to_light);
             float cos_light = -side * dot(n, to_light) * inversesqrt(r2);
-            float pdf = probability * 2.0 / size * r2 / cos_light;
+            float pdf = density_per_solid_angle(probability * 2.0 / size, r2, cos_light);
             bool lights = shows && r2 > 0.0 && cos_light > 0.0 && pdf <= LARGEST;
             vec3 radiance = emission_at(emitter.w, w.x, w.y);
             r = LightSample(to_light, 1.0, lights ? radiance / pdf : vec3(0.0), lights ? pdf : 0.0);

@@ -41,7 +41,7 @@ float snorm_steps(uint bits) {
     return float((1u << (clamp(bits, 2u, 24u) - 1u)) - 1u);
 }
 
-// What the round trips below read: +Z for the zero vector.
+// What the round trip below reads: +Z for the zero vector.
 vec3 unit_or_z(vec3 n) {
     SafeNormalized unit = safe_normalize(n);
     return unit.is_zero ? vec3(0.0, 0.0, 1.0) : unit.n;
@@ -49,6 +49,7 @@ vec3 unit_or_z(vec3 n) {
 
 // @eq N16: d = decode(round(encode(n)·m)/m), m = 2^(bits − 1) − 1
 // Each component to the nearest step, as a texture unit stores it. bits is clamped to [2, 24].
+// @lab unit_from_octahedral: what_is_stored_in_fewer_bits_is_off_by_as_much
 OctahedralRoundTrip octahedral_round_trip(vec3 n, uint bits) {
     vec3 unit = unit_or_z(n);
     float steps = snorm_steps(bits);
@@ -56,48 +57,12 @@ OctahedralRoundTrip octahedral_round_trip(vec3 n, uint bits) {
     return OctahedralRoundTrip(d, angle_between(unit, d) * (180.0 / PI));
 }
 
-// @eq N16: the best of the four steps around encode(n)·m
-// A third less error for four decodings. "Best" is the smallest |d − n|²: at 16 bits the cosines of all four are 1.
-OctahedralRoundTrip octahedral_round_trip_precise(vec3 n, uint bits) {
-    vec3 unit = unit_or_z(n);
-    float steps = snorm_steps(bits);
-    vec2 p = octahedral_from_unit(unit) * steps;
-    // The nearest step and the next on the other side of p, within the square.
-    vec2 near_step = floor(p + 0.5);
-    vec2 next_step = near_step + vec2(p.x >= near_step.x ? 1.0 : -1.0, p.y >= near_step.y ? 1.0 : -1.0);
-    next_step = clamp(next_step, vec2(-steps), vec2(steps));
-    vec3 d = unit_from_octahedral(near_step / steps);
-    if (ARITHMETIC != FAST) {
-        vec3 right = unit_from_octahedral(vec2(next_step.x, near_step.y) / steps);
-        vec3 above = unit_from_octahedral(vec2(near_step.x, next_step.y) / steps);
-        vec3 both = unit_from_octahedral(next_step / steps);
-        float least = dot(d - unit, d - unit);
-        float distance2 = dot(right - unit, right - unit);
-        d = distance2 < least ? right : d;
-        least = min(least, distance2);
-        distance2 = dot(above - unit, above - unit);
-        d = distance2 < least ? above : d;
-        least = min(least, distance2);
-        d = dot(both - unit, both - unit) < least ? both : d;
-    }
-    return OctahedralRoundTrip(d, angle_between(unit, d) * (180.0 / PI));
-}
-
-const float LARGEST_HALF = 65504.0;
-
-// @eq N43: the half-precision number next to min(|x|, 65504), with the sign of x
-// @out y
-// Clamped first: from 65520 on a conversion gives ∞, which every later sum keeps.
-float half_round_trip(float x) {
-    float stored = ARITHMETIC == FAST ? x : clamp(x, -LARGEST_HALF, LARGEST_HALF);
-    return unpackHalf2x16(packHalf2x16(vec2(stored, 0.0))).x;
-}
-
 // @eq N42: d = near/z in f32, z = near/d
 // @out z_back
 // Reversed infinite depth: the floats of d lie as densely, relative to it, at every distance. The tier fast is the
 // standard depth d = far (z − near)/(z (far − near)), which is nearly 1 for most z; `far` is of use to it alone. What
 // is nearer than `near` > 0 comes back at it, what has near/z = 0 at infinity; near ≤ 0: 0.
+// @lab view_depth: study_scenes_are_where_the_rays_find_them
 float depth_round_trip(float z, float near, float far) {
     float z_back;
     if (ARITHMETIC == FAST) {
@@ -110,6 +75,16 @@ float depth_round_trip(float z, float near, float far) {
         z_back = near > 0.0 ? z_back : 0.0;
     }
     return z_back;
+}
+
+// @eq N45: sRGB to linear by IEC 61966-2-1, of bytes
+// @out linear
+// x^2.4 as x² P(⁴√x), within 2e-6 of itself: what a texture unit does, for texels that rays read one by one.
+vec3 linear_from_srgb(vec3 x) {
+    vec3 t = (x + 0.055) / 1.055;
+    vec3 q = sqrt(sqrt(t));
+    vec3 p = (((4.466797411e-2 * q - 0.231552169) * q + 0.908784986) * q + 0.298558623) * q - 2.045780234e-2;
+    return mix(t * t * p, x / 12.92, lessThanEqual(x, vec3(0.04045)));
 }
 
 // Clear-coat strength and roughness as the two bytes of one 16-bit number, specular strength, and the coat's normal:

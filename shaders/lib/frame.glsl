@@ -62,6 +62,7 @@ vec3 cross_of_units(vec3 u, vec3 v) {
 // @out angle
 // arccos(u·v) has no digits left for small angles. Both arguments are scaled by |u||v| alike, so that rounded lengths
 // do not matter; Kahan's 2 atan2(|u − v|, |u + v|) is sensitive to them. Lengths of about 1; a zero vector: 0.
+// @lab atan2f: laboratory_forms_are_made_of_what_draws
 float angle_between(vec3 u, vec3 v) {
     float angle;
     if (ARITHMETIC == FAST) {
@@ -82,7 +83,9 @@ float grazing_cosine(vec3 a, vec3 b) {
     return ARITHMETIC == FAST ? dot(a, b) : lengths > 0.0 ? dot2(a, b).hi / lengths : 0.0;
 }
 
-// Cosine between two directions. A plain sum is good to 2e-7, lengths of rounded unit vectors included: nothing near
+// @eq B2 N25: cosθ = a·b
+// @out cos
+// Of unit vectors. A plain sum is good to 2e-7, lengths of rounded unit vectors included: nothing near
 // 90°, where it is all error. Compensated: the sum of exact products, over the lengths.
 float cosine(vec3 a, vec3 b) {
     return ARITHMETIC == COMPENSATED ? grazing_cosine(a, b) : dot(a, b);
@@ -129,6 +132,7 @@ OrthonormalBasis orthonormal_basis(vec3 n) {
 // @eq N15: the largest of |t·t − 1|, |b·b − 1|, |t·b|, |t·n|, |b·n|
 // @out gram
 // How far a basis is from orthonormal, by exact products. A NaN in it counts as 3e38, so that a maximum cannot hide it.
+// @lab orthonormal_basis: laboratory_forms_are_made_of_what_draws
 float basis_gram(vec3 n) {
     OrthonormalBasis basis = orthonormal_basis(n);
     float tt = df_add(dot2(basis.t, basis.t), DoubleFloat(-1.0, 0.0)).hi;
@@ -145,6 +149,7 @@ float basis_gram(vec3 n) {
 // without the division by a determinant that is 0 for lengths of 1e-14 already. Its sign keeps mirrored fronts in
 // front. Each column is scaled by a power of two of its own; what that does to the cofactors is undone at n.
 // Where M or n leaves no direction: the zero vector.
+// @host src/pass/scene.rs: the matrix that carries normals of an instance
 vec3 transformed_normal(vec3 a, vec3 b, vec3 c, vec3 n) {
     vec3 N;
     if (ARITHMETIC == FAST) {
@@ -171,6 +176,12 @@ float df_difference_of_products(DoubleFloat x, DoubleFloat y, DoubleFloat z, Dou
     return df_add(df_mul(x, y), df_negate(df_mul(z, w))).hi;
 }
 
+// u × v: twice the area of the triangle with these edges, times the unit normal on the side from which they turn
+// counter-clockwise.
+vec3 doubled_area(vec3 u, vec3 v) {
+    return cross(u, v);
+}
+
 struct TriangleNormal {
     vec3 n;
     bool degenerate;
@@ -179,11 +190,12 @@ struct TriangleNormal {
 // @eq N40: n = (b − a) × (c − a), normalised
 // Compensated: the edges as pairs, so that they are exact, and the six products too: the area of a sliver is a small
 // difference of large products of rounded edges otherwise. (a × b + b × c + c × a by dot2 does the same near the
-// origin, and loses digits with the distance from it.) No area: the zero vector, and a flag.
+// origin, and loses digits with the distance from it.) No area: the zero vector, and a flag. Stable: edges scaled by
+// powers of two, which round nothing.
 TriangleNormal triangle_normal(vec3 a, vec3 b, vec3 c) {
     TriangleNormal r;
     if (ARITHMETIC == FAST) {
-        r = TriangleNormal(normalize(cross(b - a, c - a)), false);
+        r = TriangleNormal(normalize(doubled_area(b - a, c - a)), false);
     } else if (ARITHMETIC == COMPENSATED) {
         float s = scale_to_one(largest_component(b - a));
         float t = scale_to_one(largest_component(c - a));
@@ -202,8 +214,10 @@ TriangleNormal triangle_normal(vec3 a, vec3 b, vec3 c) {
         vec3 v = c - a;
         u *= scale_to_one(largest_component(u));
         v *= scale_to_one(largest_component(v));
-        SafeNormalized unit = safe_normalize(cross(u, v));
-        r = TriangleNormal(unit.n, unit.is_zero);
+        vec3 across = doubled_area(u, v);
+        float size = largest_component(across);
+        r.degenerate = size < SMALLEST_NORMAL;
+        r.n = r.degenerate ? vec3(0.0) : normalize(across * scale_to_one(size));
     }
     return r;
 }
@@ -211,6 +225,7 @@ TriangleNormal triangle_normal(vec3 a, vec3 b, vec3 c) {
 // @eq Q5: N = (a x, b y, c z)/|…|, half the gradient of a x² + b y² + c z²
 // @out N
 // The normal of a level surface is the gradient of its function. At its centre: the zero vector.
+// @host src/study/shape.rs: the normals of balls
 vec3 quadric_normal(vec3 p, vec3 k) {
     vec3 n;
     if (ARITHMETIC == FAST) {

@@ -14,9 +14,23 @@ float schlick_weight(float cos_in) {
     return ARITHMETIC == FAST ? pow(1.0 - cos_in, 5.0) : m2 * m2 * m;
 }
 
-// The curve from f0 to f90: of materials that are given by reflectances.
+// @eq F2 N1: F = F0 + (F90 − F0)(1 − cosθ)⁵
+// @out F
+// Of materials that are given by reflectances.
 vec3 schlick(vec3 f0, float f90, float cos_in) {
     return f0 + (vec3(f90) - f0) * schlick_weight(cos_in);
+}
+
+// @eq F2: F0 = ((n − 1)² + κ²)/((n + 1)² + κ²)
+// @out F0
+// n − 1 is exact for n in [1/2, 2] (Sterbenz), so F0 keeps its digits where it vanishes.
+float normal_reflectance(float n, float kappa) {
+    float k2 = kappa * kappa;
+    return ((n - 1.0) * (n - 1.0) + k2) / ((n + 1.0) * (n + 1.0) + k2);
+}
+
+vec3 normal_reflectance(vec3 n, vec3 kappa) {
+    return vec3(normal_reflectance(n.r, kappa.r), normal_reflectance(n.g, kappa.g), normal_reflectance(n.b, kappa.b));
 }
 
 struct FresnelSchlick {
@@ -25,14 +39,12 @@ struct FresnelSchlick {
 };
 
 // @eq F2 N1: F = F0 + (1 − F0)(1 − cosθ)⁵, F0 = ((n − 1)² + κ²)/((n + 1)² + κ²)
-// n − 1 is exact for n in [1/2, 2] (Sterbenz), so F0 keeps its digits where it vanishes.
+// @lab schlick: laboratory_forms_are_made_of_what_draws
 FresnelSchlick fresnel_schlick(float cos_in, float n, float kappa) {
     float index = clamp(n, 0.0, LARGEST_INDEX);
     float k = clamp(kappa, 0.0, LARGEST_INDEX);
-    float below = index - 1.0;
-    float above = index + 1.0;
-    float F0 = (below * below + k * k) / (above * above + k * k);
-    return FresnelSchlick(F0, F0 + (1.0 - F0) * schlick_weight(cos_in));
+    float F0 = normal_reflectance(index, k);
+    return FresnelSchlick(F0, schlick(vec3(F0), 1.0, cos_in).x);
 }
 
 // g² = (n cosθ_t)² = c² + n² − 1 to 2^-32 of what cancels, for the price of a rewrite. With a and b the larger and the
@@ -87,7 +99,8 @@ struct FresnelDielectric {
 // Near n = 1 both differences cancel. Multiplied by their conjugates they are products:
 //   r_s = −(n² − 1)/(c + g)²,   r_p = (n² − 1)(c²(n² + 1) − 1)/(n²c + g)².
 // Total internal reflection (g² ≤ 0, only for n < 1): F = r_s = r_p = 1, cosθ_t = 0. At c = 0, F = 1 for every n: the
-// limit for n ≠ 1.
+// limit for n ≠ 1. For n = 1 there is no boundary and g is c: its square leaves the range of floats below 1e-19, and
+// cosθ_t = 0, F = 1 came of that.
 FresnelDielectric fresnel_dielectric(float cos_in, float n) {
     FresnelDielectric r = FresnelDielectric(1.0, 1.0, 1.0, 0.0, true);
     if (ARITHMETIC == FAST) {
@@ -104,7 +117,7 @@ FresnelDielectric fresnel_dielectric(float cos_in, float n) {
         float index = clamp(n, 0.0, LARGEST_INDEX);
         float g2 = refracted_square(c, index);
         if (index >= 1.0 || g2 > 0.0 && index > 0.0) {
-            float g = sqrt(max(g2, 0.0));
+            float g = index == 1.0 ? c : sqrt(max(g2, 0.0));
             float difference = (index - 1.0) * (index + 1.0);
             float s = c + g;
             float p = index * index * c + g;
@@ -115,7 +128,7 @@ FresnelDielectric fresnel_dielectric(float cos_in, float n) {
             r.rs = grazes ? -1.0 : -difference / s / s;
             r.rp = grazes ? -1.0 : (difference / p) * (brewster_term(c, index, g2) / p);
             // 1 − T where little is transmitted: its error is that of T times T.
-            float T = transmitted_part(c, g, index, s, p);
+            float T = index == 1.0 ? 1.0 : transmitted_part(c, g, index, s, p);
             r.F = grazes ? 1.0 : T < 0.5 ? 1.0 - T : min(0.5 * (r.rs * r.rs + r.rp * r.rp), 1.0);
         }
     }
@@ -129,7 +142,8 @@ struct Transmitted {
 };
 
 // @eq F3 N3: T_s = 4cg/(c + g)², T_p = 4n²cg/(n²c + g)², T = (T_s + T_p)/2 = 1 − F
-// 1 − F loses every digit at grazing incidence, where F → 1.
+// 1 − F loses every digit at grazing incidence, where F → 1. Pictures have 1 − F: what is lost there is 1e-7 of the light.
+// @lab fresnel_dielectric: reflected_and_transmitted_power_are_one
 Transmitted dielectric_transmitted(float cos_in, float n) {
     Transmitted t = Transmitted(0.0, 0.0, 0.0);
     if (ARITHMETIC == FAST) {
@@ -139,8 +153,8 @@ Transmitted dielectric_transmitted(float cos_in, float n) {
         float c = clamp(cos_in, 0.0, 1.0);
         float index = clamp(n, 0.0, LARGEST_INDEX);
         float g2 = refracted_square(c, index);
-        if (c >= SMALLEST_NORMAL && index > 0.0 && g2 > 0.0) {
-            float g = sqrt(g2);
+        if (c >= SMALLEST_NORMAL && index > 0.0 && (g2 > 0.0 || index == 1.0)) {
+            float g = index == 1.0 ? c : sqrt(g2);
             float s = c + g;
             float p = index * index * c + g;
             // 1 − r² where little is reflected: its error is that of r² times r².
@@ -150,7 +164,9 @@ Transmitted dielectric_transmitted(float cos_in, float n) {
             t.Ts = rs * rs < 0.5 ? 1.0 - rs * rs : 4.0 * (c / s) * (g / s);
             t.Tp = rp * rp < 0.5 ? 1.0 - rp * rp : 4.0 * (index * c / p) * (index * g / p);
             float F = 0.5 * (rs * rs + rp * rp);
-            t.T = F < 0.5 ? 1.0 - F : transmitted_part(c, g, index, s, p);
+            // c g would leave the range of floats for cosines below 1e-31; a power of two rounds nothing.
+            float up = c < 1e-20 ? 1.15292150e18 : 1.0;
+            t.T = F < 0.5 ? 1.0 - F : transmitted_part(c * up, g, index, s, p) * (1.0 / up);
         }
     }
     return t;
@@ -233,7 +249,8 @@ struct FresnelConductor {
 // @eq F3 F8 N5 N6 N8: R_s = |c − g|²/|c + g|², R_p = |m²c − g|²/|m²c + g|², g = √(m² − sin²θ), m = n + iκ
 // For κ well above 0 as written. For κ → 0 the differences cancel as a dielectric's do, and the products
 //   r_s = −(m² − 1)/(c + g)²,   r_p = (m² − 1)(c²(m² + 1) − 1)/(m²c + g)²
-// take over, divided twice so that no fourth power is formed. Grazing with n = 1, κ = 0: 1, as for a dielectric.
+// take over, divided twice so that no fourth power is formed. n = 1, κ = 0 is no boundary: 0, and 1 where the ray
+// grazes, as for a dielectric; the squares above leave the range of floats there from 1e-19 on.
 FresnelConductor fresnel_conductor(float cos_in, float n, float kappa) {
     FresnelConductor r = FresnelConductor(1.0, 1.0, 1.0);
     if (ARITHMETIC == FAST) {
@@ -253,7 +270,9 @@ FresnelConductor fresnel_conductor(float cos_in, float n, float kappa) {
         float index = clamp(n, 0.0, LARGEST_INDEX);
         float k = clamp(kappa, 0.0, LARGEST_INDEX);
         ConductorTerms t = conductor_terms(c, index, k);
-        if (c >= SMALLEST_NORMAL && t.s2 > 0.0 && t.p2 > 0.0) {
+        if (c >= SMALLEST_NORMAL && index == 1.0 && k == 0.0) {
+            r = FresnelConductor(0.0, 0.0, 0.0);
+        } else if (c >= SMALLEST_NORMAL && t.s2 > 0.0 && t.p2 > 0.0) {
             if (is_metallic(index, k)) {
                 // 1 − A where little is kept: its error is that of A times A.
                 float As = 4.0 * c * t.g.x / t.s2;
@@ -280,6 +299,7 @@ struct Absorbed {
 
 // @eq F3 N7: A_s = 4c Re g/|c + g|², A_p = 4c Re(m² ḡ)/|m²c + g|², A = (A_s + A_p)/2 = 1 − F
 // What a metal keeps. 1 − F loses every digit at grazing incidence.
+// @lab fresnel_conductor: reflected_and_transmitted_power_are_one
 Absorbed conductor_absorbed(float cos_in, float n, float kappa) {
     Absorbed r = Absorbed(0.0, 0.0, 0.0);
     if (ARITHMETIC == FAST) {

@@ -2,6 +2,7 @@
 #ifndef HIT_GLSL
 #define HIT_GLSL
 #include "lib/bent_normal.glsl"
+#include "lib/encode.glsl"
 #include "lib/slots.glsl"
 #include "lib/surface.glsl"
 #include "lib/trace.glsl"
@@ -36,14 +37,6 @@ const int MOST_LEVELS = 15; // above the first, of a picture of 32768 texels
 const uint TEXELS_SRGB = 1;
 const uint TEXELS_NEAREST = 2;
 // Bits 2 and 3, 4 and 5: wrap of u and v: 0 repeat, 1 mirror, 2 clamp.
-
-// An sRGB byte as a linear number (IEC 61966-2-1), x^2.4 as x² P(⁴√x): within 2e-6 of itself.
-vec3 linear_from_srgb(vec3 x) {
-    vec3 t = (x + 0.055) / 1.055;
-    vec3 q = sqrt(sqrt(t));
-    vec3 p = (((4.466797411e-2 * q - 0.231552169) * q + 0.908784986) * q + 0.298558623) * q - 2.045780234e-2;
-    return mix(t * t * p, x / 12.92, lessThanEqual(x, vec3(0.04045)));
-}
 
 int wrapped(int i, int size, uint mode) {
     int period = mode == 1 ? 2 * size : size;
@@ -135,7 +128,7 @@ vec3 hit_normal(uint triangle) {
     vec3 b = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 1).xyz);
     vec3 c = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 2).xyz);
     // Corners run counter-clockwise around the front, whatever mirrored the object.
-    return cross(b - a, c - a);
+    return doubled_area(b - a, c - a);
 }
 
 HitPoint hit_point_of(Hit hit, vec3 origin, vec3 direction) {
@@ -157,8 +150,7 @@ HitPoint hit_point_of(Hit hit, vec3 origin, vec3 direction) {
     r.face = face;
     r.uv_per_metre = tc.w;
     // Corners run counter-clockwise around the front, whatever mirrored the object.
-    vec3 across = cross(b - a, c - a);
-    r.n = normalize(across * scale_to_one(largest_component(across)));
+    r.n = triangle_normal(a, b, c).n;
     vec3 smooth_sum = ta.xyz * w.x + tb.xyz * w.y + tc.xyz * w.z;
     float length2 = dot(smooth_sum, smooth_sum);
     r.n_smooth = length2 > 0.0 ? smooth_sum * inversesqrt(length2) : r.n;

@@ -17,6 +17,7 @@ struct LightDirectional {
 
 // @eq R3 N14 N25: E cos⁺θ, cosθ = N·L/|L|; E is the irradiance perpendicular to L
 // L of any length from 1e-37 to 1e38: scaled by a power of two before it is squared.
+// @lab arriving_light: lights_of_the_lecture_are_those_that_light_pictures
 LightDirectional light_directional(vec3 N, vec3 L, float E) {
     float cos_plus;
     if (ARITHMETIC == FAST) {
@@ -43,6 +44,7 @@ struct LightPoint {
 // @eq R4 N32 N33: E_⊥ = I/r², E = E_⊥ cos⁺θ, of a light at Q with radiant intensity I on a surface at P
 // No smallest radius here: what exceeds the range of floats is +∞, never NaN. P = Q: r² = 0, cos⁺ = 0, E = 0, and E_⊥
 // is +∞ for I > 0, 0 otherwise. Q − P in pairs: it does not round.
+// @lab arriving_light: lights_of_the_lecture_are_those_that_light_pictures
 LightPoint light_point(vec3 P, vec3 Q, vec3 N, float I) {
     LightPoint r;
     if (ARITHMETIC == FAST) {
@@ -103,79 +105,43 @@ float spot_share(float cos_angle, float scale, float offset) {
     return ramp * ramp;
 }
 
-struct SphereCone {
-    float one_minus_cos;
-    float omega;
+struct ArrivingLight {
+    vec3 l;
+    float share;
 };
 
-// @eq R2 N26: 1 − cosθ = q²/(1 + √((1 − q)(1 + q))), q = radius/distance; Ω = 2π (1 − cosθ)
-// The cone of a sphere of that radius around a point at that distance from it; (1 − q)(1 + q) from distance ± radius,
-// since q has rounded. Inside the sphere is all around: 2 and 4π. A radius ≤ 0 fills nothing.
-SphereCone sphere_cone(float radius, float distance) {
-    float one_minus_cos;
-    if (ARITHMETIC == FAST) {
-        float q = radius / distance;
-        one_minus_cos = 1.0 - sqrt(1.0 - q * q);
-    } else {
-        float d = max(distance, 0.0);
-        float r = max(radius, 0.0);
-        bool outside = d >= r && d > 0.0;
-        float q = outside ? r / d : 0.0;
-        float cos2 = outside ? ((d - r) / d) * ((d + r) / d) : 0.0;
-        one_minus_cos = outside ? q * q / (1.0 + sqrt(cos2)) : r > 0.0 ? 2.0 : 0.0;
-    }
-    return SphereCone(one_minus_cos, 2.0 * PI * one_minus_cos);
+// @eq R3 R4 N32: l = Q/|Q|, share = E_⊥/I = w/r² s, w and s of point_falloff and spot_share; infinitely far: l = Q, share 1
+// Light of the table at a point from which `to_light`, Q, leads to it, or that it comes from where it is infinitely far.
+// Irradiance perpendicular to l is I, or for a directional light E, times the share.
+ArrivingLight arriving_light(vec3 to_light, bool directional, float inv_range2, vec3 axis, float spot_scale, float spot_offset) {
+    float r2 = dot(to_light, to_light);
+    vec3 l = directional ? to_light : to_light * inversesqrt(max(r2, 1e-30));
+    float falloff = point_falloff(r2, inv_range2) * spot_share(-dot(axis, l), spot_scale, spot_offset);
+    return ArrivingLight(l, directional ? 1.0 : falloff);
 }
 
-// p·(q × r), as if in twice the precision.
-DoubleFloat triple_product(DoubleFloat p[3], DoubleFloat q[3], DoubleFloat r[3]) {
-    DoubleFloat x = df_add(df_mul(q[1], r[2]), df_negate(df_mul(q[2], r[1])));
-    DoubleFloat y = df_add(df_mul(q[2], r[0]), df_negate(df_mul(q[0], r[2])));
-    DoubleFloat z = df_add(df_mul(q[0], r[1]), df_negate(df_mul(q[1], r[0])));
-    return df_add(df_add(df_mul(p[0], x), df_mul(p[1], y)), df_mul(p[2], z));
+// @eq R2 N26: 1 − cosθ = q²/(1 + √(1 − q²)), q = radius/distance; the solid angle is 2π (1 − cosθ)
+// @out one_minus_cos
+// The cone in which a ball is seen: of lights with a shape and of what paths aim at. From inside a hemisphere, 1. At the
+// surface q² has rounded, and 1 − cosθ with it, by up to 2.5e-4: (1 − q)(1 + q) of distance ± radius would keep it, for a
+// root and a division more; the estimate does not depend on it, since density and cone are of one number.
+float sphere_cone(float radius2, float distance2) {
+    float sin2 = min(radius2 / distance2, 1.0);
+    return sin2 / (1.0 + sqrt(1.0 - sin2));
 }
 
-// @eq R2: tan(Ω/2) = a·(b × c)/(|a||b||c| + (a·b)|c| + (b·c)|a| + (c·a)|b|)
-// @out omega
-// Solid angle of a triangle with corners at a, b, c from the point (van Oosterom and Strackee 1983), in [0, 2π]. The
-// volume from the edges, a·((b − a) × (c − a)): edges of small triangles are exact, a·(b × c) is all error there. A
-// corner at the point: 0. All corners are scaled together by a power of two.
-float triangle_solid_angle(vec3 a, vec3 b, vec3 c) {
-    float numerator, denominator;
-    if (ARITHMETIC == FAST) {
-        float la = length(a);
-        float lb = length(b);
-        float lc = length(c);
-        numerator = abs(dot(a, cross(b, c)));
-        denominator = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
-    } else {
-        float f = scale_to_one(largest_component(max(max(abs(a), abs(b)), abs(c))));
-        vec3 p = a * f;
-        vec3 q = b * f;
-        vec3 r = c * f;
-        if (ARITHMETIC == COMPENSATED) {
-            DoubleFloat corner[3], u[3], v[3];
-            corner[0] = DoubleFloat(p.x, 0.0);
-            corner[1] = DoubleFloat(p.y, 0.0);
-            corner[2] = DoubleFloat(p.z, 0.0);
-            u[0] = two_sum(q.x, -p.x);
-            u[1] = two_sum(q.y, -p.y);
-            u[2] = two_sum(q.z, -p.z);
-            v[0] = two_sum(r.x, -p.x);
-            v[1] = two_sum(r.y, -p.y);
-            v[2] = two_sum(r.z, -p.z);
-            numerator = abs(triple_product(corner, u, v).hi);
-        } else {
-            numerator = abs(dot(p, cross(q - p, r - p)));
-        }
-        float lp = sqrt(dot(p, p));
-        float lq = sqrt(dot(q, q));
-        float lr = sqrt(dot(r, r));
-        denominator = lp * lq * lr + dot(p, q) * lr + dot(q, r) * lp + dot(r, p) * lq;
-        bool touched = min(min(lp, lq), lr) == 0.0;
-        numerator = touched ? 0.0 : numerator;
-        denominator = touched ? 1.0 : denominator;
-    }
-    return ARITHMETIC == FAST ? 2.0 * atan(numerator, denominator) : 2.0 * atan2f(numerator, denominator);
+// @eq N34 N35: t = d cosθ − √(r² − d² sin²θ), no less than 1e-6 d
+// @out t
+// How far it is to the near side of a ball, d away, in a direction at θ from its middle. From the surface itself, where
+// all of it cancels, the least.
+float ball_reach(float distance2, float radius, float cos_theta, float sin2_theta) {
+    return max(sqrt(distance2) * cos_theta - sqrt(max(radius * radius - distance2 * sin2_theta, 0.0)), 1e-6 * sqrt(distance2));
+}
+
+// @eq R2: p(ω) = p(A) r²/cosθ
+// @out pdf
+// Density per solid angle of a place that was drawn per area, r away and turned by θ from the way to it.
+float density_per_solid_angle(float per_area, float r2, float cos_theta) {
+    return per_area * r2 / cos_theta;
 }
 #endif

@@ -100,7 +100,7 @@ vec3 environment_light(Surface s) {
     vec3 result = vec3(0.0);
     if (AMBIENT) {
         float enters = 1.0 - largest(s.f0_dielectric * ab.x + s.f90_dielectric * ab.y);
-        result += s.diffuse * (INV_PI * enters) * environment_irradiance(s.n);
+        result += s.diffuse * diffuse_brdf(enters) * environment_irradiance(s.n);
     }
     if (REFLECTION && !s.base_traced) result += mirrored_by_base(s) * prefiltered_radiance(r, s.alpha);
     if (CLEARCOAT) {

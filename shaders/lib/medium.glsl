@@ -45,15 +45,6 @@ BeerLambert beer_lambert(float L0, float sigma, float d) {
     return r;
 }
 
-// @eq A1: σ = 4πκ/λ, λ in m in the vacuum
-// @out sigma
-// κ has no unit. At most the largest float; 0 for λ ≤ 0.
-float sigma_from_kappa(float kappa, float wavelength_m) {
-    float k = max(kappa, 0.0);
-    bool open = k > 0.0 && wavelength_m >= SMALLEST_NORMAL;
-    return open ? min(4.0 * PI * (k / wavelength_m), LARGEST) : 0.0;
-}
-
 // --------------------------------------------------------------------------------------------------------------------
 // Sums over steps
 
@@ -91,6 +82,7 @@ struct BeerLambertSum {
 // @eq A2 N30: τ = Σ σ_i Δs, σ_i = s0(1 + m_i 2^-23), m_i the leading 23 bits of (2654435761 i + seed) mod 2^32
 // A running sum of n floats loses n/2 ULP at worst: summed in pairs here; s0 and Δs, common to all steps, multiplied
 // in once. More than 2^21 steps are not taken: as for n = 0.
+// @lab add_sigma: a_constant_grid_is_a_homogeneous_medium
 BeerLambertSum beer_lambert_sum(uint n, float s0, float ds, uint seed) {
     uint steps = n <= MOST_STEPS ? n : 0u;
     uint word = seed;
@@ -131,8 +123,9 @@ const uint QUADRATURE_LEFT = 0;
 const uint QUADRATURE_MIDPOINT = 1;
 const uint QUADRATURE_SIMPSON = 2;
 
-// ∫σ ds ≈ Δs/w Σ (x σ(s_i) + y σ(s_i + Δs/2)) + Δs/w z (σ(S) − σ(0)), for weights (x, y, z, w): of first, second and
-// fourth order. Simpson's sum with each step's end counted as the start of the next one.
+// @eq A2 N31: ∫σ ds ≈ Δs/w Σ (x σ(s_i) + y σ(s_i + Δs/2)) + Δs/w z (σ(S) − σ(0)), rule 0 left (slide), 1 midpoint, 2 Simpson
+// @out w
+// For weights (x, y, z, w): of first, second and fourth order. Simpson's sum with each step's end counted as the start of the next one.
 vec4 quadrature_weights(uint rule) {
     return rule == QUADRATURE_LEFT ? vec4(1.0, 0.0, 0.0, 1.0)
         : rule == QUADRATURE_MIDPOINT ? vec4(0.0, 1.0, 0.0, 1.0)
@@ -149,6 +142,7 @@ struct MarchOpticalDepth {
 // @eq A2 N31: τ ≈ Σ σ(s_i) Δs of σ(s) = σ0 e^(−falloff s), s in [0, d]; rule 0 left (slide), 1 midpoint, 2 Simpson
 // An atmosphere's density: its integral σ0 (1 − e^(−falloff d))/falloff tells each rule's error. Steps are cut to
 // [1, 4096]; τ is at most the largest float. A negative falloff is a density that grows.
+// @lab mean_sigma: errors_fall_by_the_order_of_the_rule
 MarchOpticalDepth march_optical_depth(float sigma0, float falloff, float d, uint steps, uint rule) {
     uint n = clamp(steps, 1u, MOST_MARCHED);
     float S = max(d, 0.0);

@@ -181,7 +181,7 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, bool there, out LightTask task) 
         if (EMITTING_TRIANGLES) {
             float r = p.travelled + found.t;
             float cos_light = max(abs(dot(hit.n, p.direction)), 1e-9);
-            float drawn = picked_per_area(place) * (r * r) / cos_light;
+            float drawn = density_per_solid_angle(picked_per_area(place), r * r, cos_light);
             w = p.pdf > 0.0 && drawn > 0.0 ? mis_weight(p.pdf, float(LIGHT_PLACES) * drawn) : 1.0;
         }
         gathered = shows ? p.throughput * emits * w : vec3(0.0);

@@ -22,10 +22,9 @@ PunctualLight punctual_light_at(uint index, vec3 p_rel) {
     PunctualLight r;
     r.directional = index < DIRECTIONAL_LIGHTS;
     r.to_light = r.directional ? place.xyz : place.xyz - p_rel;
-    float r2 = dot(r.to_light, r.to_light);
-    r.l = r.directional ? place.xyz : r.to_light * inversesqrt(max(r2, 1e-30));
-    float falloff = point_falloff(r2, color.w) * spot_share(-dot(axis.xyz, r.l), axis.w, spot_offset);
-    r.arriving = color.rgb * (r.directional ? 1.0 : falloff);
+    ArrivingLight arriving = arriving_light(r.to_light, r.directional, color.w, axis.xyz, axis.w, spot_offset);
+    r.l = arriving.l;
+    r.arriving = color.rgb * arriving.share;
     return r;
 }
 
@@ -50,15 +49,12 @@ PunctualLight shaped_light_at(uint index, vec3 p_rel, vec2 x) {
             r.arriving = vec3(0.0);
             return r;
         }
-        float sin2_most = shape.z * shape.z / d2;
-        float lost = sin2_most / (1.0 + sqrt(max(1.0 - sin2_most, 0.0))); // 1 − cosθ
+        float lost = sphere_cone(shape.z * shape.z, d2);
         float cos_theta = 1.0 - x.x * lost;
         float sin2 = max(x.x * lost * (2.0 - x.x * lost), 0.0);
         OrthonormalBasis b = orthonormal_basis(r.l);
         vec3 l = r.l * cos_theta + (b.t * cos(around) + b.b * sin(around)) * sqrt(sin2);
-        // On the ball itself all of this cancels.
-        float reach = max(sqrt(d2) * cos_theta - sqrt(max(shape.z * shape.z - d2 * sin2, 0.0)), 1e-6 * sqrt(d2));
-        r.to_light = l * reach;
+        r.to_light = l * ball_reach(d2, shape.z, cos_theta, sin2);
         r.l = l;
         // Ω L = 2π(1 − cosθ) I/(πr²).
         r.arriving = color.rgb * (window * 2.0 * lost / (shape.z * shape.z));

@@ -34,6 +34,8 @@ DoubleFloat times(DoubleFloat a, float s) {
 // distance of its center from the line is not. Of b ± √… only the sum is formed, the other root is Vieta's. t0 ≤ t1 are
 // the crossings of the whole line, negative ones behind the origin. Compensated: f, f² − r² and the point next to
 // the center by pairs, for origins near the surface and rays that graze a distant sphere. No hit, or direction 0: 0, 0.
+// Pictures have triangles alone; of a ball that is a light, its near side is met as ball_reach has it.
+// @lab ball_reach: lights_of_the_lecture_are_those_that_light_pictures
 RaySphere ray_sphere(vec3 origin, vec3 direction, vec3 center, float radius) {
     RaySphere r = RaySphere(false, 0.0, 0.0);
     if (ARITHMETIC == FAST) {
@@ -87,42 +89,61 @@ RaySphere ray_sphere(vec3 origin, vec3 direction, vec3 center, float radius) {
     return r;
 }
 
+// A ray as boxes see it: near and far of a box are centre·inverse + start ∓ half·extent.
+struct BoxRay {
+    vec3 inverse;
+    vec3 start_near;
+    vec3 start_far;
+    vec3 extent;
+    int base; // first texel of the list of nodes
+    int end;  // place of the sentinel
+};
+
+// Beyond 1e20 a direction is parallel to the planes as far as any scene goes, and 0·∞ does not happen.
+vec3 inverse_direction(vec3 direction) {
+    return clamp(1.0 / direction, -1e20, 1e20);
+}
+
+// Of boxes of floats: `offset`, 32 roundings of the largest coordinate in the scene, and 8 of the origin's on each side make
+// up for all roundings here, so that no box that is hit is missed. Ize (JCGT 2(2) 2013) makes the far end longer, by a
+// factor; a box that begins behind the origin has none to make longer.
+void of_boxes(inout BoxRay r, vec3 origin, vec3 inverse, float offset) {
+    vec3 pad = abs(origin) * (8.0 / 16777216.0) * abs(inverse) + abs(inverse) * offset;
+    r.inverse = inverse;
+    r.start_near = -origin * inverse - pad;
+    r.start_far = -origin * inverse + pad;
+    r.extent = abs(inverse);
+}
+
+// @eq N36: max(near_x, near_y, near_z, t_min) ≤ min(far_x, far_y, far_z, t_max), t_min ≥ 0
+// @out hit
+// Whether a ray meets a box within [t_min, t_max], in integers: floats order as their bits do where they are positive, a
+// negative far end loses in any case, and min and max of integers are one instruction each where those of floats
+// are three.
+bool meets(vec3 near, vec3 far, float t_min, float t_max) {
+    ivec3 n = floatBitsToInt(near);
+    ivec3 f = floatBitsToInt(far);
+    return max(max(n.x, n.y), max(n.z, floatBitsToInt(t_min))) <= min(min(f.x, f.y), min(f.z, floatBitsToInt(t_max)));
+}
+
 struct Slab {
     bool hit;
     float t_near;
     float t_far;
 };
 
-// @eq N36: t_near = max(0, near_i), t_far = min(t_max, far_i (1 + 6·2^-24)), i = x, y, z; hit where t_near ≤ t_far
-// near and far of an axis are (box − origin)·inv_direction, the smaller and the larger. Where the ray is parallel to a
-// plane (inv_direction infinite) and starts in it that is 0·∞: the axis then does not bound the ray. That is found by
-// comparison, not by isnan(): a device need not keep NaN. Ize, JCGT 2(2) 2013: the factor makes up for the roundings,
-// so that no box that is hit is missed.
-Slab slab(vec3 origin, vec3 inv_direction, vec3 box_min, vec3 box_max, float t_max) {
-    vec3 to_min = box_min - origin;
-    vec3 to_max = box_max - origin;
-    vec3 t_min = to_min * inv_direction;
-    vec3 t_plane = to_max * inv_direction;
-    Slab r;
-    if (ARITHMETIC == FAST) {
-        vec3 near = min(t_min, t_plane);
-        vec3 far = max(t_min, t_plane);
-        r.t_near = max(max(near.x, near.y), max(near.z, 0.0));
-        r.t_far = min(min(far.x, far.y), min(far.z, t_max));
-    } else {
-        bvec3 parallel = greaterThan(abs(inv_direction), vec3(LARGEST));
-        bvec3 at_min = equal(to_min, vec3(0.0));
-        bvec3 at_max = equal(to_max, vec3(0.0));
-        bvec3 in_min = bvec3(parallel.x && at_min.x, parallel.y && at_min.y, parallel.z && at_min.z);
-        bvec3 in_max = bvec3(parallel.x && at_max.x, parallel.y && at_max.y, parallel.z && at_max.z);
-        // ∞ with the sign that opens the interval on its own side.
-        vec3 near = min(mix(t_min, vec3(-plus_infinity()), in_min), mix(t_plane, vec3(-plus_infinity()), in_max));
-        vec3 far = max(mix(t_min, vec3(plus_infinity()), in_min), mix(t_plane, vec3(plus_infinity()), in_max));
-        r.t_near = max(max(near.x, near.y), max(near.z, 0.0));
-        r.t_far = min(min(min(far.x, far.y), far.z) * (1.0 + 6.0 / 16777216.0), t_max);
-    }
-    r.hit = r.t_near <= r.t_far;
-    return r;
+// @eq N36: t_near = max(0, near_i), t_far = min(t_max, far_i), i = x, y, z; near, far = (centre − origin ∓ half)/direction
+// A box of a tree as traversal tests it, padded. `offset` is of the scene.
+// @lab meets: every_way_finds_what_brute_force_finds
+Slab slab(vec3 origin, vec3 direction, vec3 centre, vec3 half_size, float offset, float t_max) {
+    BoxRay r;
+    of_boxes(r, origin, inverse_direction(direction), offset);
+    vec3 t = centre * r.inverse;
+    vec3 e = half_size * r.extent;
+    vec3 near = t + r.start_near - e;
+    vec3 far = t + r.start_far + e;
+    return Slab(meets(near, far, 0.0, t_max), max(max(near.x, near.y), max(near.z, 0.0)),
+                min(min(far.x, far.y), min(far.z, t_max)));
 }
 
 struct RayTriangle {
@@ -225,6 +246,7 @@ DoubleFloat edge_of_pairs(PairOfAxes a, PairOfAxes b) {
 // them is seen under less than 2.5e-7 rad, which is how coarse sheared coordinates are, and rounding turns it over.
 // Compensated: pairs, 1e-14 rad. Both sides are hit. Miss, edge-on or direction 0: all 0. Vertices and direction are
 // scaled by powers of two, which rounds nothing.
+// @lab sheared_triangle: every_way_finds_what_brute_force_finds
 RayTriangle ray_triangle(vec3 origin, vec3 direction, vec3 a, vec3 b, vec3 c) {
     RayTriangle r = RayTriangle(false, 0.0, 0.0, 0.0);
     if (ARITHMETIC == FAST) {
@@ -283,27 +305,16 @@ RayTriangle ray_triangle(vec3 origin, vec3 direction, vec3 a, vec3 b, vec3 c) {
     return r;
 }
 
-struct OffsetOrigin {
-    vec3 p_offset;
-    float shift;
-};
-
-// @eq N38: each coordinate moved along n by 256 |n_i| floats, near 0 by n_i/65536; shift = |p_offset − p|
-// Wächter and Binder, Ray Tracing Gems 6: a point of a surface moved off it by as much as its coordinates are rounded.
-// A fixed distance (fast: 1e-4) is too small for coordinates of 1e3 and too large for small scenes. n is a unit vector:
-// its components are clamped to [−1, 1].
-OffsetOrigin offset_origin(vec3 p, vec3 n) {
-    vec3 moved;
-    if (ARITHMETIC == FAST) {
-        moved = p + 1e-4 * n;
-    } else {
-        vec3 unit = clamp(n, -1.0, 1.0);
-        ivec3 steps = ivec3(256.0 * unit);
-        steps = mix(steps, -steps, lessThan(p, vec3(0.0)));
-        vec3 by_floats = intBitsToFloat(floatBitsToInt(p) + steps);
-        moved = mix(by_floats, p + unit * (1.0 / 65536.0), lessThan(abs(p), vec3(1.0 / 32.0)));
-    }
-    return OffsetOrigin(moved, vector_length(moved - p));
+// @eq N38: p + (n + free) offset
+// @out q
+// The one place where a ray leaves a surface: moved off it along n, the geometric normal on the side it leaves to, by
+// `offset`, 32 roundings of the largest coordinate in the scene: a hit is off the plane of its triangle by a few of
+// them, and another surface there is found by a few off its own (tests/traversal.rs counts self-hits). And as far
+// along `free`, a direction known to be free: back to where the surface was seen from. A point in a corner may else
+// lie behind the other wall. No length of its own: scenes of any size and place are treated alike. Wächter and Binder
+// (Ray Tracing Gems 6) move each coordinate by its own roundings, which does not move along the normal.
+vec3 offset_origin(vec3 p, vec3 n, vec3 free, float offset) {
+    return p + (n + free) * offset;
 }
 
 // @eq N39: P = a + u (b − a) + v (c − a)
@@ -319,6 +330,7 @@ vec3 hit_point(vec3 origin, vec3 direction, float t, vec3 a, vec3 b, vec3 c, flo
 // @out p_rel
 // Positions as pairs of floats, 1e-7 m apart at the Earth's radius; their difference is rounded once. Plain floats (the
 // tier fast takes the hi parts) are 6 cm apart at 1e6 m.
+// @host src/pass/scene.rs: places of instances and lights around the eye
 vec3 camera_relative(vec3 p_hi, vec3 p_lo, vec3 eye_hi, vec3 eye_lo) {
     vec3 p_rel;
     if (ARITHMETIC == FAST) {

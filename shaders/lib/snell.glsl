@@ -95,6 +95,7 @@ struct CriticalAngle {
 // @eq F6: θ_c = arcsin(n_out/n_in), from the dense side: it exists for n_in > n_out
 // Not Brewster's angle. Taken as an arc tangent of sine and cosine: the cosine √((n_in − n_out)(n_in + n_out))/n_in
 // keeps its digits for nearly equal indices, where the arc sine has none. Without one: 90°, cosine 0.
+// @lab fresnel_dielectric: both_angles_of_a_boundary_are_those_of_its_reflectance
 CriticalAngle critical_angle(float n_in, float n_out) {
     CriticalAngle r = CriticalAngle(n_in > n_out && n_out >= 0.0, 0.5 * PI, 90.0, 0.0);
     if (r.exists) {
@@ -117,6 +118,7 @@ struct BrewsterAngle {
 
 // @eq F6: θ_B = arctan(n_out/n_in), where r_p = 0; it exists on both sides
 // By the sizes of the indices; 0 on both sides: 0.
+// @lab fresnel_dielectric: both_angles_of_a_boundary_are_those_of_its_reflectance
 BrewsterAngle brewster_angle(float n_in, float n_out) {
     BrewsterAngle r = BrewsterAngle(0.0, 1.0);
     float larger = max(abs(n_in), abs(n_out));

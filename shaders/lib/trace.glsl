@@ -36,24 +36,10 @@ struct Hit {
 uint node_visits = 0;
 uint triangle_tests = 0;
 
-// The one place where a ray leaves a surface: moved off it along n, the geometric normal on the side it leaves to, by
-// `offset`, 32 roundings of the largest coordinate in the scene: a hit is off the plane of its triangle by a few of
-// them, and another surface there is found by a few off its own (tests/traversal.rs counts self-hits). And as far
-// along `free`, a direction known to be free: back to where the surface was seen from. A point in a corner may else
-// lie behind the other wall. No length of its own: scenes of any size and place are treated alike.
+// Where a ray that leaves a surface begins.
 vec3 ray_origin(vec3 p, vec3 n, vec3 free) {
-    return p + (n + free) * trace_terms.offset;
+    return offset_origin(p, n, free, trace_terms.offset);
 }
-
-// A ray as boxes see it: near and far of a box are centre·inverse + start ∓ half·extent.
-struct BoxRay {
-    vec3 inverse;
-    vec3 start_near;
-    vec3 start_far;
-    vec3 extent;
-    int base; // first texel of the list of nodes
-    int end;  // place of the sentinel
-};
 
 int octant(vec3 d) {
     return (d.x < 0.0 ? 1 : 0) | (d.y < 0.0 ? 2 : 0) | (d.z < 0.0 ? 4 : 0);
@@ -61,8 +47,7 @@ int octant(vec3 d) {
 
 BoxRay box_ray(vec3 origin, vec3 direction, bool any_order) {
     BoxRay r;
-    // Beyond 1e20 a direction is parallel to the planes as far as any scene goes, and 0·∞ does not happen.
-    vec3 inverse = clamp(1.0 / direction, -1e20, 1e20);
+    vec3 inverse = inverse_direction(direction);
     r.end = int(trace_terms.nodes);
     int list = any_order || !OCTANTS ? OCTANTS ? 8 : 0 : octant(direction);
     r.base = list * (r.end + 1);
@@ -75,22 +60,9 @@ BoxRay box_ray(vec3 origin, vec3 direction, bool any_order) {
         r.start_far = r.start_near;
         r.extent = abs(unit);
     } else {
-        vec3 pad = abs(origin) * (8.0 / 16777216.0) * abs(inverse) + abs(inverse) * trace_terms.offset;
-        r.inverse = inverse;
-        r.start_near = -origin * inverse - pad;
-        r.start_far = -origin * inverse + pad;
-        r.extent = abs(inverse);
+        of_boxes(r, origin, inverse, trace_terms.offset);
     }
     return r;
-}
-
-// Whether a ray meets a box within [t_min, t_max], t_min ≥ 0, in integers: floats order as their bits do where they are positive, a
-// negative far end loses in any case, and min and max of integers are one instruction each where those of floats
-// are three.
-bool meets(vec3 near, vec3 far, float t_min, float t_max) {
-    ivec3 n = floatBitsToInt(near);
-    ivec3 f = floatBitsToInt(far);
-    return max(max(n.x, n.y), max(n.z, floatBitsToInt(t_min))) <= min(min(f.x, f.y), min(f.z, floatBitsToInt(t_max)));
 }
 
 // One way through the tree, ready to go on.

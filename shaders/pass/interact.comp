@@ -136,7 +136,7 @@ bool mirrored_by_ray(HitSurface hit, Boundary boundary) {
 // is n_triangle's.
 float lobe_weight(vec3 n, vec3 v, vec3 r, vec3 n_triangle, float alpha) {
     float cos_r = dot(r, n);
-    return dot(r, n_triangle) > 0.0 && cos_r > 0.0 ? unmasked(dot(n, v), cos_r, alpha) : 0.0;
+    return dot(r, n_triangle) > 0.0 && cos_r > 0.0 ? smith_g2_over_g1(dot(n, v), cos_r, alpha) : 0.0;
 }
 
 // Of the numbers that random points are drawn by, those of coats.
@@ -227,7 +227,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
         vec3 through = boundary.sheet ? sheet_ray : bent_ray;
         next.direction = rough ? through : -on_side(-through, hit.n);
         bool passes = dot(next.direction, hit.n) < 0.0 && !(boundary.solid && (total || t.tir));
-        masking = rough ? unmasked(cos_v, dot(next.direction, s.n), s.alpha) : 1.0;
+        masking = rough ? smith_g2_over_g1(cos_v, dot(next.direction, s.n), s.alpha) : 1.0;
         if (rough && boundary.sheet) masking = cos_r > 0.0 ? masking : 0.0;
         vec3 tint = tint_through(hit, boundary.sheet);
         next.origin = ray_origin(s.p_bvh, -hit.n, vec3(0.0));

@@ -35,7 +35,7 @@ void main() {
             // Each sample stands for 1 / (N pdf) of solid angle: read the level whose texels are that large.
             float pdf = ggx_distribution(n, h, alpha) * 0.25;
             float lod = 0.5 * log2(1.0 / (float(SAMPLES) * pdf * texel));
-            float masking = unmasked(1.0, cos_l, alpha);
+            float masking = smith_g2_over_g1(1.0, cos_l, alpha);
             vec3 seen = textureLod(environment_map, equirectangular_from_direction(l), max(lod, 0.0)).rgb;
             sum += (seen - middle) * masking;
             weight += masking;

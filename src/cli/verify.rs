@@ -16,6 +16,7 @@ use super::print;
 use crate::gpu::{Device, DeviceInfo, Severity};
 use crate::image::file;
 use crate::optics::Tier;
+use crate::shader::Probe;
 use crate::verify::{self, Cases, Entry, Figures, Worst, document, plot, vectors};
 
 /// Hostile cases per function and tier.
@@ -76,7 +77,7 @@ struct Finding {
     per_million: f64,
     figures: Vec<Figures>,
     /// Hostile cases that gave NaN, and the first of them.
-    hostile: Option<(usize, Option<Vec<f32>>)>,
+    hostile: Option<(usize, Option<Vec<f64>>)>,
 }
 
 impl Finding {
@@ -150,7 +151,7 @@ pub fn run(args: &VerifyArgs, quiet: bool) -> Result<ExitCode> {
         print(&table(&findings).to_string())?;
         for finding in &findings {
             if let Some((count @ 1.., first)) = &finding.hostile {
-                let inputs = first.as_deref().map_or(String::new(), |row| named(finding.entry.probe.inputs, row));
+                let inputs = first.as_deref().map_or(String::new(), |row| named(finding.entry.probe, row));
                 let verdict = if finding.tier == Tier::Fast { "not promised" } else { "FAILS" };
                 let (name, tier) = (finding.entry.probe.name, finding.tier.name());
                 print(&format!(
@@ -316,19 +317,31 @@ fn short(x: f64) -> String {
 }
 
 fn named_worst(entry: &Entry, worst: &Worst) -> String {
-    let inputs = named(entry.probe.inputs, &worst.inputs);
+    let inputs = named(entry.probe, &worst.inputs);
     format!("row {}: {inputs}; got {:e}, exact {:e}", worst.row, worst.got, worst.expected)
 }
 
 /// Inputs by name, in decimal and in hex; of a long series the first ones.
-fn named(names: &[&str], values: &[f32]) -> String {
+fn named(probe: &Probe, values: &[f64]) -> String {
     let shown = 16;
-    let pair = |(name, value): (&&str, &f32)| format!("{name} {value:e} (0x{:08x})", value.to_bits());
-    let mut text = names.iter().zip(values).take(shown).map(pair).collect::<Vec<_>>().join(", ");
-    if names.len() > shown {
+    let one = |(column, (name, &value)): (usize, (&&str, &f64))| {
+        let word = probe.word(column, value);
+        if probe.whole.contains(name) {
+            format!("{name} {word}")
+        } else {
+            format!("{name} {:e} (0x{word:08x})", value as f32)
+        }
+    };
+    let mut text = probe.inputs.iter().zip(values).enumerate().take(shown).map(one).collect::<Vec<_>>().join(", ");
+    if probe.inputs.len() > shown {
         text += ", …";
     }
     text
+}
+
+/// Inputs as the device gets them.
+fn hex(probe: &Probe, values: &[f64]) -> Vec<String> {
+    values.iter().enumerate().map(|(column, &value)| format!("0x{:08x}", probe.word(column, value))).collect()
 }
 
 fn json_rows(finding: &Finding) -> Vec<Value> {
@@ -340,9 +353,9 @@ fn json_rows(finding: &Finding) -> Vec<Value> {
                 .inputs
                 .iter()
                 .zip(&worst.inputs)
-                .map(|(name, x)| ((*name).to_owned(), number(f64::from(*x))))
+                .map(|(name, x)| ((*name).to_owned(), number(*x)))
                 .collect();
-            let hex: Vec<_> = worst.inputs.iter().map(|x| format!("0x{:08x}", x.to_bits())).collect();
+            let hex = hex(entry.probe, &worst.inputs);
             json!({
                 "row": worst.row,
                 "inputs": inputs,
@@ -373,7 +386,7 @@ fn json_rows(finding: &Finding) -> Vec<Value> {
 
 fn json_hostile(finding: &Finding) -> Option<Value> {
     let (count, first) = finding.hostile.as_ref()?;
-    let hex = first.as_ref().map(|row| row.iter().map(|x| format!("0x{:08x}", x.to_bits())).collect::<Vec<_>>());
+    let hex = first.as_ref().map(|row| hex(finding.entry.probe, row));
     Some(json!({
         "function": finding.entry.probe.name,
         "tier": finding.tier,

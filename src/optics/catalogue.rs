@@ -42,7 +42,8 @@ pub struct Equation {
     pub outputs: &'static [Output],
     /// What its error is plotted against.
     pub axis: Axis,
-    /// The largest magnitude at which it must still answer without a NaN, sense or no sense.
+    /// The largest magnitude at which it must still answer without a NaN, sense or no sense. Below 0: its callers keep to its
+    /// domain, and it is not asked out of it.
     pub extreme: f32,
 }
 

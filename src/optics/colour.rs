@@ -144,6 +144,28 @@ pub fn srgb(x: f64) -> [f64; 2] {
     [encode, decode]
 }
 
+/// @eq C4: sRGB's transfer function alone.
+#[must_use]
+pub fn srgb_encode(x: f64) -> f64 {
+    srgb(x)[0]
+}
+
+const SRGB: &[Region] = &[
+    Region { name: "display light", share: 3, draw: |d| vec![d.between(0.0, 1.0) as f32] },
+    Region { name: "dark", share: 2, draw: |d| vec![d.log(1e-9, 1.0) as f32] },
+    Region {
+        name: "thresholds and ends",
+        share: 1,
+        draw: |d| vec![d.near(&[0.003_130_8, 0.04045, 0.5, 1.0]).max(0.0)],
+    },
+    Region { name: "bytes", share: 1, draw: |d| vec![srgb(d.below(256) as f64 / 255.0)[1] as f32] },
+    Region { name: "above 1", share: 1, draw: |d| vec![d.log(1.0, 65504.0) as f32] },
+];
+
+fn encode_allowed(case: &Case<'_>) -> f64 {
+    if case.inputs[0] <= 1.0 { case.ulps(8.0).min(2.5e-7) } else { case.ulps(8.0) }
+}
+
 /// numerics.md 50: 81 roundings of the sum of magnitudes.
 const SUM: f64 = 81.0 * 5.960464477539063e-8;
 
@@ -403,25 +425,19 @@ pub(super) const EQUATIONS: &[Equation] = &[
         extreme: 1e38,
     },
     Equation {
+        name: "srgb_encode",
+        twin: |x| vec![srgb_encode(x[0])],
+        regions: SRGB,
+        outputs: &[Output { name: "encode", bound: "8 ulp, and 2.5e-7 up to 1", allowed: encode_allowed }],
+        axis: Axis { name: "x", log: true, of: |x| x[0], column: 0, relative: true },
+        extreme: 1e38,
+    },
+    Equation {
         name: "srgb",
         twin: |x| srgb(x[0]).to_vec(),
-        regions: &[
-            Region { name: "display light", share: 3, draw: |d| vec![d.between(0.0, 1.0) as f32] },
-            Region { name: "dark", share: 2, draw: |d| vec![d.log(1e-9, 1.0) as f32] },
-            Region {
-                name: "thresholds and ends",
-                share: 1,
-                draw: |d| vec![d.near(&[0.003_130_8, 0.04045, 0.5, 1.0]).max(0.0)],
-            },
-            Region { name: "bytes", share: 1, draw: |d| vec![srgb(d.below(256) as f64 / 255.0)[1] as f32] },
-            Region { name: "above 1", share: 1, draw: |d| vec![d.log(1.0, 65504.0) as f32] },
-        ],
+        regions: SRGB,
         outputs: &[
-            Output {
-                name: "encode",
-                bound: "8 ulp, and 2.5e-7 up to 1",
-                allowed: |c| if c.inputs[0] <= 1.0 { c.ulps(8.0).min(2.5e-7) } else { c.ulps(8.0) },
-            },
+            Output { name: "encode", bound: "8 ulp, and 2.5e-7 up to 1", allowed: encode_allowed },
             Output { name: "decode", bound: "8 ulp", allowed: |c| c.ulps(8.0) },
         ],
         axis: Axis { name: "x", log: true, of: |x| x[0], column: 0, relative: true },

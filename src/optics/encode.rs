@@ -12,16 +12,10 @@ pub fn octahedral_round_trip(n: DVec3) -> [f64; 4] {
     [n.x, n.y, n.z, 0.0]
 }
 
-/// @eq N16: the same, whatever the encoder tries.
+/// @eq N45: sRGB's transfer function undone (IEC 61966-2-1).
 #[must_use]
-pub fn octahedral_round_trip_precise(n: DVec3) -> [f64; 4] {
-    octahedral_round_trip(n)
-}
-
-/// @eq N43: x, within the range of half precision.
-#[must_use]
-pub fn half_round_trip(x: f64) -> f64 {
-    x.clamp(-65504.0, 65504.0)
+pub fn linear_from_srgb(x: f64) -> f64 {
+    if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
 }
 
 /// @eq N42: z, but not nearer than the near plane; infinite where near/z is below the normal range of f32.
@@ -44,10 +38,9 @@ pub fn direction_from_equirectangular(uv: DVec2) -> DVec3 {
 }
 
 // The map is stretched most at the middle of a face, where steps (x, y) are √6 √(x² + xy + y²) radians: a hexagonal
-// lattice. The nearest step by coordinates is at most half a step off in both, 3/√2; the nearest of the lattice by angle
-// at most its covering radius, √2. numerics.md 16 has the largest of 200,000 directions, 1 or 2 % below.
+// lattice. The nearest step by coordinates is at most half a step off in both, 3/√2. numerics.md 16 has the largest of
+// 200,000 directions, 1 or 2 % below; the best of four steps would have at most the lattice's covering radius, √2.
 const NEAREST: f64 = 1.5 * SQRT_2;
-const PRECISE: f64 = SQRT_2;
 
 fn steps(case: &Case<'_>) -> f64 {
     2_f64.powf(case.inputs[3] - 1.0) - 1.0
@@ -60,10 +53,6 @@ fn degrees(case: &Case<'_>, part: f64) -> f64 {
 
 fn nearest_degrees(case: &Case<'_>) -> f64 {
     degrees(case, NEAREST)
-}
-
-fn precise_degrees(case: &Case<'_>) -> f64 {
-    degrees(case, PRECISE)
 }
 
 fn normal_and_bits(d: &mut Draw, n: DVec3) -> Vec<f32> {
@@ -117,40 +106,20 @@ pub(super) const EQUATIONS: &[Equation] = &[
         extreme: 1e38,
     },
     Equation {
-        name: "octahedral_round_trip_precise",
-        twin: |x| octahedral_round_trip_precise(vector(x, 0)).to_vec(),
-        regions: DIRECTIONS_AND_BITS,
-        outputs: &[
-            Output { name: "dx", bound: "as error_deg", allowed: |c| precise_degrees(c).to_radians() },
-            Output { name: "dy", bound: "as error_deg", allowed: |c| precise_degrees(c).to_radians() },
-            Output { name: "dz", bound: "as error_deg", allowed: |c| precise_degrees(c).to_radians() },
-            Output {
-                name: "error_deg",
-                bound: "0.644 at 8 bits, 0.159 at 10, 0.04 at 12, 2.5e-3 at 16",
-                allowed: precise_degrees,
-            },
-        ],
-        axis: Axis { name: "bits", log: false, of: |x| x[3], column: 3, relative: false },
-        extreme: 1e38,
-    },
-    Equation {
-        name: "half_round_trip",
-        twin: |x| vec![half_round_trip(x[0])],
+        name: "linear_from_srgb",
+        twin: |x| x.iter().map(|&x| linear_from_srgb(x)).collect(),
         regions: &[
-            Region { name: "magnitudes", share: 2, draw: |d| vec![(d.sign() * d.log(1e-9, 1e38)) as f32] },
-            Region {
-                name: "special",
-                share: 1,
-                draw: |d| vec![d.near(&[0.0, 1.0, -1.0, 2048.0, 2049.0, 65504.0, 65519.0, 65520.0, -65536.0, 6.1e-5])],
-            },
+            Region { name: "bytes", share: 1, draw: |d| [0; 3].map(|_| (d.below(256) as f64 / 255.0) as f32).to_vec() },
+            Region { name: "between them", share: 1, draw: |d| [0; 3].map(|_| d.unit() as f32).to_vec() },
         ],
-        outputs: &[Output {
-            name: "y",
-            bound: "rel 5e-4; below 2^-14 abs 2^-25 (half its step)",
-            allowed: |c| c.rel(5e-4).max(2_f64.powi(-25)),
-        }],
-        axis: Axis { name: "|x|", log: true, of: |x| x[0].abs(), column: 0, relative: true },
-        extreme: 1e38,
+        outputs: &[
+            Output { name: "linearx", bound: "rel 2e-6", allowed: |c| c.rel(2e-6) },
+            Output { name: "lineary", bound: "rel 2e-6", allowed: |c| c.rel(2e-6) },
+            Output { name: "linearz", bound: "rel 2e-6", allowed: |c| c.rel(2e-6) },
+        ],
+        axis: Axis { name: "x", log: false, of: |x| x[0], column: 0, relative: true },
+        // Texels are bytes.
+        extreme: -1.0,
     },
     Equation {
         name: "depth_round_trip",

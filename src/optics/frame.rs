@@ -3,6 +3,7 @@
 
 use glam::{DMat3, DVec3};
 
+use super::brdf::cosine_allowed;
 use super::catalogue::{Axis, Case, Draw, EXACT, Equation, Output, Region, columns, flag, vector};
 
 /// @eq N14: v/|v|, and whether v has no direction: all components below the normal range of f32.
@@ -10,6 +11,12 @@ use super::catalogue::{Axis, Case, Draw, EXACT, Equation, Output, Region, column
 pub fn safe_normalize(v: DVec3) -> (DVec3, bool) {
     let is_zero = v.abs().max_element() < f64::from(f32::MIN_POSITIVE);
     (if is_zero { DVec3::NAN } else { v.normalize() }, is_zero)
+}
+
+/// @eq B2 N25: the cosine of two directions.
+#[must_use]
+pub fn cosine(a: DVec3, b: DVec3) -> f64 {
+    a.normalize().dot(b.normalize())
 }
 
 /// @eq N10: the angle between two directions.
@@ -214,6 +221,24 @@ pub(super) const EQUATIONS: &[Equation] = &[
         ],
         axis: Axis { name: "|v|", log: true, of: |x| vector(x, 0).length(), column: 0, relative: false },
         extreme: 1e38,
+    },
+    Equation {
+        name: "cosine",
+        twin: |x| vec![cosine(vector(x, 0), vector(x, 3))],
+        regions: ANGLES,
+        outputs: &[Output {
+            name: "cos",
+            bound: "1e-7 + 1.04e-7 |cos|; compensated 8 ulp + 1e-14",
+            allowed: |c| cosine_allowed(c, c.x()),
+        }],
+        axis: Axis {
+            name: "θ, rad",
+            log: false,
+            of: |x| angle_between(vector(x, 0), vector(x, 3)),
+            column: 0,
+            relative: false,
+        },
+        extreme: 1e9,
     },
     Equation {
         name: "angle_between",

@@ -3,12 +3,24 @@
 
 use super::catalogue::{Axis, Case, Draw, Equation, Output, Region, flag};
 
+/// @eq F2: reflectance at normal incidence.
+#[must_use]
+pub fn normal_reflectance(n: f64, kappa: f64) -> f64 {
+    ((n - 1.0).powi(2) + kappa * kappa) / ((n + 1.0).powi(2) + kappa * kappa)
+}
+
+/// @eq F2: Schlick's curve between two reflectances.
+#[must_use]
+pub fn schlick(f0: f64, f90: f64, cos_in: f64) -> f64 {
+    f0 + (f90 - f0) * (1.0 - cos_in).max(0.0).powi(5)
+}
+
 /// @eq F2: Schlick's approximation: F0, F.
 #[must_use]
 pub fn fresnel_schlick(cos_in: f64, n: f64, kappa: f64) -> [f64; 2] {
-    let f0 = ((n - 1.0).powi(2) + kappa * kappa) / ((n + 1.0).powi(2) + kappa * kappa);
+    let f0 = normal_reflectance(n, kappa);
     // A cosine rounded to above 1 is 1.
-    [f0, f0 + (1.0 - f0) * (1.0 - cos_in).max(0.0).powi(5)]
+    [f0, schlick(f0, 1.0, cos_in)]
 }
 
 /// n cosθ_t squared; products of f32 are exact in f64, so only the sum rounds.
@@ -156,6 +168,16 @@ const CRITICAL: Region = Region {
 const ANYWHERE: Region =
     Region { name: "0.05 < n < 20", share: 4, draw: |d| vec![cosine(d) as f32, log_index(d) as f32] };
 
+/// Cosines whose squares leave the range of f32, half of them where there is no boundary.
+const FAR_GRAZING: Region = Region {
+    name: "cosines to 1e-37, n = 1",
+    share: 1,
+    draw: |d| {
+        let n = if d.below(2) == 0 { 1.0 } else { log_index(d) };
+        vec![d.log(2e-38, 1e-8) as f32, n as f32]
+    },
+};
+
 /// Rounding of g² = c² + n² − 1: what cancels is summed to 2^-32 in the stable tier, the terms themselves to 2^-46 in the
 /// compensated one.
 fn rounding_of_g2(case: &Case<'_>) -> f64 {
@@ -189,8 +211,60 @@ fn through_g(case: &Case<'_>) -> [f64; 2] {
     [slope(c), slope(n * n * c)].map(|slope| slope * error_of_g(case))
 }
 
+const SCHLICK_BOUND: &str = "8 ulp, and 5 of F0 where F90 is less";
+
+fn schlick_allowed(case: &Case<'_>) -> f64 {
+    let (f0, f90) = (case.inputs[case.column], case.inputs[3]);
+    case.ulps(8.0) + if f90 < f0 { 5.0 * super::ulp(f0) } else { 0.0 }
+}
+
 /// The equations of this file.
 pub(super) const EQUATIONS: &[Equation] = &[
+    Equation {
+        name: "schlick",
+        twin: |x| (0..3).map(|k| schlick(x[k], x[3], x[4])).collect(),
+        regions: &[
+            Region {
+                name: "metals and dielectrics",
+                share: 2,
+                draw: |d| {
+                    let f0 = [0; 3].map(|_| if d.below(2) == 0 { d.unit() } else { d.log(1e-6, 1.0) } as f32);
+                    [&f0[..], &[1.0, cosine(d) as f32]].concat()
+                },
+            },
+            Region {
+                name: "any F90",
+                share: 1,
+                draw: |d| {
+                    let f = [0; 4].map(|_| d.unit() as f32);
+                    [&f[..], &[cosine(d) as f32]].concat()
+                },
+            },
+        ],
+        outputs: &[
+            Output { name: "Fx", bound: SCHLICK_BOUND, allowed: schlick_allowed },
+            Output { name: "Fy", bound: "as Fx", allowed: schlick_allowed },
+            Output { name: "Fz", bound: "as Fx", allowed: schlick_allowed },
+        ],
+        axis: Axis { name: "1 − cosθ", log: true, of: |x| 1.0 - x[4], column: 0, relative: true },
+        extreme: 1e37,
+    },
+    Equation {
+        name: "normal_reflectance",
+        twin: |x| vec![normal_reflectance(x[0], x[1])],
+        regions: &[
+            Region { name: "metals", share: 2, draw: |d| vec![log_index(d) as f32, d.log(1e-6, 1e9) as f32] },
+            Region {
+                name: "n → 1",
+                share: 1,
+                draw: |d| vec![(1.0 + d.sign() * d.log(6e-8, 0.1)) as f32, d.log(1e-8, 1e-2) as f32],
+            },
+        ],
+        outputs: &[Output { name: "F0", bound: "8 ulp", allowed: |c| c.ulps(8.0) }],
+        axis: Axis { name: "κ", log: true, of: |x| x[1], column: 0, relative: true },
+        // Only indices of metals of files reach it.
+        extreme: -1.0,
+    },
     Equation {
         name: "fresnel_schlick",
         twin: |x| fresnel_schlick(x[0], x[1], x[2]).to_vec(),
@@ -220,7 +294,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
     Equation {
         name: "fresnel_dielectric",
         twin: |x| fresnel_dielectric(x[0], x[1]).to_vec(),
-        regions: &[ANYWHERE, NEAR_ONE, CRITICAL],
+        regions: &[ANYWHERE, NEAR_ONE, CRITICAL, FAR_GRAZING],
         outputs: &[
             Output {
                 name: "F",
@@ -255,7 +329,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
     Equation {
         name: "dielectric_transmitted",
         twin: |x| dielectric_transmitted(x[0], x[1]).to_vec(),
-        regions: &[ANYWHERE, NEAR_ONE, CRITICAL],
+        regions: &[ANYWHERE, NEAR_ONE, CRITICAL, FAR_GRAZING],
         outputs: &[
             Output { name: "Ts", bound: "8 ulp + δg", allowed: |c| c.ulps(8.0) + 2.0 * through_g(c)[0] },
             Output { name: "Tp", bound: "8 ulp + δg", allowed: |c| c.ulps(8.0) + 2.0 * through_g(c)[1] },
@@ -352,6 +426,15 @@ const CONDUCTORS: &[Region] = &[
         draw: |d| {
             let n = 1.0 + d.sign() * d.log(6e-8, 0.1);
             vec![cosine(d) as f32, n as f32, d.log(1e-9, 0.1) as f32]
+        },
+    },
+    Region {
+        name: "cosines to 1e-37, n = 1 and κ = 0",
+        share: 1,
+        draw: |d| {
+            let nothing = d.below(2) == 0;
+            let (n, k) = if nothing { (1.0, 0.0) } else { (log_index(d), d.log(1e-3, 1e3)) };
+            vec![d.log(2e-38, 1e-8) as f32, n as f32, k as f32]
         },
     },
     Region {

@@ -1,11 +1,11 @@
 //! Light that arrives at a surface (lecture R2–R4), and solid angles. Directions are normalised first.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec3;
 
 use super::brdf::{at_cosine, cosine, cosine_in, grazing_allowed, normal};
-use super::catalogue::{Axis, Case, Draw, Equation, Output, Region, columns, ulp, vector};
+use super::catalogue::{Axis, Draw, Equation, Output, Region, columns, ulp, vector};
 
 /// @eq R3: cos⁺θ, E cos⁺θ.
 #[must_use]
@@ -45,22 +45,37 @@ pub fn spot_share(cos_angle: f64, scale: f64, offset: f64) -> f64 {
     (cos_angle * scale + offset).clamp(0.0, 1.0).powi(2)
 }
 
-/// @eq R2: 1 − cosθ and solid angle of the cone of a sphere; all around from inside.
+/// @eq R2: 1 − cosθ of the cone of a ball; a hemisphere from inside.
 #[must_use]
-pub fn sphere_cone(radius: f64, distance: f64) -> [f64; 2] {
+pub fn sphere_cone(radius2: f64, distance2: f64) -> f64 {
     // 1 − cos θ = 2 sin²(θ/2)
-    let half = if distance < radius { FRAC_PI_2 } else { 0.5 * (radius / distance).asin() };
-    let one_minus_cos = 2.0 * half.sin().powi(2);
-    [one_minus_cos, TAU * one_minus_cos]
+    let half = 0.5 * (radius2 / distance2).min(1.0).sqrt().asin();
+    2.0 * half.sin().powi(2)
 }
 
-/// @eq R2: solid angle of a triangle (van Oosterom and Strackee 1983). The volume from the edges, as in the shader: of
-/// slivers L'Huilier's theorem and a·(b × c) leave four digits in f64 as well.
+/// @eq R3 R4: direction of the light and E_⊥/I; of a light infinitely far the direction as it is and 1.
 #[must_use]
-pub fn triangle_solid_angle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
-    let volume = a.dot((b - a).cross(c - a)).abs();
-    let (la, lb, lc) = (a.length(), b.length(), c.length());
-    2.0 * volume.atan2(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb)
+pub fn arriving_light(to_light: DVec3, directional: bool, inv_range2: f64, spot: (DVec3, f64, f64)) -> [f64; 4] {
+    if directional {
+        return [to_light.x, to_light.y, to_light.z, 1.0];
+    }
+    let l = to_light.normalize();
+    let (axis, scale, offset) = spot;
+    let share = point_falloff(to_light.length_squared(), inv_range2) * spot_share(-axis.dot(l), scale, offset);
+    [l.x, l.y, l.z, share]
+}
+
+/// @eq N34: the smaller root of |t l − c|² = r² for a unit direction l at θ from a ball's middle c, no less than 1e-6 |c|.
+#[must_use]
+pub fn ball_reach(distance2: f64, radius: f64, cos_theta: f64, sin2_theta: f64) -> f64 {
+    let d = distance2.sqrt();
+    (d * cos_theta - (radius * radius - distance2 * sin2_theta).max(0.0).sqrt()).max(1e-6 * d)
+}
+
+/// @eq R2: density per solid angle of what was drawn per area.
+#[must_use]
+pub fn density_per_solid_angle(per_area: f64, r2: f64, cos_theta: f64) -> f64 {
+    per_area * r2 / cos_theta
 }
 
 fn point_row(p: DVec3, l: DVec3, n: DVec3, intensity: f64) -> Vec<f32> {
@@ -73,19 +88,6 @@ fn point_row(p: DVec3, l: DVec3, n: DVec3, intensity: f64) -> Vec<f32> {
 fn to_light(d: &mut Draw, n: DVec3, distance: f64) -> DVec3 {
     let c = cosine_in(d) * if d.below(4) == 0 { -1.0 } else { 1.0 };
     at_cosine(d, n, c) * distance
-}
-
-/// Errors that the corners' rounding to f32 products leave in numerator and denominator of tan(Ω/2).
-fn triangle_allowed(case: &Case<'_>) -> f64 {
-    let (a, b, c) = (vector(case.inputs, 0), vector(case.inputs, 3), vector(case.inputs, 6));
-    let (la, lb, lc) = (a.length(), b.length(), c.length());
-    let lengths = la * lb * lc;
-    let numerator = a.dot((b - a).cross(c - a)).abs() / lengths;
-    let denominator = 1.0 + a.dot(b) / (la * lb) + b.dot(c) / (lb * lc) + c.dot(a) / (lc * la);
-    let edges = (b - a).length() * (c - a).length() * la / lengths;
-    let numerator_error = case.tiered(4e-7 * edges, 1e-12 * edges + 1.2e-7 * numerator);
-    let size2 = numerator * numerator + denominator * denominator;
-    case.ulps(4.0) + 2.0 * (denominator.abs() * numerator_error + numerator * 1e-6) / size2
 }
 
 /// The equations of this file.
@@ -260,66 +262,130 @@ pub(super) const EQUATIONS: &[Equation] = &[
     },
     Equation {
         name: "sphere_cone",
-        twin: |x| sphere_cone(x[0], x[1]).to_vec(),
+        twin: |x| vec![sphere_cone(x[0], x[1])],
         regions: &[
             Region {
                 name: "far away",
                 share: 2,
                 draw: |d| {
-                    let distance = d.log(1e-3, 1e6);
-                    vec![(distance * d.log(1e-9, 1.0)) as f32, distance as f32]
+                    let distance2 = d.log(1e-6, 1e12);
+                    vec![(distance2 * d.log(1e-18, 1.0)) as f32, distance2 as f32]
                 },
             },
             Region {
                 name: "at the surface",
                 share: 1,
                 draw: |d| {
-                    let distance = d.log(1e-3, 1e6);
-                    vec![(distance * (1.0 + d.sign() * d.log(1e-7, 0.1))) as f32, distance as f32]
-                },
-            },
-        ],
-        outputs: &[
-            Output { name: "one_minus_cos", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
-            Output { name: "omega", bound: "6 ulp", allowed: |c| c.ulps(6.0) },
-        ],
-        axis: Axis { name: "radius/distance", log: true, of: |x| x[0] / x[1], column: 0, relative: true },
-        extreme: 1e38,
-    },
-    Equation {
-        name: "triangle_solid_angle",
-        twin: |x| vec![triangle_solid_angle(vector(x, 0), vector(x, 3), vector(x, 6))],
-        regions: &[
-            Region {
-                name: "any three directions",
-                share: 1,
-                draw: |d| {
-                    let corners = [0; 3].map(|_| d.direction() * d.log(0.1, 10.0));
-                    columns(&corners)
-                },
-            },
-            Region {
-                name: "small or far",
-                share: 2,
-                draw: |d| {
-                    let (centre, size) = (d.direction() * d.log(1e-3, 1e6), d.log(1e-4, 1.0));
-                    let corners = [0; 3].map(|_| centre + d.direction() * size * centre.length());
-                    columns(&corners)
+                    let distance2 = d.log(1e-6, 1e12);
+                    vec![(distance2 * (1.0 + d.sign() * d.log(1e-7, 0.1))) as f32, distance2 as f32]
                 },
             },
         ],
         outputs: &[Output {
-            name: "omega",
-            bound: "4 ulp + rounding of numerator and denominator; compensated: of the denominator",
-            allowed: triangle_allowed,
+            name: "one_minus_cos",
+            bound: "4 ulp + the rounding of q² over 2 cosθ, at most its root",
+            allowed: |c| {
+                let sin2 = (c.inputs[0] / c.inputs[1]).min(1.0);
+                let error = 2_f64.powi(-24) * sin2;
+                c.ulps(4.0) + (0.6 * error / (1.0 - sin2).max(0.0).sqrt()).min(1.2 * error.sqrt())
+            },
         }],
-        axis: Axis {
-            name: "Ω, sr",
-            log: true,
-            of: |x| triangle_solid_angle(vector(x, 0), vector(x, 3), vector(x, 6)),
-            column: 0,
-            relative: true,
-        },
-        extreme: 1e38,
+        axis: Axis { name: "radius²/distance²", log: true, of: |x| x[0] / x[1], column: 0, relative: true },
+        extreme: -1.0,
+    },
+    Equation {
+        name: "arriving_light",
+        twin: |x| arriving_light(vector(x, 0), x[3] != 0.0, x[4], (vector(x, 5), x[8], x[9])).to_vec(),
+        regions: &[
+            Region {
+                name: "points, half of them with a range",
+                share: 2,
+                draw: |d| {
+                    let r = d.log(1e-3, 1e3);
+                    let range2 = if d.below(2) == 0 { 0.0 } else { 1.0 / (r * r * d.log(1.5, 100.0)) };
+                    let q = columns(&[d.direction() * r]);
+                    let a = columns(&[d.direction()]);
+                    [q, vec![0.0, range2 as f32], a, vec![0.0, 1.0]].concat()
+                },
+            },
+            Region {
+                name: "spots, between their cones",
+                share: 2,
+                draw: |d| {
+                    let l = d.direction();
+                    let outer = d.between(0.1, 1.5);
+                    let inner = outer * d.between(0.0, 0.9);
+                    let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-3);
+                    let angle = d.between(inner, outer);
+                    let axis = d.at_angle(-l, angle);
+                    let q = columns(&[l * d.log(1e-3, 1e3)]);
+                    [q, vec![0.0, 0.0], columns(&[axis]), vec![scale as f32, (-outer.cos() * scale) as f32]].concat()
+                },
+            },
+            Region {
+                name: "infinitely far",
+                share: 1,
+                draw: |d| {
+                    [columns(&[d.direction()]), vec![1.0, 0.0], columns(&[d.direction()]), vec![0.0, 1.0]].concat()
+                },
+            },
+        ],
+        outputs: &[
+            Output { name: "lx", bound: "3e-7; as given where infinitely far", allowed: |_| 3e-7 },
+            Output { name: "ly", bound: "as lx", allowed: |_| 3e-7 },
+            Output { name: "lz", bound: "as lx", allowed: |_| 3e-7 },
+            Output {
+                name: "share",
+                bound: "8 ulp + 2.4e-7/r² of the window's end + (scale 3e-7 + 1.2e-7 scale)/r² of the ramp, twice",
+                allowed: |c| {
+                    if c.inputs[3] != 0.0 {
+                        return 0.0;
+                    }
+                    let r2 = vector(c.inputs, 0).length_squared();
+                    let ramp = c.inputs[8] * 5e-7;
+                    c.ulps(8.0) + (2.4e-7 + (2.0 + ramp) * ramp) / r2
+                },
+            },
+        ],
+        axis: Axis { name: "r, m", log: true, of: |x| vector(x, 0).length(), column: 3, relative: true },
+        extreme: -1.0,
+    },
+    Equation {
+        name: "ball_reach",
+        twin: |x| vec![ball_reach(x[0], x[1], x[2], x[3])],
+        regions: &[Region {
+            name: "in the cone of a ball",
+            share: 1,
+            draw: |d| {
+                let radius = d.log(1e-3, 1e2);
+                let distance = radius * (1.0 + d.log(1e-6, 1e5));
+                let sin2 = (radius / distance).powi(2) * d.unit();
+                vec![(distance * distance) as f32, radius as f32, (1.0 - sin2).sqrt() as f32, sin2 as f32]
+            },
+        }],
+        outputs: &[Output {
+            name: "t",
+            bound: "2e-7 d + half of 4e-7 r² over the root, at most the root of that",
+            allowed: |c| {
+                let d = c.inputs[0].sqrt();
+                let disc = (c.inputs[1].powi(2) - c.inputs[0] * c.inputs[3]).max(0.0);
+                let error = 4e-7 * c.inputs[1].powi(2);
+                2.4e-7 * d + if disc > error { 0.5 * error / disc.sqrt() + 2e-7 * disc.sqrt() } else { error.sqrt() }
+            },
+        }],
+        axis: Axis { name: "distance/radius", log: true, of: |x| x[0].sqrt() / x[1], column: 0, relative: true },
+        extreme: -1.0,
+    },
+    Equation {
+        name: "density_per_solid_angle",
+        twin: |x| vec![density_per_solid_angle(x[0], x[1], x[2])],
+        regions: &[Region {
+            name: "triangles of any size",
+            share: 1,
+            draw: |d| vec![d.log(1e-6, 1e6) as f32, d.log(1e-6, 1e6) as f32, d.log(1e-6, 1.0) as f32],
+        }],
+        outputs: &[Output { name: "pdf", bound: "2 ulp", allowed: |c| c.ulps(2.0) }],
+        axis: Axis { name: "cosθ", log: true, of: |x| x[2], column: 0, relative: true },
+        extreme: -1.0,
     },
 ];

@@ -21,22 +21,28 @@ pub fn ray_sphere(origin: DVec3, direction: DVec3, center: DVec3, radius: f64) -
     if b < 0.0 { [1.0, by_d, by_q] } else { [1.0, by_q, by_d] }
 }
 
-/// @eq N36: the part of the ray inside a closed box: whether there is any, where it begins and ends. An infinite inverse
-/// is a direction parallel to the axis' planes.
+/// @eq N36: the part of the ray inside a closed box: whether there is any, where it begins and ends.
 #[must_use]
-pub fn slab(origin: DVec3, inverse: DVec3, box_min: DVec3, box_max: DVec3, t_max: f64) -> [f64; 3] {
-    let [near, far] = interval(origin, inverse, box_min, box_max, t_max);
+pub fn slab(origin: DVec3, direction: DVec3, centre: DVec3, half: DVec3, t_max: f64) -> [f64; 3] {
+    let [near, far] = interval(origin, direction, centre, half, t_max);
     if near <= far { [1.0, near, far] } else { [0.0, f64::NAN, f64::NAN] }
 }
 
-fn interval(origin: DVec3, inverse: DVec3, box_min: DVec3, box_max: DVec3, t_max: f64) -> [f64; 2] {
+/// @eq N36: whether intervals have a time in common.
+#[must_use]
+pub fn meets(near: DVec3, far: DVec3, t_min: f64, t_max: f64) -> bool {
+    near.max_element().max(t_min) <= far.min_element().min(t_max)
+}
+
+fn interval(origin: DVec3, direction: DVec3, centre: DVec3, half: DVec3, t_max: f64) -> [f64; 2] {
     let (mut near, mut far) = (0.0_f64, t_max);
     for k in 0..3 {
-        let [a, b] = if inverse[k].is_infinite() {
-            let inside = (box_min[k]..=box_max[k]).contains(&origin[k]);
+        let to = centre[k] - origin[k];
+        let [a, b] = if direction[k] == 0.0 {
+            let inside = to.abs() <= half[k];
             if inside { [f64::NEG_INFINITY, f64::INFINITY] } else { [f64::INFINITY, f64::NEG_INFINITY] }
         } else {
-            let (a, b) = ((box_min[k] - origin[k]) * inverse[k], (box_max[k] - origin[k]) * inverse[k]);
+            let (a, b) = ((to - half[k]) / direction[k], (to + half[k]) / direction[k]);
             [a.min(b), a.max(b)]
         };
         near = near.max(a);
@@ -63,17 +69,10 @@ pub fn ray_triangle(origin: DVec3, direction: DVec3, a: DVec3, b: DVec3, c: DVec
     }
 }
 
-/// @eq N38: the point that Wächter and Binder give, which is defined by the floats, and its distance from p.
+/// @eq N38: a point moved along the normal and a direction known to be free.
 #[must_use]
-pub fn offset_origin(p: DVec3, n: DVec3) -> [f64; 4] {
-    let moved = DVec3::from_array([0, 1, 2].map(|k| {
-        let steps = (256.0 * n[k]) as i32;
-        let steps = if p[k] < 0.0 { -steps } else { steps };
-        let by_floats = f32::from_bits((p[k] as f32).to_bits().wrapping_add_signed(steps));
-        let by_length = (p[k] + n[k] / 65536.0) as f32;
-        f64::from(if p[k].abs() < 1.0 / 32.0 { by_length } else { by_floats })
-    }));
-    [moved.x, moved.y, moved.z, (moved - p).length()]
+pub fn offset_origin(p: DVec3, n: DVec3, free: DVec3, offset: f64) -> DVec3 {
+    p + (n + free) * offset
 }
 
 /// @eq N39: a + u (b − a) + v (c − a)
@@ -151,17 +150,13 @@ fn toward_sphere(d: &mut Draw, distance: f64, impact: f64) -> Vec<f32> {
 }
 
 fn box_case(d: &mut Draw, parallel: bool) -> Vec<f32> {
-    let center = d.direction() * d.log(0.1, 1e3);
-    let half = DVec3::from_array([0; 3].map(|_| d.log(1e-3, 10.0)));
-    let corners = columns(&[center - half, center + half]);
-    let [low, high] =
-        [0, 3].map(|k| DVec3::new(f64::from(corners[k]), f64::from(corners[k + 1]), f64::from(corners[k + 2])));
+    let boxed = columns(&[d.direction() * d.log(0.1, 1e3), DVec3::from_array([0; 3].map(|_| d.log(1e-3, 10.0)))]);
+    let exact: Vec<f64> = boxed.iter().map(|&x| f64::from(x)).collect();
+    let (centre, half) = (vector(&exact, 0), vector(&exact, 3));
     // Inside, past it, or at an edge or a corner.
-    let target = DVec3::from_array([0, 1, 2].map(|k| match d.below(4) {
-        0 => low[k],
-        1 => high[k],
-        2 => d.between(low[k], high[k]),
-        _ => center[k] + d.between(-1.5, 1.5) * half[k],
+    let target = DVec3::from_array([0, 1, 2].map(|k| {
+        let part = [-1.0, 1.0, d.between(-1.0, 1.0), d.between(-1.5, 1.5)][d.below(4)];
+        centre[k] + part * half[k]
     }));
     let mut direction = d.direction();
     if parallel {
@@ -173,15 +168,29 @@ fn box_case(d: &mut Draw, parallel: bool) -> Vec<f32> {
             direction = DVec3::X;
         }
     }
-    let origin = target - direction * d.log(0.1, 1e3);
-    let inverse: Vec<f32> = columns(&[direction]).iter().map(|&x| 1.0 / x).collect();
-    let mut all = [columns(&[origin]), inverse, corners].concat();
-    all.push(if d.below(4) == 0 { d.log(0.1, 1e3) as f32 } else { 1e30 });
-    all
+    let ray = columns(&[target - direction * d.log(0.1, 1e3), direction]);
+    let largest = ray[..3].iter().chain(&boxed).fold(0.0_f32, |most, x| most.max(x.abs()));
+    let t_max = if d.below(4) == 0 { d.log(0.1, 1e3) as f32 } else { 1e30 };
+    [ray, boxed, vec![largest * 32.0 / 16_777_216.0, t_max]].concat()
 }
 
 fn box_of(x: &[f64]) -> [f64; 2] {
-    interval(vector(x, 0), vector(x, 3), vector(x, 6), vector(x, 9), x[12])
+    interval(vector(x, 0), vector(x, 3), vector(x, 6), vector(x, 9), x[13])
+}
+
+/// How much earlier the padded interval may begin and how much later end: by the pad of the axis that decides, 8 roundings
+/// of the origin and the scene's offset, and as much again for the roundings that it is there for.
+fn box_slack(x: &[f64]) -> [f64; 2] {
+    let [near, far] = box_of(x);
+    let pad = |end: f64| {
+        let of = |k: usize| {
+            let ends = [-1.0, 1.0].map(|s| (x[6 + k] - x[k] + s * x[9 + k]) / x[3 + k]);
+            let decides = x[3 + k] != 0.0 && ends.contains(&end);
+            if decides { 2.0 * (x[k].abs() * 2_f64.powi(-21) + x[12]) / x[3 + k].abs() } else { 0.0 }
+        };
+        of(0).max(of(1)).max(of(2))
+    };
+    [pad(near), pad(far)]
 }
 
 /// A triangle of about unit size around `center`, and a ray from `distance` towards a place in or beside it.
@@ -321,8 +330,30 @@ pub(super) const EQUATIONS: &[Equation] = &[
         extreme: 1e38,
     },
     Equation {
+        name: "meets",
+        twin: |x| vec![flag(meets(vector(x, 0), vector(x, 3), x[6], x[7]))],
+        regions: &[Region {
+            name: "ends of either sign",
+            share: 1,
+            draw: |d| {
+                let mut ends = [0; 6].map(|_| d.sign() * d.log(1e-3, 1e3));
+                for k in 0..3 {
+                    if ends[k] > ends[k + 3] {
+                        ends.swap(k, k + 3);
+                    }
+                }
+                let mut row = ends.map(|t| t as f32).to_vec();
+                row.extend([if d.below(2) == 0 { 0.0 } else { d.log(1e-3, 1e3) as f32 }, d.log(1e-3, 1e3) as f32]);
+                row
+            },
+        }],
+        outputs: &[Output { name: "hit", bound: "exact", allowed: EXACT }],
+        axis: Axis { name: "t_max", log: true, of: |x| x[7], column: 0, relative: false },
+        extreme: 1e38,
+    },
+    Equation {
         name: "slab",
-        twin: |x| slab(vector(x, 0), vector(x, 3), vector(x, 6), vector(x, 9), x[12]).to_vec(),
+        twin: |x| slab(vector(x, 0), vector(x, 3), vector(x, 6), vector(x, 9), x[13]).to_vec(),
         regions: &[
             Region { name: "inside, beside, at edges and corners", share: 2, draw: |d| box_case(d, false) },
             Region { name: "parallel to planes, half of them in one", share: 2, draw: |d| box_case(d, true) },
@@ -330,17 +361,27 @@ pub(super) const EQUATIONS: &[Equation] = &[
         outputs: &[
             Output {
                 name: "hit",
-                bound: "no box is missed; one missed by less than 1e-6 of t may be hit",
+                bound: "no box is missed; one missed by less than the pads may be hit",
                 allowed: |c| {
                     let [near, far] = box_of(c.inputs);
-                    flag(c.x() == 0.0 && near <= far * (1.0 + 1e-6))
+                    // Beside a plane that the ray is parallel to: by the pad of lengths.
+                    let beside = (0..3).any(|k| {
+                        let gap = (c.inputs[6 + k] - c.inputs[k]).abs() - c.inputs[9 + k];
+                        c.inputs[3 + k] == 0.0 && gap > 0.0 && gap <= 4.0 * c.inputs[12]
+                    });
+                    let slack: f64 = box_slack(c.inputs).iter().sum();
+                    flag(c.x() == 0.0 && (beside || near - far <= slack))
                 },
             },
-            Output { name: "t_near", bound: "2 ulp", allowed: |c| c.ulps(2.0) },
-            Output { name: "t_far", bound: "rel 6e-7, 4e-7 of it the factor", allowed: |c| c.rel(6e-7) },
+            Output {
+                name: "t_near",
+                bound: "the pad over the direction",
+                allowed: |c| box_slack(c.inputs)[0] + c.ulps(4.0),
+            },
+            Output { name: "t_far", bound: "as t_near", allowed: |c| box_slack(c.inputs)[1] + c.ulps(4.0) },
         ],
         axis: Axis { name: "t_near", log: true, of: |x| box_of(x)[0], column: 1, relative: true },
-        extreme: 1e38,
+        extreme: -1.0,
     },
     Equation {
         name: "ray_triangle",
@@ -399,34 +440,28 @@ pub(super) const EQUATIONS: &[Equation] = &[
     },
     Equation {
         name: "offset_origin",
-        twin: |x| offset_origin(vector(x, 0), vector(x, 3)).to_vec(),
-        regions: &[
-            Region {
-                name: "coordinates 1e-2 … 1e5",
-                share: 3,
-                draw: |d| {
-                    let p = DVec3::from_array([0; 3].map(|_| d.sign() * d.log(1e-2, 1e5)));
-                    columns(&[p, d.direction()])
-                },
+        twin: |x| offset_origin(vector(x, 0), vector(x, 3), vector(x, 6), x[9]).to_array().to_vec(),
+        regions: &[Region {
+            name: "coordinates 1e-2 … 1e5, of scenes as large or larger",
+            share: 1,
+            draw: |d| {
+                let p = DVec3::from_array([0; 3].map(|_| d.sign() * d.log(1e-2, 1e5)));
+                let free = if d.below(2) == 0 { DVec3::ZERO } else { d.direction() };
+                let offset = p.abs().max_element() * d.log(1.0, 1e3) * 32.0 / 16_777_216.0;
+                [columns(&[p, d.direction(), free]), vec![offset as f32]].concat()
             },
-            Region {
-                name: "around 0 and 1/32",
-                share: 1,
-                draw: |d| {
-                    let p: Vec<f32> = (0..3).map(|_| d.near(&[0.0, 1.0 / 32.0, -1.0 / 32.0, 1e-3, -1e-3])).collect();
-                    let n = columns(&[d.direction()]);
-                    [p, n].concat()
-                },
-            },
-        ],
+        }],
         outputs: &[
-            Output { name: "p_offsetx", bound: "exact", allowed: EXACT },
-            Output { name: "p_offsety", bound: "exact", allowed: EXACT },
-            Output { name: "p_offsetz", bound: "exact", allowed: EXACT },
-            Output { name: "shift", bound: "4 ulp", allowed: |c| c.ulps(4.0) },
+            Output {
+                name: "qx",
+                bound: "1 ulp + 1.2e-7 of the offset",
+                allowed: |c| c.ulps(1.0) + 2.4e-7 * c.inputs[9],
+            },
+            Output { name: "qy", bound: "as qx", allowed: |c| c.ulps(1.0) + 2.4e-7 * c.inputs[9] },
+            Output { name: "qz", bound: "as qx", allowed: |c| c.ulps(1.0) + 2.4e-7 * c.inputs[9] },
         ],
-        axis: Axis { name: "|p|", log: true, of: |x| vector(x, 0).length(), column: 3, relative: false },
-        extreme: 1e38,
+        axis: Axis { name: "|p|", log: true, of: |x| vector(x, 0).length(), column: 0, relative: false },
+        extreme: 1e18,
     },
     Equation {
         name: "hit_point",

@@ -12,6 +12,7 @@ use super::texture::{Meaning, Texels, Textures};
 use super::upload::upload;
 use super::view::View;
 use crate::gpu::{BoundSet, Buffer, DescriptorSet, Device, Draw, Place, Specialization as _, VertexStream};
+use crate::optics::ray::camera_relative;
 use crate::plan::{Knobs, Plan, casts_in_maps, is_see_through, mirrors};
 use crate::scene::solid::Solids;
 use crate::scene::wavelengths::{Banded, Slice, Wavelengths};
@@ -606,7 +607,7 @@ fn shared_instance(placement: &Placement, eye: DVec3, material: usize) -> share:
             column(m.x_axis),
             column(m.y_axis),
             column(m.z_axis),
-            column(placement.world_from_object.translation - eye),
+            column(camera_relative([placement.world_from_object.translation, DVec3::ZERO], [eye, DVec3::ZERO])),
         ],
         normal_from_object: [column(normals.x_axis), column(normals.y_axis), column(normals.z_axis)],
         handedness: sign as f32,
@@ -629,7 +630,7 @@ fn shared_light(light: &Light, [r, g, b]: [f32; 3], eye: DVec3, shadow: [f32; 4]
     let side = across.as_vec3().extend(0.0).to_array();
     let shaped = |offset: f32| [offset, shape[0], shape[1], 0.0];
     let local = |position: DVec3, range: Option<f64>| {
-        let p = (position - eye).as_vec3();
+        let p = camera_relative([position, DVec3::ZERO], [eye, DVec3::ZERO]).as_vec3();
         let inv_range2 = range.map_or(0.0, |range| (1.0 / (range * range)) as f32);
         // A negative radius tells the tile pass that the light reaches everywhere.
         ([p.x, p.y, p.z, range.map_or(-1.0, |range| range as f32)], [r, g, b, inv_range2])
@@ -667,6 +668,7 @@ mod tests {
     use glam::{DAffine3, DQuat};
 
     use super::*;
+    use crate::optics::frame::transformed_normal;
 
     #[test]
     fn normals_stay_perpendicular_under_any_transform() {
@@ -692,6 +694,9 @@ mod tests {
             );
             let columns = instance.normal_from_object.map(|c| glam::Vec3::from(c).as_dvec3());
             let n = (columns[0] * normal.x + columns[1] * normal.y + columns[2] * normal.z).normalize();
+            let m = world_from_object.matrix3;
+            let exact = transformed_normal(m.x_axis, m.y_axis, m.z_axis, normal);
+            assert!(n.distance(exact) < 1e-6, "{scale}: {n}, not {exact}");
             for t in tangents {
                 let t = world_from_object.transform_vector3(t).normalize();
                 assert!(n.dot(t).abs() < 1e-6, "{scale}: {}", n.dot(t));

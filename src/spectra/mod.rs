@@ -320,6 +320,28 @@ mod tests {
         (0..3).all(|k| (a[k] - b[k]).abs() <= tolerance)
     }
 
+    /// Integrals over bands are those of the equations, which sum over steps of 5 nm.
+    #[test]
+    fn bands_add_up_to_the_matching_of_the_lecture() {
+        use crate::optics::colour::{cmf_gaussian, cmf_integral, planck, xyz_to_srgb};
+        let bell = |nm: f64| (-((nm - 560.0) / 60.0).powi(2) / 2.0).exp();
+        let steps: Vec<f64> = (0..SAMPLES).map(|i| bell(wavelength(i))).collect();
+        let found =
+            VISIBLE.mean_of(|nm| matching(nm).map(|f| f * bell(nm))).map(|mean| mean * (VISIBLE.to - VISIBLE.from));
+        let [x, y, z, r, g, b, ..] = cmf_integral(&steps);
+        assert!(near(found, [x, y, z], 0.05), "{found:?}, not {x} {y} {z}");
+        let [x2, y2, z2, ..] = cmf_gaussian(1.0, 560.0, 60.0);
+        assert!(near([x, y, z], [x2, y2, z2], 1e-12));
+        assert!(
+            near(rgb_from_xyz([x, y, z]).map(|c| c / y), xyz_to_srgb([x, y, z]).map(|c| c / y), 1e-3),
+            "{r} {g} {b}"
+        );
+        // Of a lamp told by its temperature the shape is Planck's: the ratio of two wavelengths.
+        let lamp = Spectrum::BlackBody(2856.0);
+        let at = |nm: f64| planck(14_387_768.8 / (nm * 2856.0)) / nm.powi(5);
+        assert!((lamp.at(700.0) / lamp.at(450.0) / (at(700.0) / at(450.0)) - 1.0).abs() < 1e-6);
+    }
+
     #[test]
     fn light_told_as_rgb_has_its_colour_again() {
         for bands in [1, 8, 16, 32] {

@@ -270,6 +270,16 @@ mod tests {
     }
 
     #[test]
+    fn the_reflectance_is_the_sigmoid_of_a_polynomial() {
+        use crate::optics::colour::spectrum_sigmoid;
+        let c = fit([0.8, 0.3, 0.1]);
+        for nm in [400.0, 550.0, 700.0] {
+            let x = (c[0] * nm + c[1]) * nm + c[2];
+            assert!((upsampled_reflectance(nm, c) - spectrum_sigmoid(x)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
     fn reflectances_stay_within_0_and_1() {
         for i in 0..27 {
             let rgb = [i % 3, i / 3 % 3, i / 9].map(|x| f64::from(x) * 0.5);

@@ -329,3 +329,19 @@ impl Shape {
         shape
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::optics::frame::quadric_normal;
+
+    #[test]
+    fn normals_of_balls_are_those_of_the_quadric() {
+        let ball = Shape::sphere(0.7, 24);
+        for (p, n) in ball.positions.iter().zip(&ball.normals) {
+            let [p, n] = [p, n].map(|v| glam::Vec3::from(*v).as_dvec3());
+            let exact = quadric_normal(p, DVec3::ONE);
+            assert!(n.distance(exact) < 1e-6, "at {p}: {n}, not {exact}");
+        }
+    }
+}

@@ -5,6 +5,7 @@
 
 pub mod document;
 pub mod plot;
+pub mod statements;
 pub mod vectors;
 
 use std::sync::Arc;
@@ -56,8 +57,8 @@ pub fn find(name: &str) -> Result<Entry> {
 pub struct Cases {
     /// How many.
     pub count: usize,
-    /// Input columns.
-    pub inputs: Vec<f32>,
+    /// Input columns: values of f32, and whole numbers of 32 bits where the function takes such.
+    pub inputs: Vec<f64>,
     /// Exact outputs, row by row; NaN where nothing is expected.
     pub exact: Vec<f64>,
     /// Output columns that something is expected of.
@@ -77,7 +78,14 @@ impl Cases {
             sum += region.share;
             let end = count * sum as usize / total as usize;
             while rows.len() < end {
-                rows.push((region.draw)(&mut draw));
+                let mut row: Vec<f64> = (region.draw)(&mut draw).into_iter().map(f64::from).collect();
+                for (x, name) in row.iter_mut().zip(entry.probe.inputs) {
+                    if entry.probe.whole.contains(name) && *x >= 16_777_216.0 {
+                        // The digits that a float has not.
+                        *x = (*x + draw.below(ulp(*x) as usize) as f64).min(f64::from(u32::MAX));
+                    }
+                }
+                rows.push(row);
             }
         }
         Self::from_rows(entry, &rows)
@@ -85,9 +93,9 @@ impl Cases {
 
     /// These inputs with the twin's outputs.
     #[must_use]
-    pub fn from_rows(entry: &Entry, rows: &[Vec<f32>]) -> Self {
+    pub fn from_rows<T: Copy + Into<f64> + Sync>(entry: &Entry, rows: &[Vec<T>]) -> Self {
         let exact = rows.par_iter().flat_map_iter(|row| {
-            let inputs: Vec<f64> = row.iter().map(|&x| f64::from(x)).collect();
+            let inputs: Vec<f64> = row.iter().map(|&x| x.into()).collect();
             (entry.equation.twin)(&inputs)
         });
         Self {
@@ -101,12 +109,12 @@ impl Cases {
     /// One case's inputs.
     #[must_use]
     pub fn row(&self, row: usize) -> Vec<f64> {
-        (0..self.inputs.len() / self.count).map(|column| f64::from(self.inputs[column * self.count + row])).collect()
+        (0..self.inputs.len() / self.count).map(|column| self.inputs[column * self.count + row]).collect()
     }
 }
 
-fn by_columns(rows: &[Vec<f32>], width: usize) -> Vec<f32> {
-    (0..width).flat_map(|column| rows.iter().map(move |row| row[column])).collect()
+fn by_columns<T: Copy + Into<f64>>(rows: &[Vec<T>], width: usize) -> Vec<f64> {
+    (0..width).flat_map(|column| rows.iter().map(move |row| row[column].into())).collect()
 }
 
 /// What a probe returned.
@@ -129,7 +137,7 @@ pub fn evaluate(
     device: &Arc<Device>,
     probe: &'static Probe,
     tier: Tier,
-    inputs: &[f32],
+    inputs: &[impl Copy + Into<f64>],
     count: usize,
 ) -> Result<Evaluated> {
     assert_eq!(inputs.len(), count * probe.inputs.len(), "input columns of {}", probe.name);
@@ -137,8 +145,10 @@ pub fn evaluate(
     let mut ms = 0.0;
     for first in (0..count).step_by(BATCH) {
         let length = BATCH.min(count - first);
-        let part = |column: usize| &inputs[column * count + first..][..length];
-        let columns: Vec<f32> = (0..probe.inputs.len()).flat_map(part).copied().collect();
+        let part = |column: usize| {
+            inputs[column * count + first..][..length].iter().map(move |&x| probe.word(column, x.into()))
+        };
+        let columns: Vec<u32> = (0..probe.inputs.len()).flat_map(part).collect();
         let from = Buffer::with_data(device, "inputs of a probe", &columns)?;
         let bytes = 4 * length * probe.outputs.len();
         let to = Buffer::new(device, "outputs of a probe", bytes as u64, Place::Readback)?;
@@ -196,7 +206,7 @@ pub struct Worst {
     /// Its place among the cases, from 0.
     pub row: usize,
     /// Input columns.
-    pub inputs: Vec<f32>,
+    pub inputs: Vec<f64>,
     /// From the device.
     pub got: f32,
     /// From the twin or the file.
@@ -265,8 +275,7 @@ pub fn judge(entry: &Entry, tier: Tier, cases: &Cases, outputs: &[f32]) -> Vec<F
                     }
                     all.pass &= tier == Tier::Fast || excess <= 1.0;
                     if all.worst.as_ref().is_none_or(|worst| excess > worst.excess) {
-                        let inputs = cases.row(row).into_iter().map(|x| x as f32).collect();
-                        all.worst = Some(Worst { row, inputs, got, expected: exact, excess });
+                        all.worst = Some(Worst { row, inputs: cases.row(row), got, expected: exact, excess });
                     }
                     all
                 },
@@ -294,7 +303,7 @@ fn merge(a: Figures, b: Figures) -> Figures {
 }
 
 /// Inputs from outside every domain: zeros, ones, denormals, huge numbers of either sign, in any mixture.
-fn hostile(entry: &Entry, count: usize, seed: u64) -> Vec<f32> {
+fn hostile(entry: &Entry, count: usize, seed: u64) -> Vec<f64> {
     let huge = entry.equation.extreme;
     let values =
         [0.0, -0.0, 1.0, -1.0, 0.5, -2.0, 1e-6, -1e-6, 1e-20, -1e-20, 1e-38, 1e-44, 1e10, huge, -huge, huge * 0.1];
@@ -303,7 +312,7 @@ fn hostile(entry: &Entry, count: usize, seed: u64) -> Vec<f32> {
     let mut value = || {
         let extreme = draw.below(2) == 0;
         let pick = values[draw.below(values.len())].clamp(-huge, huge);
-        if extreme { pick } else { draw.between(-2.0, 2.0) as f32 }
+        f64::from(if extreme { pick } else { draw.between(-2.0, 2.0) as f32 })
     };
     (0..count * entry.probe.inputs.len()).map(|_| value()).collect()
 }
@@ -318,7 +327,10 @@ pub fn nan_of_hostile(
     tier: Tier,
     count: usize,
     seed: u64,
-) -> Result<(usize, Option<Vec<f32>>)> {
+) -> Result<(usize, Option<Vec<f64>>)> {
+    if entry.equation.extreme < 0.0 {
+        return Ok((0, None));
+    }
     let inputs = hostile(entry, count, seed);
     let outputs = evaluate(device, entry.probe, tier, &inputs, count)?.outputs;
     let nan = |row: &usize| (0..entry.probe.outputs.len()).any(|column| outputs[column * count + row].is_nan());

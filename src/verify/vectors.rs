@@ -11,7 +11,8 @@ use super::{Cases, Entry, find};
 ///
 /// # Errors
 /// One sentence with file and line: an unreadable file, an unknown function, columns that it does not have or that are
-/// missing, twice or of uneven length, cells that are no numbers, inputs that are not finite values of f32.
+/// missing, twice or of uneven length, cells that are no numbers, inputs that are not finite values of f32. Inputs are
+/// rounded to f32, but for whole numbers (a count, a seed) written as such, which keep all 32 bits.
 pub fn load(path: &Path, function: Option<&str>) -> Result<(Entry, Cases)> {
     let text = std::fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -55,14 +56,16 @@ fn read(text: &str, function: &str) -> Result<(Entry, Cases)> {
     for record in reader.records() {
         let record = record?;
         let line = record.position().map_or(0, csv::Position::line);
-        let mut row = vec![0.0_f32; probe.inputs.len()];
+        let mut row = vec![0.0_f64; probe.inputs.len()];
         let mut outputs = vec![f64::NAN; probe.outputs.len()];
         for ((column, name), cell) in columns.iter().zip(&header).zip(&record) {
             let broken = || format!("line {line}: {name} is \"{cell}\", no number");
             match *column {
                 Column::Input(at) => {
-                    row[at] = cell.parse().with_context(broken)?;
-                    ensure!(row[at].is_finite(), "line {line}: {name} is \"{cell}\": inputs are finite values of f32");
+                    let nearest: f32 = cell.parse().with_context(broken)?;
+                    let digits = cell.parse::<u32>().ok().filter(|_| probe.whole.contains(&name));
+                    row[at] = digits.map_or(f64::from(nearest), f64::from);
+                    ensure!(nearest.is_finite(), "line {line}: {name} is \"{cell}\": inputs are finite values of f32");
                 }
                 Column::Expected(_) if cell.is_empty() => {}
                 Column::Expected(at) => outputs[at] = cell.parse().with_context(broken)?,

@@ -27,21 +27,23 @@ fn names(events: &[Event], materials: &[Material], lights: &[Light], knobs: &Kno
             continue;
         }
         if met.total {
-            all.push("critical_angle");
+            all.push("refract");
         }
         let exact = is("fresnel", "exact");
         if m.metallic < 1.0 {
-            all.push(if exact { "fresnel_dielectric" } else { "fresnel_schlick" });
+            all.push(if exact { "fresnel_dielectric" } else { "schlick" });
         }
         if m.metallic > 0.0 {
-            all.push(if exact && m.conductor.is_some() { "fresnel_conductor" } else { "ggx_f" });
+            all.push(if exact && m.conductor.is_some() { "fresnel_conductor" } else { "schlick" });
         }
         if met.spreads {
             all.extend(match knobs.rung("brdf") {
-                "blinn-phong" => &["blinn_phong"][..],
-                "blinn-phong-reciprocal" => &["reciprocal_phong"],
-                "ggx-multi" => &["lambert", "ggx_d", "ggx_g", "ggx_f", "ggx", "ggx_compensation"],
-                _ => &["lambert", "ggx_d", "ggx_g", "ggx_f", "ggx"],
+                "blinn-phong" => &["half_angle", "diffuse_brdf", "phong_lobe"][..],
+                "blinn-phong-reciprocal" => &["half_angle", "diffuse_brdf", "phong_lobe", "reciprocal_lobe"],
+                "ggx-multi" => {
+                    &["half_angle", "diffuse_brdf", "ggx_distribution", "ggx_visibility", "schlick", "ggx_compensation"]
+                }
+                _ => &["half_angle", "diffuse_brdf", "ggx_distribution", "ggx_visibility"],
             });
         }
         let lets_through = m.transmission > 0.0 && m.alpha_mode == AlphaMode::Opaque;
@@ -49,7 +51,7 @@ fn names(events: &[Event], materials: &[Material], lights: &[Light], knobs: &Kno
             all.push("beer_lambert");
         }
         if lets_through && m.sigma.is_some() && knobs.march_steps() > 0 {
-            all.push("march_optical_depth");
+            all.push("quadrature_weights");
         }
         if lets_through && knobs.bands() > 0 {
             all.extend(match m.dispersion {
@@ -62,19 +64,19 @@ fn names(events: &[Event], materials: &[Material], lights: &[Light], knobs: &Kno
     if knobs.bands() > 0 {
         all.extend(["cmf_integral", "xyz_to_srgb"]);
     }
-    all.push("srgb");
+    all.push("srgb_encode");
     all
 }
 
 fn of_light(light: &Light, knobs: &Knobs) -> Vec<&'static str> {
     let has_shape = knobs.rung("lights") != "points";
     let mut all = match light.kind {
-        LightKind::Directional { .. } => vec!["light_directional"],
+        LightKind::Directional { .. } => vec!["arriving_light"],
         LightKind::Point { range, .. } => {
             let falloff = range.map(|_| "point_falloff");
-            ["light_point"].into_iter().chain(falloff).collect()
+            ["arriving_light"].into_iter().chain(falloff).collect()
         }
-        LightKind::Spot { .. } => vec!["light_point", "point_falloff", "spot_share"],
+        LightKind::Spot { .. } => vec!["arriving_light", "point_falloff", "spot_share"],
     };
     if has_shape && matches!(light.extent, Some(Extent::Sphere { .. })) {
         all.push("sphere_cone");
@@ -154,7 +156,8 @@ mod tests {
             {
                 let Some(knobs) = Knobs::of(model).with(knob.name, rung) else { continue };
                 for name in names(&events(materials.len()), &materials, &lights, &knobs) {
-                    assert!(PROBES.iter().any(|probe| probe.name == name), "{name}");
+                    let probe = PROBES.iter().find(|probe| probe.name == name).unwrap_or_else(|| panic!("{name}"));
+                    assert!(probe.lab.is_none(), "{name} draws nothing");
                     seen += 1;
                 }
             }
@@ -169,9 +172,9 @@ mod tests {
             used(&events(1), &glass, &[], knobs).iter().map(|probe| probe.name).collect()
         };
         let exact = list(&Knobs::of(Model::Recursive));
-        assert!(exact.contains(&"fresnel_dielectric") && !exact.contains(&"fresnel_schlick"), "{exact:?}");
+        assert!(exact.contains(&"fresnel_dielectric") && !exact.contains(&"schlick"), "{exact:?}");
         let schlick = Knobs::of(Model::Recursive).with("fresnel", "schlick").expect("a rung");
-        assert!(list(&schlick).contains(&"fresnel_schlick"));
+        assert!(list(&schlick).contains(&"schlick"));
         assert!(!exact.contains(&"fresnel_conductor") && !exact.contains(&"sellmeier"));
     }
 }
