@@ -27,7 +27,7 @@ const EFFECTS: &[(&str, &str, &[&str])] = &[
     ("metals by n and kappa", "CONDUCTORS", &["study:cornell"]),
     ("holes before rays", "MASKED_HITS,MASKED", &["study:metals"]),
     ("light through surfaces", "FILTERS", &["study:metals"]),
-    ("transmission", "TRANSMISSIVE,HAS_TRANSMISSION", &["study:metals"]),
+    ("transmission", "TRANSMISSIVE,STORED_TRANSMISSION", &["study:metals"]),
     ("absorption and media that vary", "ABSORPTION,MARCH_STEPS", &["study:metals"]),
     ("bodies that touch", "TOUCHING", &["study:etalon"]),
     ("rays by lobes", "ROUGH", &["study:nested"]),
@@ -41,7 +41,7 @@ const EFFECTS: &[(&str, &str, &[&str])] = &[
     ("aims", "AIMED", &["study:metals", "--model", "global"]),
     (
         "all of a local model's scene",
-        "CLEARCOAT,HAS_LAYERS,CONDUCTORS,MASKED_HITS,FILTERS,TRANSMISSIVE,HAS_TRANSMISSION,ABSORPTION,MARCH_STEPS,\
+        "CLEARCOAT,HAS_LAYERS,STORED_LAYERS,CONDUCTORS,MASKED_HITS,FILTERS,TRANSMISSIVE,STORED_TRANSMISSION,ABSORPTION,MARCH_STEPS,\
          TOUCHING,ROUGH,MIRROR_RAYS,SHADOWS,TILE_WORDS",
         &["study:radiance"],
     ),

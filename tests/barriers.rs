@@ -65,15 +65,15 @@ fn proves(name: &str, describe: impl for<'a> Fn(&'a Things, &mut Frame<'a>)) {
 #[test]
 fn sorting_tiles_waits_for_its_counters() {
     // copy → compute atomics on the sizes.
-    proves("classify", |things, frame| classify(frame, &things.gbuffer, &things.work).expect("the pass"));
+    proves("classify", |things, frame| classify(frame, Library::default(), &things.gbuffer, &things.work).expect("the pass"));
 }
 
 #[test]
 fn sorting_tiles_again_waits_for_the_first_time() {
     // compute → copy → compute on the same lists; the tiles are written twice.
     proves("classify twice", |things, frame| {
-        classify(frame, &things.gbuffer, &things.work).expect("the pass");
-        classify(frame, &things.gbuffer, &things.work).expect("the pass");
+        classify(frame, Library::default(), &things.gbuffer, &things.work).expect("the pass");
+        classify(frame, Library::default(), &things.gbuffer, &things.work).expect("the pass");
     });
 }
 

@@ -1,11 +1,11 @@
-// What a ray meets at a surface that may separate two media, and how much is reflected there.
+// What a ray meets at a surface that may separate two media, and the layers of that surface.
 #ifndef BOUNDARY_GLSL
 #define BOUNDARY_GLSL
 #include "lib/hit.glsl"
+#include "lib/layers.glsl"
 #include "lib/media.glsl"
 #include "lib/shadow.glsl"
 
-layout(constant) const bool TRANSMISSIVE = false; // some material lets light through
 layout(constant) const bool TOUCHING = false;     // some transparent body lies against another surface
 
 // What a surface separates, for a ray that comes through `media`.
@@ -69,23 +69,37 @@ Boundary boundary_at(HitSurface hit, uvec4 media, vec3 direction) {
     return r;
 }
 
-// Reflectance of the dielectric part of a surface for light between media of index n1 and n2. What tints it in air
-// (KHR_materials_specular) tints it between two media. `total`: nothing passes.
-vec3 reflectance_between(Surface s, bool solid, float n1, float n2, float cos_h, out bool total) {
-    float share = boundary_share(cos_h, n1, n2);
-    float in_air = nested_f0(1.0, s.ior);
-    vec3 f0 = solid ? s.f0_dielectric * (in_air > 0.0 ? nested_f0(n1, n2) / in_air : 0.0) : s.f0_dielectric;
-    total = solid && share >= 1.0;
-    return total ? vec3(1.0) : f0 + (vec3(s.f90_dielectric) - f0) * share;
-}
-
-// Colour of what goes through a surface: a solid is entered and left, and each takes the root of it.
-vec3 tint_through(HitSurface hit, bool sheet) {
-    vec3 tint = sheet ? hit.s.base : sqrt(hit.s.base);
-    if (ABSORPTION != 0) {
-        bool nominal = sheet || (ABSORPTION == 1 && hit.front);
-        tint *= nominal ? exp(-hit.sigma_thickness * hit.thickness) : vec3(1.0);
+// The layers of a surface that a ray meets. A base of roughness up to MIN_ROUGHNESS, and one between equal indices, which bends and
+// scatters nothing, is a direction.
+Layers layers_at(HitSurface hit, Boundary boundary) {
+    Layers b;
+    b.s = hit.s;
+    b.s.diffuse *= 1.0 - hit.transmits;
+    b.solid = boundary.solid;
+    b.sheet = boundary.sheet;
+    b.n1 = index_of(boundary.here);
+    b.n2 = boundary.solid ? index_of(boundary.there) : b.s.ior;
+    if (TRANSMISSIVE && !boundary.solid) seen_from(b.s, b.n1);
+    b.delta = !ROUGH || b.s.roughness <= MIN_ROUGHNESS || (b.solid && b.n1 == b.n2);
+    b.coat_delta = !ROUGH || b.s.clearcoat_roughness <= MIN_ROUGHNESS;
+    if (!b.delta) compensate(b.s);
+    b.cos_v = max(cosine(b.s.n, b.s.v), 1e-4);
+    b.f_dielectric = fresnel_below_coat(b, b.cos_v, b.total);
+    b.f_base = mix(b.f_dielectric, fresnel_of_metal(b.s, b.cos_v), b.s.metallic);
+    b.enters = 1.0 - largest(b.f_dielectric);
+    if (ROUGH && BRDF == BRDF_GGX_MULTI && !b.delta) b.enters = ground_share(b.s, lobe_reflectance(b.s));
+    b.under = 1.0;
+    if (CLEARCOAT) {
+        b.under = under_coat(b.s);
+        if (ROUGH && BRDF == BRDF_GGX_MULTI && !b.coat_delta) b.under = 1.0 - min(albedo_of_coat(b.s), 1.0);
     }
-    return tint;
+    b.tint = vec3(0.0);
+    b.transmits = 0.0;
+    if (TRANSMISSIVE) {
+        b.tint = tint_through(hit.s.base, boundary.sheet, hit.front, hit.sigma_thickness * hit.thickness);
+        b.transmits = hit.transmits * (1.0 - hit.s.metallic);
+    }
+    b.shares = vec4(0.0);
+    return b;
 }
 #endif

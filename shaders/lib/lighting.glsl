@@ -5,10 +5,8 @@
 #include "lib/environment.glsl"
 #include "lib/light_tile.glsl"
 #include "lib/punctual.glsl"
-#include "lib/reflectance.glsl"
+#include "lib/layers.glsl"
 #include "lib/shadow.glsl"
-#include "lib/snell.glsl"
-#include "lib/surface.glsl"
 
 layout(constant) const uint LOCAL_LIGHTS = 0;       // point and spot lights after them; 0 where tiles list them
 layout(constant) const uint TILE_WORDS = 0;         // words of a tile's bit mask; 0 without lists
@@ -22,9 +20,10 @@ layout(pass, scalar) readonly buffer TileLights { uint tile_lights[]; };
 const float FAINTEST_LOBE = 1.0 / 131072.0;
 
 // Light `index` of the table on a surface, as far as it is visible from there.
-vec3 light_on(Surface s, uint index) {
+vec3 light_on(Layers b, uint index) {
+    Surface s = b.s;
     PunctualLight light = punctual_light_at(index, s.p_rel);
-    vec3 result = reflected(s, light.l) * light.arriving;
+    vec3 result = evaluate_reflection(b, light.l).f_cos * light.arriving;
     if (SHADOWS != 0) {
         result *= terminator(s.n, s.n_triangle, light.l);
         bool wanted = largest(result) > FAINTEST_LOBE * largest(light.arriving);
@@ -49,7 +48,7 @@ struct LightRange {
 // Loop heads after which no further light is begun.
 layout(constant) const uint LIGHT_BUDGET = 0xffffffffu;
 
-vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across, LightRange range) {
+vec3 punctual_light(Layers b, ivec2 pixel, uint tiles_across, LightRange range) {
     vec3 sum = vec3(0.0);
     if (DIRECTIONAL_LIGHTS + LOCAL_LIGHTS + TILE_WORDS == 0) return sum;
     // Lights of the tile as a bit mask, in ascending order whatever built it. Empty words are skipped in a loop of
@@ -75,21 +74,9 @@ vec3 punctual_light(Surface s, ivec2 pixel, uint tiles_across, LightRange range)
         uint index = listed ? DIRECTIONAL_LIGHTS + word * 32 + uint(findLSB(bits)) : next;
         bits = listed ? bits & (bits - 1) : bits;
         next += listed ? 0 : 1;
-        sum += light_on(s, index);
+        sum += light_on(b, index);
     }
     return sum;
-}
-
-// Directional reflectance of the lobe: what the base sends to the eye of the light in the mirror direction (split sum,
-// Karis 2013).
-vec3 mirrored_by_base(Surface s) {
-    vec2 ab = lobe_reflectance(s);
-    return (s.f0 * ab.x + s.f90 * ab.y) * s.compensation;
-}
-
-float mirrored_by_coat(Surface s) {
-    vec2 coat = reflectance_of_lobe(dot(s.n_coat, s.v), s.clearcoat_roughness);
-    return s.clearcoat * (0.04 * coat.x + coat.y);
 }
 
 // Light from all around: irradiance on the diffuse part, the prefiltered map in the mirror direction on the specular
@@ -99,21 +86,21 @@ vec3 environment_light(Surface s) {
     vec2 ab = lobe_reflectance(s);
     vec3 result = vec3(0.0);
     if (AMBIENT) {
-        float enters = 1.0 - largest(s.f0_dielectric * ab.x + s.f90_dielectric * ab.y);
+        float enters = ground_share(s, ab);
         result += s.diffuse * diffuse_brdf(enters) * environment_irradiance(s.n);
     }
-    if (REFLECTION && !s.base_traced) result += mirrored_by_base(s) * prefiltered_radiance(r, s.alpha);
+    if (REFLECTION && !s.base_traced) result += albedo_of_base(s, ab) * prefiltered_radiance(r, s.alpha);
     if (CLEARCOAT) {
         vec3 coat_r = reflect_ray(-s.v, s.n_coat).R;
-        result *= under_coat(s);
-        if (REFLECTION && !s.coat_traced) result += mirrored_by_coat(s) * prefiltered_radiance(coat_r, s.clearcoat_alpha);
+        result *= BRDF == BRDF_GGX_MULTI ? 1.0 - min(albedo_of_coat(s), 1.0) : under_coat(s);
+        if (REFLECTION && !s.coat_traced) result += albedo_of_coat(s) * prefiltered_radiance(coat_r, s.clearcoat_alpha);
     }
     return result * s.occlusion;
 }
 
 // Light from `range`, and with `all_around` what does not come from lights as well; of a surface that is compensated.
 vec3 radiance_to_eye(Surface s, ivec2 pixel, uint tiles_across, LightRange range, bool all_around) {
-    vec3 result = punctual_light(s, pixel, tiles_across, range);
+    vec3 result = punctual_light(layers_of(s), pixel, tiles_across, range);
     vec3 around = CLEARCOAT ? s.emissive * under_coat(s) : s.emissive;
     if (AMBIENT || REFLECTION) around += environment_light(s);
     result += all_around ? around : vec3(0.0);

@@ -69,7 +69,7 @@ float search_end(LightTask task) {
 vec3 left_of_light(LightTask task) {
     uint medium = present_medium(task.media);
     float size = vector_length(task.to_light);
-    bool absorbs = ABSORPTION == 2 && medium != 0 && task.t_max == 1.0;
+    bool absorbs = ABSORPTION == ABSORPTION_PATH && medium != 0 && task.t_max == 1.0;
     return absorbs ? absorbed(medium, task.origin, task.to_light / size, size) : vec3(1.0);
 }
 
@@ -88,7 +88,7 @@ vec3 light_that_arrives(LightTask task) {
         Hit found = trace(task.origin, task.to_light, task.self, last, goes_on ? search_end(task) : -1.0, OPAQUE | FILTER, false);
         bool at_surface = goes_on && found.triangle != NO_TRIANGLE;
         uint medium = present_medium(media);
-        if (goes_on && ABSORPTION == 2 && medium != 0) {
+        if (goes_on && ABSORPTION == ABSORPTION_PATH && medium != 0) {
             float end = at_surface ? found.t : min(task.t_max, 1.0);
             // Of what is infinitely far, light comes through no medium that has no end.
             float far = at_surface || task.t_max == 1.0 ? (end - last.t) * size : 0.0;
@@ -99,7 +99,8 @@ vec3 light_that_arrives(LightTask task) {
                 through = vec3(0.0);
             } else {
                 Met met = met_at(hit_point_of(found, task.origin, task.to_light), media, direction);
-                vec3 passes = straight_through(bsdf_of(met.hit, met.boundary));
+                Layers b = layers_at(met.hit, met.boundary);
+                vec3 passes = is_straight(b) ? straight_transmittance(b) : vec3(0.0);
                 through *= met.boundary.hidden ? vec3(1.0) : 1.0 - met.hit.coverage + met.hit.coverage * passes;
                 bool enters = met.boundary.solid && (met.boundary.hidden || met.hit.coverage > 0.0);
                 media = enters ? met.boundary.beyond : media;
@@ -113,7 +114,7 @@ vec3 light_that_arrives(LightTask task) {
 }
 
 // A light to be looked for from a surface, drawn from as many places as are looked for: what of it would go along the path.
-LightTask task_of(Path p, Met met, bool spreads, vec3 front_origin, LightSample light, Scattered towards) {
+LightTask task_of(Path p, Met met, bool spreads, vec3 front_origin, LightSample light, PathEval towards) {
     LightTask task;
     float w = light.pdf > 0.0 ? mis_weight(light.pdf * float(LIGHT_PLACES), towards.pdf) : 1.0;
     vec3 contribution = p.throughput * towards.f_cos * light.arriving * (w / float(LIGHT_PLACES));
@@ -136,13 +137,14 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, bool there, out LightTask task) 
     bool at_surface = found.triangle != NO_TRIANGLE;
     uint met_before = p.state & PATH_SURFACES;
     uint medium = present_medium(p.media);
-    if (ABSORPTION == 2 && medium != 0) p.throughput *= absorbed(medium, p.origin, p.direction, at_surface ? found.t : 0.0);
+    if (ABSORPTION == ABSORPTION_PATH && medium != 0) p.throughput *= absorbed(medium, p.origin, p.direction, at_surface ? found.t : 0.0);
     uint place = at_surface ? found.triangle : 0u;
     HitPoint point = hit_point_of(Hit(found.t, place, found.u, found.v), p.origin, p.direction);
     Met met = met_at(point, p.media, p.direction);
     HitSurface hit = met.hit;
-    Bsdf b = bsdf_of(hit, met.boundary);
-    if (AIMED) aim(b);
+    Bsdf bsdf = bsdf_at(hit, met.boundary);
+    if (AIMED) guide(bsdf);
+    Layers b = bsdf.layers;
     uvec2 event = draw_words(pixel, met_before, DRAW_EVENT);
     float x = unit_float(event.x);
     // The back of what has one side only is not there for the eye.
@@ -152,7 +154,7 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, bool there, out LightTask task) 
 
     // Light from a place on what emits.
     LightSample light = LightSample(p.direction, -1.0, vec3(0.0), 0.0);
-    bool spreads = at_surface && !passed_by && !hit.s.unlit && (!b.sharp || b.shares.z > 0.0 || (CLEARCOAT && !b.coat_sharp));
+    bool spreads = at_surface && !passed_by && !hit.s.unlit && (!b.delta || b.shares.z > 0.0 || (CLEARCOAT && !b.coat_delta));
     vec3 front_origin = ray_origin(hit.s.p_bvh, hit.n, hit.s.v);
     if (EMITTERS > 0) light = sample_light(front_origin, draw_words_of(pixel, met_before, DRAW_LIGHT, 0, LIGHT_PLACES));
     if (ENVIRONMENT) {
@@ -196,14 +198,14 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, bool there, out LightTask task) 
         ends = true;
     }
     uvec2 words = draw_words(pixel, met_before, DRAW_DIRECTION);
-    Drawn drawn = draw_direction(b, p.direction, x, vec2(unit_float(words.x), unit_float(words.y)));
+    BsdfSample drawn = bsdf_sample(bsdf, x, vec2(unit_float(words.x), unit_float(words.y)));
     // One evaluation for the light's direction, one for that which was drawn: the same code, once.
     vec3 along = normalize(light.to_light);
-    Scattered towards_light = Scattered(vec3(0.0), 0.0, 0.0);
-    Scattered on_path = Scattered(vec3(0.0), 0.0, 0.0);
+    PathEval towards_light = PathEval(vec3(0.0), 0.0, 0.0);
+    PathEval on_path = PathEval(vec3(0.0), 0.0, 0.0);
     for (int i = 0; i < 2; i++) {
         loop_heads++;
-        Scattered now = scattered(b, i == 0 ? along : drawn.direction);
+        PathEval now = bsdf_evaluate(bsdf, i == 0 ? along : drawn.direction);
         if (i == 0) towards_light = now;
         on_path = now;
     }
@@ -219,21 +221,21 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, bool there, out LightTask task) 
                 bool hidden = (p.state & PATH_CLEAR) != 0 && !SKY && dot(hit.n, other.to_light) < 0.0;
                 other.arriving *= hidden ? vec3(0.0) : environment_radiance(other.to_light);
             }
-            LightTask one = task_of(p, met, spreads, front_origin, other, scattered(b, normalize(other.to_light)));
+            LightTask one = task_of(p, met, spreads, front_origin, other, bsdf_evaluate(bsdf, normalize(other.to_light)));
             one.t_max = there ? one.t_max : -1.0;
             shadow_rays += one.t_max > 0.0 ? 1u : 0u;
             vec3 arrives = light_that_arrives(one);
             if (one.t_max > 0.0) gathered += only_finite(one.contribution, pixel, hit.material, met_before) * arrives;
         }
     }
-    vec3 weight = drawn.sharp ? drawn.weight : on_path.pdf > 0.0 ? on_path.f_cos / on_path.pdf : vec3(0.0);
+    vec3 weight = drawn.delta ? drawn.weight : on_path.pdf > 0.0 ? on_path.f_cos / on_path.pdf : vec3(0.0);
     bool on_right_side = drawn.through == (dot(drawn.direction, hit.n) < 0.0);
     weight = passed_by ? vec3(1.0) : on_right_side || drawn.straight ? weight : vec3(0.0);
     // Only what filters light lets the search for lights pass as well.
     bool straight = (passed_by || drawn.straight) && hit_class(place) == FILTER;
     p.throughput *= weight;
     p.travelled = open ? behind_all : straight ? p.travelled + found.t : 0.0;
-    p.pdf = straight ? p.pdf : passed_by || drawn.sharp ? 0.0 : on_path.pdf;
+    p.pdf = straight ? p.pdf : passed_by || drawn.delta ? 0.0 : on_path.pdf;
     bool behind = passed_by || drawn.through;
     bool into = passed_by ? met.boundary.hidden : drawn.through && met.boundary.solid;
     p.origin = behind ? ray_origin(hit.s.p_bvh, met.boundary.against ? hit.n : -hit.n, vec3(0.0)) : front_origin;
@@ -245,13 +247,13 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, bool there, out LightTask task) 
     uint flags = p.state & (PATH_CLEAR | PATH_STRAIGHT | PATH_SPREAD);
     flags &= behind ? ~0u : ~PATH_CLEAR;
     flags &= passed_by || drawn.straight ? ~0u : ~PATH_STRAIGHT;
-    flags |= !passed_by && !drawn.sharp ? PATH_SPREAD : 0u;
+    flags |= !passed_by && !drawn.delta ? PATH_SPREAD : 0u;
     // Less is left of a path that was aimed than of another, and that is no reason to end it: roulette asks what would be left if
     // nothing were aimed at, or it would undo what aims are for.
     float most = largest(p.throughput);
     if (AIMED) {
-        bool spread = !passed_by && !drawn.sharp && on_path.plain_pdf > 0.0;
-        float aimed = aimed_before(p) * (spread ? on_path.pdf / on_path.plain_pdf : 1.0);
+        bool spread = !passed_by && !drawn.delta && on_path.unguided_pdf > 0.0;
+        float aimed = aimed_before(p) * (spread ? on_path.pdf / on_path.unguided_pdf : 1.0);
         flags |= packHalf2x16(vec2(0.0, min(aimed, 60000.0)));
         most *= aimed;
     }

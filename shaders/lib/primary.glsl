@@ -19,7 +19,7 @@ struct Primary {
 // What is left of the light from the nearest surface at the eye.
 vec3 left_at_eye(Surface s) {
     vec3 left = vec3(1.0);
-    if (IN_MEDIUM && ABSORPTION == 2) {
+    if (IN_MEDIUM && ABSORPTION == ABSORPTION_PATH) {
         float distance = camera.orthographic != 0 ? dot(s.p_rel, camera.forward) : length(s.p_rel);
         left = absorbed(present_medium(trace_terms.camera_media), s.p_bvh + s.v * distance, -s.v, distance);
     }
@@ -87,6 +87,8 @@ Primary primary_surface(ivec2 pixel, bool exact_normals) {
             }
         }
     }
+    // The boundaries of bodies are told between two media (lib/boundary.glsl).
+    if (IN_MEDIUM && m.transmission == 0.0) seen_from(s, index_of(present_medium(s.media)));
     r.hit.s = s;
     r.hit.n = s.n_triangle;
     r.hit.front = (id.y & BACK_FACE) == 0;

@@ -4,6 +4,7 @@
 #ifndef SHADOW_GLSL
 #define SHADOW_GLSL
 #include "lib/hit.glsl"
+#include "lib/layers.glsl"
 #include "lib/light_table.glsl"
 #include "lib/media.glsl"
 
@@ -12,7 +13,10 @@ const uint SHADOW_OFF = 0;
 const uint SHADOW_MAP = 1;
 const uint SHADOW_RAY = 2;
 layout(constant) const bool FILTERS = false; // something masked, blended or transmissive is in the scene
-layout(constant) const uint ABSORPTION = 0;  // 0 off, 1 by the nominal thickness, 2 along the path
+layout(constant) const uint ABSORPTION = 0;
+const uint ABSORPTION_OFF = 0;
+const uint ABSORPTION_NOMINAL = 1; // by the nominal thickness
+const uint ABSORPTION_PATH = 2;    // along the path
 
 // Maps of all lights in one image (pass/shadow_map.rs).
 layout(scene) uniform sampler2D shadow_depth;
@@ -27,7 +31,17 @@ uint lights_cut_off = 0; // surfaces whose lights were not all gone through, for
 float straight_reflectance(float cos_v, float n1, float n2) {
     if (n1 == n2) return 0.0;
     float ratio = max(n1, n2) / min(n1, n2);
-    return FRESNEL == 0 ? schlick(vec3(nested_f0(1.0, ratio)), 1.0, cos_v).x : fresnel_dielectric(cos_v, ratio).F;
+    return FRESNEL == FRESNEL_SCHLICK ? schlick(vec3(nested_f0(1.0, ratio)), 1.0, cos_v).x : fresnel_dielectric(cos_v, ratio).F;
+}
+
+// Colour of what goes through a surface: a solid is entered and left, and each takes the root of it.
+vec3 tint_through(vec3 base, bool sheet, bool front, vec3 nominal_depth) {
+    vec3 tint = sheet ? base : sqrt(base);
+    if (ABSORPTION != ABSORPTION_OFF) {
+        bool nominal = sheet || (ABSORPTION == ABSORPTION_NOMINAL && front);
+        tint *= nominal ? exp(-nominal_depth) : vec3(1.0);
+    }
+    return tint;
 }
 
 // What one surface lets through of light along `direction`, with the media before and after it.
@@ -39,11 +53,11 @@ vec3 filtered(HitPoint point, vec3 direction, inout uvec4 media) {
     transmits *= 1.0 - m.metallic * hit_texture_or(point.material, SLOT_METALLIC_ROUGHNESS, point.uvs, 0.0, vec4(1.0)).b;
     float coverage = coverage_of(m, varies.a);
     float cos_v = abs(dot(point.n_smooth, direction));
+    bool front = dot(point.n, direction) <= 0.0;
     uvec4 after = media;
     float n1 = 1.0;
     float n2 = m.ior;
     if (!point.sheet && m.transmission > 0.0) {
-        bool front = dot(point.n, direction) <= 0.0;
         after = front ? entered(media, m.medium) : left(media, m.medium);
         n1 = index_of(present_medium(media));
         n2 = index_of(present_medium(after));
@@ -53,13 +67,21 @@ vec3 filtered(HitPoint point, vec3 direction, inout uvec4 media) {
         }
     }
     media = after;
-    // A solid is entered and left: each takes the root of its colour.
-    vec3 tint = point.sheet ? base : sqrt(base);
-    if (point.sheet && ABSORPTION != 0) {
+    vec3 nominal_depth = vec3(0.0);
+    if (ABSORPTION != ABSORPTION_OFF) {
         float thickness = hit_texture_or(point.material, SLOT_THICKNESS, point.uvs, 0.0, vec4(1.0)).g;
-        tint *= exp(-m.sigma_thickness * (thickness * point.scale));
+        nominal_depth = m.sigma_thickness * (thickness * point.scale);
     }
-    vec3 through = tint * (transmits * (1.0 - straight_reflectance(cos_v, n1, n2)));
+    Layers b;
+    b.tint = tint_through(base, point.sheet, front, nominal_depth);
+    b.transmits = transmits;
+    b.f_dielectric = vec3(straight_reflectance(cos_v, n1, n2));
+    b.under = 1.0;
+    if (CLEARCOAT) {
+        float coat = m.clearcoat * hit_texture_or(point.material, SLOT_CLEARCOAT, point.uvs, 0.0, vec4(1.0)).r;
+        b.under = 1.0 - coat * straight_reflectance(cos_v, 1.0, COAT_INDEX);
+    }
+    vec3 through = straight_transmittance(b);
     return 1.0 - coverage + coverage * through;
 }
 
@@ -161,7 +183,7 @@ vec3 visibility(vec3 p, vec3 n, vec3 v, uint self, uvec4 media, vec3 to_light, f
             if (found) {
                 Hit hit = hit_again(origin, to_light, filters.t.x, filters.triangles.x);
                 uint medium = present_medium(media);
-                if (ABSORPTION == 2 && medium != 0) {
+                if (ABSORPTION == ABSORPTION_PATH && medium != 0) {
                     through *= absorbed(medium, origin + to_light * last.t, to_light / length_of_direction, (hit.t - last.t) * length_of_direction);
                 }
                 through *= filtered(hit_point_of(hit, origin, to_light), to_light / length_of_direction, media);
@@ -173,7 +195,7 @@ vec3 visibility(vec3 p, vec3 n, vec3 v, uint self, uvec4 media, vec3 to_light, f
         goes_on = goes_on && largest_component(through) > 0.0;
     } while (goes_on);
     uint medium = present_medium(media);
-    if (ABSORPTION == 2 && medium != 0 && t_max == 1.0) {
+    if (ABSORPTION == ABSORPTION_PATH && medium != 0 && t_max == 1.0) {
         through *= absorbed(medium, origin + to_light * last.t, to_light / length_of_direction, (1.0 - last.t) * length_of_direction);
     }
     return through;

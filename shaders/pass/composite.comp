@@ -84,22 +84,24 @@ void main() {
         Surface s = surface_from_texels(m, base, blue_metal.y, float(word >> 16) * (1.0 / 65535.0),
                                         occlusion_thickness.x, glow, layer.rgb, n,
                                         unit_from_octahedral(unpackSnorm2x16(nodes[at + 12])), -direction, p);
-        // What is not reflected goes through, tinted by the base colour and by absorption through the nominal thickness
-        // (A1): straight on, and with refraction `screen` bent where a body is entered.
         s.p_bvh = p + trace_terms.bvh_from_rel;
         s.media = trace_terms.camera_media;
         float transmission = m.transmission * layer.a;
-        float transmits = transmission * (1.0 - blue_metal.y * m.metallic);
-        vec3 f = fresnel(s, clamp(dot(s.n, s.v), 0.0, 1.0));
         float scale = occlusion_thickness.y * instances[nodes[at + 2]].scale;
-        vec3 passes = transmits * s.base * exp(-m.sigma_thickness * scale) * (1.0 - f);
         if (BENDS) {
             bool body = (instances[nodes[at + 2]].flags & INSTANCE_SHEET) == 0 && m.transmission > 0.0 &&
                         (m.flags & MATERIAL_BLENDED) == 0;
             shift += body ? bent_shift(camera, pixel, p, direction, s.n, m.ior, m.thickness * scale) : vec2(0.0);
             entry = max(entry, body ? uintBitsToFloat(nodes[at + 1]) : 0.0);
         }
-        if (CLEARCOAT) passes *= under_coat(s);
+        // What is not reflected goes through, tinted by the base colour and by absorption through the nominal thickness
+        // (A1): straight on, and with refraction `screen` bent where a body is entered.
+        Layers b;
+        b.tint = s.base * exp(-m.sigma_thickness * scale);
+        b.transmits = transmission * (1.0 - s.metallic);
+        b.f_dielectric = fresnel_of_dielectric(s, clamp(dot(s.n, s.v), 0.0, 1.0));
+        b.under = CLEARCOAT ? under_coat(s) : 1.0;
+        vec3 passes = straight_transmittance(b);
         s.diffuse *= 1.0 - transmission;
         float alpha = blue_alpha.y;
         compensate(s);

@@ -132,13 +132,6 @@ bool mirrored_by_ray(HitSurface hit, Boundary boundary) {
     return hit.s.base_traced || (boundary.solid && boundary.here != 0);
 }
 
-// Weight G2/G1 of r, mirrored at a half vector drawn for v: 0 below the surface, which is n's, or below its triangle, which
-// is n_triangle's.
-float lobe_weight(vec3 n, vec3 v, vec3 r, vec3 n_triangle, float alpha) {
-    float cos_r = dot(r, n);
-    return dot(r, n_triangle) > 0.0 && cos_r > 0.0 ? smith_g2_over_g1(dot(n, v), cos_r, alpha) : 0.0;
-}
-
 // Of the numbers that random points are drawn by, those of coats.
 const uint COAT_EVENT = 0x80000000u;
 
@@ -146,8 +139,6 @@ const uint COAT_EVENT = 0x80000000u;
 void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixel) {
     Surface s = hit.s;
     vec3 direction = ray.direction;
-    float n1 = index_of(boundary.here);
-    float n2 = boundary.solid ? index_of(boundary.there) : s.ior;
     stray_interfaces += boundary.stray ? 1u : 0u;
     Branch next;
     next.self = s.face;
@@ -170,71 +161,38 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     next.from = 0.0;
     vec3 weight = boundary.hidden || s.unlit ? vec3(0.0) : ray.throughput * hit.coverage;
 
-    // The coat.
+    // The coat, the base's mirror image, and what goes through: each lobe in turn.
+    Layers b = layers_at(hit, boundary);
     uint event = reflection_rays + refraction_rays;
-    if (CLEARCOAT) {
-        bool rough = ROUGH && s.clearcoat_roughness > MIN_ROUGHNESS;
-        vec3 h = s.n_coat;
-        if (ROUGH) {
-            vec2 u = random_point(pixel, event | COAT_EVENT, trace_terms.seed, trace_terms.sample_index);
-            h = rough ? half_vector(s.n_coat, s.v, s.clearcoat_alpha, u) : h;
-        }
-        vec3 r = reflect_ray(direction, h).R;
-        float masking = rough ? lobe_weight(s.n_coat, s.v, r, hit.n, s.clearcoat_alpha) : 1.0;
-        float f = s.clearcoat * schlick(vec3(0.04), 1.0, clamp(dot(h, s.v), 0.0, 1.0)).x;
-        next.direction = on_side(r, hit.n);
-        next.origin = ray_origin(s.p_bvh, hit.n, s.v);
-        next.media = ray.media;
-        next.events = count | BY_REFLECTION << 8;
-        next.throughput = s.coat_traced ? weight * (f * masking) : vec3(0.0);
-        next.spread = ray.spread + (rough ? s.clearcoat_alpha : 0.0);
-        send(next);
-        weight *= under_coat(s);
-    }
-
-    // Where nothing is bent, nothing is scattered either.
-    bool rough = ROUGH && s.roughness > MIN_ROUGHNESS && !(boundary.solid && n1 == n2);
-    vec3 h = s.n;
-    if (ROUGH) {
-        vec2 u = random_point(pixel, event, trace_terms.seed, trace_terms.sample_index);
-        h = rough ? half_vector(s.n, s.v, s.alpha, u) : h;
-    }
-    float cos_h = clamp(dot(h, s.v), 0.0, 1.0);
-    float cos_v = dot(s.n, s.v);
-    bool total;
-    vec3 f_dielectric = reflectance_between(s, boundary.solid, n1, n2, cos_h, total);
-    vec3 f = mix(f_dielectric, fresnel_of_metal(s, cos_h), s.metallic);
-
-    // The mirror image.
-    vec3 r = reflect_ray(direction, h).R;
-    float cos_r = dot(r, s.n);
-    float masking = rough ? lobe_weight(s.n, s.v, r, hit.n, s.alpha) : 1.0;
-    next.direction = on_side(r, hit.n);
     next.origin = ray_origin(s.p_bvh, hit.n, s.v);
     next.media = ray.media;
+    if (CLEARCOAT) {
+        vec2 u = vec2(0.0);
+        if (ROUGH) u = random_point(pixel, event | COAT_EVENT, trace_terms.seed, trace_terms.sample_index);
+        LobeSample coat = sample_coat(b, coat_half_vector(b, u));
+        next.direction = coat.direction;
+        next.events = count | BY_REFLECTION << 8;
+        next.throughput = s.coat_traced ? weight * coat.weight : vec3(0.0);
+        next.spread = ray.spread + (ROUGH && !b.coat_delta ? s.clearcoat_alpha : 0.0);
+        send(next);
+        weight *= b.under;
+    }
+    vec2 u = vec2(0.0);
+    if (ROUGH) u = random_point(pixel, event, trace_terms.seed, trace_terms.sample_index);
+    vec3 h = base_half_vector(b, u);
+    LobeSample mirrored = sample_base(b, h);
+    next.direction = mirrored.direction;
     next.events = count | BY_REFLECTION << 8;
-    next.throughput = mirrored_by_ray(hit, boundary) ? weight * f * s.compensation * masking : vec3(0.0);
-    next.spread = ray.spread + (rough ? s.alpha : 0.0);
+    next.throughput = mirrored_by_ray(hit, boundary) ? weight * mirrored.weight : vec3(0.0);
+    next.spread = ray.spread + (ROUGH && !b.delta ? s.alpha : 0.0);
     send(next);
-
-    // What goes through.
     if (TRANSMISSIVE) {
-        Refraction t = refract_ray(direction, h, n2 / n1);
-        // Equal indices bend nothing, not even by a rounding.
-        vec3 bent_ray = n1 == n2 ? direction : t.T;
-        // A sheet scatters as its mirror image does, to the other side.
-        vec3 sheet_ray = rough ? r - 2.0 * cos_r * s.n : direction;
-        vec3 through = boundary.sheet ? sheet_ray : bent_ray;
-        next.direction = rough ? through : -on_side(-through, hit.n);
-        bool passes = dot(next.direction, hit.n) < 0.0 && !(boundary.solid && (total || t.tir));
-        masking = rough ? smith_g2_over_g1(cos_v, dot(next.direction, s.n), s.alpha) : 1.0;
-        if (rough && boundary.sheet) masking = cos_r > 0.0 ? masking : 0.0;
-        vec3 tint = tint_through(hit, boundary.sheet);
+        LobeSample through = sample_transmission(b, h);
         next.origin = ray_origin(s.p_bvh, -hit.n, vec3(0.0));
         next.media = boundary.solid ? boundary.beyond : ray.media;
+        next.direction = through.direction;
         next.events = count | BY_REFRACTION << 8 | only_through;
-        next.throughput = passes ? weight * tint * (hit.transmits * (1.0 - s.metallic) * (1.0 - largest(f_dielectric)) * masking) : vec3(0.0);
-        next.spread = ray.spread + (rough ? s.alpha : 0.0);
+        next.throughput = weight * through.weight;
         send(next);
     }
 }
@@ -257,7 +215,6 @@ void main() {
     ray.events = 0x200u;
     float cone = camera.orthographic != 0 ? trace_terms.pixel_angle : trace_terms.pixel_angle * length(hit.s.p_rel);
 
-    compensate(hit.s);
     Boundary boundary = boundary_at(hit, ray.media, ray.direction);
     split(hit, boundary, ray, cone, uvec2(pixel));
     bool more = sent_now > 0;
@@ -285,14 +242,15 @@ void main() {
             reflection_rays += reflected_ray ? 1u : 0u;
             refraction_rays += reflected_ray ? 0u : 1u;
             uint medium = present_medium(ray.media);
-            if (ABSORPTION == 2 && medium != 0) ray.throughput *= absorbed(medium, ray.origin, ray.direction, at_surface ? found.t : 0.0);
+            if (ABSORPTION == ABSORPTION_PATH && medium != 0) ray.throughput *= absorbed(medium, ray.origin, ray.direction, at_surface ? found.t : 0.0);
             if (at_surface) {
                 cone = ray.width + ray.spread * found.t;
                 hit = hit_surface(point, ray.direction, cone * exp2(trace_terms.lod_bias));
                 hit.s.media = ray.media;
-                compensate(hit.s);
                 boundary = boundary_at(hit, ray.media, ray.direction);
                 Surface s = hit.s;
+                if (TRANSMISSIVE && !boundary.solid) seen_from(s, index_of(boundary.here));
+                compensate(s);
                 s.diffuse *= 1.0 - hit.transmits;
                 // What a ray is sent for is not looked up as well.
                 s.base_traced = mirrored_by_ray(hit, boundary);

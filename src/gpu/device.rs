@@ -12,7 +12,7 @@ use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use serde::Serialize;
 
 use super::cache::Caches;
-use super::limits::{PUSH_DESCRIPTORS, STORAGE_BUFFERS, STORAGE_IMAGES};
+use super::limits::{PUSH_DESCRIPTORS, STORAGE_BUFFERS, STORAGE_IMAGES, UNIFORM_BUFFERS};
 use super::surface::Surface;
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
@@ -289,6 +289,7 @@ impl Instance {
         for (has, needed, what) in [
             (limits.max_per_stage_descriptor_storage_images, STORAGE_IMAGES, "storage images in a shader"),
             (limits.max_per_stage_descriptor_storage_buffers, STORAGE_BUFFERS, "storage buffers in a shader"),
+            (limits.max_per_stage_descriptor_uniform_buffers, UNIFORM_BUFFERS, "uniform buffers in a shader"),
             (limits.max_color_attachments, 7, "colour targets"),
             (limits.max_texel_buffer_elements, 1 << 22, "texels in a buffer"),
         ] {

@@ -68,8 +68,6 @@ impl Lighting<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-
     fn parts(directional: u32, local: u32, listed: bool) -> Vec<[u32; 4]> {
         super::parts(directional, local, listed).into_iter().map(bytemuck::cast).collect()
     }

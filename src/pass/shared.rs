@@ -67,7 +67,7 @@ impl<'a> OnDevice<'a> {
         Library {
             arithmetic: lib::arithmetic::Constants { arithmetic: knobs.index("arithmetic") },
             aims: lib::aims::Constants { aimed: paths.aimed },
-            boundary: lib::boundary::Constants { transmissive: with.transmissive, touching: rays.constants.touching },
+            boundary: lib::boundary::Constants { touching: rays.constants.touching },
             bsdf: lib::bsdf::Constants { frosted: with.frosted },
             emitters: lib::emitters::Constants {
                 emitters: emitters.count,
@@ -92,6 +92,7 @@ impl<'a> OnDevice<'a> {
             },
             gbuffer_interface: lib::gbuffer_interface::Constants::default(),
             hit: lib::hit::Constants { hit_textures: rays.constants.hit_textures },
+            layers: lib::layers::Constants { transmissive: with.transmissive },
             lighting: lib::lighting::Constants {
                 // Where tiles list them, no pixel goes through all of them.
                 local_lights: if plan.tiles { 0 } else { plan.local_lights },
@@ -148,4 +149,53 @@ impl<'a> OnDevice<'a> {
 /// Halvings that single out one of `count`.
 fn halvings(count: u32) -> u32 {
     count.next_power_of_two().trailing_zeros()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::KNOBS;
+
+    /// A rung reaches the shaders as its place among its knob's: they give each place a name.
+    #[test]
+    fn rungs_have_the_places_that_shaders_name() {
+        use lib::gbuffer::{NORMALS_F32, NORMALS_OCT16, NORMALS_OCT24, NORMALS_OCT32};
+        use lib::medium::{QUADRATURE_LEFT, QUADRATURE_MIDPOINT, QUADRATURE_SIMPSON};
+        use lib::shadow::{SHADOW_MAP, SHADOW_OFF, SHADOW_RAY};
+        use lib::surface::{
+            BRDF_BLINN_PHONG, BRDF_BLINN_PHONG_RECIPROCAL, BRDF_GGX, BRDF_GGX_MULTI, FRESNEL_EXACT, FRESNEL_SCHLICK,
+        };
+        for (knob, names) in [
+            (
+                "brdf",
+                &[
+                    ("blinn-phong", BRDF_BLINN_PHONG),
+                    ("blinn-phong-reciprocal", BRDF_BLINN_PHONG_RECIPROCAL),
+                    ("ggx", BRDF_GGX),
+                    ("ggx-multi", BRDF_GGX_MULTI),
+                ][..],
+            ),
+            ("fresnel", &[("schlick", FRESNEL_SCHLICK), ("exact", FRESNEL_EXACT)]),
+            ("shadows", &[("off", SHADOW_OFF), ("map", SHADOW_MAP), ("ray", SHADOW_RAY)]),
+            (
+                "normals",
+                &[
+                    ("oct16", NORMALS_OCT16),
+                    ("oct24", NORMALS_OCT24),
+                    ("oct32", NORMALS_OCT32),
+                    ("f32", NORMALS_F32),
+                ],
+            ),
+            (
+                "quadrature",
+                &[("left", QUADRATURE_LEFT), ("midpoint", QUADRATURE_MIDPOINT), ("simpson", QUADRATURE_SIMPSON)],
+            ),
+        ] {
+            let rungs = KNOBS.iter().find(|known| known.name == knob).expect("a knob").rungs;
+            assert_eq!(rungs.len(), names.len(), "{knob}");
+            for &(rung, place) in names {
+                assert_eq!(rungs.get(place as usize), Some(&rung), "{knob}");
+            }
+        }
+    }
 }
