@@ -322,7 +322,7 @@ fn laboratory_forms_are_made_of_what_draws() {
         let decode = of(&gpu, "srgb", tier, &rows, "decode");
         alike("srgb, decode", tier, &decode, &of(&gpu, "linear_from_srgb", tier, &texels, "lineary"), 2.5e-6, 0.0);
         // N10, N15: what is measured in the laboratory, of arcs and frames that draw.
-        let turns: Vec<f64> = (0..ROWS).map(|i| (i as f64 + 0.5) / ROWS as f64 * 3.14).collect();
+        let turns: Vec<f64> = (0..ROWS).map(|i| (i as f64 + 0.5) / ROWS as f64 * 3.1).collect();
         let pair: Vec<Vec<f32>> =
             turns.iter().map(|t| vec![1.0, 0.0, 0.0, t.cos() as f32, t.sin() as f32, 0.0]).collect();
         let arcs: Vec<Vec<f32>> = pair.iter().map(|p| vec![p[4], p[3]]).collect();

@@ -195,7 +195,9 @@ struct TriangleNormal {
 TriangleNormal triangle_normal(vec3 a, vec3 b, vec3 c) {
     TriangleNormal r;
     if (ARITHMETIC == FAST) {
-        r = TriangleNormal(normalize(doubled_area(b - a, c - a)), false);
+        // Scaled, too: pictures of tiny scenes would have no normals.
+        vec3 across = doubled_area(b - a, c - a);
+        r = TriangleNormal(normalize(across * scale_to_one(largest_component(across))), false);
     } else if (ARITHMETIC == COMPENSATED) {
         float s = scale_to_one(largest_component(b - a));
         float t = scale_to_one(largest_component(c - a));

@@ -74,7 +74,7 @@ pub const STATEMENTS: &[Statement] = &[
     of("F5", "nested", "two_slabs_that_touch_shift_a_ray_as_both_do", "decisions/rays.md"),
     of("F6", "pool", "beyond_the_critical_angle_all_light_stays_inside", NUMERICS),
     by(
-        of("F7", "pool", "beyond_the_critical_angle_all_light_stays_inside", LECTURE),
+        of("F7", "pool", "snells_window_is_as_wide_as_the_critical_angle", LECTURE),
         By::Equations(&["fresnel_dielectric", "refract", "critical_angle"]),
     ),
     of("F8", "metals", "metals_have_the_reflectance_of_their_index", COLOUR),
