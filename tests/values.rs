@@ -12,9 +12,9 @@ use etalon::frame::Settings;
 use etalon::image::Picture;
 use etalon::plan::Model;
 use etalon::scene::environment::Environment;
-use etalon::scene::{LightKind, Material, Scene};
+use etalon::scene::{AlphaMode, Camera, LightKind, Material, Projection, Scene};
 use etalon::study::shape::Shape;
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use gpu::Gpu;
 use lobe::{DOME, Facet, MODELS, Rungs, dome, model, reflected, worst};
 use made::{Made, at, lambert, orthographic};
@@ -151,6 +151,44 @@ fn smooth_mirrors_show_fresnels_curve_over_all_angles() {
     // Out of the table of directional reflectance, good to 4e-3 of what is 1.
     let error = mirrored(&gpu, &materials, Model::Local, &["fresnel=schlick"]);
     assert!(error < 2e-2, "{error:e}");
+}
+
+/// Over what is black, all that a coat in such light shows is its own reflectance; over a mirror, what that reflects besides, less it.
+#[test]
+fn a_smooth_coat_mirrors_what_is_around_and_takes_that_from_its_base() {
+    let gpu = Gpu::hasty();
+    let coat = |clearcoat: f32, base: Material| Material { clearcoat, clearcoat_roughness: 0.0, ..base };
+    let black = lambert([0.0; 3]);
+    let materials =
+        [coat(1.0, black.clone()), coat(0.6, black), coat(0.6, metal(GOLD, 0.0)), coat(1.0, plastic([0.0; 3], 0.0))];
+    let (scene, facets) = dome(&materials);
+    for of in MODELS {
+        // Paths follow the coat or the base.
+        let samples = if of == Model::Global { "samples=256" } else { "samples=1" };
+        let settings = model(of, DOME, &["fresnel=schlick", samples]);
+        let (_, film) = gpu.shot(&scene, Some(&Environment::constant([1.0; 3])), settings);
+        let of_materials = |which: [usize; 2]| -> Vec<Facet> {
+            let chosen = facets.iter().filter(|facet| which.contains(&facet.material));
+            chosen.map(|facet| Facet { pixels: facet.pixels.clone(), ..*facet }).collect()
+        };
+        let expected = |facet: &Facet| {
+            let m = &materials[facet.material];
+            let coat = f64::from(m.clearcoat) * lobe::schlick(DVec3::splat(0.04), 1.0, facet.n.z).x;
+            let f = lobe::dielectric(m, false, facet.n.z).lerp(lobe::metal(m, false, facet.n.z), m.metallic.into());
+            f * (1.0 - coat) + coat
+        };
+        // The deferred pass has the coat's normal to 6.5e-5, and at 78° the curve falls by 2 per radian of what is 0.4; the table is
+        // good to 4e-3 of what is 1 (here 0.04).
+        let bound = if of == Model::Local { 2e-2 } else { 4e-4 };
+        eprint!("{of:?} black ");
+        let error = worst(&film, &of_materials([0, 1]), 1e-3, expected);
+        assert!(error < bound, "{of:?}, black: {error:e}");
+        // 256 even points of what is 1 or F: 1/256 of a share, twice.
+        let bound = if of == Model::Global { 2e-2 } else { bound };
+        eprint!("{of:?} mirrors ");
+        let error = worst(&film, &of_materials([2, 3]), 1e-3, expected);
+        assert!(error < bound, "{of:?}, mirrors: {error:e}");
+    }
 }
 
 #[test]
@@ -314,6 +352,115 @@ fn at_normal_incidence_a_lobe_tells_f0_over_four_alpha_squared() {
             eprintln!("{of:?}, {what}: {found}, expected {wanted}, {off:.1e}");
             // A handful of roundings.
             assert!(off < 2e-6, "{of:?}, {what}: {found}, not {wanted}");
+        }
+    }
+}
+
+/// Surfaces of which one is coated and glows besides.
+fn several() -> [Material; 4] {
+    let coated = Material {
+        clearcoat: 0.8,
+        clearcoat_roughness: 0.5,
+        emissive: [0.5, 1.0, 0.25],
+        ..plastic([0.6, 0.4, 0.2], 0.6)
+    };
+    [
+        plastic([0.6, 0.4, 0.2], 0.4),
+        coated,
+        metal(GOLD, 0.5),
+        Material { metallic: 0.5, ..plastic([0.5, 0.3, 0.7], 0.45) },
+    ]
+}
+
+/// What such a facet sends along `v`, in light along −`l`: `share` of its diffuse ground is left.
+fn sent(m: &Material, rungs: Rungs<'_>, n: DVec3, l: DVec3, v: DVec3, share: f64) -> DVec3 {
+    let kept = |m: &Material| reflected(m, rungs, n, l, v) * lobe::rgb(IRRADIANCE);
+    let without = Material { base_color: [0.0; 4], ..m.clone() };
+    let diffuse = if m.metallic == 0.0 { kept(m) - kept(&without) } else { DVec3::ZERO };
+    let coat = f64::from(m.clearcoat) * lobe::schlick(DVec3::splat(0.04), 1.0, n.dot(v)).x;
+    kept(m) - diffuse * (1.0 - share) + lobe::rgb(m.emissive) * (1.0 - coat)
+}
+
+/// Towards a light that comes from above, past what stands before the dome.
+const ABOVE: DVec3 = DVec3::new(0.1, 0.9, 0.3);
+
+/// The dome with something before it.
+fn with(materials: &[Material], more: impl FnOnce(&mut Made)) -> (Scene, Vec<Facet>) {
+    let (scene, facets) = dome(materials);
+    let mut made = Made(scene);
+    made.light(IRRADIANCE, LightKind::Directional { direction: -ABOVE.normalize() });
+    more(&mut made);
+    (made.0, facets)
+}
+
+#[test]
+fn what_a_mirror_shows_and_what_a_pane_lets_through_is_lit_as_what_is_seen_without_them() {
+    let gpu = Gpu::hasty();
+    let materials = several();
+    let tilted = DAffine3::from_translation(DVec3::Z * 20.0) * DAffine3::from_rotation_y(-0.75 * std::f64::consts::PI);
+    let (behind, facets) = with(&materials, |made| {
+        made.add(Shape::panel(60.0, 40.0), metal([1.0; 4], 0.0), tilted);
+        let eye = DVec3::new(-30.0, 0.0, 20.0);
+        let projection = made.0.cameras[0].projection;
+        made.0.cameras =
+            vec![Camera { projection: projection_to(projection, 90.0), ..made::looking(eye, eye + DVec3::X) }];
+    });
+    let pane = Material { transmission: 1.0, roughness: 0.0, specular: 0.0, ..lambert([1.0; 3]) };
+    let (through, _) = with(&materials, |made| made.add(Shape::panel(31.0, 31.0), pane, at(0.0, 0.0, 8.0)));
+    for (what, scene) in [("mirror", &behind), ("pane", &through)] {
+        for of in [Model::Recursive, Model::Global] {
+            // Paths end at the dome, which sees itself in the mirror.
+            let interfaces = if what == "mirror" { "interfaces=2" } else { "interfaces=8" };
+            let choices = ["brdf=ggx", "fresnel=schlick", "refraction=ray", interfaces];
+            let samples = if of == Model::Global { "samples=4" } else { "samples=1" };
+            let mut film = gpu.film(scene, model(of, DOME, &[&choices[..], &[samples]].concat()));
+            if what == "mirror" {
+                film.rgba.chunks_exact_mut(DOME[0] as usize).for_each(|row| row.reverse());
+            }
+            eprint!("{of:?}, {what}: ");
+            let rungs = Rungs { brdf: "ggx", exact: false, model: of };
+            let error = worst(&film, &facets, 1e-2, |facet| {
+                sent(&materials[facet.material], rungs, facet.n, ABOVE.normalize(), DVec3::Z, 1.0)
+            });
+            // The mirror is turned by sines in f32, 1e-7, and its stored normal by as much: see LOBES.
+            assert!(error < LOBES, "{of:?}, {what}: {error:e}");
+        }
+    }
+}
+
+fn projection_to(projection: Projection, far: f64) -> Projection {
+    match projection {
+        Projection::Orthographic { half_height, near, .. } => Projection::Orthographic { half_height, near, far },
+        perspective => perspective,
+    }
+}
+
+#[test]
+fn what_blends_and_what_lets_light_through_is_lit_as_what_is_opaque() {
+    let gpu = Gpu::hasty();
+    let blended = several().map(|m| {
+        let [r, g, b, _] = m.base_color;
+        Material { base_color: [r, g, b, 0.75], alpha_mode: AlphaMode::Blend, ..m }
+    });
+    let [plain, coated, ..] = several();
+    let sheets = [Material { transmission: 0.5, ..plain }, Material { transmission: 0.25, ..coated }];
+    for of in [Model::Local, Model::Recursive] {
+        for (what, materials) in [("blended", &blended[..]), ("sheets", &sheets[..])] {
+            // Rays through rough sheets are spread, and find what the far side of the dome lets through.
+            if (of, what) == (Model::Recursive, "sheets") {
+                continue;
+            }
+            let (scene, facets) = with(materials, |_| ());
+            let film = gpu.film(&scene, model(of, DOME, &["brdf=ggx", "fresnel=schlick"]));
+            eprint!("{of:?}, {what}: ");
+            let rungs = Rungs { brdf: "ggx", exact: false, model: of };
+            let error = worst(&film, &facets, 0.02, |facet| {
+                let m = &materials[facet.material];
+                let alpha = if what == "blended" { 0.75 } else { 1.0 };
+                sent(m, rungs, facet.n, ABOVE.normalize(), DVec3::Z, 1.0 - f64::from(m.transmission)) * alpha
+            });
+            // The coat's normal is kept in 2 x 16 bits: see there.
+            assert!(error < 3e-3, "{of:?}, {what}: {error:e}");
         }
     }
 }

@@ -520,6 +520,35 @@ fn a_body_absorbs_by_the_way_through_it_or_by_its_nominal_thickness() {
     }
 }
 
+/// By the local model and along paths. (The recursive model reads no texel of the thickness of what is nearest to the eye:
+/// shaders/lib/primary.glsl.)
+#[test]
+fn a_sheets_thickness_is_in_green() {
+    let gpu = Gpu::hasty();
+    let sheet = Material {
+        transmission: 1.0,
+        roughness: 0.0,
+        specular: 0.0,
+        thickness: 0.7,
+        attenuation_distance: 0.5,
+        attenuation_color: [0.5, 0.8, 0.1],
+        double_sided: true,
+        ..lambert([1.0; 3])
+    };
+    let textured = Material { thickness_texture: Some(sharp(0)), ..sheet.clone() };
+    let left = |d: f64| lobe::rgb(BEHIND) * DVec3::new(0.5, 0.8, 0.1).powf(d / 0.5);
+    let tiles = [
+        tile("thickness", sheet, move |_| left(f64::from(0.7_f32))),
+        tile("texels", textured, move |p| left(f64::from(0.7_f32) * texel(&texels(), p)[1])),
+    ];
+    let (scene, size) = before_a_wall(&tiles, BEHIND);
+    for of in [Model::Local, Model::Global] {
+        let film = gpu.film(&scene, model(of, size, &["fresnel=schlick"]));
+        // The texel is kept in 16 bits.
+        agrees(&film, &tiles, 1e-4, &format!("{of:?}"));
+    }
+}
+
 /// One face whose texture coordinates, transform and tangents come from a file: without tangents of its own those are made from the
 /// coordinates, so that what bends the normal to the right is to the right of the picture that is mirrored, too.
 #[test]
