@@ -61,18 +61,21 @@ fn run() -> Result<()> {
     for path in files(&root.join("pass"))? {
         sources.entry(stem(&path)).or_default().push(path);
     }
-    let programs = compile::on_all_cores(sources, || Recipe::new(root, without.clone()), |recipe, paths| {
-        let program = recipe.program(&paths)?;
-        for stage in program.stages.iter().filter(|_| without.is_empty()) {
-            contract::decorations(&stage.path, &stage.module, &stage.words)?;
-        }
-        Ok(program)
-    })?;
+    let programs = compile::on_all_cores(
+        sources,
+        || Recipe::new(root, without.clone()),
+        |recipe, paths| {
+            let program = recipe.program(&paths)?;
+            for stage in program.stages.iter().filter(|_| without.is_empty()) {
+                contract::decorations(&stage.path, &stage.module, &stage.words)?;
+            }
+            Ok(program)
+        },
+    )?;
     let mut code = generate::Programs::of(&recipe.interface, &programs)?.rust()?;
     code += &generate::probes(&recipe, &programs, without.is_empty())?;
-    let write = |name: &str, text: String| {
-        fs::write(out_dir.join(name), text).map_err(|e| format!("writing {name}: {e}"))
-    };
+    let write =
+        |name: &str, text: String| fs::write(out_dir.join(name), text).map_err(|e| format!("writing {name}: {e}"));
     write("shaders.rs", code)?;
     write("share.rs", generate::share(&recipe, &programs)?)
 }

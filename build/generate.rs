@@ -209,7 +209,8 @@ impl<'p> Programs<'p> {
             }
         }
         for group in &groups {
-            fields += &format!("        /// `shaders/lib/{group}.glsl`.\n        pub {group}: lib::{group}::Bind<'a>,\n");
+            fields +=
+                &format!("        /// `shaders/lib/{group}.glsl`.\n        pub {group}: lib::{group}::Bind<'a>,\n");
         }
         let (mut own, mut defaults, mut words, mut library) = (String::new(), String::new(), String::new(), false);
         for (id, (constant, ty, _)) in &all.constants {
@@ -321,14 +322,19 @@ fn shared_constant(Shared { name, ty, value, about }: &Shared) -> String {
 /// A struct with asserts on where its members lie.
 fn rust_struct(Struct { name, members, size }: &Struct, about: &BTreeMap<String, String>) -> String {
     let mut text = about.get("").map(|text| format!("    /// {text}\n")).unwrap_or_default();
-    text += &format!("    #[repr(C)]\n    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]\n    pub struct {name} {{\n");
+    text += &format!(
+        "    #[repr(C)]\n    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]\n    pub struct {name} {{\n"
+    );
     for member in members {
         let about = about.get(&member.name).cloned().unwrap_or_else(|| format!("`{}`.", member.name));
         text += &format!("        /// {about}\n        pub {}: {},\n", member.name, member.ty);
     }
     text += &format!("    }}\n    const _: () = assert!(size_of::<{name}>() == {size});\n");
     for member in members {
-        text += &format!("    const _: () = assert!(std::mem::offset_of!({name}, {}) == {});\n", member.name, member.offset);
+        text += &format!(
+            "    const _: () = assert!(std::mem::offset_of!({name}, {}) == {});\n",
+            member.name, member.offset
+        );
     }
     text
 }
@@ -400,14 +406,18 @@ pub(crate) fn literal(name: &str, program: &Program, all: &Declared) -> Result<S
 pub(crate) fn probes(recipe: &Recipe, programs: &BTreeMap<String, Program>, whole: bool) -> Result<String> {
     let library = equations::library(&recipe.root.join("lib"))?;
     let work = library.equations.iter().map(|equation| (equation.name.clone(), equation));
-    let compiled = on_all_cores(work, || Recipe::new(&recipe.root, Vec::new()), |recipe, equation| {
-        let name = format!("probe/{}", equation.name);
-        let program = recipe.source(shaderc::ShaderKind::Compute, name.clone(), &equation.probe)?;
-        let stage = &program.stages[0];
-        let facts = contract::check(&name, &stage.module, &stage.words, &library.functions)?;
-        let literal = literal(&name, &program, &declared(&program.stages)?)?;
-        Ok((literal, facts, contract::called(&program.stages)))
-    })?;
+    let compiled = on_all_cores(
+        work,
+        || Recipe::new(&recipe.root, Vec::new()),
+        |recipe, equation| {
+            let name = format!("probe/{}", equation.name);
+            let program = recipe.source(shaderc::ShaderKind::Compute, name.clone(), &equation.probe)?;
+            let stage = &program.stages[0];
+            let facts = contract::check(&name, &stage.module, &stage.words, &library.functions)?;
+            let literal = literal(&name, &program, &declared(&program.stages)?)?;
+            Ok((literal, facts, contract::called(&program.stages)))
+        },
+    )?;
     let called: BTreeMap<&String, BTreeSet<String>> =
         programs.iter().map(|(name, program)| (name, contract::called(&program.stages))).collect();
     let probed = compiled.values().flat_map(|(_, _, called)| called);
@@ -489,7 +499,8 @@ pub(crate) fn share(recipe: &Recipe, programs: &BTreeMap<String, Program>) -> Re
                 code += &rust_struct(known, &about);
             } else if let Some((_, members)) = &mut about
                 && let Some((code, comment)) = line.split_once("//")
-                && let Some(name) = code.trim().trim_end_matches(';').split(['[', ';']).next().and_then(|c| c.rsplit(' ').next())
+                && let Some(name) =
+                    code.trim().trim_end_matches(';').split(['[', ';']).next().and_then(|c| c.rsplit(' ').next())
             {
                 members.insert(name.to_owned(), sentence(comment.trim()));
             }

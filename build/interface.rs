@@ -188,7 +188,11 @@ fn file(path: &Path, folder: &'static str, text: &str) -> Result<File> {
     let mut file = File { stem: stem(path), folder, about, declarations: Vec::new(), shared: Vec::new() };
     for (number, line) in text.lines().enumerate() {
         if ["set =", "binding =", "constant_id"].iter().any(|word| line.starts_with("layout(") && line.contains(word)) {
-            return Err(format!("{}:{}: numbers of bindings and constants are the build's", path.display(), number + 1));
+            return Err(format!(
+                "{}:{}: numbers of bindings and constants are the build's",
+                path.display(),
+                number + 1
+            ));
         }
         file.declarations.extend(declaration(line));
         file.shared.extend(shared(line));
@@ -208,7 +212,8 @@ fn declaration(line: &str) -> Option<Declaration> {
         return None;
     }
     let (code, about) = comment(line);
-    let word = |text: &str| text.rsplit(|c: char| !c.is_alphanumeric() && c != '_').find(|w| !w.is_empty()).map(str::to_owned);
+    let word =
+        |text: &str| text.rsplit(|c: char| !c.is_alphanumeric() && c != '_').find(|w| !w.is_empty()).map(str::to_owned);
     let name = if kind == "constant" {
         word(code.split_once(" = ")?.0)?
     } else if let Some((block, instance)) = code.split_once('{').zip(code.rsplit_once('}')).map(|(a, b)| (a.0, b.1)) {

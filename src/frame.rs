@@ -30,7 +30,7 @@ use crate::pass::path::{PathsOnDevice, paths};
 use crate::pass::rays::{BvhFacts, RaysOnDevice, Traversal};
 use crate::pass::scene::SceneOnDevice;
 use crate::pass::shadow_map::ShadowMaps;
-use crate::pass::shared::OnDevice;
+use crate::pass::shared::{Library, OnDevice};
 use crate::pass::tiles::{Tiles, tiles};
 use crate::pass::tonemap::{Counts, Display, tonemap};
 use crate::pass::view::{View, jitter};
@@ -42,7 +42,6 @@ use crate::scene::reads::forget_unread;
 use crate::scene::sigma::one_medium_each;
 use crate::scene::wavelengths::Slice;
 use crate::scene::{Ambience, Bounds, Camera, Light, LightKind, Reads, Scene};
-use crate::shader::{Library, SCENE};
 use crate::share::{self, AovPixel};
 use crate::spectra::VISIBLE;
 
@@ -389,10 +388,7 @@ impl Renderer {
             (None, Some(wanted)) => bail!("--max-error {wanted}: only paths tell their error; add --model global"),
             (None, None) => {}
         }
-        plan.check(&Ability {
-            device: device.info().name.clone(),
-            adds_in_subgroups: device.adds_in_subgroups(),
-        })?;
+        plan.check(&Ability { device: device.info().name.clone(), adds_in_subgroups: device.adds_in_subgroups() })?;
         // What adds nothing takes no turn of any loop.
         let mut kept = plan.lights.iter();
         scene.lights.retain(|_| kept.next().copied().unwrap_or_default());
@@ -434,7 +430,7 @@ impl Renderer {
             environment: &environment,
         };
         Ok(Self {
-            set: DescriptorSet::new(device, &SCENE, &on_device.entries())?,
+            set: on_device.write(device)?,
             environment,
             shadow_maps,
             scene,
@@ -634,7 +630,7 @@ impl Renderer {
 
     /// An empty frame whose programs read the scene.
     fn frame(&self) -> Frame<'_> {
-        Frame::of(&self.device, self.set.bind(self.on_device().entries()))
+        Frame::of(&self.device, self.on_device().bind(&self.set))
     }
 
     /// What programs are specialised by.

@@ -5,19 +5,21 @@
 mod gpu;
 
 use ash::vk;
-use etalon::gpu::{Buffer, Frame, Image, ImageDesc, Place};
+use etalon::gpu::{Buffer, DescriptorSet, Frame, Image, ImageDesc, Place, Resource};
 use etalon::pass::classify::{WorkLists, classify};
 use etalon::pass::gbuffer::GBuffer;
 use etalon::pass::tonemap::{Display, tonemap};
 use etalon::plan::{Demand, Facts, Knobs, Plan, Surroundings};
 use etalon::scene::Scene;
+use etalon::shader::{Library, SCENE, lib};
+use etalon::share::Camera;
 use gpu::Gpu;
 
 /// Validation's error texts after `describe` has been run as a frame, with or without buffer barriers.
 fn errors_of(forget: bool, describe: impl for<'a> FnOnce(&'a Things, &mut Frame<'a>)) -> Vec<String> {
     let gpu = std::mem::ManuallyDrop::new(Gpu::new());
     let things = Things::new(&gpu);
-    let mut frame = Frame::new(&gpu.device);
+    let mut frame = Frame::of(&gpu.device, things.scene.bind(view(&things.camera)));
     if forget {
         frame.forget_barriers();
     }
@@ -28,7 +30,14 @@ fn errors_of(forget: bool, describe: impl for<'a> FnOnce(&'a Things, &mut Frame<
     errors
 }
 
+/// Of the scene, classification reads the camera alone.
+fn view(camera: &Buffer) -> Vec<(u32, Resource<'_>)> {
+    lib::view::Scene { camera_block: camera }.entries()
+}
+
 struct Things {
+    scene: DescriptorSet,
+    camera: Buffer,
     gbuffer: GBuffer,
     work: WorkLists,
     film: Image,
@@ -44,7 +53,11 @@ impl Things {
         let plan = Plan::new(&Scene::default(), &Facts::default(), surroundings, &Knobs::default());
         let desc = ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], vk::ImageUsageFlags::STORAGE);
         let buffer = |name| Buffer::new(&gpu.device, name, 256, Place::Device).expect("a buffer");
+        let camera = Camera { size, ..bytemuck::Zeroable::zeroed() };
+        let camera = Buffer::with_data(&gpu.device, "camera", &[camera]).expect("a buffer");
         Self {
+            scene: DescriptorSet::new(&gpu.device, &SCENE, &view(&camera)).expect("a set"),
+            camera,
             gbuffer: GBuffer::new(&gpu.device, &plan, size).expect("a G-buffer"),
             work: WorkLists::new(&gpu.device, size).expect("work lists"),
             film: Image::new(&gpu.device, "film", desc).expect("a film"),
@@ -65,7 +78,9 @@ fn proves(name: &str, describe: impl for<'a> Fn(&'a Things, &mut Frame<'a>)) {
 #[test]
 fn sorting_tiles_waits_for_its_counters() {
     // copy → compute atomics on the sizes.
-    proves("classify", |things, frame| classify(frame, Library::default(), &things.gbuffer, &things.work).expect("the pass"));
+    proves("classify", |things, frame| {
+        classify(frame, Library::default(), &things.gbuffer, &things.work).expect("the pass")
+    });
 }
 
 #[test]

@@ -8,6 +8,7 @@ mod made;
 
 use etalon::frame::Settings;
 use etalon::optics::brdf;
+use etalon::optics::fresnel::fresnel_dielectric;
 use etalon::scene::environment::Environment;
 use etalon::scene::{Material, Scene};
 use etalon::study::shape::Shape;
@@ -33,6 +34,11 @@ fn before_a_card(surface: Material) -> Scene {
 
 /// Of a surface with this α and these F0: radiance in units of the card's.
 fn mirrored(p: DVec3, alpha: f64, f0: [f32; 3]) -> [f64; 3] {
+    reflected(p, |l| f0.map(|f0| brdf::ggx(DVec3::Z, l, V, alpha, f0.into())[4]))
+}
+
+/// The card's light by a BRDF times cosine for light from a direction.
+fn reflected(p: DVec3, brdf: impl Fn(DVec3) -> [f64; 3]) -> [f64; 3] {
     const CELLS: i32 = 64;
     let size = 2.0 / f64::from(CELLS);
     let mut sum = [0.0; 3];
@@ -42,8 +48,7 @@ fn mirrored(p: DVec3, alpha: f64, f0: [f32; 3]) -> [f64; 3] {
             let to = at - p;
             let l = to.normalize();
             let solid_angle = l.x.abs() / to.length_squared() * size * size;
-            for (sum, f0) in sum.iter_mut().zip(f0) {
-                let [.., reflected] = brdf::ggx(DVec3::Z, l, V, alpha, f0.into());
+            for (sum, reflected) in sum.iter_mut().zip(brdf(l)) {
                 *sum += reflected * solid_angle;
             }
         }
@@ -119,7 +124,12 @@ fn a_rough_metal_mirrors_a_card_as_the_integral_says() {
 #[test]
 fn a_rough_coat_mirrors_a_card_as_the_integral_says() {
     let black = Material { clearcoat: 1.0, clearcoat_roughness: 0.5, ..lambert([0.0; 3]) };
-    agrees("coat", black, &["lobes=1"], |p| mirrored(p, 0.25, [0.04; 3]));
+    // White, times the reflectance of the coat's boundary by the half vector: the lobe of a metal has no F of its own.
+    let coat = |l: DVec3| {
+        let cos_h = V.dot((V + l).normalize());
+        [fresnel_dielectric(cos_h, 1.5)[0] * brdf::ggx(DVec3::Z, l, V, 0.25, 1.0)[4]; 3]
+    };
+    agrees("coat", black, &["lobes=1"], |p| reflected(p, coat));
 }
 
 /// 1 + F0 (1/E − 1) of what is mirrored by rays too; E comes from a table on the device, good to some 1e-3.

@@ -75,6 +75,7 @@ Layers layers_at(HitSurface hit, Boundary boundary) {
     Layers b;
     b.s = hit.s;
     b.s.diffuse *= 1.0 - hit.transmits;
+    b.between = true;
     b.solid = boundary.solid;
     b.sheet = boundary.sheet;
     b.n1 = index_of(boundary.here);

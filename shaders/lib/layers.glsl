@@ -33,22 +33,12 @@ float boundary_share(float cos_in, float n1, float n2) {
     return n1 > n2 && sin2 >= 1.0 ? 1.0 : schlick_weight(cos_thin);
 }
 
-// Of the dielectric part. F0 and F90 may be tinted by KHR_materials_specular: the curve is carried over as a share between them.
+// Of the dielectric part. F0 may be tinted by KHR_materials_specular, so the exact curve is carried over as its share between F0 and 1.
 vec3 fresnel_of_dielectric(Surface s, float cos_in) {
-    // Without bodies there is air before every surface.
-    if (FRESNEL == FRESNEL_SCHLICK && !TRANSMISSIVE) return schlick(s.f0_dielectric, s.f90_dielectric, cos_in);
-    float share = boundary_share(cos_in, s.n_outside, s.ior);
+    if (FRESNEL == FRESNEL_SCHLICK) return schlick(s.f0_dielectric, s.f90_dielectric, cos_in);
+    float r0 = nested_f0(s.n_outside, s.ior);
+    float share = clamp((fresnel_dielectric(cos_in, s.ior / s.n_outside).F - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
     return s.f0_dielectric + (vec3(s.f90_dielectric) - s.f0_dielectric) * share;
-}
-
-// Of the surface of a transparent body, between media of index n1 and n2. What tints it in air tints it between two media. `total`:
-// nothing passes.
-vec3 fresnel_between(Surface s, float n1, float n2, float cos_in, out bool total) {
-    float share = boundary_share(cos_in, n1, n2);
-    float in_air = nested_f0(1.0, s.ior);
-    vec3 f0 = s.f0_dielectric * (in_air > 0.0 ? nested_f0(n1, n2) / in_air : 0.0);
-    total = share >= 1.0;
-    return total ? vec3(1.0) : f0 + (vec3(s.f90_dielectric) - f0) * share;
 }
 
 // Of the metallic part. Metals given by a colour alone have no n and κ: Schlick on every rung. Of those that have them the colour is
@@ -138,9 +128,10 @@ void compensate(inout Surface s) {
 struct Layers {
     Surface s;         // compensated; its diffuse albedo without what goes through
     float cos_v;       // of the shading normal and the viewer, at least 1e-4
+    bool between;      // seen by a ray that knows its media, which the next three tell of
+    bool solid;        // the surface of a transparent body
     float n1;          // index of the medium before
     float n2;          // and behind, or of the dielectric part
-    bool solid;        // the surface of a transparent body
     bool sheet;        // lets light through and encloses nothing
     bool delta;        // the base reflects and refracts into one direction each
     bool coat_delta;
@@ -154,11 +145,16 @@ struct Layers {
     vec4 shares;       // probabilities of coat, base, diffuse ground, through where paths choose; their sum is 1, or 0
 };
 
-// Reflectance of the dielectric part by an angle.
+// Reflectance of the dielectric part by an angle. What tints it in air tints it between two media. `total`: nothing passes.
 vec3 fresnel_below_coat(Layers b, float cos_in, out bool total) {
-    if (b.solid) return fresnel_between(b.s, b.n1, b.n2, cos_in, total);
+    Surface s = b.s;
     total = false;
-    return fresnel_of_dielectric(b.s, cos_in);
+    if (!b.between) return fresnel_of_dielectric(s, cos_in);
+    float share = boundary_share(cos_in, b.n1, b.n2);
+    float in_air = nested_f0(1.0, s.ior);
+    vec3 f0 = b.solid ? s.f0_dielectric * (in_air > 0.0 ? nested_f0(b.n1, b.n2) / in_air : 0.0) : s.f0_dielectric;
+    total = b.solid && share >= 1.0;
+    return total ? vec3(1.0) : f0 + (vec3(s.f90_dielectric) - f0) * share;
 }
 
 // The layers of a surface whose base is a lobe, whatever its roughness, and which lets nothing through: for light from points and
@@ -167,6 +163,7 @@ Layers layers_of(Surface s) {
     Layers b;
     b.s = s;
     b.cos_v = max(cosine(s.n, s.v), 1e-4);
+    b.between = false;
     b.n1 = s.n_outside;
     b.n2 = s.ior;
     b.solid = false;

@@ -120,17 +120,28 @@ Surface surface_from_texels(Material m, vec3 base, float metallic, float roughne
 
 // The same surface in a medium of index n_outside on the viewer's side: what it reflects is a matter of relative indices. A metal
 // that is told by a colour alone has no index, and keeps it.
+//
+// Where nothing changes every value is selected as it was: a quotient of equal numbers need not be 1 on a device, nor a mixture made
+// once more have the same last bit, and both plans of a scene have to agree.
 void seen_from(inout Surface s, float n_outside) {
+    bool changes = n_outside != s.n_outside;
     float before = nested_f0(s.n_outside, s.ior);
-    s.f0_dielectric *= before > 0.0 ? nested_f0(n_outside, s.ior) / before : 0.0;
-    if (CONDUCTORS && s.n_metal.x > 0.0) {
-        vec3 before_metal = normal_reflectance(s.n_metal, s.kappa_metal);
-        s.n_metal *= s.n_outside / n_outside;
-        s.kappa_metal *= s.n_outside / n_outside;
-        s.f0_metal *= normal_reflectance(s.n_metal, s.kappa_metal) / before_metal;
+    float ratio = before > 0.0 ? nested_f0(n_outside, s.ior) / before : 0.0;
+    s.f0_dielectric = changes ? s.f0_dielectric * ratio : s.f0_dielectric;
+    // Between equal indices nothing is reflected, at no angle.
+    s.f90_dielectric = n_outside == s.ior ? 0.0 : s.f90_dielectric;
+    if (CONDUCTORS) {
+        bool relative = changes && s.n_metal.x > 0.0;
+        vec3 n = s.n_metal * (s.n_outside / n_outside);
+        vec3 kappa = s.kappa_metal * (s.n_outside / n_outside);
+        vec3 to_medium = normal_reflectance(n, kappa) / normal_reflectance(s.n_metal, s.kappa_metal);
+        s.f0_metal = relative ? s.f0_metal * to_medium : s.f0_metal;
+        s.n_metal = relative ? n : s.n_metal;
+        s.kappa_metal = relative ? kappa : s.kappa_metal;
     }
+    s.f0 = changes ? mix(s.f0_dielectric, s.f0_metal, s.metallic) : s.f0;
+    s.f90 = changes ? mix(s.f90_dielectric, 1.0, s.metallic) : s.f90;
     s.n_outside = n_outside;
-    s.f0 = mix(s.f0_dielectric, s.f0_metal, s.metallic);
 }
 
 float largest(vec3 v) {

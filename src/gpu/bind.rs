@@ -108,9 +108,8 @@ impl Descriptor {
 
     /// Its write to the slot of a binding.
     pub(super) fn write(&self, binding: &Binding) -> vk::WriteDescriptorSet<'_> {
-        let write = vk::WriteDescriptorSet::default()
-            .dst_binding(binding.slot)
-            .descriptor_type(binding.kind.descriptor_type());
+        let write =
+            vk::WriteDescriptorSet::default().dst_binding(binding.slot).descriptor_type(binding.kind.descriptor_type());
         match self {
             Self::Buffer(info) => write.buffer_info(std::slice::from_ref(info)),
             Self::Texels(view) => write.texel_buffer_view(std::slice::from_ref(view)),

@@ -606,7 +606,6 @@ impl Device {
         u64::from(self.limits.max_storage_buffer_range)
     }
 
-
     /// Whether invocations of a compute shader add up numbers among them, a subgroup at a time.
     #[must_use]
     pub fn adds_in_subgroups(&self) -> bool {

@@ -16,9 +16,7 @@ use super::bind::{Bindings, Descriptor, Resource, Sampled};
 use super::cache::{PipelineKey, RasterKey};
 use super::device::{Device, Interrupted, lock};
 use super::memory::{Buffer, Image};
-use super::recording::{
-    Dispatch, Groups, Pass, Recording, Target, Work, bind_sets, push_constants, push_descriptors,
-};
+use super::recording::{Dispatch, Groups, Pass, Recording, Target, Work, bind_sets, push_constants, push_descriptors};
 use super::set::BoundSet;
 use super::shader::{Program, SharedSet, Specialization as _};
 use super::sync::{self, ResourceId, State, Use};
@@ -193,7 +191,8 @@ impl<'a> Frame<'a> {
         let mut sets = Vec::with_capacity(program.sets.len());
         for SharedSet { layout, used } in program.sets {
             let known = self.scene.iter().chain(pages).find(|set| set.is_of(layout)).cloned();
-            let known = known.unwrap_or_else(|| panic!("\"{}\" reads the {}, and there is none", program.name, layout.name));
+            let known =
+                known.unwrap_or_else(|| panic!("\"{}\" reads the {}, and there is none", program.name, layout.name));
             for binding in *used {
                 match known.resource(binding.slot, binding.name) {
                     Resource::Buffer(buffer) => self.use_buffer(uses, buffer, binding.access, binding.stages),

@@ -5,9 +5,11 @@ use std::sync::Arc;
 use anyhow::{Context as _, Result};
 use ash::vk;
 
-use super::bind::{Descriptor, Resource};
+use super::bind::{Descriptor, Resource, Sampled};
+use super::cache::SamplerDesc;
 use super::device::Device;
-use super::shader::SetLayout;
+use super::memory::{Buffer, Image, NOTHING, Place};
+use super::shader::{BindingKind, SetLayout};
 use super::sync::ResourceId;
 
 /// A written descriptor set.
@@ -16,6 +18,8 @@ pub struct DescriptorSet {
     pool: vk::DescriptorPool,
     layout: &'static SetLayout,
     written: Vec<(u32, ResourceId)>,
+    /// What the other slots point at.
+    nothing: Option<(Buffer, Image)>,
     device: Arc<Device>,
 }
 
@@ -45,17 +49,28 @@ impl DescriptorSet {
                 }
             }
         };
+        // lavapipe 22.3 follows every descriptor of a set, whatever the program reads (docs/decisions/lavapipe.md).
+        let is_whole = layout.bindings.iter().all(|b| entries.iter().any(|(slot, _)| *slot == b.slot));
+        let make = || -> Result<(Buffer, Image)> {
+            let format = vk::Format::R32G32B32A32_SFLOAT;
+            let buffer = Buffer::texels(device, NOTHING, 0, Place::Device, format)?;
+            Ok((buffer, Image::nothing(device, format, vk::ImageUsageFlags::SAMPLED)?))
+        };
         let set = Self {
             raw,
             pool,
             layout,
+            nothing: if is_whole { None } else { Some(make()?) },
             written: entries.iter().map(|(slot, resource)| (*slot, resource.id())).collect(),
             device: device.clone(),
         };
-        for &(slot, resource) in entries {
-            let binding = layout.bindings.iter().find(|b| b.slot == slot);
-            // Declared by a library file, and read by no program.
-            let Some(binding) = binding else { continue };
+        for binding in layout.bindings {
+            let written = entries.iter().find(|(slot, _)| *slot == binding.slot).map(|(_, resource)| *resource);
+            let other = set.nothing.as_ref().map(|(buffer, image)| match binding.kind {
+                BindingKind::SampledImage => Resource::Sampled(Sampled { image, sampler: SamplerDesc::NEAREST }),
+                _ => Resource::Buffer(buffer),
+            });
+            let Some(resource) = written.or(other) else { continue };
             let image_layout = binding.access.masks(binding.stages).layout;
             let descriptor = Descriptor::new(device, binding.kind, resource, image_layout)?;
             // SAFETY: nothing uses the set yet; what it points at is alive.

@@ -19,12 +19,7 @@ pub fn accumulate<'a>(
     scale: f32,
     bands: u32,
 ) -> Result<()> {
-    let push = accumulate::Push {
-        first: u32::from(first),
-        scale,
-        bands: bands as f32,
-        rgb_from_xyz: rgb_from_xyz(),
-    };
+    let push = accumulate::Push { first: u32::from(first), scale, bands: bands as f32, rgb_from_xyz: rgb_from_xyz() };
     let size = [film.desc().width, film.desc().height];
     let bind = accumulate::Bind { radiance, film };
     let spectrum = lib::spectrum::Constants { spectral: bands > 0, ..Default::default() };

@@ -19,12 +19,8 @@ pub fn background<'a>(
     work: &'a WorkLists,
     radiance: &'a Image,
 ) -> Result<()> {
-    let bind = background::Bind {
-        gbuffer: gbuffer.bind(),
-        radiance,
-        background_tiles: &work.background,
-        work: &work.sizes,
-    };
+    let bind =
+        background::Bind { gbuffer: gbuffer.bind(), radiance, background_tiles: &work.background, work: &work.sizes };
     let constants = background::Constants { library: lighting.library };
     frame.compute_indirect("background", &bind, &constants, &(), &work.sizes, WORK_BYTES)
 }

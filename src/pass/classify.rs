@@ -62,12 +62,8 @@ pub fn classify_fragments<'a>(
     let bind = classify_fragments::Bind { heads, sizes: &list.sizes, tiles: &list.tiles };
     let tiles = list.width.div_ceil(TILE) * (rows[1] - rows[0]).div_ceil(TILE);
     let groups = tiles.div_ceil(classify_fragments::PROGRAM.local_size[0]);
-    let push = classify_fragments::Push {
-        width: list.width,
-        first_row: rows[0],
-        end_row: rows[1],
-        stride: stride(groups),
-    };
+    let push =
+        classify_fragments::Push { width: list.width, first_row: rows[0], end_row: rows[1], stride: stride(groups) };
     frame.compute("classify fragment tiles", &bind, &classify_fragments::Constants {}, &push, rows_of(groups))
 }
 
@@ -104,12 +100,7 @@ impl WorkLists {
 ///
 /// # Errors
 /// When the driver refuses what a pipeline binds.
-pub fn classify<'a>(
-    frame: &mut Frame<'a>,
-    library: Library,
-    gbuffer: &'a GBuffer,
-    lists: &'a WorkLists,
-) -> Result<()> {
+pub fn classify<'a>(frame: &mut Frame<'a>, library: Library, gbuffer: &'a GBuffer, lists: &'a WorkLists) -> Result<()> {
     frame.copy_buffer("reset work sizes", &lists.empty, &lists.sizes, 2 * WORK_BYTES);
     let bind = classify::Bind {
         gbuffer: gbuffer.bind(),
@@ -172,11 +163,7 @@ pub fn classify_rays<'a>(
     list: &'a RayTiles,
 ) -> Result<()> {
     frame.copy_buffer("reset ray work size", &list.empty, &list.sizes, WORK_BYTES);
-    let bind = ray_program::Bind {
-        gbuffer: gbuffer.bind(),
-        sizes: &list.sizes,
-        ray_tiles: &list.tiles,
-    };
+    let bind = ray_program::Bind { gbuffer: gbuffer.bind(), sizes: &list.sizes, ray_tiles: &list.tiles };
     let size = lighting.size;
     let tiles = size[0].div_ceil(TILE) * size[1].div_ceil(TILE);
     let groups = tiles.div_ceil(ray_program::PROGRAM.local_size[0]);

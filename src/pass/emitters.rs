@@ -9,9 +9,7 @@ use super::upload::upload;
 use crate::gpu::{Buffer, Device, NOTHING};
 use crate::scene::emitters::{Emitter, Emitters, Source};
 
-use crate::shader::lib::emitters::{
-    EMITTER_NONE, EMITTER_PUNCTUAL, EMITTER_SKY, EMITTER_TRIANGLE, EMITTER_TWO_SIDED,
-};
+use crate::shader::lib::emitters::{EMITTER_NONE, EMITTER_PUNCTUAL, EMITTER_SKY, EMITTER_TRIANGLE, EMITTER_TWO_SIDED};
 
 /// What paths draw light from; next to nothing without any.
 pub struct EmittersOnDevice {

@@ -28,7 +28,8 @@ pub struct Lighting<'a> {
 fn parts(directional: u32, local: u32, listed: bool) -> Vec<LightRange> {
     let of =
         |count: u32| (0..count).step_by(LIGHTS_AT_ONCE as usize).map(move |i| [i, (i + LIGHTS_AT_ONCE).min(count)]);
-    let range = |[first, end]: [u32; 2], [first_word, end_word]: [u32; 2]| LightRange { first, end, first_word, end_word };
+    let range =
+        |[first, end]: [u32; 2], [first_word, end_word]: [u32; 2]| LightRange { first, end, first_word, end_word };
     let mut parts: Vec<LightRange> = of(directional).map(|lights| range(lights, [0; 2])).collect();
     for [from, to] in of(local) {
         let [lights, words] = match listed {

@@ -318,7 +318,8 @@ impl SceneOnDevice {
     fn write_lights(&mut self, slice: Option<&Slice>) {
         let color = |light: &Light| slice.map_or(light.color, |slice| slice.light(light));
         let lights = self.lights_cpu.iter().zip(&self.light_shadows);
-        let table: Vec<_> = lights.map(|(light, &shadow)| shared_light(light, color(light), self.eye, shadow)).collect();
+        let table: Vec<_> =
+            lights.map(|(light, &shadow)| shared_light(light, color(light), self.eye, shadow)).collect();
         self.lights.write(bytemuck::cast_slice(&table));
     }
 

@@ -1,14 +1,19 @@
 //! What all programs of a renderer share: the descriptor set of the scene, and the specialization constants of
 //! `shaders/lib/`. Each is told here, once.
 
+use std::sync::Arc;
+
+use anyhow::Result;
+
 use super::environment::EnvironmentOnDevice;
 use super::rays::{LOOP_BUDGET, RaysOnDevice};
 use super::scene::SceneOnDevice;
 use super::shadow_map::ShadowMaps;
 use super::tiles::Tiles;
-use crate::gpu::{Buffer, Resource};
+use crate::gpu::{BoundSet, Buffer, DescriptorSet, Device, Resource};
 use crate::plan::{Knobs, Plan};
-use crate::shader::{Library, lib};
+pub use crate::shader::Library;
+use crate::shader::{SCENE, lib};
 
 /// What the device holds of a scene.
 #[derive(Clone, Copy)]
@@ -27,8 +32,7 @@ pub struct OnDevice<'a> {
 
 impl<'a> OnDevice<'a> {
     /// The descriptor set `scene`: slots and what is in them, file by file of `shaders/lib/`.
-    #[must_use]
-    pub fn entries(&self) -> Vec<(u32, Resource<'a>)> {
+    fn entries(&self) -> Vec<(u32, Resource<'a>)> {
         let &Self { camera, scene, rays, shadow_maps, environment } = self;
         [
             lib::view::Scene { camera_block: camera }.entries(),
@@ -53,6 +57,20 @@ impl<'a> OnDevice<'a> {
             lib::reflectance::Scene { reflectance: environment.reflectance() }.entries(),
         ]
         .concat()
+    }
+
+    /// Writes the set.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn write(&self, device: &Arc<Device>) -> Result<DescriptorSet> {
+        DescriptorSet::new(device, &SCENE, &self.entries())
+    }
+
+    /// The set as it was written, for a frame.
+    #[must_use]
+    pub fn bind(&self, set: &'a DescriptorSet) -> BoundSet<'a> {
+        set.bind(self.entries())
     }
 
     /// What programs are specialised by. A pass that wants something else changes its copy, and says why.
@@ -179,12 +197,7 @@ mod tests {
             ("shadows", &[("off", SHADOW_OFF), ("map", SHADOW_MAP), ("ray", SHADOW_RAY)]),
             (
                 "normals",
-                &[
-                    ("oct16", NORMALS_OCT16),
-                    ("oct24", NORMALS_OCT24),
-                    ("oct32", NORMALS_OCT32),
-                    ("f32", NORMALS_F32),
-                ],
+                &[("oct16", NORMALS_OCT16), ("oct24", NORMALS_OCT24), ("oct32", NORMALS_OCT32), ("f32", NORMALS_F32)],
             ),
             (
                 "quadrature",
