@@ -8,6 +8,12 @@
 //! const uint SHAPE_SPHERE = 1;                                           the host's, too
 //! ```
 //!
+//! A struct of `shaders/share/` that lies in a buffer view, texel by texel, is read by a function that the build writes:
+//!
+//! ```text
+//! // @texels Material material_at(material_words)        material_words(uint index, int texel) fetches a uvec4
+//! ```
+//!
 //! A declaration stands on one line. Constants, and bindings of the sets `scene` and `pages`, have one number in all programs, and
 //! one file that declares them. Bindings of a pass are numbered from 0 in each program.
 
@@ -56,6 +62,8 @@ pub(crate) struct Interface {
     pub(crate) files: Vec<File>,
     constants: BTreeMap<String, u32>,
     slots: BTreeMap<String, u32>,
+    /// Members of the structs of `shaders/share/`: type and name.
+    structs: BTreeMap<String, Vec<(String, String)>>,
 }
 
 /// The bindings of one program's own set, and the file of each.
@@ -63,13 +71,21 @@ pub(crate) type PassSlots = BTreeMap<String, (u32, String)>;
 
 impl Interface {
     pub(crate) fn read(root: &Path) -> Result<Self> {
-        let mut all =
-            Self { root: root.to_owned(), files: Vec::new(), constants: BTreeMap::new(), slots: BTreeMap::new() };
+        let mut all = Self {
+            root: root.to_owned(),
+            files: Vec::new(),
+            constants: BTreeMap::new(),
+            slots: BTreeMap::new(),
+            structs: BTreeMap::new(),
+        };
         let mut owners: BTreeMap<String, String> = BTreeMap::new();
         for folder in ["share", "lib", "pass"] {
             for path in files(&root.join(folder))? {
                 let text = fs::read_to_string(&path).map_err(|e| format!("reading {}: {e}", path.display()))?;
                 let file = file(&path, folder, &text)?;
+                if folder == "share" {
+                    all.structs.extend(structs(&text));
+                }
                 for Declaration { kind, name, .. } in &file.declarations {
                     if kind == "pass" {
                         continue;
@@ -150,6 +166,11 @@ impl Interface {
     pub(crate) fn numbered(&self, text: &str, slots: &PassSlots, without: &[String]) -> Result<String> {
         let mut out = String::with_capacity(text.len() + 1024);
         for line in text.lines() {
+            if let Some(tag) = line.strip_prefix("// @texels ") {
+                out += &self.reader(tag)?;
+                out.push('\n');
+                continue;
+            }
             match declaration(line) {
                 Some(Declaration { kind, name, .. }) if kind == "constant" => {
                     let (_, rest) = line.split_once(") ").unwrap_or_default();
@@ -176,6 +197,60 @@ impl Interface {
         }
         Ok(out)
     }
+}
+
+impl Interface {
+    /// The function that reads a struct out of texels of four words: `Material material_at(material_words)`. On one line, so that the
+    /// compiler's messages keep their places.
+    fn reader(&self, tag: &str) -> Result<String> {
+        let wrong = || format!("// @texels {tag}: expected `STRUCT FUNCTION(FETCH)`, of a struct of shaders/share/");
+        let (ty, rest) = tag.split_once(' ').ok_or_else(wrong)?;
+        let (name, fetch) = rest.trim_end().strip_suffix(')').and_then(|rest| rest.split_once('(')).ok_or_else(wrong)?;
+        let members = self.structs.get(ty).ok_or_else(wrong)?;
+        let (mut word, mut values) = (0, Vec::new());
+        for (kind, member) in members {
+            let (scalar, count) = match kind.as_str() {
+                "float" => ("float", 1),
+                "uint" => ("uint", 1),
+                "vec2" | "vec3" | "vec4" => ("float", kind[3..].parse().unwrap_or(0)),
+                "uvec2" | "uvec3" | "uvec4" => ("uint", kind[4..].parse().unwrap_or(0)),
+                _ => return Err(format!("{tag}: no texels for {kind} {member}")),
+            };
+            // One swizzle where the member lies in one texel.
+            let words: Vec<usize> = (word..word + count).collect();
+            let letter = |w: &usize| ["x", "y", "z", "w"][w % 4];
+            let bits = match words[0] / 4 == words[count - 1] / 4 {
+                true => format!("t{}.{}", words[0] / 4, words.iter().map(letter).collect::<String>()),
+                false => {
+                    let each: Vec<_> = words.iter().map(|w| format!("t{}.{}", w / 4, letter(w))).collect();
+                    format!("uvec{count}({})", each.join(", "))
+                }
+            };
+            values.push(if scalar == "float" { format!("uintBitsToFloat({bits})") } else { bits });
+            word += count;
+        }
+        let texels: String = (0..word.div_ceil(4)).map(|i| format!("uvec4 t{i} = {fetch}(index, {i}); ")).collect();
+        Ok(format!("{ty} {name}(uint index) {{ {texels}return {ty}({}); }}", values.join(", ")))
+    }
+}
+
+/// Structs of a file: each member on a line of its own.
+fn structs(text: &str) -> BTreeMap<String, Vec<(String, String)>> {
+    let mut all = BTreeMap::new();
+    let mut open: Option<(String, Vec<(String, String)>)> = None;
+    for line in text.lines() {
+        let (code, _) = comment(line);
+        if let Some(rest) = code.strip_prefix("struct ") {
+            open = Some((rest.trim_end_matches(['{', ' ']).to_owned(), Vec::new()));
+        } else if code.starts_with("};") {
+            all.extend(open.take());
+        } else if let Some((_, members)) = &mut open
+            && let Some((ty, name)) = code.trim().trim_end_matches(';').split_once(' ')
+        {
+            members.push((ty.to_owned(), name.to_owned()));
+        }
+    }
+    all
 }
 
 /// NAME_as_FORMAT is the binding NAME, read in another format.

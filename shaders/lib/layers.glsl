@@ -37,7 +37,8 @@ float boundary_share(float cos_in, float n1, float n2) {
 vec3 fresnel_of_dielectric(Surface s, float cos_in) {
     if (FRESNEL == FRESNEL_SCHLICK) return schlick(s.f0_dielectric, s.f90_dielectric, cos_in);
     float r0 = nested_f0(s.n_outside, s.ior);
-    float share = clamp((fresnel_dielectric(cos_in, s.ior / s.n_outside).F - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
+    float n = s.n_outside == 1.0 ? s.ior : s.ior / s.n_outside;
+    float share = clamp((fresnel_dielectric(cos_in, n).F - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
     return s.f0_dielectric + (vec3(s.f90_dielectric) - s.f0_dielectric) * share;
 }
 
@@ -56,17 +57,20 @@ vec3 fresnel_of_metal(Surface s, float cos_in) {
     return f;
 }
 
-// Of the clear coat, a layer of this index (KHR_materials_clearcoat: F0 is 0.04 in air).
+// Of the clear coat, a layer of this index. Schlick's curve keeps its F0 of 0.04 (KHR_materials_clearcoat) in every medium.
 const float COAT_INDEX = 1.5;
 const float COAT_F0 = 0.04;
 
-float coat_f0(Surface s) {
-    return s.n_outside == 1.0 ? COAT_F0 : nested_f0(s.n_outside, COAT_INDEX);
-}
-
 float fresnel_of_coat(Surface s, float cos_in) {
-    return s.clearcoat * (FRESNEL == FRESNEL_EXACT ? fresnel_dielectric(cos_in, COAT_INDEX / s.n_outside).F
-                                                   : schlick(vec3(coat_f0(s)), 1.0, cos_in).x);
+    float f;
+    if (FRESNEL == FRESNEL_EXACT) {
+        // In air from constants: drivers round what they know in another way, and both plans of a scene have to agree.
+        bool in_air = s.n_outside == 1.0;
+        f = in_air ? fresnel_dielectric(cos_in, COAT_INDEX).F : fresnel_dielectric(cos_in, COAT_INDEX / s.n_outside).F;
+    } else {
+        f = schlick(vec3(COAT_F0), 1.0, cos_in).x;
+    }
+    return s.clearcoat * f;
 }
 
 // What the clear coat lets through to the eye.
@@ -101,7 +105,7 @@ vec3 albedo_of_base(Surface s, vec2 ab) {
 float albedo_of_coat(Surface s) {
     vec2 ab = reflectance_of_lobe(dot(s.n_coat, s.v), s.clearcoat_roughness);
     if (FRESNEL == FRESNEL_EXACT) return fresnel_of_coat(s, mean_cosine(ab)) * (ab.x + ab.y);
-    return s.clearcoat * (coat_f0(s) * ab.x + ab.y);
+    return s.clearcoat * (COAT_F0 * ab.x + ab.y);
 }
 
 // The table's texel of a surface's base.

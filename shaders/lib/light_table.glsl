@@ -2,11 +2,11 @@
 #ifndef LIGHT_TABLE_GLSL
 #define LIGHT_TABLE_GLSL
 
+#include "share/light.glsl"
+
 layout(scene, rgba32f) readonly uniform imageBuffer lights;
 
-// Position (or direction to it), range | colour, 1 / range² | axis, spot scale | spot offset, shape, its radius or half its height |
-// half its side across | of its shadow maps the first texel, how many there are, and whether their depth is told from the light.
-// After all lights the shadow maps: first texel across and down and texels a side, then the rows that lead from bvh space to
+// Texels of a struct Light. After all lights the shadow maps: first texel across and down and texels a side, then the rows that lead from bvh space to
 // texels across and down of the image, depth, and 1, all times w (lib/shadow.glsl).
 const int LIGHT_TEXELS = 6;
 const int SHADOW_MAP_TEXELS = 5;
@@ -14,4 +14,10 @@ const uint SHAPE_NONE = 0;
 const uint SHAPE_SPHERE = 1;
 const uint SHAPE_DISK = 2;
 const uint SHAPE_RECTANGLE = 3;
+
+uvec4 light_words(uint index, int i) {
+    return floatBitsToUint(imageLoad(lights, int(index) * LIGHT_TEXELS + i));
+}
+
+// @texels Light light_at(light_words)
 #endif

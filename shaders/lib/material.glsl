@@ -20,19 +20,7 @@ vec4 material_texel(uint id, int i) {
     return uintBitsToFloat(material_words(id, i));
 }
 
-Material material_at(uint id) {
-    vec4 t0 = material_texel(id, 0);
-    vec4 t1 = material_texel(id, 1);
-    vec4 t2 = material_texel(id, 2);
-    vec4 t3 = material_texel(id, 3);
-    vec4 t4 = material_texel(id, 4);
-    vec4 t5 = material_texel(id, 5);
-    vec4 t6 = material_texel(id, 6);
-    vec4 t7 = material_texel(id, 7);
-    vec4 t8 = material_texel(id, 8);
-    return Material(t0, t1.xyz, t1.w, t2.xyz, t2.w, t3.xyz, t3.w, t4.x, t4.y, t4.z, t4.w, t5.x, t5.y, t5.z,
-                    floatBitsToUint(t5.w), t6.xyz, floatBitsToUint(t6.w), t7.xyz, t7.w, t8.xyz, floatBitsToUint(t8.w));
-}
+// @texels Material material_at(material_words)
 
 // Where a material's texture is read: KHR_texture_transform as two rows, which set of coordinates, and which layer of its page.
 struct TextureSlot {

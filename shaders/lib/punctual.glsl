@@ -15,16 +15,13 @@ struct PunctualLight {
 
 // Light `index` of the table as a point sees it.
 PunctualLight punctual_light_at(uint index, vec3 p_rel) {
-    vec4 place = imageLoad(lights, int(index) * LIGHT_TEXELS);
-    vec4 color = imageLoad(lights, int(index) * LIGHT_TEXELS + 1);
-    vec4 axis = imageLoad(lights, int(index) * LIGHT_TEXELS + 2);
-    float spot_offset = imageLoad(lights, int(index) * LIGHT_TEXELS + 3).x;
+    Light light = light_at(index);
     PunctualLight r;
     r.directional = index < DIRECTIONAL_LIGHTS;
-    r.to_light = r.directional ? place.xyz : place.xyz - p_rel;
-    ArrivingLight arriving = arriving_light(r.to_light, r.directional, color.w, axis.xyz, axis.w, spot_offset);
+    r.to_light = r.directional ? light.position : light.position - p_rel;
+    ArrivingLight arriving = arriving_light(r.to_light, r.directional, light.inv_range2, light.axis, light.spot_scale, light.spot_offset);
     r.l = arriving.l;
-    r.arriving = color.rgb * arriving.share;
+    r.arriving = light.color * arriving.share;
     return r;
 }
 
@@ -33,45 +30,42 @@ PunctualLight punctual_light_at(uint index, vec3 p_rel) {
 // I cosθ_light/r² however large it is.
 PunctualLight shaped_light_at(uint index, vec3 p_rel, vec2 x) {
     PunctualLight r = punctual_light_at(index, p_rel);
-    vec4 shape = imageLoad(lights, int(index) * LIGHT_TEXELS + 3);
-    uint kind = uint(shape.y);
+    Light light = light_at(index);
+    uint kind = uint(light.shape);
     if (kind == SHAPE_NONE) return r;
-    vec4 color = imageLoad(lights, int(index) * LIGHT_TEXELS + 1);
-    vec4 axis = imageLoad(lights, int(index) * LIGHT_TEXELS + 2);
     vec3 middle = r.to_light;
-    float window = point_falloff(dot(middle, middle), color.w) * dot(middle, middle);
+    float window = point_falloff(dot(middle, middle), light.inv_range2) * dot(middle, middle);
     float around = 2.0 * PI * x.y;
     if (kind == SHAPE_SPHERE) {
         // A direction of the cone in which the ball is seen, each as likely as any other (PBRT 4, section 6.2.4).
         float d2 = dot(middle, middle);
-        if (d2 <= shape.z * shape.z) {
+        if (d2 <= light.extent * light.extent) {
             // From inside nothing is seen of it.
             r.arriving = vec3(0.0);
             return r;
         }
-        float lost = sphere_cone(shape.z * shape.z, d2);
+        float lost = sphere_cone(light.extent * light.extent, d2);
         float cos_theta = 1.0 - x.x * lost;
         float sin2 = max(x.x * lost * (2.0 - x.x * lost), 0.0);
         OrthonormalBasis b = orthonormal_basis(r.l);
         vec3 l = r.l * cos_theta + (b.t * cos(around) + b.b * sin(around)) * sqrt(sin2);
-        r.to_light = l * ball_reach(d2, shape.z, cos_theta, sin2);
+        r.to_light = l * ball_reach(d2, light.extent, cos_theta, sin2);
         r.l = l;
         // Ω L = 2π(1 − cosθ) I/(πr²).
-        r.arriving = color.rgb * (window * 2.0 * lost / (shape.z * shape.z));
+        r.arriving = light.color * (window * 2.0 * lost / (light.extent * light.extent));
         return r;
     }
-    vec3 across = imageLoad(lights, int(index) * LIGHT_TEXELS + 4).xyz;
     if (kind == SHAPE_DISK) {
-        OrthonormalBasis b = orthonormal_basis(axis.xyz);
-        r.to_light = middle + (b.t * cos(around) + b.b * sin(around)) * (shape.z * sqrt(x.x));
+        OrthonormalBasis b = orthonormal_basis(light.axis);
+        r.to_light = middle + (b.t * cos(around) + b.b * sin(around)) * (light.extent * sqrt(x.x));
     } else {
-        vec3 up = normalize(cross(axis.xyz, across)) * shape.z;
-        r.to_light = middle + across * (2.0 * x.x - 1.0) + up * (2.0 * x.y - 1.0);
+        vec3 up = normalize(cross(light.axis, light.across)) * light.extent;
+        r.to_light = middle + light.across * (2.0 * x.x - 1.0) + up * (2.0 * x.y - 1.0);
     }
     float r2 = max(dot(r.to_light, r.to_light), LIGHT_RADIUS * LIGHT_RADIUS);
     r.l = r.to_light * inversesqrt(r2);
-    float cos_light = -dot(axis.xyz, r.l);
-    r.arriving = color.rgb * (cos_light > 0.0 ? window * cos_light / r2 * spot_share(cos_light, axis.w, shape.x) : 0.0);
+    float cos_light = -dot(light.axis, r.l);
+    r.arriving = light.color * (cos_light > 0.0 ? window * cos_light / r2 * spot_share(cos_light, light.spot_scale, light.spot_offset) : 0.0);
     return r;
 }
 #endif

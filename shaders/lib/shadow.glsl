@@ -124,14 +124,14 @@ int cube_face(vec3 d) {
 // map's depth likewise, 8 of the distance to a light near the scene, 8 of the scene's extent for others, and that again for
 // the products here. All of it is an offset along n, by `size` with 32: half of that, and as much to spare.
 float map_visibility(vec3 p, vec3 n, vec3 to_light, uint index, float size) {
-    vec4 light = imageLoad(lights, int(index) * LIGHT_TEXELS + 5);
-    int first = int(light.x) + (light.y > 1.0 ? cube_face(-to_light) * SHADOW_MAP_TEXELS : 0);
+    Light light = light_at(index);
+    int first = int(light.first_map) + (light.maps > 1.0 ? cube_face(-to_light) * SHADOW_MAP_TEXELS : 0);
     vec4 square = imageLoad(lights, first);
     vec4 row_u = imageLoad(lights, first + 1);
     vec4 row_v = imageLoad(lights, first + 2);
     vec4 row_d = imageLoad(lights, first + 3);
     vec4 row_w = imageLoad(lights, first + 4);
-    float distance = light.z > 0.0 ? vector_length(to_light) : 0.0;
+    float distance = light.told_from_light > 0.0 ? vector_length(to_light) : 0.0;
     vec4 q = vec4(p + n * (trace_terms.offset + (size + distance) * SHADOW_ROUNDINGS), 1.0);
     float w = dot(row_w, q);
     vec3 at = vec3(dot(row_u, q), dot(row_v, q), dot(row_d, q)) / w;

@@ -125,6 +125,8 @@ Surface surface_from_texels(Material m, vec3 base, float metallic, float roughne
 // once more have the same last bit, and both plans of a scene have to agree.
 void seen_from(inout Surface s, float n_outside) {
     bool changes = n_outside != s.n_outside;
+    vec3 dielectric_before = s.f0_dielectric;
+    vec3 metal_before = s.f0_metal;
     float before = nested_f0(s.n_outside, s.ior);
     float ratio = before > 0.0 ? nested_f0(n_outside, s.ior) / before : 0.0;
     s.f0_dielectric = changes ? s.f0_dielectric * ratio : s.f0_dielectric;
@@ -139,8 +141,11 @@ void seen_from(inout Surface s, float n_outside) {
         s.n_metal = relative ? n : s.n_metal;
         s.kappa_metal = relative ? kappa : s.kappa_metal;
     }
-    s.f0 = changes ? mix(s.f0_dielectric, s.f0_metal, s.metallic) : s.f0;
-    s.f90 = changes ? mix(s.f90_dielectric, 1.0, s.metallic) : s.f90;
+    // No second mixture by the same share: drivers that see two of them round both in another way.
+    vec3 mixture = s.f0 + (s.f0_dielectric - dielectric_before) * (1.0 - s.metallic);
+    mixture += (s.f0_metal - metal_before) * s.metallic;
+    s.f0 = changes ? mixture : s.f0;
+    s.f90 = n_outside == s.ior ? s.metallic : s.f90;
     s.n_outside = n_outside;
 }
 

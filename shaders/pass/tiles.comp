@@ -35,13 +35,13 @@ void main() {
         for (uint i = 0; i < 32; i++) {
             uint index = word * 32 + i;
             if (index >= count) break;
-            vec4 place = imageLoad(lights, int(first + index) * LIGHT_TEXELS);
-            float radius = place.w; // the light's range; negative: unlimited
+            Light light = light_at(first + index);
+            float radius = light.range; // negative: unlimited
             bool hit = radius < 0.0;
             if (!hit) {
-                float z = dot(place.xyz, f);
-                float x = dot(place.xyz, r) / r2;
-                float y = dot(place.xyz, u) / u2;
+                float z = dot(light.position, f);
+                float x = dot(light.position, r) / r2;
+                float y = dot(light.position, u) / u2;
                 float w = parallel ? 1.0 : z;
                 // Signed distances to the planes x = low.x w …: their normals are not unit, so the radius grows instead.
                 float rx = radius * (parallel ? 1.0 : sqrt(1.0 + r2 * max(low.x * low.x, high.x * high.x))) * inversesqrt(r2);

@@ -29,6 +29,8 @@ pub const SLOTS: usize = lib::slots::SLOTS as usize;
 const MATERIAL_TEXELS: usize = lib::material::MATERIAL_SLOTS_AT as usize + SLOTS * lib::material::SLOT_TEXELS as usize;
 /// Texels of a light.
 const LIGHT_TEXELS: usize = lib::light_table::LIGHT_TEXELS as usize;
+const _: () = assert!(size_of::<share::Light>() == 16 * LIGHT_TEXELS);
+const _: () = assert!(size_of::<share::Material>() == 16 * lib::material::MATERIAL_SLOTS_AT as usize);
 
 /// Where a mesh's data lies in the scene's buffers.
 struct MeshRange {
@@ -107,7 +109,7 @@ pub struct SceneOnDevice {
     pub lights: Buffer,
     lights_cpu: Vec<Light>,
     /// What each light's last texel says of its shadow maps.
-    light_shadows: Vec<[f32; 4]>,
+    light_shadows: Vec<LightMaps>,
     refraction: bool,
     normal_steps: u32,
     textures: Textures,
@@ -264,7 +266,7 @@ impl SceneOnDevice {
             },
             texture_slots: texture_slots_of,
             page_sets,
-            light_shadows: vec![[0.0; 4]; lights_cpu.len()],
+            light_shadows: vec![LightMaps::default(); lights_cpu.len()],
             spectrum: SpectrumOnDevice::new(device, spectral, fitted)?,
             wavelengths,
             knobs: knobs.clone(),
@@ -324,7 +326,7 @@ impl SceneOnDevice {
     }
 
     /// Keeps the table of the shadow maps behind that of the lights.
-    pub(super) fn keep_shadow_maps(&mut self, of_lights: Vec<[f32; 4]>, maps: &[[f32; 4]]) {
+    pub(super) fn keep_shadow_maps(&mut self, of_lights: Vec<LightMaps>, maps: &[[f32; 4]]) {
         self.lights.write_at(of_lights.len() * LIGHT_TEXELS * 16, bytemuck::cast_slice(maps));
         self.light_shadows = of_lights;
     }
@@ -619,42 +621,58 @@ fn shared_instance(placement: &Placement, eye: DVec3, material: usize) -> share:
     }
 }
 
-/// As shaders/lib/light_table.glsl says.
-fn shared_light(light: &Light, [r, g, b]: [f32; 3], eye: DVec3, shadow: [f32; 4]) -> [[f32; 4]; LIGHT_TEXELS] {
-    // Kind of the shape, its radius or half its height; half its side across.
-    let (shape, across) = match light.extent {
-        None => ([SHAPE_NONE as f32, 0.0], DVec3::ZERO),
-        Some(Extent::Sphere { radius }) => ([SHAPE_SPHERE as f32, radius as f32], DVec3::ZERO),
-        Some(Extent::Disk { radius }) => ([SHAPE_DISK as f32, radius as f32], DVec3::ZERO),
-        Some(Extent::Rectangle { across, half_height }) => ([SHAPE_RECTANGLE as f32, half_height as f32], across),
+fn shared_light(light: &Light, color: [f32; 3], eye: DVec3, maps: LightMaps) -> share::Light {
+    let (shape, extent, across) = match light.extent {
+        None => (SHAPE_NONE, 0.0, DVec3::ZERO),
+        Some(Extent::Sphere { radius }) => (SHAPE_SPHERE, radius, DVec3::ZERO),
+        Some(Extent::Disk { radius }) => (SHAPE_DISK, radius, DVec3::ZERO),
+        Some(Extent::Rectangle { across, half_height }) => (SHAPE_RECTANGLE, half_height, across),
     };
-    let side = across.as_vec3().extend(0.0).to_array();
-    let shaped = |offset: f32| [offset, shape[0], shape[1], 0.0];
-    let local = |position: DVec3, range: Option<f64>| {
-        let p = camera_relative([position, DVec3::ZERO], [eye, DVec3::ZERO]).as_vec3();
-        let inv_range2 = range.map_or(0.0, |range| (1.0 / (range * range)) as f32);
-        // A negative radius tells the tile pass that the light reaches everywhere.
-        ([p.x, p.y, p.z, range.map_or(-1.0, |range| range as f32)], [r, g, b, inv_range2])
+    let array = |v: DVec3| v.as_vec3().to_array();
+    let shared = share::Light {
+        color,
+        first_map: maps.first as f32,
+        maps: maps.count as f32,
+        told_from_light: f32::from(u8::from(maps.told_from_light)),
+        ..bytemuck::Zeroable::zeroed()
+    };
+    let local = |position: DVec3, range: Option<f64>| share::Light {
+        position: array(camera_relative([position, DVec3::ZERO], [eye, DVec3::ZERO])),
+        // A negative one tells the tile pass that the light reaches everywhere.
+        range: range.map_or(-1.0, |range| range as f32),
+        inv_range2: range.map_or(0.0, |range| (1.0 / (range * range)) as f32),
+        spot_offset: 1.0,
+        shape: shape as f32,
+        extent: extent as f32,
+        across: array(across),
+        ..shared
     };
     match light.kind {
-        LightKind::Directional { direction } => {
-            let to = (-direction).as_vec3();
-            [[to.x, to.y, to.z, 0.0], [r, g, b, 0.0], [0.0; 4], [0.0; 4], [0.0; 4], shadow]
-        }
-        LightKind::Point { position, range } => {
-            let (place, color) = local(position, range);
-            [place, color, [0.0; 4], shaped(1.0), side, shadow]
-        }
+        LightKind::Directional { direction } => share::Light { position: array(-direction), ..shared },
+        LightKind::Point { position, range } => local(position, range),
         LightKind::Spot { position, direction, range, inner, outer } => {
-            let (place, color) = local(position, range);
-            let axis = direction.as_vec3();
             // KHR_lights_punctual's ramp: (cosθ − cos outer) / (cos inner − cos outer).
             // Equal cones are a step, which a ramp of 1e-7 is to f32.
             let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-7);
-            let offset = -outer.cos() * scale;
-            [place, color, [axis.x, axis.y, axis.z, scale as f32], shaped(offset as f32), side, shadow]
+            share::Light {
+                axis: array(direction),
+                spot_scale: scale as f32,
+                spot_offset: (-outer.cos() * scale) as f32,
+                ..local(position, range)
+            }
         }
     }
+}
+
+/// The shadow maps of a light.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct LightMaps {
+    /// Texel of the first in the table of lights.
+    pub(super) first: usize,
+    /// 1 or 6; 0 where there are none.
+    pub(super) count: u32,
+    /// Depth is told from the light, not across the scene.
+    pub(super) told_from_light: bool,
 }
 
 /// A medium as rays keep it (shaders/lib/media.glsl): its priority, and which material it is.

@@ -11,7 +11,7 @@ use anyhow::{Result, bail};
 use ash::vk;
 use glam::{DVec3, DVec4};
 
-use super::scene::SceneOnDevice;
+use super::scene::{LightMaps, SceneOnDevice};
 use crate::gpu::{
     Buffer, DepthTarget, DescriptorSet, Device, Frame, Image, ImageDesc, PassTime, Raster, Sampled, SamplerDesc,
 };
@@ -87,7 +87,7 @@ impl ShadowMaps {
         };
         let mut faces: Vec<Face> = Vec::new();
         let mut first = vec![0; lights.len()];
-        let mut told = vec![0.0; lights.len()];
+        let mut told = vec![false; lights.len()];
         // Large squares first: what follows along the curve then starts at a multiple of its own size.
         let mut next = 0;
         for large in [true, false] {
@@ -95,7 +95,7 @@ impl ShadowMaps {
             {
                 first[index] = faces.len();
                 let side = if large { flat } else { cube };
-                told[index] = f32::from(u8::from(is_told_from_light(light, bounds, anchor)));
+                told[index] = is_told_from_light(light, bounds, anchor);
                 for clip in clip_rows(light, side, bounds, anchor) {
                     let [x, y] = along_curve(next);
                     faces.push(Face { clip, square: [x, y, side] });
@@ -104,9 +104,10 @@ impl ShadowMaps {
             }
         }
         let maps_at = lights.len() * LIGHT_TEXELS as usize;
-        let of_light = |(light, (first, told)): (&Light, (usize, f32))| {
-            let texel = maps_at + first * FACE_TEXELS;
-            [texel as f32, if cone(light, bounds).is_some() { 1.0 } else { 6.0 }, told, 0.0]
+        let of_light = |(light, (first, told_from_light)): (&Light, (usize, bool))| LightMaps {
+            first: maps_at + first * FACE_TEXELS,
+            count: if cone(light, bounds).is_some() { 1 } else { 6 },
+            told_from_light,
         };
         let of_lights = lights.iter().zip(first.into_iter().zip(told)).map(of_light).collect();
         let table: Vec<[f32; 4]> = faces.iter().flat_map(Face::texels).collect();
