@@ -419,6 +419,30 @@ fn cameras_and_instances_put_things_where_the_geometry_says() {
     }
 }
 
+/// How much of the picture a panel 1.3 m wide and 0.9 m high covers: its sides over those of what is seen at its distance.
+#[test]
+fn a_panel_is_as_large_in_the_picture_as_field_of_view_and_aspect_say() {
+    let gpu = Gpu::hasty();
+    let mut made = Made::new("panel");
+    made.add(Shape::panel(1.3, 0.9), unlit([1.0; 3]), DAffine3::IDENTITY);
+    for (what, projection, half_height, size) in [
+        ("35° from 4 m", perspective(35.0), 4.0 * 17.5_f64.to_radians().tan(), [48, 24]),
+        ("70° from 4 m, upright", perspective(70.0), 4.0 * 35_f64.to_radians().tan(), [24, 40]),
+        ("parallel", orthographic(0.7), 0.7, [48, 32]),
+    ] {
+        made.0.cameras = vec![Camera { projection, ..looking(DVec3::Z * 4.0, DVec3::ZERO) }];
+        let width = half_height * f64::from(size[0]) / f64::from(size[1]);
+        let want = 0.65 / width * (0.45 / half_height);
+        for of in MODELS {
+            let film = gpu.film(&made.0, model(of, size, &["samples=64"]));
+            let covered = film.rgba.iter().map(|p| f64::from(p[1])).sum::<f64>() / film.rgba.len() as f64;
+            eprintln!("{of:?}, {what}: {covered:.5} for {want:.5}");
+            // 64 even points of a pixel tell where its edge is to 1/64 of it or so; the panel is 10 pixels wide at least.
+            assert!((covered / want - 1.0).abs() < 3e-3, "{of:?}, {what}: {covered} for {want}");
+        }
+    }
+}
+
 /// A ball that its instance stretches, turns and mirrors: its normals are those of the ellipsoid.
 #[test]
 fn stretched_and_mirrored_balls_are_lit_as_ellipsoids() {
