@@ -334,6 +334,48 @@ fn snells_window_ends_where_it_should_to_a_tenth_of_a_degree() {
     }
 }
 
+/// Lecture F5: a slanted slab moves what lies behind it to the side by t sin(α − β)/cosβ, sinα = n sinβ: rays are bent as they
+/// enter and bent back as they leave. One bend and the way through the nominal thickness (`refraction=screen`): by that sin(α − β).
+#[test]
+fn a_slab_moves_what_lies_behind_it_by_snells_law() {
+    let gpu = Gpu::hasty();
+    let (n, thickness, alpha) = (1.5_f64, 0.5, 40_f64.to_radians());
+    let beta = (alpha.sin() / n).asin();
+    let glass = Material {
+        transmission: 1.0,
+        thickness: thickness as f32,
+        ior: 1.5,
+        // Nothing is reflected, so that all that is seen is what is bent.
+        specular: 0.0,
+        roughness: 0.0,
+        ..lambert([1.0; 3])
+    };
+    for (of, refraction, shift) in [
+        (Model::Recursive, "refraction=ray", thickness * (alpha - beta).sin() / beta.cos()),
+        (Model::Global, "refraction=ray", thickness * (alpha - beta).sin() / beta.cos()),
+        (Model::Local, "refraction=screen", thickness * (alpha - beta).sin()),
+    ] {
+        let mut made = Made::new("slab");
+        let turn = DAffine3::from_rotation_y(alpha);
+        made.add(Shape::cuboid(DVec3::new(4.0, 4.0, thickness)), glass.clone(), turn);
+        // Its normal leans to +x: rays leave it further to the left, and see the edge there where it is straight ahead.
+        made.add(Shape::panel(4.0, 4.0), unlit([1.0; 3]), at(2.0 - shift, 0.0, -3.0));
+        made.camera(DVec3::Z * 5.0, DVec3::ZERO, orthographic(0.1));
+        let size = [128, 64];
+        let film = gpu.film(&made.0, model(of, size, &[refraction]));
+        let row: Vec<f64> = (0..size[0]).map(|x| pixel(&film, x, 32).x).collect();
+        let bright = row.iter().sum::<f64>();
+        eprintln!("{of:?}: {bright} of {} pixels are bright, the edge is {shift:.4} m away", size[0]);
+        // Half of the picture; a pixel is 0.003 m. What is looked up on the screen is a whole pixel.
+        let bound = if of == Model::Local { 1.5 } else { 1.0 };
+        assert!((bright - 64.0).abs() <= bound, "{of:?}: {bright} of {} pixels, not half", size[0]);
+        assert!(
+            row[..60].iter().all(|&x| x < 1e-3) && row[68..].iter().all(|&x| (x - 1.0).abs() < 1e-3),
+            "{of:?}: {row:?}"
+        );
+    }
+}
+
 /// Bodies of plain colours, turned, stretched and mirrored.
 fn placed() -> Scene {
     let mut made = Made::new("placed");
@@ -373,6 +415,30 @@ fn cameras_and_instances_put_things_where_the_geometry_says() {
                 assert!(lobe::rgb([got[0], got[1], got[2]]) == color, "{of:?}, {what}, pixel {i}: {got:?} for {color}");
             }
             assert!(compared.into_iter().all(|count| count > 8), "{of:?}, {what}: {compared:?}");
+        }
+    }
+}
+
+/// How much of the picture a panel 1.3 m wide and 0.9 m high covers: its sides over those of what is seen at its distance.
+#[test]
+fn a_panel_is_as_large_in_the_picture_as_field_of_view_and_aspect_say() {
+    let gpu = Gpu::hasty();
+    let mut made = Made::new("panel");
+    made.add(Shape::panel(1.3, 0.9), unlit([1.0; 3]), DAffine3::IDENTITY);
+    for (what, projection, half_height, size) in [
+        ("35° from 4 m", perspective(35.0), 4.0 * 17.5_f64.to_radians().tan(), [48, 24]),
+        ("70° from 4 m, upright", perspective(70.0), 4.0 * 35_f64.to_radians().tan(), [24, 40]),
+        ("parallel", orthographic(0.7), 0.7, [48, 32]),
+    ] {
+        made.0.cameras = vec![Camera { projection, ..looking(DVec3::Z * 4.0, DVec3::ZERO) }];
+        let width = half_height * f64::from(size[0]) / f64::from(size[1]);
+        let want = 0.65 / width * (0.45 / half_height);
+        for of in MODELS {
+            let film = gpu.film(&made.0, model(of, size, &["samples=64"]));
+            let covered = film.rgba.iter().map(|p| f64::from(p[1])).sum::<f64>() / film.rgba.len() as f64;
+            eprintln!("{of:?}, {what}: {covered:.5} for {want:.5}");
+            // 64 even points of a pixel tell where its edge is to 1/64 of it or so; the panel is 10 pixels wide at least.
+            assert!((covered / want - 1.0).abs() < 3e-3, "{of:?}, {what}: {covered} for {want}");
         }
     }
 }
