@@ -205,7 +205,8 @@ impl Interface {
     fn reader(&self, tag: &str) -> Result<String> {
         let wrong = || format!("// @texels {tag}: expected `STRUCT FUNCTION(FETCH)`, of a struct of shaders/share/");
         let (ty, rest) = tag.split_once(' ').ok_or_else(wrong)?;
-        let (name, fetch) = rest.trim_end().strip_suffix(')').and_then(|rest| rest.split_once('(')).ok_or_else(wrong)?;
+        let (name, fetch) =
+            rest.trim_end().strip_suffix(')').and_then(|rest| rest.split_once('(')).ok_or_else(wrong)?;
         let members = self.structs.get(ty).ok_or_else(wrong)?;
         let (mut word, mut values) = (0, Vec::new());
         for (kind, member) in members {

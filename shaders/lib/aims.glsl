@@ -11,7 +11,7 @@ layout(constant) const bool AIMED = false;
 layout(scene, scalar) readonly buffer AimCells { uint aim_cells[]; };
 // Corner of the grid in bvh space and cells per metre, cells along x, y and z; then a ball each: middle, and in halves its radius
 // in cells and its share of its cell's aims.
-layout(scene, rgba32ui) readonly uniform uimageBuffer aims;
+layout(scene, scalar) readonly buffer AimTable { uvec4 aim_table[]; };
 
 // Of the directions drawn for a diffuse surface (docs/decisions/paths.md).
 const float AIMED_SHARE = 0.25;
@@ -23,8 +23,8 @@ struct Aims {
 };
 
 Aims aims_at(vec3 p) {
-    uvec4 corner = imageLoad(aims, 0);
-    uvec3 cells = imageLoad(aims, 1).xyz;
+    uvec4 corner = aim_table[0];
+    uvec3 cells = aim_table[1].xyz;
     float per_metre = uintBitsToFloat(corner.w);
     vec3 at = floor((p - uintBitsToFloat(corner.xyz)) * per_metre);
     bool inside = all(greaterThanEqual(at, vec3(0.0))) && all(lessThan(at, vec3(cells)));
@@ -41,7 +41,7 @@ struct Cone {
 };
 
 Cone cone_to(Aims at, uint i, vec3 p) {
-    uvec4 ball = imageLoad(aims, int(at.first + i));
+    uvec4 ball = aim_table[min(at.first + i, uint(aim_table.length()) - 1u)];
     vec3 to = uintBitsToFloat(ball.xyz) - p;
     vec2 radius_share = unpackHalf2x16(ball.w);
     float radius = radius_share.x * at.cell;

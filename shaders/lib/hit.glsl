@@ -29,9 +29,9 @@ const int TANGENTS_AT = UV1_AT + (HIT_SECOND_UVS ? 2 : 0);
 const int COLORS_AT = TANGENTS_AT + (HIT_TANGENTS ? 3 : 0);
 const int CORNER_TEXELS = COLORS_AT + (HIT_COLORS ? 2 : 0);
 
-// All levels of all images, RGBA in bytes. A buffer can be read at any place by any lane, where sampled images cannot be chosen
-// by an index.
-layout(scene, scalar) readonly buffer Texels { uint texels[]; };
+// All levels of all images, RGBA in bytes. A texel buffer can be read at any place by any lane, where sampled images cannot be chosen
+// by an index; lavapipe binds 128 MiB of a storage buffer at most, and 512 MiB of these.
+layout(scene, r32ui) readonly uniform uimageBuffer texels;
 
 const int MOST_LEVELS = 15; // above the first, of a picture of 32768 texels
 const uint TEXELS_SRGB = 1;
@@ -48,7 +48,7 @@ int wrapped(int i, int size, uint mode) {
 vec4 texel_at(uint first, ivec2 size, ivec2 at, uint flags) {
     int x = wrapped(at.x, size.x, flags >> 2 & 3u);
     int y = wrapped(at.y, size.y, flags >> 4 & 3u);
-    vec4 value = unpackUnorm4x8(texels[int(first) + y * size.x + x]);
+    vec4 value = unpackUnorm4x8(imageLoad(texels, int(first) + y * size.x + x).x);
     return (flags & TEXELS_SRGB) != 0 ? vec4(linear_from_srgb(value.rgb), value.a) : value;
 }
 

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use anyhow::Result;
-use ash::vk;
 use glam::DVec3;
 use half::f16;
 
@@ -36,7 +35,7 @@ impl AimsOnDevice {
         let texels: Vec<[u32; 4]> = grid.into_iter().chain(aims.aims.iter().map(ball)).collect();
         Ok(Self {
             cells: upload(device, "cells of aims", &aims.firsts, None)?,
-            balls: upload(device, "aims", &texels, Some(vk::Format::R32G32B32A32_UINT))?,
+            balls: upload(device, "aims", &texels, None)?,
         })
     }
 
@@ -45,10 +44,7 @@ impl AimsOnDevice {
     /// # Errors
     /// When memory is short.
     pub fn none(device: &Arc<Device>) -> Result<Self> {
-        let texels = vk::Format::R32G32B32A32_UINT;
-        Ok(Self {
-            cells: Buffer::new(device, NOTHING, 0, Place::Device)?,
-            balls: Buffer::texels(device, NOTHING, 0, Place::Device, texels)?,
-        })
+        let nothing = || Buffer::new(device, NOTHING, 0, Place::Device);
+        Ok(Self { cells: nothing()?, balls: nothing()? })
     }
 }

@@ -271,7 +271,7 @@ impl SceneOnDevice {
             wavelengths,
             knobs: knobs.clone(),
             eye: DVec3::ZERO,
-            texels: upload(device, "texels for rays", &texels.texels, None)?,
+            texels: upload(device, "texels for rays", &texels.texels, Some(vk::Format::R32_UINT))?,
             grids,
             instances: Buffer::new(device, "instances", instance_bytes, Place::Upload)?,
             lights: Buffer::texels(device, "lights", light_bytes, Place::Upload, vk::Format::R32G32B32A32_SFLOAT)?,

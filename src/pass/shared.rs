@@ -46,7 +46,7 @@ impl<'a> OnDevice<'a> {
             rays.trace().entries(),
             rays.work().entries(),
             lib::emitters::Scene { emitters: &rays.emitters.table, sky_shares: &rays.emitters.sky }.entries(),
-            lib::aims::Scene { aim_cells: &rays.aims.cells, aims: &rays.aims.balls }.entries(),
+            lib::aims::Scene { aim_cells: &rays.aims.cells, aim_table: &rays.aims.balls }.entries(),
             lib::shadow::Scene { shadow_depth: shadow_maps.depth() }.entries(),
             lib::environment::Scene {
                 environment: &environment.terms,
