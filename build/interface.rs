@@ -313,7 +313,7 @@ pub(crate) fn snake(name: &str) -> String {
     out
 }
 
-/// A constant with a plain number for its value.
+/// A whole-number constant: what both sides count or index with.
 fn shared(line: &str) -> Option<Shared> {
     let (code, about) = comment(line);
     let (head, value) = code.strip_prefix("const ")?.split_once(" = ")?;
@@ -326,7 +326,6 @@ fn shared(line: &str) -> Option<Shared> {
     let ty = match ty {
         "uint" if integer(value) => "u32",
         "int" if integer(value) => "i32",
-        "float" if value.parse::<f32>().is_ok() => "f32",
         _ => return None,
     };
     Some(Shared { name: name.to_owned(), ty, value: value.to_owned(), about })

@@ -156,7 +156,7 @@ fn no_statement_of_the_lecture_and_no_hard_case_is_forgotten() {
             By::Nothing(_) => assert!(!is_tagged, "{} is said to have no function, and one is tagged", statement.id),
             By::Equations(names) => {
                 let known = |name: &&str| PROBES.iter().any(|probe| probe.name == *name);
-                assert!(!is_tagged && names.iter().all(|name| known(name)), "{}: {names:?}", statement.id);
+                assert!(!is_tagged && names.iter().all(known), "{}: {names:?}", statement.id);
             }
         }
     }

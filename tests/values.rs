@@ -50,7 +50,7 @@ fn lit(gpu: &Gpu, materials: &[Material], light: DVec3, of: Model, choices: &[&s
     made.light(IRRADIANCE, LightKind::Directional { direction: -l });
     let settings = model(of, DOME, choices);
     let brdf = settings.knobs.rung("brdf");
-    let rungs = Rungs { brdf, exact: settings.knobs.rung("fresnel") == "exact", model: of };
+    let rungs = Rungs { brdf, exact: settings.knobs.rung("fresnel") == "exact" };
     let film = gpu.film(&made.0, settings);
     eprint!("{of:?} {choices:?} ");
     worst(&film, &facets, floor, |facet: &Facet| {
@@ -418,7 +418,7 @@ fn what_a_mirror_shows_and_what_a_pane_lets_through_is_lit_as_what_is_seen_witho
                 film.rgba.chunks_exact_mut(DOME[0] as usize).for_each(|row| row.reverse());
             }
             eprint!("{of:?}, {what}: ");
-            let rungs = Rungs { brdf: "ggx", exact: false, model: of };
+            let rungs = Rungs { brdf: "ggx", exact: false };
             let error = worst(&film, &facets, 1e-2, |facet| {
                 sent(&materials[facet.material], rungs, facet.n, ABOVE.normalize(), DVec3::Z, 1.0)
             });
@@ -453,7 +453,7 @@ fn what_blends_and_what_lets_light_through_is_lit_as_what_is_opaque() {
             let (scene, facets) = with(materials, |_| ());
             let film = gpu.film(&scene, model(of, DOME, &["brdf=ggx", "fresnel=schlick"]));
             eprint!("{of:?}, {what}: ");
-            let rungs = Rungs { brdf: "ggx", exact: false, model: of };
+            let rungs = Rungs { brdf: "ggx", exact: false };
             let error = worst(&film, &facets, 0.02, |facet| {
                 let m = &materials[facet.material];
                 let alpha = if what == "blended" { 0.75 } else { 1.0 };

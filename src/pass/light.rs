@@ -6,7 +6,7 @@ use super::classify::WorkLists;
 use super::gbuffer::GBuffer;
 use super::lighting::Lighting;
 use crate::gpu::{Frame, Image};
-use crate::shader::light;
+use crate::shader::{lib, light};
 
 /// Writes `radiance` where the G-buffer holds a surface.
 ///
@@ -19,7 +19,15 @@ pub fn light<'a>(
     work: &'a WorkLists,
     radiance: &'a Image,
 ) -> Result<()> {
-    let constants = light::Constants { library: lighting.library };
+    let mut library = lighting.library;
+    // Without shadow rays, and from outside of bodies, no ray leaves what is lit: one pipeline, whatever rays other passes send.
+    if !library.gbuffer.stored_triangles {
+        library.trace = lib::trace::Constants::default();
+        library.hit = lib::hit::Constants::default();
+        library.sigma_grid = lib::sigma_grid::Constants::default();
+        library.shadow = lib::shadow::Constants { shadows: library.shadow.shadows, ..Default::default() };
+    }
+    let constants = light::Constants { library };
     let bind = light::Bind {
         gbuffer: gbuffer.bind(),
         lighting: lighting.tiles.bind(),

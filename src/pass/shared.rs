@@ -11,7 +11,7 @@ use super::scene::SceneOnDevice;
 use super::shadow_map::ShadowMaps;
 use super::tiles::Tiles;
 use crate::gpu::{BoundSet, Buffer, DescriptorSet, Device, Resource};
-use crate::plan::{Knobs, Plan};
+use crate::plan::{Knobs, March, Plan};
 pub use crate::shader::Library;
 use crate::shader::{SCENE, lib};
 
@@ -140,10 +140,11 @@ impl<'a> OnDevice<'a> {
                 filters: with.filters,
                 absorption: with.absorption,
             },
-            sigma_grid: lib::sigma_grid::Constants {
-                march_steps: with.march.steps,
-                quadrature: with.march.rule,
-                march_colours: with.march.colours,
+            sigma_grid: match with.march {
+                March { steps: 0, .. } => lib::sigma_grid::Constants::default(),
+                March { steps, rule, colours } => {
+                    lib::sigma_grid::Constants { march_steps: steps, quadrature: rule, march_colours: colours }
+                }
             },
             spectrum: lib::spectrum::Constants { spectral: spectrum.spectral, grid_side: spectrum.grid_side },
             surface: lib::surface::Constants {

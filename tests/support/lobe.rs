@@ -127,7 +127,6 @@ pub fn reflectances(cos_v: f64, alpha: f64) -> [f64; 2] {
 pub struct Rungs<'a> {
     pub brdf: &'a str,
     pub exact: bool,
-    pub model: Model,
 }
 
 /// BRDF times cosθ_l of a rough surface without what it transmits.
@@ -148,19 +147,19 @@ pub fn reflected(m: &Material, rungs: Rungs<'_>, n: DVec3, l: DVec3, v: DVec3) -
         result = match rungs.brdf {
             // B5 knows no cosine beside the lobe; the quarter is |L + V|² of B6 at normal incidence.
             "blinn-phong" => diffuse * cos_l + k_s * power / 4.0,
-            "blinn-phong-reciprocal" => (diffuse + k_s * power / (l + v).length_squared()) * cos_l,
+            // The bound of B6, k_d π + k_s 2π/(shine + 2) ≤ 1: the ground has what F0 leaves.
+            "blinn-phong-reciprocal" => {
+                let ground = diffuse * (1.0 - dielectric(m, false, 1.0).max_element());
+                (ground + k_s * power / (l + v).length_squared()) * cos_l
+            }
             "ggx" => (diffuse * (1.0 - f_dielectric.max_element()) + f * ggx(n, l, v, a)) * cos_l,
             _ => {
                 let [whole, grazing] = reflectances(n.dot(v), a);
                 let compensation = DVec3::ONE + f0 * (1.0 / whole - 1.0);
-                // Paths keep below the lobe what it leaves as a whole, the deferred pass what its one facet leaves.
-                let kept = if rungs.model == Model::Global {
-                    let f0 = dielectric(m, false, 1.0);
-                    let reflects = f0 * (whole - grazing) + DVec3::splat(f64::from(m.specular) * grazing);
-                    (reflects * compensation).max_element()
-                } else {
-                    f_dielectric.max_element()
-                };
+                // What the whole lobe leaves goes below it.
+                let f0 = dielectric(m, false, 1.0);
+                let reflects = f0 * (whole - grazing) + DVec3::splat(f64::from(m.specular) * grazing);
+                let kept = (reflects * compensation).max_element();
                 (diffuse * (1.0 - kept) + f * compensation * ggx(n, l, v, a)) * cos_l
             }
         };
