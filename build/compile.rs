@@ -115,7 +115,7 @@ impl Recipe {
         Ok(Program { stages, slots })
     }
 
-    #[allow(clippy::too_many_arguments, reason = "what glslang is told, called twice above")]
+    #[allow(clippy::too_many_arguments, reason = "the options of glslang, called twice above")]
     fn words(
         &self,
         kind: shaderc::ShaderKind,

@@ -476,7 +476,7 @@ pub(crate) fn share(recipe: &Recipe, programs: &BTreeMap<String, Program>) -> Re
             if line.operands.is_empty() {
                 continue;
             }
-            // What cannot be told in Rust is no struct of `share/`.
+            // A struct that Rust has no type for is not one of `share/`.
             for one in structs(&names, id).unwrap_or_default() {
                 // Of two, the one that lies in a buffer and the one in registers, either will do: layouts are scalar.
                 found.insert(one.name.clone(), one);

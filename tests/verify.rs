@@ -142,7 +142,7 @@ fn whole_numbers_keep_all_their_digits() {
     // By a program that has integers. A reader that rounds the seed to f32, to 1944965632, is 11.7 ulp off in T.
     let row = "n,s0,ds,seed,=tau,=T\n15679,8,4.05251165e-4,1944965690,76.24975757999299,7.6762840453426705e-34\n";
     vectors("beer_lambert_sum.csv", row, &[]).succeeded();
-    // With an exponent it is told to as many digits as a float has.
+    // With an exponent the number has as many digits as a float.
     let rounded = row.replace("1944965690", "1.944965690e9");
     assert_eq!(vectors("beer_lambert_sum.csv", &rounded, &[]).code, Some(1));
 }

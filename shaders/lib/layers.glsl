@@ -2,7 +2,7 @@
 // dielectric, a metal, or a mixture of both; below the boundary a diffuse ground, or what lets light through
 // (glTF 2.0 appendix B; KHR_materials_clearcoat, specular, ior, transmission).
 //
-// Each layer is told once: its Fresnel reflectance, its lobe towards a direction (evaluate), a direction of its lobe (sample), its
+// Each layer is written once: its Fresnel reflectance, its lobe towards a direction (evaluate), a direction of its lobe (sample), its
 // directional albedo for light from all around. A layer leaves to those below what it does not reflect:
 //   1 − F(V·H) by the half vector, for lobes of single scattering;
 //   1 − its albedo at the viewer's angle for `ggx-multi`, so that no surface sends more than it receives;
@@ -257,8 +257,8 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
 }
 
 // For light from behind a rough surface. A sheet scatters as its mirror image does, to the other side. Between two media the half
-// vector that bends v into l is along n₁v + n₂l, and dω_h = n₂² |l·h| / (n₁ v·h + n₂ l·h)² dω_l (Walter et al. 2007); radiance is told
-// over the square of the index here, so that n₂² falls out of the BSDF alone.
+// vector that bends v into l is along n₁v + n₂l, and dω_h = n₂² |l·h| / (n₁ v·h + n₂ l·h)² dω_l (Walter et al. 2007); radiance is divided
+// by the square of the index here, so that n₂² falls out of the BSDF alone.
 BsdfEval evaluate_transmission(Layers b, vec3 l) {
     Surface s = b.s;
     float cos_l = dot(s.n, l);

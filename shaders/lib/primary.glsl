@@ -87,7 +87,7 @@ Primary primary_surface(ivec2 pixel, bool exact_normals) {
             }
         }
     }
-    // The boundaries of bodies are told between two media (lib/boundary.glsl).
+    // The boundaries of bodies lie between two media (lib/boundary.glsl).
     if (IN_MEDIUM && m.transmission == 0.0) seen_from(s, index_of(present_medium(s.media)));
     r.hit.s = s;
     r.hit.n = s.n_triangle;

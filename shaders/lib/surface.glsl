@@ -119,7 +119,7 @@ Surface surface_from_texels(Material m, vec3 base, float metallic, float roughne
 }
 
 // The same surface in a medium of index n_outside on the viewer's side: what it reflects is a matter of relative indices. A metal
-// that is told by a colour alone has no index, and keeps it.
+// that is given by a colour alone has no index, and keeps it.
 //
 // Where nothing changes every value is selected as it was: a quotient of equal numbers need not be 1 on a device, nor a mixture made
 // once more have the same last bit, and both plans of a scene have to agree.

@@ -163,7 +163,7 @@ pub fn diffuse_brdf(enters: f64) -> f64 {
     enters / PI
 }
 
-/// @eq B5: cos^shine of an angle that is told by its cosine and its sin²: by the latter below 45°, where it has the digits.
+/// @eq B5: cos^shine of an angle given by its cosine and its sin²: by the latter below 45°, where it has the digits.
 #[must_use]
 pub fn phong_lobe(cos_h: f64, sin2_h: f64, shine: f64) -> f64 {
     match (cos_h > 0.0, sin2_h < 0.5) {

@@ -1,5 +1,5 @@
 //! What all programs of a renderer share: the descriptor set of the scene, and the specialization constants of
-//! `shaders/lib/`. Each is told here, once.
+//! `shaders/lib/`. Both are filled in here and nowhere else.
 
 use std::sync::Arc;
 
