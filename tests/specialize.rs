@@ -4,7 +4,7 @@
 #[path = "support/gpu.rs"]
 mod gpu;
 
-use etalon::gpu::specialized;
+use etalon::gpu::{specialized, with_loops_counted};
 use etalon::shader::PROGRAMS;
 use gpu::Gpu;
 use spirv::Op;
@@ -67,6 +67,10 @@ fn what_is_left_is_valid_whatever_the_constants_are() {
             gpu.device.try_module(&left).expect("a module");
             assert!(gpu.errors().is_empty(), "{told:?}: {:?}", gpu.errors());
             assert_eq!(specialized(&left, &[]), left, "{told:?}: a second time there is nothing to do");
+            for counts in [false, true] {
+                gpu.device.try_module(&with_loops_counted(&left, counts)).expect("a module");
+                assert!(gpu.errors().is_empty(), "loops counted {counts}: {told:?}: {:?}", gpu.errors());
+            }
         }
     }
 }
@@ -148,4 +152,23 @@ fn a_loop_that_never_goes_on_stays_a_loop() {
         assert_eq!(instructions(&left).iter().filter(|one| op(one) == Op::LoopMerge).count(), 1);
     }
     assert!(gpu.errors().is_empty(), "{:?}", gpu.errors());
+}
+
+#[test]
+fn every_loop_counts_where_the_count_is_read() {
+    let mut counted_programs = 0;
+    for stage in PROGRAMS.iter().flat_map(|program| program.stages.iter()) {
+        let loops = |words: &[u32]| instructions(words).iter().filter(|one| op(one) == Op::LoopMerge).count();
+        let stores_before_loops = |words: &[u32]| {
+            let all = instructions(words);
+            all.windows(2).filter(|pair| op(pair[0]) == Op::Store && op(pair[1]) == Op::LoopMerge).count()
+        };
+        let counted = with_loops_counted(stage.words, true);
+        let reads = counted != with_loops_counted(stage.words, false);
+        let added = stores_before_loops(&counted) - stores_before_loops(stage.words);
+        assert_eq!(added, if reads { loops(stage.words) } else { 0 });
+        counted_programs += usize::from(reads);
+    }
+    // Lighting, reflection and refraction, see-through surfaces, paths.
+    assert!(counted_programs >= 4, "{counted_programs}");
 }

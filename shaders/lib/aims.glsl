@@ -55,7 +55,6 @@ vec3 aimed_direction(Aims at, vec3 p, vec2 u) {
     float first = 0.0;
     float before = cone.share;
     for (uint i = 1; i < at.count; i++) {
-        loop_heads++;
         Cone next = cone_to(at, i, p);
         bool reached = u.x >= before;
         first = reached ? before : first;
@@ -73,7 +72,6 @@ vec3 aimed_direction(Aims at, vec3 p, vec2 u) {
 float aimed_pdf(Aims at, vec3 p, vec3 direction) {
     float sum = 0.0;
     for (uint i = 0; i < at.count; i++) {
-        loop_heads++;
         Cone cone = cone_to(at, i, p);
         // 1 − cosine as half the square of a difference, which does not cancel.
         vec3 beside = direction - cone.axis;

@@ -31,7 +31,6 @@ void cross_what_touches(inout Boundary r, HitSurface hit, vec3 direction) {
     Hit last = FROM_ORIGIN;
     bool goes_on = r.solid;
     do {
-        loop_heads++;
         last = trace(origin, direction, hit.s.face, last, goes_on ? end : -1.0, OPAQUE | FILTER, false);
         goes_on = goes_on && last.triangle != NO_TRIANGLE;
         if (goes_on) {

@@ -50,7 +50,6 @@ float probability_of_share(uint first, uint next) {
 uint share_of_sky(uint base, uint count, uint word) {
     uint found = 0;
     for (uint step = SKY_STEPS; step > 0; step--) {
-        loop_heads++;
         uint next = found + (1u << (step - 1));
         uint first = sky_shares[base + min(next, count - 1)];
         found = next < count && first <= word ? next : found;
@@ -137,7 +136,6 @@ LightSample sample_light(vec3 origin, uvec2 words) {
     LightSample r = LightSample(vec3(0.0, 1.0, 0.0), -1.0, vec3(0.0), 0.0);
     uint found = 0;
     for (uint step = EMITTER_STEPS; step > 0; step--) {
-        loop_heads++;
         uint next = found + (1u << (step - 1));
         uint first = imageLoad(emitters, int(min(next, EMITTERS - 1))).x;
         found = next < EMITTERS && first <= words.x ? next : found;

@@ -58,12 +58,9 @@ vec3 punctual_light(Layers b, ivec2 pixel, uint tiles_across, LightRange range) 
     uint word = range.first_word;
     uint bits = TILE_WORDS > 0 && word < range.end_word ? tile_lights[tile + int(word)] : 0u;
     while (true) {
-        loop_heads++;
         bool listed = next >= range.end;
         if (TILE_WORDS > 0) {
-            loop_heads++;
             while (listed && bits == 0 && word + 1 < range.end_word) {
-                loop_heads++;
                 word++;
                 bits = tile_lights[tile + int(word)];
             }

@@ -84,7 +84,6 @@ vec3 light_that_arrives(LightTask task) {
     uvec4 media = task.media;
     vec3 result = through;
     do {
-        loop_heads++;
         Hit found = trace(task.origin, task.to_light, task.self, last, goes_on ? search_end(task) : -1.0, OPAQUE | FILTER, false);
         bool at_surface = goes_on && found.triangle != NO_TRIANGLE;
         uint medium = present_medium(media);
@@ -204,7 +203,6 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, bool there, out LightTask task) 
     PathEval towards_light = PathEval(vec3(0.0), 0.0, 0.0);
     PathEval on_path = PathEval(vec3(0.0), 0.0, 0.0);
     for (int i = 0; i < 2; i++) {
-        loop_heads++;
         PathEval now = bsdf_evaluate(bsdf, i == 0 ? along : drawn.direction);
         if (i == 0) towards_light = now;
         on_path = now;
@@ -215,7 +213,6 @@ vec3 meet(inout Path p, Hit found, uvec2 pixel, bool there, out LightTask task) 
     if (LIGHT_PLACES > 1) {
         // The others are looked for here, one after the other.
         for (uint i = 1; i < LIGHT_PLACES; i++) {
-            loop_heads++;
             LightSample other = sample_light(front_origin, draw_words_of(pixel, met_before, DRAW_LIGHT, i, LIGHT_PLACES));
             if (EMITTING_SKY && other.pdf > 0.0 && other.t_max == LARGEST) {
                 bool hidden = (p.state & PATH_CLEAR) != 0 && !SKY && dot(hit.n, other.to_light) < 0.0;
@@ -283,7 +280,6 @@ void bounce(inout Path a, inout Path b, uvec2 pixel_a, uvec2 pixel_b) {
     vec3 gathered_b = vec3(0.0);
     LightTask of_a, of_b;
     for (int i = 0; i < 2; i++) {
-        loop_heads++;
         Path p = a;
         Hit hit = found.a;
         uvec2 pixel = pixel_a;
@@ -314,7 +310,6 @@ void bounce(inout Path a, inout Path b, uvec2 pixel_a, uvec2 pixel_b) {
         vec3 arrives_b = vec3(of_b.t_max > 0.0 ? 1.0 : 0.0);
         if (FILTERS) {
             for (int i = 0; i < 2; i++) {
-                loop_heads++;
                 LightTask task = of_a;
                 if (i == 1) task = of_b;
                 vec3 arrives = light_that_arrives(task);

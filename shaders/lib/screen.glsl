@@ -50,7 +50,6 @@ int met_on_screen(vec3 p_rel, vec3 direction) {
     int met = -1;
     float i = 1.0;
     while (i <= last && !ends) {
-        loop_heads++;
         vec3 at = start + by * i;
         vec2 place = (at.xy + 1.0) * half_size;
         ivec2 pixel = clamp(ivec2(floor(place)), ivec2(0), ivec2(camera.size) - 1);

@@ -172,14 +172,12 @@ vec3 visibility(vec3 p, vec3 n, vec3 v, uint self, uvec4 media, vec3 to_light, f
     Hit last = FROM_ORIGIN;
     bool goes_on = wanted;
     do {
-        loop_heads++;
         Filters filters;
         bool blocked = trace_to_light(origin, to_light, self, last, goes_on ? end : -1.0, filters);
         through = blocked ? vec3(0.0) : through;
         goes_on = goes_on && !blocked && filters.triangles.w != NO_TRIANGLE;
         bool found = !blocked && filters.triangles.x != NO_TRIANGLE;
         do {
-            loop_heads++;
             if (found) {
                 Hit hit = hit_again(origin, to_light, filters.t.x, filters.triangles.x);
                 uint medium = present_medium(media);

@@ -69,7 +69,6 @@ vec3 mean_sigma(uint at, vec3 p, vec3 direction, float d) {
     vec3 sum = vec3(0.0);
     vec3 rest = vec3(0.0);
     for (uint i = 0u; i < steps; i += 4u) {
-        loop_heads++;
         vec4 n = float(i) + vec4(0.0, 1.0, 2.0, 3.0);
         if (w.x != 0.0) {
             add_sigma(sum, rest, w.x * sigma_at(grid, start + stride * n.x));
@@ -84,7 +83,6 @@ vec3 mean_sigma(uint at, vec3 p, vec3 direction, float d) {
             add_sigma(sum, rest, w.y * sigma_at(grid, start + stride * (n.w + 0.5)));
         }
     }
-    loop_heads++;
     if (w.z != 0.0) {
         add_sigma(sum, rest, w.z * sigma_at(grid, start + stride * float(steps)));
         add_sigma(sum, rest, -w.z * sigma_at(grid, start));

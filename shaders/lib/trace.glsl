@@ -196,7 +196,6 @@ Hit walk_links(TriangleRay r, vec3 direction, float t_max, uint classes, uint pu
     // lavapipe goes through a loop's body at least once and through both sides of each branch in it: a fixed number of
     // nodes, then one triangle, and one way out at the end.
     do {
-        loop_heads++;
         visit(w, b, r.after);
         visit(w, b, r.after);
         visit(w, b, r.after);
@@ -223,7 +222,6 @@ HitPair walk_links_twice(TriangleRay ra, vec3 da, float ta, TriangleRay rb, vec3
     Walk a = Walk(ta > 0.0 ? 0 : ba.end, 0, Hit(ta, NO_TRIANGLE, 0.0, 0.0));
     Walk b = Walk(tb > 0.0 ? 0 : bb.end, 0, Hit(tb, NO_TRIANGLE, 0.0, 0.0));
     do {
-        loop_heads++;
         visit(a, ba, 0.0);
         visit(b, bb, 0.0);
         visit(a, ba, 0.0);
@@ -252,7 +250,6 @@ Hit walk_stack(TriangleRay r, vec3 direction, float t_max, uint classes, uint pu
     int stack[STACK_SIZE];
     int entries = 0;
     do {
-        loop_heads++;
         for (int i = 0; i < 2; i++) {
             // A leaf waits for its turn while another is being tested.
             bool at_leaf = w.node < 0;

@@ -54,9 +54,7 @@ void main() {
         uint best = END_OF_LIST;
         uvec3 best_key = uvec3(0);
         uint before = loop_heads;
-        loop_heads += 2;
         for (uint node = head; node != END_OF_LIST; node = nodes[node * NODE_WORDS]) {
-            loop_heads++;
             uint at = node * NODE_WORDS;
             uvec3 key = uvec3(nodes[at + 1], nodes[at + 2], nodes[at + 3]);
             if (after(key, last) && !after(key, best_key)) {

@@ -79,7 +79,6 @@ void look(vec3 direction, vec3 throughput) {
 // All looks so far, in one place: a sampled image is a call that spills every register.
 void see_environment() {
     do {
-        loop_heads++;
         vec3 seen = ENVIRONMENT ? environment_radiance(looks_at[0]) : vec3(0.0);
         sum += looks > 0 ? looks_with[0] * seen : vec3(0.0);
         for (int i = 0; i < MOST_LOOKS - 1; i++) {
@@ -109,7 +108,6 @@ void send(Branch branch) {
 // The branch to follow: the last one sent, or else the last one that waits.
 Branch next_branch() {
     do {
-        loop_heads++;
         bool waits = sent_now > 1;
         Branch oldest = sent[1];
         for (int i = 2; i < MOST_SENT; i++) {
@@ -219,7 +217,6 @@ void main() {
     split(hit, boundary, ray, cone, uvec2(pixel));
     bool more = sent_now > 0;
     do {
-        loop_heads++;
         bool goes_on = more;
         ray = next_branch();
         if (FIRST_EVENT != 0) first_event = ray.events >> 10;
@@ -229,7 +226,6 @@ void main() {
         bool at_surface;
         bool hole;
         do {
-            loop_heads++;
             found = trace(ray.origin, ray.direction, ray.self, found, goes_on ? LARGEST : -1.0, OPAQUE | FILTER, false);
             at_surface = goes_on && found.triangle != NO_TRIANGLE;
             if (at_surface) point = hit_point_of(found, ray.origin, ray.direction);

@@ -27,7 +27,6 @@ void main() {
     // are through has assigned.
     bool more;
     do {
-        loop_heads++;
         more = ((a.state | b.state) & PATH_ALIVE) != 0 && loop_heads < LOOP_BUDGET;
         bounce(a, b, pixel_a, pixel_b);
     } while (more);

@@ -11,6 +11,7 @@ mod cache;
 mod device;
 mod frame;
 mod limits;
+mod loops;
 mod memory;
 mod pipeline;
 mod present;
@@ -29,6 +30,7 @@ pub use device::{
     Candidate, Created, Device, DeviceChoice, DeviceInfo, Interrupted, Message, Severity, candidates, is_lost,
 };
 pub use frame::{ColorTarget, DepthTarget, Draw, Frame, PassPlan, PassTime, Raster, VertexStream};
+pub use loops::with_loops_counted;
 pub use memory::{Buffer, Image, ImageDesc, NOTHING, Place};
 pub use present::{Overlay, Placed, Presented, Presenter};
 pub use set::{BoundSet, DescriptorSet};

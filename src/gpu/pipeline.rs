@@ -10,6 +10,7 @@ use ash::vk;
 use super::cache::{Layout, PipelineKey, SamplerDesc};
 use super::device::{Device, lock};
 use super::shader::{Binding, Program, Replacement, SetLayout};
+use super::loops::with_loops_counted;
 use super::specialize::specialized;
 
 /// Pipelines, some of which are still being made.
@@ -219,6 +220,7 @@ impl Device {
         for (index, stage) in program.stages.iter().enumerate() {
             let replaced = lock(&self.caches).replaced.get(&(program.name, index)).cloned();
             let words = specialized(replaced.as_deref().unwrap_or(stage.words), &key.constants);
+            let words = with_loops_counted(&words, self.limits_loops());
             let info = vk::ShaderModuleCreateInfo::default().code(&words);
             // SAFETY: the words come from glslang.
             let module = unsafe { self.raw.create_shader_module(&info, None) }?;

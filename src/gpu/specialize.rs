@@ -12,19 +12,19 @@ use std::ops::Range;
 use spirv::Op;
 
 /// Words before the first instruction.
-const HEADER: usize = 5;
+pub(super) const HEADER: usize = 5;
 /// Of the header, the word that all ids are below.
-const BOUND: usize = 3;
+pub(super) const BOUND: usize = 3;
 
 /// An instruction: its place among the words.
 type Place = Range<usize>;
 
-fn op(words: &[u32], at: &Place) -> Option<Op> {
+pub(super) fn op(words: &[u32], at: &Place) -> Option<Op> {
     Op::from_u32(words[at.start] & 0xffff)
 }
 
 /// The instructions from a word on.
-fn instructions(words: &[u32], first: usize) -> Vec<Place> {
+pub(super) fn instructions(words: &[u32], first: usize) -> Vec<Place> {
     let mut places = Vec::with_capacity(words.len() / 4);
     let mut at = first;
     while at < words.len() {

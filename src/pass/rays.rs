@@ -34,9 +34,6 @@ const OFFSET_ROUNDINGS: f64 = 32.0;
 /// 16 bytes: they are as many copies of the tree.
 const MOST_ORDERED_BYTES: usize = 256 << 20;
 
-/// Loop heads that one invocation of the tree of rays may evaluate where the driver limits them.
-pub const LOOP_BUDGET: u32 = 40_000;
-
 /// How the hierarchy is gone through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::Result;
 
 use super::environment::EnvironmentOnDevice;
-use super::rays::{LOOP_BUDGET, RaysOnDevice};
+use super::rays::RaysOnDevice;
 use super::scene::SceneOnDevice;
 use super::shadow_map::ShadowMaps;
 use super::tiles::Tiles;
@@ -119,8 +119,9 @@ impl<'a> OnDevice<'a> {
                 reflection: plan.reflection,
                 light_budget: u32::MAX,
             },
-            loops: lib::loops::Constants {
-                loop_budget: if scene.device().limits_loops() { LOOP_BUDGET } else { u32::MAX },
+            loops: match scene.device().limits_loops() {
+                true => lib::loops::Constants::default(),
+                false => lib::loops::Constants { loop_budget: u32::MAX },
             },
             path: lib::path::Constants { lighting_surfaces: paths.emitting, light_places: knobs.light_places() },
             path_state: lib::path_state::Constants {
