@@ -147,7 +147,8 @@ impl<'p> Programs<'p> {
             );
             groups.push((file.stem.clone(), file.about.clone()));
         }
-        for (set, name) in SETS.iter().zip(["Bind", "Scene", "Pages"]) {
+        // Pages go by the names of their textures: `PAGES` has all of them.
+        for (set, name) in SETS.iter().zip(["Bind", "Scene"]) {
             let mut names: Vec<&str> = Vec::new();
             for d in file.declarations.iter().filter(|d| d.kind == *set && !d.name.contains("_as_")) {
                 names.push(&d.name);

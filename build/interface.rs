@@ -14,6 +14,8 @@
 //! // @texels Material material_at(material_words)        material_words(uint index, int texel) fetches a uvec4
 //! ```
 //!
+//! A page is a texture of a material, and its slot there: SLOT_BASE is the number of `base_page`. `// @pages SLOTS` counts them.
+//!
 //! A declaration stands on one line. Constants, and bindings of the sets `scene` and `pages`, have one number in all programs, and
 //! one file that declares them. Bindings of a pass are numbered from 0 in each program.
 
@@ -25,6 +27,9 @@ use super::compile::{Result, files, stem};
 
 /// The kinds of descriptor sets, in the order of their numbers.
 pub(crate) const SETS: [&str; 3] = ["pass", "scene", "pages"];
+
+/// The tag of the line that becomes the number of pages.
+const PAGE_COUNT: &str = "// @pages ";
 
 /// A constant that the host shares: `const uint NAME = 3;`.
 pub(crate) struct Shared {
@@ -54,6 +59,8 @@ pub(crate) struct File {
     pub(crate) about: String,
     pub(crate) declarations: Vec<Declaration>,
     pub(crate) shared: Vec<Shared>,
+    /// The constant that counts the pages, where it is this file's.
+    page_count: Option<String>,
 }
 
 /// What all files declare, with the numbers that hold in every program.
@@ -96,7 +103,13 @@ impl Interface {
                         return Err(format!("{place}: {name} is declared in {other} already"));
                     }
                     let numbers = if kind == "constant" { &mut all.constants } else { &mut all.slots };
-                    numbers.insert(base(name).to_owned(), 0);
+                    let known = numbers.insert(base(name).to_owned(), 0);
+                    let of_other_set = SETS[1..]
+                        .iter()
+                        .any(|set| set != kind && owners.contains_key(&format!("{set} {}", base(name))));
+                    if known.is_some() && of_other_set {
+                        return Err(format!("{place}: {name} is the name of a binding in another set"));
+                    }
                 }
                 all.files.push(file);
             }
@@ -109,6 +122,23 @@ impl Interface {
             for (number, (_, slot)) in all.slots.iter_mut().filter(|(name, _)| of_set(name)).enumerate() {
                 *slot = number as u32;
             }
+        }
+        let pages = all.files.iter().flat_map(|file| &file.declarations).filter(|d| d.kind == "pages").count();
+        for file in &mut all.files {
+            let counts = file.page_count.iter();
+            file.shared.extend(counts.map(|name| Shared {
+                name: name.clone(),
+                ty: "u32",
+                value: pages.to_string(),
+                about: "Textures that a material may have.".to_owned(),
+            }));
+            let pages = file.declarations.iter().filter(|d| d.kind == "pages");
+            let slots = pages.map(|d| (page_slot(&d.name), all.slots[&d.name], &d.about));
+            let constants = slots.map(|(name, slot, about)| {
+                let about = if about.is_empty() { format!("Slot of a texture: `{name}`.") } else { about.clone() };
+                Shared { name, ty: "u32", value: slot.to_string(), about }
+            });
+            file.shared.extend(constants.collect::<Vec<_>>());
         }
         Ok(all)
     }
@@ -171,6 +201,11 @@ impl Interface {
                 out.push('\n');
                 continue;
             }
+            if let Some(name) = line.strip_prefix(PAGE_COUNT) {
+                let pages = self.files.iter().flat_map(|file| &file.declarations).filter(|d| d.kind == "pages");
+                out += &format!("const uint {name} = {};\n", pages.count());
+                continue;
+            }
             match declaration(line) {
                 Some(Declaration { kind, name, .. }) if kind == "constant" => {
                     let (_, rest) = line.split_once(") ").unwrap_or_default();
@@ -189,6 +224,9 @@ impl Interface {
                     let slot = if set == 0 { own() } else { shared() };
                     let slot = slot.ok_or_else(|| format!("{name}: a binding that nobody has numbered"))?;
                     let layout = format!("layout({kind}");
+                    if kind == "pages" {
+                        out += &format!("const uint {} = {slot}; ", page_slot(&name));
+                    }
                     out += &line.replacen(&layout, &format!("layout(set = {set}, binding = {slot}"), 1);
                 }
                 None => out += line,
@@ -254,6 +292,11 @@ fn structs(text: &str) -> BTreeMap<String, Vec<(String, String)>> {
     all
 }
 
+/// The constant of a page: `SLOT_BASE` of `base_page`.
+fn page_slot(name: &str) -> String {
+    format!("SLOT_{}", name.trim_end_matches("_page").to_uppercase())
+}
+
 /// NAME_as_FORMAT is the binding NAME, read in another format.
 fn base(name: &str) -> &str {
     name.split_once("_as_").map_or(name, |(of, _)| of)
@@ -261,7 +304,8 @@ fn base(name: &str) -> &str {
 
 fn file(path: &Path, folder: &'static str, text: &str) -> Result<File> {
     let about = text.lines().next().unwrap_or_default().trim_start_matches('/').trim().to_owned();
-    let mut file = File { stem: stem(path), folder, about, declarations: Vec::new(), shared: Vec::new() };
+    let page_count = text.lines().find_map(|line| line.strip_prefix(PAGE_COUNT)).map(str::to_owned);
+    let mut file = File { stem: stem(path), folder, about, declarations: Vec::new(), shared: Vec::new(), page_count };
     for (number, line) in text.lines().enumerate() {
         if ["set =", "binding =", "constant_id"].iter().any(|word| line.starts_with("layout(") && line.contains(word)) {
             return Err(format!(

@@ -87,23 +87,6 @@ vec3 linear_from_srgb(vec3 x) {
     return mix(t * t * p, x / 12.92, lessThanEqual(x, vec3(0.04045)));
 }
 
-// Clear-coat strength and roughness as the two bytes of one 16-bit number, specular strength, and the coat's normal:
-// for four unorm16 components.
-vec4 packed_layers(vec3 coat_roughness_specular, vec3 n_coat) {
-    vec2 bytes = floor(clamp(coat_roughness_specular.xy, 0.0, 1.0) * 255.0 + 0.5);
-    float both = (bytes.x * 256.0 + bytes.y) * (1.0 / 65535.0);
-    return vec4(both, coat_roughness_specular.z, octahedral_from_unit(n_coat) * 0.5 + 0.5);
-}
-
-vec3 layers_from_packed(vec4 packed_value) {
-    uint both = uint(packed_value.x * 65535.0 + 0.5);
-    return vec3(vec2(both >> 8, both & 255u) * (1.0 / 255.0), packed_value.y);
-}
-
-vec3 coat_normal_from_packed(vec4 packed_value) {
-    return unit_from_octahedral(packed_value.zw * 2.0 - 1.0);
-}
-
 // @eq N10: u = 1/2 + φ/2π, v = 1/2 − elevation/π; φ = atan2(d_z, d_x), elevation = atan2(d_y, √(d_x² + d_z²))
 // @out uv
 // Equirectangular coordinates of a direction (README, "Conventions"): u to the right, v down from the top. The

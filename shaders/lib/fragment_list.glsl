@@ -4,11 +4,10 @@
 #ifndef FRAGMENT_LIST_GLSL
 #define FRAGMENT_LIST_GLSL
 
-const uint NODE_WORDS = 13;
+const uint NODE_WORDS = 15;
 const uint END_OF_LIST = 0xffffffffu;
 // Layout of a node, in words:
 //   0 next   1 depth (bits)   2 instance   3 primitive   4 material | roughness << 16
 //   5 base.rg   6 base.b, metallic   7 normal, octahedral   8 emissive.rg   9 emissive.b, alpha   (halves, snorms)
-//   10 clearcoat, its roughness, specular, transmission (bytes)   11 occlusion, thickness (16 bits each)
-//   12 normal of the clear coat, octahedral
+//   10 occlusion (16 bits)   11 to 14 packed_layers (lib/texels.glsl)
 #endif

@@ -23,8 +23,8 @@ layout(pass, rgba16_snorm) readonly uniform image2D normals;
 layout(pass, rgba8_snorm) readonly uniform image2D normals_as_rgba8_snorm;
 layout(pass, rgba32f) readonly uniform image2D normals_as_rgba32f;
 layout(pass, rg32ui) readonly uniform uimage2D ids; // material | roughness << 16, instance | back face << 23 | occlusion << 24
-layout(pass, rgba16f) readonly uniform image2D emissive; // texel, and the transmission texel
-layout(pass, rgba16) readonly uniform image2D layers;    // lib/encode.glsl, packed_layers
+layout(pass, rgba16f) readonly uniform image2D emissive; // texel
+layout(pass, rgba32ui) readonly uniform uimage2D layers; // lib/texels.glsl, packed_layers
 layout(pass, r32ui) readonly uniform uimage2D triangles; // of the scene
 
 const uint NORMALS_OCT16 = 0;

@@ -3,16 +3,14 @@
 #define HIT_GLSL
 #include "lib/bent_normal.glsl"
 #include "lib/encode.glsl"
-#include "lib/slots.glsl"
 #include "lib/surface.glsl"
 #include "lib/trace.glsl"
 
-// Bit i: some material that rays may hit has a texture in slot i; bit 11: some mesh has colours; bit 12: some texture
-// reads the second coordinates.
+// Bit by slot: some material that rays may hit has such a texture.
 layout(constant) const uint HIT_TEXTURES = 0;
-const bool HIT_COLORS = (HIT_TEXTURES & (1u << 11)) != 0;
-const bool HIT_UVS = (HIT_TEXTURES & 0x7ffu) != 0;
-const bool HIT_SECOND_UVS = (HIT_TEXTURES & (1u << 12)) != 0;
+layout(constant) const bool HIT_COLORS = false;     // some mesh has colours
+layout(constant) const bool HIT_SECOND_UVS = false; // some texture reads the second coordinates
+const bool HIT_UVS = HIT_TEXTURES != 0;
 const bool HIT_TANGENTS = (HIT_TEXTURES & (1u << SLOT_NORMAL | 1u << SLOT_CLEARCOAT_NORMAL)) != 0;
 
 // What lies at the corners of the triangles, in world axes, in the order of the leaves. Three texels per triangle:
@@ -213,6 +211,8 @@ struct HitSurface {
     vec3 sigma_thickness;
 };
 
+#define TEXEL(page, slot) hit_texture_or(id, slot, point.uvs, footprint, vec4(1.0))
+
 // The surface as seen along `direction`, by a ray that is as wide as `width` there.
 HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
     HitSurface r;
@@ -220,15 +220,10 @@ HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
     Material m = material_at(id);
     float cos_v = abs(dot(point.n, direction));
     float footprint = width * point.uv_per_metre / max(cos_v, 0.05);
-    vec4 base = point.color * hit_texture_or(id, SLOT_BASE, point.uvs, footprint, vec4(1.0));
-    vec4 metallic_roughness = hit_texture_or(id, SLOT_METALLIC_ROUGHNESS, point.uvs, footprint, vec4(1.0));
-    float occlusion = hit_texture_or(id, SLOT_OCCLUSION, point.uvs, footprint, vec4(1.0)).r;
-    vec3 glow = hit_texture_or(id, SLOT_EMISSIVE, point.uvs, footprint, vec4(1.0)).rgb;
-    vec3 layers = vec3(hit_texture_or(id, SLOT_CLEARCOAT, point.uvs, footprint, vec4(1.0)).r,
-                       hit_texture_or(id, SLOT_CLEARCOAT_ROUGHNESS, point.uvs, footprint, vec4(1.0)).g,
-                       hit_texture_or(id, SLOT_SPECULAR, point.uvs, footprint, vec4(1.0)).a);
-    r.transmits = m.transmission * hit_texture_or(id, SLOT_TRANSMISSION, point.uvs, footprint, vec4(1.0)).r;
-    r.thickness = point.scale * hit_texture_or(id, SLOT_THICKNESS, point.uvs, footprint, vec4(1.0)).g;
+    Texels t = texels_of_nothing(point.color);
+    READ_TEXELS(t)
+    r.transmits = m.transmission * t.transmission;
+    r.thickness = point.scale * t.thickness;
     vec3 n = point.n_smooth;
     vec3 n_coat = n;
     if ((HIT_TEXTURES & (1u << SLOT_NORMAL)) != 0) {
@@ -244,14 +239,13 @@ HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
     r.front = dot(point.n, direction) <= 0.0;
     float side = r.front ? 1.0 : -1.0;
     r.n = side * point.n;
-    r.coverage = coverage_of(m, base.a);
+    r.coverage = coverage_of(m, t.base.a);
     r.sheet = point.sheet;
     r.material = id;
     r.transmission = m.transmission;
     r.medium = m.medium;
     r.sigma_thickness = m.sigma_thickness;
-    r.s = surface_from_texels(m, base.rgb, metallic_roughness.b, metallic_roughness.g, occlusion, glow, layers,
-                              side * n, side * n_coat, -direction, point.p - trace_terms.bvh_from_rel);
+    r.s = surface_from_texels(m, t, side * n, side * n_coat, -direction, point.p - trace_terms.bvh_from_rel);
     r.s.p_bvh = point.p;
     r.s.n_triangle = r.n;
     r.s.face = point.face;

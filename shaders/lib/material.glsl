@@ -2,10 +2,10 @@
 // eight. Words as in share/scene.glsl.
 #ifndef MATERIAL_GLSL
 #define MATERIAL_GLSL
-#include "lib/slots.glsl"
 #include "share/scene.glsl"
 
 layout(scene, rgba32ui) readonly uniform uimageBuffer material_texels;
+// @pages SLOTS
 // Of the struct Material; then, slot by slot, those of its textures: row of u, layer | row of v, coordinate set | for rays: first texel,
 // width and height, levels and flags (lib/hit.glsl).
 const int MATERIAL_SLOTS_AT = 9;
@@ -41,6 +41,13 @@ TextureSlot texture_slot(uint material, uint slot) {
 vec2 slot_coordinates(TextureSlot at, vec4 uv_sets) {
     vec3 set = vec3(at.second_set ? uv_sets.zw : uv_sets.xy, 1.0);
     return vec2(dot(at.u_row, set), dot(at.v_row, set));
+}
+
+// Where a texture is read of its page: coordinates and layer. The array index is the rounded third coordinate; a layer never bleeds
+// into the next.
+vec3 page_coordinates(uint material, uint slot, vec4 uv_sets) {
+    TextureSlot at = texture_slot(material, slot);
+    return vec3(slot_coordinates(at, uv_sets), at.layer);
 }
 
 vec3 material_emissive(uint id) {

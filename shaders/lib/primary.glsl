@@ -52,22 +52,18 @@ Primary primary_surface(ivec2 pixel, bool exact_normals) {
     uvec2 id = imageLoad(ids, pixel).xy;
     uint material = r.drawn ? id.x & 0xffffu : 0u;
     vec4 texel = imageLoad(base, pixel);
-    vec4 glow = STORED_EMISSIVE || STORED_TRANSMISSION ? imageLoad(emissive, pixel) : vec4(1.0);
     vec4 octahedral = stored_normals(pixel);
     vec3 n = unit_from_octahedral(octahedral.xy);
-    vec3 layer = vec3(1.0);
+    Texels t = texels_of_nothing(vec4(texel.rgb, 1.0));
+    t.metallic = texel.a;
+    t.roughness = float(id.x >> 16) * (1.0 / 65535.0);
+    t.occlusion = float(id.y >> 24) * (1.0 / 255.0);
+    if (STORED_EMISSIVE) t.emissive = imageLoad(emissive, pixel).rgb;
     vec3 n_coat = n;
-    if (STORED_LAYERS) {
-        vec4 packed_value = imageLoad(layers, pixel);
-        layer = layers_from_packed(packed_value);
-        n_coat = coat_normal_from_packed(packed_value);
-    }
-    float roughness = float(id.x >> 16) * (1.0 / 65535.0);
-    float occlusion = float(id.y >> 24) * (1.0 / 255.0);
+    if (STORED_LAYERS) unpack_layers(imageLoad(layers, pixel), t, n_coat);
     Material m = material_at(material);
     vec3 p_rel = POSITIONS && r.drawn ? stored_position(pixel_index(pixel)) : rel_from_pixel(camera, pixel, r.drawn ? z : 1.0);
-    Surface s = surface_from_texels(m, texel.rgb, texel.a, roughness, occlusion, STORED_EMISSIVE ? glow.rgb : vec3(1.0), layer, n, n_coat,
-                                    -view_direction(camera, pixel), p_rel);
+    Surface s = surface_from_texels(m, t, n, n_coat, -view_direction(camera, pixel), p_rel);
     vec3 p_bvh = p_rel + trace_terms.bvh_from_rel;
     s.p_bvh = p_bvh;
     s.n_triangle = unit_from_octahedral(octahedral.zw);
@@ -93,11 +89,10 @@ Primary primary_surface(ivec2 pixel, bool exact_normals) {
     r.hit.n = s.n_triangle;
     r.hit.front = (id.y & BACK_FACE) == 0;
     r.hit.coverage = 1.0;
-    // The emissive target's fourth component is how much the texture lets through.
-    r.hit.transmits = STORED_TRANSMISSION ? m.transmission * glow.a : 0.0;
+    r.hit.transmits = STORED_TRANSMISSION ? m.transmission * t.transmission : 0.0;
     uint instance = r.drawn ? id.y & INSTANCE_BITS : 0u;
     r.hit.sheet = (instances[instance].flags & INSTANCE_SHEET) != 0;
-    r.hit.thickness = instances[instance].scale;
+    r.hit.thickness = instances[instance].scale * t.thickness;
     r.hit.material = material;
     r.hit.transmission = m.transmission;
     r.hit.medium = m.medium;

@@ -4,6 +4,7 @@
 #include "lib/fresnel.glsl"
 #include "lib/material.glsl"
 #include "lib/spectrum.glsl"
+#include "lib/texels.glsl"
 
 // The knobs `brdf` and `fresnel` (src/plan/knobs.rs): one formula each, chosen when the pipeline is made.
 layout(constant) const uint BRDF = 2;
@@ -73,20 +74,19 @@ vec3 base_from_texel(Material m, vec3 varies) {
     return base;
 }
 
-Surface surface_from_texels(Material m, vec3 base, float metallic, float roughness, float occlusion, vec3 emissive,
-                            vec3 layers, vec3 n, vec3 n_coat, vec3 v, vec3 p_rel) {
+Surface surface_from_texels(Material m, Texels t, vec3 n, vec3 n_coat, vec3 v, vec3 p_rel) {
     Surface s;
     s.p_rel = p_rel;
     s.v = v;
     s.n = n;
     s.n_coat = n_coat;
     s.unlit = (m.flags & MATERIAL_UNLIT) != 0;
-    s.base = base_from_texel(m, base);
-    float metal = metallic * m.metallic;
+    s.base = base_from_texel(m, t.base.rgb);
+    float metal = t.metallic * m.metallic;
     s.diffuse = s.base * (1.0 - metal);
     s.metallic = metal;
-    s.f0_dielectric = m.f0 * layers.z;
-    s.f90_dielectric = m.f90 * layers.z;
+    s.f0_dielectric = m.f0 * t.specular;
+    s.f90_dielectric = m.f90 * t.specular;
     s.f0_metal = s.base;
     s.n_metal = vec3(0.0);
     s.kappa_metal = vec3(0.0);
@@ -101,13 +101,13 @@ Surface surface_from_texels(Material m, vec3 base, float metallic, float roughne
     s.ior = m.ior;
     s.n_outside = 1.0;
     s.compensation = vec3(1.0);
-    s.roughness = max(roughness * m.roughness, MIN_ROUGHNESS);
+    s.roughness = max(t.roughness * m.roughness, MIN_ROUGHNESS);
     s.alpha = s.roughness * s.roughness;
-    s.occlusion = 1.0 + m.occlusion_strength * (occlusion - 1.0);
-    s.emissive = emissive * m.emissive;
+    s.occlusion = 1.0 + m.occlusion_strength * (t.occlusion - 1.0);
+    s.emissive = t.emissive * m.emissive;
     if (SPECTRAL && (m.flags & MATERIAL_EMISSIVE_RGB) != 0) s.emissive = light_of_rgb(s.emissive);
-    s.clearcoat = layers.x * m.clearcoat;
-    s.clearcoat_roughness = max(layers.y * m.clearcoat_roughness, MIN_ROUGHNESS);
+    s.clearcoat = t.clearcoat * m.clearcoat;
+    s.clearcoat_roughness = max(t.clearcoat_roughness * m.clearcoat_roughness, MIN_ROUGHNESS);
     s.clearcoat_alpha = s.clearcoat_roughness * s.clearcoat_roughness;
     s.base_traced = MIRROR_RAYS && s.roughness <= ROUGHEST_MIRROR;
     s.coat_traced = MIRROR_RAYS && s.clearcoat_roughness <= ROUGHEST_MIRROR;

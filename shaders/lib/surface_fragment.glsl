@@ -4,7 +4,7 @@
 #define SURFACE_FRAGMENT_GLSL
 #include "lib/bent_normal.glsl"
 #include "lib/gbuffer_interface.glsl"
-#include "lib/pages.glsl"
+#include "lib/material.glsl"
 #include "lib/view.glsl"
 
 layout(location = 0) in vec3 p_rel;
@@ -17,45 +17,24 @@ layout(location = 5) flat in uvec3 ids;
 layout(push_constant, scalar) uniform Push { float lod_bias; uint strip; };
 
 struct SurfaceFragment {
-    vec4 base;          // texel times vertex colour; the constant factor is not in it
-    float metallic;     // texel
-    float roughness;    // texel
-    float occlusion;    // texel
-    vec3 emissive;      // texel
-    vec4 layers;        // texels: clearcoat, clearcoat roughness, specular, transmission
-    float thickness;    // texel
+    Texels texels;
     vec3 n_shading;     // unit, to the viewer's side of the face
     vec3 n_coat;        // unit: of the clear coat, which does not follow the base's normal texture
     vec3 n_geometric;   // unit, to the viewer
 };
 
-vec4 read(sampler2DArray page, uint slot) {
-    return texture(page, page_coordinates(ids.y, slot, uv), lod_bias);
+vec4 page_texel(sampler2DArray page, uint slot) {
+    vec4 texel = vec4(1.0);
+    if ((TEXTURES & (1u << slot)) != 0) texel = texture(page, page_coordinates(ids.y, slot, uv), lod_bias);
+    return texel;
 }
+#define TEXEL(page, slot) page_texel(page, slot)
 
 SurfaceFragment surface_fragment() {
     SurfaceFragment s;
     // Not the varying's constant: perspective interpolation makes 0.99999994 of 1, which a half rounds to 0.9995.
-    s.base = HAS_COLOR ? vertex_color : vec4(1.0);
-    if (HAS_BASE) s.base *= read(base_page, SLOT_BASE);
-    s.metallic = 1.0;
-    s.roughness = 1.0;
-    if (HAS_METALLIC_ROUGHNESS) {
-        vec4 texel = read(metallic_roughness_page, SLOT_METALLIC_ROUGHNESS);
-        s.roughness = texel.g;
-        s.metallic = texel.b;
-    }
-    s.occlusion = HAS_OCCLUSION ? read(occlusion_page, SLOT_OCCLUSION).r : 1.0;
-    s.emissive = HAS_EMISSIVE ? read(emissive_page, SLOT_EMISSIVE).rgb : vec3(1.0);
-    s.layers = vec4(1.0);
-    s.thickness = 1.0;
-    if (HAS_LAYERS) {
-        s.layers.x = read(clearcoat_page, SLOT_CLEARCOAT).r;
-        s.layers.y = read(clearcoat_roughness_page, SLOT_CLEARCOAT_ROUGHNESS).g;
-        s.layers.z = read(specular_page, SLOT_SPECULAR).a;
-        s.layers.w = read(transmission_page, SLOT_TRANSMISSION).r;
-        s.thickness = read(thickness_page, SLOT_THICKNESS).g;
-    }
+    s.texels = texels_of_nothing(HAS_COLOR ? vertex_color : vec4(1.0));
+    READ_TEXELS(s.texels)
 
     // The face's own normal from the positions of neighbouring fragments: they lie in the plane of the triangle.
     vec3 face = cross(dFdx(p_rel), dFdy(p_rel));
@@ -69,10 +48,10 @@ SurfaceFragment surface_fragment() {
     s.n_shading = n;
     s.n_coat = n;
     if (HAS_NORMAL) {
-        vec3 texel = read(normal_page, SLOT_NORMAL).xyz * 2.0 - 1.0;
+        vec3 texel = page_texel(normal_page, SLOT_NORMAL).xyz * 2.0 - 1.0;
         s.n_shading = bent_normal(n, t_rel, vec3(texel.xy * material_at(ids.y).normal_scale, texel.z));
     }
-    if (HAS_COAT_NORMAL) s.n_coat = bent_normal(n, t_rel, read(clearcoat_normal_page, SLOT_CLEARCOAT_NORMAL).xyz * 2.0 - 1.0);
+    if (HAS_COAT_NORMAL) s.n_coat = bent_normal(n, t_rel, page_texel(clearcoat_normal_page, SLOT_CLEARCOAT_NORMAL).xyz * 2.0 - 1.0);
     // From behind, the mapped normal is reversed as a whole (glTF 2.0 section 3.9.5, double sided).
     if (!gl_FrontFacing) {
         s.n_shading = -s.n_shading;

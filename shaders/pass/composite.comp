@@ -73,19 +73,20 @@ void main() {
         Material m = material_at(word & 0xffffu);
         vec2 blue_metal = unpackHalf2x16(nodes[at + 6]);
         vec2 blue_alpha = unpackHalf2x16(nodes[at + 9]);
-        vec4 layer = unpackUnorm4x8(nodes[at + 10]);
-        vec2 occlusion_thickness = unpackUnorm2x16(nodes[at + 11]);
-        vec3 base = vec3(unpackHalf2x16(nodes[at + 5]), blue_metal.x);
+        Texels t = texels_of_nothing(vec4(unpackHalf2x16(nodes[at + 5]), blue_metal.x, 1.0));
+        t.metallic = blue_metal.y;
+        t.roughness = float(word >> 16) * (1.0 / 65535.0);
+        t.occlusion = unpackUnorm2x16(nodes[at + 10]).x;
+        t.emissive = vec3(unpackHalf2x16(nodes[at + 8]), blue_alpha.x);
+        vec3 n_coat;
+        unpack_layers(uvec4(nodes[at + 11], nodes[at + 12], nodes[at + 13], nodes[at + 14]), t, n_coat);
         vec3 n = unit_from_octahedral(unpackSnorm2x16(nodes[at + 7]));
         vec3 p = rel_from_pixel(camera, pixel, uintBitsToFloat(nodes[at + 1]));
-        vec3 glow = vec3(unpackHalf2x16(nodes[at + 8]), blue_alpha.x);
-        Surface s = surface_from_texels(m, base, blue_metal.y, float(word >> 16) * (1.0 / 65535.0),
-                                        occlusion_thickness.x, glow, layer.rgb, n,
-                                        unit_from_octahedral(unpackSnorm2x16(nodes[at + 12])), -direction, p);
+        Surface s = surface_from_texels(m, t, n, n_coat, -direction, p);
         s.p_bvh = p + trace_terms.bvh_from_rel;
         s.media = trace_terms.camera_media;
-        float transmission = m.transmission * layer.a;
-        float scale = occlusion_thickness.y * instances[nodes[at + 2]].scale;
+        float transmission = m.transmission * t.transmission;
+        float scale = t.thickness * instances[nodes[at + 2]].scale;
         if (BENDS) {
             bool body = (instances[nodes[at + 2]].flags & INSTANCE_SHEET) == 0 && m.transmission > 0.0 &&
                         (m.flags & MATERIAL_BLENDED) == 0;

@@ -13,11 +13,12 @@ layout(pass, scalar) writeonly buffer Nodes { uint nodes[]; };
 
 void main() {
     SurfaceFragment s = surface_fragment();
+    Texels t = s.texels;
     Material m = material_at(ids.y);
-    float alpha = s.base.a * m.base_color.a;
+    float alpha = t.base.a * m.base_color.a;
     bool covers = (m.flags & MATERIAL_BLENDED) != 0;
     if (!covers) alpha = 1.0;
-    if (MASKED && s.base.a * m.base_color.a < m.alpha_cutoff) return;
+    if (MASKED && t.base.a * m.base_color.a < m.alpha_cutoff) return;
     // A fragment without coverage leaves no trace; NaN coverage must not vanish here, it is counted later.
     if (alpha <= 0.0) return;
     uint slot = atomicAdd(counters[strip], 1u);
@@ -28,13 +29,13 @@ void main() {
     nodes[at + 1] = floatBitsToUint(gl_FragCoord.z);
     nodes[at + 2] = ids.x;
     nodes[at + 3] = uint(gl_PrimitiveID);
-    nodes[at + 4] = ids.y | uint(clamp(s.roughness, 0.0, 1.0) * 65535.0 + 0.5) << 16;
-    nodes[at + 5] = packHalf2x16(s.base.rg);
-    nodes[at + 6] = packHalf2x16(vec2(s.base.b, s.metallic));
+    nodes[at + 4] = ids.y | uint(clamp(t.roughness, 0.0, 1.0) * 65535.0 + 0.5) << 16;
+    nodes[at + 5] = packHalf2x16(t.base.rg);
+    nodes[at + 6] = packHalf2x16(vec2(t.base.b, t.metallic));
     nodes[at + 7] = packSnorm2x16(in_steps(octahedral_from_unit(s.n_shading), NORMAL_STEPS));
-    nodes[at + 8] = packHalf2x16(s.emissive.rg);
-    nodes[at + 9] = packHalf2x16(vec2(s.emissive.b, alpha));
-    nodes[at + 10] = packUnorm4x8(s.layers);
-    nodes[at + 11] = packUnorm2x16(vec2(s.occlusion, s.thickness));
-    nodes[at + 12] = packSnorm2x16(octahedral_from_unit(s.n_coat));
+    nodes[at + 8] = packHalf2x16(t.emissive.rg);
+    nodes[at + 9] = packHalf2x16(vec2(t.emissive.b, alpha));
+    nodes[at + 10] = packUnorm2x16(vec2(t.occlusion, 0.0));
+    uvec4 layers = packed_layers(t, s.n_coat);
+    for (uint i = 0; i < 4; i++) nodes[at + 11 + i] = layers[i];
 }

@@ -9,8 +9,8 @@ use ash::vk;
 
 use super::cache::{Layout, PipelineKey, SamplerDesc};
 use super::device::{Device, lock};
-use super::shader::{Binding, Program, Replacement, SetLayout};
 use super::loops::with_loops_counted;
+use super::shader::{Binding, Program, Replacement, SetLayout};
 use super::specialize::specialized;
 
 /// Pipelines, some of which are still being made.

@@ -1,8 +1,8 @@
 //! Raster G-buffer: the nearest opaque surface of every pixel (shaders/pass/gbuffer.*).
 //!
 //! 24 bytes a pixel beside depth: RGBA16F base colour and metallic, two octahedral normals (RGBA16_SNORM, or as the knob
-//! `normals` says), RG32UI ids, roughness and occlusion; 16 more for positions where the knob `position` stores them; 4 more for triangles where there are rays, 8 each for emissive textures and layers where the
-//! plan has them. docs/decisions/gbuffer.md has
+//! `normals` says), RG32UI ids, roughness and occlusion; 16 more for positions where the knob `position` stores them; 4 for
+//! triangles where there are rays, 8 for emissive textures and 16 for layers where the plan has them. docs/decisions/gbuffer.md has
 //! what narrower and wider choices cost.
 
 use std::sync::Arc;
@@ -64,8 +64,7 @@ impl GBuffer {
                 false => Image::nothing(device, format, usage),
             }
         };
-        // What a transmission texture lets through is kept beside the emissive texel.
-        let with = [plan.rays.is_some(), plan.emissive || plan.rays.is_some_and(|rays| rays.refraction), plan.layers];
+        let with = [plan.rays.is_some(), plan.emissive, plan.layers];
         let positions = plan.stored.positions.then(|| -> Result<_> {
             let bytes = 16 * u64::from(size[0]) * u64::from(size[1]);
             let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC;
@@ -91,7 +90,7 @@ impl GBuffer {
             ids: target("G-buffer ids", vk::Format::R32G32_UINT, true)?,
             triangles: target("G-buffer triangles", vk::Format::R32_UINT, with[0])?,
             emissive: target("G-buffer emissive", vk::Format::R16G16B16A16_SFLOAT, with[1])?,
-            layers: target("G-buffer layers", vk::Format::R16G16B16A16_UNORM, with[2])?,
+            layers: target("G-buffer layers", vk::Format::R32G32B32A32_UINT, with[2])?,
             size,
             with,
         })

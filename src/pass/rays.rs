@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::aims::AimsOnDevice;
 use super::emitters::EmittersOnDevice;
-use super::scene::{cofactors as cofactors_of, medium, texture_slots};
+use super::scene::{BENT, cofactors as cofactors_of, medium, texture_bits};
 use super::upload::upload;
 use super::view::View;
 use crate::gpu::{Buffer, Device, Frame, NOTHING, Place};
@@ -81,7 +81,7 @@ pub struct TraceConstants {
     /// Entries.
     pub stack_size: u32,
     /// Which texture slots hits read.
-    pub hit_textures: u32,
+    pub hit: lib::hit::Constants,
     /// [`BvhFacts::touching`].
     pub touching: bool,
 }
@@ -89,7 +89,7 @@ pub struct TraceConstants {
 impl Default for TraceConstants {
     /// Of shaders that send none.
     fn default() -> Self {
-        Self { traversal: 0, octants: false, stack_size: 1, hit_textures: 0, touching: false }
+        Self { traversal: 0, octants: false, stack_size: 1, hit: lib::hit::Constants::default(), touching: false }
     }
 }
 
@@ -217,7 +217,7 @@ impl RaysOnDevice {
                 traversal: traversal as u32,
                 octants,
                 stack_size: if traversal == Traversal::Stack { bvh.depth + 1 } else { 1 },
-                hit_textures: corners.contents,
+                hit: corners.contents,
                 touching,
             },
             facts: Some(BvhFacts {
@@ -408,8 +408,10 @@ fn flat_faces(mesh: &Mesh) -> Vec<u32> {
     faces
 }
 
-/// Every bit of `HIT_TEXTURES`.
-const EVERYTHING: u32 = 0x1fff;
+/// All that may lie at the corners.
+const EVERYTHING: lib::hit::Constants =
+    lib::hit::Constants { hit_textures: (1 << lib::material::SLOTS) - 1, hit_colors: true, hit_second_uvs: true };
+
 /// What lies at the corners of triangles, as shaders/lib/hit.glsl reads it.
 struct Corners<'a> {
     scene: &'a Scene,
@@ -424,20 +426,19 @@ struct Corners<'a> {
     /// Whether the normals had to be turned over: tangents change hands with them.
     normals_mirrored: Vec<bool>,
     scales: Vec<f32>,
-    /// `HIT_TEXTURES` of the shader.
-    contents: u32,
+    /// What the shader is told of them.
+    contents: lib::hit::Constants,
 }
 
 impl<'a> Corners<'a> {
     fn of(scene: &'a Scene, solids: &'a Solids, rays: Rays, one_sided: bool) -> Self {
-        let mut contents = if rays.textures { EVERYTHING } else { 0 };
+        let mut contents = if rays.textures { EVERYTHING } else { lib::hit::Constants::default() };
         for instance in &scene.instances {
             let mesh = &scene.meshes[instance.mesh];
-            for (slot, (texture, _)) in texture_slots(&scene.materials[mesh.material]).iter().enumerate() {
-                contents |= u32::from(texture.is_some()) << slot;
-                contents |= u32::from(texture.is_some_and(|t| t.uv_set == 1)) << 12;
-            }
-            contents |= u32::from(!mesh.colors.is_empty()) << 11;
+            let material = &scene.materials[mesh.material];
+            contents.hit_textures |= texture_bits(material);
+            contents.hit_second_uvs |= material.textures().iter().any(|(.., t)| t.is_some_and(|t| t.uv_set == 1));
+            contents.hit_colors |= !mesh.colors.is_empty();
         }
         let (mut cofactors, mut mirrored, mut normals_mirrored, mut scales) =
             (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -497,13 +498,13 @@ impl<'a> Corners<'a> {
             texels.push([a[0], a[1], b[0], b[1]].map(f32::to_bits));
             texels.push([c[0], c[1], 0.0, 0.0].map(f32::to_bits));
         };
-        if self.contents & 0x7ff != 0 {
+        if self.contents.hit_textures != 0 {
             pairs(uvs(0));
         }
-        if self.contents & 1 << 12 != 0 {
+        if self.contents.hit_second_uvs {
             pairs(uvs(1));
         }
-        if self.contents & (1 << 2 | 1 << 10) != 0 {
+        if self.contents.hit_textures & BENT != 0 {
             let linear = instance.world_from_object.matrix3;
             let side = if self.normals_mirrored[i] { -1.0 } else { 1.0 };
             for v in vertices {
@@ -512,7 +513,7 @@ impl<'a> Corners<'a> {
                 texels.push([t.x, t.y, t.z, w * side].map(f32::to_bits));
             }
         }
-        if self.contents & 1 << 11 != 0 {
+        if self.contents.hit_colors {
             let half = |x: f32| u32::from(half::f16::from_f32(x).to_bits());
             let colors = vertices.map(|v| {
                 let [r, g, b, a] = mesh.colors.get(v).copied().unwrap_or([1.0; 4]).map(half);

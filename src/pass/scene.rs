@@ -8,25 +8,29 @@ use glam::{DMat3, DVec3};
 
 use super::sigma_grid::SigmaGrids;
 use super::spectrum::{SpectrumConstants, SpectrumOnDevice};
-use super::texture::{Meaning, Texels, Textures};
+use super::texture::{Texels, Textures};
 use super::upload::upload;
 use super::view::View;
-use crate::gpu::{BoundSet, Buffer, DescriptorSet, Device, Draw, Place, Specialization as _, VertexStream};
+use crate::gpu::{
+    Binding, BoundSet, Buffer, DescriptorSet, Device, Draw, Place, Resource, Specialization as _, VertexStream,
+};
 use crate::optics::ray::camera_relative;
 use crate::plan::{Knobs, Plan, casts_in_maps, is_see_through, mirrors};
 use crate::scene::solid::Solids;
 use crate::scene::wavelengths::{Banded, Slice, Wavelengths};
-use crate::scene::{AlphaMode, Bounds, Extent, Light, LightKind, Material, Scene, SigmaGrid, TextureRef};
+use crate::scene::{AlphaMode, Bounds, Extent, Light, LightKind, Material, Meaning, Scene, SigmaGrid, TextureRef};
 use crate::shader::lib::light_table::{SHAPE_DISK, SHAPE_NONE, SHAPE_RECTANGLE, SHAPE_SPHERE};
 use crate::shader::{PAGES, lib};
 use crate::share;
 use crate::spectra::{self, Upsampling};
 
 /// Texture slots of a material.
-pub const SLOTS: usize = lib::slots::SLOTS as usize;
+const SLOTS: usize = lib::material::SLOTS as usize;
 
 /// Texels of a material: of its constants, then of its texture slots.
 const MATERIAL_TEXELS: usize = lib::material::MATERIAL_SLOTS_AT as usize + SLOTS * lib::material::SLOT_TEXELS as usize;
+/// Textures that follow tangents.
+pub(super) const BENT: u32 = 1 << lib::texels::SLOT_NORMAL | 1 << lib::texels::SLOT_CLEARCOAT_NORMAL;
 /// Texels of a light.
 const LIGHT_TEXELS: usize = lib::light_table::LIGHT_TEXELS as usize;
 const _: () = assert!(size_of::<share::Light>() == 16 * LIGHT_TEXELS);
@@ -121,22 +125,23 @@ pub struct SceneOnDevice {
     pub bounds: Option<Bounds>,
 }
 
-/// The slots of a material with their meanings.
+/// The textures of a material by their slots.
 #[must_use]
 pub fn texture_slots(m: &Material) -> [(Option<TextureRef>, Meaning); SLOTS] {
-    [
-        (m.base_color_texture, Meaning::Color),
-        (m.metallic_roughness_texture, Meaning::Data),
-        (m.normal_texture, Meaning::Data),
-        (m.occlusion_texture, Meaning::Data),
-        (m.emissive_texture, Meaning::Color),
-        (m.clearcoat_texture, Meaning::Data),
-        (m.clearcoat_roughness_texture, Meaning::Data),
-        (m.specular_texture, Meaning::Data),
-        (m.transmission_texture, Meaning::Data),
-        (m.thickness_texture, Meaning::Data),
-        (m.clearcoat_normal_texture, Meaning::Data),
-    ]
+    let mut slots = [(None, Meaning::Data); SLOTS];
+    for (name, meaning, texture) in m.textures() {
+        let is_named = |page: &&Binding| page.name.strip_suffix("_page") == Some(name);
+        if let Some(page) = PAGES.bindings.iter().find(is_named) {
+            slots[page.slot as usize] = (texture, meaning);
+        }
+    }
+    slots
+}
+
+/// Bit by slot: the textures that a material has.
+#[must_use]
+pub fn texture_bits(m: &Material) -> u32 {
+    texture_slots(m).iter().enumerate().map(|(slot, (texture, _))| u32::from(texture.is_some()) << slot).sum()
 }
 
 fn extent(positions: &[[f32; 3]]) -> [DVec3; 2] {
@@ -251,7 +256,7 @@ impl SceneOnDevice {
         let texel_format = vk::Format::R32G32B32A32_UINT;
         let page_sets = page_materials
             .iter()
-            .map(|&m| DescriptorSet::new(device, &PAGES, &pages_of(&textures, &scene.materials[m]).entries()))
+            .map(|&m| DescriptorSet::new(device, &PAGES, &pages_of(&textures, &scene.materials[m])))
             .collect::<Result<_>>()?;
         Ok(Self {
             materials: match spectral {
@@ -382,7 +387,7 @@ impl SceneOnDevice {
     /// One set of texture pages per distinct combination: what the draws of a raster pass vary over.
     #[must_use]
     pub fn pages(&self) -> Vec<BoundSet<'_>> {
-        let entries = |&m: &usize| pages_of(&self.textures, &self.materials_cpu[m]).entries();
+        let entries = |&m: &usize| pages_of(&self.textures, &self.materials_cpu[m]);
         self.page_sets.iter().zip(&self.page_materials).map(|(set, m)| set.bind(entries(m))).collect()
     }
 
@@ -418,9 +423,10 @@ impl SceneOnDevice {
             .map(|(instance, placement)| {
                 let masked = matches!(material(placement).alpha_mode, AlphaMode::Mask(_));
                 let mesh = &self.meshes[placement.mesh];
+                let base = texture_bits(material(placement)) & (1 << lib::texels::SLOT_BASE);
                 let has = lib::gbuffer_interface::Constants {
                     masked,
-                    has_base: masked && material(placement).base_color_texture.is_some(),
+                    textures: if masked { base } else { 0 },
                     has_color: masked && mesh.has_colors,
                     ..Default::default()
                 };
@@ -441,15 +447,8 @@ impl SceneOnDevice {
         let mesh = &self.meshes[placement.mesh];
         let material = &self.materials_cpu[mesh.material];
         let fallback = |offset| VertexStream { buffer: &self.fallback, offset, stride: 0 };
-        let textured = |slot: usize| texture_slots(material)[slot].0.is_some();
         let has = lib::gbuffer_interface::Constants {
-            has_base: textured(0),
-            has_metallic_roughness: textured(1),
-            has_normal: textured(2) && mesh.has_tangents,
-            has_occlusion: textured(3),
-            has_emissive: textured(4),
-            has_layers: (5..10).any(textured),
-            has_coat_normal: textured(10) && mesh.has_tangents,
+            textures: texture_bits(material) & if mesh.has_tangents { u32::MAX } else { !BENT },
             has_color: mesh.has_colors,
             masked: matches!(material.alpha_mode, AlphaMode::Mask(_)),
             normal_steps: self.normal_steps,
@@ -484,34 +483,10 @@ fn same_pages(textures: &Textures, a: &Material, b: &Material) -> bool {
     })
 }
 
-/// What a material's textures are bound to.
-fn pages_of<'a>(textures: &'a Textures, material: &Material) -> lib::pages::Pages<'a> {
-    let [
-        base_page,
-        metallic_roughness_page,
-        normal_page,
-        occlusion_page,
-        emissive_page,
-        clearcoat_page,
-        clearcoat_roughness_page,
-        specular_page,
-        transmission_page,
-        thickness_page,
-        clearcoat_normal_page,
-    ] = texture_slots(material).map(|(texture, meaning)| textures.sampled(texture, meaning));
-    lib::pages::Pages {
-        base_page,
-        metallic_roughness_page,
-        normal_page,
-        occlusion_page,
-        emissive_page,
-        clearcoat_page,
-        clearcoat_roughness_page,
-        specular_page,
-        transmission_page,
-        thickness_page,
-        clearcoat_normal_page,
-    }
+/// What a material's textures are bound to: slots, and what is in them.
+fn pages_of<'a>(textures: &'a Textures, material: &Material) -> Vec<(u32, Resource<'a>)> {
+    let slots = texture_slots(material).into_iter().enumerate();
+    slots.map(|(slot, (texture, meaning))| (slot as u32, textures.sampled(texture, meaning).into())).collect()
 }
 
 /// The texels of all materials, as shaders/lib/material.glsl reads them.

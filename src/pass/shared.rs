@@ -109,7 +109,7 @@ impl<'a> OnDevice<'a> {
                 stored_transmission: with.refraction,
             },
             gbuffer_interface: lib::gbuffer_interface::Constants::default(),
-            hit: lib::hit::Constants { hit_textures: rays.constants.hit_textures },
+            hit: rays.constants.hit,
             layers: lib::layers::Constants { transmissive: with.transmissive },
             lighting: lib::lighting::Constants {
                 // Where tiles list them, no pixel goes through all of them.

@@ -11,16 +11,7 @@ use ash::vk;
 use rayon::prelude::*;
 
 use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, Place, Sampled, SamplerDesc};
-use crate::scene::{AlphaMode, Sampler, Scene, TextureRef, Wrap};
-
-/// How the bytes of an image are meant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Meaning {
-    /// sRGB-encoded colour, linear alpha.
-    Color,
-    /// Linear numbers.
-    Data,
-}
+use crate::scene::{AlphaMode, Meaning, Sampler, Scene, TextureRef, Wrap};
 
 /// Every texture of a scene on the device.
 pub struct Textures {

@@ -93,21 +93,23 @@ pub struct Material {
 }
 
 impl Material {
-    /// Every texture that it may have.
-    pub(crate) fn textures(&self) -> [Option<TextureRef>; 12] {
+    /// The textures that it may have, by the names that shaders know them by (`NAME_page` in shaders/lib/texels.glsl).
+    #[must_use]
+    pub fn textures(&self) -> [(&'static str, Meaning, Option<TextureRef>); 12] {
+        use Meaning::{Color, Data};
         [
-            self.base_color_texture,
-            self.metallic_roughness_texture,
-            self.normal_texture,
-            self.occlusion_texture,
-            self.emissive_texture,
-            self.specular_texture,
-            self.specular_color_texture,
-            self.transmission_texture,
-            self.thickness_texture,
-            self.clearcoat_texture,
-            self.clearcoat_roughness_texture,
-            self.clearcoat_normal_texture,
+            ("base", Color, self.base_color_texture),
+            ("metallic_roughness", Data, self.metallic_roughness_texture),
+            ("normal", Data, self.normal_texture),
+            ("occlusion", Data, self.occlusion_texture),
+            ("emissive", Color, self.emissive_texture),
+            ("specular", Data, self.specular_texture),
+            ("specular_color", Color, self.specular_color_texture),
+            ("transmission", Data, self.transmission_texture),
+            ("thickness", Data, self.thickness_texture),
+            ("clearcoat", Data, self.clearcoat_texture),
+            ("clearcoat_roughness", Data, self.clearcoat_roughness_texture),
+            ("clearcoat_normal", Data, self.clearcoat_normal_texture),
         ]
     }
 
@@ -193,6 +195,15 @@ pub enum AlphaMode {
     ),
     /// Alpha is coverage, composited over what lies behind.
     Blend,
+}
+
+/// How the bytes of an image are meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Meaning {
+    /// sRGB-encoded colour, linear alpha.
+    Color,
+    /// Linear numbers.
+    Data,
 }
 
 /// A texture as a material uses it.

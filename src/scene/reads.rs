@@ -81,7 +81,7 @@ pub(crate) struct Coordinates {
 
 impl Coordinates {
     pub(crate) fn of(m: &Material) -> Self {
-        let textures = m.textures();
+        let textures = m.textures().map(|(.., texture)| texture);
         let reads = |set| textures.iter().flatten().any(|t| t.uv_set as usize & 1 == set);
         let tangents = m.normal_texture.or(m.clearcoat_normal_texture).map(|t| t.uv_set as usize & 1);
         Self { sets: [reads(0), reads(1)], kept: [reads(0) || reads(1), reads(1)], tangents }

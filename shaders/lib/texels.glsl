@@ -1,0 +1,72 @@
+// What textures say of a place on a surface, each beside the factor of the material that it multiplies.
+//
+// A texture has a slot: the build counts the pages below, and SLOT_NAME is the number of NAME_page. Images of one size are layers of one
+// array, a page (src/pass/texture.rs); materials that read the same pages share a descriptor set of them.
+#ifndef TEXELS_GLSL
+#define TEXELS_GLSL
+#include "lib/constants.glsl"
+#include "lib/encode.glsl"
+
+layout(pages) uniform sampler2DArray base_page;
+layout(pages) uniform sampler2DArray metallic_roughness_page;
+layout(pages) uniform sampler2DArray normal_page;
+layout(pages) uniform sampler2DArray occlusion_page;
+layout(pages) uniform sampler2DArray emissive_page;
+layout(pages) uniform sampler2DArray clearcoat_page;
+layout(pages) uniform sampler2DArray clearcoat_roughness_page;
+layout(pages) uniform sampler2DArray clearcoat_normal_page;
+layout(pages) uniform sampler2DArray specular_page;
+layout(pages) uniform sampler2DArray transmission_page;
+layout(pages) uniform sampler2DArray thickness_page;
+
+struct Texels {
+    vec4 base; // times the colour of the vertices
+    float metallic;
+    float roughness;
+    float occlusion;
+    vec3 emissive;
+    float clearcoat;
+    float clearcoat_roughness;
+    float specular;
+    float transmission;
+    float thickness;
+};
+
+Texels texels_of_nothing(vec4 vertex_color) {
+    return Texels(vertex_color, 1.0, 1.0, 1.0, vec3(1.0), 1.0, 1.0, 1.0, 1.0, 1.0);
+}
+
+// Reads all of them but the normals. TEXEL(page, slot) is a vec4, white where the material has no such texture: a rasterised surface has
+// samplers, what a ray meets has an index (lib/surface_fragment.glsl, lib/hit.glsl).
+#define READ_TEXELS(t) \
+    t.base *= TEXEL(base_page, SLOT_BASE); \
+    vec4 metallic_roughness = TEXEL(metallic_roughness_page, SLOT_METALLIC_ROUGHNESS); \
+    t.roughness = metallic_roughness.g; \
+    t.metallic = metallic_roughness.b; \
+    t.occlusion = TEXEL(occlusion_page, SLOT_OCCLUSION).r; \
+    t.emissive = TEXEL(emissive_page, SLOT_EMISSIVE).rgb; \
+    t.clearcoat = TEXEL(clearcoat_page, SLOT_CLEARCOAT).r; \
+    t.clearcoat_roughness = TEXEL(clearcoat_roughness_page, SLOT_CLEARCOAT_ROUGHNESS).g; \
+    t.specular = TEXEL(specular_page, SLOT_SPECULAR).a; \
+    t.transmission = TEXEL(transmission_page, SLOT_TRANSMISSION).r; \
+    t.thickness = TEXEL(thickness_page, SLOT_THICKNESS).g;
+
+// The layers over and under the base, with the normal of the clear coat, in the words that the G-buffer and the fragment list keep:
+//   clearcoat and its roughness (8 bits each), specular (16) | normal of the coat, octahedral (2 x 16) | transmission, thickness (16 each) | 0
+uvec4 packed_layers(Texels t, vec3 n_coat) {
+    uint coat = packUnorm4x8(vec4(t.clearcoat, t.clearcoat_roughness, 0.0, 0.0));
+    return uvec4(coat | packUnorm2x16(vec2(0.0, t.specular)), packUnorm2x16(octahedral_from_unit(n_coat) * 0.5 + 0.5),
+                 packUnorm2x16(vec2(t.transmission, t.thickness)), 0u);
+}
+
+void unpack_layers(uvec4 words, inout Texels t, out vec3 n_coat) {
+    vec2 coat = unpackUnorm4x8(words.x).xy;
+    vec2 below = unpackUnorm2x16(words.z);
+    t.clearcoat = coat.x;
+    t.clearcoat_roughness = coat.y;
+    t.specular = unpackUnorm2x16(words.x).y;
+    t.transmission = below.x;
+    t.thickness = below.y;
+    n_coat = unit_from_octahedral(unpackUnorm2x16(words.y) * 2.0 - 1.0);
+}
+#endif
