@@ -33,7 +33,7 @@ vec4 shares_of(Layers b) {
     // Some facets let through what the viewer's angle would reflect altogether.
     float below = 1.0 - largest(b.f_dielectric);
     below = b.delta ? below : max(below, LEAST_SHARE);
-    vec4 shares = vec4(coat, vec3(left) * vec3(mirrors, mean(b.s.diffuse) * b.enters, mean(b.tint) * b.transmits * below));
+    vec4 shares = vec4(coat, vec3(left) * vec3(mirrors, scattered_share(b), mean(b.tint) * b.transmits * below));
     float sum = dot(shares, vec4(1.0));
     return sum > 0.0 ? shares / sum : vec4(0.0);
 }

@@ -245,7 +245,7 @@ HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
     r.transmission = m.transmission;
     r.medium = m.medium;
     r.sigma_thickness = m.sigma_thickness;
-    r.s = surface_from_texels(m, t, side * n, side * n_coat, -direction, point.p - trace_terms.bvh_from_rel);
+    r.s = surface_from_texels(id, m, t, side * n, side * n_coat, -direction, point.p - trace_terms.bvh_from_rel);
     r.s.p_bvh = point.p;
     r.s.n_triangle = r.n;
     r.s.face = point.face;

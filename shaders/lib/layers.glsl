@@ -87,6 +87,11 @@ float mean_cosine(vec2 ab) {
     return 1.0 - pow(clamp(ab.y / max(ab.x + ab.y, 1e-6), 0.0, 1.0), 0.2);
 }
 
+// What the lobes of extensions over the base leave to it, at the viewer's angle.
+float left_to_base(Surface s) {
+    return 1.0;
+}
+
 vec3 albedo_of_dielectric(Surface s, vec2 ab) {
     vec3 albedo = s.f0_dielectric * ab.x + s.f90_dielectric * ab.y;
     if (FRESNEL == FRESNEL_EXACT) albedo = fresnel_of_dielectric(s, mean_cosine(ab)) * (ab.x + ab.y);
@@ -99,7 +104,7 @@ vec3 albedo_of_base(Surface s, vec2 ab) {
         float cos_m = mean_cosine(ab);
         albedo = mix(fresnel_of_dielectric(s, cos_m), fresnel_of_metal(s, cos_m), s.metallic) * (ab.x + ab.y);
     }
-    return albedo * s.compensation;
+    return albedo * s.compensation * left_to_base(s);
 }
 
 float albedo_of_coat(Surface s) {
@@ -116,6 +121,11 @@ vec2 lobe_reflectance(Surface s) {
 // What the base leaves to the diffuse ground of light from all around.
 float ground_share(Surface s, vec2 ab) {
     return 1.0 - min(largest(albedo_of_dielectric(s, ab)), 1.0);
+}
+
+// What the diffuse ground, and the lobes over the base that send light in all directions, make of irradiance from all around.
+vec3 scattered_radiance(Surface s, vec2 ab, vec3 irradiance) {
+    return s.diffuse * diffuse_brdf(ground_share(s, ab)) * irradiance;
 }
 
 // Makes up for what single scattering loses, where the knob `brdf` says so.
@@ -144,6 +154,7 @@ struct Layers {
     bool total;        // nothing passes at that angle
     float enters;      // what the base leaves to what lies below it, by the viewer's angle alone
     float under;       // what the coat leaves
+    float left;        // and the lobes of extensions, to the base
     vec3 tint;         // of what goes through
     float transmits;   // share of what enters that goes through
     vec4 shares;       // probabilities of coat, base, diffuse ground, through where paths choose; their sum is 1, or 0
@@ -179,15 +190,21 @@ Layers layers_of(Surface s) {
     b.total = false;
     b.enters = BRDF == BRDF_GGX_MULTI ? ground_share(s, lobe_reflectance(s)) : 1.0;
     b.under = CLEARCOAT && BRDF == BRDF_GGX_MULTI ? 1.0 - min(albedo_of_coat(s), 1.0) : 1.0;
+    b.left = left_to_base(s);
     b.tint = vec3(0.0);
     b.transmits = 0.0;
     b.shares = vec4(0.0);
     return b;
 }
 
+// What is sent in all directions, of light from all around.
+float scattered_share(Layers b) {
+    return mean(b.s.diffuse) * b.enters * b.left;
+}
+
 // What goes straight through a surface that bends nothing.
 vec3 straight_transmittance(Layers b) {
-    return b.tint * (b.transmits * (1.0 - largest(b.f_dielectric)) * b.under);
+    return b.tint * (b.transmits * (1.0 - largest(b.f_dielectric)) * b.under * b.left);
 }
 
 // --------------------------------------------------------------------------------------------------------------------
@@ -275,7 +292,7 @@ BsdfEval evaluate_transmission(Layers b, vec3 l) {
     bool total;
     vec3 f_dielectric = fresnel_below_coat(b, v_h, total);
     float share = b.transmits * (1.0 - largest(f_dielectric)) * smith_g2_over_g1(b.cos_v, cos_l, s.alpha);
-    float under = CLEARCOAT ? b.under : 1.0;
+    float under = (CLEARCOAT ? b.under : 1.0) * b.left;
     return meets_facet ? BsdfEval(b.tint * (share * pdf * under), b.shares.w * pdf) : BsdfEval(vec3(0.0), 0.0);
 }
 
@@ -318,7 +335,7 @@ LobeSample sample_base(Layers b, vec3 h) {
     float cos_h = clamp(dot(h, s.v), 0.0, 1.0);
     bool total;
     vec3 f = mix(fresnel_below_coat(b, cos_h, total), fresnel_of_metal(s, cos_h), s.metallic);
-    return LobeSample(b.delta ? on_side(r, s.n_triangle) : r, f * s.compensation * masking, false);
+    return LobeSample(b.delta ? on_side(r, s.n_triangle) : r, f * s.compensation * (masking * b.left), false);
 }
 
 // What goes through. Equal indices bend nothing, not even by a rounding.
@@ -340,7 +357,7 @@ LobeSample sample_transmission(Layers b, vec3 h) {
     bool passes = straight || (dot(through, s.n_triangle) < 0.0 && !(b.solid && (total || t.tir)));
     float masking = rough ? smith_g2_over_g1(dot(s.n, s.v), dot(through, s.n), s.alpha) : 1.0;
     if (rough && b.sheet) masking = cos_r > 0.0 ? masking : 0.0;
-    vec3 weight = b.tint * (b.transmits * (1.0 - largest(f)) * masking);
+    vec3 weight = b.tint * (b.transmits * (1.0 - largest(f)) * masking * b.left);
     return LobeSample(through, passes ? weight : vec3(0.0), straight);
 }
 #endif

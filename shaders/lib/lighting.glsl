@@ -82,10 +82,7 @@ vec3 environment_light(Surface s) {
     vec3 r = reflect_ray(-s.v, s.n).R;
     vec2 ab = lobe_reflectance(s);
     vec3 result = vec3(0.0);
-    if (AMBIENT) {
-        float enters = ground_share(s, ab);
-        result += s.diffuse * diffuse_brdf(enters) * environment_irradiance(s.n);
-    }
+    if (AMBIENT) result += scattered_radiance(s, ab, environment_irradiance(s.n));
     if (REFLECTION && !s.base_traced) result += albedo_of_base(s, ab) * prefiltered_radiance(r, s.alpha);
     if (CLEARCOAT) {
         vec3 coat_r = reflect_ray(-s.v, s.n_coat).R;

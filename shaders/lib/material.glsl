@@ -2,6 +2,7 @@
 // eight. Words as in share/scene.glsl.
 #ifndef MATERIAL_GLSL
 #define MATERIAL_GLSL
+#include "lib/texels.glsl"
 #include "share/scene.glsl"
 
 layout(scene, rgba32ui) readonly uniform uimageBuffer material_texels;
@@ -10,7 +11,8 @@ layout(scene, rgba32ui) readonly uniform uimageBuffer material_texels;
 // width and height, levels and flags (lib/hit.glsl).
 const int MATERIAL_SLOTS_AT = 9;
 const int SLOT_TEXELS = 3;
-const int MATERIAL_TEXELS = MATERIAL_SLOTS_AT + int(SLOTS) * SLOT_TEXELS;
+const int MATERIAL_LOBES_AT = MATERIAL_SLOTS_AT + int(SLOTS) * SLOT_TEXELS;
+const int MATERIAL_TEXELS = MATERIAL_LOBES_AT + int(LOBES);
 
 uvec4 material_words(uint id, int i) {
     return imageLoad(material_texels, int(id) * MATERIAL_TEXELS + i);

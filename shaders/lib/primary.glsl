@@ -63,7 +63,7 @@ Primary primary_surface(ivec2 pixel, bool exact_normals) {
     if (STORED_LAYERS) unpack_layers(imageLoad(layers, pixel), t, n_coat);
     Material m = material_at(material);
     vec3 p_rel = POSITIONS && r.drawn ? stored_position(pixel_index(pixel)) : rel_from_pixel(camera, pixel, r.drawn ? z : 1.0);
-    Surface s = surface_from_texels(m, t, n, n_coat, -view_direction(camera, pixel), p_rel);
+    Surface s = surface_from_texels(material, m, t, n, n_coat, -view_direction(camera, pixel), p_rel);
     vec3 p_bvh = p_rel + trace_terms.bvh_from_rel;
     s.p_bvh = p_bvh;
     s.n_triangle = unit_from_octahedral(octahedral.zw);

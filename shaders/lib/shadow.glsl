@@ -26,12 +26,17 @@ const float SHADOW_ROUNDINGS = 32.0 / 16777216.0;
 uint shadow_rays = 0;
 uint lights_cut_off = 0; // surfaces whose lights were not all gone through, for want of steps
 
-// Reflectance of the boundary between two media for light that does not bend: by the angle in the thinner one, so that
-// there is no total reflection on a straight line. Equal indices reflect nothing, Schlick's curve or not.
-float straight_reflectance(float cos_v, float n1, float n2) {
-    if (n1 == n2) return 0.0;
+// Reflectance of a dielectric between two media for light that does not bend: by the angle in the thinner one, so that there is no total
+// reflection on a straight line. What tints it in air tints it there. Equal indices reflect nothing, Schlick's curve or not.
+vec3 straight_reflectance(Surface s, float cos_v, float n1, float n2) {
+    if (n1 == n2) return vec3(0.0);
     float ratio = max(n1, n2) / min(n1, n2);
-    return FRESNEL == FRESNEL_SCHLICK ? schlick(vec3(nested_f0(1.0, ratio)), 1.0, cos_v).x : fresnel_dielectric(cos_v, ratio).F;
+    float r0 = nested_f0(1.0, ratio);
+    float share = schlick_weight(cos_v);
+    if (FRESNEL == FRESNEL_EXACT) share = clamp((fresnel_dielectric(cos_v, ratio).F - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
+    float in_air = nested_f0(1.0, s.ior);
+    vec3 f0 = s.f0_dielectric * (in_air > 0.0 ? r0 / in_air : 0.0);
+    return f0 + (vec3(s.f90_dielectric) - f0) * share;
 }
 
 // Colour of what goes through a surface: a solid is entered and left, and each takes the root of it.
@@ -46,19 +51,13 @@ vec3 tint_through(vec3 base, bool sheet, bool front, vec3 nominal_depth) {
 
 // What one surface lets through of light along `direction`, with the media before and after it.
 vec3 filtered(HitPoint point, vec3 direction, inout uvec4 media) {
-    Material m = material_at(point.material);
-    vec4 varies = hit_texture_or(point.material, SLOT_BASE, point.uvs, 0.0, vec4(1.0)) * point.color;
-    vec3 base = base_from_texel(m, varies.rgb);
-    float transmits = m.transmission * hit_texture_or(point.material, SLOT_TRANSMISSION, point.uvs, 0.0, vec4(1.0)).r;
-    transmits *= 1.0 - m.metallic * hit_texture_or(point.material, SLOT_METALLIC_ROUGHNESS, point.uvs, 0.0, vec4(1.0)).b;
-    float coverage = coverage_of(m, varies.a);
+    HitSurface hit = hit_surface(point, direction, 0.0);
     float cos_v = abs(dot(point.n_smooth, direction));
-    bool front = dot(point.n, direction) <= 0.0;
     uvec4 after = media;
     float n1 = 1.0;
-    float n2 = m.ior;
-    if (!point.sheet && m.transmission > 0.0) {
-        after = front ? entered(media, m.medium) : left(media, m.medium);
+    float n2 = hit.s.ior;
+    if (!point.sheet && hit.transmission > 0.0) {
+        after = hit.front ? entered(media, hit.medium) : left(media, hit.medium);
         n1 = index_of(present_medium(media));
         n2 = index_of(present_medium(after));
         if (present_medium(media) == present_medium(after)) {
@@ -67,22 +66,12 @@ vec3 filtered(HitPoint point, vec3 direction, inout uvec4 media) {
         }
     }
     media = after;
-    vec3 nominal_depth = vec3(0.0);
-    if (ABSORPTION != ABSORPTION_OFF) {
-        float thickness = hit_texture_or(point.material, SLOT_THICKNESS, point.uvs, 0.0, vec4(1.0)).g;
-        nominal_depth = m.sigma_thickness * (thickness * point.scale);
-    }
-    Layers b;
-    b.tint = tint_through(base, point.sheet, front, nominal_depth);
-    b.transmits = transmits;
-    b.f_dielectric = vec3(straight_reflectance(cos_v, n1, n2));
-    b.under = 1.0;
-    if (CLEARCOAT) {
-        float coat = m.clearcoat * hit_texture_or(point.material, SLOT_CLEARCOAT, point.uvs, 0.0, vec4(1.0)).r;
-        b.under = 1.0 - coat * straight_reflectance(cos_v, 1.0, COAT_INDEX);
-    }
-    vec3 through = straight_transmittance(b);
-    return 1.0 - coverage + coverage * through;
+    Layers b = layers_of(hit.s);
+    b.tint = tint_through(hit.s.base, point.sheet, hit.front, hit.sigma_thickness * hit.thickness);
+    b.transmits = hit.transmits * (1.0 - hit.s.metallic);
+    b.f_dielectric = straight_reflectance(hit.s, cos_v, n1, n2);
+    b.under = CLEARCOAT ? 1.0 - fresnel_of_coat(hit.s, cos_v) : 1.0;
+    return 1.0 - hit.coverage + hit.coverage * straight_transmittance(b);
 }
 
 // A hit that is known, with its barycentrics.

@@ -18,6 +18,7 @@ const uint FRESNEL_EXACT = 1;
 layout(constant) const bool CLEARCOAT = false;
 layout(constant) const bool ROUGH = false; // some surface that rays meet is rough
 layout(constant) const bool CONDUCTORS = false; // some metal is given by its n and κ
+layout(constant) const uint LOBES_SEEN = 0;     // bit by LOBE_...: some material has the lobe
 // Smooth enough surfaces are mirrored by rays, rougher ones by the prefiltered environment (knobs `reflection`, `lobes`).
 layout(constant) const bool MIRROR_RAYS = false;
 layout(constant) const float ROUGHEST_MIRROR = 0.0;
@@ -74,7 +75,8 @@ vec3 base_from_texel(Material m, vec3 varies) {
     return base;
 }
 
-Surface surface_from_texels(Material m, Texels t, vec3 n, vec3 n_coat, vec3 v, vec3 p_rel) {
+// Of the material m, which is number `id` of the table.
+Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, vec3 v, vec3 p_rel) {
     Surface s;
     s.p_rel = p_rel;
     s.v = v;

@@ -19,6 +19,9 @@ layout(pages) uniform sampler2DArray specular_page;
 layout(pages) uniform sampler2DArray transmission_page;
 layout(pages) uniform sampler2DArray thickness_page;
 
+// Lobes that extensions lay over the base (src/scene/lobe/), each with a texel of numbers in the table of materials.
+const uint LOBES = 0;
+
 struct Texels {
     vec4 base; // times the colour of the vertices
     float metallic;

@@ -82,7 +82,7 @@ void main() {
         unpack_layers(uvec4(nodes[at + 11], nodes[at + 12], nodes[at + 13], nodes[at + 14]), t, n_coat);
         vec3 n = unit_from_octahedral(unpackSnorm2x16(nodes[at + 7]));
         vec3 p = rel_from_pixel(camera, pixel, uintBitsToFloat(nodes[at + 1]));
-        Surface s = surface_from_texels(m, t, n, n_coat, -direction, p);
+        Surface s = surface_from_texels(word & 0xffffu, m, t, n, n_coat, -direction, p);
         s.p_bvh = p + trace_terms.bvh_from_rel;
         s.media = trace_terms.camera_media;
         float transmission = m.transmission * t.transmission;
@@ -95,7 +95,7 @@ void main() {
         }
         // What is not reflected goes through, tinted by the base colour and by absorption through the nominal thickness
         // (A1): straight on, and with refraction `screen` bent where a body is entered.
-        Layers b;
+        Layers b = layers_of(s);
         b.tint = s.base * exp(-m.sigma_thickness * scale);
         b.transmits = transmission * (1.0 - s.metallic);
         b.f_dielectric = fresnel_of_dielectric(s, clamp(dot(s.n, s.v), 0.0, 1.0));

@@ -15,6 +15,7 @@ use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, Place, Sampled, Sample
 use crate::image::file;
 use crate::plan::Plan;
 use crate::scene::environment::Environment;
+use crate::scene::lobe::LOBES;
 use crate::shader::prefilter;
 use crate::share;
 
@@ -69,7 +70,7 @@ impl EnvironmentOnDevice {
             (false, false) => Vec::new(),
         };
         let prefiltered = image(device, "prefiltered environment", &levels)?;
-        let table = plan.reflectance.then(|| (REFLECTANCE, REFLECTANCE, reflectance_table()));
+        let table = plan.reflectance.then(|| (REFLECTANCE, REFLECTANCE, reflectance_table(plan.lobes)));
         let reflectance = image(device, "directional reflectance", &table.into_iter().collect())?;
         let mut irradiance = [[0.0; 3]; 9];
         if let (true, Some(environment)) = (plan.ambient, environment) {
@@ -231,15 +232,20 @@ fn cache_file(device: &Device, chain: &Levels) -> Option<PathBuf> {
 
 /// Directional reflectance of the GGX lobe, split into the factors of F0 and F90 (Karis 2013):
 /// A = ∫ (1 − (1 − V·H)⁵) G₂ V·H / (N·H N·V), B the same with (1 − V·H)⁵, over the distribution of half vectors.
-fn reflectance_table() -> Vec<Texel> {
+fn reflectance_table(lobes: u32) -> Vec<Texel> {
     let side = REFLECTANCE as usize;
-    (0..side * side)
+    // From 0 to 1 with both; of the horizon, where nothing is visible, its limit.
+    let at = |i: usize| i as f64 / (side - 1) as f64;
+    let seen = LOBES.iter().enumerate().filter(|(place, _)| lobes >> place & 1 != 0);
+    let over = seen.filter_map(|(_, lobe)| lobe.albedo).next();
+    (0..side)
         .into_par_iter()
-        .map(|i| {
-            // From 0 to 1 with both; of the horizon, where nothing is visible, its limit.
-            let at = |i: usize| i as f64 / (side - 1) as f64;
-            let [a, b] = directional_reflectance(at(i % side).max(1e-4), at(i / side));
-            [a as f32, b as f32, 0.0, 1.0]
+        .flat_map_iter(|row| {
+            let over = over.map_or(vec![[0.0; 2]; side], |albedo| albedo(at(row), side));
+            over.into_iter().enumerate().map(move |(i, [c, d])| {
+                let [a, b] = directional_reflectance(at(i).max(1e-4), at(row));
+                [a, b, c, d].map(|x| x as f32)
+            })
         })
         .collect()
 }

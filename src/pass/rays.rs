@@ -437,7 +437,7 @@ impl<'a> Corners<'a> {
             let mesh = &scene.meshes[instance.mesh];
             let material = &scene.materials[mesh.material];
             contents.hit_textures |= texture_bits(material);
-            contents.hit_second_uvs |= material.textures().iter().any(|(.., t)| t.is_some_and(|t| t.uv_set == 1));
+            contents.hit_second_uvs |= material.textures().any(|(.., t)| t.is_some_and(|t| t.uv_set == 1));
             contents.hit_colors |= !mesh.colors.is_empty();
         }
         let (mut cofactors, mut mirrored, mut normals_mirrored, mut scales) =

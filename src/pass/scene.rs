@@ -16,6 +16,7 @@ use crate::gpu::{
 };
 use crate::optics::ray::camera_relative;
 use crate::plan::{Knobs, Plan, casts_in_maps, is_see_through, mirrors};
+use crate::scene::lobe::{self, LobeOf};
 use crate::scene::solid::Solids;
 use crate::scene::wavelengths::{Banded, Slice, Wavelengths};
 use crate::scene::{AlphaMode, Bounds, Extent, Light, LightKind, Material, Meaning, Scene, SigmaGrid, TextureRef};
@@ -27,13 +28,15 @@ use crate::spectra::{self, Upsampling};
 /// Texture slots of a material.
 const SLOTS: usize = lib::material::SLOTS as usize;
 
-/// Texels of a material: of its constants, then of its texture slots.
-const MATERIAL_TEXELS: usize = lib::material::MATERIAL_SLOTS_AT as usize + SLOTS * lib::material::SLOT_TEXELS as usize;
+/// Texels of a material before those of its lobes: of its constants, then of its texture slots.
+const MATERIAL_LOBES_AT: usize =
+    lib::material::MATERIAL_SLOTS_AT as usize + SLOTS * lib::material::SLOT_TEXELS as usize;
 /// Textures that follow tangents.
 pub(super) const BENT: u32 = 1 << lib::texels::SLOT_NORMAL | 1 << lib::texels::SLOT_CLEARCOAT_NORMAL;
 /// Texels of a light.
 const LIGHT_TEXELS: usize = lib::light_table::LIGHT_TEXELS as usize;
 const _: () = assert!(size_of::<share::Light>() == 16 * LIGHT_TEXELS);
+const _: () = assert!(lobe::COUNT == lib::texels::LOBES as usize);
 const _: () = assert!(size_of::<share::Material>() == 16 * lib::material::MATERIAL_SLOTS_AT as usize);
 
 /// Where a mesh's data lies in the scene's buffers.
@@ -251,7 +254,7 @@ impl SceneOnDevice {
         let instance_bytes = (scene.instances.len() * size_of::<share::Instance>()) as u64;
         let map_texels = if plan.shadow_maps { 6 * lib::light_table::SHADOW_MAP_TEXELS as usize } else { 0 };
         let light_bytes = (lights_cpu.len() * (LIGHT_TEXELS + map_texels) * 16) as u64;
-        let shared = |(i, m): (usize, &Material)| shared_material(m, i, knobs, grids.places[i], None);
+        let shared = |(i, m): (usize, &Material)| (shared_material(m, i, knobs, grids.places[i], None), m.lobes);
         let table = material_table(scene.materials.iter().enumerate().map(shared), &texture_slots_of);
         let texel_format = vk::Format::R32G32B32A32_UINT;
         let page_sets = page_materials
@@ -341,13 +344,13 @@ impl SceneOnDevice {
         let Some(wavelengths) = &self.wavelengths else { return };
         let shared = |(i, m): (usize, &Material)| {
             let place = self.grids.places[i];
-            let Some(slice) = slice else { return shared_material(m, i, &self.knobs, place, None) };
+            let Some(slice) = slice else { return (shared_material(m, i, &self.knobs, place, None), m.lobes) };
             let Banded { material, base_rgb, varies_rgb, emissive_rgb } = wavelengths.material(i, m, slice);
             let mut shared = shared_material(&material, i, &self.knobs, place, Some(spectra::shares(&slice.band)));
             shared.flags |= if base_rgb { share::MATERIAL_BASE_RGB } else { 0 };
             shared.flags |= if varies_rgb { share::MATERIAL_VARIES_RGB } else { 0 };
             shared.flags |= if emissive_rgb { share::MATERIAL_EMISSIVE_RGB } else { 0 };
-            shared
+            (shared, material.lobes)
         };
         let table = material_table(self.materials_cpu.iter().enumerate().map(shared), &self.texture_slots);
         self.materials.write(bytemuck::cast_slice(&table));
@@ -489,13 +492,17 @@ fn pages_of<'a>(textures: &'a Textures, material: &Material) -> Vec<(u32, Resour
     slots.map(|(slot, (texture, meaning))| (slot as u32, textures.sampled(texture, meaning).into())).collect()
 }
 
-/// The texels of all materials, as shaders/lib/material.glsl reads them.
-fn material_table(materials: impl Iterator<Item = share::Material>, slots: &[[u32; 4]]) -> Vec<[u32; 4]> {
+/// The texels of all materials, as shaders/lib/material.glsl reads them: constants, texture slots, lobes.
+fn material_table(
+    materials: impl Iterator<Item = (share::Material, [LobeOf; lobe::COUNT])>,
+    slots: &[[u32; 4]],
+) -> Vec<[u32; 4]> {
     let constants = lib::material::MATERIAL_SLOTS_AT as usize;
     let mut table = Vec::new();
-    for (material, slots) in materials.zip(slots.chunks_exact(MATERIAL_TEXELS - constants)) {
+    for ((material, lobes), slots) in materials.zip(slots.chunks_exact(MATERIAL_LOBES_AT - constants)) {
         table.extend_from_slice(bytemuck::cast_slice(std::slice::from_ref(&material)));
         table.extend_from_slice(slots);
+        table.extend(lobes.map(|of| of.factors.map(f32::to_bits)));
     }
     table
 }

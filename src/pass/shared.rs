@@ -154,6 +154,7 @@ impl<'a> OnDevice<'a> {
                 clearcoat: plan.clearcoat,
                 rough: with.rough,
                 conductors: plan.conductors,
+                lobes_seen: plan.lobes,
                 mirror_rays: with.mirrors,
                 roughest_mirror: plan.roughest_mirror,
             },

@@ -16,6 +16,7 @@ use left_out::left_out;
 use surfaces::{Surfaces, by_wavelength, has_layers, refracts, scatters};
 
 use crate::scene::caustics::{SMOOTHEST, is_smooth};
+use crate::scene::lobe::LOBES;
 use crate::scene::normal_form::NormalForm;
 use crate::scene::solid::{Solids, deepest_nesting, solids};
 use crate::scene::{AlphaMode, Light, LightKind, Material, Scene};
@@ -31,6 +32,8 @@ pub struct Plan {
     pub clearcoat: bool,
     /// Code for metals given by n and κ.
     pub conductors: bool,
+    /// Code for lobes of extensions, a bit each in the order of [`LOBES`].
+    pub lobes: u32,
     /// What was asked for beside what the scene calls for.
     pub demand: Demand,
     /// There is an environment: rays that leave the scene see it, whatever surfaces do.
@@ -284,6 +287,7 @@ impl Plan {
             layers: layers.layers,
             clearcoat: layers.clearcoat,
             conductors: layers.conductors,
+            lobes: layers.lobes,
             demand: surroundings.demand,
             environment: images.environment,
             reflection: images.mirrored,
@@ -298,7 +302,8 @@ impl Plan {
                 || images.ambient
                 || images.screen != Screen::default()
                 || (surroundings.demand == Demand::Full && paths.is_none())
-                || knobs.rung("brdf") == "ggx-multi",
+                || knobs.rung("brdf") == "ggx-multi"
+                || layers.lobes != 0,
             shadow_maps,
             lights: lights.kept,
             rays,
@@ -357,6 +362,7 @@ struct Layers {
     clearcoat: bool,
     layers: bool,
     conductors: bool,
+    lobes: u32,
 }
 
 /// What lets light through, and how.
@@ -401,8 +407,14 @@ impl Planner<'_> {
         let cause =
             surfaces.cause(|m| m.conductor.is_some() && m.metallic > 0.0, |_| "is a metal with n and kappa".to_owned());
         let conductors = decisions.decide("metals by n and kappa", cause);
+        let mut lobes = 0;
+        for (place, lobe) in LOBES.iter().enumerate() {
+            let is_on = |m: &Material| !m.unlit && lobe.is_on(&m.lobes[place]);
+            let cause = surfaces.cause(is_on, |m| lobe.says(&m.lobes[place]));
+            lobes |= u32::from(decisions.decide(lobe.name, cause)) << place;
+        }
         // A coat's numbers lie in the layers.
-        Layers { emissive, clearcoat, layers: layers || clearcoat, conductors }
+        Layers { emissive, clearcoat, layers: layers || clearcoat, conductors, lobes }
     }
 
     fn transmission(&mut self) -> Transmission {

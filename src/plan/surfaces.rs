@@ -2,7 +2,7 @@
 
 use super::Facts;
 use super::effect::Cause;
-use crate::scene::{AlphaMode, Material, Scene};
+use crate::scene::{AlphaMode, Material, Meaning, Scene};
 
 /// Whether a surface is laid over what lies behind it, in passes of its own: blended surfaces, and transmissive ones where
 /// no rays refract in them (`refracting_rays`).
@@ -25,11 +25,12 @@ pub fn mirrors(material: &Material) -> bool {
 
 /// Whether some of the light that a surface receives leaves it in all directions.
 pub(super) fn scatters(material: &Material) -> bool {
-    !material.unlit
-        && (material.metallic < 1.0 || material.metallic_roughness_texture.is_some())
+    let by_lobes = material.lobes().any(|(lobe, of)| lobe.scatters && lobe.is_on(of));
+    let by_ground = (material.metallic < 1.0 || material.metallic_roughness_texture.is_some())
         // Metal transmits nothing.
         && (material.transmission < 1.0 || material.metallic > 0.0 || material.transmission_texture.is_some())
-        && material.base_color[..3] != [0.0; 3]
+        && material.base_color[..3] != [0.0; 3];
+    !material.unlit && (by_ground || by_lobes)
 }
 
 /// Whether a surface treats wavelengths differently.
@@ -39,13 +40,13 @@ pub(super) fn by_wavelength(m: &Material) -> bool {
         || differ(&m.emissive)
         || differ(&m.specular_color)
         || (m.attenuation_distance.is_finite() && differ(&m.attenuation_color))
-        || m.base_color_texture.is_some()
-        || m.emissive_texture.is_some()
         || m.reflectance.is_some()
         || m.emission.is_some()
         || m.conductor.is_some()
         || m.dispersion.disperses(f64::from(m.ior))
         || m.marched_sigma().is_some_and(|grid| grid.channels() > 1)
+        || m.lobes().any(|(lobe, of)| lobe.colour(of).is_some_and(|colour| differ(&colour)))
+        || m.textures().any(|(.., meaning, texture)| meaning == Meaning::Color && texture.is_some())
 }
 
 /// Whether a surface bends light.
@@ -69,6 +70,7 @@ pub(super) fn has_layers(material: &Material) -> bool {
         material.thickness_texture,
     ]
     .iter()
+    .chain(material.lobes.iter().flat_map(|of| &of.textures))
     .any(Option::is_some)
 }
 

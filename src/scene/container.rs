@@ -11,8 +11,10 @@ use gltf::json::{
     validation::{Checked, Error as Flaw, Validate},
 };
 
-/// Extensions whose effect is read; the only list that decides what a file may require.
-pub(crate) const SUPPORTED_EXTENSIONS: &[&str] = &[
+use super::lobe::LOBES;
+
+/// Extensions whose effect is read, beside those of lobes.
+const SUPPORTED_EXTENSIONS: &[&str] = &[
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
@@ -27,6 +29,11 @@ pub(crate) const SUPPORTED_EXTENSIONS: &[&str] = &[
     "KHR_mesh_quantization",
     "KHR_texture_transform",
 ];
+
+/// Whether the effect of an extension is read: what decides what a file may require.
+fn is_supported(name: &str) -> bool {
+    SUPPORTED_EXTENSIONS.contains(&name) || LOBES.iter().any(|lobe| lobe.extension == name)
+}
 
 /// Extensions that hide the data itself, so the advice can be more helpful than "unknown".
 const COMPRESSIONS: &[&str] = &["EXT_meshopt_compression", "KHR_draco_mesh_compression", "KHR_texture_basisu"];
@@ -157,13 +164,10 @@ fn check_extensions(root: &Root, warnings: &mut Vec<String>) -> Result<()> {
         if COMPRESSIONS.contains(&name.as_str()) {
             bail!("the file requires the extension {name}, which is not decoded; export it without that compression");
         }
-        ensure!(
-            SUPPORTED_EXTENSIONS.contains(&name.as_str()),
-            "the file requires the extension {name}, which is not supported"
-        );
+        ensure!(is_supported(name), "the file requires the extension {name}, which is not supported");
     }
     for name in &root.extensions_used {
-        if !SUPPORTED_EXTENSIONS.contains(&name.as_str()) {
+        if !is_supported(name) {
             warnings.push(format!("the optional extension {name} is not supported; the scene is read without it"));
         }
     }

@@ -17,7 +17,9 @@ use super::substance::INFINITE_IOR;
 use super::{
     AlphaMode, Image, Material, Sampler, TextureRef, Wrap,
     container::{Document, short_uri},
-    gltf_extras, pictures,
+    gltf_extras,
+    lobe::{LOBES, Lobe, LobeOf},
+    pictures,
 };
 use crate::spectra;
 
@@ -239,11 +241,37 @@ impl Reader<'_, '_, '_> {
                 }
             }
         }
+        for (lobe, of) in LOBES.iter().zip(&mut m.lobes) {
+            if let Some(value) = json.others.get(lobe.extension) {
+                *of = self.lobe(lobe, value).with_context(|| format!("the extension {}", lobe.extension))?;
+            }
+        }
         if let Some(dispersion) = parse::<Dispersion>(&json.others, "KHR_materials_dispersion")? {
             let abbe = f64::from(self.positive(dispersion.dispersion, "the dispersion"));
             m.dispersion = if abbe > 0.0 { spectra::Dispersion::Abbe(abbe) } else { spectra::Dispersion::None };
         }
         Ok(())
+    }
+
+    fn lobe(&mut self, lobe: &Lobe, said: &Value) -> Result<LobeOf> {
+        let mut of = LobeOf::default();
+        let mut factors = of.factors.iter_mut();
+        for &(name, count) in lobe.factors {
+            let numbers: Vec<f32> = match said.get(name) {
+                None => vec![0.0; count],
+                Some(value) if count == 1 => vec![f32::deserialize(value).context(name)?],
+                Some(value) => Vec::deserialize(value).context(name)?,
+            };
+            ensure!(numbers.len() == count, "{name} has {} numbers, not {count}", numbers.len());
+            for (factor, number) in factors.by_ref().zip(numbers) {
+                *factor = self.unit(number, name);
+            }
+        }
+        for (texture, &(name, ..)) in of.textures.iter_mut().zip(lobe.textures) {
+            let info = said.get(name).map(|value| json::texture::Info::deserialize(value).context(name));
+            *texture = self.texture(info.transpose()?.as_ref())?;
+        }
+        Ok(of)
     }
 
     /// KHR_materials_ior allows 0 ("infinite": a perfect reflector) and everything from 1 on. A medium may have less

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::Affine2;
 
 use super::SigmaGrid;
+use super::lobe::{self, LOBES, Lobe, LobeOf};
 use crate::spectra::{Dispersion, Emission, Spectrum};
 
 /// One surface description. Factors are linear Rec. 709; a texture multiplies its factor.
@@ -77,6 +78,8 @@ pub struct Material {
     pub clearcoat_roughness_texture: Option<TextureRef>,
     /// Tangent-space normals of the coat.
     pub clearcoat_normal_texture: Option<TextureRef>,
+    /// The lobes that extensions lay over the base, in the order of [`LOBES`].
+    pub lobes: [LobeOf; lobe::COUNT],
     /// Which solid's medium fills the place where transmissive solids overlap: that of the higher priority, and on a tie
     /// the one entered last (`extras.etalon.priority`).
     pub priority: i32,
@@ -95,9 +98,9 @@ pub struct Material {
 impl Material {
     /// The textures that it may have, by the names that shaders know them by (`NAME_page` in shaders/lib/texels.glsl).
     #[must_use]
-    pub fn textures(&self) -> [(&'static str, Meaning, Option<TextureRef>); 12] {
+    pub fn textures(&self) -> impl Iterator<Item = (&'static str, Meaning, Option<TextureRef>)> {
         use Meaning::{Color, Data};
-        [
+        let own = [
             ("base", Color, self.base_color_texture),
             ("metallic_roughness", Data, self.metallic_roughness_texture),
             ("normal", Data, self.normal_texture),
@@ -110,12 +113,20 @@ impl Material {
             ("clearcoat", Data, self.clearcoat_texture),
             ("clearcoat_roughness", Data, self.clearcoat_roughness_texture),
             ("clearcoat_normal", Data, self.clearcoat_normal_texture),
-        ]
+        ];
+        own.into_iter().chain(self.lobes().flat_map(|(lobe, of)| {
+            lobe.textures.iter().zip(of.textures).map(|(&(_, name, meaning), texture)| (name, meaning, texture))
+        }))
+    }
+
+    /// The lobes over the base, those that it has not among them.
+    pub fn lobes(&self) -> impl Iterator<Item = (&'static Lobe, &LobeOf)> {
+        LOBES.iter().copied().zip(&self.lobes)
     }
 
     /// The same, to be changed.
-    pub(crate) fn textures_mut(&mut self) -> [&mut Option<TextureRef>; 12] {
-        [
+    pub(crate) fn textures_mut(&mut self) -> impl Iterator<Item = &mut Option<TextureRef>> {
+        let own = [
             &mut self.base_color_texture,
             &mut self.metallic_roughness_texture,
             &mut self.normal_texture,
@@ -128,7 +139,8 @@ impl Material {
             &mut self.clearcoat_texture,
             &mut self.clearcoat_roughness_texture,
             &mut self.clearcoat_normal_texture,
-        ]
+        ];
+        own.into_iter().chain(self.lobes.iter_mut().flat_map(|of| &mut of.textures))
     }
 
     /// Whether light is lost on its way through the medium.
@@ -289,6 +301,7 @@ impl Default for Material {
             clearcoat_roughness: 0.0,
             clearcoat_roughness_texture: None,
             clearcoat_normal_texture: None,
+            lobes: [LobeOf::default(); lobe::COUNT],
             priority: 0,
             dispersion: Dispersion::None,
             reflectance: None,

@@ -19,6 +19,7 @@ mod gltf_import;
 mod gltf_material;
 pub mod light;
 mod line;
+pub mod lobe;
 pub mod material;
 mod nodes;
 pub mod normal_form;

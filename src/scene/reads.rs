@@ -1,5 +1,6 @@
 //! What of a scene's textures and texture coordinates a picture may depend on: the rest is neither decoded nor uploaded.
 
+use super::lobe::LOBES;
 use super::material::TextureRef;
 use super::{Material, Scene};
 
@@ -53,6 +54,12 @@ pub(crate) fn forget_textures(m: &mut Material, used: bool, ambience: bool) -> V
     let lit = unless(!m.unlit, "the material is unlit");
     let coat = lit.or(unless(m.clearcoat > 0.0, "there is no coat"));
     let transmits = unless(m.transmission > 0.0, "nothing is transmitted");
+    for (lobe, of) in LOBES.iter().zip(&mut m.lobes) {
+        let why = lit.or(unless(lobe.is_on(of), "there is no such lobe"));
+        for ((_, what, _), texture) in lobe.textures.iter().zip(&mut of.textures) {
+            forget(texture, &what.replace('_', " "), why);
+        }
+    }
     forget(&mut m.base_color_texture, "base colour", None);
     forget(&mut m.metallic_roughness_texture, "metallic and roughness", None);
     forget(&mut m.normal_texture, "normal", None);
@@ -81,8 +88,8 @@ pub(crate) struct Coordinates {
 
 impl Coordinates {
     pub(crate) fn of(m: &Material) -> Self {
-        let textures = m.textures().map(|(.., texture)| texture);
-        let reads = |set| textures.iter().flatten().any(|t| t.uv_set as usize & 1 == set);
+        let textures: Vec<TextureRef> = m.textures().filter_map(|(.., texture)| texture).collect();
+        let reads = |set| textures.iter().any(|t| t.uv_set as usize & 1 == set);
         let tangents = m.normal_texture.or(m.clearcoat_normal_texture).map(|t| t.uv_set as usize & 1);
         Self { sets: [reads(0), reads(1)], kept: [reads(0) || reads(1), reads(1)], tangents }
     }

@@ -1,6 +1,7 @@
 //! A scene in one band of wavelengths: the same materials and lights, whose colours are numbers and whose light is X, Y, Z
 //! (lecture C3; docs/decisions/spectra.md).
 
+use super::lobe::{self, LOBES};
 use super::{Light, Material, Scene};
 use crate::spectra::{Band, Spectrum, Upsampling, light_from_rgb};
 
@@ -23,6 +24,8 @@ struct Curves {
     attenuation: Spectrum,
     /// n and κ.
     metal: Option<[Spectrum; 2]>,
+    /// Colours of the lobes over the base.
+    lobes: [Option<Spectrum>; lobe::COUNT],
 }
 
 /// What a frame shows of the light.
@@ -97,6 +100,7 @@ impl Wavelengths {
                 varies,
                 specular: (spectrum(m.specular_color.map(|c| c / most)), most),
                 attenuation: spectrum(m.attenuation_color),
+                lobes: std::array::from_fn(|i| LOBES[i].colour(&m.lobes[i]).map(spectrum)),
                 metal: m.conductor_spectra.clone().or_else(|| m.conductor.map(between_lamps)),
             }
         };
@@ -117,6 +121,11 @@ impl Wavelengths {
             ior: m.dispersion.index(f64::from(m.ior), slice.part.middle()) as f32,
             ..m.clone()
         };
+        for (of, colour) in material.lobes.iter_mut().zip(&curves.lobes) {
+            if let Some(colour) = colour {
+                of.factors[..3].fill(mean(colour));
+            }
+        }
         if let Some(base) = &curves.base {
             let mean = mean(base);
             material.base_color = [mean, mean, mean, m.base_color[3]];
