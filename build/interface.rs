@@ -31,7 +31,7 @@ pub(crate) const SETS: [&str; 3] = ["pass", "scene", "pages"];
 /// The tag of the line that becomes the number of pages.
 const PAGE_COUNT: &str = "// @pages ";
 
-/// A constant that the host shares: `const uint NAME = 3;`.
+/// A constant that the host shares: `const uint NAME = 3;`, and in `shaders/share/` `const float NAME = 1.5;`.
 pub(crate) struct Shared {
     pub(crate) name: String,
     /// As Rust names it.
@@ -315,7 +315,8 @@ fn file(path: &Path, folder: &'static str, text: &str) -> Result<File> {
             ));
         }
         file.declarations.extend(declaration(line));
-        file.shared.extend(shared(line));
+        // Whole numbers of `lib/` are the host's, too; other numbers only where `share/` says so.
+        file.shared.extend(shared(line).filter(|constant| constant.ty != "f32" || folder == "share"));
     }
     Ok(file)
 }
@@ -357,7 +358,7 @@ pub(crate) fn snake(name: &str) -> String {
     out
 }
 
-/// A whole-number constant: what both sides count or index with.
+/// A constant that is one number.
 fn shared(line: &str) -> Option<Shared> {
     let (code, about) = comment(line);
     let (head, value) = code.strip_prefix("const ")?.split_once(" = ")?;
@@ -370,6 +371,7 @@ fn shared(line: &str) -> Option<Shared> {
     let ty = match ty {
         "uint" if integer(value) => "u32",
         "int" if integer(value) => "i32",
+        "float" if value.parse::<f32>().is_ok() => "f32",
         _ => return None,
     };
     Some(Shared { name: name.to_owned(), ty, value: value.to_owned(), about })

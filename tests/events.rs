@@ -5,7 +5,7 @@ mod made;
 
 use etalon::optics::fresnel::fresnel_dielectric;
 use etalon::scene::events::{Event, Limits, Tracer, Way};
-use etalon::scene::{LightKind, Material, Scene};
+use etalon::scene::{Instance, LightKind, Material, Scene};
 use etalon::study::shape::Shape;
 use glam::DVec3;
 use made::{Made, at, lambert, perspective};
@@ -94,6 +94,76 @@ fn one_body_in_another_has_the_ratio_of_both() {
     let expected = [1.3, 1.7 / 1.3, 1.3 / 1.7, 1.0 / 1.3];
     assert_eq!(ratios.len(), 4, "{ratios:?}");
     assert!(ratios.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6), "{ratios:?}");
+}
+
+/// Entered twice, left twice: where the second begins and the first ends nothing changes (shaders/lib/media.glsl).
+#[test]
+fn two_bodies_of_one_glass_that_overlap_are_one() {
+    let mut made = Made::new("overlap");
+    made.add(Shape::cuboid(DVec3::splat(2.0)), glass(1.5), at(0.0, 0.0, 0.0));
+    let second = Instance { world_from_object: at(0.1, 0.1, 1.0), ..made.0.instances[0].clone() };
+    made.0.instances.push(second);
+    made.camera(DVec3::Z * 9.0, DVec3::ZERO, perspective(30.0));
+    let events = middle(&made.0);
+    let mut ways = Vec::new();
+    let mut from = None;
+    loop {
+        let on = [Way::Seen, Way::Bent, Way::Straight].into_iter().find_map(|way| after(&events, from, way));
+        let Some((index, event)) = on else { break };
+        ways.push((event.way, event.met.map(|met| met.ratio)));
+        from = Some(index);
+    }
+    let expected = [
+        (Way::Seen, Some(1.5)),
+        (Way::Bent, Some(1.0)),
+        (Way::Straight, Some(1.0)),
+        (Way::Straight, Some(1.0 / 1.5)),
+        (Way::Bent, None),
+    ];
+    assert_eq!(ways, expected);
+}
+
+#[test]
+fn a_coat_and_what_lies_below_share_a_mirror_image() {
+    let gold = Material {
+        base_color: [0.9, 0.6, 0.3, 1.0],
+        metallic: 1.0,
+        roughness: 0.0,
+        clearcoat: 0.5,
+        clearcoat_roughness: 0.0,
+        ..Material::default()
+    };
+    // Green light; a metal that is given by its colour alone has Schlick's curve.
+    let coat = 0.5 * fresnel_dielectric(0.8, 1.5)[0];
+    let metal = 0.6 + 0.4 * 0.2_f64.powi(5);
+    let rough = Material { roughness: 0.5, ..gold.clone() };
+    for (material, followed) in [(gold, coat + (1.0 - coat) * metal), (rough, coat)] {
+        let mut made = Made::new("coated");
+        made.add(Shape::cuboid(DVec3::new(4.0, 4.0, 0.5)), material, at(0.0, 0.0, 0.0));
+        made.camera(DVec3::new(-3.0, 0.0, 4.0), DVec3::ZERO, perspective(30.0));
+        // The ray meets the top, 0.25 m nearer than the middle.
+        let events = middle(&made.0);
+        let (first, seen) = after(&events, None, Way::Seen).expect("the plate");
+        let met = seen.met.expect("a surface");
+        assert!((met.reflected - (coat + (1.0 - coat) * metal)).abs() < 1e-6, "{}", met.reflected);
+        let (_, mirrored) = after(&events, Some(first), Way::Mirrored).expect("a mirror image");
+        assert!((mirrored.share - followed).abs() < 1e-6, "{} for {followed}", mirrored.share);
+        // What is too rough to be followed is spread.
+        assert_eq!(met.spreads, followed == coat);
+    }
+}
+
+#[test]
+fn a_sheet_tints_what_goes_straight_through() {
+    let sheet = Material { base_color: [1.0, 0.5, 0.2, 1.0], thickness: 0.0, double_sided: true, ..glass(1.5) };
+    let mut made = Made::new("sheet");
+    made.add(Shape::panel(4.0, 4.0), sheet, at(0.0, 0.0, 0.0));
+    made.camera(DVec3::new(0.0, 3.0, 4.0), DVec3::ZERO, perspective(30.0));
+    let events = middle(&made.0);
+    let (first, _) = after(&events, None, Way::Seen).expect("the sheet");
+    let (_, through) = after(&events, Some(first), Way::Straight).expect("it goes through");
+    let expected = 0.5 * (1.0 - fresnel_dielectric(0.8, 1.5)[0]);
+    assert!((through.share - expected).abs() < 1e-6, "{} for {expected}", through.share);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 const MAY_USE: &[(&str, &[&str])] = &[
     ("image", &["image"]),
     ("spectra", &["spectra", "optics"]),
-    ("scene", &["scene", "image", "spectra", "optics"]),
+    ("scene", &["scene", "image", "spectra", "optics", "share"]),
     ("study", &["study", "scene", "spectra", "optics"]),
     ("plan", &["plan", "scene"]),
     ("optics", &["optics"]),

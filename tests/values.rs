@@ -12,6 +12,7 @@ use etalon::frame::Settings;
 use etalon::image::Picture;
 use etalon::plan::Model;
 use etalon::scene::environment::Environment;
+use etalon::scene::layers::{Boundary, Layer, Layers, Media};
 use etalon::scene::{AlphaMode, Camera, LightKind, Material, Projection, Scene};
 use etalon::study::shape::Shape;
 use glam::{DAffine3, DVec3};
@@ -188,6 +189,39 @@ fn a_smooth_coat_mirrors_what_is_around_and_takes_that_from_its_base() {
         eprint!("{of:?} mirrors ");
         let error = worst(&film, &of_materials([2, 3]), 1e-3, expected);
         assert!(error < bound, "{of:?}, mirrors: {error:e}");
+    }
+}
+
+/// The twin that photons and the picked pixel go by is the material of pictures: what coat and base mirror of such light.
+#[test]
+fn what_the_host_says_of_coats_and_bases_is_what_pictures_show() {
+    let gpu = Gpu::hasty();
+    let coat = |clearcoat: f32, base: Material| Material { clearcoat, clearcoat_roughness: 0.0, ..base };
+    let plastic = |ior, specular| Material { ior, specular, ..plastic([0.0; 3], 0.0) };
+    let half = Material { metallic: 0.5, ..plastic(1.8, 0.9) };
+    let materials = [
+        plastic(1.5, 0.6),
+        coat(1.0, plastic(1.5, 1.0)),
+        coat(0.6, plastic(2.4, 0.5)),
+        coat(0.5, metal([0.7, 0.7, 0.7, 1.0], 0.0)),
+        coat(0.8, Material { specular_color: [0.9; 3], ..half }),
+        coat(1.0, lambert([0.0; 3])),
+    ];
+    let (scene, facets) = dome(&materials);
+    for of in [Model::Recursive, Model::Global] {
+        // All is grey: whatever layer a path chooses has the same weight.
+        let settings = model(of, DOME, &["fresnel=exact"]);
+        let (_, film) = gpu.shot(&scene, Some(&Environment::constant([1.0; 3])), settings);
+        eprint!("{of:?} ");
+        let error = worst(&film, &facets, 1e-2, |facet| {
+            let m = &materials[facet.material];
+            let ior = f64::from(m.ior);
+            let air = Boundary { before: 1.0, behind: ior, ior, body: false, hidden: false, beyond: Media::default() };
+            let layers = Layers::of(m, &air, facet.n.z);
+            layers.share(Layer::Coat) + layers.share(Layer::Base)
+        });
+        // As for Fresnel's curve alone.
+        assert!(error < 1e-5, "{of:?}: {error:e}");
     }
 }
 

@@ -57,10 +57,7 @@ vec3 fresnel_of_metal(Surface s, float cos_in) {
     return f;
 }
 
-// Of the clear coat, a layer of this index. Schlick's curve keeps its F0 of 0.04 (KHR_materials_clearcoat) in every medium.
-const float COAT_INDEX = 1.5;
-const float COAT_F0 = 0.04;
-
+// Of the clear coat, a layer of COAT_INDEX. Schlick's curve keeps its F0 (KHR_materials_clearcoat) in every medium.
 float fresnel_of_coat(Surface s, float cos_in) {
     float f;
     if (FRESNEL == FRESNEL_EXACT) {

@@ -5,6 +5,7 @@
 #include "lib/material.glsl"
 #include "lib/spectrum.glsl"
 #include "lib/texels.glsl"
+#include "share/layers.glsl"
 
 // The knobs `brdf` and `fresnel` (src/plan/knobs.rs): one formula each, chosen when the pipeline is made.
 layout(constant) const uint BRDF = 2;
@@ -56,9 +57,6 @@ struct Surface {
     uint face;           // the flat face it lies in, which rays from it cannot meet
     uvec4 media;         // those the viewer's side lies in (lib/media.glsl)
 };
-
-// Roughness below this is a mirror to 16-bit normals; the lobe stays finite (numerics.md 20 holds from α = 1e-5).
-const float MIN_ROUGHNESS = 0.01;
 
 // Base colour, where texels and vertices say `varies`; in a band of wavelengths a number, and light of what is unlit.
 vec3 base_from_texel(Material m, vec3 varies) {

@@ -2,6 +2,7 @@
 
 use super::Facts;
 use super::effect::Cause;
+pub use crate::scene::layers::mirrors;
 use crate::scene::{AlphaMode, Material, Meaning, Scene};
 
 /// Whether a surface is laid over what lies behind it, in passes of its own: blended surfaces, and transmissive ones where
@@ -15,12 +16,6 @@ pub fn is_see_through(material: &Material, refracting_rays: bool) -> bool {
 #[must_use]
 pub fn casts_in_maps(material: &Material) -> bool {
     !is_see_through(material, false)
-}
-
-/// Whether anything is mirrored at a surface. What bends nothing mirrors nothing.
-#[must_use]
-pub fn mirrors(material: &Material) -> bool {
-    material.metallic > 0.0 || (material.specular > 0.0 && material.ior != 1.0)
 }
 
 /// Whether some of the light that a surface receives leaves it in all directions.

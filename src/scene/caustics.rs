@@ -13,12 +13,11 @@ use rayon::prelude::*;
 
 use super::bvh::Bvh;
 use super::emitters::{Emitter, Emitters, Source};
+use super::layers::{Layer, Layers, Media, coverage};
+pub use super::layers::{SMOOTHEST, is_smooth};
 use super::line::{self, Crossing};
-use super::material::Material;
 use super::solid::Solids;
-use super::{AlphaMode, Scene};
-use crate::optics::fresnel::fresnel_dielectric;
-use crate::optics::snell::{reflect, refract};
+use super::{Instance, Scene};
 
 /// Photons that are sent.
 const PHOTONS: u64 = 1 << 19;
@@ -38,12 +37,6 @@ const MARGIN: f64 = 1.2;
 const SHARES: f64 = 1024.0;
 /// Least share over the largest of its cell.
 const WORTH_AIMING: f64 = 0.05;
-
-/// Index of refraction of coats (`KHR_materials_clearcoat`).
-const COAT_INDEX: f64 = 1.5;
-
-/// Perceptual roughness up to which paths are not spread: `MIN_ROUGHNESS` of shaders/lib/surface.glsl.
-pub const SMOOTHEST: f32 = 0.01;
 
 /// Balls around what light last left, for each cell of a grid.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,17 +72,11 @@ struct Photon {
     from: DVec3,
 }
 
-/// Whether the base of a surface, and its coat, mirror or bend light without spreading it.
-fn smooth_layers(material: &Material) -> (bool, bool) {
-    let smooth = |roughness: f32, textured: bool| roughness <= SMOOTHEST && !textured;
-    let coat = smooth(material.clearcoat_roughness, material.clearcoat_roughness_texture.is_some());
-    (smooth(material.roughness, material.metallic_roughness_texture.is_some()), material.clearcoat > 0.0 && coat)
-}
-
-/// Whether a surface mirrors or bends light without spreading all of it.
-#[must_use]
-pub fn is_smooth(material: &Material) -> bool {
-    !material.unlit && material.alpha_mode == AlphaMode::Opaque && smooth_layers(material) != (false, false)
+/// A line along which light is sent.
+struct Beam {
+    origin: DVec3,
+    direction: DVec3,
+    media: Media,
 }
 
 /// What photons go through.
@@ -100,6 +87,8 @@ struct World<'a> {
     emitters: &'a Emitters,
     /// First triangle of each instance.
     firsts: Vec<u32>,
+    /// Of each instance that emits, media that its first corner lies in.
+    media: Vec<Media>,
     middle: DVec3,
     radius: f64,
 }
@@ -135,7 +124,7 @@ impl Random {
 
 impl World<'_> {
     /// A line along which light is sent, by what sends most.
-    fn start(&self, random: &mut Random) -> Option<(DVec3, DVec3)> {
+    fn start(&self, random: &mut Random) -> Option<Beam> {
         let word = (random.word() >> 32) as u32;
         let list = &self.emitters.list;
         let found = list.partition_point(|emitter| emitter.first <= word).checked_sub(1)?;
@@ -147,7 +136,8 @@ impl World<'_> {
                 let towards = self.emitters.sky.direction([(); 2].map(|()| (random.word() >> 32) as u32));
                 let (across, up) = towards.any_orthonormal_pair();
                 let at = random.disk();
-                Some((self.middle + self.radius * (towards + across * at.x + up * at.y), -towards))
+                let origin = self.middle + self.radius * (towards + across * at.x + up * at.y);
+                Some(Beam { origin, direction: -towards, media: Media::default() })
             }
             Source::Triangle { index, two_sided, .. } => {
                 let instance = self.firsts.partition_point(|&first| first <= index) - 1;
@@ -163,7 +153,8 @@ impl World<'_> {
                 let mirrored = placed.world_from_object.matrix3.determinant() < 0.0;
                 let back = (two_sided && random.unit() < 0.5) != mirrored;
                 let direction = random.above(if back { -n } else { n });
-                Some((a + (b - a) * (x * (1.0 - y)) + (c - a) * (x * y), direction))
+                let origin = a + (b - a) * (x * (1.0 - y)) + (c - a) * (x * y);
+                Some(Beam { origin, direction, media: self.media[instance].clone() })
             }
         }
     }
@@ -176,16 +167,16 @@ impl World<'_> {
         let mut next = self.start(&mut random);
         let mut from = None;
         for _ in 0..MOST_SURFACES {
-            let Some((origin, direction)) = next else { break };
-            let Some(met) = line::nearest(self.bvh, origin, direction, 1e-6 * self.radius) else { break };
-            let at = origin + direction * met.t;
-            let goes_on = self.goes_on(&met, direction, &mut random);
-            if let Some(towards) = goes_on {
+            let Some(beam) = next else { break };
+            let Some(met) = line::nearest(self.bvh, beam.origin, beam.direction, 1e-6 * self.radius) else { break };
+            let at = beam.origin + beam.direction * met.t;
+            let (spreads, onward) = self.meet(&met, &beam, &mut random);
+            next = onward.map(|(direction, media)| Beam { origin: at, direction, media });
+            if !spreads {
                 // What goes straight on is found by the search for lights.
-                if towards != direction {
+                if next.as_ref().is_some_and(|next| next.direction != beam.direction) {
                     from = Some(at);
                 }
-                next = Some((at, towards));
                 continue;
             }
             let Some(left) = from else { break };
@@ -195,61 +186,45 @@ impl World<'_> {
             }
             found[0] = Some(Photon { at, from: left });
             from = Some(at);
-            next = self.spread(&met, direction, &mut random).map(|towards| (at, towards));
         }
         found.into_iter().flatten()
     }
 
-    /// A direction in which a surface spreads light, by the cosine, as often as its colour says.
-    fn spread(&self, met: &Crossing, direction: DVec3, random: &mut Random) -> Option<DVec3> {
-        let mesh = &self.scene.meshes[self.scene.instances[met.triangle.instance as usize].mesh];
-        let colour = self.scene.materials[mesh.material].base_color;
-        let [a, b, c] = met.triangle.corners.map(|corner| DVec3::from(corner.map(f64::from)));
-        let n = (b - a).cross(c - a).normalize();
-        let n = if n.dot(direction) < 0.0 { n } else { -n };
-        let goes_on = random.unit() < f64::from(colour[0] + colour[1] + colour[2]) / 3.0;
-        goes_on.then(|| random.above(n))
-    }
-
-    /// Where a surface sends light from `direction` on, unless it spreads it.
-    fn goes_on(&self, met: &Crossing, direction: DVec3, random: &mut Random) -> Option<DVec3> {
+    /// Whether a surface spreads the light that it has received, and where that goes on.
+    fn meet(&self, met: &Crossing, beam: &Beam, random: &mut Random) -> (bool, Option<(DVec3, Media)>) {
         let instance = met.triangle.instance as usize;
-        let placed = &self.scene.instances[instance];
-        let mesh = &self.scene.meshes[placed.mesh];
-        let material = &self.scene.materials[mesh.material];
-        if material.alpha_mode != AlphaMode::Opaque {
-            return Some(direction);
+        let material = &self.scene.materials[self.scene.meshes[self.scene.instances[instance].mesh].material];
+        let facing = met.facing(self.scene, self.solids, beam.direction);
+        let boundary = beam.media.cross(self.scene, self.solids, instance, facing.front, |m| m.ior.into());
+        if boundary.hidden {
+            return (false, Some((beam.direction, boundary.beyond)));
         }
-        if !is_smooth(material) {
-            return None;
+        // Where a texture has the alpha, photons go past: what lies behind is not left without any.
+        if random.unit() >= coverage(material).unwrap_or(0.0) {
+            return (false, Some((beam.direction, beam.media.clone())));
         }
-        let n = met.normal(self.scene);
-        let cos = -direction.dot(n);
-        if !cos.is_finite() || cos == 0.0 {
-            return None;
+        let layers = Layers::of(material, &boundary, -beam.direction.dot(facing.normal));
+        let Some(layer) = layers.sample(random.unit()) else { return (layers.spreads_some(SMOOTHEST), None) };
+        let spreads = layers.spreads(layer, SMOOTHEST);
+        if layer == Layer::Ground {
+            return (spreads, Some((random.above(facing.flat), beam.media.clone())));
         }
-        // Normals of bodies look outwards, but where solids say otherwise.
-        let enters = (cos > 0.0) != self.solids.normals_flipped[instance];
-        let n = n * cos.signum();
-        let ior = f64::from(material.ior);
-        let ratio = if enters { ior } else { ior.recip() };
-        let mirrored = Some(reflect(direction, n));
-        let (base, coat) = smooth_layers(material);
-        if coat && random.unit() < f64::from(material.clearcoat) * fresnel_dielectric(cos.abs(), COAT_INDEX)[0] {
-            return mirrored;
-        }
-        if !base {
-            return None;
-        }
-        if material.metallic >= 0.5 || random.unit() < fresnel_dielectric(cos.abs(), ratio)[0] {
-            return mirrored;
-        }
-        match material.transmission > 0.0 {
-            true if self.solids.solid[instance] => Some(refract(direction, n, ratio).0),
-            true => Some(direction),
-            false => None,
-        }
+        let h = layers.half_vector(layer, beam.direction, facing.normal, [random.unit(), random.unit()]);
+        let direction = layers.direction(layer, beam.direction, [facing.normal, facing.flat], h);
+        let enters = layer == Layer::Through && self.solids.solid[instance];
+        let media = if enters { boundary.beyond } else { beam.media.clone() };
+        (spreads, direction.map(|direction| (direction, media)))
     }
+}
+
+/// Media that the first corner of an instance lies in, where that emits.
+fn media_of_lamp(scene: &Scene, solids: &Solids, placed: &Instance) -> Media {
+    let mesh = &scene.meshes[placed.mesh];
+    let corner = mesh.indices.first().filter(|_| scene.materials[mesh.material].emissive != [0.0; 3]);
+    corner.map_or_else(Media::default, |&corner| {
+        let p = glam::Vec3::from(mesh.positions[corner as usize]).as_dvec3();
+        Media::at(scene, solids, placed.world_from_object.transform_point3(p))
+    })
 }
 
 impl Aims {
@@ -267,6 +242,7 @@ impl Aims {
             bvh,
             emitters,
             firsts: scene.first_triangles(),
+            media: scene.instances.iter().map(|placed| media_of_lamp(scene, solids, placed)).collect(),
             middle: corner + size * 0.5,
             radius: 0.5 * size.length(),
         };

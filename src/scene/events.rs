@@ -1,18 +1,17 @@
 //! What the ray of a pixel meets, one surface after the other, as the lecture tells it (R1 to R6): the mirrored ray, the bent one, and
 //! from what spreads light a ray to each light. In f64 and by textbook formulas, for whoever asks why a pixel looks as it does; no
-//! picture is made of it. Normals are those of the corners, without textures; media are told for green light.
+//! picture is made of it. Normals are those of the corners, without textures; media and shares are told for green light.
 
 use glam::{DVec2, DVec3};
 
 use super::bvh::Bvh;
+use super::layers::{Layer, Layers, Media, coverage};
 use super::light::LightKind;
 use super::line::{self, Crossing};
 use super::material::Material;
 use super::sight::line_through;
-use super::solid::{Solids, media_at, solids};
-use super::{AlphaMode, Camera, Scene};
-use crate::optics::fresnel::{fresnel_conductor, fresnel_dielectric, fresnel_schlick};
-use crate::optics::snell::{reflect, refract};
+use super::solid::{Solids, solids};
+use super::{Camera, Scene};
 
 /// Events of one pixel at most: a tree of them grows quickly.
 const MOST_EVENTS: usize = 96;
@@ -28,7 +27,7 @@ pub struct Limits {
     /// Surfaces one behind the other.
     pub surfaces: u32,
     /// Perceptual roughness up to which what a surface mirrors, or lets through, is followed.
-    pub roughest: f64,
+    pub roughest: f32,
     /// Share of the pixel's light below which nothing is followed.
     pub least_share: f64,
     /// Lights shine that stand for surfaces which emit.
@@ -103,14 +102,7 @@ struct Pending {
     direction: DVec3,
     share: f64,
     surfaces: u32,
-    /// Bodies that it is in, in the order in which they were entered.
-    inside: Vec<usize>,
-}
-
-/// The index of refraction where several bodies overlap: of the highest priority, on a tie of the last.
-fn medium(scene: &Scene, inside: &[usize]) -> Option<usize> {
-    let priority = |&i: &usize| material(scene, i).priority;
-    inside.iter().copied().max_by_key(priority)
+    media: Media,
 }
 
 fn material(scene: &Scene, instance: usize) -> &Material {
@@ -142,8 +134,8 @@ impl Tracer {
             1.0 - (f64::from(pixel[1]) + 0.5) / f64::from(size[1]) * 2.0,
         );
         let (from, direction) = line_through(camera, f64::from(size[0]) / f64::from(size[1]), at);
-        let inside = media_at(scene, &self.solids, from);
-        let mut open = vec![Pending { after: None, way: Way::Seen, from, direction, share: 1.0, surfaces: 0, inside }];
+        let media = Media::at(scene, &self.solids, from);
+        let mut open = vec![Pending { after: None, way: Way::Seen, from, direction, share: 1.0, surfaces: 0, media }];
         let mut events: Vec<Event> = Vec::new();
         while let Some(ray) = open.pop() {
             if events.len() >= MOST_EVENTS {
@@ -184,21 +176,11 @@ impl Tracer {
             let crossing = line::nearest(&self.bvh, from - self.bvh.anchor, direction, behind)?;
             let instance = crossing.triangle.instance as usize;
             let is_seen = self.solids.solid[instance] || material(scene, instance).double_sided;
-            if is_seen || self.front(scene, &crossing, direction).0 {
+            if is_seen || crossing.facing(scene, &self.solids, direction).front {
                 return Some(crossing);
             }
             behind = crossing.t * (1.0 + 1e-9);
         }
-    }
-
-    /// Whether the front of a triangle is met, which looks outwards from bodies, and its unit normal on the side that the ray comes from.
-    fn front(&self, scene: &Scene, crossing: &Crossing<'_>, direction: DVec3) -> (bool, DVec3) {
-        let instance = crossing.triangle.instance as usize;
-        let [a, b, c] = crossing.triangle.corners.map(|corner| DVec3::from(corner.map(f64::from)));
-        let n = (b - a).cross(c - a).normalize();
-        let mirrored = scene.instances[instance].world_from_object.matrix3.determinant() < 0.0;
-        let faces = n.dot(direction) < 0.0;
-        ((faces != mirrored) != self.solids.flipped[instance], if faces { n } else { -n })
     }
 
     /// What a surface is to a ray, and the rays that leave it.
@@ -212,82 +194,56 @@ impl Tracer {
         let instance = crossing.triangle.instance as usize;
         let m = material(scene, instance);
         let to = ray.from + ray.direction * crossing.t;
-        let (front, flat) = self.front(scene, crossing, ray.direction);
-        let shading = crossing.normal(scene);
-        let shading = if shading.dot(flat) < 0.0 { -shading } else { shading };
-        // Where normals of corners look away from the ray, near silhouettes, or are none, the triangle's own is taken.
-        let normal = if -ray.direction.dot(shading) > 0.0 { shading } else { flat };
-        let cos = (-ray.direction.dot(normal)).clamp(0.0, 1.0);
-        let is_body = self.solids.solid[instance];
-        let mut inside = ray.inside.clone();
-        if is_body {
-            match (front, inside.iter().rposition(|&known| known == instance)) {
-                (true, _) => inside.push(instance),
-                (false, Some(place)) => drop(inside.remove(place)),
-                (false, None) => {}
-            }
-        }
-        let index_of =
-            |inside: &[usize]| medium(scene, inside).map_or(1.0, |i| material(scene, i).complex_index(GREEN)[0]);
-        let (before, behind) = (index_of(&ray.inside), index_of(&inside));
-        let changes = !is_body || medium(scene, &ray.inside) != medium(scene, &inside);
-        let ratio = if is_body { behind / before } else { m.dispersion.index(f64::from(m.ior), GREEN) / before };
-        let [of_dielectric, _, _, _, total] = fresnel_dielectric(cos, ratio);
-        let of_metal = match &m.conductor {
-            Some(index) => fresnel_conductor(cos, f64::from(index[1][0]), f64::from(index[1][1]))[0],
-            None => {
-                // Schlick's curve from the base colour: its own F0 is of no index.
-                let f0 = f64::from(m.base_color[1]);
-                let [zero, one] = fresnel_schlick(cos, 1.5, 0.0);
-                f0 + (1.0 - f0) * (one - zero) / (1.0 - zero)
-            }
-        };
-        let metallic = f64::from(m.metallic);
-        let reflected = if changes { of_dielectric + metallic * (of_metal - of_dielectric) } else { 0.0 };
-        let is_thrown_back = total > 0.0 && is_body && changes;
-        let opacity = match m.alpha_mode {
-            AlphaMode::Opaque => 1.0,
-            AlphaMode::Mask(cutoff) => f64::from(u8::from(m.base_color[3] >= cutoff)),
-            AlphaMode::Blend => f64::from(m.base_color[3]),
-        };
-        let smooth = f64::from(m.roughness) <= limits.roughest;
-        let through = f64::from(m.transmission) * (1.0 - metallic);
-        let spreads = !m.unlit && (!smooth || (through < 1.0 && metallic < 1.0));
-        let met = Met {
+        let facing = crossing.facing(scene, &self.solids, ray.direction);
+        let (normals, cos) = ([facing.normal, facing.flat], (-ray.direction.dot(facing.normal)).clamp(0.0, 1.0));
+        let index = |m: &Material| m.dispersion.index(f64::from(m.ior), GREEN);
+        let boundary = ray.media.cross(scene, &self.solids, instance, facing.front, index);
+        let layers = Layers::of(m, &boundary, cos);
+        let green = |layer: Layer| layers.share(layer).y;
+        // Where a texture has alpha, the surface is taken to be there.
+        let opacity = if boundary.hidden { 0.0 } else { coverage(m).unwrap_or(1.0) };
+        let mut met = Met {
             instance,
             material: scene.meshes[scene.instances[instance].mesh].material,
-            normal,
+            normal: facing.normal,
             cos,
-            ratio,
-            reflected,
-            total: is_thrown_back,
-            spreads: spreads && changes && opacity > 0.0,
+            ratio: layers.ratio,
+            reflected: green(Layer::Coat) + green(Layer::Base),
+            total: layers.total,
+            spreads: layers.spreads_some(limits.roughest) && opacity > 0.0,
         };
-        let leave = |way, direction, share, inside| Pending {
+        let leave = |way, direction, share, media: &Media| Pending {
             after: None,
             way,
             from: to,
             direction,
             share: ray.share * share,
             surfaces: ray.surfaces + 1,
-            inside,
+            media: media.clone(),
         };
+        if boundary.hidden {
+            (met.reflected, met.total) = (0.0, false);
+            return (met, vec![leave(Way::Straight, ray.direction, 1.0, &boundary.beyond)]);
+        }
         let mut next = Vec::new();
-        if !changes {
-            next.push(leave(Way::Straight, ray.direction, 1.0, inside));
-            return (met, next);
-        }
         if opacity < 1.0 {
-            next.push(leave(Way::Straight, ray.direction, 1.0 - opacity, ray.inside.clone()));
+            next.push(leave(Way::Straight, ray.direction, 1.0 - opacity, &ray.media));
         }
-        if smooth && !m.unlit {
-            next.push(leave(Way::Mirrored, reflect(ray.direction, normal), opacity * reflected, ray.inside.clone()));
-            let share = opacity * through * (1.0 - reflected);
-            if is_body && !is_thrown_back {
-                next.push(leave(Way::Bent, refract(ray.direction, normal, ratio).0, share, inside));
-            } else if !is_body {
-                next.push(leave(Way::Straight, ray.direction, share, ray.inside.clone()));
-            }
+        let is_followed = |layer: &Layer| !layers.spreads(*layer, limits.roughest);
+        // The middle of the lobe of what is a little rough.
+        let along = |layer| layers.direction(layer, ray.direction, normals, facing.normal);
+        // Coat and base mirror into one direction.
+        let mut mirrors = [Layer::Coat, Layer::Base].into_iter().filter(is_followed);
+        let share: f64 = mirrors.clone().map(green).sum();
+        if let Some(direction) = mirrors.next_back().and_then(along) {
+            next.push(leave(Way::Mirrored, direction, opacity * share, &ray.media));
+        }
+        if let Some(direction) = along(Layer::Through).filter(|_| is_followed(&Layer::Through)) {
+            let (way, media) = match self.solids.solid[instance] {
+                true => (Way::Bent, &boundary.beyond),
+                false => (Way::Straight, &ray.media),
+            };
+            next.push(leave(way, direction, opacity * green(Layer::Through), media));
         }
         (met, next)
     }

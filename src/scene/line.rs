@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::Scene;
 use super::bvh::{Bvh, Node, Triangle};
+use super::solid::Solids;
 
 /// Where a line meets a triangle.
 #[derive(Debug, Clone, Copy)]
@@ -15,7 +16,32 @@ pub(super) struct Crossing<'a> {
     pub(super) uv: [f64; 2],
 }
 
+/// A crossed triangle as the line sees it.
+pub(super) struct Facing {
+    /// Its front, which looks outwards from bodies.
+    pub(super) front: bool,
+    /// Unit normal that its corners' normals give, on the line's side; where that looks away, near silhouettes, or is none, the
+    /// triangle's own.
+    pub(super) normal: DVec3,
+    /// The triangle's own.
+    pub(super) flat: DVec3,
+}
+
 impl Crossing<'_> {
+    /// Which side a line in `direction` meets.
+    pub(super) fn facing(&self, scene: &Scene, solids: &Solids, direction: DVec3) -> Facing {
+        let instance = self.triangle.instance as usize;
+        let [a, b, c] = self.triangle.corners.map(|corner| DVec3::from(corner.map(f64::from)));
+        let n = (b - a).cross(c - a).normalize();
+        let mirrored = scene.instances[instance].world_from_object.matrix3.determinant() < 0.0;
+        let faces = n.dot(direction) < 0.0;
+        let flat = if faces { n } else { -n };
+        let smooth = self.normal(scene);
+        let smooth = if smooth.dot(flat) < 0.0 { -smooth } else { smooth };
+        let normal = if -direction.dot(smooth) > 0.0 { smooth } else { flat };
+        Facing { front: (faces != mirrored) != solids.flipped[instance], normal, flat }
+    }
+
     /// The unit normal that the corners of the triangle give; no number where they cancel.
     pub(super) fn normal(&self, scene: &Scene) -> DVec3 {
         let placed = &scene.instances[self.triangle.instance as usize];

@@ -17,6 +17,7 @@ mod geometry;
 mod gltf_extras;
 mod gltf_import;
 mod gltf_material;
+pub mod layers;
 pub mod light;
 mod line;
 pub mod lobe;

@@ -500,7 +500,7 @@ fn limits_of(knobs: &Knobs) -> Limits {
     Limits {
         surfaces: if rays || paths { knobs.interfaces() } else { 1 },
         stand_ins: !paths,
-        roughest: f64::from(knobs.roughest_lobe()),
+        roughest: knobs.roughest_lobe(),
         least_share: LEAST_SHARE,
     }
 }
