@@ -263,7 +263,7 @@ impl Reader<'_, '_, '_> {
                 Some(value) => Vec::deserialize(value).context(name)?,
             };
             ensure!(numbers.len() == count, "{name} has {} numbers, not {count}", numbers.len());
-            for (factor, number) in factors.by_ref().zip(numbers) {
+            for (number, factor) in numbers.into_iter().zip(factors.by_ref()) {
                 *factor = self.unit(number, name);
             }
         }
