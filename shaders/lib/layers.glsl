@@ -1,6 +1,6 @@
-// The material model: what the layers of a surface do with light. From the top: a clear coat; the base, which is the boundary of a
+// The material model: what the layers of a surface do with light. From the top: a clear coat; sheen; the base, which is the boundary of a
 // dielectric, a metal, or a mixture of both; below the boundary a diffuse ground, or what lets light through
-// (glTF 2.0 appendix B; KHR_materials_clearcoat, specular, ior, transmission).
+// (glTF 2.0 appendix B; KHR_materials_clearcoat, sheen, specular, ior, transmission).
 //
 // Each layer is written once: its Fresnel reflectance, its lobe towards a direction (evaluate), a direction of its lobe (sample), its
 // directional albedo for light from all around. A layer leaves to those below what it does not reflect:
@@ -12,6 +12,7 @@
 #define LAYERS_GLSL
 #include "lib/brdf.glsl"
 #include "lib/reflectance.glsl"
+#include "lib/sheen.glsl"
 #include "lib/snell.glsl"
 #include "lib/surface.glsl"
 
@@ -86,7 +87,7 @@ float mean_cosine(vec2 ab) {
 
 // What the lobes of extensions over the base leave to it, at the viewer's angle.
 float left_to_base(Surface s) {
-    return 1.0;
+    return SHEEN ? left_by_sheen(s, max(cosine(s.n, s.v), 1e-4)) : 1.0;
 }
 
 vec3 albedo_of_dielectric(Surface s, vec2 ab) {
@@ -122,7 +123,12 @@ float ground_share(Surface s, vec2 ab) {
 
 // What the diffuse ground, and the lobes over the base that send light in all directions, make of irradiance from all around.
 vec3 scattered_radiance(Surface s, vec2 ab, vec3 irradiance) {
-    return s.diffuse * diffuse_brdf(ground_share(s, ab)) * irradiance;
+    vec3 scattered = s.diffuse * diffuse_brdf(ground_share(s, ab));
+    if (SHEEN) {
+        float cos_v = max(cosine(s.n, s.v), 1e-4);
+        scattered = scattered * left_by_sheen_of_all(s, cos_v) + s.sheen.rgb * (sheen_albedo(s, cos_v).x * INV_PI);
+    }
+    return scattered * irradiance;
 }
 
 // Makes up for what single scattering loses, where the knob `brdf` says so.
@@ -196,7 +202,8 @@ Layers layers_of(Surface s) {
 
 // What is sent in all directions, of light from all around.
 float scattered_share(Layers b) {
-    return mean(b.s.diffuse) * b.enters * b.left;
+    float ground = mean(b.s.diffuse) * b.enters * b.left;
+    return SHEEN ? ground + mean(b.s.sheen.rgb) * sheen_albedo(b.s, b.cos_v).x : ground;
 }
 
 // What goes straight through a surface that bends nothing.
@@ -249,6 +256,8 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
         }
         r.f_cos = (s.diffuse * diffuse_brdf(enters) + lobe) * cos_l;
         if (BRDF == BRDF_BLINN_PHONG) r.f_cos += lobe_alone;
+        // Of light from l to the eye sheen leaves the lesser of what it leaves of either (KHR_materials_sheen).
+        if (SHEEN) r.f_cos = r.f_cos * min(b.left, left_by_sheen(s, cos_l)) + sheen_lobe(s, l, cos_l, b.cos_v);
         r.pdf += b.shares.z * cos_l * INV_PI;
     }
     if (CLEARCOAT) {

@@ -24,6 +24,8 @@ layout(constant) const uint LOBES_SEEN = 0;     // bit by LOBE_...: some materia
 layout(constant) const bool MIRROR_RAYS = false;
 layout(constant) const float ROUGHEST_MIRROR = 0.0;
 
+const bool SHEEN = (LOBES_SEEN & (1u << LOBE_SHEEN)) != 0;
+
 struct Surface {
     vec3 p_rel;
     vec3 n;              // shading normal
@@ -45,6 +47,7 @@ struct Surface {
     float clearcoat;
     float clearcoat_alpha;
     float clearcoat_roughness;
+    vec4 sheen;          // colour, roughness (lib/sheen.glsl)
     bool unlit;
     vec3 base;
     vec3 f0_metal;
@@ -109,6 +112,12 @@ Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, 
     s.clearcoat = t.clearcoat * m.clearcoat;
     s.clearcoat_roughness = max(t.clearcoat_roughness * m.clearcoat_roughness, MIN_ROUGHNESS);
     s.clearcoat_alpha = s.clearcoat_roughness * s.clearcoat_roughness;
+    s.sheen = vec4(0.0);
+    if (SHEEN) {
+        s.sheen = t.sheen * material_texel(id, MATERIAL_LOBES_AT + int(LOBE_SHEEN));
+        // In a band of wavelengths the factor is a number, and what texels say is still a colour.
+        if (SPECTRAL && t.sheen.rgb != vec3(1.0)) s.sheen.rgb *= reflectance_of_rgb(t.sheen.rgb) / max(t.sheen.rgb, vec3(1e-6));
+    }
     s.base_traced = MIRROR_RAYS && s.roughness <= ROUGHEST_MIRROR;
     s.coat_traced = MIRROR_RAYS && s.clearcoat_roughness <= ROUGHEST_MIRROR;
     s.p_bvh = p_rel;

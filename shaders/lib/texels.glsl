@@ -18,9 +18,12 @@ layout(pages) uniform sampler2DArray clearcoat_normal_page;
 layout(pages) uniform sampler2DArray specular_page;
 layout(pages) uniform sampler2DArray transmission_page;
 layout(pages) uniform sampler2DArray thickness_page;
+layout(pages) uniform sampler2DArray sheen_color_page;
+layout(pages) uniform sampler2DArray sheen_roughness_page;
 
 // Lobes that extensions lay over the base (src/scene/lobe/), each with a texel of numbers in the table of materials.
-const uint LOBES = 0;
+const uint LOBES = 1;
+const uint LOBE_SHEEN = 0;
 
 struct Texels {
     vec4 base; // times the colour of the vertices
@@ -33,10 +36,11 @@ struct Texels {
     float specular;
     float transmission;
     float thickness;
+    vec4 sheen; // colour, roughness
 };
 
 Texels texels_of_nothing(vec4 vertex_color) {
-    return Texels(vertex_color, 1.0, 1.0, 1.0, vec3(1.0), 1.0, 1.0, 1.0, 1.0, 1.0);
+    return Texels(vertex_color, 1.0, 1.0, 1.0, vec3(1.0), 1.0, 1.0, 1.0, 1.0, 1.0, vec4(1.0));
 }
 
 // Reads all of them but the normals. TEXEL(page, slot) is a vec4, white where the material has no such texture: a rasterised surface has
@@ -52,14 +56,16 @@ Texels texels_of_nothing(vec4 vertex_color) {
     t.clearcoat_roughness = TEXEL(clearcoat_roughness_page, SLOT_CLEARCOAT_ROUGHNESS).g; \
     t.specular = TEXEL(specular_page, SLOT_SPECULAR).a; \
     t.transmission = TEXEL(transmission_page, SLOT_TRANSMISSION).r; \
-    t.thickness = TEXEL(thickness_page, SLOT_THICKNESS).g;
+    t.thickness = TEXEL(thickness_page, SLOT_THICKNESS).g; \
+    t.sheen = vec4(TEXEL(sheen_color_page, SLOT_SHEEN_COLOR).rgb, TEXEL(sheen_roughness_page, SLOT_SHEEN_ROUGHNESS).a);
 
 // The layers over and under the base, with the normal of the clear coat, in the words that the G-buffer and the fragment list keep:
-//   clearcoat and its roughness (8 bits each), specular (16) | normal of the coat, octahedral (2 x 16) | transmission, thickness (16 each) | 0
+//   clearcoat and its roughness (8 bits each), specular (16) | normal of the coat, octahedral (2 x 16) | transmission, thickness (16 each) |
+//   sheen (8 each)
 uvec4 packed_layers(Texels t, vec3 n_coat) {
     uint coat = packUnorm4x8(vec4(t.clearcoat, t.clearcoat_roughness, 0.0, 0.0));
     return uvec4(coat | packUnorm2x16(vec2(0.0, t.specular)), packUnorm2x16(octahedral_from_unit(n_coat) * 0.5 + 0.5),
-                 packUnorm2x16(vec2(t.transmission, t.thickness)), 0u);
+                 packUnorm2x16(vec2(t.transmission, t.thickness)), packUnorm4x8(t.sheen));
 }
 
 void unpack_layers(uvec4 words, inout Texels t, out vec3 n_coat) {
@@ -70,6 +76,7 @@ void unpack_layers(uvec4 words, inout Texels t, out vec3 n_coat) {
     t.specular = unpackUnorm2x16(words.x).y;
     t.transmission = below.x;
     t.thickness = below.y;
+    t.sheen = unpackUnorm4x8(words.w);
     n_coat = unit_from_octahedral(unpackUnorm2x16(words.y) * 2.0 - 1.0);
 }
 #endif

@@ -2,6 +2,8 @@
 //! wavelengths and fills the table of materials goes through the rows and knows none of them by name. How light leaves by a lobe is a
 //! file of shaders/lib/, which shaders/lib/layers.glsl includes.
 
+pub mod sheen;
+
 use super::{Meaning, TextureRef};
 
 /// What an extension says of a lobe.
@@ -23,10 +25,10 @@ pub struct Lobe {
 }
 
 /// All of them, in the order of `LOBE_…` in shaders/lib/.
-pub static LOBES: [&Lobe; COUNT] = [];
+pub static LOBES: [&Lobe; COUNT] = [&sheen::SHEEN];
 
 /// How many there are.
-pub const COUNT: usize = 0;
+pub const COUNT: usize = 1;
 
 /// A lobe of one material.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
