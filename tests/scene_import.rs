@@ -660,9 +660,14 @@ fn what_etalon_extras_say_in_vain_is_a_warning_that_names_material_and_key() {
         json!({}),
         &["extras.etalon has no key \"Priority\"; it is ignored", "extras.etalon has no key \"a\\nb\"; it is ignored"],
     );
-    for key in ["brdf", "kd", "ks", "shine"] {
-        warned(json!({ key: [1, "x"] }), json!({}), &[&format!("extras.etalon {key} is not read yet")]);
-    }
+    warned(json!({ "brdf": [1, "x"] }), json!({}), &["extras.etalon brdf is not read yet"]);
+    let told = warned(
+        json!({ "kd": 0.2, "ks": [0.4, 0.4, 0.4], "shine": 3 }),
+        json!({}),
+        &["extras.etalon kd, ks, shine: π kd + 2π ks/(shine + 2) is 1.131, more light than there is; with \
+           brdf=blinn-phong-reciprocal of kd the share is drawn that ks leaves"],
+    );
+    assert!(told.phong && (told.base_color[0] - 0.628_318_5).abs() < 1e-6, "{told:?}");
     for (extensions, lacks) in [
         (json!({}), "transmits nothing"),
         (json!({ "KHR_materials_transmission": { "transmissionFactor": 0.5 } }), "is a thin sheet, of thickness 0"),

@@ -541,11 +541,17 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32, shares:
     };
     let flag = |is: bool, flag: u32| if is { flag } else { 0 };
     let metal = m.conductor.unwrap_or_default();
+    let mut f0 = m.specular_color.map(|c| (r * r * c).min(1.0) * m.specular);
+    let [red, green, blue, alpha] = m.base_color;
+    let mut base = [red, green, blue];
+    if m.phong {
+        (f0, base) = phong(m, knobs, f0);
+    }
     share::Material {
-        base_color: m.base_color,
+        base_color: [base[0], base[1], base[2], alpha],
         emissive: m.emissive,
         metallic: m.metallic,
-        f0: m.specular_color.map(|c| (r * r * c).min(1.0) * m.specular),
+        f0,
         roughness: m.roughness,
         sigma_thickness: of_grid(1.0).map(|sigma| sigma * m.thickness),
         // What bends nothing mirrors nothing, at no angle.
@@ -567,6 +573,20 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32, shares:
         thickness: m.thickness,
         kappa_metal: metal.map(|[_, kappa]| kappa),
         grid,
+    }
+}
+
+/// F0 and base colour from which shaders/lib/layers.glsl makes the told k_s and k_d again. B5 has no (L + V)² under its lobe, which is 4 at
+/// normal incidence. B6 draws of the ground the share that F0 leaves: divided by it where the sum of both receives no more than it is sent.
+fn phong(m: &Material, knobs: &Knobs, f0: [f32; 3]) -> ([f32; 3], [f32; 3]) {
+    let [red, green, blue, _] = m.base_color;
+    let r = (m.ior - 1.0) / (m.ior + 1.0);
+    let told = m.specular_color.map(|c| r * r * c * m.specular);
+    let left = 1.0 - told.into_iter().fold(0.0, f32::max);
+    match knobs.rung("brdf") {
+        "blinn-phong" => (told.map(|f| 4.0 * f), [red, green, blue]),
+        "blinn-phong-reciprocal" if left > 0.0 => (f0, [red, green, blue].map(|albedo| (albedo / left).min(1.0))),
+        _ => (f0, [red, green, blue]),
     }
 }
 

@@ -1,5 +1,6 @@
 //! `extras.etalon` of glTF materials and lights: what the standard's extensions have no word for.
 
+use std::f64::consts::{PI, TAU};
 use std::{collections::BTreeMap, sync::Arc};
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
@@ -15,8 +16,11 @@ use super::{
 };
 use crate::spectra::{self, Dispersion, Emission, Spectrum};
 
+/// Exponent of the narrowest lobe that a roughness stands for (`MIN_ROUGHNESS`).
+const MOST_SHINE: f64 = 1e8;
+
 /// Keys that are planned and that nothing looks at yet.
-const NOT_READ_YET: &[&str] = &["brdf", "kd", "ks", "shine"];
+const NOT_READ_YET: &[&str] = &["brdf"];
 
 /// Wavelengths that a spectrum may tell of, nm: those that the CIE has matching functions for.
 const SEEN: [f64; 2] = [360.0, 830.0];
@@ -35,6 +39,7 @@ pub(crate) fn apply(extras: &json::Extras, file_ior: Option<f32>, m: &mut Materi
     let mut warnings = Vec::new();
     let (mut preset, mut n, mut kappa) = (None, None, None);
     let (mut sellmeier, mut cauchy) = (None, None);
+    let (mut kd, mut ks, mut shine) = (None, None, None);
     for (key, text) in &entries {
         let read = || -> Result<Value> { Ok(serde_json::from_str(text.get())?) };
         let blame = || format!("extras.etalon {key}");
@@ -44,6 +49,9 @@ pub(crate) fn apply(extras: &json::Extras, file_ior: Option<f32>, m: &mut Materi
             "preset" => preset = Some(read().and_then(|v| substance(&v)).with_context(blame)?),
             "n" => n = Some(read().and_then(|v| index(&v, key, &mut warnings)).with_context(blame)?),
             "kappa" => kappa = Some(read().and_then(|v| index(&v, key, &mut warnings)).with_context(blame)?),
+            "kd" => kd = Some(read().and_then(|v| three(&v)).with_context(blame)?),
+            "ks" => ks = Some(read().and_then(|v| three(&v)).with_context(blame)?),
+            "shine" => shine = Some(read().and_then(|v| three(&v)).with_context(blame)?[0]),
             "sellmeier" => sellmeier = Some(sellmeier_of(text.get()).with_context(blame)?),
             "cauchy" => cauchy = Some(cauchy_of(text.get()).with_context(blame)?),
             "reflectance" => m.reflectance = Some(reflectance(text.get(), &mut warnings).with_context(blame)?),
@@ -58,6 +66,9 @@ pub(crate) fn apply(extras: &json::Extras, file_ior: Option<f32>, m: &mut Materi
     if m.sigma.is_some() && (m.transmission == 0.0 || m.thickness == 0.0) {
         let lacks = if m.transmission == 0.0 { "transmits nothing" } else { "is a thin sheet, of thickness 0" };
         warnings.push(format!("extras.etalon sigma is seen inside of bodies, and the material {lacks}"));
+    }
+    if kd.is_some() || ks.is_some() || shine.is_some() {
+        phong(m, kd, ks, shine, &mut warnings)?;
     }
     if let Some(n) = n {
         ensure!(n.iter().all(|&x| x > 0.0), "extras.etalon n: an index of refraction lies above 0");
@@ -360,8 +371,8 @@ fn substance(value: &Value) -> Result<Substance> {
     })
 }
 
-/// A number, or one each for red, green and blue; never negative.
-fn index(value: &Value, key: &str, warnings: &mut Vec<String>) -> Result<[f32; 3]> {
+/// A number, or one for each of red, green and blue; none is negative.
+fn three(value: &Value) -> Result<[f64; 3]> {
     let channels = match value {
         Value::Number(number) => [number.as_f64(); 3],
         Value::Array(list) if list.len() == 3 => [0, 1, 2].map(|i| list[i].as_f64()),
@@ -369,6 +380,56 @@ fn index(value: &Value, key: &str, warnings: &mut Vec<String>) -> Result<[f32; 3
     };
     let [Some(r), Some(g), Some(b)] = channels else { bail!("{} is neither a number nor three numbers", shown(value)) };
     ensure!(r >= 0.0 && g >= 0.0 && b >= 0.0, "{} is negative", shown(value));
+    Ok([r, g, b])
+}
+
+/// The numbers of lecture B5 and B6, k_d and k_s in 1/sr, as the base that the other rungs of `brdf` draw.
+fn phong(
+    m: &mut Material,
+    kd: Option<[f64; 3]>,
+    ks: Option<[f64; 3]>,
+    shine: Option<f64>,
+    warnings: &mut Vec<String>,
+) -> Result<()> {
+    ensure!(m.transmission == 0.0, "extras.etalon kd, ks, shine: the model has no light that is transmitted");
+    let ks = ks.unwrap_or_default();
+    ensure!(shine.is_some() || ks == [0.0; 3], "extras.etalon ks: a lobe has a shine too, and there is none");
+    let shine = shine.unwrap_or(0.0).min(MOST_SHINE);
+    let albedo = match kd {
+        Some(kd) => kd.map(|k| PI * k),
+        None => [0, 1, 2].map(|i| f64::from(m.base_color[i])),
+    };
+    // k_d = 0.3183 is 1/π rounded up.
+    if let Some(&most) = albedo.iter().find(|&&x| x > 1.0001) {
+        warnings.push(format!("extras.etalon kd {} sends more light than it receives and is read as 1/π", most / PI));
+    }
+    let albedo = albedo.map(|x| x.min(1.0));
+    let f0 = ks.map(|k| TAU * k / (shine + 2.0));
+    let most = (0..3).map(|i| albedo[i] + f0[i]).fold(0.0, f64::max);
+    if most > 1.0001 {
+        warnings.push(format!(
+            "extras.etalon kd, ks, shine: π kd + 2π ks/(shine + 2) is {most:.3}, more light than there is; with \
+             brdf=blinn-phong-reciprocal of kd the share is drawn that ks leaves"
+        ));
+    }
+    if m.metallic_roughness_texture.take().is_some() {
+        warnings
+            .push("extras.etalon kd, ks, shine: the metallic-roughness texture has no meaning beside them".to_owned());
+    }
+    let of_index = ((f64::from(m.ior) - 1.0) / (f64::from(m.ior) + 1.0)).powi(2);
+    ensure!(of_index > 0.0 || ks == [0.0; 3], "extras.etalon ks: a surface between equal indices mirrors nothing");
+    m.phong = true;
+    m.metallic = 0.0;
+    m.base_color[..3].copy_from_slice(&albedo.map(|x| x as f32));
+    m.specular = if ks == [0.0; 3] { 0.0 } else { 1.0 };
+    m.specular_color = f0.map(|f| if of_index > 0.0 { (f / of_index) as f32 } else { 1.0 });
+    m.roughness = (2.0 / (shine + 2.0)).sqrt().sqrt() as f32;
+    Ok(())
+}
+
+/// An index of refraction, or one each for red, green and blue.
+fn index(value: &Value, key: &str, warnings: &mut Vec<String>) -> Result<[f32; 3]> {
+    let [r, g, b] = three(value)?;
     let greatest = r.max(g).max(b);
     if greatest > f64::from(INFINITE_IOR) {
         warnings.push(format!("extras.etalon {key} {greatest:e} is clamped to {INFINITE_IOR:e}"));

@@ -91,8 +91,9 @@ pub struct Material {
     pub emission: Option<Emission>,
     /// n and κ of the metallic part by wavelength, beside `conductor`.
     pub conductor_spectra: Option<[Spectrum; 2]>,
-    /// The raw Phong numbers of an OBJ/MTL material, for the passes that show that model as it was written.
-    pub phong: Option<Phong>,
+    /// k_d, k_s and shine were told (`extras.etalon`). They are kept as the base colour π k_d, the F0 2π k_s/(shine + 2) and the roughness
+    /// (2/(shine + 2))^¼; the Phong rungs of the knob `brdf` show them as lecture B5 and B6 are written.
+    pub phong: bool,
 }
 
 impl Material {
@@ -181,17 +182,6 @@ impl Material {
     pub fn marched_sigma(&self) -> Option<&SigmaGrid> {
         self.sigma.as_deref().filter(|grid| self.transmission > 0.0 && self.thickness > 0.0 && !grid.is_zero())
     }
-}
-
-/// What an MTL file says, before it is folded into the fields above.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Phong {
-    /// Diffuse colour `Kd`, without its texture.
-    pub kd: [f32; 3],
-    /// Specular colour `Ks`.
-    pub ks: [f32; 3],
-    /// Specular exponent `Ns`.
-    pub shine: f32,
 }
 
 /// glTF 2.0 section 3.9.4.
@@ -307,7 +297,7 @@ impl Default for Material {
             reflectance: None,
             emission: None,
             conductor_spectra: None,
-            phong: None,
+            phong: false,
         }
     }
 }

@@ -42,7 +42,7 @@ use glam::{DAffine3, DVec3};
 
 pub use camera::{Camera, Projection};
 pub use light::{Extent, Light, LightKind};
-pub use material::{AlphaMode, Material, Meaning, Phong, Sampler, TextureRef, Wrap};
+pub use material::{AlphaMode, Material, Meaning, Sampler, TextureRef, Wrap};
 pub use reads::{Ambience, Reads};
 pub use sigma::SigmaGrid;
 

@@ -16,7 +16,7 @@ use glam::{Affine2, DAffine3, DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::{
-    AlphaMode, Image, Instance, Material, Mesh, Phong, Sampler, Scene, TextureRef, Wrap, geometry, pictures,
+    AlphaMode, Image, Instance, Material, Mesh, Sampler, Scene, TextureRef, Wrap, geometry, pictures,
     reads::{Reads, forget_textures},
     thin::{self, Stroke},
 };
@@ -682,7 +682,6 @@ impl Mtl {
             emissive: self.ke.unwrap_or([0.0; 3]).map(|x| x.max(0.0)),
             ior,
             unlit: illum == 0,
-            phong: Some(Phong { kd, ks: self.ks.unwrap_or([0.0; 3]), shine: ns }),
             ..Material::default()
         };
         match (illum, self.ks) {
@@ -750,7 +749,6 @@ mod tests {
         assert!((m.roughness - 0.25_f32.sqrt()).abs() < 1e-6, "α = sqrt(2/32) = 0.25");
         assert!((m.specular_color[0] * 0.04 - 0.4).abs() < 1e-6);
         assert_eq!((m.base_color, m.alpha_mode), ([0.1, 0.2, 0.3, 0.5], AlphaMode::Blend));
-        assert_eq!(m.phong, Some(Phong { kd: [0.1, 0.2, 0.3], ks: [0.4; 3], shine: 30.0 }));
         mtl.set("illum", "7").unwrap();
         mtl.set("Ni", "1.33").unwrap();
         let glass = mtl.fold("x");
