@@ -495,9 +495,12 @@ pub(crate) fn share(recipe: &Recipe, programs: &BTreeMap<String, Program>) -> Re
                 about = Some((name, BTreeMap::from([(String::new(), of)])));
             } else if line.starts_with("};") {
                 let Some((name, about)) = about.take() else { continue };
-                let known = found.get(&name);
+                let known = match found.remove(&name) {
+                    None => recipe.interface.with_all_members(&name)?,
+                    known => known,
+                };
                 let known = known.ok_or_else(|| format!("shaders/share: struct {name} is used by no shader"))?;
-                code += &rust_struct(known, &about);
+                code += &rust_struct(&known, &about);
             } else if let Some((_, members)) = &mut about
                 && let Some((code, comment)) = line.split_once("//")
                 && let Some(name) =

@@ -12,9 +12,14 @@
 //!
 //! ```text
 //! // @texels Material material_at(material_words)        material_words(uint index, int texel) fetches a uvec4
+//! // @texels BvhTriangle triangle_at(bvh_triangles)      of a binding with nothing but such structs
+//! // @texels Material.sigma material_sigma(...)          one member alone
 //! ```
 //!
 //! A page is a texture of a material, and its slot there: SLOT_BASE is the number of `base_page`. `// @pages SLOTS` counts them.
+//!
+//! A member whose comment begins with `where CONSTANT` is left out where that constant is false; such a struct is read member by
+//! member.
 //!
 //! A declaration stands on one line. Constants, and bindings of the sets `scene` and `pages`, have one number in all programs, and
 //! one file that declares them. Bindings of a pass are numbered from 0 in each program.
@@ -24,6 +29,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::compile::{Result, files, stem};
+use super::reflect::{Member, Struct};
 
 /// The kinds of descriptor sets, in the order of their numbers.
 pub(crate) const SETS: [&str; 3] = ["pass", "scene", "pages"];
@@ -69,8 +75,16 @@ pub(crate) struct Interface {
     pub(crate) files: Vec<File>,
     constants: BTreeMap<String, u32>,
     slots: BTreeMap<String, u32>,
-    /// Members of the structs of `shaders/share/`: type and name.
-    structs: BTreeMap<String, Vec<(String, String)>>,
+    /// Members of the structs of `shaders/share/`.
+    structs: BTreeMap<String, Vec<Field>>,
+}
+
+/// A member of a struct, as its line declares it.
+struct Field {
+    ty: String,
+    name: String,
+    /// The constant without which it is left out.
+    condition: Option<String>,
 }
 
 /// The bindings of one program's own set, and the file of each.
@@ -238,47 +252,122 @@ impl Interface {
 }
 
 impl Interface {
-    /// The function that reads a struct out of texels of four words: `Material material_at(material_words)`. On one line, so that the
-    /// compiler's messages keep their places.
+    /// The function that reads a struct or a member out of texels of four words: `Material material_at(material_words)`. On one line,
+    /// so that the compiler's messages keep their places.
     fn reader(&self, tag: &str) -> Result<String> {
         let wrong = || format!("// @texels {tag}: expected `STRUCT FUNCTION(FETCH)`, of a struct of shaders/share/");
-        let (ty, rest) = tag.split_once(' ').ok_or_else(wrong)?;
+        let (what, rest) = tag.split_once(' ').ok_or_else(wrong)?;
         let (name, fetch) =
             rest.trim_end().strip_suffix(')').and_then(|rest| rest.split_once('(')).ok_or_else(wrong)?;
-        let members = self.structs.get(ty).ok_or_else(wrong)?;
-        let (mut word, mut values) = (0, Vec::new());
-        for (kind, member) in members {
-            let (scalar, count) = match kind.as_str() {
-                "float" => ("float", 1),
-                "uint" => ("uint", 1),
-                "vec2" | "vec3" | "vec4" => ("float", kind[3..].parse().unwrap_or(0)),
-                "uvec2" | "uvec3" | "uvec4" => ("uint", kind[4..].parse().unwrap_or(0)),
-                _ => return Err(format!("{tag}: no texels for {kind} {member}")),
-            };
-            // One swizzle where the member lies in one texel.
-            let words: Vec<usize> = (word..word + count).collect();
-            let letter = |w: &usize| ["x", "y", "z", "w"][w % 4];
-            let bits = match words[0] / 4 == words[count - 1] / 4 {
-                true => format!("t{}.{}", words[0] / 4, words.iter().map(letter).collect::<String>()),
-                false => {
-                    let each: Vec<_> = words.iter().map(|w| format!("t{}.{}", w / 4, letter(w))).collect();
-                    format!("uvec{count}({})", each.join(", "))
-                }
-            };
-            values.push(if scalar == "float" { format!("uintBitsToFloat({bits})") } else { bits });
-            word += count;
+        let (record, member) = what.split_once('.').map_or((what, None), |(record, member)| (record, Some(member)));
+        let fields = self.structs.get(record).ok_or_else(wrong)?;
+        let at = match member {
+            Some(member) => fields.iter().position(|field| field.name == member).ok_or_else(wrong)?,
+            None if fields.iter().any(|field| field.condition.is_some()) => {
+                return Err(format!("// @texels {tag}: members that may be left out are read one by one"));
+            }
+            None => 0,
+        };
+        let ty = member.map_or(record, |_| &fields[at].ty);
+        let (before, optional_before) = self.size(&fields[..at])?;
+        let (first, mut word) = (before / 4, before % 4);
+        let value = self.value(ty, &mut word)?;
+        let (words, optional) = self.size(fields)?;
+        if self.slots.contains_key(fetch) && words % 4 != 0 {
+            return Err(format!("// @texels {tag}: {record} ends within a texel"));
         }
-        let texels: String = (0..word.div_ceil(4)).map(|i| format!("uvec4 t{i} = {fetch}(index, {i}); ")).collect();
-        Ok(format!("{ty} {name}(uint index) {{ {texels}return {ty}({}); }}", values.join(", ")))
+        let load = |i: usize| {
+            let texel = format!("{}{optional_before}", first + i);
+            match self.slots.contains_key(fetch) {
+                true => format!("imageLoad({fetch}, int(index) * ({}{optional}) + {texel})", words / 4),
+                false => format!("{fetch}(index, {texel})"),
+            }
+        };
+        let texels: String = (0..word.div_ceil(4)).map(|i| format!("uvec4 t{i} = {}; ", load(i))).collect();
+        Ok(format!("{ty} {name}(uint index) {{ {texels}return {value}; }}"))
+    }
+
+    /// Words of the members that are always there, and what others add in texels: ` + (CONSTANT ? 2 : 0)`.
+    fn size(&self, fields: &[Field]) -> Result<(usize, String)> {
+        let (mut words, mut optional) = (0, String::new());
+        for Field { ty, name, condition } in fields {
+            let mut size = 0;
+            self.value(ty, &mut size)?;
+            match condition {
+                Some(_) if size % 4 != 0 || words % 4 != 0 => {
+                    return Err(format!("{ty} {name}: what may be left out is of whole texels"));
+                }
+                Some(condition) => optional += &format!(" + ({condition} ? {} : 0)", size / 4),
+                None => words += size,
+            }
+        }
+        Ok((words, optional))
+    }
+
+    /// What begins with the word `word` of the texels t0, t1 ...: `uintBitsToFloat(t0.xyz)`.
+    fn value(&self, ty: &str, word: &mut usize) -> Result<String> {
+        if let Some(fields) = self.structs.get(ty) {
+            let members = fields.iter().map(|field| self.value(&field.ty, word)).collect::<Result<Vec<_>>>()?;
+            return Ok(format!("{ty}({})", members.join(", ")));
+        }
+        let (scalar, count) = scalars(ty).ok_or_else(|| format!("// @texels: no texels for {ty}"))?;
+        let words: Vec<usize> = (*word..*word + count).collect();
+        *word += count;
+        let letter = |w: &usize| ["x", "y", "z", "w"][w % 4];
+        // One swizzle where it lies in one texel.
+        let bits = match words[0] / 4 == words[count - 1] / 4 {
+            true => format!("t{}.{}", words[0] / 4, words.iter().map(letter).collect::<String>()),
+            false => {
+                let each: Vec<_> = words.iter().map(|w| format!("t{}.{}", w / 4, letter(w))).collect();
+                format!("uvec{count}({})", each.join(", "))
+            }
+        };
+        Ok(match scalar {
+            "f32" => format!("uintBitsToFloat({bits})"),
+            "i32" => format!("{ty}({bits})"),
+            _ => bits,
+        })
+    }
+
+    /// A struct of which shaders read some members and never all, as it is with all of them.
+    pub(crate) fn with_all_members(&self, name: &str) -> Result<Option<Struct>> {
+        let Some(fields) = self.structs.get(name) else { return Ok(None) };
+        if fields.iter().all(|field| field.condition.is_none()) {
+            return Ok(None);
+        }
+        let (mut words, mut members) = (0, Vec::new());
+        for Field { ty, name, .. } in fields {
+            let rust = match scalars(ty) {
+                None => ty.clone(),
+                Some((scalar, 1)) => scalar.to_owned(),
+                Some((scalar, count)) => format!("[{scalar}; {count}]"),
+            };
+            members.push(Member { name: name.clone(), ty: rust, offset: 4 * words as u32 });
+            self.value(ty, &mut words)?;
+        }
+        Ok(Some(Struct { name: name.to_owned(), members, size: 4 * words as u32 }))
+    }
+}
+
+/// What a scalar or a vector is made of, as Rust names it, and how many.
+fn scalars(ty: &str) -> Option<(&'static str, usize)> {
+    let count = |digits: &str| digits.parse().ok().filter(|n| (2..=4).contains(n));
+    match ty {
+        "float" => Some(("f32", 1)),
+        "uint" => Some(("u32", 1)),
+        "int" => Some(("i32", 1)),
+        _ => [("vec", "f32"), ("uvec", "u32"), ("ivec", "i32")]
+            .iter()
+            .find_map(|(vector, scalar)| Some((*scalar, count(ty.strip_prefix(vector)?)?))),
     }
 }
 
 /// Structs of a file: each member on a line of its own.
-fn structs(text: &str) -> BTreeMap<String, Vec<(String, String)>> {
+fn structs(text: &str) -> BTreeMap<String, Vec<Field>> {
     let mut all = BTreeMap::new();
-    let mut open: Option<(String, Vec<(String, String)>)> = None;
+    let mut open: Option<(String, Vec<Field>)> = None;
     for line in text.lines() {
-        let (code, _) = comment(line);
+        let (code, about) = comment(line);
         if let Some(rest) = code.strip_prefix("struct ") {
             open = Some((rest.trim_end_matches(['{', ' ']).to_owned(), Vec::new()));
         } else if code.starts_with("};") {
@@ -286,7 +375,9 @@ fn structs(text: &str) -> BTreeMap<String, Vec<(String, String)>> {
         } else if let Some((_, members)) = &mut open
             && let Some((ty, name)) = code.trim().trim_end_matches(';').split_once(' ')
         {
-            members.push((ty.to_owned(), name.to_owned()));
+            let word = |text: &str| text.split(|c: char| !c.is_alphanumeric() && c != '_').next().map(str::to_owned);
+            let condition = about.strip_prefix("where ").and_then(word);
+            members.push(Field { ty: ty.to_owned(), name: name.to_owned(), condition });
         }
     }
     all

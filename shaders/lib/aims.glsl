@@ -5,13 +5,11 @@
 #include "lib/encode.glsl"
 #include "lib/light.glsl"
 #include "lib/trace.glsl"
+#include "share/aims.glsl"
 
 layout(constant) const bool AIMED = false;
-// For each cell the place of its first ball times 16, plus how many it has.
 layout(scene, scalar) readonly buffer AimCells { uint aim_cells[]; };
-// Corner of the grid in bvh space and cells per metre, cells along x, y and z; then a ball each: middle, and in halves its radius
-// in cells and its share of its cell's aims.
-layout(scene, scalar) readonly buffer AimTable { uvec4 aim_table[]; };
+layout(scene, scalar) readonly buffer AimTable { AimGrid aim_grid; AimBall aim_balls[]; };
 
 // Of the directions drawn for a diffuse surface (docs/decisions/paths.md).
 const float AIMED_SHARE = 0.25;
@@ -23,14 +21,13 @@ struct Aims {
 };
 
 Aims aims_at(vec3 p) {
-    uvec4 corner = aim_table[0];
-    uvec3 cells = aim_table[1].xyz;
-    float per_metre = uintBitsToFloat(corner.w);
-    vec3 at = floor((p - uintBitsToFloat(corner.xyz)) * per_metre);
-    bool inside = all(greaterThanEqual(at, vec3(0.0))) && all(lessThan(at, vec3(cells)));
+    AimGrid grid = aim_grid;
+    vec3 at = floor((p - grid.corner) * grid.cells_per_metre);
+    bool inside = all(greaterThanEqual(at, vec3(0.0))) && all(lessThan(at, vec3(grid.cells)));
     uvec3 c = inside ? uvec3(at) : uvec3(0);
-    uint word = aim_cells[c.x + cells.x * (c.y + cells.y * c.z)];
-    return Aims(2 + (word >> 4), inside ? word & 15u : 0u, 1.0 / per_metre);
+    uint word = aim_cells[c.x + grid.cells.x * (c.y + grid.cells.y * c.z)];
+    uint count = word & ((1u << AIM_COUNT_BITS) - 1u);
+    return Aims(word >> AIM_COUNT_BITS, inside ? count : 0u, 1.0 / grid.cells_per_metre);
 }
 
 // The directions in which a ball is seen: a cone, or a hemisphere from inside.
@@ -41,9 +38,9 @@ struct Cone {
 };
 
 Cone cone_to(Aims at, uint i, vec3 p) {
-    uvec4 ball = aim_table[min(at.first + i, uint(aim_table.length()) - 1u)];
-    vec3 to = uintBitsToFloat(ball.xyz) - p;
-    vec2 radius_share = unpackHalf2x16(ball.w);
+    AimBall ball = aim_balls[min(at.first + i, uint(aim_balls.length()) - 1u)];
+    vec3 to = ball.middle - p;
+    vec2 radius_share = unpackHalf2x16(ball.radius_share);
     float radius = radius_share.x * at.cell;
     float square = max(dot(to, to), 1e-30);
     return Cone(to * inversesqrt(square), sphere_cone(radius * radius, square), radius_share.y);

@@ -35,7 +35,7 @@ void cross_what_touches(inout Boundary r, HitSurface hit, vec3 direction) {
         goes_on = goes_on && last.triangle != NO_TRIANGLE;
         if (goes_on) {
             uint material = hit_material(last.triangle);
-            Material m = material_at(material & 0xffffu);
+            Material m = material_at(material & MATERIAL_OF_TRIANGLE);
             if (m.transmission > 0.0 && (material & SHEET_TRIANGLE) == 0) {
                 bool front = dot(hit_normal(last.triangle), direction) <= 0.0;
                 r.beyond = front ? entered(r.beyond, m.medium) : left(r.beyond, m.medium);

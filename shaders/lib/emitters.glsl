@@ -5,6 +5,7 @@
 #include "lib/hit.glsl"
 #include "lib/punctual.glsl"
 #include "lib/random.glsl"
+#include "share/emitters.glsl"
 
 layout(constant) const uint EMITTERS = 0;
 layout(constant) const uint EMITTER_STEPS = 0;           // halvings that single one of them out
@@ -16,15 +17,10 @@ layout(constant) const uint SKY_COLUMNS = 0;             // cells of its table
 layout(constant) const uint SKY_ROWS = 0;
 layout(constant) const uint SKY_STEPS = 0;               // halvings that single out a row, or a column
 
-// A texel each: first word of its share of all words | probability | EMITTER_..., two-sided | light, or place of the triangle.
 layout(scene, rgba32ui) readonly uniform uimageBuffer emitters;
+// @texels Emitter emitter_at(emitters)
 // First words of the rows' shares; then, row by row, those of the columns'.
 layout(scene, scalar) readonly buffer SkyShares { uint sky_shares[]; };
-const uint EMITTER_PUNCTUAL = 0;
-const uint EMITTER_TRIANGLE = 1;
-const uint EMITTER_SKY = 2;
-const uint EMITTER_NONE = 3; // nothing after all
-const uint EMITTER_TWO_SIDED = 4;
 
 // Light that may arrive at a point from one place.
 struct LightSample {
@@ -77,7 +73,7 @@ float sky_pdf(vec3 direction) {
     float p_row = probability_of_share(sky_share(0, SKY_ROWS, row), sky_share(0, SKY_ROWS, row + 1));
     float p_column = probability_of_share(sky_share(columns, SKY_COLUMNS, column), sky_share(columns, SKY_COLUMNS, column + 1));
     // The environment is the first of the emitters.
-    float picked = uintBitsToFloat(imageLoad(emitters, 0).y);
+    float picked = emitter_at(0).probability;
     return picked * sky_cell_pdf(p_row, p_column, sqrt(d.x * d.x + d.z * d.z));
 }
 
@@ -107,15 +103,16 @@ SkySample sample_sky(uint word_x, uint word_y) {
 
 // Twice the area of a triangle, times the unit normal of its front.
 vec3 doubled_area_of(uint triangle, out vec3 a, out vec3 ab, out vec3 ac) {
-    a = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3).xyz);
-    ab = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 1).xyz) - a;
-    ac = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 2).xyz) - a;
+    BvhTriangle t = triangle_at(triangle);
+    a = t.a;
+    ab = t.b - t.a;
+    ac = t.c - t.a;
     return doubled_area(ab, ac);
 }
 
 // Radiance that a triangle sends from the place with these barycentrics.
 vec3 emission_at(uint triangle, float u, float v) {
-    uint material = hit_material(triangle) & 0xffffu;
+    uint material = hit_material(triangle) & MATERIAL_OF_TRIANGLE;
     vec3 radiance = material_emissive(material);
     if ((HIT_TEXTURES & (1u << SLOT_EMISSIVE)) != 0) {
         HitPoint point = hit_point_of(Hit(0.0, triangle, u, v), vec3(0.0), vec3(0.0));
@@ -127,7 +124,7 @@ vec3 emission_at(uint triangle, float u, float v) {
 
 // Probability per area with which a triangle is drawn; 0 where it is none of the emitters.
 float picked_per_area(uint triangle) {
-    return uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 2).w);
+    return triangle_at(triangle).picked;
 }
 
 // One place that light comes from, for a point at `origin` in bvh space. `arriving` of the environment is 1 over the density:
@@ -137,19 +134,19 @@ LightSample sample_light(vec3 origin, uvec2 words) {
     uint found = 0;
     for (uint step = EMITTER_STEPS; step > 0; step--) {
         uint next = found + (1u << (step - 1));
-        uint first = imageLoad(emitters, int(min(next, EMITTERS - 1))).x;
+        uint first = emitter_at(min(next, EMITTERS - 1)).first;
         found = next < EMITTERS && first <= words.x ? next : found;
     }
-    uvec4 emitter = imageLoad(emitters, int(found));
-    uint next_first = found + 1 < EMITTERS ? imageLoad(emitters, int(found + 1)).x : 0u;
-    float probability = uintBitsToFloat(emitter.y);
-    float x = place_in_share(words.x, emitter.x, next_first);
-    uint kind = emitter.z & 3u;
+    Emitter emitter = emitter_at(found);
+    uint next_first = found + 1 < EMITTERS ? emitter_at(found + 1).first : 0u;
+    float probability = emitter.probability;
+    float x = place_in_share(words.x, emitter.first, next_first);
+    uint kind = emitter.kind & EMITTER_KIND;
     if (PUNCTUAL_EMITTERS) {
         if (kind == EMITTER_PUNCTUAL) {
             vec3 p_rel = origin - trace_terms.bvh_from_rel;
-            PunctualLight light = SHAPED_EMITTERS ? shaped_light_at(emitter.w, p_rel, vec2(x, unit_float(words.y)))
-                : punctual_light_at(emitter.w, p_rel);
+            PunctualLight light = SHAPED_EMITTERS ? shaped_light_at(emitter.place, p_rel, vec2(x, unit_float(words.y)))
+                : punctual_light_at(emitter.place, p_rel);
             r = LightSample(light.directional ? light.l : light.to_light, light.directional ? LARGEST : 1.0,
                             light.arriving / probability, 0.0);
         }
@@ -167,20 +164,20 @@ LightSample sample_light(vec3 origin, uvec2 words) {
             float y = unit_float(words.y);
             vec2 w = y > x ? vec2(0.5 * x, y - 0.5 * x) : vec2(x - 0.5 * y, 0.5 * y);
             vec3 a, ab, ac;
-            vec3 doubled = doubled_area_of(emitter.w, a, ab, ac);
+            vec3 doubled = doubled_area_of(emitter.place, a, ab, ac);
             float size = vector_length(doubled);
             vec3 n = doubled / size;
             vec3 p = a + w.x * ab + w.y * ac;
             vec3 to_light = p - origin;
             float side = dot(n, to_light) < 0.0 ? 1.0 : -1.0;
-            bool shows = side > 0.0 || (emitter.z & EMITTER_TWO_SIDED) != 0;
+            bool shows = side > 0.0 || (emitter.kind & EMITTER_TWO_SIDED) != 0;
             // A point of the air before the triangle: the triangle itself is not met.
             to_light += n * (side * trace_terms.offset);
             float r2 = dot(to_light, to_light);
             float cos_light = -side * dot(n, to_light) * inversesqrt(r2);
             float pdf = density_per_solid_angle(probability * 2.0 / size, r2, cos_light);
             bool lights = shows && r2 > 0.0 && cos_light > 0.0 && pdf <= LARGEST;
-            vec3 radiance = emission_at(emitter.w, w.x, w.y);
+            vec3 radiance = emission_at(emitter.place, w.x, w.y);
             r = LightSample(to_light, 1.0, lights ? radiance / pdf : vec3(0.0), lights ? pdf : 0.0);
         }
     }

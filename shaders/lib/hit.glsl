@@ -5,6 +5,7 @@
 #include "lib/encode.glsl"
 #include "lib/surface.glsl"
 #include "lib/trace.glsl"
+#include "share/corners.glsl"
 
 // Bit by slot: some material that rays may hit has such a texture.
 layout(constant) const uint HIT_TEXTURES = 0;
@@ -13,19 +14,13 @@ layout(constant) const bool HIT_SECOND_UVS = false; // some texture reads the se
 const bool HIT_UVS = HIT_TEXTURES != 0;
 const bool HIT_TANGENTS = (HIT_TEXTURES & (1u << SLOT_NORMAL | 1u << SLOT_CLEARCOAT_NORMAL)) != 0;
 
-// What lies at the corners of the triangles, in world axes, in the order of the leaves. Three texels per triangle:
-//   normal of a, material | ..._TRIANGLE   normal of b, world length of a metre of the object   normal of c, texture
-//   coordinates per metre
-// then, where HIT_TEXTURES says so, two of the first texture coordinates, two of the second, three of tangents with
-// their handedness, and two of colours as halves.
+// In the order of the leaves.
 layout(scene, rgba32ui) readonly uniform uimageBuffer hit_corners;
-const uint SHEET_TRIANGLE = 0x10000u;
-const uint ONE_SIDED_TRIANGLE = 0x20000u;
-const int UV0_AT = 3;
-const int UV1_AT = UV0_AT + (HIT_UVS ? 2 : 0);
-const int TANGENTS_AT = UV1_AT + (HIT_SECOND_UVS ? 2 : 0);
-const int COLORS_AT = TANGENTS_AT + (HIT_TANGENTS ? 3 : 0);
-const int CORNER_TEXELS = COLORS_AT + (HIT_COLORS ? 2 : 0);
+// @texels Corners.frame corner_frame(hit_corners)
+// @texels Corners.uvs corner_uvs(hit_corners)
+// @texels Corners.second_uvs corner_second_uvs(hit_corners)
+// @texels Corners.tangents corner_tangents(hit_corners)
+// @texels Corners.colors corner_colors(hit_corners)
 
 // All levels of all images, RGBA in bytes. A texel buffer can be read at any place by any lane, where sampled images cannot be chosen
 // by an index; lavapipe binds 128 MiB of a storage buffer at most, and 512 MiB of these.
@@ -106,77 +101,62 @@ struct HitPoint {
     uint face;      // flat face of the triangle
 };
 
-vec4 corner_texel(uint triangle, int i) {
-    return uintBitsToFloat(imageLoad(hit_corners, int(triangle) * CORNER_TEXELS + i));
-}
-
 // Its material | ..._TRIANGLE.
 uint hit_material(uint triangle) {
-    return floatBitsToUint(corner_texel(triangle, 0).w);
+    return corner_frame(triangle).material;
 }
 
 // OPAQUE or FILTER.
 uint hit_class(uint triangle) {
-    return imageLoad(bvh_triangles, int(triangle * 3)).w;
+    return triangle_at(triangle).stops;
 }
 
 // Across a triangle, on the side of its front, as long as twice its area.
 vec3 hit_normal(uint triangle) {
-    vec3 a = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3).xyz);
-    vec3 b = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 1).xyz);
-    vec3 c = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 2).xyz);
-    // Corners run counter-clockwise around the front, whatever mirrored the object.
-    return doubled_area(b - a, c - a);
+    BvhTriangle t = triangle_at(triangle);
+    return doubled_area(t.b - t.a, t.c - t.a);
+}
+
+vec4 four_halves(uvec2 words) {
+    return vec4(unpackHalf2x16(words.x), unpackHalf2x16(words.y));
 }
 
 HitPoint hit_point_of(Hit hit, vec3 origin, vec3 direction) {
-    int first = int(hit.triangle * 3);
-    vec3 a = uintBitsToFloat(imageLoad(bvh_triangles, first).xyz);
-    uvec4 b_face = imageLoad(bvh_triangles, first + 1);
-    vec3 b = uintBitsToFloat(b_face.xyz);
-    uint face = b_face.w;
-    vec3 c = uintBitsToFloat(imageLoad(bvh_triangles, first + 2).xyz);
-    vec4 ta = corner_texel(hit.triangle, 0);
-    vec4 tb = corner_texel(hit.triangle, 1);
-    vec4 tc = corner_texel(hit.triangle, 2);
+    BvhTriangle triangle = triangle_at(hit.triangle);
+    CornerFrame frame = corner_frame(hit.triangle);
     vec3 w = vec3(1.0 - hit.u - hit.v, hit.u, hit.v);
     HitPoint r;
-    r.p = hit_point(origin, direction, hit.t, a, b, c, hit.u, hit.v);
-    r.material = floatBitsToUint(ta.w) & 0xffffu;
-    r.sheet = (floatBitsToUint(ta.w) & SHEET_TRIANGLE) != 0;
-    r.scale = tb.w;
-    r.face = face;
-    r.uv_per_metre = tc.w;
-    // Corners run counter-clockwise around the front, whatever mirrored the object.
-    r.n = triangle_normal(a, b, c).n;
-    vec3 smooth_sum = ta.xyz * w.x + tb.xyz * w.y + tc.xyz * w.z;
+    r.p = hit_point(origin, direction, hit.t, triangle.a, triangle.b, triangle.c, hit.u, hit.v);
+    r.material = frame.material & MATERIAL_OF_TRIANGLE;
+    r.sheet = (frame.material & SHEET_TRIANGLE) != 0;
+    r.scale = frame.scale;
+    r.face = triangle.face;
+    r.uv_per_metre = frame.uv_per_metre;
+    r.n = triangle_normal(triangle.a, triangle.b, triangle.c).n;
+    vec3 smooth_sum = frame.normal_a * w.x + frame.normal_b * w.y + frame.normal_c * w.z;
     float length2 = dot(smooth_sum, smooth_sum);
     r.n_smooth = length2 > 0.0 ? smooth_sum * inversesqrt(length2) : r.n;
     r.n_smooth = dot(r.n_smooth, r.n) < 0.0 ? -r.n_smooth : r.n_smooth;
     r.t_smooth = vec4(0.0);
     if (HIT_TANGENTS) {
-        vec4 t = corner_texel(hit.triangle, TANGENTS_AT);
-        r.t_smooth.xyz = t.xyz * w.x + corner_texel(hit.triangle, TANGENTS_AT + 1).xyz * w.y +
-                         corner_texel(hit.triangle, TANGENTS_AT + 2).xyz * w.z;
-        r.t_smooth.w = t.w;
+        CornerTangents t = corner_tangents(hit.triangle);
+        r.t_smooth = vec4(t.a.xyz * w.x + t.b.xyz * w.y + t.c.xyz * w.z, t.a.w);
     }
     r.uvs = vec4(0.0);
     if (HIT_UVS) {
-        vec4 ab = corner_texel(hit.triangle, UV0_AT);
-        r.uvs.xy = ab.xy * w.x + ab.zw * w.y + corner_texel(hit.triangle, UV0_AT + 1).xy * w.z;
+        CornerUvs uv = corner_uvs(hit.triangle);
+        r.uvs.xy = uv.a * w.x + uv.b * w.y + uv.c * w.z;
     }
     if (HIT_SECOND_UVS) {
-        vec4 ab = corner_texel(hit.triangle, UV1_AT);
-        r.uvs.zw = ab.xy * w.x + ab.zw * w.y + corner_texel(hit.triangle, UV1_AT + 1).xy * w.z;
+        CornerUvs uv = corner_second_uvs(hit.triangle);
+        r.uvs.zw = uv.a * w.x + uv.b * w.y + uv.c * w.z;
     }
     r.color = vec4(1.0);
     if (HIT_COLORS) {
-        uvec4 ab = floatBitsToUint(corner_texel(hit.triangle, COLORS_AT));
-        uvec2 of_c = floatBitsToUint(corner_texel(hit.triangle, COLORS_AT + 1).xy);
+        CornerColors color = corner_colors(hit.triangle);
         // White stays white to the last bit: the weights' sum need not be 1.
-        vec4 first = vec4(unpackHalf2x16(ab.x), unpackHalf2x16(ab.y));
-        r.color = first + (vec4(unpackHalf2x16(ab.z), unpackHalf2x16(ab.w)) - first) * w.y +
-                  (vec4(unpackHalf2x16(of_c.x), unpackHalf2x16(of_c.y)) - first) * w.z;
+        vec4 first = four_halves(color.a);
+        r.color = first + (four_halves(color.b) - first) * w.y + (four_halves(color.c) - first) * w.z;
     }
     return r;
 }

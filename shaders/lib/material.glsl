@@ -23,6 +23,11 @@ vec4 material_texel(uint id, int i) {
 }
 
 // @texels Material material_at(material_words)
+// @texels Material.emissive material_emissive(material_words)
+// @texels Material.flags material_flags(material_words)
+// @texels Material.ior material_ior(material_words)
+// @texels Material.sigma material_sigma(material_words)
+// @texels Material.grid material_grid(material_words)
 
 // Where a material's texture is read: KHR_texture_transform as two rows, which set of coordinates, and which layer of its page.
 struct TextureSlot {
@@ -50,26 +55,5 @@ vec2 slot_coordinates(TextureSlot at, vec4 uv_sets) {
 vec3 page_coordinates(uint material, uint slot, vec4 uv_sets) {
     TextureSlot at = texture_slot(material, slot);
     return vec3(slot_coordinates(at, uv_sets), at.layer);
-}
-
-vec3 material_emissive(uint id) {
-    return material_texel(id, 1).xyz;
-}
-
-uint material_flags(uint id) {
-    return floatBitsToUint(material_texel(id, 5).w);
-}
-
-float material_ior(uint id) {
-    return material_texel(id, 4).x;
-}
-
-vec3 material_sigma(uint id) {
-    return material_texel(id, 6).xyz;
-}
-
-// Of its grid of σ (lib/sigma_grid.glsl) the first texel + 1; 0 where none is marched.
-uint material_grid(uint id) {
-    return material_words(id, 8).w;
 }
 #endif

@@ -27,18 +27,11 @@ vec3 left_at_eye(Surface s) {
 }
 
 // Where the ray of a pixel meets the plane of the triangle that was drawn there. What depth and stored normal tell of
-// the point has roundings of its own, off the plane that rays meet. Not into a Surface at once: glslang never ends
-// where a `precise` value comes from a struct that is assigned from itself.
+// the point has roundings of its own, off the plane that rays meet.
 HitPoint on_triangle(uint leaf, vec3 p_bvh, vec3 direction) {
-    vec3 a = uintBitsToFloat(imageLoad(bvh_triangles, int(leaf) * 3).xyz);
-    vec3 b = uintBitsToFloat(imageLoad(bvh_triangles, int(leaf) * 3 + 1).xyz);
-    vec3 c = uintBitsToFloat(imageLoad(bvh_triangles, int(leaf) * 3 + 2).xyz);
     // Parallel rays come from the pixel's point, all others from the eye.
     vec3 origin = camera.orthographic != 0 ? p_bvh : trace_terms.bvh_from_rel;
-    precise vec3 to_a = a - origin;
-    precise vec3 to_b = b - origin;
-    precise vec3 to_c = c - origin;
-    ShearedTriangle t = sheared_triangle(ray_shear(direction), to_a, to_b, to_c);
+    ShearedTriangle t = sheared_from(triangle_at(leaf), origin, ray_shear(direction));
     float whole = t.det == 0.0 ? 1.0 : t.det;
     return hit_point_of(Hit(0.0, leaf, t.weights.y / whole, t.weights.z / whole), p_bvh, vec3(0.0));
 }

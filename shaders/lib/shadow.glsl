@@ -76,10 +76,7 @@ vec3 filtered(HitPoint point, vec3 direction, inout uvec4 media) {
 
 // A hit that is known, with its barycentrics.
 Hit hit_again(vec3 origin, vec3 direction, float t, uint triangle) {
-    precise vec3 a = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3).xyz) - origin;
-    precise vec3 b = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 1).xyz) - origin;
-    precise vec3 c = uintBitsToFloat(imageLoad(bvh_triangles, int(triangle) * 3 + 2).xyz) - origin;
-    ShearedTriangle s = sheared_triangle(ray_shear(direction), a, b, c);
+    ShearedTriangle s = sheared_from(triangle_at(triangle), origin, ray_shear(direction));
     float inverse = 1.0 / s.det;
     return Hit(t, triangle, s.weights.y * inverse, s.weights.z * inverse);
 }

@@ -5,29 +5,28 @@
 #include "lib/medium.glsl"
 #include "lib/spectrum.glsl"
 #include "lib/trace.glsl"
+#include "share/sigma_grid.glsl"
 
 layout(constant) const uint MARCH_STEPS = 0;        // of each segment, a multiple of 4; 0: no grid is marched
 layout(constant) const uint QUADRATURE = QUADRATURE_MIDPOINT;
 layout(constant) const bool MARCH_COLOURS = false;  // some grid has values for red, green and blue
 
-// Per grid five texels: three rows that lead from bvh space to places in the grid, 0 at the first point of an axis, 1 at
-// the next; places of the last points, and the first texel of the values; texels per channel, 0 where all are one.
-// Then for each pair of neighbours along x and y, layer by layer: the values at both x of the first y and of the second.
-// Two fetches make a trilinear value so, where a texel a point would take eight.
 layout(scene, rgba32f) readonly uniform imageBuffer sigma_grids;
 
-struct SigmaGrid {
-    vec3 last;
-    int first;
-    int channel;
-};
+uvec4 sigma_words(uint first, int i) {
+    return floatBitsToUint(imageLoad(sigma_grids, int(first) + i));
+}
+
+// @texels SigmaGrid sigma_grid_at(sigma_words)
+// @texels SigmaCell sigma_cell_at(sigma_words)
 
 float sigma_in_cell(int texel, int next_layer, vec3 share) {
-    vec4 low = imageLoad(sigma_grids, texel);
-    vec4 high = imageLoad(sigma_grids, texel + next_layer);
+    SigmaCell low = sigma_cell_at(uint(texel));
+    SigmaCell high = sigma_cell_at(uint(texel + next_layer));
     // As a + (b − a) t, which is a to the last bit where b is.
-    vec4 across = low + (high - low) * share.z;
-    vec2 along = across.xy + (across.zw - across.xy) * share.y;
+    vec2 first_y = low.first_y + (high.first_y - low.first_y) * share.z;
+    vec2 second_y = low.second_y + (high.second_y - low.second_y) * share.z;
+    vec2 along = first_y + (second_y - first_y) * share.y;
     return along.x + (along.y - along.x) * share.x;
 }
 
@@ -38,12 +37,13 @@ vec3 sigma_at(SigmaGrid grid, vec3 place) {
     ivec3 i = ivec3(cell);
     ivec2 cells = max(ivec2(grid.last.xy), 1);
     int layer = cells.x * cells.y;
-    int texel = grid.first + i.z * layer + i.y * cells.x + i.x;
+    int texel = int(grid.first) + i.z * layer + i.y * cells.x + i.x;
     int next_layer = grid.last.z > 0.0 ? layer : 0;
     float red = sigma_in_cell(texel, next_layer, at - cell);
     if (!MARCH_COLOURS) return vec3(red);
-    return sum_of_rgb(vec3(red, sigma_in_cell(texel + grid.channel, next_layer, at - cell),
-                           sigma_in_cell(texel + 2 * grid.channel, next_layer, at - cell)));
+    int channel = int(grid.channel);
+    return sum_of_rgb(vec3(red, sigma_in_cell(texel + channel, next_layer, at - cell),
+                           sigma_in_cell(texel + 2 * channel, next_layer, at - cell)));
 }
 
 void add_sigma(inout vec3 sum, inout vec3 rest, vec3 sigma) {
@@ -57,14 +57,12 @@ void add_sigma(inout vec3 sum, inout vec3 rest, vec3 sigma) {
 // The mean of σ over a length d from p along a unit direction, by MARCH_STEPS steps of QUADRATURE: lecture A2 divided by d.
 // A segment's steps do not depend on its length. `at` is the grid's first texel.
 vec3 mean_sigma(uint at, vec3 p, vec3 direction, float d) {
-    vec4 rows[3] = vec4[3](imageLoad(sigma_grids, int(at)), imageLoad(sigma_grids, int(at) + 1), imageLoad(sigma_grids, int(at) + 2));
-    vec4 last_first = imageLoad(sigma_grids, int(at) + 3);
-    SigmaGrid grid = SigmaGrid(last_first.xyz, int(last_first.w), int(imageLoad(sigma_grids, int(at) + 4).x));
+    SigmaGrid grid = sigma_grid_at(at);
     vec4 from = vec4(p, 1.0);
-    vec3 start = vec3(dot(rows[0], from), dot(rows[1], from), dot(rows[2], from));
+    vec3 start = vec3(dot(grid.x_row, from), dot(grid.y_row, from), dot(grid.z_row, from));
     uint steps = loop_heads < LOOP_BUDGET ? MARCH_STEPS : 4u;
     vec3 along = direction * (d / float(steps));
-    vec3 stride = vec3(dot(rows[0].xyz, along), dot(rows[1].xyz, along), dot(rows[2].xyz, along));
+    vec3 stride = vec3(dot(grid.x_row.xyz, along), dot(grid.y_row.xyz, along), dot(grid.z_row.xyz, along));
     vec4 w = quadrature_weights(QUADRATURE);
     vec3 sum = vec3(0.0);
     vec3 rest = vec3(0.0);

@@ -5,6 +5,7 @@
 #define TRACE_GLSL
 #include "lib/loops.glsl"
 #include "lib/ray.glsl"
+#include "share/bvh.glsl"
 #include "share/trace.glsl"
 
 layout(constant) const uint TRAVERSAL = 0;
@@ -13,12 +14,16 @@ const uint LINKS_32 = 1; // boxes of floats
 const uint STACK = 2;
 // Lists of nodes ordered for each octant of directions, before the one for any hit, which is the only one without.
 layout(constant) const bool OCTANTS = false;
+const int OCTANT_LISTS = 8;
 
 layout(scene, rgba32ui) readonly uniform uimageBuffer bvh_nodes;
-// Three texels per triangle: corner, and: class | flat face that it is part of | probability per area with which paths draw
-// it as a light (lib/emitters.glsl).
 layout(scene, rgba32ui) readonly uniform uimageBuffer bvh_triangles;
 layout(scene, scalar) uniform TraceBlock { TraceTerms trace_terms; };
+
+// @texels GridNode grid_node_at(bvh_nodes)
+// @texels FloatNode float_node_at(bvh_nodes)
+// @texels StackNode stack_node_at(bvh_nodes)
+// @texels BvhTriangle triangle_at(bvh_triangles)
 
 // What a ray stops at.
 const uint OPAQUE = 1;
@@ -49,13 +54,13 @@ BoxRay box_ray(vec3 origin, vec3 direction, bool any_order) {
     BoxRay r;
     vec3 inverse = inverse_direction(direction);
     r.end = int(trace_terms.nodes);
-    int list = any_order || !OCTANTS ? OCTANTS ? 8 : 0 : octant(direction);
+    int list = any_order || !OCTANTS ? OCTANTS ? OCTANT_LISTS : 0 : octant(direction);
     r.base = list * (r.end + 1);
     if (TRAVERSAL == LINKS_16) {
         // Boxes are a grid unit larger than need be on each side, 1.5e-5 of the scene: more than the roundings here as
         // long as the origin is within 80 times its extent.
         vec3 unit = inverse * trace_terms.grid_unit;
-        r.inverse = unit * (1.0 / 65536.0);
+        r.inverse = unit * (1.0 / float(1 << SLAB_BITS));
         r.start_near = (trace_terms.grid_middle - origin) * inverse;
         r.start_far = r.start_near;
         r.extent = abs(unit);
@@ -68,7 +73,7 @@ BoxRay box_ray(vec3 origin, vec3 direction, bool any_order) {
 // One way through the tree, ready to go on.
 struct Walk {
     int node;  // the next node, or BoxRay.end
-    int leaf;  // triangles found and not tested yet, ~(first · 8 + count − 1); 0: none
+    int leaf;  // triangles found and not tested yet, as a leaf of the tree; 0: none
     Hit hit;
 };
 
@@ -83,21 +88,21 @@ void visit(inout Walk w, BoxRay r, float t_min) {
     vec3 near, far;
     int word;
     if (TRAVERSAL == LINKS_16) {
-        uvec4 node = imageLoad(bvh_nodes, r.base + w.node);
-        // The whole word is the centre, times 65536.
-        vec3 half_extent = vec3(ivec3(node.xyz & 0xffffu));
-        vec3 t = vec3(ivec3(node.xyz)) * r.inverse + r.start_near;
+        GridNode node = grid_node_at(uint(r.base + w.node));
+        // The whole word is the centre, in steps of which the half extent is a fraction.
+        vec3 half_extent = vec3(node.slabs & ((1 << SLAB_BITS) - 1));
+        vec3 t = vec3(node.slabs) * r.inverse + r.start_near;
         vec3 e = half_extent * r.extent;
         near = t - e;
         far = t + e;
-        word = int(node.w);
+        word = node.word;
     } else {
-        uvec4 node = imageLoad(bvh_nodes, (r.base + w.node) * 2);
-        vec3 t = uintBitsToFloat(node.xyz) * r.inverse;
-        vec3 e = uintBitsToFloat(imageLoad(bvh_nodes, (r.base + w.node) * 2 + 1).xyz) * r.extent;
+        FloatNode node = float_node_at(uint(r.base + w.node));
+        vec3 t = node.center * r.inverse;
+        vec3 e = node.half_extent * r.extent;
         near = t + r.start_near - e;
         far = t + r.start_far + e;
-        word = int(node.w);
+        word = node.word;
     }
     bool leaf = word < 0;
     bool hit = meets(near, far, t_min, w.hit.t);
@@ -149,28 +154,31 @@ const uint NEAREST = 0;
 const uint ANY = 1;
 const uint TO_LIGHT = 2; // any opaque triangle ends it, filters are collected
 
+// A triangle as a ray sees it. A function of its own: glslang never ends where a `precise` value comes from a member of what was
+// fetched at a place that depends on itself.
+ShearedTriangle sheared_from(BvhTriangle triangle, vec3 origin, Shear shear) {
+    precise vec3 a = triangle.a - origin;
+    precise vec3 b = triangle.b - origin;
+    precise vec3 c = triangle.c - origin;
+    return sheared_triangle(shear, a, b, c);
+}
+
 // One triangle of the leaf that is kept. The nearest counts, of two at the same t the first: any order of the tree finds
 // the same.
 void test_triangle(inout Walk w, inout Filters f, TriangleRay r, BoxRay b, uint classes, uint purpose) {
     bool pending = w.leaf != 0;
     triangle_tests += pending ? 1u : 0u;
     int place = ~w.leaf;
-    int triangle = pending ? place >> 3 : 0;
-    uvec4 ta = imageLoad(bvh_triangles, triangle * 3);
-    uvec4 tb = imageLoad(bvh_triangles, triangle * 3 + 1);
-    uvec4 tc = imageLoad(bvh_triangles, triangle * 3 + 2);
-    precise vec3 a = uintBitsToFloat(ta.xyz) - r.origin;
-    precise vec3 b_rel = uintBitsToFloat(tb.xyz) - r.origin;
-    precise vec3 c = uintBitsToFloat(tc.xyz) - r.origin;
-    ShearedTriangle s = sheared_triangle(r.shear, a, b_rel, c);
+    uint index = uint(pending ? place >> LEAF_BITS : 0);
+    BvhTriangle triangle = triangle_at(index);
+    ShearedTriangle s = sheared_from(triangle, r.origin, r.shear);
     float inverse = 1.0 / s.det;
     float t = s.depth * inverse / r.shear.dz;
-    uint index = uint(triangle);
-    bool hit = pending && s.inside && s.det != 0.0 && (ta.w & classes) != 0 && tb.w != r.self;
+    bool hit = pending && s.inside && s.det != 0.0 && (triangle.stops & classes) != 0 && triangle.face != r.self;
     hit = hit && (t > r.after || (t == r.after && index > r.after_triangle));
     hit = hit && (t < w.hit.t || (t == w.hit.t && index < w.hit.triangle));
     if (purpose == TO_LIGHT) {
-        bool is_filter = hit && (ta.w & FILTER) != 0;
+        bool is_filter = hit && (triangle.stops & FILTER) != 0;
         insert(f, is_filter ? t : LARGEST, is_filter ? index : NO_TRIANGLE);
         hit = hit && !is_filter;
     }
@@ -178,8 +186,9 @@ void test_triangle(inout Walk w, inout Filters f, TriangleRay r, BoxRay b, uint 
     w.hit.triangle = hit ? index : w.hit.triangle;
     w.hit.u = hit ? s.weights.y * inverse : w.hit.u;
     w.hit.v = hit ? s.weights.z * inverse : w.hit.v;
-    // The next triangle of the leaf: first + 1, count − 1.
-    int rest = (place & 7) == 0 ? 0 : ~(place + 7);
+    // The next triangle of the leaf: one more to begin with, one fewer.
+    const int others = (1 << LEAF_BITS) - 1;
+    int rest = (place & others) == 0 ? 0 : ~(place + others);
     w.leaf = pending ? rest : 0;
     bool ended = purpose != NEAREST && hit;
     w.node = ended ? b.end : w.node;
@@ -256,16 +265,12 @@ Hit walk_stack(TriangleRay r, vec3 direction, float t_max, uint classes, uint pu
             bool keep = at_leaf && w.leaf == 0;
             w.leaf = keep ? w.node : w.leaf;
             bool inner = w.node >= 0 && w.node != b.end;
-            int at = inner ? w.node * 4 : 0;
             node_visits += inner ? 1u : 0u;
-            uvec4 left = imageLoad(bvh_nodes, at);
-            uvec4 left_half = imageLoad(bvh_nodes, at + 1);
-            uvec4 right = imageLoad(bvh_nodes, at + 2);
-            uvec4 right_half = imageLoad(bvh_nodes, at + 3);
-            vec3 tl = uintBitsToFloat(left.xyz) * b.inverse;
-            vec3 el = uintBitsToFloat(left_half.xyz) * b.extent;
-            vec3 tr = uintBitsToFloat(right.xyz) * b.inverse;
-            vec3 er = uintBitsToFloat(right_half.xyz) * b.extent;
+            StackNode node = stack_node_at(uint(inner ? w.node : 0));
+            vec3 tl = node.left_center * b.inverse;
+            vec3 el = node.left_half_extent * b.extent;
+            vec3 tr = node.right_center * b.inverse;
+            vec3 er = node.right_half_extent * b.extent;
             vec3 near_l = tl + b.start_near - el;
             vec3 near_r = tr + b.start_near - er;
             bool hit_l = inner && meets(near_l, tl + b.start_far + el, r.after, w.hit.t);
@@ -273,10 +278,10 @@ Hit walk_stack(TriangleRay r, vec3 direction, float t_max, uint classes, uint pu
             float enter_l = max(near_l.x, max(near_l.y, near_l.z));
             float enter_r = max(near_r.x, max(near_r.y, near_r.z));
             bool swap = enter_r < enter_l;
-            int first = swap ? int(left_half.w) : int(left.w);
-            int second = swap ? int(left.w) : int(left_half.w);
+            int first = swap ? node.right : node.left;
+            int second = swap ? node.left : node.right;
             bool both = hit_l && hit_r;
-            int one = hit_l ? int(left.w) : int(left_half.w);
+            int one = hit_l ? node.left : node.right;
             // Written whatever comes: only where the next entry goes is decided.
             stack[min(entries, int(STACK_SIZE) - 1)] = second;
             entries += both ? 1 : 0;

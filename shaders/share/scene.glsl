@@ -36,7 +36,7 @@ struct Material {
     vec3 n_metal;             // index of refraction and extinction of a metal per channel, where flagged
     float thickness;          // nominal, in metres of the object
     vec3 kappa_metal;
-    uint grid;                // of σ, as lib/material.glsl says
+    uint grid;                // of σ (share/sigma_grid.glsl) the first texel + 1; 0 where none is marched
 };
 const uint MATERIAL_UNLIT = 1;
 const uint MATERIAL_BLENDED = 2;   // alpha is coverage

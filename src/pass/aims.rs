@@ -6,15 +6,16 @@ use anyhow::Result;
 use glam::DVec3;
 use half::f16;
 
-use super::upload::upload;
+use super::upload::{pack_half_2x16, upload};
 use crate::gpu::{Buffer, Device, NOTHING, Place};
 use crate::scene::caustics::{Aims, Ball};
+use crate::share::{AimBall, AimGrid};
 
 /// A grid of cells, and the balls of each.
 pub struct AimsOnDevice {
     /// A word each.
     pub cells: Buffer,
-    /// Two texels of the grid, and one of each ball.
+    /// An [`AimGrid`], then an [`AimBall`] each.
     pub balls: Buffer,
 }
 
@@ -22,20 +23,18 @@ impl AimsOnDevice {
     /// # Errors
     /// When memory is short.
     pub fn new(device: &Arc<Device>, aims: &Aims) -> Result<Self> {
-        let texel = |p: DVec3, w: u32| {
-            let [x, y, z] = p.to_array().map(|x| (x as f32).to_bits());
-            [x, y, z, w]
+        let in_f32 = |p: DVec3| p.as_vec3().to_array();
+        let ball = |ball: &Ball| AimBall {
+            middle: in_f32(ball.middle),
+            radius_share: pack_half_2x16([ball.radius / aims.cell, ball.share].map(f16::from_f64)),
         };
-        let [across, up, deep] = aims.cells;
-        let ball = |ball: &Ball| {
-            let [radius, share] = [ball.radius / aims.cell, ball.share].map(|x| u32::from(f16::from_f64(x).to_bits()));
-            texel(ball.middle, radius | share << 16)
-        };
-        let grid = [texel(aims.corner, (aims.cell.recip() as f32).to_bits()), [across, up, deep, 0]];
-        let texels: Vec<[u32; 4]> = grid.into_iter().chain(aims.aims.iter().map(ball)).collect();
+        let grid =
+            AimGrid { corner: in_f32(aims.corner), cells_per_metre: aims.cell.recip() as f32, cells: aims.cells };
+        let balls: Vec<AimBall> = aims.aims.iter().map(ball).collect();
+        let table = [bytemuck::bytes_of(&grid), bytemuck::cast_slice(&balls)].concat();
         Ok(Self {
             cells: upload(device, "cells of aims", &aims.firsts, None)?,
-            balls: upload(device, "aims", &texels, None)?,
+            balls: upload(device, "aims", &table, None)?,
         })
     }
 

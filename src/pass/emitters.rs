@@ -7,13 +7,12 @@ use ash::vk;
 
 use super::upload::upload;
 use crate::gpu::{Buffer, Device, NOTHING};
-use crate::scene::emitters::{Emitter, Emitters, Source};
-
-use crate::shader::lib::emitters::{EMITTER_NONE, EMITTER_PUNCTUAL, EMITTER_SKY, EMITTER_TRIANGLE, EMITTER_TWO_SIDED};
+use crate::scene::emitters::{Emitters, Source};
+use crate::share::{EMITTER_NONE, EMITTER_PUNCTUAL, EMITTER_SKY, EMITTER_TRIANGLE, EMITTER_TWO_SIDED, Emitter};
 
 /// What paths draw light from; next to nothing without any.
 pub struct EmittersOnDevice {
-    /// A texel each.
+    /// An [`Emitter`] each.
     pub table: Buffer,
     /// Shares of the environment's cells.
     pub sky: Buffer,
@@ -35,7 +34,7 @@ impl EmittersOnDevice {
     /// # Errors
     /// When memory is short.
     pub fn new(device: &Arc<Device>, emitters: &Emitters, leaf_places: &[u32]) -> Result<Self> {
-        let texel = |emitter: &Emitter| {
+        let shared = |emitter: &crate::scene::emitters::Emitter| {
             let (kind, place) = match emitter.source {
                 Source::Sky => (EMITTER_SKY, 0),
                 Source::Punctual(light) => (EMITTER_PUNCTUAL, light),
@@ -47,9 +46,9 @@ impl EmittersOnDevice {
                     }
                 }
             };
-            [emitter.first, (emitter.probability as f32).to_bits(), kind, place]
+            Emitter { first: emitter.first, probability: emitter.probability as f32, kind, place }
         };
-        let list: Vec<[u32; 4]> = emitters.list.iter().map(texel).collect();
+        let list: Vec<Emitter> = emitters.list.iter().map(shared).collect();
         let any = |test: fn(&Source) -> bool| emitters.list.iter().any(|emitter| test(&emitter.source));
         let name = |named: &'static str, empty: bool| if empty { NOTHING } else { named };
         Ok(Self {

@@ -1,6 +1,7 @@
 //! What rays go through on the device: the bounding volume hierarchy, its triangles, and what their surfaces look like
 //! (shaders/lib/trace.glsl, hit.glsl).
 
+use std::mem::offset_of;
 use std::sync::Arc;
 
 use anyhow::Result;
@@ -12,7 +13,7 @@ use serde::Serialize;
 use super::aims::AimsOnDevice;
 use super::emitters::EmittersOnDevice;
 use super::scene::{BENT, cofactors as cofactors_of, medium, texture_bits};
-use super::upload::upload;
+use super::upload::{pack_half_2x16, upload};
 use super::view::View;
 use crate::gpu::{Buffer, Device, Frame, NOTHING, Place};
 use crate::plan::{Plan, Rays};
@@ -23,9 +24,11 @@ use crate::scene::emitters::{Emitters, Source};
 use crate::scene::solid::{Solids, media_at};
 use crate::scene::{AlphaMode, Mesh, Scene};
 use crate::shader::lib;
-use crate::shader::lib::hit::{ONE_SIDED_TRIANGLE, SHEET_TRIANGLE};
-use crate::shader::lib::trace::{FILTER, LINKS_16, LINKS_32, OPAQUE, STACK};
-use crate::share::{TraceTerms, WorkCounts};
+use crate::shader::lib::trace::{FILTER, LINKS_16, LINKS_32, OCTANT_LISTS, OPAQUE, STACK};
+use crate::share::{
+    self, BvhTriangle, CornerColors, CornerFrame, CornerTangents, CornerUvs, MATERIAL_OF_TRIANGLE, ONE_SIDED_TRIANGLE,
+    SHEET_TRIANGLE, TraceTerms, WorkCounts,
+};
 
 /// Rays start this many roundings of the largest coordinate off their surface (shaders/lib/trace.glsl, `ray_origin`).
 const OFFSET_ROUNDINGS: f64 = 32.0;
@@ -97,9 +100,9 @@ impl Default for TraceConstants {
 pub struct RaysOnDevice {
     /// Nodes in all lists.
     pub nodes: Buffer,
-    /// Three texels per triangle.
+    /// A [`BvhTriangle`] each.
     pub triangles: Buffer,
-    /// What lies at their corners.
+    /// What lies at their corners: [`share::Corners`] as far as the scene calls for them.
     pub corners: Buffer,
     /// The flat face of each triangle in the order of the leaves.
     pub faces: Vec<u32>,
@@ -147,14 +150,14 @@ impl RaysOnDevice {
         let by_links = if bvh.fits_grid() { Traversal::Links16 } else { Traversal::Links32 };
         let default = if device.limits_loops() { by_links } else { Traversal::Stack };
         let traversal = traversal.unwrap_or(default);
-        let ordered = 8 * bvh.nodes.len() * if traversal == Traversal::Links32 { 32 } else { 16 };
+        let format = if traversal == Traversal::Links32 { Format::Float } else { Format::Quantised };
+        let ordered = Order::OCTANTS.len() * bvh.nodes.len() * format.texels() * 16;
         let octants = traversal != Traversal::Stack && ordered <= MOST_ORDERED_BYTES;
         let filter: Vec<bool> = (0..scene.instances.len()).map(|i| is_filter(scene, solids, plan, i)).collect();
         let filters: Vec<bool> = bvh.triangles.iter().map(|t| filter[t.instance as usize]).collect();
         let (nodes, sentinel) = match traversal {
             Traversal::Stack => (bvh.stack_nodes(), 0),
             Traversal::Links16 | Traversal::Links32 => {
-                let format = if traversal == Traversal::Links16 { Format::Quantised } else { Format::Float };
                 let ordered: &[Order] = if octants { &Order::OCTANTS } else { &[] };
                 let lists = bvh.lists(&[ordered, &[Order::AnyHit]].concat(), format);
                 (lists.concat(), lists[0].len() / format.texels() - 1)
@@ -171,21 +174,21 @@ impl RaysOnDevice {
             })
             .collect();
         let corners = Corners::of(scene, solids, rays, plan.paths.is_some());
-        let mut picked = vec![0_u32; scene.triangles()];
+        let mut picked = vec![0.0; scene.triangles()];
         for emitter in &emitters.list {
             if let Source::Triangle { index, area, .. } = emitter.source {
-                picked[index as usize] = ((emitter.probability / area) as f32).to_bits();
+                picked[index as usize] = (emitter.probability / area) as f32;
             }
         }
-        let triangles: Vec<[[u32; 4]; 3]> = bvh
+        let triangles: Vec<BvhTriangle> = bvh
             .triangles
             .par_iter()
             .zip(filters.par_iter().zip(&faces))
             .map(|(t, (&is_filter, &face))| {
-                let [a, b, c] = corners.order(t).map(|i| t.corners[i].map(f32::to_bits));
-                let class = if is_filter { FILTER } else { OPAQUE };
+                let [a, b, c] = corners.order(t).map(|i| t.corners[i]);
+                let stops = if is_filter { FILTER } else { OPAQUE };
                 let picked = picked[(first_triangle[t.instance as usize] + t.primitive) as usize];
-                [[a[0], a[1], a[2], class], [b[0], b[1], b[2], face], [c[0], c[1], c[2], picked]]
+                BvhTriangle { a, stops, b, face, c, picked }
             })
             .collect();
         let mut leaf_places = vec![u32::MAX; scene.triangles()];
@@ -408,11 +411,13 @@ fn flat_faces(mesh: &Mesh) -> Vec<u32> {
     faces
 }
 
+const _: () = assert!(Order::OCTANTS.len() == OCTANT_LISTS as usize);
+
 /// All that may lie at the corners.
 const EVERYTHING: lib::hit::Constants =
     lib::hit::Constants { hit_textures: (1 << lib::material::SLOTS) - 1, hit_colors: true, hit_second_uvs: true };
 
-/// What lies at the corners of triangles, as shaders/lib/hit.glsl reads it.
+/// What lies at the corners of triangles.
 struct Corners<'a> {
     scene: &'a Scene,
     solids: &'a Solids,
@@ -428,6 +433,8 @@ struct Corners<'a> {
     scales: Vec<f32>,
     /// What the shader is told of them.
     contents: lib::hit::Constants,
+    /// Those texels of [`share::Corners`] that `contents` call for.
+    kept: Vec<usize>,
 }
 
 impl<'a> Corners<'a> {
@@ -440,6 +447,17 @@ impl<'a> Corners<'a> {
             contents.hit_second_uvs |= material.textures().any(|(.., t)| t.is_some_and(|t| t.uv_set == 1));
             contents.hit_colors |= !mesh.colors.is_empty();
         }
+        let parts = [
+            (offset_of!(share::Corners, uvs), size_of::<CornerUvs>(), contents.hit_textures != 0),
+            (offset_of!(share::Corners, second_uvs), size_of::<CornerUvs>(), contents.hit_second_uvs),
+            (offset_of!(share::Corners, tangents), size_of::<CornerTangents>(), contents.hit_textures & BENT != 0),
+            (offset_of!(share::Corners, colors), size_of::<CornerColors>(), contents.hit_colors),
+        ];
+        let left_out = |texel: &usize| {
+            let holds = |at: usize, size: usize| (at..at + size).contains(&(texel * 16));
+            parts.iter().any(|&(at, size, is_kept)| !is_kept && holds(at, size))
+        };
+        let kept = (0..size_of::<share::Corners>() / 16).filter(|texel| !left_out(texel)).collect();
         let (mut cofactors, mut mirrored, mut normals_mirrored, mut scales) =
             (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (i, instance) in scene.instances.iter().enumerate() {
@@ -463,6 +481,7 @@ impl<'a> Corners<'a> {
             normals_mirrored,
             scales,
             contents,
+            kept,
         }
     }
 
@@ -471,7 +490,12 @@ impl<'a> Corners<'a> {
         if self.mirrored[t.instance as usize] { [0, 2, 1] } else { [0, 1, 2] }
     }
 
-    fn texels(&self, t: &Triangle) -> Vec<[u32; 4]> {
+    fn texels(&self, t: &Triangle) -> impl Iterator<Item = [u32; 4]> {
+        let texels: [[u32; 4]; size_of::<share::Corners>() / 16] = bytemuck::cast(self.all_of(t));
+        self.kept.iter().map(move |&kept| texels[kept])
+    }
+
+    fn all_of(&self, t: &Triangle) -> share::Corners {
         let i = t.instance as usize;
         let instance = &self.scene.instances[i];
         let mesh = &self.scene.meshes[instance.mesh];
@@ -489,41 +513,32 @@ impl<'a> Corners<'a> {
         let density = if area > 0.0 { ((b - a).perp_dot(c - a).abs() / area).sqrt() as f32 } else { 0.0 };
         let one_sided = self.one_sided && !material.double_sided;
         let flags = if sheet { SHEET_TRIANGLE } else { 0 } | if one_sided { ONE_SIDED_TRIANGLE } else { 0 };
-        let words = [mesh.material as u32 | flags, self.scales[i].to_bits(), density.to_bits()];
-        let mut texels = Vec::with_capacity(12);
-        for (n, word) in normals.iter().zip(words) {
-            texels.push([n[0].to_bits(), n[1].to_bits(), n[2].to_bits(), word]);
+        let [normal_a, normal_b, normal_c] = normals;
+        let pairs = |[a, b, c]: [[f32; 2]; 3]| CornerUvs { a, b, c, pad: [0.0; 2] };
+        let linear = instance.world_from_object.matrix3;
+        let side = if self.normals_mirrored[i] { -1.0 } else { 1.0 };
+        let [tangent_a, tangent_b, tangent_c] = vertices.map(|v| {
+            let [x, y, z, w] = mesh.tangents.get(v).copied().unwrap_or_default();
+            (linear * DVec3::new(x.into(), y.into(), z.into())).as_vec3().extend(w * side).to_array()
+        });
+        let [color_a, color_b, color_c] = vertices.map(|v| {
+            let [r, g, b, a] = mesh.colors.get(v).copied().unwrap_or([1.0; 4]).map(half::f16::from_f32);
+            [pack_half_2x16([r, g]), pack_half_2x16([b, a])]
+        });
+        share::Corners {
+            frame: CornerFrame {
+                normal_a,
+                material: mesh.material as u32 & MATERIAL_OF_TRIANGLE | flags,
+                normal_b,
+                scale: self.scales[i],
+                normal_c,
+                uv_per_metre: density,
+            },
+            uvs: pairs(uvs(0)),
+            second_uvs: pairs(uvs(1)),
+            tangents: CornerTangents { a: tangent_a, b: tangent_b, c: tangent_c },
+            colors: CornerColors { a: color_a, b: color_b, c: color_c, pad: [0; 2] },
         }
-        let mut pairs = |[a, b, c]: [[f32; 2]; 3]| {
-            texels.push([a[0], a[1], b[0], b[1]].map(f32::to_bits));
-            texels.push([c[0], c[1], 0.0, 0.0].map(f32::to_bits));
-        };
-        if self.contents.hit_textures != 0 {
-            pairs(uvs(0));
-        }
-        if self.contents.hit_second_uvs {
-            pairs(uvs(1));
-        }
-        if self.contents.hit_textures & BENT != 0 {
-            let linear = instance.world_from_object.matrix3;
-            let side = if self.normals_mirrored[i] { -1.0 } else { 1.0 };
-            for v in vertices {
-                let [x, y, z, w] = mesh.tangents.get(v).copied().unwrap_or_default();
-                let t = (linear * DVec3::new(x.into(), y.into(), z.into())).as_vec3();
-                texels.push([t.x, t.y, t.z, w * side].map(f32::to_bits));
-            }
-        }
-        if self.contents.hit_colors {
-            let half = |x: f32| u32::from(half::f16::from_f32(x).to_bits());
-            let colors = vertices.map(|v| {
-                let [r, g, b, a] = mesh.colors.get(v).copied().unwrap_or([1.0; 4]).map(half);
-                [r | g << 16, b | a << 16]
-            });
-            let [a, b, c] = colors;
-            texels.push([a[0], a[1], b[0], b[1]]);
-            texels.push([c[0], c[1], 0, 0]);
-        }
-        texels
     }
 }
 

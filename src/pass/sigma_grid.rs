@@ -9,17 +9,15 @@ use glam::{DAffine3, DVec3};
 use super::upload::upload;
 use crate::gpu::{Buffer, Device};
 use crate::plan::Plan;
-use crate::scene::{Scene, SigmaGrid};
+use crate::scene::{self, Scene};
+use crate::share::{SigmaCell, SigmaGrid};
 
 /// Texels of all grids: places in them are kept as f32.
 const MOST_TEXELS: usize = 1 << 24;
 
-/// Texels before the values of a grid.
-const HEADER: usize = 5;
-
 /// The grids that are marched; next to nothing where none is.
 pub struct SigmaGrids {
-    /// As shaders/lib/sigma_grid.glsl reads them.
+    /// A [`SigmaGrid`] each with its [`SigmaCell`]s.
     pub texels: Buffer,
     /// Per material the first texel of its grid + 1, or 0.
     pub places: Vec<u32>,
@@ -51,25 +49,31 @@ impl SigmaGrids {
     }
 }
 
-fn append(texels: &mut Vec<[f32; 4]>, grid: &SigmaGrid, grid_from_bvh: DAffine3) {
+fn append(texels: &mut Vec<[f32; 4]>, grid: &scene::SigmaGrid, grid_from_bvh: DAffine3) {
     // A body scaled flat has no inside, and no inverse.
     let place = if grid_from_bvh.is_finite() { grid_from_bvh } else { DAffine3::ZERO };
     let (m, t) = (place.matrix3.transpose(), place.translation);
-    for (row, shift) in [m.x_axis, m.y_axis, m.z_axis].into_iter().zip(t.to_array()) {
-        texels.push(row.extend(shift).as_vec4().to_array());
-    }
+    let row = |row: DVec3, shift: f64| row.extend(shift).as_vec4().to_array();
     let [nx, ny, nz] = grid.size();
     let cells = [nx, ny].map(|n| (n - 1).max(1));
     let colours = grid.channels() > 1;
-    let first = texels.len() + HEADER - 3;
-    texels.push([nx - 1, ny - 1, nz - 1, first].map(|n| n as f32));
-    texels.push([if colours { cells[0] * cells[1] * nz } else { 0 } as f32, 0.0, 0.0, 0.0]);
+    let header = SigmaGrid {
+        x_row: row(m.x_axis, t.x),
+        y_row: row(m.y_axis, t.y),
+        z_row: row(m.z_axis, t.z),
+        last: [nx - 1, ny - 1, nz - 1].map(|n| n as f32),
+        first: (texels.len() + size_of::<SigmaGrid>() / 16) as f32,
+        channel: if colours { cells[0] * cells[1] * nz } else { 0 } as f32,
+        pad: [0.0; 3],
+    };
+    texels.extend_from_slice(bytemuck::cast_slice(&[header]));
     for channel in 0..grid.channels() {
         for z in 0..nz {
             for y in 0..cells[1] {
                 for x in 0..cells[0] {
                     let at = |dx: usize, dy: usize| grid.at([(x + dx).min(nx - 1), (y + dy).min(ny - 1), z], channel);
-                    texels.push([at(0, 0), at(1, 0), at(0, 1), at(1, 1)]);
+                    let cell = SigmaCell { first_y: [at(0, 0), at(1, 0)], second_y: [at(0, 1), at(1, 1)] };
+                    texels.push(bytemuck::cast(cell));
                 }
             }
         }

@@ -4,8 +4,14 @@ use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use ash::vk;
+use half::f16;
 
 use crate::gpu::{Buffer, Device, Frame, Place};
+
+/// What `unpackHalf2x16` of GLSL reads.
+pub(super) fn pack_half_2x16([x, y]: [f16; 2]) -> u32 {
+    u32::from(x.to_bits()) | u32::from(y.to_bits()) << 16
+}
 
 /// A buffer with `data` where the device reads it fastest: written in place on a CPU device, staged on others.
 ///

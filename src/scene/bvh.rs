@@ -23,12 +23,13 @@ use rayon::prelude::*;
 
 pub use super::aabb::Aabb;
 use super::{Scene, ploc};
+use crate::share::{FloatNode, GridNode, LEAF_BITS, SLAB_BITS, StackNode};
 
-/// Most triangles of one tree: a leaf's word holds the first triangle times 8 plus a count in 31 bits.
-pub const MAX_TRIANGLES: usize = 1 << 28;
+/// Most triangles of one tree: a leaf's word has a sign.
+pub const MAX_TRIANGLES: usize = 1 << (31 - LEAF_BITS);
 
 /// Most triangles of one leaf.
-pub const MAX_LEAF: u32 = 8;
+pub const MAX_LEAF: u32 = 1 << LEAF_BITS;
 
 /// Coordinates from here on are treated as not finite: differences of differences of them overflow.
 const MAX_COORDINATE: f32 = 4.253_529_6e37; // 2^125
@@ -136,20 +137,19 @@ impl Order {
 /// How a list writes boxes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// 16 bytes a node, in units of [`Bvh::grid`]: per axis one word with the centre, which has a sign, in the high and the
-    /// half extent in the low 16 bits.
+    /// A [`GridNode`], in units of [`Bvh::grid`].
     Quantised,
-    /// 32 bytes a node: f32 centre, fourth word; f32 half extent, 0.
+    /// A [`FloatNode`].
     Float,
 }
 
 impl Format {
     /// Texels of four words that a node takes.
     #[must_use]
-    pub fn texels(self) -> usize {
+    pub const fn texels(self) -> usize {
         match self {
-            Self::Quantised => 1,
-            Self::Float => 2,
+            Self::Quantised => size_of::<GridNode>() / 16,
+            Self::Float => size_of::<FloatNode>() / 16,
         }
     }
 }
@@ -164,15 +164,15 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Centre and half extent of a box, rounded outwards by at least a unit. The word as a signed number is 65536 times the
-    /// centre: the half extent below it is the fraction of a unit by which the centre read so lies too high.
-    fn encode(&self, bounds: &Aabb) -> [u32; 3] {
+    /// Centre and half extent of a box, rounded outwards by at least a unit. Rays read the whole word as the centre: the half extent
+    /// in it is the fraction of a unit by which that lies too high.
+    fn encode(&self, bounds: &Aabb) -> [i32; 3] {
         [0, 1, 2].map(|axis| {
             let (middle, unit) = (f64::from(self.middle[axis]), f64::from(self.unit[axis]));
             let low = ((f64::from(bounds.min[axis]) - middle) / unit - SPARE_UNITS).floor() as i32;
             let high = ((f64::from(bounds.max[axis]) - middle) / unit + SPARE_UNITS).ceil() as i32;
             let center = (low + high).div_euclid(2);
-            (center << 16 | (center + 1 - low)) as u32
+            center << SLAB_BITS | (center + 1 - low)
         })
     }
 }
@@ -403,10 +403,8 @@ impl Bvh {
         }
     }
 
-    /// The nodes as a list with skip links, closed by a sentinel: all zero but the fourth word, which is its own index.
-    ///
-    /// A node's fourth word is, for an inner node, the index of the node to go to when its box is missed, and for a leaf
-    /// `!(first * 8 + count - 1)`, which is negative as an i32. Indices count nodes, not texels.
+    /// The nodes as a list with skip links, closed by a sentinel: all zero but where it leads, which is itself. Indices count
+    /// nodes, not texels.
     #[must_use]
     pub fn links(&self, order: Order, format: Format) -> Vec<[u32; 4]> {
         let listed = self.listed();
@@ -414,6 +412,19 @@ impl Bvh {
         let sizes = self.sizes(&listed);
         let (grid, spare) = (self.grid(), self.reach() * SPARE_FLOAT);
         let mut list = vec![[0; 4]; (count + 1) * format.texels()];
+        let mut put = |place: usize, bounds: Option<&Aabb>, word: i32| {
+            let at = place * format.texels();
+            match format {
+                Format::Quantised => {
+                    let slabs = bounds.map(|bounds| grid.encode(bounds)).unwrap_or_default();
+                    put_texels(&mut list[at..], &GridNode { slabs, word });
+                }
+                Format::Float => {
+                    let (center, half_extent) = bounds.map(|bounds| float_box(bounds, spare)).unwrap_or_default();
+                    put_texels(&mut list[at..], &FloatNode { center, word, half_extent, pad: 0 });
+                }
+            }
+        };
         // A parent comes before its children in `nodes` too, so that a place is known when its node is.
         let mut places = vec![0; self.nodes.len()];
         for (i, node) in self.nodes.iter().enumerate() {
@@ -427,24 +438,13 @@ impl Bvh {
                     if !listed[i] {
                         continue;
                     }
-                    place + sizes[i]
+                    (place + sizes[i]) as i32
                 }
                 Node::Leaf { first, count, .. } => leaf_word(first, count),
             };
-            let texel = place as usize * format.texels();
-            match format {
-                Format::Quantised => {
-                    let [x, y, z] = grid.encode(node.bounds());
-                    list[texel] = [x, y, z, word];
-                }
-                Format::Float => {
-                    let ([x, y, z], [u, v, w]) = float_box(node.bounds(), spare);
-                    list[texel] = [x, y, z, word];
-                    list[texel + 1] = [u, v, w, 0];
-                }
-            }
+            put(place as usize, Some(node.bounds()), word);
         }
-        list[count * format.texels()][3] = count as u32;
+        put(count, None, count as i32);
         list
     }
 
@@ -454,17 +454,13 @@ impl Bvh {
         orders.par_iter().map(|&order| self.links(order, format)).collect()
     }
 
-    /// The inner nodes depth-first, four texels each, for a traversal with a stack: left centre and reference, left half
-    /// extent and right reference, right centre and 0, right half extent and 0.
-    ///
-    /// A reference is the index of an inner node, or a leaf's word as in [`Bvh::links`]. The root is node 0. What is
-    /// missing (the right child of a tree of one leaf, both of an empty one) has a box of negative extent that no ray
-    /// meets.
+    /// The inner nodes depth-first, a [`StackNode`] each, for a traversal with a stack. The root is node 0. What is missing (the
+    /// right child of a tree of one leaf, both of an empty one) has a box of negative extent that no ray meets.
     #[must_use]
     pub fn stack_nodes(&self) -> Vec<[u32; 4]> {
         let spare = self.reach() * SPARE_FLOAT;
         let mut inner = 0;
-        let words: Vec<u32> = self
+        let words: Vec<i32> = self
             .nodes
             .iter()
             .map(|node| match *node {
@@ -475,55 +471,71 @@ impl Bvh {
                 }
             })
             .collect();
-        let child = |i: u32| Child { bits: float_box(self.nodes[i as usize].bounds(), spare), word: words[i as usize] };
-        let nothing = Child { bits: ([0; 3], [(-3e38_f32).to_bits(); 3]), word: leaf_word(0, 1) };
-        match self.nodes.as_slice() {
-            [] => Child::texels([nothing, nothing]).to_vec(),
-            [Node::Leaf { .. }] => Child::texels([child(0), nothing]).to_vec(),
+        let child = |i: u32| {
+            let (center, half_extent) = float_box(self.nodes[i as usize].bounds(), spare);
+            Child { center, half_extent, word: words[i as usize] }
+        };
+        let nothing = Child { center: [0.0; 3], half_extent: [-3e38; 3], word: leaf_word(0, 1) };
+        let list: Vec<StackNode> = match self.nodes.as_slice() {
+            [] => vec![Child::both([nothing, nothing])],
+            [Node::Leaf { .. }] => vec![Child::both([child(0), nothing])],
             nodes => {
-                let mut list = Vec::with_capacity(inner as usize * 4);
-                for node in nodes {
-                    if let Node::Inner { children, .. } = node {
-                        list.extend(Child::texels(children.map(child)));
-                    }
-                }
-                list
+                let inner = nodes.iter().filter_map(|node| match node {
+                    Node::Inner { children, .. } => Some(children.map(child)),
+                    Node::Leaf { .. } => None,
+                });
+                inner.map(Child::both).collect()
             }
-        }
+        };
+        bytemuck::cast_slice(&list).to_vec()
     }
 }
 
 /// A child as its parent in [`Bvh::stack_nodes`] has it.
 #[derive(Clone, Copy)]
 struct Child {
-    /// Bits of centre and half extent.
-    bits: ([u32; 3], [u32; 3]),
+    center: [f32; 3],
+    half_extent: [f32; 3],
     /// What it is: an inner node's index or a leaf's word.
-    word: u32,
+    word: i32,
 }
 
 impl Child {
-    fn texels([left, right]: [Self; 2]) -> [[u32; 4]; 4] {
-        let texel = |[x, y, z]: [u32; 3], w| [x, y, z, w];
-        [texel(left.bits.0, left.word), texel(left.bits.1, right.word), texel(right.bits.0, 0), texel(right.bits.1, 0)]
+    fn both([left, right]: [Self; 2]) -> StackNode {
+        StackNode {
+            left_center: left.center,
+            left: left.word,
+            left_half_extent: left.half_extent,
+            right: right.word,
+            right_center: right.center,
+            pad_center: 0,
+            right_half_extent: right.half_extent,
+            pad_half_extent: 0,
+        }
     }
 }
 
-/// A leaf in one word; the complement tells it from an index.
-fn leaf_word(first: u32, count: u32) -> u32 {
-    !(first * MAX_LEAF + count - 1)
+/// A node at the beginning of these texels.
+fn put_texels<T: bytemuck::NoUninit>(texels: &mut [[u32; 4]], node: &T) {
+    let words = bytemuck::cast_slice(std::slice::from_ref(node));
+    texels[..words.len()].copy_from_slice(words);
 }
 
-/// Bits of centre and half extent in f32, so that the box contains `bounds` with `spare` metres around it.
-fn float_box(bounds: &Aabb, spare: f64) -> ([u32; 3], [u32; 3]) {
+/// A leaf in one word; the complement tells it from an index.
+fn leaf_word(first: u32, count: u32) -> i32 {
+    !(first << LEAF_BITS | (count - 1)) as i32
+}
+
+/// Centre and half extent in f32, so that the box contains `bounds` with `spare` metres around it.
+fn float_box(bounds: &Aabb, spare: f64) -> ([f32; 3], [f32; 3]) {
     let center = [0, 1, 2].map(|axis| (bounds.double_center(axis) * 0.5) as f32);
     let half = [0, 1, 2].map(|axis| {
         let middle = f64::from(center[axis]);
         let reach = (f64::from(bounds.max[axis]) - middle).max(middle - f64::from(bounds.min[axis]));
         // Up from the nearest is outwards.
-        ((reach + spare) as f32).next_up().to_bits()
+        ((reach + spare) as f32).next_up()
     });
-    (center.map(f32::to_bits), half)
+    (center, half)
 }
 
 /// Middle of the box around all vertices that have a finite place in the world.

@@ -18,6 +18,7 @@ pub use super::layers::{SMOOTHEST, is_smooth};
 use super::line::{self, Crossing};
 use super::solid::Solids;
 use super::{Instance, Scene};
+use crate::share::AIM_COUNT_BITS;
 
 /// Photons that are sent.
 const PHOTONS: u64 = 1 << 19;
@@ -25,8 +26,9 @@ const PHOTONS: u64 = 1 << 19;
 const MOST_SURFACES: usize = 12;
 /// Cells along the longest side of the scene.
 const CELLS: f64 = 32.0;
-/// Aims of one cell, at most 15: what shaders/lib/aims.glsl goes through for each direction that it weighs.
+/// Aims of one cell: shaders/lib/aims.glsl goes through all of them for each direction that it weighs.
 const MOST_AIMS: usize = 8;
+const _: () = assert!(MOST_AIMS < 1 << AIM_COUNT_BITS);
 /// Photons that the aims of one cell are made from.
 const MOST_PHOTONS: usize = 96;
 /// Radii of what is aimed at, in cells.
@@ -47,7 +49,7 @@ pub struct Aims {
     pub cell: f64,
     /// How many cells there are along x, y and z; x varies fastest.
     pub cells: [u32; 3],
-    /// For each cell the place of its first aim times 16, plus how many it has.
+    /// For each cell its first aim `<<` [`AIM_COUNT_BITS`] `|` how many it has.
     pub firsts: Vec<u32>,
     /// What is aimed at from the cells, one cell after the other.
     pub aims: Vec<Ball>,
@@ -278,7 +280,7 @@ impl Aims {
         let mut firsts = vec![0; cells.iter().product::<u32>() as usize];
         let mut aims = Vec::new();
         for (place, balls) in of_cells {
-            firsts[place as usize] = (aims.len() * 16 + balls.len()) as u32;
+            firsts[place as usize] = (aims.len() << AIM_COUNT_BITS | balls.len()) as u32;
             aims.extend(balls);
         }
         Self { corner, cell, cells, firsts, aims }
