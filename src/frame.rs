@@ -15,20 +15,21 @@ use crate::pass::accumulate::accumulate;
 use crate::pass::aov::aov;
 use crate::pass::background::background;
 use crate::pass::classify::{RayTiles, WorkLists, classify};
-use crate::pass::composite::{composite, composite_part};
+use crate::pass::composite::{Behind, composite};
 use crate::pass::environment::{EnvironmentOnDevice, Turn};
 use crate::pass::fragments::{FragmentLists, fragments};
 use crate::pass::gbuffer::{GBuffer, gbuffer};
 use crate::pass::halves::{Halves, join_halves};
-use crate::pass::interact::{interact, interact_part};
+use crate::pass::interact::interact;
 use crate::pass::light::light;
 use crate::pass::lighting::Lighting;
-use crate::pass::mirror::{OnScreen, mirror, screen_tiles};
+use crate::pass::mirror::mirror;
 pub use crate::pass::part::Part;
 use crate::pass::part::PartOnDevice;
 use crate::pass::path::{PathsOnDevice, paths};
 use crate::pass::rays::{BvhFacts, RaysOnDevice, Traversal};
 use crate::pass::scene::SceneOnDevice;
+use crate::pass::screen::{OnScreen, screen_tiles};
 use crate::pass::shadow_map::ShadowMaps;
 use crate::pass::shared::{Library, OnDevice};
 use crate::pass::tiles::{Tiles, tiles};
@@ -667,12 +668,12 @@ impl Renderer {
         light(&mut frame, lighting, g, work, radiance)?;
         background(&mut frame, lighting, g, work, radiance)?;
         if let Some(with) = plan.rays.filter(|rays| rays.mirrors || rays.refraction) {
-            interact(&mut frame, lighting, with, g, &self.targets.ray_tiles, radiance)?;
+            interact(&mut frame, lighting, with, g, &self.targets.ray_tiles, radiance, None)?;
         }
         for part in parts {
             frame.clear("reset part", &part.radiance);
             if let Some(with) = plan.rays.filter(|_| part.part.called_for(plan)) {
-                interact_part(&mut frame, lighting, with, g, &self.targets.ray_tiles, part)?;
+                interact(&mut frame, lighting, with, g, &self.targets.ray_tiles, &part.radiance, Some(part.part))?;
             }
             if plan.screen.refraction {
                 frame.download("copy part", &part.radiance, &part.seen);
@@ -693,9 +694,11 @@ impl Renderer {
             frame.fill("reset dropped fragments", &lists.dropped, 0);
             for strip in lists.strips() {
                 fragments(&mut frame, scene, g, lists, strip, lod_bias)?;
-                composite(&mut frame, lighting, g, lists, radiance, screen, strip.rows)?;
-                for part in parts {
-                    composite_part(&mut frame, lighting, g, lists, part, screen, strip.rows)?;
+                let behind = Behind { radiance, seen: &screen.seen, part: None };
+                composite(&mut frame, lighting, g, lists, screen, behind, strip.rows)?;
+                for PartOnDevice { part, radiance, seen, .. } in parts {
+                    let behind = Behind { radiance, seen, part: Some(*part) };
+                    composite(&mut frame, lighting, g, lists, screen, behind, strip.rows)?;
                 }
             }
             frame.read_back(&lists.counters);

@@ -536,3 +536,45 @@ fn a_slanted_sheet_lets_through_what_it_does_not_reflect() {
         assert!(error < bound, "{of:?}, {fresnel}: {error:e}");
     }
 }
+
+/// k_d, k_s in 1/sr and shine as a scene tells them (`extras.etalon`; src/scene/gltf_extras.rs keeps them like this).
+fn told(kd: [f32; 3], ks: [f32; 3], shine: f32) -> Material {
+    Material {
+        specular: 1.0,
+        specular_color: ks.map(|k| std::f32::consts::TAU * k / (shine + 2.0) / 0.04),
+        roughness: (2.0 / (shine + 2.0)).sqrt().sqrt(),
+        phong: true,
+        ..lambert(kd.map(|k| std::f32::consts::PI * k))
+    }
+}
+
+#[test]
+fn told_numbers_of_phong_are_drawn_as_b5_and_b6_are_written() {
+    let gpu = Gpu::hasty();
+    // The second sends more than it receives by B5, which nothing forbids.
+    let of = [([0.1, 0.2, 0.05], [0.3, 0.2, 0.4], 20.0), ([0.05; 3], [1.414, 0.7, 0.2], 3.0)];
+    let materials = of.map(|(kd, ks, shine)| told(kd, ks, shine));
+    let l = LIGHTS[0].normalize();
+    let (mut scene, facets) = dome(&materials);
+    let mut made = Made(std::mem::take(&mut scene));
+    made.light(IRRADIANCE, LightKind::Directional { direction: -l });
+    for model_of in MODELS {
+        for (brdf, count) in [("blinn-phong", 2), ("blinn-phong-reciprocal", 1)] {
+            let film = gpu.film(&made.0, model(model_of, DOME, &[&format!("brdf={brdf}"), "fresnel=schlick"]));
+            let seen: Vec<Facet> = facets.iter().filter(|f| f.material < count).map(Facet::clone).collect();
+            let error = worst(&film, &seen, FAINT, |facet: &Facet| {
+                let (kd, ks, shine) = of[facet.material];
+                let (kd, ks) = (lobe::rgb(kd), lobe::rgb(ks));
+                let (n, sum) = (facet.n, l + DVec3::Z);
+                let (cos, lobe) = (n.dot(l).max(0.0), n.dot(sum.normalize()).powf(f64::from(shine)));
+                let lit = if cos > 0.0 { 1.0 } else { 0.0 };
+                let light = match brdf {
+                    "blinn-phong" => kd * cos + ks * lobe * lit,
+                    _ => (kd + ks * lobe / sum.length_squared()) * cos,
+                };
+                light * lobe::rgb(IRRADIANCE)
+            });
+            assert!(error < LOBES, "{model_of:?}, {brdf}: {error:e}");
+        }
+    }
+}

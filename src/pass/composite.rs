@@ -5,13 +5,23 @@ use anyhow::Result;
 use super::fragments::FragmentLists;
 use super::gbuffer::GBuffer;
 use super::lighting::Lighting;
-use super::mirror::OnScreen;
-use super::part::PartOnDevice;
+use super::part::Part;
+use super::screen::OnScreen;
 use crate::gpu::{Buffer, Frame, Image};
-use crate::shader::{composite, lib};
+use crate::shader::composite;
 
-/// Adds the fragments of one strip to `radiance`, nearest first. What they show of the screen is the opaque
-/// surfaces.
+/// What fragments are laid over.
+#[derive(Clone, Copy)]
+pub struct Behind<'a> {
+    /// Radiance, pixel by pixel.
+    pub radiance: &'a Image,
+    /// The same as the screen shows it.
+    pub seen: &'a Buffer,
+    /// A part of the picture, which fragments only weaken.
+    pub part: Option<Part>,
+}
+
+/// Lays the fragments of one strip over what is behind them, nearest first. What they show of the screen is the opaque surfaces.
 ///
 /// # Errors
 /// When the driver refuses what a pipeline binds.
@@ -20,43 +30,12 @@ pub fn composite<'a>(
     lighting: &Lighting<'a>,
     gbuffer: &'a GBuffer,
     lists: &'a FragmentLists,
-    radiance: &'a Image,
     screen: &'a OnScreen,
+    behind: Behind<'a>,
     rows: [u32; 2],
 ) -> Result<()> {
-    lay_over(frame, "see-through lighting", lighting, gbuffer, lists, radiance, screen, &screen.seen, rows, false)
-}
-
-/// Weakens a part of the picture as the fragments of one strip do that lie before it.
-///
-/// # Errors
-/// When the driver refuses what a pipeline binds.
-pub fn composite_part<'a>(
-    frame: &mut Frame<'a>,
-    lighting: &Lighting<'a>,
-    gbuffer: &'a GBuffer,
-    lists: &'a FragmentLists,
-    part: &'a PartOnDevice,
-    screen: &'a OnScreen,
-    rows: [u32; 2],
-) -> Result<()> {
-    let name = format!("see-through over {}", part.part.name());
-    lay_over(frame, &name, lighting, gbuffer, lists, &part.radiance, screen, &part.seen, rows, true)
-}
-
-#[expect(clippy::too_many_arguments, reason = "the two ways to call it have names")]
-fn lay_over<'a>(
-    frame: &mut Frame<'a>,
-    name: &str,
-    lighting: &Lighting<'a>,
-    gbuffer: &'a GBuffer,
-    lists: &'a FragmentLists,
-    radiance: &'a Image,
-    screen: &'a OnScreen,
-    seen: &'a Buffer,
-    rows: [u32; 2],
-    behind_alone: bool,
-) -> Result<()> {
+    let name =
+        behind.part.map_or("see-through lighting".to_owned(), |part| format!("see-through over {}", part.name()));
     let mut library = lighting.library;
     // What is mirrored here is the environment: rays are sent from the G-buffer alone.
     library.surface.mirror_rays = false;
@@ -68,19 +47,19 @@ fn lay_over<'a>(
         library,
         bends: lighting.plan.screen.refraction,
         mirrors: lighting.plan.screen.see_through_mirrors,
-        behind_alone,
+        behind_alone: behind.part.is_some(),
     };
     let bind = composite::Bind {
         gbuffer: gbuffer.bind(),
         lighting: lighting.tiles.bind(),
-        screen: lib::screen::Bind { seen, nearest_pieces: &screen.nearest_pieces },
+        screen: screen.bind(behind.seen),
         heads: &lists.heads,
         nodes: &lists.nodes,
-        radiance,
+        radiance: behind.radiance,
         dropped: &lists.dropped,
         tiles: &lists.work.tiles,
         work: &lists.work.sizes,
     };
     let push = composite::Push { end_row: rows[1] };
-    frame.compute_indirect(name, &bind, &constants, &push, &lists.work.sizes, 0)
+    frame.compute_indirect(&name, &bind, &constants, &push, &lists.work.sizes, 0)
 }

@@ -5,7 +5,7 @@ use anyhow::Result;
 use super::classify::{Calls, RayTiles, classify_rays};
 use super::gbuffer::GBuffer;
 use super::lighting::Lighting;
-use super::part::{Part, PartOnDevice};
+use super::part::Part;
 use crate::gpu::{Frame, Image};
 use crate::plan::Rays;
 use crate::shader::interact;
@@ -14,7 +14,8 @@ use crate::shader::interact;
 /// not followed.
 const SPARE_BRANCHES: u32 = 4;
 
-/// Adds to `radiance` what the surfaces of the G-buffer mirror and what is seen through them.
+/// Adds to `radiance` what the surfaces of the G-buffer mirror and what is seen through them; with a part, what of that belongs to it: all
+/// rays are followed once more, over the same tiles.
 ///
 /// # Errors
 /// When the driver refuses what a pipeline binds.
@@ -25,39 +26,13 @@ pub fn interact<'a>(
     gbuffer: &'a GBuffer,
     tiles: &'a RayTiles,
     radiance: &'a Image,
-) -> Result<()> {
-    let calls = Calls { mirrors: with.mirrors, transmissive: with.refraction };
-    classify_rays(frame, lighting, calls, gbuffer, tiles)?;
-    follow(frame, "reflection and refraction", lighting, with, gbuffer, tiles, radiance, None)
-}
-
-/// Adds to a part of the picture what of that belongs to it: all rays are followed once more, over the same tiles.
-///
-/// # Errors
-/// When the driver refuses what a pipeline binds.
-pub fn interact_part<'a>(
-    frame: &mut Frame<'a>,
-    lighting: &Lighting<'a>,
-    with: Rays,
-    gbuffer: &'a GBuffer,
-    tiles: &'a RayTiles,
-    part: &'a PartOnDevice,
-) -> Result<()> {
-    let name = format!("{} alone", part.part.name());
-    follow(frame, &name, lighting, with, gbuffer, tiles, &part.radiance, Some(part.part))
-}
-
-#[expect(clippy::too_many_arguments, reason = "the two ways to call it have names")]
-fn follow<'a>(
-    frame: &mut Frame<'a>,
-    name: &str,
-    lighting: &Lighting<'a>,
-    with: Rays,
-    gbuffer: &'a GBuffer,
-    tiles: &'a RayTiles,
-    radiance: &'a Image,
     part: Option<Part>,
 ) -> Result<()> {
+    let name = part.map_or("reflection and refraction".to_owned(), |part| format!("{} alone", part.name()));
+    if part.is_none() {
+        let calls = Calls { mirrors: with.mirrors, transmissive: with.refraction };
+        classify_rays(frame, lighting, calls, gbuffer, tiles)?;
+    }
     let mut library = lighting.library;
     // What a ray hits is on no tile: it goes through all lights.
     library.lighting.local_lights = lighting.plan.local_lights;
@@ -77,5 +52,5 @@ fn follow<'a>(
         ray_tiles: &tiles.tiles,
         work: &tiles.sizes,
     };
-    frame.compute_indirect(name, &bind, &constants, &(), &tiles.sizes, 0)
+    frame.compute_indirect(&name, &bind, &constants, &(), &tiles.sizes, 0)
 }

@@ -22,6 +22,7 @@ pub mod path;
 pub mod rays;
 pub mod rows;
 pub mod scene;
+pub mod screen;
 pub mod shadow_map;
 pub mod shared;
 pub mod sigma_grid;

@@ -39,9 +39,9 @@ impl PathsOnDevice {
         let rays = plan.rays.unwrap_or_default();
         let pixels = u64::from(size[0]) * u64::from(size[1]);
         let places = places(size);
-        let words = |name, wanted: bool, words: u64| {
-            let (name, bytes) = if wanted { (name, 4 * words) } else { (NOTHING, 0) };
-            Buffer::new(device, name, bytes, Place::Device)
+        let words = |name, wanted: bool, words: u64| match wanted {
+            true => Buffer::new(device, name, 4 * words, Place::Device),
+            false => Buffer::new(device, NOTHING, 0, Place::Device),
         };
         let queue = || words("queue of paths", true, u64::from(places));
         let queue_size = || Buffer::new(device, "queue size", SIZE_BYTES, Place::Device);
@@ -91,8 +91,7 @@ pub fn paths<'a>(
     paths: &'a PathsOnDevice,
     radiance: &'a Image,
 ) -> Result<()> {
-    let interfaces = lighting.plan.rays.unwrap_or_default().interfaces;
-    let library = lighting.library;
+    let (library, interfaces) = (lighting.library, lighting.plan.rays.unwrap_or_default().interfaces);
     let places = places(paths.size);
     let tiles = places / (TILE * TILE);
     let stride = stride(tiles);

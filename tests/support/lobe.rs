@@ -169,6 +169,7 @@ pub fn reflected(m: &Material, rungs: Rungs<'_>, n: DVec3, l: DVec3, v: DVec3) -
 }
 
 /// One flat face of a dome, and the pixels that see nothing else.
+#[derive(Clone)]
 pub struct Facet {
     pub n: DVec3,
     pub material: usize,
