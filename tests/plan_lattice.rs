@@ -102,6 +102,7 @@ const FACTORS: &[Factor] = &[
     Factor { name: "emissive texture", levels: &["no", "yes"] },
     Factor { name: "layers", levels: &["no", "yes"] },
     Factor { name: "coat", levels: &["no", "yes"] },
+    Factor { name: "cloth", levels: &["no", "yes"] },
     Factor { name: "metal", levels: &["none", "colour", "n and kappa"] },
     Factor { name: "holes", levels: &["no", "yes"] },
     Factor { name: "bent normals", levels: &["no", "yes"] },
@@ -246,6 +247,12 @@ fn scene(ways: &Ways, choice: &Choice) -> Made {
     }
     if is("coat", "yes") {
         add(&mut made, "coated", Material { clearcoat: 1.0, clearcoat_roughness: 0.9, ..rough.clone() });
+    }
+    if is("cloth", "yes") {
+        let mut cloth = rough.clone();
+        // Sheen is the first of them.
+        cloth.lobes[0].factors = [0.8, 0.6, 0.9, 0.5];
+        add(&mut made, "cloth", cloth);
     }
     if !is("metal", "none") {
         let conductor = is("metal", "n and kappa").then_some([[0.2, 3.1], [0.4, 2.4], [1.4, 1.9]]);
@@ -528,7 +535,7 @@ const OF_PATHS: [&str; 5] = ["aims", "frosted surfaces", "lights with a shape", 
 const OF_WAVELENGTHS: [&str; 2] = ["bands of wavelengths", "dispersion"];
 
 /// Every other effect but the one that only the hierarchy of triangles tells.
-const NAMES: [&str; 21] = [
+const NAMES: [&str; 22] = [
     "absorption",
     "ambient light",
     "clear coat",
@@ -549,5 +556,6 @@ const NAMES: [&str; 21] = [
     "refraction",
     "see-through surfaces",
     "shadows",
+    "sheen",
     "transmission before rays",
 ];

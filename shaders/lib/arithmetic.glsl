@@ -7,6 +7,7 @@
 // rounded to f32 one after the other and the rest fitted again.
 #ifndef ARITHMETIC_GLSL
 #define ARITHMETIC_GLSL
+#include "lib/constants.glsl"
 
 // The knob `arithmetic`: 0 the formulas of the textbook and the built-ins, 1 rewritten so that nothing cancels,
 // 2 with sums and products in pairs of floats where that still gains.
@@ -319,5 +320,25 @@ float atan2f(float y, float x) {
     k = steep ? 2.0 - k : k;
     k = x < 0.0 ? 4.0 - k : k;
     return with_sign_of(arc_sum(k, steep != (x < 0.0) ? -1.0 : 1.0, t, t * (z * p)), y);
+}
+
+// (cos, sin) of 2π·turns. Turns reduce exactly: the nearest quarter is taken off, and the rest is within ±π/4, where series as in Cephes
+// hold. The built-ins promise no more than 2^-11. Beyond 2^22 turns, where floats are no finer than a quarter: (1, 0).
+vec2 cos_sin_of_turns(float turns) {
+    vec2 r;
+    if (ARITHMETIC == FAST) {
+        r = vec2(cos(2.0 * PI * turns), sin(2.0 * PI * turns));
+    } else {
+        precise float turn = abs(turns) < 4194304.0 ? turns - floor(turns) : 0.0;
+        precise float quarter = floor(4.0 * turn + 0.5);
+        precise float x = (turn - 0.25 * quarter) * (2.0 * PI);
+        precise float z = x * x;
+        precise float s = ((-1.9515295891e-4 * z + 8.3321608736e-3) * z - 1.6666654611e-1) * z * x + x;
+        precise float c = ((2.443315712e-5 * z - 1.388731625e-3) * z + 4.166664568e-2) * z * z - 0.5 * z + 1.0;
+        int quadrant = int(quarter) & 3;
+        r = (quadrant & 1) == 0 ? vec2(c, s) : vec2(-s, c);
+        r = quadrant < 2 ? r : -r;
+    }
+    return r;
 }
 #endif

@@ -440,27 +440,6 @@ float mirrored_pdf(float cos_v, HalfAngle h, float alpha) {
     return smith_g1(cos_v, alpha) * ggx_distribution(h.cos_h, h.sin2_h, alpha) / (4.0 * cos_v);
 }
 
-// (cos, sin) of 2πu. Turns reduce exactly: the nearest quarter is taken off, the rest is within ±π/4. The built-ins
-// promise no more than 2^-11.
-vec2 circle(float u) {
-    vec2 r;
-    if (ARITHMETIC == FAST) {
-        r = vec2(cos(2.0 * PI * u), sin(2.0 * PI * u));
-    } else {
-        float turn = u - floor(u);
-        float quarter = floor(4.0 * turn + 0.5);
-        float x = (turn - 0.25 * quarter) * (2.0 * PI);
-        float z = x * x;
-        // Cephes sinf and cosf.
-        float s = ((-1.9515295891e-4 * z + 8.3321608736e-3) * z - 1.6666654611e-1) * z * x + x;
-        float c = ((2.443315712e-5 * z - 1.388731625e-3) * z + 4.166664568e-2) * z * z - 0.5 * z + 1.0;
-        bool odd = quarter == 1.0 || quarter == 3.0;
-        vec2 turned = odd ? vec2(s, c) : vec2(c, s);
-        r = turned * vec2(quarter == 1.0 || quarter == 2.0 ? -1.0 : 1.0, quarter == 2.0 || quarter == 3.0 ? -1.0 : 1.0);
-    }
-    return r;
-}
-
 // @eq B1: H of density D max(V·H, 0) G₁/cosθ_v: a point of a disk, moved up by what the viewer sees of the hemisphere below
 // @out h
 // Heitz, JCGT 7(4) 2018; v and h in the frame of the normal.
@@ -469,7 +448,7 @@ vec3 visible_half_vector(vec3 v, float alpha, vec2 u) {
     float across2 = dot(stretched.xy, stretched.xy);
     vec3 t = across2 > 0.0 ? vec3(-stretched.y, stretched.x, 0.0) * inversesqrt(across2) : vec3(1.0, 0.0, 0.0);
     vec3 b = cross(stretched, t);
-    vec2 disk = sqrt(u.x) * circle(u.y);
+    vec2 disk = sqrt(u.x) * cos_sin_of_turns(u.y);
     float s = 0.5 * (1.0 + stretched.z);
     disk.y = (1.0 - s) * sqrt(max(1.0 - disk.x * disk.x, 0.0)) + s * disk.y;
     vec3 h = disk.x * t + disk.y * b + sqrt(max(1.0 - dot(disk, disk), 0.0)) * stretched;
@@ -504,11 +483,11 @@ struct CosineSample {
 CosineSample cosine_sample(float u1, float u2) {
     CosineSample r;
     if (ARITHMETIC == FAST) {
-        vec2 p = sqrt(u1) * circle(u2);
+        vec2 p = sqrt(u1) * cos_sin_of_turns(u2);
         r.L = vec3(p, sqrt(1.0 - p.x * p.x - p.y * p.y));
     } else {
         float u = clamp(u1, 0.0, 0.999999940395355);
-        r.L = vec3(sqrt(u) * circle(u2), sqrt(1.0 - u));
+        r.L = vec3(sqrt(u) * cos_sin_of_turns(u2), sqrt(1.0 - u));
     }
     r.pdf = r.L.z * INV_PI;
     return r;

@@ -103,30 +103,30 @@ BsdfSample bsdf_sample(Bsdf bsdf, float x, vec2 u) {
     bool last = b.shares.w == 0.0 || x < b.shares.x + b.shares.y + b.shares.z;
     bool diffuse = !coat && !lobe && last && b.shares.z > 0.0;
     bool through = TRANSMISSIVE && !coat && !lobe && !diffuse && b.shares.w > 0.0;
-    BsdfSample r = BsdfSample(s.n, vec3(0.0), (coat ? b.coat_delta : b.delta) && !diffuse, through, false);
-    vec3 h = base_half_vector(b, u);
-    LobeSample drawn = sample_base(b, h);
+    bool delta = (coat ? b.coat_delta : b.delta) && !diffuse;
+    vec3 h = event_half_vector(b, coat, u);
+    vec3 mirrored = reflect_ray(-s.v, h).R;
+    BsdfSample r = BsdfSample(delta ? on_side(mirrored, s.n_triangle) : mirrored, vec3(0.0), delta, through, false);
+    // Weights are for lobes of one direction, at the viewer's angle; of wider ones the whole BSDF is evaluated.
+    vec3 weight = b.f_base * (b.under * b.left);
     float share = b.shares.y;
     if (CLEARCOAT) {
-        if (coat) {
-            drawn = sample_coat(b, coat_half_vector(b, u));
-            share = b.shares.x;
-        } else {
-            drawn.weight *= b.under;
-        }
+        weight = coat ? vec3(1.0 - b.under) : weight;
+        share = coat ? b.shares.x : share;
     }
     if (TRANSMISSIVE) {
         if (through) {
-            drawn = sample_transmission(b, h);
-            drawn.weight *= b.under;
+            bool tir;
+            r.direction = through_direction(b, h, mirrored, tir);
+            r.straight = passes_straight(b);
+            bool passes = r.straight || (dot(r.direction, s.n_triangle) < 0.0 && !(b.solid && ((b.delta && b.total) || tir)));
+            weight = passes ? straight_transmittance(b) : vec3(0.0);
             share = b.shares.w;
-            r.straight = drawn.straight;
             // What is thrown back altogether ends.
-            r.delta = r.delta || drawn.weight == vec3(0.0);
+            r.delta = r.delta || !passes;
         }
     }
-    r.direction = drawn.direction;
-    if (r.delta) r.weight = share > 0.0 ? drawn.weight / share : vec3(0.0);
+    if (r.delta) r.weight = share > 0.0 ? weight / share : vec3(0.0);
     if (diffuse) {
         OrthonormalBasis frame = orthonormal_basis(s.n);
         // Choose the strategy with u.x and rescale it: stratification survives.

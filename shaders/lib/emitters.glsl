@@ -92,11 +92,8 @@ SkySample sample_sky(uint word_x, uint word_y) {
     uint next = sky_share(columns, SKY_COLUMNS, column + 1);
     float u = (float(column) + place_in_share(word_x, first, next)) / float(SKY_COLUMNS);
     float v = (float(row) + place_in_share(word_y, row_first, row_next)) / float(SKY_ROWS);
-    // The inverse of equirectangular_from_direction.
-    float polar = PI * (0.5 - v);
-    float longitude = 2.0 * PI * (u - 0.5);
-    float across = cos(polar);
-    vec3 d = vec3(across * cos(longitude), sin(polar), across * sin(longitude));
+    vec3 d = direction_from_equirectangular(vec2(u, v));
+    float across = sqrt(d.x * d.x + d.z * d.z);
     float pdf = sky_cell_pdf(probability_of_share(row_first, row_next), probability_of_share(first, next), across);
     return SkySample(turned(d, environment.cos_rotation, -environment.sin_rotation), pdf);
 }

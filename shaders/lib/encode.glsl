@@ -107,20 +107,6 @@ vec3 turned(vec3 d, float cos_angle, float sin_angle) {
     return vec3(cos_angle * d.x - sin_angle * d.z, d.y, sin_angle * d.x + cos_angle * d.z);
 }
 
-// (cos, sin) of 2π·turns. Reduced in turns, where multiples of a quarter are exact; series on [−π/4, π/4] as in Cephes.
-// Beyond 2^22 turns, where floats are no finer than a quarter turn: (1, 0).
-vec2 cos_sin_of_turns(float turns) {
-    precise float quarters = 4.0 * (abs(turns) < 4194304.0 ? turns : 0.0);
-    precise float whole = floor(quarters + 0.5);
-    precise float x = (quarters - whole) * (0.5 * PI);
-    precise float z = x * x;
-    precise float s = ((-1.95152959e-4 * z + 8.33216087e-3) * z - 0.166666546) * (z * x) + x;
-    precise float c = (((2.44331571e-5 * z - 1.38873163e-3) * z + 4.16666457e-2) * (z * z) - 0.5 * z) + 1.0;
-    int quadrant = int(whole) & 3;
-    vec2 r = (quadrant & 1) == 0 ? vec2(c, s) : vec2(-s, c);
-    return quadrant < 2 ? r : -r;
-}
-
 // @eq N10: d = (cos e cos φ, sin e, cos e sin φ), φ = 2π(u − 1/2), e = π(1/2 − v)
 // @out d
 // By arcs of turns: Vulkan promises its sine to 2^-11 only. u has period 1, v stays in its range by the caller.

@@ -317,13 +317,30 @@ float unshadowed(vec3 n, vec3 v, vec3 r, vec3 n_triangle, float alpha) {
     return dot(r, n_triangle) > 0.0 && cos_r > 0.0 ? smith_g2_over_g1(dot(n, v), cos_r, alpha) : 0.0;
 }
 
-// The half vector of an event: of the coat's lobe, or the base's.
-vec3 coat_half_vector(Layers b, vec2 u) {
-    return ROUGH && !b.coat_delta ? half_vector(b.s.n_coat, b.s.v, b.s.clearcoat_alpha, u) : b.s.n_coat;
+// The half vector of an event: of the coat's lobe, or of the base's.
+vec3 event_half_vector(Layers b, bool coat, vec2 u) {
+    vec3 n = coat ? b.s.n_coat : b.s.n;
+    bool delta = coat ? b.coat_delta : b.delta;
+    return ROUGH && !delta ? half_vector(n, b.s.v, coat ? b.s.clearcoat_alpha : b.s.alpha, u) : n;
 }
 
-vec3 base_half_vector(Layers b, vec2 u) {
-    return ROUGH && !b.delta ? half_vector(b.s.n, b.s.v, b.s.alpha, u) : b.s.n;
+// Where what goes through leaves, r being the mirrored direction. Equal indices bend nothing, not even by a rounding. A sheet scatters as
+// its mirror image does, to the other side. `tir`: nothing does.
+vec3 through_direction(Layers b, vec3 h, vec3 r, out bool tir) {
+    Surface s = b.s;
+    vec3 direction = -s.v;
+    bool rough = ROUGH && !b.delta;
+    Refraction t = refract_ray(direction, h, b.n2 / b.n1);
+    tir = t.tir;
+    vec3 bent = b.n1 == b.n2 ? direction : t.T;
+    vec3 scattered = rough ? r - 2.0 * dot(r, s.n) * s.n : direction;
+    vec3 through = b.sheet ? scattered : bent;
+    return rough ? through : -on_side(-through, s.n_triangle);
+}
+
+// Whether nothing bends what goes through.
+bool passes_straight(Layers b) {
+    return !(ROUGH && !b.delta) && (b.sheet || b.n1 == b.n2);
 }
 
 LobeSample sample_coat(Layers b, vec3 h) {
@@ -344,25 +361,18 @@ LobeSample sample_base(Layers b, vec3 h) {
     return LobeSample(b.delta ? on_side(r, s.n_triangle) : r, f * s.compensation * (masking * b.left), false);
 }
 
-// What goes through. Equal indices bend nothing, not even by a rounding.
 LobeSample sample_transmission(Layers b, vec3 h) {
     Surface s = b.s;
-    vec3 direction = -s.v;
     bool rough = ROUGH && !b.delta;
-    Refraction t = refract_ray(direction, h, b.n2 / b.n1);
-    vec3 bent = b.n1 == b.n2 ? direction : t.T;
-    vec3 r = reflect_ray(direction, h).R;
-    float cos_r = dot(r, s.n);
-    // A sheet scatters as its mirror image does, to the other side.
-    vec3 scattered = rough ? r - 2.0 * cos_r * s.n : direction;
-    vec3 through = b.sheet ? scattered : bent;
-    through = rough ? through : -on_side(-through, s.n_triangle);
+    vec3 r = reflect_ray(-s.v, h).R;
+    bool tir;
+    vec3 through = through_direction(b, h, r, tir);
     bool total;
     vec3 f = fresnel_below_coat(b, clamp(dot(h, s.v), 0.0, 1.0), total);
-    bool straight = !rough && (b.sheet || b.n1 == b.n2);
-    bool passes = straight || (dot(through, s.n_triangle) < 0.0 && !(b.solid && (total || t.tir)));
+    bool straight = passes_straight(b);
+    bool passes = straight || (dot(through, s.n_triangle) < 0.0 && !(b.solid && (total || tir)));
     float masking = rough ? smith_g2_over_g1(dot(s.n, s.v), dot(through, s.n), s.alpha) : 1.0;
-    if (rough && b.sheet) masking = cos_r > 0.0 ? masking : 0.0;
+    if (rough && b.sheet) masking = dot(r, s.n) > 0.0 ? masking : 0.0;
     vec3 weight = b.tint * (b.transmits * (1.0 - largest(f)) * masking * b.left);
     return LobeSample(through, passes ? weight : vec3(0.0), straight);
 }

@@ -4,7 +4,7 @@
 #define LOOPS_GLSL
 
 // Those so far by this invocation. No shader counts: src/gpu/loops.rs writes the counting into the SPIR-V of devices that need it.
-// What such a device gets is a private variable; it is shared memory here because the optimiser of the build leaves reads of that where
+// What such a device gets is a variable of the invocation; it is shared memory here because the optimiser of the build leaves reads of that where
 // they stand.
 shared uint loop_heads;
 // Those it may spend. Eight pixels share the 65,535, and the longest of them counts in every loop: 40,000 of one's own leaves them

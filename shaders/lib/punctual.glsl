@@ -35,7 +35,7 @@ PunctualLight shaped_light_at(uint index, vec3 p_rel, vec2 x) {
     if (kind == SHAPE_NONE) return r;
     vec3 middle = r.to_light;
     float window = point_falloff(dot(middle, middle), light.inv_range2) * dot(middle, middle);
-    float around = 2.0 * PI * x.y;
+    vec2 around = cos_sin_of_turns(x.y);
     if (kind == SHAPE_SPHERE) {
         // A direction of the cone in which the ball is seen, each as likely as any other (PBRT 4, section 6.2.4).
         float d2 = dot(middle, middle);
@@ -48,7 +48,7 @@ PunctualLight shaped_light_at(uint index, vec3 p_rel, vec2 x) {
         float cos_theta = 1.0 - x.x * lost;
         float sin2 = max(x.x * lost * (2.0 - x.x * lost), 0.0);
         OrthonormalBasis b = orthonormal_basis(r.l);
-        vec3 l = r.l * cos_theta + (b.t * cos(around) + b.b * sin(around)) * sqrt(sin2);
+        vec3 l = r.l * cos_theta + (b.t * around.x + b.b * around.y) * sqrt(sin2);
         r.to_light = l * ball_reach(d2, light.extent, cos_theta, sin2);
         r.l = l;
         // Ω L = 2π(1 − cosθ) I/(πr²).
@@ -57,7 +57,7 @@ PunctualLight shaped_light_at(uint index, vec3 p_rel, vec2 x) {
     }
     if (kind == SHAPE_DISK) {
         OrthonormalBasis b = orthonormal_basis(light.axis);
-        r.to_light = middle + (b.t * cos(around) + b.b * sin(around)) * (light.extent * sqrt(x.x));
+        r.to_light = middle + (b.t * around.x + b.b * around.y) * (light.extent * sqrt(x.x));
     } else {
         vec3 up = normalize(cross(light.axis, light.across)) * light.extent;
         r.to_light = middle + light.across * (2.0 * x.x - 1.0) + up * (2.0 * x.y - 1.0);

@@ -167,7 +167,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     if (CLEARCOAT) {
         vec2 u = vec2(0.0);
         if (ROUGH) u = random_point(pixel, event | COAT_EVENT, trace_terms.seed, trace_terms.sample_index);
-        LobeSample coat = sample_coat(b, coat_half_vector(b, u));
+        LobeSample coat = sample_coat(b, event_half_vector(b, true, u));
         next.direction = coat.direction;
         next.events = count | BY_REFLECTION << 8;
         next.throughput = s.coat_traced ? weight * coat.weight : vec3(0.0);
@@ -177,7 +177,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     }
     vec2 u = vec2(0.0);
     if (ROUGH) u = random_point(pixel, event, trace_terms.seed, trace_terms.sample_index);
-    vec3 h = base_half_vector(b, u);
+    vec3 h = event_half_vector(b, false, u);
     LobeSample mirrored = sample_base(b, h);
     next.direction = mirrored.direction;
     next.events = count | BY_REFLECTION << 8;

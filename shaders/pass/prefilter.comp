@@ -26,9 +26,9 @@ void main() {
     float texel = 4.0 * PI / (base_width * base_width * 0.5); // solid angle of a texel at the equator, roughly
     for (uint i = 0; i < SAMPLES; i++) {
         float x = (float(i) + 0.5) / float(SAMPLES);
-        float phi = 2.0 * PI * float(bitfieldReverse(i)) * 2.3283064365386963e-10;
+        vec2 around = cos_sin_of_turns(float(bitfieldReverse(i)) * 2.3283064365386963e-10);
         GgxSample m = ggx_sample(x, alpha);
-        vec3 h = (frame.t * cos(phi) + frame.b * sin(phi)) * m.sin_h + n * m.cos_h;
+        vec3 h = (frame.t * around.x + frame.b * around.y) * m.sin_h + n * m.cos_h;
         vec3 l = 2.0 * dot(n, h) * h - n;
         float cos_l = dot(n, l);
         if (cos_l > 0.0) {

@@ -33,6 +33,9 @@ impl Counter {
 
 /// `words` with `loop_heads` as a variable of each invocation, which every loop adds 1 to at its head. Unless `counts`, or where
 /// nothing reads it, it is 0 and costs nothing.
+///
+/// # Panics
+/// When a module that counts has more than one function: the optimiser of the build leaves one.
 #[must_use]
 pub fn with_loops_counted(words: &[u32], counts: bool) -> Vec<u32> {
     let places = instructions(words, HEADER);
@@ -46,10 +49,14 @@ pub fn with_loops_counted(words: &[u32], counts: bool) -> Vec<u32> {
     };
     let [pointer, zero, one] = [new_id(), new_id(), new_id()];
     let (uint, variable) = (counter.uint, counter.variable);
+    let function = StorageClass::Function as u32;
+    let functions = places.iter().filter(|at| op(words, at) == Some(Op::Function)).count();
+    assert!(!counts || functions == 1, "a program has one function");
+    let mut declared = false;
     for at in &places {
         let instruction = &words[at.clone()];
         match op(words, at) {
-            Some(Op::EntryPoint) if !counts => {
+            Some(Op::EntryPoint) => {
                 // Name and string come before the variables, and hold no id by chance: only the tail is searched.
                 let kept: Vec<u32> = instruction[3..].iter().copied().filter(|&word| word != variable).collect();
                 out.push((3 + kept.len() as u32) << 16 | Op::EntryPoint as u32);
@@ -60,11 +67,15 @@ pub fn with_loops_counted(words: &[u32], counts: bool) -> Vec<u32> {
             _ if *at == counter.declared => {
                 out.extend([4 << 16 | Op::Constant as u32, uint, zero, 0]);
                 if counts {
-                    let private = StorageClass::Private as u32;
                     out.extend([4 << 16 | Op::Constant as u32, uint, one, 1]);
-                    out.extend([4 << 16 | Op::TypePointer as u32, pointer, private, uint]);
-                    out.extend([5 << 16 | Op::Variable as u32, pointer, variable, private, zero]);
+                    out.extend([4 << 16 | Op::TypePointer as u32, pointer, function, uint]);
                 }
+            }
+            // Of the function and not of the module: lavapipe keeps the latter in memory.
+            Some(Op::Label) if counts && !declared => {
+                declared = true;
+                out.extend(instruction);
+                out.extend([5 << 16 | Op::Variable as u32, pointer, variable, function, zero]);
             }
             Some(Op::Load) if !counts && reads(at) => {
                 out.extend([4 << 16 | Op::CopyObject as u32, instruction[1], instruction[2], zero]);

@@ -37,10 +37,10 @@ fn lambda(cos: f64, alpha: f64) -> f64 {
     if cos < 0.5 { l(cos).exp() } else { (2.0 * l(0.5) - l(1.0 - cos)).exp() }
 }
 
-/// E, the directional albedo of a white sheen, within 4e-4 of itself.
+/// E, the directional albedo of a white sheen, within 5e-4 of itself.
 #[must_use]
 pub fn albedo(cos_v: f64, roughness: f64) -> f64 {
-    const ELEVATIONS: u32 = 64;
+    const ELEVATIONS: u32 = 128;
     const AZIMUTHS: u32 = 32;
     let sin_v = (1.0 - cos_v * cos_v).max(0.0).sqrt();
     let mut sum = 0.0;
