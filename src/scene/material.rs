@@ -98,7 +98,6 @@ pub struct Material {
 
 impl Material {
     /// The textures that it may have, by the names that shaders know them by (`NAME_page` in shaders/lib/texels.glsl).
-    #[must_use]
     pub fn textures(&self) -> impl Iterator<Item = (&'static str, Meaning, Option<TextureRef>)> {
         use Meaning::{Color, Data};
         let own = [

@@ -6,6 +6,9 @@ pub mod sheen;
 
 use super::{Meaning, TextureRef};
 
+/// For a perceptual roughness a row of so many steps from the horizon up, in the lobe's own measure.
+pub type TableRow = fn(f64, usize) -> Vec<[f64; 2]>;
+
 /// What an extension says of a lobe.
 pub struct Lobe {
     /// As plans call its effect.
@@ -19,9 +22,8 @@ pub struct Lobe {
     pub textures: &'static [(&'static str, &'static str, Meaning)],
     /// It sends light in all directions.
     pub scatters: bool,
-    /// Its part of the table of directional reflectance: for a perceptual roughness a row of so many steps from the horizon up, in the
-    /// lobe's own measure.
-    pub albedo: Option<fn(f64, usize) -> Vec<[f64; 2]>>,
+    /// Its part of the table of directional reflectance.
+    pub albedo: Option<TableRow>,
 }
 
 /// All of them, in the order of `LOBE_…` in shaders/lib/.
