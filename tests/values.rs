@@ -578,3 +578,28 @@ fn told_numbers_of_phong_are_drawn_as_b5_and_b6_are_written() {
         }
     }
 }
+
+/// Before light that is the same from everywhere a rough coat over black shows its directional albedo, along paths too: each direction is
+/// weighted by the density that it was drawn with.
+#[test]
+fn a_rough_coat_over_black_sends_its_albedo_along_paths() {
+    let gpu = Gpu::hasty();
+    let coated = Material { clearcoat: 1.0, clearcoat_roughness: 0.5, ..lambert([0.0; 3]) };
+    let (scene, facets) = dome(std::slice::from_ref(&coated));
+    let sky = Environment::constant([1.0; 3]);
+    let (_, film) =
+        gpu.shot(&scene, Some(&sky), model(Model::Global, DOME, &["samples=256", "brdf=ggx", "fresnel=schlick"]));
+    for tilt in lobe::TILTS {
+        let cos_v = tilt.to_radians().cos();
+        let same = facets.iter().filter(|facet| (facet.n.z - cos_v).abs() < 1e-6);
+        let seen: Vec<f64> =
+            same.flat_map(|facet| &facet.pixels).map(|&pixel| f64::from(film.rgba[pixel][1])).collect();
+        let n = seen.len() as f64;
+        let mean = seen.iter().sum::<f64>() / n;
+        let error = (seen.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n * (n - 1.0))).sqrt();
+        let [whole, grazing] = lobe::reflectances(cos_v, lobe::alpha(coated.clearcoat_roughness));
+        let want = 0.04 * (whole - grazing) + grazing;
+        // The rule behind `reflectances` is good to 1e-3.
+        assert!((mean - want).abs() < 4.0 * error + 2e-3 * want, "{tilt}°: {mean} ± {error}, not {want}");
+    }
+}
