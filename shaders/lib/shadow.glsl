@@ -117,7 +117,7 @@ float map_visibility(vec3 p, vec3 n, vec3 to_light, uint index, float size) {
     vec4 row_v = imageLoad(lights, first + 2);
     vec4 row_d = imageLoad(lights, first + 3);
     vec4 row_w = imageLoad(lights, first + 4);
-    float distance = light.told_from_light > 0.0 ? vector_length(to_light) : 0.0;
+    float distance = light.infinite_far > 0.0 ? vector_length(to_light) : 0.0;
     vec4 q = vec4(p + n * (trace_terms.offset + (size + distance) * SHADOW_ROUNDINGS), 1.0);
     float w = dot(row_w, q);
     vec3 at = vec3(dot(row_u, q), dot(row_v, q), dot(row_d, q)) / w;

@@ -7,9 +7,6 @@
 #include "lib/reflectance.glsl"
 #include "lib/surface.glsl"
 
-// Perceptual roughness below which sheen grows no sharper: 1/α is 204, as steep as its table can tell.
-const float LEAST_SHEEN_ROUGHNESS = 0.07;
-
 // The fit to the masking of fibres, between the numbers of α = 0 and of α = 1.
 float sheen_lambda(float cos_n, float alpha) {
     float t = (1.0 - alpha) * (1.0 - alpha);
@@ -42,7 +39,7 @@ float left_by_sheen_of_all(Surface s, float cos_v) {
     return 1.0 - largest(s.sheen.rgb) * (e.x * (1.0 - cos_v * cos_v) + e.y);
 }
 
-// The lobe for light from l, times cosθ. Below a roughness of 0.25, and less than 8° above the horizon, the fit sends more than it
+// The lobe for light from l, times cosθ. Below a roughness of 0.26, and less than 3° above the horizon, the fit sends more than it
 // receives (E up to 2.9): there it is scaled to what it receives.
 vec3 sheen_lobe(Surface s, vec3 l, float cos_l, float cos_v) {
     float roughness = max(s.sheen.a, LEAST_SHEEN_ROUGHNESS);

@@ -2,7 +2,7 @@
 #ifndef SHARE_BVH_GLSL
 #define SHARE_BVH_GLSL
 
-// Nodes are told by their index, and a leaf by a number below 0: ~(first triangle << LEAF_BITS | how many − 1).
+// A reference to a node is its index, one to a leaf is negative: ~(first triangle << LEAF_BITS | how many − 1).
 const int LEAF_BITS = 3;
 
 // Of a list: `word` is a leaf, or where to go on when the box is missed.

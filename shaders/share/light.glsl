@@ -17,7 +17,7 @@ struct Light {
     float pad_across;
     float first_map;       // texel of its first shadow map
     float maps;            // 1 or 6
-    float told_from_light; // 1: depth is told from the light, else across the scene
+    float infinite_far; // 1: depth of its maps is near/z; 0: it lies between planes around the scene
     float pad_map;
 };
 #endif

@@ -71,7 +71,7 @@ pub fn with_loops_counted(words: &[u32], counts: bool) -> Vec<u32> {
                     out.extend([4 << 16 | Op::TypePointer as u32, pointer, function, uint]);
                 }
             }
-            // Of the function and not of the module: lavapipe keeps the latter in memory.
+            // Variables come first in the first block of their function.
             Some(Op::Label) if counts && !declared => {
                 declared = true;
                 out.extend(instruction);

@@ -431,7 +431,7 @@ struct Corners<'a> {
     /// Whether the normals had to be turned over: tangents change hands with them.
     normals_mirrored: Vec<bool>,
     scales: Vec<f32>,
-    /// What the shader is told of them.
+    /// The specialization constants that say which of these there are.
     contents: lib::hit::Constants,
     /// Those texels of [`share::Corners`] that `contents` call for.
     kept: Vec<usize>,

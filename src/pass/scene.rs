@@ -576,15 +576,15 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32, shares:
     }
 }
 
-/// F0 and base colour from which shaders/lib/layers.glsl makes the told k_s and k_d again. B5 has no (L + V)² under its lobe, which is 4 at
+/// F0 and base colour from which shaders/lib/layers.glsl makes k_s and k_d of the scene again. B5 has no (L + V)² under its lobe, which is 4 at
 /// normal incidence. B6 draws of the ground the share that F0 leaves: divided by it where the sum of both receives no more than it is sent.
 fn phong(m: &Material, knobs: &Knobs, f0: [f32; 3]) -> ([f32; 3], [f32; 3]) {
     let [red, green, blue, _] = m.base_color;
     let r = (m.ior - 1.0) / (m.ior + 1.0);
-    let told = m.specular_color.map(|c| r * r * c * m.specular);
-    let left = 1.0 - told.into_iter().fold(0.0, f32::max);
+    let uncapped = m.specular_color.map(|c| r * r * c * m.specular);
+    let left = 1.0 - uncapped.into_iter().fold(0.0, f32::max);
     match knobs.rung("brdf") {
-        "blinn-phong" => (told.map(|f| 4.0 * f), [red, green, blue]),
+        "blinn-phong" => (uncapped.map(|f| 4.0 * f), [red, green, blue]),
         "blinn-phong-reciprocal" if left > 0.0 => (f0, [red, green, blue].map(|albedo| (albedo / left).min(1.0))),
         _ => (f0, [red, green, blue]),
     }
@@ -635,7 +635,7 @@ fn shared_light(light: &Light, color: [f32; 3], eye: DVec3, maps: LightMaps) -> 
         color,
         first_map: maps.first as f32,
         maps: maps.count as f32,
-        told_from_light: f32::from(u8::from(maps.told_from_light)),
+        infinite_far: f32::from(u8::from(maps.infinite_far)),
         ..bytemuck::Zeroable::zeroed()
     };
     let local = |position: DVec3, range: Option<f64>| share::Light {
@@ -673,8 +673,8 @@ pub(super) struct LightMaps {
     pub(super) first: usize,
     /// 1 or 6; 0 where there are none.
     pub(super) count: u32,
-    /// Depth is told from the light, not across the scene.
-    pub(super) told_from_light: bool,
+    /// Depth is near/z, with an infinite far plane; else its planes are those around the scene.
+    pub(super) infinite_far: bool,
 }
 
 /// A medium as rays keep it (shaders/lib/media.glsl): its priority, and which material it is.

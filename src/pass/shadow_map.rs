@@ -33,8 +33,8 @@ const BORDER: f64 = 2.0;
 /// Half angle up to which a light has one map, of a spot light's cone or of the scene seen from outside; a plane stretches
 /// as the tangent's square towards its edge, and wider ones have six, all around.
 const WIDEST_CONE: f64 = FRAC_PI_3;
-/// From how many radii of the scene on it is seen from so far that depth is told across the scene and not from the light:
-/// numbers as large as the distance then hide nothing of it.
+/// Radii of the scene from which on a light is so far that its depth lies between planes around the scene: numbers as large as
+/// the distance then hide nothing of it.
 const FAR: f64 = 4.0;
 /// Texels of the table of lights per map.
 const FACE_TEXELS: usize = SHADOW_MAP_TEXELS as usize;
@@ -87,7 +87,7 @@ impl ShadowMaps {
         };
         let mut faces: Vec<Face> = Vec::new();
         let mut first = vec![0; lights.len()];
-        let mut told = vec![false; lights.len()];
+        let mut infinite = vec![false; lights.len()];
         // Large squares first: what follows along the curve then starts at a multiple of its own size.
         let mut next = 0;
         for large in [true, false] {
@@ -95,7 +95,7 @@ impl ShadowMaps {
             {
                 first[index] = faces.len();
                 let side = if large { flat } else { cube };
-                told[index] = is_told_from_light(light, bounds, anchor);
+                infinite[index] = has_infinite_far(light, bounds, anchor);
                 for clip in clip_rows(light, side, bounds, anchor) {
                     let [x, y] = along_curve(next);
                     faces.push(Face { clip, square: [x, y, side] });
@@ -104,12 +104,12 @@ impl ShadowMaps {
             }
         }
         let maps_at = lights.len() * LIGHT_TEXELS as usize;
-        let of_light = |(light, (first, told_from_light)): (&Light, (usize, bool))| LightMaps {
+        let of_light = |(light, (first, infinite_far)): (&Light, (usize, bool))| LightMaps {
             first: maps_at + first * FACE_TEXELS,
             count: if cone(light, bounds).is_some() { 1 } else { 6 },
-            told_from_light,
+            infinite_far,
         };
-        let of_lights = lights.iter().zip(first.into_iter().zip(told)).map(of_light).collect();
+        let of_lights = lights.iter().zip(first.into_iter().zip(infinite)).map(of_light).collect();
         let table: Vec<[f32; 4]> = faces.iter().flat_map(Face::texels).collect();
         let extent = |axis: usize| faces.iter().map(|f| f.square[axis] + f.square[2]).max().unwrap_or(1);
         let depth = image(extent(0), extent(1))?;
@@ -200,8 +200,8 @@ fn cone(light: &Light, bounds: Bounds) -> Option<(DVec3, f64)> {
     (half <= WIDEST_CONE).then_some((axis, half))
 }
 
-/// Whether a map's depth is 1/z of the light, and not across the scene.
-fn is_told_from_light(light: &Light, bounds: Bounds, anchor: DVec3) -> bool {
+/// Whether a map's depth is near/z, with an infinite far plane; else it lies between planes around the scene.
+fn has_infinite_far(light: &Light, bounds: Bounds, anchor: DVec3) -> bool {
     match light.kind {
         LightKind::Directional { .. } => false,
         LightKind::Point { position, .. } | LightKind::Spot { position, .. } => {
@@ -238,7 +238,7 @@ fn clip_rows(light: &Light, side: u32, bounds: Bounds, anchor: DVec3) -> Vec<[DV
         let near = (0.5 * outside).max(1e-5 * radius) / slant;
         let row = |axis: DVec3, scale: f64| (axis * scale).extend(-axis.dot(eye) * scale);
         let down = forward.cross(right);
-        let depth = if is_told_from_light(light, bounds, anchor) {
+        let depth = if has_infinite_far(light, bounds, anchor) {
             DVec4::W * near
         } else {
             // Over z: 1 at the near end of the sphere around the scene, 0 at the far one.

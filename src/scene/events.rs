@@ -1,6 +1,6 @@
 //! What the ray of a pixel meets, one surface after the other, as the lecture tells it (R1 to R6): the mirrored ray, the bent one, and
 //! from what spreads light a ray to each light. In f64 and by textbook formulas, for whoever asks why a pixel looks as it does; no
-//! picture is made of it. Normals are those of the corners, without textures; media and shares are told for green light.
+//! picture is made of it. Normals are those of the corners, without textures; media and shares are those of green light.
 
 use glam::{DVec2, DVec3};
 
@@ -18,7 +18,7 @@ const MOST_EVENTS: usize = 96;
 /// Lights that a surface is connected with at most.
 const MOST_LIGHTS: usize = 8;
 
-/// Wavelength for which media are told, nm.
+/// Wavelength of which media and shares are, nm.
 pub const GREEN: f64 = 550.0;
 
 /// How far a ray is followed.

@@ -51,7 +51,7 @@ pub(crate) fn apply(extras: &json::Extras, file_ior: Option<f32>, m: &mut Materi
             "kappa" => kappa = Some(read().and_then(|v| index(&v, key, &mut warnings)).with_context(blame)?),
             "kd" => kd = Some(read().and_then(|v| three(&v)).with_context(blame)?),
             "ks" => ks = Some(read().and_then(|v| three(&v)).with_context(blame)?),
-            "shine" => shine = Some(read().and_then(|v| three(&v)).with_context(blame)?[0]),
+            "shine" => shine = Some(read().and_then(|v| exponent(&v)).with_context(blame)?),
             "sellmeier" => sellmeier = Some(sellmeier_of(text.get()).with_context(blame)?),
             "cauchy" => cauchy = Some(cauchy_of(text.get()).with_context(blame)?),
             "reflectance" => m.reflectance = Some(reflectance(text.get(), &mut warnings).with_context(blame)?),
@@ -381,6 +381,13 @@ fn three(value: &Value) -> Result<[f64; 3]> {
     let [Some(r), Some(g), Some(b)] = channels else { bail!("{} is neither a number nor three numbers", shown(value)) };
     ensure!(r >= 0.0 && g >= 0.0 && b >= 0.0, "{} is negative", shown(value));
     Ok([r, g, b])
+}
+
+/// One number that is not negative.
+fn exponent(value: &Value) -> Result<f64> {
+    let number = value.as_f64().with_context(|| format!("{} is not a number", shown(value)))?;
+    ensure!(number >= 0.0, "{} is negative", shown(value));
+    Ok(number)
 }
 
 /// The numbers of lecture B5 and B6, k_d and k_s in 1/sr, as the base that the other rungs of `brdf` draw.

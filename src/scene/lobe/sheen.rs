@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::Lobe;
 use crate::scene::Meaning::{Color, Data};
+use crate::share::LEAST_SHEEN_ROUGHNESS;
 
 /// KHR_materials_sheen.
 pub static SHEEN: Lobe = Lobe {
@@ -16,13 +17,10 @@ pub static SHEEN: Lobe = Lobe {
     albedo: Some(table_row),
 };
 
-/// Perceptual roughness below which sheen grows no sharper.
-pub const LEAST_ROUGHNESS: f64 = 0.07;
-
 /// The lobe of a white sheen for two directions, D V, by their cosines and that of the half vector with the normal.
 #[must_use]
 pub fn sheen(cos_l: f64, cos_v: f64, cos_h: f64, roughness: f64) -> f64 {
-    let alpha = roughness.max(LEAST_ROUGHNESS).powi(2);
+    let alpha = roughness.max(f64::from(LEAST_SHEEN_ROUGHNESS)).powi(2);
     let sin_h = (1.0 - cos_h * cos_h).max(0.0).sqrt();
     let d = (2.0 + alpha.recip()) * sin_h.powf(alpha.recip()) / TAU;
     d / ((1.0 + lambda(cos_l, alpha) + lambda(cos_v, alpha)) * 4.0 * cos_l * cos_v)
