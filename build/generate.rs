@@ -23,12 +23,12 @@ pub(crate) struct Reflected<'p> {
 pub(crate) struct Programs<'p> {
     interface: &'p Interface,
     programs: BTreeMap<&'p str, Reflected<'p>>,
-    /// Kind of each binding, by file and name; of `scene` and `pages` under those names.
+    /// Kind of each binding, by file and name; of shared sets under the names of those.
     kinds: BTreeMap<(String, String), &'static str>,
     /// Type and default of each constant.
     constants: BTreeMap<String, (&'static str, String)>,
-    /// The bindings of the sets 1 and 2, with all that read them.
-    shared: [BTreeMap<u32, Binding>; 2],
+    /// The bindings of each shared set, with all that read them.
+    shared: BTreeMap<&'static str, BTreeMap<u32, Binding>>,
 }
 
 impl<'p> Programs<'p> {
@@ -38,19 +38,21 @@ impl<'p> Programs<'p> {
             programs: BTreeMap::new(),
             kinds: BTreeMap::new(),
             constants: BTreeMap::new(),
-            shared: [BTreeMap::new(), BTreeMap::new()],
+            shared: SETS[1..].iter().map(|(set, _)| (*set, BTreeMap::new())).collect(),
         };
         for (name, program) in programs {
             let declared = declared(&program.stages)?;
             for binding in declared.bindings.values() {
+                let set = interface.set_of(&binding.name);
                 let owner = match binding.set {
                     0 => program.slots[&binding.name].1.clone(),
-                    set => SETS[set as usize].to_owned(),
+                    _ => set.to_owned(),
                 };
                 all.kinds.insert((owner, binding.name.clone()), binding.kind);
-                if binding.set > 0 {
-                    let shared = all.shared[binding.set as usize - 1].entry(binding.slot);
-                    let known = shared.or_insert_with(|| binding.clone());
+                if binding.set > 0
+                    && let Some(shared) = all.shared.get_mut(set)
+                {
+                    let known = shared.entry(binding.slot).or_insert_with(|| binding.clone());
                     known.stages.extend(&binding.stages);
                     if known.kind != binding.kind {
                         return Err(format!("{name}: {} is of another kind than elsewhere", binding.name));
@@ -76,8 +78,10 @@ impl<'p> Programs<'p> {
             return Err(format!("{name}: {pushed} push descriptors, more than {}", limits::PUSH_DESCRIPTORS));
         }
         for stage in ["VERTEX", "FRAGMENT", "COMPUTE"] {
-            let scene = self.shared[0].values().filter(|_| declared.bindings.values().any(|b| b.set > 0));
-            let all: Vec<&Binding> = own.clone().chain(scene).filter(|b| b.stages.contains(stage)).collect();
+            // A set counts as a whole, whatever the program reads of it.
+            let sets = shared_sets(self.interface, declared)?;
+            let shared = sets.iter().flat_map(|set| self.shared[set].values());
+            let all: Vec<&Binding> = own.clone().chain(shared).filter(|b| b.stages.contains(stage)).collect();
             for (kinds, most, what) in [
                 (&["StorageImage", "StorageTexelBuffer"][..], limits::STORAGE_IMAGES, "storage images"),
                 (&["StorageBuffer"][..], limits::STORAGE_BUFFERS, "storage buffers"),
@@ -94,7 +98,7 @@ impl<'p> Programs<'p> {
 
     pub(crate) fn rust(&self) -> Result<String> {
         let mut code = String::from("// Written by the build from shaders/; not edited.\n");
-        for (set, bindings) in SETS[1..].iter().zip(&self.shared) {
+        for (set, bindings) in &self.shared {
             let table: String = bindings.values().map(binding_literal).collect();
             code += &format!(
                 "/// What a descriptor set `{set}` holds.\npub static {}: SetLayout = SetLayout {{ name: \"{set}\", bindings: &[\n{table}] }};\n",
@@ -148,9 +152,9 @@ impl<'p> Programs<'p> {
             groups.push((file.stem.clone(), file.about.clone()));
         }
         // Pages go by the names of their textures: `PAGES` has all of them.
-        for (set, name) in SETS.iter().zip(["Bind", "Scene"]) {
+        for (set, name) in [("pass", "Bind"), ("scene", "Scene"), ("paths", "Paths")] {
             let mut names: Vec<&str> = Vec::new();
-            for d in file.declarations.iter().filter(|d| d.kind == *set && !d.name.contains("_as_")) {
+            for d in file.declarations.iter().filter(|d| d.kind == set && !d.name.contains("_as_")) {
                 names.push(&d.name);
             }
             if names.is_empty() {
@@ -158,12 +162,12 @@ impl<'p> Programs<'p> {
             }
             let (mut fields, mut entries) = (String::new(), String::new());
             for own in names {
-                let owner = if *set == "pass" { file.stem.clone() } else { (*set).to_owned() };
+                let owner = if set == "pass" { file.stem.clone() } else { set.to_owned() };
                 let Some(kind) = self.kinds.get(&(owner, own.to_owned())) else {
                     return Err(format!("shaders/lib/{}.glsl: no program reads the binding {own}", file.stem));
                 };
                 fields += &format!("        /// {kind}.\n        pub {own}: {},\n", resource_type(kind));
-                if *set != "pass" {
+                if set != "pass" {
                     let slot = self.interface.slot(own);
                     entries += &format!("            ({slot}, Resource::from(self.{own})),\n");
                 }
@@ -171,7 +175,7 @@ impl<'p> Programs<'p> {
             body += &format!(
                 "    /// Its bindings in the set `{set}`.\n    #[derive(Clone, Copy)]\n    pub struct {name}<'a> {{\n{fields}    }}\n"
             );
-            if *set != "pass" {
+            if set != "pass" {
                 body += &format!(
                     "    impl<'a> {name}<'a> {{\n        /// Slots and what is in them.\n        #[must_use]\n        pub fn entries(&self) -> Vec<(u32, Resource<'a>)> {{ vec![\n{entries}        ] }}\n    }}\n"
                 );
@@ -244,7 +248,7 @@ impl<'p> Programs<'p> {
             Some(_) => all.push.iter().map(|s| rust_struct(s, &BTreeMap::new())).collect(),
         };
         let life = if fields.is_empty() { "" } else { "<'a>" };
-        let literal = literal(name, program, all)?;
+        let literal = literal(self.interface, name, program, all)?;
         write!(
             code,
             "/// `shaders/pass/{name}`.
@@ -349,15 +353,31 @@ fn binding_literal(Binding { name, slot, kind, access, stages, .. }: &Binding) -
     )
 }
 
+/// The shared sets of a program, in the order of their numbers, from the first one on.
+fn shared_sets(interface: &Interface, all: &Declared) -> Result<Vec<&'static str>> {
+    let last = all.bindings.values().map(|b| b.set).max().unwrap_or(0);
+    let mut sets = Vec::new();
+    for number in 1..=last {
+        let of_number = all.bindings.values().filter(|b| b.set == number);
+        let read: BTreeSet<_> = of_number.map(|b| interface.set_of(&b.name)).collect();
+        match read.into_iter().collect::<Vec<_>>()[..] {
+            [set] => sets.push(set),
+            // One that lies before another is bound, whatever is read of it.
+            [] if number == 1 => sets.push(SETS[1].0),
+            ref read => return Err(format!("a program reads the sets {read:?}, of which there is one at a time")),
+        }
+    }
+    Ok(sets)
+}
+
 /// A `Program` as a Rust expression.
-pub(crate) fn literal(name: &str, program: &Program, all: &Declared) -> Result<String> {
+pub(crate) fn literal(interface: &Interface, name: &str, program: &Program, all: &Declared) -> Result<String> {
     let of_set = |set: u32| all.bindings.values().filter(move |b| b.set == set);
     let table: String = of_set(0).map(binding_literal).collect();
-    let sets = (1..3_u32).rev().find(|&set| of_set(set).next().is_some()).unwrap_or(0);
     let mut shared = String::new();
-    for set in 1..=sets {
-        let used: String = of_set(set).map(binding_literal).collect();
-        let layout = SETS[set as usize].to_uppercase();
+    for (set, number) in shared_sets(interface, all)?.into_iter().zip(1..) {
+        let used: String = of_set(number).map(binding_literal).collect();
+        let layout = set.to_uppercase();
         shared += &format!("            SharedSet {{ layout: &{layout}, used: &[\n{used}            ] }},\n");
     }
     let mut vertex = String::new();
@@ -415,7 +435,7 @@ pub(crate) fn probes(recipe: &Recipe, programs: &BTreeMap<String, Program>, whol
             let program = recipe.source(shaderc::ShaderKind::Compute, name.clone(), &equation.probe)?;
             let stage = &program.stages[0];
             let facts = contract::check(&name, &stage.module, &stage.words, &library.functions)?;
-            let literal = literal(&name, &program, &declared(&program.stages)?)?;
+            let literal = literal(&recipe.interface, &name, &program, &declared(&program.stages)?)?;
             Ok((literal, facts, contract::called(&program.stages)))
         },
     )?;

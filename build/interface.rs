@@ -5,6 +5,7 @@
 //! layout(pass, rgba32f) uniform image2D radiance;                        set 0: pushed with each dispatch or draw
 //! layout(scene, rgba32f) readonly uniform imageBuffer lights;            set 1: written once per renderer
 //! layout(pages) uniform sampler2DArray base_page;                        set 2: written once per combination of textures
+//! layout(paths, rgba32ui) readonly uniform uimageBuffer emitters;        set 2 of paths: written once per renderer
 //! const uint SHAPE_SPHERE = 1;                                           the host's, too
 //! ```
 //!
@@ -21,8 +22,8 @@
 //! A member whose comment begins with `where CONSTANT` is left out where that constant is false; such a struct is read member by
 //! member.
 //!
-//! A declaration stands on one line. Constants, and bindings of the sets `scene` and `pages`, have one number in all programs, and
-//! one file that declares them. Bindings of a pass are numbered from 0 in each program.
+//! A declaration stands on one line. Constants, and bindings of all sets but a pass's own, have one number in all programs, and one
+//! file that declares them. Bindings of a pass are numbered from 0 in each program.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -31,8 +32,8 @@ use std::path::{Path, PathBuf};
 use super::compile::{Result, files, stem};
 use super::reflect::{Member, Struct};
 
-/// The kinds of descriptor sets, in the order of their numbers.
-pub(crate) const SETS: [&str; 3] = ["pass", "scene", "pages"];
+/// The kinds of descriptor sets, and their numbers. A program reads `pages` or `paths`, never both.
+pub(crate) const SETS: [(&str, u32); 4] = [("pass", 0), ("scene", 1), ("pages", 2), ("paths", 2)];
 
 /// The tag of the line that becomes the number of pages.
 const PAGE_COUNT: &str = "// @pages ";
@@ -120,7 +121,7 @@ impl Interface {
                     let known = numbers.insert(base(name).to_owned(), 0);
                     let of_other_set = SETS[1..]
                         .iter()
-                        .any(|set| set != kind && owners.contains_key(&format!("{set} {}", base(name))));
+                        .any(|(set, _)| set != kind && owners.contains_key(&format!("{set} {}", base(name))));
                     if known.is_some() && of_other_set {
                         return Err(format!("{place}: {name} is the name of a binding in another set"));
                     }
@@ -131,10 +132,14 @@ impl Interface {
         for (number, id) in all.constants.values_mut().enumerate() {
             *id = number as u32;
         }
-        for set in &SETS[1..] {
+        // Sets of one number share its slots: a file that a program includes may declare what the program never reads.
+        let mut next: BTreeMap<u32, u32> = BTreeMap::new();
+        for (set, number) in &SETS[1..] {
             let of_set = |name: &String| owners.contains_key(&format!("{set} {name}"));
-            for (number, (_, slot)) in all.slots.iter_mut().filter(|(name, _)| of_set(name)).enumerate() {
-                *slot = number as u32;
+            let next = next.entry(*number).or_default();
+            for (_, slot) in all.slots.iter_mut().filter(|(name, _)| of_set(name)) {
+                *slot = *next;
+                *next += 1;
             }
         }
         let pages = all.files.iter().flat_map(|file| &file.declarations).filter(|d| d.kind == "pages").count();
@@ -161,6 +166,11 @@ impl Interface {
     pub(crate) fn owner(&self, kind: &str, name: &str) -> Option<&File> {
         let declares = |file: &&File| file.declarations.iter().any(|d| d.kind == kind && base(&d.name) == name);
         self.files.iter().find(declares)
+    }
+
+    /// The kind of set that a binding belongs to which all programs share.
+    pub(crate) fn set_of(&self, name: &str) -> &'static str {
+        SETS[1..].iter().find(|(set, _)| self.owner(set, name).is_some()).map_or("", |(set, _)| set)
     }
 
     /// The number of a specialization constant.
@@ -232,7 +242,7 @@ impl Interface {
                     }
                 }
                 Some(Declaration { kind, name, .. }) => {
-                    let set = SETS.iter().position(|set| *set == kind).unwrap_or_default();
+                    let set = SETS.iter().find(|(set, _)| *set == kind).map_or(0, |(_, number)| *number);
                     let shared = || self.slots.get(base(&name)).copied();
                     let own = || slots.get(base(&name)).map(|(slot, _)| *slot);
                     let slot = if set == 0 { own() } else { shared() };
@@ -420,7 +430,7 @@ fn declaration(line: &str) -> Option<Declaration> {
     let rest = line.strip_prefix("layout(")?;
     let (inside, _) = rest.split_once(')')?;
     let kind = inside.split(',').next()?.trim();
-    if kind != "constant" && !SETS.contains(&kind) {
+    if kind != "constant" && !SETS.iter().any(|(set, _)| *set == kind) {
         return None;
     }
     let (code, about) = comment(line);

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use anyhow::{Result, bail, ensure};
 use ash::vk;
-use glam::DVec3;
 
 use crate::gpu::{Buffer, DescriptorSet, Device, Frame, Image, ImageDesc, PassPlan, PassTime, Place};
 use crate::image::halves::{SampleError, error_of_halves};
@@ -35,14 +34,13 @@ use crate::pass::shared::{Library, OnDevice};
 use crate::pass::tiles::{Tiles, tiles};
 use crate::pass::tonemap::{Counts, Display, tonemap};
 use crate::pass::view::{View, jitter};
-use crate::plan::{Ability, Demand, Facts, Knobs, Plan, Surroundings, needs_lights};
-use crate::scene::emitters::{Emitters, Sky};
+use crate::plan::rungs::Indirect;
+use crate::plan::{Ability, Demand, Knobs, Plan};
+use crate::prepare::{Conditions, Prepared};
+use crate::scene::emitters::Sky;
 use crate::scene::environment::Environment;
-use crate::scene::normal_form::normalise;
-use crate::scene::reads::forget_unread;
-use crate::scene::sigma::one_medium_each;
 use crate::scene::wavelengths::Slice;
-use crate::scene::{Ambience, Bounds, Camera, Light, LightKind, Reads, Scene};
+use crate::scene::{Camera, Scene};
 use crate::share::{self, AovPixel};
 use crate::spectra::VISIBLE;
 
@@ -54,7 +52,7 @@ fn check_size(device: &Device, knobs: &Knobs, size: [u32; 2]) -> Result<()> {
     }
     let pixels = u64::from(size[0]) * u64::from(size[1]);
     // Paths keep four words of a pixel in one buffer, all else one.
-    let bytes = if knobs.rung("indirect") == "path" { 16 } else { 4 };
+    let bytes = if knobs.indirect == Indirect::Path { 16 } else { 4 };
     if pixels * bytes > device.max_storage_bytes() {
         let most = device.max_storage_bytes() / bytes;
         bail!("--size {}x{}: this device holds at most {most} pixels in one picture", size[0], size[1]);
@@ -140,6 +138,25 @@ impl Default for Settings {
             demand: Demand::default(),
             parts: Vec::new(),
         }
+    }
+}
+
+impl Settings {
+    /// What a scene in this environment is prepared for.
+    ///
+    /// # Errors
+    /// When the background is an environment that is not there.
+    pub fn conditions<'a>(&'a self, environment: Option<&'a Environment>) -> Result<Conditions<'a>> {
+        let background = match self.background {
+            Background::Default | Background::Environment => environment.is_some(),
+            Background::Transparent | Background::Color(_) => false,
+        };
+        if self.background == Background::Environment && environment.is_none() {
+            bail!("--background env: there is no environment (--env none, or the scene has lights of its own)");
+        }
+        let Self { environment_intensity: intensity, environment_rotation: rotation, .. } = *self;
+        let sky = environment.map(|map| Sky { map, intensity, rotation });
+        Ok(Conditions { knobs: &self.knobs, demand: self.demand, sky, background })
     }
 }
 
@@ -242,8 +259,7 @@ impl Work {
 /// A scene on a device, ready to be drawn from any camera.
 pub struct Renderer {
     device: Arc<Device>,
-    /// What will be done and why.
-    pub plan: Plan,
+    plan: Plan,
     /// What rays find odd about the scene, a sentence each.
     pub warnings: Vec<String>,
     settings: Settings,
@@ -254,7 +270,7 @@ pub struct Renderer {
     targets: Targets,
     camera: Buffer,
     /// What all programs read of the scene.
-    set: DescriptorSet,
+    sets: [DescriptorSet; 2],
 }
 
 /// All that is as large as the picture.
@@ -322,6 +338,12 @@ impl Drawing {
         self.next[0]
     }
 
+    /// Samples of each pixel that the whole picture has.
+    #[must_use]
+    pub fn of(&self) -> u32 {
+        self.count
+    }
+
     /// Whether no sample is under way, of which some bands were drawn.
     #[must_use]
     pub fn is_whole(&self) -> bool {
@@ -342,45 +364,27 @@ impl Renderer {
     /// When the scene has nothing to draw, the size is out of range, or it does not fit the device.
     pub fn new(
         device: &Arc<Device>,
-        mut scene: Scene,
+        scene: Scene,
         environment: Option<&Environment>,
         settings: Settings,
     ) -> Result<Self> {
-        one_medium_each(&mut scene);
-        let triangles = scene.triangles();
-        let shown = settings.knobs.show_occlusion(environment.is_some());
-        let reads = match settings.demand {
-            Demand::Full => Reads::Everything,
-            _ => Reads::Visible(if shown { Ambience::Present } else { Ambience::Absent }),
-        };
-        // Once more after the normal form, which leaves less to be read.
-        forget_unread(&mut scene, reads);
-        let form = normalise(&mut scene);
-        forget_unread(&mut scene, reads);
         check_size(device, &settings.knobs, settings.size)?;
-        if scene.triangles() == 0 {
-            let why = if triangles == 0 { "the scene has 0 triangles" } else { "alpha leaves nothing of its surfaces" };
-            bail!("{}: there is nothing to draw, {why}", scene.name);
-        }
-        let sky = match settings.background {
-            Background::Default | Background::Environment => environment.is_some(),
-            Background::Transparent | Background::Color(_) => false,
-        };
-        if settings.background == Background::Environment && environment.is_none() {
-            bail!("--background env: there is no environment (--env none, or the scene has lights of its own)");
-        }
-        if needs_lights(settings.demand) && scene.lights.iter().all(|light| light.stand_in) {
-            add_dark_lights(&mut scene);
-        }
-        let facts = Facts::of(&scene, form);
-        let surroundings = Surroundings {
-            environment: environment.is_some(),
-            constant: environment.is_some_and(Environment::is_constant),
-            grey: environment.is_some_and(Environment::is_grey),
-            sky,
-            demand: settings.demand,
-        };
-        let mut plan = Plan::new(&scene, &facts, surroundings, &settings.knobs);
+        let prepared = Prepared::new(scene, &settings.conditions(environment)?)?;
+        Self::of(device, prepared, environment, settings)
+    }
+
+    /// Uploads and prefilters what has been prepared, with the environment and the settings that it was prepared for.
+    ///
+    /// # Errors
+    /// When the size is out of range, the device cannot do what the plan asks for, or the scene does not fit it.
+    pub fn of(
+        device: &Arc<Device>,
+        mut prepared: Prepared,
+        environment: Option<&Environment>,
+        settings: Settings,
+    ) -> Result<Self> {
+        check_size(device, &settings.knobs, settings.size)?;
+        let plan = &mut prepared.plan;
         match (&mut plan.paths, settings.max_error) {
             (Some(paths), wanted) => {
                 paths.at_once = settings.paths_at_once;
@@ -390,34 +394,19 @@ impl Renderer {
             (None, None) => {}
         }
         plan.check(&Ability { device: device.info().name.clone(), adds_in_subgroups: device.adds_in_subgroups() })?;
-        // What adds nothing takes no turn of any loop.
-        let mut kept = plan.lights.iter();
-        scene.lights.retain(|_| kept.next().copied().unwrap_or_default());
         let most = if plan.tiles { MOST_LISTED_LIGHTS } else { MOST_LIGHTS };
-        if device.limits_loops() && scene.lights.len() > most {
-            bail!("{}: {} lights, a software device lights with at most {most} such", scene.name, scene.lights.len());
+        let (name, lights) = (prepared.scene.name.clone(), prepared.scene.lights.len());
+        if device.limits_loops() && lights > most {
+            bail!("{name}: {lights} lights, a software device lights with at most {most} such");
         }
-        let solids = facts.solids;
-        let refracts = plan.screen.refraction || plan.rays.is_some_and(|rays| rays.refraction);
-        let mut warnings = if refracts { solids.warnings.clone() } else { Vec::new() };
-        // Directional ones first: loops over lights count on it, and so does the table of what paths draw light from.
-        scene.lights.sort_by_key(|light| !matches!(light.kind, LightKind::Directional { .. }));
-        let emitters = plan.paths.map_or_else(Emitters::default, |paths| {
-            let Settings { environment_intensity: intensity, environment_rotation: rotation, .. } = settings;
-            Emitters::of(&scene, environment.map(|map| Sky { map, intensity, rotation }), paths.emitting)
-        });
-        let rays = RaysOnDevice::new(device, &plan, &scene, &solids, &emitters, settings.traversal)?;
-        warnings.extend(rays.warnings.iter().cloned());
-        if let Some(bvh) = rays.facts.filter(|_| plan.rays.is_some_and(|rays| rays.refraction)) {
-            plan.found_touching(bvh.touching);
-        }
+        let rays = RaysOnDevice::new(device, &prepared, settings.traversal)?;
+        let Prepared { scene, plan, solids, mut warnings, .. } = prepared;
         for part in settings.parts.iter().filter(|part| !part.called_for(&plan)) {
             warnings.push(format!("--aov {}: no surface of this scene sends such rays, the layer is 0", part.name()));
         }
         // What stands for an environment that is asked for and is not there.
         let dark = (plan.environment && environment.is_none()).then(Environment::dark);
         let turn = Turn { intensity: settings.environment_intensity, rotation: settings.environment_rotation };
-        let name = scene.name.clone();
         let mut scene = SceneOnDevice::new(device, scene, &plan, &settings.knobs, &solids, rays.anchor())?;
         let touching = rays.constants.touching;
         let environment = EnvironmentOnDevice::new(device, &plan, environment.or(dark.as_ref()), turn)?;
@@ -431,7 +420,7 @@ impl Renderer {
             environment: &environment,
         };
         Ok(Self {
-            set: on_device.write(device)?,
+            sets: on_device.write(device)?,
             environment,
             shadow_maps,
             scene,
@@ -450,7 +439,20 @@ impl Renderer {
     /// # Errors
     /// When the driver fails.
     pub fn render(&mut self, camera: &Camera, progress: &mut dyn FnMut(Progress)) -> Result<Rendered> {
-        let mut drawing = self.begin(camera);
+        self.render_samples(camera, self.plan.samples, progress)
+    }
+
+    /// The same with fewer samples of each pixel than the plan has.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn render_samples(
+        &mut self,
+        camera: &Camera,
+        samples: u32,
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<Rendered> {
+        let mut drawing = self.begin(camera, samples);
         while !drawing.is_done() {
             let known = drawing.errors.len();
             self.step(&mut drawing)?;
@@ -470,8 +472,14 @@ impl Renderer {
         self.picture(&drawing)
     }
 
-    /// A picture from a camera, of which nothing is drawn yet.
-    pub fn begin(&mut self, camera: &Camera) -> Drawing {
+    /// What will be done and why.
+    #[must_use]
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// A picture from a camera, of which nothing is drawn yet, of so many samples of each pixel, or as many as the plan has.
+    pub fn begin(&mut self, camera: &Camera, samples: u32) -> Drawing {
         let view = View::new(camera, self.settings.size, self.scene.bounds);
         self.scene.look_from(&view);
         let mut times = Times::default();
@@ -481,7 +489,7 @@ impl Renderer {
             interruptible: false,
             view,
             next: [0, 0],
-            count: self.plan.samples,
+            count: samples.min(self.plan.samples),
             times,
             dropped: 0,
             work: Work::default(),
@@ -631,7 +639,7 @@ impl Renderer {
 
     /// An empty frame whose programs read the scene.
     fn frame(&self) -> Frame<'_> {
-        Frame::of(&self.device, self.on_device().bind(&self.set))
+        Frame::of(&self.device, self.on_device().bind(&self.sets))
     }
 
     /// What programs are specialised by.
@@ -918,15 +926,6 @@ impl Renderer {
         let [width, height] = self.settings.size;
         png::encode_png(width, height, &rendered.display, rendered.has_alpha)
     }
-}
-
-/// Lights of both kinds that do not shine: loops over lights then have a turn to take.
-fn add_dark_lights(scene: &mut Scene) {
-    let bounds = scene.bounds().unwrap_or(Bounds { min: DVec3::ZERO, max: DVec3::ONE });
-    let dark =
-        |kind| Light { name: "dark".to_owned(), color: [0.0; 3], spectrum: None, extent: None, kind, stand_in: false };
-    let point = LightKind::Point { position: bounds.max, range: Some(2.0 * bounds.radius()) };
-    scene.lights.extend([dark(LightKind::Directional { direction: DVec3::NEG_Y }), dark(point)]);
 }
 
 /// Pass times summed by name, in order of first appearance.

@@ -14,7 +14,7 @@
 //!  │                ▲
 //!  │                │
 //!  ▼                │
-//! frame ─► pass ─► plan        what it calls for, and why
+//! frame ─► pass ─► prepare ─► plan    what it calls for, and why: no Vulkan
 //!           │
 //!           ▼
 //!         shader ─► gpu        explicit Vulkan, no renderer in it
@@ -40,7 +40,7 @@
 //! know are in [`share`], and differences from their GLSL twins do not compile.
 //!
 //! [`cost`] prices every rung against the scene's own reference, and what a plan leaves out. [`plan::Plan`] is made before any Vulkan object from the scene's values and the [`plan::Knobs`]: a pass, an image or a piece of
-//! shader code exists only if it says so. [`scene`] reads files that are not trusted; [`study`] generates scenes without files;
+//! shader code exists only if it says so. [`prepare::Prepared`] is a scene with its plan and what its rays go through. [`scene`] reads files that are not trusted; [`study`] generates scenes without files;
 //! [`image`] keeps and compares pictures; [`cli`] is the program.
 //!
 //! Each formula of `shaders/lib/` that is tagged `@eq` has a twin in [`optics`], under its name and in f64, with a bound;
@@ -62,6 +62,8 @@ pub mod share;
 
 pub mod gpu;
 
+pub mod prepare;
+
 pub mod plan;
 
 pub mod scene;
@@ -76,6 +78,7 @@ pub mod optics;
 
 pub mod verify;
 
+#[cfg(feature = "window")]
 pub mod viewer;
 
 pub mod cli;

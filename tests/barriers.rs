@@ -17,17 +17,16 @@ use gpu::Gpu;
 
 /// Validation's error texts after `describe` has been run as a frame, with or without buffer barriers.
 fn errors_of(forget: bool, describe: impl for<'a> FnOnce(&'a Things, &mut Frame<'a>)) -> Vec<String> {
-    let gpu = std::mem::ManuallyDrop::new(Gpu::new());
+    let mut gpu = Gpu::alone();
+    gpu.expects_errors = true;
     let things = Things::new(&gpu);
-    let mut frame = Frame::of(&gpu.device, things.scene.bind(view(&things.camera)));
+    let mut frame = Frame::of(&gpu.device, vec![things.scene.bind(view(&things.camera))]);
     if forget {
         frame.forget_barriers();
     }
     describe(&things, &mut frame);
     frame.finish().expect("a frame");
-    let errors = gpu.errors();
-    drop(things);
-    errors
+    gpu.errors()
 }
 
 /// Of the scene, classification reads the camera alone.

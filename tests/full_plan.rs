@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use etalon::frame::{Renderer, Settings};
 use etalon::image::Picture;
-use etalon::plan::{Demand, Effect, Knobs, Model};
+use etalon::plan::{Demand, Effect, EffectState, Knobs, Model};
 use etalon::scene::camera::DEFAULT_FOV_Y;
 use etalon::scene::environment::Environment;
 use etalon::scene::material::{Sampler, TextureRef};
@@ -37,7 +37,7 @@ fn draw(gpu: &Gpu, scene: &Scene, knobs: &Knobs, demand: Demand) -> (Picture, Ve
     let environment = share.map(|_| &studio);
     let mut renderer = Renderer::new(&gpu.device, scene.clone(), environment, settings).expect("a renderer");
     renderer.render(&camera, &mut |_| ()).expect("a picture");
-    (renderer.film().expect("the film"), renderer.plan.effects.clone())
+    (renderer.film().expect("the film"), renderer.plan().effects.clone())
 }
 
 /// Effects that no demand includes: each makes another picture, or one with other roundings, wherever it is.
@@ -47,8 +47,8 @@ const APART: [&str; 3] = ["bodies that touch", "bands of wavelengths", "dispersi
 fn is_the_same(gpu: &Gpu, name: &str, [lean, full]: [&Scene; 2], knobs: &Knobs) {
     let (planned, _) = draw(gpu, lean, knobs, Demand::Scene);
     let (everything, effects) = draw(gpu, full, knobs, Demand::Full);
-    for effect in effects.iter().filter(|effect| effect.state == "not called for") {
-        assert!(APART.contains(&effect.name), "{name}: {}: {}", effect.name, effect.reason);
+    for effect in effects.iter().filter(|effect| effect.state == EffectState::NotCalledFor) {
+        assert!(APART.contains(&effect.id.name()), "{name}: {}: {}", effect.id.name(), effect.reason());
     }
     let different = bits(&planned).iter().zip(bits(&everything)).filter(|(a, b)| *a != b).count();
     assert_eq!(different, 0, "{name}: pixels that differ");
@@ -121,14 +121,14 @@ fn each_effect_alone() {
     for name in ["radiance", "metals"] {
         let scene = study::load(name).expect("a scene");
         let (planned, effects) = draw(&gpu, &scene, &knobs, Demand::Scene);
-        for effect in effects.iter().filter(|effect| effect.state == "not called for") {
-            let (with, account) = draw(&gpu, &scene, &knobs, Demand::With(effect.name));
-            assert!(bits(&planned) == bits(&with), "{name}: {}", effect.name);
-            let kept = account.iter().filter(|kept| kept.name == effect.name && kept.state == "kept").count();
+        for effect in effects.iter().filter(|effect| effect.state == EffectState::NotCalledFor) {
+            let (with, account) = draw(&gpu, &scene, &knobs, Demand::With(effect.id));
+            assert!(bits(&planned) == bits(&with), "{name}: {}", effect.id.name());
+            let kept = account.iter().filter(|kept| kept.id == effect.id && kept.state == EffectState::Kept).count();
             // Surfaces light others along paths alone, and so do lights with a shape.
-            let needs_paths = ["aims", "surfaces that light", "lights with a shape"].contains(&effect.name);
-            let kept_alone = !needs_paths && !APART.contains(&effect.name);
-            assert_eq!(kept, usize::from(kept_alone), "{name}: {}", effect.name);
+            let needs_paths = ["aims", "surfaces that light", "lights with a shape"].contains(&effect.id.name());
+            let kept_alone = !needs_paths && !APART.contains(&effect.id.name());
+            assert_eq!(kept, usize::from(kept_alone), "{name}: {}", effect.id.name());
         }
     }
 }
@@ -188,7 +188,7 @@ fn surfaces_leave_each_other_alone() {
     made.0.images.push(black);
     is_same("black coat", &made, &[]);
     let (_, effects) = draw(&gpu, &made.0, &knobs(Model::Recursive, &["samples=1"]), Demand::Scene);
-    assert!(effects.iter().any(|effect| effect.name == "layers" && effect.state == "not called for"));
+    assert!(effects.iter().any(|effect| effect.id.name() == "layers" && effect.state == EffectState::NotCalledFor));
 }
 
 /// Files of a folder and those below it that can be loaded.

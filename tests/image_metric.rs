@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::ValueEnum;
 use etalon::cli::diff::{DiffArgs, run};
 use etalon::image::exr::write_exr;
 use etalon::image::metric::{AnyPicture, Metric, compare, map_rgba};
@@ -44,7 +43,7 @@ fn values_worked_out_by_hand() {
 
 #[test]
 fn equal_pictures_have_no_difference() {
-    for &metric in Metric::value_variants() {
+    for &metric in Metric::ALL {
         for picture in [grey(13, 11, 77), linear(13, 11, 2.5)] {
             let found = compare(metric, &picture, &picture).unwrap();
             match metric {
@@ -90,7 +89,7 @@ fn non_finite_pixels_are_counted_and_left_out() {
     b.rgba[5] = [f32::NAN, 0.0, 0.0, 1.0];
     b.rgba[7] = [0.0, f32::INFINITY, 0.0, 1.0];
     let (a, b) = (AnyPicture::Linear(a), AnyPicture::Linear(b));
-    for &metric in Metric::value_variants() {
+    for &metric in Metric::ALL {
         let found = compare(metric, &a, &b).unwrap();
         assert_eq!(found.non_finite, [1, 2]);
         assert!(found.value.is_finite() && found.map.iter().all(|error| error.is_finite()), "{metric:?}");

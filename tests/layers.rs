@@ -11,14 +11,15 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("scene", &["scene", "image", "spectra", "optics", "share"]),
     ("study", &["study", "scene", "spectra", "optics"]),
     ("plan", &["plan", "scene"]),
+    ("prepare", &["prepare", "plan", "scene"]),
     ("optics", &["optics"]),
     ("verify", &["verify", "optics", "shader", "gpu"]),
     ("share", &["share"]),
     ("gpu", &["gpu"]),
     ("shader", &["shader", "gpu", "share"]),
-    ("pass", &["pass", "gpu", "scene", "plan", "image", "optics", "shader", "share", "spectra"]),
-    ("frame", &["frame", "pass", "gpu", "scene", "plan", "image", "share", "spectra"]),
-    ("cost", &["cost", "frame", "gpu", "plan", "scene", "image"]),
+    ("pass", &["pass", "gpu", "scene", "plan", "prepare", "image", "optics", "shader", "share", "spectra"]),
+    ("frame", &["frame", "pass", "gpu", "scene", "plan", "prepare", "image", "share", "spectra"]),
+    ("cost", &["cost", "frame", "gpu", "plan", "prepare", "scene", "image"]),
     (
         "viewer",
         &["viewer", "cost", "frame", "pass", "gpu", "plan", "scene", "image", "optics", "spectra", "shader", "share"],
@@ -26,8 +27,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "cli",
         &[
-            "cli", "viewer", "cost", "verify", "optics", "spectra", "frame", "pass", "gpu", "scene", "plan", "image",
-            "study", "share", "shader",
+            "cli", "viewer", "cost", "verify", "optics", "spectra", "frame", "pass", "gpu", "scene", "plan", "prepare",
+            "image", "study", "share", "shader",
         ],
     ),
 ];

@@ -14,7 +14,8 @@ use std::sync::Arc;
 
 use etalon::frame::Settings;
 use etalon::pass::rays::Traversal;
-use etalon::plan::{Demand, Facts, Knobs, Model, Plan, Surroundings};
+use etalon::plan::rungs::Quadrature;
+use etalon::plan::{Attenuation, Demand, Facts, Knobs, Model, Plan, Surroundings};
 use etalon::scene::normal_form::NormalForm;
 use etalon::scene::{Camera, LightKind, Material, Scene, SigmaGrid};
 use etalon::study::shape::Shape;
@@ -528,31 +529,32 @@ fn planned(scene: &Scene, choices: &[&str]) -> Plan {
 fn the_plan_says_which_grid_is_marched_and_what_is_not_said_in_vain() {
     let (mut made, _) = slab(3, 1, |_, _| 1.0);
     made.0.materials[0].name = "fog".to_owned();
-    let effect = |plan: &Plan, name: &str| plan.effects.iter().find(|e| e.name == name).cloned().expect("an effect");
+    let effect =
+        |plan: &Plan, name: &str| plan.effects.iter().find(|e| e.id.name() == name).cloned().expect("an effect");
     let warned = |plan: &Plan, words: &[&str]| plan.warnings.iter().any(|w| words.iter().all(|word| w.contains(word)));
 
     let plan = planned(&made.0, &["absorption=march:8", "quadrature=simpson"]);
-    assert_eq!((plan.march().steps, plan.march().rule), (8, 2));
+    assert_eq!((plan.march().steps, plan.march().rule), (8, Quadrature::Simpson));
     let kept = effect(&plan, "media that vary");
-    assert_eq!((kept.state, kept.rung), ("kept", "march:8"));
-    assert!(kept.reason.contains("\"fog\"") && kept.evidence["grid"] == "1 x 1 x 3", "{kept:?}");
-    assert_eq!((effect(&plan, "quadrature").state, effect(&plan, "quadrature").rung), ("kept", "simpson"));
+    assert_eq!((kept.state.name(), kept.rung()), ("kept", "march:8"));
+    assert!(kept.reason().contains("\"fog\"") && kept.evidence["grid"] == "1 x 1 x 3", "{kept:?}");
+    assert_eq!((effect(&plan, "quadrature").state.name(), effect(&plan, "quadrature").rung()), ("kept", "simpson"));
     assert!(plan.warnings.is_empty(), "{:?}", plan.warnings);
 
     let plan = planned(&made.0, &["quadrature=simpson"]);
     assert_eq!(plan.march().steps, 0);
-    assert_eq!(effect(&plan, "media that vary").reason, "absorption=path");
+    assert_eq!(effect(&plan, "media that vary").reason(), "absorption=path");
     assert!(warned(&plan, &["\"fog\"", "absorption=path", "mean", "march:4"]), "{:?}", plan.warnings);
     assert!(warned(&plan, &["quadrature=simpson changes nothing"]), "{:?}", plan.warnings);
-    assert_eq!(effect(&plan, "quadrature").state, "not called for");
+    assert_eq!(effect(&plan, "quadrature").state.name(), "not called for");
 
     let plan = planned(&made.0, &["absorption=march:8", "refraction=off"]);
-    assert_eq!((plan.march().steps, effect(&plan, "media that vary").reason.as_str()), (0, "refraction=off"));
+    assert_eq!((plan.march().steps, effect(&plan, "media that vary").reason().as_str()), (0, "refraction=off"));
     assert!(warned(&plan, &["\"fog\"", "refraction=off"]), "{:?}", plan.warnings);
 
     made.0.materials[0].sigma = None;
     let plan = planned(&made.0, &["absorption=march:8", "quadrature=left"]);
-    assert_eq!((plan.march().steps, plan.rays.map(|rays| rays.absorption)), (0, Some(0)));
+    assert_eq!((plan.march().steps, plan.rays.map(|rays| rays.attenuation)), (0, Some(Attenuation::Off)));
     assert!(warned(&plan, &["quadrature=left changes nothing"]), "{:?}", plan.warnings);
     assert!(planned(&made.0, &[]).warnings.is_empty());
 }

@@ -56,7 +56,7 @@ struct Drawn {
 }
 
 fn draw(scene: &Scene, environment: Option<&Environment>, choices: &[&str]) -> Drawn {
-    let gpu = Gpu::new();
+    let gpu = Gpu::alone();
     let mut knobs = Knobs::default();
     for choice in ["samples=1"].iter().chain(choices) {
         knobs.set(choice).expect("a rung");
@@ -80,12 +80,12 @@ fn draw(scene: &Scene, environment: Option<&Environment>, choices: &[&str]) -> D
         }
     }
     let passes = rendered.passes.into_iter().map(|pass| pass.name).collect();
-    Drawn { plan: renderer.plan.clone(), film, objects, passes, code }
+    Drawn { plan: renderer.plan().clone(), film, objects, passes, code }
 }
 
 fn state(plan: &Plan, name: &str) -> (&'static str, String) {
-    let effect = plan.effects.iter().find(|effect| effect.name == name).expect("an effect");
-    (effect.state, effect.reason.clone())
+    let effect = plan.effects.iter().find(|effect| effect.id.name() == name).expect("an effect");
+    (effect.state.name(), effect.reason())
 }
 
 /// Scenes without and with what calls for an effect.
@@ -512,7 +512,7 @@ fn dark_lights_are_no_lights() {
     let both = draw(&lit.0, None, &[]);
     assert!(bits(&alone.film) == bits(&both.film));
     assert_eq!((alone.plan.local_lights, both.plan.local_lights), (1, 1));
-    let effect = both.plan.effects.iter().find(|effect| effect.name == "shadows").expect("an effect");
+    let effect = both.plan.effects.iter().find(|effect| effect.id.name() == "shadows").expect("an effect");
     assert_eq!(effect.evidence["dark"], "1");
 
     let mut dark = ball(lambert([0.5; 3]), None);
@@ -537,7 +537,7 @@ fn lights_out_of_range_are_no_lights() {
     let [alone, both] = [alone, both].map(|made| draw(&made.0, None, &[]));
     assert_eq!((alone.plan.local_lights, both.plan.local_lights), (1, 1));
     assert!(bits(&alone.film) == bits(&both.film));
-    let shadows = both.plan.effects.iter().find(|effect| effect.name == "shadows").expect("an effect");
+    let shadows = both.plan.effects.iter().find(|effect| effect.id.name() == "shadows").expect("an effect");
     assert_eq!(shadows.evidence["out of range"], "1");
 
     let mut far = ball(chalk(), None);
@@ -569,7 +569,8 @@ fn alpha_calls_for_what_it_does() {
         assert!(came(&opaque, same).is_empty() && came(same, &opaque).is_empty());
         assert!(bits(&same.film) == bits(&opaque.film));
     }
-    let see_through = blended.plan.effects.iter().find(|effect| effect.name == "see-through surfaces").expect("one");
+    let see_through =
+        blended.plan.effects.iter().find(|effect| effect.id.name() == "see-through surfaces").expect("one");
     assert_eq!(see_through.evidence.get("alpha 1 everywhere").map(String::as_str), Some("default"));
 
     let none = draw(&ball(metal(0.0), None).0, Some(&environment), &[]);

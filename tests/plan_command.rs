@@ -164,3 +164,30 @@ fn what_cannot_be_planned_is_an_error() {
     failed(&["study:etalon", "--set", "interfaces=0"], "interfaces=0 contradicts refraction=ray");
     failed(&["study:etalon", "--set", "samples=5"], "the nearest is 4");
 }
+
+#[test]
+fn what_a_scene_calls_for_needs_no_device() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let none = [("VK_DRIVER_FILES", "/nonexistent.json"), ("VK_ICD_FILENAMES", "/nonexistent.json")];
+    for scene in ["study:etalon", "study:pool", "study:haze", "study:cornell", "study:nested"] {
+        let size = ["--size", "48x27", "--json"];
+        let text = etalon(at, &[&["plan", scene], &size[..]].concat(), &none).succeeded().stdout;
+        let without: Value = serde_json::from_str(&text).expect("JSON");
+        let mut with = planned(at, &[scene]).0;
+        for effect in with["effects"].as_array_mut().expect("a list") {
+            effect["evidence"].as_object_mut().expect("an object").remove("pixels");
+        }
+        for part in ["schema", "effects", "samples", "unread"] {
+            assert_eq!(without[part], with[part], "{scene}: {part}");
+        }
+        let warnings = without["warnings"].as_array().expect("a list");
+        let told = |warning: &&Value| warning.as_str().is_some_and(|text| text.contains("Vulkan"));
+        assert_eq!(warnings.iter().filter(told).count(), 1, "{scene}: {warnings:?}");
+        let others: Vec<&Value> = warnings.iter().filter(|warning| !told(warning)).collect();
+        assert_eq!(others, with["warnings"].as_array().expect("a list").iter().collect::<Vec<_>>(), "{scene}");
+        assert!(without["pipelines"].as_array().is_some_and(Vec::is_empty), "{scene}");
+    }
+    // Where a device is asked for by name, a plan without it is none.
+    etalon(at, &["plan", "study:cornell", "--device", "cpu"], &none).failed(1, "Vulkan");
+}

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use etalon::frame::{Background, Part, Settings};
 use etalon::image::Picture;
 use etalon::pass::rays::Traversal;
-use etalon::plan::{Demand, Facts, Knobs, Plan, Surroundings};
+use etalon::plan::{Demand, EffectState, Facts, Knobs, Plan, Surroundings};
 use etalon::scene::environment::Environment;
 use etalon::scene::material::{Sampler, TextureRef};
 use etalon::scene::normal_form::normalise;
@@ -57,10 +57,10 @@ impl Ways {
     /// What a plan says of them.
     fn of(plan: &Plan) -> Self {
         let rays = plan.rays.unwrap_or_default();
-        let effect = |name: &str| plan.effects.iter().find(|effect| effect.name == name).expect("an effect");
+        let effect = |name: &str| plan.effects.iter().find(|effect| effect.id.name() == name).expect("an effect");
         let pick =
             |cases: &[(bool, &'static str)], otherwise| cases.iter().find(|(is, _)| *is).map_or(otherwise, |c| c.1);
-        let transmits = effect("refraction").state != "not called for";
+        let transmits = effect("refraction").state != EffectState::NotCalledFor;
         Self {
             shadows: pick(&[(plan.shadow_maps, "map"), (rays.shadows, "ray")], "off"),
             mirrors: pick(&[(plan.screen.mirrors, "screen"), (rays.mirrors, "ray")], "off"),
@@ -69,7 +69,7 @@ impl Ways {
                 "none",
             ),
             blended: plan.see_through
-                && (!transmits || rays.refraction || effect("see-through surfaces").reason.contains("veil")),
+                && (!transmits || rays.refraction || effect("see-through surfaces").reason().contains("veil")),
             listed: plan.tiles,
         }
     }
@@ -149,7 +149,8 @@ fn pairs(ways: &Ways, choice: &Choice) -> BTreeSet<String> {
 
 /// Of any two effects, which are kept.
 fn effect_pairs(plan: &Plan) -> BTreeSet<String> {
-    let kept = |name: &str| plan.effects.iter().any(|effect| effect.name == name && effect.state == "kept");
+    let kept =
+        |name: &str| plan.effects.iter().any(|effect| effect.id.name() == name && effect.state == EffectState::Kept);
     let states: Vec<String> = NAMES.iter().map(|name| format!("({name}: {})", kept(name))).collect();
     let pair = |i: usize| states[i + 1..].iter().map(move |b| (i, b));
     (0..states.len()).flat_map(pair).map(|(i, b)| format!("{} {b}", states[i])).collect()
@@ -346,7 +347,7 @@ fn drawn(gpu: &Gpu, ways: &Ways, choice: &Choice, demand: Demand, by_paths: bool
     let film = renderer.film().expect("the film");
     let seen = film.rgba.iter().filter(|pixel| pixel[0] > 0.0).count();
     assert!(seen > 50, "{ways:?} {choice:?}: {seen} pixels are lit");
-    (renderer.plan.clone(), film)
+    (renderer.plan().clone(), film)
 }
 
 /// Draws each of the ways `share` of three, and looks that it is the one that was meant.
@@ -403,7 +404,7 @@ fn paths_call_for_what_they_may_meet() {
     for (ways, choice) in spread() {
         let plan = planned(&ways, &choice, knobs_of_paths(&ways, &choice));
         for effect in &plan.effects {
-            states.entry(effect.name).or_default().insert(effect.state);
+            states.entry(effect.id.name()).or_default().insert(effect.state.name());
         }
     }
     let of = |name: &str| states[name].iter().copied().collect::<Vec<_>>();
@@ -502,8 +503,8 @@ fn any_two_effects_are_kept_together_and_apart() {
     for (ways, choice) in spread() {
         let plan = planned(&ways, &choice, knobs(&ways, &choice));
         let elsewhere = [OF_PATHS.as_slice(), &OF_WAVELENGTHS].concat();
-        for a in plan.effects.iter().filter(|effect| !elsewhere.contains(&effect.name)) {
-            states.entry(a.name).or_default().insert(a.state);
+        for a in plan.effects.iter().filter(|effect| !elsewhere.contains(&effect.id.name())) {
+            states.entry(a.id.name()).or_default().insert(a.state.name());
         }
         seen.extend(effect_pairs(&plan));
     }

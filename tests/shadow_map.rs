@@ -402,7 +402,11 @@ fn glass_and_blended_surfaces_cast_nothing() {
         made.camera(DVec3::new(1.0, 1.5, 1.0), DVec3::ZERO, made::perspective(50.0));
         assert!(shares(&gpu, &made.0, SIZE).iter().flatten().all(|share| *share == 1.0));
         let renderer = gpu.renderer(&made.0, None, with(SIZE, &["shadows=map"]));
-        assert!(renderer.plan.warnings.iter().any(|w| w.contains("casts no shadow")), "{:?}", renderer.plan.warnings);
+        assert!(
+            renderer.plan().warnings.iter().any(|w| w.contains("casts no shadow")),
+            "{:?}",
+            renderer.plan().warnings
+        );
     }
 }
 
@@ -468,7 +472,7 @@ fn mirrored_and_blended_surfaces_are_shadowed_too() {
 /// The maps are drawn once: the second picture costs nothing, and the first one again is the same.
 #[test]
 fn other_views_cost_nothing() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::alone();
     let mut made = room();
     made.light([10.0; 3], point(DVec3::new(0.1, 2.8, 0.4)));
     let mut renderer = gpu.renderer(&made.0, None, with(SIZE, &["shadows=map"]));
@@ -486,7 +490,7 @@ fn other_views_cost_nothing() {
 /// Many lights share 64 MiB; more than fit are an error that names the other rungs.
 #[test]
 fn many_lights_stay_within_the_budget() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::alone();
     let lit_by = |count: usize| {
         let mut made = room();
         for i in 0..count {

@@ -11,6 +11,7 @@ mod lobe;
 mod made;
 
 use etalon::plan::Model;
+use etalon::plan::rungs::Brdf;
 use etalon::scene::environment::Environment;
 use etalon::scene::lobe::LobeOf;
 use etalon::scene::lobe::sheen::{albedo, sheen};
@@ -57,7 +58,7 @@ fn factors(m: &Material) -> (DVec3, f64) {
 
 /// What the whole material makes of light from l: the base under the lesser of two scales, the lobe, and over both the coat.
 fn expected(m: &Material, n: DVec3, l: DVec3, v: DVec3) -> DVec3 {
-    let rungs = Rungs { brdf: "ggx", exact: false };
+    let rungs = Rungs { brdf: Brdf::Ggx, exact: false };
     let bare = Material { clearcoat: 0.0, ..m.clone() };
     let (color, roughness) = factors(m);
     let (cos_l, cos_v, h) = (n.dot(l), n.dot(v), (l + v).normalize());

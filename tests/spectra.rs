@@ -176,7 +176,7 @@ fn film_xyz(film: &Picture) -> Vec<[f64; 3]> {
 
 #[test]
 fn a_picture_of_the_chart_has_the_differences_of_the_tables() {
-    let gpu = Gpu::alone();
+    let gpu = Gpu::new();
     let chart: Vec<Spectrum> = chart().into_iter().map(|(_, spectrum)| spectrum).collect();
     for (light, name) in LIGHTS.into_iter().enumerate() {
         let spectrum = illuminant(name).expect("a light");
@@ -211,7 +211,7 @@ fn a_picture_of_the_chart_has_the_differences_of_the_tables() {
 
 #[test]
 fn what_varies_is_upsampled_like_what_does_not() {
-    let gpu = Gpu::alone();
+    let gpu = Gpu::new();
     let mut made = Made::new("texels");
     let colors: Vec<[u8; 4]> = (0..16).map(|i| [13 * i as u8, 255 - 11 * i as u8, (97 * i % 256) as u8, 255]).collect();
     made.0.images.push(etalon::scene::Image { name: "texels".to_owned(), width: 16, height: 1, rgba: colors.concat() });
@@ -353,7 +353,7 @@ fn recursive(choices: &[&str], size: [u32; 2]) -> Settings {
 
 #[test]
 fn a_prism_bends_each_wavelength_as_sellmeier_and_snell_say() {
-    let gpu = Gpu::alone();
+    let gpu = Gpu::new();
     let mut columns = Vec::new();
     for nm in [450.0, 550.0, 650.0] {
         let film = gpu.film(&prism(Some(line(nm)), None), recursive(&["samples=16", "colour=spectral:16"], PRISM));
@@ -368,7 +368,7 @@ fn a_prism_bends_each_wavelength_as_sellmeier_and_snell_say() {
 
 #[test]
 fn without_dispersion_there_are_no_fringes() {
-    let gpu = Gpu::alone();
+    let gpu = Gpu::new();
     let expected = predicted(1.72825);
     for light in [line(450.0), line(650.0)] {
         let scene = prism(Some(light), Some(Dispersion::None));
@@ -388,7 +388,7 @@ fn without_dispersion_there_are_no_fringes() {
 
 #[test]
 fn wavelengths_do_not_mix() {
-    let gpu = Gpu::alone();
+    let gpu = Gpu::new();
     let mut scene = study::load("cornell").expect("a scene");
     scene.materials.iter_mut().filter(|m| m.name == "lamp").for_each(|m| m.emission = Some(line(545.0)));
     let mut knobs = Knobs::of(Model::Global);
@@ -409,7 +409,7 @@ fn wavelengths_do_not_mix() {
 
 #[test]
 fn white_is_white_in_every_model_and_number_of_bands() {
-    let gpu = Gpu::alone();
+    let gpu = Gpu::new();
     let sky = Environment::constant([1.0; 3]);
     let mut made = Made::new("furnace");
     let turn = glam::DAffine3::from_rotation_x(0.5) * glam::DAffine3::from_rotation_y(0.6);
@@ -435,7 +435,7 @@ fn white_is_white_in_every_model_and_number_of_bands() {
 /// e^(−∫σ).
 #[test]
 fn media_take_their_share_of_every_band() {
-    let gpu = Gpu::alone();
+    let gpu = Gpu::new();
     let scene = study::load("absorber").expect("a scene");
     let size = [160, 90];
     let spectrum = Upsampling::JakobHanika.reflectance([0.2, 0.55, 0.85].map(|x| f64::from(x as f32)));
@@ -495,17 +495,18 @@ fn media_take_their_share_of_every_band() {
 
 #[test]
 fn what_is_grey_needs_no_bands() {
-    let gpu = Gpu::alone();
+    let gpu = Gpu::new();
     let scene = study::load("radiance").expect("a scene");
     let draw = |rung: &str| {
         let settings = recursive(&["samples=1", rung], [32, 18]);
         let mut renderer = gpu.renderer(&scene, None, settings);
         renderer.render(&scene.cameras[0], &mut |_| ()).expect("a picture");
-        let state =
-            |name: &str| renderer.plan.effects.iter().find(|effect| effect.name == name).map(|effect| effect.state);
+        let state = |name: &str| {
+            renderer.plan().effects.iter().find(|effect| effect.id.name() == name).map(|effect| effect.state.name())
+        };
         assert_eq!(state("bands of wavelengths"), Some("not called for"));
         assert_eq!(state("dispersion"), Some("not called for"));
-        assert_eq!(renderer.plan.bands, 0);
+        assert_eq!(renderer.plan().bands, 0);
         bits(&renderer.film().expect("the film"))
     };
     assert!(draw("colour=rgb") == draw("colour=spectral:16"));
@@ -514,7 +515,7 @@ fn what_is_grey_needs_no_bands() {
 /// Paths see the same as the tree of rays where both follow all there is: level rays through the prism.
 #[test]
 fn paths_disperse_as_the_tree_of_rays_does() {
-    let gpu = Gpu::alone();
+    let gpu = Gpu::new();
     let scene = prism(None, None);
     let tree = gpu.film(&scene, recursive(&["samples=16", "colour=spectral:8", "interfaces=2"], PRISM));
     let mut knobs = Knobs::of(Model::Global);
@@ -559,7 +560,7 @@ fn board(told: impl Fn(&mut Made, Shape, Material, [f32; 3], f64)) -> Scene {
 /// Vertex colours, texels and factors say the same: what lets light through, what mirrors, what is brighter than white.
 #[test]
 fn colours_are_the_same_however_they_are_told() {
-    let gpu = Gpu::alone();
+    let gpu = Gpu::new();
     let times = |m: &Material, rgb: [f32; 3]| {
         let [r, g, b, a] = m.base_color;
         [r * rgb[0], g * rgb[1], b * rgb[2], a]
@@ -611,7 +612,7 @@ fn colours_are_the_same_however_they_are_told() {
 /// Holes of a masked surface let light through in shadow maps, which are drawn before any band is.
 #[test]
 fn holes_cast_no_shadow_in_bands() {
-    let gpu = Gpu::alone();
+    let gpu = Gpu::new();
     let mut made = Made::new("holes");
     made.add(Shape::panel(4.0, 4.0), lambert([0.8, 0.5, 0.2]), at(0.0, 0.0, 0.0));
     let mut hole = lambert([0.2, 0.8, 0.3]);

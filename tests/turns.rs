@@ -70,7 +70,7 @@ fn what_is_interrupted_goes_on() {
     let whole = bits(&renderer.film().expect("a film"));
     let (device, mut interruptions) = (gpu.device.clone(), 0);
     for i in 0..12 {
-        let mut drawing = renderer.begin(&scene.cameras[0]);
+        let mut drawing = renderer.begin(&scene.cameras[0], u32::MAX);
         drawing.interruptible = true;
         let interrupter = {
             let device = device.clone();

@@ -11,6 +11,7 @@ mod made;
 use etalon::frame::Settings;
 use etalon::image::Picture;
 use etalon::plan::Model;
+use etalon::plan::rungs::{Brdf, Fresnel};
 use etalon::scene::environment::Environment;
 use etalon::scene::layers::{Boundary, Layer, Layers, Media};
 use etalon::scene::{AlphaMode, Camera, LightKind, Material, Projection, Scene};
@@ -50,8 +51,7 @@ fn lit(gpu: &Gpu, materials: &[Material], light: DVec3, of: Model, choices: &[&s
     let mut made = Made(std::mem::take(&mut scene));
     made.light(IRRADIANCE, LightKind::Directional { direction: -l });
     let settings = model(of, DOME, choices);
-    let brdf = settings.knobs.rung("brdf");
-    let rungs = Rungs { brdf, exact: settings.knobs.rung("fresnel") == "exact" };
+    let rungs = Rungs { brdf: settings.knobs.brdf, exact: settings.knobs.fresnel == Fresnel::Exact };
     let film = gpu.film(&made.0, settings);
     eprint!("{of:?} {choices:?} ");
     worst(&film, &facets, floor, |facet: &Facet| {
@@ -126,7 +126,7 @@ fn mirrored(gpu: &Gpu, materials: &[Material], of: Model, choices: &[&str]) -> f
     let (scene, facets) = dome(materials);
     let environment = Environment::constant([1.0, 0.5, 2.0]);
     let settings = model(of, DOME, choices);
-    let exact = settings.knobs.rung("fresnel") == "exact";
+    let exact = settings.knobs.fresnel == Fresnel::Exact;
     let (_, film) = gpu.shot(&scene, Some(&environment), settings);
     eprint!("{of:?} {choices:?} ");
     worst(&film, &facets, 1e-2, |facet| {
@@ -407,7 +407,7 @@ fn several() -> [Material; 4] {
 }
 
 /// What such a facet sends along `v`, in light along −`l`: `share` of its diffuse ground is left.
-fn sent(m: &Material, rungs: Rungs<'_>, n: DVec3, l: DVec3, v: DVec3, share: f64) -> DVec3 {
+fn sent(m: &Material, rungs: Rungs, n: DVec3, l: DVec3, v: DVec3, share: f64) -> DVec3 {
     let kept = |m: &Material| reflected(m, rungs, n, l, v) * lobe::rgb(IRRADIANCE);
     let without = Material { base_color: [0.0; 4], ..m.clone() };
     let diffuse = if m.metallic == 0.0 { kept(m) - kept(&without) } else { DVec3::ZERO };
@@ -452,7 +452,7 @@ fn what_a_mirror_shows_and_what_a_pane_lets_through_is_lit_as_what_is_seen_witho
                 film.rgba.chunks_exact_mut(DOME[0] as usize).for_each(|row| row.reverse());
             }
             eprint!("{of:?}, {what}: ");
-            let rungs = Rungs { brdf: "ggx", exact: false };
+            let rungs = Rungs { brdf: Brdf::Ggx, exact: false };
             let error = worst(&film, &facets, 1e-2, |facet| {
                 sent(&materials[facet.material], rungs, facet.n, ABOVE.normalize(), DVec3::Z, 1.0)
             });
@@ -487,7 +487,7 @@ fn what_blends_and_what_lets_light_through_is_lit_as_what_is_opaque() {
             let (scene, facets) = with(materials, |_| ());
             let film = gpu.film(&scene, model(of, DOME, &["brdf=ggx", "fresnel=schlick"]));
             eprint!("{of:?}, {what}: ");
-            let rungs = Rungs { brdf: "ggx", exact: false };
+            let rungs = Rungs { brdf: Brdf::Ggx, exact: false };
             let error = worst(&film, &facets, 0.02, |facet| {
                 let m = &materials[facet.material];
                 let alpha = if what == "blended" { 0.75 } else { 1.0 };

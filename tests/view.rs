@@ -139,11 +139,15 @@ fn the_window_shows_what_render_draws() {
     viewer.unhide();
     shows_its_command(&mut viewer, folder);
     // Nothing happens, nothing is drawn: a third of a core was busy here once.
-    std::thread::sleep(Duration::from_millis(500));
-    let before = viewer.cpu();
-    std::thread::sleep(Duration::from_secs(2));
-    let busy = viewer.cpu() - before;
-    assert!(busy < Duration::from_millis(200), "{busy:?} of two seconds");
+    // A machine that does other things may need a while to get there.
+    let mut two_seconds = || {
+        let before = viewer.cpu();
+        std::thread::sleep(Duration::from_secs(2));
+        viewer.cpu() - before
+    };
+    let busy: Vec<Duration> =
+        (0..5).map(|_| two_seconds()).take_while(|&busy| busy >= Duration::from_millis(200)).collect();
+    assert!(busy.len() < 5, "{busy:?} of two seconds each");
 
     let (code, words) = viewer.close();
     assert_eq!(code, Some(0), "{words}");

@@ -8,8 +8,13 @@
 #include "share/aims.glsl"
 
 layout(constant) const bool AIMED = false;
-layout(scene, scalar) readonly buffer AimCells { uint aim_cells[]; };
-layout(scene, scalar) readonly buffer AimTable { AimGrid aim_grid; AimBall aim_balls[]; };
+layout(paths, r32ui) readonly uniform uimageBuffer aim_cells;
+layout(paths, rgba32ui) readonly uniform uimageBuffer aims; // the grid, then the balls
+// @texels AimGrid aim_grid_at(aims)
+uvec4 ball_texel(uint index, int texel) {
+    return imageLoad(aims, AIM_GRID_TEXELS + int(index) + texel);
+}
+// @texels AimBall aim_ball_at(ball_texel)
 
 // Of the directions drawn for a diffuse surface (docs/decisions/paths.md).
 const float AIMED_SHARE = 0.25;
@@ -17,17 +22,18 @@ const float AIMED_SHARE = 0.25;
 struct Aims {
     uint first;
     uint count; // 0: none
+    uint last;  // of all balls
     float cell; // metres
 };
 
 Aims aims_at(vec3 p) {
-    AimGrid grid = aim_grid;
+    AimGrid grid = aim_grid_at(0);
     vec3 at = floor((p - grid.corner) * grid.cells_per_metre);
     bool inside = all(greaterThanEqual(at, vec3(0.0))) && all(lessThan(at, vec3(grid.cells)));
     uvec3 c = inside ? uvec3(at) : uvec3(0);
-    uint word = aim_cells[c.x + grid.cells.x * (c.y + grid.cells.y * c.z)];
+    uint word = imageLoad(aim_cells, int(c.x + grid.cells.x * (c.y + grid.cells.y * c.z))).x;
     uint count = word & ((1u << AIM_COUNT_BITS) - 1u);
-    return Aims(word >> AIM_COUNT_BITS, inside ? count : 0u, 1.0 / grid.cells_per_metre);
+    return Aims(word >> AIM_COUNT_BITS, inside ? count : 0u, grid.last_ball, 1.0 / grid.cells_per_metre);
 }
 
 // The directions in which a ball is seen: a cone, or a hemisphere from inside.
@@ -38,7 +44,7 @@ struct Cone {
 };
 
 Cone cone_to(Aims at, uint i, vec3 p) {
-    AimBall ball = aim_balls[min(at.first + i, uint(aim_balls.length()) - 1u)];
+    AimBall ball = aim_ball_at(min(at.first + i, at.last));
     vec3 to = ball.middle - p;
     vec2 radius_share = unpackHalf2x16(ball.radius_share);
     float radius = radius_share.x * at.cell;

@@ -87,7 +87,7 @@ Layers layers_at(HitSurface hit, Boundary boundary) {
     b.f_dielectric = fresnel_below_coat(b, b.cos_v, b.total);
     b.f_base = mix(b.f_dielectric, fresnel_of_metal(b.s, b.cos_v), b.s.metallic);
     b.enters = 1.0 - largest(b.f_dielectric);
-    if (ROUGH && BRDF == BRDF_GGX_MULTI && !b.delta) b.enters = ground_share(b.s, lobe_reflectance(b.s));
+    if (ROUGH && BRDF == BRDF_GGX_MULTI && !b.delta) b.enters = ground_share(albedo_of_base(b.s, lobe_reflectance(b.s)));
     b.left = left_to_base(b.s);
     b.under = 1.0;
     if (CLEARCOAT) {

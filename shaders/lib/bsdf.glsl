@@ -45,7 +45,7 @@ Bsdf bsdf_at(HitSurface hit, Boundary boundary) {
     b.n = hit.n;
     b.p_bvh = hit.s.p_bvh;
     b.guided = 0.0;
-    b.aims = Aims(0, 0, 0.0);
+    b.aims = Aims(0, 0, 0, 0.0);
     return b;
 }
 

@@ -17,10 +17,10 @@ layout(constant) const uint SKY_COLUMNS = 0;             // cells of its table
 layout(constant) const uint SKY_ROWS = 0;
 layout(constant) const uint SKY_STEPS = 0;               // halvings that single out a row, or a column
 
-layout(scene, rgba32ui) readonly uniform uimageBuffer emitters;
+layout(paths, rgba32ui) readonly uniform uimageBuffer emitters;
 // @texels Emitter emitter_at(emitters)
 // First words of the rows' shares; then, row by row, those of the columns'.
-layout(scene, scalar) readonly buffer SkyShares { uint sky_shares[]; };
+layout(paths, r32ui) readonly uniform uimageBuffer sky_shares;
 
 // Light that may arrive at a point from one place.
 struct LightSample {
@@ -47,14 +47,14 @@ uint share_of_sky(uint base, uint count, uint word) {
     uint found = 0;
     for (uint step = SKY_STEPS; step > 0; step--) {
         uint next = found + (1u << (step - 1));
-        uint first = sky_shares[base + min(next, count - 1)];
+        uint first = imageLoad(sky_shares, int(base + min(next, count - 1))).x;
         found = next < count && first <= word ? next : found;
     }
     return found;
 }
 
 uint sky_share(uint base, uint count, uint i) {
-    return i < count ? sky_shares[base + i] : 0u;
+    return i < count ? imageLoad(sky_shares, int(base + i)).x : 0u;
 }
 
 // Density per solid angle of the cell at `at`, whose polar angle has this sine.

@@ -17,7 +17,8 @@ layout(constant) const bool STORED_TRANSMISSION = false; // transmissive surface
 
 // Reversed depth, row by row; where positions are stored, depth and the place relative to the eye. A buffer, not the depth image: on
 // lavapipe it is fetched inline, where a sampled image is a call that spills every register.
-layout(pass, scalar) readonly buffer Depths { float depths[]; };
+layout(pass, r32f) readonly uniform imageBuffer depths;
+layout(pass, rgba32f) readonly uniform imageBuffer depths_as_rgba32f;
 layout(pass, rgba16f) readonly uniform image2D base; // base colour and metallic texels
 layout(pass, rgba16_snorm) readonly uniform image2D normals;
 layout(pass, rgba8_snorm) readonly uniform image2D normals_as_rgba8_snorm;
@@ -45,11 +46,11 @@ int pixel_index(ivec2 pixel) {
 
 // Reversed depth; 0 where nothing was drawn.
 float stored_depth(int pixel) {
-    return depths[POSITIONS ? 4 * pixel : pixel];
+    return POSITIONS ? imageLoad(depths_as_rgba32f, pixel).x : imageLoad(depths, pixel).x;
 }
 
 // Position relative to the eye, where positions are stored.
 vec3 stored_position(int pixel) {
-    return vec3(depths[4 * pixel + 1], depths[4 * pixel + 2], depths[4 * pixel + 3]);
+    return imageLoad(depths_as_rgba32f, pixel).yzw;
 }
 #endif

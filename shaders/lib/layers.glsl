@@ -49,10 +49,9 @@ vec3 fresnel_of_metal(Surface s, float cos_in) {
     vec3 f = schlick(s.f0_metal, 1.0, cos_in);
     if (CONDUCTORS && FRESNEL == FRESNEL_EXACT) {
         if (s.n_metal.x > 0.0) {
-            vec3 tint = s.f0_metal / normal_reflectance(s.n_metal, s.kappa_metal);
-            f = tint * vec3(fresnel_conductor(cos_in, s.n_metal.r, s.kappa_metal.r).F,
-                            fresnel_conductor(cos_in, s.n_metal.g, s.kappa_metal.g).F,
-                            fresnel_conductor(cos_in, s.n_metal.b, s.kappa_metal.b).F);
+            f = s.metal_tint * vec3(fresnel_conductor(cos_in, s.n_metal.r, s.kappa_metal.r).F,
+                                    fresnel_conductor(cos_in, s.n_metal.g, s.kappa_metal.g).F,
+                                    fresnel_conductor(cos_in, s.n_metal.b, s.kappa_metal.b).F);
         }
     }
     return f;
@@ -90,19 +89,22 @@ float left_to_base(Surface s) {
     return SHEEN ? left_by_sheen(s, max(cosine(s.n, s.v), 1e-4)) : 1.0;
 }
 
-vec3 albedo_of_dielectric(Surface s, vec2 ab) {
-    vec3 albedo = s.f0_dielectric * ab.x + s.f90_dielectric * ab.y;
-    if (FRESNEL == FRESNEL_EXACT) albedo = fresnel_of_dielectric(s, mean_cosine(ab)) * (ab.x + ab.y);
-    return albedo * s.compensation;
-}
+struct BaseAlbedo {
+    vec3 dielectric; // of the dielectric part alone
+    vec3 base;       // of the mixture, under the lobes of extensions
+};
 
-vec3 albedo_of_base(Surface s, vec2 ab) {
-    vec3 albedo = s.f0 * ab.x + s.f90 * ab.y;
+// `ab` is the table's texel of the base.
+BaseAlbedo albedo_of_base(Surface s, vec2 ab) {
+    vec3 dielectric = s.f0_dielectric * ab.x + s.f90_dielectric * ab.y;
+    vec3 base = s.f0 * ab.x + s.f90 * ab.y;
     if (FRESNEL == FRESNEL_EXACT) {
         float cos_m = mean_cosine(ab);
-        albedo = mix(fresnel_of_dielectric(s, cos_m), fresnel_of_metal(s, cos_m), s.metallic) * (ab.x + ab.y);
+        vec3 f_dielectric = fresnel_of_dielectric(s, cos_m);
+        dielectric = f_dielectric * (ab.x + ab.y);
+        base = mix(f_dielectric, fresnel_of_metal(s, cos_m), s.metallic) * (ab.x + ab.y);
     }
-    return albedo * s.compensation * left_to_base(s);
+    return BaseAlbedo(dielectric * s.compensation, base * s.compensation * left_to_base(s));
 }
 
 float albedo_of_coat(Surface s) {
@@ -117,13 +119,13 @@ vec2 lobe_reflectance(Surface s) {
 }
 
 // What the base leaves to the diffuse ground of light from all around.
-float ground_share(Surface s, vec2 ab) {
-    return 1.0 - min(largest(albedo_of_dielectric(s, ab)), 1.0);
+float ground_share(BaseAlbedo albedo) {
+    return 1.0 - min(largest(albedo.dielectric), 1.0);
 }
 
 // What the diffuse ground, and the lobes over the base that send light in all directions, make of irradiance from all around.
-vec3 scattered_radiance(Surface s, vec2 ab, vec3 irradiance) {
-    vec3 scattered = s.diffuse * diffuse_brdf(ground_share(s, ab));
+vec3 scattered_radiance(Surface s, BaseAlbedo albedo, vec3 irradiance) {
+    vec3 scattered = s.diffuse * diffuse_brdf(ground_share(albedo));
     if (SHEEN) {
         float cos_v = max(cosine(s.n, s.v), 1e-4);
         scattered = scattered * left_by_sheen_of_all(s, cos_v) + s.sheen.rgb * (sheen_albedo(s, cos_v).x * INV_PI);
@@ -191,7 +193,7 @@ Layers layers_of(Surface s) {
     b.f_dielectric = vec3(0.0);
     b.f_base = vec3(0.0);
     b.total = false;
-    b.enters = BRDF == BRDF_GGX_MULTI ? ground_share(s, lobe_reflectance(s)) : 1.0;
+    b.enters = BRDF == BRDF_GGX_MULTI ? ground_share(albedo_of_base(s, lobe_reflectance(s))) : 1.0;
     b.under = CLEARCOAT && BRDF == BRDF_GGX_MULTI ? 1.0 - min(albedo_of_coat(s), 1.0) : 1.0;
     b.left = left_to_base(s);
     b.tint = vec3(0.0);
@@ -351,29 +353,39 @@ LobeSample sample_coat(Layers b, vec3 h) {
     return LobeSample(b.coat_delta ? on_side(r, s.n_triangle) : r, vec3(f * masking), false);
 }
 
-LobeSample sample_base(Layers b, vec3 h) {
+// Reflectance at a facet.
+struct FacetFresnel {
+    vec3 dielectric;
+    vec3 base;  // of the mixture
+    bool total; // nothing passes
+};
+
+FacetFresnel fresnel_at_facet(Layers b, vec3 h) {
+    FacetFresnel f;
+    float cos_h = clamp(dot(h, b.s.v), 0.0, 1.0);
+    f.dielectric = fresnel_below_coat(b, cos_h, f.total);
+    f.base = mix(f.dielectric, fresnel_of_metal(b.s, cos_h), b.s.metallic);
+    return f;
+}
+
+LobeSample sample_base(Layers b, vec3 h, FacetFresnel f) {
     Surface s = b.s;
     vec3 r = reflect_ray(-s.v, h).R;
     float masking = ROUGH && !b.delta ? unshadowed(s.n, s.v, r, s.n_triangle, s.alpha) : 1.0;
-    float cos_h = clamp(dot(h, s.v), 0.0, 1.0);
-    bool total;
-    vec3 f = mix(fresnel_below_coat(b, cos_h, total), fresnel_of_metal(s, cos_h), s.metallic);
-    return LobeSample(b.delta ? on_side(r, s.n_triangle) : r, f * s.compensation * (masking * b.left), false);
+    return LobeSample(b.delta ? on_side(r, s.n_triangle) : r, f.base * s.compensation * (masking * b.left), false);
 }
 
-LobeSample sample_transmission(Layers b, vec3 h) {
+LobeSample sample_transmission(Layers b, vec3 h, FacetFresnel f) {
     Surface s = b.s;
     bool rough = ROUGH && !b.delta;
     vec3 r = reflect_ray(-s.v, h).R;
     bool tir;
     vec3 through = through_direction(b, h, r, tir);
-    bool total;
-    vec3 f = fresnel_below_coat(b, clamp(dot(h, s.v), 0.0, 1.0), total);
     bool straight = passes_straight(b);
-    bool passes = straight || (dot(through, s.n_triangle) < 0.0 && !(b.solid && (total || tir)));
+    bool passes = straight || (dot(through, s.n_triangle) < 0.0 && !(b.solid && (f.total || tir)));
     float masking = rough ? smith_g2_over_g1(dot(s.n, s.v), dot(through, s.n), s.alpha) : 1.0;
     if (rough && b.sheet) masking = dot(r, s.n) > 0.0 ? masking : 0.0;
-    vec3 weight = b.tint * (b.transmits * (1.0 - largest(f)) * masking * b.left);
+    vec3 weight = b.tint * (b.transmits * (1.0 - largest(f.dielectric)) * masking * b.left);
     return LobeSample(through, passes ? weight : vec3(0.0), straight);
 }
 #endif

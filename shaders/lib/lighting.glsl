@@ -80,10 +80,10 @@ vec3 punctual_light(Layers b, ivec2 pixel, uint tiles_across, LightRange range) 
 // part.
 vec3 environment_light(Surface s) {
     vec3 r = reflect_ray(-s.v, s.n).R;
-    vec2 ab = lobe_reflectance(s);
+    BaseAlbedo albedo = albedo_of_base(s, lobe_reflectance(s));
     vec3 result = vec3(0.0);
-    if (AMBIENT) result += scattered_radiance(s, ab, environment_irradiance(s.n));
-    if (REFLECTION && !s.base_traced) result += albedo_of_base(s, ab) * prefiltered_radiance(r, s.alpha);
+    if (AMBIENT) result += scattered_radiance(s, albedo, environment_irradiance(s.n));
+    if (REFLECTION && !s.base_traced) result += albedo.base * prefiltered_radiance(r, s.alpha);
     if (CLEARCOAT) {
         vec3 coat_r = reflect_ray(-s.v, s.n_coat).R;
         result *= BRDF == BRDF_GGX_MULTI ? 1.0 - min(albedo_of_coat(s), 1.0) : under_coat(s);

@@ -98,7 +98,7 @@ vec3 screen_instead(Surface s, vec3 n, float alpha, vec3 share) {
 vec3 mirrored_on_screen(Surface s, bool wanted) {
     float shown = wanted && !s.unlit ? s.occlusion : 0.0;
     float by_base = s.roughness <= ROUGHEST_MIRROR ? (CLEARCOAT ? under_coat(s) : 1.0) * shown : 0.0;
-    vec3 result = screen_instead(s, s.n, s.alpha, albedo_of_base(s, lobe_reflectance(s)) * by_base);
+    vec3 result = screen_instead(s, s.n, s.alpha, albedo_of_base(s, lobe_reflectance(s)).base * by_base);
     if (CLEARCOAT) {
         float by_coat = s.clearcoat_roughness <= ROUGHEST_MIRROR ? albedo_of_coat(s) * shown : 0.0;
         result += screen_instead(s, s.n_coat, s.clearcoat_alpha, vec3(by_coat));

@@ -7,7 +7,7 @@
 #include "lib/texels.glsl"
 #include "share/layers.glsl"
 
-// The knobs `brdf` and `fresnel` (src/plan/knobs.rs): one formula each, chosen when the pipeline is made.
+// The knobs `brdf` and `fresnel` (src/plan/knobs/rungs.rs): one formula each, chosen when the pipeline is made.
 layout(constant) const uint BRDF = 2;
 const uint BRDF_BLINN_PHONG = 0;
 const uint BRDF_BLINN_PHONG_RECIPROCAL = 1;
@@ -53,6 +53,7 @@ struct Surface {
     vec3 f0_metal;
     vec3 n_metal;        // index and extinction of a metal per channel; index 0 where a colour is all that is known
     vec3 kappa_metal;
+    vec3 metal_tint;     // of those that have them: the colour over what they reflect at normal incidence
     bool base_traced;    // mirrored by rays, not by the prefiltered environment
     bool coat_traced;
     vec3 p_bvh;          // the same point where rays live (share/trace.glsl)
@@ -93,10 +94,12 @@ Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, 
     s.f0_metal = s.base;
     s.n_metal = vec3(0.0);
     s.kappa_metal = vec3(0.0);
+    s.metal_tint = vec3(1.0);
     if (CONDUCTORS) {
         if ((m.flags & MATERIAL_CONDUCTOR) != 0) {
             s.n_metal = m.n_metal;
             s.kappa_metal = m.kappa_metal;
+            s.metal_tint = s.f0_metal / normal_reflectance(s.n_metal, s.kappa_metal);
         }
     }
     s.f0 = mix(s.f0_dielectric, s.f0_metal, metal);
@@ -145,8 +148,7 @@ void seen_from(inout Surface s, float n_outside) {
         bool relative = changes && s.n_metal.x > 0.0;
         vec3 n = s.n_metal * (s.n_outside / n_outside);
         vec3 kappa = s.kappa_metal * (s.n_outside / n_outside);
-        vec3 to_medium = normal_reflectance(n, kappa) / normal_reflectance(s.n_metal, s.kappa_metal);
-        s.f0_metal = relative ? s.f0_metal * to_medium : s.f0_metal;
+        s.f0_metal = relative ? s.metal_tint * normal_reflectance(n, kappa) : s.f0_metal;
         s.n_metal = relative ? n : s.n_metal;
         s.kappa_metal = relative ? kappa : s.kappa_metal;
     }

@@ -178,14 +178,15 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     vec2 u = vec2(0.0);
     if (ROUGH) u = random_point(pixel, event, trace_terms.seed, trace_terms.sample_index);
     vec3 h = event_half_vector(b, false, u);
-    LobeSample mirrored = sample_base(b, h);
+    FacetFresnel fresnel = fresnel_at_facet(b, h);
+    LobeSample mirrored = sample_base(b, h, fresnel);
     next.direction = mirrored.direction;
     next.events = count | BY_REFLECTION << 8;
     next.throughput = mirrored_by_ray(hit, boundary) ? weight * mirrored.weight : vec3(0.0);
     next.spread = ray.spread + (ROUGH && !b.delta ? s.alpha : 0.0);
     send(next);
     if (TRANSMISSIVE) {
-        LobeSample through = sample_transmission(b, h);
+        LobeSample through = sample_transmission(b, h, fresnel);
         next.origin = ray_origin(s.p_bvh, -hit.n, vec3(0.0));
         next.media = boundary.solid ? boundary.beyond : ray.media;
         next.direction = through.direction;

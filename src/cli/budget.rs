@@ -75,6 +75,7 @@ fn folder(command: &str, contents: &str, info: &DeviceInfo) -> Option<PathBuf> {
 }
 
 /// What was measured of a picture before; `None` where nothing was.
+#[cfg(feature = "window")]
 pub(super) fn known(command: &str, contents: &str, info: &DeviceInfo) -> Option<Table> {
     let bytes = file::read(&folder(command, contents, info)?.join("cost.json")).ok()?;
     serde_json::from_slice(&bytes).ok()

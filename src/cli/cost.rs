@@ -98,13 +98,13 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
     let steps = Steps::new(args.progress, quiet);
     steps.step(&format!("loading {}", args.scene.scene), 1);
     let setup = Setup::load(&args.scene, Reads::Everything, &args.device)?;
-    for warning in &setup.warnings {
+    for warning in &setup.opened.warnings {
         tracing::warn!("{warning}");
     }
     let command = command(&args.scene, &args.picture, &args.device);
     if let Some(wanted) = &args.compare {
         let mut knobs = settings.knobs.clone();
-        args.picture.colour_of(&setup.scene, &mut knobs)?;
+        args.picture.colour_of(&setup.opened.scene, &mut knobs)?;
         let compared = setup.bench(&args.scene, settings, |bench| compare_rungs(&bench, &knobs, wanted))?;
         drop(steps);
         validated(&setup)?;

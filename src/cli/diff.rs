@@ -8,6 +8,7 @@ use anyhow::{Context, Result, ensure};
 use clap::Args;
 use serde::Serialize;
 
+use super::choices::one_of;
 use crate::image::metric::{AnyPicture, Comparison, Metric, compare, map_rgba};
 use crate::image::{file, png};
 
@@ -22,7 +23,7 @@ pub struct DiffArgs {
     #[arg(value_name = "B")]
     pub b: PathBuf,
     /// Figure to print
-    #[arg(long, value_enum, default_value_t = Metric::Flip)]
+    #[arg(long, value_parser = one_of::<Metric>(), default_value = Metric::Flip.name())]
     pub metric: Metric,
     /// Exit with 1 when the value is above X; for psnr and ssim, which grow with likeness, when it is below X. Pictures
     /// with NaN or infinite pixels fail every limit

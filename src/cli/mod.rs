@@ -1,6 +1,7 @@
 //! The commands of the program, one module each.
 
 mod budget;
+mod choices;
 pub mod cost;
 pub mod devices;
 pub mod diff;
@@ -12,6 +13,10 @@ pub mod report;
 pub mod setup;
 pub mod unbuilt;
 pub mod verify;
+#[cfg(feature = "window")]
+pub mod view;
+#[cfg(not(feature = "window"))]
+#[path = "no_view.rs"]
 pub mod view;
 
 use std::io::{self, Write as _};

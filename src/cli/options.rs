@@ -6,6 +6,7 @@ use anyhow::{Context as _, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 
+use super::choices::one_of;
 use crate::frame::{Background, Settings};
 use crate::gpu::DeviceChoice;
 use crate::image::tone::ToneMap;
@@ -90,7 +91,7 @@ pub struct PictureOptions {
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
     pub size: [u32; 2],
     /// How much light transport is simulated [default: recursive]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = one_of::<Model>())]
     pub model: Option<Model>,
     /// Choose a knob's rung, for example samples=16; repeatable
     #[arg(long = "set", value_name = "KNOB=RUNG")]
@@ -111,7 +112,7 @@ pub struct PictureOptions {
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_hyphen_values = true)]
     pub exposure: f32,
     /// Tone curve, display outputs only
-    #[arg(long, value_enum, default_value_t = ToneMap::default())]
+    #[arg(long, value_parser = one_of::<ToneMap>(), default_value = ToneMap::default().name())]
     pub tonemap: ToneMap,
 }
 
@@ -293,7 +294,7 @@ impl PictureOptions {
             all.push(format!("--exposure {}", self.exposure));
         }
         if self.tonemap != ToneMap::default() {
-            let name = self.tonemap.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+            let name = self.tonemap.name();
             all.push(format!("--tonemap {name}"));
         }
         all

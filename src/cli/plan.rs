@@ -10,10 +10,11 @@ use comfy_table::{ContentArrangement, Table, presets};
 use super::options::{DeviceOptions, Extent, PictureOptions, SceneOptions};
 use super::print;
 use super::report::{Expected, PlanFacts};
-use super::setup::Setup;
+use super::setup::{Opened, Setup};
 use crate::cost::explain::Price;
-use crate::frame::Renderer;
-use crate::plan::KNOBS;
+use crate::frame::{Renderer, Settings};
+use crate::plan::rungs::Interfaces;
+use crate::scene::Camera;
 use crate::scene::normal_form::normalise;
 use crate::scene::sight::{Sight, along_lines};
 
@@ -37,18 +38,71 @@ pub struct PlanArgs {
 /// One sentence with what was being done, to what, and the cause.
 pub fn run(args: &PlanArgs) -> Result<ExitCode> {
     let mut settings = args.picture.settings(&args.scene)?;
-    let setup = Setup::load(&args.scene, args.picture.reads(&args.scene, &settings.knobs), &args.device)?;
-    args.picture.colour_of(&setup.scene, &mut settings.knobs)?;
-    let mut warnings = setup.warnings.clone();
-    let camera = args.scene.choose_camera(&setup.scene, settings.size)?;
-    let transmits = setup.scene.materials.iter().any(|material| material.transmission > 0.0);
+    let (opened, device) = Opened::load(&args.scene, args.picture.reads(&args.scene, &settings.knobs), &args.device)?;
+    args.picture.colour_of(&opened.scene, &mut settings.knobs)?;
+    let camera = args.scene.choose_camera(&opened.scene, settings.size)?;
+    let sight = sight(&opened, &camera, &settings)?;
+    let read = opened.warnings.clone();
+    // What an effect costs and how many pixels show it only a device tells; what there is, and why, nothing but the scene.
+    let wants_device = args.device.device.is_some() || args.device.validate || args.picture.plan == Extent::ExplainCost;
+    let facts = match device {
+        Ok(device) => on_device(args, Setup { device, opened }, settings, sight.as_ref(), read)?,
+        Err(error) if wants_device => return Err(error),
+        Err(error) => {
+            let interfaces = settings.knobs.interfaces.count();
+            let prepared = opened.prepared(&args.scene, settings)?;
+            let mut facts = PlanFacts::of(&prepared.plan);
+            let without = format!("passes, pipelines, memory and pixels are not told: {error:#}");
+            let lines = sight.filter(|_| prepared.plan.rays.is_some_and(|rays| rays.refraction));
+            let lost = lines.and_then(|sight| lost(&sight, interfaces));
+            facts.warnings.splice(0..0, read.into_iter().chain([without]).chain(prepared.warnings).chain(lost));
+            facts
+        }
+    };
+    if args.json {
+        print(&serde_json::to_string_pretty(&facts)?)?;
+    } else {
+        print(&text(&facts))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What lines of sight go through, where something lets light through.
+fn sight(opened: &Opened, camera: &Camera, settings: &Settings) -> Result<Option<Sight>> {
+    let transmits = opened.scene.materials.iter().any(|material| material.transmission > 0.0);
     let sight = transmits.then(|| {
-        let mut scene = setup.scene.clone();
+        let mut scene = opened.scene.clone();
         normalise(&mut scene);
-        along_lines(&scene, &camera, settings.size)
+        along_lines(&scene, camera, settings.size)
     });
-    let sight = sight.transpose()?;
-    let interfaces = settings.knobs.interfaces();
+    sight.transpose()
+}
+
+/// A sentence about what so many surfaces lose of the light along lines of sight; `None` where they lose nothing.
+fn lost(sight: &Sight, interfaces: u32) -> Option<String> {
+    let more = match sight.most {
+        0..=32 => format!("--set interfaces={} follows them", sight.most.next_power_of_two()),
+        _ => "no rung follows them all".to_owned(),
+    };
+    (sight.most > interfaces).then(|| {
+        format!(
+            "lines of sight go through up to {} transparent surfaces: interfaces={interfaces} loses up to {:.1} % of a \
+             pixel's light, {more}",
+            sight.most,
+            100.0 * sight.lost(interfaces)
+        )
+    })
+}
+
+/// The plan with what drawing it takes on a device.
+fn on_device(
+    args: &PlanArgs,
+    setup: Setup,
+    settings: Settings,
+    sight: Option<&Sight>,
+    mut warnings: Vec<String>,
+) -> Result<PlanFacts> {
+    let interfaces = settings.knobs.interfaces.count();
     let explained = (args.picture.plan == Extent::ExplainCost).then(|| (setup.clone(), settings.clone()));
     let (mut renderer, camera) = setup.renderer(&args.scene, settings)?;
     warnings.extend(renderer.warnings.iter().cloned());
@@ -62,28 +116,17 @@ pub fn run(args: &PlanArgs) -> Result<ExitCode> {
             names.push(pass.name);
         }
     }
-    let mut facts = PlanFacts::of(&renderer.plan, renderer.device(), names, pipelines);
+    let mut facts = PlanFacts::of(renderer.plan()).on(renderer.device(), names, pipelines);
     // After the account of what there is: counting takes a pipeline and a buffer of its own.
     let pixels = renderer.pixels_by_material(&camera)?;
     for effect in facts.effects.iter_mut().filter(|effect| !effect.materials.is_empty()) {
         let seen: u64 = effect.materials.iter().filter_map(|&material| pixels.get(material)).sum();
         effect.evidence.insert("pixels", seen.to_string());
     }
-    let rays = renderer.plan.rays.unwrap_or_default();
+    let rays = renderer.plan().rays.unwrap_or_default();
     let sight = sight.filter(|_| rays.refraction);
-    if let Some(sight) = sight.as_ref().filter(|sight| sight.most > interfaces) {
-        let more = match sight.most {
-            0..=32 => format!("--set interfaces={} follows them", sight.most.next_power_of_two()),
-            _ => "no rung follows them all".to_owned(),
-        };
-        warnings.push(format!(
-            "lines of sight go through up to {} transparent surfaces: interfaces={interfaces} loses up to {:.1} % of a \
-             pixel's light, {more}",
-            sight.most,
-            100.0 * sight.lost(interfaces)
-        ));
-    }
-    facts.expected = Some(expected(&facts, &renderer, sight.as_ref(), [interfaces, lighting as u32]));
+    warnings.extend(sight.and_then(|sight| lost(sight, interfaces)));
+    facts.expected = Some(expected(&facts, &renderer, sight, [interfaces, lighting as u32]));
     facts.warnings.splice(0..0, warnings);
     if let Some((setup, settings)) = explained {
         drop(renderer);
@@ -91,12 +134,7 @@ pub fn run(args: &PlanArgs) -> Result<ExitCode> {
             eprintln!("measuring what \"{effect}\" would cost");
         })?;
     }
-    if args.json {
-        print(&serde_json::to_string_pretty(&facts)?)?;
-    } else {
-        print(&text(&facts))?;
-    }
-    Ok(ExitCode::SUCCESS)
+    Ok(facts)
 }
 
 fn expected(
@@ -105,15 +143,14 @@ fn expected(
     sight: Option<&Sight>,
     [interfaces, lighting]: [u32; 2],
 ) -> Expected {
-    let rays = renderer.plan.rays.unwrap_or_default();
-    let rungs = KNOBS.iter().find(|knob| knob.name == "interfaces").map_or(&[][..], |knob| knob.rungs);
-    let lost = |rung: &&'static str| Some((*rung, sight?.lost(rung.parse().ok()?)));
+    let rays = renderer.plan().rays.unwrap_or_default();
+    let lost = |rung: &Interfaces| Some((rung.name(), sight?.lost(rung.count())));
     Expected {
         bytes: facts.buffers.iter().map(|made| made.bytes).sum(),
         shadow_rounds: if rays.shadows { lighting } else { 0 },
         ray_rounds: sight.map_or(0, |sight| sight.most).max(u32::from(rays.mirrors || rays.refraction)).min(interfaces),
         interfaces: sight.map_or(0, |sight| sight.most),
-        lost: rungs.iter().filter_map(lost).collect(),
+        lost: Interfaces::RUNGS.iter().filter_map(lost).collect(),
     }
 }
 
@@ -161,7 +198,7 @@ fn text(facts: &PlanFacts) -> String {
     let mut effects = table(&["effect", "state", "rung", "pixels", "reason"]);
     for effect in &facts.effects {
         let pixels = effect.evidence.get("pixels").map_or("", String::as_str);
-        effects.add_row([effect.name, effect.state, effect.rung, pixels, &effect.reason]);
+        effects.add_row([effect.id.name(), effect.state.name(), effect.rung(), pixels, &effect.reason()]);
     }
     // Many draws share a program: they are told apart by constants alone, which --json has.
     let mut programs: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
@@ -190,6 +227,9 @@ fn text(facts: &PlanFacts) -> String {
     let unread: String = facts.unread.iter().map(|unread| format!("not read: {unread}\n")).collect();
     let costs = if facts.costs.is_empty() { String::new() } else { format!("{}\n", cost_table(&facts.costs)) };
     let warnings: String = facts.warnings.iter().map(|warning| format!("warning: {warning}\n")).collect();
+    if facts.expected.is_none() {
+        return format!("{effects}\n\n{} samples per pixel\n{unread}{warnings}", facts.samples).trim_end().to_owned();
+    }
     format!(
         "{effects}\n\n{} samples per pixel, each by the passes {}\n\n{pipelines}\n\n{} pipelines of {:.0} KB of SPIR-V; {} buffers \
          and images of {:.1} MB; {rounds} rounds of rays or more\n{sight}{unread}{costs}{warnings}",

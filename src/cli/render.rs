@@ -25,6 +25,7 @@ use crate::frame::{Part, Rendered, Renderer};
 use crate::gpu::Severity;
 use crate::image::{Aov, AovData, Picture, exr, file};
 use crate::pass::view::View;
+use crate::plan::rungs::Indirect;
 use crate::plan::{Knobs, Plan};
 use crate::scene::{Camera, Reads, Scene};
 use crate::share::AovPixel;
@@ -180,7 +181,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         chosen = Some(found);
         phases.end("choose");
     } else {
-        args.picture.colour_of(&setup.scene, &mut settings.knobs)?;
+        args.picture.colour_of(&setup.opened.scene, &mut settings.knobs)?;
     }
     let device = setup.device.clone();
     let info = device.info().clone();
@@ -188,17 +189,17 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         let software = if info.kind == "cpu" { ", a software device" } else { "" };
         steps.say(&format!("drawing on {} ({}{software})", info.name, info.driver));
     }
-    for warning in &setup.warnings {
+    for warning in &setup.opened.warnings {
         tracing::warn!("{warning}");
     }
-    let facts = facts(&setup.scene);
+    let facts = facts(&setup.opened.scene);
 
     if let Some(name) = args.aov.iter().find(|name| name.of_halves()) {
         let name = name.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
-        if settings.knobs.rung("indirect") != "path" {
+        if settings.knobs.indirect != Indirect::Path {
             bail!("--aov {name}: only paths tell their error; add --model global");
         }
-        if settings.knobs.samples() == 1 && settings.max_error.is_none() {
+        if settings.knobs.samples.count() == 1 && settings.max_error.is_none() {
             bail!("--aov {name}: one sample has no halves; add --set samples=4");
         }
     }
@@ -211,23 +212,21 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     for warning in &renderer.warnings {
         tracing::warn!("{warning}");
     }
-    for warning in &renderer.plan.warnings {
+    for warning in &renderer.plan().warnings {
         tracing::info!("{warning}");
     }
     if tracing::enabled!(tracing::Level::INFO) {
-        for effect in &renderer.plan.effects {
-            tracing::info!("{}: {} ({})", effect.name, effect.state, effect.reason);
+        for effect in &renderer.plan().effects {
+            tracing::info!("{}: {} ({})", effect.id, effect.state, effect.reason());
         }
     }
 
-    let samples = renderer.plan.samples;
+    let samples = renderer.plan().samples;
     let mut rounds = Vec::new();
     let mut first: Option<(Rendered, Option<Picture>)> = None;
     if chosen.is_some() {
         // A budget is that of a picture with everything compiled, as tables are.
-        renderer.plan.samples = samples.min(2);
-        renderer.render(&camera, &mut |_| ())?;
-        renderer.plan.samples = samples;
+        renderer.render_samples(&camera, 2, &mut |_| ())?;
         phases.end("frame");
     }
     let needs_film =
@@ -261,13 +260,13 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let aovs =
         if args.aov.is_empty() { Vec::new() } else { layers(&mut renderer, &camera, &args.aov, rendered.samples)? };
     phases.end("readback");
-    warn_about(&rendered, settings_size(&args.picture), &knobs, renderer.plan.bands);
+    warn_about(&rendered, settings_size(&args.picture), &knobs, renderer.plan().bands);
 
     steps.step("encoding", outputs.len() as u32);
     let mut written = Vec::new();
     for (index, (path, format)) in outputs.iter().enumerate() {
         let bytes = match (format, &film) {
-            (Format::Exr, Some(film)) => exr::encode_exr(film, &aovs, &metadata(args, &renderer.plan))?,
+            (Format::Exr, Some(film)) => exr::encode_exr(film, &aovs, &metadata(args, renderer.plan()))?,
             _ => renderer.png(&rendered)?,
         };
         file::write(path, &bytes)?;
@@ -277,7 +276,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     phases.end("encode");
     let costs = match &explained {
         Some((setup, settings)) => {
-            let effects = &renderer.plan.effects;
+            let effects = &renderer.plan().effects;
             let prices = setup.prices(&args.scene, &args.device, settings.clone(), effects, &mut |effect| {
                 steps.step(&format!("measuring what \"{effect}\" would cost"), 1);
             })?;
@@ -293,7 +292,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         phases.all.insert("total", total);
         phases.all.insert("pipelines", device.pipelines_ms());
         let passes = rendered.passes.iter().map(|p| p.name.clone()).collect();
-        let mut plan = PlanFacts::of(&renderer.plan, &device, passes, device.pipelines());
+        let mut plan = PlanFacts::of(renderer.plan()).on(&device, passes, device.pipelines());
         plan.costs = costs;
         let spirv_bytes = plan.pipelines.iter().map(|pipeline| pipeline.spirv_bytes).sum();
         let report = Report {
@@ -306,7 +305,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
             phases_ms: phases.all,
             work: (&rendered.work).into(),
             sampling: Sampling::of(&rendered),
-            colour: ColourFacts::of(&renderer.plan, &rendered),
+            colour: ColourFacts::of(renderer.plan(), &rendered),
             bvh: renderer.bvh(),
             pipelines: PipelineFacts { count: device.pipelines().len(), spirv_bytes },
             memory: MemoryFacts::now(&device),
@@ -422,7 +421,7 @@ fn warn_about(rendered: &Rendered, pixels: u64, knobs: &Knobs, bands: u32) {
             "{:.1} % of the light was not followed to its end, in the worst pixel {:.0} %{}",
             work.mean_lost * 100.0,
             work.most_lost * 100.0,
-            if knobs.interfaces() < 32 { ": --set interfaces=32 follows more" } else { "" }
+            if knobs.interfaces.count() < 32 { ": --set interfaces=32 follows more" } else { "" }
         );
     }
     if rendered.dropped > 0 {

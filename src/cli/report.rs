@@ -183,10 +183,27 @@ pub struct PipelineFact {
 }
 
 impl PlanFacts {
-    /// What was planned, with the passes and the pipelines that it takes, and what exists on the device for it.
+    /// What was planned.
     #[must_use]
-    pub fn of(
-        plan: &Plan,
+    pub fn of(plan: &Plan) -> Self {
+        Self {
+            schema: "etalon.plan/1",
+            effects: plan.effects.clone(),
+            samples: plan.samples,
+            passes: Vec::new(),
+            pipelines: Vec::new(),
+            buffers: Vec::new(),
+            unread: plan.unread.clone(),
+            expected: None,
+            costs: Vec::new(),
+            warnings: plan.warnings.clone(),
+        }
+    }
+
+    /// With the passes and the pipelines that it takes, and what exists on the device for it.
+    #[must_use]
+    pub fn on(
+        self,
         device: &Device,
         passes: Vec<String>,
         mut pipelines: Vec<(&'static Program, Vec<(u32, u32)>)>,
@@ -194,9 +211,6 @@ impl PlanFacts {
         pipelines.sort_by(|a, b| (a.0.name, &a.1).cmp(&(b.0.name, &b.1)));
         pipelines.dedup();
         Self {
-            schema: "etalon.plan/1",
-            effects: plan.effects.clone(),
-            samples: plan.samples,
             passes,
             pipelines: pipelines
                 .into_iter()
@@ -211,10 +225,7 @@ impl PlanFacts {
                 .into_iter()
                 .filter(|made| matches!(made.kind, "buffer" | "image") && made.name != "staging")
                 .collect(),
-            unread: plan.unread.clone(),
-            expected: None,
-            costs: Vec::new(),
-            warnings: plan.warnings.clone(),
+            ..self
         }
     }
 }

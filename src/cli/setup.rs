@@ -10,6 +10,7 @@ use crate::cost::sitting::Bench;
 use crate::frame::{Renderer, Settings};
 use crate::gpu::Device;
 use crate::plan::Effect;
+use crate::prepare::Prepared;
 use crate::scene::environment::Environment;
 use crate::scene::{Camera, Reads, Scene};
 
@@ -18,6 +19,13 @@ use crate::scene::{Camera, Reads, Scene};
 pub struct Setup {
     /// The device.
     pub device: Arc<Device>,
+    /// What was read.
+    pub opened: Opened,
+}
+
+/// A scene and what lies around it, without anything to draw it on.
+#[derive(Clone)]
+pub struct Opened {
     /// The scene.
     pub scene: Scene,
     /// The environment that was asked for, or would be used if the scene has no lights.
@@ -26,12 +34,13 @@ pub struct Setup {
     pub warnings: Vec<String>,
 }
 
-impl Setup {
-    /// Opens the device and reads the environment while the scene loads: three things that do not wait for each other.
+impl Opened {
+    /// Opens the device and reads the environment while the scene loads: three things that do not wait for each other. A
+    /// missing device is a result of its own.
     ///
     /// # Errors
     /// One sentence with file, place and cause; that of the scene first.
-    pub fn load(scene: &SceneOptions, reads: Reads, device: &DeviceOptions) -> Result<Self> {
+    pub fn load(scene: &SceneOptions, reads: Reads, device: &DeviceOptions) -> Result<(Self, Result<Arc<Device>>)> {
         let (device, loaded, environment) = std::thread::scope(|scope| {
             let device = scope.spawn(|| Device::open(&device.choice(), device.validate));
             let environment = scope.spawn(|| scene.load_environment());
@@ -42,7 +51,35 @@ impl Setup {
         let scene = loaded?;
         let (environment, environment_warnings) = environment??;
         let warnings = scene.warnings.iter().cloned().chain(environment_warnings).collect();
-        Ok(Self { device: device??, scene, environment, warnings })
+        Ok((Self { scene, environment, warnings }, device?))
+    }
+
+    /// The environment that lights the scene, if one does, with its share in the settings.
+    fn lit(&self, options: &SceneOptions, settings: &mut Settings) -> Option<&Environment> {
+        let share = options.environment_share(&self.scene);
+        settings.environment_intensity *= share.unwrap_or(1.0);
+        self.environment.as_ref().filter(|_| share.is_some())
+    }
+
+    /// Plans the scene and builds what rays go through.
+    ///
+    /// # Errors
+    /// When the scene has nothing to draw.
+    pub fn prepared(self, options: &SceneOptions, mut settings: Settings) -> Result<Prepared> {
+        let is_lit = self.lit(options, &mut settings).is_some();
+        let Self { scene, environment, .. } = self;
+        Prepared::new(scene, &settings.conditions(environment.as_ref().filter(|_| is_lit))?)
+    }
+}
+
+impl Setup {
+    /// Opens a device and a scene.
+    ///
+    /// # Errors
+    /// One sentence with file, place and cause; that of the scene first.
+    pub fn load(scene: &SceneOptions, reads: Reads, device: &DeviceOptions) -> Result<Self> {
+        let (opened, device) = Opened::load(scene, reads, device)?;
+        Ok(Self { device: device?, opened })
     }
 
     /// What the effects that a plan leaves out would cost.
@@ -57,22 +94,16 @@ impl Setup {
         effects: &[Effect],
         progress: &mut dyn FnMut(&str),
     ) -> Result<Vec<Price>> {
-        let share = options.environment_share(&self.scene);
-        settings.environment_intensity *= share.unwrap_or(1.0);
-        let camera = options.choose_camera(&self.scene, settings.size)?;
-        let subject = Subject {
-            device: &device.choice(),
-            scene: &self.scene,
-            environment: self.environment.as_ref().filter(|_| share.is_some()),
-            settings,
-            camera: &camera,
-        };
+        let environment = self.opened.lit(options, &mut settings);
+        let camera = options.choose_camera(&self.opened.scene, settings.size)?;
+        let subject =
+            Subject { device: &device.choice(), scene: &self.opened.scene, environment, settings, camera: &camera };
         subject.prices(effects, progress)
     }
 
     /// Hash of all that is drawn, whatever files it came from.
     pub fn contents(&self) -> String {
-        contents(&self.scene, self.environment.as_ref())
+        contents(&self.opened.scene, self.opened.environment.as_ref())
     }
 
     /// Lends everything to something that draws many pictures.
@@ -85,16 +116,9 @@ impl Setup {
         mut settings: Settings,
         draw: impl FnOnce(Bench<'_>) -> Result<T>,
     ) -> Result<T> {
-        let share = options.environment_share(&self.scene);
-        settings.environment_intensity *= share.unwrap_or(1.0);
-        let camera = options.choose_camera(&self.scene, settings.size)?;
-        draw(Bench {
-            device: &self.device,
-            scene: &self.scene,
-            environment: self.environment.as_ref().filter(|_| share.is_some()),
-            settings,
-            camera: &camera,
-        })
+        let environment = self.opened.lit(options, &mut settings);
+        let camera = options.choose_camera(&self.opened.scene, settings.size)?;
+        draw(Bench { device: &self.device, scene: &self.opened.scene, environment, settings, camera: &camera })
     }
 
     /// Plans and uploads; the renderer, and the camera to draw from.
@@ -102,12 +126,11 @@ impl Setup {
     /// # Errors
     /// When there is no such camera, the scene has nothing to draw, or it does not fit the device.
     pub fn renderer(self, options: &SceneOptions, mut settings: Settings) -> Result<(Renderer, Camera)> {
-        let Self { device, scene, environment, .. } = self;
-        let share = options.environment_share(&scene);
-        let environment = environment.filter(|_| share.is_some());
-        settings.environment_intensity *= share.unwrap_or(1.0);
-        let camera = options.choose_camera(&scene, settings.size)?;
-        Ok((Renderer::new(&device, scene, environment.as_ref(), settings)?, camera))
+        let Self { device, opened } = self;
+        let is_lit = opened.lit(options, &mut settings).is_some();
+        let camera = options.choose_camera(&opened.scene, settings.size)?;
+        let environment = opened.environment.as_ref().filter(|_| is_lit);
+        Ok((Renderer::new(&device, opened.scene, environment, settings)?, camera))
     }
 }
 

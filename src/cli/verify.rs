@@ -11,6 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
+use super::choices::one_of;
 use super::options::{DeviceOptions, When};
 use super::print;
 use crate::gpu::{Device, DeviceInfo, Severity};
@@ -30,7 +31,7 @@ pub struct VerifyArgs {
     #[arg(long, value_name = "NAME")]
     pub function: Vec<String>,
     /// Only this tier; repeatable
-    #[arg(long, value_name = "TIER", value_enum)]
+    #[arg(long, value_name = "TIER", value_parser = one_of::<Tier>())]
     pub tier: Vec<Tier>,
     /// Inputs per function
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..=50_000_000))]

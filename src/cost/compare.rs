@@ -7,7 +7,7 @@ use super::price::price;
 use super::sitting::Bench;
 use super::table::{Interval, Price, WorstPixel};
 use crate::image::metric::{AnyPicture, Metric, compare};
-use crate::plan::{KNOBS, Knobs};
+use crate::plan::{Knob, Knobs};
 
 /// Two rungs.
 #[derive(Debug, Serialize)]
@@ -41,9 +41,9 @@ pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<C
     };
     let [first, last] = [of(a), of(b)].map(|knobs| knobs.with_context(|| format!("--compare {wanted}")));
     let (first, last) = (first?, last?);
-    let knob = KNOBS.iter().find(|knob| knob.name == name).context("a knob of the table")?;
+    let knob = Knob::named(name).context("a knob of the table")?;
     ensure!(first != last, "--compare {wanted}: both are the same rung");
-    let [first, last] = if first.index(knob.name) < last.index(knob.name) { [first, last] } else { [last, first] };
+    let [first, last] = if knob.place(&first) < knob.place(&last) { [first, last] } else { [last, first] };
     let mut exact = bench.sit(&last)?;
     let truth = bench.take(&mut exact, None)?;
     let mut sitting = bench.sit(&first)?;
@@ -51,7 +51,7 @@ pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<C
     let shown = |display: &crate::image::png::Display| AnyPicture::Display(display.clone());
     let flip = compare(Metric::Flip, &shown(&truth.display), &shown(&taken.display))?;
     let gpu_ms = [Interval::of(&taken.ms), Interval::of(&taken.others_ms)];
-    let rungs = [first.rung(knob.name), last.rung(knob.name)];
+    let rungs = [knob.rung(&first), knob.rung(&last)];
     let price = price(knob, [rungs[1], rungs[0]], &taken, &truth, &truth.display)?;
     Ok(Compared {
         knob: knob.name,

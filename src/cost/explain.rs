@@ -7,7 +7,8 @@ use serde::Serialize;
 
 use crate::frame::{Renderer, Settings};
 use crate::gpu::{Device, DeviceChoice};
-use crate::plan::{Demand, Effect, Knobs, Model};
+use crate::plan::rungs::{Absorption, Colour, Guiding, Indirect, Lights, Reflection, Refraction, Shadows};
+use crate::plan::{Choice, Demand, Effect, EffectId, EffectState, Knob, Knobs, Model};
 use crate::scene::environment::Environment;
 use crate::scene::{Camera, Scene};
 
@@ -59,8 +60,8 @@ pub struct Subject<'a> {
 impl Price {
     fn nothing(effect: &Effect) -> Self {
         Self {
-            effect: effect.name,
-            state: effect.state,
+            effect: effect.id.name(),
+            state: effect.state.name(),
             by: String::new(),
             fails: None,
             start_ms: 0.0,
@@ -91,11 +92,14 @@ impl Subject<'_> {
     pub fn prices(&self, effects: &[Effect], progress: &mut dyn FnMut(&str)) -> Result<Vec<Price>> {
         let mut plain = self.plan(Demand::Scene, &[])?;
         let mut prices = Vec::new();
-        for effect in effects.iter().filter(|effect| effect.state != "kept") {
-            progress(effect.name);
-            let rungs = if effect.state == "dropped" { allowing(effect) } else { Vec::new() };
+        for effect in effects.iter().filter(|effect| effect.state != EffectState::Kept) {
+            progress(effect.id.name());
+            let rungs: Vec<String> = match effect.state {
+                EffectState::DroppedBy(choice) => allowing(effect.id, choice).iter().map(Choice::to_string).collect(),
+                _ => Vec::new(),
+            };
             let (demand, by) = match rungs.is_empty() {
-                true => (Demand::With(effect.name), "asked for".to_owned()),
+                true => (Demand::With(effect.id), "asked for".to_owned()),
                 false => (Demand::Scene, rungs.join(", ")),
             };
             let price = match self.plan(demand, &rungs).and_then(|mut with| self.price(effect, &mut plain, &mut with)) {
@@ -109,7 +113,7 @@ impl Subject<'_> {
 
     /// Draws both in turns. `None`: nothing is planned otherwise, since the effect needs others that are left out too.
     fn price(&self, effect: &Effect, plain: &mut Drawn, with: &mut Drawn) -> Result<Option<Price>> {
-        if plain.renderer.plan.draws_as(&with.renderer.plan) {
+        if plain.renderer.plan().draws_as(with.renderer.plan()) {
             return Ok(None);
         }
         let (mut plain_ms, mut differences) = (Vec::new(), Vec::new());
@@ -166,22 +170,21 @@ impl Subject<'_> {
 }
 
 /// The rungs that allow an effect which a knob has dropped: those of the recursive model, and those that paths need.
-fn allowing(effect: &Effect) -> Vec<String> {
-    if effect.name == "media that vary" {
-        return ["refraction=ray", "absorption=march:32"].map(str::to_owned).into();
-    }
-    const PATHS: [&str; 6] =
-        ["shadows=ray", "reflection=ray", "refraction=ray", "indirect=path", "lights=area:1", "guiding=aims"];
-    match effect.name {
-        "paths" => return PATHS[..4].iter().map(|&rung| rung.to_owned()).collect(),
-        "bands of wavelengths" | "dispersion" => return vec!["colour=spectral:16".to_owned()],
-        "surfaces that light" | "lights with a shape" | "aims" => return PATHS.map(str::to_owned).into(),
-        _ if effect.reason == "indirect=path" => {
-            return ["indirect=ambient", "lights=points", "guiding=off"].map(str::to_owned).into();
+fn allowing(effect: EffectId, dropped_by: Choice) -> Vec<Choice> {
+    let paths = [Shadows::Ray.choice(), Reflection::Ray.choice(), Refraction::Ray.choice(), Indirect::Path.choice()];
+    let by_lights = [Lights::Area1.choice(), Guiding::Aims.choice()];
+    match effect {
+        EffectId::VaryingMedia => vec![Refraction::Ray.choice(), Absorption::March32.choice()],
+        EffectId::Paths => paths.into(),
+        EffectId::Wavelengths | EffectId::Dispersion => vec![Colour::Spectral16.choice()],
+        EffectId::EmittingSurfaces | EffectId::ShapedLights | EffectId::Aims => [&paths[..], &by_lights].concat(),
+        _ if dropped_by == Indirect::Path.choice() => {
+            vec![Indirect::Ambient.choice(), Lights::Points.choice(), Guiding::Off.choice()]
         }
-        _ => {}
+        _ => {
+            let recursive = Knobs::of(Model::Recursive);
+            let knob = Knob::named(dropped_by.knob);
+            knob.map(|knob| Choice { rung: knob.rung(&recursive), ..dropped_by }).into_iter().collect()
+        }
     }
-    let knob = effect.reason.split_once('=').map(|(knob, _)| knob);
-    let known = Knobs::of(Model::Recursive).list().into_iter().find(|(name, _)| Some(*name) == knob);
-    known.map(|(knob, rung)| format!("{knob}={rung}")).into_iter().collect()
 }

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use super::sitting::turns;
 use crate::plan::Knobs;
+use crate::plan::rungs::{Indirect, Reflection, Refraction, Shadows};
 
 /// Seconds for what is done once for each picture, before anything is known: uploading, compiling, comparing, writing.
 const ONCE_S: f64 = 0.4;
@@ -23,19 +24,20 @@ pub struct Forecast {
 
 impl Forecast {
     fn picture_ms(&self, knobs: &Knobs) -> f64 {
-        let rays = ["shadows", "reflection", "refraction"].into_iter().any(|knob| knobs.rung(knob) == "ray");
-        let sample = match (knobs.rung("indirect"), rays) {
-            ("path", _) => self.path_ms,
+        let rays =
+            knobs.shadows == Shadows::Ray || knobs.reflection == Reflection::Ray || knobs.refraction == Refraction::Ray;
+        let sample = match (knobs.indirect, rays) {
+            (Indirect::Path, _) => self.path_ms,
             (_, true) => 2.0 * self.raster_ms,
             (_, false) => self.raster_ms,
         };
-        sample * f64::from(knobs.samples()) * f64::from(knobs.bands().max(1))
+        sample * f64::from(knobs.samples.count()) * f64::from(knobs.colour.bands().max(1))
     }
 
     /// A picture to come, drawn in turns with another.
     pub fn expect(&mut self, knobs: &Knobs, base: &Knobs) {
         let ms = self.picture_ms(knobs);
-        let warm = ms * 2.0_f64.min(f64::from(knobs.samples())) / f64::from(knobs.samples());
+        let warm = ms * 2.0_f64.min(f64::from(knobs.samples.count())) / f64::from(knobs.samples.count());
         let all = warm + turns(ms) as f64 * (ms + self.picture_ms(base));
         self.coming.push_back(ONCE_S + all / 1e3);
     }

@@ -12,7 +12,8 @@ use crate::frame::{Rendered, Renderer, Settings, Work};
 use crate::gpu::Device;
 use crate::image::Picture;
 use crate::image::png::Display;
-use crate::plan::Knobs;
+use crate::plan::{Knobs, Plan};
+use crate::prepare;
 use crate::scene::environment::Environment;
 use crate::scene::{Camera, Scene};
 
@@ -77,7 +78,7 @@ pub struct Taken {
     pub samples: u32,
 }
 
-fn total(rendered: &Rendered) -> f64 {
+pub(super) fn total(rendered: &Rendered) -> f64 {
     rendered.passes.iter().map(|pass| pass.ms).sum()
 }
 
@@ -94,13 +95,13 @@ fn counts(work: &Work) -> BTreeMap<String, u64> {
 }
 
 impl Bench<'_> {
-    /// Plans and uploads, without drawing.
+    /// What these rungs call for; nothing is uploaded for that.
     ///
     /// # Errors
-    /// When these rungs cannot be drawn.
-    pub fn renderer(&self, knobs: &Knobs) -> Result<Renderer> {
-        let settings = Settings { knobs: knobs.clone(), max_error: None, ..self.settings.clone() };
-        Renderer::new(self.device, self.scene.clone(), self.environment, settings)
+    /// When the scene has nothing to draw.
+    pub fn plan(&self, knobs: &Knobs) -> Result<Plan> {
+        let settings = Settings { knobs: knobs.clone(), ..self.settings.clone() };
+        prepare::plan(self.scene.clone(), &settings.conditions(self.environment)?)
     }
 
     /// Draws two samples, which compiles everything.
@@ -119,10 +120,7 @@ impl Bench<'_> {
         let start = Instant::now();
         let settings = Settings { knobs: knobs.clone(), seed, max_error: None, ..self.settings.clone() };
         let mut renderer = Renderer::new(self.device, self.scene.clone(), self.environment, settings)?;
-        let samples = renderer.plan.samples;
-        renderer.plan.samples = samples.min(2);
-        renderer.render(self.camera, &mut |_| ())?;
-        renderer.plan.samples = samples;
+        renderer.render_samples(self.camera, 2, &mut |_| ())?;
         Ok(Sitting { renderer, start_ms: start.elapsed().as_secs_f64() * 1e3 })
     }
 

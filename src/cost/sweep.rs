@@ -11,7 +11,7 @@ use super::difference::{Truth, shown};
 use super::forecast::Forecast;
 use super::orders;
 use super::price::price;
-use super::sitting::{Bench, Sitting, Taken};
+use super::sitting::{Bench, Sitting, Taken, total};
 use super::table::{
     CONVERGED, DeviceName, Errors, Family, Interval, KnobState, Order, Point, Price, REFERENCE, Reference, Table,
     Tried, WorstPixel, frontier,
@@ -20,7 +20,7 @@ use crate::frame::Settings;
 use crate::image::metric::{AnyPicture, Comparison, Metric, compare, map_rgba};
 use crate::image::png::Display;
 use crate::image::{Aov, AovData, Picture, exr, file, png, tone};
-use crate::plan::{KNOBS, Knob, Knobs, Model, Plan};
+use crate::plan::{EffectState, KNOBS, Knob, Knobs, Model, Plan};
 
 /// Shares of the budget: for the reference, and for what is priced from it.
 const REFERENCE_SHARE: f64 = 0.3;
@@ -142,7 +142,7 @@ pub fn arguments(knobs: &Knobs) -> String {
 }
 
 /// Whether some effect that a knob shapes is planned: a sentence for or against it.
-fn called_for(knob: &Knob, plans: &[&Plan]) -> (bool, String) {
+fn called_for(knob: &Knob, plans: &[Plan]) -> (bool, String) {
     if knob.rungs.len() < 2 {
         return (false, format!("{} is its only rung", knob.rungs[0]));
     }
@@ -150,14 +150,19 @@ fn called_for(knob: &Knob, plans: &[&Plan]) -> (bool, String) {
         return (true, "shapes every surface".to_owned());
     }
     let mut against = String::new();
-    for name in knob.effects {
-        for effect in plans.iter().flat_map(|plan| &plan.effects).filter(|effect| effect.name == *name) {
-            let by_itself = effect.reason.strip_prefix(knob.name).is_some_and(|rest| rest.starts_with('='));
-            if effect.state == "kept" || (effect.state == "dropped" && by_itself) {
-                return (true, format!("{name}: {}", effect.reason));
+    for id in knob.effects {
+        for effect in plans.iter().flat_map(|plan| &plan.effects).filter(|effect| effect.id == *id) {
+            let shaped = match effect.state {
+                EffectState::Kept => true,
+                EffectState::DroppedBy(choice) => choice.knob == knob.name,
+                EffectState::NotCalledFor => false,
+            };
+            let sentence = format!("{id}: {}", effect.reason());
+            if shaped {
+                return (true, sentence);
             }
             if against.is_empty() {
-                against = format!("{name}: {}", effect.reason);
+                against = sentence;
             }
         }
     }
@@ -193,8 +198,7 @@ impl Sweep<'_> {
     fn states(&self) -> Result<Vec<(&'static Knob, bool, String)>> {
         let recursive = set(&Knobs::of(Model::Recursive), "lobes", "1")?;
         let bases = [Knobs::exact(), Knobs::of(Model::Local), recursive];
-        let renderers = bases.iter().map(|knobs| self.bench.renderer(knobs)).collect::<Result<Vec<_>>>()?;
-        let plans: Vec<&Plan> = renderers.iter().map(|renderer| &renderer.plan).collect();
+        let plans = bases.iter().map(|knobs| self.bench.plan(knobs)).collect::<Result<Vec<_>>>()?;
         let state = |knob| {
             let (called_for, reason) = called_for(knob, &plans);
             (knob, called_for, reason)
@@ -398,24 +402,24 @@ impl<'a> Run<'a> {
     /// GPU time of a sample.
     fn a_sample_ms(&self, knobs: &Knobs) -> Result<f64> {
         let mut sitting = self.sweep.bench.sit(&set(knobs, "samples", "4")?)?;
-        sitting.renderer.plan.samples = 2;
-        Ok(self.sweep.bench.time(&mut sitting)? / 2.0)
+        let rendered = sitting.renderer.render_samples(self.sweep.bench.camera, 2, &mut |_| ())?;
+        Ok(total(&rendered) / 2.0)
     }
 
     /// Every rung of every knob that is called for, one changed at a time; none twice.
     fn changes(&self, base: &Knobs, plan: &Plan, wanted: &dyn Fn(&Knob, &str) -> bool) -> Result<Vec<Change>> {
         let mut all = Vec::new();
         for (knob, _, _) in self.state.iter().filter(|(_, called_for, _)| *called_for) {
-            let from = base.rung(knob.name);
+            let from = knob.rung(base);
             for &to in knob.rungs.iter().filter(|&&to| to != from && wanted(knob, to)) {
                 let Some(knobs) = base.with(knob.name, to) else { continue };
-                if knob.name == "upsampling" && knobs.bands() == 0 {
+                if knob.name == "upsampling" && knobs.colour.bands() == 0 {
                     continue;
                 }
                 // What the plan does not tell apart is told apart by constants.
                 let by_constants = ["fresnel", "brdf", "arithmetic", "upsampling", "lights", "absorption"];
                 if !by_constants.contains(&knob.name)
-                    && self.sweep.bench.renderer(&knobs).is_ok_and(|other| other.plan.draws_as(plan))
+                    && self.sweep.bench.plan(&knobs).is_ok_and(|other| other.draws_as(plan))
                 {
                     continue;
                 }
@@ -442,15 +446,15 @@ impl<'a> Run<'a> {
             "indirect" => rung != "path",
             _ => true,
         };
-        let local_changes = self.changes(&local, &bench.renderer(&local)?.plan, &raster)?;
-        let exact_changes = self.changes(&self.plain, &bench.renderer(&self.plain)?.plan, &paths)?;
+        let local_changes = self.changes(&local, &bench.plan(&local)?, &raster)?;
+        let exact_changes = self.changes(&self.plain, &bench.plan(&self.plain)?, &paths)?;
         let mut presets = vec![("recursive".to_owned(), Knobs::of(Model::Recursive))];
-        let most: u32 = self.exact.samples();
+        let most: u32 = self.exact.samples.count();
         for model in [Model::Recursive, Model::Global] {
             for samples in ["1", "4", "16"] {
                 let knobs = set(&Knobs::of(model), "samples", samples)?;
                 let name = format!("{} samples={samples}", if model == Model::Global { "global" } else { "recursive" });
-                if (model == Model::Recursive || knobs.samples() <= most) && knobs != presets[0].1 {
+                if (model == Model::Recursive || knobs.samples.count() <= most) && knobs != presets[0].1 {
                     presets.push((name, knobs));
                 }
             }
@@ -462,7 +466,8 @@ impl<'a> Run<'a> {
         };
         // Between what is priced and the reference.
         let reference = self.reference.as_ref().context("there is no reference yet")?;
-        let samples = [1, 16, 64, 256].into_iter().filter(|&n| n != self.plain.samples() && n < reference.samples);
+        let samples =
+            [1, 16, 64, 256].into_iter().filter(|&n| n != self.plain.samples.count() && n < reference.samples);
         let affordable = |n: &u32| {
             let ms = reference.gpu_ms / f64::from(reference.samples) * f64::from(*n);
             ms < 0.05e3 * f64::from(self.sweep.extent.budget_s)
@@ -478,12 +483,13 @@ impl<'a> Run<'a> {
 
         let plain = self.plain.clone();
         let [width, height] = bench.settings.size;
-        let bands = f64::from(self.exact.bands().max(1));
+        let bands = f64::from(self.exact.colour.bands().max(1));
         self.forecast.path_ms = reference.gpu_ms / f64::from(reference.samples) / bands;
         // 8 ms for 640x360 on two cores, until it is known.
         self.forecast.raster_ms = 3.5e-5 * f64::from(width) * f64::from(height);
         let mut base = bench.sit(&local)?;
-        self.forecast.raster_ms = self.forecast.raster_ms.min(bench.time(&mut base)? / f64::from(local.samples()));
+        self.forecast.raster_ms =
+            self.forecast.raster_ms.min(bench.time(&mut base)? / f64::from(local.samples.count()));
         self.forecast.expect(&local, &local);
         local_changes.iter().for_each(|change| self.forecast.expect(&change.knobs, &local));
         presets.iter().for_each(|(_, knobs)| self.forecast.expect(knobs, &local));
@@ -767,7 +773,7 @@ impl<'a> Run<'a> {
         for (change, _, ms) in &rungs {
             let now = rungs
                 .iter()
-                .find(|(known, ..)| known.knob.name == change.knob.name && known.to == knobs.rung(change.knob.name));
+                .find(|(known, ..)| known.knob.name == change.knob.name && known.to == change.knob.rung(&knobs));
             let quickest = *ms < now.map_or(0.0, |(_, _, ms)| *ms);
             if let (true, Some(changed)) = (quickest, knobs.with(change.knob.name, change.to)) {
                 knobs = changed;
@@ -787,13 +793,13 @@ impl<'a> Run<'a> {
             };
             let mut best: Option<(f64, &'static Knob, &'static str, f64)> = None;
             for (knob, _, _) in self.state.iter().filter(|(_, called_for, _)| *called_for) {
-                let now = at(knob.name, knobs.rung(knob.name));
+                let now = at(knob.name, knob.rung(&knobs));
                 for &rung in knob.rungs.iter().filter(|&&rung| {
-                    rung != knobs.rung(knob.name)
+                    rung != knob.rung(&knobs)
                         && !refused.contains(&(knob.name, rung))
                         && knobs.with(knob.name, rung).is_some()
                 }) {
-                    let measured = rung == local.rung(knob.name)
+                    let measured = rung == knob.rung(local)
                         || rungs.iter().any(|(c, ..)| c.knob.name == knob.name && c.to == rung);
                     let then = at(knob.name, rung);
                     let (gain, ms) = (now[0] - then[0], (then[1] - now[1]).max(0.01 * base_ms));
@@ -804,7 +810,7 @@ impl<'a> Run<'a> {
             }
             let Some((_, knob, rung, gain)) = best else { break };
             let changed = set(&knobs, knob.name, rung)?;
-            let change = format!("{}: {} → {rung}", knob.name, knobs.rung(knob.name));
+            let change = format!("{}: {} → {rung}", knob.name, knob.rung(&knobs));
             let Some(found) = self.point(&format!("search: step {step}"), &changed, base, progress)? else {
                 break;
             };

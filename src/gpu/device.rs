@@ -14,6 +14,7 @@ use serde::Serialize;
 use super::cache::Caches;
 use super::limits::{PUSH_DESCRIPTORS, STORAGE_BUFFERS, STORAGE_IMAGES, UNIFORM_BUFFERS};
 use super::surface::Surface;
+use super::validated::{self, Turn, Validated, Wish};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -125,10 +126,14 @@ pub(super) struct Instance {
     debug: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     has_debug_utils: bool,
     messages: Box<Messages>,
+    /// Given back last, when nothing of this instance is left in the validation layer.
+    _turn: Option<Turn>,
 }
 
 impl Instance {
-    pub(super) fn new(validate: bool, wanted_extensions: &[*const c_char]) -> Result<Self> {
+    /// Under validation with the right to it.
+    pub(super) fn new(turn: Option<Turn>, wanted_extensions: &[*const c_char]) -> Result<Self> {
+        let validate = turn.is_some();
         // SAFETY: the loader is a shared library that stays loaded as long as `entry` lives.
         let entry = unsafe { ash::Entry::load() }
             .map_err(|e| anyhow!("no Vulkan loader (Debian: libvulkan1, mesa-vulkan-drivers): {e}"))?;
@@ -191,7 +196,7 @@ impl Instance {
         } else {
             None
         };
-        Ok(Self { entry, raw, debug, has_debug_utils, messages })
+        Ok(Self { entry, raw, debug, has_debug_utils, messages, _turn: turn })
     }
 
     fn candidates(&self, surface: Option<&Surface>) -> Result<Vec<Candidate>> {
@@ -344,7 +349,7 @@ unsafe extern "system" fn on_message(
 
 /// All devices that Vulkan offers here, in the order of `--device INDEX`.
 pub fn candidates() -> Result<Vec<Candidate>> {
-    Instance::new(false, &[])?.candidates(None)
+    Instance::new(None, &[])?.candidates(None)
 }
 
 fn choose(all: Vec<Candidate>, choice: &DeviceChoice) -> Result<Candidate> {
@@ -421,7 +426,9 @@ pub struct Device {
     created: Mutex<Vec<Created>>,
     objects: AtomicU64,
     info: DeviceInfo,
+    #[cfg(feature = "window")]
     pub(super) physical: vk::PhysicalDevice,
+    #[cfg(feature = "window")]
     pub(super) family: u32,
     /// A window shares its queue: nothing that is submitted takes long.
     pub(super) turns: bool,
@@ -433,10 +440,15 @@ pub struct Device {
 impl Device {
     /// Opens the chosen device; with `validate`, core and synchronization validation report into [`Device::messages`].
     ///
+    /// Renderers in several threads may share a device: their frames take turns. Without validation each may have a device of
+    /// its own. Under validation a process has one device at a time, as the layer breaks with two: a second call gives the same
+    /// device, with the messages of all who use it.
+    ///
     /// # Errors
-    /// One sentence when there is no loader, no such device, or the device lacks something that Etalon needs.
+    /// One sentence when there is no loader, no such device, the device lacks something that Etalon needs, or another one is
+    /// open under validation.
     pub fn open(choice: &DeviceChoice, validate: bool) -> Result<Arc<Self>> {
-        Self::open_on(Instance::new(validate, &[])?, choice, None, false)
+        Self::open_alone(choice, validate.then(|| Wish::Plain(choice.clone())), false)
     }
 
     /// The same, and what is submitted is cut into short pieces, as beside a window.
@@ -444,7 +456,16 @@ impl Device {
     /// # Errors
     /// As [`Device::open`].
     pub fn open_taking_turns(choice: &DeviceChoice, validate: bool) -> Result<Arc<Self>> {
-        Self::open_on(Instance::new(validate, &[])?, choice, None, true)
+        Self::open_alone(choice, validate.then(|| Wish::TakingTurns(choice.clone())), true)
+    }
+
+    fn open_alone(choice: &DeviceChoice, validated: Option<Wish>, turns: bool) -> Result<Arc<Self>> {
+        let turn = match validated.map(validated::take).transpose()? {
+            Some(Validated::Shared(device)) => return Ok(device),
+            Some(Validated::Mine(turn)) => Some(turn),
+            None => None,
+        };
+        Self::open_on(Instance::new(turn, &[])?, choice, None, turns)
     }
 
     /// The same with a surface that it can show pictures on.
@@ -527,7 +548,7 @@ impl Device {
                     .with_context(opening)?,
             )
         };
-        Ok(Arc::new(Self {
+        let device = Arc::new(Self {
             push: khr::push_descriptor::Device::new(&instance.raw, &raw),
             debug: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw)),
             raw,
@@ -546,12 +567,18 @@ impl Device {
             created: Mutex::default(),
             objects: AtomicU64::new(0),
             info,
+            #[cfg(feature = "window")]
             physical,
+            #[cfg(feature = "window")]
             family,
             turns,
             paces: Mutex::default(),
             instance,
-        }))
+        });
+        if device.validates() {
+            validated::share(&device);
+        }
+        Ok(device)
     }
 
     /// Who this is.

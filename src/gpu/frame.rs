@@ -113,7 +113,7 @@ pub struct Frame<'a> {
     device: Arc<Device>,
     passes: Vec<Pass<'a>>,
     targets: HashMap<ResourceId, Target<'a>>,
-    scene: Option<BoundSet<'a>>,
+    sets: Vec<BoundSet<'a>>,
     without_barriers: bool,
 }
 
@@ -125,15 +125,15 @@ impl<'a> Frame<'a> {
             device: device.clone(),
             passes: Vec::new(),
             targets: HashMap::new(),
-            scene: None,
+            sets: Vec::new(),
             without_barriers: false,
         }
     }
 
-    /// An empty frame of a scene: all its programs read the same set.
+    /// An empty frame of a scene: all its programs read the same sets.
     #[must_use]
-    pub fn of(device: &Arc<Device>, scene: BoundSet<'a>) -> Self {
-        Self { scene: Some(scene), ..Self::new(device) }
+    pub fn of(device: &Arc<Device>, sets: Vec<BoundSet<'a>>) -> Self {
+        Self { sets, ..Self::new(device) }
     }
 
     /// Leaves out every buffer barrier, for the test that validation would notice.
@@ -190,7 +190,7 @@ impl<'a> Frame<'a> {
     ) -> Vec<vk::DescriptorSet> {
         let mut sets = Vec::with_capacity(program.sets.len());
         for SharedSet { layout, used } in program.sets {
-            let known = self.scene.iter().chain(pages).find(|set| set.is_of(layout)).cloned();
+            let known = self.sets.iter().chain(pages).find(|set| set.is_of(layout)).cloned();
             let known =
                 known.unwrap_or_else(|| panic!("\"{}\" reads the {}, and there is none", program.name, layout.name));
             for binding in *used {

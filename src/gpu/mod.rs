@@ -14,6 +14,7 @@ mod limits;
 mod loops;
 mod memory;
 mod pipeline;
+#[cfg(feature = "window")]
 mod present;
 mod recording;
 mod set;
@@ -22,6 +23,9 @@ mod specialize;
 mod surface;
 pub mod sync;
 mod turns;
+mod validated;
+#[cfg(feature = "window")]
+mod window;
 
 pub use access::Access;
 pub use bind::{Bindings, Resource, Sampled};
@@ -32,10 +36,12 @@ pub use device::{
 pub use frame::{ColorTarget, DepthTarget, Draw, Frame, PassPlan, PassTime, Raster, VertexStream};
 pub use loops::with_loops_counted;
 pub use memory::{Buffer, Image, ImageDesc, NOTHING, Place};
+#[cfg(feature = "window")]
 pub use present::{Overlay, Placed, Presented, Presenter};
 pub use set::{BoundSet, DescriptorSet};
 pub use shader::{
     Binding, BindingKind, Constant, Program, Replacement, SetLayout, SharedSet, Specialization, Stage, VertexInput,
 };
 pub use specialize::specialized;
-pub use surface::Windowed;
+#[cfg(feature = "window")]
+pub use window::Windowed;

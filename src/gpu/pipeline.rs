@@ -61,7 +61,8 @@ impl Device {
     }
 
     pub(super) fn sampler(&self, desc: SamplerDesc) -> Result<vk::Sampler> {
-        if let Some(&sampler) = lock(&self.caches).samplers.get(&desc) {
+        let mut caches = lock(&self.caches);
+        if let Some(&sampler) = caches.samplers.get(&desc) {
             return Ok(sampler);
         }
         let info = vk::SamplerCreateInfo::default()
@@ -75,13 +76,14 @@ impl Device {
         // SAFETY: a valid create info.
         let sampler = unsafe { self.raw.create_sampler(&info, None) }.context("creating a sampler")?;
         self.note("sampler", "sampler", 0);
-        lock(&self.caches).samplers.insert(desc, sampler);
+        caches.samplers.insert(desc, sampler);
         Ok(sampler)
     }
 
     /// The layout of an ordinary descriptor set.
     pub(super) fn set_layout(&self, layout: &'static SetLayout) -> Result<vk::DescriptorSetLayout> {
-        if let Some(&known) = lock(&self.caches).set_layouts.get(layout.name) {
+        let mut caches = lock(&self.caches);
+        if let Some(&known) = caches.set_layouts.get(layout.name) {
             return Ok(known);
         }
         let slots = slots(layout.bindings);
@@ -89,12 +91,14 @@ impl Device {
         // SAFETY: a valid create info, taken from reflection.
         let made = unsafe { self.raw.create_descriptor_set_layout(&info, None) }
             .with_context(|| format!("creating the layout of the {}", layout.name))?;
-        lock(&self.caches).set_layouts.insert(layout.name, made);
+        caches.set_layouts.insert(layout.name, made);
         Ok(made)
     }
 
     pub(super) fn layout(&self, program: &'static Program) -> Result<Layout> {
-        if let Some(&layout) = lock(&self.caches).layouts.get(program.name) {
+        let shared = program.sets.iter().map(|set| self.set_layout(set.layout)).collect::<Result<Vec<_>>>()?;
+        let mut caches = lock(&self.caches);
+        if let Some(&layout) = caches.layouts.get(program.name) {
             return Ok(layout);
         }
         let creating = || format!("creating the layout of \"{}\"", program.name);
@@ -102,7 +106,6 @@ impl Device {
         let info = vk::DescriptorSetLayoutCreateInfo::default()
             .flags(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR)
             .bindings(&slots);
-        let shared = program.sets.iter().map(|set| self.set_layout(set.layout)).collect::<Result<Vec<_>>>()?;
         // SAFETY: valid create infos, taken from reflection.
         let layout = unsafe {
             let set = self.raw.create_descriptor_set_layout(&info, None).with_context(creating)?;
@@ -115,7 +118,7 @@ impl Device {
             }
             Layout { set, pipeline: self.raw.create_pipeline_layout(&info, None).with_context(creating)? }
         };
-        lock(&self.caches).layouts.insert(program.name, layout);
+        caches.layouts.insert(program.name, layout);
         Ok(layout)
     }
 

@@ -14,7 +14,9 @@ use super::access::Access;
 use super::device::{Device, DeviceChoice, Instance, lock};
 use super::memory::{Buffer, Image, ImageDesc, Place};
 use super::recording::begin;
-use super::surface::{Surface, Windowed, extensions};
+use super::surface::Surface;
+use super::validated;
+use super::window::{Windowed, extensions};
 
 /// A picture with its place in the window.
 #[derive(Debug, Clone, Copy)]
@@ -94,7 +96,8 @@ impl Presenter {
     /// # Errors
     /// One sentence when there is no loader, no device that can, or the window has no surface.
     pub fn open(window: Arc<dyn Windowed>, choice: &DeviceChoice, validate: bool) -> Result<(Arc<Device>, Self)> {
-        let instance = Instance::new(validate, extensions(&*window)?)?;
+        let turn = validate.then(|| validated::for_a_window(choice)).transpose()?;
+        let instance = Instance::new(turn, extensions(&*window)?)?;
         let surface = Surface::new(&instance.entry, &instance.raw, &*window)?;
         let device = Device::open_on(instance, choice, Some(&surface), true)?;
         // SAFETY: plain queries of a live surface, and objects of a live device.

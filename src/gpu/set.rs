@@ -1,4 +1,4 @@
-//! Descriptor sets that are written once: what a scene is, and the textures of its materials.
+//! Descriptor sets that are written once: what a scene is, what its paths draw from, and the textures of its materials.
 
 use std::sync::Arc;
 

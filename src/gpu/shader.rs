@@ -63,7 +63,7 @@ impl Program {
 /// What an ordinary descriptor set holds; one layout, whatever part of it a program reads.
 #[derive(Debug)]
 pub struct SetLayout {
-    /// As the shaders call it: `scene`, `pages`.
+    /// As the shaders call it: `scene`, `pages`, `paths`.
     pub name: &'static str,
     /// All its bindings, in slot order, with the stages of all programs.
     pub bindings: &'static [Binding],

@@ -50,14 +50,14 @@ impl Block {
         let words = &module.words[self.end.clone()];
         match op(module.words, &self.end) {
             Some(Op::Branch) => vec![words[1]],
-            Some(Op::BranchConditional) => match module.known.get(&words[1]) {
-                Some(&condition) => vec![if condition != 0 { words[2] } else { words[3] }],
+            Some(Op::BranchConditional) => match module.known[words[1] as usize] {
+                Some(condition) => vec![if condition != 0 { words[2] } else { words[3] }],
                 None => vec![words[2], words[3]],
             },
             Some(Op::Switch) => {
                 let cases = words[3..].as_chunks::<2>().0;
-                match module.known.get(&words[1]) {
-                    Some(selector) => vec![cases.iter().find(|case| case[0] == *selector).map_or(words[2], |c| c[1])],
+                match module.known[words[1] as usize] {
+                    Some(selector) => vec![cases.iter().find(|case| case[0] == selector).map_or(words[2], |c| c[1])],
                     None => std::iter::once(words[2]).chain(cases.iter().map(|case| case[1])).collect(),
                 }
             }
@@ -76,21 +76,32 @@ impl Block {
 /// What is known about a module.
 struct Module<'a> {
     words: &'a [u32],
-    types: HashSet<u32>,
-    /// Types whose values are known here: `bool`, and 32-bit integers.
-    scalars: HashSet<u32>,
-    known: HashMap<u32, u32>,
+    /// By id: ids are small numbers without gaps, and every operand asks.
+    types: Vec<Type>,
+    /// Values by id.
+    known: Vec<Option<u32>>,
+}
+
+/// What an id is as a type.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Type {
+    None,
+    /// `bool` or a 32-bit integer: values of these are known here.
+    Scalar,
+    Other,
 }
 
 impl Module<'_> {
     /// The result of an instruction, where it has one: it is what follows a type.
     fn result(&self, at: &Place) -> Option<u32> {
-        (at.len() > 2 && self.types.contains(&self.words[at.start + 1])).then(|| self.words[at.start + 2])
+        let words = &self.words[at.clone()];
+        let is_typed = words.len() > 2 && self.types.get(words[1] as usize).is_some_and(|ty| *ty != Type::None);
+        is_typed.then(|| words[2])
     }
 
     /// The value of an instruction whose operands are known well enough.
     fn value(&self, operation: Op, operands: &[u32]) -> Option<u32> {
-        let known = |i: usize| self.known.get(operands.get(i)?).copied();
+        let known = |i: usize| self.known.get(*operands.get(i)? as usize).copied().flatten();
         let flag = |b: bool| Some(u32::from(b));
         let (a, b) = (known(0), known(1));
         match operation {
@@ -121,9 +132,12 @@ impl Module<'_> {
 
     /// Learns the value of an instruction; whether it is new.
     fn learn(&mut self, at: &Place, constants: &HashMap<u32, u32>) -> bool {
-        let Some(id) = self.result(at).filter(|id| !self.known.contains_key(id)) else { return false };
         let words = &self.words[at.clone()];
-        if !self.scalars.contains(&words[1]) {
+        if words.len() < 3 || self.types.get(words[1] as usize) != Some(&Type::Scalar) {
+            return false;
+        }
+        let id = words[2];
+        if self.known[id as usize].is_some() {
             return false;
         }
         let told = constants.get(&id).copied();
@@ -138,7 +152,8 @@ impl Module<'_> {
             Some(operation) => self.value(operation, &words[3..]),
             None => None,
         };
-        value.is_some_and(|value| self.known.insert(id, value).is_none())
+        self.known[id as usize] = value;
+        value.is_some()
     }
 }
 
@@ -153,7 +168,8 @@ impl Module<'_> {
 #[must_use]
 pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
     let places = instructions(words, HEADER);
-    let mut module = Module { words, types: HashSet::new(), scalars: HashSet::new(), known: HashMap::new() };
+    let ids = words[BOUND] as usize;
+    let mut module = Module { words, types: vec![Type::None; ids], known: vec![None; ids] };
     let mut told = HashMap::new();
     let first_function =
         places.iter().position(|at| op(words, at) == Some(Op::Function)).expect("a module has a function");
@@ -164,26 +180,22 @@ pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
                 let value = constants.iter().find(|(id, _)| *id == operands[2]).map(|&(_, value)| value);
                 told.extend(value.map(|value| (operands[0], value)));
             }
-            Some(Op::TypeBool) => {
-                module.scalars.insert(operands[0]);
+            Some(Op::TypeBool) => module.types[operands[0] as usize] = Type::Scalar,
+            Some(Op::TypeInt) if operands[1] == 32 => module.types[operands[0] as usize] = Type::Scalar,
+            // The opcodes of types follow each other.
+            Some(ty) if (Op::TypeVoid as u32..=Op::TypeForwardPointer as u32).contains(&(ty as u32)) => {
+                module.types[operands[0] as usize] = Type::Other;
             }
-            Some(Op::TypeInt) if operands[1] == 32 => {
-                module.scalars.insert(operands[0]);
+            _ => {
+                module.learn(at, &told);
             }
-            _ => {}
-        }
-        // The opcodes of types follow each other.
-        if (Op::TypeVoid as u32..=Op::TypeForwardPointer as u32).contains(&(words[at.start] & 0xffff)) {
-            module.types.insert(operands[0]);
-        } else {
-            module.learn(at, &told);
         }
     }
 
     let mut out = words[..HEADER].to_vec();
     let mut bodies = Vec::new();
     let mut undefined = Vec::new();
-    let mut removed = HashSet::new();
+    let mut removed = vec![false; ids];
     let mut at = first_function;
     while at < places.len() {
         // OpFunction and its parameters, blocks, OpFunctionEnd.
@@ -208,10 +220,10 @@ pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
         match op(words, place) {
             Some(Op::Capability) if !adds && instruction[1] == spirv::Capability::GroupNonUniformArithmetic as u32 => {}
             Some(Op::Decorate) if instruction[2] == spirv::Decoration::SpecId as u32 => {}
-            Some(Op::Decorate | Op::Name) if removed.contains(&instruction[1]) => {}
+            Some(Op::Decorate | Op::Name) if removed[instruction[1] as usize] => {}
             Some(Op::SpecConstantTrue | Op::SpecConstantFalse) => {
-                let value = module.known[&instruction[2]];
-                let constant = if value != 0 { Op::ConstantTrue } else { Op::ConstantFalse };
+                let constant =
+                    if module.known[instruction[2] as usize] == Some(1) { Op::ConstantTrue } else { Op::ConstantFalse };
                 out.extend([3 << 16 | constant as u32, instruction[1], instruction[2]]);
             }
             Some(Op::SpecConstant) => {
@@ -230,7 +242,8 @@ pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
 /// The blocks of a function.
 struct Function {
     blocks: Vec<Block>,
-    index: HashMap<u32, usize>,
+    /// Places of the blocks, by label.
+    index: Vec<usize>,
     /// Blocks that are led to from within constructs.
     exits: HashSet<u32>,
     reached: Vec<bool>,
@@ -273,7 +286,10 @@ impl Function {
         let exits = blocks.iter().filter(|block| block.merge.is_none());
         let exits = exits.filter(|block| op(words, &block.end) == Some(Op::BranchConditional));
         let exits = exits.flat_map(|block| words[block.end.start + 2..block.end.start + 4].iter().copied()).collect();
-        let index = blocks.iter().enumerate().map(|(i, block)| (block.label, i)).collect();
+        let mut index = vec![usize::MAX; module.known.len()];
+        for (i, block) in blocks.iter().enumerate() {
+            index[block.label as usize] = i;
+        }
         let reached = vec![true; blocks.len()];
         Self { blocks, index, exits, reached }
     }
@@ -290,9 +306,9 @@ impl Function {
                     let mut from = operands.as_chunks::<2>().0.iter().filter(|pair| self.leads(module, pair[1], block));
                     // What comes from one block alone is what it was there.
                     if let (Some(&[value, _]), None) = (from.next(), from.next())
-                        && let Some(&value) = module.known.get(&value)
+                        && let Some(value) = module.known[value as usize]
                     {
-                        news |= module.known.insert(module.words[phi.start + 2], value).is_none();
+                        news |= module.known[module.words[phi.start + 2] as usize].replace(value).is_none();
                     }
                 }
                 for place in &block.body {
@@ -307,7 +323,7 @@ impl Function {
 
     /// Whether a block is reached and leads to another.
     fn leads(&self, module: &Module<'_>, from: u32, to: &Block) -> bool {
-        let from = self.index[&from];
+        let from = self.index[from as usize];
         self.reached[from] && self.targets(module, from).contains(&to.label)
     }
 
@@ -323,8 +339,9 @@ impl Function {
                 return vec![words[2], words[3]];
             }
             let goes_back = |label: u32| {
-                let target = &self.blocks[self.index[&label]];
-                target.merges(module.words).1.is_some() && self.index[&label] <= self.index[&block.label]
+                let target = &self.blocks[self.index[label as usize]];
+                target.merges(module.words).1.is_some()
+                    && self.index[label as usize] <= self.index[block.label as usize]
             };
             if goes_back(words[2]) || goes_back(words[3]) {
                 return vec![words[2], words[3]];
@@ -338,7 +355,7 @@ impl Function {
         let mut open = vec![0];
         while let Some(i) = open.pop() {
             if !std::mem::replace(&mut self.reached[i], true) {
-                open.extend(self.targets(module, i).iter().map(|label| self.index[label]));
+                open.extend(self.targets(module, i).iter().map(|&label| self.index[label as usize]));
             }
         }
     }
@@ -349,7 +366,7 @@ impl Function {
         bound: &mut u32,
         out: &mut Vec<u32>,
         undefined: &mut Vec<u32>,
-        removed: &mut HashSet<u32>,
+        removed: &mut [bool],
     ) {
         let words = module.words;
         // Structure needs the blocks that reached loops and selections name, also where nothing leads there.
@@ -366,7 +383,9 @@ impl Function {
         for (i, block) in self.blocks.iter().enumerate() {
             let label = [2 << 16 | Op::Label as u32, block.label];
             if !self.reached[i] {
-                removed.extend(block.phis.iter().chain(&block.body).filter_map(|place| module.result(place)));
+                for id in block.phis.iter().chain(&block.body).filter_map(|place| module.result(place)) {
+                    removed[id as usize] = true;
+                }
                 if let Some(header) = continued.get(&block.label) {
                     out.extend(label);
                     out.extend([2 << 16 | Op::Branch as u32, *header]);
@@ -374,12 +393,12 @@ impl Function {
                     out.extend(label);
                     out.push(1 << 16 | Op::Unreachable as u32);
                 } else {
-                    removed.insert(block.label);
+                    removed[block.label as usize] = true;
                 }
                 continue;
             }
             out.extend(label);
-            let goes_on = block.merges(words).1.map(|label| self.index[&label]).filter(|&i| !self.reached[i]);
+            let goes_on = block.merges(words).1.map(|label| self.index[label as usize]).filter(|&i| !self.reached[i]);
             for phi in &block.phis {
                 let mut pairs: Vec<u32> = words[phi.start + 3..phi.end]
                     .as_chunks::<2>()

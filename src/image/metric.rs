@@ -7,16 +7,17 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
-use clap::ValueEnum;
 use rayon::prelude::*;
 use serde::Serialize;
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use super::png::Display;
 use super::{Picture, exr, file, png, tone};
 
 /// A figure for the difference of two pictures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, ValueEnum, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, EnumMessage, IntoStaticStr, VariantArray, Serialize)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Metric {
     /// Mean of the FLIP error, 0..=1: what an eye sees when it flips between the two (Andersson et al. 2020).
     #[default]
@@ -36,17 +37,12 @@ pub enum Metric {
 }
 
 impl Metric {
+    /// All of them.
+    pub const ALL: &[Self] = Self::VARIANTS;
+
     /// Name on the command line and in JSON.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Flip => "flip",
-            Self::Mse => "mse",
-            Self::Rmse => "rmse",
-            Self::Mae => "mae",
-            Self::Relmse => "relmse",
-            Self::Psnr => "psnr",
-            Self::Ssim => "ssim",
-        }
+        self.into()
     }
 
     /// Whether a larger value means more alike.

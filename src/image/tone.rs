@@ -5,15 +5,16 @@
 //! curve a sample is made usable: NaN and negative become 0 and values above [`LARGEST`], infinity included, become
 //! [`LARGEST`], so no curve returns NaN. Counting such samples is the caller's duty, before this.
 
-use clap::ValueEnum;
 use serde::Serialize;
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 /// Where samples are cut off before a curve: the largest finite half float (docs/numerics.md 43).
 pub const LARGEST: f64 = 65504.0;
 
 /// How radiance becomes display light.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, ValueEnum, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, EnumMessage, IntoStaticStr, VariantArray, Serialize)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum ToneMap {
     /// Radiance as it is, cut at 1.
     Linear,
@@ -29,6 +30,15 @@ pub enum ToneMap {
 }
 
 impl ToneMap {
+    /// All of them.
+    pub const ALL: &[Self] = Self::VARIANTS;
+
+    /// Name on the command line and in JSON.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
     /// Linear display light in 0..=1 for exposed linear Rec. 709 radiance.
     pub fn apply(self, rgb: [f64; 3]) -> [f64; 3] {
         match self {

@@ -1,10 +1,14 @@
 //! What the catalogue says of an equation: its twin, where it is tested, what error is allowed.
 
 use glam::DVec3;
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 /// Rungs of the knob `arithmetic`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum, serde::Serialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, EnumMessage, IntoStaticStr, VariantArray, serde::Serialize,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Tier {
     /// The formula as on the slide. No bound is promised.
     Fast,
@@ -21,11 +25,7 @@ impl Tier {
     /// As on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Fast => "fast",
-            Self::Stable => "stable",
-            Self::Compensated => "compensated",
-        }
+        self.into()
     }
 }
 

@@ -3,13 +3,16 @@
 use std::sync::Arc;
 
 use anyhow::Result;
+use ash::vk;
 use glam::DVec3;
 use half::f16;
 
 use super::upload::{pack_half_2x16, upload};
 use crate::gpu::{Buffer, Device, NOTHING, Place};
 use crate::scene::caustics::{Aims, Ball};
-use crate::share::{AimBall, AimGrid};
+use crate::share::{AIM_GRID_TEXELS, AimBall, AimGrid};
+
+const _: () = assert!(size_of::<AimGrid>() == 16 * AIM_GRID_TEXELS as usize, "balls begin behind the grid");
 
 /// A grid of cells, and the balls of each.
 pub struct AimsOnDevice {
@@ -28,13 +31,17 @@ impl AimsOnDevice {
             middle: in_f32(ball.middle),
             radius_share: pack_half_2x16([ball.radius / aims.cell, ball.share].map(f16::from_f64)),
         };
-        let grid =
-            AimGrid { corner: in_f32(aims.corner), cells_per_metre: aims.cell.recip() as f32, cells: aims.cells };
         let balls: Vec<AimBall> = aims.aims.iter().map(ball).collect();
+        let grid = AimGrid {
+            corner: in_f32(aims.corner),
+            cells_per_metre: aims.cell.recip() as f32,
+            cells: aims.cells,
+            last_ball: balls.len().saturating_sub(1) as u32,
+        };
         let table = [bytemuck::bytes_of(&grid), bytemuck::cast_slice(&balls)].concat();
         Ok(Self {
-            cells: upload(device, "cells of aims", &aims.firsts, None)?,
-            balls: upload(device, "aims", &table, None)?,
+            cells: upload(device, "cells of aims", &aims.firsts, Some(vk::Format::R32_UINT))?,
+            balls: upload(device, "aims", &table, Some(vk::Format::R32G32B32A32_UINT))?,
         })
     }
 
@@ -43,7 +50,7 @@ impl AimsOnDevice {
     /// # Errors
     /// When memory is short.
     pub fn none(device: &Arc<Device>) -> Result<Self> {
-        let nothing = || Buffer::new(device, NOTHING, 0, Place::Device);
-        Ok(Self { cells: nothing()?, balls: nothing()? })
+        let nothing = |format| Buffer::texels(device, NOTHING, 0, Place::Device, format);
+        Ok(Self { cells: nothing(vk::Format::R32_UINT)?, balls: nothing(vk::Format::R32G32B32A32_UINT)? })
     }
 }

@@ -57,7 +57,7 @@ impl EmittersOnDevice {
                 device,
                 name("shares of the environment", emitters.sky.words.is_empty()),
                 &emitters.sky.words,
-                None,
+                Some(vk::Format::R32_UINT),
             )?,
             count: list.len() as u32,
             punctual: any(|source| matches!(source, Source::Punctual(_))),

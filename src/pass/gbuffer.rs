@@ -31,13 +31,13 @@ fn normal_format(normals: Normals) -> vk::Format {
 pub struct GBuffer {
     /// Reversed depth; 0 where nothing was drawn.
     pub depth: Image,
-    /// The same depth as a buffer, row by row: what the passes after it read. The copy costs half a millisecond at 1280x720.
+    /// The same depth as texels, row by row: what the passes after it read. The copy costs half a millisecond at 1280x720.
     depth_rows: Buffer,
     /// Base colour and metallic texels.
     pub base: Image,
     /// Shading and geometric normal.
     pub normals: Image,
-    /// Depth and position, where positions are stored, and the same as a buffer.
+    /// Depth and position, where positions are stored, and the same as texels.
     positions: Option<(Image, Buffer)>,
     /// Material, roughness, instance, occlusion.
     pub ids: Image,
@@ -69,7 +69,7 @@ impl GBuffer {
             let bytes = 16 * u64::from(size[0]) * u64::from(size[1]);
             let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC;
             let image = Image::new(device, "G-buffer positions", ImageDesc::flat(POSITION, size[0], size[1], usage))?;
-            Ok((image, Buffer::new(device, "G-buffer position rows", bytes, Place::Device)?))
+            Ok((image, Buffer::texels(device, "G-buffer position rows", bytes, Place::Device, POSITION)?))
         });
         let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
         Ok(Self {
@@ -78,11 +78,12 @@ impl GBuffer {
                 "G-buffer depth",
                 ImageDesc::flat(vk::Format::D32_SFLOAT, size[0], size[1], usage),
             )?,
-            depth_rows: Buffer::new(
+            depth_rows: Buffer::texels(
                 device,
                 "G-buffer depth rows",
                 4 * u64::from(size[0]) * u64::from(size[1]),
                 Place::Device,
+                vk::Format::R32_SFLOAT,
             )?,
             base: target("G-buffer base colour", vk::Format::R16G16B16A16_SFLOAT, true)?,
             normals: target("G-buffer normals", normal_format(plan.stored.normals), true)?,

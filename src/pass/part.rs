@@ -6,6 +6,7 @@ use anyhow::{Result, bail};
 use ash::vk;
 
 use crate::gpu::{Buffer, Device, Image, ImageDesc, Place};
+use crate::plan::rungs::{Reflection, Refraction};
 use crate::plan::{Knobs, Plan};
 
 /// Light that rays bring to the surface that a pixel shows. A picture is the sum of both parts and of what that surface
@@ -60,9 +61,12 @@ impl PartOnDevice {
                 "--aov {name}: this layer is what single rays bring, and indirect=path follows paths instead; add --set indirect=ambient --set lights=points"
             );
         }
-        let rung = knobs.rung(name);
-        if rung != "ray" {
-            bail!("--aov {name}: this layer is what rays bring, and {name}={rung} sends none; add --set {name}=ray");
+        let (choice, sends) = match part {
+            Part::Reflection => (knobs.reflection.choice(), knobs.reflection == Reflection::Ray),
+            Part::Refraction => (knobs.refraction.choice(), knobs.refraction == Refraction::Ray),
+        };
+        if !sends {
+            bail!("--aov {name}: this layer is what rays bring, and {choice} sends none; add --set {name}=ray");
         }
         let target = |what: &str| {
             let usage = vk::ImageUsageFlags::STORAGE;

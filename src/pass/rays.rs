@@ -17,9 +17,9 @@ use super::upload::{pack_half_2x16, upload};
 use super::view::View;
 use crate::gpu::{Buffer, Device, Frame, NOTHING, Place};
 use crate::plan::{Plan, Rays};
-use crate::scene::bvh::{Bvh, Format, Order, Triangle};
+use crate::prepare::{Hierarchy, Prepared, ray_offset};
+use crate::scene::bvh::{Format, Order, Triangle};
 use crate::scene::caustics::Aims;
-use crate::scene::contact::{bodies_touch, twins};
 use crate::scene::emitters::{Emitters, Source};
 use crate::scene::solid::{Solids, media_at};
 use crate::scene::{AlphaMode, Mesh, Scene};
@@ -29,9 +29,6 @@ use crate::share::{
     self, BvhTriangle, CornerColors, CornerFrame, CornerTangents, CornerUvs, MATERIAL_OF_TRIANGLE, ONE_SIDED_TRIANGLE,
     SHEET_TRIANGLE, TraceTerms, WorkCounts,
 };
-
-/// Rays start this many roundings of the largest coordinate off their surface (shaders/lib/trace.glsl, `ray_origin`).
-const OFFSET_ROUNDINGS: f64 = 32.0;
 
 /// Lists in eight orders beside the one for any hit, as long as they take no more bytes than this, some two million nodes of
 /// 16 bytes: they are as many copies of the tree.
@@ -120,8 +117,6 @@ pub struct RaysOnDevice {
     pub constants: TraceConstants,
     /// For the report; `None` without rays.
     pub facts: Option<BvhFacts>,
-    /// What is odd about the triangles, a sentence each.
-    pub warnings: Vec<String>,
     fixed: TraceTerms,
     anchor: DVec3,
     /// The transparent bodies alone, to find those that the eye is in.
@@ -130,22 +125,16 @@ pub struct RaysOnDevice {
 }
 
 impl RaysOnDevice {
-    /// Builds the hierarchy as far as the plan asks for it.
+    /// Lays out the hierarchy, where the plan sends rays.
     ///
     /// # Errors
     /// When the scene does not fit the device.
-    pub fn new(
-        device: &Arc<Device>,
-        plan: &Plan,
-        scene: &Scene,
-        solids: &Solids,
-        emitters: &Emitters,
-        traversal: Option<Traversal>,
-    ) -> Result<Self> {
-        let Some(rays) = plan.rays else { return Self::none(device, scene) };
-        let start = std::time::Instant::now();
-        let bvh = Bvh::build(scene)?;
-        let build_ms = start.elapsed().as_secs_f64() * 1e3;
+    pub fn new(device: &Arc<Device>, prepared: &Prepared, traversal: Option<Traversal>) -> Result<Self> {
+        let Prepared { scene, plan, solids, emitters, .. } = prepared;
+        let Some((rays, hierarchy)) = plan.rays.zip(prepared.hierarchy.as_ref()) else {
+            return Self::none(device, scene);
+        };
+        let &Hierarchy { ref bvh, build_ms, offset, touching, .. } = hierarchy;
         let start = std::time::Instant::now();
         let by_links = if bvh.fits_grid() { Traversal::Links16 } else { Traversal::Links32 };
         let default = if device.limits_loops() { by_links } else { Traversal::Stack };
@@ -197,9 +186,6 @@ impl RaysOnDevice {
         }
         let hit_corners: Vec<[u32; 4]> = bvh.triangles.par_iter().flat_map_iter(|t| corners.texels(t)).collect();
         let layout_ms = start.elapsed().as_secs_f64() * 1e3;
-        let extent = bvh.triangles.iter().flat_map(|t| t.corners.iter().flatten()).fold(0.0_f32, |m, x| m.max(x.abs()));
-        let offset = OFFSET_ROUNDINGS * f64::from(extent) * 2.0_f64.powi(-24);
-        let touching = rays.refraction && bodies_touch(&bvh, &solids.solid, offset);
         let grid = bvh.grid();
         let format = Some(vk::Format::R32G32B32A32_UINT);
         let nodes_buffer = upload(device, "BVH nodes", &nodes, format)?;
@@ -235,14 +221,13 @@ impl RaysOnDevice {
                 touching,
                 bytes: nodes_buffer.bytes() + triangle_buffer.bytes() + corner_buffer.bytes(),
             }),
-            warnings: odd_triangles(scene, &bvh, solids),
             nodes: nodes_buffer,
             triangles: triangle_buffer,
             corners: corner_buffer,
             faces,
             emitters: EmittersOnDevice::new(device, emitters, &leaf_places)?,
             aims: match plan.paths.is_some_and(|paths| paths.aimed) {
-                true => AimsOnDevice::new(device, &Aims::of(scene, solids, &bvh, emitters))?,
+                true => AimsOnDevice::new(device, &Aims::of(scene, solids, bvh, emitters))?,
                 false => AimsOnDevice::none(device)?,
             },
             leaf_places: upload(device, "leaf places", &leaf_places, None)?,
@@ -270,11 +255,7 @@ impl RaysOnDevice {
             counts: Buffer::new(device, NOTHING, 0, Place::Readback)?,
             constants: TraceConstants::default(),
             facts: None,
-            warnings: Vec::new(),
-            fixed: TraceTerms {
-                offset: (OFFSET_ROUNDINGS * half * 2.0_f64.powi(-24)) as f32,
-                ..bytemuck::Zeroable::zeroed()
-            },
+            fixed: TraceTerms { offset: ray_offset(half) as f32, ..bytemuck::Zeroable::zeroed() },
             anchor,
             bodies: Scene::default(),
             solids: Solids::default(),
@@ -359,30 +340,6 @@ fn is_filter(scene: &Scene, solids: &Solids, plan: &Plan, instance: usize) -> bo
         AlphaMode::Opaque => material.transmission > 0.0 && straight,
         AlphaMode::Mask(_) | AlphaMode::Blend => true,
     }
-}
-
-/// What is left out, and what is there twice: of that only one is seen, unless bodies touch there.
-fn odd_triangles(scene: &Scene, bvh: &Bvh, solids: &Solids) -> Vec<String> {
-    const MOST: usize = 4;
-    let mut warnings = Vec::new();
-    if bvh.dropped > 0 {
-        warnings.push(format!("{} triangles without area are left out for rays", bvh.dropped));
-    }
-    let name = |instance: u32| &scene.meshes[scene.instances[instance as usize].mesh].name;
-    let is_body = |instance: u32| solids.solid[instance as usize];
-    let mut pairs = twins(bvh).into_iter().filter(|([a, b], _)| a == b || !(is_body(*a) || is_body(*b)));
-    warnings.extend(pairs.by_ref().take(MOST).map(|([a, b], count)| {
-        format!(
-            "{count} triangles of mesh \"{}\" lie exactly in triangles of mesh \"{}\": one of each is seen",
-            name(b),
-            name(a)
-        )
-    }));
-    let more = pairs.count();
-    if more > 0 {
-        warnings.push(format!("triangles of {more} more pairs of meshes lie exactly in each other"));
-    }
-    warnings
 }
 
 /// Which flat face each triangle of a mesh is part of, named after its first triangle: triangles that follow each other,

@@ -15,6 +15,7 @@ use crate::gpu::{
     Binding, BoundSet, Buffer, DescriptorSet, Device, Draw, Place, Resource, Specialization as _, VertexStream,
 };
 use crate::optics::ray::camera_relative;
+use crate::plan::rungs::{self, Brdf};
 use crate::plan::{Knobs, Plan, casts_in_maps, is_see_through, mirrors};
 use crate::scene::lobe::{self, LobeOf};
 use crate::scene::solid::Solids;
@@ -517,7 +518,10 @@ fn shared_slot(texture: Option<TextureRef>, textures: &Textures, meaning: Meanin
 
 /// The rung of the knob.
 fn upsampling(knobs: &Knobs) -> Upsampling {
-    if knobs.rung("upsampling") == "jakob-hanika" { Upsampling::JakobHanika } else { Upsampling::MallettYuksel }
+    match knobs.upsampling {
+        rungs::Upsampling::JakobHanika => Upsampling::JakobHanika,
+        rungs::Upsampling::MallettYuksel => Upsampling::MallettYuksel,
+    }
 }
 
 /// The constants of a material. F0 of a dielectric is ((n − 1) / (n + 1))² tinted and scaled by KHR_materials_specular;
@@ -525,7 +529,7 @@ fn upsampling(knobs: &Knobs) -> Upsampling {
 /// grid of σ that is not marched, whose place is 0, adds its mean. In a band `shares` are those of red, green and blue in it.
 fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32, shares: Option<[f64; 3]>) -> share::Material {
     let r = (m.ior - 1.0) / (m.ior + 1.0);
-    let absorbs = knobs.rung("absorption") != "off";
+    let absorbs = knobs.absorption != rungs::Absorption::Off;
     // attenuationDistance is in metres of the world, thickness in metres of the object.
     let sigma = m.attenuation_color.map(|color| {
         let sigma = -color.max(1e-6).ln() / m.attenuation_distance;
@@ -583,9 +587,9 @@ fn phong(m: &Material, knobs: &Knobs, f0: [f32; 3]) -> ([f32; 3], [f32; 3]) {
     let r = (m.ior - 1.0) / (m.ior + 1.0);
     let uncapped = m.specular_color.map(|c| r * r * c * m.specular);
     let left = 1.0 - uncapped.into_iter().fold(0.0, f32::max);
-    match knobs.rung("brdf") {
-        "blinn-phong" => (uncapped.map(|f| 4.0 * f), [red, green, blue]),
-        "blinn-phong-reciprocal" if left > 0.0 => (f0, [red, green, blue].map(|albedo| (albedo / left).min(1.0))),
+    match knobs.brdf {
+        Brdf::BlinnPhong => (uncapped.map(|f| 4.0 * f), [red, green, blue]),
+        Brdf::BlinnPhongReciprocal if left > 0.0 => (f0, [red, green, blue].map(|albedo| (albedo / left).min(1.0))),
         _ => (f0, [red, green, blue]),
     }
 }

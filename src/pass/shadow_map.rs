@@ -162,7 +162,7 @@ fn draw(
     let instances = Buffer::with_data(device, "instances around the scene", &scene.instances_around(anchor))?;
     let materials = || lib::material::Scene { material_texels: &scene.materials }.entries();
     let set = DescriptorSet::new(device, &SCENE, &materials())?;
-    let mut frame = Frame::of(device, set.bind(materials()));
+    let mut frame = Frame::of(device, vec![set.bind(materials())]);
     let bind = shadow_map::Bind { casters: &instances };
     for face in faces {
         let [x, y, side] = face.square;

@@ -1,4 +1,4 @@
-//! What all programs of a renderer share: the descriptor set of the scene, and the specialization constants of
+//! What all programs of a renderer share: the descriptor sets of the scene, and the specialization constants of
 //! `shaders/lib/`. Both are filled in here and nowhere else.
 
 use std::sync::Arc;
@@ -11,9 +11,9 @@ use super::scene::SceneOnDevice;
 use super::shadow_map::ShadowMaps;
 use super::tiles::Tiles;
 use crate::gpu::{BoundSet, Buffer, DescriptorSet, Device, Resource};
-use crate::plan::{Knobs, March, Plan};
+use crate::plan::{Attenuation, Knobs, March, Plan};
 pub use crate::shader::Library;
-use crate::shader::{SCENE, lib};
+use crate::shader::{PATHS, SCENE, lib};
 
 /// What the device holds of a scene.
 #[derive(Clone, Copy)]
@@ -32,7 +32,7 @@ pub struct OnDevice<'a> {
 
 impl<'a> OnDevice<'a> {
     /// The descriptor set `scene`: slots and what is in them, file by file of `shaders/lib/`.
-    fn entries(&self) -> Vec<(u32, Resource<'a>)> {
+    fn scene_entries(&self) -> Vec<(u32, Resource<'a>)> {
         let &Self { camera, scene, rays, shadow_maps, environment } = self;
         [
             lib::view::Scene { camera_block: camera }.entries(),
@@ -45,8 +45,6 @@ impl<'a> OnDevice<'a> {
             lib::primary::Scene { leaf_places: &rays.leaf_places }.entries(),
             rays.trace().entries(),
             rays.work().entries(),
-            lib::emitters::Scene { emitters: &rays.emitters.table, sky_shares: &rays.emitters.sky }.entries(),
-            lib::aims::Scene { aim_cells: &rays.aims.cells, aim_table: &rays.aims.balls }.entries(),
             lib::shadow::Scene { shadow_depth: shadow_maps.depth() }.entries(),
             lib::environment::Scene {
                 environment: &environment.terms,
@@ -59,18 +57,31 @@ impl<'a> OnDevice<'a> {
         .concat()
     }
 
-    /// Writes the set.
+    /// The descriptor set `paths`: what they draw from.
+    fn path_entries(&self) -> Vec<(u32, Resource<'a>)> {
+        let RaysOnDevice { emitters, aims, .. } = self.rays;
+        [
+            lib::emitters::Paths { emitters: &emitters.table, sky_shares: &emitters.sky }.entries(),
+            lib::aims::Paths { aim_cells: &aims.cells, aims: &aims.balls }.entries(),
+        ]
+        .concat()
+    }
+
+    /// Writes the sets.
     ///
     /// # Errors
     /// When memory is short.
-    pub fn write(&self, device: &Arc<Device>) -> Result<DescriptorSet> {
-        DescriptorSet::new(device, &SCENE, &self.entries())
+    pub fn write(&self, device: &Arc<Device>) -> Result<[DescriptorSet; 2]> {
+        Ok([
+            DescriptorSet::new(device, &SCENE, &self.scene_entries())?,
+            DescriptorSet::new(device, &PATHS, &self.path_entries())?,
+        ])
     }
 
-    /// The set as it was written, for a frame.
+    /// The sets as they were written, for a frame.
     #[must_use]
-    pub fn bind(&self, set: &'a DescriptorSet) -> BoundSet<'a> {
-        set.bind(self.entries())
+    pub fn bind(&self, [scene, paths]: &'a [DescriptorSet; 2]) -> Vec<BoundSet<'a>> {
+        vec![scene.bind(self.scene_entries()), paths.bind(self.path_entries())]
     }
 
     /// What programs are specialised by. A pass that wants something else changes its copy, and says why.
@@ -83,7 +94,7 @@ impl<'a> OnDevice<'a> {
         let spectrum = scene.colours();
         let shadow_rays = with.shadows;
         Library {
-            arithmetic: lib::arithmetic::Constants { arithmetic: knobs.index("arithmetic") },
+            arithmetic: lib::arithmetic::Constants { arithmetic: knobs.arithmetic as u32 },
             aims: lib::aims::Constants { aimed: paths.aimed },
             boundary: lib::boundary::Constants { touching: rays.constants.touching },
             bsdf: lib::bsdf::Constants { frosted: with.frosted },
@@ -123,7 +134,7 @@ impl<'a> OnDevice<'a> {
                 true => lib::loops::Constants::default(),
                 false => lib::loops::Constants { loop_budget: u32::MAX },
             },
-            path: lib::path::Constants { lighting_surfaces: paths.emitting, light_places: knobs.light_places() },
+            path: lib::path::Constants { lighting_surfaces: paths.emitting, light_places: knobs.lights.places() },
             path_state: lib::path_state::Constants {
                 keeps_media: with.transmissive,
                 keeps_after: rays.constants.touching,
@@ -139,18 +150,22 @@ impl<'a> OnDevice<'a> {
                     lib::shadow::SHADOW_OFF
                 },
                 filters: with.filters,
-                absorption: with.absorption,
+                absorption: match with.attenuation {
+                    Attenuation::Off => lib::shadow::ABSORPTION_OFF,
+                    Attenuation::Nominal => lib::shadow::ABSORPTION_NOMINAL,
+                    Attenuation::Path => lib::shadow::ABSORPTION_PATH,
+                },
             },
             sigma_grid: match with.march {
                 March { steps: 0, .. } => lib::sigma_grid::Constants::default(),
                 March { steps, rule, colours } => {
-                    lib::sigma_grid::Constants { march_steps: steps, quadrature: rule, march_colours: colours }
+                    lib::sigma_grid::Constants { march_steps: steps, quadrature: rule as u32, march_colours: colours }
                 }
             },
             spectrum: lib::spectrum::Constants { spectral: spectrum.spectral, grid_side: spectrum.grid_side },
             surface: lib::surface::Constants {
-                brdf: knobs.index("brdf"),
-                fresnel: knobs.index("fresnel"),
+                brdf: knobs.brdf as u32,
+                fresnel: knobs.fresnel as u32,
                 clearcoat: plan.clearcoat,
                 rough: with.rough,
                 conductors: plan.conductors,
@@ -172,46 +187,19 @@ fn halvings(count: u32) -> u32 {
     count.next_power_of_two().trailing_zeros()
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::plan::KNOBS;
-
-    /// A rung reaches the shaders as its place among its knob's: they give each place a name.
-    #[test]
-    fn rungs_have_the_places_that_shaders_name() {
-        use lib::gbuffer::{NORMALS_F32, NORMALS_OCT16, NORMALS_OCT24, NORMALS_OCT32};
-        use lib::medium::{QUADRATURE_LEFT, QUADRATURE_MIDPOINT, QUADRATURE_SIMPSON};
-        use lib::shadow::{SHADOW_MAP, SHADOW_OFF, SHADOW_RAY};
-        use lib::surface::{
-            BRDF_BLINN_PHONG, BRDF_BLINN_PHONG_RECIPROCAL, BRDF_GGX, BRDF_GGX_MULTI, FRESNEL_EXACT, FRESNEL_SCHLICK,
-        };
-        for (knob, names) in [
-            (
-                "brdf",
-                &[
-                    ("blinn-phong", BRDF_BLINN_PHONG),
-                    ("blinn-phong-reciprocal", BRDF_BLINN_PHONG_RECIPROCAL),
-                    ("ggx", BRDF_GGX),
-                    ("ggx-multi", BRDF_GGX_MULTI),
-                ][..],
-            ),
-            ("fresnel", &[("schlick", FRESNEL_SCHLICK), ("exact", FRESNEL_EXACT)]),
-            ("shadows", &[("off", SHADOW_OFF), ("map", SHADOW_MAP), ("ray", SHADOW_RAY)]),
-            (
-                "normals",
-                &[("oct16", NORMALS_OCT16), ("oct24", NORMALS_OCT24), ("oct32", NORMALS_OCT32), ("f32", NORMALS_F32)],
-            ),
-            (
-                "quadrature",
-                &[("left", QUADRATURE_LEFT), ("midpoint", QUADRATURE_MIDPOINT), ("simpson", QUADRATURE_SIMPSON)],
-            ),
-        ] {
-            let rungs = KNOBS.iter().find(|known| known.name == knob).expect("a knob").rungs;
-            assert_eq!(rungs.len(), names.len(), "{knob}");
-            for &(rung, place) in names {
-                assert_eq!(rungs.get(place as usize), Some(&rung), "{knob}");
-            }
-        }
-    }
-}
+/// A rung reaches the shaders as its place among its knob's, and they give each place a name.
+const _: () = {
+    use crate::plan::rungs::{Brdf, Fresnel, Normals, Quadrature};
+    assert!(Brdf::BlinnPhong as u32 == lib::surface::BRDF_BLINN_PHONG);
+    assert!(Brdf::BlinnPhongReciprocal as u32 == lib::surface::BRDF_BLINN_PHONG_RECIPROCAL);
+    assert!(Brdf::Ggx as u32 == lib::surface::BRDF_GGX && Brdf::GgxMulti as u32 == lib::surface::BRDF_GGX_MULTI);
+    assert!(Fresnel::Schlick as u32 == lib::surface::FRESNEL_SCHLICK);
+    assert!(Fresnel::Exact as u32 == lib::surface::FRESNEL_EXACT);
+    assert!(
+        Normals::Oct16 as u32 == lib::gbuffer::NORMALS_OCT16 && Normals::Oct24 as u32 == lib::gbuffer::NORMALS_OCT24
+    );
+    assert!(Normals::Oct32 as u32 == lib::gbuffer::NORMALS_OCT32 && Normals::F32 as u32 == lib::gbuffer::NORMALS_F32);
+    assert!(Quadrature::Left as u32 == lib::medium::QUADRATURE_LEFT);
+    assert!(Quadrature::Midpoint as u32 == lib::medium::QUADRATURE_MIDPOINT);
+    assert!(Quadrature::Simpson as u32 == lib::medium::QUADRATURE_SIMPSON);
+};

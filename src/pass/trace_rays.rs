@@ -8,10 +8,8 @@ use bytemuck::{Pod, Zeroable};
 
 use super::rays::{RaysOnDevice, TraceConstants, Traversal};
 use crate::gpu::{Buffer, DescriptorSet, Device, Frame, Place};
-use crate::plan::{Demand, Facts, Knobs, Plan, Surroundings};
+use crate::prepare::Prepared;
 use crate::scene::Scene;
-use crate::scene::emitters::Emitters;
-use crate::scene::normal_form::NormalForm;
 use crate::shader::{Library, SCENE, lib, trace_rays};
 use crate::share::WorkCounts;
 
@@ -71,15 +69,8 @@ impl Tracer {
     /// # Errors
     /// When it does not fit the device.
     pub fn new(device: &Arc<Device>, scene: &Scene, traversal: Option<Traversal>) -> Result<Self> {
-        let surroundings =
-            Surroundings { environment: false, constant: false, grey: false, sky: false, demand: Demand::Scene };
-        let facts = Facts::of(scene, NormalForm::default());
-        let mut plan = Plan::new(scene, &facts, surroundings, &Knobs::default());
-        plan.rays = Some(crate::plan::Rays::default());
-        Ok(Self {
-            device: device.clone(),
-            rays: RaysOnDevice::new(device, &plan, scene, &facts.solids, &Emitters::default(), traversal)?,
-        })
+        let prepared = Prepared::for_rays(scene.clone())?;
+        Ok(Self { device: device.clone(), rays: RaysOnDevice::new(device, &prepared, traversal)? })
     }
 
     /// The hierarchy and its tables.
@@ -120,7 +111,7 @@ impl Tracer {
         let scene = DescriptorSet::new(&self.device, &SCENE, &entries())?;
         let mut times = Vec::new();
         for round in 0..repeats {
-            let mut frame = Frame::of(&self.device, scene.bind(entries()));
+            let mut frame = Frame::of(&self.device, vec![scene.bind(entries())]);
             self.rays.reset(&mut frame);
             let bind = trace_rays::Bind { rays: &input, hits: &output };
             let push = trace_rays::Push { count: rays.len() as u32, blocks };

@@ -2,7 +2,10 @@
 
 use anyhow::{Result, bail};
 
-use super::{KNOBS, Plan};
+use super::choice::Choice;
+use super::knobs::Knob;
+use super::knobs::rungs::{Indirect, Reflection, Refraction, Shadows};
+use super::work::Plan;
 
 /// What rungs ask of a device, beyond what every plan does.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -22,18 +25,14 @@ impl Plan {
         let rays = self.rays.unwrap_or_default();
         let counts = (!ability.adds_in_subgroups)
             .then(|| "has no addition within subgroups of compute shaders, by which rays count their work".to_owned());
-        for (asked, knob, rung, lacks) in [
-            (self.paths.is_some(), "indirect", "path", &counts),
-            (rays.shadows, "shadows", "ray", &counts),
-            (rays.mirrors, "reflection", "ray", &counts),
-            (rays.refraction, "refraction", "ray", &counts),
+        for (asked, choice, lacks) in [
+            (self.paths.is_some(), Indirect::Path.choice(), &counts),
+            (rays.shadows, Shadows::Ray.choice(), &counts),
+            (rays.mirrors, Reflection::Ray.choice(), &counts),
+            (rays.refraction, Refraction::Ray.choice(), &counts),
         ] {
             if let (true, Some(lacks)) = (asked, lacks) {
-                let nearest = below(knob, rung);
-                bail!(
-                    "{knob}={rung}: the device \"{}\" {lacks}; the nearest choice is {knob}={nearest}",
-                    ability.device
-                );
+                bail!("{choice}: the device \"{}\" {lacks}; the nearest choice is {}", ability.device, below(choice));
             }
         }
         Ok(())
@@ -41,10 +40,10 @@ impl Plan {
 }
 
 /// The next cheaper rung.
-fn below(knob: &str, rung: &str) -> &'static str {
-    let rungs = KNOBS.iter().find(|known| known.name == knob).map_or(&[][..], |known| known.rungs);
-    let place = rungs.iter().position(|known| *known == rung).unwrap_or_default();
-    rungs.get(place.saturating_sub(1)).copied().unwrap_or_default()
+fn below(choice: Choice) -> Choice {
+    let rungs = Knob::named(choice.knob).map_or(&[][..], |known| known.rungs);
+    let place = rungs.iter().position(|known| *known == choice.rung).unwrap_or_default();
+    Choice { rung: rungs.get(place.saturating_sub(1)).copied().unwrap_or_default(), ..choice }
 }
 
 #[cfg(test)]

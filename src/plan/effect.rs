@@ -1,27 +1,88 @@
 //! Effects with the reasons for and against them, decided one by one.
 
 use std::collections::BTreeMap;
+use std::fmt::{self, Display, Formatter};
 
 use serde::Serialize;
+use serde::ser::{SerializeStruct as _, Serializer};
 
-use super::Knobs;
+use super::choice::Choice;
+use super::effect_id::EffectId;
+
+/// What became of an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EffectState {
+    /// The scene calls for it, or somebody has asked for it.
+    Kept,
+    /// The scene calls for it, and a rung leaves it out.
+    DroppedBy(Choice),
+    /// The scene does without.
+    NotCalledFor,
+}
+
+impl EffectState {
+    /// As reports call it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Kept => "kept",
+            Self::DroppedBy(_) => "dropped",
+            Self::NotCalledFor => "not called for",
+        }
+    }
+}
+
+impl Display for EffectState {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
 
 /// One effect, kept or not, and why.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Effect {
-    /// What it is.
-    pub name: &'static str,
-    /// `kept`, `dropped` (a knob says so) or `not called for` (the scene does).
-    pub state: &'static str,
-    /// The rung of its knob.
-    pub rung: &'static str,
-    /// One sentence.
-    pub reason: String,
-    /// What the reason rests on.
+    /// Which one.
+    pub id: EffectId,
+    /// What became of it.
+    pub state: EffectState,
+    /// The rung of the knob that decides on it, where one does.
+    pub choice: Option<Choice>,
+    /// What in the scene calls for it, or does not: one sentence, for people.
+    pub cause: String,
+    /// What that rests on.
     pub evidence: Evidence,
     /// The materials that call for it, as indices of the scene's.
-    #[serde(skip)]
     pub materials: Vec<usize>,
+}
+
+impl Effect {
+    /// Why it is kept or not: the rung that drops it, else the cause.
+    #[must_use]
+    pub fn reason(&self) -> String {
+        match self.state {
+            EffectState::DroppedBy(choice) => choice.to_string(),
+            EffectState::Kept | EffectState::NotCalledFor => self.cause.clone(),
+        }
+    }
+
+    /// The rung of its knob; empty where none decides on it.
+    #[must_use]
+    pub fn rung(&self) -> &'static str {
+        self.choice.map_or("", |choice| choice.rung)
+    }
+}
+
+impl Serialize for Effect {
+    /// As docs/plan.md has it: `name`, `state`, `rung`, `reason`, `evidence`.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut effect = serializer.serialize_struct("Effect", 5)?;
+        effect.serialize_field("name", self.id.name())?;
+        effect.serialize_field("state", self.state.name())?;
+        effect.serialize_field("rung", self.rung())?;
+        effect.serialize_field("reason", &self.reason())?;
+        effect.serialize_field("evidence", &self.evidence)?;
+        effect.end()
+    }
 }
 
 /// What a reason rests on, by name.
@@ -33,8 +94,8 @@ pub enum Demand {
     /// Nothing.
     #[default]
     Scene,
-    /// One effect, by its name.
-    With(&'static str),
+    /// One effect.
+    With(EffectId),
     /// Every effect that its knob allows.
     Full,
 }
@@ -42,10 +103,10 @@ pub enum Demand {
 impl Demand {
     /// Whether an effect is planned even if the scene does not call for it.
     #[must_use]
-    pub fn includes(self, effect: &str) -> bool {
+    pub fn includes(self, effect: EffectId) -> bool {
         match self {
             Self::Scene => false,
-            Self::With(name) => name == effect,
+            Self::With(wanted) => wanted == effect,
             Self::Full => true,
         }
     }
@@ -85,62 +146,58 @@ impl Cause {
     }
 }
 
+/// What a knob says of an effect.
+#[derive(Clone, Copy)]
+pub(super) struct Verdict {
+    choice: Choice,
+    allowed: bool,
+}
+
+impl Choice {
+    /// This rung allows an effect, or does not.
+    pub(super) fn allows(self, allowed: bool) -> Verdict {
+        Verdict { choice: self, allowed }
+    }
+}
+
 /// Decides effects in order and keeps the account.
-pub(super) struct Decisions<'a> {
-    pub(super) knobs: &'a Knobs,
+pub(super) struct Decisions {
     pub(super) demand: Demand,
     pub(super) effects: Vec<Effect>,
 }
 
-impl Decisions<'_> {
+impl Decisions {
     /// An effect that only the scene decides on.
-    pub(super) fn decide(&mut self, name: &'static str, cause: Cause) -> bool {
-        self.decide_with(name, "", true, cause)
-    }
-
-    /// An effect whose place paths take, where they do; else one that a knob allows or not, or that only the scene decides on.
-    pub(super) fn decide_without(
-        &mut self,
-        paths: bool,
-        name: &'static str,
-        (knob, allowed): (&'static str, bool),
-        cause: Cause,
-    ) -> bool {
-        let (knob, allowed) = if paths { ("indirect", false) } else { (knob, allowed) };
-        self.decide_with(name, knob, allowed, cause)
+    pub(super) fn decide(&mut self, effect: EffectId, cause: Cause) -> bool {
+        self.decide_as(effect, None, cause, self.demand)
     }
 
     /// An effect that a knob allows or not: if not, its rung is the reason.
-    pub(super) fn decide_with(&mut self, name: &'static str, knob: &'static str, allowed: bool, cause: Cause) -> bool {
-        self.decide_as(name, (knob, allowed), cause, self.demand)
+    pub(super) fn decide_with(&mut self, effect: EffectId, knob: Verdict, cause: Cause) -> bool {
+        self.decide_as(effect, Some(knob), cause, self.demand)
+    }
+
+    /// An effect that a knob may say no to, if any knob.
+    pub(super) fn decide_unless(&mut self, effect: EffectId, knob: Option<Verdict>, cause: Cause) -> bool {
+        self.decide_as(effect, knob, cause, self.demand)
     }
 
     /// The same of one that no demand includes: even where nothing calls for it, it is a picture with other roundings.
-    pub(super) fn decide_apart(&mut self, name: &'static str, by: (&'static str, bool), cause: Cause) -> bool {
-        self.decide_as(name, by, cause, Demand::Scene)
+    pub(super) fn decide_apart(&mut self, effect: EffectId, knob: Verdict, cause: Cause) -> bool {
+        self.decide_as(effect, Some(knob), cause, Demand::Scene)
     }
 
-    fn decide_as(
-        &mut self,
-        name: &'static str,
-        (knob, allowed): (&'static str, bool),
-        cause: Cause,
-        demand: Demand,
-    ) -> bool {
-        let rung = if knob.is_empty() { "" } else { self.knobs.rung(knob) };
-        let Cause { called_for, mut reason, evidence, materials } = cause;
-        let demanded = !called_for && demand.includes(name);
-        let state = match (called_for || demanded, allowed) {
-            (false, _) => "not called for",
-            (true, false) => "dropped",
-            (true, true) => "kept",
+    fn decide_as(&mut self, id: EffectId, knob: Option<Verdict>, cause: Cause, demand: Demand) -> bool {
+        let Cause { called_for, reason, evidence, materials } = cause;
+        let demanded = !called_for && demand.includes(id);
+        let state = match (called_for || demanded, knob) {
+            (false, _) => EffectState::NotCalledFor,
+            (true, Some(Verdict { choice, allowed: false })) => EffectState::DroppedBy(choice),
+            (true, _) => EffectState::Kept,
         };
-        if state == "dropped" {
-            reason = format!("{knob}={rung}");
-        } else if demanded {
-            reason = format!("asked for, although {reason}");
-        }
-        self.effects.push(Effect { name, state, rung, reason, evidence, materials });
-        state == "kept"
+        let cause = if demanded { format!("asked for, although {reason}") } else { reason };
+        let choice = knob.map(|knob| knob.choice);
+        self.effects.push(Effect { id, state, choice, cause, evidence, materials });
+        state == EffectState::Kept
     }
 }

@@ -1,7 +1,8 @@
 //! What the chosen rungs leave out of a scene.
 
-use super::surfaces::{Surfaces, casts_in_maps};
-use super::{Knobs, Transmission};
+use super::knobs::Knobs;
+use super::knobs::rungs::{Absorption, Indirect, Lobes, Quadrature, Reflection};
+use super::surfaces::{Surfaces, Transmission, casts_in_maps};
 use crate::scene::{AlphaMode, Material};
 
 /// A sentence for each thing that the chosen rungs do not show of these surfaces, and for each rung that changes nothing.
@@ -24,30 +25,29 @@ pub(super) fn left_out(
     say(&|m| clear(m) && m.roughness > 0.1, "transmits through a rough surface: shown clear");
     let casts = |m: &Material| !shadow_maps || casts_in_maps(m);
     say(&|m| !casts(m), "casts no shadow: the maps of shadows=map hold opaque and masked surfaces alone");
-    let (absorption, marches) = (knobs.rung("absorption"), by_rays && knobs.march_steps() > 0);
+    let (absorption, marches) = (knobs.absorption, by_rays && knobs.absorption.steps() > 0);
     let varies = |m: &Material| m.marched_sigma().is_some();
     let instead = format!(
-        "has a grid of sigma, of which absorption={absorption} with refraction={} takes the mean; refraction=ray with \
-         absorption=march:4 to march:64 goes through it",
-        knobs.rung("refraction")
+        "has a grid of sigma, of which {absorption} with {} takes the mean; refraction=ray with absorption=march:4 to march:64 goes \
+         through it",
+        knobs.refraction
     );
-    say(&|m| varies(m) && !marches && absorption != "off", &instead);
-    if knobs.bands() == 0 {
+    say(&|m| varies(m) && !marches && absorption != Absorption::Off, &instead);
+    if knobs.colour.bands() == 0 {
         say(
             &|m| transmission.bends && m.disperses(),
             "has dispersion, which colour=rgb does not show; colour=spectral:16 does",
         );
     }
-    let (lobes, reflection) = (knobs.rung("lobes"), knobs.rung("reflection"));
-    let by_paths = knobs.rung("indirect") == "path";
-    if lobes != "0.2" && reflection != "ray" {
-        warnings.push(format!("lobes={lobes} changes nothing: reflection={reflection} sends no rays"));
-    } else if lobes != "1" && by_paths {
-        warnings.push(format!("lobes={lobes} changes nothing: indirect=path draws from every lobe"));
+    let (lobes, reflection) = (knobs.lobes, knobs.reflection);
+    if lobes != Lobes::default() && reflection != Reflection::Ray {
+        warnings.push(format!("{lobes} changes nothing: {reflection} sends no rays"));
+    } else if lobes != Lobes::All && knobs.indirect == Indirect::Path {
+        warnings.push(format!("{lobes} changes nothing: indirect=path draws from every lobe"));
     }
-    let rule = knobs.rung("quadrature");
-    if rule != "midpoint" && !(marches && surfaces.any(varies)) {
-        warnings.push(format!("quadrature={rule} changes nothing: no medium is marched"));
+    let rule = knobs.quadrature;
+    if rule != Quadrature::default() && !(marches && surfaces.any(varies)) {
+        warnings.push(format!("{rule} changes nothing: no medium is marched"));
     }
     warnings
 }

@@ -1,9 +1,20 @@
 //! What materials in use mean for a plan.
 
-use super::Facts;
 use super::effect::Cause;
+use super::facts::Facts;
+use super::work::March;
 pub use crate::scene::layers::mirrors;
 use crate::scene::{AlphaMode, Material, Meaning, Scene};
+
+/// What lets light through, and how.
+pub(super) struct Transmission {
+    /// A knob shows it bent …
+    pub(super) bends: bool,
+    /// … by rays.
+    pub(super) by_rays: bool,
+    pub(super) see_through: bool,
+    pub(super) march: March,
+}
 
 /// Whether a surface is laid over what lies behind it, in passes of its own: blended surfaces, and transmissive ones where
 /// no rays refract in them (`refracting_rays`).

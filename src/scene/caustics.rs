@@ -91,6 +91,8 @@ struct World<'a> {
     firsts: Vec<u32>,
     /// Of each instance that emits, media that its first corner lies in.
     media: Vec<Media>,
+    /// Instances that stop light or spread it, whatever else.
+    diffuse: Vec<bool>,
     middle: DVec3,
     radius: f64,
 }
@@ -171,6 +173,10 @@ impl World<'_> {
         for _ in 0..MOST_SURFACES {
             let Some(beam) = next else { break };
             let Some(met) = line::nearest(self.bvh, beam.origin, beam.direction, 1e-6 * self.radius) else { break };
+            // Most photons end here: light that nothing has mirrored or bent is found by the search for lights.
+            if from.is_none() && self.diffuse[met.triangle.instance as usize] {
+                break;
+            }
             let at = beam.origin + beam.direction * met.t;
             let (spreads, onward) = self.meet(&met, &beam, &mut random);
             next = onward.map(|(direction, media)| Beam { origin: at, direction, media });
@@ -219,6 +225,12 @@ impl World<'_> {
     }
 }
 
+/// Whether all that an instance sends on is spread: nothing passes its surface, and no layer of it is smooth.
+fn is_diffuse(scene: &Scene, solids: &Solids, instance: usize) -> bool {
+    let material = &scene.materials[scene.meshes[scene.instances[instance].mesh].material];
+    !solids.solid[instance] && coverage(material) == Some(1.0) && !is_smooth(material)
+}
+
 /// Media that the first corner of an instance lies in, where that emits.
 fn media_of_lamp(scene: &Scene, solids: &Solids, placed: &Instance) -> Media {
     let mesh = &scene.meshes[placed.mesh];
@@ -245,6 +257,7 @@ impl Aims {
             emitters,
             firsts: scene.first_triangles(),
             media: scene.instances.iter().map(|placed| media_of_lamp(scene, solids, placed)).collect(),
+            diffuse: (0..scene.instances.len()).map(|instance| is_diffuse(scene, solids, instance)).collect(),
             middle: corner + size * 0.5,
             radius: 0.5 * size.length(),
         };

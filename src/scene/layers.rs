@@ -134,16 +134,16 @@ fn boundary_share(cos: f64, before: f64, behind: f64) -> f64 {
     ((fresnel_dielectric(cos, behind / before)[0] - f0) / (1.0 - f0).max(1e-12)).clamp(0.0, 1.0)
 }
 
-/// Of the dielectric part. F0 may be tinted (KHR_materials_specular): the exact curve is carried over as its share between F0 and
+/// Of the dielectric part, by its share between that at normal and that at grazing incidence. F0 may be tinted (KHR_materials_specular): the exact curve is carried over as its share between F0 and
 /// F90, and what tints it in air tints it between two media.
-fn fresnel_of_dielectric(m: &Material, at: &Boundary, cos: f64) -> DVec3 {
+fn fresnel_of_dielectric(m: &Material, at: &Boundary, share: f64) -> DVec3 {
     let specular = f64::from(m.specular);
     let in_air = nested_f0(1.0, at.ior);
     let to_media = if in_air > 0.0 { nested_f0(at.before, at.behind) / in_air } else { 0.0 };
     let f0 = (rgb(m.specular_color) * in_air).min(DVec3::ONE) * specular * to_media;
     // Between equal indices nothing is reflected, at no angle.
     let f90 = if at.ior == 1.0 { 0.0 } else { specular };
-    f0 + (DVec3::splat(f90) - f0) * boundary_share(cos, at.before, at.behind)
+    f0 + (DVec3::splat(f90) - f0) * share
 }
 
 /// Of the metallic part, in a medium: Schlick's curve where a colour is all that is known; else n and κ, tinted by what the
@@ -162,6 +162,9 @@ fn fresnel_of_metal(m: &Material, n_outside: f64, cos: f64) -> DVec3 {
 
 /// Of the clear coat, in a medium.
 fn fresnel_of_coat(m: &Material, n_outside: f64, cos: f64) -> f64 {
+    if m.clearcoat == 0.0 {
+        return 0.0;
+    }
     f64::from(m.clearcoat) * fresnel_dielectric(cos, f64::from(COAT_INDEX) / n_outside)[0]
 }
 
@@ -171,11 +174,13 @@ impl Layers {
     pub fn of(m: &Material, at: &Boundary, cos: f64) -> Self {
         // Coats and metals of bodies are seen as from air on both sides.
         let n_outside = if at.body { 1.0 } else { at.before };
-        let total = at.body && boundary_share(cos, at.before, at.behind) >= 1.0;
-        let f_dielectric = if total { DVec3::ONE } else { fresnel_of_dielectric(m, at, cos) };
+        let share = boundary_share(cos, at.before, at.behind);
+        let total = at.body && share >= 1.0;
+        let f_dielectric = if total { DVec3::ONE } else { fresnel_of_dielectric(m, at, share) };
         let [metallic, transmission] = [m.metallic, m.transmission].map(f64::from);
         let coat = fresnel_of_coat(m, n_outside, cos);
-        let base = f_dielectric.lerp(fresnel_of_metal(m, n_outside, cos), metallic);
+        let f_metal = if metallic > 0.0 { fresnel_of_metal(m, n_outside, cos) } else { f_dielectric };
+        let base = f_dielectric.lerp(f_metal, metallic);
         // Its largest component, so that a tinted F0 gives no complementary colour. Metal lets nothing in.
         let enters = (1.0 - f_dielectric.max_element()) * (1.0 - metallic);
         let color = base_color(m);

@@ -1,6 +1,7 @@
 //! Which equations of `shaders/lib/` a pixel is made of, by what its ray meets and the rungs that it is drawn with.
 
 use crate::plan::Knobs;
+use crate::plan::rungs::{Absorption, Brdf, Fresnel, Lights};
 use crate::scene::events::{Event, Way};
 use crate::scene::{AlphaMode, Extent, Light, LightKind, Material};
 use crate::shader::{PROBES, Probe};
@@ -8,7 +9,6 @@ use crate::spectra::Dispersion;
 
 /// Names of the equations, in the order in which light needs them, backwards: from the surface to the screen.
 fn names(events: &[Event], materials: &[Material], lights: &[Light], knobs: &Knobs) -> Vec<&'static str> {
-    let is = |knob: &str, rung: &str| knobs.rung(knob) == rung;
     let mut all = Vec::new();
     for event in events {
         match event.way {
@@ -29,7 +29,7 @@ fn names(events: &[Event], materials: &[Material], lights: &[Light], knobs: &Kno
         if met.total {
             all.push("refract");
         }
-        let exact = is("fresnel", "exact");
+        let exact = knobs.fresnel == Fresnel::Exact;
         if m.metallic < 1.0 {
             all.push(if exact { "fresnel_dielectric" } else { "schlick" });
         }
@@ -37,23 +37,23 @@ fn names(events: &[Event], materials: &[Material], lights: &[Light], knobs: &Kno
             all.push(if exact && m.conductor.is_some() { "fresnel_conductor" } else { "schlick" });
         }
         if met.spreads {
-            all.extend(match knobs.rung("brdf") {
-                "blinn-phong" => &["half_angle", "diffuse_brdf", "phong_lobe"][..],
-                "blinn-phong-reciprocal" => &["half_angle", "diffuse_brdf", "phong_lobe", "reciprocal_lobe"],
-                "ggx-multi" => {
+            all.extend(match knobs.brdf {
+                Brdf::BlinnPhong => &["half_angle", "diffuse_brdf", "phong_lobe"][..],
+                Brdf::BlinnPhongReciprocal => &["half_angle", "diffuse_brdf", "phong_lobe", "reciprocal_lobe"],
+                Brdf::GgxMulti => {
                     &["half_angle", "diffuse_brdf", "ggx_distribution", "ggx_visibility", "schlick", "ggx_compensation"]
                 }
-                _ => &["half_angle", "diffuse_brdf", "ggx_distribution", "ggx_visibility"],
+                Brdf::Ggx => &["half_angle", "diffuse_brdf", "ggx_distribution", "ggx_visibility"],
             });
         }
         let lets_through = m.transmission > 0.0 && m.alpha_mode == AlphaMode::Opaque;
-        if lets_through && m.attenuation_distance.is_finite() && !is("absorption", "off") {
+        if lets_through && m.attenuation_distance.is_finite() && knobs.absorption != Absorption::Off {
             all.push("beer_lambert");
         }
-        if lets_through && m.sigma.is_some() && knobs.march_steps() > 0 {
+        if lets_through && m.sigma.is_some() && knobs.absorption.steps() > 0 {
             all.push("quadrature_weights");
         }
-        if lets_through && knobs.bands() > 0 {
+        if lets_through && knobs.colour.bands() > 0 {
             all.extend(match m.dispersion {
                 Dispersion::Sellmeier { .. } => Some("sellmeier"),
                 Dispersion::Cauchy { .. } => Some("cauchy"),
@@ -61,7 +61,7 @@ fn names(events: &[Event], materials: &[Material], lights: &[Light], knobs: &Kno
             });
         }
     }
-    if knobs.bands() > 0 {
+    if knobs.colour.bands() > 0 {
         all.extend(["cmf_integral", "xyz_to_srgb"]);
     }
     all.push("srgb_encode");
@@ -69,7 +69,7 @@ fn names(events: &[Event], materials: &[Material], lights: &[Light], knobs: &Kno
 }
 
 fn of_light(light: &Light, knobs: &Knobs) -> Vec<&'static str> {
-    let has_shape = knobs.rung("lights") != "points";
+    let has_shape = knobs.lights != Lights::Points;
     let mut all = match light.kind {
         LightKind::Directional { .. } => vec!["arriving_light"],
         LightKind::Point { range, .. } => {

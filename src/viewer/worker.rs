@@ -11,6 +11,7 @@ use crate::gpu::{Device, Interrupted, PassTime, Replacement, is_lost};
 use crate::image::metric::{AnyPicture, Metric, compare};
 use crate::image::png::Display;
 use crate::plan::Knobs;
+use crate::plan::rungs::{Indirect, Reflection, Refraction};
 use crate::scene::events::{Limits, Tracer};
 
 /// Milliseconds that a picture may take while the view moves: it gets smaller until it does.
@@ -48,8 +49,7 @@ impl Side {
 
     /// How much of its picture is drawn.
     fn progress(&self) -> f64 {
-        let samples = self.drawing.as_ref().map_or(0, Drawing::samples);
-        f64::from(samples) / f64::from(self.renderer.plan.samples.max(1))
+        self.drawing.as_ref().map_or(0.0, |drawing| f64::from(drawing.samples()) / f64::from(drawing.of().max(1)))
     }
 }
 
@@ -179,21 +179,18 @@ impl Worker {
         for (index, side) in stage.sides.iter_mut().enumerate() {
             let Settings { size, tonemap, exposure, .. } = wanted.settings;
             let size = if wanted.moving { smaller(size, ns) } else { size };
-            let all = side.settings.knobs.samples();
+            let all = side.settings.knobs.samples.count();
             let samples = if wanted.moving { 1 } else { all };
             let same_display = (side.settings.tonemap, side.settings.exposure) == (tonemap, exposure);
             (side.settings.tonemap, side.settings.exposure) = (tonemap, exposure);
             side.renderer.develop(tonemap, exposure);
             if side.settings.size != size {
                 side.drawing = None;
-                // There is room for the sum of all samples, however many are drawn.
-                side.renderer.plan.samples = all;
                 side.renderer.resize(size)?;
                 side.settings.size = size;
             }
-            if !same_view || side.drawing.is_none() || side.renderer.plan.samples != samples {
-                side.renderer.plan.samples = samples;
-                side.drawing = Some(side.renderer.begin(camera));
+            if !same_view || side.drawing.as_ref().is_none_or(|drawing| drawing.of() != samples) {
+                side.drawing = Some(side.renderer.begin(camera, samples));
                 side.spent = Duration::ZERO;
             } else if !same_display && side.drawing.as_ref().is_some_and(Drawing::is_whole) {
                 developed.push(index);
@@ -324,10 +321,10 @@ impl Worker {
 
     fn tell_plan(&self, index: usize) {
         let Some(side) = self.stage.as_ref().and_then(|stage| stage.sides.get(index)) else { return };
-        let warnings = [side.renderer.plan.warnings.clone(), side.renderer.warnings.clone()].concat();
+        let warnings = [side.renderer.plan().warnings.clone(), side.renderer.warnings.clone()].concat();
         self.say(|seen| {
             (seen.sides[index].effects, seen.sides[index].warnings) =
-                (side.renderer.plan.effects.clone().into(), warnings.into());
+                (side.renderer.plan().effects.clone().into(), warnings.into());
         });
     }
 
@@ -372,7 +369,7 @@ impl Worker {
             version: self.version,
             rgba: Arc::new(rendered.display),
             size: side.settings.size,
-            samples: [rendered.samples, side.renderer.plan.samples],
+            samples: [rendered.samples, drawing.of()],
             moving: wanted.moving,
             time: wanted.time,
             knobs: side.settings.knobs.clone(),
@@ -495,12 +492,12 @@ impl Worker {
 
 /// How far the rays of a picture with these rungs go.
 fn limits_of(knobs: &Knobs) -> Limits {
-    let rays = ["reflection", "refraction"].iter().any(|knob| knobs.rung(knob) == "ray");
-    let paths = knobs.rung("indirect") == "path";
+    let rays = knobs.reflection == Reflection::Ray || knobs.refraction == Refraction::Ray;
+    let paths = knobs.indirect == Indirect::Path;
     Limits {
-        surfaces: if rays || paths { knobs.interfaces() } else { 1 },
+        surfaces: if rays || paths { knobs.interfaces.count() } else { 1 },
         stand_ins: !paths,
-        roughest: knobs.roughest_lobe(),
+        roughest: knobs.lobes.roughest(),
         least_share: LEAST_SHARE,
     }
 }

@@ -7,6 +7,7 @@ use std::f64::consts::{PI, TAU};
 
 use etalon::frame::Settings;
 use etalon::image::Picture;
+use etalon::plan::rungs::Brdf;
 use etalon::plan::{Knobs, Model};
 use etalon::scene::{Camera, Instance, Material, Mesh, Projection, Scene};
 use glam::{DAffine3, DVec2, DVec3};
@@ -124,13 +125,13 @@ pub fn reflectances(cos_v: f64, alpha: f64) -> [f64; 2] {
 
 /// The rungs that choose a formula.
 #[derive(Debug, Clone, Copy)]
-pub struct Rungs<'a> {
-    pub brdf: &'a str,
+pub struct Rungs {
+    pub brdf: Brdf,
     pub exact: bool,
 }
 
 /// BRDF times cosθ_l of a rough surface without what it transmits.
-pub fn reflected(m: &Material, rungs: Rungs<'_>, n: DVec3, l: DVec3, v: DVec3) -> DVec3 {
+pub fn reflected(m: &Material, rungs: Rungs, n: DVec3, l: DVec3, v: DVec3) -> DVec3 {
     let (cos_l, h) = (n.dot(l), (l + v).normalize());
     let metallic = f64::from(m.metallic);
     let diffuse = base(m) * (1.0 - metallic) / PI;
@@ -146,14 +147,14 @@ pub fn reflected(m: &Material, rungs: Rungs<'_>, n: DVec3, l: DVec3, v: DVec3) -
         let power = n.dot(h).max(0.0).powf(shine);
         result = match rungs.brdf {
             // B5 knows no cosine beside the lobe; the quarter is |L + V|² of B6 at normal incidence.
-            "blinn-phong" => diffuse * cos_l + k_s * power / 4.0,
+            Brdf::BlinnPhong => diffuse * cos_l + k_s * power / 4.0,
             // The bound of B6, k_d π + k_s 2π/(shine + 2) ≤ 1: the ground has what F0 leaves.
-            "blinn-phong-reciprocal" => {
+            Brdf::BlinnPhongReciprocal => {
                 let ground = diffuse * (1.0 - dielectric(m, false, 1.0).max_element());
                 (ground + k_s * power / (l + v).length_squared()) * cos_l
             }
-            "ggx" => (diffuse * (1.0 - f_dielectric.max_element()) + f * ggx(n, l, v, a)) * cos_l,
-            _ => {
+            Brdf::Ggx => (diffuse * (1.0 - f_dielectric.max_element()) + f * ggx(n, l, v, a)) * cos_l,
+            Brdf::GgxMulti => {
                 let [whole, grazing] = reflectances(n.dot(v), a);
                 let compensation = DVec3::ONE + f0 * (1.0 / whole - 1.0);
                 // What the whole lobe leaves goes below it.

@@ -29,6 +29,16 @@ pub struct Lobe {
 /// All of them, in the order of `LOBE_…` in shaders/lib/.
 pub static LOBES: [&Lobe; COUNT] = [&sheen::SHEEN];
 
+// The table of directional reflectance has room for one (src/pass/environment.rs).
+const _: () = {
+    let (mut place, mut with_albedo) = (0, 0);
+    while place < COUNT {
+        with_albedo += LOBES[place].albedo.is_some() as u32;
+        place += 1;
+    }
+    assert!(with_albedo <= 1, "a second lobe with an albedo needs a table of its own");
+};
+
 /// How many there are.
 pub const COUNT: usize = 1;
 

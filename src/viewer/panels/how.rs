@@ -4,7 +4,7 @@ use egui::{RichText, Ui};
 
 use super::{State, go_to};
 use crate::image::tone::ToneMap;
-use crate::plan::{Effect, KNOBS, Knobs, Model};
+use crate::plan::{Effect, EffectId, EffectState, KNOBS, Knobs, Model};
 use crate::viewer::layer::LAYERS;
 use crate::viewer::shared::Seen;
 
@@ -16,9 +16,9 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
         ui.add(egui::Slider::new(&mut state.settings.exposure, -10.0..=10.0).suffix(" EV"));
         ui.end_row();
         ui.label("tone curve");
-        egui::ComboBox::from_id_salt("tone").selected_text(tone_name(state.settings.tonemap)).show_ui(ui, |ui| {
-            for curve in TONES {
-                ui.selectable_value(&mut state.settings.tonemap, curve, tone_name(curve));
+        egui::ComboBox::from_id_salt("tone").selected_text(state.settings.tonemap.name()).show_ui(ui, |ui| {
+            for &curve in ToneMap::ALL {
+                ui.selectable_value(&mut state.settings.tonemap, curve, curve.name());
             }
         });
         ui.end_row();
@@ -66,7 +66,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
             let about = reason
                 .map_or_else(|| knob.about.to_owned(), |reason| format!("{}; not called for: {reason}", knob.about));
             ui.label(label).on_hover_text(about);
-            let now = state.knobs().rung(knob.name);
+            let now = knob.rung(state.knobs());
             egui::ComboBox::from_id_salt(knob.name).width(96.0).selected_text(now).show_ui(ui, |ui| {
                 for rung in knob.rungs {
                     let changed = state.knobs().with(knob.name, rung);
@@ -132,11 +132,11 @@ fn sides(ui: &mut Ui, state: &mut State) {
 }
 
 /// Why none of the effects that a knob shapes is planned; `None` where one is, or it shapes every surface.
-fn called_for(known: &[Effect], effects: &[&str]) -> Option<String> {
-    let found = |name: &&str| known.iter().find(|effect| effect.name == *name);
+fn called_for(known: &[Effect], effects: &[EffectId]) -> Option<String> {
+    let found = |id: &EffectId| known.iter().find(|effect| effect.id == *id);
     let all: Vec<_> = effects.iter().filter_map(found).collect();
-    let none = !all.is_empty() && all.iter().all(|effect| effect.state == "not called for");
-    none.then(|| all[0].reason.clone())
+    let none = !all.is_empty() && all.iter().all(|effect| effect.state == EffectState::NotCalledFor);
+    none.then(|| all[0].reason())
 }
 
 /// What a rung was measured to cost and to be wrong by, from `local` or the reference's rungs.
@@ -146,10 +146,4 @@ fn price(seen: &Seen, knob: &str, rung: &str) -> String {
     found.map_or_else(String::new, |price| {
         format!("  {:+.1} ms, FLIP {:.3}", price.gpu_ms_delta.median, price.flip_between)
     })
-}
-
-const TONES: [ToneMap; 5] = [ToneMap::Linear, ToneMap::Reinhard, ToneMap::Aces, ToneMap::Agx, ToneMap::KhronosNeutral];
-
-fn tone_name(curve: ToneMap) -> String {
-    clap::ValueEnum::to_possible_value(&curve).map_or_else(String::new, |value| value.get_name().to_owned())
 }

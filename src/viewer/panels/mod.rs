@@ -167,7 +167,7 @@ impl State {
     fn turn_knob(&mut self, forth: bool) {
         let at = *self.knob.get_or_insert(0);
         let knob = &KNOBS[at];
-        let now = knob.rungs.iter().position(|rung| *rung == self.knobs().rung(knob.name)).unwrap_or_default();
+        let now = knob.place(self.knobs());
         let count = knob.rungs.len();
         let steps = (1..count).map(|step| if forth { (now + step) % count } else { (now + count - step) % count });
         let turned = steps.filter_map(|rung| self.knobs().with(knob.name, knob.rungs[rung])).next();
@@ -179,7 +179,7 @@ impl State {
 
     fn tell_knob(&mut self) {
         let Some(knob) = self.knob.map(|at| &KNOBS[at]) else { return };
-        self.message = Some(format!("{}={}: {}", knob.name, self.knobs().rung(knob.name), knob.about));
+        self.message = Some(format!("{}={}: {}", knob.name, knob.rung(self.knobs()), knob.about));
     }
 
     /// Whether a file is being chosen: keys are words then.

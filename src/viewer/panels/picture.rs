@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3};
 
 use super::State;
 use super::pixel::{colour, incidence};
+use crate::plan::KNOBS;
 use crate::scene::events::Way;
 use crate::scene::{Camera, Projection};
 use crate::viewer::layer::Layer;
@@ -126,9 +127,8 @@ fn wipe(ui: &mut Ui, rect: Rect, state: &mut State, seen: &Seen) {
 fn account(side: usize, seen: &Seen) -> Option<String> {
     let shown = seen.sides[side].shown.as_ref()?;
     let other = seen.sides[1 - side].shown.as_ref().map_or(&shown.knobs, |other| &other.knobs);
-    let rungs = shown.knobs.list();
-    let differs = rungs.iter().filter(|(name, rung)| other.rung(name) != *rung);
-    let own: Vec<String> = differs.map(|(name, rung)| format!("{name}={rung}")).collect();
+    let differs = KNOBS.iter().filter(|knob| knob.place(&shown.knobs) != knob.place(other));
+    let own: Vec<String> = differs.map(|knob| format!("{}={}", knob.name, knob.rung(&shown.knobs))).collect();
     // All that differs would cover the picture.
     let few = if own.len() > 3 { format!("{} and {} more", own[..3].join(" "), own.len() - 3) } else { own.join(" ") };
     let [done, of] = shown.samples;
@@ -140,7 +140,7 @@ fn account(side: usize, seen: &Seen) -> Option<String> {
     let table = seen.facts.as_ref().and_then(|facts| facts.prices.as_ref());
     let known = table.and_then(|table| {
         let is_this = |point: &&crate::cost::table::Point| {
-            rungs.iter().all(|(name, rung)| point.knobs.get(*name).is_some_and(|known| known == rung))
+            shown.knobs.list().iter().all(|(name, rung)| point.knobs.get(*name).is_some_and(|known| known == rung))
         };
         table.points.iter().find(is_this)
     });

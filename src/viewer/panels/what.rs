@@ -4,6 +4,7 @@ use egui::{Color32, Sense, Ui};
 
 use super::{HISTORY, State, pixel};
 use crate::gpu::PassTime;
+use crate::plan::EffectState;
 use crate::viewer::shared::Seen;
 
 /// Colours of passes, told apart by those who see few of them (Okabe and Ito 2008).
@@ -30,13 +31,13 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
     let side = &seen.sides[state.side];
     for effect in side.effects.iter() {
         let color = match effect.state {
-            "kept" => ui.visuals().strong_text_color(),
-            "dropped" => ui.visuals().warn_fg_color,
-            _ => ui.visuals().weak_text_color(),
+            EffectState::Kept => ui.visuals().strong_text_color(),
+            EffectState::DroppedBy(_) => ui.visuals().warn_fg_color,
+            EffectState::NotCalledFor => ui.visuals().weak_text_color(),
         };
-        ui.colored_label(color, format!("{}: {}", effect.name, effect.state)).on_hover_text(&effect.reason);
-        if effect.state != "not called for" {
-            ui.weak(format!("    {}", effect.reason));
+        ui.colored_label(color, format!("{}: {}", effect.id, effect.state)).on_hover_text(effect.reason());
+        if effect.state != EffectState::NotCalledFor {
+            ui.weak(format!("    {}", effect.reason()));
         }
     }
     let read = seen.facts.iter().flat_map(|facts| &facts.warnings);

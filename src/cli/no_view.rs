@@ -1,0 +1,24 @@
+//! `etalon view` of a build without the feature `window`.
+
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+use clap::Args;
+
+/// Open a window that shows the scene (not in this build)
+#[derive(Debug, Clone, Args)]
+pub struct ViewArgs {
+    #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<String>,
+}
+
+/// Says how to get a build that has it.
+///
+/// # Errors
+/// Always.
+pub fn run(args: &ViewArgs) -> Result<ExitCode> {
+    let arguments = args.arguments.join(" ");
+    bail!(
+        "view {arguments}: this build has no window; `./x run view {arguments}` makes one that has (cargo: feature `window`)"
+    )
+}

@@ -1,0 +1,36 @@
+//! What makes a window something that Vulkan can show pictures on.
+
+use std::ffi::c_char;
+
+use anyhow::{Context as _, Result};
+use ash::khr;
+use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
+
+use super::surface::Surface;
+
+/// What pictures can be shown on.
+pub trait Windowed: HasDisplayHandle + HasWindowHandle + Send + Sync {}
+impl<W: HasDisplayHandle + HasWindowHandle + Send + Sync> Windowed for W {}
+
+/// Extensions of the instance that a window takes.
+pub(super) fn extensions(window: &dyn Windowed) -> Result<&'static [*const c_char]> {
+    let display = window.display_handle().context("asking the window for its display")?;
+    ash_window::enumerate_required_extensions(display.as_raw()).context("asking what this display takes")
+}
+
+impl Surface {
+    pub(super) fn new(entry: &ash::Entry, instance: &ash::Instance, window: &dyn Windowed) -> Result<Self> {
+        let making = || "making a Vulkan surface of the window";
+        let display = window.display_handle().with_context(making)?;
+        let handle = window.window_handle().with_context(making)?;
+        // SAFETY: both handles are alive while `window` is borrowed; the presenter keeps it longer than the surface.
+        let raw = unsafe { ash_window::create_surface(entry, instance, display.as_raw(), handle.as_raw(), None) }
+            .with_context(making)?;
+        Ok(Self { calls: khr::surface::Instance::new(entry, instance), raw })
+    }
+
+    pub(super) fn destroy(&self) {
+        // SAFETY: the swapchain on it is gone.
+        unsafe { self.calls.destroy_surface(self.raw, None) };
+    }
+}

@@ -1,0 +1,457 @@
+//! How a plan is made: effect by effect, each with its cause.
+
+use super::effect::{Cause, Decisions, Demand, Verdict};
+use super::effect_id::EffectId;
+use super::facts::{Facts, Surroundings};
+use super::knobs::Knobs;
+use super::knobs::rungs::{self, Absorption, Brdf, Guiding, Indirect, Reflection, Refraction, Shadows};
+use super::left_out::left_out;
+use super::surfaces::{
+    self, Surfaces, Transmission, by_wavelength, has_layers, is_see_through, mirrors, refracts, scatters,
+};
+use super::work::{Attenuation, March, Paths, Plan, Rays, Screen, Stored};
+use crate::scene::layers::{SMOOTHEST, is_smooth};
+use crate::scene::lobe::LOBES;
+use crate::scene::{AlphaMode, Light, LightKind, Material, Scene};
+
+/// Perceptual roughness up to which surfaces are mirrored on the screen.
+const ROUGHEST_ON_SCREEN: f32 = 0.2;
+
+/// From this many point and spot lights on, tiles list them (docs/decisions/light-lists.md).
+const TILES_FROM: u32 = 16;
+
+/// What all parts of a plan are decided from.
+struct Planner<'a> {
+    scene: &'a Scene,
+    facts: &'a Facts,
+    surfaces: Surfaces<'a>,
+    knobs: &'a Knobs,
+    surroundings: Surroundings,
+    decisions: Decisions,
+    /// Paths take the place of what else lights surfaces.
+    paths: bool,
+}
+
+impl Plan {
+    /// Decides from values, not names. `scene` is in normal form, and `facts` are of it.
+    #[must_use]
+    pub fn new(scene: &Scene, facts: &Facts, surroundings: Surroundings, knobs: &Knobs) -> Self {
+        let surfaces = Surfaces::of(scene, facts);
+        let decisions = Decisions { demand: surroundings.demand, effects: Vec::new() };
+        let paths = knobs.indirect == Indirect::Path;
+        let mut planner = Planner { scene, facts, surfaces, knobs, surroundings, decisions, paths };
+        let layers = planner.layers();
+        let transmission = planner.transmission();
+        let images = planner.mirror_images(&transmission);
+        let paths = planner.paths();
+        let lights = planner.lights(paths);
+        let rays = planner.rays(&transmission, &images, &lights);
+        let (bands, disperses) = planner.wavelengths(&transmission);
+        let shadow_maps = lights.shadows && knobs.shadows == Shadows::Map && paths.is_none();
+        let stored = if paths.is_some() { Stored::default() } else { Stored::of(knobs) };
+        let Planner { surfaces, decisions, .. } = planner;
+        Self {
+            emissive: layers.emissive,
+            layers: layers.layers,
+            clearcoat: layers.clearcoat,
+            conductors: layers.conductors,
+            lobes: layers.lobes,
+            demand: surroundings.demand,
+            environment: images.environment,
+            reflection: images.mirrored,
+            prefilter: images.prefilter,
+            ambient: images.ambient,
+            sky: surroundings.sky,
+            see_through: transmission.see_through,
+            directional_lights: lights.directional,
+            local_lights: lights.local,
+            tiles: lights.tiles,
+            reflectance: images.mirrored
+                || images.ambient
+                || images.screen != Screen::default()
+                || (surroundings.demand == Demand::Full && paths.is_none())
+                || knobs.brdf == Brdf::GgxMulti
+                || layers.lobes != 0,
+            shadow_maps,
+            lights: lights.kept,
+            rays,
+            paths,
+            screen: images.screen,
+            roughest_mirror: images.roughest,
+            bands,
+            disperses,
+            stored,
+            samples: knobs.samples.count(),
+            effects: decisions.effects,
+            unread: scene.unread.clone(),
+            warnings: left_out(&surfaces, knobs, &transmission, shadow_maps),
+        }
+    }
+}
+
+struct Layers {
+    emissive: bool,
+    clearcoat: bool,
+    layers: bool,
+    conductors: bool,
+    lobes: u32,
+}
+
+struct MirrorImages {
+    environment: bool,
+    mirrored: bool,
+    prefilter: bool,
+    ambient: bool,
+    roughest: f32,
+    by_rays: bool,
+    screen: Screen,
+}
+
+struct Lights {
+    kept: Vec<bool>,
+    directional: u32,
+    local: u32,
+    shadows: bool,
+    tiles: bool,
+}
+
+impl Planner<'_> {
+    fn layers(&mut self) -> Layers {
+        let Self { surfaces, decisions, .. } = self;
+        let emits = |m: &Material| m.emissive_texture.is_some() && m.emissive != [0.0; 3];
+        let cause = surfaces.cause(emits, |_| "has an emissive texture".to_owned());
+        let emissive = decisions.decide(EffectId::EmissiveTextures, cause);
+        let cause = surfaces.cause(|m| m.clearcoat > 0.0, |m| format!("has clearcoat {}", m.clearcoat));
+        let clearcoat = decisions.decide(EffectId::ClearCoat, cause);
+        let cause =
+            surfaces.cause(|m| has_layers(m) || m.clearcoat > 0.0, |_| "has a coat or layer textures".to_owned());
+        let layers = decisions.decide(EffectId::Layers, cause);
+        let cause =
+            surfaces.cause(|m| m.conductor.is_some() && m.metallic > 0.0, |_| "is a metal with n and kappa".to_owned());
+        let conductors = decisions.decide(EffectId::Conductors, cause);
+        let mut lobes = 0;
+        for (place, lobe) in LOBES.iter().enumerate() {
+            let is_on = |m: &Material| !m.unlit && lobe.is_on(&m.lobes[place]);
+            let cause = surfaces.cause(is_on, |m| lobe.says(&m.lobes[place]));
+            lobes |= u32::from(decisions.decide(EffectId::Lobe(place), cause)) << place;
+        }
+        // A coat's numbers lie in the layers.
+        Layers { emissive, clearcoat, layers: layers || clearcoat, conductors, lobes }
+    }
+
+    fn transmission(&mut self) -> Transmission {
+        let Self { facts, surfaces, decisions, knobs, surroundings, paths, .. } = self;
+        let rung = knobs.refraction;
+        let cause = surfaces.cause(refracts, |m| surfaces.body(m));
+        let cause = if cause.called_for { cause.with("bodies in each other at most", facts.nesting) } else { cause };
+        let bends = decisions.decide_with(EffectId::Refraction, rung.choice().allows(rung != Refraction::Off), cause);
+        let by_rays = bends && rung == Refraction::Ray;
+        let cause = surfaces.cause(
+            |m| is_see_through(m, by_rays),
+            |m| match m.alpha_mode {
+                AlphaMode::Blend => format!("is alpha-blended, {} opaque at most", m.base_color[3]),
+                _ => format!("has transmission {}", m.transmission),
+            },
+        );
+        let see_through = decisions.decide_unless(EffectId::SeeThrough, by_paths(*paths), cause);
+        let size =
+            |m: &Material| m.sigma.as_ref().map_or([0; 3], |grid| grid.size()).map(|n| n.to_string()).join(" x ");
+        let cause =
+            surfaces.cause(|m| m.marched_sigma().is_some(), |m| format!("has a grid of {} values of sigma", size(m)));
+        let grid = surfaces.find(|m| m.marched_sigma().is_some()).map(size);
+        let cause = cause.with_some("grid", grid.as_slice());
+        // Without rays that refract all that is transparent is a sheet.
+        let by_knob = match rung == Refraction::Ray {
+            true => knobs.absorption.choice().allows(knobs.absorption.steps() > 0),
+            false => rung.choice().allows(false),
+        };
+        let marched = decisions.decide_with(EffectId::VaryingMedia, by_knob, cause) && by_rays;
+        let steps = if marched { knobs.absorption.steps() } else { 0 };
+        let cause = Cause::when(marched, format!("{steps} steps of each segment"), "no medium is marched");
+        decisions.decide_with(EffectId::Quadrature, knobs.quadrature.choice().allows(true), cause);
+        let colours = surroundings.demand == Demand::Full
+            || surfaces.any(|m| m.marched_sigma().is_some_and(|grid| grid.channels() > 1));
+        let march = March { steps, rule: knobs.quadrature, colours: marched && colours };
+        Transmission { bends, by_rays, see_through, march: if marched { march } else { March::default() } }
+    }
+
+    fn mirror_images(&mut self, transmission: &Transmission) -> MirrorImages {
+        let Self { surfaces, decisions, knobs, surroundings, .. } = self;
+        let paths = self.paths;
+        let there_is = surroundings.environment;
+        let cause = Cause::when(there_is, "there is an environment", "there is no environment");
+        let environment = decisions.decide(EffectId::Environment, cause);
+        let shown = |called_for: bool, against: &str| match there_is {
+            true => Cause::when(called_for, "there is an environment", against),
+            false => Cause::against("there is no environment"),
+        };
+        let rung = knobs.reflection;
+        let shiny = surfaces.any(|m| !m.unlit && (mirrors(m) || m.clearcoat > 0.0));
+        let cause = shown(shiny, "no material in use mirrors anything");
+        let reflection = decisions.decide_with(
+            EffectId::MirroredEnvironment,
+            unless_paths(paths, rung.choice().allows(rung != Reflection::Off)),
+            cause,
+        );
+        let cause = match (reflection, there_is) {
+            (false, _) => Cause::against("no environment is mirrored"),
+            (_, false) => Cause::against("there is no environment"),
+            _ => {
+                Cause::when(!surroundings.constant, "the environment varies", "the environment is the same everywhere")
+            }
+        };
+        let prefilter = decisions.decide(EffectId::PrefilteredEnvironment, cause) && reflection;
+        // A texture only lowers the factor.
+        let roughest = if rung == Reflection::Ray { knobs.lobes.roughest() } else { ROUGHEST_ON_SCREEN };
+        let smooth = |m: &Material| surfaces::is_smooth(m, roughest);
+        let cause = surfaces.cause(smooth, |m| match (mirrors(m) && m.roughness <= roughest, m.clearcoat > 0.0) {
+            (true, _) => format!("has roughness {}", m.roughness),
+            (false, true) => format!("has a coat of roughness {}", m.clearcoat_roughness),
+            (false, false) => "has a roughness texture".to_owned(),
+        });
+        let by_rung = rung.choice().allows(matches!(rung, Reflection::Screen | Reflection::Ray));
+        let mirrored = decisions.decide_with(EffectId::Mirrors, unless_paths(paths, by_rung), cause);
+        let by_rays = mirrored && rung == Reflection::Ray;
+        let demanded = surroundings.demand.includes(EffectId::Mirrors);
+        let on_screen = |see_through: bool| {
+            let found = surfaces.any(|m| smooth(m) && is_see_through(m, transmission.by_rays) == see_through);
+            mirrored && !by_rays && (found || demanded)
+        };
+        let screen = Screen {
+            mirrors: on_screen(false),
+            see_through_mirrors: on_screen(true) && transmission.see_through,
+            refraction: transmission.bends && !transmission.by_rays,
+        };
+        let cause = shown(surfaces.any(scatters), "no material in use scatters light");
+        let by_rung = knobs.indirect.choice().allows(knobs.indirect != Indirect::Off);
+        let ambient = decisions.decide_with(EffectId::AmbientLight, unless_paths(paths, by_rung), cause);
+        let environment = environment || reflection || ambient;
+        MirrorImages { environment, mirrored: reflection, prefilter, ambient, roughest, by_rays, screen }
+    }
+
+    fn lights(&mut self, followed: Option<Paths>) -> Lights {
+        let Self { scene, surfaces, decisions, knobs, surroundings, paths, .. } = self;
+        let lit = surfaces.any(|m| !m.unlit);
+        let bounds = scene.bounds();
+        let reaches = |light: &Light| bounds.is_none_or(|bounds| light.reaches(&bounds));
+        // The surfaces that it stands for light the scene themselves.
+        let replaced = |light: &Light| light.stand_in && followed.is_some_and(|paths| paths.emitting);
+        let useful = |light: &Light| light.shines() && reaches(light) && !replaced(light);
+        let useful_lights = scene.lights.iter().filter(|light| useful(light)).count();
+        // Dark ones stand for those that are asked for and not there. Beside others they would take room in shadow maps.
+        let demanded = needs_lights(surroundings.demand);
+        let stand_in = demanded && useful_lights == 0;
+        // Of those, the first two.
+        let free: Vec<&Light> = scene.lights.iter().filter(|light| stand_in && !replaced(light)).take(2).collect();
+        let keeps =
+            |light: &Light| free.iter().any(|kept| std::ptr::eq(*kept, light)) || (useful(light) && (lit || demanded));
+        let kept: Vec<bool> = scene.lights.iter().map(keeps).collect();
+        let count = |test: &dyn Fn(&LightKind) -> bool| {
+            scene.lights.iter().zip(&kept).filter(|(light, kept)| **kept && test(&light.kind)).count() as u32
+        };
+        let directional = count(&|kind| matches!(kind, LightKind::Directional { .. }));
+        let local = count(&|kind| !matches!(kind, LightKind::Directional { .. }));
+        let ranged = count(&|kind| {
+            matches!(kind, LightKind::Point { range: Some(_), .. } | LightKind::Spot { range: Some(_), .. })
+        });
+        let dark = scene.lights.iter().filter(|light| !light.shines()).count();
+        let stand_ins = scene.lights.iter().filter(|light| light.shines() && replaced(light)).count();
+        let cause = match (scene.lights.is_empty(), useful_lights > 0, lit) {
+            (true, ..) => Cause::against("the scene has no lights"),
+            (_, false, _) if stand_ins > 0 => {
+                Cause::against("surfaces light in place of the lights that stand for them")
+            }
+            (_, false, _) if dark == scene.lights.len() => Cause::against("all lights of the scene are dark"),
+            (_, false, _) => Cause::against("no light of the scene reaches anything"),
+            (.., false) => Cause::against("all materials in use are unlit"),
+            _ => Cause::of(format!("{directional} directional, {local} point and spot lights")),
+        };
+        let counts = |cause: Cause| match scene.lights.is_empty() {
+            true => cause,
+            false => cause
+                .with("directional", directional)
+                .with("local", local)
+                .with("with a range", ranged)
+                .with("dark", dark)
+                .with("out of range", scene.lights.len() - dark - stand_ins - useful_lights),
+        };
+        decisions.decide(EffectId::PunctualLights, counts(cause.clone()));
+        let shadows = decisions.decide_with(
+            EffectId::Shadows,
+            knobs.shadows.choice().allows(knobs.shadows != Shadows::Off),
+            counts(cause),
+        );
+        let cause = match (local >= TILES_FROM, ranged > 0) {
+            (false, _) => Cause::against("few point and spot lights"),
+            (_, false) => Cause::against("no light has a range"),
+            _ => counts(Cause::of(format!("{ranged} of {local} point and spot lights have a range"))),
+        };
+        let tiles = decisions.decide_unless(EffectId::LightLists, by_paths(*paths), cause);
+        Lights { kept, directional, local, shadows, tiles }
+    }
+
+    /// Light from surface to surface.
+    fn paths(&mut self) -> Option<Paths> {
+        let Self { scene, surfaces, decisions, knobs, surroundings, paths, .. } = self;
+        let cause = match surfaces.any(|m| !m.unlit) {
+            true => Cause::of("light goes from surface to surface"),
+            false => Cause::when(*paths, "the knob says so", "no surface in use sends light"),
+        };
+        let kept = decisions.decide_with(EffectId::Paths, knobs.indirect.choice().allows(*paths), cause);
+        let sends_light = |m: &Material| match m.unlit {
+            true => m.base_color[..3] != [0.0; 3],
+            false => m.emissive != [0.0; 3],
+        };
+        let cause = match kept {
+            true => surfaces.cause(sends_light, |m| if m.unlit { "is shown as it is" } else { "emits" }.to_owned()),
+            false => Cause::against("no paths are followed"),
+        };
+        let by_lights = knobs.lights.choice().allows(knobs.lights != rungs::Lights::Points);
+        let emitting = decisions.decide_with(EffectId::EmittingSurfaces, by_lights, cause);
+        let shaped = scene.lights.iter().find(|light| light.shines() && light.extent.is_some());
+        let cause = match (kept, shaped) {
+            (false, _) => Cause::against("no paths are followed"),
+            (_, None) => Cause::against("no light has a shape"),
+            (_, Some(light)) => Cause::of(format!("light \"{}\" has a shape", light.name)),
+        };
+        let shaped = decisions.decide_with(EffectId::ShapedLights, by_lights, cause);
+        let smooth = surfaces.cause(is_smooth, |m| {
+            let does = if m.transmission > 0.0 { "bends" } else { "mirrors" };
+            format!("{does} light without spreading it")
+        });
+        let around = surroundings.environment && !surroundings.constant;
+        let cause = match (kept, emitting || around) {
+            (false, _) => Cause::against("no paths are followed"),
+            (_, false) => Cause::against("paths meet no light by chance"),
+            _ => smooth,
+        };
+        let aimed =
+            decisions.decide_with(EffectId::Aims, knobs.guiding.choice().allows(knobs.guiding != Guiding::Off), cause);
+        paths.then_some(Paths { emitting, shaped, aimed, at_once: false })
+    }
+
+    /// Bands of wavelengths, and whether rays split by them.
+    fn wavelengths(&mut self, transmission: &Transmission) -> (u32, bool) {
+        let Self { scene, surfaces, decisions, knobs, surroundings, .. } = self;
+        let bands = knobs.colour.bands();
+        let differ = |rgb: &[f32]| rgb[0] != rgb[1] || rgb[1] != rgb[2];
+        let light =
+            scene.lights.iter().find(|light| light.shines() && (light.spectrum.is_some() || differ(&light.color)));
+        let cause = surfaces.cause(by_wavelength, |m| {
+            match (&m.reflectance, &m.emission, &m.conductor) {
+                (Some(_), ..) => "has a reflectance by wavelength",
+                (_, Some(_), _) => "has a spectrum of its own",
+                (.., Some(_)) => "is a metal with n and kappa",
+                _ if m.dispersion.disperses(f64::from(m.ior)) => "has dispersion",
+                _ => "is coloured",
+            }
+            .to_owned()
+        });
+        let cause = match (cause.called_for, light, surroundings.environment && !surroundings.grey) {
+            (true, ..) => cause,
+            _ if surfaces.with_colours().is_some() => Cause::of("vertices are coloured"),
+            (_, Some(light), _) => Cause::of(format!("light \"{}\" is coloured", light.name)),
+            (.., true) => Cause::of("the environment is coloured"),
+            _ => Cause::against("everything is grey: all wavelengths make the same picture"),
+        };
+        let by_colour = knobs.colour.choice().allows(bands > 0);
+        let spectral = decisions.decide_apart(EffectId::Wavelengths, by_colour, cause);
+        let cause = match transmission.bends {
+            true => surfaces.cause(Material::disperses, |m| {
+                let n = |nm| m.dispersion.index(f64::from(m.ior), nm);
+                format!("has n {:.4} at 450 nm and {:.4} at 650 nm", n(450.0), n(650.0))
+            }),
+            false => Cause::against("nothing is bent"),
+        };
+        let disperses = decisions.decide_apart(EffectId::Dispersion, by_colour, cause);
+        (if spectral { bands } else { 0 }, disperses && spectral)
+    }
+
+    /// What sends rays, and the code for what they may meet.
+    fn rays(&mut self, transmission: &Transmission, images: &MirrorImages, lights: &Lights) -> Option<Rays> {
+        let Self { surfaces, decisions, knobs, surroundings, paths, .. } = self;
+        let shadows = lights.shadows && knobs.shadows == Shadows::Ray;
+        let (refraction, mirrors) = (transmission.by_rays, images.by_rays);
+        if !(shadows || mirrors || refraction || *paths) {
+            return None;
+        }
+        let holes = |m: &Material| matches!(m.alpha_mode, AlphaMode::Mask(_));
+        let masked = decisions.decide(EffectId::Holes, surfaces.cause(holes, |_| "has holes".to_owned()));
+        // Paths that bend are no straight way to a light.
+        let lets_through = |m: &Material| {
+            holes(m)
+                || m.alpha_mode == AlphaMode::Blend
+                || (m.transmission > 0.0 && (!*paths || m.ior == 1.0 || surfaces.is_sheet(m)))
+        };
+        let cause = match shadows || *paths {
+            true => surfaces.cause(lets_through, |_| "lets light through".to_owned()),
+            false => Cause::against("no rays look for lights"),
+        };
+        let filters = decisions.decide(EffectId::Filters, cause);
+        let cause = surfaces.cause(|m| m.transmission > 0.0, |m| format!("has transmission {}", m.transmission));
+        let transmissive = decisions.decide(EffectId::Transmission, cause);
+        let rough = |m: &Material| {
+            let coat = m.clearcoat > 0.0 && m.clearcoat_roughness > 0.0;
+            if *paths {
+                let coat = m.clearcoat > 0.0 && m.clearcoat_roughness > SMOOTHEST;
+                return !m.unlit
+                    && (coat || (m.roughness > SMOOTHEST && (surfaces::mirrors(m) || m.transmission > 0.0)));
+            }
+            (mirrors && surfaces::is_smooth(m, images.roughest) && (m.roughness > 0.0 || coat))
+                || (m.transmission > 0.0 && m.roughness > 0.0)
+        };
+        let rough = decisions
+            .decide(EffectId::RoughRays, surfaces.cause(rough, |m| format!("sends rays at roughness {}", m.roughness)));
+        let frosted = |m: &Material| m.transmission > 0.0 && m.roughness > SMOOTHEST;
+        let cause = match *paths {
+            true => surfaces.cause(frosted, |m| format!("lets light through with roughness {}", m.roughness)),
+            false => Cause::against("no paths are followed"),
+        };
+        let frosted = decisions.decide(EffectId::Frosted, cause);
+        let absorbs = |m: &Material| m.absorbs() && m.transmission > 0.0 && m.thickness > 0.0;
+        let absorption = decisions.decide_with(
+            EffectId::Absorption,
+            knobs.absorption.choice().allows(knobs.absorption != Absorption::Off),
+            surfaces.cause(absorbs, |m| match m.marched_sigma() {
+                Some(_) => "has a grid of sigma".to_owned(),
+                None => format!("has attenuation distance {} m", m.attenuation_distance),
+            }),
+        );
+        Some(Rays {
+            shadows,
+            mirrors,
+            refraction,
+            transmissive,
+            masked,
+            filters,
+            rough,
+            frosted,
+            attenuation: match knobs.absorption {
+                Absorption::Thickness if absorption => Attenuation::Nominal,
+                _ if absorption => Attenuation::Path,
+                _ => Attenuation::Off,
+            },
+            march: transmission.march,
+            interfaces: knobs.interfaces.count(),
+            textures: surroundings.demand == Demand::Full,
+        })
+    }
+}
+
+/// What paths take the place of they drop.
+fn by_paths(paths: bool) -> Option<Verdict> {
+    paths.then(|| Indirect::Path.choice().allows(false))
+}
+
+/// The same, or where there are none what another knob says.
+fn unless_paths(paths: bool, else_by: Verdict) -> Verdict {
+    by_paths(paths).unwrap_or(else_by)
+}
+
+/// Whether effects are asked for that need lights: dark ones, where the scene has none.
+#[must_use]
+pub fn needs_lights(demand: Demand) -> bool {
+    [EffectId::PunctualLights, EffectId::Shadows, EffectId::LightLists]
+        .into_iter()
+        .any(|effect| demand.includes(effect))
+}
