@@ -5,17 +5,14 @@
 //! `./x bench --bench mirrors`
 #![allow(missing_docs, clippy::print_stdout, reason = "a program whose figures go to standard output")]
 
-#[path = "../tests/support/made.rs"]
-mod made;
-
 use anyhow::Result;
 use etalon::frame::{Renderer, Settings};
 use etalon::gpu::{Device, DeviceChoice};
 use etalon::plan::{Knobs, Model};
 use etalon::scene::{LightKind, Material};
 use etalon::study::shape::Shape;
+use etalon_testing::made::{Made, at, lambert, perspective};
 use glam::{DAffine3, DVec3};
-use made::{Made, at, lambert, perspective};
 
 const SIZE: [u32; 2] = [1280, 720];
 const CELLS: [u32; 2] = [16, 9];

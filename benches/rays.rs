@@ -13,8 +13,8 @@ use anyhow::{Context as _, Result, ensure};
 use etalon::gpu::{Device, DeviceChoice};
 use etalon::pass::rays::Traversal;
 use etalon::pass::trace_rays::{Hit, Mode, Ray, Tracer};
-use etalon::scene::bvh::Bvh;
 use etalon::scene::{Camera, Instance, LoadOptions, Material, Mesh, Scene};
+use etalon::transport::bvh::Bvh;
 use glam::{DAffine3, DVec3, Vec3};
 
 const SIZE: [u32; 2] = [1024, 576];

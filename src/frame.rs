@@ -35,27 +35,29 @@ use crate::pass::tiles::{Tiles, tiles};
 use crate::pass::tonemap::{Counts, Display, tonemap};
 use crate::pass::view::{View, jitter};
 use crate::plan::rungs::Indirect;
-use crate::plan::{Ability, Demand, Knobs, Plan};
-use crate::prepare::{Conditions, Prepared};
-use crate::scene::emitters::Sky;
+use crate::plan::{Ability, Demand, Knobs, Plan, Refused, Setting};
+use crate::prepare::{Conditions, Original, Prepared};
+use crate::scene::Camera;
 use crate::scene::environment::Environment;
 use crate::scene::wavelengths::Slice;
-use crate::scene::{Camera, Scene};
 use crate::share::{self, AovPixel};
 use crate::spectra::VISIBLE;
+use crate::transport::emitters::Sky;
 
 /// Refuses what no image or buffer of the device can hold.
 fn check_size(device: &Device, knobs: &Knobs, size: [u32; 2]) -> Result<()> {
     let limit = device.max_image_size();
     if size.contains(&0) || size.iter().any(|&side| side > limit) {
-        bail!("--size {}x{}: a picture has 1 to {limit} pixels a side on this device", size[0], size[1]);
+        let why = format!("{}x{}: a picture has 1 to {limit} pixels a side on this device", size[0], size[1]);
+        return Err(Refused::error(Setting::Size, why));
     }
     let pixels = u64::from(size[0]) * u64::from(size[1]);
     // Paths keep four words of a pixel in one buffer, all else one.
     let bytes = if knobs.indirect == Indirect::Path { 16 } else { 4 };
     if pixels * bytes > device.max_storage_bytes() {
         let most = device.max_storage_bytes() / bytes;
-        bail!("--size {}x{}: this device holds at most {most} pixels in one picture", size[0], size[1]);
+        let why = format!("{}x{}: this device holds at most {most} pixels in one picture", size[0], size[1]);
+        return Err(Refused::error(Setting::Size, why));
     }
     Ok(())
 }
@@ -152,7 +154,8 @@ impl Settings {
             Background::Transparent | Background::Color(_) => false,
         };
         if self.background == Background::Environment && environment.is_none() {
-            bail!("--background env: there is no environment (--env none, or the scene has lights of its own)");
+            let why = "env: there is no environment (none was asked for, or the scene has lights of its own)";
+            return Err(Refused::error(Setting::Background, why.to_owned()));
         }
         let Self { environment_intensity: intensity, environment_rotation: rotation, .. } = *self;
         let sky = environment.map(|map| Sky { map, intensity, rotation });
@@ -364,7 +367,7 @@ impl Renderer {
     /// When the scene has nothing to draw, the size is out of range, or it does not fit the device.
     pub fn new(
         device: &Arc<Device>,
-        scene: Scene,
+        scene: impl Into<Original>,
         environment: Option<&Environment>,
         settings: Settings,
     ) -> Result<Self> {
@@ -390,7 +393,10 @@ impl Renderer {
                 paths.at_once = settings.paths_at_once;
                 plan.samples = if wanted.is_some() { MOST_SAMPLES } else { plan.samples };
             }
-            (None, Some(wanted)) => bail!("--max-error {wanted}: only paths tell their error; add --model global"),
+            (None, Some(wanted)) => {
+                let why = format!("{wanted}: only paths tell their error, the model global follows them");
+                return Err(Refused::error(Setting::MaxError, why));
+            }
             (None, None) => {}
         }
         plan.check(&Ability { device: device.info().name.clone(), adds_in_subgroups: device.adds_in_subgroups() })?;
@@ -402,7 +408,7 @@ impl Renderer {
         let rays = RaysOnDevice::new(device, &prepared, settings.traversal)?;
         let Prepared { scene, plan, solids, mut warnings, .. } = prepared;
         for part in settings.parts.iter().filter(|part| !part.called_for(&plan)) {
-            warnings.push(format!("--aov {}: no surface of this scene sends such rays, the layer is 0", part.name()));
+            warnings.push(format!("layer {}: no surface of this scene sends such rays, the layer is 0", part.name()));
         }
         // What stands for an environment that is asked for and is not there.
         let dark = (plan.environment && environment.is_none()).then(Environment::dark);
@@ -467,7 +473,8 @@ impl Renderer {
         let wanted = self.settings.max_error.unwrap_or(f64::INFINITY);
         if let Some(error) = drawing.errors.last().filter(|error| error.relmse.sqrt() > wanted) {
             let (samples, error) = (drawing.samples(), error.relmse.sqrt());
-            bail!("--max-error {wanted}: after {samples} samples the error is still {error:.4}");
+            let why = format!("{wanted}: after {samples} samples the error is still {error:.4}");
+            return Err(Refused::error(Setting::MaxError, why));
         }
         self.picture(&drawing)
     }
@@ -791,9 +798,15 @@ impl Renderer {
     /// # Errors
     /// When the driver fails.
     pub fn film(&self) -> Result<Picture> {
-        let mut picture = self.read(self.targets.film.as_ref().unwrap_or(&self.targets.radiance))?;
+        let mut picture = self.read(self.film_on_device())?;
         self.lay_behind(&mut picture);
         Ok(picture)
+    }
+
+    /// The same where it lies, for passes of one's own: linear RGBA in f32, without a background colour.
+    #[must_use]
+    pub fn film_on_device(&self) -> &Image {
+        self.targets.film.as_ref().unwrap_or(&self.targets.radiance)
     }
 
     /// Puts a background colour behind what lets it through.

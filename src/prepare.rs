@@ -1,21 +1,22 @@
 //! A scene made ready to be drawn, before any device is there: in normal form, planned, with the hierarchy that its rays go
 //! through. Data alone: what is drawn of it, and on what, is for [`crate::frame`] to say.
 
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow, bail};
 use glam::DVec3;
 
 use crate::plan::{Demand, Facts, Knobs, Plan, Rays, Surroundings, needs_lights};
-use crate::scene::bvh::Bvh;
-use crate::scene::contact::{bodies_touch, twins};
-use crate::scene::emitters::{Emitters, Sky};
 use crate::scene::environment::Environment;
 use crate::scene::normal_form::{NormalForm, normalise};
 use crate::scene::reads::forget_unread;
 use crate::scene::sigma::one_medium_each;
 use crate::scene::solid::Solids;
 use crate::scene::{Ambience, Bounds, Light, LightKind, Reads, Scene};
+use crate::transport::bvh::Bvh;
+use crate::transport::contact::{bodies_touch, twins};
+use crate::transport::emitters::{Emitters, Sky};
 
 /// What a scene is prepared for.
 #[derive(Debug, Clone, Copy)]
@@ -28,6 +29,70 @@ pub struct Conditions<'a> {
     pub sky: Option<Sky<'a>>,
     /// The sky is seen behind the scene, too.
     pub background: bool,
+}
+
+/// A scene as it was read. Clones, and all that is prepared of them, share its lists and the one tree of its triangles, which is
+/// built when rays are first called for.
+#[derive(Debug, Clone, Default)]
+pub struct Original {
+    scene: Scene,
+    tree: Arc<OnceLock<Result<Tree, String>>>,
+}
+
+/// A tree, and the milliseconds that it took.
+type Tree = (Arc<Bvh>, f64);
+
+impl From<Scene> for Original {
+    fn from(scene: Scene) -> Self {
+        Self { scene, tree: Arc::default() }
+    }
+}
+
+impl From<&Self> for Original {
+    fn from(other: &Self) -> Self {
+        other.clone()
+    }
+}
+
+impl Original {
+    /// What was read.
+    #[must_use]
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The tree of the scene's normal form, whose triangles are those of every plan: plans leave out textures and lights.
+    ///
+    /// # Errors
+    /// When the scene has more triangles than a tree holds.
+    pub fn bvh(&self) -> Result<Arc<Bvh>> {
+        let normal = || {
+            let mut scene = self.scene.clone();
+            one_medium_each(&mut scene);
+            normalise(&mut scene);
+            scene
+        };
+        Ok(self.tree_of(normal)?.0)
+    }
+
+    fn tree_of<S: std::borrow::Borrow<Scene>>(&self, normal: impl FnOnce() -> S) -> Result<Tree> {
+        let built = self.tree.get_or_init(|| {
+            let start = Instant::now();
+            let bvh = Bvh::build(normal().borrow()).map_err(|error| format!("{error:#}"))?;
+            let build_ms = start.elapsed().as_secs_f64() * 1e3;
+            tracing::info!("a tree of {} triangles, in {build_ms:.1} ms", bvh.triangles.len());
+            Ok((Arc::new(bvh), build_ms))
+        });
+        built.clone().map_err(|error| anyhow!(error))
+    }
+
+    /// What the scene calls for under the chosen rungs, without preparing anything else.
+    ///
+    /// # Errors
+    /// When the scene has nothing to draw.
+    pub fn plan(&self, conditions: &Conditions<'_>) -> Result<Plan> {
+        planned(&mut self.scene.clone(), conditions).map(|(plan, _)| plan)
+    }
 }
 
 /// A scene that is ready to be drawn.
@@ -51,7 +116,7 @@ pub struct Prepared {
 #[derive(Debug)]
 pub struct Hierarchy {
     /// The tree.
-    pub bvh: Bvh,
+    pub bvh: Arc<Bvh>,
     /// Milliseconds that it took.
     pub build_ms: f64,
     /// How far rays start off a surface, metres.
@@ -69,14 +134,6 @@ const OFFSET_ROUNDINGS: f64 = 32.0;
 #[must_use]
 pub fn ray_offset(extent: f64) -> f64 {
     OFFSET_ROUNDINGS * extent * 2.0_f64.powi(-24)
-}
-
-/// What a scene calls for under the chosen rungs, without preparing anything else.
-///
-/// # Errors
-/// When the scene has nothing to draw.
-pub fn plan(mut scene: Scene, conditions: &Conditions<'_>) -> Result<Plan> {
-    planned(&mut scene, conditions).map(|(plan, _)| plan)
 }
 
 /// Brings a scene into its normal form and plans it.
@@ -126,7 +183,9 @@ impl Prepared {
     ///
     /// # Errors
     /// When the scene has nothing to draw, or more triangles than a hierarchy holds.
-    pub fn new(mut scene: Scene, conditions: &Conditions<'_>) -> Result<Self> {
+    pub fn new(original: impl Into<Original>, conditions: &Conditions<'_>) -> Result<Self> {
+        let original = original.into();
+        let mut scene = original.scene.clone();
         let (mut plan, solids) = planned(&mut scene, conditions)?;
         // What adds nothing takes no turn of any loop.
         let mut kept = plan.lights.iter();
@@ -137,7 +196,10 @@ impl Prepared {
         let mut warnings = if refracts { solids.warnings.clone() } else { Vec::new() };
         let emitters =
             plan.paths.map_or_else(Emitters::default, |paths| Emitters::of(&scene, conditions.sky, paths.emitting));
-        let hierarchy = plan.rays.map(|rays| Hierarchy::of(&scene, &solids, rays)).transpose()?;
+        let hierarchy = match plan.rays {
+            Some(rays) => Some(Hierarchy::of(&scene, original.tree_of(|| &scene)?, &solids, rays)),
+            None => None,
+        };
         if let Some(hierarchy) = &hierarchy {
             warnings.extend(hierarchy.warnings.iter().cloned());
             if plan.rays.is_some_and(|rays| rays.refraction) {
@@ -157,21 +219,19 @@ impl Prepared {
         let facts = Facts::of(&scene, NormalForm::default());
         let rays = Rays::default();
         let plan = Plan { rays: Some(rays), ..Plan::new(&scene, &facts, surroundings, &Knobs::default()) };
-        let hierarchy = Some(Hierarchy::of(&scene, &facts.solids, rays)?);
+        let tree = Original::from(scene.clone()).tree_of(|| &scene)?;
+        let hierarchy = Some(Hierarchy::of(&scene, tree, &facts.solids, rays));
         let solids = facts.solids;
         Ok(Self { scene, plan, solids, emitters: Emitters::default(), hierarchy, warnings: Vec::new() })
     }
 }
 
 impl Hierarchy {
-    fn of(scene: &Scene, solids: &Solids, rays: Rays) -> Result<Self> {
-        let start = Instant::now();
-        let bvh = Bvh::build(scene)?;
-        let build_ms = start.elapsed().as_secs_f64() * 1e3;
+    fn of(scene: &Scene, (bvh, build_ms): Tree, solids: &Solids, rays: Rays) -> Self {
         let extent = bvh.triangles.iter().flat_map(|t| t.corners.iter().flatten()).fold(0.0_f32, |m, x| m.max(x.abs()));
         let offset = ray_offset(extent.into());
         let touching = rays.refraction && bodies_touch(&bvh, &solids.solid, offset);
-        Ok(Self { build_ms, offset, touching, warnings: odd_triangles(scene, &bvh, solids), bvh })
+        Self { build_ms, offset, touching, warnings: odd_triangles(scene, &bvh, solids), bvh }
     }
 }
 

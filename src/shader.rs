@@ -7,8 +7,11 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::gpu::{
     Access, Binding, BindingKind, Bindings, Buffer, Constant, Image, Program, Resource, Sampled, SetLayout, SharedSet,
-    Specialization, Stage, VertexInput,
+    Specialization, Stage, VertexInput, limits,
 };
+
+/// The folder of the shaders' sources, where Etalon was built.
+pub const SOURCES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/shaders");
 
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 

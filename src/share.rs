@@ -3,3 +3,6 @@
 use bytemuck::{Pod, Zeroable};
 
 include!(concat!(env!("OUT_DIR"), "/share.rs"));
+
+// What scenes know of shaders too.
+const _: () = assert!(LEAST_SHEEN_ROUGHNESS == crate::scene::lobe::sheen::LEAST_ROUGHNESS);

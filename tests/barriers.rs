@@ -1,9 +1,6 @@
 //! The barriers are needed: the same passes without them are reported as hazards by synchronization validation, and with
 //! them nothing is. Otherwise a validation that sees nothing would prove nothing.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-
 use ash::vk;
 use etalon::gpu::{Buffer, DescriptorSet, Frame, Image, ImageDesc, Place, Resource};
 use etalon::pass::classify::{WorkLists, classify};
@@ -13,7 +10,7 @@ use etalon::plan::{Demand, Facts, Knobs, Plan, Surroundings};
 use etalon::scene::Scene;
 use etalon::shader::{Library, SCENE, lib};
 use etalon::share::Camera;
-use gpu::Gpu;
+use etalon_testing::gpu::Gpu;
 
 /// Validation's error texts after `describe` has been run as a frame, with or without buffer barriers.
 fn errors_of(forget: bool, describe: impl for<'a> FnOnce(&'a Things, &mut Frame<'a>)) -> Vec<String> {

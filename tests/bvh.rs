@@ -4,8 +4,8 @@
 use std::collections::BTreeSet;
 
 use etalon::optics::catalogue::Draw;
-use etalon::scene::bvh::{Aabb, Bvh, Format, Grid, MAX_TRIANGLES, Node, Order, Triangle};
 use etalon::scene::{Instance, Mesh, Scene};
+use etalon::transport::bvh::{Aabb, Bvh, Format, Grid, MAX_TRIANGLES, Node, Order, Triangle};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 
 const FORMATS: [Format; 2] = [Format::Quantised, Format::Float];
@@ -16,7 +16,7 @@ fn orders() -> Vec<Order> {
 
 fn scene(name: &str, triangles: &[[DVec3; 3]], world_from_object: &[DAffine3]) -> Scene {
     let positions: Vec<[f32; 3]> = triangles.iter().flatten().map(|p| p.as_vec3().to_array()).collect();
-    let mesh = Mesh { indices: (0..positions.len() as u32).collect(), positions, ..Mesh::default() };
+    let mesh = Mesh { indices: (0..positions.len() as u32).collect(), positions: positions.into(), ..Mesh::default() };
     let place = |&world_from_object| Instance { name: String::new(), mesh: 0, world_from_object };
     let instances = world_from_object.iter().map(place).collect();
     Scene { name: name.into(), meshes: vec![mesh], instances, ..Scene::default() }
@@ -565,7 +565,7 @@ fn a_tree_of_one_leaf_has_one_child() {
 
 #[test]
 fn too_many_triangles_are_an_error_of_one_sentence() {
-    let mesh = Mesh { positions: vec![[0.0; 3]; 3], indices: vec![0; 3 << 20], ..Mesh::default() };
+    let mesh = Mesh { positions: vec![[0.0; 3]; 3].into(), indices: vec![0; 3 << 20].into(), ..Mesh::default() };
     let one = Instance { name: String::new(), mesh: 0, world_from_object: DAffine3::IDENTITY };
     let scene = Scene { name: "crowd".into(), meshes: vec![mesh], instances: vec![one; 257], ..Scene::default() };
     assert_eq!(scene.triangles(), MAX_TRIANGLES + (1 << 20));

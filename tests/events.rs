@@ -1,14 +1,12 @@
 //! What a pixel's ray meets, against what is known of plates, balls, metals and shadows.
 
-#[path = "support/made.rs"]
-mod made;
-
 use etalon::optics::fresnel::fresnel_dielectric;
-use etalon::scene::events::{Event, Limits, Tracer, Way};
+use etalon::prepare::Original;
 use etalon::scene::{Instance, LightKind, Material, Scene};
 use etalon::study::shape::Shape;
+use etalon::transport::events::{Event, Limits, Tracer, Way};
+use etalon_testing::made::{Made, at, lambert, perspective};
 use glam::DVec3;
-use made::{Made, at, lambert, perspective};
 
 const LIMITS: Limits = Limits { surfaces: 8, roughest: 0.2, least_share: 0.01, stand_ins: true };
 
@@ -26,7 +24,13 @@ fn glass(ior: f32) -> Material {
 
 /// The ray of the middle of a picture of 3x3 pixels.
 fn middle(scene: &Scene) -> Vec<Event> {
-    Tracer::new(scene).expect("a tree").follow(scene, &scene.cameras[0], [3, 3], [1, 1], &LIMITS)
+    Tracer::new(scene, Original::from(scene.clone()).bvh().expect("a tree")).follow(
+        scene,
+        &scene.cameras[0],
+        [3, 3],
+        [1, 1],
+        &LIMITS,
+    )
 }
 
 /// The event that goes on from another by a way.

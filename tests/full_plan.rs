@@ -1,10 +1,5 @@
 //! The plan of what a scene calls for and the plan of everything give the same picture, to the last bit.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-
 use std::path::{Path, PathBuf};
 
 use etalon::frame::{Renderer, Settings};
@@ -15,9 +10,9 @@ use etalon::scene::environment::Environment;
 use etalon::scene::material::{Sampler, TextureRef};
 use etalon::scene::{AlphaMode, Ambience, Camera, Image, LightKind, LoadOptions, Material, Reads, Scene};
 use etalon::study::{self, shape::Shape};
+use etalon_testing::gpu::{Gpu, bits};
+use etalon_testing::made::{Made, at, lambert, perspective};
 use glam::DVec3;
-use gpu::{Gpu, bits};
-use made::{Made, at, lambert, perspective};
 
 const SIZE: [u32; 2] = [48, 27];
 
@@ -180,7 +175,7 @@ fn surfaces_leave_each_other_alone() {
     half.0.studio = Some(1.0);
     is_same("half metal", &half, &[]);
     // Coats and bodies below a black texture leave no layers.
-    let black = Image { name: "black".to_owned(), width: 1, height: 1, rgba: vec![0, 0, 0, 255] };
+    let black = Image { name: "black".to_owned(), width: 1, height: 1, rgba: vec![0, 0, 0, 255].into() };
     let none = Some(TextureRef { image: 1, ..texture() });
     let coat =
         Material { clearcoat: 1.0, clearcoat_texture: none, clearcoat_roughness_texture: Some(texture()), ..mirror() };

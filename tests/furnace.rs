@@ -1,17 +1,12 @@
 //! Study scenes in one white material before light from everywhere: nothing shows.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-
 use etalon::frame::Settings;
 use etalon::plan::{Knobs, Model};
 use etalon::scene::Material;
 use etalon::scene::environment::Environment;
 use etalon::study;
-use gpu::Gpu;
-use made::lambert;
+use etalon_testing::gpu::Gpu;
+use etalon_testing::made::lambert;
 
 /// Light that takes more than the 32 surfaces of a path to come out, of Lambert's 1: 0.8 % between the walls of `cornell`, 0.5 % in
 /// the glass of `nested`, measured with 256 samples; elsewhere less.

@@ -2,13 +2,6 @@
 //! against an f64 sum over all of them (support/shade.rs), which finds a light that a tile's list lost; emitters; and the
 //! environment, inside which a white body must vanish.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-#[path = "support/shade.rs"]
-mod shade;
-
 use std::f64::consts::PI;
 
 use etalon::frame::{Background, Renderer, Settings};
@@ -17,9 +10,9 @@ use etalon::scene::environment::{self, Environment};
 use etalon::scene::{LightKind, Material, Scene};
 use etalon::study::shape::Shape;
 use etalon::study::{self, generate};
+use etalon_testing::gpu::{Gpu, bits, knobs, largest_difference, settings};
+use etalon_testing::made::{Made, Random, at, lambert, unlit};
 use glam::{DAffine3, DVec3, Vec3};
-use gpu::{Gpu, bits, knobs, largest_difference, settings};
-use made::{Made, Random, at, lambert, unlit};
 
 const SIZE: [u32; 2] = [64, 36];
 
@@ -55,7 +48,7 @@ fn worst(film: &Picture, floor: f64, expected: impl Fn(usize) -> DVec3) -> f64 {
 
 #[test]
 fn a_directional_light_gives_irradiance_times_albedo_over_pi_times_cosine() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let albedo = [0.75, 0.5, 0.125];
     for (direction, color) in [
         (DVec3::NEG_Z, [1.0, 2.0, 4.0]),
@@ -81,7 +74,7 @@ fn a_directional_light_gives_irradiance_times_albedo_over_pi_times_cosine() {
 
 #[test]
 fn a_point_light_falls_with_the_square_of_the_distance_and_ends_at_its_range() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for range in [None, Some(0.6), Some(2.0), Some(100.0)] {
         for z in [0.1, 0.5, 1.0, 7.0, 1e4] {
             let position = DVec3::new(0.3, -0.2, z);
@@ -109,7 +102,7 @@ fn a_point_light_falls_with_the_square_of_the_distance_and_ends_at_its_range() {
 
 #[test]
 fn a_point_light_far_away_is_a_directional_light() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let towards = DVec3::new(0.4, 0.3, 1.0).normalize();
     for r in [1e4, 1e6, 1e9] {
         let mut near = wall([0.8; 3]);
@@ -126,7 +119,7 @@ fn a_point_light_far_away_is_a_directional_light() {
 
 #[test]
 fn a_spot_has_a_squared_ramp_between_its_cones() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for (inner, outer, axis, half_height) in [
         (10.0_f64, 30.0_f64, DVec3::NEG_Z, 1.0),
         (0.0, 40.0, DVec3::new(0.4, 0.1, -1.0), 1.0),
@@ -140,12 +133,12 @@ fn a_spot_has_a_squared_ramp_between_its_cones() {
         let (inner, outer, direction) = (inner.to_radians(), outer.to_radians(), axis.normalize());
         let position = if half_height < 1.0 { DVec3::Z * 1.5 } else { DVec3::new(0.1, 0.2, 1.5) };
         let mut made = wall([0.5; 3]);
-        made.0.cameras[0].projection = made::orthographic(half_height);
+        made.0.cameras[0].projection = etalon_testing::made::orthographic(half_height);
         made.light([7.0; 3], LightKind::Spot { position, direction, range: Some(9.0), inner, outer });
         let film = gpu.film(&made.0, settings(SIZE));
         let light = made.0.lights[0].clone();
         let error = worst(&film, 1.0, |i| {
-            let (l, e) = shade::incident(&light, on_wall(i, SIZE) * half_height);
+            let (l, e) = etalon_testing::shade::incident(&light, on_wall(i, SIZE) * half_height);
             e * 0.5 / PI * l.z
         });
         // The ramp's slope over cosθ is 1 / (cos inner − cos outer), and it is squared: twice that is what errors of cosθ
@@ -180,7 +173,7 @@ fn lit_scene(count: usize) -> Scene {
 
 #[test]
 fn light_adds_up_in_any_order() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let scene = lit_scene(9);
     let together = gpu.film(&scene, settings(SIZE));
     let brightest = together.rgba.iter().flatten().fold(0.0_f32, |m, v| m.max(*v));
@@ -215,8 +208,9 @@ fn against_all_lights(gpu: &Gpu, scene: &Scene, orthographic: bool, size: [u32; 
     let (mut lit, mut brightest) = (0, 0.0_f64);
     let mut wants = Vec::new();
     for pixel in &aovs {
-        let want =
-            (pixel.material != 0).then(|| shade::direct(scene, &shade::point(scene, pixel, &view, orthographic)));
+        let want = (pixel.material != 0).then(|| {
+            etalon_testing::shade::direct(scene, &etalon_testing::shade::point(scene, pixel, &view, orthographic))
+        });
         brightest = brightest.max(want.unwrap_or_default().max_element());
         lit += usize::from(want.is_some_and(|w| w.max_element() > 0.0));
         wants.push(want);
@@ -239,7 +233,7 @@ fn against_all_lights(gpu: &Gpu, scene: &Scene, orthographic: bool, size: [u32; 
 
 #[test]
 fn lists_of_lights_per_tile_lose_no_light() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for count in [1, 15, 16, 33, 1000] {
         for orthographic in [false, true] {
             // Neither divides by the tiles of 16 nor by the work tiles of 8.
@@ -266,7 +260,7 @@ fn lists_of_lights_per_tile_lose_no_light() {
 
 #[test]
 fn more_lights_than_a_loop_can_run_over_are_refused() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let with = |count: u32| {
         let mut made = wall([0.5; 3]);
         let mut random = Random(4);
@@ -307,7 +301,7 @@ fn more_lights_than_a_loop_can_run_over_are_refused() {
 
 #[test]
 fn more_lights_than_the_loops_of_rays_allow_are_an_error() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let shot = |first: u32, end: u32| {
         let mut made = wall([0.5; 3]);
         let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness: 0.0, ..Material::default() };
@@ -317,7 +311,7 @@ fn more_lights_than_the_loops_of_rays_allow_are_an_error() {
             let position = DVec3::new(f64::from(i % 40) * 0.1 - 2.0, f64::from(i / 40) * 0.02 - 1.0, 1.5);
             made.light([1.0; 3], LightKind::Point { position, range: None });
         }
-        made.camera(DVec3::new(0.0, 0.0, 1.0), DVec3::new(0.3, 0.0, 2.0), made::perspective(60.0));
+        made.camera(DVec3::new(0.0, 0.0, 1.0), DVec3::new(0.3, 0.0, 2.0), etalon_testing::made::perspective(60.0));
         let settings = Settings { knobs: knobs(&["reflection=ray", "shadows=ray", "samples=1"]), ..settings([16, 9]) };
         let mut renderer = gpu.renderer(&made.0, None, settings);
         let work = renderer.render(&made.0.cameras[1], &mut |_| ())?.work;
@@ -337,7 +331,7 @@ fn more_lights_than_the_loops_of_rays_allow_are_an_error() {
 
 #[test]
 fn all_kinds_of_light_on_study_scenes_agree_with_the_formulas() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for name in ["lamps", "materials", "metals", "cornell"] {
         let mut scene = if name == "lamps" { lit_scene(12) } else { study::load(name).expect("a study scene") };
         if name != "lamps" {
@@ -360,7 +354,7 @@ fn all_kinds_of_light_on_study_scenes_agree_with_the_formulas() {
 
 #[test]
 fn emitters_and_unlit_surfaces_show_their_radiance() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let glow = [3.0, 1e-5, 4e4];
     for (material, want) in [
         (Material { emissive: glow, ..lambert([0.0; 3]) }, glow),
@@ -381,13 +375,13 @@ fn emitters_and_unlit_surfaces_show_their_radiance() {
 fn ball(material: Material) -> Scene {
     let mut made = Made::new("ball");
     made.add(Shape::sphere(1.0, 24), material, DAffine3::IDENTITY);
-    made.camera(DVec3::new(0.5, 1.0, 4.0), DVec3::ZERO, made::perspective(40.0));
+    made.camera(DVec3::new(0.5, 1.0, 4.0), DVec3::ZERO, etalon_testing::made::perspective(40.0));
     made.0
 }
 
 #[test]
 fn a_white_body_vanishes_in_a_white_furnace() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let radiance = [0.25_f32, 1.0, 3.0];
     let environment = Environment::constant(radiance);
     let mirror = Material { base_color: [1.0; 4], metallic: 1.0, roughness: 0.0, ..Material::default() };
@@ -411,7 +405,7 @@ fn a_white_body_vanishes_in_a_white_furnace() {
 /// table, divides out to a rounding where F0 = F90 = 1.
 #[test]
 fn a_rough_metal_is_dark_in_the_furnace_until_compensated() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness: 0.9, ..Material::default() };
     let environment = Environment::constant([1.0; 3]);
     let darkest = |brdf: &str| {
@@ -431,7 +425,7 @@ fn a_rough_metal_is_dark_in_the_furnace_until_compensated() {
 /// The same compensation for punctual lights: by 1 / (A + B), which is what the same metal shows in a furnace of 1.
 #[test]
 fn compensation_is_for_lights_too() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness: 0.9, ..Material::default() };
     let mut scene = ball(metal);
     let seen = |scene: &Scene, environment: Option<&Environment>, brdf: &str| {
@@ -465,7 +459,7 @@ fn compensation_is_for_lights_too() {
 /// towards 1, below which a surface would reflect totally.
 #[test]
 fn exact_fresnel_of_a_half_metal_lies_between() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let environment = Environment::constant([1.0; 3]);
     let seen = |metallic: f32| {
         let material = Material { base_color: [0.5, 0.5, 0.5, 1.0], metallic, roughness: 0.3, ..Material::default() };
@@ -505,12 +499,12 @@ fn gradient() -> Environment {
 
 #[test]
 fn behind_the_scene_is_the_environment_turned_as_asked() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let environment = gradient();
     let scene = ball(lambert([0.5; 3]));
     for (degrees, intensity) in [(0.0_f32, 1.0_f32), (90.0, 1.0), (-33.0, 2.5), (360.0, 1.0)] {
-        let mut camera = made::looking(DVec3::new(0.5, 1.0, 4.0), DVec3::new(0.2, 0.4, 0.0));
-        camera.projection = made::perspective(100.0);
+        let mut camera = etalon_testing::made::looking(DVec3::new(0.5, 1.0, 4.0), DVec3::new(0.2, 0.4, 0.0));
+        camera.projection = etalon_testing::made::perspective(100.0);
         let settings = Settings {
             background: Background::Environment,
             environment_rotation: degrees,
@@ -551,7 +545,7 @@ fn behind_the_scene_is_the_environment_turned_as_asked() {
 
 #[test]
 fn a_turned_environment_lights_as_the_turned_map_does() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let environment = gradient();
     // 90° are 16 of 64 columns: the turned map is the map with its columns moved.
     let mut moved = environment.clone();
@@ -562,17 +556,17 @@ fn a_turned_environment_lights_as_the_turned_map_does() {
     let turned = Settings { environment_rotation: 90.0, ..settings(SIZE) };
     let (_, a) = gpu.shot(&scene, Some(&environment), turned);
     let (_, b) = gpu.shot(&scene, Some(&moved), settings(SIZE));
-    let error = gpu::largest_difference(&a, &b, 1.0);
+    let error = etalon_testing::gpu::largest_difference(&a, &b, 1.0);
     eprintln!("{error:e}");
     // The same texels at the same places up to rounding of the coordinates (1e-6 of the map) and the fraction's 8 bits.
     assert!(error < 1e-3, "{error:e}");
     let (_, unturned) = gpu.shot(&scene, Some(&environment), settings(SIZE));
-    assert!(gpu::largest_difference(&a, &unturned, 1.0) > 0.5, "the turn shows");
+    assert!(etalon_testing::gpu::largest_difference(&a, &unturned, 1.0) > 0.5, "the turn shows");
 }
 
 #[test]
 fn a_rough_metal_mirrors_the_lobe_of_what_is_around() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     // A lamp of 12° in a dim room; the map is as fine as its prefiltered levels.
     let lamp = DVec3::new(0.5, 0.35, 1.0).normalize();
     let texel = |i: u32| environment::direction((f64::from(i % 256) + 0.5) / 256.0, (f64::from(i / 256) + 0.5) / 128.0);
@@ -589,7 +583,7 @@ fn a_rough_metal_mirrors_the_lobe_of_what_is_around() {
         let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness, ..Material::default() };
         let mut made = Made::new("metal wall");
         made.add(Shape::panel(40.0, 40.0), metal, DAffine3::IDENTITY);
-        made.camera(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, made::perspective(70.0));
+        made.camera(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, etalon_testing::made::perspective(70.0));
         let shot = |environment| gpu.shot(&made.0, Some(environment), settings(SIZE)).1;
         let (of_room, of_white) = (shot(&room), shot(&white));
         let tan = 35_f64.to_radians().tan();
@@ -628,7 +622,7 @@ fn a_rough_metal_mirrors_the_lobe_of_what_is_around() {
 #[test]
 fn light_through_both_sides_of_a_sheet() {
     // A double-sided wall seen from behind is lit by what shines on that side only.
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut made = wall([1.0; 3]);
     made.0.instances[0].world_from_object = DAffine3::from_rotation_y(PI) * at(0.0, 0.0, 0.0);
     made.light([PI as f32; 3], LightKind::Directional { direction: DVec3::NEG_Z });
@@ -639,7 +633,7 @@ fn light_through_both_sides_of_a_sheet() {
 
 #[test]
 fn no_tier_of_arithmetic_makes_nan_of_a_scene() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for name in ["materials", "lamps"] {
         let scene = study::load(name).expect("a study scene");
         for brdf in ["ggx", "blinn-phong-reciprocal"] {

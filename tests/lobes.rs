@@ -1,20 +1,15 @@
 //! Rough mirrors by rays (knob `lobes`): the mean over the samples of a lobe is the integral of BRDF times cosine, worked
 //! out in f64 over the only thing that there is to be mirrored.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-
 use etalon::frame::Settings;
 use etalon::optics::brdf;
 use etalon::optics::fresnel::fresnel_dielectric;
 use etalon::scene::environment::Environment;
 use etalon::scene::{Material, Scene};
 use etalon::study::shape::Shape;
+use etalon_testing::gpu::Gpu;
+use etalon_testing::made::{Made, lambert, orthographic, unlit};
 use glam::{DAffine3, DVec3};
-use gpu::Gpu;
-use made::{Made, lambert, orthographic, unlit};
 
 const RADIANCE: [f32; 3] = [2.0, 1.0, 0.5];
 /// Towards the viewer, everywhere.
@@ -84,7 +79,7 @@ fn settings(choices: &[&str]) -> Settings {
 /// Compares the picture, pixel by pixel, with `expected` at each pixel's point. The samples of a pixel are random: it is
 /// their mean over all pixels that must agree, to four times the deviation that the pixels' own scatter gives it.
 fn agrees(name: &str, surface: Material, choices: &[&str], expected: impl Fn(DVec3) -> [f64; 3]) {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let scene = before_a_card(surface);
     let (film, aovs, view) = gpu.all(&scene, &scene.cameras[0], settings(choices));
     let expected: Vec<[f64; 3]> =
@@ -149,7 +144,7 @@ fn light_lost_to_single_scattering_is_given_back_to_rays() {
 /// What is rougher than the knob says sends no rays: without an environment nothing is mirrored.
 #[test]
 fn what_is_rougher_is_left_to_the_environment() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for (roughness, lobes, glows) in [(0.35, "lobes=0.2", false), (0.35, "lobes=0.5", true), (0.8, "lobes=0.5", false)]
     {
         let scene = before_a_card(metal(roughness));
@@ -162,7 +157,7 @@ fn what_is_rougher_is_left_to_the_environment() {
 /// good to 4e-3 (src/pass/environment.rs).
 #[test]
 fn the_roughest_metal_loses_in_a_furnace_what_the_integral_says() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut made = Made::new("furnace");
     let white = Material { base_color: [1.0; 4], metallic: 1.0, roughness: 1.0, ..Material::default() };
     made.add(Shape::panel(8.0, 8.0), white, DAffine3::IDENTITY);

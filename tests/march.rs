@@ -3,13 +3,6 @@
 //! All bodies have the index 1: rays go straight, nothing is reflected, and a pixel before a wall of radiance 1 is the
 //! transmittance of its path.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-#[path = "support/raycast.rs"]
-mod raycast;
-
 use std::sync::Arc;
 
 use etalon::frame::Settings;
@@ -19,9 +12,9 @@ use etalon::plan::{Attenuation, Demand, Facts, Knobs, Model, Plan, Surroundings}
 use etalon::scene::normal_form::NormalForm;
 use etalon::scene::{Camera, LightKind, Material, Scene, SigmaGrid};
 use etalon::study::shape::Shape;
+use etalon_testing::gpu::{Gpu, knobs, settings};
+use etalon_testing::made::{Made, Random, at, lambert, perspective, unlit};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
-use gpu::{Gpu, knobs, settings};
-use made::{Made, Random, at, lambert, perspective, unlit};
 
 fn marching(size: [u32; 2], more: &[&str]) -> Settings {
     let rungs = ["samples=1", "reflection=ray", "refraction=ray", "fresnel=exact"];
@@ -143,7 +136,13 @@ impl Body {
 
 fn ray(camera: &Camera, size: [u32; 2], i: usize, shift: [f64; 2]) -> (DVec3, DVec3) {
     let (x, y) = (i as u32 % size[0], i as u32 / size[0]);
-    let r = raycast::camera_ray(camera, size[0], size[1], f64::from(x) + 0.5 + shift[0], f64::from(y) + 0.5 + shift[1]);
+    let r = etalon_testing::raycast::camera_ray(
+        camera,
+        size[0],
+        size[1],
+        f64::from(x) + 0.5 + shift[0],
+        f64::from(y) + 0.5 + shift[1],
+    );
     (r.origin, r.direction)
 }
 
@@ -172,7 +171,7 @@ fn slab(points: usize, channels: usize, sigma: impl Fn(f64, usize) -> f64) -> (M
 
 #[test]
 fn sums_are_those_of_f64_and_midpoints_are_exact_where_sigma_is_linear() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [48, 27];
     let (low, high) = ([0.1, 0.8, 0.4], [1.2, 0.2, 0.4]);
     for channels in [1, 3] {
@@ -214,7 +213,7 @@ fn sums_are_those_of_f64_and_midpoints_are_exact_where_sigma_is_linear() {
 
 #[test]
 fn errors_fall_by_the_order_of_the_rule() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [8, 6];
     // e^(−10 z/m) over 0.6 m. Simpson's error is (h k)⁴/2880 of the integral, 5e-4 for 4 steps and 2e-6 for 16. Between its
     // points the grid is linear, which any rule that looks at points only takes for the curve itself: (k/4096)² · 0.6²/12 =
@@ -251,7 +250,7 @@ fn errors_fall_by_the_order_of_the_rule() {
 
 #[test]
 fn a_constant_grid_is_a_homogeneous_medium() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [64, 36];
     let color = [0.3, 0.6, 0.9_f32];
     let sigma = color.map(|c| -c.ln() / 0.5);
@@ -283,7 +282,7 @@ fn a_constant_grid_is_a_homogeneous_medium() {
         ("its mean", smoke(grid(1.0)), ["absorption=path", "quadrature=midpoint"]),
     ] {
         let got = picture(material, &rungs);
-        let worst = gpu::largest_difference(&got, &want, 1.0);
+        let worst = etalon_testing::gpu::largest_difference(&got, &want, 1.0);
         eprintln!("{name}: {worst:e}");
         assert!(worst < 1e-6, "{name}: {worst:e}");
     }
@@ -316,7 +315,7 @@ fn bodies(moved: DVec3) -> Vec<Body> {
 
 #[test]
 fn grids_stay_in_their_bodies_wherever_these_are() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [96, 54];
     for (name, moved) in [("here", DVec3::ZERO), ("10 km away", DVec3::new(9e3, -2e3, 4e3))] {
         let bodies = bodies(moved);
@@ -370,7 +369,7 @@ fn grids_stay_in_their_bodies_wherever_these_are() {
 /// its size came about.
 #[test]
 fn a_node_scales_the_place_of_a_grid_and_not_its_sigma() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [48, 27];
     let picture = |edge: f64, scale: f64| {
         let b = 0.5 * DVec3::splat(edge);
@@ -382,7 +381,7 @@ fn a_node_scales_the_place_of_a_grid_and_not_its_sigma() {
         made.camera(DVec3::new(0.2, 0.3, 1.4), DVec3::ZERO, perspective(60.0));
         gpu.film(&made.0, marching(size, &["absorption=march:16"]))
     };
-    let worst = gpu::largest_difference(&picture(0.8, 1.0), &picture(0.2, 4.0), 1.0);
+    let worst = etalon_testing::gpu::largest_difference(&picture(0.8, 1.0), &picture(0.2, 4.0), 1.0);
     eprintln!("{worst:e}");
     assert!(worst < 1e-6, "{worst:e}");
 }
@@ -391,7 +390,7 @@ fn a_node_scales_the_place_of_a_grid_and_not_its_sigma() {
 
 #[test]
 fn light_that_passes_a_grid_is_weakened_along_its_own_way() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [96, 54];
     let bounds = [DVec3::splat(-0.2), DVec3::splat(0.2)];
     let mut random = Random(5);
@@ -469,7 +468,7 @@ fn light_that_passes_a_grid_is_weakened_along_its_own_way() {
 /// Facets of a ball part the lanes of a software device: its rays end at different times.
 #[test]
 fn light_reaches_into_a_body_through_its_grid() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [64, 48];
     let mut random = Random(9);
     let bounds = [DVec3::splat(-0.8), DVec3::splat(0.8)];
@@ -479,7 +478,7 @@ fn light_reaches_into_a_body_through_its_grid() {
     let mut made = Made::new("ball");
     made.add(Shape::sphere(0.22, 12), lambert([0.5; 3]), at(0.1, 0.05, 0.0));
     let ball = made.0.clone();
-    let world = raycast::World::new(&ball, raycast::Options::default());
+    let world = etalon_testing::raycast::World::new(&ball, etalon_testing::raycast::Options::default());
     body.add(&mut made);
     made.light([3.0; 3], LightKind::Directional { direction });
     made.camera(DVec3::new(0.6, 0.5, 2.2), DVec3::new(0.1, 0.05, 0.0), perspective(14.0));
@@ -492,7 +491,7 @@ fn light_reaches_into_a_body_through_its_grid() {
             let (o, d) = ray(&made.0.cameras[0], size, i, [0.0; 2]);
             let hits = AROUND.map(|shift| {
                 let (o, d) = ray(&made.0.cameras[0], size, i, shift);
-                world.closest(&raycast::Ray::new(o, d)).map(|hit| hit.position)
+                world.closest(&etalon_testing::raycast::Ray::new(o, d)).map(|hit| hit.position)
             });
             let (Some(p), true) = (hits[0], hits.iter().all(Option::is_some)) else { continue };
             if clear.rgba[i][0] < 0.01 {

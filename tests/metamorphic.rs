@@ -1,19 +1,12 @@
 //! What must not change the picture: units, place, the order of triangles, and which way the world is turned.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-#[path = "support/raycast.rs"]
-mod raycast;
-
 use etalon::image::Picture;
 use etalon::scene::{LightKind, Scene};
 use etalon::study;
 use etalon::study::generate::{self, at_scale};
+use etalon_testing::gpu::{Gpu, bits, settings};
+use etalon_testing::made::Random;
 use glam::{DAffine3, DVec3};
-use gpu::{Gpu, bits, settings};
-use made::Random;
 
 const SIZE: [u32; 2] = [96, 54];
 
@@ -37,8 +30,8 @@ fn differences(a: &Picture, b: &Picture) -> Vec<f64> {
 
 /// Pixels that are no outlines differ by less than `bound`; of all pixels, one in a thousand may differ by more.
 fn same_but_outlines(a: &Picture, b: &Picture, scene: &Scene, bound: f64, what: &str) {
-    let options = raycast::Options { blend: true, textures: true };
-    let edges = raycast::picture(scene, &scene.cameras[0], a.width, a.height, options);
+    let options = etalon_testing::raycast::Options { blend: true, textures: true };
+    let edges = etalon_testing::raycast::picture(scene, &scene.cameras[0], a.width, a.height, options);
     let differences = differences(a, b);
     let many = differences.iter().filter(|d| **d > bound).count();
     let inside = differences.iter().zip(&edges).filter(|(_, p)| !p.edge).map(|(d, _)| *d);
@@ -51,7 +44,7 @@ fn same_but_outlines(a: &Picture, b: &Picture, scene: &Scene, bound: f64, what: 
 
 #[test]
 fn powers_of_two_are_only_units() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for scene in scenes() {
         let here = gpu.film(&scene, settings(SIZE));
         for exponent in [-10, -3, 1, 10] {
@@ -66,7 +59,7 @@ fn powers_of_two_are_only_units() {
 
 #[test]
 fn ten_kilometres_away_it_looks_the_same() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for scene in scenes() {
         let here = gpu.film(&scene, settings(SIZE));
         for offset in [DVec3::new(1e4, 0.0, 0.0), DVec3::new(-7e3, 1e4, 3e3)] {
@@ -80,7 +73,7 @@ fn ten_kilometres_away_it_looks_the_same() {
 
 #[test]
 fn the_order_of_triangles_and_of_their_corners_does_not_show() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for scene in scenes() {
         let here = gpu.film(&scene, settings(SIZE));
         let mut shuffled = scene.clone();
@@ -88,7 +81,7 @@ fn the_order_of_triangles_and_of_their_corners_does_not_show() {
         for mesh in &mut shuffled.meshes {
             let mut triangles: Vec<[u32; 3]> = mesh.indices.as_chunks::<3>().0.to_vec();
             random.shuffle(&mut triangles);
-            mesh.indices = triangles.concat();
+            mesh.indices = triangles.concat().into();
         }
         let there = gpu.film(&shuffled, settings(SIZE));
         assert!(bits(&here) == bits(&there), "{}: the order of triangles shows", scene.name);
@@ -107,11 +100,11 @@ fn the_order_of_triangles_and_of_their_corners_does_not_show() {
 
 #[test]
 fn a_quarter_turn_of_the_world_with_its_camera_does_not_show() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for scene in scenes() {
         let here = gpu.film(&scene, settings(SIZE));
         let mut turned = scene.clone();
-        let turn: DAffine3 = made::quarter_turn();
+        let turn: DAffine3 = etalon_testing::made::quarter_turn();
         for instance in &mut turned.instances {
             instance.world_from_object = turn * instance.world_from_object;
         }

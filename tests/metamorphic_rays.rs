@@ -2,20 +2,15 @@
 //! world is turned. Rays that have crossed many curved surfaces tell any rounding apart: there it is counted how many pixels
 //! differ.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-
 use etalon::frame::Settings;
 use etalon::image::Picture;
 use etalon::plan::{Knobs, Model};
 use etalon::scene::{LightKind, Scene};
 use etalon::study;
 use etalon::study::generate::at_scale;
+use etalon_testing::gpu::{Gpu, bits};
+use etalon_testing::made::Random;
 use glam::DVec3;
-use gpu::{Gpu, bits};
-use made::Random;
 
 const SIZE: [u32; 2] = [96, 54];
 
@@ -49,7 +44,7 @@ fn compare(a: &Picture, b: &Picture, bound: f32, most: usize, what: &str) {
 /// length of its own.
 #[test]
 fn powers_of_two_are_only_units() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for scene in scenes() {
         let here = gpu.film(&scene, settings());
         for exponent in [-20, -7, 1, 20] {
@@ -64,7 +59,7 @@ fn powers_of_two_are_only_units() {
 /// Positions and lights differ by 1e-12 m, which rounds some of them to the other f32 neighbour.
 #[test]
 fn ten_kilometres_away_it_looks_the_same() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for scene in scenes() {
         let here = gpu.film(&scene, settings());
         let moved = at_scale(scene.clone(), 1.0, DVec3::new(-7e3, 1e4, 3e3));
@@ -78,7 +73,7 @@ fn ten_kilometres_away_it_looks_the_same() {
 /// pixels differ.
 #[test]
 fn the_order_of_triangles_does_not_show() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for scene in scenes() {
         let here = gpu.film(&scene, settings());
         let mut shuffled = scene.clone();
@@ -86,7 +81,7 @@ fn the_order_of_triangles_does_not_show() {
         for mesh in &mut shuffled.meshes {
             let mut triangles: Vec<[u32; 3]> = mesh.indices.as_chunks::<3>().0.to_vec();
             random.shuffle(&mut triangles);
-            mesh.indices = triangles.concat();
+            mesh.indices = triangles.concat().into();
         }
         let there = gpu.film(&shuffled, settings());
         let most = if scene.name.contains("pool") { 25 } else { 0 };
@@ -97,7 +92,7 @@ fn the_order_of_triangles_does_not_show() {
 /// Sums of floats in another order.
 #[test]
 fn the_order_of_lights_does_not_show() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for scene in scenes().into_iter().filter(|scene| scene.lights.len() > 1) {
         let here = gpu.film(&scene, settings());
         let mut turned = scene.clone();
@@ -110,10 +105,10 @@ fn the_order_of_lights_does_not_show() {
 /// Normals of the G-buffer are not alike along all axes, and other boxes bound the same triangles.
 #[test]
 fn a_quarter_turn_of_the_world_does_not_show() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for scene in scenes() {
         let here = gpu.film(&scene, settings());
-        let turn = made::quarter_turn();
+        let turn = etalon_testing::made::quarter_turn();
         let mut turned = scene.clone();
         turned.instances.iter_mut().for_each(|i| i.world_from_object = turn * i.world_from_object);
         turned.cameras.iter_mut().for_each(|c| c.world_from_camera = turn * c.world_from_camera);

@@ -3,22 +3,15 @@
 //! Most pictures look at a card, an unlit panel whose colour is the place on it. What is seen through optics is that
 //! colour times the throughput: red over blue is where the path ended, blue how much of the light arrived.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-#[path = "support/raycast.rs"]
-mod raycast;
-
 use etalon::frame::{Rendered, Settings};
 use etalon::optics::fresnel::fresnel_dielectric;
 use etalon::optics::snell::{critical_angle, refract};
 use etalon::scene::environment::Environment;
 use etalon::scene::{AlphaMode, Camera, Image, LightKind, Material, Mesh, Projection, Sampler, TextureRef};
 use etalon::study::{self, shape::Shape};
+use etalon_testing::gpu::{Gpu, knobs, settings};
+use etalon_testing::made::{Made, at, lambert, looking, orthographic, perspective, unlit};
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
-use gpu::{Gpu, knobs, settings};
-use made::{Made, at, lambert, looking, orthographic, perspective, unlit};
 
 /// Rays for mirrors and glass with the exact formulas, and some other rungs.
 fn optics(size: [u32; 2], more: &[&str]) -> Settings {
@@ -58,7 +51,7 @@ fn on_card(pixel: [f32; 4], size: f64) -> (DVec2, f64) {
 fn ray(camera: &Camera, size: [u32; 2], i: usize, shift: DVec2) -> (DVec3, DVec3) {
     let (x, y) = (i as u32 % size[0], i as u32 / size[0]);
     let (x, y) = (f64::from(x) + 0.5 + shift.x, f64::from(y) + 0.5 + shift.y);
-    let ray = raycast::camera_ray(camera, size[0], size[1], x, y);
+    let ray = etalon_testing::raycast::camera_ray(camera, size[0], size[1], x, y);
     (ray.origin, ray.direction)
 }
 
@@ -77,7 +70,7 @@ const PATTERNS: usize = 60;
 /// Balls and boxes that shine, all on the side z > 0.
 fn patterns() -> Made {
     let mut made = Made::new("patterns");
-    let mut random = made::Random(11);
+    let mut random = etalon_testing::made::Random(11);
     for i in 0..PATTERNS {
         let color = [0; 3].map(|_| random.between(0.1, 3.0) as f32);
         let glow = Material { emissive: color, specular: 0.0, ..lambert([0.0; 3]) };
@@ -92,7 +85,7 @@ fn patterns() -> Made {
 
 #[test]
 fn a_plane_mirror_shows_what_a_mirrored_camera_sees() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [160, 90];
     for projection in [perspective(50.0), orthographic(1.0)] {
         let mut scene = patterns();
@@ -107,18 +100,18 @@ fn a_plane_mirror_shows_what_a_mirrored_camera_sees() {
         scene.0.cameras = vec![behind];
         let want = gpu.film(&scene.0, optics(size, &[]));
         let world_scene = scene.0.clone();
-        let world = raycast::World::new(&world_scene, raycast::Options::default());
+        let world = etalon_testing::raycast::World::new(&world_scene, etalon_testing::raycast::Options::default());
         scene.add(Shape::panel(9.0, 6.0), mirror(1.0), DAffine3::IDENTITY);
         scene.0.cameras = vec![camera.clone()];
         let with = gpu.film(&scene.0, optics(size, &["interfaces=1"]));
-        let everything = raycast::World::new(&scene.0, raycast::Options::default());
+        let everything = etalon_testing::raycast::World::new(&scene.0, etalon_testing::raycast::Options::default());
         let (mut compared, mut seen, mut left_out) = (0, 0, 0);
         for (i, got) in with.rgba.iter().enumerate() {
             let (x, y) = (i % size[0] as usize, i / size[0] as usize);
             let other = y * size[0] as usize + (size[0] as usize - 1 - x);
             let hits = |shift: DVec2| {
                 let (o, d) = ray(&camera, size, i, shift);
-                everything.closest(&raycast::Ray::new(o, d)).map(|hit| hit.instance)
+                everything.closest(&etalon_testing::raycast::Ray::new(o, d)).map(|hit| hit.instance)
             };
             // Pixels that see the mirror, and in it one thing all around their middles.
             if !AROUND.iter().all(|&shift| hits(shift) == Some(PATTERNS)) {
@@ -126,7 +119,8 @@ fn a_plane_mirror_shows_what_a_mirrored_camera_sees() {
             }
             let mirrored = |shift: DVec2| {
                 let (o, d) = ray(&world_scene.cameras[0], size, other, shift);
-                let plane = raycast::Ray { nearest: -o.z / d.z, ..raycast::Ray::new(o, d) };
+                let plane =
+                    etalon_testing::raycast::Ray { nearest: -o.z / d.z, ..etalon_testing::raycast::Ray::new(o, d) };
                 world.closest(&plane).map(|hit| hit.instance)
             };
             let here = mirrored(DVec2::ZERO);
@@ -146,7 +140,7 @@ fn a_plane_mirror_shows_what_a_mirrored_camera_sees() {
 
 #[test]
 fn a_tilted_mirror_shows_every_place_where_it_is() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [96, 54];
     for tilt in [0.0, 0.35, -0.5] {
         let mut made = Made::new("tilted mirror");
@@ -186,7 +180,7 @@ fn a_tilted_mirror_shows_every_place_where_it_is() {
 
 #[test]
 fn a_slab_shifts_what_is_behind_it_sideways() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [128, 72];
     for (d, n) in [(0.5, 1.5_f32), (1.2, 1.5), (0.8, 1.333), (0.3, 2.4)] {
         let mut made = Made::new("slab");
@@ -245,7 +239,7 @@ fn through_ball(o: DVec3, d: DVec3, [r_in, r_out]: [f64; 2], n: f64, far: f64) -
 
 #[test]
 fn a_glass_ball_maps_places_as_an_exact_sphere_does() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [96, 96];
     let (radius, far) = (0.8, -1.6);
     let mut mean = Vec::new();
@@ -295,7 +289,7 @@ fn a_glass_ball_maps_places_as_an_exact_sphere_does() {
 
 #[test]
 fn a_prism_deviates_by_snells_law_applied_twice() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [16, 9];
     let n = f64::from(1.62_f32);
     let apex = 60.0_f64.to_radians();
@@ -340,7 +334,7 @@ fn a_prism_deviates_by_snells_law_applied_twice() {
 
 #[test]
 fn snells_window_is_as_wide_as_the_critical_angle() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [160, 90];
     let scene = study::load("pool").expect("a study scene");
     let picture = |sky: f32| {
@@ -367,15 +361,15 @@ fn snells_window_is_as_wide_as_the_critical_angle() {
     let is = |i: usize, name: &str| scene.materials[scene.meshes[scene.instances[i].mesh].material].name == name;
     air.instances =
         (0..scene.instances.len()).filter(|&i| !is(i, "water")).map(|i| scene.instances[i].clone()).collect();
-    let air = raycast::World::new(&air, raycast::Options::default());
+    let air = etalon_testing::raycast::World::new(&air, etalon_testing::raycast::Options::default());
     let free = |r: f64, azimuth: f64| {
         let (x, y) = (80.0 + r * azimuth.cos(), 45.0 + r * azimuth.sin());
-        let below = raycast::camera_ray(&scene.cameras[0], 160, 90, x, y);
+        let below = etalon_testing::raycast::camera_ray(&scene.cameras[0], 160, 90, x, y);
         let surface = -below.origin.y / below.direction.y;
         let (direction, total, _) = refract(below.direction, DVec3::NEG_Y, 1.0 / f64::from(water));
-        let above = raycast::Ray::new(below.origin + below.direction * surface, direction);
+        let above = etalon_testing::raycast::Ray::new(below.origin + below.direction * surface, direction);
         !total
-            && air.closest(&raycast::Ray { farthest: surface, ..below }).is_none()
+            && air.closest(&etalon_testing::raycast::Ray { farthest: surface, ..below }).is_none()
             && air.closest(&above).is_some_and(|hit| scene.materials[hit.material].name == "sky")
     };
     let (mut measured, mut worst) = (0, 0.0_f64);
@@ -430,7 +424,7 @@ fn prism_faces(corners: &[DVec2], depth: f64, frame: DAffine3) -> Vec<(DVec3, DV
 
 #[test]
 fn a_wedge_absorbs_by_the_length_of_each_path() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [72, 54];
     let corners = [DVec2::new(-0.45, -0.25), DVec2::new(0.45, -0.25), DVec2::new(-0.45, 0.35)];
     let depth = 0.4;
@@ -507,7 +501,7 @@ fn lit_floor() -> Made {
 
 #[test]
 fn a_ball_of_nothing_is_invisible_and_so_is_its_shadow() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [128, 72];
     // Bright above and dark below: what the ball mirrored would show.
     let sky = Environment {
@@ -557,7 +551,7 @@ fn glowing_room(made: &mut Made, size: f64) {
 
 #[test]
 fn a_boundary_reflects_what_fresnels_equations_say() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [96, 96];
     for n in [1.333_f32, 1.5, 2.4] {
         let mut made = Made::new("boundary");
@@ -588,7 +582,7 @@ fn a_boundary_reflects_what_fresnels_equations_say() {
 
 #[test]
 fn beyond_the_critical_angle_all_light_stays_inside() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [96, 96];
     for n in [1.333_f32, 1.5, 2.4] {
         let mut made = Made::new("inside");
@@ -785,7 +779,7 @@ fn turned(x: f64, y: f64, z: f64, axis: DVec3, angle: f64) -> DAffine3 {
 
 #[test]
 fn paths_through_bodies_in_one_another_are_those_of_the_media_that_win() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let block = Body {
         frame: turned(0.0, 0.0, 0.0, DVec3::new(1.0, 2.0, 0.5), 0.4),
         edges: DVec3::splat(1.2),
@@ -829,7 +823,7 @@ fn paths_through_bodies_in_one_another_are_those_of_the_media_that_win() {
 
 #[test]
 fn bodies_of_one_index_are_one_body() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [80, 45];
     let (color, distance) = ([0.4, 0.7, 0.9_f32], 0.8);
     for (n, fresnel) in [(1.5_f32, "fresnel=exact"), (1.5, "fresnel=schlick"), (1.0, "fresnel=exact")] {
@@ -941,7 +935,7 @@ fn against_shares(gpu: &Gpu, made: &Made, bound: f64, want: impl Fn(DVec3, DVec3
 
 #[test]
 fn an_opaque_body_casts_its_shadow_where_f64_has_it() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for kind in lights() {
         let mut made = lit_wall(kind);
         let body = Body {
@@ -974,7 +968,7 @@ fn an_opaque_body_casts_its_shadow_where_f64_has_it() {
 
 #[test]
 fn coloured_sheets_and_bodies_colour_the_light_that_passes_them() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for kind in lights() {
         // A sheet: its colour once and one boundary's transmission.
         let mut made = lit_wall(kind);
@@ -1019,7 +1013,7 @@ fn coloured_sheets_and_bodies_colour_the_light_that_passes_them() {
 
 #[test]
 fn light_passes_the_holes_of_a_mask() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let holes = |x: u32, y: u32| (x * 3 + y * 5) % 7 < 3;
     for kind in lights() {
         let mut made = lit_wall(kind);
@@ -1088,7 +1082,7 @@ fn flawed(name: &str, n: f32, edit: impl FnOnce(&mut Mesh)) -> Made {
 
 #[test]
 fn flawed_glass_gives_a_defined_picture_and_is_named() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let nothing_more = |_: &mut Mesh| ();
     for fresnel in ["fresnel=exact", "fresnel=schlick"] {
         for n in [1.5, 1.0] {
@@ -1126,7 +1120,8 @@ fn flawed_glass_gives_a_defined_picture_and_is_named() {
                 let middle = m.positions.len() as u32;
                 let [p, q] = [a, b].map(|i| glam::Vec3::from(m.positions[i as usize]));
                 m.positions.push(((p + q) * 0.5).to_array());
-                m.normals.push(m.normals[a as usize]);
+                let normal = m.normals[a as usize];
+                m.normals.push(normal);
                 m.uvs[0].push([0.0; 2]);
                 m.indices.extend([a, b, middle, b, a, middle]);
             };
@@ -1150,13 +1145,13 @@ fn flawed_glass_gives_a_defined_picture_and_is_named() {
 
 #[test]
 fn turned_over_glass_looks_as_it_would_the_right_way_round() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let picture = |[turned_over, normals, mirrored]: [bool; 3]| {
         let mut made = flawed("ball", 1.5, |m| {
             *m = Mesh { material: m.material, name: m.name.clone(), ..Mesh::default() };
             let ball = Shape::sphere(0.6, 16);
-            (m.positions, m.normals, m.indices) = (ball.positions, ball.normals, ball.indices);
-            m.uvs[0] = ball.uvs;
+            (m.positions, m.normals, m.indices) = (ball.positions.into(), ball.normals.into(), ball.indices.into());
+            m.uvs[0] = ball.uvs.into();
             if turned_over {
                 m.indices.chunks_exact_mut(3).for_each(|t| t.swap(1, 2));
             }
@@ -1189,7 +1184,7 @@ fn turned_over_glass_looks_as_it_would_the_right_way_round() {
 
 #[test]
 fn bodies_that_share_a_face_lose_no_light() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for (name, gap, n) in
         [("touching", 0.0, [1.5, 1.333]), ("twins", -0.6, [1.5, 1.5]), ("far apart", 0.5, [1.5, 1.333])]
     {
@@ -1206,7 +1201,7 @@ fn bodies_that_share_a_face_lose_no_light() {
 
 #[test]
 fn an_eye_on_the_glass_sees() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     // On the front face of a block, in its plane to the last bit, looking in, out and along it; and on an edge and a corner.
     for (name, eye) in [
         ("on a face", DVec3::new(0.1, 0.2, 0.5)),
@@ -1226,7 +1221,7 @@ fn an_eye_on_the_glass_sees() {
 
 #[test]
 fn what_is_not_followed_is_reported() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [96, 54];
     let mut made = Made::new("mirrors");
     // Two mirrors face one another, not quite parallel, with lamps between them.
@@ -1277,7 +1272,7 @@ fn what_is_not_followed_is_reported() {
 
 #[test]
 fn two_slabs_that_touch_shift_a_ray_as_both_do() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     // Glass on water without a gap: all faces are parallel, so a ray leaves in its own direction.
     for indices in [[1.5_f32, 1.333], [1.333, 1.5]] {
         let mut made = Made::new("sandwich");
@@ -1308,7 +1303,7 @@ fn two_slabs_that_touch_shift_a_ray_as_both_do() {
 
 #[test]
 fn two_bodies_of_one_index_that_touch_are_as_one() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let picture = |cuts: &[f64], moved: DVec3| {
         let mut made = Made::new("cut");
         for ends in cuts.windows(2) {
@@ -1338,7 +1333,7 @@ fn two_bodies_of_one_index_that_touch_are_as_one() {
 
 #[test]
 fn what_lies_against_a_body_is_seen_through_it() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     // A card right under a slab, as a glass stands on a table, and a little off it; the same with facets that are small beside
     // the card's two; and two bodies, one in the other, with a common bottom on the card, or the inner one a little higher.
     for (name, size, inner) in [("slab", 1.0, false), ("small", 0.01, false), ("two", 1.0, true)] {
@@ -1371,7 +1366,7 @@ fn what_lies_against_a_body_is_seen_through_it() {
 
 #[test]
 fn every_level_of_a_texture_is_read_where_it_lies() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     // Half black, half white: on every level, but near the edge. The tilted wall is seen in a mirror from 4 to 12 m.
     let texels = 1024_u32;
     let rgba =
@@ -1409,7 +1404,7 @@ fn every_level_of_a_texture_is_read_where_it_lies() {
 
 #[test]
 fn light_to_an_eye_inside_a_body_is_absorbed_on_its_way() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let color = [0.3, 0.6, 0.9_f32];
     for (projection, moved) in [(perspective(60.0), 0.0), (orthographic(1.5), 900.0)] {
         let mut made = Made::new("under water");
@@ -1442,7 +1437,7 @@ fn light_to_an_eye_inside_a_body_is_absorbed_on_its_way() {
 
 #[test]
 fn triangles_that_are_there_twice_are_named() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let warnings = |twice: Material| {
         let mut made = Made::new("twice");
         made.add(Shape::panel(2.0, 2.0), mirror(0.9), at(0.0, 0.0, -3.0));
@@ -1465,7 +1460,7 @@ fn triangles_that_are_there_twice_are_named() {
 
 #[test]
 fn mirrors_between_glass_vanish_in_a_white_furnace() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     // Strips narrower than a group of lanes: their paths end at different turns of the loop, and each keeps its light.
     let mut made = Made::new("strips");
     for i in 0..24 {
@@ -1489,7 +1484,7 @@ fn mirrors_between_glass_vanish_in_a_white_furnace() {
 
 #[test]
 fn what_lies_behind_the_holes_of_masks_is_seen_in_mirrors() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     // Fine holes before a card: neighbouring lanes end at the first, second or third mask, or behind them.
     let mut made = Made::new("holes");
     let texel = |i: u32| if (i + i / 8).is_multiple_of(2) { [255; 4] } else { [255, 255, 255, 0] };
@@ -1518,7 +1513,7 @@ fn what_lies_behind_the_holes_of_masks_is_seen_in_mirrors() {
 
 #[test]
 fn a_light_behind_many_sheets_is_as_dark_beside_them_as_a_blocked_one() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     // Strips finer than a group of lanes, opaque and not, over eleven sheets: one lane is through at once, the next one goes
     // on behind the fourth sheet and the eighth.
     let mut made = Made::new("comb");

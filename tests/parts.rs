@@ -1,10 +1,5 @@
 //! Parts of a picture: what rays brought that were first mirrored, and what those brought that first went through.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-
 use etalon::frame::{Part, Rendered, Settings};
 use etalon::image::Picture;
 use etalon::optics::fresnel::fresnel_dielectric;
@@ -12,9 +7,9 @@ use etalon::plan::{Knobs, Model};
 use etalon::scene::environment::Environment;
 use etalon::scene::{AlphaMode, Camera, Material, Scene};
 use etalon::study::{self, shape::Shape};
+use etalon_testing::gpu::{Gpu, bits, knobs, settings};
+use etalon_testing::made::{Made, at, lambert, pane, perspective, unlit};
 use glam::{DAffine3, DVec3};
-use gpu::{Gpu, bits, knobs, settings};
-use made::{Made, at, lambert, pane, perspective, unlit};
 
 const BOTH: [Part; 2] = [Part::Reflection, Part::Refraction];
 
@@ -82,7 +77,7 @@ fn without(scene: &Scene, which: impl Fn(&Material) -> bool) -> Scene {
 /// a blended pane. The smooth metal emits some light of its own; what a coat covers would be weakened by it.
 fn crowd() -> Made {
     let mut made = Made::new("crowd");
-    let mut random = made::Random(5);
+    let mut random = etalon_testing::made::Random(5);
     let coated = Material { clearcoat: 1.0, ..shining([0.0; 3]) };
     let kinds = [
         glass(1.5),
@@ -130,7 +125,7 @@ fn lit_pixels(picture: &Picture) -> usize {
 
 #[test]
 fn a_picture_is_the_sum_of_its_parts_and_what_is_left_without_rays() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let scene = crowd().0;
     let sky = Environment::studio();
     for rungs in
@@ -153,7 +148,7 @@ fn a_picture_is_the_sum_of_its_parts_and_what_is_left_without_rays() {
 /// Where bodies are laid over the picture of the opaque surfaces, what those mirror is bent and weakened with it.
 #[test]
 fn mirror_images_seen_through_bodies_on_the_screen_are_bent_with_the_picture() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let scene = crowd().0;
     for refraction in ["refraction=screen", "refraction=off"] {
         let drawn = || traced([128, 72], &["samples=4", refraction]);
@@ -169,7 +164,7 @@ fn mirror_images_seen_through_bodies_on_the_screen_are_bent_with_the_picture() {
 
 #[test]
 fn asking_for_parts_changes_neither_the_picture_nor_its_work() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let scenes = ["etalon", "pool", "nested", "blend"].map(|name| study::load(name).expect("a study scene"));
     for scene in scenes.into_iter().chain([crowd().0]) {
         let mut knobs = Knobs::of(Model::Recursive);
@@ -215,7 +210,7 @@ fn through_a_pane(f: f64) -> ([f64; 2], bool) {
 
 #[test]
 fn a_pane_mirrors_f_of_what_lies_before_it_and_lets_the_rest_through() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [96, 72];
     for n in [1.333_f32, 1.5, 2.4] {
         let mut made = Made::new("pane");
@@ -262,7 +257,7 @@ fn direction(camera: &Camera, size: [u32; 2], i: usize) -> DVec3 {
 
 #[test]
 fn a_mirror_has_no_refraction_and_a_body_of_nothing_no_reflection() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for (material, part) in [(metal(0.0), 0), (glass(1.0), 1)] {
         let mut made = Made::new("one part");
         made.add(Shape::cuboid(DVec3::new(2.0, 2.0, 0.5)), material, DAffine3::from_rotation_y(0.3));
@@ -280,7 +275,7 @@ fn a_mirror_has_no_refraction_and_a_body_of_nothing_no_reflection() {
 
 #[test]
 fn where_no_ray_is_sent_parts_are_zero_and_that_is_said() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut made = Made::new("matte");
     made.add(Shape::sphere(0.5, 16), lambert([0.5; 3]), DAffine3::IDENTITY);
     made.add(Shape::panel(1.0, 1.0), unlit([0.5; 3]), at(1.0, 0.0, 0.0));

@@ -1,24 +1,19 @@
 //! Paths of light against truth: furnaces, rooms whose light is known in closed form, and the same film whatever the order of
 //! the work.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-
 use etalon::frame::Settings;
 use etalon::image::Picture;
 use etalon::plan::{Knobs, Model};
-use etalon::scene::bvh::Bvh;
-use etalon::scene::caustics::Aims;
-use etalon::scene::emitters::{Emitters, Sky, Source};
 use etalon::scene::environment::{self, Environment};
 use etalon::scene::solid::solids;
 use etalon::scene::{Extent, Light, LightKind, Material, Projection, Scene};
 use etalon::study::shape::Shape;
+use etalon::transport::bvh::Bvh;
+use etalon::transport::caustics::Aims;
+use etalon::transport::emitters::{Emitters, Sky, Source};
+use etalon_testing::gpu::{Gpu, bits};
+use etalon_testing::made::{Made, at, lambert, orthographic, perspective};
 use glam::{DAffine3, DVec3};
-use gpu::{Gpu, bits};
-use made::{Made, at, lambert, orthographic, perspective};
 
 fn settings(size: [u32; 2], choices: &[&str]) -> Settings {
     let mut knobs = Knobs::of(Model::Global);
@@ -64,7 +59,7 @@ fn under(light: Light, expected: f64) -> (Scene, f64) {
 
 #[test]
 fn lights_with_a_shape_light_as_their_form_factors_say() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let light = |extent: Option<Extent>, kind: LightKind| Light {
         name: "lamp".to_owned(),
         color: [2.0; 3],
@@ -119,7 +114,7 @@ fn lights_with_a_shape_light_as_their_form_factors_say() {
 /// However many places are looked for, the light is the same, and there is less noise; queues and one dispatch agree to the last bit.
 #[test]
 fn more_places_on_lights_are_the_same_light_with_less_noise() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut scene = etalon::study::load("cornell").expect("a scene");
     scene.lights.clear();
     let mut noise = Vec::new();
@@ -148,7 +143,7 @@ fn more_places_on_lights_are_the_same_light_with_less_noise() {
 /// Half of a shape hidden by a wall gives half of its light.
 #[test]
 fn shapes_cast_soft_shadows() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let position = DVec3::Z;
     let right = std::f64::consts::FRAC_PI_2;
     let kind = LightKind::Spot { position, direction: DVec3::NEG_Z, range: None, inner: right, outer: right };
@@ -170,7 +165,7 @@ fn shapes_cast_soft_shadows() {
 
 #[test]
 fn nothing_white_shows_before_light_from_everywhere() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let sky = Environment::constant([1.0; 3]);
     let glass =
         Material { transmission: 1.0, ior: 1.5, thickness: 1.0, specular: 1.0, roughness: 0.0, ..lambert([1.0; 3]) };
@@ -204,7 +199,7 @@ fn room(albedo: f32, glow: f32) -> Scene {
 
 #[test]
 fn a_room_is_as_bright_as_its_walls_emit_and_keep() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     // L = E/(1 − ρ) everywhere.
     for (albedo, glow) in [(0.5, 0.5), (0.8, 0.2), (0.0, 1.0)] {
         let picture = draw(&gpu, &room(albedo, glow), None, settings([16, 16], &["samples=256"]));
@@ -232,7 +227,7 @@ fn parallel_squares(distance: f64) -> Scene {
 
 #[test]
 fn squares_light_each_other_by_their_form_factor() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     // Of parallel unit squares at a distance of 1, 0.5 and 2 (Howell, catalogue of configuration factors, C-11).
     let form_factor = |c: f64| {
         let x = 1.0 / c;
@@ -255,7 +250,7 @@ fn squares_light_each_other_by_their_form_factor() {
 
 #[test]
 fn a_bright_spot_of_the_sky_is_found() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut sky = Environment::constant([0.2; 3]);
     (sky.width, sky.height) = (64, 32);
     sky.radiance = vec![[0.2; 3]; 64 * 32];
@@ -290,7 +285,7 @@ fn a_bright_spot_of_the_sky_is_found() {
 
 #[test]
 fn light_from_points_and_from_afar_is_what_the_local_model_says() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut made = Made::new("lit floor");
     let floor = Material { roughness: 0.5, specular: 1.0, ..lambert([0.6, 0.4, 0.2]) };
     made.add(Shape::panel(4.0, 4.0), floor, DAffine3::from_rotation_x(-std::f64::consts::FRAC_PI_2));
@@ -331,7 +326,7 @@ fn by_a_mirror() -> (Made, f64) {
 
 #[test]
 fn aims_take_the_noise_and_leave_the_mean() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let (made, radiance) = by_a_mirror();
     let [off, aims] = ["guiding=off", "guiding=aims"].map(|guiding| {
         let film = draw(&gpu, &made.0, None, settings([16, 16], &["samples=1024", "interfaces=4", guiding]));
@@ -375,7 +370,7 @@ fn aims_are_where_light_is_mirrored() {
 
 #[test]
 fn queues_and_one_dispatch_make_the_same_film() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for name in ["etalon", "cornell", "blend", "nested", "haze", "lamps", "materials", "metals", "pool", "radiance"] {
         let scene = etalon::study::load(name).unwrap();
         let sky = Environment::studio();
@@ -395,7 +390,7 @@ fn queues_and_one_dispatch_make_the_same_film() {
 
 #[test]
 fn what_lies_behind_tinted_glass_is_weakened_in_alpha() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut made = Made::new("pane");
     let pane = Material { transmission: 1.0, roughness: 0.0, specular: 0.0, ..lambert([0.1, 0.2, 0.3]) };
     made.add(Shape::panel(4.0, 4.0), pane, DAffine3::IDENTITY);
@@ -408,14 +403,16 @@ fn what_lies_behind_tinted_glass_is_weakened_in_alpha() {
 
 #[test]
 fn what_emits_lights_only_where_a_knob_says_so() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let scene = parallel_squares(1.0);
     let picture = draw(&gpu, &scene, None, settings([8, 8], &["samples=4", "lights=points"]));
     assert_eq!(spread(&picture, 0)[2], 0.0);
     // It is seen all the same.
     let mut turned = scene;
-    turned.cameras[0] =
-        etalon::scene::Camera { projection: perspective(20.0), ..made::looking(DVec3::new(0.0, 0.3, 0.0), DVec3::Y) };
+    turned.cameras[0] = etalon::scene::Camera {
+        projection: perspective(20.0),
+        ..etalon_testing::made::looking(DVec3::new(0.0, 0.3, 0.0), DVec3::Y)
+    };
     let picture = draw(&gpu, &turned, None, settings([8, 8], &["samples=4", "lights=points"]));
     assert!((spread(&picture, 0)[0] - 1.0).abs() < 1e-6);
 }

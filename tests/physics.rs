@@ -1,18 +1,13 @@
 //! What must hold of the shaders' formulas together, on the device: energy, reciprocity, Snell's law there and back, the
 //! furnace, and the lecture's quiz.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/probe.rs"]
-mod probe;
-
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use etalon::optics::catalogue::{columns, vector};
 use etalon::optics::{Draw, Tier};
+use etalon_testing::gpu::Gpu;
+use etalon_testing::probe::{PROMISING, column, evaluate, value};
 use glam::DVec3;
-use gpu::Gpu;
-use probe::{PROMISING, column, evaluate, value};
 
 const CASES: usize = 100_000;
 
@@ -28,7 +23,7 @@ fn above(draw: &mut Draw, n: DVec3, least: f64) -> DVec3 {
 
 #[test]
 fn reflected_and_transmitted_power_are_one() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut draw = Draw::new(1);
     let dielectrics: Vec<Vec<f32>> = (0..CASES).map(|_| vec![draw.unit() as f32, draw.log(0.2, 5.0) as f32]).collect();
     let metals: Vec<Vec<f32>> =
@@ -51,7 +46,7 @@ fn reflected_and_transmitted_power_are_one() {
 
 #[test]
 fn reflectance_never_falls_on_the_way_to_the_critical_angle() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for n in [0.4_f32, 0.66, 0.75, 0.9, 0.99] {
         let critical = (1.0 - f64::from(n).powi(2)).sqrt();
         // Beyond Brewster's angle, arctan n, both parts grow until all is reflected.
@@ -74,7 +69,7 @@ fn reflectance_never_falls_on_the_way_to_the_critical_angle() {
 
 #[test]
 fn refraction_obeys_snell_and_can_be_undone() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut draw = Draw::new(2);
     let rows: Vec<Vec<f32>> = (0..CASES)
         .map(|_| {
@@ -121,7 +116,7 @@ fn refraction_obeys_snell_and_can_be_undone() {
 
 #[test]
 fn a_chain_of_reflections_keeps_its_length() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut draw = Draw::new(3);
     let mut drift = |tier| {
         let mut directions: Vec<DVec3> = (0..1000).map(|_| draw.direction()).collect();
@@ -162,7 +157,7 @@ fn exchanged(seed: u64, parameters: impl Fn(&mut Draw) -> Vec<f32>) -> [Vec<Vec<
 
 #[test]
 fn brdfs_that_claim_reciprocity_have_it() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let phong = |draw: &mut Draw| vec![1.0, 0.1, 0.5, draw.log(1.0, 1e4) as f32];
     let ggx = |draw: &mut Draw| vec![draw.log(1e-3, 1.0) as f32, draw.unit() as f32];
     for tier in PROMISING {
@@ -181,7 +176,7 @@ fn brdfs_that_claim_reciprocity_have_it() {
 
 #[test]
 fn blinn_phong_is_not_reciprocal_by_the_ratio_of_the_cosines() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let [a, b] = exchanged(6, |draw| vec![1.0, 0.0, 1.0, draw.between(1.0, 20.0) as f32]);
     let (radiance, cos) = (column("blinn_phong", "Lref"), column("blinn_phong", "cos_in"));
     let (there, back) =
@@ -229,7 +224,7 @@ fn quadrature(gpu: &Gpu, name: &str, output: &str, angle: f64, parameters: &[f32
 
 #[test]
 fn the_furnace_gives_back_no_more_than_it_gets() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let angles = [0.0, 30.0, 60.0, 80.0, 89.0_f64].map(f64::to_radians);
     for angle in angles {
         // Lambert with k_d = 1/π reflects everything: L_ref is f cosθ, so the weight is without the cosine.
@@ -258,7 +253,7 @@ fn the_furnace_gives_back_no_more_than_it_gets() {
 
 #[test]
 fn the_quiz_comes_out_of_the_shaders() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for tier in Tier::ALL {
         let close = |found: f64, want: f64, what: &str| {
             // 1.2 is no f32, and F0 changes 4δn/(n² − 1) with n: 4.4e-7.
@@ -318,7 +313,7 @@ fn solid_angle(gpu: &Gpu, tier: Tier, corners: [[f64; 3]; 3], side: u32) -> f64 
 
 #[test]
 fn solid_angles_of_known_triangles() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for tier in PROMISING {
         let omega = |corners: [[f64; 3]; 3]| solid_angle(&gpu, tier, corners, 200);
         let octant = omega([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]]);
@@ -334,7 +329,7 @@ fn solid_angles_of_known_triangles() {
 
 #[test]
 fn both_angles_of_a_boundary_are_those_of_its_reflectance() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut draw = Draw::new(9);
     for tier in PROMISING {
         for _ in 0..200 {
@@ -358,7 +353,7 @@ fn both_angles_of_a_boundary_are_those_of_its_reflectance() {
 
 #[test]
 fn eight_bit_colours_survive_decoding_and_encoding() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for tier in PROMISING {
         let bytes: Vec<Vec<f32>> = (0..256).map(|b| vec![b as f32 / 255.0]).collect();
         let decode = column("srgb", "decode");

@@ -1,18 +1,15 @@
 //! Pipelines are made while the passes before run, but not under validation: the picture is the same.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-
 use etalon::frame::{Renderer, Settings};
 use etalon::gpu::{Device, DeviceChoice};
 use etalon::plan::Knobs;
-use gpu::Gpu;
+use etalon_testing::gpu::Gpu;
 
 /// Many devices, one after the other, each of which makes all pipelines of two scenes anew.
 #[test]
 fn a_frame_that_waits_for_its_pipelines_is_the_same() {
     const ROUNDS: u32 = 12;
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for study in ["etalon", "blend"] {
         let scene = etalon::study::load(study).expect("a study scene");
         let mut knobs = Knobs::default();

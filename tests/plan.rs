@@ -1,11 +1,6 @@
 //! What a scene does not call for is not there, and nothing is missed: the same scene with a surface that calls for it, out
 //! of sight, is planned with it and gives the same picture to the last bit.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -17,15 +12,15 @@ use etalon::scene::environment::Environment;
 use etalon::scene::material::{Sampler, TextureRef};
 use etalon::scene::{AlphaMode, Image, LightKind, Material, Scene, SigmaGrid};
 use etalon::study::shape::Shape;
+use etalon_testing::gpu::{Gpu, bits};
+use etalon_testing::made::{Made, at, lambert, orthographic, unlit};
 use glam::DVec3;
-use gpu::{Gpu, bits};
-use made::{Made, at, lambert, orthographic, unlit};
 
 const SIZE: [u32; 2] = [48, 36];
 
 /// A texture of 4x4 texels of one colour, the only one of its scene.
 fn one_colour(made: &mut Made, rgba: [u8; 4]) -> TextureRef {
-    made.0.images = vec![Image { name: "texels".to_owned(), width: 4, height: 4, rgba: rgba.repeat(16) }];
+    made.0.images = vec![Image { name: "texels".to_owned(), width: 4, height: 4, rgba: rgba.repeat(16).into() }];
     TextureRef { image: 0, uv_set: 0, uv_transform: glam::Affine2::IDENTITY, sampler: Sampler::default() }
 }
 

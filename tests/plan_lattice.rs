@@ -1,11 +1,6 @@
 //! Every plan once: tiny scenes for all ways in which lights are looked for, surfaces mirror and let light through, and
 //! everything else so spread over them that any two things meet. Each is drawn under core and synchronization validation.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -19,9 +14,9 @@ use etalon::scene::normal_form::normalise;
 use etalon::scene::reads::forget_unread;
 use etalon::scene::{AlphaMode, Ambience, Image, LightKind, Material, Reads, SigmaGrid};
 use etalon::study::shape::Shape;
+use etalon_testing::gpu::{Gpu, bits};
+use etalon_testing::made::{Made, Random, at, lambert, orthographic, perspective, unlit};
 use glam::DVec3;
-use gpu::{Gpu, bits};
-use made::{Made, Random, at, lambert, orthographic, perspective, unlit};
 
 const SIZE: [u32; 2] = [16, 16];
 
@@ -266,7 +261,7 @@ fn scene(ways: &Ways, choice: &Choice) -> Made {
     if is("bent normals", "yes") {
         add(&mut made, "bent", Material { normal_texture: Some(texture), ..rough.clone() });
         let mesh = made.0.meshes.last_mut().expect("a mesh");
-        mesh.tangents = vec![[1.0, 0.0, 0.0, 1.0]; mesh.positions.len()];
+        mesh.tangents = vec![[1.0, 0.0, 0.0, 1.0]; mesh.positions.len()].into();
     }
     if is("vertex colours", "yes") {
         add(&mut made, "coloured", rough);

@@ -3,23 +3,14 @@
 //! normals, ids and material numbers. Pixels next to an edge of the picture's content are left to the coverage test,
 //! which lets hit and miss disagree there and nowhere else.
 
-#[path = "support/gltf_builder.rs"]
-mod gltf_builder;
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-#[path = "support/raycast.rs"]
-mod raycast;
-
 use etalon::frame::Settings;
 use etalon::plan::is_see_through;
 use etalon::scene::{Camera, LoadOptions, Scene, load};
 use etalon::study;
 use etalon::study::generate::{at_scale, checker_plane};
 use etalon::study::shape::Shape;
+use etalon_testing::gpu::{Gpu, knobs, settings};
 use glam::{DVec3, Vec3};
-use gpu::{Gpu, knobs, settings};
 use serde_json::json;
 
 const SIZE: [u32; 2] = [160, 90];
@@ -67,8 +58,14 @@ fn compare_stored(gpu: &Gpu, scene: &Scene, camera: &Camera, stored: &[&str]) ->
     let settings = Settings { knobs: knobs(&[&["samples=1"], stored].concat()), ..settings(SIZE) };
     let (aovs, view) = gpu.renderer(scene, None, settings).aovs(camera).expect("the G-buffer");
     let opaque = without_see_through(scene);
-    let oracle = raycast::picture(&opaque, camera, SIZE[0], SIZE[1], raycast::Options::default());
-    let world = raycast::World::new(&opaque, raycast::Options::default());
+    let oracle = etalon_testing::raycast::picture(
+        &opaque,
+        camera,
+        SIZE[0],
+        SIZE[1],
+        etalon_testing::raycast::Options::default(),
+    );
+    let world = etalon_testing::raycast::World::new(&opaque, etalon_testing::raycast::Options::default());
     let scale = scene.bounds().expect("a scene").radius();
     let mut worst = Worst::default();
     for (i, (got, pixel)) in aovs.iter().zip(&oracle).enumerate() {
@@ -92,7 +89,7 @@ fn compare_stored(gpu: &Gpu, scene: &Scene, camera: &Camera, stored: &[&str]) ->
             let (x, y) = (f64::from(i as u32 % SIZE[0]) + 0.5, f64::from(i as u32 / SIZE[0]) + 0.5);
             let step = 1.0 / 128.0;
             for (dx, dy) in [(-step, 0.0), (step, 0.0), (0.0, -step), (0.0, step)] {
-                let ray = raycast::camera_ray(camera, SIZE[0], SIZE[1], x + dx, y + dy);
+                let ray = etalon_testing::raycast::camera_ray(camera, SIZE[0], SIZE[1], x + dx, y + dy);
                 if let Some(beside) = world.closest(&ray) {
                     angle = angle.min(degrees(normal, beside.geometric_normal));
                 }
@@ -138,7 +135,7 @@ fn check(worst: &Worst, name: &str) {
 
 #[test]
 fn study_scenes_are_where_the_rays_find_them() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for name in ["etalon", "materials", "cornell", "metals", "lamps"] {
         let scene = study::load(name).expect("a study scene");
         check(&compare(&gpu, &scene, &scene.cameras[0]), name);
@@ -149,7 +146,7 @@ fn study_scenes_are_where_the_rays_find_them() {
 /// somewhere on a ball; as floats normals are as good as they are interpolated (2e-4°), and stored positions as depth's.
 #[test]
 fn what_is_stored_in_fewer_bits_is_off_by_as_much() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let scene = study::load("materials").expect("a study scene");
     let worst = |rung| compare_stored(&gpu, &scene, &scene.cameras[0], &[rung]);
     for (rung, bound) in
@@ -168,7 +165,7 @@ fn what_is_stored_in_fewer_bits_is_off_by_as_much() {
 /// angles say. A normal off by an angle e changes a mirror's or a lobe's picture by so many e: 0.94° to 0.06° is 16 times less.
 #[test]
 fn every_reader_knows_how_it_is_stored() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let scene = study::load("materials").expect("a study scene");
     for ways in [&["reflection=ray", "refraction=ray", "shadows=ray"][..], &["reflection=screen", "refraction=screen"]]
     {
@@ -192,7 +189,7 @@ fn every_reader_knows_how_it_is_stored() {
 
 #[test]
 fn place_and_scale_do_not_matter() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let scene = study::load("materials").expect("a study scene");
     for (factor, offset) in [
         (1.0, DVec3::new(1e4, 0.0, 0.0)),
@@ -208,21 +205,24 @@ fn place_and_scale_do_not_matter() {
 
 #[test]
 fn parallel_views_see_the_same() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for (name, half_height, eye) in
         [("etalon", 1.2, DVec3::new(3.0, 4.0, 9.0)), ("cornell", 3.0, DVec3::new(0.3, 2.9, 8.0))]
     {
         let scene = study::load(name).expect("a study scene");
         let bounds = scene.bounds().expect("a scene");
-        let camera = Camera { projection: made::orthographic(half_height), ..made::looking(eye, bounds.center()) };
+        let camera = Camera {
+            projection: etalon_testing::made::orthographic(half_height),
+            ..etalon_testing::made::looking(eye, bounds.center())
+        };
         check(&compare(&gpu, &scene, &camera), &format!("{name}, parallel"));
     }
 }
 
 #[test]
 fn mirrored_and_stretched_placements_stay_outside_out() {
-    let gpu = Gpu::new();
-    let mut b = gltf_builder::Builder::new();
+    let gpu = Gpu::open();
+    let mut b = etalon_testing::gltf_builder::Builder::new();
     let ball = Shape::sphere(0.5, 16);
     let position = b.floats("VEC3", ball.positions.as_flattened());
     let normal = b.floats("VEC3", ball.normals.as_flattened());
@@ -250,27 +250,33 @@ fn mirrored_and_stretched_placements_stay_outside_out() {
     let folder = tempfile::tempdir().expect("a folder");
     let scene = load(&b.save_glb(folder.path()), &LoadOptions::default()).expect("a scene");
     assert_eq!(scene.instances.len(), 6);
-    let camera = made::looking(DVec3::new(1.0, 2.0, 9.0), DVec3::ZERO);
+    let camera = etalon_testing::made::looking(DVec3::new(1.0, 2.0, 9.0), DVec3::ZERO);
     check(&compare(&gpu, &scene, &camera), "mirrored");
     // From the other side too: a wrong winding shows at one of the two at least.
-    let camera = made::looking(DVec3::new(-2.0, -1.0, -9.0), DVec3::ZERO);
+    let camera = etalon_testing::made::looking(DVec3::new(-2.0, -1.0, -9.0), DVec3::ZERO);
     check(&compare(&gpu, &scene, &camera), "mirrored, from behind");
 }
 
 #[test]
 fn edges_between_triangles_do_not_show_in_a_texture() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let coarse = checker_plane(20.0, 10.0);
     let camera = &coarse.cameras[0];
-    let oracle = raycast::picture(&coarse, camera, SIZE[0], SIZE[1], raycast::Options::default());
+    let oracle = etalon_testing::raycast::picture(
+        &coarse,
+        camera,
+        SIZE[0],
+        SIZE[1],
+        etalon_testing::raycast::Options::default(),
+    );
     let (want, _) = gpu.renderer(&coarse, None, settings(SIZE)).aovs(camera).expect("the G-buffer");
     for cells in [7, 64, 150] {
         let mut fine = coarse.clone();
         let shape = Shape::plane(20.0, 20.0, cells).repeat_uv(10.0, 10.0);
-        fine.meshes[0].positions = shape.positions;
-        fine.meshes[0].normals = shape.normals;
-        fine.meshes[0].uvs[0] = shape.uvs;
-        fine.meshes[0].indices = shape.indices;
+        fine.meshes[0].positions = shape.positions.into();
+        fine.meshes[0].normals = shape.normals.into();
+        fine.meshes[0].uvs[0] = shape.uvs.into();
+        fine.meshes[0].indices = shape.indices.into();
         let (got, _) = gpu.renderer(&fine, None, settings(SIZE)).aovs(camera).expect("the G-buffer");
         let (mut seen, mut most) = (0, 0.0_f32);
         for ((got, want), pixel) in got.iter().zip(&want).zip(&oracle) {
@@ -295,18 +301,18 @@ fn edges_between_triangles_do_not_show_in_a_texture() {
 #[test]
 fn a_mapped_normal_is_reversed_as_a_whole_from_behind() {
     use etalon::scene::{Image, Material, Sampler, TextureRef};
-    let gpu = Gpu::new();
-    let mut made = made::Made::new("bumps");
+    let gpu = Gpu::open();
+    let mut made = etalon_testing::made::Made::new("bumps");
     let texel = [192_u8, 160, 230, 255];
-    made.0.images.push(Image { name: "tilt".to_owned(), width: 1, height: 1, rgba: texel.to_vec() });
+    made.0.images.push(Image { name: "tilt".to_owned(), width: 1, height: 1, rgba: texel.to_vec().into() });
     let texture =
         TextureRef { image: 0, uv_set: 0, uv_transform: glam::Affine2::IDENTITY, sampler: Sampler::default() };
     let material = Material { normal_texture: Some(texture), double_sided: true, ..Material::default() };
     made.add(Shape::panel(8.0, 8.0), material, glam::DAffine3::IDENTITY);
     let corners = made.0.meshes[0].positions.len();
-    made.0.meshes[0].tangents = vec![[1.0, 0.0, 0.0, 1.0]; corners];
-    made.camera(DVec3::Z * 5.0, DVec3::ZERO, made::perspective(40.0));
-    made.camera(DVec3::NEG_Z * 5.0, DVec3::ZERO, made::perspective(40.0));
+    made.0.meshes[0].tangents = vec![[1.0, 0.0, 0.0, 1.0]; corners].into();
+    made.camera(DVec3::Z * 5.0, DVec3::ZERO, etalon_testing::made::perspective(40.0));
+    made.camera(DVec3::NEG_Z * 5.0, DVec3::ZERO, etalon_testing::made::perspective(40.0));
     let expected = DVec3::from_array([0, 1, 2].map(|c| f64::from(texel[c]) / 255.0 * 2.0 - 1.0)).normalize();
     for (camera, sign) in [(0, 1.0), (1, -1.0)] {
         let mut renderer = gpu.renderer(&made.0, None, settings([16, 16]));

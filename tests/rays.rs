@@ -1,23 +1,21 @@
 //! Rays on the device where they are most likely to leak: aimed at an edge that two triangles share, and started from a
 //! surface.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-
 use etalon::optics::catalogue::{Draw, columns, vector};
 use etalon::optics::{Tier, ray};
-use etalon::verify;
+use etalon_testing::gpu::Gpu;
+
 use glam::DVec3;
-use gpu::Gpu;
 
 const RAYS: usize = 200_000;
 
 /// Output columns of a function for these rows of inputs, one row per case.
 fn evaluated(gpu: &Gpu, name: &str, tier: Tier, rows: &[Vec<f32>]) -> Vec<Vec<f32>> {
-    let entry = verify::find(name).expect("a function");
+    let entry = etalon_verify::find(name).expect("a function");
     let width = entry.probe.inputs.len();
     let inputs: Vec<f32> = (0..width).flat_map(|column| rows.iter().map(move |row| row[column])).collect();
-    let outputs = verify::evaluate(&gpu.device, entry.probe, tier, &inputs, rows.len()).expect("outputs").outputs;
+    let outputs =
+        etalon_verify::evaluate(&gpu.device, entry.probe, tier, &inputs, rows.len()).expect("outputs").outputs;
     (0..rows.len()).map(|row| (0..entry.probe.outputs.len()).map(|k| outputs[k * rows.len() + row]).collect()).collect()
 }
 
@@ -65,7 +63,7 @@ fn at_shared_edge(d: &mut Draw) -> [Vec<f32>; 2] {
 
 #[test]
 fn no_ray_passes_between_two_triangles_with_a_common_edge() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut draw = Draw::new(37);
     let pairs: Vec<[Vec<f32>; 2]> = (0..RAYS).map(|_| at_shared_edge(&mut draw)).collect();
     // How wide the narrower triangle of a pair is seen, in radians.
@@ -128,7 +126,7 @@ fn moved_off(gpu: &Gpu, fixed: Option<f32>, hits: &[Vec<f32>], size: f64) -> (us
 
 #[test]
 fn a_ray_starts_on_the_right_side_of_its_surface() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut draw = Draw::new(38);
     for (size, fixed_fails) in [(1e-2, false), (1.0, false), (1e2, false), (1e3, true), (1e4, true), (1e5, true)] {
         let hits: Vec<Vec<f32>> = (0..20_000).map(|_| hit_on_triangle(&mut draw, size)).collect();

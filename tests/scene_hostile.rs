@@ -1,13 +1,10 @@
 //! Files that are broken or mean harm: every one is an error in one sentence, none a panic or a flood of memory.
 #![allow(clippy::unwrap_used, reason = "a test may stop where it stands")]
 
-#[path = "support/gltf_builder.rs"]
-mod gltf_builder;
-
 use std::{fs, panic::AssertUnwindSafe, path::Path};
 
 use etalon::scene::{self, LoadOptions};
-use gltf_builder::{Builder, FLOAT, UNSIGNED_BYTE, UNSIGNED_INT, f32s, png, u16s};
+use etalon_testing::gltf_builder::{Builder, FLOAT, UNSIGNED_BYTE, UNSIGNED_INT, f32s, png, u16s};
 use serde_json::{Value, json};
 
 fn refuse(path: &Path) -> String {

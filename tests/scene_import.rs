@@ -1,15 +1,14 @@
 //! What a glTF or OBJ file says is what the scene holds: each feature against numbers worked out by hand.
 #![allow(clippy::unwrap_used, reason = "a test may stop where it stands")]
 
-#[path = "support/gltf_builder.rs"]
-mod gltf_builder;
-
 use std::{f64::consts::FRAC_PI_2, fs, path::Path};
 
 use etalon::scene::{self, AlphaMode, Ambience, LightKind, LoadOptions, Projection, Reads, Scene, Wrap};
 use etalon::spectra::{Dispersion, Spectrum};
+use etalon_testing::gltf_builder::{
+    BYTE, Builder, FLOAT, SHORT, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT, f32s, png, u16s,
+};
 use glam::{DVec3, Vec2, Vec3};
-use gltf_builder::{BYTE, Builder, FLOAT, SHORT, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT, f32s, png, u16s};
 use serde_json::json;
 
 fn load_at(builder: &Builder, time: Option<f64>) -> Scene {

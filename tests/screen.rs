@@ -1,23 +1,16 @@
 //! The rungs `screen`: mirror images against an f64 ray cast of the reflected ray, which also says whether what it meets is in
 //! the picture at all; the view through bodies against Snell's law and their nominal thickness.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-#[path = "support/raycast.rs"]
-mod raycast;
-
 use etalon::frame::{Rendered, Settings};
 use etalon::image::Picture;
 use etalon::scene::environment::Environment;
 use etalon::scene::{Camera, Material, Projection, Scene};
 use etalon::study;
 use etalon::study::shape::Shape;
+use etalon_testing::gpu::{Gpu, bits, knobs, largest_difference, settings};
+use etalon_testing::made::{Made, at, unlit};
+use etalon_testing::raycast::{Options, Ray, World, camera_ray};
 use glam::{DAffine3, DVec2, DVec3};
-use gpu::{Gpu, bits, knobs, largest_difference, settings};
-use made::{Made, at, unlit};
-use raycast::{Options, Ray, World, camera_ray};
 
 const SIZE: [u32; 2] = [160, 90];
 const PLAIN: Options = Options { blend: false, textures: false };
@@ -165,17 +158,17 @@ fn room(camera: (DVec3, DVec3, Projection)) -> Made {
 }
 
 fn standing() -> (DVec3, DVec3, Projection) {
-    (DVec3::new(0.3, 1.1, 3.0), DVec3::new(0.1, 0.2, -1.0), made::perspective(40.0))
+    (DVec3::new(0.3, 1.1, 3.0), DVec3::new(0.1, 0.2, -1.0), etalon_testing::made::perspective(40.0))
 }
 
 #[test]
 fn a_floor_mirrors_what_the_picture_shows() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let cameras = [
         standing(),
         // Near the floor and rolled, so to speak: the wall runs off the side and the top of the picture.
-        (DVec3::new(1.4, 0.3, 1.0), DVec3::new(0.0, 0.35, -2.0), made::perspective(30.0)),
-        (DVec3::new(2.0, 3.0, 3.0), DVec3::new(0.0, 0.0, -1.2), made::orthographic(1.3)),
+        (DVec3::new(1.4, 0.3, 1.0), DVec3::new(0.0, 0.35, -2.0), etalon_testing::made::perspective(30.0)),
+        (DVec3::new(2.0, 3.0, 3.0), DVec3::new(0.0, 0.0, -1.2), etalon_testing::made::orthographic(1.3)),
     ];
     for camera in cameras {
         let made = room(camera);
@@ -196,7 +189,7 @@ fn a_floor_mirrors_what_the_picture_shows() {
 /// Something in between, and curved: a ball, and a post before the wall.
 #[test]
 fn what_stands_on_the_floor_is_mirrored_and_hides() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut made = room(standing());
     made.add(Shape::sphere(0.35, 48), unlit([2.0, 0.5, 1.0]), at(-0.5, 0.4, -0.5));
     made.add(Shape::cuboid(DVec3::new(0.2, 1.2, 0.2)), unlit([0.5, 2.0, 1.0]), at(0.6, 0.6, -0.8));
@@ -224,21 +217,21 @@ fn what_stands_on_the_floor_is_mirrored_and_hides() {
 
 #[test]
 fn nothing_behind_the_camera_or_hidden_is_mirrored() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let environment = Environment::constant([0.25, 0.5, 0.125]);
     let seen = |made: &Made, rung: &str| gpu.shot(&made.0, Some(&environment), on(&[rung])).1;
     // A mirror that faces the camera, and light behind that.
     let mut made = Made::new("behind");
     made.add(Shape::panel(4.0, 4.0), mirror(), at(0.0, 0.0, -1.0) * DAffine3::from_rotation_x(-0.2));
     cells(&mut made, 12, 8, 0.5, at(0.0, -1.0, 6.0));
-    made.camera(DVec3::new(0.1, 0.2, 4.0), DVec3::ZERO, made::perspective(40.0));
+    made.camera(DVec3::new(0.1, 0.2, 4.0), DVec3::ZERO, etalon_testing::made::perspective(40.0));
     assert_eq!(bits(&seen(&made, "reflection=screen")), bits(&seen(&made, "reflection=environment")));
     // A red panel lies face down on the far side of a block: the floor would mirror it, the eye cannot see it.
     let mut made = Made::new("hidden");
     made.add(Shape::plane(8.0, 8.0, 1), mirror(), DAffine3::IDENTITY);
     made.add(Shape::cuboid(DVec3::new(6.0, 1.0, 0.1)), unlit([0.0, 1.0, 0.0]), at(0.0, 1.0, 0.0));
     made.add(Shape::panel(5.0, 0.9), unlit([1.0, 0.0, 0.0]), at(0.0, 1.0, -0.2));
-    made.camera(DVec3::new(0.0, 1.0, 4.0), DVec3::new(0.0, 0.8, 0.0), made::perspective(35.0));
+    made.camera(DVec3::new(0.0, 1.0, 4.0), DVec3::new(0.0, 0.8, 0.0), etalon_testing::made::perspective(35.0));
     let film = gpu.film(&made.0, on(&["reflection=screen"]));
     assert!(film.rgba.iter().all(|p| p[0] == 0.0), "the hidden panel shows");
     let green = film.rgba.iter().filter(|p| p[1] > 0.5).count();
@@ -247,14 +240,14 @@ fn nothing_behind_the_camera_or_hidden_is_mirrored() {
 
 #[test]
 fn a_scene_whose_mirror_images_all_miss_is_that_of_the_environment() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let environment = Environment::studio();
     for material in
         [mirror(), Material { roughness: 0.15, metallic: 0.0, clearcoat: 1.0, clearcoat_roughness: 0.05, ..mirror() }]
     {
         let mut made = Made::new("ball");
         made.add(Shape::sphere(1.0, 48), material, DAffine3::IDENTITY);
-        made.camera(DVec3::new(0.0, 1.0, 4.0), DVec3::ZERO, made::perspective(35.0));
+        made.camera(DVec3::new(0.0, 1.0, 4.0), DVec3::ZERO, etalon_testing::made::perspective(35.0));
         let [screen, below] = ["screen", "environment"].map(|rung| {
             let (rendered, film) = gpu.shot(&made.0, Some(&environment), on(&[&format!("reflection={rung}")]));
             let marched = rendered.passes.iter().any(|p| p.name == "mirror images on the screen");
@@ -268,7 +261,7 @@ fn a_scene_whose_mirror_images_all_miss_is_that_of_the_environment() {
 /// In a furnace of 1 a wall of 1 takes the environment's place without a trace, so the shares are the same.
 #[test]
 fn what_is_met_has_the_weight_of_the_environment_that_it_replaces() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let environment = Environment::constant([1.0; 3]);
     let glossy = Material { roughness: 0.15, ..mirror() };
     for (floor, choices) in [
@@ -311,7 +304,7 @@ fn plate(shape: Shape, material: Material, degrees: f64, tilt: f64) -> Made {
 
 #[test]
 fn a_plate_shifts_what_lies_behind_by_its_nominal_thickness() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for (degrees, tilt, thickness) in
         [(40.0_f64, 0.0_f64, 0.4_f64), (-25.0, 15.0, 0.4), (60.0, 0.0, 0.1), (0.0, 0.0, 0.4)]
     {
@@ -353,9 +346,9 @@ fn a_plate_shifts_what_lies_behind_by_its_nominal_thickness() {
 /// What a parallel view cannot tell: the exit point as the eye sees it.
 #[test]
 fn a_ball_bends_every_ray_by_its_own_normal() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut made = plate(Shape::sphere(0.5, 96), glass(0.6), 0.0, 0.0);
-    made.camera(DVec3::new(0.2, 0.1, 3.0), DVec3::ZERO, made::perspective(30.0));
+    made.camera(DVec3::new(0.2, 0.1, 3.0), DVec3::ZERO, etalon_testing::made::perspective(30.0));
     let film = gpu.film(&made.0, on(&["refraction=screen"]));
     let world = World::new(&made.0, PLAIN);
     let behind = Scene { instances: made.0.instances[1..].to_vec(), ..made.0.clone() };
@@ -385,7 +378,7 @@ fn a_ball_bends_every_ray_by_its_own_normal() {
 
 #[test]
 fn sheets_shift_nothing() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let panel = Shape::panel(6.0, 6.0);
     // With an alpha of 1 it would be glass as any other.
     let mut blended = Material { alpha_mode: etalon::scene::AlphaMode::Blend, ..glass(0.4) };
@@ -403,7 +396,7 @@ fn sheets_shift_nothing() {
 
 #[test]
 fn what_stands_before_a_body_is_not_seen_through_it() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut made = plate(Shape::cuboid(DVec3::new(6.0, 6.0, 0.4)), glass(0.4), 40.0, 0.0);
     made.add(Shape::panel(0.3, 6.0), unlit([4.0, 4.0, 1.0]), at(0.1, 0.0, 3.0));
     made.front(0.5);
@@ -423,7 +416,7 @@ fn has(rendered: &Rendered, pass: &str) -> bool {
 
 #[test]
 fn passes_exist_only_where_they_are_called_for() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let environment = Environment::studio();
     let rough = Material { roughness: 0.5, ..mirror() };
     for (material, mirrors, see_through) in [(rough, false, false), (mirror(), true, false), (glass(0.4), false, true)]
@@ -442,7 +435,7 @@ fn passes_exist_only_where_they_are_called_for() {
 
 #[test]
 fn every_pair_of_rungs_gives_radiances() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let environment = Environment::studio();
     for name in ["etalon", "nested", "pool", "materials"] {
         let scene = study::load(name).expect("a study scene");

@@ -1,21 +1,14 @@
 //! See-through surfaces against the over operator: far to near, in f64, whatever the order in which they were drawn. Panes
 //! are unlit, so that coverage and order are all there is to get wrong.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-#[path = "support/raycast.rs"]
-mod raycast;
-
 use etalon::frame::{Background, Settings};
 use etalon::image::Picture;
 use etalon::scene::{AlphaMode, Camera, Image, LightKind, Material, Sampler, Scene, TextureRef};
 use etalon::study;
 use etalon::study::shape::Shape;
+use etalon_testing::gpu::{Gpu, bits, knobs, settings};
+use etalon_testing::made::{Made, Random, at, lambert, pane, unlit};
 use glam::{Affine2, DAffine3, DVec3};
-use gpu::{Gpu, bits, knobs, settings};
-use made::{Made, Random, at, lambert, pane, unlit};
 
 const SIZE: [u32; 2] = [80, 45];
 
@@ -28,11 +21,16 @@ fn whole(gpu: &Gpu, scene: &Scene, settings: Settings) -> Picture {
 
 /// Radiance and coverage behind a pixel: every surface along its ray, far to near, over nothing.
 fn over(scene: &Scene, camera: &Camera, size: [u32; 2], x: u32, y: u32) -> [f64; 4] {
-    let world = raycast::World::new(scene, raycast::Options { blend: true, textures: true });
-    over_in(scene, &world, &raycast::camera_ray(camera, size[0], size[1], f64::from(x) + 0.5, f64::from(y) + 0.5))
+    let world =
+        etalon_testing::raycast::World::new(scene, etalon_testing::raycast::Options { blend: true, textures: true });
+    over_in(
+        scene,
+        &world,
+        &etalon_testing::raycast::camera_ray(camera, size[0], size[1], f64::from(x) + 0.5, f64::from(y) + 0.5),
+    )
 }
 
-fn over_in(scene: &Scene, world: &raycast::World<'_>, ray: &raycast::Ray) -> [f64; 4] {
+fn over_in(scene: &Scene, world: &etalon_testing::raycast::World<'_>, ray: &etalon_testing::raycast::Ray) -> [f64; 4] {
     let mut ray = *ray;
     let mut sum = DVec3::ZERO;
     let mut through = 1.0;
@@ -52,10 +50,17 @@ fn over_in(scene: &Scene, world: &raycast::World<'_>, ray: &raycast::Ray) -> [f6
 
 /// Whether a pixel's ray and the four beside it, a 64th of a pixel away, see the same stack of surfaces to `slack`:
 /// centres on outlines are anyone's.
-fn steady(scene: &Scene, world: &raycast::World<'_>, size: [u32; 2], x: u32, y: u32, slack: f64) -> Option<[f64; 4]> {
+fn steady(
+    scene: &Scene,
+    world: &etalon_testing::raycast::World<'_>,
+    size: [u32; 2],
+    x: u32,
+    y: u32,
+    slack: f64,
+) -> Option<[f64; 4]> {
     let camera = &scene.cameras[0];
     let ray = |dx: f64, dy: f64| {
-        raycast::camera_ray(camera, size[0], size[1], f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy)
+        etalon_testing::raycast::camera_ray(camera, size[0], size[1], f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy)
     };
     let here = over_in(scene, world, &ray(0.0, 0.0));
     let step = 1.0 / 64.0;
@@ -70,7 +75,8 @@ fn steady(scene: &Scene, world: &raycast::World<'_>, size: [u32; 2], x: u32, y: 
 
 /// Largest difference from the over operator, and how many pixels were left out as unsteady.
 fn against_over(film: &Picture, scene: &Scene, slack: f64) -> (f64, usize) {
-    let world = raycast::World::new(scene, raycast::Options { blend: true, textures: true });
+    let world =
+        etalon_testing::raycast::World::new(scene, etalon_testing::raycast::Options { blend: true, textures: true });
     let size = [film.width, film.height];
     let (mut worst, mut left_out) = (0.0_f64, 0);
     for (i, got) in film.rgba.iter().enumerate() {
@@ -98,7 +104,7 @@ fn stack(count: usize, mut alpha: impl FnMut(&mut Random) -> f32) -> Scene {
             * DAffine3::from_rotation_z(random.between(0.0, 3.0));
         made.add(Shape::panel(2.5, 1.5), pane(color, alpha), frame);
     }
-    made.camera(DVec3::new(0.0, 0.0, 6.0), DVec3::ZERO, made::perspective(30.0));
+    made.camera(DVec3::new(0.0, 0.0, 6.0), DVec3::ZERO, etalon_testing::made::perspective(30.0));
     made.0
 }
 
@@ -109,7 +115,7 @@ fn eighths(random: &mut Random) -> f32 {
 
 #[test]
 fn panes_in_any_order_are_composited_far_to_near() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for count in [1, 2, 7, 60] {
         let scene = stack(count, eighths);
         let film = whole(&gpu, &scene, settings(SIZE));
@@ -128,9 +134,9 @@ fn panes_in_any_order_are_composited_far_to_near() {
 
 #[test]
 fn any_opacity_is_good_to_a_half_float() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut scene = stack(20, |random| random.unit() as f32);
-    scene.cameras[0].projection = made::orthographic(1.2);
+    scene.cameras[0].projection = etalon_testing::made::orthographic(1.2);
     let film = whole(&gpu, &scene, settings(SIZE));
     let (worst, left_out) = against_over(&film, &scene, 1e-9);
     eprintln!("{worst:e}, left out {left_out}");
@@ -142,7 +148,7 @@ fn any_opacity_is_good_to_a_half_float() {
 
 #[test]
 fn the_study_of_blending_shows_the_over_operator() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut scene = study::load("blend").expect("a study scene");
     for material in &mut scene.materials {
         // The oracle reads level 0 only.
@@ -161,7 +167,7 @@ fn the_study_of_blending_shows_the_over_operator() {
 
 #[test]
 fn panes_through_each_other_change_places_at_the_line() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut made = Made::new("crossing");
     for (color, turn) in [([1.0, 0.0, 0.0], 40.0_f64), ([0.0, 0.0, 1.0], -40.0)] {
         made.add(Shape::panel(3.0, 1.5), pane(color, 0.5), DAffine3::from_rotation_y(turn.to_radians()));
@@ -178,7 +184,7 @@ fn panes_through_each_other_change_places_at_the_line() {
 
 #[test]
 fn of_coplanar_panes_the_later_one_lies_on_top() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for turned in [false, true] {
         let mut made = Made::new("coplanar");
         let mut panes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -197,7 +203,7 @@ fn of_coplanar_panes_the_later_one_lies_on_top() {
 
 #[test]
 fn a_mask_is_there_or_not_at_its_cutoff() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut made = Made::new("mask");
     // Alpha runs from 0 to 255 over as many texels; nearest, so that texel i is there exactly where i / 255 ≥ cutoff.
     let rgba = (0..256_u32).flat_map(|i| [255, 255, 255, i as u8]).collect();
@@ -225,7 +231,7 @@ fn a_mask_is_there_or_not_at_its_cutoff() {
 
 #[test]
 fn coverage_reaches_the_picture_with_a_transparent_background() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut made = Made::new("coverage");
     made.add(Shape::panel(2.0, 8.0), pane([1.0, 0.5, 0.25], 0.5), at(-2.0, 0.0, 0.0));
     made.add(Shape::panel(2.0, 8.0), unlit([1.0, 0.5, 0.25]), at(2.0, 0.0, 0.0));
@@ -246,7 +252,7 @@ fn coverage_reaches_the_picture_with_a_transparent_background() {
 #[test]
 fn clear_sheets_tint_and_absorb_by_their_thickness() {
     // Refraction `off`, straight on and unlit: what passes is base · (1 − F0) · attenuation^(thickness · scale / distance).
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for (ior, scale, thickness) in [(1.0_f32, 1.0, 0.5_f32), (1.5, 1.0, 0.25), (2.0, 3.0, 0.25), (1.5, 1.0, 0.0)] {
         let mut made = Made::new("sheet");
         made.add(Shape::panel(99.0, 50.0), unlit([1.0; 3]), at(0.0, 0.0, -1.0));
@@ -279,7 +285,7 @@ fn clear_sheets_tint_and_absorb_by_their_thickness() {
 
 #[test]
 fn opaque_walls_hide_what_is_behind_them() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut made = Made::new("hidden");
     made.add(Shape::panel(9.0, 5.0), unlit([0.0, 1.0, 0.0]), at(0.0, 0.0, 0.0));
     made.add(Shape::panel(9.0, 5.0), pane([1.0, 0.0, 0.0], 0.5), at(0.0, 0.0, -0.01));
@@ -290,7 +296,7 @@ fn opaque_walls_hide_what_is_behind_them() {
 
 #[test]
 fn lists_grow_and_split_until_everything_fits() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     // 48 bytes a fragment: more than one storage buffer holds, so that the picture is drawn in strips.
     let size = [320, 180];
     let fit = gpu.device.max_storage_bytes() / 48;
@@ -318,7 +324,7 @@ fn lists_grow_and_split_until_everything_fits() {
 
 #[test]
 fn what_one_invocation_cannot_sort_is_counted() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut made = Made::new("too many");
     for i in 0..230 {
         made.add(Shape::panel(1.0, 8.0), pane([1.0; 3], 0.125), at(0.0, 0.0, 0.01 * i as f64));
@@ -341,7 +347,7 @@ fn what_one_invocation_cannot_sort_is_counted() {
 
 #[test]
 fn memory_s_old_contents_are_not_counted_as_dropped() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let scene = study::load("blend").expect("a study scene");
     let environment = etalon::scene::environment::Environment::studio();
     // Staging of textures and of the environment has been where the counter lies.
@@ -368,7 +374,7 @@ fn lit_stack(panes: usize, lights: usize, stairs: bool) -> Scene {
 
 #[test]
 fn what_does_not_fit_into_the_loops_of_an_invocation_is_counted() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     // lavapipe ends loops in silence after 65,535 heads; a pane costs a head for each light and for each pane.
     for (panes, lights, stairs, fits) in [
         (1, 10, false, Some(true)),
@@ -404,8 +410,8 @@ fn what_does_not_fit_into_the_loops_of_an_invocation_is_counted() {
 
 #[test]
 fn glass_beside_a_nearer_wall_is_lit_through_the_background_s_part_of_its_tile() {
-    let gpu = Gpu::new();
-    for projection in [made::orthographic(1.0), made::perspective(20.0)] {
+    let gpu = Gpu::open();
+    for projection in [etalon_testing::made::orthographic(1.0), etalon_testing::made::perspective(20.0)] {
         let scene = |dark: usize| {
             let mut made = Made::new("behind");
             // The wall ends in the midst of a tile of 16 pixels: column 24 of 64, seen in parallel.
@@ -439,7 +445,7 @@ fn glass_beside_a_nearer_wall_is_lit_through_the_background_s_part_of_its_tile()
 /// start: it must be the same.
 #[test]
 fn a_sample_that_is_drawn_again_counts_once() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [8, 8];
     let mut made = Made::new("overflow at the second sample");
     made.add(Shape::panel(16.0, 16.0), pane([0.5, 0.25, 1.0], 0.5), DAffine3::IDENTITY);

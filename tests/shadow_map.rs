@@ -4,22 +4,15 @@
 //! One Lambert scene is drawn with shadows=off and with shadows=map: their ratio is the share of the light that the map
 //! lets through. Facets have their own normals here, so that no terminator is in it.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-#[path = "support/raycast.rs"]
-mod raycast;
-
 use etalon::frame::{Renderer, Settings};
 use etalon::image::Picture;
 use etalon::scene::{AlphaMode, Image, LightKind, Material, Sampler, Scene, TextureRef, Wrap};
 use etalon::study;
 use etalon::study::shape::Shape;
+use etalon_testing::gpu::{Gpu, bits, knobs};
+use etalon_testing::made::{Made, at, lambert};
+use etalon_testing::raycast::{Options, Ray, World};
 use glam::{Affine2, DAffine3, DVec3};
-use gpu::{Gpu, bits, knobs};
-use made::{Made, at, lambert};
-use raycast::{Options, Ray, World};
 use rayon::prelude::*;
 
 const SIZE: [u32; 2] = [160, 120];
@@ -67,7 +60,7 @@ fn room() -> Made {
     let slanted = DAffine3::from_rotation_x(0.5) * DAffine3::from_rotation_y(0.3);
     made.add(Shape::cuboid(DVec3::new(1.0, 0.05, 0.8)), lambert([1.0; 3]), at(0.2, 0.9, -1.6) * slanted);
     made.add(faceted(&Shape::torus(0.5, 0.2, 24)), lambert([1.0; 3]), at(-0.2, 0.15, 1.7));
-    made.camera(DVec3::new(3.5, 3.0, 5.0), DVec3::new(0.0, 0.3, 0.0), made::perspective(42.0));
+    made.camera(DVec3::new(3.5, 3.0, 5.0), DVec3::new(0.0, 0.3, 0.0), etalon_testing::made::perspective(42.0));
     made
 }
 
@@ -138,7 +131,7 @@ impl Seen {
     }
 
     /// The first surface on the way from the light through `p`, with how far before `p` it is.
-    fn first(&self, world: &World<'_>, p: DVec3) -> Option<(raycast::Hit, f64)> {
+    fn first(&self, world: &World<'_>, p: DVec3) -> Option<(etalon_testing::raycast::Hit, f64)> {
         let (direction, distance) = self.ray(p);
         let hit = world.closest(&Ray::new(p - direction * distance, direction))?;
         Some((hit, distance - hit.distance))
@@ -159,7 +152,7 @@ fn wrong(scene: &Scene, shares: &[Option<f64>], instances: std::ops::Range<usize
     let bounds = scene.bounds().expect("bounds");
     let seen = Seen { kind: scene.lights[0].kind, center: bounds.center(), radius: bounds.radius() };
     let world = World::new(scene, Options::default());
-    let pixels = raycast::picture(scene, camera, SIZE[0], SIZE[1], Options::default());
+    let pixels = etalon_testing::raycast::picture(scene, camera, SIZE[0], SIZE[1], Options::default());
     // How far a thing that is "at" a point may be off it for f64: the scene's size is some metres.
     let same = 1e-9 * seen.radius;
     let verdicts: Vec<[usize; 5]> = pixels
@@ -210,7 +203,7 @@ const BAND: f64 = 2.0 * std::f64::consts::SQRT_2;
 
 #[test]
 fn what_is_lit_is_lit_and_what_is_dark_is_dark() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut failures = Vec::new();
     for (name, kind) in all_kinds() {
         let mut made = room();
@@ -230,7 +223,7 @@ fn what_is_lit_is_lit_and_what_is_dark_is_dark() {
 /// Where a wall meets the floor, both lit, seen from so near that a texel has many pixels: no dark seam.
 #[test]
 fn hollows_have_no_seams() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let kinds = [
         ("high sun", sun(75.0, 30.0)),
         ("sun", sun(45.0, 60.0)),
@@ -245,7 +238,7 @@ fn hollows_have_no_seams() {
         // The foot of the box's side to +z.
         let foot = DVec3::new(1.1 + 0.3 * 0.4_f64.sin(), 0.0, -0.2 + 0.3 * 0.4_f64.cos());
         made.0.cameras.clear();
-        made.camera(foot + DVec3::new(0.04, 0.05, 0.08), foot, made::perspective(40.0));
+        made.camera(foot + DVec3::new(0.04, 0.05, 0.08), foot, etalon_testing::made::perspective(40.0));
         let wrong = wrong(&made.0, &shares(&gpu, &made.0, SIZE), 0..usize::MAX);
         eprintln!("{name}: {wrong:?}");
         assert!(wrong.dark + wrong.lit == 0 && wrong.judged[0] > 10_000, "{name}: {wrong:?}");
@@ -257,7 +250,7 @@ fn hollows_have_no_seams() {
 /// share is interpolated: half of it is reached within a texel of the edge, and all of it within the four around.
 #[test]
 fn edges_lie_where_they_should_within_a_texel() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let kinds = [
         ("zenith", sun(90.0, 0.0)),
         ("sun", sun(40.0, 130.0)),
@@ -295,7 +288,7 @@ fn edges_lie_where_they_should_within_a_texel() {
             let texel = seen.texel(middle) / -direction.y;
             let half_height = 8.0 * texel;
             // Below the blind, so that it is not in the way.
-            let mut camera = made::looking(middle + DVec3::Y * 0.5, middle);
+            let mut camera = etalon_testing::made::looking(middle + DVec3::Y * 0.5, middle);
             camera.projection = etalon::scene::Projection::Orthographic { half_height, near: 0.01, far: 1.0 };
             made.0.cameras = vec![camera];
             let size = [64, 64];
@@ -303,7 +296,13 @@ fn edges_lie_where_they_should_within_a_texel() {
             let (mut halves, mut count) = ((0.0_f64, 0.0_f64), 0);
             for (i, share) in shares.iter().enumerate() {
                 let share = share.expect("a lit floor");
-                let ray = raycast::camera_ray(&made.0.cameras[0], 64, 64, (i % 64) as f64 + 0.5, (i / 64) as f64 + 0.5);
+                let ray = etalon_testing::raycast::camera_ray(
+                    &made.0.cameras[0],
+                    64,
+                    64,
+                    (i % 64) as f64 + 0.5,
+                    (i / 64) as f64 + 0.5,
+                );
                 let on_floor = ray.origin + ray.direction * (ray.origin.y / -ray.direction.y);
                 let beyond = (on_floor - middle).dot(outward) / texel;
                 if beyond.abs() > 1.5 {
@@ -325,7 +324,7 @@ fn edges_lie_where_they_should_within_a_texel() {
 /// The same scene a thousand times smaller and larger, in powers of two: the same picture, bit for bit.
 #[test]
 fn scale_does_not_matter() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for (name, kind) in all_kinds() {
         let films = [1.0, 2.0_f64.powi(-10), 1024.0].map(|scale| {
             let mut scene = room().0;
@@ -361,7 +360,7 @@ fn grating() -> Image {
 
 #[test]
 fn masks_let_light_through_their_holes() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for (name, kind) in [("sun", sun(60.0, 40.0)), ("lamp", point(DVec3::new(0.2, 2.5, 0.3)))] {
         let mut made = Made::new("grating");
         made.add(Shape::plane(6.0, 6.0, 1), lambert([1.0; 3]), DAffine3::IDENTITY);
@@ -380,7 +379,7 @@ fn masks_let_light_through_their_holes() {
         };
         made.add(Shape::plane(1.6, 1.6, 1), material, at(0.0, 0.6, 0.0));
         made.light([10.0; 3], kind);
-        made.camera(DVec3::new(2.5, 3.0, 2.0), DVec3::ZERO, made::perspective(45.0));
+        made.camera(DVec3::new(2.5, 3.0, 2.0), DVec3::ZERO, etalon_testing::made::perspective(45.0));
         let wrong = wrong(&made.0, &shares(&gpu, &made.0, SIZE), 0..usize::MAX);
         eprintln!("{name}: {wrong:?}");
         assert!(wrong.dark + wrong.lit == 0, "{name}: {wrong:?}");
@@ -391,15 +390,15 @@ fn masks_let_light_through_their_holes() {
 /// What lets light through does not stop it on this rung, and the plan says so.
 #[test]
 fn glass_and_blended_surfaces_cast_nothing() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let glass = Material { transmission: 1.0, ..lambert([1.0; 3]) };
-    for material in [glass, made::pane([1.0; 3], 0.9)] {
+    for material in [glass, etalon_testing::made::pane([1.0; 3], 0.9)] {
         let mut made = Made::new("pane");
         made.add(Shape::plane(6.0, 6.0, 1), lambert([1.0; 3]), DAffine3::IDENTITY);
         made.add(Shape::plane(1.0, 1.0, 1), material, at(0.0, 2.0, 0.0));
         made.light([1.0; 3], sun(70.0, 0.0));
         // Below the pane.
-        made.camera(DVec3::new(1.0, 1.5, 1.0), DVec3::ZERO, made::perspective(50.0));
+        made.camera(DVec3::new(1.0, 1.5, 1.0), DVec3::ZERO, etalon_testing::made::perspective(50.0));
         assert!(shares(&gpu, &made.0, SIZE).iter().flatten().all(|share| *share == 1.0));
         let renderer = gpu.renderer(&made.0, None, with(SIZE, &["shadows=map"]));
         assert!(
@@ -431,7 +430,7 @@ fn unlike(a: &Picture, b: &Picture, off: &Picture) -> [usize; 2] {
 
 #[test]
 fn maps_and_rays_agree_away_from_edges() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let size = [320, 180];
     for name in ["lamps", "materials"] {
         let scene = study::load(name).expect("a study scene");
@@ -447,7 +446,7 @@ fn maps_and_rays_agree_away_from_edges() {
 /// What a mirror shows is lit by the same maps, and so is what lies over it.
 #[test]
 fn mirrored_and_blended_surfaces_are_shadowed_too() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut made = room();
     let mirror = Material { metallic: 1.0, roughness: 0.0, ..lambert([0.9; 3]) };
     made.add(Shape::cuboid(DVec3::new(5.0, 3.0, 0.1)), mirror, at(0.0, 1.5, -2.8));
@@ -458,7 +457,7 @@ fn mirrored_and_blended_surfaces_are_shadowed_too() {
     over.add(Shape::plane(3.0, 3.0, 1), pane, DAffine3::IDENTITY);
     over.add(Shape::cuboid(DVec3::new(0.6, 0.4, 0.8)), lambert([1.0; 3]), at(0.2, 0.7, 0.1));
     over.light([3.0; 3], sun(50.0, 60.0));
-    over.camera(DVec3::new(-2.0, 3.0, 2.0), DVec3::ZERO, made::perspective(50.0));
+    over.camera(DVec3::new(-2.0, 3.0, 2.0), DVec3::ZERO, etalon_testing::made::perspective(50.0));
     for scene in [made.0, over.0] {
         let [off, map, ray] = ["shadows=off", "shadows=map", "shadows=ray"]
             .map(|choice| gpu.film(&scene, with([320, 240], &["reflection=ray", choice])));
@@ -523,7 +522,7 @@ fn many_lights_stay_within_the_budget() {
 /// them. (Edges of their shadow on the floor lie closer to them than a few of these texels.)
 #[test]
 fn meshes_finer_than_texels_are_not_spotted() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     for (name, kind) in
         [("sun", sun(35.0, 150.0)), ("low sun", sun(6.0, 150.0)), ("lamp", point(DVec3::new(-4.0, 2.0, 5.0)))]
     {
@@ -531,7 +530,7 @@ fn meshes_finer_than_texels_are_not_spotted() {
         made.add(Shape::plane(60.0, 60.0, 1), lambert([1.0; 3]), DAffine3::IDENTITY);
         made.add(faceted(&Shape::sphere(0.6, 128)), lambert([1.0; 3]), at(0.0, 0.5, 0.0));
         made.light([10.0; 3], kind);
-        made.camera(DVec3::new(-0.2, 1.0, 1.9), DVec3::new(0.0, 0.5, 0.0), made::perspective(42.0));
+        made.camera(DVec3::new(-0.2, 1.0, 1.9), DVec3::new(0.0, 0.5, 0.0), etalon_testing::made::perspective(42.0));
         let wrong = wrong(&made.0, &shares(&gpu, &made.0, SIZE), 1..2);
         eprintln!("{name}: {wrong:?}");
         // The argument of lib/shadow.glsl needs planes as large as texels; what is left is a pixel in some thousands.

@@ -1,26 +1,17 @@
 //! Sheen (KHR_materials_sheen) in pictures of all three models against its formulas in f64: under a light, before light that is the same
 //! from everywhere, by its textures, and from a file.
 
-#[path = "support/gltf_builder.rs"]
-mod gltf_builder;
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/lobe.rs"]
-mod lobe;
-#[path = "support/made.rs"]
-mod made;
-
 use etalon::plan::Model;
 use etalon::plan::rungs::Brdf;
 use etalon::scene::environment::Environment;
 use etalon::scene::lobe::LobeOf;
 use etalon::scene::lobe::sheen::{albedo, sheen};
 use etalon::scene::{Image, LightKind, LoadOptions, Material, Sampler, Scene, TextureRef, load};
+use etalon_testing::gltf_builder::Builder;
+use etalon_testing::gpu::Gpu;
+use etalon_testing::lobe::{DOME, Facet, MODELS, Rungs, dome, model, reflected, worst};
+use etalon_testing::made::{Made, lambert};
 use glam::{Affine2, DVec3};
-use gltf_builder::Builder;
-use gpu::Gpu;
-use lobe::{DOME, Facet, MODELS, Rungs, dome, model, reflected, worst};
-use made::{Made, lambert};
 use serde_json::json;
 
 /// Place of sheen among the lobes of a material.
@@ -71,7 +62,7 @@ fn expected(m: &Material, n: DVec3, l: DVec3, v: DVec3) -> DVec3 {
     }
     // The coat alone is what is left of a coated black body.
     let black = Material { base_color: [0.0, 0.0, 0.0, 1.0], metallic: 0.0, specular: 0.0, ..m.clone() };
-    let coat_f = f64::from(m.clearcoat) * lobe::schlick(DVec3::splat(0.04), 1.0, h.dot(v)).x;
+    let coat_f = f64::from(m.clearcoat) * etalon_testing::lobe::schlick(DVec3::splat(0.04), 1.0, h.dot(v)).x;
     result * (1.0 - coat_f) + reflected(&black, rungs, n, l, v)
 }
 
@@ -92,7 +83,8 @@ fn cloth_reflects_a_light_as_estevez_and_kulla_say() {
             let film = gpu.film(&made.0, model(of, DOME, &["brdf=ggx", "fresnel=schlick"]));
             eprint!("{of:?} ");
             let error = worst(&film, &facets, BRIGHT, |facet: &Facet| {
-                expected(&made.0.materials[facet.material], facet.n, l, DVec3::Z) * lobe::rgb(IRRADIANCE)
+                expected(&made.0.materials[facet.material], facet.n, l, DVec3::Z)
+                    * etalon_testing::lobe::rgb(IRRADIANCE)
             });
             assert!(error < TABLE, "{of:?}, {light}: {error:e}");
         }
@@ -108,7 +100,7 @@ fn furnace(m: &Material, cos_v: f64) -> DVec3 {
     let moment: f64 = below.map(|x| 2.0 * x * albedo(x, roughness).min(1.0)).sum::<f64>() * cos_v / f64::from(steps);
     let e = albedo(cos_v, roughness).min(1.0);
     let left = 1.0 - color.max_element() * (e * (1.0 - cos_v * cos_v) + moment);
-    color * e + lobe::base(m) * left
+    color * e + etalon_testing::lobe::base(m) * left
 }
 
 #[test]
@@ -160,10 +152,10 @@ fn textures_multiply_its_colour_and_roughness() {
     let made = |material: &Material| -> Scene {
         let (mut scene, _) = dome(std::slice::from_ref(material));
         for (name, texel) in [("colour", [188, 255, 137, 9]), ("roughness", [7, 200, 90, 128])] {
-            scene.images.push(Image { name: name.to_owned(), width: 1, height: 1, rgba: texel.to_vec() });
+            scene.images.push(Image { name: name.to_owned(), width: 1, height: 1, rgba: texel.to_vec().into() });
         }
         for mesh in &mut scene.meshes {
-            mesh.uvs[0] = vec![[0.5; 2]; 4];
+            mesh.uvs[0] = vec![[0.5; 2]; 4].into();
         }
         let mut made = Made(scene);
         made.light(IRRADIANCE, LightKind::Directional { direction: DVec3::new(-0.2, -0.5, -1.0).normalize() });
@@ -172,10 +164,13 @@ fn textures_multiply_its_colour_and_roughness() {
     for of in MODELS {
         let settings = || model(of, DOME, &[]);
         let [a, b, plain] = [&textured, &product, &told].map(|m| gpu.film(&made(m), settings()));
-        let difference = gpu::largest_difference(&a, &b, 1.0);
+        let difference = etalon_testing::gpu::largest_difference(&a, &b, 1.0);
         // A byte's half step of roughness, 2e-3, is most of it.
         assert!(difference < 8e-3, "{of:?}: {difference}");
-        assert!(gpu::largest_difference(&a, &plain, 1.0) > 0.1, "{of:?}: the textures change something");
+        assert!(
+            etalon_testing::gpu::largest_difference(&a, &plain, 1.0) > 0.1,
+            "{of:?}: the textures change something"
+        );
     }
 }
 

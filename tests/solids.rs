@@ -8,9 +8,9 @@ use glam::{DAffine3, DQuat, DVec2, DVec3};
 fn mesh(name: &str, shape: Shape) -> Mesh {
     Mesh {
         name: name.to_owned(),
-        positions: shape.positions,
-        normals: shape.normals,
-        indices: shape.indices,
+        positions: shape.positions.into(),
+        normals: shape.normals.into(),
+        indices: shape.indices.into(),
         ..Mesh::default()
     }
 }
@@ -295,7 +295,7 @@ fn holes_and_hollows_are_outside() {
     let mut hollow = mesh("hollow ball", Shape::sphere(1.0, 24));
     let inner = turned(mesh("hollow", Shape::sphere(0.5, 24)));
     let shift = hollow.positions.len() as u32;
-    hollow.positions.extend(inner.positions);
+    hollow.positions.extend(&inner.positions);
     hollow.indices.extend(inner.indices.iter().map(|i| i + shift));
     let scene = scene_of(vec![(ring, DAffine3::IDENTITY), (hollow, DAffine3::from_translation(DVec3::Y * 3.0))]);
     let found = solids(&scene);

@@ -1,12 +1,9 @@
 //! What is left of the shaders once their constants are known: valid SPIR-V without constants to be told, whatever they
 //! are, and much less of it. That it computes the same is what all tests of pictures and equations rest on.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-
 use etalon::gpu::{specialized, with_loops_counted};
 use etalon::shader::PROGRAMS;
-use gpu::Gpu;
+use etalon_testing::gpu::Gpu;
 use spirv::Op;
 
 fn instructions(words: &[u32]) -> Vec<&[u32]> {
@@ -46,7 +43,7 @@ fn constants(words: &[u32]) -> Vec<(u32, Vec<u32>)> {
 
 #[test]
 fn what_is_left_is_valid_whatever_the_constants_are() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut seed = 1_u32;
     let mut random = |below: usize| {
         seed = seed.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
@@ -141,7 +138,7 @@ fn loop_with_an_end() -> Vec<u32> {
 
 #[test]
 fn a_loop_that_never_goes_on_stays_a_loop() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let words = loop_with_an_end();
     gpu.device.try_module(&words).expect("a module");
     for (value, adds) in [(0, true), (1, false)] {

@@ -1,11 +1,6 @@
 //! Pictures by wavelengths against truth: the tables of docs/colour.md for a chart of known reflectances, angles of dispersion
 //! against Sellmeier and Snell in f64, Beer and Lambert band by band, and lines that keep their colour wherever they go.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-
 use etalon::frame::Settings;
 use etalon::image::Picture;
 use etalon::plan::{Knobs, Model};
@@ -13,9 +8,9 @@ use etalon::scene::environment::Environment;
 use etalon::scene::{Light, LightKind, Material, Scene, TextureRef};
 use etalon::spectra::{Band, Dispersion, Emission, Spectrum, Upsampling, VISIBLE, chart, illuminant, rgb_from_xyz};
 use etalon::study::{self, shape::Shape};
+use etalon_testing::gpu::{Gpu, bits, knobs, settings};
+use etalon_testing::made::{Made, at, lambert, looking, perspective};
 use glam::{DMat3, DVec2, DVec3};
-use gpu::{Gpu, bits, knobs, settings};
-use made::{Made, at, lambert, looking, perspective};
 use palette::color_difference::Ciede2000;
 
 const LIGHTS: [&str; 4] = ["d65", "a", "f2", "f11"];
@@ -176,7 +171,7 @@ fn film_xyz(film: &Picture) -> Vec<[f64; 3]> {
 
 #[test]
 fn a_picture_of_the_chart_has_the_differences_of_the_tables() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let chart: Vec<Spectrum> = chart().into_iter().map(|(_, spectrum)| spectrum).collect();
     for (light, name) in LIGHTS.into_iter().enumerate() {
         let spectrum = illuminant(name).expect("a light");
@@ -211,10 +206,15 @@ fn a_picture_of_the_chart_has_the_differences_of_the_tables() {
 
 #[test]
 fn what_varies_is_upsampled_like_what_does_not() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut made = Made::new("texels");
     let colors: Vec<[u8; 4]> = (0..16).map(|i| [13 * i as u8, 255 - 11 * i as u8, (97 * i % 256) as u8, 255]).collect();
-    made.0.images.push(etalon::scene::Image { name: "texels".to_owned(), width: 16, height: 1, rgba: colors.concat() });
+    made.0.images.push(etalon::scene::Image {
+        name: "texels".to_owned(),
+        width: 16,
+        height: 1,
+        rgba: colors.concat().into(),
+    });
     let nearest = etalon::scene::Sampler { mag_nearest: true, min_nearest: true, mips: false, ..Default::default() };
     let texture = TextureRef { image: 0, uv_set: 0, uv_transform: glam::Affine2::IDENTITY, sampler: nearest };
     let textured = Material { base_color_texture: Some(texture), ..lambert([1.0; 3]) };
@@ -353,7 +353,7 @@ fn recursive(choices: &[&str], size: [u32; 2]) -> Settings {
 
 #[test]
 fn a_prism_bends_each_wavelength_as_sellmeier_and_snell_say() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut columns = Vec::new();
     for nm in [450.0, 550.0, 650.0] {
         let film = gpu.film(&prism(Some(line(nm)), None), recursive(&["samples=16", "colour=spectral:16"], PRISM));
@@ -368,7 +368,7 @@ fn a_prism_bends_each_wavelength_as_sellmeier_and_snell_say() {
 
 #[test]
 fn without_dispersion_there_are_no_fringes() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let expected = predicted(1.72825);
     for light in [line(450.0), line(650.0)] {
         let scene = prism(Some(light), Some(Dispersion::None));
@@ -388,7 +388,7 @@ fn without_dispersion_there_are_no_fringes() {
 
 #[test]
 fn wavelengths_do_not_mix() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut scene = study::load("cornell").expect("a scene");
     scene.materials.iter_mut().filter(|m| m.name == "lamp").for_each(|m| m.emission = Some(line(545.0)));
     let mut knobs = Knobs::of(Model::Global);
@@ -409,7 +409,7 @@ fn wavelengths_do_not_mix() {
 
 #[test]
 fn white_is_white_in_every_model_and_number_of_bands() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let sky = Environment::constant([1.0; 3]);
     let mut made = Made::new("furnace");
     let turn = glam::DAffine3::from_rotation_x(0.5) * glam::DAffine3::from_rotation_y(0.6);
@@ -435,7 +435,7 @@ fn white_is_white_in_every_model_and_number_of_bands() {
 /// e^(−∫σ).
 #[test]
 fn media_take_their_share_of_every_band() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let scene = study::load("absorber").expect("a scene");
     let size = [160, 90];
     let spectrum = Upsampling::JakobHanika.reflectance([0.2, 0.55, 0.85].map(|x| f64::from(x as f32)));
@@ -495,7 +495,7 @@ fn media_take_their_share_of_every_band() {
 
 #[test]
 fn what_is_grey_needs_no_bands() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let scene = study::load("radiance").expect("a scene");
     let draw = |rung: &str| {
         let settings = recursive(&["samples=1", rung], [32, 18]);
@@ -515,7 +515,7 @@ fn what_is_grey_needs_no_bands() {
 /// Paths see the same as the tree of rays where both follow all there is: level rays through the prism.
 #[test]
 fn paths_disperse_as_the_tree_of_rays_does() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let scene = prism(None, None);
     let tree = gpu.film(&scene, recursive(&["samples=16", "colour=spectral:8", "interfaces=2"], PRISM));
     let mut knobs = Knobs::of(Model::Global);
@@ -553,14 +553,14 @@ fn board(told: impl Fn(&mut Made, Shape, Material, [f32; 3], f64)) -> Scene {
     made.0.instances.last_mut().expect("the pane").world_from_object.translation.z = 9.0;
     made.light([3.0, 2.8, 2.5], LightKind::Directional { direction });
     made.front(1.0);
-    made.0.cameras[0].projection = made::orthographic(1.0);
+    made.0.cameras[0].projection = etalon_testing::made::orthographic(1.0);
     made.0
 }
 
 /// Vertex colours, texels and factors say the same: what lets light through, what mirrors, what is brighter than white.
 #[test]
 fn colours_are_the_same_however_they_are_told() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let times = |m: &Material, rgb: [f32; 3]| {
         let [r, g, b, a] = m.base_color;
         [r * rgb[0], g * rgb[1], b * rgb[2], a]
@@ -571,7 +571,7 @@ fn colours_are_the_same_however_they_are_told() {
     let vertices = board(|made, shape, m, rgb, x| {
         let mesh = made.mesh(shape, m);
         let corners = made.0.meshes[mesh].positions.len();
-        made.0.meshes[mesh].colors = vec![[rgb[0], rgb[1], rgb[2], 1.0]; corners];
+        made.0.meshes[mesh].colors = vec![[rgb[0], rgb[1], rgb[2], 1.0]; corners].into();
         made.place(mesh, at(x, 0.0, 0.0));
     });
     let texels = board(|made, shape, m, rgb, x| {
@@ -580,7 +580,7 @@ fn colours_are_the_same_however_they_are_told() {
             name: "texel".to_owned(),
             width: 1,
             height: 1,
-            rgba: vec![byte(rgb[0]), byte(rgb[1]), byte(rgb[2]), 255],
+            rgba: vec![byte(rgb[0]), byte(rgb[1]), byte(rgb[2]), 255].into(),
         });
         let image = made.0.images.len() - 1;
         let sampler = etalon::scene::Sampler::default();
@@ -597,13 +597,13 @@ fn colours_are_the_same_however_they_are_told() {
         for (how, scene) in [("vertices", &vertices), ("texels", &texels)] {
             let got = draw(scene, "colour=spectral:16");
             // Half a unit of eight bits of a texel, and the grid.
-            let error = gpu::largest_difference(&got, &expected, 1.0);
+            let error = etalon_testing::gpu::largest_difference(&got, &expected, 1.0);
             eprintln!("{model:?} {how}: {error}");
             assert!(error < 6e-3, "{model:?}, {how}: {error}");
         }
         // The colours are those of a picture in three colours, about: under white light, one reflection.
         let rgb = draw(&factors, "colour=rgb");
-        let error = gpu::largest_difference(&rgb, &expected, 1.0);
+        let error = etalon_testing::gpu::largest_difference(&rgb, &expected, 1.0);
         eprintln!("{model:?} rgb: {error}");
         assert!(error < 0.12, "{model:?}, rgb: {error}");
     }
@@ -612,7 +612,7 @@ fn colours_are_the_same_however_they_are_told() {
 /// Holes of a masked surface let light through in shadow maps, which are drawn before any band is.
 #[test]
 fn holes_cast_no_shadow_in_bands() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut made = Made::new("holes");
     made.add(Shape::panel(4.0, 4.0), lambert([0.8, 0.5, 0.2]), at(0.0, 0.0, 0.0));
     let mut hole = lambert([0.2, 0.8, 0.3]);
@@ -634,4 +634,25 @@ fn holes_cast_no_shadow_in_bands() {
     let lit = |film: &Picture| film.rgba.iter().map(|p| p[0] > 0.1).collect::<Vec<_>>();
     assert!(lit(&rgb).contains(&true));
     assert_eq!(lit(&rgb), lit(&bands));
+}
+
+/// The text of a table in GLSL.
+fn rows_of_glsl(text: &str) -> String {
+    let row = |nm: usize| {
+        let cells = text.lines().find_map(|line| line.strip_prefix(&format!("{nm},")));
+        format!("    vec3({})", cells.unwrap_or("0.0,0.0,0.0").replace(',', ", "))
+    };
+    (0..81).map(|i| row(380 + 5 * i)).collect::<Vec<_>>().join(",\n")
+}
+
+#[test]
+fn the_shader_has_the_tables_of_the_assets() {
+    let shader = include_str!("../shaders/lib/matching_functions.glsl");
+    for (name, text) in [
+        ("CIE_1931_2DEG", include_str!("../assets/cmf/cmf_cie1931_2deg_5nm.csv")),
+        ("STILES_BURCH_1959_10DEG", include_str!("../assets/cmf/cmf_stiles_burch1959_10deg_5nm.csv")),
+    ] {
+        let wanted = format!("const vec3 {name}[81] = vec3[81](\n{});\n", rows_of_glsl(text));
+        assert!(shader.contains(&wanted), "shaders/lib/matching_functions.glsl should have\n{wanted}");
+    }
 }

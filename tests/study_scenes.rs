@@ -7,10 +7,7 @@ use etalon::scene::{AlphaMode, Camera, Instance, LightKind, Material, Mesh, Proj
 use etalon::study::{self, generate, shape::Shape};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
-#[path = "support/raycast.rs"]
-mod raycast;
-
-use raycast::{Options, Ray, World};
+use etalon_testing::raycast::{Options, Ray, World};
 
 fn scenes() -> Vec<Scene> {
     let mut scenes: Vec<Scene> =
@@ -35,10 +32,10 @@ fn dvec(v: [f32; 3]) -> DVec3 {
 fn scene_of(shape: Shape, world_from_object: DAffine3) -> Scene {
     Scene {
         meshes: vec![Mesh {
-            positions: shape.positions,
-            normals: shape.normals,
-            uvs: [shape.uvs, Vec::new()],
-            indices: shape.indices,
+            positions: shape.positions.into(),
+            normals: shape.normals.into(),
+            uvs: [shape.uvs.into(), Vec::new().into()],
+            indices: shape.indices.into(),
             ..Mesh::default()
         }],
         instances: vec![Instance { name: "it".to_owned(), mesh: 0, world_from_object }],
@@ -196,7 +193,8 @@ fn scenes_are_sound() {
 fn cameras_see_their_subject() {
     for scene in scenes() {
         for camera in &scene.cameras {
-            let pixels = raycast::picture(&scene, camera, 64, 36, Options { blend: true, textures: true });
+            let pixels =
+                etalon_testing::raycast::picture(&scene, camera, 64, 36, Options { blend: true, textures: true });
             let seen = pixels.iter().filter(|p| p.hit.is_some()).count();
             assert!(seen * 5 >= pixels.len(), "{}, {}: {seen} of {} pixels", scene.name, camera.name, pixels.len());
             let edges = pixels.iter().filter(|p| p.edge).count();
@@ -244,8 +242,8 @@ fn a_swimmer_sees_the_sky_inside_snells_window_and_the_pool_outside() {
     // From inside the water its faces show their backs.
     scene.materials.iter_mut().filter(|m| m.transmission > 0.0).for_each(|m| m.double_sided = true);
     let world = World::new(&scene, Options::default());
-    let name = |hit: &raycast::Hit| scene.instances[hit.instance].name.as_str();
-    let onwards = |hit: &raycast::Hit, direction: DVec3| {
+    let name = |hit: &etalon_testing::raycast::Hit| scene.instances[hit.instance].name.as_str();
+    let onwards = |hit: &etalon_testing::raycast::Hit, direction: DVec3| {
         let ray = Ray { nearest: 1e-9, ..Ray::new(hit.position, direction) };
         world.closest(&ray).expect("the dome and the pool leave no way out")
     };
@@ -255,7 +253,7 @@ fn a_swimmer_sees_the_sky_inside_snells_window_and_the_pool_outside() {
     let (mut rim, mut bright) = (0, 0);
     for i in 0..width * height {
         let (x, y) = (i % width, i / width);
-        let ray = raycast::camera_ray(&camera, width, height, f64::from(x) + 0.5, f64::from(y) + 0.5);
+        let ray = etalon_testing::raycast::camera_ray(&camera, width, height, f64::from(x) + 0.5, f64::from(y) + 0.5);
         let angle = ray.direction.angle_between(DVec3::Y);
         if x == 0 || y == 0 || x == width - 1 || y == height - 1 {
             least_edge = angle.min(least_edge);
@@ -408,7 +406,8 @@ fn a_scaled_scene_shows_the_same_picture() {
     let scene = study::load("etalon").unwrap();
     let (factor, offset) = (128.0, DVec3::new(3000.0, -500.0, 70.0));
     let scaled = generate::at_scale(scene.clone(), factor, offset);
-    let [a, b] = [&scene, &scaled].map(|s| raycast::picture(s, &s.cameras[0], 64, 36, Options::default()));
+    let [a, b] =
+        [&scene, &scaled].map(|s| etalon_testing::raycast::picture(s, &s.cameras[0], 64, 36, Options::default()));
     let mut compared = 0;
     for (a, b) in a.iter().zip(&b).filter(|(a, b)| !a.edge && !b.edge) {
         let (Some(a), Some(b)) = (a.hit, b.hit) else { continue };
@@ -426,7 +425,7 @@ fn a_scaled_scene_shows_the_same_picture() {
 #[test]
 fn equal_quads_look_equal_at_every_distance() {
     let scene = generate::quads_at(&[0.1, 10.0, 1e5]);
-    let pixels = raycast::picture(&scene, &scene.cameras[0], 160, 90, Options::default());
+    let pixels = etalon_testing::raycast::picture(&scene, &scene.cameras[0], 160, 90, Options::default());
     let counts = [0, 1, 2].map(|i| pixels.iter().filter(|p| p.hit.is_some_and(|h| h.instance == i)).count());
     assert!(counts[0] > 500 && counts.iter().all(|c| c.abs_diff(counts[0]) * 10 < counts[0]), "{counts:?}");
 }
@@ -434,7 +433,7 @@ fn equal_quads_look_equal_at_every_distance() {
 #[test]
 fn radiance_shows_every_panel_at_the_same_level() {
     let scene = study::load("radiance").unwrap();
-    let pixels = raycast::picture(&scene, &scene.cameras[0], 320, 180, Options::default());
+    let pixels = etalon_testing::raycast::picture(&scene, &scene.cameras[0], 320, 180, Options::default());
     let seen: HashSet<usize> = pixels.iter().filter_map(|p| p.hit).map(|h| h.instance).collect();
     assert_eq!(seen.len(), scene.instances.len(), "some emitter is out of the picture or hidden");
     for material in &scene.materials {
@@ -453,7 +452,9 @@ fn raycast_meets_the_analytic_sphere() {
     let half_facet = std::f64::consts::PI / f64::from(rings) / 2.0_f64.sqrt() * 1.5;
     let sagitta = radius * (1.0 - half_facet.cos()) + 1e-6;
     let mut hits = 0;
-    for (i, pixel) in raycast::picture(&scene, &camera, width, height, Options::default()).iter().enumerate() {
+    for (i, pixel) in
+        etalon_testing::raycast::picture(&scene, &camera, width, height, Options::default()).iter().enumerate()
+    {
         // The closed form, from the pixel's coordinates up.
         let (x, y) = (i as f64 % f64::from(width) + 0.5, (i / width as usize) as f64 + 0.5);
         let pixel_size = 2.0 * (fov / 2.0).tan() / f64::from(height);
@@ -489,7 +490,7 @@ fn raycast_meets_the_plane_where_the_closed_form_does() {
     let scene = scene_of(Shape::plane(40.0, 40.0, 1), frame);
     let camera = camera_at(DVec3::new(0.0, 0.5, 0.0), 1.0);
     let normal = turn.transform_vector3(DVec3::Y);
-    for pixel in raycast::picture(&scene, &camera, 32, 18, Options::default()) {
+    for pixel in etalon_testing::raycast::picture(&scene, &camera, 32, 18, Options::default()) {
         let Some(hit) = pixel.hit else { continue };
         // f32 vertices are exact here (±20), the placement is f64.
         assert!((hit.position - frame.translation).dot(normal).abs() < 1e-12);
@@ -521,7 +522,7 @@ fn a_mirrored_instance_keeps_its_faces_and_weights() {
     let (width, height) = (63, 35);
     let [plain, mirrored] = [frame, mirror * frame].map(|frame| {
         let scene = scene_of(Shape::prism(&triangle, 1.0), frame);
-        raycast::picture(&scene, &camera, width, height, Options::default())
+        etalon_testing::raycast::picture(&scene, &camera, width, height, Options::default())
     });
     let mut hits = 0;
     for y in 0..height {
@@ -565,20 +566,20 @@ fn rays_do_not_slip_through_a_closed_mesh() {
 fn raycast_honours_masks_blending_and_orthographic_cameras() {
     let scene = study::load("blend").unwrap();
     let camera = &scene.cameras[0];
-    let opaque = raycast::picture(&scene, camera, 160, 90, Options::default());
-    let all = raycast::picture(&scene, camera, 160, 90, Options { blend: true, textures: true });
-    let name = |hit: raycast::Hit| scene.instances[hit.instance].name.as_str();
-    let share = |pixels: &[raycast::Pixel], wanted: &str| {
+    let opaque = etalon_testing::raycast::picture(&scene, camera, 160, 90, Options::default());
+    let all = etalon_testing::raycast::picture(&scene, camera, 160, 90, Options { blend: true, textures: true });
+    let name = |hit: etalon_testing::raycast::Hit| scene.instances[hit.instance].name.as_str();
+    let share = |pixels: &[etalon_testing::raycast::Pixel], wanted: &str| {
         pixels.iter().filter(|p| p.hit.is_some_and(|h| name(h) == wanted)).count() as f64 / pixels.len() as f64
     };
-    let blended = |h: raycast::Hit| scene.materials[h.material].alpha_mode == AlphaMode::Blend;
+    let blended = |h: etalon_testing::raycast::Hit| scene.materials[h.material].alpha_mode == AlphaMode::Blend;
     assert!(opaque.iter().filter_map(|p| p.hit).all(|h| !blended(h)));
     assert!(share(&all, "near red") > share(&all, "middle green"));
     assert!(share(&all, "middle green") > share(&all, "far blue"));
     assert!(share(&all, "crossing red") > 0.0 && share(&all, "crossing blue") > 0.0);
     // 16 holes of radius 9 texels out of 128² texels, of a pane of 0.81 m².
     let lattice = share(&opaque, "lattice");
-    let uncut = raycast::picture(&scene, camera, 160, 90, Options { blend: false, textures: false });
+    let uncut = etalon_testing::raycast::picture(&scene, camera, 160, 90, Options { blend: false, textures: false });
     let kept = lattice / share(&uncut, "lattice");
     let expected = 1.0 - 16.0 * std::f64::consts::PI * 81.0 / 16384.0;
     assert!((kept - expected).abs() < 0.03, "{kept} of the lattice is there instead of {expected}");
@@ -586,7 +587,7 @@ fn raycast_honours_masks_blending_and_orthographic_cameras() {
     let projection = Projection::Orthographic { half_height: 0.5, near: 0.5, far: 10.0 };
     let ortho = Camera { projection, ..camera_at(DVec3::new(0.0, 0.0, 1.0), 1.0) };
     let panel = scene_of(Shape::panel(0.5, 0.5), DAffine3::IDENTITY);
-    let pixels = raycast::picture(&panel, &ortho, 80, 40, Options::default());
+    let pixels = etalon_testing::raycast::picture(&panel, &ortho, 80, 40, Options::default());
     let hits: Vec<_> = pixels.iter().filter_map(|p| p.hit).collect();
     assert_eq!(hits.len(), 20 * 20, "half the height of the picture each way");
     assert!(hits.iter().all(|h| (h.distance - 1.0).abs() < 1e-12));

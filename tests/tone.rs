@@ -1,11 +1,6 @@
-//! The display pass against src/image/tone.rs: a film is put on the device as it is, so that the curves meet every
+//! The display pass against crates/image/src/tone.rs: a film is put on the device as it is, so that the curves meet every
 //! radiance they may ever meet, and the bytes that come back are compared with the f64 twins. NaN, infinity and negative
 //! values are counted before anything clamps, and none of them disturbs its neighbours.
-
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
 
 use ash::vk;
 use etalon::frame::{Background, NEUTRAL_GREY, Settings};
@@ -14,9 +9,9 @@ use etalon::image::tone::{ToneMap, desaturated, quantise, srgb_decode, srgb_enco
 use etalon::pass::tonemap::{Counts, Display, tonemap};
 use etalon::scene::LightKind;
 use etalon::study::shape::Shape;
+use etalon_testing::gpu::{Gpu, settings};
+use etalon_testing::made::{Made, Random, lambert, unlit};
 use glam::{DAffine3, DVec3};
-use gpu::{Gpu, settings};
-use made::{Made, Random, lambert, unlit};
 
 const CURVES: [ToneMap; 5] = [ToneMap::Linear, ToneMap::Reinhard, ToneMap::Aces, ToneMap::Agx, ToneMap::KhronosNeutral];
 
@@ -64,7 +59,7 @@ fn is_right(got: u8, display: f64, slack: f64) -> bool {
 
 #[test]
 fn every_curve_shows_the_bytes_of_its_twin() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut random = Random(11);
     // Radiances from 2^-24 to 1e38 (2^126.2) in all colours: a third greys, the rest of any saturation, some channels
     // zero. Half of them stay below 2^16, where the curves still bend.
@@ -105,7 +100,7 @@ fn every_curve_shows_the_bytes_of_its_twin() {
 
 #[test]
 fn exposure_is_a_power_of_two_before_the_curve() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let film: Vec<[f32; 4]> = (0..256).map(|i| [i as f32 / 64.0, i as f32 / 128.0, 0.1, 1.0]).collect();
     for curve in CURVES {
         for stops in [-3.0_f32, 2.0] {
@@ -120,7 +115,7 @@ fn exposure_is_a_power_of_two_before_the_curve() {
 
 #[test]
 fn what_is_no_radiance_is_counted_and_shown_as_black_or_white() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let nan = f32::NAN;
     let inf = f32::INFINITY;
     let mut film = vec![[0.5_f32, 0.5, 0.5, 1.0]; 64];
@@ -150,7 +145,7 @@ fn what_is_no_radiance_is_counted_and_shown_as_black_or_white() {
 
 #[test]
 fn coverage_is_laid_over_the_background_after_the_curve() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let film: Vec<[f32; 4]> = (0..=255)
         .map(|i| {
             let alpha = i as f32 / 255.0;
@@ -179,7 +174,7 @@ fn coverage_is_laid_over_the_background_after_the_curve() {
 
 #[test]
 fn a_whole_render_shows_the_twin_s_bytes_over_its_background() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let color = [0.9_f32, 0.35, 0.02];
     let mut made = Made::new("patch");
     made.add(Shape::panel(2.0, 8.0), unlit(color), DAffine3::IDENTITY);
@@ -207,7 +202,7 @@ fn a_whole_render_shows_the_twin_s_bytes_over_its_background() {
 
 #[test]
 fn light_beyond_f32_is_counted_as_infinite() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut made = Made::new("overflow");
     made.add(Shape::panel(8.0, 4.0), lambert([1.0; 3]), DAffine3::IDENTITY);
     // 1e38 cd at 1 cm is 1e42 lx.
@@ -231,7 +226,7 @@ fn light_beyond_f32_is_counted_as_infinite() {
 
 #[test]
 fn colours_outside_of_the_gamut_keep_their_luminance() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let mut random = Random(5);
     let film: Vec<[f32; 4]> = (0..64 * 16)
         .map(|_| {

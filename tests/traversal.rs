@@ -1,19 +1,14 @@
 //! The traversal alone: what rays meet, by three ways through the tree and by brute force in f64, and that a ray neither
 //! meets the surface it leaves nor slips out of a closed one, at any scale.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/made.rs"]
-mod made;
-
 use etalon::pass::rays::Traversal;
 use etalon::pass::trace_rays::{Hit, Mode, Ray, Tracer};
 use etalon::scene::Scene;
-use etalon::scene::bvh::Bvh;
 use etalon::study::shape::Shape;
+use etalon::transport::bvh::Bvh;
+use etalon_testing::gpu::Gpu;
+use etalon_testing::made::{Made, Random, at, lambert};
 use glam::{DAffine3, DVec3, Vec3};
-use gpu::Gpu;
-use made::{Made, Random, at, lambert};
 
 const WAYS: [Traversal; 3] = [Traversal::Links16, Traversal::Links32, Traversal::Stack];
 
@@ -96,7 +91,7 @@ fn meets(ray: &Ray, corners: &[[f32; 3]; 3]) -> Option<(f64, f64)> {
 /// doubtful, and few.
 #[test]
 fn every_way_finds_what_brute_force_finds() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let scene = scene();
     let bvh = Bvh::build(&scene).expect("a tree");
     let rays = rays(6000, 6.0);
@@ -158,7 +153,7 @@ fn bits(hits: &[Hit]) -> Vec<[u32; 4]> {
 /// Nodes and triangles are counted exactly: alone or in pairs, in one dispatch or in parts, and again and again.
 #[test]
 fn work_is_counted_exactly() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let scene = scene();
     let rays = rays(5000, 6.0);
     let mut tracer = Tracer::new(&gpu.device, &scene, Some(Traversal::Links16)).expect("a tracer");
@@ -239,7 +234,7 @@ fn tally(hits: &[Hit], is_so: impl Fn(&Hit) -> bool) -> [usize; 2] {
 /// other face may meet it: of bodies 200 times longer than thick 2 in 10,000 do.
 #[test]
 fn rays_neither_meet_what_they_leave_nor_slip_out() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     let turn = DAffine3::from_axis_angle(DVec3::new(0.3, 0.5, -0.8).normalize(), 1.1);
     let bodies: [(&str, Shape, DVec3); 5] = [
         ("ball", Shape::sphere(1.0, 48), DVec3::ONE),

@@ -1,8 +1,5 @@
 //! A device that takes turns with a window draws in short pieces what others draw at once: the same picture, bit by bit.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-
 use std::time::Duration;
 
 use etalon::frame::Settings;
@@ -10,7 +7,7 @@ use etalon::gpu::Interrupted;
 use etalon::plan::{Knobs, Model};
 use etalon::scene::environment::Environment;
 use etalon::study;
-use gpu::{Gpu, bits};
+use etalon_testing::gpu::{Gpu, bits};
 
 /// Scenes with the model that they are drawn by, and rungs.
 const PICTURES: &[(&str, Model, &[&str])] = &[

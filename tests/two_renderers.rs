@@ -1,14 +1,11 @@
 //! Two renderers in one process, each in a thread of its own: on one device, and on a device each.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-
 use std::sync::Arc;
 
 use etalon::frame::{Renderer, Settings};
 use etalon::gpu::{Device, DeviceChoice};
 use etalon::study;
-use gpu::{Gpu, knobs, settings};
+use etalon_testing::gpu::{Gpu, knobs, settings};
 
 const NAMES: [&str; 3] = ["etalon", "blend", "lamps"];
 
@@ -39,7 +36,7 @@ fn beside_each_other(device: impl Fn() -> Arc<Device> + Sync) {
 
 #[test]
 fn renderers_in_two_threads_share_a_device() {
-    let gpu = Gpu::new();
+    let gpu = Gpu::open();
     beside_each_other(|| gpu.device.clone());
 }
 

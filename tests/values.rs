@@ -1,25 +1,18 @@
 //! What a material says of itself is what its picture shows: lobes, layers and Fresnel's curves of all three models against f64
 //! closed forms (support/lobe.rs), on a dome whose facets stand at many angles to the eye and the light; and exchanging the two.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/lobe.rs"]
-mod lobe;
-#[path = "support/made.rs"]
-mod made;
-
 use etalon::frame::Settings;
 use etalon::image::Picture;
 use etalon::plan::Model;
 use etalon::plan::rungs::{Brdf, Fresnel};
 use etalon::scene::environment::Environment;
-use etalon::scene::layers::{Boundary, Layer, Layers, Media};
 use etalon::scene::{AlphaMode, Camera, LightKind, Material, Projection, Scene};
 use etalon::study::shape::Shape;
+use etalon::transport::layers::{Boundary, Layer, Layers, Media};
+use etalon_testing::gpu::Gpu;
+use etalon_testing::lobe::{DOME, Facet, MODELS, Rungs, dome, model, reflected, worst};
+use etalon_testing::made::{Made, at, lambert, orthographic};
 use glam::{DAffine3, DVec3};
-use gpu::Gpu;
-use lobe::{DOME, Facet, MODELS, Rungs, dome, model, reflected, worst};
-use made::{Made, at, lambert, orthographic};
 
 /// Towards lights: one that lies before the dome, one beside it, where half of the facets are turned away.
 const LIGHTS: [DVec3; 2] = [DVec3::new(0.2, 0.5, 1.0), DVec3::new(-0.7, 0.15, 0.4)];
@@ -56,7 +49,7 @@ fn lit(gpu: &Gpu, materials: &[Material], light: DVec3, of: Model, choices: &[&s
     eprint!("{of:?} {choices:?} ");
     worst(&film, &facets, floor, |facet: &Facet| {
         let m = &materials[facet.material];
-        reflected(m, rungs, facet.n, l, DVec3::Z) * lobe::rgb(IRRADIANCE)
+        reflected(m, rungs, facet.n, l, DVec3::Z) * etalon_testing::lobe::rgb(IRRADIANCE)
     })
 }
 
@@ -103,8 +96,8 @@ const METALS: [[[f32; 2]; 3]; 3] = [
 ];
 
 fn conductor(index: [[f32; 2]; 3], roughness: f32) -> Material {
-    // As a file's metal has it (src/scene/gltf_extras.rs): its colour is what it reflects at normal incidence.
-    let [r, g, b] = index.map(|[n, kappa]| lobe::fresnel(1.0, n.into(), kappa.into()) as f32);
+    // As a file's metal has it (crates/scene/src/gltf_extras.rs): its colour is what it reflects at normal incidence.
+    let [r, g, b] = index.map(|[n, kappa]| etalon_testing::lobe::fresnel(1.0, n.into(), kappa.into()) as f32);
     Material { conductor: Some(index), ..metal([r, g, b, 1.0], roughness) }
 }
 
@@ -131,7 +124,8 @@ fn mirrored(gpu: &Gpu, materials: &[Material], of: Model, choices: &[&str]) -> f
     eprint!("{of:?} {choices:?} ");
     worst(&film, &facets, 1e-2, |facet| {
         let m = &materials[facet.material];
-        let f = lobe::dielectric(m, exact, facet.n.z).lerp(lobe::metal(m, exact, facet.n.z), m.metallic.into());
+        let f = etalon_testing::lobe::dielectric(m, exact, facet.n.z)
+            .lerp(etalon_testing::lobe::metal(m, exact, facet.n.z), m.metallic.into());
         f * DVec3::new(1.0, 0.5, 2.0)
     })
 }
@@ -174,8 +168,9 @@ fn a_smooth_coat_mirrors_what_is_around_and_takes_that_from_its_base() {
         };
         let expected = |facet: &Facet| {
             let m = &materials[facet.material];
-            let coat = f64::from(m.clearcoat) * lobe::schlick(DVec3::splat(0.04), 1.0, facet.n.z).x;
-            let f = lobe::dielectric(m, false, facet.n.z).lerp(lobe::metal(m, false, facet.n.z), m.metallic.into());
+            let coat = f64::from(m.clearcoat) * etalon_testing::lobe::schlick(DVec3::splat(0.04), 1.0, facet.n.z).x;
+            let f = etalon_testing::lobe::dielectric(m, false, facet.n.z)
+                .lerp(etalon_testing::lobe::metal(m, false, facet.n.z), m.metallic.into());
             f * (1.0 - coat) + coat
         };
         // The deferred pass has the coat's normal to 6.5e-5, and at 78° the curve falls by 2 per radian of what is 0.4; the table is
@@ -263,7 +258,8 @@ fn a_clear_coat_keeps_from_the_eye_what_it_reflects_of_emitted_light() {
         let film = gpu.film(&scene, model(of, DOME, &["brdf=ggx", "fresnel=schlick"]));
         let error = worst(&film, &facets, 1e-3, |facet| {
             let coat = f64::from(materials[facet.material].clearcoat);
-            lobe::rgb(glow) * (1.0 - coat * lobe::schlick(DVec3::splat(0.04), 1.0, facet.n.z).x)
+            etalon_testing::lobe::rgb(glow)
+                * (1.0 - coat * etalon_testing::lobe::schlick(DVec3::splat(0.04), 1.0, facet.n.z).x)
         });
         // A cosine to 1e-7, five times over; the deferred pass has the coat's normal to 6.5e-5 (octahedra of 2 x 16 bits), and the
         // curve's slope is 2 at 78°.
@@ -408,11 +404,11 @@ fn several() -> [Material; 4] {
 
 /// What such a facet sends along `v`, in light along −`l`: `share` of its diffuse ground is left.
 fn sent(m: &Material, rungs: Rungs, n: DVec3, l: DVec3, v: DVec3, share: f64) -> DVec3 {
-    let kept = |m: &Material| reflected(m, rungs, n, l, v) * lobe::rgb(IRRADIANCE);
+    let kept = |m: &Material| reflected(m, rungs, n, l, v) * etalon_testing::lobe::rgb(IRRADIANCE);
     let without = Material { base_color: [0.0; 4], ..m.clone() };
     let diffuse = if m.metallic == 0.0 { kept(m) - kept(&without) } else { DVec3::ZERO };
-    let coat = f64::from(m.clearcoat) * lobe::schlick(DVec3::splat(0.04), 1.0, n.dot(v)).x;
-    kept(m) - diffuse * (1.0 - share) + lobe::rgb(m.emissive) * (1.0 - coat)
+    let coat = f64::from(m.clearcoat) * etalon_testing::lobe::schlick(DVec3::splat(0.04), 1.0, n.dot(v)).x;
+    kept(m) - diffuse * (1.0 - share) + etalon_testing::lobe::rgb(m.emissive) * (1.0 - coat)
 }
 
 /// Towards a light that comes from above, past what stands before the dome.
@@ -436,8 +432,10 @@ fn what_a_mirror_shows_and_what_a_pane_lets_through_is_lit_as_what_is_seen_witho
         made.add(Shape::panel(60.0, 40.0), metal([1.0; 4], 0.0), tilted);
         let eye = DVec3::new(-30.0, 0.0, 20.0);
         let projection = made.0.cameras[0].projection;
-        made.0.cameras =
-            vec![Camera { projection: projection_to(projection, 90.0), ..made::looking(eye, eye + DVec3::X) }];
+        made.0.cameras = vec![Camera {
+            projection: projection_to(projection, 90.0),
+            ..etalon_testing::made::looking(eye, eye + DVec3::X)
+        }];
     });
     let pane = Material { transmission: 1.0, roughness: 0.0, specular: 0.0, ..lambert([1.0; 3]) };
     let (through, _) = with(&materials, |made| made.add(Shape::panel(31.0, 31.0), pane, at(0.0, 0.0, 8.0)));
@@ -511,7 +509,7 @@ fn a_slanted_sheet_lets_through_what_it_does_not_reflect() {
     let mut made = Made(scene);
     // As wide as the rings up to 66°: what is mirrored misses it.
     let up = DAffine3::from_rotation_x(std::f64::consts::FRAC_PI_2);
-    made.add(Shape::disc(12.3, 96), made::unlit(behind), at(0.0, 0.0, -19.5) * up);
+    made.add(Shape::disc(12.3, 96), etalon_testing::made::unlit(behind), at(0.0, 0.0, -19.5) * up);
     let facets: Vec<Facet> = facets.into_iter().filter(|facet| facet.n.z > 0.3).collect();
     for (of, fresnel) in [
         (Model::Local, "fresnel=schlick"),
@@ -524,8 +522,8 @@ fn a_slanted_sheet_lets_through_what_it_does_not_reflect() {
         eprint!("{of:?}, {fresnel}: ");
         let error = worst(&film, &facets, 1e-2, |facet| {
             let m = &materials[facet.material];
-            let passes = 1.0 - lobe::dielectric(m, fresnel == "fresnel=exact", facet.n.z).x;
-            lobe::rgb(behind) * lobe::base(m) * (f64::from(m.transmission) * passes)
+            let passes = 1.0 - etalon_testing::lobe::dielectric(m, fresnel == "fresnel=exact", facet.n.z).x;
+            etalon_testing::lobe::rgb(behind) * etalon_testing::lobe::base(m) * (f64::from(m.transmission) * passes)
         });
         // Of 64 even points one too many or too few goes through; the deferred pass has these normals in 2 x 16 bits, 6.5e-5.
         let bound = match of {
@@ -537,7 +535,7 @@ fn a_slanted_sheet_lets_through_what_it_does_not_reflect() {
     }
 }
 
-/// k_d, k_s in 1/sr and shine as a scene tells them (`extras.etalon`; src/scene/gltf_extras.rs keeps them like this).
+/// k_d, k_s in 1/sr and shine as a scene tells them (`extras.etalon`; crates/scene/src/gltf_extras.rs keeps them like this).
 fn told(kd: [f32; 3], ks: [f32; 3], shine: f32) -> Material {
     Material {
         specular: 1.0,
@@ -564,7 +562,7 @@ fn told_numbers_of_phong_are_drawn_as_b5_and_b6_are_written() {
             let seen: Vec<Facet> = facets.iter().filter(|f| f.material < count).map(Facet::clone).collect();
             let error = worst(&film, &seen, FAINT, |facet: &Facet| {
                 let (kd, ks, shine) = of[facet.material];
-                let (kd, ks) = (lobe::rgb(kd), lobe::rgb(ks));
+                let (kd, ks) = (etalon_testing::lobe::rgb(kd), etalon_testing::lobe::rgb(ks));
                 let (n, sum) = (facet.n, l + DVec3::Z);
                 let (cos, lobe) = (n.dot(l).max(0.0), n.dot(sum.normalize()).powf(f64::from(shine)));
                 let lit = if cos > 0.0 { 1.0 } else { 0.0 };
@@ -572,7 +570,7 @@ fn told_numbers_of_phong_are_drawn_as_b5_and_b6_are_written() {
                     "blinn-phong" => kd * cos + ks * lobe * lit,
                     _ => (kd + ks * lobe / sum.length_squared()) * cos,
                 };
-                light * lobe::rgb(IRRADIANCE)
+                light * etalon_testing::lobe::rgb(IRRADIANCE)
             });
             assert!(error < LOBES, "{model_of:?}, {brdf}: {error:e}");
         }
@@ -589,7 +587,7 @@ fn a_rough_coat_over_black_sends_its_albedo_along_paths() {
     let sky = Environment::constant([1.0; 3]);
     let (_, film) =
         gpu.shot(&scene, Some(&sky), model(Model::Global, DOME, &["samples=256", "brdf=ggx", "fresnel=schlick"]));
-    for tilt in lobe::TILTS {
+    for tilt in etalon_testing::lobe::TILTS {
         let cos_v = tilt.to_radians().cos();
         let same = facets.iter().filter(|facet| (facet.n.z - cos_v).abs() < 1e-6);
         let seen: Vec<f64> =
@@ -597,7 +595,8 @@ fn a_rough_coat_over_black_sends_its_albedo_along_paths() {
         let n = seen.len() as f64;
         let mean = seen.iter().sum::<f64>() / n;
         let error = (seen.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n * (n - 1.0))).sqrt();
-        let [whole, grazing] = lobe::reflectances(cos_v, lobe::alpha(coated.clearcoat_roughness));
+        let [whole, grazing] =
+            etalon_testing::lobe::reflectances(cos_v, etalon_testing::lobe::alpha(coated.clearcoat_roughness));
         let want = 0.04 * (whole - grazing) + grazing;
         // The rule behind `reflectances` is good to 1e-3.
         assert!((mean - want).abs() < 4.0 * error + 2e-3 * want, "{tilt}°: {mean} ± {error}, not {want}");

@@ -2,17 +2,6 @@
 //! and without a shape on slanted surfaces, the environment turned and dimmed, radiance over distance and tilt, Snell's window, and
 //! objects where their instances and the camera put them. Against closed forms and integrals in f64.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/lobe.rs"]
-mod lobe;
-#[path = "support/made.rs"]
-mod made;
-#[path = "support/raycast.rs"]
-mod raycast;
-#[path = "support/shade.rs"]
-mod shade;
-
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use etalon::frame::Settings;
@@ -22,10 +11,10 @@ use etalon::scene::environment::{self, Environment};
 use etalon::scene::{Camera, Extent, Light, LightKind, Material, Projection, Scene};
 use etalon::study;
 use etalon::study::shape::Shape;
+use etalon_testing::gpu::Gpu;
+use etalon_testing::lobe::{DOME, MODELS, dome, model, worst};
+use etalon_testing::made::{Made, at, lambert, looking, orthographic, perspective, unlit};
 use glam::{DAffine3, DQuat, DVec3};
-use gpu::Gpu;
-use lobe::{DOME, MODELS, dome, model, worst};
-use made::{Made, at, lambert, looking, orthographic, perspective, unlit};
 
 fn pixel(film: &Picture, x: u32, y: u32) -> DVec3 {
     let [r, g, b, _] = film.rgba[(y * film.width + x) as usize].map(f64::from);
@@ -78,7 +67,7 @@ fn points_cones_and_what_is_far_light_as_their_formulas_say() {
             for i in 0..144 {
                 let (x, y) = (i % 12, i / 12);
                 let p = DVec3::new((f64::from(x) + 0.5) / 60.0 - 0.1, 0.1 - (f64::from(y) + 0.5) / 60.0, 0.0);
-                let (l, e) = shade::incident(&lamp, p);
+                let (l, e) = etalon_testing::shade::incident(&lamp, p);
                 let want = e * (l.z / PI);
                 brightest = brightest.max(want.x);
                 error = error.max((pixel(&film, x, y) - want).abs().max_element());
@@ -230,13 +219,18 @@ fn a_turned_and_dimmed_environment_lights_and_is_mirrored_from_where_it_is() {
         // Of a Lambert facet the mean over its pixels: paths scatter.
         let mut off = 0.0_f64;
         for facet in lambert_only {
-            let sum =
-                facet.pixels.iter().fold(DVec3::ZERO, |sum, &p| sum + lobe::rgb([0, 1, 2].map(|c| film.rgba[p][c])));
+            let sum = facet
+                .pixels
+                .iter()
+                .fold(DVec3::ZERO, |sum, &p| sum + etalon_testing::lobe::rgb([0, 1, 2].map(|c| film.rgba[p][c])));
             let want = diffuse_of_uneven(into_map(facet.n, degrees)) * f64::from(intensity);
             off = off.max((sum / facet.pixels.len() as f64 / want - 1.0).abs().max_element());
         }
-        let mirrors: Vec<_> =
-            facets.iter().filter(|f| f.material == 1).map(|f| lobe::Facet { pixels: f.pixels.clone(), ..*f }).collect();
+        let mirrors: Vec<_> = facets
+            .iter()
+            .filter(|f| f.material == 1)
+            .map(|f| etalon_testing::lobe::Facet { pixels: f.pixels.clone(), ..*f })
+            .collect();
         let error = worst(&film, &mirrors, 0.1, |facet| {
             let r = 2.0 * facet.n.z * facet.n - DVec3::Z;
             DVec3::from(environment.sample(into_map(r, degrees))) * f64::from(intensity)
@@ -322,7 +316,7 @@ fn snells_window_ends_where_it_should_to_a_tenth_of_a_degree() {
             let want: f64 = (0..64)
                 .map(|i| {
                     let theta = angle(f64::from(row) + (f64::from(i) + 0.5) / 64.0).to_radians();
-                    1.0 - lobe::fresnel(theta.cos(), 1.0 / n, 0.0)
+                    1.0 - etalon_testing::lobe::fresnel(theta.cos(), 1.0 / n, 0.0)
                 })
                 .sum();
             off = off.max((lit(row) / (want / 64.0) - 1.0).abs());
@@ -400,7 +394,13 @@ fn cameras_and_instances_put_things_where_the_geometry_says() {
         ("60°, upright", with(perspective(60.0)), [30, 60]),
         ("parallel", with(orthographic(1.7)), [64, 36]),
     ] {
-        let oracle = raycast::picture(&scene, &camera, size[0], size[1], raycast::Options::default());
+        let oracle = etalon_testing::raycast::picture(
+            &scene,
+            &camera,
+            size[0],
+            size[1],
+            etalon_testing::raycast::Options::default(),
+        );
         for of in MODELS {
             let mut made = Made(scene.clone());
             made.0.cameras = vec![camera.clone()];
@@ -412,7 +412,10 @@ fn cameras_and_instances_put_things_where_the_geometry_says() {
                 }
                 let color = want.hit.map_or(DVec3::ZERO, |hit| hit.albedo);
                 compared[want.hit.map_or(3, |hit| hit.instance)] += 1;
-                assert!(lobe::rgb([got[0], got[1], got[2]]) == color, "{of:?}, {what}, pixel {i}: {got:?} for {color}");
+                assert!(
+                    etalon_testing::lobe::rgb([got[0], got[1], got[2]]) == color,
+                    "{of:?}, {what}, pixel {i}: {got:?} for {color}"
+                );
             }
             assert!(compared.into_iter().all(|count| count > 8), "{of:?}, {what}: {compared:?}");
         }
@@ -455,7 +458,13 @@ fn stretched_and_mirrored_balls_are_lit_as_ellipsoids() {
         made.light([PI as f32; 3], LightKind::Directional { direction: -l });
         made.front(1.2);
         let size = [32, 32];
-        let oracle = raycast::picture(&made.0, &made.0.cameras[0], 32, 32, raycast::Options::default());
+        let oracle = etalon_testing::raycast::picture(
+            &made.0,
+            &made.0.cameras[0],
+            32,
+            32,
+            etalon_testing::raycast::Options::default(),
+        );
         for of in MODELS {
             let off: &[&str] = match of {
                 Model::Global => &["samples=16"],

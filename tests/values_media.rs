@@ -1,23 +1,12 @@
 //! What lies in a medium, as pictures against f64: what it reflects is a matter of relative indices.
 
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/lobe.rs"]
-mod lobe;
-#[path = "support/made.rs"]
-mod made;
-#[path = "support/raycast.rs"]
-mod raycast;
-#[path = "support/shade.rs"]
-mod shade;
-
 use etalon::plan::Model;
 use etalon::scene::{Material, Scene};
 use etalon::study::shape::Shape;
+use etalon_testing::gpu::Gpu;
+use etalon_testing::lobe::model;
+use etalon_testing::made::{Made, at, lambert, perspective, unlit};
 use glam::{DAffine3, DVec3};
-use gpu::Gpu;
-use lobe::model;
-use made::{Made, at, lambert, perspective, unlit};
 
 const WATER: f32 = 1.333;
 
@@ -43,7 +32,7 @@ const GOLD: [[f32; 2]; 3] = [[0.18, 3.43], [0.42, 2.35], [1.37, 1.77]];
 fn mirrors_under_water_reflect_by_relative_indices() {
     let gpu = Gpu::hasty();
     let water = f64::from(WATER);
-    let in_air = GOLD.map(|[n, kappa]| lobe::fresnel(1.0, n.into(), kappa.into()) as f32);
+    let in_air = GOLD.map(|[n, kappa]| etalon_testing::lobe::fresnel(1.0, n.into(), kappa.into()) as f32);
     let [r, g, b] = in_air;
     let gold = Material {
         conductor: Some(GOLD),
@@ -56,9 +45,10 @@ fn mirrors_under_water_reflect_by_relative_indices() {
     for of in [Model::Recursive, Model::Global] {
         for degrees in [0.0_f64, 30.0, 60.0] {
             let cos = degrees.to_radians().cos();
-            let of_gold =
-                DVec3::from(GOLD.map(|[n, k]| lobe::fresnel(cos, f64::from(n) / water, f64::from(k) / water)));
-            let of_plastic = DVec3::splat(lobe::fresnel(cos, 1.5 / water, 0.0));
+            let of_gold = DVec3::from(
+                GOLD.map(|[n, k]| etalon_testing::lobe::fresnel(cos, f64::from(n) / water, f64::from(k) / water)),
+            );
+            let of_plastic = DVec3::splat(etalon_testing::lobe::fresnel(cos, 1.5 / water, 0.0));
             for (name, material, expected) in [("gold", &gold, of_gold), ("plastic", &plastic, of_plastic)] {
                 let scene = plate_under_water(material.clone(), degrees);
                 let film = gpu.film(&scene, model(of, [4, 4], &["fresnel=exact"]));
@@ -71,9 +61,9 @@ fn mirrors_under_water_reflect_by_relative_indices() {
                 }
                 // In air it would be something else, by more than that.
                 let air = if name == "gold" {
-                    DVec3::from(GOLD.map(|[n, k]| lobe::fresnel(cos, n.into(), k.into())))
+                    DVec3::from(GOLD.map(|[n, k]| etalon_testing::lobe::fresnel(cos, n.into(), k.into())))
                 } else {
-                    DVec3::splat(lobe::fresnel(cos, 1.5, 0.0))
+                    DVec3::splat(etalon_testing::lobe::fresnel(cos, 1.5, 0.0))
                 };
                 assert!(((air - expected) / expected).abs().max_element() > 4e-2, "{name} at {degrees}°");
             }
@@ -93,7 +83,7 @@ fn coats_follow_fresnels_equations_where_the_rung_says_exact() {
             made.camera(DVec3::Z * 4.0, DVec3::ZERO, perspective(0.2));
             let sky = etalon::scene::environment::Environment::constant([1.0; 3]);
             let (_, film) = gpu.shot(&made.0, Some(&sky), model(of, [4, 4], &["fresnel=exact", "samples=16"]));
-            let expected = lobe::fresnel(degrees.to_radians().cos(), 1.5, 0.0);
+            let expected = etalon_testing::lobe::fresnel(degrees.to_radians().cos(), 1.5, 0.0);
             let mean = film.rgba.iter().map(|p| f64::from(p[1])).sum::<f64>() / film.rgba.len() as f64;
             // The table of directional albedo is good to 4e-3 of what is 1; paths choose coat or base.
             let bound = if of == Model::Recursive { 1e-4 } else { 6e-3 };

@@ -2,15 +2,6 @@
 //! texture of eight texels, against what the formats' specifications make of each texel (glTF 2.0, KHR_texture_transform,
 //! KHR_materials_clearcoat, _specular, _transmission, _volume).
 
-#[path = "support/gltf_builder.rs"]
-mod gltf_builder;
-#[path = "support/gpu.rs"]
-mod gpu;
-#[path = "support/lobe.rs"]
-mod lobe;
-#[path = "support/made.rs"]
-mod made;
-
 use etalon::image::Picture;
 use etalon::plan::Model;
 use etalon::scene::environment::Environment;
@@ -18,11 +9,11 @@ use etalon::scene::{
     AlphaMode, Image, Instance, LightKind, LoadOptions, Material, Mesh, Sampler, Scene, TextureRef, Wrap, load,
 };
 use etalon::study::shape::Shape;
+use etalon_testing::gltf_builder::{Builder, png};
+use etalon_testing::gpu::Gpu;
+use etalon_testing::lobe::{MODELS, model};
+use etalon_testing::made::{Made, at, lambert, unlit};
 use glam::{Affine2, DAffine3, DVec2, DVec3, Vec2};
-use gltf_builder::{Builder, png};
-use gpu::Gpu;
-use lobe::{MODELS, model};
-use made::{Made, at, lambert, unlit};
 use serde_json::json;
 
 /// Pixels of a tile's side, and tiles in a row.
@@ -87,12 +78,12 @@ fn board(tiles: &[Tile], images: Vec<Image>) -> (Scene, [u32; 2]) {
         made.0.materials.push(Material { name: tile.what.to_owned(), ..tile.material.clone() });
         made.0.meshes.push(Mesh {
             name: tile.what.to_owned(),
-            positions: [[x, y - 1.0, 0.0], [x + 1.0, y - 1.0, 0.0], [x + 1.0, y, 0.0], [x, y, 0.0]].to_vec(),
-            normals: vec![[0.0, 0.0, 1.0]; 4],
-            tangents: tile.tangent.map_or(Vec::new(), |tangent| vec![tangent; 4]),
-            uvs: tile.uvs.map(|set| set.to_vec()),
-            colors: tile.colors.clone(),
-            indices: vec![0, 1, 2, 0, 2, 3],
+            positions: [[x, y - 1.0, 0.0], [x + 1.0, y - 1.0, 0.0], [x + 1.0, y, 0.0], [x, y, 0.0]].to_vec().into(),
+            normals: vec![[0.0, 0.0, 1.0]; 4].into(),
+            tangents: tile.tangent.map_or(Vec::new().into(), |tangent| vec![tangent; 4].into()),
+            uvs: tile.uvs.map(|set| set.to_vec().into()),
+            colors: tile.colors.clone().into(),
+            indices: vec![0, 1, 2, 0, 2, 3].into(),
             material: i,
         });
         made.place(i, DAffine3::IDENTITY);
@@ -261,7 +252,7 @@ fn roughness_is_in_green_and_metal_in_blue_and_layers_in_their_channels() {
 
 /// Normals of a picture of one texel, by its bytes.
 fn bent([x, y, z]: [u8; 3]) -> (Image, DVec3) {
-    let image = Image { name: "normal".to_owned(), width: 1, height: 1, rgba: vec![x, y, z, 255] };
+    let image = Image { name: "normal".to_owned(), width: 1, height: 1, rgba: vec![x, y, z, 255].into() };
     (image, DVec3::new(f64::from(x), f64::from(y), f64::from(z)) / 127.5 - 1.0)
 }
 
@@ -311,7 +302,11 @@ fn a_coat_has_a_normal_texture_of_its_own() {
     let shown = move |n: DVec3| {
         let h = (towards + DVec3::Z).normalize();
         let f = 0.04 + 0.96 * (1.0 - h.z).powi(5);
-        DVec3::splat(f * f64::from(PI) * lobe::ggx(n, towards, DVec3::Z, lobe::alpha(0.4)) * n.dot(towards))
+        DVec3::splat(
+            f * f64::from(PI)
+                * etalon_testing::lobe::ggx(n, towards, DVec3::Z, etalon_testing::lobe::alpha(0.4))
+                * n.dot(towards),
+        )
     };
     let n_coat = n.normalize();
     let turned = DVec3::new(n_coat.x, -n_coat.y, n_coat.z);
@@ -403,7 +398,7 @@ fn alpha_cuts_out_below_its_cutoff() {
     let shown = |cutoff: f64, alpha: f64| {
         move |p: DVec2| {
             let texel = texel(&texels(), p);
-            if texel[3] * alpha < cutoff { lobe::rgb(BEHIND) } else { linear_rgb(texel) }
+            if texel[3] * alpha < cutoff { etalon_testing::lobe::rgb(BEHIND) } else { linear_rgb(texel) }
         }
     };
     let mut tiles = vec![
@@ -430,7 +425,7 @@ fn alpha_covers_its_share_of_what_lies_behind() {
         ..lambert([0.0; 3])
     };
     let colour = DVec3::new(0.2, 0.4, 0.8);
-    let over = |shown: DVec3, alpha: f64| lobe::rgb(BEHIND).lerp(shown, alpha);
+    let over = |shown: DVec3, alpha: f64| etalon_testing::lobe::rgb(BEHIND).lerp(shown, alpha);
     let tiles = [
         tile("a quarter", blend(0.25, false), move |_| over(colour, 0.25)),
         tile("texels", blend(0.75, true), move |p| {
@@ -471,8 +466,8 @@ fn a_sheet_lets_through_its_colour_times_its_transmission() {
     let tint = DVec3::new(0.5, 0.25, 1.0);
     let textured = Material { transmission_texture: Some(sharp(0)), ..sheet.clone() };
     let tiles = [
-        tile("transmission", sheet, move |_| lobe::rgb(BEHIND) * tint * 0.75),
-        tile("texels", textured, move |p| lobe::rgb(BEHIND) * tint * (0.75 * texel(&texels(), p)[0])),
+        tile("transmission", sheet, move |_| etalon_testing::lobe::rgb(BEHIND) * tint * 0.75),
+        tile("texels", textured, move |p| etalon_testing::lobe::rgb(BEHIND) * tint * (0.75 * texel(&texels(), p)[0])),
     ];
     let (scene, size) = before_a_wall(&tiles, BEHIND);
     let film = gpu.film(&scene, model(Model::Recursive, size, &["refraction=ray"]));
@@ -497,7 +492,7 @@ fn a_body_absorbs_by_the_way_through_it_or_by_its_nominal_thickness() {
         attenuation_color: [0.5, 0.8, 0.1],
         ..lambert([1.0; 3])
     };
-    let left = |d: f64| lobe::rgb(BEHIND) * DVec3::new(0.5, 0.8, 0.1).powf(d / 0.5);
+    let left = |d: f64| etalon_testing::lobe::rgb(BEHIND) * DVec3::new(0.5, 0.8, 0.1).powf(d / 0.5);
     for (absorption, ways) in [("absorption=path", [0.4, 0.8]), ("absorption=thickness", [0.7, 1.4])] {
         let mut made = Made::new("bodies");
         let mesh = made.mesh(Shape::cuboid(DVec3::new(0.9, 0.9, 0.4)), body.clone());
@@ -536,7 +531,7 @@ fn a_sheets_thickness_is_in_green() {
         ..lambert([1.0; 3])
     };
     let textured = Material { thickness_texture: Some(sharp(0)), ..sheet.clone() };
-    let left = |d: f64| lobe::rgb(BEHIND) * DVec3::new(0.5, 0.8, 0.1).powf(d / 0.5);
+    let left = |d: f64| etalon_testing::lobe::rgb(BEHIND) * DVec3::new(0.5, 0.8, 0.1).powf(d / 0.5);
     let tiles = [
         tile("thickness", sheet, move |_| left(f64::from(0.7_f32))),
         tile("texels", textured, move |p| left(f64::from(0.7_f32) * texel(&texels(), p)[1])),
@@ -560,7 +555,7 @@ fn a_file_says_transforms_scales_and_sets_of_its_textures() {
     let quarters = {
         let mut out = std::io::Cursor::new(Vec::new());
         let image = texels();
-        image::RgbaImage::from_raw(image.width, image.height, image.rgba)
+        image::RgbaImage::from_raw(image.width, image.height, image.rgba.to_vec())
             .expect("its size")
             .write_to(&mut out, image::ImageFormat::Png)
             .expect("a picture");

@@ -1,5 +1,5 @@
 // Balls that paths aim at from the cell of a grid in which they are: where light came from by way of what mirrors or bends it,
-// as far as a few photons told (src/scene/caustics.rs).
+// as far as a few photons told (src/transport/caustics.rs).
 #ifndef AIMS_GLSL
 #define AIMS_GLSL
 #include "lib/encode.glsl"

@@ -1,5 +1,5 @@
 // Sums and products without their rounding, and exp, log, pow and the arc tangent to a few units in the last place
-// (ULP), which Vulkan's built-ins are not (numerics.md 2). Twins: src/optics/arithmetic.rs.
+// (ULP), which Vulkan's built-ins are not (numerics.md 2). Twins: crates/optics/src/arithmetic.rs.
 //
 // From + − × / √ and bit patterns alone, so that every device that rounds to nearest gives the same bits; `precise`
 // everywhere: without it a compiler may fuse or reassociate, and a residual is then 0. Never `fma`: it may be a

@@ -1,5 +1,5 @@
 // Spectra to colour (lecture C1–C3), dispersion and black bodies, and from scene-linear Rec. 709 radiance to display
-// values (C4). Twins: src/optics/colour.rs; of the tone curves src/image/tone.rs. Nothing is clipped to a gamut here: a
+// values (C4). Twins: crates/optics/src/colour.rs; of the tone curves crates/image/src/tone.rs. Nothing is clipped to a gamut here: a
 // colour outside it has a negative component.
 #ifndef COLOUR_GLSL
 #define COLOUR_GLSL
@@ -22,7 +22,7 @@ struct XyzToSrgb {
 
 // @eq C2: linear sRGB of X, Y, Z, white at D65, by the four-digit matrix of IEC 61966-2-1
 // X, Y and Z below 5e37, or the sums overflow.
-// @host src/spectra/mod.rs: what turns the film of bands into a picture
+// @host crates/optics/src/spectra/mod.rs: what turns the film of bands into a picture
 XyzToSrgb xyz_to_srgb(float X, float Y, float Z) {
     vec3 rgb = linear_srgb(vec3(X, Y, Z));
     return XyzToSrgb(rgb.r, rgb.g, rgb.b);
@@ -42,7 +42,7 @@ struct CmfIntegral {
 
 // @eq C1 C2 N50: X = ∫S x̄ dλ as 5 nm sums over 380 … 780 nm, r10 g10 b10 the three lamps of Stiles & Burch that match
 // Plain sums: 81 terms cost 81 roundings at worst. Samples below 1e34 in size, or the sums overflow.
-// @host src/spectra/mod.rs: light of a band as X, Y, Z, over steps of 0.5 nm
+// @host crates/optics/src/spectra/mod.rs: light of a band as X, Y, Z, over steps of 0.5 nm
 CmfIntegral cmf_integral(float s[81]) {
     vec3 xyz = vec3(0.0);
     vec3 rgb10 = vec3(0.0);
@@ -75,7 +75,7 @@ float gaussian(float lambda, float mu, DoubleFloat scale) {
 
 // @eq C1 C2: as cmf_integral, of S = A e^(−((λ − μ)/w)²/2) at the same wavelengths
 // |μ| is cut to 1e6 nm, |w| to [1e-6, 1e6] nm; |A| below 1e34, or the sums overflow.
-// @host src/spectra/mod.rs: light of a band as X, Y, Z, of a spectrum in the shape of a bell
+// @host crates/optics/src/spectra/mod.rs: light of a band as X, Y, Z, of a spectrum in the shape of a bell
 CmfGaussian cmf_gaussian(float A, float mu_nm, float width_nm) {
     float mu = clamp(mu_nm, -1e6, 1e6);
     float w = clamp(abs(width_nm), 1e-6, 1e6);
@@ -106,7 +106,7 @@ CmfGaussian cmf_gaussian(float A, float mu_nm, float width_nm) {
 // @eq C3: S(x) = 1/2 + x/(2√(1 + x²))
 // @out S
 // For x < 0 as 1/(2(1 + x² − x√(1 + x²))): the difference loses what is left of S. |x| is cut to 1e18.
-// @host src/spectra/upsampling.rs: reflectances of colours
+// @host crates/optics/src/spectra/upsampling.rs: reflectances of colours
 float spectrum_sigmoid(float x) {
     float S;
     if (ARITHMETIC == FAST) {
@@ -124,7 +124,7 @@ float spectrum_sigmoid(float x) {
 // @out rho
 // Jakob and Hanika 2019: a smooth reflectance in (0, 1) for every colour. Compensated: the polynomial, whose terms of
 // several hundred cancel to a few, in pairs. λ is cut to [0, 1e6] nm, coefficients to ±1e20.
-// @host src/spectra/upsampling.rs: reflectances of colours
+// @host crates/optics/src/spectra/upsampling.rs: reflectances of colours
 float upsampled_reflectance(float lambda_nm, float c0, float c1, float c2) {
     float lambda = clamp(lambda_nm, 0.0, 1e6);
     vec3 c = clamp(vec3(c0, c1, c2), -1e20, 1e20);
@@ -150,7 +150,7 @@ struct Sellmeier {
 // Four terms, of which glasses use three (B.w = 0). λ²/(λ² − C) = 1 + C/(λ² − C) in whichever form does not cancel. λ
 // is cut to [1e-6, 1e9] µm, B, C and the quotients to ±1e18; a term at its own resonance is 0; t < −1, inside an
 // absorption band, is n = 0.
-// @host src/spectra/dispersion.rs: the index of a medium in a band
+// @host crates/optics/src/spectra/dispersion.rs: the index of a medium in a band
 Sellmeier sellmeier(float lambda_um, vec4 B, vec4 C) {
     float lambda = clamp(lambda_um, 1e-6, 1e9);
     float l2 = lambda * lambda;
@@ -168,7 +168,7 @@ Sellmeier sellmeier(float lambda_um, vec4 B, vec4 C) {
 // @eq F1: n = A + B/λ², λ in µm
 // @out n
 // A knob, not data. λ is cut to [1e-6, 1e9] µm, n to [0, 1e9].
-// @host src/spectra/dispersion.rs: the index of a medium in a band
+// @host crates/optics/src/spectra/dispersion.rs: the index of a medium in a band
 float cauchy(float lambda_um, float A, float B) {
     float lambda = clamp(lambda_um, 1e-6, 1e9);
     return clamp(A + B / (lambda * lambda), 0.0, 1e9);
@@ -180,7 +180,7 @@ float cauchy(float lambda_um, float A, float B) {
 // @eq N48: 1/(e^x − 1), x = hc/(λkT)
 // @out y
 // 0 from 88 on, where e^x leaves the range; 2^126 for x → 0 and x ≤ 0.
-// @host src/spectra/mod.rs: lamps told by their temperature
+// @host crates/optics/src/spectra/mod.rs: lamps told by their temperature
 float planck(float x) {
     float y;
     if (ARITHMETIC == FAST) {
@@ -199,7 +199,7 @@ const float RADIATION_2_LO = 2.2035184e-4;
 // @out L
 // hc/(λkT) as a pair: its rounding times itself, up to 88, is the exponential's. λ is cut to [1e-3, 1e4] µm, T to
 // [1e-3, 1e12] K. 0 where the exponent exceeds 88.
-// @host src/spectra/mod.rs: lamps told by their temperature
+// @host crates/optics/src/spectra/mod.rs: lamps told by their temperature
 float blackbody(float lambda_um, float T) {
     float lambda = clamp(lambda_um, 1e-3, 1e4);
     float kelvin = clamp(T, 1e-3, 1e12);

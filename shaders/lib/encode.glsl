@@ -1,5 +1,5 @@
 // How quantities are stored: normals as octahedra, numbers as parts of words, depths, directions on a map. Twins of the
-// tagged functions: src/optics/encode.rs.
+// tagged functions: crates/optics/src/encode.rs.
 #ifndef ENCODE_GLSL
 #define ENCODE_GLSL
 #include "lib/constants.glsl"

@@ -1,5 +1,5 @@
 // Directions: unit vectors of any length, angles, frames around a normal, normals of triangles and of their images.
-// Twins: src/optics/frame.rs.
+// Twins: crates/optics/src/frame.rs.
 #ifndef FRAME_GLSL
 #define FRAME_GLSL
 #include "lib/arithmetic.glsl"
@@ -227,7 +227,7 @@ TriangleNormal triangle_normal(vec3 a, vec3 b, vec3 c) {
 // @eq Q5: N = (a x, b y, c z)/|…|, half the gradient of a x² + b y² + c z²
 // @out N
 // The normal of a level surface is the gradient of its function. At its centre: the zero vector.
-// @host src/study/shape.rs: the normals of balls
+// @host crates/scene/src/study/shape.rs: the normals of balls
 vec3 quadric_normal(vec3 p, vec3 k) {
     vec3 n;
     if (ARITHMETIC == FAST) {

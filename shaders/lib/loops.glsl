@@ -3,7 +3,7 @@
 #ifndef LOOPS_GLSL
 #define LOOPS_GLSL
 
-// Those so far by this invocation. No shader counts: src/gpu/loops.rs writes the counting into the SPIR-V of devices that need it.
+// Those so far by this invocation. No shader counts: crates/vulkan/src/loops.rs writes the counting into the SPIR-V of devices that need it.
 // What such a device gets is a variable of the invocation; it is shared memory here because the optimiser of the build leaves reads of that where
 // they stand.
 shared uint loop_heads;

@@ -1,5 +1,5 @@
 // Colour matching functions at 380, 385, … 780 nm: the tables under assets/cmf/, 0 outside their range. A test in
-// src/optics/colour.rs holds them to those files. Source and licence: assets/cmf/README.md.
+// crates/optics/src/colour.rs holds them to those files. Source and licence: assets/cmf/README.md.
 #ifndef MATCHING_FUNCTIONS_GLSL
 #define MATCHING_FUNCTIONS_GLSL
 

@@ -1,5 +1,5 @@
 // Rays against spheres, boxes and triangles, and where a ray begins and ends. A ray is origin + t direction, t ≥ 0, and
-// its direction has any length. Twins: src/optics/ray.rs.
+// its direction has any length. Twins: crates/optics/src/ray.rs.
 #ifndef RAY_GLSL
 #define RAY_GLSL
 #include "lib/arithmetic.glsl"

@@ -1,5 +1,5 @@
 // Sheen (KHR_materials_sheen): cloth, whose fibres stand off the surface and glow at its edges. Estevez and Kulla, "Production friendly
-// microfacet sheen BRDF", 2017. The twin in f64, which also makes the table: src/scene/lobe/sheen.rs.
+// microfacet sheen BRDF", 2017. The twin in f64, which also makes the table: crates/scene/src/lobe/sheen.rs.
 #ifndef SHEEN_GLSL
 #define SHEEN_GLSL
 #include "lib/constants.glsl"

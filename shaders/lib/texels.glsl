@@ -21,7 +21,7 @@ layout(pages) uniform sampler2DArray thickness_page;
 layout(pages) uniform sampler2DArray sheen_color_page;
 layout(pages) uniform sampler2DArray sheen_roughness_page;
 
-// Lobes that extensions lay over the base (src/scene/lobe/), each with a texel of numbers in the table of materials.
+// Lobes that extensions lay over the base (crates/scene/src/lobe/), each with a texel of numbers in the table of materials.
 const uint LOBES = 1;
 const uint LOBE_SHEEN = 0;
 

@@ -1,4 +1,4 @@
-// Numbers of the material model (lib/layers.glsl) that its twin on the host has, too (src/scene/layers.rs).
+// Numbers of the material model (lib/layers.glsl) that its twin on the host has, too (src/transport/layers.rs).
 #ifndef SHARE_LAYERS_GLSL
 #define SHARE_LAYERS_GLSL
 

@@ -9,8 +9,8 @@ use half::f16;
 
 use super::upload::{pack_half_2x16, upload};
 use crate::gpu::{Buffer, Device, NOTHING, Place};
-use crate::scene::caustics::{Aims, Ball};
 use crate::share::{AIM_GRID_TEXELS, AimBall, AimGrid};
+use crate::transport::caustics::{Aims, Ball};
 
 const _: () = assert!(size_of::<AimGrid>() == 16 * AIM_GRID_TEXELS as usize, "balls begin behind the grid");
 

@@ -7,8 +7,8 @@ use ash::vk;
 
 use super::upload::upload;
 use crate::gpu::{Buffer, Device, NOTHING};
-use crate::scene::emitters::{Emitters, Source};
 use crate::share::{EMITTER_NONE, EMITTER_PUNCTUAL, EMITTER_SKY, EMITTER_TRIANGLE, EMITTER_TWO_SIDED, Emitter};
+use crate::transport::emitters::{Emitters, Source};
 
 /// What paths draw light from; next to nothing without any.
 pub struct EmittersOnDevice {
@@ -34,7 +34,7 @@ impl EmittersOnDevice {
     /// # Errors
     /// When memory is short.
     pub fn new(device: &Arc<Device>, emitters: &Emitters, leaf_places: &[u32]) -> Result<Self> {
-        let shared = |emitter: &crate::scene::emitters::Emitter| {
+        let shared = |emitter: &crate::transport::emitters::Emitter| {
             let (kind, place) = match emitter.source {
                 Source::Sky => (EMITTER_SKY, 0),
                 Source::Punctual(light) => (EMITTER_PUNCTUAL, light),

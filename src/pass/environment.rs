@@ -4,7 +4,7 @@
 //! Prefiltering is done once per map and kept in the user's cache folder; a changed map or shader has another name there.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use anyhow::Result;
 use ash::vk;
@@ -70,7 +70,7 @@ impl EnvironmentOnDevice {
             (false, false) => Vec::new(),
         };
         let prefiltered = image(device, "prefiltered environment", &levels)?;
-        let table = plan.reflectance.then(|| (REFLECTANCE, REFLECTANCE, reflectance_table(plan.lobes)));
+        let table = plan.reflectance.then(|| (REFLECTANCE, REFLECTANCE, reflectance_table(plan.lobes).to_vec()));
         let reflectance = image(device, "directional reflectance", &table.into_iter().collect())?;
         let mut irradiance = [[0.0; 3]; 9];
         if let (true, Some(environment)) = (plan.ambient, environment) {
@@ -232,22 +232,24 @@ fn cache_file(device: &Device, chain: &Levels) -> Option<PathBuf> {
 
 /// Directional reflectance of the GGX lobe, split into the factors of F0 and F90 (Karis 2013):
 /// A = ∫ (1 − (1 − V·H)⁵) G₂ V·H / (N·H N·V), B the same with (1 − V·H)⁵, over the distribution of half vectors.
-fn reflectance_table(lobes: u32) -> Vec<Texel> {
+///
+/// Made once for all renderers of a process: with the albedo of a lobe beside it, or without.
+fn reflectance_table(lobes: u32) -> &'static [Texel] {
+    static TABLES: [OnceLock<Vec<Texel>>; 2] = [const { OnceLock::new() }; 2];
     let side = REFLECTANCE as usize;
     // From 0 to 1 with both; of the horizon, where nothing is visible, its limit.
     let at = |i: usize| i as f64 / (side - 1) as f64;
     let seen = LOBES.iter().enumerate().filter(|(place, _)| lobes >> place & 1 != 0);
     let over = seen.filter_map(|(_, lobe)| lobe.albedo).next();
-    (0..side)
-        .into_par_iter()
-        .flat_map_iter(|row| {
-            let over = over.map_or(vec![[0.0; 2]; side], |albedo| albedo(at(row), side));
-            over.into_iter().enumerate().map(move |(i, [c, d])| {
-                let [a, b] = directional_reflectance(at(i).max(1e-4), at(row));
-                [a, b, c, d].map(|x| x as f32)
-            })
+    let row = |row: usize| {
+        let over = over.map_or(vec![[0.0; 2]; side], |albedo| albedo(at(row), side));
+        over.into_iter().enumerate().map(move |(i, [c, d])| {
+            let [a, b] = directional_reflectance(at(i).max(1e-4), at(row));
+            [a, b, c, d].map(|x| x as f32)
         })
-        .collect()
+    };
+    // At most one lobe has an albedo (`LOBES`).
+    TABLES[usize::from(over.is_some())].get_or_init(|| (0..side).into_par_iter().flat_map_iter(row).collect())
 }
 
 /// Half vectors are drawn from those visible to V (Heitz 2018): each sample's weight is G₂ / G₁(V), at most 1, so that

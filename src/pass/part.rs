@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use ash::vk;
 
 use crate::gpu::{Buffer, Device, Image, ImageDesc, Place};
 use crate::plan::rungs::{Reflection, Refraction};
-use crate::plan::{Knobs, Plan};
+use crate::plan::{Knobs, Plan, Refused, Setting};
 
 /// Light that rays bring to the surface that a pixel shows. A picture is the sum of both parts and of what that surface
 /// itself emits, scatters and takes from the prefiltered environment.
@@ -57,16 +57,19 @@ impl PartOnDevice {
     pub fn new(device: &Arc<Device>, plan: &Plan, knobs: &Knobs, part: Part, size: [u32; 2]) -> Result<Self> {
         let name = part.name();
         if plan.paths.is_some() {
-            bail!(
-                "--aov {name}: this layer is what single rays bring, and indirect=path follows paths instead; add --set indirect=ambient --set lights=points"
+            let why = format!(
+                "{name}: this layer is what single rays bring, and indirect=path follows paths instead; choose indirect=ambient \
+                 and lights=points"
             );
+            return Err(Refused::error(Setting::Part, why));
         }
         let (choice, sends) = match part {
             Part::Reflection => (knobs.reflection.choice(), knobs.reflection == Reflection::Ray),
             Part::Refraction => (knobs.refraction.choice(), knobs.refraction == Refraction::Ray),
         };
         if !sends {
-            bail!("--aov {name}: this layer is what rays bring, and {choice} sends none; add --set {name}=ray");
+            let why = format!("{name}: this layer is what rays bring, and {choice} sends none; choose {name}=ray");
+            return Err(Refused::error(Setting::Part, why));
         }
         let target = |what: &str| {
             let usage = vk::ImageUsageFlags::STORAGE;

@@ -18,17 +18,17 @@ use super::view::View;
 use crate::gpu::{Buffer, Device, Frame, NOTHING, Place};
 use crate::plan::{Plan, Rays};
 use crate::prepare::{Hierarchy, Prepared, ray_offset};
-use crate::scene::bvh::{Format, Order, Triangle};
-use crate::scene::caustics::Aims;
-use crate::scene::emitters::{Emitters, Source};
 use crate::scene::solid::{Solids, media_at};
-use crate::scene::{AlphaMode, Mesh, Scene};
+use crate::scene::{AlphaMode, Mesh, Scene, Shared};
 use crate::shader::lib;
 use crate::shader::lib::trace::{FILTER, LINKS_16, LINKS_32, OCTANT_LISTS, OPAQUE, STACK};
 use crate::share::{
     self, BvhTriangle, CornerColors, CornerFrame, CornerTangents, CornerUvs, MATERIAL_OF_TRIANGLE, ONE_SIDED_TRIANGLE,
     SHEET_TRIANGLE, TraceTerms, WorkCounts,
 };
+use crate::transport::bvh::{Format, Order, Triangle};
+use crate::transport::caustics::Aims;
+use crate::transport::emitters::{Emitters, Source};
 
 /// Lists in eight orders beside the one for any hit, as long as they take no more bytes than this, some two million nodes of
 /// 16 bytes: they are as many copies of the tree.
@@ -506,8 +506,8 @@ fn bodies(scene: &Scene, solids: &Solids, rays: Rays) -> Scene {
         wanted[instance.mesh] |= rays.refraction && solid;
     }
     let mesh = |(mesh, &wanted): (&Mesh, &bool)| Mesh {
-        positions: if wanted { mesh.positions.clone() } else { Vec::new() },
-        indices: if wanted { mesh.indices.clone() } else { Vec::new() },
+        positions: if wanted { mesh.positions.clone() } else { Shared::default() },
+        indices: if wanted { mesh.indices.clone() } else { Shared::default() },
         material: mesh.material,
         ..Mesh::default()
     };

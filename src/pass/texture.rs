@@ -11,7 +11,7 @@ use ash::vk;
 use rayon::prelude::*;
 
 use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, Place, Sampled, SamplerDesc};
-use crate::scene::{AlphaMode, Meaning, Sampler, Scene, TextureRef, Wrap};
+use crate::scene::{AlphaMode, Meaning, Sampler, Scene, Shared, TextureRef, Wrap};
 
 /// Every texture of a scene on the device.
 pub struct Textures {
@@ -93,7 +93,7 @@ impl Textures {
                     let last_use =
                         groups.iter().filter(|((.., m), list)| *m > meaning && list.contains(&image)).count() == 0;
                     if last_use {
-                        scene.images[image].rgba = Vec::new();
+                        scene.images[image].rgba = Shared::default();
                     }
                 }
             }

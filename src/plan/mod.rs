@@ -14,6 +14,7 @@ mod facts;
 mod knobs;
 mod left_out;
 mod planner;
+mod refused;
 mod surfaces;
 mod work;
 
@@ -25,5 +26,6 @@ pub use facts::{Facts, Surroundings};
 pub use knobs::rungs::{self, Normals};
 pub use knobs::{KNOBS, Knob, Knobs, Model};
 pub use planner::needs_lights;
+pub use refused::{Refused, Setting};
 pub use surfaces::{casts_in_maps, is_see_through, mirrors};
 pub use work::{Attenuation, March, Paths, Plan, Rays, Screen, Stored};

@@ -10,9 +10,9 @@ use super::surfaces::{
     self, Surfaces, Transmission, by_wavelength, has_layers, is_see_through, mirrors, refracts, scatters,
 };
 use super::work::{Attenuation, March, Paths, Plan, Rays, Screen, Stored};
-use crate::scene::layers::{SMOOTHEST, is_smooth};
 use crate::scene::lobe::LOBES;
 use crate::scene::{AlphaMode, Light, LightKind, Material, Scene};
+use crate::transport::layers::{SMOOTHEST, is_smooth};
 
 /// Perceptual roughness up to which surfaces are mirrored on the screen.
 const ROUGHEST_ON_SCREEN: f32 = 0.2;

@@ -3,8 +3,8 @@
 use super::effect::Cause;
 use super::facts::Facts;
 use super::work::March;
-pub use crate::scene::layers::mirrors;
 use crate::scene::{AlphaMode, Material, Meaning, Scene};
+pub use crate::transport::layers::mirrors;
 
 /// What lets light through, and how.
 pub(super) struct Transmission {

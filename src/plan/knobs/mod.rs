@@ -2,10 +2,11 @@
 
 pub mod rungs;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use super::effect_id::EffectId;
+use super::refused::{Refused, Setting};
 use rungs::{
     Absorption, Arithmetic, Brdf, Colour, Fresnel, Guiding, Indirect, Interfaces, Lights, Lobes, Normals, Position,
     Quadrature, Reflection, Refraction, Samples, Shadows, Upsampling,
@@ -130,6 +131,10 @@ impl Default for Knobs {
     }
 }
 
+fn refused(why: String) -> anyhow::Error {
+    Refused::error(Setting::Knob, why)
+}
+
 impl Knobs {
     /// Applies one `KNOB=RUNG`.
     ///
@@ -137,23 +142,23 @@ impl Knobs {
     /// One sentence when there is no such knob or rung.
     pub fn set(&mut self, choice: &str) -> Result<()> {
         let Some((name, rung)) = choice.split_once('=') else {
-            bail!("--set {choice}: expected KNOB=RUNG, for example samples=16");
+            return Err(refused(format!("{choice}: expected KNOB=RUNG, for example samples=16")));
         };
         let Some(knob) = Knob::named(name) else {
             let names: Vec<_> = KNOBS.iter().map(|knob| knob.name).collect();
-            bail!("--set {choice}: no knob is called \"{name}\"; there are {}", names.join(", "));
+            return Err(refused(format!("{choice}: no knob is called \"{name}\"; there are {}", names.join(", "))));
         };
         if let Some(found) = knob.rungs.iter().position(|r| *r == rung) {
             (knob.choose)(self, found);
             return Ok(());
         }
         if let (Ok(wanted), Some(nearest)) = (rung.parse::<f64>(), nearest(knob.rungs, rung)) {
-            bail!(
-                "--set {choice}: {name} has no rung {wanted}, it has {}; the nearest is {nearest}",
+            return Err(refused(format!(
+                "{choice}: {name} has no rung {wanted}, it has {}; the nearest is {nearest}",
                 knob.rungs.join(", ")
-            );
+            )));
         }
-        bail!("--set {choice}: {name} has no rung \"{rung}\", it has {}", knob.rungs.join(", "));
+        Err(refused(format!("{choice}: {name} has no rung \"{rung}\", it has {}", knob.rungs.join(", "))))
     }
 
     /// Applies several choices in order. Where two of them contradict each other, or a model, the error names both.
@@ -173,10 +178,10 @@ impl Knobs {
         match (none.first(), sends) {
             (None, _) => Ok(()),
             (Some(choice), None) => self.set(choice),
-            (Some(choice), Some(knob)) => bail!(
-                "--set {choice} contradicts {knob}=ray, whose rays meet at least one surface; the nearest choice is \
+            (Some(choice), Some(knob)) => Err(refused(format!(
+                "{choice} contradicts {knob}=ray, whose rays meet at least one surface; the nearest choice is \
                  interfaces=1, or {knob}=screen"
-            ),
+            ))),
         }
     }
 
@@ -193,21 +198,21 @@ impl Knobs {
                 (refraction != Refraction::Ray).then(|| (refraction.to_string(), Refraction::Ray.to_string())),
             ];
             if let Some((chosen, nearest)) = other.into_iter().flatten().next() {
-                bail!(
-                    "--set {chosen} contradicts indirect=path, whose paths meet every surface by rays; the nearest choice is \
+                return Err(refused(format!(
+                    "{chosen} contradicts indirect=path, whose paths meet every surface by rays; the nearest choice is \
                      {nearest}, or indirect=ambient with lights=points"
-                );
+                )));
             }
         } else if lights != Lights::Points {
-            bail!(
-                "--set {lights} contradicts {indirect}: surfaces light others along paths; the nearest choice is \
+            return Err(refused(format!(
+                "{lights} contradicts {indirect}: surfaces light others along paths; the nearest choice is \
                  indirect=path, or lights=points"
-            );
+            )));
         } else if guiding != Guiding::Off {
-            bail!(
-                "--set {guiding} contradicts {indirect}: only paths are guided; the nearest choice is indirect=path, or \
+            return Err(refused(format!(
+                "{guiding} contradicts {indirect}: only paths are guided; the nearest choice is indirect=path, or \
                  guiding=off"
-            );
+            )));
         }
         Ok(())
     }

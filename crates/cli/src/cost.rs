@@ -1,0 +1,183 @@
+//! `etalon cost`: error against time for every rung that a scene calls for.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context as _, Result, bail, ensure};
+use clap::Args;
+
+use super::budget::{command, keep};
+use super::options::{DeviceOptions, Extent as Planned, PictureOptions, SceneOptions, When};
+use super::print;
+use super::progress::Steps;
+use super::setup::Setup;
+use etalon::gpu::Severity;
+use etalon::image::file;
+use etalon::scene::Reads;
+use etalon_cost::compare::{Compared, compare_rungs};
+use etalon_cost::report;
+use etalon_cost::sweep::{Extent, Step, Sweep};
+use etalon_cost::table::Table;
+
+/// Price every approximation on a scene: error against the scene's own reference, beside GPU time
+#[derive(Debug, Clone, Args)]
+pub struct CostArgs {
+    #[command(flatten)]
+    scene: SceneOptions,
+    /// Folder for report.html, cost.json, cost.csv and the pictures; a run that was interrupted there goes on
+    #[arg(short, long, value_name = "DIR", required_unless_present = "compare")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    picture: PictureOptions,
+    #[command(flatten)]
+    device: DeviceOptions,
+    /// Seconds to be spent, about: they decide how many samples the reference has
+    #[arg(long, value_name = "SECONDS", default_value_t = 240, value_parser = clap::value_parser!(u32).range(1..))]
+    budget: u32,
+    /// Samples of the reference, whatever the budget
+    #[arg(long, value_name = "N")]
+    reference_samples: Option<u32>,
+    /// Draw only the I-th of N parts; each part needs a folder of its own, and --merge joins them
+    #[arg(long, value_name = "I/N", value_parser = shard, requires = "reference_samples")]
+    shard: Option<[u32; 2]>,
+    /// Join the parts of a run, in these folders, instead of measuring
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["shard", "reference_samples", "compare"])]
+    merge: Vec<PathBuf>,
+    /// Price one approximation only: two pictures in turns, two lines and a verdict
+    #[arg(long, value_name = "KNOB=A,B", conflicts_with_all = ["shard", "reference_samples", "output", "budget"])]
+    compare: Option<String>,
+    /// Print cost.json as well
+    #[arg(long)]
+    json: bool,
+    /// Progress: a bar on a terminal, a line per step elsewhere
+    #[arg(long, value_enum, default_value_t = When::Auto)]
+    progress: When,
+}
+
+fn shard(text: &str) -> Result<[u32; 2], String> {
+    let parts = text.split_once('/').and_then(|(i, n)| Some([i.parse().ok()?, n.parse().ok()?]));
+    match parts {
+        Some([i, n]) if i >= 1 && i <= n => Ok([i, n]),
+        _ => Err("expected I/N with I from 1 to N, for example 2/3".to_owned()),
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// One sentence with what was being done, to what, and the cause.
+pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
+    let output = args.output.clone().unwrap_or_default();
+    if !args.merge.is_empty() {
+        let read = |folder: &PathBuf| -> Result<Table> {
+            let path = folder.join("cost.json");
+            serde_json::from_slice(&file::read(&path)?).with_context(|| format!("reading {}", path.display()))
+        };
+        let table = Table::merge(args.merge.iter().map(read).collect::<Result<_>>()?)?;
+        let pictures = output.join("pictures");
+        std::fs::create_dir_all(&pictures).with_context(|| format!("making the folder {}", pictures.display()))?;
+        for folder in &args.merge {
+            for entry in folder.join("pictures").read_dir().with_context(|| format!("reading {}", folder.display()))? {
+                let from = entry?.path();
+                let to = pictures.join(from.file_name().unwrap_or_default());
+                file::write(&to, &file::read(&from)?)?;
+            }
+        }
+        return write(args, &output, &table);
+    }
+    let settings = args.picture.settings(&args.scene)?;
+    let compared = args.compare.is_some();
+    if !compared && (!args.picture.set.is_empty() || args.picture.model.is_some()) {
+        bail!(
+            "--model and --set: cost chooses the rungs itself; with --compare KNOB=A,B they are those of all other knobs"
+        );
+    }
+    ensure!(args.picture.plan == Planned::Scene, "--plan: cost plans what the scene calls for");
+    ensure!(compared || args.output.is_some(), "--output: name a folder for the report");
+    ensure!(settings.max_error.is_none(), "--max-error: cost draws a reference and many pictures; it has none to end");
+    let steps = Steps::new(args.progress, quiet);
+    steps.step(&format!("loading {}", args.scene.scene), 1);
+    let setup = Setup::load(&args.scene, Reads::Everything, &args.device)?;
+    for warning in &setup.opened.warnings {
+        tracing::warn!("{warning}");
+    }
+    let command = command(&args.scene, &args.picture, &args.device);
+    if let Some(wanted) = &args.compare {
+        let mut knobs = settings.knobs.clone();
+        args.picture.colour_of(setup.opened.scene(), &mut knobs)?;
+        let compared = setup.bench(&args.scene, settings, |bench| compare_rungs(&bench, &knobs, wanted))?;
+        drop(steps);
+        validated(&setup)?;
+        return say(args, &compared);
+    }
+    let contents = setup.contents();
+    let table = setup.bench(&args.scene, settings, |bench| {
+        let samples = args.reference_samples;
+        if let Some(samples) =
+            samples.filter(|n| !n.is_power_of_two() || n.trailing_zeros() % 2 == 1 || *n < 4 || *n > 4096)
+        {
+            bail!("--reference-samples {samples}: expected 4, 16, 64, 256, 1024 or 4096");
+        }
+        let sweep = Sweep {
+            bench,
+            folder: &output,
+            extent: Extent { budget_s: args.budget, reference_samples: samples, shard: args.shard.unwrap_or([1, 1]) },
+            command: &command,
+            scene: &args.scene.scene,
+            contents: &contents,
+        };
+        sweep.run(&mut |step: Step<'_>| steps.of(step.name, step.done, step.of, step.left_s))
+    })?;
+    drop(steps);
+    validated(&setup)?;
+    let done = write(args, &output, &table)?;
+    if args.shard.is_none() {
+        keep(&command, &setup, &output);
+    }
+    Ok(done)
+}
+
+/// What the validation layer calls an error fails the run.
+fn validated(setup: &Setup) -> Result<()> {
+    match setup.device.messages().into_iter().find(|message| message.severity == Severity::Error) {
+        Some(message) => bail!("validation: {}", message.text),
+        None => Ok(()),
+    }
+}
+
+/// Two lines and a verdict.
+fn say(args: &CostArgs, compared: &Compared) -> Result<ExitCode> {
+    if args.json {
+        print(&serde_json::to_string_pretty(compared)?)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let Compared { knob, rungs, gpu_ms, price, worst_pixel } = compared;
+    let width = rungs.map(str::len).into_iter().max().unwrap_or_default();
+    for (rung, ms) in rungs.iter().zip(gpu_ms) {
+        let error = if *rung == price.to {
+            let error = 100.0 * price.shown_delta.median.max(0.0).sqrt();
+            format!("{error:.3} % of what is shown, FLIP {:.4}", price.flip_between)
+        } else {
+            "compared with".to_owned()
+        };
+        print(&format!("{knob}={rung:width$}  {:8.2} ms ({:.2} … {:.2})  {error}", ms.median, ms.low, ms.high))?;
+    }
+    let worst =
+        if price.same { String::new() } else { format!("; most of it at pixel {},{}", worst_pixel.x, worst_pixel.y) };
+    print(&format!("{knob}={} instead of {} {}{worst}", price.to, price.from, price.verdict))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn write(args: &CostArgs, output: &std::path::Path, table: &Table) -> Result<ExitCode> {
+    file::write(&output.join("cost.csv"), &table.csv()?)?;
+    file::write(&output.join("report.html"), report::page(table, &output.join("pictures"))?.as_bytes())?;
+    // Last: a folder with this file is a finished run.
+    let json = serde_json::to_string_pretty(table)?;
+    file::write(&output.join("cost.json"), json.as_bytes())?;
+    if args.json {
+        print(&json)?;
+    } else {
+        print(&output.join("report.html").display().to_string())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

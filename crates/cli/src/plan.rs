@@ -1,0 +1,245 @@
+//! `etalon plan`: which effects a scene calls for and why, and what drawing it takes, without drawing it.
+
+use std::collections::BTreeMap;
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::Args;
+use comfy_table::{ContentArrangement, Table, presets};
+
+use super::options::{DeviceOptions, Extent, PictureOptions, SceneOptions};
+use super::print;
+use super::report::{Expected, PlanFacts};
+use super::setup::{self, Setup};
+use etalon::frame::{Renderer, Settings};
+use etalon::open::Opened;
+use etalon::plan::rungs::Interfaces;
+use etalon::scene::Camera;
+use etalon::scene::normal_form::normalise;
+use etalon::transport::sight::{Sight, along_lines};
+use etalon_cost::explain::Price;
+
+/// Say what a scene calls for, with reasons, and what drawing it takes
+#[derive(Debug, Clone, Args)]
+pub struct PlanArgs {
+    #[command(flatten)]
+    scene: SceneOptions,
+    #[command(flatten)]
+    picture: PictureOptions,
+    #[command(flatten)]
+    device: DeviceOptions,
+    /// Print one JSON document
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// One sentence with what was being done, to what, and the cause.
+pub fn run(args: &PlanArgs) -> Result<ExitCode> {
+    let mut settings = args.picture.settings(&args.scene)?;
+    let (opened, device) = setup::open(&args.scene, args.picture.reads(&args.scene, &settings.knobs), &args.device)?;
+    args.picture.colour_of(opened.scene(), &mut settings.knobs)?;
+    let camera = args.scene.choose_camera(opened.scene(), settings.size)?;
+    let sight = sight(&opened, &camera, &settings)?;
+    let read = opened.warnings.clone();
+    // What an effect costs and how many pixels show it only a device tells; what there is, and why, nothing but the scene.
+    let wants_device = args.device.device.is_some() || args.device.validate || args.picture.plan == Extent::ExplainCost;
+    let facts = match device {
+        Ok(device) => on_device(args, Setup { device, opened }, settings, sight.as_ref(), read)?,
+        Err(error) if wants_device => return Err(error),
+        Err(error) => {
+            let interfaces = settings.knobs.interfaces.count();
+            let prepared = opened.prepared(settings)?;
+            let mut facts = PlanFacts::of(&prepared.plan);
+            let without = format!("passes, pipelines, memory and pixels are not told: {error:#}");
+            let lines = sight.filter(|_| prepared.plan.rays.is_some_and(|rays| rays.refraction));
+            let lost = lines.and_then(|sight| lost(&sight, interfaces));
+            facts.warnings.splice(0..0, read.into_iter().chain([without]).chain(prepared.warnings).chain(lost));
+            facts
+        }
+    };
+    if args.json {
+        print(&serde_json::to_string_pretty(&facts)?)?;
+    } else {
+        print(&text(&facts))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What lines of sight go through, where something lets light through.
+fn sight(opened: &Opened, camera: &Camera, settings: &Settings) -> Result<Option<Sight>> {
+    if opened.scene().materials.iter().all(|material| material.transmission <= 0.0) {
+        return Ok(None);
+    }
+    let mut scene = opened.scene().clone();
+    normalise(&mut scene);
+    Ok(Some(along_lines(&scene, &*opened.original.bvh()?, camera, settings.size)))
+}
+
+/// A sentence about what so many surfaces lose of the light along lines of sight; `None` where they lose nothing.
+fn lost(sight: &Sight, interfaces: u32) -> Option<String> {
+    let more = match sight.most {
+        0..=32 => format!("--set interfaces={} follows them", sight.most.next_power_of_two()),
+        _ => "no rung follows them all".to_owned(),
+    };
+    (sight.most > interfaces).then(|| {
+        format!(
+            "lines of sight go through up to {} transparent surfaces: interfaces={interfaces} loses up to {:.1} % of a \
+             pixel's light, {more}",
+            sight.most,
+            100.0 * sight.lost(interfaces)
+        )
+    })
+}
+
+/// The plan with what drawing it takes on a device.
+fn on_device(
+    args: &PlanArgs,
+    setup: Setup,
+    settings: Settings,
+    sight: Option<&Sight>,
+    mut warnings: Vec<String>,
+) -> Result<PlanFacts> {
+    let interfaces = settings.knobs.interfaces.count();
+    let explained = (args.picture.plan == Extent::ExplainCost).then(|| (setup.clone(), settings.clone()));
+    let (mut renderer, camera) = setup.renderer(&args.scene, settings)?;
+    warnings.extend(renderer.warnings.iter().cloned());
+    let passes = renderer.passes(&camera)?;
+    let mut pipelines = renderer.device().pipelines();
+    pipelines.extend(passes.iter().flat_map(|pass| pass.pipelines.iter().cloned()));
+    let lighting = passes.iter().filter(|pass| pass.name == "lighting").count();
+    let mut names: Vec<String> = Vec::new();
+    for pass in passes {
+        if !names.contains(&pass.name) {
+            names.push(pass.name);
+        }
+    }
+    let mut facts = PlanFacts::of(renderer.plan()).on(renderer.device(), names, pipelines);
+    // After the account of what there is: counting takes a pipeline and a buffer of its own.
+    let pixels = renderer.pixels_by_material(&camera)?;
+    for effect in facts.effects.iter_mut().filter(|effect| !effect.materials.is_empty()) {
+        let seen: u64 = effect.materials.iter().filter_map(|&material| pixels.get(material)).sum();
+        effect.evidence.insert("pixels", seen.to_string());
+    }
+    let rays = renderer.plan().rays.unwrap_or_default();
+    let sight = sight.filter(|_| rays.refraction);
+    warnings.extend(sight.and_then(|sight| lost(sight, interfaces)));
+    facts.expected = Some(expected(&facts, &renderer, sight, [interfaces, lighting as u32]));
+    facts.warnings.splice(0..0, warnings);
+    if let Some((setup, settings)) = explained {
+        drop(renderer);
+        facts.costs = setup.prices(&args.scene, &args.device, settings, &facts.effects, &mut |effect| {
+            eprintln!("measuring what \"{effect}\" would cost");
+        })?;
+    }
+    Ok(facts)
+}
+
+fn expected(
+    facts: &PlanFacts,
+    renderer: &Renderer,
+    sight: Option<&Sight>,
+    [interfaces, lighting]: [u32; 2],
+) -> Expected {
+    let rays = renderer.plan().rays.unwrap_or_default();
+    let lost = |rung: &Interfaces| Some((rung.name(), sight?.lost(rung.count())));
+    Expected {
+        bytes: facts.buffers.iter().map(|made| made.bytes).sum(),
+        shadow_rounds: if rays.shadows { lighting } else { 0 },
+        ray_rounds: sight.map_or(0, |sight| sight.most).max(u32::from(rays.mirrors || rays.refraction)).min(interfaces),
+        interfaces: sight.map_or(0, |sight| sight.most),
+        lost: Interfaces::RUNGS.iter().filter_map(lost).collect(),
+    }
+}
+
+fn table(header: &[&str]) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic).set_header(header);
+    table
+}
+
+/// What the effects that are left out would have cost.
+pub(super) fn cost_table(prices: &[Price]) -> Table {
+    let mut costs = table(&[
+        "would cost",
+        "by",
+        "first picture",
+        "a sample",
+        "from … to",
+        "of a sample",
+        "pipelines",
+        "KB of SPIR-V",
+        "MB",
+    ]);
+    for price in prices {
+        if let Some(fails) = &price.fails {
+            costs.add_row([price.effect, &price.by, &format!("cannot be drawn: {fails}")]);
+            continue;
+        }
+        let [low, high] = price.frame_range_ms;
+        costs.add_row([
+            price.effect.to_owned(),
+            price.by.clone(),
+            format!("{:+.0} ms", price.start_ms),
+            format!("{:+.2} ms", price.frame_ms),
+            format!("{low:+.2} … {high:+.2}"),
+            format!("{:+.1} %", 100.0 * price.frame_share),
+            format!("{:+}", price.pipelines),
+            format!("{:+.1}", price.spirv_bytes as f64 / 1e3),
+            format!("{:+.2}", price.bytes as f64 / 1e6),
+        ]);
+    }
+    costs
+}
+
+fn text(facts: &PlanFacts) -> String {
+    let mut effects = table(&["effect", "state", "rung", "pixels", "reason"]);
+    for effect in &facts.effects {
+        let pixels = effect.evidence.get("pixels").map_or("", String::as_str);
+        effects.add_row([effect.id.name(), effect.state.name(), effect.rung(), pixels, &effect.reason()]);
+    }
+    // Many draws share a program: they are told apart by constants alone, which --json has.
+    let mut programs: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
+    for pipeline in &facts.pipelines {
+        let (count, bytes) = programs.entry(pipeline.name).or_default();
+        *count += 1;
+        *bytes += pipeline.spirv_bytes;
+    }
+    let mut pipelines = table(&["program", "pipelines", "KB of SPIR-V"]);
+    for (name, (count, bytes)) in &programs {
+        pipelines.add_row([(*name).to_owned(), count.to_string(), format!("{:.1}", *bytes as f64 / 1e3)]);
+    }
+    let (bytes, rounds) = facts.expected.as_ref().map_or((0, 0), |expected| (expected.bytes, expected.ray_rounds));
+    let spirv: usize = facts.pipelines.iter().map(|pipeline| pipeline.spirv_bytes).sum();
+    let loses: Vec<String> = facts
+        .expected
+        .iter()
+        .flat_map(|expected| &expected.lost)
+        .filter(|(_, lost)| **lost > 0.0)
+        .map(|(rung, lost)| format!("interfaces={rung} would lose up to {:.1} %", 100.0 * lost))
+        .collect();
+    let sight = match facts.expected.as_ref().map_or(0, |expected| expected.interfaces) {
+        0 => String::new(),
+        most => format!("lines of sight go through up to {most} transparent surfaces; {}\n", loses.join(", ")),
+    };
+    let unread: String = facts.unread.iter().map(|unread| format!("not read: {unread}\n")).collect();
+    let costs = if facts.costs.is_empty() { String::new() } else { format!("{}\n", cost_table(&facts.costs)) };
+    let warnings: String = facts.warnings.iter().map(|warning| format!("warning: {warning}\n")).collect();
+    if facts.expected.is_none() {
+        return format!("{effects}\n\n{} samples per pixel\n{unread}{warnings}", facts.samples).trim_end().to_owned();
+    }
+    format!(
+        "{effects}\n\n{} samples per pixel, each by the passes {}\n\n{pipelines}\n\n{} pipelines of {:.0} KB of SPIR-V; {} buffers \
+         and images of {:.1} MB; {rounds} rounds of rays or more\n{sight}{unread}{costs}{warnings}",
+        facts.samples,
+        facts.passes.join(", "),
+        facts.pipelines.len(),
+        spirv as f64 / 1e3,
+        facts.buffers.len(),
+        bytes as f64 / 1e6,
+    )
+    .trim_end()
+    .to_owned()
+}

@@ -1,0 +1,175 @@
+//! `etalon view`: the scene in a window.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use anyhow::{Result, bail};
+use clap::Args;
+
+use super::budget;
+use super::options::{DeviceOptions, Extent, PictureOptions, SceneOptions};
+use super::setup::contents;
+use etalon::frame::Settings;
+use etalon::gpu::{DeviceInfo, Severity};
+use etalon::image::file;
+use etalon::open::Opened;
+use etalon::scene::{Camera, Reads, Scene};
+use etalon_cost::sweep::arguments;
+use etalon_viewer::shared::{Asked, Loaded, Source};
+use etalon_viewer::{Start, View, run as run_window};
+
+/// Open a window that shows the scene, and why it looks as it does
+#[derive(Debug, Clone, Args)]
+pub struct ViewArgs {
+    #[command(flatten)]
+    scene: SceneOptions,
+    #[command(flatten)]
+    picture: PictureOptions,
+    #[command(flatten)]
+    device: DeviceOptions,
+    /// Begin without panels: P brings them
+    #[arg(long)]
+    bare: bool,
+}
+
+impl Source for ViewArgs {
+    fn open(&self, asked: Asked<'_>, device: &DeviceInfo) -> Result<Loaded> {
+        let options = &asked_for(&self.scene, asked.file, asked.time);
+        let scene = options.load(Reads::Everything)?;
+        let (environment, more) = options.load_environment()?;
+        let camera = options.choose_camera(&scene, asked.size)?;
+        let framed = options.frames(&scene);
+        let chosen = self.picture.knobs()?;
+        let mut knobs = chosen.clone();
+        self.picture.colour_of(&scene, &mut knobs)?;
+        let mut opened = Opened::new(scene, environment, options.asks_for_environment());
+        opened.warnings.extend(more);
+        // `cost` measures the size of the command line, whatever part of the window the picture has.
+        let priced = budget::command(options, &self.picture, &self.device);
+        let prices = budget::known(&priced, &contents(opened.scene(), opened.environment()), device);
+        let (lit, as_lit) = opened.lit(Settings::default());
+        Ok(Loaded {
+            name: opened.scene().name.clone(),
+            environment: lit.cloned().map(|map| (Arc::new(map), as_lit.environment_intensity)),
+            camera,
+            framed,
+            knobs: (knobs != chosen).then_some(knobs),
+            warnings: opened.warnings.clone(),
+            prices: prices.map(Arc::new),
+            original: opened.original.clone(),
+        })
+    }
+
+    fn moment(&self, asked: Asked<'_>) -> Result<(Scene, Camera)> {
+        let options = asked_for(&self.scene, asked.file, asked.time);
+        let scene = options.load(Reads::Everything)?;
+        let camera = options.choose_camera(&scene, asked.size)?;
+        Ok((scene, camera))
+    }
+}
+
+/// The same options for another file, or another time: what belongs to the first file, its cameras and its time, is forgotten.
+fn asked_for(options: &SceneOptions, file: Option<&Path>, time: Option<f64>) -> SceneOptions {
+    let options = match file {
+        None => options.clone(),
+        Some(path) => SceneOptions {
+            scene: path.display().to_string(),
+            camera: None,
+            eye: None,
+            target: None,
+            up: None,
+            time: "none".to_owned(),
+            ..options.clone()
+        },
+    };
+    SceneOptions { time: time.map_or(options.time, |time| time.to_string()), ..options }
+}
+
+/// The command that draws a view.
+fn command(args: &ViewArgs, view: &View<'_>) -> String {
+    let mut scene = asked_for(&args.scene, view.file, view.time);
+    scene.env_rotation = view.settings.environment_rotation;
+    if view.camera.is_some() || view.named.is_some() {
+        (scene.camera, scene.eye, scene.target, scene.up, scene.fov) = (None, None, None, None, None);
+    }
+    scene.camera = view.named.map(str::to_owned).or(scene.camera);
+    let picture = PictureOptions {
+        size: view.settings.size,
+        exposure: view.settings.exposure,
+        tonemap: view.settings.tonemap,
+        ..args.picture.clone()
+    };
+    let seed = (args.picture.seed != 0).then(|| format!("--seed {}", args.picture.seed));
+    let words = [
+        vec!["etalon render".to_owned()],
+        scene.words(),
+        view.camera.clone().into_iter().collect(),
+        picture.words(),
+        seed.into_iter().collect(),
+        vec![arguments(&view.settings.knobs)],
+        args.device.words(),
+        vec!["-o picture.png".to_owned()],
+    ];
+    words.concat().join(" ")
+}
+
+/// Where files that were opened are noted, a line each.
+fn notes() -> Option<PathBuf> {
+    Some(file::cache_folder()?.join("recent"))
+}
+
+fn recent() -> Vec<PathBuf> {
+    let text = notes().and_then(|path| std::fs::read_to_string(path).ok()).unwrap_or_default();
+    text.lines().map(PathBuf::from).filter(|path| path.is_file()).collect()
+}
+
+/// Notes files for the next time; where that is impossible they are known until the window is closed.
+fn keep(recent: &[PathBuf]) {
+    let text: String = recent.iter().map(|path| format!("{}\n", path.display())).collect();
+    let write = |path: PathBuf| {
+        path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
+        file::write(&path, text.as_bytes())
+    };
+    let written = notes().map(write);
+    if let Some(Err(error)) = written {
+        tracing::info!("recent files are not kept: {error:#}");
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// One sentence: no display, no device, a file that cannot be read.
+pub fn run(args: &ViewArgs) -> Result<ExitCode> {
+    if let Some(error) = &args.picture.max_error {
+        bail!("--max-error {error}: the viewer draws until its samples are done; `render` has this option");
+    }
+    if args.picture.plan == Extent::ExplainCost {
+        bail!(
+            "--plan explain-cost: the viewer measures no effects that are left out; `plan` and `render` have this option"
+        );
+    }
+    let settings = args.picture.settings(&args.scene)?;
+    let told = args.clone();
+    let first = (!args.scene.scene.starts_with("study:")).then(|| PathBuf::from(&args.scene.scene));
+    let messages = run_window(Start {
+        file: first,
+        size: args.picture.size,
+        settings,
+        device: args.device.choice(),
+        validate: args.device.validate,
+        panels: !args.bare,
+        source: Box::new(args.clone()),
+        command: Box::new(move |view| command(&told, view)),
+        recent: recent(),
+        keep: Box::new(keep),
+        // A terminal that has gone is no reason to close the window.
+        said: Box::new(|command| drop(super::print(command))),
+    })?;
+    let errors: Vec<_> = messages.iter().filter(|message| message.severity == Severity::Error).collect();
+    if let Some(first) = errors.first() {
+        bail!("validation: {} errors, the first: {}", errors.len(), first.text);
+    }
+    Ok(ExitCode::SUCCESS)
+}

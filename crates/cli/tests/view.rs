@@ -1,0 +1,380 @@
+//! The viewer in a real window on a display of its own, moved by synthetic hands: what it shows is what `render` draws, by the command
+//! that it copies, bit by bit.
+
+#[path = "support/program.rs"]
+mod program;
+#[path = "support/x11.rs"]
+mod x11;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::channel;
+use std::time::Duration;
+
+use anyhow::{Result, bail};
+use etalon::frame::Settings;
+use etalon::gpu::{DeviceInfo, Replacement};
+use etalon::plan::{KNOBS, Knobs, Model};
+use etalon::scene::{Camera, Scene};
+use etalon::study;
+use etalon_testing::gltf_builder::{Builder, FLOAT, f32s};
+use etalon_testing::gpu::Gpu;
+use etalon_testing::made::Random;
+use etalon_viewer::shared::{Asked, Loaded, Seen, Shared, Source, Viewpoint, Wanted};
+use etalon_viewer::worker::Worker;
+use serde_json::json;
+use x11::{Display, Viewer};
+
+const C: u32 = 0x63;
+const F: u32 = 0x66;
+const Z: u32 = 0x7a;
+const P: u32 = 0x70;
+const V: u32 = 0x76;
+const SPACE: u32 = 0x20;
+const FULL_STOP: u32 = 0x2e;
+const DOWN: u32 = 0xff54;
+const LEFT: u32 = 0xff51;
+const RIGHT: u32 = 0xff53;
+const ESCAPE: u32 = 0xff1b;
+const CONTROL: u32 = 0xffe3;
+
+/// What a command draws, RGB.
+fn drawn(folder: &Path, command: &str) -> ([u32; 2], Vec<[u8; 3]>) {
+    let words: Vec<&str> = command.split_whitespace().skip(1).collect();
+    program::etalon(folder, &words, &[]).succeeded();
+    let picture = image::open(folder.join("picture.png")).expect("a picture").to_rgb8();
+    let size = [picture.width(), picture.height()];
+    (size, picture.pixels().map(|p| p.0).collect())
+}
+
+/// Waits until the window shows what its own command draws.
+#[track_caller]
+fn shows_its_command(viewer: &mut Viewer<'_>, folder: &Path) -> String {
+    // A wheel is smoothed over some pictures.
+    std::thread::sleep(Duration::from_secs(1));
+    viewer.key(C, None);
+    let command = viewer.line();
+    assert!(command.starts_with("etalon render "), "{command}");
+    viewer.key(ESCAPE, None);
+    let (size, expected) = drawn(folder, &command);
+    let mut last = String::new();
+    viewer.until(&format!("the picture of `{command}`"), |viewer| {
+        let (window, pixels) = viewer.pixels()?;
+        let other = pixels.iter().zip(&expected).filter(|(a, b)| a != b).count();
+        let now = format!("{window:?} of {size:?}, {other} pixels differ");
+        if now != last {
+            eprintln!("{now}");
+            last = now;
+        }
+        (window == size && other == 0).then_some(())
+    });
+    command
+}
+
+const OBJ: &str = "mtllib two.mtl\nv -1 0 0\nv 1 0 0\nv 0 1.5 0\nv 0 0 -1\nusemtl red\nf 1 2 3\nf 2 4 3\nf 4 1 3\n";
+const MTL: &str = "newmtl red\nKd 0.7 0.1 0.1\nKs 0 0 0\n";
+
+#[test]
+fn the_window_shows_what_render_draws() {
+    let Some(display) = Display::start() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let mut viewer = Viewer::open(&display, folder, &["study:cornell", "--size", "320x180", "--bare", "--validate"]);
+    let first = shows_its_command(&mut viewer, folder);
+    assert!(!first.contains("--eye"), "the scene's own camera: {first}");
+
+    viewer.drag(1, [160, 90], [200, 110]);
+    viewer.click(4, [160, 90]);
+    let moved = shows_its_command(&mut viewer, folder);
+    assert!(moved.contains("--eye"), "{moved}");
+    viewer.key(Z, Some(CONTROL));
+    assert_eq!(shows_its_command(&mut viewer, folder), first, "taken back");
+
+    let mut random = Random(7);
+    for _ in 0..200 {
+        viewer.resize([random.between(160.0, 500.0) as u32, random.between(120.0, 400.0) as u32]);
+    }
+    viewer.resize([333, 211]);
+    let resized = shows_its_command(&mut viewer, folder);
+    assert!(resized.contains("--size 333x211"), "{resized}");
+
+    for (name, text) in [("two.obj", OBJ), ("two.mtl", MTL), ("broken.glb", "glTF?")] {
+        std::fs::write(folder.join(name), text).expect("a file");
+    }
+    viewer.drop_file(&folder.join("two.obj"));
+    viewer.until("the second file", |viewer| viewer.title().contains("two").then_some(()));
+    viewer.key(F, None);
+    let second = shows_its_command(&mut viewer, folder);
+    assert!(second.contains("two.obj") && second.contains("--eye"), "{second}");
+    // A file that changes is read again, from where it was seen.
+    let red = viewer.pixels().expect("a window").1;
+    std::fs::write(folder.join("two.mtl"), MTL.replace("0.7 0.1 0.1", "0.1 0.7 0.2")).expect("a file");
+    viewer.until("another colour", |viewer| (viewer.pixels()?.1 != red).then_some(()));
+    assert_eq!(shows_its_command(&mut viewer, folder), second, "another picture, the same view");
+    viewer.drop_file(&folder.join("broken.glb"));
+    let shown = viewer.pixels().expect("a window").1;
+    viewer.until("a message", |viewer| (viewer.pixels()?.1 != shown).then_some(()));
+    assert_eq!(shows_its_command(&mut viewer, folder), second, "the old picture stays");
+
+    // Panels make room for themselves, and give it back.
+    viewer.resize([900, 500]);
+    shows_its_command(&mut viewer, folder);
+    viewer.key(P, None);
+    viewer.key(C, None);
+    let beside = viewer.line();
+    assert!(!beside.contains("--size 900x500"), "{beside}");
+    viewer.key(ESCAPE, None);
+    viewer.key(P, None);
+    shows_its_command(&mut viewer, folder);
+
+    // Once hidden and shown again.
+    viewer.hide();
+    std::thread::sleep(Duration::from_millis(300));
+    viewer.unhide();
+    shows_its_command(&mut viewer, folder);
+    // Nothing happens, nothing is drawn: a third of a core was busy here once.
+    // A machine that does other things may need a while to get there.
+    let two_seconds = || {
+        let before = viewer.cpu();
+        std::thread::sleep(Duration::from_secs(2));
+        viewer.cpu() - before
+    };
+    let busy: Vec<Duration> =
+        (0..5).map(|_| two_seconds()).take_while(|&busy| busy >= Duration::from_millis(200)).collect();
+    assert!(busy.len() < 5, "{busy:?} of two seconds each");
+
+    let (code, words) = viewer.close();
+    assert_eq!(code, Some(0), "{words}");
+    assert!(!words.contains("Validation") && !words.contains("panicked"), "{words}");
+}
+
+/// A triangle that goes to the right for two seconds, seen by a camera of the file that goes with it for one.
+fn animated(folder: &Path) -> PathBuf {
+    let mut b = Builder::new();
+    let positions = b.accessor(&f32s(&[-1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.5, 0.0]), FLOAT, "VEC3", 3);
+    let mesh = b.push("meshes", json!({ "primitives": [{ "attributes": { "POSITION": positions }, "material": 0 }] }));
+    b.push("materials", json!({ "pbrMetallicRoughness": { "metallicFactor": 0.0 } }));
+    b.push("cameras", json!({ "type": "perspective", "perspective": { "yfov": 0.8, "znear": 0.1 } }));
+    b.push("nodes", json!({ "mesh": mesh }));
+    b.push("nodes", json!({ "camera": 0, "name": "eye", "translation": [0, 0.5, 6] }));
+    let times = b.accessor(&f32s(&[0.0, 2.0]), FLOAT, "SCALAR", 2);
+    let short = b.accessor(&f32s(&[0.0, 1.0]), FLOAT, "SCALAR", 2);
+    let places = b.accessor(&f32s(&[0.0, 0.0, 0.0, 2.0, 0.0, 0.0]), FLOAT, "VEC3", 2);
+    let eyes = b.accessor(&f32s(&[0.0, 0.5, 6.0, 1.0, 0.5, 5.0]), FLOAT, "VEC3", 2);
+    let channel =
+        |sampler: usize, node: usize| json!({ "sampler": sampler, "target": { "node": node, "path": "translation" } });
+    b.push(
+        "animations",
+        json!({
+            "samplers": [{ "input": times, "output": places }, { "input": short, "output": eyes }],
+            "channels": [channel(0, 0), channel(1, 1)],
+        }),
+    );
+    b.json["scenes"] = json!([{ "nodes": [0, 1] }]);
+    b.save_glb(folder)
+}
+
+/// Time, by keys: the window is at a time that its command says, and the file's camera goes with it. Then a wipe between two settings:
+/// left of the line is what one command draws, right of it what the other does.
+#[test]
+fn time_passes_and_settings_are_compared() {
+    let Some(display) = Display::start() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let file = animated(folder);
+    let file = file.file_name().and_then(|name| name.to_str()).expect("a name");
+    let mut viewer = Viewer::open(&display, folder, &[file, "--size", "300x260", "--bare", "--validate"]);
+    let at_rest = shows_its_command(&mut viewer, folder);
+    assert!(!at_rest.contains("--time") && !at_rest.contains("--eye"), "{at_rest}");
+    (0..12).for_each(|_| viewer.key(FULL_STOP, None));
+    let half = shows_its_command(&mut viewer, folder);
+    assert!(half.contains("--time 0.5 ") && !half.contains("--eye"), "{half}");
+    viewer.drag(1, [150, 130], [180, 140]);
+    viewer.key(SPACE, None);
+    std::thread::sleep(Duration::from_millis(700));
+    viewer.key(SPACE, None);
+    let played = shows_its_command(&mut viewer, folder);
+    let time =
+        played.split_whitespace().skip_while(|word| *word != "--time").nth(1).and_then(|t| t.parse::<f64>().ok());
+    assert!(time.is_some_and(|time| time != 0.5 && time <= 2.0) && played.contains("--eye"), "{played}");
+
+    viewer.key(V, None);
+    let knob = KNOBS.iter().position(|knob| knob.name == "indirect").expect("a knob");
+    (0..=knob).for_each(|_| viewer.key(DOWN, None));
+    viewer.key(LEFT, None);
+    viewer.key(ESCAPE, None);
+    viewer.key(C, None);
+    let left = viewer.line();
+    viewer.key(ESCAPE, None);
+    assert_eq!(left, played, "the left side is as before");
+    // From the model's ambient light to none.
+    let (size, expected_left) = drawn(folder, &left);
+    let (_, expected_right) = drawn(folder, &left.replace("-o picture.png", "--set indirect=off -o picture.png"));
+    // The first rows and the last are covered by figures.
+    let rows = 60..170;
+    let differ = |found: &[[u8; 3]], expected: &[[u8; 3]], columns: std::ops::Range<u32>| {
+        let places = rows.clone().flat_map(|y| columns.clone().map(move |x| (y * size[0] + x) as usize));
+        places.filter(|&at| found[at] != expected[at]).count()
+    };
+    viewer.until("both sides", |viewer| {
+        let (window, found) = viewer.pixels()?;
+        let both = [differ(&found, &expected_left, 0..145), differ(&found, &expected_right, 155..300)];
+        eprintln!("{window:?} {both:?}");
+        (window == size && both == [0, 0]).then_some(())
+    });
+    assert!(differ(&expected_left, &expected_right, 155..300) > 0, "both are the same");
+    let (code, words) = viewer.close();
+    assert_eq!(code, Some(0), "{words}");
+    assert!(!words.contains("Validation Error") && !words.contains("panicked"), "{words}");
+}
+
+/// Every knob by the keys of the window, rung by rung, with validation: the command says so, and some pictures are compared.
+#[test]
+fn every_knob_turns_in_the_window() {
+    let Some(display) = Display::start() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    // As on a screen of one and a half points a pixel.
+    let scale = [("WINIT_X11_SCALE_FACTOR", "1.5")];
+    let arguments = ["study:cornell", "--size", "200x130", "--bare", "--validate", "--set", "samples=1"];
+    let mut viewer = Viewer::open_with(&display, folder, &arguments, &scale);
+    shows_its_command(&mut viewer, folder);
+    for knob in KNOBS {
+        viewer.key(DOWN, None);
+        let mut seen = Vec::new();
+        for _ in knob.rungs {
+            viewer.key(RIGHT, None);
+            viewer.key(C, None);
+            let command = viewer.line();
+            let begin = format!("{}=", knob.name);
+            let rung = command.split_whitespace().find_map(|word| word.strip_prefix(&begin)).unwrap_or("the model's");
+            if !seen.contains(&rung.to_owned()) {
+                seen.push(rung.to_owned());
+            }
+        }
+        // Some rungs go with others alone.
+        let turns =
+            knob.rungs.iter().filter(|rung| Knobs::of(Model::Recursive).with(knob.name, rung).is_some()).count();
+        assert!(seen.len() > 1 || turns < 2, "{}: {seen:?}", knob.name);
+        if ["shadows", "fresnel", "brdf", "reflection", "interfaces", "arithmetic"].contains(&knob.name) {
+            shows_its_command(&mut viewer, folder);
+        }
+    }
+    shows_its_command(&mut viewer, folder);
+    let (code, words) = viewer.close();
+    assert_eq!(code, Some(0), "{words}");
+    assert!(!words.contains("Validation Error") && !words.contains("panicked"), "{words}");
+}
+
+#[test]
+fn without_a_display_there_is_a_sentence() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let nothing = [("DISPLAY", ""), ("WAYLAND_DISPLAY", ""), ("WAYLAND_SOCKET", "")];
+    let run = program::etalon(folder.path(), &["view", "study:cornell"], &nothing);
+    run.failed(1, "etalon render SCENE");
+}
+
+fn scene() -> Scene {
+    study::load("etalon").expect("a scene")
+}
+
+struct Study;
+
+impl Source for Study {
+    fn open(&self, _: Asked<'_>, _: &DeviceInfo) -> Result<Loaded> {
+        let scene = scene();
+        Ok(Loaded {
+            name: scene.name.clone(),
+            camera: scene.cameras[0].clone(),
+            original: scene.into(),
+            environment: None,
+            warnings: Vec::new(),
+            prices: None,
+            framed: false,
+            knobs: None,
+        })
+    }
+
+    fn moment(&self, _: Asked<'_>) -> Result<(Scene, Camera)> {
+        bail!("nothing moves")
+    }
+}
+
+/// The thread that draws, without a window: every rung of every knob one after the other, each wanted while the one before is under
+/// way. What it shows in the end is what a renderer of those rungs draws.
+#[test]
+fn every_knob_turns_while_pictures_are_drawn() {
+    let gpu = Gpu::hasty();
+    let size = [64, 36];
+    let settings = |knobs: &Knobs| Settings { size, knobs: knobs.clone(), ..Settings::default() };
+    let shared = Arc::new(Shared::new(Wanted::new(settings(&Knobs::of(Model::Local)))));
+    let (to, woken) = channel();
+    let thread = {
+        let (device, shared) = (gpu.device.clone(), shared.clone());
+        std::thread::spawn(move || {
+            Worker::run(device, shared, Box::new(Study), Arc::new(move || to.send(()).unwrap_or_default()))
+        })
+    };
+    let mut turned = 0;
+    for knob in KNOBS.iter().filter(|knob| !["samples", "colour"].contains(&knob.name)) {
+        for (base, rung) in
+            [Model::Local, Model::Recursive].into_iter().flat_map(|m| knob.rungs.iter().map(move |r| (m, r)))
+        {
+            let Some(knobs) = Knobs::of(base).with(knob.name, rung) else { continue };
+            shared.want(|wanted| wanted.settings = settings(&knobs));
+            // Sometimes it is done before the next, sometimes not.
+            if turned % 3 == 0 {
+                woken.recv_timeout(Duration::from_secs(60)).expect("something is shown");
+            }
+            turned += 1;
+        }
+    }
+    assert!(turned > 60, "{turned} rungs");
+    // What cannot be drawn quickly is small while it moves, and whole once it rests.
+    let last = settings(&Knobs::of(Model::Recursive));
+    let last = Settings { size: [480, 270], ..last };
+    shared.want(|wanted| (wanted.settings, wanted.moving) = (last.clone(), true));
+    let wait = |what: &str, is_there: &dyn Fn(&Seen) -> bool| {
+        let begun = std::time::Instant::now();
+        loop {
+            let seen = shared.seen();
+            if is_there(&seen) {
+                return seen;
+            }
+            assert!(begun.elapsed() < Duration::from_secs(120), "{what}: {:?}", seen.error);
+            let _ = woken.recv_timeout(Duration::from_millis(200));
+        }
+    };
+    wait("moving", &|seen| seen.shown().is_some_and(|shown| shown.moving && shown.size[0] > 64));
+    // By now it is known how long a pixel takes.
+    let mut aside = scene().cameras[0].clone();
+    aside.world_from_camera.translation.x += 0.1;
+    shared.want(|wanted| wanted.from = Viewpoint::Free(aside));
+    let small = wait("small", &|seen| {
+        seen.shown().is_some_and(|shown| shown.moving && shown.size[0] < 480 && shown.size != size)
+    });
+    assert_eq!(small.shown().expect("a picture").samples, [1, 1]);
+    shared.want(|wanted| (wanted.from, wanted.moving, wanted.surfaces) = (Viewpoint::Own, false, true));
+    let seen = wait("whole", &|seen| seen.now().is_some_and(|surfaces| surfaces.size == [480, 270]));
+    assert_eq!(seen.shown().map(|shown| shown.samples), Some([4, 4]));
+    let found: Vec<[u32; 4]> =
+        seen.now().expect("surfaces").radiance[0].iter().map(|pixel| pixel.map(f32::to_bits)).collect();
+    assert!(found == etalon_testing::gpu::bits(&gpu.film(&scene(), last)), "another picture");
+    assert_eq!(seen.error, None);
+    // Other code draws another picture, and what was built the same again.
+    let before = seen.shown().expect("a picture").clone();
+    let program = &etalon::shader::tonemap::PROGRAM;
+    let mut words = program.stages[0].words.to_vec();
+    let factor = words.iter().position(|&word| word == 12.92_f32.to_bits()).expect("the slope of sRGB in the dark");
+    words[factor] = 30.0_f32.to_bits();
+    let code = Arc::new(vec![Replacement { program: program.name, stage: 0, words }]);
+    shared.want(|wanted| wanted.code = code);
+    let is_new = |seen: &Seen, version| seen.shown().is_some_and(|shown| shown.is_done() && shown.version > version);
+    let other = wait("other code", &|seen| is_new(seen, before.version)).shown().expect("a picture").clone();
+    assert!(other.rgba != before.rgba, "the same picture by other code");
+    shared.want(|wanted| wanted.code = Arc::default());
+    let again = wait("the code before", &|seen| is_new(seen, other.version));
+    assert!(again.shown().expect("a picture").rgba == before.rgba, "another picture by the same code");
+    shared.want(|wanted| wanted.quit = true);
+    thread.join().expect("the thread ends");
+}

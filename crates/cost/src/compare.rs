@@ -1,0 +1,63 @@
+//! The price of one approximation: two rungs of one knob, drawn in turns, all others alike.
+
+use anyhow::{Context as _, Result, bail, ensure};
+use serde::Serialize;
+
+use super::price::price;
+use super::sitting::Bench;
+use super::table::{Interval, Price, WorstPixel};
+use etalon::image::metric::{AnyPicture, Metric, compare};
+use etalon::plan::{Knob, Knobs};
+
+/// Two rungs.
+#[derive(Debug, Serialize)]
+pub struct Compared {
+    /// The knob.
+    pub knob: &'static str,
+    /// The rungs: of the two the more exact one last, against which the other is in error.
+    pub rungs: [&'static str; 2],
+    /// GPU time of each.
+    pub gpu_ms: [Interval; 2],
+    /// What the first costs and buys beside the last.
+    pub price: Price,
+    /// Where an eye sees most of it.
+    pub worst_pixel: WorstPixel,
+}
+
+/// Draws both, `knobs` being those of all others.
+///
+/// # Errors
+/// When there are no such two rungs, or one of them contradicts another knob or cannot be drawn.
+pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<Compared> {
+    let parts = wanted.split_once('=').and_then(|(knob, rungs)| Some((knob, rungs.split_once(',')?)));
+    let Some((name, (a, b))) = parts else {
+        bail!("--compare {wanted}: expected KNOB=A,B, for example fresnel=schlick,exact");
+    };
+    let of = |rung: &str| -> Result<Knobs> {
+        let mut knobs = knobs.clone();
+        knobs.set(&format!("{name}={rung}"))?;
+        knobs.check()?;
+        Ok(knobs)
+    };
+    let [first, last] = [of(a), of(b)].map(|knobs| knobs.with_context(|| format!("--compare {wanted}")));
+    let (first, last) = (first?, last?);
+    let knob = Knob::named(name).context("a knob of the table")?;
+    ensure!(first != last, "--compare {wanted}: both are the same rung");
+    let [first, last] = if knob.place(&first) < knob.place(&last) { [first, last] } else { [last, first] };
+    let mut exact = bench.sit(&last)?;
+    let truth = bench.take(&mut exact, None)?;
+    let mut sitting = bench.sit(&first)?;
+    let taken = bench.take(&mut sitting, Some(&mut exact))?;
+    let shown = |display: &etalon::image::png::Display| AnyPicture::Display(display.clone());
+    let flip = compare(Metric::Flip, &shown(&truth.display), &shown(&taken.display))?;
+    let gpu_ms = [Interval::of(&taken.ms), Interval::of(&taken.others_ms)];
+    let rungs = [knob.rung(&first), knob.rung(&last)];
+    let price = price(knob, [rungs[1], rungs[0]], &taken, &truth, &truth.display)?;
+    Ok(Compared {
+        knob: knob.name,
+        rungs,
+        gpu_ms,
+        price,
+        worst_pixel: WorstPixel { x: flip.worst[0], y: flip.worst[1], error: flip.worst_error },
+    })
+}

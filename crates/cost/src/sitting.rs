@@ -1,0 +1,178 @@
+//! Pictures taken for a measurement: warm, in turns with another, with everything that is to be known of them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+use anyhow::Result;
+
+use super::difference::{Shown, shown};
+use super::table::Interval;
+use etalon::frame::{Rendered, Renderer, Settings, Work};
+use etalon::gpu::Device;
+use etalon::image::Picture;
+use etalon::image::png::Display;
+use etalon::plan::{Knobs, Plan};
+use etalon::prepare::Original;
+use etalon::scene::Camera;
+use etalon::scene::environment::Environment;
+
+/// Pictures of one plan are timed until there are so many …
+const MOST: usize = 7;
+/// … or they took so many milliseconds; two at least …
+const ENOUGH_MS: f64 = 1000.0;
+/// … unless one takes so long.
+const LONG_MS: f64 = 6000.0;
+
+/// How many pictures that take so long are timed.
+pub(super) fn turns(ms: f64) -> usize {
+    match ms {
+        ms if ms >= LONG_MS => 1,
+        ms => ((ENOUGH_MS / ms.max(1e-3)).ceil() as usize).clamp(2, MOST),
+    }
+}
+
+/// What is drawn, from where, on what.
+pub struct Bench<'a> {
+    /// The device.
+    pub device: &'a Arc<Device>,
+    /// The scene.
+    pub original: &'a Original,
+    /// Light from all around.
+    pub environment: Option<&'a Environment>,
+    /// All but the knobs.
+    pub settings: Settings,
+    /// From where.
+    pub camera: &'a Camera,
+}
+
+/// Rungs that are ready to be drawn: uploaded, and with every shader compiled.
+pub struct Sitting {
+    /// What draws them.
+    pub renderer: Renderer,
+    /// Wall time until the first samples were there.
+    pub start_ms: f64,
+}
+
+/// A picture.
+pub struct Taken {
+    /// Radiance.
+    pub film: Picture,
+    /// Both halves of its samples as they would be shown, of pictures by paths.
+    pub halves: Option<[Shown; 2]>,
+    /// Relative mean squared error by chance, which those tell.
+    pub noise: Option<f64>,
+    /// As it is shown.
+    pub display: Display,
+    /// And as a file.
+    pub png: Vec<u8>,
+    /// GPU milliseconds of each that was timed.
+    pub ms: Vec<f64>,
+    /// Of the others that were drawn in turns with them.
+    pub others_ms: Vec<f64>,
+    /// GPU milliseconds of each pass.
+    pub passes: Vec<(String, f64)>,
+    /// Counts.
+    pub work: BTreeMap<String, u64>,
+    /// Samples of each pixel.
+    pub samples: u32,
+}
+
+pub(super) fn total(rendered: &Rendered) -> f64 {
+    rendered.passes.iter().map(|pass| pass.ms).sum()
+}
+
+fn counts(work: &Work) -> BTreeMap<String, u64> {
+    let all = [
+        ("reflection_rays", work.reflection),
+        ("refraction_rays", work.refraction),
+        ("shadow_rays", work.shadow),
+        ("indirect_rays", work.indirect),
+        ("node_visits", work.node_visits),
+        ("triangle_tests", work.triangle_tests),
+    ];
+    all.into_iter().map(|(name, count)| (name.to_owned(), count)).collect()
+}
+
+impl Bench<'_> {
+    /// What these rungs call for; nothing is uploaded for that.
+    ///
+    /// # Errors
+    /// When the scene has nothing to draw.
+    pub fn plan(&self, knobs: &Knobs) -> Result<Plan> {
+        let settings = Settings { knobs: knobs.clone(), ..self.settings.clone() };
+        self.original.plan(&settings.conditions(self.environment)?)
+    }
+
+    /// Draws two samples, which compiles everything.
+    ///
+    /// # Errors
+    /// When these rungs cannot be drawn.
+    pub fn sit(&self, knobs: &Knobs) -> Result<Sitting> {
+        self.sit_with(knobs, self.settings.seed)
+    }
+
+    /// The same with other random numbers.
+    ///
+    /// # Errors
+    /// As [`Bench::sit`].
+    pub fn sit_with(&self, knobs: &Knobs, seed: u32) -> Result<Sitting> {
+        let start = Instant::now();
+        let settings = Settings { knobs: knobs.clone(), seed, max_error: None, ..self.settings.clone() };
+        let mut renderer = Renderer::new(self.device, self.original, self.environment, settings)?;
+        renderer.render_samples(self.camera, 2, &mut |_| ())?;
+        Ok(Sitting { renderer, start_ms: start.elapsed().as_secs_f64() * 1e3 })
+    }
+
+    /// GPU time of one picture.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn time(&self, sitting: &mut Sitting) -> Result<f64> {
+        Ok(total(&sitting.renderer.render(self.camera, &mut |_| ())?))
+    }
+
+    /// Draws and times, in turns with `other` where there is one.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn take(&self, sitting: &mut Sitting, mut other: Option<&mut Sitting>) -> Result<Taken> {
+        let rendered = sitting.renderer.render(self.camera, &mut |_| ())?;
+        let film = sitting.renderer.film()?;
+        let halves = sitting.renderer.halves(rendered.samples)?;
+        let Settings { size: [width, height], tonemap, exposure, .. } = self.settings;
+        let mut ms = vec![total(&rendered)];
+        let mut others_ms = Vec::new();
+        let mut passes: Vec<(String, Vec<f64>)> =
+            rendered.passes.iter().map(|p| (p.name.clone(), vec![p.ms])).collect();
+        if let Some(other) = &mut other {
+            others_ms.push(self.time(other)?);
+        }
+        while ms.len() < turns(ms[0]) {
+            let again = sitting.renderer.render(self.camera, &mut |_| ())?;
+            ms.push(total(&again));
+            for (pass, known) in again.passes.iter().zip(&mut passes) {
+                known.1.push(pass.ms);
+            }
+            if let Some(other) = &mut other {
+                others_ms.push(self.time(other)?);
+            }
+        }
+        Ok(Taken {
+            film,
+            halves: halves.map(|halves| halves.map(|half| shown(&half, tonemap, exposure))),
+            noise: rendered.errors.last().map(|error| error.relmse),
+            png: sitting.renderer.png(&rendered)?,
+            display: Display {
+                width,
+                height,
+                rgba: rendered.display.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect(),
+            },
+            ms,
+            others_ms,
+            passes: passes.into_iter().map(|(name, ms)| (name, Interval::of(&ms).median)).collect(),
+            work: counts(&rendered.work),
+            samples: rendered.samples,
+        })
+    }
+}

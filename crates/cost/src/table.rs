@@ -1,0 +1,478 @@
+//! What a run of `etalon cost` found, as data: `cost.json` (schema `etalon.cost/1`) and `cost.csv`.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Result, bail, ensure};
+use serde::{Deserialize, Serialize};
+
+use etalon::plan::KNOBS;
+
+/// The document.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Table {
+    /// `etalon.cost/1`.
+    pub schema: String,
+    /// Version of the program.
+    pub program: String,
+    /// Where it was measured.
+    pub device: DeviceName,
+    /// Path or `study:NAME`.
+    pub scene: String,
+    /// The first words of every command: all that a picture depends on beside its knobs.
+    pub command: String,
+    /// Pixels.
+    pub size: [u32; 2],
+    /// What every error is an error against.
+    pub reference: Reference,
+    /// Which knobs the scene calls for.
+    pub knobs: Vec<KnobState>,
+    /// Everything that was drawn.
+    pub points: Vec<Point>,
+    /// Places in `points` of those that nothing beats in time and error at once, the quickest first.
+    pub frontier: Vec<usize>,
+    /// What changing one knob bought and cost.
+    pub prices: Vec<Price>,
+    /// How the search for better combinations went, a step each.
+    pub search: Vec<Tried>,
+    /// How the rules of quadrature come near to the integral, where media vary.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub orders: Vec<Order>,
+    /// What is worth knowing before a figure is believed.
+    pub warnings: Vec<String>,
+    /// Which part of how many, counted from 1.
+    pub shard: [u32; 2],
+    /// Seconds that were given, and taken.
+    pub budget_s: f64,
+    /// See `budget_s`; those of an interrupted run are not known to the one that went on with it.
+    pub took_s: f64,
+}
+
+/// A device by name.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DeviceName {
+    /// Marketing name.
+    pub name: String,
+    /// Driver in words.
+    pub driver: String,
+    /// Its version.
+    pub version: String,
+    /// `cpu`, `discrete`, …
+    #[serde(rename = "type")]
+    pub kind: String,
+}
+
+/// The scene's own reference: every knob on the rung that approximates least.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Reference {
+    /// Its rungs.
+    pub knobs: BTreeMap<String, String>,
+    /// Samples of each pixel.
+    pub samples: u32,
+    /// Those of pictures whose prices are told from its rungs.
+    pub priced_samples: u32,
+    /// GPU time of the picture.
+    pub gpu_ms: f64,
+    /// Root of its relative mean squared error against what it converges to, which its halves tell.
+    pub own_error: f64,
+    /// Mean of FLIP's error against what it converges to: that of one half of its samples against all, whose difference is as
+    /// large as that error.
+    pub own_flip: f64,
+    /// Whether that is at most [`CONVERGED`].
+    pub converged: bool,
+    /// Makes it again.
+    pub command: String,
+    /// Hash of the picture's file.
+    pub image: String,
+}
+
+/// FLIP up to which a reference is called converged.
+pub const CONVERGED: f64 = 0.02;
+
+/// A knob in this scene.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct KnobState {
+    /// Its name.
+    pub knob: String,
+    /// Whether some effect that it shapes is planned for the scene.
+    pub called_for: bool,
+    /// Which, or why none.
+    pub reason: String,
+    /// The lecture's statements behind it.
+    pub lecture: Vec<String>,
+    /// What it approximates.
+    pub about: String,
+}
+
+/// Where a point comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Family {
+    /// A preset, with other numbers of samples.
+    Preset,
+    /// The preset `local` with one rung changed.
+    Local,
+    /// The reference's rungs, with one changed or none, and fewer samples.
+    Exact,
+    /// Found by the search.
+    Search,
+}
+
+/// A number and how well it is known.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Interval {
+    /// In the middle.
+    pub median: f64,
+    /// At least.
+    pub low: f64,
+    /// At most.
+    pub high: f64,
+}
+
+impl Interval {
+    /// The middle and both ends of some numbers, at least one.
+    #[must_use]
+    pub fn of(values: &[f64]) -> Self {
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let n = sorted.len();
+        let at = |i: usize| sorted.get(i).copied().unwrap_or_default();
+        Self { median: 0.5 * (at(n.saturating_sub(1) / 2) + at(n / 2)), low: at(0), high: at(n.saturating_sub(1)) }
+    }
+
+    /// A value and two standard errors either way.
+    #[must_use]
+    pub fn around(value: f64, deviation: f64) -> Self {
+        Self { median: value, low: value - 2.0 * deviation, high: value + 2.0 * deviation }
+    }
+
+    /// Three standard errors below a value that [`Interval::around`] made: dozens of prices are told, of which two standard errors
+    /// would call some by mistake.
+    #[must_use]
+    pub fn surely(&self) -> f64 {
+        self.median - 1.5 * (self.median - self.low)
+    }
+}
+
+/// Place and size of the largest error.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct WorstPixel {
+    /// Column.
+    pub x: u32,
+    /// Row from the top.
+    pub y: u32,
+    /// FLIP's error there.
+    pub error: f64,
+}
+
+/// How far a picture is from the reference.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Errors {
+    /// Mean of FLIP's error of the displayed pictures.
+    pub flip_mean: f64,
+    /// What 95 of 100 pixels stay below.
+    pub flip_p95: f64,
+    /// Relative mean squared error of the radiance, less what the reference's own noise adds; with two standard errors, as far as
+    /// that noise makes it uncertain.
+    pub relmse: Interval,
+    /// Root mean squared error of the radiance, as it is.
+    pub rmse: f64,
+    /// Mean CIEDE2000 of the displayed colours.
+    pub delta_e_mean: f64,
+    /// Where FLIP's error is largest.
+    pub worst_pixel: WorstPixel,
+}
+
+/// One picture: how it was made, what it took and how far off it is.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Point {
+    /// Unique in the table.
+    pub name: String,
+    /// Where it comes from.
+    pub family: Family,
+    /// Rungs.
+    pub knobs: BTreeMap<String, String>,
+    /// GPU time of a picture with everything compiled: the middle, the shortest and the longest.
+    pub gpu_ms: Interval,
+    /// How many were timed.
+    pub timed: usize,
+    /// Milliseconds of wall time before that: uploading, making pipelines, compiling, and one or two samples.
+    pub start_ms: f64,
+    /// GPU milliseconds of each pass.
+    pub passes: Vec<(String, f64)>,
+    /// Against the reference.
+    #[serde(flatten)]
+    pub errors: Errors,
+    /// Relative mean squared error by chance alone, which halves tell; of pictures by paths.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise: Option<f64>,
+    /// Counts that are the same on every machine.
+    pub work: BTreeMap<String, u64>,
+    /// Draws it again.
+    pub command: String,
+    /// Hash of the picture's file.
+    pub image: String,
+    /// Stem of its files in the folder `pictures`.
+    pub picture: String,
+}
+
+impl Point {
+    /// What the frontier is drawn by: FLIP's mean. Squares of radiance would be those of a few pixels that paths make far too bright.
+    #[must_use]
+    pub fn error(&self) -> f64 {
+        self.errors.flip_mean
+    }
+}
+
+/// What changing one knob bought and cost.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Price {
+    /// The knob.
+    pub knob: String,
+    /// Rung it was on.
+    pub from: String,
+    /// Rung it was set to.
+    pub to: String,
+    /// `local` or `exact`: the rungs of all others.
+    pub base: Family,
+    /// The point.
+    pub point: String,
+    /// Milliseconds of GPU time more: the middle and both ends of pictures drawn in turns.
+    pub gpu_ms_delta: Interval,
+    /// How many turns.
+    pub turns: usize,
+    /// The same as a share of the base's.
+    pub share: f64,
+    /// FLIP between the two pictures; from `exact` with the same random numbers, so that noise is in both alike.
+    pub flip_between: f64,
+    /// More of FLIP's mean error against the reference.
+    pub flip_delta: f64,
+    /// More of the mean squared error of displayed values 0 to 1 against the reference; from `exact` the mean squared difference of
+    /// what both pictures converge to, of which halves give a mean without noise, with two standard errors either way.
+    pub shown_delta: Interval,
+    /// Side in pixels of the squares over which displayed values were averaged for that: 1, or more where single pixels are too noisy
+    /// to tell anything.
+    pub squares: u32,
+    /// Of a knob that changes chance alone: its relative mean squared error by chance over that of the base.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_ratio: Option<f64>,
+    /// Whether the pictures are the same to the last bit.
+    pub same: bool,
+    /// Whether the scene calls for the knob.
+    pub called_for: bool,
+    /// In a sentence.
+    pub verdict: String,
+}
+
+/// FLIP below which nobody sees a difference: half of a step of eight bits.
+pub const INVISIBLE: f64 = 0.002;
+
+impl Price {
+    /// Whether a time is more than chance: all turns say so, of which there are five, or fewer and it is more than a twentieth.
+    fn is_sure(&self) -> bool {
+        self.turns >= 5 || self.share.abs() > 0.05
+    }
+
+    /// Whether it takes longer than the base.
+    #[must_use]
+    pub fn takes_longer(&self) -> bool {
+        self.gpu_ms_delta.low > 0.0 && self.is_sure()
+    }
+
+    /// Whether it takes less time than the base.
+    #[must_use]
+    pub fn saves(&self) -> bool {
+        self.gpu_ms_delta.high < 0.0 && self.is_sure()
+    }
+
+    /// Whether it went to a rung further on in its knob's list.
+    #[must_use]
+    pub fn to_more_exact(&self) -> bool {
+        let knob = KNOBS.iter().find(|knob| knob.name == self.knob);
+        let place = |rung: &str| knob.and_then(|knob| knob.rungs.iter().position(|known| *known == rung));
+        place(&self.to) > place(&self.from)
+    }
+
+    /// Whether an eye sees it, and it is more than the noise of paths that went apart.
+    #[must_use]
+    pub fn is_seen(&self) -> bool {
+        let beyond_noise = self.base != Family::Exact || self.shown_delta.surely() > 0.0;
+        !self.same && self.noise_ratio.is_none() && self.flip_between >= INVISIBLE && beyond_noise
+    }
+}
+
+/// How a rule of quadrature comes near to the integral (lecture A2).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Order {
+    /// Rung of the knob `quadrature`.
+    pub rule: String,
+    /// Steps of each segment.
+    pub steps: Vec<u32>,
+    /// Root mean squared difference of radiance to that with most steps, over the root mean square of what is all around.
+    pub errors: Vec<f64>,
+    /// GPU milliseconds of the picture.
+    pub gpu_ms: Vec<f64>,
+    /// p of error ~ steps^−p where rounding does not hide it; `None` where fewer than two errors are left.
+    pub order: Option<f64>,
+}
+
+/// A step of the search.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Tried {
+    /// What was changed.
+    pub change: String,
+    /// FLIP's mean that single prices promised.
+    pub promised: f64,
+    /// And what was found.
+    pub found: f64,
+    /// Whether it was kept.
+    pub kept: bool,
+}
+
+/// Places of the points that no other beats in time and error at once, the quickest first; of equal ones the first. Nothing is
+/// known to be nearer to the truth than the reference is: it is the last, and what comes within its own error ties with it.
+#[must_use]
+pub fn frontier(points: &[Point]) -> Vec<usize> {
+    let reference = points.iter().position(|point| point.name == REFERENCE);
+    let floor = reference.map_or(0.0, |i| points[i].error());
+    let error = |i: usize| points[i].error().max(floor);
+    let mut order: Vec<usize> = (0..points.len()).filter(|i| Some(*i) != reference).collect();
+    let time = |i: usize| points[i].gpu_ms.median;
+    // What takes longer and is no better is beaten by the reference itself.
+    order.retain(|&i| reference.is_none_or(|r| time(i) < time(r)));
+    order.sort_by(|&a, &b| time(a).total_cmp(&time(b)).then(error(a).total_cmp(&error(b))));
+    let mut best = f64::INFINITY;
+    order.retain(|&i| {
+        let better = error(i) < best;
+        best = best.min(error(i));
+        better
+    });
+    order.extend(reference);
+    order
+}
+
+/// Name of the reference among the points.
+pub const REFERENCE: &str = "reference";
+
+impl Table {
+    /// The knobs that the scene calls for and that a point has on other rungs than the reference.
+    #[must_use]
+    pub fn given_up(&self, point: &Point) -> String {
+        let other = |knob: &KnobState| {
+            let [now, exact] = [&point.knobs, &self.reference.knobs].map(|knobs| knobs.get(&knob.knob));
+            (now != exact).then(|| format!("{}={}", knob.knob, now.map_or("", String::as_str)))
+        };
+        let all: Vec<String> = self.knobs.iter().filter(|knob| knob.called_for).filter_map(other).collect();
+        if all.is_empty() { "nothing".to_owned() } else { all.join(", ") }
+    }
+
+    /// The points as comma-separated values, a line each.
+    ///
+    /// # Errors
+    /// Never: it is written to memory.
+    pub fn csv(&self) -> Result<Vec<u8>> {
+        let mut all = csv::Writer::from_writer(Vec::new());
+        let knobs: Vec<&str> = self.knobs.iter().map(|k| k.knob.as_str()).collect();
+        let figures = [
+            "point",
+            "family",
+            "frontier",
+            "gpu_ms",
+            "gpu_ms_low",
+            "gpu_ms_high",
+            "start_ms",
+            "flip_mean",
+            "flip_p95",
+            "relmse",
+            "relmse_low",
+            "relmse_high",
+            "rmse",
+            "delta_e_mean",
+            "worst_x",
+            "worst_y",
+            "worst_error",
+            "image",
+        ];
+        all.write_record(figures.iter().chain(&knobs))?;
+        for (index, p) in self.points.iter().enumerate() {
+            let e = &p.errors;
+            let mut row = vec![
+                p.name.clone(),
+                format!("{:?}", p.family).to_lowercase(),
+                self.frontier.contains(&index).to_string(),
+            ];
+            let numbers = [
+                p.gpu_ms.median,
+                p.gpu_ms.low,
+                p.gpu_ms.high,
+                p.start_ms,
+                e.flip_mean,
+                e.flip_p95,
+                e.relmse.median,
+                e.relmse.low,
+                e.relmse.high,
+                e.rmse,
+                e.delta_e_mean,
+            ];
+            row.extend(numbers.map(|number| number.to_string()));
+            row.extend([e.worst_pixel.x.to_string(), e.worst_pixel.y.to_string(), e.worst_pixel.error.to_string()]);
+            row.push(p.image.clone());
+            row.extend(knobs.iter().map(|knob| p.knobs.get(*knob).cloned().unwrap_or_default()));
+            all.write_record(&row)?;
+        }
+        Ok(all.into_inner()?)
+    }
+
+    /// One table of the parts that shards of one run measured.
+    ///
+    /// # Errors
+    /// When they are not of one scene, one reference and one kind of device.
+    pub fn merge(parts: Vec<Self>) -> Result<Self> {
+        let mut parts = parts.into_iter();
+        let Some(mut all) = parts.next() else { bail!("merging: there is nothing to merge") };
+        let of = all.shard[1];
+        let mut drawn = vec![all.shard[0]];
+        for part in parts {
+            for (what, a, b) in [
+                ("programs", &all.program, &part.program),
+                ("commands", &all.command, &part.command),
+                ("references", &all.reference.image, &part.reference.image),
+                ("drivers", &all.device.driver, &part.device.driver),
+            ] {
+                ensure!(a == b, "merging: two parts have different {what}, {a} and {b}");
+            }
+            if all.device != part.device {
+                all.warnings.push(format!("times are those of {} and {}", all.device.name, part.device.name));
+            }
+            ensure!(part.shard[1] == of, "merging: two parts are of {of} and of {}", part.shard[1]);
+            drawn.push(part.shard[0]);
+            for point in part.points {
+                if all.points.iter().all(|known| known.name != point.name) {
+                    all.points.push(point);
+                }
+            }
+            for price in part.prices {
+                if all.prices.iter().all(|known| known.point != price.point) {
+                    all.prices.push(price);
+                }
+            }
+            all.search.extend(part.search);
+            if all.orders.is_empty() {
+                all.orders = part.orders;
+            }
+            for warning in part.warnings {
+                if !all.warnings.contains(&warning) {
+                    all.warnings.push(warning);
+                }
+            }
+            all.took_s = all.took_s.max(part.took_s);
+        }
+        if let Some(missing) = (1..=of).find(|i| !drawn.contains(i)) {
+            bail!("merging: part {missing}/{of} is missing");
+        }
+        all.shard = [1, 1];
+        // The reference is the last.
+        all.points.sort_by_key(|point| point.name == REFERENCE);
+        all.frontier = frontier(&all.points);
+        Ok(all)
+    }
+}

@@ -1,0 +1,152 @@
+//! GLSL to SPIR-V by glslang: what build.rs does for all shaders, and the viewer for those that change (feature `reload`).
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use rspirv::dr::Module;
+
+use super::interface::{Interface, PassSlots};
+
+pub(crate) type Result<T, E = String> = std::result::Result<T, E>;
+
+/// The files of a folder, in order; none where there is no such folder: passes need no library.
+pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>> {
+    if !folder.exists() {
+        return Ok(Vec::new());
+    }
+    let entries = fs::read_dir(folder).map_err(|e| format!("reading {}: {e}", folder.display()))?;
+    let mut paths: Vec<PathBuf> = entries.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
+    paths.sort();
+    Ok(paths)
+}
+
+pub(crate) fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Does something with each of `work` by name, as many at once as there are cores; `tool` is what each thread does it with.
+pub(crate) fn on_all_cores<Tool, W: Send, R: Send>(
+    work: impl IntoIterator<Item = (String, W)>,
+    tool: impl Fn() -> Result<Tool> + Sync,
+    make: impl Fn(&Tool, W) -> Result<R> + Sync,
+) -> Result<BTreeMap<String, R>> {
+    let queue = Mutex::new(work.into_iter().collect::<Vec<_>>());
+    let made = Mutex::new(BTreeMap::new());
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let run = || -> Result<()> {
+        let tool = tool()?;
+        loop {
+            let next = queue.lock().unwrap_or_else(PoisonError::into_inner).pop();
+            let Some((name, work)) = next else { return Ok(()) };
+            let result = make(&tool, work)?;
+            made.lock().unwrap_or_else(PoisonError::into_inner).insert(name, result);
+        }
+    };
+    std::thread::scope(|scope| {
+        let all: Vec<_> = (0..threads).map(|_| scope.spawn(run)).collect();
+        all.into_iter().try_for_each(|thread| thread.join().map_err(|_| "a thread of the build panicked")?)
+    })?;
+    Ok(made.into_inner().unwrap_or_else(PoisonError::into_inner))
+}
+
+/// One compiled shader: what it declares, and the words that ship.
+pub(crate) struct Stage {
+    pub(crate) kind: shaderc::ShaderKind,
+    pub(crate) module: Module,
+    pub(crate) words: Vec<u32>,
+    pub(crate) path: String,
+}
+
+/// The stages of a program.
+pub(crate) struct Program {
+    pub(crate) stages: Vec<Stage>,
+    pub(crate) slots: PassSlots,
+}
+
+/// How shaders are compiled.
+pub(crate) struct Recipe {
+    compiler: shaderc::Compiler,
+    /// The folder `shaders`, which all includes are written from: one rule, whatever file includes.
+    pub(crate) root: PathBuf,
+    /// Who declares what, and its numbers.
+    pub(crate) interface: Interface,
+    /// Names of specialization constants whose code is left out.
+    without: Vec<String>,
+}
+
+impl Recipe {
+    pub(crate) fn new(root: &Path, without: Vec<String>) -> Result<Self> {
+        let compiler = shaderc::Compiler::new().map_err(|e| format!("shaderc: {e}"))?;
+        Ok(Self { compiler, root: root.to_owned(), interface: Interface::read(root)?, without })
+    }
+
+    /// Compiles the files of a program, all stages of which bind the same.
+    pub(crate) fn program(&self, paths: &[PathBuf]) -> Result<Program> {
+        let mut texts = Vec::new();
+        for path in paths {
+            let text = fs::read_to_string(path).map_err(|e| format!("reading {}: {e}", path.display()))?;
+            texts.push((path.display().to_string(), text));
+        }
+        let kind = |path: &PathBuf| match path.extension().and_then(|e| e.to_str()) {
+            Some("vert") => Ok(shaderc::ShaderKind::Vertex),
+            Some("frag") => Ok(shaderc::ShaderKind::Fragment),
+            Some("comp") => Ok(shaderc::ShaderKind::Compute),
+            _ => Err(format!("{}: expected .vert, .frag or .comp", path.display())),
+        };
+        let kinds = paths.iter().map(kind).collect::<Result<Vec<_>>>()?;
+        self.compile(&kinds, &texts)
+    }
+
+    /// Compiles a text of that name.
+    pub(crate) fn source(&self, kind: shaderc::ShaderKind, name: String, source: &str) -> Result<Program> {
+        self.compile(&[kind], &[(name, source.to_owned())])
+    }
+
+    fn compile(&self, kinds: &[shaderc::ShaderKind], texts: &[(String, String)]) -> Result<Program> {
+        let slots = self.interface.pass_slots(texts)?;
+        let stage = |(&kind, (name, text)): (&shaderc::ShaderKind, &(String, String))| -> Result<Stage> {
+            // rspirv 0.13 cannot load SPIR-V 1.6's OpExecutionModeId; the declarations are the same in 1.5.
+            let (zero, performance) = (shaderc::OptimizationLevel::Zero, shaderc::OptimizationLevel::Performance);
+            let plain = self.words(kind, name, text, &slots, zero, shaderc::SpirvVersion::V1_5, &[])?;
+            let module = rspirv::dr::load_words(plain).map_err(|e| format!("{name}: reflection: {e:?}"))?;
+            let version = shaderc::SpirvVersion::V1_6;
+            let words = self.words(kind, name, text, &slots, performance, version, &self.without)?;
+            Ok(Stage { kind, module, words, path: name.clone() })
+        };
+        let stages = kinds.iter().zip(texts).map(stage).collect::<Result<_>>()?;
+        Ok(Program { stages, slots })
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "the options of glslang, called twice above")]
+    fn words(
+        &self,
+        kind: shaderc::ShaderKind,
+        name: &str,
+        source: &str,
+        slots: &PassSlots,
+        level: shaderc::OptimizationLevel,
+        version: shaderc::SpirvVersion,
+        without: &[String],
+    ) -> Result<Vec<u32>> {
+        let mut options = shaderc::CompileOptions::new().map_err(|e| format!("shaderc: {e}"))?;
+        options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
+        options.set_target_spirv(version);
+        options.set_optimization_level(level);
+        options.set_warnings_as_errors();
+        options.set_include_callback(|wanted, _, from, _| {
+            let resolved = self.root.join(wanted);
+            let content = fs::read_to_string(&resolved).map_err(|e| format!("{from} includes \"{wanted}\": {e}"))?;
+            let content = self.interface.numbered(&content, slots, without)?;
+            Ok(shaderc::ResolvedInclude { resolved_name: resolved.display().to_string(), content })
+        });
+        let source = self.interface.numbered(source, slots, without)?;
+        let compiled = self.compiler.compile_into_spirv(&source, kind, name, "main", Some(&options));
+        let artifact = compiled.map_err(|e| match e {
+            shaderc::Error::CompilationError(_, log) => log,
+            other => format!("{name}: {other}"),
+        })?;
+        Ok(artifact.as_binary().to_vec())
+    }
+}

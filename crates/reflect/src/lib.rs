@@ -1,0 +1,127 @@
+//! GLSL under a folder `shaders/` becomes SPIR-V 1.6 and plain Rust that describes it, at build time.
+//!
+//! 1. `shaders/pass/NAME.comp`, or `NAME.vert` with `NAME.frag`, is one program. Each stage is compiled twice by glslang
+//!    (crate shaderc): without optimisation for reflection, which needs the names, and with it for shipping.
+//! 2. rspirv reads the bindings, their access (`readonly`/`writeonly` survive as NonWritable/NonReadable), push
+//!    constants, specialization constants, vertex inputs and local size.
+//! 3. Every function of `shaders/lib/` tagged `@eq` gets a probe, a program that evaluates it (`src/equations.rs`), and
+//!    its SPIR-V is held to a contract (`src/contract.rs`).
+//! 4. `shaders.rs` gets a module per library file and per program: bindings as named fields, so that a forgotten one does not
+//!    compile, specialization and push constants as structs (`src/generate.rs`). `share.rs` gets the structs of
+//!    `shaders/share/`. Who declares what and gets which number: `src/interface.rs`.
+//!
+//! Errors are printed as `file:line: message` by the compiler itself.
+
+mod compile;
+mod contract;
+mod equations;
+mod generate;
+mod interface;
+mod reflect;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use compile::{Recipe, Result, files, stem};
+
+/// Compiles and describes what is under `shaders`: writes `shaders.rs` and `share.rs` into `out_dir`. Code behind the specialization
+/// constants `without` is not built at all.
+///
+/// # Errors
+/// What the compiler says, as `file:line: message`, or what keeps a shader from being described.
+pub fn build(shaders: &Path, out_dir: &Path, without: &[String]) -> Result<(), String> {
+    let recipe = Recipe::new(shaders, without.to_vec())?;
+    if let Some(name) = without.iter().find(|name| recipe.interface.owner("constant", name).is_none()) {
+        return Err(format!("no shader has a constant {name}"));
+    }
+    let mut sources: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
+    for path in files(&shaders.join("pass"))? {
+        sources.entry(stem(&path)).or_default().push(path);
+    }
+    if sources.is_empty() {
+        return Err(format!("{}: there are no shaders", shaders.join("pass").display()));
+    }
+    let programs = compile::on_all_cores(
+        sources,
+        || Recipe::new(shaders, without.to_vec()),
+        |recipe, paths| {
+            let program = recipe.program(&paths)?;
+            for stage in program.stages.iter().filter(|_| without.is_empty()) {
+                contract::decorations(&stage.path, &stage.module, &stage.words)?;
+            }
+            Ok(program)
+        },
+    )?;
+    let mut code = generate::Programs::of(&recipe.interface, &programs)?.rust()?;
+    code += &generate::probes(&recipe, &programs, without.is_empty())?;
+    let write =
+        |name: &str, text: String| fs::write(out_dir.join(name), text).map_err(|e| format!("writing {name}: {e}"));
+    write("shaders.rs", code)?;
+    write("share.rs", generate::share(&recipe, &programs)?)
+}
+
+/// A binding of a program: its set, name and slot, and its kind and access by the names of the generated Rust.
+pub type Binding = (u32, String, u32, &'static str, &'static str);
+
+/// A program, compiled for itself.
+pub struct Compiled {
+    /// SPIR-V of each stage.
+    pub stages: Vec<Vec<u32>>,
+    /// All of them, by set and slot.
+    pub bindings: Vec<Binding>,
+    /// Specialization constants by id.
+    pub constants: Vec<(u32, String)>,
+    /// Vertex inputs: location, components.
+    pub inputs: Vec<(u32, u32)>,
+    /// Of push constants.
+    pub push_bytes: u32,
+    /// Invocations of a workgroup.
+    pub local_size: [u32; 3],
+}
+
+/// Compiles the program `name` under `shaders`.
+///
+/// # Errors
+/// As [`build`].
+pub fn program(shaders: &Path, name: &str) -> Result<Compiled, String> {
+    let stages = Recipe::new(shaders, Vec::new())?.program(&sources(shaders, name)?)?.stages;
+    let all = reflect::declared(&stages)?;
+    let binding = |b: &reflect::Binding| (b.set, b.name.clone(), b.slot, b.kind, b.access);
+    Ok(Compiled {
+        bindings: all.bindings.values().map(binding).collect(),
+        constants: all.constants.iter().map(|(id, (name, ..))| (*id, name.clone())).collect(),
+        inputs: all.inputs.iter().map(|(location, (_, components))| (*location, *components)).collect(),
+        push_bytes: all.push_bytes(),
+        local_size: reflect::local_size(&stages[0].module),
+        stages: stages.into_iter().map(|stage| stage.words).collect(),
+    })
+}
+
+/// The files that the program `name` is made of: its stages and all that they include.
+///
+/// # Errors
+/// When the folder cannot be read.
+pub fn parts(shaders: &Path, name: &str) -> Result<BTreeSet<PathBuf>, String> {
+    let mut parts = BTreeSet::new();
+    sources(shaders, name)?.into_iter().for_each(|path| include(shaders, path, &mut parts));
+    Ok(parts)
+}
+
+/// The files of a program, in the order of its stages.
+fn sources(shaders: &Path, name: &str) -> Result<Vec<PathBuf>> {
+    let all = files(&shaders.join("pass"))?;
+    Ok(all.into_iter().filter(|path| stem(path) == name).collect())
+}
+
+fn include(shaders: &Path, path: PathBuf, parts: &mut BTreeSet<PathBuf>) {
+    let text = fs::read_to_string(&path).unwrap_or_default();
+    if !parts.insert(path) {
+        return;
+    }
+    for line in text.lines() {
+        if let Some(name) = line.strip_prefix("#include \"").and_then(|rest| rest.split('"').next()) {
+            include(shaders, shaders.join(name), parts);
+        }
+    }
+}

@@ -1,0 +1,373 @@
+//! glTF materials, textures and pictures into [`Material`] and [`Image`].
+
+use anyhow::{Context, Result, ensure};
+use glam::{Affine2, Vec2};
+use gltf::json::{
+    self,
+    extensions::texture::TextureTransform,
+    material::AlphaMode as JsonAlphaMode,
+    texture::{MagFilter, MinFilter, WrappingMode},
+    validation::Checked,
+};
+use rayon::prelude::*;
+use serde::Deserialize;
+use serde_json::{Map, Value};
+
+use super::substance::INFINITE_IOR;
+use super::{
+    AlphaMode, Image, Material, Sampler, TextureRef, Wrap,
+    container::{Document, short_uri},
+    gltf_extras,
+    lobe::{LOBES, Lobe, LobeOf},
+    pictures,
+};
+use etalon_optics::spectra;
+
+/// Materials of the whole file, and which of its images their textures are of.
+pub(crate) struct Materials {
+    pub(crate) materials: Vec<Material>,
+    /// By [`TextureRef::image`], until [`Materials::decode`].
+    files: Vec<usize>,
+}
+
+/// KHR_materials_clearcoat, which the `gltf` crate does not know.
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+struct Clearcoat {
+    clearcoat_factor: f32,
+    clearcoat_texture: Option<json::texture::Info>,
+    clearcoat_roughness_factor: f32,
+    clearcoat_roughness_texture: Option<json::texture::Info>,
+    clearcoat_normal_texture: Option<json::material::NormalTexture>,
+}
+
+/// KHR_materials_dispersion, which the `gltf` crate does not know.
+#[derive(Deserialize, Default)]
+#[serde(default)]
+struct Dispersion {
+    dispersion: f32,
+}
+
+/// EXT_texture_webp.
+#[derive(Deserialize)]
+struct Webp {
+    source: usize,
+}
+
+struct Reader<'d, 'b, 'w> {
+    document: &'d Document<'b>,
+    warnings: &'w mut Vec<String>,
+    /// Scene image of each file image, once a material refers to it.
+    image_slots: Vec<Option<usize>>,
+    /// File image of each scene image.
+    used_images: Vec<usize>,
+    /// Words for messages: `material 3 "Glass"`.
+    place: String,
+}
+
+/// Reads every material of the file.
+pub(crate) fn read(document: &Document<'_>, warnings: &mut Vec<String>) -> Result<Materials> {
+    let root = &document.root;
+    let mut reader = Reader {
+        document,
+        warnings,
+        image_slots: vec![None; root.images.len()],
+        used_images: Vec::new(),
+        place: String::new(),
+    };
+    let mut materials = Vec::with_capacity(root.materials.len() + 1);
+    for (index, json) in root.materials.iter().enumerate() {
+        reader.place = match &json.name {
+            Some(name) => format!("material {index} \"{name}\""),
+            None => format!("material {index}"),
+        };
+        materials.push(reader.material(index, json).with_context(|| reader.place.clone())?);
+    }
+    Ok(Materials { materials, files: reader.used_images })
+}
+
+impl Materials {
+    /// Decodes, in parallel, the pictures that the materials still name. The others are opened as far as their header, so
+    /// that a broken file is not called sound.
+    pub(crate) fn decode(&mut self, document: &Document<'_>) -> Result<Vec<Image>> {
+        let mut places = vec![None; self.files.len()];
+        let mut wanted = Vec::new();
+        for texture in self.materials.iter_mut().flat_map(Material::textures_mut).flatten() {
+            texture.image = *places[texture.image].get_or_insert_with(|| {
+                wanted.push(self.files[texture.image]);
+                wanted.len() - 1
+            });
+        }
+        for i in (0..document.root.images.len()).filter(|i| !wanted.contains(i)) {
+            with_bytes(document, i, |_, bytes| pictures::probe(bytes))?;
+        }
+        wanted.par_iter().map(|&i| decode(document, i)).collect()
+    }
+}
+
+/// Hands the encoded bytes of image `index` and its name to `then`, and puts the name into what goes wrong.
+fn with_bytes<T>(document: &Document<'_>, index: usize, then: impl FnOnce(String, &[u8]) -> Result<T>) -> Result<T> {
+    let json = document.root.images.get(index).with_context(|| format!("image {index} does not exist"))?;
+    let name = match (&json.name, &json.uri) {
+        (_, Some(uri)) if !uri.starts_with("data:") => short_uri(uri),
+        (Some(name), _) => name.clone(),
+        _ => format!("image {index}"),
+    };
+    let what = format!("image {index} \"{name}\"");
+    match (&json.uri, json.buffer_view) {
+        (Some(uri), _) => document.resolve(uri).and_then(|bytes| then(name, &bytes)),
+        (None, Some(view)) => document.view(view.value()).and_then(|(bytes, _)| then(name, bytes)),
+        (None, None) => Err(anyhow::anyhow!("it has neither a URI nor a buffer view")),
+    }
+    .context(what)
+}
+
+fn decode(document: &Document<'_>, index: usize) -> Result<Image> {
+    with_bytes(document, index, pictures::decode)
+}
+
+fn parse<'v, T: Deserialize<'v>>(others: &'v Map<String, Value>, name: &str) -> Result<Option<T>> {
+    others.get(name).map(|v| T::deserialize(v).with_context(|| format!("the extension {name}"))).transpose()
+}
+
+impl Reader<'_, '_, '_> {
+    fn warn(&mut self, what: &str) {
+        self.warnings.push(format!("{}: {what}", self.place));
+    }
+
+    /// A factor that the specification keeps in 0 … 1.
+    fn unit(&mut self, value: f32, name: &str) -> f32 {
+        let clamped = value.clamp(0.0, 1.0);
+        if clamped != value {
+            self.warn(&format!("{name} {value} lies outside 0 … 1 and is clamped"));
+        }
+        clamped
+    }
+
+    /// A factor that the specification keeps from being negative.
+    fn positive(&mut self, value: f32, name: &str) -> f32 {
+        let clamped = value.clamp(0.0, f32::MAX);
+        if clamped != value {
+            self.warn(&format!("{name} {value} is negative or infinite and is clamped"));
+        }
+        clamped
+    }
+
+    fn material(&mut self, index: usize, json: &json::Material) -> Result<Material> {
+        let pbr = &json.pbr_metallic_roughness;
+        let mut m = Material {
+            name: json.name.clone().unwrap_or_else(|| format!("material {index}")),
+            base_color: pbr.base_color_factor.0.map(|x| self.unit(x, "the base colour factor")),
+            base_color_texture: self.texture(pbr.base_color_texture.as_ref())?,
+            metallic: self.unit(pbr.metallic_factor.0, "the metallic factor"),
+            roughness: self.unit(pbr.roughness_factor.0, "the roughness factor"),
+            metallic_roughness_texture: self.texture(pbr.metallic_roughness_texture.as_ref())?,
+            emissive: json.emissive_factor.0.map(|x| self.positive(x, "the emissive factor")),
+            emissive_texture: self.texture(json.emissive_texture.as_ref())?,
+            double_sided: json.double_sided,
+            ..Material::default()
+        };
+        m.alpha_mode = match json.alpha_mode {
+            Checked::Valid(JsonAlphaMode::Mask) => {
+                AlphaMode::Mask(self.positive(json.alpha_cutoff.unwrap_or_default().0, "the alpha cutoff"))
+            }
+            Checked::Valid(JsonAlphaMode::Blend) => AlphaMode::Blend,
+            _ => AlphaMode::Opaque,
+        };
+        if let Some(normal) = &json.normal_texture {
+            m.normal_texture = self.normal_texture(normal)?;
+            m.normal_scale = normal.scale;
+        }
+        if let Some(occlusion) = &json.occlusion_texture {
+            let transform = occlusion.extensions.as_ref().map(|e| parse(&e.others, "KHR_texture_transform"));
+            let transform: Option<TextureTransform> = transform.transpose()?.flatten();
+            m.occlusion_texture = self.reference(occlusion.index.value(), occlusion.tex_coord, transform.as_ref())?;
+            m.occlusion_strength = self.unit(occlusion.strength.0, "the occlusion strength");
+        }
+        if let Some(extensions) = &json.extensions {
+            self.extensions(&mut m, extensions)?;
+        }
+        let file_ior = json.extensions.as_ref().and_then(|e| e.ior.as_ref()).map(|ior| ior.ior.0);
+        for warning in gltf_extras::apply(&json.extras, file_ior, &mut m)? {
+            self.warn(&warning);
+        }
+        if m.ior < 1.0 {
+            self.warn(&format!("the index of refraction {} is below 1, that of a vacuum", m.ior));
+        }
+        Ok(m)
+    }
+
+    fn extensions(&mut self, m: &mut Material, json: &json::extensions::material::Material) -> Result<()> {
+        m.unlit = json.unlit.is_some();
+        if let Some(strength) = &json.emissive_strength {
+            let strength = self.positive(strength.emissive_strength.0, "the emissive strength");
+            m.emissive = m.emissive.map(|e| (e * strength).min(f32::MAX));
+        }
+        if let Some(specular) = &json.specular {
+            m.specular = self.unit(specular.specular_factor.0, "the specular factor");
+            m.specular_texture = self.texture(specular.specular_texture.as_ref())?;
+            m.specular_color = specular.specular_color_factor.0.map(|x| self.positive(x, "the specular colour"));
+            m.specular_color_texture = self.texture(specular.specular_color_texture.as_ref())?;
+            if m.specular_color_texture.is_some() {
+                self.warn("the specular colour texture is not drawn; its factor is");
+            }
+        }
+        if let Some(transmission) = &json.transmission {
+            m.transmission = self.unit(transmission.transmission_factor.0, "the transmission factor");
+            m.transmission_texture = self.texture(transmission.transmission_texture.as_ref())?;
+        }
+        if let Some(ior) = &json.ior {
+            m.ior = self.ior(ior.ior.0, m.transmission)?;
+        }
+        if let Some(volume) = &json.volume {
+            m.thickness = self.positive(volume.thickness_factor.0, "the thickness");
+            m.thickness_texture = self.texture(volume.thickness_texture.as_ref())?;
+            m.attenuation_distance = volume.attenuation_distance.0;
+            if m.attenuation_distance <= 0.0 {
+                self.warn("the attenuation distance is not positive; the medium is read as clear");
+                m.attenuation_distance = f32::INFINITY;
+            }
+            m.attenuation_color = volume.attenuation_color.0.map(|x| self.unit(x, "the attenuation colour"));
+        }
+        if let Some(coat) = parse::<Clearcoat>(&json.others, "KHR_materials_clearcoat")? {
+            m.clearcoat = self.unit(coat.clearcoat_factor, "the clear-coat factor");
+            m.clearcoat_texture = self.texture(coat.clearcoat_texture.as_ref())?;
+            m.clearcoat_roughness = self.unit(coat.clearcoat_roughness_factor, "the clear-coat roughness");
+            m.clearcoat_roughness_texture = self.texture(coat.clearcoat_roughness_texture.as_ref())?;
+            if let Some(normal) = &coat.clearcoat_normal_texture {
+                m.clearcoat_normal_texture = self.normal_texture(normal)?;
+                if normal.scale != 1.0 {
+                    self.warn("the scale of the clear-coat normal texture is ignored");
+                }
+            }
+        }
+        for (lobe, of) in LOBES.iter().zip(&mut m.lobes) {
+            if let Some(value) = json.others.get(lobe.extension) {
+                *of = self.lobe(lobe, value).with_context(|| format!("the extension {}", lobe.extension))?;
+            }
+        }
+        if let Some(dispersion) = parse::<Dispersion>(&json.others, "KHR_materials_dispersion")? {
+            let abbe = f64::from(self.positive(dispersion.dispersion, "the dispersion"));
+            m.dispersion = if abbe > 0.0 { spectra::Dispersion::Abbe(abbe) } else { spectra::Dispersion::None };
+        }
+        Ok(())
+    }
+
+    fn lobe(&mut self, lobe: &Lobe, said: &Value) -> Result<LobeOf> {
+        let mut of = LobeOf::default();
+        let mut factors = of.factors.iter_mut();
+        for &(name, count) in lobe.factors {
+            let numbers: Vec<f32> = match said.get(name) {
+                None => vec![0.0; count],
+                Some(value) if count == 1 => vec![f32::deserialize(value).context(name)?],
+                Some(value) => Vec::deserialize(value).context(name)?,
+            };
+            ensure!(numbers.len() == count, "{name} has {} numbers, not {count}", numbers.len());
+            for (number, factor) in numbers.into_iter().zip(factors.by_ref()) {
+                *factor = self.unit(number, name);
+            }
+        }
+        for (texture, &(name, ..)) in of.textures.iter_mut().zip(lobe.textures) {
+            let info = said.get(name).map(|value| json::texture::Info::deserialize(value).context(name));
+            *texture = self.texture(info.transpose()?.as_ref())?;
+        }
+        Ok(of)
+    }
+
+    /// KHR_materials_ior allows 0 ("infinite": a perfect reflector) and everything from 1 on. A medium may have less
+    /// than 1, too; no light gets into one of 0.
+    fn ior(&mut self, ior: f32, transmission: f32) -> Result<f32> {
+        ensure!(
+            ior > 0.0 || transmission == 0.0,
+            "n = {ior} in KHR_materials_ior: light that is transmitted ({transmission}) needs an index above 0"
+        );
+        if ior == 0.0 {
+            self.warn(&format!("the index of refraction 0 means infinite and is read as {INFINITE_IOR:e}"));
+            return Ok(INFINITE_IOR);
+        }
+        let possible = if ior > 0.0 { ior.min(INFINITE_IOR) } else { 1.0 };
+        if possible != ior {
+            self.warn(&format!("the index of refraction {ior} is not possible and is read as {possible}"));
+        }
+        Ok(possible)
+    }
+
+    fn texture(&mut self, info: Option<&json::texture::Info>) -> Result<Option<TextureRef>> {
+        let Some(info) = info else { return Ok(None) };
+        let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
+        self.reference(info.index.value(), info.tex_coord, transform)
+    }
+
+    fn normal_texture(&mut self, normal: &json::material::NormalTexture) -> Result<Option<TextureRef>> {
+        let transform = normal.extensions.as_ref().map(|e| parse(&e.others, "KHR_texture_transform"));
+        let transform: Option<TextureTransform> = transform.transpose()?.flatten();
+        self.reference(normal.index.value(), normal.tex_coord, transform.as_ref())
+    }
+
+    fn reference(
+        &mut self,
+        texture: usize,
+        tex_coord: u32,
+        transform: Option<&TextureTransform>,
+    ) -> Result<Option<TextureRef>> {
+        let root = &self.document.root;
+        let json = root
+            .textures
+            .get(texture)
+            .with_context(|| format!("texture {texture} does not exist; the file has {}", root.textures.len()))?;
+        let webp = json.extensions.as_ref().map(|e| parse::<Webp>(&e.others, "EXT_texture_webp"));
+        let source = match webp.transpose()?.flatten() {
+            Some(webp) => webp.source,
+            // The crate's stand-in for a texture without a source.
+            None if json.source.value() == u32::MAX as usize => {
+                self.warn(&format!("texture {texture} has no picture that can be read, and is left out"));
+                return Ok(None);
+            }
+            None => json.source.value(),
+        };
+        let slot = self.image_slots.get_mut(source);
+        let count = root.images.len();
+        let slot = slot.with_context(|| format!("texture {texture} names image {source}, but the file has {count}"))?;
+        let image = *slot.get_or_insert_with(|| {
+            self.used_images.push(source);
+            self.used_images.len() - 1
+        });
+        let mut uv_set = transform.and_then(|t| t.tex_coord).unwrap_or(tex_coord);
+        if uv_set > 1 {
+            self.warn(&format!(
+                "texture {texture} uses texture-coordinate set {uv_set}; only 0 and 1 are read, 0 is taken"
+            ));
+            uv_set = 0;
+        }
+        let uv_transform = transform.map_or(Affine2::IDENTITY, |t| {
+            // v points down, so a counter-clockwise turn of the coordinates is a negative angle.
+            Affine2::from_scale_angle_translation(Vec2::from(t.scale.0), -t.rotation.0, Vec2::from(t.offset.0))
+        });
+        ensure!(uv_transform.is_finite(), "the transform of texture {texture} is not finite");
+        let sampler = json.sampler.and_then(|s| root.samplers.get(s.value())).map_or_else(Sampler::default, sampler);
+        Ok(Some(TextureRef { image, uv_set, uv_transform, sampler }))
+    }
+}
+
+fn wrap(mode: &Checked<WrappingMode>) -> Wrap {
+    match mode {
+        Checked::Valid(WrappingMode::ClampToEdge) => Wrap::Clamp,
+        Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::Mirror,
+        _ => Wrap::Repeat,
+    }
+}
+
+/// Only filters that ask for nearest texels are obeyed; the others get the best there is.
+fn sampler(json: &json::texture::Sampler) -> Sampler {
+    let min = json.min_filter.and_then(|f| if let Checked::Valid(f) = f { Some(f) } else { None });
+    Sampler {
+        wrap_u: wrap(&json.wrap_s),
+        wrap_v: wrap(&json.wrap_t),
+        mag_nearest: matches!(json.mag_filter, Some(Checked::Valid(MagFilter::Nearest))),
+        min_nearest: matches!(
+            min,
+            Some(MinFilter::Nearest | MinFilter::NearestMipmapNearest | MinFilter::NearestMipmapLinear)
+        ),
+        mips: min != Some(MinFilter::Nearest),
+    }
+}

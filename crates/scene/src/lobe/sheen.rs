@@ -1,0 +1,119 @@
+//! Sheen (KHR_materials_sheen): cloth, whose fibres stand off the surface and glow at its edges. Estevez and Kulla, "Production friendly
+//! microfacet sheen BRDF", 2017. The twin of shaders/lib/sheen.glsl, and the table that it reads.
+
+use std::f64::consts::{PI, TAU};
+
+use super::Lobe;
+use crate::Meaning::{Color, Data};
+
+/// Perceptual roughness below which sheen grows no sharper: `LEAST_SHEEN_ROUGHNESS` of the shaders.
+pub const LEAST_ROUGHNESS: f32 = 0.07;
+
+/// KHR_materials_sheen.
+pub static SHEEN: Lobe = Lobe {
+    name: "sheen",
+    extension: "KHR_materials_sheen",
+    factors: &[("sheenColorFactor", 3), ("sheenRoughnessFactor", 1)],
+    textures: &[("sheenColorTexture", "sheen_color", Color), ("sheenRoughnessTexture", "sheen_roughness", Data)],
+    scatters: true,
+    albedo: Some(table_row),
+};
+
+/// The lobe of a white sheen for two directions, D V, by their cosines and that of the half vector with the normal.
+#[must_use]
+pub fn sheen(cos_l: f64, cos_v: f64, cos_h: f64, roughness: f64) -> f64 {
+    let alpha = roughness.max(f64::from(LEAST_ROUGHNESS)).powi(2);
+    let sin_h = (1.0 - cos_h * cos_h).max(0.0).sqrt();
+    let d = (2.0 + alpha.recip()) * sin_h.powf(alpha.recip()) / TAU;
+    d / ((1.0 + lambda(cos_l, alpha) + lambda(cos_v, alpha)) * 4.0 * cos_l * cos_v)
+}
+
+fn lambda(cos: f64, alpha: f64) -> f64 {
+    let t = (1.0 - alpha).powi(2);
+    let between = |soft: f64, sharp: f64| t * sharp + (1.0 - t) * soft;
+    let (a, b) = (between(21.5473, 25.3245), between(3.82987, 3.32435));
+    let (c, d, e) = (between(0.19823, 0.16801), between(-1.97760, -1.27393), between(-4.32054, -4.85967));
+    let l = |x: f64| a / (1.0 + b * x.powf(c)) + d * x + e;
+    if cos < 0.5 { l(cos).exp() } else { (2.0 * l(0.5) - l(1.0 - cos)).exp() }
+}
+
+/// E, the directional albedo of a white sheen, within 5e-4 of itself.
+#[must_use]
+pub fn albedo(cos_v: f64, roughness: f64) -> f64 {
+    const ELEVATIONS: u32 = 128;
+    const AZIMUTHS: u32 = 32;
+    let sin_v = (1.0 - cos_v * cos_v).max(0.0).sqrt();
+    let mut sum = 0.0;
+    for i in 0..ELEVATIONS {
+        // The square of even steps: they are small at the horizon, where most of it lies.
+        let x = (f64::from(i) + 0.5) / f64::from(ELEVATIONS);
+        let cos_l = x * x;
+        let sin_l = (1.0 - cos_l * cos_l).sqrt();
+        for k in 0..AZIMUTHS {
+            // One half of the turn is as the other.
+            let azimuth = (f64::from(k) + 0.5) / f64::from(AZIMUTHS) * PI;
+            let cos_between = cos_l * cos_v + sin_l * sin_v * azimuth.cos();
+            let cos_h = ((cos_l + cos_v) / (2.0 + 2.0 * cos_between).sqrt()).min(1.0);
+            sum += sheen(cos_l, cos_v, cos_h, roughness) * cos_l * 2.0 * x;
+        }
+    }
+    sum * TAU / f64::from(ELEVATIONS * AZIMUTHS)
+}
+
+/// E, and the part of light from all around that comes in lower, each by its own E but at most 1: ∫ 2x E(x) dx from 0 to cosθ. Over the
+/// root of the cosine, u: x = u², 2x dx = 4u³ du.
+fn table_row(roughness: f64, side: usize) -> Vec<[f64; 2]> {
+    let step = 1.0 / (side - 1) as f64;
+    let of_all = |u: f64, e: f64| 4.0 * u.powi(3) * e.min(1.0);
+    let (mut below, mut before) = (0.0, 0.0);
+    let mut row = Vec::with_capacity(side);
+    for i in 0..side {
+        let u = i as f64 * step;
+        let e = albedo((u * u).max(1e-8), roughness);
+        let here = of_all(u, e);
+        // The trapezoid rule; the first piece is 0 to its third power.
+        below += 0.5 * (before + here) * if i == 0 { 0.0 } else { step };
+        before = here;
+        row.push([e, below]);
+    }
+    row
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// E is the mean over directions of the lobe, here by another rule and ten times as many of them.
+    #[test]
+    fn the_albedo_is_that_of_the_lobe() {
+        for (cos_v, roughness) in [(0.02, 0.3), (0.3, 0.5), (0.7, 0.8), (1.0, 1.0), (0.1, 0.15)] {
+            let (rows, columns) = (400, 400);
+            let sin_v = f64::sqrt(1.0 - cos_v * cos_v);
+            let mut sum = 0.0;
+            for i in 0..rows {
+                let theta = (f64::from(i) + 0.5) / f64::from(rows) * 0.5 * PI;
+                for k in 0..columns {
+                    let azimuth = (f64::from(k) + 0.5) / f64::from(columns) * TAU;
+                    let (sin_l, cos_l) = theta.sin_cos();
+                    let cos_between = cos_l * cos_v + sin_l * sin_v * azimuth.cos();
+                    let cos_h = ((cos_l + cos_v) / (2.0 + 2.0 * cos_between).sqrt()).min(1.0);
+                    sum += sheen(cos_l, cos_v, cos_h, roughness) * cos_l * sin_l;
+                }
+            }
+            let mean = sum * 0.5 * PI / f64::from(rows) * TAU / f64::from(columns);
+            let error = albedo(cos_v, roughness) / mean - 1.0;
+            assert!(error.abs() < 1e-3, "{cos_v}, {roughness}: {error}");
+        }
+    }
+
+    #[test]
+    fn the_moment_of_the_table_is_that_of_finer_steps() {
+        for roughness in [0.1, 0.4, 1.0] {
+            let (coarse, fine) = (table_row(roughness, 32), table_row(roughness, 311));
+            for i in 0..32 {
+                let error = coarse[i][1] - fine[10 * i][1];
+                assert!(error.abs() < 1e-3, "{roughness}, {i}: {error}");
+            }
+        }
+    }
+}

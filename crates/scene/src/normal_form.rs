@@ -1,0 +1,165 @@
+//! The same scene said more simply: what texels and vertices make of the factors of its materials. Nothing that is seen
+//! changes, but that what covers wholly is opaque in every respect: it casts shadows in maps, and bends what it transmits.
+
+use super::material::TextureRef;
+use super::{AlphaMode, Image, Material, Mesh, Scene, Shared};
+
+/// What turned out to be simpler than it was written, by names.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct NormalForm {
+    /// Textures that are black in the channels that multiply a factor: "emission of \"lamp\"".
+    pub black: Vec<String>,
+    /// Materials that blend or have holes, and an alpha of 1 everywhere: read as opaque.
+    pub opaque: Vec<String>,
+    /// Meshes of which alpha leaves nothing.
+    pub unseen: Vec<String>,
+}
+
+/// Brings a scene to that form.
+pub fn normalise(scene: &mut Scene) -> NormalForm {
+    let mut form = NormalForm::default();
+    let Scene { materials, meshes, images, .. } = scene;
+    for mesh in meshes.iter_mut().filter(|mesh| mesh.colors.iter().all(|color| *color == [1.0; 4])) {
+        mesh.colors = Shared::default();
+    }
+    for (index, material) in materials.iter_mut().enumerate() {
+        form.black
+            .extend(settle_black(material, images).into_iter().map(|of| format!("{of} of \"{}\"", material.name)));
+        settle_alpha(index, material, meshes, images, &mut form);
+    }
+    form
+}
+
+/// Sets to 0 each factor whose texture is black in the channels that multiply it, and forgets the texture where nothing else
+/// is read from it: 0 times the factor.
+fn settle_black(material: &mut Material, images: &[Image]) -> Vec<&'static str> {
+    // Found out at the first texel that is not black, which most textures have near their start.
+    let black = |texture: Option<TextureRef>, channels: &[usize]| {
+        texture.is_some_and(|texture| {
+            let mut texels = images[texture.image].rgba.as_chunks::<4>().0.iter();
+            texels.all(|texel| channels.iter().all(|&c| texel[c] == 0))
+        })
+    };
+    let mut found = Vec::new();
+    if black(material.emissive_texture, &[0, 1, 2]) {
+        material.emissive = [0.0; 3];
+        material.emissive_texture = None;
+        found.push("emission");
+    }
+    if black(material.transmission_texture, &[0]) {
+        material.transmission = 0.0;
+        material.transmission_texture = None;
+        found.push("transmission");
+    }
+    if black(material.clearcoat_texture, &[0]) {
+        material.clearcoat = 0.0;
+        material.clearcoat_texture = None;
+        found.push("clear coat");
+    }
+    // Roughness is in the same texture.
+    if black(material.metallic_roughness_texture, &[2]) && material.metallic > 0.0 {
+        material.metallic = 0.0;
+        found.push("metal");
+    }
+    found
+}
+
+/// Alpha that is 1 everywhere covers; alpha that is nowhere above the cutoff, or 0 where it blends, leaves nothing.
+fn settle_alpha(index: usize, material: &mut Material, meshes: &mut [Mesh], images: &[Image], form: &mut NormalForm) {
+    if material.alpha_mode == AlphaMode::Opaque {
+        return;
+    }
+    let [texels_least, texels_most] = material.base_color_texture.map_or([1.0; 2], |texture| {
+        let alphas = images[texture.image].rgba.as_chunks::<4>().0.iter().map(|texel| texel[3]);
+        alphas
+            .fold([1.0_f32, 0.0], |[least, most], a| [least.min(f32::from(a) / 255.0), most.max(f32::from(a) / 255.0)])
+    });
+    let (mut covers, mut used) = (true, false);
+    for mesh in meshes.iter_mut().filter(|mesh| mesh.material == index && !mesh.indices.is_empty()) {
+        used = true;
+        let of_vertices = |first: f32, pick: fn(f32, f32) -> f32| {
+            mesh.colors.iter().map(|color| color[3]).reduce(pick).unwrap_or(first)
+        };
+        let least = material.base_color[3] * of_vertices(1.0, f32::min);
+        let most = material.base_color[3] * texels_most * of_vertices(1.0, f32::max);
+        let (whole, nothing) = match material.alpha_mode {
+            // Filtering may lower what is not 1 by a rounding.
+            AlphaMode::Mask(cutoff) => (texels_least == 1.0 && least > cutoff, most < cutoff),
+            _ => (texels_least == 1.0 && least >= 1.0, most <= 0.0),
+        };
+        covers &= whole;
+        if nothing {
+            form.unseen.push(mesh.name.clone());
+            *mesh = Mesh { name: std::mem::take(&mut mesh.name), material: index, ..Mesh::default() };
+        }
+    }
+    // What no mesh has is not called anything, and does not weigh the texels that it shares.
+    if covers {
+        material.alpha_mode = AlphaMode::Opaque;
+        form.opaque.extend(used.then(|| material.name.clone()));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Sampler;
+
+    fn scene(alpha_mode: AlphaMode, alpha: f32, texels: Option<u8>, vertices: &[f32]) -> Scene {
+        let texture =
+            TextureRef { image: 0, uv_set: 0, uv_transform: glam::Affine2::IDENTITY, sampler: Sampler::default() };
+        let image =
+            |alpha| Image { name: String::new(), width: 2, height: 1, rgba: vec![9, 9, 9, alpha, 9, 9, 9, 255].into() };
+        Scene {
+            materials: vec![Material {
+                alpha_mode,
+                base_color: [1.0, 1.0, 1.0, alpha],
+                base_color_texture: texels.map(|_| texture),
+                ..Material::default()
+            }],
+            meshes: vec![Mesh {
+                positions: vec![[0.0; 3]; 3].into(),
+                indices: vec![0, 1, 2].into(),
+                colors: vertices.iter().map(|&a| [1.0, 1.0, 1.0, a]).collect(),
+                ..Mesh::default()
+            }],
+            images: texels.map(image).into_iter().collect(),
+            ..Scene::default()
+        }
+    }
+
+    #[test]
+    fn alpha_is_read_by_its_values() {
+        use AlphaMode::{Blend, Mask, Opaque};
+        // Mode, factor, one of two texels, vertices: what it becomes, and whether anything is left.
+        type Case = (AlphaMode, f32, Option<u8>, &'static [f32], AlphaMode, bool);
+        let cases: [Case; 15] = [
+            (Blend, 1.0, None, &[], Opaque, true),
+            (Blend, 1.0, Some(255), &[], Opaque, true),
+            (Blend, 1.0, Some(255), &[1.0, 1.0, 1.0], Opaque, true),
+            (Blend, 1.0, Some(254), &[], Blend, true),
+            (Blend, 0.99, Some(255), &[], Blend, true),
+            (Blend, 1.0, None, &[1.0, 0.5, 1.0], Blend, true),
+            (Blend, 0.0, Some(255), &[], Blend, false),
+            (Blend, 1.0, None, &[0.0, 0.0, 0.0], Blend, false),
+            (Blend, 1.0, None, &[0.0, 0.0, 0.1], Blend, true),
+            (Mask(0.5), 1.0, None, &[], Opaque, true),
+            (Mask(0.5), 0.6, Some(255), &[], Opaque, true),
+            (Mask(0.5), 0.4, Some(255), &[], Mask(0.5), false),
+            (Mask(0.5), 1.0, Some(0), &[], Mask(0.5), true),
+            (Mask(0.5), 0.5, None, &[], Mask(0.5), true),
+            (Mask(1.5), 1.0, None, &[1.0, 1.0, 1.0], Mask(1.5), false),
+        ];
+        for (i, (mode, factor, texels, vertices, becomes, left)) in cases.into_iter().enumerate() {
+            let mut scene = scene(mode, factor, texels, vertices);
+            let form = normalise(&mut scene);
+            assert_eq!(scene.materials[0].alpha_mode, becomes, "case {i}");
+            assert_eq!(!scene.meshes[0].indices.is_empty(), left, "case {i}");
+            assert_eq!(
+                (form.opaque.len(), form.unseen.len()),
+                (usize::from(becomes == Opaque), usize::from(!left)),
+                "case {i}"
+            );
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! Puts a study scene together; the only place that knows how the types of [`crate`] are filled.
+
+use glam::{Affine2, DAffine3, DMat3, DVec3};
+
+use super::shape::Shape;
+use crate::substance::{Medium, Metal};
+use crate::{
+    Camera, Image, Instance, Light, LightKind, Material, Mesh, Projection, Sampler, Scene, Shared, TextureRef,
+};
+
+/// A scene in the making.
+pub(super) struct Builder {
+    scene: Scene,
+}
+
+impl Builder {
+    /// An empty scene called `study:NAME`.
+    pub(super) fn new(name: &str) -> Self {
+        Self { scene: Scene { name: format!("study:{name}"), ..Scene::default() } }
+    }
+
+    pub(super) fn material(&mut self, material: Material) -> usize {
+        self.scene.materials.push(material);
+        self.scene.materials.len() - 1
+    }
+
+    /// A square picture whose texels are linear colours, stored with the sRGB curve.
+    pub(super) fn picture(&mut self, name: &str, size: u32, texel: impl Fn(u32, u32) -> [f64; 4]) -> TextureRef {
+        let mut rgba = Vec::with_capacity((size * size * 4) as usize);
+        for y in 0..size {
+            for x in 0..size {
+                let [r, g, b, a] = texel(x, y);
+                rgba.extend([r, g, b].map(srgb8));
+                rgba.push((a * 255.0).round() as u8);
+            }
+        }
+        self.scene.images.push(Image { name: name.to_owned(), width: size, height: size, rgba: rgba.into() });
+        TextureRef {
+            image: self.scene.images.len() - 1,
+            uv_set: 0,
+            uv_transform: Affine2::IDENTITY,
+            sampler: Sampler::default(),
+        }
+    }
+
+    /// A checker of two linear greys, eight squares across one repeat.
+    pub(super) fn checker(&mut self, name: &str, dark: [f64; 3], light: [f64; 3]) -> TextureRef {
+        self.picture(name, 256, |x, y| {
+            let [r, g, b] = if (x / 32 + y / 32) % 2 == 0 { dark } else { light };
+            [r, g, b, 1.0]
+        })
+    }
+
+    pub(super) fn mesh(&mut self, name: &str, shape: Shape, material: usize) -> usize {
+        self.scene.meshes.push(Mesh {
+            name: name.to_owned(),
+            positions: shape.positions.into(),
+            normals: shape.normals.into(),
+            uvs: [shape.uvs.into(), Shared::default()],
+            indices: shape.indices.into(),
+            material,
+            ..Mesh::default()
+        });
+        self.scene.meshes.len() - 1
+    }
+
+    pub(super) fn place(&mut self, name: &str, mesh: usize, world_from_object: DAffine3) {
+        self.scene.instances.push(Instance { name: name.to_owned(), mesh, world_from_object });
+    }
+
+    /// A mesh that is drawn once, under its own name.
+    pub(super) fn add(&mut self, name: &str, shape: Shape, material: usize, world_from_object: DAffine3) {
+        let mesh = self.mesh(name, shape, material);
+        self.place(name, mesh, world_from_object);
+    }
+
+    pub(super) fn light(&mut self, name: &str, color: [f32; 3], kind: LightKind) {
+        self.shine(Light { name: name.to_owned(), color, spectrum: None, extent: None, kind, stand_in: false });
+    }
+
+    /// A light with everything about it.
+    pub(super) fn shine(&mut self, light: Light) {
+        self.scene.lights.push(light);
+    }
+
+    /// A light that stands for an emitting surface where such surfaces light nothing.
+    pub(super) fn stand_in(&mut self, name: &str, color: [f32; 3], kind: LightKind) {
+        self.shine(Light { name: name.to_owned(), color, spectrum: None, extent: None, kind, stand_in: true });
+    }
+
+    /// A pinhole camera with a vertical field of view in degrees; the near distance is left to the renderer.
+    pub(super) fn camera(&mut self, name: &str, eye: DVec3, target: DVec3, fov_y_degrees: f64) {
+        self.scene.cameras.push(Camera {
+            name: name.to_owned(),
+            world_from_camera: facing(eye, eye - target),
+            projection: Projection::Perspective { fov_y: fov_y_degrees.to_radians(), near: None },
+        });
+    }
+
+    /// Adds the built-in studio to the scene's own lights, for surfaces that need something to mirror.
+    pub(super) fn studio(&mut self, intensity: f32) {
+        self.scene.studio = Some(intensity);
+    }
+
+    pub(super) fn finish(self) -> Scene {
+        self.scene
+    }
+}
+
+/// A frame at `position` whose +Z points along `forward`, with +Y as high as it can be; straight up and down take
+/// −Z of the world as their up.
+pub(super) fn facing(position: DVec3, forward: DVec3) -> DAffine3 {
+    let z = forward.normalize();
+    let up = if z.y.abs() > 0.999_999 { DVec3::NEG_Z } else { DVec3::Y };
+    let x = up.cross(z).normalize();
+    DAffine3::from_mat3_translation(DMat3::from_cols(x, z.cross(x), z), position)
+}
+
+/// A frame at `(x, y, z)` turned about +Y by an angle in degrees.
+pub(super) fn at(x: f64, y: f64, z: f64, turn_degrees: f64) -> DAffine3 {
+    DAffine3::from_translation(DVec3::new(x, y, z)) * DAffine3::from_rotation_y(turn_degrees.to_radians())
+}
+
+/// A rough or smooth non-metal of one colour.
+pub(super) fn dielectric(name: &str, color: [f32; 3], roughness: f32) -> Material {
+    let [r, g, b] = color;
+    Material { name: name.to_owned(), base_color: [r, g, b, 1.0], metallic: 0.0, roughness, ..Material::default() }
+}
+
+/// A metal whose reflectance at normal incidence is `f0`.
+pub(super) fn metal(name: &str, f0: [f32; 3], roughness: f32) -> Material {
+    Material { metallic: 1.0, ..dielectric(name, f0, roughness) }
+}
+
+/// A metal of known complex index.
+pub(super) fn conductor(name: &str, known: Metal, roughness: f32) -> Material {
+    Material {
+        conductor: Some(known.index()),
+        conductor_spectra: known.spectra(),
+        ..metal(name, known.f0(), roughness)
+    }
+}
+
+/// A smooth non-metal of a known medium.
+pub(super) fn medium(name: &str, known: Medium) -> Material {
+    Material { ior: known.n as f32, dispersion: known.dispersion, ..dielectric(name, [1.0; 3], 0.0) }
+}
+
+/// A clear body of index `ior`. Its true surfaces bound it, so any thickness above zero says "a volume".
+pub(super) fn glass(name: &str, ior: f32, thickness: f32) -> Material {
+    Material { transmission: 1.0, ior, thickness, ..dielectric(name, [1.0; 3], 0.0) }
+}
+
+/// A surface that emits and reflects nothing.
+pub(super) fn emitter(name: &str, radiance: [f32; 3]) -> Material {
+    Material { emissive: radiance, specular: 0.0, ..dielectric(name, [0.0; 3], 1.0) }
+}
+
+/// A linear value as an sRGB byte (IEC 61966-2-1).
+fn srgb8(linear: f64) -> u8 {
+    let v = linear.clamp(0.0, 1.0);
+    let encoded = if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+    (encoded * 255.0).round() as u8
+}

@@ -1,0 +1,154 @@
+//! A scene in one band of wavelengths: the same materials and lights, whose colours are numbers and whose light is X, Y, Z
+//! (lecture C3; docs/decisions/spectra.md).
+
+use super::lobe::{self, LOBES};
+use super::{Light, Material, Scene};
+use etalon_optics::spectra::{Band, Spectrum, Upsampling, light_from_rgb};
+
+/// What the materials of a scene are by wavelength.
+pub struct Wavelengths {
+    curves: Vec<Curves>,
+    /// Some base varies over its surface.
+    pub vary: bool,
+}
+
+/// Of one material.
+struct Curves {
+    /// `None`: it is found for the colour of each place.
+    base: Option<Spectrum>,
+    /// What texels and vertices say multiplies the base.
+    varies: bool,
+    /// Of at most 1, and what it is multiplied by.
+    specular: (Spectrum, f32),
+    /// What is left after the attenuation distance.
+    attenuation: Spectrum,
+    /// n and κ.
+    metal: Option<[Spectrum; 2]>,
+    /// Colours of the lobes over the base.
+    lobes: [Option<Spectrum>; lobe::COUNT],
+}
+
+/// What a frame shows of the light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slice {
+    /// A band of the picture: what reflects is its mean over it.
+    pub band: Band,
+    /// All of the band, or a part of it that stands for all: light is that of the part, and so is what bends it.
+    pub part: Band,
+    /// X, Y, Z of light that is red, green, blue.
+    pub light_from_rgb: [[f64; 3]; 3],
+}
+
+impl Slice {
+    /// Of a part of a band.
+    #[must_use]
+    pub fn new(band: Band, part: Band) -> Self {
+        let mut slice = Self { band, part, light_from_rgb: light_from_rgb(&part) };
+        let weight = slice.weight();
+        slice.light_from_rgb.as_flattened_mut().iter_mut().for_each(|x| *x *= weight);
+        slice
+    }
+
+    /// How many of such parts the band has.
+    #[must_use]
+    pub fn weight(&self) -> f64 {
+        (self.band.to - self.band.from) / (self.part.to - self.part.from)
+    }
+
+    /// X, Y, Z of a light, in its own unit.
+    #[must_use]
+    pub fn light(&self, light: &Light) -> [f32; 3] {
+        let of_rgb = |k: usize| (0..3).map(|i| f64::from(light.color[i]) * self.light_from_rgb[i][k]).sum::<f64>();
+        let xyz = match &light.spectrum {
+            Some(emission) => emission.in_band(&self.part).map(|x| x * self.weight()),
+            None => [0, 1, 2].map(of_rgb),
+        };
+        xyz.map(|x| x as f32)
+    }
+}
+
+/// A material in a band, and what of it is still told as red, green and blue.
+pub struct Banded {
+    /// Numbers stand three times where colours stood.
+    pub material: Material,
+    /// `base_color` is: texels or vertices multiply it.
+    pub base_rgb: bool,
+    /// What texels or vertices say is, and `base_color` is a number.
+    pub varies_rgb: bool,
+    /// `emissive` is: as all light that has no spectrum of its own.
+    pub emissive_rgb: bool,
+}
+
+impl Wavelengths {
+    /// Fits what is told as colours.
+    #[must_use]
+    pub fn new(scene: &Scene, upsampling: Upsampling) -> Self {
+        let spectrum = |rgb: [f32; 3]| upsampling.reflectance(rgb.map(f64::from));
+        let mut coloured = vec![false; scene.materials.len()];
+        for mesh in scene.meshes.iter().filter(|mesh| !mesh.colors.is_empty()) {
+            coloured[mesh.material] = true;
+        }
+        let of = |(m, coloured): (&Material, bool)| {
+            let [r, g, b, _] = m.base_color;
+            let varies = m.base_color_texture.is_some() || coloured;
+            let told = m.reflectance.clone().or_else(|| m.conductor.map(|_| Spectrum::Constant(1.0)));
+            let found = || (!varies).then(|| spectrum([r, g, b]));
+            // F0 is multiplied by it before it is cut to 1.
+            let most = m.specular_color.iter().copied().fold(1.0, f32::max);
+            Curves {
+                base: if m.unlit { None } else { told.or_else(found) },
+                varies,
+                specular: (spectrum(m.specular_color.map(|c| c / most)), most),
+                attenuation: spectrum(m.attenuation_color),
+                lobes: std::array::from_fn(|i| LOBES[i].colour(&m.lobes[i]).map(spectrum)),
+                metal: m.conductor_spectra.clone().or_else(|| m.conductor.map(between_lamps)),
+            }
+        };
+        let curves: Vec<Curves> = scene.materials.iter().zip(coloured).map(of).collect();
+        let vary = scene.materials.iter().zip(&curves).any(|(m, curves)| curves.varies && !m.unlit);
+        Self { curves, vary }
+    }
+
+    /// Material `index` of the scene in a band.
+    #[must_use]
+    pub fn material(&self, index: usize, m: &Material, slice: &Slice) -> Banded {
+        let curves = &self.curves[index];
+        let band = &slice.band;
+        let mean = |spectrum: &Spectrum| band.mean(|nm| spectrum.at(nm)) as f32;
+        let mut material = Material {
+            specular_color: [mean(&curves.specular.0) * curves.specular.1; 3],
+            attenuation_color: [mean(&curves.attenuation); 3],
+            ior: m.dispersion.index(f64::from(m.ior), slice.part.middle()) as f32,
+            ..m.clone()
+        };
+        for (of, colour) in material.lobes.iter_mut().zip(&curves.lobes) {
+            if let Some(colour) = colour {
+                of.factors[..3].fill(mean(colour));
+            }
+        }
+        if let Some(base) = &curves.base {
+            let mean = mean(base);
+            material.base_color = [mean, mean, mean, m.base_color[3]];
+        }
+        if let Some([n, kappa]) = &curves.metal {
+            let [n, kappa] = [mean(n), mean(kappa)];
+            let f0 = ((n - 1.0).powi(2) + kappa * kappa) / ((n + 1.0).powi(2) + kappa * kappa);
+            material.conductor = Some([[n, kappa]; 3]);
+            material.base_color = [f0, f0, f0, m.base_color[3]];
+        }
+        if let Some(emission) = &m.emission {
+            material.emissive = emission.in_band(&slice.part).map(|part| (part * slice.weight()) as f32);
+        }
+        let (told, varies) = (curves.base.is_some(), curves.varies);
+        Banded { material, base_rgb: !told, varies_rgb: told && varies, emissive_rgb: m.emission.is_none() }
+    }
+}
+
+/// n and κ that are told at the three lamps of lecture C1, red first: linear between.
+fn between_lamps(index: [[f32; 2]; 3]) -> [Spectrum; 2] {
+    const LAMPS: [f64; 3] = [645.16, 526.32, 444.44];
+    [0, 1].map(|part| {
+        let row = |lamp: usize| [LAMPS[lamp], f64::from(index[lamp][part])];
+        Spectrum::Table([row(2), row(1), row(0)].into())
+    })
+}

@@ -1,0 +1,146 @@
+//! A device under validation, and the short ways to a picture that the tests share.
+//!
+//! Core and synchronization validation are on; an error message fails the test that owns the [`Gpu`] when it ends.
+
+use std::sync::{Arc, Once, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+
+use etalon::frame::{Rendered, Renderer, Settings};
+use etalon::gpu::{Device, DeviceChoice, Severity};
+use etalon::image::Picture;
+use etalon::pass::view::View;
+use etalon::plan::{Knobs, Model};
+use etalon::scene::environment::Environment;
+use etalon::scene::{Camera, Scene};
+use etalon::share::AovPixel;
+
+/// The software device with validation on, which tests of one program share (`crates/vulkan/src/validated.rs`).
+pub struct Gpu {
+    /// The device.
+    pub device: Arc<Device>,
+    /// The test looks for errors itself.
+    pub expects_errors: bool,
+    /// Held to the end.
+    _place: Place,
+}
+
+enum Place {
+    Shared { _guard: RwLockReadGuard<'static, ()> },
+    Own { _guard: RwLockWriteGuard<'static, ()> },
+}
+
+static PLACES: RwLock<()> = RwLock::new(());
+
+impl Gpu {
+    /// Opens it; a machine without it fails the test.
+    pub fn open() -> Self {
+        let place = Place::Shared { _guard: PLACES.read().unwrap_or_else(PoisonError::into_inner) };
+        Self::opened(place, Device::open)
+    }
+
+    /// The same while no other test of this program has it: for tests that count what is made, or that expect errors.
+    pub fn alone() -> Self {
+        let place = Place::Own { _guard: PLACES.write().unwrap_or_else(PoisonError::into_inner) };
+        Self::opened(place, Device::open)
+    }
+
+    /// The same for programs that make hundreds of pipelines for a few pixels each: lavapipe compiles them without LLVM's
+    /// optimisations, to the same bits (`study:etalon` and `study:cornell` along paths were compared) in 0.6 of the time.
+    pub fn hasty() -> Self {
+        in_haste();
+        Self::open()
+    }
+
+    /// The same as [`Gpu::hasty`], on a device that takes turns as beside a window.
+    pub fn taking_turns() -> Self {
+        in_haste();
+        let place = Place::Own { _guard: PLACES.write().unwrap_or_else(PoisonError::into_inner) };
+        Self::opened(place, Device::open_taking_turns)
+    }
+
+    fn opened(place: Place, open: impl FnOnce(&DeviceChoice, bool) -> anyhow::Result<Arc<Device>>) -> Self {
+        match open(&DeviceChoice::Cpu, true) {
+            Ok(device) => Self { device, expects_errors: false, _place: place },
+            Err(error) => panic!("these tests need lavapipe and the Khronos validation layer: {error:#}"),
+        }
+    }
+
+    /// What validation calls errors, so far.
+    pub fn errors(&self) -> Vec<String> {
+        let messages = self.device.messages();
+        messages.into_iter().filter(|m| m.severity == Severity::Error).map(|m| m.text).collect()
+    }
+
+    /// A renderer of a scene.
+    pub fn renderer(&self, scene: &Scene, environment: Option<&Environment>, settings: Settings) -> Renderer {
+        Renderer::new(&self.device, scene.clone(), environment, settings).expect("a renderer")
+    }
+
+    /// The scene-linear picture from the scene's first camera, without an environment.
+    pub fn film(&self, scene: &Scene, settings: Settings) -> Picture {
+        self.shot(scene, None, settings).1
+    }
+
+    /// What is rendered, and the scene-linear picture, from the scene's first camera.
+    pub fn shot(&self, scene: &Scene, environment: Option<&Environment>, settings: Settings) -> (Rendered, Picture) {
+        let mut renderer = self.renderer(scene, environment, settings);
+        let rendered = renderer.render(&scene.cameras[0], &mut |_| ()).expect("a picture");
+        let film = renderer.film().expect("the film");
+        (rendered, film)
+    }
+
+    /// Picture, G-buffer and view of one renderer.
+    pub fn all(&self, scene: &Scene, camera: &Camera, settings: Settings) -> (Picture, Vec<AovPixel>, View) {
+        let mut renderer = self.renderer(scene, None, settings);
+        renderer.render(camera, &mut |_| ()).expect("a picture");
+        let film = renderer.film().expect("the film");
+        let (aovs, view) = renderer.aovs(camera).expect("the G-buffer");
+        (film, aovs, view)
+    }
+}
+
+impl Drop for Gpu {
+    fn drop(&mut self) {
+        // A second panic while one unwinds would hide the first.
+        if !std::thread::panicking() && !self.expects_errors {
+            let errors = self.errors();
+            assert!(errors.is_empty(), "validation: {}", errors.join("\n"));
+        }
+    }
+}
+
+#[allow(unsafe_code, reason = "the driver takes this setting from the environment alone")]
+fn in_haste() {
+    static SET: Once = Once::new();
+    SET.call_once(|| {
+        // SAFETY: every test of such a program begins here, and nothing has read the environment but Rust's own start.
+        unsafe { std::env::set_var("GALLIVM_PERF", "nopt") }
+    });
+}
+
+/// One sample per pixel, at the pixel centres, of a picture of `size`.
+pub fn settings(size: [u32; 2]) -> Settings {
+    Settings { size, knobs: knobs(&["samples=1"]), ..Settings::default() }
+}
+
+/// The local model without shadows, and with some other rungs.
+pub fn knobs(choices: &[&str]) -> Knobs {
+    let mut knobs = Knobs::of(Model::Local);
+    // What most tests compare with has no shadows.
+    knobs.set("shadows=off").expect("a rung");
+    for choice in choices {
+        knobs.set(choice).expect("a rung");
+    }
+    knobs
+}
+
+/// The bits of a picture.
+pub fn bits(picture: &Picture) -> Vec<[u32; 4]> {
+    picture.rgba.iter().map(|p| p.map(f32::to_bits)).collect()
+}
+
+/// Largest |a − b| / scale over the three colours of all pixels.
+pub fn largest_difference(a: &Picture, b: &Picture, scale: f64) -> f64 {
+    assert_eq!((a.width, a.height), (b.width, b.height));
+    let all = a.rgba.iter().flatten().zip(b.rgba.iter().flatten());
+    all.fold(0.0, |most, (a, b)| most.max((f64::from(*a) - f64::from(*b)).abs() / scale))
+}

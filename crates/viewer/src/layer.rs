@@ -1,0 +1,146 @@
+//! What the window may show in place of radiance: surfaces at the pixel centres, as colours.
+
+use glam::Vec3;
+
+use super::shared::Surfaces;
+use etalon::share::AovPixel;
+
+/// Something that is known of each pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Layer {
+    /// The picture.
+    Radiance,
+    /// Base colour.
+    Albedo,
+    /// Shading normal.
+    Normal,
+    /// The triangle's own.
+    GeometricNormal,
+    /// Distance from the eye.
+    Distance,
+    /// Perceptual roughness.
+    Roughness,
+    /// Metallic.
+    Metallic,
+    /// Which material.
+    Material,
+    /// Which instance.
+    Instance,
+    /// Emitted light.
+    Emissive,
+    /// Pixels with no number, or an infinite one.
+    NotFinite,
+}
+
+/// Every layer with its name.
+pub const LAYERS: [(Layer, &str); 11] = [
+    (Layer::Radiance, "radiance"),
+    (Layer::Albedo, "albedo"),
+    (Layer::Normal, "normal"),
+    (Layer::GeometricNormal, "geometric normal"),
+    (Layer::Distance, "distance"),
+    (Layer::Roughness, "roughness"),
+    (Layer::Metallic, "metallic"),
+    (Layer::Material, "material"),
+    (Layer::Instance, "instance"),
+    (Layer::Emissive, "emissive"),
+    (Layer::NotFinite, "NaN and infinity"),
+];
+
+fn encoded(color: Vec3) -> [u8; 4] {
+    let byte = |x: f32| etalon::image::tone::quantise(etalon::image::tone::srgb_encode(f64::from(x.clamp(0.0, 1.0))));
+    [byte(color.x), byte(color.y), byte(color.z), 255]
+}
+
+/// Numbers as colours that differ from their neighbours': hues apart by the golden section.
+fn of_number(number: u32) -> [u8; 4] {
+    let hue = (number as f32 * 0.618_034).fract() * 6.0;
+    let wave = |shift: f32| ((hue + shift).rem_euclid(6.0) - 3.0).abs().clamp(1.0, 2.0) - 1.0;
+    [wave(0.0), wave(2.0), wave(4.0), 1.0].map(|x| (55.0 + 200.0 * x) as u8)
+}
+
+/// Normals as colours: −1 to 1 becomes 0 to 255, as it is, without a curve.
+fn of_normal(n: [f32; 3]) -> [u8; 4] {
+    let [x, y, z] = n.map(|c| (c * 127.5 + 128.0).clamp(0.0, 255.0) as u8);
+    [x, y, z, 255]
+}
+
+const NOTHING: [u8; 4] = [24, 24, 26, 255];
+
+impl Layer {
+    /// RGBA8 of the layer; the picture itself is none of these.
+    #[must_use]
+    pub fn draw(self, surfaces: &Surfaces) -> Vec<u8> {
+        let farthest = surfaces.pixels.iter().map(|p| p.distance).fold(0.0, f32::max).max(1e-9);
+        let pixel = |(p, radiance): (&AovPixel, &[f32; 4])| {
+            if self == Self::NotFinite {
+                // What is a number is shown dim, so that one sees where one is.
+                let grey = (radiance[..3].iter().sum::<f32>() / 12.0).clamp(0.0, 0.25);
+                return match radiance {
+                    r if r.iter().any(|x| x.is_nan()) => [255, 0, 255, 255],
+                    r if r.iter().any(|x| x.is_infinite()) => [0, 255, 255, 255],
+                    _ => encoded(Vec3::splat(grey)),
+                };
+            }
+            if p.material == 0 {
+                return NOTHING;
+            }
+            match self {
+                Self::Radiance | Self::NotFinite => NOTHING,
+                Self::Albedo => encoded(p.albedo.into()),
+                Self::Normal => of_normal(p.normal),
+                Self::GeometricNormal => of_normal(p.geometric_normal),
+                Self::Distance => encoded(Vec3::splat(1.0 - p.distance / farthest)),
+                Self::Roughness => encoded(Vec3::splat(p.roughness)),
+                Self::Metallic => encoded(Vec3::splat(p.metallic)),
+                Self::Material => of_number(p.material),
+                Self::Instance => of_number(p.instance),
+                Self::Emissive => encoded(p.emissive.into()),
+            }
+        };
+        surfaces.pixels.iter().zip(surfaces.radiance[0].iter()).flat_map(pixel).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+
+    #[test]
+    fn what_is_no_number_stands_out() {
+        let pixel = AovPixel {
+            p_rel: [0.0; 3],
+            normal: [0.0, 0.0, 1.0],
+            geometric_normal: [0.0, 0.0, -1.0],
+            albedo: [1.0, 0.0, 0.5],
+            distance: 2.0,
+            roughness: 0.5,
+            metallic: 1.0,
+            emissive: [0.0; 3],
+            material: 1,
+            instance: 2,
+        };
+        let nothing = AovPixel { material: 0, ..pixel };
+        let surfaces = Surfaces {
+            pixels: Arc::new(vec![pixel, nothing, pixel]),
+            radiance: vec![Arc::new(vec![[f32::NAN, 0.0, 0.0, 1.0], [0.0, f32::INFINITY, 0.0, 1.0], [1.0; 4]])],
+            size: [3, 1],
+            eye: glam::DVec3::ZERO,
+            seen_from: etalon::scene::Camera::framing(
+                etalon::scene::Bounds { min: glam::DVec3::ZERO, max: glam::DVec3::ONE },
+                1.0,
+                1.0,
+            ),
+            versions: [Some(1), None],
+        };
+        let of = |layer: Layer, i: usize| layer.draw(&surfaces)[4 * i..4 * i + 4].to_vec();
+        assert_eq!(of(Layer::NotFinite, 0), [255, 0, 255, 255]);
+        assert_eq!(of(Layer::NotFinite, 1), [0, 255, 255, 255]);
+        assert!(of(Layer::NotFinite, 2)[0] < 140);
+        assert_eq!(of(Layer::Normal, 0), [128, 128, 255, 255]);
+        assert_eq!(of(Layer::Albedo, 0)[..2], [255, 0]);
+        assert_eq!(of(Layer::Albedo, 1), NOTHING);
+        assert_ne!(of_number(1), of_number(2));
+    }
+}

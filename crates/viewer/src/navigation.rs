@@ -1,0 +1,356 @@
+//! Where the camera goes: orbit, pan, zoom, look around and fly, with the habits of desktop viewers. Pure: no window.
+
+use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
+
+use etalon::scene::camera::DEFAULT_FOV_Y;
+use etalon::scene::{Bounds, Camera, Projection};
+
+/// Radians of a drag over the height of the window.
+const TURN: f64 = std::f64::consts::PI;
+/// Of the distance, for one step of a wheel.
+const STEP: f64 = 0.85;
+/// Distances to the point looked at, as parts of the size of the scene.
+const NEAREST: f64 = 1e-4;
+const FARTHEST: f64 = 1e3;
+/// Elevations stay this far, in radians, from straight up and down, where there is no horizon.
+const POLE: f64 = 1e-3;
+/// Views that can be taken back.
+const HISTORY: usize = 64;
+
+/// A camera that looks at a point.
+#[derive(Debug, Clone)]
+pub struct Navigation {
+    view: Camera,
+    /// Metres to the point that it turns about.
+    distance: f64,
+    /// Size of the scene in metres.
+    size: f64,
+    bounds: Bounds,
+    home: Camera,
+    before: Vec<(Camera, f64, bool, Option<String>)>,
+    /// It is no longer the camera that it was set to, or that frames the scene for one size alone.
+    moved: bool,
+    /// The camera of the file that it was set to; `None`: the first one.
+    named: Option<String>,
+    framed: bool,
+}
+
+impl Navigation {
+    /// Begins at a camera, in a scene of that extent.
+    #[must_use]
+    pub fn new(home: Camera, bounds: Bounds, framed: bool) -> Self {
+        let size = bounds.radius().max(1e-6);
+        let mut new = Self {
+            view: home.clone(),
+            distance: size,
+            size,
+            bounds,
+            home,
+            before: Vec::new(),
+            moved: framed,
+            named: None,
+            framed,
+        };
+        new.distance = new.distance_to_middle();
+        new
+    }
+
+    /// The camera now: the one that it was set to, or one told by eye, target and field of view, so that those words give the same.
+    #[must_use]
+    pub fn camera(&self) -> Camera {
+        self.words().map_or_else(|| self.view.clone(), |(camera, _)| camera)
+    }
+
+    /// The same as words of a command line; `None` where it is the camera that it was set to, or has parallel rays.
+    #[must_use]
+    pub fn words(&self) -> Option<(Camera, String)> {
+        let Projection::Perspective { fov_y, .. } = self.view.projection else { return None };
+        // To a millionth, so that the words are short: what is drawn is what they say.
+        let short = |x: f64| (x * 1e6).round() / 1e6;
+        let point = |p: DVec3| DVec3::new(short(p.x), short(p.y), short(p.z));
+        let (eye, target, degrees) = (point(self.eye()), point(self.target()), short(fov_y.to_degrees()));
+        let camera = Camera::looking_at(eye, target, DVec3::Y, degrees.to_radians()).ok().filter(|_| self.moved)?;
+        let list = |p: DVec3| format!("{},{},{}", p.x, p.y, p.z);
+        Some((camera, format!("--eye {} --target {} --fov {degrees}", list(eye), list(target))))
+    }
+
+    /// Whether it is no longer the camera that it was set to.
+    #[must_use]
+    pub fn moved(&self) -> bool {
+        self.moved
+    }
+
+    /// The camera of the file that it was set to; `None`: the first one.
+    #[must_use]
+    pub fn named(&self) -> Option<&str> {
+        self.named.as_deref()
+    }
+
+    /// The point that it turns about.
+    #[must_use]
+    pub fn target(&self) -> DVec3 {
+        self.eye() + self.forward() * self.distance
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn eye(&self) -> DVec3 {
+        self.view.world_from_camera.translation
+    }
+
+    fn forward(&self) -> DVec3 {
+        -self.view.world_from_camera.matrix3.z_axis
+    }
+
+    /// What lies nearest to the scene's middle on the way that it looks.
+    fn distance_to_middle(&self) -> f64 {
+        (self.bounds.center() - self.eye()).dot(self.forward()).max(0.05 * self.size)
+    }
+
+    /// Keeps the view for [`Navigation::undo`]: at the beginning of each movement.
+    pub fn keep(&mut self) {
+        if self.before.len() == HISTORY {
+            self.before.remove(0);
+        }
+        self.before.push((self.view.clone(), self.distance, self.moved, self.named.clone()));
+    }
+
+    /// The scene has changed under the camera, which stays where it is.
+    pub fn stay(&mut self, home: Camera, bounds: Bounds) {
+        // A camera of the file that is another now is no longer this one.
+        self.moved |= home != self.home || self.named.is_some();
+        (self.home, self.bounds, self.size) = (home, bounds, bounds.radius().max(1e-6));
+    }
+
+    /// The scene is at another time: a camera of the file has moved with it.
+    pub fn moment(&mut self, home: Camera, cameras: &[Camera]) {
+        if self.framed {
+            return;
+        }
+        self.home = home;
+        if !self.moved {
+            let named = cameras.iter().find(|camera| Some(&camera.name) == self.named.as_ref());
+            self.view = named.unwrap_or(&self.home).clone();
+            self.distance = self.distance_to_middle();
+        }
+    }
+
+    /// Takes the last movement back; false where there is none.
+    pub fn undo(&mut self) -> bool {
+        let Some((view, distance, moved, named)) = self.before.pop() else { return false };
+        (self.view, self.distance, self.moved, self.named) = (view, distance, moved, named);
+        true
+    }
+
+    /// Back to where it began.
+    pub fn reset(&mut self) {
+        self.go_to(self.home.clone(), None);
+        self.moved = self.framed;
+    }
+
+    /// To another camera, of that name in the file.
+    pub fn go_to(&mut self, camera: Camera, name: Option<String>) {
+        self.keep();
+        self.view = camera;
+        self.moved = false;
+        self.named = name;
+        self.distance = self.distance_to_middle();
+    }
+
+    /// Sees the whole scene, from the side that it looks from now.
+    pub fn fit(&mut self, aspect: f64) {
+        self.keep();
+        self.moved = true;
+        let fov_y = match self.view.projection {
+            Projection::Perspective { fov_y, .. } => fov_y,
+            Projection::Orthographic { .. } => DEFAULT_FOV_Y,
+        };
+        let narrow = (fov_y * 0.5).tan() * aspect.min(1.0);
+        // The sphere around the box touches the sides of the picture.
+        self.distance = self.size / narrow.atan().sin();
+        if let Projection::Orthographic { half_height, .. } = &mut self.view.projection {
+            *half_height = self.size / aspect.min(1.0);
+        }
+        self.view.world_from_camera.translation = self.bounds.center() - self.forward() * self.distance;
+    }
+
+    /// Turned about an axis through a point of the world.
+    fn turn(&mut self, about: DVec3, pivot: DVec3, angle: f64) {
+        self.moved = true;
+        let turn = DMat3::from_quat(DQuat::from_axis_angle(about, angle));
+        let frame = self.view.world_from_camera;
+        let eye = pivot + turn * (frame.translation - pivot);
+        self.view.world_from_camera = DAffine3::from_mat3_translation(turn * frame.matrix3, eye);
+    }
+
+    /// By how much it may still be tilted: the elevation stays off the poles.
+    fn tilt(&self, wanted: f64) -> f64 {
+        let elevation = self.forward().y.clamp(-1.0, 1.0).asin();
+        let limit = std::f64::consts::FRAC_PI_2 - POLE;
+        (elevation + wanted).clamp(-limit.max(elevation.abs()), limit.max(elevation.abs())) - elevation
+    }
+
+    fn turned(&mut self, by: DVec2, pivot: DVec3) {
+        self.turn(DVec3::Y, pivot, -by.x * TURN);
+        let right = self.view.world_from_camera.matrix3.x_axis;
+        self.turn(right, pivot, self.tilt(-by.y * TURN));
+    }
+
+    /// Around the point looked at, by a drag in heights of the window.
+    pub fn orbit(&mut self, by: DVec2) {
+        self.turned(by, self.target());
+    }
+
+    /// Around the eye.
+    pub fn look(&mut self, by: DVec2) {
+        self.turned(by, self.eye());
+    }
+
+    /// Along the picture: what is under the pointer, at the distance of the point looked at, stays there.
+    pub fn pan(&mut self, by: DVec2) {
+        let height = match self.view.projection {
+            Projection::Perspective { fov_y, .. } => 2.0 * (fov_y * 0.5).tan() * self.distance,
+            Projection::Orthographic { half_height, .. } => 2.0 * half_height,
+        };
+        self.moved = true;
+        let frame = &mut self.view.world_from_camera;
+        frame.translation += (frame.matrix3.y_axis * by.y - frame.matrix3.x_axis * by.x) * height;
+    }
+
+    /// Nearer (positive) or farther, by steps of a wheel.
+    pub fn zoom(&mut self, steps: f64) {
+        self.moved = true;
+        let target = self.target();
+        self.distance = (self.distance * STEP.powf(steps)).clamp(NEAREST * self.size, FARTHEST * self.size);
+        if let Projection::Orthographic { half_height, .. } = &mut self.view.projection {
+            *half_height = (*half_height * STEP.powf(steps)).max(NEAREST * self.size);
+        }
+        self.view.world_from_camera.translation = target - self.forward() * self.distance;
+    }
+
+    /// Through the scene: right, up and forwards, in sizes of the scene.
+    pub fn fly(&mut self, by: DVec3) {
+        self.moved = true;
+        let frame = &mut self.view.world_from_camera;
+        let way = frame.matrix3.x_axis * by.x + DVec3::Y * by.y - frame.matrix3.z_axis * by.z;
+        frame.translation += way * self.size;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn navigation() -> Navigation {
+        let bounds = Bounds { min: DVec3::new(-1.0, 0.0, -2.0), max: DVec3::new(3.0, 2.0, 1.0) };
+        Navigation::new(Camera::framing(bounds, 1.5, 0.7), bounds, false)
+    }
+
+    fn is_upright(view: &Camera) -> bool {
+        let frame = view.world_from_camera.matrix3;
+        let rigid = (frame.transpose() * frame).abs_diff_eq(DMat3::IDENTITY, 1e-9) && frame.determinant() > 0.0;
+        rigid && frame.x_axis.y.abs() < 1e-9 && frame.y_axis.y > 0.0
+    }
+
+    #[test]
+    fn orbits_keep_distance_target_and_horizon() {
+        let mut n = navigation();
+        let (target, distance) = (n.target(), n.distance);
+        for i in 0..1000 {
+            n.orbit(DVec2::new((f64::from(i) * 0.7).sin(), (f64::from(i) * 1.3).cos()) * 0.4);
+            assert!(n.target().abs_diff_eq(target, 1e-6) && is_upright(&n.camera()), "after {i}: {:?}", n.camera());
+            assert!((n.eye().distance(target) - distance).abs() < 1e-6);
+        }
+        n.orbit(DVec2::new(0.0, 50.0));
+        assert!(is_upright(&n.camera()) && n.forward().y < -0.999, "from above: {:?}", n.forward());
+    }
+
+    #[test]
+    fn a_drag_to_the_right_shows_the_left_side() {
+        let mut n = navigation();
+        let before = n.eye();
+        n.orbit(DVec2::new(0.05, 0.0));
+        let right = n.camera().world_from_camera.matrix3.x_axis;
+        assert!((n.eye() - before).dot(right) < 0.0, "the eye goes to the left");
+        let mut n = navigation();
+        let right = n.camera().world_from_camera.matrix3.x_axis;
+        n.pan(DVec2::new(0.1, 0.0));
+        assert!((n.eye() - before).dot(right) < 0.0, "the scene follows the pointer");
+        let mut n = navigation();
+        n.look(DVec2::new(0.05, 0.0));
+        assert!(n.forward().dot(right) > 0.0 && n.eye() == before, "the eye looks where the pointer goes");
+    }
+
+    #[test]
+    fn wheels_go_back_and_forth() {
+        let mut n = navigation();
+        let (eye, target) = (n.eye(), n.target());
+        n.zoom(3.0);
+        assert!(n.eye().distance(target) < eye.distance(target) && n.target().abs_diff_eq(target, 1e-9));
+        n.zoom(-3.0);
+        assert!(n.eye().abs_diff_eq(eye, 1e-9));
+        (0..500).for_each(|_| n.zoom(5.0));
+        assert!(n.eye().is_finite() && n.eye().distance(n.target()) > 0.0);
+    }
+
+    #[test]
+    fn what_fits_is_seen_and_undone() {
+        let mut n = navigation();
+        let home = n.eye();
+        n.fly(DVec3::new(5.0, -2.0, 9.0));
+        for aspect in [0.4, 1.0, 2.5] {
+            n.fit(aspect);
+            let to_camera = n.camera().world_from_camera.inverse();
+            for corner in 0..8 {
+                let pick = |bit: usize, axis: usize| [n.bounds.min, n.bounds.max][corner >> bit & 1][axis];
+                let p = to_camera.transform_point3(DVec3::new(pick(0, 0), pick(1, 1), pick(2, 2)));
+                let tangent = 0.35_f64.tan();
+                assert!(p.z < 0.0 && (p.y / -p.z).abs() < tangent && (p.x / -p.z).abs() < tangent * aspect, "{p}");
+            }
+        }
+        n.reset();
+        assert_eq!(n.eye(), home);
+        for _ in 0..4 {
+            assert!(n.undo());
+        }
+        assert!(!n.undo() && n.eye() != home, "flying was no kept movement");
+    }
+
+    #[test]
+    fn cameras_of_the_file_go_with_its_time_until_they_are_moved() {
+        let mut n = navigation();
+        let at = |x: f64| Camera { world_from_camera: DAffine3::from_translation(DVec3::X * x), ..n.home.clone() };
+        let (first, second, third) = (at(1.0), at(2.0), at(3.0));
+        n.moment(first.clone(), &[]);
+        assert!(n.camera() == first && !n.moved());
+        n.stay(first, n.bounds);
+        assert!(!n.moved(), "a file that is read again with the same camera");
+        n.orbit(DVec2::new(0.1, 0.0));
+        let turned = n.camera();
+        n.moment(second.clone(), &[]);
+        assert!(n.camera() == turned && n.moved());
+        n.reset();
+        assert!(n.camera() == second);
+        n.stay(third, n.bounds);
+        assert!(n.moved() && n.eye() == DVec3::X * 2.0, "it stays where it is, and is no camera of the file");
+    }
+
+    #[test]
+    fn words_give_the_same_camera() {
+        let mut n = navigation();
+        assert!(n.words().is_none() && !n.moved());
+        n.orbit(DVec2::new(0.123, 0.0777));
+        n.zoom(1.5);
+        let (camera, words) = n.words().unwrap();
+        assert!(camera.world_from_camera.abs_diff_eq(n.view.world_from_camera, 1e-5), "{words}");
+        assert_eq!(n.camera().world_from_camera, camera.world_from_camera);
+        let numbers: Vec<f64> = words.split([' ', ',']).filter_map(|word| word.parse().ok()).collect();
+        let again = Camera::looking_at(
+            DVec3::from_slice(&numbers[..3]),
+            DVec3::from_slice(&numbers[3..6]),
+            DVec3::Y,
+            numbers[6].to_radians(),
+        );
+        assert_eq!(again.unwrap().world_from_camera, camera.world_from_camera);
+    }
+}

@@ -1,0 +1,242 @@
+//! A pixel that was asked about: its surface, its indices by wavelength, what its ray meets, and the equations of that.
+
+use egui::{Color32, Pos2, Sense, Stroke, Ui};
+use glam::DVec3;
+
+use super::State;
+use crate::equations::used;
+use crate::shared::{SceneFacts, Seen, Surfaces, Trace};
+use etalon::optics::fresnel::{fresnel_conductor, fresnel_dielectric};
+use etalon::scene::Material;
+use etalon::share::AovPixel;
+use etalon::spectra::VISIBLE;
+use etalon::transport::events::{Event, GREEN, Met, Way};
+
+/// What lies at a pixel, as it was found when it was asked about.
+pub(super) struct Facts {
+    surface: AovPixel,
+    /// Of each side.
+    radiance: Vec<[f32; 4]>,
+    eye: DVec3,
+}
+
+/// Cosine of the angle between the normal and the way to the eye.
+pub(super) fn incidence(p: &AovPixel) -> f64 {
+    let [normal, way] = [p.normal, p.p_rel].map(|v| DVec3::from(v.map(f64::from)));
+    (-way.normalize_or_zero().dot(normal)).clamp(-1.0, 1.0)
+}
+
+/// Takes what is known of the pixel, while the scene is seen from where it was asked about; whether it is.
+fn look(state: &mut State, trace: &Trace, seen: &Seen) -> bool {
+    if state.navigation.as_ref().is_none_or(|navigation| navigation.camera() != trace.seen_from) {
+        return false;
+    }
+    let is_of = |surfaces: &&Surfaces| surfaces.size == trace.size && surfaces.seen_from == trace.seen_from;
+    let Some(surfaces) = seen.now().filter(is_of) else { return true };
+    let ([x, y], [width, height]) = (trace.pixel, surfaces.size);
+    if x < width && y < height {
+        let at = (y * width + x) as usize;
+        let radiance = surfaces.radiance.iter().map(|side| side[at]).collect();
+        state.pixel = Some(Facts { surface: surfaces.pixels[at], radiance, eye: surfaces.eye });
+    }
+    true
+}
+
+pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
+    let Some(picked) = state.picked else {
+        ui.weak("Ctrl+click a pixel to ask about it.");
+        return;
+    };
+    let (Some(trace), Some(scene)) = (seen.trace.as_ref().filter(|trace| trace.number == picked.number), &seen.facts)
+    else {
+        ui.weak("once the picture is finished …");
+        return;
+    };
+    let is_there = look(state, trace, seen);
+    match &state.pixel {
+        Some(facts) => {
+            let met = trace.events.first().and_then(|event| event.met);
+            surface(ui, trace.pixel, facts, scene, met);
+        }
+        None if is_there => drop(ui.weak("once the picture is finished …")),
+        None => drop(ui.weak("the view moved before the picture was finished: Ctrl+Z goes back")),
+    }
+    ui.separator();
+    ui.strong("What its ray meets").on_hover_text(
+        "followed in f64 by textbook formulas, for green light, without textures of normals; seen from elsewhere, too: orbit",
+    );
+    for (index, event) in trace.events.iter().enumerate() {
+        if told(ui, event, depth(&trace.events, index), scene) {
+            state.pointed = Some(index);
+        }
+    }
+    ui.separator();
+    ui.strong("Its equations").on_hover_text("lines of shaders/lib that hold the formula; point at one to see it");
+    for probe in used(&trace.events, &scene.materials, &scene.lights, &state.settings.knobs) {
+        let ids = probe.ids.join(" ");
+        let text = format!("{ids}  {}  {}.glsl:{}", probe.name, probe.subject, probe.line);
+        ui.monospace(text).on_hover_text(probe.formula);
+    }
+}
+
+/// The surface at the pixel.
+fn surface(ui: &mut Ui, [x, y]: [u32; 2], facts: &Facts, scene: &SceneFacts, met: Option<Met>) {
+    let p = &facts.surface;
+    let material = (p.material as usize).checked_sub(1).and_then(|index| scene.materials.get(index));
+    egui::Grid::new("pixel").num_columns(2).striped(true).show(ui, |ui| {
+        let mut row = |name: &str, value: String| {
+            ui.label(name);
+            ui.monospace(value);
+            ui.end_row();
+        };
+        let three = |v: [f32; 3]| format!("{:.5} {:.5} {:.5}", v[0], v[1], v[2]);
+        row("pixel", format!("{x}, {y}"));
+        for (name, radiance) in ["radiance", "on the right"].into_iter().zip(&facts.radiance) {
+            row(name, three([radiance[0], radiance[1], radiance[2]]));
+        }
+        if p.material == 0 {
+            row("surface", "none".to_owned());
+            return;
+        }
+        let instance = scene.instances.get(p.instance as usize - 1);
+        row("material", material.map_or_else(String::new, |m| m.name.clone()));
+        row("instance", instance.cloned().unwrap_or_default());
+        let position = facts.eye + DVec3::from(p.p_rel.map(f64::from));
+        row("position, m", format!("{:.4} {:.4} {:.4}", position.x, position.y, position.z));
+        row("distance, m", format!("{:.5}", p.distance));
+        row("normal", three(p.normal));
+        row("triangle's", three(p.geometric_normal));
+        row("albedo", three(p.albedo));
+        row("roughness", format!("{:.4}", p.roughness));
+        row("metallic", format!("{:.4}", p.metallic));
+        row("incidence", format!("{:.2}°", incidence(p).acos().to_degrees()));
+        if let (Some(m), Some(met)) = (material, met) {
+            indices(&mut row, m, met);
+        }
+    });
+    if let Some(m) = material.filter(|m| m.conductor_spectra.is_some() || varies(m)) {
+        curves(ui, m);
+    }
+}
+
+/// Whether the index of refraction depends on the wavelength.
+fn varies(m: &Material) -> bool {
+    m.conductor.is_none() && m.dispersion.disperses(f64::from(m.ior))
+}
+
+/// n and κ, at three wavelengths where they differ, and the share that is mirrored of green light and, where only the index decides, of
+/// the others.
+fn indices(row: &mut impl FnMut(&str, String), m: &Material, met: Met) {
+    let [green, _] = m.complex_index(GREEN);
+    if m.metallic >= 1.0 && m.conductor.is_none() {
+        row("n, κ", "not told: base colour is F0".to_owned());
+    } else if m.conductor.is_none() && !varies(m) {
+        row("n", format!("{green:.4}"));
+    } else {
+        for nm in [650.0, GREEN, 450.0] {
+            let [n, kappa] = m.complex_index(nm);
+            // Other light has another ratio where the medium on one of the sides disperses.
+            let ratio = if met.ratio < 1.0 { met.ratio * green / n } else { met.ratio * n / green };
+            let share = if kappa > 0.0 {
+                fresnel_conductor(met.cos, n, kappa)[0]
+            } else {
+                fresnel_dielectric(met.cos, ratio)[0]
+            };
+            row(&format!("n, κ at {nm} nm"), format!("{n:.4} {kappa:.4}, F {:.2} %", 100.0 * share));
+        }
+    }
+    row("Fresnel", format!("{:.3} % mirrored", 100.0 * met.reflected));
+}
+
+/// n and κ over visible light.
+fn curves(ui: &mut Ui, m: &Material) {
+    let (rect, _) = ui.allocate_exact_size(egui::vec2(ui.available_width(), 64.0), Sense::hover());
+    ui.painter().rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
+    let step = |i: u32| VISIBLE.from + (VISIBLE.to - VISIBLE.from) * f64::from(i) / 64.0;
+    let values: Vec<[f64; 2]> = (0..=64).map(|i| m.complex_index(step(i))).collect();
+    let is_metal = values.iter().any(|[_, kappa]| *kappa > 0.0);
+    for (which, (name, colour)) in [("n", Color32::from_rgb(86, 180, 233)), ("κ", Color32::from_rgb(230, 159, 0))]
+        .into_iter()
+        .enumerate()
+        .take(1 + usize::from(is_metal))
+    {
+        let ends =
+            values.iter().map(|v| v[which]).fold([f64::INFINITY, 0.0], |[low, high], v| [low.min(v), high.max(v)]);
+        let [low, high] = ends;
+        let place = |(i, v): (usize, &[f64; 2])| {
+            let up = ((v[which] - low) / (high - low).max(1e-9)) as f32;
+            Pos2::new(rect.left() + rect.width() * i as f32 / 64.0, rect.bottom() - 6.0 - up * (rect.height() - 12.0))
+        };
+        ui.painter().add(egui::Shape::line(values.iter().enumerate().map(place).collect(), Stroke::new(2.0, colour)));
+        ui.colored_label(colour, format!("{name} {low:.4} to {high:.4}, {:.0} to {:.0} nm", VISIBLE.from, VISIBLE.to));
+    }
+}
+
+/// How many rays led to an event.
+fn depth(events: &[Event], index: usize) -> usize {
+    std::iter::successors(events[index].after, |&before| events[before].after).count()
+}
+
+/// Colour of a ray.
+pub(super) fn colour(event: &Event) -> Color32 {
+    match (event.way, event.met) {
+        (Way::Seen, _) => Color32::WHITE,
+        (Way::Mirrored, _) => Color32::from_rgb(230, 159, 0),
+        (Way::Bent, _) => Color32::from_rgb(86, 180, 233),
+        (Way::Straight, _) => Color32::from_rgb(170, 170, 170),
+        (Way::ToLight(_), None) => Color32::from_rgb(240, 228, 66),
+        (Way::ToLight(_), Some(_)) => Color32::from_rgb(213, 94, 0),
+    }
+}
+
+/// One event in words; whether the pointer is on it.
+fn told(ui: &mut Ui, event: &Event, depth: usize, scene: &SceneFacts) -> bool {
+    let name = |met: &Met| {
+        let material = scene.materials.get(met.material).map_or("", |m| &m.name);
+        let instance = scene.instances.get(met.instance).map_or("", |name| name.as_str());
+        if instance.is_empty() { material.to_owned() } else { instance.to_owned() }
+    };
+    let share = format!("{:.1} %", 100.0 * event.share);
+    let length = event.from.distance(event.to);
+    let text = match (event.way, &event.met) {
+        (Way::ToLight(index), met) => {
+            let light = scene.lights.get(index).map_or("", |light| &light.name);
+            match met {
+                None => format!("to light {index} {light}: {length:.3} m, free"),
+                Some(met) => {
+                    let lets_through = scene.materials.get(met.material).is_some_and(|m| m.transmission > 0.0);
+                    let how = if lets_through { ", which lets light through, lies" } else { " stands" };
+                    format!("to light {index} {light}: {}{how} before it", name(met))
+                }
+            }
+        }
+        (way, met) => {
+            let way = match way {
+                Way::Seen => "seen",
+                Way::Mirrored => "mirrored",
+                Way::Bent => "bent",
+                _ => "straight on",
+            };
+            match met {
+                None => format!("{way} {share}: out of the scene"),
+                Some(met) => {
+                    let thrown = if met.total { ", totally reflected (F6)" } else { "" };
+                    format!(
+                        "{way} {share}: {} after {length:.4} m, {:.2}°, n₂/n₁ {:.4}, mirrors {:.2} %{thrown}",
+                        name(met),
+                        met.cos.acos().to_degrees(),
+                        met.ratio,
+                        100.0 * met.reflected
+                    )
+                }
+            }
+        }
+    };
+    ui.horizontal_top(|ui| {
+        ui.add_space(8.0 * depth as f32);
+        let (dot, _) = ui.allocate_exact_size(egui::vec2(8.0, 14.0), Sense::hover());
+        ui.painter().circle(dot.center(), 3.5, colour(event), Stroke::new(1.0, Color32::from_gray(90)));
+        ui.add(egui::Label::new(text).wrap()).hovered()
+    })
+    .inner
+}

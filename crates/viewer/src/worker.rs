@@ -1,0 +1,532 @@
+//! The thread that loads and draws: it looks at what is wanted before each sample, and shows what it has after some.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context as _, Result};
+
+use super::shared::{Difference, Loaded, Pick, SceneFacts, Seen, Shared, Shown, Source, Surfaces, Trace, Wanted, lock};
+use etalon::frame::{Drawing, Renderer, Settings};
+use etalon::gpu::{Device, Interrupted, PassTime, Replacement, is_lost};
+use etalon::image::metric::{AnyPicture, Metric, compare};
+use etalon::image::png::Display;
+use etalon::plan::Knobs;
+use etalon::plan::rungs::{Indirect, Reflection, Refraction};
+use etalon::transport::events::{Limits, Tracer};
+
+/// Milliseconds that a picture may take while the view moves: it gets smaller until it does.
+const MOVING_MS: f64 = 40.0;
+/// Sides of pictures while the view moves: the window's over one of these.
+const SMALLER: [u32; 6] = [1, 2, 3, 4, 6, 8];
+/// The same where nobody knows yet how long a pixel takes.
+const UNKNOWN: u32 = 4;
+/// Between two looks at a picture under way.
+const LOOK: Duration = Duration::from_millis(100);
+/// Share of a pixel's light below which its ray is not followed.
+const LEAST_SHARE: f64 = 0.002;
+
+/// What draws one side of the window.
+struct Side {
+    renderer: Renderer,
+    /// Of the renderer.
+    settings: Settings,
+    drawing: Option<Drawing>,
+    /// What the sample under way took so far.
+    spent: Duration,
+    looked: Instant,
+}
+
+impl Side {
+    fn new(device: &Arc<Device>, loaded: &Loaded, settings: Settings) -> Result<Self> {
+        let environment = loaded.environment.as_ref().map(|(environment, _)| &**environment);
+        let renderer = Renderer::new(device, &loaded.original, environment, settings.clone())?;
+        Ok(Self { renderer, settings, drawing: None, spent: Duration::ZERO, looked: Instant::now() })
+    }
+
+    fn is_done(&self) -> bool {
+        self.drawing.as_ref().is_none_or(Drawing::is_done)
+    }
+
+    /// How much of its picture is drawn.
+    fn progress(&self) -> f64 {
+        self.drawing.as_ref().map_or(0.0, |drawing| f64::from(drawing.samples()) / f64::from(drawing.of().max(1)))
+    }
+}
+
+/// The scene and what draws it.
+struct Stage {
+    scene: u64,
+    time: Option<f64>,
+    loaded: Loaded,
+    sides: Vec<Side>,
+    /// Wall nanoseconds of a pixel of a sample, of each side; 0: nobody knows.
+    ns_per_pixel: [f64; 2],
+    /// Settings that could not be drawn: they are not tried again.
+    refused: [Option<Settings>; 2],
+    /// Made when a ray is followed for the first time.
+    tracer: Option<Tracer>,
+}
+
+/// Settings of a side, with the environment as strong as the scene says.
+fn settings_of(loaded: &Loaded, wanted: &Wanted, side: usize) -> Settings {
+    let share = loaded.environment.as_ref().map_or(1.0, |(_, share)| *share);
+    let settings = wanted.settings.clone();
+    let knobs = wanted.other.clone().filter(|_| side == 1).unwrap_or(settings.knobs);
+    Settings { environment_intensity: settings.environment_intensity * share, knobs, ..settings }
+}
+
+/// Whether a renderer for the one draws the other as well.
+fn same_renderer(a: &Settings, b: &Settings) -> bool {
+    a.knobs == b.knobs
+        && a.background == b.background
+        && a.environment_intensity == b.environment_intensity
+        && a.environment_rotation == b.environment_rotation
+        && a.seed == b.seed
+        && a.demand == b.demand
+}
+
+/// Says that there is something to be seen.
+pub type Wake = Arc<dyn Fn() + Send + Sync>;
+
+/// What a worker goes through.
+pub struct Worker {
+    device: Arc<Device>,
+    shared: Arc<Shared>,
+    source: Box<dyn Source>,
+    wake: Wake,
+    stage: Option<Stage>,
+    version: u64,
+    /// Code of shaders that is drawn with in place of what was built.
+    code: Arc<Vec<Replacement>>,
+    /// Pictures that are compared, or will be next; `None`: nobody compares.
+    comparing: Arc<Mutex<Option<(Shown, Shown)>>>,
+}
+
+impl Worker {
+    /// Loads and draws until nothing more is wanted.
+    pub fn run(device: Arc<Device>, shared: Arc<Shared>, source: Box<dyn Source>, wake: Wake) {
+        let (code, comparing) = (lock(&shared.wanted).0.code.clone(), Arc::default());
+        let mut worker = Self { device, shared, source, wake, stage: None, version: 0, code, comparing };
+        let mut known = 0;
+        let mut last: Option<Wanted> = None;
+        loop {
+            let (wanted, number) = {
+                let mut wanted = lock(&worker.shared.wanted);
+                while wanted.1 == known && worker.is_idle() {
+                    wanted = worker.shared.changed.wait(wanted).unwrap_or_else(PoisonError::into_inner);
+                }
+                // Whoever interrupts holds this lock, and wants something else.
+                worker.device.resume();
+                wanted.clone()
+            };
+            if wanted.quit {
+                return;
+            }
+            // A sample is drawn after each change: a scene that never rests is seen, too.
+            let begun = if number == known { Ok(()) } else { worker.begin(&wanted, last.as_ref()) };
+            let result = begun.and_then(|()| worker.refine(&wanted));
+            known = number;
+            last = Some(wanted);
+            if let Err(error) = result {
+                if error.is::<Interrupted>() {
+                    continue;
+                }
+                worker.stage.iter_mut().flat_map(|stage| &mut stage.sides).for_each(|side| side.drawing = None);
+                let lost = is_lost(&error);
+                worker.say(|seen| {
+                    seen.error = Some(format!("{error:#}"));
+                    seen.lost |= lost;
+                });
+                if lost {
+                    return;
+                }
+            }
+        }
+    }
+
+    fn is_idle(&self) -> bool {
+        self.stage.as_ref().is_none_or(|stage| stage.sides.iter().all(Side::is_done))
+    }
+
+    fn say(&self, change: impl FnOnce(&mut Seen)) {
+        change(&mut lock(&self.shared.seen));
+        (self.wake)();
+    }
+
+    /// Something else is wanted.
+    fn begin(&mut self, wanted: &Wanted, last: Option<&Wanted>) -> Result<()> {
+        let renewed = !Arc::ptr_eq(&self.code, &wanted.code);
+        if renewed {
+            self.code = wanted.code.clone();
+            self.device.replace(&wanted.code);
+        }
+        let here = self.stage.as_ref().map(|stage| (stage.scene, stage.time));
+        let tried = last.map(|last| (last.scene, last.time));
+        let at = (wanted.scene, wanted.time);
+        if here != Some(at) && tried != Some(at) {
+            let other_scene = here.map(|(scene, _)| scene) != Some(wanted.scene);
+            if other_scene { self.load(wanted)? } else { self.go_to(wanted)? }
+        }
+        self.follow_knobs(wanted, renewed)?;
+        let Some(stage) = &mut self.stage else { return Ok(()) };
+        let camera = wanted.from.camera(&stage.loaded)?;
+        let same_view = last.is_some_and(|last| {
+            // What is the scene's own may have moved with its time.
+            (&last.from, last.moving) == (&wanted.from, wanted.moving) && tried == Some(at)
+        });
+        let ns: f64 = stage.ns_per_pixel.iter().take(stage.sides.len()).sum();
+        let mut developed = Vec::new();
+        for (index, side) in stage.sides.iter_mut().enumerate() {
+            let Settings { size, tonemap, exposure, .. } = wanted.settings;
+            let size = if wanted.moving { smaller(size, ns) } else { size };
+            let all = side.settings.knobs.samples.count();
+            let samples = if wanted.moving { 1 } else { all };
+            let same_display = (side.settings.tonemap, side.settings.exposure) == (tonemap, exposure);
+            (side.settings.tonemap, side.settings.exposure) = (tonemap, exposure);
+            side.renderer.develop(tonemap, exposure);
+            if side.settings.size != size {
+                side.drawing = None;
+                side.renderer.resize(size)?;
+                side.settings.size = size;
+            }
+            if !same_view || side.drawing.as_ref().is_none_or(|drawing| drawing.of() != samples) {
+                side.drawing = Some(side.renderer.begin(camera, samples));
+                side.spent = Duration::ZERO;
+            } else if !same_display && side.drawing.as_ref().is_some_and(Drawing::is_whole) {
+                developed.push(index);
+            }
+        }
+        for side in developed {
+            self.show(wanted, side)?;
+        }
+        if self.is_idle() {
+            self.finish(wanted)?;
+        }
+        self.trace(wanted, last)
+    }
+
+    /// Reads a scene and makes ready to draw it; what cannot be read, or drawn, leaves the one before.
+    fn load(&mut self, wanted: &Wanted) -> Result<()> {
+        let name = wanted.file.as_ref().map_or("the scene".to_owned(), |file| file.display().to_string());
+        self.say(|seen| seen.busy = Some(format!("reading {name}")));
+        let found = self.source.open(wanted.asked(), self.device.info()).and_then(|loaded| {
+            self.say(|seen| seen.busy = Some("uploading and compiling".to_owned()));
+            self.ready(wanted, loaded)
+        });
+        self.say(|seen| {
+            seen.busy = None;
+            seen.failed = found.is_err().then_some(wanted.scene);
+        });
+        self.take_over(found?);
+        Ok(())
+    }
+
+    /// The same scene at another time.
+    fn go_to(&mut self, wanted: &Wanted) -> Result<()> {
+        let Some(stage) = &self.stage else { return Ok(()) };
+        let (scene, camera) = self.source.moment(wanted.asked())?;
+        let Loaded { name, environment, warnings, prices, framed, knobs, .. } = &stage.loaded;
+        let loaded = Loaded {
+            name: name.clone(),
+            original: scene.into(),
+            environment: environment.clone(),
+            camera,
+            warnings: warnings.clone(),
+            prices: prices.clone(),
+            framed: *framed,
+            knobs: knobs.clone(),
+        };
+        // Times of samples are much the same from one moment to the next.
+        let ns = stage.ns_per_pixel;
+        let (mut stage, facts) = self.ready(wanted, loaded)?;
+        stage.ns_per_pixel = ns;
+        self.take_over((stage, facts));
+        Ok(())
+    }
+
+    /// A scene with what draws it, and what there is to be known of it.
+    fn ready(&self, wanted: &Wanted, loaded: Loaded) -> Result<(Stage, SceneFacts)> {
+        let facts = SceneFacts::of(wanted, &loaded)?;
+        let side = Side::new(&self.device, &loaded, settings_of(&loaded, wanted, 0))?;
+        let (scene, time) = (wanted.scene, wanted.time);
+        let sides = vec![side];
+        Ok((Stage { scene, time, loaded, sides, ns_per_pixel: [0.0; 2], refused: [None, None], tracer: None }, facts))
+    }
+
+    fn take_over(&mut self, (stage, facts): (Stage, SceneFacts)) {
+        self.stage = Some(stage);
+        self.tell_plan(0);
+        self.say(|seen| {
+            if seen.facts.as_ref().is_some_and(|before| before.scene != facts.scene) {
+                (seen.sides[1], seen.difference) = Default::default();
+            }
+            seen.facts = Some(Arc::new(facts));
+            (seen.surfaces, seen.error) = (None, None);
+        });
+    }
+
+    /// As many sides as are wanted, with their rungs; those that cannot be drawn leave what is there.
+    fn follow_knobs(&mut self, wanted: &Wanted, renewed: bool) -> Result<()> {
+        let Some(stage) = &mut self.stage else { return Ok(()) };
+        if wanted.other.is_none() {
+            stage.sides.truncate(1);
+            let is_seen = lock(&self.shared.seen).sides[1].shown.is_some();
+            if is_seen {
+                self.say(|seen| (seen.sides[1], seen.difference) = Default::default());
+            }
+        }
+        for index in 0..1 + usize::from(wanted.other.is_some()) {
+            let Some(stage) = &mut self.stage else { return Ok(()) };
+            let settings = settings_of(&stage.loaded, wanted, index);
+            let ready = stage.sides.get(index).is_some_and(|side| same_renderer(&side.settings, &settings)) && !renewed;
+            let refused =
+                stage.refused[index].as_ref().is_some_and(|r| r.size == settings.size && same_renderer(r, &settings));
+            if ready && stage.refused[index].take().is_some() {
+                self.say(|seen| seen.error = None);
+            } else if !ready && (!refused || renewed) {
+                self.plan(settings, index)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Plans and uploads one side for other rungs.
+    fn plan(&mut self, settings: Settings, index: usize) -> Result<()> {
+        self.say(|seen| seen.busy = Some("uploading and compiling".to_owned()));
+        let Some(stage) = &mut self.stage else { return Ok(()) };
+        let made = Side::new(&self.device, &stage.loaded, settings.clone());
+        match made {
+            Ok(side) => {
+                stage.refused[index] = None;
+                if index < stage.sides.len() {
+                    // Other rungs take other times: the next sample tells.
+                    stage.ns_per_pixel[index] = 0.0;
+                    stage.sides[index] = side;
+                } else {
+                    stage.sides.push(side);
+                }
+                self.say(|seen| (seen.busy, seen.error) = (None, None));
+                self.tell_plan(index);
+                Ok(())
+            }
+            Err(error) if is_lost(&error) => Err(error),
+            // What can be drawn goes on.
+            Err(error) => {
+                stage.refused[index] = Some(settings);
+                self.say(|seen| (seen.busy, seen.error) = (None, Some(format!("{error:#}"))));
+                Ok(())
+            }
+        }
+    }
+
+    fn tell_plan(&self, index: usize) {
+        let Some(side) = self.stage.as_ref().and_then(|stage| stage.sides.get(index)) else { return };
+        let warnings = [side.renderer.plan().warnings.clone(), side.renderer.warnings.clone()].concat();
+        self.say(|seen| {
+            (seen.sides[index].effects, seen.sides[index].warnings) =
+                (side.renderer.plan().effects.clone().into(), warnings.into());
+        });
+    }
+
+    /// One more sample, or band of it, of the side that is less far; of both that which was shown longer ago.
+    fn refine(&mut self, wanted: &Wanted) -> Result<()> {
+        let Some(stage) = &mut self.stage else { return Ok(()) };
+        let unfinished = stage.sides.iter_mut().enumerate().filter(|(_, side)| !side.is_done());
+        let order = |a: &Side, b: &Side| a.progress().total_cmp(&b.progress()).then(a.looked.cmp(&b.looked));
+        let Some((index, side)) = unfinished.min_by(|a, b| order(a.1, b.1)) else { return Ok(()) };
+        let Some(drawing) = &mut side.drawing else { return Ok(()) };
+        // While the view moves each picture is seen, all its bands: the next is not better.
+        drawing.interruptible = !wanted.moving;
+        let (begun, before) = (Instant::now(), drawing.samples());
+        side.renderer.step(drawing)?;
+        while wanted.moving && drawing.samples() == before {
+            side.renderer.step(drawing)?;
+        }
+        side.spent += begun.elapsed();
+        if drawing.samples() == before {
+            return Ok(());
+        }
+        // The first sample compiles; what is quicker is believed at once.
+        let [width, height] = side.settings.size;
+        let ns = std::mem::take(&mut side.spent).as_secs_f64() * 1e9 / f64::from(width) / f64::from(height);
+        let known = stage.ns_per_pixel[index];
+        stage.ns_per_pixel[index] = if known == 0.0 || ns < known { ns } else { known + 0.2 * (ns - known) };
+        if drawing.is_done() || drawing.samples() == 1 || side.looked.elapsed() >= LOOK {
+            side.looked = Instant::now();
+            self.show(wanted, index)?;
+        }
+        if self.is_idle() { self.finish(wanted) } else { Ok(()) }
+    }
+
+    fn show(&mut self, wanted: &Wanted, index: usize) -> Result<()> {
+        let Some(side) = self.stage.as_mut().and_then(|stage| stage.sides.get_mut(index)) else { return Ok(()) };
+        let Some(drawing) = &side.drawing else { return Ok(()) };
+        let rendered = side.renderer.picture(drawing)?;
+        self.version += 1;
+        let each = f64::from(rendered.samples.max(1));
+        let work = rendered.work;
+        let shown = Shown {
+            version: self.version,
+            rgba: Arc::new(rendered.display),
+            size: side.settings.size,
+            samples: [rendered.samples, drawing.of()],
+            moving: wanted.moving,
+            time: wanted.time,
+            knobs: side.settings.knobs.clone(),
+            passes: rendered.passes.into_iter().map(|pass| PassTime { ms: pass.ms / each, ..pass }).collect(),
+            rays: (work.reflection + work.refraction + work.shadow + work.indirect)
+                / u64::from(rendered.samples.max(1)),
+            counts: rendered.counts,
+            error: rendered.errors.last().map(|error| error.relmse.sqrt()),
+        };
+        self.say(|seen| seen.sides[index].shown = Some(shown));
+        Ok(())
+    }
+
+    /// What is asked of pictures that are finished.
+    fn finish(&mut self, wanted: &Wanted) -> Result<()> {
+        if wanted.moving {
+            return Ok(());
+        }
+        if wanted.surfaces {
+            self.read_surfaces(wanted)?;
+        }
+        let shown = lock(&self.shared.seen).sides.each_ref().map(|side| side.shown.clone());
+        if let ([Some(left), Some(right)], true) = (shown, wanted.other.is_some())
+            && left.is_done()
+            && right.is_done()
+            && left.size == right.size
+        {
+            let versions = [left.version, right.version];
+            if lock(&self.shared.seen).difference.is_none_or(|known| known.versions != versions) {
+                self.compare(left, right);
+            }
+        }
+        Ok(())
+    }
+
+    /// Compares both sides, on a thread of its own: that takes longer than a piece of a pass. Of what is asked meanwhile it does the last.
+    fn compare(&self, left: Shown, right: Shown) {
+        let runs = lock(&self.comparing).replace((left, right)).is_some();
+        if runs {
+            return;
+        }
+        let (shared, wake, comparing) = (self.shared.clone(), self.wake.clone(), self.comparing.clone());
+        let work = move || {
+            let picture = |shown: &Shown| {
+                let rgba = shown.rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect();
+                AnyPicture::Display(Display { width: shown.size[0], height: shown.size[1], rgba })
+            };
+            loop {
+                let Some((left, right)) = lock(&comparing).clone() else { return };
+                let versions = [left.version, right.version];
+                match compare(Metric::Flip, &picture(&left), &picture(&right)) {
+                    Ok(found) => lock(&shared.seen).difference = Some(Difference { versions, flip: found.value }),
+                    Err(error) => lock(&shared.seen).error = Some(format!("comparing both sides: {error:#}")),
+                }
+                wake();
+                let mut next = lock(&comparing);
+                if next.as_ref().is_some_and(|(a, b)| [a.version, b.version] == versions) {
+                    *next = None;
+                    return;
+                }
+            }
+        };
+        if let Err(error) = std::thread::Builder::new().name("comparing".to_owned()).spawn(work) {
+            *lock(&self.comparing) = None;
+            self.say(|seen| seen.error = Some(format!("comparing both sides: {error}")));
+        }
+    }
+
+    fn read_surfaces(&mut self, wanted: &Wanted) -> Result<()> {
+        if lock(&self.shared.seen).now().is_some() {
+            return Ok(());
+        }
+        let Some(stage) = &mut self.stage else { return Ok(()) };
+        let camera = wanted.from.camera(&stage.loaded)?.clone();
+        let mut radiance = Vec::new();
+        for side in &stage.sides {
+            radiance.push(Arc::new(side.renderer.film()?.rgba));
+        }
+        let Some(left) = stage.sides.first_mut() else { return Ok(()) };
+        let (pixels, view) = left.renderer.aovs(&camera)?;
+        let (pixels, size, eye) = (Arc::new(pixels), left.settings.size, view.eye);
+        self.say(|seen| {
+            let versions = seen.versions();
+            seen.surfaces = Some(Surfaces { pixels, radiance, size, eye, seen_from: camera, versions });
+        });
+        Ok(())
+    }
+
+    /// Follows the ray of a pixel that is asked about, seen from where it was asked: whoever moves sees it from elsewhere.
+    fn trace(&mut self, wanted: &Wanted, last: Option<&Wanted>) -> Result<()> {
+        let Some(picked) = wanted.picked else {
+            let known = lock(&self.shared.seen).trace.is_some();
+            if known {
+                self.say(|seen| seen.trace = None);
+            }
+            return Ok(());
+        };
+        let known = lock(&self.shared.seen).trace.clone().filter(|trace| trace.number == picked.number);
+        let same = |last: &Wanted| last.settings.knobs == wanted.settings.knobs && last.time == wanted.time;
+        if known.is_some() && last.is_some_and(same) {
+            return Ok(());
+        }
+        let Some(stage) = &mut self.stage else { return Ok(()) };
+        let (seen_from, size) = match known {
+            Some(known) => (known.seen_from.clone(), known.size),
+            None => (wanted.from.camera(&stage.loaded)?.clone(), wanted.settings.size),
+        };
+        let tracer = match stage.tracer.take() {
+            Some(tracer) => tracer,
+            None => {
+                let bvh = stage.loaded.original.bvh().context("following the ray of a pixel")?;
+                Tracer::new(stage.loaded.original.scene(), bvh)
+            }
+        };
+        let limits = limits_of(&wanted.settings.knobs);
+        let events = tracer.follow(stage.loaded.original.scene(), &seen_from, size, picked.pixel, &limits);
+        stage.tracer = Some(tracer);
+        let Pick { number, pixel } = picked;
+        self.say(|seen| seen.trace = Some(Arc::new(Trace { number, pixel, events, seen_from, size })));
+        Ok(())
+    }
+}
+
+/// How far the rays of a picture with these rungs go.
+fn limits_of(knobs: &Knobs) -> Limits {
+    let rays = knobs.reflection == Reflection::Ray || knobs.refraction == Refraction::Ray;
+    let paths = knobs.indirect == Indirect::Path;
+    Limits {
+        surfaces: if rays || paths { knobs.interfaces.count() } else { 1 },
+        stand_ins: !paths,
+        roughest: knobs.lobes.roughest(),
+        least_share: LEAST_SHARE,
+    }
+}
+
+/// The largest of some sizes that takes no longer than a picture may while the view moves.
+fn smaller(size: [u32; 2], ns_per_pixel: f64) -> [u32; 2] {
+    if ns_per_pixel == 0.0 {
+        return size.map(|side| side.div_ceil(UNKNOWN));
+    }
+    let pixels = f64::from(size[0]) * f64::from(size[1]);
+    let takes = |by: u32| ns_per_pixel * 1e-6 * pixels / f64::from(by * by);
+    let by = SMALLER.into_iter().find(|&by| takes(by) <= MOVING_MS).unwrap_or(SMALLER[SMALLER.len() - 1]);
+    size.map(|side| side.div_ceil(by).max(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_get_smaller_until_they_are_quick() {
+        assert_eq!(smaller([1280, 720], 0.0), [320, 180]);
+        assert_eq!(smaller([1280, 720], 40.0), [1280, 720]);
+        // 92 ms whole, 23 at half the side.
+        assert_eq!(smaller([1280, 720], 100.0), [640, 360]);
+        assert_eq!(smaller([1281, 721], 1e6), [161, 91]);
+        assert_eq!(smaller([3, 1], 1e9), [1, 1]);
+    }
+}

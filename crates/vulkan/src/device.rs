@@ -1,0 +1,726 @@
+//! Instance, choice of a device, and the device with its queue, allocator and caches.
+
+use std::collections::HashMap;
+use std::ffi::{CStr, CString, c_char, c_void};
+use std::mem::ManuallyDrop;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use anyhow::{Context as _, Result, anyhow, bail, ensure};
+use ash::{ext, khr, vk};
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use serde::Serialize;
+
+use super::cache::Caches;
+use super::limits::{PUSH_DESCRIPTORS, STORAGE_BUFFERS, STORAGE_IMAGES, UNIFORM_BUFFERS};
+use super::surface::Surface;
+use super::validated::{self, Turn, Validated, Wish};
+
+const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+/// Which device the user wants.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum DeviceChoice {
+    /// The best there is: discrete, integrated, virtual, then CPU.
+    #[default]
+    Best,
+    /// A software device.
+    Cpu,
+    /// Anything but a software device.
+    Gpu,
+    /// By place in `etalon devices`.
+    Index(usize),
+    /// By part of its name, ignoring case.
+    Name(String),
+}
+
+impl std::str::FromStr for DeviceChoice {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Ok(match text {
+            "cpu" => Self::Cpu,
+            "gpu" => Self::Gpu,
+            _ => text.parse().map_or_else(|_| Self::Name(text.to_owned()), Self::Index),
+        })
+    }
+}
+
+/// A device as reports name it.
+#[derive(Debug, Clone, Serialize)]
+pub struct DeviceInfo {
+    /// Marketing name.
+    pub name: String,
+    /// Driver and its version in words.
+    pub driver: String,
+    /// Driver version.
+    pub version: String,
+    /// `cpu`, `discrete`, `integrated`, `virtual` or `other`.
+    #[serde(rename = "type")]
+    pub kind: &'static str,
+    /// Vulkan version.
+    pub api: String,
+}
+
+impl DeviceInfo {
+    /// Place of its kind among the kinds, the best first.
+    #[must_use]
+    pub fn rank(&self) -> Option<usize> {
+        ["discrete", "integrated", "virtual", "other", "cpu"].iter().position(|kind| *kind == self.kind)
+    }
+}
+
+/// A device that Vulkan offers here, and what keeps Etalon from using it.
+#[derive(Debug, Clone, Serialize)]
+pub struct Candidate {
+    /// Its identity.
+    #[serde(flatten)]
+    pub info: DeviceInfo,
+    /// What Etalon needs and the device lacks; empty when it can be used.
+    pub missing: Vec<String>,
+    #[serde(skip)]
+    physical: vk::PhysicalDevice,
+}
+
+/// How much a validation message matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// Worth a look.
+    Warning,
+    /// A mistake of ours.
+    Error,
+}
+
+/// A message of the validation layer.
+#[derive(Debug, Clone, Serialize)]
+pub struct Message {
+    /// Warning or error.
+    pub severity: Severity,
+    /// What it says.
+    pub text: String,
+}
+
+/// A Vulkan object that was created.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Created {
+    /// `buffer`, `image`, `pipeline` or `sampler`.
+    pub kind: &'static str,
+    /// Its label.
+    pub name: String,
+    /// Memory bound to it.
+    pub bytes: u64,
+}
+
+type Messages = Mutex<Vec<Message>>;
+
+/// Locks without caring about a panic elsewhere: the data is only counters and caches.
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The instance with everything that hangs on it.
+pub(super) struct Instance {
+    pub(super) entry: ash::Entry,
+    pub(super) raw: ash::Instance,
+    debug: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    has_debug_utils: bool,
+    messages: Box<Messages>,
+    /// Given back last, when nothing of this instance is left in the validation layer.
+    _turn: Option<Turn>,
+}
+
+impl Instance {
+    /// Under validation with the right to it.
+    pub(super) fn new(turn: Option<Turn>, wanted_extensions: &[*const c_char]) -> Result<Self> {
+        let validate = turn.is_some();
+        // SAFETY: the loader is a shared library that stays loaded as long as `entry` lives.
+        let entry = unsafe { ash::Entry::load() }
+            .map_err(|e| anyhow!("no Vulkan loader (Debian: libvulkan1, mesa-vulkan-drivers): {e}"))?;
+        // SAFETY: plain queries.
+        let (extensions, layers) = unsafe {
+            (entry.enumerate_instance_extension_properties(None)?, entry.enumerate_instance_layer_properties()?)
+        };
+        let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+        for &wanted in wanted_extensions {
+            // SAFETY: names out of ash's own tables.
+            let wanted = unsafe { CStr::from_ptr(wanted) };
+            ensure!(has(wanted), "the Vulkan loader cannot show windows here: it lacks {}", wanted.to_string_lossy());
+        }
+        let mut enabled = wanted_extensions.to_vec();
+        let mut flags = vk::InstanceCreateFlags::empty();
+        let has_debug_utils = has(ext::debug_utils::NAME);
+        if has_debug_utils {
+            enabled.push(ext::debug_utils::NAME.as_ptr());
+        }
+        if has(khr::portability_enumeration::NAME) {
+            enabled.push(khr::portability_enumeration::NAME.as_ptr());
+            flags |= vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
+        }
+        let mut layer_names = Vec::new();
+        if validate {
+            if !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
+                bail!("validation needs the Khronos validation layer (Debian: vulkan-validationlayers)");
+            }
+            layer_names.push(VALIDATION_LAYER.as_ptr());
+            enabled.push(ext::validation_features::NAME.as_ptr());
+        }
+        let app = vk::ApplicationInfo::default().application_name(c"etalon").api_version(vk::API_VERSION_1_3);
+        let wanted = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+        let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&wanted);
+        let mut info = vk::InstanceCreateInfo::default()
+            .application_info(&app)
+            .enabled_extension_names(&enabled)
+            .enabled_layer_names(&layer_names)
+            .flags(flags);
+        if validate {
+            info = info.push_next(&mut features);
+        }
+        // SAFETY: `info` points at data that outlives the call.
+        let raw = unsafe { entry.create_instance(&info, None) }.context("creating a Vulkan 1.3 instance")?;
+        let messages: Box<Messages> = Box::default();
+        let debug = if validate {
+            let utils = ext::debug_utils::Instance::new(&entry, &raw);
+            let create = vk::DebugUtilsMessengerCreateInfoEXT::default()
+                .message_severity(
+                    vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
+                )
+                .message_type(
+                    vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION | vk::DebugUtilsMessageTypeFlagsEXT::GENERAL,
+                )
+                .pfn_user_callback(Some(on_message))
+                .user_data(std::ptr::from_ref::<Messages>(&messages).cast_mut().cast());
+            // SAFETY: the box behind `user_data` is freed after the messenger is destroyed.
+            let messenger = unsafe { utils.create_debug_utils_messenger(&create, None) }?;
+            Some((utils, messenger))
+        } else {
+            None
+        };
+        Ok(Self { entry, raw, debug, has_debug_utils, messages, _turn: turn })
+    }
+
+    fn candidates(&self, surface: Option<&Surface>) -> Result<Vec<Candidate>> {
+        // SAFETY: plain queries on a live instance.
+        let devices = unsafe { self.raw.enumerate_physical_devices() }.context("listing Vulkan devices")?;
+        Ok(devices.into_iter().map(|physical| self.candidate(physical, surface)).collect())
+    }
+
+    fn candidate(&self, physical: vk::PhysicalDevice, surface: Option<&Surface>) -> Candidate {
+        let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut push = vk::PhysicalDevicePushDescriptorPropertiesKHR::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut push);
+        // SAFETY: plain queries; the chain outlives the call.
+        unsafe { self.raw.get_physical_device_properties2(physical, &mut properties) };
+        let properties = properties.properties;
+        let text = |s: Result<&CStr, _>| s.map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+        let version =
+            |v: u32| format!("{}.{}.{}", vk::api_version_major(v), vk::api_version_minor(v), vk::api_version_patch(v));
+        let info = DeviceInfo {
+            name: text(properties.device_name_as_c_str()),
+            driver: format!("{} {}", text(driver.driver_name_as_c_str()), text(driver.driver_info_as_c_str())),
+            version: version(properties.driver_version),
+            kind: match properties.device_type {
+                vk::PhysicalDeviceType::CPU => "cpu",
+                vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
+                vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
+                vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
+                _ => "other",
+            },
+            api: version(properties.api_version),
+        };
+        let mut missing = self.missing(physical, properties.api_version, push.max_push_descriptors, properties.limits);
+        missing.extend(
+            surface
+                .filter(|surface| !surface.is_shown_by(&self.raw, physical))
+                .map(|_| "a way to show pictures in this window".to_owned()),
+        );
+        Candidate { info, missing, physical }
+    }
+
+    /// What the device lacks, each with the Mesa version that brings it where that helps.
+    fn missing(
+        &self,
+        physical: vk::PhysicalDevice,
+        api: u32,
+        push_descriptors: u32,
+        limits: vk::PhysicalDeviceLimits,
+    ) -> Vec<String> {
+        if api < vk::API_VERSION_1_3 {
+            return vec!["Vulkan 1.3 (lavapipe: Mesa 22.1 or newer)".to_owned()];
+        }
+        let mut missing = Vec::new();
+        let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
+        let mut v13 = vk::PhysicalDeviceVulkan13Features::default();
+        let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut v12).push_next(&mut v13);
+        // SAFETY: plain queries; the chain outlives the call.
+        let (extensions, families) = unsafe {
+            self.raw.get_physical_device_features2(physical, &mut all);
+            (
+                self.raw.enumerate_device_extension_properties(physical).unwrap_or_default(),
+                self.raw.get_physical_device_queue_family_properties(physical),
+            )
+        };
+        let core = all.features;
+        for (has, what) in [
+            (core.fragment_stores_and_atomics, "feature fragmentStoresAndAtomics"),
+            (core.shader_storage_image_extended_formats, "feature shaderStorageImageExtendedFormats"),
+            (core.full_draw_index_uint32, "feature fullDrawIndexUint32"),
+            (core.geometry_shader, "feature geometryShader (for gl_PrimitiveID in fragments)"),
+            (v12.timeline_semaphore, "feature timelineSemaphore"),
+            (v12.scalar_block_layout, "feature scalarBlockLayout (lavapipe: Mesa 21.1 or newer)"),
+            (v13.dynamic_rendering, "feature dynamicRendering (lavapipe: Mesa 22.1 or newer)"),
+            (v13.maintenance4, "feature maintenance4 (lavapipe: Mesa 22.1 or newer)"),
+            (v13.synchronization2, "feature synchronization2 (lavapipe: Mesa 22.1 or newer)"),
+        ] {
+            if has == vk::FALSE {
+                missing.push(what.to_owned());
+            }
+        }
+        use vk::FormatFeatureFlags as F;
+        let target = F::COLOR_ATTACHMENT | F::STORAGE_IMAGE;
+        for (format, uses, what) in [
+            (vk::Format::R16G16B16A16_SFLOAT, target, "colour targets and storage images of RGBA16_SFLOAT"),
+            (vk::Format::R16G16B16A16_SNORM, target, "colour targets and storage images of RGBA16_SNORM"),
+            (vk::Format::R16G16B16A16_UNORM, target, "colour targets and storage images of RGBA16_UNORM"),
+            (vk::Format::R32G32_UINT, target, "colour targets and storage images of RG32_UINT"),
+            (vk::Format::R32G32B32A32_SFLOAT, F::SAMPLED_IMAGE_FILTER_LINEAR, "linear filtering of RGBA32_SFLOAT"),
+        ] {
+            // SAFETY: a plain query.
+            let has = unsafe { self.raw.get_physical_device_format_properties(physical, format) };
+            if !has.optimal_tiling_features.contains(uses) {
+                missing.push(what.to_owned());
+            }
+        }
+        for (has, needed, what) in [
+            (limits.max_per_stage_descriptor_storage_images, STORAGE_IMAGES, "storage images in a shader"),
+            (limits.max_per_stage_descriptor_storage_buffers, STORAGE_BUFFERS, "storage buffers in a shader"),
+            (limits.max_per_stage_descriptor_uniform_buffers, UNIFORM_BUFFERS, "uniform buffers in a shader"),
+            (limits.max_color_attachments, 7, "colour targets"),
+            (limits.max_texel_buffer_elements, 1 << 22, "texels in a buffer"),
+        ] {
+            if has < needed {
+                missing.push(format!("{needed} {what} (it has {has})"));
+            }
+        }
+        if !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::push_descriptor::NAME)) {
+            missing.push("extension VK_KHR_push_descriptor (lavapipe: Mesa 20.3 or newer)".to_owned());
+        } else if push_descriptors < PUSH_DESCRIPTORS {
+            missing.push(format!("{PUSH_DESCRIPTORS} push descriptors (it has {push_descriptors})"));
+        }
+        if !families.iter().any(|f| f.queue_flags.contains(QUEUE)) {
+            missing.push("a queue with graphics and compute".to_owned());
+        }
+        missing
+    }
+}
+
+pub(super) const QUEUE: vk::QueueFlags =
+    vk::QueueFlags::from_raw(vk::QueueFlags::GRAPHICS.as_raw() | vk::QueueFlags::COMPUTE.as_raw());
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        // SAFETY: the device, the only child, is gone; the messenger goes before the box it writes to.
+        unsafe {
+            if let Some((utils, messenger)) = &self.debug {
+                utils.destroy_debug_utils_messenger(*messenger, None);
+            }
+            self.raw.destroy_instance(None);
+        }
+    }
+}
+
+unsafe extern "system" fn on_message(
+    severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    user: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: Vulkan passes valid callback data, and `user` is the messages' box (see `Instance::new`).
+    let (text, messages) = unsafe {
+        let text = CStr::from_ptr((*data).p_message).to_string_lossy().into_owned();
+        (text, &*user.cast::<Messages>())
+    };
+    let error = severity.contains(vk::DebugUtilsMessageSeverityFlagsEXT::ERROR);
+    let severity = if error { Severity::Error } else { Severity::Warning };
+    tracing::warn!(target: "validation", "{text}");
+    lock(messages).push(Message { severity, text });
+    vk::FALSE
+}
+
+/// All devices that Vulkan offers here, in the order of `--device INDEX`.
+pub fn candidates() -> Result<Vec<Candidate>> {
+    Instance::new(None, &[])?.candidates(None)
+}
+
+fn choose(all: Vec<Candidate>, choice: &DeviceChoice) -> Result<Candidate> {
+    if all.is_empty() {
+        bail!("Vulkan offers no device here (Debian: install mesa-vulkan-drivers for the software device)");
+    }
+    let names = all.iter().map(|c| format!("\"{}\"", c.info.name)).collect::<Vec<_>>().join(", ");
+    let mut wanted: Vec<(usize, Candidate)> = all
+        .into_iter()
+        .enumerate()
+        .filter(|(index, c)| match choice {
+            DeviceChoice::Best => true,
+            DeviceChoice::Cpu => c.info.kind == "cpu",
+            DeviceChoice::Gpu => c.info.kind != "cpu",
+            DeviceChoice::Index(i) => i == index,
+            DeviceChoice::Name(name) => c.info.name.to_lowercase().contains(&name.to_lowercase()),
+        })
+        .collect();
+    // A usable device of lower rank beats an unusable one.
+    wanted.sort_by_key(|(index, c)| (!c.missing.is_empty(), c.info.rank(), *index));
+    let Some((_, best)) = wanted.into_iter().next() else {
+        let what = match choice {
+            DeviceChoice::Best => "a device".to_owned(),
+            DeviceChoice::Cpu => "a software device".to_owned(),
+            DeviceChoice::Gpu => "a GPU".to_owned(),
+            DeviceChoice::Index(i) => format!("a device of index {i}"),
+            DeviceChoice::Name(name) => format!("a device named like \"{name}\""),
+        };
+        bail!("asked for {what}, Vulkan offers {names}");
+    };
+    if !best.missing.is_empty() {
+        bail!("device \"{}\" ({}) lacks {}", best.info.name, best.info.driver, best.missing.join(", "));
+    }
+    Ok(best)
+}
+
+/// Why a frame was not drawn to its end: somebody wants another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Interrupted;
+
+impl std::fmt::Display for Interrupted {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "the frame was given up for another")
+    }
+}
+
+impl std::error::Error for Interrupted {}
+
+/// Whether the device is gone: nothing that it holds can be used again.
+#[must_use]
+pub fn is_lost(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| cause.downcast_ref() == Some(&vk::Result::ERROR_DEVICE_LOST))
+}
+
+/// A Vulkan device, its one queue, and the caches of what was made on it.
+pub struct Device {
+    pub(super) raw: ash::Device,
+    pub(super) queue: Mutex<vk::Queue>,
+    pub(super) commands: Mutex<vk::CommandPool>,
+    pub(super) timeline: vk::Semaphore,
+    pub(super) push: khr::push_descriptor::Device,
+    pub(super) debug: Option<ext::debug_utils::Device>,
+    pub(super) allocator: Mutex<ManuallyDrop<Allocator>>,
+    pub(super) caches: Mutex<Caches>,
+    pub(super) limits: vk::PhysicalDeviceLimits,
+    adds_in_subgroups: bool,
+    pub(super) submitted: AtomicU64,
+    /// Dispatches that were drawn in more than one piece.
+    pub(super) cut: AtomicU64,
+    /// Somebody wants what is drawn to be given up, and whoever draws it agrees.
+    interrupted: AtomicBool,
+    interruptible: AtomicBool,
+    next_id: AtomicU64,
+    created: Mutex<Vec<Created>>,
+    objects: AtomicU64,
+    info: DeviceInfo,
+    #[cfg(feature = "window")]
+    pub(super) physical: vk::PhysicalDevice,
+    #[cfg(feature = "window")]
+    pub(super) family: u32,
+    /// A window shares its queue: nothing that is submitted takes long.
+    pub(super) turns: bool,
+    /// Milliseconds of a group of invocations in the last dispatch of each name, where `turns`.
+    pub(super) paces: Mutex<HashMap<String, f64>>,
+    pub(super) instance: Instance,
+}
+
+impl Device {
+    /// Opens the chosen device; with `validate`, core and synchronization validation report into [`Device::messages`].
+    ///
+    /// Renderers in several threads may share a device: their frames take turns. Without validation each may have a device of
+    /// its own. Under validation a process has one device at a time, as the layer breaks with two: a second call gives the same
+    /// device, with the messages of all who use it.
+    ///
+    /// # Errors
+    /// One sentence when there is no loader, no such device, the device lacks something that Etalon needs, or another one is
+    /// open under validation.
+    pub fn open(choice: &DeviceChoice, validate: bool) -> Result<Arc<Self>> {
+        Self::open_alone(choice, validate.then(|| Wish::Plain(choice.clone())), false)
+    }
+
+    /// The same, and what is submitted is cut into short pieces, as beside a window.
+    ///
+    /// # Errors
+    /// As [`Device::open`].
+    pub fn open_taking_turns(choice: &DeviceChoice, validate: bool) -> Result<Arc<Self>> {
+        Self::open_alone(choice, validate.then(|| Wish::TakingTurns(choice.clone())), true)
+    }
+
+    fn open_alone(choice: &DeviceChoice, validated: Option<Wish>, turns: bool) -> Result<Arc<Self>> {
+        let turn = match validated.map(validated::take).transpose()? {
+            Some(Validated::Shared(device)) => return Ok(device),
+            Some(Validated::Mine(turn)) => Some(turn),
+            None => None,
+        };
+        Self::open_on(Instance::new(turn, &[])?, choice, None, turns)
+    }
+
+    /// The same with a surface that it can show pictures on.
+    pub(super) fn open_on(
+        instance: Instance,
+        choice: &DeviceChoice,
+        surface: Option<&Surface>,
+        turns: bool,
+    ) -> Result<Arc<Self>> {
+        let Candidate { info, physical, .. } = choose(instance.candidates(surface)?, choice)?;
+        let opening = || format!("opening device \"{}\"", info.name);
+        // SAFETY: plain queries on a live instance.
+        let (families, properties, extensions) = unsafe {
+            (
+                instance.raw.get_physical_device_queue_family_properties(physical),
+                instance.raw.get_physical_device_properties(physical),
+                instance.raw.enumerate_device_extension_properties(physical)?,
+            )
+        };
+        let family = families
+            .iter()
+            .enumerate()
+            .position(|(i, f)| {
+                f.queue_flags.contains(QUEUE)
+                    && surface.is_none_or(|surface| surface.is_shown_by_family(physical, i as u32))
+            })
+            .ok_or_else(|| anyhow!("no queue with graphics and compute"))
+            .with_context(opening)? as u32;
+
+        let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
+        let mut names = vec![khr::push_descriptor::NAME.as_ptr()];
+        names.extend(surface.map(|_| khr::swapchain::NAME.as_ptr()));
+        if extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::portability_subset::NAME)) {
+            names.push(khr::portability_subset::NAME.as_ptr());
+        }
+        let core = vk::PhysicalDeviceFeatures::default()
+            .fragment_stores_and_atomics(true)
+            .shader_storage_image_extended_formats(true)
+            .full_draw_index_uint32(true)
+            .geometry_shader(true);
+        let mut v12 = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true).scalar_block_layout(true);
+        let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
+            .dynamic_rendering(true)
+            .synchronization2(true)
+            .maintenance4(true);
+        let create = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_extension_names(&names)
+            .enabled_features(&core)
+            .push_next(&mut v12)
+            .push_next(&mut v13);
+        // SAFETY: everything `create` asks for was found present by `Instance::missing`.
+        let raw = unsafe { instance.raw.create_device(physical, &create, None) }.with_context(opening)?;
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.raw.clone(),
+            device: raw.clone(),
+            physical_device: physical,
+            debug_settings: gpu_allocator::AllocatorDebugSettings::default(),
+            buffer_device_address: false,
+            // Small blocks: an idle 256 MiB block is most of a software renderer's memory.
+            allocation_sizes: gpu_allocator::AllocationSizes::new(16 << 20, 8 << 20),
+        })
+        .with_context(opening)?;
+        let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
+        let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut v11);
+        // SAFETY: a plain query; the chain outlives the call.
+        unsafe { instance.raw.get_physical_device_properties2(physical, &mut all) };
+        let adds_in_subgroups = v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
+            && v11.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::ARITHMETIC);
+        // SAFETY: the family was created above; the create infos outlive the calls.
+        let (queue, commands, timeline) = unsafe {
+            let pool = vk::CommandPoolCreateInfo::default()
+                .queue_family_index(family)
+                .flags(vk::CommandPoolCreateFlags::TRANSIENT);
+            let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+            (
+                raw.get_device_queue(family, 0),
+                raw.create_command_pool(&pool, None).with_context(opening)?,
+                raw.create_semaphore(&vk::SemaphoreCreateInfo::default().push_next(&mut kind), None)
+                    .with_context(opening)?,
+            )
+        };
+        let device = Arc::new(Self {
+            push: khr::push_descriptor::Device::new(&instance.raw, &raw),
+            debug: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw)),
+            raw,
+            queue: Mutex::new(queue),
+            commands: Mutex::new(commands),
+            timeline,
+            allocator: Mutex::new(ManuallyDrop::new(allocator)),
+            caches: Mutex::default(),
+            limits: properties.limits,
+            adds_in_subgroups,
+            submitted: AtomicU64::new(0),
+            cut: AtomicU64::new(0),
+            interrupted: AtomicBool::new(false),
+            interruptible: AtomicBool::new(false),
+            next_id: AtomicU64::new(1),
+            created: Mutex::default(),
+            objects: AtomicU64::new(0),
+            info,
+            #[cfg(feature = "window")]
+            physical,
+            #[cfg(feature = "window")]
+            family,
+            turns,
+            paces: Mutex::default(),
+            instance,
+        });
+        if device.validates() {
+            validated::share(&device);
+        }
+        Ok(device)
+    }
+
+    /// Who this is.
+    #[must_use]
+    pub fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    /// Whether the validation layer listens.
+    pub(super) fn validates(&self) -> bool {
+        self.instance.debug.is_some()
+    }
+
+    /// What the validation layer has said so far.
+    #[must_use]
+    pub fn messages(&self) -> Vec<Message> {
+        lock(&self.instance.messages).clone()
+    }
+
+    /// Every object created so far, in order; none of a device that takes turns.
+    #[must_use]
+    pub fn created(&self) -> Vec<Created> {
+        lock(&self.created).clone()
+    }
+
+    /// Bytes of device memory in blocks now.
+    #[must_use]
+    pub fn memory_bytes(&self) -> u64 {
+        lock(&self.allocator).generate_report().total_capacity_bytes
+    }
+
+    /// Whether the driver ends all loops of an invocation, in silence, after 65,535 evaluations of their heads: lavapipe.
+    #[must_use]
+    pub fn limits_loops(&self) -> bool {
+        self.is_software()
+    }
+
+    /// Whether the device is the processor itself: its memory is the process's own.
+    pub(super) fn is_software(&self) -> bool {
+        self.info.kind == "cpu"
+    }
+
+    /// Largest width and height of a 2D image and of a viewport.
+    #[must_use]
+    pub fn max_image_size(&self) -> u32 {
+        self.limits.max_image_dimension2_d.min(self.limits.max_viewport_dimensions[0])
+    }
+
+    /// Largest storage buffer binding in bytes.
+    #[must_use]
+    pub fn max_storage_bytes(&self) -> u64 {
+        u64::from(self.limits.max_storage_buffer_range)
+    }
+
+    /// Whether invocations of a compute shader add up numbers among them, a subgroup at a time.
+    #[must_use]
+    pub fn adds_in_subgroups(&self) -> bool {
+        self.adds_in_subgroups
+    }
+
+    /// Buffers, images, pipelines and samplers that there are now.
+    #[must_use]
+    pub fn objects(&self) -> u64 {
+        self.objects.load(Ordering::Relaxed)
+    }
+
+    /// Gives up what is drawn within [`Device::interruptible`], now or the next time, until [`Device::resume`].
+    pub fn interrupt(&self) {
+        self.interrupted.store(true, Ordering::Relaxed);
+    }
+
+    /// Takes [`Device::interrupt`] back.
+    pub fn resume(&self) {
+        self.interrupted.store(false, Ordering::Relaxed);
+    }
+
+    /// Draws frames that may be given up between two pieces, where the device takes turns: they end with [`Interrupted`].
+    pub fn interruptible<T>(&self, draw: impl FnOnce() -> T) -> T {
+        self.interruptible.store(true, Ordering::Relaxed);
+        let drawn = draw();
+        self.interruptible.store(false, Ordering::Relaxed);
+        drawn
+    }
+
+    pub(super) fn go_on(&self) -> Result<()> {
+        let is_over = self.interruptible.load(Ordering::Relaxed) && self.interrupted.load(Ordering::Relaxed);
+        if is_over { Err(Interrupted.into()) } else { Ok(()) }
+    }
+
+    /// Dispatches so far that were drawn in more than one piece.
+    #[must_use]
+    pub fn cut(&self) -> u64 {
+        self.cut.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn gone(&self) {
+        self.objects.fetch_sub(1, Ordering::Relaxed);
+    }
+
+    pub(super) fn note(&self, kind: &'static str, name: &str, bytes: u64) {
+        self.objects.fetch_add(1, Ordering::Relaxed);
+        // A window goes on for hours: a list of all that it made would grow as long.
+        if self.turns {
+            return;
+        }
+        lock(&self.created).push(Created { kind, name: name.to_owned(), bytes });
+    }
+
+    pub(super) fn next_id(&self) -> u64 {
+        self.next_id.fetch_add(1, Ordering::Relaxed)
+    }
+
+    /// Gives an object a name for validation messages and captures.
+    pub(super) fn name<H: vk::Handle>(&self, object: H, name: &str) {
+        if let Some(debug) = &self.debug {
+            let name = CString::new(name.replace('\0', " ")).unwrap_or_default();
+            let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
+            // SAFETY: the object is alive. A name that cannot be set is not worth an error.
+            let _ = unsafe { debug.set_debug_utils_object_name(&info) };
+        }
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        // SAFETY: every buffer, image and frame holds an `Arc` of the device, so none is left; the allocator goes before
+        // the device it allocates from.
+        unsafe {
+            let _ = self.raw.device_wait_idle();
+            lock(&self.caches).destroy(&self.raw);
+            ManuallyDrop::drop(&mut lock(&self.allocator));
+            self.raw.destroy_semaphore(self.timeline, None);
+            self.raw.destroy_command_pool(*lock(&self.commands), None);
+            self.raw.destroy_device(None);
+        }
+        // `instance` is dropped after this; it keeps `entry`, the loader's library, until then.
+        let _ = &self.instance.entry;
+    }
+}
+
+impl std::fmt::Debug for Device {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Device({})", self.info.name)
+    }
+}

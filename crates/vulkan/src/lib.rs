@@ -1,0 +1,47 @@
+//! Explicit Vulkan without a renderer in it: devices, memory, pipelines, and frames with derived barriers.
+//!
+//! The only part of Etalon that is allowed `unsafe`: every call into the driver is here, and each block says why it is
+//! sound. Objects own a reference to their [`Device`] and destroy themselves; a [`Frame`] has always finished on the
+//! device when [`Frame::finish`] returns, so nothing is ever destroyed while in use.
+#![allow(unsafe_code, reason = "the one room that talks to the driver")]
+
+mod access;
+mod bind;
+mod cache;
+mod device;
+mod frame;
+pub mod limits;
+mod loops;
+mod memory;
+mod pipeline;
+#[cfg(feature = "window")]
+mod present;
+mod recording;
+mod set;
+mod shader;
+mod specialize;
+mod surface;
+pub mod sync;
+mod turns;
+mod validated;
+#[cfg(feature = "window")]
+mod window;
+
+pub use access::Access;
+pub use bind::{Bindings, Resource, Sampled};
+pub use cache::SamplerDesc;
+pub use device::{
+    Candidate, Created, Device, DeviceChoice, DeviceInfo, Interrupted, Message, Severity, candidates, is_lost,
+};
+pub use frame::{ColorTarget, DepthTarget, Draw, Frame, PassPlan, PassTime, Raster, VertexStream};
+pub use loops::with_loops_counted;
+pub use memory::{Buffer, Image, ImageDesc, NOTHING, Place};
+#[cfg(feature = "window")]
+pub use present::{Overlay, Placed, Presented, Presenter};
+pub use set::{BoundSet, DescriptorSet};
+pub use shader::{
+    Binding, BindingKind, Constant, Program, Replacement, SetLayout, SharedSet, Specialization, Stage, VertexInput,
+};
+pub use specialize::specialized;
+#[cfg(feature = "window")]
+pub use window::Windowed;

@@ -1,0 +1,137 @@
+//! Where surfaces lie in each other: transparent bodies against others, whose faces are crossed together, and triangles
+//! that are there twice.
+
+use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::bvh::{Aabb, Bvh, Node, Triangle};
+
+/// Whether some triangle of an instance for which `is_body` says so lies in the plane of a triangle of another instance,
+/// within `distance` metres, and their boxes overlap. Triangles in one plane that only have boxes in common count, too: that
+/// costs time. Shells of one mesh that touch each other are not looked for: near the pole of a ball, triangles that are not
+/// even neighbours lie in one plane.
+#[must_use]
+pub fn bodies_touch(bvh: &Bvh, is_body: &[bool], distance: f64) -> bool {
+    bvh.triangles.par_iter().filter(|t| is_body[t.instance as usize]).any(|t| touches(bvh, t, distance))
+}
+
+/// Pairs of instances, the same one twice for itself, and how many triangles of the one have the same three corners as one
+/// of the other, whichever way round.
+#[must_use]
+pub fn twins(bvh: &Bvh) -> BTreeMap<[u32; 2], usize> {
+    let corners = |triangle: &Triangle| {
+        let mut corners = triangle.corners.map(|corner| corner.map(|x| (x + 0.0).to_bits()));
+        corners.sort_unstable();
+        corners
+    };
+    let mut named: Vec<(u64, u32)> = bvh
+        .triangles
+        .par_iter()
+        .enumerate()
+        .map(|(i, triangle)| {
+            let mut name = DefaultHasher::new();
+            corners(triangle).hash(&mut name);
+            (name.finish(), i as u32)
+        })
+        .collect();
+    named.par_sort_unstable();
+    let mut found = BTreeMap::new();
+    for same in named.chunk_by(|a, b| a.0 == b.0) {
+        for pair in same.windows(2) {
+            let [a, b] = [pair[0], pair[1]].map(|(_, i)| &bvh.triangles[i as usize]);
+            if corners(a) == corners(b) {
+                *found.entry([a.instance.min(b.instance), a.instance.max(b.instance)]).or_default() += 1;
+            }
+        }
+    }
+    found
+}
+
+fn touches(bvh: &Bvh, triangle: &Triangle, distance: f64) -> bool {
+    let around = triangle.bounds();
+    let apart = |other: &Aabb| {
+        (0..3).any(|i| {
+            let gap = (f64::from(other.min[i]) - f64::from(around.max[i]))
+                .max(f64::from(around.min[i]) - f64::from(other.max[i]));
+            gap > distance
+        })
+    };
+    let mut open = vec![0];
+    while let Some(i) = open.pop() {
+        let node = &bvh.nodes[i as usize];
+        if apart(node.bounds()) {
+            continue;
+        }
+        match node {
+            Node::Inner { children, .. } => open.extend(children),
+            Node::Leaf { first, count, .. } => {
+                let inside = &bvh.triangles[*first as usize..(*first + *count) as usize];
+                let coincides = |other: &Triangle| {
+                    other.instance != triangle.instance
+                        && !apart(&other.bounds())
+                        && (in_plane(triangle, other, distance) || in_plane(other, triangle, distance))
+                };
+                if inside.iter().any(coincides) {
+                    return true;
+                }
+            }
+        }
+    }
+    false
+}
+
+/// Whether the corners of `small` lie in the plane of `large`. The plane of a small triangle is not known as far away as a
+/// large one reaches: the caller asks both ways.
+fn in_plane(large: &Triangle, small: &Triangle, distance: f64) -> bool {
+    let [a, b, c] = corners(large);
+    let n = (b - a).cross(c - a).normalize_or_zero();
+    corners(small).iter().all(|p| (p - a).dot(n).abs() <= distance)
+}
+
+fn corners(triangle: &Triangle) -> [DVec3; 3] {
+    triangle.corners.map(|p| Vec3::from(p).as_dvec3())
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DAffine3;
+
+    use super::*;
+    use crate::scene::{Instance, Material, Mesh, Scene};
+
+    /// Two triangles: a square of that side at that height, turned about an axis that makes its coordinates round.
+    fn squares(placed: &[(f32, f32)]) -> Bvh {
+        let mut scene = Scene { materials: vec![Material::default()], ..Scene::default() };
+        for (i, &(side, height)) in placed.iter().enumerate() {
+            let corner = |x: f32, y: f32| [x * side, y * side, height];
+            scene.meshes.push(Mesh {
+                positions: vec![corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)].into(),
+                indices: vec![0, 1, 2, 0, 2, 3].into(),
+                ..Mesh::default()
+            });
+            let world_from_object = DAffine3::from_axis_angle(DVec3::new(0.3, 0.7, 0.2).normalize(), 0.9);
+            scene.instances.push(Instance { name: String::new(), mesh: i, world_from_object });
+        }
+        Bvh::build(&scene).unwrap()
+    }
+
+    #[test]
+    fn small_and_large_faces_in_one_plane_touch_both_ways() {
+        let offset = 32.0 * 5.0 * 2_f64.powi(-24);
+        let bvh = squares(&[(10.0, 0.5), (0.01, 0.5), (1.0, 0.501)]);
+        assert!(bodies_touch(&bvh, &[true, false, false], offset));
+        assert!(bodies_touch(&bvh, &[false, true, false], offset));
+        assert!(!bodies_touch(&bvh, &[false, false, true], offset), "a millimetre is no contact");
+        assert!(!bodies_touch(&bvh, &[false; 3], offset));
+    }
+
+    #[test]
+    fn triangles_that_are_there_twice_are_found() {
+        assert!(twins(&squares(&[(1.0, 0.0), (1.0, 0.1), (2.0, 0.0)])).is_empty());
+        let found = twins(&squares(&[(1.0, 0.0), (2.0, 0.0), (1.0, 0.0)]));
+        assert_eq!(found.into_iter().collect::<Vec<_>>(), [([0, 2], 2)]);
+    }
+}

@@ -1,0 +1,276 @@
+//! What light comes from, with the probability that a path looks there (lecture R2–R4): in proportion to power.
+
+use glam::{DMat3, DVec3};
+
+use crate::image::tone::srgb_decode;
+use crate::scene::environment::{Environment, direction};
+use crate::scene::{AlphaMode, Image, Light, LightKind, Material, Scene};
+
+/// Where light comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Source {
+    /// The environment.
+    Sky,
+    /// A light without extent, as an index of the scene's.
+    Punctual(u32),
+    /// A triangle, as an index of the scene's with instances counted.
+    Triangle {
+        /// Which.
+        index: u32,
+        /// Square metres.
+        area: f64,
+        /// It emits on both sides.
+        two_sided: bool,
+    },
+}
+
+/// One of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Emitter {
+    /// What it is.
+    pub source: Source,
+    /// First word of its share of all 32-bit words.
+    pub first: u32,
+    /// Size of that share over 2³².
+    pub probability: f64,
+}
+
+/// All of them: the environment first, then lights, then triangles.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Emitters {
+    /// In order of their shares.
+    pub list: Vec<Emitter>,
+    /// How the environment is drawn.
+    pub sky: SkyShares,
+}
+
+/// The environment as cells of equal width and height, each with its share of all words: rows first, then, row by row, columns.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SkyShares {
+    /// Cells across.
+    pub columns: u32,
+    /// And down.
+    pub rows: u32,
+    /// First words.
+    pub words: Vec<u32>,
+    /// By how much it is turned about +Y, degrees.
+    pub rotation: f64,
+}
+
+/// An environment that lights a scene.
+#[derive(Debug, Clone, Copy)]
+pub struct Sky<'a> {
+    /// What it shows.
+    pub map: &'a Environment,
+    /// Multiplies its radiance.
+    pub intensity: f32,
+    /// Degrees about +Y.
+    pub rotation: f32,
+}
+
+/// First words of shares of all 32-bit words in proportion to weights, none of them empty; and their sizes over 2³².
+fn shares(weights: &[f64]) -> Vec<(u32, f64)> {
+    const ALL: f64 = 4_294_967_296.0;
+    let count = weights.len() as f64;
+    let sum: f64 = weights.iter().sum();
+    let even = !(sum > 0.0 && sum.is_finite());
+    let mut before = 0.0;
+    let mut firsts: Vec<u64> = Vec::with_capacity(weights.len() + 1);
+    for (i, weight) in weights.iter().enumerate() {
+        let share = if even { i as f64 / count } else { before / sum };
+        firsts.push((share * (ALL - count)) as u64 + i as u64);
+        before += weight;
+    }
+    firsts.push(ALL as u64);
+    firsts.windows(2).map(|pair| (pair[0] as u32, (pair[1] - pair[0]) as f64 / ALL)).collect()
+}
+
+fn mean(rgb: [f32; 3]) -> f64 {
+    rgb.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0
+}
+
+/// Whether paths look for places on a surface: it emits, and nothing else decides how much of that is seen.
+fn is_emitter(material: &Material) -> bool {
+    !material.unlit
+        && material.emissive.iter().any(|&c| c > 0.0)
+        && material.alpha_mode == AlphaMode::Opaque
+        && material.clearcoat == 0.0
+}
+
+/// Power of a light over what one of radiance 1 and a square metre sends from one side, π: for directional ones, through the
+/// scene's largest section.
+fn power(light: &Light, radius: f64) -> f64 {
+    use std::f64::consts::PI;
+    let towards = match light.kind {
+        LightKind::Directional { .. } => PI * radius * radius,
+        LightKind::Spot { .. } if light.extent.is_some() => PI,
+        LightKind::Spot { outer, .. } => 2.0 * PI * (1.0 - outer.cos()),
+        LightKind::Point { .. } => 4.0 * PI,
+    };
+    mean(light.color) * towards
+}
+
+impl Emitters {
+    /// Of a scene, its environment times an intensity, and, with `surfaces`, what emits in it.
+    #[must_use]
+    pub fn of(scene: &Scene, environment: Option<Sky>, surfaces: bool) -> Self {
+        use std::f64::consts::PI;
+        let radius = scene.bounds().map_or(1.0, |bounds| bounds.radius());
+        let mut sources = Vec::new();
+        let mut weights = Vec::new();
+        let mut sky = SkyShares::default();
+        // One that is the same everywhere is found as well by the direction that is followed anyway.
+        if let Some(around) = environment.filter(|sky| !sky.map.is_constant() && sky.intensity > 0.0) {
+            let radiance = around.map.mean().iter().sum::<f64>() / 3.0 * f64::from(around.intensity);
+            if radiance > 0.0 {
+                sky = SkyShares::of(around.map);
+                sky.rotation = f64::from(around.rotation);
+                sources.push(Source::Sky);
+                weights.push(PI * radius * radius * 4.0 * PI * radiance);
+            }
+        }
+        for (i, light) in scene.lights.iter().enumerate().filter(|(_, light)| light.shines()) {
+            sources.push(Source::Punctual(i as u32));
+            weights.push(power(light, radius));
+        }
+        if surfaces {
+            for (source, weight) in triangles(scene) {
+                sources.push(source);
+                weights.push(weight);
+            }
+        }
+        let shares = shares(&weights);
+        let list = sources.into_iter().zip(shares).map(|(source, (first, probability))| Emitter {
+            source,
+            first,
+            probability,
+        });
+        Self { list: list.collect(), sky }
+    }
+}
+
+/// Mean of a picture's texels, which are stored with the sRGB curve.
+fn mean_of(image: &Image) -> f64 {
+    let mut counts = [0_u64; 256];
+    for texel in image.rgba.as_chunks::<4>().0 {
+        texel[..3].iter().for_each(|&byte| counts[usize::from(byte)] += 1);
+    }
+    let total: u64 = counts.iter().sum();
+    let decoded = counts.iter().enumerate().map(|(i, &n)| srgb_decode(i as f64 / 255.0) * n as f64);
+    decoded.sum::<f64>() / total.max(1) as f64
+}
+
+/// The triangles that emit, with their power.
+fn triangles(scene: &Scene) -> Vec<(Source, f64)> {
+    use std::f64::consts::PI;
+    let radiance: Vec<f64> = scene
+        .materials
+        .iter()
+        .map(|material| match is_emitter(material) {
+            true => {
+                mean(material.emissive) * material.emissive_texture.map_or(1.0, |t| mean_of(&scene.images[t.image]))
+            }
+            false => 0.0,
+        })
+        .collect();
+    let mut found = Vec::new();
+    let mut first = 0;
+    for instance in &scene.instances {
+        let mesh = &scene.meshes[instance.mesh];
+        let material = &scene.materials[mesh.material];
+        let count = mesh.indices.len() / 3;
+        if radiance[mesh.material] > 0.0 {
+            for i in 0..count {
+                let [a, b, c] = [0, 1, 2].map(|k| {
+                    let p = mesh.positions[mesh.indices[3 * i + k] as usize];
+                    instance.world_from_object.transform_point3(glam::Vec3::from(p).as_dvec3())
+                });
+                let area = 0.5 * (b - a).cross(c - a).length();
+                let two_sided = material.double_sided;
+                if area > 0.0 && area.is_finite() {
+                    let sides = if two_sided { 2.0 } else { 1.0 };
+                    let source = Source::Triangle { index: (first + i) as u32, area, two_sided };
+                    found.push((source, PI * area * sides * radiance[mesh.material]));
+                }
+            }
+        }
+        first += count;
+    }
+    found
+}
+
+/// Most cells of the environment, down; twice as many across.
+const MOST_ROWS: u32 = 256;
+
+impl SkyShares {
+    /// In proportion to the radiance around each cell times its solid angle.
+    fn of(map: &Environment) -> Self {
+        let (rows, columns) = (map.height.min(MOST_ROWS), map.width.min(2 * MOST_ROWS));
+        let (width, height) = (map.width as usize, map.height as usize);
+        // With the texels beside it, which bilinear interpolation mixes in.
+        let range = |cell: u32, cells: u32, texels: usize| {
+            let at = |i: u32| f64::from(i) / f64::from(cells) * texels as f64;
+            (at(cell).floor() as isize - 1, at(cell + 1).ceil() as isize + 1)
+        };
+        let mut cells = vec![0.0; (rows * columns) as usize];
+        let mut sums = Vec::with_capacity(rows as usize);
+        for row in 0..rows {
+            let (top, bottom) = range(row, rows, height);
+            let sin = ((f64::from(row) + 0.5) / f64::from(rows) * std::f64::consts::PI).sin();
+            let mut sum = 0.0;
+            for column in 0..columns {
+                let (left, right) = range(column, columns, width);
+                let mut total = 0.0;
+                for y in top..bottom {
+                    let y = y.clamp(0, height as isize - 1) as usize;
+                    for x in left..right {
+                        total += mean(map.radiance[y * width + x.rem_euclid(width as isize) as usize]);
+                    }
+                }
+                let weight = total / ((bottom - top) * (right - left)) as f64 * sin;
+                cells[(row * columns + column) as usize] = weight;
+                sum += weight;
+            }
+            sums.push(sum);
+        }
+        let mut words: Vec<u32> = shares(&sums).into_iter().map(|(first, _)| first).collect();
+        for row in cells.chunks(columns as usize) {
+            words.extend(shares(row).into_iter().map(|(first, _)| first));
+        }
+        Self { columns, rows, words, rotation: 0.0 }
+    }
+
+    /// A direction of the world drawn by two words: `sample_sky` of shaders/lib/emitters.glsl, but for where in a cell.
+    #[must_use]
+    pub fn direction(&self, words: [u32; 2]) -> DVec3 {
+        let (columns, rows) = (self.columns as usize, self.rows as usize);
+        let row = self.words[..rows].partition_point(|&first| first <= words[1]) - 1;
+        let of_row = &self.words[rows + row * columns..][..columns];
+        let column = of_row.partition_point(|&first| first <= words[0]) - 1;
+        let middle = |i: usize, of: usize| (i as f64 + 0.5) / of as f64;
+        DMat3::from_rotation_y(self.rotation.to_radians()) * direction(middle(column, columns), middle(row, rows))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_fill_all_words_and_none_is_empty() {
+        for weights in [vec![1.0], vec![1.0, 3.0], vec![0.0, 0.0, 5.0], vec![0.0; 4], vec![1e-30, 1.0, 1e30]] {
+            let shares = shares(&weights);
+            assert_eq!(shares[0].0, 0);
+            let total: f64 = shares.iter().map(|share| share.1).sum();
+            assert!((total - 1.0).abs() < 1e-15);
+            assert!(shares.iter().all(|share| share.1 > 0.0));
+            let sum: f64 = weights.iter().sum();
+            for ((_, probability), weight) in shares.iter().zip(&weights) {
+                let wanted = if sum > 0.0 { weight / sum } else { 1.0 / weights.len() as f64 };
+                assert!((probability - wanted).abs() < 1e-8, "{weights:?}: {probability} for {wanted}");
+            }
+            let word = |probability: f64| probability * 4_294_967_296.0;
+            assert!(shares.windows(2).all(|pair| f64::from(pair[1].0 - pair[0].0) == word(pair[0].1)));
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! Straight lines through the hierarchy of boxes, in f64: what is asked of rays before there is a device.
+
+use glam::DVec3;
+
+use super::bvh::{Bvh, Node, Triangle};
+use crate::scene::Scene;
+use crate::scene::solid::Solids;
+
+/// Where a line meets a triangle.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Crossing<'a> {
+    pub(super) triangle: &'a Triangle,
+    /// In lengths of the direction.
+    pub(super) t: f64,
+    /// Barycentrics of the second and the third corner.
+    pub(super) uv: [f64; 2],
+}
+
+/// A crossed triangle as the line sees it.
+pub(super) struct Facing {
+    /// Its front, which looks outwards from bodies.
+    pub(super) front: bool,
+    /// Unit normal that its corners' normals give, on the line's side; where that looks away, near silhouettes, or is none, the
+    /// triangle's own.
+    pub(super) normal: DVec3,
+    /// The triangle's own.
+    pub(super) flat: DVec3,
+}
+
+impl Crossing<'_> {
+    /// Which side a line in `direction` meets.
+    pub(super) fn facing(&self, scene: &Scene, solids: &Solids, direction: DVec3) -> Facing {
+        let instance = self.triangle.instance as usize;
+        let [a, b, c] = self.triangle.corners.map(|corner| DVec3::from(corner.map(f64::from)));
+        let n = (b - a).cross(c - a).normalize();
+        let mirrored = scene.instances[instance].world_from_object.matrix3.determinant() < 0.0;
+        let faces = n.dot(direction) < 0.0;
+        let flat = if faces { n } else { -n };
+        let smooth = self.normal(scene);
+        let smooth = if smooth.dot(flat) < 0.0 { -smooth } else { smooth };
+        let normal = if -direction.dot(smooth) > 0.0 { smooth } else { flat };
+        Facing { front: (faces != mirrored) != solids.flipped[instance], normal, flat }
+    }
+
+    /// The unit normal that the corners of the triangle give; no number where they cancel.
+    pub(super) fn normal(&self, scene: &Scene) -> DVec3 {
+        let placed = &scene.instances[self.triangle.instance as usize];
+        let mesh = &scene.meshes[placed.mesh];
+        let first = 3 * self.triangle.primitive as usize;
+        let [u, v] = self.uv;
+        let n: DVec3 = [1.0 - u - v, u, v]
+            .into_iter()
+            .zip(&mesh.indices[first..first + 3])
+            .map(|(weight, &i)| glam::Vec3::from(mesh.normals[i as usize]).as_dvec3() * weight)
+            .sum();
+        (placed.world_from_object.matrix3.inverse().transpose() * n).normalize()
+    }
+}
+
+/// Shows `crossed` what a line from `origin`, in bvh space, crosses in (`from`, what `crossed` said last], in no order.
+pub(super) fn walk<'a>(
+    bvh: &'a Bvh,
+    origin: DVec3,
+    direction: DVec3,
+    from: f64,
+    mut crossed: impl FnMut(Crossing<'a>) -> f64,
+) {
+    let mut until = f64::INFINITY;
+    let mut open = if bvh.nodes.is_empty() { Vec::new() } else { vec![0_u32] };
+    let inverse = direction.recip();
+    while let Some(node) = open.pop() {
+        let node = &bvh.nodes[node as usize];
+        let bounds = node.bounds();
+        let [low, high] =
+            [bounds.min, bounds.max].map(|corner| (DVec3::from(corner.map(f64::from)) - origin) * inverse);
+        let (near, far) = (low.min(high).max_element(), low.max(high).min_element());
+        // A line within a side of a box gives NaN, which opens it.
+        if far < from || near > far || near > until {
+            continue;
+        }
+        match node {
+            Node::Inner { children, .. } => open.extend(children),
+            Node::Leaf { first, count, .. } => {
+                for triangle in &bvh.triangles[*first as usize..(*first + *count) as usize] {
+                    if let Some((t, uv)) = meets(triangle.corners, origin, direction).filter(|(t, _)| *t > from) {
+                        until = crossed(Crossing { triangle, t, uv });
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The nearest of what a line crosses behind `from`.
+pub(super) fn nearest(bvh: &Bvh, origin: DVec3, direction: DVec3, from: f64) -> Option<Crossing<'_>> {
+    let mut found: Option<Crossing> = None;
+    walk(bvh, origin, direction, from, |crossing| {
+        if found.is_none_or(|best| crossing.t < best.t) {
+            found = Some(crossing);
+        }
+        found.map_or(f64::INFINITY, |best| best.t)
+    });
+    found
+}
+
+/// Where a line meets a triangle (Möller and Trumbore 1997).
+fn meets(corners: [[f32; 3]; 3], origin: DVec3, direction: DVec3) -> Option<(f64, [f64; 2])> {
+    let [a, b, c] = corners.map(|corner| DVec3::from(corner.map(f64::from)));
+    let (ab, ac) = (b - a, c - a);
+    let p = direction.cross(ac);
+    let inverse = ab.dot(p).recip();
+    let from = origin - a;
+    let u = from.dot(p) * inverse;
+    let q = from.cross(ab);
+    let v = direction.dot(q) * inverse;
+    let t = ac.dot(q) * inverse;
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then_some((t, [u, v]))
+}
