@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde::ser::{SerializeStruct as _, Serializer};
 
 use super::choice::Choice;
-use super::effect_id::EffectId;
+use super::knobs::rungs::EffectId;
 
 /// What became of an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

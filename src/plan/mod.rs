@@ -9,7 +9,6 @@
 mod ability;
 mod choice;
 mod effect;
-mod effect_id;
 mod facts;
 mod knobs;
 mod left_out;
@@ -21,9 +20,8 @@ mod work;
 pub use ability::Ability;
 pub use choice::Choice;
 pub use effect::{Demand, Effect, EffectState, Evidence};
-pub use effect_id::EffectId;
 pub use facts::{Facts, Surroundings};
-pub use knobs::rungs::{self, Normals};
+pub use knobs::rungs::{self, EffectId, Normals};
 pub use knobs::{KNOBS, Knob, Knobs, Model};
 pub use planner::needs_lights;
 pub use refused::{Refused, Setting};

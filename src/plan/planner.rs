@@ -1,10 +1,9 @@
 //! How a plan is made: effect by effect, each with its cause.
 
 use super::effect::{Cause, Decisions, Demand, Verdict};
-use super::effect_id::EffectId;
 use super::facts::{Facts, Surroundings};
 use super::knobs::Knobs;
-use super::knobs::rungs::{self, Absorption, Brdf, Guiding, Indirect, Reflection, Refraction, Shadows};
+use super::knobs::rungs::{self, Absorption, Brdf, EffectId, Guiding, Indirect, Reflection, Refraction, Shadows};
 use super::left_out::left_out;
 use super::surfaces::{
     self, Surfaces, Transmission, by_wavelength, has_layers, is_see_through, mirrors, refracts, scatters,

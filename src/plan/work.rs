@@ -1,9 +1,8 @@
 //! A plan as data: what is done, and how.
 
 use super::effect::{Demand, Effect, EffectState, Evidence};
-use super::effect_id::EffectId;
 use super::knobs::Knobs;
-use super::knobs::rungs::{Normals, Position, Quadrature};
+use super::knobs::rungs::{EffectId, Normals, Position, Quadrature};
 
 /// Which passes and which code a scene needs under the chosen knobs.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,37 +1,13 @@
 //! Knobs: each approximation with its rungs, as types ([`rungs`]), and as data for what goes through all of them.
 
+#[macro_use]
+mod macros;
 pub mod rungs;
 
-use anyhow::Result;
-use strum::{EnumMessage, IntoStaticStr, VariantArray};
-
-use super::effect_id::EffectId;
 use super::refused::{Refused, Setting};
-use rungs::{
-    Absorption, Arithmetic, Brdf, Colour, Fresnel, Guiding, Indirect, Interfaces, Lights, Lobes, Normals, Position,
-    Quadrature, Reflection, Refraction, Samples, Shadows, Upsampling,
-};
-
-/// One knob.
-#[derive(Debug)]
-pub struct Knob {
-    /// Name on the command line.
-    pub name: &'static str,
-    /// Rungs that can be chosen, cheap to exact.
-    pub rungs: &'static [&'static str],
-    /// What the presets `local`, `recursive` and `global` choose.
-    pub presets: [&'static str; 3],
-    /// The rung that approximates least.
-    pub exact: &'static str,
-    /// The lecture's statements that it is about.
-    pub lecture: &'static [&'static str],
-    /// The plan's effects that it shapes; none: every surface of every scene.
-    pub effects: &'static [EffectId],
-    /// What it approximates.
-    pub about: &'static str,
-    chosen: fn(&Knobs) -> usize,
-    choose: fn(&mut Knobs, usize),
-}
+use anyhow::Result;
+use rungs::{Guiding, Indirect, Lights, Reflection, Refraction, Shadows};
+pub use rungs::{KNOBS, Knob, Knobs, Model};
 
 impl Knob {
     /// The knob of that name.
@@ -51,78 +27,6 @@ impl Knob {
     pub fn rung(&self, knobs: &Knobs) -> &'static str {
         self.rungs[self.place(knobs)]
     }
-}
-
-/// [`Knobs`], a field each, and [`KNOBS`], an entry each.
-macro_rules! knobs {
-    ($( $field:ident: $Type:ident ),+ $(,)?) => {
-        /// A rung for every knob.
-        #[derive(Debug, Clone, PartialEq, Eq)]
-        pub struct Knobs {
-            $( #[doc = concat!("Rung of the knob `", stringify!($field), "`.")] pub $field: $Type, )+
-        }
-
-        /// Every knob. The command line, the report, the viewer and the documentation read this table.
-        pub static KNOBS: &[Knob] = &[$( Knob {
-            name: $Type::NAME,
-            rungs: $Type::NAMES,
-            presets: [$Type::PRESETS[0].name(), $Type::PRESETS[1].name(), $Type::PRESETS[2].name()],
-            exact: $Type::EXACT.name(),
-            lecture: $Type::LECTURE,
-            effects: $Type::EFFECTS,
-            about: $Type::ABOUT,
-            chosen: |knobs| knobs.$field as usize,
-            choose: |knobs, place| knobs.$field = $Type::RUNGS[place],
-        } ),+];
-
-        impl Knobs {
-            /// The rungs of a model.
-            #[must_use]
-            pub fn of(model: Model) -> Self {
-                Self { $( $field: $Type::PRESETS[model as usize] ),+ }
-            }
-
-            /// The rungs of paths that approximate least, with the samples of `global`.
-            #[must_use]
-            pub fn exact() -> Self {
-                Self { $( $field: $Type::EXACT ),+ }
-            }
-        }
-    };
-}
-
-knobs! {
-    shadows: Shadows,
-    fresnel: Fresnel,
-    brdf: Brdf,
-    reflection: Reflection,
-    lobes: Lobes,
-    refraction: Refraction,
-    interfaces: Interfaces,
-    absorption: Absorption,
-    quadrature: Quadrature,
-    indirect: Indirect,
-    lights: Lights,
-    guiding: Guiding,
-    samples: Samples,
-    colour: Colour,
-    upsampling: Upsampling,
-    arithmetic: Arithmetic,
-    normals: Normals,
-    position: Position,
-}
-
-/// The lecture's three models (R6): presets of all knobs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, EnumMessage, IntoStaticStr, VariantArray)]
-#[strum(serialize_all = "lowercase")]
-pub enum Model {
-    /// Direct light with shadow maps, and the environment as ambient and mirrored light.
-    Local,
-    /// Plus rays for shadows, mirrors and what lets light through.
-    #[default]
-    Recursive,
-    /// Paths from surface to surface: rough ones, too, light others.
-    Global,
 }
 
 impl Default for Knobs {

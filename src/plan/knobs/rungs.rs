@@ -1,65 +1,105 @@
 //! The knobs, a type each: what each approximates, its rungs from cheap to exact, what the models choose, what it is about.
 //!
-//! A rung is named once, here. Renaming a variant is an error of the compiler wherever it is used; what users type is the text beside it.
+//! Beside them the list of knobs, the models that choose rungs, and the list of effects. A rung is named once, here. Renaming a variant is an error of the compiler wherever it is used; what users type is the text beside it.
+
+use std::fmt::{self, Display, Formatter};
+
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use crate::plan::choice::Choice;
-use crate::plan::effect_id::EffectId;
+use crate::scene::lobe::LOBES;
 
-/// A type whose values are the rungs of a knob.
-macro_rules! knob {
-    (
-        $(#[$doc:meta])*
-        $Type:ident = $name:literal { $( $Rung:ident = $rung:literal ),+ $(,)? }
-        presets: [$local:ident, $recursive:ident, $global:ident],
-        exact: $exact:ident,
-        lecture: [$($lecture:literal),*],
-        effects: [$($Effect:ident),*],
-        about: $about:literal,
-    ) => {
-        #[doc = concat!("Knob `", $name, "`: ", $about, ".")]
-        $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-        pub enum $Type {
-            $( #[doc = concat!("`", $rung, "`.")] $Rung, )+
-        }
+effects! {
+    EmissiveTextures = "emissive textures",
+    ClearCoat = "clear coat",
+    Layers = "layers",
+    Conductors = "metals by n and kappa",
+    Refraction = "refraction",
+    SeeThrough = "see-through surfaces",
+    VaryingMedia = "media that vary",
+    Quadrature = "quadrature",
+    Environment = "environment",
+    MirroredEnvironment = "mirrored environment",
+    PrefilteredEnvironment = "prefiltered environment",
+    Mirrors = "mirrors",
+    AmbientLight = "ambient light",
+    PunctualLights = "punctual lights",
+    Shadows = "shadows",
+    LightLists = "light lists per tile",
+    Paths = "paths",
+    EmittingSurfaces = "surfaces that light",
+    ShapedLights = "lights with a shape",
+    Aims = "aims",
+    Wavelengths = "bands of wavelengths",
+    Dispersion = "dispersion",
+    Holes = "holes before rays",
+    Filters = "light through surfaces",
+    Transmission = "transmission before rays",
+    RoughRays = "rays by lobes",
+    Frosted = "frosted surfaces",
+    Absorption = "absorption",
+    TouchingBodies = "bodies that touch",
+}
 
-        impl $Type {
-            pub(super) const NAME: &str = $name;
-            /// From cheap to exact.
-            pub const RUNGS: &[Self] = &[$( Self::$Rung ),+];
-            pub(super) const NAMES: &[&str] = &[$( $rung ),+];
-            pub(super) const PRESETS: [Self; 3] = [Self::$local, Self::$recursive, Self::$global];
-            pub(super) const EXACT: Self = Self::$exact;
-            pub(super) const LECTURE: &[&str] = &[$( $lecture ),*];
-            pub(super) const EFFECTS: &[EffectId] = &[$( EffectId::$Effect ),*];
-            pub(super) const ABOUT: &str = $about;
+impl Display for EffectId {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
 
-            /// The knob with this rung.
-            #[must_use]
-            pub const fn choice(self) -> Choice {
-                Choice { knob: Self::NAME, rung: self.name() }
-            }
+knobs! {
+    shadows: Shadows,
+    fresnel: Fresnel,
+    brdf: Brdf,
+    reflection: Reflection,
+    lobes: Lobes,
+    refraction: Refraction,
+    interfaces: Interfaces,
+    absorption: Absorption,
+    quadrature: Quadrature,
+    indirect: Indirect,
+    lights: Lights,
+    guiding: Guiding,
+    samples: Samples,
+    colour: Colour,
+    upsampling: Upsampling,
+    arithmetic: Arithmetic,
+    normals: Normals,
+    position: Position,
+}
 
-            /// As the command line calls it.
-            #[must_use]
-            pub const fn name(self) -> &'static str {
-                Self::NAMES[self as usize]
-            }
-        }
+/// One knob.
+#[derive(Debug)]
+pub struct Knob {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// Rungs that can be chosen, cheap to exact.
+    pub rungs: &'static [&'static str],
+    /// What the presets `local`, `recursive` and `global` choose.
+    pub presets: [&'static str; 3],
+    /// The rung that approximates least.
+    pub exact: &'static str,
+    /// The lecture's statements that it is about.
+    pub lecture: &'static [&'static str],
+    /// The plan's effects that it shapes; none: every surface of every scene.
+    pub effects: &'static [EffectId],
+    /// What it approximates.
+    pub about: &'static str,
+    pub(super) chosen: fn(&Knobs) -> usize,
+    pub(super) choose: fn(&mut Knobs, usize),
+}
 
-        impl Default for $Type {
-            /// Of the model `recursive`.
-            fn default() -> Self {
-                Self::$recursive
-            }
-        }
-
-        impl std::fmt::Display for $Type {
-            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                self.choice().fmt(f)
-            }
-        }
-    };
+/// The lecture's three models (R6): presets of all knobs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, EnumMessage, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase")]
+pub enum Model {
+    /// Direct light with shadow maps, and the environment as ambient and mirrored light.
+    Local,
+    /// Plus rays for shadows, mirrors and what lets light through.
+    #[default]
+    Recursive,
+    /// Paths from surface to surface: rough ones, too, light others.
+    Global,
 }
 
 /// What follows a prefix in a rung's name, as a number; `None` for rungs that are called otherwise.
@@ -345,5 +385,16 @@ mod tests {
         assert_eq!(Lights::RUNGS.iter().map(|rung| rung.places()).collect::<Vec<_>>(), [1, 1, 4, 16]);
         assert_eq!(Colour::RUNGS.iter().map(|rung| rung.bands()).collect::<Vec<_>>(), [0, 8, 16, 32]);
         assert_eq!(Guiding::Aims.to_string(), "guiding=aims");
+    }
+
+    #[test]
+    fn names_lead_back_to_effects() {
+        for knob in KNOBS {
+            for effect in knob.effects {
+                assert_eq!(EffectId::named(effect.name()), Some(*effect), "{}", knob.name);
+            }
+        }
+        assert_eq!(EffectId::named("sheen"), Some(EffectId::Lobe(0)));
+        assert_eq!(EffectId::named("haze"), None);
     }
 }

@@ -1,0 +1,127 @@
+//! How the lists of knobs and effects (`rungs.rs`) become types.
+
+/// A type whose values are the rungs of a knob.
+macro_rules! knob {
+    (
+        $(#[$doc:meta])*
+        $Type:ident = $name:literal { $( $Rung:ident = $rung:literal ),+ $(,)? }
+        presets: [$local:ident, $recursive:ident, $global:ident],
+        exact: $exact:ident,
+        lecture: [$($lecture:literal),*],
+        effects: [$($Effect:ident),*],
+        about: $about:literal,
+    ) => {
+        #[doc = concat!("Knob `", $name, "`: ", $about, ".")]
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum $Type {
+            $( #[doc = concat!("`", $rung, "`.")] $Rung, )+
+        }
+
+        impl $Type {
+            pub(super) const NAME: &str = $name;
+            /// From cheap to exact.
+            pub const RUNGS: &[Self] = &[$( Self::$Rung ),+];
+            pub(super) const NAMES: &[&str] = &[$( $rung ),+];
+            pub(super) const PRESETS: [Self; 3] = [Self::$local, Self::$recursive, Self::$global];
+            pub(super) const EXACT: Self = Self::$exact;
+            pub(super) const LECTURE: &[&str] = &[$( $lecture ),*];
+            pub(super) const EFFECTS: &[EffectId] = &[$( EffectId::$Effect ),*];
+            pub(super) const ABOUT: &str = $about;
+
+            /// The knob with this rung.
+            #[must_use]
+            pub const fn choice(self) -> Choice {
+                Choice { knob: Self::NAME, rung: self.name() }
+            }
+
+            /// As the command line calls it.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                Self::NAMES[self as usize]
+            }
+        }
+
+        impl Default for $Type {
+            /// Of the model `recursive`.
+            fn default() -> Self {
+                Self::$recursive
+            }
+        }
+
+        impl std::fmt::Display for $Type {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                self.choice().fmt(f)
+            }
+        }
+    };
+}
+
+/// [`Knobs`], a field each, and [`KNOBS`], an entry each.
+macro_rules! knobs {
+    ($( $field:ident: $Type:ident ),+ $(,)?) => {
+        /// A rung for every knob.
+        #[derive(Debug, Clone, PartialEq, Eq)]
+        pub struct Knobs {
+            $( #[doc = concat!("Rung of the knob `", stringify!($field), "`.")] pub $field: $Type, )+
+        }
+
+        /// Every knob. The command line, the report, the viewer and the documentation read this table.
+        pub static KNOBS: &[Knob] = &[$( Knob {
+            name: $Type::NAME,
+            rungs: $Type::NAMES,
+            presets: [$Type::PRESETS[0].name(), $Type::PRESETS[1].name(), $Type::PRESETS[2].name()],
+            exact: $Type::EXACT.name(),
+            lecture: $Type::LECTURE,
+            effects: $Type::EFFECTS,
+            about: $Type::ABOUT,
+            chosen: |knobs| knobs.$field as usize,
+            choose: |knobs, place| knobs.$field = $Type::RUNGS[place],
+        } ),+];
+
+        impl Knobs {
+            /// The rungs of a model.
+            #[must_use]
+            pub fn of(model: Model) -> Self {
+                Self { $( $field: $Type::PRESETS[model as usize] ),+ }
+            }
+
+            /// The rungs of paths that approximate least, with the samples of `global`.
+            #[must_use]
+            pub fn exact() -> Self {
+                Self { $( $field: $Type::EXACT ),+ }
+            }
+        }
+    };
+}
+
+/// [`EffectId`] and what each is called.
+macro_rules! effects {
+    ($( $Effect:ident = $name:literal ),+ $(,)?) => {
+        /// An effect that a scene may call for.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub enum EffectId {
+            $( #[doc = concat!("`", $name, "`.")] $Effect, )+
+            /// A lobe that an extension lays over the base, by its place in [`LOBES`].
+            Lobe(usize),
+        }
+
+        impl EffectId {
+            /// As reports call it.
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self {
+                    $( Self::$Effect => $name, )+
+                    Self::Lobe(place) => LOBES[place].name,
+                }
+            }
+
+            /// The effect of that name.
+            #[must_use]
+            pub fn named(name: &str) -> Option<Self> {
+                let lobes = (0..LOBES.len()).map(Self::Lobe);
+                [$( Self::$Effect ),+].into_iter().chain(lobes).find(|effect| effect.name() == name)
+            }
+        }
+    };
+}
