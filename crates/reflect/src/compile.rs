@@ -5,26 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use rspirv::dr::Module;
-
+use super::files::Result;
 use super::interface::{Interface, PassSlots};
-
-pub(crate) type Result<T, E = String> = std::result::Result<T, E>;
-
-/// The files of a folder, in order; none where there is no such folder: passes need no library.
-pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>> {
-    if !folder.exists() {
-        return Ok(Vec::new());
-    }
-    let entries = fs::read_dir(folder).map_err(|e| format!("reading {}: {e}", folder.display()))?;
-    let mut paths: Vec<PathBuf> = entries.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
-    paths.sort();
-    Ok(paths)
-}
-
-pub(crate) fn stem(path: &Path) -> String {
-    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
-}
+use super::reflect::Stage;
 
 /// Does something with each of `work` by name, as many at once as there are cores; `tool` is what each thread does it with.
 pub(crate) fn on_all_cores<Tool, W: Send, R: Send>(
@@ -49,14 +32,6 @@ pub(crate) fn on_all_cores<Tool, W: Send, R: Send>(
         all.into_iter().try_for_each(|thread| thread.join().map_err(|_| "a thread of the build panicked")?)
     })?;
     Ok(made.into_inner().unwrap_or_else(PoisonError::into_inner))
-}
-
-/// One compiled shader: what it declares, and the words that ship.
-pub(crate) struct Stage {
-    pub(crate) kind: shaderc::ShaderKind,
-    pub(crate) module: Module,
-    pub(crate) words: Vec<u32>,
-    pub(crate) path: String,
 }
 
 /// The stages of a program.

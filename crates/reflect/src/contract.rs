@@ -10,8 +10,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use rspirv::dr::{Function, Module, Operand};
 use rspirv::spirv::{Decoration, GlslStd450Op as GLOp, Op};
 
-use crate::compile::{Result, Stage};
 use crate::equations::Source;
+use crate::files::Result;
+use crate::reflect::Stage;
 use crate::reflect::{Names, word};
 
 /// Loop heads that one call may evaluate.

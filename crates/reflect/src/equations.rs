@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use crate::compile::{Result, files, stem};
+use crate::files::{Result, files, stem};
 
 /// One tagged function.
 pub(crate) struct Equation {

@@ -5,9 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::fs;
 
-use super::compile::{Program, Recipe, Result, files, on_all_cores};
+use super::compile::{Program, Recipe, on_all_cores};
 use super::contract;
 use super::equations;
+use super::files::{Result, files};
 use super::interface::{File, Interface, SETS, Shared};
 use super::reflect::{Binding, Declared, Names, Struct, all_constants, declared, local_size, stage_flag, structs};
 use rspirv::spirv::Op;

@@ -29,7 +29,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::compile::{Result, files, stem};
+use super::files::{Result, files, snake, stem};
 use super::reflect::{Member, Struct};
 
 /// The kinds of descriptor sets, and their numbers. A program reads `pages` or `paths`, never both.
@@ -445,18 +445,6 @@ fn declaration(line: &str) -> Option<Declaration> {
         word(code.split(';').next()?)?
     };
     Some(Declaration { kind: kind.to_owned(), name, about })
-}
-
-/// `SurfaceTiles` as `surface_tiles`.
-pub(crate) fn snake(name: &str) -> String {
-    let mut out = String::new();
-    for (i, c) in name.chars().enumerate() {
-        if c.is_uppercase() && i > 0 {
-            out.push('_');
-        }
-        out.extend(c.to_lowercase());
-    }
-    out
 }
 
 /// A constant that is one number.

@@ -15,6 +15,7 @@
 mod compile;
 mod contract;
 mod equations;
+mod files;
 mod generate;
 mod interface;
 mod reflect;
@@ -23,7 +24,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use compile::{Recipe, Result, files, stem};
+use compile::Recipe;
+use files::{Result, files, stem};
 
 /// Compiles and describes what is under `shaders`: writes `shaders.rs` and `share.rs` into `out_dir`. Code behind the specialization
 /// constants `without` is not built at all.

@@ -8,8 +8,15 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{Decoration, Dim, ExecutionMode, Op, StorageClass};
 
-use super::compile::{Result, Stage};
-use super::interface::snake;
+use super::files::{Result, snake};
+
+/// One compiled shader: what it declares, and the words that ship.
+pub(crate) struct Stage {
+    pub(crate) kind: shaderc::ShaderKind,
+    pub(crate) module: Module,
+    pub(crate) words: Vec<u32>,
+    pub(crate) path: String,
+}
 
 #[derive(Clone, PartialEq)]
 pub(crate) struct Binding {

@@ -13,7 +13,7 @@ use etalon::scene::environment::Environment;
 use etalon::scene::{Camera, Scene};
 use etalon::share::AovPixel;
 
-/// The software device with validation on, which tests of one program share (`crates/vulkan/src/validated.rs`).
+/// The software device with validation on, which tests of one program share (`crates/vulkan/src/open.rs`).
 pub struct Gpu {
     /// The device.
     pub device: Arc<Device>,

@@ -14,7 +14,6 @@ use serde::Serialize;
 use super::cache::Caches;
 use super::limits::{PUSH_DESCRIPTORS, STORAGE_BUFFERS, STORAGE_IMAGES, UNIFORM_BUFFERS};
 use super::surface::Surface;
-use super::validated::{self, Turn, Validated, Wish};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -119,6 +118,9 @@ pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// What lets an instance validate (`open.rs`).
+pub(super) type RightToValidate = Box<dyn Send + Sync>;
+
 /// The instance with everything that hangs on it.
 pub(super) struct Instance {
     pub(super) entry: ash::Entry,
@@ -126,14 +128,14 @@ pub(super) struct Instance {
     debug: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     has_debug_utils: bool,
     messages: Box<Messages>,
-    /// Given back last, when nothing of this instance is left in the validation layer.
-    _turn: Option<Turn>,
+    /// Dropped last, when nothing of this instance is left in the validation layer.
+    _right: Option<RightToValidate>,
 }
 
 impl Instance {
     /// Under validation with the right to it.
-    pub(super) fn new(turn: Option<Turn>, wanted_extensions: &[*const c_char]) -> Result<Self> {
-        let validate = turn.is_some();
+    pub(super) fn new(right: Option<RightToValidate>, wanted_extensions: &[*const c_char]) -> Result<Self> {
+        let validate = right.is_some();
         // SAFETY: the loader is a shared library that stays loaded as long as `entry` lives.
         let entry = unsafe { ash::Entry::load() }
             .map_err(|e| anyhow!("no Vulkan loader (Debian: libvulkan1, mesa-vulkan-drivers): {e}"))?;
@@ -196,7 +198,7 @@ impl Instance {
         } else {
             None
         };
-        Ok(Self { entry, raw, debug, has_debug_utils, messages, _turn: turn })
+        Ok(Self { entry, raw, debug, has_debug_utils, messages, _right: right })
     }
 
     fn candidates(&self, surface: Option<&Surface>) -> Result<Vec<Candidate>> {
@@ -438,37 +440,7 @@ pub struct Device {
 }
 
 impl Device {
-    /// Opens the chosen device; with `validate`, core and synchronization validation report into [`Device::messages`].
-    ///
-    /// Renderers in several threads may share a device: their frames take turns. Without validation each may have a device of
-    /// its own. Under validation a process has one device at a time, as the layer breaks with two: a second call gives the same
-    /// device, with the messages of all who use it.
-    ///
-    /// # Errors
-    /// One sentence when there is no loader, no such device, the device lacks something that Etalon needs, or another one is
-    /// open under validation.
-    pub fn open(choice: &DeviceChoice, validate: bool) -> Result<Arc<Self>> {
-        Self::open_alone(choice, validate.then(|| Wish::Plain(choice.clone())), false)
-    }
-
-    /// The same, and what is submitted is cut into short pieces, as beside a window.
-    ///
-    /// # Errors
-    /// As [`Device::open`].
-    pub fn open_taking_turns(choice: &DeviceChoice, validate: bool) -> Result<Arc<Self>> {
-        Self::open_alone(choice, validate.then(|| Wish::TakingTurns(choice.clone())), true)
-    }
-
-    fn open_alone(choice: &DeviceChoice, validated: Option<Wish>, turns: bool) -> Result<Arc<Self>> {
-        let turn = match validated.map(validated::take).transpose()? {
-            Some(Validated::Shared(device)) => return Ok(device),
-            Some(Validated::Mine(turn)) => Some(turn),
-            None => None,
-        };
-        Self::open_on(Instance::new(turn, &[])?, choice, None, turns)
-    }
-
-    /// The same with a surface that it can show pictures on.
+    /// Opens a device of an instance; with a surface that it can show pictures on, where there is one.
     pub(super) fn open_on(
         instance: Instance,
         choice: &DeviceChoice,
@@ -575,9 +547,6 @@ impl Device {
             paces: Mutex::default(),
             instance,
         });
-        if device.validates() {
-            validated::share(&device);
-        }
         Ok(device)
     }
 

@@ -13,6 +13,7 @@ mod frame;
 pub mod limits;
 mod loops;
 mod memory;
+mod open;
 mod pipeline;
 #[cfg(feature = "window")]
 mod present;
@@ -23,7 +24,6 @@ mod specialize;
 mod surface;
 pub mod sync;
 mod turns;
-mod validated;
 #[cfg(feature = "window")]
 mod window;
 

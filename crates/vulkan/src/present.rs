@@ -13,9 +13,9 @@ use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer};
 use super::access::Access;
 use super::device::{Device, DeviceChoice, Instance, lock};
 use super::memory::{Buffer, Image, ImageDesc, Place};
+use super::open;
 use super::recording::begin;
 use super::surface::Surface;
-use super::validated;
 use super::window::{Windowed, extensions};
 
 /// A picture with its place in the window.
@@ -96,10 +96,13 @@ impl Presenter {
     /// # Errors
     /// One sentence when there is no loader, no device that can, or the window has no surface.
     pub fn open(window: Arc<dyn Windowed>, choice: &DeviceChoice, validate: bool) -> Result<(Arc<Device>, Self)> {
-        let turn = validate.then(|| validated::for_a_window(choice)).transpose()?;
+        let turn = validate.then(|| open::for_a_window(choice)).transpose()?;
         let instance = Instance::new(turn, extensions(&*window)?)?;
         let surface = Surface::new(&instance.entry, &instance.raw, &*window)?;
         let device = Device::open_on(instance, choice, Some(&surface), true)?;
+        if validate {
+            open::share(&device);
+        }
         // SAFETY: plain queries of a live surface, and objects of a live device.
         let (formats, pool, acquired, finished) = unsafe {
             let pool = vk::CommandPoolCreateInfo::default()

@@ -1,4 +1,4 @@
-//! One device under validation at a time.
+//! Opening devices: one under validation at a time.
 //!
 //! The validation layer keeps its instances and devices in a table that every call reads without a lock and that making or
 //! destroying one of them changes (its issue 4391; seen with helgrind in 1.3.239). Two validated devices in two threads
@@ -8,7 +8,7 @@ use std::sync::{Arc, Condvar, Mutex, Weak};
 
 use anyhow::{Result, bail};
 
-use super::device::{Device, DeviceChoice, lock};
+use super::device::{Device, DeviceChoice, Instance, RightToValidate, lock};
 
 struct Slot {
     wish: Wish,
@@ -18,7 +18,7 @@ struct Slot {
 
 /// What was asked for.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Wish {
+enum Wish {
     Plain(DeviceChoice),
     TakingTurns(DeviceChoice),
     /// It shows pictures in a window of its own.
@@ -36,7 +36,7 @@ static SLOT: Mutex<Option<Slot>> = Mutex::new(None);
 static FREED: Condvar = Condvar::new();
 
 /// The right to have the validated device; whoever drops it gives it back.
-pub(super) struct Turn(());
+struct Turn(());
 
 impl Drop for Turn {
     fn drop(&mut self) {
@@ -46,7 +46,7 @@ impl Drop for Turn {
 }
 
 /// The device that there is, or the right to make it.
-pub(super) enum Validated {
+enum Validated {
     Shared(Arc<Device>),
     Mine(Turn),
 }
@@ -55,7 +55,7 @@ pub(super) enum Validated {
 ///
 /// # Errors
 /// Where there is one of another kind.
-pub(super) fn take(wish: Wish) -> Result<Validated> {
+fn take(wish: Wish) -> Result<Validated> {
     let mut slot = lock(&SLOT);
     loop {
         match &*slot {
@@ -88,9 +88,47 @@ pub(super) fn share(device: &Arc<Device>) {
 /// # Errors
 /// Where there is another one.
 #[cfg(feature = "window")]
-pub(super) fn for_a_window(choice: &DeviceChoice) -> Result<Turn> {
+pub(super) fn for_a_window(choice: &DeviceChoice) -> Result<RightToValidate> {
     match take(Wish::Window(choice.clone()))? {
-        Validated::Mine(turn) => Ok(turn),
+        Validated::Mine(turn) => Ok(Box::new(turn)),
         Validated::Shared(_) => unreachable!("a window's device is its own"),
+    }
+}
+
+impl Device {
+    /// Opens the chosen device; with `validate`, core and synchronization validation report into [`Device::messages`].
+    ///
+    /// Renderers in several threads may share a device: their frames take turns. Without validation each may have a device of
+    /// its own. Under validation a process has one device at a time, as the layer breaks with two: a second call gives the same
+    /// device, with the messages of all who use it.
+    ///
+    /// # Errors
+    /// One sentence when there is no loader, no such device, the device lacks something that Etalon needs, or another one is
+    /// open under validation.
+    pub fn open(choice: &DeviceChoice, validate: bool) -> Result<Arc<Self>> {
+        Self::open_alone(choice, validate.then(|| Wish::Plain(choice.clone())), false)
+    }
+
+    /// The same, and what is submitted is cut into short pieces, as beside a window.
+    ///
+    /// # Errors
+    /// As [`Device::open`].
+    pub fn open_taking_turns(choice: &DeviceChoice, validate: bool) -> Result<Arc<Self>> {
+        Self::open_alone(choice, validate.then(|| Wish::TakingTurns(choice.clone())), true)
+    }
+
+    fn open_alone(choice: &DeviceChoice, validated: Option<Wish>, turns: bool) -> Result<Arc<Self>> {
+        let turn = match validated.map(take).transpose()? {
+            Some(Validated::Shared(device)) => return Ok(device),
+            Some(Validated::Mine(turn)) => Some(turn),
+            None => None,
+        };
+        let is_validated = turn.is_some();
+        let right = turn.map(|turn| Box::new(turn) as RightToValidate);
+        let device = Self::open_on(Instance::new(right, &[])?, choice, None, turns)?;
+        if is_validated {
+            share(&device);
+        }
+        Ok(device)
     }
 }
