@@ -39,7 +39,7 @@ impl Made {
         self.place(mesh, world_from_object);
     }
 
-    /// Adds a light: W/sr or W/m², or whatever its kind is told in.
+    /// Adds a light; its colour has the unit of `Light::color`: cd, or lx where it is directional.
     pub fn light(&mut self, color: [f32; 3], kind: LightKind) {
         self.0.lights.push(Light {
             name: "made".to_owned(),
