@@ -11,10 +11,10 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result, ensure};
 use etalon::gpu::{Device, DeviceChoice};
-use etalon::pass::rays::Traversal;
 use etalon::pass::trace_rays::{Hit, Mode, Ray, Tracer};
 use etalon::scene::{Camera, Instance, LoadOptions, Material, Mesh, Scene};
 use etalon::transport::bvh::Bvh;
+use etalon::upload::rays::Traversal;
 use glam::{DAffine3, DVec3, Vec3};
 
 const SIZE: [u32; 2] = [1024, 576];

@@ -15,7 +15,6 @@ use crate::pass::aov::aov;
 use crate::pass::background::background;
 use crate::pass::classify::{RayTiles, WorkLists, classify};
 use crate::pass::composite::{Behind, composite};
-use crate::pass::environment::{EnvironmentOnDevice, Turn};
 use crate::pass::fragments::{FragmentLists, fragments};
 use crate::pass::gbuffer::{GBuffer, gbuffer};
 use crate::pass::halves::{Halves, join_halves};
@@ -26,14 +25,10 @@ use crate::pass::mirror::mirror;
 pub use crate::pass::part::Part;
 use crate::pass::part::PartOnDevice;
 use crate::pass::path::{PathsOnDevice, paths};
-use crate::pass::rays::{BvhFacts, RaysOnDevice, Traversal};
-use crate::pass::scene::SceneOnDevice;
 use crate::pass::screen::{OnScreen, screen_tiles};
 use crate::pass::shadow_map::ShadowMaps;
-use crate::pass::shared::{Library, OnDevice};
 use crate::pass::tiles::{Tiles, tiles};
 use crate::pass::tonemap::{Counts, Display, tonemap};
-use crate::pass::view::{View, jitter};
 use crate::plan::rungs::Indirect;
 use crate::plan::{Ability, Demand, Knobs, Plan, Refused, Setting};
 use crate::prepare::{Conditions, Original, Prepared};
@@ -43,6 +38,11 @@ use crate::scene::wavelengths::Slice;
 use crate::share::{self, AovPixel};
 use crate::spectra::VISIBLE;
 use crate::transport::emitters::Sky;
+use crate::upload::environment::{EnvironmentOnDevice, Turn};
+use crate::upload::rays::{BvhFacts, RaysOnDevice, Traversal};
+use crate::upload::scene::SceneOnDevice;
+use crate::upload::shared::{Library, OnDevice};
+use crate::upload::view::{View, jitter};
 
 /// Refuses what no image or buffer of the device can hold.
 fn check_size(device: &Device, knobs: &Knobs, size: [u32; 2]) -> Result<()> {
@@ -422,7 +422,7 @@ impl Renderer {
             camera: &camera,
             scene: &scene,
             rays: &rays,
-            shadow_maps: &shadow_maps,
+            shadow_depth: shadow_maps.depth(),
             environment: &environment,
         };
         Ok(Self {
@@ -641,7 +641,7 @@ impl Renderer {
 
     fn on_device(&self) -> OnDevice<'_> {
         let Self { camera, scene, rays, shadow_maps, environment, .. } = self;
-        OnDevice { camera, scene, rays, shadow_maps, environment }
+        OnDevice { camera, scene, rays, shadow_depth: shadow_maps.depth(), environment }
     }
 
     /// An empty frame whose programs read the scene.
@@ -651,7 +651,7 @@ impl Renderer {
 
     /// What programs are specialised by.
     fn library(&self) -> Library {
-        self.on_device().library(&self.plan, &self.settings.knobs, &self.targets.tiles)
+        self.on_device().library(&self.plan, &self.settings.knobs, self.targets.tiles.words())
     }
 
     /// One sample of every pixel, or one band of it: the frame, pass by pass.

@@ -8,9 +8,9 @@
 //!  │                         ▲
 //!  └───► verify ─────────────┘         the shaders' formulas, held against those in f64
 //!
-//! frame ─► pass ─► prepare ─► plan ─► transport ─► scene ─► optics
-//!           │      what a scene calls for,         what to draw: data, no Vulkan
-//!           ▼      and why: no Vulkan
+//! frame ─► pass ─► upload ─► prepare ─► plan ─► transport ─► scene ─► optics
+//!           │         │      what a scene calls for,         what to draw: data, no Vulkan
+//!           ▼         ▼      and why: no Vulkan
 //!         shader ─► gpu                explicit Vulkan, no renderer in it
 //! ```
 //!
@@ -25,7 +25,7 @@
 //! 3. `shaders/lib/lighting.glsl`, `surface.glsl`, `brdf.glsl`: the equations;
 //! 4. [`gpu::sync::barriers`]: the barriers of the whole frame, as a pure function of what the passes declare.
 //!
-//! Rays go through [`transport::bvh`], laid out by [`pass::rays`], along `shaders/lib/trace.glsl`; `shaders/pass/interact.comp` is
+//! Rays go through [`transport::bvh`], laid out by [`upload::rays`], along `shaders/lib/trace.glsl`; `shaders/pass/interact.comp` is
 //! the tree of reflection and refraction, `shaders/lib/shadow.glsl` the way to a light.
 //!
 //! [`spectra`] has what light and matter are by wavelength; [`scene::wavelengths`] makes of a scene the same scene in one band of
@@ -54,6 +54,8 @@ pub mod open;
 pub mod frame;
 
 pub mod pass;
+
+pub mod upload;
 
 pub mod shader;
 

@@ -10,21 +10,8 @@ use etalon::plan::{Demand, Facts, Knobs, Plan, Surroundings};
 use etalon::scene::Scene;
 use etalon::shader::{Library, SCENE, lib};
 use etalon::share::Camera;
+use etalon_testing::barriers::are_needed;
 use etalon_testing::gpu::Gpu;
-
-/// Validation's error texts after `describe` has been run as a frame, with or without buffer barriers.
-fn errors_of(forget: bool, describe: impl for<'a> FnOnce(&'a Things, &mut Frame<'a>)) -> Vec<String> {
-    let mut gpu = Gpu::alone();
-    gpu.expects_errors = true;
-    let things = Things::new(&gpu);
-    let mut frame = Frame::of(&gpu.device, vec![things.scene.bind(view(&things.camera))]);
-    if forget {
-        frame.forget_barriers();
-    }
-    describe(&things, &mut frame);
-    frame.finish().expect("a frame");
-    gpu.errors()
-}
 
 /// Of the scene, classification reads the camera alone.
 fn view(camera: &Buffer) -> Vec<(u32, Resource<'_>)> {
@@ -65,10 +52,11 @@ impl Things {
 
 /// Clean with barriers, a hazard without.
 fn proves(name: &str, describe: impl for<'a> Fn(&'a Things, &mut Frame<'a>)) {
-    let clean = errors_of(false, &describe);
-    assert!(clean.is_empty(), "{name}, with barriers: {clean:?}");
-    let hazards = errors_of(true, &describe);
-    assert!(hazards.iter().any(|text| text.contains("SYNC-HAZARD")), "{name}, without barriers: {hazards:?}");
+    are_needed(name, Things::new, |things, gpu| {
+        let mut frame = Frame::of(&gpu.device, vec![things.scene.bind(view(&things.camera))]);
+        describe(things, &mut frame);
+        frame
+    });
 }
 
 #[test]

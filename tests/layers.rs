@@ -11,15 +11,19 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("plan", &["plan", "scene", "transport"]),
     ("prepare", &["prepare", "plan", "scene", "transport"]),
     (
-        "pass",
-        &["pass", "gpu", "scene", "transport", "plan", "prepare", "image", "optics", "shader", "share", "spectra"],
+        "upload",
+        &["upload", "gpu", "scene", "transport", "plan", "prepare", "image", "optics", "shader", "share", "spectra"],
     ),
-    ("frame", &["frame", "pass", "gpu", "scene", "transport", "plan", "prepare", "image", "share", "spectra"]),
+    ("pass", &["pass", "upload", "gpu", "scene", "plan", "prepare", "shader", "share"]),
+    (
+        "frame",
+        &["frame", "pass", "upload", "gpu", "scene", "transport", "plan", "prepare", "image", "share", "spectra"],
+    ),
     ("open", &["frame", "gpu", "plan", "prepare", "scene", "study"]),
 ];
 
 /// Modules that know Vulkan.
-const KNOW_VULKAN: &[&str] = &["pass", "frame", "shader"];
+const KNOW_VULKAN: &[&str] = &["pass", "upload", "frame", "shader"];
 
 fn sources(folder: &Path, all: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).expect("a folder of sources") {

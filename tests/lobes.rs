@@ -154,7 +154,7 @@ fn what_is_rougher_is_left_to_the_environment() {
 }
 
 /// The table of directional reflectance at its edge: the roughest metal in a white furnace, without rays. The table's sum is
-/// good to 4e-3 (src/pass/environment.rs).
+/// good to 4e-3 (src/upload/environment.rs).
 #[test]
 fn the_roughest_metal_loses_in_a_furnace_what_the_integral_says() {
     let gpu = Gpu::open();

@@ -6,12 +6,12 @@
 use std::sync::Arc;
 
 use etalon::frame::Settings;
-use etalon::pass::rays::Traversal;
 use etalon::plan::rungs::Quadrature;
 use etalon::plan::{Attenuation, Demand, Facts, Knobs, Model, Plan, Surroundings};
 use etalon::scene::normal_form::NormalForm;
 use etalon::scene::{Camera, LightKind, Material, Scene, SigmaGrid};
 use etalon::study::shape::Shape;
+use etalon::upload::rays::Traversal;
 use etalon_testing::gpu::{Gpu, knobs, settings};
 use etalon_testing::made::{Made, Random, at, lambert, perspective, unlit};
 use glam::{DAffine3, DMat3, DQuat, DVec3};

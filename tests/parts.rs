@@ -247,7 +247,7 @@ fn a_pane_mirrors_f_of_what_lies_before_it_and_lets_the_rest_through() {
 
 /// Towards the middle of a pixel.
 fn direction(camera: &Camera, size: [u32; 2], i: usize) -> DVec3 {
-    let view = etalon::pass::view::View::new(camera, size, None);
+    let view = etalon::upload::view::View::new(camera, size, None);
     let [width, height] = size.map(f64::from);
     let x = (f64::from(i as u32 % size[0]) + 0.5) / width * 2.0 - 1.0;
     let y = 1.0 - (f64::from(i as u32 / size[0]) + 0.5) / height * 2.0;

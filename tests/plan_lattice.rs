@@ -2,11 +2,10 @@
 //! everything else so spread over them that any two things meet. Each is drawn under core and synchronization validation.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use etalon::frame::{Background, Part, Settings};
 use etalon::image::Picture;
-use etalon::pass::rays::Traversal;
 use etalon::plan::{Demand, EffectState, Facts, Knobs, Plan, Surroundings};
 use etalon::scene::environment::Environment;
 use etalon::scene::material::{Sampler, TextureRef};
@@ -14,6 +13,7 @@ use etalon::scene::normal_form::normalise;
 use etalon::scene::reads::forget_unread;
 use etalon::scene::{AlphaMode, Ambience, Image, LightKind, Material, Reads, SigmaGrid};
 use etalon::study::shape::Shape;
+use etalon::upload::rays::Traversal;
 use etalon_testing::gpu::{Gpu, bits};
 use etalon_testing::made::{Made, Random, at, lambert, orthographic, perspective, unlit};
 use glam::DVec3;
@@ -151,8 +151,13 @@ fn effect_pairs(plan: &Plan) -> BTreeSet<String> {
     (0..states.len()).flat_map(pair).map(|(i, b)| format!("{} {b}", states[i])).collect()
 }
 
-/// Levels for all ways, chosen among a few random ones for the most pairs that are new.
-fn spread() -> Vec<(Ways, Choice)> {
+/// Levels for all ways, chosen once (2 s) among a few random ones for the most pairs that are new.
+fn spread() -> &'static [(Ways, Choice)] {
+    static SPREAD: OnceLock<Vec<(Ways, Choice)>> = OnceLock::new();
+    SPREAD.get_or_init(chosen)
+}
+
+fn chosen() -> Vec<(Ways, Choice)> {
     let mut random = Random(5);
     let mut seen = BTreeSet::new();
     let mut all = Vec::new();
@@ -397,7 +402,7 @@ fn plans_with_paths() {
 fn paths_call_for_what_they_may_meet() {
     let mut states: BTreeMap<&'static str, BTreeSet<&'static str>> = BTreeMap::new();
     for (ways, choice) in spread() {
-        let plan = planned(&ways, &choice, knobs_of_paths(&ways, &choice));
+        let plan = planned(ways, choice, knobs_of_paths(ways, choice));
         for effect in &plan.effects {
             states.entry(effect.id.name()).or_default().insert(effect.state.name());
         }
@@ -496,7 +501,7 @@ fn any_two_effects_are_kept_together_and_apart() {
     let mut states: BTreeMap<&'static str, BTreeSet<&'static str>> = BTreeMap::new();
     let mut seen = BTreeSet::new();
     for (ways, choice) in spread() {
-        let plan = planned(&ways, &choice, knobs(&ways, &choice));
+        let plan = planned(ways, choice, knobs(ways, choice));
         let elsewhere = [OF_PATHS.as_slice(), &OF_WAVELENGTHS].concat();
         for a in plan.effects.iter().filter(|effect| !elsewhere.contains(&effect.id.name())) {
             states.entry(a.id.name()).or_default().insert(a.state.name());

@@ -450,7 +450,7 @@ fn a_sample_that_is_drawn_again_counts_once() {
     let mut made = Made::new("overflow at the second sample");
     made.add(Shape::panel(16.0, 16.0), pane([0.5, 0.25, 1.0], 0.5), DAffine3::IDENTITY);
     // One unit is one pixel; samples lie at jitter(1, 4) from the centres of pixels, y down.
-    let jitter = etalon::pass::view::jitter(1, 4);
+    let jitter = etalon::upload::view::jitter(1, 4);
     made.add(Shape::panel(0.05, 0.05), pane([1.0; 3], 0.5), at(0.5 + jitter.x, 0.5 - jitter.y, 1.0));
     made.front(4.0);
     let settings = Settings { knobs: knobs(&["samples=4"]), ..settings(size) };

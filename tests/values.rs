@@ -83,7 +83,7 @@ fn compensated_ggx_gives_back_what_single_scattering_loses() {
     let gpu = Gpu::hasty();
     for of in MODELS {
         let error = lit(&gpu, &rough(), LIGHTS[0], of, &["brdf=ggx-multi", "fresnel=schlick"], FAINT);
-        // The table of directional reflectance E is good to 4e-3 (src/pass/environment.rs), and E is 0.6 at least here.
+        // The table of directional reflectance E is good to 4e-3 (src/upload/environment.rs), and E is 0.6 at least here.
         assert!(error < 1e-2, "{of:?}: {error:e}");
     }
 }

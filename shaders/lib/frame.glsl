@@ -149,7 +149,7 @@ float basis_gram(vec3 n) {
 // without the division by a determinant that is 0 for lengths of 1e-14 already. Its sign keeps mirrored fronts in
 // front. Each column is scaled by a power of two of its own; what that does to the cofactors is undone at n.
 // Where M or n leaves no direction: the zero vector.
-// @host src/pass/scene.rs: the matrix that carries normals of an instance
+// @host src/upload/scene.rs: the matrix that carries normals of an instance
 vec3 transformed_normal(vec3 a, vec3 b, vec3 c, vec3 n) {
     vec3 N;
     if (ARITHMETIC == FAST) {

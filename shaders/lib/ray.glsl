@@ -330,7 +330,7 @@ vec3 hit_point(vec3 origin, vec3 direction, float t, vec3 a, vec3 b, vec3 c, flo
 // @out p_rel
 // Positions as pairs of floats, 1e-7 m apart at the Earth's radius; their difference is rounded once. Plain floats (the
 // tier fast takes the hi parts) are 6 cm apart at 1e6 m.
-// @host src/pass/scene.rs: places of instances and lights around the eye
+// @host src/upload/scene.rs: places of instances and lights around the eye
 vec3 camera_relative(vec3 p_hi, vec3 p_lo, vec3 eye_hi, vec3 eye_lo) {
     vec3 p_rel;
     if (ARITHMETIC == FAST) {

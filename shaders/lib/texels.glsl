@@ -1,7 +1,7 @@
 // What textures say of a place on a surface, each beside the factor of the material that it multiplies.
 //
 // A texture has a slot: the build counts the pages below, and SLOT_NAME is the number of NAME_page. Images of one size are layers of one
-// array, a page (src/pass/texture.rs); materials that read the same pages share a descriptor set of them.
+// array, a page (src/upload/texture.rs); materials that read the same pages share a descriptor set of them.
 #ifndef TEXELS_GLSL
 #define TEXELS_GLSL
 #include "lib/constants.glsl"

@@ -2,9 +2,9 @@
 
 use anyhow::Result;
 
-use super::spectrum::rgb_from_xyz;
 use crate::gpu::{Frame, Image};
 use crate::shader::{Library, accumulate, lib};
+use crate::upload::spectrum::rgb_from_xyz;
 
 /// Adds `radiance` to `film`, of which it is the first part or not, and multiplies by `scale`. Of a picture in `bands` of
 /// wavelengths it is one of them, in X, Y and Z.

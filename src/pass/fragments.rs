@@ -7,9 +7,9 @@ use ash::vk;
 
 use super::classify::{FragmentTiles, classify_fragments};
 use super::gbuffer::GBuffer;
-use super::scene::SceneOnDevice;
 use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Frame, Image, ImageDesc, Place, Raster};
 use crate::shader::{fragments, lib};
+use crate::upload::scene::SceneOnDevice;
 
 /// Bytes of one fragment.
 const NODE_BYTES: u64 = 4 * lib::fragment_list::NODE_WORDS as u64;

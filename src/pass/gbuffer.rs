@@ -10,10 +10,10 @@ use std::sync::Arc;
 use anyhow::Result;
 use ash::vk;
 
-use super::scene::SceneOnDevice;
 use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Draw, Frame, Image, ImageDesc, Place, Raster};
 use crate::plan::{Normals, Plan};
 use crate::shader::{gbuffer, lib};
+use crate::upload::scene::SceneOnDevice;
 
 const POSITION: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 

@@ -3,13 +3,10 @@
 //! A pass takes what it reads, writes what its name says, and contains no formula: those are in `shaders/lib/`.
 
 pub mod accumulate;
-pub mod aims;
 pub mod aov;
 pub mod background;
 pub mod classify;
 pub mod composite;
-pub mod emitters;
-pub mod environment;
 pub mod fragments;
 pub mod gbuffer;
 pub mod halves;
@@ -19,17 +16,9 @@ pub mod lighting;
 pub mod mirror;
 pub mod part;
 pub mod path;
-pub mod rays;
 pub mod rows;
-pub mod scene;
 pub mod screen;
 pub mod shadow_map;
-pub mod shared;
-pub mod sigma_grid;
-pub mod spectrum;
-pub mod texture;
 pub mod tiles;
 pub mod tonemap;
 pub mod trace_rays;
-pub mod upload;
-pub mod view;

@@ -11,7 +11,6 @@ use anyhow::{Result, bail};
 use ash::vk;
 use glam::{DVec3, DVec4};
 
-use super::scene::{LightMaps, SceneOnDevice};
 use crate::gpu::{
     Buffer, DepthTarget, DescriptorSet, Device, Frame, Image, ImageDesc, PassTime, Raster, Sampled, SamplerDesc,
 };
@@ -19,6 +18,7 @@ use crate::plan::Plan;
 use crate::scene::{Bounds, Light, LightKind};
 use crate::shader::lib::light_table::{LIGHT_TEXELS, SHADOW_MAP_TEXELS};
 use crate::shader::{SCENE, lib, shadow_map};
+use crate::upload::scene::{LightMaps, SceneOnDevice};
 
 /// Texels a side of the image that holds all maps, at most: what every device allows, and 64 MiB of depth.
 const ATLAS: u32 = 4096;

@@ -6,12 +6,12 @@ use anyhow::Result;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
-use super::rays::{RaysOnDevice, TraceConstants, Traversal};
 use crate::gpu::{Buffer, DescriptorSet, Device, Frame, Place};
 use crate::prepare::Prepared;
 use crate::scene::Scene;
 use crate::shader::{Library, SCENE, lib, trace_rays};
 use crate::share::WorkCounts;
+use crate::upload::rays::{RaysOnDevice, TraceConstants, Traversal};
 
 /// A ray in the space of the hierarchy: world axes, metres, from the anchor.
 #[repr(C)]

@@ -22,13 +22,15 @@ pub mod view;
 use std::io::{self, Write as _};
 
 use anyhow::{Context as _, Result};
+use etalon::gpu::NotOpened;
 use etalon::plan::{Refused, Setting};
 
-/// An error as one sentence, with the options of the command line in place of the settings of the library.
+/// An error as one sentence, with the options of the command line in place of the settings of the library, and with the packages
+/// that bring what is missing.
 #[must_use]
 pub fn told(error: &anyhow::Error) -> String {
-    let cause = |cause: &(dyn std::error::Error + 'static)| match cause.downcast_ref::<Refused>() {
-        Some(Refused { setting, why }) => {
+    let cause = |cause: &(dyn std::error::Error + 'static)| {
+        if let Some(Refused { setting, why }) = cause.downcast_ref() {
             let option = match setting {
                 Setting::Knob => "--set",
                 Setting::Size => "--size",
@@ -36,11 +38,24 @@ pub fn told(error: &anyhow::Error) -> String {
                 Setting::Part => "--aov",
                 Setting::MaxError => "--max-error",
             };
-            format!("{option} {why}")
+            return format!("{option} {why}");
         }
-        None => cause.to_string(),
+        match cause.downcast_ref::<NotOpened>().and_then(packages) {
+            Some(packages) => format!("{cause} (Debian: {packages})"),
+            None => cause.to_string(),
+        }
     };
     error.chain().map(cause).collect::<Vec<_>>().join(": ")
+}
+
+/// Debian's packages that mend it.
+fn packages(error: &NotOpened) -> Option<&'static str> {
+    match error {
+        NotOpened::NoLoader(_) => Some("libvulkan1, mesa-vulkan-drivers"),
+        NotOpened::NoDevice => Some("mesa-vulkan-drivers"),
+        NotOpened::NoValidation => Some("vulkan-validationlayers"),
+        _ => None,
+    }
 }
 
 /// One line to stdout. A reader that has closed the pipe has seen enough: that is no error.

@@ -24,12 +24,12 @@ use super::unbuilt::UnbuiltOptions;
 use etalon::frame::{Part, Rendered, Renderer};
 use etalon::gpu::Severity;
 use etalon::image::{Aov, AovData, Picture, exr, file};
-use etalon::pass::view::View;
 use etalon::plan::rungs::Indirect;
 use etalon::plan::{Knobs, Plan};
 use etalon::scene::{Camera, Reads, Scene};
 use etalon::share::AovPixel;
 use etalon::spectra;
+use etalon::upload::view::View;
 
 /// Draw a picture of a scene.
 #[derive(Debug, Clone, Args)]

@@ -9,9 +9,9 @@ use etalon::frame::{NotFinite, Rendered, Work};
 use etalon::gpu::{Created, Device, DeviceInfo, Message, Program, Severity};
 use etalon::image::Statistics;
 use etalon::image::halves::{SampleError, slope};
-use etalon::pass::rays::BvhFacts;
 use etalon::plan::{Effect, Knobs, Plan};
 use etalon::spectra;
+use etalon::upload::rays::BvhFacts;
 use etalon_cost::explain::Price;
 
 /// The document.

@@ -7,11 +7,11 @@ use std::sync::{Arc, Once, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuar
 use etalon::frame::{Rendered, Renderer, Settings};
 use etalon::gpu::{Device, DeviceChoice, Severity};
 use etalon::image::Picture;
-use etalon::pass::view::View;
 use etalon::plan::{Knobs, Model};
 use etalon::scene::environment::Environment;
 use etalon::scene::{Camera, Scene};
 use etalon::share::AovPixel;
+use etalon::upload::view::View;
 
 /// The software device with validation on, which tests of one program share (`crates/vulkan/src/open.rs`).
 pub struct Gpu {
@@ -44,7 +44,9 @@ impl Gpu {
     }
 
     /// The same for programs that make hundreds of pipelines for a few pixels each: lavapipe compiles them without LLVM's
-    /// optimisations, to the same bits (`study:etalon` and `study:cornell` along paths were compared) in 0.6 of the time.
+    /// optimisations, to the same bits (`study:etalon` and `study:cornell` along paths were compared) in 0.6 of the time; and it
+    /// draws on the thread of its queue, since waking others takes longer than what they do for so few pixels (tests/furnace.rs:
+    /// 43 s for 65 s on two cores, of which 15 s went into waking).
     pub fn hasty() -> Self {
         in_haste();
         Self::open()
@@ -108,12 +110,15 @@ impl Drop for Gpu {
     }
 }
 
-#[allow(unsafe_code, reason = "the driver takes this setting from the environment alone")]
+#[allow(unsafe_code, reason = "the driver takes these settings from the environment alone")]
 fn in_haste() {
     static SET: Once = Once::new();
     SET.call_once(|| {
         // SAFETY: every test of such a program begins here, and nothing has read the environment but Rust's own start.
-        unsafe { std::env::set_var("GALLIVM_PERF", "nopt") }
+        unsafe {
+            std::env::set_var("GALLIVM_PERF", "nopt");
+            std::env::set_var("LP_NUM_THREADS", "0");
+        }
     });
 }
 

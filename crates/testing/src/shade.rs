@@ -5,9 +5,9 @@
 
 use std::f64::consts::PI;
 
-use etalon::pass::view::View;
 use etalon::scene::{Light, LightKind, Scene};
 use etalon::share::AovPixel;
+use etalon::upload::view::View;
 use glam::DVec3;
 
 /// A surface point seen from `v`.

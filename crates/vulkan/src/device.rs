@@ -1,9 +1,8 @@
 //! Instance, choice of a device, and the device with its queue, allocator and caches.
 
-use std::collections::HashMap;
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::mem::ManuallyDrop;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use anyhow::{Context as _, Result, anyhow, bail, ensure};
@@ -12,8 +11,10 @@ use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use serde::Serialize;
 
 use super::cache::Caches;
+use super::error::NotOpened;
 use super::limits::{PUSH_DESCRIPTORS, STORAGE_BUFFERS, STORAGE_IMAGES, UNIFORM_BUFFERS};
 use super::surface::Surface;
+use super::turns::Turns;
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -137,8 +138,7 @@ impl Instance {
     pub(super) fn new(right: Option<RightToValidate>, wanted_extensions: &[*const c_char]) -> Result<Self> {
         let validate = right.is_some();
         // SAFETY: the loader is a shared library that stays loaded as long as `entry` lives.
-        let entry = unsafe { ash::Entry::load() }
-            .map_err(|e| anyhow!("no Vulkan loader (Debian: libvulkan1, mesa-vulkan-drivers): {e}"))?;
+        let entry = unsafe { ash::Entry::load() }.map_err(|e| NotOpened::NoLoader(e.to_string()))?;
         // SAFETY: plain queries.
         let (extensions, layers) = unsafe {
             (entry.enumerate_instance_extension_properties(None)?, entry.enumerate_instance_layer_properties()?)
@@ -147,7 +147,7 @@ impl Instance {
         for &wanted in wanted_extensions {
             // SAFETY: names out of ash's own tables.
             let wanted = unsafe { CStr::from_ptr(wanted) };
-            ensure!(has(wanted), "the Vulkan loader cannot show windows here: it lacks {}", wanted.to_string_lossy());
+            ensure!(has(wanted), NotOpened::NoWindows(wanted.to_string_lossy().into_owned()));
         }
         let mut enabled = wanted_extensions.to_vec();
         let mut flags = vk::InstanceCreateFlags::empty();
@@ -162,7 +162,7 @@ impl Instance {
         let mut layer_names = Vec::new();
         if validate {
             if !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
-                bail!("validation needs the Khronos validation layer (Debian: vulkan-validationlayers)");
+                bail!(NotOpened::NoValidation);
             }
             layer_names.push(VALIDATION_LAYER.as_ptr());
             enabled.push(ext::validation_features::NAME.as_ptr());
@@ -356,9 +356,9 @@ pub fn candidates() -> Result<Vec<Candidate>> {
 
 fn choose(all: Vec<Candidate>, choice: &DeviceChoice) -> Result<Candidate> {
     if all.is_empty() {
-        bail!("Vulkan offers no device here (Debian: install mesa-vulkan-drivers for the software device)");
+        bail!(NotOpened::NoDevice);
     }
-    let names = all.iter().map(|c| format!("\"{}\"", c.info.name)).collect::<Vec<_>>().join(", ");
+    let offered: Vec<String> = all.iter().map(|c| format!("\"{}\"", c.info.name)).collect();
     let mut wanted: Vec<(usize, Candidate)> = all
         .into_iter()
         .enumerate()
@@ -373,32 +373,15 @@ fn choose(all: Vec<Candidate>, choice: &DeviceChoice) -> Result<Candidate> {
     // A usable device of lower rank beats an unusable one.
     wanted.sort_by_key(|(index, c)| (!c.missing.is_empty(), c.info.rank(), *index));
     let Some((_, best)) = wanted.into_iter().next() else {
-        let what = match choice {
-            DeviceChoice::Best => "a device".to_owned(),
-            DeviceChoice::Cpu => "a software device".to_owned(),
-            DeviceChoice::Gpu => "a GPU".to_owned(),
-            DeviceChoice::Index(i) => format!("a device of index {i}"),
-            DeviceChoice::Name(name) => format!("a device named like \"{name}\""),
-        };
-        bail!("asked for {what}, Vulkan offers {names}");
+        bail!(NotOpened::NoneLike { choice: choice.clone(), offered });
     };
     if !best.missing.is_empty() {
-        bail!("device \"{}\" ({}) lacks {}", best.info.name, best.info.driver, best.missing.join(", "));
+        let DeviceInfo { name: device, driver, .. } = best.info;
+        let missing = best.missing.iter().map(ToString::to_string).collect();
+        bail!(NotOpened::Lacks { device, driver, missing });
     }
     Ok(best)
 }
-
-/// Why a frame was not drawn to its end: somebody wants another.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Interrupted;
-
-impl std::fmt::Display for Interrupted {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "the frame was given up for another")
-    }
-}
-
-impl std::error::Error for Interrupted {}
 
 /// Whether the device is gone: nothing that it holds can be used again.
 #[must_use]
@@ -419,11 +402,6 @@ pub struct Device {
     pub(super) limits: vk::PhysicalDeviceLimits,
     adds_in_subgroups: bool,
     pub(super) submitted: AtomicU64,
-    /// Dispatches that were drawn in more than one piece.
-    pub(super) cut: AtomicU64,
-    /// Somebody wants what is drawn to be given up, and whoever draws it agrees.
-    interrupted: AtomicBool,
-    interruptible: AtomicBool,
     next_id: AtomicU64,
     created: Mutex<Vec<Created>>,
     objects: AtomicU64,
@@ -432,10 +410,7 @@ pub struct Device {
     pub(super) physical: vk::PhysicalDevice,
     #[cfg(feature = "window")]
     pub(super) family: u32,
-    /// A window shares its queue: nothing that is submitted takes long.
-    pub(super) turns: bool,
-    /// Milliseconds of a group of invocations in the last dispatch of each name, where `turns`.
-    pub(super) paces: Mutex<HashMap<String, f64>>,
+    pub(super) turns: Turns,
     pub(super) instance: Instance,
 }
 
@@ -532,9 +507,6 @@ impl Device {
             limits: properties.limits,
             adds_in_subgroups,
             submitted: AtomicU64::new(0),
-            cut: AtomicU64::new(0),
-            interrupted: AtomicBool::new(false),
-            interruptible: AtomicBool::new(false),
             next_id: AtomicU64::new(1),
             created: Mutex::default(),
             objects: AtomicU64::new(0),
@@ -543,8 +515,7 @@ impl Device {
             physical,
             #[cfg(feature = "window")]
             family,
-            turns,
-            paces: Mutex::default(),
+            turns: Turns::new(turns),
             instance,
         });
         Ok(device)
@@ -614,35 +585,6 @@ impl Device {
         self.objects.load(Ordering::Relaxed)
     }
 
-    /// Gives up what is drawn within [`Device::interruptible`], now or the next time, until [`Device::resume`].
-    pub fn interrupt(&self) {
-        self.interrupted.store(true, Ordering::Relaxed);
-    }
-
-    /// Takes [`Device::interrupt`] back.
-    pub fn resume(&self) {
-        self.interrupted.store(false, Ordering::Relaxed);
-    }
-
-    /// Draws frames that may be given up between two pieces, where the device takes turns: they end with [`Interrupted`].
-    pub fn interruptible<T>(&self, draw: impl FnOnce() -> T) -> T {
-        self.interruptible.store(true, Ordering::Relaxed);
-        let drawn = draw();
-        self.interruptible.store(false, Ordering::Relaxed);
-        drawn
-    }
-
-    pub(super) fn go_on(&self) -> Result<()> {
-        let is_over = self.interruptible.load(Ordering::Relaxed) && self.interrupted.load(Ordering::Relaxed);
-        if is_over { Err(Interrupted.into()) } else { Ok(()) }
-    }
-
-    /// Dispatches so far that were drawn in more than one piece.
-    #[must_use]
-    pub fn cut(&self) -> u64 {
-        self.cut.load(Ordering::Relaxed)
-    }
-
     pub(super) fn gone(&self) {
         self.objects.fetch_sub(1, Ordering::Relaxed);
     }
@@ -650,7 +592,7 @@ impl Device {
     pub(super) fn note(&self, kind: &'static str, name: &str, bytes: u64) {
         self.objects.fetch_add(1, Ordering::Relaxed);
         // A window goes on for hours: a list of all that it made would grow as long.
-        if self.turns {
+        if self.turns.taken {
             return;
         }
         lock(&self.created).push(Created { kind, name: name.to_owned(), bytes });

@@ -14,12 +14,13 @@ use ash::vk;
 use super::access::Access;
 use super::bind::{Bindings, Descriptor, Resource, Sampled};
 use super::cache::{PipelineKey, RasterKey};
-use super::device::{Device, Interrupted, lock};
+use super::device::{Device, lock};
 use super::memory::{Buffer, Image};
 use super::recording::{Dispatch, Groups, Pass, Recording, Target, Work, bind_sets, push_constants, push_descriptors};
 use super::set::BoundSet;
 use super::shader::{Program, SharedSet, Specialization as _};
 use super::sync::{self, ResourceId, State, Use};
+use super::turns::Interrupted;
 
 /// GPU time of one pass.
 #[derive(Debug, Clone, PartialEq)]
@@ -537,7 +538,7 @@ impl<'a> Frame<'a> {
         let names: Vec<String> = passes.iter().map(|pass| pass.name.clone()).collect();
         let wanted: Vec<PipelineKey> = passes.iter().flat_map(|pass| pass.pipelines.clone()).collect();
         let keys: Vec<&PipelineKey> = wanted.iter().collect();
-        let count = if device.turns { 2 } else { 2 * passes.len() as u32 };
+        let count = if device.turns.taken { 2 } else { 2 * passes.len() as u32 };
         let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(count.max(1));
         // SAFETY: command buffers that are recorded here, submitted once and waited for before anything is freed. Every
         // handle in them is borrowed for `'a`, which ends after this function.
@@ -550,7 +551,11 @@ impl<'a> Frame<'a> {
                 let (device, from, targets) = (&device, *from, &targets);
                 let begun = &begun;
                 let recording = Recording { device, from, targets, pipelines, queries, without_barriers, begun };
-                if device.turns { recording.in_turns(passes, &barriers) } else { recording.at_once(passes, &barriers) }
+                if device.turns.taken {
+                    recording.in_turns(passes, &barriers)
+                } else {
+                    recording.at_once(passes, &barriers)
+                }
             });
             device.raw.destroy_query_pool(queries, None);
             outcome

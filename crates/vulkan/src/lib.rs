@@ -9,6 +9,7 @@ mod access;
 mod bind;
 mod cache;
 mod device;
+mod error;
 mod frame;
 pub mod limits;
 mod loops;
@@ -30,9 +31,8 @@ mod window;
 pub use access::Access;
 pub use bind::{Bindings, Resource, Sampled};
 pub use cache::SamplerDesc;
-pub use device::{
-    Candidate, Created, Device, DeviceChoice, DeviceInfo, Interrupted, Message, Severity, candidates, is_lost,
-};
+pub use device::{Candidate, Created, Device, DeviceChoice, DeviceInfo, Message, Severity, candidates, is_lost};
+pub use error::{NotOpened, TooLarge};
 pub use frame::{ColorTarget, DepthTarget, Draw, Frame, PassPlan, PassTime, Raster, VertexStream};
 pub use loops::with_loops_counted;
 pub use memory::{Buffer, Image, ImageDesc, NOTHING, Place};
@@ -43,5 +43,6 @@ pub use shader::{
     Binding, BindingKind, Constant, Program, Replacement, SetLayout, SharedSet, Specialization, Stage, VertexInput,
 };
 pub use specialize::specialized;
+pub use turns::Interrupted;
 #[cfg(feature = "window")]
 pub use window::Windowed;

@@ -8,6 +8,7 @@ use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 
 use super::device::{Device, lock};
+use super::error::TooLarge;
 use super::sync::State;
 
 /// Where a buffer lives.
@@ -109,7 +110,7 @@ impl Buffer {
         if let Some(format) = texels
             && bytes / texel_bytes(format) > most
         {
-            bail!("{}: the device fetches at most {most} texels from one", creating());
+            bail!(TooLarge { what: creating(), limit: format!("fetches at most {most} texels from one") });
         }
         let mut usage = vk::BufferUsageFlags::UNIFORM_BUFFER
             | vk::BufferUsageFlags::STORAGE_BUFFER
@@ -272,7 +273,7 @@ impl Image {
         let limit = device.limits.max_image_dimension2_d;
         if width > limit || height > limit || layers > device.limits.max_image_array_layers {
             let layers = device.limits.max_image_array_layers;
-            bail!("{}: the device allows {limit} pixels a side and {layers} layers", creating());
+            bail!(TooLarge { what: creating(), limit: format!("allows {limit} pixels a side and {layers} layers") });
         }
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)

@@ -9,6 +9,7 @@ use std::sync::{Arc, Condvar, Mutex, Weak};
 use anyhow::{Result, bail};
 
 use super::device::{Device, DeviceChoice, Instance, RightToValidate, lock};
+use super::error::NotOpened;
 
 struct Slot {
     wish: Wish,
@@ -62,11 +63,11 @@ fn take(wish: Wish) -> Result<Validated> {
             None => break,
             Some(other) => match other.device.upgrade() {
                 Some(device) if other.wish == wish && wish.is_shared() => return Ok(Validated::Shared(device)),
-                Some(device) => bail!(
-                    "this process has device \"{}\" under validation already, as {:?}: the layer cannot hold {wish:?} beside it",
-                    device.info().name,
-                    other.wish
-                ),
+                Some(device) => bail!(NotOpened::Validated {
+                    device: device.info().name.clone(),
+                    has: format!("{:?}", other.wish),
+                    wanted: format!("{wish:?}"),
+                }),
                 None => slot = FREED.wait(slot).unwrap_or_else(std::sync::PoisonError::into_inner),
             },
         }
@@ -103,8 +104,7 @@ impl Device {
     /// device, with the messages of all who use it.
     ///
     /// # Errors
-    /// One sentence when there is no loader, no such device, the device lacks something that Etalon needs, or another one is
-    /// open under validation.
+    /// [`NotOpened`], or what the driver answers.
     pub fn open(choice: &DeviceChoice, validate: bool) -> Result<Arc<Self>> {
         Self::open_alone(choice, validate.then(|| Wish::Plain(choice.clone())), false)
     }

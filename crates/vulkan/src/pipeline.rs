@@ -124,7 +124,7 @@ impl Device {
 
     /// Runs `meanwhile` while the pipelines of `keys` that do not exist yet are made on another thread, in their order.
     ///
-    /// One thread, not several: docs/decisions/specialization.md.
+    /// One thread, not several, and under validation none beside this one: docs/decisions/specialization.md.
     ///
     /// # Errors
     /// Those of `meanwhile`, which is told of those of the driver when it asks for a pipeline.
@@ -147,17 +147,23 @@ impl Device {
         if missing.is_empty() {
             return meanwhile(&pipelines);
         }
-        let result = std::thread::scope(|scope| {
-            scope.spawn(|| {
-                let _end = Settled(&pipelines);
-                let start = Instant::now();
-                for &key in &missing {
-                    let _ = pipelines.slots[key].set(self.make(key));
-                }
-                lock(&self.caches).making_ms += start.elapsed().as_secs_f64() * 1e3;
-            });
+        let make_all = || {
+            let _end = Settled(&pipelines);
+            let start = Instant::now();
+            for &key in &missing {
+                let _ = pipelines.slots[key].set(self.make(key));
+            }
+            lock(&self.caches).making_ms += start.elapsed().as_secs_f64() * 1e3;
+        };
+        let result = if self.validates() {
+            make_all();
             meanwhile(&pipelines)
-        });
+        } else {
+            std::thread::scope(|scope| {
+                scope.spawn(make_all);
+                meanwhile(&pipelines)
+            })
+        };
         let mut caches = lock(&self.caches);
         for key in missing {
             if let Some(&Ok(pipeline)) = pipelines.slots[key].get() {
@@ -231,8 +237,11 @@ impl Device {
             stages.push(vk::PipelineShaderStageCreateInfo::default().stage(stage.flag).module(module).name(c"main"));
         }
         let Some(raster) = &key.raster else {
-            let flags =
-                if self.turns { vk::PipelineCreateFlags::DISPATCH_BASE } else { vk::PipelineCreateFlags::empty() };
+            let flags = if self.turns.taken {
+                vk::PipelineCreateFlags::DISPATCH_BASE
+            } else {
+                vk::PipelineCreateFlags::empty()
+            };
             let info = vk::ComputePipelineCreateInfo::default().flags(flags).stage(stages[0]).layout(layout);
             // SAFETY: a valid create info whose pointees outlive the call.
             let made = unsafe { self.raw.create_compute_pipelines(vk::PipelineCache::null(), &[info], None) };

@@ -4,7 +4,9 @@
 //! other, as many at a time as took [`PIECE_MS`] by the pace of the piece before. What the host must know for that, how many
 //! groups a dispatch has whose number the device wrote, is read back first.
 
-use std::sync::atomic::Ordering;
+use std::collections::HashMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use anyhow::{Context as _, Result};
 use ash::vk;
@@ -23,6 +25,68 @@ const PIECE_MS: f64 = 10.0;
 const FIRST: u64 = 32;
 /// A piece has at most so many times the groups of the one before: that one may have been quick by chance.
 const GROWTH: f64 = 4.0;
+
+/// What a device knows of its turns.
+#[derive(Debug)]
+pub(super) struct Turns {
+    /// A window shares the queue: nothing that is submitted takes long.
+    pub(super) taken: bool,
+    /// Milliseconds of a group of invocations in the last dispatch of each name, where turns are taken.
+    paces: Mutex<HashMap<String, f64>>,
+    /// Dispatches that were drawn in more than one piece.
+    cut: AtomicU64,
+    /// Somebody wants what is drawn to be given up, and whoever draws it agrees.
+    interrupted: AtomicBool,
+    interruptible: AtomicBool,
+}
+
+impl Turns {
+    pub(super) fn new(taken: bool) -> Self {
+        Self {
+            taken,
+            paces: Mutex::default(),
+            cut: AtomicU64::new(0),
+            interrupted: AtomicBool::new(false),
+            interruptible: AtomicBool::new(false),
+        }
+    }
+
+    fn go_on(&self) -> Result<()> {
+        let is_over = self.interruptible.load(Ordering::Relaxed) && self.interrupted.load(Ordering::Relaxed);
+        if is_over { Err(Interrupted.into()) } else { Ok(()) }
+    }
+}
+
+/// Why a frame was not drawn to its end: somebody wants another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the frame was given up for another")]
+pub struct Interrupted;
+
+impl Device {
+    /// Gives up what is drawn within [`Device::interruptible`], now or the next time, until [`Device::resume`].
+    pub fn interrupt(&self) {
+        self.turns.interrupted.store(true, Ordering::Relaxed);
+    }
+
+    /// Takes [`Device::interrupt`] back.
+    pub fn resume(&self) {
+        self.turns.interrupted.store(false, Ordering::Relaxed);
+    }
+
+    /// Draws frames that may be given up between two pieces, where the device takes turns: they end with [`Interrupted`].
+    pub fn interruptible<T>(&self, draw: impl FnOnce() -> T) -> T {
+        self.turns.interruptible.store(true, Ordering::Relaxed);
+        let drawn = draw();
+        self.turns.interruptible.store(false, Ordering::Relaxed);
+        drawn
+    }
+
+    /// Dispatches so far that were drawn in more than one piece.
+    #[must_use]
+    pub fn cut(&self) -> u64 {
+        self.turns.cut.load(Ordering::Relaxed)
+    }
+}
 
 /// The piece of at most `most` groups, and at least one, that comes after `done` of them: whole rows, or part of one.
 fn piece(groups: [u32; 3], done: u64, most: u64) -> Piece {
@@ -59,7 +123,7 @@ impl Recording<'_> {
                 }
                 Work::Dispatch(work) => work,
             };
-            let known = lock(&self.device.paces).get(&pass.name).copied();
+            let known = lock(&self.device.turns.paces).get(&pass.name).copied();
             let groups = match work.groups {
                 Groups::Count(groups) => groups,
                 Groups::At(sizes, offset) => self.read_groups(sizes, offset, room)?,
@@ -102,12 +166,12 @@ impl Recording<'_> {
             if count == 0 {
                 break;
             }
-            self.device.cut.fetch_add(u64::from(done == 0 && count < all), Ordering::Relaxed);
+            self.device.turns.cut.fetch_add(u64::from(done == 0 && count < all), Ordering::Relaxed);
             done += count;
             most = (PIECE_MS * count as f64 / ms.max(1e-9)).min(GROWTH * count as f64);
         }
         // The mean: some part is always cheap, and the next frame may begin with one that is not.
-        lock(&self.device.paces).insert(name.to_owned(), total / all.max(1) as f64);
+        lock(&self.device.turns.paces).insert(name.to_owned(), total / all.max(1) as f64);
         Ok(total)
     }
 
@@ -119,7 +183,7 @@ impl Recording<'_> {
         record: impl FnOnce(vk::CommandBuffer),
     ) -> Result<f64> {
         let (device, raw, timed) = (self.device, &self.device.raw, self.queries != vk::QueryPool::null());
-        device.go_on()?;
+        device.turns.go_on()?;
         // SAFETY: the command buffer is recorded here and waited for before it is freed.
         unsafe {
             let commands = begin(device, self.from)?;

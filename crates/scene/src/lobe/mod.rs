@@ -29,7 +29,7 @@ pub struct Lobe {
 /// All of them, in the order of `LOBE_…` in shaders/lib/.
 pub static LOBES: [&Lobe; COUNT] = [&sheen::SHEEN];
 
-// The table of directional reflectance has room for one (src/pass/environment.rs).
+// The table of directional reflectance has room for one (src/upload/environment.rs).
 const _: () = {
     let (mut place, mut with_albedo) = (0, 0);
     while place < COUNT {

@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::aims::AimsOnDevice;
 use super::emitters::EmittersOnDevice;
 use super::scene::{BENT, cofactors as cofactors_of, medium, texture_bits};
-use super::upload::{pack_half_2x16, upload};
+use super::table::{pack_half_2x16, upload};
 use super::view::View;
 use crate::gpu::{Buffer, Device, Frame, NOTHING, Place};
 use crate::plan::{Plan, Rays};

@@ -8,8 +8,8 @@ use glam::{DMat3, DVec3};
 
 use super::sigma_grid::SigmaGrids;
 use super::spectrum::{SpectrumConstants, SpectrumOnDevice};
+use super::table::upload;
 use super::texture::{Texels, Textures};
-use super::upload::upload;
 use super::view::View;
 use crate::gpu::{
     Binding, BoundSet, Buffer, DescriptorSet, Device, Draw, Place, Resource, Specialization as _, VertexStream,
@@ -335,7 +335,7 @@ impl SceneOnDevice {
     }
 
     /// Keeps the table of the shadow maps behind that of the lights.
-    pub(super) fn keep_shadow_maps(&mut self, of_lights: Vec<LightMaps>, maps: &[[f32; 4]]) {
+    pub(crate) fn keep_shadow_maps(&mut self, of_lights: Vec<LightMaps>, maps: &[[f32; 4]]) {
         self.lights.write_at(of_lights.len() * LIGHT_TEXELS * 16, bytemuck::cast_slice(maps));
         self.light_shadows = of_lights;
     }
@@ -672,13 +672,13 @@ fn shared_light(light: &Light, color: [f32; 3], eye: DVec3, maps: LightMaps) -> 
 
 /// The shadow maps of a light.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct LightMaps {
+pub(crate) struct LightMaps {
     /// Texel of the first in the table of lights.
-    pub(super) first: usize,
+    pub(crate) first: usize,
     /// 1 or 6; 0 where there are none.
-    pub(super) count: u32,
+    pub(crate) count: u32,
     /// Depth is near/z, with an infinite far plane; else its planes are those around the scene.
-    pub(super) infinite_far: bool,
+    pub(crate) infinite_far: bool,
 }
 
 /// A medium as rays keep it (shaders/lib/media.glsl): its priority, and which material it is.

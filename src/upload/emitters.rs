@@ -5,7 +5,7 @@ use std::sync::Arc;
 use anyhow::Result;
 use ash::vk;
 
-use super::upload::upload;
+use super::table::upload;
 use crate::gpu::{Buffer, Device, NOTHING};
 use crate::share::{EMITTER_NONE, EMITTER_PUNCTUAL, EMITTER_SKY, EMITTER_TRIANGLE, EMITTER_TWO_SIDED, Emitter};
 use crate::transport::emitters::{Emitters, Source};

@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 use ash::vk;
 use half::f16;
 
-use crate::gpu::{Buffer, Device, Frame, Place};
+use crate::gpu::{Buffer, Device, Frame, Place, TooLarge};
 
 /// What `unpackHalf2x16` of GLSL reads.
 pub(super) fn pack_half_2x16([x, y]: [f16; 2]) -> u32 {
@@ -27,7 +27,8 @@ pub fn upload<T: bytemuck::NoUninit>(
     let place = if device.info().kind == "cpu" { Place::Upload } else { Place::Device };
     let size = bytes.len() as u64;
     if texels.is_none() && size > device.max_storage_bytes() {
-        bail!("{name} need {size} bytes, the device binds at most {} at once", device.max_storage_bytes());
+        let limit = format!("binds at most {} at once", device.max_storage_bytes());
+        bail!(TooLarge { what: format!("buffer \"{name}\" of {size} bytes"), limit });
     }
     let mut buffer = match texels {
         Some(format) => Buffer::texels(device, name, size, place, format)?,

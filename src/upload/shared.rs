@@ -8,9 +8,7 @@ use anyhow::Result;
 use super::environment::EnvironmentOnDevice;
 use super::rays::RaysOnDevice;
 use super::scene::SceneOnDevice;
-use super::shadow_map::ShadowMaps;
-use super::tiles::Tiles;
-use crate::gpu::{BoundSet, Buffer, DescriptorSet, Device, Resource};
+use crate::gpu::{BoundSet, Buffer, DescriptorSet, Device, Resource, Sampled};
 use crate::plan::{Attenuation, Knobs, March, Plan};
 pub use crate::shader::Library;
 use crate::shader::{PATHS, SCENE, lib};
@@ -24,8 +22,8 @@ pub struct OnDevice<'a> {
     pub scene: &'a SceneOnDevice,
     /// What rays go through.
     pub rays: &'a RaysOnDevice,
-    /// What lights see.
-    pub shadow_maps: &'a ShadowMaps,
+    /// Depths that lights see.
+    pub shadow_depth: Sampled<'a>,
     /// Light from all around.
     pub environment: &'a EnvironmentOnDevice,
 }
@@ -33,7 +31,7 @@ pub struct OnDevice<'a> {
 impl<'a> OnDevice<'a> {
     /// The descriptor set `scene`: slots and what is in them, file by file of `shaders/lib/`.
     fn scene_entries(&self) -> Vec<(u32, Resource<'a>)> {
-        let &Self { camera, scene, rays, shadow_maps, environment } = self;
+        let &Self { camera, scene, rays, shadow_depth, environment } = self;
         [
             lib::view::Scene { camera_block: camera }.entries(),
             lib::instances::Scene { instances: &scene.instances }.entries(),
@@ -45,7 +43,7 @@ impl<'a> OnDevice<'a> {
             lib::primary::Scene { leaf_places: &rays.leaf_places }.entries(),
             rays.trace().entries(),
             rays.work().entries(),
-            lib::shadow::Scene { shadow_depth: shadow_maps.depth() }.entries(),
+            lib::shadow::Scene { shadow_depth }.entries(),
             lib::environment::Scene {
                 environment: &environment.terms,
                 sky: environment.sky(),
@@ -84,9 +82,10 @@ impl<'a> OnDevice<'a> {
         vec![scene.bind(self.scene_entries()), paths.bind(self.path_entries())]
     }
 
-    /// What programs are specialised by. A pass that wants something else changes its copy, and says why.
+    /// What programs are specialised by; `tile_words` are the words of a tile's list of lights. A pass that wants something else
+    /// changes its copy, and says why.
     #[must_use]
-    pub fn library(&self, plan: &Plan, knobs: &Knobs, tiles: &Tiles) -> Library {
+    pub fn library(&self, plan: &Plan, knobs: &Knobs, tile_words: u32) -> Library {
         let &Self { scene, rays, .. } = self;
         let with = plan.rays.unwrap_or_default();
         let paths = plan.paths.unwrap_or_default();
@@ -125,7 +124,7 @@ impl<'a> OnDevice<'a> {
             lighting: lib::lighting::Constants {
                 // Where tiles list them, no pixel goes through all of them.
                 local_lights: if plan.tiles { 0 } else { plan.local_lights },
-                tile_words: tiles.words(),
+                tile_words,
                 ambient: plan.ambient,
                 reflection: plan.reflection,
                 light_budget: u32::MAX,

@@ -6,7 +6,7 @@ use anyhow::{Result, ensure};
 use ash::vk;
 use glam::{DAffine3, DVec3};
 
-use super::upload::upload;
+use super::table::upload;
 use crate::gpu::{Buffer, Device};
 use crate::plan::Plan;
 use crate::scene::{self, Scene};

@@ -7,7 +7,7 @@ use ash::vk;
 use glam::DVec3;
 use half::f16;
 
-use super::upload::{pack_half_2x16, upload};
+use super::table::{pack_half_2x16, upload};
 use crate::gpu::{Buffer, Device, NOTHING, Place};
 use crate::share::{AIM_GRID_TEXELS, AimBall, AimGrid};
 use crate::transport::caustics::{Aims, Ball};
