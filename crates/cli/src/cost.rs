@@ -31,7 +31,7 @@ pub struct CostArgs {
     picture: PictureOptions,
     #[command(flatten)]
     device: DeviceOptions,
-    /// Seconds to be spent, about: they decide how many samples the reference has
+    /// Seconds to be spent: they decide how many samples the reference has, and what there is no time for is left out
     #[arg(long, value_name = "SECONDS", default_value_t = 240, value_parser = clap::value_parser!(u32).range(1..))]
     budget: u32,
     /// Samples of the reference, whatever the budget

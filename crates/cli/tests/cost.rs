@@ -5,11 +5,9 @@ mod program;
 
 use std::path::Path;
 
-use program::etalon;
+use program::{HASTY, etalon};
 use serde_json::Value;
 
-/// The driver's optimisations cost more here than they save; the bits are the same.
-const HASTY: [(&str, &str); 1] = [("GALLIVM_PERF", "nopt")];
 const COMMON: [&str; 6] = ["--size", "40x24", "--device", "cpu", "--reference-samples", "16"];
 
 fn run(at: &Path, scene: &str, folder: &str, more: &[&str]) -> Value {

@@ -4,14 +4,14 @@
 #[path = "support/program.rs"]
 mod program;
 
-use program::etalon;
+use program::{HASTY, etalon};
 use serde_json::Value;
 
 const COMMON: [&str; 4] = ["--size", "48x27", "--device", "cpu"];
 
 fn planned(folder: &std::path::Path, arguments: &[&str]) -> (Value, String) {
     let all = [&["plan"], arguments, &COMMON, &["--json"]].concat();
-    let text = etalon(folder, &all, &[]).succeeded().stdout;
+    let text = etalon(folder, &all, &HASTY).succeeded().stdout;
     (serde_json::from_str(&text).expect("JSON"), text)
 }
 
@@ -34,7 +34,7 @@ fn a_plan_is_what_is_then_done() {
     ] {
         let (plan, text) = planned(at, arguments);
         let render = [&["render"], arguments, &COMMON, &["-o", "out.png", "--report", "report.json"]].concat();
-        etalon(at, &render, &[]).succeeded();
+        etalon(at, &render, &HASTY).succeeded();
         let report = std::fs::read(at.join("report.json")).expect("a report");
         let report: Value = serde_json::from_slice(&report).expect("JSON");
         for part in ["schema", "samples", "passes", "pipelines", "unread"] {
@@ -60,7 +60,7 @@ fn a_plan_is_what_is_then_done() {
 fn a_plan_can_be_read() {
     let folder = tempfile::tempdir().expect("a folder");
     let all = [&["plan", "study:pool", "--set", "quadrature=left"][..], &COMMON].concat();
-    let text = etalon(folder.path(), &all, &[]).succeeded().stdout;
+    let text = etalon(folder.path(), &all, &HASTY).succeeded().stdout;
     for said in ["refraction", "has transmission 1", "not called for", "reflection and refraction", "interact", "MB"] {
         assert!(text.contains(said), "\"{said}\" is not in {text}");
     }

@@ -3,7 +3,7 @@
 use anyhow::{Context as _, Result, bail, ensure};
 use serde::Serialize;
 
-use super::price::price;
+use super::price::{Against, price};
 use super::sitting::Bench;
 use super::table::{Interval, Price, WorstPixel};
 use etalon::image::metric::{AnyPicture, Metric, compare};
@@ -52,7 +52,7 @@ pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<C
     let flip = compare(Metric::Flip, &shown(&truth.display), &shown(&taken.display))?;
     let gpu_ms = [Interval::of(&taken.ms), Interval::of(&taken.others_ms)];
     let rungs = [knob.rung(&first), knob.rung(&last)];
-    let price = price(knob, [rungs[1], rungs[0]], &taken, &truth, &truth.display)?;
+    let price = price(knob, [rungs[1], rungs[0]], &taken, &truth, Against::Picture(&truth.display))?;
     Ok(Compared {
         knob: knob.name,
         rungs,

@@ -24,6 +24,8 @@ pub struct Truth {
     pub film: Picture,
     /// The mean of one half of its samples.
     pub half: Picture,
+    /// Both as they would be shown, with the other half.
+    pub shown: ShownReference,
     /// As it is shown.
     pub display: Display,
 }
@@ -151,6 +153,39 @@ pub fn told_apart(a: &[Shown; 2], b: &[Shown; 2], width: usize) -> (Interval, u3
     told.unwrap_or((fine, 1))
 }
 
+/// A reference as it would be shown: from all of its samples, and from each half of them.
+pub struct ShownReference {
+    /// All.
+    pub film: Shown,
+    /// Halves.
+    pub halves: [Shown; 2],
+}
+
+/// How much more the mean squared error of displayed values is of `x` than of `b` against what a reference converges to: about two
+/// standard errors either way.
+///
+/// Against the truth t it is x² − b² − 2(x − b)t in the mean, linear in t: the reference's noise adds no square to it. A tone curve is
+/// not straight, so that what is shown of n samples is t + c/n in the mean: F has c/n, the halves r₁ and r₂ have 2c/n, and
+/// 2F − (r₁ + r₂)/2 has nothing of it (the jackknife). What noise is left is that of (x − b)(r₁ + r₂), which r₁ − r₂ tells, the
+/// halves being independent; and what the jackknife took away is added to the interval, since c/n is the first term alone.
+#[must_use]
+pub fn more_error(x: &Display, b: &Display, reference: &ShownReference) -> Interval {
+    let (mut more, mut spread, mut curve) = (0.0, 0.0, 0.0);
+    let ShownReference { film, halves: [r1, r2] } = reference;
+    for (i, (x, b)) in x.rgba.iter().zip(&b.rgba).enumerate() {
+        for c in 0..3 {
+            let [x, b] = [x[c], b[c]].map(|byte| f64::from(byte) / 255.0);
+            let [f, r1, r2] = [film, r1, r2].map(|shown| f64::from(shown[i][c]));
+            more += x * x - b * b - (x - b) * (4.0 * f - r1 - r2);
+            spread += ((x - b) * (r1 - r2)).powi(2);
+            curve += 2.0 * (x - b) * (f - 0.5 * (r1 + r2));
+        }
+    }
+    // The colours of a pixel have their noise in common: as if one of them told that of all three.
+    let n = 3.0 * x.rgba.len().max(1) as f64;
+    Interval::around(more / n, (3.0 * spread).sqrt() / n + 0.5 * curve.abs() / n)
+}
+
 /// Mean squared difference of displayed values 0 to 1.
 #[must_use]
 pub fn display_mse(a: &Display, b: &Display) -> f64 {
@@ -198,7 +233,12 @@ mod tests {
     fn a_noisy_reference_takes_nothing_from_an_error() {
         let (a, b) = (picture(|i| 0.5 + 0.02 * noise(i)), picture(|i| 0.5 + 0.02 * noise(i + 100_000)));
         let film = picture(|i| 0.5 * (a.rgba[i][0] + b.rgba[i][0]));
-        let truth = Truth { display: shown(&film), film, half: a };
+        let truth = Truth {
+            display: shown(&film),
+            film,
+            half: a,
+            shown: ShownReference { film: Vec::new(), halves: [Vec::new(), Vec::new()] },
+        };
         // Off by 0.05 everywhere: 0.0025 / (0.25 + 0.01).
         let off = picture(|_| 0.55);
         let (errors, _) = truth.errors(&off, &shown(&off)).unwrap();
@@ -208,6 +248,55 @@ mod tests {
         let right = picture(|_| 0.5);
         let (errors, _) = truth.errors(&right, &shown(&right)).unwrap();
         assert!(errors.relmse.median.abs() < 3e-4, "{errors:?}");
+    }
+
+    #[test]
+    fn a_noisy_reference_says_which_is_nearer_or_that_it_cannot() {
+        // Bytes 128 and 140; the truth is 0.55, 140.25 / 255.
+        let flat = |byte: u8| Display { width: 64, height: 64, rgba: vec![[byte, byte, byte, 255]; 64 * 64] };
+        let half = |seed: usize, noise_of: f32| -> Shown {
+            (0..64 * 64).map(|i| [0.55 + noise_of * noise(i + seed * 100_000); 3]).collect()
+        };
+        let square = |byte: f64| (byte / 255.0 - 0.55).powi(2);
+        let expected = square(128.0) - square(140.0);
+        let of = |r1: Shown, r2: Shown| {
+            let film = r1.iter().zip(&r2).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect();
+            ShownReference { film, halves: [r1, r2] }
+        };
+        let found = more_error(&flat(128), &flat(140), &of(half(1, 0.2), half(2, 0.2)));
+        assert!(found.low < expected && expected < found.high && found.surely() > 0.0, "{found:?} {expected}");
+        // Two that are as far off: nothing is sure, whatever noise says.
+        let found = more_error(&flat(137), &flat(143), &of(half(3, 0.2), half(4, 0.2)));
+        assert!(found.low < 0.0 && found.high > 0.0, "{found:?}");
+        // The intervals cover the truth in about 95 of 100 draws.
+        let covers = |seed: usize| {
+            let found = more_error(&flat(128), &flat(140), &of(half(2 * seed, 0.3), half(2 * seed + 1, 0.3)));
+            found.low <= expected && expected <= found.high
+        };
+        let covered = (10..110).filter(|&seed| covers(seed)).count();
+        assert!(covered >= 90, "{covered} of 100");
+    }
+
+    /// A curve that bends, x², shows the noise of a reference as brightness, and its halves show twice of it.
+    #[test]
+    fn what_a_curve_makes_of_noise_is_taken_away() {
+        let flat = |byte: u8| Display { width: 64, height: 64, rgba: vec![[byte, byte, byte, 255]; 64 * 64] };
+        // In pairs of which the mean has no noise, so that what the curve makes of it is all there is.
+        let sign = |i: usize| if i.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let half = |seed: usize| -> Vec<f32> {
+            (0..64 * 64).map(|i| 0.7 + 0.3 * sign(i) * noise(i / 2 + seed * 100_000)).collect()
+        };
+        let (a, b) = (half(1), half(2));
+        let shown = |value: &dyn Fn(usize) -> f32| -> Shown { (0..64 * 64).map(|i| [value(i).powi(2); 3]).collect() };
+        let film = shown(&|i| 0.5 * (a[i] + b[i]));
+        let reference = ShownReference { film, halves: [shown(&|i| a[i]), shown(&|i| b[i])] };
+        let (x, base) = (140.0 / 255.0, 128.0 / 255.0);
+        let expected = x * x - base * base - 2.0 * (x - base) * 0.49;
+        let found = more_error(&flat(140), &flat(128), &reference);
+        assert!(found.low < expected && expected < found.high, "{found:?} {expected}");
+        // Half of 0.3² / 3 is what the film shows too much on average; it would be 20 times that far off.
+        let bent = 2.0 * (x - base) * 0.5 * 0.03;
+        assert!((found.median - expected).abs() < 0.1 * bent, "{found:?} {expected} {bent}");
     }
 
     #[test]

@@ -47,6 +47,12 @@ impl Forecast {
         self.coming.pop_front().unwrap_or(ONCE_S)
     }
 
+    /// The expected seconds of the next one.
+    #[must_use]
+    pub fn next(&self) -> f64 {
+        self.coming.front().copied().unwrap_or(ONCE_S)
+    }
+
     /// So many are not drawn.
     pub fn skip(&mut self, count: usize) {
         self.coming.drain(..count.min(self.coming.len()));
@@ -57,11 +63,18 @@ impl Forecast {
         self.was = [self.was[0] + expected, self.was[1] + seconds];
     }
 
-    /// Seconds left. One picture says little: the first ten seconds are taken as they were expected.
+    /// Seconds left.
     #[must_use]
     pub fn left(&self) -> f64 {
+        self.as_it_went(self.coming.iter().sum())
+    }
+
+    /// What was expected, by what it turned out to be so far. One picture says little: the first ten seconds are taken as they were
+    /// expected.
+    #[must_use]
+    pub fn as_it_went(&self, seconds: f64) -> f64 {
         let [expected, took] = self.was;
-        self.coming.iter().sum::<f64>() * (10.0 + took) / (10.0 + expected)
+        seconds * (10.0 + took) / (10.0 + expected)
     }
 }
 

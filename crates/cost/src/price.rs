@@ -2,30 +2,46 @@
 
 use anyhow::Result;
 
-use super::difference::{display_mse, told_apart};
+use super::difference::{Truth, display_mse, more_error, told_apart};
 use super::sitting::Taken;
 use super::table::{Family, INVISIBLE, Interval, Price};
 use etalon::image::metric::{AnyPicture, Metric, compare};
 use etalon::image::png::Display;
 use etalon::plan::Knob;
 
+/// What errors are told against.
+pub(super) enum Against<'a> {
+    /// A picture that is taken for the truth.
+    Picture(&'a Display),
+    /// A reference with noise of its own.
+    Reference(&'a Truth),
+}
+
 /// The price of going from one rung to another, `taken` having been drawn in turns with its base. Pictures by paths are compared with
 /// each other, others by their errors against `truth`. It is of no point yet, and `flip_delta` is FLIP between both.
 ///
 /// # Errors
 /// When the pictures cannot be compared.
-pub(super) fn price(knob: &Knob, [from, to]: [&str; 2], taken: &Taken, base: &Taken, truth: &Display) -> Result<Price> {
+pub(super) fn price(
+    knob: &Knob,
+    [from, to]: [&str; 2],
+    taken: &Taken,
+    base: &Taken,
+    truth: Against<'_>,
+) -> Result<Price> {
     let differences: Vec<f64> = taken.ms.iter().zip(&taken.others_ms).map(|(a, b)| a - b).collect();
     let gpu_ms_delta = Interval::of(&differences);
     let base_ms = Interval::of(&taken.others_ms).median;
     let shown = |taken: &Taken| AnyPicture::Display(taken.display.clone());
     let flip_between = compare(Metric::Flip, &shown(base), &shown(taken))?.value;
-    let (family, (shown_delta, squares)) = match (&taken.halves, &base.halves) {
-        (Some(a), Some(b)) => (Family::Exact, told_apart(a, b, taken.film.width as usize)),
-        // The noise of the truth is in both.
-        _ => {
+    let (family, (shown_delta, squares)) = match (&taken.halves, &base.halves, truth) {
+        (Some(a), Some(b), _) => (Family::Exact, told_apart(a, b, taken.film.width as usize)),
+        (_, _, Against::Picture(truth)) => {
             let more = display_mse(truth, &taken.display) - display_mse(truth, &base.display);
             (Family::Local, (Interval::around(more, 0.0), 1))
+        }
+        (_, _, Against::Reference(truth)) => {
+            (Family::Local, (more_error(&taken.display, &base.display, &truth.shown), 1))
         }
     };
     let mut price = Price {
@@ -40,6 +56,7 @@ pub(super) fn price(knob: &Knob, [from, to]: [&str; 2], taken: &Taken, base: &Ta
         flip_between,
         flip_delta: flip_between,
         shown_delta,
+        error_told: shown_delta.surely() > 0.0 || shown_delta.surely_below() < 0.0,
         squares,
         noise_ratio: match (by_chance(knob, from, to), taken.noise, base.noise) {
             (true, Some(noise), Some(before)) if before > 0.0 => Some(noise / before),
@@ -62,7 +79,7 @@ fn by_chance(knob: &Knob, from: &str, to: &str) -> bool {
     }
 }
 
-/// What a price says, in a sentence.
+/// What a price says, in a sentence; nothing of errors that a reference cannot tell.
 fn verdict(price: &Price) -> String {
     let median = price.gpu_ms_delta.median;
     let (longer, shorter) = (price.takes_longer(), price.saves());
@@ -81,6 +98,8 @@ fn verdict(price: &Price) -> String {
         format!("the same light, {:.2} times the noise", ratio.sqrt())
     } else if flip < INVISIBLE {
         format!("nobody sees it (FLIP {flip:.4} between both)")
+    } else if price.base != Family::Exact && !price.error_told {
+        format!("which is nearer to the truth cannot be told from the reference's noise (FLIP {flip:.3} between both)")
     } else if price.base != Family::Exact && error.median < 0.0 {
         format!("less error by {:.2} % of what is shown (FLIP {flip:.3} between both)", 100.0 * (-error.median).sqrt())
     } else if price.is_seen() {
@@ -96,8 +115,8 @@ fn verdict(price: &Price) -> String {
     } else {
         format!("no error beyond noise (FLIP {flip:.3} between both)")
     };
-    let better =
-        price.noise_ratio.is_some_and(|ratio| ratio < 1.0) || (price.base != Family::Exact && error.median < 0.0);
+    let nearer = price.base != Family::Exact && price.error_told && error.median < 0.0;
+    let better = price.noise_ratio.is_some_and(|ratio| ratio < 1.0) || nearer;
     if longer && !better && !price.is_seen() {
         return format!("{time}; {seen}: wasted here");
     }

@@ -404,7 +404,7 @@ fn bought(price: &Price) -> f64 {
 fn prices(table: &Table) -> Markup {
     let mut all: Vec<&Price> = table.prices.iter().collect();
     let worth =
-        |price: &Price| if price.same { 0.0 } else { bought(price) / price.gpu_ms_delta.median.abs().max(0.05) };
+        |price: &Price| if price.error_told { bought(price) / price.gpu_ms_delta.median.abs().max(0.05) } else { 0.0 };
     all.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
     html! {
         div.scroll { table {
@@ -422,7 +422,7 @@ fn prices(table: &Table) -> Markup {
                         td { (class(price.base)) }
                         td.number { (format!("{:+.2}", price.gpu_ms_delta.median)) }
                         td.number { (format!("{:+.0} %", 100.0 * price.share)) }
-                        td.number { @if price.same { "0" } @else { (sign) (percent(bought(price))) } }
+                        td.number { @if price.same { "0" } @else if price.error_told { (sign) (percent(bought(price))) } @else { "?" } }
                         td.number { (digits(price.flip_between)) }
                         td { (price.verdict) }
                     }

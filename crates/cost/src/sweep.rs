@@ -7,10 +7,10 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
-use super::difference::{Truth, shown};
+use super::difference::{Shown, ShownReference, Truth, shown, told_apart};
 use super::forecast::Forecast;
 use super::orders;
-use super::price::price;
+use super::price::{Against, price};
 use super::sitting::{Bench, Sitting, Taken, total};
 use super::table::{
     CONVERGED, DeviceName, Errors, Family, Interval, KnobState, Order, Point, Price, REFERENCE, Reference, Table,
@@ -27,6 +27,9 @@ const REFERENCE_SHARE: f64 = 0.3;
 const EXACT_SHARE: f64 = 0.4;
 /// What comes after the reference, as far as can be told before.
 const AFTER_SHARE: f64 = 0.3;
+/// Bands of wavelengths that a reference may have, and samples that it has at least before it has more bands.
+const BANDS: [u32; 3] = [32, 16, 8];
+const FEWEST_SAMPLES: u32 = 64;
 /// Pictures that the search may draw.
 const SEARCH: usize = 8;
 /// Mean squared difference of displayed values below which the search leaves out what it pays for: a thousandth of their range.
@@ -229,6 +232,8 @@ struct Run<'a> {
     warnings: Vec<String>,
     done: usize,
     of: usize,
+    /// Pictures that the budget had no time for, and the seconds that they would have taken.
+    left_out: (usize, f64),
     forecast: Forecast,
 }
 
@@ -290,6 +295,7 @@ impl<'a> Run<'a> {
             warnings,
             done: 0,
             of: 0,
+            left_out: (0, 0.0),
             forecast: Forecast::default(),
         })
     }
@@ -301,25 +307,58 @@ impl<'a> Run<'a> {
     /// Chooses its samples and draws it, or reads it where an interrupted run has drawn it already.
     fn reference(&mut self, progress: &mut dyn FnMut(Step<'_>)) -> Result<()> {
         let sweep = self.sweep;
-        let spectral = told_by_wavelength(&sweep.bench) && self.calls_for("colour");
         let mut exact = Knobs::exact();
+        let known = self.read_reference()?;
+        let spectral = match &known {
+            Some(known) => known.knobs.get("colour").is_some_and(|rung| rung != "rgb"),
+            None => self.calls_for("colour") && told_by_wavelength(&sweep.bench) && self.seen_by_wavelength(&exact)?,
+        };
         if !spectral {
             exact = set(&exact, "colour", "rgb")?;
             if self.calls_for("colour") {
                 self.warnings.push(
-                    "nothing in this scene is told by wavelength: the reference has three colours, and bands of wavelengths are \
-                     priced as another reading of them"
+                    "nothing that is told by wavelength is seen in this picture: the reference has three colours, and bands of \
+                     wavelengths are priced as another reading of them"
                         .to_owned(),
                 );
             }
         }
         // Times choose samples, but not twice in one run, and not differently in its parts.
-        let [samples, priced] = match (self.read_reference()?, sweep.extent.reference_samples) {
-            (Some(known), _) => [known.samples, known.priced_samples],
+        let [samples, priced] = match (known, sweep.extent.reference_samples) {
+            (Some(known), _) => {
+                if let Some(colour) = known.knobs.get("colour") {
+                    exact = set(&exact, "colour", colour)?;
+                }
+                [known.samples, known.priced_samples]
+            }
             (None, Some(samples)) => [samples, if samples >= 256 { 16 } else { 4 }],
             (None, None) => {
                 let budget_ms = f64::from(sweep.extent.budget_s) * 1e3;
-                let each_ms = self.a_sample_ms(&exact)?;
+                let mut each_ms = self.a_sample_ms(&exact)?;
+                if spectral {
+                    let all = exact.colour.bands();
+                    let affordable = |bands: &u32| {
+                        let ms = each_ms * f64::from(*bands) / f64::from(all);
+                        samples_within(ms, REFERENCE_SHARE * budget_ms) >= FEWEST_SAMPLES
+                    };
+                    let bands = BANDS.into_iter().find(affordable).unwrap_or(BANDS[BANDS.len() - 1]);
+                    if bands < all {
+                        each_ms *= f64::from(bands) / f64::from(all);
+                        exact = set(&exact, "colour", &format!("spectral:{bands}"))?;
+                        self.warnings.push(format!(
+                            "the reference has {bands} bands of wavelengths: {all} would have left fewer than {FEWEST_SAMPLES} samples \
+                             of each pixel; give it a larger --budget"
+                        ));
+                    }
+                }
+                let least_s = self.start.elapsed().as_secs_f64() + 4.0 * each_ms / 1e3;
+                ensure!(
+                    least_s < f64::from(sweep.extent.budget_s),
+                    "the budget of {} s is spent before there is a reference of 4 samples, which takes {least_s:.0} s with what comes \
+                     before it: --budget {:.0}, or a smaller --size, measures something",
+                    sweep.extent.budget_s,
+                    (4.0 * least_s).max(20.0)
+                );
                 // All but colours is priced in three of them.
                 let plain_ms = if spectral { self.a_sample_ms(&set(&exact, "colour", "rgb")?)? } else { each_ms };
                 let priced = samples_within(plain_ms, EXACT_SHARE * budget_ms / 80.0).min(16);
@@ -386,7 +425,16 @@ impl<'a> Run<'a> {
         let film = exr::read_exr(&film_path)?;
         let half = half_of(&film_path, &film)?;
         let display = png::read_display(&sweep.path("pictures", "reference.png"))?;
-        self.truth = Some(Truth { film, half, display });
+        // What the other half must be for the film to be the mean of both.
+        let other = Picture {
+            width: film.width,
+            height: film.height,
+            rgba: film.rgba.iter().zip(&half.rgba).map(|(f, h)| std::array::from_fn(|c| 2.0 * f[c] - h[c])).collect(),
+        };
+        let Settings { tonemap, exposure, .. } = sweep.bench.settings;
+        let [shown_film, a, b] = [&film, &half, &other].map(|picture| shown(picture, tonemap, exposure));
+        let shown = ShownReference { film: shown_film, halves: [a, b] };
+        self.truth = Some(Truth { film, half, shown, display });
         Ok(())
     }
 
@@ -398,6 +446,22 @@ impl<'a> Run<'a> {
         }
         let reference = serde_json::from_slice(&file::read(&path)?);
         Ok(Some(reference.with_context(|| format!("reading {}", path.display()))?))
+    }
+
+    /// Whether bands of wavelengths show more than noise does: a picture with three colours and one with bands, along the same paths.
+    fn seen_by_wavelength(&self, exact: &Knobs) -> Result<bool> {
+        let bench = &self.sweep.bench;
+        let Settings { tonemap, exposure, size, .. } = bench.settings;
+        let few = set(exact, "samples", "4")?;
+        let halves = |colour: &str| -> Result<[Shown; 2]> {
+            let mut sitting = bench.sit(&set(&few, "colour", colour)?)?;
+            let rendered = sitting.renderer.render(bench.camera, &mut |_| ())?;
+            let halves =
+                sitting.renderer.halves(rendered.samples)?.context("a picture by paths has no halves: our mistake")?;
+            Ok(halves.map(|half| shown(&half, tonemap, exposure)))
+        };
+        let (difference, _) = told_apart(&halves("rgb")?, &halves("spectral:8")?, size[0] as usize);
+        Ok(difference.surely() > 0.0)
     }
 
     /// GPU time of a sample.
@@ -465,6 +529,12 @@ impl<'a> Run<'a> {
             (true, true) => vec!["spectral:16"],
             (true, false) => vec!["spectral:8", "spectral:16", "spectral:32"],
         };
+        // What has more bands than the reference has nothing to be compared with.
+        let compared = |rung: &&str| {
+            self.exact == self.plain
+                || self.plain.with("colour", rung).is_some_and(|k| k.colour.bands() <= self.exact.colour.bands())
+        };
+        let wavelengths: Vec<&str> = wavelengths.into_iter().filter(compared).collect();
         // Between what is priced and the reference.
         let reference = self.reference.as_ref().context("there is no reference yet")?;
         let samples =
@@ -492,8 +562,8 @@ impl<'a> Run<'a> {
         self.forecast.raster_ms =
             self.forecast.raster_ms.min(bench.time(&mut base)? / f64::from(local.samples.count()));
         self.forecast.expect(&local, &local);
-        local_changes.iter().for_each(|change| self.forecast.expect(&change.knobs, &local));
         presets.iter().for_each(|(_, knobs)| self.forecast.expect(knobs, &local));
+        local_changes.iter().for_each(|change| self.forecast.expect(&change.knobs, &local));
         (0..SEARCH - 1).for_each(|_| self.forecast.expect(&local, &local));
         self.forecast.expect(&plain, &plain);
         exact_changes.iter().for_each(|change| self.forecast.expect(&change.knobs, &plain));
@@ -507,14 +577,20 @@ impl<'a> Run<'a> {
         self.forecast.expect(&plain, &local);
 
         let taken = self.base("local", Family::Preset, &local, &mut base, progress)?;
-        for change in &local_changes {
-            self.single(Family::Local, change, &mut base, &taken, progress)?;
-        }
+        // First what answers most, should the budget end.
         for (name, knobs) in &presets {
             self.point(name, knobs, &mut base, progress)?;
         }
+        for change in &local_changes {
+            self.single(Family::Local, change, &mut base, &taken, progress)?;
+        }
         self.search(&local, &local_changes, &mut base, progress)?;
 
+        if self.too_late(self.forecast.next()) {
+            let rest = self.of - self.done;
+            self.left_out = (self.left_out.0 + rest - 1, self.left_out.1 + self.forecast.left());
+            return Ok(());
+        }
         let mut exact = bench.sit(&plain)?;
         let taken = self.base("exact", Family::Exact, &plain, &mut exact, progress)?;
         for change in &exact_changes {
@@ -541,6 +617,11 @@ impl<'a> Run<'a> {
         if path.exists() {
             self.orders =
                 serde_json::from_slice(&file::read(&path)?).with_context(|| format!("reading {}", path.display()))?;
+            self.of -= orders::PICTURES;
+            self.forecast.skip(orders::PICTURES);
+            return Ok(());
+        }
+        if self.too_late(orders::PICTURES as f64 * self.forecast.next()) {
             self.of -= orders::PICTURES;
             self.forecast.skip(orders::PICTURES);
             return Ok(());
@@ -577,6 +658,17 @@ impl<'a> Run<'a> {
         progress(Step { name, done: self.done, of: self.of, left_s: self.forecast.left() });
         self.done += 1;
         self.forecast.begin()
+    }
+
+    /// Whether the budget has no time for a picture. One whose reference was given its samples draws everything.
+    fn too_late(&mut self, expected: f64) -> bool {
+        let seconds = self.forecast.as_it_went(expected);
+        let late = self.sweep.extent.reference_samples.is_none()
+            && self.start.elapsed().as_secs_f64() + seconds > f64::from(self.sweep.extent.budget_s);
+        if late {
+            self.left_out = (self.left_out.0 + 1, self.left_out.1 + seconds);
+        }
+        late
     }
 
     /// What an interrupted run has found of the same rungs under this name.
@@ -630,6 +722,9 @@ impl<'a> Run<'a> {
             self.records.push(record);
             return Ok(Some(point));
         }
+        if self.too_late(expected) {
+            return Ok(None);
+        }
         let begun = Instant::now();
         let drawn = self.sweep.bench.sit(knobs).and_then(|mut sitting| {
             let taken = self.sweep.bench.take(&mut sitting, Some(base))?;
@@ -666,6 +761,9 @@ impl<'a> Run<'a> {
         }
         if let Some(record) = self.known(&name, &change.knobs)? {
             self.records.push(record);
+            return Ok(());
+        }
+        if self.too_late(expected) {
             return Ok(());
         }
         let begun = Instant::now();
@@ -738,7 +836,7 @@ impl<'a> Run<'a> {
         Ok(Price {
             point: point.name.clone(),
             flip_delta: point.error() - known.point.error(),
-            ..price(change.knob, [change.from, change.to], taken, base, &truth.display)?
+            ..price(change.knob, [change.from, change.to], taken, base, Against::Reference(truth))?
         })
     }
 
@@ -757,6 +855,8 @@ impl<'a> Run<'a> {
             self.forecast.skip(SEARCH - 1);
             return Ok(());
         }
+        // Nothing is known below it.
+        let floor = self.reference.as_ref().context("there is no reference yet")?.own_flip;
         // What each rung adds to the error and the time of `local`.
         let base_ms = self.records.iter().find(|r| r.point.name == "local").map_or(0.0, |r| r.point.gpu_ms.median);
         let mut rungs: Vec<(&Change, f64, f64)> = Vec::new();
@@ -766,7 +866,7 @@ impl<'a> Run<'a> {
                 .iter()
                 .filter_map(|r| r.price.as_ref())
                 .find(|p| p.base == Family::Local && p.knob == change.knob.name && p.to == change.to);
-            if let Some(price) = price.filter(|price| !price.same) {
+            if let Some(price) = price.filter(|price| !price.same && price.error_told) {
                 rungs.push((change, price.flip_delta, price.share * base_ms));
             }
         }
@@ -804,7 +904,7 @@ impl<'a> Run<'a> {
                         || rungs.iter().any(|(c, ..)| c.knob.name == knob.name && c.to == rung);
                     let then = at(knob.name, rung);
                     let (gain, ms) = (now[0] - then[0], (then[1] - now[1]).max(0.01 * base_ms));
-                    if measured && gain > 0.0 && best.as_ref().is_none_or(|(ratio, ..)| gain / ms > *ratio) {
+                    if measured && gain > floor && best.as_ref().is_none_or(|(ratio, ..)| gain / ms > *ratio) {
                         best = Some((gain / ms, knob, rung, gain));
                     }
                 }
@@ -815,7 +915,7 @@ impl<'a> Run<'a> {
             let Some(found) = self.point(&format!("search: step {step}"), &changed, base, progress)? else {
                 break;
             };
-            let kept = found.error() < current.error();
+            let kept = found.error().max(floor) < current.error().max(floor);
             self.search.push(Tried { change, promised: (current.error() - gain).max(0.0), found: found.error(), kept });
             if kept {
                 knobs = changed;
@@ -880,6 +980,15 @@ impl<'a> Run<'a> {
                 "the reference has not converged: its own FLIP is {:.3} after {} samples, more than {CONVERGED}, and no error below \
                  that is known",
                 reference.own_flip, reference.samples
+            ));
+        }
+        if let (1.., seconds) = self.left_out {
+            let budget_s = self.sweep.extent.budget_s;
+            self.warnings.push(format!(
+                "the budget of {budget_s} s was spent before {} of {} pictures were drawn: --budget {:.0} would draw them all, about",
+                self.left_out.0,
+                self.of,
+                f64::from(budget_s) + 1.2 * seconds
             ));
         }
         if self.exact != self.plain {

@@ -151,6 +151,12 @@ impl Interval {
     pub fn surely(&self) -> f64 {
         self.median - 1.5 * (self.median - self.low)
     }
+
+    /// Three standard errors above it.
+    #[must_use]
+    pub fn surely_below(&self) -> f64 {
+        self.median + 1.5 * (self.high - self.median)
+    }
 }
 
 /// Place and size of the largest error.
@@ -249,6 +255,9 @@ pub struct Price {
     /// More of the mean squared error of displayed values 0 to 1 against the reference; from `exact` the mean squared difference of
     /// what both pictures converge to, of which halves give a mean without noise, with two standard errors either way.
     pub shown_delta: Interval,
+    /// Whether that is more than the noise of both pictures, or that of the reference: its sign is known.
+    #[serde(default)]
+    pub error_told: bool,
     /// Side in pixels of the squares over which displayed values were averaged for that: 1, or more where single pixels are too noisy
     /// to tell anything.
     pub squares: u32,

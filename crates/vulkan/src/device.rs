@@ -11,40 +11,13 @@ use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use serde::Serialize;
 
 use super::cache::Caches;
+use super::choice::DeviceChoice;
 use super::error::NotOpened;
 use super::limits::{PUSH_DESCRIPTORS, STORAGE_BUFFERS, STORAGE_IMAGES, UNIFORM_BUFFERS};
+use super::pace::Turns;
 use super::surface::Surface;
-use super::turns::Turns;
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
-
-/// Which device the user wants.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub enum DeviceChoice {
-    /// The best there is: discrete, integrated, virtual, then CPU.
-    #[default]
-    Best,
-    /// A software device.
-    Cpu,
-    /// Anything but a software device.
-    Gpu,
-    /// By place in `etalon devices`.
-    Index(usize),
-    /// By part of its name, ignoring case.
-    Name(String),
-}
-
-impl std::str::FromStr for DeviceChoice {
-    type Err = std::convert::Infallible;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Ok(match text {
-            "cpu" => Self::Cpu,
-            "gpu" => Self::Gpu,
-            _ => text.parse().map_or_else(|_| Self::Name(text.to_owned()), Self::Index),
-        })
-    }
-}
 
 /// A device as reports name it.
 #[derive(Debug, Clone, Serialize)]

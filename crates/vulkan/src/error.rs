@@ -1,6 +1,6 @@
 //! Errors that a caller may want to match on.
 
-use super::device::DeviceChoice;
+use super::choice::DeviceChoice;
 
 /// Why no device was opened: what a caller may look for in an [`anyhow::Error`].
 ///
@@ -63,16 +63,4 @@ pub struct TooLarge {
     pub what: String,
     /// What the device allows.
     pub limit: String,
-}
-
-impl std::fmt::Display for DeviceChoice {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Best => f.write_str("a device"),
-            Self::Cpu => f.write_str("a software device"),
-            Self::Gpu => f.write_str("a GPU"),
-            Self::Index(i) => write!(f, "a device of index {i}"),
-            Self::Name(name) => write!(f, "a device named like \"{name}\""),
-        }
-    }
 }

@@ -16,11 +16,11 @@ use super::bind::{Bindings, Descriptor, Resource, Sampled};
 use super::cache::{PipelineKey, RasterKey};
 use super::device::{Device, lock};
 use super::memory::{Buffer, Image};
+use super::pace::Interrupted;
 use super::recording::{Dispatch, Groups, Pass, Recording, Target, Work, bind_sets, push_constants, push_descriptors};
 use super::set::BoundSet;
 use super::shader::{Program, SharedSet, Specialization as _};
 use super::sync::{self, ResourceId, State, Use};
-use super::turns::Interrupted;
 
 /// GPU time of one pass.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,6 +8,7 @@
 mod access;
 mod bind;
 mod cache;
+mod choice;
 mod device;
 mod error;
 mod frame;
@@ -15,6 +16,7 @@ pub mod limits;
 mod loops;
 mod memory;
 mod open;
+mod pace;
 mod pipeline;
 #[cfg(feature = "window")]
 mod present;
@@ -31,11 +33,13 @@ mod window;
 pub use access::Access;
 pub use bind::{Bindings, Resource, Sampled};
 pub use cache::SamplerDesc;
-pub use device::{Candidate, Created, Device, DeviceChoice, DeviceInfo, Message, Severity, candidates, is_lost};
+pub use choice::DeviceChoice;
+pub use device::{Candidate, Created, Device, DeviceInfo, Message, Severity, candidates, is_lost};
 pub use error::{NotOpened, TooLarge};
 pub use frame::{ColorTarget, DepthTarget, Draw, Frame, PassPlan, PassTime, Raster, VertexStream};
 pub use loops::with_loops_counted;
 pub use memory::{Buffer, Image, ImageDesc, NOTHING, Place};
+pub use pace::Interrupted;
 #[cfg(feature = "window")]
 pub use present::{Overlay, Placed, Presented, Presenter};
 pub use set::{BoundSet, DescriptorSet};
@@ -43,6 +47,5 @@ pub use shader::{
     Binding, BindingKind, Constant, Program, Replacement, SetLayout, SharedSet, Specialization, Stage, VertexInput,
 };
 pub use specialize::specialized;
-pub use turns::Interrupted;
 #[cfg(feature = "window")]
 pub use window::Windowed;

@@ -8,7 +8,8 @@ use std::sync::{Arc, Condvar, Mutex, Weak};
 
 use anyhow::{Result, bail};
 
-use super::device::{Device, DeviceChoice, Instance, RightToValidate, lock};
+use super::choice::DeviceChoice;
+use super::device::{Device, Instance, RightToValidate, lock};
 use super::error::NotOpened;
 
 struct Slot {

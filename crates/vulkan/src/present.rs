@@ -11,7 +11,8 @@ use egui_ash_renderer::allocator::DefaultAllocator;
 use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer};
 
 use super::access::Access;
-use super::device::{Device, DeviceChoice, Instance, lock};
+use super::choice::DeviceChoice;
+use super::device::{Device, Instance, lock};
 use super::memory::{Buffer, Image, ImageDesc, Place};
 use super::open;
 use super::recording::begin;

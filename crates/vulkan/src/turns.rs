@@ -4,9 +4,7 @@
 //! other, as many at a time as took [`PIECE_MS`] by the pace of the piece before. What the host must know for that, how many
 //! groups a dispatch has whose number the device wrote, is read back first.
 
-use std::collections::HashMap;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result};
 use ash::vk;
@@ -25,42 +23,6 @@ const PIECE_MS: f64 = 10.0;
 const FIRST: u64 = 32;
 /// A piece has at most so many times the groups of the one before: that one may have been quick by chance.
 const GROWTH: f64 = 4.0;
-
-/// What a device knows of its turns.
-#[derive(Debug)]
-pub(super) struct Turns {
-    /// A window shares the queue: nothing that is submitted takes long.
-    pub(super) taken: bool,
-    /// Milliseconds of a group of invocations in the last dispatch of each name, where turns are taken.
-    paces: Mutex<HashMap<String, f64>>,
-    /// Dispatches that were drawn in more than one piece.
-    cut: AtomicU64,
-    /// Somebody wants what is drawn to be given up, and whoever draws it agrees.
-    interrupted: AtomicBool,
-    interruptible: AtomicBool,
-}
-
-impl Turns {
-    pub(super) fn new(taken: bool) -> Self {
-        Self {
-            taken,
-            paces: Mutex::default(),
-            cut: AtomicU64::new(0),
-            interrupted: AtomicBool::new(false),
-            interruptible: AtomicBool::new(false),
-        }
-    }
-
-    fn go_on(&self) -> Result<()> {
-        let is_over = self.interruptible.load(Ordering::Relaxed) && self.interrupted.load(Ordering::Relaxed);
-        if is_over { Err(Interrupted.into()) } else { Ok(()) }
-    }
-}
-
-/// Why a frame was not drawn to its end: somebody wants another.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the frame was given up for another")]
-pub struct Interrupted;
 
 impl Device {
     /// Gives up what is drawn within [`Device::interruptible`], now or the next time, until [`Device::resume`].

@@ -1,7 +1,7 @@
 //! Runs the program `etalon` as a user would.
 #![allow(dead_code, unreachable_pub, reason = "each test program includes this file and uses its own part of it")]
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What a run leaves behind.
@@ -35,12 +35,23 @@ impl Run {
     }
 }
 
+/// Where many pipelines draw few pixels, the driver's optimisations and threads cost more than they save; the bits are the same.
+pub const HASTY: [(&str, &str); 2] = [("GALLIVM_PERF", "nopt"), ("LP_NUM_THREADS", "0")];
+
+/// Where the driver keeps what it compiled: the same for all tests, whose own caches are theirs alone.
+fn cache_of_driver() -> PathBuf {
+    let of = |name: &str, below: &str| std::env::var_os(name).map(|folder| PathBuf::from(folder).join(below));
+    let found = of("MESA_SHADER_CACHE_DIR", "").or_else(|| of("XDG_CACHE_HOME", "")).or_else(|| of("HOME", ".cache"));
+    found.unwrap_or_else(std::env::temp_dir)
+}
+
 /// In `folder`, with a cache of its own there and these variables beside the machine's.
 pub fn etalon(folder: &Path, arguments: &[&str], variables: &[(&str, &str)]) -> Run {
     let output = Command::new(env!("CARGO_BIN_EXE_etalon"))
         .args(arguments)
         .current_dir(folder)
         .env("XDG_CACHE_HOME", folder.join("cache"))
+        .env("MESA_SHADER_CACHE_DIR", cache_of_driver())
         .env_remove("RUST_BACKTRACE")
         .env_remove("RUST_LOG")
         .envs(variables.iter().copied())
