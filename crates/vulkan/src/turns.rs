@@ -35,7 +35,7 @@ impl Device {
         self.turns.interrupted.store(false, Ordering::Relaxed);
     }
 
-    /// Draws frames that may be given up between two pieces, where the device takes turns: they end with [`Interrupted`].
+    /// Draws frames that may be given up between two pieces, where the device takes turns: they end with [`crate::Interrupted`].
     pub fn interruptible<T>(&self, draw: impl FnOnce() -> T) -> T {
         self.turns.interruptible.store(true, Ordering::Relaxed);
         let drawn = draw();
