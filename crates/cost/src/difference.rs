@@ -294,7 +294,7 @@ mod tests {
         let expected = x * x - base * base - 2.0 * (x - base) * 0.49;
         let found = more_error(&flat(140), &flat(128), &reference);
         assert!(found.low < expected && expected < found.high, "{found:?} {expected}");
-        // Half of 0.3² / 3 is what the film shows too much on average; it would be 20 times that far off.
+        // The film shows half of 0.3² / 3 too much in the mean: taken for the truth it would be ten times this bound off.
         let bent = 2.0 * (x - base) * 0.5 * 0.03;
         assert!((found.median - expected).abs() < 0.1 * bent, "{found:?} {expected} {bent}");
     }

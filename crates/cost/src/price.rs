@@ -9,7 +9,7 @@ use etalon::image::metric::{AnyPicture, Metric, compare};
 use etalon::image::png::Display;
 use etalon::plan::Knob;
 
-/// What errors are told against.
+/// The reference against which an error is computed.
 pub(super) enum Against<'a> {
     /// A picture that is taken for the truth.
     Picture(&'a Display),

@@ -317,7 +317,7 @@ impl<'a> Run<'a> {
             exact = set(&exact, "colour", "rgb")?;
             if self.calls_for("colour") {
                 self.warnings.push(
-                    "nothing that is told by wavelength is seen in this picture: the reference has three colours, and bands of \
+                    "bands of wavelengths change nothing visible in this picture: the reference has three colours, and bands of \
                      wavelengths are priced as another reading of them"
                         .to_owned(),
                 );
@@ -866,8 +866,10 @@ impl<'a> Run<'a> {
                 .iter()
                 .filter_map(|r| r.price.as_ref())
                 .find(|p| p.base == Family::Local && p.knob == change.knob.name && p.to == change.to);
-            if let Some(price) = price.filter(|price| !price.same && price.error_told) {
-                rungs.push((change, price.flip_delta, price.share * base_ms));
+            if let Some(price) = price.filter(|price| !price.same) {
+                // A change of error that the reference cannot tell promises nothing; its time counts all the same.
+                let more_error = if price.error_told { price.flip_delta } else { 0.0 };
+                rungs.push((change, more_error, price.share * base_ms));
             }
         }
         let mut knobs = local.clone();

@@ -48,9 +48,9 @@ pub enum NotOpened {
     Validated {
         /// Its name.
         device: String,
-        /// How it was asked for.
+        /// The kind of the device that is open.
         has: String,
-        /// What is asked for now.
+        /// The kind that the caller requested.
         wanted: String,
     },
 }

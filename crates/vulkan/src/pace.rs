@@ -1,4 +1,4 @@
-//! What a device knows of drawing in turns with a window (`turns.rs`): how quick its dispatches are, and whether somebody waits.
+//! The state of time slicing beside a window (`turns.rs`): milliseconds per workgroup of each dispatch, and requests to interrupt.
 
 use std::collections::HashMap;
 use std::sync::Mutex;
@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use anyhow::Result;
 
-/// What a device knows of its turns.
+/// A device's part of it.
 #[derive(Debug)]
 pub(super) struct Turns {
     /// A window shares the queue: nothing that is submitted takes long.
