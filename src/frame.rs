@@ -8,7 +8,7 @@ use ash::vk;
 
 use crate::gpu::{Buffer, DescriptorSet, Device, Frame, Image, ImageDesc, PassPlan, PassTime, Place};
 use crate::image::halves::{SampleError, error_of_halves};
-use crate::image::tone::ToneMap;
+use crate::image::tone::{ToneMap, ViewTransform};
 use crate::image::{Picture, png};
 use crate::pass::accumulate::accumulate;
 use crate::pass::aov::aov;
@@ -160,6 +160,22 @@ impl Settings {
         let Self { environment_intensity: intensity, environment_rotation: rotation, .. } = *self;
         let sky = environment.map(|map| Sky { map, intensity, rotation });
         Ok(Conditions { knobs: &self.knobs, demand: self.demand, sky, background })
+    }
+
+    /// Display-linear colour that the display output has behind the scene; `None`: it is transparent there.
+    fn behind(&self) -> Option<[f64; 3]> {
+        match self.background {
+            Background::Color(bytes) => Some(bytes),
+            Background::Transparent => None,
+            Background::Default | Background::Environment => Some(NEUTRAL_GREY),
+        }
+        .map(|bytes| bytes.map(|byte| crate::image::tone::srgb_decode(f64::from(byte) / 255.0)))
+    }
+
+    /// What a display shows of a film of this picture.
+    #[must_use]
+    pub fn view_transform(&self) -> ViewTransform {
+        ViewTransform { curve: self.tonemap, exposure: self.exposure, background: self.behind() }
     }
 }
 
@@ -782,14 +798,12 @@ impl Renderer {
 
     /// Display-linear colour behind the scene with alpha 1, or all 0, and whether the display output is transparent.
     fn display_background(&self) -> ([f32; 4], bool) {
-        let linear = |bytes: [u8; 3]| {
-            let [r, g, b] = bytes.map(|byte| crate::image::tone::srgb_decode(f64::from(byte) / 255.0) as f32);
-            ([r, g, b, 1.0], false)
-        };
-        match self.settings.background {
-            Background::Color(bytes) => linear(bytes),
-            Background::Transparent => ([0.0; 4], true),
-            Background::Default | Background::Environment => linear(NEUTRAL_GREY),
+        match self.settings.behind() {
+            Some(colour) => {
+                let [r, g, b] = colour.map(|light| light as f32);
+                ([r, g, b, 1.0], false)
+            }
+            None => ([0.0; 4], true),
         }
     }
 
@@ -798,9 +812,17 @@ impl Renderer {
     /// # Errors
     /// When the driver fails.
     pub fn film(&self) -> Result<Picture> {
-        let mut picture = self.read(self.film_on_device())?;
+        let mut picture = self.film_alone()?;
         self.lay_behind(&mut picture);
         Ok(picture)
+    }
+
+    /// The same with its coverage as alpha, without a background colour: what [`Settings::view_transform`] takes.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn film_alone(&self) -> Result<Picture> {
+        self.read(self.film_on_device())
     }
 
     /// The same where it lies, for passes of one's own: linear RGBA in f32, without a background colour.
@@ -842,12 +864,21 @@ impl Renderer {
     /// # Errors
     /// When the driver fails.
     pub fn halves(&self, samples: u32) -> Result<Option<[Picture; 2]>> {
+        let mut halves = self.halves_alone(samples)?;
+        halves.iter_mut().flatten().for_each(|half| self.lay_behind(half));
+        Ok(halves)
+    }
+
+    /// The same with their coverage as alpha, without a background colour.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn halves_alone(&self, samples: u32) -> Result<Option<[Picture; 2]>> {
         let Some(halves) = &self.targets.halves else { return Ok(None) };
         let mean = |sum: &Image| -> Result<Picture> {
             let mut picture = self.read(sum)?;
             let scale = 2.0 / samples as f32;
             picture.rgba.iter_mut().flatten().for_each(|value| *value *= scale);
-            self.lay_behind(&mut picture);
             Ok(picture)
         };
         Ok(Some([mean(&halves.sums[0])?, mean(&halves.sums[1])?]))

@@ -67,6 +67,8 @@ pub mod plan;
 
 pub mod transport;
 
+pub mod lecture;
+
 pub use etalon_image as image;
 pub use etalon_optics as optics;
 pub use etalon_optics::spectra;

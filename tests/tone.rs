@@ -5,7 +5,7 @@
 use ash::vk;
 use etalon::frame::{Background, NEUTRAL_GREY, Settings};
 use etalon::gpu::{Buffer, Frame, Image, ImageDesc};
-use etalon::image::tone::{ToneMap, desaturated, quantise, srgb_decode, srgb_encode};
+use etalon::image::tone::{ToneMap, ViewTransform, desaturated, quantise, srgb_decode, srgb_encode};
 use etalon::pass::tonemap::{Counts, Display, tonemap};
 use etalon::scene::LightKind;
 use etalon::study::shape::Shape;
@@ -221,6 +221,29 @@ fn light_beyond_f32_is_counted_as_infinite() {
             film.rgba.iter().zip(rendered.display.chunks(4)).filter(|(f, _)| f[0].is_infinite()).collect();
         // 65504 / 65505 of Reinhard is the last to reach the byte: 1.5e-5 below 1, half a byte is 2e-3.
         assert!(white.iter().all(|(_, bytes)| **bytes == [255; 4]), "{tonemap:?}: {:?}", white[0].1);
+    }
+}
+
+#[test]
+fn what_lies_behind_is_what_the_twin_has_there() {
+    let gpu = Gpu::open();
+    let mut random = Random(11);
+    let film: Vec<[f32; 4]> = (0..64 * 16)
+        .map(|i| {
+            let alpha = [0.0, 1.0, random.between(0.0, 1.0)][i % 3];
+            let [r, g, b] = [0; 3].map(|_| (alpha * random.between(0.0, 3.0)) as f32);
+            [r, g, b, alpha as f32]
+        })
+        .collect();
+    for (curve, exposure) in CURVES.into_iter().zip([0.0, 1.0, -1.0, 0.5, 0.0]) {
+        let behind = [0.2, 0.5, 0.7];
+        let [r, g, b] = behind.map(|x| x as f32);
+        let (bytes, _) = display(&gpu, &film, 64, curve, exposure, [r, g, b, 1.0]);
+        let twin = ViewTransform { curve, exposure, background: Some(behind) };
+        for (pixel, got) in film.iter().zip(bytes) {
+            let expected = twin.shown(*pixel);
+            assert!((0..3).all(|k| is_right(got[k], expected[k], 1e-3)), "{curve:?} {pixel:?}: {got:?}, {expected:?}");
+        }
     }
 }
 

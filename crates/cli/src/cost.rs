@@ -2,21 +2,27 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
 
-use super::budget::{command, keep};
+use super::budget::{command, keep, kept};
 use super::options::{DeviceOptions, Extent as Planned, PictureOptions, SceneOptions, When};
 use super::print;
 use super::progress::Steps;
 use super::setup::Setup;
 use etalon::gpu::Severity;
 use etalon::image::file;
+use etalon::image::metric::AnyPicture;
 use etalon::scene::Reads;
+use etalon_cost::beside::Beside;
 use etalon_cost::compare::{Compared, compare_rungs};
+use etalon_cost::pace::Step;
+use etalon_cost::reference::NotMeasured;
 use etalon_cost::report;
-use etalon_cost::sweep::{Extent, Step, Sweep};
+use etalon_cost::sweep::{Extent, Listener, Sweep, merge};
 use etalon_cost::table::Table;
 
 /// Price every approximation on a scene: error against the scene's own reference, beside GPU time
@@ -25,7 +31,7 @@ pub struct CostArgs {
     #[command(flatten)]
     scene: SceneOptions,
     /// Folder for report.html, cost.json, cost.csv and the pictures; a run that was interrupted there goes on
-    #[arg(short, long, value_name = "DIR", required_unless_present = "compare")]
+    #[arg(short, long, value_name = "DIR", required_unless_present_any = ["compare", "beside"])]
     output: Option<PathBuf>,
     #[command(flatten)]
     picture: PictureOptions,
@@ -43,6 +49,12 @@ pub struct CostArgs {
     /// Join the parts of a run, in these folders, instead of measuring
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["shard", "reference_samples", "compare"])]
     merge: Vec<PathBuf>,
+    /// Lay two finished runs of one scene side by side, such as those of two devices, instead of measuring
+    #[arg(long, value_names = ["DIR", "DIR"], num_args = 2, conflicts_with_all = ["shard", "reference_samples", "compare", "merge"])]
+    beside: Vec<PathBuf>,
+    /// Hold a picture of another program against the reference too: OpenEXR or PNG of the same size
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["merge", "compare", "beside"])]
+    judge: Vec<PathBuf>,
     /// Price one approximation only: two pictures in turns, two lines and a verdict
     #[arg(long, value_name = "KNOB=A,B", conflicts_with_all = ["shard", "reference_samples", "output", "budget"])]
     compare: Option<String>,
@@ -69,23 +81,18 @@ fn shard(text: &str) -> Result<[u32; 2], String> {
 pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
     let output = args.output.clone().unwrap_or_default();
     if !args.merge.is_empty() {
-        let read = |folder: &PathBuf| -> Result<Table> {
-            let path = folder.join("cost.json");
-            serde_json::from_slice(&file::read(&path)?).with_context(|| format!("reading {}", path.display()))
-        };
-        let table = Table::merge(args.merge.iter().map(read).collect::<Result<_>>()?)?;
-        let pictures = output.join("pictures");
-        std::fs::create_dir_all(&pictures).with_context(|| format!("making the folder {}", pictures.display()))?;
-        for folder in &args.merge {
-            for entry in folder.join("pictures").read_dir().with_context(|| format!("reading {}", folder.display()))? {
-                let from = entry?.path();
-                let to = pictures.join(from.file_name().unwrap_or_default());
-                file::write(&to, &file::read(&from)?)?;
-            }
-        }
+        let table = merge(&args.merge, &output, &args.picture.settings(&args.scene)?)?;
         return write(args, &output, &table);
     }
+    if let [a, b] = &args.beside[..] {
+        return beside(args, [a, b]);
+    }
     let settings = args.picture.settings(&args.scene)?;
+    let others: Vec<(String, AnyPicture)> = args
+        .judge
+        .iter()
+        .map(|path| Ok((path.display().to_string(), AnyPicture::load(path)?)))
+        .collect::<Result<_>>()?;
     let compared = args.compare.is_some();
     if !compared && (!args.picture.set.is_empty() || args.picture.model.is_some()) {
         bail!(
@@ -111,7 +118,10 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
         return say(args, &compared);
     }
     let contents = setup.contents();
-    let table = setup.bench(&args.scene, settings, |bench| {
+    let kept = kept(&command, &setup);
+    let stopped = Arc::new(AtomicBool::new(false));
+    listen(&stopped);
+    let measured = setup.bench(&args.scene, settings, |bench| {
         let samples = args.reference_samples;
         if let Some(samples) =
             samples.filter(|n| !n.is_power_of_two() || n.trailing_zeros() % 2 == 1 || *n < 4 || *n > 4096)
@@ -125,16 +135,92 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
             command: &command,
             scene: &args.scene.scene,
             contents: &contents,
+            kept: kept.as_deref(),
+            others: &others,
+            stopped: &|| stopped.load(Ordering::Relaxed),
         };
-        sweep.run(&mut |step: Step<'_>| steps.of(step.name, step.done, step.of, step.left_s))
-    })?;
+        sweep.run(&mut Listener {
+            step: &mut |step: Step<'_>| steps.of(step.name, step.done, step.of, step.left_s),
+            early: &mut |table: &Table| {
+                let page = report::page(table, &output.join("pictures"))?;
+                file::write(&output.join("report.html"), page.as_bytes())
+            },
+        })
+    });
     drop(steps);
+    let table = match measured {
+        Ok(table) => table,
+        Err(error) => {
+            if let Some(nothing) = error.downcast_ref::<NotMeasured>() {
+                file::write(&output.join("report.html"), report::nothing(&args.scene.scene, nothing).as_bytes())?;
+            }
+            return Err(error);
+        }
+    };
     validated(&setup)?;
     let done = write(args, &output, &table)?;
     if args.shard.is_none() {
         keep(&command, &setup, &output);
     }
     Ok(done)
+}
+
+/// Time and error of the points that two tables have in common, and where their work differs.
+fn beside(args: &CostArgs, folders: [&PathBuf; 2]) -> Result<ExitCode> {
+    let read = |folder: &PathBuf| -> Result<Table> {
+        let path = folder.join("cost.json");
+        serde_json::from_slice(&file::read(&path)?).with_context(|| format!("reading {}", path.display()))
+    };
+    let [a, b] = [read(folders[0])?, read(folders[1])?];
+    for (what, a, b) in [("scenes", &a.scene, &b.scene), ("sizes", &format!("{:?}", a.size), &format!("{:?}", b.size))]
+    {
+        ensure!(a == b, "--beside: two runs have different {what}, {a} and {b}");
+    }
+    let rows = Beside::of(&a, &b);
+    ensure!(!rows.is_empty(), "--beside: the two runs have no picture in common");
+    if args.json {
+        print(&serde_json::to_string_pretty(&rows)?)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let mut table = comfy_table::Table::new();
+    table.load_preset(comfy_table::presets::NOTHING);
+    table.set_header(["picture", "A ms", "B ms", "B/A", "A error %", "B error %", "work"]);
+    for row in &rows {
+        let [a, b] = row.gpu_ms;
+        let work = if row.same_work { "same".to_owned() } else { row.other_work.join(", ") };
+        let errors = row.error.map(|error| format!("{:.2}", 100.0 * error));
+        table.add_row([
+            row.picture.clone(),
+            format!("{a:.2}"),
+            format!("{b:.2}"),
+            format!("{:.2}", b / a),
+            errors[0].clone(),
+            errors[1].clone(),
+            work,
+        ]);
+    }
+    for (name, table) in [("A", &a), ("B", &b)] {
+        print(&format!(
+            "{name}: {} ({}), {} {}",
+            table.device.name, table.device.kind, table.device.driver, table.device.version
+        ))?;
+    }
+    print(&table.to_string())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The first Ctrl-C ends the run with what there is, the second at once.
+fn listen(stopped: &Arc<AtomicBool>) {
+    let stopped = stopped.clone();
+    let heard = ctrlc::set_handler(move || {
+        if stopped.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+        tracing::warn!("ending after this picture with what there is; Ctrl-C again ends at once");
+    });
+    if let Err(error) = heard {
+        tracing::info!("listening to Ctrl-C: {error}");
+    }
 }
 
 /// What the validation layer calls an error fails the run.
@@ -156,7 +242,7 @@ fn say(args: &CostArgs, compared: &Compared) -> Result<ExitCode> {
     for (rung, ms) in rungs.iter().zip(gpu_ms) {
         let error = if *rung == price.to {
             let error = 100.0 * price.shown_delta.median.max(0.0).sqrt();
-            format!("{error:.3} % of what is shown, FLIP {:.4}", price.flip_between)
+            format!("{error:.3} % of the range, FLIP {:.4}", price.flip_between)
         } else {
             "compared with".to_owned()
         };

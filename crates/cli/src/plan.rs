@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 use clap::Args;
 use comfy_table::{ContentArrangement, Table, presets};
 
@@ -18,6 +18,7 @@ use etalon::scene::Camera;
 use etalon::scene::normal_form::normalise;
 use etalon::transport::sight::{Sight, along_lines};
 use etalon_cost::explain::Price;
+use etalon_cost::predict::{Prediction, Trial, predict};
 
 /// Say what a scene calls for, with reasons, and what drawing it takes
 #[derive(Debug, Clone, Args)]
@@ -28,10 +29,16 @@ pub struct PlanArgs {
     picture: PictureOptions,
     #[command(flatten)]
     device: DeviceOptions,
+    /// Say what every rung will take and how wrong it will be at this size, from pictures of few pixels
+    #[arg(long)]
+    forecast: bool,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
 }
+
+/// Seconds of a forecast.
+const FORECAST_S: u32 = 30;
 
 /// Runs the command.
 ///
@@ -45,7 +52,10 @@ pub fn run(args: &PlanArgs) -> Result<ExitCode> {
     let sight = sight(&opened, &camera, &settings)?;
     let read = opened.warnings.clone();
     // What an effect costs and how many pixels show it only a device tells; what there is, and why, nothing but the scene.
-    let wants_device = args.device.device.is_some() || args.device.validate || args.picture.plan == Extent::ExplainCost;
+    let wants_device = args.device.device.is_some()
+        || args.device.validate
+        || args.forecast
+        || args.picture.plan == Extent::ExplainCost;
     let facts = match device {
         Ok(device) => on_device(args, Setup { device, opened }, settings, sight.as_ref(), read)?,
         Err(error) if wants_device => return Err(error),
@@ -104,6 +114,7 @@ fn on_device(
 ) -> Result<PlanFacts> {
     let interfaces = settings.knobs.interfaces.count();
     let explained = (args.picture.plan == Extent::ExplainCost).then(|| (setup.clone(), settings.clone()));
+    let forecast = args.forecast.then(|| (setup.clone(), settings.clone()));
     let (mut renderer, camera) = setup.renderer(&args.scene, settings)?;
     warnings.extend(renderer.warnings.iter().cloned());
     let passes = renderer.passes(&camera)?;
@@ -128,8 +139,15 @@ fn on_device(
     warnings.extend(sight.and_then(|sight| lost(sight, interfaces)));
     facts.expected = Some(expected(&facts, &renderer, sight, [interfaces, lighting as u32]));
     facts.warnings.splice(0..0, warnings);
+    drop(renderer);
+    if let Some((setup, settings)) = forecast {
+        let folder = tempfile::tempdir().context("making a folder")?;
+        let trial = Trial { folder: &folder.path().join("forecast"), budget_s: FORECAST_S };
+        facts.forecast = setup.bench(&args.scene, settings, |bench| {
+            predict(&bench, &trial, &mut |step| eprintln!("{}, about {:.0} s left", step.name, step.left_s))
+        })?;
+    }
     if let Some((setup, settings)) = explained {
-        drop(renderer);
         facts.costs = setup.prices(&args.scene, &args.device, settings, &facts.effects, &mut |effect| {
             eprintln!("measuring what \"{effect}\" would cost");
         })?;
@@ -194,6 +212,21 @@ pub(super) fn cost_table(prices: &[Price]) -> Table {
     costs
 }
 
+/// What every rung will take, and how wrong it will be.
+fn forecast_table(predictions: &[Prediction]) -> Table {
+    let mut all = table(&["picture", "GPU ms", "from … to", "error %", "from … to"]);
+    for Prediction { picture, gpu_ms: ms, error, .. } in predictions {
+        all.add_row([
+            picture.clone(),
+            format!("{:.1}", ms.median),
+            format!("{:.1} … {:.1}", ms.low, ms.high),
+            format!("{:.2}", 100.0 * error.median),
+            format!("{:.2} … {:.2}", 100.0 * error.low, 100.0 * error.high),
+        ]);
+    }
+    all
+}
+
 fn text(facts: &PlanFacts) -> String {
     let mut effects = table(&["effect", "state", "rung", "pixels", "reason"]);
     for effect in &facts.effects {
@@ -226,13 +259,15 @@ fn text(facts: &PlanFacts) -> String {
     };
     let unread: String = facts.unread.iter().map(|unread| format!("not read: {unread}\n")).collect();
     let costs = if facts.costs.is_empty() { String::new() } else { format!("{}\n", cost_table(&facts.costs)) };
+    let forecast =
+        if facts.forecast.is_empty() { String::new() } else { format!("\n{}\n", forecast_table(&facts.forecast)) };
     let warnings: String = facts.warnings.iter().map(|warning| format!("warning: {warning}\n")).collect();
     if facts.expected.is_none() {
         return format!("{effects}\n\n{} samples per pixel\n{unread}{warnings}", facts.samples).trim_end().to_owned();
     }
     format!(
         "{effects}\n\n{} samples per pixel, each by the passes {}\n\n{pipelines}\n\n{} pipelines of {:.0} KB of SPIR-V; {} buffers \
-         and images of {:.1} MB; {rounds} rounds of rays or more\n{sight}{unread}{costs}{warnings}",
+         and images of {:.1} MB; {rounds} rounds of rays or more\n{sight}{unread}{costs}{forecast}{warnings}",
         facts.samples,
         facts.passes.join(", "),
         facts.pipelines.len(),

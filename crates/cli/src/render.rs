@@ -255,7 +255,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     }
     let (rendered, film) = first.ok_or_else(|| anyhow!("nothing was drawn"))?;
     if let Some(chosen) = &mut chosen {
-        chosen.check(&rendered, args.picture.size)?;
+        chosen.check(&rendered, args.picture.size, &mut renderer, &camera)?;
     }
     let aovs =
         if args.aov.is_empty() { Vec::new() } else { layers(&mut renderer, &camera, &args.aov, rendered.samples)? };

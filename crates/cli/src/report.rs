@@ -13,6 +13,7 @@ use etalon::plan::{Effect, Knobs, Plan};
 use etalon::spectra;
 use etalon::upload::rays::BvhFacts;
 use etalon_cost::explain::Price;
+use etalon_cost::predict::Prediction;
 
 /// The document.
 #[derive(Debug, Serialize)]
@@ -152,6 +153,9 @@ pub struct PlanFacts {
     /// What the effects that are left out would have cost, where that was asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub costs: Vec<Price>,
+    /// What every rung will take at this size, and how wrong it will be, where that was asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub forecast: Vec<Prediction>,
     /// What the chosen rungs leave out.
     pub warnings: Vec<String>,
 }
@@ -196,6 +200,7 @@ impl PlanFacts {
             unread: plan.unread.clone(),
             expected: None,
             costs: Vec::new(),
+            forecast: Vec::new(),
             warnings: plan.warnings.clone(),
         }
     }

@@ -15,7 +15,7 @@ use etalon::gpu::{DeviceInfo, Severity};
 use etalon::image::file;
 use etalon::open::Opened;
 use etalon::scene::{Camera, Reads, Scene};
-use etalon_cost::sweep::arguments;
+use etalon_cost::command::arguments;
 use etalon_viewer::shared::{Asked, Loaded, Source};
 use etalon_viewer::{Start, View, run as run_window};
 

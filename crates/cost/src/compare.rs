@@ -3,11 +3,17 @@
 use anyhow::{Context as _, Result, bail, ensure};
 use serde::Serialize;
 
-use super::price::{Against, price};
-use super::sitting::Bench;
-use super::table::{Interval, Price, WorstPixel};
+use super::agenda::Change;
+use super::difference::ShownReference;
+use super::price::{Clock, Pair, Turns, price};
+use super::sitting::{Bench, ENOUGH_MS};
+use super::statistics::{Interval, MANY, standard_errors};
+use super::table::{Price, WorstPixel};
 use etalon::image::metric::{AnyPicture, Metric, compare};
 use etalon::plan::{Knob, Knobs};
+
+/// What is said of two pictures: a time, and an error in squares of three sides.
+const STATEMENTS: usize = 4;
 
 /// Two rungs.
 #[derive(Debug, Serialize)]
@@ -45,14 +51,19 @@ pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<C
     ensure!(first != last, "--compare {wanted}: both are the same rung");
     let [first, last] = if knob.place(&first) < knob.place(&last) { [first, last] } else { [last, first] };
     let mut exact = bench.sit(&last)?;
-    let truth = bench.take(&mut exact, None)?;
+    let truth = bench.take(&mut exact, None, ENOUGH_MS)?;
     let mut sitting = bench.sit(&first)?;
-    let taken = bench.take(&mut sitting, Some(&mut exact))?;
+    let taken = bench.take(&mut sitting, Some((&mut exact, &truth)), ENOUGH_MS)?;
     let shown = |display: &etalon::image::png::Display| AnyPicture::Display(display.clone());
     let flip = compare(Metric::Flip, &shown(&truth.display), &shown(&taken.display))?;
     let gpu_ms = [Interval::of(&taken.ms), Interval::of(&taken.others_ms)];
     let rungs = [knob.rung(&first), knob.rung(&last)];
-    let price = price(knob, [rungs[1], rungs[0]], &taken, &truth, Against::Picture(&truth.display))?;
+    let change = Change { knob: knob.name.to_owned(), from: rungs[1].to_owned(), to: rungs[0].to_owned() };
+    let pair = Pair::of(&change, &taken, &truth)?;
+    let more = truth.halves.is_none().then(|| ShownReference::exact(&truth.display).error(&taken.display));
+    let clock = Clock::of([(&taken.ms[..], &taken.others_ms[..])].into_iter());
+    let turns = Turns { ms: &taken.ms, others_ms: &taken.others_ms, clock };
+    let price = price(&change, &pair, more, turns, STATEMENTS, standard_errors(STATEMENTS, MANY));
     Ok(Compared {
         knob: knob.name,
         rungs,

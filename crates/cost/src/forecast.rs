@@ -16,6 +16,8 @@ pub struct Forecast {
     pub path_ms: f64,
     /// Of a sample of the preset `local`.
     pub raster_ms: f64,
+    /// Pictures are timed again until they took so long.
+    pub enough_ms: f64,
     /// Seconds of each picture to come, in order.
     coming: VecDeque<f64>,
     /// Seconds that were expected of those that were drawn, and that they took.
@@ -38,7 +40,7 @@ impl Forecast {
     pub fn expect(&mut self, knobs: &Knobs, base: &Knobs) {
         let ms = self.picture_ms(knobs);
         let warm = ms * 2.0_f64.min(f64::from(knobs.samples.count())) / f64::from(knobs.samples.count());
-        let all = warm + turns(ms) as f64 * (ms + self.picture_ms(base));
+        let all = warm + turns(ms, self.enough_ms) as f64 * (ms + self.picture_ms(base));
         self.coming.push_back(ONCE_S + all / 1e3);
     }
 
@@ -85,7 +87,7 @@ mod tests {
 
     #[test]
     fn what_took_twice_as_long_goes_on_to() {
-        let mut forecast = Forecast { path_ms: 100.0, raster_ms: 10.0, ..Forecast::default() };
+        let mut forecast = Forecast { path_ms: 100.0, raster_ms: 10.0, enough_ms: 1000.0, ..Forecast::default() };
         let (local, exact) = (Knobs::of(Model::Local), Knobs::exact());
         (0..10).for_each(|_| forecast.expect(&local, &local));
         forecast.expect(&exact, &exact);

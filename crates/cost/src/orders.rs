@@ -7,7 +7,8 @@
 use anyhow::{Context as _, Result, ensure};
 
 use super::sitting::Bench;
-use super::table::{Interval, Order};
+use super::statistics::Interval;
+use super::table::Order;
 use etalon::image::Picture;
 use etalon::plan::{Knobs, Model};
 

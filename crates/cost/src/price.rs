@@ -1,82 +1,156 @@
 //! What one picture costs and buys beside another that has one knob on another rung.
 
 use anyhow::Result;
+use serde::{Deserialize, Serialize};
 
-use super::difference::{Truth, display_mse, more_error, told_apart};
+use super::agenda::Change;
+use super::difference::{in_squares, told};
 use super::sitting::Taken;
-use super::table::{Family, INVISIBLE, Interval, Price};
+use super::statistics::{Estimate, Interval, mean, pooled, standard_errors};
+use super::table::{Family, INVISIBLE, Price};
 use etalon::image::metric::{AnyPicture, Metric, compare};
-use etalon::image::png::Display;
 use etalon::plan::Knob;
 
-/// The reference against which an error is computed.
-pub(super) enum Against<'a> {
-    /// A picture that is taken for the truth.
-    Picture(&'a Display),
-    /// A reference with noise of its own.
-    Reference(&'a Truth),
+/// Times of one program on the same rungs differ by so much between two places in memory: less is no difference of the rungs.
+const SAME_PROGRAM: f64 = 0.02;
+/// Spread of the logarithms of two times whose turns tell none, and how well that is known.
+const NO_TURNS: (f64, f64) = (0.05, 5.0);
+
+/// What two pictures say of each other, whatever the reference.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Pair {
+    /// Mean FLIP between both.
+    pub flip: f64,
+    /// Whether they are the same to the last bit.
+    pub same: bool,
+    /// The mean squared difference of displayed values of what both converge to, in squares of several sides; of pictures by paths.
+    pub squares: Vec<(u32, Estimate)>,
+    /// Of a knob that changes chance alone: relative mean squared error by chance over that of the base.
+    pub noise_ratio: Option<f64>,
 }
 
-/// The price of going from one rung to another, `taken` having been drawn in turns with its base. Pictures by paths are compared with
-/// each other, others by their errors against `truth`. It is of no point yet, and `flip_delta` is FLIP between both.
-///
-/// # Errors
-/// When the pictures cannot be compared.
-pub(super) fn price(
-    knob: &Knob,
-    [from, to]: [&str; 2],
-    taken: &Taken,
-    base: &Taken,
-    truth: Against<'_>,
-) -> Result<Price> {
-    let differences: Vec<f64> = taken.ms.iter().zip(&taken.others_ms).map(|(a, b)| a - b).collect();
+impl Pair {
+    /// Compares a picture with its base.
+    ///
+    /// # Errors
+    /// When the pictures cannot be compared.
+    pub fn of(change: &Change, taken: &Taken, base: &Taken) -> Result<Self> {
+        let shown = |taken: &Taken| AnyPicture::Display(taken.display.clone());
+        let squares = match (&taken.halves, &base.halves) {
+            (Some(a), Some(b)) => in_squares(a, b, taken.film.width as usize),
+            _ => Vec::new(),
+        };
+        Ok(Self {
+            flip: compare(Metric::Flip, &shown(base), &shown(taken))?.value,
+            same: base.is(&taken.film),
+            squares,
+            noise_ratio: match (by_chance(change), taken.noise, base.noise) {
+                (true, Some(noise), Some(before)) if before > 0.0 => Some(noise / before),
+                _ => None,
+            },
+        })
+    }
+}
+
+/// How well times are known: the spread of the logarithms of ratios within their turns, over all pictures drawn in turns with one base.
+#[derive(Debug, Clone, Copy)]
+pub struct Clock {
+    deviation: f64,
+    freedom: f64,
+}
+
+fn logs(ms: &[f64], others_ms: &[f64]) -> Vec<f64> {
+    ms.iter().zip(others_ms).filter(|(a, b)| **a > 0.0 && **b > 0.0).map(|(a, b)| (a / b).ln()).collect()
+}
+
+impl Clock {
+    /// By the turns of some pictures: each its own times and those of the base.
+    #[must_use]
+    pub fn of<'a>(turns: impl Iterator<Item = (&'a [f64], &'a [f64])>) -> Self {
+        let groups: Vec<Vec<f64>> = turns.map(|(ms, others)| logs(ms, others)).collect();
+        let (deviation, freedom) = pooled(&groups).unwrap_or(NO_TURNS);
+        Self { deviation, freedom }
+    }
+
+    /// Whether a picture takes more or less time than its base, one of so many statements.
+    fn tells(&self, ms: &[f64], others_ms: &[f64], statements: usize) -> bool {
+        let logs = logs(ms, others_ms);
+        let error = self.deviation / (logs.len().max(1) as f64).sqrt();
+        !logs.is_empty() && mean(&logs).abs() > SAME_PROGRAM + standard_errors(statements, self.freedom) * error
+    }
+}
+
+/// Times of a picture and of its base in turns.
+#[derive(Clone, Copy)]
+pub struct Turns<'a> {
+    /// Its own, in milliseconds.
+    pub ms: &'a [f64],
+    /// The base's.
+    pub others_ms: &'a [f64],
+    /// How well both are known.
+    pub clock: Clock,
+}
+
+/// The price of a change. `more_error`: how much more mean squared error it has than its base, where a reference tells that; `None`
+/// of pictures by paths, which are compared with each other. It is of no point yet, and `flip_delta` is FLIP between both.
+#[must_use]
+pub fn price(
+    change: &Change,
+    pair: &Pair,
+    more_error: Option<Estimate>,
+    turns: Turns<'_>,
+    statements: usize,
+    sure: f64,
+) -> Price {
+    let Turns { ms, others_ms, clock } = turns;
+    let differences: Vec<f64> = ms.iter().zip(others_ms).map(|(a, b)| a - b).collect();
     let gpu_ms_delta = Interval::of(&differences);
-    let base_ms = Interval::of(&taken.others_ms).median;
-    let shown = |taken: &Taken| AnyPicture::Display(taken.display.clone());
-    let flip_between = compare(Metric::Flip, &shown(base), &shown(taken))?.value;
-    let (family, (shown_delta, squares)) = match (&taken.halves, &base.halves, truth) {
-        (Some(a), Some(b), _) => (Family::Exact, told_apart(a, b, taken.film.width as usize)),
-        (_, _, Against::Picture(truth)) => {
-            let more = display_mse(truth, &taken.display) - display_mse(truth, &base.display);
-            (Family::Local, (Interval::around(more, 0.0), 1))
-        }
-        (_, _, Against::Reference(truth)) => {
-            (Family::Local, (more_error(&taken.display, &base.display, &truth.shown), 1))
+    let base_ms = Interval::of(others_ms).median;
+    let (base, squares, more) = match more_error {
+        Some(more) => (Family::Local, 1, more),
+        None => {
+            let (side, found) = told(&pair.squares, sure).unwrap_or((1, Estimate::default()));
+            (Family::Exact, side, found)
         }
     };
     let mut price = Price {
-        knob: knob.name.to_owned(),
-        from: from.to_owned(),
-        to: to.to_owned(),
-        base: family,
+        knob: change.knob.clone(),
+        from: change.from.clone(),
+        to: change.to.clone(),
+        base,
         point: String::new(),
         gpu_ms_delta,
         turns: differences.len(),
         share: if base_ms > 0.0 { gpu_ms_delta.median / base_ms } else { 0.0 },
-        flip_between,
-        flip_delta: flip_between,
-        shown_delta,
-        error_told: shown_delta.surely() > 0.0 || shown_delta.surely_below() < 0.0,
+        flip_between: pair.flip,
+        flip_delta: pair.flip,
+        shown_delta: more.interval(),
+        error_told: !pair.same && more.is_told(sure),
+        time_told: clock.tells(ms, others_ms, statements),
         squares,
-        noise_ratio: match (by_chance(knob, from, to), taken.noise, base.noise) {
-            (true, Some(noise), Some(before)) if before > 0.0 => Some(noise / before),
-            _ => None,
-        },
-        same: bytemuck::cast_slice::<_, u8>(&taken.film.rgba) == bytemuck::cast_slice::<_, u8>(&base.film.rgba),
+        noise_ratio: pair.noise_ratio,
+        same: pair.same,
         called_for: true,
         verdict: String::new(),
     };
     price.verdict = verdict(&price);
-    Ok(price)
+    price
 }
 
 /// Whether a change is one of chance alone: the light is the same in the mean.
-fn by_chance(knob: &Knob, from: &str, to: &str) -> bool {
-    match knob.name {
+fn by_chance(change: &Change) -> bool {
+    match change.knob.as_str() {
         "guiding" => true,
-        "lights" => from != "points" && to != "points",
+        "lights" => change.from != "points" && change.to != "points",
         _ => false,
     }
+}
+
+/// Whether a change is one to a rung further on in its knob's list.
+fn to_more_exact(price: &Price) -> bool {
+    let place =
+        |rung: &str| Knob::named(&price.knob).and_then(|knob| knob.rungs.iter().position(|known| *known == rung));
+    place(&price.to) > place(&price.from)
 }
 
 /// What a price says, in a sentence; nothing of errors that a reference cannot tell.
@@ -86,7 +160,7 @@ fn verdict(price: &Price) -> String {
     let time = if longer {
         format!("takes {median:.1} ms longer ({:+.0} %)", 100.0 * price.share)
     } else if shorter {
-        format!("saves {:.1} ms ({:+.0} %)", -median, 100.0 * price.share)
+        format!("saves {:.1} ms (−{:.0} %)", -median, -100.0 * price.share)
     } else {
         "takes the same time as far as can be told".to_owned()
     };
@@ -101,17 +175,17 @@ fn verdict(price: &Price) -> String {
     } else if price.base != Family::Exact && !price.error_told {
         format!("which is nearer to the truth cannot be told from the reference's noise (FLIP {flip:.3} between both)")
     } else if price.base != Family::Exact && error.median < 0.0 {
-        format!("less error by {:.2} % of what is shown (FLIP {flip:.3} between both)", 100.0 * (-error.median).sqrt())
+        format!("less error by {:.2} % of the range (FLIP {flip:.3} between both)", 100.0 * (-error.median).sqrt())
     } else if price.is_seen() {
         // From the reference's rungs a cheaper one is wrong; a dearer one says what they leave out.
-        let more = match (price.base, price.to_more_exact()) {
+        let more = match (price.base, to_more_exact(price)) {
             (Family::Exact, false) => "an error of",
             (Family::Exact, true) => "another picture by",
             _ => "more error by",
         };
         let squares =
             if price.squares > 1 { format!(" in squares of {} pixels", price.squares) } else { String::new() };
-        format!("{more} {:.2} % of what is shown{squares} (FLIP {flip:.3} between both)", 100.0 * error.median.sqrt())
+        format!("{more} {:.2} % of the range{squares} (FLIP {flip:.3} between both)", 100.0 * error.median.sqrt())
     } else {
         format!("no error beyond noise (FLIP {flip:.3} between both)")
     };
@@ -121,4 +195,27 @@ fn verdict(price: &Price) -> String {
         return format!("{time}; {seen}: wasted here");
     }
     format!("{time}; {seen}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_that_differ_by_chance_are_not_told() {
+        let turns = |ratio: f64| -> (Vec<f64>, Vec<f64>) {
+            let noise = [0.99, 1.02, 1.0, 0.98, 1.01, 1.0, 1.005];
+            (noise.iter().map(|n| 10.0 * ratio * n).collect(), vec![10.0; 7])
+        };
+        let all = [turns(1.0), turns(1.2), turns(0.9)];
+        let clock = Clock::of(all.iter().map(|(ms, others)| (&ms[..], &others[..])));
+        let tells = |ratio: f64| {
+            let (ms, others) = turns(ratio);
+            clock.tells(&ms, &others, 100)
+        };
+        assert!(tells(1.2) && tells(0.9));
+        // All seven turns may agree, and it is still what two places in memory differ by.
+        assert!(!tells(1.03) && !tells(1.0));
+        assert!(!clock.tells(&[], &[], 100));
+    }
 }

@@ -7,7 +7,7 @@ use std::time::Instant;
 use anyhow::Result;
 
 use super::difference::{Shown, shown};
-use super::table::Interval;
+use super::statistics::Interval;
 use etalon::frame::{Rendered, Renderer, Settings, Work};
 use etalon::gpu::Device;
 use etalon::image::Picture;
@@ -20,16 +20,21 @@ use etalon::scene::environment::Environment;
 /// Pictures of one plan are timed until there are so many …
 const MOST: usize = 7;
 /// … or they took so many milliseconds; two at least …
-const ENOUGH_MS: f64 = 1000.0;
+pub const ENOUGH_MS: f64 = 1000.0;
 /// … unless one takes so long.
 const LONG_MS: f64 = 6000.0;
 
 /// How many pictures that take so long are timed.
-pub(super) fn turns(ms: f64) -> usize {
+pub(super) fn turns(ms: f64, enough_ms: f64) -> usize {
     match ms {
         ms if ms >= LONG_MS => 1,
-        ms => ((ENOUGH_MS / ms.max(1e-3)).ceil() as usize).clamp(2, MOST),
+        ms => ((enough_ms / ms.max(1e-3)).ceil() as usize).clamp(2, MOST),
     }
+}
+
+/// The same for a run of so many seconds: a short one draws more pictures instead.
+pub(super) fn enough_ms(budget_s: f64) -> f64 {
+    (ENOUGH_MS * budget_s / 480.0).clamp(0.15 * ENOUGH_MS, ENOUGH_MS)
 }
 
 /// What is drawn, from where, on what.
@@ -78,6 +83,14 @@ pub struct Taken {
     pub samples: u32,
 }
 
+impl Taken {
+    /// Whether its radiance is this to the last bit.
+    #[must_use]
+    pub fn is(&self, film: &Picture) -> bool {
+        bytemuck::cast_slice::<_, u8>(&self.film.rgba) == bytemuck::cast_slice::<_, u8>(&film.rgba)
+    }
+}
+
 pub(super) fn total(rendered: &Rendered) -> f64 {
     rendered.passes.iter().map(|pass| pass.ms).sum()
 }
@@ -109,19 +122,19 @@ impl Bench<'_> {
     /// # Errors
     /// When these rungs cannot be drawn.
     pub fn sit(&self, knobs: &Knobs) -> Result<Sitting> {
-        self.sit_with(knobs, self.settings.seed)
-    }
-
-    /// The same with other random numbers.
-    ///
-    /// # Errors
-    /// As [`Bench::sit`].
-    pub fn sit_with(&self, knobs: &Knobs, seed: u32) -> Result<Sitting> {
         let start = Instant::now();
-        let settings = Settings { knobs: knobs.clone(), seed, max_error: None, ..self.settings.clone() };
-        let mut renderer = Renderer::new(self.device, self.original, self.environment, settings)?;
+        let mut renderer = self.renderer(knobs, self.settings.seed)?;
         renderer.render_samples(self.camera, 2, &mut |_| ())?;
         Ok(Sitting { renderer, start_ms: start.elapsed().as_secs_f64() * 1e3 })
+    }
+
+    /// What draws these rungs with these random numbers; nothing is drawn yet.
+    ///
+    /// # Errors
+    /// When these rungs cannot be drawn.
+    pub fn renderer(&self, knobs: &Knobs, seed: u32) -> Result<Renderer> {
+        let settings = Settings { knobs: knobs.clone(), seed, max_error: None, ..self.settings.clone() };
+        Renderer::new(self.device, self.original, self.environment, settings)
     }
 
     /// GPU time of one picture.
@@ -132,35 +145,44 @@ impl Bench<'_> {
         Ok(total(&sitting.renderer.render(self.camera, &mut |_| ())?))
     }
 
-    /// Draws and times, in turns with `other` where there is one.
+    /// Draws and times, in turns with `other` where there is one, until pictures took so many milliseconds.
     ///
     /// # Errors
     /// When the driver fails.
-    pub fn take(&self, sitting: &mut Sitting, mut other: Option<&mut Sitting>) -> Result<Taken> {
+    pub fn take(
+        &self,
+        sitting: &mut Sitting,
+        mut other: Option<(&mut Sitting, &Taken)>,
+        enough_ms: f64,
+    ) -> Result<Taken> {
         let rendered = sitting.renderer.render(self.camera, &mut |_| ())?;
-        let film = sitting.renderer.film()?;
-        let halves = sitting.renderer.halves(rendered.samples)?;
-        let Settings { size: [width, height], tonemap, exposure, .. } = self.settings;
+        let film = sitting.renderer.film_alone()?;
+        let halves = sitting.renderer.halves_alone(rendered.samples)?;
+        let [width, height] = self.settings.size;
+        let view = self.settings.view_transform();
+        let same = other.as_ref().is_some_and(|(_, known)| known.is(&film));
         let mut ms = vec![total(&rendered)];
         let mut others_ms = Vec::new();
         let mut passes: Vec<(String, Vec<f64>)> =
             rendered.passes.iter().map(|p| (p.name.clone(), vec![p.ms])).collect();
-        if let Some(other) = &mut other {
+        if let Some((other, _)) = &mut other {
             others_ms.push(self.time(other)?);
         }
-        while ms.len() < turns(ms[0]) {
+        // What cannot be told from its base has no more to say.
+        let enough_ms = if same { 0.0 } else { enough_ms };
+        while ms.len() < turns(ms[0], enough_ms) {
             let again = sitting.renderer.render(self.camera, &mut |_| ())?;
             ms.push(total(&again));
             for (pass, known) in again.passes.iter().zip(&mut passes) {
                 known.1.push(pass.ms);
             }
-            if let Some(other) = &mut other {
+            if let Some((other, _)) = &mut other {
                 others_ms.push(self.time(other)?);
             }
         }
         Ok(Taken {
             film,
-            halves: halves.map(|halves| halves.map(|half| shown(&half, tonemap, exposure))),
+            halves: halves.map(|halves| halves.map(|half| shown(&half, &view))),
             noise: rendered.errors.last().map(|error| error.relmse),
             png: sitting.renderer.png(&rendered)?,
             display: Display {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use anyhow::{Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
-use etalon::plan::KNOBS;
+use super::statistics::Interval;
 
 /// The document.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -28,12 +28,22 @@ pub struct Table {
     pub knobs: Vec<KnobState>,
     /// Everything that was drawn.
     pub points: Vec<Point>,
-    /// Places in `points` of those that nothing beats in time and error at once, the quickest first.
+    /// Places in `points` of those that nothing beats in time and error at once, the quickest first, the reference last: each is
+    /// nearer to the truth than the one before by more than noise.
     pub frontier: Vec<usize>,
+    /// The settings that the frontier recommends.
+    #[serde(default)]
+    pub recommended: Vec<Recommended>,
+    /// Standard errors that a statement had to be away from nothing, there being so many statements.
+    #[serde(default)]
+    pub standard_errors: f64,
     /// What changing one knob bought and cost.
     pub prices: Vec<Price>,
     /// How the search for better combinations went, a step each.
     pub search: Vec<Tried>,
+    /// Pictures of other programs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub others: Vec<Other>,
     /// How the rules of quadrature come near to the integral, where media vary.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub orders: Vec<Order>,
@@ -77,16 +87,40 @@ pub struct Reference {
     /// Mean of FLIP's error against what it converges to: that of one half of its samples against all, whose difference is as
     /// large as that error.
     pub own_flip: f64,
-    /// Whether that is at most [`CONVERGED`].
+    /// The least error, of displayed values 0 to 1, that can be told from none.
+    pub resolution: f64,
+    /// Whether that is at most [`RESOLVED`].
     pub converged: bool,
-    /// Makes it again.
+    /// The pictures with random numbers of their own that it is the mean of.
+    pub rounds: Vec<Round>,
+    /// Makes it again, or the first of its rounds.
     pub command: String,
     /// Hash of the picture's file.
     pub image: String,
 }
 
-/// FLIP up to which a reference is called converged.
-pub const CONVERGED: f64 = 0.02;
+/// A picture that a reference is made of.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Round {
+    /// Chooses its random numbers.
+    pub seed: u32,
+    /// Samples of each pixel.
+    pub samples: u32,
+    /// GPU time that it took.
+    pub gpu_ms: f64,
+}
+
+/// Error that a reference has to resolve to be called converged: a step and a quarter of eight bits.
+pub const RESOLVED: f64 = 0.005;
+
+/// A setting that the page recommends.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Recommended {
+    /// `quick`, `balanced` or `exact`.
+    pub setting: String,
+    /// Its place in `points`.
+    pub point: usize,
+}
 
 /// A knob in this scene.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -117,48 +151,6 @@ pub enum Family {
     Search,
 }
 
-/// A number and how well it is known.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Interval {
-    /// In the middle.
-    pub median: f64,
-    /// At least.
-    pub low: f64,
-    /// At most.
-    pub high: f64,
-}
-
-impl Interval {
-    /// The middle and both ends of some numbers, at least one.
-    #[must_use]
-    pub fn of(values: &[f64]) -> Self {
-        let mut sorted = values.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        let n = sorted.len();
-        let at = |i: usize| sorted.get(i).copied().unwrap_or_default();
-        Self { median: 0.5 * (at(n.saturating_sub(1) / 2) + at(n / 2)), low: at(0), high: at(n.saturating_sub(1)) }
-    }
-
-    /// A value and two standard errors either way.
-    #[must_use]
-    pub fn around(value: f64, deviation: f64) -> Self {
-        Self { median: value, low: value - 2.0 * deviation, high: value + 2.0 * deviation }
-    }
-
-    /// Three standard errors below a value that [`Interval::around`] made: dozens of prices are told, of which two standard errors
-    /// would call some by mistake.
-    #[must_use]
-    pub fn surely(&self) -> f64 {
-        self.median - 1.5 * (self.median - self.low)
-    }
-
-    /// Three standard errors above it.
-    #[must_use]
-    pub fn surely_below(&self) -> f64 {
-        self.median + 1.5 * (self.high - self.median)
-    }
-}
-
 /// Place and size of the largest error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WorstPixel {
@@ -173,6 +165,9 @@ pub struct WorstPixel {
 /// How far a picture is from the reference.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Errors {
+    /// Root of the mean squared error of displayed values 0 to 1 against what the reference converges to: two standard errors of
+    /// the square either way.
+    pub error: Interval,
     /// Mean of FLIP's error of the displayed pictures.
     pub flip_mean: f64,
     /// What 95 of 100 pixels stay below.
@@ -222,11 +217,25 @@ pub struct Point {
 }
 
 impl Point {
-    /// What the frontier is drawn by: FLIP's mean. Squares of radiance would be those of a few pixels that paths make far too bright.
+    /// What the frontier is drawn by: the root mean squared error of displayed values. Unlike FLIP it can be told without the
+    /// reference's noise; squares of radiance would be those of a few pixels that paths make far too bright.
     #[must_use]
     pub fn error(&self) -> f64 {
-        self.errors.flip_mean
+        self.errors.error.median
     }
+}
+
+/// A picture that another program drew of the same scene, from the same place.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Other {
+    /// Its file.
+    pub file: String,
+    /// Against the reference; of a file of display values without those of radiance.
+    #[serde(flatten)]
+    pub errors: Errors,
+    /// Mean radiance over that of the reference in red, green and blue; of OpenEXR.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_ratio: Option<[f64; 3]>,
 }
 
 /// What changing one knob bought and cost.
@@ -258,6 +267,9 @@ pub struct Price {
     /// Whether that is more than the noise of both pictures, or that of the reference: its sign is known.
     #[serde(default)]
     pub error_told: bool,
+    /// Whether the difference of time is more than that of two runs of one program.
+    #[serde(default)]
+    pub time_told: bool,
     /// Side in pixels of the squares over which displayed values were averaged for that: 1, or more where single pixels are too noisy
     /// to tell anything.
     pub squares: u32,
@@ -276,35 +288,22 @@ pub struct Price {
 pub const INVISIBLE: f64 = 0.002;
 
 impl Price {
-    /// Whether a time is more than chance: all turns say so, of which there are five, or fewer and it is more than a twentieth.
-    fn is_sure(&self) -> bool {
-        self.turns >= 5 || self.share.abs() > 0.05
-    }
-
     /// Whether it takes longer than the base.
     #[must_use]
     pub fn takes_longer(&self) -> bool {
-        self.gpu_ms_delta.low > 0.0 && self.is_sure()
+        self.time_told && self.share > 0.0
     }
 
     /// Whether it takes less time than the base.
     #[must_use]
     pub fn saves(&self) -> bool {
-        self.gpu_ms_delta.high < 0.0 && self.is_sure()
-    }
-
-    /// Whether it went to a rung further on in its knob's list.
-    #[must_use]
-    pub fn to_more_exact(&self) -> bool {
-        let knob = KNOBS.iter().find(|knob| knob.name == self.knob);
-        let place = |rung: &str| knob.and_then(|knob| knob.rungs.iter().position(|known| *known == rung));
-        place(&self.to) > place(&self.from)
+        self.time_told && self.share < 0.0
     }
 
     /// Whether an eye sees it, and it is more than the noise of paths that went apart.
     #[must_use]
     pub fn is_seen(&self) -> bool {
-        let beyond_noise = self.base != Family::Exact || self.shown_delta.surely() > 0.0;
+        let beyond_noise = self.base != Family::Exact || self.error_told;
         !self.same && self.noise_ratio.is_none() && self.flip_between >= INVISIBLE && beyond_noise
     }
 }
@@ -329,34 +328,12 @@ pub struct Order {
 pub struct Tried {
     /// What was changed.
     pub change: String,
-    /// FLIP's mean that single prices promised.
+    /// Error that single prices promised.
     pub promised: f64,
     /// And what was found.
     pub found: f64,
     /// Whether it was kept.
     pub kept: bool,
-}
-
-/// Places of the points that no other beats in time and error at once, the quickest first; of equal ones the first. Nothing is
-/// known to be nearer to the truth than the reference is: it is the last, and what comes within its own error ties with it.
-#[must_use]
-pub fn frontier(points: &[Point]) -> Vec<usize> {
-    let reference = points.iter().position(|point| point.name == REFERENCE);
-    let floor = reference.map_or(0.0, |i| points[i].error());
-    let error = |i: usize| points[i].error().max(floor);
-    let mut order: Vec<usize> = (0..points.len()).filter(|i| Some(*i) != reference).collect();
-    let time = |i: usize| points[i].gpu_ms.median;
-    // What takes longer and is no better is beaten by the reference itself.
-    order.retain(|&i| reference.is_none_or(|r| time(i) < time(r)));
-    order.sort_by(|&a, &b| time(a).total_cmp(&time(b)).then(error(a).total_cmp(&error(b))));
-    let mut best = f64::INFINITY;
-    order.retain(|&i| {
-        let better = error(i) < best;
-        best = best.min(error(i));
-        better
-    });
-    order.extend(reference);
-    order
 }
 
 /// Name of the reference among the points.
@@ -389,6 +366,9 @@ impl Table {
             "gpu_ms_low",
             "gpu_ms_high",
             "start_ms",
+            "error",
+            "error_low",
+            "error_high",
             "flip_mean",
             "flip_p95",
             "relmse",
@@ -414,6 +394,9 @@ impl Table {
                 p.gpu_ms.low,
                 p.gpu_ms.high,
                 p.start_ms,
+                e.error.median,
+                e.error.low,
+                e.error.high,
                 e.flip_mean,
                 e.flip_p95,
                 e.relmse.median,
@@ -431,7 +414,7 @@ impl Table {
         Ok(all.into_inner()?)
     }
 
-    /// One table of the parts that shards of one run measured.
+    /// One table of the parts that shards of one run measured, whose points are not judged together yet.
     ///
     /// # Errors
     /// When they are not of one scene, one reference and one kind of device.
@@ -459,11 +442,6 @@ impl Table {
                     all.points.push(point);
                 }
             }
-            for price in part.prices {
-                if all.prices.iter().all(|known| known.point != price.point) {
-                    all.prices.push(price);
-                }
-            }
             all.search.extend(part.search);
             if all.orders.is_empty() {
                 all.orders = part.orders;
@@ -481,7 +459,6 @@ impl Table {
         all.shard = [1, 1];
         // The reference is the last.
         all.points.sort_by_key(|point| point.name == REFERENCE);
-        all.frontier = frontier(&all.points);
         Ok(all)
     }
 }

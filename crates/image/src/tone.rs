@@ -178,3 +178,29 @@ pub fn srgb_decode(display: f64) -> f64 {
 pub fn quantise(display: f64) -> u8 {
     (usable(display).min(1.0) * 255.0 + 0.5).floor() as u8
 }
+
+/// How radiance becomes display values (shaders/pass/tonemap.comp): exposure, curve, and what lies behind.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ViewTransform {
+    /// The tone curve.
+    pub curve: ToneMap,
+    /// Stops.
+    pub exposure: f32,
+    /// Display-linear colour behind what is not covered; `None` leaves it transparent.
+    pub background: Option<[f64; 3]>,
+}
+
+impl ViewTransform {
+    /// Display values 0 to 1 of linear RGBA, without rounding to bytes. Values below 0 are those of wavelengths outside of Rec. 709: they
+    /// lose saturation, not their luminance.
+    #[must_use]
+    pub fn shown(&self, rgba: [f32; 4]) -> [f64; 3] {
+        let alpha = f64::from(rgba[3]).clamp(0.0, 1.0);
+        let scale = f64::from(self.exposure).exp2() / alpha;
+        let over = |c: usize| f64::from(rgba[c]) * scale;
+        let linear = if alpha > 0.0 { self.curve.apply(desaturated([over(0), over(1), over(2)])) } else { [0.0; 3] };
+        let behind =
+            self.background.map_or(linear, |behind| [0, 1, 2].map(|c| behind[c] + alpha * (linear[c] - behind[c])));
+        behind.map(|light| srgb_encode(light.clamp(0.0, 1.0)))
+    }
+}

@@ -144,7 +144,7 @@ fn account(side: usize, seen: &Seen) -> Option<String> {
         };
         table.points.iter().find(is_this)
     });
-    lines.extend(known.map(|point| format!("FLIP {:.4} against the reference, by cost", point.error())));
+    lines.extend(known.map(|point| format!("error {:.2} % of the range, by cost", 100.0 * point.error())));
     if side == 1 {
         lines.push(match seen.difference() {
             Some(difference) => format!("FLIP {:.4} between both", difference.flip),

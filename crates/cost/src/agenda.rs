@@ -1,0 +1,274 @@
+//! What a run draws, in which order: every rung that the scene calls for, changed alone, beside presets.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Context as _, Result};
+use serde::{Deserialize, Serialize};
+
+use super::sitting::Bench;
+use super::table::{Family, KnobState};
+use etalon::plan::{EffectState, KNOBS, Knob, Knobs, Model, Plan};
+
+/// A rung that one knob is set to.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Change {
+    /// The knob.
+    pub knob: String,
+    /// Its rung in the base.
+    pub from: String,
+    /// And in the picture.
+    pub to: String,
+}
+
+/// A picture to be drawn.
+#[derive(Debug, Clone)]
+pub struct Task {
+    /// Unique in a run.
+    pub name: String,
+    /// Where it comes from.
+    pub family: Family,
+    /// Its rungs.
+    pub knobs: Knobs,
+    /// What was changed of its base, where that is all.
+    pub change: Option<Change>,
+}
+
+/// Which of a scene's knobs are called for.
+pub struct States(Vec<(&'static Knob, bool, String)>);
+
+/// The pictures of a run but for those of the search.
+pub struct Agenda {
+    /// The preset that rungs are changed of.
+    pub local: Knobs,
+    /// The reference's rungs with few samples and three colours, of which others are changed.
+    pub plain: Knobs,
+    /// Presets, and more samples of them.
+    pub presets: Vec<Task>,
+    /// `local` with one rung changed.
+    pub of_local: Vec<Task>,
+    /// `exact` with one rung changed.
+    pub of_exact: Vec<Task>,
+    /// The reference's rungs with other numbers of samples.
+    pub ladder: Vec<Task>,
+    /// Whether orders of quadrature are told.
+    pub orders: bool,
+}
+
+/// `knobs` with one on another rung.
+pub fn set(knobs: &Knobs, knob: &str, rung: &str) -> Result<Knobs> {
+    knobs.with(knob, rung).with_context(|| format!("setting {knob}={rung}"))
+}
+
+/// Rungs by name.
+pub fn named(knobs: &Knobs) -> BTreeMap<String, String> {
+    knobs.list().into_iter().map(|(knob, rung)| (knob.to_owned(), rung.to_owned())).collect()
+}
+
+/// Whether some effect that a knob shapes is planned: a sentence for or against it.
+fn called_for(knob: &Knob, plans: &[Plan]) -> (bool, String) {
+    if knob.rungs.len() < 2 {
+        return (false, format!("{} is its only rung", knob.rungs[0]));
+    }
+    if knob.effects.is_empty() {
+        return (true, "shapes every surface".to_owned());
+    }
+    let mut against = String::new();
+    for id in knob.effects {
+        for effect in plans.iter().flat_map(|plan| &plan.effects).filter(|effect| effect.id == *id) {
+            let shaped = match effect.state {
+                EffectState::Kept => true,
+                EffectState::DroppedBy(choice) => choice.knob == knob.name,
+                EffectState::NotCalledFor => false,
+            };
+            let sentence = format!("{id}: {}", effect.reason());
+            if shaped {
+                return (true, sentence);
+            }
+            if against.is_empty() {
+                against = sentence;
+            }
+        }
+    }
+    (false, against)
+}
+
+impl States {
+    /// By the plans of the reference's rungs, of `local` and of `recursive`.
+    ///
+    /// # Errors
+    /// When the scene has nothing to draw.
+    pub fn of(bench: &Bench<'_>) -> Result<Self> {
+        let recursive = set(&Knobs::of(Model::Recursive), "lobes", "1")?;
+        let bases = [Knobs::exact(), Knobs::of(Model::Local), recursive];
+        let plans = bases.iter().map(|knobs| bench.plan(knobs)).collect::<Result<Vec<_>>>()?;
+        let state = |knob| {
+            let (called_for, reason) = called_for(knob, &plans);
+            (knob, called_for, reason)
+        };
+        Ok(Self(KNOBS.iter().map(state).collect()))
+    }
+
+    /// Whether the scene calls for a knob.
+    #[must_use]
+    pub fn calls_for(&self, knob: &str) -> bool {
+        self.called_for().any(|known| known.name == knob)
+    }
+
+    /// Those that it calls for.
+    pub fn called_for(&self) -> impl Iterator<Item = &'static Knob> {
+        self.0.iter().filter(|(_, called_for, _)| *called_for).map(|(knob, ..)| *knob)
+    }
+
+    /// For the table.
+    #[must_use]
+    pub fn list(&self) -> Vec<KnobState> {
+        let state = |(knob, called_for, reason): &(&'static Knob, bool, String)| KnobState {
+            knob: knob.name.to_owned(),
+            called_for: *called_for,
+            reason: reason.clone(),
+            lecture: knob.lecture.iter().map(|&id| id.to_owned()).collect(),
+            about: knob.about.to_owned(),
+        };
+        self.0.iter().map(state).collect()
+    }
+
+    /// Every rung of every knob that is called for and `wanted`, one changed at a time; none twice.
+    fn changes(
+        &self,
+        bench: &Bench<'_>,
+        family: Family,
+        base: &Knobs,
+        wanted: &dyn Fn(&Knob, &str) -> bool,
+    ) -> Result<Vec<Task>> {
+        let plan = bench.plan(base)?;
+        let mut all = Vec::new();
+        for knob in self.called_for() {
+            let from = knob.rung(base);
+            for &to in knob.rungs.iter().filter(|&&to| to != from && wanted(knob, to)) {
+                let Some(knobs) = base.with(knob.name, to) else { continue };
+                if knob.name == "upsampling" && knobs.colour.bands() == 0 {
+                    continue;
+                }
+                // What the plan does not tell apart is told apart by constants.
+                let by_constants = ["fresnel", "brdf", "arithmetic", "upsampling", "lights", "absorption"];
+                if !by_constants.contains(&knob.name) && bench.plan(&knobs).is_ok_and(|other| other.draws_as(&plan)) {
+                    continue;
+                }
+                all.push(changed(family, knob, from, to, knobs));
+            }
+        }
+        Ok(all)
+    }
+}
+
+fn changed(family: Family, knob: &Knob, from: &str, to: &str, knobs: Knobs) -> Task {
+    let word = if family == Family::Local { "local" } else { "exact" };
+    let change = Change { knob: knob.name.to_owned(), from: from.to_owned(), to: to.to_owned() };
+    Task { name: format!("{word} {}={to}", knob.name), family, knobs, change: Some(change) }
+}
+
+/// What `local` is changed to. Of samples and wavelengths a few rungs say enough.
+fn of_local(knob: &Knob, rung: &str) -> bool {
+    match knob.name {
+        "samples" => matches!(rung, "1" | "16" | "64"),
+        "colour" => rung == "spectral:16",
+        "indirect" => rung != "path",
+        _ => true,
+    }
+}
+
+/// What the reference's rungs are changed to. Noise is what samples, places and aims buy, and the presets show it.
+fn of_exact(knob: &Knob, rung: &str) -> bool {
+    match knob.name {
+        "samples" | "colour" => false,
+        "lights" => rung != "points",
+        "brdf" => rung == "ggx",
+        _ => true,
+    }
+}
+
+impl Agenda {
+    /// `reference`: its rungs, of whose colours none has more bands; `samples_ms`: GPU time of one of its samples, and of one with
+    /// three colours; `budget_ms`: of all, where it is limited.
+    ///
+    /// # Errors
+    /// When the scene has nothing to draw.
+    pub fn new(
+        bench: &Bench<'_>,
+        states: &States,
+        reference: &Knobs,
+        [each_ms, plain_ms]: [f64; 2],
+        priced: Option<u32>,
+        budget_ms: f64,
+    ) -> Result<Self> {
+        let local = Knobs::of(Model::Local);
+        let three_colours = set(reference, "colour", "rgb")?;
+        let base = set(&three_colours, "samples", "4")?;
+        let exact_changes = states.changes(bench, Family::Exact, &base, &of_exact)?;
+        // Two turns of both pictures, for a third of the budget.
+        let most = budget_ms / 3.0 / (4.0 * exact_changes.len().max(1) as f64);
+        let priced = priced.unwrap_or_else(|| super::reference::samples_within(plain_ms, most).min(16));
+        let priced_rung = priced.to_string();
+        let plain = set(&three_colours, "samples", &priced_rung)?;
+        let mut of_exact = Vec::new();
+        for task in exact_changes {
+            of_exact.push(Task { knobs: set(&task.knobs, "samples", &priced_rung)?, ..task });
+        }
+        of_exact.extend(wavelengths(states, reference, &plain)?);
+        Ok(Self {
+            presets: presets(priced)?,
+            of_local: states.changes(bench, Family::Local, &local, &self::of_local)?,
+            of_exact,
+            ladder: ladder(reference, priced, each_ms, budget_ms)?,
+            orders: states.calls_for("quadrature"),
+            local,
+            plain,
+        })
+    }
+
+    /// Samples of pictures that are priced from the reference's rungs.
+    #[must_use]
+    pub fn priced(&self) -> u32 {
+        self.plain.samples.count()
+    }
+}
+
+/// Bands of wavelengths beside three colours; what has more than the reference has nothing to be compared with.
+fn wavelengths(states: &States, reference: &Knobs, plain: &Knobs) -> Result<Vec<Task>> {
+    let rungs: &[&str] = match (states.calls_for("colour"), reference.colour.bands()) {
+        (false, _) => &[],
+        (true, 0) => &["spectral:16"],
+        (true, bands) => &["spectral:8", "spectral:16", "spectral:32"][..(bands / 8).ilog2() as usize + 1],
+    };
+    let knob = Knob::named("colour").context("the knob colour")?;
+    rungs.iter().map(|&to| Ok(changed(Family::Exact, knob, "rgb", to, set(plain, "colour", to)?))).collect()
+}
+
+fn presets(most: u32) -> Result<Vec<Task>> {
+    let recursive = Knobs::of(Model::Recursive);
+    let task = |name: String, knobs| Task { name, family: Family::Preset, knobs, change: None };
+    let mut all = vec![task("recursive".to_owned(), recursive.clone())];
+    for model in [Model::Recursive, Model::Global] {
+        for samples in ["1", "4", "16"] {
+            let knobs = set(&Knobs::of(model), "samples", samples)?;
+            let name = if model == Model::Global { "global" } else { "recursive" };
+            if (model == Model::Recursive || knobs.samples.count() <= most) && knobs != recursive {
+                all.push(task(format!("{name} samples={samples}"), knobs));
+            }
+        }
+    }
+    Ok(all)
+}
+
+/// Between what is priced and the reference: what is quicker than a twentieth of the budget.
+fn ladder(reference: &Knobs, priced: u32, each_ms: f64, budget_ms: f64) -> Result<Vec<Task>> {
+    let affordable = |n: &u32| *n != priced && *n < reference.samples.count().max(priced + 1) * 4;
+    let quick = |n: &u32| f64::from(*n) * each_ms < 0.05 * budget_ms;
+    let rungs = [1, 16, 64, 256].into_iter().filter(|n| affordable(n) && quick(n));
+    rungs
+        .map(|n| {
+            let knobs = set(reference, "samples", &n.to_string())?;
+            Ok(Task { name: format!("exact samples={n}"), family: Family::Preset, knobs, change: None })
+        })
+        .collect()
+}

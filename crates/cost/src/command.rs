@@ -1,0 +1,19 @@
+//! Rungs as words of a command line.
+
+use etalon::plan::{Knobs, Model};
+
+/// `--model` and `--set` of some rungs: the preset that leaves least to be said.
+#[must_use]
+pub fn arguments(knobs: &Knobs) -> String {
+    let rest = |model: Model| -> Vec<String> {
+        let preset = Knobs::of(model).list();
+        // Of glass that disperses the model of paths takes bands of wavelengths, unless told otherwise.
+        let said = |knob: &str| model == Model::Global && knob == "colour";
+        let others = knobs.list().into_iter().zip(preset).filter(|(a, b)| a != b || said(a.0));
+        others.map(|((knob, rung), _)| format!("--set {knob}={rung}")).collect()
+    };
+    let all = [(Model::Local, "local"), (Model::Recursive, "recursive"), (Model::Global, "global")];
+    let least = all.map(|(model, name)| (rest(model), name)).into_iter().min_by_key(|(rest, _)| rest.len());
+    let (rest, name) = least.unwrap_or_default();
+    std::iter::once(format!("--model {name}")).chain(rest).collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,437 @@
+//! What errors are errors against: the scene with every knob on the rung that approximates least, and as many samples as it takes to
+//! tell errors, or as there is time for.
+//!
+//! It is the mean of rounds, each a picture with random numbers of its own that a command draws again. A later run goes on with the
+//! rounds of an earlier one. How many samples are wanted is planned from a pilot whose samples are not used, and what there is time for
+//! from the clock: neither looks at what the reference says, so that stopping there makes nothing seem sure that is not.
+
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::{Context as _, Result, bail, ensure};
+
+use super::agenda::{named, set};
+use super::command::arguments;
+use super::difference::{Shown, ShownReference, Truth, in_squares, mean_of, shown, told};
+use super::sitting::{Bench, total};
+use super::statistics::{MANY, standard_errors};
+use super::table::{RESOLVED, Reference, Round};
+use etalon::frame::{Progress, Settings};
+use etalon::image::halves::error_of_halves;
+use etalon::image::metric::{AnyPicture, Metric, compare};
+use etalon::image::png::Display;
+use etalon::image::{Aov, AovData, Picture, exr, file, png, tone};
+use etalon::plan::Knobs;
+
+/// Bands of wavelengths that a reference may have, and samples that it has at least before it has more bands.
+const BANDS: [u32; 3] = [32, 16, 8];
+const FEWEST_SAMPLES: u32 = 16;
+/// Samples of a pilot.
+const PILOT: u32 = 4;
+/// Pixels of a pilot, about: what a sample takes and how noisy it is goes with them.
+const PILOT_PIXELS: f64 = 160.0 * 90.0;
+/// Statements that a report makes, about: what is wanted of a reference is planned for so many.
+const STATEMENTS: usize = 150;
+/// Rounds of one run at most: each is a picture that is begun anew.
+const MOST_ROUNDS: usize = 16;
+
+/// A budget that is spent before there is a reference of four samples.
+#[derive(Debug, Clone, Copy, thiserror::Error)]
+#[error(
+    "the budget of {budget_s:.0} s is spent before there is a reference of 4 samples, which takes {least_s:.0} s with what comes before \
+     it: --budget {enough_s}, or a smaller --size, measures something"
+)]
+pub struct NotMeasured {
+    /// Seconds that were given.
+    pub budget_s: f64,
+    /// Seconds until there is a reference.
+    pub least_s: f64,
+    /// Seconds that measure something.
+    pub enough_s: u32,
+}
+
+/// What was found out before it is drawn.
+#[derive(Debug, Clone)]
+pub struct Pilot {
+    /// Its rungs, `samples` being whatever they are.
+    pub knobs: Knobs,
+    /// GPU milliseconds of a sample.
+    pub each_ms: f64,
+    /// Of a sample with three colours.
+    pub plain_ms: f64,
+    /// Samples after which it resolves what it should, as far as the pilot tells.
+    pub wanted: u32,
+    /// What a reader should know.
+    pub warnings: Vec<String>,
+}
+
+/// The means of four parts of a picture's samples, of the even and of the odd ones in turns.
+type Parts = Vec<Picture>;
+
+/// Rounds, and what they came to.
+pub struct Refined {
+    parts: Parts,
+    rounds: Vec<Round>,
+    knobs: Knobs,
+    /// The file that the only round's command writes.
+    png: Option<Vec<u8>>,
+}
+
+/// The largest of the rungs 1, 4, 16, … that takes no longer than so many milliseconds; 4 at least, without which no parts tell
+/// the error.
+#[must_use]
+pub fn samples_within(ms_each: f64, limit_ms: f64) -> u32 {
+    [4096, 1024, 256, 64, 16].into_iter().find(|&n| f64::from(n) * ms_each <= limit_ms).unwrap_or(4)
+}
+
+/// Random numbers of a round, which nobody chooses by chance: what shares some with the reference is nearer to it than to the truth.
+fn seed_of(seed: u32, round: usize) -> u32 {
+    seed ^ 0x2a2a_2a2a ^ (round as u32).wrapping_mul(0x9e37_79b9)
+}
+
+fn told_by_wavelength(bench: &Bench<'_>) -> bool {
+    let scene = bench.original.scene();
+    let materials = scene
+        .meshes
+        .iter()
+        .map(|mesh| &scene.materials[mesh.material])
+        .any(|m| m.reflectance.is_some() || m.emission.is_some() || m.conductor.is_some() || m.disperses());
+    materials || scene.lights.iter().any(|light| light.spectrum.is_some())
+}
+
+/// The mean of two pictures by their samples.
+fn joined(a: &Picture, b: &Picture, samples: [u32; 2]) -> Picture {
+    let share = f64::from(samples[1]) / (f64::from(samples[0]) + f64::from(samples[1]));
+    let mean = |(a, b): (&[f32; 4], &[f32; 4])| {
+        std::array::from_fn(|c| (f64::from(a[c]) + share * (f64::from(b[c]) - f64::from(a[c]))) as f32)
+    };
+    Picture { width: a.width, height: a.height, rgba: a.rgba.iter().zip(&b.rgba).map(mean).collect() }
+}
+
+/// The last of so many parts of samples of which the mean, and that of all before, are known.
+fn last_part(all: &Picture, before: &Picture, parts: f32) -> Picture {
+    let part = |(a, b): (&[f32; 4], &[f32; 4])| std::array::from_fn(|c| parts * a[c] - (parts - 1.0) * b[c]);
+    Picture { width: all.width, height: all.height, rgba: all.rgba.iter().zip(&before.rgba).map(part).collect() }
+}
+
+/// The mean of all even, or of all odd samples.
+fn half(parts: &Parts, odd: usize) -> Picture {
+    mean_of(&parts.iter().skip(odd).step_by(2).collect::<Vec<_>>())
+}
+
+fn all(parts: &Parts) -> Picture {
+    mean_of(&parts.iter().collect::<Vec<_>>())
+}
+
+/// Draws a picture by paths; parts of its samples, its file, and its GPU time.
+fn draw(
+    bench: &Bench<'_>,
+    knobs: &Knobs,
+    seed: u32,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<(Parts, Vec<u8>, f64)> {
+    let samples = knobs.samples.count();
+    ensure!(samples >= 4, "{samples} samples have no parts: our mistake");
+    let each = samples / 2;
+    let mut renderer = bench.renderer(knobs, seed)?;
+    let mut drawing = renderer.begin(bench.camera, samples);
+    let (mut parts, mut before, mut last) = (Parts::new(), None::<[Picture; 2]>, Instant::now());
+    while !drawing.is_done() {
+        renderer.step(&mut drawing)?;
+        let done = drawing.samples();
+        if !drawing.is_whole() {
+            continue;
+        }
+        if done.is_multiple_of(each) {
+            let Some(now) = renderer.halves_alone(done)? else {
+                bail!("a reference by paths has no halves: our mistake")
+            };
+            let count = (done / each) as f32;
+            parts.extend(match &before {
+                None => now.clone(),
+                Some([even, odd]) => [last_part(&now[0], even, count), last_part(&now[1], odd, count)],
+            });
+            before = Some(now);
+        }
+        if !drawing.is_done() && last.elapsed().as_secs() >= 1 {
+            last = Instant::now();
+            progress(Progress { done, of: samples, error: None });
+        }
+    }
+    let rendered = renderer.picture(&drawing)?;
+    Ok((parts, renderer.png(&rendered)?, total(&rendered)))
+}
+
+impl Pilot {
+    /// Draws a few samples. `called_for`: whether the scene calls for the knob `colour`; `budget_ms`: what the reference may take.
+    ///
+    /// # Errors
+    /// When they cannot be drawn.
+    pub fn draw(bench: &Bench<'_>, called_for: bool, budget_ms: f64) -> Result<Self> {
+        let exact = set(&Knobs::exact(), "samples", &PILOT.to_string())?;
+        let mut warnings = Vec::new();
+        let [width, height] = bench.settings.size.map(f64::from);
+        let scale = (PILOT_PIXELS / (width * height)).sqrt().min(1.0);
+        let size = [width, height].map(|side| (side * scale).round().max(1.0));
+        let pixels = width * height / (size[0] * size[1]);
+        let settings = Settings { size: size.map(|side| side as u32), ..bench.settings.clone() };
+        let bench = &Bench { settings, ..*bench };
+        let look = |colour: &str| -> Result<(Parts, f64, u32)> {
+            let knobs = set(&exact, "colour", colour)?;
+            // What compiling takes is no sample's time.
+            bench.sit(&knobs)?;
+            let (parts, _, ms) = draw(bench, &knobs, bench.settings.seed, &mut |_| ())?;
+            let sure = standard_errors(STATEMENTS, MANY);
+            let resolution = ShownReference::of(&parts, &bench.settings.view_transform()).resolution(sure);
+            // What is resolved goes with the root of the samples, and with the fourth root of the pixels.
+            let wanted = (f64::from(PILOT) * (resolution / RESOLVED).powi(2) / pixels.sqrt()).ceil().clamp(4.0, 4096.0);
+            Ok((parts, pixels * ms / f64::from(PILOT), wanted as u32))
+        };
+        let (plain, plain_ms, mut wanted) = look("rgb")?;
+        let (mut knobs, mut each_ms) = (set(&exact, "colour", "rgb")?, plain_ms);
+        if called_for {
+            let bands = if told_by_wavelength(bench) { Some(look("spectral:8")?) } else { None };
+            let seen = bands.as_ref().is_some_and(|(parts, ..)| differ(bench, &plain, parts));
+            match bands.filter(|_| seen) {
+                Some((_, ms, by_bands)) => {
+                    let affordable = |bands: &u32| {
+                        samples_within(ms * f64::from(*bands) / 8.0, budget_ms) >= FEWEST_SAMPLES
+                    };
+                    let bands = BANDS.into_iter().find(affordable).unwrap_or(8);
+                    knobs = set(&exact, "colour", &format!("spectral:{bands}"))?;
+                    each_ms = ms * f64::from(bands) / 8.0;
+                    // Each band has random numbers of its own.
+                    wanted = (by_bands * 8).div_ceil(bands).max(FEWEST_SAMPLES);
+                    if bands < BANDS[0] {
+                        warnings.push(format!(
+                            "the reference has {bands} bands of wavelengths: {} would have left fewer than {FEWEST_SAMPLES} samples \
+                             of each pixel; give it a larger --budget",
+                            BANDS[0]
+                        ));
+                    }
+                }
+                None => warnings.push(
+                    "bands of wavelengths change nothing in this picture that is more than noise: the reference has three colours, and \
+                     bands of wavelengths are priced as another reading of them"
+                        .to_owned(),
+                ),
+            }
+        }
+        Ok(Self { knobs, each_ms, plain_ms, wanted, warnings })
+    }
+}
+
+/// Whether two pictures differ by more than noise.
+fn differ(bench: &Bench<'_>, a: &Parts, b: &Parts) -> bool {
+    let (view, size) = (bench.settings.view_transform(), bench.settings.size);
+    let halves = |parts: &Parts| -> [Shown; 2] { [0, 1].map(|odd| shown(&half(parts, odd), &view)) };
+    let enough = standard_errors(3, MANY);
+    told(&in_squares(&halves(a), &halves(b), size[0] as usize), enough).is_some_and(|(_, found)| found.is_above(enough))
+}
+
+impl Refined {
+    /// One more round of so many samples, after those of `known`.
+    ///
+    /// # Errors
+    /// When it cannot be drawn.
+    pub fn round(
+        known: Option<Self>,
+        bench: &Bench<'_>,
+        knobs: &Knobs,
+        samples: u32,
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<Self> {
+        let knobs = set(knobs, "samples", &samples.to_string())?;
+        let seed = seed_of(bench.settings.seed, known.as_ref().map_or(0, |known| known.rounds.len()));
+        let (parts, png, gpu_ms) = draw(bench, &knobs, seed, progress)?;
+        let round = Round { seed, samples, gpu_ms };
+        Ok(match known {
+            None => Self { parts, rounds: vec![round], knobs, png: Some(png) },
+            Some(known) => {
+                let samples = [known.samples(), samples];
+                let parts = known.parts.iter().zip(&parts).map(|(a, b)| joined(a, b, samples)).collect();
+                let rounds = [known.rounds, vec![round]].concat();
+                Self { parts, rounds, knobs: known.knobs, png: None }
+            }
+        })
+    }
+
+    /// Samples of each pixel.
+    #[must_use]
+    pub fn samples(&self) -> u32 {
+        self.rounds.iter().map(|round| round.samples).sum()
+    }
+
+    /// GPU milliseconds of a sample.
+    #[must_use]
+    pub fn each_ms(&self) -> f64 {
+        self.gpu_ms() / f64::from(self.samples().max(1))
+    }
+
+    fn gpu_ms(&self) -> f64 {
+        self.rounds.iter().map(|round| round.gpu_ms).sum()
+    }
+
+    /// Its rungs; those of its first round's samples.
+    #[must_use]
+    pub fn knobs(&self) -> &Knobs {
+        &self.knobs
+    }
+
+    /// Whether one run should not draw more rounds.
+    #[must_use]
+    pub fn has_many_rounds(&self, before: usize) -> bool {
+        self.rounds.len() - before >= MOST_ROUNDS
+    }
+
+    /// How many.
+    #[must_use]
+    pub fn rounds(&self) -> usize {
+        self.rounds.len()
+    }
+
+    /// What errors are told against.
+    #[must_use]
+    pub fn truth(&self, settings: &Settings) -> Truth {
+        let (film, half) = (all(&self.parts), half(&self.parts, 0));
+        let display = self.png.as_ref().and_then(|png| png::decode_display(png).ok());
+        let display = display.unwrap_or_else(|| display_of(&film, settings));
+        let shown = ShownReference::of(&self.parts, &settings.view_transform());
+        Truth { film, half, shown, display }
+    }
+
+    /// What is said of it; `command`: the first words of every command, `priced`: samples of pictures that are priced from it.
+    ///
+    /// # Errors
+    /// When pictures cannot be compared or encoded.
+    pub fn describe(
+        &self,
+        truth: &Truth,
+        command: &str,
+        priced: u32,
+        bench: &Bench<'_>,
+    ) -> Result<(Reference, Vec<u8>)> {
+        let Settings { size: [width, height], .. } = bench.settings;
+        let halves = [0, 1].map(|odd| half(&self.parts, odd));
+        let sum = |half: &Picture| -> Vec<[f32; 4]> { half.rgba.iter().map(|p| p.map(|v| 0.5 * v)).collect() };
+        let own = error_of_halves([&sum(&halves[0]), &sum(&halves[1])], 1);
+        let any = |display: Display| AnyPicture::Display(display);
+        let half = display_of(&truth.half, &bench.settings);
+        let own_flip = compare(Metric::Flip, &any(display_of(&truth.film, &bench.settings)), &any(half))?.value;
+        let resolution = truth.shown.resolution(standard_errors(STATEMENTS, MANY));
+        let png = match &self.png {
+            Some(png) => png.clone(),
+            None => {
+                let rgba: Vec<u8> = truth.display.rgba.concat();
+                png::encode_png(width, height, &rgba, false)?
+            }
+        };
+        let samples = set(&self.knobs, "samples", &self.rounds[0].samples.to_string())?;
+        let mut knobs = named(&self.knobs);
+        knobs.insert("samples".to_owned(), self.samples().to_string());
+        let reference = Reference {
+            knobs,
+            samples: self.samples(),
+            priced_samples: priced,
+            gpu_ms: self.gpu_ms(),
+            own_error: own.relmse.sqrt(),
+            own_flip,
+            resolution,
+            converged: resolution <= RESOLVED,
+            rounds: self.rounds.clone(),
+            command: format!("{command} --seed {} {} -o reference.png", self.rounds[0].seed, arguments(&samples)),
+            image: file::hash(&png),
+        };
+        Ok((reference, png))
+    }
+
+    /// Writes all that a later run goes on with: the film with its parts, and `reference` last.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn write(&self, folder: &Path, reference: &Reference, png: &[u8]) -> Result<()> {
+        let part = |(i, part): (usize, &Picture)| Aov {
+            name: format!("part_{i}"),
+            channels: ["R", "G", "B", "A"].map(str::to_owned).into(),
+            samples: AovData::F32(part.rgba.iter().flatten().copied().collect()),
+        };
+        let parts: Vec<Aov> = self.parts.iter().enumerate().map(part).collect();
+        file::write(&folder.join("reference.exr"), &exr::encode_exr_quickly(&all(&self.parts), &parts)?)?;
+        file::write(&folder.join("reference.png"), png)?;
+        file::write(&folder.join("reference.json"), serde_json::to_string_pretty(reference)?.as_bytes())
+    }
+
+    /// What [`Refined::write`] wrote, and what it said; `None` where nothing was written.
+    ///
+    /// # Errors
+    /// When it is not what was written.
+    pub fn read(folder: &Path) -> Result<Option<(Self, Reference)>> {
+        let path = folder.join("reference.json");
+        if !path.exists() {
+            return Ok(None);
+        }
+        let reference: Reference =
+            serde_json::from_slice(&file::read(&path)?).with_context(|| format!("reading {}", path.display()))?;
+        let path = folder.join("reference.exr");
+        let (film, channels) = (exr::read_exr(&path)?, exr::read_channels(&path)?);
+        let get = |name: &str| {
+            let found = channels.list.iter().find_map(|(known, samples)| match samples {
+                AovData::F32(samples) if known == name => Some(samples),
+                _ => None,
+            });
+            found.with_context(|| format!("reading {}: it has no channel {name}", path.display()))
+        };
+        let part = |i: usize| -> Result<Picture> {
+            let [r, g, b, a] = ["R", "G", "B", "A"].map(|c| get(&format!("part_{i}.{c}")));
+            let (r, g, b, a) = (r?, g?, b?, a?);
+            let rgba = (0..film.rgba.len()).map(|i| [r[i], g[i], b[i], a[i]]).collect();
+            Ok(Picture { width: film.width, height: film.height, rgba })
+        };
+        let count = channels.list.iter().filter(|(name, _)| name.starts_with("part_")).count() / 4;
+        let parts = (0..count).map(part).collect::<Result<Parts>>()?;
+        let first = reference.rounds.first().with_context(|| format!("{} has no rounds", path.display()))?;
+        let mut knobs = Knobs::exact();
+        for (knob, rung) in reference.knobs.iter().filter(|(knob, _)| *knob != "samples") {
+            knobs = set(&knobs, knob, rung)?;
+        }
+        let knobs = set(&knobs, "samples", &first.samples.to_string())?;
+        let png = if reference.rounds.len() == 1 { Some(file::read(&folder.join("reference.png"))?) } else { None };
+        Ok(Some((Self { parts, rounds: reference.rounds.clone(), knobs, png }, reference)))
+    }
+}
+
+/// A film as a display shows it.
+pub(super) fn display_of(film: &Picture, settings: &Settings) -> Display {
+    let pixel = |v: [f32; 3]| {
+        let [r, g, b] = v.map(|v| tone::quantise(f64::from(v)));
+        [r, g, b, 255]
+    };
+    let rgba = shown(film, &settings.view_transform()).into_iter().map(pixel).collect();
+    Display { width: film.width, height: film.height, rgba }
+}
+
+/// Draws rounds until it resolves what it should, or `time_for` says that there is no time for another of so many samples.
+///
+/// # Errors
+/// When a round cannot be drawn.
+pub fn refine(
+    mut known: Refined,
+    bench: &Bench<'_>,
+    wanted: u32,
+    seconds_left: &dyn Fn() -> f64,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Refined> {
+    let before = known.rounds();
+    let mut each_s = known.each_ms() / 1e3;
+    while known.samples() < wanted && !known.has_many_rounds(before) {
+        let left_s = seconds_left();
+        let missing = f64::from(wanted - known.samples());
+        let fits = |n: &u32| f64::from(*n) * each_s <= left_s && f64::from(*n) < 4.0 * missing;
+        let Some(samples) = [1024, 256, 64, 16, 4].into_iter().find(fits) else { break };
+        let begun = Instant::now();
+        let knobs = known.knobs().clone();
+        known = Refined::round(Some(known), bench, &knobs, samples, progress)?;
+        each_s = begun.elapsed().as_secs_f64() / f64::from(samples);
+    }
+    Ok(known)
+}

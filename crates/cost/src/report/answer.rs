@@ -1,0 +1,145 @@
+//! Which setting to use, what it gives up, and how far that is to be trusted.
+
+use std::path::Path;
+
+use anyhow::Result;
+use maud::{Markup, html};
+
+use super::pictures::{embedded, size};
+use super::{digits, percent, plain, time, title, words};
+use crate::table::{Point, REFERENCE, RESOLVED, Recommended, Table};
+
+/// A recommended point with the settings that it is recommended for: one may be more than one of them.
+fn recommended(table: &Table) -> Vec<(Vec<&str>, &Point)> {
+    let mut all: Vec<(Vec<&str>, &Point)> = Vec::new();
+    for Recommended { setting, point } in &table.recommended {
+        let Some(point) = table.points.get(*point) else { continue };
+        match all.iter_mut().find(|(_, known)| known.name == point.name) {
+            Some((settings, _)) => settings.push(setting),
+            None => all.push((vec![setting], point)),
+        }
+    }
+    all
+}
+
+/// An error with its interval.
+pub(super) fn error(point: &Point) -> Markup {
+    let e = &point.errors.error;
+    html! { b { (percent(e.median)) } " (" (digits(100.0 * e.low)) " to " (digits(100.0 * e.high)) ")" }
+}
+
+/// The answer in a sentence.
+pub(super) fn lead(table: &Table) -> Markup {
+    let all = recommended(table);
+    let balanced = all.iter().find(|(settings, _)| settings.contains(&"balanced"));
+    let Some((_, point)) = balanced else {
+        return html! { "Nothing that was drawn is quicker than the reference: there is nothing to choose." };
+    };
+    let seen = table.prices.iter().any(|price| !price.same && price.flip_between >= crate::table::INVISIBLE);
+    html! {
+        "Use " b { (title(point)) } ": a picture takes " (time(point.gpu_ms.median)) " on this device, with an " (words::link("error", "error"))
+        " of " (percent(point.error())) "."
+        @if !table.reference.converged {
+            " The " (words::link("reference", "reference")) " is noisy: errors below " (percent(table.reference.resolution)) " are not told."
+        }
+        @if !seen { " No knob changes this picture visibly." }
+    }
+}
+
+/// The recommended settings, side by side.
+pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
+    let cards = recommended(table)
+        .into_iter()
+        .map(|(settings, point)| {
+            let picture = embedded(&folder.join(format!("{}.png", point.picture)))?;
+            Ok(html! {
+                article.setting {
+                    h3 { (settings.join(", ")) ": " (title(point)) }
+                    img src=(picture) width=(size(table)[0]) height=(size(table)[1]) alt={ "Picture of the setting " (title(point)) };
+                    table.facts { tbody {
+                        tr { th scope="row" { "time" } td { b { (time(point.gpu_ms.median)) } } }
+                        tr { th scope="row" { "error" } td { @if point.name == REFERENCE { "below " b { (percent(point.error())) } } @else { (error(point)) } } }
+                        tr { th scope="row" { "given up" } td { (given_up(table, point)) } }
+                    } }
+                    p.command { code { (point.command.replace(" --repeat 3", "")) } button.copy type="button" { "copy" } }
+                }
+            })
+        })
+        .collect::<Result<Vec<Markup>>>()?;
+    Ok(html! {
+        section #settings {
+            h2 { "Which setting" }
+            div.settings { @for card in &cards { (card) } }
+        }
+    })
+}
+
+/// What a point gives up, the most telling first and the rest in one number.
+fn given_up(table: &Table, point: &Point) -> Markup {
+    let all = table.given_up(point);
+    let list: Vec<&str> = all.split(", ").collect();
+    let [first, rest] = [&list[..list.len().min(4)], &list[list.len().min(4)..]];
+    html! {
+        (first.join(", "))
+        @if !rest.is_empty() { details.more { summary { "and " (rest.len()) " more" } (rest.join(", ")) } }
+    }
+}
+
+/// How sure all of it is.
+pub(super) fn trust(table: &Table) -> Markup {
+    let r = &table.reference;
+    let rounds = if r.rounds.len() > 1 { format!(", the mean of {} pictures", r.rounds.len()) } else { String::new() };
+    html! {
+        section #trust {
+            h2 { "How far to trust it" }
+            p.verdict.good[r.converged].poor[!r.converged] {
+                @if r.converged {
+                    "The " (words::link("reference", "reference")) " has converged: errors of " (percent(r.resolution)) " and more are told."
+                } @else {
+                    "The " (words::link("reference", "reference")) " has not converged. Errors below " (percent(r.resolution)) " are not told; the aim is "
+                    (plain(100.0 * RESOLVED)) " %. Run the same command again: it goes on with this reference."
+                }
+                " A difference is called one where it is " (digits(table.standard_errors)) " standard errors from none, so that noise makes any one of this page's "
+                "statements wrong in at most 1 of 100 runs. Where that cannot be said, the page says that it cannot."
+            }
+            table.facts { tbody {
+                tr { th scope="row" { "scene" } td { (table.scene) ", " (table.size[0]) "×" (table.size[1]) } }
+                tr { th scope="row" { "device" } td { (table.device.name) " (" (table.device.kind) "), " (table.device.driver) " " (table.device.version) } }
+                tr { th scope="row" { "reference" } td {
+                    (r.samples) " samples of each pixel" (rounds) ", " (time(r.gpu_ms)) " of GPU time; " (words::link("flip", "FLIP")) " of its own noise " (digits(r.own_flip))
+                } }
+                tr { th scope="row" { "made by" } td { code { (r.command) } } }
+            } }
+            @if !table.warnings.is_empty() {
+                ul.warnings { @for warning in &table.warnings { li { (warning) } } }
+            }
+        }
+    }
+}
+
+/// Each recommended picture over the reference, with a line between them that one can move.
+pub(super) fn slider(table: &Table, folder: &Path) -> Result<Markup> {
+    let reference = embedded(&folder.join("reference.png"))?;
+    let all = recommended(table);
+    let [width, height] = size(table);
+    Ok(html! {
+        section #compare {
+            h2 { "Beside the reference" }
+            @if !all.is_empty() {
+                p { label { "On the left " select #left {
+                    @for (settings, point) in &all { option value=(format!("pictures/{}.png", point.picture)) { (settings.join(", ")) ": " (title(point)) } }
+                    @for point in table.points.iter().filter(|point| point.picture != "reference" && all.iter().all(|(_, known)| known.name != point.name)) {
+                        option value=(format!("pictures/{}.png", point.picture)) { (title(point)) }
+                    }
+                } } ", on the right the reference." }
+            }
+            div.slider style="--at:50%" {
+                img src=(reference) width=(width) height=(height) alt="The reference";
+                @if let Some((_, point)) = all.first() {
+                    img.over src=(format!("pictures/{}.png", point.picture)) width=(width) height=(height) alt="The chosen picture";
+                    input type="range" min="0" max="100" value="50" aria-label="Where the chosen picture ends and the reference begins";
+                }
+            }
+        }
+    })
+}

@@ -1,0 +1,167 @@
+//! Pictures in the page and beside it.
+
+use std::path::Path;
+
+use anyhow::{Context as _, Result};
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use image::ExtendedColorType;
+use image::codecs::jpeg::JpegEncoder;
+use maud::{Markup, html};
+
+use super::{COLOURS, answer, digits, hex, percent, time, title, words};
+use crate::table::{Family, Point, REFERENCE, Table};
+use etalon::image::png::{Display, encode_png, read_display};
+
+/// Quality of the pictures in the page; the folder `pictures` has them as they are.
+const QUALITY: u8 = 82;
+/// Pixels of a picture in the page, at most: larger ones are beside it.
+const MOST_PIXELS: u32 = 640 * 360;
+
+/// How large pictures are, so that the page does not grow when they come.
+pub(super) fn size(table: &Table) -> [u32; 2] {
+    table.size
+}
+
+/// A picture as a part of the page, halved until it is not large.
+pub(super) fn embedded(path: &Path) -> Result<String> {
+    let mut picture = read_display(path)?;
+    while picture.width * picture.height > MOST_PIXELS {
+        picture = halved(&picture);
+    }
+    jpeg(&picture)
+}
+
+/// Every second pixel of every second row, the mean of it and its neighbours.
+fn halved(picture: &Display) -> Display {
+    let (width, height) = ((picture.width / 2).max(1), (picture.height / 2).max(1));
+    let at =
+        |x: u32, y: u32| picture.rgba[(y.min(picture.height - 1) * picture.width + x.min(picture.width - 1)) as usize];
+    let mean = |x: u32, y: u32| {
+        let four = [at(2 * x, 2 * y), at(2 * x + 1, 2 * y), at(2 * x, 2 * y + 1), at(2 * x + 1, 2 * y + 1)];
+        std::array::from_fn(|c| (four.iter().map(|p| u32::from(p[c])).sum::<u32>() / 4) as u8)
+    };
+    let rgba = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| mean(x, y)).collect();
+    Display { width, height, rgba }
+}
+
+fn jpeg(picture: &Display) -> Result<String> {
+    let rgb: Vec<u8> = picture
+        .rgba
+        .iter()
+        .flat_map(|&[r, g, b, a]| {
+            // Nothing shows as the grey that a PNG's viewer might put there.
+            let over = |c: u8| ((u32::from(c) * u32::from(a) + 119 * u32::from(255 - a)) / 255) as u8;
+            [over(r), over(g), over(b)]
+        })
+        .collect();
+    let mut bytes = Vec::new();
+    let encoder = &mut JpegEncoder::new_with_quality(&mut bytes, QUALITY);
+    encoder.encode(&rgb, picture.width, picture.height, ExtendedColorType::Rgb8)?;
+    Ok(format!("data:image/jpeg;base64,{}", STANDARD.encode(bytes)))
+}
+
+/// Every picture, its error, the worst of it and how to draw it.
+pub(super) fn gallery(table: &Table) -> Markup {
+    let [width, height] = size(table);
+    html! {
+        p { label { "Only pictures with " input.filter type="search" data-of="gallery"; } }
+        div.gallery #gallery {
+            @for point in table.points.iter().filter(|point| point.name != REFERENCE) { (shown(point, table, [width, height])) }
+        }
+    }
+}
+
+fn shown(point: &Point, table: &Table, [width, height]: [u32; 2]) -> Markup {
+    let file = |end: &str| format!("pictures/{}{end}", point.picture);
+    let e = &point.errors;
+    let noise = point.noise.map(|noise| format!(", by chance alone {}", percent(noise.sqrt())));
+    html! {
+        article id={ "p-" (point.picture) } data-name=(point.picture) {
+            h3 { (title(point)) }
+            div.three {
+                figure { img loading="lazy" width=(width) height=(height) src=(file(".png")) alt={ (title(point)) ": the picture" }; }
+                figure { img loading="lazy" width=(width) height=(height) src=(file(".error.png")) alt={ (title(point)) ": its error" }; }
+                figure { img.pixels loading="lazy" width="328" height="160" src=(file(".worst.png")) alt="The worst pixel: the reference on the left, the picture on the right"; figcaption { "worst pixel " (e.worst_pixel.x) ", " (e.worst_pixel.y) ": reference, picture" } }
+            }
+            p.figures {
+                span { b { (time(point.gpu_ms.median)) } " (" (digits(point.gpu_ms.low)) " to " (digits(point.gpu_ms.high)) " ms, " (point.timed) " timed)" }
+                span { (words::link("error", "error")) " " (answer::error(point)) }
+                span { (words::link("flip", "FLIP")) " " (digits(e.flip_mean)) ", 95 of 100 pixels below " (digits(e.flip_p95)) }
+                span { (words::link("relmse", "√relMSE")) " " (percent(e.relmse.median.max(0.0).sqrt())) (noise.unwrap_or_default()) }
+                span { (words::link("delta-e", "ΔE2000")) " " (digits(e.delta_e_mean)) }
+            }
+            p.given { "Given up: " (table.given_up(point)) }
+            p.command { code { (point.command) } button.copy type="button" { "copy" } }
+        }
+    }
+}
+
+/// For each pixel of `local` the change that brings it nearest to the reference, as a picture with a legend.
+pub(super) fn causes(table: &Table, pictures: &Path) -> Result<Option<Markup>> {
+    let Some(local) = table.points.iter().find(|point| point.name == "local") else { return Ok(None) };
+    let open = |name: &str| read_display(&pictures.join(format!("{name}.png")));
+    let (reference, base) = (open("reference")?, open(&local.picture)?);
+    // What noise cannot tell would only show the reference's.
+    let others: Vec<&Point> = table
+        .points
+        .iter()
+        .filter(|point| point.family == Family::Local)
+        .filter(|point| table.prices.iter().any(|price| price.point == point.name && price.error_told))
+        .collect();
+    let distance = |a: &[u8; 4], b: &[u8; 4]| (0..3).map(|c| (f64::from(a[c]) - f64::from(b[c])).powi(2)).sum::<f64>();
+    let mut best: Vec<(f64, usize)> =
+        base.rgba.iter().zip(&reference.rgba).map(|(a, r)| (distance(a, r), usize::MAX)).collect();
+    let before: Vec<f64> = best.iter().map(|(d, _)| *d).collect();
+    for (index, point) in others.iter().enumerate() {
+        let picture = open(&point.picture)?;
+        for ((known, pixel), r) in best.iter_mut().zip(&picture.rgba).zip(&reference.rgba) {
+            let found = distance(pixel, r);
+            if found < known.0 {
+                *known = (found, index);
+            }
+        }
+    }
+    if others.is_empty() {
+        return Ok(None);
+    }
+    // Squared error that each change takes away where it is the best.
+    let mut gains = vec![0.0; others.len()];
+    for ((after, index), before) in best.iter().zip(&before) {
+        if let Some(gain) = gains.get_mut(*index) {
+            *gain += before - after;
+        }
+    }
+    let total: f64 = before.iter().sum::<f64>().max(1e-9);
+    // What takes away less than half a percent has no colour.
+    let mut order: Vec<usize> = (0..others.len()).filter(|&i| gains[i] > 0.005 * total).collect();
+    order.sort_by(|&a, &b| gains[b].total_cmp(&gains[a]));
+    order.truncate(COLOURS.len() - 1);
+    let rgba: Vec<u8> = best
+        .iter()
+        .zip(&before)
+        .flat_map(|((after, index), before)| {
+            let colour = order.iter().position(|i| i == index).map_or([40; 3], |place| COLOURS[place]);
+            // As bright as the share of the pixel's error that goes away.
+            let share = if *before > 0.0 { ((before - after) / before).sqrt().max(0.25) } else { 0.0 };
+            let [r, g, b] = colour.map(|c| (f64::from(c) * share) as u8);
+            [r, g, b, 255]
+        })
+        .collect();
+    let map = format!(
+        "data:image/png;base64,{}",
+        STANDARD.encode(encode_png(base.width, base.height, &rgba, false).context("drawing causes")?)
+    );
+    let picture = jpeg(&base)?;
+    Ok(Some(html! {
+        div.pair {
+            figure { img src=(picture) width=(base.width) height=(base.height) alt="The picture of the preset local"; figcaption { "local" } }
+            figure { img src=(map) width=(base.width) height=(base.height) alt="Each pixel in the colour of the change that helps it most"; figcaption { "what would help most" } }
+        }
+        p.legend {
+            @for (place, &index) in order.iter().enumerate() {
+                span { i.key style={ "background:" (hex(place)) } {} (others[index].name) ", " (format!("{:.0}", 100.0 * gains[index] / total)) " % of the squared error" }
+            }
+        }
+    }))
+}

@@ -1,0 +1,183 @@
+//! Combinations of rungs that single prices promise something of.
+
+use std::collections::BTreeMap;
+
+use anyhow::Result;
+
+use super::agenda::{Agenda, States, Task, set};
+use super::judge::{Judge, Record};
+use super::measure::{Base, Measuring};
+use super::pace::Step;
+use super::statistics::{Estimate, Interval, MANY, mean, standard_errors};
+use super::table::{Family, INVISIBLE, Price, Tried};
+use etalon::plan::{KNOBS, Knobs};
+
+/// Pictures that the search may draw.
+pub const PICTURES: usize = 8;
+/// Statements of a search, about: what each rung adds, and whether each step is one.
+const STATEMENTS: usize = 100;
+/// Share of the squared error that a step has to promise to take away.
+const WORTH: f64 = 0.01;
+/// Mean squared difference of displayed values below which the search leaves out what it pays for: a thousandth of their range.
+const NOTHING: f64 = 1e-6;
+
+/// What a rung adds to the squared error and to the time of `local`.
+struct Rung {
+    knob: &'static str,
+    to: &'static str,
+    more: Estimate,
+    ms: f64,
+}
+
+fn task(name: String, knobs: &Knobs) -> Task {
+    Task { name, family: Family::Search, knobs: knobs.clone(), change: None }
+}
+
+/// What each rung of `local` was found to add.
+fn rungs(records: &[Record], judge: &Judge<'_>) -> Result<(Vec<Rung>, f64)> {
+    let Some(local) = records.iter().find(|record| record.name == "local") else { return Ok((Vec::new(), 0.0)) };
+    let base_ms = Interval::of(&local.ms).median;
+    let shown = judge.display(local)?;
+    let mut all = Vec::new();
+    for record in records.iter().filter(|record| record.family == Family::Local) {
+        let Some((change, pair)) = record.pair.as_ref().filter(|(_, pair)| !pair.same) else { continue };
+        let Some(knob) = KNOBS.iter().find(|knob| knob.name == change.knob) else { continue };
+        let Some(&to) = knob.rungs.iter().find(|rung| **rung == change.to) else { continue };
+        let more = if pair.flip == 0.0 {
+            Estimate::default()
+        } else {
+            judge.truth.shown.more_error(&judge.display(record)?, &shown)
+        };
+        let ratios: Vec<f64> = record.ms.iter().zip(&record.others_ms).map(|(ms, other)| ms / other - 1.0).collect();
+        all.push(Rung { knob: knob.name, to, more, ms: mean(&ratios) * base_ms });
+    }
+    Ok((all, base_ms))
+}
+
+/// From the quickest rungs towards less error, a rung further at a time: that which single prices promise most of for its time, and kept
+/// only if the picture has less error by more than the reference's noise.
+///
+/// # Errors
+/// When files cannot be read or written.
+pub fn search(
+    measuring: &mut Measuring<'_>,
+    judge: &Judge<'_>,
+    (agenda, states): (&Agenda, &States),
+    base: &mut Base,
+    progress: &mut dyn FnMut(Step<'_>),
+) -> Result<Vec<Tried>> {
+    let (rungs, base_ms) = rungs(&measuring.records, judge)?;
+    let sure = standard_errors(STATEMENTS, MANY);
+    let local = &agenda.local;
+    let before = measuring.pace.place();
+    let mut tried = Vec::new();
+    let mut knobs = local.clone();
+    for rung in &rungs {
+        let now = rungs.iter().find(|known| known.knob == rung.knob && local_rung(&knobs, known.knob) == known.to);
+        let quickest = rung.ms < now.map_or(0.0, |now| now.ms);
+        if let (true, Some(changed)) = (quickest, knobs.with(rung.knob, rung.to)) {
+            knobs = changed;
+        }
+    }
+    let mut current = measuring.picture(&task("search: quickest".to_owned(), &knobs), base, progress)?;
+    let mut refused: Vec<(&str, &str)> = Vec::new();
+    for step in 1..PICTURES - 1 {
+        let Some(known) = &current else { break };
+        let nothing = Estimate::default();
+        let at = |knob: &str, to: &str| {
+            let found = rungs.iter().find(|rung| rung.knob == knob && rung.to == to);
+            found.map_or((nothing, 0.0), |rung| (rung.more, rung.ms))
+        };
+        let mut best: Option<(f64, &'static str, &'static str, f64)> = None;
+        for knob in states.called_for() {
+            let now = at(knob.name, knob.rung(&knobs));
+            for &to in knob.rungs {
+                let measured =
+                    to == knob.rung(local) || rungs.iter().any(|rung| rung.knob == knob.name && rung.to == to);
+                // A rung that approximates more and has less error undoes another error: it is no improvement of its own.
+                let further = knobs.with(knob.name, to).filter(|then| knob.place(then) > knob.place(&knobs));
+                let possible = further.is_some();
+                if !measured || !possible || refused.contains(&(knob.name, to)) {
+                    continue;
+                }
+                let then = at(knob.name, to);
+                // What cannot be told from nothing promises nothing; its time counts all the same.
+                let told = |more: Estimate| if more.is_told(sure) { more.mean } else { 0.0 };
+                let gain = told(now.0) - told(then.0);
+                let ms = (then.1 - now.1).max(0.01 * base_ms);
+                if gain > 0.0 && best.is_none_or(|(ratio, ..)| gain / ms > ratio) {
+                    best = Some((gain / ms, knob.name, to, gain));
+                }
+            }
+        }
+        let now = judge.display(known)?;
+        let now_error = judge.truth.shown.error(&now);
+        let worth = best.filter(|(.., gain)| *gain > WORTH * now_error.mean);
+        let Some((_, knob, to, gain)) = worth else { break };
+        let changed = set(&knobs, knob, to)?;
+        let change = format!("{knob}: {} → {to}", local_rung(&knobs, knob));
+        let Some(found) = measuring.picture(&task(format!("search: step {step}"), &changed), base, progress)? else {
+            break;
+        };
+        let then = judge.display(&found)?;
+        let found_error = judge.truth.shown.error(&then);
+        let kept = judge.truth.shown.more_error(&then, &now).is_below(sure);
+        let promised = (now_error.mean - gain).max(0.0).sqrt();
+        tried.push(Tried { change, promised, found: found_error.interval().root().median, kept });
+        if kept {
+            knobs = changed;
+            current = Some(found);
+        } else {
+            refused.push((knob, to));
+        }
+    }
+    let drawn = measuring.pace.place() - before;
+    measuring.pace.skip((PICTURES - 1).saturating_sub(drawn));
+    Ok(tried)
+}
+
+fn local_rung(knobs: &Knobs, name: &str) -> &'static str {
+    KNOBS.iter().find(|knob| knob.name == name).map_or("", |knob| knob.rung(knobs))
+}
+
+/// The exact rungs less all that cost time and changed nothing that is seen: whether it is still so together.
+///
+/// # Errors
+/// When files cannot be read or written.
+pub fn without_waste(
+    measuring: &mut Measuring<'_>,
+    judge: &Judge<'_>,
+    (agenda, prices): (&Agenda, &[Price]),
+    base: &mut Base,
+    progress: &mut dyn FnMut(Step<'_>),
+) -> Result<Option<Tried>> {
+    // Of each knob the rung that saves most of those that change nothing.
+    let mut best: BTreeMap<&str, &Price> = BTreeMap::new();
+    for price in prices.iter().filter(|price| price.base == Family::Exact && price.saves()) {
+        let unseen = price.flip_between < INVISIBLE || !price.error_told;
+        let nothing = price.same || (unseen && price.shown_delta.high < NOTHING && price.noise_ratio.is_none());
+        let saved = |price: &Price| -price.gpu_ms_delta.median;
+        if nothing && best.get(price.knob.as_str()).is_none_or(|known| saved(price) > saved(known)) {
+            best.insert(&price.knob, price);
+        }
+    }
+    let mut knobs = agenda.plain.clone();
+    let mut saved = Vec::new();
+    for price in best.into_values() {
+        if let Some(changed) = knobs.with(&price.knob, &price.to) {
+            saved.push(format!("{}={}", price.knob, price.to));
+            knobs = changed;
+        }
+    }
+    if saved.is_empty() {
+        measuring.pace.skip(1);
+        return Ok(None);
+    }
+    let exact = measuring.records.iter().find(|record| record.name == "exact").cloned();
+    let found = measuring.picture(&task("search: exact without waste".to_owned(), &knobs), base, progress)?;
+    let (Some(exact), Some(found)) = (exact, found) else { return Ok(None) };
+    let [before, after] = [judge.display(&exact)?, judge.display(&found)?];
+    let [promised, now] = [&before, &after].map(|display| judge.truth.shown.error(display).interval().root().median);
+    let kept = !judge.truth.shown.more_error(&after, &before).is_above(standard_errors(STATEMENTS, MANY));
+    Ok(Some(Tried { change: format!("exact with {}", saved.join(", ")), promised, found: now, kept }))
+}
