@@ -15,7 +15,7 @@ use etalon::image::file;
 use etalon::image::png::Display;
 use etalon::plan::{Demand, Knobs, Model};
 use etalon::scene::Camera;
-use etalon_cost::choose::{at_most, most_exact, quickest, within};
+use etalon_cost::choose::{SPARE, at_most, most_exact, quickest, within};
 use etalon_cost::difference::Truth;
 use etalon_cost::reference::{NotMeasured, Refined};
 use etalon_cost::sitting::Bench;
@@ -280,10 +280,10 @@ fn first_that_fits<'a>(table: &'a Table, ms: f64, bench: &Bench<'_>) -> Result<O
         let mut sitting = bench.sit(&knobs_of(point)?)?;
         let times = [bench.time(&mut sitting)?, bench.time(&mut sitting)?, bench.time(&mut sitting)?];
         let found = Interval::of(&times);
-        if found.median <= ms {
+        if found.median * SPARE <= ms {
             return Ok(Some(point));
         }
-        slower *= (found.median / (ms / slower)).max(1.1);
+        slower = (found.median / point.gpu_ms.median).max(1.1 * slower);
     }
     Ok(None)
 }

@@ -24,6 +24,8 @@ use etalon::image::{Picture, exr, file, png};
 const AROUND: i64 = 20;
 /// A step along the frontier that is recommended whatever the wish: so much less squared error for so much more time.
 const CHEAP: [f64; 2] = [0.6, 2.0];
+/// How far below the line a corner is, of the whole way in logarithms: what is less is no corner, and the quick setting stands.
+const CORNER: f64 = 0.05;
 /// The reference is recommended where nothing else comes so near to what it resolves.
 const FAR: f64 = 2.0;
 /// Two times of which the longer is no more than so many times the shorter are the same.
@@ -237,7 +239,7 @@ fn recommended(points: &[Point], frontier: &[usize]) -> Vec<Recommended> {
         if from == to { 0.0 } else { (value.max(1e-9) / from.max(1e-9)).ln() / (to.max(1e-9) / from.max(1e-9)).ln() }
     };
     let below = |i: usize| part(error(i), [error(quick), error(exact)]) - part(time(i), [time(quick), time(exact)]);
-    let between = all.iter().copied().filter(|&i| time(i) >= time(quick));
+    let between = all.iter().copied().filter(|&i| time(i) > time(quick) && below(i) > CORNER);
     let balanced = between.max_by(|&a, &b| below(a).total_cmp(&below(b))).unwrap_or(quick);
     let named = [("quick", quick), ("balanced", balanced), ("exact", exact)];
     named.map(|(setting, point)| Recommended { setting: setting.to_owned(), point }).into()

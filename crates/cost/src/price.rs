@@ -9,7 +9,6 @@ use super::sitting::Taken;
 use super::statistics::{Estimate, Interval, mean, pooled, standard_errors};
 use super::table::{Family, INVISIBLE, Price};
 use etalon::image::metric::{AnyPicture, Metric, compare};
-use etalon::plan::Knob;
 
 /// Times of one program on the same rungs differ by so much between two places in memory: less is no difference of the rungs.
 const SAME_PROGRAM: f64 = 0.02;
@@ -146,13 +145,6 @@ fn by_chance(change: &Change) -> bool {
     }
 }
 
-/// Whether a change is one to a rung further on in its knob's list.
-fn to_more_exact(price: &Price) -> bool {
-    let place =
-        |rung: &str| Knob::named(&price.knob).and_then(|knob| knob.rungs.iter().position(|known| *known == rung));
-    place(&price.to) > place(&price.from)
-}
-
 /// What a price says, in a sentence; nothing of errors that a reference cannot tell.
 fn verdict(price: &Price) -> String {
     let median = price.gpu_ms_delta.median;
@@ -175,10 +167,12 @@ fn verdict(price: &Price) -> String {
     } else if price.base != Family::Exact && !price.error_told {
         format!("which is nearer to the truth cannot be told from the reference's noise (FLIP {flip:.3} between both)")
     } else if price.base != Family::Exact && error.median < 0.0 {
-        format!("less error by {:.2} % of the range (FLIP {flip:.3} between both)", 100.0 * (-error.median).sqrt())
+        let less = 100.0 * (-error.median).sqrt();
+        let undoes = if price.undoes_another() { ", though it approximates more: it undoes another error" } else { "" };
+        format!("less error by {less:.2} % of the range (FLIP {flip:.3} between both){undoes}")
     } else if price.is_seen() {
         // From the reference's rungs a cheaper one is wrong; a dearer one says what they leave out.
-        let more = match (price.base, to_more_exact(price)) {
+        let more = match (price.base, price.to_more_exact()) {
             (Family::Exact, false) => "an error of",
             (Family::Exact, true) => "another picture by",
             _ => "more error by",

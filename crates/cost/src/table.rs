@@ -6,6 +6,7 @@ use anyhow::{Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::statistics::Interval;
+use etalon::plan::Knob;
 
 /// The document.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -298,6 +299,20 @@ impl Price {
     #[must_use]
     pub fn saves(&self) -> bool {
         self.time_told && self.share < 0.0
+    }
+
+    /// Whether it went to a rung further on in its knob's list.
+    #[must_use]
+    pub fn to_more_exact(&self) -> bool {
+        let rungs = Knob::named(&self.knob).map_or(&[][..], |knob| knob.rungs);
+        let place = |rung: &str| rungs.iter().position(|known| *known == rung);
+        place(&self.to) > place(&self.from)
+    }
+
+    /// Whether it has less error though it approximates more: the error that it adds is against one that the base has.
+    #[must_use]
+    pub fn undoes_another(&self) -> bool {
+        self.base == Family::Local && self.error_told && self.shown_delta.median < 0.0 && !self.to_more_exact()
     }
 
     /// Whether an eye sees it, and it is more than the noise of paths that went apart.

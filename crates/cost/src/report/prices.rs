@@ -20,7 +20,9 @@ fn from_to(price: &Price) -> Markup {
 /// What matters here and what is wasted here.
 pub(super) fn matters(table: &Table) -> Markup {
     let of = |family: Family| table.prices.iter().filter(move |price| price.base == family);
-    let mut better: Vec<&Price> = of(Family::Local).filter(|p| p.error_told && p.shown_delta.median < 0.0).collect();
+    let nearer = |p: &&Price| p.error_told && p.shown_delta.median < 0.0 && !p.undoes_another();
+    let mut better: Vec<&Price> = of(Family::Local).filter(nearer).collect();
+    let undoing: Vec<&Price> = of(Family::Local).filter(|p| p.undoes_another()).collect();
     let mut worse: Vec<&Price> = of(Family::Local).filter(|p| p.error_told && p.shown_delta.median > 0.0).collect();
     for list in [&mut better, &mut worse] {
         list.sort_by(|a, b| bought(b).total_cmp(&bought(a)));
@@ -49,7 +51,11 @@ pub(super) fn matters(table: &Table) -> Markup {
                 p { "and these add error:" }
                 ul { @for price in &worse { li { (from_to(price)) ": more error by " (percent(bought(price))) (spent(price)) } } }
             }
-            p.quiet { "Errors add by their squares. Less error than " em { "local" } " has may also come of two errors that undo each other: only " em { "exact" } " shows a rung where all else is right." }
+            p.quiet { "Errors add by their squares." }
+            @if !undoing.is_empty() {
+                p { "These have less error though they approximate more: their error is against another that " em { "local" } " has. None is recommended." }
+                ul { @for price in &undoing { li { (from_to(price)) ": less error by " (percent(bought(price))) (spent(price)) } } }
+            }
             h2 { "What is wasted here" }
             @if wasted.is_empty() && unseen.is_empty() { p { "Nothing that was drawn costs time without an effect." } }
             @if !unseen.is_empty() { p { "Nobody sees any rung of " (unseen.join(", ")) "." } }
