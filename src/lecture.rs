@@ -8,18 +8,3 @@ pub fn statement(id: &str) -> Option<&'static str> {
     let rows = LECTURE.lines().filter_map(|line| line.strip_prefix("| ")?.split_once(" | "));
     rows.into_iter().find(|(known, _)| *known == id).map(|(_, rest)| rest.split(" | ").next().unwrap_or(rest))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_rung_names_statements_that_there_are() {
-        for knob in crate::plan::KNOBS {
-            for id in knob.lecture {
-                assert!(statement(id).is_some_and(|text| text.len() > 20), "{}: {id}", knob.name);
-            }
-        }
-        assert_eq!(statement("Z9"), None);
-    }
-}

@@ -8,6 +8,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("share", &["scene"]),
     ("shader", &["gpu", "share"]),
     ("transport", &["transport", "scene", "image", "optics", "share"]),
+    ("lecture", &[]),
     ("plan", &["plan", "scene", "transport"]),
     ("prepare", &["prepare", "plan", "scene", "transport"]),
     (

@@ -577,3 +577,13 @@ fn alpha_calls_for_what_it_does() {
     let veil = drawn(AlphaMode::Blend, 0.5);
     assert!(bits(&veil.film) != bits(&opaque.film) && veil.plan.see_through);
 }
+
+#[test]
+fn rungs_name_statements_that_there_are() {
+    for knob in etalon::plan::KNOBS {
+        for id in knob.lecture {
+            assert!(etalon::lecture::statement(id).is_some_and(|text| text.len() > 20), "{}: {id}", knob.name);
+        }
+    }
+    assert_eq!(etalon::lecture::statement("Z9"), None);
+}

@@ -38,7 +38,7 @@ pub struct PlanArgs {
 }
 
 /// Seconds of a forecast.
-const FORECAST_S: u32 = 30;
+const FORECAST_S: u32 = 60;
 
 /// Runs the command.
 ///

@@ -310,7 +310,7 @@ impl ShownReference {
     pub fn resolution(&self, standard_errors: f64) -> f64 {
         let [_, deviation, _] = self.means(|_, _, _, squared| Sums { variance: squared, ..Sums::default() });
         // The least m with m² > z σ + 2mβ + β².
-        self.off + (2.0 * self.off * self.off + standard_errors * deviation).sqrt()
+        (self.off + (2.0 * self.off * self.off + standard_errors * deviation).sqrt()).min(1.0)
     }
 }
 

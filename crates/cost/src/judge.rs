@@ -307,11 +307,10 @@ fn the_reference(reference: &Reference, wandered: Option<Interval>) -> Point {
     }
 }
 
-/// What draws the reference, or, where it has many rounds, a picture with as many samples at least.
+/// What draws the reference, or, where it has many rounds, a picture with about as many samples.
 fn drawing(reference: &Reference) -> String {
     let [first, ..] = &reference.rounds[..] else { return reference.command.clone() };
-    let rungs = (0..=6).map(|power| 4_u32.pow(power));
-    let rung = rungs.into_iter().find(|rung| *rung >= reference.samples).unwrap_or(first.samples);
+    let rung = 4_u32.pow((f64::from(reference.samples).log2() / 2.0).round().min(6.0) as u32);
     reference.command.replace(&format!("samples={}", first.samples), &format!("samples={rung}"))
 }
 

@@ -137,7 +137,7 @@ impl<'a> Pace<'a> {
     #[must_use]
     pub fn warning(&self) -> Option<String> {
         if (self.stopped)() {
-            return Some(format!("the run was ended before {} of {} pictures were drawn", self.left_out, self.of));
+            return Some("the run was ended before all of its pictures were drawn".to_owned());
         }
         (self.left_out > 0).then(|| {
             format!(

@@ -121,7 +121,9 @@ impl Sweep<'_> {
         if ends {
             let share = REFERENCE_SHARE * budget_s - reference.gpu_ms / 1e3;
             let missing = f64::from(pilot.wanted.saturating_sub(refined.samples())) * refined.each_ms() / 1e3;
-            m.pace.reserved_s = share.min(missing).max(0.0);
+            // What is too little for a round is there for pictures.
+            let round = 4.0 * refined.each_ms() / 1e3;
+            m.pace.reserved_s = Some(share.min(missing)).filter(|seconds| *seconds >= round).unwrap_or(0.0);
         }
         // First what answers most, should the budget end.
         for task in agenda.presets.iter().chain(&agenda.of_local) {
