@@ -1,10 +1,9 @@
 //! What a run draws, in which order: every rung that the scene calls for, changed alone, beside presets.
 
-use std::collections::BTreeMap;
-
 use anyhow::{Context as _, Result};
 use serde::{Deserialize, Serialize};
 
+use super::command::set;
 use super::sitting::Bench;
 use super::table::{Family, KnobState};
 use etalon::plan::{EffectState, KNOBS, Knob, Knobs, Model, Plan};
@@ -52,16 +51,6 @@ pub struct Agenda {
     pub ladder: Vec<Task>,
     /// Whether orders of quadrature are told.
     pub orders: bool,
-}
-
-/// `knobs` with one on another rung.
-pub fn set(knobs: &Knobs, knob: &str, rung: &str) -> Result<Knobs> {
-    knobs.with(knob, rung).with_context(|| format!("setting {knob}={rung}"))
-}
-
-/// Rungs by name.
-pub fn named(knobs: &Knobs) -> BTreeMap<String, String> {
-    knobs.list().into_iter().map(|(knob, rung)| (knob.to_owned(), rung.to_owned())).collect()
 }
 
 /// Whether some effect that a knob shapes is planned: a sentence for or against it.

@@ -1,6 +1,20 @@
 //! Rungs as words of a command line.
 
+use std::collections::BTreeMap;
+
+use anyhow::{Context as _, Result};
+
 use etalon::plan::{Knobs, Model};
+
+/// `knobs` with one on another rung.
+pub fn set(knobs: &Knobs, knob: &str, rung: &str) -> Result<Knobs> {
+    knobs.with(knob, rung).with_context(|| format!("setting {knob}={rung}"))
+}
+
+/// Rungs by name.
+pub fn named(knobs: &Knobs) -> BTreeMap<String, String> {
+    knobs.list().into_iter().map(|(knob, rung)| (knob.to_owned(), rung.to_owned())).collect()
+}
 
 /// `--model` and `--set` of some rungs: the preset that leaves least to be said.
 #[must_use]

@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result};
 
-use super::agenda::{Task, named};
-use super::command::arguments;
+use super::agenda::Task;
+use super::command::{arguments, named};
 use super::judge::Record;
 use super::pace::{Pace, Step};
 use super::price::Pair;

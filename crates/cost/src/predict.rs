@@ -9,7 +9,7 @@ use std::path::Path;
 use anyhow::Result;
 use serde::{Deserialize, Serialize};
 
-use super::agenda::set;
+use super::command::set;
 use super::pace::Step;
 use super::sitting::Bench;
 use super::statistics::Interval;

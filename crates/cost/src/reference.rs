@@ -10,8 +10,7 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail, ensure};
 
-use super::agenda::{named, set};
-use super::command::arguments;
+use super::command::{arguments, named, set};
 use super::difference::{Shown, ShownReference, Truth, in_squares, mean_of, shown, told};
 use super::sitting::{Bench, total};
 use super::statistics::{MANY, standard_errors};

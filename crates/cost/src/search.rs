@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use anyhow::Result;
 
-use super::agenda::{Agenda, States, Task, set};
+use super::agenda::{Agenda, States, Task};
+use super::command::set;
 use super::judge::{Judge, Record};
 use super::measure::{Base, Measuring};
 use super::pace::Step;

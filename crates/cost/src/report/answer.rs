@@ -6,7 +6,7 @@ use anyhow::Result;
 use maud::{Markup, html};
 
 use super::pictures::{embedded, size};
-use super::{digits, percent, plain, time, title, words};
+use super::{digits, error, percent, plain, time, title, words};
 use crate::table::{Point, REFERENCE, RESOLVED, Recommended, Table};
 
 /// A recommended point with the settings that it is recommended for: one may be more than one of them.
@@ -20,12 +20,6 @@ fn recommended(table: &Table) -> Vec<(Vec<&str>, &Point)> {
         }
     }
     all
-}
-
-/// An error with its interval.
-pub(super) fn error(point: &Point) -> Markup {
-    let e = &point.errors.error;
-    html! { b { (percent(e.median)) } " (" (digits(100.0 * e.low)) " to " (digits(100.0 * e.high)) ")" }
 }
 
 /// The answer in a sentence.

@@ -70,6 +70,12 @@ fn time(ms: f64) -> String {
     if ms >= 1000.0 { format!("{} s", digits(ms / 1000.0)) } else { format!("{} ms", digits(ms)) }
 }
 
+/// An error with its interval.
+fn error(point: &Point) -> Markup {
+    let e = &point.errors.error;
+    html! { b { (percent(e.median)) } " (" (digits(100.0 * e.low)) " to " (digits(100.0 * e.high)) ")" }
+}
+
 /// What a point is called on the page.
 fn title(point: &Point) -> String {
     match (point.family, point.name.strip_prefix("search: ")) {

@@ -9,7 +9,7 @@ use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use maud::{Markup, html};
 
-use super::{COLOURS, answer, digits, hex, percent, time, title, words};
+use super::{COLOURS, digits, error, hex, percent, time, title, words};
 use crate::table::{Family, Point, REFERENCE, Table};
 use etalon::image::png::{Display, encode_png, read_display};
 
@@ -86,7 +86,7 @@ fn shown(point: &Point, table: &Table, [width, height]: [u32; 2]) -> Markup {
             }
             p.figures {
                 span { b { (time(point.gpu_ms.median)) } " (" (digits(point.gpu_ms.low)) " to " (digits(point.gpu_ms.high)) " ms, " (point.timed) " timed)" }
-                span { (words::link("error", "error")) " " (answer::error(point)) }
+                span { (words::link("error", "error")) " " (error(point)) }
                 span { (words::link("flip", "FLIP")) " " (digits(e.flip_mean)) ", 95 of 100 pixels below " (digits(e.flip_p95)) }
                 span { (words::link("relmse", "√relMSE")) " " (percent(e.relmse.median.max(0.0).sqrt())) (noise.unwrap_or_default()) }
                 span { (words::link("delta-e", "ΔE2000")) " " (digits(e.delta_e_mean)) }

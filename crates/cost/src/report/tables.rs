@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use maud::{Markup, html};
 
-use super::{COLOURS, anchor, answer, digits, hex, percent, time, title, words};
+use super::{COLOURS, anchor, digits, error, hex, percent, time, title, words};
 use crate::table::{Point, REFERENCE, Table};
 
 /// The frontier as a list: what each of its points gives up.
@@ -18,7 +18,7 @@ pub(super) fn frontier(table: &Table) -> Markup {
                     tr {
                         th scope="row" { a href=(anchor(p)) { (title(p)) } }
                         td.number { (time(p.gpu_ms.median)) }
-                        td.number { @if p.name == REFERENCE { "below " (percent(p.error())) } @else { (answer::error(p)) } }
+                        td.number { @if p.name == REFERENCE { "below " (percent(p.error())) } @else { (error(p)) } }
                         td.knobs { (table.given_up(p)) }
                     }
                 }
