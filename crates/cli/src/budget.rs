@@ -13,7 +13,7 @@ use etalon::frame::{Rendered, Renderer, Settings};
 use etalon::gpu::DeviceInfo;
 use etalon::image::file;
 use etalon::image::png::Display;
-use etalon::plan::{Demand, Knobs, Model};
+use etalon::plan::{Demand, Knobs};
 use etalon::scene::Camera;
 use etalon_cost::choose::{SPARE, at_most, most_exact, quickest, within};
 use etalon_cost::difference::Truth;
@@ -193,7 +193,7 @@ impl Budget {
             given_up: table.given_up(point),
             took_ms: None,
             found_error: None,
-            knobs: knobs_of(point)?,
+            knobs: point.rungs()?,
             truth: Arc::new(truth),
         };
         let Interval { median, low, high } = chosen.error;
@@ -242,10 +242,11 @@ fn measure(
                 bench,
                 folder,
                 extent,
-                command,
+                command: &|_| command.to_owned(),
                 scene,
                 contents: &contents,
-                kept: None,
+                kept: &|_| None,
+                may_shrink: false,
                 others: &[],
                 stopped: &|| false,
             };
@@ -262,22 +263,13 @@ fn measure(
     file::write(&folder.join("cost.json"), serde_json::to_string_pretty(&table)?.as_bytes())
 }
 
-fn knobs_of(point: &Point) -> Result<Knobs> {
-    let mut knobs = Knobs::of(Model::Local);
-    for (knob, rung) in &point.knobs {
-        knobs.set(&format!("{knob}={rung}"))?;
-    }
-    knobs.check()?;
-    Ok(knobs)
-}
-
 /// The rungs with the least error of those that keep a time: by the table, and by three pictures drawn now. A machine that is slower
 /// than when the table was measured is slower for all.
 fn first_that_fits<'a>(table: &'a Table, ms: f64, bench: &Bench<'_>) -> Result<Option<&'a Point>> {
     let mut slower = 1.0_f64;
     for _ in 0..TRIALS {
         let Some(&point) = within(table, ms / slower).first() else { return Ok(None) };
-        let mut sitting = bench.sit(&knobs_of(point)?)?;
+        let mut sitting = bench.sit(&point.rungs()?)?;
         let times = [bench.time(&mut sitting)?, bench.time(&mut sitting)?, bench.time(&mut sitting)?];
         let found = Interval::of(&times);
         if found.median * SPARE <= ms {

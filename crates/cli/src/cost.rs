@@ -108,7 +108,6 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
     for warning in &setup.opened.warnings {
         tracing::warn!("{warning}");
     }
-    let command = command(&args.scene, &args.picture, &args.device);
     if let Some(wanted) = &args.compare {
         let mut knobs = settings.knobs.clone();
         args.picture.colour_of(setup.opened.scene(), &mut knobs)?;
@@ -118,7 +117,7 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
         return say(args, &compared);
     }
     let contents = setup.contents();
-    let kept = kept(&command, &setup);
+    let sized = |size: [u32; 2]| command(&args.scene, &PictureOptions { size, ..args.picture.clone() }, &args.device);
     let stopped = Arc::new(AtomicBool::new(false));
     listen(&stopped);
     let measured = setup.bench(&args.scene, settings, |bench| {
@@ -132,10 +131,11 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
             bench,
             folder: &output,
             extent: Extent { budget_s: args.budget, reference_samples: samples, shard: args.shard.unwrap_or([1, 1]) },
-            command: &command,
+            command: &sized,
             scene: &args.scene.scene,
             contents: &contents,
-            kept: kept.as_deref(),
+            kept: &|command| kept(command, &setup),
+            may_shrink: true,
             others: &others,
             stopped: &|| stopped.load(Ordering::Relaxed),
         };
@@ -160,7 +160,7 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
     validated(&setup)?;
     let done = write(args, &output, &table)?;
     if args.shard.is_none() {
-        keep(&command, &setup, &output);
+        keep(&table.command, &setup, &output);
     }
     Ok(done)
 }

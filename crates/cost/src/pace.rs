@@ -31,6 +31,8 @@ pub struct Pace<'a> {
     judged_s: f64,
     /// Seconds that are not there for pictures, but for the reference.
     pub reserved_s: f64,
+    /// Seconds for what comes after all of that is drawn.
+    pub after_s: f64,
     /// What pictures are expected to take.
     pub forecast: Forecast,
     done: usize,
@@ -51,6 +53,7 @@ impl<'a> Pace<'a> {
             stopped,
             judged_s: JUDGED_S,
             reserved_s,
+            after_s: 0.0,
             forecast,
             done,
             of,
@@ -68,7 +71,7 @@ impl<'a> Pace<'a> {
     /// Seconds that the budget leaves for drawing: judging and showing what was drawn comes after.
     #[must_use]
     pub fn left_s(&self) -> f64 {
-        let after = self.judged_s * self.done as f64;
+        let after = self.judged_s * self.done as f64 + self.after_s;
         if (self.stopped)() { 0.0 } else { self.budget_s - after - self.took_s() }
     }
 

@@ -13,6 +13,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 use super::command::{arguments, named, set};
 use super::difference::{Shown, ShownReference, Truth, in_squares, mean_of, shown, told};
 use super::sitting::{Bench, total};
+use super::size::{fewer, pixels, resized};
 use super::statistics::{MANY, standard_errors};
 use super::table::{RESOLVED, Reference, Round};
 use etalon::frame::{Progress, Settings};
@@ -49,9 +50,15 @@ pub struct NotMeasured {
     pub enough_s: u32,
 }
 
+/// A run whose budget has no time for so many samples of three colours measures a picture of fewer pixels: pictures by paths alone
+/// take about as many (measured: docs/cost.md).
+const WHOLE: f64 = 100.0;
+
 /// What was found out before it is drawn.
 #[derive(Debug, Clone)]
 pub struct Pilot {
+    /// Of how many pixels it is, a side.
+    pub size: [u32; 2],
     /// Its rungs, `samples` being whatever they are.
     pub knobs: Knobs,
     /// GPU milliseconds of a sample.
@@ -161,62 +168,74 @@ fn draw(
     Ok((parts, renderer.png(&rendered)?, total(&rendered)))
 }
 
+/// What a pilot's picture says.
+struct Look {
+    parts: Parts,
+    /// GPU milliseconds of a sample.
+    each_ms: f64,
+    /// Samples after which it would resolve what a reference should.
+    wanted: f64,
+}
+
+fn look(bench: &Bench<'_>, colour: &str) -> Result<Look> {
+    let knobs = set(&set(&Knobs::exact(), "samples", &PILOT.to_string())?, "colour", colour)?;
+    // What compiling takes is no sample's time.
+    bench.sit(&knobs)?;
+    let (parts, _, ms) = draw(bench, &knobs, bench.settings.seed, &mut |_| ())?;
+    let samples = f64::from(PILOT);
+    let shown = ShownReference::of(&parts, &bench.settings.view_transform());
+    let resolution = shown.resolution(standard_errors(STATEMENTS, MANY));
+    Ok(Look { parts, each_ms: ms / samples, wanted: samples * (resolution / RESOLVED).powi(2) })
+}
+
 impl Pilot {
-    /// Draws a few samples. `called_for`: whether the scene calls for the knob `colour`; `budget_ms`: what the reference may take.
+    /// Draws a few samples. `called_for`: whether the scene calls for the knob `colour`; `budget_ms`: what the run may take, and
+    /// `share` what the reference may of it; `may_shrink`: whether fewer pixels than the bench's may be measured.
     ///
     /// # Errors
     /// When they cannot be drawn.
-    pub fn draw(bench: &Bench<'_>, called_for: bool, budget_ms: f64) -> Result<Self> {
-        let exact = set(&Knobs::exact(), "samples", &PILOT.to_string())?;
-        let mut warnings = Vec::new();
-        let [width, height] = bench.settings.size.map(f64::from);
-        let scale = (PILOT_PIXELS / (width * height)).sqrt().min(1.0);
-        let size = [width, height].map(|side| (side * scale).round().max(1.0));
-        let pixels = width * height / (size[0] * size[1]);
-        let settings = Settings { size: size.map(|side| side as u32), ..bench.settings.clone() };
-        let bench = &Bench { settings, ..*bench };
-        let look = |colour: &str| -> Result<(Parts, f64, u32)> {
-            let knobs = set(&exact, "colour", colour)?;
-            // What compiling takes is no sample's time.
-            bench.sit(&knobs)?;
-            let (parts, _, ms) = draw(bench, &knobs, bench.settings.seed, &mut |_| ())?;
-            let sure = standard_errors(STATEMENTS, MANY);
-            let resolution = ShownReference::of(&parts, &bench.settings.view_transform()).resolution(sure);
-            // What is resolved goes with the root of the samples, and with the fourth root of the pixels.
-            let wanted = (f64::from(PILOT) * (resolution / RESOLVED).powi(2) / pixels.sqrt()).ceil().clamp(4.0, 4096.0);
-            Ok((parts, pixels * ms / f64::from(PILOT), wanted as u32))
+    pub fn draw(bench: &Bench<'_>, called_for: bool, [budget_ms, share]: [f64; 2], may_shrink: bool) -> Result<Self> {
+        let asked = bench.settings.size;
+        let few = fewer(asked, (pixels(asked) / PILOT_PIXELS).max(1.0));
+        let bench = &resized(bench, few);
+        let plain = look(bench, "rgb")?;
+        let bands = if called_for && told_by_wavelength(bench) { Some(look(bench, "spectral:8")?) } else { None };
+        let seen = bands.filter(|bands| differ(bench, &plain.parts, &bands.parts));
+
+        let reference_ms = f64::from(FEWEST_SAMPLES) * seen.as_ref().unwrap_or(&plain).each_ms;
+        let fits = |size: &[u32; 2]| {
+            let more = pixels(*size) / pixels(few);
+            WHOLE * plain.each_ms * more <= budget_ms && reference_ms * more <= share * budget_ms
         };
-        let (plain, plain_ms, mut wanted) = look("rgb")?;
-        let (mut knobs, mut each_ms) = (set(&exact, "colour", "rgb")?, plain_ms);
-        if called_for {
-            let bands = if told_by_wavelength(bench) { Some(look("spectral:8")?) } else { None };
-            let seen = bands.as_ref().is_some_and(|(parts, ..)| differ(bench, &plain, parts));
-            match bands.filter(|_| seen) {
-                Some((_, ms, by_bands)) => {
-                    let affordable = |bands: &u32| {
-                        samples_within(ms * f64::from(*bands) / 8.0, budget_ms) >= FEWEST_SAMPLES
-                    };
-                    let bands = BANDS.into_iter().find(affordable).unwrap_or(8);
-                    knobs = set(&exact, "colour", &format!("spectral:{bands}"))?;
-                    each_ms = ms * f64::from(bands) / 8.0;
-                    // Each band has random numbers of its own.
-                    wanted = (by_bands * 8).div_ceil(bands).max(FEWEST_SAMPLES);
-                    if bands < BANDS[0] {
-                        warnings.push(format!(
-                            "the reference has {bands} bands of wavelengths: {} would have left fewer than {FEWEST_SAMPLES} samples \
-                             of each pixel; give it a larger --budget",
-                            BANDS[0]
-                        ));
-                    }
-                }
-                None => warnings.push(
-                    "bands of wavelengths change nothing in this picture that is more than noise: the reference has three colours, and \
-                     bands of wavelengths are priced as another reading of them"
-                        .to_owned(),
-                ),
-            }
+        let sizes = (0..).map(|n| fewer(asked, 4.0_f64.powi(n))).take_while(|size| pixels(*size) > pixels(few));
+        let size = if may_shrink { sizes.chain([few]).find(fits).unwrap_or(few) } else { asked };
+        let more = pixels(size) / pixels(few);
+        // What is resolved goes with the root of the samples, and with the fourth root of the pixels.
+        let wanted = |look: &Look| (look.wanted / more.sqrt()).ceil().clamp(4.0, 4096.0) as u32;
+        let plain_ms = more * plain.each_ms;
+        let rungs = |colour: &str| set(&Knobs::exact(), "colour", colour);
+        let Some(seen) = seen else {
+            let same = "bands of wavelengths change nothing in this picture that is more than noise: the reference has three colours, and \
+                        bands of wavelengths are priced as another reading of them";
+            let warnings = if called_for { vec![same.to_owned()] } else { Vec::new() };
+            let knobs = rungs("rgb")?;
+            return Ok(Self { size, knobs, each_ms: plain_ms, plain_ms, wanted: wanted(&plain), warnings });
+        };
+        let each_ms = |bands: u32| more * seen.each_ms * f64::from(bands) / 8.0;
+        let affordable = |bands: &u32| samples_within(each_ms(*bands), share * budget_ms) >= FEWEST_SAMPLES;
+        let bands = BANDS.into_iter().find(affordable).unwrap_or(8);
+        let mut warnings = Vec::new();
+        if bands < BANDS[0] {
+            warnings.push(format!(
+                "the reference has {bands} bands of wavelengths: {} would have left fewer than {FEWEST_SAMPLES} samples of each pixel; \
+                 give it a larger --budget",
+                BANDS[0]
+            ));
         }
-        Ok(Self { knobs, each_ms, plain_ms, wanted, warnings })
+        // Each band has random numbers of its own.
+        let wanted = (wanted(&seen) * 8).div_ceil(bands).max(FEWEST_SAMPLES);
+        let knobs = rungs(&format!("spectral:{bands}"))?;
+        Ok(Self { size, knobs, each_ms: each_ms(bands), plain_ms, wanted, warnings })
     }
 }
 
@@ -269,6 +288,12 @@ impl Refined {
 
     fn gpu_ms(&self) -> f64 {
         self.rounds.iter().map(|round| round.gpu_ms).sum()
+    }
+
+    /// Its sides in pixels.
+    #[must_use]
+    pub fn size(&self) -> [u32; 2] {
+        self.parts.first().map_or([0, 0], |part| [part.width, part.height])
     }
 
     /// Its rungs; those of its first round's samples.

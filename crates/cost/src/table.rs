@@ -6,7 +6,7 @@ use anyhow::{Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::statistics::Interval;
-use etalon::plan::Knob;
+use etalon::plan::{Knob, Knobs, Model};
 
 /// The document.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -23,6 +23,9 @@ pub struct Table {
     pub command: String,
     /// Pixels.
     pub size: [u32; 2],
+    /// The pixels that were asked for, where the budget had no time for them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub asked: Option<Asked>,
     /// What every error is an error against.
     pub reference: Reference,
     /// Which knobs the scene calls for.
@@ -121,6 +124,26 @@ pub struct Recommended {
     pub setting: String,
     /// Its place in `points`.
     pub point: usize,
+}
+
+/// The size that was asked for, of which fewer pixels were measured.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Asked {
+    /// Pixels.
+    pub size: [u32; 2],
+    /// The recommended settings there, in the order of `recommended`.
+    pub settings: Vec<AtSize>,
+}
+
+/// A picture of the size that was asked for.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct AtSize {
+    /// GPU time with everything compiled.
+    pub gpu_ms: Interval,
+    /// Whether it was drawn; otherwise its time is foretold from that of fewer pixels.
+    pub measured: bool,
+    /// Draws it.
+    pub command: String,
 }
 
 /// A knob in this scene.
@@ -223,6 +246,19 @@ impl Point {
     #[must_use]
     pub fn error(&self) -> f64 {
         self.errors.error.median
+    }
+
+    /// Its rungs as knobs.
+    ///
+    /// # Errors
+    /// When this program has no such knob or rung.
+    pub fn rungs(&self) -> Result<Knobs> {
+        let mut knobs = Knobs::of(Model::Local);
+        for (knob, rung) in &self.knobs {
+            knobs.set(&format!("{knob}={rung}"))?;
+        }
+        knobs.check()?;
+        Ok(knobs)
     }
 }
 

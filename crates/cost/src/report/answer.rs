@@ -7,7 +7,22 @@ use maud::{Markup, html};
 
 use super::pictures::{embedded, size};
 use super::{digits, error, percent, plain, time, title, words};
-use crate::table::{Point, REFERENCE, RESOLVED, Recommended, Table};
+use crate::table::{AtSize, Point, REFERENCE, RESOLVED, Recommended, Table};
+
+/// What a recommended point takes at the size that was asked for.
+fn at_size<'a>(table: &'a Table, point: &Point) -> Option<(String, &'a AtSize)> {
+    let asked = table.asked.as_ref()?;
+    let place =
+        table.recommended.iter().position(|r| table.points.get(r.point).is_some_and(|p| p.name == point.name))?;
+    let at = asked.settings.get(place)?;
+    let about = if at.measured { "" } else { "about " };
+    Some((format!("{about}{} at {}×{}", time(at.gpu_ms.median), asked.size[0], asked.size[1]), at))
+}
+
+/// The time of a point, where it may be at the size that was asked for.
+fn takes(table: &Table, point: &Point) -> String {
+    at_size(table, point).map_or_else(|| time(point.gpu_ms.median), |(words, _)| words)
+}
 
 /// A recommended point with the settings that it is recommended for: one may be more than one of them.
 fn recommended(table: &Table) -> Vec<(Vec<&str>, &Point)> {
@@ -31,7 +46,7 @@ pub(super) fn lead(table: &Table) -> Markup {
     };
     let seen = table.prices.iter().any(|price| !price.same && price.flip_between >= crate::table::INVISIBLE);
     html! {
-        "Use " b { (title(point)) } ": a picture takes " (time(point.gpu_ms.median)) " on this device, with an " (words::link("error", "error"))
+        "Use " b { (title(point)) } ": a picture takes " (takes(table, point)) " on this device, with an " (words::link("error", "error"))
         " of " (percent(point.error())) "."
         @if !table.reference.converged {
             " The " (words::link("reference", "reference")) " is noisy: errors below " (percent(table.reference.resolution)) " are not told."
@@ -45,17 +60,18 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
     let cards = recommended(table)
         .into_iter()
         .map(|(settings, point)| {
+            let command = at_size(table, point).map_or(&point.command, |(_, at)| &at.command);
             let picture = embedded(&folder.join(format!("{}.png", point.picture)))?;
             Ok(html! {
                 article.setting {
                     h3 { (settings.join(", ")) ": " (title(point)) }
                     img src=(picture) width=(size(table)[0]) height=(size(table)[1]) alt={ "Picture of the setting " (title(point)) };
                     table.facts { tbody {
-                        tr { th scope="row" { "time" } td { b { (time(point.gpu_ms.median)) } } }
+                        tr { th scope="row" { "time" } td { b { (takes(table, point)) } @if table.asked.is_some() { ", " (time(point.gpu_ms.median)) " as shown" } } }
                         tr { th scope="row" { "error" } td { @if point.name == REFERENCE { "below " b { (percent(point.error())) } } @else { (error(point)) } } }
                         tr { th scope="row" { "given up" } td { (given_up(table, point)) } }
                     } }
-                    p.command { code { (point.command.replace(" --repeat 3", "")) } button.copy type="button" { "copy" } }
+                    p.command { code { (command.replace(" --repeat 3", "")) } button.copy type="button" { "copy" } }
                 }
             })
         })

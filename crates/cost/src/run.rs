@@ -1,0 +1,359 @@
+//! The score of a run: what the other files do, in order.
+//!
+//! A first round of the reference, presets and every rung of `local`, a search for combinations, every rung of the reference's, and with
+//! what time is left more rounds of the reference. Then all is judged by it.
+
+use std::time::Instant;
+
+use anyhow::{Context as _, Result, ensure};
+
+use super::agenda::{Agenda, States, Task};
+use super::difference::Truth;
+use super::judge::{Judge, Judged};
+use super::measure::Measuring;
+use super::orders;
+use super::pace::{Pace, Step};
+use super::reference::{NotMeasured, Pilot, Refined, refine, samples_within};
+use super::search::{PICTURES, search, without_waste};
+use super::sitting::{Bench, ENOUGH_MS, enough_ms};
+use super::size::Growth;
+use super::statistics::Interval;
+use super::sweep::{Extent, Listener, REFERENCE_SHARE, Sweep};
+use super::table::{Asked, AtSize, Family, Order, REFERENCE, RESOLVED, Recommended, Reference, Table, Tried};
+use etalon::frame::Progress;
+use etalon::image::file;
+use etalon::image::metric::AnyPicture;
+use etalon::plan::Knobs;
+
+/// Share of the budget for the first round of the reference.
+const FIRST_SHARE: f64 = 0.12;
+/// Seconds of a budget from which on a page is written before the end.
+const EARLY_S: f64 = 90.0;
+/// A picture is drawn twice, the first time to compile.
+const TWICE: f64 = 2.0;
+
+/// A run of some size.
+pub(super) struct Run<'a> {
+    /// What is asked for.
+    pub sweep: &'a Sweep<'a>,
+    /// What draws, in that size.
+    pub bench: Bench<'a>,
+    /// The first words of every command.
+    pub command: &'a str,
+    /// What is known before anything is drawn.
+    pub pilot: Pilot,
+}
+
+/// What is found out beside pictures.
+#[derive(Default)]
+struct Found {
+    search: Vec<Tried>,
+    orders: Vec<Order>,
+    warnings: Vec<String>,
+}
+
+impl Run<'_> {
+    /// Measures. `begun`: the reference as far as an interrupted run has drawn it.
+    pub(super) fn measure(
+        &self,
+        states: &States,
+        pace: Pace<'_>,
+        begun: Option<Refined>,
+        listener: &mut Listener<'_>,
+    ) -> Result<Table> {
+        let Extent { budget_s, reference_samples, shard } = self.sweep.extent;
+        let (budget_s, ends) = (f64::from(budget_s), reference_samples.is_none());
+        let (bench, pilot) = (&self.bench, &self.pilot);
+        let (records, warnings) = (Vec::new(), Vec::new());
+        let (folder, command) = (self.sweep.folder, self.command);
+        let enough_ms = if ends { enough_ms(budget_s) } else { ENOUGH_MS };
+        let mut m = Measuring { bench, folder, command, shard, enough_ms, pace, records, warnings };
+        let mut found = Found::default();
+
+        let mut refined = self.first_round(begun, &m.pace, listener)?;
+        found.warnings.extend(pilot.warnings.iter().cloned());
+        let rungs = refined.knobs().clone();
+        // What is given a number of samples is the same whatever the clock says.
+        let priced = reference_samples.map(|samples| if samples >= 256 { 16 } else { 4 });
+        let each = [pilot.each_ms, pilot.plain_ms];
+        let agenda = Agenda::new(bench, states, &rungs, each, priced, budget_s * 1e3)?;
+        let (mut truth, mut reference) = self.describe(&refined, agenda.priced())?;
+        let mut local = m.base(&base_task("local", Family::Preset, &agenda.local), listener.step)?;
+        self.expect(&mut m, &agenda);
+        if ends {
+            let share = REFERENCE_SHARE * budget_s - reference.gpu_ms / 1e3;
+            let missing = f64::from(pilot.wanted.saturating_sub(refined.samples())) * refined.each_ms() / 1e3;
+            // What is too little for a round is there for pictures.
+            let round = 4.0 * refined.each_ms() / 1e3;
+            m.pace.reserved_s = Some(share.min(missing)).filter(|seconds| *seconds >= round).unwrap_or(0.0);
+        }
+        // First what answers most, should the budget end.
+        for task in agenda.presets.iter().chain(&agenda.of_local) {
+            m.picture(task, &mut local, listener.step)?;
+        }
+        if shard == [1, 1] {
+            let judge = Judge { truth: &truth, reference: &reference, folder };
+            found.search = search(&mut m, &judge, (&agenda, &states), &mut local, listener.step)?;
+        } else {
+            found.warnings.push("a part of a run does not search for combinations".to_owned());
+            m.pace.skip(PICTURES - 1);
+        }
+        for task in &agenda.ladder {
+            m.picture(task, &mut local, listener.step)?;
+        }
+        if ends {
+            // Its share comes before prices that nobody could believe without it.
+            let share = std::mem::take(&mut m.pace.reserved_s);
+            refined = self.more(refined, &m.pace, pilot.wanted, share, listener)?;
+            (truth, reference) = self.describe(&refined, agenda.priced())?;
+        }
+        if ends && budget_s >= EARLY_S {
+            let begun = Instant::now();
+            let judge = Judge { truth: &truth, reference: &reference, folder };
+            (listener.early)(&self.table(&judge.judge(&m.records)?, &m, &reference, states, &found))?;
+            m.pace.judged(m.records.len(), begun.elapsed().as_secs_f64());
+        }
+        self.prices_of_exact(&mut m, &agenda, listener)?;
+        self.orders(&mut m, &agenda, &mut found, listener)?;
+
+        if ends {
+            refined = self.more(refined, &m.pace, pilot.wanted, f64::INFINITY, listener)?;
+            (truth, reference) = self.describe(&refined, agenda.priced())?;
+        }
+        if shard == [1, 1] && m.records.iter().any(|record| record.name == "exact") {
+            let judge = Judge { truth: &truth, reference: &reference, folder };
+            let prices = judge.judge(&m.records)?.prices;
+            let tried = without_waste(&mut m, &judge, (&agenda, &prices), &mut local, listener.step)?;
+            found.search.extend(tried);
+        }
+        if agenda.plain.colour != rungs.colour {
+            found.warnings.push("knobs other than colour are priced in three colours".to_owned());
+        }
+        let judge = Judge { truth: &truth, reference: &reference, folder };
+        let other = |(name, picture): &(String, AnyPicture)| judge.other(name, picture, &bench.settings);
+        let others = self.sweep.others.iter().map(other).collect::<Result<_>>()?;
+        let mut table = Table { others, ..self.table(&judge.judge(&m.records)?, &m, &reference, states, &found) };
+        if self.is_smaller() {
+            table.asked = Some(self.at_size(&table, budget_s - m.pace.took_s())?);
+            table.took_s = m.pace.took_s();
+        }
+        Ok(table)
+    }
+
+    /// Whether fewer pixels are measured than were asked for.
+    fn is_smaller(&self) -> bool {
+        self.bench.settings.size != self.sweep.bench.settings.size
+    }
+
+    /// The reference as far as it is drawn before anything else: what an interrupted or an earlier run has drawn, or a first round.
+    fn first_round(&self, begun: Option<Refined>, pace: &Pace<'_>, listener: &mut Listener<'_>) -> Result<Refined> {
+        let Extent { budget_s, reference_samples, .. } = self.sweep.extent;
+        let (budget_s, pilot) = (f64::from(budget_s), &self.pilot);
+        // What cannot be read is drawn again.
+        let kept = || Some(Refined::read(&(self.sweep.kept)(self.command)?).ok()??.0);
+        if let Some(known) = begun.or_else(|| if reference_samples.is_none() { kept() } else { None }) {
+            return Ok(known);
+        }
+        let samples = match reference_samples {
+            Some(samples) => samples,
+            None => {
+                let least_s = pace.took_s() + 4.0 * pilot.each_ms / 1e3;
+                let enough_s = (4.0 * least_s).max(20.0).ceil() as u32;
+                ensure!(least_s < budget_s, NotMeasured { budget_s, least_s, enough_s });
+                samples_within(pilot.each_ms, FIRST_SHARE * budget_s * 1e3).min(pilot.wanted.next_power_of_two().max(4))
+            }
+        };
+        // The next rung at least, where a power of two is none.
+        let samples = if samples.trailing_zeros() % 2 == 1 { 2 * samples } else { samples };
+        let left_s = |at: &Progress| f64::from(at.of - at.done) * pilot.each_ms / 1e3 + (1.0 - FIRST_SHARE) * budget_s;
+        let refined = Refined::round(None, &self.bench, &pilot.knobs, samples, &mut |at| {
+            let (done, of, left_s) = (at.done as usize, at.of as usize, left_s(&at));
+            (listener.step)(Step { name: "reference", done, of, left_s });
+        })?;
+        Ok(refined)
+    }
+
+    /// More rounds of the reference, for so many seconds at most.
+    fn more(
+        &self,
+        refined: Refined,
+        pace: &Pace<'_>,
+        wanted: u32,
+        seconds: f64,
+        listener: &mut Listener<'_>,
+    ) -> Result<Refined> {
+        let begun = Instant::now();
+        let left = || pace.left_s().min(seconds - begun.elapsed().as_secs_f64());
+        refine(refined, &self.bench, wanted, &left, &mut |at: Progress| {
+            let (done, of, left_s) = (at.done as usize, at.of as usize, pace.all_left_s());
+            (listener.step)(Step { name: "reference", done, of, left_s });
+        })
+    }
+
+    /// What errors are told against, and what is said of it; both are written.
+    fn describe(&self, refined: &Refined, priced: u32) -> Result<(Truth, Reference)> {
+        let truth = refined.truth(&self.bench.settings);
+        let (reference, png) = refined.describe(&truth, self.command, priced, &self.bench)?;
+        refined.write(self.sweep.folder, &reference, &png)?;
+        file::write(&self.sweep.folder.join("pictures/reference.png"), &png)?;
+        Ok((truth, reference))
+    }
+
+    /// Tells the clock what is to come.
+    fn expect(&self, m: &mut Measuring<'_>, agenda: &Agenda) {
+        let pilot = &self.pilot;
+        let (local, plain) = (&agenda.local, &agenda.plain);
+        let drawn = m.records.last().map_or(0.0, |record| Interval::of(&record.ms).median);
+        let pace = &mut m.pace;
+        pace.forecast.enough_ms = m.enough_ms;
+        pace.forecast.path_ms = pilot.plain_ms;
+        pace.forecast.raster_ms = drawn / f64::from(local.samples.count());
+        let mut expect = |knobs, base| pace.forecast.expect(knobs, base);
+        agenda.presets.iter().chain(&agenda.of_local).for_each(|task| expect(&task.knobs, local));
+        (0..PICTURES - 1).for_each(|_| expect(local, local));
+        agenda.ladder.iter().for_each(|task| expect(&task.knobs, local));
+        expect(plain, plain);
+        agenda.of_exact.iter().for_each(|task| expect(&task.knobs, plain));
+        let with_orders = agenda.orders && self.sweep.extent.shard[0] == 1;
+        (0..if with_orders { orders::PICTURES } else { 0 }).for_each(|_| expect(local, local));
+        expect(plain, local);
+        let count = [agenda.presets.len(), agenda.of_local.len(), agenda.of_exact.len(), agenda.ladder.len()];
+        pace.expects(1 + count.iter().sum::<usize>() + PICTURES + if with_orders { orders::PICTURES } else { 0 });
+    }
+
+    /// Every rung of the reference's rungs, changed alone.
+    fn prices_of_exact(&self, m: &mut Measuring<'_>, agenda: &Agenda, listener: &mut Listener<'_>) -> Result<()> {
+        let next = m.pace.forecast.next();
+        if m.pace.too_late(next) {
+            m.pace.leave_out(agenda.of_exact.len());
+            return Ok(());
+        }
+        let mut exact = m.base(&base_task("exact", Family::Exact, &agenda.plain), listener.step)?;
+        for task in &agenda.of_exact {
+            m.picture(task, &mut exact, listener.step)?;
+        }
+        Ok(())
+    }
+
+    /// Orders of the rules of quadrature: one part of a run in shards draws them.
+    fn orders(
+        &self,
+        m: &mut Measuring<'_>,
+        agenda: &Agenda,
+        found: &mut Found,
+        listener: &mut Listener<'_>,
+    ) -> Result<()> {
+        if !agenda.orders || self.sweep.extent.shard[0] != 1 {
+            return Ok(());
+        }
+        let path = self.sweep.folder.join("orders.json");
+        if path.exists() {
+            found.orders =
+                serde_json::from_slice(&file::read(&path)?).with_context(|| format!("reading {}", path.display()))?;
+            m.pace.skip(orders::PICTURES);
+            return Ok(());
+        }
+        let all = orders::PICTURES as f64 * m.pace.forecast.next();
+        if m.pace.too_late(all) {
+            m.pace.skip(orders::PICTURES);
+            return Ok(());
+        }
+        let pace = &mut m.pace;
+        let drawn = orders::orders(&self.bench, &mut |name| {
+            pace.tell(name, listener.step);
+        });
+        match drawn {
+            Ok(orders) => {
+                file::write(&path, serde_json::to_string_pretty(&orders)?.as_bytes())?;
+                found.orders = orders;
+            }
+            Err(error) => m.warnings.push(format!("\"orders\" cannot be drawn here: {error:#}")),
+        }
+        Ok(())
+    }
+
+    /// The recommended settings at the size that was asked for: drawn in the seconds that are left, or foretold.
+    fn at_size(&self, table: &Table, mut left_s: f64) -> Result<Asked> {
+        let asked = self.sweep.bench.settings.size;
+        let growth = Growth::of(&self.bench, asked)?;
+        let begins = (self.sweep.command)(asked);
+        let mut settings: Vec<AtSize> = Vec::new();
+        for (place, Recommended { point, .. }) in table.recommended.iter().enumerate() {
+            if let Some(same) = table.recommended[..place].iter().position(|known| known.point == *point) {
+                settings.push(settings[same].clone());
+                continue;
+            }
+            let point = &table.points[*point];
+            let command = point.command.replacen(self.command, &begins, 1);
+            let mut at = AtSize { gpu_ms: growth.of_time(point), measured: false, command };
+            let seconds = TWICE * at.gpu_ms.high / 1e3;
+            if point.name != REFERENCE && seconds < left_s && !(self.sweep.stopped)() {
+                let begun = Instant::now();
+                let ms = self.sweep.bench.time(&mut self.sweep.bench.sit(&point.rungs()?)?)?;
+                at = AtSize { gpu_ms: Interval { median: ms, low: ms, high: ms }, measured: true, ..at };
+                left_s -= begun.elapsed().as_secs_f64();
+            }
+            settings.push(at);
+        }
+        Ok(Asked { size: asked, settings })
+    }
+
+    fn table(
+        &self,
+        judged: &Judged,
+        m: &Measuring<'_>,
+        reference: &Reference,
+        states: &States,
+        found: &Found,
+    ) -> Table {
+        let mut warnings = Vec::new();
+        if self.bench.device.info().kind == "cpu" {
+            warnings.push("a software device: times are those of this processor and of what else it does".to_owned());
+        }
+        if self.is_smaller() {
+            let ([w, h], [x, y]) = (self.sweep.bench.settings.size, self.bench.settings.size);
+            warnings.push(format!(
+                "the budget has no time for pictures of {w}x{h}: errors and times are those of {x}x{y}, and those of the recommended \
+                 settings are told of both; a larger --budget measures {w}x{h}"
+            ));
+        }
+        warnings.extend(found.warnings.iter().chain(&m.warnings).cloned());
+        if !reference.converged {
+            warnings.push(format!(
+                "the reference resolves errors of {:.2} % of the range, after {} samples, not of {:.1} %: smaller ones are not told; a \
+                 second run goes on with it",
+                100.0 * reference.resolution,
+                reference.samples,
+                100.0 * RESOLVED
+            ));
+        }
+        warnings.extend(m.pace.warning());
+        Table {
+            schema: "etalon.cost/1".to_owned(),
+            program: env!("CARGO_PKG_VERSION").to_owned(),
+            device: self.sweep.device(),
+            scene: self.sweep.scene.to_owned(),
+            command: self.command.to_owned(),
+            size: self.bench.settings.size,
+            asked: None,
+            reference: reference.clone(),
+            knobs: states.list(),
+            frontier: judged.frontier.clone(),
+            recommended: judged.recommended.clone(),
+            standard_errors: judged.standard_errors,
+            points: judged.points.clone(),
+            prices: judged.prices.clone(),
+            search: found.search.clone(),
+            others: Vec::new(),
+            orders: found.orders.clone(),
+            warnings,
+            shard: self.sweep.extent.shard,
+            budget_s: f64::from(self.sweep.extent.budget_s),
+            took_s: m.pace.took_s(),
+        }
+    }
+}
+
+fn base_task(name: &str, family: Family, knobs: &Knobs) -> Task {
+    Task { name: name.to_owned(), family, knobs: knobs.clone(), change: None }
+}

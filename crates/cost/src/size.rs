@@ -1,0 +1,91 @@
+//! Sizes of the same picture: what is measured of fewer pixels, and what it says of more.
+//!
+//! What an error is in the mean over a picture depends little on how many pixels sample it. A time is one part for each picture and one
+//! for each pixel, which two sizes tell.
+
+use anyhow::Result;
+
+use super::command::set;
+use super::sitting::Bench;
+use super::statistics::Interval;
+use super::table::Point;
+use etalon::frame::Settings;
+use etalon::plan::{Knobs, Model};
+
+/// What a time scatters by beside noise, because caches are filled otherwise (measured: docs/cost.md).
+const OTHER_SIZE: f64 = 0.25;
+
+/// Pictures of which the quickest counts take so many milliseconds, or are five.
+const ENOUGH_MS: f64 = 300.0;
+
+/// How many pixels a picture has.
+#[must_use]
+pub fn pixels(size: [u32; 2]) -> f64 {
+    size.map(f64::from).iter().product()
+}
+
+/// A size with so many times fewer pixels.
+#[must_use]
+pub fn fewer(size: [u32; 2], times: f64) -> [u32; 2] {
+    size.map(|side| (f64::from(side) / times.sqrt()).round().max(1.0) as u32)
+}
+
+/// The same picture with another number of pixels.
+#[must_use]
+pub fn resized<'a>(bench: &Bench<'a>, size: [u32; 2]) -> Bench<'a> {
+    Bench { settings: Settings { size, ..bench.settings.clone() }, ..*bench }
+}
+
+/// How times grow from one size to another: the factors of pictures by paths, and of all others.
+#[derive(Debug, Clone, Copy)]
+pub struct Growth {
+    paths: f64,
+    others: f64,
+}
+
+impl Growth {
+    /// From the bench's size to `size`, by what both kinds of pictures take at the bench's and at a quarter of it.
+    ///
+    /// # Errors
+    /// When they cannot be drawn.
+    pub fn of(bench: &Bench<'_>, size: [u32; 2]) -> Result<Self> {
+        let times = pixels(size) / pixels(bench.settings.size);
+        let factor = |knobs: &Knobs| -> Result<f64> {
+            let share = share_of_a_picture(bench, knobs)?;
+            Ok(share + (1.0 - share) * times)
+        };
+        let paths = factor(&set(&Knobs::of(Model::Global), "samples", "1")?)?;
+        Ok(Self { paths, others: factor(&Knobs::of(Model::Local))? })
+    }
+
+    /// What a point's time becomes.
+    #[must_use]
+    pub fn of_time(&self, point: &Point) -> Interval {
+        let by_paths = point.knobs.get("indirect").is_some_and(|rung| rung == "path");
+        let factor = if by_paths { self.paths } else { self.others };
+        let Interval { median, low, high } = point.gpu_ms;
+        Interval {
+            median: factor * median,
+            low: factor * low * (1.0 - OTHER_SIZE),
+            high: factor * high * (1.0 + OTHER_SIZE),
+        }
+    }
+}
+
+/// The share of a time that does not go with pixels, by two sizes.
+fn share_of_a_picture(bench: &Bench<'_>, knobs: &Knobs) -> Result<f64> {
+    let time = |bench: &Bench<'_>| -> Result<f64> {
+        let mut sitting = bench.sit(knobs)?;
+        let (mut least, mut all, mut count) = (f64::INFINITY, 0.0, 0);
+        while count < 5 && all < ENOUGH_MS {
+            let ms = bench.time(&mut sitting)?;
+            (least, all, count) = (ms.min(least), all + ms, count + 1);
+        }
+        Ok(least)
+    };
+    let small = resized(bench, fewer(bench.settings.size, 4.0));
+    let [all, few] = [time(bench)?, time(&small)?];
+    let more = (pixels(bench.settings.size) - pixels(small.settings.size)).max(1.0);
+    let each = (all - few) / more;
+    Ok((1.0 - each * pixels(bench.settings.size) / all.max(1e-9)).clamp(0.0, 1.0))
+}
