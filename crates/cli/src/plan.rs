@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result};
 use clap::Args;
 use comfy_table::{ContentArrangement, Table, presets};
 
-use super::options::{DeviceOptions, Extent, PictureOptions, SceneOptions};
+use super::options::{DeviceOptions, Extent as Planned, PictureOptions, SceneOptions};
 use super::print;
 use super::report::{Expected, PlanFacts};
 use super::setup::{self, Setup};
@@ -19,6 +19,7 @@ use etalon::scene::normal_form::normalise;
 use etalon::transport::sight::{Sight, along_lines};
 use etalon_cost::explain::Price;
 use etalon_cost::predict::{Prediction, Trial, predict};
+use etalon_cost::sweep::Extent;
 
 /// Say what a scene calls for, with reasons, and what drawing it takes
 #[derive(Debug, Clone, Args)]
@@ -55,7 +56,7 @@ pub fn run(args: &PlanArgs) -> Result<ExitCode> {
     let wants_device = args.device.device.is_some()
         || args.device.validate
         || args.forecast
-        || args.picture.plan == Extent::ExplainCost;
+        || args.picture.plan == Planned::ExplainCost;
     let facts = match device {
         Ok(device) => on_device(args, Setup { device, opened }, settings, sight.as_ref(), read)?,
         Err(error) if wants_device => return Err(error),
@@ -113,7 +114,7 @@ fn on_device(
     mut warnings: Vec<String>,
 ) -> Result<PlanFacts> {
     let interfaces = settings.knobs.interfaces.count();
-    let explained = (args.picture.plan == Extent::ExplainCost).then(|| (setup.clone(), settings.clone()));
+    let explained = (args.picture.plan == Planned::ExplainCost).then(|| (setup.clone(), settings.clone()));
     let forecast = args.forecast.then(|| (setup.clone(), settings.clone()));
     let (mut renderer, camera) = setup.renderer(&args.scene, settings)?;
     warnings.extend(renderer.warnings.iter().cloned());
@@ -142,7 +143,8 @@ fn on_device(
     drop(renderer);
     if let Some((setup, settings)) = forecast {
         let folder = tempfile::tempdir().context("making a folder")?;
-        let trial = Trial { folder: &folder.path().join("forecast"), budget_s: FORECAST_S };
+        let extent = Extent { budget_s: FORECAST_S, reference_samples: None, shard: [1, 1] };
+        let trial = Trial { folder: &folder.path().join("forecast"), extent };
         facts.forecast = setup.bench(&args.scene, settings, |bench| {
             predict(&bench, &trial, &mut |step| eprintln!("{}, about {:.0} s left", step.name, step.left_s))
         })?;

@@ -13,7 +13,7 @@ use super::sitting::Bench;
 use super::size::{Growth, fewer, pixels, resized};
 use super::statistics::Interval;
 use super::sweep::{Extent, Listener, Sweep};
-use super::table::{Point, REFERENCE};
+use super::table::{Point, REFERENCE, Table};
 
 /// Pixels that are drawn, at most.
 const PIXELS: f64 = 96.0 * 54.0;
@@ -37,8 +37,8 @@ pub struct Prediction {
 pub struct Trial<'a> {
     /// An empty folder.
     pub folder: &'a Path,
-    /// Seconds.
-    pub budget_s: u32,
+    /// How much is drawn.
+    pub extent: Extent,
 }
 
 /// Expectations of every picture that a run of `cost` would draw and that there was time for.
@@ -52,7 +52,7 @@ pub fn predict(bench: &Bench<'_>, trial: &Trial<'_>, progress: &mut dyn FnMut(St
     let sweep = Sweep {
         bench: few,
         folder: trial.folder,
-        extent: Extent { budget_s: trial.budget_s, reference_samples: None, shard: [1, 1] },
+        extent: trial.extent.clone(),
         command: &|_| String::new(),
         scene: "",
         contents: "",
@@ -76,4 +76,69 @@ pub fn predict(bench: &Bench<'_>, trial: &Trial<'_>, progress: &mut dyn FnMut(St
         }
     };
     Ok(table.points.iter().filter(|point| point.name != REFERENCE).map(of).collect())
+}
+
+/// How right predictions were.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Score {
+    /// Pictures that were both foretold and measured, with errors that the reference tells.
+    pub pictures: usize,
+    /// Rank correlation of errors and of times (Spearman 1904), −1 to 1.
+    pub rank: [f64; 2],
+    /// Errors and times that lie in their predictions' intervals.
+    pub covered: [usize; 2],
+}
+
+/// Holds predictions against what was measured.
+#[must_use]
+pub fn score(predictions: &[Prediction], table: &Table) -> Score {
+    let pairs: Vec<(&Prediction, &Point)> = predictions
+        .iter()
+        .filter_map(|p| Some((p, table.points.iter().find(|point| point.name == p.picture)?)))
+        .filter(|(_, point)| point.error() > table.reference.resolution)
+        .collect();
+    let kinds: [fn(&(&Prediction, &Point)) -> (Interval, f64); 2] =
+        [|(p, point)| (p.error, point.error()), |(p, point)| (p.gpu_ms, point.gpu_ms.median)];
+    let rank = kinds.map(|of| {
+        let (foretold, measured): (Vec<f64>, Vec<f64>) =
+            pairs.iter().map(|pair| (of(pair).0.median, of(pair).1)).unzip();
+        correlation(&ranks(&foretold), &ranks(&measured))
+    });
+    let covered = kinds.map(|of| {
+        let inside = |pair: &&(&Prediction, &Point)| (of(pair).0.low..=of(pair).0.high).contains(&of(pair).1);
+        pairs.iter().filter(inside).count()
+    });
+    Score { pictures: pairs.len(), rank, covered }
+}
+
+/// Places in order; equal values share the mean of theirs.
+fn ranks(values: &[f64]) -> Vec<f64> {
+    let place = |x: &f64| {
+        let (less, same) = values.iter().fold((0, 0), |(l, s), v| (l + usize::from(v < x), s + usize::from(v == x)));
+        less as f64 + 0.5 * (same as f64 - 1.0)
+    };
+    values.iter().map(place).collect()
+}
+
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let (a, b) = (a.iter().copied(), b.iter().copied());
+    let deviation = |all: f64| all.sqrt().max(f64::MIN_POSITIVE);
+    let [mean_a, mean_b] = [a.clone(), b.clone()].map(|all| all.clone().sum::<f64>() / all.count().max(1) as f64);
+    let sum =
+        |of: &dyn Fn(f64, f64) -> f64| a.clone().zip(b.clone()).map(|(a, b)| of(a - mean_a, b - mean_b)).sum::<f64>();
+    sum(&|a, b| a * b) / (deviation(sum(&|a, _| a * a)) * deviation(sum(&|_, b| b * b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranks_are_those_of_order_alone() {
+        let (a, b) = ([1.0, 2.0, 3.0, 50.0], [0.1, 0.4, 0.5, 0.6]);
+        assert!((correlation(&ranks(&a), &ranks(&b)) - 1.0).abs() < 1e-12);
+        let back = [4.0, 3.0, 2.0, 1.0];
+        assert!((correlation(&ranks(&a), &ranks(&back)) + 1.0).abs() < 1e-12);
+        assert_eq!(ranks(&[5.0, 1.0, 5.0, 2.0]), [2.5, 0.0, 2.5, 1.0]);
+    }
 }

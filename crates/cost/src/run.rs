@@ -93,7 +93,7 @@ impl Run<'_> {
         }
         if shard == [1, 1] {
             let judge = Judge { truth: &truth, reference: &reference, folder };
-            found.search = search(&mut m, &judge, (&agenda, &states), &mut local, listener.step)?;
+            found.search = search(&mut m, &judge, (&agenda, states), &mut local, listener.step)?;
         } else {
             found.warnings.push("a part of a run does not search for combinations".to_owned());
             m.pace.skip(PICTURES - 1);

@@ -1,0 +1,60 @@
+//! Scores forecasts: what `etalon plan --forecast` says of scenes against what `etalon cost` then measures.
+//!
+//!     cargo run -p etalon-cost --example forecast -- study:metals study:lamps
+#![allow(clippy::print_stdout, reason = "an example shows what it does")]
+
+use etalon::frame::Settings;
+use etalon::gpu::{Device, DeviceChoice};
+use etalon::open::Opened;
+use etalon_cost::pace::Step;
+use etalon_cost::predict::{Trial, predict, score};
+use etalon_cost::sitting::Bench;
+use etalon_cost::sweep::{Extent, Listener, Sweep};
+
+/// Pixels that are measured.
+const SIZE: [u32; 2] = [320, 180];
+/// Seconds of both runs.
+const SECONDS: [u32; 2] = [60, 180];
+
+fn main() -> anyhow::Result<()> {
+    let device = Device::open(&DeviceChoice::Best, false)?;
+    for name in std::env::args().skip(1) {
+        let opened = Opened::load(&name)?;
+        let (environment, settings) = opened.lit(Settings { size: SIZE, ..Settings::default() });
+        let camera = opened.camera(SIZE)?;
+        let bench = || Bench {
+            device: &device,
+            original: &opened.original,
+            environment,
+            settings: settings.clone(),
+            camera: &camera,
+        };
+        let folder = tempfile::tempdir()?;
+        let [foretold, measured] = SECONDS.map(|budget_s| Extent { budget_s, reference_samples: None, shard: [1, 1] });
+        let trial = Trial { folder: &folder.path().join("forecast"), extent: foretold };
+        let predictions = predict(&bench(), &trial, &mut |_: Step<'_>| ())?;
+        let sweep = Sweep {
+            bench: bench(),
+            folder: &folder.path().join("cost"),
+            extent: measured,
+            command: &|_| String::new(),
+            scene: &name,
+            contents: "",
+            kept: &|_| None,
+            may_shrink: false,
+            others: &[],
+            stopped: &|| false,
+        };
+        let table = sweep.run(&mut Listener { step: &mut |_| (), early: &mut |_| Ok(()) })?;
+        println!("{name}: {:?}", score(&predictions, &table));
+        for p in &predictions {
+            let Some(point) = table.points.iter().find(|point| point.name == p.picture) else { continue };
+            let [e, t] = [(p.error, point.error()), (p.gpu_ms, point.gpu_ms.median)].map(|(foretold, measured)| {
+                let of = |x: f64| x / measured;
+                format!("{measured:.4} {:.2} ({:.2} {:.2})", of(foretold.median), of(foretold.low), of(foretold.high))
+            });
+            println!("  {}: error {e}, ms {t}", p.picture);
+        }
+    }
+    Ok(())
+}
