@@ -8,7 +8,7 @@ use std::path::Path;
 use program::{HASTY, etalon};
 use serde_json::Value;
 
-const COMMON: [&str; 6] = ["--size", "40x24", "--device", "cpu", "--reference-samples", "16"];
+const COMMON: [&str; 8] = ["--size", "40x24", "--device", "cpu", "--reference-samples", "16", "--budget", "20"];
 
 fn run(at: &Path, scene: &str, folder: &str, more: &[&str]) -> Value {
     let all = [&["cost", scene, "-o", folder], &COMMON[..], more].concat();

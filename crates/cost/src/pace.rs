@@ -144,10 +144,10 @@ impl<'a> Pace<'a> {
         }
         (self.left_out > 0).then(|| {
             format!(
-                "the budget of {:.0} s was spent before {} of {} pictures were drawn: --budget {:.0} would draw them all, about",
-                self.budget_s,
+                "{} of {} pictures were not drawn, because the budget of {:.0} s ended: --budget {:.0} would draw them all, about",
                 self.left_out,
                 self.of,
+                self.budget_s,
                 self.budget_s + 1.2 * self.left_out_s
             )
         })

@@ -16,7 +16,7 @@ use super::sweep::{Extent, Listener, Sweep};
 use super::table::{Point, REFERENCE, Table};
 
 /// Pixels that are drawn, at most.
-const PIXELS: f64 = 96.0 * 54.0;
+const PIXELS: f64 = 160.0 * 90.0;
 /// What an error scatters by beside noise, because few pixels sample edges and small things by chance (measured: docs/cost.md).
 const OTHER_PIXELS: f64 = 0.15;
 
@@ -92,22 +92,19 @@ pub struct Score {
 /// Holds predictions against what was measured.
 #[must_use]
 pub fn score(predictions: &[Prediction], table: &Table) -> Score {
+    let found = |p: &Prediction| table.points.iter().find(|point| point.name == p.picture && point.knobs == p.knobs);
     let pairs: Vec<(&Prediction, &Point)> = predictions
         .iter()
-        .filter_map(|p| Some((p, table.points.iter().find(|point| point.name == p.picture)?)))
+        .filter_map(|p| Some((p, found(p)?)))
         .filter(|(_, point)| point.error() > table.reference.resolution)
         .collect();
-    let kinds: [fn(&(&Prediction, &Point)) -> (Interval, f64); 2] =
-        [|(p, point)| (p.error, point.error()), |(p, point)| (p.gpu_ms, point.gpu_ms.median)];
-    let rank = kinds.map(|of| {
-        let (foretold, measured): (Vec<f64>, Vec<f64>) =
-            pairs.iter().map(|pair| (of(pair).0.median, of(pair).1)).unzip();
+    let errors: Vec<(Interval, f64)> = pairs.iter().map(|(p, point)| (p.error, point.error())).collect();
+    let times: Vec<(Interval, f64)> = pairs.iter().map(|(p, point)| (p.gpu_ms, point.gpu_ms.median)).collect();
+    let rank = [&errors, &times].map(|all| {
+        let (foretold, measured): (Vec<f64>, Vec<f64>) = all.iter().map(|(p, found)| (p.median, found)).unzip();
         correlation(&ranks(&foretold), &ranks(&measured))
     });
-    let covered = kinds.map(|of| {
-        let inside = |pair: &&(&Prediction, &Point)| (of(pair).0.low..=of(pair).0.high).contains(&of(pair).1);
-        pairs.iter().filter(inside).count()
-    });
+    let covered = [&errors, &times].map(|all| all.iter().filter(|(p, found)| (p.low..=p.high).contains(found)).count());
     Score { pictures: pairs.len(), rank, covered }
 }
 

@@ -8,6 +8,7 @@ use super::difference::{in_squares, told};
 use super::sitting::Taken;
 use super::statistics::{Estimate, Interval, mean, pooled, standard_errors};
 use super::table::{Family, INVISIBLE, Price};
+use etalon::image::Picture;
 use etalon::image::metric::{AnyPicture, Metric, compare};
 
 /// Times of one program on the same rungs differ by so much between two places in memory: less is no difference of the rungs.
@@ -26,6 +27,17 @@ pub struct Pair {
     pub squares: Vec<(u32, Estimate)>,
     /// Of a knob that changes chance alone: relative mean squared error by chance over that of the base.
     pub noise_ratio: Option<f64>,
+    /// Of a knob that changes rounding alone, where no chance is in the pictures: mean radiance over that of the base.
+    #[serde(default)]
+    pub brightness: Option<f64>,
+}
+
+/// Mean radiance differs by so much at most where rounding alone does (measured: docs/cost.md).
+const BY_ROUNDING: f64 = 2e-5;
+
+/// Radiance of all pixels and channels.
+fn sum(film: &Picture) -> f64 {
+    film.rgba.iter().map(|p| p[..3].iter().copied().map(f64::from).sum::<f64>()).sum()
 }
 
 impl Pair {
@@ -47,6 +59,8 @@ impl Pair {
                 (true, Some(noise), Some(before)) if before > 0.0 => Some(noise / before),
                 _ => None,
             },
+            brightness: (change.knob == "arithmetic" && taken.halves.is_none())
+                .then(|| sum(&taken.film) / sum(&base.film)),
         })
     }
 }
@@ -128,6 +142,7 @@ pub fn price(
         time_told: clock.tells(ms, others_ms, statements),
         squares,
         noise_ratio: pair.noise_ratio,
+        brightness: pair.brightness,
         same: pair.same,
         called_for: true,
         verdict: String::new(),
@@ -184,6 +199,13 @@ fn verdict(price: &Price) -> String {
         format!("no error beyond noise (FLIP {flip:.3} between both)")
     };
     let nearer = price.base != Family::Exact && price.error_told && error.median < 0.0;
+    let seen = match price.brightness {
+        Some(ratio) if (ratio - 1.0).abs() > BY_ROUNDING => format!(
+            "{seen}; the mean brightness changes by {:+.4} %, which rounding alone does not do: one of both is wrong here",
+            100.0 * (ratio - 1.0)
+        ),
+        _ => seen,
+    };
     let better = price.noise_ratio.is_some_and(|ratio| ratio < 1.0) || nearer;
     if longer && !better && !price.is_seen() {
         return format!("{time}; {seen}: wasted here");
@@ -194,6 +216,21 @@ fn verdict(price: &Price) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_rounding_does_not_do_is_named() {
+        let change = Change { knob: "arithmetic".to_owned(), from: "compensated".to_owned(), to: "fast".to_owned() };
+        let said = |brightness: f64| {
+            let brightness = Some(brightness);
+            let pair = Pair { flip: 0.0001, same: false, squares: Vec::new(), noise_ratio: None, brightness };
+            let turns = Turns { ms: &[10.0], others_ms: &[10.0], clock: Clock { deviation: 0.01, freedom: 9.0 } };
+            price(&change, &pair, Some(Estimate::default()), turns, 100, 4.0).verdict
+        };
+        // π off by a thousandth in the lobe of a tier: study:lamps and study:materials at 160x90.
+        assert!(said(0.999_947_5).contains("one of both is wrong here") && said(0.999_962_4).contains("wrong here"));
+        // The tiers as they are, there and in study:metals.
+        assert!(![1.0, 1.000_000_9, 1.000_007_3].iter().any(|&same| said(same).contains("wrong here")));
+    }
 
     #[test]
     fn times_that_differ_by_chance_are_not_told() {

@@ -24,7 +24,7 @@ use etalon::image::{Aov, AovData, Picture, exr, file, png, tone};
 use etalon::plan::Knobs;
 
 /// Bands of wavelengths that a reference may have, and samples that it has at least before it has more bands.
-const BANDS: [u32; 3] = [32, 16, 8];
+pub(super) const BANDS: [u32; 3] = [32, 16, 8];
 const FEWEST_SAMPLES: u32 = 16;
 /// Samples of a pilot.
 const PILOT: u32 = 4;
@@ -224,18 +224,10 @@ impl Pilot {
         let each_ms = |bands: u32| more * seen.each_ms * f64::from(bands) / 8.0;
         let affordable = |bands: &u32| samples_within(each_ms(*bands), share * budget_ms) >= FEWEST_SAMPLES;
         let bands = BANDS.into_iter().find(affordable).unwrap_or(8);
-        let mut warnings = Vec::new();
-        if bands < BANDS[0] {
-            warnings.push(format!(
-                "the reference has {bands} bands of wavelengths: {} would have left fewer than {FEWEST_SAMPLES} samples of each pixel; \
-                 give it a larger --budget",
-                BANDS[0]
-            ));
-        }
         // Each band has random numbers of its own.
         let wanted = (wanted(&seen) * 8).div_ceil(bands).max(FEWEST_SAMPLES);
         let knobs = rungs(&format!("spectral:{bands}"))?;
-        Ok(Self { size, knobs, each_ms: each_ms(bands), plain_ms, wanted, warnings })
+        Ok(Self { size, knobs, each_ms: each_ms(bands), plain_ms, wanted, warnings: Vec::new() })
     }
 }
 

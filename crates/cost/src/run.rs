@@ -13,9 +13,9 @@ use super::judge::{Judge, Judged};
 use super::measure::Measuring;
 use super::orders;
 use super::pace::{Pace, Step};
-use super::reference::{NotMeasured, Pilot, Refined, refine, samples_within};
+use super::reference::{BANDS, NotMeasured, Pilot, Refined, refine, samples_within};
 use super::search::{PICTURES, search, without_waste};
-use super::sitting::{Bench, ENOUGH_MS, enough_ms};
+use super::sitting::{Bench, enough_ms};
 use super::size::Growth;
 use super::statistics::Interval;
 use super::sweep::{Extent, Listener, REFERENCE_SHARE, Sweep};
@@ -66,7 +66,7 @@ impl Run<'_> {
         let (bench, pilot) = (&self.bench, &self.pilot);
         let (records, warnings) = (Vec::new(), Vec::new());
         let (folder, command) = (self.sweep.folder, self.command);
-        let enough_ms = if ends { enough_ms(budget_s) } else { ENOUGH_MS };
+        let enough_ms = enough_ms(budget_s);
         let mut m = Measuring { bench, folder, command, shard, enough_ms, pace, records, warnings };
         let mut found = Found::default();
 
@@ -127,7 +127,11 @@ impl Run<'_> {
             found.search.extend(tried);
         }
         if agenda.plain.colour != rungs.colour {
-            found.warnings.push("knobs other than colour are priced in three colours".to_owned());
+            found.warnings.push(format!(
+                "the reference has {} bands of wavelengths, of {} at most; knobs other than colour are priced in three colours",
+                rungs.colour.bands(),
+                BANDS[0]
+            ));
         }
         let judge = Judge { truth: &truth, reference: &reference, folder };
         let other = |(name, picture): &(String, AnyPicture)| judge.other(name, picture, &bench.settings);
@@ -308,20 +312,21 @@ impl Run<'_> {
     ) -> Table {
         let mut warnings = Vec::new();
         if self.bench.device.info().kind == "cpu" {
-            warnings.push("a software device: times are those of this processor and of what else it does".to_owned());
+            warnings
+                .push("a software device: GPU times are those of this processor, and of what else it does".to_owned());
         }
         if self.is_smaller() {
             let ([w, h], [x, y]) = (self.sweep.bench.settings.size, self.bench.settings.size);
             warnings.push(format!(
-                "the budget has no time for pictures of {w}x{h}: errors and times are those of {x}x{y}, and those of the recommended \
-                 settings are told of both; a larger --budget measures {w}x{h}"
+                "the budget has no time for pictures of {w}x{h}: all is measured at {x}x{y}, and only the recommended settings are timed \
+                 at {w}x{h} too; a larger --budget measures all of it there"
             ));
         }
         warnings.extend(found.warnings.iter().chain(&m.warnings).cloned());
         if !reference.converged {
             warnings.push(format!(
-                "the reference resolves errors of {:.2} % of the range, after {} samples, not of {:.1} %: smaller ones are not told; a \
-                 second run goes on with it",
+                "the reference's noise hides differences below {:.2} % of the range after {} samples; the aim is {:.1} %: a second run \
+                 goes on with it",
                 100.0 * reference.resolution,
                 reference.samples,
                 100.0 * RESOLVED

@@ -313,6 +313,9 @@ pub struct Price {
     /// Of a knob that changes chance alone: its relative mean squared error by chance over that of the base.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_ratio: Option<f64>,
+    /// Of a knob that changes rounding alone: mean radiance over the base's, where no chance is in both.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub brightness: Option<f64>,
     /// Whether the pictures are the same to the last bit.
     pub same: bool,
     /// Whether the scene calls for the knob.

@@ -47,9 +47,9 @@ pub(super) fn lead(table: &Table) -> Markup {
     let seen = table.prices.iter().any(|price| !price.same && price.flip_between >= crate::table::INVISIBLE);
     html! {
         "Use " b { (title(point)) } ": a picture takes " (takes(table, point)) " on this device, with an " (words::link("error", "error"))
-        " of " (percent(point.error())) "."
+        " of " (percent(point.error())) " of the range from black to white."
         @if !table.reference.converged {
-            " The " (words::link("reference", "reference")) " is noisy: errors below " (percent(table.reference.resolution)) " are not told."
+            " The " (words::link("reference", "reference")) " still has noise: what differs by less than " (percent(table.reference.resolution)) " cannot be told apart."
         }
         @if !seen { " No knob changes this picture visibly." }
     }
@@ -64,11 +64,11 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
             let picture = embedded(&folder.join(format!("{}.png", point.picture)))?;
             Ok(html! {
                 article.setting {
-                    h3 { (settings.join(", ")) ": " (title(point)) }
+                    h3 { (settings.join(" and ")) ": " (title(point)) }
                     img src=(picture) width=(size(table)[0]) height=(size(table)[1]) alt={ "Picture of the setting " (title(point)) };
                     table.facts { tbody {
-                        tr { th scope="row" { "time" } td { b { (takes(table, point)) } @if table.asked.is_some() { ", " (time(point.gpu_ms.median)) " as shown" } } }
-                        tr { th scope="row" { "error" } td { @if point.name == REFERENCE { "below " b { (percent(point.error())) } } @else { (error(point)) } } }
+                        tr { th scope="row" { "time" } td { b { (takes(table, point)) } @if table.asked.is_some() { ", " (time(point.gpu_ms.median)) " at " (table.size[0]) "×" (table.size[1]) } } }
+                        tr { th scope="row" { "error" } td { @if point.name == REFERENCE { "its own noise, below " b { (percent(point.error())) } "; other errors are told against it" } @else { (error(point)) } } }
                         tr { th scope="row" { "given up" } td { (given_up(table, point)) } }
                     } }
                     p.command { code { (command.replace(" --repeat 3", "")) } button.copy type="button" { "copy" } }
@@ -84,14 +84,23 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
     })
 }
 
-/// What a point gives up, the most telling first and the rest in one number.
+/// What a point gives up, the most telling first and the rest in one number; each with what its knob approximates.
 fn given_up(table: &Table, point: &Point) -> Markup {
     let all = table.given_up(point);
     let list: Vec<&str> = all.split(", ").collect();
     let [first, rest] = [&list[..list.len().min(4)], &list[list.len().min(4)..]];
+    let about = |choice: &str| {
+        let name = choice.split('=').next().unwrap_or_default();
+        table.knobs.iter().find(|knob| knob.knob == name).map_or("", |knob| knob.about.as_str())
+    };
+    let choices = |list: &[&str]| {
+        html! {
+            @for (i, choice) in list.iter().enumerate() { @if i > 0 { ", " } span title=(about(choice)) { (choice) } }
+        }
+    };
     html! {
-        (first.join(", "))
-        @if !rest.is_empty() { details.more { summary { "and " (rest.len()) " more" } (rest.join(", ")) } }
+        (choices(first))
+        @if !rest.is_empty() { details.more { summary { "and " (rest.len()) " more" } (choices(rest)) } }
     }
 }
 
@@ -104,21 +113,21 @@ pub(super) fn trust(table: &Table) -> Markup {
             h2 { "How far to trust it" }
             p.verdict.good[r.converged].poor[!r.converged] {
                 @if r.converged {
-                    "The " (words::link("reference", "reference")) " has converged: errors of " (percent(r.resolution)) " and more are told."
+                    "The " (words::link("reference", "reference")) " has converged: differences of " (percent(r.resolution)) " and more are found."
                 } @else {
-                    "The " (words::link("reference", "reference")) " has not converged. Errors below " (percent(r.resolution)) " are not told; the aim is "
+                    "The " (words::link("reference", "reference")) " still has noise, which hides differences below " (percent(r.resolution)) "; the aim is "
                     (plain(100.0 * RESOLVED)) " %. Run the same command again: it goes on with this reference."
                 }
-                " A difference is called one where it is " (digits(table.standard_errors)) " standard errors from none, so that noise makes any one of this page's "
-                "statements wrong in at most 1 of 100 runs. Where that cannot be said, the page says that it cannot."
+                " What noise may have made is not called a difference: the page then says that it cannot tell. All of its statements together "
+                "are wrong by noise in at most 1 of 100 runs (each is " (digits(table.standard_errors)) " standard errors from zero)."
             }
             table.facts { tbody {
                 tr { th scope="row" { "scene" } td { (table.scene) ", " (table.size[0]) "×" (table.size[1]) } }
                 tr { th scope="row" { "device" } td { (table.device.name) " (" (table.device.kind) "), " (table.device.driver) " " (table.device.version) } }
                 tr { th scope="row" { "reference" } td {
-                    (r.samples) " samples of each pixel" (rounds) ", " (time(r.gpu_ms)) " of GPU time; " (words::link("flip", "FLIP")) " of its own noise " (digits(r.own_flip))
+                    (r.samples) " samples of each pixel" (rounds) ", " (time(r.gpu_ms)) " of GPU time; its noise is " (digits(r.own_flip)) " in " (words::link("flip", "FLIP"))
                 } }
-                tr { th scope="row" { "made by" } td { code { (r.command) } } }
+                tr { th scope="row" { (if r.rounds.len() > 1 { "the first of them" } else { "made by" }) } td { code { (r.command) } } }
             } }
             @if !table.warnings.is_empty() {
                 ul.warnings { @for warning in &table.warnings { li { (warning) } } }
@@ -137,7 +146,7 @@ pub(super) fn slider(table: &Table, folder: &Path) -> Result<Markup> {
             h2 { "Beside the reference" }
             @if !all.is_empty() {
                 p { label { "On the left " select #left {
-                    @for (settings, point) in &all { option value=(format!("pictures/{}.png", point.picture)) { (settings.join(", ")) ": " (title(point)) } }
+                    @for (settings, point) in &all { option value=(format!("pictures/{}.png", point.picture)) { (settings.join(" and ")) ": " (title(point)) } }
                     @for point in table.points.iter().filter(|point| point.picture != "reference" && all.iter().all(|(_, known)| known.name != point.name)) {
                         option value=(format!("pictures/{}.png", point.picture)) { (title(point)) }
                     }

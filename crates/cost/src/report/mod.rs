@@ -148,8 +148,8 @@ pub fn page(table: &Table, folder: &Path) -> Result<String> {
                         p {
                             "Each point is a picture. GPU time goes across and "
                             (words::link("error", "error")) " up, both logarithmic. The line joins the "
-                            (words::link("frontier", "frontier")) ". Nothing is told below the broken line, which is what the "
-                            (words::link("reference", "reference")) " resolves. Point at a point, or step through them with Tab."
+                            (words::link("frontier", "frontier")) ". Below the broken line nothing can be told: that is the noise of the "
+                            (words::link("reference", "reference")) ". Point at a point, or step through them with Tab."
                         }
                         div.chart-and-card {
                             (chart::errors(table))

@@ -17,7 +17,7 @@ const WORDS: [(&str, &str, &str); 9] = [
     (
         "reference",
         "reference",
-        "The scene drawn along paths with every knob on the rung that approximates least, and as many samples as there was time for. What it resolves is the least error that can be told from none.",
+        "The scene drawn along paths with every knob on the rung that approximates least, and as many samples as there was time for. Its own noise hides differences that are smaller than a number which the page gives.",
     ),
     (
         "frontier",
