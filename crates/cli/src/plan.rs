@@ -18,7 +18,7 @@ use etalon::scene::Camera;
 use etalon::scene::normal_form::normalise;
 use etalon::transport::sight::{Sight, along_lines};
 use etalon_cost::explain::Price;
-use etalon_cost::predict::{Prediction, Trial, predict};
+use etalon_cost::predict::{PIXELS, Prediction, Trial, predict};
 use etalon_cost::sweep::Extent;
 
 /// Say what a scene calls for, with reasons, and what drawing it takes
@@ -144,7 +144,7 @@ fn on_device(
     if let Some((setup, settings)) = forecast {
         let folder = tempfile::tempdir().context("making a folder")?;
         let extent = Extent { budget_s: FORECAST_S, reference_samples: None, shard: [1, 1] };
-        let trial = Trial { folder: &folder.path().join("forecast"), extent };
+        let trial = Trial { folder: &folder.path().join("forecast"), extent, pixels: PIXELS };
         facts.forecast = setup.bench(&args.scene, settings, |bench| {
             predict(&bench, &trial, &mut |step| eprintln!("{}, about {:.0} s left", step.name, step.left_s))
         })?;

@@ -7,7 +7,7 @@ use etalon::frame::Settings;
 use etalon::gpu::{Device, DeviceChoice};
 use etalon::open::Opened;
 use etalon_cost::pace::Step;
-use etalon_cost::predict::{Trial, predict, score};
+use etalon_cost::predict::{PIXELS, Trial, predict, score};
 use etalon_cost::sitting::Bench;
 use etalon_cost::sweep::{Extent, Listener, Sweep};
 
@@ -31,7 +31,7 @@ fn main() -> anyhow::Result<()> {
         };
         let folder = tempfile::tempdir()?;
         let [foretold, measured] = SECONDS.map(|budget_s| Extent { budget_s, reference_samples: None, shard: [1, 1] });
-        let trial = Trial { folder: &folder.path().join("forecast"), extent: foretold };
+        let trial = Trial { folder: &folder.path().join("forecast"), extent: foretold, pixels: PIXELS };
         let predictions = predict(&bench(), &trial, &mut |_: Step<'_>| ())?;
         let sweep = Sweep {
             bench: bench(),

@@ -15,8 +15,8 @@ use super::statistics::Interval;
 use super::sweep::{Extent, Listener, Sweep};
 use super::table::{Point, REFERENCE, Table};
 
-/// Pixels that are drawn, at most.
-const PIXELS: f64 = 160.0 * 90.0;
+/// Pixels that are drawn, at most, unless something else is asked for.
+pub const PIXELS: f64 = 160.0 * 90.0;
 /// What an error scatters by beside noise, because few pixels sample edges and small things by chance (measured: docs/cost.md).
 const OTHER_PIXELS: f64 = 0.15;
 
@@ -39,6 +39,8 @@ pub struct Trial<'a> {
     pub folder: &'a Path,
     /// How much is drawn.
     pub extent: Extent,
+    /// Of so many pixels at most.
+    pub pixels: f64,
 }
 
 /// Expectations of every picture that a run of `cost` would draw and that there was time for.
@@ -47,7 +49,7 @@ pub struct Trial<'a> {
 /// When something cannot be drawn or written.
 pub fn predict(bench: &Bench<'_>, trial: &Trial<'_>, progress: &mut dyn FnMut(Step<'_>)) -> Result<Vec<Prediction>> {
     let size = bench.settings.size;
-    let few = resized(bench, fewer(size, (pixels(size) / PIXELS).max(1.0)));
+    let few = resized(bench, fewer(size, (pixels(size) / trial.pixels).max(1.0)));
     let growth = Growth::of(&few, size)?;
     let sweep = Sweep {
         bench: few,

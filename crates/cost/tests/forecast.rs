@@ -8,8 +8,8 @@ use etalon_cost::sitting::Bench;
 use etalon_cost::sweep::{Extent, Listener, Sweep};
 use etalon_testing::gpu::Gpu;
 
-/// Four times the pixels of a forecast.
-const SIZE: [u32; 2] = [320, 180];
+const SIZE: [u32; 2] = [128, 72];
+const PIXELS: f64 = 64.0 * 36.0;
 
 /// Errors come from few pixels and are those of many; times are only counted, for no test judges a machine's pace.
 #[test]
@@ -26,8 +26,8 @@ fn errors_of_few_pixels_are_those_of_many() {
         camera: &camera,
     };
     let folder = tempfile::tempdir().expect("a folder");
-    let extent = Extent { budget_s: 10, reference_samples: Some(64), shard: [1, 1] };
-    let trial = Trial { folder: &folder.path().join("forecast"), extent: extent.clone() };
+    let extent = Extent { budget_s: 10, reference_samples: Some(16), shard: [1, 1] };
+    let trial = Trial { folder: &folder.path().join("forecast"), extent: extent.clone(), pixels: PIXELS };
     let predictions = predict(&bench(), &trial, &mut |_: Step<'_>| ()).expect("a forecast");
     let sweep = Sweep {
         bench: bench(),
