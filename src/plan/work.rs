@@ -167,6 +167,17 @@ impl Plan {
         self.rays.map_or_else(March::default, |rays| rays.march)
     }
 
+    /// The effects that are drawn.
+    pub fn kept(&self) -> impl Iterator<Item = EffectId> {
+        self.effects.iter().filter(|effect| effect.state == EffectState::Kept).map(|effect| effect.id)
+    }
+
+    /// Whether an effect is drawn. What a constant of the shaders turns on needs no member of its own here.
+    #[must_use]
+    pub fn keeps(&self, id: EffectId) -> bool {
+        self.kept().any(|kept| kept == id)
+    }
+
     /// Whether the same is done for both, whatever their reasons.
     #[must_use]
     pub fn draws_as(&self, other: &Self) -> bool {

@@ -140,7 +140,8 @@ impl States {
                 }
                 // What the plan does not tell apart is told apart by constants.
                 let by_constants = ["fresnel", "brdf", "arithmetic", "upsampling", "lights", "absorption"];
-                if !by_constants.contains(&knob.name) && bench.plan(&knobs).is_ok_and(|other| other.draws_as(&plan)) {
+                let same = |other: Plan| other.draws_as(&plan) && other.kept().eq(plan.kept());
+                if !by_constants.contains(&knob.name) && bench.plan(&knobs).is_ok_and(same) {
                     continue;
                 }
                 all.push(changed(family, knob, from, to, knobs));
