@@ -1,4 +1,4 @@
-//! A run of `etalon cost`: what is asked for, its folder, how many pixels it measures, and joining its parts ([`Run`] measures).
+//! A run of `etalon cost`: what is asked for, its folder, how many pixels it measures, and joining its parts (`run.rs` measures).
 
 use std::path::{Path, PathBuf};
 
