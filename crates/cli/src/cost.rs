@@ -206,6 +206,20 @@ fn beside(args: &CostArgs, folders: [&PathBuf; 2]) -> Result<ExitCode> {
         ))?;
     }
     print(&table.to_string())?;
+    // Of the picture that took longest: the whole list is in the JSON.
+    let longest = rows.iter().filter(|row| !row.compiled.is_empty()).max_by(|x, y| x.gpu_ms[0].total_cmp(&y.gpu_ms[0]));
+    if let Some(row) = longest {
+        print(&format!("\nWhat the compilers made of \"{}\", in their own words:", row.picture))?;
+        for program in &row.compiled {
+            for (name, stages) in ["A", "B"].iter().zip(&program.stages) {
+                for stage in stages {
+                    let figures: Vec<String> =
+                        stage.figures.iter().map(|(what, value)| format!("{what} {value}")).collect();
+                    print(&format!("{name} {} ({}): {}", program.program, stage.stage, figures.join(", ")))?;
+                }
+            }
+        }
+    }
     Ok(ExitCode::SUCCESS)
 }
 

@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use etalon::frame::{NotFinite, Rendered, Work};
-use etalon::gpu::{Created, Device, DeviceInfo, Message, Program, Severity};
+use etalon::gpu::{Compiled, Created, Device, DeviceInfo, Message, Program, Severity};
 use etalon::image::Statistics;
 use etalon::image::halves::{SampleError, slope};
 use etalon::plan::{Effect, Knobs, Plan};
@@ -184,6 +184,9 @@ pub struct PipelineFact {
     pub constants: BTreeMap<&'static str, Value>,
     /// SPIR-V that the driver is given for these constants.
     pub spirv_bytes: usize,
+    /// What the driver's compiler made of it, where it tells.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub compiled: Vec<Compiled>,
 }
 
 impl PlanFacts {
@@ -222,6 +225,8 @@ impl PlanFacts {
                 .map(|(program, constants)| PipelineFact {
                     name: program.name,
                     spirv_bytes: program.spirv_bytes(&constants),
+                    // What it does not tell is no reason to lose a report.
+                    compiled: device.compiled(program, &constants).unwrap_or_default(),
                     constants: named(program, &constants),
                 })
                 .collect(),

@@ -4,12 +4,21 @@
 //! cargo run -p etalon-cost --example contradictions -- A/cost.json B/cost.json …
 //! ```
 //!
-//! of each pair of files the first is judged. Counted are signs of errors and of times, what is said to be wasted, steps of the
-//! frontier, and how many intervals of errors cover what the second run found.
+//! of each pair of files the first is judged. Counted are signs of errors and of times, what is said to be wasted, steps of the frontier,
+//! and how many intervals of errors cover what the second run found.
+//!
+//! Of two folders the pictures of the first are judged by the reference of the second, which `--reference-samples N --seed S
+//! --shard 2/1000` draws alone; maps of errors in the first folder become those against it. Times, and prices from the reference's
+//! rungs, are not compared then.
 
 #![expect(clippy::print_stdout, reason = "a program that prints what it finds")]
 
+use std::path::Path;
+
 use anyhow::{Context as _, Result, ensure};
+use etalon::frame::Settings;
+use etalon_cost::judge::{Judge, Record};
+use etalon_cost::reference::Refined;
 use etalon_cost::table::{Family, Point, Price, REFERENCE, Table};
 
 #[derive(Default)]
@@ -37,9 +46,13 @@ fn price<'a>(table: &'a Table, name: &str) -> Option<&'a Price> {
     table.prices.iter().find(|price| price.point == name)
 }
 
-fn compare(a: &Table, b: &Table, count: &mut Count) {
+/// `measured`: whether the second has pictures of its own.
+fn compare(a: &Table, b: &Table, measured: bool, count: &mut Count) {
     for now in &a.prices {
         let Some(truth) = price(b, &now.point) else { continue };
+        if !measured && now.base != Family::Local {
+            continue;
+        }
         let told = |x: &Price| if x.error_told { x.shown_delta.median.signum() } else { 0.0 };
         if now.error_told {
             // What nobody else can tell is not contradicted; the other sign is, or an interval that leaves no room for this one.
@@ -49,7 +62,7 @@ fn compare(a: &Table, b: &Table, count: &mut Count) {
             };
             count.say(!rules_out, || format!("{}: {} / {}", now.point, now.verdict, truth.verdict));
         }
-        if now.time_told {
+        if now.time_told && measured {
             let rules_out = truth.time_told && truth.share * now.share < 0.0;
             count.say(!rules_out, || format!("{}: {:+.3} of the time / {:+.3}", now.point, now.share, truth.share));
         }
@@ -65,6 +78,9 @@ fn compare(a: &Table, b: &Table, count: &mut Count) {
         if quick.knobs == pair[0].knobs && slow.knobs == pair[1].knobs {
             let says = || format!("{} before {}: error {} / {}", quick.name, slow.name, quick.error(), slow.error());
             count.say(quick.error() > slow.error(), says);
+            if !measured {
+                continue;
+            }
             let says =
                 || format!("{} before {}: {} ms / {} ms", quick.name, slow.name, quick.gpu_ms.low, slow.gpu_ms.high);
             count.say(quick.gpu_ms.low < slow.gpu_ms.high, says);
@@ -80,16 +96,37 @@ fn compare(a: &Table, b: &Table, count: &mut Count) {
 
 fn main() -> Result<()> {
     let paths: Vec<String> = std::env::args().skip(1).collect();
-    ensure!(!paths.is_empty() && paths.len().is_multiple_of(2), "expected pairs of cost.json");
-    let read = |path: &String| -> Result<Table> {
-        let text = std::fs::read(path).with_context(|| format!("reading {path}"))?;
-        serde_json::from_slice(&text).with_context(|| format!("reading {path}"))
+    ensure!(!paths.is_empty() && paths.len().is_multiple_of(2), "expected pairs of cost.json, or of folders");
+    let read = |path: &Path| -> Result<Table> {
+        let text = std::fs::read(path).with_context(|| format!("reading {}", path.display()))?;
+        serde_json::from_slice(&text).with_context(|| format!("reading {}", path.display()))
+    };
+    let rejudged = |a: &Path, b: &Path| -> Result<Table> {
+        let table = read(&a.join("cost.json"))?;
+        let (refined, reference) = Refined::read(b)?.with_context(|| format!("{} has no reference", b.display()))?;
+        ensure!(refined.size() == table.size, "{} and {} have different sizes", a.display(), b.display());
+        let truth = refined.truth(&Settings { size: table.size, ..Settings::default() });
+        let record = |point: &Point| -> Result<Record> {
+            let path = a.join("points").join(format!("{}.json", point.picture));
+            let text = std::fs::read(&path).with_context(|| format!("reading {}", path.display()))?;
+            serde_json::from_slice(&text).with_context(|| format!("reading {}", path.display()))
+        };
+        let drawn = table.points.iter().filter(|point| point.name != REFERENCE);
+        let records = drawn.map(record).collect::<Result<Vec<_>>>()?;
+        let judge = Judge { truth: &truth, reference: &reference, folder: a };
+        let judged = judge.judge(&records)?;
+        Ok(Table { points: judged.points, prices: judged.prices, frontier: judged.frontier, reference, ..table })
     };
     let mut all = Count::default();
     for pair in paths.chunks(2) {
-        let (a, b) = (read(&pair[0])?, read(&pair[1])?);
+        let (a, b) = (Path::new(&pair[0]), Path::new(&pair[1]));
+        let measured = a.is_file();
+        let (a, b) = match measured {
+            true => (read(a)?, read(b)?),
+            false => (read(&a.join("cost.json"))?, rejudged(a, b)?),
+        };
         let before = (all.statements, all.wrong.len(), all.intervals, all.covered);
-        compare(&a, &b, &mut all);
+        compare(&a, &b, measured, &mut all);
         println!(
             "{}: {} statements, {} contradicted; {} of {} intervals cover; resolution {:.4} / {:.4}",
             a.scene,

@@ -1,8 +1,11 @@
 //! Two tables of one scene laid side by side: what took how long on each device, with which error and which work.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use serde::Serialize;
 
 use super::table::{Point, Table};
+use etalon::gpu::Compiled;
 
 /// A picture that both tables have.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -17,6 +20,30 @@ pub struct Beside {
     pub same_work: bool,
     /// Those that are not, as shares of the first.
     pub other_work: Vec<String>,
+    /// What each driver's compiler made of the programs, where one of both tells.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub compiled: Vec<CompiledBeside>,
+}
+
+/// What two compilers made of a program.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CompiledBeside {
+    /// Its name.
+    pub program: String,
+    /// Of each; empty where the driver does not tell.
+    pub stages: [Vec<Compiled>; 2],
+}
+
+impl CompiledBeside {
+    fn of(a: &BTreeMap<String, Vec<Compiled>>, b: &BTreeMap<String, Vec<Compiled>>) -> Vec<Self> {
+        let programs: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+        let of =
+            |table: &BTreeMap<String, Vec<Compiled>>, program: &String| table.get(program).cloned().unwrap_or_default();
+        programs
+            .into_iter()
+            .map(|program| Self { program: program.clone(), stages: [of(a, program), of(b, program)] })
+            .collect()
+    }
 }
 
 impl Beside {
@@ -37,6 +64,7 @@ impl Beside {
                 error: [point.error(), other.error()],
                 same_work: other_work.is_empty(),
                 other_work,
+                compiled: CompiledBeside::of(&point.compiled, &other.compiled),
             })
         };
         a.points.iter().filter_map(pair).collect()

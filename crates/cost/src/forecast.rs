@@ -6,7 +6,7 @@ use super::sitting::turns;
 use etalon::plan::Knobs;
 use etalon::plan::rungs::{Indirect, Reflection, Refraction, Shadows};
 
-/// Seconds for what is done once for each picture, before anything is known: uploading, compiling, comparing, writing.
+/// Seconds for what is done once for each picture, at least: uploading, compiling, comparing, writing.
 const ONCE_S: f64 = 0.4;
 
 /// What is still to be drawn.
@@ -16,6 +16,8 @@ pub struct Forecast {
     pub path_ms: f64,
     /// Of a sample of the preset `local`.
     pub raster_ms: f64,
+    /// Seconds that uploading and compiling the preset `local` took.
+    pub start_s: f64,
     /// Pictures are timed again until they took so long.
     pub enough_ms: f64,
     /// Seconds of each picture to come, in order.
@@ -24,11 +26,13 @@ pub struct Forecast {
     was: [f64; 2],
 }
 
+fn by_rays(knobs: &Knobs) -> bool {
+    knobs.shadows == Shadows::Ray || knobs.reflection == Reflection::Ray || knobs.refraction == Refraction::Ray
+}
+
 impl Forecast {
     fn picture_ms(&self, knobs: &Knobs) -> f64 {
-        let rays =
-            knobs.shadows == Shadows::Ray || knobs.reflection == Reflection::Ray || knobs.refraction == Refraction::Ray;
-        let sample = match (knobs.indirect, rays) {
+        let sample = match (knobs.indirect, by_rays(knobs)) {
             (Indirect::Path, _) => self.path_ms,
             (_, true) => 2.0 * self.raster_ms,
             (_, false) => self.raster_ms,
@@ -41,7 +45,9 @@ impl Forecast {
         let ms = self.picture_ms(knobs);
         let warm = ms * 2.0_f64.min(f64::from(knobs.samples.count())) / f64::from(knobs.samples.count());
         let all = warm + turns(ms, self.enough_ms) as f64 * (ms + self.picture_ms(base));
-        self.coming.push_back(ONCE_S + all / 1e3);
+        // Rungs are programs of their own, and those that send rays are longer ones.
+        let programs = if by_rays(knobs) { 2.0 } else { 1.0 };
+        self.coming.push_back(ONCE_S.max(programs * self.start_s) + all / 1e3);
     }
 
     /// The next one begins: its expected seconds. It, and what comes after it, are `left`.

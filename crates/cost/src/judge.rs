@@ -16,6 +16,7 @@ use super::reference::display_of;
 use super::statistics::{Interval, MANY, standard_errors};
 use super::table::{Errors, Family, Other, Point, Price, REFERENCE, Recommended, Reference, WorstPixel};
 use etalon::frame::Settings;
+use etalon::gpu::Compiled;
 use etalon::image::metric::{AnyPicture, Comparison, map_rgba};
 use etalon::image::png::{Display, read_display};
 use etalon::image::{Picture, exr, file, png};
@@ -52,6 +53,9 @@ pub struct Record {
     pub noise: Option<f64>,
     /// Counts that are the same on every machine.
     pub work: BTreeMap<String, u64>,
+    /// What the driver's compiler made of each program, where it tells.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub compiled: BTreeMap<String, Vec<Compiled>>,
     /// Draws it again.
     pub command: String,
     /// Hash of the picture's file.
@@ -174,6 +178,7 @@ impl Judge<'_> {
             timed: record.ms.len(),
             start_ms: record.start_ms,
             passes: record.passes.clone(),
+            compiled: record.compiled.clone(),
             errors,
             noise: record.noise,
             work: record.work.clone(),
@@ -254,7 +259,9 @@ fn even_out(records: &[Record]) -> Vec<Interval> {
         let in_turns = || records.iter().filter(move |r| of_exact(r) == exact && !r.others_ms.is_empty());
         let all: Vec<f64> = in_turns().flat_map(|r| r.others_ms.iter().copied()).collect();
         let medians: Vec<f64> = in_turns().map(|r| Interval::of(&r.others_ms).median).collect();
-        (!all.is_empty()).then(|| Interval { median: Interval::of(&medians).median, ..Interval::of(&all) })
+        // A device without timestamps tells 0 of every picture, which is no base.
+        let timed = all.iter().all(|&ms| ms > 0.0);
+        (!all.is_empty() && timed).then(|| Interval { median: Interval::of(&medians).median, ..Interval::of(&all) })
     });
     let of = |record: &Record| {
         let base = bases[usize::from(of_exact(record))];
@@ -290,6 +297,7 @@ fn the_reference(reference: &Reference, wandered: Option<Interval>) -> Point {
         timed: 1,
         start_ms: 0.0,
         passes: Vec::new(),
+        compiled: BTreeMap::new(),
         errors: Errors {
             error: Interval { median: reference.resolution, low: 0.0, high: reference.resolution },
             flip_mean: reference.own_flip,

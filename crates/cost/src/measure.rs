@@ -137,6 +137,7 @@ impl Measuring<'_> {
             passes: taken.passes.clone(),
             noise: taken.noise,
             work: taken.work.clone(),
+            compiled: taken.compiled.clone(),
             command: format!("{}{seed} {} --repeat 3 -o {picture}.png", self.command, arguments(&task.knobs)),
             image: file::hash(&taken.png),
             picture: picture.clone(),

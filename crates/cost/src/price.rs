@@ -60,7 +60,9 @@ impl Pair {
                 _ => None,
             },
             brightness: (change.knob == "arithmetic" && taken.halves.is_none())
-                .then(|| sum(&taken.film) / sum(&base.film)),
+                .then(|| sum(&taken.film) / sum(&base.film))
+                // Where all is black there is nothing to compare.
+                .filter(|ratio| ratio.is_finite()),
         })
     }
 }

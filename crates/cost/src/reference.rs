@@ -26,12 +26,19 @@ use etalon::plan::Knobs;
 /// Bands of wavelengths that a reference may have, and samples that it has at least before it has more bands.
 pub(super) const BANDS: [u32; 3] = [32, 16, 8];
 const FEWEST_SAMPLES: u32 = 16;
+/// Samples without which no parts tell the error.
+const LEAST_SAMPLES: f64 = 4.0;
 /// Samples of a pilot.
 const PILOT: u32 = 4;
 /// Pixels of a pilot, about: what a sample takes and how noisy it is goes with them.
 const PILOT_PIXELS: f64 = 160.0 * 90.0;
+/// A pilot of bands takes twice as long as that of three colours before it, about, and may take this share of the budget.
+const TWICE: f64 = 2.0;
+const PILOT_SHARE: f64 = 0.5;
 /// Statements that a report makes, about: what is wanted of a reference is planned for so many.
 const STATEMENTS: usize = 150;
+/// A round takes no more than this share of the seconds left: nothing ends it, and the machine may become slower meanwhile.
+const AT_ONCE: f64 = 0.7;
 /// Rounds of one run at most: each is a picture that is begun anew.
 const MOST_ROUNDS: usize = 16;
 
@@ -195,12 +202,20 @@ impl Pilot {
     /// # Errors
     /// When they cannot be drawn.
     pub fn draw(bench: &Bench<'_>, called_for: bool, [budget_ms, share]: [f64; 2], may_shrink: bool) -> Result<Self> {
+        let begun = Instant::now();
         let asked = bench.settings.size;
         let few = fewer(asked, (pixels(asked) / PILOT_PIXELS).max(1.0));
         let bench = &resized(bench, few);
         let plain = look(bench, "rgb")?;
-        let bands = if called_for && told_by_wavelength(bench) { Some(look(bench, "spectral:8")?) } else { None };
-        let seen = bands.filter(|bands| differ(bench, &plain.parts, &bands.parts));
+        let by_wavelength = called_for && told_by_wavelength(bench);
+        // Bands are programs of their own: compiling them takes about as long again.
+        let mut has_time = TWICE * begun.elapsed().as_secs_f64() * 1e3 < PILOT_SHARE * budget_ms;
+        let bands = if by_wavelength && has_time { Some(look(bench, "spectral:8")?) } else { None };
+        let mut seen = bands.filter(|bands| differ(bench, &plain.parts, &bands.parts));
+        let most = if may_shrink { 1.0 } else { pixels(asked) / pixels(few) };
+        if seen.as_ref().is_some_and(|bands| LEAST_SAMPLES * bands.each_ms * most > share * budget_ms) {
+            (seen, has_time) = (None, false);
+        }
 
         let reference_ms = f64::from(FEWEST_SAMPLES) * seen.as_ref().unwrap_or(&plain).each_ms;
         let fits = |size: &[u32; 2]| {
@@ -217,7 +232,10 @@ impl Pilot {
         let Some(seen) = seen else {
             let same = "bands of wavelengths change nothing in this picture that is more than noise: the reference has three colours, and \
                         bands of wavelengths are priced as another reading of them";
-            let warnings = if called_for { vec![same.to_owned()] } else { Vec::new() };
+            let short = "the budget has no time for bands of wavelengths, by which the scene tells something: the reference has three \
+                         colours";
+            let why = if by_wavelength && !has_time { short } else { same };
+            let warnings = if called_for { vec![why.to_owned()] } else { Vec::new() };
             let knobs = rungs("rgb")?;
             return Ok(Self { size, knobs, each_ms: plain_ms, plain_ms, wanted: wanted(&plain), warnings });
         };
@@ -442,7 +460,7 @@ pub fn refine(
     while known.samples() < wanted && !known.has_many_rounds(before) {
         let left_s = seconds_left();
         let missing = f64::from(wanted - known.samples());
-        let fits = |n: &u32| f64::from(*n) * each_s <= left_s && f64::from(*n) < 4.0 * missing;
+        let fits = |n: &u32| f64::from(*n) * each_s <= AT_ONCE * left_s && f64::from(*n) < 4.0 * missing;
         let Some(samples) = [1024, 256, 64, 16, 4].into_iter().find(fits) else { break };
         let begun = Instant::now();
         let knobs = known.knobs().clone();

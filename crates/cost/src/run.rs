@@ -29,6 +29,9 @@ use etalon::plan::Knobs;
 const FIRST_SHARE: f64 = 0.12;
 /// Seconds of a budget from which on a page is written before the end.
 const EARLY_S: f64 = 90.0;
+/// It takes about so many seconds, and so many samples by paths, to find out how times grow with pixels.
+const GROWTH_S: f64 = 1.6;
+const GROWTH_SAMPLES: f64 = 10.0;
 /// A picture is drawn twice, the first time to compile.
 const TWICE: f64 = 2.0;
 
@@ -80,6 +83,11 @@ impl Run<'_> {
         let (mut truth, mut reference) = self.describe(&refined, agenda.priced())?;
         let mut local = m.base(&base_task("local", Family::Preset, &agenda.local), listener.step)?;
         self.expect(&mut m, &agenda);
+        // One answer beside `local` comes before the reference's share.
+        let (first, presets) = agenda.presets.split_at(1.min(agenda.presets.len()));
+        for task in first {
+            m.picture(task, &mut local, listener.step)?;
+        }
         if ends {
             let share = REFERENCE_SHARE * budget_s - reference.gpu_ms / 1e3;
             let missing = f64::from(pilot.wanted.saturating_sub(refined.samples())) * refined.each_ms() / 1e3;
@@ -88,7 +96,7 @@ impl Run<'_> {
             m.pace.reserved_s = Some(share.min(missing)).filter(|seconds| *seconds >= round).unwrap_or(0.0);
         }
         // First what answers most, should the budget end.
-        for task in agenda.presets.iter().chain(&agenda.of_local) {
+        for task in presets.iter().chain(&agenda.of_local) {
             m.picture(task, &mut local, listener.step)?;
         }
         if shard == [1, 1] {
@@ -211,6 +219,7 @@ impl Run<'_> {
         let pace = &mut m.pace;
         pace.forecast.enough_ms = m.enough_ms;
         pace.forecast.path_ms = pilot.plain_ms;
+        pace.forecast.start_s = m.records.last().map_or(0.0, |record| record.start_ms / 1e3);
         pace.forecast.raster_ms = drawn / f64::from(local.samples.count());
         let mut expect = |knobs, base| pace.forecast.expect(knobs, base);
         agenda.presets.iter().chain(&agenda.of_local).for_each(|task| expect(&task.knobs, local));
@@ -279,7 +288,12 @@ impl Run<'_> {
     /// The recommended settings at the size that was asked for: drawn in the seconds that are left, or foretold.
     fn at_size(&self, table: &Table, mut left_s: f64) -> Result<Asked> {
         let asked = self.sweep.bench.settings.size;
-        let growth = Growth::of(&self.bench, asked)?;
+        let begun = Instant::now();
+        let growth = match left_s > GROWTH_S + GROWTH_SAMPLES * self.pilot.plain_ms / 1e3 {
+            true => Growth::of(&self.bench, asked)?,
+            false => Growth::by_pixels(&self.bench, asked),
+        };
+        left_s -= begun.elapsed().as_secs_f64();
         let begins = (self.sweep.command)(asked);
         let mut settings: Vec<AtSize> = Vec::new();
         for (place, Recommended { point, .. }) in table.recommended.iter().enumerate() {
@@ -314,6 +328,9 @@ impl Run<'_> {
         if self.bench.device.info().kind == "cpu" {
             warnings
                 .push("a software device: GPU times are those of this processor, and of what else it does".to_owned());
+        }
+        if judged.points.iter().all(|point| point.gpu_ms.high == 0.0) {
+            warnings.push("this device tells no times: errors are measured here, prices are not".to_owned());
         }
         if self.is_smaller() {
             let ([w, h], [x, y]) = (self.sweep.bench.settings.size, self.bench.settings.size);

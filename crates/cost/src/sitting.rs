@@ -9,7 +9,7 @@ use anyhow::Result;
 use super::difference::{Shown, shown};
 use super::statistics::Interval;
 use etalon::frame::{Rendered, Renderer, Settings, Work};
-use etalon::gpu::Device;
+use etalon::gpu::{Compiled, Device, Program};
 use etalon::image::Picture;
 use etalon::image::png::Display;
 use etalon::plan::{Knobs, Plan};
@@ -79,6 +79,8 @@ pub struct Taken {
     pub passes: Vec<(String, f64)>,
     /// Counts.
     pub work: BTreeMap<String, u64>,
+    /// What the driver's compiler made of each program, where it tells.
+    pub compiled: BTreeMap<String, Vec<Compiled>>,
     /// Samples of each pixel.
     pub samples: u32,
 }
@@ -135,6 +137,17 @@ impl Bench<'_> {
     pub fn renderer(&self, knobs: &Knobs, seed: u32) -> Result<Renderer> {
         let settings = Settings { knobs: knobs.clone(), seed, max_error: None, ..self.settings.clone() };
         Renderer::new(self.device, self.original, self.environment, settings)
+    }
+
+    fn compiled(&self, sitting: &mut Sitting) -> Result<BTreeMap<String, Vec<Compiled>>> {
+        if !self.device.tells_compiled() {
+            return Ok(BTreeMap::new());
+        }
+        let passes = sitting.renderer.passes(self.camera)?;
+        let one = |(program, constants): &(&'static Program, Vec<(u32, u32)>)| {
+            Ok((program.name.to_owned(), self.device.compiled(program, constants)?))
+        };
+        passes.iter().flat_map(|pass| &pass.pipelines).map(one).collect()
     }
 
     /// GPU time of one picture.
@@ -194,6 +207,7 @@ impl Bench<'_> {
             others_ms,
             passes: passes.into_iter().map(|(name, ms)| (name, Interval::of(&ms).median)).collect(),
             work: counts(&rendered.work),
+            compiled: self.compiled(sitting)?,
             samples: rendered.samples,
         })
     }

@@ -44,7 +44,8 @@ pub struct Growth {
 }
 
 impl Growth {
-    /// From the bench's size to `size`, by what both kinds of pictures take at the bench's and at a quarter of it.
+    /// From the bench's size to `size`, by what both kinds of pictures take at the bench's and at a quarter of it: those of the exact
+    /// rungs in three colours, which every run has compiled, and those of `local`.
     ///
     /// # Errors
     /// When they cannot be drawn.
@@ -54,8 +55,16 @@ impl Growth {
             let share = share_of_a_picture(bench, knobs)?;
             Ok(share + (1.0 - share) * times)
         };
-        let paths = factor(&set(&Knobs::of(Model::Global), "samples", "1")?)?;
+        let exact = set(&set(&Knobs::exact(), "samples", "1")?, "colour", "rgb")?;
+        let paths = factor(&exact)?;
         Ok(Self { paths, others: factor(&Knobs::of(Model::Local))? })
+    }
+
+    /// As if all of a time went with pixels: what is known without drawing anything.
+    #[must_use]
+    pub fn by_pixels(bench: &Bench<'_>, size: [u32; 2]) -> Self {
+        let times = pixels(size) / pixels(bench.settings.size);
+        Self { paths: times, others: times }
     }
 
     /// What a point's time becomes.

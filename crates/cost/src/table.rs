@@ -6,6 +6,7 @@ use anyhow::{Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::statistics::Interval;
+use etalon::gpu::Compiled;
 use etalon::plan::{Knob, Knobs, Model};
 
 /// The document.
@@ -232,6 +233,9 @@ pub struct Point {
     pub noise: Option<f64>,
     /// Counts that are the same on every machine.
     pub work: BTreeMap<String, u64>,
+    /// What the driver's compiler made of each program (registers, spills, size of code, in its own words), where it tells.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub compiled: BTreeMap<String, Vec<Compiled>>,
     /// Draws it again.
     pub command: String,
     /// Hash of the picture's file.

@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use super::cache::Caches;
 use super::choice::DeviceChoice;
+use super::compiled;
 use super::error::NotOpened;
 use super::limits::{PUSH_DESCRIPTORS, STORAGE_BUFFERS, STORAGE_IMAGES, UNIFORM_BUFFERS};
 use super::pace::Turns;
@@ -370,6 +371,8 @@ pub struct Device {
     pub(super) timeline: vk::Semaphore,
     pub(super) push: khr::push_descriptor::Device,
     pub(super) debug: Option<ext::debug_utils::Device>,
+    /// What tells of compiled pipelines, where the driver does.
+    pub(super) executables: Option<khr::pipeline_executable_properties::Device>,
     pub(super) allocator: Mutex<ManuallyDrop<Allocator>>,
     pub(super) caches: Mutex<Caches>,
     pub(super) limits: vk::PhysicalDeviceLimits,
@@ -421,6 +424,10 @@ impl Device {
         if extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::portability_subset::NAME)) {
             names.push(khr::portability_subset::NAME.as_ptr());
         }
+        let told = compiled::is_told(&instance.raw, physical, &extensions);
+        if told {
+            names.push(khr::pipeline_executable_properties::NAME.as_ptr());
+        }
         let core = vk::PhysicalDeviceFeatures::default()
             .fragment_stores_and_atomics(true)
             .shader_storage_image_extended_formats(true)
@@ -431,12 +438,17 @@ impl Device {
             .dynamic_rendering(true)
             .synchronization2(true)
             .maintenance4(true);
-        let create = vk::DeviceCreateInfo::default()
+        let mut executables =
+            vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
+        let mut create = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_extension_names(&names)
             .enabled_features(&core)
             .push_next(&mut v12)
             .push_next(&mut v13);
+        if told {
+            create = create.push_next(&mut executables);
+        }
         // SAFETY: everything `create` asks for was found present by `Instance::missing`.
         let raw = unsafe { instance.raw.create_device(physical, &create, None) }.with_context(opening)?;
         let allocator = Allocator::new(&AllocatorCreateDesc {
@@ -470,6 +482,7 @@ impl Device {
         };
         let device = Arc::new(Self {
             push: khr::push_descriptor::Device::new(&instance.raw, &raw),
+            executables: told.then(|| khr::pipeline_executable_properties::Device::new(&instance.raw, &raw)),
             debug: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw)),
             raw,
             queue: Mutex::new(queue),

@@ -237,11 +237,10 @@ impl Device {
             stages.push(vk::PipelineShaderStageCreateInfo::default().stage(stage.flag).module(module).name(c"main"));
         }
         let Some(raster) = &key.raster else {
-            let flags = if self.turns.taken {
-                vk::PipelineCreateFlags::DISPATCH_BASE
-            } else {
-                vk::PipelineCreateFlags::empty()
-            };
+            let mut flags = self.capture();
+            if self.turns.taken {
+                flags |= vk::PipelineCreateFlags::DISPATCH_BASE;
+            }
             let info = vk::ComputePipelineCreateInfo::default().flags(flags).stage(stages[0]).layout(layout);
             // SAFETY: a valid create info whose pointees outlive the call.
             let made = unsafe { self.raw.create_compute_pipelines(vk::PipelineCache::null(), &[info], None) };
@@ -306,6 +305,7 @@ impl Device {
             rendering = rendering.depth_attachment_format(format);
         }
         let info = vk::GraphicsPipelineCreateInfo::default()
+            .flags(self.capture())
             .stages(&stages)
             .vertex_input_state(&vertex)
             .input_assembly_state(&assembly)

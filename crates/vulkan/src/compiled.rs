@@ -1,0 +1,102 @@
+//! What a driver's compiler says of the pipelines that it has made: registers, spills, size of code.
+//!
+//! `VK_KHR_pipeline_executable_properties`, where the driver has it (RADV, ANV, NVIDIA and others; lavapipe has not). Names and units of
+//! the figures are the driver's own.
+
+use std::collections::BTreeMap;
+use std::ffi::CStr;
+
+use anyhow::{Context as _, Result};
+use ash::khr::pipeline_executable_properties as executable;
+use ash::vk;
+use serde::{Deserialize, Serialize};
+
+use super::device::{Device, lock};
+use super::shader::Program;
+
+/// Code that a pipeline was compiled to, as a rule that of one stage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Compiled {
+    /// What the driver calls it.
+    pub stage: String,
+    /// What it is made of.
+    pub figures: BTreeMap<String, f64>,
+}
+
+/// Whether a device has the extension with its one feature.
+pub(super) fn is_told(
+    raw: &ash::Instance,
+    physical: vk::PhysicalDevice,
+    extensions: &[vk::ExtensionProperties],
+) -> bool {
+    if !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(executable::NAME)) {
+        return false;
+    }
+    let mut told = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default();
+    let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut told);
+    // SAFETY: a plain query; the chain outlives the call.
+    unsafe { raw.get_physical_device_features2(physical, &mut all) };
+    told.pipeline_executable_info == vk::TRUE
+}
+
+/// A figure as a number: what is true is 1.
+fn number(figure: &vk::PipelineExecutableStatisticKHR<'_>) -> f64 {
+    use vk::PipelineExecutableStatisticFormatKHR as Format;
+    // SAFETY: the format says which field the driver has written.
+    unsafe {
+        match figure.format {
+            Format::BOOL32 => f64::from(figure.value.b32),
+            Format::INT64 => figure.value.i64 as f64,
+            Format::UINT64 => figure.value.u64 as f64,
+            _ => figure.value.f64,
+        }
+    }
+}
+
+fn text(name: Result<&CStr, std::ffi::FromBytesUntilNulError>) -> String {
+    name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+impl Device {
+    /// Whether the driver tells what its compiler makes of pipelines.
+    #[must_use]
+    pub fn tells_compiled(&self) -> bool {
+        self.executables.is_some()
+    }
+
+    /// What the driver's compiler says of a program with these specialization constants: nothing where it does not tell, or where
+    /// there is no such pipeline yet.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn compiled(&self, program: &'static Program, constants: &[(u32, u32)]) -> Result<Vec<Compiled>> {
+        let Some(asked) = &self.executables else { return Ok(Vec::new()) };
+        let known = lock(&self.caches);
+        let of = |key: &&super::cache::PipelineKey| key.program.name == program.name && key.constants == constants;
+        let Some(&pipeline) = known.pipelines.keys().find(of).map(|key| &known.pipelines[key]) else {
+            return Ok(Vec::new());
+        };
+        let asking = || format!("asking what \"{}\" was compiled to", program.name);
+        // SAFETY: the pipeline lives as long as its cache, which is locked; it was made to be asked (`capture`).
+        unsafe {
+            let stages = asked
+                .get_pipeline_executable_properties(&vk::PipelineInfoKHR::default().pipeline(pipeline))
+                .with_context(asking)?;
+            let one = |(index, stage): (usize, &vk::PipelineExecutablePropertiesKHR<'_>)| {
+                let info = vk::PipelineExecutableInfoKHR::default().pipeline(pipeline).executable_index(index as u32);
+                let figures = asked.get_pipeline_executable_statistics(&info).with_context(asking)?;
+                let figures = figures.iter().map(|f| (text(f.name_as_c_str()), number(f))).collect();
+                Ok(Compiled { stage: text(stage.name_as_c_str()), figures })
+            };
+            stages.iter().enumerate().map(one).collect()
+        }
+    }
+
+    /// How pipelines are made whose compiler will be asked.
+    pub(super) fn capture(&self) -> vk::PipelineCreateFlags {
+        match self.executables {
+            Some(_) => vk::PipelineCreateFlags::CAPTURE_STATISTICS_KHR,
+            None => vk::PipelineCreateFlags::empty(),
+        }
+    }
+}
