@@ -315,9 +315,10 @@ impl Chosen {
                 Some(format!("--within {}: the picture takes {ms:.1} ms of GPU time{drawn}", self.limit))
             }
             ("max-error", _, Some(error)) if error.median > self.limit || !self.possible => Some(format!(
-                "--max-error {}: the picture's error is {:.2} % of the range ({:.2} … {:.2}){drawn}; --model global with --max-error \
+                "--max-error {}%: the picture's error is {:.2} % of the range ({:.2} … {:.2}){drawn}; --model global with --max-error \
                  draws until its noise is small enough",
-                self.limit,
+                // A share of 0.1 is 10 % and not 10.000000000000002.
+                (1e8 * self.limit).round() / 1e6,
                 100.0 * error.median,
                 100.0 * error.low,
                 100.0 * error.high

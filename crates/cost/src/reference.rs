@@ -32,9 +32,10 @@ const LEAST_SAMPLES: f64 = 4.0;
 const PILOT: u32 = 4;
 /// Pixels of a pilot, about: what a sample takes and how noisy it is goes with them.
 const PILOT_PIXELS: f64 = 160.0 * 90.0;
-/// A pilot of bands takes twice as long as that of three colours before it, about, and may take this share of the budget.
-const TWICE: f64 = 2.0;
-const PILOT_SHARE: f64 = 0.5;
+/// A pilot of bands takes up to so many times as long as that of three colours before it (whose programs may be in the driver's cache
+/// while those of bands are not), and may take this share of the budget.
+const BANDS_TAKE: f64 = 4.0;
+const PILOT_SHARE: f64 = 0.6;
 /// Statements that a report makes, about: what is wanted of a reference is planned for so many.
 const STATEMENTS: usize = 150;
 /// A round takes no more than this share of the seconds left: nothing ends it, and the machine may become slower meanwhile.
@@ -209,7 +210,7 @@ impl Pilot {
         let plain = look(bench, "rgb")?;
         let by_wavelength = called_for && told_by_wavelength(bench);
         // Bands are programs of their own: compiling them takes about as long again.
-        let mut has_time = TWICE * begun.elapsed().as_secs_f64() * 1e3 < PILOT_SHARE * budget_ms;
+        let mut has_time = BANDS_TAKE * begun.elapsed().as_secs_f64() * 1e3 < PILOT_SHARE * budget_ms;
         let bands = if by_wavelength && has_time { Some(look(bench, "spectral:8")?) } else { None };
         let mut seen = bands.filter(|bands| differ(bench, &plain.parts, &bands.parts));
         let most = if may_shrink { 1.0 } else { pixels(asked) / pixels(few) };
