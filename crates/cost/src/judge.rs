@@ -131,7 +131,12 @@ impl Judge<'_> {
             let local = record.family == Family::Local;
             let more = local.then(|| self.truth.shown.more_error(&displays[i], &displays[base]));
             let clock = clocks[usize::from(!local)];
-            let turns = Turns { ms: &record.ms, others_ms: &record.others_ms, clock };
+            // As quick as the machine was in the middle of the run, like the times of points.
+            let even = points[base].gpu_ms.median / Interval::of(&record.others_ms).median;
+            let even = if even.is_finite() && even > 0.0 { even } else { 1.0 };
+            let [ms, others_ms] =
+                [&record.ms, &record.others_ms].map(|all| all.iter().map(|ms| even * ms).collect::<Vec<_>>());
+            let turns = Turns { ms: &ms, others_ms: &others_ms, clock };
             prices.push(Price {
                 point: record.name.clone(),
                 flip_delta: points[i].errors.flip_mean - points[base].errors.flip_mean,

@@ -144,7 +144,7 @@ impl<'a> Pace<'a> {
         }
         (self.left_out > 0).then(|| {
             format!(
-                "{} of {} pictures were not drawn, because the budget of {:.0} s ended: --budget {:.0} would draw them all, about",
+                "{} of {} pictures were not drawn, because the budget of {:.0} s ended: about --budget {:.0} would draw all of them",
                 self.left_out,
                 self.of,
                 self.budget_s,

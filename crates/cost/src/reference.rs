@@ -231,8 +231,7 @@ impl Pilot {
         let plain_ms = more * plain.each_ms;
         let rungs = |colour: &str| set(&Knobs::exact(), "colour", colour);
         let Some(seen) = seen else {
-            let same = "bands of wavelengths change nothing in this picture that is more than noise: the reference has three colours, and \
-                        bands of wavelengths are priced as another reading of them";
+            let same = "bands of wavelengths change nothing in this picture that is more than noise: the reference has three colours";
             let short = "the budget has no time for bands of wavelengths, by which the scene tells something: the reference has three \
                          colours";
             let why = if by_wavelength && !has_time { short } else { same };

@@ -7,6 +7,7 @@ use maud::{Markup, html};
 
 use super::pictures::{embedded, size};
 use super::{digits, error, percent, plain, time, title, words};
+use crate::statistics::Interval;
 use crate::table::{AtSize, Point, REFERENCE, RESOLVED, Recommended, Table};
 
 /// What a recommended point takes at the size that was asked for.
@@ -22,6 +23,12 @@ fn at_size<'a>(table: &'a Table, point: &Point) -> Option<(String, &'a AtSize)> 
 /// The time of a point, where it may be at the size that was asked for.
 fn takes(table: &Table, point: &Point) -> String {
     at_size(table, point).map_or_else(|| time(point.gpu_ms.median), |(words, _)| words)
+}
+
+/// The shortest and the longest of the times that a point took at the size that was asked for.
+fn spread(table: &Table, point: &Point) -> String {
+    let Interval { low, high, .. } = at_size(table, point).map_or(point.gpu_ms, |(_, at)| at.gpu_ms);
+    if high > low { format!(" ({} to {})", time(low), time(high)) } else { String::new() }
 }
 
 /// A recommended point with the settings that it is recommended for: one may be more than one of them.
@@ -67,10 +74,11 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
                     h3 { (settings.join(" and ")) ": " (title(point)) }
                     img src=(picture) width=(size(table)[0]) height=(size(table)[1]) alt={ "Picture of the setting " (title(point)) };
                     table.facts { tbody {
-                        tr { th scope="row" { "time" } td { b { (takes(table, point)) } @if table.asked.is_some() { ", " (time(point.gpu_ms.median)) " at " (table.size[0]) "×" (table.size[1]) } } }
-                        tr { th scope="row" { "error" } td { @if point.name == REFERENCE { "its own noise, below " b { (percent(point.error())) } "; other errors are told against it" } @else { (error(point)) } } }
+                        tr { th scope="row" { "time" } td { b { (takes(table, point)) } (spread(table, point)) @if table.asked.is_some() { ", " (time(point.gpu_ms.median)) " at " (table.size[0]) "×" (table.size[1]) } } }
+                        tr { th scope="row" { "error" } td { @if point.name == REFERENCE { "noise below " b { (percent(point.error())) } "; the others are compared with it" } @else { (error(point)) } } }
                         tr { th scope="row" { "given up" } td { (given_up(table, point)) } }
                     } }
+                    @if point.name == REFERENCE && table.reference.rounds.len() > 1 { p.quiet { "A picture of about this quality:" } }
                     p.command { code { (command.replace(" --repeat 3", "")) } button.copy type="button" { "copy" } }
                 }
             })
@@ -113,12 +121,12 @@ pub(super) fn trust(table: &Table) -> Markup {
             h2 { "How far to trust it" }
             p.verdict.good[r.converged].poor[!r.converged] {
                 @if r.converged {
-                    "The " (words::link("reference", "reference")) " has converged: differences of " (percent(r.resolution)) " and more are found."
+                    "The " (words::link("reference", "reference")) " has converged: an " (words::link("error", "error")) " of " (percent(r.resolution)) " or more can be told from none. Two pictures can be compared more finely, because both are held against the same noise."
                 } @else {
                     "The " (words::link("reference", "reference")) " still has noise, which hides differences below " (percent(r.resolution)) "; the aim is "
                     (plain(100.0 * RESOLVED)) " %. Run the same command again: it goes on with this reference."
                 }
-                " What noise may have made is not called a difference: the page then says that it cannot tell. All of its statements together "
+                " A difference that may be noise has a question mark. All statements of this page together "
                 "are wrong by noise in at most 1 of 100 runs (each is " (digits(table.standard_errors)) " standard errors from zero)."
             }
             table.facts { tbody {

@@ -149,21 +149,21 @@ pub fn page(table: &Table, folder: &Path) -> Result<String> {
                             "Each point is a picture. GPU time goes across and "
                             (words::link("error", "error")) " up, both logarithmic. The line joins the "
                             (words::link("frontier", "frontier")) ". Below the broken line nothing can be told: that is the noise of the "
-                            (words::link("reference", "reference")) ". Point at a point, or step through them with Tab."
+                            (words::link("reference", "reference")) ". Point at a dot, or step through them with Tab."
                         }
                         div.chart-and-card {
                             (chart::errors(table))
-                            aside #card { p.quiet { "Point at a point." } }
+                            aside #card { p.quiet { "Point at a dot." } }
                         }
                         (tables::frontier(table))
                     }
                     (prices::matters(table))
                     (folded("prices", "The price of each rung alone", html! {
                         "One " (words::link("rung", "knob")) " changed, all others as in the preset " em { "local" } ", or on the reference's rungs with fewer samples ("
-                        em { "exact" } "). Error is more or less of it than the base has; from exact it is the difference of what both pictures converge to. A question mark stands where noise hides it."
+                        em { "exact" } "). Error is what the change adds or takes away; errors add by their squares, so that 1 % less of 3 % leaves 2.8 %. From exact it is the difference of what both pictures converge to. A question mark stands where noise hides it."
                     }, prices::table(table)))
                     (folded("tornado", "Time and visible change of each knob", html! {
-                        "To the left the time that a change takes or saves, to the right " (words::link("flip", "FLIP")) " between both pictures. Both scales are linear, and reach to their largest bar. Pale bars are no more than noise."
+                        "To the left the time that a change takes or saves, to the right " (words::link("flip", "FLIP")) " between both pictures. Both scales are linear; bars that are longer than a scale are cut. Pale bars are no more than noise."
                     }, prices::tornado(table)))
                     @if let Some(causes) = causes {
                         (folded("causes", "What would help each pixel most", html! {

@@ -30,35 +30,41 @@ pub(super) fn matters(table: &Table) -> Markup {
     }
     let wasted: Vec<&Price> = table.prices.iter().filter(|price| price.verdict.ends_with("wasted here")).collect();
     let knobs = table.knobs.iter().filter(|knob| knob.called_for);
-    let unseen: Vec<&str> = knobs.filter(|knob| harmless(table, &knob.knob)).map(|knob| knob.knob.as_str()).collect();
+    let changes_error = |name: &str| better.iter().chain(&worse).chain(&undoing).any(|price| price.knob == name);
+    let unseen = knobs.filter(|knob| harmless(table, &knob.knob) && !changes_error(&knob.knob));
+    let unseen: Vec<&str> = unseen.map(|knob| knob.knob.as_str()).collect();
     let hidden = table.prices.iter().filter(|p| !p.error_told && !p.same && p.flip_between >= INVISIBLE).count();
     let spent = |price: &Price| {
         html! {
             @if price.takes_longer() { ", for " (time(price.gpu_ms_delta.median)) " more" }
             @else if price.saves() { ", and saves " (time(-price.gpu_ms_delta.median)) }
-            @else { ", for no time that can be told" }
+            @else { ", in about the same time" }
+            @if price.flip_between < INVISIBLE { ", which no eye sees" }
         }
+    };
+    let error = |name: &str| table.points.iter().find(|point| point.name == name).map(|point| percent(point.error()));
+    let changes = |price: &Price| {
+        html! { (from_to(price)) ": " @if let (Some(base), Some(now)) = (error("local"), error(&price.point)) { (base) " → " (now) } (spent(price)) }
     };
     html! {
         section #matters {
             h2 { "What matters here" }
             @if better.is_empty() && worse.is_empty() { p { "No change of one knob of " em { "local" } " has an effect on its error that can be told." } }
             @if !better.is_empty() {
-                p { "From " (words::link("preset", "local")) ", these take error away:" }
-                ul { @for price in &better { li { (from_to(price)) ": less " (words::link("error", "error")) " by " (percent(bought(price))) (spent(price)) } } }
+                p { "From " (words::link("preset", "local")) ", these lower the " (words::link("error", "error")) ", from that of " em { "local" } " to their own:" }
+                ul { @for price in &better { li { (changes(price)) } } }
             }
             @if !worse.is_empty() {
-                p { "and these add error:" }
-                ul { @for price in &worse { li { (from_to(price)) ": more error by " (percent(bought(price))) (spent(price)) } } }
+                p { "and these raise it:" }
+                ul { @for price in &worse { li { (changes(price)) } } }
             }
-            p.quiet { "Errors add by their squares." }
             @if !undoing.is_empty() {
-                p { "These have less error though they approximate more: their error is against another that " em { "local" } " has. None is recommended." }
-                ul { @for price in &undoing { li { (from_to(price)) ": less error by " (percent(bought(price))) (spent(price)) } } }
+                p { "These have less error though they approximate more: what they do wrong cancels something else that " em { "local" } " does wrong. None is recommended." }
+                ul { @for price in &undoing { li { (changes(price)) } } }
             }
             h2 { "What is wasted here" }
             @if wasted.is_empty() && unseen.is_empty() { p { "Nothing that was drawn costs time without an effect." } }
-            @if !unseen.is_empty() { p { "Nobody sees any rung of " (unseen.join(", ")) "." } }
+            @if !unseen.is_empty() { p { "Nobody sees which rung these knobs are on: " (unseen.join(", ")) "." } }
             @if !wasted.is_empty() {
                 ul { @for price in &wasted { li { (from_to(price)) " (" (class(price.base)) ") takes " (time(price.gpu_ms_delta.median)) " more and changes nothing that can be told" } } }
             }
