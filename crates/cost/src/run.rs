@@ -16,15 +16,19 @@ use super::pace::{Pace, Step};
 use super::reference::{BANDS, NotMeasured, Pilot, Refined, refine, samples_within};
 use super::search::{PICTURES, search, without_waste};
 use super::sitting::{Bench, enough_ms};
-use super::size::Growth;
+use super::size::{Growth, resized};
 use super::statistics::Interval;
-use super::sweep::{Extent, Listener, REFERENCE_SHARE, Sweep};
+use super::sweep::{Extent, Listener, Sweep};
 use super::table::{Asked, AtSize, Family, Order, REFERENCE, RESOLVED, Recommended, Reference, Table, Tried};
 use etalon::frame::Progress;
 use etalon::image::file;
 use etalon::image::metric::AnyPicture;
 use etalon::plan::Knobs;
 
+/// Shares of the budget: for the reference before prices are drawn from its rungs, and for pictures of the size that was asked for where
+/// fewer pixels are measured.
+const REFERENCE_SHARE: f64 = 0.4;
+const AFTER_SHARE: f64 = 0.08;
 /// Share of the budget for the first round of the reference.
 const FIRST_SHARE: f64 = 0.12;
 /// Seconds of a budget from which on a page is written before the end.
@@ -53,6 +57,33 @@ struct Found {
     search: Vec<Tried>,
     orders: Vec<Order>,
     warnings: Vec<String>,
+}
+
+impl Sweep<'_> {
+    /// Measures, and writes each picture as it is drawn.
+    ///
+    /// # Errors
+    /// When something cannot be drawn or written.
+    pub fn run(&self, listener: &mut Listener<'_>) -> Result<Table> {
+        self.claim_folder()?;
+        let budget_s = f64::from(self.extent.budget_s);
+        let ends = self.extent.reference_samples.is_none();
+        let mut pace = Pace::new(budget_s, ends, self.stopped);
+        (listener.step)(Step { name: "pilot", done: 0, of: 1, left_s: budget_s });
+        let states = States::of(&self.bench)?;
+        let begun = Refined::read(self.folder)?.map(|(known, _)| known);
+        let asked = self.bench.settings.size;
+        let bench = resized(&self.bench, begun.as_ref().map_or(asked, Refined::size));
+        let may_shrink = self.may_shrink && ends && self.others.is_empty() && begun.is_none();
+        let share = [budget_s * 1e3, REFERENCE_SHARE];
+        let pilot = Pilot::draw(&bench, states.calls_for("colour"), share, may_shrink)?;
+        let size = pilot.size;
+        if size != asked {
+            pace.after_s = AFTER_SHARE * budget_s;
+        }
+        let run = Run { sweep: self, bench: resized(&bench, size), command: &(self.command)(size), pilot };
+        run.measure(&states, pace, begun, listener)
+    }
 }
 
 impl Run<'_> {

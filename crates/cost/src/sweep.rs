@@ -1,25 +1,17 @@
-//! A run of `etalon cost`: what is asked for, its folder, how many pixels it measures, and joining its parts (`run.rs` measures).
+//! A run of `etalon cost`: what is asked for, its folder, and joining its parts (`run.rs` measures).
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
-use super::agenda::States;
 use super::judge::{Judge, Record};
-use super::pace::{Pace, Step};
-use super::reference::{Pilot, Refined};
-use super::run::Run;
+use super::pace::Step;
+use super::reference::Refined;
 use super::sitting::Bench;
-use super::size::resized;
 use super::table::{DeviceName, Table};
 use etalon::image::file;
 use etalon::image::metric::AnyPicture;
-
-/// Shares of the budget: for the reference before prices are drawn from its rungs, and for pictures of the size that was asked for where
-/// fewer pixels are measured.
-pub(super) const REFERENCE_SHARE: f64 = 0.4;
-const AFTER_SHARE: f64 = 0.08;
 
 /// How much is measured.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -76,33 +68,8 @@ struct Identity {
 }
 
 impl Sweep<'_> {
-    /// Measures, and writes each picture as it is drawn.
-    ///
-    /// # Errors
-    /// When something cannot be drawn or written.
-    pub fn run(&self, listener: &mut Listener<'_>) -> Result<Table> {
-        self.claim_folder()?;
-        let budget_s = f64::from(self.extent.budget_s);
-        let ends = self.extent.reference_samples.is_none();
-        let mut pace = Pace::new(budget_s, ends, self.stopped);
-        (listener.step)(Step { name: "pilot", done: 0, of: 1, left_s: budget_s });
-        let states = States::of(&self.bench)?;
-        let begun = Refined::read(self.folder)?.map(|(known, _)| known);
-        let asked = self.bench.settings.size;
-        let bench = resized(&self.bench, begun.as_ref().map_or(asked, Refined::size));
-        let may_shrink = self.may_shrink && ends && self.others.is_empty() && begun.is_none();
-        let share = [budget_s * 1e3, REFERENCE_SHARE];
-        let pilot = Pilot::draw(&bench, states.calls_for("colour"), share, may_shrink)?;
-        let size = pilot.size;
-        if size != asked {
-            pace.after_s = AFTER_SHARE * budget_s;
-        }
-        let run = Run { sweep: self, bench: resized(&bench, size), command: &(self.command)(size), pilot };
-        run.measure(&states, pace, begun, listener)
-    }
-
     /// A folder is that of one run: new, or one that was interrupted.
-    fn claim_folder(&self) -> Result<()> {
+    pub(super) fn claim_folder(&self) -> Result<()> {
         let identity = Identity {
             program: env!("CARGO_PKG_VERSION").to_owned(),
             command: (self.command)(self.bench.settings.size),

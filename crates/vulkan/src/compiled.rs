@@ -7,7 +7,6 @@ use std::collections::BTreeMap;
 use std::ffi::CStr;
 
 use anyhow::{Context as _, Result};
-use ash::khr::pipeline_executable_properties as executable;
 use ash::vk;
 use serde::{Deserialize, Serialize};
 
@@ -21,22 +20,6 @@ pub struct Compiled {
     pub stage: String,
     /// What it is made of.
     pub figures: BTreeMap<String, f64>,
-}
-
-/// Whether a device has the extension with its one feature.
-pub(super) fn is_told(
-    raw: &ash::Instance,
-    physical: vk::PhysicalDevice,
-    extensions: &[vk::ExtensionProperties],
-) -> bool {
-    if !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(executable::NAME)) {
-        return false;
-    }
-    let mut told = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default();
-    let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut told);
-    // SAFETY: a plain query; the chain outlives the call.
-    unsafe { raw.get_physical_device_features2(physical, &mut all) };
-    told.pipeline_executable_info == vk::TRUE
 }
 
 /// A figure as a number: what is true is 1.

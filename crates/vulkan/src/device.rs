@@ -12,7 +12,6 @@ use serde::Serialize;
 
 use super::cache::Caches;
 use super::choice::DeviceChoice;
-use super::compiled;
 use super::error::NotOpened;
 use super::limits::{PUSH_DESCRIPTORS, STORAGE_BUFFERS, STORAGE_IMAGES, UNIFORM_BUFFERS};
 use super::pace::Turns;
@@ -328,6 +327,18 @@ pub fn candidates() -> Result<Vec<Candidate>> {
     Instance::new(None, &[])?.candidates(None)
 }
 
+/// Whether a device tells what its compiler makes of pipelines (`compiled.rs`): the extension with its one feature.
+fn tells_compiled(raw: &ash::Instance, physical: vk::PhysicalDevice, extensions: &[vk::ExtensionProperties]) -> bool {
+    if !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::pipeline_executable_properties::NAME)) {
+        return false;
+    }
+    let mut told = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default();
+    let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut told);
+    // SAFETY: a plain query; the chain outlives the call.
+    unsafe { raw.get_physical_device_features2(physical, &mut all) };
+    told.pipeline_executable_info == vk::TRUE
+}
+
 fn choose(all: Vec<Candidate>, choice: &DeviceChoice) -> Result<Candidate> {
     if all.is_empty() {
         bail!(NotOpened::NoDevice);
@@ -424,7 +435,7 @@ impl Device {
         if extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::portability_subset::NAME)) {
             names.push(khr::portability_subset::NAME.as_ptr());
         }
-        let told = compiled::is_told(&instance.raw, physical, &extensions);
+        let told = tells_compiled(&instance.raw, physical, &extensions);
         if told {
             names.push(khr::pipeline_executable_properties::NAME.as_ptr());
         }
