@@ -317,7 +317,7 @@ impl Chosen {
             ("max-error", _, Some(error)) if error.median > self.limit || !self.possible => Some(format!(
                 "--max-error {}%: the picture's error is {:.2} % of the range ({:.2} … {:.2}){drawn}; --model global with --max-error \
                  draws until its noise is small enough",
-                // A share of 0.1 is 10 % and not 10.000000000000002.
+                // As it was typed: without the digits that dividing by a hundred leaves behind.
                 (1e8 * self.limit).round() / 1e6,
                 100.0 * error.median,
                 100.0 * error.low,

@@ -33,18 +33,8 @@ fn main() -> anyhow::Result<()> {
         let [foretold, measured] = SECONDS.map(|budget_s| Extent { budget_s, reference_samples: None, shard: [1, 1] });
         let trial = Trial { folder: &folder.path().join("forecast"), extent: foretold, pixels: PIXELS };
         let predictions = predict(&bench(), &trial, &mut |_: Step<'_>| ())?;
-        let sweep = Sweep {
-            bench: bench(),
-            folder: &folder.path().join("cost"),
-            extent: measured,
-            command: &|_| String::new(),
-            scene: &name,
-            contents: "",
-            kept: &|_| None,
-            may_shrink: false,
-            others: &[],
-            stopped: &|| false,
-        };
+        let own = folder.path().join("cost");
+        let sweep = Sweep::alone(bench(), &own, measured);
         let table = sweep.run(&mut Listener { step: &mut |_| (), early: &mut |_| Ok(()) })?;
         println!("{name}: {:?}", score(&predictions, &table));
         for p in &predictions {

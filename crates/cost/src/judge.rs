@@ -131,11 +131,7 @@ impl Judge<'_> {
             let local = record.family == Family::Local;
             let more = local.then(|| self.truth.shown.more_error(&displays[i], &displays[base]));
             let clock = clocks[usize::from(!local)];
-            // As quick as the machine was in the middle of the run, like the times of points.
-            let even = points[base].gpu_ms.median / Interval::of(&record.others_ms).median;
-            let even = if even.is_finite() && even > 0.0 { even } else { 1.0 };
-            let [ms, others_ms] =
-                [&record.ms, &record.others_ms].map(|all| all.iter().map(|ms| even * ms).collect::<Vec<_>>());
+            let [ms, others_ms] = in_the_middle([&record.ms, &record.others_ms], points[base].gpu_ms.median);
             let turns = Turns { ms: &ms, others_ms: &others_ms, clock };
             prices.push(Price {
                 point: record.name.clone(),
@@ -255,6 +251,14 @@ fn recommended(points: &[Point], frontier: &[usize]) -> Vec<Recommended> {
     named.map(|(setting, point)| Recommended { setting: setting.to_owned(), point }).into()
 }
 
+/// Times of a picture and of the base that it was drawn in turns with, as quick as the machine was in the middle of the run, where that
+/// base took so many milliseconds: the times of points are told so, too.
+fn in_the_middle([ms, others_ms]: [&[f64]; 2], base_ms: f64) -> [Vec<f64>; 2] {
+    let factor = base_ms / Interval::of(others_ms).median;
+    let factor = if factor.is_finite() && factor > 0.0 { factor } else { 1.0 };
+    [ms, others_ms].map(|all| all.iter().map(|ms| factor * ms).collect())
+}
+
 /// Times as if the machine had been as quick all along: each is told as so many times the base's that was drawn in turns with it,
 /// and the base's is the middle of all of its own. Whoever draws the picture again finds the machine somewhere else: the ends are
 /// as far apart as those of the turns and those of the base over the whole run together.
@@ -350,4 +354,35 @@ fn around(flip: &Comparison, pictures: [&Vec<[u8; 4]>; 2]) -> Result<Vec<u8>> {
         }
     }
     png::encode_png(width as u32, height as u32, &rgba, false)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(name: &str, ms: &[f64], others_ms: &[f64]) -> Record {
+        serde_json::from_value(serde_json::json!({
+            "name": name, "family": "local", "knobs": {}, "ms": ms, "others_ms": others_ms, "start_ms": 0.0, "passes": [],
+            "noise": null, "work": {}, "command": "", "image": "", "picture": name, "pair": null,
+        }))
+        .expect("a record")
+    }
+
+    #[test]
+    fn what_a_change_adds_is_a_part_of_what_its_picture_takes() {
+        // The machine was half as quick when the second picture was drawn in turns with the base.
+        let all = [record("local", &[50.0, 50.0], &[]), record("a", &[80.0], &[50.0]), record("b", &[300.0], &[100.0])];
+        let times = even_out(&all);
+        let base = times[0].median;
+        let [ms, others_ms] = in_the_middle([&all[2].ms, &all[2].others_ms], base);
+        assert!((times[2].median - (base + ms[0] - others_ms[0])).abs() < 1e-9, "{times:?}, {ms:?}, {others_ms:?}");
+    }
+
+    #[test]
+    fn a_device_without_timestamps_tells_no_time() {
+        let all = [record("local", &[0.0], &[]), record("a", &[0.0, 0.0], &[0.0, 0.0])];
+        assert!(even_out(&all).iter().all(|time| time.median == 0.0 && time.high == 0.0));
+        let [ms, others_ms] = in_the_middle([&all[1].ms, &all[1].others_ms], 0.0);
+        assert!([ms, others_ms].concat().iter().all(|ms| *ms == 0.0));
+    }
 }

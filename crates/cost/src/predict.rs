@@ -51,18 +51,7 @@ pub fn predict(bench: &Bench<'_>, trial: &Trial<'_>, progress: &mut dyn FnMut(St
     let size = bench.settings.size;
     let few = resized(bench, fewer(size, (pixels(size) / trial.pixels).max(1.0)));
     let growth = Growth::of(&few, size)?;
-    let sweep = Sweep {
-        bench: few,
-        folder: trial.folder,
-        extent: trial.extent.clone(),
-        command: &|_| String::new(),
-        scene: "",
-        contents: "",
-        kept: &|_| None,
-        may_shrink: false,
-        others: &[],
-        stopped: &|| false,
-    };
+    let sweep = Sweep::alone(few, trial.folder, trial.extent.clone());
     let table = sweep.run(&mut Listener { step: progress, early: &mut |_| Ok(()) })?;
     let of = |point: &Point| {
         let e = point.errors.error;

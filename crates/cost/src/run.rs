@@ -33,7 +33,7 @@ const AFTER_SHARE: f64 = 0.08;
 const FIRST_SHARE: f64 = 0.12;
 /// Seconds of a budget from which on a page is written before the end.
 const EARLY_S: f64 = 90.0;
-/// It takes about so many seconds, and so many samples by paths, to find out how times grow with pixels.
+/// What finding out how times grow with pixels is taken to cost: four starts, and samples by paths. A guess on the safe side.
 const GROWTH_S: f64 = 1.6;
 const GROWTH_SAMPLES: f64 = 10.0;
 /// A picture is drawn twice, the first time to compile.

@@ -67,6 +67,25 @@ struct Identity {
     seed: u32,
 }
 
+impl<'a> Sweep<'a> {
+    /// A run of which nothing but the table is wanted: it goes on with no earlier one, and its commands are not told.
+    #[must_use]
+    pub fn alone(bench: Bench<'a>, folder: &'a Path, extent: Extent) -> Self {
+        Self {
+            bench,
+            folder,
+            extent,
+            command: &|_| String::new(),
+            scene: "",
+            contents: "",
+            kept: &|_| None,
+            may_shrink: false,
+            others: &[],
+            stopped: &|| false,
+        }
+    }
+}
+
 impl Sweep<'_> {
     /// A folder is that of one run: new, or one that was interrupted.
     pub(super) fn claim_folder(&self) -> Result<()> {

@@ -29,18 +29,8 @@ fn errors_of_few_pixels_are_those_of_many() {
     let extent = Extent { budget_s: 10, reference_samples: Some(16), shard: [1, 1] };
     let trial = Trial { folder: &folder.path().join("forecast"), extent: extent.clone(), pixels: PIXELS };
     let predictions = predict(&bench(), &trial, &mut |_: Step<'_>| ()).expect("a forecast");
-    let sweep = Sweep {
-        bench: bench(),
-        folder: &folder.path().join("cost"),
-        extent,
-        command: &|_| String::new(),
-        scene: "study:lamps",
-        contents: "",
-        kept: &|_| None,
-        may_shrink: false,
-        others: &[],
-        stopped: &|| false,
-    };
+    let own = folder.path().join("cost");
+    let sweep = Sweep::alone(bench(), &own, extent);
     let table = sweep.run(&mut Listener { step: &mut |_| (), early: &mut |_| Ok(()) }).expect("a run");
     let score = score(&predictions, &table);
     eprintln!("{score:?}");

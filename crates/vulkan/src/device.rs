@@ -1,6 +1,6 @@
 //! Instance, choice of a device, and the device with its queue, allocator and caches.
 
-use std::ffi::{CStr, CString, c_char, c_void};
+use std::ffi::{CStr, CString, FromBytesUntilNulError, c_char, c_void};
 use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -187,7 +187,6 @@ impl Instance {
         // SAFETY: plain queries; the chain outlives the call.
         unsafe { self.raw.get_physical_device_properties2(physical, &mut properties) };
         let properties = properties.properties;
-        let text = |s: Result<&CStr, _>| s.map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         let version =
             |v: u32| format!("{}.{}.{}", vk::api_version_major(v), vk::api_version_minor(v), vk::api_version_patch(v));
         let info = DeviceInfo {
@@ -325,6 +324,11 @@ unsafe extern "system" fn on_message(
 /// All devices that Vulkan offers here, in the order of `--device INDEX`.
 pub fn candidates() -> Result<Vec<Candidate>> {
     Instance::new(None, &[])?.candidates(None)
+}
+
+/// A name that a driver wrote.
+pub(super) fn text(name: Result<&CStr, FromBytesUntilNulError>) -> String {
+    name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
 /// Whether a device tells what its compiler makes of pipelines (`compiled.rs`): the extension with its one feature.

@@ -39,12 +39,11 @@ pub(super) fn matters(table: &Table) -> Markup {
             @if price.takes_longer() { ", for " (time(price.gpu_ms_delta.median)) " more" }
             @else if price.saves() { ", and saves " (time(-price.gpu_ms_delta.median)) }
             @else { ", in about the same time" }
-            @if price.flip_between < INVISIBLE { ", which no eye sees" }
         }
     };
     let error = |name: &str| table.points.iter().find(|point| point.name == name).map(|point| percent(point.error()));
     let changes = |price: &Price| {
-        html! { (from_to(price)) ": " @if let (Some(base), Some(now)) = (error("local"), error(&price.point)) { (base) " → " (now) } (spent(price)) }
+        html! { (from_to(price)) ": " @if let (Some(base), Some(now)) = (error("local"), error(&price.point)) { (base) " → " (now) } (spent(price)) @if price.flip_between < INVISIBLE { ", which no eye sees" } }
     };
     html! {
         section #matters {
