@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use super::compact::compacted;
 use super::files::Result;
 use super::interface::{Interface, PassSlots};
 use super::reflect::Stage;
@@ -122,6 +123,6 @@ impl Recipe {
             shaderc::Error::CompilationError(_, log) => log,
             other => format!("{name}: {other}"),
         })?;
-        Ok(artifact.as_binary().to_vec())
+        compacted(artifact.as_binary().to_vec())
     }
 }

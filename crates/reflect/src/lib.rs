@@ -12,6 +12,7 @@
 //!
 //! Errors are printed as `file:line: message` by the compiler itself.
 
+mod compact;
 mod compile;
 mod contract;
 mod equations;
