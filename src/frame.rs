@@ -415,7 +415,10 @@ impl Renderer {
             }
             (None, None) => {}
         }
-        plan.check(&Ability { device: device.info().name.clone(), adds_in_subgroups: device.adds_in_subgroups() })?;
+        plan.check(&Ability {
+            device: device.info().name.clone(),
+            adds_in_subgroups: device.offers().adds_in_subgroups,
+        })?;
         let most = if plan.tiles { MOST_LISTED_LIGHTS } else { MOST_LIGHTS };
         let (name, lights) = (prepared.scene.name.clone(), prepared.scene.lights.len());
         if device.limits_loops() && lights > most {

@@ -1,7 +1,7 @@
 //! What is left of the shaders once their constants are known: valid SPIR-V without constants to be told, whatever they
 //! are, and much less of it. That it computes the same is what all tests of pictures and equations rest on.
 
-use etalon::gpu::{specialized, with_loops_counted};
+use etalon::gpu::{specialized, with_loops_counted, with_tables_in_storage, without_primitive_ids};
 use etalon::shader::PROGRAMS;
 use etalon_testing::gpu::Gpu;
 use spirv::Op;
@@ -28,7 +28,8 @@ fn constants(words: &[u32]) -> Vec<(u32, Vec<u32>)> {
     let numbered = all.iter().filter(|one| op(one) == Op::Decorate && one[2] == spirv::Decoration::SpecId as u32);
     numbered
         .map(|decoration| {
-            let declared = |one: &&&[u32]| one.len() > 2 && one[2] == decoration[1] && op(one) != Op::Decorate;
+            let forms = [Op::SpecConstant, Op::SpecConstantTrue, Op::SpecConstantFalse];
+            let declared = |one: &&&[u32]| forms.contains(&op(one)) && one[2] == decoration[1];
             let constant = all.iter().find(declared).expect("what is decorated is declared");
             let values = match op(constant) {
                 Op::SpecConstantTrue | Op::SpecConstantFalse => vec![0, 1],
@@ -39,6 +40,16 @@ fn constants(words: &[u32]) -> Vec<(u32, Vec<u32>)> {
             (decoration[3], values)
         })
         .collect()
+}
+
+/// Variables that are buffers of texels.
+fn reads_texels(words: &[u32]) -> usize {
+    let all = instructions(words);
+    let of = |operation: Op| all.iter().filter(move |one| op(one) == operation);
+    let images: Vec<u32> =
+        of(Op::TypeImage).filter(|one| one[3] == spirv::Dim::DimBuffer as u32).map(|one| one[1]).collect();
+    let pointers: Vec<u32> = of(Op::TypePointer).filter(|one| images.contains(&one[3])).map(|one| one[1]).collect();
+    of(Op::Variable).filter(|one| pointers.contains(&one[1])).count()
 }
 
 #[test]
@@ -68,6 +79,16 @@ fn what_is_left_is_valid_whatever_the_constants_are() {
                 gpu.device.try_module(&with_loops_counted(&left, counts)).expect("a module");
                 assert!(gpu.errors().is_empty(), "loops counted {counts}: {told:?}: {:?}", gpu.errors());
             }
+            // For devices that fetch no texels and know no triangles in fragments.
+            let other = with_tables_in_storage(&without_primitive_ids(&left));
+            gpu.device.try_module(&other).expect("a module");
+            assert!(gpu.errors().is_empty(), "tables in storage: {told:?}: {:?}", gpu.errors());
+            let asks = |capability| {
+                let is = |one: &&[u32]| op(one) == Op::Capability && one[1] == capability as u32;
+                instructions(&other).iter().any(is)
+            };
+            assert!(!asks(spirv::Capability::Geometry));
+            assert!(reads_texels(&other) == 0 && (reads_texels(&left) == 0 || other.len() > left.len()), "{told:?}");
         }
     }
 }

@@ -5,9 +5,9 @@
 // told by the image alone is no way: lavapipe 22.3 lacks shaderStorageImageReadWithoutFormat.
 #ifndef GBUFFER_GLSL
 #define GBUFFER_GLSL
+#include "lib/normals.glsl"
 #include "lib/view.glsl"
 
-layout(constant) const uint NORMALS = 2;              // rung of the knob `normals`
 layout(constant) const float NORMAL_ERROR2 = 1e-7;    // |n − stored n|² that storing accounts for
 layout(constant) const bool POSITIONS = false;        // positions are stored beside depth (knob `position`)
 layout(constant) const bool STORED_EMISSIVE = false;
@@ -20,24 +20,21 @@ layout(constant) const bool STORED_TRANSMISSION = false; // transmissive surface
 layout(pass, r32f) readonly uniform imageBuffer depths;
 layout(pass, rgba32f) readonly uniform imageBuffer depths_as_rgba32f;
 layout(pass, rgba16f) readonly uniform image2D base; // base colour and metallic texels
-layout(pass, rgba16_snorm) readonly uniform image2D normals;
-layout(pass, rgba8_snorm) readonly uniform image2D normals_as_rgba8_snorm;
-layout(pass, rgba32f) readonly uniform image2D normals_as_rgba32f;
+layout(pass, rg32ui) readonly uniform uimage2D normals; // lib/normals.glsl
+layout(pass, r32ui) readonly uniform uimage2D normals_as_r32ui;
+layout(pass, rgba32ui) readonly uniform uimage2D normals_as_rgba32ui;
 layout(pass, rg32ui) readonly uniform uimage2D ids; // material | roughness << 16, instance | back face << 23 | occlusion << 24
 layout(pass, rgba16f) readonly uniform image2D emissive; // texel
 layout(pass, rgba32ui) readonly uniform uimage2D layers; // lib/texels.glsl, packed_layers
 layout(pass, r32ui) readonly uniform uimage2D triangles; // of the scene
 
-const uint NORMALS_OCT16 = 0;
-const uint NORMALS_OCT24 = 1;
-const uint NORMALS_OCT32 = 2;
-const uint NORMALS_F32 = 3;
-
 // Octahedral shading normal and geometric normal.
 vec4 stored_normals(ivec2 pixel) {
-    if (NORMALS == NORMALS_OCT16) return imageLoad(normals_as_rgba8_snorm, pixel);
-    if (NORMALS == NORMALS_F32) return imageLoad(normals_as_rgba32f, pixel);
-    return imageLoad(normals, pixel);
+    uvec4 words;
+    if (NORMALS == NORMALS_OCT16) words = imageLoad(normals_as_r32ui, pixel);
+    else if (NORMALS == NORMALS_F32) words = imageLoad(normals_as_rgba32ui, pixel);
+    else words = imageLoad(normals, pixel);
+    return octahedra_of_words(words);
 }
 
 int pixel_index(ivec2 pixel) {

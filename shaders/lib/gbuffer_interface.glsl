@@ -8,7 +8,7 @@
 layout(constant) const uint TEXTURES = 0; // bit by slot; those of normals where the mesh has tangents
 layout(constant) const bool HAS_COLOR = false;
 layout(constant) const bool MASKED = false;
-layout(constant) const uint NORMAL_STEPS = 0; // that stored normals are rounded to; 0: what they are stored in decides
+layout(constant) const bool SHARED_VERTICES = true; // by triangles; otherwise each has three of its own, one after the other
 const bool HAS_NORMAL = (TEXTURES & (1u << SLOT_NORMAL)) != 0;
 const bool HAS_COAT_NORMAL = (TEXTURES & (1u << SLOT_CLEARCOAT_NORMAL)) != 0;
 

@@ -109,6 +109,9 @@ int cube_face(vec3 d) {
 // normal, and h/z ≥ cos is the plane's distance over p's: 4 h z/z_n ≤ 4 z/cos of the frustum's corner: 8 of |p_rel|. The
 // map's depth likewise, 8 of the distance to a light near the scene, 8 of the scene's extent for others, and that again for
 // the products here. All of it is an offset along n, by `size` with 32: half of that, and as much to spare.
+//
+// Rasterisers round vertices to parts of a pixel, and most interpolate depth between the rounded ones (View::snap): then p has the depth of
+// a point that far beside it, and is off the plane by that at most. What the map stores is less by the change over a whole texel already.
 float map_visibility(vec3 p, vec3 n, vec3 to_light, uint index, float size) {
     Light light = light_at(index);
     int first = int(light.first_map) + (light.maps > 1.0 ? cube_face(-to_light) * SHADOW_MAP_TEXELS : 0);
@@ -118,7 +121,8 @@ float map_visibility(vec3 p, vec3 n, vec3 to_light, uint index, float size) {
     vec4 row_d = imageLoad(lights, first + 3);
     vec4 row_w = imageLoad(lights, first + 4);
     float distance = light.infinite_far > 0.0 ? vector_length(to_light) : 0.0;
-    vec4 q = vec4(p + n * (trace_terms.offset + (size + distance) * SHADOW_ROUNDINGS), 1.0);
+    float snap = trace_terms.snap.x + trace_terms.snap.y * size;
+    vec4 q = vec4(p + n * (trace_terms.offset + snap + (size + distance) * SHADOW_ROUNDINGS), 1.0);
     float w = dot(row_w, q);
     vec3 at = vec3(dot(row_u, q), dot(row_v, q), dot(row_d, q)) / w;
     // Gradients of across, down and depth in space, times w. On the plane, ∇d = g_x ∇u + g_y ∇v + a multiple of n.

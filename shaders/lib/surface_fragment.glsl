@@ -16,6 +16,11 @@ layout(location = 5) flat in uvec3 ids;
 
 layout(push_constant, scalar) uniform Push { float lod_bias; uint strip; };
 
+// Of the scene. Where fragments cannot know it, `ids` has it all, and gl_PrimitiveID is made 0 (crates/vulkan/src/primitive_ids.rs).
+uint triangle() {
+    return ids.z + uint(gl_PrimitiveID);
+}
+
 struct SurfaceFragment {
     Texels texels;
     vec3 n_shading;     // unit, to the viewer's side of the face

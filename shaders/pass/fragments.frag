@@ -4,7 +4,7 @@
 #extension GL_EXT_scalar_block_layout : require
 layout(early_fragment_tests) in;
 #include "lib/surface_fragment.glsl"
-#include "lib/encode.glsl"
+#include "lib/normals.glsl"
 #include "lib/fragment_list.glsl"
 
 layout(pass, r32ui) uniform uimage2D heads;
@@ -28,14 +28,17 @@ void main() {
     nodes[at + 0] = imageAtomicExchange(heads, ivec2(gl_FragCoord.xy), slot);
     nodes[at + 1] = floatBitsToUint(gl_FragCoord.z);
     nodes[at + 2] = ids.x;
-    nodes[at + 3] = uint(gl_PrimitiveID);
+    nodes[at + 3] = triangle();
     nodes[at + 4] = ids.y | uint(clamp(t.roughness, 0.0, 1.0) * 65535.0 + 0.5) << 16;
     nodes[at + 5] = packHalf2x16(t.base.rg);
     nodes[at + 6] = packHalf2x16(vec2(t.base.b, t.metallic));
-    nodes[at + 7] = packSnorm2x16(in_steps(octahedral_from_unit(s.n_shading), NORMAL_STEPS));
+    nodes[at + 7] = packSnorm2x16(stored_octahedron(s.n_shading));
     nodes[at + 8] = packHalf2x16(t.emissive.rg);
     nodes[at + 9] = packHalf2x16(vec2(t.emissive.b, alpha));
     nodes[at + 10] = packUnorm2x16(vec2(t.occlusion, 0.0));
     uvec4 layers = packed_layers(t, s.n_coat);
-    for (uint i = 0; i < 4; i++) nodes[at + 11 + i] = layers[i];
+    nodes[at + 11] = layers.x;
+    nodes[at + 12] = layers.y;
+    nodes[at + 13] = layers.z;
+    nodes[at + 14] = layers.w;
 }

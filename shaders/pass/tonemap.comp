@@ -13,6 +13,8 @@ layout(pass, scalar) buffer Counts { uint nan; uint inf; uint negative; };
 // `background` is display-linear and lies behind what is not covered; its alpha 0 keeps the picture transparent.
 layout(push_constant, scalar) uniform Push { vec4 background; float exposure; float scale; };
 
+const uint INFINITY_BITS = 0x7f800000u;
+
 uint byte_from(float x) {
     return uint(floor(x * 255.0 + 0.5));
 }
@@ -23,8 +25,10 @@ void main() {
     if (any(greaterThanEqual(pixel, size))) return;
     vec4 value = imageLoad(film, pixel) * scale;
     // Counted before anything clamps: max(NaN, 0) is 0.
-    if (any(isnan(value))) atomicAdd(nan, 1u);
-    if (any(isinf(value))) atomicAdd(inf, 1u);
+    // By their bits: a compiler may assume that there are none, and drop a comparison.
+    uvec4 bits = floatBitsToUint(value) & 0x7fffffffu;
+    if (any(greaterThan(bits, uvec4(INFINITY_BITS)))) atomicAdd(nan, 1u);
+    if (any(equal(bits, uvec4(INFINITY_BITS)))) atomicAdd(inf, 1u);
     // Of a picture by wavelengths even white comes back with roundings.
     float rounding = DESATURATES ? -1e-4 * max(value.r, max(value.g, value.b)) : 0.0;
     if (any(lessThan(value, vec4(rounding)))) atomicAdd(negative, 1u);

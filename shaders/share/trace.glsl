@@ -13,6 +13,7 @@ struct TraceTerms {
     uvec4 camera_media;   // the media the eye is in (lib/media.glsl)
     float pixel_angle;    // what a pixel covers at distance 1, or everywhere where the camera is orthographic
     float lod_bias;
+    vec2 snap;            // how far a point rebuilt from depth may lie off its surface because vertices are rounded: metres, and parts of its distance
     uint sample_index;
     uint interfaces;      // surfaces that a path may meet
 };

@@ -20,7 +20,9 @@ pub fn aov<'a>(
     let bind = aov::Bind { gbuffer: gbuffer.bind(), pixels };
     let size = gbuffer.depth.desc();
     // Of the formulas only how things are stored.
-    let constants = aov::Constants { library: Library { gbuffer: library.gbuffer, ..Library::default() } };
+    let constants = aov::Constants {
+        library: Library { gbuffer: library.gbuffer, normals: library.normals, ..Library::default() },
+    };
     let push = aov::Push { first_row: rows[0], end_row: rows[1] };
     frame.compute_over("AOVs", &bind, &constants, &push, [size.width, rows[1] - rows[0]])?;
     frame.read_back(pixels);

@@ -1,6 +1,6 @@
 //! Raster G-buffer: the nearest opaque surface of every pixel (shaders/pass/gbuffer.*).
 //!
-//! 24 bytes a pixel beside depth: RGBA16F base colour and metallic, two octahedral normals (RGBA16_SNORM, or as the knob
+//! 24 bytes a pixel beside depth: RGBA16F base colour and metallic, two octahedral normals (RG32UI, or as the knob
 //! `normals` says), RG32UI ids, roughness and occlusion; 16 more for positions where the knob `position` stores them; 4 for
 //! triangles where there are rays, 8 for emissive textures and 16 for layers where the plan has them. docs/decisions/gbuffer.md has
 //! what narrower and wider choices cost.
@@ -17,13 +17,13 @@ use crate::upload::scene::SceneOnDevice;
 
 const POSITION: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
-/// Four components: two octahedral normals. Nothing that can be drawn to has four of 12 bits: `oct24` leaves four of each 16
-/// empty, and costs what `oct32` does.
+/// Words of two octahedral normals (shaders/lib/normals.glsl): every device draws to such formats and stores them, which is not so of
+/// RGBA16_SNORM.
 fn normal_format(normals: Normals) -> vk::Format {
     match normals {
-        Normals::Oct16 => vk::Format::R8G8B8A8_SNORM,
-        Normals::Oct24 | Normals::Oct32 => vk::Format::R16G16B16A16_SNORM,
-        Normals::F32 => vk::Format::R32G32B32A32_SFLOAT,
+        Normals::Oct16 => vk::Format::R32_UINT,
+        Normals::Oct24 | Normals::Oct32 => vk::Format::R32G32_UINT,
+        Normals::F32 => vk::Format::R32G32B32A32_UINT,
     }
 }
 

@@ -118,6 +118,7 @@ pub struct RaysOnDevice {
     /// For the report; `None` without rays.
     pub facts: Option<BvhFacts>,
     fixed: TraceTerms,
+    snap_pixels: f64,
     anchor: DVec3,
     /// The transparent bodies alone, to find those that the eye is in.
     bodies: Scene,
@@ -201,6 +202,7 @@ impl RaysOnDevice {
         };
         Ok(Self {
             terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,
+            snap_pixels: device.snap_pixels(),
             counts: Buffer::new(device, "work counts", size_of::<WorkCounts>() as u64, Place::Readback)?,
             constants: TraceConstants {
                 traversal: traversal as u32,
@@ -252,6 +254,7 @@ impl RaysOnDevice {
             emitters: EmittersOnDevice::new(device, &Emitters::default(), &[])?,
             aims: AimsOnDevice::none(device)?,
             terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,
+            snap_pixels: device.snap_pixels(),
             counts: Buffer::new(device, NOTHING, 0, Place::Readback)?,
             constants: TraceConstants::default(),
             facts: None,
@@ -292,6 +295,7 @@ impl RaysOnDevice {
             sample_index,
             pixel_angle: view.pixel_angle() as f32,
             lod_bias: -0.5 * (samples as f32).log2(),
+            snap: view.snap(self.snap_pixels).map(|off| off as f32),
             ..self.fixed
         };
         self.terms.write(bytemuck::bytes_of(&terms));

@@ -119,7 +119,7 @@ pub struct SceneOnDevice {
     /// What each light's last texel says of its shadow maps.
     light_shadows: Vec<LightMaps>,
     refraction: bool,
-    normal_steps: u32,
+    stored_normals: lib::normals::Constants,
     textures: Textures,
     /// Materials by index → place in [`SceneOnDevice::pages`].
     page_of_material: Vec<usize>,
@@ -165,7 +165,12 @@ fn stream<T: bytemuck::NoUninit>(
     let mut all: Vec<T> = Vec::with_capacity(scene.meshes.iter().map(|m| attribute(m).len()).sum());
     for mesh in &scene.meshes {
         offsets.push(size_of_val(all.as_slice()) as u64);
-        all.extend_from_slice(attribute(mesh));
+        let of_vertices = attribute(mesh);
+        if device.offers().primitive_ids || of_vertices.is_empty() {
+            all.extend_from_slice(of_vertices);
+        } else {
+            all.extend(mesh.indices.iter().map(|&vertex| of_vertices[vertex as usize]));
+        }
     }
     Ok(Stream { data: upload(device, name, &all, None)?, offsets, stride: size_of::<T>() as u32 })
 }
@@ -212,7 +217,11 @@ impl SceneOnDevice {
                 has_colors: !mesh.colors.is_empty(),
                 extent: extent(&mesh.positions),
             });
-            all_indices.extend_from_slice(&mesh.indices);
+            if device.offers().primitive_ids {
+                all_indices.extend_from_slice(&mesh.indices);
+            } else {
+                all_indices.extend(0..mesh.indices.len() as u32);
+            }
         }
         let grids = SigmaGrids::new(device, plan, &scene, anchor)?;
         let first_triangles = scene.first_triangles();
@@ -310,7 +319,7 @@ impl SceneOnDevice {
             materials_cpu: scene.materials,
             lights_cpu,
             refraction: plan.rays.is_some_and(|rays| rays.refraction),
-            normal_steps: plan.stored.normals.steps(),
+            stored_normals: lib::normals::Constants { normals: plan.stored.normals as u32 },
             textures,
             page_of_material,
             page_materials,
@@ -455,11 +464,11 @@ impl SceneOnDevice {
             textures: texture_bits(material) & if mesh.has_tangents { u32::MAX } else { !BENT },
             has_color: mesh.has_colors,
             masked: matches!(material.alpha_mode, AlphaMode::Mask(_)),
-            normal_steps: self.normal_steps,
+            shared_vertices: self.device.offers().primitive_ids,
         };
         Draw {
             pages: self.page_of_material[mesh.material],
-            constants: has.words(),
+            constants: [has.words(), self.stored_normals.words()].concat(),
             streams: vec![
                 self.positions.of(placement.mesh),
                 self.normals.of(placement.mesh),

@@ -110,7 +110,6 @@ impl<'a> OnDevice<'a> {
             },
             environment: lib::environment::Constants { sky: plan.sky, environment: plan.environment },
             gbuffer: lib::gbuffer::Constants {
-                normals: plan.stored.normals as u32,
                 normal_error2: plan.stored.normals.error2(),
                 positions: plan.stored.positions,
                 stored_emissive: plan.emissive,
@@ -120,6 +119,7 @@ impl<'a> OnDevice<'a> {
             },
             gbuffer_interface: lib::gbuffer_interface::Constants::default(),
             hit: rays.constants.hit,
+            normals: lib::normals::Constants { normals: plan.stored.normals as u32 },
             layers: lib::layers::Constants { transmissive: with.transmissive },
             lighting: lib::lighting::Constants {
                 // Where tiles list them, no pixel goes through all of them.
@@ -195,9 +195,9 @@ const _: () = {
     assert!(Fresnel::Schlick as u32 == lib::surface::FRESNEL_SCHLICK);
     assert!(Fresnel::Exact as u32 == lib::surface::FRESNEL_EXACT);
     assert!(
-        Normals::Oct16 as u32 == lib::gbuffer::NORMALS_OCT16 && Normals::Oct24 as u32 == lib::gbuffer::NORMALS_OCT24
+        Normals::Oct16 as u32 == lib::normals::NORMALS_OCT16 && Normals::Oct24 as u32 == lib::normals::NORMALS_OCT24
     );
-    assert!(Normals::Oct32 as u32 == lib::gbuffer::NORMALS_OCT32 && Normals::F32 as u32 == lib::gbuffer::NORMALS_F32);
+    assert!(Normals::Oct32 as u32 == lib::normals::NORMALS_OCT32 && Normals::F32 as u32 == lib::normals::NORMALS_F32);
     assert!(Quadrature::Left as u32 == lib::medium::QUADRATURE_LEFT);
     assert!(Quadrature::Midpoint as u32 == lib::medium::QUADRATURE_MIDPOINT);
     assert!(Quadrature::Simpson as u32 == lib::medium::QUADRATURE_SIMPSON);

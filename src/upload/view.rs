@@ -53,6 +53,18 @@ impl View {
         2.0 * self.half.y / f64::from(self.size[1])
     }
 
+    /// How far a point that is rebuilt from depth may lie off its surface on a device that moves vertices by so many pixels before it
+    /// interpolates depth between them: metres, and parts of its largest coordinate.
+    ///
+    /// Depth d is linear on the screen. From vertices moved by up to s pixels, a pixel at x has d(x − δ), |δ| ≤ s: the depth of a point of
+    /// the surface that lies s pixels beside it, and so that distance from it at most.
+    #[must_use]
+    pub fn snap(&self, pixels: f64) -> [f64; 2] {
+        let off = pixels * self.pixel_angle();
+        // The distance is at most √3 of the largest coordinate.
+        if self.orthographic { [off, 0.0] } else { [0.0, 3.0_f64.sqrt() * off] }
+    }
+
     /// What the shaders get, for a sample `jitter` pixels off the pixel centres.
     #[must_use]
     pub fn shared(&self, jitter: DVec2) -> share::Camera {

@@ -87,6 +87,11 @@ impl<'p> Programs<'p> {
             for (kinds, limit, what) in [
                 (&["StorageImage", "StorageTexelBuffer"][..], "STORAGE_IMAGES", "storage images"),
                 (&["StorageBuffer"][..], "STORAGE_BUFFERS", "storage buffers"),
+                (
+                    &["StorageBuffer", "StorageTexelBuffer"][..],
+                    "STORAGE_BUFFERS_AND_TABLES",
+                    "storage buffers and tables",
+                ),
                 (&["UniformBuffer"][..], "UNIFORM_BUFFERS", "uniform buffers"),
             ] {
                 match all().filter(|b| kinds.contains(&b.kind)).count() {

@@ -85,13 +85,14 @@ impl Descriptor {
         layout: vk::ImageLayout,
     ) -> Result<Self> {
         Ok(match (kind, resource) {
-            (BindingKind::StorageTexelBuffer, Resource::Buffer(buffer)) => {
+            (BindingKind::StorageTexelBuffer, Resource::Buffer(buffer)) if device.offers().texel_buffers => {
                 assert!(buffer.view != vk::BufferView::null(), "a texel buffer needs `Buffer::texels`");
                 Self::Texels(buffer.view)
             }
-            (BindingKind::UniformBuffer | BindingKind::StorageBuffer, Resource::Buffer(buffer)) => {
-                Self::Buffer(vk::DescriptorBufferInfo { buffer: buffer.raw, offset: 0, range: vk::WHOLE_SIZE })
-            }
+            (
+                BindingKind::UniformBuffer | BindingKind::StorageBuffer | BindingKind::StorageTexelBuffer,
+                Resource::Buffer(buffer),
+            ) => Self::Buffer(vk::DescriptorBufferInfo { buffer: buffer.raw, offset: 0, range: vk::WHOLE_SIZE }),
             (BindingKind::StorageImage, Resource::Image(image)) => Self::Image(vk::DescriptorImageInfo {
                 sampler: vk::Sampler::null(),
                 image_view: image.view,
@@ -107,9 +108,9 @@ impl Descriptor {
     }
 
     /// Its write to the slot of a binding.
-    pub(super) fn write(&self, binding: &Binding) -> vk::WriteDescriptorSet<'_> {
-        let write =
-            vk::WriteDescriptorSet::default().dst_binding(binding.slot).descriptor_type(binding.kind.descriptor_type());
+    pub(super) fn write(&self, device: &Device, binding: &Binding) -> vk::WriteDescriptorSet<'_> {
+        let kind = binding.kind.descriptor_type(device.offers().texel_buffers);
+        let write = vk::WriteDescriptorSet::default().dst_binding(binding.slot).descriptor_type(kind);
         match self {
             Self::Buffer(info) => write.buffer_info(std::slice::from_ref(info)),
             Self::Texels(view) => write.texel_buffer_view(std::slice::from_ref(view)),

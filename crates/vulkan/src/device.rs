@@ -13,7 +13,8 @@ use serde::Serialize;
 use super::cache::Caches;
 use super::choice::DeviceChoice;
 use super::error::NotOpened;
-use super::limits::{PUSH_DESCRIPTORS, STORAGE_BUFFERS, STORAGE_IMAGES, UNIFORM_BUFFERS};
+use super::limits::{COLOR_TARGETS, STORAGE_BUFFERS, STORAGE_BUFFERS_AND_TABLES, STORAGE_IMAGES, UNIFORM_BUFFERS};
+use super::offers::Offers;
 use super::pace::Turns;
 use super::surface::Surface;
 
@@ -51,6 +52,10 @@ pub struct Candidate {
     pub info: DeviceInfo,
     /// What Etalon needs and the device lacks; empty when it can be used.
     pub missing: Vec<String>,
+    /// What it has of what Etalon can do without.
+    pub offers: Offers,
+    #[serde(skip)]
+    is_lavapipe: bool,
     #[serde(skip)]
     physical: vk::PhysicalDevice,
 }
@@ -182,10 +187,12 @@ impl Instance {
 
     fn candidate(&self, physical: vk::PhysicalDevice, surface: Option<&Surface>) -> Candidate {
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
-        let mut push = vk::PhysicalDevicePushDescriptorPropertiesKHR::default();
-        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut push);
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
         // SAFETY: plain queries; the chain outlives the call.
-        unsafe { self.raw.get_physical_device_properties2(physical, &mut properties) };
+        let extensions = unsafe {
+            self.raw.get_physical_device_properties2(physical, &mut properties);
+            self.raw.enumerate_device_extension_properties(physical).unwrap_or_default()
+        };
         let properties = properties.properties;
         let version =
             |v: u32| format!("{}.{}.{}", vk::api_version_major(v), vk::api_version_minor(v), vk::api_version_patch(v));
@@ -202,21 +209,23 @@ impl Instance {
             },
             api: version(properties.api_version),
         };
-        let mut missing = self.missing(physical, properties.api_version, push.max_push_descriptors, properties.limits);
+        let offers = Offers::of(&self.raw, physical, &extensions);
+        let is_lavapipe = driver.driver_id == vk::DriverId::MESA_LLVMPIPE;
+        let mut missing = self.missing(physical, properties.api_version, &offers, properties.limits);
         missing.extend(
             surface
                 .filter(|surface| !surface.is_shown_by(&self.raw, physical))
                 .map(|_| "a way to show pictures in this window".to_owned()),
         );
-        Candidate { info, missing, physical }
+        Candidate { info, missing, offers, physical, is_lavapipe }
     }
 
-    /// What the device lacks, each with the Mesa version that brings it where that helps.
+    /// What the device lacks of what none can do without, each with the Mesa version that brings it where that helps.
     fn missing(
         &self,
         physical: vk::PhysicalDevice,
         api: u32,
-        push_descriptors: u32,
+        offers: &Offers,
         limits: vk::PhysicalDeviceLimits,
     ) -> Vec<String> {
         if api < vk::API_VERSION_1_3 {
@@ -227,19 +236,14 @@ impl Instance {
         let mut v13 = vk::PhysicalDeviceVulkan13Features::default();
         let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut v12).push_next(&mut v13);
         // SAFETY: plain queries; the chain outlives the call.
-        let (extensions, families) = unsafe {
+        let families = unsafe {
             self.raw.get_physical_device_features2(physical, &mut all);
-            (
-                self.raw.enumerate_device_extension_properties(physical).unwrap_or_default(),
-                self.raw.get_physical_device_queue_family_properties(physical),
-            )
+            self.raw.get_physical_device_queue_family_properties(physical)
         };
         let core = all.features;
         for (has, what) in [
             (core.fragment_stores_and_atomics, "feature fragmentStoresAndAtomics"),
             (core.shader_storage_image_extended_formats, "feature shaderStorageImageExtendedFormats"),
-            (core.full_draw_index_uint32, "feature fullDrawIndexUint32"),
-            (core.geometry_shader, "feature geometryShader (for gl_PrimitiveID in fragments)"),
             (v12.timeline_semaphore, "feature timelineSemaphore"),
             (v12.scalar_block_layout, "feature scalarBlockLayout (lavapipe: Mesa 21.1 or newer)"),
             (v13.dynamic_rendering, "feature dynamicRendering (lavapipe: Mesa 22.1 or newer)"),
@@ -254,7 +258,6 @@ impl Instance {
         let target = F::COLOR_ATTACHMENT | F::STORAGE_IMAGE;
         for (format, uses, what) in [
             (vk::Format::R16G16B16A16_SFLOAT, target, "colour targets and storage images of RGBA16_SFLOAT"),
-            (vk::Format::R16G16B16A16_SNORM, target, "colour targets and storage images of RGBA16_SNORM"),
             (vk::Format::R16G16B16A16_UNORM, target, "colour targets and storage images of RGBA16_UNORM"),
             (vk::Format::R32G32_UINT, target, "colour targets and storage images of RG32_UINT"),
             (vk::Format::R32G32B32A32_SFLOAT, F::SAMPLED_IMAGE_FILTER_LINEAR, "linear filtering of RGBA32_SFLOAT"),
@@ -265,21 +268,16 @@ impl Instance {
                 missing.push(what.to_owned());
             }
         }
+        let buffers = if offers.texel_buffers { STORAGE_BUFFERS } else { STORAGE_BUFFERS_AND_TABLES };
         for (has, needed, what) in [
             (limits.max_per_stage_descriptor_storage_images, STORAGE_IMAGES, "storage images in a shader"),
-            (limits.max_per_stage_descriptor_storage_buffers, STORAGE_BUFFERS, "storage buffers in a shader"),
+            (limits.max_per_stage_descriptor_storage_buffers, buffers, "storage buffers in a shader"),
             (limits.max_per_stage_descriptor_uniform_buffers, UNIFORM_BUFFERS, "uniform buffers in a shader"),
-            (limits.max_color_attachments, 7, "colour targets"),
-            (limits.max_texel_buffer_elements, 1 << 22, "texels in a buffer"),
+            (limits.max_color_attachments, COLOR_TARGETS, "colour targets"),
         ] {
             if has < needed {
                 missing.push(format!("{needed} {what} (it has {has})"));
             }
-        }
-        if !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::push_descriptor::NAME)) {
-            missing.push("extension VK_KHR_push_descriptor (lavapipe: Mesa 20.3 or newer)".to_owned());
-        } else if push_descriptors < PUSH_DESCRIPTORS {
-            missing.push(format!("{PUSH_DESCRIPTORS} push descriptors (it has {push_descriptors})"));
         }
         if !families.iter().any(|f| f.queue_flags.contains(QUEUE)) {
             missing.push("a queue with graphics and compute".to_owned());
@@ -331,18 +329,6 @@ pub(super) fn text(name: Result<&CStr, FromBytesUntilNulError>) -> String {
     name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// Whether a device tells what its compiler makes of pipelines (`compiled.rs`): the extension with its one feature.
-fn tells_compiled(raw: &ash::Instance, physical: vk::PhysicalDevice, extensions: &[vk::ExtensionProperties]) -> bool {
-    if !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::pipeline_executable_properties::NAME)) {
-        return false;
-    }
-    let mut told = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default();
-    let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut told);
-    // SAFETY: a plain query; the chain outlives the call.
-    unsafe { raw.get_physical_device_features2(physical, &mut all) };
-    told.pipeline_executable_info == vk::TRUE
-}
-
 fn choose(all: Vec<Candidate>, choice: &DeviceChoice) -> Result<Candidate> {
     if all.is_empty() {
         bail!(NotOpened::NoDevice);
@@ -384,14 +370,15 @@ pub struct Device {
     pub(super) queue: Mutex<vk::Queue>,
     pub(super) commands: Mutex<vk::CommandPool>,
     pub(super) timeline: vk::Semaphore,
-    pub(super) push: khr::push_descriptor::Device,
+    pub(super) push: Option<khr::push_descriptor::Device>,
     pub(super) debug: Option<ext::debug_utils::Device>,
     /// What tells of compiled pipelines, where the driver does.
     pub(super) executables: Option<khr::pipeline_executable_properties::Device>,
     pub(super) allocator: Mutex<ManuallyDrop<Allocator>>,
     pub(super) caches: Mutex<Caches>,
     pub(super) limits: vk::PhysicalDeviceLimits,
-    adds_in_subgroups: bool,
+    offers: Offers,
+    is_lavapipe: bool,
     pub(super) submitted: AtomicU64,
     next_id: AtomicU64,
     created: Mutex<Vec<Created>>,
@@ -413,7 +400,7 @@ impl Device {
         surface: Option<&Surface>,
         turns: bool,
     ) -> Result<Arc<Self>> {
-        let Candidate { info, physical, .. } = choose(instance.candidates(surface)?, choice)?;
+        let Candidate { info, physical, offers, is_lavapipe, .. } = choose(instance.candidates(surface)?, choice)?;
         let opening = || format!("opening device \"{}\"", info.name);
         // SAFETY: plain queries on a live instance.
         let (families, properties, extensions) = unsafe {
@@ -434,20 +421,24 @@ impl Device {
             .with_context(opening)? as u32;
 
         let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
-        let mut names = vec![khr::push_descriptor::NAME.as_ptr()];
+        let mut names = Vec::new();
+        if offers.push_descriptors {
+            names.push(khr::push_descriptor::NAME.as_ptr());
+        }
         names.extend(surface.map(|_| khr::swapchain::NAME.as_ptr()));
         if extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::portability_subset::NAME)) {
             names.push(khr::portability_subset::NAME.as_ptr());
         }
-        let told = tells_compiled(&instance.raw, physical, &extensions);
-        if told {
+        if offers.tells_compiled {
             names.push(khr::pipeline_executable_properties::NAME.as_ptr());
         }
         let core = vk::PhysicalDeviceFeatures::default()
             .fragment_stores_and_atomics(true)
             .shader_storage_image_extended_formats(true)
-            .full_draw_index_uint32(true)
-            .geometry_shader(true);
+            .full_draw_index_uint32(offers.large_indices)
+            .geometry_shader(offers.primitive_ids)
+            // What is read beside an array that was a buffer of texels must stay as harmless as it was there.
+            .robust_buffer_access(!offers.texel_buffers);
         let mut v12 = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true).scalar_block_layout(true);
         let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
             .dynamic_rendering(true)
@@ -461,7 +452,7 @@ impl Device {
             .enabled_features(&core)
             .push_next(&mut v12)
             .push_next(&mut v13);
-        if told {
+        if offers.tells_compiled {
             create = create.push_next(&mut executables);
         }
         // SAFETY: everything `create` asks for was found present by `Instance::missing`.
@@ -476,12 +467,6 @@ impl Device {
             allocation_sizes: gpu_allocator::AllocationSizes::new(16 << 20, 8 << 20),
         })
         .with_context(opening)?;
-        let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
-        let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut v11);
-        // SAFETY: a plain query; the chain outlives the call.
-        unsafe { instance.raw.get_physical_device_properties2(physical, &mut all) };
-        let adds_in_subgroups = v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
-            && v11.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::ARITHMETIC);
         // SAFETY: the family was created above; the create infos outlive the calls.
         let (queue, commands, timeline) = unsafe {
             let pool = vk::CommandPoolCreateInfo::default()
@@ -496,8 +481,10 @@ impl Device {
             )
         };
         let device = Arc::new(Self {
-            push: khr::push_descriptor::Device::new(&instance.raw, &raw),
-            executables: told.then(|| khr::pipeline_executable_properties::Device::new(&instance.raw, &raw)),
+            push: offers.push_descriptors.then(|| khr::push_descriptor::Device::new(&instance.raw, &raw)),
+            executables: offers
+                .tells_compiled
+                .then(|| khr::pipeline_executable_properties::Device::new(&instance.raw, &raw)),
             debug: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw)),
             raw,
             queue: Mutex::new(queue),
@@ -506,7 +493,8 @@ impl Device {
             allocator: Mutex::new(ManuallyDrop::new(allocator)),
             caches: Mutex::default(),
             limits: properties.limits,
-            adds_in_subgroups,
+            offers,
+            is_lavapipe,
             submitted: AtomicU64::new(0),
             next_id: AtomicU64::new(1),
             created: Mutex::default(),
@@ -554,12 +542,21 @@ impl Device {
     /// Whether the driver ends all loops of an invocation, in silence, after 65,535 evaluations of their heads: lavapipe.
     #[must_use]
     pub fn limits_loops(&self) -> bool {
-        self.is_software()
+        self.is_lavapipe
     }
 
     /// Whether the device is the processor itself: its memory is the process's own.
     pub(super) fn is_software(&self) -> bool {
         self.info.kind == "cpu"
+    }
+
+    /// Pixels by which the rasteriser moves vertices at most before it interpolates depth between them. lavapipe finds what a triangle
+    /// covers from rounded vertices and depth from exact ones.
+    #[must_use]
+    pub fn snap_pixels(&self) -> f64 {
+        // Half a step across and down.
+        let half_diagonal = std::f64::consts::FRAC_1_SQRT_2 * 0.5_f64.powi(self.limits.sub_pixel_precision_bits as i32);
+        if self.is_lavapipe { 0.0 } else { half_diagonal }
     }
 
     /// Largest width and height of a 2D image and of a viewport.
@@ -574,10 +571,10 @@ impl Device {
         u64::from(self.limits.max_storage_buffer_range)
     }
 
-    /// Whether invocations of a compute shader add up numbers among them, a subgroup at a time.
+    /// What it has of what Etalon can do without.
     #[must_use]
-    pub fn adds_in_subgroups(&self) -> bool {
-        self.adds_in_subgroups
+    pub fn offers(&self) -> &Offers {
+        &self.offers
     }
 
     /// Buffers, images, pipelines and samplers that there are now.

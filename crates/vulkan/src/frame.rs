@@ -17,8 +17,8 @@ use super::cache::{PipelineKey, RasterKey};
 use super::device::{Device, lock};
 use super::memory::{Buffer, Image};
 use super::pace::Interrupted;
-use super::recording::{Dispatch, Groups, Pass, Recording, Target, Work, bind_sets, push_constants, push_descriptors};
-use super::set::BoundSet;
+use super::recording::{Dispatch, Groups, Own, Pass, Recording, Target, Work, bind_own, bind_sets, push_constants};
+use super::set::{BoundSet, Pooled};
 use super::shader::{Program, SharedSet, Specialization as _};
 use super::sync::{self, ResourceId, State, Use};
 
@@ -115,6 +115,8 @@ pub struct Frame<'a> {
     passes: Vec<Pass<'a>>,
     targets: HashMap<ResourceId, Target<'a>>,
     sets: Vec<BoundSet<'a>>,
+    /// Sets of single passes, where descriptors cannot be pushed.
+    own: Vec<Pooled>,
     without_barriers: bool,
 }
 
@@ -127,6 +129,7 @@ impl<'a> Frame<'a> {
             passes: Vec::new(),
             targets: HashMap::new(),
             sets: Vec::new(),
+            own: Vec::new(),
             without_barriers: false,
         }
     }
@@ -153,14 +156,14 @@ impl<'a> Frame<'a> {
         uses.push(Use { resource: image.id, is_image: true, access, shaders });
     }
 
-    /// Notes the uses of a program's bindings and prepares their descriptors.
+    /// Notes the uses of a program's bindings and prepares their descriptors: to be pushed, or in a set for this one use.
     fn bind(
         &mut self,
         uses: &mut Vec<Use>,
         program: &'static Program,
         resources: &[Resource<'a>],
         depth: Option<ResourceId>,
-    ) -> Result<Vec<Descriptor>> {
+    ) -> Result<Own> {
         let mut descriptors = Vec::with_capacity(resources.len());
         for (binding, &resource) in program.bindings.iter().zip(resources) {
             let mut layout = binding.access.masks(binding.stages).layout;
@@ -176,7 +179,19 @@ impl<'a> Frame<'a> {
             }
             descriptors.push(Descriptor::new(&self.device, binding.kind, resource, layout)?);
         }
-        Ok(descriptors)
+        if self.device.push.is_some() || descriptors.is_empty() {
+            return Ok(Own::Pushed(descriptors));
+        }
+        let layout = self.device.layout(program)?.set;
+        let creating = || format!("creating descriptors of \"{}\"", program.name);
+        let own = Pooled::new(&self.device, program.bindings, layout, creating)?;
+        for (binding, descriptor) in program.bindings.iter().zip(&descriptors) {
+            // SAFETY: it is new, and what it points at lives as long as the frame.
+            unsafe { own.write(binding, descriptor) };
+        }
+        let raw = own.raw;
+        self.own.push(own);
+        Ok(Own::Set(raw))
     }
 
     /// Notes the uses of what a program reads of the sets 1 and 2.
@@ -202,7 +217,7 @@ impl<'a> Frame<'a> {
                     }
                 }
             }
-            sets.push(known.set.raw);
+            sets.push(known.set.pooled.raw);
         }
         sets
     }
@@ -248,7 +263,7 @@ impl<'a> Frame<'a> {
     ) -> Result<()> {
         let program = bindings.program();
         let mut uses = Vec::new();
-        let descriptors = self.bind(&mut uses, program, &bindings.resources(), None)?;
+        let own = self.bind(&mut uses, program, &bindings.resources(), None)?;
         let sets = self.shared(&mut uses, program, None);
         if let Groups::At(sizes, _) = groups {
             self.use_buffer(&mut uses, sizes, Access::IndirectRead, vk::ShaderStageFlags::empty());
@@ -260,7 +275,7 @@ impl<'a> Frame<'a> {
             pipelines: vec![PipelineKey { program, constants: constants.words(), raster: None }],
             work: Work::Dispatch(Dispatch {
                 program,
-                descriptors,
+                own,
                 sets,
                 layout,
                 push: bytemuck::bytes_of(push).to_vec(),
@@ -311,7 +326,7 @@ impl<'a> Frame<'a> {
         let depth = raster.depth.map(|d| d.image.id);
         // A pass that draws nothing clears its targets, which no program binds meanwhile.
         let resources = if draws.is_empty() { Vec::new() } else { bindings.resources() };
-        let descriptors = self.bind(&mut uses, program, &resources, depth)?;
+        let own = self.bind(&mut uses, program, &resources, depth)?;
         let sets: Vec<_> = pages.iter().map(|pages| self.shared(&mut uses, program, Some(pages))).collect();
         let layout = self.device.layout(program)?;
         let key = RasterKey {
@@ -384,7 +399,7 @@ impl<'a> Frame<'a> {
                 device.raw.cmd_set_scissor(commands, 0, &[area]);
                 push_constants(device, commands, layout, program, &push);
                 let point = vk::PipelineBindPoint::GRAPHICS;
-                push_descriptors(device, commands, point, layout, program, &descriptors);
+                bind_own(device, commands, point, layout, program, &own);
                 let mut bound = (vk::Pipeline::null(), usize::MAX);
                 for (draw, &pipeline) in draws.iter().zip(pipelines) {
                     if bound.0 != pipeline {
@@ -519,7 +534,7 @@ impl<'a> Frame<'a> {
     /// # Errors
     /// When the driver refuses a pipeline or fails: out of memory, or a lost device.
     pub fn finish(self) -> Result<Vec<PassTime>> {
-        let Self { device, passes, targets, without_barriers, .. } = self;
+        let Self { device, passes, targets, without_barriers, own, .. } = self;
         let uses: Vec<Vec<Use>> = passes.iter().map(|pass| pass.uses.clone()).collect();
         let before: HashMap<ResourceId, State> = targets
             .iter()
@@ -560,6 +575,7 @@ impl<'a> Frame<'a> {
             device.raw.destroy_query_pool(queries, None);
             outcome
         };
+        drop(own);
         let is_known = match &outcome {
             Ok(_) => true,
             Err(error) if error.is::<Interrupted>() => {

@@ -16,17 +16,20 @@ mod frame;
 pub mod limits;
 mod loops;
 mod memory;
+mod offers;
 mod open;
 mod pace;
 mod pipeline;
 #[cfg(feature = "window")]
 mod present;
+mod primitive_ids;
 mod recording;
 mod set;
 mod shader;
 mod specialize;
 mod surface;
 pub mod sync;
+mod tables;
 mod turns;
 #[cfg(feature = "window")]
 mod window;
@@ -41,13 +44,16 @@ pub use error::{NotOpened, TooLarge};
 pub use frame::{ColorTarget, DepthTarget, Draw, Frame, PassPlan, PassTime, Raster, VertexStream};
 pub use loops::with_loops_counted;
 pub use memory::{Buffer, Image, ImageDesc, NOTHING, Place};
+pub use offers::Offers;
 pub use pace::Interrupted;
 #[cfg(feature = "window")]
 pub use present::{Overlay, Placed, Presented, Presenter};
+pub use primitive_ids::without_primitive_ids;
 pub use set::{BoundSet, DescriptorSet};
 pub use shader::{
     Binding, BindingKind, Constant, Program, Replacement, SetLayout, SharedSet, Specialization, Stage, VertexInput,
 };
 pub use specialize::specialized;
+pub use tables::with_tables_in_storage;
 #[cfg(feature = "window")]
 pub use window::Windowed;

@@ -106,6 +106,13 @@ impl Buffer {
         let name = if bytes == 0 { NOTHING } else { name };
         let creating = || format!("creating buffer \"{name}\" of {bytes} bytes");
         let bytes = bytes.max(16);
+        if texels.is_some() && bytes > device.max_storage_bytes() && !device.offers().texel_buffers {
+            bail!(TooLarge {
+                what: creating(),
+                limit: format!("binds at most {} bytes of one", device.max_storage_bytes())
+            });
+        }
+        let texels = texels.filter(|_| device.offers().texel_buffers);
         let most = u64::from(device.limits.max_texel_buffer_elements);
         if let Some(format) = texels
             && bytes / texel_bytes(format) > most

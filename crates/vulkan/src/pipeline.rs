@@ -10,8 +10,10 @@ use ash::vk;
 use super::cache::{Layout, PipelineKey, SamplerDesc};
 use super::device::{Device, lock};
 use super::loops::with_loops_counted;
+use super::primitive_ids::without_primitive_ids;
 use super::shader::{Binding, Program, Replacement, SetLayout};
 use super::specialize::specialized;
+use super::tables::with_tables_in_storage;
 
 /// Pipelines, some of which are still being made.
 pub(super) struct Pipelines<'k> {
@@ -86,7 +88,7 @@ impl Device {
         if let Some(&known) = caches.set_layouts.get(layout.name) {
             return Ok(known);
         }
-        let slots = slots(layout.bindings);
+        let slots = self.slots(layout.bindings);
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&slots);
         // SAFETY: a valid create info, taken from reflection.
         let made = unsafe { self.raw.create_descriptor_set_layout(&info, None) }
@@ -102,10 +104,11 @@ impl Device {
             return Ok(layout);
         }
         let creating = || format!("creating the layout of \"{}\"", program.name);
-        let slots = slots(program.bindings);
-        let info = vk::DescriptorSetLayoutCreateInfo::default()
-            .flags(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR)
-            .bindings(&slots);
+        let slots = self.slots(program.bindings);
+        let mut info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&slots);
+        if self.offers().push_descriptors {
+            info = info.flags(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR);
+        }
         // SAFETY: valid create infos, taken from reflection.
         let layout = unsafe {
             let set = self.raw.create_descriptor_set_layout(&info, None).with_context(creating)?;
@@ -221,6 +224,17 @@ impl Device {
         Ok(())
     }
 
+    fn slots(&self, bindings: &[Binding]) -> Vec<vk::DescriptorSetLayoutBinding<'static>> {
+        let slot = |binding: &Binding| {
+            vk::DescriptorSetLayoutBinding::default()
+                .binding(binding.slot)
+                .descriptor_type(binding.kind.descriptor_type(self.offers().texel_buffers))
+                .descriptor_count(1)
+                .stage_flags(binding.stages)
+        };
+        bindings.iter().map(slot).collect()
+    }
+
     fn build(&self, key: &PipelineKey, modules: &mut Vec<vk::ShaderModule>) -> Result<vk::Pipeline, vk::Result> {
         let program = key.program;
         // Made when the pass was described.
@@ -229,7 +243,13 @@ impl Device {
         for (index, stage) in program.stages.iter().enumerate() {
             let replaced = lock(&self.caches).replaced.get(&(program.name, index)).cloned();
             let words = specialized(replaced.as_deref().unwrap_or(stage.words), &key.constants);
-            let words = with_loops_counted(&words, self.limits_loops());
+            let mut words = with_loops_counted(&words, self.limits_loops());
+            if !self.offers().primitive_ids {
+                words = without_primitive_ids(&words);
+            }
+            if !self.offers().texel_buffers {
+                words = with_tables_in_storage(&words);
+            }
             let info = vk::ShaderModuleCreateInfo::default().code(&words);
             // SAFETY: the words come from glslang.
             let module = unsafe { self.raw.create_shader_module(&info, None) }?;
@@ -321,15 +341,4 @@ impl Device {
         let made = unsafe { self.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
         made.map(|p| p[0]).map_err(|(_, error)| error)
     }
-}
-
-fn slots(bindings: &[Binding]) -> Vec<vk::DescriptorSetLayoutBinding<'static>> {
-    let slot = |binding: &Binding| {
-        vk::DescriptorSetLayoutBinding::default()
-            .binding(binding.slot)
-            .descriptor_type(binding.kind.descriptor_type())
-            .descriptor_count(1)
-            .stage_flags(binding.stages)
-    };
-    bindings.iter().map(slot).collect()
 }

@@ -53,6 +53,9 @@ pub struct Overlay {
     pub pixels_per_point: f32,
 }
 
+/// How long a window may take to give a picture: as long as a user may wait for what else it does.
+const ACQUIRE_NS: u64 = 100_000_000;
+
 /// What became of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Presented {
@@ -60,7 +63,7 @@ pub enum Presented {
     Shown,
     /// The window has no area: minimised.
     Hidden,
-    /// The window changed meanwhile: once more.
+    /// The window changed meanwhile, or gave no picture: once more.
     Changed,
 }
 
@@ -185,12 +188,14 @@ impl Presenter {
         let Some(swapchain) = &self.swapchain else { return Ok(Presented::Hidden) };
         // SAFETY: the semaphore is not in use: the frame before has finished.
         let acquired =
-            unsafe { self.calls.acquire_next_image(swapchain.raw, u64::MAX, self.acquired, vk::Fence::null()) };
+            unsafe { self.calls.acquire_next_image(swapchain.raw, ACQUIRE_NS, self.acquired, vk::Fence::null()) };
         let index = match acquired {
             Ok((index, suboptimal)) => {
                 self.stale |= suboptimal;
                 index as usize
             }
+            // A window that is covered or on another desktop may get no picture for as long as it is.
+            Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(Presented::Changed),
             Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => {
                 self.stale = true;
                 return Ok(Presented::Changed);

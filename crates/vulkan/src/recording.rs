@@ -34,10 +34,18 @@ pub(super) enum Work<'a> {
     Record(Record<'a>),
 }
 
+/// What a program has bound for itself, in set 0.
+pub(super) enum Own {
+    /// Pushed with each use.
+    Pushed(Vec<Descriptor>),
+    /// Written to a set that the frame keeps.
+    Set(vk::DescriptorSet),
+}
+
 /// One dispatch.
 pub(super) struct Dispatch<'a> {
     pub(super) program: &'static Program,
-    pub(super) descriptors: Vec<Descriptor>,
+    pub(super) own: Own,
     pub(super) sets: Vec<vk::DescriptorSet>,
     pub(super) layout: Layout,
     pub(super) push: Vec<u8>,
@@ -56,11 +64,11 @@ impl Dispatch<'_> {
         pipeline: vk::Pipeline,
         piece: Option<Piece>,
     ) {
-        let Self { program, descriptors, sets, layout, push, groups } = self;
+        let Self { program, own, sets, layout, push, groups } = self;
         // SAFETY: as the caller says.
         unsafe {
             device.raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline);
-            push_descriptors(device, commands, vk::PipelineBindPoint::COMPUTE, *layout, program, descriptors);
+            bind_own(device, commands, vk::PipelineBindPoint::COMPUTE, *layout, program, own);
             bind_sets(device, commands, vk::PipelineBindPoint::COMPUTE, *layout, sets);
             push_constants(device, commands, *layout, program, push);
             match (piece, groups) {
@@ -312,18 +320,26 @@ pub(super) unsafe fn bind_sets(
     }
 }
 
-pub(super) unsafe fn push_descriptors(
+/// Binds set 0 of a program.
+pub(super) unsafe fn bind_own(
     device: &Device,
     commands: vk::CommandBuffer,
     point: vk::PipelineBindPoint,
     layout: Layout,
     program: &'static Program,
-    descriptors: &[Descriptor],
+    own: &Own,
 ) {
-    if descriptors.is_empty() {
-        return;
+    match (own, &device.push) {
+        (Own::Set(set), _) => {
+            // SAFETY: the command buffer is recording; the set is alive until the frame has finished, and of the layout's.
+            unsafe { device.raw.cmd_bind_descriptor_sets(commands, point, layout.pipeline, 0, &[*set], &[]) };
+        }
+        (Own::Pushed(descriptors), Some(push)) if !descriptors.is_empty() => {
+            let writes: Vec<_> =
+                program.bindings.iter().zip(descriptors).map(|(b, descriptor)| descriptor.write(device, b)).collect();
+            // SAFETY: the command buffer is recording; the writes match the layout, both come from reflection.
+            unsafe { push.cmd_push_descriptor_set(commands, point, layout.pipeline, 0, &writes) };
+        }
+        (Own::Pushed(_), _) => {}
     }
-    let writes: Vec<_> = program.bindings.iter().zip(descriptors).map(|(b, descriptor)| descriptor.write(b)).collect();
-    // SAFETY: the command buffer is recording; the writes match the layout, both come from reflection.
-    unsafe { device.push.cmd_push_descriptor_set(commands, point, layout.pipeline, 0, &writes) };
 }

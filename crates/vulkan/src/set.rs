@@ -9,18 +9,70 @@ use super::bind::{Descriptor, Resource, Sampled};
 use super::cache::SamplerDesc;
 use super::device::Device;
 use super::memory::{Buffer, Image, NOTHING, Place};
-use super::shader::{BindingKind, SetLayout};
+use super::shader::{Binding, BindingKind, SetLayout};
 use super::sync::ResourceId;
+
+/// A set out of a pool of its own.
+pub(super) struct Pooled {
+    pub(super) raw: vk::DescriptorSet,
+    pool: vk::DescriptorPool,
+    device: Arc<Device>,
+}
+
+impl Pooled {
+    /// Of a layout with these bindings, unwritten.
+    pub(super) fn new(
+        device: &Arc<Device>,
+        bindings: &[Binding],
+        layout: vk::DescriptorSetLayout,
+        creating: impl Fn() -> String,
+    ) -> Result<Self> {
+        let of = |b: &Binding| vk::DescriptorPoolSize {
+            ty: b.kind.descriptor_type(device.offers().texel_buffers),
+            descriptor_count: 1,
+        };
+        let sizes: Vec<_> = bindings.iter().map(of).collect();
+        let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
+        let layouts = [layout];
+        // SAFETY: valid infos; the pool holds one such set.
+        unsafe {
+            let pool = device.raw.create_descriptor_pool(&info, None).with_context(&creating)?;
+            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
+            match device.raw.allocate_descriptor_sets(&info) {
+                Ok(sets) => Ok(Self { raw: sets[0], pool, device: device.clone() }),
+                Err(error) => {
+                    device.raw.destroy_descriptor_pool(pool, None);
+                    Err(error).with_context(creating)
+                }
+            }
+        }
+    }
+
+    /// Writes what a binding points at.
+    ///
+    /// # Safety
+    /// Nothing uses the set yet; what the descriptor points at outlives every use of it.
+    pub(super) unsafe fn write(&self, binding: &Binding, descriptor: &Descriptor) {
+        let write = descriptor.write(&self.device, binding).dst_set(self.raw);
+        // SAFETY: as the caller says.
+        unsafe { self.device.raw.update_descriptor_sets(&[write], &[]) };
+    }
+}
+
+impl Drop for Pooled {
+    fn drop(&mut self) {
+        // SAFETY: every frame has been waited for.
+        unsafe { self.device.raw.destroy_descriptor_pool(self.pool, None) };
+    }
+}
 
 /// A written descriptor set.
 pub struct DescriptorSet {
-    pub(super) raw: vk::DescriptorSet,
-    pool: vk::DescriptorPool,
+    pub(super) pooled: Pooled,
     layout: &'static SetLayout,
     written: Vec<(u32, ResourceId)>,
     /// What the other slots point at.
     nothing: Option<(Buffer, Image)>,
-    device: Arc<Device>,
 }
 
 impl DescriptorSet {
@@ -30,25 +82,7 @@ impl DescriptorSet {
     /// When memory is short.
     pub fn new(device: &Arc<Device>, layout: &'static SetLayout, entries: &[(u32, Resource<'_>)]) -> Result<Self> {
         let creating = || format!("creating a descriptor set of the {}", layout.name);
-        let sizes: Vec<_> = layout
-            .bindings
-            .iter()
-            .map(|b| vk::DescriptorPoolSize { ty: b.kind.descriptor_type(), descriptor_count: 1 })
-            .collect();
-        let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
-        let layouts = [device.set_layout(layout)?];
-        // SAFETY: valid infos; the pool holds one such set.
-        let (pool, raw) = unsafe {
-            let pool = device.raw.create_descriptor_pool(&info, None).with_context(creating)?;
-            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
-            match device.raw.allocate_descriptor_sets(&info) {
-                Ok(sets) => (pool, sets[0]),
-                Err(error) => {
-                    device.raw.destroy_descriptor_pool(pool, None);
-                    return Err(error).with_context(creating);
-                }
-            }
-        };
+        let pooled = Pooled::new(device, layout.bindings, device.set_layout(layout)?, creating)?;
         // lavapipe 22.3 follows every descriptor of a set, whatever the program reads (docs/decisions/lavapipe.md).
         let is_whole = layout.bindings.iter().all(|b| entries.iter().any(|(slot, _)| *slot == b.slot));
         let make = || -> Result<(Buffer, Image)> {
@@ -57,12 +91,10 @@ impl DescriptorSet {
             Ok((buffer, Image::nothing(device, format, vk::ImageUsageFlags::SAMPLED)?))
         };
         let set = Self {
-            raw,
-            pool,
+            pooled,
             layout,
             nothing: if is_whole { None } else { Some(make()?) },
             written: entries.iter().map(|(slot, resource)| (*slot, resource.id())).collect(),
-            device: device.clone(),
         };
         for binding in layout.bindings {
             let written = entries.iter().find(|(slot, _)| *slot == binding.slot).map(|(_, resource)| *resource);
@@ -74,7 +106,7 @@ impl DescriptorSet {
             let image_layout = binding.access.masks(binding.stages).layout;
             let descriptor = Descriptor::new(device, binding.kind, resource, image_layout)?;
             // SAFETY: nothing uses the set yet; what it points at is alive.
-            unsafe { device.raw.update_descriptor_sets(&[descriptor.write(binding).dst_set(raw)], &[]) };
+            unsafe { set.pooled.write(binding, &descriptor) };
         }
         Ok(set)
     }
@@ -88,13 +120,6 @@ impl DescriptorSet {
         let same = entries.iter().map(|(slot, resource)| (*slot, resource.id())).eq(self.written.iter().copied());
         assert!(same, "a descriptor set of the {} was written with other resources", self.layout.name);
         BoundSet { set: self, entries }
-    }
-}
-
-impl Drop for DescriptorSet {
-    fn drop(&mut self) {
-        // SAFETY: every frame has been waited for.
-        unsafe { self.device.raw.destroy_descriptor_pool(self.pool, None) };
     }
 }
 

@@ -124,15 +124,16 @@ pub enum BindingKind {
 }
 
 impl BindingKind {
-    /// Vulkan's name.
+    /// Vulkan's name on a device that fetches tables as texels, or as storage buffers.
     #[must_use]
-    pub fn descriptor_type(self) -> vk::DescriptorType {
+    pub fn descriptor_type(self, texel_buffers: bool) -> vk::DescriptorType {
         match self {
             Self::UniformBuffer => vk::DescriptorType::UNIFORM_BUFFER,
             Self::StorageBuffer => vk::DescriptorType::STORAGE_BUFFER,
             Self::SampledImage => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
             Self::StorageImage => vk::DescriptorType::STORAGE_IMAGE,
-            Self::StorageTexelBuffer => vk::DescriptorType::STORAGE_TEXEL_BUFFER,
+            Self::StorageTexelBuffer if texel_buffers => vk::DescriptorType::STORAGE_TEXEL_BUFFER,
+            Self::StorageTexelBuffer => vk::DescriptorType::STORAGE_BUFFER,
         }
     }
 }

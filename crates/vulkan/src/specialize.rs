@@ -413,9 +413,15 @@ impl Function {
                     pairs.extend([*bound, self.blocks[unreached].label]);
                     *bound += 1;
                 }
-                out.push((3 + pairs.len() as u32) << 16 | Op::Phi as u32);
-                out.extend([words[phi.start + 1], words[phi.start + 2]]);
-                out.extend(pairs);
+                let (ty, result) = (words[phi.start + 1], words[phi.start + 2]);
+                // What comes from one block alone does so for all phis here. Drivers make a variable of each phi.
+                if let [value, _] = pairs[..] {
+                    out.extend([4 << 16 | Op::CopyObject as u32, ty, result, value]);
+                } else {
+                    out.push((3 + pairs.len() as u32) << 16 | Op::Phi as u32);
+                    out.extend([ty, result]);
+                    out.extend(pairs);
+                }
             }
             for place in &block.body {
                 out.extend_from_slice(&words[place.clone()]);

@@ -335,16 +335,6 @@ knob! {
 }
 
 impl Normals {
-    /// Steps on each side of 0 that octahedra are rounded to before they are stored; 0: what they are stored in decides.
-    #[must_use]
-    pub fn steps(self) -> u32 {
-        match self {
-            Self::Oct16 => (1 << 7) - 1,
-            Self::Oct24 => (1 << 11) - 1,
-            Self::Oct32 | Self::F32 => 0,
-        }
-    }
-
     /// |n − stored n|² that storing accounts for, at least twice the largest (numerics 16: 0.95°, 0.059°, 0.0037°): what a normal
     /// texture bends less than that is lost.
     #[must_use]

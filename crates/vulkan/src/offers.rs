@@ -1,0 +1,71 @@
+//! What devices have that Etalon can do without: looked for when one is opened.
+
+use ash::{khr, vk};
+
+use super::limits::{LEAST_TEXELS, PUSH_DESCRIPTORS};
+
+/// What a device offers beyond what every one must have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct Offers {
+    /// Fragments know the number of their triangle (feature geometryShader). Without, each triangle has vertices of its own, which
+    /// tell it.
+    pub primitive_ids: bool,
+    /// A draw has more than 2^24 vertices (feature fullDrawIndexUint32).
+    pub large_indices: bool,
+    /// Descriptors can be pushed (VK_KHR_push_descriptor). Without, each pass has a set of its own.
+    pub push_descriptors: bool,
+    /// Tables are fetched as texels. Without, as storage buffers (`tables.rs`).
+    pub texel_buffers: bool,
+    /// Invocations of a compute shader add up numbers among them, a subgroup at a time.
+    pub adds_in_subgroups: bool,
+    /// The driver tells what its compiler makes of pipelines (VK_KHR_pipeline_executable_properties).
+    pub tells_compiled: bool,
+    /// f32 arithmetic keeps the sign of zero, infinities and NaN where a program asks for it.
+    pub keeps_specials: bool,
+    /// f32 arithmetic rounds to the nearest, to even where there are two, where a program asks for it.
+    pub rounds_to_even: bool,
+}
+
+impl Offers {
+    /// Of a device.
+    pub(super) fn of(
+        raw: &ash::Instance,
+        physical: vk::PhysicalDevice,
+        extensions: &[vk::ExtensionProperties],
+    ) -> Self {
+        let has = |name| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+        let has_push = has(khr::push_descriptor::NAME);
+        let has_executables = has(khr::pipeline_executable_properties::NAME);
+        let mut push = vk::PhysicalDevicePushDescriptorPropertiesKHR::default();
+        let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
+        let mut v12 = vk::PhysicalDeviceVulkan12Properties::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut v11).push_next(&mut v12);
+        if has_push {
+            properties = properties.push_next(&mut push);
+        }
+        let mut executables = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default();
+        let mut features = vk::PhysicalDeviceFeatures2::default();
+        if has_executables {
+            features = features.push_next(&mut executables);
+        }
+        // SAFETY: plain queries; the chains outlive the calls, and hold no struct of an extension that the device has not.
+        unsafe {
+            raw.get_physical_device_properties2(physical, &mut properties);
+            raw.get_physical_device_features2(physical, &mut features);
+        }
+        let (core, features) = (properties.properties, features.features);
+        // Other drivers fetch from storage buffers as fast or faster, and hold more in one.
+        let is_software = core.device_type == vk::PhysicalDeviceType::CPU;
+        Self {
+            primitive_ids: features.geometry_shader == vk::TRUE,
+            large_indices: features.full_draw_index_uint32 == vk::TRUE,
+            push_descriptors: has_push && push.max_push_descriptors >= PUSH_DESCRIPTORS,
+            texel_buffers: is_software && core.limits.max_texel_buffer_elements >= LEAST_TEXELS,
+            adds_in_subgroups: v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
+                && v11.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::ARITHMETIC),
+            tells_compiled: executables.pipeline_executable_info == vk::TRUE,
+            keeps_specials: v12.shader_signed_zero_inf_nan_preserve_float32 == vk::TRUE,
+            rounds_to_even: v12.shader_rounding_mode_rte_float32 == vk::TRUE,
+        }
+    }
+}
