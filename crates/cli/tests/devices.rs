@@ -1,0 +1,90 @@
+//! Devices that one does not own: the one here, lowered to what files describe, draws the same picture or is refused for what it lacks.
+
+use std::path::{Path, PathBuf};
+
+use etalon_mask::{Description, Mask};
+
+#[path = "support/program.rs"]
+mod program;
+
+use program::{HASTY, Run, etalon};
+
+fn descriptions() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/devices");
+    let files = std::fs::read_dir(folder).expect("a folder of descriptions");
+    let mut files: Vec<PathBuf> = files.map(|file| file.expect("a file").path()).collect();
+    files.sort();
+    files
+}
+
+/// The program on a device that a file describes.
+struct Masked<'a> {
+    folder: &'a Path,
+    variables: Vec<(&'static str, String)>,
+}
+
+impl<'a> Masked<'a> {
+    fn new(folder: &'a Path, file: &Path) -> Self {
+        let mask = Mask::in_folder(folder).expect("the layer is built");
+        Self { folder, variables: mask.variables(file).into() }
+    }
+
+    fn run(&self, arguments: &[&str]) -> Run {
+        let own = self.variables.iter().map(|(name, value)| (*name, value.as_str()));
+        let all: Vec<(&str, &str)> = HASTY.into_iter().chain(own).collect();
+        etalon(self.folder, arguments, &all)
+    }
+}
+
+/// Shadow maps; paths past textures. Nothing that fragments see is textured: lavapipe 22.3 chooses other mip levels where places of textures
+/// lie in storage buffers (docs/decisions/helper-invocations.md).
+const PICTURES: [[&str; 3]; 2] = [["study:cornell", "--model", "local"], ["study:metals", "--model", "global"]];
+
+#[test]
+fn a_device_that_can_draw_draws_the_same_bits() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let render = |[scene, model, name]: [&'static str; 3], to: &'static str| {
+        ["render", scene, model, name, "--size", "48x27", "--validate", "-o", to]
+    };
+    for picture in PICTURES {
+        etalon(folder.path(), &render(picture, "here.exr"), &HASTY).succeeded();
+        for file in descriptions() {
+            let description = Description::read(&file).expect("a description");
+            if !description.refused.is_empty() {
+                continue;
+            }
+            let masked = Masked::new(folder.path(), &file);
+            masked.run(&render(picture, "there.exr")).succeeded();
+            let diff = etalon(folder.path(), &["diff", "--metric", "mae", "here.exr", "there.exr"], &[]).succeeded();
+            assert_eq!(diff.stdout.trim().parse::<f64>().expect("a number"), 0.0, "{}: {picture:?}", description.name);
+        }
+    }
+}
+
+#[test]
+fn a_device_that_cannot_draw_is_refused_for_all_that_it_lacks() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for file in descriptions() {
+        let description = Description::read(&file).expect("a description");
+        let masked = Masked::new(folder.path(), &file);
+        let Some(first) = description.refused.first() else { continue };
+        let run = masked.run(&["render", "study:cornell", "--size", "8x8", "-o", "x.png"]);
+        for said in &description.refused {
+            assert!(run.stderr.contains(said), "{}: \"{said}\" is not in {run:?}", description.name);
+        }
+        run.failed(1, first);
+        assert!(!folder.path().join("x.png").exists(), "{}", description.name);
+    }
+}
+
+#[test]
+fn rays_need_addition_within_subgroups_and_shadow_maps_do_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("lonely.json");
+    std::fs::write(&file, r#"{ "name": "Invocations by themselves", "without_subgroup_arithmetic": true }"#)
+        .expect("a file");
+    let masked = Masked::new(folder.path(), &file);
+    let render = |model| ["render", "study:cornell", "--model", model, "--size", "8x8", "-o", "x.png"];
+    masked.run(&render("local")).succeeded();
+    masked.run(&render("global")).failed(1, "addition within subgroups");
+}

@@ -1,0 +1,216 @@
+//! What a device offers less, and how a program comes to see it.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use ash::vk;
+use serde::Deserialize;
+
+/// The file that the layer reads.
+pub(crate) const VARIABLE: &str = "ETALON_MASK";
+
+/// What a device offers less than the one that does the work. Names are Vulkan's.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Description {
+    /// What it is called, and why it is like that.
+    pub name: String,
+    /// `cpu`, `discrete` or `integrated`.
+    #[serde(rename = "type")]
+    pub kind: Option<String>,
+    /// Vulkan version.
+    pub api: Option<[u32; 2]>,
+    /// Features that it has not.
+    pub without_features: Vec<String>,
+    /// Extensions that it has not.
+    pub without_extensions: Vec<String>,
+    /// Limits, where they are lower.
+    pub limits: BTreeMap<String, u64>,
+    /// Uses that it has no formats for.
+    pub without_formats: BTreeMap<String, Vec<String>>,
+    /// Properties that none of its kinds of memory has.
+    pub without_memory: Vec<String>,
+    /// Subgroups do not add.
+    pub without_subgroup_arithmetic: bool,
+    /// Queues have no timestamps.
+    pub without_timestamps: bool,
+    /// What is expected of a program: words that its refusal has. Empty: it draws.
+    pub refused: Vec<String>,
+}
+
+/// Sets to `false` what is listed, of the features of one struct.
+macro_rules! without {
+    ($listed:expr, $features:expr, $($field:ident = $name:literal),+ $(,)?) => {
+        for name in $listed {
+            match name.as_str() {
+                $($name => $features.$field = vk::FALSE,)+
+                _ => {}
+            }
+        }
+    };
+}
+
+/// Lowers what is listed, of the limits of one struct.
+macro_rules! lowered {
+    ($listed:expr, $limits:expr, $($field:ident = $name:literal),+ $(,)?) => {
+        for (name, &most) in $listed {
+            match name.as_str() {
+                $($name => $limits.$field = $limits.$field.min(most as _),)+
+                _ => {}
+            }
+        }
+    };
+}
+
+impl Description {
+    /// Reads the file that the environment names.
+    pub(crate) fn from_environment() -> io::Result<Self> {
+        let path = std::env::var_os(VARIABLE).ok_or_else(|| io::Error::other(format!("{VARIABLE} is not set")))?;
+        Self::read(Path::new(&path))
+    }
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// When it is not there, or says what no description can.
+    pub fn read(path: &Path) -> io::Result<Self> {
+        let text = std::fs::read_to_string(path)?;
+        serde_json::from_str(&text).map_err(|error| io::Error::other(format!("{}: {error}", path.display())))
+    }
+
+    pub(crate) fn lower_features(&self, features: &mut vk::PhysicalDeviceFeatures) {
+        without!(
+            &self.without_features,
+            features,
+            geometry_shader = "geometryShader",
+            fragment_stores_and_atomics = "fragmentStoresAndAtomics",
+            shader_storage_image_extended_formats = "shaderStorageImageExtendedFormats",
+            full_draw_index_uint32 = "fullDrawIndexUint32",
+            robust_buffer_access = "robustBufferAccess",
+        );
+    }
+
+    pub(crate) fn lower_features_1_2(&self, features: &mut vk::PhysicalDeviceVulkan12Features<'_>) {
+        without!(
+            &self.without_features,
+            features,
+            timeline_semaphore = "timelineSemaphore",
+            scalar_block_layout = "scalarBlockLayout",
+        );
+    }
+
+    pub(crate) fn lower_features_1_3(&self, features: &mut vk::PhysicalDeviceVulkan13Features<'_>) {
+        without!(
+            &self.without_features,
+            features,
+            dynamic_rendering = "dynamicRendering",
+            synchronization2 = "synchronization2",
+            maintenance4 = "maintenance4",
+        );
+    }
+
+    pub(crate) fn lower_properties(&self, properties: &mut vk::PhysicalDeviceProperties) {
+        properties.device_type = match self.kind.as_deref() {
+            Some("discrete") => vk::PhysicalDeviceType::DISCRETE_GPU,
+            Some("integrated") => vk::PhysicalDeviceType::INTEGRATED_GPU,
+            Some("cpu") => vk::PhysicalDeviceType::CPU,
+            _ => properties.device_type,
+        };
+        if let Some([major, minor]) = self.api {
+            properties.api_version = vk::make_api_version(0, major, minor, 0);
+        }
+        lowered!(
+            &self.limits,
+            properties.limits,
+            max_image_dimension2_d = "maxImageDimension2D",
+            max_texel_buffer_elements = "maxTexelBufferElements",
+            max_storage_buffer_range = "maxStorageBufferRange",
+            max_color_attachments = "maxColorAttachments",
+            max_per_stage_descriptor_storage_images = "maxPerStageDescriptorStorageImages",
+            max_per_stage_descriptor_storage_buffers = "maxPerStageDescriptorStorageBuffers",
+            max_per_stage_descriptor_uniform_buffers = "maxPerStageDescriptorUniformBuffers",
+            max_draw_indexed_index_value = "maxDrawIndexedIndexValue",
+            sub_pixel_precision_bits = "subPixelPrecisionBits",
+        );
+        if self.without_timestamps {
+            properties.limits.timestamp_compute_and_graphics = vk::FALSE;
+        }
+    }
+
+    pub(crate) fn lower_push_descriptors(&self, properties: &mut vk::PhysicalDevicePushDescriptorPropertiesKHR<'_>) {
+        lowered!(&self.limits, properties, max_push_descriptors = "maxPushDescriptors");
+    }
+
+    pub(crate) fn lower_subgroups(&self, properties: &mut vk::PhysicalDeviceVulkan11Properties<'_>) {
+        if self.without_subgroup_arithmetic {
+            properties.subgroup_supported_operations &= !vk::SubgroupFeatureFlags::ARITHMETIC;
+        }
+    }
+
+    pub(crate) fn lower_format(&self, format: vk::Format, properties: &mut vk::FormatProperties) {
+        for lacks in self.without_formats.get(&format!("{format:?}")).into_iter().flatten() {
+            properties.optimal_tiling_features &= !match lacks.as_str() {
+                "COLOR_ATTACHMENT" => vk::FormatFeatureFlags::COLOR_ATTACHMENT,
+                "STORAGE_IMAGE" => vk::FormatFeatureFlags::STORAGE_IMAGE,
+                "SAMPLED_IMAGE_FILTER_LINEAR" => vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR,
+                _ => vk::FormatFeatureFlags::empty(),
+            };
+        }
+    }
+
+    pub(crate) fn lower_memory(&self, memory: &mut vk::PhysicalDeviceMemoryProperties) {
+        for kind in &mut memory.memory_types {
+            for lacks in &self.without_memory {
+                kind.property_flags &= !match lacks.as_str() {
+                    "HOST_CACHED" => vk::MemoryPropertyFlags::HOST_CACHED,
+                    "DEVICE_LOCAL" => vk::MemoryPropertyFlags::DEVICE_LOCAL,
+                    _ => vk::MemoryPropertyFlags::empty(),
+                };
+            }
+        }
+    }
+}
+
+/// A folder with the layer's manifest, for programs that a test starts.
+pub struct Mask {
+    folder: PathBuf,
+}
+
+impl Mask {
+    /// Writes the manifest of the layer to a folder. The library lies beside the test that asks.
+    ///
+    /// # Errors
+    /// When the folder cannot be written, or there is no such library.
+    pub fn in_folder(folder: &Path) -> io::Result<Self> {
+        let beside = std::env::current_exe()?;
+        let name = format!("{}etalon_mask{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+        let library = beside.with_file_name(name);
+        if !library.is_file() {
+            return Err(io::Error::other(format!("{} is not there", library.display())));
+        }
+        let manifest = serde_json::json!({
+            "file_format_version": "1.2.0",
+            "layer": {
+                "name": "VK_LAYER_ETALON_mask",
+                "type": "GLOBAL",
+                "library_path": library,
+                "api_version": "1.3.0",
+                "implementation_version": "1",
+                "description": "The device offers no more than a file describes",
+            },
+        });
+        std::fs::write(folder.join("etalon_mask.json"), manifest.to_string())?;
+        Ok(Self { folder: folder.to_owned() })
+    }
+
+    /// The environment in which a program sees the device that a file describes.
+    #[must_use]
+    pub fn variables(&self, description: &Path) -> [(&'static str, String); 3] {
+        [
+            ("VK_ADD_LAYER_PATH", self.folder.display().to_string()),
+            ("VK_INSTANCE_LAYERS", "VK_LAYER_ETALON_mask".to_owned()),
+            (VARIABLE, description.display().to_string()),
+        ]
+    }
+}

@@ -1,0 +1,306 @@
+//! The layer: what asks a device what it offers, answered by the device and then lowered. All else goes straight to it.
+//!
+//! LunarG, "Architecture of the Vulkan Loader Interfaces", layer interface version 2.
+
+use std::ffi::{CStr, c_char, c_void};
+use std::ptr;
+use std::sync::OnceLock;
+
+use ash::vk;
+
+use crate::description::Description;
+
+/// What the loader and a layer agree on.
+#[repr(C)]
+struct Negotiation {
+    kind: i32,
+    next: *mut c_void,
+    version: u32,
+    instance_proc: Option<vk::PFN_vkGetInstanceProcAddr>,
+    device_proc: Option<vk::PFN_vkGetDeviceProcAddr>,
+    physical_device_proc: Option<vk::PFN_vkGetInstanceProcAddr>,
+}
+
+/// The next layer, in the loader's list of those that an instance is made by.
+#[repr(C)]
+struct Link {
+    next: *mut Link,
+    instance_proc: vk::PFN_vkGetInstanceProcAddr,
+    physical_device_proc: Option<vk::PFN_vkGetInstanceProcAddr>,
+}
+
+#[repr(C)]
+struct LinkInfo {
+    kind: vk::StructureType,
+    next: *const c_void,
+    function: i32,
+    link: *mut Link,
+}
+
+/// `VK_LAYER_LINK_INFO`.
+const LINK_INFO: i32 = 0;
+
+/// What comes after the layer, and what is lowered of it. Tests start programs with one instance: the last one counts.
+struct Below {
+    description: Description,
+    properties: vk::PFN_vkGetPhysicalDeviceProperties,
+    properties2: vk::PFN_vkGetPhysicalDeviceProperties2,
+    features: vk::PFN_vkGetPhysicalDeviceFeatures,
+    features2: vk::PFN_vkGetPhysicalDeviceFeatures2,
+    format: vk::PFN_vkGetPhysicalDeviceFormatProperties,
+    memory: vk::PFN_vkGetPhysicalDeviceMemoryProperties,
+    memory2: vk::PFN_vkGetPhysicalDeviceMemoryProperties2,
+    extensions: vk::PFN_vkEnumerateDeviceExtensionProperties,
+}
+
+static NEXT: OnceLock<vk::PFN_vkGetInstanceProcAddr> = OnceLock::new();
+static BELOW: OnceLock<Below> = OnceLock::new();
+
+fn below() -> &'static Below {
+    BELOW.get().expect("an instance was made")
+}
+
+/// The loader's first call.
+///
+/// # Safety
+/// The loader calls it, with a struct of version 2.
+#[unsafe(no_mangle)]
+#[allow(unreachable_pub, private_interfaces, reason = "the loader finds it by its name")]
+pub unsafe extern "system" fn vkNegotiateLoaderLayerInterfaceVersion(asked: *mut Negotiation) -> vk::Result {
+    // SAFETY: as the loader promises.
+    let asked = unsafe { &mut *asked };
+    asked.version = asked.version.min(2);
+    asked.instance_proc = Some(instance_proc);
+    asked.device_proc = None;
+    asked.physical_device_proc = None;
+    vk::Result::SUCCESS
+}
+
+unsafe extern "system" fn instance_proc(instance: vk::Instance, name: *const c_char) -> vk::PFN_vkVoidFunction {
+    /// As the pointer that Vulkan hands out for all functions.
+    macro_rules! ours {
+        ($function:ident as $kind:ty) => {
+            // SAFETY: who asks by name casts it back to the type of that name.
+            Some(unsafe { std::mem::transmute::<$kind, unsafe extern "system" fn()>($function as $kind) })
+        };
+    }
+    // SAFETY: a name that ends in 0.
+    match unsafe { CStr::from_ptr(name) }.to_bytes() {
+        b"vkGetInstanceProcAddr" => ours!(instance_proc as vk::PFN_vkGetInstanceProcAddr),
+        b"vkCreateInstance" => ours!(create_instance as vk::PFN_vkCreateInstance),
+        b"vkGetPhysicalDeviceProperties" => ours!(properties as vk::PFN_vkGetPhysicalDeviceProperties),
+        b"vkGetPhysicalDeviceProperties2" | b"vkGetPhysicalDeviceProperties2KHR" => {
+            ours!(properties2 as vk::PFN_vkGetPhysicalDeviceProperties2)
+        }
+        b"vkGetPhysicalDeviceFeatures" => ours!(features as vk::PFN_vkGetPhysicalDeviceFeatures),
+        b"vkGetPhysicalDeviceFeatures2" | b"vkGetPhysicalDeviceFeatures2KHR" => {
+            ours!(features2 as vk::PFN_vkGetPhysicalDeviceFeatures2)
+        }
+        b"vkGetPhysicalDeviceFormatProperties" => ours!(format as vk::PFN_vkGetPhysicalDeviceFormatProperties),
+        b"vkGetPhysicalDeviceMemoryProperties" => ours!(memory as vk::PFN_vkGetPhysicalDeviceMemoryProperties),
+        b"vkGetPhysicalDeviceMemoryProperties2" => ours!(memory2 as vk::PFN_vkGetPhysicalDeviceMemoryProperties2),
+        b"vkEnumerateDeviceExtensionProperties" => ours!(extensions as vk::PFN_vkEnumerateDeviceExtensionProperties),
+        // SAFETY: the next one's own function.
+        _ => NEXT.get().and_then(|next| unsafe { next(instance, name) }),
+    }
+}
+
+unsafe extern "system" fn create_instance(
+    info: *const vk::InstanceCreateInfo<'_>,
+    allocator: *const vk::AllocationCallbacks<'_>,
+    made: *mut vk::Instance,
+) -> vk::Result {
+    let description = match Description::from_environment() {
+        Ok(description) => description,
+        Err(error) => {
+            eprintln!("the mask: {error}");
+            return vk::Result::ERROR_INITIALIZATION_FAILED;
+        }
+    };
+    // SAFETY: the loader's chain has the link of this layer, which is to be moved on to the next one's.
+    unsafe {
+        let mut at = (*info).p_next.cast::<LinkInfo>().cast_mut();
+        while !at.is_null()
+            && ((*at).kind != vk::StructureType::LOADER_INSTANCE_CREATE_INFO || (*at).function != LINK_INFO)
+        {
+            at = (*at).next.cast::<LinkInfo>().cast_mut();
+        }
+        if at.is_null() {
+            return vk::Result::ERROR_INITIALIZATION_FAILED;
+        }
+        let next = (*(*at).link).instance_proc;
+        (*at).link = (*(*at).link).next;
+        let _ = NEXT.set(next);
+        /// A function of the next layer, by its name.
+        macro_rules! next {
+            ($instance:expr, $name:literal, $kind:ty) => {
+                match next($instance, $name.as_ptr()) {
+                    Some(found) => std::mem::transmute::<unsafe extern "system" fn(), $kind>(found),
+                    None => return vk::Result::ERROR_INITIALIZATION_FAILED,
+                }
+            };
+        }
+        let create = next!(vk::Instance::null(), c"vkCreateInstance", vk::PFN_vkCreateInstance);
+        let answer = create(info, allocator, made);
+        if answer != vk::Result::SUCCESS {
+            return answer;
+        }
+        let instance = *made;
+        let _ = BELOW.set(Below {
+            description,
+            properties: next!(instance, c"vkGetPhysicalDeviceProperties", vk::PFN_vkGetPhysicalDeviceProperties),
+            properties2: next!(instance, c"vkGetPhysicalDeviceProperties2", vk::PFN_vkGetPhysicalDeviceProperties2),
+            features: next!(instance, c"vkGetPhysicalDeviceFeatures", vk::PFN_vkGetPhysicalDeviceFeatures),
+            features2: next!(instance, c"vkGetPhysicalDeviceFeatures2", vk::PFN_vkGetPhysicalDeviceFeatures2),
+            format: next!(
+                instance,
+                c"vkGetPhysicalDeviceFormatProperties",
+                vk::PFN_vkGetPhysicalDeviceFormatProperties
+            ),
+            memory: next!(
+                instance,
+                c"vkGetPhysicalDeviceMemoryProperties",
+                vk::PFN_vkGetPhysicalDeviceMemoryProperties
+            ),
+            memory2: next!(
+                instance,
+                c"vkGetPhysicalDeviceMemoryProperties2",
+                vk::PFN_vkGetPhysicalDeviceMemoryProperties2
+            ),
+            extensions: next!(
+                instance,
+                c"vkEnumerateDeviceExtensionProperties",
+                vk::PFN_vkEnumerateDeviceExtensionProperties
+            ),
+        });
+    }
+    vk::Result::SUCCESS
+}
+
+unsafe extern "system" fn properties(device: vk::PhysicalDevice, to: *mut vk::PhysicalDeviceProperties) {
+    // SAFETY: the caller's struct, filled by the next.
+    unsafe {
+        (below().properties)(device, to);
+        below().description.lower_properties(&mut *to);
+    }
+}
+
+unsafe extern "system" fn properties2(device: vk::PhysicalDevice, to: *mut vk::PhysicalDeviceProperties2<'_>) {
+    let description = &below().description;
+    // SAFETY: the caller's chain, filled by the next; each struct has the type that it says.
+    unsafe {
+        (below().properties2)(device, to);
+        description.lower_properties(&mut (*to).properties);
+        for at in chain((*to).p_next) {
+            match (*at).s_type {
+                vk::StructureType::PHYSICAL_DEVICE_VULKAN_1_1_PROPERTIES => {
+                    description.lower_subgroups(&mut *at.cast())
+                }
+                vk::StructureType::PHYSICAL_DEVICE_PUSH_DESCRIPTOR_PROPERTIES_KHR => {
+                    description.lower_push_descriptors(&mut *at.cast());
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+unsafe extern "system" fn features(device: vk::PhysicalDevice, to: *mut vk::PhysicalDeviceFeatures) {
+    // SAFETY: the caller's struct, filled by the next.
+    unsafe {
+        (below().features)(device, to);
+        below().description.lower_features(&mut *to);
+    }
+}
+
+unsafe extern "system" fn features2(device: vk::PhysicalDevice, to: *mut vk::PhysicalDeviceFeatures2<'_>) {
+    let description = &below().description;
+    // SAFETY: as for properties.
+    unsafe {
+        (below().features2)(device, to);
+        description.lower_features(&mut (*to).features);
+        for at in chain((*to).p_next) {
+            match (*at).s_type {
+                vk::StructureType::PHYSICAL_DEVICE_VULKAN_1_2_FEATURES => {
+                    description.lower_features_1_2(&mut *at.cast())
+                }
+                vk::StructureType::PHYSICAL_DEVICE_VULKAN_1_3_FEATURES => {
+                    description.lower_features_1_3(&mut *at.cast())
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// The structs of a chain.
+///
+/// # Safety
+/// It is one, and lives as long as it is gone through.
+unsafe fn chain(first: *mut c_void) -> impl Iterator<Item = *mut vk::BaseOutStructure<'static>> {
+    let first = first.cast::<vk::BaseOutStructure<'static>>();
+    // SAFETY: as the caller says.
+    std::iter::successors((!first.is_null()).then_some(first), |at| unsafe {
+        let next = (**at).p_next;
+        (!next.is_null()).then_some(next)
+    })
+}
+
+unsafe extern "system" fn format(device: vk::PhysicalDevice, of: vk::Format, to: *mut vk::FormatProperties) {
+    // SAFETY: the caller's struct, filled by the next.
+    unsafe {
+        (below().format)(device, of, to);
+        below().description.lower_format(of, &mut *to);
+    }
+}
+
+unsafe extern "system" fn memory(device: vk::PhysicalDevice, to: *mut vk::PhysicalDeviceMemoryProperties) {
+    // SAFETY: the caller's struct, filled by the next.
+    unsafe {
+        (below().memory)(device, to);
+        below().description.lower_memory(&mut *to);
+    }
+}
+
+unsafe extern "system" fn memory2(device: vk::PhysicalDevice, to: *mut vk::PhysicalDeviceMemoryProperties2<'_>) {
+    // SAFETY: the caller's struct, filled by the next.
+    unsafe {
+        (below().memory2)(device, to);
+        below().description.lower_memory(&mut (*to).memory_properties);
+    }
+}
+
+unsafe extern "system" fn extensions(
+    device: vk::PhysicalDevice,
+    layer: *const c_char,
+    count: *mut u32,
+    to: *mut vk::ExtensionProperties,
+) -> vk::Result {
+    // SAFETY: asked for the number first, as everybody does, then for all; the caller's array holds as many as it says.
+    unsafe {
+        let next = below().extensions;
+        let mut all_count = 0;
+        let answer = next(device, layer, &raw mut all_count, ptr::null_mut());
+        if answer != vk::Result::SUCCESS {
+            return answer;
+        }
+        let mut all = vec![vk::ExtensionProperties::default(); all_count as usize];
+        let answer = next(device, layer, &raw mut all_count, all.as_mut_ptr());
+        if answer != vk::Result::SUCCESS {
+            return answer;
+        }
+        let is_hidden = |extension: &vk::ExtensionProperties| {
+            let name = extension.extension_name_as_c_str().unwrap_or_default().to_string_lossy();
+            below().description.without_extensions.iter().any(|hidden| *hidden == name)
+        };
+        all.retain(|extension| !is_hidden(extension));
+        if to.is_null() {
+            *count = all.len() as u32;
+            return vk::Result::SUCCESS;
+        }
+        let fit = all.len().min(*count as usize);
+        ptr::copy_nonoverlapping(all.as_ptr(), to, fit);
+        *count = fit as u32;
+        if fit < all.len() { vk::Result::INCOMPLETE } else { vk::Result::SUCCESS }
+    }
+}
