@@ -598,7 +598,7 @@ impl Renderer {
         Ok(Rendered {
             display: self.targets.display.pixels.read(<[u8]>::to_vec),
             has_alpha: self.display_background().1,
-            counts: self.targets.display.counts(),
+            counts: self.targets.display.counts()?,
             dropped: drawing.dropped,
             work,
             passes: times.list(),
@@ -790,13 +790,12 @@ impl Renderer {
         self.look(&view, 0, count, 0);
         let done =
             self.shadow_maps.times.iter().map(|pass| PassPlan { name: pass.name.clone(), pipelines: Vec::new() });
-        Ok([
-            done.collect(),
-            self.sample(count, 0)?.plan(),
-            self.add(0, count, 0)?.plan(),
-            self.show(count, count)?.plan(),
-        ]
-        .concat())
+        let mut passes: Vec<PassPlan> = done.collect();
+        for frame in [self.sample(count, 0)?, self.add(0, count, 0)?, self.show(count, count)?] {
+            frame.compile_where_told()?;
+            passes.extend(frame.plan());
+        }
+        Ok(passes)
     }
 
     /// Display-linear colour behind the scene with alpha 1, or all 0, and whether the display output is transparent.

@@ -1,7 +1,9 @@
 //! What is left of the shaders once their constants are known: valid SPIR-V without constants to be told, whatever they
 //! are, and much less of it. That it computes the same is what all tests of pictures and equations rest on.
 
-use etalon::gpu::{specialized, with_loops_counted, with_tables_in_storage, without_primitive_ids};
+use etalon::gpu::{
+    specialized, with_float_controls, with_loops_counted, with_tables_in_storage, without_primitive_ids,
+};
 use etalon::shader::PROGRAMS;
 use etalon_testing::gpu::Gpu;
 use spirv::Op;
@@ -80,14 +82,15 @@ fn what_is_left_is_valid_whatever_the_constants_are() {
                 assert!(gpu.errors().is_empty(), "loops counted {counts}: {told:?}: {:?}", gpu.errors());
             }
             // For devices that fetch no texels and know no triangles in fragments.
-            let other = with_tables_in_storage(&without_primitive_ids(&left));
+            let controlled = with_float_controls(&left, gpu.device.offers());
+            let other = with_tables_in_storage(&without_primitive_ids(&controlled));
             gpu.device.try_module(&other).expect("a module");
             assert!(gpu.errors().is_empty(), "tables in storage: {told:?}: {:?}", gpu.errors());
             let asks = |capability| {
                 let is = |one: &&[u32]| op(one) == Op::Capability && one[1] == capability as u32;
                 instructions(&other).iter().any(is)
             };
-            assert!(!asks(spirv::Capability::Geometry));
+            assert!(!asks(spirv::Capability::Geometry) && asks(spirv::Capability::SignedZeroInfNanPreserve));
             assert!(reads_texels(&other) == 0 && (reads_texels(&left) == 0 || other.len() > left.len()), "{told:?}");
         }
     }

@@ -47,7 +47,7 @@ fn shown(
     tonemap(&mut frame, (&film, 1.0), &target, curve as u32, exposure, background, desaturates).expect("the pass");
     frame.finish().expect("a frame");
     let bytes = target.pixels.read(|all| all[..rgba.len() * 4].as_chunks::<4>().0.to_vec());
-    (bytes, target.counts())
+    (bytes, target.counts().expect("the device runs"))
 }
 
 /// A display value within `slack` of the middle between two bytes may be rounded either way.
@@ -55,6 +55,17 @@ fn is_right(got: u8, display: f64, slack: f64) -> bool {
     let low = quantise((display - slack).max(0.0));
     let high = quantise((display + slack).min(1.0));
     (low..=high).contains(&got)
+}
+
+#[test]
+fn a_device_that_runs_nothing_is_an_error() {
+    let gpu = Gpu::open();
+    let target = Display::new(&gpu.device, [4, 4]).expect("a display");
+    let mut frame = Frame::new(&gpu.device);
+    frame.fill("what memory may hold", &target.pixels, 0);
+    frame.finish().expect("a frame");
+    let said = target.counts().expect_err("no pass has written it").to_string();
+    assert!(said.ends_with("runs nothing: what it was given is not done"), "{said}");
 }
 
 #[test]

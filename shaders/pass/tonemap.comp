@@ -9,9 +9,9 @@ layout(constant) const uint CURVE = 0;
 layout(constant) const bool DESATURATES = false; // colours outside of Rec. 709 lose saturation, not their luminance
 layout(pass, rgba32f) readonly uniform image2D film;
 layout(pass, scalar) writeonly buffer Display { uint display[]; };
-layout(pass, scalar) buffer Counts { uint nan; uint inf; uint negative; };
+layout(pass, scalar) buffer Counts { uint nan; uint inf; uint negative; uint ran; };
 // `background` is display-linear and lies behind what is not covered; its alpha 0 keeps the picture transparent.
-layout(push_constant, scalar) uniform Push { vec4 background; float exposure; float scale; };
+layout(push_constant, scalar) uniform Push { vec4 background; float exposure; float scale; uint canary; };
 
 const uint INFINITY_BITS = 0x7f800000u;
 
@@ -23,6 +23,8 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     ivec2 size = imageSize(film);
     if (any(greaterThanEqual(pixel, size))) return;
+    // By which the host sees that a device has run what it was given.
+    if (pixel == ivec2(0)) ran = canary;
     vec4 value = imageLoad(film, pixel) * scale;
     // Counted before anything clamps: max(NaN, 0) is 0.
     // By their bits: a compiler may assume that there are none, and drop a comparison.

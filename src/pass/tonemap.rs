@@ -2,16 +2,20 @@
 
 use std::sync::Arc;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 
 use crate::gpu::{Buffer, Device, Frame, Image, Place};
 use crate::shader::tonemap;
+
+/// What the last pass writes back: no count, and nothing that memory is filled with.
+const CANARY: u32 = 0x65_74_61_6c;
 
 /// What the last pass leaves for the host.
 pub struct Display {
     /// RGBA8, sRGB-encoded, rows from the top.
     pub pixels: Buffer,
     counts: Buffer,
+    device: Arc<Device>,
 }
 
 /// Values that are not radiances, counted before anything clamps.
@@ -33,16 +37,24 @@ impl Display {
     pub fn new(device: &Arc<Device>, size: [u32; 2]) -> Result<Self> {
         Ok(Self {
             pixels: Buffer::new(device, "display", 4 * u64::from(size[0]) * u64::from(size[1]), Place::Readback)?,
-            counts: Buffer::new(device, "counts of non-radiances", 12, Place::Readback)?,
+            counts: Buffer::new(device, "counts of non-radiances", 16, Place::Readback)?,
+            device: device.clone(),
         })
     }
 
     /// The counts of the frame that has just finished.
-    #[must_use]
-    pub fn counts(&self) -> Counts {
+    ///
+    /// # Errors
+    /// When the device has not run it, and shows nothing: a driver without its hardware.
+    pub fn counts(&self) -> Result<Counts> {
         self.counts.read(|bytes| {
             let words: &[u32] = bytemuck::cast_slice(bytes);
-            Counts { nan: words[0], inf: words[1], negative: words[2] }
+            ensure!(
+                words[3] == CANARY,
+                "device \"{}\" runs nothing: what it was given is not done",
+                self.device.info().name
+            );
+            Ok(Counts { nan: words[0], inf: words[1], negative: words[2] })
         })
     }
 }
@@ -62,7 +74,7 @@ pub fn tonemap<'a>(
     desaturates: bool,
 ) -> Result<()> {
     frame.fill("reset counts", &display.counts, 0);
-    let push = tonemap::Push { background, exposure: exposure.exp2(), scale };
+    let push = tonemap::Push { background, exposure: exposure.exp2(), scale, canary: CANARY };
     let bind = tonemap::Bind { film, display: &display.pixels, counts: &display.counts };
     let size = [film.desc().width, film.desc().height];
     let constants = tonemap::Constants { curve, desaturates, ..Default::default() };

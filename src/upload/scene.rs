@@ -12,7 +12,8 @@ use super::table::upload;
 use super::texture::{Texels, Textures};
 use super::view::View;
 use crate::gpu::{
-    Binding, BoundSet, Buffer, DescriptorSet, Device, Draw, Place, Resource, Specialization as _, VertexStream,
+    Binding, BoundSet, Buffer, DescriptorSet, Device, Draw, Place, Resource, Specialization as _, TooLarge,
+    VertexStream,
 };
 use crate::optics::ray::camera_relative;
 use crate::plan::rungs::{self, Brdf};
@@ -208,6 +209,12 @@ impl SceneOnDevice {
         let mut meshes = Vec::with_capacity(scene.meshes.len());
         let mut all_indices: Vec<u32> = Vec::with_capacity(scene.meshes.iter().map(|m| m.indices.len()).sum());
         for mesh in &scene.meshes {
+            let shared = device.offers().primitive_ids;
+            let vertices = if shared { mesh.positions.len() } else { mesh.indices.len() };
+            if vertices > device.max_vertices() {
+                let what = format!("{}: uploading a mesh of {vertices} vertices", scene.name);
+                bail!(TooLarge { what, limit: format!("draws at most {} in one", device.max_vertices()) });
+            }
             meshes.push(MeshRange {
                 first_index: all_indices.len() as u32,
                 index_count: mesh.indices.len() as u32,
@@ -217,7 +224,7 @@ impl SceneOnDevice {
                 has_colors: !mesh.colors.is_empty(),
                 extent: extent(&mesh.positions),
             });
-            if device.offers().primitive_ids {
+            if shared {
                 all_indices.extend_from_slice(&mesh.indices);
             } else {
                 all_indices.extend(0..mesh.indices.len() as u32);

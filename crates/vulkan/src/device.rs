@@ -545,6 +545,10 @@ impl Device {
         self.is_lavapipe
     }
 
+    pub(super) fn is_lavapipe(&self) -> bool {
+        self.is_lavapipe
+    }
+
     /// Whether the device is the processor itself: its memory is the process's own.
     pub(super) fn is_software(&self) -> bool {
         self.info.kind == "cpu"
@@ -563,6 +567,13 @@ impl Device {
     #[must_use]
     pub fn max_image_size(&self) -> u32 {
         self.limits.max_image_dimension2_d.min(self.limits.max_viewport_dimensions[0])
+    }
+
+    /// Vertices that one draw can have.
+    #[must_use]
+    pub fn max_vertices(&self) -> usize {
+        let largest = if self.offers.large_indices { u32::MAX - 1 } else { self.limits.max_draw_indexed_index_value };
+        largest as usize + 1
     }
 
     /// Largest storage buffer binding in bytes.

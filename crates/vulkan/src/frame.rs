@@ -529,6 +529,19 @@ impl<'a> Frame<'a> {
         self.passes.iter().map(plan).collect()
     }
 
+    /// Makes the pipelines of the passes so far, where the driver tells what it makes of them ([`Device::compiled`]).
+    ///
+    /// # Errors
+    /// When the driver refuses one.
+    pub fn compile_where_told(&self) -> Result<()> {
+        if !self.device.offers().tells_compiled {
+            return Ok(());
+        }
+        let all: Vec<PipelineKey> = self.passes.iter().flat_map(|pass| pass.pipelines.clone()).collect();
+        let keys: Vec<&PipelineKey> = all.iter().collect();
+        self.device.with_pipelines(&keys, |pipelines| pipelines.wait_for(&all).map(|_| ()))
+    }
+
     /// Records, submits, waits, and returns the time of each pass in order.
     ///
     /// # Errors

@@ -9,6 +9,7 @@ use ash::vk;
 
 use super::cache::{Layout, PipelineKey, SamplerDesc};
 use super::device::{Device, lock};
+use super::float_controls::with_float_controls;
 use super::loops::with_loops_counted;
 use super::primitive_ids::without_primitive_ids;
 use super::shader::{Binding, Program, Replacement, SetLayout};
@@ -244,6 +245,10 @@ impl Device {
             let replaced = lock(&self.caches).replaced.get(&(program.name, index)).cloned();
             let words = specialized(replaced.as_deref().unwrap_or(stage.words), &key.constants);
             let mut words = with_loops_counted(&words, self.limits_loops());
+            // lavapipe keeps them unasked: the tests of bits and of NaN hold there. What it would cost to ask was not measured.
+            if !self.is_lavapipe() {
+                words = with_float_controls(&words, self.offers());
+            }
             if !self.offers().primitive_ids {
                 words = without_primitive_ids(&words);
             }
