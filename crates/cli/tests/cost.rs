@@ -163,7 +163,7 @@ fn a_run_is_what_its_commands_draw() {
     let said = etalon(at, &["cost", "--beside", "a", "a", "--json"], &[]).succeeded().stdout;
     let rows: Value = serde_json::from_str(&said).expect("JSON");
     let rows = rows.as_array().expect("a list");
-    assert_eq!(rows.len(), points.len());
+    assert_eq!(rows.len(), list(&again, "points").len());
     assert!(rows.iter().all(|row| row["same_work"] == true && row["gpu_ms"][0] == row["gpu_ms"][1]));
     let said = etalon(at, &["cost", "--beside", "a", "a"], &[]).succeeded().stdout;
     assert!(said.contains("local shadows=ray") && said.contains("same"), "{said}");
