@@ -54,6 +54,8 @@ impl Plan {
             layers: layers.layers,
             clearcoat: layers.clearcoat,
             conductors: layers.conductors,
+            // n and κ of each band of wavelengths are known when it is drawn.
+            faint_conductors: bands > 0 || scene.materials.iter().any(|m| !m.is_metallic()),
             lobes: layers.lobes,
             demand: surroundings.demand,
             environment: images.environment,

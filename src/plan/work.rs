@@ -15,6 +15,8 @@ pub struct Plan {
     pub clearcoat: bool,
     /// Code for metals given by n and κ.
     pub conductors: bool,
+    /// And for such as hardly absorb, where the differences of their reflectance cancel.
+    pub faint_conductors: bool,
     /// Code for lobes of extensions, a bit each in the order of [`LOBES`](crate::scene::lobe::LOBES).
     pub lobes: u32,
     /// What was asked for beside what the scene calls for.

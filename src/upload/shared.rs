@@ -109,6 +109,7 @@ impl<'a> OnDevice<'a> {
                 sky_steps: halvings(emitters.columns.max(emitters.rows)),
             },
             environment: lib::environment::Constants { sky: plan.sky, environment: plan.environment },
+            fresnel: lib::fresnel::Constants { faint_conductors: plan.faint_conductors },
             gbuffer: lib::gbuffer::Constants {
                 normal_error2: plan.stored.normals.error2(),
                 positions: plan.stored.positions,

@@ -97,6 +97,12 @@ pub struct Material {
 }
 
 impl Material {
+    /// Whether κ of all that is given by n and κ is well above 0, as `is_metallic` of shaders/lib/fresnel.glsl has it.
+    #[must_use]
+    pub fn is_metallic(&self) -> bool {
+        self.conductor.iter().flatten().all(|&[n, kappa]| kappa > n.max(0.5))
+    }
+
     /// The textures that it may have, by the names that shaders know them by (`NAME_page` in shaders/lib/texels.glsl).
     pub fn textures(&self) -> impl Iterator<Item = (&'static str, Meaning, Option<TextureRef>)> {
         use Meaning::{Color, Data};
