@@ -11,7 +11,7 @@ use crate::plan::Plan;
 use crate::prepare::{Original, Prepared};
 use crate::scene::camera::DEFAULT_FOV_Y;
 use crate::scene::environment::Environment;
-use crate::scene::{Camera, LoadOptions, Scene};
+use crate::scene::{Camera, LoadOptions, Reads, Scene, Source};
 use crate::study;
 
 /// A scene, the light from all around it, and a camera for whoever names none. Clones share what is large.
@@ -53,6 +53,17 @@ pub fn scene(name: &str, options: &LoadOptions) -> Result<Scene> {
     }
 }
 
+/// The same for all moments of its animation: what does not move is read once.
+///
+/// # Errors
+/// As [`scene()`].
+pub fn source(name: &str, reads: Reads) -> Result<Source> {
+    match name.strip_prefix("study:") {
+        Some(study) => study::load(study).map(Source::still),
+        None => Source::open(Path::new(name), reads),
+    }
+}
+
 /// A camera that sees the whole scene.
 ///
 /// # Errors
@@ -76,6 +87,11 @@ impl Opened {
     pub fn new(scene: Scene, environment: Option<Environment>, is_asked_for: bool) -> Self {
         let warnings = scene.warnings.clone();
         Self { original: scene.into(), environment, is_asked_for, warnings }
+    }
+
+    /// Another moment of the scene, in the same environment.
+    pub fn pose(&mut self, scene: Scene) {
+        self.original = scene.into();
     }
 
     /// The scene as it was read.

@@ -9,11 +9,10 @@ use glam::{DMat3, DVec3};
 use super::sigma_grid::SigmaGrids;
 use super::spectrum::{SpectrumConstants, SpectrumOnDevice};
 use super::table::upload;
-use super::texture::{Texels, Textures};
+use super::texture::{SLOTS, Textures, texture_slots};
 use super::view::View;
 use crate::gpu::{
-    Binding, BoundSet, Buffer, DescriptorSet, Device, Draw, Place, Resource, Specialization as _, TooLarge,
-    VertexStream,
+    BoundSet, Buffer, DescriptorSet, Device, Draw, Place, Resource, Specialization as _, TooLarge, VertexStream,
 };
 use crate::optics::ray::camera_relative;
 use crate::plan::rungs::{self, Brdf};
@@ -26,9 +25,6 @@ use crate::shader::lib::light_table::{SHAPE_DISK, SHAPE_NONE, SHAPE_RECTANGLE, S
 use crate::shader::{PAGES, lib};
 use crate::share;
 use crate::spectra::{self, Upsampling};
-
-/// Texture slots of a material.
-const SLOTS: usize = lib::material::SLOTS as usize;
 
 /// Texels of a material before those of its lobes: of its constants, then of its texture slots.
 const MATERIAL_LOBES_AT: usize =
@@ -108,8 +104,6 @@ pub struct SceneOnDevice {
     wavelengths: Option<Wavelengths>,
     knobs: Knobs,
     eye: DVec3,
-    /// For rays: the texels of all textures.
-    pub texels: Buffer,
     /// For rays: media that vary.
     pub grids: SigmaGrids,
     /// Instances relative to the eye of the current view.
@@ -121,26 +115,14 @@ pub struct SceneOnDevice {
     light_shadows: Vec<LightMaps>,
     refraction: bool,
     stored_normals: lib::normals::Constants,
-    textures: Textures,
+    /// Textures, for rasterisation and for rays.
+    pub textures: Textures,
     /// Materials by index → place in [`SceneOnDevice::pages`].
     page_of_material: Vec<usize>,
     page_materials: Vec<usize>,
     page_sets: Vec<DescriptorSet>,
     /// World-space box of the drawn triangles.
     pub bounds: Option<Bounds>,
-}
-
-/// The textures of a material by their slots.
-#[must_use]
-pub fn texture_slots(m: &Material) -> [(Option<TextureRef>, Meaning); SLOTS] {
-    let mut slots = [(None, Meaning::Data); SLOTS];
-    for (name, meaning, texture) in m.textures() {
-        let is_named = |page: &&Binding| page.name.strip_suffix("_page") == Some(name);
-        if let Some(page) = PAGES.bindings.iter().find(is_named) {
-            slots[page.slot as usize] = (texture, meaning);
-        }
-    }
-    slots
 }
 
 /// Bit by slot: the textures that a material has.
@@ -177,7 +159,8 @@ fn stream<T: bytemuck::NoUninit>(
 }
 
 impl SceneOnDevice {
-    /// Uploads a scene; decoded images and geometry are taken out of it. `anchor` is what rays are told from.
+    /// Uploads a scene; decoded images and geometry are taken out of it. `anchor` is what rays are told from. Textures of the same
+    /// images that are there from `before` stay.
     ///
     /// # Errors
     /// When the scene does not fit the device.
@@ -188,6 +171,7 @@ impl SceneOnDevice {
         knobs: &Knobs,
         solids: &Solids,
         anchor: DVec3,
+        before: Option<Textures>,
     ) -> Result<Self> {
         if scene.materials.len() > 0xffff || scene.instances.len() > 0x7f_ffff {
             bail!(
@@ -238,14 +222,7 @@ impl SceneOnDevice {
         let indices = upload(device, "indices", &all_indices, None)?;
         drop(all_indices);
 
-        let mut wanted = Vec::new();
-        for material in &scene.materials {
-            wanted.extend(texture_slots(material).into_iter().filter_map(|(t, meaning)| t.map(|t| (t.image, meaning))));
-        }
-        wanted.sort_unstable();
-        wanted.dedup();
-        let mut texels = Texels::default();
-        let textures = Textures::new(device, &mut scene, &wanted, plan.rays.is_some().then_some(&mut texels))?;
+        let textures = Textures::new(device, &mut scene, plan.rays.is_some(), before)?;
 
         let fitted =
             wavelengths.as_ref().is_some_and(|known| known.vary) && upsampling(knobs) == Upsampling::JakobHanika;
@@ -254,7 +231,7 @@ impl SceneOnDevice {
         let mut page_materials: Vec<usize> = Vec::new();
         for (index, material) in scene.materials.iter().enumerate() {
             for (texture, meaning) in texture_slots(material) {
-                let for_rays = plan.rays.map_or([0; 4], |_| texels.slot(texture, meaning));
+                let for_rays = plan.rays.map_or([0; 4], |_| textures.slot(texture, meaning));
                 texture_slots_of.extend(shared_slot(texture, &textures, meaning).map(|texel| texel.map(f32::to_bits)));
                 texture_slots_of.push(for_rays);
             }
@@ -296,7 +273,6 @@ impl SceneOnDevice {
             wavelengths,
             knobs: knobs.clone(),
             eye: DVec3::ZERO,
-            texels: upload(device, "texels for rays", &texels.texels, Some(vk::Format::R32_UINT))?,
             grids,
             instances: Buffer::new(device, "instances", instance_bytes, Place::Upload)?,
             lights: Buffer::texels(device, "lights", light_bytes, Place::Upload, vk::Format::R32G32B32A32_SFLOAT)?,

@@ -39,7 +39,7 @@ impl<'a> OnDevice<'a> {
             lib::light_table::Scene { lights: &scene.lights }.entries(),
             lib::spectrum::Scene { spectrum: &scene.spectrum.texels }.entries(),
             lib::sigma_grid::Scene { sigma_grids: &scene.grids.texels }.entries(),
-            lib::hit::Scene { hit_corners: &rays.corners, texels: &scene.texels }.entries(),
+            lib::hit::Scene { hit_corners: &rays.corners, texels: &scene.textures.texels }.entries(),
             lib::primary::Scene { leaf_places: &rays.leaf_places }.entries(),
             rays.trace().entries(),
             rays.work().entries(),

@@ -10,8 +10,26 @@ use anyhow::Result;
 use ash::vk;
 use rayon::prelude::*;
 
-use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, Place, Sampled, SamplerDesc};
-use crate::scene::{AlphaMode, Meaning, Sampler, Scene, Shared, TextureRef, Wrap};
+use super::table::upload;
+use crate::gpu::{Binding, Buffer, Device, Frame, Image, ImageDesc, Place, Sampled, SamplerDesc};
+use crate::scene::{AlphaMode, Mark, Material, Meaning, Sampler, Scene, Shared, TextureRef, Wrap};
+use crate::shader::{PAGES, lib};
+
+/// Texture slots of a material.
+pub const SLOTS: usize = lib::material::SLOTS as usize;
+
+/// The textures of a material by their slots.
+#[must_use]
+pub fn texture_slots(m: &Material) -> [(Option<TextureRef>, Meaning); SLOTS] {
+    let mut slots = [(None, Meaning::Data); SLOTS];
+    for (name, meaning, texture) in m.textures() {
+        let is_named = |page: &&Binding| page.name.strip_suffix("_page") == Some(name);
+        if let Some(page) = PAGES.bindings.iter().find(is_named) {
+            slots[page.slot as usize] = (texture, meaning);
+        }
+    }
+    slots
+}
 
 /// Every texture of a scene on the device.
 pub struct Textures {
@@ -19,27 +37,59 @@ pub struct Textures {
     /// (image, meaning) → (page, layer).
     places: BTreeMap<(usize, Meaning), (usize, u32)>,
     white: Image,
+    /// For rays: the texels of all textures.
+    pub texels: Buffer,
+    for_rays: Texels,
+    made_of: Wanted,
+    images: Vec<Mark<u8>>,
+}
+
+/// What textures are made for.
+#[derive(PartialEq)]
+struct Wanted {
+    textures: BTreeSet<(usize, Meaning)>,
+    /// Images whose alpha hides texels: only there does it weigh them.
+    faded: BTreeSet<usize>,
+    for_rays: bool,
+}
+
+impl Wanted {
+    fn of(scene: &Scene, for_rays: bool) -> Self {
+        let slots = scene.materials.iter().flat_map(texture_slots);
+        let hides = scene.materials.iter().filter(|material| material.alpha_mode != AlphaMode::Opaque);
+        Self {
+            textures: slots.filter_map(|(texture, meaning)| texture.map(|t| (t.image, meaning))).collect(),
+            faded: hides.filter_map(|material| material.base_color_texture.map(|texture| texture.image)).collect(),
+            for_rays,
+        }
+    }
+
+    /// Marks of the images that are used, in their order.
+    fn images(&self, scene: &Scene) -> Vec<Mark<u8>> {
+        let used: BTreeSet<usize> = self.textures.iter().map(|&(image, _)| image).collect();
+        used.into_iter().map(|image| scene.images[image].rgba.mark()).collect()
+    }
 }
 
 impl Textures {
-    /// Uploads the images that `wanted` names, and keeps a copy of all levels `for_rays`; their pixels are taken out of
-    /// the scene, image by image, so that only one decoded image exists twice at a time.
+    /// Uploads the images that the scene's materials name, and keeps a copy of all levels `for_rays`; their pixels are taken out of
+    /// the scene, image by image, so that only one decoded image exists twice at a time. What was made `before` of the same images
+    /// stays as it is.
     ///
     /// # Errors
     /// When memory is short or an image is larger than the device allows.
-    pub fn new(
-        device: &Arc<Device>,
-        scene: &mut Scene,
-        wanted: &[(usize, Meaning)],
-        mut for_rays: Option<&mut Texels>,
-    ) -> Result<Self> {
-        // Images whose alpha hides texels: only there does it weigh them.
-        let faded: BTreeSet<usize> = scene
-            .materials
-            .iter()
-            .filter(|material| material.alpha_mode != AlphaMode::Opaque)
-            .filter_map(|material| material.base_color_texture.map(|texture| texture.image))
-            .collect();
+    pub fn new(device: &Arc<Device>, scene: &mut Scene, for_rays: bool, before: Option<Self>) -> Result<Self> {
+        let wanted = Wanted::of(scene, for_rays);
+        let images = wanted.images(scene);
+        match before.filter(|before| before.made_of == wanted && before.images == images) {
+            Some(before) => Ok(before),
+            None => Self::upload(device, scene, wanted, images),
+        }
+    }
+
+    fn upload(device: &Arc<Device>, scene: &mut Scene, made_of: Wanted, marks: Vec<Mark<u8>>) -> Result<Self> {
+        let Wanted { textures: wanted, faded, for_rays: keep_for_rays } = &made_of;
+        let mut for_rays = Texels::default();
         let mut groups: BTreeMap<(u32, u32, Meaning), Vec<usize>> = BTreeMap::new();
         for &(image, meaning) in wanted {
             let source = &scene.images[image];
@@ -83,8 +133,8 @@ impl Textures {
                     places.insert((image, meaning), (pages.len(), layer));
                     let mut staging = Buffer::new(device, "staging", chain.len() as u64, Place::Upload)?;
                     staging.write(&chain);
-                    if let Some(texels) = &mut for_rays {
-                        texels.add((image, meaning), [width, height], levels, &chain);
+                    if *keep_for_rays {
+                        for_rays.add((image, meaning), [width, height], levels, &chain);
                     }
                     drop(chain);
                     let mut frame = Frame::new(device);
@@ -116,7 +166,15 @@ impl Textures {
         let mut frame = Frame::new(device);
         frame.upload("upload white", &staging, &white, 0, &[0]);
         frame.finish()?;
-        Ok(Self { pages, places, white })
+        let words = std::mem::take(&mut for_rays.words);
+        let texels = upload(device, "texels for rays", &words, Some(vk::Format::R32_UINT))?;
+        Ok(Self { pages, places, white, texels, for_rays, made_of, images: marks })
+    }
+
+    /// A slot of a material as rays read it.
+    #[must_use]
+    pub fn slot(&self, texture: Option<TextureRef>, meaning: Meaning) -> [u32; 4] {
+        self.for_rays.slot(texture, meaning)
     }
 
     /// The page of a texture with its sampler; white where the material has none.
@@ -137,22 +195,21 @@ impl Textures {
 
 /// All levels of all textures one after the other, for shaders that choose a texture by an index (shaders/lib/hit.glsl).
 #[derive(Default)]
-pub struct Texels {
+struct Texels {
     /// RGBA in bytes.
-    pub texels: Vec<u32>,
+    words: Vec<u32>,
     places: BTreeMap<(usize, Meaning), [u32; 3]>,
 }
 
 impl Texels {
     fn add(&mut self, key: (usize, Meaning), [width, height]: [u32; 2], levels: u32, chain: &[u8]) {
-        self.places.insert(key, [self.texels.len() as u32, width | height << 16, levels]);
+        self.places.insert(key, [self.words.len() as u32, width | height << 16, levels]);
         let words = chain.as_chunks::<4>().0;
-        self.texels.extend(words.iter().map(|bytes| u32::from_le_bytes(*bytes)));
+        self.words.extend(words.iter().map(|bytes| u32::from_le_bytes(*bytes)));
     }
 
     /// A slot of a material: first texel | width, height | levels, flags << 8 | unused; zeros without a texture.
-    #[must_use]
-    pub fn slot(&self, texture: Option<TextureRef>, meaning: Meaning) -> [u32; 4] {
+    fn slot(&self, texture: Option<TextureRef>, meaning: Meaning) -> [u32; 4] {
         let place = texture.and_then(|t| self.places.get(&(t.image, meaning)).map(|place| (t.sampler, place)));
         let Some((sampler, &[first, size, levels])) = place else { return [0; 4] };
         let wrap = |wrap| match wrap {

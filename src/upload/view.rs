@@ -100,6 +100,7 @@ impl View {
             orthographic: u32::from(self.orthographic),
             jitter: jitter.as_vec2().into(),
             size: self.size,
+            tiles: [0, 1],
         }
     }
 }

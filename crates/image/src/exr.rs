@@ -9,8 +9,8 @@ use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer, LayerAttributes,
-    MetaData, ReadChannels, ReadLayers, ReadSpecificChannel, SmallVec, Text, Vec2, WritableImage,
+    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer,
+    LayerAttributes, MetaData, ReadChannels, ReadLayers, ReadSpecificChannel, SmallVec, Text, Vec2, WritableImage,
 };
 
 use super::{Aov, AovData, MAX_PIXELS, Picture};
@@ -299,9 +299,35 @@ pub struct Channels {
     pub list: Vec<(String, AovData)>,
 }
 
+/// Text attributes of the first part, such as those that [`encode_exr`] is given.
+///
+/// # Errors
+/// When the bytes are no OpenEXR file.
+pub fn texts(bytes: &[u8]) -> Result<Vec<(String, String)>> {
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|error| anyhow!("{error}"))?;
+    guard(&meta, bytes.len() as u64)?;
+    let header = meta.headers.first().context("the file has no part")?;
+    let others = header.own_attributes.other.iter().chain(&header.shared_attributes.other);
+    let text = |(name, value): (&Text, &AttributeValue)| match value {
+        AttributeValue::Text(text) => {
+            String::from_utf8(text.bytes().to_vec()).ok().map(|text| (name.to_string(), text))
+        }
+        _ => None,
+    };
+    Ok(others.filter_map(text).collect())
+}
+
 /// Every channel of the first flat part, with the extent of its data window; half samples become f32.
 pub fn read_channels(path: &Path) -> Result<Channels> {
     let bytes = super::file::read(path)?;
+    decode_channels(&bytes).with_context(|| format!("reading {}", path.display()))
+}
+
+/// The same for bytes in memory.
+///
+/// # Errors
+/// When the bytes are no OpenEXR file, or end too early.
+pub fn decode_channels(bytes: &[u8]) -> Result<Channels> {
     let read = || -> Result<_> {
         let meta = MetaData::read_from_buffered(Cursor::new(&bytes), false).map_err(|error| anyhow!("{error}"))?;
         guard(&meta, bytes.len() as u64)?;
@@ -322,5 +348,5 @@ pub fn read_channels(path: &Path) -> Result<Channels> {
         });
         Ok(Channels { width: layer.size.x() as u32, height: layer.size.y() as u32, list: channels.collect() })
     };
-    read().with_context(|| format!("reading {}", path.display()))
+    read()
 }

@@ -21,6 +21,25 @@ pub fn cause(error: &io::Error) -> String {
     }
 }
 
+/// Why an operation on a file failed: what a caller may look for in an [`anyhow::Error`].
+#[derive(Debug)]
+pub struct Failed(io::Error);
+
+impl std::fmt::Display for Failed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&cause(&self.0))
+    }
+}
+
+impl std::error::Error for Failed {}
+
+/// Whether an error comes of a disk, or of somebody's share of it, that is full: the same may be possible later.
+#[must_use]
+pub fn is_full(error: &anyhow::Error) -> bool {
+    let full = |error: &Failed| matches!(error.0.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
+    error.chain().any(|cause| cause.downcast_ref().is_some_and(full))
+}
+
 /// Whole contents of `path`, with one sentence when it cannot be read.
 pub fn read(path: &Path) -> Result<Vec<u8>> {
     let bytes = File::open(path).and_then(|mut file| {
@@ -42,7 +61,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
 }
 
 fn write_inner(path: &Path, bytes: &[u8]) -> Result<()> {
-    let plain = |error: io::Error| anyhow!(cause(&error));
+    let plain = |error: io::Error| anyhow!(Failed(error));
     let before = match fs::metadata(path) {
         Ok(found) => Some(found),
         Err(error) if error.kind() == io::ErrorKind::NotFound => None,
@@ -109,12 +128,11 @@ fn beside(target: &Path) -> Result<NamedTempFile> {
         io::ErrorKind::NotFound => anyhow!("the folder {} does not exist", folder.display()),
         io::ErrorKind::NotADirectory => anyhow!("{} is not a folder", folder.display()),
         // tempfile appends its own file name to the text of the error, which would only confuse.
-        kind => match kind {
-            io::ErrorKind::PermissionDenied | io::ErrorKind::StorageFull | io::ErrorKind::ReadOnlyFilesystem => {
-                anyhow!(cause(&error))
-            }
-            _ => anyhow!("no file can be created in {}: {}", folder.display(), kind),
-        },
+        io::ErrorKind::PermissionDenied
+        | io::ErrorKind::StorageFull
+        | io::ErrorKind::QuotaExceeded
+        | io::ErrorKind::ReadOnlyFilesystem => anyhow!(Failed(error)),
+        kind => anyhow!("no file can be created in {}: {}", folder.display(), kind),
     })
 }
 

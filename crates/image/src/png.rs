@@ -22,6 +22,19 @@ pub struct Display {
 /// how to read the bytes, together with the `gAMA` and `cHRM` that the PNG specification asks for beside it, so that
 /// no viewer guesses. The same input gives the same file.
 pub fn encode_png(width: u32, height: u32, rgba: &[u8], has_alpha: bool) -> Result<Vec<u8>> {
+    encode_png_with([width, height], rgba, has_alpha, &[])
+}
+
+/// The same with texts (`tEXt`): keyword and text in Latin-1.
+///
+/// # Errors
+/// As [`encode_png`], or when a keyword is none.
+pub fn encode_png_with(
+    [width, height]: [u32; 2],
+    rgba: &[u8],
+    has_alpha: bool,
+    texts: &[(String, String)],
+) -> Result<Vec<u8>> {
     let pixels = width as usize * height as usize;
     ensure!(
         rgba.len() == pixels * 4,
@@ -38,6 +51,9 @@ pub fn encode_png(width: u32, height: u32, rgba: &[u8], has_alpha: bool) -> Resu
         encoder.set_compression(::png::Compression::Fast);
         // One fixed filter: choosing one for each row costs more time than it saves in bytes on rendered pictures.
         encoder.set_filter(::png::Filter::Paeth);
+        for (keyword, text) in texts {
+            encoder.add_text_chunk(keyword.clone(), text.clone())?;
+        }
         let mut writer = encoder.write_header()?;
         if has_alpha {
             writer.write_image_data(rgba)?;
@@ -50,6 +66,57 @@ pub fn encode_png(width: u32, height: u32, rgba: &[u8], has_alpha: bool) -> Resu
         Ok(bytes)
     };
     encode().with_context(|| format!("encoding a PNG of {width}x{height} pixels"))
+}
+
+/// Texts of a PNG and its pixels, whole: every byte is read and every checksum compared.
+///
+/// # Errors
+/// When the bytes are no PNG, or end too early.
+pub fn decode_png_with(bytes: &[u8]) -> Result<(Display, Vec<(String, String)>)> {
+    let mut decoder = ::png::Decoder::new(Cursor::new(bytes));
+    decoder.set_transformations(::png::Transformations::EXPAND | ::png::Transformations::ALPHA);
+    let mut reader = decoder.read_info()?;
+    let size = reader.output_buffer_size().context("the picture is too large")?;
+    ensure!(size as u64 <= super::MAX_PIXELS * 4, "the picture is too large");
+    let mut pixels = vec![0; size];
+    let frame = reader.next_frame(&mut pixels)?;
+    reader.finish()?;
+    ensure!(
+        frame.color_type == ::png::ColorType::Rgba && frame.bit_depth == ::png::BitDepth::Eight,
+        "the picture is not of eight bits a colour"
+    );
+    let texts = &reader.info().uncompressed_latin1_text;
+    let texts = texts.iter().map(|text| (text.keyword.clone(), text.text.clone())).collect();
+    let rgba = pixels.as_chunks::<4>().0.to_vec();
+    Ok((Display { width: frame.width, height: frame.height, rgba }, texts))
+}
+
+/// An animated PNG of pictures of one size, for ever in a circle, each for `seconds[0] / seconds[1]` of a second.
+///
+/// # Errors
+/// When there is no picture, or they are not of one size.
+pub fn encode_animation(pictures: &[Display], [seconds, of]: [u16; 2]) -> Result<Vec<u8>> {
+    let first = pictures.first().context("encoding an animation: there are no pictures")?;
+    let (width, height) = (first.width, first.height);
+    let same = pictures.iter().all(|picture| (picture.width, picture.height) == (width, height));
+    ensure!(same, "encoding an animation: the pictures are not of one size");
+    let encode = || -> Result<Vec<u8>, ::png::EncodingError> {
+        let mut bytes = Vec::new();
+        let mut encoder = ::png::Encoder::new(&mut bytes, width, height);
+        encoder.set_color(::png::ColorType::Rgba);
+        encoder.set_depth(::png::BitDepth::Eight);
+        encoder.set_source_srgb(::png::SrgbRenderingIntent::Perceptual);
+        encoder.set_compression(::png::Compression::Fast);
+        encoder.set_animated(pictures.len() as u32, 0)?;
+        encoder.set_frame_delay(seconds, of)?;
+        let mut writer = encoder.write_header()?;
+        for picture in pictures {
+            writer.write_image_data(picture.rgba.as_flattened())?;
+        }
+        writer.finish()?;
+        Ok(bytes)
+    };
+    encode().with_context(|| format!("encoding an animation of {width}x{height} pixels"))
 }
 
 /// Reads a PNG, JPEG or WebP as 8-bit sRGB; the contents decide, not the extension.

@@ -3,7 +3,11 @@
 //! After [`Document::open`] every index in the JSON that the `gltf` crate knows of is in range, every buffer has the
 //! length its JSON claims, and the node hierarchy has not been looked at yet.
 
-use std::{borrow::Cow, fs, path::Path};
+use std::{
+    borrow::Cow,
+    fs,
+    path::{Path, PathBuf},
+};
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use gltf::json::{
@@ -45,7 +49,7 @@ pub(crate) struct Document<'a> {
     /// One byte string per buffer, exactly `byteLength` long.
     pub(crate) buffers: Vec<Cow<'a, [u8]>>,
     /// Folder that relative URIs start from.
-    pub(crate) folder: &'a Path,
+    pub(crate) folder: PathBuf,
 }
 
 /// The two parts of a GLB file, or a plain JSON file without the second.
@@ -56,7 +60,7 @@ struct Parts<'a> {
 
 impl<'a> Document<'a> {
     /// Parses and checks `bytes`, and reads every buffer the file names.
-    pub(crate) fn open(bytes: &'a [u8], path: &'a Path, warnings: &mut Vec<String>) -> Result<Self> {
+    pub(crate) fn open(bytes: &'a [u8], path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
         let is_glb = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb"));
         let parts = if is_glb || bytes.starts_with(b"glTF") {
             split_glb(bytes)?
@@ -72,14 +76,21 @@ impl<'a> Document<'a> {
         check_asset(&root)?;
         check_extensions(&root, warnings)?;
         check_references(&root)?;
-        let folder = path.parent().unwrap_or(Path::new(""));
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let buffers = root
             .buffers
             .iter()
             .enumerate()
-            .map(|(index, buffer)| read_buffer(index, buffer, parts.binary, folder))
+            .map(|(index, buffer)| read_buffer(index, buffer, parts.binary, &folder))
             .collect::<Result<Vec<_>>>()?;
         Ok(Self { root, buffers, folder })
+    }
+
+    /// The same with buffers of its own, for as long as one likes.
+    pub(crate) fn into_owned(self) -> Document<'static> {
+        let Self { root, buffers, folder } = self;
+        let buffers = buffers.into_iter().map(|buffer| Cow::Owned(buffer.into_owned())).collect();
+        Document { root, buffers, folder }
     }
 
     /// The bytes of a buffer view and its stride.
@@ -105,7 +116,7 @@ impl<'a> Document<'a> {
 
     /// The bytes behind a URI: `data:` or a path relative to the file.
     pub(crate) fn resolve(&self, uri: &str) -> Result<Vec<u8>> {
-        resolve(uri, self.folder)
+        resolve(uri, &self.folder)
     }
 }
 

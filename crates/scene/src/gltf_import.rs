@@ -7,7 +7,7 @@
 use std::{
     collections::{HashMap, HashSet},
     fs,
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 use anyhow::{Context, Result, ensure};
@@ -22,7 +22,7 @@ use gltf::json::{
 use rayon::prelude::*;
 
 use super::{
-    Camera, Instance, Light, LightKind, LoadOptions, Material, Mesh, Projection, Scene, Shared,
+    Camera, Image, Instance, Light, LightKind, LoadOptions, Material, Mesh, Projection, Scene, Shared,
     accessor::Accessor,
     container::Document,
     geometry, gltf_extras, gltf_material,
@@ -31,20 +31,61 @@ use super::{
     thin::{self, Stroke},
 };
 
+/// What is the same at all moments of a file's animation, by its place in the file.
+#[derive(Default)]
+struct Known {
+    images: HashMap<usize, Image>,
+    /// Of primitives that nothing bends: mesh, primitive.
+    resting: HashMap<(usize, usize), Mesh>,
+}
+
+/// A file that is read at one moment after another: what the moments share is read once.
+pub(crate) struct File {
+    path: PathBuf,
+    document: Document<'static>,
+    warnings: Vec<String>,
+    known: Known,
+}
+
+impl File {
+    pub(crate) fn open(path: &Path) -> Result<Self> {
+        let bytes = fs::read(path).context("the file cannot be read")?;
+        let mut warnings = Vec::new();
+        let document = Document::open(&bytes, path, &mut warnings)?.into_owned();
+        Ok(Self { path: path.to_owned(), document, warnings, known: Known::default() })
+    }
+
+    pub(crate) fn at(&mut self, options: &LoadOptions) -> Result<Scene> {
+        read(&self.document, &self.path, options, self.warnings.clone(), &mut self.known)
+    }
+}
+
 /// Reads a `.gltf` or `.glb` file.
 pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let bytes = fs::read(path).context("the file cannot be read")?;
     let mut warnings = Vec::new();
     let document = Document::open(&bytes, path, &mut warnings)?;
-    let nodes = Nodes::new(&document, options.time, &mut warnings)?;
-    let mut materials = gltf_material::read(&document, &mut warnings)?;
-    check_unseen_meshes(&document)?;
-    let lights = lights(&document, &nodes, &mut warnings)?;
-    let mut placing = Placing::new(&document, &nodes, &mut materials.materials, &mut warnings)?;
+    read(&document, path, options, warnings, &mut Known::default())
+}
+
+fn read(
+    document: &Document<'_>,
+    path: &Path,
+    options: &LoadOptions,
+    mut warnings: Vec<String>,
+    known: &mut Known,
+) -> Result<Scene> {
+    let nodes = Nodes::new(document, options.time, &mut warnings)?;
+    let mut materials = gltf_material::read(document, &mut warnings)?;
+    if known.resting.is_empty() {
+        check_unseen_meshes(document)?;
+    }
+    let lights = lights(document, &nodes, &mut warnings)?;
+    let mut placing = Placing::new(document, &nodes, &mut materials.materials, &mut warnings)?;
     let unread = placing.forget_unread(options.reads.ambience(lights.len()));
-    let (meshes, instances) = placing.run()?;
-    let images = materials.decode(&document)?;
-    let cameras = cameras(&document, &nodes, &mut warnings)?;
+    let (meshes, instances) = placing.run(&mut known.resting)?;
+    let images = materials.decode(document, &mut known.images)?;
+    let cameras = cameras(document, &nodes, &mut warnings)?;
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     Ok(Scene {
         name: path.display().to_string(),
@@ -192,15 +233,23 @@ impl<'d, 'b, 'w> Placing<'d, 'b, 'w> {
         unread
     }
 
-    fn run(self) -> Result<(Vec<Mesh>, Vec<Instance>)> {
+    /// Meshes and their places; those that nothing bends are `resting`, for the moments to come.
+    fn run(self, resting: &mut HashMap<(usize, usize), Mesh>) -> Result<(Vec<Mesh>, Vec<Instance>)> {
         let (document, materials): (_, &[Material]) = (self.document, self.materials);
         let (jobs, everything) = (&self.jobs, self.everything);
         let built = jobs
             .par_iter()
-            .map(|job| {
-                build(document, materials, job, everything).with_context(|| place(document, job.mesh, job.primitive))
+            .map(|job| match resting.get(&(job.mesh, job.primitive)).filter(|_| job.pose.is_rest()) {
+                Some(mesh) => Ok(Built { mesh: mesh.clone(), strokes: Vec::new(), warnings: Vec::new() }),
+                None => build(document, materials, job, everything)
+                    .with_context(|| place(document, job.mesh, job.primitive)),
             })
             .collect::<Result<Vec<_>>>()?;
+        for (job, built) in jobs.iter().zip(&built) {
+            if job.pose.is_rest() && built.strokes.is_empty() {
+                resting.entry((job.mesh, job.primitive)).or_insert_with(|| built.mesh.clone());
+            }
+        }
         let mut meshes: Vec<Mesh> = Vec::with_capacity(built.len());
         let mut instances = Vec::new();
         let mut strokes = Vec::new();

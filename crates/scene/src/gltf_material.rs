@@ -1,5 +1,7 @@
 //! glTF materials, textures and pictures into [`Material`] and [`Image`].
 
+use std::collections::HashMap;
+
 use anyhow::{Context, Result, ensure};
 use glam::{Affine2, Vec2};
 use gltf::json::{
@@ -87,9 +89,10 @@ pub(crate) fn read(document: &Document<'_>, warnings: &mut Vec<String>) -> Resul
 }
 
 impl Materials {
-    /// Decodes, in parallel, the pictures that the materials still name. The others are opened as far as their header, so
-    /// that a broken file is not called sound.
-    pub(crate) fn decode(&mut self, document: &Document<'_>) -> Result<Vec<Image>> {
+    /// Decodes, in parallel, the pictures that the materials still name and that are not `known` by their place in the file. The others
+    /// are opened as far as their header, so that a broken file is not called sound.
+    pub(crate) fn decode(&mut self, document: &Document<'_>, known: &mut HashMap<usize, Image>) -> Result<Vec<Image>> {
+        let first = known.is_empty();
         let mut places = vec![None; self.files.len()];
         let mut wanted = Vec::new();
         for texture in self.materials.iter_mut().flat_map(Material::textures_mut).flatten() {
@@ -98,10 +101,13 @@ impl Materials {
                 wanted.len() - 1
             });
         }
-        for i in (0..document.root.images.len()).filter(|i| !wanted.contains(i)) {
+        for i in (0..document.root.images.len()).filter(|i| first && !wanted.contains(i)) {
             with_bytes(document, i, |_, bytes| pictures::probe(bytes))?;
         }
-        wanted.par_iter().map(|&i| decode(document, i)).collect()
+        let missing: Vec<usize> = wanted.iter().copied().filter(|i| !known.contains_key(i)).collect();
+        let decoded: Vec<_> = missing.par_iter().map(|&i| Ok((i, decode(document, i)?))).collect::<Result<_>>()?;
+        known.extend(decoded);
+        Ok(wanted.iter().map(|i| known[i].clone()).collect())
     }
 }
 

@@ -36,7 +36,7 @@ pub use camera::{Camera, Projection};
 pub use light::{Extent, Light, LightKind};
 pub use material::{AlphaMode, Material, Meaning, Sampler, TextureRef, Wrap};
 pub use reads::{Ambience, Reads};
-pub use shared::Shared;
+pub use shared::{Mark, Shared};
 pub use sigma::SigmaGrid;
 
 /// What [`load`] may be told.
@@ -66,6 +66,60 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let mut scene = scene.with_context(|| format!("loading {}", path.display()))?;
     sigma::one_medium_each(&mut scene);
     Ok(scene)
+}
+
+/// A scene that is looked at one moment after another: its file is read once, and all moments share what does not move.
+pub struct Source {
+    kind: Kind,
+    reads: Reads,
+}
+
+enum Kind {
+    Gltf {
+        file: gltf_import::File,
+        name: String,
+    },
+    /// Nothing moves.
+    Still(Scene),
+}
+
+impl Source {
+    /// Opens a file that [`load`] reads.
+    ///
+    /// # Errors
+    /// As [`load`].
+    pub fn open(path: &Path, reads: Reads) -> Result<Self> {
+        let is_gltf = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb"));
+        if !is_gltf {
+            return Ok(Self::still(load(path, &LoadOptions { time: None, reads })?));
+        }
+        let name = path.display().to_string();
+        let file = gltf_import::File::open(path).with_context(|| format!("loading {name}"))?;
+        Ok(Self { kind: Kind::Gltf { file, name }, reads })
+    }
+
+    /// A scene that does not move.
+    #[must_use]
+    pub fn still(scene: Scene) -> Self {
+        Self { kind: Kind::Still(scene), reads: Reads::Everything }
+    }
+
+    /// The scene at a moment of its animation; `None` is its rest pose. What [`load`] gives, to the last bit; its warnings of what does
+    /// not move are those of the first moment.
+    ///
+    /// # Errors
+    /// As [`load`].
+    pub fn at(&mut self, time: Option<f64>) -> Result<Scene> {
+        match &mut self.kind {
+            Kind::Still(scene) => Ok(scene.clone()),
+            Kind::Gltf { file, name } => {
+                let options = LoadOptions { time, reads: self.reads };
+                let mut scene = file.at(&options).with_context(|| format!("loading {name}"))?;
+                sigma::one_medium_each(&mut scene);
+                Ok(scene)
+            }
+        }
+    }
 }
 
 /// Everything a picture is made from.

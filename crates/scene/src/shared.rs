@@ -1,7 +1,7 @@
 //! Lists that scenes share until one of them changes its own.
 
 use std::ops::{Deref, DerefMut};
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 /// A list that clones share: a clone costs a count, and a change makes the list its owner's own.
 ///
@@ -21,6 +21,22 @@ impl<T> Shared<T> {
     #[must_use]
     pub fn is_same(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
+    }
+
+    /// What tells this list in memory from all others, also when it is gone.
+    #[must_use]
+    pub fn mark(&self) -> Mark<T> {
+        Mark(Arc::downgrade(&self.0))
+    }
+}
+
+/// Which list in memory it was: equal marks are of one list. It keeps nothing of the list.
+#[derive(Debug, Clone)]
+pub struct Mark<T>(Weak<Vec<T>>);
+
+impl<T> PartialEq for Mark<T> {
+    fn eq(&self, other: &Self) -> bool {
+        Weak::ptr_eq(&self.0, &other.0)
     }
 }
 
