@@ -17,7 +17,6 @@ use crate::pass::classify::{RayTiles, WorkLists, classify};
 use crate::pass::composite::{Behind, composite};
 use crate::pass::fragments::{FragmentLists, fragments};
 use crate::pass::gbuffer::{GBuffer, gbuffer};
-use crate::pass::halves::{Halves, join_halves};
 use crate::pass::interact::interact;
 use crate::pass::light::light;
 use crate::pass::lighting::Lighting;
@@ -25,8 +24,10 @@ use crate::pass::mirror::mirror;
 pub use crate::pass::part::Part;
 use crate::pass::part::PartOnDevice;
 use crate::pass::path::{PathsOnDevice, paths};
+pub use crate::pass::rows::TileShare;
 use crate::pass::screen::{OnScreen, screen_tiles};
 use crate::pass::shadow_map::ShadowMaps;
+use crate::pass::sum::{Sample, Sum, block_of, join};
 use crate::pass::tiles::{Tiles, tiles};
 use crate::pass::tonemap::{Counts, Display, tonemap};
 use crate::plan::rungs::Indirect;
@@ -76,6 +77,22 @@ pub enum Background {
     Color([u8; 3]),
 }
 
+impl Background {
+    /// Puts a background colour behind what lets it through.
+    pub fn lay_behind(self, picture: &mut Picture) {
+        if let Self::Color(color) = self {
+            let behind = color.map(|byte| crate::image::tone::srgb_decode(f64::from(byte) / 255.0) as f32);
+            for pixel in &mut picture.rgba {
+                let rest = 1.0 - pixel[3];
+                for (value, behind) in pixel.iter_mut().zip(behind) {
+                    *value += rest * behind;
+                }
+                pixel[3] = 1.0;
+            }
+        }
+    }
+}
+
 /// Grey behind a scene without an environment, as sRGB bytes.
 pub const NEUTRAL_GREY: [u8; 3] = [119; 3];
 
@@ -121,6 +138,8 @@ pub struct Settings {
     pub demand: Demand,
     /// Which parts of the picture are kept beside it, each for the price of following all rays once more.
     pub parts: Vec<Part>,
+    /// Which share of the picture is drawn; the rest is black.
+    pub share: TileShare,
 }
 
 impl Default for Settings {
@@ -139,6 +158,7 @@ impl Default for Settings {
             traversal: None,
             demand: Demand::default(),
             parts: Vec::new(),
+            share: TileShare::ALL,
         }
     }
 }
@@ -212,7 +232,7 @@ pub struct Progress {
 }
 
 /// Work counts of a picture: the same on every machine that goes through the tree in the same way.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Work {
     /// Rays sent for a mirror image.
     pub reflection: u64,
@@ -234,14 +254,16 @@ pub struct Work {
     pub first_not_finite: Option<NotFinite>,
     /// Surfaces at which not all lights were gone through, because the driver would have ended the loop over them.
     pub lights_cut_off: u64,
-    /// Share of a pixel's light that was not followed: the mean over all pixels …
+    /// Light that was not followed, summed over all pixels of all frames: of each the share of its light, in parts of 65536.
+    pub lost: u64,
+    /// Share of a pixel's light that was not followed: the mean over all pixels of the picture …
     pub mean_lost: f64,
     /// … and the largest.
     pub most_lost: f32,
 }
 
 /// Where light came out as no number.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct NotFinite {
     /// Across and down.
     pub pixel: [u32; 2],
@@ -252,7 +274,7 @@ pub struct NotFinite {
 }
 
 impl Work {
-    fn add(&mut self, counts: &share::WorkCounts, pixels: f64) {
+    fn add(&mut self, counts: &share::WorkCounts) {
         let sum = |[low, high]: [u32; 2]| u64::from(high) << 32 | u64::from(low);
         self.reflection += sum(counts.reflection);
         self.refraction += sum(counts.refraction);
@@ -262,7 +284,7 @@ impl Work {
         self.triangle_tests += sum(counts.triangle_tests);
         self.stray_interfaces += sum(counts.stray_interfaces);
         self.lights_cut_off += sum(counts.lights_cut_off);
-        self.mean_lost += sum(counts.lost) as f64 / 65536.0 / pixels;
+        self.lost += sum(counts.lost);
         self.not_finite += u64::from(counts.not_finite);
         if self.first_not_finite.is_none() && counts.not_finite > 0 {
             self.first_not_finite = Some(NotFinite {
@@ -272,6 +294,33 @@ impl Work {
             });
         }
         self.most_lost = self.most_lost.max(f32::from_bits(counts.most_lost));
+    }
+
+    /// The same, with the mean of a picture of so many pixels and frames.
+    #[must_use]
+    pub fn of(mut self, [width, height]: [u32; 2], frames: u32) -> Self {
+        self.mean_lost = self.lost as f64 / 65536.0 / (f64::from(width) * f64::from(height) * f64::from(frames));
+        self
+    }
+
+    /// What was done by two.
+    #[must_use]
+    pub fn with(self, other: &Self) -> Self {
+        Self {
+            reflection: self.reflection + other.reflection,
+            refraction: self.refraction + other.refraction,
+            shadow: self.shadow + other.shadow,
+            indirect: self.indirect + other.indirect,
+            node_visits: self.node_visits + other.node_visits,
+            triangle_tests: self.triangle_tests + other.triangle_tests,
+            stray_interfaces: self.stray_interfaces + other.stray_interfaces,
+            not_finite: self.not_finite + other.not_finite,
+            first_not_finite: self.first_not_finite.or(other.first_not_finite),
+            lights_cut_off: self.lights_cut_off + other.lights_cut_off,
+            lost: self.lost + other.lost,
+            mean_lost: 0.0,
+            most_lost: self.most_lost.max(other.most_lost),
+        }
     }
 }
 
@@ -290,6 +339,8 @@ pub struct Renderer {
     camera: Buffer,
     /// What all programs read of the scene.
     sets: [DescriptorSet; 2],
+    /// Samples of the last picture, and those of the whole one.
+    drawn: [u32; 2],
 }
 
 /// All that is as large as the picture.
@@ -301,12 +352,13 @@ struct Targets {
     lists: Option<FragmentLists>,
     radiance: Image,
     screen: OnScreen,
-    /// The mean of the samples, where there is more than one.
+    /// Of the samples, where there is more than one; of pictures by paths of the even and of the odd ones, whose random numbers have
+    /// nothing in common: what they differ by is the picture's error.
+    sums: Vec<Sum>,
+    /// The mean of the samples, where it is no sum of them.
     film: Option<Image>,
     parts: Vec<PartOnDevice>,
     paths: Option<PathsOnDevice>,
-    /// Of pictures by paths, where there is more than one sample.
-    halves: Option<Halves>,
     display: Display,
 }
 
@@ -318,21 +370,46 @@ impl Targets {
             Image::new(device, name, ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], usage))
         };
         let part = |&part: &Part| PartOnDevice::new(device, plan, &settings.knobs, part, size);
+        let sums = match (plan.samples, plan.paths) {
+            (1, _) if plan.bands == 0 => Vec::new(),
+            (1, _) | (_, None) => vec![Sum::new(device, "sum of samples", size, plan.samples, plan.bands)?],
+            (samples, Some(_)) => {
+                let half = |name: &str| Sum::new(device, name, size, samples.div_ceil(2), plan.bands);
+                vec![half("sum of even samples")?, half("sum of odd samples")?]
+            }
+        };
+        let is_sum = sums.is_empty() || (sums.len() == 1 && sums[0].is_plain());
         Ok(Self {
             ray_tiles: RayTiles::new(device, plan, size)?,
             gbuffer: GBuffer::new(device, plan, size)?,
             tiles: Tiles::new(device, plan, size)?,
-            work: WorkLists::new(device, size)?,
+            work: WorkLists::new(device, size, settings.share)?,
             lists: if plan.see_through { Some(FragmentLists::new(device, size)?) } else { None },
             radiance: target("radiance")?,
             screen: OnScreen::new(device, plan, size)?,
-            film: if plan.samples > 1 || plan.bands > 0 { Some(target("film")?) } else { None },
+            sums,
+            film: if is_sum { None } else { Some(target("film")?) },
             parts: settings.parts.iter().map(part).collect::<Result<_>>()?,
-            paths: plan.paths.map(|paths| PathsOnDevice::new(device, paths, plan, touching, size)).transpose()?,
-            halves: if plan.paths.is_some() && plan.samples > 1 { Some(Halves::new(device, size)?) } else { None },
+            paths: plan
+                .paths
+                .map(|paths| PathsOnDevice::new(device, paths, plan, touching, (size, settings.share)))
+                .transpose()?,
             display: Display::new(device, size)?,
         })
     }
+}
+
+/// What processes that draw a picture together hand to each other.
+#[derive(Debug, Clone)]
+pub struct Sums {
+    /// From which sample, up to which.
+    pub samples: [u32; 2],
+    /// Sums of the samples: one, or those of the even and of the odd ones; then those of [`Settings::parts`].
+    pub sums: Vec<Picture>,
+    /// What rays did.
+    pub work: Work,
+    /// As [`Rendered::dropped`].
+    pub dropped: u32,
 }
 
 /// A picture under way.
@@ -343,6 +420,11 @@ pub struct Drawing {
     /// The sample and the band of it that come next, and of how many samples.
     next: [u32; 2],
     count: u32,
+    /// The first sample, and that before which it ends.
+    from: u32,
+    end: u32,
+    /// For sums that others go on with.
+    is_part: bool,
     times: Times,
     dropped: u32,
     work: Work,
@@ -351,6 +433,23 @@ pub struct Drawing {
 }
 
 impl Drawing {
+    fn new(view: View, count: u32) -> Self {
+        Self {
+            interruptible: false,
+            view,
+            next: [0, 0],
+            count,
+            from: 0,
+            end: count,
+            is_part: false,
+            times: Times::default(),
+            dropped: 0,
+            work: Work::default(),
+            errors: Vec::new(),
+            enough: false,
+        }
+    }
+
     /// Samples drawn.
     #[must_use]
     pub fn samples(&self) -> u32 {
@@ -372,7 +471,7 @@ impl Drawing {
     /// Whether nothing is left to be drawn.
     #[must_use]
     pub fn is_done(&self) -> bool {
-        self.enough || self.next[0] == self.count
+        self.enough || self.next[0] == self.end
     }
 }
 
@@ -397,6 +496,26 @@ impl Renderer {
     /// # Errors
     /// When the size is out of range, the device cannot do what the plan asks for, or the scene does not fit it.
     pub fn of(
+        device: &Arc<Device>,
+        prepared: Prepared,
+        environment: Option<&Environment>,
+        settings: Settings,
+    ) -> Result<Self> {
+        Self::after(None, device, prepared, environment, settings)
+    }
+
+    /// Another moment of the scene, in the same environment and with the same settings: what has not changed stays on the device.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn next(self, scene: impl Into<Original>, environment: Option<&Environment>) -> Result<Self> {
+        let (device, settings) = (self.device.clone(), self.settings.clone());
+        let prepared = Prepared::new(scene, &settings.conditions(environment)?)?;
+        Self::after(Some(self), &device, prepared, environment, settings)
+    }
+
+    fn after(
+        before: Option<Self>,
         device: &Arc<Device>,
         mut prepared: Prepared,
         environment: Option<&Environment>,
@@ -432,9 +551,20 @@ impl Renderer {
         // What stands for an environment that is asked for and is not there.
         let dark = (plan.environment && environment.is_none()).then(Environment::dark);
         let turn = Turn { intensity: settings.environment_intensity, rotation: settings.environment_rotation };
-        let mut scene = SceneOnDevice::new(device, scene, &plan, &settings.knobs, &solids, rays.anchor())?;
         let touching = rays.constants.touching;
-        let environment = EnvironmentOnDevice::new(device, &plan, environment.or(dark.as_ref()), turn)?;
+        // Where the same is done, what it is done with is as large and as it was.
+        let (textures, around, targets) = match before {
+            Some(Self { scene, environment, targets, plan: known, rays, .. }) => {
+                let same = known.draws_as(&plan) && rays.constants.touching == touching;
+                (Some(scene.textures), same.then_some(environment), same.then_some(targets))
+            }
+            None => (None, None, None),
+        };
+        let mut scene = SceneOnDevice::new(device, scene, &plan, &settings.knobs, &solids, rays.anchor(), textures)?;
+        let environment = match around {
+            Some(around) => around,
+            None => EnvironmentOnDevice::new(device, &plan, environment.or(dark.as_ref()), turn)?,
+        };
         let shadow_maps = ShadowMaps::new(device, &plan, &name, &mut scene, rays.anchor())?;
         let camera = Buffer::new(device, "camera", size_of::<share::Camera>() as u64, Place::Upload)?;
         let on_device = OnDevice {
@@ -450,12 +580,16 @@ impl Renderer {
             shadow_maps,
             scene,
             rays,
-            targets: Targets::new(device, &plan, &settings, touching)?,
+            targets: match targets {
+                Some(targets) => targets,
+                None => Targets::new(device, &plan, &settings, touching)?,
+            },
             camera,
             device: device.clone(),
             plan,
             warnings,
             settings,
+            drawn: [0; 2],
         })
     }
 
@@ -508,20 +642,57 @@ impl Renderer {
     pub fn begin(&mut self, camera: &Camera, samples: u32) -> Drawing {
         let view = View::new(camera, self.settings.size, self.scene.bounds);
         self.scene.look_from(&view);
-        let mut times = Times::default();
+        let mut drawing = Drawing::new(view, samples.min(self.plan.samples));
         // Drawn once, before the first picture.
-        times.add(std::mem::take(&mut self.shadow_maps.times));
-        Drawing {
-            interruptible: false,
-            view,
-            next: [0, 0],
-            count: samples.min(self.plan.samples),
-            times,
-            dropped: 0,
-            work: Work::default(),
-            errors: Vec::new(),
-            enough: false,
+        drawing.times.add(std::mem::take(&mut self.shadow_maps.times));
+        drawing
+    }
+
+    /// Which samples a process can draw by itself so that the sums of all of them are those of one: the first sample of each block, and
+    /// the number of all.
+    #[must_use]
+    pub fn block_starts(&self) -> Vec<u32> {
+        let (count, halves) = (self.plan.samples, self.halves());
+        let block = block_of(count.div_ceil(halves)) * halves;
+        (0..count).step_by(block as usize).chain([count]).collect()
+    }
+
+    /// The same picture of which only samples `from` up to `end` are drawn, both out of [`Renderer::block_starts`], for sums that others
+    /// go on with: there is no picture of them. What is known of them goes on from `known`, which holds the samples up to `from`.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn begin_part(&mut self, camera: &Camera, [from, end]: [u32; 2], known: Option<&Sums>) -> Result<Drawing> {
+        let mut drawing = Drawing { is_part: true, end, ..self.begin(camera, self.plan.samples) };
+        drawing.next = [from, 0];
+        drawing.from = from;
+        if let Some(known) = known {
+            drawing.from = known.samples[0];
+            drawing.work = known.work;
+            drawing.dropped = known.dropped;
+            for (image, sum) in self.sums_on_device().into_iter().zip(&known.sums) {
+                self.write(image, sum)?;
+            }
         }
+        Ok(drawing)
+    }
+
+    /// Sums on the device, those of parts last.
+    fn sums_on_device(&self) -> Vec<&Image> {
+        let Targets { sums, parts, radiance, .. } = &self.targets;
+        let own: Vec<&Image> = sums.iter().map(|sum| &sum.total).collect();
+        let own = if own.is_empty() { vec![radiance] } else { own };
+        own.into_iter().chain(parts.iter().map(PartOnDevice::film)).collect()
+    }
+
+    /// What a drawing of a part has made so far, where a block has just ended.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn sums(&self, drawing: &Drawing) -> Result<Sums> {
+        let sums = self.sums_on_device().into_iter().map(|image| self.read(image)).collect::<Result<_>>()?;
+        let &Drawing { from, next: [end, _], work, dropped, .. } = drawing;
+        Ok(Sums { samples: [from, end], sums, work, dropped })
     }
 
     /// Draws one more sample of every pixel, or one band of it.
@@ -549,8 +720,7 @@ impl Renderer {
             }
         }
         if self.plan.rays.is_some() {
-            let pixels = f64::from(self.settings.size[0]) * f64::from(self.settings.size[1]);
-            drawing.work.add(&self.rays.counted(), pixels);
+            drawing.work.add(&self.rays.counted());
             ensure!(
                 drawing.work.lights_cut_off == 0,
                 "lighting what rays meet ({} lights, at {} surfaces) takes longer loops than the driver allows: \
@@ -559,17 +729,20 @@ impl Renderer {
                 drawing.work.lights_cut_off
             );
         }
-        if self.targets.film.is_some() {
-            drawing.times.add(self.add(index, count, band)?.finish()?);
+        if !self.targets.sums.is_empty() {
+            drawing.times.add(self.add(drawing, band)?.finish()?);
         }
         drawing.next = if band + 1 < self.plan.bands { [index, band + 1] } else { [index + 1, 0] };
         if drawing.next[1] > 0 {
             return Ok(());
         }
+        self.drawn = [index + 1, count];
         drawing.dropped = drawing.dropped.max(self.targets.lists.as_ref().map_or(0, FragmentLists::dropped));
         let done = index + 1;
-        let error = match &self.targets.halves {
-            Some(halves) if done > 1 && (done.is_power_of_two() || done == count) => Some(self.error(halves, done)?),
+        let error = match self.halves() {
+            2 if !drawing.is_part && done > 1 && (done.is_power_of_two() || done == count) => {
+                Some(self.error(done, count)?)
+            }
             _ => None,
         };
         drawing.errors.extend(error);
@@ -587,17 +760,18 @@ impl Renderer {
     pub fn picture(&mut self, drawing: &Drawing) -> Result<Rendered> {
         let samples = drawing.samples();
         let mut times = drawing.times.clone();
-        if let (Some(halves), Some(film)) = (&self.targets.halves, &self.targets.film) {
+        if let Some(film) = &self.targets.film {
             let mut frame = Frame::new(&self.device);
-            join_halves(&mut frame, halves, film, samples)?;
+            let (of_sums, block) = self.samples_of_sums(samples, drawing.count);
+            join(&mut frame, &self.targets.sums, &of_sums, block, film)?;
             times.add(frame.finish()?);
         }
         times.add(self.show(samples, drawing.count)?.finish()?);
-        let mut work = drawing.work;
-        work.mean_lost /= f64::from(samples) * f64::from(self.plan.bands.max(1));
+        let frames = samples * self.plan.bands.max(1);
+        let work = drawing.work.of(self.settings.size, frames);
         Ok(Rendered {
             display: self.targets.display.pixels.read(<[u8]>::to_vec),
-            has_alpha: self.display_background().1,
+            has_alpha: display_background(&self.settings).1,
             counts: self.targets.display.counts()?,
             dropped: drawing.dropped,
             work,
@@ -627,10 +801,12 @@ impl Renderer {
 
     /// Where the next frame is seen from.
     fn look(&mut self, view: &View, index: u32, count: u32, band: u32) {
-        self.camera.write(bytemuck::bytes_of(&view.shared(jitter(index, count))));
+        let TileShare { index: first, of } = self.settings.share;
+        let camera = share::Camera { tiles: [first, of], ..view.shared(jitter(index, count)) };
+        self.camera.write(bytemuck::bytes_of(&camera));
         // Halves of a picture by paths have random numbers of their own, and so has each band: what is noise in one is none in
         // another, and their sum has less of it.
-        let [at, half] = if self.targets.halves.is_some() { [index / 2, index % 2] } else { [index, 0] };
+        let [at, half] = [index / self.halves(), index % self.halves()];
         let seed = self.settings.seed.wrapping_mul(2).wrapping_add(half).wrapping_add(band.wrapping_mul(0x9e37_79b9));
         self.rays.look_from(view, at, count, seed);
     }
@@ -638,7 +814,7 @@ impl Renderer {
     /// What goes another way for each wavelength is drawn for parts of each band, one for each sample of a half: as many as there
     /// are, up to a limit; where an error is the end, so few that it may be told early.
     fn parts(&self, count: u32) -> u32 {
-        let halves = if self.targets.halves.is_some() { 2 } else { 1 };
+        let halves = self.halves();
         let limit = if self.settings.max_error.is_some() { PARTS_BEFORE_AN_END } else { MOST_PARTS };
         let most = if self.plan.disperses { (count / halves).clamp(1, limit) } else { 1 };
         1 << most.ilog2()
@@ -652,8 +828,7 @@ impl Renderer {
         }
         let band = VISIBLE.part(band, bands);
         let parts = self.parts(count);
-        let halves = if self.targets.halves.is_some() { 2 } else { 1 };
-        let at = (index / halves) % parts;
+        let at = (index / self.halves()) % parts;
         let part = if parts > 1 { at.reverse_bits() >> (32 - parts.ilog2()) } else { 0 };
         self.scene.show(Some(&Slice::new(band, band.part(part, parts))));
     }
@@ -680,11 +855,15 @@ impl Renderer {
         // With n samples a pixel each one stands for 1/n of its area: textures are read that much sharper.
         let lod_bias = -0.5 * (count as f32).log2();
         let library = self.library();
-        let lighting = &Lighting { plan, library, tiles: lists_of_lights, size: self.settings.size };
+        let Settings { size, share, .. } = self.settings;
+        let lighting = &Lighting { plan, library, tiles: lists_of_lights, size, share };
 
         let mut frame = self.frame();
         if plan.rays.is_some() {
             rays.reset(&mut frame);
+        }
+        if share != TileShare::ALL {
+            frame.clear("clear radiance", radiance);
         }
         if let Some(with) = &self.targets.paths {
             paths(&mut frame, lighting, with, radiance)?;
@@ -744,20 +923,33 @@ impl Renderer {
         Ok(frame)
     }
 
-    /// Adds the sample, or one band of it, to the film, where there is more than one.
-    fn add(&self, index: u32, count: u32, band: u32) -> Result<Frame<'_>> {
+    /// How many sums the samples go to by turns.
+    fn halves(&self) -> u32 {
+        self.targets.sums.len().max(1) as u32
+    }
+
+    /// Samples that each sum has after so many of `count`, and those of a block.
+    fn samples_of_sums(&self, samples: u32, count: u32) -> (Vec<u32>, u32) {
+        let halves = self.halves();
+        ((0..halves).map(|half| (samples + halves - 1 - half) / halves).collect(), block_of(count.div_ceil(halves)))
+    }
+
+    /// Adds the sample, or one band of it, to its sum, and to those of parts.
+    fn add(&self, drawing: &Drawing, band: u32) -> Result<Frame<'_>> {
         let mut frame = Frame::new(&self.device);
-        let bands = self.plan.bands;
-        if let Some(halves) = &self.targets.halves {
-            let (round, half) = (index / 2, index as usize % 2);
-            accumulate(&mut frame, &self.targets.radiance, &halves.sums[half], round == 0 && band == 0, 1.0, bands)?;
-        } else if let Some(film) = &self.targets.film {
-            let (first, last) = (index == 0 && band == 0, index + 1 == count && band + 1 == bands.max(1));
+        let &Drawing { next: [index, _], count, from, .. } = drawing;
+        let Targets { sums, film, radiance, parts, .. } = &self.targets;
+        let (bands, halves) = (self.plan.bands, self.halves());
+        let block = block_of(count.div_ceil(halves));
+        let sample = Sample { index: index / halves, block, begins: band == 0, ends: band + 1 == bands.max(1) };
+        // A sum that is the film as well becomes the mean with its last sample.
+        let last = film.is_none() && !drawing.is_part && index + 1 == count && sample.ends;
+        let scale = if last { 1.0 / count as f32 } else { 1.0 };
+        sums[(index % halves) as usize].add(&mut frame, radiance, sample, from / halves, (scale, bands))?;
+        for part in parts {
+            let last = !drawing.is_part && index + 1 == count && sample.ends;
             let scale = if last { 1.0 / count as f32 } else { 1.0 };
-            accumulate(&mut frame, &self.targets.radiance, film, first, scale, bands)?;
-            for part in &self.targets.parts {
-                accumulate(&mut frame, &part.radiance, part.film(), first, scale, bands)?;
-            }
+            accumulate(&mut frame, &part.radiance, part.film(), index == from && band == 0, scale, bands)?;
         }
         Ok(frame)
     }
@@ -765,14 +957,12 @@ impl Renderer {
     /// The film as a display shows it, after so many of the samples.
     fn show(&self, samples: u32, count: u32) -> Result<Frame<'_>> {
         let mut frame = Frame::new(&self.device);
-        let Targets { radiance, film, halves, display, .. } = &self.targets;
-        // Before the last sample the film is a sum, unless it was joined of halves.
-        let (film, scale) = match (film, halves) {
-            (Some(film), None) if samples < count => (film, 1.0 / samples as f32),
-            (Some(film), _) => (film, 1.0),
-            (None, _) => (radiance, 1.0),
-        };
-        let (background, _) = self.display_background();
+        let Targets { sums, film, display, .. } = &self.targets;
+        // Before the last sample a film that is the sum is no mean yet.
+        let is_sum = film.is_none() && !sums.is_empty() && samples < count;
+        let scale = if is_sum { 1.0 / samples as f32 } else { 1.0 };
+        let film = self.film_on_device();
+        let (background, _) = display_background(&self.settings);
         let Settings { tonemap: curve, exposure, .. } = self.settings;
         tonemap(&mut frame, (film, scale), display, curve as u32, exposure, background, self.plan.bands > 0)?;
         Ok(frame)
@@ -784,29 +974,19 @@ impl Renderer {
     /// # Errors
     /// When the driver fails.
     pub fn passes(&mut self, camera: &Camera) -> Result<Vec<PassPlan>> {
+        let count = self.plan.samples;
         let view = View::new(camera, self.settings.size, self.scene.bounds);
         self.scene.look_from(&view);
-        let count = self.plan.samples;
         self.look(&view, 0, count, 0);
         let done =
             self.shadow_maps.times.iter().map(|pass| PassPlan { name: pass.name.clone(), pipelines: Vec::new() });
         let mut passes: Vec<PassPlan> = done.collect();
-        for frame in [self.sample(count, 0)?, self.add(0, count, 0)?, self.show(count, count)?] {
+        let drawing = Drawing::new(view, count);
+        for frame in [self.sample(count, 0)?, self.add(&drawing, 0)?, self.show(count, count)?] {
             frame.compile_where_told()?;
             passes.extend(frame.plan());
         }
         Ok(passes)
-    }
-
-    /// Display-linear colour behind the scene with alpha 1, or all 0, and whether the display output is transparent.
-    fn display_background(&self) -> ([f32; 4], bool) {
-        match self.settings.behind() {
-            Some(colour) => {
-                let [r, g, b] = colour.map(|light| light as f32);
-                ([r, g, b, 1.0], false)
-            }
-            None => ([0.0; 4], true),
-        }
     }
 
     /// The scene-linear film of the last render.
@@ -815,7 +995,7 @@ impl Renderer {
     /// When the driver fails.
     pub fn film(&self) -> Result<Picture> {
         let mut picture = self.film_alone()?;
-        self.lay_behind(&mut picture);
+        self.settings.background.lay_behind(&mut picture);
         Ok(picture)
     }
 
@@ -830,21 +1010,8 @@ impl Renderer {
     /// The same where it lies, for passes of one's own: linear RGBA in f32, without a background colour.
     #[must_use]
     pub fn film_on_device(&self) -> &Image {
-        self.targets.film.as_ref().unwrap_or(&self.targets.radiance)
-    }
-
-    /// Puts a background colour behind what lets it through.
-    fn lay_behind(&self, picture: &mut Picture) {
-        if let Background::Color(color) = self.settings.background {
-            let behind = color.map(|byte| crate::image::tone::srgb_decode(f64::from(byte) / 255.0) as f32);
-            for pixel in &mut picture.rgba {
-                let rest = 1.0 - pixel[3];
-                for (value, behind) in pixel.iter_mut().zip(behind) {
-                    *value += rest * behind;
-                }
-                pixel[3] = 1.0;
-            }
-        }
+        let Targets { film, sums, radiance, .. } = &self.targets;
+        film.as_ref().or(sums.first().map(|sum| &sum.total)).unwrap_or(radiance)
     }
 
     /// A part of the film of the last render; `None` where [`Settings::parts`] does not name it. Its alpha means nothing.
@@ -855,9 +1022,30 @@ impl Renderer {
         self.targets.parts.iter().find(|kept| kept.part == part).map(|kept| self.read(kept.film())).transpose()
     }
 
+    /// A sum of so many samples in blocks of so many.
+    fn sum(&self, sum: &Sum, samples: u32, block: u32) -> Result<Picture> {
+        let mut images = sum.images(samples, block).into_iter().flatten();
+        let Some(first) = images.next() else { bail!("a sum of no samples was asked for: our mistake") };
+        let mut all = self.read(first)?;
+        for other in images {
+            let other = self.read(other)?;
+            for (sum, value) in all.rgba.iter_mut().flatten().zip(other.rgba.iter().flatten()) {
+                *sum += value;
+            }
+        }
+        Ok(all)
+    }
+
+    /// The sums of the even and of the odd samples, after so many of `count`.
+    fn half_sums(&self, samples: u32, count: u32) -> Result<[Picture; 2]> {
+        let (of_sums, block) = self.samples_of_sums(samples, count);
+        let sum = |half: usize| self.sum(&self.targets.sums[half], of_sums[half], block);
+        Ok([sum(0)?, sum(1)?])
+    }
+
     /// What the halves say of the picture's error after so many samples.
-    fn error(&self, halves: &Halves, samples: u32) -> Result<SampleError> {
-        let [a, b] = [self.read(&halves.sums[0])?, self.read(&halves.sums[1])?];
+    fn error(&self, samples: u32, count: u32) -> Result<SampleError> {
+        let [a, b] = self.half_sums(samples, count)?;
         Ok(error_of_halves([&a.rgba, &b.rgba], samples))
     }
 
@@ -865,9 +1053,9 @@ impl Renderer {
     ///
     /// # Errors
     /// When the driver fails.
-    pub fn halves(&self, samples: u32) -> Result<Option<[Picture; 2]>> {
-        let mut halves = self.halves_alone(samples)?;
-        halves.iter_mut().flatten().for_each(|half| self.lay_behind(half));
+    pub fn half_means(&self) -> Result<Option<[Picture; 2]>> {
+        let mut halves = self.half_means_alone()?;
+        halves.iter_mut().flatten().for_each(|half| self.settings.background.lay_behind(half));
         Ok(halves)
     }
 
@@ -875,15 +1063,22 @@ impl Renderer {
     ///
     /// # Errors
     /// When the driver fails.
-    pub fn halves_alone(&self, samples: u32) -> Result<Option<[Picture; 2]>> {
-        let Some(halves) = &self.targets.halves else { return Ok(None) };
-        let mean = |sum: &Image| -> Result<Picture> {
-            let mut picture = self.read(sum)?;
-            let scale = 2.0 / samples as f32;
-            picture.rgba.iter_mut().flatten().for_each(|value| *value *= scale);
-            Ok(picture)
-        };
-        Ok(Some([mean(&halves.sums[0])?, mean(&halves.sums[1])?]))
+    pub fn half_means_alone(&self) -> Result<Option<[Picture; 2]>> {
+        if self.halves() < 2 {
+            return Ok(None);
+        }
+        let [samples, count] = self.drawn;
+        let scale = 2.0 / samples as f32;
+        let mut halves = self.half_sums(samples, count)?;
+        halves.iter_mut().flat_map(|half| half.rgba.iter_mut().flatten()).for_each(|value| *value *= scale);
+        Ok(Some(halves))
+    }
+
+    fn write(&self, film: &Image, picture: &Picture) -> Result<()> {
+        let source = Buffer::with_data(&self.device, "staging", &picture.rgba)?;
+        let mut frame = Frame::new(&self.device);
+        frame.upload("upload sum", &source, film, 0, &[0]);
+        frame.finish().map(drop)
     }
 
     fn read(&self, film: &Image) -> Result<Picture> {
@@ -971,6 +1166,42 @@ impl Renderer {
     pub fn png(&self, rendered: &Rendered) -> Result<Vec<u8>> {
         let [width, height] = self.settings.size;
         png::encode_png(width, height, &rendered.display, rendered.has_alpha)
+    }
+}
+
+/// What a display shows of a film that was made elsewhere, as a renderer with these settings would show it: RGBA8 (sRGB-encoded, rows
+/// from the top), whether it has transparency, and what is no radiance. A film by wavelengths is `spectral`.
+///
+/// # Errors
+/// When the driver fails.
+pub fn shown(
+    device: &Arc<Device>,
+    film: &Picture,
+    settings: &Settings,
+    spectral: bool,
+) -> Result<(Vec<u8>, bool, Counts)> {
+    let size = [film.width, film.height];
+    let desc = ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], vk::ImageUsageFlags::STORAGE);
+    let image = Image::new(device, "film", desc)?;
+    let source = Buffer::with_data(device, "staging", &film.rgba)?;
+    let display = Display::new(device, size)?;
+    let mut frame = Frame::new(device);
+    frame.upload("upload film", &source, &image, 0, &[0]);
+    let (background, has_alpha) = display_background(settings);
+    let Settings { tonemap: curve, exposure, .. } = *settings;
+    tonemap(&mut frame, (&image, 1.0), &display, curve as u32, exposure, background, spectral)?;
+    frame.finish()?;
+    Ok((display.pixels.read(<[u8]>::to_vec), has_alpha, display.counts()?))
+}
+
+/// Display-linear colour behind the scene with alpha 1, or all 0, and whether the display output is transparent.
+fn display_background(settings: &Settings) -> ([f32; 4], bool) {
+    match settings.behind() {
+        Some(colour) => {
+            let [r, g, b] = colour.map(|light| light as f32);
+            ([r, g, b, 1.0], false)
+        }
+        None => ([0.0; 4], true),
     }
 }
 

@@ -2,6 +2,7 @@
 //! them nothing is. Otherwise a validation that sees nothing would prove nothing.
 
 use ash::vk;
+use etalon::frame::TileShare;
 use etalon::gpu::{Buffer, DescriptorSet, Frame, Image, ImageDesc, Place, Resource};
 use etalon::pass::classify::{WorkLists, classify};
 use etalon::pass::gbuffer::GBuffer;
@@ -36,13 +37,13 @@ impl Things {
         let plan = Plan::new(&Scene::default(), &Facts::default(), surroundings, &Knobs::default());
         let desc = ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], vk::ImageUsageFlags::STORAGE);
         let buffer = |name| Buffer::new(&gpu.device, name, 256, Place::Device).expect("a buffer");
-        let camera = Camera { size, ..bytemuck::Zeroable::zeroed() };
+        let camera = Camera { size, tiles: [0, 1], ..bytemuck::Zeroable::zeroed() };
         let camera = Buffer::with_data(&gpu.device, "camera", &[camera]).expect("a buffer");
         Self {
             scene: DescriptorSet::new(&gpu.device, &SCENE, &view(&camera)).expect("a set"),
             camera,
             gbuffer: GBuffer::new(&gpu.device, &plan, size).expect("a G-buffer"),
-            work: WorkLists::new(&gpu.device, size).expect("work lists"),
+            work: WorkLists::new(&gpu.device, size, TileShare::ALL).expect("work lists"),
             film: Image::new(&gpu.device, "film", desc).expect("a film"),
             display: Display::new(&gpu.device, size).expect("a display"),
             buffers: [buffer("a"), buffer("b"), buffer("c")],

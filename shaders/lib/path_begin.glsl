@@ -1,19 +1,17 @@
 // Where paths begin: at the eye, through a point of the pixel.
 #ifndef PATH_BEGIN_GLSL
 #define PATH_BEGIN_GLSL
-#include "lib/view.glsl"
+#include "lib/own_tiles.glsl"
 #include "lib/path_ray.glsl"
-
 
 // The pixel that stands at a place of the first queue: tiles of 8x8 in strides over the picture, since lavapipe gives each of
 // its threads one contiguous piece of a dispatch; within a tile in Morton order, so that neighbours in a queue are neighbours
 // in the picture. One outside of the picture where a tile juts out.
 uvec2 pixel_at(uint place, uint stride) {
-    uvec2 tiles = (camera.size + 7) / 8;
-    uint tile = place / 64 * stride % (tiles.x * tiles.y);
+    uint turn = place / 64 * stride % own_tiles();
     uint lane = place % 64;
     uvec2 within = uvec2(lane & 1u | lane >> 1 & 2u | lane >> 2 & 4u, lane >> 1 & 1u | lane >> 2 & 2u | lane >> 3 & 4u);
-    return uvec2(tile % tiles.x, tile / tiles.x) * 8 + within;
+    return own_tile(turn) + within;
 }
 
 Path path_through(uvec2 pixel) {

@@ -6,7 +6,7 @@
 #extension GL_EXT_scalar_block_layout : require
 layout(local_size_x = 64) in;
 #include "lib/gbuffer.glsl"
-#include "lib/work_tile.glsl"
+#include "lib/own_tiles.glsl"
 
 layout(pass, scalar) buffer Sizes { WorkSize surface_size; WorkSize background_size; };
 layout(pass, scalar) writeonly buffer SurfaceTiles { uint surface_tiles[]; };
@@ -14,10 +14,9 @@ layout(pass, scalar) writeonly buffer BackgroundTiles { uint background_tiles[];
 layout(push_constant, scalar) uniform Push { uint stride; };
 
 void main() {
-    uvec2 tiles = (camera.size + WORK_TILE - 1) / WORK_TILE;
-    uint tile = scattered_tile(tiles.x * tiles.y, stride);
-    if (tile >= tiles.x * tiles.y) return;
-    uvec2 first = uvec2(tile % tiles.x, tile / tiles.x) * WORK_TILE;
+    uint turn = scattered_tile(own_tiles(), stride);
+    if (turn >= own_tiles()) return;
+    uvec2 first = own_tile(turn);
     uvec2 last = min(first + WORK_TILE, camera.size);
     float nearest = 0.0;
     float farthest = 1.0;

@@ -4,7 +4,7 @@
 #extension GL_EXT_scalar_block_layout : require
 layout(local_size_x = 64) in;
 #include "lib/fragment_list.glsl"
-#include "lib/work_tile.glsl"
+#include "lib/own_tiles.glsl"
 
 layout(pass, r32ui) readonly uniform uimage2D heads;
 layout(pass, scalar) buffer Sizes { WorkSize tiles_size; };
@@ -17,6 +17,7 @@ void main() {
     uint tile = scattered_tile(tiles.x * tiles.y, stride);
     if (tile >= tiles.x * tiles.y) return;
     uvec2 first = uvec2(tile % tiles.x, tile / tiles.x) * WORK_TILE + uvec2(0, first_row);
+    if (!in_own_tile(first)) return;
     uvec2 last = min(first + WORK_TILE, uvec2(width, end_row));
     bool any_fragment = false;
     for (uint y = first.y; y < last.y; y++) {

@@ -6,7 +6,7 @@
 layout(local_size_x = 64) in;
 #include "lib/gbuffer.glsl"
 #include "lib/surface.glsl"
-#include "lib/work_tile.glsl"
+#include "lib/own_tiles.glsl"
 
 // Which surfaces are looked for.
 layout(constant) const bool FIND_MIRRORS = false;
@@ -17,10 +17,9 @@ layout(pass, scalar) writeonly buffer RayTiles { uint ray_tiles[]; };
 layout(push_constant, scalar) uniform Push { uint stride; };
 
 void main() {
-    uvec2 tiles = (camera.size + WORK_TILE - 1) / WORK_TILE;
-    uint tile = scattered_tile(tiles.x * tiles.y, stride);
-    if (tile >= tiles.x * tiles.y) return;
-    uvec2 first = uvec2(tile % tiles.x, tile / tiles.x) * WORK_TILE;
+    uint turn = scattered_tile(own_tiles(), stride);
+    if (turn >= own_tiles()) return;
+    uvec2 first = own_tile(turn);
     uvec2 last = min(first + WORK_TILE, camera.size);
     bool calls = false;
     for (uint y = first.y; y < last.y; y++) {

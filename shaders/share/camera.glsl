@@ -13,5 +13,6 @@ struct Camera {
     uint orthographic;
     vec2 jitter;         // sub-pixel offset of this sample, in pixels
     uvec2 size;          // pixels
+    uvec2 tiles;         // of the picture's tiles of 8x8 pixels, row by row: the first that is drawn, and how far on the next one is
 };
 #endif

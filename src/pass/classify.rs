@@ -7,7 +7,7 @@ use anyhow::Result;
 
 use super::gbuffer::GBuffer;
 use super::lighting::Lighting;
-use super::rows::{rows_of, stride};
+use super::rows::{TileShare, rows_of, stride};
 use crate::gpu::{Buffer, Device, Frame, Image, NOTHING, Place};
 use crate::plan::Plan;
 use crate::shader::{Library, classify, classify_fragments, classify_rays as ray_program, lib};
@@ -76,22 +76,23 @@ pub struct WorkLists {
     pub surface: Buffer,
     /// Tiles with background.
     pub background: Buffer,
-    size: [u32; 2],
+    tiles: u32,
 }
 
 impl WorkLists {
-    /// Lists for a picture of `size` pixels.
+    /// Lists for a share of a picture of `size` pixels.
     ///
     /// # Errors
     /// When memory is short.
-    pub fn new(device: &Arc<Device>, size: [u32; 2]) -> Result<Self> {
-        let bytes = 4 * u64::from(size[0].div_ceil(TILE)) * u64::from(size[1].div_ceil(TILE));
+    pub fn new(device: &Arc<Device>, size: [u32; 2], share: TileShare) -> Result<Self> {
+        let tiles = share.tiles(size);
+        let bytes = 4 * u64::from(tiles);
         Ok(Self {
             sizes: Buffer::new(device, "work sizes", 2 * WORK_BYTES, Place::Device)?,
             empty: Buffer::with_data(device, "empty work sizes", &[EMPTY, EMPTY])?,
             surface: Buffer::new(device, "surface tiles", bytes, Place::Device)?,
             background: Buffer::new(device, "background tiles", bytes, Place::Device)?,
-            size,
+            tiles,
         })
     }
 }
@@ -108,8 +109,7 @@ pub fn classify<'a>(frame: &mut Frame<'a>, library: Library, gbuffer: &'a GBuffe
         surface_tiles: &lists.surface,
         background_tiles: &lists.background,
     };
-    let tiles = lists.size[0].div_ceil(TILE) * lists.size[1].div_ceil(TILE);
-    let groups = tiles.div_ceil(classify::PROGRAM.local_size[0]);
+    let groups = lists.tiles.div_ceil(classify::PROGRAM.local_size[0]);
     let push = classify::Push { stride: stride(groups) };
     frame.compute("classify tiles", &bind, &classify::Constants { library }, &push, rows_of(groups))
 }
@@ -164,9 +164,7 @@ pub fn classify_rays<'a>(
 ) -> Result<()> {
     frame.copy_buffer("reset ray work size", &list.empty, &list.sizes, WORK_BYTES);
     let bind = ray_program::Bind { gbuffer: gbuffer.bind(), sizes: &list.sizes, ray_tiles: &list.tiles };
-    let size = lighting.size;
-    let tiles = size[0].div_ceil(TILE) * size[1].div_ceil(TILE);
-    let groups = tiles.div_ceil(ray_program::PROGRAM.local_size[0]);
+    let groups = lighting.share.tiles(lighting.size).div_ceil(ray_program::PROGRAM.local_size[0]);
     let constants = ray_program::Constants {
         library: lighting.library,
         find_mirrors: calls.mirrors,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use anyhow::{Result, bail};
 use ash::vk;
 
-use super::classify::{FragmentTiles, classify_fragments};
+use super::classify::{FragmentTiles, TILE, classify_fragments};
 use super::gbuffer::GBuffer;
 use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Frame, Image, ImageDesc, Place, Raster};
 use crate::shader::{fragments, lib};
@@ -73,6 +73,8 @@ impl FragmentLists {
     #[must_use]
     pub fn strips(&self) -> Vec<Strip> {
         let rows = self.size[1].div_ceil(self.strips);
+        // No strip has parts of two tiles of the picture in one of its own.
+        let rows = if rows < TILE { rows.next_power_of_two() } else { rows.next_multiple_of(TILE) };
         (0..self.strips)
             .map(|index| Strip { index, rows: [index, index + 1].map(|i| (i * rows).min(self.size[1])) })
             .filter(|strip| strip.rows[0] < strip.rows[1])

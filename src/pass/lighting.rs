@@ -1,5 +1,6 @@
 //! What all passes that light surfaces share.
 
+use super::rows::TileShare;
 use super::tiles::Tiles;
 use crate::plan::Plan;
 use crate::shader::Library;
@@ -20,6 +21,8 @@ pub struct Lighting<'a> {
     pub tiles: &'a Tiles,
     /// Pixels.
     pub size: [u32; 2],
+    /// Those of them that are drawn.
+    pub share: TileShare,
 }
 
 /// Directional lights in parts and local ones in parts, of which one dispatch takes the last of the former with the first of the

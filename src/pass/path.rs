@@ -6,15 +6,15 @@ use std::sync::Arc;
 use anyhow::Result;
 
 use super::lighting::Lighting;
-use super::rows::{rows_of, stride};
+use super::rows::{TileShare, rows_of, stride};
 use crate::gpu::{Buffer, Device, Frame, Image, NOTHING, Place};
 use crate::plan::{Paths, Plan};
 use crate::shader::lib::queue::{CHUNK, PATHS_IN_GROUP};
 use crate::shader::{lib, path, path_at_once, path_begin, queue_count, queue_next, queue_scan};
 use crate::share::{QueueSize, WorkSize};
 
-/// Pixels a side of the tiles that the first queue is made of.
-const TILE: u32 = 8;
+/// Pixels of the tiles that the first queue is made of.
+const TILE: u32 = lib::work_tile::WORK_TILE * lib::work_tile::WORK_TILE;
 const SIZE_BYTES: u64 = size_of::<QueueSize>() as u64;
 const CHUNKS_AT: u64 = std::mem::offset_of!(QueueSize, chunks) as u64;
 
@@ -27,18 +27,26 @@ pub struct PathsOnDevice {
     sizes: [Buffer; 2],
     first_size: Buffer,
     chunks: Buffer,
-    size: [u32; 2],
+    places: u32,
+    width: u32,
 }
 
 impl PathsOnDevice {
-    /// For a picture of `size` pixels.
+    /// For a share of a picture of `size` pixels.
     ///
     /// # Errors
     /// When memory is short.
-    pub fn new(device: &Arc<Device>, with: Paths, plan: &Plan, touching: bool, size: [u32; 2]) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        with: Paths,
+        plan: &Plan,
+        touching: bool,
+        (size, share): ([u32; 2], TileShare),
+    ) -> Result<Self> {
         let rays = plan.rays.unwrap_or_default();
         let pixels = u64::from(size[0]) * u64::from(size[1]);
-        let places = places(size);
+        // All pixels of the tiles, also those that a tile has beyond the picture.
+        let places = share.tiles(size) * TILE;
         let words = |name, wanted: bool, words: u64| match wanted {
             true => Buffer::new(device, name, 4 * words, Place::Device),
             false => Buffer::new(device, NOTHING, 0, Place::Device),
@@ -66,7 +74,8 @@ impl PathsOnDevice {
             sizes: [queue_size()?, queue_size()?],
             first_size: Buffer::with_data(device, "first queue size", &[first_size])?,
             chunks: words("chunks of a queue", true, u64::from(places.div_ceil(CHUNK)))?,
-            size,
+            places,
+            width: size[0],
         })
     }
 
@@ -74,11 +83,6 @@ impl PathsOnDevice {
         let [origins, directions, throughputs, sums, media, afters] = &self.states;
         lib::path_state::Bind { origins, directions, throughputs, sums, media, afters }
     }
-}
-
-/// Entries of the first queue: all pixels of the tiles that the picture touches.
-fn places(size: [u32; 2]) -> u32 {
-    size[0].div_ceil(TILE) * size[1].div_ceil(TILE) * TILE * TILE
 }
 
 /// One sample of every pixel into `radiance`.
@@ -92,8 +96,8 @@ pub fn paths<'a>(
     radiance: &'a Image,
 ) -> Result<()> {
     let (library, interfaces) = (lighting.library, lighting.plan.rays.unwrap_or_default().interfaces);
-    let places = places(paths.size);
-    let tiles = places / (TILE * TILE);
+    let places = paths.places;
+    let tiles = places / TILE;
     let stride = stride(tiles);
     if paths.with.at_once {
         let push = path_at_once::Push { places, stride };
@@ -109,7 +113,7 @@ pub fn paths<'a>(
         let [from, to] = if bounce % 2 == 0 { [0, 1] } else { [1, 0] };
         let sizes = &paths.sizes[from];
         let bind = path::Bind { path_state: paths.state(), radiance, queue: &paths.queues[from], sizes };
-        let push = path::Push { width: paths.size[0] };
+        let push = path::Push { width: paths.width };
         frame.compute_indirect("paths", &bind, &path::Constants { library }, &push, sizes, 0)?;
         if bounce < interfaces {
             compact(frame, paths, from, to)?;

@@ -1,6 +1,34 @@
-//! How long lists of workgroups are dispatched.
+//! How long lists of workgroups are dispatched, and which tiles of the picture are drawn.
 
-use crate::shader::lib::work_tile::ROW;
+use crate::shader::lib::work_tile::{ROW, WORK_TILE};
+
+/// A share of the picture: of its tiles of 8x8 pixels, row by row, every `of`-th from the `index`-th on. Tiles side by side take about
+/// the same time, so that shares do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TileShare {
+    /// The first tile, less than `of`.
+    pub index: u32,
+    /// Into how many shares the picture is divided.
+    pub of: u32,
+}
+
+impl TileShare {
+    /// The whole picture.
+    pub const ALL: Self = Self { index: 0, of: 1 };
+
+    /// How many tiles of a picture of `size` pixels are in it (shaders/lib/own_tiles.glsl).
+    #[must_use]
+    pub fn tiles(self, size: [u32; 2]) -> u32 {
+        let all = size[0].div_ceil(WORK_TILE) * size[1].div_ceil(WORK_TILE);
+        all.saturating_sub(self.index).div_ceil(self.of)
+    }
+
+    /// Whether it has the tile of a pixel.
+    #[must_use]
+    pub fn has(self, [x, y]: [u32; 2], width: u32) -> bool {
+        (y / WORK_TILE * width.div_ceil(WORK_TILE) + x / WORK_TILE) % self.of == self.index
+    }
+}
 
 /// A dispatch of `count` workgroups in rows; the shader takes its place from `listed_tile`.
 #[must_use]

@@ -157,7 +157,7 @@ fn draw(
             continue;
         }
         if done.is_multiple_of(each) {
-            let Some(now) = renderer.halves_alone(done)? else {
+            let Some(now) = renderer.half_means_alone()? else {
                 bail!("a reference by paths has no halves: our mistake")
             };
             let count = (done / each) as f32;

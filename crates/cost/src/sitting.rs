@@ -170,7 +170,7 @@ impl Bench<'_> {
     ) -> Result<Taken> {
         let rendered = sitting.renderer.render(self.camera, &mut |_| ())?;
         let film = sitting.renderer.film_alone()?;
-        let halves = sitting.renderer.halves_alone(rendered.samples)?;
+        let halves = sitting.renderer.half_means_alone()?;
         let [width, height] = self.settings.size;
         let view = self.settings.view_transform();
         let same = other.as_ref().is_some_and(|(_, known)| known.is(&film));

@@ -1,0 +1,31 @@
+// Which tiles of the picture are drawn: all of them, or every n-th where other processes draw the rest.
+#ifndef OWN_TILES_GLSL
+#define OWN_TILES_GLSL
+#include "lib/view.glsl"
+#include "lib/work_tile.glsl"
+
+uvec2 tiles_of_picture() {
+    return (camera.size + WORK_TILE - 1) / WORK_TILE;
+}
+
+// How many are drawn.
+uint own_tiles() {
+    uvec2 tiles = tiles_of_picture();
+    uint all = tiles.x * tiles.y;
+    return camera.tiles.x < all ? (all - camera.tiles.x - 1) / camera.tiles.y + 1 : 0;
+}
+
+// The first pixel of one of them.
+uvec2 own_tile(uint index) {
+    uint tile = camera.tiles.x + index * camera.tiles.y;
+    uint across = tiles_of_picture().x;
+    return uvec2(tile % across, tile / across) * WORK_TILE;
+}
+
+// Whether the tile that holds a pixel is drawn.
+bool in_own_tile(uvec2 pixel) {
+    uvec2 at = pixel / WORK_TILE;
+    uint tile = at.y * tiles_of_picture().x + at.x;
+    return tile % camera.tiles.y == camera.tiles.x;
+}
+#endif

@@ -1,0 +1,130 @@
+//! Sums of the samples of each pixel, block by block (shaders/pass/accumulate.comp, join.comp).
+//!
+//! The samples of a picture are added in blocks of as many, first to last, and the blocks one after the other. Which blocks there are
+//! depends on the number of samples alone, so that processes that draw some of the blocks each make, together, the sum of one that
+//! draws all of them, to the last bit: a sum in single precision depends on its order.
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use ash::vk;
+
+use super::accumulate::accumulate;
+use crate::gpu::{Device, Frame, Image, ImageDesc};
+use crate::shader::join;
+
+/// Blocks that the samples of a picture make, where there are so many.
+pub const BLOCKS: u32 = 32;
+
+/// Samples of a block, of a sum of so many.
+#[must_use]
+pub fn block_of(samples: u32) -> u32 {
+    samples.div_ceil(BLOCKS).max(1)
+}
+
+/// A sum on the device.
+pub struct Sum {
+    /// Of whole blocks.
+    pub total: Image,
+    /// Of the block that is under way, where blocks may be of more than one frame.
+    open: Option<Image>,
+}
+
+/// A sample of a sum.
+#[derive(Debug, Clone, Copy)]
+pub struct Sample {
+    /// Counted from 0.
+    pub index: u32,
+    /// Samples of a block.
+    pub block: u32,
+    /// What is drawn is the first band of it, or all of it …
+    pub begins: bool,
+    /// … and the last one.
+    pub ends: bool,
+}
+
+impl Sample {
+    /// Whether a block ends with it.
+    #[must_use]
+    pub fn ends_block(self) -> bool {
+        self.ends && (self.index + 1).is_multiple_of(self.block)
+    }
+}
+
+impl Sum {
+    /// For up to so many samples, in so many bands of wavelengths, of a picture of `size` pixels.
+    ///
+    /// # Errors
+    /// When memory is short.
+    pub fn new(device: &Arc<Device>, name: &str, size: [u32; 2], samples: u32, bands: u32) -> Result<Self> {
+        let image = |name: &str| {
+            let usage = vk::ImageUsageFlags::STORAGE;
+            Image::new(device, name, ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], usage))
+        };
+        let open = if samples > 1 && (block_of(samples) > 1 || bands > 0) {
+            Some(image(&format!("block of the {name}"))?)
+        } else {
+            None
+        };
+        Ok(Self { total: image(name)?, open })
+    }
+
+    /// Whether the sum of whole blocks is all there is.
+    #[must_use]
+    pub fn is_plain(&self) -> bool {
+        self.open.is_none()
+    }
+
+    /// Adds a sample, or one band of it. The total is begun anew with the block that has the sample `from`, and is multiplied by
+    /// `scale` when a block has been added.
+    ///
+    /// # Errors
+    /// When the driver refuses what a pipeline binds.
+    pub fn add<'a>(
+        &'a self,
+        frame: &mut Frame<'a>,
+        radiance: &'a Image,
+        sample: Sample,
+        from: u32,
+        (scale, bands): (f32, u32),
+    ) -> Result<()> {
+        let Sample { index, block, begins, .. } = sample;
+        let first_block = index / block == from / block;
+        let Some(open) = self.open.as_ref().filter(|_| block > 1 || bands > 0) else {
+            return accumulate(frame, radiance, &self.total, first_block && begins, scale, bands);
+        };
+        accumulate(frame, radiance, open, index.is_multiple_of(block) && begins, 1.0, bands)?;
+        if sample.ends_block() {
+            accumulate(frame, open, &self.total, first_block, scale, 0)?;
+        }
+        Ok(())
+    }
+
+    /// Images that hold something after so many samples in blocks of so many: the total, the block under way.
+    #[must_use]
+    pub fn images(&self, samples: u32, block: u32) -> [Option<&Image>; 2] {
+        let total = (samples >= block).then_some(&self.total);
+        [total, self.open.as_ref().filter(|_| !samples.is_multiple_of(block))]
+    }
+}
+
+/// Writes the mean of all samples into `film`, of which each sum has so many, in blocks of so many.
+///
+/// # Errors
+/// When the driver refuses what a pipeline binds.
+pub fn join<'a>(frame: &mut Frame<'a>, sums: &'a [Sum], samples: &[u32], block: u32, film: &'a Image) -> Result<()> {
+    let images: Vec<Option<&Image>> = sums.iter().zip(samples).flat_map(|(sum, &of)| sum.images(of, block)).collect();
+    let image = |i: usize| images.get(i).copied().flatten();
+    // What is not there is not read.
+    let at = |i: usize| image(i).unwrap_or(&sums[0].total);
+    let has = |i: usize| u32::from(image(i).is_some());
+    let bind = join::Bind { total_a: at(0), open_a: at(1), total_b: at(2), open_b: at(3), film };
+    let push = join::Push {
+        scale: 1.0 / samples.iter().sum::<u32>() as f32,
+        has_total_a: has(0),
+        has_open_a: has(1),
+        has_total_b: has(2),
+        has_open_b: has(3),
+    };
+    frame.compute_over("join sums", &bind, &join::Constants {}, &push, [film.desc().width, film.desc().height])
+}
