@@ -9,9 +9,9 @@ use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
 
 use super::budget::{command, keep, kept};
-use super::options::{DeviceOptions, Extent as Planned, PictureOptions, SceneOptions, When};
+use super::options::{DeviceOptions, Extent as Planned, PictureOptions, SceneOptions, shard};
 use super::print;
-use super::progress::Steps;
+use super::progress::{ProgressForm, Steps};
 use super::setup::Setup;
 use etalon::gpu::Severity;
 use etalon::image::file;
@@ -61,17 +61,9 @@ pub struct CostArgs {
     /// Print cost.json as well
     #[arg(long)]
     json: bool,
-    /// Progress: a bar on a terminal, a line per step elsewhere
-    #[arg(long, value_enum, default_value_t = When::Auto)]
-    progress: When,
-}
-
-fn shard(text: &str) -> Result<[u32; 2], String> {
-    let parts = text.split_once('/').and_then(|(i, n)| Some([i.parse().ok()?, n.parse().ok()?]));
-    match parts {
-        Some([i, n]) if i >= 1 && i <= n => Ok([i, n]),
-        _ => Err("expected I/N with I from 1 to N, for example 2/3".to_owned()),
-    }
+    /// How progress is told
+    #[arg(long, value_enum, default_value_t = ProgressForm::Auto)]
+    pub progress: ProgressForm,
 }
 
 /// Runs the command.

@@ -5,13 +5,16 @@ mod choices;
 pub mod cost;
 pub mod devices;
 pub mod diff;
+pub mod farm;
+pub mod merge;
 pub mod options;
 pub mod plan;
-mod progress;
+pub mod progress;
 pub mod render;
 pub mod report;
+pub mod sequence;
 pub mod setup;
-pub mod unbuilt;
+mod shard;
 pub mod verify;
 #[cfg(feature = "window")]
 pub mod view;
@@ -22,7 +25,7 @@ pub mod view;
 use std::io::{self, Write as _};
 
 use anyhow::{Context as _, Result};
-use etalon::gpu::NotOpened;
+use etalon::gpu::{NotOpened, is_lost};
 use etalon::plan::{Refused, Setting};
 
 /// An error as one sentence, with the options of the command line in place of the settings of the library, and with the packages
@@ -48,6 +51,12 @@ pub fn told(error: &anyhow::Error) -> String {
     error.chain().map(cause).collect::<Vec<_>>().join(": ")
 }
 
+/// Whether the same may succeed later, or elsewhere: the device was lost, a disk is full. Engines try such work again.
+#[must_use]
+pub fn is_worth_another_try(error: &anyhow::Error) -> bool {
+    is_lost(error) || etalon::image::file::is_full(error)
+}
+
 /// Debian's packages that mend it.
 fn packages(error: &NotOpened) -> Option<&'static str> {
     match error {
@@ -56,6 +65,12 @@ fn packages(error: &NotOpened) -> Option<&'static str> {
         NotOpened::NoValidation => Some("vulkan-validationlayers"),
         _ => None,
     }
+}
+
+/// Tells an engine of Open Job Description why there is no picture.
+pub fn fail_openjd(text: &str) {
+    // Where nobody reads, nobody is told.
+    drop(print(&format!("openjd_fail: {}", text.replace('\n', " "))));
 }
 
 /// One line to stdout. A reader that has closed the pipe has seen enough: that is no error.

@@ -5,7 +5,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use etalon_cli::options::When;
-use etalon_cli::{cost, devices, diff, plan, render, verify, view};
+use etalon_cli::progress::ProgressForm;
+use etalon_cli::{cost, devices, diff, farm, merge, plan, render, verify, view};
 
 /// A Vulkan renderer written directly against ash: glTF in, radiance out.
 #[derive(Parser)]
@@ -33,7 +34,12 @@ enum Command {
     Verify(verify::VerifyArgs),
     View(Box<view::ViewArgs>),
     Cost(Box<cost::CostArgs>),
+    Merge(merge::MergeArgs),
+    Farm(farm::FarmArgs),
 }
+
+/// Worth trying again: EX_TEMPFAIL of sysexits.h.
+const AGAIN: u8 = 75;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
@@ -63,10 +69,21 @@ fn main() -> ExitCode {
         Command::Plan(args) => plan::run(args),
         Command::Cost(args) => cost::run(args, arguments.quiet),
         Command::Verify(args) => verify::run(args, arguments.quiet),
+        Command::Merge(args) => merge::run(args),
+        Command::Farm(args) => farm::run(args),
+    };
+    let form = match &arguments.command {
+        Command::Render(args) => args.progress,
+        Command::Cost(args) => args.progress,
+        _ => ProgressForm::Auto,
     };
     result.unwrap_or_else(|error| {
         let label = if color { "\x1b[1;31merror:\x1b[0m" } else { "error:" };
-        eprintln!("{label} {}", etalon_cli::told(&error));
-        ExitCode::FAILURE
+        let text = etalon_cli::told(&error);
+        eprintln!("{label} {text}");
+        if form == ProgressForm::Openjd {
+            etalon_cli::fail_openjd(&text);
+        }
+        if etalon_cli::is_worth_another_try(&error) { ExitCode::from(AGAIN) } else { ExitCode::FAILURE }
     })
 }

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use glam::DVec3;
 
 use super::choices::one_of;
-use etalon::frame::{Background, Settings};
+use etalon::frame::{Background, Settings, TileShare};
 use etalon::gpu::DeviceChoice;
 use etalon::image::tone::ToneMap;
 use etalon::plan::{Demand, Knobs, Model};
@@ -15,7 +15,7 @@ use etalon::scene::camera::{Camera, DEFAULT_FOV_Y};
 use etalon::scene::environment::Environment;
 use etalon::scene::{Ambience, LoadOptions, Reads, Scene};
 
-/// When to show something.
+/// When to colour something.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum When {
     /// On a terminal.
@@ -136,6 +136,15 @@ fn vector(text: &str) -> Result<DVec3, String> {
     }
 }
 
+/// I/N, I from 1 to N.
+pub(super) fn shard(text: &str) -> Result<[u32; 2], String> {
+    let parts = text.split_once('/').and_then(|(i, n)| Some([i.parse().ok()?, n.parse().ok()?]));
+    match parts {
+        Some([i, n]) if i >= 1 && i <= n => Ok([i, n]),
+        _ => Err("expected I/N with I from 1 to N, for example 2/3".to_owned()),
+    }
+}
+
 fn size(text: &str) -> Result<[u32; 2], String> {
     let parts: Option<(u32, u32)> = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     match parts {
@@ -144,7 +153,7 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     }
 }
 
-fn background(text: &str) -> Result<Background, String> {
+pub(super) fn background(text: &str) -> Result<Background, String> {
     match text {
         "env" => Ok(Background::Environment),
         "transparent" => Ok(Background::Transparent),
@@ -197,19 +206,26 @@ impl SceneOptions {
         all
     }
 
+    /// The asked time of the animation; `None` is the rest pose.
+    ///
+    /// # Errors
+    /// When it is no number of seconds.
+    pub fn time(&self) -> Result<Option<f64>> {
+        match self.time.as_str() {
+            "none" => Ok(None),
+            text => match text.parse::<f64>() {
+                Ok(seconds) if seconds.is_finite() => Ok(Some(seconds)),
+                _ => bail!("--time {text}: expected seconds, or none"),
+            },
+        }
+    }
+
     /// Loads the scene at the asked time.
     ///
     /// # Errors
     /// One sentence with file, place and cause.
     pub fn load(&self, reads: Reads) -> Result<Scene> {
-        let time = match self.time.as_str() {
-            "none" => None,
-            text => match text.parse::<f64>() {
-                Ok(seconds) if seconds.is_finite() => Some(seconds),
-                _ => bail!("--time {text}: expected seconds, or none"),
-            },
-        };
-        etalon::open::scene(&self.scene, &LoadOptions { time, reads })
+        etalon::open::scene(&self.scene, &LoadOptions { time: self.time()?, reads })
     }
 
     /// Loads the environment that is asked for, or would be used if the scene has no lights.
@@ -371,6 +387,7 @@ impl PictureOptions {
             traversal: None,
             demand: self.plan.demand(),
             parts: Vec::new(),
+            share: TileShare::ALL,
         })
     }
 }

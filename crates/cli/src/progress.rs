@@ -1,30 +1,62 @@
 //! How far something is.
 
+use std::cell::Cell;
 use std::io::IsTerminal as _;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
+use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde_json::json;
 
-use super::options::When;
+use super::print;
 use etalon::frame::Progress;
+
+/// In which form progress is told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ProgressForm {
+    /// A bar on a terminal, a line per step elsewhere
+    Auto,
+    /// A bar, wherever it goes
+    Always,
+    /// Nothing
+    Never,
+    /// A line per step
+    Plain,
+    /// A line of JSON per step, on standard error: status, or progress from 0 to 1 with the seconds left
+    Json,
+    /// What Open Job Description reads on standard output: openjd_status, openjd_progress, openjd_fail
+    Openjd,
+}
+
+/// Between two lines that tell how far something is.
+const PAUSE: Duration = Duration::from_secs(1);
 
 /// Steps as a bar on a terminal, as lines elsewhere, or not at all.
 pub(super) struct Steps {
+    form: ProgressForm,
     bar: Option<ProgressBar>,
-    lines: bool,
+    begun: Instant,
+    told: Cell<Option<Instant>>,
+    /// Where the picture under way begins, and how much it is, of all that is done.
+    share: Cell<[f64; 2]>,
 }
 
 impl Steps {
-    pub(super) fn new(progress: When, quiet: bool) -> Self {
-        let terminal = std::io::stderr().is_terminal();
-        let shown = !quiet && progress != When::Never;
-        let bar = (shown && (terminal || progress == When::Always)).then(|| {
+    pub(super) fn new(form: ProgressForm, quiet: bool) -> Self {
+        let form = match form {
+            ProgressForm::Json | ProgressForm::Openjd => form,
+            _ if quiet => ProgressForm::Never,
+            ProgressForm::Auto if std::io::stderr().is_terminal() => ProgressForm::Always,
+            ProgressForm::Auto => ProgressForm::Plain,
+            form => form,
+        };
+        let bar = (form == ProgressForm::Always).then(|| {
             let bar = ProgressBar::with_draw_target(Some(1), ProgressDrawTarget::stderr());
             let style = ProgressStyle::with_template("{msg:<24} {wide_bar} {pos}/{len} {elapsed}, {eta} left");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             bar
         });
-        Self { lines: shown && bar.is_none(), bar }
+        Self { form, bar, begun: Instant::now(), told: Cell::new(None), share: Cell::new([0.0, 1.0]) }
     }
 
     pub(super) fn step(&self, message: &str, of: u32) {
@@ -33,20 +65,46 @@ impl Steps {
             bar.set_length(u64::from(of));
             bar.set_position(0);
         }
-        if self.lines {
-            eprintln!("{message}");
+        match self.form {
+            ProgressForm::Plain => eprintln!("{message}"),
+            ProgressForm::Json => eprintln!("{}", json!({ "status": message })),
+            // A pipe that nobody reads is no reason to stop.
+            ProgressForm::Openjd => drop(print(&format!("openjd_status: {message}"))),
+            _ => {}
+        }
+    }
+
+    /// What is done from here on is so much of the whole, beginning at so much.
+    pub(super) fn is_share(&self, from: f64, share: f64) {
+        self.share.set([from, share]);
+    }
+
+    /// How much of the present share is done, and so of the whole; engines hear of it no more than once a second.
+    pub(super) fn done(&self, share: f64) {
+        let [from, of] = self.share.get();
+        let done = (from + of * share).clamp(0.0, 1.0);
+        let pauses = self.told.get().is_some_and(|told| told.elapsed() < PAUSE) && done < 1.0;
+        if pauses || !matches!(self.form, ProgressForm::Json | ProgressForm::Openjd) {
+            return;
+        }
+        self.told.set(Some(Instant::now()));
+        let left_s = self.begun.elapsed().as_secs_f64() * (1.0 - done) / done.max(1e-9);
+        match self.form {
+            ProgressForm::Json => eprintln!("{}", json!({ "progress": done, "left_s": left_s })),
+            _ => drop(print(&format!("openjd_progress: {:.1}", 100.0 * done))),
         }
     }
 
     /// How far a picture is. Where there is no bar, a line at powers of two, no more often than once a second.
     pub(super) fn sampled(&self, progress: Progress, begun: Instant, last: &mut Instant) {
         self.at(progress.done);
+        self.done(f64::from(progress.done) / f64::from(progress.of.max(1)));
         let Some(error) = progress.error else { return };
         let relative = error.relmse.sqrt() * 100.0;
         if let Some(bar) = &self.bar {
             bar.set_message(format!("drawing, error {relative:.2} %"));
         }
-        if self.lines && last.elapsed().as_secs() >= 1 {
+        if self.form == ProgressForm::Plain && last.elapsed() >= PAUSE {
             *last = Instant::now();
             let left =
                 begun.elapsed().as_secs_f64() / f64::from(progress.done) * f64::from(progress.of - progress.done);
@@ -62,9 +120,11 @@ impl Steps {
             bar.set_length(of as u64);
             bar.set_position(done as u64);
         }
-        if self.lines {
+        if self.form == ProgressForm::Plain {
             eprintln!("{} of {of}: {name}, {left}", done + 1);
         }
+        self.is_share(done as f64 / of.max(1) as f64, 1.0 / of.max(1) as f64);
+        self.done(0.0);
     }
 
     pub(super) fn at(&self, position: u32) {
@@ -75,7 +135,7 @@ impl Steps {
 
     /// The same, unless nothing is to be said.
     pub(super) fn tell(&self, line: &str) {
-        if self.bar.is_some() || self.lines {
+        if self.bar.is_some() || self.form == ProgressForm::Plain {
             self.say(line);
         }
     }

@@ -11,17 +11,18 @@ use glam::DVec3;
 use serde_json::json;
 
 use super::budget::{Budget, Chosen, command};
-use super::options::{DeviceOptions, Extent, PictureOptions, SceneOptions, When};
+use super::options::{DeviceOptions, Extent, PictureOptions, SceneOptions};
 use super::plan::cost_table;
 use super::print;
-use super::progress::Steps;
+use super::progress::{ProgressForm, Steps};
 use super::report::{
     ColourFacts, MemoryFacts, Output, PassFacts, PipelineFacts, PlanFacts, Report, Sampling, SceneFacts, Spread,
     Validation, knob_map,
 };
+use super::sequence::{self, SequenceOptions};
 use super::setup::Setup;
-use super::unbuilt::UnbuiltOptions;
-use etalon::frame::{Part, Rendered, Renderer};
+use super::shard;
+use etalon::frame::{Part, Rendered, Renderer, Settings};
 use etalon::gpu::Severity;
 use etalon::image::{Aov, AovData, Picture, exr, file};
 use etalon::plan::rungs::Indirect;
@@ -35,33 +36,47 @@ use etalon::upload::view::View;
 #[derive(Debug, Clone, Args)]
 pub struct RenderArgs {
     #[command(flatten)]
-    scene: SceneOptions,
-    /// Output file: .png (display) or .exr (scene-linear radiance); repeatable [default: the scene's name with .png]
+    pub(super) scene: SceneOptions,
+    /// Output file: .png (display) or .exr (scene-linear radiance); repeatable [default: the scene's name with .png]. Of a sequence also
+    /// .apng, an animated preview; of a part of a picture the one file that it goes to
     #[arg(short, long, value_name = "FILE")]
-    output: Vec<PathBuf>,
+    pub(super) output: Vec<PathBuf>,
     #[command(flatten)]
-    picture: PictureOptions,
+    pub(super) picture: PictureOptions,
     /// Choose the rungs with the least error that take no more GPU time than this, out of what `cost` measured of the same picture
     /// on this device or is measured first
     #[arg(long, value_name = "MS")]
-    within: Option<String>,
+    pub(super) within: Option<String>,
     #[command(flatten)]
-    device: DeviceOptions,
+    pub(super) device: DeviceOptions,
     /// Further layers of the EXR: the nearest opaque surface at the pixel centres; and, of the picture itself, the light
     /// that rays brought which were first mirrored (reflection) or first went through (refraction)
     #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,...")]
-    aov: Vec<AovName>,
+    pub(super) aov: Vec<AovName>,
     /// Draw N times and fail unless all are bit-identical
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
-    repeat: u32,
+    pub(super) repeat: u32,
     /// Write a machine-readable account of the run
     #[arg(long, value_name = "FILE.json")]
-    report: Option<PathBuf>,
-    /// Progress: a bar on a terminal, a line per step elsewhere
-    #[arg(long, value_enum, default_value_t = When::Auto)]
-    progress: When,
+    pub(super) report: Option<PathBuf>,
+    /// How progress is told
+    #[arg(long, value_enum, default_value_t = ProgressForm::Auto)]
+    pub progress: ProgressForm,
     #[command(flatten)]
-    unbuilt: UnbuiltOptions,
+    pub(super) sequence: SequenceOptions,
+}
+
+impl RenderArgs {
+    /// What the renderer needs to know.
+    pub(super) fn render_settings(&self) -> Result<Settings> {
+        let mut settings = self.picture.settings(&self.scene)?;
+        for part in self.aov.iter().filter_map(|name| name.part()) {
+            if !settings.parts.contains(&part) {
+                settings.parts.push(part);
+            }
+        }
+        Ok(settings)
+    }
 }
 
 /// Layers that can be asked for.
@@ -104,7 +119,7 @@ pub enum AovName {
 
 impl AovName {
     /// Of the picture, not of the surfaces.
-    fn part(self) -> Option<Part> {
+    pub(super) fn part(self) -> Option<Part> {
         match self {
             Self::Reflection => Some(Part::Reflection),
             Self::Refraction => Some(Part::Refraction),
@@ -113,19 +128,19 @@ impl AovName {
     }
 
     /// Told by the halves of a picture's samples.
-    fn of_halves(self) -> bool {
+    pub(super) fn of_halves(self) -> bool {
         matches!(self, Self::Variance | Self::HalfA | Self::HalfB)
     }
 }
 
 /// What an output path asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Format {
+pub(super) enum Format {
     Png,
     Exr,
 }
 
-fn format_of(path: &Path) -> Result<Format> {
+pub(super) fn format_of(path: &Path) -> Result<Format> {
     match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
         Some("png") => Ok(Format::Png),
         Some("exr") => Ok(Format::Exr),
@@ -153,18 +168,18 @@ impl Phases {
 /// # Errors
 /// One sentence with what was being done, to what, and the cause.
 pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
+    if args.sequence.is_sequence() {
+        return sequence::run(args, quiet);
+    }
+    if let Some(part) = args.sequence.shard {
+        return shard::run(args, part, quiet);
+    }
     let now = Instant::now();
     let mut phases =
         Phases { start: now, last: now, all: BTreeMap::from(["bvh", "pipelines"].map(|name| (name, 0.0))) };
-    args.unbuilt.refuse()?;
     let outputs = outputs(args)?;
     let budget = Budget::of(args.within.as_deref(), &args.picture)?;
-    let mut settings = args.picture.settings(&args.scene)?;
-    for part in args.aov.iter().filter_map(|name| name.part()) {
-        if !settings.parts.contains(&part) {
-            settings.parts.push(part);
-        }
-    }
+    let mut settings = args.render_settings()?;
     let steps = Steps::new(args.progress, quiet);
     phases.end("start");
 
@@ -194,15 +209,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     }
     let facts = facts(setup.opened.scene());
 
-    if let Some(name) = args.aov.iter().find(|name| name.of_halves()) {
-        let name = name.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
-        if settings.knobs.indirect != Indirect::Path {
-            bail!("--aov {name}: only paths tell their error; add --model global");
-        }
-        if settings.knobs.samples.count() == 1 && settings.max_error.is_none() {
-            bail!("--aov {name}: one sample has no halves; add --set samples=4");
-        }
-    }
+    check_halves(&args.aov, &settings)?;
     steps.step("uploading", 1);
     let knobs = settings.knobs.clone();
     let explained = (args.picture.plan == Extent::ExplainCost).then(|| (setup.clone(), settings.clone()));
@@ -257,8 +264,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     if let Some(chosen) = &mut chosen {
         chosen.check(&rendered, args.picture.size, &mut renderer, &camera)?;
     }
-    let aovs =
-        if args.aov.is_empty() { Vec::new() } else { layers(&mut renderer, &camera, &args.aov, rendered.samples)? };
+    let aovs = if args.aov.is_empty() { Vec::new() } else { layers(&mut renderer, &camera, &args.aov)? };
     phases.end("readback");
     warn_about(&rendered, settings_size(&args.picture), &knobs, renderer.plan().bands);
 
@@ -329,7 +335,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn settings_size(picture: &PictureOptions) -> u64 {
+pub(super) fn settings_size(picture: &PictureOptions) -> u64 {
     u64::from(picture.size[0]) * u64::from(picture.size[1])
 }
 
@@ -371,18 +377,23 @@ fn facts(scene: &Scene) -> SceneFacts {
 }
 
 /// What the EXR says of its making.
-fn metadata(args: &RenderArgs, plan: &Plan) -> Vec<(String, String)> {
+pub(super) fn metadata(args: &RenderArgs, plan: &Plan) -> Vec<(String, String)> {
+    made(&args.scene.scene, plan.bands)
+}
+
+/// The same of a scene, in so many bands of wavelengths.
+pub(super) fn made(scene: &str, bands: u32) -> Vec<(String, String)> {
     let mut all = vec![
         ("software".to_owned(), format!("etalon {}", env!("CARGO_PKG_VERSION"))),
-        ("scene".to_owned(), args.scene.scene.clone()),
+        ("scene".to_owned(), scene.to_owned()),
     ];
-    if plan.bands > 0 {
+    if bands > 0 {
         all.push(("observer".to_owned(), spectra::OBSERVER.to_owned()));
     }
     all
 }
 
-fn warn_about(rendered: &Rendered, pixels: u64, knobs: &Knobs, bands: u32) {
+pub(super) fn warn_about(rendered: &Rendered, pixels: u64, knobs: &Knobs, bands: u32) {
     let counts = rendered.counts;
     let negative = if bands > 0 { 0 } else { counts.negative };
     if bands > 0 && counts.negative > 0 {
@@ -443,12 +454,26 @@ fn pass_facts(rounds: &[Vec<etalon::gpu::PassTime>]) -> Vec<PassFacts> {
         .collect()
 }
 
+/// Layers of halves are those of pictures that have halves.
+pub(super) fn check_halves(names: &[AovName], settings: &Settings) -> Result<()> {
+    if let Some(name) = names.iter().find(|name| name.of_halves()) {
+        let name = name.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+        if settings.knobs.indirect != Indirect::Path {
+            bail!("--aov {name}: only paths tell their error; add --model global");
+        }
+        if settings.knobs.samples.count() == 1 && settings.max_error.is_none() {
+            bail!("--aov {name}: one sample has no halves; add --set samples=4");
+        }
+    }
+    Ok(())
+}
+
 /// The asked layers in the order asked.
-fn layers(renderer: &mut Renderer, camera: &Camera, names: &[AovName], samples: u32) -> Result<Vec<Aov>> {
+pub(super) fn layers(renderer: &mut Renderer, camera: &Camera, names: &[AovName]) -> Result<Vec<Aov>> {
     let (pixels, view) = renderer.aovs(camera).context("reading the G-buffer")?;
     let of = |&name: &AovName| match name.part() {
         Some(part) => layer_of_part(renderer, part),
-        None if name.of_halves() => layer_of_halves(renderer, name, samples),
+        None if name.of_halves() => layer_of_halves(renderer, name),
         None => Ok(layer(&pixels, &view, name)),
     };
     names.iter().map(of).collect()
@@ -463,21 +488,22 @@ fn layer_of_part(renderer: &Renderer, part: Part) -> Result<Aov> {
     })
 }
 
-fn layer_of_halves(renderer: &Renderer, name: AovName, samples: u32) -> Result<Aov> {
-    let halves = renderer.halves(samples)?;
-    let [a, b] = halves.ok_or_else(|| anyhow!("--aov: variance and halves are those of several samples by paths"))?;
+fn layer_of_halves(renderer: &Renderer, name: AovName) -> Result<Aov> {
+    let halves = renderer.half_means()?;
+    let halves = halves.ok_or_else(|| anyhow!("--aov: variance and halves are those of several samples by paths"))?;
+    Ok(layer_between(&halves, name))
+}
+
+/// What the means of even and odd samples tell.
+pub(super) fn layer_between([a, b]: &[Picture; 2], name: AovName) -> Aov {
     let colors = |picture: &Picture| -> Vec<f32> { picture.rgba.iter().flat_map(|&[r, g, b, _]| [r, g, b]).collect() };
     let variance = |(a, b): (&f32, &f32)| (0.5 * (a - b)).powi(2);
     let (title, samples) = match name {
-        AovName::HalfA => ("half_a", colors(&a)),
-        AovName::HalfB => ("half_b", colors(&b)),
-        _ => ("variance", colors(&a).iter().zip(&colors(&b)).map(variance).collect()),
+        AovName::HalfA => ("half_a", colors(a)),
+        AovName::HalfB => ("half_b", colors(b)),
+        _ => ("variance", colors(a).iter().zip(&colors(b)).map(variance).collect()),
     };
-    Ok(Aov {
-        name: title.to_owned(),
-        channels: ["R", "G", "B"].map(str::to_owned).into(),
-        samples: AovData::F32(samples),
-    })
+    Aov { name: title.to_owned(), channels: ["R", "G", "B"].map(str::to_owned).into(), samples: AovData::F32(samples) }
 }
 
 fn layer(pixels: &[AovPixel], view: &View, name: AovName) -> Aov {

@@ -10,9 +10,10 @@ use etalon::gpu::Device;
 use etalon::open::Opened;
 use etalon::plan::Effect;
 use etalon::scene::environment::Environment;
-use etalon::scene::{Camera, Reads, Scene};
+use etalon::scene::{Camera, Reads, Scene, Source};
 use etalon_cost::explain::{Price, Subject};
 use etalon_cost::sitting::Bench;
+use etalon_farm::identity::contents;
 
 /// A scene, what lies around it, and what it will be drawn on.
 #[derive(Clone)]
@@ -41,6 +42,32 @@ pub fn open(scene: &SceneOptions, reads: Reads, device: &DeviceOptions) -> Resul
     let mut opened = Opened::new(loaded, environment, scene.asks_for_environment());
     opened.warnings.extend(warnings);
     Ok((opened, device?))
+}
+
+/// The same for a scene of which many moments are looked at: its file, and the scene at the asked time.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_source(
+    options: &SceneOptions,
+    reads: Reads,
+    device: &DeviceOptions,
+) -> Result<(Source, Scene, Option<Environment>, Arc<Device>)> {
+    let time = options.time()?;
+    let (device, loaded, environment) = std::thread::scope(|scope| {
+        let device = scope.spawn(|| Device::open(&device.choice(), device.validate));
+        let environment = scope.spawn(|| options.load_environment());
+        let loaded = etalon::open::source(&options.scene, reads).and_then(|mut source| {
+            let scene = source.at(time)?;
+            Ok((source, scene))
+        });
+        let join = |_| anyhow!("a loading thread failed");
+        (device.join().map_err(join), loaded, environment.join().map_err(join))
+    });
+    let (source, mut scene) = loaded?;
+    let (environment, warnings) = environment??;
+    scene.warnings.extend(warnings);
+    Ok((source, scene, environment, device??))
 }
 
 impl Setup {
@@ -105,29 +132,4 @@ impl Setup {
         let camera = options.choose_camera(self.opened.scene(), settings.size)?;
         Ok((self.opened.renderer(&self.device, settings)?, camera))
     }
-}
-
-/// Hash of all that is drawn, whatever files it came from.
-#[must_use]
-pub fn contents(scene: &Scene, environment: Option<&Environment>) -> String {
-    let mut all = xxhash_rust::xxh3::Xxh3::new();
-    for mesh in &scene.meshes {
-        all.update(bytemuck::cast_slice(&mesh.positions));
-        all.update(bytemuck::cast_slice(&mesh.normals));
-        all.update(bytemuck::cast_slice(&mesh.tangents));
-        all.update(bytemuck::cast_slice(&mesh.colors));
-        all.update(bytemuck::cast_slice(&mesh.indices));
-        mesh.uvs.iter().for_each(|set| all.update(bytemuck::cast_slice(set)));
-        all.update(&mesh.material.to_le_bytes());
-    }
-    for image in &scene.images {
-        all.update(&image.width.to_le_bytes());
-        all.update(&image.rgba);
-    }
-    let Scene { instances, materials, lights, cameras, studio, .. } = scene;
-    all.update(format!("{instances:?}{materials:?}{lights:?}{cameras:?}{studio:?}").as_bytes());
-    if let Some(environment) = environment {
-        all.update(bytemuck::cast_slice(&environment.radiance));
-    }
-    format!("{:032x}", all.digest128())
 }

@@ -9,13 +9,13 @@ use clap::Args;
 
 use super::budget;
 use super::options::{DeviceOptions, Extent, PictureOptions, SceneOptions};
-use super::setup::contents;
 use etalon::frame::Settings;
 use etalon::gpu::{DeviceInfo, Severity};
 use etalon::image::file;
 use etalon::open::Opened;
 use etalon::scene::{Camera, Reads, Scene};
 use etalon_cost::command::arguments;
+use etalon_farm::identity::contents;
 use etalon_viewer::shared::{Asked, Loaded, Source};
 use etalon_viewer::{Start, View, run as run_window};
 

@@ -1,0 +1,144 @@
+//! `etalon merge`: parts of a picture, drawn by several processes, to the bits of one run.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Result, bail, ensure};
+use clap::{Args, ValueEnum as _};
+use serde::Serialize;
+
+use super::options::DeviceOptions;
+use super::print;
+use super::render::{AovName, Format, format_of, layer_between};
+use super::report::{Output, WorkFacts};
+use super::shard::display_settings;
+use etalon::frame::shown;
+use etalon::gpu::Device;
+use etalon::image::halves::SampleError;
+use etalon::image::{Aov, Statistics, exr, file, png};
+use etalon_farm::identity::Identity;
+use etalon_farm::join::{Joined, join};
+use etalon_farm::worker::Worker;
+
+/// Join the parts of a picture that `render --shard` wrote, to the bits of one run
+#[derive(Debug, Clone, Args)]
+pub struct MergeArgs {
+    /// The parts, in any order
+    #[arg(required = true, value_name = "PART")]
+    parts: Vec<PathBuf>,
+    /// Output file: .png (display) or .exr (scene-linear radiance); repeatable
+    #[arg(short, long, value_name = "FILE", required = true)]
+    output: Vec<PathBuf>,
+    #[command(flatten)]
+    device: DeviceOptions,
+    /// Write a machine-readable account: error, work, workers
+    #[arg(long, value_name = "FILE.json")]
+    report: Option<PathBuf>,
+}
+
+/// The account: schema `etalon.merge/1`.
+#[derive(Debug, Serialize)]
+struct Account<'a> {
+    schema: &'static str,
+    identity: &'a Identity,
+    samples: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<SampleError>,
+    work: WorkFacts,
+    image: Statistics,
+    workers: &'a [Worker],
+    outputs: Vec<Output>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// One sentence with the part that is missing, there twice, cut short or of another picture.
+pub fn run(args: &MergeArgs) -> Result<ExitCode> {
+    let mut outputs: Vec<(&Path, Format)> = Vec::new();
+    for path in &args.output {
+        let format = format_of(path)?;
+        ensure!(!args.parts.contains(path), "--output {}: a part would be written over", path.display());
+        file::check_writable(path)?;
+        outputs.push((path, format));
+    }
+    args.report.iter().try_for_each(|path| file::check_writable(path))?;
+    let joined = join(&args.parts)?;
+    let settings = display_settings(&joined.identity);
+    let display = match outputs.iter().any(|(_, format)| *format == Format::Png) {
+        true => {
+            let device = Device::open(&args.device.choice(), args.device.validate)?;
+            let info = device.info();
+            let here = [&info.name, &info.driver, &info.version];
+            // The tone curve is the device's as well.
+            ensure!(
+                joined.identity.device.iter().eq(here),
+                "the parts were drawn on \"{}\", and this device is \"{}\": it would round otherwise; -o FILE.exr needs no device",
+                joined.identity.device.join(", "),
+                here.map(String::as_str).join(", ")
+            );
+            Some(shown(&device, &joined.film, &settings, joined.bands > 0)?)
+        }
+        false => None,
+    };
+    let mut film = joined.film.clone();
+    settings.background.lay_behind(&mut film);
+    let aovs = aovs(&joined)?;
+    let mut written = Vec::new();
+    for (path, format) in outputs {
+        let [width, height] = joined.identity.size;
+        let bytes = match (format, &display) {
+            (Format::Png, Some((pixels, has_alpha, _))) => png::encode_png(width, height, pixels, *has_alpha)?,
+            _ => exr::encode_exr(&film, &aovs, &metadata(&joined))?,
+        };
+        file::write(path, &bytes)?;
+        written.push(Output { path: path.display().to_string(), hash: file::hash(&bytes) });
+        print(&path.display().to_string())?;
+    }
+    if let Some(path) = &args.report {
+        let account = Account {
+            schema: "etalon.merge/1",
+            identity: &joined.identity,
+            samples: joined.samples,
+            error: joined.error,
+            work: (&joined.work).into(),
+            image: film.statistics(),
+            workers: &joined.workers,
+            outputs: written,
+        };
+        file::write(path, serde_json::to_string_pretty(&account)?.as_bytes())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What the EXR of one run says of its making.
+fn metadata(joined: &Joined) -> Vec<(String, String)> {
+    super::render::made(&joined.identity.name, joined.bands)
+}
+
+/// The layers that were asked for, in that order.
+fn aovs(joined: &Joined) -> Result<Vec<Aov>> {
+    let asked = joined.identity.settings.get("aov").map_or("", String::as_str);
+    let names = AovName::value_variants().iter().copied();
+    // `[Normal, HalfA]`, as the parts were told.
+    let words = asked.trim_matches(['[', ']']).split(", ").filter(|word| !word.is_empty());
+    let mut all = Vec::new();
+    for word in words {
+        let Some(name) = names.clone().find(|name| format!("{name:?}") == word) else {
+            bail!("a layer {word} is not known")
+        };
+        let title = name.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+        let known = joined.aovs.iter().find(|aov| aov.name == title).cloned();
+        all.extend(match (&joined.halves, known) {
+            (_, Some(known)) => Some(known),
+            (Some(halves), None) if name.of_halves() => {
+                let mut halves = halves.clone();
+                let background = display_settings(&joined.identity).background;
+                halves.iter_mut().for_each(|half| background.lay_behind(half));
+                Some(layer_between(&halves, name))
+            }
+            _ => bail!("the layer {title} is in none of the parts"),
+        });
+    }
+    Ok(all)
+}

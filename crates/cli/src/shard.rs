@@ -1,0 +1,246 @@
+//! `etalon render --shard` of one picture: the part of it that one process draws, which goes on where it was stopped.
+
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context as _, Result, bail, ensure};
+
+use super::options::Extent;
+use super::print;
+use super::progress::Steps;
+use super::render::{RenderArgs, check_halves, layers};
+use super::report::Validation;
+use super::setup::Setup;
+use etalon::frame::{Renderer, Settings, Sums, TileShare};
+use etalon::gpu::Severity;
+use etalon::image::file;
+use etalon::plan::Plan;
+use etalon::scene::Camera;
+use etalon_farm::identity::{Identity, contents};
+use etalon_farm::part::{Drawn, Part, Split};
+use etalon_farm::worker::Worker;
+
+/// How often what is drawn is kept for the moment when the process is told to end.
+const KEEP: Duration = Duration::from_secs(1);
+/// What a process that ends on SIGTERM returns, as shells have it.
+const TERMINATED: u8 = 128 + 15;
+
+/// Tiles, unless the picture looks things up in itself: then each process needs all of it.
+fn split(args: &RenderArgs, plan: &Plan) -> Result<Split> {
+    let looks = plan.screen != etalon::plan::Screen::default();
+    match args.sequence.split.map(Split::from) {
+        Some(Split::Tiles) if looks => bail!(
+            "--split tiles: the plan looks up the screen (reflection=screen or refraction=screen), of which a tile needs all; \
+             choose --split samples"
+        ),
+        Some(split) => Ok(split),
+        None => Ok(if looks { Split::Samples } else { Split::Tiles }),
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// One sentence with what was being done, to what, and the cause.
+pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<ExitCode> {
+    let begun = Instant::now();
+    let [index, of] = shard;
+    ensure!(args.repeat == 1, "--repeat draws a picture again; a part of one is drawn once");
+    ensure!(args.within.is_none(), "--within chooses rungs for one process; choose them with --set for many");
+    ensure!(args.picture.plan != Extent::ExplainCost, "--plan explain-cost is about a whole picture");
+    ensure!(args.report.is_none(), "--report: a part tells of itself; `etalon merge --report` has the account of all");
+    let [output] = &args.output[..] else {
+        bail!("--shard {index}/{of}: name the one file that this part goes to with -o, such as -o {index}.part")
+    };
+    file::check_writable(output)?;
+    let mut settings = args.render_settings()?;
+    check_halves(&args.aov, &settings)?;
+    ensure!(
+        settings.max_error.is_none(),
+        "--max-error: a process that draws a part cannot tell when the whole is good enough; choose --set samples"
+    );
+    let stopped = Arc::new(AtomicBool::new(false));
+    signal_hook::flag::register(signal_hook::consts::SIGTERM, stopped.clone()).context("listening to SIGTERM")?;
+    let steps = Steps::new(args.progress, quiet);
+    steps.step(&format!("loading {}", args.scene.scene), 1);
+    let reads = args.picture.reads(&args.scene, &settings.knobs);
+    let setup = Setup::load(&args.scene, reads, &args.device)?;
+    args.picture.colour_of(setup.opened.scene(), &mut settings.knobs)?;
+    setup.opened.warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
+    let split = split(args, &setup.opened.plan(settings.clone())?)?;
+    if split == Split::Tiles {
+        settings.share = TileShare { index: index - 1, of };
+        ensure!(
+            of <= TileShare::ALL.tiles(settings.size),
+            "--shard {index}/{of}: a picture of {}x{} has fewer tiles of 8x8 pixels than that",
+            settings.size[0],
+            settings.size[1]
+        );
+    } else {
+        ensure!(
+            settings.parts.is_empty(),
+            "--split samples: --aov reflection and refraction are divided by tiles alone"
+        );
+    }
+    let scene = contents(setup.opened.scene(), setup.opened.environment());
+    let device = setup.device.clone();
+    let (_, lit) = setup.opened.lit(settings.clone());
+    steps.step("uploading", 1);
+    let (renderer, camera) = setup.renderer(&args.scene, settings)?;
+    renderer.warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
+    let mut identity = Identity::of(&args.scene.scene, scene, &camera, &lit, device.info());
+    identity.settings.insert("aov".to_owned(), format!("{:?}", args.aov));
+    identity.settings.insert("plan".to_owned(), format!("{:?}", args.picture.plan));
+    let mut work = Work { args, renderer, camera, steps: &steps, stopped: &stopped, begun, prepared: begun.elapsed() };
+    let starts = work.renderer.block_starts();
+    let wanted = match split {
+        Split::Tiles => vec![starts[0], starts[starts.len() - 1]],
+        Split::Samples => {
+            let blocks = starts.len() as u32 - 1;
+            ensure!(
+                of <= blocks,
+                "--shard {index}/{of} --split samples: the {} samples are added in {blocks} blocks, which make at most as many parts; \
+                 --split tiles makes more",
+                work.renderer.plan().samples
+            );
+            let at = |i: u32| (u64::from(blocks) * u64::from(i) / u64::from(of)) as usize;
+            starts[at(index - 1)..=at(index)].to_vec()
+        }
+    };
+    let drawn = |work: &Work<'_>, pieces: Vec<Sums>, aovs| Drawn {
+        identity: identity.clone(),
+        shard,
+        split,
+        samples: work.renderer.plan().samples,
+        bands: work.renderer.plan().bands,
+        parts: lit.parts.iter().map(|part| part.name().to_owned()).collect(),
+        wanted: [wanted[0], wanted[wanted.len() - 1]],
+        pieces,
+        aovs,
+        worker: work.worker(),
+    };
+    let known = match Part::read(output) {
+        Ok(known) => {
+            let same = known.head.identity.same_as(&identity).is_ok()
+                && (known.head.shard, known.head.split, known.head.samples)
+                    == (shard, split, work.renderer.plan().samples);
+            if same && known.is_whole() {
+                steps.tell(&format!("{} is whole already", output.display()));
+                drop(steps);
+                return print(&output.display().to_string()).map(|()| ExitCode::SUCCESS);
+            }
+            same.then(|| known.into_sums()).unwrap_or_default()
+        }
+        // Nothing there, or nothing of ours.
+        Err(_) => Vec::new(),
+    };
+    let (pieces, is_whole) = match split {
+        Split::Tiles => work.tiles(&starts, known.into_iter().next())?,
+        Split::Samples => work.samples(&wanted, known)?,
+    };
+    let aovs = if index == 1 && is_whole { work.layers()? } else { Vec::new() };
+    if !pieces.is_empty() {
+        steps.step("encoding", 1);
+        file::write(output, &Part::of(drawn(&work, pieces, aovs))?.encode()?)?;
+    }
+    if !is_whole {
+        drop(steps);
+        tracing::warn!("ended by SIGTERM; the same command goes on from what {} holds", output.display());
+        return Ok(ExitCode::from(TERMINATED));
+    }
+    drop(steps);
+    print(&output.display().to_string())?;
+    let messages = Validation::of(&device, args.device.validate).messages;
+    match messages.iter().find(|message| message.severity == Severity::Error) {
+        Some(message) => bail!("validation: {}", message.text),
+        None => Ok(ExitCode::SUCCESS),
+    }
+}
+
+/// What draws a part.
+struct Work<'a> {
+    args: &'a RenderArgs,
+    renderer: Renderer,
+    camera: Camera,
+    steps: &'a Steps,
+    stopped: &'a AtomicBool,
+    begun: Instant,
+    prepared: Duration,
+}
+
+impl Work<'_> {
+    fn is_stopped(&self) -> bool {
+        self.stopped.load(Ordering::Relaxed)
+    }
+
+    fn worker(&self) -> Worker {
+        let info = self.renderer.device().info();
+        let device = [&info.name, &info.driver, &info.version].map(Clone::clone);
+        Worker::here(device, self.begun.elapsed(), self.prepared)
+    }
+
+    /// All samples of a share of the tiles; whether it is drawn to its end.
+    fn tiles(&mut self, starts: &[u32], known: Option<Sums>) -> Result<(Vec<Sums>, bool)> {
+        let end = starts[starts.len() - 1];
+        let from = known.as_ref().map_or(0, |known| known.samples[1]);
+        self.steps.step("drawing", end);
+        let mut drawing = self.renderer.begin_part(&self.camera, [from, end], known.as_ref())?;
+        let (mut kept, mut when) = (known, Instant::now());
+        while !drawing.is_done() {
+            if self.is_stopped() {
+                return Ok((kept.into_iter().collect(), false));
+            }
+            self.renderer.step(&mut drawing)?;
+            let done = drawing.samples();
+            self.steps.at(done);
+            self.steps.done(f64::from(done) / f64::from(end));
+            if drawing.is_whole() && starts.contains(&done) && (when.elapsed() >= KEEP || kept.is_none()) {
+                kept = Some(self.renderer.sums(&drawing)?);
+                when = Instant::now();
+            }
+        }
+        Ok((vec![self.renderer.sums(&drawing)?], true))
+    }
+
+    /// Some of the blocks of samples of all pixels; whether they are all there.
+    fn samples(&mut self, starts: &[u32], mut pieces: Vec<Sums>) -> Result<(Vec<Sums>, bool)> {
+        let (first, end) = (starts[0], starts[starts.len() - 1]);
+        self.steps.step("drawing", end - first);
+        for block in starts.windows(2).skip(pieces.len()) {
+            let mut drawing = self.renderer.begin_part(&self.camera, [block[0], block[1]], None)?;
+            while !drawing.is_done() {
+                if self.is_stopped() {
+                    return Ok((pieces, false));
+                }
+                self.renderer.step(&mut drawing)?;
+                let done = drawing.samples() - first;
+                self.steps.at(done);
+                self.steps.done(f64::from(done) / f64::from(end - first));
+            }
+            pieces.push(self.renderer.sums(&drawing)?);
+        }
+        Ok((pieces, true))
+    }
+
+    /// Layers of the surfaces; those of halves are made when all parts are there.
+    fn layers(&mut self) -> Result<Vec<etalon::image::Aov>> {
+        let own = self.args.aov.iter().copied().filter(|name| name.part().is_none() && !name.of_halves());
+        let names: Vec<_> = own.collect();
+        if names.is_empty() { Ok(Vec::new()) } else { layers(&mut self.renderer, &self.camera, &names) }
+    }
+}
+
+/// Settings that say how a film becomes display values, out of what a part tells.
+pub(super) fn display_settings(identity: &Identity) -> Settings {
+    let text = |name: &str| identity.settings.get(name).map_or("", String::as_str);
+    let tonemap = etalon::image::tone::ToneMap::ALL.iter().copied().find(|curve| curve.name() == text("tonemap"));
+    Settings {
+        size: identity.size,
+        tonemap: tonemap.unwrap_or_default(),
+        exposure: text("exposure").parse().unwrap_or_default(),
+        background: super::options::background(text("background")).unwrap_or_default(),
+        ..Settings::default()
+    }
+}
