@@ -945,7 +945,8 @@ impl Renderer {
         // A sum that is the film as well becomes the mean with its last sample.
         let last = film.is_none() && !drawing.is_part && index + 1 == count && sample.ends;
         let scale = if last { 1.0 / count as f32 } else { 1.0 };
-        sums[(index % halves) as usize].add(&mut frame, radiance, sample, from / halves, (scale, bands))?;
+        let Some(sum) = sums.get((index % halves) as usize) else { return Ok(frame) };
+        sum.add(&mut frame, radiance, sample, from / halves, (scale, bands))?;
         for part in parts {
             let last = !drawing.is_part && index + 1 == count && sample.ends;
             let scale = if last { 1.0 / count as f32 } else { 1.0 };

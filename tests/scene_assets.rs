@@ -134,3 +134,32 @@ fn every_broken_file_is_one_sentence() {
     }
     assert!(seen >= 16, "only {seen} files were found");
 }
+
+#[test]
+fn moments_of_a_source_are_what_is_loaded_and_share_what_does_not_move() {
+    let Some(assets) = assets() else { return };
+    for name in ["BoxAnimated", "AnimatedMorphCube", "SimpleSkin", "CesiumMan", "CesiumMilkTruck", "WaterBottle"] {
+        let folder = assets.join("models").join(name);
+        let entries = fs::read_dir(&folder).expect("a folder of the collection");
+        let mut files: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+        files.retain(|path| path.extension().is_some_and(|e| e == "glb" || e == "gltf"));
+        files.sort();
+        let path = &files[0];
+        let mut source = scene::Source::open(path, scene::Reads::Everything).unwrap();
+        let mut first: Option<Scene> = None;
+        for time in [None, Some(0.0), Some(0.4), Some(1.3), None] {
+            let known = source.at(time).unwrap();
+            let loaded = scene::load(path, &LoadOptions { time, reads: scene::Reads::Everything }).unwrap();
+            let all = |scene: &Scene| {
+                let Scene { meshes, instances, materials, images, lights, cameras, duration, .. } = scene;
+                format!("{meshes:?}{instances:?}{materials:?}{images:?}{lights:?}{cameras:?}{duration:?}")
+            };
+            assert!(all(&known) == all(&loaded), "{name} at {time:?}");
+            if let Some(first) = &first {
+                let same = first.images.iter().zip(&known.images).all(|(a, b)| a.rgba.mark() == b.rgba.mark());
+                assert!(same, "{name} at {time:?}: an image was decoded again");
+            }
+            first.get_or_insert(known);
+        }
+    }
+}

@@ -158,18 +158,19 @@ Transmitted dielectric_transmitted(float cos_in, float n) {
         float g2 = refracted_square(c, index);
         if (c >= SMALLEST_NORMAL && index > 0.0 && (g2 > 0.0 || index == 1.0)) {
             float g = index == 1.0 ? c : sqrt(g2);
-            float s = c + g;
-            float p = index * index * c + g;
+            // The same products as there, so that both are 1 together.
+            float by_s = 1.0 / (c + g);
+            float by_p = 1.0 / (index * index * c + g);
             // 1 − r² where little is reflected: its error is that of r² times r².
             float difference = (index - 1.0) * (index + 1.0);
-            float rs = difference / s / s;
-            float rp = (difference / p) * (brewster_term(c, index, g2) / p);
-            t.Ts = rs * rs < 0.5 ? 1.0 - rs * rs : 4.0 * (c / s) * (g / s);
-            t.Tp = rp * rp < 0.5 ? 1.0 - rp * rp : 4.0 * (index * c / p) * (index * g / p);
+            float rs = difference * by_s * by_s;
+            float rp = (difference * by_p) * (brewster_term(c, index, g2) * by_p);
+            t.Ts = rs * rs < 0.5 ? 1.0 - rs * rs : 4.0 * (c * by_s) * (g * by_s);
+            t.Tp = rp * rp < 0.5 ? 1.0 - rp * rp : 4.0 * (index * c * by_p) * (index * g * by_p);
             float F = 0.5 * (rs * rs + rp * rp);
             // c g would leave the range of floats for cosines below 1e-31; a power of two rounds nothing.
             float up = c < 1e-20 ? 1.15292150e18 : 1.0;
-            t.T = F < 0.5 ? 1.0 - F : transmitted_part(c * up, g, index, 1.0 / s, 1.0 / p) * (1.0 / up);
+            t.T = F < 0.5 ? 1.0 - F : transmitted_part(c * up, g, index, by_s, by_p) * (1.0 / up);
         }
     }
     return t;

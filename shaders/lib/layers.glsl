@@ -63,7 +63,7 @@ float fresnel_of_coat(Surface s, float cos_in) {
     if (FRESNEL == FRESNEL_EXACT) {
         // In air from constants: drivers round what they know in another way, and both plans of a scene have to agree (from a selected
         // index 6 pixels of ClearCoatTest do not).
-        bool in_air = !TRANSMISSIVE || s.n_outside == 1.0;
+        bool in_air = s.n_outside == 1.0;
         f = in_air ? fresnel_dielectric(cos_in, COAT_INDEX).F : fresnel_dielectric(cos_in, COAT_INDEX / s.n_outside).F;
     } else {
         f = schlick(vec3(COAT_F0), 1.0, cos_in).x;

@@ -131,7 +131,7 @@ pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<Exi
                 drop(steps);
                 return print(&output.display().to_string()).map(|()| ExitCode::SUCCESS);
             }
-            same.then(|| known.into_sums()).unwrap_or_default()
+            if same { known.into_sums() } else { Vec::new() }
         }
         // Nothing there, or nothing of ours.
         Err(_) => Vec::new(),

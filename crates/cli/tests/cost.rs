@@ -187,6 +187,7 @@ fn parts_make_the_whole() {
     assert!(at.join("all/report.html").exists());
     etalon(at, &["cost", "--merge", "p1", "all/pictures", "-o", "b"], &[]).failed(1, "cost.json");
     etalon(at, &["cost", "--merge", "p2", "-o", "b"], &[]).failed(1, "part 1/2 is missing");
+    etalon(at, &["cost", "--merge", "p1", "p1", "-o", "b"], &[]).failed(1, "part 1/2 is there twice");
     assert!(!at.join("b/cost.json").exists());
 }
 

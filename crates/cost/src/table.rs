@@ -494,6 +494,7 @@ impl Table {
                 all.warnings.push(format!("times are those of {} and {}", all.device.name, part.device.name));
             }
             ensure!(part.shard[1] == of, "merging: two parts are of {of} and of {}", part.shard[1]);
+            ensure!(!drawn.contains(&part.shard[0]), "merging: part {}/{of} is there twice", part.shard[0]);
             drawn.push(part.shard[0]);
             for point in part.points {
                 if all.points.iter().all(|known| known.name != point.name) {

@@ -5,7 +5,13 @@
 set -eu
 mkdir -p @FOLDER@
 cat > @FOLDER@/task.sh <<'TASK'
-exec @PROGRAM@ render @ARGUMENTS@ --shard "$HQ_TASK_ID/@COUNT@"@OUTPUT_HYPERQUEUE@
+for try in 1 2 3 4 5; do
+    @PROGRAM@ render @ARGUMENTS@ --shard "$HQ_TASK_ID/@COUNT@"@OUTPUT_HYPERQUEUE@ && exit 0
+    status=$?
+    # 75: worth trying again; 137: killed; 143: ended by SIGTERM.
+    case $status in 75 | 137 | 143) ;; *) exit $status ;; esac
+done
+exit $status
 TASK
 hq submit --wait --name @NAME@ --array 1-@COUNT@ --crash-limit 5 \
     --stdout '@FOLDER@/%{TASK_ID}.log' --stderr '@FOLDER@/%{TASK_ID}.log' bash @FOLDER@/task.sh

@@ -17,8 +17,8 @@ trap 'kill -TERM $!' TERM
 wait $!; status=$?
 # The trap has ended the first wait; the second one has the program's own answer.
 wait $!; status=$?
-# 75: worth trying again; 143: ended by SIGTERM.
-case $status in 75 | 143) [ "${SLURM_RESTART_COUNT:-0}" -lt 5 ] && scontrol requeue "${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID" ;; esac
+# 75: worth trying again; 137: killed; 143: ended by SIGTERM.
+case $status in 75 | 137 | 143) [ "${SLURM_RESTART_COUNT:-0}" -lt 5 ] && scontrol requeue "${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID" ;; esac
 exit $status
 TASK
 )

@@ -76,11 +76,11 @@ pub struct Source {
 
 enum Kind {
     Gltf {
-        file: gltf_import::File,
+        file: Box<gltf_import::File>,
         name: String,
     },
     /// Nothing moves.
-    Still(Scene),
+    Still(Box<Scene>),
 }
 
 impl Source {
@@ -94,14 +94,14 @@ impl Source {
             return Ok(Self::still(load(path, &LoadOptions { time: None, reads })?));
         }
         let name = path.display().to_string();
-        let file = gltf_import::File::open(path).with_context(|| format!("loading {name}"))?;
+        let file = Box::new(gltf_import::File::open(path).with_context(|| format!("loading {name}"))?);
         Ok(Self { kind: Kind::Gltf { file, name }, reads })
     }
 
     /// A scene that does not move.
     #[must_use]
     pub fn still(scene: Scene) -> Self {
-        Self { kind: Kind::Still(scene), reads: Reads::Everything }
+        Self { kind: Kind::Still(Box::new(scene)), reads: Reads::Everything }
     }
 
     /// The scene at a moment of its animation; `None` is its rest pose. What [`load`] gives, to the last bit; its warnings of what does
@@ -111,7 +111,7 @@ impl Source {
     /// As [`load`].
     pub fn at(&mut self, time: Option<f64>) -> Result<Scene> {
         match &mut self.kind {
-            Kind::Still(scene) => Ok(scene.clone()),
+            Kind::Still(scene) => Ok(Scene::clone(scene)),
             Kind::Gltf { file, name } => {
                 let options = LoadOptions { time, reads: self.reads };
                 let mut scene = file.at(&options).with_context(|| format!("loading {name}"))?;
