@@ -13,7 +13,7 @@ use crate::image::{Picture, png};
 use crate::pass::accumulate::accumulate;
 use crate::pass::aov::aov;
 use crate::pass::background::background;
-use crate::pass::classify::{RayTiles, WorkLists, classify};
+use crate::pass::classify::{RayTiles, WorkLists, classify, classify_fragments};
 use crate::pass::composite::{Behind, composite};
 use crate::pass::fragments::{FragmentLists, fragments};
 use crate::pass::gbuffer::{GBuffer, gbuffer};
@@ -845,7 +845,9 @@ impl Renderer {
 
     /// What programs are specialised by.
     fn library(&self) -> Library {
-        self.on_device().library(&self.plan, &self.settings.knobs, self.targets.tiles.words())
+        let mut library = self.on_device().library(&self.plan, &self.settings.knobs, self.targets.tiles.words());
+        library.own_tiles.shared_picture = self.settings.share != TileShare::ALL;
+        library
     }
 
     /// One sample of every pixel, or one band of it: the frame, pass by pass.
@@ -907,6 +909,7 @@ impl Renderer {
             frame.fill("reset dropped fragments", &lists.dropped, 0);
             for strip in lists.strips() {
                 fragments(&mut frame, scene, g, lists, strip, lod_bias)?;
+                classify_fragments(&mut frame, library, &lists.heads, &lists.work, strip.rows)?;
                 let behind = Behind { radiance, seen: &screen.seen, part: None };
                 composite(&mut frame, lighting, g, lists, screen, behind, strip.rows)?;
                 for PartOnDevice { part, radiance, seen, .. } in parts {

@@ -4,6 +4,8 @@
 #include "lib/view.glsl"
 #include "lib/work_tile.glsl"
 
+layout(constant) const bool SHARED_PICTURE = false; // other processes draw some of the tiles
+
 uvec2 tiles_of_picture() {
     return (camera.size + WORK_TILE - 1) / WORK_TILE;
 }
@@ -12,18 +14,20 @@ uvec2 tiles_of_picture() {
 uint own_tiles() {
     uvec2 tiles = tiles_of_picture();
     uint all = tiles.x * tiles.y;
+    if (!SHARED_PICTURE) return all;
     return camera.tiles.x < all ? (all - camera.tiles.x - 1) / camera.tiles.y + 1 : 0;
 }
 
 // The first pixel of one of them.
 uvec2 own_tile(uint index) {
-    uint tile = camera.tiles.x + index * camera.tiles.y;
+    uint tile = SHARED_PICTURE ? camera.tiles.x + index * camera.tiles.y : index;
     uint across = tiles_of_picture().x;
     return uvec2(tile % across, tile / across) * WORK_TILE;
 }
 
 // Whether the tile that holds a pixel is drawn.
 bool in_own_tile(uvec2 pixel) {
+    if (!SHARED_PICTURE) return true;
     uvec2 at = pixel / WORK_TILE;
     uint tile = at.y * tiles_of_picture().x + at.x;
     return tile % camera.tiles.y == camera.tiles.x;

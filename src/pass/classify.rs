@@ -54,6 +54,7 @@ impl FragmentTiles {
 /// When the driver refuses what a pipeline binds.
 pub fn classify_fragments<'a>(
     frame: &mut Frame<'a>,
+    library: Library,
     heads: &'a Image,
     list: &'a FragmentTiles,
     rows: [u32; 2],
@@ -64,7 +65,7 @@ pub fn classify_fragments<'a>(
     let groups = tiles.div_ceil(classify_fragments::PROGRAM.local_size[0]);
     let push =
         classify_fragments::Push { width: list.width, first_row: rows[0], end_row: rows[1], stride: stride(groups) };
-    frame.compute("classify fragment tiles", &bind, &classify_fragments::Constants {}, &push, rows_of(groups))
+    frame.compute("classify fragment tiles", &bind, &classify_fragments::Constants { library }, &push, rows_of(groups))
 }
 
 /// Lists of tiles and the sizes of the dispatches over them.

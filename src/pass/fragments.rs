@@ -5,7 +5,7 @@ use std::sync::Arc;
 use anyhow::{Result, bail};
 use ash::vk;
 
-use super::classify::{FragmentTiles, TILE, classify_fragments};
+use super::classify::{FragmentTiles, TILE};
 use super::gbuffer::GBuffer;
 use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Frame, Image, ImageDesc, Place, Raster};
 use crate::shader::{fragments, lib};
@@ -151,6 +151,5 @@ pub fn fragments<'a>(
         size: lists.size,
         rows: strip.rows,
     };
-    frame.raster(&raster, &bind, &scene.pages(), &push, scene.draws(true, false))?;
-    classify_fragments(frame, &lists.heads, &lists.work, strip.rows)
+    frame.raster(&raster, &bind, &scene.pages(), &push, scene.draws(true, false))
 }

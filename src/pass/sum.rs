@@ -14,7 +14,7 @@ use crate::gpu::{Device, Frame, Image, ImageDesc};
 use crate::shader::join;
 
 /// Blocks that the samples of a picture make, where there are so many.
-pub const BLOCKS: u32 = 32;
+pub const BLOCKS: u32 = 64;
 
 /// Samples of a block, of a sum of so many.
 #[must_use]

@@ -120,6 +120,7 @@ impl<'a> OnDevice<'a> {
             },
             gbuffer_interface: lib::gbuffer_interface::Constants::default(),
             hit: rays.constants.hit,
+            own_tiles: lib::own_tiles::Constants::default(),
             normals: lib::normals::Constants { normals: plan.stored.normals as u32 },
             layers: lib::layers::Constants { transmissive: with.transmissive },
             lighting: lib::lighting::Constants {

@@ -49,7 +49,7 @@ pub struct SequenceOptions {
     /// joins with the others to the bits of one run
     #[arg(long, value_name = "I/N", value_parser = shard)]
     pub shard: Option<[u32; 2]>,
-    /// How a single picture is divided: by tiles of its pixels, or by its samples, which makes at most 32 parts
+    /// How a single picture is divided: by tiles of its pixels, or by its samples, which makes at most 64 parts
     /// [default: tiles; samples where the plan looks things up on the screen]
     #[arg(long, value_enum, value_name = "tiles|samples", requires = "shard")]
     pub split: Option<SplitBy>,
