@@ -178,6 +178,10 @@ fn wanted(args: &RenderArgs) -> Result<Wanted> {
         "--output: an animated preview is made of PNG files; add one, such as frame.{{frame:04}}.png"
     );
     ensure!(
+        preview.is_none() || options.shard.is_none(),
+        "--shard: an animated preview is made of all frames; when they are there, the same command without --shard draws none again"
+    );
+    ensure!(
         args.aov.is_empty() || outputs.iter().any(|(_, format)| *format == Format::Exr),
         "--aov: layers go into an EXR; add -o FILE.{{frame:04}}.exr"
     );

@@ -174,6 +174,7 @@ fn what_cannot_be_divided_is_refused() {
         ("--fps 5 --cameras all -o {camera}.png", 1, "--fps"),
         ("--turntable 2 -o a.apng", 1, "made of pictures"),
         ("--turntable 2 -o {frame}.exr -o a.apng", 1, "made of PNG"),
+        ("--turntable 2 -o {frame}.png -o a.apng --shard 1/2", 1, "made of all frames"),
         ("--cameras nobody -o {camera}.png", 1, "nobody"),
         ("--cameras all -o a.png", 1, "{camera}"),
         ("--turntable 2 --within 5", 1, "--within"),
@@ -274,7 +275,7 @@ fn a_part_that_is_told_to_end_keeps_what_it_has() {
             .spawn()
             .expect("the program starts");
         std::thread::sleep(Duration::from_millis(1500));
-        Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill");
+        Command::new("sh").args(["-c", &format!("kill -TERM {}", child.id())]).status().expect("a shell");
         let told = Instant::now();
         let status = child.wait().expect("it ends");
         assert!(told.elapsed() < Duration::from_secs(20), "no notice is that long");

@@ -108,9 +108,9 @@ impl Account {
         Ok(Self { took_s: ended - began, busy_s, at_once, devices, shifts })
     }
 
-    /// How many processes' worth of work was done at a time, in the mean: as many as there were at most, were the farm ideal.
+    /// How many processes were at work, in the mean: as many as at most, were the farm ideal.
     #[must_use]
-    pub fn speedup(&self) -> f64 {
+    pub fn at_work(&self) -> f64 {
         if self.took_s > 0.0 { self.busy_s / self.took_s } else { 1.0 }
     }
 
@@ -144,8 +144,8 @@ impl Account {
                     table {
                         tr { th { "processes at one time" } td { (self.at_once) } }
                         tr { th { "seconds of all processes" } td { (format!("{:.1}", self.busy_s)) } }
-                        tr { th { "times as fast as one" } td { (format!("{:.2}", self.speedup())) " of " (self.at_once) " ideal: "
-                            (share(self.speedup(), self.at_once as f64)) } }
+                        tr { th { "processes at work, in the mean" } td { (format!("{:.2}", self.at_work())) ", "
+                            (share(self.at_work(), self.at_once as f64)) " of the ideal" } }
                         tr { th { "before the first sample" } td { (share(prepared, self.busy_s)) " of their time" } }
                     }
                     h2 { "Time line" }
@@ -220,7 +220,7 @@ mod tests {
         let account =
             Account::of(vec![shift(4.0, 10.0, "x"), shift(0.0, 10.0, "x"), shift(0.0, 4.0, "x")]).expect("shifts");
         assert_eq!((account.took_s, account.busy_s, account.at_once), (10.0, 20.0, 2));
-        assert!((account.speedup() - 2.0).abs() < 1e-12);
+        assert!((account.at_work() - 2.0).abs() < 1e-12);
         assert!(!account.page().contains("Mixed farm"));
         assert!(Account::of(Vec::new()).is_err());
     }

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// Everything that decides the bits of a picture, in words that can be compared and told.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Identity {
-    /// Of the program.
+    /// Of the program, and a hash of its shaders: what was built of other sources is another one.
     pub version: String,
     /// What the user called the scene; it decides nothing.
     pub name: String,
@@ -28,6 +28,13 @@ pub struct Identity {
     pub settings: BTreeMap<String, String>,
     /// Device, driver and its version: other ones round otherwise.
     pub device: [String; 3],
+}
+
+fn version() -> String {
+    let stages = etalon::shader::PROGRAMS.iter().flat_map(|program| program.stages);
+    let mut all = xxhash_rust::xxh3::Xxh3::new();
+    stages.for_each(|stage| all.update(bytemuck::cast_slice(stage.words)));
+    format!("{}+{:016x}", env!("CARGO_PKG_VERSION"), all.digest())
 }
 
 /// Hash of all that is drawn of a scene in an environment, whatever files it came from: 32 hexadecimal digits.
@@ -79,7 +86,7 @@ impl Identity {
             ("traversal", format!("{:?}", settings.traversal)),
         ];
         Self {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
+            version: version(),
             name: name.to_owned(),
             scene,
             camera: format!("{:?} {:?}", camera.world_from_camera, camera.projection),
