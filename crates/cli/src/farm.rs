@@ -8,8 +8,8 @@ use clap::{Args, Parser, Subcommand};
 use serde_json::Value;
 
 use super::choices::one_of;
+use super::picture::RenderArgs;
 use super::print;
-use super::render::RenderArgs;
 use etalon::image::file;
 use etalon_farm::account::{Account, Shift};
 use etalon_farm::frames::Frames;

@@ -8,6 +8,7 @@ pub mod diff;
 pub mod farm;
 pub mod merge;
 pub mod options;
+pub mod picture;
 pub mod plan;
 pub mod progress;
 pub mod render;

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use etalon_cli::options::When;
 use etalon_cli::progress::ProgressForm;
-use etalon_cli::{cost, devices, diff, farm, merge, plan, render, verify, view};
+use etalon_cli::{cost, devices, diff, farm, merge, picture, plan, render, verify, view};
 
 /// A Vulkan renderer written directly against ash: glTF in, radiance out.
 #[derive(Parser)]
@@ -27,7 +27,7 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    Render(Box<render::RenderArgs>),
+    Render(Box<picture::RenderArgs>),
     Plan(Box<plan::PlanArgs>),
     Diff(diff::DiffArgs),
     Devices(devices::DevicesArgs),

@@ -8,8 +8,8 @@ use clap::{Args, ValueEnum as _};
 use serde::Serialize;
 
 use super::options::DeviceOptions;
+use super::picture::{AovName, Format, format_of, layer_between};
 use super::print;
-use super::render::{AovName, Format, format_of, layer_between};
 use super::report::{Output, WorkFacts};
 use super::shard::display_settings;
 use etalon::frame::shown;
@@ -113,7 +113,7 @@ pub fn run(args: &MergeArgs) -> Result<ExitCode> {
 
 /// What the EXR of one run says of its making.
 fn metadata(joined: &Joined) -> Vec<(String, String)> {
-    super::render::made(&joined.identity.name, joined.bands)
+    super::picture::made(&joined.identity.name, joined.bands)
 }
 
 /// The layers that were asked for, in that order.

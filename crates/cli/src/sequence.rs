@@ -6,14 +6,13 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, anyhow, bail, ensure};
-use clap::Args;
 use glam::{DAffine3, DVec3};
 use serde::Serialize;
 
-use super::options::{Extent, SceneOptions, shard};
+use super::options::{Extent, SceneOptions};
+use super::picture::{Format, RenderArgs, check_halves, format_of, layers, metadata, settings_size, warn_about};
 use super::print;
 use super::progress::Steps;
-use super::render::{Format, RenderArgs, check_halves, format_of, layers, metadata, settings_size, warn_about};
 use super::report::{Output, Validation};
 use super::setup;
 use etalon::frame::{Renderer, Settings};
@@ -24,62 +23,7 @@ use etalon::scene::{Camera, Scene};
 use etalon_farm::frames::Frames;
 use etalon_farm::identity::Identity;
 use etalon_farm::names::Pattern;
-use etalon_farm::part::Split;
 use etalon_farm::worker::Worker;
-
-/// Options of `render` for more than one picture, and for more than one process.
-#[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Sequences and shards")]
-pub struct SequenceOptions {
-    /// Draw these frames: numbers and ranges such as 1-100:2,105. Frame F shows the animation F / fps seconds after --time; each output
-    /// has a place for the number, {frame} or {frame:04}. Frames whose files are whole and of the same picture are not drawn again
-    #[arg(long, value_name = "RANGE", allow_hyphen_values = true)]
-    pub frames: Option<Frames>,
-    /// Frames of a second [default: 24]
-    #[arg(long, value_name = "N")]
-    pub fps: Option<f64>,
-    /// Turn the camera around the scene's middle, or --target, by 1/N of a circle for each frame; the animation stands still unless
-    /// --fps is given [default frames: 0 to N - 1]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    pub turntable: Option<u32>,
-    /// Draw from these cameras of the file, by name or index, or from all of them; each output has a place for the name, {camera}
-    #[arg(long, value_name = "NAME,...|all", value_delimiter = ',', conflicts_with_all = ["camera", "eye", "target", "up", "fov"])]
-    pub cameras: Vec<String>,
-    /// Draw the I-th of N shares: every N-th picture of a sequence, or a part of a single one into the file of -o, which `etalon merge`
-    /// joins with the others to the bits of one run
-    #[arg(long, value_name = "I/N", value_parser = shard)]
-    pub shard: Option<[u32; 2]>,
-    /// How a single picture is divided: by tiles of its pixels, or by its samples, which makes at most 64 parts
-    /// [default: tiles; samples where the plan looks things up on the screen]
-    #[arg(long, value_enum, value_name = "tiles|samples", requires = "shard")]
-    pub split: Option<SplitBy>,
-}
-
-/// [`Split`] as a value of an option.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum SplitBy {
-    /// By tiles.
-    Tiles,
-    /// By samples.
-    Samples,
-}
-
-impl From<SplitBy> for Split {
-    fn from(by: SplitBy) -> Self {
-        match by {
-            SplitBy::Tiles => Self::Tiles,
-            SplitBy::Samples => Self::Samples,
-        }
-    }
-}
-
-impl SequenceOptions {
-    /// Whether there may be more than one picture.
-    #[must_use]
-    pub fn is_sequence(&self) -> bool {
-        self.frames.is_some() || self.turntable.is_some() || !self.cameras.is_empty()
-    }
-}
 
 /// Frames of a second where nobody says.
 const FPS: f64 = 24.0;

@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::options::Extent;
+use super::picture::{RenderArgs, check_halves, layers};
 use super::print;
 use super::progress::Steps;
-use super::render::{RenderArgs, check_halves, layers};
 use super::report::Validation;
 use super::setup::Setup;
 use etalon::frame::{Renderer, Settings, Sums, TileShare};

@@ -1,0 +1,345 @@
+//! What all forms of `etalon render` share: its options, layers beside a picture, and what is said of one.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, anyhow, bail};
+use clap::{Args, ValueEnum};
+use glam::DVec3;
+
+use super::options::{DeviceOptions, PictureOptions, SceneOptions, shard};
+use super::progress::ProgressForm;
+use etalon::frame::{Part, Rendered, Renderer, Settings};
+use etalon::image::{Aov, AovData, Picture};
+use etalon::plan::rungs::Indirect;
+use etalon::plan::{Knobs, Plan};
+use etalon::scene::Camera;
+use etalon::share::AovPixel;
+use etalon::spectra;
+use etalon::upload::view::View;
+use etalon_farm::frames::Frames;
+use etalon_farm::part::Split;
+
+/// Options of `render` for more than one picture, and for more than one process.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Sequences and shards")]
+pub struct SequenceOptions {
+    /// Draw these frames: numbers and ranges such as 1-100:2,105. Frame F shows the animation F / fps seconds after --time; each output
+    /// has a place for the number, {frame} or {frame:04}. Frames whose files are whole and of the same picture are not drawn again
+    #[arg(long, value_name = "RANGE", allow_hyphen_values = true)]
+    pub frames: Option<Frames>,
+    /// Frames of a second [default: 24]
+    #[arg(long, value_name = "N")]
+    pub fps: Option<f64>,
+    /// Turn the camera around the scene's middle, or --target, by 1/N of a circle for each frame; the animation stands still unless
+    /// --fps is given [default frames: 0 to N - 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub turntable: Option<u32>,
+    /// Draw from these cameras of the file, by name or index, or from all of them; each output has a place for the name, {camera}
+    #[arg(long, value_name = "NAME,...|all", value_delimiter = ',', conflicts_with_all = ["camera", "eye", "target", "up", "fov"])]
+    pub cameras: Vec<String>,
+    /// Draw the I-th of N shares: every N-th picture of a sequence, or a part of a single one into the file of -o, which `etalon merge`
+    /// joins with the others to the bits of one run
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    pub shard: Option<[u32; 2]>,
+    /// How a single picture is divided: by tiles of its pixels, or by its samples, which makes at most 64 parts
+    /// [default: tiles; samples where the plan looks things up on the screen]
+    #[arg(long, value_enum, value_name = "tiles|samples", requires = "shard")]
+    pub split: Option<SplitBy>,
+}
+
+/// [`Split`] as a value of an option.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum SplitBy {
+    /// By tiles.
+    Tiles,
+    /// By samples.
+    Samples,
+}
+
+impl From<SplitBy> for Split {
+    fn from(by: SplitBy) -> Self {
+        match by {
+            SplitBy::Tiles => Self::Tiles,
+            SplitBy::Samples => Self::Samples,
+        }
+    }
+}
+
+impl SequenceOptions {
+    /// Whether there may be more than one picture.
+    #[must_use]
+    pub fn is_sequence(&self) -> bool {
+        self.frames.is_some() || self.turntable.is_some() || !self.cameras.is_empty()
+    }
+}
+
+/// Draw a picture of a scene.
+#[derive(Debug, Clone, Args)]
+pub struct RenderArgs {
+    #[command(flatten)]
+    pub(super) scene: SceneOptions,
+    /// Output file: .png (display) or .exr (scene-linear radiance); repeatable [default: the scene's name with .png]. Of a sequence also
+    /// .apng, an animated preview; of a part of a picture the one file that it goes to
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(super) picture: PictureOptions,
+    /// Choose the rungs with the least error that take no more GPU time than this, out of what `cost` measured of the same picture
+    /// on this device or is measured first
+    #[arg(long, value_name = "MS")]
+    pub(super) within: Option<String>,
+    #[command(flatten)]
+    pub(super) device: DeviceOptions,
+    /// Further layers of the EXR: the nearest opaque surface at the pixel centres; and, of the picture itself, the light
+    /// that rays brought which were first mirrored (reflection) or first went through (refraction)
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,...")]
+    pub(super) aov: Vec<AovName>,
+    /// Draw N times and fail unless all are bit-identical
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) repeat: u32,
+    /// Write a machine-readable account of the run
+    #[arg(long, value_name = "FILE.json")]
+    pub(super) report: Option<PathBuf>,
+    /// How progress is told
+    #[arg(long, value_enum, default_value_t = ProgressForm::Auto)]
+    pub progress: ProgressForm,
+    #[command(flatten)]
+    pub(super) sequence: SequenceOptions,
+}
+
+impl RenderArgs {
+    /// What the renderer needs to know.
+    pub(super) fn render_settings(&self) -> Result<Settings> {
+        let mut settings = self.picture.settings(&self.scene)?;
+        for part in self.aov.iter().filter_map(|name| name.part()) {
+            if !settings.parts.contains(&part) {
+                settings.parts.push(part);
+            }
+        }
+        Ok(settings)
+    }
+}
+
+/// Layers that can be asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub enum AovName {
+    /// Base colour.
+    Albedo,
+    /// Shading normal in world space.
+    Normal,
+    /// Normal of the triangle, towards the viewer.
+    GeometricNormal,
+    /// Position in world space, metres.
+    Position,
+    /// Distance along the viewing direction, metres.
+    Depth,
+    /// Distance from the eye, metres.
+    Distance,
+    /// Perceptual roughness.
+    Roughness,
+    /// Metallic.
+    Metallic,
+    /// Emitted radiance.
+    Emissive,
+    /// Index of the material, counted from 1; 0 is nothing.
+    Material,
+    /// Index of the instance, counted from 1; 0 is nothing.
+    Instance,
+    /// Radiance by rays that the nearest surface mirrored.
+    Reflection,
+    /// Radiance by rays that went through it.
+    Refraction,
+    /// Of a picture by paths, the variance of each pixel that its halves tell.
+    Variance,
+    /// The mean of its even samples.
+    HalfA,
+    /// The mean of its odd samples, whose random numbers have nothing in common with those of the even ones.
+    HalfB,
+}
+
+impl AovName {
+    /// Of the picture, not of the surfaces.
+    pub(super) fn part(self) -> Option<Part> {
+        match self {
+            Self::Reflection => Some(Part::Reflection),
+            Self::Refraction => Some(Part::Refraction),
+            _ => None,
+        }
+    }
+
+    /// Told by the halves of a picture's samples.
+    pub(super) fn of_halves(self) -> bool {
+        matches!(self, Self::Variance | Self::HalfA | Self::HalfB)
+    }
+}
+
+/// What an output path asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Format {
+    Png,
+    Exr,
+}
+
+pub(super) fn format_of(path: &Path) -> Result<Format> {
+    match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
+        Some("png") => Ok(Format::Png),
+        Some("exr") => Ok(Format::Exr),
+        _ => bail!("--output {}: only .png and .exr are written", path.display()),
+    }
+}
+
+pub(super) fn settings_size(picture: &PictureOptions) -> u64 {
+    u64::from(picture.size[0]) * u64::from(picture.size[1])
+}
+
+/// What the EXR says of its making.
+pub(super) fn metadata(args: &RenderArgs, plan: &Plan) -> Vec<(String, String)> {
+    made(&args.scene.scene, plan.bands)
+}
+
+/// The same of a scene, in so many bands of wavelengths.
+pub(super) fn made(scene: &str, bands: u32) -> Vec<(String, String)> {
+    let mut all = vec![
+        ("software".to_owned(), format!("etalon {}", env!("CARGO_PKG_VERSION"))),
+        ("scene".to_owned(), scene.to_owned()),
+    ];
+    if bands > 0 {
+        all.push(("observer".to_owned(), spectra::OBSERVER.to_owned()));
+    }
+    all
+}
+
+pub(super) fn warn_about(rendered: &Rendered, pixels: u64, knobs: &Knobs, bands: u32) {
+    let counts = rendered.counts;
+    let negative = if bands > 0 { 0 } else { counts.negative };
+    if bands > 0 && counts.negative > 0 {
+        tracing::warn!(
+            "{} of {pixels} pixels have colours outside of Rec. 709: shown less saturated at the same luminance, negative in \
+             an EXR",
+            counts.negative
+        );
+    }
+    for (count, what) in [(counts.nan, "NaN"), (counts.inf, "infinite"), (negative, "negative")] {
+        if count > 0 {
+            tracing::warn!("{count} of {pixels} pixels hold {what} radiance, shown as black or white");
+        }
+    }
+    let work = &rendered.work;
+    if let Some(first) = work.first_not_finite {
+        tracing::warn!(
+            "{} estimates of paths were no finite numbers and were left out; the first at pixel {},{}, surface {} of its path, \
+             material {}",
+            work.not_finite,
+            first.pixel[0],
+            first.pixel[1],
+            first.event,
+            first.material
+        );
+    }
+    if work.stray_interfaces > 0 {
+        tracing::warn!(
+            "{} rays left a transparent body that they had not entered: shells that are open, turned or cross without \
+             priorities (extras.etalon.priority)",
+            work.stray_interfaces
+        );
+    }
+    if work.mean_lost > 0.01 {
+        tracing::warn!(
+            "{:.1} % of the light was not followed to its end, in the worst pixel {:.0} %{}",
+            work.mean_lost * 100.0,
+            work.most_lost * 100.0,
+            if knobs.interfaces.count() < 32 { ": --set interfaces=32 follows more" } else { "" }
+        );
+    }
+    if rendered.dropped > 0 {
+        tracing::warn!(
+            "{} pixels have more see-through surfaces than one invocation sorts; their farthest were left out",
+            rendered.dropped
+        );
+    }
+}
+
+/// Layers of halves are those of pictures that have halves.
+pub(super) fn check_halves(names: &[AovName], settings: &Settings) -> Result<()> {
+    if let Some(name) = names.iter().find(|name| name.of_halves()) {
+        let name = name.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+        if settings.knobs.indirect != Indirect::Path {
+            bail!("--aov {name}: only paths tell their error; add --model global");
+        }
+        if settings.knobs.samples.count() == 1 && settings.max_error.is_none() {
+            bail!("--aov {name}: one sample has no halves; add --set samples=4");
+        }
+    }
+    Ok(())
+}
+
+/// The asked layers in the order asked.
+pub(super) fn layers(renderer: &mut Renderer, camera: &Camera, names: &[AovName]) -> Result<Vec<Aov>> {
+    let (pixels, view) = renderer.aovs(camera).context("reading the G-buffer")?;
+    let of = |&name: &AovName| match name.part() {
+        Some(part) => layer_of_part(renderer, part),
+        None if name.of_halves() => layer_of_halves(renderer, name),
+        None => Ok(layer(&pixels, &view, name)),
+    };
+    names.iter().map(of).collect()
+}
+
+fn layer_of_part(renderer: &Renderer, part: Part) -> Result<Aov> {
+    let picture = renderer.part(part)?.ok_or_else(|| anyhow!("--aov {}: this layer was not drawn", part.name()))?;
+    Ok(Aov {
+        name: part.name().to_owned(),
+        channels: ["R", "G", "B"].map(str::to_owned).into(),
+        samples: AovData::F32(picture.rgba.iter().flat_map(|&[r, g, b, _]| [r, g, b]).collect()),
+    })
+}
+
+fn layer_of_halves(renderer: &Renderer, name: AovName) -> Result<Aov> {
+    let halves = renderer.half_means()?;
+    let halves = halves.ok_or_else(|| anyhow!("--aov: variance and halves are those of several samples by paths"))?;
+    Ok(layer_between(&halves, name))
+}
+
+/// What the means of even and odd samples tell.
+pub(super) fn layer_between([a, b]: &[Picture; 2], name: AovName) -> Aov {
+    let colors = |picture: &Picture| -> Vec<f32> { picture.rgba.iter().flat_map(|&[r, g, b, _]| [r, g, b]).collect() };
+    let variance = |(a, b): (&f32, &f32)| (0.5 * (a - b)).powi(2);
+    let (title, samples) = match name {
+        AovName::HalfA => ("half_a", colors(a)),
+        AovName::HalfB => ("half_b", colors(b)),
+        _ => ("variance", colors(a).iter().zip(&colors(b)).map(variance).collect()),
+    };
+    Aov { name: title.to_owned(), channels: ["R", "G", "B"].map(str::to_owned).into(), samples: AovData::F32(samples) }
+}
+
+fn layer(pixels: &[AovPixel], view: &View, name: AovName) -> Aov {
+    let drawn = |p: &AovPixel| p.material != 0;
+    let vectors = |get: &dyn Fn(&AovPixel) -> [f32; 3]| AovData::F32(pixels.iter().flat_map(get).collect());
+    let numbers = |get: &dyn Fn(&AovPixel) -> f32| AovData::F32(pixels.iter().map(get).collect());
+    let (rgb, xyz): (&[&str], &[&str]) = (&["R", "G", "B"], &["X", "Y", "Z"]);
+    // World positions are sums in f64: far from the origin f32 is only good for the difference.
+    let world = |p: &AovPixel| {
+        if drawn(p) { (glam::Vec3::from(p.p_rel).as_dvec3() + view.eye).as_vec3().to_array() } else { [0.0; 3] }
+    };
+    let along = |p: &AovPixel| {
+        let p_rel: DVec3 = glam::Vec3::from(p.p_rel).as_dvec3();
+        p_rel.dot(view.axes[2]) as f32
+    };
+    let (title, channels, samples) = match name {
+        AovName::Albedo => ("albedo", rgb, vectors(&|p| p.albedo)),
+        AovName::Normal => ("normal", xyz, vectors(&|p| p.normal)),
+        AovName::GeometricNormal => ("geometric_normal", xyz, vectors(&|p| p.geometric_normal)),
+        AovName::Position => ("position", xyz, vectors(&world)),
+        AovName::Depth => ("depth", &["Z"][..], numbers(&along)),
+        AovName::Distance => ("distance", &["Z"][..], numbers(&|p| p.distance)),
+        AovName::Roughness => ("roughness", &["Y"][..], numbers(&|p| p.roughness)),
+        AovName::Metallic => ("metallic", &["Y"][..], numbers(&|p| p.metallic)),
+        AovName::Emissive => ("emissive", rgb, vectors(&|p| p.emissive)),
+        AovName::Material => ("material", &["id"][..], AovData::U32(pixels.iter().map(|p| p.material).collect())),
+        AovName::Instance => ("instance", &["id"][..], AovData::U32(pixels.iter().map(|p| p.instance).collect())),
+        AovName::Reflection | AovName::Refraction | AovName::Variance | AovName::HalfA | AovName::HalfB => {
+            unreachable!("of the picture")
+        }
+    };
+    Aov { name: title.to_owned(), channels: channels.iter().map(|c| (*c).to_owned()).collect(), samples }
+}
