@@ -1174,7 +1174,7 @@ impl Renderer {
 }
 
 /// What a display shows of a film that was made elsewhere, as a renderer with these settings would show it: RGBA8 (sRGB-encoded, rows
-/// from the top), whether it has transparency, and what is no radiance. A film by wavelengths is `spectral`.
+/// from the top), whether it has transparency, and the counts of NaN, infinite and negative pixels. A film by wavelengths is `spectral`.
 ///
 /// # Errors
 /// When the driver fails.

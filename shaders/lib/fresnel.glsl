@@ -121,7 +121,7 @@ FresnelDielectric fresnel_dielectric(float cos_in, float n) {
         if (index >= 1.0 || g2 > 0.0 && index > 0.0) {
             float g = index == 1.0 ? c : sqrt(max(g2, 0.0));
             float difference = (index - 1.0) * (index + 1.0);
-            // Both quotients by one division: seven of them were a third of the time of a surface that mirrors.
+            // Two divisions in place of seven.
             float by_s = 1.0 / (c + g);
             float by_p = 1.0 / (index * index * c + g);
             // Below the normal range some operations flush the cosine to 0, others do not.

@@ -159,7 +159,7 @@ fn stream<T: bytemuck::NoUninit>(
 }
 
 impl SceneOnDevice {
-    /// Uploads a scene; decoded images and geometry are taken out of it. `anchor` is what rays are told from. Textures of the same
+    /// Uploads a scene; decoded images and geometry are taken out of it. `anchor` is the origin of the space of rays. Textures of the same
     /// images that are there from `before` stay.
     ///
     /// # Errors

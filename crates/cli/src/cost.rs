@@ -61,7 +61,7 @@ pub struct CostArgs {
     /// Print cost.json as well
     #[arg(long)]
     json: bool,
-    /// How progress is told
+    /// Form of the progress messages
     #[arg(long, value_enum, default_value_t = ProgressForm::Auto)]
     pub progress: ProgressForm,
 }

@@ -142,6 +142,10 @@ fn write_job(args: &JobArgs) -> Result<()> {
     let pictures = frames.as_ref().map_or(1, |frames| frames.numbers().len());
     let is_still = frames.is_none();
     ensure!(
+        !is_still || sequence.cameras.is_empty(),
+        "--cameras: a job of several pictures is divided by frames; add --frames or --turntable"
+    );
+    ensure!(
         is_still || !render.output.is_empty(),
         "name the files of the frames with -o, such as -o frame.{{frame:04}}.png"
     );
@@ -150,7 +154,7 @@ fn write_job(args: &JobArgs) -> Result<()> {
         "an animated preview is made by one process, of all frames: run the command itself once more when they are there"
     );
     let seconds_of_task = args.minutes.map_or(300.0, |minutes| minutes * 60.0);
-    ensure!(seconds_of_task >= 1.0 && seconds_of_task.is_finite(), "--minutes: expected a number above 0");
+    ensure!(seconds_of_task >= 1.0 && seconds_of_task.is_finite(), "--minutes: a task takes a second at least");
     let count = match (args.tasks, &args.cost, args.seconds) {
         (Some(count), _, _) => count,
         (None, Some(path), _) => {

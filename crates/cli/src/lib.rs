@@ -70,7 +70,7 @@ fn packages(error: &NotOpened) -> Option<&'static str> {
 
 /// Tells an engine of Open Job Description why there is no picture.
 pub fn fail_openjd(text: &str) {
-    // Where nobody reads, nobody is told.
+    // The exit code follows in any case: a closed pipe is no error here.
     drop(print(&format!("openjd_fail: {}", text.replace('\n', " "))));
 }
 

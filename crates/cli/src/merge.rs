@@ -16,7 +16,7 @@ use etalon::frame::shown;
 use etalon::gpu::Device;
 use etalon::image::halves::SampleError;
 use etalon::image::{Aov, Statistics, exr, file, png};
-use etalon_farm::identity::Identity;
+use etalon_farm::identity::{Identity, device_name};
 use etalon_farm::join::{Joined, join};
 use etalon_farm::worker::Worker;
 
@@ -68,14 +68,13 @@ pub fn run(args: &MergeArgs) -> Result<ExitCode> {
     let display = match outputs.iter().any(|(_, format)| *format == Format::Png) {
         true => {
             let device = Device::open(&args.device.choice(), args.device.validate)?;
-            let info = device.info();
-            let here = [&info.name, &info.driver, &info.version];
+            let here = device_name(device.info());
             // The tone curve is the device's as well.
             ensure!(
-                joined.identity.device.iter().eq(here),
+                joined.identity.device == here,
                 "the parts were drawn on \"{}\", and this device is \"{}\": it would round otherwise; -o FILE.exr needs no device",
                 joined.identity.device.join(", "),
-                here.map(String::as_str).join(", ")
+                here.join(", ")
             );
             Some(shown(&device, &joined.film, &settings, joined.bands > 0)?)
         }

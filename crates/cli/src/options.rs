@@ -14,6 +14,7 @@ use etalon::plan::{Demand, Knobs, Model};
 use etalon::scene::camera::{Camera, DEFAULT_FOV_Y};
 use etalon::scene::environment::Environment;
 use etalon::scene::{Ambience, LoadOptions, Reads, Scene};
+use etalon_farm::job::word;
 
 /// When to colour something.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -163,16 +164,6 @@ pub(super) fn background(text: &str) -> Result<Background, String> {
             .and_then(|hex| u32::from_str_radix(hex, 16).ok())
             .map(|rgb| Background::Color([(rgb >> 16) as u8, (rgb >> 8) as u8, rgb as u8]))
             .ok_or_else(|| "expected env, transparent or #rrggbb".to_owned()),
-    }
-}
-
-/// One word of a command line as a shell reads it.
-fn word(text: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=+%".contains(c);
-    if !text.is_empty() && text.chars().all(plain) {
-        text.to_owned()
-    } else {
-        format!("'{}'", text.replace('\'', "'\\''"))
     }
 }
 

@@ -100,7 +100,7 @@ pub struct RenderArgs {
     /// Write a machine-readable account of the run
     #[arg(long, value_name = "FILE.json")]
     pub(super) report: Option<PathBuf>,
-    /// How progress is told
+    /// Form of the progress messages
     #[arg(long, value_enum, default_value_t = ProgressForm::Auto)]
     pub progress: ProgressForm,
     #[command(flatten)]

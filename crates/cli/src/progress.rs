@@ -11,7 +11,7 @@ use serde_json::json;
 use super::print;
 use etalon::frame::Progress;
 
-/// In which form progress is told.
+/// Form of the progress messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ProgressForm {
     /// A bar on a terminal, a line per step elsewhere

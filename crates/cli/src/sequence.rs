@@ -21,7 +21,7 @@ use etalon::image::png::{self, Display};
 use etalon::image::{exr, file};
 use etalon::scene::{Camera, Scene};
 use etalon_farm::frames::Frames;
-use etalon_farm::identity::Identity;
+use etalon_farm::identity::{Identity, device_name};
 use etalon_farm::names::Pattern;
 use etalon_farm::worker::Worker;
 
@@ -271,8 +271,6 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
             steps.done(1.0);
         }
     }
-    let info = device.info();
-    let device_name = [&info.name, &info.driver, &info.version].map(Clone::clone);
     let mut preview = None;
     if let Some(path) = wanted.preview.as_ref().filter(|_| !shown.is_empty()) {
         // A fraction of 16-bit numbers: milliseconds.
@@ -282,7 +280,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         preview = Some(Output { path: path.display().to_string(), hash: file::hash(&bytes) });
     }
     if let Some(path) = &args.report {
-        let worker = Worker::here(device_name, begun.elapsed(), prepared.unwrap_or_default());
+        let worker = Worker::here(device_name(device.info()), begun.elapsed(), prepared.unwrap_or_default());
         let shard = args.sequence.shard.unwrap_or([1, 1]);
         let account = Account { schema: "etalon.sequence/1", worker, shard, pictures, preview };
         file::write(path, serde_json::to_string_pretty(&account)?.as_bytes())?;

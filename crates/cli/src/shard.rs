@@ -18,11 +18,11 @@ use etalon::gpu::Severity;
 use etalon::image::file;
 use etalon::plan::Plan;
 use etalon::scene::Camera;
-use etalon_farm::identity::{Identity, contents};
+use etalon_farm::identity::{Identity, contents, device_name};
 use etalon_farm::part::{Drawn, Part, Split};
 use etalon_farm::worker::Worker;
 
-/// How often what is drawn is kept for the moment when the process is told to end.
+/// Least time between two copies of the sums. The process writes the last copy when it receives SIGTERM.
 const KEEP: Duration = Duration::from_secs(1);
 /// What a process that ends on SIGTERM returns, as shells have it.
 const TERMINATED: u8 = 128 + 15;
@@ -176,9 +176,7 @@ impl Work<'_> {
     }
 
     fn worker(&self) -> Worker {
-        let info = self.renderer.device().info();
-        let device = [&info.name, &info.driver, &info.version].map(Clone::clone);
-        Worker::here(device, self.begun.elapsed(), self.prepared)
+        Worker::here(device_name(self.renderer.device().info()), self.begun.elapsed(), self.prepared)
     }
 
     /// All samples of a share of the tiles; whether it is drawn to its end.

@@ -362,6 +362,7 @@ fn job_files_are_what_their_engines_read() {
         ("--engine slurm --tasks 2 -- study:cornell --no-such-option", 1, "--no-such-option"),
         ("--engine slurm --tasks 2 -- study:cornell --shard 1/2", 1, "--shard"),
         ("--engine slurm --tasks 2 -- study:cornell --turntable 5", 1, "name the files"),
+        ("--engine slurm --tasks 2 -- study:lamps --cameras all -o {camera}.png", 1, "divided by frames"),
         ("--engine slurm --minutes 1 --cost nowhere -- study:cornell", 1, "nowhere"),
     ] {
         run(at, &format!("farm job {arguments}")).failed(code, said);

@@ -37,6 +37,12 @@ fn version() -> String {
     format!("{}+{:016x}", env!("CARGO_PKG_VERSION"), all.digest())
 }
 
+/// Device, driver and its version: other ones round otherwise.
+#[must_use]
+pub fn device_name(info: &DeviceInfo) -> [String; 3] {
+    [&info.name, &info.driver, &info.version].map(Clone::clone)
+}
+
 /// Hash of all that is drawn of a scene in an environment, whatever files it came from: 32 hexadecimal digits.
 #[must_use]
 pub fn contents(scene: &Scene, environment: Option<&Environment>) -> String {
@@ -93,7 +99,7 @@ impl Identity {
             size: settings.size,
             knobs: knobs.collect(),
             settings: numbers.map(|(name, value)| (name.to_owned(), value)).into(),
-            device: [&device.name, &device.driver, &device.version].map(Clone::clone),
+            device: device_name(device),
         }
     }
 

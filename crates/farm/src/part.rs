@@ -2,7 +2,7 @@
 //!
 //! Any viewer of OpenEXR shows it. The first sum is the picture's R G B A; the others are layers `sum1`, `sum2`, …, and what the picture
 //! has as layers beside it is `aov.NAME`. What the file is a part of is the text attribute `etalon.part`, a JSON document of schema
-//! `etalon.part/1` with a hash of all samples: a file that was cut short or changed is told from a whole one.
+//! `etalon.part/1` with a hash of all samples: it reveals a truncated or changed file.
 
 use std::path::Path;
 
