@@ -18,6 +18,9 @@ const TILE: u32 = lib::work_tile::WORK_TILE * lib::work_tile::WORK_TILE;
 const SIZE_BYTES: u64 = size_of::<QueueSize>() as u64;
 const CHUNKS_AT: u64 = std::mem::offset_of!(QueueSize, chunks) as u64;
 
+/// Those of a picture, and the share of them that is drawn.
+type Pixels = ([u32; 2], TileShare);
+
 /// Paths between two dispatches.
 pub struct PathsOnDevice {
     /// What is done at their surfaces.
@@ -36,13 +39,8 @@ impl PathsOnDevice {
     ///
     /// # Errors
     /// When memory is short.
-    pub fn new(
-        device: &Arc<Device>,
-        with: Paths,
-        plan: &Plan,
-        touching: bool,
-        (size, share): ([u32; 2], TileShare),
-    ) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, with: Paths, plan: &Plan, touching: bool, pixels: Pixels) -> Result<Self> {
+        let (size, share) = pixels;
         let rays = plan.rays.unwrap_or_default();
         let pixels = u64::from(size[0]) * u64::from(size[1]);
         // All pixels of the tiles, also those that a tile has beyond the picture.
@@ -96,9 +94,7 @@ pub fn paths<'a>(
     radiance: &'a Image,
 ) -> Result<()> {
     let (library, interfaces) = (lighting.library, lighting.plan.rays.unwrap_or_default().interfaces);
-    let places = paths.places;
-    let tiles = places / TILE;
-    let stride = stride(tiles);
+    let (places, tiles, stride) = (paths.places, paths.places / TILE, stride(paths.places / TILE));
     if paths.with.at_once {
         let push = path_at_once::Push { places, stride };
         let groups = rows_of(places.div_ceil(PATHS_IN_GROUP));
