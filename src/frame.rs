@@ -1,4 +1,8 @@
-//! The score: the whole frame, one call per pass, top to bottom. Read `Renderer::sample` first.
+//! The renderer: the whole frame, one call per pass, top to bottom. Read `Renderer::sample` first.
+//!
+//! Read docs/frame.md; Real-Time Rendering (4th ed.), chapter 20 for deferred shading; pbrt (4th ed.), chapters 5 (film) and
+//! 13 (path tracing). A picture is the mean of samples; each sample is one [`Frame`] per band of wavelengths. The input is a
+//! [`Prepared`] scene: planned, with its BVH.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -31,7 +35,7 @@ use crate::pass::sum::{Sample, Sum, block_of, join};
 use crate::pass::tiles::{Tiles, tiles};
 use crate::pass::tonemap::{Counts, Display, tonemap};
 use crate::plan::rungs::Indirect;
-use crate::plan::{Ability, Demand, Knobs, Plan, Refused, Setting};
+use crate::plan::{Ability, ForcedEffects, Knobs, Plan, Refused, Setting};
 use crate::prepare::{Conditions, Original, Prepared};
 use crate::scene::Camera;
 use crate::scene::environment::Environment;
@@ -39,13 +43,13 @@ use crate::scene::wavelengths::Slice;
 use crate::share::{self, AovPixel};
 use crate::spectra::VISIBLE;
 use crate::transport::emitters::Sky;
-use crate::upload::environment::{EnvironmentOnDevice, Turn};
+use crate::upload::environment::{EnvironmentOnDevice, EnvironmentRotation};
 use crate::upload::rays::{BvhFacts, RaysOnDevice, Traversal};
 use crate::upload::scene::SceneOnDevice;
 use crate::upload::shared::{Library, OnDevice};
 use crate::upload::view::{View, jitter};
 
-/// Refuses what no image or buffer of the device can hold.
+/// Refuses a size that no image or buffer of the device can hold.
 fn check_size(device: &Device, knobs: &Knobs, size: [u32; 2]) -> Result<()> {
     let limit = device.max_image_size();
     if size.contains(&0) || size.iter().any(|&side| side > limit) {
@@ -53,7 +57,7 @@ fn check_size(device: &Device, knobs: &Knobs, size: [u32; 2]) -> Result<()> {
         return Err(Refused::error(Setting::Size, why));
     }
     let pixels = u64::from(size[0]) * u64::from(size[1]);
-    // Paths keep four words of a pixel in one buffer, all else one.
+    // Paths store four words per pixel in one buffer, everything else one.
     let bytes = if knobs.indirect == Indirect::Path { 16 } else { 4 };
     if pixels * bytes > device.max_storage_bytes() {
         let most = device.max_storage_bytes() / bytes;
@@ -63,10 +67,10 @@ fn check_size(device: &Device, knobs: &Knobs, size: [u32; 2]) -> Result<()> {
     Ok(())
 }
 
-/// What lies behind the scene.
+/// The background behind the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Background {
-    /// The environment where there is one; else nothing, which a PNG shows as [`NEUTRAL_GREY`].
+    /// The environment if there is one, otherwise nothing, which a PNG shows as [`NEUTRAL_GREY`].
     #[default]
     Default,
     /// The environment.
@@ -78,7 +82,7 @@ pub enum Background {
 }
 
 impl Background {
-    /// Puts a background colour behind what lets it through.
+    /// Composites a background colour behind the picture's premultiplied alpha.
     pub fn lay_behind(self, picture: &mut Picture) {
         if let Self::Color(color) = self {
             let behind = color.map(|byte| crate::image::tone::srgb_decode(f64::from(byte) / 255.0) as f32);
@@ -93,52 +97,52 @@ impl Background {
     }
 }
 
-/// Grey behind a scene without an environment, as sRGB bytes.
+/// Grey behind a scene without environment, as sRGB bytes.
 pub const NEUTRAL_GREY: [u8; 3] = [119; 3];
 
-/// Lights that one invocation can loop over where the driver limits loops to 65,535 heads: one head each …
+/// Largest number of lights on a driver that limits loops to 65,535 iterations: one iteration per light.
 const MOST_LIGHTS: usize = 60_000;
-/// … and two each, besides one a word of 32, where tiles list them.
+/// The same limit with tiled light culling: two iterations per light, and one per word of 32 lights.
 const MOST_LISTED_LIGHTS: usize = 30_000;
 
-/// Samples of each pixel after which a picture whose error is the end is given up.
+/// Samples per pixel after which rendering to a target error gives up.
 const MOST_SAMPLES: u32 = 1 << 16;
 
-/// Parts of a band that the samples of a picture go through, where wavelengths go different ways.
+/// Largest number of parts of a band of wavelengths, in pictures with dispersion; each sample takes one part.
 const MOST_PARTS: u32 = 64;
-/// And where the picture's error is to end them.
+/// Largest number of parts of a band when rendering to a target error.
 const PARTS_BEFORE_AN_END: u32 = 8;
 
-/// How a picture is made; everything that does not change between the frames of a sequence.
+/// Settings of a picture: everything that is constant over the frames of a sequence.
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// Pixels.
+    /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Rungs.
+    /// Rungs of all knobs.
     pub knobs: Knobs,
     /// Tone curve of the display output.
     pub tonemap: ToneMap,
     /// Exposure in stops.
     pub exposure: f32,
-    /// What lies behind.
+    /// Background behind the scene.
     pub background: Background,
-    /// Multiplies the environment.
+    /// Factor on the environment's radiance.
     pub environment_intensity: f32,
-    /// Turns the environment about +Y, in degrees.
+    /// Rotation of the environment about +Y, in degrees.
     pub environment_rotation: f32,
-    /// Chooses the random numbers.
+    /// Seed of the random numbers.
     pub seed: u32,
-    /// Samples are drawn until the root of [`SampleError::relmse`] is no more than this, whatever the knob says.
+    /// Target error: samples are drawn until the root of [`SampleError::relmse`] is at most this, whatever the knob `samples`.
     pub max_error: Option<f64>,
-    /// Paths take all their bounces in one dispatch: the same film, for comparison.
+    /// Traces all bounces of a path in one dispatch instead of a wavefront: the same film, for comparison.
     pub paths_at_once: bool,
-    /// The way rays go through the scene; `None`: what suits the device and the scene.
+    /// BVH traversal; `None` selects the one that suits the device and the scene.
     pub traversal: Option<Traversal>,
-    /// What is planned although the scene does not call for it.
-    pub demand: Demand,
-    /// Which parts of the picture are kept beside it, each for the price of following all rays once more.
+    /// Effects that are planned although the scene does not call for them.
+    pub forced: ForcedEffects,
+    /// Parts of the picture that are stored as layers of their own; each costs one more pass of the recursive rays.
     pub parts: Vec<Part>,
-    /// Which share of the picture is drawn; the rest is black.
+    /// The share of the picture's tiles that is drawn; the rest is black.
     pub share: TileShare,
 }
 
@@ -156,7 +160,7 @@ impl Default for Settings {
             max_error: None,
             paths_at_once: false,
             traversal: None,
-            demand: Demand::default(),
+            forced: ForcedEffects::default(),
             parts: Vec::new(),
             share: TileShare::ALL,
         }
@@ -164,10 +168,10 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// What a scene in this environment is prepared for.
+    /// The conditions under which a scene in this environment is prepared.
     ///
     /// # Errors
-    /// When the background is an environment that is not there.
+    /// When the background is an environment and there is none.
     pub fn conditions<'a>(&'a self, environment: Option<&'a Environment>) -> Result<Conditions<'a>> {
         let background = match self.background {
             Background::Default | Background::Environment => environment.is_some(),
@@ -179,10 +183,10 @@ impl Settings {
         }
         let Self { environment_intensity: intensity, environment_rotation: rotation, .. } = *self;
         let sky = environment.map(|map| Sky { map, intensity, rotation });
-        Ok(Conditions { knobs: &self.knobs, demand: self.demand, sky, background })
+        Ok(Conditions { knobs: &self.knobs, forced: self.forced, sky, background })
     }
 
-    /// Display-linear colour that the display output has behind the scene; `None`: it is transparent there.
+    /// Display-linear colour behind the scene in the display output; `None` for a transparent output.
     fn behind(&self) -> Option<[f64; 3]> {
         match self.background {
             Background::Color(bytes) => Some(bytes),
@@ -192,84 +196,84 @@ impl Settings {
         .map(|bytes| bytes.map(|byte| crate::image::tone::srgb_decode(f64::from(byte) / 255.0)))
     }
 
-    /// What a display shows of a film of this picture.
+    /// The view transform from a film of this picture to the display output.
     #[must_use]
     pub fn view_transform(&self) -> ViewTransform {
         ViewTransform { curve: self.tonemap, exposure: self.exposure, background: self.behind() }
     }
 }
 
-/// A picture that has been drawn.
+/// A rendered picture.
 pub struct Rendered {
     /// RGBA8, sRGB-encoded, rows from the top.
     pub display: Vec<u8>,
     /// Whether `display` has transparency.
     pub has_alpha: bool,
-    /// Values that are no radiances, counted before anything clamped.
+    /// Pixels with NaN, infinite or negative values, counted before any clamp.
     pub counts: Counts,
-    /// Pixels whose list of see-through fragments was too long for one invocation, in the worst sample: their farthest
-    /// were left out.
+    /// Pixels whose list of transparent fragments was too long for one invocation, in the worst sample: the farthest
+    /// fragments were dropped.
     pub dropped: u32,
-    /// What the rays did, summed over the samples.
+    /// Work counts of the rays, summed over the samples.
     pub work: Work,
     /// GPU time per pass, summed over the samples, in the order of the frame.
     pub passes: Vec<PassTime>,
     /// Samples of each pixel.
     pub samples: u32,
-    /// What halves of the samples said of the picture's error, at powers of two and at the end; of pictures by paths.
+    /// Error estimates from the two halves of the samples, at powers of two and at the end; for path tracing only.
     pub errors: Vec<SampleError>,
 }
 
-/// How far a picture is.
+/// Progress of a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Progress {
     /// Samples drawn.
     pub done: u32,
-    /// Of so many, or fewer where an error is the end.
+    /// Total number of samples, unless the target error stops earlier.
     pub of: u32,
-    /// The picture's error, where it has just been estimated.
+    /// Error estimate of the picture after this sample, when one was made.
     pub error: Option<SampleError>,
 }
 
-/// Work counts of a picture: the same on every machine that goes through the tree in the same way.
+/// Work counts of a picture: the same on every device with the same BVH traversal.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Work {
-    /// Rays sent for a mirror image.
+    /// Reflection rays.
     pub reflection: u64,
-    /// Rays sent through a surface.
+    /// Refraction rays.
     pub refraction: u64,
-    /// Rays sent to lights.
+    /// Shadow rays.
     pub shadow: u64,
-    /// Rays of paths.
+    /// Rays of path tracing.
     pub indirect: u64,
-    /// Nodes met.
+    /// Visited BVH nodes.
     pub node_visits: u64,
-    /// Triangles tested.
+    /// Ray/triangle tests.
     pub triangle_tests: u64,
-    /// Boundaries of transparent bodies left without having been entered.
-    pub stray_interfaces: u64,
-    /// Estimates of paths that were no numbers, and left out …
+    /// Exits from closed dielectric meshes that the path had not entered.
+    pub unmatched_exits: u64,
+    /// Estimates of paths with NaN or infinite radiance, which were discarded.
     pub not_finite: u64,
-    /// … and where the first of them was met.
+    /// The first discarded estimate.
     pub first_not_finite: Option<NotFinite>,
-    /// Surfaces at which not all lights were gone through, because the driver would have ended the loop over them.
+    /// Surfaces at which the loop over lights stopped early, because the driver would have ended it.
     pub lights_cut_off: u64,
-    /// Light that was not followed, summed over all pixels of all frames: of each the share of its light, in parts of 65536.
+    /// Light of truncated paths, summed over all pixels of all frames: the truncated share of a pixel's light, in parts of 65536.
     pub lost: u64,
-    /// Share of a pixel's light that was not followed: the mean over all pixels of the picture …
+    /// Share of a pixel's light in truncated paths: the mean over all pixels of the picture.
     pub mean_lost: f64,
-    /// … and the largest.
+    /// Share of a pixel's light in truncated paths: the largest of all pixels.
     pub most_lost: f32,
 }
 
-/// Where light came out as no number.
+/// Place of a NaN or infinite radiance.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct NotFinite {
-    /// Across and down.
+    /// Column and row of the pixel.
     pub pixel: [u32; 2],
-    /// Index of the scene's.
+    /// Index into the scene's materials.
     pub material: u32,
-    /// Which surface of its path it was, counted from 1.
+    /// Index of the surface along the path, counted from 1.
     pub event: u32,
 }
 
@@ -282,7 +286,7 @@ impl Work {
         self.indirect += sum(counts.indirect);
         self.node_visits += sum(counts.node_visits);
         self.triangle_tests += sum(counts.triangle_tests);
-        self.stray_interfaces += sum(counts.stray_interfaces);
+        self.unmatched_exits += sum(counts.unmatched_exits);
         self.lights_cut_off += sum(counts.lights_cut_off);
         self.lost += sum(counts.lost);
         self.not_finite += u64::from(counts.not_finite);
@@ -296,14 +300,14 @@ impl Work {
         self.most_lost = self.most_lost.max(f32::from_bits(counts.most_lost));
     }
 
-    /// The same, with the mean of a picture of so many pixels and frames.
+    /// The counts with `mean_lost` for a picture of this size and number of frames.
     #[must_use]
     pub fn of(mut self, [width, height]: [u32; 2], frames: u32) -> Self {
         self.mean_lost = self.lost as f64 / 65536.0 / (f64::from(width) * f64::from(height) * f64::from(frames));
         self
     }
 
-    /// What was done by two.
+    /// The sum of two counts.
     #[must_use]
     pub fn with(self, other: &Self) -> Self {
         Self {
@@ -313,7 +317,7 @@ impl Work {
             indirect: self.indirect + other.indirect,
             node_visits: self.node_visits + other.node_visits,
             triangle_tests: self.triangle_tests + other.triangle_tests,
-            stray_interfaces: self.stray_interfaces + other.stray_interfaces,
+            unmatched_exits: self.unmatched_exits + other.unmatched_exits,
             not_finite: self.not_finite + other.not_finite,
             first_not_finite: self.first_not_finite.or(other.first_not_finite),
             lights_cut_off: self.lights_cut_off + other.lights_cut_off,
@@ -324,11 +328,11 @@ impl Work {
     }
 }
 
-/// A scene on a device, ready to be drawn from any camera.
+/// A scene on a device, ready to be rendered from any camera.
 pub struct Renderer {
     device: Arc<Device>,
     plan: Plan,
-    /// What rays find odd about the scene, a sentence each.
+    /// Warnings about the scene, one sentence each.
     pub warnings: Vec<String>,
     settings: Settings,
     scene: SceneOnDevice,
@@ -337,13 +341,13 @@ pub struct Renderer {
     environment: EnvironmentOnDevice,
     targets: Targets,
     camera: Buffer,
-    /// What all programs read of the scene.
+    /// The scene's descriptor sets, which all programs read.
     sets: [DescriptorSet; 2],
-    /// Samples of the last picture, and those of the whole one.
+    /// Number of samples in the last picture so far, and in the complete picture.
     drawn: [u32; 2],
 }
 
-/// All that is as large as the picture.
+/// All resources whose size depends on the picture's.
 struct Targets {
     ray_tiles: RayTiles,
     gbuffer: GBuffer,
@@ -352,10 +356,10 @@ struct Targets {
     lists: Option<FragmentLists>,
     radiance: Image,
     screen: OnScreen,
-    /// Of the samples, where there is more than one; of pictures by paths of the even and of the odd ones, whose random numbers have
-    /// nothing in common: what they differ by is the picture's error.
+    /// Sums of samples, when there is more than one. Path tracing sums even and odd samples separately: their random numbers
+    /// are independent, so the difference of the two means estimates the picture's error.
     sums: Vec<Sum>,
-    /// The mean of the samples, where it is no sum of them.
+    /// Mean of the samples, when it is not one of the sums.
     film: Option<Image>,
     parts: Vec<PartOnDevice>,
     paths: Option<PathsOnDevice>,
@@ -384,7 +388,7 @@ impl Targets {
             gbuffer: GBuffer::new(device, plan, size)?,
             tiles: Tiles::new(device, plan, size)?,
             work: WorkLists::new(device, size, settings.share)?,
-            lists: if plan.see_through { Some(FragmentLists::new(device, size)?) } else { None },
+            lists: if plan.transparency { Some(FragmentLists::new(device, size)?) } else { None },
             radiance: target("radiance")?,
             screen: OnScreen::new(device, plan, size)?,
             sums,
@@ -399,31 +403,31 @@ impl Targets {
     }
 }
 
-/// What processes that draw a picture together hand to each other.
+/// Sums of samples, as processes that render one picture together exchange them.
 #[derive(Debug, Clone)]
 pub struct Sums {
-    /// From which sample, up to which.
+    /// First sample, and one past the last.
     pub samples: [u32; 2],
-    /// Sums of the samples: one, or those of the even and of the odd ones; then those of [`Settings::parts`].
+    /// Sums of the samples: one, or one each of even and odd samples; then the sums of [`Settings::parts`].
     pub sums: Vec<Picture>,
-    /// What rays did.
+    /// Work counts of the rays.
     pub work: Work,
     /// As [`Rendered::dropped`].
     pub dropped: u32,
 }
 
-/// A picture under way.
+/// A picture in progress.
 pub struct Drawing {
-    /// A sample may be given up before it is added to the others ([`Device::interrupt`]): the next step draws it again.
+    /// Whether [`Device::interrupt`] may abandon a sample before it is added to the sum; the next step draws it again.
     pub interruptible: bool,
     view: View,
-    /// The sample and the band of it that come next, and of how many samples.
+    /// Index of the next sample, and of its next band.
     next: [u32; 2],
     count: u32,
-    /// The first sample, and that before which it ends.
+    /// First sample of the drawing; `end` is one past the last.
     from: u32,
     end: u32,
-    /// For sums that others go on with.
+    /// Whether the drawing is a part whose sums another process continues.
     is_part: bool,
     times: Times,
     dropped: u32,
@@ -450,25 +454,25 @@ impl Drawing {
         }
     }
 
-    /// Samples drawn.
+    /// Number of completed samples.
     #[must_use]
     pub fn samples(&self) -> u32 {
         self.next[0]
     }
 
-    /// Samples of each pixel that the whole picture has.
+    /// Samples per pixel of the complete picture.
     #[must_use]
     pub fn of(&self) -> u32 {
         self.count
     }
 
-    /// Whether no sample is under way, of which some bands were drawn.
+    /// Whether all bands of the last sample are complete, and there is a sample.
     #[must_use]
     pub fn is_whole(&self) -> bool {
         self.next[1] == 0 && self.next[0] > 0
     }
 
-    /// Whether nothing is left to be drawn.
+    /// Whether the drawing is complete.
     #[must_use]
     pub fn is_done(&self) -> bool {
         self.enough || self.next[0] == self.end
@@ -476,7 +480,7 @@ impl Drawing {
 }
 
 impl Renderer {
-    /// Plans, uploads and prefilters.
+    /// Plans, prepares and uploads a scene, and prefilters the environment.
     ///
     /// # Errors
     /// When the scene has nothing to draw, the size is out of range, or it does not fit the device.
@@ -491,10 +495,10 @@ impl Renderer {
         Self::of(device, prepared, environment, settings)
     }
 
-    /// Uploads and prefilters what has been prepared, with the environment and the settings that it was prepared for.
+    /// Uploads a prepared scene and prefilters its environment; environment and settings must be those of the preparation.
     ///
     /// # Errors
-    /// When the size is out of range, the device cannot do what the plan asks for, or the scene does not fit it.
+    /// When the size is out of range, the device lacks what the plan needs, or the scene does not fit the device.
     pub fn of(
         device: &Arc<Device>,
         prepared: Prepared,
@@ -504,7 +508,7 @@ impl Renderer {
         Self::after(None, device, prepared, environment, settings)
     }
 
-    /// Another moment of the scene, in the same environment and with the same settings: what has not changed stays on the device.
+    /// Another frame of the scene's animation, same environment and settings: unchanged data stays on the device.
     ///
     /// # Errors
     /// As [`Renderer::new`].
@@ -548,11 +552,12 @@ impl Renderer {
         for part in settings.parts.iter().filter(|part| !part.called_for(&plan)) {
             warnings.push(format!("layer {}: no surface of this scene sends such rays, the layer is 0", part.name()));
         }
-        // What stands for an environment that is asked for and is not there.
+        // A forced environment effect without an environment uses a black one.
         let dark = (plan.environment && environment.is_none()).then(Environment::dark);
-        let turn = Turn { intensity: settings.environment_intensity, rotation: settings.environment_rotation };
+        let turn =
+            EnvironmentRotation { intensity: settings.environment_intensity, rotation: settings.environment_rotation };
         let touching = rays.constants.touching;
-        // Where the same is done, what it is done with is as large and as it was.
+        // If both plans draw the same work, targets and environment are reused.
         let (textures, around, targets) = match before {
             Some(Self { scene, environment, targets, plan: known, rays, .. }) => {
                 let same = known.draws_as(&plan) && rays.constants.touching == touching;
@@ -593,7 +598,7 @@ impl Renderer {
         })
     }
 
-    /// Draws the scene from a camera.
+    /// Renders the scene from a camera.
     ///
     /// # Errors
     /// When the driver fails.
@@ -601,7 +606,7 @@ impl Renderer {
         self.render_samples(camera, self.plan.samples, progress)
     }
 
-    /// The same with fewer samples of each pixel than the plan has.
+    /// Renders with fewer samples per pixel than the plan has.
     ///
     /// # Errors
     /// When the driver fails.
@@ -632,24 +637,24 @@ impl Renderer {
         self.picture(&drawing)
     }
 
-    /// What will be done and why.
+    /// The plan: effects with reasons.
     #[must_use]
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// A picture from a camera, of which nothing is drawn yet, of so many samples of each pixel, or as many as the plan has.
+    /// Begins a picture from a camera with `samples` samples per pixel, at most as many as the plan has.
     pub fn begin(&mut self, camera: &Camera, samples: u32) -> Drawing {
         let view = View::new(camera, self.settings.size, self.scene.bounds);
-        self.scene.look_from(&view);
+        self.scene.set_view(&view);
         let mut drawing = Drawing::new(view, samples.min(self.plan.samples));
-        // Drawn once, before the first picture.
+        // Shadow maps were drawn once, before the first picture.
         drawing.times.add(std::mem::take(&mut self.shadow_maps.times));
         drawing
     }
 
-    /// Which samples a process can draw by itself so that the sums of all of them are those of one: the first sample of each block, and
-    /// the number of all.
+    /// Sample indices at which processes may split a picture so that their sums add up to those of one process: the first sample
+    /// of each block, and the number of all samples.
     #[must_use]
     pub fn block_starts(&self) -> Vec<u32> {
         let (count, halves) = (self.plan.samples, self.halves());
@@ -657,8 +662,8 @@ impl Renderer {
         (0..count).step_by(block as usize).chain([count]).collect()
     }
 
-    /// The same picture of which only samples `from` up to `end` are drawn, both out of [`Renderer::block_starts`], for sums that others
-    /// go on with: there is no picture of them. What is known of them goes on from `known`, which holds the samples up to `from`.
+    /// Begins a part of a picture: samples `from` to before `end`, both from [`Renderer::block_starts`]. A part has sums that
+    /// other processes continue, but no picture. It continues from `known`, the sums of the samples before `from`.
     ///
     /// # Errors
     /// When the driver fails.
@@ -677,7 +682,7 @@ impl Renderer {
         Ok(drawing)
     }
 
-    /// Sums on the device, those of parts last.
+    /// Sums on the device, then those of the parts.
     fn sums_on_device(&self) -> Vec<&Image> {
         let Targets { sums, parts, radiance, .. } = &self.targets;
         let own: Vec<&Image> = sums.iter().map(|sum| &sum.total).collect();
@@ -685,7 +690,7 @@ impl Renderer {
         own.into_iter().chain(parts.iter().map(PartOnDevice::film)).collect()
     }
 
-    /// What a drawing of a part has made so far, where a block has just ended.
+    /// The sums of a part at the end of a block.
     ///
     /// # Errors
     /// When the driver fails.
@@ -701,8 +706,8 @@ impl Renderer {
     /// When the driver fails.
     pub fn step(&mut self, drawing: &mut Drawing) -> Result<()> {
         let ([index, band], count) = (drawing.next, drawing.count);
-        self.show_band(band, index, count);
-        // A frame whose see-through fragments did not fit is drawn again with more room.
+        self.set_band(band, index, count);
+        // A frame whose transparent fragments did not fit is drawn again with a larger buffer.
         loop {
             self.look(&drawing.view, index, count, band);
             let sample = self.sample(count, band)?;
@@ -747,13 +752,13 @@ impl Renderer {
         };
         drawing.errors.extend(error);
         let limit = self.settings.max_error.unwrap_or(0.0);
-        // Before all parts of the bands were drawn, halves do not know what is missing.
+        // Before all parts of the bands were drawn, the halves do not contain the missing parts' error.
         let whole = done >= 2 * self.parts(count);
         drawing.enough = error.is_some_and(|error| whole && limit > 0.0 && error.relmse.sqrt() <= limit);
         Ok(())
     }
 
-    /// What is there of a picture: the mean of the samples drawn, at least one.
+    /// The picture so far: the mean of at least one sample.
     ///
     /// # Errors
     /// When the driver fails.
@@ -781,10 +786,10 @@ impl Renderer {
         })
     }
 
-    /// Another size for the pictures to come.
+    /// Changes the size of all further pictures.
     ///
     /// # Errors
-    /// When the size is out of range, or memory is short: the old size stays.
+    /// When the size is out of range, or memory is short; the old size stays.
     pub fn resize(&mut self, size: [u32; 2]) -> Result<()> {
         check_size(&self.device, &self.settings.knobs, size)?;
         let settings = Settings { size, ..self.settings.clone() };
@@ -793,26 +798,26 @@ impl Renderer {
         Ok(())
     }
 
-    /// Tone curve and exposure of what is shown from now on.
-    pub fn develop(&mut self, tonemap: ToneMap, exposure: f32) {
+    /// Sets tone curve and exposure of the display output.
+    pub fn set_display(&mut self, tonemap: ToneMap, exposure: f32) {
         self.settings.tonemap = tonemap;
         self.settings.exposure = exposure;
     }
 
-    /// Where the next frame is seen from.
+    /// Sets camera and random numbers of the next frame.
     fn look(&mut self, view: &View, index: u32, count: u32, band: u32) {
         let TileShare { index: first, of } = self.settings.share;
         let camera = share::Camera { tiles: [first, of], ..view.shared(jitter(index, count)) };
         self.camera.write(bytemuck::bytes_of(&camera));
-        // Halves of a picture by paths have random numbers of their own, and so has each band: what is noise in one is none in
-        // another, and their sum has less of it.
+        // The two halves of path tracing have independent random numbers, and so have the bands: their noise is uncorrelated
+        // and partly cancels in the sum.
         let [at, half] = [index / self.halves(), index % self.halves()];
         let seed = self.settings.seed.wrapping_mul(2).wrapping_add(half).wrapping_add(band.wrapping_mul(0x9e37_79b9));
-        self.rays.look_from(view, at, count, seed);
+        self.rays.set_view(view, at, count, seed);
     }
 
-    /// What goes another way for each wavelength is drawn for parts of each band, one for each sample of a half: as many as there
-    /// are, up to a limit; where an error is the end, so few that it may be told early.
+    /// Number of parts of each band in pictures with dispersion, a power of two: one for each sample of a half up to a limit,
+    /// which is low when rendering to a target error, so that the error can be estimated early.
     fn parts(&self, count: u32) -> u32 {
         let halves = self.halves();
         let limit = if self.settings.max_error.is_some() { PARTS_BEFORE_AN_END } else { MOST_PARTS };
@@ -820,8 +825,8 @@ impl Renderer {
         1 << most.ilog2()
     }
 
-    /// The wavelengths of the next frame, where the picture is drawn by them.
-    fn show_band(&mut self, band: u32, index: u32, count: u32) {
+    /// Uploads the spectra of the next frame's band of wavelengths, in spectral rendering.
+    fn set_band(&mut self, band: u32, index: u32, count: u32) {
         let bands = self.plan.bands;
         if bands == 0 {
             return;
@@ -830,7 +835,7 @@ impl Renderer {
         let parts = self.parts(count);
         let at = (index / self.halves()) % parts;
         let part = if parts > 1 { at.reverse_bits() >> (32 - parts.ilog2()) } else { 0 };
-        self.scene.show(Some(&Slice::new(band, band.part(part, parts))));
+        self.scene.upload_band(Some(&Slice::new(band, band.part(part, parts))));
     }
 
     fn on_device(&self) -> OnDevice<'_> {
@@ -843,18 +848,18 @@ impl Renderer {
         Frame::of(&self.device, self.on_device().bind(&self.sets))
     }
 
-    /// What programs are specialised by.
+    /// Specialization constants of the shaders' library.
     fn library(&self) -> Library {
         let mut library = self.on_device().library(&self.plan, &self.settings.knobs, self.targets.tiles.words());
         library.own_tiles.shared_picture = self.settings.share != TileShare::ALL;
         library
     }
 
-    /// One sample of every pixel, or one band of it: the frame, pass by pass.
+    /// Records one sample of every pixel, or one band of it: the frame, pass by pass.
     fn sample(&self, count: u32, band: u32) -> Result<Frame<'_>> {
         let Self { plan, scene, rays, targets, .. } = self;
         let Targets { gbuffer: g, tiles: lists_of_lights, work, lists, radiance, parts, screen, .. } = targets;
-        // With n samples a pixel each one stands for 1/n of its area: textures are read that much sharper.
+        // Each of n samples per pixel stands for 1/n of the pixel's area, so the texture level of detail is biased by -log2(n)/2.
         let lod_bias = -0.5 * (count as f32).log2();
         let library = self.library();
         let Settings { size, share, .. } = self.settings;
@@ -872,7 +877,7 @@ impl Renderer {
             frame.read_back(&rays.counts);
             return Ok(frame);
         }
-        // What is where is the same in all bands.
+        // Visibility is the same in all bands.
         if band == 0 {
             gbuffer(&mut frame, scene, g, lod_bias, scene.draws(false, rays.inside()))?;
             if plan.tiles {
@@ -894,14 +899,14 @@ impl Renderer {
                 frame.download("copy part", &part.radiance, &part.seen);
             }
         }
-        if plan.screen.mirrors || plan.screen.see_through_mirrors {
+        if plan.screen.mirrors || plan.screen.transparent_mirrors {
             screen_tiles(&mut frame, lighting, g, screen)?;
         }
         if plan.screen.mirrors {
             frame.download("copy radiance", radiance, &screen.seen);
             mirror(&mut frame, lighting, g, &self.targets.ray_tiles, screen, radiance)?;
         }
-        if plan.screen.refraction || plan.screen.see_through_mirrors {
+        if plan.screen.refraction || plan.screen.transparent_mirrors {
             frame.download("copy radiance", radiance, &screen.seen);
         }
         if let Some(lists) = lists {
@@ -926,18 +931,18 @@ impl Renderer {
         Ok(frame)
     }
 
-    /// How many sums the samples go to by turns.
+    /// Number of sums among which samples alternate: 1, or 2 for even and odd samples.
     fn halves(&self) -> u32 {
         self.targets.sums.len().max(1) as u32
     }
 
-    /// Samples that each sum has after so many of `count`, and those of a block.
+    /// Number of samples in each sum after `samples` of `count`, and samples per block.
     fn samples_of_sums(&self, samples: u32, count: u32) -> (Vec<u32>, u32) {
         let halves = self.halves();
         ((0..halves).map(|half| (samples + halves - 1 - half) / halves).collect(), block_of(count.div_ceil(halves)))
     }
 
-    /// Adds the sample, or one band of it, to its sum, and to those of parts.
+    /// Records the addition of the sample, or one band of it, to its sum and to the sums of parts.
     fn add(&self, drawing: &Drawing, band: u32) -> Result<Frame<'_>> {
         let mut frame = Frame::new(&self.device);
         let &Drawing { next: [index, _], count, from, .. } = drawing;
@@ -945,7 +950,7 @@ impl Renderer {
         let (bands, halves) = (self.plan.bands, self.halves());
         let block = block_of(count.div_ceil(halves));
         let sample = Sample { index: index / halves, block, begins: band == 0, ends: band + 1 == bands.max(1) };
-        // A sum that is the film as well becomes the mean with its last sample.
+        // A sum that is also the film becomes the mean with its last sample.
         let last = film.is_none() && !drawing.is_part && index + 1 == count && sample.ends;
         let scale = if last { 1.0 / count as f32 } else { 1.0 };
         let Some(sum) = sums.get((index % halves) as usize) else { return Ok(frame) };
@@ -958,11 +963,11 @@ impl Renderer {
         Ok(frame)
     }
 
-    /// The film as a display shows it, after so many of the samples.
+    /// Records the tone mapping of the film after `samples` of `count`.
     fn show(&self, samples: u32, count: u32) -> Result<Frame<'_>> {
         let mut frame = Frame::new(&self.device);
         let Targets { sums, film, display, .. } = &self.targets;
-        // Before the last sample a film that is the sum is no mean yet.
+        // Before the last sample, a film that is the sum is not yet divided.
         let is_sum = film.is_none() && !sums.is_empty() && samples < count;
         let scale = if is_sum { 1.0 / samples as f32 } else { 1.0 };
         let film = self.film_on_device();
@@ -972,15 +977,16 @@ impl Renderer {
         Ok(frame)
     }
 
-    /// The passes of a first picture from a camera, without drawing it: those before all samples, with the pipelines that exist
-    /// already, those of one sample, and those after.
+    /// The passes of a first picture from a camera, without drawing it: those before all samples, those of one sample, and those
+    /// after all samples. Pipelines are created where the driver reports statistics of them.
     ///
     /// # Errors
+    /// When the driver fails.
     /// When the driver fails.
     pub fn passes(&mut self, camera: &Camera) -> Result<Vec<PassPlan>> {
         let count = self.plan.samples;
         let view = View::new(camera, self.settings.size, self.scene.bounds);
-        self.scene.look_from(&view);
+        self.scene.set_view(&view);
         self.look(&view, 0, count, 0);
         let done =
             self.shadow_maps.times.iter().map(|pass| PassPlan { name: pass.name.clone(), pipelines: Vec::new() });
@@ -993,7 +999,7 @@ impl Renderer {
         Ok(passes)
     }
 
-    /// The scene-linear film of the last render.
+    /// The scene-linear film of the last picture, over the background colour.
     ///
     /// # Errors
     /// When the driver fails.
@@ -1003,7 +1009,7 @@ impl Renderer {
         Ok(picture)
     }
 
-    /// The same with its coverage as alpha, without a background colour: what [`Settings::view_transform`] takes.
+    /// The film without a background colour, its coverage as alpha: the input of [`Settings::view_transform`].
     ///
     /// # Errors
     /// When the driver fails.
@@ -1011,14 +1017,14 @@ impl Renderer {
         self.read(self.film_on_device())
     }
 
-    /// The same where it lies, for passes of one's own: linear RGBA in f32, without a background colour.
+    /// The film on the device, for passes of other programs: linear RGBA in f32, without a background colour.
     #[must_use]
     pub fn film_on_device(&self) -> &Image {
         let Targets { film, sums, radiance, .. } = &self.targets;
         film.as_ref().or(sums.first().map(|sum| &sum.total)).unwrap_or(radiance)
     }
 
-    /// A part of the film of the last render; `None` where [`Settings::parts`] does not name it. Its alpha means nothing.
+    /// A part of the film of the last picture; `None` unless [`Settings::parts`] names it. Its alpha is undefined.
     ///
     /// # Errors
     /// When the driver fails.
@@ -1026,7 +1032,7 @@ impl Renderer {
         self.targets.parts.iter().find(|kept| kept.part == part).map(|kept| self.read(kept.film())).transpose()
     }
 
-    /// A sum of so many samples in blocks of so many.
+    /// The sum of `samples` samples in blocks of `block`, read back.
     fn sum(&self, sum: &Sum, samples: u32, block: u32) -> Result<Picture> {
         let mut images = sum.images(samples, block).into_iter().flatten();
         let Some(first) = images.next() else { bail!("a sum of no samples was asked for: our mistake") };
@@ -1040,20 +1046,20 @@ impl Renderer {
         Ok(all)
     }
 
-    /// The sums of the even and of the odd samples, after so many of `count`.
+    /// The sums of even and of odd samples, after `samples` of `count`.
     fn half_sums(&self, samples: u32, count: u32) -> Result<[Picture; 2]> {
         let (of_sums, block) = self.samples_of_sums(samples, count);
         let sum = |half: usize| self.sum(&self.targets.sums[half], of_sums[half], block);
         Ok([sum(0)?, sum(1)?])
     }
 
-    /// What the halves say of the picture's error after so many samples.
+    /// Error estimate from the two halves after `samples` samples.
     fn error(&self, samples: u32, count: u32) -> Result<SampleError> {
         let [a, b] = self.half_sums(samples, count)?;
         Ok(error_of_halves([&a.rgba, &b.rgba], samples))
     }
 
-    /// The means of the two halves of the last render's samples; `None` where it has none.
+    /// The means of the two halves of the last picture's samples, over the background colour; `None` when there is one sum.
     ///
     /// # Errors
     /// When the driver fails.
@@ -1063,7 +1069,7 @@ impl Renderer {
         Ok(halves)
     }
 
-    /// The same with their coverage as alpha, without a background colour.
+    /// The means of the two halves without a background colour, their coverage as alpha.
     ///
     /// # Errors
     /// When the driver fails.
@@ -1097,7 +1103,7 @@ impl Renderer {
         Ok(Picture { width, height, rgba })
     }
 
-    /// The G-buffer at the pixel centres, with the eye that `p_rel` is relative to.
+    /// The G-buffer at the pixel centres as AOVs, with the view whose eye `p_rel` is relative to.
     ///
     /// # Errors
     /// When the driver fails.
@@ -1105,7 +1111,7 @@ impl Renderer {
         self.surfaces(camera, false)
     }
 
-    /// For each material of the scene, the pixels whose centre shows it nearest, whatever it lets through.
+    /// For each material of the scene, the number of pixels whose nearest surface at the centre has it, transparent ones included.
     ///
     /// # Errors
     /// When the driver fails.
@@ -1121,12 +1127,12 @@ impl Renderer {
         Ok(counts)
     }
 
-    /// What lies at the pixel centres; with `all`, what is laid over the picture as well.
+    /// The surfaces at the pixel centres; with `all`, transparent surfaces, too.
     fn surfaces(&mut self, camera: &Camera, all: bool) -> Result<(Vec<AovPixel>, View)> {
         let [width, height] = self.settings.size;
         let view = View::new(camera, self.settings.size, self.scene.bounds);
-        self.scene.look_from(&view);
-        self.scene.show(None);
+        self.scene.set_view(&view);
+        self.scene.upload_band(None);
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(0, 1))));
         let mut frame = self.frame();
         let mut draws = self.scene.draws(false, self.rays.inside());
@@ -1135,7 +1141,7 @@ impl Renderer {
         }
         gbuffer(&mut frame, &self.scene, &self.targets.gbuffer, 0.0, draws)?;
         frame.finish()?;
-        // As many rows at a time as one storage buffer holds.
+        // One readback holds as many rows as a storage buffer binding allows.
         let row_bytes = u64::from(width) * size_of::<AovPixel>() as u64;
         let rows = ((self.device.max_storage_bytes() / row_bytes) as u32).clamp(1, height);
         let pixels = Buffer::new(&self.device, "AOVs", row_bytes * u64::from(rows), Place::Readback)?;
@@ -1151,13 +1157,13 @@ impl Renderer {
         Ok((all, view))
     }
 
-    /// The hierarchy that rays go through, if there is one.
+    /// Figures of the BVH; `None` when the plan sends no rays.
     #[must_use]
     pub fn bvh(&self) -> Option<BvhFacts> {
         self.rays.facts
     }
 
-    /// The device it draws on.
+    /// The device that the renderer draws on.
     #[must_use]
     pub fn device(&self) -> &Arc<Device> {
         &self.device
@@ -1173,8 +1179,8 @@ impl Renderer {
     }
 }
 
-/// What a display shows of a film that was made elsewhere, as a renderer with these settings would show it: RGBA8 (sRGB-encoded, rows
-/// from the top), whether it has transparency, and the counts of NaN, infinite and negative pixels. A film by wavelengths is `spectral`.
+/// Tone maps a film that was rendered elsewhere, with these settings: RGBA8 (sRGB-encoded, rows from the top), whether it has
+/// transparency, and the counts of NaN, infinite and negative pixels. `spectral` marks a film of spectral rendering.
 ///
 /// # Errors
 /// When the driver fails.
@@ -1198,7 +1204,7 @@ pub fn shown(
     Ok((display.pixels.read(<[u8]>::to_vec), has_alpha, display.counts()?))
 }
 
-/// Display-linear colour behind the scene with alpha 1, or all 0, and whether the display output is transparent.
+/// Display-linear colour behind the scene with alpha 1, or all 0; and whether the display output is transparent.
 fn display_background(settings: &Settings) -> ([f32; 4], bool) {
     match settings.behind() {
         Some(colour) => {

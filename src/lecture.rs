@@ -1,8 +1,8 @@
-//! The lecture's statements that rungs and equations name by their ids, from docs/lecture.md.
+//! Statements of the lecture by their ids, from docs/lecture.md; rungs and equations refer to the ids.
 
 const LECTURE: &str = include_str!("../docs/lecture.md");
 
-/// What the lecture says under an id such as `R5`; `None` for an id that it does not have.
+/// The lecture's statement with an id such as `R5`; `None` for an unknown id.
 #[must_use]
 pub fn statement(id: &str) -> Option<&'static str> {
     let rows = LECTURE.lines().filter_map(|line| line.strip_prefix("| ")?.split_once(" | "));

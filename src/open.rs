@@ -1,4 +1,6 @@
-//! A scene with what lies around it: what a program begins with.
+//! A scene with its environment and a default camera: the entry point of programs that use the library.
+//!
+//! Read examples/render.rs, and docs/scene-input.md for the formats.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -11,10 +13,10 @@ use crate::plan::Plan;
 use crate::prepare::{Original, Prepared};
 use crate::scene::camera::DEFAULT_FOV_Y;
 use crate::scene::environment::Environment;
-use crate::scene::{Camera, LoadOptions, Reads, Scene, Source};
+use crate::scene::{Camera, LoadOptions, Prune, Scene, Source};
 use crate::study;
 
-/// A scene, the light from all around it, and a camera for whoever names none. Clones share what is large.
+/// A scene, its environment, and a default camera. Clones share the large data.
 ///
 /// ```no_run
 /// use etalon::frame::Settings;
@@ -37,11 +39,11 @@ pub struct Opened {
     pub original: Original,
     environment: Option<Environment>,
     is_asked_for: bool,
-    /// What was read around, in the scene's file and in the environment's, a sentence each.
+    /// Warnings of the readers about skipped parts of the scene's file and of the environment's, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// Reads the scene of a name: a path, or `study:` and the name of one that is generated.
+/// Loads a scene by name: a path, or `study:` and the name of a study scene.
 ///
 /// # Errors
 /// One sentence with file, place and cause.
@@ -53,28 +55,28 @@ pub fn scene(name: &str, options: &LoadOptions) -> Result<Scene> {
     }
 }
 
-/// The same for all moments of its animation: what does not move is read once.
+/// Opens a scene for all frames of its animation: the file is read once.
 ///
 /// # Errors
 /// As [`scene()`].
-pub fn source(name: &str, reads: Reads) -> Result<Source> {
+pub fn source(name: &str, prune: Prune) -> Result<Source> {
     match name.strip_prefix("study:") {
         Some(study) => study::load(study).map(Source::still),
-        None => Source::open(Path::new(name), reads),
+        None => Source::open(Path::new(name), prune),
     }
 }
 
 /// A camera that sees the whole scene.
 ///
 /// # Errors
-/// When there is nothing to frame.
+/// When the scene has nothing to draw.
 pub fn framing(scene: &Scene, size: [u32; 2], fov_y: f64) -> Result<Camera> {
     let bounds = scene.bounds().ok_or_else(|| anyhow!("{}: there is nothing to draw", scene.name))?;
     Ok(Camera::framing(bounds, f64::from(size[0]) / f64::from(size[1]), fov_y))
 }
 
 impl Opened {
-    /// Reads the scene of a name, at rest, as [`scene()`] does; the built-in studio lights it where nothing else does.
+    /// Loads a scene by name in its rest pose, as [`scene()`] does; the built-in studio lights a scene without lights.
     ///
     /// # Errors
     /// One sentence with file, place and cause.
@@ -82,14 +84,15 @@ impl Opened {
         Ok(Self::new(scene(name, &LoadOptions::default())?, Some(Environment::studio()), false))
     }
 
-    /// A scene in an environment, which lights it if that `is_asked_for`, or if the scene has no lights of its own, or says so.
+    /// A scene in an environment. The environment lights the scene if it `is_asked_for`, if the scene has no lights, or if the
+    /// scene requests it.
     #[must_use]
     pub fn new(scene: Scene, environment: Option<Environment>, is_asked_for: bool) -> Self {
         let warnings = scene.warnings.clone();
         Self { original: scene.into(), environment, is_asked_for, warnings }
     }
 
-    /// Another moment of the scene, in the same environment.
+    /// Replaces the scene by another frame of its animation, in the same environment.
     pub fn pose(&mut self, scene: Scene) {
         self.original = scene.into();
     }
@@ -100,13 +103,13 @@ impl Opened {
         self.original.scene()
     }
 
-    /// The environment that there is, whether or not it lights the scene.
+    /// The environment, whether or not it lights the scene.
     #[must_use]
     pub fn environment(&self) -> Option<&Environment> {
         self.environment.as_ref()
     }
 
-    /// The environment that lights the scene, with the settings in which it is as strong as the scene says.
+    /// The environment that lights the scene, and settings with the scene's environment intensity.
     #[must_use]
     pub fn lit(&self, mut settings: Settings) -> (Option<&Environment>, Settings) {
         let scene = self.scene();
@@ -119,13 +122,13 @@ impl Opened {
     /// The first camera of the scene, or one that frames it.
     ///
     /// # Errors
-    /// When there is nothing to frame.
+    /// When the scene has nothing to draw.
     pub fn camera(&self, size: [u32; 2]) -> Result<Camera> {
         let framing = || framing(self.scene(), size, DEFAULT_FOV_Y);
         self.scene().cameras.first().cloned().map_or_else(framing, Ok)
     }
 
-    /// What drawing it with these settings does, and why: no device is needed.
+    /// The plan for these settings, with reasons; it needs no device.
     ///
     /// # Errors
     /// When the scene has nothing to draw.
@@ -134,23 +137,23 @@ impl Opened {
         self.original.plan(&settings.conditions(environment)?)
     }
 
-    /// Plans it and builds what rays go through.
+    /// Plans the scene and builds its BVH.
     ///
     /// # Errors
-    /// When the scene has nothing to draw, or more triangles than a tree holds.
+    /// When the scene has nothing to draw, or more triangles than a BVH holds.
     pub fn prepared(&self, settings: Settings) -> Result<Prepared> {
         let (environment, settings) = self.lit(settings);
         Prepared::new(&self.original, &settings.conditions(environment)?)
     }
 
-    /// Plans and uploads it.
+    /// Plans the scene and uploads it.
     ///
     /// # Errors
     /// When the scene has nothing to draw, or it does not fit the device.
     pub fn renderer(self, device: &Arc<Device>, settings: Settings) -> Result<Renderer> {
         let (lit, settings) = self.lit(settings);
         let is_lit = lit.is_some();
-        // Nothing else holds on to the scene, where this is the last clone: texels go as they are uploaded.
+        // The last clone owns the scene alone, so texels are freed while they are uploaded.
         let Self { original, environment, .. } = self;
         Renderer::new(device, original, environment.as_ref().filter(|_| is_lit), settings)
     }

@@ -1,5 +1,6 @@
-//! A scene made ready to be drawn, before any device is there: in normal form, planned, with the hierarchy that its rays go
-//! through. Data alone: what is drawn of it, and on what, is for [`crate::frame`] to say.
+//! Preparation of a scene without a device: canonical form, plan, BVH and light sampling tables.
+//!
+//! Read docs/plan.md. The result is data; [`crate::frame`] uploads and draws it.
 
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
@@ -7,39 +8,39 @@ use std::time::Instant;
 use anyhow::{Result, anyhow, bail};
 use glam::DVec3;
 
-use crate::plan::{Demand, Facts, Knobs, Plan, Rays, Surroundings, needs_lights};
+use crate::plan::{Facts, ForcedEffects, Knobs, Plan, Rays, Surroundings, needs_lights};
+use crate::scene::canonical::{CanonicalForm, canonicalise};
 use crate::scene::environment::Environment;
-use crate::scene::normal_form::{NormalForm, normalise};
-use crate::scene::reads::forget_unread;
+use crate::scene::prune::prune_unused;
 use crate::scene::sigma::one_medium_each;
 use crate::scene::solid::Solids;
-use crate::scene::{Ambience, Bounds, Light, LightKind, Reads, Scene};
+use crate::scene::{AmbientLight, Bounds, Light, LightKind, Prune, Scene};
 use crate::transport::bvh::Bvh;
-use crate::transport::contact::{bodies_touch, twins};
+use crate::transport::contact::{has_coincident_interfaces, twins};
 use crate::transport::emitters::{Emitters, Sky};
 
-/// What a scene is prepared for.
+/// Conditions under which a scene is prepared.
 #[derive(Debug, Clone, Copy)]
 pub struct Conditions<'a> {
-    /// Rungs.
+    /// Rungs of all knobs.
     pub knobs: &'a Knobs,
-    /// What is planned although the scene does not call for it.
-    pub demand: Demand,
-    /// Light from all around.
+    /// Effects that are planned although the scene does not call for them.
+    pub forced: ForcedEffects,
+    /// The environment light.
     pub sky: Option<Sky<'a>>,
-    /// The sky is seen behind the scene, too.
+    /// Whether the environment is also the background.
     pub background: bool,
 }
 
-/// A scene as it was read. Clones, and all that is prepared of them, share its lists and the one tree of its triangles, which is
-/// built when rays are first called for.
+/// A scene as it was read. Clones, and everything prepared from them, share its lists and the one BVH of its triangles, which
+/// is built when rays are first needed.
 #[derive(Debug, Clone, Default)]
 pub struct Original {
     scene: Scene,
     tree: Arc<OnceLock<Result<Tree, String>>>,
 }
 
-/// A tree, and the milliseconds that it took.
+/// A BVH, and its build time in milliseconds.
 type Tree = (Arc<Bvh>, f64);
 
 impl From<Scene> for Original {
@@ -55,21 +56,21 @@ impl From<&Self> for Original {
 }
 
 impl Original {
-    /// What was read.
+    /// The scene as it was read.
     #[must_use]
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// The tree of the scene's normal form, whose triangles are those of every plan: plans leave out textures and lights.
+    /// The BVH of the scene's canonical form. Its triangles are those of every plan: a plan omits only textures and lights.
     ///
     /// # Errors
-    /// When the scene has more triangles than a tree holds.
+    /// When the scene has more triangles than a BVH holds.
     pub fn bvh(&self) -> Result<Arc<Bvh>> {
         let normal = || {
             let mut scene = self.scene.clone();
             one_medium_each(&mut scene);
-            normalise(&mut scene);
+            canonicalise(&mut scene);
             scene
         };
         Ok(self.tree_of(normal)?.0)
@@ -86,7 +87,7 @@ impl Original {
         built.clone().map_err(|error| anyhow!(error))
     }
 
-    /// What the scene calls for under the chosen rungs, without preparing anything else.
+    /// The plan of the scene under the chosen rungs, without any other preparation.
     ///
     /// # Errors
     /// When the scene has nothing to draw.
@@ -95,66 +96,66 @@ impl Original {
     }
 }
 
-/// A scene that is ready to be drawn.
+/// A scene that is ready to be rendered.
 #[derive(Debug)]
 pub struct Prepared {
-    /// In normal form, with the lights that are planned, directional ones first.
+    /// The scene in canonical form, with the planned lights, directional ones first.
     pub scene: Scene,
-    /// What will be done and why.
+    /// The plan.
     pub plan: Plan,
-    /// Which surfaces enclose a medium.
+    /// Closed dielectric meshes, which enclose a medium.
     pub solids: Solids,
-    /// What paths draw light from.
+    /// The light sampling tables of path tracing.
     pub emitters: Emitters,
-    /// What rays go through; `None` where the plan sends none.
+    /// The BVH; `None` when the plan sends no rays.
     pub hierarchy: Option<Hierarchy>,
-    /// What is odd about the scene, a sentence each.
+    /// Warnings about the scene, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// The hierarchy of a scene's triangles.
+/// The BVH of a scene's triangles, with its ray offset.
 #[derive(Debug)]
 pub struct Hierarchy {
-    /// The tree.
+    /// The BVH.
     pub bvh: Arc<Bvh>,
-    /// Milliseconds that it took.
+    /// Build time in milliseconds.
     pub build_ms: f64,
-    /// How far rays start off a surface, metres.
+    /// Distance from the surface at which rays start, in metres.
     pub offset: f64,
-    /// Some transparent body lies against another surface.
+    /// Whether some closed dielectric mesh touches another surface (coincident interfaces).
     pub touching: bool,
-    /// What is odd about the triangles, a sentence each.
+    /// Warnings about the triangles, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// Rays start this many roundings of the largest coordinate off their surface (shaders/lib/trace.glsl, `ray_origin`).
+/// Ray offset from the surface, in rounding errors of the largest coordinate (shaders/lib/trace.glsl, `ray_origin`).
 const OFFSET_ROUNDINGS: f64 = 32.0;
 
-/// How far rays start off surfaces of a scene whose coordinates are at most `extent`.
+/// Ray offset in metres for a scene whose coordinates are at most `extent` in absolute value.
 #[must_use]
 pub fn ray_offset(extent: f64) -> f64 {
     OFFSET_ROUNDINGS * extent * 2.0_f64.powi(-24)
 }
 
-/// Brings a scene into its normal form and plans it.
+/// Canonicalises a scene and plans it.
 fn planned(scene: &mut Scene, conditions: &Conditions<'_>) -> Result<(Plan, Solids)> {
-    let &Conditions { knobs, demand, sky, background } = conditions;
+    let &Conditions { knobs, forced, sky, background } = conditions;
     one_medium_each(scene);
     let triangles = scene.triangles();
     let shown = knobs.show_occlusion(sky.is_some());
-    let reads = match demand {
-        Demand::Full => Reads::Everything,
-        _ => Reads::Visible(if shown { Ambience::Present } else { Ambience::Absent }),
+    let reads = match forced {
+        ForcedEffects::All => Prune::Nothing,
+        _ => Prune::Unused(if shown { AmbientLight::Present } else { AmbientLight::Absent }),
     };
-    // Once more after the normal form, which leaves less to be read.
-    forget_unread(scene, reads);
-    let form = normalise(scene);
-    forget_unread(scene, reads);
+    // Pruned again after canonicalisation, which leaves fewer textures and attributes in use.
+    prune_unused(scene, reads);
+    let form = canonicalise(scene);
+    prune_unused(scene, reads);
     if scene.triangles() == 0 {
         let why = if triangles == 0 { "the scene has 0 triangles" } else { "alpha leaves nothing of its surfaces" };
         bail!("{}: there is nothing to draw, {why}", scene.name);
     }
-    if needs_lights(demand) && scene.lights.iter().all(|light| light.stand_in) {
+    if needs_lights(forced) && scene.lights.iter().all(|light| light.proxy) {
         add_dark_lights(scene);
     }
     let facts = Facts::of(scene, form);
@@ -163,34 +164,34 @@ fn planned(scene: &mut Scene, conditions: &Conditions<'_>) -> Result<(Plan, Soli
         constant: sky.is_some_and(|sky| Environment::is_constant(sky.map)),
         grey: sky.is_some_and(|sky| Environment::is_grey(sky.map)),
         sky: background,
-        demand,
+        forced,
     };
     let plan = Plan::new(scene, &facts, surroundings, knobs);
     Ok((plan, facts.solids))
 }
 
-/// A directional and a point light without light: they stand for what is asked for and not there.
+/// Adds a black directional and a black point light: placeholders for forced effects that need lights.
 fn add_dark_lights(scene: &mut Scene) {
     let bounds = scene.bounds().unwrap_or(Bounds { min: DVec3::ZERO, max: DVec3::ONE });
     let dark =
-        |kind| Light { name: "dark".to_owned(), color: [0.0; 3], spectrum: None, extent: None, kind, stand_in: false };
+        |kind| Light { name: "dark".to_owned(), color: [0.0; 3], spectrum: None, extent: None, kind, proxy: false };
     let point = LightKind::Point { position: bounds.max, range: Some(2.0 * bounds.radius()) };
     scene.lights.extend([dark(LightKind::Directional { direction: DVec3::NEG_Y }), dark(point)]);
 }
 
 impl Prepared {
-    /// Plans a scene and builds what the plan asks for.
+    /// Plans a scene and builds the BVH and tables that the plan needs.
     ///
     /// # Errors
-    /// When the scene has nothing to draw, or more triangles than a hierarchy holds.
+    /// When the scene has nothing to draw, or more triangles than a BVH holds.
     pub fn new(original: impl Into<Original>, conditions: &Conditions<'_>) -> Result<Self> {
         let original = original.into();
         let mut scene = original.scene.clone();
         let (mut plan, solids) = planned(&mut scene, conditions)?;
-        // What adds nothing takes no turn of any loop.
+        // Lights that contribute nothing take no loop iteration.
         let mut kept = plan.lights.iter();
         scene.lights.retain(|_| kept.next().copied().unwrap_or_default());
-        // Directional ones first: loops over lights count on it, and so does the table of what paths draw light from.
+        // Directional lights come first: loops over lights and the light sampling table rely on it.
         scene.lights.sort_by_key(|light| !matches!(light.kind, LightKind::Directional { .. }));
         let refracts = plan.screen.refraction || plan.rays.is_some_and(|rays| rays.refraction);
         let mut warnings = if refracts { solids.warnings.clone() } else { Vec::new() };
@@ -209,14 +210,14 @@ impl Prepared {
         Ok(Self { scene, plan, solids, emitters, hierarchy, warnings })
     }
 
-    /// A scene as it is, for rays alone.
+    /// Prepares a scene without canonicalisation, for rays only.
     ///
     /// # Errors
-    /// When it has more triangles than a hierarchy holds.
+    /// When the scene has more triangles than a BVH holds.
     pub fn for_rays(scene: Scene) -> Result<Self> {
         let surroundings =
-            Surroundings { environment: false, constant: false, grey: false, sky: false, demand: Demand::Scene };
-        let facts = Facts::of(&scene, NormalForm::default());
+            Surroundings { environment: false, constant: false, grey: false, sky: false, forced: ForcedEffects::None };
+        let facts = Facts::of(&scene, CanonicalForm::default());
         let rays = Rays::default();
         let plan = Plan { rays: Some(rays), ..Plan::new(&scene, &facts, surroundings, &Knobs::default()) };
         let tree = Original::from(scene.clone()).tree_of(|| &scene)?;
@@ -230,12 +231,13 @@ impl Hierarchy {
     fn of(scene: &Scene, (bvh, build_ms): Tree, solids: &Solids, rays: Rays) -> Self {
         let extent = bvh.triangles.iter().flat_map(|t| t.corners.iter().flatten()).fold(0.0_f32, |m, x| m.max(x.abs()));
         let offset = ray_offset(extent.into());
-        let touching = rays.refraction && bodies_touch(&bvh, &solids.solid, offset);
+        let touching = rays.refraction && has_coincident_interfaces(&bvh, &solids.solid, offset);
         Self { build_ms, offset, touching, warnings: odd_triangles(scene, &bvh, solids), bvh }
     }
 }
 
-/// What is left out, and what is there twice: of that only one is seen, unless bodies touch there.
+/// Warnings about degenerate triangles, and about coincident triangles of which only one is visible. Coincident interfaces of
+/// closed dielectric meshes are legitimate.
 fn odd_triangles(scene: &Scene, bvh: &Bvh, solids: &Solids) -> Vec<String> {
     const MOST: usize = 4;
     let mut warnings = Vec::new();

@@ -1,5 +1,8 @@
-//! The programs under `shaders/pass/`, as the build describes them: one module each with `PROGRAM`, `Bind`, `Constants`, `Push`;
-//! what each file of `shaders/lib/` owns ([`lib`], [`Library`]); and the equations tagged in `shaders/lib/`, each with a program that evaluates it.
+//! The programs of `shaders/pass/` as the build generates them: one module each with `PROGRAM`, `Bind`, `Constants`, `Push`;
+//! bindings and constants of each file of `shaders/lib/` ([`lib`], [`Library`]); and the tagged equations of `shaders/lib/`,
+//! each with a program that evaluates it.
+//!
+//! Read shaders/README.md and docs/equations.md.
 
 use ash::vk;
 
@@ -10,7 +13,7 @@ use crate::gpu::{
     Specialization, Stage, VertexInput, limits,
 };
 
-/// The folder of the shaders' sources, where Etalon was built.
+/// The folder of the shaders' sources on the machine that built Etalon.
 pub const SOURCES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/shaders");
 
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
@@ -22,57 +25,57 @@ pub struct Probe {
     pub name: &'static str,
     /// File under `shaders/lib/`, without `.glsl`.
     pub subject: &'static str,
-    /// Line of its tag in that file.
+    /// Line of the function's tag in that file.
     pub line: usize,
     /// The formula, in one line.
     pub formula: &'static str,
-    /// Ids of the lecture, and rows of docs/numerics.md as `N` and a number.
+    /// Ids of the lecture's statements, and rows of docs/numerics.md as `N` and a number.
     pub ids: &'static [&'static str],
     /// Input columns: the function's parameters in order.
     pub inputs: &'static [&'static str],
-    /// Those of the inputs that are whole numbers of 32 bits.
+    /// The inputs that are 32-bit integers.
     pub whole: &'static [&'static str],
-    /// Output columns: the members of its result.
+    /// Output columns: the members of the function's result.
     pub outputs: &'static [&'static str],
-    /// Built-ins and operations whose precision is the device's own, reached in the tiers fast, stable, compensated.
+    /// Built-ins and operations with implementation-defined precision, in the tiers fast, stable, compensated.
     pub builtins: [&'static [&'static str]; 3],
-    /// Most evaluations of loop heads in one call.
+    /// Largest number of loop iterations in one call.
     pub loop_heads: u32,
     /// Programs of `shaders/pass/` that call the function.
     pub passes: &'static [&'static str],
-    /// Where none does, because the host computes it for pictures: file and what for.
+    /// For a function that no program calls because the host computes it for pictures: file and purpose.
     pub host: Option<(&'static str, &'static str)>,
-    /// Where none does, because it is a laboratory form: the function that draws instead, and the test that both are equal.
+    /// For a laboratory form that no program calls: the function used instead, and the test that both are equal.
     pub lab: Option<(&'static str, &'static str)>,
-    /// Programs that call the function that draws instead.
+    /// Programs that call the function used instead.
     pub drawn_by: &'static [&'static str],
-    /// The program.
+    /// The program that evaluates the function.
     pub program: &'static Program,
 }
 
 impl Probe {
-    /// An input as the program gets it: the bits of a float, or a whole number. What is none of 32 bits counts as the
-    /// nearest one.
+    /// An input as a 32-bit word for the program: the bits of a float, or an integer. Values out of range become the nearest
+    /// representable one.
     #[must_use]
     pub fn word(&self, column: usize, value: f64) -> u32 {
         if self.whole.contains(&self.inputs[column]) { value as u32 } else { (value as f32).to_bits() }
     }
 }
 
-/// What every probe binds: columns of 32 bits, one after the other.
+/// Bindings of every probe: columns of 32-bit words, one after the other.
 #[derive(Clone, Copy)]
 pub struct ProbeBind<'a> {
-    /// Which.
+    /// The function to evaluate.
     pub probe: &'static Probe,
     /// [`Probe::inputs`] columns of [`Probe::word`]s.
     pub inputs: &'a Buffer,
-    /// [`Probe::outputs`] columns.
+    /// Columns of the results, one per [`Probe::outputs`].
     pub outputs: &'a Buffer,
 }
 
 impl<'a> Bindings<'a> for ProbeBind<'a> {
     type Constants = lib::arithmetic::Constants;
-    /// How many cases.
+    /// Number of cases.
     type Push = u32;
 
     fn program(&self) -> &'static Program {

@@ -1,8 +1,10 @@
-//! What host and shaders both know: the structs and constants of `shaders/share/`, written by the build from the GLSL.
+//! Structs and constants shared by host and shaders: the build generates them from the GLSL in `shaders/share/`.
+//!
+//! Read the Vulkan specification, section Shader Interfaces (scalar block layout).
 
 use bytemuck::{Pod, Zeroable};
 
 include!(concat!(env!("OUT_DIR"), "/share.rs"));
 
-// What scenes know of shaders too.
+// A constant that scenes and shaders share.
 const _: () = assert!(LEAST_SHEEN_ROUGHNESS == crate::scene::lobe::sheen::LEAST_ROUGHNESS);

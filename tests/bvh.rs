@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use etalon::optics::catalogue::Draw;
+use etalon::optics::catalogue::SplitMix64;
 use etalon::scene::{Instance, Mesh, Scene};
 use etalon::transport::bvh::{Aabb, Bvh, Format, Grid, MAX_TRIANGLES, Node, Order, Triangle};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
@@ -24,7 +24,7 @@ fn scene(name: &str, triangles: &[[DVec3; 3]], world_from_object: &[DAffine3]) -
 
 /// Triangles of very different sizes in a cube of 2 m.
 fn soup(count: usize, seed: u64) -> Vec<[DVec3; 3]> {
-    let mut d = Draw::new(seed);
+    let mut d = SplitMix64::new(seed);
     let triangle = |_| {
         let center = DVec3::new(d.between(-1.0, 1.0), d.between(-1.0, 1.0), d.between(-1.0, 1.0));
         let size = d.log(1e-3, 0.5);
@@ -53,7 +53,7 @@ fn fan(count: usize) -> Vec<[DVec3; 3]> {
 
 /// Triangles of growing size around one point.
 fn shells(count: usize) -> Vec<[DVec3; 3]> {
-    let mut d = Draw::new(3);
+    let mut d = SplitMix64::new(3);
     let shell = |i| {
         let a = d.direction();
         let b = d.perpendicular(a);
@@ -167,7 +167,7 @@ impl Ray {
 
 /// Rays from around and inside the scene at points of its triangles, a quarter of them along an axis.
 fn rays(bvh: &Bvh, count: usize) -> Vec<Ray> {
-    let mut d = Draw::new(7);
+    let mut d = SplitMix64::new(7);
     let root = bvh.nodes[0].bounds();
     let size = (0..3).map(|i| root.size(i)).fold(0.0, f64::max);
     let aimed = |_| {

@@ -4,11 +4,11 @@ use etalon::optics::fresnel::fresnel_dielectric;
 use etalon::prepare::Original;
 use etalon::scene::{Instance, LightKind, Material, Scene};
 use etalon::study::shape::Shape;
-use etalon::transport::events::{Event, Limits, Tracer, Way};
+use etalon::transport::events::{Event, EventTracer, Limits, Way};
 use etalon_testing::made::{Made, at, lambert, perspective};
 use glam::DVec3;
 
-const LIMITS: Limits = Limits { surfaces: 8, roughest: 0.2, least_share: 0.01, stand_ins: true };
+const LIMITS: Limits = Limits { surfaces: 8, roughest: 0.2, least_share: 0.01, proxies: true };
 
 fn glass(ior: f32) -> Material {
     Material {
@@ -24,7 +24,7 @@ fn glass(ior: f32) -> Material {
 
 /// The ray of the middle of a picture of 3x3 pixels.
 fn middle(scene: &Scene) -> Vec<Event> {
-    Tracer::new(scene, Original::from(scene.clone()).bvh().expect("a tree")).follow(
+    EventTracer::new(scene, Original::from(scene.clone()).bvh().expect("a tree")).follow(
         scene,
         &scene.cameras[0],
         [3, 3],
@@ -46,19 +46,23 @@ fn a_plate_shifts_a_ray_and_shares_its_light() {
     made.camera(-direction * 5.0, DVec3::ZERO, perspective(30.0));
     let events = middle(&made.0);
     let (first, seen) = after(&events, None, Way::Seen).expect("the plate");
-    let met = seen.met.expect("a surface");
+    let interaction = seen.interaction.expect("a surface");
     let [reflected, ..] = fresnel_dielectric(0.8, 1.5);
-    assert!((met.cos - 0.8).abs() < 1e-6 && (met.ratio - 1.5).abs() < 1e-6 && (met.reflected - reflected).abs() < 1e-6);
+    assert!(
+        (interaction.cos - 0.8).abs() < 1e-6
+            && (interaction.ratio - 1.5).abs() < 1e-6
+            && (interaction.reflected - reflected).abs() < 1e-6
+    );
     let (second, inside) = after(&events, Some(first), Way::Bent).expect("it enters");
     // sin β = 0.6/1.5.
     let way = (inside.to - inside.from).normalize();
     assert!((way - DVec3::new(0.4, 0.0, -(1.0 - 0.16_f64).sqrt())).length() < 1e-6, "{way}");
     assert!((inside.share - (1.0 - reflected)).abs() < 1e-6, "{}", inside.share);
-    let leaves = inside.met.expect("the other side");
+    let leaves = inside.interaction.expect("the other side");
     assert!((leaves.ratio - 1.0 / 1.5).abs() < 1e-6 && !leaves.total);
     let (_, out) = after(&events, Some(second), Way::Bent).expect("it leaves");
     assert!(((out.to - out.from).normalize() - direction).length() < 1e-6, "parallel to where it came from");
-    assert!((out.share - (1.0 - reflected).powi(2)).abs() < 1e-6 && out.met.is_none());
+    assert!((out.share - (1.0 - reflected).powi(2)).abs() < 1e-6 && out.interaction.is_none());
     let (_, mirrored) = after(&events, Some(first), Way::Mirrored).expect("a mirror image");
     assert!(((mirrored.to - mirrored.from).normalize() - DVec3::new(0.6, 0.0, 0.8)).length() < 1e-6);
     // Shares of what ends add up to all light but what is too little to be followed.
@@ -74,11 +78,13 @@ fn steep_rays_stay_inside() {
     // Through a side face near its middle, far off the normal of the top.
     made.camera(DVec3::new(-3.0, -4.5, 0.1), DVec3::new(-1.0, 0.0, 0.1), perspective(30.0));
     let events = middle(&made.0);
-    let total = events.iter().filter(|event| event.met.is_some_and(|met| met.total)).count();
+    let total = events.iter().filter(|event| event.interaction.is_some_and(|interaction| interaction.total)).count();
     assert!(total > 0, "the top throws all back: {events:?}");
-    for (index, event) in events.iter().enumerate().filter(|(_, event)| event.met.is_some_and(|met| met.total)) {
+    for (index, event) in
+        events.iter().enumerate().filter(|(_, event)| event.interaction.is_some_and(|interaction| interaction.total))
+    {
         assert!(after(&events, Some(index), Way::Bent).is_none(), "nothing goes on from {event:?}");
-        assert_eq!(event.met.map(|met| met.reflected), Some(1.0));
+        assert_eq!(event.interaction.map(|interaction| interaction.reflected), Some(1.0));
     }
 }
 
@@ -92,7 +98,7 @@ fn one_body_in_another_has_the_ratio_of_both() {
     let mut ratios = Vec::new();
     let mut at = after(&events, None, Way::Seen);
     while let Some((index, event)) = at {
-        ratios.extend(event.met.map(|met| met.ratio));
+        ratios.extend(event.interaction.map(|interaction| interaction.ratio));
         at = after(&events, Some(index), Way::Bent);
     }
     let expected = [1.3, 1.7 / 1.3, 1.3 / 1.7, 1.0 / 1.3];
@@ -114,7 +120,7 @@ fn two_bodies_of_one_glass_that_overlap_are_one() {
     loop {
         let on = [Way::Seen, Way::Bent, Way::Straight].into_iter().find_map(|way| after(&events, from, way));
         let Some((index, event)) = on else { break };
-        ways.push((event.way, event.met.map(|met| met.ratio)));
+        ways.push((event.way, event.interaction.map(|interaction| interaction.ratio)));
         from = Some(index);
     }
     let expected = [
@@ -148,12 +154,12 @@ fn a_coat_and_what_lies_below_share_a_mirror_image() {
         // The ray meets the top, 0.25 m nearer than the middle.
         let events = middle(&made.0);
         let (first, seen) = after(&events, None, Way::Seen).expect("the plate");
-        let met = seen.met.expect("a surface");
-        assert!((met.reflected - (coat + (1.0 - coat) * metal)).abs() < 1e-6, "{}", met.reflected);
+        let interaction = seen.interaction.expect("a surface");
+        assert!((interaction.reflected - (coat + (1.0 - coat) * metal)).abs() < 1e-6, "{}", interaction.reflected);
         let (_, mirrored) = after(&events, Some(first), Way::Mirrored).expect("a mirror image");
         assert!((mirrored.share - followed).abs() < 1e-6, "{} for {followed}", mirrored.share);
         // What is too rough to be followed is spread.
-        assert_eq!(met.spreads, followed == coat);
+        assert_eq!(interaction.spreads, followed == coat);
     }
 }
 
@@ -182,9 +188,20 @@ fn what_stands_before_a_light_is_told() {
     made.camera(DVec3::new(0.0, 1.0, 5.0), DVec3::ZERO, perspective(30.0));
     let events = middle(&made.0);
     let (floor, seen) = after(&events, None, Way::Seen).expect("the floor");
-    assert!(seen.met.is_some_and(|met| met.instance == 0 && met.spreads) && seen.to.length() < 1e-6, "{seen:?}");
+    assert!(
+        seen.interaction.is_some_and(|interaction| interaction.instance == 0 && interaction.spreads)
+            && seen.to.length() < 1e-6,
+        "{seen:?}"
+    );
     let to = |light: usize| after(&events, Some(floor), Way::ToLight(light)).map(|(_, event)| event);
-    assert_eq!(to(0).and_then(|event| event.met).map(|met| met.instance), Some(1), "the board stands before the first");
-    assert!(to(1).is_some_and(|event| event.met.is_none() && (event.to - DVec3::new(4.0, 4.0, 0.0)).length() < 1e-9));
+    assert_eq!(
+        to(0).and_then(|event| event.interaction).map(|interaction| interaction.instance),
+        Some(1),
+        "the board stands before the first"
+    );
+    assert!(
+        to(1)
+            .is_some_and(|event| event.interaction.is_none() && (event.to - DVec3::new(4.0, 4.0, 0.0)).length() < 1e-9)
+    );
     assert!(to(2).is_none(), "the third lies below the floor");
 }

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use etalon::frame::{Renderer, Settings};
 use etalon::image::Picture;
-use etalon::plan::{Demand, Effect, EffectState, Knobs, Model};
+use etalon::plan::{Effect, EffectState, ForcedEffects, Knobs, Model};
 use etalon::scene::camera::DEFAULT_FOV_Y;
 use etalon::scene::environment::Environment;
 use etalon::scene::material::{Sampler, TextureRef};
-use etalon::scene::{AlphaMode, Ambience, Camera, Image, LightKind, LoadOptions, Material, Reads, Scene};
+use etalon::scene::{AlphaMode, AmbientLight, Camera, Image, LightKind, LoadOptions, Material, Prune, Scene};
 use etalon::study::{self, shape::Shape};
 use etalon_testing::gpu::{Gpu, bits};
 use etalon_testing::made::{Made, at, lambert, perspective};
@@ -16,7 +16,7 @@ use glam::DVec3;
 
 const SIZE: [u32; 2] = [48, 27];
 
-fn draw(gpu: &Gpu, scene: &Scene, knobs: &Knobs, demand: Demand) -> (Picture, Vec<Effect>) {
+fn draw(gpu: &Gpu, scene: &Scene, knobs: &Knobs, forced: ForcedEffects) -> (Picture, Vec<Effect>) {
     let studio = Environment::studio();
     let share = scene.studio.or(scene.lights.is_empty().then_some(1.0));
     let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
@@ -25,7 +25,7 @@ fn draw(gpu: &Gpu, scene: &Scene, knobs: &Knobs, demand: Demand) -> (Picture, Ve
     let settings = Settings {
         size: SIZE,
         knobs: knobs.clone(),
-        demand,
+        forced,
         environment_intensity: share.unwrap_or(1.0),
         ..Settings::default()
     };
@@ -36,12 +36,12 @@ fn draw(gpu: &Gpu, scene: &Scene, knobs: &Knobs, demand: Demand) -> (Picture, Ve
 }
 
 /// Effects that no demand includes: each makes another picture, or one with other roundings, wherever it is.
-const APART: [&str; 3] = ["bodies that touch", "bands of wavelengths", "dispersion"];
+const APART: [&str; 3] = ["coincident interfaces", "spectral rendering", "dispersion"];
 
 /// Both plans of a scene as it was loaded for each. Everything is kept in the one but what a knob drops, and what stands apart.
 fn is_the_same(gpu: &Gpu, name: &str, [lean, full]: [&Scene; 2], knobs: &Knobs) {
-    let (planned, _) = draw(gpu, lean, knobs, Demand::Scene);
-    let (everything, effects) = draw(gpu, full, knobs, Demand::Full);
+    let (planned, _) = draw(gpu, lean, knobs, ForcedEffects::None);
+    let (everything, effects) = draw(gpu, full, knobs, ForcedEffects::All);
     for effect in effects.iter().filter(|effect| effect.state == EffectState::NotCalledFor) {
         assert!(APART.contains(&effect.id.name()), "{name}: {}: {}", effect.id.name(), effect.reason());
     }
@@ -115,13 +115,14 @@ fn each_effect_alone() {
     let knobs = knobs(Model::Recursive, &["samples=1", "absorption=march:4"]);
     for name in ["radiance", "metals"] {
         let scene = study::load(name).expect("a scene");
-        let (planned, effects) = draw(&gpu, &scene, &knobs, Demand::Scene);
+        let (planned, effects) = draw(&gpu, &scene, &knobs, ForcedEffects::None);
         for effect in effects.iter().filter(|effect| effect.state == EffectState::NotCalledFor) {
-            let (with, account) = draw(&gpu, &scene, &knobs, Demand::With(effect.id));
+            let (with, account) = draw(&gpu, &scene, &knobs, ForcedEffects::One(effect.id));
             assert!(bits(&planned) == bits(&with), "{name}: {}", effect.id.name());
             let kept = account.iter().filter(|kept| kept.id == effect.id && kept.state == EffectState::Kept).count();
             // Surfaces light others along paths alone, and so do lights with a shape.
-            let needs_paths = ["aims", "surfaces that light", "lights with a shape"].contains(&effect.id.name());
+            let needs_paths =
+                ["path guiding", "emissive surfaces as lights", "analytic area lights"].contains(&effect.id.name());
             let kept_alone = !needs_paths && !APART.contains(&effect.id.name());
             assert_eq!(kept, usize::from(kept_alone), "{name}: {}", effect.id.name());
         }
@@ -182,8 +183,10 @@ fn surfaces_leave_each_other_alone() {
     let mut made = pair(coat, lambert([0.5; 3]));
     made.0.images.push(black);
     is_same("black coat", &made, &[]);
-    let (_, effects) = draw(&gpu, &made.0, &knobs(Model::Recursive, &["samples=1"]), Demand::Scene);
-    assert!(effects.iter().any(|effect| effect.id.name() == "layers" && effect.state == EffectState::NotCalledFor));
+    let (_, effects) = draw(&gpu, &made.0, &knobs(Model::Recursive, &["samples=1"]), ForcedEffects::None);
+    assert!(
+        effects.iter().any(|effect| effect.id.name() == "material layers" && effect.state == EffectState::NotCalledFor)
+    );
 }
 
 /// Files of a folder and those below it that can be loaded.
@@ -212,9 +215,9 @@ fn models_of_the_shared_assets() {
     let gpu = Gpu::hasty();
     let knobs = knobs(Model::Recursive, &["samples=1"]);
     for path in all {
-        let load = |reads| etalon::scene::load(&path, &LoadOptions { reads, ..LoadOptions::default() });
-        let lean = load(Reads::Visible(Ambience::WithoutLights)).expect("a scene");
-        let full = load(Reads::Everything).expect("a scene");
+        let load = |reads| etalon::scene::load(&path, &LoadOptions { prune: reads, ..LoadOptions::default() });
+        let lean = load(Prune::Unused(AmbientLight::WithoutLights)).expect("a scene");
+        let full = load(Prune::Nothing).expect("a scene");
         is_the_same(&gpu, &path.display().to_string(), [&lean, &full], &knobs);
     }
 }

@@ -1,7 +1,7 @@
 //! Study scenes in one white material before light from everywhere: nothing shows.
 
 use etalon::study;
-use etalon_testing::furnace::{Shown, in_one_material, shown, whites};
+use etalon_testing::furnace::{FurnaceRadiance, in_one_material, shown, whites};
 use etalon_testing::gpu::Gpu;
 
 /// Light that takes more than the 32 surfaces of a path to come out, of Lambert's 1: 0.8 % between the walls of `cornell`, 0.5 % in
@@ -18,7 +18,7 @@ fn no_study_scene_shows_in_a_white_furnace() {
     for &name in study::NAMES.iter().filter(|&&name| name != "pool") {
         let scene = study::load(name).expect("a scene");
         for (kind, white) in &whites() {
-            let Shown { mean, error } = shown(&gpu, &in_one_material(scene.clone(), white), 16);
+            let FurnaceRadiance { mean, error } = shown(&gpu, &in_one_material(scene.clone(), white), 16);
             eprintln!("{name}, {kind}: {mean:.6} ± {error:.6}");
             let above = if *kind == "rough metal" { TABLE } else { 0.0 };
             assert!(mean <= 1.0 + above + 4.0 * error, "{name}, {kind}: {mean} ± {error}");

@@ -3,6 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use etalon_testing::document::says;
+
 /// What each module of the renderer may name with `crate::`; the crates below it are re-exported by these names.
 const MAY_USE: &[(&str, &[&str])] = &[
     ("share", &["scene"]),
@@ -114,6 +116,16 @@ fn modules_know_only_what_lies_below_them() {
     }
     assert!(seen > 40, "only {seen} names found");
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_tour_shows_the_order_of_modules() {
+    let mut table = String::from("| module | uses |\n|---|---|\n");
+    for (module, uses) in MAY_USE {
+        let others: Vec<String> = uses.iter().filter(|name| *name != module).map(|name| format!("`{name}`")).collect();
+        table += &format!("| `{module}` | {} |\n", others.join(" "));
+    }
+    says(&Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/tour.md"), "modules", &table);
 }
 
 #[test]

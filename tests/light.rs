@@ -436,7 +436,7 @@ fn compensation_is_for_lights_too() {
     let furnace = seen(&scene, Some(&Environment::constant([1.0; 3])), "brdf=ggx");
     let direction = DVec3::new(0.0, -0.3, -1.0).normalize();
     scene.lights.push(etalon::scene::Light {
-        stand_in: false,
+        proxy: false,
         spectrum: None,
         extent: None,
         name: "sun".to_owned(),
@@ -465,7 +465,7 @@ fn exact_fresnel_of_a_half_metal_lies_between() {
         let material = Material { base_color: [0.5, 0.5, 0.5, 1.0], metallic, roughness: 0.3, ..Material::default() };
         let mut scene = ball(material);
         scene.lights.push(etalon::scene::Light {
-            stand_in: false,
+            proxy: false,
             spectrum: None,
             extent: None,
             name: "sun".to_owned(),

@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use etalon::frame::Settings;
 use etalon::plan::rungs::Quadrature;
-use etalon::plan::{Attenuation, Demand, Facts, Knobs, Model, Plan, Surroundings};
-use etalon::scene::normal_form::NormalForm;
+use etalon::plan::{Attenuation, Facts, ForcedEffects, Knobs, Model, Plan, Surroundings};
+use etalon::scene::canonical::CanonicalForm;
 use etalon::scene::{Camera, LightKind, Material, Scene, SigmaGrid};
 use etalon::study::shape::Shape;
 use etalon::upload::rays::Traversal;
@@ -520,8 +520,8 @@ fn planned(scene: &Scene, choices: &[&str]) -> Plan {
     let mut knobs = Knobs::of(Model::Recursive);
     choices.iter().for_each(|choice| knobs.set(choice).expect("a rung"));
     let surroundings =
-        Surroundings { environment: false, constant: false, grey: false, sky: false, demand: Demand::Scene };
-    Plan::new(scene, &Facts::of(scene, NormalForm::default()), surroundings, &knobs)
+        Surroundings { environment: false, constant: false, grey: false, sky: false, forced: ForcedEffects::None };
+    Plan::new(scene, &Facts::of(scene, CanonicalForm::default()), surroundings, &knobs)
 }
 
 #[test]
@@ -534,21 +534,21 @@ fn the_plan_says_which_grid_is_marched_and_what_is_not_said_in_vain() {
 
     let plan = planned(&made.0, &["absorption=march:8", "quadrature=simpson"]);
     assert_eq!((plan.march().steps, plan.march().rule), (8, Quadrature::Simpson));
-    let kept = effect(&plan, "media that vary");
-    assert_eq!((kept.state.name(), kept.rung()), ("kept", "march:8"));
+    let kept = effect(&plan, "heterogeneous media");
+    assert_eq!((kept.state.name(), kept.rung()), ("used", "march:8"));
     assert!(kept.reason().contains("\"fog\"") && kept.evidence["grid"] == "1 x 1 x 3", "{kept:?}");
-    assert_eq!((effect(&plan, "quadrature").state.name(), effect(&plan, "quadrature").rung()), ("kept", "simpson"));
+    assert_eq!((effect(&plan, "quadrature").state.name(), effect(&plan, "quadrature").rung()), ("used", "simpson"));
     assert!(plan.warnings.is_empty(), "{:?}", plan.warnings);
 
     let plan = planned(&made.0, &["quadrature=simpson"]);
     assert_eq!(plan.march().steps, 0);
-    assert_eq!(effect(&plan, "media that vary").reason(), "absorption=path");
+    assert_eq!(effect(&plan, "heterogeneous media").reason(), "absorption=path");
     assert!(warned(&plan, &["\"fog\"", "absorption=path", "mean", "march:4"]), "{:?}", plan.warnings);
     assert!(warned(&plan, &["quadrature=simpson changes nothing"]), "{:?}", plan.warnings);
-    assert_eq!(effect(&plan, "quadrature").state.name(), "not called for");
+    assert_eq!(effect(&plan, "quadrature").state.name(), "not needed");
 
     let plan = planned(&made.0, &["absorption=march:8", "refraction=off"]);
-    assert_eq!((plan.march().steps, effect(&plan, "media that vary").reason().as_str()), (0, "refraction=off"));
+    assert_eq!((plan.march().steps, effect(&plan, "heterogeneous media").reason().as_str()), (0, "refraction=off"));
     assert!(warned(&plan, &["\"fog\"", "refraction=off"]), "{:?}", plan.warnings);
 
     made.0.materials[0].sigma = None;

@@ -7,7 +7,7 @@ use etalon::frame::{Renderer, Settings, TileShare};
 use etalon::open;
 use etalon::plan::{Knobs, Model};
 use etalon::scene::environment::Environment;
-use etalon::scene::{Camera, Reads, Scene, Source};
+use etalon::scene::{Camera, Prune, Scene, Source};
 use etalon_testing::gpu::{Gpu, bits};
 
 fn settings(model: Model, samples: &str) -> Settings {
@@ -55,7 +55,7 @@ fn moments_of_an_animation_are_drawn_as_if_each_were_the_first() {
             eprintln!("skipped: {} is absent", path.display());
             continue;
         }
-        let source = Source::open(&path, Reads::Everything).unwrap();
+        let source = Source::open(&path, Prune::Nothing).unwrap();
         same_at_all_moments(&gpu, source, &[None, Some(0.2), Some(0.9)], &settings(model, samples));
     }
     assert_eq!(gpu.errors(), Vec::<String>::new());

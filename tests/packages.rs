@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
 
+use etalon_testing::document::says;
 use serde_json::Value;
 
 fn cargo(arguments: &[&str]) -> Vec<u8> {
@@ -79,6 +80,36 @@ fn every_crate_says_what_it_is() {
             assert!(!text(package, key).is_empty(), "{name} has no {key}");
         }
     }
+}
+
+/// The table of docs/tour.md: a crate stands below those that it uses.
+#[test]
+fn the_tour_shows_the_crates() {
+    let metadata = metadata();
+    let own = own(&metadata);
+    let mut crates: BTreeMap<&str, (&str, BTreeSet<&str>)> = BTreeMap::new();
+    for package in metadata["packages"].as_array().expect("packages").iter().filter(|p| own.contains(text(p, "id"))) {
+        let used = package["dependencies"].as_array().expect("dependencies").iter();
+        let used = used.filter(|d| d["path"].is_string() && d["kind"] != "dev").map(|d| text(d, "name")).collect();
+        crates.insert(text(package, "name"), (text(package, "description"), used));
+    }
+    let mut table = String::from("| crate | what it is | uses |\n|---|---|---|\n");
+    let mut placed = BTreeSet::new();
+    while placed.len() < crates.len() {
+        let ready: Vec<&str> = crates
+            .iter()
+            .filter(|(name, (_, used))| !placed.contains(*name) && used.is_subset(&placed))
+            .map(|(name, _)| *name)
+            .collect();
+        assert!(!ready.is_empty(), "crates use each other in a circle");
+        for name in ready {
+            let (about, used) = &crates[name];
+            let used: Vec<String> = used.iter().map(|used| format!("`{used}`")).collect();
+            table += &format!("| `{name}` | {about} | {} |\n", used.join(" "));
+            placed.insert(name);
+        }
+    }
+    says(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/tour.md"), "crates", &table);
 }
 
 #[test]

@@ -279,8 +279,8 @@ fn where_no_ray_is_sent_parts_are_zero_and_that_is_said() {
     let mut made = Made::new("matte");
     made.add(Shape::sphere(0.5, 16), lambert([0.5; 3]), DAffine3::IDENTITY);
     made.add(Shape::panel(1.0, 1.0), unlit([0.5; 3]), at(1.0, 0.0, 0.0));
-    let see_through = Material { alpha_mode: AlphaMode::Blend, ..lambert([0.5, 0.5, 0.5]) };
-    made.add(Shape::panel(0.5, 0.5), see_through, at(0.0, 0.0, 1.0));
+    let transparency = Material { alpha_mode: AlphaMode::Blend, ..lambert([0.5, 0.5, 0.5]) };
+    made.add(Shape::panel(0.5, 0.5), transparency, at(0.0, 0.0, 1.0));
     made.camera(DVec3::Z * 3.0, DVec3::ZERO, perspective(50.0));
     let sky = Environment::constant([1.0; 3]);
     let drawn = || traced([64, 36], &["samples=4"]);

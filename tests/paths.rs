@@ -9,8 +9,8 @@ use etalon::scene::solid::solids;
 use etalon::scene::{Extent, Light, LightKind, Material, Projection, Scene};
 use etalon::study::shape::Shape;
 use etalon::transport::bvh::Bvh;
-use etalon::transport::caustics::Aims;
-use etalon::transport::emitters::{Emitters, Sky, Source};
+use etalon::transport::emitters::{EmitterSource, Emitters, Sky};
+use etalon::transport::photon_guiding::PhotonGuiding;
 use etalon_testing::gpu::{Gpu, bits};
 use etalon_testing::made::{Made, at, lambert, orthographic, perspective};
 use glam::{DAffine3, DVec3};
@@ -66,7 +66,7 @@ fn lights_with_a_shape_light_as_their_form_factors_say() {
         spectrum: None,
         extent,
         kind,
-        stand_in: false,
+        proxy: false,
     };
     let position = DVec3::Z;
     let point = LightKind::Point { position, range: None };
@@ -148,7 +148,7 @@ fn shapes_cast_soft_shadows() {
     let right = std::f64::consts::FRAC_PI_2;
     let kind = LightKind::Spot { position, direction: DVec3::NEG_Z, range: None, inner: right, outer: right };
     let extent = Some(Extent::Rectangle { across: DVec3::X * 0.5, half_height: 0.5 });
-    let light = Light { name: "lamp".to_owned(), color: [2.0; 3], spectrum: None, extent, kind, stand_in: false };
+    let light = Light { name: "lamp".to_owned(), color: [2.0; 3], spectrum: None, extent, kind, proxy: false };
     let (mut scene, _) = under(light, 0.0);
     let open = draw(&gpu, &scene, None, settings([8, 8], &["samples=256"]));
     let mut made = Made(scene.clone());
@@ -328,7 +328,7 @@ fn by_a_mirror() -> (Made, f64) {
 fn aims_take_the_noise_and_leave_the_mean() {
     let gpu = Gpu::open();
     let (made, radiance) = by_a_mirror();
-    let [off, aims] = ["guiding=off", "guiding=aims"].map(|guiding| {
+    let [off, aims] = ["guiding=off", "guiding=photons"].map(|guiding| {
         let film = draw(&gpu, &made.0, None, settings([16, 16], &["samples=1024", "interfaces=4", guiding]));
         let [mean, deviation, _] = spread(&film, 1);
         eprintln!("{guiding}: {mean:.6} ± {deviation:.6}, expected {radiance:.6}");
@@ -344,10 +344,10 @@ fn aims_are_where_light_is_mirrored() {
     let (made, _) = by_a_mirror();
     let scene = &made.0;
     let bvh = Bvh::build(scene).expect("a hierarchy");
-    let aims = Aims::of(scene, &solids(scene), &bvh, &Emitters::of(scene, None, true));
+    let aims = PhotonGuiding::of(scene, &solids(scene), &bvh, &Emitters::of(scene, None, true));
     let floor = ((-bvh.anchor - aims.corner) / aims.cell).floor().as_uvec3();
     let word = aims.firsts[(floor.x + aims.cells[0] * (floor.y + aims.cells[1] * floor.z)) as usize];
-    let balls = &aims.aims[(word >> 4) as usize..][..(word & 15) as usize];
+    let balls = &aims.spheres[(word >> 4) as usize..][..(word & 15) as usize];
     assert!(!balls.is_empty());
     assert!(balls.iter().map(|ball| ball.share).sum::<f64>() == 1.0 && balls.iter().all(|ball| ball.share > 0.0));
     assert!(balls.iter().all(|ball| half::f16::from_f64(ball.share).to_f64() == ball.share), "{balls:?}");
@@ -364,7 +364,7 @@ fn aims_are_where_light_is_mirrored() {
     for change in not_mirrors {
         let mut matt = made.0.clone();
         matt.materials.iter_mut().for_each(change);
-        assert!(Aims::of(&matt, &solids(&matt), &bvh, &Emitters::of(&matt, None, true)).aims.is_empty());
+        assert!(PhotonGuiding::of(&matt, &solids(&matt), &bvh, &Emitters::of(&matt, None, true)).spheres.is_empty());
     }
 }
 
@@ -423,7 +423,7 @@ fn a_lamp_is_drawn_by_its_power_and_the_sky_where_it_is_bright() {
     let emitters = Emitters::of(&scene, None, true);
     // The point light, which the plan takes out, and the two triangles of the panel, 1.3 m by 1.05 m of radiance 12.
     let [point, one, other] = emitters.list[..] else { panic!("{emitters:?}") };
-    assert_eq!(point.source, Source::Punctual(0));
+    assert_eq!(point.source, EmitterSource::Punctual(0));
     assert!((one.probability - other.probability).abs() < 1e-9);
     let (panel, lamp) = (1.3 * 1.05 * 12.0 * std::f64::consts::PI, 16.4 * 4.0 * std::f64::consts::PI);
     assert!((point.probability - lamp / (lamp + panel)).abs() < 1e-6, "{point:?}");
@@ -431,7 +431,7 @@ fn a_lamp_is_drawn_by_its_power_and_the_sky_where_it_is_bright() {
     let mut map = Environment::dark();
     map.radiance[(64 * map.width + 100) as usize] = [100.0; 3];
     let around = |map, rotation| Some(Sky { map, intensity: 1.0, rotation });
-    let sky = Emitters::of(&Scene::default(), around(&map, 0.0), true).sky;
+    let sky = Emitters::of(&Scene::default(), around(&map, 0.0), true).environment;
     // The three rows around that texel share all but what every other has at least.
     let share = |row: usize| sky.words[row + 1].wrapping_sub(sky.words[row]);
     assert!(share(63) > 1 << 30 && share(64) > 1 << 30 && share(65) > 1 << 30);
@@ -439,7 +439,7 @@ fn a_lamp_is_drawn_by_its_power_and_the_sky_where_it_is_bright() {
     // Directions lie around it, and turn as what is seen of it does: into the environment by the angle, out of it back.
     let cell = std::f64::consts::PI / 256.0;
     for rotation in [0.0_f32, 50.0] {
-        let sky = Emitters::of(&Scene::default(), around(&map, rotation), true).sky;
+        let sky = Emitters::of(&Scene::default(), around(&map, rotation), true).environment;
         let (sin, cos) = f64::from(rotation).to_radians().sin_cos();
         for word in [1_u32 << 29, 1 << 31, 3 << 30] {
             let d = sky.direction([word; 2]);

@@ -4,7 +4,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use etalon::optics::catalogue::{columns, vector};
-use etalon::optics::{Draw, Tier};
+use etalon::optics::{SplitMix64, Tier};
 use etalon_testing::gpu::Gpu;
 use etalon_testing::probe::{PROMISING, column, evaluate, value};
 use glam::DVec3;
@@ -16,7 +16,7 @@ fn wide(row: &[f32]) -> Vec<f64> {
 }
 
 /// A direction on N's side, at least `least` radians above the horizon.
-fn above(draw: &mut Draw, n: DVec3, least: f64) -> DVec3 {
+fn above(draw: &mut SplitMix64, n: DVec3, least: f64) -> DVec3 {
     let angle = draw.between(0.0, FRAC_PI_2 - least);
     draw.at_angle(n, angle)
 }
@@ -24,7 +24,7 @@ fn above(draw: &mut Draw, n: DVec3, least: f64) -> DVec3 {
 #[test]
 fn reflected_and_transmitted_power_are_one() {
     let gpu = Gpu::open();
-    let mut draw = Draw::new(1);
+    let mut draw = SplitMix64::new(1);
     let dielectrics: Vec<Vec<f32>> = (0..CASES).map(|_| vec![draw.unit() as f32, draw.log(0.2, 5.0) as f32]).collect();
     let metals: Vec<Vec<f32>> =
         (0..CASES).map(|_| vec![draw.unit() as f32, draw.log(0.05, 5.0) as f32, draw.log(0.5, 8.0) as f32]).collect();
@@ -70,7 +70,7 @@ fn reflectance_never_falls_on_the_way_to_the_critical_angle() {
 #[test]
 fn refraction_obeys_snell_and_can_be_undone() {
     let gpu = Gpu::open();
-    let mut draw = Draw::new(2);
+    let mut draw = SplitMix64::new(2);
     let rows: Vec<Vec<f32>> = (0..CASES)
         .map(|_| {
             let n = draw.direction();
@@ -117,7 +117,7 @@ fn refraction_obeys_snell_and_can_be_undone() {
 #[test]
 fn a_chain_of_reflections_keeps_its_length() {
     let gpu = Gpu::open();
-    let mut draw = Draw::new(3);
+    let mut draw = SplitMix64::new(3);
     let mut drift = |tier| {
         let mut directions: Vec<DVec3> = (0..1000).map(|_| draw.direction()).collect();
         let mut longest: f64 = 0.0;
@@ -142,8 +142,8 @@ fn configuration(n: DVec3, l: DVec3, v: DVec3, parameters: &[f32]) -> Vec<f32> {
 }
 
 /// Rows with L and V, and the same with both exchanged.
-fn exchanged(seed: u64, parameters: impl Fn(&mut Draw) -> Vec<f32>) -> [Vec<Vec<f32>>; 2] {
-    let mut draw = Draw::new(seed);
+fn exchanged(seed: u64, parameters: impl Fn(&mut SplitMix64) -> Vec<f32>) -> [Vec<Vec<f32>>; 2] {
+    let mut draw = SplitMix64::new(seed);
     let mut pairs = (Vec::new(), Vec::new());
     for _ in 0..CASES {
         let n = draw.direction();
@@ -158,8 +158,8 @@ fn exchanged(seed: u64, parameters: impl Fn(&mut Draw) -> Vec<f32>) -> [Vec<Vec<
 #[test]
 fn brdfs_that_claim_reciprocity_have_it() {
     let gpu = Gpu::open();
-    let phong = |draw: &mut Draw| vec![1.0, 0.1, 0.5, draw.log(1.0, 1e4) as f32];
-    let ggx = |draw: &mut Draw| vec![draw.log(1e-3, 1.0) as f32, draw.unit() as f32];
+    let phong = |draw: &mut SplitMix64| vec![1.0, 0.1, 0.5, draw.log(1.0, 1e4) as f32];
+    let ggx = |draw: &mut SplitMix64| vec![draw.log(1e-3, 1.0) as f32, draw.unit() as f32];
     for tier in PROMISING {
         for (name, output, [a, b]) in
             [("reciprocal_phong", "fr_spec", exchanged(4, phong)), ("ggx", "fr", exchanged(5, ggx))]
@@ -330,7 +330,7 @@ fn solid_angles_of_known_triangles() {
 #[test]
 fn both_angles_of_a_boundary_are_those_of_its_reflectance() {
     let gpu = Gpu::open();
-    let mut draw = Draw::new(9);
+    let mut draw = SplitMix64::new(9);
     for tier in PROMISING {
         for _ in 0..200 {
             let (n_in, n_out) = (draw.between(1.05, 3.0) as f32, draw.between(1.0, 1.04) as f32);

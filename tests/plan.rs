@@ -112,8 +112,8 @@ impl Case {
     fn check(self) -> [Drawn; 2] {
         let Self { effect, reason, scenes, environments, choices, brings, same } = self;
         let [without, with] = [0, 1].map(|i| draw(&scenes[i].0, environments[i].as_ref(), choices));
-        assert_eq!(state(&without.plan, effect), ("not called for", reason.to_owned()), "{effect}");
-        assert_eq!(state(&with.plan, effect).0, "kept", "{effect}: {}", state(&with.plan, effect).1);
+        assert_eq!(state(&without.plan, effect), ("not needed", reason.to_owned()), "{effect}");
+        assert_eq!(state(&with.plan, effect).0, "used", "{effect}: {}", state(&with.plan, effect).1);
         let mut brings: Vec<&str> = brings.concat();
         brings.sort_unstable();
         assert_eq!(came(&without, &with), brings, "{effect}");
@@ -189,10 +189,10 @@ const FRAGMENTS: &[&str] = &[
 ];
 /// A copy of the picture to look up.
 const SCREEN: &[&str] = &[
-    "nearest pieces of tiles",
+    "nearest depth of tiles",
     "radiance on the screen",
     "[copy radiance]",
-    "[nearest pieces of tiles]",
+    "[nearest depth of tiles]",
     "screen_tiles",
 ];
 const TEXTURES: &[&str] = &["texture coordinates 0"];
@@ -235,12 +235,13 @@ fn surfaces_bring_their_targets() {
     with.0.materials[2].specular_texture = Some(texture);
     Case {
         brings: &[TEXTURES, &["G-buffer layers", "gbuffer.textures", "light.stored_layers"]],
-        ..Case::new("layers", NONE, ball(metal(0.5), None), with)
+        ..Case::new("material layers", NONE, ball(metal(0.5), None), with)
     }
     .check();
 
     let gold = Material { conductor: Some([[0.2, 3.1]; 3]), ..metal(0.5) };
-    Case { brings: &[&["light.conductors"]], ..Case::hidden("metals by n and kappa", NONE, metal(0.5), gold) }.check();
+    Case { brings: &[&["light.conductors"]], ..Case::hidden("conductors with n and kappa", NONE, metal(0.5), gold) }
+        .check();
 }
 
 #[test]
@@ -258,7 +259,7 @@ fn what_lets_light_through_brings_its_passes() {
     Case { choices: screen, brings: &[FRAGMENTS, SCREEN], ..Case::hidden("refraction", NONE, metal(0.5), glass()) }
         .check();
     let veil = Material { base_color: [1.0, 1.0, 1.0, 0.5], alpha_mode: AlphaMode::Blend, ..metal(0.5) };
-    Case { brings: &[FRAGMENTS], ..Case::hidden("see-through surfaces", NONE, metal(0.5), veil) }.check();
+    Case { brings: &[FRAGMENTS], ..Case::hidden("order-independent transparency", NONE, metal(0.5), veil) }.check();
 }
 
 #[test]
@@ -266,7 +267,7 @@ fn media_bring_their_code() {
     let fog = SigmaGrid::new([2, 2, 2], vec![0.1; 8], None).expect("a grid");
     let fog = Material { sigma: Some(Arc::new(fog)), ..glass() };
     let tinted = || Material { attenuation_color: [0.5; 3], attenuation_distance: 0.1, ..glass() };
-    let march = Case::new("media that vary", NONE, ball(metal(0.5), Some(tinted())), ball(metal(0.5), Some(fog)));
+    let march = Case::new("heterogeneous media", NONE, ball(metal(0.5), Some(tinted())), ball(metal(0.5), Some(fog)));
     Case { choices: &["absorption=march:4"], brings: &[&["grids of sigma", "interact.march_steps"]], ..march }.check();
     let absorbs = Case::new("absorption", NONE, ball(metal(0.5), Some(glass())), ball(metal(0.5), Some(tinted())));
     Case { brings: &[&["interact.absorption"]], ..absorbs }.check();
@@ -276,8 +277,11 @@ fn media_bring_their_code() {
         made
     };
     let reason = "no transparent body lies against another surface";
-    Case { brings: &[&["interact.touching"]], ..Case::new("bodies that touch", reason, slabs(0.01), slabs(0.0)) }
-        .check();
+    Case {
+        brings: &[&["interact.coincident_interfaces"]],
+        ..Case::new("coincident interfaces", reason, slabs(0.01), slabs(0.0))
+    }
+    .check();
 }
 
 #[test]
@@ -287,14 +291,14 @@ fn light_from_all_around_is_there_where_it_is_seen() {
     let mirrors = "no material in use mirrors anything";
     Case {
         brings: &[&["prefiltered environment", "light.reflection"]],
-        ..Case::hidden("mirrored environment", mirrors, chalk(), metal(0.5))
+        ..Case::hidden("environment reflection", mirrors, chalk(), metal(0.5))
     }
     .check();
     // What is made of glass that bends nothing mirrors nothing.
     let air = Material { ior: 1.0, specular: 1.0, ..chalk() };
     Case {
         brings: &[&["prefiltered environment", "light.reflection"]],
-        ..Case::hidden("mirrored environment", mirrors, air, metal(0.5))
+        ..Case::hidden("environment reflection", mirrors, air, metal(0.5))
     }
     .check();
     let around =
@@ -318,9 +322,9 @@ fn light_from_all_around_is_there_where_it_is_seen() {
 #[test]
 fn aims() {
     Case {
-        choices: &["indirect=path", "lights=area:1", "guiding=aims"],
-        brings: &[&["aims", "cells of aims", "path.aimed"]],
-        ..Case::hidden("aims", NONE, metal(0.3), metal(0.0))
+        choices: &["indirect=path", "lights=area:1", "guiding=photons"],
+        brings: &[&["path guiding", "guiding cells", "path.path_guiding"]],
+        ..Case::hidden("path guiding", NONE, metal(0.3), metal(0.0))
     }
     .check();
 }
@@ -329,21 +333,21 @@ fn aims() {
 fn mirrors_bring_rays_and_rays_what_they_may_meet() {
     Case {
         brings: &[HIERARCHY, TILES, &["[reflection and refraction]", "interact", "light.mirror_rays"]],
-        ..Case::hidden("mirrors", NONE, metal(0.5), metal(0.0))
+        ..Case::hidden("reflection", NONE, metal(0.5), metal(0.0))
     }
     .check();
     let screen = &["reflection=screen"];
     Case {
         choices: screen,
-        brings: &[TILES, SCREEN, &["[mirror images on the screen]", "mirror"]],
-        ..Case::hidden("mirrors", NONE, metal(0.5), metal(0.0))
+        brings: &[TILES, SCREEN, &["[screen-space reflection]", "mirror"]],
+        ..Case::hidden("reflection", NONE, metal(0.5), metal(0.0))
     }
     .check();
-    Case { brings: &[&["interact.rough"]], ..Case::hidden("rays by lobes", NONE, metal(0.0), metal(0.1)) }.check();
+    Case { brings: &[&["interact.rough"]], ..Case::hidden("glossy reflection", NONE, metal(0.0), metal(0.1)) }.check();
     let holes = Material { base_color: [1.0, 1.0, 1.0, 0.5], alpha_mode: AlphaMode::Mask(0.5), ..metal(0.5) };
     Case {
         brings: &[&["gbuffer.masked", "interact.masked_hits"]],
-        ..Case::hidden("holes before rays", NONE, metal(0.0), holes)
+        ..Case::hidden("alpha test in rays", NONE, metal(0.0), holes)
     }
     .check();
     let sheet = Material { thickness: 0.0, ..glass() };
@@ -351,7 +355,7 @@ fn mirrors_bring_rays_and_rays_what_they_may_meet() {
     Case {
         choices: off,
         brings: &[FRAGMENTS, &["interact.transmissive"]],
-        ..Case::hidden("transmission before rays", NONE, metal(0.0), sheet)
+        ..Case::hidden("transmissive hits", NONE, metal(0.0), sheet)
     }
     .check();
 }
@@ -408,11 +412,11 @@ fn lights_are_there_where_something_is_lit() {
     Case {
         environments: dark(),
         brings: &[FRAGMENTS, &["light.filters"]],
-        ..Case::new("light through surfaces", NONE, without, with)
+        ..Case::new("transparent shadows", NONE, without, with)
     }
     .check();
     let (without, with) = (lit(ball(chalk(), None), 15), lit(ball(chalk(), None), 16));
-    let lists = Case::new("light lists per tile", "few point and spot lights", without, with);
+    let lists = Case::new("tiled light culling", "few point and spot lights", without, with);
     Case {
         environments: dark(),
         same: false,
@@ -476,8 +480,8 @@ fn black_textures_call_for_nothing() {
             draw(&made.0, Some(&environment), &[])
         };
         let (black, without) = (drawn(Some(texel)), drawn(None));
-        assert_eq!(state(&without.plan, effect).0, "not called for", "{effect}");
-        assert_eq!(state(&black.plan, effect).0, "not called for", "{effect}");
+        assert_eq!(state(&without.plan, effect).0, "not needed", "{effect}");
+        assert_eq!(state(&black.plan, effect).0, "not needed", "{effect}");
         assert!(bits(&black.film) == bits(&without.film), "{effect}: the pictures differ");
     }
 }
@@ -513,7 +517,7 @@ fn dark_lights_are_no_lights() {
     let mut dark = ball(lambert([0.5; 3]), None);
     dark.light([0.0; 3], lamp(1.0));
     let dark = draw(&dark.0, None, &[]);
-    assert_eq!(state(&dark.plan, "shadows"), ("not called for", "all lights of the scene are dark".to_owned()));
+    assert_eq!(state(&dark.plan, "shadows"), ("not needed", "all lights of the scene are dark".to_owned()));
     assert!(dark.plan.rays.is_none());
     assert!(dark.film.rgba.iter().all(|pixel| pixel[..3] == [0.0; 3]));
 }
@@ -538,7 +542,7 @@ fn lights_out_of_range_are_no_lights() {
     let mut far = ball(chalk(), None);
     far.light([10.0; 3], lamp(-12.0, 10.9));
     let far = draw(&far.0, None, &[]);
-    assert_eq!(state(&far.plan, "shadows"), ("not called for", "no light of the scene reaches anything".to_owned()));
+    assert_eq!(state(&far.plan, "shadows"), ("not needed", "no light of the scene reaches anything".to_owned()));
     assert!(far.plan.rays.is_none());
     // As far as it says, and a little more, it is one.
     let mut touching = ball(chalk(), None);
@@ -564,9 +568,9 @@ fn alpha_calls_for_what_it_does() {
         assert!(came(&opaque, same).is_empty() && came(same, &opaque).is_empty());
         assert!(bits(&same.film) == bits(&opaque.film));
     }
-    let see_through =
-        blended.plan.effects.iter().find(|effect| effect.id.name() == "see-through surfaces").expect("one");
-    assert_eq!(see_through.evidence.get("alpha 1 everywhere").map(String::as_str), Some("default"));
+    let transparency =
+        blended.plan.effects.iter().find(|effect| effect.id.name() == "order-independent transparency").expect("one");
+    assert_eq!(transparency.evidence.get("alpha 1 everywhere").map(String::as_str), Some("default"));
 
     let none = draw(&ball(metal(0.0), None).0, Some(&environment), &[]);
     for (mode, alpha) in [(AlphaMode::Blend, 0.0), (AlphaMode::Mask(0.5), 0.4)] {
@@ -575,7 +579,7 @@ fn alpha_calls_for_what_it_does() {
         assert!(bits(&unseen.film) == bits(&none.film));
     }
     let veil = drawn(AlphaMode::Blend, 0.5);
-    assert!(bits(&veil.film) != bits(&opaque.film) && veil.plan.see_through);
+    assert!(bits(&veil.film) != bits(&opaque.film) && veil.plan.transparency);
 }
 
 #[test]

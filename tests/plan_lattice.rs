@@ -6,12 +6,12 @@ use std::sync::{Arc, OnceLock};
 
 use etalon::frame::{Background, Part, Settings};
 use etalon::image::Picture;
-use etalon::plan::{Demand, EffectState, Facts, Knobs, Plan, Surroundings};
+use etalon::plan::{EffectState, Facts, ForcedEffects, Knobs, Plan, Surroundings};
+use etalon::scene::canonical::canonicalise;
 use etalon::scene::environment::Environment;
 use etalon::scene::material::{Sampler, TextureRef};
-use etalon::scene::normal_form::normalise;
-use etalon::scene::reads::forget_unread;
-use etalon::scene::{AlphaMode, Ambience, Image, LightKind, Material, Reads, SigmaGrid};
+use etalon::scene::prune::prune_unused;
+use etalon::scene::{AlphaMode, AmbientLight, Image, LightKind, Material, Prune, SigmaGrid};
 use etalon::study::shape::Shape;
 use etalon::upload::rays::Traversal;
 use etalon_testing::gpu::{Gpu, bits};
@@ -63,8 +63,10 @@ impl Ways {
                 &[(plan.screen.refraction, "screen"), (rays.refraction, "ray"), (transmits, "off")],
                 "none",
             ),
-            blended: plan.see_through
-                && (!transmits || rays.refraction || effect("see-through surfaces").reason().contains("veil")),
+            blended: plan.transparency
+                && (!transmits
+                    || rays.refraction
+                    || effect("order-independent transparency").reason().contains("veil")),
             listed: plan.tiles,
         }
     }
@@ -313,7 +315,7 @@ fn knobs_of_paths(ways: &Ways, choice: &Choice) -> Knobs {
     knobs
 }
 
-fn drawn(gpu: &Gpu, ways: &Ways, choice: &Choice, demand: Demand, by_paths: bool) -> (Plan, Picture) {
+fn drawn(gpu: &Gpu, ways: &Ways, choice: &Choice, forced: ForcedEffects, by_paths: bool) -> (Plan, Picture) {
     let made = scene(ways, choice);
     let environment = match level(choice, "environment") {
         "none" => None,
@@ -338,7 +340,7 @@ fn drawn(gpu: &Gpu, ways: &Ways, choice: &Choice, demand: Demand, by_paths: bool
             _ => Traversal::Stack,
         }),
         parts,
-        demand,
+        forced,
         ..Settings::default()
     };
     let mut renderer = gpu.renderer(&made.0, environment.as_ref(), settings);
@@ -354,12 +356,12 @@ fn drawn(gpu: &Gpu, ways: &Ways, choice: &Choice, demand: Demand, by_paths: bool
 fn draw_all(share: &str) {
     let gpu = Gpu::hasty();
     for (i, (ways, choice)) in spread().iter().enumerate().filter(|(_, (ways, _))| ways.shadows == share) {
-        let (plan, film) = drawn(&gpu, ways, choice, Demand::Scene, false);
+        let (plan, film) = drawn(&gpu, ways, choice, ForcedEffects::None, false);
         assert_eq!(Ways::of(&plan), *ways, "{choice:?}: {:#?}", plan.effects);
         // The pictures of everything take as long again: a sixth of them. All 144 were compared once: 143 were the same to the
         // last bit, one differed in one pixel by two roundings, with no single effect at fault.
         if i % 6 == 0 {
-            let (_, full) = drawn(&gpu, ways, choice, Demand::Full, false);
+            let (_, full) = drawn(&gpu, ways, choice, ForcedEffects::All, false);
             let named: Vec<_> = FACTORS.iter().zip(choice).map(|(f, &c)| (f.name, f.levels[c])).collect();
             assert!(bits(&film) == bits(&full), "{ways:?} {named:?}");
         }
@@ -387,9 +389,9 @@ fn plans_with_shadow_rays() {
 fn plans_with_paths() {
     let gpu = Gpu::hasty();
     for (i, (ways, choice)) in spread().iter().enumerate().filter(|(i, _)| i % 24 == 0) {
-        let (plan, film) = drawn(&gpu, ways, choice, Demand::Scene, true);
-        assert!(plan.paths.is_some() && !plan.tiles && !plan.see_through && !plan.shadow_maps, "{ways:?}");
-        let (_, full) = drawn(&gpu, ways, choice, Demand::Full, true);
+        let (plan, film) = drawn(&gpu, ways, choice, ForcedEffects::None, true);
+        assert!(plan.paths.is_some() && !plan.tiles && !plan.transparency && !plan.shadow_maps, "{ways:?}");
+        let (_, full) = drawn(&gpu, ways, choice, ForcedEffects::All, true);
         let named: Vec<_> = FACTORS.iter().zip(choice).map(|(f, &c)| (f.name, f.levels[c])).collect();
         let different = bits(&film).iter().zip(bits(&full)).filter(|(a, b)| *a != b).count();
         assert!(different == 0, "{i}: {different} pixels differ: {ways:?} {named:?}");
@@ -412,21 +414,27 @@ fn paths_call_for_what_they_may_meet() {
         "absorption",
         "clear coat",
         "environment",
-        "frosted surfaces",
-        "holes before rays",
-        "light through surfaces",
-        "media that vary",
-        "metals by n and kappa",
+        "rough transmission",
+        "alpha test in rays",
+        "transparent shadows",
+        "heterogeneous media",
+        "conductors with n and kappa",
         "punctual lights",
-        "transmission before rays",
+        "transmissive hits",
     ] {
-        assert!(of(name).contains(&"kept") && of(name).contains(&"not called for"), "{name}: {:?}", of(name));
+        assert!(of(name).contains(&"used") && of(name).contains(&"not needed"), "{name}: {:?}", of(name));
     }
-    for name in ["ambient light", "light lists per tile", "mirrored environment", "mirrors", "see-through surfaces"] {
-        assert_eq!(of(name), ["dropped", "not called for"], "{name}");
+    for name in [
+        "ambient light",
+        "tiled light culling",
+        "environment reflection",
+        "reflection",
+        "order-independent transparency",
+    ] {
+        assert_eq!(of(name), ["switched off", "not needed"], "{name}");
     }
     // Some surface of each scene is rough, and one is shown as it is.
-    assert_eq!([of("paths"), of("rays by lobes"), of("surfaces that light")], [["kept"]; 3]);
+    assert_eq!([of("path tracing"), of("glossy reflection"), of("emissive surfaces as lights")], [["used"]; 3]);
 }
 
 #[test]
@@ -462,31 +470,31 @@ fn any_two_things_meet() {
 fn planned(ways: &Ways, choice: &Choice, knobs: Knobs) -> Plan {
     let Made(mut scene) = scene(ways, choice);
     let environment = level(choice, "environment");
-    let ambience = if environment == "none" { Ambience::Absent } else { Ambience::Present };
-    forget_unread(&mut scene, Reads::Visible(ambience));
-    let form = normalise(&mut scene);
+    let ambience = if environment == "none" { AmbientLight::Absent } else { AmbientLight::Present };
+    prune_unused(&mut scene, Prune::Unused(ambience));
+    let form = canonicalise(&mut scene);
     let surroundings = Surroundings {
         environment: environment != "none",
         constant: environment == "constant",
         grey: false,
         sky: environment != "none",
-        demand: Demand::Scene,
+        forced: ForcedEffects::None,
     };
     Plan::new(&scene, &Facts::of(&scene, form), surroundings, &knobs)
 }
 
 /// Effects that are only kept where another one is, and so where those are that it needs.
 const NEEDS: &[(&str, &str)] = &[
-    ("absorption", "transmission before rays"),
+    ("absorption", "transmissive hits"),
     ("ambient light", "environment"),
-    ("clear coat", "layers"),
-    ("light lists per tile", "punctual lights"),
-    ("light through surfaces", "shadows"),
-    ("media that vary", "absorption"),
-    ("media that vary", "refraction"),
-    ("mirrored environment", "environment"),
-    ("prefiltered environment", "mirrored environment"),
-    ("quadrature", "media that vary"),
+    ("clear coat", "material layers"),
+    ("tiled light culling", "punctual lights"),
+    ("transparent shadows", "shadows"),
+    ("heterogeneous media", "absorption"),
+    ("heterogeneous media", "refraction"),
+    ("environment reflection", "environment"),
+    ("prefiltered environment", "environment reflection"),
+    ("quadrature", "heterogeneous media"),
     ("shadows", "punctual lights"),
 ];
 
@@ -510,14 +518,14 @@ fn any_two_effects_are_kept_together_and_apart() {
     }
     assert_eq!(states.keys().copied().collect::<Vec<_>>(), NAMES);
     for (name, states) in &states {
-        assert!(states.contains("kept") && states.contains("not called for"), "{name}: only {states:?}");
+        assert!(states.contains("used") && states.contains("not needed"), "{name}: only {states:?}");
     }
     let mut missed = Vec::new();
     for (i, a) in NAMES.iter().enumerate() {
         for b in &NAMES[i + 1..] {
             for (x, y) in [(true, true), (true, false), (false, true)] {
                 // Where a medium is marched there is a rule for it.
-                let marched = [*a, *b] == ["media that vary", "quadrature"] && x != y;
+                let marched = [*a, *b] == ["heterogeneous media", "quadrature"] && x != y;
                 let impossible = marched || (x && !y && needs(a, b)) || (y && !x && needs(b, a));
                 let pair = format!("({a}: {x}) ({b}: {y})");
                 if seen.contains(&pair) == impossible {
@@ -530,33 +538,34 @@ fn any_two_effects_are_kept_together_and_apart() {
 }
 
 /// Effects of paths: kept nowhere without them.
-const OF_PATHS: [&str; 5] = ["aims", "frosted surfaces", "lights with a shape", "paths", "surfaces that light"];
+const OF_PATHS: [&str; 5] =
+    ["path guiding", "rough transmission", "analytic area lights", "path tracing", "emissive surfaces as lights"];
 
 /// Effects of another rung of `colour`: tests/spectra.rs has them.
-const OF_WAVELENGTHS: [&str; 2] = ["bands of wavelengths", "dispersion"];
+const OF_WAVELENGTHS: [&str; 2] = ["spectral rendering", "dispersion"];
 
 /// Every other effect but the one that only the hierarchy of triangles tells.
 const NAMES: [&str; 22] = [
     "absorption",
+    "alpha test in rays",
     "ambient light",
     "clear coat",
+    "conductors with n and kappa",
     "emissive textures",
+    "environment reflection",
     "environment",
-    "holes before rays",
-    "layers",
-    "light lists per tile",
-    "light through surfaces",
-    "media that vary",
-    "metals by n and kappa",
-    "mirrored environment",
-    "mirrors",
+    "glossy reflection",
+    "heterogeneous media",
+    "material layers",
+    "order-independent transparency",
     "prefiltered environment",
     "punctual lights",
     "quadrature",
-    "rays by lobes",
+    "reflection",
     "refraction",
-    "see-through surfaces",
     "shadows",
     "sheen",
-    "transmission before rays",
+    "tiled light culling",
+    "transmissive hits",
+    "transparent shadows",
 ];

@@ -4,7 +4,7 @@
 //! which lets hit and miss disagree there and nowhere else.
 
 use etalon::frame::Settings;
-use etalon::plan::is_see_through;
+use etalon::plan::is_transparent;
 use etalon::scene::{Camera, LoadOptions, Scene, load};
 use etalon::study;
 use etalon::study::generate::{at_scale, checker_plane};
@@ -40,10 +40,10 @@ fn degrees(a: DVec3, b: DVec3) -> f64 {
 }
 
 /// What the G-buffer pass draws: see-through surfaces have a pass of their own.
-fn without_see_through(scene: &Scene) -> Scene {
+fn without_transparent(scene: &Scene) -> Scene {
     let mut opaque = scene.clone();
     for mesh in &mut opaque.meshes {
-        if is_see_through(&scene.materials[mesh.material], false) {
+        if is_transparent(&scene.materials[mesh.material], false) {
             mesh.indices.clear();
         }
     }
@@ -57,7 +57,7 @@ fn compare(gpu: &Gpu, scene: &Scene, camera: &Camera) -> Worst {
 fn compare_stored(gpu: &Gpu, scene: &Scene, camera: &Camera, stored: &[&str]) -> Worst {
     let settings = Settings { knobs: knobs(&[&["samples=1"], stored].concat()), ..settings(SIZE) };
     let (aovs, view) = gpu.renderer(scene, None, settings).aovs(camera).expect("the G-buffer");
-    let opaque = without_see_through(scene);
+    let opaque = without_transparent(scene);
     let oracle = etalon_testing::raycast::picture(
         &opaque,
         camera,

@@ -1,7 +1,7 @@
 //! Rays on the device where they are most likely to leak: aimed at an edge that two triangles share, and started from a
 //! surface.
 
-use etalon::optics::catalogue::{Draw, columns, vector};
+use etalon::optics::catalogue::{SplitMix64, columns, vector};
 use etalon::optics::{Tier, ray};
 use etalon_testing::gpu::Gpu;
 
@@ -25,7 +25,7 @@ fn exact(row: &[f32]) -> Vec<f64> {
 
 /// Triangles abc and bad on both sides of the edge ab as the ray sees them, and the ray, aimed at the edge; a third of
 /// the pairs nearly edge-on. Columns of two `ray_triangle` cases.
-fn at_shared_edge(d: &mut Draw) -> [Vec<f32>; 2] {
+fn at_shared_edge(d: &mut SplitMix64) -> [Vec<f32>; 2] {
     loop {
         let [a, b] = [0; 2].map(|_| d.direction());
         let target = a.lerp(b, d.between(0.1, 0.9));
@@ -64,7 +64,7 @@ fn at_shared_edge(d: &mut Draw) -> [Vec<f32>; 2] {
 #[test]
 fn no_ray_passes_between_two_triangles_with_a_common_edge() {
     let gpu = Gpu::open();
-    let mut draw = Draw::new(37);
+    let mut draw = SplitMix64::new(37);
     let pairs: Vec<[Vec<f32>; 2]> = (0..RAYS).map(|_| at_shared_edge(&mut draw)).collect();
     // How wide the narrower triangle of a pair is seen, in radians.
     let width = |pair: &[Vec<f32>; 2]| {
@@ -96,7 +96,7 @@ fn no_ray_passes_between_two_triangles_with_a_common_edge() {
 }
 
 /// A triangle with coordinates of about `size` and a place on it.
-fn hit_on_triangle(d: &mut Draw, size: f64) -> Vec<f32> {
+fn hit_on_triangle(d: &mut SplitMix64, size: f64) -> Vec<f32> {
     let place = DVec3::from_array([0; 3].map(|_| d.sign() * size * d.between(0.1, 1.0)));
     let extent = size * d.log(1e-3, 1.0);
     let [a, b, c] = [0; 3].map(|_| place + d.direction() * extent);
@@ -127,7 +127,7 @@ fn moved_off(gpu: &Gpu, fixed: Option<f32>, hits: &[Vec<f32>], size: f64) -> (us
 #[test]
 fn a_ray_starts_on_the_right_side_of_its_surface() {
     let gpu = Gpu::open();
-    let mut draw = Draw::new(38);
+    let mut draw = SplitMix64::new(38);
     for (size, fixed_fails) in [(1e-2, false), (1.0, false), (1e2, false), (1e3, true), (1e4, true), (1e5, true)] {
         let hits: Vec<Vec<f32>> = (0..20_000).map(|_| hit_on_triangle(&mut draw, size)).collect();
         let (wrong, shift) = moved_off(&gpu, None, &hits, size);

@@ -3,7 +3,7 @@
 
 use std::{f64::consts::FRAC_PI_2, fs, path::Path};
 
-use etalon::scene::{self, AlphaMode, Ambience, LightKind, LoadOptions, Projection, Reads, Scene, Wrap};
+use etalon::scene::{self, AlphaMode, AmbientLight, LightKind, LoadOptions, Projection, Prune, Scene, Wrap};
 use etalon::spectra::{Dispersion, Spectrum};
 use etalon_testing::gltf_builder::{
     BYTE, Builder, FLOAT, SHORT, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT, f32s, png, u16s,
@@ -1186,19 +1186,19 @@ fn what_cannot_be_seen_is_not_read() {
         let builder = textured(material, &["KHR_materials_unlit", "KHR_materials_clearcoat"]);
         let folder = tempfile::tempdir().unwrap();
         let path = builder.save_glb(folder.path());
-        scene::load(&path, &LoadOptions { reads, ..LoadOptions::default() }).unwrap()
+        scene::load(&path, &LoadOptions { prune: reads, ..LoadOptions::default() }).unwrap()
     };
-    let visible = |ambience| Reads::Visible(ambience);
+    let visible = |ambience| Prune::Unused(ambience);
     let material = json!({
         "name": "m",
         "occlusionTexture": { "index": 0 },
         "emissiveTexture": { "index": 1 },
         "extensions": { "KHR_materials_clearcoat": { "clearcoatFactor": 0, "clearcoatTexture": { "index": 1 } } },
     });
-    let all = read(material.clone(), Reads::Everything);
+    let all = read(material.clone(), Prune::Nothing);
     assert_eq!((all.images.len(), all.unread.len(), all.meshes[0].uvs[0].is_empty()), (2, 0, false));
     // Occlusion is seen in light from all around, which there is where the scene has no lights.
-    for ambience in [Ambience::Present, Ambience::WithoutLights] {
+    for ambience in [AmbientLight::Present, AmbientLight::WithoutLights] {
         let some = read(material.clone(), visible(ambience));
         assert_eq!((some.images.len(), some.meshes[0].uvs[0].is_empty()), (1, false));
         assert_eq!(
@@ -1207,7 +1207,7 @@ fn what_cannot_be_seen_is_not_read() {
         );
         assert!(some.materials[0].occlusion_texture.is_some_and(|texture| texture.image == 0));
     }
-    let none = read(material, visible(Ambience::Absent));
+    let none = read(material, visible(AmbientLight::Absent));
     assert_eq!((none.images.len(), none.meshes[0].uvs[0].is_empty()), (0, true));
     assert_eq!(none.unread.len(), 4, "{:?}", none.unread);
     assert!(none.unread[1].ends_with("no light comes from all around"), "{:?}", none.unread);
@@ -1218,7 +1218,7 @@ fn what_cannot_be_seen_is_not_read() {
         "occlusionTexture": { "index": 0 },
         "extensions": { "KHR_materials_unlit": {} },
     });
-    let unlit = read(unlit, visible(Ambience::Present));
+    let unlit = read(unlit, visible(AmbientLight::Present));
     assert_eq!((unlit.images.len(), unlit.images[0].width), (1, 3));
     assert_eq!(unlit.unread, ["occlusion texture of \"material 0\": the material is unlit"]);
 }
@@ -1231,7 +1231,7 @@ fn a_broken_picture_that_nothing_reads_is_an_error() {
     builder.json["images"][0]["bufferView"] = view.into();
     let folder = tempfile::tempdir().unwrap();
     let path = builder.save_glb(folder.path());
-    let reads = Reads::Visible(Ambience::Present);
-    let error = scene::load(&path, &LoadOptions { reads, ..LoadOptions::default() }).unwrap_err();
+    let reads = Prune::Unused(AmbientLight::Present);
+    let error = scene::load(&path, &LoadOptions { prune: reads, ..LoadOptions::default() }).unwrap_err();
     assert!(format!("{error:#}").contains("not PNG, JPEG or WebP"), "{error:#}");
 }

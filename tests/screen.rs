@@ -250,7 +250,7 @@ fn a_scene_whose_mirror_images_all_miss_is_that_of_the_environment() {
         made.camera(DVec3::new(0.0, 1.0, 4.0), DVec3::ZERO, etalon_testing::made::perspective(35.0));
         let [screen, below] = ["screen", "environment"].map(|rung| {
             let (rendered, film) = gpu.shot(&made.0, Some(&environment), on(&[&format!("reflection={rung}")]));
-            let marched = rendered.passes.iter().any(|p| p.name == "mirror images on the screen");
+            let marched = rendered.passes.iter().any(|p| p.name == "screen-space reflection");
             assert_eq!(marched, rung == "screen");
             film
         });
@@ -419,17 +419,17 @@ fn passes_exist_only_where_they_are_called_for() {
     let gpu = Gpu::open();
     let environment = Environment::studio();
     let rough = Material { roughness: 0.5, ..mirror() };
-    for (material, mirrors, see_through) in [(rough, false, false), (mirror(), true, false), (glass(0.4), false, true)]
+    for (material, mirrors, transparency) in [(rough, false, false), (mirror(), true, false), (glass(0.4), false, true)]
     {
         let mut made = Made::new("ball");
         made.add(Shape::sphere(1.0, 24), material, DAffine3::IDENTITY);
         made.front(1.5);
         let (rendered, _) = gpu.shot(&made.0, Some(&environment), on(&["reflection=screen", "refraction=screen"]));
-        assert_eq!(has(&rendered, "mirror images on the screen"), mirrors);
-        assert_eq!(has(&rendered, "copy radiance"), mirrors || see_through);
-        assert_eq!(has(&rendered, "see-through lighting"), see_through);
+        assert_eq!(has(&rendered, "screen-space reflection"), mirrors);
+        assert_eq!(has(&rendered, "copy radiance"), mirrors || transparency);
+        assert_eq!(has(&rendered, "transparent lighting"), transparency);
         let (rendered, _) = gpu.shot(&made.0, Some(&environment), on(&["reflection=ray", "refraction=ray"]));
-        assert!(!has(&rendered, "mirror images on the screen") && !has(&rendered, "copy radiance"));
+        assert!(!has(&rendered, "screen-space reflection") && !has(&rendered, "copy radiance"));
     }
 }
 

@@ -158,7 +158,7 @@ fn lit_chart(light: &str, by_wavelength: bool) -> Scene {
         color: emission.rgb(),
         spectrum: Some(emission),
         kind: LightKind::Directional { direction: DVec3::NEG_Z },
-        stand_in: false,
+        proxy: false,
         extent: None,
     });
     made.front(2.0);
@@ -504,8 +504,8 @@ fn what_is_grey_needs_no_bands() {
         let state = |name: &str| {
             renderer.plan().effects.iter().find(|effect| effect.id.name() == name).map(|effect| effect.state.name())
         };
-        assert_eq!(state("bands of wavelengths"), Some("not called for"));
-        assert_eq!(state("dispersion"), Some("not called for"));
+        assert_eq!(state("spectral rendering"), Some("not needed"));
+        assert_eq!(state("dispersion"), Some("not needed"));
         assert_eq!(renderer.plan().bands, 0);
         bits(&renderer.film().expect("the film"))
     };

@@ -31,7 +31,7 @@ fn small_wall(light: Light) -> Scene {
 }
 
 fn light(color: [f32; 3], extent: Option<Extent>, kind: LightKind) -> Light {
-    Light { name: "lamp".to_owned(), color, spectrum: None, extent, kind, stand_in: false }
+    Light { name: "lamp".to_owned(), color, spectrum: None, extent, kind, proxy: false }
 }
 
 #[test]

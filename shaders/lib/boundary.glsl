@@ -6,25 +6,25 @@
 #include "lib/media.glsl"
 #include "lib/shadow.glsl"
 
-layout(constant) const bool TOUCHING = false;     // some transparent body lies against another surface
+layout(constant) const bool COINCIDENT_INTERFACES = false;     // some transparent body lies against another surface
 
 // What a surface separates, for a ray that comes through `media`.
 struct Boundary {
     bool sheet;  // transmits light and encloses nothing
     bool solid;  // the surface of a transparent body
-    bool hidden; // a body of higher priority displaces it: nothing changes here
-    bool stray;  // left without having been entered: the shell is open, or another one crosses it
-    bool against; // something opaque lies against it: it is met next, as if it were in the medium before
+    bool suppressed_by_priority; // a body of higher priority displaces it: nothing changes here
+    bool unmatched_exit;  // left without having been entered: the shell is open, or another one crosses it
+    bool touches_opaque; // something opaque lies against it: it is met next, as if it were in the medium before
     float opaque_at; // where, along the ray from before the boundary
-    uint here;   // the medium before
-    uint there;  // and behind
-    uvec4 beyond; // all media behind
+    uint medium_in;   // the medium before
+    uint medium_out;  // and behind
+    uvec4 media_out; // all media behind
 };
 
 // Where bodies touch there is one boundary, from the one to the other, and where something opaque lies against a body there
 // is none: what is within the offset behind a surface is crossed with it, since a ray that goes on starts behind it. Looked
 // for along the ray from before the surface: as deep as the offset behind it down to a cosine of 1/16, less deep beyond.
-void cross_what_touches(inout Boundary r, HitSurface hit, vec3 direction) {
+void cross_coincident_interfaces(inout Boundary r, HitSurface hit, vec3 direction) {
     vec3 origin = ray_origin(hit.s.p_bvh, hit.n, vec3(0.0));
     float cos_v = max(-dot(hit.n, direction), 1e-6);
     float end = trace_terms.offset / cos_v + trace_terms.offset / max(cos_v, 1.0 / 16.0);
@@ -38,9 +38,9 @@ void cross_what_touches(inout Boundary r, HitSurface hit, vec3 direction) {
             Material m = material_at(material & MATERIAL_OF_TRIANGLE);
             if (m.transmission > 0.0 && (material & SHEET_TRIANGLE) == 0) {
                 bool front = dot(hit_normal(last.triangle), direction) <= 0.0;
-                r.beyond = front ? entered(r.beyond, m.medium) : left(r.beyond, m.medium);
+                r.media_out = front ? entered(r.media_out, m.medium) : left(r.media_out, m.medium);
             } else if (hit_class(last.triangle) == OPAQUE) {
-                r.against = true;
+                r.touches_opaque = true;
                 // A few roundings before it: what is crossed lies there or before.
                 r.opaque_at = intBitsToFloat(floatBitsToInt(last.t) - 4);
                 goes_on = false;
@@ -56,15 +56,15 @@ Boundary boundary_at(HitSurface hit, uvec4 media, vec3 direction) {
     bool transmissive = TRANSMISSIVE && hit.transmission > 0.0;
     r.sheet = transmissive && hit.sheet;
     r.solid = transmissive && !r.sheet;
-    r.beyond = hit.front ? entered(media, medium) : left(media, medium);
-    r.stray = r.solid && !hit.front && !inside(media, medium);
-    r.here = r.stray ? medium : present_medium(media);
-    r.against = false;
+    r.media_out = hit.front ? entered(media, medium) : left(media, medium);
+    r.unmatched_exit = r.solid && !hit.front && !inside(media, medium);
+    r.medium_in = r.unmatched_exit ? medium : present_medium(media);
+    r.touches_opaque = false;
     r.opaque_at = 0.0;
-    if (TOUCHING) cross_what_touches(r, hit, direction);
-    if (r.against) r.beyond = media;
-    r.there = r.against ? r.here : present_medium(r.beyond);
-    r.hidden = r.solid && r.here == r.there;
+    if (COINCIDENT_INTERFACES) cross_coincident_interfaces(r, hit, direction);
+    if (r.touches_opaque) r.media_out = media;
+    r.medium_out = r.touches_opaque ? r.medium_in : present_medium(r.media_out);
+    r.suppressed_by_priority = r.solid && r.medium_in == r.medium_out;
     return r;
 }
 
@@ -77,8 +77,8 @@ Layers layers_at(HitSurface hit, Boundary boundary) {
     b.between = true;
     b.solid = boundary.solid;
     b.sheet = boundary.sheet;
-    b.n1 = index_of(boundary.here);
-    b.n2 = boundary.solid ? index_of(boundary.there) : b.s.ior;
+    b.n1 = index_of(boundary.medium_in);
+    b.n2 = boundary.solid ? index_of(boundary.medium_out) : b.s.ior;
     if (TRANSMISSIVE && !boundary.solid) seen_from(b.s, b.n1);
     b.delta = !ROUGH || b.s.roughness <= MIN_ROUGHNESS || (b.solid && b.n1 == b.n2);
     b.coat_delta = !ROUGH || b.s.clearcoat_roughness <= MIN_ROUGHNESS;

@@ -51,15 +51,15 @@ HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
         vec3 D_lo = vec3(dx.lo, dy.lo, dz.lo);
         DoubleFloat l2 = dot2(L, L);
         DoubleFloat v2 = dot2(V, V);
-        precise float longer = ((l2.hi - 1.0) + l2.lo) + ((v2.hi - 1.0) + v2.lo);
+        precise float length_error = ((l2.hi - 1.0) + l2.lo) + ((v2.hi - 1.0) + v2.lo);
         // Divided by (|L| + |V|)², which is 2L² + 2V² to 1e-14: |L + V| may be as small as the correction itself.
         DoubleFloat products = dot2(S, D);
         precise float along_lo = products.lo + (dot(S_lo, D) + dot(S, D_lo));
-        DoubleFloat turn = df_div(quick_two_sum(products.hi, along_lo), df_scale(df_add(l2, v2), 2.0));
-        DoubleFloat px = two_product(turn.hi, D.x);
-        DoubleFloat py = two_product(turn.hi, D.y);
-        DoubleFloat pz = two_product(turn.hi, D.z);
-        precise vec3 turned_lo = vec3(px.lo, py.lo, pz.lo) + (turn.hi * D_lo + turn.lo * D);
+        DoubleFloat correction = df_div(quick_two_sum(products.hi, along_lo), df_scale(df_add(l2, v2), 2.0));
+        DoubleFloat px = two_product(correction.hi, D.x);
+        DoubleFloat py = two_product(correction.hi, D.y);
+        DoubleFloat pz = two_product(correction.hi, D.z);
+        precise vec3 turned_lo = vec3(px.lo, py.lo, pz.lo) + (correction.hi * D_lo + correction.lo * D);
         DoubleFloat tx = two_sum(S.x, -px.hi);
         DoubleFloat ty = two_sum(S.y, -py.hi);
         DoubleFloat tz = two_sum(S.z, -pz.hi);
@@ -75,7 +75,7 @@ HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
             precise float c_lo = c.lo + dot(N, T_lo);
             r.cos_h = df_div(quick_two_sum(c.hi, c_lo), df_sqrt(lengths)).hi;
             r.sin2_h = df_div(dot2(across, across), lengths).hi;
-            float sum2 = s2.hi - s2.hi * (0.5 * longer);
+            float sum2 = s2.hi - s2.hi * (0.5 * length_error);
             r.cos_d = min(0.5 * sqrt(sum2), 1.0);
             r.sum2 = sum2;
         }
@@ -102,9 +102,9 @@ HalfAngle phong_half_angle(vec3 N, vec3 L, vec3 V) {
     if (ARITHMETIC == STABLE) {
         DoubleFloat l2 = dot2(L, L);
         DoubleFloat v2 = dot2(V, V);
-        precise float longer = (l2.hi - v2.hi) + (l2.lo - v2.lo);
-        float turn = 0.25 * longer * dot(N, L - V);
-        DoubleFloat sum = df_add(df_add(dot2(N, L), dot2(N, V)), DoubleFloat(-turn, 0.0));
+        precise float length_error = (l2.hi - v2.hi) + (l2.lo - v2.lo);
+        float correction = 0.25 * length_error * dot(N, L - V);
+        DoubleFloat sum = df_add(df_add(dot2(N, L), dot2(N, V)), DoubleFloat(-correction, 0.0));
         r.cos_h = r.sum2 > 0.0 ? sum.hi / sqrt(r.sum2 * dot(N, N)) : 0.0;
     }
     return r;

@@ -2,17 +2,17 @@
 // the drawing of one (lib/layers.glsl has the lobes). Diffuse directions are partly drawn by a guiding distribution (lib/aims.glsl).
 #ifndef BSDF_GLSL
 #define BSDF_GLSL
-#include "lib/aims.glsl"
+#include "lib/path_guiding.glsl"
 #include "lib/boundary.glsl"
 
-layout(constant) const bool FROSTED = false; // some surface that lets light through is rough
+layout(constant) const bool ROUGH_TRANSMISSION = false; // some surface that lets light through is rough
 
 struct Bsdf {
     Layers layers;
     vec3 n;       // of the triangle, on the viewer's side
     vec3 p_bvh;   // where from
     float guided; // share of the diffuse directions that are drawn by the guiding distribution
-    Aims aims;
+    GuidingCell guiding;
 };
 
 // Least probability of a rough lobe, beside albedos.
@@ -45,14 +45,14 @@ Bsdf bsdf_at(HitSurface hit, Boundary boundary) {
     b.n = hit.n;
     b.p_bvh = hit.s.p_bvh;
     b.guided = 0.0;
-    b.aims = Aims(0, 0, 0, 0.0);
+    b.guiding = GuidingCell(0, 0, 0, 0.0);
     return b;
 }
 
 // The same, for a path that goes on from there: towards what mirrors or bends light, too.
-void guide(inout Bsdf b) {
-    b.aims = aims_at(b.p_bvh);
-    b.guided = b.aims.count > 0 ? AIMED_SHARE : 0.0;
+void enable_guiding(inout Bsdf b) {
+    b.guiding = guiding_cell_at(b.p_bvh);
+    b.guided = b.guiding.count > 0 ? GUIDED_FRACTION : 0.0;
 }
 
 // Whether light goes straight through: a sheet that does not scatter, or a boundary between equal indices.
@@ -71,16 +71,16 @@ PathEval bsdf_evaluate(Bsdf b, vec3 l) {
     bool above = dot(b.n, l) > 0.0;
     BsdfEval e = evaluate_reflection(b.layers, l);
     if (!above) e = BsdfEval(vec3(0.0), 0.0);
-    if (TRANSMISSIVE && FROSTED) {
+    if (TRANSMISSIVE && ROUGH_TRANSMISSION) {
         BsdfEval behind = evaluate_transmission(b.layers, l);
         if (dot(b.n, l) < 0.0) e = behind;
     }
     PathEval r = PathEval(e.f_cos, e.pdf, e.pdf);
-    if (AIMED) {
+    if (PATH_GUIDING) {
         float cos_l = dot(b.layers.s.n, l);
         float instead = b.guided * b.layers.shares.z;
         bool guided = above && cos_l > 0.0 && instead > 0.0;
-        if (guided) r.pdf += instead * (aimed_pdf(b.aims, b.p_bvh, l) - cos_l * INV_PI);
+        if (guided) r.pdf += instead * (guided_pdf(b.guiding, b.p_bvh, l) - cos_l * INV_PI);
     }
     return r;
 }
@@ -130,12 +130,12 @@ BsdfSample bsdf_sample(Bsdf bsdf, float x, vec2 u) {
     if (diffuse) {
         OrthonormalBasis frame = orthonormal_basis(s.n);
         // Choose the strategy with u.x and rescale it: stratification survives.
-        bool guided = AIMED && u.x < bsdf.guided;
-        float across = AIMED && !guided ? (u.x - bsdf.guided) / (1.0 - bsdf.guided) : u.x;
+        bool guided = PATH_GUIDING && u.x < bsdf.guided;
+        float across = PATH_GUIDING && !guided ? (u.x - bsdf.guided) / (1.0 - bsdf.guided) : u.x;
         vec3 l = cosine_sample(across, u.y).L;
         r.direction = frame.t * l.x + frame.b * l.y + s.n * l.z;
-        if (AIMED) {
-            if (guided) r.direction = aimed_direction(bsdf.aims, bsdf.p_bvh, vec2(u.x / bsdf.guided, u.y));
+        if (PATH_GUIDING) {
+            if (guided) r.direction = guided_direction(bsdf.guiding, bsdf.p_bvh, vec2(u.x / bsdf.guided, u.y));
         }
     }
     return r;

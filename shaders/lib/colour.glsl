@@ -46,7 +46,7 @@ struct CmfIntegral {
 CmfIntegral cmf_integral(float s[81]) {
     vec3 xyz = vec3(0.0);
     vec3 rgb10 = vec3(0.0);
-    // @heads 82
+    // @iterations 82
     for (uint i = 0u; i < 81u; ++i) {
         xyz += s[i] * CIE_1931_2DEG[i];
         rgb10 += s[i] * STILES_BURCH_1959_10DEG[i];
@@ -82,7 +82,7 @@ CmfGaussian cmf_gaussian(float A, float mu_nm, float width_nm) {
     DoubleFloat scale = df_div(DoubleFloat(0.5, 0.0), two_product(w, w));
     vec3 xyz = vec3(0.0);
     vec3 rgb10 = vec3(0.0);
-    // @heads 82
+    // @iterations 82
     for (uint i = 0u; i < 81u; ++i) {
         float lambda = 380.0 + 5.0 * float(i);
         float S;

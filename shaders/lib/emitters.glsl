@@ -8,19 +8,19 @@
 #include "share/emitters.glsl"
 
 layout(constant) const uint EMITTERS = 0;
-layout(constant) const uint EMITTER_STEPS = 0;           // halvings that single one of them out
+layout(constant) const uint EMITTER_SEARCH_STEPS = 0;           // halvings that single one of them out
 layout(constant) const bool PUNCTUAL_EMITTERS = false;   // some of them are lights of the table
-layout(constant) const bool SHAPED_EMITTERS = false;     // some of those have a shape
-layout(constant) const bool EMITTING_TRIANGLES = false;  // some of them are triangles
-layout(constant) const bool EMITTING_SKY = false;        // one is the environment
-layout(constant) const uint SKY_COLUMNS = 0;             // cells of its table
-layout(constant) const uint SKY_ROWS = 0;
-layout(constant) const uint SKY_STEPS = 0;               // halvings that single out a row, or a column
+layout(constant) const bool AREA_EMITTERS = false;     // some of those have a shape
+layout(constant) const bool EMISSIVE_TRIANGLES = false;  // some of them are triangles
+layout(constant) const bool SAMPLED_ENVIRONMENT = false;        // one is the environment
+layout(constant) const uint CDF_COLUMNS = 0;             // cells of its table
+layout(constant) const uint CDF_ROWS = 0;
+layout(constant) const uint CDF_SEARCH_STEPS = 0;               // halvings that single out a row, or a column
 
 layout(paths, rgba32ui) readonly uniform uimageBuffer emitters;
 // @texels Emitter emitter_at(emitters)
 // First words of the rows' shares; then, row by row, those of the columns'.
-layout(paths, r32ui) readonly uniform uimageBuffer sky_shares;
+layout(paths, r32ui) readonly uniform uimageBuffer environment_cdf;
 
 // Light that may arrive at a point from one place.
 struct LightSample {
@@ -31,71 +31,71 @@ struct LightSample {
 };
 
 // Of a word that lies in the share [first, next) of all words, where in it: in [0, 1). A share of 0 is all of them.
-float place_in_share(uint word, uint first, uint next) {
+float remapped_in_bin(uint word, uint first, uint next) {
     uint size = next - first;
     float place = size == 0u ? float(word) * (1.0 / 4294967296.0) : float(word - first) / float(size);
     return min(place, 0.999999940395355);
 }
 
 // Size of a share of all words, as a probability.
-float probability_of_share(uint first, uint next) {
+float bin_probability(uint first, uint next) {
     return next == first ? 1.0 : float(next - first) * (1.0 / 4294967296.0);
 }
 
 // Where the share lies in which a word is, among `count` from `base` on.
-uint share_of_sky(uint base, uint count, uint word) {
+uint search_environment_cdf(uint base, uint count, uint word) {
     uint found = 0;
-    for (uint step = SKY_STEPS; step > 0; step--) {
+    for (uint step = CDF_SEARCH_STEPS; step > 0; step--) {
         uint next = found + (1u << (step - 1));
-        uint first = imageLoad(sky_shares, int(base + min(next, count - 1))).x;
+        uint first = imageLoad(environment_cdf, int(base + min(next, count - 1))).x;
         found = next < count && first <= word ? next : found;
     }
     return found;
 }
 
-uint sky_share(uint base, uint count, uint i) {
-    return i < count ? imageLoad(sky_shares, int(base + i)).x : 0u;
+uint environment_cdf_at(uint base, uint count, uint i) {
+    return i < count ? imageLoad(environment_cdf, int(base + i)).x : 0u;
 }
 
 // Density per solid angle of the cell at `at`, whose polar angle has this sine.
-float sky_cell_pdf(float p_row, float p_column, float sin_theta) {
-    return p_row * p_column * float(SKY_ROWS * SKY_COLUMNS) / (2.0 * PI * PI * max(sin_theta, 1e-6));
+float environment_texel_pdf(float p_row, float p_column, float sin_theta) {
+    return p_row * p_column * float(CDF_ROWS * CDF_COLUMNS) / (2.0 * PI * PI * max(sin_theta, 1e-6));
 }
 
 // Density of a direction, in the world, among all that light is drawn from.
-float sky_pdf(vec3 direction) {
-    if (!EMITTING_SKY) return 0.0;
+float environment_pdf(vec3 direction) {
+    if (!SAMPLED_ENVIRONMENT) return 0.0;
     vec3 d = into_environment(direction);
     vec2 at = equirectangular_from_direction(d);
-    uint row = min(uint(max(at.y, 0.0) * float(SKY_ROWS)), SKY_ROWS - 1);
-    uint column = min(uint(max(at.x, 0.0) * float(SKY_COLUMNS)), SKY_COLUMNS - 1);
-    uint columns = SKY_ROWS + row * SKY_COLUMNS;
-    float p_row = probability_of_share(sky_share(0, SKY_ROWS, row), sky_share(0, SKY_ROWS, row + 1));
-    float p_column = probability_of_share(sky_share(columns, SKY_COLUMNS, column), sky_share(columns, SKY_COLUMNS, column + 1));
+    uint row = min(uint(max(at.y, 0.0) * float(CDF_ROWS)), CDF_ROWS - 1);
+    uint column = min(uint(max(at.x, 0.0) * float(CDF_COLUMNS)), CDF_COLUMNS - 1);
+    uint columns = CDF_ROWS + row * CDF_COLUMNS;
+    float p_row = bin_probability(environment_cdf_at(0, CDF_ROWS, row), environment_cdf_at(0, CDF_ROWS, row + 1));
+    float p_column = bin_probability(environment_cdf_at(columns, CDF_COLUMNS, column), environment_cdf_at(columns, CDF_COLUMNS, column + 1));
     // The environment is the first of the emitters.
     float picked = emitter_at(0).probability;
-    return picked * sky_cell_pdf(p_row, p_column, sqrt(d.x * d.x + d.z * d.z));
+    return picked * environment_texel_pdf(p_row, p_column, sqrt(d.x * d.x + d.z * d.z));
 }
 
-struct SkySample {
+struct EnvironmentSample {
     vec3 direction;
     float pdf;
 };
 
-SkySample sample_sky(uint word_x, uint word_y) {
-    uint row = share_of_sky(0, SKY_ROWS, word_y);
-    uint row_first = sky_share(0, SKY_ROWS, row);
-    uint row_next = sky_share(0, SKY_ROWS, row + 1);
-    uint columns = SKY_ROWS + row * SKY_COLUMNS;
-    uint column = share_of_sky(columns, SKY_COLUMNS, word_x);
-    uint first = sky_share(columns, SKY_COLUMNS, column);
-    uint next = sky_share(columns, SKY_COLUMNS, column + 1);
-    float u = (float(column) + place_in_share(word_x, first, next)) / float(SKY_COLUMNS);
-    float v = (float(row) + place_in_share(word_y, row_first, row_next)) / float(SKY_ROWS);
+EnvironmentSample sample_environment(uint word_x, uint word_y) {
+    uint row = search_environment_cdf(0, CDF_ROWS, word_y);
+    uint row_first = environment_cdf_at(0, CDF_ROWS, row);
+    uint row_next = environment_cdf_at(0, CDF_ROWS, row + 1);
+    uint columns = CDF_ROWS + row * CDF_COLUMNS;
+    uint column = search_environment_cdf(columns, CDF_COLUMNS, word_x);
+    uint first = environment_cdf_at(columns, CDF_COLUMNS, column);
+    uint next = environment_cdf_at(columns, CDF_COLUMNS, column + 1);
+    float u = (float(column) + remapped_in_bin(word_x, first, next)) / float(CDF_COLUMNS);
+    float v = (float(row) + remapped_in_bin(word_y, row_first, row_next)) / float(CDF_ROWS);
     vec3 d = direction_from_equirectangular(vec2(u, v));
     float across = sqrt(d.x * d.x + d.z * d.z);
-    float pdf = sky_cell_pdf(probability_of_share(row_first, row_next), probability_of_share(first, next), across);
-    return SkySample(turned(d, environment.cos_rotation, -environment.sin_rotation), pdf);
+    float pdf = environment_texel_pdf(bin_probability(row_first, row_next), bin_probability(first, next), across);
+    return EnvironmentSample(turned(d, environment.cos_rotation, -environment.sin_rotation), pdf);
 }
 
 // Twice the area of a triangle, times the unit normal of its front.
@@ -120,7 +120,7 @@ vec3 emission_at(uint triangle, float u, float v) {
 }
 
 // Probability per area with which a triangle is drawn; 0 where it is none of the emitters.
-float picked_per_area(uint triangle) {
+float light_pdf_area(uint triangle) {
     return triangle_at(triangle).picked;
 }
 
@@ -129,7 +129,7 @@ float picked_per_area(uint triangle) {
 LightSample sample_light(vec3 origin, uvec2 words) {
     LightSample r = LightSample(vec3(0.0, 1.0, 0.0), -1.0, vec3(0.0), 0.0);
     uint found = 0;
-    for (uint step = EMITTER_STEPS; step > 0; step--) {
+    for (uint step = EMITTER_SEARCH_STEPS; step > 0; step--) {
         uint next = found + (1u << (step - 1));
         uint first = emitter_at(min(next, EMITTERS - 1)).first;
         found = next < EMITTERS && first <= words.x ? next : found;
@@ -137,25 +137,25 @@ LightSample sample_light(vec3 origin, uvec2 words) {
     Emitter emitter = emitter_at(found);
     uint next_first = found + 1 < EMITTERS ? emitter_at(found + 1).first : 0u;
     float probability = emitter.probability;
-    float x = place_in_share(words.x, emitter.first, next_first);
+    float x = remapped_in_bin(words.x, emitter.first, next_first);
     uint kind = emitter.kind & EMITTER_KIND;
     if (PUNCTUAL_EMITTERS) {
         if (kind == EMITTER_PUNCTUAL) {
             vec3 p_rel = origin - trace_terms.bvh_from_rel;
-            PunctualLight light = SHAPED_EMITTERS ? shaped_light_at(emitter.place, p_rel, vec2(x, unit_float(words.y)))
+            PunctualLight light = AREA_EMITTERS ? shaped_light_at(emitter.place, p_rel, vec2(x, unit_float(words.y)))
                 : punctual_light_at(emitter.place, p_rel);
             r = LightSample(light.directional ? light.l : light.to_light, light.directional ? LARGEST : 1.0,
                             light.arriving / probability, 0.0);
         }
     }
-    if (EMITTING_SKY) {
-        if (kind == EMITTER_SKY) {
-            SkySample sky = sample_sky(uint(x * 4294967040.0), words.y);
+    if (SAMPLED_ENVIRONMENT) {
+        if (kind == EMITTER_ENVIRONMENT) {
+            EnvironmentSample sky = sample_environment(uint(x * 4294967040.0), words.y);
             float pdf = probability * sky.pdf;
             r = LightSample(sky.direction, LARGEST, vec3(1.0 / pdf), pdf);
         }
     }
-    if (EMITTING_TRIANGLES) {
+    if (EMISSIVE_TRIANGLES) {
         if (kind == EMITTER_TRIANGLE) {
             // The unit square onto a triangle, with little distortion (Heitz 2019): halves along the diagonal.
             float y = unit_float(words.y);

@@ -65,7 +65,7 @@ vec3 punctual_light(Layers b, ivec2 pixel, uint tiles_across, LightRange range) 
                 bits = tile_lights[tile + int(word)];
             }
         }
-        bool out_of_steps = loop_heads > LIGHT_BUDGET && !(listed && bits == 0);
+        bool out_of_steps = loop_iterations > LIGHT_BUDGET && !(listed && bits == 0);
         lights_cut_off += out_of_steps ? 1u : 0u;
         if (out_of_steps || (listed && bits == 0)) break;
         uint index = listed ? DIRECTIONAL_LIGHTS + word * 32 + uint(findLSB(bits)) : next;

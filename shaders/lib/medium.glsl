@@ -90,7 +90,7 @@ BeerLambertSum beer_lambert_sum(uint n, float s0, float ds, uint seed) {
     float rest = 0.0;
     float factor = ARITHMETIC == FAST ? s0 : 1.0;
     float width = ARITHMETIC == FAST ? ds : 1.0;
-    // @heads 32769
+    // @iterations 32769
     for (uint block = 0u; block < steps / 64u; ++block) {
         TIMES_64(add_absorption(sum, rest, factor * scrambled(word) * width); word += GOLDEN;)
         // The rest stays so small that its own rounding does not matter.
@@ -98,7 +98,7 @@ BeerLambertSum beer_lambert_sum(uint n, float s0, float ds, uint seed) {
         sum = t.hi;
         rest = t.lo;
     }
-    // @heads 64
+    // @iterations 64
     for (uint i = 0u; i < steps % 64u; ++i) {
         add_absorption(sum, rest, factor * scrambled(word) * width);
         word += GOLDEN;
@@ -150,7 +150,7 @@ MarchOpticalDepth march_optical_depth(float sigma0, float falloff, float d, uint
     vec4 w = quadrature_weights(rule);
     float sum = 0.0;
     float rest = 0.0;
-    // @heads 4097
+    // @iterations 4097
     for (uint i = 0u; i < n; ++i) {
         if (w.x != 0.0) add_absorption(sum, rest, w.x * expf(-falloff * (float(i) * ds)));
         if (w.y != 0.0) add_absorption(sum, rest, w.y * expf(-falloff * ((float(i) + 0.5) * ds)));

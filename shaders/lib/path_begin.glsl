@@ -16,19 +16,19 @@ uvec2 pixel_at(uint place, uint stride) {
 
 Path path_through(uvec2 pixel) {
     Camera c = camera;
-    uvec2 words = draw_words(pixel, 0, DRAW_PIXEL);
+    uvec2 words = dimension_words(pixel, 0, DIMENSION_PIXEL);
     c.jitter = vec2(unit_float(words.x), unit_float(words.y)) - 0.5;
     Path p;
     // From the near plane, as what is rasterised; what lies beyond an orthographic camera's far one is seen all the same.
     p.origin = trace_terms.bvh_from_rel + rel_from_pixel(c, ivec2(pixel), 1.0);
     p.direction = view_direction(c, ivec2(pixel));
-    p.self = 0xffffffffu;
+    p.source_face = 0xffffffffu;
     p.pdf = 0.0;
     p.throughput = vec3(1.0);
-    p.state = PATH_ALIVE | PATH_CLEAR | PATH_STRAIGHT | packHalf2x16(vec2(0.0, 1.0));
+    p.state = PATH_ALIVE | PATH_TRANSPARENT_SO_FAR | PATH_UNSCATTERED | packHalf2x16(vec2(0.0, 1.0));
     p.media = trace_terms.camera_media;
-    p.travelled = 0.0;
-    p.after = 0.0;
+    p.distance_since_vertex = 0.0;
+    p.t_min = 0.0;
     p.sum = vec3(0.0);
     return p;
 }

@@ -5,14 +5,14 @@
 #include "lib/path_ray.glsl"
 
 layout(constant) const bool KEEPS_MEDIA = false; // paths go through media
-layout(constant) const bool KEEPS_AFTER = false; // something opaque lies against some of them
+layout(constant) const bool KEEPS_T_MIN = false; // something opaque lies against some of them
 
 layout(pass, scalar) buffer Origins { uvec4 origins[]; };          // and self
 layout(pass, scalar) buffer Directions { uvec4 directions[]; };    // and pdf
 layout(pass, scalar) buffer Throughputs { uvec4 throughputs[]; };  // and state
 layout(pass, scalar) buffer Sums { uvec4 sums[]; };                // and travelled
 layout(pass, scalar) buffer Media { uvec4 media[]; };
-layout(pass, scalar) buffer Afters { float afters[]; };
+layout(pass, scalar) buffer TMins { float t_mins[]; };
 
 Path path_of(uint pixel) {
     uvec4 a = origins[pixel];
@@ -21,26 +21,26 @@ Path path_of(uint pixel) {
     uvec4 d = sums[pixel];
     Path p;
     p.origin = uintBitsToFloat(a.xyz);
-    p.self = a.w;
+    p.source_face = a.w;
     p.direction = uintBitsToFloat(b.xyz);
     p.pdf = uintBitsToFloat(b.w);
     p.throughput = uintBitsToFloat(c.xyz);
     p.state = c.w;
     p.sum = uintBitsToFloat(d.xyz);
-    p.travelled = uintBitsToFloat(d.w);
+    p.distance_since_vertex = uintBitsToFloat(d.w);
     p.media = trace_terms.camera_media;
     if (KEEPS_MEDIA) p.media = media[pixel];
-    p.after = 0.0;
-    if (KEEPS_AFTER) p.after = afters[pixel];
+    p.t_min = 0.0;
+    if (KEEPS_T_MIN) p.t_min = t_mins[pixel];
     return p;
 }
 
 void store_path(Path p, uint pixel) {
-    origins[pixel] = uvec4(floatBitsToUint(p.origin), p.self);
+    origins[pixel] = uvec4(floatBitsToUint(p.origin), p.source_face);
     directions[pixel] = uvec4(floatBitsToUint(p.direction), floatBitsToUint(p.pdf));
     throughputs[pixel] = uvec4(floatBitsToUint(p.throughput), p.state);
-    sums[pixel] = uvec4(floatBitsToUint(p.sum), floatBitsToUint(p.travelled));
+    sums[pixel] = uvec4(floatBitsToUint(p.sum), floatBitsToUint(p.distance_since_vertex));
     if (KEEPS_MEDIA) media[pixel] = p.media;
-    if (KEEPS_AFTER) afters[pixel] = p.after;
+    if (KEEPS_T_MIN) t_mins[pixel] = p.t_min;
 }
 #endif

@@ -4,7 +4,7 @@
 #include "lib/work_tile.glsl"
 
 // What follows the pixel of an entry that is through.
-const uint ENDED = 0x80000000u;
+const uint TERMINATED = 0x80000000u;
 
 const uint PATHS_IN_GROUP = 128; // two in each invocation
 const uint CHUNK = 16; // entries that one invocation counts

@@ -147,7 +147,7 @@ float map_visibility(vec3 p, vec3 n, vec3 to_light, uint index, float size) {
 
 // p in bvh space, n the normal of its triangle, `self` its flat face, v to the viewer, `media` those on the light's
 // side. The light is at p + to_light, or in that direction where t_max is larger than 1.
-vec3 visibility(vec3 p, vec3 n, vec3 v, uint self, uvec4 media, vec3 to_light, float t_max, bool wanted) {
+vec3 visibility(vec3 p, vec3 n, vec3 v, uint source_face, uvec4 media, vec3 to_light, float t_max, bool wanted) {
     vec3 origin = ray_origin(p, n, v);
     float length_of_direction = vector_length(to_light);
     // What touches the light itself does not shadow it: t is a few roundings off.
@@ -155,7 +155,7 @@ vec3 visibility(vec3 p, vec3 n, vec3 v, uint self, uvec4 media, vec3 to_light, f
     shadow_rays += wanted ? 1u : 0u;
     vec3 through = vec3(wanted ? 1.0 : 0.0);
     if (!FILTERS) {
-        bool blocked = trace(origin, to_light, self, FROM_ORIGIN, wanted ? end : -1.0, OPAQUE, true).triangle != NO_TRIANGLE;
+        bool blocked = trace(origin, to_light, source_face, FROM_ORIGIN, wanted ? end : -1.0, OPAQUE, true).triangle != NO_TRIANGLE;
         return blocked ? vec3(0.0) : through;
     }
     // Four filters at a time.
@@ -163,7 +163,7 @@ vec3 visibility(vec3 p, vec3 n, vec3 v, uint self, uvec4 media, vec3 to_light, f
     bool goes_on = wanted;
     do {
         Filters filters;
-        bool blocked = trace_to_light(origin, to_light, self, last, goes_on ? end : -1.0, filters);
+        bool blocked = trace_to_light(origin, to_light, source_face, last, goes_on ? end : -1.0, filters);
         through = blocked ? vec3(0.0) : through;
         goes_on = goes_on && !blocked && filters.triangles.w != NO_TRIANGLE;
         bool found = !blocked && filters.triangles.x != NO_TRIANGLE;

@@ -60,7 +60,7 @@ vec3 mean_sigma(uint at, vec3 p, vec3 direction, float d) {
     SigmaGrid grid = sigma_grid_at(at);
     vec4 from = vec4(p, 1.0);
     vec3 start = vec3(dot(grid.x_row, from), dot(grid.y_row, from), dot(grid.z_row, from));
-    uint steps = loop_heads < LOOP_BUDGET ? MARCH_STEPS : 4u;
+    uint steps = loop_iterations < LOOP_BUDGET ? MARCH_STEPS : 4u;
     vec3 along = direction * (d / float(steps));
     vec3 stride = vec3(dot(grid.x_row.xyz, along), dot(grid.y_row.xyz, along), dot(grid.z_row.xyz, along));
     vec4 w = quadrature_weights(QUADRATURE);

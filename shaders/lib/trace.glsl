@@ -71,19 +71,19 @@ BoxRay box_ray(vec3 origin, vec3 direction, bool any_order) {
 }
 
 // One way through the tree, ready to go on.
-struct Walk {
+struct Traversal {
     int node;  // the next node, or BoxRay.end
     int leaf;  // triangles found and not tested yet, as a leaf of the tree; 0: none
     Hit hit;
 };
 
-bool walking(Walk w, BoxRay r) {
+bool is_traversing(Traversal w, BoxRay r) {
     return w.node != r.end || w.leaf != 0;
 }
 
 // One node: to its children, which follow it, or along its link. A leaf is kept for later; if one is being kept
 // already, the walk waits. Selections only: lavapipe runs both sides of a branch.
-void visit(inout Walk w, BoxRay r, float t_min) {
+void visit(inout Traversal w, BoxRay r, float t_min) {
     node_visits += w.node != r.end ? 1u : 0u;
     vec3 near, far;
     int word;
@@ -121,7 +121,7 @@ struct TriangleRay {
     Shear shear;
     float after;         // hits at this t or before do not count,
     uint after_triangle; // but those of later triangles at the same t
-    uint self;           // the flat face it leaves, which it cannot meet again
+    uint source_face;           // the flat face it leaves, which it cannot meet again
 };
 
 // The nearest four filters on the way to a light, in order; LARGEST where there are fewer.
@@ -165,7 +165,7 @@ ShearedTriangle sheared_from(BvhTriangle triangle, vec3 origin, Shear shear) {
 
 // One triangle of the leaf that is kept. The nearest counts, of two at the same t the first: any order of the tree finds
 // the same.
-void test_triangle(inout Walk w, inout Filters f, TriangleRay r, BoxRay b, uint classes, uint purpose) {
+void test_triangle(inout Traversal w, inout Filters f, TriangleRay r, BoxRay b, uint classes, uint purpose) {
     bool pending = w.leaf != 0;
     triangle_tests += pending ? 1u : 0u;
     int place = ~w.leaf;
@@ -174,7 +174,7 @@ void test_triangle(inout Walk w, inout Filters f, TriangleRay r, BoxRay b, uint 
     ShearedTriangle s = sheared_from(triangle, r.origin, r.shear);
     float inverse = 1.0 / s.det;
     float t = s.depth * inverse / r.shear.dz;
-    bool hit = pending && s.inside && s.det != 0.0 && (triangle.stops & classes) != 0 && triangle.face != r.self;
+    bool hit = pending && s.inside && s.det != 0.0 && (triangle.stops & classes) != 0 && triangle.face != r.source_face;
     hit = hit && (t > r.after || (t == r.after && index > r.after_triangle));
     hit = hit && (t < w.hit.t || (t == w.hit.t && index < w.hit.triangle));
     if (purpose == TO_LIGHT) {
@@ -195,9 +195,9 @@ void test_triangle(inout Walk w, inout Filters f, TriangleRay r, BoxRay b, uint 
     w.leaf = ended ? 0 : w.leaf;
 }
 
-Hit walk_links(TriangleRay r, vec3 direction, float t_max, uint classes, uint purpose, inout Filters f) {
+Hit traverse_links(TriangleRay r, vec3 direction, float t_max, uint classes, uint purpose, inout Filters f) {
     BoxRay b = box_ray(r.origin, direction, purpose != NEAREST);
-    Walk w = Walk(t_max > 0.0 ? 0 : b.end, 0, Hit(t_max, NO_TRIANGLE, 0.0, 0.0));
+    Traversal w = Traversal(t_max > 0.0 ? 0 : b.end, 0, Hit(t_max, NO_TRIANGLE, 0.0, 0.0));
     // Once more after a filter has been found: where lanes end at different times, lavapipe forgets for those that are through
     // what their last iteration has put into `f`. Light on a ball of 12 rings, inside a body, missed the faces of the body
     // in a third of the pixels.
@@ -213,7 +213,7 @@ Hit walk_links(TriangleRay r, vec3 direction, float t_max, uint classes, uint pu
         uvec4 known = f.triangles;
         test_triangle(w, f, r, b, classes, purpose);
         inserted = purpose == TO_LIGHT && any(notEqual(f.triangles, known));
-    } while (walking(w, b) || inserted);
+    } while (is_traversing(w, b) || inserted);
     return w.hit;
 }
 
@@ -224,12 +224,12 @@ struct HitPair {
 
 // Two rays at once, turn about: what one waits for, the other computes. A node is a chain of fetch, conversion, comparison
 // and selection in which most of a processor idles.
-HitPair walk_links_twice(TriangleRay ra, vec3 da, float ta, TriangleRay rb, vec3 db, float tb, uint classes, uint purpose) {
+HitPair traverse_links_pair(TriangleRay ra, vec3 da, float ta, TriangleRay rb, vec3 db, float tb, uint classes, uint purpose) {
     BoxRay ba = box_ray(ra.origin, da, purpose != NEAREST);
     BoxRay bb = box_ray(rb.origin, db, purpose != NEAREST);
     Filters none;
-    Walk a = Walk(ta > 0.0 ? 0 : ba.end, 0, Hit(ta, NO_TRIANGLE, 0.0, 0.0));
-    Walk b = Walk(tb > 0.0 ? 0 : bb.end, 0, Hit(tb, NO_TRIANGLE, 0.0, 0.0));
+    Traversal a = Traversal(ta > 0.0 ? 0 : ba.end, 0, Hit(ta, NO_TRIANGLE, 0.0, 0.0));
+    Traversal b = Traversal(tb > 0.0 ? 0 : bb.end, 0, Hit(tb, NO_TRIANGLE, 0.0, 0.0));
     do {
         visit(a, ba, 0.0);
         visit(b, bb, 0.0);
@@ -243,19 +243,19 @@ HitPair walk_links_twice(TriangleRay ra, vec3 da, float ta, TriangleRay rb, vec3
         visit(b, bb, 0.0);
         test_triangle(a, none, ra, ba, classes, purpose);
         test_triangle(b, none, rb, bb, classes, purpose);
-    } while (walking(a, ba) || walking(b, bb));
+    } while (is_traversing(a, ba) || is_traversing(b, bb));
     return HitPair(a.hit, b.hit);
 }
 
 layout(constant) const uint STACK_SIZE = 1; // one more than the depth of the tree: the entry above the last is written, too
 
 // The tree with both children's boxes in the parent, the nearer child first, the other on a stack.
-Hit walk_stack(TriangleRay r, vec3 direction, float t_max, uint classes, uint purpose, inout Filters f) {
+Hit traverse_stack(TriangleRay r, vec3 direction, float t_max, uint classes, uint purpose, inout Filters f) {
     BoxRay b = box_ray(r.origin, direction, purpose != NEAREST);
     // A reference is a node, or a leaf as in Walk; the sentinel ends the walk.
     b.end = 0x7fffffff;
-    Walk w = Walk(t_max > 0.0 ? 0 : b.end, 0, Hit(t_max, NO_TRIANGLE, 0.0, 0.0));
-    bool inserted; // as in walk_links
+    Traversal w = Traversal(t_max > 0.0 ? 0 : b.end, 0, Hit(t_max, NO_TRIANGLE, 0.0, 0.0));
+    bool inserted; // as in traverse_links
     int stack[STACK_SIZE];
     int entries = 0;
     do {
@@ -294,50 +294,50 @@ Hit walk_stack(TriangleRay r, vec3 direction, float t_max, uint classes, uint pu
         uvec4 known = f.triangles;
         test_triangle(w, f, r, b, classes, purpose);
         inserted = purpose == TO_LIGHT && any(notEqual(f.triangles, known));
-    } while (walking(w, b) || inserted);
+    } while (is_traversing(w, b) || inserted);
     return w.hit;
 }
 
-Hit walk(TriangleRay r, vec3 direction, float t_max, uint classes, uint purpose, inout Filters f) {
-    return TRAVERSAL == STACK ? walk_stack(r, direction, t_max, classes, purpose, f)
-                              : walk_links(r, direction, t_max, classes, purpose, f);
+Hit traverse(TriangleRay r, vec3 direction, float t_max, uint classes, uint purpose, inout Filters f) {
+    return TRAVERSAL == STACK ? traverse_stack(r, direction, t_max, classes, purpose, f)
+                              : traverse_links(r, direction, t_max, classes, purpose, f);
 }
 
 // The nearest hit of a triangle of these classes along origin + t direction that comes after the hit `after` and not
 // after t_max; or, with any_hit, any such hit, of which only that there is one is the same every way. A negative t_max asks
 // for nothing and costs next to nothing. `self` is the flat face that the origin lies in, or 0xffffffff: slivers of 7 m were
 // met again up to 7e-6 m away, and what is seen edge-on may be met at any t.
-Hit trace(vec3 origin, vec3 direction, uint self, Hit after, float t_max, uint classes, bool any_hit) {
+Hit trace(vec3 origin, vec3 direction, uint source_face, Hit after, float t_max, uint classes, bool any_hit) {
     Filters none;
-    return walk(TriangleRay(origin, ray_shear(direction), after.t, after.triangle, self), direction, t_max, classes,
+    return traverse(TriangleRay(origin, ray_shear(direction), after.t, after.triangle, source_face), direction, t_max, classes,
                 any_hit ? ANY : NEAREST, none);
 }
 
 // Whether anything opaque lies on the way, and the nearest four filters after `after`.
-bool trace_to_light(vec3 origin, vec3 direction, uint self, Hit after, float t_max, out Filters filters) {
+bool trace_to_light(vec3 origin, vec3 direction, uint source_face, Hit after, float t_max, out Filters filters) {
     filters = NO_FILTERS;
-    TriangleRay r = TriangleRay(origin, ray_shear(direction), after.t, after.triangle, self);
-    return walk(r, direction, t_max, OPAQUE | FILTER, TO_LIGHT, filters).triangle != NO_TRIANGLE;
+    TriangleRay r = TriangleRay(origin, ray_shear(direction), after.t, after.triangle, source_face);
+    return traverse(r, direction, t_max, OPAQUE | FILTER, TO_LIGHT, filters).triangle != NO_TRIANGLE;
 }
 
 // One of two rays: nothing up to `after` is met.
 struct PairedRay {
     vec3 origin;
     vec3 direction;
-    uint self;
+    uint source_face;
     float after;
     float t_max;
 };
 
 // Two rays at once.
 HitPair trace_pair(PairedRay a, PairedRay b, uint classes, bool any_hit) {
-    TriangleRay ra = TriangleRay(a.origin, ray_shear(a.direction), a.after, NO_TRIANGLE, a.self);
-    TriangleRay rb = TriangleRay(b.origin, ray_shear(b.direction), b.after, NO_TRIANGLE, b.self);
+    TriangleRay ra = TriangleRay(a.origin, ray_shear(a.direction), a.after, NO_TRIANGLE, a.source_face);
+    TriangleRay rb = TriangleRay(b.origin, ray_shear(b.direction), b.after, NO_TRIANGLE, b.source_face);
     uint purpose = any_hit ? ANY : NEAREST;
-    if (TRAVERSAL != STACK) return walk_links_twice(ra, a.direction, a.t_max, rb, b.direction, b.t_max, classes, purpose);
+    if (TRAVERSAL != STACK) return traverse_links_pair(ra, a.direction, a.t_max, rb, b.direction, b.t_max, classes, purpose);
     Filters none;
-    return HitPair(walk_stack(ra, a.direction, a.t_max, classes, purpose, none),
-                   walk_stack(rb, b.direction, b.t_max, classes, purpose, none));
+    return HitPair(traverse_stack(ra, a.direction, a.t_max, classes, purpose, none),
+                   traverse_stack(rb, b.direction, b.t_max, classes, purpose, none));
 }
 
 // To begin with: t > 0.

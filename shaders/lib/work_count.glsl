@@ -5,7 +5,7 @@
 #include "lib/shadow.glsl"
 
 // Boundaries that were left without having been entered.
-uint stray_interfaces = 0;
+uint unmatched_exits = 0;
 
 // `lost` of all pixels of the invocation, and of the worst.
 void count_rays(uint reflection, uint refraction, float lost, float most_lost) {
@@ -14,7 +14,7 @@ void count_rays(uint reflection, uint refraction, float lost, float most_lost) {
     ADD_WORK(shadow, shadow_rays)
     ADD_WORK(node_visits, node_visits)
     ADD_WORK(triangle_tests, triangle_tests)
-    ADD_WORK(stray_interfaces, stray_interfaces)
+    ADD_WORK(unmatched_exits, unmatched_exits)
     ADD_WORK(lights_cut_off, lights_cut_off)
     // Steps of 2^-16, rounded up: what is counted is not less than what was lost.
     ADD_WORK(lost, lost > 0.0 ? uint(min(lost, 1e3) * 65536.0) + 1u : 0u)

@@ -53,7 +53,7 @@ void main() {
     while (true) {
         uint best = END_OF_LIST;
         uvec3 best_key = uvec3(0);
-        uint before = loop_heads;
+        uint before = loop_iterations;
         for (uint node = head; node != END_OF_LIST; node = nodes[node * NODE_WORDS]) {
             uint at = node * NODE_WORDS;
             uvec3 key = uvec3(nodes[at + 1], nodes[at + 2], nodes[at + 3]);
@@ -63,7 +63,7 @@ void main() {
             }
         }
         if (best == END_OF_LIST) break;
-        if (loop_heads + per_fragment > LOOP_BUDGET) {
+        if (loop_iterations + per_fragment > LOOP_BUDGET) {
             if (!BEHIND_ALONE) atomicAdd(dropped, 1u);
             break;
         }
@@ -110,7 +110,7 @@ void main() {
         nearest = false;
         sum += through * alpha * shown;
         through *= 1.0 - alpha + alpha * passes;
-        per_fragment = loop_heads - before;
+        per_fragment = loop_iterations - before;
     }
     vec4 behind = imageLoad(radiance, pixel);
     if (BENDS) {

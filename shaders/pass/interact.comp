@@ -34,7 +34,7 @@ const uint BY_REFRACTION = 1; // or straight through
 struct Branch {
     vec3 origin;      // bvh space
     vec3 direction;
-    uint self;        // the flat face it leaves
+    uint source_face;        // the flat face it leaves
     vec3 throughput;
     uvec4 media;
     float from;       // nothing up to this t is met
@@ -127,7 +127,7 @@ Branch next_branch() {
 
 // Whether a ray is sent to see what the base of a surface mirrors: inside a body there is no environment.
 bool mirrored_by_ray(HitSurface hit, Boundary boundary) {
-    return hit.s.base_traced || (boundary.solid && boundary.here != 0);
+    return hit.s.base_traced || (boundary.solid && boundary.medium_in != 0);
 }
 
 // Of the numbers that random points are drawn by, those of coats.
@@ -137,9 +137,9 @@ const uint COAT_EVENT = 0x80000000u;
 void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixel) {
     Surface s = hit.s;
     vec3 direction = ray.direction;
-    stray_interfaces += boundary.stray ? 1u : 0u;
+    unmatched_exits += boundary.unmatched_exit ? 1u : 0u;
     Branch next;
-    next.self = s.face;
+    next.source_face = s.face;
     next.media = ray.media;
     next.width = cone;
     next.spread = ray.spread;
@@ -149,15 +149,15 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     uint only_through = ray.events & 0x200u;
 
     // Straight on: past what is not covered, and through a boundary that another medium displaces.
-    next.origin = ray_origin(s.p_bvh, boundary.against ? hit.n : -hit.n, vec3(0.0));
+    next.origin = ray_origin(s.p_bvh, boundary.touches_opaque ? hit.n : -hit.n, vec3(0.0));
     next.direction = direction;
-    next.media = boundary.hidden ? boundary.beyond : ray.media;
-    next.events = (boundary.hidden && !boundary.against ? count - 1 : count) | BY_REFRACTION << 8 | only_through;
-    next.throughput = boundary.hidden ? ray.throughput : ray.throughput * (1.0 - hit.coverage);
-    next.from = boundary.against ? boundary.opaque_at : 0.0;
-    if (boundary.hidden || hit.coverage < 1.0) send(next);
+    next.media = boundary.suppressed_by_priority ? boundary.media_out : ray.media;
+    next.events = (boundary.suppressed_by_priority && !boundary.touches_opaque ? count - 1 : count) | BY_REFRACTION << 8 | only_through;
+    next.throughput = boundary.suppressed_by_priority ? ray.throughput : ray.throughput * (1.0 - hit.coverage);
+    next.from = boundary.touches_opaque ? boundary.opaque_at : 0.0;
+    if (boundary.suppressed_by_priority || hit.coverage < 1.0) send(next);
     next.from = 0.0;
-    vec3 weight = boundary.hidden || s.unlit ? vec3(0.0) : ray.throughput * hit.coverage;
+    vec3 weight = boundary.suppressed_by_priority || s.unlit ? vec3(0.0) : ray.throughput * hit.coverage;
 
     // The coat, the base's mirror image, and what goes through: each lobe in turn.
     Layers b = layers_at(hit, boundary);
@@ -188,7 +188,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     if (TRANSMISSIVE) {
         LobeSample through = sample_transmission(b, h, fresnel);
         next.origin = ray_origin(s.p_bvh, -hit.n, vec3(0.0));
-        next.media = boundary.solid ? boundary.beyond : ray.media;
+        next.media = boundary.solid ? boundary.media_out : ray.media;
         next.direction = through.direction;
         next.events = count | BY_REFRACTION << 8 | only_through;
         next.throughput = weight * through.weight;
@@ -222,15 +222,15 @@ void main() {
         ray = next_branch();
         if (FIRST_EVENT != 0) first_event = ray.events >> 10;
         // Holes of masks are passed by.
-        Hit found = Hit(TOUCHING ? ray.from : 0.0, NO_TRIANGLE, 0.0, 0.0);
+        Hit found = Hit(COINCIDENT_INTERFACES ? ray.from : 0.0, NO_TRIANGLE, 0.0, 0.0);
         HitPoint point;
         bool at_surface;
         bool hole;
         do {
-            found = trace(ray.origin, ray.direction, ray.self, found, goes_on ? LARGEST : -1.0, OPAQUE | FILTER, false);
+            found = trace(ray.origin, ray.direction, ray.source_face, found, goes_on ? LARGEST : -1.0, OPAQUE | FILTER, false);
             at_surface = goes_on && found.triangle != NO_TRIANGLE;
             if (at_surface) point = hit_point_of(found, ray.origin, ray.direction);
-            hole = MASKED_HITS && at_surface && loop_heads < LOOP_BUDGET && hit_is_hole(point);
+            hole = MASKED_HITS && at_surface && loop_iterations < LOOP_BUDGET && hit_is_hole(point);
         } while (hole);
         // What outlives the loop is assigned under a condition: lavapipe goes on with lanes that are through, and what it
         // computes for them then is nothing.
@@ -246,14 +246,14 @@ void main() {
                 hit.s.media = ray.media;
                 boundary = boundary_at(hit, ray.media, ray.direction);
                 Surface s = hit.s;
-                if (TRANSMISSIVE && !boundary.solid) seen_from(s, index_of(boundary.here));
+                if (TRANSMISSIVE && !boundary.solid) seen_from(s, index_of(boundary.medium_in));
                 compensate(s);
                 s.diffuse *= 1.0 - hit.transmits;
                 // What a ray is sent for is not looked up as well.
                 s.base_traced = mirrored_by_ray(hit, boundary);
                 LightRange all = LightRange(0, DIRECTIONAL_LIGHTS + LOCAL_LIGHTS, 0, 0);
                 vec3 weight = ray.throughput * hit.coverage;
-                if (!boundary.hidden) sum += wanted(ray.events, weight * radiance_to_eye(s, pixel, 0, all, true));
+                if (!boundary.suppressed_by_priority) sum += wanted(ray.events, weight * radiance_to_eye(s, pixel, 0, all, true));
                 split(hit, boundary, ray, cone, uvec2(pixel));
             } else {
                 bool clear = (ray.events & 0x200u) != 0 && !SKY;
@@ -263,7 +263,7 @@ void main() {
         }
         if (goes_on || looks > 0) see_environment();
         more = sent_now > 0 || waiting > 0;
-        more = more && loop_heads < LOOP_BUDGET;
+        more = more && loop_iterations < LOOP_BUDGET;
     } while (more);
     // Out of steps: what waits is not followed.
     for (int i = 0; i < MOST_SENT; i++) lost += sent_now > i ? largest(sent[i].throughput) : 0.0;

@@ -18,7 +18,7 @@ void end_of(Path p, uint place, uint pixel) {
     if ((p.state & PATH_ALIVE) != 0) {
         store_path(p, pixel);
     } else {
-        queue[place] = pixel | ENDED;
+        queue[place] = pixel | TERMINATED;
         imageStore(radiance, ivec2(pixel % width, pixel / width), radiance_of(p));
     }
 }
@@ -27,18 +27,18 @@ void main() {
     // Neighbouring groups of eight: what runs together lies together in the picture.
     uint lane = gl_LocalInvocationID.x;
     uint place = listed_tile(gl_WorkGroupID) * PATHS_IN_GROUP + (lane >> 3) * 16 + (lane & 7u);
-    uint entry_a = place < size.paths.count ? queue[place] : ENDED;
-    uint entry_b = place + 8 < size.paths.count ? queue[place + 8] : ENDED;
-    bool there_a = (entry_a & ENDED) == 0;
-    bool there_b = (entry_b & ENDED) == 0;
-    uint pixel_a = there_a ? entry_a : 0u;
-    uint pixel_b = there_b ? entry_b : 0u;
+    uint entry_a = place < size.paths.count ? queue[place] : TERMINATED;
+    uint entry_b = place + 8 < size.paths.count ? queue[place + 8] : TERMINATED;
+    bool alive_a = (entry_a & TERMINATED) == 0;
+    bool alive_b = (entry_b & TERMINATED) == 0;
+    uint pixel_a = alive_a ? entry_a : 0u;
+    uint pixel_b = alive_b ? entry_b : 0u;
     Path a = path_of(pixel_a);
     Path b = path_of(pixel_b);
-    if (!there_a) a.state = 0;
-    if (!there_b) b.state = 0;
+    if (!alive_a) a.state = 0;
+    if (!alive_b) b.state = 0;
     bounce(a, b, uvec2(pixel_a % width, pixel_a / width), uvec2(pixel_b % width, pixel_b / width));
-    if (there_a) end_of(a, place, pixel_a);
-    if (there_b) end_of(b, place + 8, pixel_b);
+    if (alive_a) end_of(a, place, pixel_a);
+    if (alive_b) end_of(b, place + 8, pixel_b);
     count_paths(path_rays, lost, most_lost);
 }

@@ -27,7 +27,7 @@ void main() {
     // are through has assigned.
     bool more;
     do {
-        more = ((a.state | b.state) & PATH_ALIVE) != 0 && loop_heads < LOOP_BUDGET;
+        more = ((a.state | b.state) & PATH_ALIVE) != 0 && loop_iterations < LOOP_BUDGET;
         bounce(a, b, pixel_a, pixel_b);
     } while (more);
     if (inside_a) imageStore(radiance, ivec2(pixel_a), radiance_of(a));

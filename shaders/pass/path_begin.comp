@@ -16,6 +16,6 @@ void main() {
     uvec2 pixel = pixel_at(place, stride);
     bool inside = all(lessThan(pixel, camera.size));
     uint index = pixel.y * camera.size.x + pixel.x;
-    queue[place] = inside ? index : ENDED;
+    queue[place] = inside ? index : TERMINATED;
     if (inside) store_path(path_through(pixel), index);
 }

@@ -12,11 +12,11 @@ layout(pass, scalar) writeonly buffer Chunks { uint chunks[]; };
 void main() {
     uint chunk = listed_tile(gl_WorkGroupID) * 64 + gl_LocalInvocationID.x;
     if (chunk * CHUNK >= size.paths.count) return;
-    uint going_on = 0;
+    uint survivors = 0;
     for (uint i = 0; i < CHUNK; i++) {
         uint place = chunk * CHUNK + i;
-        uint entry = place < size.paths.count ? queue[place] : ENDED;
-        going_on += (entry & ENDED) == 0 ? 1u : 0u;
+        uint entry = place < size.paths.count ? queue[place] : TERMINATED;
+        survivors += (entry & TERMINATED) == 0 ? 1u : 0u;
     }
-    chunks[chunk] = going_on;
+    chunks[chunk] = survivors;
 }

@@ -16,8 +16,8 @@ void main() {
     uint next = chunks[chunk];
     for (uint i = 0; i < CHUNK; i++) {
         uint place = chunk * CHUNK + i;
-        uint entry = place < size.paths.count ? queue[place] : ENDED;
-        if ((entry & ENDED) == 0) {
+        uint entry = place < size.paths.count ? queue[place] : TERMINATED;
+        if ((entry & TERMINATED) == 0) {
             next_queue[next] = entry;
             next++;
         }

@@ -19,7 +19,7 @@ layout(push_constant, scalar) uniform Push { uint count; uint blocks; };
 struct RayRead {
     vec3 origin;
     vec3 direction;
-    uint self;
+    uint source_face;
     float t_max;
 };
 
@@ -44,14 +44,14 @@ void main() {
         uint b = a + 8;
         RayRead ra = read_ray(a);
         RayRead rb = read_ray(b);
-        HitPair hit = trace_pair(PairedRay(ra.origin, ra.direction, ra.self, 0.0, ra.t_max),
-                                 PairedRay(rb.origin, rb.direction, rb.self, 0.0, rb.t_max), OPAQUE | FILTER, ANY_HIT);
+        HitPair hit = trace_pair(PairedRay(ra.origin, ra.direction, ra.source_face, 0.0, ra.t_max),
+                                 PairedRay(rb.origin, rb.direction, rb.source_face, 0.0, rb.t_max), OPAQUE | FILTER, ANY_HIT);
         if (a < count) hits[a] = hit.a;
         if (b < count) hits[b] = hit.b;
     } else {
         uint a = group * 64 + lane;
         RayRead r = read_ray(a);
-        Hit hit = trace(r.origin, r.direction, r.self, FROM_ORIGIN, r.t_max, OPAQUE | FILTER, ANY_HIT);
+        Hit hit = trace(r.origin, r.direction, r.source_face, FROM_ORIGIN, r.t_max, OPAQUE | FILTER, ANY_HIT);
         if (a < count) hits[a] = hit;
     }
     if (COUNT) {

@@ -10,7 +10,7 @@ struct Emitter {
 const uint EMITTER_KIND = 3; // what `kind` says without flags
 const uint EMITTER_PUNCTUAL = 0;
 const uint EMITTER_TRIANGLE = 1;
-const uint EMITTER_SKY = 2;
+const uint EMITTER_ENVIRONMENT = 2;
 const uint EMITTER_NONE = 3; // nothing after all
 const uint EMITTER_TWO_SIDED = 4;
 #endif

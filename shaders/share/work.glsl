@@ -7,7 +7,7 @@ struct WorkCounts {
     uint shadow[2];
     uint node_visits[2];
     uint triangle_tests[2];
-    uint stray_interfaces[2]; // left without having been entered
+    uint unmatched_exits[2]; // left without having been entered
     uint lights_cut_off[2];   // surfaces at which the loop over lights was left before its end
     uint lost[2];             // throughput that was not followed, in steps of 2^-16, summed over pixels
     uint most_lost;           // the largest of a pixel, as the bits of a float

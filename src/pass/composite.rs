@@ -35,7 +35,7 @@ pub fn composite<'a>(
     rows: [u32; 2],
 ) -> Result<()> {
     let name =
-        behind.part.map_or("see-through lighting".to_owned(), |part| format!("see-through over {}", part.name()));
+        behind.part.map_or("transparent lighting".to_owned(), |part| format!("transparent over {}", part.name()));
     let mut library = lighting.library;
     // What is mirrored here is the environment: rays are sent from the G-buffer alone.
     library.surface.mirror_rays = false;
@@ -46,7 +46,7 @@ pub fn composite<'a>(
     let constants = composite::Constants {
         library,
         bends: lighting.plan.screen.refraction,
-        mirrors: lighting.plan.screen.see_through_mirrors,
+        mirrors: lighting.plan.screen.transparent_mirrors,
         behind_alone: behind.part.is_some(),
     };
     let bind = composite::Bind {

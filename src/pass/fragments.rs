@@ -144,7 +144,7 @@ pub fn fragments<'a>(
     let push = fragments::Push { lod_bias, strip: strip.index };
     frame.raster(&clear, &bind, &[], &push, Vec::new())?;
     let raster = Raster {
-        name: "see-through fragments",
+        name: "transparent fragments",
         colors: Vec::new(),
         depth: Some(DepthTarget { image: &gbuffer.depth, clear: false, write: false }),
         origin: [0, 0],

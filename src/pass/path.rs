@@ -78,8 +78,8 @@ impl PathsOnDevice {
     }
 
     fn state(&self) -> lib::path_state::Bind<'_> {
-        let [origins, directions, throughputs, sums, media, afters] = &self.states;
-        lib::path_state::Bind { origins, directions, throughputs, sums, media, afters }
+        let [origins, directions, throughputs, sums, media, t_mins] = &self.states;
+        lib::path_state::Bind { origins, directions, throughputs, sums, media, t_mins }
     }
 }
 
@@ -104,7 +104,7 @@ pub fn paths<'a>(
     frame.copy_buffer("reset queue size", &paths.first_size, &paths.sizes[0], SIZE_BYTES);
     let bind = path_begin::Bind { path_state: paths.state(), queue: &paths.queues[0] };
     let push = path_begin::Push { places, stride };
-    frame.compute("paths begin", &bind, &path_begin::Constants { library }, &push, rows_of(tiles))?;
+    frame.compute("camera rays", &bind, &path_begin::Constants { library }, &push, rows_of(tiles))?;
     for bounce in 0..interfaces + 1 {
         let [from, to] = if bounce % 2 == 0 { [0, 1] } else { [1, 0] };
         let sizes = &paths.sizes[from];
@@ -122,9 +122,9 @@ pub fn paths<'a>(
 fn compact<'a>(frame: &mut Frame<'a>, paths: &'a PathsOnDevice, from: usize, to: usize) -> Result<()> {
     let (queue, sizes, chunks) = (&paths.queues[from], &paths.sizes[from], &paths.chunks);
     let bind = queue_count::Bind { queue, sizes, chunks };
-    frame.compute_indirect("count paths", &bind, &queue_count::Constants {}, &(), sizes, CHUNKS_AT)?;
+    frame.compute_indirect("queue count", &bind, &queue_count::Constants {}, &(), sizes, CHUNKS_AT)?;
     let bind = queue_scan::Bind { sizes, chunks, next_sizes: &paths.sizes[to] };
-    frame.compute("sum up paths", &bind, &queue_scan::Constants {}, &(), [1, 1, 1])?;
+    frame.compute("queue prefix sum", &bind, &queue_scan::Constants {}, &(), [1, 1, 1])?;
     let bind = queue_next::Bind { queue, sizes, chunks, next_queue: &paths.queues[to] };
-    frame.compute_indirect("next queue", &bind, &queue_next::Constants {}, &(), sizes, CHUNKS_AT)
+    frame.compute_indirect("queue scatter", &bind, &queue_next::Constants {}, &(), sizes, CHUNKS_AT)
 }

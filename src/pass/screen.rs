@@ -32,7 +32,7 @@ impl OnScreen {
         let buffer = |name, bytes| Buffer::new(device, name, bytes, Place::Device);
         Ok(Self {
             seen: buffer("radiance on the screen", 16 * pixels)?,
-            nearest_pieces: buffer("nearest pieces of tiles", 4 * tiles)?,
+            nearest_pieces: buffer("nearest depth of tiles", 4 * tiles)?,
         })
     }
 
@@ -58,5 +58,5 @@ pub fn screen_tiles<'a>(
     let tiles = width.div_ceil(TILE) * height.div_ceil(TILE);
     let groups = rows_of(tiles.div_ceil(tiles_program::PROGRAM.local_size[0]));
     let constants = tiles_program::Constants { library: lighting.library };
-    frame.compute("nearest pieces of tiles", &bind, &constants, &(), groups)
+    frame.compute("nearest depth of tiles", &bind, &constants, &(), groups)
 }

@@ -66,7 +66,7 @@ pub fn tiles<'a>(
     target: &'a Tiles,
 ) -> Result<()> {
     let bind = tile_depth::Bind { gbuffer: gbuffer.bind(), tile_depths: &target.depths };
-    let constants = tile_depth::Constants { library, from_camera: plan.see_through };
+    let constants = tile_depth::Constants { library, from_camera: plan.transparency };
     frame.compute_over("tile depths", &bind, &constants, &(), [target.across, target.down])?;
 
     let bind = tiles::Bind { tile_depths: &target.depths, tile_lights: &target.masks };
@@ -79,5 +79,5 @@ pub fn tiles<'a>(
         tiles: count,
     };
     let groups = rows_of((count * target.words).div_ceil(tiles::PROGRAM.local_size[0]));
-    frame.compute("light lists", &bind, &tiles::Constants {}, &push, groups)
+    frame.compute("tiled light culling", &bind, &tiles::Constants {}, &push, groups)
 }

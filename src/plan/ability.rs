@@ -1,4 +1,4 @@
-//! What a device must be able to do for a plan.
+//! Optional device features that a plan needs.
 
 use anyhow::{Result, bail};
 
@@ -7,17 +7,17 @@ use super::knobs::Knob;
 use super::knobs::rungs::{Indirect, Reflection, Refraction, Shadows};
 use super::work::Plan;
 
-/// What rungs ask of a device, beyond what every plan does.
+/// Optional features of the device that some rungs need.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Ability {
     /// Name of the device.
     pub device: String,
-    /// Compute shaders add within subgroups: how rays count their work.
+    /// Subgroup arithmetic in compute shaders, with which rays count their work.
     pub adds_in_subgroups: bool,
 }
 
 impl Plan {
-    /// Refuses a plan that the device cannot draw.
+    /// Refuses a plan that the device cannot render.
     ///
     /// # Errors
     /// One sentence with the rung, the device and the nearest rung.
@@ -39,7 +39,7 @@ impl Plan {
     }
 }
 
-/// The next cheaper rung.
+/// The next cheaper rung of the choice's knob.
 fn below(choice: Choice) -> Choice {
     let rungs = Knob::named(choice.knob).map_or(&[][..], |known| known.rungs);
     let place = rungs.iter().position(|known| *known == choice.rung).unwrap_or_default();
@@ -49,7 +49,7 @@ fn below(choice: Choice) -> Choice {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::{Demand, Facts, Knobs, Surroundings};
+    use crate::plan::{Facts, ForcedEffects, Knobs, Surroundings};
     use crate::scene::Scene;
 
     #[test]
@@ -59,7 +59,7 @@ mod tests {
             let mut knobs = Knobs::default();
             choices.iter().for_each(|choice| knobs.set(choice).unwrap());
             let surroundings =
-                Surroundings { environment: true, constant: false, grey: false, sky: true, demand: Demand::Full };
+                Surroundings { environment: true, constant: false, grey: false, sky: true, forced: ForcedEffects::All };
             Plan::new(&Scene::default(), &Facts::default(), surroundings, &knobs)
         };
         let refused = |choices: &[&str], ability: &Ability| plan(choices).check(ability).map_err(|e| e.to_string());

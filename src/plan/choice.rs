@@ -1,4 +1,4 @@
-//! A rung that somebody, or a model, has chosen.
+//! A rung that a user or a model has chosen.
 
 use std::fmt::{self, Display, Formatter};
 

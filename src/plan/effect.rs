@@ -1,4 +1,6 @@
 //! Effects with the reasons for and against them, decided one by one.
+//!
+//! Read docs/plan.md. An effect is a feature of rendering that a scene may call for, such as refraction.
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
@@ -9,25 +11,25 @@ use serde::ser::{SerializeStruct as _, Serializer};
 use super::choice::Choice;
 use super::knobs::rungs::EffectId;
 
-/// What became of an effect.
+/// The state of an effect in a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EffectState {
-    /// The scene calls for it, or somebody has asked for it.
+    /// The scene calls for the effect, or a caller forces it.
     Kept,
-    /// The scene calls for it, and a rung leaves it out.
+    /// The scene calls for the effect, but a rung switches it off.
     DroppedBy(Choice),
-    /// The scene does without.
+    /// The scene does not call for the effect.
     NotCalledFor,
 }
 
 impl EffectState {
-    /// As reports call it.
+    /// The state's name in reports.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Self::Kept => "kept",
-            Self::DroppedBy(_) => "dropped",
-            Self::NotCalledFor => "not called for",
+            Self::Kept => "used",
+            Self::DroppedBy(_) => "switched off",
+            Self::NotCalledFor => "not needed",
         }
     }
 }
@@ -38,25 +40,25 @@ impl Display for EffectState {
     }
 }
 
-/// One effect, kept or not, and why.
+/// An effect with its state and reasons.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Effect {
-    /// Which one.
+    /// The effect.
     pub id: EffectId,
-    /// What became of it.
+    /// The state.
     pub state: EffectState,
-    /// The rung of the knob that decides on it, where one does.
+    /// The rung of the knob that decides on the effect, if one does.
     pub choice: Option<Choice>,
-    /// What in the scene calls for it, or does not: one sentence, for people.
+    /// The reason why the scene calls for the effect or does not: one sentence for users.
     pub cause: String,
-    /// What that rests on.
+    /// The facts behind the cause.
     pub evidence: Evidence,
-    /// The materials that call for it, as indices of the scene's.
+    /// Indices of the scene's materials that call for the effect.
     pub materials: Vec<usize>,
 }
 
 impl Effect {
-    /// Why it is kept or not: the rung that drops it, else the cause.
+    /// The reason of the state: the rung that switches the effect off, otherwise the cause.
     #[must_use]
     pub fn reason(&self) -> String {
         match self.state {
@@ -65,7 +67,7 @@ impl Effect {
         }
     }
 
-    /// The rung of its knob; empty where none decides on it.
+    /// The rung of the knob that decides on the effect; empty when no knob does.
     #[must_use]
     pub fn rung(&self) -> &'static str {
         self.choice.map_or("", |choice| choice.rung)
@@ -73,7 +75,7 @@ impl Effect {
 }
 
 impl Serialize for Effect {
-    /// As docs/plan.md has it: `name`, `state`, `rung`, `reason`, `evidence`.
+    /// The fields of docs/plan.md: `name`, `state`, `rung`, `reason`, `evidence`.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut effect = serializer.serialize_struct("Effect", 5)?;
         effect.serialize_field("name", self.id.name())?;
@@ -85,34 +87,34 @@ impl Serialize for Effect {
     }
 }
 
-/// What a reason rests on, by name.
+/// Facts behind a cause, by name.
 pub type Evidence = BTreeMap<&'static str, String>;
 
-/// What is planned beside that which the scene calls for. The picture stays the same.
+/// Effects that are planned although the scene does not call for them. The picture stays the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Demand {
-    /// Nothing.
+pub enum ForcedEffects {
+    /// No forced effect.
     #[default]
-    Scene,
-    /// One effect.
-    With(EffectId),
+    None,
+    /// One forced effect.
+    One(EffectId),
     /// Every effect that its knob allows.
-    Full,
+    All,
 }
 
-impl Demand {
-    /// Whether an effect is planned even if the scene does not call for it.
+impl ForcedEffects {
+    /// Whether an effect is planned although the scene does not call for it.
     #[must_use]
     pub fn includes(self, effect: EffectId) -> bool {
         match self {
-            Self::Scene => false,
-            Self::With(wanted) => wanted == effect,
-            Self::Full => true,
+            Self::None => false,
+            Self::One(wanted) => wanted == effect,
+            Self::All => true,
         }
     }
 }
 
-/// What speaks for an effect, or against it, in this scene.
+/// Whether this scene calls for an effect, with the reason.
 #[derive(Clone)]
 pub(super) struct Cause {
     pub(super) called_for: bool,
@@ -130,7 +132,7 @@ impl Cause {
         Self { called_for: true, reason: reason.into(), evidence: Evidence::new(), materials: Vec::new() }
     }
 
-    /// For it if `called_for`, with the one reason or the other.
+    /// A cause for the effect if `called_for`, otherwise a cause against it.
     pub(super) fn when(called_for: bool, of: impl Into<String>, against: &str) -> Self {
         if called_for { Self::of(of) } else { Self::against(against) }
     }
@@ -140,13 +142,13 @@ impl Cause {
         self
     }
 
-    /// Evidence where there is any.
+    /// Adds evidence unless `values` is empty.
     pub(super) fn with_some(self, name: &'static str, values: &[String]) -> Self {
         if values.is_empty() { self } else { self.with(name, values.join(", ")) }
     }
 }
 
-/// What a knob says of an effect.
+/// A knob's rung, and whether it allows an effect.
 #[derive(Clone, Copy)]
 pub(super) struct Verdict {
     choice: Choice,
@@ -154,48 +156,48 @@ pub(super) struct Verdict {
 }
 
 impl Choice {
-    /// This rung allows an effect, or does not.
+    /// The verdict of this rung on an effect.
     pub(super) fn allows(self, allowed: bool) -> Verdict {
         Verdict { choice: self, allowed }
     }
 }
 
-/// Decides effects in order and keeps the account.
+/// Decides effects in order and records them.
 pub(super) struct Decisions {
-    pub(super) demand: Demand,
+    pub(super) forced: ForcedEffects,
     pub(super) effects: Vec<Effect>,
 }
 
 impl Decisions {
-    /// An effect that only the scene decides on.
+    /// Decides an effect that depends on the scene only.
     pub(super) fn decide(&mut self, effect: EffectId, cause: Cause) -> bool {
-        self.decide_as(effect, None, cause, self.demand)
+        self.decide_as(effect, None, cause, self.forced)
     }
 
-    /// An effect that a knob allows or not: if not, its rung is the reason.
+    /// Decides an effect that a knob allows or forbids; if it forbids, its rung is the reason.
     pub(super) fn decide_with(&mut self, effect: EffectId, knob: Verdict, cause: Cause) -> bool {
-        self.decide_as(effect, Some(knob), cause, self.demand)
+        self.decide_as(effect, Some(knob), cause, self.forced)
     }
 
-    /// An effect that a knob may say no to, if any knob.
+    /// Decides an effect that a knob may forbid; `None` when no knob does.
     pub(super) fn decide_unless(&mut self, effect: EffectId, knob: Option<Verdict>, cause: Cause) -> bool {
-        self.decide_as(effect, knob, cause, self.demand)
+        self.decide_as(effect, knob, cause, self.forced)
     }
 
-    /// The same of one that no demand includes: even where nothing calls for it, it is a picture with other roundings.
+    /// Decides an effect that cannot be forced: even without a cause it would change roundings of the picture.
     pub(super) fn decide_apart(&mut self, effect: EffectId, knob: Verdict, cause: Cause) -> bool {
-        self.decide_as(effect, Some(knob), cause, Demand::Scene)
+        self.decide_as(effect, Some(knob), cause, ForcedEffects::None)
     }
 
-    fn decide_as(&mut self, id: EffectId, knob: Option<Verdict>, cause: Cause, demand: Demand) -> bool {
+    fn decide_as(&mut self, id: EffectId, knob: Option<Verdict>, cause: Cause, forced: ForcedEffects) -> bool {
         let Cause { called_for, reason, evidence, materials } = cause;
-        let demanded = !called_for && demand.includes(id);
-        let state = match (called_for || demanded, knob) {
+        let is_forced = !called_for && forced.includes(id);
+        let state = match (called_for || is_forced, knob) {
             (false, _) => EffectState::NotCalledFor,
             (true, Some(Verdict { choice, allowed: false })) => EffectState::DroppedBy(choice),
             (true, _) => EffectState::Kept,
         };
-        let cause = if demanded { format!("asked for, although {reason}") } else { reason };
+        let cause = if is_forced { format!("asked for, although {reason}") } else { reason };
         let choice = knob.map(|knob| knob.choice);
         self.effects.push(Effect { id, state, choice, cause, evidence, materials });
         state == EffectState::Kept

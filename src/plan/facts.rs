@@ -1,41 +1,41 @@
-//! What is known of a scene and around it before it is planned.
+//! Facts about a scene and its surroundings that a plan is decided from.
 
-use super::effect::Demand;
+use super::effect::ForcedEffects;
 use crate::scene::Scene;
-use crate::scene::normal_form::NormalForm;
+use crate::scene::canonical::CanonicalForm;
 use crate::scene::solid::{Solids, deepest_nesting, solids};
 
-/// What is known of a scene beside what it says.
+/// Derived facts about a scene.
 #[derive(Debug, Clone, Default)]
 pub struct Facts {
-    /// Which surfaces enclose a medium.
+    /// Closed dielectric meshes, which enclose a medium.
     pub solids: Solids,
-    /// How many of those one point may be in, at most.
+    /// Largest number of closed meshes that contain one point.
     pub nesting: usize,
-    /// What was said more simply.
-    pub form: NormalForm,
+    /// Record of the canonicalisation.
+    pub form: CanonicalForm,
 }
 
 impl Facts {
-    /// Of a scene in normal form.
+    /// Facts about a scene in canonical form.
     #[must_use]
-    pub fn of(scene: &Scene, form: NormalForm) -> Self {
+    pub fn of(scene: &Scene, form: CanonicalForm) -> Self {
         let solids = solids(scene);
         Self { nesting: deepest_nesting(scene, &solids), solids, form }
     }
 }
 
-/// What is known beside the scene.
+/// Facts about the surroundings of a scene.
 #[derive(Debug, Clone, Copy)]
 pub struct Surroundings {
-    /// There is an environment that lights the scene.
+    /// Whether there is an environment that lights the scene.
     pub environment: bool,
-    /// The same light comes from everywhere.
+    /// Whether the environment's radiance is the same in all directions.
     pub constant: bool,
-    /// All its light is grey.
+    /// Whether the environment is grey everywhere.
     pub grey: bool,
-    /// It is also the background.
+    /// Whether the environment is also the background.
     pub sky: bool,
-    /// What is asked for beside what the scene calls for.
-    pub demand: Demand,
+    /// Effects that are planned although the scene does not call for them.
+    pub forced: ForcedEffects,
 }

@@ -1,11 +1,11 @@
-//! What the chosen rungs leave out of a scene.
+//! Warnings of a plan: parts of a scene that the chosen rungs simplify or omit, and rungs that change nothing.
 
 use super::knobs::Knobs;
 use super::knobs::rungs::{Absorption, Indirect, Lobes, Quadrature, Reflection};
 use super::surfaces::{Surfaces, Transmission, casts_in_maps};
 use crate::scene::{AlphaMode, Material};
 
-/// A sentence for each thing that the chosen rungs do not show of these surfaces, and for each rung that changes nothing.
+/// One sentence for each property of these surfaces that the chosen rungs do not show, and for each rung without effect.
 pub(super) fn left_out(
     surfaces: &Surfaces,
     knobs: &Knobs,

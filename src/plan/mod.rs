@@ -1,4 +1,6 @@
-//! The plan: what a scene calls for, with the reason, before any Vulkan object exists. Pure and printable.
+//! The plan: the effects that a scene calls for, with reasons, before any Vulkan object exists. Pure and printable.
+//!
+//! Read docs/plan.md; docs/glossary.md defines knob, rung, effect and plan.
 //!
 //! ```text
 //! planner ─► left_out ─► surfaces ─► facts ─► effect ─► choice, effect_id
@@ -19,11 +21,11 @@ mod work;
 
 pub use ability::Ability;
 pub use choice::Choice;
-pub use effect::{Demand, Effect, EffectState, Evidence};
+pub use effect::{Effect, EffectState, Evidence, ForcedEffects};
 pub use facts::{Facts, Surroundings};
 pub use knobs::rungs::{self, EffectId, Normals};
 pub use knobs::{KNOBS, Knob, Knobs, Model};
 pub use planner::needs_lights;
 pub use refused::{Refused, Setting};
-pub use surfaces::{casts_in_maps, is_see_through, mirrors};
+pub use surfaces::{casts_in_maps, is_transparent, mirrors};
 pub use work::{Attenuation, March, Paths, Plan, Rays, Screen, Stored};

@@ -1,25 +1,27 @@
-//! How a plan is made: effect by effect, each with its cause.
+//! The planner: decides effect by effect, each with its cause.
+//!
+//! Read docs/plan.md. The input is a scene in canonical form with its facts; the output is a [`Plan`].
 
-use super::effect::{Cause, Decisions, Demand, Verdict};
+use super::effect::{Cause, Decisions, ForcedEffects, Verdict};
 use super::facts::{Facts, Surroundings};
 use super::knobs::Knobs;
 use super::knobs::rungs::{self, Absorption, Brdf, EffectId, Guiding, Indirect, Reflection, Refraction, Shadows};
 use super::left_out::left_out;
 use super::surfaces::{
-    self, Surfaces, Transmission, by_wavelength, has_layers, is_see_through, mirrors, refracts, scatters,
+    self, Surfaces, Transmission, by_wavelength, has_layers, is_transparent, mirrors, refracts, scatters,
 };
 use super::work::{Attenuation, March, Paths, Plan, Rays, Screen, Stored};
 use crate::scene::lobe::LOBES;
 use crate::scene::{AlphaMode, Light, LightKind, Material, Scene};
 use crate::transport::layers::{SMOOTHEST, is_smooth};
 
-/// Perceptual roughness up to which surfaces are mirrored on the screen.
+/// Perceptual roughness up to which surfaces have screen-space reflections.
 const ROUGHEST_ON_SCREEN: f32 = 0.2;
 
-/// From this many point and spot lights on, tiles list them (docs/decisions/light-lists.md).
+/// Number of point and spot lights from which on tiled light culling is used (docs/decisions/light-lists.md).
 const TILES_FROM: u32 = 16;
 
-/// What all parts of a plan are decided from.
+/// The inputs of all decisions, and the decisions so far.
 struct Planner<'a> {
     scene: &'a Scene,
     facts: &'a Facts,
@@ -27,16 +29,16 @@ struct Planner<'a> {
     knobs: &'a Knobs,
     surroundings: Surroundings,
     decisions: Decisions,
-    /// Paths take the place of what else lights surfaces.
+    /// Path tracing is chosen; it replaces all other passes that light surfaces.
     paths: bool,
 }
 
 impl Plan {
-    /// Decides from values, not names. `scene` is in normal form, and `facts` are of it.
+    /// Decides from values, not names. `scene` is in canonical form, and `facts` describe it.
     #[must_use]
     pub fn new(scene: &Scene, facts: &Facts, surroundings: Surroundings, knobs: &Knobs) -> Self {
         let surfaces = Surfaces::of(scene, facts);
-        let decisions = Decisions { demand: surroundings.demand, effects: Vec::new() };
+        let decisions = Decisions { forced: surroundings.forced, effects: Vec::new() };
         let paths = knobs.indirect == Indirect::Path;
         let mut planner = Planner { scene, facts, surfaces, knobs, surroundings, decisions, paths };
         let layers = planner.layers();
@@ -54,23 +56,23 @@ impl Plan {
             layers: layers.layers,
             clearcoat: layers.clearcoat,
             conductors: layers.conductors,
-            // n and κ of each band of wavelengths are known when it is drawn.
+            // n and κ of each band of wavelengths are only known when the band is rendered.
             faint_conductors: bands > 0 || scene.materials.iter().any(|m| !m.is_metallic()),
             lobes: layers.lobes,
-            demand: surroundings.demand,
+            forced: surroundings.forced,
             environment: images.environment,
             reflection: images.mirrored,
             prefilter: images.prefilter,
             ambient: images.ambient,
             sky: surroundings.sky,
-            see_through: transmission.see_through,
+            transparency: transmission.transparency,
             directional_lights: lights.directional,
             local_lights: lights.local,
             tiles: lights.tiles,
             reflectance: images.mirrored
                 || images.ambient
                 || images.screen != Screen::default()
-                || (surroundings.demand == Demand::Full && paths.is_none())
+                || (surroundings.forced == ForcedEffects::All && paths.is_none())
                 || knobs.brdf == Brdf::GgxMulti
                 || layers.lobes != 0,
             shadow_maps,
@@ -90,7 +92,7 @@ impl Plan {
     }
 }
 
-struct Layers {
+struct LayerDecisions {
     emissive: bool,
     clearcoat: bool,
     layers: bool,
@@ -117,7 +119,7 @@ struct Lights {
 }
 
 impl Planner<'_> {
-    fn layers(&mut self) -> Layers {
+    fn layers(&mut self) -> LayerDecisions {
         let Self { surfaces, decisions, .. } = self;
         let emits = |m: &Material| m.emissive_texture.is_some() && m.emissive != [0.0; 3];
         let cause = surfaces.cause(emits, |_| "has an emissive texture".to_owned());
@@ -136,8 +138,8 @@ impl Planner<'_> {
             let cause = surfaces.cause(is_on, |m| lobe.says(&m.lobes[place]));
             lobes |= u32::from(decisions.decide(EffectId::Lobe(place), cause)) << place;
         }
-        // A coat's numbers lie in the layers.
-        Layers { emissive, clearcoat, layers: layers || clearcoat, conductors, lobes }
+        // A coat's parameters are stored in the G-buffer target of the layers.
+        LayerDecisions { emissive, clearcoat, layers: layers || clearcoat, conductors, lobes }
     }
 
     fn transmission(&mut self) -> Transmission {
@@ -148,32 +150,32 @@ impl Planner<'_> {
         let bends = decisions.decide_with(EffectId::Refraction, rung.choice().allows(rung != Refraction::Off), cause);
         let by_rays = bends && rung == Refraction::Ray;
         let cause = surfaces.cause(
-            |m| is_see_through(m, by_rays),
+            |m| is_transparent(m, by_rays),
             |m| match m.alpha_mode {
                 AlphaMode::Blend => format!("is alpha-blended, {} opaque at most", m.base_color[3]),
                 _ => format!("has transmission {}", m.transmission),
             },
         );
-        let see_through = decisions.decide_unless(EffectId::SeeThrough, by_paths(*paths), cause);
+        let transparency = decisions.decide_unless(EffectId::Transparency, by_paths(*paths), cause);
         let size =
             |m: &Material| m.sigma.as_ref().map_or([0; 3], |grid| grid.size()).map(|n| n.to_string()).join(" x ");
         let cause =
             surfaces.cause(|m| m.marched_sigma().is_some(), |m| format!("has a grid of {} values of sigma", size(m)));
         let grid = surfaces.find(|m| m.marched_sigma().is_some()).map(size);
         let cause = cause.with_some("grid", grid.as_slice());
-        // Without rays that refract all that is transparent is a sheet.
+        // Without refracting rays every transmissive surface is rendered as thin-walled.
         let by_knob = match rung == Refraction::Ray {
             true => knobs.absorption.choice().allows(knobs.absorption.steps() > 0),
             false => rung.choice().allows(false),
         };
-        let marched = decisions.decide_with(EffectId::VaryingMedia, by_knob, cause) && by_rays;
+        let marched = decisions.decide_with(EffectId::HeterogeneousMedia, by_knob, cause) && by_rays;
         let steps = if marched { knobs.absorption.steps() } else { 0 };
         let cause = Cause::when(marched, format!("{steps} steps of each segment"), "no medium is marched");
         decisions.decide_with(EffectId::Quadrature, knobs.quadrature.choice().allows(true), cause);
-        let colours = surroundings.demand == Demand::Full
+        let colours = surroundings.forced == ForcedEffects::All
             || surfaces.any(|m| m.marched_sigma().is_some_and(|grid| grid.channels() > 1));
         let march = March { steps, rule: knobs.quadrature, colours: marched && colours };
-        Transmission { bends, by_rays, see_through, march: if marched { march } else { March::default() } }
+        Transmission { bends, by_rays, transparency, march: if marched { march } else { March::default() } }
     }
 
     fn mirror_images(&mut self, transmission: &Transmission) -> MirrorImages {
@@ -190,7 +192,7 @@ impl Planner<'_> {
         let shiny = surfaces.any(|m| !m.unlit && (mirrors(m) || m.clearcoat > 0.0));
         let cause = shown(shiny, "no material in use mirrors anything");
         let reflection = decisions.decide_with(
-            EffectId::MirroredEnvironment,
+            EffectId::EnvironmentReflection,
             unless_paths(paths, rung.choice().allows(rung != Reflection::Off)),
             cause,
         );
@@ -211,16 +213,16 @@ impl Planner<'_> {
             (false, false) => "has a roughness texture".to_owned(),
         });
         let by_rung = rung.choice().allows(matches!(rung, Reflection::Screen | Reflection::Ray));
-        let mirrored = decisions.decide_with(EffectId::Mirrors, unless_paths(paths, by_rung), cause);
+        let mirrored = decisions.decide_with(EffectId::Reflection, unless_paths(paths, by_rung), cause);
         let by_rays = mirrored && rung == Reflection::Ray;
-        let demanded = surroundings.demand.includes(EffectId::Mirrors);
-        let on_screen = |see_through: bool| {
-            let found = surfaces.any(|m| smooth(m) && is_see_through(m, transmission.by_rays) == see_through);
-            mirrored && !by_rays && (found || demanded)
+        let is_forced = surroundings.forced.includes(EffectId::Reflection);
+        let on_screen = |transparency: bool| {
+            let found = surfaces.any(|m| smooth(m) && is_transparent(m, transmission.by_rays) == transparency);
+            mirrored && !by_rays && (found || is_forced)
         };
         let screen = Screen {
             mirrors: on_screen(false),
-            see_through_mirrors: on_screen(true) && transmission.see_through,
+            transparent_mirrors: on_screen(true) && transmission.transparency,
             refraction: transmission.bends && !transmission.by_rays,
         };
         let cause = shown(surfaces.any(scatters), "no material in use scatters light");
@@ -235,17 +237,18 @@ impl Planner<'_> {
         let lit = surfaces.any(|m| !m.unlit);
         let bounds = scene.bounds();
         let reaches = |light: &Light| bounds.is_none_or(|bounds| light.reaches(&bounds));
-        // The surfaces that it stands for light the scene themselves.
-        let replaced = |light: &Light| light.stand_in && followed.is_some_and(|paths| paths.emitting);
+        // The emissive surfaces behind a proxy light are lights themselves.
+        let replaced = |light: &Light| light.proxy && followed.is_some_and(|paths| paths.emitting);
         let useful = |light: &Light| light.shines() && reaches(light) && !replaced(light);
         let useful_lights = scene.lights.iter().filter(|light| useful(light)).count();
-        // Dark ones stand for those that are asked for and not there. Beside others they would take room in shadow maps.
-        let demanded = needs_lights(surroundings.demand);
-        let stand_in = demanded && useful_lights == 0;
-        // Of those, the first two.
-        let free: Vec<&Light> = scene.lights.iter().filter(|light| stand_in && !replaced(light)).take(2).collect();
+        // Black placeholder lights keep loops non-empty when lights are forced but absent. Beside real lights they would waste
+        // shadow maps.
+        let is_forced = needs_lights(surroundings.forced);
+        let proxy = is_forced && useful_lights == 0;
+        // At most two placeholders.
+        let free: Vec<&Light> = scene.lights.iter().filter(|light| proxy && !replaced(light)).take(2).collect();
         let keeps =
-            |light: &Light| free.iter().any(|kept| std::ptr::eq(*kept, light)) || (useful(light) && (lit || demanded));
+            |light: &Light| free.iter().any(|kept| std::ptr::eq(*kept, light)) || (useful(light) && (lit || is_forced));
         let kept: Vec<bool> = scene.lights.iter().map(keeps).collect();
         let count = |test: &dyn Fn(&LightKind) -> bool| {
             scene.lights.iter().zip(&kept).filter(|(light, kept)| **kept && test(&light.kind)).count() as u32
@@ -256,12 +259,10 @@ impl Planner<'_> {
             matches!(kind, LightKind::Point { range: Some(_), .. } | LightKind::Spot { range: Some(_), .. })
         });
         let dark = scene.lights.iter().filter(|light| !light.shines()).count();
-        let stand_ins = scene.lights.iter().filter(|light| light.shines() && replaced(light)).count();
+        let proxies = scene.lights.iter().filter(|light| light.shines() && replaced(light)).count();
         let cause = match (scene.lights.is_empty(), useful_lights > 0, lit) {
             (true, ..) => Cause::against("the scene has no lights"),
-            (_, false, _) if stand_ins > 0 => {
-                Cause::against("surfaces light in place of the lights that stand for them")
-            }
+            (_, false, _) if proxies > 0 => Cause::against("surfaces light in place of the lights that stand for them"),
             (_, false, _) if dark == scene.lights.len() => Cause::against("all lights of the scene are dark"),
             (_, false, _) => Cause::against("no light of the scene reaches anything"),
             (.., false) => Cause::against("all materials in use are unlit"),
@@ -274,7 +275,7 @@ impl Planner<'_> {
                 .with("local", local)
                 .with("with a range", ranged)
                 .with("dark", dark)
-                .with("out of range", scene.lights.len() - dark - stand_ins - useful_lights),
+                .with("out of range", scene.lights.len() - dark - proxies - useful_lights),
         };
         decisions.decide(EffectId::PunctualLights, counts(cause.clone()));
         let shadows = decisions.decide_with(
@@ -287,18 +288,18 @@ impl Planner<'_> {
             (_, false) => Cause::against("no light has a range"),
             _ => counts(Cause::of(format!("{ranged} of {local} point and spot lights have a range"))),
         };
-        let tiles = decisions.decide_unless(EffectId::LightLists, by_paths(*paths), cause);
+        let tiles = decisions.decide_unless(EffectId::TiledLightCulling, by_paths(*paths), cause);
         Lights { kept, directional, local, shadows, tiles }
     }
 
-    /// Light from surface to surface.
+    /// Path tracing: indirect light between surfaces.
     fn paths(&mut self) -> Option<Paths> {
         let Self { scene, surfaces, decisions, knobs, surroundings, paths, .. } = self;
         let cause = match surfaces.any(|m| !m.unlit) {
             true => Cause::of("light goes from surface to surface"),
             false => Cause::when(*paths, "the knob says so", "no surface in use sends light"),
         };
-        let kept = decisions.decide_with(EffectId::Paths, knobs.indirect.choice().allows(*paths), cause);
+        let kept = decisions.decide_with(EffectId::PathTracing, knobs.indirect.choice().allows(*paths), cause);
         let sends_light = |m: &Material| match m.unlit {
             true => m.base_color[..3] != [0.0; 3],
             false => m.emissive != [0.0; 3],
@@ -308,14 +309,14 @@ impl Planner<'_> {
             false => Cause::against("no paths are followed"),
         };
         let by_lights = knobs.lights.choice().allows(knobs.lights != rungs::Lights::Points);
-        let emitting = decisions.decide_with(EffectId::EmittingSurfaces, by_lights, cause);
+        let emitting = decisions.decide_with(EffectId::EmissiveLights, by_lights, cause);
         let shaped = scene.lights.iter().find(|light| light.shines() && light.extent.is_some());
         let cause = match (kept, shaped) {
             (false, _) => Cause::against("no paths are followed"),
             (_, None) => Cause::against("no light has a shape"),
             (_, Some(light)) => Cause::of(format!("light \"{}\" has a shape", light.name)),
         };
-        let shaped = decisions.decide_with(EffectId::ShapedLights, by_lights, cause);
+        let shaped = decisions.decide_with(EffectId::AreaLights, by_lights, cause);
         let smooth = surfaces.cause(is_smooth, |m| {
             let does = if m.transmission > 0.0 { "bends" } else { "mirrors" };
             format!("{does} light without spreading it")
@@ -326,12 +327,15 @@ impl Planner<'_> {
             (_, false) => Cause::against("paths meet no light by chance"),
             _ => smooth,
         };
-        let aimed =
-            decisions.decide_with(EffectId::Aims, knobs.guiding.choice().allows(knobs.guiding != Guiding::Off), cause);
-        paths.then_some(Paths { emitting, shaped, aimed, at_once: false })
+        let guided = decisions.decide_with(
+            EffectId::PathGuiding,
+            knobs.guiding.choice().allows(knobs.guiding != Guiding::Off),
+            cause,
+        );
+        paths.then_some(Paths { emitting, shaped, guided, at_once: false })
     }
 
-    /// Bands of wavelengths, and whether rays split by them.
+    /// Number of bands of wavelengths, and whether dispersion splits rays by wavelength.
     fn wavelengths(&mut self, transmission: &Transmission) -> (u32, bool) {
         let Self { scene, surfaces, decisions, knobs, surroundings, .. } = self;
         let bands = knobs.colour.bands();
@@ -356,7 +360,7 @@ impl Planner<'_> {
             _ => Cause::against("everything is grey: all wavelengths make the same picture"),
         };
         let by_colour = knobs.colour.choice().allows(bands > 0);
-        let spectral = decisions.decide_apart(EffectId::Wavelengths, by_colour, cause);
+        let spectral = decisions.decide_apart(EffectId::SpectralRendering, by_colour, cause);
         let cause = match transmission.bends {
             true => surfaces.cause(Material::disperses, |m| {
                 let n = |nm| m.dispersion.index(f64::from(m.ior), nm);
@@ -368,7 +372,7 @@ impl Planner<'_> {
         (if spectral { bands } else { 0 }, disperses && spectral)
     }
 
-    /// What sends rays, and the code for what they may meet.
+    /// The kinds of rays, and the shader code for the surfaces that they can hit.
     fn rays(&mut self, transmission: &Transmission, images: &MirrorImages, lights: &Lights) -> Option<Rays> {
         let Self { surfaces, decisions, knobs, surroundings, paths, .. } = self;
         let shadows = lights.shadows && knobs.shadows == Shadows::Ray;
@@ -377,8 +381,8 @@ impl Planner<'_> {
             return None;
         }
         let holes = |m: &Material| matches!(m.alpha_mode, AlphaMode::Mask(_));
-        let masked = decisions.decide(EffectId::Holes, surfaces.cause(holes, |_| "has holes".to_owned()));
-        // Paths that bend are no straight way to a light.
+        let masked = decisions.decide(EffectId::AlphaTest, surfaces.cause(holes, |_| "has holes".to_owned()));
+        // A path that refracts is not a straight shadow ray.
         let lets_through = |m: &Material| {
             holes(m)
                 || m.alpha_mode == AlphaMode::Blend
@@ -388,9 +392,9 @@ impl Planner<'_> {
             true => surfaces.cause(lets_through, |_| "lets light through".to_owned()),
             false => Cause::against("no rays look for lights"),
         };
-        let filters = decisions.decide(EffectId::Filters, cause);
+        let filters = decisions.decide(EffectId::TransparentShadows, cause);
         let cause = surfaces.cause(|m| m.transmission > 0.0, |m| format!("has transmission {}", m.transmission));
-        let transmissive = decisions.decide(EffectId::Transmission, cause);
+        let transmissive = decisions.decide(EffectId::TransmissiveHits, cause);
         let rough = |m: &Material| {
             let coat = m.clearcoat > 0.0 && m.clearcoat_roughness > 0.0;
             if *paths {
@@ -401,14 +405,18 @@ impl Planner<'_> {
             (mirrors && surfaces::is_smooth(m, images.roughest) && (m.roughness > 0.0 || coat))
                 || (m.transmission > 0.0 && m.roughness > 0.0)
         };
-        let rough = decisions
-            .decide(EffectId::RoughRays, surfaces.cause(rough, |m| format!("sends rays at roughness {}", m.roughness)));
-        let frosted = |m: &Material| m.transmission > 0.0 && m.roughness > SMOOTHEST;
+        let rough = decisions.decide(
+            EffectId::GlossyReflection,
+            surfaces.cause(rough, |m| format!("sends rays at roughness {}", m.roughness)),
+        );
+        let rough_transmission = |m: &Material| m.transmission > 0.0 && m.roughness > SMOOTHEST;
         let cause = match *paths {
-            true => surfaces.cause(frosted, |m| format!("lets light through with roughness {}", m.roughness)),
+            true => {
+                surfaces.cause(rough_transmission, |m| format!("lets light through with roughness {}", m.roughness))
+            }
             false => Cause::against("no paths are followed"),
         };
-        let frosted = decisions.decide(EffectId::Frosted, cause);
+        let rough_transmission = decisions.decide(EffectId::RoughTransmission, cause);
         let absorbs = |m: &Material| m.absorbs() && m.transmission > 0.0 && m.thickness > 0.0;
         let absorption = decisions.decide_with(
             EffectId::Absorption,
@@ -426,7 +434,7 @@ impl Planner<'_> {
             masked,
             filters,
             rough,
-            frosted,
+            rough_transmission,
             attenuation: match knobs.absorption {
                 Absorption::Thickness if absorption => Attenuation::Nominal,
                 _ if absorption => Attenuation::Path,
@@ -434,25 +442,25 @@ impl Planner<'_> {
             },
             march: transmission.march,
             interfaces: knobs.interfaces.count(),
-            textures: surroundings.demand == Demand::Full,
+            textures: surroundings.forced == ForcedEffects::All,
         })
     }
 }
 
-/// What paths take the place of they drop.
+/// The verdict on effects that path tracing replaces.
 fn by_paths(paths: bool) -> Option<Verdict> {
     paths.then(|| Indirect::Path.choice().allows(false))
 }
 
-/// The same, or where there are none what another knob says.
+/// The verdict of path tracing on an effect that it replaces, or without path tracing that of another knob.
 fn unless_paths(paths: bool, else_by: Verdict) -> Verdict {
     by_paths(paths).unwrap_or(else_by)
 }
 
-/// Whether effects are asked for that need lights: dark ones, where the scene has none.
+/// Whether a forced effect needs lights: a scene without lights then gets black placeholders.
 #[must_use]
-pub fn needs_lights(demand: Demand) -> bool {
-    [EffectId::PunctualLights, EffectId::Shadows, EffectId::LightLists]
+pub fn needs_lights(forced: ForcedEffects) -> bool {
+    [EffectId::PunctualLights, EffectId::Shadows, EffectId::TiledLightCulling]
         .into_iter()
-        .any(|effect| demand.includes(effect))
+        .any(|effect| forced.includes(effect))
 }

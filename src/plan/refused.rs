@@ -1,23 +1,23 @@
-//! Settings that cannot be followed.
+//! Errors for settings that cannot be satisfied.
 
 use std::fmt;
 
-/// What a caller chose.
+/// A kind of setting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Setting {
     /// A rung of a knob: `KNOB=RUNG`.
     Knob,
     /// The picture's pixels.
     Size,
-    /// What lies behind the scene.
+    /// The background behind the scene.
     Background,
-    /// A part of the picture that is kept beside it.
+    /// A part of the picture that is stored as a layer.
     Part,
-    /// The largest error of a picture by paths.
+    /// The target error of path tracing.
     MaxError,
 }
 
-/// A setting that cannot be followed, with the reason: what a caller may match on in an [`anyhow::Error`].
+/// A setting that cannot be satisfied, with the reason; callers downcast an [`anyhow::Error`] to this type.
 ///
 /// ```
 /// use etalon::plan::{Knobs, Refused, Setting};
@@ -27,14 +27,14 @@ pub enum Setting {
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refused {
-    /// Which.
+    /// The kind of setting.
     pub setting: Setting,
-    /// Its value, and what is wrong with it.
+    /// The setting's value, and the reason of the refusal.
     pub why: String,
 }
 
 impl Refused {
-    /// An error of its own.
+    /// A refusal as an [`anyhow::Error`].
     pub(crate) fn error(setting: Setting, why: String) -> anyhow::Error {
         Self { setting, why }.into()
     }

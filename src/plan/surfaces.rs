@@ -1,4 +1,4 @@
-//! What materials in use mean for a plan.
+//! Materials in use, and their properties that a plan depends on.
 
 use super::effect::Cause;
 use super::facts::Facts;
@@ -6,40 +6,40 @@ use super::work::March;
 use crate::scene::{AlphaMode, Material, Meaning, Scene};
 pub use crate::transport::layers::mirrors;
 
-/// What lets light through, and how.
+/// How transmissive and alpha-blended surfaces are rendered.
 pub(super) struct Transmission {
-    /// A knob shows it bent …
+    /// Refraction is shown, by rays or in screen space.
     pub(super) bends: bool,
-    /// … by rays.
+    /// Refraction is shown by rays.
     pub(super) by_rays: bool,
-    pub(super) see_through: bool,
+    pub(super) transparency: bool,
     pub(super) march: March,
 }
 
-/// Whether a surface is laid over what lies behind it, in passes of its own: blended surfaces, and transmissive ones where
-/// no rays refract in them (`refracting_rays`).
+/// Whether a surface is drawn by order-independent transparency: an alpha-blended surface, or a transmissive one when no rays
+/// refract (`refracting_rays`).
 #[must_use]
-pub fn is_see_through(material: &Material, refracting_rays: bool) -> bool {
+pub fn is_transparent(material: &Material, refracting_rays: bool) -> bool {
     material.alpha_mode == AlphaMode::Blend || (material.transmission > 0.0 && !refracting_rays)
 }
 
-/// Whether a surface is drawn into shadow maps. What lets light through does not stop it there: it passes unweakened.
+/// Whether a surface is drawn into shadow maps. Transparent and transmissive surfaces are not: light passes unattenuated.
 #[must_use]
 pub fn casts_in_maps(material: &Material) -> bool {
-    !is_see_through(material, false)
+    !is_transparent(material, false)
 }
 
-/// Whether some of the light that a surface receives leaves it in all directions.
+/// Whether a surface has a diffuse part: it scatters some of its incident light into all directions.
 pub(super) fn scatters(material: &Material) -> bool {
     let by_lobes = material.lobes().any(|(lobe, of)| lobe.scatters && lobe.is_on(of));
     let by_ground = (material.metallic < 1.0 || material.metallic_roughness_texture.is_some())
-        // Metal transmits nothing.
+        // Metals do not transmit.
         && (material.transmission < 1.0 || material.metallic > 0.0 || material.transmission_texture.is_some())
         && material.base_color[..3] != [0.0; 3];
     !material.unlit && (by_ground || by_lobes)
 }
 
-/// Whether a surface treats wavelengths differently.
+/// Whether the surface depends on wavelength.
 pub(super) fn by_wavelength(m: &Material) -> bool {
     let differ = |rgb: &[f32]| rgb[0] != rgb[1] || rgb[1] != rgb[2];
     differ(&m.base_color[..3])
@@ -55,12 +55,12 @@ pub(super) fn by_wavelength(m: &Material) -> bool {
         || m.textures().any(|(.., meaning, texture)| meaning == Meaning::Color && texture.is_some())
 }
 
-/// Whether a surface bends light.
+/// Whether a surface refracts light.
 pub(super) fn refracts(material: &Material) -> bool {
     material.transmission > 0.0 && material.alpha_mode != AlphaMode::Blend
 }
 
-/// Whether a surface or its coat mirrors, with a perceptual roughness up to `roughest`.
+/// Whether a surface or its coat has specular reflection with a perceptual roughness up to `roughest`.
 pub(super) fn is_smooth(m: &Material, roughest: f32) -> bool {
     let base = mirrors(m) && (m.roughness <= roughest || m.metallic_roughness_texture.is_some());
     let coat = m.clearcoat > 0.0 && (m.clearcoat_roughness <= roughest || m.clearcoat_roughness_texture.is_some());
@@ -80,7 +80,7 @@ pub(super) fn has_layers(material: &Material) -> bool {
     .any(Option::is_some)
 }
 
-/// The materials of what is drawn, with what is known of their surfaces.
+/// The materials in use, with facts about their surfaces.
 pub(super) struct Surfaces<'a> {
     used: Vec<Used<'a>>,
     facts: &'a Facts,
@@ -89,10 +89,10 @@ pub(super) struct Surfaces<'a> {
 struct Used<'a> {
     index: usize,
     material: &'a Material,
-    /// Of its instances those that enclose a medium, and all.
+    /// Instances that enclose a medium; `instances` counts all.
     closed: usize,
     instances: usize,
-    /// Some mesh has colours.
+    /// Whether some mesh of the material has vertex colours.
     coloured: bool,
 }
 
@@ -121,7 +121,7 @@ impl<'a> Surfaces<'a> {
         self.used.iter().any(|used| test(used.material))
     }
 
-    /// The first material in use on a mesh whose vertices are coloured.
+    /// The first material in use on a mesh with vertex colours.
     pub(super) fn with_colours(&self) -> Option<&'a Material> {
         self.used.iter().find(|used| used.coloured).map(|used| used.material)
     }
@@ -130,7 +130,7 @@ impl<'a> Surfaces<'a> {
         self.used.iter().map(|used| used.material).find(|material| test(material))
     }
 
-    /// For an effect, where a material in use passes a test; with the first one that does.
+    /// The cause of an effect: the materials in use that pass a test, with the first of them as the reason.
     pub(super) fn cause(&self, test: impl Fn(&Material) -> bool, says: impl Fn(&Material) -> String) -> Cause {
         let found: Vec<&Used> = self.used.iter().filter(|used| test(used.material)).collect();
         let Some(first) = found.first() else {
@@ -147,13 +147,13 @@ impl<'a> Surfaces<'a> {
             .with("materials", found.len())
     }
 
-    /// Whether a material that lets light through encloses nothing, at least in one place.
+    /// Whether a transmissive material is thin-walled: at least one of its instances is not closed.
     pub(super) fn is_sheet(&self, material: &Material) -> bool {
         let used = self.used.iter().find(|used| std::ptr::eq(used.material, material));
         used.is_some_and(|used| used.closed < used.instances)
     }
 
-    /// A sentence's end about a material that lets light through.
+    /// A sentence's end that describes a transmissive material.
     pub(super) fn body(&self, material: &Material) -> String {
         let used = self.used.iter().find(|used| std::ptr::eq(used.material, material));
         let closed = match used.map(|used| (used.closed, used.instances)) {

@@ -1,111 +1,112 @@
-//! A plan as data: what is done, and how.
+//! A plan as data: passes, shader code and resources that a scene needs under the chosen knobs.
+//!
+//! Read docs/plan.md. Every field turns passes, images or specialization constants on or off.
 
-use super::effect::{Demand, Effect, EffectState, Evidence};
+use super::effect::{Effect, EffectState, Evidence, ForcedEffects};
 use super::knobs::Knobs;
 use super::knobs::rungs::{EffectId, Normals, Position, Quadrature};
 
-/// Which passes and which code a scene needs under the chosen knobs.
+/// The passes and the shader code that a scene needs under the chosen knobs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// A G-buffer target for emissive texels: some material has an emissive texture.
+    /// A G-buffer target for emissive textures.
     pub emissive: bool,
-    /// A G-buffer target for clear-coat and specular texels and the coat's normal.
+    /// A G-buffer target for clear coat, specular and transmission texels and the coat's normal.
     pub layers: bool,
     /// Code for the clear coat.
     pub clearcoat: bool,
-    /// Code for metals given by n and κ.
+    /// Code for conductors with n and κ.
     pub conductors: bool,
-    /// And for such as hardly absorb, where the differences of their reflectance cancel.
+    /// Code for conductors with small κ, where the differences of their reflectance cancel.
     pub faint_conductors: bool,
-    /// Code for lobes of extensions, a bit each in the order of [`LOBES`](crate::scene::lobe::LOBES).
+    /// Code for lobes of material extensions, one bit each in the order of [`LOBES`](crate::scene::lobe::LOBES).
     pub lobes: u32,
-    /// What was asked for beside what the scene calls for.
-    pub demand: Demand,
-    /// There is an environment: rays that leave the scene see it, whatever surfaces do.
+    /// Effects that are planned although the scene does not call for them.
+    pub forced: ForcedEffects,
+    /// There is an environment: rays that leave the scene return its radiance.
     pub environment: bool,
-    /// The environment is seen in surfaces.
+    /// Surfaces reflect the environment.
     pub reflection: bool,
-    /// It is not the same everywhere: its averages over lobes are made beforehand.
+    /// The environment varies, so a prefiltered environment map is made.
     pub prefilter: bool,
     /// The environment's irradiance lights diffuse surfaces.
     pub ambient: bool,
-    /// The environment is seen behind it.
+    /// The environment is the background.
     pub sky: bool,
-    /// Passes for alpha-blended and transmissive surfaces.
-    pub see_through: bool,
-    /// Which lights of the scene there are.
+    /// Passes for order-independent transparency: alpha-blended surfaces, and transmissive ones without refracting rays.
+    pub transparency: bool,
+    /// For each light of the scene, whether it is kept.
     pub lights: Vec<bool>,
-    /// Directional ones among them.
+    /// Number of kept directional lights.
     pub directional_lights: u32,
-    /// Point and spot lights.
+    /// Number of kept point and spot lights.
     pub local_lights: u32,
-    /// Lists of lights per tile.
+    /// Tiled light culling.
     pub tiles: bool,
-    /// The table of directional reflectance: for an environment, or to make up for single scattering.
+    /// The table of directional albedo: for the split sum of an environment, and for energy compensation of multiple scattering.
     pub reflectance: bool,
-    /// Lights are looked for in depth maps drawn from where they are.
+    /// Shadow maps for the lights.
     pub shadow_maps: bool,
-    /// Rays, and the hierarchy of the scene's triangles that they go through; `None` where nothing sends any.
+    /// Ray tracing with the BVH; `None` when no pass sends rays.
     pub rays: Option<Rays>,
-    /// Paths of light, which take the place of all other passes that light surfaces; `None`: light comes straight from lights,
-    /// and by rays from what is smooth.
+    /// Path tracing, which replaces all other passes that light surfaces. `None`: direct light from punctual lights, and
+    /// recursive rays from smooth surfaces.
     pub paths: Option<Paths>,
-    /// What is looked up in the picture itself.
+    /// Screen-space reflection and refraction.
     pub screen: Screen,
-    /// Perceptual roughness up to which surfaces are mirrored by rays or on the screen, and not by the prefiltered
-    /// environment.
+    /// Perceptual roughness up to which surfaces reflect by rays or in screen space instead of the prefiltered environment.
     pub roughest_mirror: f32,
-    /// Bands of wavelengths that the picture is drawn in, one after the other; 0: red, green and blue at once.
+    /// Number of bands of wavelengths, rendered one after the other; 0 for RGB.
     pub bands: u32,
-    /// Rays of different wavelengths go different ways: the samples go through parts of each band.
+    /// Dispersion: refraction depends on wavelength, so the samples take parts of each band.
     pub disperses: bool,
-    /// How the G-buffer keeps what is lit out of it; paths light nothing out of it.
+    /// Encoding of normals and positions in the G-buffer; path tracing does not light from the G-buffer.
     pub stored: Stored,
     /// Samples per pixel.
     pub samples: u32,
-    /// Every effect with its reason.
+    /// Every effect with its state and reason.
     pub effects: Vec<Effect>,
-    /// Textures and texture coordinates of the scene that are neither decoded nor uploaded, and why, a sentence each.
+    /// Textures and texture coordinates of the scene that are neither decoded nor uploaded, with reasons, one sentence each.
     pub unread: Vec<String>,
-    /// What the chosen rungs leave out of this scene, a sentence each.
+    /// Parts of this scene that the chosen rungs simplify or omit, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// What sends rays and what they may meet.
+/// The kinds of rays that passes send, and the kinds of surfaces that rays can hit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Rays {
-    /// Lights are looked for by rays.
+    /// Shadow rays towards lights.
     pub shadows: bool,
-    /// Surfaces up to [`Plan::roughest_mirror`] mirror the scene.
+    /// Reflection rays from surfaces up to [`Plan::roughest_mirror`].
     pub mirrors: bool,
-    /// Transmissive surfaces refract; they are in the G-buffer.
+    /// Refraction rays at transmissive surfaces, which are then in the G-buffer.
     pub refraction: bool,
-    /// Transmissive surfaces may be hit.
+    /// Rays can hit transmissive surfaces.
     pub transmissive: bool,
-    /// Surfaces with holes may be hit.
+    /// Rays can hit alpha-tested surfaces.
     pub masked: bool,
-    /// Masked, blended or transmissive surfaces may lie before a light.
+    /// Shadow rays can hit alpha-tested, blended or transmissive surfaces (transparent shadows).
     pub filters: bool,
-    /// Some surface that sends rays is rough: they are drawn from its lobe.
+    /// Some surface that sends rays is rough: rays sample its lobe (glossy reflection).
     pub rough: bool,
-    /// Some surface that paths go through is rough.
-    pub frosted: bool,
-    /// How media absorb.
+    /// Some transmissive surface of a path is rough (rough BTDF).
+    pub rough_transmission: bool,
+    /// Absorption of media.
     pub attenuation: Attenuation,
-    /// How media that vary are gone through.
+    /// Marching of heterogeneous media.
     pub march: March,
-    /// Surfaces that a path may meet.
+    /// Largest number of surfaces along a path.
     pub interfaces: u32,
-    /// Textures, coordinates and colours are kept for what rays meet, whether or not there are any.
+    /// Textures, coordinates and colours are kept for ray hits even where no material uses them.
     pub textures: bool,
 }
 
-/// How the G-buffer keeps normals and positions (knobs `normals` and `position`).
+/// Encoding of normals and positions in the G-buffer (knobs `normals` and `position`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Stored {
-    /// As octahedra of so many bits, or in floats.
+    /// Octahedral encoding in a number of bits, or floats.
     pub normals: Normals,
-    /// Positions themselves, and not their depth alone.
+    /// Positions are stored instead of reconstructed from depth.
     pub positions: bool,
 }
 
@@ -115,76 +116,77 @@ impl Stored {
     }
 }
 
-/// How media absorb on the way through them.
+/// Model of absorption in media.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Attenuation {
-    /// Not at all.
+    /// No absorption.
     #[default]
     Off,
-    /// By the nominal thickness of a surface.
+    /// Absorption over the nominal thickness of a surface.
     Nominal,
-    /// Along the path.
+    /// Absorption over the path length (Beer-Lambert law).
     Path,
 }
 
-/// How paths of light go on (knob `indirect`).
+/// Settings of path tracing (knob `indirect`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Paths {
-    /// What emits lights the scene (knob `lights`); else it is only seen.
+    /// Emissive surfaces light the scene (knob `lights`); otherwise they are only visible.
     pub emitting: bool,
-    /// Some light has a shape.
+    /// Some light is an analytic area light.
     pub shaped: bool,
-    /// They aim at what light left last before it came to where they are.
-    pub aimed: bool,
-    /// All bounces in one dispatch: the same film, for comparison.
+    /// Path guiding with photons.
+    pub guided: bool,
+    /// All bounces in one dispatch instead of a wavefront: the same film, for comparison.
     pub at_once: bool,
 }
 
-/// How segments of paths go through grids of σ.
+/// Ray marching through grids of σ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct March {
     /// Steps of each segment, a multiple of 4; 0: no grid is marched.
     pub steps: u32,
-    /// By which the steps are summed.
+    /// Quadrature rule over the steps.
     pub rule: Quadrature,
-    /// Some grid has values for red, green and blue.
+    /// Some grid has three channels.
     pub colours: bool,
 }
 
-/// What is looked up in the picture of the opaque surfaces: the rungs `screen` of `reflection` and `refraction`.
+/// Screen-space effects, from the picture of the opaque surfaces: rung `screen` of `reflection` and `refraction`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Screen {
-    /// Smooth opaque surfaces mirror what is on it …
+    /// Screen-space reflection of smooth opaque surfaces.
     pub mirrors: bool,
-    /// … and so do the nearest see-through ones.
-    pub see_through_mirrors: bool,
-    /// Transmissive bodies show what lies on it where a bent ray leaves them; they are see-through surfaces.
+    /// Screen-space reflection of the nearest transparent surfaces.
+    pub transparent_mirrors: bool,
+    /// Screen-space refraction: a transmissive surface shows the picture where the refracted ray leaves it. Transmissive
+    /// surfaces are then drawn as transparent surfaces.
     pub refraction: bool,
 }
 
 impl Plan {
-    /// How segments go through grids of σ.
+    /// Ray marching through grids of σ.
     #[must_use]
     pub fn march(&self) -> March {
         self.rays.map_or_else(March::default, |rays| rays.march)
     }
 
-    /// The effects that are drawn.
+    /// Effects in state `Kept`.
     pub fn kept(&self) -> impl Iterator<Item = EffectId> {
         self.effects.iter().filter(|effect| effect.state == EffectState::Kept).map(|effect| effect.id)
     }
 
-    /// Whether an effect is drawn. What a constant of the shaders turns on needs no member of its own here.
+    /// Whether an effect is kept. Effects that only set a specialization constant have no field of their own.
     #[must_use]
     pub fn keeps(&self, id: EffectId) -> bool {
         self.kept().any(|kept| kept == id)
     }
 
-    /// Whether the same is done for both, whatever their reasons.
+    /// Whether two plans draw the same work, whatever their reasons.
     #[must_use]
     pub fn draws_as(&self, other: &Self) -> bool {
         let work = |plan: &Self| Self {
-            demand: Demand::Scene,
+            forced: ForcedEffects::None,
             lights: Vec::new(),
             effects: Vec::new(),
             warnings: Vec::new(),
@@ -193,11 +195,11 @@ impl Plan {
         work(self) == work(other)
     }
 
-    /// Enters into the account what only the hierarchy of triangles tells: whether transparent bodies lie against other
-    /// surfaces. No demand includes that: what touches is another picture.
+    /// Adds the effect `CoincidentInterfaces`, which only the BVH decides: whether closed dielectric meshes touch other
+    /// surfaces. It cannot be forced, because it changes the picture.
     pub fn found_touching(&mut self, touching: bool) {
         self.effects.push(Effect {
-            id: EffectId::TouchingBodies,
+            id: EffectId::CoincidentInterfaces,
             state: if touching { EffectState::Kept } else { EffectState::NotCalledFor },
             choice: None,
             cause: match touching {

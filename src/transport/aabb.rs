@@ -1,4 +1,6 @@
-//! Boxes along the axes.
+//! Axis-aligned bounding boxes (AABB).
+//!
+//! Read pbrt (4th ed.), section 3.7 (bounding boxes).
 
 /// An axis-aligned box in bvh space.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -10,10 +12,10 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// The box of nothing: a union with it changes nothing.
+    /// The empty box: the neutral element of the union.
     pub const EMPTY: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
 
-    /// The smallest box around both.
+    /// The smallest box around both boxes.
     #[must_use]
     pub fn union(&self, other: &Self) -> Self {
         Self {
@@ -34,14 +36,14 @@ impl Aabb {
         f64::from(self.max[axis]) - f64::from(self.min[axis])
     }
 
-    /// Half the surface.
+    /// Half of the surface area.
     #[must_use]
     pub fn half_area(&self) -> f64 {
         let [x, y, z] = [0, 1, 2].map(|axis| self.size(axis));
         x * y + y * z + z * x
     }
 
-    /// Twice the middle, which is exact in f64 for coordinates of like size.
+    /// Twice the centre; exact in f64 for coordinates of similar size.
     pub(crate) fn double_center(&self, axis: usize) -> f64 {
         f64::from(self.min[axis]) + f64::from(self.max[axis])
     }

@@ -1,20 +1,22 @@
-//! A hierarchy of boxes over the triangles of a scene, and the forms in which rays walk it.
+//! Bounding volume hierarchy (BVH) over the triangles of a scene, and its memory layouts for traversal.
 //!
-//! Rays need all triangles in one space with coordinates that f32 can hold: **bvh space**, the world's axes in metres
-//! with the origin at the anchor, the middle of the scene. A view adds one vector to come from positions relative to
-//! its eye.
+//! Read pbrt (4th ed.), section 7.3; docs/decisions/rays.md. `ploc.rs` builds the topology (PLOC); the figure [`Bvh::sah`]
+//! is the surface area heuristic.
 //!
-//! The tree is binary. It is written out in two forms:
+//! Rays need all triangles in one space whose coordinates f32 can represent: **bvh space**, the world's axes in metres
+//! with the origin at the anchor, the centre of the scene. A view adds one vector to positions relative to its eye.
 //!
-//! - as a **list** ([`Bvh::links`]): the nodes depth-first, each inner node with a link to the node after its subtree.
-//!   A ray that meets a box goes on to the next node, one that misses it to the link; there is no stack, and an inner
-//!   node whose box is hardly smaller than the one above is left out. The order of
-//!   siblings is fixed in a list, so there is one for each octant of directions (nearest hit) and one that looks at
-//!   small boxes with much inside first (any hit).
-//! - as **nodes with both children's boxes** ([`Bvh::stack_nodes`]) for a traversal with a stack.
+//! The tree is binary. There are two layouts:
 //!
-//! Boxes are centre and half extent, in f32 or in 16 bits of a [`Grid`] over the scene. All of them contain their
-//! triangles with something to spare, so that a slab test in f32 loses none.
+//! - A **list with skip pointers** (threaded BVH, [`Bvh::links`]) for stackless traversal: nodes in depth-first order, each
+//!   inner node with a link to the node after its subtree. A ray that hits a box continues with the next node, one that
+//!   misses follows the link. Inner nodes whose box is hardly smaller than their parent's are omitted. A list fixes the
+//!   order of siblings, so there is one list per octant of directions (nearest hit) and one that visits small boxes with
+//!   many nodes first (any hit).
+//! - **Nodes with both children's boxes** ([`Bvh::stack_nodes`]) for traversal with a stack.
+//!
+//! Boxes are centre and half extent, in f32 or in 16 bits of a [`Grid`] over the scene. All are conservative: they contain
+//! their triangles with a margin, so a slab test in f32 misses none.
 
 use std::sync::atomic::{AtomicU64, Ordering as Memory};
 
@@ -28,37 +30,35 @@ use super::ploc;
 use crate::scene::Scene;
 use crate::share::{FloatNode, GridNode, LEAF_BITS, SLAB_BITS, StackNode};
 
-/// Most triangles of one tree: a leaf's word has a sign.
+/// Largest number of triangles in a BVH: a leaf's word has a sign bit.
 pub const MAX_TRIANGLES: usize = 1 << (31 - LEAF_BITS);
 
-/// Most triangles of one leaf.
+/// Largest number of triangles in a leaf.
 pub const MAX_LEAF: u32 = 1 << LEAF_BITS;
 
-/// Coordinates from here on are treated as not finite: differences of differences of them overflow.
+/// Coordinates from this value on count as not finite: products of their differences would overflow.
 const MAX_COORDINATE: f32 = 4.253_529_6e37; // 2^125
 
-/// What a box is given around it in units of the grid: one, and more than f64 rounds.
+/// Margin around a quantised box in units of the grid: one unit, and more than the rounding of f64.
 const SPARE_UNITS: f64 = 1.0 + 1.0 / 1_048_576.0;
 
-/// What a box in f32 is given around it, as a part of the farthest coordinate: four roundings of f32. That is what a slab
-/// test rounds for rays from anywhere in the scene.
+/// Margin around a box in f32, relative to the largest coordinate: four rounding errors of f32, the error of a slab test for
+/// rays from anywhere in the scene.
 const SPARE_FLOAT: f64 = 1.0 / 4_194_304.0;
 
-/// Part of the surface of the nearest box listed above, below which the box of an inner node is worth testing in a list. A
-/// box with two children that is met at the part p of the rays costs 1 + 2 p tests, or 2 without it: worth it for p under
-/// 1/2. With children of children it is worth it a little longer: at 70 thousand triangles a ray took 36.9 tests with all
-/// boxes, 36.8, 35.5, 35.3 and 36.0 with 0.4, 0.5, 0.6 and 0.7, and 35.0 with the best choice by dynamic programming.
+/// Ratio of surface areas, inner node to nearest listed ancestor, below which a list keeps the inner node. A box with two
+/// children that a share p of the rays hits costs 1 + 2 p tests, or 2 without it: it pays for p under 1/2. With deeper
+/// subtrees it pays a little longer: at 70 thousand triangles a ray took 36.9 tests with all boxes, 36.8, 35.5, 35.3 and
+/// 36.0 with 0.4, 0.5, 0.6 and 0.7, and 35.0 with the optimum by dynamic programming.
 const WORTH_TESTING: f64 = 0.6;
 
-/// Unit of the grid along an axis in which the scene has no extent, as a part of the farthest coordinate: 16 roundings of
-/// f32.
+/// Unit of the grid along an axis without extent, relative to the largest coordinate: 16 rounding errors of f32.
 const LEAST_UNIT: f64 = 1.0 / 1_048_576.0;
 
-/// A triangle as rays meet it.
+/// A triangle in bvh space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Triangle {
-    /// Corners in bvh space, in the order of the mesh. A vertex shared by triangles of one instance is the same in all of
-    /// them to the last bit.
+    /// Corners in bvh space, in the mesh's order. A vertex that triangles of one instance share is bit-identical in all of them.
     pub corners: [[f32; 3]; 3],
     /// Index into [`Scene::instances`].
     pub instance: u32,
@@ -67,14 +67,14 @@ pub struct Triangle {
 }
 
 impl Triangle {
-    /// The box around the corners.
+    /// The bounding box of the corners.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
         self.corners.iter().fold(Aabb::EMPTY, |all, &corner| all.union(&Aabb { min: corner, max: corner }))
     }
 
-    /// Whether a ray can meet it: f32 holds its corners, and they span an area. Differences of f32 and their products are
-    /// nearly exact in f64, so that a sliver is not taken for a line.
+    /// Whether a ray can hit the triangle: its corners are finite in f32, and its area is not zero. Differences of f32 and their
+    /// products are nearly exact in f64, so a sliver does not count as degenerate.
     fn is_solid(&self) -> bool {
         let held = self.corners.iter().flatten().all(|x| x.abs() < MAX_COORDINATE);
         let [a, b, c] = self.corners.map(|corner| Vec3::from(corner).as_dvec3());
@@ -82,7 +82,7 @@ impl Triangle {
     }
 }
 
-/// A node of the tree.
+/// A node of the BVH.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Node {
     /// A node with two children.
@@ -92,13 +92,13 @@ pub enum Node {
         /// Indices into [`Bvh::nodes`], both larger than this node's own.
         children: [u32; 2],
     },
-    /// A run of triangles.
+    /// A leaf: a range of triangles.
     Leaf {
         /// Box around the triangles.
         bounds: Aabb,
-        /// Index of the first in [`Bvh::triangles`].
+        /// Index of the first triangle in [`Bvh::triangles`].
         first: u32,
-        /// How many, 1 … 8.
+        /// Number of triangles, 1 … 8.
         count: u32,
     },
 }
@@ -113,18 +113,18 @@ impl Node {
     }
 }
 
-/// In which order a list has siblings.
+/// The order of siblings in a list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Order {
-    /// The nearer child first, along the axis in which the children's middles differ most, for directions that are
-    /// negative along axis i where bit i is set.
+    /// Front to back: the nearer child first, along the axis in which the children's centres differ most, for directions
+    /// whose component i is negative where bit i is set.
     Octant(u8),
-    /// The child with less surface per node in it first.
+    /// The child with less surface area per node of its subtree first.
     AnyHit,
 }
 
 impl Order {
-    /// The lists of all directions; the index is made of the signs' bits.
+    /// The orders of all octants of directions; the index is formed by the sign bits.
     pub const OCTANTS: [Self; 8] = [
         Self::Octant(0),
         Self::Octant(1),
@@ -137,7 +137,7 @@ impl Order {
     ];
 }
 
-/// How a list writes boxes.
+/// The encoding of boxes in a list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// A [`GridNode`], in units of [`Bvh::grid`].
@@ -147,7 +147,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Texels of four words that a node takes.
+    /// Texels of four words per node.
     #[must_use]
     pub const fn texels(self) -> usize {
         match self {
@@ -157,18 +157,18 @@ impl Format {
     }
 }
 
-/// The lattice of [`Format::Quantised`]: coordinate k, -32768 … 32767, stands for `middle + k * unit`.
+/// The lattice of [`Format::Quantised`]: coordinate k, -32768 … 32767, is `middle + k * unit`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
-    /// Where 0 is, in bvh space: in the middle of the scene.
+    /// Position of coordinate 0 in bvh space, the centre of the scene.
     pub middle: [f32; 3],
-    /// Length of 1 in metres, along each axis.
+    /// Length of a unit in metres, along each axis.
     pub unit: [f32; 3],
 }
 
 impl Grid {
-    /// Centre and half extent of a box, rounded outwards by at least a unit. Rays read the whole word as the centre: the half extent
-    /// in it is the fraction of a unit by which that lies too high.
+    /// Centre and half extent of a box, rounded outwards by at least a unit. Rays use the whole word as the centre; the half
+    /// extent in its low bits then adds a fraction of a unit to the centre.
     fn encode(&self, bounds: &Aabb) -> [i32; 3] {
         [0, 1, 2].map(|axis| {
             let (middle, unit) = (f64::from(self.middle[axis]), f64::from(self.unit[axis]));
@@ -180,35 +180,35 @@ impl Grid {
     }
 }
 
-/// The tree over all triangles of a scene.
+/// The BVH over all triangles of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bvh {
     /// Origin of bvh space in the world.
     pub anchor: DVec3,
-    /// Triangles in the order of the leaves.
+    /// Triangles in leaf order.
     pub triangles: Vec<Triangle>,
-    /// Nodes depth-first from the root; none where there are no triangles.
+    /// Nodes in depth-first order from the root; empty without triangles.
     pub nodes: Vec<Node>,
-    /// Steps from the root to the deepest leaf.
+    /// Depth: edges from the root to the deepest leaf.
     pub depth: u32,
-    /// Expected cost of a ray that meets the root's box: 1 for each inner node and each triangle of a leaf, weighted by
-    /// the surface of the node's box (surface area heuristic).
+    /// Surface area heuristic (SAH): expected cost of a ray that hits the root's box, 1 for each inner node and each triangle of
+    /// a leaf, weighted by the surface area of the node's box.
     pub sah: f64,
-    /// Triangles left out because no ray can meet them: corners that are not finite in bvh space, or no area.
+    /// Number of omitted triangles: corners that are not finite in bvh space, or no area.
     pub dropped: usize,
 }
 
-/// Trees that this process has built.
+/// Number of BVHs that this process has built.
 static BUILT: AtomicU64 = AtomicU64::new(0);
 
 impl Bvh {
-    /// How many trees this process has built so far: a scene needs one.
+    /// Number of BVHs that this process has built so far; a scene needs one.
     #[must_use]
     pub fn built() -> u64 {
         BUILT.load(Memory::Relaxed)
     }
 
-    /// Builds the tree. The same scene gives the same tree, on any number of threads.
+    /// Builds the BVH. The same scene gives the same BVH on any number of threads.
     ///
     /// # Errors
     /// One sentence when the scene has more than [`MAX_TRIANGLES`] triangles.
@@ -229,14 +229,14 @@ impl Bvh {
         Ok(bvh)
     }
 
-    /// Takes over an arrangement: nodes depth-first, triangles in the order of leaves, boxes from the triangles.
+    /// Converts a topology: nodes in depth-first order, triangles in leaf order, boxes computed from the triangles.
     fn unfold(&mut self, tree: &Bvh2, placed: &[Triangle]) {
         self.triangles.reserve_exact(placed.len());
         self.nodes.reserve_exact(tree.nodes.len());
         let mut open = vec![(0, None, 0)];
         while let Some((from, parent, depth)) = open.pop() {
             let (node, index) = (&tree.nodes[from as usize], self.nodes.len());
-            // The left child comes right after its parent, the right one when the left subtree is done.
+            // The left child follows its parent directly, the right child follows the left subtree.
             if let Some(parent) = parent
                 && let Node::Inner { children, .. } = &mut self.nodes[parent]
             {
@@ -273,8 +273,8 @@ impl Bvh {
         weighted.sum::<f64>() / self.nodes[0].bounds().half_area()
     }
 
-    /// Checks what every traversal relies on: each node but the root is the child of one node before it, each triangle is
-    /// in one leaf, boxes contain what is in them, the depth is the depth.
+    /// Checks the invariants of every traversal: each node but the root is the child of exactly one earlier node, each triangle
+    /// is in exactly one leaf, boxes contain their contents, and the depth is correct.
     ///
     /// # Errors
     /// One sentence: the first thing that is wrong.
@@ -285,7 +285,7 @@ impl Bvh {
             self.triangles.len(),
             self.nodes.len()
         );
-        // Depth of each node below its parent; the root has none.
+        // Depth of each node; `None` until a parent has been seen.
         let mut depths: Vec<Option<u32>> = vec![None; self.nodes.len()];
         let mut covered = vec![false; self.triangles.len()];
         let mut deepest = 0;
@@ -339,7 +339,7 @@ impl Bvh {
         Ok(())
     }
 
-    /// The largest coordinate of any corner, without its sign.
+    /// The largest absolute coordinate of any corner.
     fn reach(&self) -> f64 {
         let corners = self.nodes.first().map(|root| [root.bounds().min, root.bounds().max]);
         corners.iter().flatten().flatten().fold(0.0, |reach, x| f64::from(x.abs()).max(reach))
@@ -357,8 +357,8 @@ impl Bvh {
         Grid { middle, unit }
     }
 
-    /// Whether 16 bits are fine enough: at least half of the leaves' boxes are four units of the grid long, or more, along
-    /// the axis in which they are longest.
+    /// Whether 16-bit boxes are precise enough: at least half of the leaves' boxes are four or more units long along their
+    /// longest axis.
     #[must_use]
     pub fn fits_grid(&self) -> bool {
         let unit = self.grid().unit;
@@ -372,7 +372,7 @@ impl Bvh {
         fitting * 2 >= count
     }
 
-    /// Listed nodes in each node's subtree, itself counted if it is one.
+    /// Number of listed nodes in each node's subtree, including the node.
     fn sizes(&self, listed: &[bool]) -> Vec<u32> {
         let mut sizes: Vec<u32> = listed.iter().map(|&l| u32::from(l)).collect();
         for (i, node) in self.nodes.iter().enumerate().rev() {
@@ -383,8 +383,8 @@ impl Bvh {
         sizes
     }
 
-    /// Which nodes are worth a place in a list: all leaves, and inner nodes so much smaller than the nearest one listed
-    /// above that a miss of their box saves more tests of what is in it than the test itself costs.
+    /// The nodes that a list keeps: all leaves, and inner nodes so much smaller than their nearest listed ancestor that a miss
+    /// of their box saves more tests than the test of the box costs.
     fn listed(&self) -> Vec<bool> {
         let mut listed = vec![true; self.nodes.len()];
         let mut area_above = vec![f64::INFINITY; self.nodes.len()];
@@ -400,7 +400,7 @@ impl Bvh {
         listed
     }
 
-    /// Whether the first of two children comes first.
+    /// Whether the first of two children comes first in an order.
     fn keeps_order(&self, children: [u32; 2], order: Order, sizes: &[u32]) -> bool {
         let [a, b] = children.map(|child| self.nodes[child as usize].bounds());
         match order {
@@ -416,7 +416,7 @@ impl Bvh {
         }
     }
 
-    /// The nodes as a list with skip links, closed by a sentinel: all zero but where it leads, which is itself. Indices count
+    /// The nodes as a list with skip pointers, closed by a sentinel: a node of zeros whose link points to itself. Indices count
     /// nodes, not texels.
     #[must_use]
     pub fn links(&self, order: Order, format: Format) -> Vec<[u32; 4]> {
@@ -438,7 +438,7 @@ impl Bvh {
                 }
             }
         };
-        // A parent comes before its children in `nodes` too, so that a place is known when its node is.
+        // Parents precede their children in `nodes`, so a node's place is known when the loop reaches it.
         let mut places = vec![0; self.nodes.len()];
         for (i, node) in self.nodes.iter().enumerate() {
             let place = places[i];
@@ -461,14 +461,14 @@ impl Bvh {
         list
     }
 
-    /// [`Bvh::links`] for several orders, side by side.
+    /// The lists of [`Bvh::links`] for several orders, computed in parallel.
     #[must_use]
     pub fn lists(&self, orders: &[Order], format: Format) -> Vec<Vec<[u32; 4]>> {
         orders.par_iter().map(|&order| self.links(order, format)).collect()
     }
 
-    /// The inner nodes depth-first, a [`StackNode`] each, for a traversal with a stack. The root is node 0. What is missing (the
-    /// right child of a tree of one leaf, both of an empty one) has a box of negative extent that no ray meets.
+    /// The inner nodes in depth-first order, one [`StackNode`] each, for traversal with a stack. The root is node 0. A missing
+    /// child (the right one of a single leaf, both without triangles) has a box of negative extent that no ray hits.
     #[must_use]
     pub fn stack_nodes(&self) -> Vec<[u32; 4]> {
         let spare = self.reach() * SPARE_FLOAT;
@@ -504,12 +504,12 @@ impl Bvh {
     }
 }
 
-/// A child as its parent in [`Bvh::stack_nodes`] has it.
+/// A child in its parent's [`StackNode`].
 #[derive(Clone, Copy)]
 struct Child {
     center: [f32; 3],
     half_extent: [f32; 3],
-    /// What it is: an inner node's index or a leaf's word.
+    /// The child's word: index of an inner node, or [`leaf_word`].
     word: i32,
 }
 
@@ -528,30 +528,30 @@ impl Child {
     }
 }
 
-/// A node at the beginning of these texels.
+/// Writes a node to the start of `texels`.
 fn put_texels<T: bytemuck::NoUninit>(texels: &mut [[u32; 4]], node: &T) {
     let words = bytemuck::cast_slice(std::slice::from_ref(node));
     texels[..words.len()].copy_from_slice(words);
 }
 
-/// A leaf in one word; the complement tells it from an index.
+/// A leaf in one word; the complement makes it negative, unlike an index.
 fn leaf_word(first: u32, count: u32) -> i32 {
     !(first << LEAF_BITS | (count - 1)) as i32
 }
 
-/// Centre and half extent in f32, so that the box contains `bounds` with `spare` metres around it.
+/// Centre and half extent in f32 of a box that contains `bounds` with a margin of `spare` metres.
 fn float_box(bounds: &Aabb, spare: f64) -> ([f32; 3], [f32; 3]) {
     let center = [0, 1, 2].map(|axis| (bounds.double_center(axis) * 0.5) as f32);
     let half = [0, 1, 2].map(|axis| {
         let middle = f64::from(center[axis]);
         let reach = (f64::from(bounds.max[axis]) - middle).max(middle - f64::from(bounds.min[axis]));
-        // Up from the nearest is outwards.
+        // The next larger value is always outwards.
         ((reach + spare) as f32).next_up()
     });
     (center, half)
 }
 
-/// Middle of the box around all vertices that have a finite place in the world.
+/// Centre of the bounding box of all vertices with finite world positions.
 fn anchor(scene: &Scene) -> DVec3 {
     let mut bounds: Option<(DVec3, DVec3)> = None;
     for instance in &scene.instances {
@@ -563,11 +563,11 @@ fn anchor(scene: &Scene) -> DVec3 {
             }
         }
     }
-    // Halved first: the sum of two finite numbers may not be one.
+    // Halved first: the sum of two finite values may overflow.
     bounds.map_or(DVec3::ZERO, |(min, max)| min * 0.5 + max * 0.5)
 }
 
-/// Triangles of all instances in bvh space, and how many were left out.
+/// Triangles of all instances in bvh space, and the number of omitted ones.
 fn place(scene: &Scene, anchor: DVec3) -> (Vec<Triangle>, usize) {
     let count = scene.triangles();
     let mut triangles = Vec::with_capacity(count);

@@ -1,5 +1,6 @@
-//! Where surfaces lie in each other: transparent bodies against others, whose faces are crossed together, and triangles
-//! that are there twice.
+//! Coincident geometry: closed dielectric meshes that touch other surfaces (coincident interfaces), and duplicate triangles.
+//!
+//! Read docs/decisions/rays.md. Rays cross coincident interfaces together, because they are closer than the ray offset.
 
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -9,17 +10,17 @@ use rayon::prelude::*;
 
 use super::bvh::{Aabb, Bvh, Node, Triangle};
 
-/// Whether some triangle of an instance for which `is_body` says so lies in the plane of a triangle of another instance,
-/// within `distance` metres, and their boxes overlap. Triangles in one plane that only have boxes in common count, too: that
-/// costs time. Shells of one mesh that touch each other are not looked for: near the pole of a ball, triangles that are not
-/// even neighbours lie in one plane.
+/// Whether some triangle of an instance with `is_body` lies within `distance` metres of the plane of another instance's
+/// triangle, and their bounding boxes overlap. Coplanar triangles whose boxes overlap count even when the triangles do
+/// not: that costs only time. Shells of one mesh that touch each other are not searched: near the pole of a sphere,
+/// triangles that are not even neighbours are coplanar.
 #[must_use]
-pub fn bodies_touch(bvh: &Bvh, is_body: &[bool], distance: f64) -> bool {
+pub fn has_coincident_interfaces(bvh: &Bvh, is_body: &[bool], distance: f64) -> bool {
     bvh.triangles.par_iter().filter(|t| is_body[t.instance as usize]).any(|t| touches(bvh, t, distance))
 }
 
-/// Pairs of instances, the same one twice for itself, and how many triangles of the one have the same three corners as one
-/// of the other, whichever way round.
+/// Duplicate triangles: for each pair of instances (equal indices for duplicates within one instance), the number of
+/// triangles with the same three corners in any order.
 #[must_use]
 pub fn twins(bvh: &Bvh) -> BTreeMap<[u32; 2], usize> {
     let corners = |triangle: &Triangle| {
@@ -83,8 +84,8 @@ fn touches(bvh: &Bvh, triangle: &Triangle, distance: f64) -> bool {
     false
 }
 
-/// Whether the corners of `small` lie in the plane of `large`. The plane of a small triangle is not known as far away as a
-/// large one reaches: the caller asks both ways.
+/// Whether the corners of `small` lie in the plane of `large`. The plane of a small triangle is not accurate over the extent
+/// of a large one, so the caller tests both ways.
 fn in_plane(large: &Triangle, small: &Triangle, distance: f64) -> bool {
     let [a, b, c] = corners(large);
     let n = (b - a).cross(c - a).normalize_or_zero();
@@ -102,7 +103,7 @@ mod tests {
     use super::*;
     use crate::scene::{Instance, Material, Mesh, Scene};
 
-    /// Two triangles: a square of that side at that height, turned about an axis that makes its coordinates round.
+    /// Squares of two triangles each, with side and height; a rotation makes their coordinates inexact.
     fn squares(placed: &[(f32, f32)]) -> Bvh {
         let mut scene = Scene { materials: vec![Material::default()], ..Scene::default() };
         for (i, &(side, height)) in placed.iter().enumerate() {
@@ -122,10 +123,10 @@ mod tests {
     fn small_and_large_faces_in_one_plane_touch_both_ways() {
         let offset = 32.0 * 5.0 * 2_f64.powi(-24);
         let bvh = squares(&[(10.0, 0.5), (0.01, 0.5), (1.0, 0.501)]);
-        assert!(bodies_touch(&bvh, &[true, false, false], offset));
-        assert!(bodies_touch(&bvh, &[false, true, false], offset));
-        assert!(!bodies_touch(&bvh, &[false, false, true], offset), "a millimetre is no contact");
-        assert!(!bodies_touch(&bvh, &[false; 3], offset));
+        assert!(has_coincident_interfaces(&bvh, &[true, false, false], offset));
+        assert!(has_coincident_interfaces(&bvh, &[false, true, false], offset));
+        assert!(!has_coincident_interfaces(&bvh, &[false, false, true], offset), "a millimetre is no contact");
+        assert!(!has_coincident_interfaces(&bvh, &[false; 3], offset));
     }
 
     #[test]

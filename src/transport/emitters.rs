@@ -1,4 +1,8 @@
-//! What light comes from, with the probability that a path looks there (lecture R2–R4): in proportion to power.
+//! Light sampling by power: the discrete distribution over lights, emissive triangles and the environment (lecture R2–R4).
+//!
+//! Read pbrt (4th ed.), sections 12.6 (light sampling), 12.5 (infinite area lights) and 2.4 (inversion method).
+//! Importance sampling inverts a CDF: cumulative probabilities are 32-bit fixed point, a random 32-bit word selects a bin by
+//! binary search, and every bin has at least one word. Units: radiance in the scene's units, areas in square metres.
 
 use glam::{DMat3, DVec3};
 
@@ -6,69 +10,71 @@ use crate::image::tone::srgb_decode;
 use crate::scene::environment::{Environment, direction};
 use crate::scene::{AlphaMode, Image, Light, LightKind, Material, Scene};
 
-/// Where light comes from.
+/// A kind of light.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Source {
-    /// The environment.
-    Sky,
-    /// A light without extent, as an index of the scene's.
+pub enum EmitterSource {
+    /// The environment map.
+    Environment,
+    /// A punctual or analytic area light, as an index into the scene's lights.
     Punctual(u32),
-    /// A triangle, as an index of the scene's with instances counted.
+    /// An emissive triangle.
     Triangle {
-        /// Which.
+        /// Index among all triangles of the scene, in the order of instances.
         index: u32,
-        /// Square metres.
+        /// Area in square metres.
         area: f64,
-        /// It emits on both sides.
+        /// Whether both sides emit.
         two_sided: bool,
     },
 }
 
-/// One of them.
+/// A light with its bin of the CDF.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Emitter {
-    /// What it is.
-    pub source: Source,
-    /// First word of its share of all 32-bit words.
+    /// The light.
+    pub source: EmitterSource,
+    /// CDF at the light's bin: its first 32-bit word.
     pub first: u32,
-    /// Size of that share over 2³².
+    /// Probability of the light: size of its bin over 2³².
     pub probability: f64,
 }
 
-/// All of them: the environment first, then lights, then triangles.
+/// All lights: the environment first, then punctual and area lights, then emissive triangles.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Emitters {
-    /// In order of their shares.
+    /// Lights in the order of their bins.
     pub list: Vec<Emitter>,
-    /// How the environment is drawn.
-    pub sky: SkyShares,
+    /// The distribution within the environment.
+    pub environment: EnvironmentCdf,
 }
 
-/// The environment as cells of equal width and height, each with its share of all words: rows first, then, row by row, columns.
+/// Environment CDF: a piecewise-constant distribution over cells of the map. The marginal CDF over rows comes first, then, row
+/// by row, the conditional CDF over columns.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct SkyShares {
-    /// Cells across.
+pub struct EnvironmentCdf {
+    /// Number of columns.
     pub columns: u32,
-    /// And down.
+    /// Number of rows.
     pub rows: u32,
-    /// First words.
+    /// First words of the bins: marginal, then conditional.
     pub words: Vec<u32>,
-    /// By how much it is turned about +Y, degrees.
+    /// Rotation of the environment about +Y in degrees.
     pub rotation: f64,
 }
 
 /// An environment that lights a scene.
 #[derive(Debug, Clone, Copy)]
 pub struct Sky<'a> {
-    /// What it shows.
+    /// The environment map.
     pub map: &'a Environment,
-    /// Multiplies its radiance.
+    /// Factor on the radiance.
     pub intensity: f32,
-    /// Degrees about +Y.
+    /// Rotation about +Y in degrees.
     pub rotation: f32,
 }
 
-/// First words of shares of all 32-bit words in proportion to weights, none of them empty; and their sizes over 2³².
+/// CDF in 32-bit fixed point: for each weight the first word of its bin and its probability (bin size over 2³²). No bin is
+/// empty; weights without a finite positive sum give equal bins.
 fn shares(weights: &[f64]) -> Vec<(u32, f64)> {
     const ALL: f64 = 4_294_967_296.0;
     let count = weights.len() as f64;
@@ -89,7 +95,7 @@ fn mean(rgb: [f32; 3]) -> f64 {
     rgb.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0
 }
 
-/// Whether paths look for places on a surface: it emits, and nothing else decides how much of that is seen.
+/// Whether next event estimation samples a surface: it emits, and neither alpha nor a coat modifies its emission.
 fn is_emitter(material: &Material) -> bool {
     !material.unlit
         && material.emissive.iter().any(|&c| c > 0.0)
@@ -97,8 +103,8 @@ fn is_emitter(material: &Material) -> bool {
         && material.clearcoat == 0.0
 }
 
-/// Power of a light over what one of radiance 1 and a square metre sends from one side, π: for directional ones, through the
-/// scene's largest section.
+/// Power of a light relative to π, the power of one side of a square metre of radiance 1. A directional light's power is that
+/// through the scene's largest cross-section.
 fn power(light: &Light, radius: f64) -> f64 {
     use std::f64::consts::PI;
     let towards = match light.kind {
@@ -111,26 +117,26 @@ fn power(light: &Light, radius: f64) -> f64 {
 }
 
 impl Emitters {
-    /// Of a scene, its environment times an intensity, and, with `surfaces`, what emits in it.
+    /// The distribution for a scene, its environment and, with `surfaces`, its emissive triangles.
     #[must_use]
     pub fn of(scene: &Scene, environment: Option<Sky>, surfaces: bool) -> Self {
         use std::f64::consts::PI;
         let radius = scene.bounds().map_or(1.0, |bounds| bounds.radius());
         let mut sources = Vec::new();
         let mut weights = Vec::new();
-        let mut sky = SkyShares::default();
-        // One that is the same everywhere is found as well by the direction that is followed anyway.
+        let mut cdf = EnvironmentCdf::default();
+        // A constant environment is not sampled: BSDF sampling finds it as well.
         if let Some(around) = environment.filter(|sky| !sky.map.is_constant() && sky.intensity > 0.0) {
             let radiance = around.map.mean().iter().sum::<f64>() / 3.0 * f64::from(around.intensity);
             if radiance > 0.0 {
-                sky = SkyShares::of(around.map);
-                sky.rotation = f64::from(around.rotation);
-                sources.push(Source::Sky);
+                cdf = EnvironmentCdf::of(around.map);
+                cdf.rotation = f64::from(around.rotation);
+                sources.push(EmitterSource::Environment);
                 weights.push(PI * radius * radius * 4.0 * PI * radiance);
             }
         }
         for (i, light) in scene.lights.iter().enumerate().filter(|(_, light)| light.shines()) {
-            sources.push(Source::Punctual(i as u32));
+            sources.push(EmitterSource::Punctual(i as u32));
             weights.push(power(light, radius));
         }
         if surfaces {
@@ -145,11 +151,11 @@ impl Emitters {
             first,
             probability,
         });
-        Self { list: list.collect(), sky }
+        Self { list: list.collect(), environment: cdf }
     }
 }
 
-/// Mean of a picture's texels, which are stored with the sRGB curve.
+/// Linear mean of an sRGB-encoded image.
 fn mean_of(image: &Image) -> f64 {
     let mut counts = [0_u64; 256];
     for texel in image.rgba.as_chunks::<4>().0 {
@@ -160,8 +166,8 @@ fn mean_of(image: &Image) -> f64 {
     decoded.sum::<f64>() / total.max(1) as f64
 }
 
-/// The triangles that emit, with their power.
-fn triangles(scene: &Scene) -> Vec<(Source, f64)> {
+/// The emissive triangles with their power.
+fn triangles(scene: &Scene) -> Vec<(EmitterSource, f64)> {
     use std::f64::consts::PI;
     let radiance: Vec<f64> = scene
         .materials
@@ -189,7 +195,7 @@ fn triangles(scene: &Scene) -> Vec<(Source, f64)> {
                 let two_sided = material.double_sided;
                 if area > 0.0 && area.is_finite() {
                     let sides = if two_sided { 2.0 } else { 1.0 };
-                    let source = Source::Triangle { index: (first + i) as u32, area, two_sided };
+                    let source = EmitterSource::Triangle { index: (first + i) as u32, area, two_sided };
                     found.push((source, PI * area * sides * radiance[mesh.material]));
                 }
             }
@@ -199,15 +205,15 @@ fn triangles(scene: &Scene) -> Vec<(Source, f64)> {
     found
 }
 
-/// Most cells of the environment, down; twice as many across.
+/// Largest number of rows of the environment CDF; there are twice as many columns.
 const MOST_ROWS: u32 = 256;
 
-impl SkyShares {
-    /// In proportion to the radiance around each cell times its solid angle.
+impl EnvironmentCdf {
+    /// The CDF in proportion to each cell's mean radiance times its solid angle.
     fn of(map: &Environment) -> Self {
         let (rows, columns) = (map.height.min(MOST_ROWS), map.width.min(2 * MOST_ROWS));
         let (width, height) = (map.width as usize, map.height as usize);
-        // With the texels beside it, which bilinear interpolation mixes in.
+        // Neighbouring texels count, too, because bilinear interpolation mixes them in.
         let range = |cell: u32, cells: u32, texels: usize| {
             let at = |i: u32| f64::from(i) / f64::from(cells) * texels as f64;
             (at(cell).floor() as isize - 1, at(cell + 1).ceil() as isize + 1)
@@ -240,7 +246,8 @@ impl SkyShares {
         Self { columns, rows, words, rotation: 0.0 }
     }
 
-    /// A direction of the world drawn by two words: `sample_sky` of shaders/lib/emitters.glsl, but for where in a cell.
+    /// Samples a world-space direction with two random words: `sample_environment` of shaders/lib/emitters.glsl without the jitter
+    /// within a cell.
     #[must_use]
     pub fn direction(&self, words: [u32; 2]) -> DVec3 {
         let (columns, rows) = (self.columns as usize, self.rows as usize);

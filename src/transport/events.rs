@@ -1,6 +1,9 @@
-//! What the ray of a pixel meets, one surface after the other, as the lecture tells it (R1 to R6): the mirrored ray, the bent one, and
-//! from what spreads light a ray to each light. In f64 and by textbook formulas, for whoever asks why a pixel looks as it does; no
-//! picture is made of it. Normals are those of the corners, without textures; media and shares are those of green light.
+//! Recursive ray tracing of one pixel on the host (lecture R1 to R6): reflected and refracted rays, and shadow rays to each
+//! light from scattering surfaces.
+//!
+//! Read Whitted 1980, "An Improved Illumination Model for Shaded Display". The rays explain a pixel to a user; no picture is
+//! made of them. They are in f64 and use textbook formulas. Normals are those of the corners, without normal maps; media
+//! and energy shares are those of green light.
 
 use std::sync::Arc;
 
@@ -15,88 +18,88 @@ use crate::scene::material::Material;
 use crate::scene::solid::{Solids, solids};
 use crate::scene::{Camera, Scene};
 
-/// Events of one pixel at most: a tree of them grows quickly.
+/// Largest number of events per pixel: their tree grows exponentially.
 const MOST_EVENTS: usize = 96;
-/// Lights that a surface is connected with at most.
+/// Largest number of lights that a surface sends shadow rays to.
 const MOST_LIGHTS: usize = 8;
 
-/// Wavelength of which media and shares are, nm.
+/// Wavelength of indices and energy shares, nm.
 pub const GREEN: f64 = 550.0;
 
-/// How far a ray is followed.
+/// Limits of the recursion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// Surfaces one behind the other.
+    /// Largest number of surfaces along a path.
     pub surfaces: u32,
-    /// Perceptual roughness up to which what a surface mirrors, or lets through, is followed.
+    /// Perceptual roughness up to which reflection and transmission are followed.
     pub roughest: f32,
-    /// Share of the pixel's light below which nothing is followed.
+    /// Smallest share of the pixel's light that is followed.
     pub least_share: f64,
-    /// Lights shine that stand for surfaces which emit.
-    pub stand_ins: bool,
+    /// Whether proxy lights are used, which replace emissive surfaces.
+    pub proxies: bool,
 }
 
-/// What a ray was sent for.
+/// The kind of a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Way {
-    /// By the eye.
+    /// A camera ray.
     Seen,
-    /// For a mirror image (F4).
+    /// A reflected ray (F4).
     Mirrored,
-    /// Through a boundary of two media (F5).
+    /// A refracted ray at an interface of two media (F5).
     Bent,
-    /// Through a sheet, or where no medium ends.
+    /// A ray straight through a thin-walled surface, or where no medium changes.
     Straight,
-    /// To a light, by its index (R5).
+    /// A shadow ray to the light with this index (R5).
     ToLight(usize),
 }
 
-/// One ray and where it ends.
+/// A ray with its end point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
-    /// Place in the list of the event whose surface it leaves; `None`: the eye's.
+    /// Index of the event whose surface the ray leaves; `None` for the camera ray.
     pub after: Option<usize>,
-    /// What it was sent for.
+    /// Kind of the ray.
     pub way: Way,
-    /// Where it begins, in the world.
+    /// Origin in world space.
     pub from: DVec3,
-    /// Where it ends; of what leaves the scene, as far away as the scene is large.
+    /// End point in world space; a ray that leaves the scene ends at a distance of the scene's size.
     pub to: DVec3,
-    /// Of the pixel's light, before absorption; of a ray to a light, that of the surface.
+    /// Share of the pixel's light, before absorption; for a shadow ray that of the surface.
     pub share: f64,
-    /// What it meets; of a ray to a light, what stands before that light.
-    pub met: Option<Met>,
+    /// The surface at the end; for a shadow ray the occluder.
+    pub interaction: Option<Interaction>,
 }
 
-/// A surface that a ray meets.
+/// A surface hit by a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Met {
-    /// Index of the scene's.
+pub struct Interaction {
+    /// Index into the scene's instances.
     pub instance: usize,
-    /// Index of the scene's.
+    /// Index into the scene's materials.
     pub material: usize,
-    /// Unit normal on the side that the ray comes from.
+    /// Unit normal on the ray's side.
     pub normal: DVec3,
-    /// Of the angle of incidence.
+    /// Cosine of the angle of incidence.
     pub cos: f64,
-    /// Index of refraction behind it over that before it.
+    /// Relative index of refraction: behind the surface over before it.
     pub ratio: f64,
-    /// Share that is mirrored (F2, F3).
+    /// Reflectance (F2, F3).
     pub reflected: f64,
-    /// Nothing goes through (F6).
+    /// Whether reflection is total (F6).
     pub total: bool,
-    /// It spreads what it does not mirror, or is too rough to be followed.
+    /// Whether the surface scatters the remaining light, or is too rough to be followed.
     pub spreads: bool,
 }
 
-/// A scene that rays can be followed through.
-pub struct Tracer {
+/// A scene with its BVH, ready for recursive ray tracing.
+pub struct EventTracer {
     bvh: Arc<Bvh>,
     solids: Solids,
     radius: f64,
 }
 
-/// A ray that is still to be followed.
+/// A ray on the stack of rays to follow.
 struct Pending {
     after: Option<usize>,
     way: Way,
@@ -111,15 +114,15 @@ fn material(scene: &Scene, instance: usize) -> &Material {
     &scene.materials[scene.meshes[scene.instances[instance].mesh].material]
 }
 
-impl Tracer {
-    /// Makes ready, with the tree of the scene's triangles.
+impl EventTracer {
+    /// Prepares a scene with its BVH.
     #[must_use]
     pub fn new(scene: &Scene, bvh: Arc<Bvh>) -> Self {
         let radius = scene.bounds().map_or(1.0, |bounds| bounds.radius());
         Self { bvh, solids: solids(scene), radius }
     }
 
-    /// Follows the ray through the middle of a pixel of a picture of `size` that `camera` sees.
+    /// Traces the ray through the centre of a pixel of `camera`'s picture of `size` pixels, and its secondary rays.
     #[must_use]
     pub fn follow(
         &self,
@@ -144,19 +147,20 @@ impl Tracer {
             let crossing = self.nearest_seen(scene, ray.from, ray.direction);
             let index = events.len();
             let to = ray.from + ray.direction * crossing.map_or(2.0 * self.radius, |crossing| crossing.t);
-            let mut event = Event { after: ray.after, way: ray.way, from: ray.from, to, share: ray.share, met: None };
+            let mut event =
+                Event { after: ray.after, way: ray.way, from: ray.from, to, share: ray.share, interaction: None };
             let Some(crossing) = crossing else {
                 events.push(event);
                 continue;
             };
-            let (met, next) = self.at_surface(scene, &ray, &crossing, limits);
-            event.met = Some(met);
+            let (interaction, next) = self.at_surface(scene, &ray, &crossing, limits);
+            event.interaction = Some(interaction);
             events.push(event);
-            if met.spreads {
+            if interaction.spreads {
                 let from = (index, to);
-                events.extend(self.to_lights(scene, from, met, ray.share, limits.stand_ins));
+                events.extend(self.to_lights(scene, from, interaction, ray.share, limits.proxies));
             }
-            // The strongest is followed first.
+            // The strongest ray is followed first.
             let mut next: Vec<Pending> = next.into_iter().map(|ray| Pending { after: Some(index), ..ray }).collect();
             next.retain(|ray| ray.share >= limits.least_share && ray.surfaces < limits.surfaces);
             next.sort_by(|a, b| a.share.total_cmp(&b.share));
@@ -169,7 +173,7 @@ impl Tracer {
         line::nearest(&self.bvh, from - self.bvh.anchor, direction, 1e-6 * self.radius)
     }
 
-    /// The nearest surface that is seen: backs of sheets with one side are not.
+    /// The nearest visible surface: back faces of one-sided thin-walled surfaces are skipped.
     fn nearest_seen(&self, scene: &Scene, from: DVec3, direction: DVec3) -> Option<Crossing<'_>> {
         let mut behind = 1e-6 * self.radius;
         loop {
@@ -183,14 +187,14 @@ impl Tracer {
         }
     }
 
-    /// What a surface is to a ray, and the rays that leave it.
+    /// The interaction of a ray with a surface, and the secondary rays.
     fn at_surface(
         &self,
         scene: &Scene,
         ray: &Pending,
         crossing: &Crossing<'_>,
         limits: &Limits,
-    ) -> (Met, Vec<Pending>) {
+    ) -> (Interaction, Vec<Pending>) {
         let instance = crossing.triangle.instance as usize;
         let m = material(scene, instance);
         let to = ray.from + ray.direction * crossing.t;
@@ -200,9 +204,9 @@ impl Tracer {
         let boundary = ray.media.cross(scene, &self.solids, instance, facing.front, index);
         let layers = Layers::of(m, &boundary, cos);
         let green = |layer: Layer| layers.share(layer).y;
-        // Where a texture has alpha, the surface is taken to be there.
+        // A surface whose alpha comes from a texture counts as opaque.
         let opacity = if boundary.hidden { 0.0 } else { coverage(m).unwrap_or(1.0) };
-        let mut met = Met {
+        let mut interaction = Interaction {
             instance,
             material: scene.meshes[scene.instances[instance].mesh].material,
             normal: facing.normal,
@@ -222,17 +226,17 @@ impl Tracer {
             media: media.clone(),
         };
         if boundary.hidden {
-            (met.reflected, met.total) = (0.0, false);
-            return (met, vec![leave(Way::Straight, ray.direction, 1.0, &boundary.beyond)]);
+            (interaction.reflected, interaction.total) = (0.0, false);
+            return (interaction, vec![leave(Way::Straight, ray.direction, 1.0, &boundary.beyond)]);
         }
         let mut next = Vec::new();
         if opacity < 1.0 {
             next.push(leave(Way::Straight, ray.direction, 1.0 - opacity, &ray.media));
         }
         let is_followed = |layer: &Layer| !layers.spreads(*layer, limits.roughest);
-        // The middle of the lobe of what is a little rough.
+        // Slightly rough lobes are followed along their centre.
         let along = |layer| layers.direction(layer, ray.direction, normals, facing.normal);
-        // Coat and base mirror into one direction.
+        // Coat and base reflect into the same direction.
         let mut mirrors = [Layer::Coat, Layer::Base].into_iter().filter(is_followed);
         let share: f64 = mirrors.clone().map(green).sum();
         if let Some(direction) = mirrors.next_back().and_then(along) {
@@ -245,34 +249,33 @@ impl Tracer {
             };
             next.push(leave(way, direction, opacity * green(Layer::Through), media));
         }
-        (met, next)
+        (interaction, next)
     }
 
-    /// A ray to each light, of the first few.
+    /// Shadow rays to the first few lights.
     fn to_lights(
         &self,
         scene: &Scene,
         (after, at): (usize, DVec3),
-        met: Met,
+        interaction: Interaction,
         share: f64,
-        stand_ins: bool,
+        proxies: bool,
     ) -> Vec<Event> {
-        let lights =
-            scene.lights.iter().enumerate().filter(|(_, light)| light.shines() && (stand_ins || !light.stand_in));
+        let lights = scene.lights.iter().enumerate().filter(|(_, light)| light.shines() && (proxies || !light.proxy));
         let towards = lights.map(|(index, light)| match light.kind {
             LightKind::Directional { direction } => (index, at - direction * 2.0 * self.radius),
             LightKind::Point { position, .. } | LightKind::Spot { position, .. } => (index, position),
         });
-        let lit = towards.filter(|(_, place)| (*place - at).dot(met.normal) > 0.0).take(MOST_LIGHTS);
+        let lit = towards.filter(|(_, place)| (*place - at).dot(interaction.normal) > 0.0).take(MOST_LIGHTS);
         lit.map(|(index, place)| {
             let way = place - at;
             let direction = way.normalize();
             let crossing = self.nearest(at, direction).filter(|crossing| crossing.t < way.length());
-            let met = crossing.map(|crossing| {
+            let interaction = crossing.map(|crossing| {
                 let instance = crossing.triangle.instance as usize;
                 let normal = crossing.normal(scene);
                 let cos = -direction.dot(normal);
-                Met {
+                Interaction {
                     instance,
                     material: scene.meshes[scene.instances[instance].mesh].material,
                     normal: normal * cos.signum(),
@@ -284,7 +287,7 @@ impl Tracer {
                 }
             });
             let to = crossing.map_or(place, |crossing| at + direction * crossing.t);
-            Event { after: Some(after), way: Way::ToLight(index), from: at, to, share, met }
+            Event { after: Some(after), way: Way::ToLight(index), from: at, to, share, interaction }
         })
         .collect()
     }

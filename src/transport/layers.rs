@@ -1,9 +1,13 @@
-//! What the layers of a surface do with light, in f64: the twin of shaders/lib/layers.glsl for what is followed without a device,
-//! photons ([`super::caustics`]) and the ray of a picked pixel ([`super::events`]).
+//! Layered BSDF in f64: the twin of shaders/lib/layers.glsl for rays on the host, which are photons
+//! ([`super::photon_guiding`]) and the ray of a picked pixel ([`super::events`]). BSDF sampling chooses a layer by its share
+//! of the energy, then a direction of its lobe.
 //!
-//! From the top: a clear coat; the base, which is the boundary of a dielectric, a metal, or a mixture of both; below the boundary
-//! a diffuse ground, or what lets light through. A layer leaves to those below what it does not reflect at the angle at which
-//! the ray comes. Fresnel's curves are the exact ones. Textures and vertex colours are not known: they count as 1.
+//! Read pbrt (4th ed.), chapter 9 (BSDFs) and section 14.3 (layered materials); Schmidt and Budge 2002, "Simple Nested
+//! Dielectrics in Ray Traced Images"; the glTF extensions KHR_materials_clearcoat, _specular, _transmission and _volume.
+//!
+//! From the top: a clear coat; the base, which is a dielectric interface, a conductor, or a mixture of both; below the
+//! interface a diffuse base layer, or transmission. A layer passes on the energy left under its Fresnel reflectance at the
+//! ray's angle. Fresnel terms are exact. Textures and vertex colours are ignored: they count as 1.
 
 use glam::DVec3;
 
@@ -16,25 +20,25 @@ use crate::scene::{AlphaMode, Scene};
 use crate::share::COAT_INDEX;
 pub use crate::share::MIN_ROUGHNESS as SMOOTHEST;
 
-/// Media that a ray is in, as materials, in the order in which they were entered (shaders/lib/media.glsl).
+/// The media around a ray as materials, in the order in which the ray entered them (nested dielectrics, shaders/lib/media.glsl).
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Media(Vec<usize>);
 
 impl Media {
-    /// Those that a point lies in.
+    /// The media that contain a point.
     #[must_use]
     pub fn at(scene: &Scene, solids: &Solids, p_world: DVec3) -> Self {
         let bodies = media_at(scene, solids, p_world);
         Self(bodies.into_iter().map(|instance| scene.meshes[scene.instances[instance].mesh].material).collect())
     }
 
-    /// The one of the highest priority, of several the one entered last.
+    /// The medium of the highest priority; of several the one entered last.
     fn present(&self, scene: &Scene) -> Option<usize> {
         self.0.iter().copied().max_by_key(|&material| scene.materials[material].priority)
     }
 
-    /// What a surface separates for a ray in these media (shaders/lib/boundary.glsl). `front`: its outer side is met; `index`:
-    /// of refraction of a material in the light that is followed.
+    /// The interface at a surface for a ray in these media (nested dielectrics, shaders/lib/boundary.glsl). `front`: the ray meets
+    /// the outer side; `index`: index of refraction of a material at the ray's wavelength.
     #[must_use]
     pub fn cross(
         &self,
@@ -58,60 +62,60 @@ impl Media {
             (false, Some(place)) => drop(beyond.0.remove(place)),
             (false, None) => {}
         }
-        // What is left without having been entered was there all the time.
+        // A medium that the ray leaves without having entered it was around the ray from its start.
         let here = if front || entered.is_some() { present } else { Some(material) };
         let there = beyond.present(scene);
         Boundary { before: of(here), behind: of(there), ior, body: true, hidden: here == there, beyond }
     }
 }
 
-/// What a surface separates.
+/// An interface between two media.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Boundary {
-    /// Index of the medium before it.
+    /// Index of refraction on the ray's side.
     pub before: f64,
-    /// Of the medium behind it; where it encloses none, of its dielectric part.
+    /// Index of refraction on the other side; at a surface without an interior, that of its dielectric part.
     pub behind: f64,
-    /// Of its dielectric part.
+    /// Index of refraction of the surface's dielectric part.
     pub ior: f64,
-    /// It encloses a medium.
+    /// Whether the surface belongs to a closed dielectric mesh.
     pub body: bool,
-    /// A body of higher priority displaces it: nothing changes there.
+    /// Whether a medium of higher priority suppresses the interface: the ray passes unchanged.
     pub hidden: bool,
-    /// Media of a ray that has gone through.
+    /// The media of a ray that has passed through.
     pub beyond: Media,
 }
 
-/// Where light goes on.
+/// A layer of the BSDF: the way on which light continues.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Layer {
-    /// Mirrored by the clear coat.
+    /// Specular reflection by the clear coat.
     Coat,
-    /// Mirrored by the base.
+    /// Specular reflection by the base.
     Base,
-    /// Spread by the diffuse ground.
+    /// Diffuse reflection by the base layer.
     Ground,
-    /// Through the surface.
+    /// Transmission.
     Through,
 }
 
 impl Layer {
-    /// From the top.
+    /// All layers, from the top.
     pub const ALL: [Self; 4] = [Self::Coat, Self::Base, Self::Ground, Self::Through];
 }
 
-/// The layers of a surface at an angle.
+/// The layers of a surface at an angle of incidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Layers {
-    /// Shares of the light that go on by each of [`Layer::ALL`], per channel; the rest is absorbed.
+    /// Share of the energy in each of [`Layer::ALL`], per channel; the rest is absorbed.
     shares: [DVec3; 4],
-    /// Perceptual roughness of coat and base.
+    /// Perceptual roughness of coat and of base.
     roughness: [f32; 2],
-    /// Index behind the surface over that before it.
+    /// Relative index of refraction: behind the surface over before it.
     pub ratio: f64,
-    /// It encloses a medium.
+    /// Whether the surface belongs to a closed dielectric mesh.
     body: bool,
-    /// Nothing passes at that angle (F6).
+    /// Whether reflection is total at this angle (F6).
     pub total: bool,
 }
 
@@ -124,8 +128,8 @@ fn base_color(m: &Material) -> DVec3 {
     rgb([r, g, b])
 }
 
-/// Reflectance of the boundary as its share between that at normal and that at grazing incidence: 1 where the reflection is
-/// total, 0 where the indices are equal.
+/// Fresnel reflectance of the interface, normalised: 0 is its value at normal incidence, 1 at grazing incidence and under total
+/// reflection; 0 between equal indices.
 fn boundary_share(cos: f64, before: f64, behind: f64) -> f64 {
     if before == behind {
         return 0.0;
@@ -134,20 +138,20 @@ fn boundary_share(cos: f64, before: f64, behind: f64) -> f64 {
     ((fresnel_dielectric(cos, behind / before)[0] - f0) / (1.0 - f0).max(1e-12)).clamp(0.0, 1.0)
 }
 
-/// Of the dielectric part, by its share between that at normal and that at grazing incidence. F0 may be tinted (KHR_materials_specular): the exact curve is carried over as its share between F0 and
-/// F90, and what tints it in air tints it between two media.
+/// Fresnel reflectance of the dielectric part, from the normalised reflectance `share`. KHR_materials_specular tints F0, so
+/// the exact curve is rescaled between F0 and F90; a tint in air applies between two media, too.
 fn fresnel_of_dielectric(m: &Material, at: &Boundary, share: f64) -> DVec3 {
     let specular = f64::from(m.specular);
     let in_air = nested_f0(1.0, at.ior);
     let to_media = if in_air > 0.0 { nested_f0(at.before, at.behind) / in_air } else { 0.0 };
     let f0 = (rgb(m.specular_color) * in_air).min(DVec3::ONE) * specular * to_media;
-    // Between equal indices nothing is reflected, at no angle.
+    // An interface between equal indices reflects nothing, at any angle.
     let f90 = if at.ior == 1.0 { 0.0 } else { specular };
     f0 + (DVec3::splat(f90) - f0) * share
 }
 
-/// Of the metallic part, in a medium: Schlick's curve where a colour is all that is known; else n and κ, tinted by what the
-/// colour is beside their reflectance at normal incidence.
+/// Fresnel reflectance of the conductor part, in a medium: Schlick's approximation when only a colour is known; otherwise n
+/// and κ, tinted by the ratio of the colour to their reflectance at normal incidence.
 fn fresnel_of_metal(m: &Material, n_outside: f64, cos: f64) -> DVec3 {
     let f0 = base_color(m);
     let curve = |f0: f64, index: Option<[f64; 2]>| match index {
@@ -160,7 +164,7 @@ fn fresnel_of_metal(m: &Material, n_outside: f64, cos: f64) -> DVec3 {
     DVec3::from([0, 1, 2].map(|c| curve(f0[c], m.conductor.map(|index| index[c].map(f64::from)))))
 }
 
-/// Of the clear coat, in a medium.
+/// Fresnel reflectance of the clear coat, in a medium.
 fn fresnel_of_coat(m: &Material, n_outside: f64, cos: f64) -> f64 {
     if m.clearcoat == 0.0 {
         return 0.0;
@@ -169,10 +173,10 @@ fn fresnel_of_coat(m: &Material, n_outside: f64, cos: f64) -> f64 {
 }
 
 impl Layers {
-    /// Of a surface that is met at an angle, given by its cosine. What is unlit passes nothing on.
+    /// The layers of a surface at an angle of incidence, given by its cosine. Unlit surfaces reflect nothing.
     #[must_use]
     pub fn of(m: &Material, at: &Boundary, cos: f64) -> Self {
-        // Coats and metals of bodies are seen as from air on both sides.
+        // Coats and metals of closed meshes are evaluated as from air on both sides.
         let n_outside = if at.body { 1.0 } else { at.before };
         let share = boundary_share(cos, at.before, at.behind);
         let total = at.body && share >= 1.0;
@@ -181,10 +185,10 @@ impl Layers {
         let coat = fresnel_of_coat(m, n_outside, cos);
         let f_metal = if metallic > 0.0 { fresnel_of_metal(m, n_outside, cos) } else { f_dielectric };
         let base = f_dielectric.lerp(f_metal, metallic);
-        // Its largest component, so that a tinted F0 gives no complementary colour. Metal lets nothing in.
+        // The largest component, so that a tinted F0 causes no complementary colour below. Metals have no layer below.
         let enters = (1.0 - f_dielectric.max_element()) * (1.0 - metallic);
         let color = base_color(m);
-        // A body is entered and left, and each takes the root of its colour.
+        // Light enters and leaves a closed mesh, and each crossing takes the square root of the colour.
         let tint = if at.body { color.map(f64::sqrt) } else { color };
         let ground = color * (enters * (1.0 - transmission));
         let through = tint * (enters * transmission);
@@ -200,13 +204,13 @@ impl Layers {
         }
     }
 
-    /// Of the light, per channel.
+    /// The energy share of a layer, per channel.
     #[must_use]
     pub fn share(&self, layer: Layer) -> DVec3 {
         self.shares[layer as usize]
     }
 
-    /// Whether a layer sends light into more than one direction, as far as it is rougher than this.
+    /// Whether a layer scatters (diffuse or glossy) instead of having a specular (delta) lobe: its roughness exceeds `roughest`.
     #[must_use]
     pub fn spreads(&self, layer: Layer, roughest: f32) -> bool {
         match layer {
@@ -216,13 +220,13 @@ impl Layers {
         }
     }
 
-    /// Whether some light is spread by layers rougher than this.
+    /// Whether some layer with energy scatters, given the roughness limit `roughest`.
     #[must_use]
     pub fn spreads_some(&self, roughest: f32) -> bool {
         Layer::ALL.into_iter().any(|layer| self.share(layer) != DVec3::ZERO && self.spreads(layer, roughest))
     }
 
-    /// A layer as often as it sends light on, all channels together; `None` where the light is absorbed. `x` in [0, 1).
+    /// Samples a layer in proportion to its mean energy share; `None` when the light is absorbed. `x` is uniform in [0, 1).
     #[must_use]
     pub fn sample(&self, x: f64) -> Option<Layer> {
         let mut before = 0.0;
@@ -232,8 +236,8 @@ impl Layers {
         })
     }
 
-    /// The normal at which coat or base mirrors or bends light from `direction`: the surface's, or of what is rough a facet's that
-    /// is drawn by two numbers in [0, 1).
+    /// The half vector of reflection or refraction of light from `direction`: the normal for a specular lobe, otherwise a visible
+    /// normal (VNDF) sampled with two uniform numbers in [0, 1).
     #[must_use]
     pub fn half_vector(&self, layer: Layer, direction: DVec3, n: DVec3, u: [f64; 2]) -> DVec3 {
         if !self.spreads(layer, SMOOTHEST) {
@@ -246,9 +250,9 @@ impl Layers {
         x * h.x + y * h.y + n * h.z
     }
 
-    /// Where light from `direction` goes by a layer other than the ground, at a half vector. Normals, the smooth one and the
-    /// triangle's, are on the side that the light comes from. `None` on the wrong side of a rough surface, and beyond the
-    /// critical angle.
+    /// The outgoing direction of light from `direction` at a half vector, for any layer but the diffuse one. The shading normal
+    /// and the geometric normal are on the side of the incident light. `None` when a rough lobe leaves on the wrong side, and
+    /// beyond the critical angle.
     #[must_use]
     pub fn direction(&self, layer: Layer, direction: DVec3, [n, flat]: [DVec3; 2], h: DVec3) -> Option<DVec3> {
         let rough = self.spreads(layer, SMOOTHEST);
@@ -260,7 +264,7 @@ impl Layers {
         let up = mirrored.dot(n);
         match layer {
             _ if rough && up <= 0.0 => None,
-            // What bends nothing scatters as its mirror image does, to the other side.
+            // A rough thin-walled surface transmits its reflected lobe, mirrored to the other side.
             Layer::Through if rough => on_side(mirrored - 2.0 * up * n, -flat, rough),
             Layer::Through => Some(direction),
             _ => on_side(mirrored, flat, rough),
@@ -268,13 +272,14 @@ impl Layers {
     }
 }
 
-/// What a smooth normal has sent to the wrong side of the triangle is mirrored in it, and what a facet has sent there is lost.
+/// Keeps a direction on one side of the geometric normal `flat`: a specular direction on the wrong side is mirrored back, a
+/// rough one is discarded.
 fn on_side(direction: DVec3, flat: DVec3, rough: bool) -> Option<DVec3> {
     let wrong = direction.dot(flat).min(0.0);
     (!rough || wrong == 0.0).then(|| direction - 2.0 * wrong * flat)
 }
 
-/// Share of the light that a surface stops, by its alpha; `None` where a texture says.
+/// Opacity of a surface from its alpha; `None` when a texture decides.
 #[must_use]
 pub fn coverage(m: &Material) -> Option<f64> {
     let alpha = m.base_color[3];
@@ -286,13 +291,13 @@ pub fn coverage(m: &Material) -> Option<f64> {
     }
 }
 
-/// Whether anything is mirrored at the base of a surface. What bends nothing mirrors nothing.
+/// Whether the base of a surface has specular reflection. An index of refraction of 1 reflects nothing.
 #[must_use]
 pub fn mirrors(m: &Material) -> bool {
     m.metallic > 0.0 || (m.specular > 0.0 && m.ior != 1.0)
 }
 
-/// Whether a surface mirrors or bends some light without spreading it. A texture only lowers a factor.
+/// Whether a surface has a specular (delta) lobe of reflection or transmission. A texture only lowers a factor.
 #[must_use]
 pub fn is_smooth(m: &Material) -> bool {
     let base = m.roughness <= SMOOTHEST && (mirrors(m) || m.transmission > 0.0);
@@ -312,7 +317,7 @@ mod tests {
         Material { metallic: 0.0, ..Material::default() }
     }
 
-    /// Between two media, of a body or of what lies behind its surface in one.
+    /// An interface between two media, of a closed mesh or of a surface without an interior.
     fn between(before: f64, behind: f64, body: bool) -> Boundary {
         let ior = before.max(behind);
         Boundary { before, behind, ior, body, hidden: false, beyond: Media::default() }
@@ -337,7 +342,7 @@ mod tests {
             for clearcoat in [0.0, 0.5, 1.0] {
                 let m = Material { clearcoat, ..m.clone() };
                 for at in [between(1.0, 1.5, true), between(1.5, 1.0, true), between(1.0, 1.5, false)] {
-                    // Metal by a colour of 1, and what it hides of the dielectric part.
+                    // White metals, whose colour is 1, hide as much of the dielectric part as they reflect.
                     COSINES.iter().for_each(|&cos| near(sum(&Layers::of(&m, &at, cos)), DVec3::ONE));
                 }
             }
@@ -350,7 +355,7 @@ mod tests {
         for (metallic, conductor) in [(0.0, None), (0.5, None), (0.5, gold), (1.0, gold)] {
             let tinted = Material { specular_color: [1.0, 0.3, 0.0], specular: 0.7, metallic, conductor, ..white() };
             for (transmission, clearcoat) in [(0.0, 0.0), (0.6, 0.3), (1.0, 1.0)] {
-                // Of metals by n and κ no more than their reflectance.
+                // Conductors with n and kappa reflect at most their reflectance.
                 let color = [0.9, 0.7, 0.3, 1.0];
                 let m = Material { transmission, clearcoat, base_color: color, ..tinted.clone() };
                 for cos in COSINES {
@@ -392,7 +397,7 @@ mod tests {
         assert!(beyond.total && beyond.share(Layer::Through) == DVec3::ZERO);
         near(beyond.share(Layer::Base), DVec3::ONE);
         assert!(!inside(critical + 1e-6).total && inside(critical + 1e-6).share(Layer::Through).x > 0.0);
-        // What is no body cannot throw light back from within.
+        // A surface without an interior has no total internal reflection.
         assert!(!Layers::of(&m, &between(1.5, 1.0, false), critical - 1e-9).total);
     }
 
@@ -440,7 +445,7 @@ mod tests {
         let m = Material { specular: 0.5, specular_color: [1.0, 0.5, 0.0], ..white() };
         near(layers(&m, 1.0).share(Layer::Base), DVec3::new(0.02, 0.01, 0.0));
         near(layers(&m, 0.0).share(Layer::Base), DVec3::splat(0.5));
-        // The ground has what the largest component leaves.
+        // The diffuse base layer gets the energy that the largest component leaves.
         near(layers(&m, 1.0).share(Layer::Ground), DVec3::splat(0.98));
     }
 
@@ -459,7 +464,7 @@ mod tests {
         }
     }
 
-    /// A lobe's directions stay on their side; a layer of one direction has the mirrored and the bent one whatever is drawn.
+    /// Glossy directions stay on their side; a specular lobe has the same reflected and refracted direction for all random numbers.
     #[test]
     fn directions_leave_on_the_side_of_their_layer() {
         let direction = DVec3::new(0.6, 0.0, -0.8);

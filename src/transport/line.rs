@@ -1,4 +1,7 @@
-//! Straight lines through the hierarchy of boxes, in f64: what is asked of rays before there is a device.
+//! Ray casting through the BVH on the host, in f64: a slab test per box, an intersection test per triangle.
+//!
+//! Read Möller and Trumbore 1997, "Fast, Minimum Storage Ray/Triangle Intersection"; Real-Time Rendering (4th ed.), chapter 22.
+//! Coordinates are in bvh space.
 
 use glam::DVec3;
 
@@ -6,29 +9,29 @@ use super::bvh::{Bvh, Node, Triangle};
 use crate::scene::Scene;
 use crate::scene::solid::Solids;
 
-/// Where a line meets a triangle.
+/// The intersection of a line with a triangle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Crossing<'a> {
     pub(super) triangle: &'a Triangle,
-    /// In lengths of the direction.
+    /// Parameter along the line, in lengths of the direction.
     pub(super) t: f64,
-    /// Barycentrics of the second and the third corner.
+    /// Barycentric coordinates of the second and the third corner.
     pub(super) uv: [f64; 2],
 }
 
-/// A crossed triangle as the line sees it.
+/// The orientation of an intersected triangle relative to the line.
 pub(super) struct Facing {
-    /// Its front, which looks outwards from bodies.
+    /// Whether the line meets the front side; fronts of closed meshes face outwards.
     pub(super) front: bool,
-    /// Unit normal that its corners' normals give, on the line's side; where that looks away, near silhouettes, or is none, the
-    /// triangle's own.
+    /// Unit shading normal, interpolated from the corners, on the line's side. The geometric normal replaces it where it faces
+    /// away, near silhouettes, or is NaN.
     pub(super) normal: DVec3,
-    /// The triangle's own.
+    /// Unit geometric normal on the line's side.
     pub(super) flat: DVec3,
 }
 
 impl Crossing<'_> {
-    /// Which side a line in `direction` meets.
+    /// The orientation for a line in `direction`.
     pub(super) fn facing(&self, scene: &Scene, solids: &Solids, direction: DVec3) -> Facing {
         let instance = self.triangle.instance as usize;
         let [a, b, c] = self.triangle.corners.map(|corner| DVec3::from(corner.map(f64::from)));
@@ -42,7 +45,7 @@ impl Crossing<'_> {
         Facing { front: (faces != mirrored) != solids.flipped[instance], normal, flat }
     }
 
-    /// The unit normal that the corners of the triangle give; no number where they cancel.
+    /// Unit shading normal, interpolated from the corners; NaN where they cancel.
     pub(super) fn normal(&self, scene: &Scene) -> DVec3 {
         let placed = &scene.instances[self.triangle.instance as usize];
         let mesh = &scene.meshes[placed.mesh];
@@ -57,8 +60,9 @@ impl Crossing<'_> {
     }
 }
 
-/// Shows `crossed` what a line from `origin`, in bvh space, crosses in (`from`, what `crossed` said last], in no order.
-pub(super) fn walk<'a>(
+/// Calls `crossed` with each intersection of a line from `origin` (bvh space) with t > `from`, in no order. The return value
+/// of `crossed` is the new upper limit of t.
+pub(super) fn traverse<'a>(
     bvh: &'a Bvh,
     origin: DVec3,
     direction: DVec3,
@@ -74,7 +78,7 @@ pub(super) fn walk<'a>(
         let [low, high] =
             [bounds.min, bounds.max].map(|corner| (DVec3::from(corner.map(f64::from)) - origin) * inverse);
         let (near, far) = (low.min(high).max_element(), low.max(high).min_element());
-        // A line within a side of a box gives NaN, which opens it.
+        // A line in the plane of a box's side gives NaN; the box is then visited.
         if far < from || near > far || near > until {
             continue;
         }
@@ -91,10 +95,10 @@ pub(super) fn walk<'a>(
     }
 }
 
-/// The nearest of what a line crosses behind `from`.
+/// The nearest intersection with t > `from`.
 pub(super) fn nearest(bvh: &Bvh, origin: DVec3, direction: DVec3, from: f64) -> Option<Crossing<'_>> {
     let mut found: Option<Crossing> = None;
-    walk(bvh, origin, direction, from, |crossing| {
+    traverse(bvh, origin, direction, from, |crossing| {
         if found.is_none_or(|best| crossing.t < best.t) {
             found = Some(crossing);
         }
@@ -103,7 +107,7 @@ pub(super) fn nearest(bvh: &Bvh, origin: DVec3, direction: DVec3, from: f64) -> 
     found
 }
 
-/// Where a line meets a triangle (Möller and Trumbore 1997).
+/// Ray/triangle intersection (Möller and Trumbore 1997): t and barycentric coordinates.
 fn meets(corners: [[f32; 3]; 3], origin: DVec3, direction: DVec3) -> Option<(f64, [f64; 2])> {
     let [a, b, c] = corners.map(|corner| DVec3::from(corner.map(f64::from)));
     let (ab, ac) = (b - a, c - a);

@@ -1,14 +1,14 @@
-//! Light transport on the host: what rays go through, what paths aim at, and what is met at one picked pixel.
+//! The host's part of light transport: BVH, light sampling tables, photons for path guiding, and the rays of one picked pixel.
 //!
-//! It knows scenes and no Vulkan. The passes upload what is made here.
+//! Read pbrt (4th ed.), chapters 7 and 12 to 14. This module uses scenes and no Vulkan; [`crate::upload`] uploads its results.
 
 mod aabb;
 pub mod bvh;
-pub mod caustics;
 pub mod contact;
 pub mod emitters;
 pub mod events;
 pub mod layers;
 mod line;
+pub mod photon_guiding;
 mod ploc;
 pub mod sight;

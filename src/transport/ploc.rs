@@ -1,13 +1,15 @@
-//! Which boxes belong together: parallel locally-ordered clustering, then two optimisations of the crate `obvhs`.
+//! BVH construction: parallel locally-ordered clustering (PLOC), then two optimisations of the crate `obvhs`.
 //!
-//! Clustering (Meister and Bittner 2018): boxes in the order of their Morton codes, each finds the neighbour within a
-//! few places whose common box has the smallest surface, pairs that chose each other become one, until one is left.
-//! Reinsertion (Meister and Bittner 2018) then moves subtrees to where they cost less, and small subtrees become leaves.
+//! Read Meister and Bittner 2018, "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy Construction" and
+//! "Parallel Reinsertion for Bounding Volume Hierarchy Optimization". Clustering sorts boxes by Morton code. Each box finds
+//! the neighbour within a search radius whose common box has the smallest surface area, and mutual nearest neighbours
+//! merge, until one cluster is left. Reinsertion then moves subtrees to lower the surface area heuristic (SAH), and small
+//! subtrees collapse into leaves.
 //!
-//! The clustering is here and not the crate's, because there a round joins only pairs that agree, and in some scenes one
-//! pair a round does: 20 000 equal boxes in a row, such as the posts of a fence, took it 6.3 s and 20 000 boxes inside
-//! each other 12.7 s, both growing with the square. Here both sides of a pair decide equal costs in the same way, and a
-//! round in which too few agree joins pairs by order.
+//! The clustering is implemented here, because a round of the crate's merges only mutual pairs, and in some scenes that is
+//! one pair a round: 20 000 equal boxes in a row, such as the posts of a fence, took it 6.3 s and 20 000 nested boxes
+//! 12.7 s, both growing with the square. Here both sides of a pair break ties the same way, and a round with too few mutual
+//! pairs merges neighbours in order.
 
 use obvhs::bvh2::leaf_collapser::collapse;
 use obvhs::bvh2::node::Bvh2Node;
@@ -18,33 +20,33 @@ use rayon::prelude::*;
 
 use super::aabb::Aabb;
 
-/// Neighbours looked at on either side. With 14 a million triangles of one surface take 0.1 s longer and cost the same;
-/// a building of 390 000 costs 0.3 to 1.8 % less.
+/// Search radius: neighbours on either side. With 14 a million triangles of one surface take 0.1 s longer at equal cost; a
+/// building of 390 000 costs 0.3 to 1.8 % less.
 const RADIUS: usize = 8;
 
-/// A round with fewer than one pair in so many clusters pairs by order instead. Of a million triangles one pair in two to
-/// six clusters agrees until ten thousand are left; the first round by order comes below two thousand.
+/// A round with fewer than one mutual pair in this many clusters merges in order instead. Of a million triangles one pair in
+/// two to six clusters is mutual until ten thousand clusters are left; the first round in order comes below two thousand.
 const STALLED: usize = 16;
 
-/// Part of the nodes that reinsertion looks at in its first turn, before and after leaves are made. 0.1 before takes
-/// 120 ms more at a million triangles and gains 0.4 %.
+/// Share of the nodes in the first pass of reinsertion, before and after leaves collapse. 0.1 before takes 120 ms more at a
+/// million triangles and gains 0.4 %.
 const REINSERTED: [f32; 2] = [0.05, 0.1];
 
-/// Largest leaf that is made.
+/// Largest number of triangles in a collapsed leaf.
 const LEAF: u32 = 4;
 
-/// What a step to an inner node costs in triangles of a leaf, when leaves are made. At 2 a third of the nodes goes; a ray
+/// Cost of an inner node relative to a triangle test, for collapsing (SAH). With 2 a third of the nodes disappears; a ray
 /// takes 3 % fewer steps and tests 30 to 40 % more triangles.
 const STEP: f32 = 1.0;
 
-/// A tree with one leaf entry for each of `boxes`, at least one, all finite and not all of them one point.
+/// A BVH with one leaf entry per box. There must be at least one box; all are finite, and not all are one point.
 ///
-/// The same boxes give the same tree, whatever the number of threads. Of its boxes only the arrangement should be used:
-/// they are scaled.
+/// The same boxes give the same tree on any number of threads. Only the topology of the result is meaningful: its boxes are
+/// scaled.
 pub(super) fn arrange(boxes: &[Aabb]) -> Bvh2 {
     let (mut tree, by_order) = cluster(boxes);
-    // Where many pairs came from the order alone, boxes lie inside each other. Reinsertion then takes a time that grows
-    // with the square (200 000: 4.3 s), gains nothing and makes the tree deep (14 000 levels in place of 26).
+    // Many merges in order mean that boxes are nested. Reinsertion then takes time that grows with the square (200 000:
+    // 4.3 s), gains nothing and makes the tree deep (14 000 levels instead of 26).
     let reinserted = if by_order * 4 > boxes.len() { [0.0; 2] } else { REINSERTED };
     let mut reinsertion = ReinsertionOptimizer::default();
     reinsertion.run(&mut tree, reinserted[0], None);
@@ -53,7 +55,8 @@ pub(super) fn arrange(boxes: &[Aabb]) -> Bvh2 {
     tree
 }
 
-/// The boxes with a longest side of 1 … 2: surfaces neither overflow nor vanish. A power of two changes no comparison.
+/// The boxes, scaled so that the longest side of the scene is 1 … 2: surface areas neither overflow nor underflow. A power of
+/// two changes no comparison.
 fn scaled(boxes: &[Aabb]) -> (Aabb, Vec<obvhs::aabb::Aabb>) {
     let all = boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b));
     let side = (0..3).map(|axis| all.size(axis)).fold(0.0, f64::max);
@@ -64,24 +67,24 @@ fn scaled(boxes: &[Aabb]) -> (Aabb, Vec<obvhs::aabb::Aabb>) {
     (one(&all), boxes.iter().map(foreign).collect())
 }
 
-/// Bottom-up clustering; also how many pairs were made by order alone.
+/// Bottom-up clustering; also returns the number of merges that were made in order.
 fn cluster(boxes: &[Aabb]) -> (Bvh2, usize) {
     let (all, boxes) = scaled(boxes);
-    // Just below 1 at the far side: the code keeps 21 bits of a coordinate, and 1 would wrap to 0.
+    // Just below 1 at the far side: the Morton code has 21 bits per coordinate, and 1 would wrap to 0.
     let cells: [f64; 3] = [0, 1, 2].map(|axis| (1.0 - 1e-9) / all.size(axis).max(1e-30));
     let code = |b: &obvhs::aabb::Aabb| {
         let center: [f32; 3] = b.center().into();
         let unit = [0, 1, 2].map(|axis| (f64::from(center[axis]) - f64::from(all.min[axis])) * cells[axis]);
         morton_encode_u64_unorm(unit.into())
     };
-    // With the index every key is different, so that an unstable sort has one answer.
+    // The index makes all keys different, so an unstable sort has a unique result.
     let mut keys: Vec<(u64, u32)> = boxes.par_iter().enumerate().map(|(i, b)| (code(b), i as u32)).collect();
     keys.par_sort_unstable();
 
     let mut clusters: Vec<Bvh2Node> = keys.iter().map(|&(_, i)| Bvh2Node::new(boxes[i as usize], 1, i)).collect();
     let mut joined = Vec::with_capacity(clusters.len());
     let mut best: Vec<u32> = Vec::new();
-    // Siblings side by side, filled from the end: parents before their children, the root first.
+    // Siblings are adjacent, and the array is filled from its end: parents precede their children, the root is first.
     let mut nodes = vec![Bvh2Node::default(); 2 * clusters.len() - 1];
     let mut free = nodes.len();
     let mut by_order = 0;
@@ -112,16 +115,16 @@ fn cluster(boxes: &[Aabb]) -> (Bvh2, usize) {
     let tree = Bvh2 {
         primitive_indices: (0..boxes.len() as u32).collect(),
         nodes,
-        // The search of the reinsertion keeps a stack of fixed size then, which leaves out candidates where a tree is
-        // deeper; a larger one panics there.
+        // Reinsertion then searches with a stack of fixed size, which skips candidates in deeper trees; a larger value
+        // panics there.
         max_depth: DEFAULT_MAX_STACK_DEPTH,
         ..Bvh2::default()
     };
     (tree, by_order)
 }
 
-/// The neighbour whose common box with cluster `i` has the smallest surface. Equal ones are told apart by `i ^ j`, which
-/// is the same from both sides: in a row of equal boxes 0 finds 1 and 2 finds 3.
+/// The neighbour whose common box with cluster `i` has the smallest surface area. Ties are broken by `i ^ j`, which is the same
+/// from both sides: in a row of equal boxes 0 finds 1 and 2 finds 3.
 fn nearest(clusters: &[Bvh2Node], i: usize) -> usize {
     let own = *clusters[i].aabb();
     let (mut best, mut least) = (i, f32::INFINITY);
@@ -166,7 +169,7 @@ mod tests {
         boxes(count, |_| ([-1.0; 3], [1.0; 3]))
     }
 
-    /// Equal squares side by side: many equal costs.
+    /// A grid of equal squares, which has many ties.
     fn grid(count: u32) -> Vec<Aabb> {
         boxes(count, |i| {
             let (x, z) = (i % 77.0, (i / 77.0).floor());
@@ -174,12 +177,12 @@ mod tests {
         })
     }
 
-    /// All of a tree but its boxes.
+    /// The topology of a tree, without its boxes.
     fn shape(tree: Bvh2) -> (Vec<(u32, u32)>, Vec<u32>) {
         (tree.nodes.iter().map(|n| (n.prim_count, n.first_index)).collect(), tree.primitive_indices)
     }
 
-    /// One pair a round would make these as deep as they have boxes, in a time that grows with the square.
+    /// One pair per round would make these trees as deep as their number of boxes, in time that grows with the square.
     #[test]
     fn rows_piles_and_nests_of_boxes_give_flat_trees() {
         let n = 4096;
@@ -191,7 +194,7 @@ mod tests {
         }
     }
 
-    /// Pairs by order take no notice of what is where.
+    /// Merges in order ignore positions, so ties must not cause them.
     #[test]
     fn equal_costs_need_no_pairs_by_order() {
         for boxes in [row(5000), pile(5000), grid(5000)] {

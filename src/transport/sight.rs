@@ -1,5 +1,7 @@
-//! How many transparent surfaces lie one behind the other along straight lines from the eye: the least that a path of rays
-//! has to meet to see what is behind them. Rays that are bent, or thrown back inside, meet more.
+//! Number of transparent surfaces along straight lines of sight: a lower bound for the surfaces that a path must cross to
+//! reach what is behind them. Refracted and internally reflected paths cross more.
+//!
+//! Read docs/decisions/interfaces.md. `etalon plan` uses the bound to choose the knob `interfaces`.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -8,16 +10,16 @@ use super::bvh::Bvh;
 use super::line::{self, Crossing};
 use crate::scene::{AlphaMode, Camera, Projection, Scene};
 
-/// Lines across the picture; as many down as its shape gives.
+/// Columns of the grid of lines; the number of rows follows from the aspect ratio.
 const LINES: u32 = 160;
 
-/// What lies along the lines of sight of a camera.
+/// Transparent surfaces along a camera's lines of sight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sight {
-    /// The most transparent surfaces on one line, before the first opaque one.
+    /// Largest number of transparent surfaces on one line, before the first opaque one.
     pub most: u32,
-    /// For each number of surfaces from 0 up to `most`, the largest share of light that any line with more than that number
-    /// lets through so many: what a path that ends there loses.
+    /// For each number of surfaces from 0 up to `most`: the largest share of light behind that many surfaces, over all lines
+    /// with more surfaces. A path that ends there loses this share.
     pub left: Vec<f64>,
 }
 
@@ -29,7 +31,7 @@ impl Sight {
     }
 }
 
-/// Follows a grid of lines through the picture of `size` pixels that `camera` sees; `bvh` is the tree of the scene's triangles.
+/// Casts a grid of lines through the picture of `size` pixels seen by `camera`; `bvh` is the scene's BVH.
 #[must_use]
 pub fn along_lines(scene: &Scene, bvh: &Bvh, camera: &Camera, size: [u32; 2]) -> Sight {
     let aspect = f64::from(size[0]) / f64::from(size[1]);
@@ -44,7 +46,7 @@ pub fn along_lines(scene: &Scene, bvh: &Bvh, camera: &Camera, size: [u32; 2]) ->
         })
         .collect();
     let most = lines.iter().map(Vec::len).max().unwrap_or_default();
-    // A line's k-th entry is what is left behind its first k surfaces.
+    // Entry k of a line is the light left behind its first k + 1 surfaces.
     let left = (0..most).map(|k| {
         let longer = lines.iter().filter(|line| line.len() > k);
         longer.map(|line| if k == 0 { 1.0 } else { line[k - 1] }).fold(0.0, f64::max)
@@ -52,7 +54,7 @@ pub fn along_lines(scene: &Scene, bvh: &Bvh, camera: &Camera, size: [u32; 2]) ->
     Sight { most: most as u32, left: left.collect() }
 }
 
-/// The line of sight through a place of the picture, −1 … 1 to the right and up: its origin and unit direction.
+/// The line of sight through a point of the picture (−1 … 1 to the right and up): origin and unit direction in world space.
 pub(super) fn line_through(camera: &Camera, aspect: f64, at: DVec2) -> (DVec3, DVec3) {
     let m = camera.world_from_camera.matrix3;
     let eye = camera.world_from_camera.translation;
@@ -68,15 +70,15 @@ pub(super) fn line_through(camera: &Camera, aspect: f64, at: DVec2) -> (DVec3, D
     }
 }
 
-/// What is left of the light along a line behind each transparent surface before the first opaque one. `origin` is in bvh
+/// The share of light left behind each transparent surface along a line, before the first opaque one. `origin` is in bvh
 /// space.
 fn shares(scene: &Scene, bvh: &Bvh, origin: DVec3, direction: DVec3) -> Vec<f64> {
     let mut found: Vec<(f64, u32, f64)> = Vec::new();
     let mut opaque = f64::INFINITY;
-    line::walk(bvh, origin, direction, 0.0, |Crossing { triangle, t, .. }| {
+    line::traverse(bvh, origin, direction, 0.0, |Crossing { triangle, t, .. }| {
         let material = &scene.materials[scene.meshes[scene.instances[triangle.instance as usize].mesh].material];
         if material.transmission > 0.0 {
-            // Along a line that is not bent as much as at normal incidence is mirrored, or more.
+            // Along a straight line a surface reflects at least as much as at normal incidence.
             let f0 = ((f64::from(material.ior) - 1.0) / (f64::from(material.ior) + 1.0)).powi(2);
             found.push((t, triangle.instance, f64::from(material.transmission) * (1.0 - f0)));
         } else if material.alpha_mode == AlphaMode::Blend {
@@ -88,7 +90,7 @@ fn shares(scene: &Scene, bvh: &Bvh, origin: DVec3, direction: DVec3) -> Vec<f64>
     });
     found.retain(|(t, ..)| *t < opaque);
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    // On an edge both triangles are met, of one surface.
+    // A line through an edge meets both triangles of one surface.
     found.dedup_by(|b, a| a.1 == b.1 && b.0 - a.0 <= 1e-9 * b.0);
     found
         .iter()
@@ -106,7 +108,7 @@ mod tests {
     use super::*;
     use crate::scene::{Instance, Material, Mesh};
 
-    /// Panes of glass one behind the other, the first nearest to the camera, and an opaque one after `glass` of them.
+    /// Parallel glass panes, the first nearest to the camera, with an opaque pane after `glass` of them.
     fn panes(glass: usize, behind: usize) -> Scene {
         let pane = |material| Mesh {
             positions: vec![[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [9.0, 9.0, 0.0], [-9.0, 9.0, 0.0]].into(),

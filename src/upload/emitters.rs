@@ -1,4 +1,6 @@
-//! What paths draw light from, as tables on the device (shaders/lib/emitters.glsl).
+//! The light sampling tables of path tracing on the device (shaders/lib/emitters.glsl): light sampling by power, environment CDF.
+//!
+//! [`crate::transport::emitters`] computes them.
 
 use std::sync::Arc;
 
@@ -7,40 +9,40 @@ use ash::vk;
 
 use super::table::upload;
 use crate::gpu::{Buffer, Device, NOTHING};
-use crate::share::{EMITTER_NONE, EMITTER_PUNCTUAL, EMITTER_SKY, EMITTER_TRIANGLE, EMITTER_TWO_SIDED, Emitter};
-use crate::transport::emitters::{Emitters, Source};
+use crate::share::{EMITTER_ENVIRONMENT, EMITTER_NONE, EMITTER_PUNCTUAL, EMITTER_TRIANGLE, EMITTER_TWO_SIDED, Emitter};
+use crate::transport::emitters::{EmitterSource, Emitters};
 
-/// What paths draw light from; next to nothing without any.
+/// The light sampling tables; dummies without lights.
 pub struct EmittersOnDevice {
-    /// An [`Emitter`] each.
+    /// One [`Emitter`] per light, ordered by the CDF.
     pub table: Buffer,
-    /// Shares of the environment's cells.
+    /// The environment CDF: marginal over rows, then conditional over columns.
     pub sky: Buffer,
-    /// How many.
+    /// Number of entries in the table.
     pub count: u32,
-    /// Some are lights without extent.
+    /// Whether some entries are punctual or analytic area lights.
     pub punctual: bool,
-    /// Some are triangles.
+    /// Whether some entries are emissive triangles.
     pub triangles: bool,
-    /// Cells of the environment across; 0 where it is none of them.
+    /// Columns of the environment CDF; 0 when the environment is not sampled.
     pub columns: u32,
-    /// And down.
+    /// Rows of the environment CDF.
     pub rows: u32,
 }
 
 impl EmittersOnDevice {
-    /// `leaf_places` are those of the scene's triangles in the hierarchy.
+    /// Uploads the tables; `leaf_places` maps the scene's triangles to their index among the BVH's leaves.
     ///
     /// # Errors
     /// When memory is short.
     pub fn new(device: &Arc<Device>, emitters: &Emitters, leaf_places: &[u32]) -> Result<Self> {
         let shared = |emitter: &crate::transport::emitters::Emitter| {
             let (kind, place) = match emitter.source {
-                Source::Sky => (EMITTER_SKY, 0),
-                Source::Punctual(light) => (EMITTER_PUNCTUAL, light),
-                Source::Triangle { index, two_sided, .. } => {
+                EmitterSource::Environment => (EMITTER_ENVIRONMENT, 0),
+                EmitterSource::Punctual(light) => (EMITTER_PUNCTUAL, light),
+                EmitterSource::Triangle { index, two_sided, .. } => {
                     match leaf_places[index as usize] {
-                        // Rays leave it out, and so do the lights.
+                        // A degenerate triangle is not in the BVH, so it is no light either.
                         u32::MAX => (EMITTER_NONE, 0),
                         place => (EMITTER_TRIANGLE | if two_sided { EMITTER_TWO_SIDED } else { 0 }, place),
                     }
@@ -49,21 +51,21 @@ impl EmittersOnDevice {
             Emitter { first: emitter.first, probability: emitter.probability as f32, kind, place }
         };
         let list: Vec<Emitter> = emitters.list.iter().map(shared).collect();
-        let any = |test: fn(&Source) -> bool| emitters.list.iter().any(|emitter| test(&emitter.source));
+        let any = |test: fn(&EmitterSource) -> bool| emitters.list.iter().any(|emitter| test(&emitter.source));
         let name = |named: &'static str, empty: bool| if empty { NOTHING } else { named };
         Ok(Self {
             table: upload(device, name("emitters", list.is_empty()), &list, Some(vk::Format::R32G32B32A32_UINT))?,
             sky: upload(
                 device,
-                name("shares of the environment", emitters.sky.words.is_empty()),
-                &emitters.sky.words,
+                name("shares of the environment", emitters.environment.words.is_empty()),
+                &emitters.environment.words,
                 Some(vk::Format::R32_UINT),
             )?,
             count: list.len() as u32,
-            punctual: any(|source| matches!(source, Source::Punctual(_))),
-            triangles: any(|source| matches!(source, Source::Triangle { .. })),
-            columns: emitters.sky.columns,
-            rows: emitters.sky.rows,
+            punctual: any(|source| matches!(source, EmitterSource::Punctual(_))),
+            triangles: any(|source| matches!(source, EmitterSource::Triangle { .. })),
+            columns: emitters.environment.columns,
+            rows: emitters.environment.rows,
         })
     }
 }

@@ -1,7 +1,9 @@
-//! The environment on the device: the map itself, its GGX-prefiltered levels, its irradiance, and the directional
-//! reflectance of the lobe (shaders/pass/prefilter.comp).
+//! The environment map on the device: the map, the prefiltered environment map (GGX), its irradiance, and the table of
+//! directional albedo (shaders/pass/prefilter.comp).
 //!
-//! Prefiltering is done once per map and kept in the user's cache folder; a changed map or shader has another name there.
+//! Read Karis 2013, "Real Shading in Unreal Engine 4", for the split sum; Ramamoorthi and Hanrahan 2001, "An Efficient
+//! Representation for Irradiance Environment Maps"; Real-Time Rendering (4th ed.), chapter 10. Prefiltering runs once per map
+//! and is stored in the user's cache folder; the file name contains a hash of the map and of the shader.
 
 use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
@@ -19,14 +21,14 @@ use crate::scene::lobe::LOBES;
 use crate::shader::prefilter;
 use crate::share;
 
-/// Widest level 0 of the prefiltered map; a wider environment enters it at the first mip level that fits.
+/// Largest width of the prefiltered map's level 0; a wider environment enters at the first mip level that fits.
 const WIDEST: u32 = 1024;
 /// Width of the level for α = 1.
 const NARROWEST: u32 = 16;
-/// Side of the table of directional reflectance, over cosθ and perceptual roughness.
+/// Side of the directional albedo table (split sum), over cosθ and perceptual roughness.
 const REFLECTANCE: u32 = 32;
 
-/// The environment's images and terms; a texel that is never read where the plan has none.
+/// The environment's images and constants; a dummy texel where the plan needs none.
 pub struct EnvironmentOnDevice {
     sky: Image,
     prefiltered: Image,
@@ -35,12 +37,12 @@ pub struct EnvironmentOnDevice {
     pub terms: Buffer,
 }
 
-/// How the user wants the environment.
+/// The user's scale and rotation of the environment.
 #[derive(Debug, Clone, Copy)]
-pub struct Turn {
-    /// Multiplies its radiance.
+pub struct EnvironmentRotation {
+    /// Factor on the radiance.
     pub intensity: f32,
-    /// Degrees about +Y.
+    /// Rotation about +Y in degrees.
     pub rotation: f32,
 }
 
@@ -50,11 +52,16 @@ type Texel = [f32; 4];
 type Levels = Vec<(u32, u32, Vec<Texel>)>;
 
 impl EnvironmentOnDevice {
-    /// Uploads and prefilters `environment` as far as the plan asks for it.
+    /// Uploads and prefilters `environment` as far as the plan needs it.
     ///
     /// # Errors
     /// When memory is short.
-    pub fn new(device: &Arc<Device>, plan: &Plan, environment: Option<&Environment>, turn: Turn) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        plan: &Plan,
+        environment: Option<&Environment>,
+        turn: EnvironmentRotation,
+    ) -> Result<Self> {
         let lights = plan.ambient || plan.reflection || plan.rays.is_some();
         let chain = match environment {
             Some(environment) if lights || plan.sky => match plan.prefilter || !environment.is_constant() {
@@ -74,7 +81,7 @@ impl EnvironmentOnDevice {
         let reflectance = image(device, "directional reflectance", &table.into_iter().collect())?;
         let mut irradiance = [[0.0; 3]; 9];
         if let (true, Some(environment)) = (plan.ambient, environment) {
-            // The cosine lobe of Ramamoorthi & Hanrahan 2001 by band.
+            // Cosine lobe coefficients of Ramamoorthi and Hanrahan 2001, by band.
             use std::f64::consts::PI;
             let lobe = |i: usize| [PI, 2.0 * PI / 3.0, PI / 4.0][usize::from(i > 0) + usize::from(i > 3)];
             let coefficients = environment.irradiance_sh9();
@@ -92,26 +99,26 @@ impl EnvironmentOnDevice {
         Ok(Self { sky, prefiltered, reflectance, terms: Buffer::with_data(device, "environment terms", &[terms])? })
     }
 
-    /// The map as it is, for the background.
+    /// The environment map, for the background and for rays.
     #[must_use]
     pub fn sky(&self) -> Sampled<'_> {
         Sampled { image: &self.sky, sampler: SamplerDesc::EQUIRECTANGULAR }
     }
 
-    /// The prefiltered map.
+    /// The prefiltered environment map.
     #[must_use]
     pub fn prefiltered(&self) -> Sampled<'_> {
         Sampled { image: &self.prefiltered, sampler: SamplerDesc::EQUIRECTANGULAR }
     }
 
-    /// Directional reflectance: F0 and F90 factors over (cosθ, roughness).
+    /// Directional albedo of the specular lobe (split sum): factors of F0 and F90 over (cosθ, roughness).
     #[must_use]
     pub fn reflectance(&self) -> Sampled<'_> {
         Sampled { image: &self.reflectance, sampler: SamplerDesc::LINEAR }
     }
 }
 
-/// An image of these levels; without any, something to bind.
+/// An image with these mip levels; a dummy without any.
 fn image(device: &Arc<Device>, name: &str, levels: &Levels) -> Result<Image> {
     let (format, usage) = (vk::Format::R32G32B32A32_SFLOAT, vk::ImageUsageFlags::SAMPLED);
     let Some(&(width, height, _)) = levels.first() else { return Image::nothing(device, format, usage) };
@@ -130,12 +137,12 @@ fn image(device: &Arc<Device>, name: &str, levels: &Levels) -> Result<Image> {
     Ok(image)
 }
 
-/// What stands for a map that is the same everywhere.
+/// One texel for a constant environment.
 fn one_texel(environment: &Environment) -> Levels {
     environment.radiance.first().map(|&[r, g, b]| (1, 1, vec![[r, g, b, 1.0]])).into_iter().collect()
 }
 
-/// The map and its averages by twos, down to a single texel.
+/// The mip chain of the map by a box filter, down to a single texel.
 fn box_chain(environment: &Environment) -> Levels {
     let texels = environment.radiance.iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
     let mut levels: Levels = vec![(environment.width, environment.height, texels)];
@@ -164,8 +171,8 @@ fn box_chain(environment: &Environment) -> Levels {
     }
 }
 
-/// Levels of halving width from at most [`WIDEST`] to [`NARROWEST`] texels: level 0 is the map, each other one is
-/// filtered with the lobe of α = 16 / width.
+/// Mip levels of the prefiltered map, of halving width from at most [`WIDEST`] to [`NARROWEST`] texels: level 0 is the map,
+/// every other level is filtered with the GGX lobe of α = 16 / width.
 fn prefilter(device: &Arc<Device>, sky: &Image, chain: &Levels) -> Result<Levels> {
     let first = chain.iter().position(|(width, ..)| *width <= WIDEST).unwrap_or(chain.len() - 1);
     let (width, height, base) = &chain[first];
@@ -179,7 +186,7 @@ fn prefilter(device: &Arc<Device>, sky: &Image, chain: &Levels) -> Result<Levels
     let cache = cache_file(device, chain);
     if let Some(known) = cache.as_ref().and_then(|path| std::fs::read(path).ok()) {
         let total: usize = sizes.iter().map(|&(w, h)| (w * h) as usize * size_of::<Texel>()).sum();
-        // The file begins with the hash of the rest: a damaged one is made anew.
+        // The file begins with the hash of the rest; a damaged file is computed again.
         let (hash, rest) = known.split_at(known.len().min(HASH_BYTES));
         if rest.len() == total && file::hash(rest).as_bytes() == hash {
             let texels: Vec<Texel> = bytemuck::pod_collect_to_vec(rest);
@@ -219,7 +226,7 @@ fn prefilter(device: &Arc<Device>, sky: &Image, chain: &Levels) -> Result<Levels
 /// Hexadecimal digits of [`file::hash`].
 const HASH_BYTES: usize = 32;
 
-/// Where the prefiltered levels of this map are kept: named by the map's texels, the shader's words and the device.
+/// The cache file of the prefiltered levels, named by hashes of the map's texels, of the shader and of the device.
 fn cache_file(device: &Device, chain: &Levels) -> Option<PathBuf> {
     let folder = file::cache_folder()?;
     let map = file::hash(bytemuck::cast_slice(&chain[0].2));
@@ -230,14 +237,15 @@ fn cache_file(device: &Device, chain: &Levels) -> Option<PathBuf> {
     Some(folder.join(format!("environment-{map}-{maker}-{width}x{height}")))
 }
 
-/// Directional reflectance of the GGX lobe, split into the factors of F0 and F90 (Karis 2013):
-/// A = ∫ (1 − (1 − V·H)⁵) G₂ V·H / (N·H N·V), B the same with (1 − V·H)⁵, over the distribution of half vectors.
+/// Directional albedo of the GGX lobe, split into the factors of F0 and F90 (split sum, Karis 2013):
+/// A = ∫ (1 − (1 − V·H)⁵) G₂ V·H / (N·H N·V), B the same integral with (1 − V·H)⁵, over the distribution of half vectors.
 ///
-/// Made once for all renderers of a process: with the albedo of a lobe beside it, or without.
+/// The table is computed once per process, in two forms: with the albedo of an extension's lobe in the other channels, or
+/// without.
 fn reflectance_table(lobes: u32) -> &'static [Texel] {
     static TABLES: [OnceLock<Vec<Texel>>; 2] = [const { OnceLock::new() }; 2];
     let side = REFLECTANCE as usize;
-    // From 0 to 1 with both; of the horizon, where nothing is visible, its limit.
+    // Both axes run from 0 to 1 inclusive; the horizon, where the lobe is invisible, takes its limit.
     let at = |i: usize| i as f64 / (side - 1) as f64;
     let seen = LOBES.iter().enumerate().filter(|(place, _)| lobes >> place & 1 != 0);
     let over = seen.filter_map(|(_, lobe)| lobe.albedo).next();
@@ -252,23 +260,23 @@ fn reflectance_table(lobes: u32) -> &'static [Texel] {
     TABLES[usize::from(over.is_some())].get_or_init(|| (0..side).into_par_iter().flat_map_iter(row).collect())
 }
 
-/// Half vectors are drawn from those visible to V (Heitz 2018): each sample's weight is G₂ / G₁(V), at most 1, so that
-/// they never sum to more than the light received. 512 of them are good to 3e-3 and to 6e-4 of a table's texel in the mean; with
-/// 128 white metals of roughness 0.5 sent 1.002 of what they received. Drawing from D alone needs 4096 for 4e-3.
+/// Importance sampling of the visible normals (VNDF, Heitz 2018): each sample's weight is G₂ / G₁(V), at most 1, so the sum
+/// never exceeds the received energy. 512 samples are accurate to 3e-3, and to 6e-4 in the mean over the table's texels;
+/// with 128, white metals of roughness 0.5 reflected 1.002 of the received light. Sampling D alone needs 4096 for 4e-3.
 fn directional_reflectance(cos_v: f64, roughness: f64) -> [f64; 2] {
     const SAMPLES: u32 = 512;
     let alpha = roughness * roughness;
     let a2 = alpha * alpha;
     let root = |c: f64| (a2 + (1.0 - a2) * c * c).sqrt();
     let v = DVec3::new((1.0 - cos_v * cos_v).sqrt(), 0.0, cos_v);
-    // V in the space where the microsurface is a hemisphere, and a basis around it; V has no y.
+    // V in the stretched space where the microsurface is a hemisphere, and a basis around it; V has no y.
     let stretched = DVec3::new(alpha * v.x, 0.0, v.z).normalize();
     let (t1, t2) = (DVec3::Y, stretched.cross(DVec3::Y));
     let mut sum = [0.0; 2];
     for i in 0..SAMPLES {
         let radius = ((f64::from(i) + 0.5) / f64::from(SAMPLES)).sqrt();
         let (sin, cos) = (std::f64::consts::TAU * f64::from(i.reverse_bits()) / 2_f64.powi(32)).sin_cos();
-        // A point on the disc as V sees the hemisphere: the lower half is foreshortened.
+        // A point on the projected disk of the hemisphere seen from V: its lower half is foreshortened.
         let x = radius * cos;
         let lower = 0.5 * (1.0 + stretched.z);
         let y = (1.0 - lower) * (1.0 - x * x).sqrt() + lower * radius * sin;
@@ -310,7 +318,7 @@ mod tests {
         }
     }
 
-    /// The same integral by midpoint rule over the hemisphere of L, without importance sampling.
+    /// The reference integral by the midpoint rule over the hemisphere of L, without importance sampling.
     #[test]
     fn the_table_is_the_integral() {
         for (cos_v, roughness) in [(0.9, 0.6), (0.3, 0.5), (0.1, 0.8), (0.6, 1.0)] {

@@ -1,10 +1,10 @@
-//! What the device holds of a prepared scene, one file per table or picture, and the descriptor sets in which all programs find it.
+//! Uploads: the device's buffers and images of a prepared scene, one file per table, and the descriptor sets that bind them.
 //!
-//! It is written before the first frame; [`crate::pass`] reads it.
+//! Read docs/frame.md. Uploads happen before the first frame; [`crate::pass`] reads them.
 
-pub mod aims;
 pub mod emitters;
 pub mod environment;
+pub mod path_guiding;
 pub mod rays;
 pub mod scene;
 pub mod shared;

@@ -1,5 +1,8 @@
-//! What rays go through on the device: the bounding volume hierarchy, its triangles, and what their surfaces look like
+//! Ray tracing data on the device: the BVH in the layout of its traversal, triangles, and shading data of their corners
 //! (shaders/lib/trace.glsl, hit.glsl).
+//!
+//! Read pbrt (4th ed.), section 7.3 (BVH), and docs/decisions/rays.md. Coordinates are in bvh space: world axes, metres, origin
+//! at the anchor.
 
 use std::mem::offset_of;
 use std::sync::Arc;
@@ -10,8 +13,8 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::aims::AimsOnDevice;
 use super::emitters::EmittersOnDevice;
+use super::path_guiding::GuidingOnDevice;
 use super::scene::{BENT, cofactors as cofactors_of, medium, texture_bits};
 use super::table::{pack_half_2x16, upload};
 use super::view::View;
@@ -27,106 +30,106 @@ use crate::share::{
     SHEET_TRIANGLE, TraceTerms, WorkCounts,
 };
 use crate::transport::bvh::{Format, Order, Triangle};
-use crate::transport::caustics::Aims;
-use crate::transport::emitters::{Emitters, Source};
+use crate::transport::emitters::{EmitterSource, Emitters};
+use crate::transport::photon_guiding::PhotonGuiding;
 
-/// Lists in eight orders beside the one for any hit, as long as they take no more bytes than this, some two million nodes of
-/// 16 bytes: they are as many copies of the tree.
+/// Largest size of the eight octant-ordered node lists in bytes, some two million nodes of 16 bytes: they are eight copies of
+/// the BVH.
 const MOST_ORDERED_BYTES: usize = 256 << 20;
 
-/// How the hierarchy is gone through.
+/// The BVH traversal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Traversal {
-    /// Skip links between nodes of 16 bytes.
+    /// Stackless traversal by skip pointers (threaded BVH), with quantised nodes of 16 bytes.
     Links16 = LINKS_16 as isize,
-    /// Skip links between nodes of 32 bytes, for scenes whose boxes are too small for a grid of 16 bits.
+    /// Stackless traversal by skip pointers, with nodes of 32 bytes, for scenes whose boxes are too small for a 16-bit grid.
     Links32 = LINKS_32 as isize,
-    /// Nodes of 64 bytes with both children's boxes, and a stack.
+    /// Traversal with a stack; nodes of 64 bytes hold the boxes of both children.
     Stack = STACK as isize,
 }
 
-/// What the report says of the hierarchy.
+/// Figures about the BVH, for reports.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct BvhFacts {
-    /// Milliseconds to build and check it.
+    /// Build and validation time in milliseconds.
     pub build_ms: f64,
-    /// And to lay it out for the device.
+    /// Time in milliseconds to convert it to the device's layout.
     pub layout_ms: f64,
-    /// Triangles in it.
+    /// Number of triangles.
     pub triangles: usize,
-    /// Triangles left out: without area or not finite.
+    /// Number of omitted triangles: degenerate or not finite.
     pub dropped: usize,
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: usize,
-    /// Edges from the root to the deepest leaf.
+    /// Depth: edges from the root to the deepest leaf.
     pub depth: u32,
-    /// Expected nodes and triangles met by a line through the root's box.
+    /// Surface area heuristic (SAH): expected nodes and triangles visited by a line through the root's box.
     pub sah: f64,
-    /// How it is gone through.
+    /// Traversal.
     pub traversal: Traversal,
-    /// Some transparent body lies against another surface: what touches is crossed together.
+    /// Whether some closed dielectric mesh touches another surface (coincident interfaces).
     pub touching: bool,
-    /// Bytes on the device.
+    /// Size on the device in bytes.
     pub bytes: u64,
 }
 
 /// Specialization constants of every pass that includes shaders/lib/trace.glsl.
 #[derive(Debug, Clone, Copy)]
 pub struct TraceConstants {
-    /// [`Traversal`].
+    /// A [`Traversal`].
     pub traversal: u32,
-    /// Ordered lists for nearest hits.
+    /// Whether nearest-hit rays use octant-ordered node lists.
     pub octants: bool,
-    /// Entries.
+    /// Entries of the traversal stack.
     pub stack_size: u32,
-    /// Which texture slots hits read.
+    /// Vertex attributes and texture slots that ray hits read.
     pub hit: lib::hit::Constants,
     /// [`BvhFacts::touching`].
     pub touching: bool,
 }
 
 impl Default for TraceConstants {
-    /// Of shaders that send none.
+    /// Constants of shaders that send no rays.
     fn default() -> Self {
         Self { traversal: 0, octants: false, stack_size: 1, hit: lib::hit::Constants::default(), touching: false }
     }
 }
 
-/// Tables of a scene for rays; next to nothing where the plan sends none.
+/// Ray tracing data of a scene; dummies where the plan sends no rays.
 pub struct RaysOnDevice {
-    /// Nodes in all lists.
+    /// Nodes of all node lists.
     pub nodes: Buffer,
-    /// A [`BvhTriangle`] each.
+    /// One [`BvhTriangle`] per triangle.
     pub triangles: Buffer,
-    /// What lies at their corners: [`share::Corners`] as far as the scene calls for them.
+    /// Shading data of the triangles' corners: [`share::Corners`] as far as the scene needs them.
     pub corners: Buffer,
-    /// The flat face of each triangle in the order of the leaves.
+    /// Coplanar group of each triangle, in leaf order.
     pub faces: Vec<u32>,
-    /// The place among the leaves of each triangle of the scene, in the order of instances.
+    /// For each triangle of the scene, in the order of instances, its index among the BVH's leaves.
     pub leaf_places: Buffer,
-    /// What paths draw light from, and how.
+    /// Light sampling tables.
     pub emitters: EmittersOnDevice,
-    /// What they aim at.
-    pub aims: AimsOnDevice,
+    /// Guiding distribution of path guiding.
+    pub guiding: GuidingOnDevice,
     /// [`TraceTerms`].
     pub terms: Buffer,
     /// [`WorkCounts`].
     pub counts: Buffer,
-    /// Specialization.
+    /// Specialization constants.
     pub constants: TraceConstants,
-    /// For the report; `None` without rays.
+    /// Figures for reports; `None` without rays.
     pub facts: Option<BvhFacts>,
     fixed: TraceTerms,
     snap_pixels: f64,
     anchor: DVec3,
-    /// The transparent bodies alone, to find those that the eye is in.
+    /// The closed dielectric meshes, to find the media around the eye.
     bodies: Scene,
     solids: Solids,
 }
 
 impl RaysOnDevice {
-    /// Lays out the hierarchy, where the plan sends rays.
+    /// Uploads the BVH and its tables, where the plan sends rays.
     ///
     /// # Errors
     /// When the scene does not fit the device.
@@ -163,10 +166,10 @@ impl RaysOnDevice {
                 first_triangle[t.instance as usize] + local[t.primitive as usize]
             })
             .collect();
-        let corners = Corners::of(scene, solids, rays, plan.paths.is_some());
+        let corners = CornerTable::of(scene, solids, rays, plan.paths.is_some());
         let mut picked = vec![0.0; scene.triangles()];
         for emitter in &emitters.list {
-            if let Source::Triangle { index, area, .. } = emitter.source {
+            if let EmitterSource::Triangle { index, area, .. } = emitter.source {
                 picked[index as usize] = (emitter.probability / area) as f32;
             }
         }
@@ -228,9 +231,9 @@ impl RaysOnDevice {
             corners: corner_buffer,
             faces,
             emitters: EmittersOnDevice::new(device, emitters, &leaf_places)?,
-            aims: match plan.paths.is_some_and(|paths| paths.aimed) {
-                true => AimsOnDevice::new(device, &Aims::of(scene, solids, bvh, emitters))?,
-                false => AimsOnDevice::none(device)?,
+            guiding: match plan.paths.is_some_and(|paths| paths.guided) {
+                true => GuidingOnDevice::new(device, &PhotonGuiding::of(scene, solids, bvh, emitters))?,
+                false => GuidingOnDevice::none(device)?,
             },
             leaf_places: upload(device, "leaf places", &leaf_places, None)?,
             fixed,
@@ -240,7 +243,7 @@ impl RaysOnDevice {
         })
     }
 
-    /// Without rays there still is the space they would live in: shadow maps share it.
+    /// Dummies without rays. The anchor is still that of bvh space, because shadow maps use it.
     fn none(device: &Arc<Device>, scene: &Scene) -> Result<Self> {
         let (anchor, half) =
             scene.bounds().map_or_else(Default::default, |b| (b.center(), (b.max - b.min).max_element() * 0.5));
@@ -252,7 +255,7 @@ impl RaysOnDevice {
             faces: Vec::new(),
             leaf_places: Buffer::new(device, NOTHING, 0, Place::Device)?,
             emitters: EmittersOnDevice::new(device, &Emitters::default(), &[])?,
-            aims: AimsOnDevice::none(device)?,
+            guiding: GuidingOnDevice::none(device)?,
             terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,
             snap_pixels: device.snap_pixels(),
             counts: Buffer::new(device, NOTHING, 0, Place::Readback)?,
@@ -265,20 +268,20 @@ impl RaysOnDevice {
         })
     }
 
-    /// What the traversal reads.
+    /// Bindings of the traversal.
     #[must_use]
     pub fn trace(&self) -> lib::trace::Scene<'_> {
         lib::trace::Scene { bvh_nodes: &self.nodes, bvh_triangles: &self.triangles, trace_block: &self.terms }
     }
 
-    /// Where work is counted.
+    /// Bindings of the work counts.
     #[must_use]
     pub fn work(&self) -> lib::add_work::Scene<'_> {
         lib::add_work::Scene { work_done: &self.counts }
     }
 
-    /// What rays need to know of one sample of a view.
-    pub fn look_from(&mut self, view: &View, sample_index: u32, samples: u32, seed: u32) {
+    /// Updates the constants of rays for one sample of a view.
+    pub fn set_view(&mut self, view: &View, sample_index: u32, samples: u32, seed: u32) {
         let eye = view.eye - self.anchor;
         let mut camera_media = [0; 4];
         if sample_index == 0 {
@@ -301,42 +304,42 @@ impl RaysOnDevice {
         self.terms.write(bytemuck::bytes_of(&terms));
     }
 
-    /// What rays need to know where there is no view.
+    /// Writes the constants of rays that are sent without a view.
     pub fn write_fixed(&mut self) {
         self.terms.write(bytemuck::bytes_of(&self.fixed));
     }
 
-    /// The world's position of the origin that rays are told from.
+    /// Origin of bvh space in world space.
     #[must_use]
     pub fn anchor(&self) -> DVec3 {
         self.anchor
     }
 
-    /// How far rays start off a surface that the scene itself is seen from, in metres.
+    /// Ray offset from a surface, in metres.
     #[must_use]
     pub fn offset(&self) -> f32 {
         self.fixed.offset
     }
 
-    /// Whether the eye of the last view is inside a transparent body.
+    /// Whether the eye of the last view is inside a closed dielectric mesh.
     #[must_use]
     pub fn inside(&self) -> bool {
         self.fixed.camera_media[0] != 0
     }
 
-    /// What the sample that has just finished counted.
+    /// The work counts of the sample that has just finished.
     #[must_use]
     pub fn counted(&self) -> WorkCounts {
         self.counts.read(|bytes| bytemuck::pod_read_unaligned(&bytes[..size_of::<WorkCounts>()]))
     }
 
-    /// Sets the counts to 0.
+    /// Resets the work counts.
     pub fn reset<'a>(&'a self, frame: &mut Frame<'a>) {
         frame.fill("reset work counts", &self.counts, 0);
     }
 }
 
-/// Whether what lies behind an instance's surface may be seen through it: for paths, on a straight line.
+/// Whether shadow rays may pass through an instance's surface; in path tracing only without refraction.
 fn is_filter(scene: &Scene, solids: &Solids, plan: &Plan, instance: usize) -> bool {
     let material = &scene.materials[scene.meshes[scene.instances[instance].mesh].material];
     let straight = plan.paths.is_none() || solids.sheet[instance] || material.ior == 1.0;
@@ -346,9 +349,9 @@ fn is_filter(scene: &Scene, solids: &Solids, plan: &Plan, instance: usize) -> bo
     }
 }
 
-/// Which flat face each triangle of a mesh is part of, named after its first triangle: triangles that follow each other,
-/// share an edge and lie in one plane as far as its coordinates can tell. A ray that leaves such a face cannot meet it again,
-/// which no test of the other half of a quad could tell as surely where it is seen edge-on.
+/// The coplanar group of each triangle of a mesh, identified by its first triangle: consecutive triangles with a common edge
+/// in one plane, within the precision of the coordinates. A ray that leaves such a group cannot hit it again. The group
+/// prevents self-intersection with the other half of a quad seen edge-on, where an intersection test is not reliable.
 fn flat_faces(mesh: &Mesh) -> Vec<u32> {
     let at = |i: u32| glam::Vec3::from(mesh.positions[i as usize]).as_dvec3();
     let mut faces: Vec<u32> = Vec::with_capacity(mesh.indices.len() / 3);
@@ -374,31 +377,31 @@ fn flat_faces(mesh: &Mesh) -> Vec<u32> {
 
 const _: () = assert!(Order::OCTANTS.len() == OCTANT_LISTS as usize);
 
-/// All that may lie at the corners.
+/// Constants that keep all attributes of the corners.
 const EVERYTHING: lib::hit::Constants =
     lib::hit::Constants { hit_textures: (1 << lib::material::SLOTS) - 1, hit_colors: true, hit_second_uvs: true };
 
-/// What lies at the corners of triangles.
-struct Corners<'a> {
+/// Shading data of the corners of triangles.
+struct CornerTable<'a> {
     scene: &'a Scene,
     solids: &'a Solids,
-    /// Transmissive bodies refract; else all of them are sheets.
+    /// Whether closed dielectric meshes refract; otherwise all transmissive surfaces are thin-walled.
     refraction: bool,
-    /// The eye passes by the backs of surfaces that have one side only.
+    /// Whether camera rays ignore the back faces of one-sided surfaces.
     one_sided: bool,
-    /// Cofactors of each instance with the sign that keeps normals outside.
+    /// Cofactor matrix of each instance, with the sign that keeps normals outside.
     cofactors: Vec<DMat3>,
     mirrored: Vec<bool>,
-    /// Whether the normals had to be turned over: tangents change hands with them.
+    /// Whether the normals were inverted; tangents then change their handedness.
     normals_mirrored: Vec<bool>,
     scales: Vec<f32>,
-    /// The specialization constants that say which of these there are.
+    /// Specialization constants for the attributes that exist.
     contents: lib::hit::Constants,
-    /// Those texels of [`share::Corners`] that `contents` call for.
+    /// Indices of the texels of [`share::Corners`] that `contents` keeps.
     kept: Vec<usize>,
 }
 
-impl<'a> Corners<'a> {
+impl<'a> CornerTable<'a> {
     fn of(scene: &'a Scene, solids: &'a Solids, rays: Rays, one_sided: bool) -> Self {
         let mut contents = if rays.textures { EVERYTHING } else { lib::hit::Constants::default() };
         for instance in &scene.instances {
@@ -446,7 +449,7 @@ impl<'a> Corners<'a> {
         }
     }
 
-    /// The order of a triangle's corners that runs counter-clockwise around its front.
+    /// The counter-clockwise order of a triangle's corners, seen from its front.
     fn order(&self, t: &Triangle) -> [usize; 3] {
         if self.mirrored[t.instance as usize] { [0, 2, 1] } else { [0, 1, 2] }
     }
@@ -503,7 +506,7 @@ impl<'a> Corners<'a> {
     }
 }
 
-/// The geometry of the instances that are transparent bodies, under the same indices; the others have no triangles.
+/// The geometry of the instances that are closed dielectric meshes, under the same indices; other meshes are empty.
 fn bodies(scene: &Scene, solids: &Solids, rays: Rays) -> Scene {
     let mut wanted = vec![false; scene.meshes.len()];
     for (instance, &solid) in scene.instances.iter().zip(&solids.solid) {

@@ -1,4 +1,7 @@
-//! The scene on the device: vertex streams, indices, tables of materials, instances and lights, textures.
+//! The scene on the device: vertex and index buffers, tables of materials, instances and lights, texture pages.
+//!
+//! Read docs/scene-input.md and shaders/share/ for the layouts; the Vulkan specification, chapter Fixed-Function Vertex
+//! Processing. Positions are camera-relative: differences are computed in f64 and stored in f32.
 
 use std::sync::Arc;
 
@@ -16,7 +19,7 @@ use crate::gpu::{
 };
 use crate::optics::ray::camera_relative;
 use crate::plan::rungs::{self, Brdf};
-use crate::plan::{Knobs, Plan, casts_in_maps, is_see_through, mirrors};
+use crate::plan::{Knobs, Plan, casts_in_maps, is_transparent, mirrors};
 use crate::scene::lobe::{self, LobeOf};
 use crate::scene::solid::Solids;
 use crate::scene::wavelengths::{Banded, Slice, Wavelengths};
@@ -26,18 +29,18 @@ use crate::shader::{PAGES, lib};
 use crate::share;
 use crate::spectra::{self, Upsampling};
 
-/// Texels of a material before those of its lobes: of its constants, then of its texture slots.
+/// Texels of a material before those of its lobes: constants, then texture slots.
 const MATERIAL_LOBES_AT: usize =
     lib::material::MATERIAL_SLOTS_AT as usize + SLOTS * lib::material::SLOT_TEXELS as usize;
-/// Textures that follow tangents.
+/// Texture slots that use tangents: normal maps.
 pub(super) const BENT: u32 = 1 << lib::texels::SLOT_NORMAL | 1 << lib::texels::SLOT_CLEARCOAT_NORMAL;
-/// Texels of a light.
+/// Texels per light.
 const LIGHT_TEXELS: usize = lib::light_table::LIGHT_TEXELS as usize;
 const _: () = assert!(size_of::<share::Light>() == 16 * LIGHT_TEXELS);
 const _: () = assert!(lobe::COUNT == lib::texels::LOBES as usize);
 const _: () = assert!(size_of::<share::Material>() == 16 * lib::material::MATERIAL_SLOTS_AT as usize);
 
-/// Where a mesh's data lies in the scene's buffers.
+/// Ranges of a mesh in the scene's buffers.
 struct MeshRange {
     first_index: u32,
     index_count: u32,
@@ -45,17 +48,17 @@ struct MeshRange {
     has_tangents: bool,
     has_uvs: [bool; 2],
     has_colors: bool,
-    /// Middle and half extent of its box.
+    /// Centre and half extent of the mesh's bounding box.
     extent: [DVec3; 2],
 }
 
-/// An instance as it was read, for every frame's eye.
+/// An instance in f64, from which every view computes camera-relative transforms.
 struct Placement {
     world_from_object: glam::DAffine3,
     mesh: usize,
-    /// A transparent body whose triangles are wound the wrong way round.
+    /// A closed dielectric mesh with inverted winding.
     flipped: bool,
-    /// And whose normals look inwards with them.
+    /// Whether the normals of the mesh point inwards, too.
     normals_flipped: bool,
     sheet: bool,
     first_triangle: u32,
@@ -67,10 +70,10 @@ impl Placement {
     }
 }
 
-/// One concatenated attribute of all meshes that have it; others read the fallback with stride 0.
+/// One vertex attribute of all meshes that have it, concatenated; the others read the fallback with stride 0.
 struct Stream {
     data: Buffer,
-    /// First byte of each mesh.
+    /// Offset of each mesh in bytes.
     offsets: Vec<u64>,
     stride: u32,
 }
@@ -81,7 +84,7 @@ impl Stream {
     }
 }
 
-/// Everything about a scene that outlives a frame.
+/// The data of a scene that outlives a frame.
 pub struct SceneOnDevice {
     device: Arc<Device>,
     positions: Stream,
@@ -89,43 +92,43 @@ pub struct SceneOnDevice {
     tangents: Stream,
     uvs: [Stream; 2],
     colors: Stream,
-    /// 0, 0, 0, 0 and 1, 1, 1, 1.
+    /// Fallback attributes: 0, 0, 0, 0 and 1, 1, 1, 1.
     fallback: Buffer,
     indices: Buffer,
     meshes: Vec<MeshRange>,
     placements: Vec<Placement>,
     materials_cpu: Vec<Material>,
-    /// The table of materials with their texture slots, in the slice of wavelengths that is shown.
+    /// The material table with texture slots, for the current slice of wavelengths.
     pub materials: Buffer,
     texture_slots: Vec<[u32; 4]>,
-    /// What that slice is to colours.
+    /// Conversion of RGB colours to the current slice of wavelengths.
     pub spectrum: SpectrumOnDevice,
-    /// What materials are by wavelength; `None` where the picture is made of three colours.
+    /// Spectra of the materials; `None` for RGB rendering.
     wavelengths: Option<Wavelengths>,
     knobs: Knobs,
     eye: DVec3,
-    /// For rays: media that vary.
+    /// Heterogeneous media, for rays.
     pub grids: SigmaGrids,
-    /// Instances relative to the eye of the current view.
+    /// Instances, relative to the eye of the current view.
     pub instances: Buffer,
-    /// Lights relative to the eye of the current view: directional first, `LIGHT_TEXELS` each.
+    /// Lights, relative to the eye of the current view: directional first, `LIGHT_TEXELS` each; then the shadow map table.
     pub lights: Buffer,
     lights_cpu: Vec<Light>,
-    /// What each light's last texel says of its shadow maps.
+    /// Shadow maps of each light, stored in its last texel.
     light_shadows: Vec<LightMaps>,
     refraction: bool,
     stored_normals: lib::normals::Constants,
-    /// Textures, for rasterisation and for rays.
+    /// Textures for rasterisation and for rays.
     pub textures: Textures,
-    /// Materials by index → place in [`SceneOnDevice::pages`].
+    /// Per material, index of its set in [`SceneOnDevice::pages`].
     page_of_material: Vec<usize>,
     page_materials: Vec<usize>,
     page_sets: Vec<DescriptorSet>,
-    /// World-space box of the drawn triangles.
+    /// World-space bounding box of the drawn triangles.
     pub bounds: Option<Bounds>,
 }
 
-/// Bit by slot: the textures that a material has.
+/// One bit per texture slot: the textures that a material has.
 #[must_use]
 pub fn texture_bits(m: &Material) -> u32 {
     texture_slots(m).iter().enumerate().map(|(slot, (texture, _))| u32::from(texture.is_some()) << slot).sum()
@@ -159,8 +162,8 @@ fn stream<T: bytemuck::NoUninit>(
 }
 
 impl SceneOnDevice {
-    /// Uploads a scene; decoded images and geometry are taken out of it. `anchor` is the origin of the space of rays. Textures of the same
-    /// images that are there from `before` stay.
+    /// Uploads a scene and moves decoded images and geometry out of it. `anchor` is the origin of bvh space. Textures in
+    /// `before` are reused when they hold the same images.
     ///
     /// # Errors
     /// When the scene does not fit the device.
@@ -235,7 +238,7 @@ impl SceneOnDevice {
                 texture_slots_of.extend(shared_slot(texture, &textures, meaning).map(|texel| texel.map(f32::to_bits)));
                 texture_slots_of.push(for_rays);
             }
-            // Materials that read the same pages through the same samplers share a set of descriptors.
+            // Materials with the same pages and samplers share a descriptor set.
             let same = |&other: &usize| same_pages(&textures, material, &scene.materials[other]);
             let set = page_materials.iter().position(same).unwrap_or_else(|| {
                 page_materials.push(index);
@@ -257,7 +260,7 @@ impl SceneOnDevice {
             .collect::<Result<_>>()?;
         Ok(Self {
             materials: match spectral {
-                // Written anew for each slice.
+                // The buffer is rewritten for each slice of wavelengths.
                 true => {
                     let bytes = size_of_val(table.as_slice()) as u64;
                     let mut buffer = Buffer::texels(device, "materials", bytes, Place::Upload, texel_format)?;
@@ -310,8 +313,8 @@ impl SceneOnDevice {
         })
     }
 
-    /// Moves instances and lights to the eye of `view`: differences in f64, stored in f32.
-    pub fn look_from(&mut self, view: &View) {
+    /// Updates instances and lights to the eye of `view`: differences in f64, stored in f32.
+    pub fn set_view(&mut self, view: &View) {
         self.eye = view.eye;
         let table = self.instances_around(view.eye);
         self.instances.write(bytemuck::cast_slice(&table));
@@ -326,14 +329,14 @@ impl SceneOnDevice {
         self.lights.write(bytemuck::cast_slice(&table));
     }
 
-    /// Keeps the table of the shadow maps behind that of the lights.
+    /// Stores the shadow map table after the light table.
     pub(crate) fn keep_shadow_maps(&mut self, of_lights: Vec<LightMaps>, maps: &[[f32; 4]]) {
         self.lights.write_at(of_lights.len() * LIGHT_TEXELS * 16, bytemuck::cast_slice(maps));
         self.light_shadows = of_lights;
     }
 
-    /// Makes materials and lights those of a slice of wavelengths, or of three colours, where the picture is drawn by wavelengths.
-    pub fn show(&mut self, slice: Option<&Slice>) {
+    /// Converts materials and lights to a slice of wavelengths, or to RGB for `None`, in spectral rendering.
+    pub fn upload_band(&mut self, slice: Option<&Slice>) {
         let Some(wavelengths) = &self.wavelengths else { return };
         let shared = |(i, m): (usize, &Material)| {
             let place = self.grids.places[i];
@@ -348,18 +351,18 @@ impl SceneOnDevice {
         let table = material_table(self.materials_cpu.iter().enumerate().map(shared), &self.texture_slots);
         self.materials.write(bytemuck::cast_slice(&table));
         if let Some(slice) = slice {
-            self.spectrum.show(slice);
+            self.spectrum.upload_band(slice);
         }
         self.write_lights(slice);
     }
 
-    /// What programs that see colours are specialised by.
+    /// Specialization constants of programs that read colours.
     #[must_use]
     pub fn colours(&self) -> SpectrumConstants {
         self.spectrum.constants(self.wavelengths.is_some())
     }
 
-    /// The table of instances relative to a point of the world.
+    /// The instance table relative to a world-space point.
     #[must_use]
     pub fn instances_around(&self, origin: DVec3) -> Vec<share::Instance> {
         self.placements
@@ -368,42 +371,42 @@ impl SceneOnDevice {
             .collect()
     }
 
-    /// The lights in the order of their table: directional ones first.
+    /// The lights in table order: directional ones first.
     #[must_use]
     pub fn lights_in_order(&self) -> &[Light] {
         &self.lights_cpu
     }
 
-    /// The device that holds it.
+    /// The device of the scene's buffers.
     #[must_use]
     pub fn device(&self) -> &Arc<Device> {
         &self.device
     }
 
-    /// One set of texture pages per distinct combination: what the draws of a raster pass vary over.
+    /// The texture sets of the scene, one per distinct combination of pages; a raster pass's draws select among them.
     #[must_use]
     pub fn pages(&self) -> Vec<BoundSet<'_>> {
         let entries = |&m: &usize| pages_of(&self.textures, &self.materials_cpu[m]);
         self.page_sets.iter().zip(&self.page_materials).map(|(set, m)| set.bind(entries(m))).collect()
     }
 
-    /// The draws of all instances whose material is see-through or not, in the order of the file; from inside a
-    /// transparent body its back faces as well.
+    /// The draws of all instances with transparent or with opaque materials, in the file's order. With `inside`, back faces of
+    /// transmissive materials are drawn, too, because the eye is inside a closed dielectric mesh.
     #[must_use]
-    pub fn draws(&self, see_through: bool, inside: bool) -> Vec<Draw<'_>> {
+    pub fn draws(&self, transparency: bool, inside: bool) -> Vec<Draw<'_>> {
         self.placements
             .iter()
             .enumerate()
             .filter(|(_, p)| {
-                is_see_through(&self.materials_cpu[self.meshes[p.mesh].material], self.refraction) == see_through
+                is_transparent(&self.materials_cpu[self.meshes[p.mesh].material], self.refraction) == transparency
             })
             .filter(|(_, p)| self.meshes[p.mesh].index_count > 0)
             .map(|(instance, placement)| self.draw(instance as u32, placement, inside))
             .collect()
     }
 
-    /// The draws of all surfaces that shadow maps hold, from both sides, as a ray to a light stops at either: those whose box
-    /// is seen, by its middle and half extent in the world.
+    /// The draws of all surfaces in shadow maps, without culling, as a shadow ray stops at either side; only instances whose
+    /// world-space bounding box (centre, half extent) passes `is_seen`.
     #[must_use]
     pub fn casters(&self, is_seen: impl Fn(DVec3, DVec3) -> bool) -> Vec<Draw<'_>> {
         let material = |p: &Placement| &self.materials_cpu[self.meshes[p.mesh].material];
@@ -430,7 +433,7 @@ impl SceneOnDevice {
                 Draw {
                     pages: if masked { draw.pages } else { 0 },
                     constants: has.words(),
-                    // Position, both texture coordinates, colour.
+                    // Position, both texture coordinate sets, colour.
                     streams: [0, 3, 4, 5].map(|i| draw.streams[i]).to_vec(),
                     cull_back: false,
                     ..draw
@@ -464,7 +467,7 @@ impl SceneOnDevice {
             first_index: mesh.first_index,
             index_count: mesh.index_count,
             instance,
-            // A volume's boundary is crossed once: KHR_materials_volume gives double sidedness no effect.
+            // The boundary of a closed mesh is crossed once, so KHR_materials_volume ignores double sidedness there.
             cull_back: (!material.double_sided || (material.thickness > 0.0 && !placement.sheet))
                 && !(inside && self.refraction && material.transmission > 0.0),
             clockwise: placement.mirrors(),
@@ -479,13 +482,13 @@ fn same_pages(textures: &Textures, a: &Material, b: &Material) -> bool {
     })
 }
 
-/// What a material's textures are bound to: slots, and what is in them.
+/// Entries of a material's texture set: slots and resources.
 fn pages_of<'a>(textures: &'a Textures, material: &Material) -> Vec<(u32, Resource<'a>)> {
     let slots = texture_slots(material).into_iter().enumerate();
     slots.map(|(slot, (texture, meaning))| (slot as u32, textures.sampled(texture, meaning).into())).collect()
 }
 
-/// The texels of all materials, as shaders/lib/material.glsl reads them: constants, texture slots, lobes.
+/// The texels of all materials in the layout of shaders/lib/material.glsl: constants, texture slots, lobes.
 fn material_table(
     materials: impl Iterator<Item = (share::Material, [LobeOf; lobe::COUNT])>,
     slots: &[[u32; 4]],
@@ -500,7 +503,7 @@ fn material_table(
     table
 }
 
-/// Two texels: row of u, layer | row of v, coordinate set.
+/// Two texels of a texture slot: row of u, layer | row of v, coordinate set.
 fn shared_slot(texture: Option<TextureRef>, textures: &Textures, meaning: Meaning) -> [[f32; 4]; 2] {
     let Some(texture) = texture else { return [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]] };
     let (m, t) = (texture.uv_transform.matrix2, texture.uv_transform.translation);
@@ -508,7 +511,7 @@ fn shared_slot(texture: Option<TextureRef>, textures: &Textures, meaning: Meanin
     [[m.x_axis.x, m.y_axis.x, t.x, layer], [m.x_axis.y, m.y_axis.y, t.y, texture.uv_set as f32]]
 }
 
-/// The rung of the knob.
+/// The method of spectral upsampling that the knob selects.
 fn upsampling(knobs: &Knobs) -> Upsampling {
     match knobs.upsampling {
         rungs::Upsampling::JakobHanika => Upsampling::JakobHanika,
@@ -516,13 +519,13 @@ fn upsampling(knobs: &Knobs) -> Upsampling {
     }
 }
 
-/// The constants of a material. F0 of a dielectric is ((n − 1) / (n + 1))² tinted and scaled by KHR_materials_specular;
-/// the optical depth is −ln(attenuation colour) · thickness / attenuation distance (lecture A1, KHR_materials_volume). A
-/// grid of σ that is not marched, whose place is 0, adds its mean. In a band `shares` are those of red, green and blue in it.
+/// The constants of a material. F0 of a dielectric is ((n − 1) / (n + 1))², tinted and scaled by KHR_materials_specular.
+/// Optical depth is −ln(attenuation colour) · thickness / attenuation distance (lecture A1, KHR_materials_volume). A grid of
+/// σ that is not marched (`grid` is 0) adds its mean. In a band, `shares` are the band's shares of red, green and blue.
 fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32, shares: Option<[f64; 3]>) -> share::Material {
     let r = (m.ior - 1.0) / (m.ior + 1.0);
     let absorbs = knobs.absorption != rungs::Absorption::Off;
-    // attenuationDistance is in metres of the world, thickness in metres of the object.
+    // attenuationDistance is in world-space metres, thickness in object-space metres.
     let sigma = m.attenuation_color.map(|color| {
         let sigma = -color.max(1e-6).ln() / m.attenuation_distance;
         if absorbs && m.thickness > 0.0 && sigma > 0.0 { sigma } else { 0.0 }
@@ -550,7 +553,7 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32, shares:
         f0,
         roughness: m.roughness,
         sigma_thickness: of_grid(1.0).map(|sigma| sigma * m.thickness),
-        // What bends nothing mirrors nothing, at no angle.
+        // An interface between equal indices reflects nothing, at no angle.
         f90: if m.ior == 1.0 { 0.0 } else { m.specular },
         ior: m.ior,
         occlusion_strength: m.occlusion_strength,
@@ -572,8 +575,9 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32, shares:
     }
 }
 
-/// F0 and base colour from which shaders/lib/layers.glsl makes k_s and k_d of the scene again. B5 has no (L + V)² under its lobe, which is 4 at
-/// normal incidence. B6 draws of the ground the share that F0 leaves: divided by it where the sum of both receives no more than it is sent.
+/// F0 and base colour from which shaders/lib/layers.glsl reconstructs k_s and k_d of the scene. B5 lacks (L + V)² in the
+/// denominator of its lobe, which is 4 at normal incidence. B6 scales the diffuse base layer by the energy that F0 leaves, so
+/// the colour is divided by it where specular and diffuse together reflect no more than they receive.
 fn phong(m: &Material, knobs: &Knobs, f0: [f32; 3]) -> ([f32; 3], [f32; 3]) {
     let [red, green, blue, _] = m.base_color;
     let r = (m.ior - 1.0) / (m.ior + 1.0);
@@ -586,14 +590,14 @@ fn phong(m: &Material, knobs: &Knobs, f0: [f32; 3]) -> ([f32; 3], [f32; 3]) {
     }
 }
 
-/// The matrix of cofactors: what carries normals, up to its sign, without a division.
+/// The cofactor matrix: it transforms normals, up to a factor, without a division.
 #[must_use]
 pub fn cofactors(m: DMat3) -> DMat3 {
     DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
 }
 
-/// Normals transform by the cofactor matrix, which needs no division and survives a singular matrix; the sign of the
-/// determinant keeps them outside of mirrored objects, and a power of two keeps them in range (numerics.md 41).
+/// Normals transform by the cofactor matrix, which needs no division and tolerates a singular matrix. The determinant's sign
+/// keeps them outside of mirrored objects, and a power of two keeps them in range (numerics.md 41).
 fn shared_instance(placement: &Placement, eye: DVec3, material: usize) -> share::Instance {
     let m = placement.world_from_object.matrix3;
     let determinant = m.determinant();
@@ -636,7 +640,7 @@ fn shared_light(light: &Light, color: [f32; 3], eye: DVec3, maps: LightMaps) -> 
     };
     let local = |position: DVec3, range: Option<f64>| share::Light {
         position: array(camera_relative([position, DVec3::ZERO], [eye, DVec3::ZERO])),
-        // A negative one tells the tile pass that the light reaches everywhere.
+        // A negative range marks a light without range for tiled light culling.
         range: range.map_or(-1.0, |range| range as f32),
         inv_range2: range.map_or(0.0, |range| (1.0 / (range * range)) as f32),
         spot_offset: 1.0,
@@ -649,8 +653,8 @@ fn shared_light(light: &Light, color: [f32; 3], eye: DVec3, maps: LightMaps) -> 
         LightKind::Directional { direction } => share::Light { position: array(-direction), ..shared },
         LightKind::Point { position, range } => local(position, range),
         LightKind::Spot { position, direction, range, inner, outer } => {
-            // KHR_lights_punctual's ramp: (cosθ − cos outer) / (cos inner − cos outer).
-            // Equal cones are a step, which a ramp of 1e-7 is to f32.
+            // The ramp of KHR_lights_punctual: (cosθ − cos outer) / (cos inner − cos outer).
+            // Equal cones are a step, which a ramp of 1e-7 represents in f32.
             let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-7);
             share::Light {
                 axis: array(direction),
@@ -662,18 +666,18 @@ fn shared_light(light: &Light, color: [f32; 3], eye: DVec3, maps: LightMaps) -> 
     }
 }
 
-/// The shadow maps of a light.
+/// The shadow maps of a light, in the light table.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct LightMaps {
-    /// Texel of the first in the table of lights.
+    /// Texel index of the light's first shadow map in the light table.
     pub(crate) first: usize,
-    /// 1 or 6; 0 where there are none.
+    /// Number of shadow maps: 1, or 6 for a cube; 0 without any.
     pub(crate) count: u32,
-    /// Depth is near/z, with an infinite far plane; else its planes are those around the scene.
+    /// Whether depth is near/z with an infinite far plane; otherwise the planes enclose the scene.
     pub(crate) infinite_far: bool,
 }
 
-/// A medium as rays keep it (shaders/lib/media.glsl): its priority, and which material it is.
+/// A medium in the ray's list of media (shaders/lib/media.glsl): priority of nested dielectrics, and material index plus 1.
 #[must_use]
 pub fn medium(material: &Material, index: usize) -> u32 {
     let priority = (material.priority.clamp(-0x7fff, 0x7fff) + 0x8000) as u32;
@@ -718,7 +722,7 @@ mod tests {
                 let t = world_from_object.transform_vector3(t).normalize();
                 assert!(n.dot(t).abs() < 1e-6, "{scale}: {}", n.dot(t));
             }
-            // Outside stays outside: the transform of a point just above the surface is on the normal's side.
+            // Normals stay outside: the transform of a point just above the surface is on the normal's side.
             assert!(n.dot(world_from_object.transform_vector3(normal)) > 0.0, "{scale}");
             assert_eq!(instance.rel_from_object[3], [0.0, -1.0, 0.0]);
             assert_eq!(instance.handedness < 0.0, scale.x * scale.y * scale.z < 0.0);

@@ -1,5 +1,7 @@
-//! What all programs of a renderer share: the descriptor sets of the scene, and the specialization constants of
-//! `shaders/lib/`. Both are filled in here and nowhere else.
+//! Shared state of all programs of a renderer: the scene's descriptor sets, and the specialization constants of
+//! `shaders/lib/`. No other file fills them.
+//!
+//! Read shaders/README.md; the Vulkan specification, sections Descriptor Sets and Specialization Constants.
 
 use std::sync::Arc;
 
@@ -13,23 +15,23 @@ use crate::plan::{Attenuation, Knobs, March, Plan};
 pub use crate::shader::Library;
 use crate::shader::{PATHS, SCENE, lib};
 
-/// What the device holds of a scene.
+/// The device resources of a scene.
 #[derive(Clone, Copy)]
 pub struct OnDevice<'a> {
-    /// The camera's buffer.
+    /// The camera's uniform buffer.
     pub camera: &'a Buffer,
     /// Materials, lights, instances, textures.
     pub scene: &'a SceneOnDevice,
-    /// What rays go through.
+    /// The BVH and the tables of rays and paths.
     pub rays: &'a RaysOnDevice,
-    /// Depths that lights see.
+    /// Shadow maps.
     pub shadow_depth: Sampled<'a>,
-    /// Light from all around.
+    /// The environment map.
     pub environment: &'a EnvironmentOnDevice,
 }
 
 impl<'a> OnDevice<'a> {
-    /// The descriptor set `scene`: slots and what is in them, file by file of `shaders/lib/`.
+    /// Entries of the descriptor set `scene`: slots and resources, by file of `shaders/lib/`.
     fn scene_entries(&self) -> Vec<(u32, Resource<'a>)> {
         let &Self { camera, scene, rays, shadow_depth, environment } = self;
         [
@@ -55,17 +57,17 @@ impl<'a> OnDevice<'a> {
         .concat()
     }
 
-    /// The descriptor set `paths`: what they draw from.
+    /// Entries of the descriptor set `paths`: light sampling and path guiding.
     fn path_entries(&self) -> Vec<(u32, Resource<'a>)> {
-        let RaysOnDevice { emitters, aims, .. } = self.rays;
+        let RaysOnDevice { emitters, guiding, .. } = self.rays;
         [
-            lib::emitters::Paths { emitters: &emitters.table, sky_shares: &emitters.sky }.entries(),
-            lib::aims::Paths { aim_cells: &aims.cells, aims: &aims.balls }.entries(),
+            lib::emitters::Paths { emitters: &emitters.table, environment_cdf: &emitters.sky }.entries(),
+            lib::path_guiding::Paths { guiding_cells: &guiding.cells, guiding_spheres: &guiding.spheres }.entries(),
         ]
         .concat()
     }
 
-    /// Writes the sets.
+    /// Writes the two descriptor sets.
     ///
     /// # Errors
     /// When memory is short.
@@ -76,14 +78,14 @@ impl<'a> OnDevice<'a> {
         ])
     }
 
-    /// The sets as they were written, for a frame.
+    /// The descriptor sets with their resources, for a frame.
     #[must_use]
     pub fn bind(&self, [scene, paths]: &'a [DescriptorSet; 2]) -> Vec<BoundSet<'a>> {
         vec![scene.bind(self.scene_entries()), paths.bind(self.path_entries())]
     }
 
-    /// What programs are specialised by; `tile_words` are the words of a tile's list of lights. A pass that wants something else
-    /// changes its copy, and says why.
+    /// Specialization constants of `shaders/lib/`; `tile_words` is the number of words of a tile's light mask. A pass that needs
+    /// other values changes its own copy and states why.
     #[must_use]
     pub fn library(&self, plan: &Plan, knobs: &Knobs, tile_words: u32) -> Library {
         let &Self { scene, rays, .. } = self;
@@ -94,19 +96,19 @@ impl<'a> OnDevice<'a> {
         let shadow_rays = with.shadows;
         Library {
             arithmetic: lib::arithmetic::Constants { arithmetic: knobs.arithmetic as u32 },
-            aims: lib::aims::Constants { aimed: paths.aimed },
-            boundary: lib::boundary::Constants { touching: rays.constants.touching },
-            bsdf: lib::bsdf::Constants { frosted: with.frosted },
+            path_guiding: lib::path_guiding::Constants { path_guiding: paths.guided },
+            boundary: lib::boundary::Constants { coincident_interfaces: rays.constants.touching },
+            bsdf: lib::bsdf::Constants { rough_transmission: with.rough_transmission },
             emitters: lib::emitters::Constants {
                 emitters: emitters.count,
-                emitter_steps: halvings(emitters.count),
+                emitter_search_steps: binary_search_steps(emitters.count),
                 punctual_emitters: emitters.punctual,
-                shaped_emitters: paths.shaped && emitters.punctual,
-                emitting_triangles: emitters.triangles,
-                emitting_sky: emitters.rows > 0,
-                sky_columns: emitters.columns,
-                sky_rows: emitters.rows,
-                sky_steps: halvings(emitters.columns.max(emitters.rows)),
+                area_emitters: paths.shaped && emitters.punctual,
+                emissive_triangles: emitters.triangles,
+                sampled_environment: emitters.rows > 0,
+                cdf_columns: emitters.columns,
+                cdf_rows: emitters.rows,
+                cdf_search_steps: binary_search_steps(emitters.columns.max(emitters.rows)),
             },
             environment: lib::environment::Constants { sky: plan.sky, environment: plan.environment },
             fresnel: lib::fresnel::Constants { faint_conductors: plan.faint_conductors },
@@ -124,7 +126,7 @@ impl<'a> OnDevice<'a> {
             normals: lib::normals::Constants { normals: plan.stored.normals as u32 },
             layers: lib::layers::Constants { transmissive: with.transmissive },
             lighting: lib::lighting::Constants {
-                // Where tiles list them, no pixel goes through all of them.
+                // With tiled light culling no pixel loops over all local lights.
                 local_lights: if plan.tiles { 0 } else { plan.local_lights },
                 tile_words,
                 ambient: plan.ambient,
@@ -135,10 +137,10 @@ impl<'a> OnDevice<'a> {
                 true => lib::loops::Constants::default(),
                 false => lib::loops::Constants { loop_budget: u32::MAX },
             },
-            path: lib::path::Constants { lighting_surfaces: paths.emitting, light_places: knobs.lights.places() },
+            path: lib::path::Constants { emissive_lights: paths.emitting, light_samples: knobs.lights.places() },
             path_state: lib::path_state::Constants {
                 keeps_media: with.transmissive,
-                keeps_after: rays.constants.touching,
+                keeps_t_min: rays.constants.touching,
             },
             primary: lib::primary::Constants { in_medium: rays.inside() },
             punctual: lib::punctual::Constants { directional_lights: plan.directional_lights },
@@ -183,12 +185,12 @@ impl<'a> OnDevice<'a> {
     }
 }
 
-/// Halvings that single out one of `count`.
-fn halvings(count: u32) -> u32 {
+/// Steps of a binary search among `count` entries.
+fn binary_search_steps(count: u32) -> u32 {
     count.next_power_of_two().trailing_zeros()
 }
 
-/// A rung reaches the shaders as its place among its knob's, and they give each place a name.
+/// The shaders receive a rung as its index in its knob; these assertions tie the indices to the shaders' names.
 const _: () = {
     use crate::plan::rungs::{Brdf, Fresnel, Normals, Quadrature};
     assert!(Brdf::BlinnPhong as u32 == lib::surface::BRDF_BLINN_PHONG);

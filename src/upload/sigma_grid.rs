@@ -1,4 +1,6 @@
-//! Grids of σ on the device (shaders/lib/sigma_grid.glsl).
+//! Grids of σ on the device: heterogeneous media as voxels of the absorption coefficient (shaders/lib/sigma_grid.glsl).
+//!
+//! Read pbrt (4th ed.), section 11.4 (grid media), and docs/decisions/absorption.md.
 
 use std::sync::Arc;
 
@@ -12,22 +14,22 @@ use crate::plan::Plan;
 use crate::scene::{self, Scene};
 use crate::share::{SigmaCell, SigmaGrid};
 
-/// Texels of all grids: places in them are kept as f32.
+/// Largest number of texels of all grids: indices into them are stored as f32, which is exact up to 2^24.
 const MOST_TEXELS: usize = 1 << 24;
 
-/// The grids that are marched; next to nothing where none is.
+/// The grids of heterogeneous media; a dummy where the plan marches none.
 pub struct SigmaGrids {
-    /// A [`SigmaGrid`] each with its [`SigmaCell`]s.
+    /// For each grid a header [`SigmaGrid`], then its [`SigmaCell`]s.
     pub texels: Buffer,
-    /// Per material the first texel of its grid + 1, or 0.
+    /// Per material, index of the first texel of its grid plus 1, or 0 without a grid.
     pub places: Vec<u32>,
 }
 
 impl SigmaGrids {
-    /// Uploads the grids of a scene each of whose instances has a medium of its own; rays are told from `anchor`.
+    /// Uploads the grids. Every instance must have a medium of its own; `anchor` is the origin of bvh space.
     ///
     /// # Errors
-    /// When they do not fit the device.
+    /// When the grids do not fit the device.
     pub fn new(device: &Arc<Device>, plan: &Plan, scene: &Scene, anchor: DVec3) -> Result<Self> {
         let mut texels: Vec<[f32; 4]> = Vec::new();
         let mut places = vec![0; scene.materials.len()];
@@ -50,7 +52,7 @@ impl SigmaGrids {
 }
 
 fn append(texels: &mut Vec<[f32; 4]>, grid: &scene::SigmaGrid, grid_from_bvh: DAffine3) {
-    // A body scaled flat has no inside, and no inverse.
+    // A mesh with a singular transform has no interior and no inverse.
     let place = if grid_from_bvh.is_finite() { grid_from_bvh } else { DAffine3::ZERO };
     let (m, t) = (place.matrix3.transpose(), place.translation);
     let row = |row: DVec3, shift: f64| row.extend(shift).as_vec4().to_array();

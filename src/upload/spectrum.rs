@@ -1,4 +1,7 @@
-//! The band of wavelengths that a frame shows (shaders/lib/spectrum.glsl).
+//! The band of wavelengths of a frame in spectral rendering (shaders/lib/spectrum.glsl).
+//!
+//! Read pbrt (4th ed.), chapter 4; Jakob and Hanika 2019, "A Low-Dimensional Function Space for Efficient Spectral
+//! Upsampling"; docs/decisions/spectra.md.
 
 use std::sync::Arc;
 
@@ -13,26 +16,27 @@ use crate::spectra::{Band, Grid, RGB_FROM_XYZ, shares};
 /// Texels before the grid.
 const HEADER: usize = lib::spectrum::GRID_AT as usize;
 
-/// What a band is to colours; a texel that is never read where a picture is made of three colours.
+/// Conversion of RGB colours to a band of wavelengths; a dummy texel for RGB rendering.
 pub struct SpectrumOnDevice {
-    /// As shaders/lib/spectrum.glsl reads it.
+    /// Header and grid, in the layout of shaders/lib/spectrum.glsl.
     pub texels: Buffer,
     grid: Option<&'static Grid>,
-    /// The grid's texels for each band that was shown, so that each is averaged once.
+    /// Averaged grid texels of the bands that were uploaded before, so that each band is averaged once.
     known: Vec<(Band, Vec<[f32; 4]>)>,
 }
 
-/// What all programs that see colours are specialised by.
+/// Specialization constants of all programs that read colours.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SpectrumConstants {
-    /// The picture is drawn band by band.
+    /// Spectral rendering: one frame per band of wavelengths.
     pub spectral: bool,
-    /// Corners a side of the grid; 0: there is none.
+    /// Grid points per side of the upsampling grid; 0 without a grid.
     pub grid_side: u32,
 }
 
 impl SpectrumOnDevice {
-    /// Of a picture that is drawn by wavelengths or not; with a grid where reflectances are fitted to what varies.
+    /// Buffers for spectral or RGB rendering, with an upsampling grid if `fitted`: reflectances of textures or vertex colours
+    /// are then fitted sigmoids.
     ///
     /// # Errors
     /// When memory is short.
@@ -45,14 +49,14 @@ impl SpectrumOnDevice {
         Ok(Self { texels, grid, known: Vec::new() })
     }
 
-    /// For [`SpectrumConstants`].
+    /// The specialization constants for this spectrum.
     #[must_use]
     pub fn constants(&self, spectral: bool) -> SpectrumConstants {
         SpectrumConstants { spectral, grid_side: self.grid.as_ref().map_or(0, |grid| grid.side) }
     }
 
-    /// Writes what colours are in a slice.
-    pub fn show(&mut self, slice: &Slice) {
+    /// Uploads the conversion of RGB colours to a slice of wavelengths.
+    pub fn upload_band(&mut self, slice: &Slice) {
         let band = &slice.band;
         let column = |v: [f64; 3]| [v[0] as f32, v[1] as f32, v[2] as f32, 0.0];
         let [red, green, blue] = slice.light_from_rgb.map(column);
@@ -66,7 +70,7 @@ impl SpectrumOnDevice {
     }
 }
 
-/// The corners of each cell's side of least blue.
+/// The grid's cells: each texel holds the four corners of a cell's face with the smaller blue.
 fn cells(side: u32, corners: &[f32]) -> Vec<[f32; 4]> {
     let at = |r: u32, g: u32, b: u32| corners[((b * side + g) * side + r) as usize];
     let mut cells = Vec::with_capacity((side * (side - 1) * (side - 1)) as usize);
@@ -80,7 +84,7 @@ fn cells(side: u32, corners: &[f32]) -> Vec<[f32; 4]> {
     cells
 }
 
-/// Columns of what makes linear Rec. 709 of X, Y, Z.
+/// Columns of the matrix from CIE XYZ to linear Rec. 709.
 #[must_use]
 pub fn rgb_from_xyz() -> [[f32; 3]; 3] {
     std::array::from_fn(|column| std::array::from_fn(|row| RGB_FROM_XYZ[row][column] as f32))

@@ -1,4 +1,4 @@
-//! How tables of a scene come to the device.
+//! Uploads of tables: direct writes on a CPU device, a staging buffer and a copy elsewhere.
 
 use std::sync::Arc;
 
@@ -8,15 +8,15 @@ use half::f16;
 
 use crate::gpu::{Buffer, Device, Frame, Place, TooLarge};
 
-/// What `unpackHalf2x16` of GLSL reads.
+/// Two half floats in one word, the inverse of GLSL's `unpackHalf2x16`.
 pub(super) fn pack_half_2x16([x, y]: [f16; 2]) -> u32 {
     u32::from(x.to_bits()) | u32::from(y.to_bits()) << 16
 }
 
-/// A buffer with `data` where the device reads it fastest: written in place on a CPU device, staged on others.
+/// A buffer with `data` in the device's fastest memory: written directly on a CPU device, through a staging buffer on others.
 ///
 /// # Errors
-/// When it does not fit the device.
+/// When the data does not fit the device.
 pub fn upload<T: bytemuck::NoUninit>(
     device: &Arc<Device>,
     name: &str,

@@ -1,6 +1,7 @@
 //! Textures as pages: images of one size and transfer function are the layers of one array image, with mip levels.
 //!
-//! lavapipe cannot index arrays of sampled images, but a layer is only a coordinate.
+//! Read Real-Time Rendering (4th ed.), section 6.2 (mipmapping); the Vulkan specification, chapter Image Operations. lavapipe
+//! cannot index arrays of sampled images, but an array layer is only a coordinate.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -18,7 +19,7 @@ use crate::shader::{PAGES, lib};
 /// Texture slots of a material.
 pub const SLOTS: usize = lib::material::SLOTS as usize;
 
-/// The textures of a material by their slots.
+/// The textures of a material, indexed by texture slot.
 #[must_use]
 pub fn texture_slots(m: &Material) -> [(Option<TextureRef>, Meaning); SLOTS] {
     let mut slots = [(None, Meaning::Data); SLOTS];
@@ -31,29 +32,29 @@ pub fn texture_slots(m: &Material) -> [(Option<TextureRef>, Meaning); SLOTS] {
     slots
 }
 
-/// Every texture of a scene on the device.
+/// All textures of a scene on the device.
 pub struct Textures {
     pages: Vec<Image>,
     /// (image, meaning) → (page, layer).
     places: BTreeMap<(usize, Meaning), (usize, u32)>,
     white: Image,
-    /// For rays: the texels of all textures.
+    /// Texels of all textures and mip levels, for rays.
     pub texels: Buffer,
     for_rays: Texels,
-    made_of: Wanted,
+    made_of: TextureRequest,
     images: Vec<Mark<u8>>,
 }
 
-/// What textures are made for.
+/// The set of textures to upload; unchanged requests reuse the images.
 #[derive(PartialEq)]
-struct Wanted {
+struct TextureRequest {
     textures: BTreeSet<(usize, Meaning)>,
-    /// Images whose alpha hides texels: only there does it weigh them.
+    /// Images whose alpha can hide texels: only for them alpha weights the mip levels.
     faded: BTreeSet<usize>,
     for_rays: bool,
 }
 
-impl Wanted {
+impl TextureRequest {
     fn of(scene: &Scene, for_rays: bool) -> Self {
         let slots = scene.materials.iter().flat_map(texture_slots);
         let hides = scene.materials.iter().filter(|material| material.alpha_mode != AlphaMode::Opaque);
@@ -64,7 +65,7 @@ impl Wanted {
         }
     }
 
-    /// Marks of the images that are used, in their order.
+    /// Identity marks of the used images, in the order of image indices.
     fn images(&self, scene: &Scene) -> Vec<Mark<u8>> {
         let used: BTreeSet<usize> = self.textures.iter().map(|&(image, _)| image).collect();
         used.into_iter().map(|image| scene.images[image].rgba.mark()).collect()
@@ -72,14 +73,13 @@ impl Wanted {
 }
 
 impl Textures {
-    /// Uploads the images that the scene's materials name, and keeps a copy of all levels `for_rays`; their pixels are taken out of
-    /// the scene, image by image, so that only one decoded image exists twice at a time. What was made `before` of the same images
-    /// stays as it is.
+    /// Uploads the images of the scene's materials and, with `for_rays`, a buffer of all mip levels. Pixels are moved out of the
+    /// scene image by image, so only one decoded image exists twice at a time. `before` is reused when it holds the same images.
     ///
     /// # Errors
     /// When memory is short or an image is larger than the device allows.
     pub fn new(device: &Arc<Device>, scene: &mut Scene, for_rays: bool, before: Option<Self>) -> Result<Self> {
-        let wanted = Wanted::of(scene, for_rays);
+        let wanted = TextureRequest::of(scene, for_rays);
         let images = wanted.images(scene);
         match before.filter(|before| before.made_of == wanted && before.images == images) {
             Some(before) => Ok(before),
@@ -87,8 +87,8 @@ impl Textures {
         }
     }
 
-    fn upload(device: &Arc<Device>, scene: &mut Scene, made_of: Wanted, marks: Vec<Mark<u8>>) -> Result<Self> {
-        let Wanted { textures: wanted, faded, for_rays: keep_for_rays } = &made_of;
+    fn upload(device: &Arc<Device>, scene: &mut Scene, made_of: TextureRequest, marks: Vec<Mark<u8>>) -> Result<Self> {
+        let TextureRequest { textures: wanted, faded, for_rays: keep_for_rays } = &made_of;
         let mut for_rays = Texels::default();
         let mut groups: BTreeMap<(u32, u32, Meaning), Vec<usize>> = BTreeMap::new();
         for &(image, meaning) in wanted {
@@ -119,7 +119,7 @@ impl Textures {
                     usage: vk::ImageUsageFlags::SAMPLED,
                 },
             )?;
-            // Two images at a time: their mips are made in parallel, their staging memory is what is held at once.
+            // Two images at a time: their mip levels are computed in parallel, and their staging buffers exist together.
             for (chunk_index, chunk) in images.chunks(2).enumerate() {
                 let chains: Vec<Vec<u8>> = chunk
                     .par_iter()
@@ -171,13 +171,13 @@ impl Textures {
         Ok(Self { pages, places, white, texels, for_rays, made_of, images: marks })
     }
 
-    /// A slot of a material as rays read it.
+    /// The ray shaders' texel of a material's texture slot.
     #[must_use]
     pub fn slot(&self, texture: Option<TextureRef>, meaning: Meaning) -> [u32; 4] {
         self.for_rays.slot(texture, meaning)
     }
 
-    /// The page of a texture with its sampler; white where the material has none.
+    /// The page of a texture with its sampler; a white texel when the material has no texture.
     #[must_use]
     pub fn sampled(&self, texture: Option<TextureRef>, meaning: Meaning) -> Sampled<'_> {
         match texture.and_then(|t| self.places.get(&(t.image, meaning)).map(|place| (t, place))) {
@@ -193,10 +193,10 @@ impl Textures {
     }
 }
 
-/// All levels of all textures one after the other, for shaders that choose a texture by an index (shaders/lib/hit.glsl).
+/// All mip levels of all textures in one array, for shaders that select a texture by index (shaders/lib/hit.glsl).
 #[derive(Default)]
 struct Texels {
-    /// RGBA in bytes.
+    /// RGBA, one byte each.
     words: Vec<u32>,
     places: BTreeMap<(usize, Meaning), [u32; 3]>,
 }
@@ -208,7 +208,7 @@ impl Texels {
         self.words.extend(words.iter().map(|bytes| u32::from_le_bytes(*bytes)));
     }
 
-    /// A slot of a material: first texel | width, height | levels, flags << 8 | unused; zeros without a texture.
+    /// A texture slot: first texel | width, height | levels, flags << 8 | unused; zeros without a texture.
     fn slot(&self, texture: Option<TextureRef>, meaning: Meaning) -> [u32; 4] {
         let place = texture.and_then(|t| self.places.get(&(t.image, meaning)).map(|place| (t.sampler, place)));
         let Some((sampler, &[first, size, levels])) = place else { return [0; 4] };
@@ -264,7 +264,7 @@ fn linear_from_srgb() -> &'static [f32; 256] {
     })
 }
 
-/// sRGB byte of each of 2^14 linear values: half a step of the darkest bytes is 2.5 entries.
+/// sRGB byte for each of 2^14 + 1 linear values: half a step of the darkest bytes is 2.5 entries.
 fn srgb_from_linear() -> &'static [u8] {
     static TABLE: OnceLock<Vec<u8>> = OnceLock::new();
     TABLE.get_or_init(|| {
@@ -278,8 +278,8 @@ fn srgb_from_linear() -> &'static [u8] {
     })
 }
 
-/// The base level and all smaller ones: averages of 2x2 texels (3 along an odd side), colour in linear light; `weighted`
-/// by alpha, so that what is invisible does not fringe what is visible.
+/// The base level and all mip levels: box filter of 2x2 texels (3 along an odd side), colour in linear light. With `weighted`
+/// alpha weights the colours, so that invisible texels do not bleed into visible ones.
 fn mip_chain(rgba: &[u8], width: u32, height: u32, levels: u32, meaning: Meaning, weighted: bool) -> Vec<u8> {
     let offsets = level_offsets(width, height, levels);
     let bytes = offsets.last().copied().unwrap_or(0) as usize + 4;
@@ -291,7 +291,7 @@ fn mip_chain(rgba: &[u8], width: u32, height: u32, levels: u32, meaning: Meaning
         let (above, below) = chain.split_at_mut(offsets[level] as usize);
         let above = &above[offsets[level - 1] as usize..];
         below[..4 * nw * nh].par_chunks_mut(4 * nw).enumerate().for_each(|(y, row)| {
-            // An odd side of 2k + 1 becomes k: the last texel takes three.
+            // An odd side of 2k + 1 becomes k: the last texel averages three.
             let ys = if y + 1 == nh { (2 * y).min(h - 1)..h } else { 2 * y..2 * y + 2 };
             for (x, texel) in row.as_chunks_mut::<4>().0.iter_mut().enumerate() {
                 let xs = if x + 1 == nw { (2 * x).min(w - 1)..w } else { 2 * x..2 * x + 2 };
@@ -303,7 +303,7 @@ fn mip_chain(rgba: &[u8], width: u32, height: u32, levels: u32, meaning: Meaning
     chain
 }
 
-/// Mean of a block of texels of a level `width` texels wide.
+/// Mean of a block of texels of a level with `width` texels per row.
 fn average(
     level: &[u8],
     width: usize,
@@ -328,7 +328,7 @@ fn average(
         }
     }
     if weight == 0.0 {
-        // Nothing here is visible; its colour still bleeds into neighbours that are, when filtered.
+        // All texels are invisible; their colour still bleeds into visible neighbours when filtered.
         return average(level, width, xs, ys, meaning, false);
     }
     let mean = |sum: f32| sum / weight;
@@ -368,7 +368,7 @@ mod tests {
         let rgba = [[10, 200, 10, 255], [255, 0, 255, 0]].concat();
         let chain = mip_chain(&rgba, 2, 1, 2, Meaning::Color, true);
         assert_eq!(&chain[8..], [10, 200, 10, 128]);
-        // Where alpha means nothing it weighs nothing, and what is all invisible keeps its colour.
+        // Without weights alpha has no influence, and an all-invisible block keeps its colour.
         assert_eq!(mip_chain(&rgba, 2, 1, 2, Meaning::Color, false)[8], 188);
         let hidden = [[255, 255, 255, 0], [0, 0, 0, 0]].concat();
         assert_eq!(mip_chain(&hidden, 2, 1, 2, Meaning::Color, true)[8..], [188, 188, 188, 0]);

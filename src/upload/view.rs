@@ -1,4 +1,6 @@
-//! A camera as the device sees it: relative to the eye, reversed depth, one sub-pixel offset.
+//! Camera transforms for the device: camera-relative coordinates, reversed depth, one sub-pixel offset per sample.
+//!
+//! Read Real-Time Rendering (4th ed.), chapter 4 (projections, reversed depth), and docs/numerics.md for the roundings.
 
 use glam::{DVec2, DVec3};
 
@@ -8,7 +10,7 @@ use crate::share;
 /// Basis and projection of a camera for a picture of a given size, in f64.
 #[derive(Debug, Clone, Copy)]
 pub struct View {
-    /// Where the eye is, in world space.
+    /// The eye in world space, metres.
     pub eye: DVec3,
     /// Unit axes of the camera in world space: right, up, and the viewing direction.
     pub axes: [DVec3; 3],
@@ -47,30 +49,29 @@ impl View {
         }
     }
 
-    /// How wide a pixel is at distance 1, or at any distance where the camera is orthographic.
+    /// Width of a pixel at distance 1, or at any distance for an orthographic camera.
     #[must_use]
     pub fn pixel_angle(&self) -> f64 {
         2.0 * self.half.y / f64::from(self.size[1])
     }
 
-    /// How far a point that is rebuilt from depth may lie off its surface on a device that moves vertices by so many pixels before it
-    /// interpolates depth between them: metres, and parts of its largest coordinate.
+    /// Largest distance between a surface and its point reconstructed from depth, on a device that snaps vertices by up to
+    /// `pixels` pixels before it interpolates depth: in metres, and relative to the point's largest coordinate.
     ///
-    /// Depth d is linear on the screen. From vertices moved by up to s pixels, a pixel at x has d(x − δ), |δ| ≤ s: the depth of a point of
-    /// the surface that lies s pixels beside it, and so that distance from it at most.
+    /// Depth d is linear on the screen. With vertices snapped by up to s pixels, a pixel at x has d(x − δ), |δ| ≤ s. This is
+    /// the depth of a surface point at most s pixels away, which bounds the distance.
     #[must_use]
     pub fn snap(&self, pixels: f64) -> [f64; 2] {
         let off = pixels * self.pixel_angle();
-        // The distance is at most √3 of the largest coordinate.
+        // The distance of a point is at most √3 of its largest coordinate.
         if self.orthographic { [off, 0.0] } else { [0.0, 3.0_f64.sqrt() * off] }
     }
 
-    /// What the shaders get, for a sample `jitter` pixels off the pixel centres.
+    /// The camera block of the shaders, for a sample `jitter` pixels off the pixel centres.
     #[must_use]
     pub fn shared(&self, jitter: DVec2) -> share::Camera {
         let [right, up, forward] = self.axes;
-        // Rows of clip_from_rel. The picture's y points down in clip space, as Vulkan has it. A sample offset by +j means
-        // that the world moves by −j pixels.
+        // Rows of clip_from_rel. In Vulkan's clip space y points down. A sample at +j pixels moves the world by −j pixels.
         let shift = -2.0 * jitter / DVec2::new(f64::from(self.size[0]), f64::from(self.size[1]));
         let (w, w0) = if self.orthographic { (DVec3::ZERO, 1.0) } else { (forward, 0.0) };
         let x = right / self.half.x + w * shift.x;
@@ -105,8 +106,8 @@ impl View {
     }
 }
 
-/// A distance from the eye that clips nothing of a scene seen from outside and next to nothing from inside. Reversed floating
-/// depth has the same relative precision for every near distance (numerics.md 42), so small is free.
+/// A near distance that clips nothing of a scene seen from outside, and very little from inside. Reversed floating-point
+/// depth has the same relative precision for every near distance (numerics.md 42), so a small one costs nothing.
 fn near_distance(eye: DVec3, bounds: Option<Bounds>) -> f64 {
     let Some(bounds) = bounds else { return 0.01 };
     let radius = bounds.radius().max(1e-6);
@@ -114,8 +115,8 @@ fn near_distance(eye: DVec3, bounds: Option<Bounds>) -> f64 {
     (0.5 * outside).max(1e-5 * radius)
 }
 
-/// Sub-pixel offsets in (−0.5, 0.5)² of `count` samples: the centre for one, else the R2 sequence (Roberts 2018), which
-/// covers the pixel evenly for any count. The box they fill is the reconstruction filter.
+/// Sub-pixel offset in (−0.5, 0.5)² of sample `index` of `count`: the centre for a single sample, otherwise the R2
+/// low-discrepancy sequence (Roberts 2018), which covers the pixel evenly for any count. Box reconstruction filter.
 #[must_use]
 pub fn jitter(index: u32, count: u32) -> DVec2 {
     if count == 1 {

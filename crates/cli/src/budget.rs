@@ -1,4 +1,7 @@
-//! Rungs for a budget of time or error: out of what was measured of the same picture on this device, or is measured now.
+//! Chooses rungs for a time or error budget (`render --within`, `--max-error`) from measurements of `etalon cost`.
+//!
+//! The measurements are of the same picture on the same device, and are kept in the cache folder. Where there are none, a quick run
+//! measures first. See docs/cost.md, "Budgets of pictures".
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,52 +16,52 @@ use etalon::frame::{Rendered, Renderer, Settings};
 use etalon::gpu::DeviceInfo;
 use etalon::image::file;
 use etalon::image::png::Display;
-use etalon::plan::{Demand, Knobs};
+use etalon::plan::{ForcedEffects, Knobs};
 use etalon::scene::Camera;
 use etalon_cost::choose::{SPARE, at_most, most_exact, quickest, within};
 use etalon_cost::difference::Truth;
 use etalon_cost::reference::{NotMeasured, Refined};
-use etalon_cost::sitting::Bench;
 use etalon_cost::statistics::Interval;
-use etalon_cost::sweep::{Extent, Listener, Sweep};
+use etalon_cost::sweep::{Listener, Sweep, SweepExtent};
 use etalon_cost::table::{Point, Table};
+use etalon_cost::warm::Bench;
 
-/// Seconds for a table that nobody has asked for.
+/// Seconds of the quick run that measures where no table is kept.
 const QUICK_S: u32 = 30;
-/// Settings that are tried before the quickest is taken.
+/// Points that are timed before the fastest point is taken.
 const TRIALS: usize = 4;
-/// Rungs are chosen by what is drawn with these random numbers, whatever the picture's own.
+/// Random seed of all measurements; the seed of the picture does not change the choice.
 const SEED: u32 = 0;
-/// What is written of a run for later budgets; the table last.
+/// Files of a run that are kept for later budgets; the table is written last.
 const KEPT: [&str; 4] = ["reference.png", "reference.exr", "reference.json", "cost.json"];
 
-/// What a picture may take, or how wrong it may be.
+/// Limit for a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Budget {
     /// Milliseconds of GPU time.
     Within(f64),
-    /// Root mean squared error of displayed values against the scene's reference.
+    /// Root mean squared error of displayed values 0 to 1 against the scene's reference.
     MaxError(f64),
 }
 
-/// What was chosen, and what that gives up.
+/// The chosen rungs, their measurements, and the measurements of the picture drawn with them.
 #[derive(Clone, Serialize)]
 pub(super) struct Chosen {
     /// `within` or `max-error`.
     budget: &'static str,
-    /// Milliseconds, or a share of the range of displayed values.
+    /// Milliseconds, or a fraction of the range of displayed values.
     limit: f64,
-    /// The point of the table.
+    /// Name of the chosen point of the table.
     point: String,
-    /// GPU time that it took when it was measured.
+    /// Measured GPU time of the point, in milliseconds.
     gpu_ms: Interval,
-    /// Its error against the reference then.
+    /// Measured error of the point against the reference.
     error: Interval,
-    /// Whether the limit can be kept, as far as was measured.
+    /// Whether a measured point keeps the limit.
     possible: bool,
-    /// Knobs on other rungs than the reference's.
+    /// Knobs whose rungs differ from the reference.
     given_up: String,
-    /// GPU time that the picture took: the middle of three where the first took longer than the limit.
+    /// GPU milliseconds of the picture: the median of three renders where the first took longer than the limit.
     pub(super) took_ms: Option<f64>,
     /// Error of the picture against the reference.
     pub(super) found_error: Option<Interval>,
@@ -68,35 +71,36 @@ pub(super) struct Chosen {
     truth: Arc<Truth>,
 }
 
-/// All that a picture depends on beside its knobs, as a command line.
+/// The command line of a picture without its knobs: scene, camera, size, display and device.
 pub(super) fn command(scene: &SceneOptions, picture: &PictureOptions, device: &DeviceOptions) -> String {
     format!("etalon render {}", [scene.words(), picture.words(), device.words()].concat().join(" "))
 }
 
-/// Where tables of this picture on this device are kept: named by the command, all that is drawn, the device and the program.
+/// Cache folder of the measurements of a picture on a device. The name is a hash of the program version, the command, the scene
+/// contents, the device and its driver.
 fn folder(command: &str, contents: &str, info: &DeviceInfo) -> Option<PathBuf> {
     let version = env!("CARGO_PKG_VERSION");
     let known = [version, command, contents, &info.name, &info.driver, &info.version].join("\n");
     Some(file::cache_folder()?.join(format!("cost-{}", file::hash(known.as_bytes()))))
 }
 
-/// Where an earlier run of a picture left its reference.
+/// Cache folder with the reference of an earlier run of the same picture.
 pub(super) fn kept(command: &str, setup: &Setup) -> Option<PathBuf> {
     folder(command, &setup.contents(), setup.device.info())
 }
 
-/// What was measured of a picture before; `None` where nothing was.
+/// The kept table of a picture; `None` where it has not been measured.
 #[cfg(feature = "window")]
 pub(super) fn known(command: &str, contents: &str, info: &DeviceInfo) -> Option<Table> {
     let bytes = file::read(&folder(command, contents, info)?.join("cost.json")).ok()?;
     serde_json::from_slice(&bytes).ok()
 }
 
-/// Keeps a finished run's table for later budgets; a cache that cannot be written costs time later, nothing else.
+/// Copies the table and the reference of a finished run to the cache. Where the cache cannot be written, later budgets measure again.
 pub(super) fn keep(command: &str, setup: &Setup, from: &Path) {
     let Some(to) = folder(command, &setup.contents(), setup.device.info()) else { return };
     let copy = || -> Result<()> {
-        // A quick run's own account would not be that of this table.
+        // The run.json of a quick run does not describe this table.
         let _ = std::fs::remove_dir_all(&to);
         std::fs::create_dir_all(&to)?;
         for name in KEPT {
@@ -105,15 +109,15 @@ pub(super) fn keep(command: &str, setup: &Setup, from: &Path) {
         Ok(())
     };
     if let Err(error) = copy() {
-        tracing::info!("keeping the table for --within: {error:#}");
+        tracing::info!("the measurements cannot be kept for --within: {error:#}");
     }
 }
 
 impl Budget {
-    /// What the options say; `None` where they leave the rungs to the user.
+    /// The budget that the options give; `None` where the user chooses the rungs.
     ///
     /// # Errors
-    /// One sentence for a number that is none, and for what contradicts it.
+    /// One sentence for an invalid number, and for options that contradict the budget.
     pub(super) fn of(within: Option<&str>, picture: &PictureOptions) -> Result<Option<Self>> {
         let chosen = !picture.set.is_empty() || picture.model.is_some();
         if let Some(text) = within {
@@ -121,11 +125,8 @@ impl Budget {
             let Some(ms) = number.filter(|ms| *ms > 0.0 && ms.is_finite()) else {
                 bail!("--within {text}: expected milliseconds above 0, for example 8 or 8ms");
             };
-            ensure!(!chosen, "--within {text} contradicts --model and --set: it chooses the rungs");
-            ensure!(
-                picture.max_error.is_none(),
-                "--within {text} contradicts --max-error: the one or the other is the limit"
-            );
+            ensure!(!chosen, "--within {text} contradicts --model and --set: --within chooses the rungs itself");
+            ensure!(picture.max_error.is_none(), "--within {text} contradicts --max-error: give only one limit");
             return Ok(Some(Self::Within(ms)));
         }
         if chosen || picture.max_error.is_none() {
@@ -134,8 +135,8 @@ impl Budget {
         Ok(picture.max_error()?.map(Self::MaxError))
     }
 
-    /// Chooses rungs: of a limit of time those with the least error that keep it when they are tried, of one of error the quickest
-    /// that keep it. Where none do, those that come nearest.
+    /// Chooses rungs. A time limit gets the rungs with the least error that keep the limit when they are timed now; an error limit gets
+    /// the fastest rungs that keep it. Where no measured rungs keep the limit, the closest ones are chosen.
     ///
     /// # Errors
     /// When nothing can be measured.
@@ -147,10 +148,10 @@ impl Budget {
         settings: &Settings,
         steps: &Steps,
     ) -> Result<Chosen> {
-        // What no table depends on: parts beside the picture, effects that are not called for, other noise.
-        let demand = Demand::Scene;
-        let settings = Settings { max_error: None, demand, parts: Vec::new(), seed: SEED, ..settings.clone() };
-        let temporary = tempfile::tempdir().context("making a folder")?;
+        // No table depends on extra layers, forced effects or the seed.
+        let forced = ForcedEffects::None;
+        let settings = Settings { max_error: None, forced, parts: Vec::new(), seed: SEED, ..settings.clone() };
+        let temporary = tempfile::tempdir().context("creating a temporary folder")?;
         let kept = folder(command, &setup.contents(), setup.device.info())
             .filter(|kept| std::fs::create_dir_all(kept).is_ok());
         let folder = kept.unwrap_or_else(|| temporary.path().join("cost"));
@@ -158,7 +159,7 @@ impl Budget {
             Ok(known) => known,
             Err(_) => {
                 steps.tell(
-                    "nothing was measured of this picture on this device yet: measuring (etalon cost measures better)",
+                    "this picture has not been measured on this device: a quick measurement comes first (etalon cost measures more precisely)",
                 );
                 measure(&folder, [scene, command], options, setup, &settings, steps)?;
                 measured(&folder, &settings)?
@@ -172,7 +173,7 @@ impl Budget {
             Self::Within(ms) => ("within", ms),
             Self::MaxError(error) => ("max-error", error),
         };
-        let nothing = "nothing was measured: our mistake";
+        let nothing = "the table has no points: a bug of Etalon";
         let (point, possible) = match self {
             Self::Within(ms) => match first_that_fits(table, ms, bench)? {
                 Some(point) => (point, true),
@@ -197,10 +198,10 @@ impl Budget {
             truth: Arc::new(truth),
         };
         let Interval { median, low, high } = chosen.error;
-        let nearest = if possible { "" } else { ", which is nearest of what was measured" };
+        let nearest = if possible { "" } else { " (no measured choice keeps the limit; this one comes closest)" };
         steps.tell(&format!(
-            "{budget} {limit}: \"{}\"{nearest}: it took {:.1} ms ({:.1} … {:.1}) with an error of {:.2} % of the range ({:.2} … {:.2}) \
-             against the reference; given up: {}",
+            "{budget} {limit}: using \"{}\"{nearest}: {:.1} ms ({:.1} … {:.1}) and an error of {:.2} % ({:.2} … {:.2}) when measured; \
+             simplified: {}",
             chosen.point,
             chosen.gpu_ms.median,
             chosen.gpu_ms.low,
@@ -214,14 +215,14 @@ impl Budget {
     }
 }
 
-/// A table and its reference, as they were kept.
+/// Reads a kept table and its reference.
 fn measured(folder: &Path, settings: &Settings) -> Result<(Table, Truth)> {
     let table = serde_json::from_slice(&file::read(&folder.join("cost.json"))?)?;
-    let (refined, _) = Refined::read(folder)?.context("there is no reference")?;
+    let (refined, _) = Refined::read(folder)?.context("the folder has no reference")?;
     Ok((table, refined.truth(settings)))
 }
 
-/// Measures quickly, or as quickly as it can be done.
+/// Measures with a budget of [`QUICK_S`] seconds, or with the smallest budget that measures something.
 fn measure(
     folder: &Path,
     [scene, command]: [&str; 2],
@@ -237,7 +238,7 @@ fn measure(
             let _ = std::fs::remove_dir_all(folder);
         }
         setup.bench(options, settings.clone(), |bench| {
-            let extent = Extent { budget_s, reference_samples: None, shard: [1, 1] };
+            let extent = SweepExtent { budget_s, reference_samples: None, shard: [1, 1] };
             let sweep = Sweep {
                 bench,
                 folder,
@@ -263,14 +264,14 @@ fn measure(
     file::write(&folder.join("cost.json"), serde_json::to_string_pretty(&table)?.as_bytes())
 }
 
-/// The rungs with the least error of those that keep a time: by the table, and by three pictures drawn now. A machine that is slower
-/// than when the table was measured is slower for all.
+/// The point with the least error that takes at most `ms` milliseconds, by the table and by the median of three renders now. If the
+/// machine is slower than when the table was measured, the same factor is assumed for all points.
 fn first_that_fits<'a>(table: &'a Table, ms: f64, bench: &Bench<'_>) -> Result<Option<&'a Point>> {
     let mut slower = 1.0_f64;
     for _ in 0..TRIALS {
         let Some(&point) = within(table, ms / slower).first() else { return Ok(None) };
-        let mut sitting = bench.sit(&point.rungs()?)?;
-        let times = [bench.time(&mut sitting)?, bench.time(&mut sitting)?, bench.time(&mut sitting)?];
+        let mut warm = bench.warm_up(&point.rungs()?)?;
+        let times = [bench.time(&mut warm)?, bench.time(&mut warm)?, bench.time(&mut warm)?];
         let found = Interval::of(&times);
         if found.median * SPARE <= ms {
             return Ok(Some(point));
@@ -281,8 +282,8 @@ fn first_that_fits<'a>(table: &'a Table, ms: f64, bench: &Bench<'_>) -> Result<O
 }
 
 impl Chosen {
-    /// Holds a picture against the reference, and its time against the limit: where it took longer than that, it is drawn twice more,
-    /// and the middle counts.
+    /// Measures the error of a picture against the reference, and its GPU time. Where the time is above the limit, the picture is drawn
+    /// twice more, and the median counts.
     ///
     /// # Errors
     /// When the picture cannot be drawn again.
@@ -307,17 +308,17 @@ impl Chosen {
         Ok(())
     }
 
-    /// What became of the budget: a sentence where it was not kept.
+    /// A sentence about a budget that the picture did not keep; `None` where it was kept.
     pub(super) fn broken(&self) -> Option<String> {
-        let drawn = if self.possible { "" } else { "; nothing that was measured keeps it, and this is the nearest" };
+        let drawn = if self.possible { "" } else { "; no measured rungs keep this limit, and these come closest" };
         match (self.budget, self.took_ms, self.found_error) {
             ("within", Some(ms), _) if ms > self.limit => {
-                Some(format!("--within {}: the picture takes {ms:.1} ms of GPU time{drawn}", self.limit))
+                Some(format!("--within {}: the picture took {ms:.1} ms of GPU time{drawn}", self.limit))
             }
             ("max-error", _, Some(error)) if error.median > self.limit || !self.possible => Some(format!(
-                "--max-error {}%: the picture's error is {:.2} % of the range ({:.2} … {:.2}){drawn}; --model global with --max-error \
-                 draws until its noise is small enough",
-                // As it was typed: without the digits that dividing by a hundred leaves behind.
+                "--max-error {}%: the picture's error is {:.2} % ({:.2} … {:.2}){drawn}; --model global with --max-error draws samples \
+                 until the noise is small enough",
+                // As typed: dividing by a hundred leaves further digits behind.
                 (1e8 * self.limit).round() / 1e6,
                 100.0 * error.median,
                 100.0 * error.low,

@@ -1,9 +1,9 @@
-//! Types of the library as values of options: a name each, and its documentation as help.
+//! Enums of the library as clap option values: the strum name of a variant is the value, its doc comment the help text.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use strum::{EnumMessage, VariantArray};
 
-/// One of the variants of a type.
+/// Parser for the variants of an enum.
 pub(super) fn one_of<T>() -> impl TypedValueParser<Value = T>
 where
     T: VariantArray + EnumMessage + Into<&'static str> + Copy + Send + Sync + 'static,

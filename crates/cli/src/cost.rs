@@ -1,4 +1,5 @@
-//! `etalon cost`: error against time for every rung that a scene calls for.
+//! `etalon cost`: measures the error and the GPU time of every rung that a scene calls for, and writes the report with the Pareto
+//! frontier. The measurements are made by the crate `etalon_cost`; docs/cost.md describes them.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -9,54 +10,54 @@ use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
 
 use super::budget::{command, keep, kept};
-use super::options::{DeviceOptions, Extent as Planned, PictureOptions, SceneOptions, shard};
+use super::options::{DeviceOptions, PictureOptions, PlanExtent as Planned, SceneOptions, shard};
 use super::print;
 use super::progress::{ProgressForm, Steps};
 use super::setup::Setup;
 use etalon::gpu::Severity;
 use etalon::image::file;
 use etalon::image::metric::AnyPicture;
-use etalon::scene::Reads;
+use etalon::scene::Prune;
 use etalon_cost::beside::Beside;
 use etalon_cost::compare::{Compared, compare_rungs};
 use etalon_cost::pace::Step;
 use etalon_cost::reference::NotMeasured;
 use etalon_cost::report;
-use etalon_cost::sweep::{Extent, Listener, Sweep, merge};
+use etalon_cost::sweep::{Listener, Sweep, SweepExtent, merge};
 use etalon_cost::table::Table;
 
-/// Price every approximation on a scene: error against the scene's own reference, beside GPU time
+/// Measure what each approximation costs in a scene: its error against the scene's reference, and its GPU time
 #[derive(Debug, Clone, Args)]
 pub struct CostArgs {
     #[command(flatten)]
     scene: SceneOptions,
-    /// Folder for report.html, cost.json, cost.csv and the pictures; a run that was interrupted there goes on
+    /// Folder for report.html, cost.json, cost.csv and the pictures; an interrupted run in this folder is continued
     #[arg(short, long, value_name = "DIR", required_unless_present_any = ["compare", "beside"])]
     output: Option<PathBuf>,
     #[command(flatten)]
     picture: PictureOptions,
     #[command(flatten)]
     device: DeviceOptions,
-    /// Seconds to be spent: they decide how many samples the reference has, and what there is no time for is left out
+    /// Time budget in seconds: it determines the samples of the reference; pictures for which there is no time are left out
     #[arg(long, value_name = "SECONDS", default_value_t = 240, value_parser = clap::value_parser!(u32).range(1..))]
     budget: u32,
-    /// Samples of the reference, whatever the budget
+    /// Samples of the reference, regardless of the budget
     #[arg(long, value_name = "N")]
     reference_samples: Option<u32>,
-    /// Draw only the I-th of N parts; each part needs a folder of its own, and --merge joins them
+    /// Draw only the I-th of N parts; each part needs its own folder, and --merge joins the folders
     #[arg(long, value_name = "I/N", value_parser = shard, requires = "reference_samples")]
     shard: Option<[u32; 2]>,
-    /// Join the parts of a run, in these folders, instead of measuring
+    /// Join the parts of a run from these folders instead of measuring
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["shard", "reference_samples", "compare"])]
     merge: Vec<PathBuf>,
-    /// Lay two finished runs of one scene side by side, such as those of two devices, instead of measuring
+    /// Compare two finished runs of one scene, for example on two devices, instead of measuring
     #[arg(long, value_names = ["DIR", "DIR"], num_args = 2, conflicts_with_all = ["shard", "reference_samples", "compare", "merge"])]
     beside: Vec<PathBuf>,
-    /// Hold a picture of another program against the reference too: OpenEXR or PNG of the same size
+    /// Also compare a picture of another program with the reference: OpenEXR or PNG of the same size
     #[arg(long, value_name = "FILE", conflicts_with_all = ["merge", "compare", "beside"])]
     judge: Vec<PathBuf>,
-    /// Price one approximation only: two pictures in turns, two lines and a verdict
-    #[arg(long, value_name = "KNOB=A,B", conflicts_with_all = ["shard", "reference_samples", "output", "budget"])]
+    /// Compare two rungs of one knob only: interleaved timing, two lines and a verdict; with -o also both pictures and their difference
+    #[arg(long, value_name = "KNOB=A,B", conflicts_with_all = ["shard", "reference_samples", "budget"])]
     compare: Option<String>,
     /// Print cost.json as well
     #[arg(long)]
@@ -69,7 +70,7 @@ pub struct CostArgs {
 /// Runs the command.
 ///
 /// # Errors
-/// One sentence with what was being done, to what, and the cause.
+/// One sentence with the action, its object and the cause.
 pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
     let output = args.output.clone().unwrap_or_default();
     if !args.merge.is_empty() {
@@ -88,15 +89,15 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
     let compared = args.compare.is_some();
     if !compared && (!args.picture.set.is_empty() || args.picture.model.is_some()) {
         bail!(
-            "--model and --set: cost chooses the rungs itself; with --compare KNOB=A,B they are those of all other knobs"
+            "--model and --set: cost chooses the rungs itself; only with --compare KNOB=A,B do they set the other knobs"
         );
     }
-    ensure!(args.picture.plan == Planned::Scene, "--plan: cost plans what the scene calls for");
+    ensure!(args.picture.plan == Planned::Scene, "--plan: cost always plans the effects that the scene calls for");
     ensure!(compared || args.output.is_some(), "--output: name a folder for the report");
-    ensure!(settings.max_error.is_none(), "--max-error: cost draws a reference and many pictures; it has none to end");
+    ensure!(settings.max_error.is_none(), "--max-error: cost draws many pictures and ends none of them by its error");
     let steps = Steps::new(args.progress, quiet);
     steps.step(&format!("loading {}", args.scene.scene), 1);
-    let setup = Setup::load(&args.scene, Reads::Everything, &args.device)?;
+    let setup = Setup::load(&args.scene, Prune::Nothing, &args.device)?;
     for warning in &setup.opened.warnings {
         tracing::warn!("{warning}");
     }
@@ -106,6 +107,15 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
         let compared = setup.bench(&args.scene, settings, |bench| compare_rungs(&bench, &knobs, wanted))?;
         drop(steps);
         validated(&setup)?;
+        if let Some(folder) = &args.output {
+            std::fs::create_dir_all(folder).with_context(|| format!("creating {}", folder.display()))?;
+            let [a, b] = compared.rungs.map(|rung| format!("{}-{}", compared.knob, rung.replace(':', "-")));
+            for (name, bytes) in [a, b, format!("{}-difference", compared.knob)].iter().zip(&compared.pictures) {
+                let path = folder.join(format!("{name}.png"));
+                file::write(&path, bytes)?;
+                print(&path.display().to_string())?;
+            }
+        }
         return say(args, &compared);
     }
     let contents = setup.contents();
@@ -122,7 +132,11 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
         let sweep = Sweep {
             bench,
             folder: &output,
-            extent: Extent { budget_s: args.budget, reference_samples: samples, shard: args.shard.unwrap_or([1, 1]) },
+            extent: SweepExtent {
+                budget_s: args.budget,
+                reference_samples: samples,
+                shard: args.shard.unwrap_or([1, 1]),
+            },
             command: &sized,
             scene: &args.scene.scene,
             contents: &contents,
@@ -157,7 +171,7 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
     Ok(done)
 }
 
-/// Time and error of the points that two tables have in common, and where their work differs.
+/// Prints time and error of the points that two tables share, and the work counts that differ.
 fn beside(args: &CostArgs, folders: [&PathBuf; 2]) -> Result<ExitCode> {
     let read = |folder: &PathBuf| -> Result<Table> {
         let path = folder.join("cost.json");
@@ -169,7 +183,7 @@ fn beside(args: &CostArgs, folders: [&PathBuf; 2]) -> Result<ExitCode> {
         ensure!(a == b, "--beside: two runs have different {what}, {a} and {b}");
     }
     let rows = Beside::of(&a, &b);
-    ensure!(!rows.is_empty(), "--beside: the two runs have no picture in common");
+    ensure!(!rows.is_empty(), "--beside: the two runs share no picture");
     if args.json {
         print(&serde_json::to_string_pretty(&rows)?)?;
         return Ok(ExitCode::SUCCESS);
@@ -198,10 +212,10 @@ fn beside(args: &CostArgs, folders: [&PathBuf; 2]) -> Result<ExitCode> {
         ))?;
     }
     print(&table.to_string())?;
-    // Of the picture that took longest: the whole list is in the JSON.
+    // Only the picture that took longest: the JSON has the whole list.
     let longest = rows.iter().filter(|row| !row.compiled.is_empty()).max_by(|x, y| x.gpu_ms[0].total_cmp(&y.gpu_ms[0]));
     if let Some(row) = longest {
-        print(&format!("\nWhat the compilers made of \"{}\", in their own words:", row.picture))?;
+        print(&format!("\nCompiler statistics of \"{}\", as the drivers report them:", row.picture))?;
         for program in &row.compiled {
             for (name, stages) in ["A", "B"].iter().zip(&program.stages) {
                 for stage in stages {
@@ -215,21 +229,21 @@ fn beside(args: &CostArgs, folders: [&PathBuf; 2]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The first Ctrl-C ends the run with what there is, the second at once.
+/// The first Ctrl-C ends the run after the picture in progress and keeps its results; the second ends the program at once.
 fn listen(stopped: &Arc<AtomicBool>) {
     let stopped = stopped.clone();
     let heard = ctrlc::set_handler(move || {
         if stopped.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        tracing::warn!("ending after this picture with what there is; Ctrl-C again ends at once");
+        tracing::warn!("stopping after this picture; results so far are kept; press Ctrl-C again to stop at once");
     });
     if let Err(error) = heard {
-        tracing::info!("listening to Ctrl-C: {error}");
+        tracing::info!("Ctrl-C cannot end the run early: {error}");
     }
 }
 
-/// What the validation layer calls an error fails the run.
+/// Fails the run on an error of the validation layer.
 fn validated(setup: &Setup) -> Result<()> {
     match setup.device.messages().into_iter().find(|message| message.severity == Severity::Error) {
         Some(message) => bail!("validation: {}", message.text),
@@ -237,33 +251,36 @@ fn validated(setup: &Setup) -> Result<()> {
     }
 }
 
-/// Two lines and a verdict.
+/// Prints a line for each rung and a verdict.
 fn say(args: &CostArgs, compared: &Compared) -> Result<ExitCode> {
     if args.json {
         print(&serde_json::to_string_pretty(compared)?)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let Compared { knob, rungs, gpu_ms, price, worst_pixel } = compared;
+    let Compared { knob, rungs, gpu_ms, price, worst_pixel, .. } = compared;
     let width = rungs.map(str::len).into_iter().max().unwrap_or_default();
     for (rung, ms) in rungs.iter().zip(gpu_ms) {
         let error = if *rung == price.to {
             let error = 100.0 * price.shown_delta.median.max(0.0).sqrt();
             format!("{error:.3} % of the range, FLIP {:.4}", price.flip_between)
         } else {
-            "compared with".to_owned()
+            "baseline".to_owned()
         };
         print(&format!("{knob}={rung:width$}  {:8.2} ms ({:.2} … {:.2})  {error}", ms.median, ms.low, ms.high))?;
     }
-    let worst =
-        if price.same { String::new() } else { format!("; most of it at pixel {},{}", worst_pixel.x, worst_pixel.y) };
-    print(&format!("{knob}={} instead of {} {}{worst}", price.to, price.from, price.verdict))?;
+    let worst = if price.same {
+        String::new()
+    } else {
+        format!("; largest difference at pixel {},{}", worst_pixel.x, worst_pixel.y)
+    };
+    print(&format!("{knob}={} instead of {}: {}{worst}", price.to, price.from, price.verdict))?;
     Ok(ExitCode::SUCCESS)
 }
 
 fn write(args: &CostArgs, output: &std::path::Path, table: &Table) -> Result<ExitCode> {
     file::write(&output.join("cost.csv"), &table.csv()?)?;
     file::write(&output.join("report.html"), report::page(table, &output.join("pictures"))?.as_bytes())?;
-    // Last: a folder with this file is a finished run.
+    // cost.json is written last: it marks a finished run.
     let json = serde_json::to_string_pretty(table)?;
     file::write(&output.join("cost.json"), json.as_bytes())?;
     if args.json {

@@ -1,4 +1,4 @@
-//! `etalon devices`: what Vulkan offers here, what is missing, what would be used.
+//! `etalon devices`: lists the Vulkan devices, the features that each lacks, and the device that Etalon uses by default.
 
 use std::process::ExitCode;
 
@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::print;
 use etalon::gpu::{Candidate, candidates};
 
-/// List the Vulkan devices, what they lack, and which one would be used.
+/// List the Vulkan devices, the features that they lack, and the device used by default
 #[derive(Debug, Clone, Args)]
 pub struct DevicesArgs {
     /// Print one JSON document
@@ -18,10 +18,10 @@ pub struct DevicesArgs {
 }
 
 #[derive(Serialize)]
-struct Document<'a> {
+struct DevicesJson<'a> {
     schema: &'static str,
     devices: &'a [Candidate],
-    /// Index of the device that would be used.
+    /// Index of the device used by default; `None` where every device lacks something.
     used: Option<usize>,
 }
 
@@ -34,7 +34,7 @@ pub fn run(args: &DevicesArgs) -> Result<ExitCode> {
     let used =
         (0..devices.len()).filter(|&i| devices[i].missing.is_empty()).min_by_key(|&i| (devices[i].info.rank(), i));
     if args.json {
-        let document = Document { schema: "etalon.devices/1", devices: &devices, used };
+        let document = DevicesJson { schema: "etalon.devices/1", devices: &devices, used };
         print(&serde_json::to_string_pretty(&document)?)?;
     } else {
         for (index, device) in devices.iter().enumerate() {
@@ -46,7 +46,7 @@ pub fn run(args: &DevicesArgs) -> Result<ExitCode> {
             }
         }
         if used.is_none() {
-            print("no usable Vulkan device (Debian: install mesa-vulkan-drivers for the software device)")?;
+            print("there is no usable Vulkan device; on Debian, mesa-vulkan-drivers provides a software device")?;
         }
     }
     Ok(if used.is_some() { ExitCode::SUCCESS } else { ExitCode::FAILURE })

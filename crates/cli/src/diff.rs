@@ -1,4 +1,4 @@
-//! `etalon diff A B`: how far apart two pictures are.
+//! `etalon diff A B`: compares two pictures by FLIP or another image metric.
 
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -12,8 +12,7 @@ use super::choices::one_of;
 use etalon::image::metric::{AnyPicture, Comparison, Metric, compare, map_rgba};
 use etalon::image::{file, png};
 
-/// Compare two pictures of the same size: two OpenEXR files in radiance, or two PNG, JPEG or WebP files in display
-/// values.
+/// Compare two pictures of the same size: two OpenEXR files by radiance, or two PNG, JPEG or WebP files by display values
 #[derive(Debug, Clone, Args)]
 pub struct DiffArgs {
     /// Reference picture
@@ -22,14 +21,14 @@ pub struct DiffArgs {
     /// Picture to judge
     #[arg(value_name = "B")]
     pub b: PathBuf,
-    /// Figure to print
+    /// Metric to print
     #[arg(long, value_parser = one_of::<Metric>(), default_value = Metric::Flip.name())]
     pub metric: Metric,
-    /// Exit with 1 when the value is above X; for psnr and ssim, which grow with likeness, when it is below X. Pictures
-    /// with NaN or infinite pixels fail every limit
+    /// Exit with code 1 if the value is above X; for psnr and ssim, which grow with similarity, if it is below X. Pictures with NaN or
+    /// infinite pixels fail every limit
     #[arg(long, value_name = "X", allow_negative_numbers = true)]
     pub max: Option<f64>,
-    /// Write the error of every pixel as PNG: FLIP in magma colours, else the absolute difference in grey (white is 1)
+    /// Write the error of each pixel as PNG: FLIP in magma colours, other metrics as absolute difference in grey (white is 1)
     #[arg(short, long, value_name = "FILE.png")]
     pub output: Option<PathBuf>,
     /// Print one JSON document instead of the number
@@ -39,10 +38,10 @@ pub struct DiffArgs {
 
 /// The document of `--json`, schema `etalon.diff/1`.
 #[derive(Debug, Serialize)]
-struct Document<'a> {
+struct DiffJson<'a> {
     schema: &'static str,
     metric: Metric,
-    /// Absent as a number (null) where it is infinite: psnr of equal pictures.
+    /// `null` where the value is infinite: psnr of equal pictures.
     value: Option<f64>,
     max: Option<f64>,
     pass: bool,
@@ -54,7 +53,7 @@ struct Document<'a> {
     height: u32,
     space: &'static str,
     non_finite: NonFinite,
-    worst_pixel: Worst,
+    worst_pixel: WorstDifference,
 }
 
 #[derive(Debug, Serialize)]
@@ -64,19 +63,19 @@ struct NonFinite {
 }
 
 #[derive(Debug, Serialize)]
-struct Worst {
+struct WorstDifference {
     x: u32,
     y: u32,
     error: f64,
 }
 
-/// Runs the command: the result to stdout, notes to stderr; exit 0 within the limit (or without one), 1 outside.
+/// Runs the command: the result goes to stdout, notes go to stderr. The exit code is 0 within the limit or without one, else 1.
 pub fn run(args: &DiffArgs) -> Result<ExitCode> {
     let (a, b) = (args.a.display().to_string(), args.b.display().to_string());
-    ensure!(!args.max.is_some_and(f64::is_nan), "--max is not a number");
+    ensure!(!args.max.is_some_and(f64::is_nan), "--max NaN: expected a number");
     if let Some(output) = &args.output {
         let png = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
-        ensure!(png, "the map {} cannot be written: only .png can", output.display());
+        ensure!(png, "--output {}: the error map can only be written as .png", output.display());
         file::check_writable(output)?;
     }
     let (first, second) = (AnyPicture::load(&args.a)?, AnyPicture::load(&args.b)?);
@@ -91,14 +90,14 @@ pub fn run(args: &DiffArgs) -> Result<ExitCode> {
     }
     for (path, count) in [(&a, found.non_finite[0]), (&b, found.non_finite[1])] {
         if count > 0 {
-            note(&format!("warning: {path}: pixels with NaN or infinity, left out of the value: {count}"));
+            note(&format!("warning: {path}: {count} pixels with NaN or infinity are left out of the value"));
         }
     }
     let line = if args.json { document(args, &a, &b, &found, pass)? } else { found.value.to_string() };
     let mut out = io::stdout().lock();
     let written = writeln!(out, "{line}").and_then(|()| out.flush());
     if let Err(error) = written
-        // A reader that has seen enough is no failure of the comparison.
+        // A closed pipe is no failure of the comparison.
         && error.kind() != io::ErrorKind::BrokenPipe
     {
         return Err(error).context("writing the result to stdout");
@@ -113,7 +112,7 @@ pub fn run(args: &DiffArgs) -> Result<ExitCode> {
 }
 
 fn document(args: &DiffArgs, a: &str, b: &str, found: &Comparison, pass: bool) -> Result<String> {
-    let document = Document {
+    let document = DiffJson {
         schema: "etalon.diff/1",
         metric: args.metric,
         value: found.value.is_finite().then_some(found.value),
@@ -126,12 +125,12 @@ fn document(args: &DiffArgs, a: &str, b: &str, found: &Comparison, pass: bool) -
         height: found.height,
         space: found.space,
         non_finite: NonFinite { a: found.non_finite[0], b: found.non_finite[1] },
-        worst_pixel: Worst { x: found.worst[0], y: found.worst[1], error: found.worst_error },
+        worst_pixel: WorstDifference { x: found.worst[0], y: found.worst[1], error: found.worst_error },
     };
     Ok(serde_json::to_string(&document)?)
 }
 
-/// A sentence to stderr; when nobody can read it there is nothing to do about it.
+/// Prints a sentence to stderr; a write error is ignored.
 fn note(sentence: &str) {
     let _ = writeln!(io::stderr().lock(), "{sentence}");
 }

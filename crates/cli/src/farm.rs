@@ -1,4 +1,4 @@
-//! `etalon farm`: job files for engines that split work, and a page about what their workers did.
+//! `etalon farm`: writes job files for render-farm engines, and a report about the workers. See docs/farm.md.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -13,65 +13,65 @@ use super::print;
 use etalon::image::file;
 use etalon_farm::account::{Account, Shift};
 use etalon_farm::frames::Frames;
-use etalon_farm::job::{Engine, Work};
+use etalon_farm::job::{Engine, JobWork};
 
-/// Write job files for engines that split work over machines, and account for what their workers did
+/// Write job files for engines that split work over machines, and a report about their workers
 #[derive(Debug, Clone, Args)]
 pub struct FarmArgs {
     #[command(subcommand)]
-    command: Command,
+    command: FarmCommand,
 }
 
 #[derive(Debug, Clone, Subcommand)]
-enum Command {
-    /// Write a file that an engine reads: tasks that each draw their share, and one that joins parts
+enum FarmCommand {
+    /// Write a job file for an engine: tasks that each draw a share, and a task that joins parts
     Job(JobArgs),
-    /// A page about processes: time line, scaling, devices; of parts, of `render --report` of sequences, of `merge --report`
+    /// Write an HTML page about the processes, with time line, scaling and devices, from parts and from reports of sequences and merges
     Report(ReportArgs),
 }
 
 #[derive(Debug, Clone, Args)]
 struct JobArgs {
-    /// What runs the tasks
+    /// Engine that runs the tasks
     #[arg(long, value_parser = one_of::<Engine>())]
     engine: Engine,
-    /// Tasks
+    /// Number of tasks
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), required_unless_present = "minutes")]
     tasks: Option<u32>,
-    /// Minutes that a task should take: as many tasks as that makes, by the seconds that --cost or --seconds says
+    /// Minutes that a task should take: the number of tasks follows from the seconds of --cost or --seconds
     #[arg(long, value_name = "MINUTES", conflicts_with = "tasks")]
     minutes: Option<f64>,
-    /// What `etalon cost` measured of this scene: the folder, or its cost.json
+    /// Measurements of this scene by `etalon cost`: the folder, or its cost.json
     #[arg(long, value_name = "DIR", requires = "minutes", conflicts_with = "seconds")]
     cost: Option<PathBuf>,
-    /// Seconds of one picture
+    /// Seconds that one picture takes
     #[arg(long, value_name = "SECONDS", requires = "minutes")]
     seconds: Option<f64>,
-    /// The program, as workers find it
+    /// Path of the program on the workers
     #[arg(long, value_name = "PATH", default_value = "etalon")]
     program: String,
-    /// The folder in which workers run it [default: this one]
+    /// Folder in which workers run the program [default: the current folder]
     #[arg(long, value_name = "DIR")]
     here: Option<PathBuf>,
-    /// The job file [default: standard output]
+    /// Job file to write [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Arguments of `etalon render`, after --
+    /// Arguments of `etalon render`, after `--`
     #[arg(last = true, required = true, value_name = "ARGUMENTS")]
     arguments: Vec<String>,
 }
 
 #[derive(Debug, Clone, Args)]
 struct ReportArgs {
-    /// Parts, and accounts of sequences and merged pictures
+    /// Parts, and reports of sequences and merged pictures
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// The page
+    /// HTML page to write
     #[arg(short, long, value_name = "FILE.html")]
     output: PathBuf,
 }
 
-/// `render` alone, to read its arguments as it does.
+/// The command line of `render`, to parse its arguments the same way.
 #[derive(Parser)]
 #[command(name = "etalon render", no_binary_name = true)]
 struct Render {
@@ -82,11 +82,11 @@ struct Render {
 /// Runs the command.
 ///
 /// # Errors
-/// One sentence with what was being done, to what, and the cause.
+/// One sentence with the action, its object and the cause.
 pub fn run(args: &FarmArgs) -> Result<ExitCode> {
     match &args.command {
-        Command::Job(job) => write_job(job),
-        Command::Report(report) => write_report(report),
+        FarmCommand::Job(job) => write_job(job),
+        FarmCommand::Report(report) => write_report(report),
     }?;
     Ok(ExitCode::SUCCESS)
 }
@@ -100,13 +100,13 @@ fn write_report(args: &ReportArgs) -> Result<()> {
     let account = Account::of(shifts)?;
     if account.devices.len() > 1 {
         let all: Vec<&str> = account.devices.keys().map(String::as_str).collect();
-        tracing::warn!("a mixed farm, of devices that round otherwise: {}", all.join("; "));
+        tracing::warn!("the workers used different devices, whose rounding may differ: {}", all.join("; "));
     }
     file::write(&args.output, account.page().as_bytes())?;
     print(&args.output.display().to_string())
 }
 
-/// Arguments without the options of these names and their values.
+/// Removes the options of these names and their values from the arguments.
 fn without(arguments: &[String], names: &[&str]) -> Vec<String> {
     let mut left = Vec::new();
     let mut all = arguments.iter();
@@ -129,10 +129,10 @@ fn without(arguments: &[String], names: &[&str]) -> Vec<String> {
 
 fn write_job(args: &JobArgs) -> Result<()> {
     args.output.iter().try_for_each(|path| file::check_writable(path))?;
-    // What it prints is the sentence about the mistake, as `etalon render` would have it.
+    // The error sentence is that of `etalon render`.
     let Render { render } = Render::try_parse_from(&args.arguments).map_err(|error| anyhow!("{}", error.render()))?;
     let sequence = &render.sequence;
-    ensure!(sequence.shard.is_none(), "--shard: the job file gives each task its share");
+    ensure!(sequence.shard.is_none(), "--shard: the job file gives each task its own share; leave this option out");
     let settings = render.render_settings()?;
     let frames = match (&sequence.frames, sequence.turntable) {
         (Some(frames), _) => Some(frames.clone()),
@@ -143,28 +143,28 @@ fn write_job(args: &JobArgs) -> Result<()> {
     let is_still = frames.is_none();
     ensure!(
         !is_still || sequence.cameras.is_empty(),
-        "--cameras: a job of several pictures is divided by frames; add --frames or --turntable"
+        "--cameras: several pictures are divided by frames; add --frames or --turntable"
     );
     ensure!(
         is_still || !render.output.is_empty(),
-        "name the files of the frames with -o, such as -o frame.{{frame:04}}.png"
+        "--output: name the files of the frames, for example -o frame.{{frame:04}}.png"
     );
     ensure!(
         is_still || !render.output.iter().any(|path| path.extension().is_some_and(|e| e == "apng")),
-        "an animated preview is made by one process, of all frames: run the command itself once more when they are there"
+        "--output: one process makes an animated preview from all frames; when they are drawn, run `etalon render` itself once more"
     );
     let seconds_of_task = args.minutes.map_or(300.0, |minutes| minutes * 60.0);
-    ensure!(seconds_of_task >= 1.0 && seconds_of_task.is_finite(), "--minutes: a task takes a second at least");
+    ensure!(seconds_of_task >= 1.0 && seconds_of_task.is_finite(), "--minutes: a task must take at least one second");
     let count = match (args.tasks, &args.cost, args.seconds) {
         (Some(count), _, _) => count,
         (None, Some(path), _) => {
             let seconds = seconds_by_cost(path, &settings)?;
-            tracing::info!("{seconds:.1} s a picture by {}", path.display());
+            tracing::info!("{seconds:.1} s per picture according to {}", path.display());
             tasks(seconds * pictures as f64, seconds_of_task)?
         }
         (None, None, Some(seconds)) => tasks(seconds * pictures as f64, seconds_of_task)?,
         (None, None, None) => {
-            bail!("--minutes: how long a picture takes is not known; add --cost DIR of `etalon cost`, or --seconds")
+            bail!("--minutes: the time of a picture is unknown; add --cost DIR of `etalon cost`, or --seconds")
         }
     };
     let count = if is_still { count } else { count.min(pictures as u32) };
@@ -172,14 +172,14 @@ fn write_job(args: &JobArgs) -> Result<()> {
     let name = name.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let here = match &args.here {
         Some(here) => here.clone(),
-        None => std::env::current_dir().context("looking for this folder")?,
+        None => std::env::current_dir().context("finding the current folder")?,
     };
     let mut outputs: Vec<String> = render.output.iter().map(|path| path.display().to_string()).collect();
     if is_still && outputs.is_empty() {
         outputs.push(format!("{name}.png"));
     }
     let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
-    let work = Work {
+    let work = JobWork {
         program: args.program.clone(),
         here: here.display().to_string(),
         arguments: if is_still { without(&args.arguments, &["-o", "--output"]) } else { args.arguments.clone() },
@@ -201,22 +201,23 @@ fn write_job(args: &JobArgs) -> Result<()> {
     }
 }
 
-/// As many as make tasks of so many seconds.
+/// Number of tasks of `of_task` seconds that `seconds` of work make, from 1 to 10,000.
 fn tasks(seconds: f64, of_task: f64) -> Result<u32> {
     ensure!(seconds.is_finite() && seconds > 0.0, "--seconds: expected a number above 0");
     Ok((seconds / of_task).ceil().clamp(1.0, 10_000.0) as u32)
 }
 
-/// Seconds that a picture of these knobs took when it was measured, scaled by pixels.
+/// Seconds of a picture with these knobs, from a measurement of `etalon cost`, scaled by pixels and samples.
 fn seconds_by_cost(path: &Path, settings: &etalon::frame::Settings) -> Result<f64> {
     let path = if path.is_dir() { path.join("cost.json") } else { path.to_owned() };
     let table: Value =
         serde_json::from_slice(&file::read(&path)?).with_context(|| format!("reading {}", path.display()))?;
     let place = path.display();
     let pixels = |size: [u32; 2]| f64::from(size[0]) * f64::from(size[1]);
-    let size: [u32; 2] = serde_json::from_value(table["size"].clone()).with_context(|| format!("{place}: its size"))?;
+    let size: [u32; 2] =
+        serde_json::from_value(table["size"].clone()).with_context(|| format!("{place}: reading \"size\""))?;
     let knobs = settings.knobs.list();
-    // Samples are proportional to time; all else has to be the same.
+    // Time is proportional to samples; all other knobs have to be equal.
     let same = |point: &&Value| {
         knobs
             .iter()
@@ -224,9 +225,9 @@ fn seconds_by_cost(path: &Path, settings: &etalon::frame::Settings) -> Result<f6
     };
     let all = table["points"].as_array().map_or(&[][..], Vec::as_slice);
     let point = all.iter().find(same).ok_or_else(|| {
-        anyhow!("{place} has no picture with these knobs; say --seconds, or run `etalon cost --budget` for longer")
+        anyhow!("{place} has no picture with these knobs; give --seconds, or run `etalon cost` with a larger --budget")
     })?;
-    let ms = point["gpu_ms"]["median"].as_f64().ok_or_else(|| anyhow!("{place}: a point without a time"))?;
+    let ms = point["gpu_ms"]["median"].as_f64().ok_or_else(|| anyhow!("{place}: a point has no time"))?;
     let samples: f64 = point["knobs"]["samples"].as_str().and_then(|text| text.parse().ok()).unwrap_or(1.0);
     Ok(ms * 1e-3 * f64::from(settings.knobs.samples.count()) / samples * pixels(settings.size) / pixels(size))
 }

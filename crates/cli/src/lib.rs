@@ -1,15 +1,19 @@
-//! The commands of the program, one module each.
+//! The subcommands of the program `etalon`, one module each, with what all of them share: error sentences and lines on stdout.
 
+pub mod arguments;
 mod budget;
 mod choices;
 pub mod cost;
 pub mod devices;
 pub mod diff;
+pub mod documents;
+pub mod eval;
 pub mod farm;
 pub mod merge;
 pub mod options;
 pub mod picture;
 pub mod plan;
+pub mod plot;
 pub mod progress;
 pub mod render;
 pub mod report;
@@ -29,8 +33,8 @@ use anyhow::{Context as _, Result};
 use etalon::gpu::{NotOpened, is_lost};
 use etalon::plan::{Refused, Setting};
 
-/// An error as one sentence, with the options of the command line in place of the settings of the library, and with the packages
-/// that bring what is missing.
+/// Formats an error chain as one sentence. Settings of the library are named as command-line options; where a part of Vulkan is
+/// missing, the sentence names the Debian packages that provide it.
 #[must_use]
 pub fn told(error: &anyhow::Error) -> String {
     let cause = |cause: &(dyn std::error::Error + 'static)| {
@@ -52,13 +56,14 @@ pub fn told(error: &anyhow::Error) -> String {
     error.chain().map(cause).collect::<Vec<_>>().join(": ")
 }
 
-/// Whether the same may succeed later, or elsewhere: the device was lost, a disk is full. Engines try such work again.
+/// Whether the same command may succeed later or on another machine: the device was lost, or a disk is full. Render-farm engines
+/// retry such tasks.
 #[must_use]
 pub fn is_worth_another_try(error: &anyhow::Error) -> bool {
     is_lost(error) || etalon::image::file::is_full(error)
 }
 
-/// Debian's packages that mend it.
+/// Debian packages that provide what is missing; `None` for every other error.
 fn packages(error: &NotOpened) -> Option<&'static str> {
     match error {
         NotOpened::NoLoader(_) => Some("libvulkan1, mesa-vulkan-drivers"),
@@ -68,13 +73,13 @@ fn packages(error: &NotOpened) -> Option<&'static str> {
     }
 }
 
-/// Tells an engine of Open Job Description why there is no picture.
+/// Prints the `openjd_fail` message of Open Job Description with the error text.
 pub fn fail_openjd(text: &str) {
     // The exit code follows in any case: a closed pipe is no error here.
     drop(print(&format!("openjd_fail: {}", text.replace('\n', " "))));
 }
 
-/// One line to stdout. A reader that has closed the pipe has seen enough: that is no error.
+/// Prints one line to stdout. A closed pipe (EPIPE) is no error: the reader has read enough.
 fn print(line: &str) -> Result<()> {
     match writeln!(io::stdout().lock(), "{line}") {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),

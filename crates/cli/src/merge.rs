@@ -1,4 +1,4 @@
-//! `etalon merge`: parts of a picture, drawn by several processes, to the bits of one run.
+//! `etalon merge`: joins the parts of a picture that several processes drew. The result is bit-identical to the picture of one process.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::options::DeviceOptions;
 use super::picture::{AovName, Format, format_of, layer_between};
 use super::print;
-use super::report::{Output, WorkFacts};
+use super::report::{WorkFacts, WrittenFile};
 use super::shard::display_settings;
 use etalon::frame::shown;
 use etalon::gpu::Device;
@@ -18,12 +18,12 @@ use etalon::image::halves::SampleError;
 use etalon::image::{Aov, Statistics, exr, file, png};
 use etalon_farm::identity::{Identity, device_name};
 use etalon_farm::join::{Joined, join};
-use etalon_farm::worker::Worker;
+use etalon_farm::worker::FarmWorker;
 
-/// Join the parts of a picture that `render --shard` wrote, to the bits of one run
+/// Join the parts that `render --shard` wrote into the picture that one run draws, bit for bit
 #[derive(Debug, Clone, Args)]
 pub struct MergeArgs {
-    /// The parts, in any order
+    /// Parts in any order
     #[arg(required = true, value_name = "PART")]
     parts: Vec<PathBuf>,
     /// Output file: .png (display) or .exr (scene-linear radiance); repeatable
@@ -31,14 +31,14 @@ pub struct MergeArgs {
     output: Vec<PathBuf>,
     #[command(flatten)]
     device: DeviceOptions,
-    /// Write a machine-readable account: error, work, workers
+    /// Write a JSON report: error, work, workers
     #[arg(long, value_name = "FILE.json")]
     report: Option<PathBuf>,
 }
 
-/// The account: schema `etalon.merge/1`.
+/// The document of `--report`, schema `etalon.merge/1`.
 #[derive(Debug, Serialize)]
-struct Account<'a> {
+struct MergeReport<'a> {
     schema: &'static str,
     identity: &'a Identity,
     samples: u32,
@@ -46,19 +46,19 @@ struct Account<'a> {
     error: Option<SampleError>,
     work: WorkFacts,
     image: Statistics,
-    workers: &'a [Worker],
-    outputs: Vec<Output>,
+    workers: &'a [FarmWorker],
+    outputs: Vec<WrittenFile>,
 }
 
 /// Runs the command.
 ///
 /// # Errors
-/// One sentence with the part that is missing, there twice, cut short or of another picture.
+/// One sentence with the part that is missing, duplicate, truncated or of another picture.
 pub fn run(args: &MergeArgs) -> Result<ExitCode> {
     let mut outputs: Vec<(&Path, Format)> = Vec::new();
     for path in &args.output {
         let format = format_of(path)?;
-        ensure!(!args.parts.contains(path), "--output {}: a part would be written over", path.display());
+        ensure!(!args.parts.contains(path), "--output {}: this file is one of the parts", path.display());
         file::check_writable(path)?;
         outputs.push((path, format));
     }
@@ -69,10 +69,10 @@ pub fn run(args: &MergeArgs) -> Result<ExitCode> {
         true => {
             let device = Device::open(&args.device.choice(), args.device.validate)?;
             let here = device_name(device.info());
-            // The tone curve is the device's as well.
+            // The device evaluates the tone curve too.
             ensure!(
                 joined.identity.device == here,
-                "the parts were drawn on \"{}\", and this device is \"{}\": it would round otherwise; -o FILE.exr needs no device",
+                "the parts were drawn on \"{}\", but this device is \"{}\" and may round differently; -o FILE.exr needs no device",
                 joined.identity.device.join(", "),
                 here.join(", ")
             );
@@ -91,11 +91,11 @@ pub fn run(args: &MergeArgs) -> Result<ExitCode> {
             _ => exr::encode_exr(&film, &aovs, &metadata(&joined))?,
         };
         file::write(path, &bytes)?;
-        written.push(Output { path: path.display().to_string(), hash: file::hash(&bytes) });
+        written.push(WrittenFile { path: path.display().to_string(), hash: file::hash(&bytes) });
         print(&path.display().to_string())?;
     }
     if let Some(path) = &args.report {
-        let account = Account {
+        let account = MergeReport {
             schema: "etalon.merge/1",
             identity: &joined.identity,
             samples: joined.samples,
@@ -110,21 +110,21 @@ pub fn run(args: &MergeArgs) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What the EXR of one run says of its making.
+/// Text attributes of the EXR, equal to those of one run.
 fn metadata(joined: &Joined) -> Vec<(String, String)> {
     super::picture::made(&joined.identity.name, joined.bands)
 }
 
-/// The layers that were asked for, in that order.
+/// The layers of `--aov`, in the order of the option.
 fn aovs(joined: &Joined) -> Result<Vec<Aov>> {
     let asked = joined.identity.settings.get("aov").map_or("", String::as_str);
     let names = AovName::value_variants().iter().copied();
-    // `[Normal, HalfA]`, as the parts were told.
+    // The parts store the option as `[Normal, HalfA]`.
     let words = asked.trim_matches(['[', ']']).split(", ").filter(|word| !word.is_empty());
     let mut all = Vec::new();
     for word in words {
         let Some(name) = names.clone().find(|name| format!("{name:?}") == word) else {
-            bail!("a layer {word} is not known")
+            bail!("the parts have an unknown layer {word}")
         };
         let title = name.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
         let known = joined.aovs.iter().find(|aov| aov.name == title).cloned();
@@ -136,7 +136,7 @@ fn aovs(joined: &Joined) -> Result<Vec<Aov>> {
                 halves.iter_mut().for_each(|half| background.lay_behind(half));
                 Some(layer_between(&halves, name))
             }
-            _ => bail!("the layer {title} is in none of the parts"),
+            _ => bail!("no part has the layer {title}"),
         });
     }
     Ok(all)

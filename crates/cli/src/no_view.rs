@@ -1,4 +1,4 @@
-//! `etalon view` of a build without the feature `window`.
+//! `etalon view` in a build without the feature `window`.
 
 use std::process::ExitCode;
 
@@ -12,13 +12,11 @@ pub struct ViewArgs {
     arguments: Vec<String>,
 }
 
-/// Says how to get a build that has it.
+/// Reports how to get a build with a window.
 ///
 /// # Errors
 /// Always.
 pub fn run(args: &ViewArgs) -> Result<ExitCode> {
     let arguments = args.arguments.join(" ");
-    bail!(
-        "view {arguments}: this build has no window; `./x run view {arguments}` makes one that has (cargo: feature `window`)"
-    )
+    bail!("view {arguments}: this build has no window; `./x run view {arguments}` builds one (cargo feature `window`)")
 }

@@ -1,4 +1,5 @@
-//! Options that several commands share, and what they mean.
+//! Command-line options that several subcommands share, and their conversion to cameras, environments and renderer settings. clap
+//! prints the doc comments of options as help texts.
 
 use std::path::PathBuf;
 
@@ -10,16 +11,16 @@ use super::choices::one_of;
 use etalon::frame::{Background, Settings, TileShare};
 use etalon::gpu::DeviceChoice;
 use etalon::image::tone::ToneMap;
-use etalon::plan::{Demand, Knobs, Model};
+use etalon::plan::{ForcedEffects, Knobs, Model};
 use etalon::scene::camera::{Camera, DEFAULT_FOV_Y};
 use etalon::scene::environment::Environment;
-use etalon::scene::{Ambience, LoadOptions, Reads, Scene};
+use etalon::scene::{AmbientLight, LoadOptions, Prune, Scene};
 use etalon_farm::job::word;
 
-/// When to colour something.
+/// When to print colour or progress.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum When {
-    /// On a terminal.
+    /// Only on a terminal.
     Auto,
     /// Always.
     Always,
@@ -27,103 +28,102 @@ pub enum When {
     Never,
 }
 
-/// How much is planned.
+/// Which effects a plan contains.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Extent {
-    /// What the scene calls for.
+pub enum PlanExtent {
+    /// Effects that the scene calls for.
     Scene,
     /// Every effect that the knobs allow.
     Full,
-    /// What the scene calls for, and what each of the others would have cost, measured.
+    /// Effects that the scene calls for, and a measured table of what each other effect would cost.
     ExplainCost,
 }
 
-impl Extent {
-    fn demand(self) -> Demand {
+impl PlanExtent {
+    fn forced(self) -> ForcedEffects {
         match self {
-            Self::Scene | Self::ExplainCost => Demand::Scene,
-            Self::Full => Demand::Full,
+            Self::Scene | Self::ExplainCost => ForcedEffects::None,
+            Self::Full => ForcedEffects::All,
         }
     }
 }
 
-/// What to draw, and from where.
+/// Scene, camera, animation time and environment.
 #[derive(Debug, Clone, Args)]
 pub struct SceneOptions {
-    /// A .glb, .gltf or .obj file, or study:NAME
+    /// A .glb, .gltf or .obj file, or a built-in scene as study:NAME
     #[arg(default_value = "study:etalon")]
     pub scene: String,
-    /// A camera of the file, by name or index [default: the first; else one that frames the scene]
+    /// Camera of the file, by name or index [default: the first camera; if the file has none, a camera that frames the scene]
     #[arg(long, value_name = "NAME|INDEX", conflicts_with_all = ["eye", "target", "up"])]
     pub camera: Option<String>,
     /// Eye position in metres
     #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
     pub eye: Option<DVec3>,
-    /// Point to look at [default: the scene's middle]
+    /// Point to look at [default: the middle of the scene]
     #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true, requires = "eye")]
     pub target: Option<DVec3>,
-    /// Direction that is up in the picture [default: 0,1,0]
+    /// Direction that points up in the picture [default: 0,1,0]
     #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true, requires = "eye")]
     pub up: Option<DVec3>,
-    /// Vertical field of view in degrees, for cameras that are not the file's [default: 40]
+    /// Vertical field of view in degrees, for cameras that do not come from the file [default: 40]
     #[arg(long, value_name = "DEG", conflicts_with = "camera")]
     pub fov: Option<f64>,
     /// Animation time in seconds, or none for the rest pose stored in the file
     #[arg(long, value_name = "SECONDS|none", default_value = "none", allow_hyphen_values = true)]
     pub time: String,
-    /// Environment map, or none [default: a built-in studio when the scene has no lights of its own]
+    /// Environment map, or none [default: built-in studio lighting if the file contains no lights]
     #[arg(long, value_name = "FILE.hdr|FILE.exr|none")]
     pub env: Option<String>,
-    /// Multiplies the environment's radiance
+    /// Factor for the radiance of the environment
     #[arg(long, value_name = "K", default_value_t = 1.0)]
     pub env_intensity: f32,
-    /// Turns the environment about +Y
+    /// Rotation of the environment about +Y in degrees
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true)]
     pub env_rotation: f32,
-    /// What lies behind the scene [default: the environment; without one transparent in EXR, grey in PNG]
+    /// Background behind the scene [default: the environment; without one, transparent in EXR and grey in PNG]
     #[arg(long, value_name = "env|transparent|#rrggbb", value_parser = background)]
     pub background: Option<Background>,
 }
 
-/// How to draw it.
+/// Size, model, knobs and display of a picture.
 #[derive(Debug, Clone, Args)]
 pub struct PictureOptions {
-    /// Pixels across and down
+    /// Width and height in pixels
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
     pub size: [u32; 2],
     /// How much light transport is simulated [default: recursive]
     #[arg(long, value_parser = one_of::<Model>())]
     pub model: Option<Model>,
-    /// Choose a knob's rung, for example samples=16; repeatable
+    /// Set a knob to a rung, for example samples=16; repeatable
     #[arg(long = "set", value_name = "KNOB=RUNG")]
     pub set: Vec<String>,
-    /// What is planned: what the scene calls for; or every effect that the knobs allow, for the same picture; or what the
-    /// scene calls for, with a table of what each other effect would have cost here
-    #[arg(long, value_enum, value_name = "scene|full|explain-cost", default_value_t = Extent::Scene)]
-    pub plan: Extent,
-    /// Chooses the random numbers: another one, another noise
+    /// Which effects to prepare: those that the scene calls for; or every effect that the knobs allow, for the same picture; or those
+    /// that the scene calls for, with a table of what each other effect would cost here
+    #[arg(long, value_enum, value_name = "scene|full|explain-cost", default_value_t = PlanExtent::Scene)]
+    pub plan: PlanExtent,
+    /// Random seed: another seed gives the picture other noise
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..1 << 31))]
     pub seed: u32,
-    /// Choose the quickest rungs whose FLIP against the scene's own reference is no more than this, for example 0.02 or 2%, out
-    /// of what `cost` measured or is measured first. With --model global: draw samples until the picture's relative error, which
-    /// it estimates itself, is no more than this
+    /// Pick the fastest rungs whose error against the scene's reference is at most this, for example 0.02 or 2% (measures first if
+    /// `cost` has not been run). With --model global: draw samples until the estimated relative error of the picture is at most this
     #[arg(long, value_name = "E")]
     pub max_error: Option<String>,
-    /// Exposure in stops, display outputs only
+    /// Exposure in stops; changes display outputs only
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_hyphen_values = true)]
     pub exposure: f32,
-    /// Tone curve, display outputs only
+    /// Tone curve; changes display outputs only
     #[arg(long, value_parser = one_of::<ToneMap>(), default_value = ToneMap::default().name())]
     pub tonemap: ToneMap,
 }
 
-/// Where to draw it.
+/// Vulkan device and validation.
 #[derive(Debug, Clone, Args)]
 pub struct DeviceOptions {
-    /// Device by part of its name, index, or kind [default: the best there is]
+    /// Device, by a part of its name, its index or its kind [default: the best device]
     #[arg(long, value_name = "NAME|INDEX|cpu|gpu")]
     pub device: Option<String>,
-    /// Check every Vulkan call and every hazard with the Khronos validation layer; any error fails the run
+    /// Check Vulkan calls and synchronization hazards with the Khronos validation layer; any validation error fails the run
     #[arg(long)]
     pub validate: bool,
 }
@@ -137,7 +137,7 @@ fn vector(text: &str) -> Result<DVec3, String> {
     }
 }
 
-/// I/N, I from 1 to N.
+/// Parses a shard I/N, with I from 1 to N.
 pub(super) fn shard(text: &str) -> Result<[u32; 2], String> {
     let parts = text.split_once('/').and_then(|(i, n)| Some([i.parse().ok()?, n.parse().ok()?]));
     match parts {
@@ -168,7 +168,7 @@ pub(super) fn background(text: &str) -> Result<Background, String> {
 }
 
 impl SceneOptions {
-    /// What was chosen, as words of a command line.
+    /// These options as command-line words; options at their defaults are left out.
     #[must_use]
     pub fn words(&self) -> Vec<String> {
         let point = |p: DVec3| format!("{},{},{}", p.x, p.y, p.z);
@@ -197,10 +197,10 @@ impl SceneOptions {
         all
     }
 
-    /// The asked time of the animation; `None` is the rest pose.
+    /// Animation time in seconds; `None` is the rest pose.
     ///
     /// # Errors
-    /// When it is no number of seconds.
+    /// When `--time` is neither `none` nor a finite number.
     pub fn time(&self) -> Result<Option<f64>> {
         match self.time.as_str() {
             "none" => Ok(None),
@@ -211,25 +211,25 @@ impl SceneOptions {
         }
     }
 
-    /// Loads the scene at the asked time.
+    /// Loads the scene at the animation time.
     ///
     /// # Errors
-    /// One sentence with file, place and cause.
-    pub fn load(&self, reads: Reads) -> Result<Scene> {
-        etalon::open::scene(&self.scene, &LoadOptions { time: self.time()?, reads })
+    /// One sentence with the file, the place in it and the cause.
+    pub fn load(&self, prune: Prune) -> Result<Scene> {
+        etalon::open::scene(&self.scene, &LoadOptions { time: self.time()?, prune })
     }
 
-    /// Loads the environment that is asked for, or would be used if the scene has no lights.
+    /// Loads the environment of `--env`, or the built-in studio, which lights scenes without lights. Returns it with warnings.
     ///
     /// # Errors
-    /// One sentence with file and cause.
+    /// One sentence with the file and the cause.
     pub fn load_environment(&self) -> Result<(Option<Environment>, Vec<String>)> {
         if !(self.env_intensity.is_finite() && self.env_intensity >= 0.0 && self.env_rotation.is_finite()) {
-            bail!("--env-intensity and --env-rotation are finite numbers, the intensity not negative");
+            bail!("--env-intensity must be a finite number of at least 0, and --env-rotation a finite number");
         }
         match self.env.as_deref() {
             Some("none") if self.env_intensity != 1.0 || self.env_rotation != 0.0 => {
-                bail!("--env none: there is no environment for --env-intensity and --env-rotation to change")
+                bail!("--env none contradicts --env-intensity and --env-rotation: there is no environment")
             }
             Some("none") => Ok((None, Vec::new())),
             Some(path) => Environment::load(&PathBuf::from(path)).map(|(map, warnings)| (Some(map), warnings)),
@@ -237,29 +237,29 @@ impl SceneOptions {
         }
     }
 
-    /// Whether the environment lights the scene whatever lights that has.
+    /// Whether the environment lights the scene even if the scene has lights.
     #[must_use]
     pub fn asks_for_environment(&self) -> bool {
         self.env.is_some() || self.background == Some(Background::Environment)
     }
 
-    /// Whether the camera is one that frames the scene, for the size that is asked for.
+    /// Whether the camera is computed to frame the scene at the size of the picture.
     #[must_use]
     pub fn frames(&self, scene: &Scene) -> bool {
         self.eye.is_none() && self.camera.is_none() && (scene.cameras.is_empty() || self.fov.is_some())
     }
 
-    /// The camera to draw from.
+    /// The camera that these options choose.
     ///
     /// # Errors
-    /// One sentence when there is no such camera or the directions do not give one.
+    /// One sentence when the file has no such camera, or when eye, target and up direction define none.
     pub fn choose_camera(&self, scene: &Scene, size: [u32; 2]) -> Result<Camera> {
         let fov_y = match self.fov {
             None => DEFAULT_FOV_Y,
             Some(degrees) if degrees > 0.0 && degrees < 180.0 => degrees.to_radians(),
-            Some(degrees) => bail!("--fov {degrees}: a field of view lies between 0 and 180 degrees"),
+            Some(degrees) => bail!("--fov {degrees}: expected a field of view between 0 and 180 degrees"),
         };
-        let bounds = scene.bounds().ok_or_else(|| anyhow!("{}: there is nothing to draw", scene.name))?;
+        let bounds = scene.bounds().ok_or_else(|| anyhow!("{}: the scene has nothing to draw", scene.name))?;
         if let Some(eye) = self.eye {
             let target = self.target.unwrap_or_else(|| bounds.center());
             let up = self.up.unwrap_or(DVec3::Y);
@@ -276,7 +276,7 @@ impl SceneOptions {
                 .cloned()
                 .ok_or_else(|| match scene.cameras.len() {
                     0 => anyhow!("--camera {wanted}: {} has no cameras", scene.name),
-                    _ => anyhow!("--camera {wanted}: {} has the cameras {}", scene.name, names()),
+                    _ => anyhow!("--camera {wanted}: no such camera; {} has the cameras {}", scene.name, names()),
                 });
         }
         match scene.cameras.first() {
@@ -287,7 +287,7 @@ impl SceneOptions {
 }
 
 impl PictureOptions {
-    /// What was chosen beside model, knobs and seed, as words of a command line.
+    /// Size and display options as command-line words, without model, knobs and seed.
     #[must_use]
     pub fn words(&self) -> Vec<String> {
         let mut all = vec![format!("--size {}x{}", self.size[0], self.size[1])];
@@ -301,7 +301,8 @@ impl PictureOptions {
         all
     }
 
-    /// Draws a scene by wavelengths whose glass sends them different ways, where the model is the one of paths and nobody chose.
+    /// Selects spectral rendering (`colour=spectral:16`) for scenes with dispersive glass under `--model global`, unless `--set colour`
+    /// is given.
     ///
     /// # Errors
     /// Never: the rung exists.
@@ -315,7 +316,7 @@ impl PictureOptions {
         }
     }
 
-    /// The knobs as set.
+    /// Knobs of `--model` with the changes of `--set`.
     ///
     /// # Errors
     /// One sentence for a model, knob or rung that does not exist.
@@ -325,41 +326,41 @@ impl PictureOptions {
         Ok(knobs)
     }
 
-    /// The error that is the end of sampling, as a share.
+    /// The error limit of `--max-error` as a fraction: `2%` is 0.02.
     pub(super) fn max_error(&self) -> Result<Option<f64>> {
         let Some(text) = &self.max_error else { return Ok(None) };
         let (number, scale) = text.strip_suffix('%').map_or((text.as_str(), 1.0), |number| (number, 0.01));
         let error = number.trim().parse::<f64>().ok().map(|number| number * scale);
         let Some(error) = error.filter(|error| *error > 0.0 && error.is_finite()) else {
-            bail!("--max-error {text}: expected a share above 0, for example 0.02 or 2%");
+            bail!("--max-error {text}: expected a fraction above 0, for example 0.02 or 2%");
         };
         if self.set.iter().any(|choice| choice.starts_with("samples=")) {
-            bail!("--max-error {text} contradicts --set samples: the one or the other ends the sampling");
+            bail!("--max-error {text} contradicts --set samples: give only one of them to end the sampling");
         }
         Ok(Some(error))
     }
 
-    /// What the picture may depend on, as far as that can be told before the scene is read.
+    /// Which textures and attributes loading may prune, as far as this is known before the scene is read.
     #[must_use]
-    pub fn reads(&self, scene: &SceneOptions, knobs: &Knobs) -> Reads {
+    pub fn prune(&self, scene: &SceneOptions, knobs: &Knobs) -> Prune {
         let asked = scene.background == Some(Background::Environment);
         match (self.plan, scene.env.as_deref()) {
-            (Extent::Full, _) => Reads::Everything,
-            _ if !knobs.show_occlusion(true) => Reads::Visible(Ambience::Absent),
-            _ if knobs.show_occlusion(false) => Reads::Visible(Ambience::Present),
-            (_, Some("none")) => Reads::Visible(Ambience::Absent),
-            (_, None) if !asked => Reads::Visible(Ambience::WithoutLights),
-            _ => Reads::Visible(Ambience::Present),
+            (PlanExtent::Full, _) => Prune::Nothing,
+            _ if !knobs.show_occlusion(true) => Prune::Unused(AmbientLight::Absent),
+            _ if knobs.show_occlusion(false) => Prune::Unused(AmbientLight::Present),
+            (_, Some("none")) => Prune::Unused(AmbientLight::Absent),
+            (_, None) if !asked => Prune::Unused(AmbientLight::WithoutLights),
+            _ => Prune::Unused(AmbientLight::Present),
         }
     }
 
-    /// Everything the renderer needs to know.
+    /// Settings of the renderer.
     ///
     /// # Errors
-    /// As [`PictureOptions::knobs`].
+    /// One sentence for an invalid size, exposure or error limit, and the errors of [`PictureOptions::knobs`].
     pub fn settings(&self, scene: &SceneOptions) -> Result<Settings> {
         if self.size.contains(&0) {
-            bail!("--size {}x{}: a picture has at least one pixel a side", self.size[0], self.size[1]);
+            bail!("--size {}x{}: width and height must be at least one pixel", self.size[0], self.size[1]);
         }
         if !self.exposure.is_finite() {
             bail!("--exposure {}: expected a finite number of stops", self.exposure);
@@ -376,7 +377,7 @@ impl PictureOptions {
             max_error: self.max_error()?,
             paths_at_once: false,
             traversal: None,
-            demand: self.plan.demand(),
+            forced: self.plan.forced(),
             parts: Vec::new(),
             share: TileShare::ALL,
         })
@@ -384,13 +385,13 @@ impl PictureOptions {
 }
 
 impl DeviceOptions {
-    /// What was chosen, as words of a command line.
+    /// These options as command-line words.
     #[must_use]
     pub fn words(&self) -> Vec<String> {
         self.device.iter().map(|device| format!("--device {}", word(device))).collect()
     }
 
-    /// Which device is meant.
+    /// The device that `--device` chooses.
     #[must_use]
     pub fn choice(&self) -> DeviceChoice {
         self.device.as_deref().map(|text| text.parse().unwrap_or_default()).unwrap_or_default()

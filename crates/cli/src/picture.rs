@@ -1,4 +1,5 @@
-//! What all forms of `etalon render` share: its options, layers beside a picture, and what is said of one.
+//! Parts shared by all forms of `etalon render`: options, arbitrary output variables (AOV layers of an EXR), and warnings about a
+//! drawn picture.
 
 use std::path::{Path, PathBuf};
 
@@ -19,30 +20,30 @@ use etalon::upload::view::View;
 use etalon_farm::frames::Frames;
 use etalon_farm::part::Split;
 
-/// Options of `render` for more than one picture, and for more than one process.
+/// Options of `render` for several pictures and for several processes.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Sequences and shards")]
 pub struct SequenceOptions {
-    /// Draw these frames: numbers and ranges such as 1-100:2,105. Frame F shows the animation F / fps seconds after --time; each output
-    /// has a place for the number, {frame} or {frame:04}. Frames whose files are whole and of the same picture are not drawn again
+    /// Draw these frames: numbers and ranges such as 1-100:2,105. Frame F shows the animation at --time plus F / fps seconds. Each output
+    /// name contains the frame number as {frame} or {frame:04}. Frames whose files are complete and hold the same picture are not drawn again
     #[arg(long, value_name = "RANGE", allow_hyphen_values = true)]
     pub frames: Option<Frames>,
-    /// Frames of a second [default: 24]
+    /// Frames per second [default: 24]
     #[arg(long, value_name = "N")]
     pub fps: Option<f64>,
-    /// Turn the camera around the scene's middle, or --target, by 1/N of a circle for each frame; the animation stands still unless
-    /// --fps is given [default frames: 0 to N - 1]
+    /// Turn the camera around --target, or the middle of the scene, by 1/N of a circle per frame; the animation stands still unless --fps
+    /// is given [default frames: 0 to N - 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub turntable: Option<u32>,
-    /// Draw from these cameras of the file, by name or index, or from all of them; each output has a place for the name, {camera}
+    /// Draw from these cameras of the file, by name or index, or from all of them. Each output name contains the camera name as {camera}
     #[arg(long, value_name = "NAME,...|all", value_delimiter = ',', conflicts_with_all = ["camera", "eye", "target", "up", "fov"])]
     pub cameras: Vec<String>,
-    /// Draw the I-th of N shares: every N-th picture of a sequence, or a part of a single one into the file of -o, which `etalon merge`
-    /// joins with the others to the bits of one run
+    /// Draw the I-th of N shares: every N-th picture of a sequence, or a part of a single picture into the file of -o. `etalon merge` joins
+    /// the parts into the picture that one run draws, bit for bit
     #[arg(long, value_name = "I/N", value_parser = shard)]
     pub shard: Option<[u32; 2]>,
-    /// How a single picture is divided: by tiles of its pixels, or by its samples, which makes at most 64 parts
-    /// [default: tiles; samples where the plan looks things up on the screen]
+    /// How to divide a single picture: by tiles of pixels, or by samples into at most 64 parts
+    /// [default: tiles; samples if the plan uses screen-space reflection or refraction]
     #[arg(long, value_enum, value_name = "tiles|samples", requires = "shard")]
     pub split: Option<SplitBy>,
 }
@@ -66,38 +67,37 @@ impl From<SplitBy> for Split {
 }
 
 impl SequenceOptions {
-    /// Whether there may be more than one picture.
+    /// Whether the options can ask for more than one picture.
     #[must_use]
     pub fn is_sequence(&self) -> bool {
         self.frames.is_some() || self.turntable.is_some() || !self.cameras.is_empty()
     }
 }
 
-/// Draw a picture of a scene.
+/// Draw a picture of a scene
 #[derive(Debug, Clone, Args)]
 pub struct RenderArgs {
     #[command(flatten)]
     pub(super) scene: SceneOptions,
-    /// Output file: .png (display) or .exr (scene-linear radiance); repeatable [default: the scene's name with .png]. Of a sequence also
-    /// .apng, an animated preview; of a part of a picture the one file that it goes to
+    /// Output file: .png (display) or .exr (scene-linear radiance); repeatable [default: the scene's name with .png]. A sequence can also
+    /// write an animated preview, .apng; a part of a picture has exactly one output
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) picture: PictureOptions,
-    /// Choose the rungs with the least error that take no more GPU time than this, out of what `cost` measured of the same picture
-    /// on this device or is measured first
+    /// Pick the most accurate rungs that render within this GPU time, in milliseconds (measures first if `cost` has not been run)
     #[arg(long, value_name = "MS")]
     pub(super) within: Option<String>,
     #[command(flatten)]
     pub(super) device: DeviceOptions,
-    /// Further layers of the EXR: the nearest opaque surface at the pixel centres; and, of the picture itself, the light
-    /// that rays brought which were first mirrored (reflection) or first went through (refraction)
+    /// Additional EXR layers: the nearest opaque surface at each pixel centre; the radiance of rays that were first reflected
+    /// (reflection) or first refracted (refraction); variance and half buffers of path tracing
     #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,...")]
     pub(super) aov: Vec<AovName>,
-    /// Draw N times and fail unless all are bit-identical
+    /// Draw the picture N times and fail unless all results are bit-identical
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     pub(super) repeat: u32,
-    /// Write a machine-readable account of the run
+    /// Write a JSON report of the run
     #[arg(long, value_name = "FILE.json")]
     pub(super) report: Option<PathBuf>,
     /// Form of the progress messages
@@ -108,7 +108,7 @@ pub struct RenderArgs {
 }
 
 impl RenderArgs {
-    /// What the renderer needs to know.
+    /// Settings of the renderer, with the picture parts of `--aov`.
     pub(super) fn render_settings(&self) -> Result<Settings> {
         let mut settings = self.picture.settings(&self.scene)?;
         for part in self.aov.iter().filter_map(|name| name.part()) {
@@ -120,7 +120,7 @@ impl RenderArgs {
     }
 }
 
-/// Layers that can be asked for.
+/// Layers of `--aov`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 #[value(rename_all = "snake_case")]
 pub enum AovName {
@@ -128,7 +128,7 @@ pub enum AovName {
     Albedo,
     /// Shading normal in world space.
     Normal,
-    /// Normal of the triangle, towards the viewer.
+    /// Normal of the triangle, facing the viewer.
     GeometricNormal,
     /// Position in world space, metres.
     Position,
@@ -142,24 +142,24 @@ pub enum AovName {
     Metallic,
     /// Emitted radiance.
     Emissive,
-    /// Index of the material, counted from 1; 0 is nothing.
+    /// Index of the material, from 1; 0 is no surface.
     Material,
-    /// Index of the instance, counted from 1; 0 is nothing.
+    /// Index of the instance, from 1; 0 is no surface.
     Instance,
-    /// Radiance by rays that the nearest surface mirrored.
+    /// Radiance of rays that the nearest surface reflected.
     Reflection,
-    /// Radiance by rays that went through it.
+    /// Radiance of rays that the nearest surface transmitted.
     Refraction,
-    /// Of a picture by paths, the variance of each pixel that its halves tell.
+    /// Variance of each pixel of a path-traced picture, estimated from the half buffers.
     Variance,
-    /// The mean of its even samples.
+    /// Half buffer: mean of the even samples.
     HalfA,
-    /// The mean of its odd samples, whose random numbers have nothing in common with those of the even ones.
+    /// Half buffer: mean of the odd samples, whose random numbers are independent of the even samples.
     HalfB,
 }
 
 impl AovName {
-    /// Of the picture, not of the surfaces.
+    /// The part of the picture that the layer holds; `None` for layers of surfaces and of half buffers.
     pub(super) fn part(self) -> Option<Part> {
         match self {
             Self::Reflection => Some(Part::Reflection),
@@ -168,13 +168,13 @@ impl AovName {
         }
     }
 
-    /// Told by the halves of a picture's samples.
+    /// Whether the layer is computed from the half buffers.
     pub(super) fn of_halves(self) -> bool {
         matches!(self, Self::Variance | Self::HalfA | Self::HalfB)
     }
 }
 
-/// What an output path asks for.
+/// File format of an output path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Format {
     Png,
@@ -193,12 +193,12 @@ pub(super) fn settings_size(picture: &PictureOptions) -> u64 {
     u64::from(picture.size[0]) * u64::from(picture.size[1])
 }
 
-/// What the EXR says of its making.
+/// Text attributes of the EXR.
 pub(super) fn metadata(args: &RenderArgs, plan: &Plan) -> Vec<(String, String)> {
     made(&args.scene.scene, plan.bands)
 }
 
-/// The same of a scene, in so many bands of wavelengths.
+/// Text attributes for a scene name; with bands of wavelengths they name the colour-matching functions.
 pub(super) fn made(scene: &str, bands: u32) -> Vec<(String, String)> {
     let mut all = vec![
         ("software".to_owned(), format!("etalon {}", env!("CARGO_PKG_VERSION"))),
@@ -215,21 +215,20 @@ pub(super) fn warn_about(rendered: &Rendered, pixels: u64, knobs: &Knobs, bands:
     let negative = if bands > 0 { 0 } else { counts.negative };
     if bands > 0 && counts.negative > 0 {
         tracing::warn!(
-            "{} of {pixels} pixels have colours outside of Rec. 709: shown less saturated at the same luminance, negative in \
-             an EXR",
+            "{} of {pixels} pixels have colours outside the Rec. 709 gamut: displays show them desaturated at the same luminance, \
+             an EXR has negative values",
             counts.negative
         );
     }
     for (count, what) in [(counts.nan, "NaN"), (counts.inf, "infinite"), (negative, "negative")] {
         if count > 0 {
-            tracing::warn!("{count} of {pixels} pixels hold {what} radiance, shown as black or white");
+            tracing::warn!("{count} of {pixels} pixels have {what} radiance and are shown black or white");
         }
     }
     let work = &rendered.work;
     if let Some(first) = work.first_not_finite {
         tracing::warn!(
-            "{} estimates of paths were no finite numbers and were left out; the first at pixel {},{}, surface {} of its path, \
-             material {}",
+            "{} path estimates were NaN or infinite and were left out; the first at pixel {},{}, vertex {} of its path, material {}",
             work.not_finite,
             first.pixel[0],
             first.pixel[1],
@@ -237,44 +236,44 @@ pub(super) fn warn_about(rendered: &Rendered, pixels: u64, knobs: &Knobs, bands:
             first.material
         );
     }
-    if work.stray_interfaces > 0 {
+    if work.unmatched_exits > 0 {
         tracing::warn!(
-            "{} rays left a transparent body that they had not entered: shells that are open, turned or cross without \
+            "{} rays left a transparent mesh that they had not entered: some mesh is open, inside out, or overlaps another one without \
              priorities (extras.etalon.priority)",
-            work.stray_interfaces
+            work.unmatched_exits
         );
     }
     if work.mean_lost > 0.01 {
         tracing::warn!(
-            "{:.1} % of the light was not followed to its end, in the worst pixel {:.0} %{}",
+            "{:.1} % of the light was cut off by the bounce limit (up to {:.0} % in one pixel){}",
             work.mean_lost * 100.0,
             work.most_lost * 100.0,
-            if knobs.interfaces.count() < 32 { ": --set interfaces=32 follows more" } else { "" }
+            if knobs.interfaces.count() < 32 { "; try --set interfaces=32" } else { "" }
         );
     }
     if rendered.dropped > 0 {
         tracing::warn!(
-            "{} pixels have more see-through surfaces than one invocation sorts; their farthest were left out",
+            "{} pixels have more transparent surfaces than a shader invocation can sort; the farthest ones were left out",
             rendered.dropped
         );
     }
 }
 
-/// Layers of halves are those of pictures that have halves.
+/// Refuses layers of half buffers for pictures without half buffers.
 pub(super) fn check_halves(names: &[AovName], settings: &Settings) -> Result<()> {
     if let Some(name) = names.iter().find(|name| name.of_halves()) {
         let name = name.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
         if settings.knobs.indirect != Indirect::Path {
-            bail!("--aov {name}: only paths tell their error; add --model global");
+            bail!("--aov {name}: only path tracing estimates its error; add --model global");
         }
         if settings.knobs.samples.count() == 1 && settings.max_error.is_none() {
-            bail!("--aov {name}: one sample has no halves; add --set samples=4");
+            bail!("--aov {name}: one sample cannot be split into halves; add --set samples=4");
         }
     }
     Ok(())
 }
 
-/// The asked layers in the order asked.
+/// The layers of `names`, in their order.
 pub(super) fn layers(renderer: &mut Renderer, camera: &Camera, names: &[AovName]) -> Result<Vec<Aov>> {
     let (pixels, view) = renderer.aovs(camera).context("reading the G-buffer")?;
     let of = |&name: &AovName| match name.part() {
@@ -286,7 +285,8 @@ pub(super) fn layers(renderer: &mut Renderer, camera: &Camera, names: &[AovName]
 }
 
 fn layer_of_part(renderer: &Renderer, part: Part) -> Result<Aov> {
-    let picture = renderer.part(part)?.ok_or_else(|| anyhow!("--aov {}: this layer was not drawn", part.name()))?;
+    let picture =
+        renderer.part(part)?.ok_or_else(|| anyhow!("--aov {}: the renderer did not draw this layer", part.name()))?;
     Ok(Aov {
         name: part.name().to_owned(),
         channels: ["R", "G", "B"].map(str::to_owned).into(),
@@ -296,11 +296,12 @@ fn layer_of_part(renderer: &Renderer, part: Part) -> Result<Aov> {
 
 fn layer_of_halves(renderer: &Renderer, name: AovName) -> Result<Aov> {
     let halves = renderer.half_means()?;
-    let halves = halves.ok_or_else(|| anyhow!("--aov: variance and halves are those of several samples by paths"))?;
+    let halves =
+        halves.ok_or_else(|| anyhow!("--aov: variance, half_a and half_b need several samples of path tracing"))?;
     Ok(layer_between(&halves, name))
 }
 
-/// What the means of even and odd samples tell.
+/// A layer computed from the means of the even and of the odd samples. The variance of a pixel is ((a − b) / 2)².
 pub(super) fn layer_between([a, b]: &[Picture; 2], name: AovName) -> Aov {
     let colors = |picture: &Picture| -> Vec<f32> { picture.rgba.iter().flat_map(|&[r, g, b, _]| [r, g, b]).collect() };
     let variance = |(a, b): (&f32, &f32)| (0.5 * (a - b)).powi(2);
@@ -317,7 +318,7 @@ fn layer(pixels: &[AovPixel], view: &View, name: AovName) -> Aov {
     let vectors = |get: &dyn Fn(&AovPixel) -> [f32; 3]| AovData::F32(pixels.iter().flat_map(get).collect());
     let numbers = |get: &dyn Fn(&AovPixel) -> f32| AovData::F32(pixels.iter().map(get).collect());
     let (rgb, xyz): (&[&str], &[&str]) = (&["R", "G", "B"], &["X", "Y", "Z"]);
-    // World positions are sums in f64: far from the origin f32 is only good for the difference.
+    // World positions are added in f64: far from the origin f32 is precise enough only for positions relative to the eye.
     let world = |p: &AovPixel| {
         if drawn(p) { (glam::Vec3::from(p.p_rel).as_dvec3() + view.eye).as_vec3().to_array() } else { [0.0; 3] }
     };

@@ -1,4 +1,5 @@
-//! `etalon plan`: which effects a scene calls for and why, and what drawing it takes, without drawing it.
+//! `etalon plan`: reports which effects a scene calls for and why, and what drawing takes (passes, pipelines, memory, rays), without
+//! drawing. See docs/plan.md.
 
 use std::collections::BTreeMap;
 use std::process::ExitCode;
@@ -7,7 +8,7 @@ use anyhow::{Context as _, Result};
 use clap::Args;
 use comfy_table::{ContentArrangement, Table, presets};
 
-use super::options::{DeviceOptions, Extent as Planned, PictureOptions, SceneOptions};
+use super::options::{DeviceOptions, PictureOptions, PlanExtent as Planned, SceneOptions};
 use super::print;
 use super::report::{Expected, PlanFacts};
 use super::setup::{self, Setup};
@@ -15,13 +16,13 @@ use etalon::frame::{Renderer, Settings};
 use etalon::open::Opened;
 use etalon::plan::rungs::Interfaces;
 use etalon::scene::Camera;
-use etalon::scene::normal_form::normalise;
+use etalon::scene::canonical::canonicalise;
 use etalon::transport::sight::{Sight, along_lines};
 use etalon_cost::explain::Price;
 use etalon_cost::predict::{PIXELS, Prediction, Trial, predict};
-use etalon_cost::sweep::Extent;
+use etalon_cost::sweep::SweepExtent;
 
-/// Say what a scene calls for, with reasons, and what drawing it takes
+/// Show which effects a scene calls for and why, and what drawing takes
 #[derive(Debug, Clone, Args)]
 pub struct PlanArgs {
     #[command(flatten)]
@@ -30,7 +31,7 @@ pub struct PlanArgs {
     picture: PictureOptions,
     #[command(flatten)]
     device: DeviceOptions,
-    /// Say what every rung will take and how wrong it will be at this size, from pictures of few pixels
+    /// Predict the time and the error of each rung at this size, from pictures with few pixels
     #[arg(long)]
     forecast: bool,
     /// Print one JSON document
@@ -38,21 +39,21 @@ pub struct PlanArgs {
     json: bool,
 }
 
-/// Seconds of a forecast.
+/// Time budget of a forecast, in seconds.
 const FORECAST_S: u32 = 60;
 
 /// Runs the command.
 ///
 /// # Errors
-/// One sentence with what was being done, to what, and the cause.
+/// One sentence with the action, its object and the cause.
 pub fn run(args: &PlanArgs) -> Result<ExitCode> {
     let mut settings = args.picture.settings(&args.scene)?;
-    let (opened, device) = setup::open(&args.scene, args.picture.reads(&args.scene, &settings.knobs), &args.device)?;
+    let (opened, device) = setup::open(&args.scene, args.picture.prune(&args.scene, &settings.knobs), &args.device)?;
     args.picture.colour_of(opened.scene(), &mut settings.knobs)?;
     let camera = args.scene.choose_camera(opened.scene(), settings.size)?;
     let sight = sight(&opened, &camera, &settings)?;
     let read = opened.warnings.clone();
-    // What an effect costs and how many pixels show it only a device tells; what there is, and why, nothing but the scene.
+    // Costs and pixel counts of effects need a device; effects and their reasons need only the scene.
     let wants_device = args.device.device.is_some()
         || args.device.validate
         || args.forecast
@@ -64,7 +65,7 @@ pub fn run(args: &PlanArgs) -> Result<ExitCode> {
             let interfaces = settings.knobs.interfaces.count();
             let prepared = opened.prepared(settings)?;
             let mut facts = PlanFacts::of(&prepared.plan);
-            let without = format!("passes, pipelines, memory and pixels are not told: {error:#}");
+            let without = format!("passes, pipelines, memory and pixels are unknown without a device: {error:#}");
             let lines = sight.filter(|_| prepared.plan.rays.is_some_and(|rays| rays.refraction));
             let lost = lines.and_then(|sight| lost(&sight, interfaces));
             facts.warnings.splice(0..0, read.into_iter().chain([without]).chain(prepared.warnings).chain(lost));
@@ -79,33 +80,33 @@ pub fn run(args: &PlanArgs) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What lines of sight go through, where something lets light through.
+/// Transparent surfaces along the lines of sight; `None` where no material transmits light.
 fn sight(opened: &Opened, camera: &Camera, settings: &Settings) -> Result<Option<Sight>> {
     if opened.scene().materials.iter().all(|material| material.transmission <= 0.0) {
         return Ok(None);
     }
     let mut scene = opened.scene().clone();
-    normalise(&mut scene);
+    canonicalise(&mut scene);
     Ok(Some(along_lines(&scene, &*opened.original.bvh()?, camera, settings.size)))
 }
 
-/// A sentence about what so many surfaces lose of the light along lines of sight; `None` where they lose nothing.
+/// A warning about light that `interfaces` surfaces per path cannot follow along the lines of sight; `None` where they suffice.
 fn lost(sight: &Sight, interfaces: u32) -> Option<String> {
     let more = match sight.most {
-        0..=32 => format!("--set interfaces={} follows them", sight.most.next_power_of_two()),
-        _ => "no rung follows them all".to_owned(),
+        0..=32 => format!("--set interfaces={} traces all of them", sight.most.next_power_of_two()),
+        _ => "no rung traces all of them".to_owned(),
     };
     (sight.most > interfaces).then(|| {
         format!(
-            "lines of sight go through up to {} transparent surfaces: interfaces={interfaces} loses up to {:.1} % of a \
-             pixel's light, {more}",
+            "lines of sight pass through up to {} transparent surfaces: interfaces={interfaces} loses up to {:.1} % of the light \
+             of a pixel; {more}",
             sight.most,
             100.0 * sight.lost(interfaces)
         )
     })
 }
 
-/// The plan with what drawing it takes on a device.
+/// The plan, with passes, pipelines, memory and pixel counts on a device.
 fn on_device(
     args: &PlanArgs,
     setup: Setup,
@@ -129,7 +130,7 @@ fn on_device(
         }
     }
     let mut facts = PlanFacts::of(renderer.plan()).on(renderer.device(), names, pipelines);
-    // After the account of what there is: counting takes a pipeline and a buffer of its own.
+    // After the list of pipelines and buffers: counting pixels adds a pipeline and a buffer.
     let pixels = renderer.pixels_by_material(&camera)?;
     for effect in facts.effects.iter_mut().filter(|effect| !effect.materials.is_empty()) {
         let seen: u64 = effect.materials.iter().filter_map(|&material| pixels.get(material)).sum();
@@ -142,8 +143,8 @@ fn on_device(
     facts.warnings.splice(0..0, warnings);
     drop(renderer);
     if let Some((setup, settings)) = forecast {
-        let folder = tempfile::tempdir().context("making a folder")?;
-        let extent = Extent { budget_s: FORECAST_S, reference_samples: None, shard: [1, 1] };
+        let folder = tempfile::tempdir().context("creating a temporary folder")?;
+        let extent = SweepExtent { budget_s: FORECAST_S, reference_samples: None, shard: [1, 1] };
         let trial = Trial { folder: &folder.path().join("forecast"), extent, pixels: PIXELS };
         facts.forecast = setup.bench(&args.scene, settings, |bench| {
             predict(&bench, &trial, &mut |step| eprintln!("{}, about {:.0} s left", step.name, step.left_s))
@@ -151,7 +152,7 @@ fn on_device(
     }
     if let Some((setup, settings)) = explained {
         facts.costs = setup.prices(&args.scene, &args.device, settings, &facts.effects, &mut |effect| {
-            eprintln!("measuring what \"{effect}\" would cost");
+            eprintln!("measuring the cost of \"{effect}\"");
         })?;
     }
     Ok(facts)
@@ -180,14 +181,14 @@ fn table(header: &[&str]) -> Table {
     table
 }
 
-/// What the effects that are left out would have cost.
+/// Table of what the effects that the plan leaves out would cost.
 pub(super) fn cost_table(prices: &[Price]) -> Table {
     let mut costs = table(&[
-        "would cost",
-        "by",
+        "effect",
+        "enabled by",
         "first picture",
-        "a sample",
-        "from … to",
+        "per sample",
+        "lowest … highest",
         "of a sample",
         "pipelines",
         "KB of SPIR-V",
@@ -214,9 +215,9 @@ pub(super) fn cost_table(prices: &[Price]) -> Table {
     costs
 }
 
-/// What every rung will take, and how wrong it will be.
+/// Table of predicted time and error of each rung.
 fn forecast_table(predictions: &[Prediction]) -> Table {
-    let mut all = table(&["picture", "GPU ms", "from … to", "error %", "from … to"]);
+    let mut all = table(&["picture", "GPU ms", "low … high", "error %", "low … high"]);
     for Prediction { picture, gpu_ms: ms, error, .. } in predictions {
         all.add_row([
             picture.clone(),
@@ -235,7 +236,7 @@ fn text(facts: &PlanFacts) -> String {
         let pixels = effect.evidence.get("pixels").map_or("", String::as_str);
         effects.add_row([effect.id.name(), effect.state.name(), effect.rung(), pixels, &effect.reason()]);
     }
-    // Many draws share a program: they are told apart by constants alone, which --json has.
+    // Pipelines of one program differ only in specialization constants, which --json lists.
     let mut programs: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
     for pipeline in &facts.pipelines {
         let (count, bytes) = programs.entry(pipeline.name).or_default();
@@ -253,13 +254,13 @@ fn text(facts: &PlanFacts) -> String {
         .iter()
         .flat_map(|expected| &expected.lost)
         .filter(|(_, lost)| **lost > 0.0)
-        .map(|(rung, lost)| format!("interfaces={rung} would lose up to {:.1} %", 100.0 * lost))
+        .map(|(rung, lost)| format!("interfaces={rung} would lose up to {:.1} % of the light of a pixel", 100.0 * lost))
         .collect();
     let sight = match facts.expected.as_ref().map_or(0, |expected| expected.interfaces) {
         0 => String::new(),
-        most => format!("lines of sight go through up to {most} transparent surfaces; {}\n", loses.join(", ")),
+        most => format!("lines of sight pass through up to {most} transparent surfaces; {}\n", loses.join(", ")),
     };
-    let unread: String = facts.unread.iter().map(|unread| format!("not read: {unread}\n")).collect();
+    let unread: String = facts.unread.iter().map(|unread| format!("not loaded: {unread}\n")).collect();
     let costs = if facts.costs.is_empty() { String::new() } else { format!("{}\n", cost_table(&facts.costs)) };
     let forecast =
         if facts.forecast.is_empty() { String::new() } else { format!("\n{}\n", forecast_table(&facts.forecast)) };
@@ -268,8 +269,8 @@ fn text(facts: &PlanFacts) -> String {
         return format!("{effects}\n\n{} samples per pixel\n{unread}{warnings}", facts.samples).trim_end().to_owned();
     }
     format!(
-        "{effects}\n\n{} samples per pixel, each by the passes {}\n\n{pipelines}\n\n{} pipelines of {:.0} KB of SPIR-V; {} buffers \
-         and images of {:.1} MB; {rounds} rounds of rays or more\n{sight}{unread}{costs}{forecast}{warnings}",
+        "{effects}\n\n{} samples per pixel; passes of each sample: {}\n\n{pipelines}\n\n{} pipelines with {:.0} KB of SPIR-V; {} \
+         buffers and images with {:.1} MB; at least {rounds} ray dispatches in a row\n{sight}{unread}{costs}{forecast}{warnings}",
         facts.samples,
         facts.passes.join(", "),
         facts.pipelines.len(),

@@ -1,4 +1,4 @@
-//! How far something is.
+//! Progress messages on stderr: a bar, plain lines, JSON lines, or the messages of Open Job Description.
 
 use std::cell::Cell;
 use std::io::IsTerminal as _;
@@ -16,28 +16,28 @@ use etalon::frame::Progress;
 pub enum ProgressForm {
     /// A bar on a terminal, a line per step elsewhere
     Auto,
-    /// A bar, wherever it goes
+    /// A bar, even without a terminal
     Always,
     /// Nothing
     Never,
     /// A line per step
     Plain,
-    /// A line of JSON per step, on standard error: status, or progress from 0 to 1 with the seconds left
+    /// A line of JSON per step on standard error: a status, or the progress from 0 to 1 and the seconds left
     Json,
-    /// What Open Job Description reads on standard output: openjd_status, openjd_progress, openjd_fail
+    /// Messages of Open Job Description on standard output: openjd_status, openjd_progress, openjd_fail
     Openjd,
 }
 
-/// Between two lines that tell how far something is.
+/// Least time between two progress lines.
 const PAUSE: Duration = Duration::from_secs(1);
 
-/// Steps as a bar on a terminal, as lines elsewhere, or not at all.
+/// Prints the steps of a command in one of the forms of [`ProgressForm`].
 pub(super) struct Steps {
     form: ProgressForm,
     bar: Option<ProgressBar>,
     begun: Instant,
     told: Cell<Option<Instant>>,
-    /// Where the picture under way begins, and how much it is, of all that is done.
+    /// Start and length of the current picture, as fractions of the whole work.
     share: Cell<[f64; 2]>,
 }
 
@@ -68,18 +68,18 @@ impl Steps {
         match self.form {
             ProgressForm::Plain => eprintln!("{message}"),
             ProgressForm::Json => eprintln!("{}", json!({ "status": message })),
-            // A pipe that nobody reads is no reason to stop.
+            // A closed pipe does not stop the work.
             ProgressForm::Openjd => drop(print(&format!("openjd_status: {message}"))),
             _ => {}
         }
     }
 
-    /// What is done from here on is so much of the whole, beginning at so much.
+    /// The following work is the fraction `share` of the whole, starting at the fraction `from`.
     pub(super) fn is_share(&self, from: f64, share: f64) {
         self.share.set([from, share]);
     }
 
-    /// How much of the present share is done, and so of the whole; engines hear of it no more than once a second.
+    /// Reports the finished fraction of the current share, at most once a second.
     pub(super) fn done(&self, share: f64) {
         let [from, of] = self.share.get();
         let done = (from + of * share).clamp(0.0, 1.0);
@@ -95,24 +95,24 @@ impl Steps {
         }
     }
 
-    /// How far a picture is. Where there is no bar, a line at powers of two, no more often than once a second.
+    /// Reports the samples and the estimated error of a picture. Without a bar it is a line at powers of two, at most once a second.
     pub(super) fn sampled(&self, progress: Progress, begun: Instant, last: &mut Instant) {
         self.at(progress.done);
         self.done(f64::from(progress.done) / f64::from(progress.of.max(1)));
         let Some(error) = progress.error else { return };
         let relative = error.relmse.sqrt() * 100.0;
         if let Some(bar) = &self.bar {
-            bar.set_message(format!("drawing, error {relative:.2} %"));
+            bar.set_message(format!("drawing, estimated error {relative:.1} %"));
         }
         if self.form == ProgressForm::Plain && last.elapsed() >= PAUSE {
             *last = Instant::now();
             let left =
                 begun.elapsed().as_secs_f64() / f64::from(progress.done) * f64::from(progress.of - progress.done);
-            eprintln!("{} of {} samples, error {relative:.2} %, {left:.0} s left at most", progress.done, progress.of);
+            eprintln!("{}/{} samples, estimated error {relative:.1} %, at most {left:.0} s left", progress.done, progress.of);
         }
     }
 
-    /// One of many pictures.
+    /// Reports that picture `done + 1` of `of` begins, with the seconds left for all.
     pub(super) fn of(&self, name: &str, done: usize, of: usize, left_s: f64) {
         let left = format!("about {left_s:.0} s left");
         if let Some(bar) = &self.bar {
@@ -133,14 +133,14 @@ impl Steps {
         }
     }
 
-    /// The same, unless nothing is to be said.
+    /// Prints a line as [`Steps::say`] does, if the form has a bar or plain lines.
     pub(super) fn tell(&self, line: &str) {
         if self.bar.is_some() || self.form == ProgressForm::Plain {
             self.say(line);
         }
     }
 
-    /// A line that stays, whatever the bar does.
+    /// Prints a line that stays above the bar.
     pub(super) fn say(&self, line: &str) {
         match &self.bar {
             Some(bar) => bar.suspend(|| eprintln!("{line}")),

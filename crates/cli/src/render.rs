@@ -1,4 +1,4 @@
-//! `etalon render`: one picture, or a sequence of them.
+//! `etalon render` of one picture. Sequences are drawn in `sequence.rs`, parts of a picture in `shard.rs`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,14 +9,14 @@ use anyhow::{Result, anyhow, bail};
 use serde_json::json;
 
 use super::budget::{Budget, Chosen, command};
-use super::options::Extent;
+use super::options::PlanExtent;
 use super::picture::{Format, RenderArgs, check_halves, format_of, layers, metadata, settings_size, warn_about};
 use super::plan::cost_table;
 use super::print;
 use super::progress::Steps;
 use super::report::{
-    ColourFacts, MemoryFacts, Output, PassFacts, PipelineFacts, PlanFacts, Report, Sampling, SceneFacts, Spread,
-    Validation, knob_map,
+    ColourFacts, MemoryFacts, PassFacts, PipelineFacts, PlanFacts, Report, Sampling, SceneReport, Spread, Validation,
+    WrittenFile, knob_map,
 };
 use super::sequence;
 use super::setup::Setup;
@@ -24,9 +24,9 @@ use super::shard;
 use etalon::frame::Rendered;
 use etalon::gpu::Severity;
 use etalon::image::{Picture, exr, file};
-use etalon::scene::{Reads, Scene};
+use etalon::scene::{Prune, Scene};
 
-/// Wall time of named phases.
+/// Wall time of named phases, in milliseconds.
 struct Phases {
     start: Instant,
     last: Instant,
@@ -44,7 +44,7 @@ impl Phases {
 /// Runs the command.
 ///
 /// # Errors
-/// One sentence with what was being done, to what, and the cause.
+/// One sentence with the action, its object and the cause.
 pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     if args.sequence.is_sequence() {
         return sequence::run(args, quiet);
@@ -62,8 +62,8 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     phases.end("start");
 
     steps.step(&format!("loading {}", args.scene.scene), 1);
-    let reads = if budget.is_some() { Reads::Everything } else { args.picture.reads(&args.scene, &settings.knobs) };
-    let setup = Setup::load(&args.scene, reads, &args.device)?;
+    let prune = if budget.is_some() { Prune::Nothing } else { args.picture.prune(&args.scene, &settings.knobs) };
+    let setup = Setup::load(&args.scene, prune, &args.device)?;
     phases.end("load");
     let mut chosen = None;
     if let Some(budget) = budget {
@@ -90,7 +90,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     check_halves(&args.aov, &settings)?;
     steps.step("uploading", 1);
     let knobs = settings.knobs.clone();
-    let explained = (args.picture.plan == Extent::ExplainCost).then(|| (setup.clone(), settings.clone()));
+    let explained = (args.picture.plan == PlanExtent::ExplainCost).then(|| (setup.clone(), settings.clone()));
     let (mut renderer, camera) = setup.renderer(&args.scene, settings)?;
     phases.end("upload");
     phases.all.insert("bvh", renderer.bvh().map_or(0.0, |bvh| bvh.build_ms + bvh.layout_ms));
@@ -110,7 +110,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let mut rounds = Vec::new();
     let mut first: Option<(Rendered, Option<Picture>)> = None;
     if chosen.is_some() {
-        // A budget is that of a picture with everything compiled, as tables are.
+        // A budget applies to a warmed-up renderer, as the measured tables do: compile everything first.
         renderer.render_samples(&camera, 2, &mut |_| ())?;
         phases.end("frame");
     }
@@ -133,7 +133,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
                 };
                 let films = known_film.as_ref().zip(film.as_ref()).is_none_or(|(a, b)| same(a, b));
                 if known.display != rendered.display || !films {
-                    bail!("--repeat: picture {} differs from the first", round + 1);
+                    bail!("--repeat: picture {} differs from the first picture", round + 1);
                 }
             }
         }
@@ -154,7 +154,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
             _ => renderer.png(&rendered)?,
         };
         file::write(path, &bytes)?;
-        written.push(Output { path: path.display().to_string(), hash: file::hash(&bytes) });
+        written.push(WrittenFile { path: path.display().to_string(), hash: file::hash(&bytes) });
         steps.at(index as u32 + 1);
     }
     phases.end("encode");
@@ -162,7 +162,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         Some((setup, settings)) => {
             let effects = &renderer.plan().effects;
             let prices = setup.prices(&args.scene, &args.device, settings.clone(), effects, &mut |effect| {
-                steps.step(&format!("measuring what \"{effect}\" would cost"), 1);
+                steps.step(&format!("measuring the cost of \"{effect}\""), 1);
             })?;
             steps.say(&cost_table(&prices).to_string());
             prices
@@ -213,7 +213,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Checks everything about the outputs that can be checked before any work is done.
+/// Checks formats and writability of the outputs before any work is done.
 fn outputs(args: &RenderArgs) -> Result<Vec<(PathBuf, Format)>> {
     let mut paths = args.output.clone();
     if paths.is_empty() {
@@ -225,7 +225,7 @@ fn outputs(args: &RenderArgs) -> Result<Vec<(PathBuf, Format)>> {
         let format = format_of(&path)?;
         file::check_writable(&path)?;
         if all.iter().any(|(known, _)| *known == path) {
-            bail!("--output {}: named twice", path.display());
+            bail!("--output {}: this file is named twice", path.display());
         }
         all.push((path, format));
     }
@@ -233,13 +233,13 @@ fn outputs(args: &RenderArgs) -> Result<Vec<(PathBuf, Format)>> {
         file::check_writable(report)?;
     }
     if !args.aov.is_empty() && !all.iter().any(|(_, format)| *format == Format::Exr) {
-        bail!("--aov: layers go into an EXR; add -o FILE.exr");
+        bail!("--aov: layers are written to an EXR; add -o FILE.exr");
     }
     Ok(all)
 }
 
-fn facts(scene: &Scene) -> SceneFacts {
-    SceneFacts {
+fn facts(scene: &Scene) -> SceneReport {
+    SceneReport {
         path: scene.name.clone(),
         triangles: scene.triangles(),
         instances: scene.instances.len(),

@@ -1,4 +1,4 @@
-//! `render --report FILE`: the machine-readable account of a run, schema `etalon.report/1`.
+//! `render --report FILE`: the JSON report of a run, schema `etalon.report/1`, and the JSON form of a plan, schema `etalon.plan/1`.
 
 use std::collections::BTreeMap;
 
@@ -15,68 +15,68 @@ use etalon::upload::rays::BvhFacts;
 use etalon_cost::explain::Price;
 use etalon_cost::predict::Prediction;
 
-/// The document.
+/// The document of `render --report`.
 #[derive(Debug, Serialize)]
 pub struct Report {
     /// `etalon.report/1`.
     pub schema: &'static str,
-    /// Where it ran.
+    /// Device that drew.
     pub device: DeviceInfo,
-    /// What was drawn.
-    pub scene: SceneFacts,
+    /// Scene that was drawn.
+    pub scene: SceneReport,
     /// Rung of every knob.
     pub knobs: BTreeMap<&'static str, &'static str>,
-    /// What was done and why.
+    /// Effects, passes, pipelines and buffers, with reasons.
     pub plan: PlanFacts,
     /// GPU time per pass over the repeats.
     pub passes: Vec<PassFacts>,
-    /// Wall time of each phase in milliseconds. `bvh` is a part of `upload`; `pipelines` of `upload` and `frame`, beside
-    /// what else goes on there: they are made on a thread of their own, and the driver compiles them at their first use.
+    /// Wall time of each phase in milliseconds. `bvh` is a part of `upload`. `pipelines` runs on its own thread during `upload` and
+    /// `frame`, in parallel with other work; the driver compiles a pipeline at its first use.
     pub phases_ms: BTreeMap<&'static str, f64>,
-    /// Work counts: the same on every machine.
+    /// Work counts, equal on every machine.
     pub work: WorkFacts,
-    /// Samples, and what they say of the picture's error.
+    /// Samples, and the error that they estimate.
     pub sampling: Sampling,
-    /// Of a picture by wavelengths.
+    /// Colour of a spectral rendering; absent for RGB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub colour: Option<ColourFacts>,
-    /// What rays went through; absent where none were sent.
+    /// BVH of the triangles; absent where the plan traces no rays.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bvh: Option<BvhFacts>,
-    /// Pipelines made.
+    /// Pipelines created.
     pub pipelines: PipelineFacts,
     /// Peak memory.
     pub memory: MemoryFacts,
     /// Statistics of the film.
     pub image: Statistics,
-    /// What the validation layer said.
+    /// Messages of the validation layer.
     pub validation: Validation,
     /// Files written, with hashes of their bytes.
-    pub outputs: Vec<Output>,
+    pub outputs: Vec<WrittenFile>,
     /// Rungs chosen for `--within` or `--max-error`, and how the budget was kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub budget: Option<Value>,
 }
 
-/// How wavelengths became colours.
+/// Conversion of wavelengths to colours in a spectral rendering.
 #[derive(Debug, Serialize)]
 pub struct ColourFacts {
-    /// Whose matching functions.
+    /// Colour-matching functions.
     pub observer: &'static str,
-    /// Of equal width, each drawn for itself.
+    /// Number of bands of equal width; each band is drawn separately.
     pub bands: u32,
-    /// What they divide, nm.
+    /// First and last wavelength of the bands, nm.
     pub wavelengths: [f64; 2],
-    /// Samples go through parts of each band, because wavelengths go different ways.
+    /// Whether a material disperses: samples then cycle through sub-bands of each band.
     pub disperses: bool,
-    /// Pixels whose colour lies outside of Rec. 709.
+    /// Pixels whose colour lies outside the Rec. 709 gamut.
     pub outside_gamut: u32,
-    /// What becomes of them on a display; an EXR has them as they are.
+    /// How displays show colours outside the gamut; an EXR stores them unchanged.
     pub outside_gamut_rule: &'static str,
 }
 
 impl ColourFacts {
-    /// Of a picture; `None` where it is made of three colours.
+    /// Colour facts of a picture; `None` for RGB.
     #[must_use]
     pub fn of(plan: &Plan, rendered: &Rendered) -> Option<Self> {
         (plan.bands > 0).then_some(Self {
@@ -90,35 +90,35 @@ impl ColourFacts {
     }
 }
 
-/// Samples, and what they say of the picture's error where it is estimated: of pictures by paths.
+/// Samples of a picture, and its estimated error, which only path tracing has.
 #[derive(Debug, Serialize)]
 pub struct Sampling {
-    /// Of each pixel.
+    /// Samples per pixel.
     pub samples: u32,
-    /// At powers of two and at the end.
+    /// Estimated errors at powers of two and at the end.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub errors: Vec<SampleError>,
-    /// Slope of the logarithm of the relative error over that of samples; −0.5 where samples do not depend on each other.
+    /// Slope of the logarithm of the relative error over the logarithm of the samples; −0.5 for independent samples.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slope: Option<f64>,
 }
 
 impl Sampling {
-    /// Of a picture.
+    /// Sampling facts of a picture.
     #[must_use]
     pub fn of(rendered: &Rendered) -> Self {
         Self { samples: rendered.samples, errors: rendered.errors.clone(), slope: slope(&rendered.errors) }
     }
 }
 
-/// What was drawn.
+/// Counts of the scene.
 #[derive(Debug, Clone, Serialize)]
-pub struct SceneFacts {
+pub struct SceneReport {
     /// Path or `study:NAME`.
     pub path: String,
-    /// As drawn: instances counted.
+    /// Triangles as drawn: those of each instance count.
     pub triangles: usize,
-    /// Placed meshes.
+    /// Mesh instances.
     pub instances: usize,
     /// Materials.
     pub materials: usize,
@@ -126,11 +126,11 @@ pub struct SceneFacts {
     pub lights: usize,
     /// Decoded images.
     pub textures: usize,
-    /// What was read around.
+    /// Warnings of the loader.
     pub warnings: Vec<String>,
 }
 
-/// The plan as data, with what came of it on the device.
+/// The plan as data, with passes, pipelines and buffers on the device. The document of `plan --json`.
 #[derive(Debug, Serialize)]
 pub struct PlanFacts {
     /// `etalon.plan/1`.
@@ -147,50 +147,50 @@ pub struct PlanFacts {
     pub buffers: Vec<Created>,
     /// Textures and texture coordinates of the scene that are neither decoded nor uploaded, with the reason.
     pub unread: Vec<String>,
-    /// What can be told of a picture that is not drawn; of one that is, there are the counts themselves.
+    /// Expected work of a picture that is not drawn; absent in reports of drawn pictures, which have the counts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected: Option<Expected>,
-    /// What the effects that are left out would have cost, where that was asked for.
+    /// Measured costs of the effects that are left out; only with `--plan explain-cost`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub costs: Vec<Price>,
-    /// What every rung will take at this size, and how wrong it will be, where that was asked for.
+    /// Predicted time and error of each rung at this size; only with `--forecast`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub forecast: Vec<Prediction>,
-    /// What the chosen rungs leave out.
+    /// Warnings about what the chosen rungs leave out.
     pub warnings: Vec<String>,
 }
 
-/// What a picture from a camera will take.
+/// Expected memory and rays of a picture from a camera.
 #[derive(Debug, Serialize)]
 pub struct Expected {
     /// Bytes of all buffers and images.
     pub bytes: u64,
-    /// Dispatches that send rays to lights, in each sample.
+    /// Dispatches of shadow rays per sample.
     pub shadow_rounds: u32,
-    /// Rays that a path sends one after another, at least: along straight lines, and no more than `interfaces` allows.
+    /// Least number of rays that a path traces in a row: counted along straight lines of sight, at most `interfaces`.
     pub ray_rounds: u32,
-    /// The most transparent surfaces on a line of sight.
+    /// Largest number of transparent surfaces on a line of sight.
     pub interfaces: u32,
-    /// By rungs of `interfaces`, the largest share of a pixel's light that they lose on those lines.
+    /// For each rung of `interfaces`, the largest fraction of a pixel's light that it loses on lines of sight.
     pub lost: BTreeMap<&'static str, f64>,
 }
 
 /// One pipeline.
 #[derive(Debug, Serialize)]
 pub struct PipelineFact {
-    /// Its program.
+    /// Name of the program.
     pub name: &'static str,
-    /// Specialization constants; what is true is 1.
+    /// Specialization constants by name; true is 1.
     pub constants: BTreeMap<&'static str, Value>,
-    /// SPIR-V that the driver is given for these constants.
+    /// Bytes of the SPIR-V that the driver gets for these constants.
     pub spirv_bytes: usize,
-    /// What the driver's compiler made of it, where it tells.
+    /// Compiler statistics of the driver, where it reports any.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub compiled: Vec<Compiled>,
 }
 
 impl PlanFacts {
-    /// What was planned.
+    /// The facts of a plan without a device.
     #[must_use]
     pub fn of(plan: &Plan) -> Self {
         Self {
@@ -208,7 +208,7 @@ impl PlanFacts {
         }
     }
 
-    /// With the passes and the pipelines that it takes, and what exists on the device for it.
+    /// Adds passes and pipelines, and the buffers and images on the device.
     #[must_use]
     pub fn on(
         self,
@@ -225,7 +225,7 @@ impl PlanFacts {
                 .map(|(program, constants)| PipelineFact {
                     name: program.name,
                     spirv_bytes: program.spirv_bytes(&constants),
-                    // What it does not tell is no reason to lose a report.
+                    // Missing compiler statistics must not fail the report.
                     compiled: device.compiled(program, &constants).unwrap_or_default(),
                     constants: named(program, &constants),
                 })
@@ -240,36 +240,36 @@ impl PlanFacts {
     }
 }
 
-/// Constants by name: numbers as the shader has them.
+/// Specialization constants by name, as floats or integers like in the shader.
 fn named(program: &Program, constants: &[(u32, u32)]) -> BTreeMap<&'static str, Value> {
     let known = constants.iter().filter_map(|&(id, word)| Some((program.constants.iter().find(|c| c.id == id)?, word)));
     known.map(|(c, word)| (c.name, if c.float { json!(f32::from_bits(word)) } else { json!(word) })).collect()
 }
 
-/// One pass.
+/// Time of one pass.
 #[derive(Debug, Serialize)]
 pub struct PassFacts {
-    /// Its name.
+    /// Name of the pass.
     pub name: String,
-    /// Milliseconds on the device.
+    /// GPU milliseconds.
     pub gpu_ms: Spread,
 }
 
-/// A sample of times.
+/// Minimum, median and maximum of measured times.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Spread {
     /// Smallest.
     pub min: f64,
-    /// Middle.
+    /// Median.
     pub median: f64,
     /// Largest.
     pub max: f64,
-    /// How many.
+    /// Number of measurements.
     pub n: usize,
 }
 
 impl Spread {
-    /// Of some numbers, at least one.
+    /// The spread of at least one number.
     #[must_use]
     pub fn of(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
@@ -280,7 +280,7 @@ impl Spread {
     }
 }
 
-/// Exact counts.
+/// Work counts, equal on every machine.
 #[derive(Debug, Serialize)]
 pub struct WorkFacts {
     /// Rays by kind; primary visibility is rasterised.
@@ -289,24 +289,23 @@ pub struct WorkFacts {
     pub node_visits: u64,
     /// Triangles tested by rays.
     pub triangle_tests: u64,
-    /// Boundaries of transparent bodies that were left without having been entered: open or crossing shells.
-    pub stray_interfaces: u64,
-    /// Estimates of paths that were no finite numbers and left out of the picture, and where the first was met.
+    /// Rays that left a transparent mesh without having entered it: the mesh is open, or meshes overlap without priorities.
+    pub unmatched_exits: u64,
+    /// Path estimates that were NaN or infinite and were left out of the picture.
     pub not_finite: u64,
-    /// See `not_finite`.
+    /// Pixel, path vertex and material of the first such estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_not_finite: Option<NotFinite>,
-    /// Share of a pixel's light that was not followed because a path met too many surfaces or had become too faint.
+    /// Fraction of a pixel's light that was cut off because a path met too many surfaces or its throughput became too small.
     pub cut_off: CutOff,
 }
 
-/// Throughput that was not followed. What it would have found is at most as bright as the brightest thing in the scene,
-/// so that no pixel misses more than this share of that.
+/// Path throughput that was cut off. The missing radiance of a pixel is at most this fraction of the largest radiance in the scene.
 #[derive(Debug, Serialize)]
 pub struct CutOff {
-    /// Over all pixels.
+    /// Mean over all pixels.
     pub mean: f64,
-    /// Of the worst pixel.
+    /// Maximum over all pixels.
     pub max: f32,
 }
 
@@ -323,7 +322,7 @@ impl From<&Work> for WorkFacts {
             rays: rays.into_iter().collect(),
             node_visits: work.node_visits,
             triangle_tests: work.triangle_tests,
-            stray_interfaces: work.stray_interfaces,
+            unmatched_exits: work.unmatched_exits,
             not_finite: work.not_finite,
             first_not_finite: work.first_not_finite,
             cut_off: CutOff { mean: work.mean_lost, max: work.most_lost },
@@ -331,29 +330,29 @@ impl From<&Work> for WorkFacts {
     }
 }
 
-/// Pipelines made.
+/// Pipelines created.
 #[derive(Debug, Serialize)]
 pub struct PipelineFacts {
-    /// How many.
+    /// Number of pipelines.
     pub count: usize,
-    /// SPIR-V that the driver was given for them.
+    /// Bytes of their SPIR-V.
     pub spirv_bytes: usize,
 }
 
-/// Memory.
+/// Memory of host and device.
 #[derive(Debug, Serialize)]
 pub struct MemoryFacts {
-    /// Largest resident size of the process; on a CPU device this includes the device's memory.
+    /// Largest resident size of the process, in bytes; on a CPU device this includes device memory.
     pub host_peak_bytes: u64,
-    /// Blocks allocated on the device at the end.
+    /// Bytes of the memory blocks allocated on the device at the end.
     pub device_bytes: u64,
 }
 
 impl MemoryFacts {
-    /// As things stand.
+    /// Memory at this moment.
     #[must_use]
     pub fn now(device: &Device) -> Self {
-        // Linux keeps the high-water mark; elsewhere it is not known.
+        // Linux keeps the high-water mark; on other systems it is unknown and 0.
         let peak = std::fs::read_to_string("/proc/self/status")
             .ok()
             .and_then(|status| {
@@ -365,21 +364,21 @@ impl MemoryFacts {
     }
 }
 
-/// Validation.
+/// Messages of the validation layer.
 #[derive(Debug, Serialize)]
 pub struct Validation {
-    /// Whether the layer was on.
+    /// Whether validation was enabled.
     pub enabled: bool,
-    /// Errors.
+    /// Number of errors.
     pub errors: usize,
-    /// Warnings.
+    /// Number of warnings.
     pub warnings: usize,
-    /// All of them.
+    /// All messages.
     pub messages: Vec<Message>,
 }
 
 impl Validation {
-    /// What the layer has said so far.
+    /// The messages so far.
     #[must_use]
     pub fn of(device: &Device, enabled: bool) -> Self {
         let messages = device.messages();
@@ -390,14 +389,14 @@ impl Validation {
 
 /// A file that was written.
 #[derive(Debug, Serialize)]
-pub struct Output {
-    /// Where.
+pub struct WrittenFile {
+    /// Path of the file.
     pub path: String,
-    /// XXH3-128 of its bytes.
+    /// XXH3-128 of the file's bytes.
     pub hash: String,
 }
 
-/// Knobs as the report lists them.
+/// Rungs by knob.
 #[must_use]
 pub fn knob_map(knobs: &Knobs) -> BTreeMap<&'static str, &'static str> {
     knobs.list().into_iter().collect()

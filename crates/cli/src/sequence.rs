@@ -1,5 +1,5 @@
-//! `etalon render` of many pictures: the frames of an animation, a turntable, several cameras. What is the same for all of them is read,
-//! uploaded and compiled once.
+//! `etalon render` of a sequence: frames of an animation, a turntable, or several cameras. Data that all pictures share is read, uploaded
+//! and compiled once. See docs/farm.md.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -9,11 +9,11 @@ use anyhow::{Context as _, Result, anyhow, bail, ensure};
 use glam::{DAffine3, DVec3};
 use serde::Serialize;
 
-use super::options::{Extent, SceneOptions};
+use super::options::{PlanExtent, SceneOptions};
 use super::picture::{Format, RenderArgs, check_halves, format_of, layers, metadata, settings_size, warn_about};
 use super::print;
 use super::progress::Steps;
-use super::report::{Output, Validation};
+use super::report::{Validation, WrittenFile};
 use super::setup;
 use etalon::frame::{Renderer, Settings};
 use etalon::gpu::{Device, Severity};
@@ -23,42 +23,42 @@ use etalon::scene::{Camera, Scene};
 use etalon_farm::frames::Frames;
 use etalon_farm::identity::{Identity, device_name};
 use etalon_farm::names::Pattern;
-use etalon_farm::worker::Worker;
+use etalon_farm::worker::FarmWorker;
 
-/// Frames of a second where nobody says.
+/// Default frames per second.
 const FPS: f64 = 24.0;
 
-/// The account of a sequence: schema `etalon.sequence/1`.
+/// The document of `--report` for a sequence, schema `etalon.sequence/1`.
 #[derive(Debug, Serialize)]
-struct Account {
+struct SequenceReport {
     schema: &'static str,
-    worker: Worker,
+    worker: FarmWorker,
     shard: [u32; 2],
-    pictures: Vec<Told>,
+    pictures: Vec<PictureRecord>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    preview: Option<Output>,
+    preview: Option<WrittenFile>,
 }
 
-/// One picture of it.
+/// One picture of a sequence.
 #[derive(Debug, Serialize)]
-struct Told {
+struct PictureRecord {
     frame: i32,
     camera: String,
-    /// Its files were there, whole and of the same picture.
+    /// Whether its files existed, complete and of the same picture, so that it was not drawn.
     found: bool,
-    /// Seconds since 1970 when it was begun.
+    /// Start, in seconds since 1970.
     began: f64,
-    /// Milliseconds until it could be drawn: pose, hierarchy, upload.
+    /// Milliseconds of preparation: pose, BVH, upload.
     prepare_ms: f64,
-    /// Milliseconds of drawing, with what is compiled meanwhile.
+    /// Milliseconds of drawing, including compilation.
     draw_ms: f64,
     /// Milliseconds of encoding and writing.
     write_ms: f64,
-    outputs: Vec<Output>,
+    outputs: Vec<WrittenFile>,
 }
 
-/// What a sequence is made of, before anything is read.
-struct Wanted {
+/// The parsed options of a sequence, before the scene is read.
+struct SequenceRequest {
     frames: Vec<i32>,
     moves: bool,
     turns: Option<u32>,
@@ -67,17 +67,17 @@ struct Wanted {
     preview: Option<PathBuf>,
 }
 
-/// Checks all that can be checked before any work is done.
-fn wanted(args: &RenderArgs) -> Result<Wanted> {
+/// Checks all options that can be checked before any work is done.
+fn wanted(args: &RenderArgs) -> Result<SequenceRequest> {
     let options = &args.sequence;
-    ensure!(args.repeat == 1, "--repeat draws one picture again; it has no meaning for a sequence");
-    ensure!(args.within.is_none(), "--within chooses rungs for one picture; choose them with --set for a sequence");
-    ensure!(args.picture.plan != Extent::ExplainCost, "--plan explain-cost is about one picture");
+    ensure!(args.repeat == 1, "--repeat draws one picture again; it does not work with a sequence");
+    ensure!(args.within.is_none(), "--within chooses rungs for one picture; for a sequence choose rungs with --set");
+    ensure!(args.picture.plan != PlanExtent::ExplainCost, "--plan explain-cost works with one picture only");
     let fps = options.fps.unwrap_or(FPS);
     ensure!(fps.is_finite() && fps > 0.0, "--fps {fps}: expected a number above 0");
     let moves = options.frames.is_some() && (options.turntable.is_none() || options.fps.is_some())
         || options.turntable.is_some() && options.fps.is_some();
-    ensure!(options.fps.is_none() || moves, "--fps: there are no frames; add --frames or --turntable");
+    ensure!(options.fps.is_none() || moves, "--fps: the command draws no frames; add --frames or --turntable");
     let all = match (&options.frames, options.turntable) {
         (Some(frames), _) => frames.clone(),
         (None, Some(count)) => Frames::first(count),
@@ -95,39 +95,39 @@ fn wanted(args: &RenderArgs) -> Result<Wanted> {
     }
     for path in given {
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("apng")) {
-            ensure!(preview.replace(path).is_none(), "--output: a sequence has one animated preview");
+            ensure!(preview.replace(path).is_none(), "--output: a sequence can have only one animated preview");
             continue;
         }
         let format = format_of(&path)?;
         let pattern = Pattern::of(&path).context("--output")?;
         ensure!(
             !many || pattern.has_frame(),
-            "--output {}: {} frames need a place for their number, such as {{frame:04}}",
+            "--output {}: the names of {} frames need a frame number, for example {{frame:04}}",
             pattern.text(),
             all.numbers().len()
         );
         ensure!(
             options.cameras.is_empty() || pattern.has_camera(),
-            "--output {}: --cameras needs a place for their names, {{camera}}",
+            "--output {}: with --cameras the file name needs {{camera}}",
             pattern.text()
         );
         outputs.push((pattern, format));
     }
     ensure!(
         !outputs.is_empty(),
-        "--output: an animated preview is made of pictures; add one for them, such as frame.{{frame:04}}.png"
+        "--output: an animated preview is made from the pictures; add their name, for example -o frame.{{frame:04}}.png"
     );
     ensure!(
         preview.is_none() || outputs.iter().any(|(_, format)| *format == Format::Png),
-        "--output: an animated preview is made of PNG files; add one, such as frame.{{frame:04}}.png"
+        "--output: an animated preview is made from PNG files; add their name, for example -o frame.{{frame:04}}.png"
     );
     ensure!(
         preview.is_none() || options.shard.is_none(),
-        "--shard: an animated preview is made of all frames; when they are there, the same command without --shard draws none again"
+        "--shard: an animated preview needs all frames; when they are drawn, run the command without --shard: it draws none again"
     );
     ensure!(
         args.aov.is_empty() || outputs.iter().any(|(_, format)| *format == Format::Exr),
-        "--aov: layers go into an EXR; add -o FILE.{{frame:04}}.exr"
+        "--aov: layers are written to an EXR; add -o FILE.{{frame:04}}.exr"
     );
     let share = options.shard.unwrap_or([1, 1]);
     let frames = all.share(share).numbers().to_vec();
@@ -140,17 +140,17 @@ fn wanted(args: &RenderArgs) -> Result<Wanted> {
         }
     }
     preview.iter().chain(&args.report).try_for_each(|path| file::check_writable(path))?;
-    Ok(Wanted { frames, moves, turns: options.turntable, fps, outputs, preview })
+    Ok(SequenceRequest { frames, moves, turns: options.turntable, fps, outputs, preview })
 }
 
-/// A camera turned about the vertical through `center` by a part of a circle.
+/// The camera rotated about the axis `up` through `center` by the fraction `part` of a full turn.
 fn turned(camera: &Camera, center: DVec3, up: DVec3, part: f64) -> Camera {
     let turn = DAffine3::from_axis_angle(up.normalize_or(DVec3::Y), std::f64::consts::TAU * part);
     let about = DAffine3::from_translation(center) * turn * DAffine3::from_translation(-center);
     Camera { world_from_camera: about * camera.world_from_camera, ..camera.clone() }
 }
 
-/// Cameras of a moment of the scene: name and camera, in the order asked for.
+/// Name and camera of each requested camera at the scene's current time, in the order of the option.
 fn cameras(options: &SceneOptions, names: &[String], scene: &Scene, size: [u32; 2]) -> Result<Vec<(String, Camera)>> {
     if names.is_empty() {
         return Ok(vec![(String::new(), options.choose_camera(scene, size)?)]);
@@ -169,16 +169,16 @@ fn cameras(options: &SceneOptions, names: &[String], scene: &Scene, size: [u32; 
     for (place, (name, _)) in found.iter().enumerate() {
         ensure!(
             found[..place].iter().all(|(other, _)| other != name),
-            "--cameras: two cameras are called \"{name}\", so that their files would be one; name them by index"
+            "--cameras: two cameras are called \"{name}\" and would write the same file; name them by index"
         );
     }
     Ok(found)
 }
 
-/// The keyword under which a picture says what it is of.
+/// Keyword of the text in a file that identifies its picture.
 const KEY: &str = "etalon.picture";
 
-/// Whether a file holds the picture, whole.
+/// The bytes of a file, if it is complete and holds this picture; with the display values of a PNG.
 fn holds(path: &Path, format: Format, picture: &str) -> Option<(Vec<u8>, Option<Display>)> {
     let bytes = std::fs::read(path).ok()?;
     let is_of = |texts: &[(String, String)]| texts.iter().any(|(key, text)| key == KEY && text == picture);
@@ -197,7 +197,7 @@ fn holds(path: &Path, format: Format, picture: &str) -> Option<(Vec<u8>, Option<
 /// Runs the command.
 ///
 /// # Errors
-/// One sentence with what was being done, to what, and the cause; of a picture, with its frame.
+/// One sentence with the action, its object and the cause; an error of a picture also names its frame.
 pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let begun = Instant::now();
     let wanted = wanted(args)?;
@@ -205,11 +205,11 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     check_halves(&args.aov, &settings)?;
     let steps = Steps::new(args.progress, quiet);
     steps.step(&format!("loading {}", args.scene.scene), 1);
-    let reads = args.picture.reads(&args.scene, &settings.knobs);
-    let (mut source, rest, environment, device) = setup::open_source(&args.scene, reads, &args.device)?;
+    let prune = args.picture.prune(&args.scene, &settings.knobs);
+    let (mut source, rest, environment, device) = setup::open_source(&args.scene, prune, &args.device)?;
     if wanted.moves && wanted.turns.is_none() && rest.duration.is_none() {
         bail!(
-            "--frames: nothing in {} moves, so that all frames would be the same; --turntable N turns the camera",
+            "--frames: nothing in {} moves, so all frames would be the same; to turn the camera, use --turntable N",
             rest.name
         );
     }
@@ -219,16 +219,16 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     for warning in &opened.warnings {
         tracing::warn!("{warning}");
     }
-    // What frames the scene, and what a turntable turns about, is the same for all frames.
+    // The camera that frames the scene, and the axis of a turntable, are the same for all frames.
     let still = opened.scene().clone();
     let frames_scene = args.scene.frames(&still) && args.sequence.cameras.is_empty();
     let names = &args.sequence.cameras;
     let fixed = cameras(&args.scene, names, &still, settings.size)?;
-    let middle = still.bounds().ok_or_else(|| anyhow!("{}: there is nothing to draw", still.name))?.center();
+    let middle = still.bounds().ok_or_else(|| anyhow!("{}: the scene has nothing to draw", still.name))?.center();
     let (center, up) = (args.scene.target.unwrap_or(middle), args.scene.up.unwrap_or(DVec3::Y));
     let base_time = args.scene.time()?;
     let mut drawer = Drawer { args, device: &device, renderer: None, moved: true, settings };
-    let mut pictures: Vec<Told> = Vec::new();
+    let mut pictures: Vec<PictureRecord> = Vec::new();
     let mut shown: Vec<Display> = Vec::new();
     let of = (wanted.frames.len() * fixed.len()).max(1) as f64;
     let mut prepared = None;
@@ -273,16 +273,16 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     }
     let mut preview = None;
     if let Some(path) = wanted.preview.as_ref().filter(|_| !shown.is_empty()) {
-        // A fraction of 16-bit numbers: milliseconds.
+        // APNG stores the delay as a fraction of 16-bit numbers: milliseconds over 1000.
         let of_second = (1000.0 / wanted.fps).round().clamp(1.0, f64::from(u16::MAX)) as u16;
         let bytes = png::encode_animation(&shown, [of_second, 1000])?;
         file::write(path, &bytes)?;
-        preview = Some(Output { path: path.display().to_string(), hash: file::hash(&bytes) });
+        preview = Some(WrittenFile { path: path.display().to_string(), hash: file::hash(&bytes) });
     }
     if let Some(path) = &args.report {
-        let worker = Worker::here(device_name(device.info()), begun.elapsed(), prepared.unwrap_or_default());
+        let worker = FarmWorker::here(device_name(device.info()), begun.elapsed(), prepared.unwrap_or_default());
         let shard = args.sequence.shard.unwrap_or([1, 1]);
-        let account = Account { schema: "etalon.sequence/1", worker, shard, pictures, preview };
+        let account = SequenceReport { schema: "etalon.sequence/1", worker, shard, pictures, preview };
         file::write(path, serde_json::to_string_pretty(&account)?.as_bytes())?;
     }
     drop(steps);
@@ -296,18 +296,18 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What draws the pictures of a sequence one after the other.
+/// Draws the pictures of a sequence one after another with one renderer.
 struct Drawer<'a> {
     args: &'a RenderArgs,
     device: &'a std::sync::Arc<Device>,
     renderer: Option<Renderer>,
-    /// The scene is another one than that of the renderer.
+    /// Whether the scene has changed since the renderer was made.
     moved: bool,
     settings: Settings,
 }
 
 impl Drawer<'_> {
-    /// Draws and writes a picture, unless its files hold it already; what a display shows of it, where it has a PNG.
+    /// Draws and writes a picture, unless its files already hold it. Also returns its display values if it has a PNG.
     fn picture(
         &mut self,
         opened: &etalon::open::Opened,
@@ -316,7 +316,7 @@ impl Drawer<'_> {
         camera: &Camera,
         files: &[(PathBuf, Format)],
         steps: &Steps,
-    ) -> Result<(Told, Option<Display>)> {
+    ) -> Result<(PictureRecord, Option<Display>)> {
         let args = self.args;
         let start = Instant::now();
         let began =
@@ -324,7 +324,7 @@ impl Drawer<'_> {
         let identity = Identity::of(&args.scene.scene, contents.to_owned(), camera, &self.settings, self.device.info());
         let picture =
             file::hash(format!("{} {:?} {:?}", identity.fingerprint(), args.aov, args.picture.plan).as_bytes());
-        let mut told = Told {
+        let mut told = PictureRecord {
             frame,
             camera: name.to_owned(),
             found: true,
@@ -339,7 +339,7 @@ impl Drawer<'_> {
             let mut display = None;
             for ((path, _), (bytes, shown)) in files.iter().zip(found) {
                 display = display.or(shown);
-                told.outputs.push(Output { path: path.display().to_string(), hash: file::hash(&bytes) });
+                told.outputs.push(WrittenFile { path: path.display().to_string(), hash: file::hash(&bytes) });
                 print(&path.display().to_string())?;
             }
             return Ok((told, display));
@@ -378,7 +378,7 @@ impl Drawer<'_> {
                 )?,
             };
             file::write(path, &bytes)?;
-            told.outputs.push(Output { path: path.display().to_string(), hash: file::hash(&bytes) });
+            told.outputs.push(WrittenFile { path: path.display().to_string(), hash: file::hash(&bytes) });
             print(&path.display().to_string())?;
         }
         told.write_ms = writing.elapsed().as_secs_f64() * 1e3;

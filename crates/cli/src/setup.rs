@@ -1,4 +1,4 @@
-//! What every command that knows a scene begins with.
+//! Opening of scene, environment and device, which all commands with a scene share.
 
 use std::sync::Arc;
 
@@ -10,30 +10,30 @@ use etalon::gpu::Device;
 use etalon::open::Opened;
 use etalon::plan::Effect;
 use etalon::scene::environment::Environment;
-use etalon::scene::{Camera, Reads, Scene, Source};
+use etalon::scene::{Camera, Prune, Scene, Source};
 use etalon_cost::explain::{Price, Subject};
-use etalon_cost::sitting::Bench;
+use etalon_cost::warm::Bench;
 use etalon_farm::identity::contents;
 
-/// A scene, what lies around it, and what it will be drawn on.
+/// A scene with its environment, and the device that draws it.
 #[derive(Clone)]
 pub struct Setup {
     /// The device.
     pub device: Arc<Device>,
-    /// What was read.
+    /// The scene and its environment.
     pub opened: Opened,
 }
 
-/// Opens the device and reads the environment while the scene loads: three things that do not wait for each other. A missing
-/// device is a result of its own.
+/// Opens the device, reads the environment and loads the scene in parallel. A missing device is a separate result, so that callers
+/// can go on without one.
 ///
 /// # Errors
-/// One sentence with file, place and cause; that of the scene first.
-pub fn open(scene: &SceneOptions, reads: Reads, device: &DeviceOptions) -> Result<(Opened, Result<Arc<Device>>)> {
+/// One sentence with the file, the place in it and the cause; an error of the scene comes first.
+pub fn open(scene: &SceneOptions, prune: Prune, device: &DeviceOptions) -> Result<(Opened, Result<Arc<Device>>)> {
     let (device, loaded, environment) = std::thread::scope(|scope| {
         let device = scope.spawn(|| Device::open(&device.choice(), device.validate));
         let environment = scope.spawn(|| scene.load_environment());
-        let loaded = scene.load(reads);
+        let loaded = scene.load(prune);
         let join = |_| anyhow!("a loading thread failed");
         (device.join().map_err(join), loaded, environment.join().map_err(join))
     });
@@ -44,20 +44,20 @@ pub fn open(scene: &SceneOptions, reads: Reads, device: &DeviceOptions) -> Resul
     Ok((opened, device?))
 }
 
-/// The same for a scene of which many moments are looked at: its file, and the scene at the asked time.
+/// Opens a scene that is drawn at several animation times: the file, the scene at `--time`, the environment and the device.
 ///
 /// # Errors
-/// As [`open`].
+/// The errors of [`open`]; a missing device is one of them.
 pub fn open_source(
     options: &SceneOptions,
-    reads: Reads,
+    prune: Prune,
     device: &DeviceOptions,
 ) -> Result<(Source, Scene, Option<Environment>, Arc<Device>)> {
     let time = options.time()?;
     let (device, loaded, environment) = std::thread::scope(|scope| {
         let device = scope.spawn(|| Device::open(&device.choice(), device.validate));
         let environment = scope.spawn(|| options.load_environment());
-        let loaded = etalon::open::source(&options.scene, reads).and_then(|mut source| {
+        let loaded = etalon::open::source(&options.scene, prune).and_then(|mut source| {
             let scene = source.at(time)?;
             Ok((source, scene))
         });
@@ -74,16 +74,16 @@ impl Setup {
     /// Opens a device and a scene.
     ///
     /// # Errors
-    /// One sentence with file, place and cause; that of the scene first.
-    pub fn load(scene: &SceneOptions, reads: Reads, device: &DeviceOptions) -> Result<Self> {
-        let (opened, device) = open(scene, reads, device)?;
+    /// One sentence with the file, the place in it and the cause; an error of the scene comes first.
+    pub fn load(scene: &SceneOptions, prune: Prune, device: &DeviceOptions) -> Result<Self> {
+        let (opened, device) = open(scene, prune, device)?;
         Ok(Self { device: device?, opened })
     }
 
-    /// What the effects that a plan leaves out would cost.
+    /// Measures what the effects that a plan leaves out would cost.
     ///
     /// # Errors
-    /// When something cannot be drawn.
+    /// When the plan cannot be drawn.
     pub fn prices(
         &self,
         options: &SceneOptions,
@@ -104,15 +104,15 @@ impl Setup {
         subject.prices(effects, progress)
     }
 
-    /// Hash of all that is drawn, whatever files it came from.
+    /// Hash of the scene and the environment in memory; file names do not enter it.
     pub fn contents(&self) -> String {
         contents(self.opened.scene(), self.opened.environment())
     }
 
-    /// Lends everything to something that draws many pictures.
+    /// Calls `draw` with a bench, which draws and times many pictures.
     ///
     /// # Errors
-    /// When there is no such camera, and whatever goes wrong there.
+    /// When the scene has no such camera, and the errors of `draw`.
     pub fn bench<T>(
         &self,
         options: &SceneOptions,
@@ -124,10 +124,10 @@ impl Setup {
         draw(Bench { device: &self.device, original: &self.opened.original, environment, settings, camera: &camera })
     }
 
-    /// Plans and uploads; the renderer, and the camera to draw from.
+    /// Plans the picture and uploads the scene; returns the renderer and the camera.
     ///
     /// # Errors
-    /// When there is no such camera, the scene has nothing to draw, or it does not fit the device.
+    /// When the scene has no such camera or nothing to draw, or when it does not fit the device.
     pub fn renderer(self, options: &SceneOptions, settings: Settings) -> Result<(Renderer, Camera)> {
         let camera = options.choose_camera(self.opened.scene(), settings.size)?;
         Ok((self.opened.renderer(&self.device, settings)?, camera))

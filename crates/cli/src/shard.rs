@@ -1,4 +1,4 @@
-//! `etalon render --shard` of one picture: the part of it that one process draws, which goes on where it was stopped.
+//! `etalon render --shard` of one picture: draws the part of one process, and resumes a part that was stopped. See docs/farm.md.
 
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail, ensure};
 
-use super::options::Extent;
+use super::options::PlanExtent;
 use super::picture::{RenderArgs, check_halves, layers};
 use super::print;
 use super::progress::Steps;
@@ -20,20 +20,19 @@ use etalon::plan::Plan;
 use etalon::scene::Camera;
 use etalon_farm::identity::{Identity, contents, device_name};
 use etalon_farm::part::{Drawn, Part, Split};
-use etalon_farm::worker::Worker;
+use etalon_farm::worker::FarmWorker;
 
 /// Least time between two copies of the sums. The process writes the last copy when it receives SIGTERM.
 const KEEP: Duration = Duration::from_secs(1);
-/// What a process that ends on SIGTERM returns, as shells have it.
-const TERMINATED: u8 = 128 + 15;
+/// Exit code after SIGTERM, as shells define it.
+const TERMINATED: u8 = super::arguments::ENDED;
 
-/// Tiles, unless the picture looks things up in itself: then each process needs all of it.
+/// Division into tiles, or into samples if the plan uses screen-space reflection or refraction, which read the whole picture.
 fn split(args: &RenderArgs, plan: &Plan) -> Result<Split> {
     let looks = plan.screen != etalon::plan::Screen::default();
     match args.sequence.split.map(Split::from) {
         Some(Split::Tiles) if looks => bail!(
-            "--split tiles: the plan looks up the screen (reflection=screen or refraction=screen), of which a tile needs all; \
-             choose --split samples"
+            "--split tiles: reflection=screen and refraction=screen need the whole picture, not a tile of it; choose --split samples"
         ),
         Some(split) => Ok(split),
         None => Ok(if looks { Split::Samples } else { Split::Tiles }),
@@ -43,30 +42,30 @@ fn split(args: &RenderArgs, plan: &Plan) -> Result<Split> {
 /// Runs the command.
 ///
 /// # Errors
-/// One sentence with what was being done, to what, and the cause.
+/// One sentence with the action, its object and the cause.
 pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<ExitCode> {
     let begun = Instant::now();
     let [index, of] = shard;
-    ensure!(args.repeat == 1, "--repeat draws a picture again; a part of one is drawn once");
-    ensure!(args.within.is_none(), "--within chooses rungs for one process; choose them with --set for many");
-    ensure!(args.picture.plan != Extent::ExplainCost, "--plan explain-cost is about a whole picture");
-    ensure!(args.report.is_none(), "--report: a part tells of itself; `etalon merge --report` has the account of all");
+    ensure!(args.repeat == 1, "--repeat does not work with --shard: a part of a picture is drawn once");
+    ensure!(args.within.is_none(), "--within chooses rungs for one process; with --shard choose rungs with --set");
+    ensure!(args.picture.plan != PlanExtent::ExplainCost, "--plan explain-cost works with a whole picture only");
+    ensure!(args.report.is_none(), "--report: a part file holds its own report; `etalon merge --report` writes the report of all parts");
     let [output] = &args.output[..] else {
-        bail!("--shard {index}/{of}: name the one file that this part goes to with -o, such as -o {index}.part")
+        bail!("--shard {index}/{of}: name the one file of this part with -o, for example -o {index}.part")
     };
     file::check_writable(output)?;
     let mut settings = args.render_settings()?;
     check_halves(&args.aov, &settings)?;
     ensure!(
         settings.max_error.is_none(),
-        "--max-error: a process that draws a part cannot tell when the whole is good enough; choose --set samples"
+        "--max-error: a process that draws a part does not know the error of the whole picture; choose --set samples"
     );
     let stopped = Arc::new(AtomicBool::new(false));
-    signal_hook::flag::register(signal_hook::consts::SIGTERM, stopped.clone()).context("listening to SIGTERM")?;
+    signal_hook::flag::register(signal_hook::consts::SIGTERM, stopped.clone()).context("installing the handler of SIGTERM")?;
     let steps = Steps::new(args.progress, quiet);
     steps.step(&format!("loading {}", args.scene.scene), 1);
-    let reads = args.picture.reads(&args.scene, &settings.knobs);
-    let setup = Setup::load(&args.scene, reads, &args.device)?;
+    let prune = args.picture.prune(&args.scene, &settings.knobs);
+    let setup = Setup::load(&args.scene, prune, &args.device)?;
     args.picture.colour_of(setup.opened.scene(), &mut settings.knobs)?;
     setup.opened.warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
     let split = split(args, &setup.opened.plan(settings.clone())?)?;
@@ -74,14 +73,14 @@ pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<Exi
         settings.share = TileShare { index: index - 1, of };
         ensure!(
             of <= TileShare::ALL.tiles(settings.size),
-            "--shard {index}/{of}: a picture of {}x{} has fewer tiles of 8x8 pixels than that",
+            "--shard {index}/{of}: a picture of {}x{} has fewer tiles of 8x8 pixels than parts",
             settings.size[0],
             settings.size[1]
         );
     } else {
         ensure!(
             settings.parts.is_empty(),
-            "--split samples: --aov reflection and refraction are divided by tiles alone"
+            "--split samples: --aov reflection and refraction need --split tiles"
         );
     }
     let scene = contents(setup.opened.scene(), setup.opened.environment());
@@ -93,7 +92,8 @@ pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<Exi
     let mut identity = Identity::of(&args.scene.scene, scene, &camera, &lit, device.info());
     identity.settings.insert("aov".to_owned(), format!("{:?}", args.aov));
     identity.settings.insert("plan".to_owned(), format!("{:?}", args.picture.plan));
-    let mut work = Work { args, renderer, camera, steps: &steps, stopped: &stopped, begun, prepared: begun.elapsed() };
+    let mut work =
+        ShardWork { args, renderer, camera, steps: &steps, stopped: &stopped, begun, prepared: begun.elapsed() };
     let starts = work.renderer.block_starts();
     let wanted = match split {
         Split::Tiles => vec![starts[0], starts[starts.len() - 1]],
@@ -101,15 +101,15 @@ pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<Exi
             let blocks = starts.len() as u32 - 1;
             ensure!(
                 of <= blocks,
-                "--shard {index}/{of} --split samples: the {} samples are added in {blocks} blocks, which make at most as many parts; \
-                 --split tiles makes more",
+                "--shard {index}/{of} --split samples: the {} samples are added in {blocks} blocks, and there can be no more parts than \
+                 blocks; --split tiles allows more",
                 work.renderer.plan().samples
             );
             let at = |i: u32| (u64::from(blocks) * u64::from(i) / u64::from(of)) as usize;
             starts[at(index - 1)..=at(index)].to_vec()
         }
     };
-    let drawn = |work: &Work<'_>, pieces: Vec<Sums>, aovs| Drawn {
+    let drawn = |work: &ShardWork<'_>, pieces: Vec<Sums>, aovs| Drawn {
         identity: identity.clone(),
         shard,
         split,
@@ -127,13 +127,13 @@ pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<Exi
                 && (known.head.shard, known.head.split, known.head.samples)
                     == (shard, split, work.renderer.plan().samples);
             if same && known.is_whole() {
-                steps.tell(&format!("{} is whole already", output.display()));
+                steps.tell(&format!("{} is already complete", output.display()));
                 drop(steps);
                 return print(&output.display().to_string()).map(|()| ExitCode::SUCCESS);
             }
             if same { known.into_sums() } else { Vec::new() }
         }
-        // Nothing there, or nothing of ours.
+        // There is no file, or it is not a part.
         Err(_) => Vec::new(),
     };
     let (pieces, is_whole) = match split {
@@ -147,7 +147,7 @@ pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<Exi
     }
     if !is_whole {
         drop(steps);
-        tracing::warn!("ended by SIGTERM; the same command goes on from what {} holds", output.display());
+        tracing::warn!("stopped by SIGTERM; the same command continues from {}", output.display());
         return Ok(ExitCode::from(TERMINATED));
     }
     drop(steps);
@@ -159,8 +159,8 @@ pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<Exi
     }
 }
 
-/// What draws a part.
-struct Work<'a> {
+/// State of drawing a part.
+struct ShardWork<'a> {
     args: &'a RenderArgs,
     renderer: Renderer,
     camera: Camera,
@@ -170,16 +170,16 @@ struct Work<'a> {
     prepared: Duration,
 }
 
-impl Work<'_> {
+impl ShardWork<'_> {
     fn is_stopped(&self) -> bool {
         self.stopped.load(Ordering::Relaxed)
     }
 
-    fn worker(&self) -> Worker {
-        Worker::here(device_name(self.renderer.device().info()), self.begun.elapsed(), self.prepared)
+    fn worker(&self) -> FarmWorker {
+        FarmWorker::here(device_name(self.renderer.device().info()), self.begun.elapsed(), self.prepared)
     }
 
-    /// All samples of a share of the tiles; whether it is drawn to its end.
+    /// Draws all samples of a share of the tiles; returns the sums and whether the part is complete.
     fn tiles(&mut self, starts: &[u32], known: Option<Sums>) -> Result<(Vec<Sums>, bool)> {
         let end = starts[starts.len() - 1];
         let from = known.as_ref().map_or(0, |known| known.samples[1]);
@@ -202,7 +202,7 @@ impl Work<'_> {
         Ok((vec![self.renderer.sums(&drawing)?], true))
     }
 
-    /// Some of the blocks of samples of all pixels; whether they are all there.
+    /// Draws some blocks of samples for all pixels; returns the sums of each block and whether the part is complete.
     fn samples(&mut self, starts: &[u32], mut pieces: Vec<Sums>) -> Result<(Vec<Sums>, bool)> {
         let (first, end) = (starts[0], starts[starts.len() - 1]);
         self.steps.step("drawing", end - first);
@@ -222,7 +222,7 @@ impl Work<'_> {
         Ok((pieces, true))
     }
 
-    /// Layers of the surfaces; those of halves are made when all parts are there.
+    /// Layers of surfaces. Layers of half buffers are computed by `etalon merge`.
     fn layers(&mut self) -> Result<Vec<etalon::image::Aov>> {
         let own = self.args.aov.iter().copied().filter(|name| name.part().is_none() && !name.of_halves());
         let names: Vec<_> = own.collect();
@@ -230,7 +230,7 @@ impl Work<'_> {
     }
 }
 
-/// Settings that say how a film becomes display values, out of what a part tells.
+/// Settings that convert a film to display values, read from the identity of a part.
 pub(super) fn display_settings(identity: &Identity) -> Settings {
     let text = |name: &str| identity.settings.get(name).map_or("", String::as_str);
     let tonemap = etalon::image::tone::ToneMap::ALL.iter().copied().find(|curve| curve.name() == text("tonemap"));

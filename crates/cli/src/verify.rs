@@ -1,4 +1,5 @@
-//! `etalon verify`: the shipped shader functions against f64, on this device.
+//! `etalon verify`: compares the shipped shader functions on a device with their f64 twins. The evaluation is in the crate
+//! `etalon_verify`; docs/equations.md lists functions and bounds.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -20,14 +21,14 @@ use etalon::optics::Tier;
 use etalon::shader::Probe;
 use etalon_verify::{self, Cases, Entry, Figures, Worst, document, plot, vectors};
 
-/// Hostile cases per function and tier.
+/// Hostile cases (inputs outside the domain) per function and tier.
 const HOSTILE: usize = 4096;
 
-/// Evaluate every shader function on the device and compare it with its f64 twin, in three tiers: `fast` is the
-/// textbook form and promises nothing, `stable` is what pictures use, `compensated` is what is left to gain.
+/// Compare every shader function on the device with its double-precision reference (f64 twin), in three tiers: `fast` is the textbook
+/// form and has no bounds, `stable` is used for pictures, `compensated` is the most accurate
 #[derive(Debug, Clone, Args)]
 pub struct VerifyArgs {
-    /// Only this function; repeatable. With --vectors: the function that the file is for, else its stem says it
+    /// Only this function; repeatable. With --vectors: the function of the file [default: the stem of the file name]
     #[arg(long, value_name = "NAME")]
     pub function: Vec<String>,
     /// Only this tier; repeatable
@@ -36,19 +37,19 @@ pub struct VerifyArgs {
     /// Inputs per function
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..=50_000_000))]
     pub cases: u32,
-    /// Which inputs: the same seed gives the same ones on every machine
+    /// Random seed of the inputs; the same seed gives the same inputs on every machine
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Inputs and expected outputs from a CSV file: columns by name, expected ones with a leading `=`
+    /// Read inputs and expected outputs from a CSV file: columns by name, expected outputs with a leading `=`
     #[arg(long, value_name = "FILE.csv", conflicts_with_all = ["cases", "seed", "output"])]
     pub vectors: Option<PathBuf>,
-    /// Print every function with its inputs and outputs
+    /// List every function with its inputs and outputs
     #[arg(long, conflicts_with_all = ["vectors", "output", "cases", "seed", "tier", "device", "validate", "progress"])]
     pub list: bool,
-    /// Write a plot of error by region for every function into this folder, as SVG
+    /// Write an SVG plot of the error over its domain into this folder, one per function
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
-    /// Which device, and whether it is validated
+    /// Device and validation
     #[command(flatten)]
     pub device: DeviceOptions,
     /// Print one JSON document
@@ -60,7 +61,7 @@ pub struct VerifyArgs {
 }
 
 #[derive(Serialize)]
-struct Document<'a> {
+struct VerifyJson<'a> {
     schema: &'static str,
     device: &'a DeviceInfo,
     seed: Option<u64>,
@@ -70,14 +71,14 @@ struct Document<'a> {
     pass: bool,
 }
 
-/// A function in a tier, with what was found.
+/// The errors of a function in a tier.
 struct Finding {
     entry: Entry,
     tier: Tier,
     /// GPU milliseconds per million evaluations.
     per_million: f64,
     figures: Vec<Figures>,
-    /// Hostile cases that gave NaN, and the first of them.
+    /// Number of hostile cases that returned NaN, and the inputs of the first; `None` where inputs come from a file.
     hostile: Option<(usize, Option<Vec<f64>>)>,
 }
 
@@ -91,14 +92,14 @@ impl Finding {
 /// Runs the command: exit 0 when every bound holds, 1 when one does not.
 ///
 /// # Errors
-/// An unknown function, an unreadable vector file, a device that fails, a folder that cannot be written.
+/// For an unknown function, an unreadable vector file, a device that fails, or a folder that cannot be written.
 pub fn run(args: &VerifyArgs, quiet: bool) -> Result<ExitCode> {
     if args.list {
         return list(args);
     }
     let given = match &args.vectors {
         Some(path) => {
-            ensure!(args.function.len() < 2, "--vectors takes one --function, {} were given", args.function.len());
+            ensure!(args.function.len() < 2, "--vectors takes one --function, but {} were given", args.function.len());
             Some(vectors::load(path, args.function.first().map(String::as_str))?)
         }
         None => None,
@@ -107,7 +108,7 @@ pub fn run(args: &VerifyArgs, quiet: bool) -> Result<ExitCode> {
         Some((entry, _)) => vec![*entry],
         None => chosen(args)?,
     };
-    // Each once, in the order of the catalogue, however often it was named.
+    // Each tier once, in a fixed order, however often it was named.
     let tiers: Vec<Tier> =
         Tier::ALL.into_iter().filter(|tier| args.tier.is_empty() || args.tier.contains(tier)).collect();
     let device = Device::open(&args.device.choice(), args.device.validate)?;
@@ -138,7 +139,7 @@ pub fn run(args: &VerifyArgs, quiet: bool) -> Result<ExitCode> {
         pass = false;
     }
     if args.json {
-        let document = Document {
+        let document = VerifyJson {
             schema: "etalon.verify/1",
             device: device.info(),
             seed: args.vectors.is_none().then_some(args.seed),
@@ -156,7 +157,7 @@ pub fn run(args: &VerifyArgs, quiet: bool) -> Result<ExitCode> {
                 let verdict = if finding.tier == Tier::Fast { "not promised" } else { "FAILS" };
                 let (name, tier) = (finding.entry.probe.name, finding.tier.name());
                 print(&format!(
-                    "{name}, {tier}: NaN for {count} of {HOSTILE} inputs out of its domain ({verdict}): {inputs}"
+                    "{name}, {tier}: NaN for {count} of {HOSTILE} inputs outside its domain ({verdict}): {inputs}"
                 ))?;
             }
         }
@@ -165,7 +166,7 @@ pub fn run(args: &VerifyArgs, quiet: bool) -> Result<ExitCode> {
         let (count, held) = judged.fold((0, 0), |(n, held), f| (n + 1, held + usize::from(f.pass)));
         print(&format!("{}, {}: {held} of {count} bounds hold", info.name, info.driver))?;
         if count == 0 {
-            print("the tier fast promises nothing: nothing was judged")?;
+            print("the tier fast has no bounds: nothing was judged")?;
         }
     }
     Ok(if pass { ExitCode::SUCCESS } else { ExitCode::FAILURE })
@@ -214,7 +215,7 @@ fn examine(
     Ok(findings)
 }
 
-/// The functions that were named, each once, in the order of the catalogue; all where none was.
+/// The functions of `--function`, each once, in the order of the catalogue; all functions without the option.
 fn chosen(args: &VerifyArgs) -> Result<Vec<Entry>> {
     for name in &args.function {
         etalon_verify::find(name)?;
@@ -223,7 +224,7 @@ fn chosen(args: &VerifyArgs) -> Result<Vec<Entry>> {
     Ok(etalon_verify::catalogue().into_iter().filter(named).collect())
 }
 
-/// Every function with its columns.
+/// Prints every function with its inputs and outputs.
 fn list(args: &VerifyArgs) -> Result<ExitCode> {
     let entries = chosen(args)?;
     if args.json {
@@ -312,7 +313,7 @@ fn table(findings: &[Finding]) -> Table {
     table
 }
 
-/// Three digits.
+/// Formats a number with two or three significant digits.
 fn short(x: f64) -> String {
     if x == 0.0 || (1e-2..1e5).contains(&x) { format!("{x:.2}") } else { format!("{x:.1e}") }
 }
@@ -322,7 +323,7 @@ fn named_worst(entry: &Entry, worst: &Worst) -> String {
     format!("row {}: {inputs}; got {:e}, exact {:e}", worst.row, worst.got, worst.expected)
 }
 
-/// Inputs by name, in decimal and in hex; of a long series the first ones.
+/// The first 16 inputs by name, in decimal and in hex.
 fn named(probe: &Probe, values: &[f64]) -> String {
     let shown = 16;
     let one = |(column, (name, &value)): (usize, (&&str, &f64))| {
@@ -340,7 +341,7 @@ fn named(probe: &Probe, values: &[f64]) -> String {
     text
 }
 
-/// Inputs as the device gets them.
+/// Inputs as the 32-bit words that the device gets.
 fn hex(probe: &Probe, values: &[f64]) -> Vec<String> {
     values.iter().enumerate().map(|(column, &value)| format!("0x{:08x}", probe.word(column, value))).collect()
 }
@@ -398,7 +399,7 @@ fn json_hostile(finding: &Finding) -> Option<Value> {
     }))
 }
 
-/// JSON has no infinities: they are words.
+/// A number as JSON; infinities and NaN become strings, because JSON has none.
 fn number(x: f64) -> Value {
     if x.is_finite() { json!(x) } else { json!(x.to_string()) }
 }

@@ -1,4 +1,4 @@
-//! `etalon view`: the scene in a window.
+//! `etalon view`: opens the desktop viewer of the crate `etalon_viewer`. See docs/view.md.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -8,18 +8,18 @@ use anyhow::{Result, bail};
 use clap::Args;
 
 use super::budget;
-use super::options::{DeviceOptions, Extent, PictureOptions, SceneOptions};
+use super::options::{DeviceOptions, PictureOptions, PlanExtent, SceneOptions};
 use etalon::frame::Settings;
 use etalon::gpu::{DeviceInfo, Severity};
 use etalon::image::file;
 use etalon::open::Opened;
-use etalon::scene::{Camera, Reads, Scene};
+use etalon::scene::{Camera, Prune, Scene};
 use etalon_cost::command::arguments;
 use etalon_farm::identity::contents;
-use etalon_viewer::shared::{Asked, Loaded, Source};
+use etalon_viewer::shared::{Loaded, OpenRequest, SceneSource};
 use etalon_viewer::{Start, View, run as run_window};
 
-/// Open a window that shows the scene, and why it looks as it does
+/// Open a window that shows the scene, with its plan, pass times, and the rays and equations of a pixel
 #[derive(Debug, Clone, Args)]
 pub struct ViewArgs {
     #[command(flatten)]
@@ -28,15 +28,15 @@ pub struct ViewArgs {
     picture: PictureOptions,
     #[command(flatten)]
     device: DeviceOptions,
-    /// Begin without panels: P brings them
+    /// Start without panels; the key P shows them
     #[arg(long)]
     bare: bool,
 }
 
-impl Source for ViewArgs {
-    fn open(&self, asked: Asked<'_>, device: &DeviceInfo) -> Result<Loaded> {
+impl SceneSource for ViewArgs {
+    fn open(&self, asked: OpenRequest<'_>, device: &DeviceInfo) -> Result<Loaded> {
         let options = &asked_for(&self.scene, asked.file, asked.time);
-        let scene = options.load(Reads::Everything)?;
+        let scene = options.load(Prune::Nothing)?;
         let (environment, more) = options.load_environment()?;
         let camera = options.choose_camera(&scene, asked.size)?;
         let framed = options.frames(&scene);
@@ -45,7 +45,7 @@ impl Source for ViewArgs {
         self.picture.colour_of(&scene, &mut knobs)?;
         let mut opened = Opened::new(scene, environment, options.asks_for_environment());
         opened.warnings.extend(more);
-        // `cost` measures the size of the command line, whatever part of the window the picture has.
+        // `cost` measures at the size of the command line, not at the size of the picture in the window.
         let priced = budget::command(options, &self.picture, &self.device);
         let prices = budget::known(&priced, &contents(opened.scene(), opened.environment()), device);
         let (lit, as_lit) = opened.lit(Settings::default());
@@ -61,15 +61,15 @@ impl Source for ViewArgs {
         })
     }
 
-    fn moment(&self, asked: Asked<'_>) -> Result<(Scene, Camera)> {
+    fn moment(&self, asked: OpenRequest<'_>) -> Result<(Scene, Camera)> {
         let options = asked_for(&self.scene, asked.file, asked.time);
-        let scene = options.load(Reads::Everything)?;
+        let scene = options.load(Prune::Nothing)?;
         let camera = options.choose_camera(&scene, asked.size)?;
         Ok((scene, camera))
     }
 }
 
-/// The same options for another file, or another time: what belongs to the first file, its cameras and its time, is forgotten.
+/// The options for another file or another time. For another file, camera and time of the first file are dropped.
 fn asked_for(options: &SceneOptions, file: Option<&Path>, time: Option<f64>) -> SceneOptions {
     let options = match file {
         None => options.clone(),
@@ -86,7 +86,7 @@ fn asked_for(options: &SceneOptions, file: Option<&Path>, time: Option<f64>) -> 
     SceneOptions { time: time.map_or(options.time, |time| time.to_string()), ..options }
 }
 
-/// The command that draws a view.
+/// The `etalon render` command that draws a view.
 fn command(args: &ViewArgs, view: &View<'_>) -> String {
     let mut scene = asked_for(&args.scene, view.file, view.time);
     scene.env_rotation = view.settings.environment_rotation;
@@ -114,7 +114,7 @@ fn command(args: &ViewArgs, view: &View<'_>) -> String {
     words.concat().join(" ")
 }
 
-/// Where files that were opened are noted, a line each.
+/// File that lists recently opened files, one per line.
 fn notes() -> Option<PathBuf> {
     Some(file::cache_folder()?.join("recent"))
 }
@@ -124,7 +124,7 @@ fn recent() -> Vec<PathBuf> {
     text.lines().map(PathBuf::from).filter(|path| path.is_file()).collect()
 }
 
-/// Notes files for the next time; where that is impossible they are known until the window is closed.
+/// Stores the recent files. If the list cannot be written, they are known until the window is closed.
 fn keep(recent: &[PathBuf]) {
     let text: String = recent.iter().map(|path| format!("{}\n", path.display())).collect();
     let write = |path: PathBuf| {
@@ -133,21 +133,21 @@ fn keep(recent: &[PathBuf]) {
     };
     let written = notes().map(write);
     if let Some(Err(error)) = written {
-        tracing::info!("recent files are not kept: {error:#}");
+        tracing::info!("the list of recent files cannot be written: {error:#}");
     }
 }
 
 /// Runs the command.
 ///
 /// # Errors
-/// One sentence: no display, no device, a file that cannot be read.
+/// One sentence when there is no display or no device, or when a file cannot be read.
 pub fn run(args: &ViewArgs) -> Result<ExitCode> {
     if let Some(error) = &args.picture.max_error {
-        bail!("--max-error {error}: the viewer draws until its samples are done; `render` has this option");
+        bail!("--max-error {error}: the viewer always draws all samples; use this option with `render`");
     }
-    if args.picture.plan == Extent::ExplainCost {
+    if args.picture.plan == PlanExtent::ExplainCost {
         bail!(
-            "--plan explain-cost: the viewer measures no effects that are left out; `plan` and `render` have this option"
+            "--plan explain-cost: the viewer does not measure the cost of effects; use this option with `plan` or `render`"
         );
     }
     let settings = args.picture.settings(&args.scene)?;
@@ -164,7 +164,7 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode> {
         command: Box::new(move |view| command(&told, view)),
         recent: recent(),
         keep: Box::new(keep),
-        // A terminal that has gone is no reason to close the window.
+        // A closed terminal does not close the window.
         said: Box::new(|command| drop(super::print(command))),
     })?;
     let errors: Vec<_> = messages.iter().filter(|message| message.severity == Severity::Error).collect();

@@ -111,7 +111,7 @@ fn a_run_is_what_its_commands_draw() {
     };
     let budget = |more: &[&str]| -> Value {
         let run = render(more).succeeded();
-        assert!(!run.stderr.contains("measuring") && run.stderr.contains("given up"), "{run:?}");
+        assert!(!run.stderr.contains("has not been measured") && run.stderr.contains("simplified"), "{run:?}");
         let report = std::fs::read(at.join("w.json")).expect("a report");
         serde_json::from_slice::<Value>(&report).expect("JSON")["budget"].clone()
     };
@@ -126,7 +126,7 @@ fn a_run_is_what_its_commands_draw() {
     assert!((number(&chosen["found_error"]["median"]) - number(&chosen["error"]["median"])).abs() < 1e-9, "{chosen}");
     // What cannot be kept is answered with what comes nearest.
     for (limit, said) in [
-        (["--within", "0.0001"], "--within 0.0001: the picture takes"),
+        (["--within", "0.0001"], "--within 0.0001: the picture took"),
         (["--max-error", "0.0000001"], "the picture's error is"),
     ] {
         std::fs::remove_file(at.join("w.png")).expect("a picture");

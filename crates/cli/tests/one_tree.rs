@@ -16,13 +16,13 @@ use etalon::plan::{Knobs, Model};
 use etalon::prepare::Prepared;
 use etalon::scene::{Camera, Scene};
 use etalon::transport::bvh::Bvh;
-use etalon_viewer::shared::{Asked, Loaded, Pick, Shared, Source, Wanted};
+use etalon_viewer::shared::{Loaded, OpenRequest, Pick, RenderRequest, SceneSource, SharedState};
 use etalon_viewer::worker::Worker;
 
 struct Pool;
 
-impl Source for Pool {
-    fn open(&self, asked: Asked<'_>, _: &DeviceInfo) -> Result<Loaded> {
+impl SceneSource for Pool {
+    fn open(&self, asked: OpenRequest<'_>, _: &DeviceInfo) -> Result<Loaded> {
         let opened = Opened::load("study:pool")?;
         Ok(Loaded {
             name: opened.scene().name.clone(),
@@ -36,7 +36,7 @@ impl Source for Pool {
         })
     }
 
-    fn moment(&self, _: Asked<'_>) -> Result<(Scene, Camera)> {
+    fn moment(&self, _: OpenRequest<'_>) -> Result<(Scene, Camera)> {
         bail!("nothing moves")
     }
 }
@@ -52,12 +52,12 @@ fn settings(model: Model, more: &[&str]) -> Settings {
 fn two_sides_and_a_picked_pixel_take_one_tree() {
     let left = settings(Model::Recursive, &[]);
     let right = settings(Model::Local, &["reflection=ray", "fresnel=exact"]);
-    let wanted = Wanted {
+    let wanted = RenderRequest {
         other: Some(right.knobs.clone()),
         picked: Some(Pick { number: 1, pixel: [16, 9] }),
-        ..Wanted::new(left.clone())
+        ..RenderRequest::new(left.clone())
     };
-    let shared = Arc::new(Shared::new(wanted));
+    let shared = Arc::new(SharedState::new(wanted));
     let (to, woken) = channel();
     let before = Bvh::built();
     let thread = {

@@ -61,7 +61,7 @@ fn a_plan_can_be_read() {
     let folder = tempfile::tempdir().expect("a folder");
     let all = [&["plan", "study:pool", "--set", "quadrature=left"][..], &COMMON].concat();
     let text = etalon(folder.path(), &all, &HASTY).succeeded().stdout;
-    for said in ["refraction", "has transmission 1", "not called for", "reflection and refraction", "interact", "MB"] {
+    for said in ["refraction", "has transmission 1", "not needed", "reflection and refraction", "interact", "MB"] {
         assert!(text.contains(said), "\"{said}\" is not in {text}");
     }
     assert!(text.contains("warning: quadrature=left changes nothing"), "{text}");
@@ -112,21 +112,21 @@ fn what_is_left_out_has_a_price() {
     let effects = plan["effects"].as_array().expect("a list").iter();
     let priced = |name: &Value| costs.iter().any(|cost| cost["effect"] == *name);
     let without: Vec<_> = effects
-        .filter(|effect| effect["state"] != "kept" && !priced(&effect["name"]))
+        .filter(|effect| effect["state"] != "used" && !priced(&effect["name"]))
         .map(|e| e["name"].clone())
         .collect();
-    let mut alone = vec!["media that vary", "quadrature", "prefiltered environment", "surfaces that light"];
-    alone.extend(["lights with a shape", "aims", "dispersion"]);
+    let mut alone = vec!["heterogeneous media", "quadrature", "prefiltered environment", "emissive surfaces as lights"];
+    alone.extend(["analytic area lights", "path guiding", "dispersion"]);
     assert_eq!(without, alone);
-    assert!(of("layers")["bytes"].as_i64() > Some(48 * 27 * 8), "{costs:?}");
-    assert!(of("see-through surfaces")["pipelines"].as_i64() > Some(1), "{costs:?}");
-    assert!(of("mirrors")["spirv_bytes"].as_i64() > Some(10_000), "{costs:?}");
+    assert!(of("material layers")["bytes"].as_i64() > Some(48 * 27 * 8), "{costs:?}");
+    assert!(of("order-independent transparency")["pipelines"].as_i64() > Some(1), "{costs:?}");
+    assert!(of("reflection")["spirv_bytes"].as_i64() > Some(10_000), "{costs:?}");
     assert!(costs.iter().all(|cost| cost["frame_ms"].is_f64()), "{costs:?}");
     let by = |cost: &Value| {
-        ["paths", "bands of wavelengths"].iter().any(|name| cost["effect"] == *name) || cost["by"] == "asked for"
+        ["path tracing", "spectral rendering"].iter().any(|name| cost["effect"] == *name) || cost["by"] == "asked for"
     };
     assert!(costs.iter().all(by), "{costs:?}");
-    assert_eq!(of("paths")["by"], "shadows=ray, reflection=ray, refraction=ray, indirect=path");
+    assert_eq!(of("path tracing")["by"], "shadows=ray, reflection=ray, refraction=ray, indirect=path");
     let lean = planned(folder.path(), &["study:radiance"]).0;
     assert!(lean.get("costs").is_none());
     // What a knob drops is planned with another rung.
@@ -144,9 +144,9 @@ fn everything_can_be_planned() {
     let count = |plan: &Value, state: &str| {
         plan["effects"].as_array().expect("a list").iter().filter(|effect| effect["state"] == state).count()
     };
-    assert!(count(&lean, "not called for") > 10);
+    assert!(count(&lean, "not needed") > 10);
     // Bodies that touch are another picture, and so is dispersion.
-    assert_eq!(count(&full, "not called for"), 2);
+    assert_eq!(count(&full, "not needed"), 2);
     let reasons = full["effects"].to_string();
     assert!(reasons.contains("asked for, although no material in use has it"), "{reasons}");
     assert!(full["pipelines"].as_array().expect("a list").len() > lean["pipelines"].as_array().expect("a list").len());

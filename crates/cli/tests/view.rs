@@ -20,7 +20,7 @@ use etalon::study;
 use etalon_testing::gltf_builder::{Builder, FLOAT, f32s};
 use etalon_testing::gpu::Gpu;
 use etalon_testing::made::Random;
-use etalon_viewer::shared::{Asked, Loaded, Seen, Shared, Source, Viewpoint, Wanted};
+use etalon_viewer::shared::{Loaded, OpenRequest, RenderRequest, RenderState, SceneSource, SharedState, Viewpoint};
 use etalon_viewer::worker::Worker;
 use serde_json::json;
 use x11::{Display, Viewer};
@@ -280,8 +280,8 @@ fn scene() -> Scene {
 
 struct Study;
 
-impl Source for Study {
-    fn open(&self, _: Asked<'_>, _: &DeviceInfo) -> Result<Loaded> {
+impl SceneSource for Study {
+    fn open(&self, _: OpenRequest<'_>, _: &DeviceInfo) -> Result<Loaded> {
         let scene = scene();
         Ok(Loaded {
             name: scene.name.clone(),
@@ -295,7 +295,7 @@ impl Source for Study {
         })
     }
 
-    fn moment(&self, _: Asked<'_>) -> Result<(Scene, Camera)> {
+    fn moment(&self, _: OpenRequest<'_>) -> Result<(Scene, Camera)> {
         bail!("nothing moves")
     }
 }
@@ -307,7 +307,7 @@ fn every_knob_turns_while_pictures_are_drawn() {
     let gpu = Gpu::hasty();
     let size = [64, 36];
     let settings = |knobs: &Knobs| Settings { size, knobs: knobs.clone(), ..Settings::default() };
-    let shared = Arc::new(Shared::new(Wanted::new(settings(&Knobs::of(Model::Local)))));
+    let shared = Arc::new(SharedState::new(RenderRequest::new(settings(&Knobs::of(Model::Local)))));
     let (to, woken) = channel();
     let thread = {
         let (device, shared) = (gpu.device.clone(), shared.clone());
@@ -334,7 +334,7 @@ fn every_knob_turns_while_pictures_are_drawn() {
     let last = settings(&Knobs::of(Model::Recursive));
     let last = Settings { size: [480, 270], ..last };
     shared.want(|wanted| (wanted.settings, wanted.moving) = (last.clone(), true));
-    let wait = |what: &str, is_there: &dyn Fn(&Seen) -> bool| {
+    let wait = |what: &str, is_there: &dyn Fn(&RenderState) -> bool| {
         let begun = std::time::Instant::now();
         loop {
             let seen = shared.seen();
@@ -369,7 +369,8 @@ fn every_knob_turns_while_pictures_are_drawn() {
     words[factor] = 30.0_f32.to_bits();
     let code = Arc::new(vec![Replacement { program: program.name, stage: 0, words }]);
     shared.want(|wanted| wanted.code = code);
-    let is_new = |seen: &Seen, version| seen.shown().is_some_and(|shown| shown.is_done() && shown.version > version);
+    let is_new =
+        |seen: &RenderState, version| seen.shown().is_some_and(|shown| shown.is_done() && shown.version > version);
     let other = wait("other code", &|seen| is_new(seen, before.version)).shown().expect("a picture").clone();
     assert!(other.rgba != before.rgba, "the same picture by other code");
     shared.want(|wanted| wanted.code = Arc::default());

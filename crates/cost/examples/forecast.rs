@@ -8,8 +8,8 @@ use etalon::gpu::{Device, DeviceChoice};
 use etalon::open::Opened;
 use etalon_cost::pace::Step;
 use etalon_cost::predict::{PIXELS, Trial, predict, score};
-use etalon_cost::sitting::Bench;
-use etalon_cost::sweep::{Extent, Listener, Sweep};
+use etalon_cost::sweep::{Listener, Sweep, SweepExtent};
+use etalon_cost::warm::Bench;
 
 /// Pixels that are measured.
 const SIZE: [u32; 2] = [320, 180];
@@ -30,7 +30,8 @@ fn main() -> anyhow::Result<()> {
             camera: &camera,
         };
         let folder = tempfile::tempdir()?;
-        let [foretold, measured] = SECONDS.map(|budget_s| Extent { budget_s, reference_samples: None, shard: [1, 1] });
+        let [foretold, measured] =
+            SECONDS.map(|budget_s| SweepExtent { budget_s, reference_samples: None, shard: [1, 1] });
         let trial = Trial { folder: &folder.path().join("forecast"), extent: foretold, pixels: PIXELS };
         let predictions = predict(&bench(), &trial, &mut |_: Step<'_>| ())?;
         let own = folder.path().join("cost");

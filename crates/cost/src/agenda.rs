@@ -4,8 +4,8 @@ use anyhow::{Context as _, Result};
 use serde::{Deserialize, Serialize};
 
 use super::command::set;
-use super::sitting::Bench;
 use super::table::{Family, KnobState};
+use super::warm::Bench;
 use etalon::plan::{EffectState, KNOBS, Knob, Knobs, Model, Plan};
 
 /// A rung that one knob is set to.

@@ -5,11 +5,12 @@ use serde::Serialize;
 
 use super::agenda::Change;
 use super::difference::ShownReference;
-use super::price::{Clock, Pair, Turns, price};
-use super::sitting::{Bench, ENOUGH_MS};
+use super::price::{Pair, PairedTimes, TimeNoise, price};
 use super::statistics::{Interval, MANY, standard_errors};
 use super::table::{Price, WorstPixel};
-use etalon::image::metric::{AnyPicture, Metric, compare};
+use super::warm::{Bench, ENOUGH_MS};
+use etalon::image::metric::{AnyPicture, Metric, compare, map_rgba};
+use etalon::image::png::encode_png;
 use etalon::plan::{Knob, Knobs};
 
 /// What is said of two pictures: a time, and an error in squares of three sides.
@@ -28,6 +29,9 @@ pub struct Compared {
     pub price: Price,
     /// Where an eye sees most of it.
     pub worst_pixel: WorstPixel,
+    /// PNG files of the rungs and of FLIP's error map between them.
+    #[serde(skip)]
+    pub pictures: [Vec<u8>; 3],
 }
 
 /// Draws both, `knobs` being those of all others.
@@ -50,19 +54,24 @@ pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<C
     let knob = Knob::named(name).context("a knob of the table")?;
     ensure!(first != last, "--compare {wanted}: both are the same rung");
     let [first, last] = if knob.place(&first) < knob.place(&last) { [first, last] } else { [last, first] };
-    let mut exact = bench.sit(&last)?;
-    let truth = bench.take(&mut exact, None, ENOUGH_MS)?;
-    let mut sitting = bench.sit(&first)?;
-    let taken = bench.take(&mut sitting, Some((&mut exact, &truth)), ENOUGH_MS)?;
+    let mut exact = bench.warm_up(&last)?;
+    let truth = bench.measure(&mut exact, None, ENOUGH_MS)?;
+    let mut warm = bench.warm_up(&first)?;
+    let measured = bench.measure(&mut warm, Some((&mut exact, &truth)), ENOUGH_MS)?;
     let shown = |display: &etalon::image::png::Display| AnyPicture::Display(display.clone());
-    let flip = compare(Metric::Flip, &shown(&truth.display), &shown(&taken.display))?;
-    let gpu_ms = [Interval::of(&taken.ms), Interval::of(&taken.others_ms)];
+    let flip = compare(Metric::Flip, &shown(&truth.display), &shown(&measured.display))?;
+    let png = |display: &etalon::image::png::Display| {
+        encode_png(display.width, display.height, display.rgba.as_flattened(), false)
+    };
+    let pictures =
+        [png(&measured.display)?, png(&truth.display)?, encode_png(flip.width, flip.height, &map_rgba(&flip), false)?];
+    let gpu_ms = [Interval::of(&measured.ms), Interval::of(&measured.baseline_ms)];
     let rungs = [knob.rung(&first), knob.rung(&last)];
     let change = Change { knob: knob.name.to_owned(), from: rungs[1].to_owned(), to: rungs[0].to_owned() };
-    let pair = Pair::of(&change, &taken, &truth)?;
-    let more = truth.halves.is_none().then(|| ShownReference::exact(&truth.display).error(&taken.display));
-    let clock = Clock::of([(&taken.ms[..], &taken.others_ms[..])].into_iter());
-    let turns = Turns { ms: &taken.ms, others_ms: &taken.others_ms, clock };
+    let pair = Pair::of(&change, &measured, &truth)?;
+    let more = truth.halves.is_none().then(|| ShownReference::exact(&truth.display).error(&measured.display));
+    let clock = TimeNoise::of([(&measured.ms[..], &measured.baseline_ms[..])].into_iter());
+    let turns = PairedTimes { ms: &measured.ms, baseline_ms: &measured.baseline_ms, clock };
     let price = price(&change, &pair, more, turns, STATEMENTS, standard_errors(STATEMENTS, MANY));
     Ok(Compared {
         knob: knob.name,
@@ -70,5 +79,6 @@ pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<C
         gpu_ms,
         price,
         worst_pixel: WorstPixel { x: flip.worst[0], y: flip.worst[1], error: flip.worst_error },
+        pictures,
     })
 }

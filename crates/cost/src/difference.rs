@@ -116,7 +116,7 @@ pub fn shown(picture: &Picture, view: &ViewTransform) -> Shown {
 /// spread over the squares says how well that is known. Displayed values are bounded: single pixels that are far too bright count as
 /// much as others. Larger squares have less noise, and see no difference that is finer than they are.
 #[must_use]
-pub fn without_noise(a: &[Shown; 2], b: &[Shown; 2], width: usize, side: usize) -> Estimate {
+pub fn unbiased_squared_difference(a: &[Shown; 2], b: &[Shown; 2], width: usize, side: usize) -> Estimate {
     let across = width / side;
     let down = a[0].len() / width.max(1) / side;
     let mean = |half: usize, x: usize, y: usize, c: usize| -> f64 {
@@ -144,13 +144,13 @@ pub fn without_noise(a: &[Shown; 2], b: &[Shown; 2], width: usize, side: usize) 
 
 /// The same in squares of several sides, the finest first.
 #[must_use]
-pub fn in_squares(a: &[Shown; 2], b: &[Shown; 2], width: usize) -> Vec<(u32, Estimate)> {
-    SIDES.map(|side| (side, without_noise(a, b, width, side as usize))).into()
+pub fn in_blocks(a: &[Shown; 2], b: &[Shown; 2], width: usize) -> Vec<(u32, Estimate)> {
+    SIDES.map(|side| (side, unbiased_squared_difference(a, b, width, side as usize))).into()
 }
 
 /// Which of them tells most: the finest that is told from nothing, or the finest.
 #[must_use]
-pub fn told(squares: &[(u32, Estimate)], standard_errors: f64) -> Option<(u32, Estimate)> {
+pub fn significant(squares: &[(u32, Estimate)], standard_errors: f64) -> Option<(u32, Estimate)> {
     squares.iter().find(|(_, found)| found.is_above(standard_errors)).or(squares.first()).copied()
 }
 
@@ -181,7 +181,7 @@ const CAUTION: f64 = 3.0;
 
 /// Sums over pixels and colours that an error and its uncertainty are made of.
 #[derive(Default, Clone, Copy)]
-struct Sums {
+struct SquaredSums {
     value: f64,
     /// The variance that the reference's noise gives it.
     variance: f64,
@@ -189,7 +189,7 @@ struct Sums {
     weight: f64,
 }
 
-impl Sums {
+impl SquaredSums {
     fn add(self, other: Self) -> Self {
         Self {
             value: self.value + other.value,
@@ -238,7 +238,7 @@ impl ShownReference {
         let estimates = [estimate(&levels[0]), estimate(&levels[1])];
         // How far a half is from its own halves, of which the other half tells the square without noise; what the film is from here on.
         let side = ((parts[0].rgba.len() / SQUARES) as f64).sqrt() as usize;
-        let change = without_noise(
+        let change = unbiased_squared_difference(
             &[levels[0][1].clone(), levels[1][1].clone()],
             &[levels[0][0].clone(), levels[1][0].clone()],
             parts[0].width as usize,
@@ -258,22 +258,22 @@ impl ShownReference {
     /// Means of what `of` makes of a pixel's colour: of both estimates, and the squared variance of the noise of one. Neighbours have
     /// about the same variance and no random numbers in common: the product of both pixels' (j₁ − j₂)² is 4v² in the mean whatever the
     /// noise is distributed like, which that of one pixel's is not.
-    fn means(&self, of: impl Fn(usize, usize, [f64; 2], f64) -> Sums + Sync) -> [f64; 3] {
+    fn means(&self, of: impl Fn(usize, usize, [f64; 2], f64) -> SquaredSums + Sync) -> [f64; 3] {
         let [j1, j2] = &self.estimates;
         let square = |i: usize, c: usize| (f64::from(j1[i][c]) - f64::from(j2[i][c])).powi(2);
         let neighbour = |i: usize| if i + 1 < j1.len() { i + 1 } else { i.saturating_sub(1) };
         let pixel = |i: usize| {
             let all = (0..3)
                 .map(|c| of(i, c, [j1[i][c], j2[i][c]].map(f64::from), 0.25 * square(i, c) * square(neighbour(i), c)));
-            all.fold(Sums::default(), Sums::add)
+            all.fold(SquaredSums::default(), SquaredSums::add)
         };
         // In pieces of one size, so that sums are the same on every machine.
         let pixels: Vec<usize> = (0..j1.len()).collect();
-        let pieces: Vec<Sums> = pixels
+        let pieces: Vec<SquaredSums> = pixels
             .par_chunks(4096)
-            .map(|piece| piece.iter().map(|&i| pixel(i)).fold(Sums::default(), Sums::add))
+            .map(|piece| piece.iter().map(|&i| pixel(i)).fold(SquaredSums::default(), SquaredSums::add))
             .collect();
-        pieces.into_iter().fold(Sums::default(), Sums::add).means(j1.len())
+        pieces.into_iter().fold(SquaredSums::default(), SquaredSums::add).means(j1.len())
     }
 
     /// The mean squared error of displayed values 0 to 1 against what the reference converges to.
@@ -286,7 +286,7 @@ impl ShownReference {
         let [mean, deviation, _] = self.means(|i, c, [j1, j2], squared| {
             let x = f64::from(x.rgba[i][c]) / 255.0;
             let value = (x - j1) * (x - j2);
-            Sums { value, variance: value * (j1 - j2) * (j1 - j2) + 3.0 * squared, weight: 0.0 }
+            SquaredSums { value, variance: value * (j1 - j2) * (j1 - j2) + 3.0 * squared, weight: 0.0 }
         });
         Estimate { mean, deviation, bias: 2.0 * mean.max(0.0).sqrt() * self.off + self.off * self.off }
     }
@@ -299,7 +299,7 @@ impl ShownReference {
         let [mean, deviation, weight] = self.means(|i, c, [j1, j2], _| {
             let [x, b] = [x, b].map(|picture| f64::from(picture.rgba[i][c]) / 255.0);
             let value = x * x - b * b - (x - b) * (j1 + j2);
-            Sums { value, variance: ((x - b) * (j1 - j2)).powi(2), weight: (x - b) * (x - b) }
+            SquaredSums { value, variance: ((x - b) * (j1 - j2)).powi(2), weight: (x - b) * (x - b) }
         });
         Estimate { mean, deviation, bias: 2.0 * weight.sqrt() * self.off }
     }
@@ -308,7 +308,8 @@ impl ShownReference {
     /// resolves.
     #[must_use]
     pub fn resolution(&self, standard_errors: f64) -> f64 {
-        let [_, deviation, _] = self.means(|_, _, _, squared| Sums { variance: squared, ..Sums::default() });
+        let [_, deviation, _] =
+            self.means(|_, _, _, squared| SquaredSums { variance: squared, ..SquaredSums::default() });
         // The least m with m² > z σ + 2mβ + β².
         (self.off + (2.0 * self.off * self.off + standard_errors * deviation).sqrt()).min(1.0)
     }
@@ -453,18 +454,18 @@ mod tests {
             (0..64 * 64).map(|i| [0.5 + off + 0.2 * noise(i + seed * 100_000); 3]).collect()
         };
         let (a, same) = ([half(1, 0.0), half(2, 0.0)], [half(3, 0.0), half(4, 0.0)]);
-        let nothing = without_noise(&a, &same, 64, 1);
+        let nothing = unbiased_squared_difference(&a, &same, 64, 1);
         assert!(holds(nothing, 0.0) && nothing.interval().high < 2e-3, "{nothing:?}");
         let other = [half(3, 0.05), half(4, 0.05)];
-        let found = without_noise(&a, &other, 64, 1);
+        let found = unbiased_squared_difference(&a, &other, 64, 1);
         assert!(holds(found, 0.0025) && found.is_above(2.0), "{found:?}");
         // Too little for pixels, but not for squares.
         let little = [half(3, 0.02), half(4, 0.02)];
-        let told = |b: &[Shown; 2]| told(&in_squares(&a, b, 64), 3.0).expect("squares");
-        let (side, found) = told(&little);
+        let found_in = |b: &[Shown; 2]| significant(&in_blocks(&a, b, 64), 3.0).expect("squares");
+        let (side, found) = found_in(&little);
         assert!(side > 1 && found.mean > 2e-4 && found.mean < 6e-4, "{side} {found:?}");
-        assert_eq!(told(&other).0, 1);
-        assert!(!told(&same).1.is_above(3.0), "{:?}", told(&same));
+        assert_eq!(found_in(&other).0, 1);
+        assert!(!found_in(&same).1.is_above(3.0), "{:?}", found_in(&same));
     }
 
     #[test]

@@ -8,7 +8,7 @@ use serde::Serialize;
 use etalon::frame::{Renderer, Settings};
 use etalon::gpu::{Device, DeviceChoice};
 use etalon::plan::rungs::{Absorption, Colour, Guiding, Indirect, Lights, Reflection, Refraction, Shadows};
-use etalon::plan::{Choice, Demand, Effect, EffectId, EffectState, Knob, Knobs, Model};
+use etalon::plan::{Choice, Effect, EffectId, EffectState, ForcedEffects, Knob, Knobs, Model};
 use etalon::prepare::Original;
 use etalon::scene::Camera;
 use etalon::scene::environment::Environment;
@@ -21,7 +21,7 @@ const ROUNDS: usize = 7;
 pub struct Price {
     /// Its name.
     pub effect: &'static str,
-    /// `not called for`: the picture would be the same. `dropped`: it would be that of another rung.
+    /// `not needed`: the picture would be the same. `switched off`: it would be that of another rung.
     pub state: &'static str,
     /// How it was planned: `asked for`, or the rungs that allow it.
     pub by: String,
@@ -77,7 +77,7 @@ impl Price {
 }
 
 /// A plan that has been drawn once.
-struct Drawn {
+struct DrawnPlan {
     renderer: Renderer,
     start_ms: f64,
     pipelines: i64,
@@ -91,7 +91,7 @@ impl Subject<'_> {
     /// # Errors
     /// When something cannot be drawn.
     pub fn prices(&self, effects: &[Effect], progress: &mut dyn FnMut(&str)) -> Result<Vec<Price>> {
-        let mut plain = self.plan(Demand::Scene, &[])?;
+        let mut plain = self.plan(ForcedEffects::None, &[])?;
         let mut prices = Vec::new();
         for effect in effects.iter().filter(|effect| effect.state != EffectState::Kept) {
             progress(effect.id.name());
@@ -99,11 +99,11 @@ impl Subject<'_> {
                 EffectState::DroppedBy(choice) => allowing(effect.id, choice).iter().map(Choice::to_string).collect(),
                 _ => Vec::new(),
             };
-            let (demand, by) = match rungs.is_empty() {
-                true => (Demand::With(effect.id), "asked for".to_owned()),
-                false => (Demand::Scene, rungs.join(", ")),
+            let (forced, by) = match rungs.is_empty() {
+                true => (ForcedEffects::One(effect.id), "asked for".to_owned()),
+                false => (ForcedEffects::None, rungs.join(", ")),
             };
-            let price = match self.plan(demand, &rungs).and_then(|mut with| self.price(effect, &mut plain, &mut with)) {
+            let price = match self.plan(forced, &rungs).and_then(|mut with| self.price(effect, &mut plain, &mut with)) {
                 Ok(price) => price.map(|price| Price { by, ..price }),
                 Err(error) => Some(Price { by, fails: Some(format!("{error:#}")), ..Price::nothing(effect) }),
             };
@@ -113,7 +113,7 @@ impl Subject<'_> {
     }
 
     /// Draws both in turns. `None`: nothing is planned otherwise, since the effect needs others that are left out too.
-    fn price(&self, effect: &Effect, plain: &mut Drawn, with: &mut Drawn) -> Result<Option<Price>> {
+    fn price(&self, effect: &Effect, plain: &mut DrawnPlan, with: &mut DrawnPlan) -> Result<Option<Price>> {
         if plain.renderer.plan().draws_as(with.renderer.plan()) {
             return Ok(None);
         }
@@ -141,9 +141,9 @@ impl Subject<'_> {
     }
 
     /// Makes everything for a plan, on a device that has made nothing yet, and draws once.
-    fn plan(&self, demand: Demand, rungs: &[String]) -> Result<Drawn> {
+    fn plan(&self, forced: ForcedEffects, rungs: &[String]) -> Result<DrawnPlan> {
         let device = Device::open(self.device, false)?;
-        let mut settings = Settings { demand, ..self.settings.clone() };
+        let mut settings = Settings { forced, ..self.settings.clone() };
         settings.max_error = None;
         settings.knobs.set("samples=1")?;
         settings.knobs.set_all(rungs)?;
@@ -154,7 +154,7 @@ impl Subject<'_> {
         let pipelines = device.pipelines();
         let spirv: usize = pipelines.iter().map(|(program, constants)| program.spirv_bytes(constants)).sum();
         let bytes: u64 = device.created().iter().filter(|made| made.name != "staging").map(|made| made.bytes).sum();
-        Ok(Drawn {
+        Ok(DrawnPlan {
             renderer,
             start_ms,
             pipelines: pipelines.len() as i64,
@@ -173,12 +173,12 @@ impl Subject<'_> {
 /// The rungs that allow an effect which a knob has dropped: those of the recursive model, and those that paths need.
 fn allowing(effect: EffectId, dropped_by: Choice) -> Vec<Choice> {
     let paths = [Shadows::Ray.choice(), Reflection::Ray.choice(), Refraction::Ray.choice(), Indirect::Path.choice()];
-    let by_lights = [Lights::Area1.choice(), Guiding::Aims.choice()];
+    let by_lights = [Lights::Area1.choice(), Guiding::Photons.choice()];
     match effect {
-        EffectId::VaryingMedia => vec![Refraction::Ray.choice(), Absorption::March32.choice()],
-        EffectId::Paths => paths.into(),
-        EffectId::Wavelengths | EffectId::Dispersion => vec![Colour::Spectral16.choice()],
-        EffectId::EmittingSurfaces | EffectId::ShapedLights | EffectId::Aims => [&paths[..], &by_lights].concat(),
+        EffectId::HeterogeneousMedia => vec![Refraction::Ray.choice(), Absorption::March32.choice()],
+        EffectId::PathTracing => paths.into(),
+        EffectId::SpectralRendering | EffectId::Dispersion => vec![Colour::Spectral16.choice()],
+        EffectId::EmissiveLights | EffectId::AreaLights | EffectId::PathGuiding => [&paths[..], &by_lights].concat(),
         _ if dropped_by == Indirect::Path.choice() => {
             vec![Indirect::Ambient.choice(), Lights::Points.choice(), Guiding::Off.choice()]
         }

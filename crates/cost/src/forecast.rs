@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::sitting::turns;
+use super::warm::turns;
 use etalon::plan::Knobs;
 use etalon::plan::rungs::{Indirect, Reflection, Refraction, Shadows};
 

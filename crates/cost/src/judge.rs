@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::agenda::Change;
 use super::difference::Truth;
-use super::price::{Clock, Pair, Turns, price};
+use super::price::{Pair, PairedTimes, TimeNoise, price};
 use super::reference::display_of;
 use super::statistics::{Interval, MANY, standard_errors};
 use super::table::{Errors, Family, Other, Point, Price, REFERENCE, Recommended, Reference, WorstPixel};
@@ -44,7 +44,7 @@ pub struct Record {
     /// GPU milliseconds of each picture …
     pub ms: Vec<f64>,
     /// … and of the base's, drawn in turns with them.
-    pub others_ms: Vec<f64>,
+    pub baseline_ms: Vec<f64>,
     /// Wall time of a start.
     pub start_ms: f64,
     /// GPU milliseconds of each pass.
@@ -110,7 +110,7 @@ impl Judge<'_> {
         let sure = standard_errors(statements, MANY);
         let displays: Vec<Display> =
             records.par_iter().map(|record| self.display(record)).collect::<Result<Vec<_>>>()?;
-        let times = even_out(records);
+        let times = normalise_by_baseline(records);
         let points: Vec<Result<Point>> =
             (0..records.len()).into_par_iter().map(|i| self.point(&records[i], &displays[i], times[i])).collect();
         let mut points = points.into_iter().collect::<Result<Vec<Point>>>()?;
@@ -118,7 +118,7 @@ impl Judge<'_> {
         points.push(the_reference(self.reference, exact_ms));
         let clocks = [Family::Local, Family::Exact].map(|family| {
             let of_family = records.iter().filter(|r| r.pair.is_some() && r.family == family);
-            Clock::of(of_family.map(|r| (&r.ms[..], &r.others_ms[..])))
+            TimeNoise::of(of_family.map(|r| (&r.ms[..], &r.baseline_ms[..])))
         });
         let base = |family: Family| {
             let name = if family == Family::Local { "local" } else { "exact" };
@@ -131,8 +131,8 @@ impl Judge<'_> {
             let local = record.family == Family::Local;
             let more = local.then(|| self.truth.shown.more_error(&displays[i], &displays[base]));
             let clock = clocks[usize::from(!local)];
-            let [ms, others_ms] = in_the_middle([&record.ms, &record.others_ms], points[base].gpu_ms.median);
-            let turns = Turns { ms: &ms, others_ms: &others_ms, clock };
+            let [ms, baseline_ms] = in_the_middle([&record.ms, &record.baseline_ms], points[base].gpu_ms.median);
+            let turns = PairedTimes { ms: &ms, baseline_ms: &baseline_ms, clock };
             prices.push(Price {
                 point: record.name.clone(),
                 flip_delta: points[i].errors.flip_mean - points[base].errors.flip_mean,
@@ -253,21 +253,21 @@ fn recommended(points: &[Point], frontier: &[usize]) -> Vec<Recommended> {
 
 /// Times of a picture and of the base that it was drawn in turns with, as quick as the machine was in the middle of the run, where that
 /// base took so many milliseconds: the times of points are told so, too.
-fn in_the_middle([ms, others_ms]: [&[f64]; 2], base_ms: f64) -> [Vec<f64>; 2] {
-    let factor = base_ms / Interval::of(others_ms).median;
+fn in_the_middle([ms, baseline_ms]: [&[f64]; 2], base_ms: f64) -> [Vec<f64>; 2] {
+    let factor = base_ms / Interval::of(baseline_ms).median;
     let factor = if factor.is_finite() && factor > 0.0 { factor } else { 1.0 };
-    [ms, others_ms].map(|all| all.iter().map(|ms| factor * ms).collect())
+    [ms, baseline_ms].map(|all| all.iter().map(|ms| factor * ms).collect())
 }
 
 /// Times as if the machine had been as quick all along: each is told as so many times the base's that was drawn in turns with it,
 /// and the base's is the middle of all of its own. Whoever draws the picture again finds the machine somewhere else: the ends are
 /// as far apart as those of the turns and those of the base over the whole run together.
-fn even_out(records: &[Record]) -> Vec<Interval> {
+fn normalise_by_baseline(records: &[Record]) -> Vec<Interval> {
     let of_exact = |record: &Record| record.family == Family::Exact;
     let bases = [false, true].map(|exact| {
-        let in_turns = || records.iter().filter(move |r| of_exact(r) == exact && !r.others_ms.is_empty());
-        let all: Vec<f64> = in_turns().flat_map(|r| r.others_ms.iter().copied()).collect();
-        let medians: Vec<f64> = in_turns().map(|r| Interval::of(&r.others_ms).median).collect();
+        let in_turns = || records.iter().filter(move |r| of_exact(r) == exact && !r.baseline_ms.is_empty());
+        let all: Vec<f64> = in_turns().flat_map(|r| r.baseline_ms.iter().copied()).collect();
+        let medians: Vec<f64> = in_turns().map(|r| Interval::of(&r.baseline_ms).median).collect();
         // A device without timestamps tells 0 of every picture, which is no base.
         let timed = all.iter().all(|&ms| ms > 0.0);
         (!all.is_empty() && timed).then(|| Interval { median: Interval::of(&medians).median, ..Interval::of(&all) })
@@ -276,8 +276,9 @@ fn even_out(records: &[Record]) -> Vec<Interval> {
         let base = bases[usize::from(of_exact(record))];
         match base {
             Some(base) if ["local", "exact"].contains(&record.name.as_str()) => base,
-            Some(base) if !record.others_ms.is_empty() => {
-                let ratios: Vec<f64> = record.ms.iter().zip(&record.others_ms).map(|(ms, other)| ms / other).collect();
+            Some(base) if !record.baseline_ms.is_empty() => {
+                let ratios: Vec<f64> =
+                    record.ms.iter().zip(&record.baseline_ms).map(|(ms, other)| ms / other).collect();
                 let ratios = Interval::of(&ratios);
                 Interval {
                     median: ratios.median * base.median,
@@ -360,9 +361,9 @@ fn around(flip: &Comparison, pictures: [&Vec<[u8; 4]>; 2]) -> Result<Vec<u8>> {
 mod tests {
     use super::*;
 
-    fn record(name: &str, ms: &[f64], others_ms: &[f64]) -> Record {
+    fn record(name: &str, ms: &[f64], baseline_ms: &[f64]) -> Record {
         serde_json::from_value(serde_json::json!({
-            "name": name, "family": "local", "knobs": {}, "ms": ms, "others_ms": others_ms, "start_ms": 0.0, "passes": [],
+            "name": name, "family": "local", "knobs": {}, "ms": ms, "baseline_ms": baseline_ms, "start_ms": 0.0, "passes": [],
             "noise": null, "work": {}, "command": "", "image": "", "picture": name, "pair": null,
         }))
         .expect("a record")
@@ -372,17 +373,17 @@ mod tests {
     fn what_a_change_adds_is_a_part_of_what_its_picture_takes() {
         // The machine was half as quick when the second picture was drawn in turns with the base.
         let all = [record("local", &[50.0, 50.0], &[]), record("a", &[80.0], &[50.0]), record("b", &[300.0], &[100.0])];
-        let times = even_out(&all);
+        let times = normalise_by_baseline(&all);
         let base = times[0].median;
-        let [ms, others_ms] = in_the_middle([&all[2].ms, &all[2].others_ms], base);
-        assert!((times[2].median - (base + ms[0] - others_ms[0])).abs() < 1e-9, "{times:?}, {ms:?}, {others_ms:?}");
+        let [ms, baseline_ms] = in_the_middle([&all[2].ms, &all[2].baseline_ms], base);
+        assert!((times[2].median - (base + ms[0] - baseline_ms[0])).abs() < 1e-9, "{times:?}, {ms:?}, {baseline_ms:?}");
     }
 
     #[test]
     fn a_device_without_timestamps_tells_no_time() {
         let all = [record("local", &[0.0], &[]), record("a", &[0.0, 0.0], &[0.0, 0.0])];
-        assert!(even_out(&all).iter().all(|time| time.median == 0.0 && time.high == 0.0));
-        let [ms, others_ms] = in_the_middle([&all[1].ms, &all[1].others_ms], 0.0);
-        assert!([ms, others_ms].concat().iter().all(|ms| *ms == 0.0));
+        assert!(normalise_by_baseline(&all).iter().all(|time| time.median == 0.0 && time.high == 0.0));
+        let [ms, baseline_ms] = in_the_middle([&all[1].ms, &all[1].baseline_ms], 0.0);
+        assert!([ms, baseline_ms].concat().iter().all(|ms| *ms == 0.0));
     }
 }

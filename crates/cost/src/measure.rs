@@ -10,7 +10,7 @@ use super::command::{arguments, named};
 use super::judge::Record;
 use super::pace::{Pace, Step};
 use super::price::Pair;
-use super::sitting::{Bench, Sitting, Taken};
+use super::warm::{Bench, Measurement, WarmRenderer};
 use etalon::image::{exr, file};
 use etalon::plan::Knobs;
 
@@ -22,8 +22,8 @@ fn stem(name: &str) -> String {
 
 /// A base that others are drawn in turns with.
 pub struct Base {
-    sitting: Sitting,
-    taken: Taken,
+    warm: WarmRenderer,
+    measured: Measurement,
 }
 
 /// What is measured with, and what was measured.
@@ -54,11 +54,11 @@ impl Measuring<'_> {
     pub fn base(&mut self, task: &Task, progress: &mut dyn FnMut(Step<'_>)) -> Result<Base> {
         let expected = self.pace.tell(&task.name, progress);
         let begun = Instant::now();
-        let mut sitting = self.bench.sit(&task.knobs)?;
-        let taken = self.bench.take(&mut sitting, None, self.enough_ms)?;
-        self.keep(task, sitting.start_ms, &taken, None)?;
+        let mut warm = self.bench.warm_up(&task.knobs)?;
+        let measured = self.bench.measure(&mut warm, None, self.enough_ms)?;
+        self.keep(task, warm.start_ms, &measured, None)?;
         self.pace.forecast.took(expected, begun.elapsed().as_secs_f64());
-        Ok(Base { sitting, taken })
+        Ok(Base { warm, measured })
     }
 
     /// A picture, in turns with a base. `None` where another part of the run draws it, there is no time for it, or it cannot be drawn:
@@ -86,18 +86,18 @@ impl Measuring<'_> {
             return Ok(None);
         }
         let begun = Instant::now();
-        let drawn = self.bench.sit(&task.knobs).and_then(|mut sitting| {
-            let taken = self.bench.take(&mut sitting, Some((&mut base.sitting, &base.taken)), self.enough_ms)?;
-            Ok((sitting.start_ms, taken))
+        let drawn = self.bench.warm_up(&task.knobs).and_then(|mut warm| {
+            let measured = self.bench.measure(&mut warm, Some((&mut base.warm, &base.measured)), self.enough_ms)?;
+            Ok((warm.start_ms, measured))
         });
-        let (start_ms, taken) = match drawn {
+        let (start_ms, measured) = match drawn {
             Ok(drawn) => drawn,
             Err(error) => {
                 self.warnings.push(format!("\"{}\" cannot be drawn here: {error:#}", task.name));
                 return Ok(None);
             }
         };
-        let record = self.keep(task, start_ms, &taken, Some(&base.taken))?;
+        let record = self.keep(task, start_ms, &measured, Some(&base.measured))?;
         self.pace.forecast.took(expected, begun.elapsed().as_secs_f64());
         Ok(Some(record))
     }
@@ -114,32 +114,38 @@ impl Measuring<'_> {
     }
 
     /// Writes a picture and what was measured of it, that last.
-    fn keep(&mut self, task: &Task, start_ms: f64, taken: &Taken, base: Option<&Taken>) -> Result<Record> {
+    fn keep(
+        &mut self,
+        task: &Task,
+        start_ms: f64,
+        measured: &Measurement,
+        base: Option<&Measurement>,
+    ) -> Result<Record> {
         let picture = stem(&task.name);
-        file::write(&self.folder.join("pictures").join(format!("{picture}.png")), &taken.png)?;
+        file::write(&self.folder.join("pictures").join(format!("{picture}.png")), &measured.png)?;
         let points = self.folder.join("points");
-        file::write(&points.join(format!("{picture}.exr")), &exr::encode_exr_quickly(&taken.film, &[])?)?;
+        file::write(&points.join(format!("{picture}.exr")), &exr::encode_exr_quickly(&measured.film, &[])?)?;
         let seed = match self.bench.settings.seed {
             0 => String::new(),
             seed => format!(" --seed {seed}"),
         };
         let pair = match (&task.change, base) {
-            (Some(change), Some(base)) => Some((change.clone(), Pair::of(change, taken, base)?)),
+            (Some(change), Some(base)) => Some((change.clone(), Pair::of(change, measured, base)?)),
             _ => None,
         };
         let record = Record {
             name: task.name.clone(),
             family: task.family,
             knobs: named(&task.knobs),
-            ms: taken.ms.clone(),
-            others_ms: taken.others_ms.clone(),
+            ms: measured.ms.clone(),
+            baseline_ms: measured.baseline_ms.clone(),
             start_ms,
-            passes: taken.passes.clone(),
-            noise: taken.noise,
-            work: taken.work.clone(),
-            compiled: taken.compiled.clone(),
+            passes: measured.passes.clone(),
+            noise: measured.noise,
+            work: measured.work.clone(),
+            compiled: measured.compiled.clone(),
             command: format!("{}{seed} {} --repeat 3 -o {picture}.png", self.command, arguments(&task.knobs)),
-            image: file::hash(&taken.png),
+            image: file::hash(&measured.png),
             picture: picture.clone(),
             pair,
         };

@@ -6,9 +6,9 @@
 
 use anyhow::{Context as _, Result, ensure};
 
-use super::sitting::Bench;
 use super::statistics::Interval;
-use super::table::Order;
+use super::table::QuadratureOrder;
+use super::warm::Bench;
 use etalon::image::Picture;
 use etalon::plan::{Knobs, Model};
 
@@ -50,13 +50,13 @@ pub const PICTURES: usize = RULES.len() * STEPS.len();
 ///
 /// # Errors
 /// When something cannot be drawn.
-pub fn orders(bench: &Bench<'_>, tell: &mut dyn FnMut(&str)) -> Result<Vec<Order>> {
+pub fn orders(bench: &Bench<'_>, tell: &mut dyn FnMut(&str)) -> Result<Vec<QuadratureOrder>> {
     let mut films: Vec<(Picture, f64)> = Vec::new();
     for (rule, steps) in RULES.iter().flat_map(|rule| STEPS.map(|steps| (rule, steps))) {
         tell(&format!("orders: {rule}, {steps} steps"));
-        let mut sitting = bench.sit(&knobs(steps, rule)?)?;
-        let ms = bench.time(&mut sitting)?;
-        films.push((sitting.renderer.film()?, ms));
+        let mut warm = bench.warm_up(&knobs(steps, rule)?)?;
+        let ms = bench.time(&mut warm)?;
+        films.push((warm.renderer.film()?, ms));
     }
     let finite = |(film, _): &(Picture, f64)| film.rgba.iter().flatten().all(|value| value.is_finite());
     ensure!(films.iter().all(finite), "some picture has values that are no numbers");
@@ -70,7 +70,7 @@ pub fn orders(bench: &Bench<'_>, tell: &mut dyn FnMut(&str)) -> Result<Vec<Order
         // The truth has no error that can be told.
         let told = STEPS.len() - usize::from(rule + 1 == RULES.len());
         let errors: Vec<f64> = films[..told].iter().map(error).collect();
-        Order {
+        QuadratureOrder {
             rule: RULES[rule].to_owned(),
             steps: STEPS[..told].to_vec(),
             order: order(&STEPS, &errors),

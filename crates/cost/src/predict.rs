@@ -9,11 +9,11 @@ use anyhow::Result;
 use serde::{Deserialize, Serialize};
 
 use super::pace::Step;
-use super::sitting::Bench;
 use super::size::{Growth, fewer, pixels, resized};
 use super::statistics::Interval;
-use super::sweep::{Extent, Listener, Sweep};
+use super::sweep::{Listener, Sweep, SweepExtent};
 use super::table::{Point, REFERENCE, Table};
+use super::warm::Bench;
 
 /// Pixels that are drawn, at most, unless something else is asked for.
 pub const PIXELS: f64 = 160.0 * 90.0;
@@ -38,7 +38,7 @@ pub struct Trial<'a> {
     /// An empty folder.
     pub folder: &'a Path,
     /// How much is drawn.
-    pub extent: Extent,
+    pub extent: SweepExtent,
     /// Of so many pixels at most.
     pub pixels: f64,
 }

@@ -4,10 +4,10 @@ use anyhow::Result;
 use serde::{Deserialize, Serialize};
 
 use super::agenda::Change;
-use super::difference::{in_squares, told};
-use super::sitting::Taken;
+use super::difference::{in_blocks, significant};
 use super::statistics::{Estimate, Interval, mean, pooled, standard_errors};
 use super::table::{Family, INVISIBLE, Price};
+use super::warm::Measurement;
 use etalon::image::Picture;
 use etalon::image::metric::{AnyPicture, Metric, compare};
 
@@ -45,22 +45,22 @@ impl Pair {
     ///
     /// # Errors
     /// When the pictures cannot be compared.
-    pub fn of(change: &Change, taken: &Taken, base: &Taken) -> Result<Self> {
-        let shown = |taken: &Taken| AnyPicture::Display(taken.display.clone());
-        let squares = match (&taken.halves, &base.halves) {
-            (Some(a), Some(b)) => in_squares(a, b, taken.film.width as usize),
+    pub fn of(change: &Change, measured: &Measurement, base: &Measurement) -> Result<Self> {
+        let shown = |measured: &Measurement| AnyPicture::Display(measured.display.clone());
+        let squares = match (&measured.halves, &base.halves) {
+            (Some(a), Some(b)) => in_blocks(a, b, measured.film.width as usize),
             _ => Vec::new(),
         };
         Ok(Self {
-            flip: compare(Metric::Flip, &shown(base), &shown(taken))?.value,
-            same: base.is(&taken.film),
+            flip: compare(Metric::Flip, &shown(base), &shown(measured))?.value,
+            same: base.is(&measured.film),
             squares,
-            noise_ratio: match (by_chance(change), taken.noise, base.noise) {
+            noise_ratio: match (by_chance(change), measured.noise, base.noise) {
                 (true, Some(noise), Some(before)) if before > 0.0 => Some(noise / before),
                 _ => None,
             },
-            brightness: (change.knob == "arithmetic" && taken.halves.is_none())
-                .then(|| sum(&taken.film) / sum(&base.film))
+            brightness: (change.knob == "arithmetic" && measured.halves.is_none())
+                .then(|| sum(&measured.film) / sum(&base.film))
                 // Where all is black there is nothing to compare.
                 .filter(|ratio| ratio.is_finite()),
         })
@@ -69,16 +69,16 @@ impl Pair {
 
 /// How well times are known: the spread of the logarithms of ratios within their turns, over all pictures drawn in turns with one base.
 #[derive(Debug, Clone, Copy)]
-pub struct Clock {
+pub struct TimeNoise {
     deviation: f64,
     freedom: f64,
 }
 
-fn logs(ms: &[f64], others_ms: &[f64]) -> Vec<f64> {
-    ms.iter().zip(others_ms).filter(|(a, b)| **a > 0.0 && **b > 0.0).map(|(a, b)| (a / b).ln()).collect()
+fn logs(ms: &[f64], baseline_ms: &[f64]) -> Vec<f64> {
+    ms.iter().zip(baseline_ms).filter(|(a, b)| **a > 0.0 && **b > 0.0).map(|(a, b)| (a / b).ln()).collect()
 }
 
-impl Clock {
+impl TimeNoise {
     /// By the turns of some pictures: each its own times and those of the base.
     #[must_use]
     pub fn of<'a>(turns: impl Iterator<Item = (&'a [f64], &'a [f64])>) -> Self {
@@ -88,8 +88,8 @@ impl Clock {
     }
 
     /// Whether a picture takes more or less time than its base, one of so many statements.
-    fn tells(&self, ms: &[f64], others_ms: &[f64], statements: usize) -> bool {
-        let logs = logs(ms, others_ms);
+    fn tells(&self, ms: &[f64], baseline_ms: &[f64], statements: usize) -> bool {
+        let logs = logs(ms, baseline_ms);
         let error = self.deviation / (logs.len().max(1) as f64).sqrt();
         !logs.is_empty() && mean(&logs).abs() > SAME_PROGRAM + standard_errors(statements, self.freedom) * error
     }
@@ -97,13 +97,13 @@ impl Clock {
 
 /// Times of a picture and of its base in turns.
 #[derive(Clone, Copy)]
-pub struct Turns<'a> {
+pub struct PairedTimes<'a> {
     /// Its own, in milliseconds.
     pub ms: &'a [f64],
     /// The base's.
-    pub others_ms: &'a [f64],
+    pub baseline_ms: &'a [f64],
     /// How well both are known.
-    pub clock: Clock,
+    pub clock: TimeNoise,
 }
 
 /// The price of a change. `more_error`: how much more mean squared error it has than its base, where a reference tells that; `None`
@@ -113,18 +113,18 @@ pub fn price(
     change: &Change,
     pair: &Pair,
     more_error: Option<Estimate>,
-    turns: Turns<'_>,
+    turns: PairedTimes<'_>,
     statements: usize,
     sure: f64,
 ) -> Price {
-    let Turns { ms, others_ms, clock } = turns;
-    let differences: Vec<f64> = ms.iter().zip(others_ms).map(|(a, b)| a - b).collect();
+    let PairedTimes { ms, baseline_ms, clock } = turns;
+    let differences: Vec<f64> = ms.iter().zip(baseline_ms).map(|(a, b)| a - b).collect();
     let gpu_ms_delta = Interval::of(&differences);
-    let base_ms = Interval::of(others_ms).median;
+    let base_ms = Interval::of(baseline_ms).median;
     let (base, squares, more) = match more_error {
         Some(more) => (Family::Local, 1, more),
         None => {
-            let (side, found) = told(&pair.squares, sure).unwrap_or((1, Estimate::default()));
+            let (side, found) = significant(&pair.squares, sure).unwrap_or((1, Estimate::default()));
             (Family::Exact, side, found)
         }
     };
@@ -140,8 +140,8 @@ pub fn price(
         flip_between: pair.flip,
         flip_delta: pair.flip,
         shown_delta: more.interval(),
-        error_told: !pair.same && more.is_told(sure),
-        time_told: clock.tells(ms, others_ms, statements),
+        error_told: !pair.same && more.is_significant(sure),
+        time_told: clock.tells(ms, baseline_ms, statements),
         squares,
         noise_ratio: pair.noise_ratio,
         brightness: pair.brightness,
@@ -225,7 +225,8 @@ mod tests {
         let said = |brightness: f64| {
             let brightness = Some(brightness);
             let pair = Pair { flip: 0.0001, same: false, squares: Vec::new(), noise_ratio: None, brightness };
-            let turns = Turns { ms: &[10.0], others_ms: &[10.0], clock: Clock { deviation: 0.01, freedom: 9.0 } };
+            let turns =
+                PairedTimes { ms: &[10.0], baseline_ms: &[10.0], clock: TimeNoise { deviation: 0.01, freedom: 9.0 } };
             price(&change, &pair, Some(Estimate::default()), turns, 100, 4.0).verdict
         };
         // π off by a thousandth in the lobe of a tier: study:lamps and study:materials at 160x90.
@@ -241,7 +242,7 @@ mod tests {
             (noise.iter().map(|n| 10.0 * ratio * n).collect(), vec![10.0; 7])
         };
         let all = [turns(1.0), turns(1.2), turns(0.9)];
-        let clock = Clock::of(all.iter().map(|(ms, others)| (&ms[..], &others[..])));
+        let clock = TimeNoise::of(all.iter().map(|(ms, others)| (&ms[..], &others[..])));
         let tells = |ratio: f64| {
             let (ms, others) = turns(ratio);
             clock.tells(&ms, &others, 100)

@@ -11,11 +11,11 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::command::{arguments, named, set};
-use super::difference::{Shown, ShownReference, Truth, in_squares, mean_of, shown, told};
-use super::sitting::{Bench, total};
+use super::difference::{Shown, ShownReference, Truth, in_blocks, mean_of, shown, significant};
 use super::size::{fewer, pixels, resized};
 use super::statistics::{MANY, standard_errors};
 use super::table::{RESOLVED, Reference, Round};
+use super::warm::{Bench, total};
 use etalon::frame::{Progress, Settings};
 use etalon::image::halves::error_of_halves;
 use etalon::image::metric::{AnyPicture, Metric, compare};
@@ -188,7 +188,7 @@ struct Look {
 fn look(bench: &Bench<'_>, colour: &str) -> Result<Look> {
     let knobs = set(&set(&Knobs::exact(), "samples", &PILOT.to_string())?, "colour", colour)?;
     // What compiling takes is no sample's time.
-    bench.sit(&knobs)?;
+    bench.warm_up(&knobs)?;
     let (parts, _, ms) = draw(bench, &knobs, bench.settings.seed, &mut |_| ())?;
     let samples = f64::from(PILOT);
     let shown = ShownReference::of(&parts, &bench.settings.view_transform());
@@ -254,7 +254,8 @@ fn differ(bench: &Bench<'_>, a: &Parts, b: &Parts) -> bool {
     let (view, size) = (bench.settings.view_transform(), bench.settings.size);
     let halves = |parts: &Parts| -> [Shown; 2] { [0, 1].map(|odd| shown(&half(parts, odd), &view)) };
     let enough = standard_errors(3, MANY);
-    told(&in_squares(&halves(a), &halves(b), size[0] as usize), enough).is_some_and(|(_, found)| found.is_above(enough))
+    significant(&in_blocks(&halves(a), &halves(b), size[0] as usize), enough)
+        .is_some_and(|(_, found)| found.is_above(enough))
 }
 
 impl Refined {

@@ -15,11 +15,13 @@ use super::orders;
 use super::pace::{Pace, Step};
 use super::reference::{BANDS, NotMeasured, Pilot, Refined, refine, samples_within};
 use super::search::{PICTURES, search, without_waste};
-use super::sitting::{Bench, enough_ms};
 use super::size::{Growth, resized};
 use super::statistics::Interval;
-use super::sweep::{Extent, Listener, Sweep};
-use super::table::{Asked, AtSize, Family, Order, REFERENCE, RESOLVED, Recommended, Reference, Table, Tried};
+use super::sweep::{Listener, Sweep, SweepExtent};
+use super::table::{
+    AtSize, Family, QuadratureOrder, REFERENCE, RESOLVED, Recommended, Reference, RequestedSize, Table, Tried,
+};
+use super::warm::{Bench, enough_ms};
 use etalon::frame::Progress;
 use etalon::image::file;
 use etalon::image::metric::AnyPicture;
@@ -55,7 +57,7 @@ pub(super) struct Run<'a> {
 #[derive(Default)]
 struct Found {
     search: Vec<Tried>,
-    orders: Vec<Order>,
+    orders: Vec<QuadratureOrder>,
     warnings: Vec<String>,
 }
 
@@ -95,7 +97,7 @@ impl Run<'_> {
         begun: Option<Refined>,
         listener: &mut Listener<'_>,
     ) -> Result<Table> {
-        let Extent { budget_s, reference_samples, shard } = self.sweep.extent;
+        let SweepExtent { budget_s, reference_samples, shard } = self.sweep.extent;
         let (budget_s, ends) = (f64::from(budget_s), reference_samples.is_none());
         let (bench, pilot) = (&self.bench, &self.pilot);
         let (records, warnings) = (Vec::new(), Vec::new());
@@ -190,7 +192,7 @@ impl Run<'_> {
 
     /// The reference as far as it is drawn before anything else: what an interrupted or an earlier run has drawn, or a first round.
     fn first_round(&self, begun: Option<Refined>, pace: &Pace<'_>, listener: &mut Listener<'_>) -> Result<Refined> {
-        let Extent { budget_s, reference_samples, .. } = self.sweep.extent;
+        let SweepExtent { budget_s, reference_samples, .. } = self.sweep.extent;
         let (budget_s, pilot) = (f64::from(budget_s), &self.pilot);
         // What cannot be read is drawn again.
         let kept = || Some(Refined::read(&(self.sweep.kept)(self.command)?).ok()??.0);
@@ -317,7 +319,7 @@ impl Run<'_> {
     }
 
     /// The recommended settings at the size that was asked for: drawn in the seconds that are left, or foretold.
-    fn at_size(&self, table: &Table, mut left_s: f64) -> Result<Asked> {
+    fn at_size(&self, table: &Table, mut left_s: f64) -> Result<RequestedSize> {
         let asked = self.sweep.bench.settings.size;
         let begun = Instant::now();
         let growth = match left_s > GROWTH_S + GROWTH_SAMPLES * self.pilot.plain_ms / 1e3 {
@@ -338,13 +340,13 @@ impl Run<'_> {
             let seconds = TWICE * at.gpu_ms.high / 1e3;
             if point.name != REFERENCE && seconds < left_s && !(self.sweep.stopped)() {
                 let begun = Instant::now();
-                let ms = self.sweep.bench.time(&mut self.sweep.bench.sit(&point.rungs()?)?)?;
+                let ms = self.sweep.bench.time(&mut self.sweep.bench.warm_up(&point.rungs()?)?)?;
                 at = AtSize { gpu_ms: Interval { median: ms, low: ms, high: ms }, measured: true, ..at };
                 left_s -= begun.elapsed().as_secs_f64();
             }
             settings.push(at);
         }
-        Ok(Asked { size: asked, settings })
+        Ok(RequestedSize { size: asked, settings })
     }
 
     fn table(

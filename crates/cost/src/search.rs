@@ -49,7 +49,7 @@ fn rungs(records: &[Record], judge: &Judge<'_>) -> Result<(Vec<Rung>, f64)> {
         } else {
             judge.truth.shown.more_error(&judge.display(record)?, &shown)
         };
-        let ratios: Vec<f64> = record.ms.iter().zip(&record.others_ms).map(|(ms, other)| ms / other - 1.0).collect();
+        let ratios: Vec<f64> = record.ms.iter().zip(&record.baseline_ms).map(|(ms, other)| ms / other - 1.0).collect();
         all.push(Rung { knob: knob.name, to, more, ms: mean(&ratios) * base_ms });
     }
     Ok((all, base_ms))
@@ -103,7 +103,7 @@ pub fn search(
                 }
                 let then = at(knob.name, to);
                 // What cannot be told from nothing promises nothing; its time counts all the same.
-                let told = |more: Estimate| if more.is_told(sure) { more.mean } else { 0.0 };
+                let told = |more: Estimate| if more.is_significant(sure) { more.mean } else { 0.0 };
                 let gain = told(now.0) - told(then.0);
                 let ms = (then.1 - now.1).max(0.01 * base_ms);
                 if gain > 0.0 && best.is_none_or(|(ratio, ..)| gain / ms > ratio) {

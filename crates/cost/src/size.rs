@@ -6,9 +6,9 @@
 use anyhow::Result;
 
 use super::command::set;
-use super::sitting::Bench;
 use super::statistics::Interval;
 use super::table::Point;
+use super::warm::Bench;
 use etalon::frame::Settings;
 use etalon::plan::{Knobs, Model};
 
@@ -84,10 +84,10 @@ impl Growth {
 /// The share of a time that does not go with pixels, by two sizes.
 fn share_of_a_picture(bench: &Bench<'_>, knobs: &Knobs) -> Result<f64> {
     let time = |bench: &Bench<'_>| -> Result<f64> {
-        let mut sitting = bench.sit(knobs)?;
+        let mut warm = bench.warm_up(knobs)?;
         let (mut least, mut all, mut count) = (f64::INFINITY, 0.0, 0);
         while count < 5 && all < ENOUGH_MS {
-            let ms = bench.time(&mut sitting)?;
+            let ms = bench.time(&mut warm)?;
             (least, all, count) = (ms.min(least), all + ms, count + 1);
         }
         Ok(least)

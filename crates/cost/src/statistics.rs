@@ -69,7 +69,7 @@ impl Estimate {
 
     /// Whether it is one or the other.
     #[must_use]
-    pub fn is_told(&self, standard_errors: f64) -> bool {
+    pub fn is_significant(&self, standard_errors: f64) -> bool {
         self.is_above(standard_errors) || self.is_below(standard_errors)
     }
 }
@@ -129,7 +129,7 @@ mod tests {
         let far = Estimate { mean: 1.0, deviation: 0.2, bias: 0.0 };
         assert!(far.is_above(4.0) && !far.is_above(6.0) && !far.is_below(0.0));
         let off = Estimate { bias: 0.3, ..far };
-        assert!(off.is_told(3.0) && !off.is_told(4.0));
+        assert!(off.is_significant(3.0) && !off.is_significant(4.0));
         assert!((off.interval().low - 0.3).abs() < 1e-12 && (off.interval().high - 1.7).abs() < 1e-12);
         let root = Interval { median: 4.0, low: -1.0, high: 9.0 }.root();
         assert_eq!(root, Interval { median: 2.0, low: 0.0, high: 3.0 });

@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 use super::judge::{Judge, Record};
 use super::pace::Step;
 use super::reference::Refined;
-use super::sitting::Bench;
 use super::table::{DeviceName, Table};
+use super::warm::Bench;
 use etalon::image::file;
 use etalon::image::metric::AnyPicture;
 
 /// How much is measured.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Extent {
+pub struct SweepExtent {
     /// Seconds to be spent.
     pub budget_s: u32,
     /// Samples of the reference, whatever that takes; `None`: what the budget allows.
@@ -31,7 +31,7 @@ pub struct Sweep<'a> {
     /// Where the results go.
     pub folder: &'a Path,
     /// How much is measured.
-    pub extent: Extent,
+    pub extent: SweepExtent,
     /// The first words of every command of a size.
     pub command: &'a dyn Fn([u32; 2]) -> String,
     /// What the scene is called.
@@ -58,11 +58,11 @@ pub struct Listener<'a> {
 
 /// What two runs must have in common for one to go on with the other's pictures.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
-struct Identity {
+struct SweepIdentity {
     program: String,
     command: String,
     device: DeviceName,
-    extent: Extent,
+    extent: SweepExtent,
     contents: String,
     seed: u32,
 }
@@ -70,7 +70,7 @@ struct Identity {
 impl<'a> Sweep<'a> {
     /// A run of which nothing but the table is wanted: it goes on with no earlier one, and its commands are not told.
     #[must_use]
-    pub fn alone(bench: Bench<'a>, folder: &'a Path, extent: Extent) -> Self {
+    pub fn alone(bench: Bench<'a>, folder: &'a Path, extent: SweepExtent) -> Self {
         Self {
             bench,
             folder,
@@ -89,7 +89,7 @@ impl<'a> Sweep<'a> {
 impl Sweep<'_> {
     /// A folder is that of one run: new, or one that was interrupted.
     pub(super) fn claim_folder(&self) -> Result<()> {
-        let identity = Identity {
+        let identity = SweepIdentity {
             program: env!("CARGO_PKG_VERSION").to_owned(),
             command: (self.command)(self.bench.settings.size),
             device: self.device(),
@@ -99,7 +99,7 @@ impl Sweep<'_> {
         };
         let path = self.folder.join("run.json");
         if path.exists() {
-            let known: Identity = serde_json::from_slice(&file::read(&path)?)
+            let known: SweepIdentity = serde_json::from_slice(&file::read(&path)?)
                 .with_context(|| format!("reading {}: it is not that of a run of cost", path.display()))?;
             ensure!(
                 known == identity,

@@ -26,7 +26,7 @@ pub struct Table {
     pub size: [u32; 2],
     /// The pixels that were asked for, where the budget had no time for them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub asked: Option<Asked>,
+    pub asked: Option<RequestedSize>,
     /// What every error is an error against.
     pub reference: Reference,
     /// Which knobs the scene calls for.
@@ -51,7 +51,7 @@ pub struct Table {
     pub others: Vec<Other>,
     /// How the rules of quadrature come near to the integral, where media vary.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub orders: Vec<Order>,
+    pub orders: Vec<QuadratureOrder>,
     /// What is worth knowing before a figure is believed.
     pub warnings: Vec<String>,
     /// Which part of how many, counted from 1.
@@ -129,7 +129,7 @@ pub struct Recommended {
 
 /// The size that was asked for, of which fewer pixels were measured.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Asked {
+pub struct RequestedSize {
     /// Pixels.
     pub size: [u32; 2],
     /// The recommended settings there, in the order of `recommended`.
@@ -368,7 +368,7 @@ impl Price {
 
 /// How a rule of quadrature comes near to the integral (lecture A2).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Order {
+pub struct QuadratureOrder {
     /// Rung of the knob `quadrature`.
     pub rule: String,
     /// Steps of each segment.

@@ -4,8 +4,8 @@ use etalon::frame::Settings;
 use etalon::open::Opened;
 use etalon_cost::pace::Step;
 use etalon_cost::predict::{Trial, predict, score};
-use etalon_cost::sitting::Bench;
-use etalon_cost::sweep::{Extent, Listener, Sweep};
+use etalon_cost::sweep::{Listener, Sweep, SweepExtent};
+use etalon_cost::warm::Bench;
 use etalon_testing::gpu::Gpu;
 
 const SIZE: [u32; 2] = [128, 72];
@@ -26,7 +26,7 @@ fn errors_of_few_pixels_are_those_of_many() {
         camera: &camera,
     };
     let folder = tempfile::tempdir().expect("a folder");
-    let extent = Extent { budget_s: 10, reference_samples: Some(16), shard: [1, 1] };
+    let extent = SweepExtent { budget_s: 10, reference_samples: Some(16), shard: [1, 1] };
     let trial = Trial { folder: &folder.path().join("forecast"), extent: extent.clone(), pixels: PIXELS };
     let predictions = predict(&bench(), &trial, &mut |_: Step<'_>| ()).expect("a forecast");
     let own = folder.path().join("cost");

@@ -8,14 +8,14 @@ use maud::{DOCTYPE, PreEscaped, html};
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::part::{Head, Part};
-use crate::worker::Worker;
+use crate::part::{Part, PartHeader};
+use crate::worker::FarmWorker;
 
 /// What one process did.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shift {
     /// Who, where, when.
-    pub worker: Worker,
+    pub worker: FarmWorker,
     /// What it drew, in words.
     pub what: String,
     /// When each of its pictures was begun and done, in seconds since 1970; none for a part of a picture.
@@ -39,7 +39,7 @@ pub struct Account {
 
 /// Frames in the account of a sequence.
 #[derive(Deserialize)]
-struct Picture {
+struct AccountPicture {
     frame: i32,
     began: f64,
     prepare_ms: f64,
@@ -56,7 +56,7 @@ impl Shift {
     pub fn read(path: &Path) -> Result<Vec<Self>> {
         let bytes = etalon::image::file::read(path)?;
         if bytes.first() != Some(&b'{') {
-            let Head { worker, shard: [index, of], .. } = Part::read(path)?.head;
+            let PartHeader { worker, shard: [index, of], .. } = Part::read(path)?.head;
             return Ok(vec![Self { worker, what: format!("part {index} of {of}"), pictures: Vec::new() }]);
         }
         let place = || format!("reading {}", path.display());
@@ -64,16 +64,17 @@ impl Shift {
         match value["schema"].as_str() {
             Some("etalon.sequence/1") => {
                 let worker = serde_json::from_value(value["worker"].clone()).with_context(place)?;
-                let pictures: Vec<Picture> = serde_json::from_value(value["pictures"].clone()).with_context(place)?;
+                let pictures: Vec<AccountPicture> =
+                    serde_json::from_value(value["pictures"].clone()).with_context(place)?;
                 let mut frames: Vec<i32> = pictures.iter().map(|picture| picture.frame).collect();
                 frames.dedup();
                 let drawn = pictures.iter().filter(|picture| !picture.found);
-                let span = |p: &Picture| [p.began, p.began + (p.prepare_ms + p.draw_ms + p.write_ms) * 1e-3];
+                let span = |p: &AccountPicture| [p.began, p.began + (p.prepare_ms + p.draw_ms + p.write_ms) * 1e-3];
                 let what = format!("{} pictures, {} of them drawn", pictures.len(), drawn.clone().count());
                 Ok(vec![Self { worker, what, pictures: drawn.map(span).collect() }])
             }
             Some("etalon.merge/1") => {
-                let workers: Vec<Worker> = serde_json::from_value(value["workers"].clone()).with_context(place)?;
+                let workers: Vec<FarmWorker> = serde_json::from_value(value["workers"].clone()).with_context(place)?;
                 let of = workers.len();
                 let shift =
                     |(i, worker)| Self { worker, what: format!("part {} of {of}", i + 1), pictures: Vec::new() };
@@ -154,7 +155,7 @@ impl Account {
                         svg viewBox=(format!("0 0 {} {height}", WIDTH + 220.0)) role="img" aria-label="time line of the processes" {
                             @for (row, shift) in self.shifts.iter().enumerate() {
                                 @let y = ROW * row as f64;
-                                @let Worker { began, ended, prepared_s, host, process, .. } = &shift.worker;
+                                @let FarmWorker { began, ended, prepared_s, host, process, .. } = &shift.worker;
                                 rect.prepare x=(x(*began)) y=(y) width=(x(began + prepared_s.min(ended - began)) - x(*began)) height=(ROW - 6.0) {}
                                 rect.draw x=(x(began + prepared_s.min(ended - began))) y=(y)
                                     width=((x(*ended) - x(began + prepared_s.min(ended - began))).max(1.0)) height=(ROW - 6.0) {}
@@ -211,7 +212,7 @@ mod tests {
 
     fn shift(began: f64, ended: f64, driver: &str) -> Shift {
         let device = ["device".to_owned(), driver.to_owned(), "1".to_owned()];
-        let worker = Worker { host: "a".to_owned(), process: 1, began, ended, device, prepared_s: 1.0 };
+        let worker = FarmWorker { host: "a".to_owned(), process: 1, began, ended, device, prepared_s: 1.0 };
         Shift { worker, what: "part".to_owned(), pictures: Vec::new() }
     }
 

@@ -82,7 +82,7 @@ impl Identity {
         // Debug of a float is the shortest text that is read back as the same bits.
         let numbers = [
             ("background", behind),
-            ("demand", format!("{:?}", settings.demand)),
+            ("forced", format!("{:?}", settings.forced)),
             ("env-intensity", format!("{:?}", settings.environment_intensity)),
             ("env-rotation", format!("{:?}", settings.environment_rotation)),
             ("exposure", format!("{:?}", settings.exposure)),

@@ -27,7 +27,7 @@ pub enum Engine {
 
 /// What is drawn, and by how many tasks.
 #[derive(Debug, Clone)]
-pub struct Work {
+pub struct JobWork {
     /// For file names and labels.
     pub name: String,
     /// The program, as workers find it.
@@ -78,7 +78,7 @@ fn json(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
 
-impl Work {
+impl JobWork {
     /// The file for an engine.
     ///
     /// # Errors
@@ -171,9 +171,9 @@ impl Work {
 mod tests {
     use super::*;
 
-    fn work(outputs: &[&str], frames: Option<&str>) -> Work {
+    fn work(outputs: &[&str], frames: Option<&str>) -> JobWork {
         let arguments = ["scene name.glb", "--set", "samples=64"].map(str::to_owned).to_vec();
-        Work {
+        JobWork {
             name: "Scene name".to_owned(),
             program: "etalon".to_owned(),
             here: "/home/me/a folder".to_owned(),

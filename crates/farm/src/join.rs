@@ -8,8 +8,8 @@ use etalon::image::halves::{SampleError, error_of_halves};
 use etalon::image::{Aov, AovData, Picture};
 
 use crate::identity::Identity;
-use crate::part::{Head, Part, Split};
-use crate::worker::Worker;
+use crate::part::{Part, PartHeader, Split};
+use crate::worker::FarmWorker;
 
 /// A picture that several processes drew.
 #[derive(Debug)]
@@ -30,10 +30,10 @@ pub struct Joined {
     pub bands: u32,
     /// What rays did.
     pub work: Work,
-    /// Pixels whose list of see-through surfaces was cut short.
+    /// Pixels whose list of transparent surfaces was cut short.
     pub dropped: u32,
     /// Who drew it, by part.
-    pub workers: Vec<Worker>,
+    pub workers: Vec<FarmWorker>,
 }
 
 /// Reads parts and joins them.
@@ -53,7 +53,8 @@ pub fn join(paths: &[PathBuf]) -> Result<Joined> {
         if let Err(why) = first.head.identity.same_as(&part.head.identity) {
             bail!("{first_path} and {path} are no parts of one picture: {why:#}");
         }
-        let of = |head: &Head| (head.shard[1], head.split, head.samples, head.bands, head.halves, head.parts.clone());
+        let of =
+            |head: &PartHeader| (head.shard[1], head.split, head.samples, head.bands, head.halves, head.parts.clone());
         let same = of(&first.head) == of(&part.head);
         ensure!(
             same,
@@ -88,7 +89,7 @@ pub fn join(paths: &[PathBuf]) -> Result<Joined> {
 }
 
 fn told(part: &Part) -> String {
-    let Head { shard: [index, of], split, samples, .. } = part.head;
+    let PartHeader { shard: [index, of], split, samples, .. } = part.head;
     let split = if split == Split::Tiles { "tiles" } else { "samples" };
     format!("{index} of {of} by {split} of {samples} samples")
 }
@@ -99,7 +100,8 @@ fn whole(mut parts: Vec<Part>) -> Joined {
     let workers = parts.iter().map(|part| part.head.worker.clone()).collect();
     let dropped: Vec<u32> = parts.iter().map(|part| part.head.dropped).collect();
     let mut aovs = std::mem::take(&mut parts[0].aovs);
-    let Head { identity, shard: [_, of], split, samples, bands, halves, parts: names, .. } = parts[0].head.clone();
+    let PartHeader { identity, shard: [_, of], split, samples, bands, halves, parts: names, .. } =
+        parts[0].head.clone();
     // A pixel belongs to one part by tiles, a sample to one by samples.
     let dropped =
         if split == Split::Tiles { dropped.iter().sum() } else { dropped.into_iter().max().unwrap_or_default() };

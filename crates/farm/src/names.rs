@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pattern {
     text: String,
-    pieces: Vec<Piece>,
+    pieces: Vec<NamePiece>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum Piece {
+enum NamePiece {
     Text(String),
     /// Digits at least.
     Frame(usize),
@@ -39,30 +39,30 @@ impl Pattern {
         let mut rest = text.as_str();
         while let Some((before, inside)) = rest.split_once('{') {
             let (name, after) = inside.split_once('}').ok_or_else(|| NotPattern::Open(text.clone()))?;
-            pieces.push(Piece::Text(before.to_owned()));
+            pieces.push(NamePiece::Text(before.to_owned()));
             let digits = |width: &str| width.strip_prefix('0').and_then(|n| n.parse().ok()).filter(|n| *n <= 20);
             pieces.push(match name.split_once(':') {
-                None if name == "frame" => Piece::Frame(1),
-                None if name == "camera" => Piece::Camera,
-                Some(("frame", width)) if digits(width).is_some() => Piece::Frame(digits(width).unwrap_or(1)),
+                None if name == "frame" => NamePiece::Frame(1),
+                None if name == "camera" => NamePiece::Camera,
+                Some(("frame", width)) if digits(width).is_some() => NamePiece::Frame(digits(width).unwrap_or(1)),
                 _ => return Err(NotPattern::Unknown(text.clone(), name.to_owned())),
             });
             rest = after;
         }
-        pieces.push(Piece::Text(rest.to_owned()));
+        pieces.push(NamePiece::Text(rest.to_owned()));
         Ok(Self { text, pieces })
     }
 
     /// Whether the path depends on the frame.
     #[must_use]
     pub fn has_frame(&self) -> bool {
-        self.pieces.iter().any(|piece| matches!(piece, Piece::Frame(_)))
+        self.pieces.iter().any(|piece| matches!(piece, NamePiece::Frame(_)))
     }
 
     /// Whether the path depends on the camera.
     #[must_use]
     pub fn has_camera(&self) -> bool {
-        self.pieces.contains(&Piece::Camera)
+        self.pieces.contains(&NamePiece::Camera)
     }
 
     /// As it was written.
@@ -75,11 +75,11 @@ impl Pattern {
     #[must_use]
     pub fn path(&self, frame: i32, camera: &str) -> PathBuf {
         let plain = |c: char| if c.is_alphanumeric() || "._-".contains(c) { c } else { '-' };
-        let text = |piece: &Piece| match piece {
-            Piece::Text(text) => text.clone(),
-            Piece::Frame(digits) if frame < 0 => format!("-{:0digits$}", frame.unsigned_abs()),
-            Piece::Frame(digits) => format!("{frame:0digits$}"),
-            Piece::Camera => camera.chars().map(plain).collect(),
+        let text = |piece: &NamePiece| match piece {
+            NamePiece::Text(text) => text.clone(),
+            NamePiece::Frame(digits) if frame < 0 => format!("-{:0digits$}", frame.unsigned_abs()),
+            NamePiece::Frame(digits) => format!("{frame:0digits$}"),
+            NamePiece::Camera => camera.chars().map(plain).collect(),
         };
         PathBuf::from(self.pieces.iter().map(text).collect::<String>())
     }

@@ -12,7 +12,7 @@ use etalon::image::{Aov, AovData, Picture, exr, file};
 use serde::{Deserialize, Serialize};
 
 use crate::identity::Identity;
-use crate::worker::Worker;
+use crate::worker::FarmWorker;
 
 const SCHEMA: &str = "etalon.part/1";
 const ATTRIBUTE: &str = "etalon.part";
@@ -29,7 +29,7 @@ pub enum Split {
 
 /// What a part is a part of.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Head {
+pub struct PartHeader {
     /// `etalon.part/1`.
     pub schema: String,
     /// The picture.
@@ -53,10 +53,10 @@ pub struct Head {
     pub wanted: [u32; 2],
     /// What rays did.
     pub work: Work,
-    /// Pixels whose list of see-through surfaces was cut short.
+    /// Pixels whose list of transparent surfaces was cut short.
     pub dropped: u32,
     /// Who drew it.
-    pub worker: Worker,
+    pub worker: FarmWorker,
     /// Of all samples.
     hash: String,
 }
@@ -65,7 +65,7 @@ pub struct Head {
 #[derive(Debug, Clone)]
 pub struct Part {
     /// What it is.
-    pub head: Head,
+    pub head: PartHeader,
     /// Of each piece its sums, those of parts last.
     pub sums: Vec<Vec<Picture>>,
     /// Layers of the whole picture; the first part has them.
@@ -94,7 +94,7 @@ pub struct Drawn {
     /// Layers of the whole picture.
     pub aovs: Vec<Aov>,
     /// Who drew it.
-    pub worker: Worker,
+    pub worker: FarmWorker,
 }
 
 fn hash(sums: &[Vec<Picture>]) -> String {
@@ -117,7 +117,7 @@ impl Part {
         let ranges = pieces.iter().map(|piece| piece.samples).collect();
         let sums: Vec<Vec<Picture>> = pieces.into_iter().map(|piece| piece.sums).collect();
         let hash = hash(&sums);
-        let head = Head {
+        let head = PartHeader {
             schema: SCHEMA.to_owned(),
             identity,
             shard,
@@ -151,7 +151,7 @@ impl Part {
     /// What to go on with, of a part by tiles.
     #[must_use]
     pub fn into_sums(self) -> Vec<Sums> {
-        let Head { pieces, work, dropped, .. } = self.head;
+        let PartHeader { pieces, work, dropped, .. } = self.head;
         // The counts of all pieces are with the first one.
         let known = |place: usize| if place == 0 { (work, dropped) } else { (Work::default(), 0) };
         let of = |(place, (samples, sums)): (usize, ([u32; 2], Vec<Picture>))| {
@@ -190,7 +190,7 @@ impl Part {
         let texts = exr::texts(&bytes).map_err(|_| anyhow!("{place} is no part of a picture, or was cut short"))?;
         let text = texts.iter().find(|(name, _)| name == ATTRIBUTE).map(|(_, text)| text);
         let text = text.ok_or_else(|| anyhow!("{place} is no part of a picture: render --shard writes those"))?;
-        let head: Head = serde_json::from_str(text).with_context(|| format!("{place}: what it is a part of"))?;
+        let head: PartHeader = serde_json::from_str(text).with_context(|| format!("{place}: what it is a part of"))?;
         ensure!(head.schema == SCHEMA, "{place} is of schema {}, this program reads {SCHEMA}", head.schema);
         let channels = exr::decode_channels(&bytes).map_err(|_| anyhow!("{place} was cut short, or is damaged"))?;
         let size = [channels.width, channels.height];

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Who drew something, where, and when.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Worker {
+pub struct FarmWorker {
     /// The machine's name.
     pub host: String,
     /// Number of the process.
@@ -25,7 +25,7 @@ fn since_1970(time: SystemTime) -> f64 {
     time.duration_since(UNIX_EPOCH).unwrap_or(Duration::ZERO).as_secs_f64()
 }
 
-impl Worker {
+impl FarmWorker {
     /// This process, which began so long ago.
     #[must_use]
     pub fn here(device: [String; 3], running: Duration, prepared: Duration) -> Self {

@@ -144,7 +144,7 @@ fn header_end(bytes: &[u8]) -> Option<usize> {
 }
 
 /// Which channels of a file make the picture.
-enum Source {
+enum ChannelSource {
     /// Colour channels by name, with the name that alpha would have.
     Colour { red: Text, green: Text, blue: Text, alpha: Text },
     /// One luminance channel for all three.
@@ -176,7 +176,7 @@ pub fn decode_exr(bytes: &[u8]) -> Result<Picture> {
     let source = find_source(&meta)?;
     let reader = exr::image::read::read().no_deep_data().largest_resolution_level().specific_channels();
     let (position, display, (size, stored)) = match source {
-        Source::Colour { red, green, blue, alpha } => {
+        ChannelSource::Colour { red, green, blue, alpha } => {
             let image = reader
                 .required(red)
                 .required(green)
@@ -192,7 +192,7 @@ pub fn decode_exr(bytes: &[u8]) -> Result<Picture> {
             let position = image.layer_data.attributes.layer_position;
             (position, image.attributes.display_window, image.layer_data.channel_data.pixels)
         }
-        Source::Grey => {
+        ChannelSource::Grey => {
             let image = reader
                 .required("Y")
                 .optional("A", 1.0f32)
@@ -258,14 +258,14 @@ fn guard(meta: &MetaData, length: u64) -> Result<()> {
     Ok(())
 }
 
-fn find_source(meta: &MetaData) -> Result<Source> {
+fn find_source(meta: &MetaData) -> Result<ChannelSource> {
     let mut names: Vec<String> = Vec::new();
     for header in meta.headers.iter().filter(|header| !header.deep) {
         names.extend(header.channels.list.iter().map(|channel| channel.name.to_string()));
     }
     let colour = |prefix: &str| {
         let named = |channel: &str| Text::from(format!("{prefix}{channel}").as_str());
-        Source::Colour { red: named("R"), green: named("G"), blue: named("B"), alpha: named("A") }
+        ChannelSource::Colour { red: named("R"), green: named("G"), blue: named("B"), alpha: named("A") }
     };
     let complete = |prefix: &str| {
         ["R", "G", "B"].iter().all(|channel| names.iter().any(|name| *name == format!("{prefix}{channel}")))
@@ -280,7 +280,7 @@ fn find_source(meta: &MetaData) -> Result<Source> {
     let has = |wanted: &str| names.iter().any(|name| name == wanted);
     ensure!(!has("RY"), "luminance with chroma channels is not supported; store R, G and B");
     if has("Y") {
-        return Ok(Source::Grey);
+        return Ok(ChannelSource::Grey);
     }
     bail!(
         "there are no channels R, G and B, only {}",

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::catalogue::{Axis, Draw, EXACT, Equation, Output, Region, columns, ulp, vector};
+use super::catalogue::{Axis, EXACT, Equation, Output, Region, SplitMix64, columns, ulp, vector};
 
 /// hi + lo = `value` + `rest`, with hi an f32 value; lo is 0 where hi is beyond f32.
 fn pair(value: f64, rest: f64) -> [f64; 2] {
@@ -116,19 +116,19 @@ pub fn atan2f(y: f64, x: f64) -> f64 {
 }
 
 /// Moderate numbers, and pairs that nearly cancel.
-fn pair_of_numbers(d: &mut Draw) -> Vec<f32> {
+fn pair_of_numbers(d: &mut SplitMix64) -> Vec<f32> {
     let a = (d.sign() * d.log(1e-6, 1e6)) as f32;
     let b = if d.below(2) == 0 { d.near(&[a, -a]) } else { (d.sign() * d.log(1e-6, 1e6)) as f32 };
     vec![a, b]
 }
 
-fn double(d: &mut Draw) -> [f32; 2] {
+fn double(d: &mut SplitMix64) -> [f32; 2] {
     let exact = d.sign() * d.log(1e-3, 1e3);
     let hi = exact as f32;
     [hi, (exact - f64::from(hi)) as f32]
 }
 
-fn positive_double(d: &mut Draw) -> [f32; 2] {
+fn positive_double(d: &mut SplitMix64) -> [f32; 2] {
     let [hi, lo] = double(d);
     if hi < 0.0 { [-hi, -lo] } else { [hi, lo] }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
-use super::catalogue::{Axis, Case, Draw, EXACT, Equation, Output, Region, columns, ulp, vector};
+use super::catalogue::{Axis, Case, EXACT, Equation, Output, Region, SplitMix64, columns, ulp, vector};
 
 /// cosθ of the angle between two directions; 0 for a zero vector.
 pub(super) fn cosine(a: DVec3, b: DVec3) -> f64 {
@@ -210,18 +210,18 @@ pub fn mis_weight(p: f64, q: f64) -> f64 {
 const AXES: [DVec3; 6] = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z];
 
 /// An axis, against which f32 has cosines of 1e-8 and less, or any direction.
-pub(super) fn normal(d: &mut Draw) -> DVec3 {
+pub(super) fn normal(d: &mut SplitMix64) -> DVec3 {
     if d.below(5) < 2 { AXES[d.below(6)] } else { d.direction() }
 }
 
 /// A direction at that cosine.
-pub(super) fn at_cosine(d: &mut Draw, from: DVec3, cosine: f64) -> DVec3 {
+pub(super) fn at_cosine(d: &mut SplitMix64, from: DVec3, cosine: f64) -> DVec3 {
     let across = d.perpendicular(from);
     from * cosine + across * ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt()
 }
 
 /// Any, grazing, almost normal.
-pub(super) fn cosine_in(d: &mut Draw) -> f64 {
+pub(super) fn cosine_in(d: &mut SplitMix64) -> f64 {
     match d.below(8) {
         0..3 => d.unit(),
         3..6 => d.log(1e-8, 1.0),
@@ -230,7 +230,7 @@ pub(super) fn cosine_in(d: &mut Draw) -> f64 {
     }
 }
 
-fn alpha(d: &mut Draw) -> f64 {
+fn alpha(d: &mut SplitMix64) -> f64 {
     if d.below(8) == 0 { f64::from(d.near(&[1e-5, 1e-3, 0.1, 1.0])).clamp(1e-5, 1.0) } else { d.log(1e-5, 1.0) }
 }
 
@@ -240,26 +240,26 @@ fn rounded(v: DVec3) -> DVec3 {
 }
 
 /// N around which L and V have their half vector at `angle`.
-fn around_half(d: &mut Draw, l: DVec3, v: DVec3, angle: f64) -> DVec3 {
+fn around_half(d: &mut SplitMix64, l: DVec3, v: DVec3, angle: f64) -> DVec3 {
     let s = rounded(l).normalize() + rounded(v).normalize();
     let h = if s.length() > 1e-9 { s.normalize() } else { d.perpendicular(l) };
     d.at_angle(h, angle)
 }
 
 /// L and V: by an angle apart, or nearly opposite.
-fn pair(d: &mut Draw, opposite: bool) -> [DVec3; 2] {
+fn pair(d: &mut SplitMix64, opposite: bool) -> [DVec3; 2] {
     let l = if opposite && d.below(3) == 0 { AXES[d.below(6)] } else { d.direction() };
     let angle = if opposite { PI - d.log(1e-7, 1.0) } else { d.between(0.0, 2.5) };
     [l, d.at_angle(l, angle)]
 }
 
 /// L_in, k_d, k_s and a shine.
-fn strengths(d: &mut Draw, shine: f64) -> [f32; 4] {
+fn strengths(d: &mut SplitMix64, shine: f64) -> [f32; 4] {
     [d.log(1e-3, 1e6) as f32, d.unit() as f32, d.unit() as f32, shine as f32]
 }
 
 /// A shine, and δ at which its lobe is e^-13.8 or more.
-fn in_lobe(d: &mut Draw) -> (f64, f64) {
+fn in_lobe(d: &mut SplitMix64) -> (f64, f64) {
     let shine = d.log(1.0, 1e7);
     let depth = if d.below(2) == 0 { d.between(0.0, 13.8) } else { d.log(1e-6, 13.8) };
     (shine, (-depth / shine).exp().acos())
@@ -346,7 +346,7 @@ const GGX: &[Region] = &[
     },
 ];
 
-fn ggx_row(vectors: [DVec3; 3], alpha: f64, d: &mut Draw) -> Vec<f32> {
+fn ggx_row(vectors: [DVec3; 3], alpha: f64, d: &mut SplitMix64) -> Vec<f32> {
     let mut row = columns(&vectors);
     let f0 = match d.below(4) {
         0 => 0.04,
@@ -946,7 +946,7 @@ fn lv2_allowed(case: &Case<'_>) -> f64 {
     if s2 == 0.0 { 0.0 } else { s2 * lv2_part(case, s2) }
 }
 
-fn ggx_d_row(d: &mut Draw, n: DVec3, angle: f64, alpha: f64) -> Vec<f32> {
+fn ggx_d_row(d: &mut SplitMix64, n: DVec3, angle: f64, alpha: f64) -> Vec<f32> {
     let n = rounded(n);
     let mut row = columns(&[n, d.at_angle(n.normalize(), angle)]);
     row.push(alpha as f32);
@@ -965,7 +965,7 @@ fn factors(case: &Case<'_>) -> f64 {
 }
 
 /// cosδ, sin²δ, two that the lobe does not read, and the shine.
-fn lobe_row(d: &mut Draw, delta: f64, shine: f64) -> Vec<f32> {
+fn lobe_row(d: &mut SplitMix64, delta: f64, shine: f64) -> Vec<f32> {
     vec![delta.cos() as f32, delta.sin().powi(2) as f32, d.unit() as f32, d.unit() as f32, shine as f32]
 }
 

@@ -55,7 +55,7 @@ pub struct Region {
     /// Its part of the cases, relative to the others.
     pub share: u32,
     /// One case: input columns, each a value of f32.
-    pub draw: fn(&mut Draw) -> Vec<f32>,
+    pub draw: fn(&mut SplitMix64) -> Vec<f32>,
 }
 
 /// One output column and what is promised for it.
@@ -137,9 +137,9 @@ pub fn ulp(x: f64) -> f64 {
 
 /// Random numbers of one seed: SplitMix64 (Steele, Lea, Flood 2014), the same on every machine.
 #[derive(Debug, Clone)]
-pub struct Draw(u64);
+pub struct SplitMix64(u64);
 
-impl Draw {
+impl SplitMix64 {
     /// The stream of `seed`.
     #[must_use]
     pub fn new(seed: u64) -> Self {

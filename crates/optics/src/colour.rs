@@ -3,7 +3,7 @@
 
 use std::sync::LazyLock;
 
-use super::catalogue::{Axis, Case, Draw, Equation, Output, Region};
+use super::catalogue::{Axis, Case, Equation, Output, Region, SplitMix64};
 
 /// Samples of a spectrum: 380, 385, … 780 nm.
 pub const SAMPLES: usize = 81;
@@ -204,7 +204,7 @@ fn upsampled_allowed(case: &Case<'_>) -> f64 {
 }
 
 /// Two lines, a bell and noise of either sign, in a mixture.
-fn spectrum(d: &mut Draw) -> Vec<f32> {
+fn spectrum(d: &mut SplitMix64) -> Vec<f32> {
     let scale = d.log(1e-3, 1e6);
     let (mu, width) = (d.between(380.0, 780.0), d.log(2.0, 200.0));
     let (bell, noise, line) = (d.below(2) as f64, d.below(2) as f64 * d.log(1e-3, 1.0), d.below(3));
@@ -217,7 +217,7 @@ fn spectrum(d: &mut Draw) -> Vec<f32> {
 }
 
 /// Coefficients of x = a u² + b u + c, u = (λ − 580)/200, as the fit gives them.
-fn coefficients(d: &mut Draw) -> Vec<f32> {
+fn coefficients(d: &mut SplitMix64) -> Vec<f32> {
     let size = d.log(0.1, 300.0);
     let [a, b, c] = [0; 3].map(|_| size * d.between(-1.0, 1.0));
     let (s, m) = (1.0 / 200.0, 580.0 / 200.0);

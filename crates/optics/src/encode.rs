@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, SQRT_2, TAU};
 
-use super::catalogue::{Axis, Case, Draw, Equation, Output, Region, columns, vector};
+use super::catalogue::{Axis, Case, Equation, Output, Region, SplitMix64, columns, vector};
 
 /// @eq N16: n itself, and no angle between it and what comes back.
 #[must_use]
@@ -55,7 +55,7 @@ fn nearest_degrees(case: &Case<'_>) -> f64 {
     degrees(case, NEAREST)
 }
 
-fn normal_and_bits(d: &mut Draw, n: DVec3) -> Vec<f32> {
+fn normal_and_bits(d: &mut SplitMix64, n: DVec3) -> Vec<f32> {
     let mut all = columns(&[n]);
     all.push([8.0, 10.0, 12.0, 16.0][d.below(4)]);
     all

@@ -4,7 +4,7 @@
 use glam::{DMat3, DVec3};
 
 use super::brdf::cosine_allowed;
-use super::catalogue::{Axis, Case, Draw, EXACT, Equation, Output, Region, columns, flag, vector};
+use super::catalogue::{Axis, Case, EXACT, Equation, Output, Region, SplitMix64, columns, flag, vector};
 
 /// @eq N14: v/|v|, and whether v has no direction: all components below the normal range of f32.
 #[must_use]
@@ -62,7 +62,7 @@ pub fn triangle_normal(a: DVec3, b: DVec3, c: DVec3) -> (DVec3, bool) {
 }
 
 /// Two unit vectors with an angle between them: small, any, or nearly π.
-fn units_apart(d: &mut Draw, angle: f64) -> Vec<f32> {
+fn units_apart(d: &mut SplitMix64, angle: f64) -> Vec<f32> {
     let u = d.direction();
     let v = d.at_angle(u, angle);
     columns(&[u, v])
@@ -133,12 +133,12 @@ const NORMALS: &[Region] = &[
 ];
 
 /// A rotation about a random axis.
-fn rotation(d: &mut Draw) -> DMat3 {
+fn rotation(d: &mut SplitMix64) -> DMat3 {
     let angle = d.between(0.0, std::f64::consts::TAU);
     DMat3::from_axis_angle(d.direction(), angle)
 }
 
-fn map_and_normal(d: &mut Draw, map: DMat3) -> Vec<f32> {
+fn map_and_normal(d: &mut SplitMix64, map: DMat3) -> Vec<f32> {
     columns(&[map.x_axis, map.y_axis, map.z_axis, d.direction()])
 }
 
@@ -168,7 +168,7 @@ fn normal_allowed(case: &Case<'_>) -> f64 {
 }
 
 /// A triangle with an edge of about `size` and the height `height` over it, somewhere within `reach`.
-fn triangle(d: &mut Draw, reach: f64, size: f64, height: f64) -> Vec<f32> {
+fn triangle(d: &mut SplitMix64, reach: f64, size: f64, height: f64) -> Vec<f32> {
     let a = d.direction() * reach * d.unit();
     let along = d.direction();
     let across = d.perpendicular(along);

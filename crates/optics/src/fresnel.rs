@@ -1,7 +1,7 @@
 //! Reflectance of smooth surfaces, as textbooks write it (lecture F2, F3; Born & Wolf, Principles of Optics, 1.5.2 and
 //! 14.2). n is n_transmitted / n_incident.
 
-use super::catalogue::{Axis, Case, Draw, Equation, Output, Region, flag};
+use super::catalogue::{Axis, Case, Equation, Output, Region, SplitMix64, flag};
 
 /// @eq F2: reflectance at normal incidence.
 #[must_use]
@@ -129,7 +129,7 @@ pub fn conductor_absorbed(cos_in: f64, n: f64, kappa: f64) -> [f64; 3] {
 }
 
 /// A cosine: uniform, grazing, nearly normal, or a special one.
-fn cosine(d: &mut Draw) -> f64 {
+fn cosine(d: &mut SplitMix64) -> f64 {
     match d.below(8) {
         0..4 => d.unit(),
         4..6 => d.log(1e-8, 1.0),
@@ -138,7 +138,7 @@ fn cosine(d: &mut Draw) -> f64 {
     }
 }
 
-fn log_index(d: &mut Draw) -> f64 {
+fn log_index(d: &mut SplitMix64) -> f64 {
     match d.below(8) {
         0 => f64::from(d.near(&[1.0, 1.2, 1.333, 1.5, 2.42, 0.5, 1.0 / 1.5])),
         1..3 => d.between(1.0, 3.0),

@@ -19,7 +19,7 @@ pub mod ray;
 pub mod snell;
 pub mod spectra;
 
-pub use catalogue::{Axis, Case, Draw, Equation, Output, Region, Tier, ulp};
+pub use catalogue::{Axis, Case, Equation, Output, Region, SplitMix64, Tier, ulp};
 
 /// Every equation, by subject.
 pub fn equations() -> impl Iterator<Item = &'static Equation> {

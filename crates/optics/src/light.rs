@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use glam::DVec3;
 
 use super::brdf::{at_cosine, cosine, cosine_in, grazing_allowed, normal};
-use super::catalogue::{Axis, Draw, Equation, Output, Region, columns, ulp, vector};
+use super::catalogue::{Axis, Equation, Output, Region, SplitMix64, columns, ulp, vector};
 
 /// @eq R3: cos⁺θ, E cos⁺θ.
 #[must_use]
@@ -85,7 +85,7 @@ fn point_row(p: DVec3, l: DVec3, n: DVec3, intensity: f64) -> Vec<f32> {
 }
 
 /// From a surface with normal N a vector to the light: any side, `distance` long.
-fn to_light(d: &mut Draw, n: DVec3, distance: f64) -> DVec3 {
+fn to_light(d: &mut SplitMix64, n: DVec3, distance: f64) -> DVec3 {
     let c = cosine_in(d) * if d.below(4) == 0 { -1.0 } else { 1.0 };
     at_cosine(d, n, c) * distance
 }

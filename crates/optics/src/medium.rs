@@ -1,6 +1,6 @@
 //! Absorption along a path, as the lecture has it (A1, A2).
 
-use super::catalogue::{Axis, Case, Draw, EXACT, Equation, Output, Region};
+use super::catalogue::{Axis, Case, EXACT, Equation, Output, Region, SplitMix64};
 
 /// @eq A1: optical depth, transmittance, 1 − transmittance, what is left of L0 (Beer 1852).
 #[must_use]
@@ -59,20 +59,20 @@ fn march_allowed(case: &Case<'_>) -> f64 {
 }
 
 /// σ, d with an optical depth of `tau`.
-fn path(d: &mut Draw, tau: f64) -> [f32; 2] {
+fn path(d: &mut SplitMix64, tau: f64) -> [f32; 2] {
     let sigma = d.log(1e-3, 1e8);
     [sigma as f32, (tau / sigma) as f32]
 }
 
 /// n, s0, ds, seed of about the optical depth `tau`; s0 a power of two, so that every σ_i is a value of f32.
-fn steps(d: &mut Draw, n: f64, tau: f64) -> Vec<f32> {
+fn steps(d: &mut SplitMix64, n: f64, tau: f64) -> Vec<f32> {
     let s0 = 2_f64.powi(d.below(21) as i32 - 10);
     // Of all 32 bits; verify adds the digits that a float has not.
     let seed = (d.unit() * 4294967040.0) as f32;
     vec![n.floor() as f32, s0 as f32, (tau / (1.5 * n * s0)) as f32, seed]
 }
 
-fn medium(d: &mut Draw, rule: f32) -> Vec<f32> {
+fn medium(d: &mut SplitMix64, rule: f32) -> Vec<f32> {
     let length = d.log(1e-2, 1e4);
     let falloff = match d.below(8) {
         0 => 0.0,

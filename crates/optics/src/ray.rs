@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::catalogue::{Axis, Case, Draw, EXACT, Equation, Output, Region, columns, flag, ulp, vector};
+use super::catalogue::{Axis, Case, EXACT, Equation, Output, Region, SplitMix64, columns, flag, ulp, vector};
 
 /// @eq N34 N35: whether the line meets the sphere, and where: the roots of |o + t d − c|² = r², the smaller first.
 #[must_use]
@@ -132,7 +132,7 @@ fn root_allowed(case: &Case<'_>) -> f64 {
     case.ulps(5.0).max(case.rel(part)) + case.rel(by_root)
 }
 
-fn sphere_case(d: &mut Draw, center: DVec3, radius: f64, origin: DVec3, direction: DVec3) -> Vec<f32> {
+fn sphere_case(d: &mut SplitMix64, center: DVec3, radius: f64, origin: DVec3, direction: DVec3) -> Vec<f32> {
     let length = if d.below(2) == 0 { 1.0 } else { d.log(1e-3, 1e3) };
     let mut all = columns(&[origin, direction * length, center]);
     all.push(radius as f32);
@@ -140,7 +140,7 @@ fn sphere_case(d: &mut Draw, center: DVec3, radius: f64, origin: DVec3, directio
 }
 
 /// A ray from `distance` away that passes a sphere's center at `impact` radii.
-fn toward_sphere(d: &mut Draw, distance: f64, impact: f64) -> Vec<f32> {
+fn toward_sphere(d: &mut SplitMix64, distance: f64, impact: f64) -> Vec<f32> {
     let (radius, along) = (d.log(0.1, 10.0), d.direction());
     let origin = d.direction() * d.unit();
     let across = d.perpendicular(along);
@@ -149,7 +149,7 @@ fn toward_sphere(d: &mut Draw, distance: f64, impact: f64) -> Vec<f32> {
     sphere_case(d, center, radius, origin, aim)
 }
 
-fn box_case(d: &mut Draw, parallel: bool) -> Vec<f32> {
+fn box_case(d: &mut SplitMix64, parallel: bool) -> Vec<f32> {
     let boxed = columns(&[d.direction() * d.log(0.1, 1e3), DVec3::from_array([0; 3].map(|_| d.log(1e-3, 10.0)))]);
     let exact: Vec<f64> = boxed.iter().map(|&x| f64::from(x)).collect();
     let (centre, half) = (vector(&exact, 0), vector(&exact, 3));
@@ -194,7 +194,7 @@ fn box_slack(x: &[f64]) -> [f64; 2] {
 }
 
 /// A triangle of about unit size around `center`, and a ray from `distance` towards a place in or beside it.
-fn toward_triangle(d: &mut Draw, distance: f64, scale: f64) -> Vec<f32> {
+fn toward_triangle(d: &mut SplitMix64, distance: f64, scale: f64) -> Vec<f32> {
     let center = d.direction();
     let [a, b, c] = [0; 3].map(|_| center + d.direction());
     let (u, v) = (d.between(-0.2, 1.2), d.between(-0.2, 1.2));
@@ -253,7 +253,7 @@ fn pair_of(p: DVec3) -> [DVec3; 2] {
 }
 
 /// A ray that meets a triangle of about unit size, and t, u, v of the meeting; not seen edge-on.
-fn ray_to_point(d: &mut Draw) -> Vec<f32> {
+fn ray_to_point(d: &mut SplitMix64) -> Vec<f32> {
     loop {
         let place = d.direction() * d.between(0.0, 2.0);
         let corners = columns(&[0; 3].map(|_| place + d.direction()));

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::catalogue::{Axis, Case, Draw, EXACT, Equation, Output, Region, columns, flag, vector};
+use super::catalogue::{Axis, Case, EXACT, Equation, Output, Region, SplitMix64, columns, flag, vector};
 
 /// @eq F4: the mirrored direction.
 #[must_use]
@@ -42,12 +42,12 @@ pub fn brewster_angle(n_in: f64, n_out: f64) -> [f64; 2] {
 }
 
 /// v, N with an angle of incidence of `angle`.
-fn incident(d: &mut Draw, angle: f64) -> [DVec3; 2] {
+fn incident(d: &mut SplitMix64, angle: f64) -> [DVec3; 2] {
     let n = d.direction();
     [-d.at_angle(n, angle), n]
 }
 
-fn with_index(d: &mut Draw, angle: f64, n: f64) -> Vec<f32> {
+fn with_index(d: &mut SplitMix64, angle: f64, n: f64) -> Vec<f32> {
     let pair = incident(d, angle);
     let mut all = columns(&pair);
     all.push(n as f32);

@@ -51,7 +51,7 @@ pub(crate) fn check(name: &str, module: &Module, shipped: &[u32], sources: &BTre
         }
         if loops.get(function).is_some_and(|&found| found != source.heads.len()) {
             let (stated, found) = (source.heads.len(), loops[function]);
-            return Err(format!("{name}: {function} has {found} loops and states `@heads` of {stated}"));
+            return Err(format!("{name}: {function} has {found} loops and states `@iterations` of {stated}"));
         }
     }
     decorations(name, module, shipped)?;

@@ -52,7 +52,7 @@ pub(crate) struct Source {
     pub(crate) precise: bool,
     /// Loops in its body.
     pub(crate) loops: usize,
-    /// `@heads N` of its loops.
+    /// `@iterations N` of its loops.
     pub(crate) heads: Vec<u32>,
 }
 
@@ -193,8 +193,8 @@ fn read(path: &Path, text: &str, structs: &Structs, library: &mut Library) -> Re
                     let code = without_comment(lines[end]);
                     source.precise |= code.contains("precise ");
                     source.loops += ["for (", "while ("].iter().map(|word| code.matches(word).count()).sum::<usize>();
-                    if let Some(heads) = lines[end].trim().strip_prefix("// @heads ") {
-                        source.heads.push(heads.trim().parse().map_err(|e| format!("{}: @heads: {e}", place()))?);
+                    if let Some(heads) = lines[end].trim().strip_prefix("// @iterations ") {
+                        source.heads.push(heads.trim().parse().map_err(|e| format!("{}: @iterations: {e}", place()))?);
                     }
                     end += 1;
                 }

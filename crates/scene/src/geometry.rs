@@ -210,19 +210,19 @@ fn normalize_tangents(mesh: &mut Mesh) -> usize {
 }
 
 /// The mesh as the tangent generator sees it, and one tangent per corner as it answers.
-struct Corners<'a> {
+struct TangentCorners<'a> {
     mesh: &'a Mesh,
     set: usize,
     tangents: Vec<[f32; 4]>,
 }
 
-impl Corners<'_> {
+impl TangentCorners<'_> {
     fn vertex(&self, face: usize, corner: usize) -> usize {
         self.mesh.indices[face * 3 + corner] as usize
     }
 }
 
-impl Geometry for Corners<'_> {
+impl Geometry for TangentCorners<'_> {
     fn num_faces(&self) -> usize {
         self.mesh.indices.len() / 3
     }
@@ -255,7 +255,7 @@ impl Geometry for Corners<'_> {
 
 /// MikkTSpace tangents; a vertex whose corners disagree is split.
 fn generate(mesh: &mut Mesh, set: usize) {
-    let mut corners = Corners { mesh, set, tangents: vec![[1.0, 0.0, 0.0, 1.0]; mesh.indices.len()] };
+    let mut corners = TangentCorners { mesh, set, tangents: vec![[1.0, 0.0, 0.0, 1.0]; mesh.indices.len()] };
     // The generator's error type has no values.
     let _ = generate_tangents(&mut corners);
     let per_corner = corners.tangents;

@@ -205,7 +205,7 @@ fn told(error: &serde_json::Error) -> anyhow::Error {
 fn light_spectrum(text: &str, warnings: &mut Vec<String>) -> Result<Spectrum> {
     #[derive(Deserialize)]
     #[serde(rename_all = "lowercase", deny_unknown_fields)]
-    enum Told {
+    enum SpectrumJson {
         Blackbody(f64),
         Table(Vec<[f64; 2]>),
     }
@@ -215,14 +215,14 @@ fn light_spectrum(text: &str, warnings: &mut Vec<String>) -> Result<Spectrum> {
         })?
     } else {
         match serde_json::from_str(text).map_err(|error| told(&error))? {
-            Told::Blackbody(kelvin) => {
+            SpectrumJson::Blackbody(kelvin) => {
                 ensure!(
                     (500.0..=1e6).contains(&kelvin),
                     "a black body of {kelvin} K: those of 500 to 1000000 K shine visibly"
                 );
                 Spectrum::BlackBody(kelvin)
             }
-            Told::Table(rows) => {
+            SpectrumJson::Table(rows) => {
                 check_table(&rows, warnings)?;
                 Spectrum::light_table(&rows)
             }
@@ -242,10 +242,10 @@ fn light_spectrum(text: &str, warnings: &mut Vec<String>) -> Result<Spectrum> {
 fn reflectance(text: &str, warnings: &mut Vec<String>) -> Result<Spectrum> {
     #[derive(Deserialize)]
     #[serde(deny_unknown_fields)]
-    struct Told {
+    struct SpectrumJson {
         table: Vec<[f64; 2]>,
     }
-    let mut rows = serde_json::from_str::<Told>(text).map_err(|error| told(&error))?.table;
+    let mut rows = serde_json::from_str::<SpectrumJson>(text).map_err(|error| told(&error))?.table;
     check_table(&rows, warnings)?;
     let most = rows.iter().map(|row| row[1]).fold(0.0, f64::max);
     if most > 1.0 {
@@ -278,11 +278,11 @@ fn check_table(rows: &[[f64; 2]], warnings: &mut Vec<String>) -> Result<()> {
 fn sellmeier_of(text: &str) -> Result<Dispersion> {
     #[derive(Deserialize)]
     #[serde(deny_unknown_fields)]
-    struct Told {
+    struct SpectrumJson {
         b: Vec<f64>,
         c: Vec<f64>,
     }
-    let Told { b, c } = serde_json::from_str(text).map_err(|error| told(&error))?;
+    let SpectrumJson { b, c } = serde_json::from_str(text).map_err(|error| told(&error))?;
     ensure!(
         b.len() == c.len() && (1..=4).contains(&b.len()),
         "{} B and {} C; there are as many of both, 1 to 4",

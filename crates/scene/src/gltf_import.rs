@@ -27,32 +27,32 @@ use super::{
     container::Document,
     geometry, gltf_extras, gltf_material,
     nodes::{Nodes, label},
-    reads::{Coordinates, forget_textures, unread_coordinates},
+    prune::{Coordinates, prune_textures, unused_coordinates},
     thin::{self, Stroke},
 };
 
 /// What is the same at all moments of a file's animation, by its place in the file.
 #[derive(Default)]
-struct Known {
+struct StillParts {
     images: HashMap<usize, Image>,
     /// Of primitives that nothing bends: mesh, primitive.
     resting: HashMap<(usize, usize), Mesh>,
 }
 
 /// A file that is read at one moment after another: what the moments share is read once.
-pub(crate) struct File {
+pub(crate) struct GltfFile {
     path: PathBuf,
     document: Document<'static>,
     warnings: Vec<String>,
-    known: Known,
+    known: StillParts,
 }
 
-impl File {
+impl GltfFile {
     pub(crate) fn open(path: &Path) -> Result<Self> {
         let bytes = fs::read(path).context("the file cannot be read")?;
         let mut warnings = Vec::new();
         let document = Document::open(&bytes, path, &mut warnings)?.into_owned();
-        Ok(Self { path: path.to_owned(), document, warnings, known: Known::default() })
+        Ok(Self { path: path.to_owned(), document, warnings, known: StillParts::default() })
     }
 
     pub(crate) fn at(&mut self, options: &LoadOptions) -> Result<Scene> {
@@ -65,7 +65,7 @@ pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let bytes = fs::read(path).context("the file cannot be read")?;
     let mut warnings = Vec::new();
     let document = Document::open(&bytes, path, &mut warnings)?;
-    read(&document, path, options, warnings, &mut Known::default())
+    read(&document, path, options, warnings, &mut StillParts::default())
 }
 
 fn read(
@@ -73,7 +73,7 @@ fn read(
     path: &Path,
     options: &LoadOptions,
     mut warnings: Vec<String>,
-    known: &mut Known,
+    known: &mut StillParts,
 ) -> Result<Scene> {
     let nodes = Nodes::new(document, options.time, &mut warnings)?;
     let mut materials = gltf_material::read(document, &mut warnings)?;
@@ -81,8 +81,8 @@ fn read(
         check_unseen_meshes(document)?;
     }
     let lights = lights(document, &nodes, &mut warnings)?;
-    let mut placing = Placing::new(document, &nodes, &mut materials.materials, &mut warnings)?;
-    let unread = placing.forget_unread(options.reads.ambience(lights.len()));
+    let mut placing = InstancePlacer::new(document, &nodes, &mut materials.materials, &mut warnings)?;
+    let unread = placing.prune_unused(options.prune.ambient(lights.len()));
     let (meshes, instances) = placing.run(&mut known.resting)?;
     let images = materials.decode(document, &mut known.images)?;
     let cameras = cameras(document, &nodes, &mut warnings)?;
@@ -170,7 +170,7 @@ impl Pose {
 }
 
 /// A primitive to be read, and the nodes it stands at.
-struct Job {
+struct PrimitiveJob {
     mesh: usize,
     primitive: usize,
     pose: Pose,
@@ -178,24 +178,24 @@ struct Job {
 }
 
 /// A primitive that has been read.
-struct Built {
+struct BuiltPrimitive {
     mesh: Mesh,
     /// Corner pairs (lines) or single corners (points) that become thin triangles.
     strokes: Vec<Stroke>,
     warnings: Vec<String>,
 }
 
-struct Placing<'d, 'b, 'w> {
+struct InstancePlacer<'d, 'b, 'w> {
     document: &'d Document<'b>,
     nodes: &'d Nodes,
     materials: &'w mut Vec<Material>,
     warnings: &'w mut Vec<String>,
-    jobs: Vec<Job>,
+    jobs: Vec<PrimitiveJob>,
     /// Attributes that nothing reads are read nevertheless.
     everything: bool,
 }
 
-impl<'d, 'b, 'w> Placing<'d, 'b, 'w> {
+impl<'d, 'b, 'w> InstancePlacer<'d, 'b, 'w> {
     fn new(
         document: &'d Document<'b>,
         nodes: &'d Nodes,
@@ -210,24 +210,24 @@ impl<'d, 'b, 'w> Placing<'d, 'b, 'w> {
         Ok(placing)
     }
 
-    fn material(&self, job: &Job) -> Option<usize> {
+    fn material(&self, job: &PrimitiveJob) -> Option<usize> {
         self.document.root.meshes[job.mesh].primitives[job.primitive].material.map(|m| m.value())
     }
 
     /// Takes from the materials what cannot be seen; `None` for `ambience` keeps it all.
-    fn forget_unread(&mut self, ambience: Option<bool>) -> Vec<String> {
-        let Some(ambience) = ambience else { return Vec::new() };
+    fn prune_unused(&mut self, ambient: Option<bool>) -> Vec<String> {
+        let Some(ambient) = ambient else { return Vec::new() };
         self.everything = false;
         let used: HashSet<usize> = self.jobs.iter().filter_map(|job| self.material(job)).collect();
         let materials = self.materials.iter_mut().enumerate();
         let mut unread: Vec<String> =
-            materials.flat_map(|(i, m)| forget_textures(m, used.contains(&i), ambience)).collect();
+            materials.flat_map(|(i, m)| prune_textures(m, used.contains(&i), ambient)).collect();
         for job in &self.jobs {
             let read = self.material(job).map_or([false; 2], |i| Coordinates::of(&self.materials[i]).kept);
             let json = &self.document.root.meshes[job.mesh].primitives[job.primitive];
             let there = |set: usize| json.attributes.contains_key(&Checked::Valid(Semantic::TexCoords(set as u32)));
             let name = self.document.root.meshes[job.mesh].name.clone().unwrap_or_else(|| format!("mesh {}", job.mesh));
-            unread.extend((0..2).filter(|&set| there(set) && !read[set]).map(|set| unread_coordinates(&name, set)));
+            unread.extend((0..2).filter(|&set| there(set) && !read[set]).map(|set| unused_coordinates(&name, set)));
         }
         unread.dedup();
         unread
@@ -240,7 +240,7 @@ impl<'d, 'b, 'w> Placing<'d, 'b, 'w> {
         let built = jobs
             .par_iter()
             .map(|job| match resting.get(&(job.mesh, job.primitive)).filter(|_| job.pose.is_rest()) {
-                Some(mesh) => Ok(Built { mesh: mesh.clone(), strokes: Vec::new(), warnings: Vec::new() }),
+                Some(mesh) => Ok(BuiltPrimitive { mesh: mesh.clone(), strokes: Vec::new(), warnings: Vec::new() }),
                 None => build(document, materials, job, everything)
                     .with_context(|| place(document, job.mesh, job.primitive)),
             })
@@ -259,7 +259,7 @@ impl<'d, 'b, 'w> Placing<'d, 'b, 'w> {
             let placements: Vec<_> = job.nodes.iter().map(|&node| (node, self.placement(job, node))).collect();
             if !built.strokes.is_empty() {
                 let placements = placements.into_iter().map(|(node, world)| (self.node_name(node), world)).collect();
-                strokes.push(thin::Group { placements, mesh: built.mesh, strokes: built.strokes });
+                strokes.push(thin::StrokeGroup { placements, mesh: built.mesh, strokes: built.strokes });
                 continue;
             }
             if built.mesh.indices.is_empty() {
@@ -286,13 +286,13 @@ impl<'d, 'b, 'w> Placing<'d, 'b, 'w> {
     }
 
     /// A skinned mesh is already in the world: its joints say where, and its node does not count.
-    fn placement(&self, job: &Job, node: usize) -> DAffine3 {
+    fn placement(&self, job: &PrimitiveJob, node: usize) -> DAffine3 {
         if job.pose.joints.is_some() { DAffine3::IDENTITY } else { self.nodes.world_from_node[node] }
     }
 
-    fn jobs(&self) -> Result<Vec<Job>> {
+    fn jobs(&self) -> Result<Vec<PrimitiveJob>> {
         let root = &self.document.root;
-        let mut jobs: Vec<Job> = Vec::new();
+        let mut jobs: Vec<PrimitiveJob> = Vec::new();
         let mut shared: HashMap<(usize, usize), usize> = HashMap::new();
         for &node in &self.nodes.shown {
             let Some(mesh) = root.nodes[node].mesh.map(|m| m.value()) else { continue };
@@ -305,7 +305,7 @@ impl<'d, 'b, 'w> Placing<'d, 'b, 'w> {
                         continue;
                     }
                 }
-                jobs.push(Job { mesh, primitive, pose, nodes: vec![node] });
+                jobs.push(PrimitiveJob { mesh, primitive, pose, nodes: vec![node] });
             }
         }
         Ok(jobs)
@@ -368,7 +368,12 @@ fn cofactors(m: &DMat3) -> DMat3 {
     DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b))
 }
 
-fn build(document: &Document<'_>, materials: &[Material], job: &Job, everything: bool) -> Result<Built> {
+fn build(
+    document: &Document<'_>,
+    materials: &[Material],
+    job: &PrimitiveJob,
+    everything: bool,
+) -> Result<BuiltPrimitive> {
     let root = &document.root;
     let json = &root.meshes[job.mesh].primitives[job.primitive];
     let place = place(document, job.mesh, job.primitive);
@@ -444,7 +449,7 @@ fn build(document: &Document<'_>, materials: &[Material], job: &Job, everything:
                 before - strokes.len()
             ));
         }
-        return Ok(Built { mesh, strokes, warnings });
+        return Ok(BuiltPrimitive { mesh, strokes, warnings });
     }
     let (triangles, left_over) = triangles(mode, indices);
     if left_over > 0 {
@@ -456,7 +461,7 @@ fn build(document: &Document<'_>, materials: &[Material], job: &Job, everything:
     }
     let repairs = geometry::finish(&mut mesh, read.tangents);
     warnings.extend(repairs.sentences(&place));
-    Ok(Built { mesh, strokes: Vec::new(), warnings })
+    Ok(BuiltPrimitive { mesh, strokes: Vec::new(), warnings })
 }
 
 /// Points and lines of a primitive; `None` for triangles.
@@ -704,7 +709,7 @@ fn lights(document: &Document<'_>, nodes: &Nodes, warnings: &mut Vec<String>) ->
         }
         let name = json.name.clone().or_else(|| root.nodes[node].name.clone());
         let name = name.unwrap_or_else(|| format!("light {index}"));
-        let mut light = Light { name, color, spectrum: None, extent: None, kind, stand_in: false };
+        let mut light = Light { name, color, spectrum: None, extent: None, kind, proxy: false };
         let found = gltf_extras::apply_to_light(&json.extras, &mut light, side(world.matrix3.x_axis, direction))
             .with_context(|| place.clone())?;
         warnings.extend(found.into_iter().map(|warning| format!("{place}: {warning}")));

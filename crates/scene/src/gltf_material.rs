@@ -46,7 +46,7 @@ struct Clearcoat {
 /// KHR_materials_dispersion, which the `gltf` crate does not know.
 #[derive(Deserialize, Default)]
 #[serde(default)]
-struct Dispersion {
+struct KhrDispersion {
     dispersion: f32,
 }
 
@@ -56,7 +56,7 @@ struct Webp {
     source: usize,
 }
 
-struct Reader<'d, 'b, 'w> {
+struct MaterialReader<'d, 'b, 'w> {
     document: &'d Document<'b>,
     warnings: &'w mut Vec<String>,
     /// Scene image of each file image, once a material refers to it.
@@ -70,7 +70,7 @@ struct Reader<'d, 'b, 'w> {
 /// Reads every material of the file.
 pub(crate) fn read(document: &Document<'_>, warnings: &mut Vec<String>) -> Result<Materials> {
     let root = &document.root;
-    let mut reader = Reader {
+    let mut reader = MaterialReader {
         document,
         warnings,
         image_slots: vec![None; root.images.len()],
@@ -136,7 +136,7 @@ fn parse<'v, T: Deserialize<'v>>(others: &'v Map<String, Value>, name: &str) -> 
     others.get(name).map(|v| T::deserialize(v).with_context(|| format!("the extension {name}"))).transpose()
 }
 
-impl Reader<'_, '_, '_> {
+impl MaterialReader<'_, '_, '_> {
     fn warn(&mut self, what: &str) {
         self.warnings.push(format!("{}: {what}", self.place));
     }
@@ -252,7 +252,7 @@ impl Reader<'_, '_, '_> {
                 *of = self.lobe(lobe, value).with_context(|| format!("the extension {}", lobe.extension))?;
             }
         }
-        if let Some(dispersion) = parse::<Dispersion>(&json.others, "KHR_materials_dispersion")? {
+        if let Some(dispersion) = parse::<KhrDispersion>(&json.others, "KHR_materials_dispersion")? {
             let abbe = f64::from(self.positive(dispersion.dispersion, "the dispersion"));
             m.dispersion = if abbe > 0.0 { spectra::Dispersion::Abbe(abbe) } else { spectra::Dispersion::None };
         }

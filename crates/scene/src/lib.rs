@@ -5,6 +5,7 @@
 
 mod accessor;
 pub mod camera;
+pub mod canonical;
 mod container;
 pub mod environment;
 mod geometry;
@@ -15,10 +16,9 @@ pub mod light;
 pub mod lobe;
 pub mod material;
 mod nodes;
-pub mod normal_form;
 mod obj;
 mod pictures;
-pub mod reads;
+pub mod prune;
 mod shared;
 pub mod sigma;
 pub mod solid;
@@ -35,7 +35,7 @@ use glam::{DAffine3, DVec3};
 pub use camera::{Camera, Projection};
 pub use light::{Extent, Light, LightKind};
 pub use material::{AlphaMode, Material, Meaning, Sampler, TextureRef, Wrap};
-pub use reads::{Ambience, Reads};
+pub use prune::{AmbientLight, Prune};
 pub use shared::{Mark, Shared};
 pub use sigma::SigmaGrid;
 
@@ -47,7 +47,7 @@ pub struct LoadOptions {
     /// weights as written, skins evaluated with them.
     pub time: Option<f64>,
     /// What is read of it.
-    pub reads: Reads,
+    pub prune: Prune,
 }
 
 /// Reads a scene from a glTF 2.0 file (`.gltf`, `.glb`) or a Wavefront file (`.obj`).
@@ -58,7 +58,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let scene = match extension.as_str() {
         "gltf" | "glb" => gltf_import::load(path, options),
-        "obj" => obj::load(path, options.reads),
+        "obj" => obj::load(path, options.prune),
         _ => {
             bail!("loading {}: only .gltf, .glb and .obj files are supported", path.display())
         }
@@ -71,12 +71,12 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
 /// A scene that is looked at one moment after another: its file is read once, and all moments share what does not move.
 pub struct Source {
     kind: Kind,
-    reads: Reads,
+    prune: Prune,
 }
 
 enum Kind {
     Gltf {
-        file: Box<gltf_import::File>,
+        file: Box<gltf_import::GltfFile>,
         name: String,
     },
     /// Nothing moves.
@@ -88,20 +88,20 @@ impl Source {
     ///
     /// # Errors
     /// As [`load`].
-    pub fn open(path: &Path, reads: Reads) -> Result<Self> {
+    pub fn open(path: &Path, prune: Prune) -> Result<Self> {
         let is_gltf = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb"));
         if !is_gltf {
-            return Ok(Self::still(load(path, &LoadOptions { time: None, reads })?));
+            return Ok(Self::still(load(path, &LoadOptions { time: None, prune })?));
         }
         let name = path.display().to_string();
-        let file = Box::new(gltf_import::File::open(path).with_context(|| format!("loading {name}"))?);
-        Ok(Self { kind: Kind::Gltf { file, name }, reads })
+        let file = Box::new(gltf_import::GltfFile::open(path).with_context(|| format!("loading {name}"))?);
+        Ok(Self { kind: Kind::Gltf { file, name }, prune })
     }
 
     /// A scene that does not move.
     #[must_use]
     pub fn still(scene: Scene) -> Self {
-        Self { kind: Kind::Still(Box::new(scene)), reads: Reads::Everything }
+        Self { kind: Kind::Still(Box::new(scene)), prune: Prune::Nothing }
     }
 
     /// The scene at a moment of its animation; `None` is its rest pose. What [`load`] gives, to the last bit; its warnings of what does
@@ -113,7 +113,7 @@ impl Source {
         match &mut self.kind {
             Kind::Still(scene) => Ok(Scene::clone(scene)),
             Kind::Gltf { file, name } => {
-                let options = LoadOptions { time, reads: self.reads };
+                let options = LoadOptions { time, prune: self.prune };
                 let mut scene = file.at(&options).with_context(|| format!("loading {name}"))?;
                 sigma::one_medium_each(&mut scene);
                 Ok(scene)

@@ -20,7 +20,7 @@ pub struct Light {
     /// What kind, with its geometry.
     pub kind: LightKind,
     /// Stands for a surface that emits, where such surfaces light nothing: where they do, it is dark. In study scenes; no file says it.
-    pub stand_in: bool,
+    pub proxy: bool,
 }
 
 impl Light {

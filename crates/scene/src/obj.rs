@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use super::{
     AlphaMode, Image, Instance, Material, Mesh, Sampler, Scene, TextureRef, Wrap, geometry, pictures,
-    reads::{Reads, forget_textures},
+    prune::{Prune, prune_textures},
     thin::{self, Stroke},
 };
 
@@ -25,18 +25,18 @@ use super::{
 const MAX_EARS: usize = 2_000;
 
 /// Reads an `.obj` file and the material libraries it names.
-pub(crate) fn load(path: &Path, reads: Reads) -> Result<Scene> {
+pub(crate) fn load(path: &Path, prune: Prune) -> Result<Scene> {
     let bytes = fs::read(path).context("the file cannot be read")?;
     let text = String::from_utf8_lossy(&bytes);
-    let mut reader = Reader {
+    let mut reader = ObjReader {
         folder: path.parent().unwrap_or(Path::new("")).to_owned(),
         name: "object".to_owned(),
-        ..Reader::default()
+        ..ObjReader::default()
     };
     for (number, line) in logical_lines(&text) {
         reader.line(&line).with_context(|| format!("line {number}"))?;
     }
-    let mut scene = reader.finish(reads)?;
+    let mut scene = reader.finish(prune)?;
     scene.name = path.display().to_string();
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     scene.warnings.iter_mut().for_each(|w| *w = format!("{file}: {w}"));
@@ -97,7 +97,7 @@ type Corner = (u32, Option<u32>, Option<u32>);
 
 /// Faces in a row that share object, material and the presence of normals.
 #[derive(Default)]
-struct Group {
+struct ObjGroup {
     name: String,
     material: Option<usize>,
     smooth: bool,
@@ -108,18 +108,18 @@ struct Group {
 }
 
 #[derive(Default)]
-struct Reader {
+struct ObjReader {
     folder: PathBuf,
     positions: Vec<[f32; 3]>,
     colors: Vec<Option<[f32; 3]>>,
     uvs: Vec<[f32; 2]>,
     normals: Vec<[f32; 3]>,
-    groups: Vec<Group>,
+    groups: Vec<ObjGroup>,
     name: String,
     material: Option<usize>,
     materials: Vec<Material>,
     by_name: HashMap<String, usize>,
-    pictures: Vec<Picture>,
+    pictures: Vec<ObjPicture>,
     warnings: Vec<String>,
     /// A library was missing, so unknown material names have been explained.
     library_missing: bool,
@@ -127,7 +127,7 @@ struct Reader {
 
 /// A picture of a material: colour, and opacity from another file.
 #[derive(Debug, Clone, PartialEq)]
-struct Picture {
+struct ObjPicture {
     color: Option<PathBuf>,
     alpha: Option<PathBuf>,
 }
@@ -145,7 +145,7 @@ fn numbers<const N: usize>(words: &mut SplitWhitespace<'_>) -> Result<[f32; N]> 
     Ok(out)
 }
 
-impl Reader {
+impl ObjReader {
     fn line(&mut self, line: &str) -> Result<()> {
         let mut words = line.split_whitespace();
         let Some(keyword) = words.next() else { return Ok(()) };
@@ -228,8 +228,8 @@ impl Reader {
     }
 
     /// The group that the next face belongs to.
-    fn group(&mut self, smooth: bool, strokes: bool) -> &mut Group {
-        let fits = |g: &Group| {
+    fn group(&mut self, smooth: bool, strokes: bool) -> &mut ObjGroup {
+        let fits = |g: &ObjGroup| {
             g.material == self.material
                 && g.name == self.name
                 && g.smooth == smooth
@@ -237,7 +237,7 @@ impl Reader {
         };
         if !self.groups.last().is_some_and(fits) {
             let (name, material) = (self.name.clone(), self.material);
-            self.groups.push(Group { name, material, smooth, ..Group::default() });
+            self.groups.push(ObjGroup { name, material, smooth, ..ObjGroup::default() });
         }
         let last = self.groups.len() - 1;
         &mut self.groups[last]
@@ -305,7 +305,7 @@ impl Reader {
         let mut material = mtl.fold(&name);
         if mtl.map_kd.is_some() || mtl.map_d.is_some() {
             let options = mtl.map_kd.as_ref().or(mtl.map_d.as_ref());
-            let picture = Picture {
+            let picture = ObjPicture {
                 color: mtl.map_kd.as_ref().map(|m| self.folder.join(&m.path)),
                 alpha: mtl.map_d.as_ref().map(|m| self.folder.join(&m.path)),
             };
@@ -316,7 +316,7 @@ impl Reader {
         }
         let plain = |r: &mut Self, map: &Map| {
             let color = Some(r.folder.join(&map.path));
-            map.reference(r.picture(Picture { color, alpha: None }))
+            map.reference(r.picture(ObjPicture { color, alpha: None }))
         };
         if let Some(map) = &mtl.map_ke {
             material.emissive_texture = Some(plain(self, map));
@@ -335,14 +335,14 @@ impl Reader {
     }
 
     /// Index of a picture, the same for the same files.
-    fn picture(&mut self, picture: Picture) -> usize {
+    fn picture(&mut self, picture: ObjPicture) -> usize {
         self.pictures.iter().position(|p| *p == picture).unwrap_or_else(|| {
             self.pictures.push(picture);
             self.pictures.len() - 1
         })
     }
 
-    fn finish(mut self, reads: Reads) -> Result<Scene> {
+    fn finish(mut self, prune: Prune) -> Result<Scene> {
         if self.groups.iter().any(|g| g.material.is_none()) {
             let grey = Mtl { kd: Some([0.8; 3]), ..Mtl::default() };
             for group in self.groups.iter_mut().filter(|g| g.material.is_none()) {
@@ -351,7 +351,7 @@ impl Reader {
             self.materials.push(grey.fold("default"));
         }
         let groups = std::mem::take(&mut self.groups);
-        let unread = self.forget_unread(reads, &groups);
+        let unread = self.prune_unused(prune, &groups);
         let images = self.decode()?;
         let built: Vec<(Mesh, Vec<Stroke>, Vec<String>)> = groups.into_par_iter().map(|g| self.build(g)).collect();
         let mut scene = Scene { images, unread, warnings: self.warnings, ..Scene::default() };
@@ -360,7 +360,7 @@ impl Reader {
             scene.warnings.extend(warnings);
             let (name, world_from_object) = (mesh.name.clone(), DAffine3::IDENTITY);
             if !lines.is_empty() {
-                strokes.push(thin::Group { placements: vec![(name, world_from_object)], mesh, strokes: lines });
+                strokes.push(thin::StrokeGroup { placements: vec![(name, world_from_object)], mesh, strokes: lines });
             } else if !mesh.indices.is_empty() {
                 scene.instances.push(Instance { name, mesh: scene.meshes.len(), world_from_object });
                 scene.meshes.push(mesh);
@@ -372,11 +372,11 @@ impl Reader {
     }
 
     /// Takes from the materials what cannot be seen. There are no lights in such a file.
-    fn forget_unread(&mut self, reads: Reads, groups: &[Group]) -> Vec<String> {
-        let Some(ambience) = reads.ambience(0) else { return Vec::new() };
+    fn prune_unused(&mut self, prune: Prune, groups: &[ObjGroup]) -> Vec<String> {
+        let Some(ambient) = prune.ambient(0) else { return Vec::new() };
         let used: HashSet<usize> = groups.iter().filter_map(|group| group.material).collect();
         let materials = self.materials.iter_mut().enumerate();
-        materials.flat_map(|(i, m)| forget_textures(m, used.contains(&i), ambience)).collect()
+        materials.flat_map(|(i, m)| prune_textures(m, used.contains(&i), ambient)).collect()
     }
 
     /// Decodes, in parallel, the pictures that the materials still name.
@@ -392,7 +392,7 @@ impl Reader {
         wanted.par_iter().map(|&picture| decode(picture)).collect()
     }
 
-    fn build(&self, group: Group) -> (Mesh, Vec<Stroke>, Vec<String>) {
+    fn build(&self, group: ObjGroup) -> (Mesh, Vec<Stroke>, Vec<String>) {
         let mut warnings = Vec::new();
         let material = group.material.unwrap_or(0);
         let textured = {
@@ -495,7 +495,7 @@ fn read_picture(path: &Path) -> Result<Image> {
     pictures::decode(name, &bytes).with_context(|| format!("the texture {}", path.display()))
 }
 
-fn decode(picture: &Picture) -> Result<Image> {
+fn decode(picture: &ObjPicture) -> Result<Image> {
     match (&picture.color, &picture.alpha) {
         (Some(color), None) => read_picture(color),
         (color, Some(alpha)) => {

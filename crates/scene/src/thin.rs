@@ -18,7 +18,7 @@ pub(crate) enum Stroke {
 }
 
 /// Strokes over the vertices of one mesh, and the places where they are drawn.
-pub(crate) struct Group {
+pub(crate) struct StrokeGroup {
     /// Name and world placement of each.
     pub(crate) placements: Vec<(String, DAffine3)>,
     /// Vertices with their attributes; its triangles and normals are not looked at.
@@ -28,7 +28,7 @@ pub(crate) struct Group {
 }
 
 /// Turns strokes into meshes and instances; their thickness comes from the bounds of everything.
-pub(crate) fn add(groups: &[Group], meshes: &mut Vec<Mesh>, instances: &mut Vec<Instance>) {
+pub(crate) fn add(groups: &[StrokeGroup], meshes: &mut Vec<Mesh>, instances: &mut Vec<Instance>) {
     if groups.is_empty() {
         return;
     }
@@ -38,7 +38,7 @@ pub(crate) fn add(groups: &[Group], meshes: &mut Vec<Mesh>, instances: &mut Vec<
     let drawn = Scene { meshes: std::mem::take(meshes), instances: std::mem::take(instances), ..Scene::default() };
     let mut bounds = drawn.bounds();
     (*meshes, *instances) = (drawn.meshes, drawn.instances);
-    for Group { placements, mesh, strokes } in groups {
+    for StrokeGroup { placements, mesh, strokes } in groups {
         for (_, world) in placements {
             for stroke in strokes {
                 let (a, b) = match *stroke {
@@ -54,11 +54,11 @@ pub(crate) fn add(groups: &[Group], meshes: &mut Vec<Mesh>, instances: &mut Vec<
     }
     let diagonal = bounds.map_or(0.0, |b| 2.0 * b.radius());
     let radius = HALF_THICKNESS * if diagonal > 0.0 { diagonal } else { 1.0 };
-    for Group { placements, mesh, strokes } in groups {
+    for StrokeGroup { placements, mesh, strokes } in groups {
         let Some(Stroke::Point(first) | Stroke::Line(first, _)) = strokes.first().copied() else { continue };
         for (name, world) in placements {
             let corner = |i: u32| Corner { position: at(mesh, world, i), source: i as usize };
-            let mut builder = Builder::new(at(mesh, world, first), radius, mesh);
+            let mut builder = StrokeBuilder::new(at(mesh, world, first), radius, mesh);
             for stroke in strokes {
                 match *stroke {
                     Stroke::Point(i) => builder.point(corner(i)),
@@ -82,14 +82,14 @@ struct Corner {
 }
 
 /// Collects thin geometry around an origin.
-struct Builder<'a> {
+struct StrokeBuilder<'a> {
     origin: DVec3,
     radius: f64,
     attributes: &'a Mesh,
     out: Mesh,
 }
 
-impl<'a> Builder<'a> {
+impl<'a> StrokeBuilder<'a> {
     /// Geometry `radius` thick on each side; colours and texture coordinates come from `attributes`.
     fn new(origin: DVec3, radius: f64, attributes: &'a Mesh) -> Self {
         let out = Mesh { name: attributes.name.clone(), material: attributes.material, ..Mesh::default() };
@@ -175,7 +175,7 @@ mod tests {
     fn a_line_is_a_closed_box_with_outward_faces() {
         for end in [DVec3::X, DVec3::new(-1.0, 2.0, 0.5), DVec3::NEG_Z * 3.0, DVec3::new(0.1, 0.0, -7.0)] {
             let source = Mesh { colors: vec![[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0]].into(), ..Mesh::default() };
-            let mut builder = Builder::new(DVec3::ZERO, 0.1, &source);
+            let mut builder = StrokeBuilder::new(DVec3::ZERO, 0.1, &source);
             builder.line(Corner { position: DVec3::ZERO, source: 0 }, Corner { position: end, source: 1 });
             let (mesh, _) = builder.finish();
             assert_eq!(mesh.indices.len(), 36);
@@ -189,7 +189,7 @@ mod tests {
     #[test]
     fn a_point_is_a_closed_octahedron() {
         let source = Mesh::default();
-        let mut builder = Builder::new(DVec3::ZERO, 0.3, &source);
+        let mut builder = StrokeBuilder::new(DVec3::ZERO, 0.3, &source);
         builder.point(Corner { position: DVec3::ZERO, source: 0 });
         let (mesh, _) = builder.finish();
         assert_eq!(mesh.indices.len(), 24);

@@ -10,7 +10,7 @@ use super::made::lambert;
 
 /// What a picture in a furnace shows.
 #[derive(Debug, Clone, Copy)]
-pub struct Shown {
+pub struct FurnaceRadiance {
     /// Mean of the pixels' green.
     pub mean: f64,
     /// Its standard error, over the pixels.
@@ -43,7 +43,7 @@ pub fn in_one_material(mut scene: Scene, white: &Material) -> Scene {
 /// # Panics
 /// Where it cannot be drawn.
 #[must_use]
-pub fn shown(gpu: &Gpu, scene: &Scene, samples: u32) -> Shown {
+pub fn shown(gpu: &Gpu, scene: &Scene, samples: u32) -> FurnaceRadiance {
     let mut knobs = Knobs::of(Model::Global);
     knobs.set(&format!("samples={samples}")).expect("a number of samples");
     let sky = Environment::constant([1.0; 3]);
@@ -52,5 +52,5 @@ pub fn shown(gpu: &Gpu, scene: &Scene, samples: u32) -> Shown {
     let n = all.len() as f64;
     let mean = all.iter().sum::<f64>() / n;
     let error = (all.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n * (n - 1.0))).sqrt();
-    Shown { mean, error }
+    FurnaceRadiance { mean, error }
 }

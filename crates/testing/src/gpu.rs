@@ -53,10 +53,10 @@ impl Gpu {
     }
 
     /// The same as [`Gpu::hasty`], on a device that takes turns as beside a window.
-    pub fn taking_turns() -> Self {
+    pub fn time_sliced() -> Self {
         in_haste();
         let place = Place::Own { _guard: PLACES.write().unwrap_or_else(PoisonError::into_inner) };
-        Self::opened(place, Device::open_taking_turns)
+        Self::opened(place, Device::open_time_sliced)
     }
 
     fn opened(place: Place, open: impl FnOnce(&DeviceChoice, bool) -> anyhow::Result<Arc<Device>>) -> Self {

@@ -4,6 +4,7 @@
 //! barriers are needed ([`barriers`]).
 
 pub mod barriers;
+pub mod document;
 pub mod furnace;
 pub mod gltf_builder;
 pub mod gpu;

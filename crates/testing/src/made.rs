@@ -41,14 +41,7 @@ impl Made {
 
     /// Adds a light; its colour has the unit of `Light::color`: cd, or lx where it is directional.
     pub fn light(&mut self, color: [f32; 3], kind: LightKind) {
-        self.0.lights.push(Light {
-            name: "made".to_owned(),
-            color,
-            spectrum: None,
-            extent: None,
-            kind,
-            stand_in: false,
-        });
+        self.0.lights.push(Light { name: "made".to_owned(), color, spectrum: None, extent: None, kind, proxy: false });
     }
 
     /// From `eye` to `target`; the picture is `half_height` high either way where it is orthographic.

@@ -144,13 +144,13 @@ fn differ(a: &Option<Hit>, b: &Option<Hit>) -> bool {
 }
 
 /// A triangle in world space, its vertices in the order in which they run counter-clockwise seen from the front.
-struct Triangle {
+struct WorldTriangle {
     p: [DVec3; 3],
     instance: u32,
     index: u32,
 }
 
-struct Node {
+struct RaycastNode {
     min: DVec3,
     max: DVec3,
     /// Leaf: first triangle and how many. Inner node: the second child (the first one follows its parent) and zero.
@@ -159,7 +159,7 @@ struct Node {
 }
 
 /// Per instance: what turns normals, and whether it mirrors.
-struct Frame {
+struct InstanceFrame {
     /// Inverse transpose of the placement's linear part.
     normal: DMat3,
     mirrored: bool,
@@ -169,14 +169,14 @@ struct Frame {
 pub struct World<'a> {
     scene: &'a Scene,
     options: Options,
-    frames: Vec<Frame>,
-    triangles: Vec<Triangle>,
-    nodes: Vec<Node>,
+    frames: Vec<InstanceFrame>,
+    triangles: Vec<WorldTriangle>,
+    nodes: Vec<RaycastNode>,
 }
 
 /// What the triangle test knows: distance and weights of the world triangle's vertices.
 #[derive(Clone, Copy)]
-struct Candidate {
+struct TriangleHit {
     distance: f64,
     weights: [f64; 3],
     triangle: usize,
@@ -197,7 +197,7 @@ impl<'a> World<'a> {
                 linear.z_axis.cross(linear.x_axis),
                 linear.x_axis.cross(linear.y_axis),
             );
-            frames.push(Frame { normal: if mirrored { normal * -1.0 } else { normal }, mirrored });
+            frames.push(InstanceFrame { normal: if mirrored { normal * -1.0 } else { normal }, mirrored });
             if !options.blend && scene.materials[mesh.material].alpha_mode == AlphaMode::Blend {
                 continue;
             }
@@ -207,7 +207,7 @@ impl<'a> World<'a> {
                     linear * p + instance.world_from_object.translation
                 });
                 let p = if mirrored { [a, c, b] } else { [a, b, c] };
-                triangles.push(Triangle { p, instance: i as u32, index: t as u32 });
+                triangles.push(WorldTriangle { p, instance: i as u32, index: t as u32 });
             }
         }
         let mut world = Self { scene, options, frames, triangles: Vec::new(), nodes: Vec::new() };
@@ -220,7 +220,7 @@ impl<'a> World<'a> {
     }
 
     /// Builds the tree over `triangles[begin..end]`, halving at the median centroid of the widest axis.
-    fn split(&mut self, triangles: &mut [Triangle], begin: usize, end: usize) {
+    fn split(&mut self, triangles: &mut [WorldTriangle], begin: usize, end: usize) {
         let part = &mut triangles[begin..end];
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for p in part.iter().flat_map(|t| t.p) {
@@ -229,14 +229,19 @@ impl<'a> World<'a> {
         // The slab test rounds; a wider box may cost a visit, a narrower one a hit.
         let slack = (min.abs().max(max.abs())).max_element() * 1e-14;
         let node = self.nodes.len();
-        self.nodes.push(Node { min: min - slack, max: max + slack, first: begin as u32, count: part.len() as u32 });
+        self.nodes.push(RaycastNode {
+            min: min - slack,
+            max: max + slack,
+            first: begin as u32,
+            count: part.len() as u32,
+        });
         if part.len() <= 4 {
             return;
         }
         let size = max - min;
         let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
         let middle = part.len() / 2;
-        let key = |t: &Triangle| t.p[0][axis] + t.p[1][axis] + t.p[2][axis];
+        let key = |t: &WorldTriangle| t.p[0][axis] + t.p[1][axis] + t.p[2][axis];
         part.select_nth_unstable_by(middle, |s, t| key(s).total_cmp(&key(t)));
         self.split(triangles, begin, begin + middle);
         self.nodes[node].first = self.nodes.len() as u32;
@@ -248,7 +253,7 @@ impl<'a> World<'a> {
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         let shear = Shear::new(ray);
         let inverse = ray.direction.recip();
-        let mut best: Option<(Candidate, Hit)> = None;
+        let mut best: Option<(TriangleHit, Hit)> = None;
         let mut stack = if self.nodes.is_empty() { vec![] } else { vec![0_usize] };
         while let Some(i) = stack.pop() {
             let node = &self.nodes[i];
@@ -271,7 +276,7 @@ impl<'a> World<'a> {
                 if best.is_some_and(|b| b.0.distance == distance && order(b.0.triangle) < order(t)) {
                     continue;
                 }
-                let candidate = Candidate { distance, weights, triangle: t };
+                let candidate = TriangleHit { distance, weights, triangle: t };
                 if let Some(hit) = self.surface(ray, &candidate) {
                     best = Some((candidate, hit));
                 }
@@ -282,7 +287,7 @@ impl<'a> World<'a> {
 
     /// Everything about a candidate, or nothing when its material says that it does not exist from this side or at
     /// this place.
-    fn surface(&self, ray: &Ray, candidate: &Candidate) -> Option<Hit> {
+    fn surface(&self, ray: &Ray, candidate: &TriangleHit) -> Option<Hit> {
         let triangle = &self.triangles[candidate.triangle];
         let instance = triangle.instance as usize;
         let frame = &self.frames[instance];
@@ -392,7 +397,7 @@ fn linear(encoded: f64) -> f64 {
     if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
 }
 
-fn crosses(node: &Node, ray: &Ray, inverse: DVec3, limit: f64) -> bool {
+fn crosses(node: &RaycastNode, ray: &Ray, inverse: DVec3, limit: f64) -> bool {
     let (mut enter, mut leave) = (0.0_f64, limit);
     for axis in 0..3 {
         let a = (node.min[axis] - ray.origin[axis]) * inverse[axis];

@@ -3,6 +3,8 @@
 //! [`catalogue`] joins what build.rs found in `shaders/lib/` with what `optics` says of it. [`Cases`] draws inputs and asks
 //! the twin, or takes both from a vector file ([`vectors`]). [`evaluate`] runs the probe, [`judge`] compares.
 
+pub mod arguments;
+pub mod curve;
 pub mod document;
 pub mod plot;
 pub mod statements;
@@ -14,7 +16,7 @@ use anyhow::{Result, ensure};
 use rayon::prelude::*;
 
 use etalon::gpu::{Buffer, Device, Frame, Place};
-use etalon::optics::{self, Case, Draw, Equation, Tier, ulp};
+use etalon::optics::{self, Case, Equation, SplitMix64, Tier, ulp};
 use etalon::shader::{PROBES, Probe, ProbeBind, lib};
 
 /// Written to every output before a probe runs: a NaN that no arithmetic makes.
@@ -71,7 +73,7 @@ impl Cases {
     pub fn draw(entry: &Entry, count: usize, seed: u64) -> Self {
         let equation = entry.equation;
         let total: u32 = equation.regions.iter().map(|region| region.share).sum();
-        let mut draw = Draw::new(seed);
+        let mut draw = SplitMix64::new(seed);
         let mut rows = Vec::with_capacity(count);
         let mut sum = 0;
         for region in equation.regions {
@@ -307,7 +309,7 @@ fn hostile(entry: &Entry, count: usize, seed: u64) -> Vec<f64> {
     let huge = entry.equation.extreme;
     let values =
         [0.0, -0.0, 1.0, -1.0, 0.5, -2.0, 1e-6, -1e-6, 1e-20, -1e-20, 1e-38, 1e-44, 1e10, huge, -huge, huge * 0.1];
-    let mut draw = Draw::new(seed);
+    let mut draw = SplitMix64::new(seed);
     // Column by column: half of the entries are extreme, so that some cases have a single one.
     let mut value = || {
         let extreme = draw.below(2) == 0;

@@ -80,10 +80,10 @@ pub const STATEMENTS: &[Statement] = &[
     of("F8", "metals", "metals_have_the_reflectance_of_their_index", COLOUR),
     of("B1", "materials", "a_rough_metal_mirrors_a_card_as_the_integral_says", NUMERICS),
     of("B2", "materials", "all_kinds_of_light_on_study_scenes_agree_with_the_formulas", LECTURE),
-    of("B3", "materials", "brdfs_that_claim_reciprocity_have_it", NUMERICS),
+    of("B3", "materials", "light_and_camera_may_be_exchanged", NUMERICS),
     of("B4", "lamps", "a_directional_light_gives_irradiance_times_albedo_over_pi_times_cosine", LECTURE),
-    of("B5", "golden-bridge", "blinn_phong_is_not_reciprocal_by_the_ratio_of_the_cosines", NUMERICS),
-    of("B6", "golden-bridge", "brdfs_that_claim_reciprocity_have_it", NUMERICS),
+    of("B5", "golden-bridge", "blinn_phong_is_off_by_the_ratio_of_the_cosines_when_they_are", NUMERICS),
+    of("B6", "golden-bridge", "told_numbers_of_phong_are_drawn_as_b5_and_b6_are_written", NUMERICS),
     by(
         of("B7", "golden-bridge", "laboratory_forms_are_made_of_what_draws", LECTURE),
         By::Equations(&["phong_lobe", "reciprocal_lobe", "ggx_distribution"]),

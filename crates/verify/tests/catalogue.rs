@@ -76,7 +76,7 @@ fn columns_of_bounds_are_those_of_the_shader() {
         assert!(entry.equation.axis.column < named.len(), "{}", entry.probe.name);
         assert!(!entry.equation.regions.is_empty(), "{}", entry.probe.name);
         for region in entry.equation.regions {
-            let row = (region.draw)(&mut optics::Draw::new(1));
+            let row = (region.draw)(&mut optics::SplitMix64::new(1));
             assert_eq!(row.len(), entry.probe.inputs.len(), "{}, {}", entry.probe.name, region.name);
             let twin = (entry.equation.twin)(&row.iter().map(|&x| f64::from(x)).collect::<Vec<_>>());
             assert_eq!(twin.len(), named.len(), "twin of {}", entry.probe.name);

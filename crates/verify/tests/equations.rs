@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use etalon::optics::{Case, Draw, Tier, ulp};
+use etalon::optics::{Case, SplitMix64, Tier, ulp};
 use etalon_testing::gpu::Gpu;
 use etalon_testing::probe::{PROMISING, evaluate};
 use etalon_verify::{Cases, Entry, catalogue, vectors};
@@ -180,7 +180,7 @@ fn twins_agree_with_the_vector_files() {
 #[test]
 fn double_floats_keep_44_bits() {
     let gpu = Gpu::open();
-    let mut draw = Draw::new(5);
+    let mut draw = SplitMix64::new(5);
     let mut pair = || {
         let exact = draw.sign() * draw.log(1e-3, 1e3);
         let hi = exact as f32;
@@ -210,7 +210,7 @@ fn double_floats_keep_44_bits() {
 #[test]
 fn the_logarithm_keeps_30_bits() {
     let gpu = Gpu::open();
-    let mut draw = Draw::new(6);
+    let mut draw = SplitMix64::new(6);
     let rows: Vec<Vec<f32>> = (0..CASES).map(|_| vec![draw.log(1.2e-38, 3e38) as f32]).collect();
     for (row, got) in rows.iter().zip(evaluate(&gpu, "df_log", Tier::Stable, &rows)) {
         let want = f64::from(row[0]).ln();
@@ -342,7 +342,7 @@ fn laboratory_forms_are_made_of_what_draws() {
 fn lights_of_the_lecture_are_those_that_light_pictures() {
     const ROWS: usize = 20_000;
     let gpu = Gpu::open();
-    let mut draw = Draw::new(23);
+    let mut draw = SplitMix64::new(23);
     let unit = |v: glam::DVec3| [v.x as f32, v.y as f32, v.z as f32];
     for tier in PROMISING {
         let all: Vec<_> = (0..ROWS).map(|_| (draw.direction(), draw.direction(), draw.log(1e-2, 1e3))).collect();

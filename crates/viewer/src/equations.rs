@@ -22,11 +22,15 @@ fn names(events: &[Event], materials: &[Material], lights: &[Light], knobs: &Kno
                 continue;
             }
         }
-        let Some((met, m)) = event.met.and_then(|met| Some((met, materials.get(met.material)?))) else { continue };
+        let Some((interaction, m)) =
+            event.interaction.and_then(|interaction| Some((interaction, materials.get(interaction.material)?)))
+        else {
+            continue;
+        };
         if m.unlit {
             continue;
         }
-        if met.total {
+        if interaction.total {
             all.push("refract");
         }
         let exact = knobs.fresnel == Fresnel::Exact;
@@ -36,7 +40,7 @@ fn names(events: &[Event], materials: &[Material], lights: &[Light], knobs: &Kno
         if m.metallic > 0.0 {
             all.push(if exact && m.conductor.is_some() { "fresnel_conductor" } else { "schlick" });
         }
-        if met.spreads {
+        if interaction.spreads {
             all.extend(match knobs.brdf {
                 Brdf::BlinnPhong => &["half_angle", "diffuse_brdf", "phong_lobe"][..],
                 Brdf::BlinnPhongReciprocal => &["half_angle", "diffuse_brdf", "phong_lobe", "reciprocal_lobe"],
@@ -99,14 +103,14 @@ pub fn used(events: &[Event], materials: &[Material], lights: &[Light], knobs: &
 mod tests {
     use super::*;
     use etalon::plan::{KNOBS, Model};
-    use etalon::transport::events::Met;
+    use etalon::transport::events::Interaction;
     use glam::DVec3;
 
     /// One event of each kind on each of some materials.
     fn events(materials: usize) -> Vec<Event> {
         let ways =
             [Way::Seen, Way::Mirrored, Way::Bent, Way::Straight, Way::ToLight(0), Way::ToLight(1), Way::ToLight(2)];
-        let met = |material, total| Met {
+        let interaction = |material, total| Interaction {
             instance: 0,
             material,
             normal: DVec3::Y,
@@ -116,8 +120,10 @@ mod tests {
             total,
             spreads: true,
         };
-        let event = |way, met| Event { after: None, way, from: DVec3::ZERO, to: DVec3::Y, share: 1.0, met };
-        let of = |way| (0..materials).flat_map(move |m| [true, false].map(|total| event(way, Some(met(m, total)))));
+        let event =
+            |way, interaction| Event { after: None, way, from: DVec3::ZERO, to: DVec3::Y, share: 1.0, interaction };
+        let of =
+            |way| (0..materials).flat_map(move |m| [true, false].map(|total| event(way, Some(interaction(m, total)))));
         ways.into_iter().flat_map(of).collect()
     }
 
@@ -134,14 +140,8 @@ mod tests {
         let cauchy = Dispersion::Cauchy { a: 1.5, b: 0.004 };
         let sellmeier = Dispersion::Sellmeier { b: [0.5; 4], c: [0.01; 4] };
         let materials = [metal, glass(cauchy), glass(sellmeier)];
-        let light = |kind, extent| Light {
-            name: String::new(),
-            color: [1.0; 3],
-            spectrum: None,
-            extent,
-            kind,
-            stand_in: false,
-        };
+        let light =
+            |kind, extent| Light { name: String::new(), color: [1.0; 3], spectrum: None, extent, kind, proxy: false };
         let ball = Some(Extent::Sphere { radius: 0.1 });
         let (position, direction, range) = (DVec3::Y, DVec3::NEG_Y, Some(2.0));
         let lights = [

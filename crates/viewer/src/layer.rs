@@ -2,12 +2,12 @@
 
 use glam::Vec3;
 
-use super::shared::Surfaces;
+use super::shared::PixelSurfaces;
 use etalon::share::AovPixel;
 
 /// Something that is known of each pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Layer {
+pub enum SurfaceLayer {
     /// The picture.
     Radiance,
     /// Base colour.
@@ -33,18 +33,18 @@ pub enum Layer {
 }
 
 /// Every layer with its name.
-pub const LAYERS: [(Layer, &str); 11] = [
-    (Layer::Radiance, "radiance"),
-    (Layer::Albedo, "albedo"),
-    (Layer::Normal, "normal"),
-    (Layer::GeometricNormal, "geometric normal"),
-    (Layer::Distance, "distance"),
-    (Layer::Roughness, "roughness"),
-    (Layer::Metallic, "metallic"),
-    (Layer::Material, "material"),
-    (Layer::Instance, "instance"),
-    (Layer::Emissive, "emissive"),
-    (Layer::NotFinite, "NaN and infinity"),
+pub const LAYERS: [(SurfaceLayer, &str); 11] = [
+    (SurfaceLayer::Radiance, "radiance"),
+    (SurfaceLayer::Albedo, "albedo"),
+    (SurfaceLayer::Normal, "normal"),
+    (SurfaceLayer::GeometricNormal, "geometric normal"),
+    (SurfaceLayer::Distance, "distance"),
+    (SurfaceLayer::Roughness, "roughness"),
+    (SurfaceLayer::Metallic, "metallic"),
+    (SurfaceLayer::Material, "material"),
+    (SurfaceLayer::Instance, "instance"),
+    (SurfaceLayer::Emissive, "emissive"),
+    (SurfaceLayer::NotFinite, "NaN and infinity"),
 ];
 
 fn encoded(color: Vec3) -> [u8; 4] {
@@ -67,10 +67,10 @@ fn of_normal(n: [f32; 3]) -> [u8; 4] {
 
 const NOTHING: [u8; 4] = [24, 24, 26, 255];
 
-impl Layer {
+impl SurfaceLayer {
     /// RGBA8 of the layer; the picture itself is none of these.
     #[must_use]
-    pub fn draw(self, surfaces: &Surfaces) -> Vec<u8> {
+    pub fn draw(self, surfaces: &PixelSurfaces) -> Vec<u8> {
         let farthest = surfaces.pixels.iter().map(|p| p.distance).fold(0.0, f32::max).max(1e-9);
         let pixel = |(p, radiance): (&AovPixel, &[f32; 4])| {
             if self == Self::NotFinite {
@@ -122,7 +122,7 @@ mod tests {
             instance: 2,
         };
         let nothing = AovPixel { material: 0, ..pixel };
-        let surfaces = Surfaces {
+        let surfaces = PixelSurfaces {
             pixels: Arc::new(vec![pixel, nothing, pixel]),
             radiance: vec![Arc::new(vec![[f32::NAN, 0.0, 0.0, 1.0], [0.0, f32::INFINITY, 0.0, 1.0], [1.0; 4]])],
             size: [3, 1],
@@ -134,13 +134,13 @@ mod tests {
             ),
             versions: [Some(1), None],
         };
-        let of = |layer: Layer, i: usize| layer.draw(&surfaces)[4 * i..4 * i + 4].to_vec();
-        assert_eq!(of(Layer::NotFinite, 0), [255, 0, 255, 255]);
-        assert_eq!(of(Layer::NotFinite, 1), [0, 255, 255, 255]);
-        assert!(of(Layer::NotFinite, 2)[0] < 140);
-        assert_eq!(of(Layer::Normal, 0), [128, 128, 255, 255]);
-        assert_eq!(of(Layer::Albedo, 0)[..2], [255, 0]);
-        assert_eq!(of(Layer::Albedo, 1), NOTHING);
+        let of = |layer: SurfaceLayer, i: usize| layer.draw(&surfaces)[4 * i..4 * i + 4].to_vec();
+        assert_eq!(of(SurfaceLayer::NotFinite, 0), [255, 0, 255, 255]);
+        assert_eq!(of(SurfaceLayer::NotFinite, 1), [0, 255, 255, 255]);
+        assert!(of(SurfaceLayer::NotFinite, 2)[0] < 140);
+        assert_eq!(of(SurfaceLayer::Normal, 0), [128, 128, 255, 255]);
+        assert_eq!(of(SurfaceLayer::Albedo, 0)[..2], [255, 0]);
+        assert_eq!(of(SurfaceLayer::Albedo, 1), NOTHING);
         assert_ne!(of_number(1), of_number(2));
     }
 }

@@ -27,12 +27,12 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy}
 use winit::window::{Window, WindowId};
 
 use etalon::frame::Settings;
-use etalon::gpu::{DeviceChoice, Message, Overlay, Placed, Presented, Presenter, Replacement};
+use etalon::gpu::{DeviceChoice, Message, Overlay, PlacedPicture, Presented, Presenter, Replacement};
 use etalon::image::{Picture, exr, file, png};
-use layer::Layer;
+use layer::SurfaceLayer;
 use navigation::Navigation;
-use panels::{Action, State};
-use shared::{Seen, Shared, Source, Viewpoint, Wanted, lock};
+use panels::{Action, PanelState};
+use shared::{RenderRequest, RenderState, SceneSource, SharedState, Viewpoint, lock};
 use worker::Worker;
 
 /// Between two pictures of the window: a driver's FIFO does not always wait for a screen.
@@ -71,8 +71,8 @@ pub struct Start {
     pub validate: bool,
     /// Panels lie beside the picture.
     pub panels: bool,
-    /// Reads scenes.
-    pub source: Box<dyn Source>,
+    /// Prune scenes.
+    pub source: Box<dyn SceneSource>,
     /// The command that draws a view.
     pub command: Box<dyn Fn(&View<'_>) -> String>,
     /// The scene's file, where it is one: read again when it changes.
@@ -88,7 +88,7 @@ pub struct Start {
 /// What has happened meanwhile, elsewhere.
 enum Woken {
     /// The thread that draws has something to show.
-    Seen,
+    RenderState,
     /// A file beside the scene's has changed, or itself.
     Changed,
     /// Shaders were compiled again.
@@ -136,7 +136,7 @@ struct Viewer {
 /// A layer as pixels.
 #[derive(Clone)]
 struct DrawnLayer {
-    layer: Layer,
+    layer: SurfaceLayer,
     /// Numbers of the pictures that it is of.
     of: [Option<u64>; 2],
     rgba: Arc<Vec<u8>>,
@@ -149,10 +149,10 @@ struct OpenWindow {
     window: Arc<Window>,
     presenter: Presenter,
     device: Arc<etalon::gpu::Device>,
-    shared: Arc<Shared>,
+    shared: Arc<SharedState>,
     worker: Option<JoinHandle<()>>,
     egui: egui_winit::State,
-    state: State,
+    state: PanelState,
     command: Box<dyn Fn(&View<'_>) -> String>,
     said: Box<dyn Fn(&str)>,
     keep: Keep,
@@ -162,7 +162,7 @@ struct OpenWindow {
     /// The scene that the navigation belongs to, once there is one, and its time.
     navigated: Option<u64>,
     moment: Option<f64>,
-    sent: Option<Wanted>,
+    sent: Option<RenderRequest>,
     moving_until: Option<Instant>,
     drawn: Instant,
     dirty: bool,
@@ -209,7 +209,7 @@ impl ApplicationHandler<Woken> for Viewer {
     fn user_event(&mut self, _: &ActiveEventLoop, woken: Woken) {
         let Some(window) = &mut self.window else { return };
         match woken {
-            Woken::Seen => window.dirty = true,
+            Woken::RenderState => window.dirty = true,
             Woken::Changed => {
                 window.reads_at = Some(Instant::now() + SETTLED);
                 window.dirty = true;
@@ -295,20 +295,20 @@ impl OpenWindow {
             .with_min_inner_size(PhysicalSize::new(160, 120));
         let window = Arc::new(events.create_window(attributes).context("opening a window")?);
         let (device, presenter) = Presenter::open(window.clone(), &choice, validate)?;
-        let mut state = State::new(settings.clone(), device.info().clone(), recent);
+        let mut state = PanelState::new(settings.clone(), device.info().clone(), recent);
         state.panels = panels;
-        let wanted = Wanted::new(settings);
+        let wanted = RenderRequest::new(settings);
         let context = egui::Context::default();
         let native = Some(window.scale_factor() as f32);
         let side = device.max_image_size() as usize;
         let egui =
             egui_winit::State::new(context, egui::ViewportId::ROOT, &*window, native, window.theme(), Some(side));
         let (code, sent) = (wanted.code.clone(), Some(wanted.clone()));
-        let shared = Arc::new(Shared::new(wanted));
+        let shared = Arc::new(SharedState::new(wanted));
         let worker = {
             let (device, shared) = (device.clone(), shared.clone());
             let proxy = proxy.clone();
-            let wake = Arc::new(move || drop(proxy.send_event(Woken::Seen)));
+            let wake = Arc::new(move || drop(proxy.send_event(Woken::RenderState)));
             std::thread::Builder::new()
                 .name("drawing".to_owned())
                 .spawn(move || Worker::run(device, shared, source, wake))
@@ -403,15 +403,15 @@ impl OpenWindow {
         let layer = self.drawn_layer(&seen);
         let place = self.state.place;
         let [left, _, right, _] = place;
-        let pictures: Vec<Placed<'_>> = match &layer {
+        let pictures: Vec<PlacedPicture<'_>> = match &layer {
             Some(DrawnLayer { rgba, size, version, .. }) => {
-                vec![Placed { rgba, size: *size, version: *version, place, columns: [left, right] }]
+                vec![PlacedPicture { rgba, size: *size, version: *version, place, columns: [left, right] }]
             }
             None => {
                 let wipe = seen.sides[1].shown.as_ref().map_or(right, |_| self.state.wipe_column());
                 let columns = [[left, wipe], [wipe, right]];
                 let shown = seen.sides.iter().filter_map(|side| side.shown.as_ref());
-                let placed = shown.zip(columns).map(|(shown, columns)| Placed {
+                let placed = shown.zip(columns).map(|(shown, columns)| PlacedPicture {
                     rgba: &shown.rgba,
                     size: shown.size,
                     version: 2 * shown.version,
@@ -492,9 +492,9 @@ impl OpenWindow {
     }
 
     /// What the chosen layer shows.
-    fn drawn_layer(&mut self, seen: &Seen) -> Option<DrawnLayer> {
+    fn drawn_layer(&mut self, seen: &RenderState) -> Option<DrawnLayer> {
         let layer = self.state.layer;
-        let surfaces = seen.now().filter(|_| layer != Layer::Radiance)?;
+        let surfaces = seen.now().filter(|_| layer != SurfaceLayer::Radiance)?;
         let is_drawn = |known: &DrawnLayer| known.layer == layer && known.of == surfaces.versions;
         if !self.layer.as_ref().is_some_and(is_drawn) {
             self.layers += 1;
@@ -507,7 +507,7 @@ impl OpenWindow {
     }
 
     /// Takes over what the worker has found.
-    fn follow(&mut self, seen: &Seen) {
+    fn follow(&mut self, seen: &RenderState) {
         if let Some(facts) = seen.facts.as_ref().filter(|facts| Some(facts.scene) != self.navigated) {
             self.navigated = Some(facts.scene);
             match (&mut self.state.navigation, self.again == Some(facts.scene)) {
@@ -539,7 +539,7 @@ impl OpenWindow {
         }
     }
 
-    fn act(&mut self, action: Action, seen: &Seen) {
+    fn act(&mut self, action: Action, seen: &RenderState) {
         match action {
             Action::Open(path) => {
                 self.scene = self.files.len() as u64;
@@ -600,7 +600,7 @@ impl OpenWindow {
             (false, Some(name)) => Viewpoint::Named(name.to_owned()),
             (false, None) => Viewpoint::Own,
         };
-        let wanted = Wanted {
+        let wanted = RenderRequest {
             scene: self.scene,
             file: self.files.get(self.scene as usize).cloned().flatten(),
             time: self.state.clock.time,
@@ -626,7 +626,7 @@ impl OpenWindow {
     }
 
     /// A name that nothing has yet, in the folder that the program was started in.
-    fn free_name(&self, seen: &Seen, ending: &str) -> PathBuf {
+    fn free_name(&self, seen: &RenderState, ending: &str) -> PathBuf {
         let name = seen.facts.as_ref().map_or("scene", |facts| &facts.name);
         let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
         let mut all = (1..).map(|i| PathBuf::from(format!("{plain}-{i}.{ending}")));
@@ -635,14 +635,14 @@ impl OpenWindow {
         free
     }
 
-    fn write_png(&self, seen: &Seen) -> Result<PathBuf> {
+    fn write_png(&self, seen: &RenderState) -> Result<PathBuf> {
         let shown = seen.shown().context("there is no picture yet")?;
         let path = self.free_name(seen, "png");
         file::write(&path, &png::encode_png(shown.size[0], shown.size[1], &shown.rgba, false)?)?;
         Ok(path)
     }
 
-    fn write_exr(&self, seen: &Seen) -> Result<PathBuf> {
+    fn write_exr(&self, seen: &RenderState) -> Result<PathBuf> {
         let surfaces = seen.surfaces.as_ref().context("there is no picture yet")?;
         let path = self.free_name(seen, "exr");
         let [width, height] = surfaces.size;

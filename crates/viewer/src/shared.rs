@@ -38,7 +38,7 @@ pub struct Loaded {
 
 /// Which scene: the one of the command line, or another file, at its own time or another.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Asked<'a> {
+pub struct OpenRequest<'a> {
     /// `None`: that of the command line.
     pub file: Option<&'a Path>,
     /// Seconds; `None`: as the command line says, or at rest.
@@ -48,18 +48,18 @@ pub struct Asked<'a> {
 }
 
 /// Where scenes come from.
-pub trait Source: Send {
+pub trait SceneSource: Send {
     /// Reads a scene, and all that belongs to it on this device.
     ///
     /// # Errors
     /// One sentence with file and cause.
-    fn open(&self, asked: Asked<'_>, device: &DeviceInfo) -> Result<Loaded>;
+    fn open(&self, asked: OpenRequest<'_>, device: &DeviceInfo) -> Result<Loaded>;
 
     /// The scene alone, at another moment, and the camera that it begins with.
     ///
     /// # Errors
-    /// As [`Source::open`].
-    fn moment(&self, asked: Asked<'_>) -> Result<(Scene, Camera)>;
+    /// As [`SceneSource::open`].
+    fn moment(&self, asked: OpenRequest<'_>) -> Result<(Scene, Camera)>;
 }
 
 /// From where a scene is seen.
@@ -101,7 +101,7 @@ pub struct Pick {
 
 /// What is to be seen.
 #[derive(Clone)]
-pub struct Wanted {
+pub struct RenderRequest {
     /// Another number: another scene.
     pub scene: u64,
     /// Its file; `None`: that of the command line.
@@ -126,7 +126,7 @@ pub struct Wanted {
     pub quit: bool,
 }
 
-impl Wanted {
+impl RenderRequest {
     /// A scene of the command line, seen as it is found.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
@@ -145,8 +145,8 @@ impl Wanted {
         }
     }
 
-    pub(super) fn asked(&self) -> Asked<'_> {
-        Asked { file: self.file.as_deref(), time: self.time, size: self.settings.size }
+    pub(super) fn asked(&self) -> OpenRequest<'_> {
+        OpenRequest { file: self.file.as_deref(), time: self.time, size: self.settings.size }
     }
 
     /// Whether the same is to be drawn, however it is shown.
@@ -205,7 +205,7 @@ pub struct SceneFacts {
 }
 
 impl SceneFacts {
-    pub(super) fn of(wanted: &Wanted, loaded: &Loaded) -> Result<Self> {
+    pub(super) fn of(wanted: &RenderRequest, loaded: &Loaded) -> Result<Self> {
         let scene = loaded.original.scene();
         let bounds = scene.bounds().with_context(|| format!("{}: there is nothing to draw", loaded.name))?;
         Ok(Self {
@@ -271,7 +271,7 @@ impl Shown {
 
 /// Surfaces at the pixel centres of a picture.
 #[derive(Clone)]
-pub struct Surfaces {
+pub struct PixelSurfaces {
     /// Row by row.
     pub pixels: Arc<Vec<AovPixel>>,
     /// Radiance of the same pixels, of each side.
@@ -323,7 +323,7 @@ pub struct Trace {
 
 /// What the worker has to say.
 #[derive(Clone, Default)]
-pub struct Seen {
+pub struct RenderState {
     /// The scene.
     pub facts: Option<Arc<SceneFacts>>,
     /// The picture, and the one it is compared with.
@@ -331,7 +331,7 @@ pub struct Seen {
     /// How far both are from each other.
     pub difference: Option<Difference>,
     /// Surfaces, where they are wanted.
-    pub surfaces: Option<Surfaces>,
+    pub surfaces: Option<PixelSurfaces>,
     /// A pixel's ray, where it is wanted.
     pub trace: Option<Arc<Trace>>,
     /// What it is doing, when that takes long.
@@ -344,7 +344,7 @@ pub struct Seen {
     pub lost: bool,
 }
 
-impl Seen {
+impl RenderState {
     /// The picture.
     #[must_use]
     pub fn shown(&self) -> Option<&Shown> {
@@ -359,7 +359,7 @@ impl Seen {
 
     /// Surfaces of the pictures that are seen; `None` until they are read.
     #[must_use]
-    pub fn now(&self) -> Option<&Surfaces> {
+    pub fn now(&self) -> Option<&PixelSurfaces> {
         self.surfaces.as_ref().filter(|surfaces| surfaces.versions == self.versions())
     }
 
@@ -371,10 +371,10 @@ impl Seen {
 }
 
 /// What is wanted and what is seen, between two threads.
-pub struct Shared {
-    pub(super) wanted: Mutex<(Wanted, u64)>,
+pub struct SharedState {
+    pub(super) wanted: Mutex<(RenderRequest, u64)>,
     pub(super) changed: Condvar,
-    pub(super) seen: Mutex<Seen>,
+    pub(super) seen: Mutex<RenderState>,
 }
 
 /// Locks without caring about a panic elsewhere: what is wanted and seen is whole at any time.
@@ -382,15 +382,15 @@ pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl Shared {
+impl SharedState {
     /// Begins with something wanted.
     #[must_use]
-    pub fn new(wanted: Wanted) -> Self {
+    pub fn new(wanted: RenderRequest) -> Self {
         Self { wanted: Mutex::new((wanted, 1)), changed: Condvar::new(), seen: Mutex::default() }
     }
 
     /// Wants something else.
-    pub fn want(&self, change: impl FnOnce(&mut Wanted)) {
+    pub fn want(&self, change: impl FnOnce(&mut RenderRequest)) {
         let mut wanted = lock(&self.wanted);
         change(&mut wanted.0);
         wanted.1 += 1;
@@ -399,7 +399,7 @@ impl Shared {
 
     /// What there is to be seen.
     #[must_use]
-    pub fn seen(&self) -> Seen {
+    pub fn seen(&self) -> RenderState {
         lock(&self.seen).clone()
     }
 

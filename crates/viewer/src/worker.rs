@@ -5,14 +5,17 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
 
-use super::shared::{Difference, Loaded, Pick, SceneFacts, Seen, Shared, Shown, Source, Surfaces, Trace, Wanted, lock};
+use super::shared::{
+    Difference, Loaded, Pick, PixelSurfaces, RenderRequest, RenderState, SceneFacts, SceneSource, SharedState, Shown,
+    Trace, lock,
+};
 use etalon::frame::{Drawing, Renderer, Settings};
 use etalon::gpu::{Device, Interrupted, PassTime, Replacement, is_lost};
 use etalon::image::metric::{AnyPicture, Metric, compare};
 use etalon::image::png::Display;
 use etalon::plan::Knobs;
 use etalon::plan::rungs::{Indirect, Reflection, Refraction};
-use etalon::transport::events::{Limits, Tracer};
+use etalon::transport::events::{EventTracer, Limits};
 
 /// Milliseconds that a picture may take while the view moves: it gets smaller until it does.
 const MOVING_MS: f64 = 40.0;
@@ -26,7 +29,7 @@ const LOOK: Duration = Duration::from_millis(100);
 const LEAST_SHARE: f64 = 0.002;
 
 /// What draws one side of the window.
-struct Side {
+struct DrawnSide {
     renderer: Renderer,
     /// Of the renderer.
     settings: Settings,
@@ -36,7 +39,7 @@ struct Side {
     looked: Instant,
 }
 
-impl Side {
+impl DrawnSide {
     fn new(device: &Arc<Device>, loaded: &Loaded, settings: Settings) -> Result<Self> {
         let environment = loaded.environment.as_ref().map(|(environment, _)| &**environment);
         let renderer = Renderer::new(device, &loaded.original, environment, settings.clone())?;
@@ -54,21 +57,21 @@ impl Side {
 }
 
 /// The scene and what draws it.
-struct Stage {
+struct LoadedRenderers {
     scene: u64,
     time: Option<f64>,
     loaded: Loaded,
-    sides: Vec<Side>,
+    sides: Vec<DrawnSide>,
     /// Wall nanoseconds of a pixel of a sample, of each side; 0: nobody knows.
     ns_per_pixel: [f64; 2],
     /// Settings that could not be drawn: they are not tried again.
     refused: [Option<Settings>; 2],
     /// Made when a ray is followed for the first time.
-    tracer: Option<Tracer>,
+    tracer: Option<EventTracer>,
 }
 
 /// Settings of a side, with the environment as strong as the scene says.
-fn settings_of(loaded: &Loaded, wanted: &Wanted, side: usize) -> Settings {
+fn settings_of(loaded: &Loaded, wanted: &RenderRequest, side: usize) -> Settings {
     let share = loaded.environment.as_ref().map_or(1.0, |(_, share)| *share);
     let settings = wanted.settings.clone();
     let knobs = wanted.other.clone().filter(|_| side == 1).unwrap_or(settings.knobs);
@@ -82,7 +85,7 @@ fn same_renderer(a: &Settings, b: &Settings) -> bool {
         && a.environment_intensity == b.environment_intensity
         && a.environment_rotation == b.environment_rotation
         && a.seed == b.seed
-        && a.demand == b.demand
+        && a.forced == b.forced
 }
 
 /// Says that there is something to be seen.
@@ -91,10 +94,10 @@ pub type Wake = Arc<dyn Fn() + Send + Sync>;
 /// What a worker goes through.
 pub struct Worker {
     device: Arc<Device>,
-    shared: Arc<Shared>,
-    source: Box<dyn Source>,
+    shared: Arc<SharedState>,
+    source: Box<dyn SceneSource>,
     wake: Wake,
-    stage: Option<Stage>,
+    stage: Option<LoadedRenderers>,
     version: u64,
     /// Code of shaders that is drawn with in place of what was built.
     code: Arc<Vec<Replacement>>,
@@ -104,11 +107,11 @@ pub struct Worker {
 
 impl Worker {
     /// Loads and draws until nothing more is wanted.
-    pub fn run(device: Arc<Device>, shared: Arc<Shared>, source: Box<dyn Source>, wake: Wake) {
+    pub fn run(device: Arc<Device>, shared: Arc<SharedState>, source: Box<dyn SceneSource>, wake: Wake) {
         let (code, comparing) = (lock(&shared.wanted).0.code.clone(), Arc::default());
         let mut worker = Self { device, shared, source, wake, stage: None, version: 0, code, comparing };
         let mut known = 0;
-        let mut last: Option<Wanted> = None;
+        let mut last: Option<RenderRequest> = None;
         loop {
             let (wanted, number) = {
                 let mut wanted = lock(&worker.shared.wanted);
@@ -145,16 +148,16 @@ impl Worker {
     }
 
     fn is_idle(&self) -> bool {
-        self.stage.as_ref().is_none_or(|stage| stage.sides.iter().all(Side::is_done))
+        self.stage.as_ref().is_none_or(|stage| stage.sides.iter().all(DrawnSide::is_done))
     }
 
-    fn say(&self, change: impl FnOnce(&mut Seen)) {
+    fn say(&self, change: impl FnOnce(&mut RenderState)) {
         change(&mut lock(&self.shared.seen));
         (self.wake)();
     }
 
     /// Something else is wanted.
-    fn begin(&mut self, wanted: &Wanted, last: Option<&Wanted>) -> Result<()> {
+    fn begin(&mut self, wanted: &RenderRequest, last: Option<&RenderRequest>) -> Result<()> {
         let renewed = !Arc::ptr_eq(&self.code, &wanted.code);
         if renewed {
             self.code = wanted.code.clone();
@@ -183,7 +186,7 @@ impl Worker {
             let samples = if wanted.moving { 1 } else { all };
             let same_display = (side.settings.tonemap, side.settings.exposure) == (tonemap, exposure);
             (side.settings.tonemap, side.settings.exposure) = (tonemap, exposure);
-            side.renderer.develop(tonemap, exposure);
+            side.renderer.set_display(tonemap, exposure);
             if side.settings.size != size {
                 side.drawing = None;
                 side.renderer.resize(size)?;
@@ -206,7 +209,7 @@ impl Worker {
     }
 
     /// Reads a scene and makes ready to draw it; what cannot be read, or drawn, leaves the one before.
-    fn load(&mut self, wanted: &Wanted) -> Result<()> {
+    fn load(&mut self, wanted: &RenderRequest) -> Result<()> {
         let name = wanted.file.as_ref().map_or("the scene".to_owned(), |file| file.display().to_string());
         self.say(|seen| seen.busy = Some(format!("reading {name}")));
         let found = self.source.open(wanted.asked(), self.device.info()).and_then(|loaded| {
@@ -222,7 +225,7 @@ impl Worker {
     }
 
     /// The same scene at another time.
-    fn go_to(&mut self, wanted: &Wanted) -> Result<()> {
+    fn go_to(&mut self, wanted: &RenderRequest) -> Result<()> {
         let Some(stage) = &self.stage else { return Ok(()) };
         let (scene, camera) = self.source.moment(wanted.asked())?;
         let Loaded { name, environment, warnings, prices, framed, knobs, .. } = &stage.loaded;
@@ -245,15 +248,18 @@ impl Worker {
     }
 
     /// A scene with what draws it, and what there is to be known of it.
-    fn ready(&self, wanted: &Wanted, loaded: Loaded) -> Result<(Stage, SceneFacts)> {
+    fn ready(&self, wanted: &RenderRequest, loaded: Loaded) -> Result<(LoadedRenderers, SceneFacts)> {
         let facts = SceneFacts::of(wanted, &loaded)?;
-        let side = Side::new(&self.device, &loaded, settings_of(&loaded, wanted, 0))?;
+        let side = DrawnSide::new(&self.device, &loaded, settings_of(&loaded, wanted, 0))?;
         let (scene, time) = (wanted.scene, wanted.time);
         let sides = vec![side];
-        Ok((Stage { scene, time, loaded, sides, ns_per_pixel: [0.0; 2], refused: [None, None], tracer: None }, facts))
+        Ok((
+            LoadedRenderers { scene, time, loaded, sides, ns_per_pixel: [0.0; 2], refused: [None, None], tracer: None },
+            facts,
+        ))
     }
 
-    fn take_over(&mut self, (stage, facts): (Stage, SceneFacts)) {
+    fn take_over(&mut self, (stage, facts): (LoadedRenderers, SceneFacts)) {
         self.stage = Some(stage);
         self.tell_plan(0);
         self.say(|seen| {
@@ -266,7 +272,7 @@ impl Worker {
     }
 
     /// As many sides as are wanted, with their rungs; those that cannot be drawn leave what is there.
-    fn follow_knobs(&mut self, wanted: &Wanted, renewed: bool) -> Result<()> {
+    fn follow_knobs(&mut self, wanted: &RenderRequest, renewed: bool) -> Result<()> {
         let Some(stage) = &mut self.stage else { return Ok(()) };
         if wanted.other.is_none() {
             stage.sides.truncate(1);
@@ -294,7 +300,7 @@ impl Worker {
     fn plan(&mut self, settings: Settings, index: usize) -> Result<()> {
         self.say(|seen| seen.busy = Some("uploading and compiling".to_owned()));
         let Some(stage) = &mut self.stage else { return Ok(()) };
-        let made = Side::new(&self.device, &stage.loaded, settings.clone());
+        let made = DrawnSide::new(&self.device, &stage.loaded, settings.clone());
         match made {
             Ok(side) => {
                 stage.refused[index] = None;
@@ -329,10 +335,10 @@ impl Worker {
     }
 
     /// One more sample, or band of it, of the side that is less far; of both that which was shown longer ago.
-    fn refine(&mut self, wanted: &Wanted) -> Result<()> {
+    fn refine(&mut self, wanted: &RenderRequest) -> Result<()> {
         let Some(stage) = &mut self.stage else { return Ok(()) };
         let unfinished = stage.sides.iter_mut().enumerate().filter(|(_, side)| !side.is_done());
-        let order = |a: &Side, b: &Side| a.progress().total_cmp(&b.progress()).then(a.looked.cmp(&b.looked));
+        let order = |a: &DrawnSide, b: &DrawnSide| a.progress().total_cmp(&b.progress()).then(a.looked.cmp(&b.looked));
         let Some((index, side)) = unfinished.min_by(|a, b| order(a.1, b.1)) else { return Ok(()) };
         let Some(drawing) = &mut side.drawing else { return Ok(()) };
         // While the view moves each picture is seen, all its bands: the next is not better.
@@ -358,7 +364,7 @@ impl Worker {
         if self.is_idle() { self.finish(wanted) } else { Ok(()) }
     }
 
-    fn show(&mut self, wanted: &Wanted, index: usize) -> Result<()> {
+    fn show(&mut self, wanted: &RenderRequest, index: usize) -> Result<()> {
         let Some(side) = self.stage.as_mut().and_then(|stage| stage.sides.get_mut(index)) else { return Ok(()) };
         let Some(drawing) = &side.drawing else { return Ok(()) };
         let rendered = side.renderer.picture(drawing)?;
@@ -384,7 +390,7 @@ impl Worker {
     }
 
     /// What is asked of pictures that are finished.
-    fn finish(&mut self, wanted: &Wanted) -> Result<()> {
+    fn finish(&mut self, wanted: &RenderRequest) -> Result<()> {
         if wanted.moving {
             return Ok(());
         }
@@ -438,7 +444,7 @@ impl Worker {
         }
     }
 
-    fn read_surfaces(&mut self, wanted: &Wanted) -> Result<()> {
+    fn read_surfaces(&mut self, wanted: &RenderRequest) -> Result<()> {
         if lock(&self.shared.seen).now().is_some() {
             return Ok(());
         }
@@ -453,13 +459,13 @@ impl Worker {
         let (pixels, size, eye) = (Arc::new(pixels), left.settings.size, view.eye);
         self.say(|seen| {
             let versions = seen.versions();
-            seen.surfaces = Some(Surfaces { pixels, radiance, size, eye, seen_from: camera, versions });
+            seen.surfaces = Some(PixelSurfaces { pixels, radiance, size, eye, seen_from: camera, versions });
         });
         Ok(())
     }
 
     /// Follows the ray of a pixel that is asked about, seen from where it was asked: whoever moves sees it from elsewhere.
-    fn trace(&mut self, wanted: &Wanted, last: Option<&Wanted>) -> Result<()> {
+    fn trace(&mut self, wanted: &RenderRequest, last: Option<&RenderRequest>) -> Result<()> {
         let Some(picked) = wanted.picked else {
             let known = lock(&self.shared.seen).trace.is_some();
             if known {
@@ -468,7 +474,7 @@ impl Worker {
             return Ok(());
         };
         let known = lock(&self.shared.seen).trace.clone().filter(|trace| trace.number == picked.number);
-        let same = |last: &Wanted| last.settings.knobs == wanted.settings.knobs && last.time == wanted.time;
+        let same = |last: &RenderRequest| last.settings.knobs == wanted.settings.knobs && last.time == wanted.time;
         if known.is_some() && last.is_some_and(same) {
             return Ok(());
         }
@@ -481,7 +487,7 @@ impl Worker {
             Some(tracer) => tracer,
             None => {
                 let bvh = stage.loaded.original.bvh().context("following the ray of a pixel")?;
-                Tracer::new(stage.loaded.original.scene(), bvh)
+                EventTracer::new(stage.loaded.original.scene(), bvh)
             }
         };
         let limits = limits_of(&wanted.settings.knobs);
@@ -499,7 +505,7 @@ fn limits_of(knobs: &Knobs) -> Limits {
     let paths = knobs.indirect == Indirect::Path;
     Limits {
         surfaces: if rays || paths { knobs.interfaces.count() } else { 1 },
-        stand_ins: !paths,
+        proxies: !paths,
         roughest: knobs.lobes.roughest(),
         least_share: LEAST_SHARE,
     }

@@ -1,8 +1,11 @@
-//! The dozen ways a pass can touch a resource, and the one table that turns them into Vulkan's masks.
+//! Kinds of access to a resource, and the one table that maps them to pipeline stages, access masks and image layouts.
+//!
+//! Read the Vulkan specification, chapter Synchronization and Cache Control (`VkPipelineStageFlagBits2`,
+//! `VkAccessFlagBits2`) and chapter Resource Creation, section Image Layouts.
 
 use ash::vk;
 
-/// How a pass uses a buffer or an image. No stage, access or layout mask is written anywhere else.
+/// A pass's kind of access to a buffer or an image. No other file writes a stage, access or layout mask.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Access {
     /// Colour attachment, written (and cleared or blended over).
@@ -17,15 +20,15 @@ pub enum Access {
     UniformRead,
     /// `readonly` storage buffer, storage image or texel buffer.
     StorageRead,
-    /// `writeonly` storage.
+    /// `writeonly` storage buffer, image or texel buffer.
     StorageWrite,
-    /// Storage both read and written.
+    /// Storage buffer, image or texel buffer, both read and written.
     StorageReadWrite,
     /// Vertex attributes.
     VertexRead,
-    /// Indices.
+    /// Index buffer.
     IndexRead,
-    /// Arguments of an indirect command.
+    /// Arguments of an indirect dispatch.
     IndirectRead,
     /// Source of a copy.
     TransferSrc,
@@ -35,21 +38,21 @@ pub enum Access {
     HostRead,
 }
 
-/// What an [`Access`] means to Vulkan.
+/// Vulkan's masks for an [`Access`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Masks {
     /// Stages that perform the access.
     pub stages: vk::PipelineStageFlags2,
     /// Kinds of memory access.
     pub access: vk::AccessFlags2,
-    /// Layout an image has to be in.
+    /// Required image layout.
     pub layout: vk::ImageLayout,
-    /// Whether anything is written.
+    /// Whether the access writes.
     pub writes: bool,
 }
 
 impl Access {
-    /// The table. `shaders` are the shader stages of the binding, for the accesses that shaders perform.
+    /// The masks of the access. `shaders` are the shader stages of the binding, for accesses of shaders.
     #[must_use]
     pub fn masks(self, shaders: vk::ShaderStageFlags) -> Masks {
         use vk::{AccessFlags2 as A, ImageLayout as L, PipelineStageFlags2 as S};

@@ -1,4 +1,6 @@
-//! What a program's bindings point at.
+//! Bindings of programs: the resources behind each descriptor.
+//!
+//! Read the Vulkan specification, chapter Resource Descriptors. The build generates one [`Bindings`] type per program.
 
 use anyhow::Result;
 use ash::vk;
@@ -9,16 +11,16 @@ use super::memory::{Buffer, Image};
 use super::shader::{Binding, BindingKind, Program, Specialization};
 use super::sync::ResourceId;
 
-/// An image with the sampler it is read through.
+/// An image with its sampler (a combined image sampler).
 #[derive(Clone, Copy)]
 pub struct Sampled<'a> {
     /// The image.
     pub image: &'a Image,
-    /// How it is read.
+    /// Sampler state.
     pub sampler: SamplerDesc,
 }
 
-/// What one binding points at.
+/// The resource that one binding points at.
 #[derive(Clone, Copy)]
 pub enum Resource<'a> {
     /// Any kind of buffer.
@@ -57,11 +59,11 @@ impl<'a> From<Sampled<'a>> for Resource<'a> {
     }
 }
 
-/// A generated struct with one field per binding that a program has for itself, in set 0.
+/// A generated struct with one field per binding in a program's own descriptor set, set 0.
 pub trait Bindings<'a> {
-    /// Its specialization constants.
+    /// The program's specialization constants.
     type Constants: Specialization;
-    /// Its push constants.
+    /// The program's push constants.
     type Push: bytemuck::NoUninit;
     /// The program the fields belong to.
     fn program(&self) -> &'static Program;
@@ -69,7 +71,7 @@ pub trait Bindings<'a> {
     fn resources(&self) -> Vec<Resource<'a>>;
 }
 
-/// A descriptor ready to be pushed.
+/// A descriptor ready for a push or a write.
 #[derive(Clone, Copy)]
 pub(super) enum Descriptor {
     Buffer(vk::DescriptorBufferInfo),
@@ -107,7 +109,7 @@ impl Descriptor {
         })
     }
 
-    /// Its write to the slot of a binding.
+    /// The descriptor write for the slot of a binding.
     pub(super) fn write(&self, device: &Device, binding: &Binding) -> vk::WriteDescriptorSet<'_> {
         let kind = binding.kind.descriptor_type(device.offers().texel_buffers);
         let write = vk::WriteDescriptorSet::default().dst_binding(binding.slot).descriptor_type(kind);

@@ -1,4 +1,6 @@
-//! What a device makes once per distinct description: the descriptions and the store.
+//! Caches of a device for samplers, layouts and pipelines: one object per distinct description.
+//!
+//! Read the Vulkan specification, chapters Pipelines, Samplers and Resource Descriptors.
 
 use std::collections::HashMap;
 
@@ -6,16 +8,16 @@ use ash::vk;
 
 use super::shader::Program;
 
-/// How an image is sampled.
+/// Sampler state: address modes and filters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct SamplerDesc {
-    /// Along u and v.
+    /// Address modes along u and v.
     pub wrap: [vk::SamplerAddressMode; 2],
-    /// Magnification.
+    /// Magnification filter.
     pub mag: vk::Filter,
-    /// Minification within a level.
+    /// Minification filter within a mip level.
     pub min: vk::Filter,
-    /// Between levels; `None` stays on the base level.
+    /// Filter between mip levels; `None` samples only the base level.
     pub mip: Option<vk::SamplerMipmapMode>,
 }
 
@@ -37,7 +39,7 @@ impl SamplerDesc {
     };
 }
 
-/// Everything that decides which pipeline a draw or dispatch needs.
+/// The description that identifies a pipeline: program, specialization constants, and raster state.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct PipelineKey {
     pub(super) program: &'static Program,
@@ -45,7 +47,7 @@ pub(super) struct PipelineKey {
     pub(super) raster: Option<RasterKey>,
 }
 
-/// The part of a raster pipeline that is not dynamic.
+/// The state of a graphics pipeline that is not dynamic: attachment formats.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct RasterKey {
     pub(super) colors: Vec<vk::Format>,
@@ -64,16 +66,16 @@ pub(super) struct Caches {
     pub(super) set_layouts: HashMap<&'static str, vk::DescriptorSetLayout>,
     pub(super) pipelines: HashMap<PipelineKey, vk::Pipeline>,
     pub(super) samplers: HashMap<SamplerDesc, vk::Sampler>,
-    /// Code of stages in place of what was built, by program and stage.
+    /// SPIR-V that replaces the built code, by program name and stage index.
     pub(super) replaced: HashMap<(&'static str, usize), Vec<u32>>,
     pub(super) making_ms: f64,
 }
 
 impl Caches {
     /// # Safety
-    /// Nothing that was handed out may be in use.
+    /// No command buffer in flight uses any of the objects.
     pub(super) unsafe fn destroy(&mut self, raw: &ash::Device) {
-        // SAFETY: by the caller's promise.
+        // SAFETY: the caller guarantees that nothing uses the objects.
         unsafe {
             for pipeline in self.pipelines.drain().map(|(_, p)| p) {
                 raw.destroy_pipeline(pipeline, None);

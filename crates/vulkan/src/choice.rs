@@ -1,18 +1,18 @@
-//! Which of the devices is wanted.
+//! The user's choice of a Vulkan device.
 
-/// Which device the user wants.
+/// The device that the user requests.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum DeviceChoice {
-    /// The best there is: discrete, integrated, virtual, then CPU.
+    /// The best device: discrete, integrated, virtual, then CPU.
     #[default]
     Best,
     /// A software device.
     Cpu,
     /// Anything but a software device.
     Gpu,
-    /// By place in `etalon devices`.
+    /// By index in the list of `etalon devices`.
     Index(usize),
-    /// By part of its name, ignoring case.
+    /// By part of the device's name, ignoring case.
     Name(String),
 }
 

@@ -1,7 +1,7 @@
-//! What a driver's compiler says of the pipelines that it has made: registers, spills, size of code.
+//! Statistics of compiled pipelines from the driver's compiler: registers, spills, code size.
 //!
-//! `VK_KHR_pipeline_executable_properties`, where the driver has it (RADV of Mesa 25.0 has, lavapipe of 22.3 has not). Names and units of
-//! the figures are the driver's own.
+//! Read the Vulkan documentation of `VK_KHR_pipeline_executable_properties`. RADV of Mesa 25.0 has the extension, lavapipe
+//! of 22.3 has not. Names and units of the figures are the driver's own.
 
 use std::collections::BTreeMap;
 
@@ -12,16 +12,16 @@ use serde::{Deserialize, Serialize};
 use super::device::{Device, lock, text};
 use super::shader::Program;
 
-/// Code that a pipeline was compiled to, as a rule that of one stage.
+/// Statistics of one executable of a pipeline, as a rule one shader stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Compiled {
-    /// What the driver calls it.
+    /// The driver's name of the executable.
     pub stage: String,
-    /// What it is made of.
+    /// Statistics by name.
     pub figures: BTreeMap<String, f64>,
 }
 
-/// A figure as a number: what is true is 1.
+/// A statistic as a number; `true` is 1.
 fn number(figure: &vk::PipelineExecutableStatisticKHR<'_>) -> f64 {
     use vk::PipelineExecutableStatisticFormatKHR as Format;
     // SAFETY: the format says which field the driver has written.
@@ -36,14 +36,14 @@ fn number(figure: &vk::PipelineExecutableStatisticKHR<'_>) -> f64 {
 }
 
 impl Device {
-    /// Whether the driver tells what its compiler makes of pipelines.
+    /// Whether the driver reports statistics of compiled pipelines.
     #[must_use]
     pub fn tells_compiled(&self) -> bool {
         self.executables.is_some()
     }
 
-    /// What the driver's compiler says of a program with these specialization constants: nothing where it does not tell, or where
-    /// there is no such pipeline yet.
+    /// Statistics of a program with these specialization constants; empty when the driver reports none, or when the
+    /// pipeline does not exist yet.
     ///
     /// # Errors
     /// When memory is short.
@@ -55,7 +55,7 @@ impl Device {
             return Ok(Vec::new());
         };
         let asking = || format!("asking what \"{}\" was compiled to", program.name);
-        // SAFETY: the pipeline lives as long as its cache, which is locked; it was made to be asked (`capture`).
+        // SAFETY: the pipeline lives as long as its cache, which is locked; it was created with `capture`'s flags.
         unsafe {
             let stages = asked
                 .get_pipeline_executable_properties(&vk::PipelineInfoKHR::default().pipeline(pipeline))
@@ -70,7 +70,7 @@ impl Device {
         }
     }
 
-    /// How pipelines are made whose compiler will be asked.
+    /// Flags of pipelines whose statistics will be queried.
     pub(super) fn capture(&self) -> vk::PipelineCreateFlags {
         match self.executables {
             Some(_) => vk::PipelineCreateFlags::CAPTURE_STATISTICS_KHR,

@@ -1,4 +1,8 @@
-//! Instance, choice of a device, and the device with its queue, allocator and caches.
+//! Instance, physical devices, and the logical device with its queue, allocator and caches.
+//!
+//! Read the Vulkan specification, chapters Initialization, Devices and Queues, Features and Limits; validation reports through
+//! `VK_EXT_debug_utils`. One queue executes everything, and one timeline semaphore counts its submissions. Features that
+//! every device must have are listed in `Instance::missing`, optional features in `offers.rs`.
 
 use std::ffi::{CStr, CString, FromBytesUntilNulError, c_char, c_void};
 use std::mem::ManuallyDrop;
@@ -15,44 +19,44 @@ use super::choice::DeviceChoice;
 use super::error::NotOpened;
 use super::limits::{COLOR_TARGETS, STORAGE_BUFFERS, STORAGE_BUFFERS_AND_TABLES, STORAGE_IMAGES, UNIFORM_BUFFERS};
 use super::offers::Offers;
-use super::pace::Turns;
+use super::pace::SliceTimes;
 use super::surface::Surface;
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
-/// A device as reports name it.
+/// The identity of a device, for reports.
 #[derive(Debug, Clone, Serialize)]
 pub struct DeviceInfo {
     /// Marketing name.
     pub name: String,
-    /// Driver and its version in words.
+    /// Driver name and driver information.
     pub driver: String,
     /// Driver version.
     pub version: String,
     /// `cpu`, `discrete`, `integrated`, `virtual` or `other`.
     #[serde(rename = "type")]
     pub kind: &'static str,
-    /// Vulkan version.
+    /// Vulkan version of the device.
     pub api: String,
 }
 
 impl DeviceInfo {
-    /// Place of its kind among the kinds, the best first.
+    /// Rank of the device's kind, 0 for the best; `None` for an unknown kind.
     #[must_use]
     pub fn rank(&self) -> Option<usize> {
         ["discrete", "integrated", "virtual", "other", "cpu"].iter().position(|kind| *kind == self.kind)
     }
 }
 
-/// A device that Vulkan offers here, and what keeps Etalon from using it.
+/// A physical device, and the reasons why Etalon cannot use it.
 #[derive(Debug, Clone, Serialize)]
 pub struct Candidate {
-    /// Its identity.
+    /// Identity of the device.
     #[serde(flatten)]
     pub info: DeviceInfo,
-    /// What Etalon needs and the device lacks; empty when it can be used.
+    /// Required features and limits that the device lacks; empty when Etalon can use it.
     pub missing: Vec<String>,
-    /// What it has of what Etalon can do without.
+    /// Optional features of the device.
     pub offers: Offers,
     #[serde(skip)]
     is_lavapipe: bool,
@@ -60,13 +64,13 @@ pub struct Candidate {
     physical: vk::PhysicalDevice,
 }
 
-/// How much a validation message matters.
+/// Severity of a validation message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
     /// Worth a look.
     Warning,
-    /// A mistake of ours.
+    /// A bug of Etalon or of its caller.
     Error,
 }
 
@@ -75,44 +79,44 @@ pub enum Severity {
 pub struct Message {
     /// Warning or error.
     pub severity: Severity,
-    /// What it says.
+    /// Text of the message.
     pub text: String,
 }
 
-/// A Vulkan object that was created.
+/// Record of a Vulkan object that was created.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Created {
     /// `buffer`, `image`, `pipeline` or `sampler`.
     pub kind: &'static str,
-    /// Its label.
+    /// Debug name of the object.
     pub name: String,
-    /// Memory bound to it.
+    /// Bytes of memory bound to the object.
     pub bytes: u64,
 }
 
 type Messages = Mutex<Vec<Message>>;
 
-/// Locks without caring about a panic elsewhere: the data is only counters and caches.
+/// Locks a mutex and ignores poisoning: the data consists of counters and caches only.
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What lets an instance validate (`open.rs`).
+/// The right of an instance to enable validation (`open.rs`).
 pub(super) type RightToValidate = Box<dyn Send + Sync>;
 
-/// The instance with everything that hangs on it.
+/// The Vulkan instance with its loader and debug messenger.
 pub(super) struct Instance {
     pub(super) entry: ash::Entry,
     pub(super) raw: ash::Instance,
     debug: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     has_debug_utils: bool,
     messages: Box<Messages>,
-    /// Dropped last, when nothing of this instance is left in the validation layer.
+    /// Dropped last, when the validation layer has nothing left of this instance.
     _right: Option<RightToValidate>,
 }
 
 impl Instance {
-    /// Under validation with the right to it.
+    /// Creates an instance, with validation when the caller has the right to it.
     pub(super) fn new(right: Option<RightToValidate>, wanted_extensions: &[*const c_char]) -> Result<Self> {
         let validate = right.is_some();
         // SAFETY: the loader is a shared library that stays loaded as long as `entry` lives.
@@ -123,7 +127,7 @@ impl Instance {
         };
         let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
         for &wanted in wanted_extensions {
-            // SAFETY: names out of ash's own tables.
+            // SAFETY: names from ash's own tables.
             let wanted = unsafe { CStr::from_ptr(wanted) };
             ensure!(has(wanted), NotOpened::NoWindows(wanted.to_string_lossy().into_owned()));
         }
@@ -220,7 +224,7 @@ impl Instance {
         Candidate { info, missing, offers, physical, is_lavapipe }
     }
 
-    /// What the device lacks of what none can do without, each with the Mesa version that brings it where that helps.
+    /// Required features and limits that the device lacks, each with the Mesa version that has it where an update helps.
     fn missing(
         &self,
         physical: vk::PhysicalDevice,
@@ -291,7 +295,7 @@ pub(super) const QUEUE: vk::QueueFlags =
 
 impl Drop for Instance {
     fn drop(&mut self) {
-        // SAFETY: the device, the only child, is gone; the messenger goes before the box it writes to.
+        // SAFETY: the device, the only child, is destroyed; the messenger is destroyed before the box that it writes to.
         unsafe {
             if let Some((utils, messenger)) = &self.debug {
                 utils.destroy_debug_utils_messenger(*messenger, None);
@@ -307,7 +311,7 @@ unsafe extern "system" fn on_message(
     data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
     user: *mut c_void,
 ) -> vk::Bool32 {
-    // SAFETY: Vulkan passes valid callback data, and `user` is the messages' box (see `Instance::new`).
+    // SAFETY: Vulkan passes valid callback data, and `user` is the box of messages (see `Instance::new`).
     let (text, messages) = unsafe {
         let text = CStr::from_ptr((*data).p_message).to_string_lossy().into_owned();
         (text, &*user.cast::<Messages>())
@@ -319,12 +323,12 @@ unsafe extern "system" fn on_message(
     vk::FALSE
 }
 
-/// All devices that Vulkan offers here, in the order of `--device INDEX`.
+/// All physical devices, in the order of `--device INDEX`.
 pub fn candidates() -> Result<Vec<Candidate>> {
     Instance::new(None, &[])?.candidates(None)
 }
 
-/// A name that a driver wrote.
+/// A driver's string.
 pub(super) fn text(name: Result<&CStr, FromBytesUntilNulError>) -> String {
     name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
@@ -345,7 +349,7 @@ fn choose(all: Vec<Candidate>, choice: &DeviceChoice) -> Result<Candidate> {
             DeviceChoice::Name(name) => c.info.name.to_lowercase().contains(&name.to_lowercase()),
         })
         .collect();
-    // A usable device of lower rank beats an unusable one.
+    // A usable device of lower rank is preferred to an unusable one of higher rank.
     wanted.sort_by_key(|(index, c)| (!c.missing.is_empty(), c.info.rank(), *index));
     let Some((_, best)) = wanted.into_iter().next() else {
         bail!(NotOpened::NoneLike { choice: choice.clone(), offered });
@@ -358,13 +362,13 @@ fn choose(all: Vec<Candidate>, choice: &DeviceChoice) -> Result<Candidate> {
     Ok(best)
 }
 
-/// Whether the device is gone: nothing that it holds can be used again.
+/// Whether the error is `VK_ERROR_DEVICE_LOST`: no object of the device can be used again.
 #[must_use]
 pub fn is_lost(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| cause.downcast_ref() == Some(&vk::Result::ERROR_DEVICE_LOST))
 }
 
-/// A Vulkan device, its one queue, and the caches of what was made on it.
+/// A logical device with its one queue, and the caches of the objects created on it.
 pub struct Device {
     pub(super) raw: ash::Device,
     pub(super) queue: Mutex<vk::Queue>,
@@ -372,7 +376,7 @@ pub struct Device {
     pub(super) timeline: vk::Semaphore,
     pub(super) push: Option<khr::push_descriptor::Device>,
     pub(super) debug: Option<ext::debug_utils::Device>,
-    /// What tells of compiled pipelines, where the driver does.
+    /// Functions of VK_KHR_pipeline_executable_properties, on drivers that have it.
     pub(super) executables: Option<khr::pipeline_executable_properties::Device>,
     pub(super) allocator: Mutex<ManuallyDrop<Allocator>>,
     pub(super) caches: Mutex<Caches>,
@@ -388,17 +392,17 @@ pub struct Device {
     pub(super) physical: vk::PhysicalDevice,
     #[cfg(feature = "window")]
     pub(super) family: u32,
-    pub(super) turns: Turns,
+    pub(super) time_slices: SliceTimes,
     pub(super) instance: Instance,
 }
 
 impl Device {
-    /// Opens a device of an instance; with a surface that it can show pictures on, where there is one.
+    /// Opens a device of an instance; with a surface, one that can present to it.
     pub(super) fn open_on(
         instance: Instance,
         choice: &DeviceChoice,
         surface: Option<&Surface>,
-        turns: bool,
+        time_slices: bool,
     ) -> Result<Arc<Self>> {
         let Candidate { info, physical, offers, is_lavapipe, .. } = choose(instance.candidates(surface)?, choice)?;
         let opening = || format!("opening device \"{}\"", info.name);
@@ -437,7 +441,8 @@ impl Device {
             .shader_storage_image_extended_formats(true)
             .full_draw_index_uint32(offers.large_indices)
             .geometry_shader(offers.primitive_ids)
-            // What is read beside an array that was a buffer of texels must stay as harmless as it was there.
+            // Reads out of bounds are harmless in texel buffers; robust buffer access keeps them so in the storage buffers that
+            // replace them.
             .robust_buffer_access(!offers.texel_buffers);
         let mut v12 = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true).scalar_block_layout(true);
         let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
@@ -455,7 +460,7 @@ impl Device {
         if offers.tells_compiled {
             create = create.push_next(&mut executables);
         }
-        // SAFETY: everything `create` asks for was found present by `Instance::missing`.
+        // SAFETY: `Instance::missing` and `Offers` have found every requested feature.
         let raw = unsafe { instance.raw.create_device(physical, &create, None) }.with_context(opening)?;
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.raw.clone(),
@@ -463,11 +468,11 @@ impl Device {
             physical_device: physical,
             debug_settings: gpu_allocator::AllocatorDebugSettings::default(),
             buffer_device_address: false,
-            // Small blocks: an idle 256 MiB block is most of a software renderer's memory.
+            // Small blocks for sub-allocation: an idle block of 256 MiB would be most of a software renderer's memory.
             allocation_sizes: gpu_allocator::AllocationSizes::new(16 << 20, 8 << 20),
         })
         .with_context(opening)?;
-        // SAFETY: the family was created above; the create infos outlive the calls.
+        // SAFETY: the queue family was requested above; the create infos outlive the calls.
         let (queue, commands, timeline) = unsafe {
             let pool = vk::CommandPoolCreateInfo::default()
                 .queue_family_index(family)
@@ -504,42 +509,42 @@ impl Device {
             physical,
             #[cfg(feature = "window")]
             family,
-            turns: Turns::new(turns),
+            time_slices: SliceTimes::new(time_slices),
             instance,
         });
         Ok(device)
     }
 
-    /// Who this is.
+    /// Identity of the device.
     #[must_use]
     pub fn info(&self) -> &DeviceInfo {
         &self.info
     }
 
-    /// Whether the validation layer listens.
+    /// Whether the validation layer is enabled.
     pub(super) fn validates(&self) -> bool {
         self.instance.debug.is_some()
     }
 
-    /// What the validation layer has said so far.
+    /// Messages of the validation layer so far.
     #[must_use]
     pub fn messages(&self) -> Vec<Message> {
         lock(&self.instance.messages).clone()
     }
 
-    /// Every object created so far, in order; none of a device that takes turns.
+    /// Every object created so far, in order; empty for a device with time-sliced submission.
     #[must_use]
     pub fn created(&self) -> Vec<Created> {
         lock(&self.created).clone()
     }
 
-    /// Bytes of device memory in blocks now.
+    /// Bytes of device memory in the allocator's blocks now.
     #[must_use]
     pub fn memory_bytes(&self) -> u64 {
         lock(&self.allocator).generate_report().total_capacity_bytes
     }
 
-    /// Whether the driver ends all loops of an invocation, in silence, after 65,535 evaluations of their heads: lavapipe.
+    /// Whether the driver silently ends all loops of an invocation after 65,535 loop iterations, as lavapipe does.
     #[must_use]
     pub fn limits_loops(&self) -> bool {
         self.is_lavapipe
@@ -549,16 +554,16 @@ impl Device {
         self.is_lavapipe
     }
 
-    /// Whether the device is the processor itself: its memory is the process's own.
+    /// Whether the device is the CPU: its memory is the process's own.
     pub(super) fn is_software(&self) -> bool {
         self.info.kind == "cpu"
     }
 
-    /// Pixels by which the rasteriser moves vertices at most before it interpolates depth between them. lavapipe finds what a triangle
-    /// covers from rounded vertices and depth from exact ones.
+    /// Largest distance in pixels by which the rasteriser snaps vertices to its sub-pixel grid before it interpolates depth.
+    /// lavapipe rasterises coverage from snapped vertices and depth from exact ones, so its value is 0.
     #[must_use]
     pub fn snap_pixels(&self) -> f64 {
-        // Half a step across and down.
+        // Half a grid step in x and in y.
         let half_diagonal = std::f64::consts::FRAC_1_SQRT_2 * 0.5_f64.powi(self.limits.sub_pixel_precision_bits as i32);
         if self.is_lavapipe { 0.0 } else { half_diagonal }
     }
@@ -569,26 +574,26 @@ impl Device {
         self.limits.max_image_dimension2_d.min(self.limits.max_viewport_dimensions[0])
     }
 
-    /// Vertices that one draw can have.
+    /// Largest number of vertices of one draw.
     #[must_use]
     pub fn max_vertices(&self) -> usize {
         let largest = if self.offers.large_indices { u32::MAX - 1 } else { self.limits.max_draw_indexed_index_value };
         largest as usize + 1
     }
 
-    /// Largest storage buffer binding in bytes.
+    /// Largest size of a storage buffer binding in bytes.
     #[must_use]
     pub fn max_storage_bytes(&self) -> u64 {
         u64::from(self.limits.max_storage_buffer_range)
     }
 
-    /// What it has of what Etalon can do without.
+    /// Optional features of the device.
     #[must_use]
     pub fn offers(&self) -> &Offers {
         &self.offers
     }
 
-    /// Buffers, images, pipelines and samplers that there are now.
+    /// Number of buffers, images, pipelines and samplers that exist now.
     #[must_use]
     pub fn objects(&self) -> u64 {
         self.objects.load(Ordering::Relaxed)
@@ -600,8 +605,8 @@ impl Device {
 
     pub(super) fn note(&self, kind: &'static str, name: &str, bytes: u64) {
         self.objects.fetch_add(1, Ordering::Relaxed);
-        // A window goes on for hours: a list of all that it made would grow as long.
-        if self.turns.taken {
+        // A window runs for hours: a list of every created object would grow without bound.
+        if self.time_slices.taken {
             return;
         }
         lock(&self.created).push(Created { kind, name: name.to_owned(), bytes });
@@ -611,12 +616,12 @@ impl Device {
         self.next_id.fetch_add(1, Ordering::Relaxed)
     }
 
-    /// Gives an object a name for validation messages and captures.
+    /// Names an object for validation messages and captures (`VK_EXT_debug_utils`).
     pub(super) fn name<H: vk::Handle>(&self, object: H, name: &str) {
         if let Some(debug) = &self.debug {
             let name = CString::new(name.replace('\0', " ")).unwrap_or_default();
             let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
-            // SAFETY: the object is alive. A name that cannot be set is not worth an error.
+            // SAFETY: the object is alive. An object without its name is not worth an error.
             let _ = unsafe { debug.set_debug_utils_object_name(&info) };
         }
     }
@@ -624,8 +629,8 @@ impl Device {
 
 impl Drop for Device {
     fn drop(&mut self) {
-        // SAFETY: every buffer, image and frame holds an `Arc` of the device, so none is left; the allocator goes before
-        // the device it allocates from.
+        // SAFETY: every buffer, image and frame holds an `Arc` of the device, so none exists any more; the allocator is dropped
+        // before the device that it allocates from.
         unsafe {
             let _ = self.raw.device_wait_idle();
             lock(&self.caches).destroy(&self.raw);
@@ -634,7 +639,7 @@ impl Drop for Device {
             self.raw.destroy_command_pool(*lock(&self.commands), None);
             self.raw.destroy_device(None);
         }
-        // `instance` is dropped after this; it keeps `entry`, the loader's library, until then.
+        // `instance` is dropped after this function; it keeps `entry`, the loader's library, until then.
         let _ = &self.instance.entry;
     }
 }

@@ -1,8 +1,8 @@
-//! Errors that a caller may want to match on.
+//! Errors that a caller may match on.
 
 use super::choice::DeviceChoice;
 
-/// Why no device was opened: what a caller may look for in an [`anyhow::Error`].
+/// The reasons why no device was opened; callers downcast an [`anyhow::Error`] to this type.
 ///
 /// ```
 /// use etalon_vulkan::{Device, DeviceChoice, NotOpened};
@@ -11,56 +11,56 @@ use super::choice::DeviceChoice;
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NotOpened {
-    /// The loader's library is not there, or does not load.
+    /// The loader's library is missing, or does not load.
     #[error("no Vulkan loader: {0}")]
     NoLoader(String),
-    /// The loader has not what a window needs.
+    /// The loader lacks an instance extension that the window needs.
     #[error("the Vulkan loader cannot show windows here: it lacks {0}")]
     NoWindows(String),
-    /// Validation was asked for.
+    /// Validation was requested, and the layer is not installed.
     #[error("validation needs the Khronos validation layer")]
     NoValidation,
-    /// There is a loader, and no driver.
+    /// There is a loader, but no driver.
     #[error("Vulkan offers no device here")]
     NoDevice,
-    /// None of the devices is the one that was asked for.
+    /// No device matches the choice.
     #[error("asked for {choice}, Vulkan offers {}", .offered.join(", "))]
     NoneLike {
-        /// What was asked for.
+        /// The requested device.
         choice: DeviceChoice,
-        /// Names of the devices, quoted.
+        /// Names of the present devices, quoted.
         offered: Vec<String>,
     },
-    /// The best device that was asked for cannot draw.
+    /// The best matching device lacks something that Etalon requires.
     #[error("device \"{device}\" ({driver}) lacks {}", .missing.join(", "))]
     Lacks {
-        /// Its name.
+        /// Name of the device.
         device: String,
-        /// Its driver.
+        /// Driver of the device.
         driver: String,
-        /// Features, extensions, limits.
+        /// Missing features, extensions and limits.
         missing: Vec<String>,
     },
-    /// The process has another device under validation.
+    /// The process has another device under validation (`open.rs`).
     #[error(
         "this process has device \"{device}\" under validation already, as {has}: the layer cannot hold {wanted} beside it"
     )]
     Validated {
-        /// Its name.
+        /// Name of the open device.
         device: String,
-        /// The kind of the device that is open.
+        /// Kind of the open device.
         has: String,
-        /// The kind that the caller requested.
+        /// Kind of the requested device.
         wanted: String,
     },
 }
 
-/// Something is larger than the device can hold or bind; a smaller scene or picture may fit.
+/// A resource exceeds a limit of the device; a smaller scene or picture may fit.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{what}: the device {limit}")]
 pub struct TooLarge {
-    /// What was being made, with its size.
+    /// The resource with its size.
     pub what: String,
-    /// What the device allows.
+    /// The limit of the device.
     pub limit: String,
 }

@@ -1,12 +1,15 @@
-//! What arithmetic of f32 must keep, asked for where a device can: the sign of zero, infinities and NaN, and the nearest rounding. Without,
-//! a compiler may assume that there are no such numbers, and sums that carry their errors may round as they like.
+//! Float controls: execution modes that make f32 arithmetic keep signed zeros, infinities and NaN, and round to nearest even.
+//!
+//! Read the SPIR-V specification, section Execution Modes (`SignedZeroInfNanPreserve`, `RoundingModeRTE`), and the Vulkan
+//! specification, `VkPhysicalDeviceFloatControlsProperties`. Without these modes a compiler may assume that no infinities
+//! and NaN occur, and may choose the rounding of compensated sums.
 
 use spirv::{Capability, ExecutionMode, Op};
 
 use super::offers::Offers;
 use super::specialize::{HEADER, instructions, op};
 
-/// `words` with what the device offers of it, in 32 bits.
+/// `words` with the execution modes that the device offers, for 32-bit floats.
 ///
 /// # Panics
 /// When the module has no entry point.

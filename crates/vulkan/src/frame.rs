@@ -1,8 +1,9 @@
-//! A frame: passes in reading order, barriers derived from what they declare, a timestamp pair around each.
+//! A frame: passes in reading order, with derived pipeline barriers and a timestamp pair around each pass.
 //!
-//! Passes are plain data (`Vec<Pass>`) until [`Frame::finish`] records them in the order they were written, submits them,
-//! and waits. Labels, object names, timestamps and barriers come by themselves, and so do pipelines: those that are new are
-//! made on another thread, and while a pass waits for its own the device goes on with the passes before.
+//! Read the Vulkan specification, chapters Render Pass (Dynamic Rendering), Dispatching Commands, Drawing Commands and
+//! Queries. Passes are plain data (`Vec<Pass>`) until [`Frame::finish`] records them in order, submits them, and waits.
+//! Labels, object names, timestamps and barriers are automatic. New pipelines are created on another thread, and while a
+//! pass waits for its pipeline, the device already executes the earlier passes.
 
 use std::cell::Cell;
 use std::collections::HashMap;
@@ -17,10 +18,12 @@ use super::cache::{PipelineKey, RasterKey};
 use super::device::{Device, lock};
 use super::memory::{Buffer, Image};
 use super::pace::Interrupted;
-use super::recording::{Dispatch, Groups, Own, Pass, Recording, Target, Work, bind_own, bind_sets, push_constants};
+use super::recording::{
+    Dispatch, Groups, Own, Pass, RecordedWork, Recording, Target, bind_own, bind_sets, push_constants,
+};
 use super::set::{BoundSet, Pooled};
 use super::shader::{Program, SharedSet, Specialization as _};
-use super::sync::{self, ResourceId, State, Use};
+use super::sync::{self, ResourceId, ResourceState, Use};
 
 /// GPU time of one pass.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,20 +37,20 @@ pub struct PassTime {
 /// A colour attachment of a raster pass.
 #[derive(Clone, Copy)]
 pub struct ColorTarget<'a> {
-    /// Where it draws.
+    /// The attachment's image.
     pub image: &'a Image,
-    /// Cleared to this, as raw words of the format's numeric type; `None` keeps what is there.
+    /// Clear value as raw words of the format's numeric type; `None` keeps the contents.
     pub clear: Option<[u32; 4]>,
 }
 
-/// The depth attachment of a raster pass (reversed: 0 is infinitely far).
+/// The depth attachment of a raster pass, with reversed depth: 0 is infinitely far.
 #[derive(Clone, Copy)]
 pub struct DepthTarget<'a> {
-    /// Where it tests.
+    /// The attachment's image.
     pub image: &'a Image,
-    /// Whether it is cleared to 0 first.
+    /// Whether the attachment is cleared to 0 first.
     pub clear: bool,
-    /// Whether fragments write it.
+    /// Whether fragments write depth.
     pub write: bool,
 }
 
@@ -56,7 +59,7 @@ pub struct DepthTarget<'a> {
 pub struct VertexStream<'a> {
     /// Tightly packed f32 components.
     pub buffer: &'a Buffer,
-    /// First byte.
+    /// Offset of the first vertex in bytes.
     pub offset: u64,
     /// Bytes between vertices; 0 gives every vertex the first element.
     pub stride: u32,
@@ -64,7 +67,7 @@ pub struct VertexStream<'a> {
 
 /// One indexed draw.
 pub struct Draw<'a> {
-    /// Index into the pass's list of pages.
+    /// Index into the pass's list of texture sets (`pages`).
     pub pages: usize,
     /// Specialization constants.
     pub constants: Vec<(u32, u32)>,
@@ -76,11 +79,11 @@ pub struct Draw<'a> {
     pub first_index: u32,
     /// Number of indices.
     pub index_count: u32,
-    /// Passed to the shader as `gl_InstanceIndex`.
+    /// Instance index, `gl_InstanceIndex` in the shader.
     pub instance: u32,
-    /// Whether back faces are dropped.
+    /// Whether back faces are culled.
     pub cull_back: bool,
-    /// Whether clockwise triangles face the front: a mirrored placement.
+    /// Whether clockwise triangles are front faces, as under a mirroring transform.
     pub clockwise: bool,
 }
 
@@ -88,24 +91,24 @@ pub struct Draw<'a> {
 pub struct Raster<'a> {
     /// Name in labels and timings.
     pub name: &'a str,
-    /// Colour attachments in location order; what is written to `None` is lost.
+    /// Colour attachments in location order; outputs to `None` are discarded.
     pub colors: Vec<Option<ColorTarget<'a>>>,
     /// Depth attachment.
     pub depth: Option<DepthTarget<'a>>,
-    /// First pixel of the viewport: several pictures may share one image.
+    /// First pixel of the viewport; several views may share one image.
     pub origin: [u32; 2],
     /// Size of the viewport in pixels.
     pub size: [u32; 2],
-    /// Rows of the viewport that are cleared and drawn: from, up to.
+    /// Rows of the viewport that are cleared and drawn: first, and one past the last.
     pub rows: [u32; 2],
 }
 
-/// A pass of a frame that has been described, before anything is made for it.
+/// The description of a pass, before its pipelines exist.
 #[derive(Debug, Clone)]
 pub struct PassPlan {
     /// Name of the pass.
     pub name: String,
-    /// Its pipelines: programs with their specialization constants.
+    /// Pipelines of the pass: programs with their specialization constants.
     pub pipelines: Vec<(&'static Program, Vec<(u32, u32)>)>,
 }
 
@@ -115,7 +118,7 @@ pub struct Frame<'a> {
     passes: Vec<Pass<'a>>,
     targets: HashMap<ResourceId, Target<'a>>,
     sets: Vec<BoundSet<'a>>,
-    /// Sets of single passes, where descriptors cannot be pushed.
+    /// Descriptor sets of single passes, on devices without push descriptors.
     own: Vec<Pooled>,
     without_barriers: bool,
 }
@@ -134,13 +137,13 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// An empty frame of a scene: all its programs read the same sets.
+    /// An empty frame whose programs all read the same shared sets.
     #[must_use]
     pub fn of(device: &Arc<Device>, sets: Vec<BoundSet<'a>>) -> Self {
         Self { sets, ..Self::new(device) }
     }
 
-    /// Leaves out every buffer barrier, for the test that validation would notice.
+    /// Omits every buffer barrier, for the test that validation detects the omission.
     #[doc(hidden)]
     pub fn forget_barriers(&mut self) {
         self.without_barriers = true;
@@ -156,7 +159,7 @@ impl<'a> Frame<'a> {
         uses.push(Use { resource: image.id, is_image: true, access, shaders });
     }
 
-    /// Notes the uses of a program's bindings and prepares their descriptors: to be pushed, or in a set for this one use.
+    /// Adds the uses of a program's bindings and prepares set 0: push descriptors, or a descriptor set for this pass.
     fn bind(
         &mut self,
         uses: &mut Vec<Use>,
@@ -186,7 +189,7 @@ impl<'a> Frame<'a> {
         let creating = || format!("creating descriptors of \"{}\"", program.name);
         let own = Pooled::new(&self.device, program.bindings, layout, creating)?;
         for (binding, descriptor) in program.bindings.iter().zip(&descriptors) {
-            // SAFETY: it is new, and what it points at lives as long as the frame.
+            // SAFETY: the set is new, and its resources live as long as the frame.
             unsafe { own.write(binding, descriptor) };
         }
         let raw = own.raw;
@@ -194,10 +197,10 @@ impl<'a> Frame<'a> {
         Ok(Own::Set(raw))
     }
 
-    /// Notes the uses of what a program reads of the sets 1 and 2.
+    /// Adds the uses of the bindings that a program reads in the shared sets 1 and 2.
     ///
     /// # Panics
-    /// When a set is missing: our mistake.
+    /// When a set is missing, a bug of the caller.
     fn shared(
         &mut self,
         uses: &mut Vec<Use>,
@@ -225,7 +228,7 @@ impl<'a> Frame<'a> {
     /// One dispatch of `groups` workgroups.
     ///
     /// # Errors
-    /// When the driver refuses what the pipeline binds.
+    /// When the driver refuses a descriptor or a layout.
     pub fn compute<B: Bindings<'a>>(
         &mut self,
         name: &str,
@@ -237,7 +240,7 @@ impl<'a> Frame<'a> {
         self.dispatch(name, bindings, constants, push, Groups::Count(groups))
     }
 
-    /// One dispatch whose number of workgroups lies at `offset` bytes of `sizes`.
+    /// One indirect dispatch; its three workgroup counts are at `offset` bytes of `sizes`.
     ///
     /// # Errors
     /// As [`Frame::compute`].
@@ -273,7 +276,7 @@ impl<'a> Frame<'a> {
             name: name.to_owned(),
             uses,
             pipelines: vec![PipelineKey { program, constants: constants.words(), raster: None }],
-            work: Work::Dispatch(Dispatch {
+            work: RecordedWork::Dispatch(Dispatch {
                 program,
                 own,
                 sets,
@@ -301,10 +304,10 @@ impl<'a> Frame<'a> {
         self.compute(name, bindings, constants, push, [size[0].div_ceil(x), size[1].div_ceil(y), 1])
     }
 
-    /// A raster pass: `draws` in order, each with one of `pages`.
+    /// A raster pass: `draws` in order, each with one of the texture sets `pages`.
     ///
     /// # Errors
-    /// When the driver refuses what a pipeline binds.
+    /// When the driver refuses a descriptor or a layout.
     pub fn raster<B: Bindings<'a>>(
         &mut self,
         raster: &Raster<'a>,
@@ -324,7 +327,7 @@ impl<'a> Frame<'a> {
             self.use_image(&mut uses, depth.image, access, none);
         }
         let depth = raster.depth.map(|d| d.image.id);
-        // A pass that draws nothing clears its targets, which no program binds meanwhile.
+        // A pass without draws only clears its attachments: no program binds anything.
         let resources = if draws.is_empty() { Vec::new() } else { bindings.resources() };
         let own = self.bind(&mut uses, program, &resources, depth)?;
         let sets: Vec<_> = pages.iter().map(|pages| self.shared(&mut uses, program, Some(pages))).collect();
@@ -372,7 +375,7 @@ impl<'a> Frame<'a> {
             let depth_info = depth.map(|(view, clear, layout)| {
                 let read_only = layout == vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL;
                 let info = attachment(view, layout, clear);
-                // Storing counts as a write, which a depth that is only tested does not declare.
+                // STORE counts as a write, which a pass that only tests depth does not declare.
                 if read_only { info.store_op(vk::AttachmentStoreOp::NONE) } else { info }
             });
             let area = vk::Rect2D {
@@ -415,17 +418,22 @@ impl<'a> Frame<'a> {
                 device.raw.cmd_end_rendering(commands);
             }
         };
-        self.passes.push(Pass { name: raster.name.to_owned(), uses, pipelines, work: Work::Record(Box::new(record)) });
+        self.passes.push(Pass {
+            name: raster.name.to_owned(),
+            uses,
+            pipelines,
+            work: RecordedWork::Record(Box::new(record)),
+        });
         Ok(())
     }
 
-    /// A pass that takes no pipeline.
+    /// A pass without a pipeline: copies, fills and clears.
     fn transfer(&mut self, name: &str, uses: Vec<Use>, record: impl FnOnce(&Device, vk::CommandBuffer) + 'a) {
         self.passes.push(Pass {
             name: name.to_owned(),
             uses,
             pipelines: Vec::new(),
-            work: Work::Record(Box::new(move |device, commands, _| record(device, commands))),
+            work: RecordedWork::Record(Box::new(move |device, commands, _| record(device, commands))),
         });
     }
 
@@ -448,7 +456,7 @@ impl<'a> Frame<'a> {
         let mut uses = Vec::new();
         self.use_buffer(&mut uses, buffer, Access::TransferDst, vk::ShaderStageFlags::empty());
         let raw = buffer.raw;
-        // SAFETY: as above.
+        // SAFETY: as in `copy_buffer`.
         self.transfer(name, uses, move |device, commands| unsafe {
             device.raw.cmd_fill_buffer(commands, raw, 0, vk::WHOLE_SIZE, word);
         });
@@ -461,7 +469,7 @@ impl<'a> Frame<'a> {
         let (raw, range) = (image.raw, image.range());
         self.transfer(name, uses, move |device, commands| {
             let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-            // SAFETY: as above.
+            // SAFETY: as in `copy_buffer`.
             unsafe {
                 let black = vk::ClearColorValue::default();
                 device.raw.cmd_clear_color_image(commands, raw, layout, &black, &[range]);
@@ -487,7 +495,7 @@ impl<'a> Frame<'a> {
         let (from, to) = (from.raw, to.raw);
         self.transfer(name, uses, move |device, commands| {
             let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-            // SAFETY: as above.
+            // SAFETY: as in `copy_buffer`.
             unsafe { device.raw.cmd_copy_buffer_to_image(commands, from, to, layout, &regions) };
         });
     }
@@ -503,12 +511,12 @@ impl<'a> Frame<'a> {
         let (from, to) = (from.raw, to.raw);
         self.transfer(name, uses, move |device, commands| {
             let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
-            // SAFETY: as above.
+            // SAFETY: as in `copy_buffer`.
             unsafe { device.raw.cmd_copy_image_to_buffer(commands, from, layout, to, &[region]) };
         });
     }
 
-    /// Makes what the device wrote to a buffer visible to [`Buffer::read`].
+    /// Makes the device's writes to a buffer visible to [`Buffer::read`].
     pub fn read_back(&mut self, buffer: &'a Buffer) {
         let mut uses = Vec::new();
         self.use_buffer(&mut uses, buffer, Access::HostRead, vk::ShaderStageFlags::empty());
@@ -516,11 +524,11 @@ impl<'a> Frame<'a> {
             name: "read back".to_owned(),
             uses,
             pipelines: Vec::new(),
-            work: Work::Record(Box::new(|_, _, _| {})),
+            work: RecordedWork::Record(Box::new(|_, _, _| {})),
         });
     }
 
-    /// The passes so far, in order.
+    /// The descriptions of the passes so far, in order.
     #[must_use]
     pub fn plan(&self) -> Vec<PassPlan> {
         let of = |key: &PipelineKey| (key.program, key.constants.clone());
@@ -529,10 +537,10 @@ impl<'a> Frame<'a> {
         self.passes.iter().map(plan).collect()
     }
 
-    /// Makes the pipelines of the passes so far, where the driver tells what it makes of them ([`Device::compiled`]).
+    /// Creates the pipelines of the passes so far, on drivers that report statistics of them ([`Device::compiled`]).
     ///
     /// # Errors
-    /// When the driver refuses one.
+    /// When the driver refuses a pipeline.
     pub fn compile_where_told(&self) -> Result<()> {
         if !self.device.offers().tells_compiled {
             return Ok(());
@@ -542,14 +550,14 @@ impl<'a> Frame<'a> {
         self.device.with_pipelines(&keys, |pipelines| pipelines.wait_for(&all).map(|_| ()))
     }
 
-    /// Records, submits, waits, and returns the time of each pass in order.
+    /// Records, submits and waits; GPU times of the passes, in order.
     ///
     /// # Errors
     /// When the driver refuses a pipeline or fails: out of memory, or a lost device.
     pub fn finish(self) -> Result<Vec<PassTime>> {
         let Self { device, passes, targets, without_barriers, own, .. } = self;
         let uses: Vec<Vec<Use>> = passes.iter().map(|pass| pass.uses.clone()).collect();
-        let before: HashMap<ResourceId, State> = targets
+        let before: HashMap<ResourceId, ResourceState> = targets
             .iter()
             .map(|(&id, target)| {
                 let state = match target {
@@ -566,20 +574,20 @@ impl<'a> Frame<'a> {
         let names: Vec<String> = passes.iter().map(|pass| pass.name.clone()).collect();
         let wanted: Vec<PipelineKey> = passes.iter().flat_map(|pass| pass.pipelines.clone()).collect();
         let keys: Vec<&PipelineKey> = wanted.iter().collect();
-        let count = if device.turns.taken { 2 } else { 2 * passes.len() as u32 };
+        let count = if device.time_slices.taken { 2 } else { 2 * passes.len() as u32 };
         let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(count.max(1));
-        // SAFETY: command buffers that are recorded here, submitted once and waited for before anything is freed. Every
-        // handle in them is borrowed for `'a`, which ends after this function.
+        // SAFETY: command buffers are recorded here, submitted once, and waited for before anything is freed. Every handle in
+        // them is borrowed for `'a`, which ends after this function.
         let outcome = unsafe {
             let made = if timed { device.raw.create_query_pool(&info, None) } else { Ok(vk::QueryPool::null()) };
             let queries = made.context("creating timestamps")?;
-            // Whoever draws holds the pool until the frame has ended: threads take turns.
+            // The frame holds the command pool until it has finished: one thread draws at a time.
             let from = lock(&device.commands);
             let outcome = device.with_pipelines(&keys, |pipelines| {
                 let (device, from, targets) = (&device, *from, &targets);
                 let begun = &begun;
                 let recording = Recording { device, from, targets, pipelines, queries, without_barriers, begun };
-                if device.turns.taken {
+                if device.time_slices.taken {
                     recording.in_turns(passes, &barriers)
                 } else {
                     recording.at_once(passes, &barriers)
@@ -599,7 +607,7 @@ impl<'a> Frame<'a> {
             Err(_) => false,
         };
         for (id, target) in &targets {
-            // What a frame that failed has left behind is not known.
+            // The state of the resources after a failed frame is unknown.
             let state = if is_known { states.get(id).copied() } else { None }.unwrap_or_default();
             match target {
                 Target::Buffer(buffer) => *lock(&buffer.state) = state,

@@ -1,8 +1,11 @@
-//! Explicit Vulkan without a renderer in it: devices, memory, pipelines, and frames with derived barriers.
+//! A thin Vulkan 1.3 layer: devices, memory, pipelines, descriptor sets, and frames whose pipeline barriers are derived.
 //!
-//! The only part of Etalon that is allowed `unsafe`: every call into the driver is here, and each block says why it is
-//! sound. Objects own a reference to their [`Device`] and destroy themselves; a [`Frame`] has always finished on the
-//! device when [`Frame::finish`] returns, so nothing is ever destroyed while in use.
+//! Read the Vulkan specification, chapters Devices and Queues, Synchronization and Cache Control, Pipelines, Resource
+//! Descriptors and Memory Allocation. The crate contains no renderer.
+//!
+//! This is the only crate that may use `unsafe`: every call into the driver is here, and each block states why it is
+//! sound. Objects own a reference to their [`Device`] and destroy themselves. [`Frame::finish`] returns only when the
+//! device has finished the frame, so nothing is destroyed while in use.
 #![allow(unsafe_code, reason = "the one room that talks to the driver")]
 
 mod access;
@@ -31,7 +34,7 @@ mod specialize;
 mod surface;
 pub mod sync;
 mod tables;
-mod turns;
+mod time_slices;
 #[cfg(feature = "window")]
 mod window;
 
@@ -49,7 +52,7 @@ pub use memory::{Buffer, Image, ImageDesc, NOTHING, Place};
 pub use offers::Offers;
 pub use pace::Interrupted;
 #[cfg(feature = "window")]
-pub use present::{Overlay, Placed, Presented, Presenter};
+pub use present::{Overlay, PlacedPicture, Presented, Presenter};
 pub use primitive_ids::without_primitive_ids;
 pub use set::{BoundSet, DescriptorSet};
 pub use shader::{

@@ -1,17 +1,20 @@
-//! What programs may ask of a device. The build refuses a program that asks for more, and a device with less is not used.
+//! Limits that shaders rely on: the build refuses a program that exceeds one, and a device below one is not used.
+//!
+//! Read the Vulkan specification, chapter Limits.
 
-/// Descriptors that a pass pushes: no device has to take more than 32.
+/// Push descriptors of a pass (`maxPushDescriptors`); every device allows 32.
 pub const PUSH_DESCRIPTORS: u32 = 12;
-/// Storage images and storage texel buffers that one stage of a pass sees.
+/// Storage images and storage texel buffers in one shader stage.
 pub const STORAGE_IMAGES: u32 = 16;
-/// Storage buffers.
+/// Storage buffers in one shader stage.
 pub const STORAGE_BUFFERS: u32 = 16;
-/// Storage buffers where tables are such (`tables.rs`).
+/// Storage buffers in one shader stage where lookup tables are storage buffers (`tables.rs`).
 pub const STORAGE_BUFFERS_AND_TABLES: u32 = 24;
-/// Colour targets of a raster pass.
+/// Colour attachments of a raster pass.
 pub const COLOR_TARGETS: u32 = 7;
-/// Texels that a buffer must hold for tables to be fetched from it: a picture's depths, the textures of a small scene.
+/// Texels that a texel buffer must hold for lookup tables to be texel buffers: a picture's depths, textures of a small scene.
 pub const LEAST_TEXELS: u32 = 1 << 22;
-/// Uniform buffers: lavapipe 22.3 inlines uniforms that conditions depend on, and writes past its table of them where such a buffer is
-/// the fourth or a later one of a stage: it crashes while it makes the pipeline (docs/decisions/lavapipe.md).
+/// Uniform buffers in one shader stage. lavapipe 22.3 inlines uniforms that conditions depend on, and writes past its
+/// table of them for the fourth uniform buffer of a stage or a later one: it crashes while it creates the pipeline
+/// (docs/decisions/lavapipe.md).
 pub const UNIFORM_BUFFERS: u32 = 3;

@@ -1,7 +1,8 @@
-//! Counting of loop heads, for devices that end loops after so many of them (docs/decisions/lavapipe.md).
+//! Counting of loop iterations in SPIR-V, for devices that end loops after a fixed number (docs/decisions/lavapipe.md).
 //!
-//! Shaders read `loop_heads` (shaders/lib/loops.glsl) to end on their own account before the device does, and say so. The counting is
-//! no part of their algorithms, so it is written into the SPIR-V here, at the head of every loop.
+//! Read the SPIR-V specification, sections Structured Control Flow and `OpLoopMerge`. Shaders read `loop_iterations`
+//! (shaders/lib/loops.glsl) to end before the device does, and report it. The count is no part of their algorithms, so
+//! this file inserts it into the header block of every loop.
 
 use std::ops::Range;
 
@@ -9,11 +10,11 @@ use spirv::{Op, StorageClass};
 
 use super::specialize::{BOUND, HEADER, instructions, op};
 
-/// The variable that shaders call `loop_heads`: the only scalar of shared memory in any of them.
+/// The variable `loop_iterations` of the shaders: the only scalar in shared memory of any shader.
 struct Counter {
     uint: u32,
     variable: u32,
-    /// Where it is declared.
+    /// The instruction that declares the variable.
     declared: Range<usize>,
 }
 
@@ -31,11 +32,11 @@ impl Counter {
     }
 }
 
-/// `words` with `loop_heads` as a variable of each invocation, which every loop adds 1 to at its head. Unless `counts`, or where
-/// nothing reads it, it is 0 and costs nothing.
+/// `words` with `loop_iterations` as a private variable of each invocation, which every loop header increments. It is the
+/// constant 0 and free where `counts` is false or no instruction reads it.
 ///
 /// # Panics
-/// When a module that counts has more than one function: the optimiser of the build leaves one.
+/// When a module that counts has more than one function: the build's optimiser leaves one.
 #[must_use]
 pub fn with_loops_counted(words: &[u32], counts: bool) -> Vec<u32> {
     let places = instructions(words, HEADER);
@@ -57,7 +58,7 @@ pub fn with_loops_counted(words: &[u32], counts: bool) -> Vec<u32> {
         let instruction = &words[at.clone()];
         match op(words, at) {
             Some(Op::EntryPoint) => {
-                // Name and string come before the variables, and hold no id by chance: only the tail is searched.
+                // Only the words after name and string are searched: a word of the string could equal the id by chance.
                 let kept: Vec<u32> = instruction[3..].iter().copied().filter(|&word| word != variable).collect();
                 out.push((3 + kept.len() as u32) << 16 | Op::EntryPoint as u32);
                 out.extend(&instruction[1..3]);

@@ -1,4 +1,7 @@
-//! Buffers and images with their memory.
+//! Buffers and images with device memory, sub-allocated from large blocks.
+//!
+//! Read the Vulkan specification, chapters Resource Creation and Memory Allocation, and the documentation of the crate
+//! `gpu-allocator`, which does the sub-allocation. A staging buffer is a buffer with [`Place::Upload`].
 
 use std::sync::{Arc, Mutex};
 
@@ -9,31 +12,31 @@ use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 
 use super::device::{Device, lock};
 use super::error::TooLarge;
-use super::sync::State;
+use super::sync::ResourceState;
 
-/// Where a buffer lives.
+/// The kind of memory of a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// Fast for the device, invisible to the host.
+    /// Device-local memory, not mapped by the host.
     Device,
-    /// Written by the host, read by the device.
+    /// Host-visible memory that the host writes and the device reads: staging and upload buffers.
     Upload,
-    /// Written by the device, read by the host.
+    /// Host-visible memory that the device writes and the host reads.
     Readback,
 }
 
-/// A range of memory that shaders and copies use.
+/// A buffer with its memory.
 pub struct Buffer {
     pub(super) raw: vk::Buffer,
     pub(super) view: vk::BufferView,
     pub(super) id: u64,
-    pub(super) state: Mutex<State>,
+    pub(super) state: Mutex<ResourceState>,
     bytes: u64,
     allocation: Mutex<Option<Allocation>>,
     device: Arc<Device>,
 }
 
-/// Memory for a resource; `linear` for buffers.
+/// Sub-allocates memory for a resource; `linear` for buffers.
 fn allocate(
     device: &Device,
     name: &str,
@@ -55,16 +58,16 @@ fn allocate(
     Ok(allocation)
 }
 
-/// Asks Linux for pages of 2 MiB under the memory of a software device, from the start of the block that an allocation lies
-/// in to the allocation's own end: docs/decisions/large-pages.md.
+/// Requests huge pages of 2 MiB from Linux (`madvise`) for the memory of a software device, from the start of the
+/// allocation's block to the allocation's end: docs/decisions/large-pages.md.
 #[cfg(target_os = "linux")]
 fn prefer_large_pages(allocation: &Allocation) {
     let Some(start) = allocation.mapped_ptr() else { return };
     let page = rustix::param::page_size();
     let first = (start.as_ptr() as usize - allocation.offset() as usize) / page * page;
     let end = (start.as_ptr() as usize + allocation.size() as usize).next_multiple_of(page);
-    // SAFETY: advice changes nothing but how fast memory is: not what lies in it, nor in the rest of its first and last page,
-    // and it may outlive the block. A kernel that does not take it is none the worse.
+    // SAFETY: the advice changes only the speed of memory. Contents stay, also in the rest of the first and last page, and
+    // the advice may outlive the block. A kernel without huge pages ignores it.
     let _ = unsafe {
         rustix::mm::madvise(
             std::ptr::with_exposed_provenance_mut(first),
@@ -75,8 +78,8 @@ fn prefer_large_pages(allocation: &Allocation) {
 }
 
 impl Buffer {
-    /// A buffer of `bytes` bytes, usable for everything a shader or copy does. Of 0 bytes it is something to bind where
-    /// nothing is read, and is called [`NOTHING`].
+    /// A buffer of `bytes` bytes with every usage of a shader or copy. A buffer of 0 bytes is a dummy to bind where no shader
+    /// reads, and is named [`NOTHING`].
     ///
     /// # Errors
     /// When memory is short.
@@ -84,7 +87,7 @@ impl Buffer {
         Self::create(device, name, bytes, place, None)
     }
 
-    /// A buffer whose elements shaders also fetch as texels of `format`: `imageBuffer`.
+    /// A buffer that shaders also read as texels of `format` (`imageBuffer`).
     ///
     /// # Errors
     /// When it has more texels than the device allows, or memory is short.
@@ -92,7 +95,7 @@ impl Buffer {
         Self::create(device, name, bytes, place, Some(format))
     }
 
-    /// An upload buffer that holds `data`.
+    /// An upload buffer with the contents `data`.
     ///
     /// # Errors
     /// As [`Buffer::new`].
@@ -178,7 +181,7 @@ impl Buffer {
     /// Copies `data` to the start of an upload buffer.
     ///
     /// # Panics
-    /// When the buffer is not host-visible or too small: our mistake.
+    /// When the buffer is not host-visible or too small, a bug of the caller.
     pub fn write(&mut self, data: &[u8]) {
         self.write_at(0, data);
     }
@@ -193,10 +196,10 @@ impl Buffer {
         mapped[offset..offset + data.len()].copy_from_slice(data);
     }
 
-    /// Lets `read` see the bytes of a readback buffer, after the frame that wrote them has finished.
+    /// Calls `read` with the bytes of a readback buffer, after the frame that wrote them has finished.
     ///
     /// # Panics
-    /// When the buffer is not host-visible: our mistake.
+    /// When the buffer is not host-visible, a bug of the caller.
     pub fn read<R>(&self, read: impl FnOnce(&[u8]) -> R) -> R {
         let allocation = lock(&self.allocation);
         let mapped = allocation.as_ref().and_then(Allocation::mapped_slice).expect("a readback buffer is mapped");
@@ -219,7 +222,7 @@ impl Drop for Buffer {
     }
 }
 
-/// Size of the texels of a buffer.
+/// Bytes of a texel of a texel buffer.
 fn texel_bytes(format: vk::Format) -> u64 {
     match format {
         vk::Format::R32G32B32A32_SFLOAT | vk::Format::R32G32B32A32_UINT => 16,
@@ -228,7 +231,7 @@ fn texel_bytes(format: vk::Format) -> u64 {
     }
 }
 
-/// Shape of an image.
+/// Format, size and usage of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ImageDesc {
     /// Pixel format.
@@ -237,13 +240,13 @@ pub struct ImageDesc {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// Array layers; `array` decides whether one layer is viewed as an array.
+    /// Number of array layers; `array` decides whether a single layer is viewed as an array.
     pub layers: u32,
-    /// Mip levels.
+    /// Number of mip levels.
     pub levels: u32,
-    /// Viewed as `2DArray`.
+    /// Whether the view is a `2DArray`.
     pub array: bool,
-    /// Uses beyond copies.
+    /// Usage flags beyond copies.
     pub usage: vk::ImageUsageFlags,
 }
 
@@ -255,7 +258,7 @@ impl ImageDesc {
     }
 }
 
-/// What is bound where a shader's layout has a place and a plan has nothing to put there.
+/// Name of the dummy resources that are bound in slots for which a plan has no resource.
 pub const NOTHING: &str = "nothing";
 
 /// An image with a view of all of it.
@@ -263,7 +266,7 @@ pub struct Image {
     pub(super) raw: vk::Image,
     pub(super) view: vk::ImageView,
     pub(super) id: u64,
-    pub(super) state: Mutex<State>,
+    pub(super) state: Mutex<ResourceState>,
     desc: ImageDesc,
     allocation: Mutex<Option<Allocation>>,
     device: Arc<Device>,
@@ -327,7 +330,7 @@ impl Image {
         }
     }
 
-    /// One texel that is never read: [`NOTHING`].
+    /// A dummy image of one texel that no shader reads: [`NOTHING`].
     ///
     /// # Errors
     /// When memory is short.
@@ -335,7 +338,7 @@ impl Image {
         Self::new(device, NOTHING, ImageDesc::flat(format, 1, 1, usage))
     }
 
-    /// Its shape.
+    /// Format, size and usage of the image.
     #[must_use]
     pub fn desc(&self) -> ImageDesc {
         self.desc

@@ -1,33 +1,35 @@
-//! What devices have that Etalon can do without: looked for when one is opened.
+//! Optional features of devices, queried when a device is opened: Etalon works without them.
+//!
+//! Read the Vulkan specification, chapters Features and Limits, and docs/decisions/devices.md for the replacements.
 
 use ash::{khr, vk};
 
 use super::limits::{LEAST_TEXELS, PUSH_DESCRIPTORS};
 
-/// What a device offers beyond what every one must have.
+/// Optional features and limits of a device, beyond the required ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct Offers {
-    /// Fragments know the number of their triangle (feature geometryShader). Without, each triangle has vertices of its own, which
-    /// tell it.
+    /// Fragment shaders read `gl_PrimitiveID` (feature geometryShader). Without it each triangle has vertices of its own, and
+    /// the vertex index gives the triangle's number.
     pub primitive_ids: bool,
-    /// A draw has more than 2^24 vertices (feature fullDrawIndexUint32).
+    /// Vertex indices above 2^24 (feature fullDrawIndexUint32).
     pub large_indices: bool,
-    /// Descriptors can be pushed (VK_KHR_push_descriptor). Without, each pass has a set of its own.
+    /// Push descriptors (VK_KHR_push_descriptor). Without them each pass has a descriptor set of its own.
     pub push_descriptors: bool,
-    /// Tables are fetched as texels. Without, as storage buffers (`tables.rs`).
+    /// Lookup tables are storage texel buffers. Without it they are storage buffers (`tables.rs`).
     pub texel_buffers: bool,
-    /// Invocations of a compute shader add up numbers among them, a subgroup at a time.
+    /// Subgroup arithmetic in compute shaders (`subgroupAdd`).
     pub adds_in_subgroups: bool,
-    /// The driver tells what its compiler makes of pipelines (VK_KHR_pipeline_executable_properties).
+    /// The driver reports statistics of compiled pipelines (VK_KHR_pipeline_executable_properties).
     pub tells_compiled: bool,
-    /// f32 arithmetic keeps the sign of zero, infinities and NaN where a program asks for it.
+    /// f32 arithmetic preserves signed zeros, infinities and NaN for shaders that request it.
     pub keeps_specials: bool,
-    /// f32 arithmetic rounds to the nearest, to even where there are two, where a program asks for it.
+    /// f32 arithmetic rounds to nearest even for shaders that request it.
     pub rounds_to_even: bool,
 }
 
 impl Offers {
-    /// Of a device.
+    /// Queries the optional features of a device.
     pub(super) fn of(
         raw: &ash::Instance,
         physical: vk::PhysicalDevice,
@@ -48,13 +50,13 @@ impl Offers {
         if has_executables {
             features = features.push_next(&mut executables);
         }
-        // SAFETY: plain queries; the chains outlive the calls, and hold no struct of an extension that the device has not.
+        // SAFETY: plain queries; the chains outlive the calls, and hold no struct of an absent extension.
         unsafe {
             raw.get_physical_device_properties2(physical, &mut properties);
             raw.get_physical_device_features2(physical, &mut features);
         }
         let (core, features) = (properties.properties, features.features);
-        // Other drivers fetch from storage buffers as fast or faster, and hold more in one.
+        // Other drivers fetch from storage buffers as fast or faster, and their storage buffers hold more.
         let is_software = core.device_type == vk::PhysicalDeviceType::CPU;
         Self {
             primitive_ids: features.geometry_shader == vk::TRUE,

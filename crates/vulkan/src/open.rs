@@ -1,8 +1,10 @@
-//! Opening devices: one under validation at a time.
+//! Opening of logical devices, with at most one device per process under validation.
 //!
-//! The validation layer keeps its instances and devices in a table that every call reads without a lock and that making or
-//! destroying one of them changes (its issue 4391; seen with helgrind in 1.3.239). Two validated devices in two threads
-//! broke the heap in some runs of hundreds. So a process has one: whoever asks again gets the same.
+//! Read the Vulkan specification, chapter Devices and Queues, and the Khronos validation layer's documentation. The
+//! layer keeps its instances and devices in a table. Every call reads the table without a lock, and creation or
+//! destruction of a device changes it (issue 4391 of Vulkan-ValidationLayers; seen with helgrind in 1.3.239). Two
+//! validated devices in two threads corrupted the heap in some runs of hundreds. A process therefore has one validated
+//! device, and a second request gets the same one.
 
 use std::sync::{Arc, Condvar, Mutex, Weak};
 
@@ -12,18 +14,18 @@ use super::choice::DeviceChoice;
 use super::device::{Device, Instance, RightToValidate, lock};
 use super::error::NotOpened;
 
-struct Slot {
+struct ValidationSlot {
     wish: Wish,
-    /// Of nothing while the device is being made, and once its last owner is gone.
+    /// A dangling reference while the device is being created, and after its last owner has dropped it.
     device: Weak<Device>,
 }
 
-/// What was asked for.
+/// The kind of device that a caller requested.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Wish {
     Plain(DeviceChoice),
     TakingTurns(DeviceChoice),
-    /// It shows pictures in a window of its own.
+    /// A device that presents to a window of its own, with time-sliced submission.
     #[cfg(feature = "window")]
     Window(DeviceChoice),
 }
@@ -34,29 +36,29 @@ impl Wish {
     }
 }
 
-static SLOT: Mutex<Option<Slot>> = Mutex::new(None);
+static SLOT: Mutex<Option<ValidationSlot>> = Mutex::new(None);
 static FREED: Condvar = Condvar::new();
 
-/// The right to have the validated device; whoever drops it gives it back.
-struct Turn(());
+/// The right to own the validated device; dropping the lease returns it.
+struct ValidationLease(());
 
-impl Drop for Turn {
+impl Drop for ValidationLease {
     fn drop(&mut self) {
         *lock(&SLOT) = None;
         FREED.notify_all();
     }
 }
 
-/// The device that there is, or the right to make it.
+/// The existing validated device, or the right to create it.
 enum Validated {
     Shared(Arc<Device>),
-    Mine(Turn),
+    Mine(ValidationLease),
 }
 
-/// Waits for a device that is being made or destroyed.
+/// Waits while another thread creates or destroys the validated device.
 ///
 /// # Errors
-/// Where there is one of another kind.
+/// When the process has a validated device of another kind.
 fn take(wish: Wish) -> Result<Validated> {
     let mut slot = lock(&SLOT);
     loop {
@@ -73,11 +75,11 @@ fn take(wish: Wish) -> Result<Validated> {
             },
         }
     }
-    *slot = Some(Slot { wish, device: Weak::new() });
-    Ok(Validated::Mine(Turn(())))
+    *slot = Some(ValidationSlot { wish, device: Weak::new() });
+    Ok(Validated::Mine(ValidationLease(())))
 }
 
-/// Shares a device that was made by right of a [`Turn`].
+/// Publishes a device that was created under a [`ValidationLease`].
 pub(super) fn share(device: &Arc<Device>) {
     if let Some(slot) = &mut *lock(&SLOT) {
         slot.device = Arc::downgrade(device);
@@ -85,10 +87,10 @@ pub(super) fn share(device: &Arc<Device>) {
     FREED.notify_all();
 }
 
-/// The right to make the device of a window, which is not shared.
+/// The right to create the validated device of a window, which is not shared.
 ///
 /// # Errors
-/// Where there is another one.
+/// When the process has another validated device.
 #[cfg(feature = "window")]
 pub(super) fn for_a_window(choice: &DeviceChoice) -> Result<RightToValidate> {
     match take(Wish::Window(choice.clone()))? {
@@ -100,25 +102,25 @@ pub(super) fn for_a_window(choice: &DeviceChoice) -> Result<RightToValidate> {
 impl Device {
     /// Opens the chosen device; with `validate`, core and synchronization validation report into [`Device::messages`].
     ///
-    /// Renderers in several threads may share a device: their frames take turns. Without validation each may have a device of
-    /// its own. Under validation a process has one device at a time, as the layer breaks with two: a second call gives the same
-    /// device, with the messages of all who use it.
+    /// Renderers in several threads may share a device: the device draws one frame at a time. Without validation each
+    /// renderer may have a device of its own. Under validation a process has one device at a time, because the layer
+    /// breaks with two: a second call returns the same device, and its messages are those of all users.
     ///
     /// # Errors
-    /// [`NotOpened`], or what the driver answers.
+    /// [`NotOpened`], or the error of the driver.
     pub fn open(choice: &DeviceChoice, validate: bool) -> Result<Arc<Self>> {
         Self::open_alone(choice, validate.then(|| Wish::Plain(choice.clone())), false)
     }
 
-    /// The same, and what is submitted is cut into short pieces, as beside a window.
+    /// Opens a device as [`Device::open`] does, with time-sliced submission: every submission is short, as beside a window.
     ///
     /// # Errors
     /// As [`Device::open`].
-    pub fn open_taking_turns(choice: &DeviceChoice, validate: bool) -> Result<Arc<Self>> {
+    pub fn open_time_sliced(choice: &DeviceChoice, validate: bool) -> Result<Arc<Self>> {
         Self::open_alone(choice, validate.then(|| Wish::TakingTurns(choice.clone())), true)
     }
 
-    fn open_alone(choice: &DeviceChoice, validated: Option<Wish>, turns: bool) -> Result<Arc<Self>> {
+    fn open_alone(choice: &DeviceChoice, validated: Option<Wish>, time_slices: bool) -> Result<Arc<Self>> {
         let turn = match validated.map(take).transpose()? {
             Some(Validated::Shared(device)) => return Ok(device),
             Some(Validated::Mine(turn)) => Some(turn),
@@ -126,7 +128,7 @@ impl Device {
         };
         let is_validated = turn.is_some();
         let right = turn.map(|turn| Box::new(turn) as RightToValidate);
-        let device = Self::open_on(Instance::new(right, &[])?, choice, None, turns)?;
+        let device = Self::open_on(Instance::new(right, &[])?, choice, None, time_slices)?;
         if is_validated {
             share(&device);
         }

@@ -1,4 +1,4 @@
-//! The state of time slicing beside a window (`turns.rs`): milliseconds per workgroup of each dispatch, and requests to interrupt.
+//! State of time-sliced submission (`time_slices.rs`): milliseconds per workgroup of each dispatch, and requests to interrupt.
 
 use std::collections::HashMap;
 use std::sync::Mutex;
@@ -6,21 +6,21 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use anyhow::Result;
 
-/// A device's part of it.
+/// A device's state of time-sliced submission.
 #[derive(Debug)]
-pub(super) struct Turns {
-    /// A window shares the queue: nothing that is submitted takes long.
+pub(super) struct SliceTimes {
+    /// Whether submission is time-sliced: a window shares the queue, so every submission is short.
     pub(super) taken: bool,
-    /// Milliseconds of a group of invocations in the last dispatch of each name, where turns are taken.
+    /// Milliseconds per workgroup in the last dispatch of each pass name, under time-sliced submission.
     pub(super) paces: Mutex<HashMap<String, f64>>,
-    /// Dispatches that were drawn in more than one piece.
+    /// Number of dispatches that were split into more than one piece.
     pub(super) cut: AtomicU64,
-    /// Somebody wants what is drawn to be given up, and whoever draws it agrees.
+    /// A caller has requested that the frame be abandoned; it takes effect while `interruptible` is set, too.
     pub(super) interrupted: AtomicBool,
     pub(super) interruptible: AtomicBool,
 }
 
-impl Turns {
+impl SliceTimes {
     pub(super) fn new(taken: bool) -> Self {
         Self {
             taken,
@@ -37,7 +37,7 @@ impl Turns {
     }
 }
 
-/// Why a frame was not drawn to its end: somebody wants another.
+/// The error of a frame that was abandoned because another frame was requested.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the frame was given up for another")]
 pub struct Interrupted;

@@ -1,4 +1,7 @@
-//! Pipelines, layouts and samplers, made once per distinct description.
+//! Pipelines, pipeline layouts and samplers, created once per distinct description.
+//!
+//! Read the Vulkan specification, chapters Pipelines, Resource Descriptors and Samplers. New pipelines are created on
+//! another thread while the frame is recorded.
 
 use std::collections::HashMap;
 use std::sync::OnceLock;
@@ -16,12 +19,12 @@ use super::shader::{Binding, Program, Replacement, SetLayout};
 use super::specialize::specialized;
 use super::tables::with_tables_in_storage;
 
-/// Pipelines, some of which are still being made.
+/// The pipelines of a frame, some of which another thread is still creating.
 pub(super) struct Pipelines<'k> {
     slots: HashMap<&'k PipelineKey, OnceLock<Result<vk::Pipeline, vk::Result>>>,
 }
 
-/// Whoever waits for a pipeline gets an answer, also where the thread that makes it panics.
+/// On drop, completes every pending pipeline with an error: waiting threads return even when the creating thread panics.
 struct Settled<'p, 'k>(&'p Pipelines<'k>);
 
 impl Drop for Settled<'_, '_> {
@@ -33,15 +36,15 @@ impl Drop for Settled<'_, '_> {
 }
 
 impl Pipelines<'_> {
-    /// Whether all of `keys` are there.
+    /// Whether the pipelines of all `keys` exist or have failed.
     pub(super) fn ready(&self, keys: &[PipelineKey]) -> bool {
         keys.iter().all(|key| self.slots[key].get().is_some())
     }
 
-    /// The pipelines of `keys`, as soon as they are there.
+    /// The pipelines of `keys`; waits until they exist.
     ///
     /// # Errors
-    /// When the driver refuses one.
+    /// When the driver refuses a pipeline.
     pub(super) fn wait_for(&self, keys: &[PipelineKey]) -> Result<Vec<vk::Pipeline>> {
         let one = |key: &PipelineKey| {
             self.slots[key].wait().with_context(|| format!("creating pipeline \"{}\"", key.program.name))
@@ -51,13 +54,13 @@ impl Pipelines<'_> {
 }
 
 impl Device {
-    /// Milliseconds that making pipelines has taken.
+    /// Milliseconds spent in the creation of pipelines so far.
     #[must_use]
     pub fn pipelines_ms(&self) -> f64 {
         lock(&self.caches).making_ms
     }
 
-    /// Every pipeline made so far: programs with their specialization constants, in no order.
+    /// Every pipeline created so far: program and specialization constants, in no order.
     #[must_use]
     pub fn pipelines(&self) -> Vec<(&'static Program, Vec<(u32, u32)>)> {
         lock(&self.caches).pipelines.keys().map(|key| (key.program, key.constants.clone())).collect()
@@ -83,7 +86,7 @@ impl Device {
         Ok(sampler)
     }
 
-    /// The layout of an ordinary descriptor set.
+    /// The layout of a shared descriptor set (set 1 or 2).
     pub(super) fn set_layout(&self, layout: &'static SetLayout) -> Result<vk::DescriptorSetLayout> {
         let mut caches = lock(&self.caches);
         if let Some(&known) = caches.set_layouts.get(layout.name) {
@@ -126,12 +129,13 @@ impl Device {
         Ok(layout)
     }
 
-    /// Runs `meanwhile` while the pipelines of `keys` that do not exist yet are made on another thread, in their order.
+    /// Runs `meanwhile` while another thread creates those pipelines of `keys` that do not exist yet, in the order of `keys`.
     ///
-    /// One thread, not several, and under validation none beside this one: docs/decisions/specialization.md.
+    /// One thread creates pipelines, not several, and under validation none beside the calling thread
+    /// (docs/decisions/specialization.md).
     ///
     /// # Errors
-    /// Those of `meanwhile`, which is told of those of the driver when it asks for a pipeline.
+    /// Errors of `meanwhile`; it sees errors of pipeline creation when it waits for that pipeline.
     pub(super) fn with_pipelines<T>(
         &self,
         keys: &[&PipelineKey],
@@ -178,7 +182,7 @@ impl Device {
         result
     }
 
-    /// Takes other code for some stages, and what was built for all others. No frame may be under way.
+    /// Replaces the SPIR-V of the given stages and restores the built code of all others. No frame may be in flight.
     pub fn replace(&self, replacements: &[Replacement]) {
         let mut caches = lock(&self.caches);
         let code: HashMap<(&'static str, usize), Vec<u32>> =
@@ -206,10 +210,10 @@ impl Device {
         pipeline
     }
 
-    /// Shows SPIR-V to the validation layer, for tests of what it says.
+    /// Passes SPIR-V to the validation layer, for tests of its messages.
     ///
     /// # Errors
-    /// When the driver refuses it.
+    /// When the driver refuses the module.
     ///
     /// # Panics
     /// Without validation.
@@ -217,7 +221,7 @@ impl Device {
     pub fn try_module(&self, words: &[u32]) -> Result<()> {
         assert!(self.validates(), "a driver trusts what it is given");
         let info = vk::ShaderModuleCreateInfo::default().code(words);
-        // SAFETY: the layer refuses what is not valid before the driver sees it; nobody else has the module.
+        // SAFETY: the layer refuses invalid code before the driver sees it; nobody else has the module.
         unsafe {
             let module = self.raw.create_shader_module(&info, None).context("creating a shader module")?;
             self.raw.destroy_shader_module(module, None);
@@ -238,14 +242,14 @@ impl Device {
 
     fn build(&self, key: &PipelineKey, modules: &mut Vec<vk::ShaderModule>) -> Result<vk::Pipeline, vk::Result> {
         let program = key.program;
-        // Made when the pass was described.
+        // The layout was created when the pass was described.
         let layout = lock(&self.caches).layouts[program.name].pipeline;
         let mut stages = Vec::new();
         for (index, stage) in program.stages.iter().enumerate() {
             let replaced = lock(&self.caches).replaced.get(&(program.name, index)).cloned();
             let words = specialized(replaced.as_deref().unwrap_or(stage.words), &key.constants);
             let mut words = with_loops_counted(&words, self.limits_loops());
-            // lavapipe keeps them unasked: the tests of bits and of NaN hold there. What it would cost to ask was not measured.
+            // lavapipe keeps them without a request (tests of bits and of NaN hold there); the cost of a request was not measured.
             if !self.is_lavapipe() {
                 words = with_float_controls(&words, self.offers());
             }
@@ -263,7 +267,7 @@ impl Device {
         }
         let Some(raster) = &key.raster else {
             let mut flags = self.capture();
-            if self.turns.taken {
+            if self.time_slices.taken {
                 flags |= vk::PipelineCreateFlags::DISPATCH_BASE;
             }
             let info = vk::ComputePipelineCreateInfo::default().flags(flags).stage(stages[0]).layout(layout);
@@ -306,7 +310,7 @@ impl Device {
         let raster_state = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
         let multisample =
             vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
-        // Reversed depth: nearer is greater. Equal passes, so that the later of two coplanar draws wins on every machine.
+        // Reversed depth: nearer is greater. Equal depth passes, so the later of two coplanar draws wins on every device.
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
             .depth_test_enable(raster.depth.is_some())
             .depth_write_enable(raster.depth.is_some_and(|(_, write)| write))

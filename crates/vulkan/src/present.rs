@@ -1,7 +1,9 @@
-//! Pictures in a window: a swapchain whose ends are states and not errors, and egui over it.
+//! Presentation of pictures in a window: a swapchain, a blit per picture, and the egui user interface over them.
 //!
-//! A picture comes from the host and is blitted to its place, so that its bytes are those of the display output: the swapchain
-//! holds encoded bytes (UNORM) that nothing encodes again. One frame is in flight.
+//! Read the Vulkan specification, chapter Window System Integration (`vkAcquireNextImageKHR`, `vkQueuePresentKHR`). A
+//! swapchain that is out of date or lost is a state, not an error. A picture comes from the host through a staging buffer
+//! and is blitted, so that the window shows the bytes of the display output: the swapchain has a UNORM format, which does
+//! not encode the sRGB bytes again. One frame is in flight.
 
 use std::sync::Arc;
 
@@ -19,51 +21,51 @@ use super::recording::begin;
 use super::surface::Surface;
 use super::window::{Windowed, extensions};
 
-/// A picture with its place in the window.
+/// A picture with its rectangle in the window.
 #[derive(Debug, Clone, Copy)]
-pub struct Placed<'a> {
+pub struct PlacedPicture<'a> {
     /// RGBA8, sRGB-encoded, rows from the top.
     pub rgba: &'a [u8],
-    /// Pixels across and down.
+    /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Another number: another picture.
+    /// Version of the contents; a new number causes an upload.
     pub version: u64,
-    /// Left, top, right, bottom in pixels of the window; where it is of another size, pixels are mixed.
+    /// Left, top, right, bottom in pixels of the window; a rectangle of another size than the picture is filtered linearly.
     pub place: [i32; 4],
-    /// Columns of the window in which it is seen: from, up to.
+    /// Columns of the window that show the picture: first, and one past the last.
     pub columns: [i32; 2],
 }
 
-/// A picture on the device.
-struct Slot {
+/// A picture's image on the device with its staging buffer.
+struct SwapchainSlot {
     image: Image,
     staging: Buffer,
     version: u64,
-    /// It lies in `staging` alone.
+    /// Whether the contents are in `staging` only, not yet in `image`.
     fresh: bool,
 }
 
-/// What egui wants to be seen.
+/// The egui output of a frame.
 pub struct Overlay {
-    /// Textures that changed.
+    /// Textures that were created, changed or freed.
     pub textures: egui::TexturesDelta,
-    /// Triangles.
+    /// Triangle meshes with clip rectangles.
     pub primitives: Vec<egui::ClippedPrimitive>,
-    /// Pixels of a point.
+    /// Pixels of the window per egui point.
     pub pixels_per_point: f32,
 }
 
-/// How long a window may take to give a picture: as long as a user may wait for what else it does.
+/// Time limit for `vkAcquireNextImageKHR` in nanoseconds: longer would block the user interface noticeably.
 const ACQUIRE_NS: u64 = 100_000_000;
 
-/// What became of a picture.
+/// The result of a presentation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Presented {
-    /// It is seen.
+    /// The picture was queued for presentation.
     Shown,
-    /// The window has no area: minimised.
+    /// The window has no area, because it is minimised.
     Hidden,
-    /// The window changed meanwhile, or gave no picture: once more.
+    /// The swapchain is out of date or gave no image in time; the caller retries.
     Changed,
 }
 
@@ -71,12 +73,12 @@ struct Swapchain {
     raw: vk::SwapchainKHR,
     images: Vec<vk::Image>,
     views: Vec<vk::ImageView>,
-    /// Signalled when the image may be shown.
+    /// Semaphores that are signalled when the image may be presented, one per image.
     done: Vec<vk::Semaphore>,
     extent: [u32; 2],
 }
 
-/// A window that pictures are shown in.
+/// A window with its surface, swapchain and user interface.
 pub struct Presenter {
     device: Arc<Device>,
     window: Arc<dyn Windowed>,
@@ -89,16 +91,16 @@ pub struct Presenter {
     acquired: vk::Semaphore,
     finished: vk::Fence,
     commands: Option<vk::CommandBuffer>,
-    slots: Vec<Slot>,
+    slots: Vec<SwapchainSlot>,
     overlay: Option<Renderer<DefaultAllocator>>,
     freed: Vec<egui::TextureId>,
 }
 
 impl Presenter {
-    /// Opens a device that shows pictures in the window.
+    /// Opens a device that can present to the window.
     ///
     /// # Errors
-    /// One sentence when there is no loader, no device that can, or the window has no surface.
+    /// When there is no loader, no device that can present, or the window has no surface.
     pub fn open(window: Arc<dyn Windowed>, choice: &DeviceChoice, validate: bool) -> Result<(Arc<Device>, Self)> {
         let turn = validate.then(|| open::for_a_window(choice)).transpose()?;
         let instance = Instance::new(turn, extensions(&*window)?)?;
@@ -164,16 +166,21 @@ impl Presenter {
         Ok((device, presenter))
     }
 
-    /// The next picture has another size.
+    /// Marks the swapchain as out of date, because the window has changed its size.
     pub fn resized(&mut self) {
         self.stale = true;
     }
 
-    /// Shows pictures with panels over them in a window of `size` pixels.
+    /// Presents pictures with the user interface over them in a window of `size` pixels.
     ///
     /// # Errors
-    /// When the device is lost or memory is short. A surface that is lost or out of date is made anew.
-    pub fn present(&mut self, size: [u32; 2], pictures: &[Placed<'_>], mut overlay: Overlay) -> Result<Presented> {
+    /// When the device is lost or memory is short. A surface that is lost or out of date is created again.
+    pub fn present(
+        &mut self,
+        size: [u32; 2],
+        pictures: &[PlacedPicture<'_>],
+        mut overlay: Overlay,
+    ) -> Result<Presented> {
         let applied = self.wait().and_then(|()| self.apply(&overlay));
         overlay.textures.clear();
         applied?;
@@ -182,11 +189,11 @@ impl Presenter {
             self.upload(index, picture)?;
         }
         if (self.stale || self.swapchain.is_none()) && !self.recreate(size)? {
-            // A surface that was renewed meanwhile has an area all the same.
+            // A surface that was created again in the meantime may still have an area.
             return Ok(if size.contains(&0) { Presented::Hidden } else { Presented::Changed });
         }
         let Some(swapchain) = &self.swapchain else { return Ok(Presented::Hidden) };
-        // SAFETY: the semaphore is not in use: the frame before has finished.
+        // SAFETY: the semaphore is not in use: the previous frame has finished.
         let acquired =
             unsafe { self.calls.acquire_next_image(swapchain.raw, ACQUIRE_NS, self.acquired, vk::Fence::null()) };
         let index = match acquired {
@@ -194,7 +201,7 @@ impl Presenter {
                 self.stale |= suboptimal;
                 index as usize
             }
-            // A window that is covered or on another desktop may get no picture for as long as it is.
+            // A covered window, or one on another desktop, may get no image while it is hidden.
             Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(Presented::Changed),
             Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => {
                 self.stale = true;
@@ -213,7 +220,7 @@ impl Presenter {
         let info =
             vk::PresentInfoKHR::default().swapchains(&swapchains).image_indices(&indices).wait_semaphores(&waits);
         let queue = lock(&self.device.queue);
-        // SAFETY: the image was acquired, and is drawn when its semaphore is signalled.
+        // SAFETY: the image was acquired, and its semaphore is signalled when the image is drawn.
         let shown = unsafe { self.calls.queue_present(*queue, &info) };
         drop(queue);
         match shown {
@@ -225,9 +232,9 @@ impl Presenter {
         Ok(Presented::Shown)
     }
 
-    /// Until the frame before has finished; frees what it used.
+    /// Waits until the previous frame has finished, and frees its command buffer and textures.
     fn wait(&mut self) -> Result<()> {
-        // SAFETY: the fence is signalled by the last submission, or was made so.
+        // SAFETY: the fence is signalled by the last submission, or was created signalled.
         unsafe {
             self.device.raw.wait_for_fences(&[self.finished], true, u64::MAX).context("waiting for the window")?;
             if let Some(commands) = self.commands.take() {
@@ -244,7 +251,7 @@ impl Presenter {
 
     fn apply(&mut self, overlay: &Overlay) -> Result<()> {
         let Some(renderer) = &mut self.overlay else { return Ok(()) };
-        // It submits and waits itself.
+        // `set_texture` submits and waits by itself.
         let queue = lock(&self.device.queue);
         for (id, deltas) in &overlay.textures.set {
             for delta in deltas {
@@ -255,13 +262,13 @@ impl Presenter {
         Ok(())
     }
 
-    fn upload(&mut self, index: usize, placed: &Placed<'_>) -> Result<()> {
-        let fits = |slot: &Slot| {
+    fn upload(&mut self, index: usize, placed: &PlacedPicture<'_>) -> Result<()> {
+        let fits = |slot: &SwapchainSlot| {
             let desc = slot.image.desc();
             [desc.width, desc.height] == placed.size
         };
         if !self.slots.get(index).is_some_and(fits) {
-            // Every image has a view, and a view is for some shader.
+            // Every image has a view, and a view needs a usage of shaders.
             let usage =
                 vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
             let [width, height] = placed.size;
@@ -270,7 +277,7 @@ impl Presenter {
             let bytes = 4 * u64::from(width) * u64::from(height);
             let staging = Buffer::new(&self.device, "picture for the window", bytes, Place::Upload)?;
             self.slots.truncate(index);
-            self.slots.push(Slot { image, staging, version: u64::MAX, fresh: false });
+            self.slots.push(SwapchainSlot { image, staging, version: u64::MAX, fresh: false });
         }
         let slot = &mut self.slots[index];
         if slot.version != placed.version {
@@ -282,7 +289,7 @@ impl Presenter {
         Ok(())
     }
 
-    /// Makes the swapchain anew; false where the window has no area.
+    /// Creates the swapchain again; false when the window has no area.
     fn recreate(&mut self, size: [u32; 2]) -> Result<bool> {
         let making = || format!("making a swapchain of {}x{}", size[0], size[1]);
         // SAFETY: a plain query.
@@ -300,7 +307,7 @@ impl Presenter {
             }
             other => other.with_context(making)?,
         };
-        // The window's own size, unless it leaves it to us.
+        // The window's current extent, unless the surface leaves the extent to the application.
         let extent = match caps.current_extent.width {
             u32::MAX => [
                 size[0].clamp(caps.min_image_extent.width, caps.max_image_extent.width.max(1)),
@@ -333,7 +340,7 @@ impl Presenter {
             .image_sharing_mode(vk::SharingMode::EXCLUSIVE)
             .pre_transform(caps.current_transform)
             .composite_alpha(alpha)
-            // Every driver has it, and it does not tear.
+            // FIFO is mandatory in every driver and does not tear.
             .present_mode(vk::PresentModeKHR::FIFO)
             .clipped(true)
             .old_swapchain(old.as_ref().map_or(vk::SwapchainKHR::null(), |old| old.raw));
@@ -374,7 +381,7 @@ impl Presenter {
         Ok(true)
     }
 
-    /// A surface that was lost takes its swapchain with it; the window gives another.
+    /// Creates the surface again after its loss, which also invalidates its swapchain.
     fn renew_surface(&mut self) -> Result<()> {
         if let Some(old) = self.swapchain.take() {
             let queue = lock(&self.device.queue);
@@ -392,7 +399,7 @@ impl Presenter {
     }
 
     unsafe fn destroy_swapchain(&self, swapchain: &Swapchain) {
-        // SAFETY: the caller knows that nothing of it is in use.
+        // SAFETY: the caller guarantees that nothing of the swapchain is in use.
         unsafe {
             swapchain.views.iter().for_each(|view| self.device.raw.destroy_image_view(*view, None));
             swapchain.done.iter().for_each(|semaphore| self.device.raw.destroy_semaphore(*semaphore, None));
@@ -400,8 +407,8 @@ impl Presenter {
         }
     }
 
-    /// The commands of a frame: background, picture, panels.
-    fn record(&mut self, index: usize, pictures: &[Placed<'_>], overlay: &Overlay) -> Result<vk::CommandBuffer> {
+    /// Records the commands of a frame: background, pictures, user interface.
+    fn record(&mut self, index: usize, pictures: &[PlacedPicture<'_>], overlay: &Overlay) -> Result<vk::CommandBuffer> {
         let swapchain = self.swapchain.as_ref().context("there is no swapchain: our mistake")?;
         let (image, view, [width, height]) = (swapchain.images[index], swapchain.views[index], swapchain.extent);
         let raw = &self.device.raw;
@@ -425,7 +432,7 @@ impl Presenter {
                     raw.cmd_copy_buffer_to_image(commands, slot.staging.raw, slot.image.raw, to, &[region]);
                     change(raw, commands, slot.image.raw, to, Access::TransferSrc);
                 }
-                // What was written before the blit, the clear or another picture, are the same texels.
+                // The clear and earlier blits write the same texels, so the blit waits for them.
                 change(raw, commands, image, to, Access::TransferDst);
                 if let Some([from, to]) = clipped(placed, [width, height]) {
                     let corner = |[x, y]: [i32; 2], z| vk::Offset3D { x, y, z };
@@ -489,7 +496,7 @@ impl Presenter {
             .command_buffer_infos(&buffers)
             .signal_semaphore_infos(&signals);
         let queue = lock(&self.device.queue);
-        // SAFETY: the fence is not in use, the command buffer is recorded, and what it uses lives until the fence is signalled.
+        // SAFETY: the fence is not in use, the command buffer is recorded, and its resources live until the fence is signalled.
         unsafe {
             self.device.raw.reset_fences(&[self.finished]).context("showing a picture")?;
             self.device.raw.queue_submit2(*queue, &[info], self.finished).context("showing a picture")
@@ -530,7 +537,7 @@ const LAYER: vk::ImageSubresourceLayers = vk::ImageSubresourceLayers {
     layer_count: 1,
 };
 
-/// Brings an image from a layout to what an access takes, after all that was done to it before.
+/// Records an image layout transition for an access, after all earlier commands.
 unsafe fn change(
     raw: &ash::Device,
     commands: vk::CommandBuffer,
@@ -552,8 +559,8 @@ unsafe fn change(
     unsafe { raw.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().image_memory_barriers(&[barrier])) };
 }
 
-/// Corners in the picture and in the window of what is seen of a picture; `None` where that is nothing.
-fn clipped(placed: &Placed<'_>, window: [u32; 2]) -> Option<[[[i32; 2]; 2]; 2]> {
+/// Corners of the visible part of a picture, in the picture's and in the window's pixels; `None` when nothing is visible.
+fn clipped(placed: &PlacedPicture<'_>, window: [u32; 2]) -> Option<[[[i32; 2]; 2]; 2]> {
     let [left, top, right, bottom] = placed.place;
     let (low, high) = ([left, top], [right, bottom]);
     let [first_column, end_column] = placed.columns;
@@ -585,12 +592,12 @@ mod tests {
 
     #[test]
     fn what_is_outside_of_the_window_is_not_copied() {
-        let placed = |place| Placed { rgba: &[], size: [100, 50], version: 0, place, columns: [0, i32::MAX] };
+        let placed = |place| PlacedPicture { rgba: &[], size: [100, 50], version: 0, place, columns: [0, i32::MAX] };
         assert_eq!(clipped(&placed([10, 20, 110, 70]), [640, 480]), Some([[[0, 0], [100, 50]], [[10, 20], [110, 70]]]));
         assert_eq!(clipped(&placed([-30, 0, 70, 50]), [60, 480]), Some([[[30, 0], [90, 50]], [[0, 0], [60, 50]]]));
         assert_eq!(clipped(&placed([0, 0, 200, 100]), [100, 100]), Some([[[0, 0], [50, 50]], [[0, 0], [100, 100]]]));
         assert_eq!(clipped(&placed([700, 0, 800, 50]), [640, 480]), None);
-        let part = |columns| Placed { columns, ..placed([10, 20, 110, 70]) };
+        let part = |columns| PlacedPicture { columns, ..placed([10, 20, 110, 70]) };
         assert_eq!(clipped(&part([0, 40]), [640, 480]), Some([[[0, 0], [30, 50]], [[10, 20], [40, 70]]]));
         assert_eq!(clipped(&part([40, 640]), [640, 480]), Some([[[30, 0], [100, 50]], [[40, 20], [110, 70]]]));
         assert_eq!(clipped(&part([0, 10]), [640, 480]), None);

@@ -1,4 +1,6 @@
-//! Fragments without the number of their triangle, for devices that do not tell it (MoltenVK, SwiftShader: no feature geometryShader).
+//! Removal of `gl_PrimitiveID` from SPIR-V, for devices without the feature geometryShader (MoltenVK, SwiftShader).
+//!
+//! Read the SPIR-V specification, section BuiltIn (`PrimitiveId` in fragment shaders needs the capability `Geometry`).
 
 use std::ops::Range;
 
@@ -6,7 +8,7 @@ use spirv::{BuiltIn, Capability, Decoration, Op};
 
 use super::specialize::{BOUND, HEADER, instructions, op};
 
-/// `words` with 0 for `gl_PrimitiveID` in a fragment shader, and without asking for the feature.
+/// `words` with 0 for `gl_PrimitiveID` in a fragment shader, and without the capability `Geometry`.
 #[must_use]
 pub fn without_primitive_ids(words: &[u32]) -> Vec<u32> {
     let places = instructions(words, HEADER);

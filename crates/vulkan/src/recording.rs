@@ -1,4 +1,7 @@
-//! Passes as they are handed to the device, and their recording into one command buffer: barriers, labels, timestamps around each.
+//! Recording of passes into command buffers: pipeline barriers, debug labels, and a timestamp pair around each pass.
+//!
+//! Read the Vulkan specification, chapters Command Buffers, Synchronization and Cache Control (Timeline Semaphores), Queries
+//! (Timestamp Queries) and Resource Descriptors (Push Descriptor Updates). One timeline semaphore counts submissions.
 
 use std::cell::Cell;
 use std::collections::HashMap;
@@ -21,28 +24,28 @@ pub(super) type Record<'a> = Box<dyn FnOnce(&Device, vk::CommandBuffer, &[vk::Pi
 pub(super) struct Pass<'a> {
     pub(super) name: String,
     pub(super) uses: Vec<Use>,
-    /// Handed to `work` in this order.
+    /// Pipelines of the pass, passed to `work` in this order.
     pub(super) pipelines: Vec<PipelineKey>,
-    pub(super) work: Work<'a>,
+    pub(super) work: RecordedWork<'a>,
 }
 
-/// What a pass does.
-pub(super) enum Work<'a> {
-    /// A dispatch, which may be cut into pieces.
+/// The commands of a pass.
+pub(super) enum RecordedWork<'a> {
+    /// A dispatch, which time-sliced submission may split.
     Dispatch(Dispatch<'a>),
-    /// Anything else.
+    /// Any other commands.
     Record(Record<'a>),
 }
 
-/// What a program has bound for itself, in set 0.
+/// The descriptors of set 0, which belong to one use of a program.
 pub(super) enum Own {
-    /// Pushed with each use.
+    /// Push descriptors.
     Pushed(Vec<Descriptor>),
-    /// Written to a set that the frame keeps.
+    /// A descriptor set that the frame owns.
     Set(vk::DescriptorSet),
 }
 
-/// One dispatch.
+/// One dispatch with its descriptors, push constants and workgroup count.
 pub(super) struct Dispatch<'a> {
     pub(super) program: &'static Program,
     pub(super) own: Own,
@@ -53,7 +56,7 @@ pub(super) struct Dispatch<'a> {
 }
 
 impl Dispatch<'_> {
-    /// Records it, or a piece of it.
+    /// Records the dispatch, or a piece of it.
     ///
     /// # Safety
     /// The command buffer is recording, and handles are alive until the frame has finished.
@@ -62,17 +65,17 @@ impl Dispatch<'_> {
         device: &Device,
         commands: vk::CommandBuffer,
         pipeline: vk::Pipeline,
-        piece: Option<Piece>,
+        piece: Option<DispatchPiece>,
     ) {
         let Self { program, own, sets, layout, push, groups } = self;
-        // SAFETY: as the caller says.
+        // SAFETY: the caller guarantees both conditions.
         unsafe {
             device.raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline);
             bind_own(device, commands, vk::PipelineBindPoint::COMPUTE, *layout, program, own);
             bind_sets(device, commands, vk::PipelineBindPoint::COMPUTE, *layout, sets);
             push_constants(device, commands, *layout, program, push);
             match (piece, groups) {
-                (Some(Piece { base: [x, y, z], count: [across, down, deep] }), _) => {
+                (Some(DispatchPiece { base: [x, y, z], count: [across, down, deep] }), _) => {
                     device.raw.cmd_dispatch_base(commands, x, y, z, across, down, deep);
                 }
                 (None, Groups::Count([x, y, z])) => device.raw.cmd_dispatch(commands, *x, *y, *z),
@@ -82,42 +85,42 @@ impl Dispatch<'_> {
     }
 }
 
-/// How many workgroups a dispatch has.
+/// Number of workgroups: given by the host, or read by an indirect dispatch at an offset in bytes.
 #[derive(Clone, Copy)]
 pub(super) enum Groups<'a> {
     Count([u32; 3]),
     At(&'a Buffer, u64),
 }
 
-/// A barrier's target.
+/// The resource of a barrier.
 #[derive(Clone, Copy)]
 pub(super) enum Target<'a> {
     Buffer(&'a Buffer),
     Image(&'a Image),
 }
 
-/// Groups of a dispatch from `base` on, as many as `count` says along each axis.
+/// A box of workgroups of a dispatch: from `base` on, `count` along each axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Piece {
+pub(super) struct DispatchPiece {
     pub(super) base: [u32; 3],
     pub(super) count: [u32; 3],
 }
 
-/// What passes are recorded with.
+/// The state shared by all passes of a frame while they are recorded.
 pub(super) struct Recording<'f> {
     pub(super) device: &'f Arc<Device>,
     pub(super) from: vk::CommandPool,
     pub(super) targets: &'f HashMap<ResourceId, Target<'f>>,
     pub(super) pipelines: &'f Pipelines<'f>,
-    /// Null where the device takes no times.
+    /// Null when the device has no timestamps.
     pub(super) queries: vk::QueryPool,
     pub(super) without_barriers: bool,
-    /// Passes whose barriers are recorded, where they are drawn by turns.
+    /// Number of passes whose barriers have been recorded, under time-sliced submission.
     pub(super) begun: &'f Cell<usize>,
 }
 
 impl Recording<'_> {
-    /// Records passes into one command buffer, or into more where pipelines are still being made; the milliseconds of each.
+    /// Records passes into one command buffer, or several while pipelines are still being created; milliseconds of each pass.
     ///
     /// # Safety
     /// Every handle of the passes is alive, and nothing else is recorded with the pool.
@@ -126,7 +129,7 @@ impl Recording<'_> {
         let (raw, timed) = (&device.raw, queries != vk::QueryPool::null());
         let mut ticks = vec![0_u64; 2 * passes.len()];
         let names: Vec<String> = passes.iter().map(|pass| pass.name.clone()).collect();
-        // SAFETY: as the caller says.
+        // SAFETY: the caller guarantees both conditions.
         unsafe {
             let mut used = vec![begin(device, from)?];
             if timed {
@@ -134,7 +137,7 @@ impl Recording<'_> {
             }
             let record_all = || {
                 for (index, (pass, barriers)) in passes.into_iter().zip(barriers).enumerate() {
-                    // Validation sees hazards within a command buffer alone: it gets all passes in one.
+                    // Validation finds hazards only within one command buffer, so under validation all passes share one.
                     if index > 0 && !device.validates() && !pipelines.ready(&pass.pipelines) {
                         submit(device, used[used.len() - 1])?;
                         used.push(begin(device, from)?);
@@ -147,8 +150,8 @@ impl Recording<'_> {
                         write_first_timestamp(device, commands, queries, 2 * index as u32);
                     }
                     match pass.work {
-                        Work::Record(record) => record(device, commands, &made),
-                        Work::Dispatch(work) => work.record(device, commands, made[0], None),
+                        RecordedWork::Record(record) => record(device, commands, &made),
+                        RecordedWork::Dispatch(work) => work.record(device, commands, made[0], None),
                     }
                     if timed {
                         raw.cmd_write_timestamp2(commands, ALL, queries, 2 * index as u32 + 1);
@@ -158,7 +161,7 @@ impl Recording<'_> {
                 submit(device, used[used.len() - 1])
             };
             let recorded = record_all();
-            // What has been submitted is waited for also where the rest could not be.
+            // Submitted work is waited for even when the rest could not be submitted.
             let waited = wait(device).with_context(|| format!("waiting for a frame of passes {}", names.join(", ")));
             let outcome = recorded.and(waited).and_then(|()| {
                 let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
@@ -175,15 +178,15 @@ impl Recording<'_> {
     }
 }
 
-/// Takes the time before a pass.
+/// Writes the timestamp before a pass.
 pub(super) unsafe fn write_first_timestamp(
     device: &Device,
     commands: vk::CommandBuffer,
     queries: vk::QueryPool,
     index: u32,
 ) {
-    // lavapipe takes a timestamp only when it next flushes, which would be after a dispatch that it runs at once (measured:
-    // 0.05 ms for a tone map of 7.5 ms). A barrier flushes; one between no stages is no dependency, so it hides no hazard from
+    // lavapipe takes a timestamp only at its next flush, which would be after a dispatch that runs at once (measured: 0.05 ms
+    // for a tone map of 7.5 ms). A barrier flushes. A barrier between no stages is no dependency: it hides no hazard from
     // validation and costs nothing on a GPU.
     let nothing = [vk::MemoryBarrier2::default()];
     // SAFETY: the command buffer is recording; the pool has the query.
@@ -195,7 +198,7 @@ pub(super) unsafe fn write_first_timestamp(
 
 pub(super) const ALL: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::ALL_COMMANDS;
 
-/// A command buffer that is being recorded.
+/// Allocates a command buffer and begins its recording.
 pub(super) unsafe fn begin(device: &Device, pool: vk::CommandPool) -> Result<vk::CommandBuffer> {
     let info = vk::CommandBufferAllocateInfo::default()
         .command_pool(pool)
@@ -210,14 +213,14 @@ pub(super) unsafe fn begin(device: &Device, pool: vk::CommandPool) -> Result<vk:
     }
 }
 
-/// Ends a command buffer and hands it to the device; the timeline counts when it is done.
+/// Ends and submits a command buffer; the timeline semaphore reaches `submitted` when it has executed.
 pub(super) unsafe fn submit(device: &Device, commands: vk::CommandBuffer) -> Result<()> {
     let queue = lock(&device.queue);
     let done = device.submitted.load(Ordering::Relaxed) + 1;
     let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
     let signals = [vk::SemaphoreSubmitInfo::default().semaphore(device.timeline).value(done).stage_mask(ALL)];
     let info = vk::SubmitInfo2::default().command_buffer_infos(&buffers).signal_semaphore_infos(&signals);
-    // SAFETY: the command buffer is recording; whoever calls waits for it before anything it uses is freed.
+    // SAFETY: the command buffer is recording; the caller waits for it before it frees any resource of it.
     unsafe {
         device.raw.end_command_buffer(commands).context("recording a frame")?;
         device.raw.queue_submit2(*queue, &[info], vk::Fence::null()).context("submitting a frame")?;
@@ -226,11 +229,11 @@ pub(super) unsafe fn submit(device: &Device, commands: vk::CommandBuffer) -> Res
     Ok(())
 }
 
-/// Until all that was submitted is done.
+/// Waits until all submitted work has executed.
 pub(super) unsafe fn wait(device: &Device) -> Result<()> {
     let (semaphores, values) = ([device.timeline], [device.submitted.load(Ordering::Relaxed)]);
     let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
-    // SAFETY: a semaphore of this device, which the last submission signals.
+    // SAFETY: a semaphore of this device, signalled by the last submission.
     unsafe { device.raw.wait_semaphores(&info, u64::MAX) }.context("waiting for the device")
 }
 
@@ -306,7 +309,7 @@ pub(super) unsafe fn push_constants(
     }
 }
 
-/// Binds the sets 1 and 2 of a program.
+/// Binds the shared sets 1 and 2 of a program.
 pub(super) unsafe fn bind_sets(
     device: &Device,
     commands: vk::CommandBuffer,
@@ -315,12 +318,12 @@ pub(super) unsafe fn bind_sets(
     sets: &[vk::DescriptorSet],
 ) {
     if !sets.is_empty() {
-        // SAFETY: the command buffer is recording; the sets are alive until the frame has finished, and of the layout's.
+        // SAFETY: the command buffer is recording; the sets match the layout and are alive until the frame has finished.
         unsafe { device.raw.cmd_bind_descriptor_sets(commands, point, layout.pipeline, 1, sets, &[]) };
     }
 }
 
-/// Binds set 0 of a program.
+/// Binds or pushes set 0 of a program.
 pub(super) unsafe fn bind_own(
     device: &Device,
     commands: vk::CommandBuffer,
@@ -331,7 +334,7 @@ pub(super) unsafe fn bind_own(
 ) {
     match (own, &device.push) {
         (Own::Set(set), _) => {
-            // SAFETY: the command buffer is recording; the set is alive until the frame has finished, and of the layout's.
+            // SAFETY: the command buffer is recording; the set matches the layout and is alive until the frame has finished.
             unsafe { device.raw.cmd_bind_descriptor_sets(commands, point, layout.pipeline, 0, &[*set], &[]) };
         }
         (Own::Pushed(descriptors), Some(push)) if !descriptors.is_empty() => {

@@ -1,4 +1,7 @@
-//! Descriptor sets that are written once: what a scene is, what its paths draw from, and the textures of its materials.
+//! Descriptor sets that are written once and bound by many dispatches: scene data, light and path data, textures of materials.
+//!
+//! Read the Vulkan specification, chapter Resource Descriptors, section Descriptor Sets. Each set has a descriptor pool of
+//! its own.
 
 use std::sync::Arc;
 
@@ -12,7 +15,7 @@ use super::memory::{Buffer, Image, NOTHING, Place};
 use super::shader::{Binding, BindingKind, SetLayout};
 use super::sync::ResourceId;
 
-/// A set out of a pool of its own.
+/// A descriptor set with the pool that it was allocated from.
 pub(super) struct Pooled {
     pub(super) raw: vk::DescriptorSet,
     pool: vk::DescriptorPool,
@@ -20,7 +23,7 @@ pub(super) struct Pooled {
 }
 
 impl Pooled {
-    /// Of a layout with these bindings, unwritten.
+    /// An unwritten set for a layout with these bindings.
     pub(super) fn new(
         device: &Arc<Device>,
         bindings: &[Binding],
@@ -34,7 +37,7 @@ impl Pooled {
         let sizes: Vec<_> = bindings.iter().map(of).collect();
         let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
         let layouts = [layout];
-        // SAFETY: valid infos; the pool holds one such set.
+        // SAFETY: valid infos; the pool has room for exactly this set.
         unsafe {
             let pool = device.raw.create_descriptor_pool(&info, None).with_context(&creating)?;
             let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
@@ -48,13 +51,13 @@ impl Pooled {
         }
     }
 
-    /// Writes what a binding points at.
+    /// Writes the descriptor of a binding.
     ///
     /// # Safety
-    /// Nothing uses the set yet; what the descriptor points at outlives every use of it.
+    /// Nothing uses the set yet, and the resource outlives every use of the set.
     pub(super) unsafe fn write(&self, binding: &Binding, descriptor: &Descriptor) {
         let write = descriptor.write(&self.device, binding).dst_set(self.raw);
-        // SAFETY: as the caller says.
+        // SAFETY: the caller guarantees both conditions.
         unsafe { self.device.raw.update_descriptor_sets(&[write], &[]) };
     }
 }
@@ -71,19 +74,19 @@ pub struct DescriptorSet {
     pub(super) pooled: Pooled,
     layout: &'static SetLayout,
     written: Vec<(u32, ResourceId)>,
-    /// What the other slots point at.
+    /// Dummy buffer and image in the slots without an entry.
     nothing: Option<(Buffer, Image)>,
 }
 
 impl DescriptorSet {
-    /// Writes a set: slots and what is in them. What is not written no program may read.
+    /// Writes a set from pairs of slot and resource. No program may read a slot without an entry.
     ///
     /// # Errors
     /// When memory is short.
     pub fn new(device: &Arc<Device>, layout: &'static SetLayout, entries: &[(u32, Resource<'_>)]) -> Result<Self> {
         let creating = || format!("creating a descriptor set of the {}", layout.name);
         let pooled = Pooled::new(device, layout.bindings, device.set_layout(layout)?, creating)?;
-        // lavapipe 22.3 follows every descriptor of a set, whatever the program reads (docs/decisions/lavapipe.md).
+        // lavapipe 22.3 follows every descriptor of a set, even those that the program does not read (docs/decisions/lavapipe.md).
         let is_whole = layout.bindings.iter().all(|b| entries.iter().any(|(slot, _)| *slot == b.slot));
         let make = || -> Result<(Buffer, Image)> {
             let format = vk::Format::R32G32B32A32_SFLOAT;
@@ -105,16 +108,16 @@ impl DescriptorSet {
             let Some(resource) = written.or(other) else { continue };
             let image_layout = binding.access.masks(binding.stages).layout;
             let descriptor = Descriptor::new(device, binding.kind, resource, image_layout)?;
-            // SAFETY: nothing uses the set yet; what it points at is alive.
+            // SAFETY: nothing uses the set yet; the resource is alive.
             unsafe { set.pooled.write(binding, &descriptor) };
         }
         Ok(set)
     }
 
-    /// The set with what was written to it, for a frame.
+    /// The set with the resources that were written to it, for a frame.
     ///
     /// # Panics
-    /// When something else was written: our mistake.
+    /// When `entries` differ from the written resources, a bug of the caller.
     #[must_use]
     pub fn bind<'a>(&'a self, entries: Vec<(u32, Resource<'a>)>) -> BoundSet<'a> {
         let same = entries.iter().map(|(slot, resource)| (*slot, resource.id())).eq(self.written.iter().copied());
@@ -123,7 +126,7 @@ impl DescriptorSet {
     }
 }
 
-/// A written set in a frame.
+/// A written descriptor set with its resources, bound in a frame.
 #[derive(Clone)]
 pub struct BoundSet<'a> {
     pub(super) set: &'a DescriptorSet,
@@ -135,10 +138,10 @@ impl<'a> BoundSet<'a> {
         std::ptr::eq(self.set.layout, layout)
     }
 
-    /// What is in a slot.
+    /// The resource in a slot.
     ///
     /// # Panics
-    /// When nothing was written there: our mistake.
+    /// When the slot has no entry, a bug of the caller.
     pub(super) fn resource(&self, slot: u32, name: &str) -> Resource<'a> {
         let found = self.entries.iter().find(|(written, _)| *written == slot);
         found.unwrap_or_else(|| panic!("nothing was written to {name} of the {}", self.set.layout.name)).1

@@ -1,4 +1,7 @@
-//! What build.rs says about the shaders.
+//! Reflection data of the shaders, as the build generates it: programs, bindings, specialization constants, vertex inputs.
+//!
+//! Read the Vulkan specification, chapters Shaders and Resource Descriptors, and shaders/README.md. `crates/reflect` reads the
+//! data out of the SPIR-V.
 
 use ash::vk;
 
@@ -12,15 +15,15 @@ pub struct Program {
     pub name: &'static str,
     /// Optimised SPIR-V per stage.
     pub stages: &'static [Stage],
-    /// What is pushed to set 0 with each use of it, in slot order.
+    /// Bindings of set 0, pushed or written with each use of the program, in slot order.
     pub bindings: &'static [Binding],
-    /// The sets 1 and 2, as far as it reads them.
+    /// The shared sets 1 and 2 with the bindings that the program reads.
     pub sets: &'static [SharedSet],
     /// Vertex attributes, each its own tightly packed stream of f32.
     pub inputs: &'static [VertexInput],
-    /// Specialization constants in the order of their numbers.
+    /// Specialization constants in the order of their ids.
     pub constants: &'static [Constant],
-    /// Size of the push constants.
+    /// Size of the push constants in bytes.
     pub push_bytes: u32,
     /// Workgroup size of a compute shader.
     pub local_size: [u32; 3],
@@ -29,15 +32,15 @@ pub struct Program {
 /// A specialization constant.
 #[derive(Debug, Clone, Copy)]
 pub struct Constant {
-    /// Its number.
+    /// The constant's id (`constant_id`).
     pub id: u32,
-    /// Its name, in lower case.
+    /// The constant's name, in lower case.
     pub name: &'static str,
-    /// Its word is a float.
+    /// Whether the 32-bit word is a float.
     pub float: bool,
 }
 
-/// Programs are told apart by their names.
+/// Programs are equal when their names are.
 impl PartialEq for Program {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name
@@ -53,28 +56,28 @@ impl std::hash::Hash for Program {
 }
 
 impl Program {
-    /// Bytes of SPIR-V that the driver is given for these specialization constants.
+    /// Bytes of SPIR-V that the driver receives for these specialization constants.
     #[must_use]
     pub fn spirv_bytes(&self, constants: &[(u32, u32)]) -> usize {
         self.stages.iter().map(|stage| specialized(stage.words, constants).len() * 4).sum()
     }
 }
 
-/// What an ordinary descriptor set holds; one layout, whatever part of it a program reads.
+/// The layout of a shared descriptor set; it is the same for every program, whatever bindings the program reads.
 #[derive(Debug)]
 pub struct SetLayout {
-    /// As the shaders call it: `scene`, `pages`, `paths`.
+    /// Name in the shaders: `scene`, `pages`, `paths`.
     pub name: &'static str,
-    /// All its bindings, in slot order, with the stages of all programs.
+    /// All bindings of the set, in slot order, with the stages of all programs.
     pub bindings: &'static [Binding],
 }
 
-/// The part of an ordinary descriptor set that a program reads.
+/// The part of a shared descriptor set that a program reads.
 #[derive(Debug)]
 pub struct SharedSet {
-    /// The whole.
+    /// The layout of the whole set.
     pub layout: &'static SetLayout,
-    /// The part.
+    /// The bindings that the program reads.
     pub used: &'static [Binding],
 }
 
@@ -84,10 +87,10 @@ pub trait Specialization {
     fn words(&self) -> Vec<(u32, u32)>;
 }
 
-/// One stage's code.
+/// The code of one shader stage.
 #[derive(Debug)]
 pub struct Stage {
-    /// Which stage.
+    /// The shader stage.
     pub flag: vk::ShaderStageFlags,
     /// SPIR-V 1.6.
     pub words: &'static [u32],
@@ -102,9 +105,9 @@ pub struct Binding {
     pub slot: u32,
     /// Kind of descriptor.
     pub kind: BindingKind,
-    /// What the shader does with it.
+    /// The shader's access to the resource.
     pub access: Access,
-    /// Stages that declare it.
+    /// Stages that declare the binding.
     pub stages: vk::ShaderStageFlags,
 }
 
@@ -124,7 +127,7 @@ pub enum BindingKind {
 }
 
 impl BindingKind {
-    /// Vulkan's name on a device that fetches tables as texels, or as storage buffers.
+    /// Vulkan's descriptor type; lookup tables are storage texel buffers or, without `texel_buffers`, storage buffers.
     #[must_use]
     pub fn descriptor_type(self, texel_buffers: bool) -> vk::DescriptorType {
         match self {
@@ -149,13 +152,13 @@ pub struct VertexInput {
     pub components: u32,
 }
 
-/// Other code of a stage.
+/// Replacement code for one stage of a program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Replacement {
     /// Name of the program.
     pub program: &'static str,
-    /// Place in [`Program::stages`].
+    /// Index into [`Program::stages`].
     pub stage: usize,
-    /// SPIR-V of the same interface.
+    /// SPIR-V with the same interface.
     pub words: Vec<u32>,
 }

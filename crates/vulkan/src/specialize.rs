@@ -1,29 +1,30 @@
-//! SPIR-V without the code that its specialization constants rule out.
+//! Specialization constants folded into SPIR-V: constant folding and dead-branch elimination before the driver compiles.
 //!
-//! A pipeline could be told its constants by `VkSpecializationInfo`, but then the driver reads, inlines and optimises
-//! every rung of every knob before it throws most of them away: of the 1.06 MB of `interact`, a frame uses some 6 %, and
-//! lavapipe spent 0.48 s on one core making the pipelines of a frame. Here one pass over the words, some milliseconds,
-//! leaves out the blocks that no branch leads to once the constants are known. The optimiser of SPIRV-Tools does the
-//! same and more but takes 0.5 s to load such a module.
+//! Read the Vulkan specification, chapter Pipelines, section Specialization Constants, and the SPIR-V specification,
+//! sections Structured Control Flow and Specialization. `VkSpecializationInfo` would set the constants, too, but then the
+//! driver reads, inlines and optimises every rung of every knob before it discards most of them: of the 1.06 MB of
+//! `interact`, a frame uses some 6 %, and lavapipe spent 0.48 s on one core creating the pipelines of a frame. One pass over
+//! the words takes some milliseconds here and removes the unreachable blocks. The optimiser of SPIRV-Tools does more but
+//! takes 0.5 s to load such a module.
 
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 use spirv::Op;
 
-/// Words before the first instruction.
+/// Words of the module header, before the first instruction.
 pub(super) const HEADER: usize = 5;
-/// Of the header, the word that all ids are below.
+/// Index of the header word `Bound`: all ids are below it.
 pub(super) const BOUND: usize = 3;
 
-/// An instruction: its place among the words.
+/// An instruction, as its range of words.
 type Place = Range<usize>;
 
 pub(super) fn op(words: &[u32], at: &Place) -> Option<Op> {
     Op::from_u32(words[at.start] & 0xffff)
 }
 
-/// The instructions from a word on.
+/// The instructions from word `first` on.
 pub(super) fn instructions(words: &[u32], first: usize) -> Vec<Place> {
     let mut places = Vec::with_capacity(words.len() / 4);
     let mut at = first;
@@ -45,7 +46,7 @@ struct Block {
 }
 
 impl Block {
-    /// Where its last instruction may lead.
+    /// Labels that the block's terminator may branch to.
     fn targets(&self, module: &Module<'_>) -> Vec<u32> {
         let words = &module.words[self.end.clone()];
         match op(module.words, &self.end) {
@@ -65,7 +66,7 @@ impl Block {
         }
     }
 
-    /// The block to go on at after a loop or a selection, and the one that goes on with a loop.
+    /// The block's merge block, and the continue target of a loop.
     fn merges(&self, words: &[u32]) -> (Option<u32>, Option<u32>) {
         let Some(merge) = &self.merge else { return (None, None) };
         let is_loop = op(words, merge) == Some(Op::LoopMerge);
@@ -73,33 +74,33 @@ impl Block {
     }
 }
 
-/// What is known about a module.
+/// A module with its types and the constant values that are known so far.
 struct Module<'a> {
     words: &'a [u32],
-    /// By id: ids are small numbers without gaps, and every operand asks.
+    /// The type of each id, indexed by id: ids are small numbers without gaps, and every operand is looked up.
     types: Vec<Type>,
-    /// Values by id.
+    /// The known 32-bit value of each id.
     known: Vec<Option<u32>>,
 }
 
-/// What an id is as a type.
+/// The kind of type that an id declares.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Type {
     None,
-    /// `bool` or a 32-bit integer: values of these are known here.
+    /// `bool` or a 32-bit integer: only values of these types are folded.
     Scalar,
     Other,
 }
 
 impl Module<'_> {
-    /// The result of an instruction, where it has one: it is what follows a type.
+    /// The result id of an instruction that has one: the word after the result type.
     fn result(&self, at: &Place) -> Option<u32> {
         let words = &self.words[at.clone()];
         let is_typed = words.len() > 2 && self.types.get(words[1] as usize).is_some_and(|ty| *ty != Type::None);
         is_typed.then(|| words[2])
     }
 
-    /// The value of an instruction whose operands are known well enough.
+    /// The folded value of an instruction whose operands are known as far as necessary.
     fn value(&self, operation: Op, operands: &[u32]) -> Option<u32> {
         let known = |i: usize| self.known.get(*operands.get(i)? as usize).copied().flatten();
         let flag = |b: bool| Some(u32::from(b));
@@ -130,7 +131,7 @@ impl Module<'_> {
         }
     }
 
-    /// Learns the value of an instruction; whether it is new.
+    /// Folds an instruction and stores its value; whether the value is new.
     fn learn(&mut self, at: &Place, constants: &HashMap<u32, u32>) -> bool {
         let words = &self.words[at.clone()];
         if words.len() < 3 || self.types.get(words[1] as usize) != Some(&Type::Scalar) {
@@ -157,14 +158,14 @@ impl Module<'_> {
     }
 }
 
-/// `words` with the constants of `constants` (id, value) and those they leave at their defaults in place, and without the
-/// blocks that nothing leads to then.
+/// `words` with specialization constants as ordinary constants, and without unreachable blocks.
 ///
-/// What is left computes what a driver would that specialises. Constants become ordinary ones, branches that are decided
-/// become jumps, and what comes together where nothing comes any more loses that; all else stays as it is.
+/// `constants` are pairs of id and value; the others keep their defaults. The result computes the same as a driver that
+/// specialises `words`. Decided branches become unconditional, and a phi loses the operands of unreachable predecessors.
+/// Nothing else changes.
 ///
 /// # Panics
-/// When the words are no SPIR-V, or have constants of other than 32 bits: ours come from glslang and have none.
+/// When the words are not SPIR-V, or have constants of other than 32 bits: glslang's output for Etalon's shaders has none.
 #[must_use]
 pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
     let places = instructions(words, HEADER);
@@ -182,7 +183,7 @@ pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
             }
             Some(Op::TypeBool) => module.types[operands[0] as usize] = Type::Scalar,
             Some(Op::TypeInt) if operands[1] == 32 => module.types[operands[0] as usize] = Type::Scalar,
-            // The opcodes of types follow each other.
+            // Opcodes of type declarations are consecutive.
             Some(ty) if (Op::TypeVoid as u32..=Op::TypeForwardPointer as u32).contains(&(ty as u32)) => {
                 module.types[operands[0] as usize] = Type::Other;
             }
@@ -198,7 +199,7 @@ pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
     let mut removed = vec![false; ids];
     let mut at = first_function;
     while at < places.len() {
-        // OpFunction and its parameters, blocks, OpFunctionEnd.
+        // A function is OpFunction with its parameters, blocks, and OpFunctionEnd.
         let first_block = at + places[at..].iter().take_while(|p| op(words, p) != Some(Op::Label)).count();
         let end =
             first_block + places[first_block..].iter().take_while(|p| op(words, p) != Some(Op::FunctionEnd)).count();
@@ -212,7 +213,7 @@ pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
         at = end + 1;
     }
 
-    // A device without it may still draw what adds nothing.
+    // Without arithmetic in subgroups the capability is removed: a device that lacks it may still run the module.
     let adds = Op::GroupNonUniformIAdd as u32..=Op::GroupNonUniformLogicalXor as u32;
     let adds = instructions(&bodies, 0).iter().any(|place| adds.contains(&(bodies[place.start] & 0xffff)));
     for place in &places[..first_function] {
@@ -239,12 +240,12 @@ pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
     out
 }
 
-/// The blocks of a function.
+/// The control-flow graph of a function.
 struct Function {
     blocks: Vec<Block>,
-    /// Places of the blocks, by label.
+    /// Index of each block, by label.
     index: Vec<usize>,
-    /// Blocks that are led to from within constructs.
+    /// Targets of conditional branches that exit an enclosing construct.
     exits: HashSet<u32>,
     reached: Vec<bool>,
 }
@@ -282,7 +283,7 @@ impl Function {
                 }
             }
         }
-        // Branches without a merge of their own leave a construct: what they lead to must stay the end of one.
+        // A conditional branch without a merge instruction exits a construct: its target must stay that construct's merge block.
         let exits = blocks.iter().filter(|block| block.merge.is_none());
         let exits = exits.filter(|block| op(words, &block.end) == Some(Op::BranchConditional));
         let exits = exits.flat_map(|block| words[block.end.start + 2..block.end.start + 4].iter().copied()).collect();
@@ -294,7 +295,7 @@ impl Function {
         Self { blocks, index, exits, reached }
     }
 
-    /// Finds the blocks that are reached, until nothing more is learnt of what decides that.
+    /// Finds the reachable blocks and folds values until a fixed point is reached.
     fn prune(&mut self, module: &mut Module<'_>) {
         let nothing = HashMap::new();
         loop {
@@ -304,7 +305,7 @@ impl Function {
                 for phi in &block.phis {
                     let operands = &module.words[phi.start + 3..phi.end];
                     let mut from = operands.as_chunks::<2>().0.iter().filter(|pair| self.leads(module, pair[1], block));
-                    // What comes from one block alone is what it was there.
+                    // A phi with one reachable predecessor is a copy of that operand.
                     if let (Some(&[value, _]), None) = (from.next(), from.next())
                         && let Some(value) = module.known[value as usize]
                     {
@@ -321,14 +322,14 @@ impl Function {
         }
     }
 
-    /// Whether a block is reached and leads to another.
+    /// Whether block `from` is reachable and branches to block `to`.
     fn leads(&self, module: &Module<'_>, from: u32, to: &Block) -> bool {
         let from = self.index[from as usize];
         self.reached[from] && self.targets(module, from).contains(&to.label)
     }
 
-    /// Where a block leads: the end of a loop's body always to its start, as a loop without that is none, and a selection that
-    /// is left from within always both ways.
+    /// Labels that a block branches to. A loop's back edge and a selection with exits from within keep both targets, because
+    /// structured control flow needs them.
     fn targets(&self, module: &Module<'_>, block: usize) -> Vec<u32> {
         let block = &self.blocks[block];
         let words = &module.words[block.end.clone()];
@@ -369,7 +370,7 @@ impl Function {
         removed: &mut [bool],
     ) {
         let words = module.words;
-        // Structure needs the blocks that reached loops and selections name, also where nothing leads there.
+        // Structured control flow needs the merge blocks and continue targets of reachable headers, reachable or not.
         let mut named = HashSet::new();
         let mut continued = HashMap::new();
         for i in (0..self.blocks.len()).filter(|&i| self.reached[i]) {
@@ -414,7 +415,7 @@ impl Function {
                     *bound += 1;
                 }
                 let (ty, result) = (words[phi.start + 1], words[phi.start + 2]);
-                // What comes from one block alone does so for all phis here. Drivers make a variable of each phi.
+                // One reachable predecessor holds for all phis of the block. Drivers make a variable of each phi.
                 if let [value, _] = pairs[..] {
                     out.extend([4 << 16 | Op::CopyObject as u32, ty, result, value]);
                 } else {
@@ -438,7 +439,8 @@ impl Function {
         }
     }
 
-    /// A selection that is decided is none. One of several cases stays: what is in it may leave it from within.
+    /// Whether the block keeps its merge instruction. A decided selection loses it; a decided switch keeps it, because blocks
+    /// within may exit to its merge block.
     fn keeps_merge(&self, module: &Module<'_>, block: usize) -> bool {
         let is_if = op(module.words, &self.blocks[block].end) == Some(Op::BranchConditional);
         let is_loop = self.blocks[block].merges(module.words).1.is_some();

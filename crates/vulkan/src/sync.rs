@@ -1,7 +1,8 @@
-//! Barriers as a pure function of what the passes declare; tested without a device.
+//! Pipeline barriers as a pure function of the accesses that passes declare; tested without a device.
 //!
-//! One rule per hazard (Vulkan specification, chapter 7): a read after a write waits for the write and makes it visible
-//! once per reading stage; a write waits for every earlier read and write; a layout change counts as a write.
+//! Read the Vulkan specification, chapter Synchronization and Cache Control. One rule per hazard: a read after a write
+//! waits for the write and makes it visible once per reading stage; a write waits for every earlier read and write; a
+//! layout transition counts as a write.
 
 use std::collections::HashMap;
 
@@ -15,21 +16,21 @@ pub type ResourceId = u64;
 /// One use of one resource by one pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Use {
-    /// What is used.
+    /// The buffer or image.
     pub resource: ResourceId,
-    /// Whether it has a layout.
+    /// Whether the resource is an image and has a layout.
     pub is_image: bool,
-    /// How.
+    /// The kind of access.
     pub access: Access,
-    /// By which shader stages, for the accesses that shaders perform.
+    /// The shader stages that perform the access, for accesses of shaders.
     pub shaders: vk::ShaderStageFlags,
 }
 
-/// What is known of a resource between two passes.
+/// Synchronization state of a resource between two passes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct State {
+pub struct ResourceState {
     layout: vk::ImageLayout,
-    /// Last write: where it happens, and what has to be made available.
+    /// The last write: its stages, and the accesses that must be made available.
     write_stages: vk::PipelineStageFlags2,
     write_access: vk::AccessFlags2,
     /// Stages and accesses that already see the last write.
@@ -39,7 +40,7 @@ pub struct State {
     read_stages: vk::PipelineStageFlags2,
 }
 
-impl Default for State {
+impl Default for ResourceState {
     fn default() -> Self {
         Self {
             layout: vk::ImageLayout::UNDEFINED,
@@ -52,27 +53,28 @@ impl Default for State {
     }
 }
 
-/// A dependency to record before a pass.
+/// A pipeline barrier to record before a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Barrier {
-    /// What it guards.
+    /// The resource that the barrier guards.
     pub resource: ResourceId,
-    /// Wait for these stages …
+    /// Source stages: the barrier waits for them.
     pub src_stages: vk::PipelineStageFlags2,
-    /// … and make these writes available.
+    /// Source accesses: the writes that the barrier makes available.
     pub src_access: vk::AccessFlags2,
-    /// Before these stages …
+    /// Destination stages: they wait for the barrier.
     pub dst_stages: vk::PipelineStageFlags2,
-    /// … perform these accesses.
+    /// Destination accesses: the accesses that see the writes.
     pub dst_access: vk::AccessFlags2,
     /// Layout before and after, for images.
     pub layouts: Option<(vk::ImageLayout, vk::ImageLayout)>,
 }
 
-/// The barriers each pass needs before it, given each pass's uses in execution order.
+/// The pipeline barriers before each pass, from each pass's uses in execution order.
 ///
-/// `states` holds what is known at the start (absent: never used) and is left as it is after the last pass.
-pub fn barriers(passes: &[Vec<Use>], states: &mut HashMap<ResourceId, State>) -> Vec<Vec<Barrier>> {
+/// `states` holds the state of each resource before the first pass (absent: never used), and after the call the state
+/// after the last pass.
+pub fn barriers(passes: &[Vec<Use>], states: &mut HashMap<ResourceId, ResourceState>) -> Vec<Vec<Barrier>> {
     passes
         .iter()
         .map(|uses| {
@@ -86,7 +88,7 @@ pub fn barriers(passes: &[Vec<Use>], states: &mut HashMap<ResourceId, State>) ->
         .collect()
 }
 
-/// One entry per resource, in order of first use: a pass that both reads and writes a resource is one access.
+/// One entry per resource, in order of first use: a read and a write of a resource in one pass are one access.
 fn merged(uses: &[Use]) -> Vec<(ResourceId, bool, Masks)> {
     let mut all: Vec<(ResourceId, bool, Masks)> = Vec::new();
     for usage in uses {
@@ -97,8 +99,8 @@ fn merged(uses: &[Use]) -> Vec<(ResourceId, bool, Masks)> {
                 known.access |= masks.access;
                 known.writes |= masks.writes;
                 if known.layout != masks.layout {
-                    // A depth image that is tested and sampled in one pass is the one legal mixture (DEPTH_READ_ONLY
-                    // allows both); anything else is a mistake of ours.
+                    // The only legal mixture is a depth image that one pass tests and samples (DEPTH_READ_ONLY allows both). Any
+                    // other mixture is a bug of the caller.
                     let depth = vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL;
                     let sampled = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
                     let legal =
@@ -113,7 +115,7 @@ fn merged(uses: &[Use]) -> Vec<(ResourceId, bool, Masks)> {
     all
 }
 
-fn step(resource: ResourceId, is_image: bool, masks: Masks, state: &mut State) -> Option<Barrier> {
+fn step(resource: ResourceId, is_image: bool, masks: Masks, state: &mut ResourceState) -> Option<Barrier> {
     let relayout = is_image && state.layout != masks.layout;
     let barrier = |src_stages, src_access, layouts| Barrier {
         resource,
@@ -128,10 +130,10 @@ fn step(resource: ResourceId, is_image: bool, masks: Masks, state: &mut State) -
         let needed = relayout || !src_stages.is_empty();
         let layouts = is_image.then_some((state.layout, masks.layout));
         let needed = needed.then(|| barrier(src_stages, state.write_access, layouts));
-        *state = State {
+        *state = ResourceState {
             layout: if is_image { masks.layout } else { vk::ImageLayout::UNDEFINED },
             write_stages: masks.stages,
-            // A transition alone leaves nothing to flush: what it wrote is visible to the use that asked for it.
+            // A transition alone leaves nothing to flush: its write is visible to the access that caused it.
             write_access: if masks.writes { write_part(masks.access) } else { vk::AccessFlags2::NONE },
             visible_stages: if masks.writes { vk::PipelineStageFlags2::NONE } else { masks.stages },
             visible_access: if masks.writes { vk::AccessFlags2::NONE } else { masks.access },
@@ -149,7 +151,7 @@ fn step(resource: ResourceId, is_image: bool, masks: Masks, state: &mut State) -
     Some(barrier(state.write_stages, state.write_access, is_image.then_some((state.layout, state.layout))))
 }
 
-/// Only writes have to be made available.
+/// The write accesses among `access`: only writes have to be made available.
 fn write_part(access: vk::AccessFlags2) -> vk::AccessFlags2 {
     use vk::AccessFlags2 as A;
     access

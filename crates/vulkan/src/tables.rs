@@ -1,8 +1,11 @@
-//! Tables that shaders fetch texel by texel, as storage buffers.
+//! Lookup tables of shaders as storage buffers instead of storage texel buffers.
 //!
-//! `imageBuffer` is the fastest fetch on lavapipe (docs/decisions/lavapipe.md). Elsewhere its views hold too little: 65,536 texels on
-//! SwiftShader, 2^27 on NVIDIA and Intel, which six textures of 4096 x 4096 fill. Shaders are written for the one; for the other their
-//! SPIR-V is rewritten here: a buffer of texels becomes an array of the same numbers in a storage buffer, and nothing else changes.
+//! Read the Vulkan specification, chapter Resource Descriptors (Storage Texel Buffer, Storage Buffer) and the SPIR-V
+//! specification (`OpImageRead`, `OpAccessChain`). `imageBuffer` is the fastest fetch on lavapipe
+//! (docs/decisions/lavapipe.md). Elsewhere its views hold too little: 65,536 texels on SwiftShader, 2^27 on NVIDIA and
+//! Intel, which six textures of 4096 x 4096 fill. Shaders are written for texel buffers; this file rewrites their SPIR-V: a
+//! texel buffer becomes an array of the same numbers in a storage buffer, and nothing else changes. Robust buffer access
+//! (`device.rs`) keeps reads out of bounds harmless.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -10,14 +13,14 @@ use spirv::{Decoration, Dim, ImageFormat, Op, StorageClass};
 
 use super::specialize::{BOUND, HEADER, instructions, op};
 
-/// A type of texel buffer, and what stands for it.
-struct Table {
-    /// Type of a component, and of a texel that is read.
+/// The ids of a texel buffer's type and of the storage buffer types that replace it.
+struct TexelTable {
+    /// Type of a component, and of a texel after a read.
     scalar: u32,
     texel: u32,
-    /// Components that are stored: a texel that is read has four.
+    /// Stored components per texel; a texel after a read has four.
     stored: u32,
-    /// Type of what is stored of a texel, and of a pointer to it.
+    /// Type of a stored texel, and of a pointer to it.
     element: u32,
     pointer: u32,
     array: u32,
@@ -39,20 +42,20 @@ fn put(out: &mut Vec<u32>, operation: Op, operands: &[u32]) {
     out.extend_from_slice(operands);
 }
 
-/// Ids of types and constants by what they are: a module may not declare one twice.
-struct Known {
+/// Ids of types and constants by their declaration: a module may not declare one twice.
+struct KnownIds {
     by_words: HashMap<Vec<u32>, u32>,
     bound: u32,
     declared: Vec<u32>,
 }
 
-impl Known {
+impl KnownIds {
     fn new_id(&mut self) -> u32 {
         self.bound += 1;
         self.bound - 1
     }
 
-    /// The type that these words describe.
+    /// The id of the type with this declaration.
     fn typed(&mut self, operation: Op, of: &[u32]) -> u32 {
         self.id(operation, of, 0)
     }
@@ -61,7 +64,7 @@ impl Known {
         self.id(Op::Constant, &[ty, bits], 1)
     }
 
-    /// The id stands after `before` operands.
+    /// The id of a declaration; its result id stands after `before` operands.
     fn id(&mut self, operation: Op, of: &[u32], before: usize) -> u32 {
         let key = [&[operation as u32][..], of].concat();
         if let Some(&known) = self.by_words.get(&key) {
@@ -77,7 +80,7 @@ impl Known {
 /// `words` with every texel buffer as a storage buffer of the same set and slot.
 ///
 /// # Panics
-/// When the module does with texel buffers what none of ours does: anything but reading and writing.
+/// When the module uses texel buffers for anything but reads and writes, which no shader of Etalon does.
 #[must_use]
 pub fn with_tables_in_storage(words: &[u32]) -> Vec<u32> {
     let places = instructions(words, HEADER);
@@ -89,7 +92,7 @@ pub fn with_tables_in_storage(words: &[u32]) -> Vec<u32> {
     if !all(Op::TypeImage).any(|of| is_texels(&of)) {
         return words.to_vec();
     }
-    let mut known = Known { by_words: HashMap::new(), bound: words[BOUND], declared: Vec::new() };
+    let mut known = KnownIds { by_words: HashMap::new(), bound: words[BOUND], declared: Vec::new() };
     for (operation, before) in
         [(Op::TypeInt, 0), (Op::TypeFloat, 0), (Op::TypeVector, 0), (Op::TypePointer, 0), (Op::Constant, 1)]
     {
@@ -107,14 +110,14 @@ pub fn with_tables_in_storage(words: &[u32]) -> Vec<u32> {
         let texel = known.typed(Op::TypeVector, &[scalar, 4]);
         let element = if stored == 1 { scalar } else { known.typed(Op::TypeVector, &[scalar, stored]) };
         let pointer = known.typed(Op::TypePointer, &[storage, element]);
-        // Of arrays and structs there may be several that look alike: these have decorations of their own.
+        // Arrays and structs may be declared twice, because their decorations differ.
         let [array, block, pointer_to_block] = [known.new_id(), known.new_id(), known.new_id()];
         put(&mut known.declared, Op::TypeRuntimeArray, &[array, element]);
         put(&mut known.declared, Op::TypeStruct, &[block, array]);
         put(&mut known.declared, Op::TypePointer, &[pointer_to_block, storage, block]);
-        tables.insert(of[0], Table { scalar, texel, stored, element, pointer, array, block, pointer_to_block });
+        tables.insert(of[0], TexelTable { scalar, texel, stored, element, pointer, array, block, pointer_to_block });
     }
-    let pointers: HashMap<u32, &Table> =
+    let pointers: HashMap<u32, &TexelTable> =
         all(Op::TypePointer).filter_map(|of| Some((of[0], tables.get(&of[2])?))).collect();
     let mut variables = HashMap::new();
     for of in all(Op::Variable) {
@@ -125,8 +128,8 @@ pub fn with_tables_in_storage(words: &[u32]) -> Vec<u32> {
     }
 
     let mut out = words[..HEADER].to_vec();
-    // What a function has loaded: a variable and its table.
-    let mut loaded: HashMap<u32, (u32, &Table)> = HashMap::new();
+    // Texel buffers that the function has loaded: variable and table, by the id of the load.
+    let mut loaded: HashMap<u32, (u32, &TexelTable)> = HashMap::new();
     let mut bodies = Vec::new();
     let first_function = places.iter().position(|at| op(words, at) == Some(Op::Function)).unwrap_or(places.len());
     for at in &places[first_function..] {
@@ -142,7 +145,7 @@ pub fn with_tables_in_storage(words: &[u32]) -> Vec<u32> {
                 put(&mut bodies, Op::AccessChain, &[table.pointer, place, variable, first, operands[3]]);
                 put(&mut bodies, Op::Load, &[table.element, value, place]);
                 if !is_whole {
-                    // As an image fills what its format lacks: 0, and 1 at the end.
+                    // Missing components are 0, and 1 for the last, as in an image of that format.
                     let is_float = known.by_words.get(&vec![Op::TypeFloat as u32, 32]) == Some(&table.scalar);
                     let zero = known.constant(table.scalar, 0);
                     let one = known.constant(table.scalar, if is_float { 1.0_f32.to_bits() } else { 1 });
@@ -188,7 +191,7 @@ pub fn with_tables_in_storage(words: &[u32]) -> Vec<u32> {
             out.extend_from_slice(instruction);
         }
     }
-    // Last, when all that they are made of is declared.
+    // These come last, after all declarations that they refer to.
     out.extend(known.declared);
     out.extend(bodies);
     out[BOUND] = known.bound;

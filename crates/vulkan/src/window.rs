@@ -1,4 +1,7 @@
-//! What makes a window something that Vulkan can show pictures on.
+//! Window handles: the instance extensions and the surface of a window.
+//!
+//! Read the Vulkan specification, chapter Window System Integration, and the documentation of the crates `raw-window-handle`
+//! and `ash-window`.
 
 use std::ffi::c_char;
 
@@ -8,11 +11,11 @@ use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 
 use super::surface::Surface;
 
-/// What pictures can be shown on.
+/// A window with the handles that a Vulkan surface needs.
 pub trait Windowed: HasDisplayHandle + HasWindowHandle + Send + Sync {}
 impl<W: HasDisplayHandle + HasWindowHandle + Send + Sync> Windowed for W {}
 
-/// Extensions of the instance that a window takes.
+/// Instance extensions that a surface of the window needs.
 pub(super) fn extensions(window: &dyn Windowed) -> Result<&'static [*const c_char]> {
     let display = window.display_handle().context("asking the window for its display")?;
     ash_window::enumerate_required_extensions(display.as_raw()).context("asking what this display takes")

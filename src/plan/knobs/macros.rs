@@ -1,4 +1,4 @@
-//! How the lists of knobs and effects (`rungs.rs`) become types.
+//! Macros that turn the lists of knobs and effects (`rungs.rs`) into types.
 
 /// A type whose values are the rungs of a knob.
 macro_rules! knob {
@@ -20,7 +20,7 @@ macro_rules! knob {
 
         impl $Type {
             pub(super) const NAME: &str = $name;
-            /// From cheap to exact.
+            /// All rungs, from cheap to exact.
             pub const RUNGS: &[Self] = &[$( Self::$Rung ),+];
             pub(super) const NAMES: &[&str] = &[$( $rung ),+];
             pub(super) const PRESETS: [Self; 3] = [Self::$local, Self::$recursive, Self::$global];
@@ -35,7 +35,7 @@ macro_rules! knob {
                 Choice { knob: Self::NAME, rung: self.name() }
             }
 
-            /// As the command line calls it.
+            /// The rung's name on the command line.
             #[must_use]
             pub const fn name(self) -> &'static str {
                 Self::NAMES[self as usize]
@@ -43,7 +43,7 @@ macro_rules! knob {
         }
 
         impl Default for $Type {
-            /// Of the model `recursive`.
+            /// The rung of the model `recursive`.
             fn default() -> Self {
                 Self::$recursive
             }
@@ -57,10 +57,10 @@ macro_rules! knob {
     };
 }
 
-/// [`Knobs`], a field each, and [`KNOBS`], an entry each.
+/// [`Knobs`] with one field per knob, and [`KNOBS`] with one entry per knob.
 macro_rules! knobs {
     ($( $field:ident: $Type:ident ),+ $(,)?) => {
-        /// A rung for every knob.
+        /// The rungs of all knobs.
         #[derive(Debug, Clone, PartialEq, Eq)]
         pub struct Knobs {
             $( #[doc = concat!("Rung of the knob `", stringify!($field), "`.")] pub $field: $Type, )+
@@ -80,13 +80,13 @@ macro_rules! knobs {
         } ),+];
 
         impl Knobs {
-            /// The rungs of a model.
+            /// The preset of a model.
             #[must_use]
             pub fn of(model: Model) -> Self {
                 Self { $( $field: $Type::PRESETS[model as usize] ),+ }
             }
 
-            /// The rungs of paths that approximate least, with the samples of `global`.
+            /// The rungs of path tracing with the least approximation, with the samples of `global`.
             #[must_use]
             pub fn exact() -> Self {
                 Self { $( $field: $Type::EXACT ),+ }
@@ -95,19 +95,19 @@ macro_rules! knobs {
     };
 }
 
-/// [`EffectId`] and what each is called.
+/// [`EffectId`] with the name and the table row of each effect.
 macro_rules! effects {
-    ($( $Effect:ident = $name:literal ),+ $(,)?) => {
+    ($( $Effect:ident = $name:literal: $cause:literal => $brings:literal, )+) => {
         /// An effect that a scene may call for.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum EffectId {
             $( #[doc = concat!("`", $name, "`.")] $Effect, )+
-            /// A lobe that an extension lays over the base, by its place in [`LOBES`].
+            /// A lobe of a material extension, by its index in [`LOBES`].
             Lobe(usize),
         }
 
         impl EffectId {
-            /// As reports call it.
+            /// The effect's name in reports.
             #[must_use]
             pub fn name(self) -> &'static str {
                 match self {
@@ -116,11 +116,24 @@ macro_rules! effects {
                 }
             }
 
-            /// The effect of that name.
+            /// The effect's cause in a scene and its consequence for a plan: a row of docs/plan.md.
+            #[must_use]
+            pub fn row(self) -> [&'static str; 2] {
+                match self {
+                    $( Self::$Effect => [$cause, $brings], )+
+                    Self::Lobe(place) => LOBES[place].row,
+                }
+            }
+
+            /// Every effect, in the order in which plans list them.
+            pub fn all() -> impl Iterator<Item = Self> {
+                [$( Self::$Effect ),+].into_iter().chain((0..LOBES.len()).map(Self::Lobe))
+            }
+
+            /// The effect with a name.
             #[must_use]
             pub fn named(name: &str) -> Option<Self> {
-                let lobes = (0..LOBES.len()).map(Self::Lobe);
-                [$( Self::$Effect ),+].into_iter().chain(lobes).find(|effect| effect.name() == name)
+                Self::all().find(|effect| effect.name() == name)
             }
         }
     };

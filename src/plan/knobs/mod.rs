@@ -1,4 +1,4 @@
-//! Knobs: each approximation with its rungs, as types ([`rungs`]), and as data for what goes through all of them.
+//! Knobs: the settings of quality. Each knob is an approximation with rungs, as types ([`rungs`]) and as a table of data.
 
 #[macro_use]
 mod macros;
@@ -10,19 +10,19 @@ use rungs::{Guiding, Indirect, Lights, Reflection, Refraction, Shadows};
 pub use rungs::{KNOBS, Knob, Knobs, Model};
 
 impl Knob {
-    /// The knob of that name.
+    /// The knob with a name.
     #[must_use]
     pub fn named(name: &str) -> Option<&'static Self> {
         KNOBS.iter().find(|knob| knob.name == name)
     }
 
-    /// Place of the chosen rung.
+    /// Index of the chosen rung.
     #[must_use]
     pub fn place(&self, knobs: &Knobs) -> usize {
         (self.chosen)(knobs)
     }
 
-    /// The chosen rung.
+    /// Name of the chosen rung.
     #[must_use]
     pub fn rung(&self, knobs: &Knobs) -> &'static str {
         self.rungs[self.place(knobs)]
@@ -65,7 +65,7 @@ impl Knobs {
         Err(refused(format!("{choice}: {name} has no rung \"{rung}\", it has {}", knob.rungs.join(", "))))
     }
 
-    /// Applies several choices in order. Where two of them contradict each other, or a model, the error names both.
+    /// Applies several choices in order. The error for two contradictory choices, or a choice and a model, names both.
     ///
     /// # Errors
     /// As [`Knobs::set`], and one sentence for choices that contradict.
@@ -89,7 +89,7 @@ impl Knobs {
         }
     }
 
-    /// Says whether two rungs contradict.
+    /// Checks that no two rungs contradict each other.
     ///
     /// # Errors
     /// One sentence with both and the nearest choice.
@@ -121,7 +121,7 @@ impl Knobs {
         Ok(())
     }
 
-    /// The same with another rung of one knob; `None` where there is no such rung or it contradicts another.
+    /// A copy with another rung of one knob; `None` when there is no such rung or it contradicts another.
     #[must_use]
     pub fn with(&self, knob: &str, rung: &str) -> Option<Self> {
         let mut changed = self.clone();
@@ -130,10 +130,10 @@ impl Knobs {
         Some(changed)
     }
 
-    /// Whether occlusion may be seen: on light from all around, if there is any, and on mirror images of the screen.
+    /// Whether ambient occlusion can be visible: on the environment's light, or on screen-space reflections.
     #[must_use]
     pub fn show_occlusion(&self, environment: bool) -> bool {
-        // Paths find what is occluded themselves.
+        // Path tracing computes occlusion itself.
         if self.indirect == Indirect::Path {
             return false;
         }
@@ -148,7 +148,7 @@ impl Knobs {
     }
 }
 
-/// Of rungs that are numbers the one whose ratio to a number is nearest to 1.
+/// The numeric rung whose ratio to `wanted` is nearest to 1.
 fn nearest(rungs: &'static [&'static str], wanted: &str) -> Option<&'static str> {
     let wanted: f64 = wanted.parse().ok().filter(|number: &f64| number.is_finite())?;
     let number = |rung: &&&str| rung.parse::<f64>().ok();

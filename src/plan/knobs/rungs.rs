@@ -1,6 +1,8 @@
-//! The knobs, a type each: what each approximates, its rungs from cheap to exact, what the models choose, what it is about.
+//! The knobs as types: each one's approximation, its rungs from cheap to exact, and its rungs in the three models.
 //!
-//! Beside them the list of knobs, the models that choose rungs, and the list of effects. A rung is named once, here. Renaming a variant is an error of the compiler wherever it is used; what users type is the text beside it.
+//! Read docs/plan.md; the ids under `lecture` are statements of docs/lecture.md. Knobs, models and effects have their names
+//! only here: a renamed variant is a compile error wherever it is used. Users type the text beside a variant, and reports
+//! and the generated tables of the documentation print it.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -10,35 +12,64 @@ use crate::plan::choice::Choice;
 use crate::scene::lobe::LOBES;
 
 effects! {
-    EmissiveTextures = "emissive textures",
-    ClearCoat = "clear coat",
-    Layers = "layers",
-    Conductors = "metals by n and kappa",
-    Refraction = "refraction",
-    SeeThrough = "see-through surfaces",
-    VaryingMedia = "media that vary",
-    Quadrature = "quadrature",
-    Environment = "environment",
-    MirroredEnvironment = "mirrored environment",
-    PrefilteredEnvironment = "prefiltered environment",
-    Mirrors = "mirrors",
-    AmbientLight = "ambient light",
-    PunctualLights = "punctual lights",
-    Shadows = "shadows",
-    LightLists = "light lists per tile",
-    Paths = "paths",
-    EmittingSurfaces = "surfaces that light",
-    ShapedLights = "lights with a shape",
-    Aims = "aims",
-    Wavelengths = "bands of wavelengths",
-    Dispersion = "dispersion",
-    Holes = "holes before rays",
-    Filters = "light through surfaces",
-    Transmission = "transmission before rays",
-    RoughRays = "rays by lobes",
-    Frosted = "frosted surfaces",
-    Absorption = "absorption",
-    TouchingBodies = "bodies that touch",
+    EmissiveTextures = "emissive textures":
+        "an emissive texture below a factor other than 0" => "a G-buffer target; code",
+    ClearCoat = "clear coat":
+        "a clear coat above 0" => "the G-buffer target of layers; code",
+    Layers = "material layers":
+        "a clear coat, or textures of coat, specular, transmission or thickness" => "a G-buffer target; code",
+    Conductors = "conductors with n and kappa":
+        "a metal given by n and kappa" => "code",
+    Refraction = "refraction":
+        "transmission above 0 on a surface that is not alpha-blended" => "by rays: the BVH, tile lists, the ray tree; in screen space: the passes of transparent surfaces and a copy of the picture",
+    Transparency = "order-independent transparency":
+        "alpha blending; transmission where no rays refract" => "per-pixel linked lists of fragments (A-buffer) and their passes",
+    HeterogeneousMedia = "heterogeneous media":
+        "a grid of absorption coefficients that is not 0, in a closed mesh" => "the grids; code",
+    Quadrature = "quadrature":
+        "a medium through which rays march" => "code",
+    Environment = "environment":
+        "an environment map" => "the map",
+    EnvironmentReflection = "environment reflection":
+        "a metal, a specular reflectance above 0 with an index other than 1, or a clear coat" => "the prefiltered map; code",
+    PrefilteredEnvironment = "prefiltered environment":
+        "an environment that is not the same everywhere" => "prefiltered levels in place of one texel",
+    Reflection = "reflection":
+        "a surface or clear coat that is smooth enough for the rung of `lobes`" => "by rays: the BVH, tile lists, the ray tree; in screen space: a copy of the picture, passes",
+    AmbientLight = "ambient light":
+        "an environment, and a surface with a diffuse part" => "code",
+    PunctualLights = "punctual lights":
+        "a light that shines and reaches a surface that it lights" => "the light table; code",
+    Shadows = "shadows":
+        "the same lights" => "by rays: the BVH, code; by maps: depth images, passes",
+    TiledLightCulling = "tiled light culling":
+        "16 point and spot lights, one of them with a range" => "two passes and a bit mask for each 16x16 tile",
+    PathTracing = "path tracing":
+        "`indirect=path`: paths take the place of the G-buffer, of lighting and of single rays" => "the BVH, queues, states of paths",
+    EmissiveLights = "emissive surfaces as lights":
+        "an emissive surface, with `lights=area:N` and path tracing" => "a table of triangles; code",
+    AreaLights = "analytic area lights":
+        "a sphere, disk or rectangle light, with `lights=area:N` and path tracing" => "code",
+    PathGuiding = "path guiding":
+        "a smooth surface that light reaches and that sends it to a diffuse one, with `guiding=photons` and path tracing" => "photons, a grid of cells with bounding spheres; code",
+    SpectralRendering = "spectral rendering":
+        "something coloured, with `colour=spectral:N`" => "a frame for each band of wavelengths, a table of the band; code where colours are read",
+    Dispersion = "dispersion":
+        "a refracting solid whose index depends on wavelength, with `colour=spectral:N`" => "parts of the bands, one for each sample",
+    AlphaTest = "alpha test in rays":
+        "an alpha mask, or alpha blending, on a surface that rays may meet" => "code",
+    TransparentShadows = "transparent shadows":
+        "a transparent or transmissive surface that shadow rays may meet" => "code",
+    TransmissiveHits = "transmissive hits":
+        "a transmissive surface that rays may meet" => "code",
+    GlossyReflection = "glossy reflection":
+        "a rough surface within the rung of `lobes`" => "code",
+    RoughTransmission = "rough transmission":
+        "a rough transmissive surface, with path tracing" => "code",
+    Absorption = "absorption":
+        "a solid that absorbs" => "code",
+    CoincidentInterfaces = "coincident interfaces":
+        "a solid whose surface touches another one, which only the BVH shows" => "code",
 }
 
 impl Display for EffectId {
@@ -68,22 +99,22 @@ knobs! {
     position: Position,
 }
 
-/// One knob.
+/// A knob: an approximation with its rungs, as data.
 #[derive(Debug)]
 pub struct Knob {
     /// Name on the command line.
     pub name: &'static str,
-    /// Rungs that can be chosen, cheap to exact.
+    /// Names of the rungs, from cheap to exact.
     pub rungs: &'static [&'static str],
-    /// What the presets `local`, `recursive` and `global` choose.
+    /// The rungs of the presets `local`, `recursive` and `global`.
     pub presets: [&'static str; 3],
-    /// The rung that approximates least.
+    /// The rung with the least approximation.
     pub exact: &'static str,
-    /// The lecture's statements that it is about.
+    /// Ids of the lecture's statements about the approximation.
     pub lecture: &'static [&'static str],
-    /// The plan's effects that it shapes; none: every surface of every scene.
+    /// The plan's effects that the knob decides on; empty when it concerns every surface of every scene.
     pub effects: &'static [EffectId],
-    /// What it approximates.
+    /// The approximation, in words.
     pub about: &'static str,
     pub(super) chosen: fn(&Knobs) -> usize,
     pub(super) choose: fn(&mut Knobs, usize),
@@ -93,16 +124,16 @@ pub struct Knob {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, EnumMessage, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "lowercase")]
 pub enum Model {
-    /// Direct light with shadow maps, and the environment as ambient and mirrored light.
+    /// Direct light with shadow maps; the environment as ambient light and reflection.
     Local,
-    /// Plus rays for shadows, mirrors and what lets light through.
+    /// Adds ray-traced shadows, reflection and refraction.
     #[default]
     Recursive,
-    /// Paths from surface to surface: rough ones, too, light others.
+    /// Path tracing: indirect light between all surfaces.
     Global,
 }
 
-/// What follows a prefix in a rung's name, as a number; `None` for rungs that are called otherwise.
+/// The number after a prefix in a rung's name; `None` for rungs without the prefix.
 fn number(rung: &str, prefix: &str) -> Option<u32> {
     rung.strip_prefix(prefix)?.parse().ok()
 }
@@ -113,7 +144,7 @@ knob! {
     exact: Ray,
     lecture: ["R5"],
     effects: [Shadows],
-    about: "visibility of lights",
+    about: "visibility of lights: none, shadow maps, shadow rays",
 }
 
 knob! {
@@ -122,7 +153,7 @@ knob! {
     exact: Exact,
     lecture: ["F2", "F3"],
     effects: [],
-    about: "Fresnel curve",
+    about: "Fresnel reflectance: Schlick's approximation or the exact equations",
 }
 
 knob! {
@@ -136,7 +167,7 @@ knob! {
     exact: GgxMulti,
     lecture: ["B1", "B5", "B6"],
     effects: [],
-    about: "rough reflection",
+    about: "specular lobe of rough surfaces; ggx-multi adds energy compensation for multiple scattering",
 }
 
 knob! {
@@ -144,21 +175,21 @@ knob! {
     presets: [Environment, Ray, Ray],
     exact: Ray,
     lecture: ["F4"],
-    effects: [Mirrors, MirroredEnvironment],
-    about: "what a surface mirrors: nothing, what is infinitely far, what is on the screen, the scene",
+    effects: [Reflection, EnvironmentReflection],
+    about: "specular reflection of smooth surfaces: none, of the environment, in screen space, by rays; rougher surfaces reflect the environment",
 }
 
 knob! {
     Lobes = "lobes" { Narrow = "0.2", Half = "0.5", All = "1" }
     presets: [Narrow, Narrow, All],
     exact: All,
-    lecture: ["B6"],
-    effects: [RoughRays],
-    about: "roughness up to which rays sample what a surface mirrors, one direction of its lobe for each of the samples",
+    lecture: ["B1", "R6"],
+    effects: [GlossyReflection],
+    about: "roughness up to which rays sample the specular lobe, one direction for each sample",
 }
 
 impl Lobes {
-    /// Perceptual roughness up to which rays sample what a surface mirrors.
+    /// Perceptual roughness up to which reflection rays sample the specular lobe.
     #[must_use]
     pub const fn roughest(self) -> f32 {
         match self {
@@ -175,7 +206,7 @@ knob! {
     exact: Ray,
     lecture: ["F5"],
     effects: [Refraction],
-    about: "bent transmission: none, one bend and a look at the screen, every bend",
+    about: "refraction: none, one interface in screen space, every interface by rays",
 }
 
 knob! {
@@ -183,12 +214,12 @@ knob! {
     presets: [Eight, Eight, ThirtyTwo],
     exact: ThirtyTwo,
     lecture: ["R6"],
-    effects: [Refraction, Mirrors, Paths],
-    about: "surfaces that a path of rays may meet",
+    effects: [Refraction, Reflection, PathTracing],
+    about: "surfaces that a path may meet; the report gives the light that this cuts off",
 }
 
 impl Interfaces {
-    /// How many.
+    /// Number of surfaces.
     #[must_use]
     pub const fn count(self) -> u32 {
         1 << self as u32
@@ -209,12 +240,12 @@ knob! {
     presets: [Thickness, Path, March32],
     exact: March64,
     lecture: ["A1", "A2"],
-    effects: [Absorption, VaryingMedia],
-    about: "light lost inside media; march:N goes through grids of sigma in N steps of each segment",
+    effects: [Absorption, HeterogeneousMedia],
+    about: "absorption in media: none, by nominal thickness, by path length, or by marching grids of sigma in N steps for each segment",
 }
 
 impl Absorption {
-    /// Steps of each segment through a medium that varies; 0: none is marched.
+    /// Steps per segment through a heterogeneous medium; 0 when none is marched.
     #[must_use]
     pub fn steps(self) -> u32 {
         number(self.name(), "march:").unwrap_or(0)
@@ -227,7 +258,7 @@ knob! {
     exact: Simpson,
     lecture: ["A2"],
     effects: [Quadrature],
-    about: "rule of the sum over those steps, of order 1, 2 and 4",
+    about: "quadrature rule of the marching steps, of order 1, 2 and 4",
 }
 
 knob! {
@@ -235,8 +266,8 @@ knob! {
     presets: [Ambient, Ambient, Path],
     exact: Path,
     lecture: ["R6"],
-    effects: [Paths, AmbientLight],
-    about: "light from all around: none, the environment as if nothing stood before it, paths from surface to surface",
+    effects: [PathTracing, AmbientLight],
+    about: "indirect light: none, unshadowed ambient light of the environment, path tracing",
 }
 
 knob! {
@@ -244,12 +275,12 @@ knob! {
     presets: [Points, Points, Area1],
     exact: Area1,
     lecture: ["R2"],
-    effects: [EmittingSurfaces, ShapedLights],
-    about: "extent of lights: with area:N surfaces that emit light others, by N places on them at each surface of a path",
+    effects: [EmissiveLights, AreaLights],
+    about: "lights as points, or as area lights with N light samples at each path vertex",
 }
 
 impl Lights {
-    /// Places on lights that are looked for at each surface of a path.
+    /// Light samples at each path vertex.
     #[must_use]
     pub fn places(self) -> u32 {
         number(self.name(), "area:").unwrap_or(1)
@@ -257,12 +288,12 @@ impl Lights {
 }
 
 knob! {
-    Guiding = "guiding" { Off = "off", Aims = "aims" }
-    presets: [Off, Off, Aims],
-    exact: Aims,
+    Guiding = "guiding" { Off = "off", Photons = "photons" }
+    presets: [Off, Off, Photons],
+    exact: Photons,
     lecture: ["R6"],
-    effects: [Aims],
-    about: "where paths go: as surfaces scatter, or also where photons came from by way of mirrors and lenses; the same mean",
+    effects: [PathGuiding],
+    about: "path guiding: BSDF sampling alone, or mixed with directions from which photons came by specular surfaces; the same mean",
 }
 
 knob! {
@@ -283,7 +314,7 @@ knob! {
 }
 
 impl Samples {
-    /// How many.
+    /// Samples per pixel.
     #[must_use]
     pub const fn count(self) -> u32 {
         4_u32.pow(self as u32)
@@ -295,12 +326,12 @@ knob! {
     presets: [Rgb, Rgb, Rgb],
     exact: Spectral32,
     lecture: ["C1", "C2", "C3"],
-    effects: [Wavelengths],
-    about: "wavelengths: three colours, or so many bands of 380 to 780 nm, each a picture of its own",
+    effects: [SpectralRendering],
+    about: "RGB rendering, or spectral rendering in N bands of 380 to 780 nm, each as long as a picture",
 }
 
 impl Colour {
-    /// Bands of wavelengths; 0: three colours.
+    /// Number of bands of wavelengths; 0 for RGB.
     #[must_use]
     pub fn bands(self) -> u32 {
         number(self.name(), "spectral:").unwrap_or(0)
@@ -312,8 +343,8 @@ knob! {
     presets: [JakobHanika, JakobHanika, JakobHanika],
     exact: JakobHanika,
     lecture: ["C3"],
-    effects: [Wavelengths],
-    about: "reflectance by wavelength of what is given as a colour: a sum of three curves, a fitted sigmoid",
+    effects: [SpectralRendering],
+    about: "spectral upsampling of RGB reflectances: a sum of three curves (Mallett and Yuksel), or a fitted sigmoid (Jakob and Hanika)",
 }
 
 knob! {
@@ -322,7 +353,7 @@ knob! {
     exact: Compensated,
     lecture: [],
     effects: [],
-    about: "form of the formulas (docs/numerics.md)",
+    about: "floating-point form of the formulas of lighting and background",
 }
 
 knob! {
@@ -331,12 +362,12 @@ knob! {
     exact: F32,
     lecture: [],
     effects: [],
-    about: "normals in the G-buffer: as octahedra in so many bits each, or in floats",
+    about: "normals in the G-buffer: octahedral encoding in N bits for each, or floats",
 }
 
 impl Normals {
-    /// |n − stored n|² that storing accounts for, at least twice the largest (numerics 16: 0.95°, 0.059°, 0.0037°): what a normal
-    /// texture bends less than that is lost.
+    /// Tolerance for |n − stored n|² of the encoding, at least twice the largest error (numerics 16: 0.95°, 0.059°, 0.0037°). A
+    /// smaller bend of a normal texture is lost.
     #[must_use]
     pub fn error2(self) -> f32 {
         match self {
@@ -374,7 +405,7 @@ mod tests {
         assert_eq!(Absorption::RUNGS.iter().map(|rung| rung.steps()).collect::<Vec<_>>(), [0, 0, 0, 4, 8, 16, 32, 64]);
         assert_eq!(Lights::RUNGS.iter().map(|rung| rung.places()).collect::<Vec<_>>(), [1, 1, 4, 16]);
         assert_eq!(Colour::RUNGS.iter().map(|rung| rung.bands()).collect::<Vec<_>>(), [0, 8, 16, 32]);
-        assert_eq!(Guiding::Aims.to_string(), "guiding=aims");
+        assert_eq!(Guiding::Photons.to_string(), "guiding=photons");
     }
 
     #[test]

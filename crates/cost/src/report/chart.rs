@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use maud::{Markup, html};
 
 use super::{anchor, class, digits, percent, plain, time, title};
-use crate::table::{Family, Order, Table};
+use crate::table::{Family, QuadratureOrder, Table};
 
 /// Width and height of the charts, in their own units.
 const CHART: [f64; 2] = [760.0, 420.0];
@@ -15,14 +15,14 @@ const MARGIN: [f64; 4] = [64.0, 16.0, 32.0, 44.0];
 const LETTER: [f64; 2] = [6.6, 14.0];
 
 /// Where a logarithm falls.
-struct Axis {
+struct ChartAxis {
     low: f64,
     high: f64,
     from: f64,
     to: f64,
 }
 
-impl Axis {
+impl ChartAxis {
     /// Around some numbers above 0.
     fn around(values: impl Iterator<Item = f64> + Clone, from: f64, to: f64) -> Self {
         let high = values.clone().fold(1e-9, f64::max);
@@ -59,8 +59,8 @@ pub(super) fn errors(table: &Table) -> Markup {
     let [width, height] = CHART;
     let [left, right, top, bottom] = MARGIN;
     let visible = || table.points.iter().filter(|p| p.error() > 0.0 && p.gpu_ms.median > 0.0);
-    let x = Axis::around(visible().map(|p| p.gpu_ms.median), left, width - right);
-    let y = Axis::around(visible().map(|p| p.error()), height - bottom, top);
+    let x = ChartAxis::around(visible().map(|p| p.gpu_ms.median), left, width - right);
+    let y = ChartAxis::around(visible().map(|p| p.error()), height - bottom, top);
     let place = |i: usize| [x.at(table.points[i].gpu_ms.median), y.at(table.points[i].error())];
     let line: Vec<String> = table.frontier.iter().map(|&i| place(i)).map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
     let own = y.at(table.reference.resolution);
@@ -155,14 +155,14 @@ pub(super) fn orders(table: &Table) -> Markup {
     let ([width, height], [left, right, top, bottom]) = (CHART, MARGIN);
     let all = || table.orders.iter().flat_map(|order| order.errors.iter().copied().filter(|error| *error > 0.0));
     let steps = || table.orders.iter().flat_map(|order| order.steps.iter().map(|&n| f64::from(n)));
-    let (x, y) = (Axis::around(steps(), left, width - right), Axis::around(all(), height - bottom, top));
+    let (x, y) = (ChartAxis::around(steps(), left, width - right), ChartAxis::around(all(), height - bottom, top));
     let told: BTreeSet<u32> = table.orders.iter().flat_map(|order| order.steps.iter().copied()).collect();
-    let place = |order: &Order, i: usize| [x.at(f64::from(order.steps[i])), y.at(order.errors[i])];
-    let line = |order: &Order| -> String {
+    let place = |order: &QuadratureOrder, i: usize| [x.at(f64::from(order.steps[i])), y.at(order.errors[i])];
+    let line = |order: &QuadratureOrder| -> String {
         let points: Vec<_> = (0..order.steps.len()).map(|i| place(order, i)).collect();
         points.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect::<Vec<_>>().join(" ")
     };
-    let name = |order: &Order| order.order.map_or_else(String::new, |p| format!(", order {p:.1}"));
+    let name = |order: &QuadratureOrder| order.order.map_or_else(String::new, |p| format!(", order {p:.1}"));
     html! {
         svg.chart viewBox=(format!("0 0 {width} {height}")) role="img" aria-label="Error against steps" {
             @for &tick in &told {

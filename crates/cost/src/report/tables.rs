@@ -74,7 +74,7 @@ pub(super) fn knobs(table: &Table) -> Markup {
                 @for knob in &table.knobs {
                     tr.off[!knob.called_for] {
                         th scope="row" { (knob.knob) }
-                        td { @if knob.called_for { "yes" } @else { "not called for" } }
+                        td { @if knob.called_for { "yes" } @else { "not needed" } }
                         td { (knob.reason) }
                         td { (knob.about) }
                         td { @for id in &knob.lecture { (words::lecture(id)) " " } }

@@ -12,7 +12,7 @@ const WORDS: [(&str, &str, &str); 9] = [
     (
         "error",
         "error",
-        "How far a picture is from the truth: the root mean squared difference of displayed values, in percent of their range from black to white. 1 % is two and a half of the 256 steps of a display. The truth is what the reference converges to; its noise is taken out of the number, and the interval says how well that went (two standard errors).",
+        "How far a picture is from the truth: the root mean squared difference of displayed values, in percent of their range from black to white. 1 % is two and a half of the 256 steps of a display. The truth is what the reference converges to; its noise is measured out of the number, and the interval says how well that went (two standard errors).",
     ),
     (
         "reference",

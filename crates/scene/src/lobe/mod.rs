@@ -15,6 +15,8 @@ pub struct Lobe {
     pub name: &'static str,
     /// The extension.
     pub extension: &'static str,
+    /// What in a scene calls for it, and what it brings into a plan: a row of docs/plan.md.
+    pub row: [&'static str; 2],
     /// Its numbers by their names in JSON, each with how many it has: four at most together, of 0 … 1, absent ones 0. Without the first
     /// there is no lobe. One of three is a colour.
     pub factors: &'static [(&'static str, usize)],

@@ -13,6 +13,7 @@ pub const LEAST_ROUGHNESS: f32 = 0.07;
 pub static SHEEN: Lobe = Lobe {
     name: "sheen",
     extension: "KHR_materials_sheen",
+    row: ["a sheen colour above 0", "code, part of the table of directional albedo"],
     factors: &[("sheenColorFactor", 3), ("sheenRoughnessFactor", 1)],
     textures: &[("sheenColorTexture", "sheen_color", Color), ("sheenRoughnessTexture", "sheen_roughness", Data)],
     scatters: true,

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::build::{Builder, at, emitter, glass};
+use super::build::{StudyBuilder, at, emitter, glass};
 use super::shape::Shape;
 use crate::{Material, Scene, SigmaGrid};
 
@@ -16,7 +16,7 @@ const DISTANCE: f32 = 0.1;
 const COLOR: [f32; 3] = [0.2, 0.55, 0.85];
 
 pub(super) fn scene() -> Scene {
-    let mut b = Builder::new("absorber");
+    let mut b = StudyBuilder::new("absorber");
     let white = b.material(emitter("light", [1.0; 3]));
     b.add("light", Shape::panel(2.0, 1.2), white, at(0.0, 0.0, -0.6, 0.0));
     let tea = |name: &str, thickness: f64| Material {

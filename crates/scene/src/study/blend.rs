@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::build::{Builder, at, dielectric};
+use super::build::{StudyBuilder, at, dielectric};
 use super::shape::Shape;
 use crate::{AlphaMode, Material, Scene};
 
@@ -19,7 +19,7 @@ fn pane(name: &str, color: [f32; 4]) -> Material {
 }
 
 pub(super) fn scene() -> Scene {
-    let mut b = Builder::new("blend");
+    let mut b = StudyBuilder::new("blend");
     let stripes =
         b.picture("stripes", 64, |x, _| if (x / 8) % 2 == 0 { [0.05, 0.05, 0.05, 1.0] } else { [0.6, 0.6, 0.6, 1.0] });
     let board =
@@ -29,7 +29,7 @@ pub(super) fn scene() -> Scene {
     let red = b.material(pane("red glass", [0.9, 0.1, 0.1, 0.5]));
     let green = b.material(pane("green glass", [0.1, 0.8, 0.1, 0.5]));
     let blue = b.material(pane("blue glass", [0.1, 0.2, 0.9, 0.5]));
-    let sheet = |b: &mut Builder, name: &str, material: usize| b.mesh(name, Shape::panel(0.8, 0.8), material);
+    let sheet = |b: &mut StudyBuilder, name: &str, material: usize| b.mesh(name, Shape::panel(0.8, 0.8), material);
     let panes = [sheet(&mut b, "red pane", red), sheet(&mut b, "green pane", green), sheet(&mut b, "blue pane", blue)];
 
     // Left: three overlapping panes, listed near to far, which is the wrong way round for painting.

@@ -9,11 +9,11 @@ use crate::{
 };
 
 /// A scene in the making.
-pub(super) struct Builder {
+pub(super) struct StudyBuilder {
     scene: Scene,
 }
 
-impl Builder {
+impl StudyBuilder {
     /// An empty scene called `study:NAME`.
     pub(super) fn new(name: &str) -> Self {
         Self { scene: Scene { name: format!("study:{name}"), ..Scene::default() } }
@@ -75,7 +75,7 @@ impl Builder {
     }
 
     pub(super) fn light(&mut self, name: &str, color: [f32; 3], kind: LightKind) {
-        self.shine(Light { name: name.to_owned(), color, spectrum: None, extent: None, kind, stand_in: false });
+        self.shine(Light { name: name.to_owned(), color, spectrum: None, extent: None, kind, proxy: false });
     }
 
     /// A light with everything about it.
@@ -84,8 +84,8 @@ impl Builder {
     }
 
     /// A light that stands for an emitting surface where such surfaces light nothing.
-    pub(super) fn stand_in(&mut self, name: &str, color: [f32; 3], kind: LightKind) {
-        self.shine(Light { name: name.to_owned(), color, spectrum: None, extent: None, kind, stand_in: true });
+    pub(super) fn proxy(&mut self, name: &str, color: [f32; 3], kind: LightKind) {
+        self.shine(Light { name: name.to_owned(), color, spectrum: None, extent: None, kind, proxy: true });
     }
 
     /// A pinhole camera with a vertical field of view in degrees; the near distance is left to the renderer.

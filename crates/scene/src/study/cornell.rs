@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use super::build::{Builder, at, dielectric, emitter, facing};
+use super::build::{StudyBuilder, at, dielectric, emitter, facing};
 use super::shape::Shape;
 use crate::{LightKind, Scene};
 
@@ -14,7 +14,7 @@ const HEIGHT: f64 = 5.488;
 const DEPTH: f64 = 5.592;
 
 pub(super) fn scene() -> Scene {
-    let mut b = Builder::new("cornell");
+    let mut b = StudyBuilder::new("cornell");
     // Linear Rec. 709 stand-ins for the measured spectra.
     let white = b.material(dielectric("white", [0.73, 0.73, 0.73], 1.0));
     let red = b.material(dielectric("red", [0.63, 0.065, 0.05], 1.0));
@@ -43,7 +43,7 @@ pub(super) fn scene() -> Scene {
     let glow = b.material(emitter("lamp", [12.0, 12.0, 12.0]));
     let lamp = DVec3::new(0.0, HEIGHT - 0.01, -2.795);
     b.add("ceiling panel", Shape::panel(1.3, 1.05), glow, facing(lamp, DVec3::NEG_Y));
-    b.stand_in("ceiling lamp", [16.4; 3], LightKind::Point { position: lamp - DVec3::Y * 0.05, range: None });
+    b.proxy("ceiling lamp", [16.4; 3], LightKind::Point { position: lamp - DVec3::Y * 0.05, range: None });
     // From further away than the original's 8 m the room still fills the height of a wide picture.
     b.camera("front", DVec3::new(0.0, HEIGHT * 0.5, 8.0), middle, 39.3);
     b.finish()

@@ -3,13 +3,13 @@
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use super::build::{Builder, at, conductor, dielectric, emitter, facing, glass, metal};
+use super::build::{StudyBuilder, at, conductor, dielectric, emitter, facing, glass, metal};
 use super::shape::{Shape, arc, line};
 use crate::substance::GOLD;
 use crate::{LightKind, Material, Scene};
 
 pub(super) fn scene() -> Scene {
-    let mut b = Builder::new("etalon");
+    let mut b = StudyBuilder::new("etalon");
     table(&mut b);
     plates(&mut b);
 
@@ -36,7 +36,7 @@ pub(super) fn scene() -> Scene {
 
 /// Matt floor and backdrop. The floor's checker is faint enough to stay behind the subject and clear enough to be
 /// seen in a mirror.
-fn table(b: &mut Builder) {
+fn table(b: &mut StudyBuilder) {
     let checker = b.checker("table checker", [0.30, 0.30, 0.31], [0.43, 0.42, 0.41]);
     let matt = b.material(Material { base_color_texture: Some(checker), ..dielectric("table", [1.0; 3], 0.9) });
     // One repeat of eight squares on half a metre: 7 m by 3.5 m, from behind the camera to the backdrop.
@@ -47,7 +47,7 @@ fn table(b: &mut Builder) {
 
 /// The etalon itself. The plates stand near enough to each other for a chain of images, and open enough to
 /// look in.
-fn plates(b: &mut Builder) {
+fn plates(b: &mut StudyBuilder) {
     // Part metal, part clear glass: the metallic share reflects, the rest lets through.
     let silver = b.material(Material {
         base_color: [0.96, 0.96, 0.97, 1.0],
@@ -63,7 +63,7 @@ fn plates(b: &mut Builder) {
 }
 
 /// A glazed bowl with water. The water's side and foot lie inside the bowl's wall, so that no two surfaces coincide.
-fn basin(b: &mut Builder) {
+fn basin(b: &mut StudyBuilder) {
     let glaze = b.material(dielectric("glazed clay", [0.05, 0.12, 0.20], 0.25));
     let p = DVec2::new;
     let bowl = [
@@ -88,7 +88,7 @@ fn basin(b: &mut Builder) {
 
 /// A ball that glows on a thin stand. Its point light hangs below the ball: inside it, its own ball would
 /// shadow it. It ends before the backdrop, where the ball's shadow would tell.
-fn lamp(b: &mut Builder) {
+fn lamp(b: &mut StudyBuilder) {
     let (x, z, radius, height) = (0.56, -0.62, 0.05, 0.30);
     let brass = b.material(metal("brass", [0.89, 0.76, 0.43], 0.3));
     let p = DVec2::new;
@@ -103,11 +103,11 @@ fn lamp(b: &mut Builder) {
     let glow = b.material(emitter("lamp glow", [14.0, 8.4, 3.6]));
     b.add("lamp ball", Shape::sphere(radius, 32), glow, at(x, height, z, 0.0));
     let position = DVec3::new(x - 0.02, height - 0.06, z + 0.035);
-    b.stand_in("lamp", [0.60, 0.36, 0.15], LightKind::Point { position, range: Some(1.1) });
+    b.proxy("lamp", [0.60, 0.36, 0.15], LightKind::Point { position, range: Some(1.1) });
 }
 
 /// Two soft boxes, for the shine on glass and metal, and the lights that stand for them where only points light.
-fn studio(b: &mut Builder) {
+fn studio(b: &mut StudyBuilder) {
     let middle = DVec3::new(0.0, 0.15, 0.0);
     let key = b.material(emitter("key soft box", [5.0, 5.0, 5.0]));
     let key_at = DVec3::new(-1.5, 1.7, 0.7);
@@ -125,7 +125,7 @@ fn studio(b: &mut Builder) {
         inner: 30.0_f64.to_radians(),
         outer: 62.0_f64.to_radians(),
     };
-    b.stand_in("key", [15.0, 15.0, 15.0], kind);
+    b.proxy("key", [15.0, 15.0, 15.0], kind);
     let position = rim_at + (middle - rim_at).normalize() * 0.05;
-    b.stand_in("fill", [1.3, 1.5, 1.8], LightKind::Point { position, range: None });
+    b.proxy("fill", [1.3, 1.5, 1.8], LightKind::Point { position, range: None });
 }

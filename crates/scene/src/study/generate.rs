@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::build::{Builder, at, dielectric, emitter};
+use super::build::{StudyBuilder, at, dielectric, emitter};
 use super::shape::Shape;
 use crate::{LightKind, Material, Projection, Scene};
 
@@ -31,7 +31,7 @@ impl Pcg {
 /// lights of a smaller one in their places.
 #[must_use]
 pub fn lights(count: usize) -> Scene {
-    let mut b = Builder::new(&format!("lights({count})"));
+    let mut b = StudyBuilder::new(&format!("lights({count})"));
     let floor = b.material(dielectric("floor", [0.5; 3], 0.8));
     b.add("floor", Shape::plane(64.0, 64.0, 1), floor, DAffine3::IDENTITY);
     let clay = b.material(dielectric("clay", [0.7, 0.68, 0.65], 0.5));
@@ -59,7 +59,7 @@ pub fn lights(count: usize) -> Scene {
 /// One ball of about `triangles` triangles with hills and dents, 2 m across.
 #[must_use]
 pub fn sphere_field(triangles: usize) -> Scene {
-    let mut b = Builder::new(&format!("sphere_field({triangles})"));
+    let mut b = StudyBuilder::new(&format!("sphere_field({triangles})"));
     let clay = b.material(dielectric("clay", [0.7, 0.55, 0.42], 0.6));
     b.add("ball", Shape::displaced_sphere(1.0, triangles), clay, DAffine3::IDENTITY);
     let direction = DVec3::new(-0.5, -0.8, -0.6).normalize();
@@ -72,7 +72,7 @@ pub fn sphere_field(triangles: usize) -> Scene {
 /// picture, side by side; square `i` emits radiance (i + 1, 1, 1), so that a picture tells them apart.
 #[must_use]
 pub fn quads_at(distances: &[f64]) -> Scene {
-    let mut b = Builder::new(&format!("quads_at({})", distances.len()));
+    let mut b = StudyBuilder::new(&format!("quads_at({})", distances.len()));
     let count = distances.len().max(1) as f64;
     // Angular tangents: the row spans ±0.6 across, inside a 16:9 picture of 40° (±0.647).
     let pitch = 1.2 / count;
@@ -92,7 +92,7 @@ pub fn quads_at(distances: &[f64]) -> Scene {
 /// horizon: the case that asks most of texture filters.
 #[must_use]
 pub fn checker_plane(size: f64, repeats: f64) -> Scene {
-    let mut b = Builder::new("checker_plane");
+    let mut b = StudyBuilder::new("checker_plane");
     let checker = b.checker("checker", [0.02; 3], [0.9; 3]);
     let matt = b.material(Material { base_color_texture: Some(checker), ..dielectric("floor", [1.0; 3], 1.0) });
     b.add("floor", Shape::plane(size, size, 1).repeat_uv(repeats, repeats), matt, DAffine3::IDENTITY);

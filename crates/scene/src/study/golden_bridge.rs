@@ -4,12 +4,12 @@
 
 use glam::DVec3;
 
-use super::build::{Builder, at, dielectric, emitter};
+use super::build::{StudyBuilder, at, dielectric, emitter};
 use super::shape::Shape;
 use crate::{LightKind, Material, Scene};
 
 pub(super) fn scene() -> Scene {
-    let mut b = Builder::new("golden-bridge");
+    let mut b = StudyBuilder::new("golden-bridge");
     let water = b.material(Material { ior: 1.333, ..dielectric("water", [0.004, 0.007, 0.010], 0.3) });
     b.add("water", Shape::plane(400.0, 260.0, 1), water, at(0.0, 0.0, -80.0, 0.0));
     let dusk = b.material(emitter("dusk", [0.008, 0.013, 0.028]));
@@ -29,7 +29,7 @@ pub(super) fn scene() -> Scene {
         b.place(&format!("lamp {i}"), lamp, at(x, 9.1, -89.8, 0.0));
         // The intensity of the ball's disc, before it.
         let color = [90.0, 55.0, 22.0].map(|radiance| radiance * std::f32::consts::PI * 0.09);
-        b.stand_in(&format!("lamp {i}"), color, LightKind::Point { position: DVec3::new(x, 9.1, -89.4), range: None });
+        b.proxy(&format!("lamp {i}"), color, LightKind::Point { position: DVec3::new(x, 9.1, -89.4), range: None });
     }
     b.camera("shore", DVec3::new(0.0, 4.0, 12.0), DVec3::new(0.0, 2.0, -90.0), 30.0);
     b.finish()

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
-use super::build::{Builder, at, dielectric, glass};
+use super::build::{StudyBuilder, at, dielectric, glass};
 use super::shape::Shape;
 use crate::{LightKind, Material, Scene, SigmaGrid};
 
@@ -15,7 +15,7 @@ const BODY: DVec3 = DVec3::new(1.6, 2.0, 1.6);
 const POINTS: [usize; 3] = [32, 40, 32];
 
 pub(super) fn scene() -> Scene {
-    let mut b = Builder::new("haze");
+    let mut b = StudyBuilder::new("haze");
     let checker = b.checker("floor checker", [0.30; 3], [0.62; 3]);
     let floor = b.material(Material { base_color_texture: Some(checker), ..dielectric("floor", [1.0; 3], 0.9) });
     b.add("floor", Shape::plane(9.0, 9.0, 1).repeat_uv(3.0, 3.0), floor, DAffine3::IDENTITY);

@@ -2,12 +2,12 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::build::{Builder, at, dielectric};
+use super::build::{StudyBuilder, at, dielectric};
 use super::shape::Shape;
 use crate::{LightKind, Material, Scene};
 
 pub(super) fn scene() -> Scene {
-    let mut b = Builder::new("lamps");
+    let mut b = StudyBuilder::new("lamps");
     let checker = b.checker("floor checker", [0.36; 3], [0.48; 3]);
     let floor = b.material(Material { base_color_texture: Some(checker), ..dielectric("floor", [1.0; 3], 0.9) });
     b.add("floor", Shape::plane(16.0, 12.0, 1).repeat_uv(4.0, 3.0), floor, DAffine3::IDENTITY);

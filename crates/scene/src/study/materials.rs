@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::build::{Builder, at, conductor, dielectric, emitter};
+use super::build::{StudyBuilder, at, conductor, dielectric, emitter};
 use super::shape::Shape;
 use crate::substance::GOLD;
 use crate::{LightKind, Material, Scene};
@@ -12,7 +12,7 @@ use crate::{LightKind, Material, Scene};
 const COLUMNS: u32 = 7;
 
 pub(super) fn scene() -> Scene {
-    let mut b = Builder::new("materials");
+    let mut b = StudyBuilder::new("materials");
     let checker = b.checker("wall checker", [0.22, 0.22, 0.23], [0.32, 0.32, 0.31]);
     let wall = b.material(Material { base_color_texture: Some(checker), ..dielectric("wall", [1.0; 3], 1.0) });
     b.add("wall", Shape::panel(9.0, 5.5).repeat_uv(4.5, 2.75), wall, at(0.0, 0.0, -0.6, 0.0));

@@ -2,13 +2,13 @@
 
 use glam::DVec3;
 
-use super::build::{Builder, at, conductor, dielectric, emitter, facing};
+use super::build::{StudyBuilder, at, conductor, dielectric, emitter, facing};
 use super::shape::Shape;
 use crate::substance::{ALUMINIUM, COPPER, GOLD, SILVER};
 use crate::{LightKind, Material, Scene};
 
 pub(super) fn scene() -> Scene {
-    let mut b = Builder::new("metals");
+    let mut b = StudyBuilder::new("metals");
     let checker = b.checker("floor checker", [0.10, 0.10, 0.11], [0.45, 0.45, 0.44]);
     let floor = b.material(Material { base_color_texture: Some(checker), ..dielectric("floor", [1.0; 3], 0.8) });
     b.add("floor", Shape::plane(8.0, 4.0, 1).repeat_uv(8.0, 4.0), floor, at(0.0, 0.0, 0.5, 0.0));

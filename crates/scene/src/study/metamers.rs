@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use super::build::{Builder, at, dielectric};
+use super::build::{StudyBuilder, at, dielectric};
 use super::shape::Shape;
 use crate::{Light, LightKind, Material, Scene};
 use etalon_optics::spectra::{Emission, chart, illuminant};
@@ -16,7 +16,7 @@ const PITCH: f64 = 0.1;
 const LIGHTS: [&str; 3] = ["d65", "a", "f11"];
 
 pub(super) fn scene() -> Scene {
-    let mut b = Builder::new("metamers");
+    let mut b = StudyBuilder::new("metamers");
     // Without a surface that mirrors: what is seen is the reflectance alone.
     let matt = |name: &str, color: [f32; 3]| Material { specular: 0.0, ..dielectric(name, color, 1.0) };
     let grey = b.material(matt("booth", [0.18; 3]));
@@ -55,7 +55,7 @@ pub(super) fn scene() -> Scene {
             color: emission.as_ref().map_or([1.0; 3], Emission::rgb),
             spectrum: emission,
             kind: LightKind::Spot { position, direction: DVec3::NEG_Z, range: None, inner: 0.44, outer: 0.47 },
-            stand_in: false,
+            proxy: false,
             extent: None,
         });
     }

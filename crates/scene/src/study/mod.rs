@@ -26,24 +26,35 @@ use anyhow::{Result, bail};
 
 use crate::Scene;
 
-/// Study scenes that can be loaded, the default one first.
-pub const NAMES: &[&str] = &[
-    "etalon",
-    "materials",
-    "lamps",
-    "radiance",
-    "cornell",
-    "metals",
-    "blend",
-    "pool",
-    "nested",
-    "haze",
-    "prism",
-    "metamers",
-    "absorber",
-    "golden-bridge",
-    "torture",
+/// Study scenes with one line about each, the default one first.
+pub const SCENES: [(&str, &str); 15] = [
+    ("etalon", "half-silvered plates that mirror each other, a prism, a gold and a glass ball, water in a basin"),
+    ("materials", "plastic, metal, clear coat and emission, from smooth to rough"),
+    ("lamps", "punctual lights: point, spot and directional"),
+    ("radiance", "emitters of equal radiance at different distance and tilt"),
+    ("cornell", "a box with a red and a green wall, lit by a panel"),
+    ("metals", "metals with measured n and κ"),
+    ("blend", "alpha-blended and alpha-tested surfaces"),
+    ("pool", "Snell's window from below the water"),
+    ("nested", "an air bubble in ice in water in glass: nested dielectrics"),
+    ("haze", "a heterogeneous absorbing medium"),
+    ("prism", "dispersion of a slit and a bar by dense flint"),
+    ("metamers", "a colour chart under daylight, a filament and a fluorescent lamp, with metamers"),
+    ("absorber", "slabs that absorb by path length"),
+    ("golden-bridge", "a lamp over water: the streak by three specular lobes"),
+    ("torture", "the hard cases in one scene"),
 ];
+
+/// Their names.
+pub const NAMES: [&str; SCENES.len()] = {
+    let mut names = [""; SCENES.len()];
+    let mut i = 0;
+    while i < names.len() {
+        names[i] = SCENES[i].0;
+        i += 1;
+    }
+    names
+};
 
 /// Generates the study scene `name`, as in `study:NAME` without the prefix.
 pub fn load(name: &str) -> Result<Scene> {

@@ -7,7 +7,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DAffine3, DQuat, DVec2, DVec3, EulerRot};
 
-use super::build::{Builder, at, dielectric, emitter, facing, glass};
+use super::build::{StudyBuilder, at, dielectric, emitter, facing, glass};
 use super::shape::{Shape, arc, line};
 use crate::{LightKind, Material, Scene};
 
@@ -15,7 +15,7 @@ use crate::{LightKind, Material, Scene};
 const LEVEL: f64 = 0.088;
 
 pub(super) fn scene() -> Scene {
-    let mut b = Builder::new("nested");
+    let mut b = StudyBuilder::new("nested");
     surroundings(&mut b);
     tumbler(&mut b);
     ice(&mut b);
@@ -33,7 +33,7 @@ fn medium(name: &str, ior: f32, thickness: f32, priority: i32) -> Material {
 }
 
 /// A table and a striped board, red on the left and blue on the right, so that a picture turned about is seen to be.
-fn surroundings(b: &mut Builder) {
+fn surroundings(b: &mut StudyBuilder) {
     let checker = b.checker("table checker", [0.22, 0.21, 0.20], [0.34, 0.33, 0.31]);
     let table = b.material(Material { base_color_texture: Some(checker), ..dielectric("table", [1.0; 3], 0.8) });
     b.add("table", Shape::plane(2.4, 1.6, 1).repeat_uv(12.0, 8.0), table, at(0.0, 0.0, 0.3, 0.0));
@@ -50,7 +50,7 @@ fn surroundings(b: &mut Builder) {
 }
 
 /// A thick-walled glass on a hair of air, and the water, whose side and foot lie in the middle of wall and base.
-fn tumbler(b: &mut Builder) {
+fn tumbler(b: &mut StudyBuilder) {
     let p = DVec2::new;
     let crown = b.material(medium("glass", 1.5, 0.005, 4));
     let outline = [
@@ -77,7 +77,7 @@ fn tumbler(b: &mut Builder) {
 }
 
 /// Three cubes that float with a corner or a face out of the water; the first has a bubble in it.
-fn ice(b: &mut Builder) {
+fn ice(b: &mut StudyBuilder) {
     let ice = b.material(medium("ice", 1.31, 0.022, 2));
     let cube = b.mesh("ice cube", Shape::cuboid(DVec3::splat(0.022)), ice);
     // A third of a turn apart; their corners reach 19 mm, so that 35 mm between their middles need only a little care.
@@ -98,7 +98,7 @@ fn ice(b: &mut Builder) {
 }
 
 /// A straw between two of the cubes: broken at the surface, swollen behind the glass.
-fn straw(b: &mut Builder) {
+fn straw(b: &mut StudyBuilder) {
     let spiral =
         b.picture("spiral", 64, |x, y| if (x + y) % 64 < 24 { [0.70, 0.10, 0.08, 1.0] } else { [0.8, 0.8, 0.8, 1.0] });
     let paper = b.material(Material { base_color_texture: Some(spiral), ..dielectric("paper", [1.0; 3], 0.7) });
@@ -110,7 +110,7 @@ fn straw(b: &mut Builder) {
 }
 
 /// Two soft boxes beside the camera for shine, and the lights that stand for them where only points light.
-fn lights(b: &mut Builder) {
+fn lights(b: &mut StudyBuilder) {
     let middle = DVec3::new(0.0, 0.07, 0.0);
     let boxes = [
         ("key", DVec3::new(-0.55, 0.55, 0.35), 0.40, 0.25, [6.0, 6.0, 6.0], [1.5, 1.5, 1.5]),

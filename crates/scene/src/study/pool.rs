@@ -3,7 +3,7 @@
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use super::build::{Builder, at, dielectric, emitter, glass, metal};
+use super::build::{StudyBuilder, at, dielectric, emitter, glass, metal};
 use super::shape::{Shape, arc, line};
 use crate::{LightKind, Material, Sampler, Scene, TextureRef, Wrap};
 
@@ -15,7 +15,7 @@ const RIM: f64 = 0.02;
 const INTO_WALL: f64 = 0.005;
 
 pub(super) fn scene() -> Scene {
-    let mut b = Builder::new("pool");
+    let mut b = StudyBuilder::new("pool");
     basin(&mut b);
     let water = b.material(Material {
         attenuation_color: [0.55, 0.86, 0.92],
@@ -40,7 +40,7 @@ pub(super) fn scene() -> Scene {
 }
 
 /// Matt tiles of 20 cm with grout, and a deck around them whose edge lies inside the tiled wall.
-fn basin(b: &mut Builder) {
+fn basin(b: &mut StudyBuilder) {
     let tiles = b.picture("tiles", 256, |x, y| {
         // Two texels of 32 are grout: 12.5 mm, more than a pool has, to be seen from its other end.
         let (column, row) = (x / 32, y / 32);
@@ -61,7 +61,7 @@ fn basin(b: &mut Builder) {
 }
 
 /// Rails that stand on the floor, rise through the surface and bend back to the deck.
-fn ladder(b: &mut Builder) {
+fn ladder(b: &mut StudyBuilder) {
     let steel = b.material(metal("steel", [0.56, 0.57, 0.58], 0.2));
     let (front, back, top, radius) = (-0.5 * POOL.z + 0.3, -0.5 * POOL.z - 0.45, 0.72, 0.025);
     let foot = -POOL.y - 0.02;
@@ -85,7 +85,7 @@ fn ladder(b: &mut Builder) {
 }
 
 /// One on the floor, where the swimmer sees it only in the mirror outside the window, and one that floats.
-fn balls(b: &mut Builder) {
+fn balls(b: &mut StudyBuilder) {
     let red = b.material(dielectric("red rubber", [0.70, 0.06, 0.04], 0.6));
     b.add("ball", Shape::sphere(0.35, 48), red, at(3.1, -POOL.y + 0.3501, -0.9, 0.0));
     let yellow = b.material(dielectric("yellow rubber", [0.80, 0.52, 0.04], 0.6));
@@ -93,7 +93,7 @@ fn balls(b: &mut Builder) {
 }
 
 /// What the window compresses: low things near its rim, high ones near its middle.
-fn things_above(b: &mut Builder) {
+fn things_above(b: &mut StudyBuilder) {
     let board = b.material(dielectric("board", [0.10, 0.30, 0.62], 0.5));
     b.add("diving board", Shape::cuboid(DVec3::new(3.6, 0.06, 0.5)), board, at(-4.2, 1.03, -0.6, 0.0));
     let white = b.material(dielectric("white paint", [0.75; 3], 0.7));
@@ -114,7 +114,7 @@ fn things_above(b: &mut Builder) {
 }
 
 /// A dome that shines inwards, from the zenith down past the horizon, so that the window is bright up to its rim.
-fn sky(b: &mut Builder) {
+fn sky(b: &mut StudyBuilder) {
     let radius = 14.0;
     let lowest = -20.0_f64.to_radians();
     // From the top downwards the right of the direction of travel is the inside.
@@ -132,7 +132,7 @@ fn sky(b: &mut Builder) {
 }
 
 /// The sun, and two lamps in the walls that light the pool where light does not pass the surface.
-fn lamps(b: &mut Builder) {
+fn lamps(b: &mut StudyBuilder) {
     let direction = DVec3::new(0.45, -1.0, -0.35).normalize();
     b.light("sun", [3.2, 3.0, 2.7], LightKind::Directional { direction });
     let glow = b.material(emitter("lamp glow", [6.0, 5.6, 4.8]));

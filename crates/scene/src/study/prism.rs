@@ -3,7 +3,7 @@
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
-use super::build::{Builder, at, dielectric, emitter, facing, medium};
+use super::build::{StudyBuilder, at, dielectric, emitter, facing, medium};
 use super::shape::Shape;
 use crate::substance::SF10;
 use crate::{LightKind, Material, Scene};
@@ -15,7 +15,7 @@ const TO_EYE: f64 = 1.2;
 const TO_SLIT: f64 = 3.0;
 
 pub(super) fn scene() -> Scene {
-    let mut b = Builder::new("prism");
+    let mut b = StudyBuilder::new("prism");
     // Turned so that yellow light passes with the least deviation: the ray inside is parallel to the base.
     let deviation = 2.0 * (SF10.n * (0.5 * APEX).sin()).asin() - APEX;
     let flint = b.material(Material { thickness: 0.1, transmission: 1.0, roughness: 0.0, ..medium("flint", SF10) });

@@ -3,12 +3,12 @@
 
 use glam::DVec3;
 
-use super::build::{Builder, at, dielectric, emitter};
+use super::build::{StudyBuilder, at, dielectric, emitter};
 use super::shape::Shape;
 use crate::{Material, Scene};
 
 pub(super) fn scene() -> Scene {
-    let mut b = Builder::new("radiance");
+    let mut b = StudyBuilder::new("radiance");
     let emitting = b.material(Material { double_sided: true, ..emitter("emitter of radiance 1", [1.0; 3]) });
     // The same radiance by the other road: shown as it is.
     let unlit =

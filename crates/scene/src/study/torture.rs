@@ -3,7 +3,7 @@
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use super::build::{Builder, at, conductor, dielectric, emitter, facing, glass, metal};
+use super::build::{StudyBuilder, at, conductor, dielectric, emitter, facing, glass, metal};
 use super::shape::Shape;
 use crate::substance::SILVER;
 use crate::{LightKind, Material, Scene};
@@ -12,7 +12,7 @@ use crate::{LightKind, Material, Scene};
 const FAR: DVec3 = DVec3::new(10_000.3, 0.0, -7_000.7);
 
 pub(super) fn scene() -> Scene {
-    let mut b = Builder::new("torture");
+    let mut b = StudyBuilder::new("torture");
     let far = DAffine3::from_translation(FAR);
     let here = |x: f64, y: f64, z: f64, turn: f64| far * at(x, y, z, turn);
 
@@ -56,7 +56,7 @@ pub(super) fn scene() -> Scene {
     let spark = b.material(emitter("spark", [2.0e5, 1.8e5, 1.5e5]));
     b.add("spark", Shape::sphere(0.001, 16), spark, here(-0.95, 0.55, 0.5, 0.0));
     let position = FAR + DVec3::new(-0.95, 0.548, 0.5);
-    b.stand_in("spark lamp", [0.63, 0.57, 0.47], LightKind::Point { position, range: None });
+    b.proxy("spark lamp", [0.63, 0.57, 0.47], LightKind::Point { position, range: None });
     let sheet = b.material(emitter("sheet", [2.2, 2.3, 2.5]));
     let above = DVec3::new(0.3, 2.2, 0.6);
     b.add("sheet", Shape::panel(1.0, 1.0), sheet, far * facing(above, DVec3::NEG_Y));
@@ -67,7 +67,7 @@ pub(super) fn scene() -> Scene {
         inner: 0.6,
         outer: 1.4,
     };
-    b.stand_in("sheet lamp", [2.2, 2.3, 2.5], kind);
+    b.proxy("sheet lamp", [2.2, 2.3, 2.5], kind);
     b.camera("front", FAR + DVec3::new(0.05, 0.42, 2.3), FAR + DVec3::new(0.03, 0.2, 0.0), 34.0);
     b.studio(0.3);
     b.finish()

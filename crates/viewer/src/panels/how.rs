@@ -2,14 +2,14 @@
 
 use egui::{RichText, Ui};
 
-use super::{State, go_to};
+use super::{PanelState, go_to};
 use crate::layer::LAYERS;
-use crate::shared::Seen;
+use crate::shared::RenderState;
 use etalon::image::tone::ToneMap;
 use etalon::plan::{Effect, EffectId, EffectState, KNOBS, Knobs, Model};
 
 /// How it is drawn: display, time, cameras, what it is compared with, model and knobs.
-pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
+pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     ui.heading("Display");
     egui::Grid::new("display").num_columns(2).show(ui, |ui| {
         ui.label("exposure");
@@ -63,8 +63,8 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
             let reason = called_for(&effects, knob.effects);
             let label = if reason.is_some() { RichText::new(knob.name).weak() } else { RichText::new(knob.name) };
             let label = if state.knob == Some(index) { label.underline() } else { label };
-            let about = reason
-                .map_or_else(|| knob.about.to_owned(), |reason| format!("{}; not called for: {reason}", knob.about));
+            let about =
+                reason.map_or_else(|| knob.about.to_owned(), |reason| format!("{}; not needed: {reason}", knob.about));
             ui.label(label).on_hover_text(about);
             let now = knob.rung(state.knobs());
             egui::ComboBox::from_id_salt(knob.name).width(96.0).selected_text(now).show_ui(ui, |ui| {
@@ -86,7 +86,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
 }
 
 /// Time of a scene that moves.
-fn time(ui: &mut Ui, state: &mut State, seen: &Seen) {
+fn time(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     let Some(duration) = seen.facts.as_ref().and_then(|facts| facts.duration) else { return };
     ui.separator();
     ui.heading("Time");
@@ -108,7 +108,7 @@ fn time(ui: &mut Ui, state: &mut State, seen: &Seen) {
 }
 
 /// What is compared, and which side is chosen.
-fn sides(ui: &mut Ui, state: &mut State) {
+fn sides(ui: &mut Ui, state: &mut PanelState) {
     let mut compares = state.other.is_some();
     if ui.checkbox(&mut compares, "compare two settings (V)").changed() {
         state.compare(compares);
@@ -140,7 +140,7 @@ fn called_for(known: &[Effect], effects: &[EffectId]) -> Option<String> {
 }
 
 /// What a rung was measured to cost and to be wrong by, from `local` or the reference's rungs.
-fn price(seen: &Seen, knob: &str, rung: &str) -> String {
+fn price(seen: &RenderState, knob: &str, rung: &str) -> String {
     let Some(table) = seen.facts.as_ref().and_then(|facts| facts.prices.as_ref()) else { return String::new() };
     let found = table.prices.iter().find(|price| price.knob == knob && price.to == rung);
     found.map_or_else(String::new, |price| {

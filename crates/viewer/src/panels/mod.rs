@@ -1,4 +1,4 @@
-//! The panels: egui over what the worker has seen. They change [`State`] and ask for the rest by [`Action`].
+//! The panels: egui over what the worker has seen. They change [`PanelState`] and ask for the rest by [`Action`].
 
 mod how;
 mod picture;
@@ -12,9 +12,9 @@ use egui::{Key, Modifiers, Ui};
 use egui_file_dialog::{DialogState, FileDialog};
 
 use super::clock::Clock;
-use super::layer::Layer;
+use super::layer::SurfaceLayer;
 use super::navigation::Navigation;
-use super::shared::{Pick, Seen};
+use super::shared::{Pick, RenderState};
 use etalon::frame::Settings;
 use etalon::gpu::{DeviceInfo, PassTime};
 use etalon::plan::{KNOBS, Knobs};
@@ -42,7 +42,7 @@ pub enum Action {
 }
 
 /// What is looked at, and how.
-pub struct State {
+pub struct PanelState {
     /// Where from; `None` until there is a scene.
     pub navigation: Option<Navigation>,
     /// How it is drawn; the size is the picture's.
@@ -58,7 +58,7 @@ pub struct State {
     /// Time of the scene.
     pub clock: Clock,
     /// What is shown of it.
-    pub layer: Layer,
+    pub layer: SurfaceLayer,
     /// Whether panels lie beside it.
     pub panels: bool,
     /// Whether the keys are told.
@@ -83,14 +83,14 @@ pub struct State {
     /// Pixels that were asked about so far.
     picks: u64,
     /// What was found at the last of them.
-    pixel: Option<pixel::Facts>,
+    pixel: Option<pixel::PixelFacts>,
     /// The event under the pointer.
     pointed: Option<usize>,
     /// Seconds of the interface when the scene's time went on last.
     played_at: f64,
 }
 
-impl State {
+impl PanelState {
     /// Begins with settings.
     #[must_use]
     pub fn new(settings: Settings, device: DeviceInfo, recent: Vec<PathBuf>) -> Self {
@@ -102,7 +102,7 @@ impl State {
             knob: None,
             wipe: 0.5,
             clock: Clock::default(),
-            layer: Layer::Radiance,
+            layer: SurfaceLayer::Radiance,
             panels: true,
             help: false,
             picked: None,
@@ -128,7 +128,7 @@ impl State {
     /// Whether surfaces at the pixels have to be known.
     #[must_use]
     pub fn wants_surfaces(&self) -> bool {
-        self.layer != Layer::Radiance || self.picked.is_some() || self.other.is_some()
+        self.layer != SurfaceLayer::Radiance || self.picked.is_some() || self.other.is_some()
     }
 
     /// The first column of the window that is right of the wipe.
@@ -193,7 +193,7 @@ impl State {
 }
 
 /// One frame of the interface.
-pub fn show(root: &mut Ui, state: &mut State, seen: &Seen) -> Vec<Action> {
+pub fn show(root: &mut Ui, state: &mut PanelState, seen: &RenderState) -> Vec<Action> {
     let mut actions = Vec::new();
     state.moved = false;
     state.pointed = None;
@@ -226,7 +226,7 @@ pub fn show(root: &mut Ui, state: &mut State, seen: &Seen) -> Vec<Action> {
 }
 
 /// Lets the time of a scene that is played go on, once the last one is seen: what is drawn slowly is played slowly, and not in jumps.
-fn play(ui: &Ui, state: &mut State, seen: &Seen) {
+fn play(ui: &Ui, state: &mut PanelState, seen: &RenderState) {
     let now = ui.input(|input| input.time);
     let since = now - std::mem::replace(&mut state.played_at, now);
     let Some(duration) = seen.facts.as_ref().and_then(|facts| facts.duration).filter(|_| state.clock.playing) else {
@@ -242,7 +242,7 @@ fn play(ui: &Ui, state: &mut State, seen: &Seen) {
 }
 
 /// The file, the device and the picture's state, in a line; where that is short, words make room for buttons.
-fn bar(ui: &mut Ui, state: &mut State, seen: &Seen, actions: &mut Vec<Action>) {
+fn bar(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, actions: &mut Vec<Action>) {
     let (mut opened, mut asked) = (None, Vec::new());
     let helps = &mut state.help;
     let dialog = &mut state.dialog;
@@ -306,7 +306,7 @@ fn bar(ui: &mut Ui, state: &mut State, seen: &Seen, actions: &mut Vec<Action>) {
 }
 
 /// What went wrong, what takes long, what was done.
-fn notices(ui: &mut Ui, state: &mut State, seen: &Seen) {
+fn notices(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     let area = |id: &str, offset: f32| {
         egui::Area::new(egui::Id::new(id.to_owned())).anchor(egui::Align2::CENTER_BOTTOM, egui::vec2(0.0, offset))
     };
@@ -353,7 +353,7 @@ const KEYS: &[(&str, &str)] = &[
     ("H, ?", "this"),
 ];
 
-fn help(ui: &mut Ui, state: &mut State) {
+fn help(ui: &mut Ui, state: &mut PanelState) {
     let mut open = true;
     let middle = ui.ctx().content_rect().center();
     let window = egui::Window::new("Keys").pivot(egui::Align2::CENTER_CENTER).default_pos(middle);
@@ -370,7 +370,7 @@ fn help(ui: &mut Ui, state: &mut State) {
     state.help &= open;
 }
 
-fn go_to(state: &mut State, seen: &Seen, index: usize) {
+fn go_to(state: &mut PanelState, seen: &RenderState, index: usize) {
     let camera = seen.facts.as_ref().and_then(|facts| facts.cameras.get(index));
     if let (Some(navigation), Some(camera)) = (&mut state.navigation, camera) {
         navigation.go_to(camera.clone(), Some(camera.name.clone()));
@@ -378,7 +378,7 @@ fn go_to(state: &mut State, seen: &Seen, index: usize) {
     }
 }
 
-fn keys(ui: &mut Ui, state: &mut State, seen: &Seen, actions: &mut Vec<Action>) {
+fn keys(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, actions: &mut Vec<Action>) {
     for file in ui.input(|input| input.raw.dropped_files.clone()) {
         actions.push(Action::Open(file.path().to_owned()));
     }

@@ -3,10 +3,10 @@
 use egui::{Align2, Color32, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, Sense, Stroke, Ui};
 use glam::{DVec2, DVec3};
 
-use super::State;
+use super::PanelState;
 use super::pixel::{colour, incidence};
-use crate::layer::Layer;
-use crate::shared::{Pick, Seen, Trace};
+use crate::layer::SurfaceLayer;
+use crate::shared::{Pick, RenderState, Trace};
 use etalon::plan::KNOBS;
 use etalon::scene::{Camera, Projection};
 use etalon::transport::events::Way;
@@ -15,7 +15,7 @@ use etalon::transport::events::Way;
 const PACE: f64 = 0.5;
 
 /// What is left of the window.
-pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
+pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     let rect = ui.available_rect_before_wrap();
     let scale = ui.ctx().pixels_per_point();
     let corner = |p: egui::Pos2| [(p.x * scale).round() as i32, (p.y * scale).round() as i32];
@@ -81,7 +81,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
     {
         rays(&painter, rect, &navigation.camera(), trace, state.pointed);
     }
-    if state.other.is_some() && state.layer == Layer::Radiance {
+    if state.other.is_some() && state.layer == SurfaceLayer::Radiance {
         wipe(ui, rect, state, seen);
         under_pointer(ui, rect, under, seen);
     }
@@ -101,7 +101,7 @@ fn touchpad(ui: &Ui) -> Option<egui::Vec2> {
 }
 
 /// The line between both sides, and what each took.
-fn wipe(ui: &mut Ui, rect: Rect, state: &mut State, seen: &Seen) {
+fn wipe(ui: &mut Ui, rect: Rect, state: &mut PanelState, seen: &RenderState) {
     let scale = ui.ctx().pixels_per_point();
     let x = state.wipe_column() as f32 / scale;
     let handle = Rect::from_min_max(Pos2::new(x - 5.0, rect.top()), Pos2::new(x + 5.0, rect.bottom()));
@@ -124,7 +124,7 @@ fn wipe(ui: &mut Ui, rect: Rect, state: &mut State, seen: &Seen) {
 }
 
 /// What one side of the wipe is drawn with, what that took, and how wrong it is.
-fn account(side: usize, seen: &Seen) -> Option<String> {
+fn account(side: usize, seen: &RenderState) -> Option<String> {
     let shown = seen.sides[side].shown.as_ref()?;
     let other = seen.sides[1 - side].shown.as_ref().map_or(&shown.knobs, |other| &other.knobs);
     let differs = KNOBS.iter().filter(|knob| knob.place(&shown.knobs) != knob.place(other));
@@ -162,7 +162,7 @@ fn label(painter: &egui::Painter, at: Pos2, align: Align2, text: &str) {
 }
 
 /// Radiance of both sides at the pixel under the pointer, and the angle under which its surface is seen.
-fn under_pointer(ui: &Ui, rect: Rect, under: Option<[u32; 2]>, seen: &Seen) {
+fn under_pointer(ui: &Ui, rect: Rect, under: Option<[u32; 2]>, seen: &RenderState) {
     let (Some([x, y]), Some(surfaces)) = (under, seen.now()) else { return };
     let [width, height] = surfaces.size;
     if x >= width || y >= height {
@@ -185,7 +185,7 @@ fn under_pointer(ui: &Ui, rect: Rect, under: Option<[u32; 2]>, seen: &Seen) {
 fn rays(painter: &egui::Painter, rect: Rect, camera: &Camera, trace: &Trace, pointed: Option<usize>) {
     for (index, event) in trace.events.iter().enumerate() {
         // What leaves the scene has no end: some of it is enough.
-        let leaves = event.met.is_none() && !matches!(event.way, Way::ToLight(_));
+        let leaves = event.interaction.is_none() && !matches!(event.way, Way::ToLight(_));
         let to = if leaves { event.from.lerp(event.to, 0.25) } else { event.to };
         let Some([a, b]) = on_screen(camera, rect, [event.from, to]) else { continue };
         let width = if pointed == Some(index) { 4.0 } else { 1.5 };
@@ -195,7 +195,7 @@ fn rays(painter: &egui::Painter, rect: Rect, camera: &Camera, trace: &Trace, poi
             painter.line_segment([a, b], Stroke::new(width + 2.0, Color32::from_black_alpha(150)));
             painter.line_segment([a, b], Stroke::new(width, colour(event)));
         }
-        if event.met.is_some() {
+        if event.interaction.is_some() {
             painter.circle(b, width + 1.5, colour(event), Stroke::new(1.0, Color32::BLACK));
         }
     }

@@ -3,17 +3,17 @@
 use egui::{Color32, Pos2, Sense, Stroke, Ui};
 use glam::DVec3;
 
-use super::State;
+use super::PanelState;
 use crate::equations::used;
-use crate::shared::{SceneFacts, Seen, Surfaces, Trace};
+use crate::shared::{PixelSurfaces, RenderState, SceneFacts, Trace};
 use etalon::optics::fresnel::{fresnel_conductor, fresnel_dielectric};
 use etalon::scene::Material;
 use etalon::share::AovPixel;
 use etalon::spectra::VISIBLE;
-use etalon::transport::events::{Event, GREEN, Met, Way};
+use etalon::transport::events::{Event, GREEN, Interaction, Way};
 
 /// What lies at a pixel, as it was found when it was asked about.
-pub(super) struct Facts {
+pub(super) struct PixelFacts {
     surface: AovPixel,
     /// Of each side.
     radiance: Vec<[f32; 4]>,
@@ -27,22 +27,22 @@ pub(super) fn incidence(p: &AovPixel) -> f64 {
 }
 
 /// Takes what is known of the pixel, while the scene is seen from where it was asked about; whether it is.
-fn look(state: &mut State, trace: &Trace, seen: &Seen) -> bool {
+fn look(state: &mut PanelState, trace: &Trace, seen: &RenderState) -> bool {
     if state.navigation.as_ref().is_none_or(|navigation| navigation.camera() != trace.seen_from) {
         return false;
     }
-    let is_of = |surfaces: &&Surfaces| surfaces.size == trace.size && surfaces.seen_from == trace.seen_from;
+    let is_of = |surfaces: &&PixelSurfaces| surfaces.size == trace.size && surfaces.seen_from == trace.seen_from;
     let Some(surfaces) = seen.now().filter(is_of) else { return true };
     let ([x, y], [width, height]) = (trace.pixel, surfaces.size);
     if x < width && y < height {
         let at = (y * width + x) as usize;
         let radiance = surfaces.radiance.iter().map(|side| side[at]).collect();
-        state.pixel = Some(Facts { surface: surfaces.pixels[at], radiance, eye: surfaces.eye });
+        state.pixel = Some(PixelFacts { surface: surfaces.pixels[at], radiance, eye: surfaces.eye });
     }
     true
 }
 
-pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
+pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     let Some(picked) = state.picked else {
         ui.weak("Ctrl+click a pixel to ask about it.");
         return;
@@ -55,8 +55,8 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
     let is_there = look(state, trace, seen);
     match &state.pixel {
         Some(facts) => {
-            let met = trace.events.first().and_then(|event| event.met);
-            surface(ui, trace.pixel, facts, scene, met);
+            let interaction = trace.events.first().and_then(|event| event.interaction);
+            surface(ui, trace.pixel, facts, scene, interaction);
         }
         None if is_there => drop(ui.weak("once the picture is finished …")),
         None => drop(ui.weak("the view moved before the picture was finished: Ctrl+Z goes back")),
@@ -80,7 +80,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
 }
 
 /// The surface at the pixel.
-fn surface(ui: &mut Ui, [x, y]: [u32; 2], facts: &Facts, scene: &SceneFacts, met: Option<Met>) {
+fn surface(ui: &mut Ui, [x, y]: [u32; 2], facts: &PixelFacts, scene: &SceneFacts, interaction: Option<Interaction>) {
     let p = &facts.surface;
     let material = (p.material as usize).checked_sub(1).and_then(|index| scene.materials.get(index));
     egui::Grid::new("pixel").num_columns(2).striped(true).show(ui, |ui| {
@@ -110,8 +110,8 @@ fn surface(ui: &mut Ui, [x, y]: [u32; 2], facts: &Facts, scene: &SceneFacts, met
         row("roughness", format!("{:.4}", p.roughness));
         row("metallic", format!("{:.4}", p.metallic));
         row("incidence", format!("{:.2}°", incidence(p).acos().to_degrees()));
-        if let (Some(m), Some(met)) = (material, met) {
-            indices(&mut row, m, met);
+        if let (Some(m), Some(interaction)) = (material, interaction) {
+            indices(&mut row, m, interaction);
         }
     });
     if let Some(m) = material.filter(|m| m.conductor_spectra.is_some() || varies(m)) {
@@ -126,7 +126,7 @@ fn varies(m: &Material) -> bool {
 
 /// n and κ, at three wavelengths where they differ, and the share that is mirrored of green light and, where only the index decides, of
 /// the others.
-fn indices(row: &mut impl FnMut(&str, String), m: &Material, met: Met) {
+fn indices(row: &mut impl FnMut(&str, String), m: &Material, interaction: Interaction) {
     let [green, _] = m.complex_index(GREEN);
     if m.metallic >= 1.0 && m.conductor.is_none() {
         row("n, κ", "not told: base colour is F0".to_owned());
@@ -136,16 +136,17 @@ fn indices(row: &mut impl FnMut(&str, String), m: &Material, met: Met) {
         for nm in [650.0, GREEN, 450.0] {
             let [n, kappa] = m.complex_index(nm);
             // Other light has another ratio where the medium on one of the sides disperses.
-            let ratio = if met.ratio < 1.0 { met.ratio * green / n } else { met.ratio * n / green };
+            let ratio =
+                if interaction.ratio < 1.0 { interaction.ratio * green / n } else { interaction.ratio * n / green };
             let share = if kappa > 0.0 {
-                fresnel_conductor(met.cos, n, kappa)[0]
+                fresnel_conductor(interaction.cos, n, kappa)[0]
             } else {
-                fresnel_dielectric(met.cos, ratio)[0]
+                fresnel_dielectric(interaction.cos, ratio)[0]
             };
             row(&format!("n, κ at {nm} nm"), format!("{n:.4} {kappa:.4}, F {:.2} %", 100.0 * share));
         }
     }
-    row("Fresnel", format!("{:.3} % mirrored", 100.0 * met.reflected));
+    row("Fresnel", format!("{:.3} % mirrored", 100.0 * interaction.reflected));
 }
 
 /// n and κ over visible light.
@@ -179,7 +180,7 @@ fn depth(events: &[Event], index: usize) -> usize {
 
 /// Colour of a ray.
 pub(super) fn colour(event: &Event) -> Color32 {
-    match (event.way, event.met) {
+    match (event.way, event.interaction) {
         (Way::Seen, _) => Color32::WHITE,
         (Way::Mirrored, _) => Color32::from_rgb(230, 159, 0),
         (Way::Bent, _) => Color32::from_rgb(86, 180, 233),
@@ -191,42 +192,42 @@ pub(super) fn colour(event: &Event) -> Color32 {
 
 /// One event in words; whether the pointer is on it.
 fn told(ui: &mut Ui, event: &Event, depth: usize, scene: &SceneFacts) -> bool {
-    let name = |met: &Met| {
-        let material = scene.materials.get(met.material).map_or("", |m| &m.name);
-        let instance = scene.instances.get(met.instance).map_or("", |name| name.as_str());
+    let name = |interaction: &Interaction| {
+        let material = scene.materials.get(interaction.material).map_or("", |m| &m.name);
+        let instance = scene.instances.get(interaction.instance).map_or("", |name| name.as_str());
         if instance.is_empty() { material.to_owned() } else { instance.to_owned() }
     };
     let share = format!("{:.1} %", 100.0 * event.share);
     let length = event.from.distance(event.to);
-    let text = match (event.way, &event.met) {
-        (Way::ToLight(index), met) => {
+    let text = match (event.way, &event.interaction) {
+        (Way::ToLight(index), interaction) => {
             let light = scene.lights.get(index).map_or("", |light| &light.name);
-            match met {
+            match interaction {
                 None => format!("to light {index} {light}: {length:.3} m, free"),
-                Some(met) => {
-                    let lets_through = scene.materials.get(met.material).is_some_and(|m| m.transmission > 0.0);
+                Some(interaction) => {
+                    let lets_through = scene.materials.get(interaction.material).is_some_and(|m| m.transmission > 0.0);
                     let how = if lets_through { ", which lets light through, lies" } else { " stands" };
-                    format!("to light {index} {light}: {}{how} before it", name(met))
+                    format!("to light {index} {light}: {}{how} before it", name(interaction))
                 }
             }
         }
-        (way, met) => {
+        (way, interaction) => {
             let way = match way {
                 Way::Seen => "seen",
                 Way::Mirrored => "mirrored",
                 Way::Bent => "bent",
                 _ => "straight on",
             };
-            match met {
+            match interaction {
                 None => format!("{way} {share}: out of the scene"),
-                Some(met) => {
-                    let thrown = if met.total { ", totally reflected (F6)" } else { "" };
+                Some(interaction) => {
+                    let thrown = if interaction.total { ", totally reflected (F6)" } else { "" };
                     format!(
                         "{way} {share}: {} after {length:.4} m, {:.2}°, n₂/n₁ {:.4}, mirrors {:.2} %{thrown}",
-                        name(met),
-                        met.cos.acos().to_degrees(),
-                        met.ratio,
-                        100.0 * met.reflected
+                        name(interaction),
+                        interaction.cos.acos().to_degrees(),
+                        interaction.ratio,
+                        100.0 * interaction.reflected
                     )
                 }
             }

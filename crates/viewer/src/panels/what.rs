@@ -2,8 +2,8 @@
 
 use egui::{Color32, Sense, Ui};
 
-use super::{HISTORY, State, pixel};
-use crate::shared::Seen;
+use super::{HISTORY, PanelState, pixel};
+use crate::shared::RenderState;
 use etalon::gpu::PassTime;
 use etalon::plan::EffectState;
 
@@ -20,7 +20,7 @@ const COLOURS: [Color32; 8] = [
 ];
 
 /// What is seen: a picked pixel, times, the plan.
-pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
+pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     ui.heading("Pixel");
     pixel::show(ui, state, seen);
     ui.separator();
@@ -47,7 +47,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut State, seen: &Seen) {
 }
 
 /// Pass times of the last pictures, one upon the other.
-fn times(ui: &mut Ui, state: &State) {
+fn times(ui: &mut Ui, state: &PanelState) {
     let Some(last) = state.history.back() else { return };
     let total = |passes: &Vec<PassTime>| passes.iter().map(|pass| pass.ms).sum::<f64>();
     let most = state.history.iter().map(total).fold(1e-6, f64::max);

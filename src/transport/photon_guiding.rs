@@ -1,10 +1,13 @@
-//! Where light comes from by way of what mirrors and bends it: places that paths aim at. A path that goes on from a wall in any
-//! direction hardly ever meets the small part of a ball in which the lamp is seen, and is very bright when it does. Light
-//! is therefore sent the other way first, a little of it, and what it last left before each part of the scene is kept.
+//! Path guiding by photons: the guiding distribution of path tracing, from photon mapping.
 //!
-//! Aims only say where paths go more often (photon maps as densities: Jensen, "Importance driven path tracing using the photon
-//! map", 1995). They are weighted by the density with which they are drawn, so that however few or wrong they are, the
-//! picture is the same in the mean.
+//! Read Jensen 1995, "Importance Driven Path Tracing using the Photon Map"; pbrt (4th ed.), section 13.4 (path tracing).
+//! BSDF sampling at a diffuse surface rarely hits the small part of a sphere in which the lamp is seen, and the path is then
+//! very bright (a caustic). A few photons are therefore traced from the lights first. For each cell of a grid over the scene, the points
+//! that photons last left before they arrived in the cell are covered by a few bounding spheres. A path in the cell samples
+//! the cones of these spheres.
+//!
+//! The guiding distribution only changes how often paths take a direction. The mixture density with BSDF sampling divides the
+//! estimate, so the expected picture is the same, however few or wrong the photons are.
 
 use std::collections::HashMap;
 
@@ -12,95 +15,95 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::bvh::Bvh;
-use super::emitters::{Emitter, Emitters, Source};
+use super::emitters::{Emitter, EmitterSource, Emitters};
 use super::layers::{Layer, Layers, Media, coverage};
 pub use super::layers::{SMOOTHEST, is_smooth};
 use super::line::{self, Crossing};
 use crate::scene::solid::Solids;
 use crate::scene::{Instance, Scene};
-use crate::share::AIM_COUNT_BITS;
+use crate::share::GUIDING_COUNT_BITS;
 
-/// Photons that are sent.
+/// Number of photons.
 const PHOTONS: u64 = 1 << 19;
-/// Surfaces that one of them may meet.
+/// Largest number of surfaces along a photon's path.
 const MOST_SURFACES: usize = 12;
 /// Cells along the longest side of the scene.
 const CELLS: f64 = 32.0;
-/// Aims of one cell: shaders/lib/aims.glsl goes through all of them for each direction that it weighs.
-const MOST_AIMS: usize = 8;
-const _: () = assert!(MOST_AIMS < 1 << AIM_COUNT_BITS);
-/// Photons that the aims of one cell are made from.
+/// Largest number of spheres per cell: shaders/lib/path_guiding.glsl loops over all of them to evaluate the density.
+const MOST_SPHERES: usize = 8;
+const _: () = assert!(MOST_SPHERES < 1 << GUIDING_COUNT_BITS);
+/// Largest number of photons from which a cell's spheres are made.
 const MOST_PHOTONS: usize = 96;
-/// Radii of what is aimed at, in cells.
+/// Candidate radii of the spheres, in cells.
 const RADII: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
-/// Around them: few photons do not tell where what they stand for ends.
+/// Factor on the radii: few photons do not show the extent of the region that they represent.
 const MARGIN: f64 = 1.2;
-/// Steps of shares in 1: no more than a half holds exactly.
+/// Probabilities are multiples of 1/1024, which a half float stores exactly.
 const SHARES: f64 = 1024.0;
-/// Least share over the largest of its cell.
+/// Smallest score of a sphere relative to the largest of its cell.
 const WORTH_AIMING: f64 = 0.05;
 
-/// Balls around what light last left, for each cell of a grid.
+/// The guiding distribution: bounding spheres of the points that light last left, for each cell of a grid.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Aims {
-    /// Least corner of the grid, in bvh space.
+pub struct PhotonGuiding {
+    /// Smallest corner of the grid, in bvh space.
     pub corner: DVec3,
-    /// Length of a cell's sides, metres.
+    /// Side of a cell in metres.
     pub cell: f64,
-    /// How many cells there are along x, y and z; x varies fastest.
+    /// Number of cells along x, y and z; x varies fastest.
     pub cells: [u32; 3],
-    /// For each cell its first aim `<<` [`AIM_COUNT_BITS`] `|` how many it has.
+    /// For each cell the index of its first sphere `<<` [`GUIDING_COUNT_BITS`] `|` its number of spheres.
     pub firsts: Vec<u32>,
-    /// What is aimed at from the cells, one cell after the other.
-    pub aims: Vec<Ball>,
+    /// The spheres of all cells, one cell after the other.
+    pub spheres: Vec<GuidingBall>,
 }
 
-/// What paths aim at.
+/// A bounding sphere of the guiding distribution.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ball {
-    /// In bvh space.
+pub struct GuidingBall {
+    /// Centre in bvh space.
     pub middle: DVec3,
-    /// Metres.
+    /// Radius in metres.
     pub radius: f64,
-    /// Of the aims of its cell.
+    /// Probability among the spheres of its cell.
     pub share: f64,
 }
 
-/// Light that arrived at a surface that spreads it.
+/// A photon that arrived at a diffuse or glossy surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Photon {
     at: DVec3,
-    /// Where it left the surface before.
+    /// The point on the previous surface that the photon left.
     from: DVec3,
 }
 
-/// A line along which light is sent.
+/// A ray of a photon.
 struct Beam {
     origin: DVec3,
     direction: DVec3,
     media: Media,
 }
 
-/// What photons go through.
-struct World<'a> {
+/// The scene that photons are traced through.
+struct PhotonWorld<'a> {
     scene: &'a Scene,
     solids: &'a Solids,
     bvh: &'a Bvh,
     emitters: &'a Emitters,
-    /// First triangle of each instance.
+    /// Index of the first triangle of each instance.
     firsts: Vec<u32>,
-    /// Of each instance that emits, media that its first corner lies in.
+    /// For each emissive instance, the media around its first corner.
     media: Vec<Media>,
-    /// Instances that stop light or spread it, whatever else.
+    /// Whether an instance is opaque and purely diffuse or glossy.
     diffuse: Vec<bool>,
     middle: DVec3,
     radius: f64,
 }
 
-/// Numbers in [0, 1) (splitmix64; Steele, Lea and Flood 2014).
-struct Random(u64);
+/// Uniform random numbers in [0, 1) (splitmix64; Steele, Lea and Flood 2014).
+struct PhotonRandom(u64);
 
-impl Random {
+impl PhotonRandom {
     fn word(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -112,13 +115,13 @@ impl Random {
         (self.word() >> 11) as f64 / 9_007_199_254_740_992.0
     }
 
-    /// In the unit circle, evenly.
+    /// A uniform point in the unit disk.
     fn disk(&mut self) -> DVec2 {
         let radius = self.unit().sqrt();
         DVec2::from_angle(std::f64::consts::TAU * self.unit()) * radius
     }
 
-    /// A unit direction by its cosine with n.
+    /// A cosine-weighted unit direction around n.
     fn above(&mut self, n: DVec3) -> DVec3 {
         let (across, up) = n.any_orthonormal_pair();
         let at = self.disk();
@@ -126,24 +129,24 @@ impl Random {
     }
 }
 
-impl World<'_> {
-    /// A line along which light is sent, by what sends most.
-    fn start(&self, random: &mut Random) -> Option<Beam> {
+impl PhotonWorld<'_> {
+    /// Samples a light by power and a ray that leaves it.
+    fn start(&self, random: &mut PhotonRandom) -> Option<Beam> {
         let word = (random.word() >> 32) as u32;
         let list = &self.emitters.list;
         let found = list.partition_point(|emitter| emitter.first <= word).checked_sub(1)?;
         let Emitter { source, .. } = list[found];
         match source {
-            // No ray meets them.
-            Source::Punctual(_) => None,
-            Source::Sky => {
-                let towards = self.emitters.sky.direction([(); 2].map(|()| (random.word() >> 32) as u32));
+            // No BSDF-sampled ray hits a punctual light.
+            EmitterSource::Punctual(_) => None,
+            EmitterSource::Environment => {
+                let towards = self.emitters.environment.direction([(); 2].map(|()| (random.word() >> 32) as u32));
                 let (across, up) = towards.any_orthonormal_pair();
                 let at = random.disk();
                 let origin = self.middle + self.radius * (towards + across * at.x + up * at.y);
                 Some(Beam { origin, direction: -towards, media: Media::default() })
             }
-            Source::Triangle { index, two_sided, .. } => {
+            EmitterSource::Triangle { index, two_sided, .. } => {
                 let instance = self.firsts.partition_point(|&first| first <= index) - 1;
                 let placed = &self.scene.instances[instance];
                 let mesh = &self.scene.meshes[placed.mesh];
@@ -163,17 +166,17 @@ impl World<'_> {
         }
     }
 
-    /// Follows one photon to the first surface that spreads it after some surface has mirrored or bent it, and to the next from
-    /// there: spots of such light are small and bright, and light others.
+    /// Traces one photon to the first diffuse or glossy surface after a specular one, and to the next from there: caustics are
+    /// small and bright, and light other surfaces.
     fn follow(&self, number: u64) -> impl Iterator<Item = Photon> {
         let mut found = [None; 2];
-        let mut random = Random(number);
+        let mut random = PhotonRandom(number);
         let mut next = self.start(&mut random);
         let mut from = None;
         for _ in 0..MOST_SURFACES {
             let Some(beam) = next else { break };
             let Some(met) = line::nearest(self.bvh, beam.origin, beam.direction, 1e-6 * self.radius) else { break };
-            // Most photons end here: light that nothing has mirrored or bent is found by the search for lights.
+            // Most photons end here: next event estimation finds light without a specular surface in between.
             if from.is_none() && self.diffuse[met.triangle.instance as usize] {
                 break;
             }
@@ -181,7 +184,7 @@ impl World<'_> {
             let (spreads, onward) = self.meet(&met, &beam, &mut random);
             next = onward.map(|(direction, media)| Beam { origin: at, direction, media });
             if !spreads {
-                // What goes straight on is found by the search for lights.
+                // Next event estimation also finds light that passes straight through.
                 if next.as_ref().is_some_and(|next| next.direction != beam.direction) {
                     from = Some(at);
                 }
@@ -198,8 +201,8 @@ impl World<'_> {
         found.into_iter().flatten()
     }
 
-    /// Whether a surface spreads the light that it has received, and where that goes on.
-    fn meet(&self, met: &Crossing, beam: &Beam, random: &mut Random) -> (bool, Option<(DVec3, Media)>) {
+    /// Whether a surface scatters the photon (diffuse or glossy), and the ray that continues: direction and media.
+    fn meet(&self, met: &Crossing, beam: &Beam, random: &mut PhotonRandom) -> (bool, Option<(DVec3, Media)>) {
         let instance = met.triangle.instance as usize;
         let material = &self.scene.materials[self.scene.meshes[self.scene.instances[instance].mesh].material];
         let facing = met.facing(self.scene, self.solids, beam.direction);
@@ -207,7 +210,7 @@ impl World<'_> {
         if boundary.hidden {
             return (false, Some((beam.direction, boundary.beyond)));
         }
-        // Where a texture has the alpha, photons go past: what lies behind is not left without any.
+        // Alpha from a texture is unknown, so photons pass: surfaces behind then still get guiding.
         if random.unit() >= coverage(material).unwrap_or(0.0) {
             return (false, Some((beam.direction, beam.media.clone())));
         }
@@ -225,13 +228,13 @@ impl World<'_> {
     }
 }
 
-/// Whether all that an instance sends on is spread: nothing passes its surface, and no layer of it is smooth.
+/// Whether an instance only scatters: it is opaque, and no layer has a specular lobe.
 fn is_diffuse(scene: &Scene, solids: &Solids, instance: usize) -> bool {
     let material = &scene.materials[scene.meshes[scene.instances[instance].mesh].material];
     !solids.solid[instance] && coverage(material) == Some(1.0) && !is_smooth(material)
 }
 
-/// Media that the first corner of an instance lies in, where that emits.
+/// The media around the first corner of an emissive instance.
 fn media_of_lamp(scene: &Scene, solids: &Solids, placed: &Instance) -> Media {
     let mesh = &scene.meshes[placed.mesh];
     let corner = mesh.indices.first().filter(|_| scene.materials[mesh.material].emissive != [0.0; 3]);
@@ -241,16 +244,16 @@ fn media_of_lamp(scene: &Scene, solids: &Solids, placed: &Instance) -> Media {
     })
 }
 
-impl Aims {
-    /// For paths through a scene.
+impl PhotonGuiding {
+    /// The guiding distribution of a scene.
     #[must_use]
     pub fn of(scene: &Scene, solids: &Solids, bvh: &Bvh, emitters: &Emitters) -> Self {
         let Some(bounds) = bvh.nodes.first().map(|root| *root.bounds()) else {
-            return Self { corner: DVec3::ZERO, cell: 1.0, cells: [1; 3], firsts: vec![0], aims: Vec::new() };
+            return Self { corner: DVec3::ZERO, cell: 1.0, cells: [1; 3], firsts: vec![0], spheres: Vec::new() };
         };
         let corner = DVec3::from(bounds.min.map(f64::from));
         let size = DVec3::from(bounds.max.map(f64::from)) - corner;
-        let world = World {
+        let world = PhotonWorld {
             scene,
             solids,
             bvh,
@@ -267,10 +270,10 @@ impl Aims {
 
     fn around(corner: DVec3, size: DVec3, photons: &[Photon]) -> Self {
         let cell = size.max_element() / CELLS;
-        // What bounds the scene lies well within the outermost cells.
+        // The scene's bounds then lie well inside the outermost cells.
         let corner = corner - 0.5 * cell;
         let cells = (size / cell).to_array().map(|n| n.ceil() as u32 + 1);
-        // Photons of the cells beside a cell count as its own: paths meet surfaces between them, too.
+        // Photons of neighbouring cells count, too: the grid has no discontinuities at cell borders that way.
         let mut found: HashMap<u32, Vec<DVec3>> = HashMap::new();
         for photon in photons {
             let at = ((photon.at - corner) / cell).floor();
@@ -288,25 +291,25 @@ impl Aims {
         }
         let mut order: Vec<(u32, Vec<DVec3>)> = found.into_iter().collect();
         order.sort_unstable_by_key(|(place, _)| *place);
-        let of_cells: Vec<(u32, Vec<Ball>)> =
-            order.into_par_iter().map(|(place, from)| (place, balls(&from, cell))).collect();
+        let of_cells: Vec<(u32, Vec<GuidingBall>)> =
+            order.into_par_iter().map(|(place, from)| (place, spheres(&from, cell))).collect();
         let mut firsts = vec![0; cells.iter().product::<u32>() as usize];
-        let mut aims = Vec::new();
-        for (place, balls) in of_cells {
-            firsts[place as usize] = (aims.len() << AIM_COUNT_BITS | balls.len()) as u32;
-            aims.extend(balls);
+        let mut all = Vec::new();
+        for (place, spheres) in of_cells {
+            firsts[place as usize] = (all.len() << GUIDING_COUNT_BITS | spheres.len()) as u32;
+            all.extend(spheres);
         }
-        Self { corner, cell, cells, firsts, aims }
+        Self { corner, cell, cells, firsts, spheres: all }
     }
 }
 
-/// At most [`MOST_AIMS`] balls around points, of few sizes: one by one that which holds most of what is left, as light falls on it
-/// unevenly. What a ball of radius r holds is missed by a path that does not aim with a variance of (points)²/r²; aims are
-/// shared out by its root.
-fn balls(points: &[DVec3], cell: f64) -> Vec<Ball> {
+/// At most [`MOST_SPHERES`] spheres that cover the points, chosen greedily: each is the candidate with the best score among the
+/// points not yet covered. BSDF sampling alone finds a sphere of radius r with a variance of (points)²/r²; the score and
+/// the probability are proportional to its root.
+fn spheres(points: &[DVec3], cell: f64) -> Vec<GuidingBall> {
     let mut left = points.to_vec();
-    let mut found: Vec<Ball> = Vec::new();
-    while found.len() < MOST_AIMS && !left.is_empty() {
+    let mut found: Vec<GuidingBall> = Vec::new();
+    while found.len() < MOST_SPHERES && !left.is_empty() {
         let held =
             |middle: DVec3, radius: f64| left.iter().filter(|p| p.distance_squared(middle) <= radius * radius).count();
         let candidates = left.iter().flat_map(|&middle| RADII.map(|radius| (middle, radius * cell)));
@@ -315,13 +318,13 @@ fn balls(points: &[DVec3], cell: f64) -> Vec<Ball> {
         if found.first().is_some_and(|first| score < WORTH_AIMING * first.share) {
             break;
         }
-        found.push(Ball { middle, radius: MARGIN * radius, share: score });
+        found.push(GuidingBall { middle, radius: MARGIN * radius, share: score });
         left.retain(|p| p.distance_squared(middle) > radius * radius);
     }
-    // In steps that a half holds exactly: what is drawn by shares that do not add up to 1 is drawn by another density.
-    let sum: f64 = found.iter().map(|ball| ball.share).sum();
-    found.iter_mut().for_each(|ball| ball.share = (ball.share / sum * SHARES).floor().max(1.0) / SHARES);
-    let others: f64 = found.iter().skip(1).map(|ball| ball.share).sum();
+    // Probabilities are exact in half floats: if they did not sum to 1, the sampled density would differ from the computed one.
+    let sum: f64 = found.iter().map(|sphere| sphere.share).sum();
+    found.iter_mut().for_each(|sphere| sphere.share = (sphere.share / sum * SHARES).floor().max(1.0) / SHARES);
+    let others: f64 = found.iter().skip(1).map(|sphere| sphere.share).sum();
     if let Some(first) = found.first_mut() {
         first.share = 1.0 - others;
     }

@@ -46,7 +46,7 @@ fn pieces_are_the_same_picture() {
         let gpu = Gpu::hasty();
         films(&gpu)
     };
-    let gpu = Gpu::taking_turns();
+    let gpu = Gpu::time_sliced();
     let in_turns = films(&gpu);
     for ((name, ..), (a, b)) in PICTURES.iter().zip(at_once.iter().zip(&in_turns)) {
         assert!(a[0] == b[0], "{name}: another picture in pieces");
@@ -59,7 +59,7 @@ fn pieces_are_the_same_picture() {
 /// A frame that is given up leaves the device and the film as they are: the picture goes on, and is whole.
 #[test]
 fn what_is_interrupted_goes_on() {
-    let gpu = Gpu::taking_turns();
+    let gpu = Gpu::time_sliced();
     let scene = study::load("etalon").expect("a scene");
     let settings = Settings { size: [176, 99], knobs: Knobs::of(Model::Recursive), ..Settings::default() };
     let mut renderer = gpu.renderer(&scene, None, settings);

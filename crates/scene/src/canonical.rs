@@ -6,7 +6,7 @@ use super::{AlphaMode, Image, Material, Mesh, Scene, Shared};
 
 /// What turned out to be simpler than it was written, by names.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct NormalForm {
+pub struct CanonicalForm {
     /// Textures that are black in the channels that multiply a factor: "emission of \"lamp\"".
     pub black: Vec<String>,
     /// Materials that blend or have holes, and an alpha of 1 everywhere: read as opaque.
@@ -16,23 +16,22 @@ pub struct NormalForm {
 }
 
 /// Brings a scene to that form.
-pub fn normalise(scene: &mut Scene) -> NormalForm {
-    let mut form = NormalForm::default();
+pub fn canonicalise(scene: &mut Scene) -> CanonicalForm {
+    let mut form = CanonicalForm::default();
     let Scene { materials, meshes, images, .. } = scene;
     for mesh in meshes.iter_mut().filter(|mesh| mesh.colors.iter().all(|color| *color == [1.0; 4])) {
         mesh.colors = Shared::default();
     }
     for (index, material) in materials.iter_mut().enumerate() {
-        form.black
-            .extend(settle_black(material, images).into_iter().map(|of| format!("{of} of \"{}\"", material.name)));
-        settle_alpha(index, material, meshes, images, &mut form);
+        form.black.extend(fold_black(material, images).into_iter().map(|of| format!("{of} of \"{}\"", material.name)));
+        fold_alpha(index, material, meshes, images, &mut form);
     }
     form
 }
 
 /// Sets to 0 each factor whose texture is black in the channels that multiply it, and forgets the texture where nothing else
 /// is read from it: 0 times the factor.
-fn settle_black(material: &mut Material, images: &[Image]) -> Vec<&'static str> {
+fn fold_black(material: &mut Material, images: &[Image]) -> Vec<&'static str> {
     // Found out at the first texel that is not black, which most textures have near their start.
     let black = |texture: Option<TextureRef>, channels: &[usize]| {
         texture.is_some_and(|texture| {
@@ -65,7 +64,7 @@ fn settle_black(material: &mut Material, images: &[Image]) -> Vec<&'static str> 
 }
 
 /// Alpha that is 1 everywhere covers; alpha that is nowhere above the cutoff, or 0 where it blends, leaves nothing.
-fn settle_alpha(index: usize, material: &mut Material, meshes: &mut [Mesh], images: &[Image], form: &mut NormalForm) {
+fn fold_alpha(index: usize, material: &mut Material, meshes: &mut [Mesh], images: &[Image], form: &mut CanonicalForm) {
     if material.alpha_mode == AlphaMode::Opaque {
         return;
     }
@@ -152,7 +151,7 @@ mod tests {
         ];
         for (i, (mode, factor, texels, vertices, becomes, left)) in cases.into_iter().enumerate() {
             let mut scene = scene(mode, factor, texels, vertices);
-            let form = normalise(&mut scene);
+            let form = canonicalise(&mut scene);
             assert_eq!(scene.materials[0].alpha_mode, becomes, "case {i}");
             assert_eq!(!scene.meshes[0].indices.is_empty(), left, "case {i}");
             assert_eq!(

@@ -1,39 +1,39 @@
 // Balls that paths aim at from the cell of a grid in which they are: where light came from by way of what mirrors or bends it,
 // as far as a few photons told (src/transport/caustics.rs).
-#ifndef AIMS_GLSL
-#define AIMS_GLSL
+#ifndef PATH_GUIDING_GLSL
+#define PATH_GUIDING_GLSL
 #include "lib/encode.glsl"
 #include "lib/light.glsl"
 #include "lib/trace.glsl"
-#include "share/aims.glsl"
+#include "share/path_guiding.glsl"
 
-layout(constant) const bool AIMED = false;
-layout(paths, r32ui) readonly uniform uimageBuffer aim_cells;
-layout(paths, rgba32ui) readonly uniform uimageBuffer aims; // the grid, then the balls
-// @texels AimGrid aim_grid_at(aims)
-uvec4 ball_texel(uint index, int texel) {
-    return imageLoad(aims, AIM_GRID_TEXELS + int(index) + texel);
+layout(constant) const bool PATH_GUIDING = false;
+layout(paths, r32ui) readonly uniform uimageBuffer guiding_cells;
+layout(paths, rgba32ui) readonly uniform uimageBuffer guiding_spheres; // the grid, then the balls
+// @texels GuidingGrid guiding_grid_at(guiding_spheres)
+uvec4 guiding_sphere_texel(uint index, int texel) {
+    return imageLoad(guiding_spheres, GUIDING_GRID_TEXELS + int(index) + texel);
 }
-// @texels AimBall aim_ball_at(ball_texel)
+// @texels GuidingSphere guiding_sphere_at(guiding_sphere_texel)
 
 // Of the directions drawn for a diffuse surface (docs/decisions/paths.md).
-const float AIMED_SHARE = 0.25;
+const float GUIDED_FRACTION = 0.25;
 
-struct Aims {
+struct GuidingCell {
     uint first;
     uint count; // 0: none
     uint last;  // of all balls
     float cell; // metres
 };
 
-Aims aims_at(vec3 p) {
-    AimGrid grid = aim_grid_at(0);
+GuidingCell guiding_cell_at(vec3 p) {
+    GuidingGrid grid = guiding_grid_at(0);
     vec3 at = floor((p - grid.corner) * grid.cells_per_metre);
     bool inside = all(greaterThanEqual(at, vec3(0.0))) && all(lessThan(at, vec3(grid.cells)));
     uvec3 c = inside ? uvec3(at) : uvec3(0);
-    uint word = imageLoad(aim_cells, int(c.x + grid.cells.x * (c.y + grid.cells.y * c.z))).x;
-    uint count = word & ((1u << AIM_COUNT_BITS) - 1u);
-    return Aims(word >> AIM_COUNT_BITS, inside ? count : 0u, grid.last_ball, 1.0 / grid.cells_per_metre);
+    uint word = imageLoad(guiding_cells, int(c.x + grid.cells.x * (c.y + grid.cells.y * c.z))).x;
+    uint count = word & ((1u << GUIDING_COUNT_BITS) - 1u);
+    return GuidingCell(word >> GUIDING_COUNT_BITS, inside ? count : 0u, grid.last_ball, 1.0 / grid.cells_per_metre);
 }
 
 // The directions in which a ball is seen: a cone, or a hemisphere from inside.
@@ -43,8 +43,8 @@ struct Cone {
     float share;  // of the cell's aims
 };
 
-Cone cone_to(Aims at, uint i, vec3 p) {
-    AimBall ball = aim_ball_at(min(at.first + i, at.last));
+Cone guiding_cone(GuidingCell at, uint i, vec3 p) {
+    GuidingSphere ball = guiding_sphere_at(min(at.first + i, at.last));
     vec3 to = ball.middle - p;
     vec2 radius_share = unpackHalf2x16(ball.radius_share);
     float radius = radius_share.x * at.cell;
@@ -53,12 +53,12 @@ Cone cone_to(Aims at, uint i, vec3 p) {
 }
 
 // `u.x` chooses among them, and the place in the cone with what is left of it.
-vec3 aimed_direction(Aims at, vec3 p, vec2 u) {
-    Cone cone = cone_to(at, 0, p);
+vec3 guided_direction(GuidingCell at, vec3 p, vec2 u) {
+    Cone cone = guiding_cone(at, 0, p);
     float first = 0.0;
     float before = cone.share;
     for (uint i = 1; i < at.count; i++) {
-        Cone next = cone_to(at, i, p);
+        Cone next = guiding_cone(at, i, p);
         bool reached = u.x >= before;
         first = reached ? before : first;
         if (reached) cone = next;
@@ -72,10 +72,10 @@ vec3 aimed_direction(Aims at, vec3 p, vec2 u) {
 }
 
 // Density of a unit direction among those, per solid angle.
-float aimed_pdf(Aims at, vec3 p, vec3 direction) {
+float guided_pdf(GuidingCell at, vec3 p, vec3 direction) {
     float sum = 0.0;
     for (uint i = 0; i < at.count; i++) {
-        Cone cone = cone_to(at, i, p);
+        Cone cone = guiding_cone(at, i, p);
         // 1 − cosine as half the square of a difference, which does not cancel.
         vec3 beside = direction - cone.axis;
         bool within = 0.5 * dot(beside, beside) <= cone.spread;

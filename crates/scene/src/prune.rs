@@ -6,17 +6,17 @@ use super::{Material, Scene, Shared};
 
 /// What is read of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Reads {
+pub enum Prune {
     /// All that materials name, whatever comes of it.
     #[default]
-    Everything,
+    Nothing,
     /// What can be seen.
-    Visible(Ambience),
+    Unused(AmbientLight),
 }
 
 /// When occlusion may be seen: it takes from light that comes from all around, and from mirror images of the screen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ambience {
+pub enum AmbientLight {
     /// Never.
     Absent,
     /// If the scene has no lights of its own.
@@ -25,21 +25,21 @@ pub enum Ambience {
     Present,
 }
 
-impl Reads {
+impl Prune {
     /// Whether occlusion may be seen, and whether anything may be left out, for a scene with so many lights.
-    pub(crate) fn ambience(self, lights: usize) -> Option<bool> {
+    pub(crate) fn ambient(self, lights: usize) -> Option<bool> {
         match self {
-            Self::Everything => None,
-            Self::Visible(Ambience::Absent) => Some(false),
-            Self::Visible(Ambience::WithoutLights) => Some(lights == 0),
-            Self::Visible(Ambience::Present) => Some(true),
+            Self::Nothing => None,
+            Self::Unused(AmbientLight::Absent) => Some(false),
+            Self::Unused(AmbientLight::WithoutLights) => Some(lights == 0),
+            Self::Unused(AmbientLight::Present) => Some(true),
         }
     }
 }
 
 /// Takes the textures from a material that nothing of the picture depends on, and says of each which and why. `used`: some
 /// mesh that is drawn has it. `ambience`: occlusion may be seen.
-pub(crate) fn forget_textures(m: &mut Material, used: bool, ambience: bool) -> Vec<String> {
+pub(crate) fn prune_textures(m: &mut Material, used: bool, ambient: bool) -> Vec<String> {
     let mut unread = Vec::new();
     let name = m.name.clone();
     let mut forget = |texture: &mut Option<TextureRef>, what: &str, why: Option<&str>| {
@@ -65,7 +65,7 @@ pub(crate) fn forget_textures(m: &mut Material, used: bool, ambience: bool) -> V
     forget(&mut m.normal_texture, "normal", None);
     forget(&mut m.emissive_texture, "emissive", unless(m.emissive != [0.0; 3], "nothing is emitted"));
     let occludes =
-        unless(m.occlusion_strength > 0.0, "its strength is 0").or(unless(ambience, "no light comes from all around"));
+        unless(m.occlusion_strength > 0.0, "its strength is 0").or(unless(ambient, "no light comes from all around"));
     forget(&mut m.occlusion_texture, "occlusion", lit.or(occludes));
     forget(&mut m.clearcoat_texture, "clear coat", coat);
     forget(&mut m.clearcoat_roughness_texture, "clear coat roughness", coat);
@@ -96,21 +96,21 @@ impl Coordinates {
 }
 
 /// Takes from a whole scene what nothing of the picture depends on.
-pub fn forget_unread(scene: &mut Scene, reads: Reads) {
-    let Some(ambience) = reads.ambience(scene.lights.len()) else { return };
+pub fn prune_unused(scene: &mut Scene, prune: Prune) {
+    let Some(ambient) = prune.ambient(scene.lights.len()) else { return };
     let mut used = vec![false; scene.materials.len()];
     for instance in &scene.instances {
         let mesh = &scene.meshes[instance.mesh];
         used[mesh.material] |= !mesh.indices.is_empty();
     }
     for (material, used) in scene.materials.iter_mut().zip(used) {
-        scene.unread.extend(forget_textures(material, used, ambience));
+        scene.unread.extend(prune_textures(material, used, ambient));
     }
     for mesh in &mut scene.meshes {
         let read = Coordinates::of(&scene.materials[mesh.material]);
         for (set, uvs) in mesh.uvs.iter_mut().enumerate() {
             if !read.kept[set] && !uvs.is_empty() {
-                scene.unread.push(unread_coordinates(&mesh.name, set));
+                scene.unread.push(unused_coordinates(&mesh.name, set));
                 *uvs = Shared::default();
             }
         }
@@ -120,6 +120,6 @@ pub fn forget_unread(scene: &mut Scene, reads: Reads) {
     }
 }
 
-pub(crate) fn unread_coordinates(mesh: &str, set: usize) -> String {
+pub(crate) fn unused_coordinates(mesh: &str, set: usize) -> String {
     format!("texture coordinates {set} of mesh \"{mesh}\": no texture of its material reads them")
 }

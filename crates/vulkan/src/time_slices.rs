@@ -1,8 +1,9 @@
-//! A frame beside a window: no submission is long, so that whoever moves the view waits for a piece of a pass and not for all of it.
+//! Time-sliced submission: long dispatches are split so that a frame beside a window never blocks the queue for long.
 //!
-//! Each pass is submitted and waited for by itself, and a dispatch that takes long in pieces: groups of invocations one after the
-//! other, as many at a time as took [`PIECE_MS`] by the pace of the piece before. What the host must know for that, how many
-//! groups a dispatch has whose number the device wrote, is read back first.
+//! Read the Vulkan specification, chapters Dispatching Commands (`vkCmdDispatchBase`) and Command Buffers. Each pass is
+//! submitted and waited for by itself. A long dispatch is submitted in pieces of workgroups: each piece has as many groups
+//! as would take [`PIECE_MS`] at the measured time per group of the piece before. The host must know the number of groups,
+//! so the arguments of an indirect dispatch are read back first.
 
 use std::sync::atomic::Ordering;
 
@@ -12,80 +13,81 @@ use ash::vk;
 use super::device::{Device, lock};
 use super::memory::{Buffer, Place};
 use super::recording::{
-    ALL, Dispatch, Groups, Pass, Piece, Recording, Work, begin, label, record_barriers, submit, wait,
+    ALL, Dispatch, DispatchPiece, Groups, Pass, RecordedWork, Recording, begin, label, record_barriers, submit, wait,
     write_first_timestamp,
 };
 use super::sync::Barrier;
 
-/// Milliseconds that one submission aims at.
+/// Target duration of one submission in milliseconds.
 const PIECE_MS: f64 = 10.0;
-/// Of a dispatch whose pace nobody knows yet, the first piece is this part.
+/// The first piece of a dispatch with unknown time per group is 1/32 of it.
 const FIRST: u64 = 32;
-/// A piece has at most so many times the groups of the one before: that one may have been quick by chance.
+/// Largest ratio of the groups of a piece to those of the piece before, which may have been fast by chance.
 const GROWTH: f64 = 4.0;
 
 impl Device {
-    /// Gives up what is drawn within [`Device::interruptible`], now or the next time, until [`Device::resume`].
+    /// Abandons the frame within [`Device::interruptible`], now or the next time, until [`Device::resume`].
     pub fn interrupt(&self) {
-        self.turns.interrupted.store(true, Ordering::Relaxed);
+        self.time_slices.interrupted.store(true, Ordering::Relaxed);
     }
 
-    /// Takes [`Device::interrupt`] back.
+    /// Cancels [`Device::interrupt`].
     pub fn resume(&self) {
-        self.turns.interrupted.store(false, Ordering::Relaxed);
+        self.time_slices.interrupted.store(false, Ordering::Relaxed);
     }
 
-    /// Draws frames that may be given up between two pieces, where the device takes turns: they end with [`crate::Interrupted`].
+    /// Draws frames that [`Device::interrupt`] may abandon between two pieces, under time-sliced submission. An abandoned
+    /// frame ends with [`crate::Interrupted`].
     pub fn interruptible<T>(&self, draw: impl FnOnce() -> T) -> T {
-        self.turns.interruptible.store(true, Ordering::Relaxed);
+        self.time_slices.interruptible.store(true, Ordering::Relaxed);
         let drawn = draw();
-        self.turns.interruptible.store(false, Ordering::Relaxed);
+        self.time_slices.interruptible.store(false, Ordering::Relaxed);
         drawn
     }
 
-    /// Dispatches so far that were drawn in more than one piece.
+    /// Number of dispatches so far that were split into more than one piece.
     #[must_use]
     pub fn cut(&self) -> u64 {
-        self.turns.cut.load(Ordering::Relaxed)
+        self.time_slices.cut.load(Ordering::Relaxed)
     }
 }
 
-/// The piece of at most `most` groups, and at least one, that comes after `done` of them: whole rows, or part of one.
-fn piece(groups: [u32; 3], done: u64, most: u64) -> Piece {
+/// The next piece after `done` workgroups, of at least 1 and at most `most` groups: whole rows, or part of one row.
+fn piece(groups: [u32; 3], done: u64, most: u64) -> DispatchPiece {
     let [across, down, _] = groups.map(u64::from);
     let (x, y, z) = (done % across, done / across % down, done / across / down);
     let rows = (most / across).min(down - y);
     let count = if x == 0 && rows > 0 { [across, rows, 1] } else { [most.clamp(1, across - x), 1, 1] };
-    Piece { base: [x, y, z].map(|at| at as u32), count: count.map(|n| n as u32) }
+    DispatchPiece { base: [x, y, z].map(|at| at as u32), count: count.map(|n| n as u32) }
 }
 
 impl Recording<'_> {
-    /// Draws passes one after the other; the milliseconds of each.
+    /// Draws passes one after the other, each in its own submissions; milliseconds of each pass.
     ///
     /// # Safety
     /// Every handle of the passes is alive, and nothing else is recorded with the pool.
     pub(super) unsafe fn in_turns(&self, passes: Vec<Pass<'_>>, barriers: &[Vec<Barrier>]) -> Result<Vec<f64>> {
         let groups = Buffer::new(self.device, "groups", 12, Place::Readback)?;
-        // SAFETY: as the caller says.
+        // SAFETY: the caller guarantees both conditions.
         passes.into_iter().zip(barriers).map(|(pass, barriers)| unsafe { self.draw(pass, barriers, &groups) }).collect()
     }
 
-    /// Draws a pass; its GPU milliseconds.
+    /// Draws a pass; its GPU time in milliseconds.
     unsafe fn draw(&self, pass: Pass<'_>, barriers: &[Barrier], room: &Buffer) -> Result<f64> {
         let made = self.pipelines.wait_for(&pass.pipelines)?;
-        // SAFETY: as the caller says.
+        // SAFETY: as for `in_turns`.
         unsafe {
             let first = |commands| {
                 self.begun.set(self.begun.get() + 1);
                 record_barriers(self.device, commands, barriers, self.targets, false);
             };
             let work = match pass.work {
-                Work::Record(record) => {
+                RecordedWork::Record(record) => {
                     return self.turn(&pass.name, first, |commands| record(self.device, commands, &made));
                 }
-                Work::Dispatch(work) => work,
+                RecordedWork::Dispatch(work) => work,
             };
-            let known = lock(&self.device.turns.paces).get(&pass.name).copied();
+            let known = lock(&self.device.time_slices.paces).get(&pass.name).copied();
             let groups = match work.groups {
                 Groups::Count(groups) => groups,
                 Groups::At(sizes, offset) => self.read_groups(sizes, offset, room)?,
@@ -94,7 +96,7 @@ impl Recording<'_> {
         }
     }
 
-    /// A dispatch in as many pieces as it takes.
+    /// Submits a dispatch in pieces; its GPU time in milliseconds.
     unsafe fn pieces(
         &self,
         name: &str,
@@ -107,7 +109,7 @@ impl Recording<'_> {
         let all: u64 = groups.into_iter().map(u64::from).product();
         let mut most = known.filter(|ms| *ms > 0.0).map_or(all.div_ceil(FIRST) as f64, |ms| PIECE_MS / ms);
         let (mut done, mut total) = (0, 0.0);
-        // Barriers count, too, where there is nothing to do.
+        // A dispatch without groups is still submitted once, for its barriers.
         while done < all || done == 0 {
             let part = piece(groups.map(|n| n.max(1)), done, (most as u64).max(1));
             let count: u64 = if all == 0 { 0 } else { part.count.into_iter().map(u64::from).product() };
@@ -118,26 +120,26 @@ impl Recording<'_> {
             };
             let record = |commands| {
                 if count > 0 {
-                    // SAFETY: as the caller says.
+                    // SAFETY: the caller of `in_turns` keeps all handles alive.
                     unsafe { work.record(self.device, commands, pipeline, Some(part)) };
                 }
             };
-            // SAFETY: as the caller says.
+            // SAFETY: as above.
             let ms = unsafe { self.turn(name, before, record)? };
             total += ms;
             if count == 0 {
                 break;
             }
-            self.device.turns.cut.fetch_add(u64::from(done == 0 && count < all), Ordering::Relaxed);
+            self.device.time_slices.cut.fetch_add(u64::from(done == 0 && count < all), Ordering::Relaxed);
             done += count;
             most = (PIECE_MS * count as f64 / ms.max(1e-9)).min(GROWTH * count as f64);
         }
-        // The mean: some part is always cheap, and the next frame may begin with one that is not.
-        lock(&self.device.turns.paces).insert(name.to_owned(), total / all.max(1) as f64);
+        // The mean, not the last piece: some part is always cheap, and the next frame may begin with an expensive one.
+        lock(&self.device.time_slices.paces).insert(name.to_owned(), total / all.max(1) as f64);
         Ok(total)
     }
 
-    /// One submission, waited for; its GPU milliseconds.
+    /// Submits commands once and waits for them; their GPU time in milliseconds.
     unsafe fn turn(
         &self,
         name: &str,
@@ -145,7 +147,7 @@ impl Recording<'_> {
         record: impl FnOnce(vk::CommandBuffer),
     ) -> Result<f64> {
         let (device, raw, timed) = (self.device, &self.device.raw, self.queries != vk::QueryPool::null());
-        device.turns.go_on()?;
+        device.time_slices.go_on()?;
         // SAFETY: the command buffer is recorded here and waited for before it is freed.
         unsafe {
             let commands = begin(device, self.from)?;
@@ -176,7 +178,7 @@ impl Recording<'_> {
         }
     }
 
-    /// The number of groups that the device wrote.
+    /// Reads back the workgroup count of an indirect dispatch.
     unsafe fn read_groups(&self, sizes: &Buffer, offset: u64, room: &Buffer) -> Result<[u32; 3]> {
         let copy = |commands| {
             let region = vk::BufferCopy { src_offset: offset, dst_offset: 0, size: 12 };
@@ -193,14 +195,14 @@ impl Recording<'_> {
                 self.device.raw.cmd_pipeline_barrier2(commands, &info);
             }
         };
-        // SAFETY: as the caller says.
+        // SAFETY: the caller of `in_turns` keeps all handles alive.
         unsafe { self.turn("how many groups", |commands| after_all(self.device, commands), copy)? };
         let words: Vec<u32> = room.read(|bytes| bytemuck::pod_collect_to_vec(&bytes[..12]));
         Ok([words[0], words[1], words[2]])
     }
 }
 
-/// What was written before is seen by what comes.
+/// Makes all earlier writes available to all later commands.
 unsafe fn after_all(device: &Device, commands: vk::CommandBuffer) {
     let all = [vk::MemoryBarrier2::default()
         .src_stage_mask(ALL)
@@ -226,7 +228,7 @@ mod tests {
                 let mut seen = vec![false; all as usize];
                 let mut done = 0;
                 while done < all {
-                    let Piece { base, count } = piece(groups, done, most);
+                    let DispatchPiece { base, count } = piece(groups, done, most);
                     let size: u64 = count.into_iter().map(u64::from).product();
                     assert!((1..=most).contains(&size), "{groups:?} {done} {most}: {count:?}");
                     for z in base[2]..base[2] + count[2] {

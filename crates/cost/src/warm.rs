@@ -52,7 +52,7 @@ pub struct Bench<'a> {
 }
 
 /// Rungs that are ready to be drawn: uploaded, and with every shader compiled.
-pub struct Sitting {
+pub struct WarmRenderer {
     /// What draws them.
     pub renderer: Renderer,
     /// Wall time until the first samples were there.
@@ -60,7 +60,7 @@ pub struct Sitting {
 }
 
 /// A picture.
-pub struct Taken {
+pub struct Measurement {
     /// Radiance.
     pub film: Picture,
     /// Both halves of its samples as they would be shown, of pictures by paths.
@@ -74,7 +74,7 @@ pub struct Taken {
     /// GPU milliseconds of each that was timed.
     pub ms: Vec<f64>,
     /// Of the others that were drawn in turns with them.
-    pub others_ms: Vec<f64>,
+    pub baseline_ms: Vec<f64>,
     /// GPU milliseconds of each pass.
     pub passes: Vec<(String, f64)>,
     /// Counts.
@@ -85,7 +85,7 @@ pub struct Taken {
     pub samples: u32,
 }
 
-impl Taken {
+impl Measurement {
     /// Whether its radiance is this to the last bit.
     #[must_use]
     pub fn is(&self, film: &Picture) -> bool {
@@ -123,11 +123,11 @@ impl Bench<'_> {
     ///
     /// # Errors
     /// When these rungs cannot be drawn.
-    pub fn sit(&self, knobs: &Knobs) -> Result<Sitting> {
+    pub fn warm_up(&self, knobs: &Knobs) -> Result<WarmRenderer> {
         let start = Instant::now();
         let mut renderer = self.renderer(knobs, self.settings.seed)?;
         renderer.render_samples(self.camera, 2, &mut |_| ())?;
-        Ok(Sitting { renderer, start_ms: start.elapsed().as_secs_f64() * 1e3 })
+        Ok(WarmRenderer { renderer, start_ms: start.elapsed().as_secs_f64() * 1e3 })
     }
 
     /// What draws these rungs with these random numbers; nothing is drawn yet.
@@ -139,11 +139,11 @@ impl Bench<'_> {
         Renderer::new(self.device, self.original, self.environment, settings)
     }
 
-    fn compiled(&self, sitting: &mut Sitting) -> Result<BTreeMap<String, Vec<Compiled>>> {
+    fn compiled(&self, warm: &mut WarmRenderer) -> Result<BTreeMap<String, Vec<Compiled>>> {
         if !self.device.tells_compiled() {
             return Ok(BTreeMap::new());
         }
-        let passes = sitting.renderer.passes(self.camera)?;
+        let passes = warm.renderer.passes(self.camera)?;
         let one = |(program, constants): &(&'static Program, Vec<(u32, u32)>)| {
             Ok((program.name.to_owned(), self.device.compiled(program, constants)?))
         };
@@ -154,60 +154,60 @@ impl Bench<'_> {
     ///
     /// # Errors
     /// When the driver fails.
-    pub fn time(&self, sitting: &mut Sitting) -> Result<f64> {
-        Ok(total(&sitting.renderer.render(self.camera, &mut |_| ())?))
+    pub fn time(&self, warm: &mut WarmRenderer) -> Result<f64> {
+        Ok(total(&warm.renderer.render(self.camera, &mut |_| ())?))
     }
 
     /// Draws and times, in turns with `other` where there is one, until pictures took so many milliseconds.
     ///
     /// # Errors
     /// When the driver fails.
-    pub fn take(
+    pub fn measure(
         &self,
-        sitting: &mut Sitting,
-        mut other: Option<(&mut Sitting, &Taken)>,
+        warm: &mut WarmRenderer,
+        mut other: Option<(&mut WarmRenderer, &Measurement)>,
         enough_ms: f64,
-    ) -> Result<Taken> {
-        let rendered = sitting.renderer.render(self.camera, &mut |_| ())?;
-        let film = sitting.renderer.film_alone()?;
-        let halves = sitting.renderer.half_means_alone()?;
+    ) -> Result<Measurement> {
+        let rendered = warm.renderer.render(self.camera, &mut |_| ())?;
+        let film = warm.renderer.film_alone()?;
+        let halves = warm.renderer.half_means_alone()?;
         let [width, height] = self.settings.size;
         let view = self.settings.view_transform();
         let same = other.as_ref().is_some_and(|(_, known)| known.is(&film));
         let mut ms = vec![total(&rendered)];
-        let mut others_ms = Vec::new();
+        let mut baseline_ms = Vec::new();
         let mut passes: Vec<(String, Vec<f64>)> =
             rendered.passes.iter().map(|p| (p.name.clone(), vec![p.ms])).collect();
         if let Some((other, _)) = &mut other {
-            others_ms.push(self.time(other)?);
+            baseline_ms.push(self.time(other)?);
         }
         // What cannot be told from its base has no more to say.
         let enough_ms = if same { 0.0 } else { enough_ms };
         while ms.len() < turns(ms[0], enough_ms) {
-            let again = sitting.renderer.render(self.camera, &mut |_| ())?;
+            let again = warm.renderer.render(self.camera, &mut |_| ())?;
             ms.push(total(&again));
             for (pass, known) in again.passes.iter().zip(&mut passes) {
                 known.1.push(pass.ms);
             }
             if let Some((other, _)) = &mut other {
-                others_ms.push(self.time(other)?);
+                baseline_ms.push(self.time(other)?);
             }
         }
-        Ok(Taken {
+        Ok(Measurement {
             film,
             halves: halves.map(|halves| halves.map(|half| shown(&half, &view))),
             noise: rendered.errors.last().map(|error| error.relmse),
-            png: sitting.renderer.png(&rendered)?,
+            png: warm.renderer.png(&rendered)?,
             display: Display {
                 width,
                 height,
                 rgba: rendered.display.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect(),
             },
             ms,
-            others_ms,
+            baseline_ms,
             passes: passes.into_iter().map(|(name, ms)| (name, Interval::of(&ms).median)).collect(),
             work: counts(&rendered.work),
-            compiled: self.compiled(sitting)?,
+            compiled: self.compiled(warm)?,
             samples: rendered.samples,
         })
     }

@@ -1,0 +1,30 @@
+//! Blocks of Markdown pages that a program writes: between `<!-- generated: NAME -->` and `<!-- end -->`.
+
+use std::path::Path;
+
+/// `text` with the block replaced; `None` where the page has no such block.
+///
+/// # Panics
+/// Where the block has no end.
+#[must_use]
+pub fn replaced(text: &str, name: &str, block: &str) -> Option<String> {
+    let begin = format!("<!-- generated: {name} -->\n");
+    let at = text.find(&begin)? + begin.len();
+    let end = at + text[at..].find("<!-- end -->").unwrap_or_else(|| panic!("the block {name} has no end"));
+    Some(format!("{}\n{}\n\n{}", &text[..at], block.trim_end(), &text[end..]))
+}
+
+/// Asserts that a page has this block; with the variable `ETALON_BLESS` it writes the block instead.
+///
+/// # Panics
+/// Where the page has no such block, or another one.
+pub fn says(page: &Path, name: &str, block: &str) {
+    let text = std::fs::read_to_string(page).unwrap_or_else(|error| panic!("{}: {error}", page.display()));
+    let fresh = replaced(&text, name, block).unwrap_or_else(|| panic!("{} has no block {name}", page.display()));
+    if fresh != text && std::env::var_os("ETALON_BLESS").is_some() {
+        std::fs::write(page, &fresh).expect("a page is written");
+        return;
+    }
+    let line = text.lines().zip(fresh.lines()).find(|(old, new)| old != new);
+    assert!(fresh == text, "{}, {name}: run the test with ETALON_BLESS=1; {line:?}", page.display());
+}
