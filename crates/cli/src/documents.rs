@@ -1,0 +1,210 @@
+//! Tables of the documentation that the program writes itself: a page has a block between `<!-- generated: NAME -->` and
+//! `<!-- end -->`, and a test (`crates/cli/tests/documents.rs`) compares the block with what stands here.
+
+use std::fmt::Write as _;
+
+use etalon::gpu::{Access, BindingKind, Program};
+use etalon::plan::{EffectId, KNOBS, Knob};
+use etalon::shader;
+use etalon::study;
+
+use super::arguments::{EXIT_CODES, command};
+
+/// The blocks by name.
+#[must_use]
+pub fn blocks() -> Vec<(&'static str, String)> {
+    vec![
+        ("commands", commands()),
+        ("render options", render_options()),
+        ("knobs", knobs()),
+        ("effects", effects()),
+        ("study scenes", study_scenes()),
+        ("exit codes", exit_codes()),
+        ("bindings", bindings()),
+        ("barrier", barrier()),
+    ]
+}
+
+/// A cell of a Markdown table on one line.
+fn cell(text: &str) -> String {
+    text.replace('|', "\\|").replace('\n', " ").trim().trim_end_matches('.').to_owned()
+}
+
+fn commands() -> String {
+    let mut table = String::from("| command | what it does |\n|---|---|\n");
+    for sub in command().get_subcommands() {
+        let about = sub.get_about().map(ToString::to_string).unwrap_or_default();
+        let _ = writeln!(table, "| `etalon {}` | {} |", sub.get_name(), cell(&about));
+    }
+    table
+}
+
+fn render_options() -> String {
+    let mut table = String::from("| option | meaning | default |\n|---|---|---|\n");
+    let command = command();
+    let Some(render) = command.find_subcommand("render") else { return table };
+    for option in render.get_arguments().filter(|argument| argument.get_long().is_some() && !argument.is_hide_set()) {
+        let mut name = option.get_short().map_or(String::new(), |short| format!("-{short}, "));
+        let _ = write!(name, "--{}", option.get_long().unwrap_or_default());
+        if option.get_action().takes_values() {
+            let values: Vec<String> = match option.get_value_names() {
+                Some(names) => names.iter().map(ToString::to_string).collect(),
+                None => vec![option.get_id().as_str().to_uppercase()],
+            };
+            let possible: Vec<String> =
+                option.get_possible_values().iter().map(|value| value.get_name().to_owned()).collect();
+            let _ = write!(name, " {}", if possible.is_empty() { values.join(" ") } else { possible.join("\\|") });
+        }
+        let help = option.get_help().map(ToString::to_string).unwrap_or_default();
+        let default: Vec<_> = option.get_default_values().iter().map(|value| value.to_string_lossy()).collect();
+        let _ = writeln!(
+            table,
+            "| `{}` | {} | {} |",
+            name.replace("\\|", "|").replace('|', "\\|"),
+            cell(&help),
+            default.join(" ")
+        );
+    }
+    table
+}
+
+/// The rungs of a knob: that of `recursive` bold, that of `local` in italics, that of `global` underlined, where they differ.
+fn rungs(knob: &Knob) -> String {
+    let [local, recursive, global] = knob.presets;
+    let mark = |rung: &&'static str| match () {
+        () if *rung == recursive => format!("**{rung}**"),
+        () if *rung == local => format!("*{rung}*"),
+        () if *rung == global => format!("<u>{rung}</u>"),
+        () => (*rung).to_owned(),
+    };
+    knob.rungs.iter().map(mark).collect::<Vec<_>>().join(", ")
+}
+
+fn knobs() -> String {
+    let mut table = String::from("| knob | rungs | what it approximates | lecture |\n|---|---|---|---|\n");
+    for knob in KNOBS {
+        let _ = writeln!(
+            table,
+            "| `{}` | {} | {} | {} |",
+            knob.name,
+            rungs(knob),
+            cell(knob.about),
+            knob.lecture.join(", ")
+        );
+    }
+    table
+}
+
+fn effects() -> String {
+    let mut table = String::from("| effect | called for by | what it brings |\n|---|---|---|\n");
+    for effect in EffectId::all() {
+        let [cause, brings] = effect.row();
+        let _ = writeln!(table, "| {} | {cause} | {brings} |", effect.name());
+    }
+    table
+}
+
+fn study_scenes() -> String {
+    let mut table = String::from("| scene | what it shows |\n|---|---|\n");
+    for (name, about) in study::SCENES {
+        let _ = writeln!(table, "| `study:{name}` | {about} |");
+    }
+    table
+}
+
+fn exit_codes() -> String {
+    let mut table = String::from("| exit code | meaning |\n|---|---|\n");
+    for (code, meaning) in EXIT_CODES {
+        let _ = writeln!(table, "| {code} | {meaning} |");
+    }
+    table
+}
+
+/// What each program reads and writes, as the reflection of its SPIR-V has it.
+fn bindings() -> String {
+    let mut table = String::from("| program | reads | writes |\n|---|---|---|\n");
+    for program in shader::PROGRAMS {
+        let mut reads = Vec::new();
+        let mut writes = Vec::new();
+        for binding in program.bindings.iter().chain(program.sets.iter().flat_map(|set| set.used)) {
+            let name = format!("`{}`", binding.name);
+            if binding.access != Access::StorageWrite {
+                reads.push(name.clone());
+            }
+            if matches!(binding.access, Access::StorageWrite | Access::StorageReadWrite) {
+                writes.push(name);
+            }
+        }
+        let _ = writeln!(table, "| `{}` | {} | {} |", program.name, reads.join(" "), writes.join(" "));
+    }
+    table
+}
+
+/// The line of a shader of `shaders/pass/` that declares a binding.
+fn declaration(program: &str, name: &str) -> String {
+    let path = format!("{}/pass/{program}.comp", shader::SOURCES);
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let line = text.lines().find(|line| line.starts_with("layout(") && line.contains(&format!(" {name};")));
+    line.and_then(|line| line.split("//").next()).unwrap_or_default().trim().to_owned()
+}
+
+/// How the barrier of one image comes to be: the tour's example, from the reflection.
+fn barrier() -> String {
+    let found = |program: &str| {
+        let program: &'static Program = shader::PROGRAMS.iter().copied().find(|p| p.name == program)?;
+        program.bindings.iter().find(|binding| binding.name == "radiance")
+    };
+    let (Some(light), Some(composite)) = (found("light"), found("composite")) else { return String::new() };
+    let masks = light.access.masks(light.stages);
+    let after = composite.access.masks(composite.stages);
+    // A barrier makes writes available; reads need only be waited for.
+    let writes = Access::StorageWrite.masks(light.stages).access;
+    let kind = if light.kind == BindingKind::StorageImage { "a storage image" } else { "a buffer" };
+    let mut text = String::from("```text\n");
+    let _ = writeln!(text, "shaders/pass/light.comp           {}", declaration("light", "radiance"));
+    let _ = writeln!(text, "        │                         the qualifier, or none, decides the access");
+    let _ = writeln!(text, "        ▼");
+    let _ = writeln!(
+        text,
+        "crates/reflect/src/reflect.rs     Binding {{ name: \"radiance\", kind: {:?}, access: {:?} }}",
+        light.kind, light.access
+    );
+    let _ = writeln!(
+        text,
+        "        │                         light::Bind gets a field `radiance`: without it nothing compiles"
+    );
+    let _ = writeln!(text, "        ▼");
+    let _ = writeln!(
+        text,
+        "src/pass/light.rs                 frame.compute_indirect(\"lighting\", &light::Bind {{ radiance, .. }}, ..)"
+    );
+    let _ = writeln!(text, "        ▼");
+    let _ = writeln!(
+        text,
+        "crates/vulkan/src/frame.rs        Use {{ resource: radiance, access: {:?} }}: {kind}",
+        light.access
+    );
+    let _ = writeln!(text, "        ▼");
+    let _ = writeln!(
+        text,
+        "crates/vulkan/src/access.rs       masks(): stages {:?}, access {:?}, layout {:?}",
+        masks.stages, masks.access, masks.layout
+    );
+    let _ = writeln!(text, "        ▼");
+    let _ = writeln!(
+        text,
+        "crates/vulkan/src/sync.rs         barriers(): the uses of all passes in order → the barriers before each pass"
+    );
+    let _ = writeln!(text, "        ▼");
+    let _ = writeln!(
+        text,
+        "crates/vulkan/src/recording.rs    vkCmdPipelineBarrier2 before the pass \"transparent lighting\":"
+    );
+    let _ = writeln!(
+        text,
+        "                                  wait for {:?}, make {:?} available → before {:?} does {:?}",
+        masks.stages, writes, after.stages, after.access
+    );
+    text.push_str("```\n");
+    text
+}
