@@ -431,7 +431,7 @@ fn paths_call_for_what_they_may_meet() {
         "reflection",
         "order-independent transparency",
     ] {
-        assert_eq!(of(name), ["switched off", "not needed"], "{name}");
+        assert_eq!(of(name), ["not needed", "switched off"], "{name}");
     }
     // Some surface of each scene is rough, and one is shown as it is.
     assert_eq!([of("path tracing"), of("glossy reflection"), of("emissive surfaces as lights")], [["used"]; 3]);
@@ -552,8 +552,8 @@ const NAMES: [&str; 22] = [
     "clear coat",
     "conductors with n and kappa",
     "emissive textures",
-    "environment reflection",
     "environment",
+    "environment reflection",
     "glossy reflection",
     "heterogeneous media",
     "material layers",

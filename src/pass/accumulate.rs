@@ -1,4 +1,6 @@
-//! Sum of a pixel's samples (shaders/pass/accumulate.comp).
+//! Accumulation of samples into the film (shaders/pass/accumulate.comp).
+//!
+//! Read pbrt (4th ed.), section 5.4 (film).
 
 use anyhow::Result;
 
@@ -6,11 +8,11 @@ use crate::gpu::{Frame, Image};
 use crate::shader::{Library, accumulate, lib};
 use crate::upload::spectrum::rgb_from_xyz;
 
-/// Adds `radiance` to `film`, of which it is the first part or not, and multiplies by `scale`. Of a picture in `bands` of
-/// wavelengths it is one of them, in X, Y and Z.
+/// Adds `radiance` to `film` and multiplies the sum by `scale`; `first` overwrites the film. With `bands` above 0, `radiance` is
+/// one band of wavelengths in CIE XYZ.
 ///
 /// # Errors
-/// When the driver refuses what a pipeline binds.
+/// When the driver refuses a descriptor or a layout.
 pub fn accumulate<'a>(
     frame: &mut Frame<'a>,
     radiance: &'a Image,

@@ -1,4 +1,4 @@
-//! The G-buffer as arbitrary output variables (shaders/pass/aov.comp).
+//! Arbitrary output variables (AOVs): the G-buffer as data for the host (shaders/pass/aov.comp).
 
 use anyhow::Result;
 
@@ -6,10 +6,10 @@ use super::gbuffer::GBuffer;
 use crate::gpu::{Buffer, Frame};
 use crate::shader::{Library, aov};
 
-/// Writes one [`crate::share::AovPixel`] per pixel of the rows from `rows[0]` up to `rows[1]`.
+/// Writes one [`crate::share::AovPixel`] per pixel of the rows from `rows[0]` to before `rows[1]`.
 ///
 /// # Errors
-/// When the driver refuses what a pipeline binds.
+/// When the driver refuses a descriptor or a layout.
 pub fn aov<'a>(
     frame: &mut Frame<'a>,
     library: Library,
@@ -19,7 +19,7 @@ pub fn aov<'a>(
 ) -> Result<()> {
     let bind = aov::Bind { gbuffer: gbuffer.bind(), pixels };
     let size = gbuffer.depth.desc();
-    // Of the formulas only how things are stored.
+    // Only the constants of the encoding matter here.
     let constants = aov::Constants {
         library: Library { gbuffer: library.gbuffer, normals: library.normals, ..Library::default() },
     };

@@ -1,4 +1,4 @@
-//! What lies behind the scene (shaders/pass/background.comp).
+//! The background behind the scene: environment or nothing (shaders/pass/background.comp).
 
 use anyhow::Result;
 
@@ -8,10 +8,10 @@ use super::lighting::Lighting;
 use crate::gpu::{Frame, Image};
 use crate::shader::background;
 
-/// Writes `radiance` where no surface was drawn.
+/// Writes `radiance` at pixels without a surface, by indirect dispatch over the list of background tiles.
 ///
 /// # Errors
-/// When the driver refuses what a pipeline binds.
+/// When the driver refuses a descriptor or a layout.
 pub fn background<'a>(
     frame: &mut Frame<'a>,
     lighting: &Lighting<'a>,

@@ -1,5 +1,7 @@
-//! Work lists: which 8x8 tiles hold surfaces, which hold background or see-through fragments
-//! (shaders/pass/classify.comp, classify_fragments.comp).
+//! Tile classification: lists of the 8x8 tiles with surfaces, background, transparent fragments or rays, and the arguments of
+//! indirect dispatches over them (shaders/pass/classify.comp, classify_fragments.comp, classify_rays.comp).
+//!
+//! Read Real-Time Rendering (4th ed.), section 20.1 (classification of tiles), and docs/decisions/work-tiles.md.
 
 use std::sync::Arc;
 
@@ -13,21 +15,21 @@ use crate::plan::Plan;
 use crate::shader::{Library, classify, classify_fragments, classify_rays as ray_program, lib};
 use crate::share::WorkSize;
 
-/// Pixels a side.
+/// Side of a tile in pixels.
 pub const TILE: u32 = lib::work_tile::WORK_TILE;
 
-/// Bytes of one [`WorkSize`].
+/// Bytes of a [`WorkSize`], the arguments of an indirect dispatch.
 pub const WORK_BYTES: u64 = size_of::<WorkSize>() as u64;
 
-/// A dispatch of nothing.
+/// Arguments of an empty indirect dispatch.
 const EMPTY: WorkSize = WorkSize { x: 0, y: 1, z: 1, count: 0 };
 
-/// The tiles of a strip that hold see-through fragments.
+/// The tiles of a strip that hold transparent fragments.
 pub struct FragmentTiles {
-    /// One `WorkSize`.
+    /// One [`WorkSize`].
     pub sizes: Buffer,
     empty: Buffer,
-    /// The tiles.
+    /// Indices of the tiles.
     pub tiles: Buffer,
     width: u32,
 }
@@ -48,10 +50,10 @@ impl FragmentTiles {
     }
 }
 
-/// Lists the tiles of rows `rows[0]` up to `rows[1]` that hold see-through fragments.
+/// Lists the tiles of rows `rows[0]` to before `rows[1]` that hold transparent fragments.
 ///
 /// # Errors
-/// When the driver refuses what a pipeline binds.
+/// When the driver refuses a descriptor or a layout.
 pub fn classify_fragments<'a>(
     frame: &mut Frame<'a>,
     library: Library,
@@ -68,14 +70,14 @@ pub fn classify_fragments<'a>(
     frame.compute("classify fragment tiles", &bind, &classify_fragments::Constants { library }, &push, rows_of(groups))
 }
 
-/// Lists of tiles and the sizes of the dispatches over them.
+/// Lists of surface and background tiles, and the arguments of the indirect dispatches over them.
 pub struct WorkLists {
-    /// Two `WorkSize`: surfaces, background.
+    /// Two [`WorkSize`]: surfaces, background.
     pub sizes: Buffer,
     empty: Buffer,
-    /// Tiles with surfaces.
+    /// Indices of the tiles with surfaces.
     pub surface: Buffer,
-    /// Tiles with background.
+    /// Indices of the tiles with background.
     pub background: Buffer,
     tiles: u32,
 }
@@ -98,10 +100,10 @@ impl WorkLists {
     }
 }
 
-/// Sorts the tiles of the G-buffer into the lists.
+/// Classifies the tiles of the G-buffer: surfaces, background, or both.
 ///
 /// # Errors
-/// When the driver refuses what a pipeline binds.
+/// When the driver refuses a descriptor or a layout.
 pub fn classify<'a>(frame: &mut Frame<'a>, library: Library, gbuffer: &'a GBuffer, lists: &'a WorkLists) -> Result<()> {
     frame.copy_buffer("reset work sizes", &lists.empty, &lists.sizes, 2 * WORK_BYTES);
     let bind = classify::Bind {
@@ -115,26 +117,26 @@ pub fn classify<'a>(frame: &mut Frame<'a>, library: Library, gbuffer: &'a GBuffe
     frame.compute("classify tiles", &bind, &classify::Constants { library }, &push, rows_of(groups))
 }
 
-/// Which surfaces are looked for.
+/// The kinds of surfaces whose tiles are listed.
 #[derive(Debug, Clone, Copy)]
 pub struct Calls {
-    /// Those smooth enough for a mirror image.
+    /// Surfaces smooth enough for specular reflection.
     pub mirrors: bool,
-    /// Those that transmit light.
+    /// Transmissive surfaces.
     pub transmissive: bool,
 }
 
-/// The tiles that hold surfaces which send rays, or march them over the screen.
+/// The tiles with surfaces that send rays, in the BVH or in screen space.
 pub struct RayTiles {
-    /// One `WorkSize`.
+    /// One [`WorkSize`].
     pub sizes: Buffer,
     empty: Buffer,
-    /// The tiles.
+    /// Indices of the tiles.
     pub tiles: Buffer,
 }
 
 impl RayTiles {
-    /// A list for a picture of `size` pixels, where the plan has something that is done in those tiles.
+    /// A list for a picture of `size` pixels; dummies where no pass of the plan uses it.
     ///
     /// # Errors
     /// When memory is short.
@@ -155,7 +157,7 @@ impl RayTiles {
 /// Lists the tiles of the G-buffer whose surfaces send rays (shaders/pass/classify_rays.comp).
 ///
 /// # Errors
-/// When the driver refuses what a pipeline binds.
+/// When the driver refuses a descriptor or a layout.
 pub fn classify_rays<'a>(
     frame: &mut Frame<'a>,
     lighting: &Lighting<'a>,

@@ -1,4 +1,8 @@
-//! See-through surfaces lit and laid over what is behind them (shaders/pass/composite.comp).
+//! Order-independent transparency, second pass: sorts, lights and composites the per-pixel linked lists of fragments (A-buffer,
+//! shaders/pass/composite.comp).
+//!
+//! Read Carpenter 1984, "The A-buffer, an Antialiased Hidden Surface Method"; Real-Time Rendering (4th ed.), section 5.5;
+//! docs/decisions/see-through.md.
 
 use anyhow::Result;
 
@@ -10,21 +14,22 @@ use super::screen::OnScreen;
 use crate::gpu::{Buffer, Frame, Image};
 use crate::shader::composite;
 
-/// What fragments are laid over.
+/// The picture behind the fragments.
 #[derive(Clone, Copy)]
 pub struct Behind<'a> {
-    /// Radiance, pixel by pixel.
+    /// Radiance per pixel, which the pass updates.
     pub radiance: &'a Image,
-    /// The same as the screen shows it.
+    /// A copy of the radiance for screen-space lookups.
     pub seen: &'a Buffer,
-    /// A part of the picture, which fragments only weaken.
+    /// A part of the picture, which fragments only attenuate.
     pub part: Option<Part>,
 }
 
-/// Lays the fragments of one strip over what is behind them, nearest first. What they show of the screen is the opaque surfaces.
+/// Composites the fragments of one strip over the picture behind them, nearest first. Screen-space lookups see the opaque
+/// surfaces only.
 ///
 /// # Errors
-/// When the driver refuses what a pipeline binds.
+/// When the driver refuses a descriptor or a layout.
 pub fn composite<'a>(
     frame: &mut Frame<'a>,
     lighting: &Lighting<'a>,
@@ -37,9 +42,9 @@ pub fn composite<'a>(
     let name =
         behind.part.map_or("transparent lighting".to_owned(), |part| format!("transparent over {}", part.name()));
     let mut library = lighting.library;
-    // What is mirrored here is the environment: rays are sent from the G-buffer alone.
+    // Transparent surfaces reflect the environment: reflection rays start from the G-buffer only.
     library.surface.mirror_rays = false;
-    // Without rays a light is a single turn of a loop, and what may be too many is refused before.
+    // Without shadow rays a light is one loop iteration, and too many lights were refused before.
     if lighting.shadow_rays() {
         library.lighting.light_budget = library.loops.loop_budget;
     }

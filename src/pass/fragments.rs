@@ -1,4 +1,8 @@
-//! See-through surfaces into lists per pixel (shaders/pass/fragments.*).
+//! Order-independent transparency, first pass: transparent surfaces into per-pixel linked lists of fragments (A-buffer,
+//! shaders/pass/fragments.*).
+//!
+//! Read Carpenter 1984, "The A-buffer, an Antialiased Hidden Surface Method"; Yang et al. 2010, "Real-Time Concurrent Linked
+//! List Construction on the GPU"; Real-Time Rendering (4th ed.), section 5.5; docs/decisions/see-through.md.
 
 use std::sync::Arc;
 
@@ -14,17 +18,17 @@ use crate::upload::scene::SceneOnDevice;
 /// Bytes of one fragment.
 const NODE_BYTES: u64 = 4 * lib::fragment_list::NODE_WORDS as u64;
 
-/// Lists of see-through fragments, drawn in horizontal strips so that any number of fragments fits the memory of one.
+/// Per-pixel linked lists of fragments (A-buffer), built in horizontal strips so that any number of fragments fits memory.
 pub struct FragmentLists {
-    /// First fragment of each pixel.
+    /// First fragment of each pixel's list.
     pub heads: Image,
     /// The fragments of a strip.
     pub nodes: Buffer,
-    /// Per strip, how many fragments it has: more than `nodes` holds means that the frame has to be drawn again.
+    /// Number of fragments per strip; more than `nodes` holds means that the frame has to be drawn again.
     pub counters: Buffer,
-    /// Pixels whose list was too long for one invocation.
+    /// Number of pixels whose list was too long for one invocation.
     pub dropped: Buffer,
-    /// Tiles that hold fragments.
+    /// Tiles with fragments.
     pub work: FragmentTiles,
     strips: u32,
     size: [u32; 2],
@@ -34,14 +38,14 @@ pub struct FragmentLists {
 /// Rows of the picture whose fragments are in memory together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Strip {
-    /// Counted from the top.
+    /// Index of the strip, from the top.
     pub index: u32,
-    /// From, up to.
+    /// First row, and one past the last.
     pub rows: [u32; 2],
 }
 
 impl FragmentLists {
-    /// Lists that hold one fragment per pixel to begin with.
+    /// Lists with space for one fragment per pixel at first.
     ///
     /// # Errors
     /// When memory is short.
@@ -73,7 +77,7 @@ impl FragmentLists {
     #[must_use]
     pub fn strips(&self) -> Vec<Strip> {
         let rows = self.size[1].div_ceil(self.strips);
-        // No strip has parts of two tiles of the picture in one of its own.
+        // A strip boundary never divides a tile of the picture, unless strips are smaller than a tile.
         let rows = if rows < TILE { rows.next_power_of_two() } else { rows.next_multiple_of(TILE) };
         (0..self.strips)
             .map(|index| Strip { index, rows: [index, index + 1].map(|i| (i * rows).min(self.size[1])) })
@@ -81,7 +85,7 @@ impl FragmentLists {
             .collect()
     }
 
-    /// Whether the frame that has just finished fitted. If not, the lists have grown (or the strips shrunk): draw again.
+    /// Whether the fragments of the last frame fitted. If not, the buffer has grown (or the strips have shrunk): draw again.
     ///
     /// # Errors
     /// When memory is short.
@@ -95,7 +99,7 @@ impl FragmentLists {
             return Ok(true);
         }
         let limit = self.device.max_storage_bytes() / NODE_BYTES;
-        // Room for the next samples, whose edges fall a little differently.
+        // Space for the next samples, whose edges fall a little differently.
         let wanted = most + most / 16 + 1024;
         if wanted > limit {
             if self.strips == self.size[1] {
@@ -112,17 +116,17 @@ impl FragmentLists {
         Ok(false)
     }
 
-    /// Pixels of the sample that has just finished whose farthest fragments were left out.
+    /// Number of pixels in the last sample whose farthest fragments were dropped.
     #[must_use]
     pub fn dropped(&self) -> u32 {
         self.dropped.read(|bytes| u32::from_ne_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
     }
 }
 
-/// Draws every see-through surface in front of the opaque ones into the lists of one strip.
+/// Draws every transparent surface in front of the opaque ones into the lists of one strip.
 ///
 /// # Errors
-/// When the driver refuses what a pipeline binds.
+/// When the driver refuses a descriptor or a layout.
 pub fn fragments<'a>(
     frame: &mut Frame<'a>,
     scene: &'a SceneOnDevice,
@@ -131,7 +135,7 @@ pub fn fragments<'a>(
     strip: Strip,
     lod_bias: f32,
 ) -> Result<()> {
-    // An empty raster pass clears the heads; one that draws could not, it exchanges them atomically.
+    // An empty raster pass clears the heads; a pass with draws exchanges them atomically and cannot clear them.
     let clear = Raster {
         name: "clear fragment lists",
         colors: vec![Some(ColorTarget { image: &lists.heads, clear: Some([u32::MAX; 4]) })],

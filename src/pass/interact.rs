@@ -1,4 +1,7 @@
-//! Reflection and refraction by rays, over the tiles that call for them (shaders/pass/interact.comp).
+//! Recursive ray tracing of reflection and refraction, by indirect dispatch over ray tiles (shaders/pass/interact.comp).
+//!
+//! Read Whitted 1980, "An Improved Illumination Model for Shaded Display"; Schmidt and Budge 2002, "Simple Nested Dielectrics in
+//! Ray Traced Images"; docs/decisions/rays.md. The G-buffer replaces camera rays.
 
 use anyhow::Result;
 
@@ -10,15 +13,15 @@ use crate::gpu::{Frame, Image};
 use crate::plan::Rays;
 use crate::shader::interact;
 
-/// Branches that can wait beside one for each surface of a path: a surface may send four. What finds no place is counted as
-/// not followed.
+/// Pending rays beyond one per surface of a path: a surface may send four rays. Rays without a free slot are counted as
+/// truncated.
 const SPARE_BRANCHES: u32 = 4;
 
-/// Adds to `radiance` what the surfaces of the G-buffer mirror and what is seen through them; with a part, what of that belongs to it: all
-/// rays are followed once more, over the same tiles.
+/// Adds reflected and refracted light at the surfaces of the G-buffer to `radiance`. With a part, only light of the part is
+/// added: all rays are traced once more, over the same tiles.
 ///
 /// # Errors
-/// When the driver refuses what a pipeline binds.
+/// When the driver refuses a descriptor or a layout.
 pub fn interact<'a>(
     frame: &mut Frame<'a>,
     lighting: &Lighting<'a>,
@@ -34,7 +37,7 @@ pub fn interact<'a>(
         classify_rays(frame, lighting, calls, gbuffer, tiles)?;
     }
     let mut library = lighting.library;
-    // What a ray hits is on no tile: it goes through all lights.
+    // Ray hits are outside of the light tiles, so they loop over all lights.
     library.lighting.local_lights = lighting.plan.local_lights;
     library.lighting.tile_words = 0;
     library.lighting.light_budget = library.loops.loop_budget;

@@ -1,4 +1,6 @@
-//! Deferred lighting of the nearest surfaces (shaders/pass/light.comp).
+//! Deferred shading: direct light of the G-buffer's surfaces (shaders/pass/light.comp).
+//!
+//! Read Real-Time Rendering (4th ed.), section 20.1 (deferred shading), and docs/decisions/work-tiles.md.
 
 use anyhow::Result;
 
@@ -8,10 +10,10 @@ use super::lighting::Lighting;
 use crate::gpu::{Frame, Image};
 use crate::shader::{lib, light};
 
-/// Writes `radiance` where the G-buffer holds a surface.
+/// Writes `radiance` at pixels with a surface, by indirect dispatch over the list of surface tiles.
 ///
 /// # Errors
-/// When the driver refuses what a pipeline binds.
+/// When the driver refuses a descriptor or a layout.
 pub fn light<'a>(
     frame: &mut Frame<'a>,
     lighting: &Lighting<'a>,
@@ -20,7 +22,7 @@ pub fn light<'a>(
     radiance: &'a Image,
 ) -> Result<()> {
     let mut library = lighting.library;
-    // Without shadow rays, and from outside of bodies, no ray leaves what is lit: one pipeline, whatever rays other passes send.
+    // Without shadow rays, and with the eye outside of closed meshes, the pass sends no ray: one pipeline for all plans.
     if !library.gbuffer.stored_triangles {
         library.trace = lib::trace::Constants::default();
         library.hit = lib::hit::Constants::default();

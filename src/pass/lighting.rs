@@ -1,4 +1,4 @@
-//! What all passes that light surfaces share.
+//! Inputs shared by all passes that light surfaces, and the division of lights among dispatches.
 
 use super::rows::TileShare;
 use super::tiles::Tiles;
@@ -6,28 +6,28 @@ use crate::plan::Plan;
 use crate::shader::Library;
 use crate::shader::light::LightRange;
 
-/// Lights of one dispatch where each sends a ray: a traversal evaluates some 20 to 200 loop heads, of 65,535 that lavapipe
+/// Lights per dispatch when each sends a shadow ray: a traversal takes some 20 to 200 loop iterations, of 65,535 that lavapipe
 /// grants an invocation.
 const LIGHTS_AT_ONCE: u32 = 64;
 
-/// What all passes that light surfaces need.
+/// Inputs of the passes that light surfaces.
 #[derive(Clone, Copy)]
 pub struct Lighting<'a> {
-    /// Which code.
+    /// The plan.
     pub plan: &'a Plan,
-    /// What programs are specialised by.
+    /// Specialization constants.
     pub library: Library,
-    /// Light lists.
+    /// Light masks of tiled light culling.
     pub tiles: &'a Tiles,
-    /// Pixels.
+    /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Those of them that are drawn.
+    /// The share of the picture's tiles that is drawn.
     pub share: TileShare,
 }
 
-/// Directional lights in parts and local ones in parts, of which one dispatch takes the last of the former with the first of the
-/// latter if both are few. Local lights are divided at the same ones whether or not tiles list them: sums are the same to
-/// the last bit then.
+/// The ranges of lights for each dispatch: directional lights, then local ones, at most [`LIGHTS_AT_ONCE`] each. The last
+/// directional range takes the first local one if both are small. Local lights are divided at the same indices with and
+/// without tiled light culling, so the sums are bit-identical.
 fn parts(directional: u32, local: u32, listed: bool) -> Vec<LightRange> {
     let of =
         |count: u32| (0..count).step_by(LIGHTS_AT_ONCE as usize).map(move |i| [i, (i + LIGHTS_AT_ONCE).min(count)]);
@@ -48,13 +48,13 @@ fn parts(directional: u32, local: u32, listed: bool) -> Vec<LightRange> {
 }
 
 impl Lighting<'_> {
-    /// Whether rays look for lights.
+    /// Whether lights use shadow rays.
     #[must_use]
     pub fn shadow_rays(&self) -> bool {
         self.plan.rays.is_some_and(|rays| rays.shadows)
     }
 
-    /// What each dispatch goes through: everything at once, or a few lights at a time where each sends a ray.
+    /// The range of each dispatch: all lights at once, or a few at a time when each sends a shadow ray.
     #[must_use]
     pub fn ranges(&self) -> Vec<LightRange> {
         let Plan { directional_lights, local_lights, tiles, .. } = *self.plan;
@@ -84,7 +84,7 @@ mod tests {
         assert_eq!(parts(0, 70, true), [[0, 0, 0, 2], [0, 0, 2, 3]]);
         assert_eq!(parts(65, 63, false), [[0, 64, 0, 0], [64, 128, 0, 0]]);
         assert_eq!(parts(65, 63, true), [[0, 64, 0, 0], [64, 65, 0, 2]]);
-        // Too many for one dispatch.
+        // More lights than one dispatch takes.
         assert_eq!(parts(2, 130, false), [[0, 2, 0, 0], [2, 66, 0, 0], [66, 130, 0, 0], [130, 132, 0, 0]]);
         assert_eq!(parts(2, 130, true), [[0, 2, 0, 0], [2, 2, 0, 2], [2, 2, 2, 4], [2, 2, 4, 5]]);
     }

@@ -1,4 +1,7 @@
-//! Mirror images of what is on the screen, over the tiles that call for them (shaders/pass/mirror.comp).
+//! Screen-space reflections (SSR), by indirect dispatch over ray tiles (shaders/pass/mirror.comp).
+//!
+//! Read Real-Time Rendering (4th ed.), section 11.6.5 (screen-space methods); McGuire and Mara 2014, "Efficient GPU Screen-Space
+//! Ray Tracing"; docs/decisions/screen-space.md.
 
 use anyhow::Result;
 
@@ -9,10 +12,10 @@ use super::screen::OnScreen;
 use crate::gpu::{Frame, Image};
 use crate::shader::mirror;
 
-/// Puts the radiance on the screen in the place of the environment's where a mirrored ray meets it.
+/// Replaces the environment's reflection by the picture's radiance where a reflected ray hits the depth buffer.
 ///
 /// # Errors
-/// When the driver refuses what a pipeline binds.
+/// When the driver refuses a descriptor or a layout.
 pub fn mirror<'a>(
     frame: &mut Frame<'a>,
     lighting: &Lighting<'a>,
@@ -22,7 +25,7 @@ pub fn mirror<'a>(
     radiance: &'a Image,
 ) -> Result<()> {
     classify_rays(frame, lighting, Calls { mirrors: true, transmissive: false }, gbuffer, tiles)?;
-    // The surfaces are those of the lighting, to the last bit: what it has added is taken away.
+    // Constants as in the lighting pass: its reflection is recomputed bit-identically and subtracted.
     let mut library = lighting.library;
     library.surface.mirror_rays = false;
     library.gbuffer.stored_triangles = false;

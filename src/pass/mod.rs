@@ -1,6 +1,7 @@
-//! One file per pass, each with one public function that describes it to a [`crate::gpu::Frame`].
+//! Render passes: one file per pass, each with one public function that records the pass into a [`crate::gpu::Frame`].
 //!
-//! A pass takes what it reads, writes what its name says, and contains no formula: those are in `shaders/lib/`.
+//! Read docs/frame.md. A pass reads its arguments, writes what its name says, and contains no formula: formulas are in
+//! `shaders/lib/`.
 
 pub mod accumulate;
 pub mod aov;

@@ -1,5 +1,8 @@
-//! Paths of light: a wavefront of one bounce after the other over queues of pixels (shaders/pass/path.comp), or all bounces in
-//! one dispatch (path_at_once.comp), which tests compare it with.
+//! Wavefront path tracing: one dispatch per bounce over a queue of pixels, with stream compaction in between
+//! (shaders/pass/path.comp); or all bounces in one dispatch (path_at_once.comp), for comparison in tests.
+//!
+//! Read pbrt (4th ed.), chapter 15 (wavefront rendering) and sections 13.2 to 13.4; Laine, Karras and Aila 2013, "Megakernels
+//! Considered Harmful"; docs/decisions/paths.md. Estimates use next event estimation with multiple importance sampling.
 
 use std::sync::Arc;
 
@@ -13,17 +16,17 @@ use crate::shader::lib::queue::{CHUNK, PATHS_IN_GROUP};
 use crate::shader::{lib, path, path_at_once, path_begin, queue_count, queue_next, queue_scan};
 use crate::share::{QueueSize, WorkSize};
 
-/// Pixels of the tiles that the first queue is made of.
+/// Pixels per tile; the first queue consists of whole tiles.
 const TILE: u32 = lib::work_tile::WORK_TILE * lib::work_tile::WORK_TILE;
 const SIZE_BYTES: u64 = size_of::<QueueSize>() as u64;
 const CHUNKS_AT: u64 = std::mem::offset_of!(QueueSize, chunks) as u64;
 
-/// Those of a picture, and the share of them that is drawn.
+/// Size of the picture, and the share of its tiles that is drawn.
 type Pixels = ([u32; 2], TileShare);
 
-/// Paths between two dispatches.
+/// State of all paths between two dispatches.
 pub struct PathsOnDevice {
-    /// What is done at their surfaces.
+    /// Settings of path tracing.
     pub with: Paths,
     states: [Buffer; 6],
     queues: [Buffer; 2],
@@ -35,7 +38,7 @@ pub struct PathsOnDevice {
 }
 
 impl PathsOnDevice {
-    /// For a share of a picture of `size` pixels.
+    /// Buffers for a share of a picture of `size` pixels.
     ///
     /// # Errors
     /// When memory is short.
@@ -43,7 +46,7 @@ impl PathsOnDevice {
         let (size, share) = pixels;
         let rays = plan.rays.unwrap_or_default();
         let pixels = u64::from(size[0]) * u64::from(size[1]);
-        // All pixels of the tiles, also those that a tile has beyond the picture.
+        // All pixels of the tiles, including those outside of the picture.
         let places = share.tiles(size) * TILE;
         let words = |name, wanted: bool, words: u64| match wanted {
             true => Buffer::new(device, name, 4 * words, Place::Device),
@@ -83,7 +86,7 @@ impl PathsOnDevice {
     }
 }
 
-/// One sample of every pixel into `radiance`.
+/// Records one sample of every pixel into `radiance`.
 ///
 /// # Errors
 /// When the driver refuses what a pipeline binds.
@@ -118,7 +121,8 @@ pub fn paths<'a>(
     Ok(())
 }
 
-/// The next queue: entries that go on, in their order.
+/// Stream compaction: the next queue holds the paths that are not terminated, in the same order. Three dispatches: count per
+/// chunk, prefix sum (scan) over the chunks, scatter.
 fn compact<'a>(frame: &mut Frame<'a>, paths: &'a PathsOnDevice, from: usize, to: usize) -> Result<()> {
     let (queue, sizes, chunks) = (&paths.queues[from], &paths.sizes[from], &paths.chunks);
     let bind = queue_count::Bind { queue, sizes, chunks };

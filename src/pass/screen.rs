@@ -1,4 +1,6 @@
-//! The picture as a scene, for the rungs `screen` (shaders/lib/screen.glsl).
+//! The picture as input of screen-space reflection and refraction, with a per-tile depth bound (shaders/lib/screen.glsl).
+//!
+//! Read docs/decisions/screen-space.md.
 
 use std::sync::Arc;
 
@@ -12,11 +14,11 @@ use crate::gpu::{Buffer, Device, Frame, Place};
 use crate::plan::{Plan, Screen};
 use crate::shader::{lib, screen_tiles as tiles_program};
 
-/// The picture as something to be looked up; next to nothing where the plan does not.
+/// The picture for screen-space lookups; dummies where the plan has none.
 pub struct OnScreen {
-    /// A copy of the radiance, row by row, to be read while that is written.
+    /// A copy of the radiance in row order, which passes read while they write the original.
     pub seen: Buffer,
-    /// How near the surfaces of each 8x8 tile come, as reversed depth.
+    /// Largest reversed depth (nearest surface) of each 8x8 tile.
     pub nearest_pieces: Buffer,
 }
 
@@ -36,14 +38,14 @@ impl OnScreen {
         })
     }
 
-    /// What passes read of it, with `seen` for the radiance.
+    /// Bindings of screen-space lookups, with `seen` as the radiance.
     #[must_use]
     pub fn bind<'a>(&'a self, seen: &'a Buffer) -> lib::screen::Bind<'a> {
         lib::screen::Bind { seen, nearest_pieces: &self.nearest_pieces }
     }
 }
 
-/// Finds how near the surfaces of each tile come (shaders/pass/screen_tiles.comp).
+/// Computes the nearest depth of each tile (shaders/pass/screen_tiles.comp).
 ///
 /// # Errors
 /// When the driver refuses what a pipeline binds.

@@ -1,8 +1,8 @@
-//! Sums of the samples of each pixel, block by block (shaders/pass/accumulate.comp, join.comp).
+//! Sums of samples in blocks, so that a split render is bit-identical (shaders/pass/accumulate.comp, join.comp).
 //!
-//! The samples of a picture are added in blocks of as many, first to last, and the blocks one after the other. Which blocks there are
-//! depends on the number of samples alone, so that processes that draw some of the blocks each make, together, the sum of one that
-//! draws all of them, to the last bit: a sum in single precision depends on its order.
+//! Read docs/decisions/shards.md. The samples of a picture are added in blocks of equal size, first to last, and then the
+//! blocks. The blocks depend only on the number of samples. Processes that draw different blocks therefore produce the same
+//! sum as one process, to the last bit: a sum in single precision depends on its order.
 
 use std::sync::Arc;
 
@@ -13,38 +13,38 @@ use super::accumulate::accumulate;
 use crate::gpu::{Device, Frame, Image, ImageDesc};
 use crate::shader::join;
 
-/// Blocks that the samples of a picture make, where there are so many.
+/// Number of blocks of a picture's samples, when there are enough samples.
 pub const BLOCKS: u32 = 64;
 
-/// Samples of a block, of a sum of so many.
+/// Samples per block of a sum of `samples` samples.
 #[must_use]
 pub fn block_of(samples: u32) -> u32 {
     samples.div_ceil(BLOCKS).max(1)
 }
 
-/// A sum on the device.
+/// A sum of samples on the device.
 pub struct Sum {
-    /// Of whole blocks.
+    /// Sum of the completed blocks.
     pub total: Image,
-    /// Of the block that is under way, where blocks may be of more than one frame.
+    /// Sum of the current block, when a block can take more than one frame.
     open: Option<Image>,
 }
 
-/// A sample of a sum.
+/// A sample of a sum, or one band of it.
 #[derive(Debug, Clone, Copy)]
 pub struct Sample {
-    /// Counted from 0.
+    /// Index of the sample in the sum.
     pub index: u32,
-    /// Samples of a block.
+    /// Samples per block.
     pub block: u32,
-    /// What is drawn is the first band of it, or all of it …
+    /// Whether the frame is the sample's first band.
     pub begins: bool,
-    /// … and the last one.
+    /// Whether the frame is the sample's last band.
     pub ends: bool,
 }
 
 impl Sample {
-    /// Whether a block ends with it.
+    /// Whether the frame completes a block.
     #[must_use]
     pub fn ends_block(self) -> bool {
         self.ends && (self.index + 1).is_multiple_of(self.block)
@@ -52,7 +52,7 @@ impl Sample {
 }
 
 impl Sum {
-    /// For up to so many samples, in so many bands of wavelengths, of a picture of `size` pixels.
+    /// A sum of up to `samples` samples in `bands` bands of wavelengths, of a picture of `size` pixels.
     ///
     /// # Errors
     /// When memory is short.
@@ -69,17 +69,17 @@ impl Sum {
         Ok(Self { total: image(name)?, open })
     }
 
-    /// Whether the sum of whole blocks is all there is.
+    /// Whether there is no separate image for the current block.
     #[must_use]
     pub fn is_plain(&self) -> bool {
         self.open.is_none()
     }
 
-    /// Adds a sample, or one band of it. The total is begun anew with the block that has the sample `from`, and is multiplied by
-    /// `scale` when a block has been added.
+    /// Adds a sample, or one band of it. The total restarts with the block that contains the sample `from`, and is multiplied by
+    /// `scale` whenever a block has been added.
     ///
     /// # Errors
-    /// When the driver refuses what a pipeline binds.
+    /// When the driver refuses a descriptor or a layout.
     pub fn add<'a>(
         &'a self,
         frame: &mut Frame<'a>,
@@ -100,7 +100,7 @@ impl Sum {
         Ok(())
     }
 
-    /// Images that hold something after so many samples in blocks of so many: the total, the block under way.
+    /// The images with contents after `samples` samples in blocks of `block`: the total, and the current block.
     #[must_use]
     pub fn images(&self, samples: u32, block: u32) -> [Option<&Image>; 2] {
         let total = (samples >= block).then_some(&self.total);
@@ -108,14 +108,14 @@ impl Sum {
     }
 }
 
-/// Writes the mean of all samples into `film`, of which each sum has so many, in blocks of so many.
+/// Writes the mean of all samples of several sums into `film`; `samples` holds the number of samples of each sum.
 ///
 /// # Errors
-/// When the driver refuses what a pipeline binds.
+/// When the driver refuses a descriptor or a layout.
 pub fn join<'a>(frame: &mut Frame<'a>, sums: &'a [Sum], samples: &[u32], block: u32, film: &'a Image) -> Result<()> {
     let images: Vec<Option<&Image>> = sums.iter().zip(samples).flat_map(|(sum, &of)| sum.images(of, block)).collect();
     let image = |i: usize| images.get(i).copied().flatten();
-    // What is not there is not read.
+    // The shader does not read images that are absent.
     let at = |i: usize| image(i).unwrap_or(&sums[0].total);
     let has = |i: usize| u32::from(image(i).is_some());
     let bind = join::Bind { total_a: at(0), open_a: at(1), total_b: at(2), open_b: at(3), film };

@@ -1,4 +1,6 @@
-//! Light lists: which point and spot lights reach which 16x16 tile (shaders/pass/tile_depth.comp, tiles.comp).
+//! Tiled light culling: the point and spot lights that reach each 16x16 tile (shaders/pass/tile_depth.comp, tiles.comp).
+//!
+//! Read Real-Time Rendering (4th ed.), section 20.3 (tiled shading), and docs/decisions/light-lists.md.
 
 use std::sync::Arc;
 
@@ -13,7 +15,7 @@ use crate::shader::{Library, lib, tile_depth, tiles};
 
 const TILE: u32 = lib::light_tile::TILE;
 
-/// Depth ranges and light masks of the tiles of a picture.
+/// Depth bounds and light masks of the tiles of a picture.
 pub struct Tiles {
     depths: Buffer,
     /// One bit per light, `words` words per tile.
@@ -24,7 +26,7 @@ pub struct Tiles {
 }
 
 impl Tiles {
-    /// Buffers for a picture of `size` pixels; minimal where the plan has no lists.
+    /// Buffers for a picture of `size` pixels; dummies without tiled light culling.
     ///
     /// # Errors
     /// When memory is short.
@@ -41,23 +43,23 @@ impl Tiles {
         })
     }
 
-    /// What passes that light surfaces read.
+    /// Bindings of the passes that light surfaces.
     #[must_use]
     pub fn bind(&self) -> lib::lighting::Bind<'_> {
         lib::lighting::Bind { tile_lights: &self.masks }
     }
 
-    /// Words of a tile's mask; 0 without lists.
+    /// Words of a tile's mask; 0 without tiled light culling.
     #[must_use]
     pub fn words(&self) -> u32 {
         self.words
     }
 }
 
-/// Fills the masks for what the G-buffer holds.
+/// Computes depth bounds and light masks from the G-buffer.
 ///
 /// # Errors
-/// When the driver refuses what a pipeline binds.
+/// When the driver refuses a descriptor or a layout.
 pub fn tiles<'a>(
     frame: &mut Frame<'a>,
     plan: &Plan,

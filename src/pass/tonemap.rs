@@ -1,4 +1,6 @@
-//! Film to display bytes (shaders/pass/tonemap.comp).
+//! Tone mapping: film to display bytes (shaders/pass/tonemap.comp).
+//!
+//! Read Real-Time Rendering (4th ed.), section 8.2 (scene to screen), and docs/colour.md.
 
 use std::sync::Arc;
 
@@ -7,10 +9,10 @@ use anyhow::{Result, ensure};
 use crate::gpu::{Buffer, Device, Frame, Image, Place};
 use crate::shader::tonemap;
 
-/// What the last pass writes back: no count, and nothing that memory is filled with.
+/// A known word that the pass writes back: neither a count nor a fill pattern, it proves that the device executes commands.
 const CANARY: u32 = 0x65_74_61_6c;
 
-/// What the last pass leaves for the host.
+/// The host-visible output of the last pass.
 pub struct Display {
     /// RGBA8, sRGB-encoded, rows from the top.
     pub pixels: Buffer,
@@ -18,7 +20,7 @@ pub struct Display {
     device: Arc<Device>,
 }
 
-/// Values that are not radiances, counted before anything clamps.
+/// Pixels that are not valid radiance, counted before any clamp.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
     /// Pixels with a NaN.
@@ -45,7 +47,7 @@ impl Display {
     /// The counts of the frame that has just finished.
     ///
     /// # Errors
-    /// When the device has not run it, and shows nothing: a driver without its hardware.
+    /// When the device has not executed the frame, as with a driver without its hardware.
     pub fn counts(&self) -> Result<Counts> {
         self.counts.read(|bytes| {
             let words: &[u32] = bytemuck::cast_slice(bytes);
@@ -59,11 +61,12 @@ impl Display {
     }
 }
 
-/// Multiplies a film by `scale`, exposes by `exposure` stops, bends by tone curve number `curve`, and encodes; `background` is display-linear with
-/// alpha 1, or all 0 to keep transparency. With `desaturates` colours outside of Rec. 709 keep their luminance.
+/// Multiplies a film by `scale`, exposes it by `exposure` stops, applies tone curve number `curve`, and encodes sRGB. `background`
+/// is display-linear with alpha 1, or all 0 to keep transparency. With `desaturates`, colours outside of Rec. 709 keep
+/// their luminance.
 ///
 /// # Errors
-/// When the driver refuses what a pipeline binds.
+/// When the driver refuses a descriptor or a layout.
 pub fn tonemap<'a>(
     frame: &mut Frame<'a>,
     (film, scale): (&'a Image, f32),

@@ -1,4 +1,4 @@
-//! Rays alone: what the tests of the traversal and its measurements send (shaders/pass/trace_rays.comp).
+//! Ray tracing of a list of rays, for tests and benchmarks of the BVH traversal (shaders/pass/trace_rays.comp).
 
 use std::sync::Arc;
 
@@ -13,79 +13,79 @@ use crate::shader::{Library, SCENE, lib, trace_rays};
 use crate::share::WorkCounts;
 use crate::upload::rays::{RaysOnDevice, TraceConstants, Traversal};
 
-/// A ray in the space of the hierarchy: world axes, metres, from the anchor.
+/// A ray in bvh space: world axes, metres, origin at the anchor.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub struct Ray {
-    /// Where it begins.
+    /// Origin of the ray.
     pub origin: [f32; 3],
-    /// Hits beyond do not count; a negative one asks for nothing.
+    /// Largest parameter of a hit; a negative one disables the ray.
     pub t_max: f32,
-    /// Of any length.
+    /// Direction of any length.
     pub direction: [f32; 3],
-    /// The flat face it leaves ([`Tracer::face`]), which it cannot meet again, or [`Hit::NONE`].
+    /// Coplanar group that the ray leaves ([`Tracer::face`]) and cannot hit again, or [`Hit::NONE`].
     pub from: u32,
 }
 
-/// What a ray met.
+/// The hit of a ray.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Hit {
-    /// Where along it.
+    /// Parameter along the ray.
     pub t: f32,
-    /// Place among the triangles of the hierarchy; [`Hit::NONE`] for nothing.
+    /// Index among the BVH's triangles; [`Hit::NONE`] for a miss.
     pub triangle: u32,
     /// Barycentric coordinate of the second corner.
     pub u: f32,
-    /// Of the third.
+    /// Barycentric coordinate of the third corner.
     pub v: f32,
 }
 
 impl Hit {
-    /// No triangle.
+    /// Marks a miss: no triangle.
     pub const NONE: u32 = u32::MAX;
 }
 
-/// How rays are sent.
+/// The kind of query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Mode {
-    /// Any hit will do.
+    /// Any hit instead of the nearest.
     pub any_hit: bool,
-    /// Two rays in an invocation.
+    /// Two rays per invocation.
     pub pairs: bool,
-    /// Count nodes and triangles.
+    /// Count visited nodes and tested triangles.
     pub count: bool,
 }
 
-/// A scene that rays can be sent through.
+/// A scene with its BVH on a device.
 pub struct Tracer {
     device: Arc<Device>,
     rays: RaysOnDevice,
 }
 
 impl Tracer {
-    /// Builds the hierarchy of a scene.
+    /// Builds and uploads the BVH of a scene.
     ///
     /// # Errors
-    /// When it does not fit the device.
+    /// When the BVH does not fit the device.
     pub fn new(device: &Arc<Device>, scene: &Scene, traversal: Option<Traversal>) -> Result<Self> {
         let prepared = Prepared::for_rays(scene.clone())?;
         Ok(Self { device: device.clone(), rays: RaysOnDevice::new(device, &prepared, traversal)? })
     }
 
-    /// The hierarchy and its tables.
+    /// The BVH and its tables.
     #[must_use]
     pub fn rays(&self) -> &RaysOnDevice {
         &self.rays
     }
 
-    /// The flat face that a triangle is part of, by its place in the hierarchy.
+    /// Coplanar group of a triangle, by the triangle's index in the BVH.
     #[must_use]
     pub fn face(&self, triangle: u32) -> u32 {
         self.rays.faces[triangle as usize]
     }
 
-    /// Sends rays `repeats` times: what they met, the work of one time, and the milliseconds of each.
+    /// Traces rays `repeats` times: hits, work counts of one repeat, and milliseconds of each repeat.
     ///
     /// # Errors
     /// When the driver fails.

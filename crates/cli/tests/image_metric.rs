@@ -165,5 +165,5 @@ fn the_command_judges() {
     let error = format!("{:#}", run(&args).unwrap_err());
     assert!(error.ends_with("no.png: no such file or folder"), "{error}");
     let args = DiffArgs { a, b, metric: Metric::Mse, max: None, output: Some("map.jpg".into()), json: false };
-    assert_eq!(run(&args).unwrap_err().to_string(), "the map map.jpg cannot be written: only .png can");
+    assert_eq!(run(&args).unwrap_err().to_string(), "--output map.jpg: the error map can only be written as .png");
 }

@@ -1,30 +1,30 @@
-//! The time of a scene that moves: stopped, played in a circle, or set by hand.
+//! Animation time of the viewer: stopped, played in a loop, or set by hand.
 
-/// Steps of time, seconds: words of a command line stay short.
+/// Resolution of the time in seconds; keeps `--time` in copied commands short.
 const STEP: f64 = 1e-3;
 
-/// A clock that shows the time of a scene.
+/// Animation time of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Clock {
-    /// Seconds; `None`: as the command line says, or at rest.
+    /// Seconds; `None` is the time of the command line, or the rest pose.
     pub time: Option<f64>,
-    /// It goes on by itself.
+    /// Whether the animation plays.
     pub playing: bool,
 }
 
 impl Clock {
-    /// Back to what the command line says.
+    /// Stops, and returns to the time of the command line.
     pub fn stop(&mut self) {
         *self = Self::default();
     }
 
-    /// Goes to a time within what the scene lasts.
+    /// Sets the time in seconds, clamped to 0 … `duration` and rounded to milliseconds.
     pub fn set(&mut self, seconds: f64, duration: f64) {
         let steps = (seconds.clamp(0.0, duration) / STEP).round();
         self.time = Some(steps / STEP.recip());
     }
 
-    /// Goes on by some seconds, and begins anew at the end.
+    /// Advances a playing clock by some seconds; after `duration` it starts again at 0.
     pub fn advance(&mut self, seconds: f64, duration: f64) {
         if self.playing && duration > 0.0 {
             self.set((self.time.unwrap_or_default() + seconds).rem_euclid(duration), duration);

@@ -1,4 +1,5 @@
-//! Which equations of `shaders/lib/` a pixel is made of, by what its ray meets and the rungs that it is drawn with.
+//! Finds the equations of `shaders/lib/` that contribute to a pixel, from the events along its ray and the knobs of the picture.
+//! docs/equations.md lists all equations.
 
 use etalon::plan::Knobs;
 use etalon::plan::rungs::{Absorption, Brdf, Fresnel, Lights};
@@ -7,7 +8,7 @@ use etalon::shader::{PROBES, Probe};
 use etalon::spectra::Dispersion;
 use etalon::transport::events::{Event, Way};
 
-/// Names of the equations, in the order in which light needs them, backwards: from the surface to the screen.
+/// Names of the equations in the order of the events: from the eye along the ray, and the display encoding last.
 fn names(events: &[Event], materials: &[Material], lights: &[Light], knobs: &Knobs) -> Vec<&'static str> {
     let mut all = Vec::new();
     for event in events {
@@ -88,7 +89,7 @@ fn of_light(light: &Light, knobs: &Knobs) -> Vec<&'static str> {
     all
 }
 
-/// The equations, each once.
+/// The equations that contribute to a pixel, each once.
 #[must_use]
 pub fn used(events: &[Event], materials: &[Material], lights: &[Light], knobs: &Knobs) -> Vec<&'static Probe> {
     let mut found: Vec<&'static Probe> = Vec::new();
@@ -106,7 +107,7 @@ mod tests {
     use etalon::transport::events::Interaction;
     use glam::DVec3;
 
-    /// One event of each kind on each of some materials.
+    /// One event of each kind on each of `materials` materials.
     fn events(materials: usize) -> Vec<Event> {
         let ways =
             [Way::Seen, Way::Mirrored, Way::Bent, Way::Straight, Way::ToLight(0), Way::ToLight(1), Way::ToLight(2)];

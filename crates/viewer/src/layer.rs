@@ -1,20 +1,21 @@
-//! What the window may show in place of radiance: surfaces at the pixel centres, as colours.
+//! False-colour views of the surfaces at the pixel centres (albedo, normals, distance, …), which the window can show in place of the
+//! picture.
 
 use glam::Vec3;
 
 use super::shared::PixelSurfaces;
 use etalon::share::AovPixel;
 
-/// Something that is known of each pixel.
+/// What the window shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SurfaceLayer {
-    /// The picture.
+    /// The shaded picture.
     Radiance,
     /// Base colour.
     Albedo,
     /// Shading normal.
     Normal,
-    /// The triangle's own.
+    /// Normal of the triangle.
     GeometricNormal,
     /// Distance from the eye.
     Distance,
@@ -22,19 +23,19 @@ pub enum SurfaceLayer {
     Roughness,
     /// Metallic.
     Metallic,
-    /// Which material.
+    /// Index of the material.
     Material,
-    /// Which instance.
+    /// Index of the instance.
     Instance,
-    /// Emitted light.
+    /// Emitted radiance.
     Emissive,
-    /// Pixels with no number, or an infinite one.
+    /// Pixels with NaN or infinite radiance.
     NotFinite,
 }
 
 /// Every layer with its name.
 pub const LAYERS: [(SurfaceLayer, &str); 11] = [
-    (SurfaceLayer::Radiance, "radiance"),
+    (SurfaceLayer::Radiance, "shaded"),
     (SurfaceLayer::Albedo, "albedo"),
     (SurfaceLayer::Normal, "normal"),
     (SurfaceLayer::GeometricNormal, "geometric normal"),
@@ -52,14 +53,14 @@ fn encoded(color: Vec3) -> [u8; 4] {
     [byte(color.x), byte(color.y), byte(color.z), 255]
 }
 
-/// Numbers as colours that differ from their neighbours': hues apart by the golden section.
+/// Colour of an index. Consecutive indices differ clearly: their hues are a golden-ratio step apart.
 fn of_number(number: u32) -> [u8; 4] {
     let hue = (number as f32 * 0.618_034).fract() * 6.0;
     let wave = |shift: f32| ((hue + shift).rem_euclid(6.0) - 3.0).abs().clamp(1.0, 2.0) - 1.0;
     [wave(0.0), wave(2.0), wave(4.0), 1.0].map(|x| (55.0 + 200.0 * x) as u8)
 }
 
-/// Normals as colours: −1 to 1 becomes 0 to 255, as it is, without a curve.
+/// Colour of a normal: −1 … 1 is mapped to 0 … 255 without gamma encoding.
 fn of_normal(n: [f32; 3]) -> [u8; 4] {
     let [x, y, z] = n.map(|c| (c * 127.5 + 128.0).clamp(0.0, 255.0) as u8);
     [x, y, z, 255]
@@ -68,13 +69,13 @@ fn of_normal(n: [f32; 3]) -> [u8; 4] {
 const NOTHING: [u8; 4] = [24, 24, 26, 255];
 
 impl SurfaceLayer {
-    /// RGBA8 of the layer; the picture itself is none of these.
+    /// RGBA8 pixels of the layer. Must not be called for [`SurfaceLayer::Radiance`], which is the picture itself.
     #[must_use]
     pub fn draw(self, surfaces: &PixelSurfaces) -> Vec<u8> {
         let farthest = surfaces.pixels.iter().map(|p| p.distance).fold(0.0, f32::max).max(1e-9);
         let pixel = |(p, radiance): (&AovPixel, &[f32; 4])| {
             if self == Self::NotFinite {
-                // What is a number is shown dim, so that one sees where one is.
+                // Finite pixels are shown dim, for orientation.
                 let grey = (radiance[..3].iter().sum::<f32>() / 12.0).clamp(0.0, 0.25);
                 return match radiance {
                     r if r.iter().any(|x| x.is_nan()) => [255, 0, 255, 255],

@@ -1,7 +1,7 @@
-//! The desktop viewer: a winit window, egui panels, and a thread that draws.
+//! The desktop viewer: a winit window, egui panels, and a render thread. See docs/view.md.
 //!
-//! [`worker`] loads and draws samples one after the other and looks at what is wanted before each; the window shows what there is and
-//! asks for the rest. It is drawn when something happened, at most once in 16 ms, and not at all otherwise.
+//! The render thread ([`worker`]) loads the scene and draws samples progressively; before each sample it reads the current request. The
+//! window shows the latest picture. It redraws only after an event, at most once in 16 ms.
 
 pub mod clock;
 pub mod equations;
@@ -35,83 +35,83 @@ use panels::{Action, PanelState};
 use shared::{RenderRequest, RenderState, SceneSource, SharedState, Viewpoint, lock};
 use worker::Worker;
 
-/// Between two pictures of the window: a driver's FIFO does not always wait for a screen.
+/// Least time between two frames of the window: a driver's FIFO present mode does not always wait for a screen.
 const FRAME: Duration = Duration::from_millis(16);
-/// Pictures of the window whose times are kept for the account at its end.
+/// Number of window frames whose times are kept for the statistics at the end.
 const REMEMBERED: usize = 100_000;
-/// After this long without movement the picture is drawn well.
+/// Time without movement before the picture is drawn at full quality.
 const STILL: Duration = Duration::from_millis(150);
 
-/// What a command line says of a view.
+/// A view, to be written as a command line.
 pub struct View<'a> {
-    /// The file, where another was opened.
+    /// Scene file; `None`: that of the command line.
     pub file: Option<&'a Path>,
-    /// Words for eye, target and field of view.
+    /// Options for eye, target and field of view.
     pub camera: Option<String>,
-    /// A camera of the file.
+    /// Name of a camera of the file.
     pub named: Option<&'a str>,
-    /// Seconds, where another time was chosen.
+    /// Animation time in seconds; `None`: that of the command line.
     pub time: Option<f64>,
-    /// How it is drawn.
+    /// Settings of the renderer.
     pub settings: &'a Settings,
 }
 
-/// Keeps names of files.
+/// Stores the list of recent files.
 pub type Keep = Box<dyn Fn(&[PathBuf])>;
 
-/// What the viewer begins with.
+/// Initial state of the viewer.
 pub struct Start {
-    /// Pixels of the window.
+    /// Size of the window in pixels.
     pub size: [u32; 2],
-    /// How it is drawn.
+    /// Settings of the renderer.
     pub settings: Settings,
-    /// On what.
+    /// Device that draws.
     pub device: DeviceChoice,
-    /// With core and synchronization validation.
+    /// Whether to enable core and synchronization validation.
     pub validate: bool,
-    /// Panels lie beside the picture.
+    /// Whether to show the panels.
     pub panels: bool,
-    /// Prune scenes.
+    /// Loader of scenes.
     pub source: Box<dyn SceneSource>,
-    /// The command that draws a view.
+    /// Returns the command that draws a view.
     pub command: Box<dyn Fn(&View<'_>) -> String>,
-    /// The scene's file, where it is one: read again when it changes.
+    /// File of the scene, which is read again when it changes; `None` for a built-in scene.
     pub file: Option<PathBuf>,
-    /// Files that were opened before, the last first.
+    /// Recently opened files, the latest first.
     pub recent: Vec<PathBuf>,
-    /// Keeps such files for the next time.
+    /// Stores the recent files.
     pub keep: Keep,
-    /// Hears of each command that is copied.
+    /// Called with each copied command.
     pub said: Box<dyn Fn(&str)>,
 }
 
-/// What has happened meanwhile, elsewhere.
+/// Events that other threads send to the window.
 enum Woken {
-    /// The thread that draws has something to show.
+    /// The render thread has something to show.
     RenderState,
-    /// A file beside the scene's has changed, or itself.
+    /// The scene file, or a file beside it, has changed.
     Changed,
-    /// Shaders were compiled again.
+    /// Shaders were recompiled.
     #[cfg(feature = "reload")]
     Compiled(reload::Compiled),
 }
 
-/// Endings of what a scene may be made of.
+/// File name extensions of scene files, buffers and textures.
 const PARTS: [&str; 9] = ["glb", "gltf", "bin", "obj", "mtl", "png", "jpg", "jpeg", "webp"];
-/// After this long without another change a file is read again.
+/// Time without another change before a file is read again.
 const SETTLED: Duration = Duration::from_millis(300);
 
-/// Shows a window until it is closed; what validation said.
+/// Shows a window until it is closed; returns the messages of validation.
 ///
 /// # Errors
-/// When there is no display, no device that shows pictures on it, or the device is lost.
+/// When there is no display, when no device can present on it, or when the device is lost.
 pub fn run(start: Start) -> Result<Vec<Message>> {
     let named = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
-    let instead = "without a display `etalon render SCENE -o FILE.png` draws the same picture";
+    let instead = "`etalon render SCENE -o FILE.png` draws the same picture without a display";
     if cfg!(all(unix, not(target_os = "macos")))
         && !["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"].into_iter().any(named)
     {
-        bail!("opening a window: neither DISPLAY nor WAYLAND_DISPLAY names one; {instead}");
+        bail!("opening a window: neither DISPLAY nor WAYLAND_DISPLAY is set; {instead}");
     }
     let events = EventLoop::<Woken>::with_user_event()
         .build()
@@ -133,18 +133,18 @@ struct Viewer {
     messages: Vec<Message>,
 }
 
-/// A layer as pixels.
+/// A false-colour layer as pixels.
 #[derive(Clone)]
 struct DrawnLayer {
     layer: SurfaceLayer,
-    /// Numbers of the pictures that it is of.
+    /// Versions of the pictures that it belongs to.
     of: [Option<u64>; 2],
     rgba: Arc<Vec<u8>>,
     size: [u32; 2],
     version: u64,
 }
 
-/// The window and all that belongs to it.
+/// The window, its panels and the connection to the render thread.
 struct OpenWindow {
     window: Arc<Window>,
     presenter: Presenter,
@@ -156,10 +156,10 @@ struct OpenWindow {
     command: Box<dyn Fn(&View<'_>) -> String>,
     said: Box<dyn Fn(&str)>,
     keep: Keep,
-    /// Of each scene, by number.
+    /// File of each opened scene, by scene number; `None`: that of the command line.
     files: Vec<Option<PathBuf>>,
     scene: u64,
-    /// The scene that the navigation belongs to, once there is one, and its time.
+    /// Number of the scene that the navigation belongs to; `None` until one is loaded.
     navigated: Option<u64>,
     moment: Option<f64>,
     sent: Option<RenderRequest>,
@@ -167,28 +167,28 @@ struct OpenWindow {
     drawn: Instant,
     dirty: bool,
     wait_until: Option<Instant>,
-    /// Pictures of the window, and milliseconds of the first [`REMEMBERED`] of them.
+    /// Number of window frames, and milliseconds of the first [`REMEMBERED`] ones.
     pictures: u64,
     took: Vec<f32>,
-    /// Buffers, images and pipelines when the first picture was done.
+    /// Number of buffers, images and pipelines when the first picture was done.
     objects: Option<u64>,
     layer: Option<DrawnLayer>,
     layers: u64,
-    /// Tells of changes in the folder of the scene's file.
+    /// Watches the folder of the scene file.
     watcher: Option<notify::RecommendedWatcher>,
-    /// Names of files that were written from here.
+    /// Names of files that this window wrote.
     written: Arc<Mutex<Vec<OsString>>>,
     proxy: EventLoopProxy<Woken>,
-    /// The file of the command line.
+    /// Scene file of the command line.
     first: Option<PathBuf>,
-    /// When the file is read again.
+    /// When the scene file is read again.
     reads_at: Option<Instant>,
-    /// The scene that is read again: the camera stays.
+    /// Number of a scene that is read again; its camera stays.
     again: Option<u64>,
     writes_exr: bool,
-    /// Code of shaders in place of what was built.
+    /// Shader code that replaces built code.
     code: Arc<Vec<Replacement>>,
-    /// Looks at the shaders' files.
+    /// Watches the shader files.
     #[cfg(feature = "reload")]
     _shaders: notify::RecommendedWatcher,
     quits: bool,
@@ -220,7 +220,7 @@ impl ApplicationHandler<Woken> for Viewer {
                 window.state.message = Some(match compiled {
                     Ok(code) => {
                         window.code = code;
-                        "shaders were compiled again".to_owned()
+                        "shaders recompiled".to_owned()
                     }
                     Err(message) => message,
                 });
@@ -230,7 +230,7 @@ impl ApplicationHandler<Woken> for Viewer {
 
     fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         let Some(window) = &mut self.window else { return };
-        // Of a request to draw egui would ask for another: the window would never rest.
+        // egui answers a redraw request with another redraw request: the window would never rest.
         if event != WindowEvent::RedrawRequested {
             window.dirty |= window.egui.on_window_event(&window.window, &event).repaint;
         }
@@ -275,10 +275,10 @@ impl ApplicationHandler<Woken> for Viewer {
                 window.device.interrupt();
             });
             if window.worker.take().is_some_and(|worker| worker.join().is_err()) && self.failure.is_none() {
-                self.failure = Some(anyhow!("the thread that draws has failed"));
+                self.failure = Some(anyhow!("the render thread has failed"));
             }
             let device = window.device.clone();
-            // What goes away last has something to say as well.
+            // Validation reports objects that still exist while the window is dropped.
             drop(window);
             self.messages = device.messages();
         }
@@ -312,7 +312,7 @@ impl OpenWindow {
             std::thread::Builder::new()
                 .name("drawing".to_owned())
                 .spawn(move || Worker::run(device, shared, source, wake))
-                .context("starting the thread that draws")?
+                .context("starting the render thread")?
         };
         #[cfg(feature = "reload")]
         let shaders = {
@@ -361,12 +361,12 @@ impl OpenWindow {
         Ok(new)
     }
 
-    /// One picture of the window.
+    /// Draws one frame of the window.
     fn draw(&mut self) -> Result<()> {
         self.drawn = Instant::now();
         let seen = self.shared.seen();
         if self.worker.as_ref().is_some_and(JoinHandle::is_finished) && !seen.lost {
-            bail!("the thread that draws has failed");
+            bail!("the render thread has failed");
         }
         if seen.lost {
             return Err(anyhow!(seen.error.unwrap_or_default()));
@@ -432,7 +432,7 @@ impl OpenWindow {
         Ok(())
     }
 
-    /// Puts the file that is seen before those that were opened earlier.
+    /// Moves the current file to the front of the recent files.
     fn remember(&mut self) {
         let Some(path) = self.file().or(self.first.as_deref()) else { return };
         let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
@@ -443,14 +443,14 @@ impl OpenWindow {
         (self.keep)(recent);
     }
 
-    /// Listens for changes of the file that is seen, and of what lies beside it: buffers and textures.
+    /// Watches the current file and the buffers and textures beside it for changes.
     fn watch(&mut self) {
         self.watcher = None;
         let Some(path) = self.file().or(self.first.as_deref()) else { return };
         let (proxy, folder) = (self.proxy.clone(), path.parent().filter(|folder| !folder.as_os_str().is_empty()));
         let written = self.written.clone();
         let told = move |event: notify::Result<notify::Event>| {
-            // What this window wrote itself is no part of the scene.
+            // Files that this window wrote do not belong to the scene.
             let ours = |path: &PathBuf| lock(&written).iter().any(|name| path.file_name() == Some(name));
             let part = |path: &PathBuf| {
                 let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
@@ -473,15 +473,15 @@ impl OpenWindow {
         });
         match watching {
             Ok(watcher) => self.watcher = Some(watcher),
-            Err(error) => tracing::info!("changes of {} are not seen: {error}", path.display()),
+            Err(error) => tracing::info!("{} cannot be watched for changes: {error}", path.display()),
         }
     }
 
     /// Reads the file again.
     fn read_again(&mut self) {
-        // Another is being opened, or the first one failed and is tried once more.
+        // Another file is being opened, or the first one failed and is tried again.
         if self.navigated.is_some_and(|navigated| navigated != self.scene) {
-            // Once that is read.
+            // Try again when that file has been read.
             self.reads_at = Some(Instant::now() + SETTLED);
             return;
         }
@@ -491,14 +491,14 @@ impl OpenWindow {
         self.files.push(same);
     }
 
-    /// What the chosen layer shows.
+    /// Pixels of the chosen layer; `None` for the shaded picture.
     fn drawn_layer(&mut self, seen: &RenderState) -> Option<DrawnLayer> {
         let layer = self.state.layer;
         let surfaces = seen.now().filter(|_| layer != SurfaceLayer::Radiance)?;
         let is_drawn = |known: &DrawnLayer| known.layer == layer && known.of == surfaces.versions;
         if !self.layer.as_ref().is_some_and(is_drawn) {
             self.layers += 1;
-            // Odd: pictures have even ones.
+            // Layers have odd versions, pictures have even ones.
             let version = 2 * self.layers + 1;
             let rgba = Arc::new(layer.draw(surfaces));
             self.layer = Some(DrawnLayer { layer, of: surfaces.versions, rgba, size: surfaces.size, version });
@@ -506,7 +506,7 @@ impl OpenWindow {
         self.layer.clone()
     }
 
-    /// Takes over what the worker has found.
+    /// Takes over the state of the render thread.
     fn follow(&mut self, seen: &RenderState) {
         if let Some(facts) = seen.facts.as_ref().filter(|facts| Some(facts.scene) != self.navigated) {
             self.navigated = Some(facts.scene);
@@ -551,7 +551,7 @@ impl OpenWindow {
             Action::CopyCommand => {
                 let Some(command) = self.words() else {
                     self.state.message = Some(
-                        "no command draws this view: of parallel rays, or straight up or down, only the file's own have words"
+                        "no command draws this view: --eye and --target cannot describe an orthographic camera or a view straight up or down"
                             .to_owned(),
                     );
                     return;
@@ -566,12 +566,12 @@ impl OpenWindow {
         self.dirty = true;
     }
 
-    /// The file of what is seen.
+    /// File of the current scene; `None`: that of the command line.
     fn file(&self) -> Option<&Path> {
         self.files.get(self.navigated? as usize)?.as_deref()
     }
 
-    /// The command that draws this view; `None` where none does.
+    /// The command that draws this view; `None` where no command can.
     fn words(&self) -> Option<String> {
         let navigation = self.state.navigation.as_ref();
         let moved = navigation.is_some_and(Navigation::moved);
@@ -586,14 +586,14 @@ impl OpenWindow {
         (view.camera.is_some() || !moved).then(|| (self.command)(&view))
     }
 
-    /// Tells the worker what is to be seen, where that has changed.
+    /// Sends the render request to the render thread if it has changed.
     fn want(&mut self) {
         let now = Instant::now();
         if self.state.moved {
             self.moving_until = Some(now + STILL);
         }
         self.moving_until = self.moving_until.filter(|until| *until > now);
-        // A scene that is read again is seen from where it was.
+        // A scene that is read again keeps its viewpoint.
         let belongs = self.navigated == Some(self.scene) || self.again == Some(self.scene);
         let from = |navigation: &Navigation| match (navigation.moved(), navigation.named()) {
             (true, _) => Viewpoint::Free(navigation.camera()),
@@ -625,7 +625,7 @@ impl OpenWindow {
         }
     }
 
-    /// A name that nothing has yet, in the folder that the program was started in.
+    /// A file name that does not exist yet, in the current folder.
     fn free_name(&self, seen: &RenderState, ending: &str) -> PathBuf {
         let name = seen.facts.as_ref().map_or("scene", |facts| &facts.name);
         let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
@@ -651,13 +651,13 @@ impl OpenWindow {
         Ok(path)
     }
 
-    /// How the window did.
+    /// Logs the frame times of the window and its number of Vulkan objects.
     fn account(&self) {
         let mut sorted = self.took.clone();
         sorted.sort_by(f32::total_cmp);
         let at = |share: f64| sorted.get((share * sorted.len() as f64) as usize).copied().unwrap_or_default();
         tracing::info!(
-            "{} pictures of the window: {:.1} ms in the middle, 95 of 100 below {:.1}, 99 below {:.1}; {} buffers, images and pipelines, {} when the first was done",
+            "{} window frames: median {:.1} ms, 95th percentile {:.1} ms, 99th percentile {:.1} ms; {} buffers, images and pipelines, {} after the first picture",
             self.pictures,
             at(0.5),
             at(0.95),
@@ -667,7 +667,7 @@ impl OpenWindow {
         );
     }
 
-    /// Saves the last picture of a device that is gone, and says so.
+    /// Saves the last picture after the device was lost, and adds the file name to the error.
     fn last_picture(&self, error: anyhow::Error) -> anyhow::Error {
         match self.write_png(&self.shared.seen()) {
             Ok(path) => error.context(format!("the last picture is saved as {}", path.display())),
@@ -678,7 +678,7 @@ impl OpenWindow {
 
 fn told(written: Result<PathBuf>) -> String {
     match written {
-        Ok(path) => format!("written: {}", path.display()),
+        Ok(path) => format!("saved {}", path.display()),
         Err(error) => format!("{error:#}"),
     }
 }

@@ -1,42 +1,43 @@
-//! Where the camera goes: orbit, pan, zoom, look around and fly, with the habits of desktop viewers. Pure: no window.
+//! Camera navigation: orbit, pan, zoom (dolly), look around and fly, with the conventions of desktop viewers. Independent of the
+//! window, so that tests can drive it.
 
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 
 use etalon::scene::camera::DEFAULT_FOV_Y;
 use etalon::scene::{Bounds, Camera, Projection};
 
-/// Radians of a drag over the height of the window.
+/// Rotation in radians for a drag over the height of the window.
 const TURN: f64 = std::f64::consts::PI;
-/// Of the distance, for one step of a wheel.
+/// Factor of the distance for one step of the wheel.
 const STEP: f64 = 0.85;
-/// Distances to the point looked at, as parts of the size of the scene.
+/// Range of the distance to the orbit centre, as fractions of the size of the scene.
 const NEAREST: f64 = 1e-4;
 const FARTHEST: f64 = 1e3;
-/// Elevations stay this far, in radians, from straight up and down, where there is no horizon.
+/// Least angle in radians between the viewing direction and the vertical, where an orbit has no horizon.
 const POLE: f64 = 1e-3;
-/// Views that can be taken back.
+/// Number of camera moves that can be undone.
 const HISTORY: usize = 64;
 
-/// A camera that looks at a point.
+/// A camera with an orbit centre and an undo history.
 #[derive(Debug, Clone)]
 pub struct Navigation {
     view: Camera,
-    /// Metres to the point that it turns about.
+    /// Distance to the orbit centre in metres.
     distance: f64,
     /// Size of the scene in metres.
     size: f64,
     bounds: Bounds,
     home: Camera,
     before: Vec<(Camera, f64, bool, Option<String>)>,
-    /// It is no longer the camera that it was set to, or that frames the scene for one size alone.
+    /// Whether the user moved the camera, or it was computed to frame the scene at one size.
     moved: bool,
-    /// The camera of the file that it was set to; `None`: the first one.
+    /// Name of the file's camera that was chosen; `None`: the first one.
     named: Option<String>,
     framed: bool,
 }
 
 impl Navigation {
-    /// Begins at a camera, in a scene of that extent.
+    /// Starts at a camera. `framed`: the camera was computed to frame the scene.
     #[must_use]
     pub fn new(home: Camera, bounds: Bounds, framed: bool) -> Self {
         let size = bounds.radius().max(1e-6);
@@ -55,17 +56,19 @@ impl Navigation {
         new
     }
 
-    /// The camera now: the one that it was set to, or one told by eye, target and field of view, so that those words give the same.
+    /// The current camera. A moved camera is rebuilt from the rounded options of [`Navigation::words`], so that the copied command draws
+    /// the same picture.
     #[must_use]
     pub fn camera(&self) -> Camera {
         self.words().map_or_else(|| self.view.clone(), |(camera, _)| camera)
     }
 
-    /// The same as words of a command line; `None` where it is the camera that it was set to, or has parallel rays.
+    /// The current camera as `--eye`, `--target` and `--fov`, with the camera that these options give. `None` where the camera was not
+    /// moved, is orthographic, or looks straight up or down.
     #[must_use]
     pub fn words(&self) -> Option<(Camera, String)> {
         let Projection::Perspective { fov_y, .. } = self.view.projection else { return None };
-        // To a millionth, so that the words are short: what is drawn is what they say.
+        // Rounded to a millionth, so that the options are short.
         let short = |x: f64| (x * 1e6).round() / 1e6;
         let point = |p: DVec3| DVec3::new(short(p.x), short(p.y), short(p.z));
         let (eye, target, degrees) = (point(self.eye()), point(self.target()), short(fov_y.to_degrees()));
@@ -74,25 +77,25 @@ impl Navigation {
         Some((camera, format!("--eye {} --target {} --fov {degrees}", list(eye), list(target))))
     }
 
-    /// Whether it is no longer the camera that it was set to.
+    /// Whether the user moved the camera, or it was computed to frame the scene.
     #[must_use]
     pub fn moved(&self) -> bool {
         self.moved
     }
 
-    /// The camera of the file that it was set to; `None`: the first one.
+    /// Name of the file's camera that was chosen; `None`: the first one.
     #[must_use]
     pub fn named(&self) -> Option<&str> {
         self.named.as_deref()
     }
 
-    /// The point that it turns about.
+    /// Centre of the orbit in world space.
     #[must_use]
     pub fn target(&self) -> DVec3 {
         self.eye() + self.forward() * self.distance
     }
 
-    /// Where it is.
+    /// Position of the camera in world space.
     #[must_use]
     pub fn eye(&self) -> DVec3 {
         self.view.world_from_camera.translation
@@ -102,12 +105,12 @@ impl Navigation {
         -self.view.world_from_camera.matrix3.z_axis
     }
 
-    /// What lies nearest to the scene's middle on the way that it looks.
+    /// Distance along the viewing direction to the point nearest to the middle of the scene.
     fn distance_to_middle(&self) -> f64 {
         (self.bounds.center() - self.eye()).dot(self.forward()).max(0.05 * self.size)
     }
 
-    /// Keeps the view for [`Navigation::undo`]: at the beginning of each movement.
+    /// Stores the view for [`Navigation::undo`]; called at the start of each movement.
     pub fn keep(&mut self) {
         if self.before.len() == HISTORY {
             self.before.remove(0);
@@ -115,14 +118,14 @@ impl Navigation {
         self.before.push((self.view.clone(), self.distance, self.moved, self.named.clone()));
     }
 
-    /// The scene has changed under the camera, which stays where it is.
+    /// Takes over a scene that was read again; the camera stays where it is.
     pub fn stay(&mut self, home: Camera, bounds: Bounds) {
-        // A camera of the file that is another now is no longer this one.
+        // The file's camera may have changed, so that its name no longer describes this view.
         self.moved |= home != self.home || self.named.is_some();
         (self.home, self.bounds, self.size) = (home, bounds, bounds.radius().max(1e-6));
     }
 
-    /// The scene is at another time: a camera of the file has moved with it.
+    /// Follows a change of the animation time: a camera of the file moves with its node unless the user moved it.
     pub fn moment(&mut self, home: Camera, cameras: &[Camera]) {
         if self.framed {
             return;
@@ -135,20 +138,20 @@ impl Navigation {
         }
     }
 
-    /// Takes the last movement back; false where there is none.
+    /// Undoes the last movement; returns false where there is none.
     pub fn undo(&mut self) -> bool {
         let Some((view, distance, moved, named)) = self.before.pop() else { return false };
         (self.view, self.distance, self.moved, self.named) = (view, distance, moved, named);
         true
     }
 
-    /// Back to where it began.
+    /// Returns to the initial camera.
     pub fn reset(&mut self) {
         self.go_to(self.home.clone(), None);
         self.moved = self.framed;
     }
 
-    /// To another camera, of that name in the file.
+    /// Goes to a camera; `name` is its name in the file.
     pub fn go_to(&mut self, camera: Camera, name: Option<String>) {
         self.keep();
         self.view = camera;
@@ -157,7 +160,7 @@ impl Navigation {
         self.distance = self.distance_to_middle();
     }
 
-    /// Sees the whole scene, from the side that it looks from now.
+    /// Frames the whole scene without changing the viewing direction.
     pub fn fit(&mut self, aspect: f64) {
         self.keep();
         self.moved = true;
@@ -166,7 +169,7 @@ impl Navigation {
             Projection::Orthographic { .. } => DEFAULT_FOV_Y,
         };
         let narrow = (fov_y * 0.5).tan() * aspect.min(1.0);
-        // The sphere around the box touches the sides of the picture.
+        // The bounding sphere touches the sides of the picture.
         self.distance = self.size / narrow.atan().sin();
         if let Projection::Orthographic { half_height, .. } = &mut self.view.projection {
             *half_height = self.size / aspect.min(1.0);
@@ -174,7 +177,7 @@ impl Navigation {
         self.view.world_from_camera.translation = self.bounds.center() - self.forward() * self.distance;
     }
 
-    /// Turned about an axis through a point of the world.
+    /// Rotates the camera about an axis through the point `pivot`.
     fn turn(&mut self, about: DVec3, pivot: DVec3, angle: f64) {
         self.moved = true;
         let turn = DMat3::from_quat(DQuat::from_axis_angle(about, angle));
@@ -183,7 +186,7 @@ impl Navigation {
         self.view.world_from_camera = DAffine3::from_mat3_translation(turn * frame.matrix3, eye);
     }
 
-    /// By how much it may still be tilted: the elevation stays off the poles.
+    /// The tilt in radians, limited so that the elevation stays off the poles.
     fn tilt(&self, wanted: f64) -> f64 {
         let elevation = self.forward().y.clamp(-1.0, 1.0).asin();
         let limit = std::f64::consts::FRAC_PI_2 - POLE;
@@ -196,17 +199,17 @@ impl Navigation {
         self.turn(right, pivot, self.tilt(-by.y * TURN));
     }
 
-    /// Around the point looked at, by a drag in heights of the window.
+    /// Orbits about the orbit centre; `by` is a drag in window heights.
     pub fn orbit(&mut self, by: DVec2) {
         self.turned(by, self.target());
     }
 
-    /// Around the eye.
+    /// Looks around: rotates about the eye.
     pub fn look(&mut self, by: DVec2) {
         self.turned(by, self.eye());
     }
 
-    /// Along the picture: what is under the pointer, at the distance of the point looked at, stays there.
+    /// Pans parallel to the picture; a point at the distance of the orbit centre stays under the pointer.
     pub fn pan(&mut self, by: DVec2) {
         let height = match self.view.projection {
             Projection::Perspective { fov_y, .. } => 2.0 * (fov_y * 0.5).tan() * self.distance,
@@ -217,7 +220,7 @@ impl Navigation {
         frame.translation += (frame.matrix3.y_axis * by.y - frame.matrix3.x_axis * by.x) * height;
     }
 
-    /// Nearer (positive) or farther, by steps of a wheel.
+    /// Dollies towards the orbit centre (positive) or away, in steps of the wheel.
     pub fn zoom(&mut self, steps: f64) {
         self.moved = true;
         let target = self.target();
@@ -228,7 +231,7 @@ impl Navigation {
         self.view.world_from_camera.translation = target - self.forward() * self.distance;
     }
 
-    /// Through the scene: right, up and forwards, in sizes of the scene.
+    /// Flies right, up and forwards, in sizes of the scene.
     pub fn fly(&mut self, by: DVec3) {
         self.moved = true;
         let frame = &mut self.view.world_from_camera;

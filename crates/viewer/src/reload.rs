@@ -1,5 +1,5 @@
-//! Shaders that are compiled again when their files change (feature `reload`, for whoever works on them): the recipe is build.rs's
-//! own. What does not compile, or declares other bindings than the program was built with, changes nothing and is told.
+//! Shader hot reload (feature `reload`): recompiles shaders when their files change, the same way as build.rs. A shader that does not
+//! compile, or whose interface differs from the built one, changes nothing and is reported.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -12,13 +12,14 @@ use anyhow::{Context as _, Result, anyhow};
 use etalon::gpu::{Constant, Program, Replacement};
 use etalon::shader::PROGRAMS;
 
-/// After this long without another change shaders are compiled.
+/// Time without another change before shaders are compiled.
 const SETTLED: Duration = Duration::from_millis(200);
 
-/// What came of compiling: all that differs from what was built, or what the compiler says.
+/// Result of compiling: all stages that replace built ones, or the compiler's message.
 pub type Compiled = Result<Arc<Vec<Replacement>>, String>;
 
-/// Compiles what changes under `root`, a folder like `shaders`, and tells of it; until what it returns is dropped.
+/// Watches the shader folder `root`, recompiles programs whose files change, and calls `told` with each result, until the returned
+/// watcher is dropped.
 ///
 /// # Errors
 /// When there is no such folder.
@@ -36,7 +37,7 @@ pub fn watch(root: &Path, told: impl Fn(Compiled) + Send + 'static) -> Result<no
         .with_context(|| format!("watching {}", root.display()))?;
     let work = move || {
         let mut compiled: BTreeMap<&'static str, Vec<Vec<u32>>> = BTreeMap::new();
-        // Those that did not compile are tried again with the next change.
+        // Files whose programs did not compile are compiled again with the next change.
         let mut open: BTreeSet<PathBuf> = BTreeSet::new();
         while let Ok(path) = changes.recv() {
             open.insert(path);
@@ -68,7 +69,7 @@ pub fn watch(root: &Path, told: impl Fn(Compiled) + Send + 'static) -> Result<no
     Ok(watcher)
 }
 
-/// Programs that some files are part of.
+/// Programs that include one of the changed files.
 fn programs_of(root: &Path, changed: &BTreeSet<PathBuf>) -> Result<Vec<&'static Program>, String> {
     let mut found = Vec::new();
     for program in PROGRAMS {
@@ -79,7 +80,7 @@ fn programs_of(root: &Path, changed: &BTreeSet<PathBuf>) -> Result<Vec<&'static 
     Ok(found)
 }
 
-/// Compiles a program, whose interface has to be the one that it was built with.
+/// Compiles a program; its interface must equal that of the built program.
 fn compile(root: &Path, program: &'static Program) -> Result<Vec<Vec<u32>>, String> {
     let new = etalon_reflect::program(root, program.name)?;
     let known = |list: &[Constant]| list.iter().map(|one| (one.id, one.name.to_owned())).collect::<Vec<_>>();
@@ -100,7 +101,7 @@ fn compile(root: &Path, program: &'static Program) -> Result<Vec<Vec<u32>>, Stri
     match same {
         true => Ok(new.stages),
         false => Err(format!(
-            "shaders/pass/{}: its bindings, constants, vertex inputs, push constants or workgroup size are others now: build Etalon again",
+            "shaders/pass/{}: bindings, constants, vertex inputs, push constants or workgroup size have changed; build Etalon again",
             program.name
         )),
     }
@@ -140,7 +141,7 @@ mod tests {
         let words = next().expect("it compiles");
         let tonemap = PROGRAMS.iter().find(|program| program.name == "tonemap").expect("a program");
         assert!(words.iter().any(|r| r.program == "tonemap" && r.words == tonemap.stages[0].words), "the same words");
-        // What is included is part of all that include it.
+        // A library file belongs to every program that includes it.
         let all = programs_of(
             &root.canonicalize().expect("a path"),
             &[root.canonicalize().expect("a path").join("lib/fresnel.glsl")].into(),
