@@ -1,12 +1,13 @@
-// Work that passes count: sums of 64 bits over all invocations, as pairs of words.
+// Work counters of passes: 64-bit sums over all invocations, each stored as two 32-bit words (share/work.glsl).
+// Where to read: Vulkan specification, "Group Operations" (subgroups), and the atomic memory functions of GLSL 4.6.
+// Assumes: the sum over one subgroup fits into 32 bits.
 #ifndef ADD_WORK_GLSL
 #define ADD_WORK_GLSL
 #include "share/work.glsl"
 
 layout(scene, scalar) buffer WorkDone { WorkCounts counts; };
 
-// One addition per subgroup; the sum of a subgroup fits into a word. An atomic's old value tells whether the low word
-// ran over.
+// One atomic addition per subgroup. The value that the atomic returns shows whether the low word overflowed.
 #define ADD_WORK(member, value) \
     { \
         uint total = subgroupAdd(value); \

@@ -1,16 +1,18 @@
-// Sums and products without their rounding, and exp, log, pow and the arc tangent to a few units in the last place
-// (ULP), which Vulkan's built-ins are not (numerics.md 2). Twins: crates/optics/src/arithmetic.rs.
+// Error-free sums and products, double-float arithmetic, and exp, log, pow and atan2 to a few ULP.
+// Vulkan's own exp, log, pow and atan are less precise (numerics.md 2). Twins on the host: crates/optics/src/arithmetic.rs.
+// Where to read: Knuth, The Art of Computer Programming 2, section 4.2.2 (two_sum); Dekker 1971 (two_product); Ogita, Rump
+// and Oishi 2005 (dot2); pbrt 4, section 6.8 (rounding error).
 //
-// From + − × / √ and bit patterns alone, so that every device that rounds to nearest gives the same bits; `precise`
-// everywhere: without it a compiler may fuse or reassociate, and a residual is then 0. Never `fma`: it may be a
-// multiplication and an addition. Polynomials are minimax fits (Lawson's reweighted least squares), their coefficients
-// rounded to f32 one after the other and the rest fitted again.
+// Everything here is made of + − × / √ and bit patterns, so devices that round to nearest give the same bits. Every step is
+// `precise`: a compiler may otherwise fuse or reassociate, and the computed rounding error becomes 0. `fma` is never used:
+// a device may implement it as a multiplication and an addition. Polynomials are minimax fits by Lawson's reweighted least
+// squares. Their coefficients are rounded to f32 one after the other, and the remaining ones are fitted again.
 #ifndef ARITHMETIC_GLSL
 #define ARITHMETIC_GLSL
 #include "lib/constants.glsl"
 
-// The knob `arithmetic`: 0 the formulas of the textbook and the built-ins, 1 rewritten so that nothing cancels,
-// 2 with sums and products in pairs of floats where that still gains.
+// The knob `arithmetic`. 0: textbook formulas and built-in functions. 1: formulas rewritten so that nothing cancels. 2:
+// double-float sums and products where they still gain digits.
 layout(constant) const uint ARITHMETIC = 1;
 const uint FAST = 0;
 const uint STABLE = 1;
@@ -24,7 +26,7 @@ const float LN2_HI = 0.693359375;
 const float LN2_LO = -2.121944401e-4;
 const float LOG2_E = 1.44269504;
 // 1, 2 and 4 times EIGHTH_HI are exact, and 3 times as well.
-const float EIGHTH_HI = 0.785398483276;  // π/4, an eighth of a turn
+const float EIGHTH_HI = 0.785398483276;  // π/4
 const float EIGHTH_LO = -3.19878919e-7;
 const float TAN_PI_8 = 0.414213562;
 
@@ -38,11 +40,11 @@ float power_of_two(int n) {
 }
 
 // --------------------------------------------------------------------------------------------------------------------
-// Pairs of floats: the value is hi + lo, |lo| ≤ ULP(hi)/2. Where hi overflows, lo is 0 and not ∞ − ∞.
+// Double-float numbers: the value is hi + lo, with |lo| ≤ ULP(hi)/2. Where hi overflows, lo is 0 and not ∞ − ∞.
 //
-// glslang never ends if a `precise` value comes from a member of a variable that is assigned from its own member:
-// `s = two_sum(s.hi, x); precise float r = s.lo + y;`. A new variable each time; in loops either whole pairs,
-// `s = df_add(s, t)`, or plain floats, `DoubleFloat t = two_sum(sum, x); rest += t.lo; sum = t.hi;`.
+// glslang does not terminate where a `precise` value comes from a member of a variable that is assigned from its own
+// member: `s = two_sum(s.hi, x); precise float r = s.lo + y;`. So each result gets a new variable. Loops carry either whole
+// pairs, `s = df_add(s, t)`, or plain floats, `DoubleFloat t = two_sum(sum, x); rest += t.lo; sum = t.hi;`.
 
 struct DoubleFloat {
     float hi;
@@ -50,7 +52,7 @@ struct DoubleFloat {
 };
 
 // @eq N11 N25 N30: hi + lo = a + b exactly, hi = fl(a + b)
-// Knuth: no condition on the magnitudes.
+// Knuth's two-sum: no condition on the magnitudes.
 DoubleFloat two_sum(float a, float b) {
     precise float s = a + b;
     precise float b_in_s = s - a;
@@ -60,7 +62,7 @@ DoubleFloat two_sum(float a, float b) {
 }
 
 // @eq N11 N25 N30: hi + lo = a + b exactly, for |a| ≥ |b| or a = 0
-// Dekker: half of Knuth's operations. If |a| < |b|, lo may lack the last bits.
+// Dekker's fast two-sum: half the operations of Knuth's. If |a| < |b|, lo may lack the last bits.
 DoubleFloat quick_two_sum(float a, float b) {
     precise float s = a + b;
     precise float b_in_s = s - a;
@@ -68,14 +70,14 @@ DoubleFloat quick_two_sum(float a, float b) {
     return DoubleFloat(s, abs(s) <= LARGEST ? rest : 0.0);
 }
 
-// The leading 12 of 24 bits. Veltkamp's split, 4097·a − (4097·a − a), costs twice as much and overflows above 8e34.
+// The leading 12 of 24 bits. Veltkamp's splitting, 4097·a − (4097·a − a), costs twice as much and overflows above 8e34.
 float leading_half(float a) {
     return uintBitsToFloat(floatBitsToUint(a) & 0xfffff000u);
 }
 
 // @eq N11 N25 N28: hi + lo = a·b exactly, hi = fl(a·b)
-// Dekker: halves of 12 bits have exact products, and each partial sum below fits into 24 bits. Where |a·b| < 2^-102 the
-// rest is below the normal range and lo is rounded or 0.
+// Dekker's product: halves of 12 bits have exact products, and each partial sum below fits into 24 bits. Where |a·b| <
+// 2^-102 the error is below the normal range and lo is rounded or 0.
 DoubleFloat two_product(float a, float b) {
     precise float p = a * b;
     precise float a_hi = leading_half(a);
@@ -87,7 +89,7 @@ DoubleFloat two_product(float a, float b) {
 }
 
 // @eq N11: a + b, relative error 3·2^-48
-// The accurate variant (both pairs of parts by two_sum): the bound holds whatever cancels.
+// The accurate variant, with two_sum for both pairs of parts: the bound holds whatever cancels.
 DoubleFloat df_add(DoubleFloat a, DoubleFloat b) {
     DoubleFloat s = two_sum(a.hi, b.hi);
     DoubleFloat t = two_sum(a.lo, b.lo);
@@ -115,7 +117,7 @@ DoubleFloat df_mul(DoubleFloat a, DoubleFloat b) {
 }
 
 // @eq N11: a/b, relative error 2^-44
-// One Newton step from fl(a_hi/b_hi), whose own error does not matter. 0/0 is 0, a/0 is ±∞.
+// One Newton step from fl(a_hi/b_hi). The error of that quotient does not matter. 0/0 is 0, a/0 is ±∞.
 DoubleFloat df_div(DoubleFloat a, DoubleFloat b) {
     precise float q = a.hi == 0.0 ? 0.0 : a.hi / b.hi;
     DoubleFloat p = two_product(q, b.hi);
@@ -124,7 +126,7 @@ DoubleFloat df_div(DoubleFloat a, DoubleFloat b) {
 }
 
 // @eq N11: √a, relative error 2^-44; 0 for a ≤ 0
-// One Newton step from fl(√a_hi), whose own error does not matter.
+// One Newton step from fl(√a_hi). The error of that root does not matter.
 DoubleFloat df_sqrt(DoubleFloat a) {
     bool positive = a.hi > 0.0;
     precise float root = positive ? sqrt(a.hi) : 0.0;
@@ -138,7 +140,7 @@ DoubleFloat df_square_minus_one(float n) {
     return df_add(two_product(n, n), DoubleFloat(-1.0, 0.0));
 }
 
-// ab − cd, as if in twice the precision.
+// ab − cd, as if computed in twice the precision.
 float difference_of_products(float a, float b, float c, float d) {
     DoubleFloat p = two_product(a, b);
     DoubleFloat q = two_product(c, d);
@@ -148,15 +150,15 @@ float difference_of_products(float a, float b, float c, float d) {
     return sum;
 }
 
-// a × b, each component as if in twice the precision.
+// a × b, each component as if computed in twice the precision.
 vec3 cross2(vec3 a, vec3 b) {
     return vec3(difference_of_products(a.y, b.z, a.z, b.y), difference_of_products(a.z, b.x, a.x, b.z),
                 difference_of_products(a.x, b.y, a.y, b.x));
 }
 
 // @eq N11 N25: a_x b_x + a_y b_y + a_z b_z as if in twice the precision
-// Ogita, Rump and Oishi: exact products and sums, their rests added in f32. Error 2^-46 of the sum of magnitudes.
-// Components below 1e19: the products overflow above.
+// Ogita, Rump and Oishi: exact products and sums; their rounding errors are added in f32. Error 2^-46 of the sum of
+// magnitudes. Components stay below 1e19: the products overflow above.
 DoubleFloat dot2(vec3 a, vec3 b) {
     DoubleFloat x = two_product(a.x, b.x);
     DoubleFloat y = two_product(a.y, b.y);
@@ -172,8 +174,8 @@ DoubleFloat dot2(vec3 a, vec3 b) {
 
 // @eq N28: e^(x + lo)
 // @out y
-// |lo| ≤ ULP(x). x = k ln 2 + r, |r| ≤ ln(2)/2, e^r = 1 + r + r²P(r). +∞ above 88.72284; 0, or a denormal where the device
-// keeps them, below -87.34. Selects, not clamp: NaN stays NaN.
+// Assumes |lo| ≤ ULP(x). Reduction: x = k ln 2 + r, |r| ≤ ln(2)/2, e^r = 1 + r + r²P(r). The result is +∞ above 88.72284,
+// and below -87.34 it is 0, or a denormal where the device keeps them. Selects instead of clamp keep NaN as NaN.
 float exp_pair(float x, float lo) {
     precise float c = x > 89.0 ? 89.0 : x;
     c = c < -104.0 ? -104.0 : c;
@@ -181,7 +183,7 @@ float exp_pair(float x, float lo) {
     precise float r = ((c - k * LN2_HI) - k * LN2_LO) + lo;
     precise float p = ((((1.38198258e-3 * r + 8.36868677e-3) * r + 4.16682772e-2) * r + 0.166665211) * r + 0.49999994);
     precise float y = (p * (r * r) + r) + 1.0;
-    // 2^k in two steps: 2^128 and what is below 2^-126 are no floats, results near them are.
+    // 2^k in two factors: 2^128 and numbers below 2^-126 are no normal floats, but results near them are.
     int n = int(k);
     int half_n = n >> 1;
     precise float scaled = y * power_of_two(half_n) * power_of_two(n - half_n);
@@ -196,7 +198,7 @@ float expf(float x) {
 
 // @eq N27: e^x − 1
 // @out y
-// 2^k (e^r − 1) + (2^k − 1), in halves so that k = 128 does not overflow early; for k = 0 the first term alone.
+// 2^k (e^r − 1) + (2^k − 1), computed in halves so that k = 128 does not overflow early. For k = 0 the first term alone.
 float expm1f(float x) {
     if (ARITHMETIC == FAST) return exp(x) - 1.0;
     precise float c = x > 89.0 ? 89.0 : x;
@@ -224,7 +226,7 @@ Reduced log_reduced(float x) {
     return Reduced(float(i >> 23), intBitsToFloat((i & 0x7fffff) + 0x3f3504f3) - 1.0);
 }
 
-// Positive numbers below the normal range are scaled into it. Where the device reads them as 0, the logarithm is -∞.
+// Scales positive numbers below the normal range into it. Where the device reads them as 0, the logarithm is -∞.
 float log_scaled(float x) {
     return x < SMALLEST_NORMAL ? x * 33554432.0 : x;
 }
@@ -244,9 +246,9 @@ float log_sum(float k, float f) {
 }
 
 // @eq N17 N44: hi + lo = ln x, to 2^-30 of itself
-// Near 1 as well. (-∞, 0) for x ≤ 0.
-// x = 2^k m, ln m = ln c + 2 artanh(s), s = (m − c)/(m + c), c the nearest of three numbers, so that s², and with it
-// the part that f32 must carry, stays below 0.0035. ln c is a multiple of 1/512, as LN2_HI is, and some 1e-8.
+// The bound holds near 1 as well. (-∞, 0) for x ≤ 0.
+// x = 2^k m, ln m = ln c + 2 artanh(s), s = (m − c)/(m + c), with c the nearest of three numbers. So s², and with it the
+// part that f32 must carry, stays below 0.0035. ln c is a multiple of 1/512, as LN2_HI is, plus some 1e-8.
 DoubleFloat df_log(float x) {
     Reduced m = log_reduced(log_scaled(x));
     precise float k = m.k - log_scale(x);
@@ -272,14 +274,14 @@ DoubleFloat df_log(float x) {
 
 // @eq N17 N44: x^y = e^(y ln x)
 // @out z
-// ln x and the product as pairs: the built-in's y log2 x loses every bit for x near 1 and y of 1e7. For x ≤ 0 the power
-// of 0: 0 if y > 0, 1 if y = 0, +∞ if y < 0.
+// ln x and the product are double-floats: the built-in's y log2 x loses every bit for x near 1 and y of 1e7. For x ≤ 0 the
+// result is the power of 0: 0 if y > 0, 1 if y = 0, +∞ if y < 0.
 float powf(float x, float y) {
     if (ARITHMETIC == FAST) return pow(x, y);
     DoubleFloat l = df_log(x);
     DoubleFloat p = two_product(y, l.hi);
     precise float lo = p.lo + y * l.lo;
-    // Beyond ±110 the power is 0 or +∞ whatever lo is.
+    // Beyond ±110 the power is 0 or +∞ for every lo.
     float power = exp_pair(p.hi, abs(p.hi) < 110.0 ? lo : 0.0);
     return y == 0.0 ? 1.0 : power;
 }
@@ -287,7 +289,7 @@ float powf(float x, float y) {
 // --------------------------------------------------------------------------------------------------------------------
 // Arc tangent
 
-// k π/4 + m (s + rest), where s + rest would round once more than need be.
+// k π/4 + m (s + rest). Adding s + rest first would cost one more rounding.
 float arc_sum(float k, float m, float s, float rest) {
     precise float y = (k * EIGHTH_HI + m * s) + (m * rest + k * EIGHTH_LO);
     return y;
@@ -299,14 +301,15 @@ float with_sign_of(float magnitude, float x) {
 
 // @eq N10: the angle of (x, y) from +x
 // @out angle
-// arctan of the smaller over the larger, or by a turn of π/4 of (a − b)/(a + b), so that |t| ≤ tan(π/8). 0 for (0, 0).
+// arctan of the smaller over the larger argument, or π/4 plus arctan of (a − b)/(a + b), so that |t| ≤ tan(π/8). 0 for (0,
+// 0).
 float atan2f(float y, float x) {
     if (ARITHMETIC == FAST) return atan(y, x);
     float ax = abs(x);
     float ay = abs(y);
     bool steep = ay > ax;
     float large = steep ? ay : ax;
-    // Away from both ends of the range of floats, so that neither the sum nor the quotient leaves it.
+    // Scaled away from both ends of the range of floats, so that sum and quotient stay inside it.
     float scale = large > 1.15292150e18 ? 0.0625 : 16777216.0;
     precise float a = (steep ? ax : ay) * scale;
     precise float b = large * scale;
@@ -322,8 +325,9 @@ float atan2f(float y, float x) {
     return with_sign_of(arc_sum(k, steep != (x < 0.0) ? -1.0 : 1.0, t, t * (z * p)), y);
 }
 
-// (cos, sin) of 2π·turns. Turns reduce exactly: the nearest quarter is taken off, and the rest is within ±π/4, where series as in Cephes
-// hold. The built-ins promise no more than 2^-11. Beyond 2^22 turns, where floats are no finer than a quarter: (1, 0).
+// (cos, sin) of 2π·turns. Turns reduce exactly: the nearest quarter turn is subtracted, and the rest is within ±π/4, where
+// series as in Cephes hold. Vulkan's sin and cos promise no more than 2^-11. Beyond 2^22 turns, where floats are no finer
+// than a quarter: (1, 0).
 vec2 cos_sin_of_turns(float turns) {
     vec2 r;
     if (ARITHMETIC == FAST) {

@@ -1,8 +1,12 @@
+// Normal mapping: a tangent-space normal in the frame of an interpolated normal and tangent.
+// Not the "bent normal" of ambient occlusion. Where to read: RTR 4, section 6.7.2; glTF 2.0, section 3.9.3 (additional
+// textures).
+// Assumes: the texel is decoded to [−1, 1], with its scale applied.
 #ifndef BENT_NORMAL_GLSL
 #define BENT_NORMAL_GLSL
 
-// A tangent-space normal in the frame of an interpolated normal and tangent, whose w is the handedness; the normal itself
-// where that is no frame.
+// n is the unit interpolated normal, and tangent.w the handedness of the bitangent. Returns n where the vectors span no
+// frame.
 vec3 bent_normal(vec3 n, vec4 tangent, vec3 texel) {
     vec3 t = tangent.xyz - n * dot(n, tangent.xyz);
     float t2 = dot(t, t);

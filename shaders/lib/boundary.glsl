@@ -1,4 +1,9 @@
-// What a ray meets at a surface that may separate two media, and the layers of that surface.
+// Interfaces between media that a ray meets: nested dielectrics, coincident interfaces, and the layers of the surface.
+// A closed dielectric mesh (a solid) separates the medium before from the medium behind. Of overlapping solids the one of
+// highest priority is present (lib/media.glsl). Surfaces of solids that touch each other or something opaque are crossed as
+// one interface.
+// Where to read: Schmidt and Budge, Journal of Graphics Tools 7(2) 2002; docs/decisions/rays.md. Assumes: bvh space
+// (share/trace.glsl), metres.
 #ifndef BOUNDARY_GLSL
 #define BOUNDARY_GLSL
 #include "lib/hit.glsl"
@@ -6,24 +11,25 @@
 #include "lib/media.glsl"
 #include "lib/shadow.glsl"
 
-layout(constant) const bool COINCIDENT_INTERFACES = false;     // some transparent body lies against another surface
+layout(constant) const bool COINCIDENT_INTERFACES = false;     // some transparent solid touches another surface
 
-// What a surface separates, for a ray that comes through `media`.
+// What a surface separates, for a ray in the media `media`.
 struct Boundary {
-    bool sheet;  // transmits light and encloses nothing
-    bool solid;  // the surface of a transparent body
-    bool suppressed_by_priority; // a body of higher priority displaces it: nothing changes here
-    bool unmatched_exit;  // left without having been entered: the shell is open, or another one crosses it
-    bool touches_opaque; // something opaque lies against it: it is met next, as if it were in the medium before
-    float opaque_at; // where, along the ray from before the boundary
-    uint medium_in;   // the medium before
-    uint medium_out;  // and behind
-    uvec4 media_out; // all media behind
+    bool sheet;  // thin-walled: transmits light and encloses no medium
+    bool solid;  // interface of a closed dielectric mesh
+    bool suppressed_by_priority; // a solid of higher priority is present on both sides: the interface does nothing
+    bool unmatched_exit;  // an exit without an entry: the mesh is open, or another one intersects it
+    bool touches_opaque; // an opaque surface coincides with it: that one is hit next, from the medium before
+    float opaque_at; // t of that opaque surface on a ray that starts before the interface
+    uint medium_in;   // the present medium before the interface
+    uint medium_out;  // and the one behind it
+    uvec4 media_out; // all media behind it, as entries of lib/media.glsl
 };
 
-// Where bodies touch there is one boundary, from the one to the other, and where something opaque lies against a body there
-// is none: what is within the offset behind a surface is crossed with it, since a ray that goes on starts behind it. Looked
-// for along the ray from before the surface: as deep as the offset behind it down to a cosine of 1/16, less deep beyond.
+// Coincident interfaces. Where solids touch, there is one interface from one medium to the other. Where something opaque
+// touches a solid, there is no interface at all. A ray that continues starts `offset` behind a surface, so every surface
+// within that distance has to be crossed here. They are searched along the ray, starting before the surface. The search
+// reaches the full offset behind it down to a cosine of 1/16, and less beyond.
 void cross_coincident_interfaces(inout Boundary r, HitSurface hit, vec3 direction) {
     vec3 origin = ray_origin(hit.s.p_bvh, hit.n, vec3(0.0));
     float cos_v = max(-dot(hit.n, direction), 1e-6);
@@ -41,7 +47,7 @@ void cross_coincident_interfaces(inout Boundary r, HitSurface hit, vec3 directio
                 r.media_out = front ? entered(r.media_out, m.medium) : left(r.media_out, m.medium);
             } else if (hit_class(last.triangle) == OPAQUE) {
                 r.touches_opaque = true;
-                // A few roundings before it: what is crossed lies there or before.
+                // Four ULP before the opaque surface: the interfaces crossed lie there or before.
                 r.opaque_at = intBitsToFloat(floatBitsToInt(last.t) - 4);
                 goes_on = false;
             }
@@ -49,7 +55,7 @@ void cross_coincident_interfaces(inout Boundary r, HitSurface hit, vec3 directio
     } while (goes_on);
 }
 
-// `direction` is the ray's.
+// `direction` is the direction of the ray.
 Boundary boundary_at(HitSurface hit, uvec4 media, vec3 direction) {
     Boundary r;
     uint medium = hit.medium;
@@ -68,8 +74,8 @@ Boundary boundary_at(HitSurface hit, uvec4 media, vec3 direction) {
     return r;
 }
 
-// The layers of a surface that a ray meets. A base of roughness up to MIN_ROUGHNESS, and one between equal indices, which bends and
-// scatters nothing, is a direction.
+// The layers of a surface that a ray hits. The base is a delta lobe for a roughness up to MIN_ROUGHNESS, and between media
+// of equal index, where nothing is refracted or scattered.
 Layers layers_at(HitSurface hit, Boundary boundary) {
     Layers b;
     b.s = hit.s;

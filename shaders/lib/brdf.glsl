@@ -1,7 +1,10 @@
-// Reflection models (lecture B1–B6, B9), their parts and how to sample them. N, L, V, H are unit vectors as 32 bits
-// hold them, L and V point away from the surface; α = roughness². Out of domain: α is clamped to [1e-9, 1], shine < 0
-// is 0, F0 is clamped to [0, 1]; a zero vector makes a right angle with everything, and so does one too long for its
-// square.
+// Reflection models: Lambert, Blinn–Phong, GGX microfacets; their terms and how to sample them (lecture B1–B6, B9).
+// Where to read: pbrt 4, section 9.6; RTR 4, section 9.8; Walter et al. 2007 (GGX); Heitz 2014 (Smith masking) and 2018
+// (VNDF); Turquin 2019 (energy compensation); Veach 1997, chapter 9 (power heuristic). Twins on the host:
+// crates/optics/src/.
+// Assumes: N, L, V, H are unit vectors rounded to f32; L and V point away from the surface; α = roughness². Out of domain:
+// α is clamped to [1e-9, 1], shine < 0 is 0, F0 is clamped to [0, 1]. A zero vector, or one whose square overflows, counts
+// as perpendicular to everything.
 #ifndef BRDF_GLSL
 #define BRDF_GLSL
 #include "lib/arithmetic.glsl"
@@ -18,18 +21,20 @@ float alpha_in_domain(float alpha) {
 // --------------------------------------------------------------------------------------------------------------------
 // Angles
 
-// The angle of N and H = (L + V)/|L + V|.
+// The half vector H = (L + V)/|L + V| by its angles to N and to V.
 struct HalfAngle {
     float cos_h;
     float sin2_h;
-    float cos_d;  // of H and V: |L + V|/2
-    float sum2;   // (L + V)²; 0 for L = −V, where there is no H, cos_h is 0 and sin2_h 1
+    float cos_d;  // cosine between H and V: |L + V|/2
+    float sum2;   // |L + V|²; 0 for L = −V, where H is undefined: then cos_h is 0 and sin2_h 1
 };
 
 // @eq B1 N9 N18 N19: H = (L + V)/|L + V|, cosθ_h = N·H, cosθ_d = V·H = |L + V|/2
-// Where L is near −V their sum is exact, but not the sum of two vectors of one length: lengths that differ by 1e-7 turn
-// it. It has to be perpendicular to D = L − V, so what it has along D goes: (L² − V²)/4 D. 2(1 + L·V) would lose (L +
-// V)² altogether (numerics.md 18). Compensated: both sums in pairs, N × (L + V) and N·(L + V) of exact products.
+// Derivation. S = L + V, D = L − V.
+// 1. Where L is near −V, S is exact but short. If rounding makes |L| and |V| differ by 1e-7, S has a component along D.
+// 2. For unit vectors S ⟂ D. So the component of S along D is removed: S − (L² − V²)/4 · D, since S·D = L² − V² and D² = 4.
+// 3. cosθ_h, sin²θ_h and cosθ_d follow from the corrected S. 2(1 + L·V) would lose |L + V|² altogether (numerics.md 18).
+// Compensated: S and D are double-floats, and N × S and N·S are sums of exact products.
 HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
     HalfAngle r = HalfAngle(0.0, 1.0, 0.0, 0.0);
     if (ARITHMETIC == FAST) {
@@ -39,6 +44,7 @@ HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
         r.cos_d = dot(V, H);
         r.sum2 = 2.0 * (1.0 + dot(L, V));
     } else if (ARITHMETIC == COMPENSATED) {
+        // 1. S and D as double-floats.
         DoubleFloat sx = two_sum(L.x, V.x);
         DoubleFloat sy = two_sum(L.y, V.y);
         DoubleFloat sz = two_sum(L.z, V.z);
@@ -49,6 +55,7 @@ HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
         vec3 S_lo = vec3(sx.lo, sy.lo, sz.lo);
         vec3 D = vec3(dx.hi, dy.hi, dz.hi);
         vec3 D_lo = vec3(dx.lo, dy.lo, dz.lo);
+        // 2. Remove the component of S along D.
         DoubleFloat l2 = dot2(L, L);
         DoubleFloat v2 = dot2(V, V);
         precise float length_error = ((l2.hi - 1.0) + l2.lo) + ((v2.hi - 1.0) + v2.lo);
@@ -65,6 +72,7 @@ HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
         DoubleFloat tz = two_sum(S.z, -pz.hi);
         vec3 T = vec3(tx.hi, ty.hi, tz.hi);
         precise vec3 T_lo = (S_lo + vec3(tx.lo, ty.lo, tz.lo)) - turned_lo;
+        // 3. Angles from the corrected sum T.
         DoubleFloat t2 = dot2(T, T);
         precise float t2_lo = t2.lo + 2.0 * dot(T, T_lo);
         DoubleFloat s2 = quick_two_sum(t2.hi, t2_lo);
@@ -80,6 +88,7 @@ HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
             r.sum2 = sum2;
         }
     } else {
+        // The same three steps in f32.
         vec3 S = L + V;
         vec3 D = L - V;
         S -= D * (0.25 * dot(S, D));
@@ -95,8 +104,8 @@ HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
     return r;
 }
 
-// The same for a lobe that may be wide: for a shine of 1 it is the cosine, and near 90° that has no digits in a plain
-// sum.
+// half_angle for a lobe that may be wide. For a shininess of 1 the lobe is the cosine itself, and near 90° a plain sum
+// leaves no digits of it. So N·S is a sum of exact products here.
 HalfAngle phong_half_angle(vec3 N, vec3 L, vec3 V) {
     HalfAngle r = half_angle(N, L, V);
     if (ARITHMETIC == STABLE) {
@@ -110,7 +119,7 @@ HalfAngle phong_half_angle(vec3 N, vec3 L, vec3 V) {
     return r;
 }
 
-// The same without NaN and infinities.
+// The same angles without NaN and infinities.
 HalfAngle half_angle_in_range(HalfAngle a) {
     bool good = abs(a.cos_h) <= LARGEST && a.sin2_h <= LARGEST && a.sum2 <= LARGEST;
     return HalfAngle(good ? clamp(a.cos_h, -1.0, 1.0) : 0.0, good ? min(a.sin2_h, 1.0) : 1.0,
@@ -141,9 +150,9 @@ Lambert lambert(vec3 N, vec3 L, float Lin, float kd) {
 
 // @eq B5 N17: (cos⁺δ)^shine
 // @out lobe
-// 0 from 90° on and for L = −V. cos^shine = e^(shine/2 ln(1 − sin²)): for a shine of 1e7 cosδ
-// is 1 − 1e-6 and has one digit left of δ, sin²δ has them all; pow on top loses the rest (numerics.md 17). Beyond 45°
-// by the cosine itself.
+// 0 from 90° on and for L = −V. cos^shine = e^(shine/2 ln(1 − sin²)). For a shininess of 1e7, cosδ is 1 − 1e-6 and keeps
+// one digit of δ, while sin²δ keeps all of them; pow on top loses the rest (numerics.md 17). Beyond 45° the cosine itself
+// is used.
 float phong_lobe(HalfAngle a, float shine) {
     float lobe;
     if (ARITHMETIC == FAST) {
@@ -176,7 +185,7 @@ struct BlinnPhong {
 };
 
 // @eq B5 B9 N9 N17 N19: L = L_in (k_d cos⁺θ + k_s (cos⁺δ)^shine), cosδ = N·H, H = (L + V)/|L + V|
-// Self-shadow: spec and L are 0 for cosθ < 0, not for cosθ = 0. V may be anywhere, as in the lecture's shade().
+// Self-shadowing: spec and L are 0 for cosθ < 0, not for cosθ = 0. V may point anywhere, as in the lecture's shade().
 // @lab phong_lobe: laboratory_forms_are_made_of_what_draws
 BlinnPhong blinn_phong(vec3 N, vec3 L, vec3 V, float Lin, float kd, float ks, float shine) {
     BlinnPhong r;
@@ -203,7 +212,7 @@ struct ReciprocalPhong {
 };
 
 // @eq B6 N17 N18: L = L_in (k_d + f_s) cos⁺θ, f_s = k_s (cos⁺δ)^shine/(L + V)²
-// The BRDF is symmetric in L and V; f_s is 0 for cosθ < 0, as is L.
+// The BRDF is symmetric in L and V (reciprocity). f_s is 0 for cosθ < 0, and so is L.
 // @lab reciprocal_lobe: laboratory_forms_are_made_of_what_draws
 ReciprocalPhong reciprocal_phong(vec3 N, vec3 L, vec3 V, float Lin, float kd, float ks, float shine) {
     HalfAngle a = phong_half_angle(N, L, V);
@@ -222,7 +231,7 @@ ReciprocalPhong reciprocal_phong(vec3 N, vec3 L, vec3 V, float Lin, float kd, fl
     return r;
 }
 
-// Shininess whose Blinn–Phong lobe has the width of a GGX lobe (Walter et al. 2007): α² = 2 / (shine + 2).
+// Shininess of the Blinn–Phong lobe as wide as a GGX lobe (Walter et al. 2007): α² = 2 / (shine + 2).
 float shine_from_alpha(float alpha) {
     return max(2.0 / (alpha * alpha) - 2.0, 0.0);
 }
@@ -232,8 +241,8 @@ float shine_from_alpha(float alpha) {
 
 // @eq B1 N20: D = α²/(π (α² + sin²θ_h (1 − α²))²), 0 for cosθ_h ≤ 0
 // @out D
-// Walter et al. 2007. c²(α² − 1) + 1 cancels to nothing at the peak of a narrow lobe; with
-// c² = 1 − s² it is α² + s²(1 − α²), a sum, and all that is left of the cosine is its sign (numerics.md 20).
+// The GGX (Trowbridge–Reitz) normal distribution (Walter et al. 2007). c²(α² − 1) + 1 cancels at the peak of a narrow lobe.
+// With c² = 1 − s² it is the sum α² + s²(1 − α²), and only the sign of the cosine is still needed (numerics.md 20).
 float ggx_distribution(float cos_h, float sin2_h, float alpha) {
     float D;
     if (ARITHMETIC == FAST) {
@@ -270,19 +279,19 @@ GgxD ggx_d(vec3 N, vec3 H, float alpha) {
     return GgxD(cos_h, sin2_h, ggx_distribution(cos_h, sin2_h, a));
 }
 
-// √(cos² + α² sin²), which is cosθ (1 + 2Λ), in a form that is a sum for every α ≤ 1.
+// √(cos² + α² sin²), which is cosθ (1 + 2Λ), written as a sum for every α ≤ 1.
 float smith_root(float c, float alpha) {
     return sqrt(alpha * alpha + (1.0 - alpha) * (1.0 + alpha) * (c * c));
 }
 
-// G₁ = 1/(1 + Λ) without a quotient that is ∞ at 90°.
+// Smith masking-shadowing: the masking function G₁ = 1/(1 + Λ), without a quotient that is ∞ at 90°.
 float smith_g1(float c, float alpha) {
     return 2.0 * c / (c + smith_root(c, alpha));
 }
 
 // @eq B1 N22: Λ = (√(1 + α² tan²θ) − 1)/2
 // @out lambda
-// With q = α² sin²θ and s = √(cos²θ + q), (s − c)/(2c) = q/(2c (s + c)). +∞ at 90°.
+// Smith's Λ for GGX. With q = α² sin²θ and s = √(cos²θ + q), (s − c)/(2c) = q/(2c (s + c)). +∞ at 90°.
 float ggx_lambda(float cos_v, float alpha) {
     float lambda;
     if (ARITHMETIC == FAST) {
@@ -300,7 +309,8 @@ float ggx_lambda(float cos_v, float alpha) {
 
 // @eq B1 N23: Vis = G₂/(4 cosθ_l cosθ_v), height-correlated
 // @out Vis
-// Smith's (Heitz 2014), without division by the cosines. Both 0: a large number, not infinity.
+// Smith's height-correlated masking-shadowing (Heitz 2014), without division by the cosines. If both are 0: a large number,
+// not infinity.
 float ggx_visibility(float cos_l, float cos_v, float alpha) {
     float Vis;
     if (ARITHMETIC == FAST) {
@@ -322,7 +332,7 @@ struct GgxG {
 };
 
 // @eq B1 N23: G₁ = 1/(1 + Λ), G₂ = 1/(1 + Λ_l + Λ_v), Vis = G₂/(4 N·L N·V)
-// Λ → ∞ at 90°, where G₁ = 2c/(c + √(c² + α² sin²)) goes to 0 in all its digits. Cosines are clamped to [0, 1].
+// Λ → ∞ at 90°, where G₁ = 2c/(c + √(c² + α² sin²)) goes to 0 with all its digits. Cosines are clamped to [0, 1].
 // @lab ggx_visibility: laboratory_forms_are_made_of_what_draws
 GgxG ggx_g(float NoL, float NoV, float alpha) {
     GgxG r;
@@ -338,7 +348,7 @@ GgxG ggx_g(float NoL, float NoV, float alpha) {
         float qv = smith_root(cv, a);
         r.G1_L = 2.0 * cl / (cl + ql);
         r.G1_V = 2.0 * cv / (cv + qv);
-        // Divided, not multiplied out: the product of two cosines of 1e-30 is no float.
+        // Divided one by one: the product of two cosines of 1e-30 is no float.
         bool lit = min(cl, cv) >= SMALLEST_NORMAL;
         r.G2 = lit ? 2.0 / (ql / cl + qv / cv) : 0.0;
         r.Vis = ggx_visibility(cl, cv, a);
@@ -363,7 +373,7 @@ struct Ggx {
 };
 
 // @eq B1 B2 B3: f_r = D G₂ F/(4 N·L N·V)
-// V·H is |L + V|/2. f_r is 0 where L or V is not above the surface.
+// V·H is |L + V|/2. f_r is 0 where L or V is below the surface.
 // @lab ggx_distribution: laboratory_forms_are_made_of_what_draws
 Ggx ggx(vec3 N, vec3 L, vec3 V, float alpha, float F0) {
     HalfAngle h = half_angle(N, L, V);
@@ -390,7 +400,7 @@ Ggx ggx(vec3 N, vec3 L, vec3 V, float alpha, float F0) {
     return r;
 }
 
-// What the lobe of a white metal keeps of the light, over what it reflects: (1 − E)/E.
+// Energy that single scattering loses on a white metal, relative to the energy it reflects: (1 − E)/E.
 float ggx_missing(float albedo) {
     float E = clamp(albedo, 1.0 / 1024.0, 1.0);
     return ARITHMETIC == FAST ? 1.0 / albedo - 1.0 : (1.0 - E) / E;
@@ -398,8 +408,9 @@ float ggx_missing(float albedo) {
 
 // @eq B1: factor = 1 + F0 (1/E − 1)
 // @out factor
-// The lobe scaled so that a white metal reflects all it receives (Turquin 2019). That light keeps the shape of the lobe after
-// more than one reflection is a simplification: it leaves the microsurface about evenly (lecture B1). E is the directional albedo of the lobe with F = 1, clamped to
+// Energy compensation (Turquin 2019): scales the single-scattering lobe so that a white metal reflects all light it
+// receives. Keeping the shape of the lobe is Turquin's simplification: light that scatters several times leaves the
+// microsurface in more uniform directions (lecture B1). E is the directional albedo of the lobe with F = 1, clamped to
 // [1/1024, 1]; that of GGX is above 0.3.
 float ggx_compensation(float F0, float albedo) {
     return 1.0 + F0 * ggx_missing(albedo);
@@ -418,7 +429,7 @@ struct GgxSample {
 };
 
 // @eq B1 N21: tan²θ_h = α² u/(1 − u): half vectors of density D cosθ_h
-// sin = α√u/√((1 − u) + α²u): √(1 − cos²) is 0 for narrow lobes.
+// Sampling of the normal distribution (Walter et al. 2007). sin = α√u/√((1 − u) + α²u): √(1 − cos²) is 0 for narrow lobes.
 GgxSample ggx_sample(float u, float alpha) {
     GgxSample r;
     if (ARITHMETIC == FAST) {
@@ -435,14 +446,15 @@ GgxSample ggx_sample(float u, float alpha) {
 
 // @eq B1: p(L) = G₁ D/(4 cosθ_v) per solid angle: of V mirrored at the half vectors of visible_half_vector
 // @out pdf
-// Heitz 2018.
+// Density of reflected directions for half vectors sampled from the VNDF (Heitz 2018).
 float mirrored_pdf(float cos_v, HalfAngle h, float alpha) {
     return smith_g1(cos_v, alpha) * ggx_distribution(h.cos_h, h.sin2_h, alpha) / (4.0 * cos_v);
 }
 
 // @eq B1: H of density D max(V·H, 0) G₁/cosθ_v: a point of a disk, moved up by what the viewer sees of the hemisphere below
 // @out h
-// Heitz, JCGT 7(4) 2018; v and h in the frame of the normal.
+// Sampling of the VNDF, the distribution of visible normals (Heitz, JCGT 7(4) 2018). v and h are in the frame of the
+// normal.
 vec3 visible_half_vector(vec3 v, float alpha, vec2 u) {
     vec3 stretched = normalize(vec3(alpha * v.xy, v.z));
     float across2 = dot(stretched.xy, stretched.xy);
@@ -455,7 +467,7 @@ vec3 visible_half_vector(vec3 v, float alpha, vec2 u) {
     return normalize(vec3(alpha * h.xy, max(h.z, 0.0)));
 }
 
-// The half vector of one event.
+// A half vector sampled from the VNDF, in the space of n and v.
 vec3 half_vector(vec3 n, vec3 v, float alpha, vec2 u) {
     OrthonormalBasis frame = orthonormal_basis(n);
     vec3 local = vec3(dot(v, frame.t), dot(v, frame.b), max(dot(v, n), 1e-4));
@@ -465,7 +477,8 @@ vec3 half_vector(vec3 n, vec3 v, float alpha, vec2 u) {
 
 // @eq B1 N22: G₂/G₁ = (1 + Λ_v)/(1 + Λ_v + Λ_l)
 // @out share
-// What masking leaves of light along l that was mirrored at a half vector the viewer sees; cosines from 1e-4 on.
+// Weight of VNDF sampling: masking-shadowing over masking, for a direction l reflected at a visible facet. Cosines from
+// 1e-4 on.
 float smith_g2_over_g1(float cos_v, float cos_l, float alpha) {
     float lambda_v = ggx_lambda(max(abs(cos_v), 1e-4), alpha);
     float lambda_l = ggx_lambda(max(abs(cos_l), 1e-4), alpha);
@@ -478,8 +491,8 @@ struct CosineSample {
 };
 
 // @eq B4 N49: L = (√u₁ cos 2πu₂, √u₁ sin 2πu₂, √(1 − u₁)), p(L) = cosθ/π
-// About the z axis. z from 1 − u₁, not from 1 − x² − y², which may be below 0. u₁ is clamped to [0, 1 − 2^-24], so that
-// no direction lies in the surface and has a density of 0.
+// Cosine-weighted hemisphere about the z axis. z comes from 1 − u₁, not from 1 − x² − y², which may be below 0. u₁ is
+// clamped to [0, 1 − 2^-24], so that no direction lies in the surface, where its density would be 0.
 CosineSample cosine_sample(float u1, float u2) {
     CosineSample r;
     if (ARITHMETIC == FAST) {
@@ -495,8 +508,8 @@ CosineSample cosine_sample(float u1, float u2) {
 
 // @eq N24: w = p²/(p² + q²), the power heuristic for a sample of density p that q might have drawn
 // @out w
-// By the quotient of the smaller over the larger, whose square may vanish but never overflows (Veach 1997). Densities
-// below 0 count as 0; w is 0 for p = 0 and 1 for p = ∞.
+// Multiple importance sampling (Veach 1997). Computed by the quotient of the smaller over the larger density: its square
+// may underflow but never overflows. Densities below 0 count as 0; w is 0 for p = 0 and 1 for p = ∞.
 float mis_weight(float p, float q) {
     float w;
     if (ARITHMETIC == FAST) {

@@ -1,28 +1,33 @@
-// How a path scatters at a surface: one function of two directions, evaluated with the density by which directions are drawn, and
-// the drawing of one (lib/layers.glsl has the lobes). Diffuse directions are partly drawn by a guiding distribution (lib/aims.glsl).
+// The BSDF of a path vertex: evaluation with its sampling density, and sampling of one direction.
+// lib/layers.glsl has the lobes. A lobe is specular (a delta distribution: one direction) or rough (evaluated, with a
+// density). Half vectors of rough lobes are sampled from the VNDF. Path guiding samples part of the directions of the
+// diffuse base layer (lib/path_guiding.glsl).
+// Where to read: pbrt 4, sections 9.1 (BSDF interface) and 9.7; docs/decisions/paths.md. Assumes: world axes, densities per
+// solid angle.
 #ifndef BSDF_GLSL
 #define BSDF_GLSL
 #include "lib/path_guiding.glsl"
 #include "lib/boundary.glsl"
 
-layout(constant) const bool ROUGH_TRANSMISSION = false; // some surface that lets light through is rough
+layout(constant) const bool ROUGH_TRANSMISSION = false; // some transmissive surface is rough
 
 struct Bsdf {
     Layers layers;
-    vec3 n;       // of the triangle, on the viewer's side
-    vec3 p_bvh;   // where from
-    float guided; // share of the diffuse directions that are drawn by the guiding distribution
+    vec3 n;       // normal of the triangle, on the viewer's side
+    vec3 p_bvh;   // position of the vertex, bvh space
+    float guided; // fraction of the diffuse directions that the guiding distribution samples
     GuidingCell guiding;
 };
 
-// Least probability of a rough lobe, beside albedos.
+// Least selection probability of a rough lobe, before normalisation.
 const float LEAST_SHARE = 0.1;
 
-// Probabilities of coat, base, diffuse ground and what goes through, in proportion to what each sends at the viewer's angle.
+// Selection probabilities of coat, base, diffuse base layer and transmission, in proportion to their albedos at the
+// viewer's angle.
 vec4 shares_of(Layers b) {
     float mirrors = mean(b.f_base);
-    // Half vectors away from the normal see more of it than the viewer's angle tells: what little a lobe reflects at normal
-    // incidence may be ten times as much there, and is drawn often enough for that.
+    // Facets tilted away from the normal reflect more than the viewer's angle suggests. A small reflectance at normal
+    // incidence may be ten times as large there, so the lobe is sampled at least that often.
     if (!b.delta && mirrors > 0.0) mirrors = max(mirrors * mean(b.s.compensation), LEAST_SHARE);
     float coat = CLEARCOAT ? 1.0 - b.under : 0.0;
     float left = 1.0 - coat;
@@ -30,7 +35,7 @@ vec4 shares_of(Layers b) {
         coat = max(coat, LEAST_SHARE);
         left = 1.0 - coat;
     }
-    // Some facets let through what the viewer's angle would reflect altogether.
+    // Some facets transmit where the viewer's angle would give total reflection.
     float below = 1.0 - largest(b.f_dielectric);
     below = b.delta ? below : max(below, LEAST_SHARE);
     vec4 shares = vec4(coat, vec3(left) * vec3(mirrors, scattered_share(b), mean(b.tint) * b.transmits * below));
@@ -49,24 +54,24 @@ Bsdf bsdf_at(HitSurface hit, Boundary boundary) {
     return b;
 }
 
-// The same, for a path that goes on from there: towards what mirrors or bends light, too.
+// Enables path guiding for a vertex at which the path continues.
 void enable_guiding(inout Bsdf b) {
     b.guiding = guiding_cell_at(b.p_bvh);
     b.guided = b.guiding.count > 0 ? GUIDED_FRACTION : 0.0;
 }
 
-// Whether light goes straight through: a sheet that does not scatter, or a boundary between equal indices.
+// Whether light passes undeflected: a smooth thin-walled surface, or an interface between equal indices.
 bool is_straight(Layers b) {
     return b.delta && (b.sheet || (b.solid && b.n1 == b.n2));
 }
 
 struct PathEval {
-    vec3 f_cos;         // BSDF times |cosθ|, of all lobes that are wider than one direction
-    float pdf;          // with which they are drawn, per solid angle
-    float unguided_pdf; // and would be without the guiding distribution
+    vec3 f_cos;         // BSDF times |cosθ|, of all lobes but the delta ones
+    float pdf;          // density with which bsdf_sample draws the direction, per solid angle
+    float unguided_pdf; // the same without path guiding
 };
 
-// For light from the unit direction l, on whichever side.
+// For light from the unit direction l, on either side of the surface.
 PathEval bsdf_evaluate(Bsdf b, vec3 l) {
     bool above = dot(b.n, l) > 0.0;
     BsdfEval e = evaluate_reflection(b.layers, l);
@@ -85,16 +90,16 @@ PathEval bsdf_evaluate(Bsdf b, vec3 l) {
     return r;
 }
 
-// A direction drawn from a surface.
+// A sampled direction.
 struct BsdfSample {
     vec3 direction;
-    vec3 weight;   // of a lobe of one direction: BSDF times |cosθ| over probability
+    vec3 weight;   // of a delta lobe: BSDF times |cosθ| over probability
     bool delta;
-    bool through;  // it leaves behind the surface
-    bool straight; // and nothing bent it
+    bool through;  // the direction leaves behind the surface
+    bool straight; // and is not deflected
 };
 
-// `x` chooses the lobe, `u` the direction in it.
+// `x` chooses the lobe, `u` the direction within it.
 BsdfSample bsdf_sample(Bsdf bsdf, float x, vec2 u) {
     Layers b = bsdf.layers;
     Surface s = b.s;
@@ -107,7 +112,7 @@ BsdfSample bsdf_sample(Bsdf bsdf, float x, vec2 u) {
     vec3 h = event_half_vector(b, coat, u);
     vec3 mirrored = reflect_ray(-s.v, h).R;
     BsdfSample r = BsdfSample(delta ? on_side(mirrored, s.n_triangle) : mirrored, vec3(0.0), delta, through, false);
-    // Weights are for lobes of one direction, at the viewer's angle; of wider ones the whole BSDF is evaluated.
+    // A delta lobe returns its weight, at the viewer's angle. For rough lobes the caller evaluates the whole BSDF instead.
     vec3 weight = b.f_base * (b.under * b.left);
     float share = b.shares.y;
     if (CLEARCOAT) {
@@ -122,7 +127,7 @@ BsdfSample bsdf_sample(Bsdf bsdf, float x, vec2 u) {
             bool passes = r.straight || (dot(r.direction, s.n_triangle) < 0.0 && !(b.solid && ((b.delta && b.total) || tir)));
             weight = passes ? straight_transmittance(b) : vec3(0.0);
             share = b.shares.w;
-            // What is thrown back altogether ends.
+            // Total internal reflection at the sampled facet: weight 0, so the path terminates.
             r.delta = r.delta || !passes;
         }
     }

@@ -1,15 +1,16 @@
-// Spectra to colour (lecture C1–C3), dispersion and black bodies, and from scene-linear Rec. 709 radiance to display
-// values (C4). Twins: crates/optics/src/colour.rs; of the tone curves crates/image/src/tone.rs. Nothing is clipped to a gamut here: a
-// colour outside it has a negative component.
+// Colour: spectra to XYZ and sRGB, spectral upsampling, dispersion, black bodies, and tone mapping (lecture C1–C4).
+// Twins: crates/optics/src/colour.rs; of the tone curves crates/image/src/tone.rs.
+// Where to read: pbrt 4, chapter 4; RTR 4, chapter 8; docs/colour.md; IEC 61966-2-1 (sRGB). Assumes: scene-linear values
+// with Rec. 709 primaries. No colour is clipped to a gamut here: one outside it has a negative component.
 #ifndef COLOUR_GLSL
 #define COLOUR_GLSL
 #include "lib/arithmetic.glsl"
 #include "lib/matching_functions.glsl"
 
 // --------------------------------------------------------------------------------------------------------------------
-// Matching
+// Colour matching
 
-// By the four-digit matrix of IEC 61966-2-1.
+// XYZ to linear sRGB, with the four-digit matrix of IEC 61966-2-1.
 vec3 linear_srgb(vec3 xyz) {
     return mat3(3.2406, -0.9689, 0.0557, -1.5372, 1.8758, -0.2040, -0.4986, 0.0415, 1.0570) * xyz;
 }
@@ -21,7 +22,7 @@ struct XyzToSrgb {
 };
 
 // @eq C2: linear sRGB of X, Y, Z, white at D65, by the four-digit matrix of IEC 61966-2-1
-// X, Y and Z below 5e37, or the sums overflow.
+// X, Y and Z stay below 5e37, or the sums overflow.
 // @host crates/optics/src/spectra/mod.rs: what turns the film of bands into a picture
 XyzToSrgb xyz_to_srgb(float X, float Y, float Z) {
     vec3 rgb = linear_srgb(vec3(X, Y, Z));
@@ -41,7 +42,7 @@ struct CmfIntegral {
 };
 
 // @eq C1 C2 N50: X = ∫S x̄ dλ as 5 nm sums over 380 … 780 nm, r10 g10 b10 the three lamps of Stiles & Burch that match
-// Plain sums: 81 terms cost 81 roundings at worst. Samples below 1e34 in size, or the sums overflow.
+// Plain sums: 81 terms cost 81 roundings at worst. Samples stay below 1e34 in magnitude, or the sums overflow.
 // @host crates/optics/src/spectra/mod.rs: light of a band as X, Y, Z, over steps of 0.5 nm
 CmfIntegral cmf_integral(float s[81]) {
     vec3 xyz = vec3(0.0);
@@ -66,7 +67,8 @@ struct CmfGaussian {
     float b10;
 };
 
-// ((λ − μ)/w)²/2, `scale` 1/(2w²): in pairs, because its rounding error times itself is the exponential's.
+// ((λ − μ)/w)²/2, with `scale` = 1/(2w²). Double-float: the exponential multiplies the argument's rounding error by the
+// argument.
 float gaussian(float lambda, float mu, DoubleFloat scale) {
     DoubleFloat off = two_sum(lambda, -mu);
     DoubleFloat x = df_mul(df_mul(off, off), scale);
@@ -74,7 +76,7 @@ float gaussian(float lambda, float mu, DoubleFloat scale) {
 }
 
 // @eq C1 C2: as cmf_integral, of S = A e^(−((λ − μ)/w)²/2) at the same wavelengths
-// |μ| is cut to 1e6 nm, |w| to [1e-6, 1e6] nm; |A| below 1e34, or the sums overflow.
+// |μ| is clamped to 1e6 nm, |w| to [1e-6, 1e6] nm; |A| stays below 1e34, or the sums overflow.
 // @host crates/optics/src/spectra/mod.rs: light of a band as X, Y, Z, of a spectrum in the shape of a bell
 CmfGaussian cmf_gaussian(float A, float mu_nm, float width_nm) {
     float mu = clamp(mu_nm, -1e6, 1e6);
@@ -101,11 +103,11 @@ CmfGaussian cmf_gaussian(float A, float mu_nm, float width_nm) {
 }
 
 // --------------------------------------------------------------------------------------------------------------------
-// Reflectance from three numbers
+// Spectral upsampling of RGB reflectances
 
 // @eq C3: S(x) = 1/2 + x/(2√(1 + x²))
 // @out S
-// For x < 0 as 1/(2(1 + x² − x√(1 + x²))): the difference loses what is left of S. |x| is cut to 1e18.
+// For x < 0 it is 1/(2(1 + x² − x√(1 + x²))): the difference loses the digits of a small S. |x| is clamped to 1e18.
 // @host crates/optics/src/spectra/upsampling.rs: reflectances of colours
 float spectrum_sigmoid(float x) {
     float S;
@@ -122,8 +124,9 @@ float spectrum_sigmoid(float x) {
 
 // @eq C3: ρ(λ) = S((c0 λ + c1) λ + c2), λ in nm
 // @out rho
-// Jakob and Hanika 2019: a smooth reflectance in (0, 1) for every colour. Compensated: the polynomial, whose terms of
-// several hundred cancel to a few, in pairs. λ is cut to [0, 1e6] nm, coefficients to ±1e20.
+// Spectral upsampling by Jakob and Hanika 2019: a smooth reflectance in (0, 1) for every colour. Compensated: the
+// polynomial is a double-float, because its terms of several hundred cancel to a few. λ is clamped to [0, 1e6] nm,
+// coefficients to ±1e20.
 // @host crates/optics/src/spectra/upsampling.rs: reflectances of colours
 float upsampled_reflectance(float lambda_nm, float c0, float c1, float c2) {
     float lambda = clamp(lambda_nm, 0.0, 1e6);
@@ -147,9 +150,9 @@ struct Sellmeier {
 };
 
 // @eq F1 N46: n² − 1 = t = Σ B λ²/(λ² − C), λ in µm; n − 1 = t/(√(1 + t) + 1)
-// Four terms, of which glasses use three (B.w = 0). λ²/(λ² − C) = 1 + C/(λ² − C) in whichever form does not cancel. λ
-// is cut to [1e-6, 1e9] µm, B, C and the quotients to ±1e18; a term at its own resonance is 0; t < −1, inside an
-// absorption band, is n = 0.
+// The Sellmeier equation with four terms, of which glasses use three (B.w = 0). λ²/(λ² − C) = 1 + C/(λ² − C), in the form
+// that does not cancel. λ is clamped to [1e-6, 1e9] µm, B, C and the quotients to ±1e18. A term at its own resonance is 0.
+// t < −1, inside an absorption band, gives n = 0.
 // @host crates/optics/src/spectra/dispersion.rs: the index of a medium in a band
 Sellmeier sellmeier(float lambda_um, vec4 B, vec4 C) {
     float lambda = clamp(lambda_um, 1e-6, 1e9);
@@ -167,7 +170,7 @@ Sellmeier sellmeier(float lambda_um, vec4 B, vec4 C) {
 
 // @eq F1: n = A + B/λ², λ in µm
 // @out n
-// A knob, not data. λ is cut to [1e-6, 1e9] µm, n to [0, 1e9].
+// Cauchy's equation: an adjustable approximation, not measured data. λ is clamped to [1e-6, 1e9] µm, n to [0, 1e9].
 // @host crates/optics/src/spectra/dispersion.rs: the index of a medium in a band
 float cauchy(float lambda_um, float A, float B) {
     float lambda = clamp(lambda_um, 1e-6, 1e9);
@@ -179,7 +182,7 @@ float cauchy(float lambda_um, float A, float B) {
 
 // @eq N48: 1/(e^x − 1), x = hc/(λkT)
 // @out y
-// 0 from 88 on, where e^x leaves the range; 2^126 for x → 0 and x ≤ 0.
+// The Planck distribution without its factor. 0 from x = 88 on, where e^x overflows; 2^126 for x → 0 and x ≤ 0.
 // @host crates/optics/src/spectra/mod.rs: lamps told by their temperature
 float planck(float x) {
     float y;
@@ -197,8 +200,8 @@ const float RADIATION_2_LO = 2.2035184e-4;
 
 // @eq N48: L = 2hc²/λ⁵ /(e^(hc/(λkT)) − 1) in W/(m² sr µm), λ in µm, T in K
 // @out L
-// hc/(λkT) as a pair: its rounding times itself, up to 88, is the exponential's. λ is cut to [1e-3, 1e4] µm, T to
-// [1e-3, 1e12] K. 0 where the exponent exceeds 88.
+// Planck's law, spectral radiance. hc/(λkT) is a double-float: the exponential multiplies its rounding error by its value,
+// up to 88. λ is clamped to [1e-3, 1e4] µm, T to [1e-3, 1e12] K. 0 where the exponent exceeds 88.
 // @host crates/optics/src/spectra/mod.rs: lamps told by their temperature
 float blackbody(float lambda_um, float T) {
     float lambda = clamp(lambda_um, 1e-3, 1e4);
@@ -226,14 +229,15 @@ struct Srgb {
 
 // @eq C4 N44: IEC 61966-2-1: 12.92 x or 1.055 x^(1/2.4) − 0.055
 // @out encode
-// At most 1 up to 1; negative is 0. 0.0031308 lies below its f32: that one is above the threshold.
+// Not above 1 for x up to 1; 0 for negative x. The decimal 0.0031308 lies below its f32, so that f32 is above the
+// threshold.
 float srgb_encode(float x) {
     float y = 1.055 * powf(x, 1.0 / 2.4) - 0.055;
     y = x <= 1.0 ? min(y, 1.0) : y;
     return x < 0.0031308 ? 12.92 * max(x, 0.0) : y;
 }
 
-// v^2.4 as v² v^0.4: the nearest f32 to 0.4 is nearer than that to 2.4. 0.04045 lies above its f32.
+// v^2.4 is v² v^0.4: the nearest f32 to 0.4 is nearer than that to 2.4. The decimal 0.04045 lies above its f32.
 float srgb_decode(float x) {
     float v = (x + 0.055) / 1.055;
     float power = ARITHMETIC == FAST ? pow(v, 2.4) : v * v * powf(v, 0.4);
@@ -241,21 +245,21 @@ float srgb_decode(float x) {
 }
 
 // @eq C4 N44 N45: IEC 61966-2-1: encode 12.92 x or 1.055 x^(1/2.4) − 0.055, decode its inverse
-// Negative is 0; above 1 the power goes on. The textbook's 2.2 is another curve, off by 0.034: fast has the same
-// formula, of built-in powers, so that it does not change what a picture looks like.
+// Negative values give 0; above 1 the power continues. A gamma of 2.2 is another curve, off by 0.034. The tier fast has the
+// same formula with built-in powers, so that it does not change the look of a picture.
 // @lab srgb_encode: laboratory_forms_are_made_of_what_draws
 Srgb srgb(float x) {
     return Srgb(srgb_encode(x), srgb_decode(x));
 }
 
 // --------------------------------------------------------------------------------------------------------------------
-// Tone curves. Their pow and log2 are the built-ins: what those lose, 33 ULP at worst, is far below a display's step.
+// Tone curves. They use the built-in pow and log2: their error, 33 ULP at worst, is far below a step of a display.
 
 vec3 tone_reinhard(vec3 x) {
     return x / (1.0 + x);
 }
 
-// Stephen Hill's fit of the ACES reference rendering and sRGB output transforms.
+// Stephen Hill's fit of the ACES reference rendering transform and sRGB output transform.
 vec3 tone_aces(vec3 x) {
     const mat3 aces_from_linear = mat3(0.59719, 0.07600, 0.02840, 0.35458, 0.90834, 0.13383, 0.04823, 0.01566, 0.83777);
     const mat3 linear_from_aces =
@@ -265,7 +269,7 @@ vec3 tone_aces(vec3 x) {
     return linear_from_aces * v;
 }
 
-// AgX (Troy Sobotka) with the sixth-order fit of its sigmoid by Benjamin Wrensch; display-linear result.
+// AgX (Troy Sobotka), with Benjamin Wrensch's sixth-order fit of its sigmoid. The result is display-linear.
 vec3 tone_agx(vec3 x) {
     const mat3 inset = mat3(
         0.842479062253094, 0.0423282422610123, 0.0423756549057051,
@@ -282,7 +286,7 @@ vec3 tone_agx(vec3 x) {
     vec3 v4 = v2 * v2;
     v = 15.5 * v4 * v2 - 40.14 * v4 * v + 31.96 * v4 - 6.868 * v2 * v + 0.4298 * v2 + 0.1191 * v - 0.00232;
     v = max(outset * v, 0.0);
-    // The fit ends in display values of gamma 2.2; the transfer function is applied by the caller.
+    // The fit gives display values of gamma 2.2; the caller applies the transfer function.
     return pow(v, vec3(2.2));
 }
 
@@ -304,8 +308,8 @@ vec3 tone_khronos_neutral(vec3 x) {
     return x;
 }
 
-// Towards the grey of the same luminance (of Rec. 709's primaries), until nothing is negative: what a spectrum may be and a display
-// cannot show. Without luminance: black.
+// Gamut mapping: moves a colour towards the grey of the same luminance (Rec. 709) until no component is negative. Spectra
+// may lie outside the gamut of a display. Without luminance: black.
 vec3 desaturated(vec3 x) {
     float y = dot(vec3(0.2126, 0.7152, 0.0722), x);
     float least = min(x.r, min(x.g, x.b));
@@ -313,9 +317,9 @@ vec3 desaturated(vec3 x) {
     return least < 0.0 ? max(inside, 0.0) : x;
 }
 
-// `curve`: 0 linear, 1 reinhard, 2 aces, 3 agx, 4 khronos-neutral. Result in [0, 1], display-linear.
+// `curve`: 0 linear, 1 reinhard, 2 aces, 3 agx, 4 khronos-neutral. The result is in [0, 1], display-linear.
 vec3 tone(uint curve, vec3 x) {
-    // Cut where a half float ends: a curve that divides would make NaN, shown black, of the brightest pixels.
+    // Clamped to the largest half float: a curve with a quotient would give NaN, shown as black, for the brightest pixels.
     x = clamp(x, 0.0, 65504.0);
     if (curve == 1) x = tone_reinhard(x);
     if (curve == 2) x = tone_aces(x);

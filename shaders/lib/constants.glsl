@@ -1,4 +1,4 @@
-// Constants, once.
+// Mathematical constants.
 #ifndef CONSTANTS_GLSL
 #define CONSTANTS_GLSL
 const float PI = 3.14159265358979323846;

@@ -1,4 +1,10 @@
-// What light comes from, drawn in proportion to its power: punctual lights, triangles that emit, the environment (lecture R2–R4).
+// Light sampling by power: punctual lights, emissive triangles and the environment, with their densities (lecture R2–R4).
+// One emitter is chosen by a CDF over powers, then a point or direction on it. Each CDF is in 32-bit fixed point: a random
+// 32-bit word is looked up by binary search, and its position inside the bin becomes the next random number. The
+// environment has a marginal CDF over rows and one conditional CDF over columns for each row.
+// Where to read: pbrt 4, section 12.6 (light sampling) and appendix A (piecewise constant distributions);
+// docs/decisions/paths.md.
+// Assumes: points in bvh space, metres; densities per solid angle.
 #ifndef EMITTERS_GLSL
 #define EMITTERS_GLSL
 #include "lib/environment.glsl"
@@ -8,41 +14,42 @@
 #include "share/emitters.glsl"
 
 layout(constant) const uint EMITTERS = 0;
-layout(constant) const uint EMITTER_SEARCH_STEPS = 0;           // halvings that single one of them out
-layout(constant) const bool PUNCTUAL_EMITTERS = false;   // some of them are lights of the table
-layout(constant) const bool AREA_EMITTERS = false;     // some of those have a shape
-layout(constant) const bool EMISSIVE_TRIANGLES = false;  // some of them are triangles
-layout(constant) const bool SAMPLED_ENVIRONMENT = false;        // one is the environment
-layout(constant) const uint CDF_COLUMNS = 0;             // cells of its table
+layout(constant) const uint EMITTER_SEARCH_STEPS = 0;           // binary-search steps over all emitters
+layout(constant) const bool PUNCTUAL_EMITTERS = false;   // some emitter is a light of the table
+layout(constant) const bool AREA_EMITTERS = false;     // some light of the table is an analytic area light
+layout(constant) const bool EMISSIVE_TRIANGLES = false;  // some emitter is an emissive triangle
+layout(constant) const bool SAMPLED_ENVIRONMENT = false;        // the environment is an emitter
+layout(constant) const uint CDF_COLUMNS = 0;             // columns of the environment's CDF
 layout(constant) const uint CDF_ROWS = 0;
-layout(constant) const uint CDF_SEARCH_STEPS = 0;               // halvings that single out a row, or a column
+layout(constant) const uint CDF_SEARCH_STEPS = 0;               // binary-search steps in a row, or over the rows
 
 layout(paths, rgba32ui) readonly uniform uimageBuffer emitters;
 // @texels Emitter emitter_at(emitters)
-// First words of the rows' shares; then, row by row, those of the columns'.
+// Lower ends of the bins: the marginal CDF over rows; then, row by row, the conditional CDF over columns.
 layout(paths, r32ui) readonly uniform uimageBuffer environment_cdf;
 
-// Light that may arrive at a point from one place.
+// A light sample: light that may arrive at a point from one point on a light.
 struct LightSample {
-    vec3 to_light; // from the point; a unit vector to what is infinitely far
-    float t_max;   // of to_light: 1, or LARGEST
-    vec3 arriving; // radiance over density, or irradiance perpendicular to to_light over probability
-    float pdf;     // per solid angle; 0 where nothing but this could have drawn it
+    vec3 to_light; // from the shaded point; a unit vector to a light at infinity
+    float t_max;   // end of the shadow ray in units of to_light: 1, or LARGEST
+    vec3 arriving; // radiance over density; of punctual lights irradiance perpendicular to to_light over probability
+    float pdf;     // per solid angle; 0 for punctual (delta) lights, which BSDF sampling cannot hit
 };
 
-// Of a word that lies in the share [first, next) of all words, where in it: in [0, 1). A share of 0 is all of them.
+// Position of a word inside its bin [first, next), in [0, 1): a new uniform number. A bin of size 0 is the only one and
+// spans all words.
 float remapped_in_bin(uint word, uint first, uint next) {
     uint size = next - first;
     float place = size == 0u ? float(word) * (1.0 / 4294967296.0) : float(word - first) / float(size);
     return min(place, 0.999999940395355);
 }
 
-// Size of a share of all words, as a probability.
+// Probability of a bin: its size over 2^32.
 float bin_probability(uint first, uint next) {
     return next == first ? 1.0 : float(next - first) * (1.0 / 4294967296.0);
 }
 
-// Where the share lies in which a word is, among `count` from `base` on.
+// Binary search for the bin that holds a word, in a CDF of `count` entries from `base` on.
 uint search_environment_cdf(uint base, uint count, uint word) {
     uint found = 0;
     for (uint step = CDF_SEARCH_STEPS; step > 0; step--) {
@@ -57,12 +64,12 @@ uint environment_cdf_at(uint base, uint count, uint i) {
     return i < count ? imageLoad(environment_cdf, int(base + i)).x : 0u;
 }
 
-// Density per solid angle of the cell at `at`, whose polar angle has this sine.
+// Density per solid angle of a texel of the environment's CDF; sin_theta is the sine of its polar angle.
 float environment_texel_pdf(float p_row, float p_column, float sin_theta) {
     return p_row * p_column * float(CDF_ROWS * CDF_COLUMNS) / (2.0 * PI * PI * max(sin_theta, 1e-6));
 }
 
-// Density of a direction, in the world, among all that light is drawn from.
+// Density, among all light samples, of a direction in world axes.
 float environment_pdf(vec3 direction) {
     if (!SAMPLED_ENVIRONMENT) return 0.0;
     vec3 d = into_environment(direction);
@@ -72,7 +79,7 @@ float environment_pdf(vec3 direction) {
     uint columns = CDF_ROWS + row * CDF_COLUMNS;
     float p_row = bin_probability(environment_cdf_at(0, CDF_ROWS, row), environment_cdf_at(0, CDF_ROWS, row + 1));
     float p_column = bin_probability(environment_cdf_at(columns, CDF_COLUMNS, column), environment_cdf_at(columns, CDF_COLUMNS, column + 1));
-    // The environment is the first of the emitters.
+    // The environment is the first emitter.
     float picked = emitter_at(0).probability;
     return picked * environment_texel_pdf(p_row, p_column, sqrt(d.x * d.x + d.z * d.z));
 }
@@ -107,7 +114,7 @@ vec3 doubled_area_of(uint triangle, out vec3 a, out vec3 ab, out vec3 ac) {
     return doubled_area(ab, ac);
 }
 
-// Radiance that a triangle sends from the place with these barycentrics.
+// Radiance that a triangle emits at these barycentric coordinates.
 vec3 emission_at(uint triangle, float u, float v) {
     uint material = hit_material(triangle) & MATERIAL_OF_TRIANGLE;
     vec3 radiance = material_emissive(material);
@@ -119,15 +126,16 @@ vec3 emission_at(uint triangle, float u, float v) {
     return radiance;
 }
 
-// Probability per area with which a triangle is drawn; 0 where it is none of the emitters.
+// Density per area of light sampling on a triangle; 0 where the triangle is no emitter.
 float light_pdf_area(uint triangle) {
     return triangle_at(triangle).picked;
 }
 
-// One place that light comes from, for a point at `origin` in bvh space. `arriving` of the environment is 1 over the density:
-// what it shows is the caller's to look up.
+// Draws one light sample for a point at `origin` in bvh space. For the environment `arriving` is 1 over the density: the
+// caller multiplies by the environment's radiance.
 LightSample sample_light(vec3 origin, uvec2 words) {
     LightSample r = LightSample(vec3(0.0, 1.0, 0.0), -1.0, vec3(0.0), 0.0);
+    // 1. Choose an emitter: binary search in the CDF over powers.
     uint found = 0;
     for (uint step = EMITTER_SEARCH_STEPS; step > 0; step--) {
         uint next = found + (1u << (step - 1));
@@ -139,6 +147,7 @@ LightSample sample_light(vec3 origin, uvec2 words) {
     float probability = emitter.probability;
     float x = remapped_in_bin(words.x, emitter.first, next_first);
     uint kind = emitter.kind & EMITTER_KIND;
+    // 2a. A punctual light, or a point on an analytic area light.
     if (PUNCTUAL_EMITTERS) {
         if (kind == EMITTER_PUNCTUAL) {
             vec3 p_rel = origin - trace_terms.bvh_from_rel;
@@ -148,6 +157,7 @@ LightSample sample_light(vec3 origin, uvec2 words) {
                             light.arriving / probability, 0.0);
         }
     }
+    // 2b. A direction to the environment.
     if (SAMPLED_ENVIRONMENT) {
         if (kind == EMITTER_ENVIRONMENT) {
             EnvironmentSample sky = sample_environment(uint(x * 4294967040.0), words.y);
@@ -155,9 +165,10 @@ LightSample sample_light(vec3 origin, uvec2 words) {
             r = LightSample(sky.direction, LARGEST, vec3(1.0 / pdf), pdf);
         }
     }
+    // 2c. A point on an emissive triangle.
     if (EMISSIVE_TRIANGLES) {
         if (kind == EMITTER_TRIANGLE) {
-            // The unit square onto a triangle, with little distortion (Heitz 2019): halves along the diagonal.
+            // Low-distortion map from the unit square to a triangle (Heitz 2019): it folds along the diagonal.
             float y = unit_float(words.y);
             vec2 w = y > x ? vec2(0.5 * x, y - 0.5 * x) : vec2(x - 0.5 * y, 0.5 * y);
             vec3 a, ab, ac;
@@ -168,7 +179,7 @@ LightSample sample_light(vec3 origin, uvec2 words) {
             vec3 to_light = p - origin;
             float side = dot(n, to_light) < 0.0 ? 1.0 : -1.0;
             bool shows = side > 0.0 || (emitter.kind & EMITTER_TWO_SIDED) != 0;
-            // A point of the air before the triangle: the triangle itself is not met.
+            // The end of the shadow ray lies off the triangle by `offset`, so that the triangle does not occlude itself.
             to_light += n * (side * trace_terms.offset);
             float r2 = dot(to_light, to_light);
             float cos_light = -side * dot(n, to_light) * inversesqrt(r2);

@@ -1,11 +1,12 @@
-// How quantities are stored: normals as octahedra, numbers as parts of words, depths, directions on a map. Twins of the
-// tagged functions: crates/optics/src/encode.rs.
+// Storage formats: octahedral encoding of normals, depths, sRGB bytes, and equirectangular maps of directions.
+// Twins of the tagged functions: crates/optics/src/encode.rs. Where to read: Cigolle et al., JCGT 3(2) 2014 (octahedral
+// encoding); IEC 61966-2-1 (sRGB); RTR 4, section 4.7 (projections and depth). Assumes: directions in world axes, +Y up.
 #ifndef ENCODE_GLSL
 #define ENCODE_GLSL
 #include "lib/constants.glsl"
 #include "lib/frame.glsl"
 
-// Octahedral map of a unit vector to [−1, 1]² (Cigolle et al., JCGT 3(2) 2014). In 2x16 bits the largest error is
+// Octahedral encoding of a unit vector into [−1, 1]² (Cigolle et al., JCGT 3(2) 2014). In 2x16 bits the largest error is
 // 3.7e-3 degrees (numerics.md 16).
 //        y
 //     +--|--+    the upper hemisphere is the inner diamond |u| + |v| < 1,
@@ -26,7 +27,7 @@ vec3 unit_from_octahedral(vec2 p) {
     return normalize(n);
 }
 
-// To the nearest of so many steps on each side of 0; 0: as it is.
+// Rounds to the nearest of `steps` steps on each side of 0; no rounding for steps = 0.
 vec2 in_steps(vec2 p, uint steps) {
     return steps == 0 ? p : floor(p * float(steps) + 0.5) / float(steps);
 }
@@ -36,19 +37,19 @@ struct OctahedralRoundTrip {
     float error_deg;
 };
 
-// Steps of a signed normalised number of `bits` bits on each side of 0.
+// Steps on each side of 0 of a signed normalised number with `bits` bits.
 float snorm_steps(uint bits) {
     return float((1u << (clamp(bits, 2u, 24u) - 1u)) - 1u);
 }
 
-// What the round trip below reads: +Z for the zero vector.
+// Normalised input of the round trip below: +Z for the zero vector.
 vec3 unit_or_z(vec3 n) {
     SafeNormalized unit = safe_normalize(n);
     return unit.is_zero ? vec3(0.0, 0.0, 1.0) : unit.n;
 }
 
 // @eq N16: d = decode(round(encode(n)·m)/m), m = 2^(bits − 1) − 1
-// Each component to the nearest step, as a texture unit stores it. bits is clamped to [2, 24].
+// Each component is rounded to the nearest step, as a texture unit stores it. bits is clamped to [2, 24].
 // @lab unit_from_octahedral: what_is_stored_in_fewer_bits_is_off_by_as_much
 OctahedralRoundTrip octahedral_round_trip(vec3 n, uint bits) {
     vec3 unit = unit_or_z(n);
@@ -59,9 +60,9 @@ OctahedralRoundTrip octahedral_round_trip(vec3 n, uint bits) {
 
 // @eq N42: d = near/z in f32, z = near/d
 // @out z_back
-// Reversed infinite depth: the floats of d lie as densely, relative to it, at every distance. The tier fast is the
-// standard depth d = far (z − near)/(z (far − near)), which is nearly 1 for most z; `far` is of use to it alone. What
-// is nearer than `near` > 0 comes back at it, what has near/z = 0 at infinity; near ≤ 0: 0.
+// Reversed infinite depth: the floats of d have the same relative density at every distance. The tier fast is the standard
+// depth d = far (z − near)/(z (far − near)), which is nearly 1 for most z; only that tier uses `far`. A point nearer than
+// `near` > 0 comes back at `near`, and one with near/z = 0 at infinity. near ≤ 0 gives 0.
 // @lab view_depth: study_scenes_are_where_the_rays_find_them
 float depth_round_trip(float z, float near, float far) {
     float z_back;
@@ -69,7 +70,7 @@ float depth_round_trip(float z, float near, float far) {
         float d = far / (far - near) * (1.0 - near / z);
         z_back = near * far / (far - d * (far - near));
     } else {
-        // `precise`: no division of the quotient into z.
+        // `precise` keeps the compiler from simplifying near / (near / z).
         precise float d = near / max(z, near);
         z_back = d >= SMALLEST_NORMAL ? near / d : plus_infinity();
         z_back = near > 0.0 ? z_back : 0.0;
@@ -79,7 +80,7 @@ float depth_round_trip(float z, float near, float far) {
 
 // @eq N45: sRGB to linear by IEC 61966-2-1, of bytes
 // @out linear
-// x^2.4 as x² P(⁴√x), within 2e-6 of itself: what a texture unit does, for texels that rays read one by one.
+// x^2.4 as x² P(⁴√x), with a relative error of 2e-6. Rays decode single texels with it, as a texture unit does in hardware.
 vec3 linear_from_srgb(vec3 x) {
     vec3 t = (x + 0.055) / 1.055;
     vec3 q = sqrt(sqrt(t));
@@ -89,8 +90,8 @@ vec3 linear_from_srgb(vec3 x) {
 
 // @eq N10: u = 1/2 + φ/2π, v = 1/2 − elevation/π; φ = atan2(d_z, d_x), elevation = atan2(d_y, √(d_x² + d_z²))
 // @out uv
-// Equirectangular coordinates of a direction (README, "Conventions"): u to the right, v down from the top. The
-// elevation as an arc tangent: the arc sine turns the rounding of d_y into 3e-4 rad at the poles. Zero: (1/2, 1/2).
+// Equirectangular coordinates of a direction (README, "Conventions"): u to the right, v down from the top. The elevation is
+// an arc tangent: an arc sine turns the rounding of d_y into 3e-4 rad at the poles. The zero vector gives (1/2, 1/2).
 vec2 equirectangular_from_direction(vec3 d) {
     vec2 uv;
     if (ARITHMETIC == FAST) {
@@ -102,14 +103,14 @@ vec2 equirectangular_from_direction(vec3 d) {
     return uv;
 }
 
-// A direction turned about +Y.
+// Rotates a direction about +Y.
 vec3 turned(vec3 d, float cos_angle, float sin_angle) {
     return vec3(cos_angle * d.x - sin_angle * d.z, d.y, sin_angle * d.x + cos_angle * d.z);
 }
 
 // @eq N10: d = (cos e cos φ, sin e, cos e sin φ), φ = 2π(u − 1/2), e = π(1/2 − v)
 // @out d
-// By arcs of turns: Vulkan promises its sine to 2^-11 only. u has period 1, v stays in its range by the caller.
+// Angles are in turns: Vulkan promises its sine to 2^-11 only. u has period 1; the caller keeps v in its range.
 vec3 direction_from_equirectangular(vec2 uv) {
     vec3 d;
     if (ARITHMETIC == FAST) {
@@ -117,8 +118,8 @@ vec3 direction_from_equirectangular(vec2 uv) {
         float elevation = (0.5 - uv.y) * PI;
         d = vec3(cos(elevation) * cos(phi), sin(elevation), cos(elevation) * sin(phi));
     } else {
-        // φ half a turn early: both signs change. Polar angle from the top instead of the elevation: no difference to
-        // round near v = 0.
+        // φ is taken half a turn early, so both signs change. The polar angle from the top replaces the elevation: no
+        // difference is rounded near v = 0.
         vec2 around = -cos_sin_of_turns(uv.x);
         vec2 polar = cos_sin_of_turns(0.5 * uv.y);
         d = vec3(polar.y * around.x, polar.x, polar.y * around.y);

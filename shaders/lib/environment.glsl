@@ -1,32 +1,36 @@
-// Light from all around: the environment's map, what was made of it, and how it is turned and scaled.
+// Environment lighting: the map, its irradiance in spherical harmonics and its prefiltered levels (split sum).
+// The split-sum approximation multiplies a prefiltered level of the map (pass/prefilter.comp) by the directional albedo of
+// the lobe (lib/reflectance.glsl).
+// Where to read: RTR 4, sections 10.5 and 10.6; Ramamoorthi and Hanrahan 2001 (irradiance); Karis 2013 (split sum).
+// Assumes: directions in world axes; `turned` rotates them about +Y into the map.
 #ifndef ENVIRONMENT_GLSL
 #define ENVIRONMENT_GLSL
 #include "lib/encode.glsl"
 #include "lib/spectrum.glsl"
 #include "share/environment.glsl"
 
-layout(constant) const bool SKY = false;         // it is seen behind the scene
-layout(constant) const bool ENVIRONMENT = false; // there is one, for rays that leave the scene
+layout(constant) const bool SKY = false;         // the environment is visible as the background
+layout(constant) const bool ENVIRONMENT = false; // rays that leave the scene see an environment
 layout(scene, scalar) uniform Environment { EnvironmentTerms environment; };
 layout(scene) uniform sampler2D sky;
-layout(scene) uniform sampler2D prefiltered; // level by level convolved with wider lobes (pass/prefilter.comp)
+layout(scene) uniform sampler2D prefiltered; // mip chain: each level convolved with a wider lobe (pass/prefilter.comp)
 
 vec3 into_environment(vec3 d) {
     return turned(d, environment.cos_rotation, environment.sin_rotation);
 }
 
-// Light of the environment, from its map or what was made of it.
+// Light of the environment from a texel of its map, of a prefiltered level or of its irradiance.
 vec3 light_of_environment(vec3 rgb) {
     return light_of_rgb(rgb * environment.intensity);
 }
 
-// Radiance that comes from a direction of the world.
+// Radiance from a direction in world axes.
 vec3 environment_radiance(vec3 direction) {
     vec2 at = equirectangular_from_direction(into_environment(direction));
     return light_of_environment(textureLod(sky, at, 0.0).rgb);
 }
 
-// Level of the prefiltered map whose texels are 1/16 of the lobe: α = 16 / width (pass/prefilter.comp).
+// Mip level of the prefiltered map whose texels are 1/16 of the lobe: α = 16 / width (pass/prefilter.comp).
 float prefiltered_level(float alpha) {
     float first = environment.width * alpha * 0.0625;
     return first >= 2.0 ? min(log2(first), environment.levels - 1.0) : first * 0.5;

@@ -1,5 +1,6 @@
-// Directions: unit vectors of any length, angles, frames around a normal, normals of triangles and of their images.
-// Twins: crates/optics/src/frame.rs.
+// Directions: robust normalisation, angles, orthonormal bases, and normals of triangles, instances and quadrics.
+// Twins: crates/optics/src/frame.rs. Where to read: pbrt 4, chapter 3; Duff et al., JCGT 6(1) 2017 (bases); Kahan's notes
+// on angles between vectors. Assumes: vectors of any length that f32 holds, unless a function says more.
 #ifndef FRAME_GLSL
 #define FRAME_GLSL
 #include "lib/arithmetic.glsl"
@@ -8,20 +9,21 @@ float largest_component(vec3 v) {
     return max(abs(v.x), max(abs(v.y), abs(v.z)));
 }
 
-// The power of two that brings a size into [1, 2), above 2^127 into [2, 4), exactly; 1 for what is below the normal
-// range and counts as 0. Squares of the scaled size neither overflow nor vanish. Its reciprocal is a normal number too.
+// The power of two that brings a size into [1, 2), exactly; above 2^127 into [2, 4). A size below the normal range counts
+// as 0 and gives 1. Squares of the scaled size neither overflow nor underflow, and the reciprocal of the factor is a normal
+// number too.
 float scale_to_one(float size) {
     int exponent = int(floatBitsToUint(size) >> 23) - 127;
     return size < SMALLEST_NORMAL ? 1.0 : power_of_two(-min(exponent, 126));
 }
 
-// The same for sizes that could not be squared; 1 between 1e-9 and 1e9, so that differences of two vectors of about one
-// length stay what they are.
+// scale_to_one for sizes whose squares leave the range of floats. It is 1 between 1e-9 and 1e9, so that differences of two
+// vectors of about one length stay unchanged.
 float scale_if_extreme(float size) {
     return size > 1e9 || size < 1e-9 ? scale_to_one(size) : 1.0;
 }
 
-// |v|, for every v whose length is a float
+// The length |v|, for every v whose length is a float.
 float vector_length(vec3 v) {
     float scale = scale_to_one(largest_component(v));
     vec3 w = v * scale;
@@ -34,9 +36,9 @@ struct SafeNormalized {
 };
 
 // @eq N14: n = v/|v|
-// |v|² of components below 1e-19 is 0, of those above 1e19 ∞: v is scaled first by the power of two of its largest
-// component, which rounds nothing. A vector below the normal range of floats has no direction: the zero vector, and a
-// flag.
+// |v|² is 0 for components below 1e-19 and ∞ for components above 1e19. So v is first scaled by the power of two of its
+// largest component, which rounds nothing. A vector below the normal range of floats has no direction: the result is the
+// zero vector and a flag.
 SafeNormalized safe_normalize(vec3 v) {
     SafeNormalized r = SafeNormalized(vec3(0.0), false);
     if (ARITHMETIC == FAST) {
@@ -50,8 +52,8 @@ SafeNormalized safe_normalize(vec3 v) {
     return r;
 }
 
-// u × v for two unit vectors. Nearly parallel as u × (v ∓ u): the difference of nearly equal, or the sum of nearly
-// opposite, vectors is exact, the products of the plain cross product are not and leave little of a small difference.
+// u × v for two unit vectors. Nearly parallel ones use u × (v ∓ u): the difference of nearly equal vectors, or the sum of
+// nearly opposite ones, is exact. The products of the plain cross product round, and leave little of a small difference.
 vec3 cross_of_units(vec3 u, vec3 v) {
     float cosine = dot(u, v);
     float parallel = cosine > 0.5 ? 1.0 : cosine < -0.5 ? -1.0 : 0.0;
@@ -60,8 +62,8 @@ vec3 cross_of_units(vec3 u, vec3 v) {
 
 // @eq N10: θ = atan2(|u × v|, u·v)
 // @out angle
-// arccos(u·v) has no digits left for small angles. Both arguments are scaled by |u||v| alike, so that rounded lengths
-// do not matter; Kahan's 2 atan2(|u − v|, |u + v|) is sensitive to them. Lengths of about 1; a zero vector: 0.
+// arccos(u·v) keeps no digits for small angles. Both arguments scale with |u||v|, so rounded lengths do not matter. Kahan's
+// 2 atan2(|u − v|, |u + v|) is sensitive to them. Lengths are about 1; a zero vector gives 0.
 // @lab atan2f: laboratory_forms_are_made_of_what_draws
 float angle_between(vec3 u, vec3 v) {
     float angle;
@@ -76,8 +78,8 @@ float angle_between(vec3 u, vec3 v) {
     return angle;
 }
 
-// Cosine between two directions to 32 ulp down to 1e-8: exact products, over the lengths. What the functions below
-// return as a cosine; `cosine` is enough for the terms of a microfacet model, which are smooth in it.
+// Cosine between two directions to 32 ULP down to 1e-8: exact products over the lengths. The tagged functions return this
+// one; `cosine` is enough for the terms of a microfacet model, which are smooth in it.
 float grazing_cosine(vec3 a, vec3 b) {
     float lengths = sqrt(dot(a, a) * dot(b, b));
     return ARITHMETIC == FAST ? dot(a, b) : lengths > 0.0 ? dot2(a, b).hi / lengths : 0.0;
@@ -85,19 +87,19 @@ float grazing_cosine(vec3 a, vec3 b) {
 
 // @eq B2 N25: cosθ = a·b
 // @out cos
-// Of unit vectors. A plain sum is good to 2e-7, lengths of rounded unit vectors included: nothing near
-// 90°, where it is all error. Compensated: the sum of exact products, over the lengths.
+// Of unit vectors. A plain sum is good to 2e-7, rounded lengths included; near 90° nothing but that error is left.
+// Compensated: the sum of exact products over the lengths.
 float cosine(vec3 a, vec3 b) {
     return ARITHMETIC == COMPENSATED ? grazing_cosine(a, b) : dot(a, b);
 }
 
-// A cosine in its range; 0 for NaN and infinities.
+// Clamps a cosine to [−1, 1]; 0 for NaN and infinities.
 float cosine_in_range(float c) {
     return abs(c) <= LARGEST ? clamp(c, -1.0, 1.0) : 0.0;
 }
 
-// sin² between two directions. 1 − cos² loses small angles, and so does the cross product N × H of rounded products;
-// H − N is exact where H is near N, and N × (H − N) has nothing to lose (numerics.md 9).
+// sin² of the angle between two directions. 1 − cos² loses small angles, and so does the cross product N × H with its
+// rounded products. H − N is exact where H is near N, so N × (H − N) loses nothing (numerics.md 9).
 float sine_squared(vec3 N, vec3 H) {
     float sin2;
     if (ARITHMETIC == FAST) {
@@ -120,8 +122,8 @@ struct OrthonormalBasis {
 };
 
 // @eq N15: t = (1 + s a n_x², s a n_x n_y, −s n_x), b = (a n_x n_y, s + a n_y², −n_y), a = −1/(s + n_z), s = sign n_z
-// Duff et al., JCGT 6(1) 2017. Frisvad's basis (s = 1 everywhere, the tier fast) has no denominator left at n_z = −1;
-// for n_z < 0 it is another basis than this one, which is a choice and no error. (t, b, n) is right-handed.
+// Duff et al., JCGT 6(1) 2017. Frisvad's basis (s = 1 everywhere, the tier fast) divides by 0 at n_z = −1. For n_z < 0 it
+// is another basis than this one: a choice, no error. (t, b, n) is right-handed.
 OrthonormalBasis orthonormal_basis(vec3 n) {
     float s = ARITHMETIC != FAST && n.z < 0.0 ? -1.0 : 1.0;
     float a = -1.0 / (s + n.z);
@@ -131,7 +133,7 @@ OrthonormalBasis orthonormal_basis(vec3 n) {
 
 // @eq N15: the largest of |t·t − 1|, |b·b − 1|, |t·b|, |t·n|, |b·n|
 // @out gram
-// How far a basis is from orthonormal, by exact products. A NaN in it counts as 3e38, so that a maximum cannot hide it.
+// Deviation of a basis from orthonormality, by exact products. NaN counts as 3e38, so that a maximum cannot hide it.
 // @lab orthonormal_basis: laboratory_forms_are_made_of_what_draws
 float basis_gram(vec3 n) {
     OrthonormalBasis basis = orthonormal_basis(n);
@@ -145,10 +147,10 @@ float basis_gram(vec3 n) {
 
 // @eq N41: N = sign(det M) (b × c, c × a, a × b) n, normalised; M = (a, b, c)
 // @out N
-// A normal under the linear map with columns a, b, c. The cofactor matrix is det(M) times the inverse transpose,
-// without the division by a determinant that is 0 for lengths of 1e-14 already. Its sign keeps mirrored fronts in
-// front. Each column is scaled by a power of two of its own; what that does to the cofactors is undone at n.
-// Where M or n leaves no direction: the zero vector.
+// Transforms a normal by the linear map with columns a, b, c. The cofactor matrix is det(M) times the inverse transpose. It
+// needs no division by the determinant, which is 0 already for lengths of 1e-14. The sign of the determinant keeps the
+// fronts of mirrored meshes in front. Each column is scaled by its own power of two, and n is scaled to undo the effect on
+// the cofactors. Where M or n leaves no direction: the zero vector.
 // @host src/upload/scene.rs: the matrix that carries normals of an instance
 vec3 transformed_normal(vec3 a, vec3 b, vec3 c, vec3 n) {
     vec3 N;
@@ -161,7 +163,7 @@ vec3 transformed_normal(vec3 a, vec3 b, vec3 c, vec3 n) {
         vec3 v = b * scales.y;
         vec3 w = c * scales.z;
         vec3 bc = cross(v, w);
-        // Relative to the largest of the three, so that none overflows.
+        // Relative to the largest of the three factors, so that none overflows.
         vec3 weights = scales * (1.0 / max(scales.x, max(scales.y, scales.z)));
         vec3 m = n * scale_to_one(largest_component(n)) * weights;
         m *= scale_to_one(largest_component(m));
@@ -171,12 +173,12 @@ vec3 transformed_normal(vec3 a, vec3 b, vec3 c, vec3 n) {
     return N;
 }
 
-// x y − z w rounded once, of pairs
+// x y − z w of double-floats, rounded once.
 float df_difference_of_products(DoubleFloat x, DoubleFloat y, DoubleFloat z, DoubleFloat w) {
     return df_add(df_mul(x, y), df_negate(df_mul(z, w))).hi;
 }
 
-// u × v: twice the area of the triangle with these edges, times the unit normal on the side from which they turn
+// u × v: twice the area of the triangle with these edges, times its unit normal on the side from which they run
 // counter-clockwise.
 vec3 doubled_area(vec3 u, vec3 v) {
     return cross(u, v);
@@ -188,14 +190,14 @@ struct TriangleNormal {
 };
 
 // @eq N40: n = (b − a) × (c − a), normalised
-// Compensated: the edges as pairs, so that they are exact, and the six products too: the area of a sliver is a small
-// difference of large products of rounded edges otherwise. (a × b + b × c + c × a by dot2 does the same near the
-// origin, and loses digits with the distance from it.) No area: the zero vector, and a flag. Stable: edges scaled by
-// powers of two, which round nothing.
+// Stable: edges are scaled by powers of two, which round nothing. Compensated: the edges are exact double-floats, and so
+// are the six products. Otherwise the area of a sliver is a small difference of large products of rounded edges. (a × b + b
+// × c + c × a by dot2 is as exact near the origin, and loses digits with the distance from it.) Without area: the zero
+// vector, and a flag.
 TriangleNormal triangle_normal(vec3 a, vec3 b, vec3 c) {
     TriangleNormal r;
     if (ARITHMETIC == FAST) {
-        // Scaled, too: pictures of tiny scenes would have no normals.
+        // Scaled as well: scenes of tiny size would otherwise have no normals.
         vec3 across = doubled_area(b - a, c - a);
         r = TriangleNormal(normalize(across * scale_to_one(largest_component(across))), false);
     } else if (ARITHMETIC == COMPENSATED) {
@@ -226,7 +228,7 @@ TriangleNormal triangle_normal(vec3 a, vec3 b, vec3 c) {
 
 // @eq Q5: N = (a x, b y, c z)/|…|, half the gradient of a x² + b y² + c z²
 // @out N
-// The normal of a level surface is the gradient of its function. At its centre: the zero vector.
+// The normal of a level surface is the gradient of its function. At the centre: the zero vector.
 // @host crates/scene/src/study/shape.rs: the normals of balls
 vec3 quadric_normal(vec3 p, vec3 k) {
     vec3 n;

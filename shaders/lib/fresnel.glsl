@@ -1,15 +1,16 @@
-// Reflectance of smooth surfaces (lecture F2, F3). n is n_transmitted / n_incident, cosines are of angles to the
-// normal; F is the unpolarised power reflectance. Out of domain: cosines are clamped to [0, 1], n to [0, 1e9], κ to
-// [0, 1e9] (its square times n² still fits in 32 bits); n = 0 reflects everything.
+// Fresnel reflectance of smooth dielectrics and conductors, exact and by Schlick's approximation (lecture F2, F3).
+// Where to read: pbrt 4, sections 9.3 and 9.4; RTR 4, section 9.5; Schlick 1994. Twins: crates/optics/src/.
+// Assumes: n = n_transmitted / n_incident, cosines of angles to the normal; F is the unpolarised power reflectance. Out of
+// domain: cosines are clamped to [0, 1], n and κ to [0, 1e9] (κ² times n² still fits in f32). n = 0 reflects everything.
 #ifndef FRESNEL_GLSL
 #define FRESNEL_GLSL
 #include "lib/arithmetic.glsl"
 
 const float LARGEST_INDEX = 1e9;
 
-layout(constant) const bool FAINT_CONDUCTORS = true; // some conductor is not metallic (is_metallic)
+layout(constant) const bool FAINT_CONDUCTORS = true; // some conductor has a small κ (is_metallic is false)
 
-// (1 − cosθ)⁵. Multiplied out: exact powers, and no NaN where a rounded dot product exceeds 1, which one in five does.
+// (1 − cosθ)⁵, multiplied out: exact powers, and no NaN where a rounded dot product exceeds 1, as one in five does.
 float schlick_weight(float cos_in) {
     float m = clamp(1.0 - cos_in, 0.0, 1.0);
     float m2 = m * m;
@@ -18,14 +19,14 @@ float schlick_weight(float cos_in) {
 
 // @eq F2 N1: F = F0 + (F90 − F0)(1 − cosθ)⁵
 // @out F
-// Of materials that are given by reflectances.
+// Schlick's approximation, for materials given by their reflectances.
 vec3 schlick(vec3 f0, float f90, float cos_in) {
     return f0 + (vec3(f90) - f0) * schlick_weight(cos_in);
 }
 
 // @eq F2: F0 = ((n − 1)² + κ²)/((n + 1)² + κ²)
 // @out F0
-// n − 1 is exact for n in [1/2, 2] (Sterbenz), so F0 keeps its digits where it vanishes.
+// Reflectance at normal incidence. n − 1 is exact for n in [1/2, 2] (Sterbenz), so F0 keeps its digits where it vanishes.
 float normal_reflectance(float n, float kappa) {
     float k2 = kappa * kappa;
     return ((n - 1.0) * (n - 1.0) + k2) / ((n + 1.0) * (n + 1.0) + k2);
@@ -49,11 +50,11 @@ FresnelSchlick fresnel_schlick(float cos_in, float n, float kappa) {
     return FresnelSchlick(F0, schlick(vec3(F0), 1.0, cos_in).x);
 }
 
-// g² = (n cosθ_t)² = c² + n² − 1 to 2^-32 of what cancels, for the price of a rewrite. With a and b the larger and the
-// smaller of c and n, and e = 1 − a (exact near the critical angle, where a > 1/√2): g² = b² − 2e + e². The squares of
-// the leading halves of b and e are exact, and where everything cancels their sum is too (Sterbenz).
-// Plain f32 was measured first: c² + (n − 1)(n + 1) missed total reflection in 3 of 2000 cases within a few ULP of
-// critical. Compensated: in double-float.
+// g² = (n cosθ_t)² = c² + n² − 1, to 2^-32 of the terms that cancel. Let a and b be the larger and the smaller of c and n,
+// and e = 1 − a (exact near the critical angle, where a > 1/√2). Then g² = b² − 2e + e². The squares of the leading halves
+// of b and e are exact, and where everything cancels their sum is exact too (Sterbenz).
+// Rejected after measurement: c² + (n − 1)(n + 1) in plain f32 missed total internal reflection in 3 of 2000 cases within a
+// few ULP of the critical angle. Compensated: in double-float.
 float refracted_square(float c, float n) {
     float sum;
     if (ARITHMETIC == COMPENSATED) {
@@ -71,7 +72,7 @@ float refracted_square(float c, float n) {
     return sum;
 }
 
-// c²(n² + 1) − 1, zero at Brewster's angle. For n < 1 by way of g² (numerics.md 4).
+// c²(n² + 1) − 1, zero at Brewster's angle. For n < 1 it is computed from g² (numerics.md 4).
 float brewster_term(float c, float n, float g2) {
     float term;
     if (ARITHMETIC == COMPENSATED) {
@@ -84,7 +85,8 @@ float brewster_term(float c, float n, float g2) {
     return term;
 }
 
-// T = 2cg(1/s² + n²/p²), s = c + g, p = n²c + g, of 1/s and 1/p: one sum, so that reflected and transmitted power are 1 to 2e-7.
+// T = 2cg(1/s² + n²/p²), s = c + g, p = n²c + g, from 1/s and 1/p: a single sum, so reflected and transmitted power add up
+// to 1 within 2e-7.
 float transmitted_part(float c, float g, float n, float by_s, float by_p) {
     return 2.0 * (c * g) * (by_s * by_s + n * by_p * (n * by_p));
 }
@@ -98,11 +100,11 @@ struct FresnelDielectric {
 };
 
 // @eq F3 F5 N2 N4: r_s = (c − g)/(c + g), r_p = (n²c − g)/(n²c + g), g = n cosθ_t = √(c² + n² − 1), F = (r_s² + r_p²)/2
-// Near n = 1 both differences cancel. Multiplied by their conjugates they are products:
+// Near n = 1 both differences suffer catastrophic cancellation. Multiplied by their conjugates they become products:
 //   r_s = −(n² − 1)/(c + g)²,   r_p = (n² − 1)(c²(n² + 1) − 1)/(n²c + g)².
-// Total internal reflection (g² ≤ 0, only for n < 1): F = r_s = r_p = 1, cosθ_t = 0. At c = 0, F = 1 for every n: the
-// limit for n ≠ 1. For n = 1 there is no boundary and g is c: its square leaves the range of floats below 1e-19, and
-// cosθ_t = 0, F = 1 came of that.
+// Total internal reflection (g² ≤ 0, only for n < 1): F = r_s = r_p = 1, cosθ_t = 0. At c = 0, F = 1 for every n: the limit
+// for n ≠ 1. For n = 1 there is no interface, and g is c itself: computed from g², which underflows for c below 1e-19, it
+// would give cosθ_t = 0 and F = 1.
 FresnelDielectric fresnel_dielectric(float cos_in, float n) {
     FresnelDielectric r = FresnelDielectric(1.0, 1.0, 1.0, 0.0, true);
     if (ARITHMETIC == FAST) {
@@ -121,16 +123,16 @@ FresnelDielectric fresnel_dielectric(float cos_in, float n) {
         if (index >= 1.0 || g2 > 0.0 && index > 0.0) {
             float g = index == 1.0 ? c : sqrt(max(g2, 0.0));
             float difference = (index - 1.0) * (index + 1.0);
-            // Two divisions in place of seven.
+            // Two divisions instead of seven.
             float by_s = 1.0 / (c + g);
             float by_p = 1.0 / (index * index * c + g);
-            // Below the normal range some operations flush the cosine to 0, others do not.
+            // Below the normal range some operations flush the cosine to 0 and others do not.
             bool grazes = c < SMALLEST_NORMAL;
             r.tir = false;
             r.cos_t = min(g / index, 1.0);
             r.rs = grazes ? -1.0 : -difference * by_s * by_s;
             r.rp = grazes ? -1.0 : (difference * by_p) * (brewster_term(c, index, g2) * by_p);
-            // 1 − T where little is transmitted: its error is that of T times T.
+            // 1 − T where little is transmitted: the error is T times the relative error of T.
             float T = index == 1.0 ? 1.0 : transmitted_part(c, g, index, by_s, by_p);
             r.F = grazes ? 1.0 : T < 0.5 ? 1.0 - T : min(0.5 * (r.rs * r.rs + r.rp * r.rp), 1.0);
         }
@@ -145,7 +147,7 @@ struct Transmitted {
 };
 
 // @eq F3 N3: T_s = 4cg/(c + g)², T_p = 4n²cg/(n²c + g)², T = (T_s + T_p)/2 = 1 − F
-// 1 − F loses every digit at grazing incidence, where F → 1. Pictures have 1 − F: what is lost there is 1e-7 of the light.
+// 1 − F loses every digit at grazing incidence, where F → 1. Pictures use 1 − F: the loss is 1e-7 of the light.
 // @lab fresnel_dielectric: reflected_and_transmitted_power_are_one
 Transmitted dielectric_transmitted(float cos_in, float n) {
     Transmitted t = Transmitted(0.0, 0.0, 0.0);
@@ -158,17 +160,17 @@ Transmitted dielectric_transmitted(float cos_in, float n) {
         float g2 = refracted_square(c, index);
         if (c >= SMALLEST_NORMAL && index > 0.0 && (g2 > 0.0 || index == 1.0)) {
             float g = index == 1.0 ? c : sqrt(g2);
-            // The same products as there, so that both are 1 together.
+            // The same products as in fresnel_dielectric, so that F and T add up to 1.
             float by_s = 1.0 / (c + g);
             float by_p = 1.0 / (index * index * c + g);
-            // 1 − r² where little is reflected: its error is that of r² times r².
+            // 1 − r² where little is reflected: the error is r² times the relative error of r².
             float difference = (index - 1.0) * (index + 1.0);
             float rs = difference * by_s * by_s;
             float rp = (difference * by_p) * (brewster_term(c, index, g2) * by_p);
             t.Ts = rs * rs < 0.5 ? 1.0 - rs * rs : 4.0 * (c * by_s) * (g * by_s);
             t.Tp = rp * rp < 0.5 ? 1.0 - rp * rp : 4.0 * (index * c * by_p) * (index * g * by_p);
             float F = 0.5 * (rs * rs + rp * rp);
-            // c g would leave the range of floats for cosines below 1e-31; a power of two rounds nothing.
+            // c g would underflow for cosines below 1e-31; a power of two rounds nothing.
             float up = c < 1e-20 ? 1.15292150e18 : 1.0;
             t.T = F < 0.5 ? 1.0 - F : transmitted_part(c * up, g, index, by_s, by_p) * (1.0 / up);
         }
@@ -177,7 +179,7 @@ Transmitted dielectric_transmitted(float cos_in, float n) {
 }
 
 // @eq F2 N47: F0 = ((n2 − n1)/(n2 + n1))²
-// Between two media of nearly one index: their quotient rounds the difference away, the indices themselves do not.
+// Between two media of nearly equal index: their quotient rounds the difference away, the indices themselves do not.
 // @out F0
 float nested_f0(float n1, float n2) {
     float r;
@@ -195,8 +197,8 @@ float abs2(vec2 z) {
     return dot(z, z);
 }
 
-// What both polarisations of a conductor need: m² = (n + iκ)², g = √(m² − sin²θ) = m cosθ_t, and the denominators
-// |c + g|² and |m²c + g|², summed from positive parts: |g|² = |g²| and Re(m² ḡ) = Re g (|g²| + sin²θ).
+// Terms that both polarisations of a conductor need: m² = (n + iκ)², g = √(m² − sin²θ) = m cosθ_t, and the denominators |c
+// + g|² and |m²c + g|². These are sums of positive parts: |g|² = |g²| and Re(m² ḡ) = Re g (|g²| + sin²θ).
 struct ConductorTerms {
     vec2 m2;
     vec2 g;
@@ -205,7 +207,7 @@ struct ConductorTerms {
     float p2;  // |m²c + g|²
 };
 
-// κ well above 0: nothing cancels in the reflectances as written.
+// κ is well above 0: nothing cancels in the textbook form of the reflectances.
 bool is_metallic(float n, float k) {
     return k > max(n, 0.5);
 }
@@ -221,8 +223,8 @@ ConductorTerms conductor_terms(float c, float n, float k) {
         real = t.m2.x - (1.0 - c) * (1.0 + c);
         if (FAINT_CONDUCTORS && !is_metallic(n, k)) real = refracted_square(c, n) - k * k;
     }
-    // The root with positive parts: the smaller part by division, not by the difference |g²| − |x|, which cancels.
-    // Squares are at most 4e36, n and κ at most 1e9.
+    // The root with positive parts. The smaller part is a quotient: the difference |g²| − |x| cancels. Squares are at most
+    // 4e36, n and κ at most 1e9.
     float size = sqrt(real * real + t.m2.y * t.m2.y);
     float larger = sqrt(0.5 * (size + abs(real)));
     float smaller = larger > 0.0 ? 0.5 * t.m2.y / larger : 0.0;
@@ -234,9 +236,8 @@ ConductorTerms conductor_terms(float c, float n, float k) {
     return t;
 }
 
-// m² − 1 and c²(m² + 1) − 1, each zero where a dielectric reflects nothing.
-// Summed in pairs in both careful tiers: in plain f32 R_p was off by nine times itself at Brewster's angle of a nearly
-// transparent conductor.
+// m² − 1 and c²(m² + 1) − 1, each zero where a dielectric reflects nothing. Double-float sums in both careful tiers: in
+// plain f32 R_p was off by nine times itself at Brewster's angle of a nearly transparent conductor.
 void conductor_differences(float c, float n, float k, float im_m2, out vec2 difference, out vec2 brewster) {
     DoubleFloat c2 = two_product(c, c);
     DoubleFloat re_m2 = df_add(two_product(n, n), df_negate(two_product(k, k)));
@@ -252,10 +253,10 @@ struct FresnelConductor {
 };
 
 // @eq F3 F8 N5 N6 N8: R_s = |c − g|²/|c + g|², R_p = |m²c − g|²/|m²c + g|², g = √(m² − sin²θ), m = n + iκ
-// For κ well above 0 as written. For κ → 0 the differences cancel as a dielectric's do, and the products
+// For κ well above 0 in textbook form. For κ → 0 the differences cancel as those of a dielectric do, and the products
 //   r_s = −(m² − 1)/(c + g)²,   r_p = (m² − 1)(c²(m² + 1) − 1)/(m²c + g)²
-// take over, divided twice so that no fourth power is formed. n = 1, κ = 0 is no boundary: 0, and 1 where the ray
-// grazes, as for a dielectric; the squares above leave the range of floats there from 1e-19 on.
+// replace them, divided twice so that no fourth power is formed. n = 1, κ = 0 is no interface: F = 0, and 1 at grazing
+// incidence, as for a dielectric. There the squares above underflow from 1e-19 on.
 FresnelConductor fresnel_conductor(float cos_in, float n, float kappa) {
     FresnelConductor r = FresnelConductor(1.0, 1.0, 1.0);
     if (ARITHMETIC == FAST) {
@@ -279,7 +280,7 @@ FresnelConductor fresnel_conductor(float cos_in, float n, float kappa) {
             r = FresnelConductor(0.0, 0.0, 0.0);
         } else if (c >= SMALLEST_NORMAL && t.s2 > 0.0 && t.p2 > 0.0) {
             if (!FAINT_CONDUCTORS || is_metallic(index, k)) {
-                // 1 − A where little is kept: its error is that of A times A.
+                // 1 − A where little is absorbed: the error is A times the relative error of A.
                 float As = 4.0 * c * t.g.x / t.s2;
                 float Ap = 4.0 * c * (t.mg / t.p2);
                 r.Rs = clamp(As < 0.5 ? 1.0 - As : abs2(vec2(c, 0.0) - t.g) / t.s2, 0.0, 1.0);
@@ -303,7 +304,7 @@ struct Absorbed {
 };
 
 // @eq F3 N7: A_s = 4c Re g/|c + g|², A_p = 4c Re(m² ḡ)/|m²c + g|², A = (A_s + A_p)/2 = 1 − F
-// What a metal keeps. 1 − F loses every digit at grazing incidence.
+// The absorbed part of the power. 1 − F loses every digit at grazing incidence.
 // @lab fresnel_conductor: reflected_and_transmitted_power_are_one
 Absorbed conductor_absorbed(float cos_in, float n, float kappa) {
     Absorbed r = Absorbed(0.0, 0.0, 0.0);
@@ -314,7 +315,7 @@ Absorbed conductor_absorbed(float cos_in, float n, float kappa) {
         float c = clamp(cos_in, 0.0, 1.0);
         ConductorTerms t = conductor_terms(c, clamp(n, 0.0, LARGEST_INDEX), clamp(kappa, 0.0, LARGEST_INDEX));
         if (c >= SMALLEST_NORMAL && t.s2 > 0.0 && t.p2 > 0.0) {
-            // 1 − R where little is reflected, as fresnel_conductor takes 1 − A where little is kept.
+            // 1 − R where little is reflected, as fresnel_conductor takes 1 − A where little is absorbed.
             float As = 4.0 * c * t.g.x / t.s2;
             float Ap = 4.0 * c * (t.mg / t.p2);
             r.As = clamp(As > 0.5 ? 1.0 - abs2(vec2(c, 0.0) - t.g) / t.s2 : As, 0.0, 1.0);

@@ -1,4 +1,5 @@
-// One vertex of a surface: object space to clip space, and what the fragments interpolate.
+// The vertex stage of rasterised surfaces: object space to clip space, and the interpolated attributes.
+// Assumes: positions relative to the eye in metres (rel space); reversed depth in clip space.
 #include "lib/gbuffer_interface.glsl"
 #include "lib/instances.glsl"
 #include "lib/view.glsl"
@@ -10,14 +11,14 @@ layout(location = 3) in vec2 uv0;
 layout(location = 4) in vec2 uv1;
 layout(location = 5) in vec4 color;
 
-// The same in all variants of the program: meshes of different materials share edges.
+// `invariant`: meshes of different materials, drawn by different variants of the program, share edges.
 invariant gl_Position;
 layout(location = 0) out vec3 p_rel;
 layout(location = 1) out vec3 n_rel;
 layout(location = 2) out vec4 t_rel;
 layout(location = 3) out vec4 uv;
 layout(location = 4) out vec4 vertex_color;
-layout(location = 5) flat out uvec3 ids; // instance, material, first triangle of the instance or, where vertices are not shared, the triangle
+layout(location = 5) flat out uvec3 ids; // instance, material, first triangle of the instance (vertices not shared: the triangle)
 
 void main() {
     Instance instance = instances[gl_InstanceIndex];

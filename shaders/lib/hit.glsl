@@ -1,4 +1,6 @@
-// What lies where a ray hits: the surface, from the same vertices and textures that the G-buffer is drawn with.
+// Surfaces at ray hits, from the same vertices and textures that the G-buffer is drawn with.
+// Where to read: pbrt 4, section 10.4 (image textures); glTF 2.0, section 3.9. Assumes: bvh space (share/trace.glsl),
+// metres; world axes.
 #ifndef HIT_GLSL
 #define HIT_GLSL
 #include "lib/bent_normal.glsl"
@@ -7,14 +9,14 @@
 #include "lib/trace.glsl"
 #include "share/corners.glsl"
 
-// Bit by slot: some material that rays may hit has such a texture.
+// Bit by slot: some material that rays may hit has a texture in it.
 layout(constant) const uint HIT_TEXTURES = 0;
-layout(constant) const bool HIT_COLORS = false;     // some mesh has colours
-layout(constant) const bool HIT_SECOND_UVS = false; // some texture reads the second coordinates
+layout(constant) const bool HIT_COLORS = false;     // some mesh has vertex colours
+layout(constant) const bool HIT_SECOND_UVS = false; // some texture reads the second texture coordinates
 const bool HIT_UVS = HIT_TEXTURES != 0;
 const bool HIT_TANGENTS = (HIT_TEXTURES & (1u << SLOT_NORMAL | 1u << SLOT_CLEARCOAT_NORMAL)) != 0;
 
-// In the order of the leaves.
+// In the order of the BVH's leaves.
 layout(scene, rgba32ui) readonly uniform uimageBuffer hit_corners;
 // @texels Corners.frame corner_frame(hit_corners)
 // @texels Corners.uvs corner_uvs(hit_corners)
@@ -22,14 +24,14 @@ layout(scene, rgba32ui) readonly uniform uimageBuffer hit_corners;
 // @texels Corners.tangents corner_tangents(hit_corners)
 // @texels Corners.colors corner_colors(hit_corners)
 
-// All levels of all images, RGBA in bytes. A texel buffer can be read at any place by any lane, where sampled images cannot be chosen
-// by an index; lavapipe binds 128 MiB of a storage buffer at most, and 512 MiB of these.
+// All mip levels of all images, RGBA in bytes. Any lane can read any texel of a texel buffer, while sampled images cannot
+// be indexed per lane. lavapipe binds at most 128 MiB of a storage buffer, and 512 MiB of a texel buffer.
 layout(scene, r32ui) readonly uniform uimageBuffer texels;
 
-const int MOST_LEVELS = 15; // above the first, of a picture of 32768 texels
+const int MOST_LEVELS = 15; // above level 0, for an image of 32768 texels
 const uint TEXELS_SRGB = 1;
 const uint TEXELS_NEAREST = 2;
-// Bits 2 and 3, 4 and 5: wrap of u and v: 0 repeat, 1 mirror, 2 clamp.
+// Wrap modes, u in bits 2 and 3, v in bits 4 and 5: 0 repeat, 1 mirrored repeat, 2 clamp to edge.
 
 int wrapped(int i, int size, uint mode) {
     int period = mode == 1 ? 2 * size : size;
@@ -45,8 +47,7 @@ vec4 texel_at(uint first, ivec2 size, ivec2 at, uint flags) {
     return (flags & TEXELS_SRGB) != 0 ? vec4(linear_from_srgb(value.rgb), value.a) : value;
 }
 
-// A texture of a material at coordinates uv, at the level whose texels are `footprint` wide in units of the
-// coordinates: bilinear in it.
+// A texture of a material at uv, bilinear within one mip level: the one whose texels are `footprint` wide in units of uv.
 vec4 hit_texture(uint material, uint slot, vec4 uv_sets, float footprint) {
     TextureSlot at_slot = texture_slot(material, slot);
     uvec4 place = material_words(material, at_slot.first);
@@ -54,13 +55,13 @@ vec4 hit_texture(uint material, uint slot, vec4 uv_sets, float footprint) {
     ivec2 size = ivec2(place.y & 0xffffu, place.y >> 16);
     uint levels = place.z & 0xffu;
     uint flags = place.z >> 8;
-    // The coordinate's transform may scale; its determinant is its area.
+    // The texture transform may scale; its determinant is the scale of areas.
     float stretch = sqrt(abs(at_slot.u_row.x * at_slot.v_row.y - at_slot.u_row.y * at_slot.v_row.x));
     float across = footprint * stretch * float(max(size.x, size.y));
     int level = clamp(int(floor(log2(max(across, 1.0)) + 0.5)), 0, int(levels) - 1);
     uint first = place.x;
-    // Sizes of the levels above: their sum has no closed form where sides are odd.
-    // As many turns for every lane: where the level ended the loop, lavapipe read other texels in whole groups of lanes.
+    // Start of the level: the sum of the sizes of the finer levels, which has no closed form for odd sizes. The loop count
+    // is the same for every lane: when the level ended the loop, lavapipe read wrong texels for whole groups of lanes.
     for (int i = 0; i < MOST_LEVELS; i++) {
         bool above = i < level;
         first += above ? uint(size.x * size.y) : 0u;
@@ -68,7 +69,7 @@ vec4 hit_texture(uint material, uint slot, vec4 uv_sets, float footprint) {
     }
     bool nearest = (flags & TEXELS_NEAREST) != 0;
     vec2 at = uv * vec2(size) - (nearest ? 0.0 : 0.5);
-    // Far coordinates have no fraction left: keep the integers in range.
+    // Very large coordinates have no fraction left; this keeps the integers in range.
     at = clamp(at, -1e9, 1e9);
     ivec2 corner = ivec2(floor(at));
     vec2 share = nearest ? vec2(0.0) : at - floor(at);
@@ -86,7 +87,7 @@ vec4 hit_texture_or(uint material, uint slot, vec4 uv_sets, float footprint, vec
     return has_hit_texture(material, slot) ? hit_texture(material, slot, uv_sets, footprint) : otherwise;
 }
 
-// The point and the frame of a hit.
+// Position, frame and attributes of a hit.
 struct HitPoint {
     vec3 p;         // bvh space
     vec3 n;         // unit normal of the triangle, on the side of its front
@@ -94,14 +95,14 @@ struct HitPoint {
     vec4 t_smooth;  // interpolated tangent and its handedness
     vec4 uvs;
     vec4 color;
-    float uv_per_metre; // how dense texture coordinates are
-    float scale;    // how long a metre of the object is in the world
-    bool sheet;     // transmits light and encloses nothing
+    float uv_per_metre; // density of texture coordinates
+    float scale;    // length in the world of one metre of the object
+    bool sheet;     // thin-walled: transmits light and encloses no medium
     uint material;
-    uint face;      // flat face of the triangle
+    uint face;      // coplanar group of the triangle
 };
 
-// Its material | ..._TRIANGLE.
+// Material | ..._TRIANGLE flags.
 uint hit_material(uint triangle) {
     return corner_frame(triangle).material;
 }
@@ -111,7 +112,7 @@ uint hit_class(uint triangle) {
     return triangle_at(triangle).stops;
 }
 
-// Across a triangle, on the side of its front, as long as twice its area.
+// Normal of a triangle on the side of its front; its length is twice the area.
 vec3 hit_normal(uint triangle) {
     BvhTriangle t = triangle_at(triangle);
     return doubled_area(t.b - t.a, t.c - t.a);
@@ -154,22 +155,21 @@ HitPoint hit_point_of(Hit hit, vec3 origin, vec3 direction) {
     r.color = vec4(1.0);
     if (HIT_COLORS) {
         CornerColors color = corner_colors(hit.triangle);
-        // White stays white to the last bit: the weights' sum need not be 1.
+        // White stays white to the last bit: the sum of the weights need not be 1.
         vec4 first = four_halves(color.a);
         r.color = first + (four_halves(color.b) - first) * w.y + (four_halves(color.c) - first) * w.z;
     }
     return r;
 }
 
-// How much of the surface there is where its texel and colour have this alpha: 0 in the holes of a mask, coverage where
-// it is blended, else 1.
+// Coverage of a surface with this alpha: 0 where an alpha-tested surface is cut out, alpha where it is blended, else 1.
 float coverage_of(Material m, float texel_alpha) {
     float alpha = texel_alpha * m.base_color.a;
     bool blended = (m.flags & MATERIAL_BLENDED) != 0;
     return blended ? clamp(alpha, 0.0, 1.0) : m.alpha_cutoff > 0.0 && alpha < m.alpha_cutoff ? 0.0 : 1.0;
 }
 
-// Whether there is no surface: in the holes of masks. What blends is there, however little of it.
+// The alpha test: whether the hit is in a hole of a masked surface. A blended surface is hit however small its alpha.
 bool hit_is_hole(HitPoint point) {
     Material m = material_at(point.material);
     vec4 texel = hit_texture_or(point.material, SLOT_BASE, point.uvs, 0.0, vec4(1.0));
@@ -181,11 +181,11 @@ struct HitSurface {
     vec3 n;          // of the triangle, on the viewer's side
     bool front;
     float coverage;
-    float transmits; // share of what enters its dielectric part that goes through
-    float thickness; // texel, times how long a metre of the object is in the world
-    bool sheet;      // transmits light and encloses nothing
+    float transmits; // fraction of the light entering the dielectric part that is transmitted
+    float thickness; // thickness texel, times the length in the world of one metre of the object
+    bool sheet;      // thin-walled: transmits light and encloses no medium
     uint material;
-    // Of its material.
+    // Copied from the material.
     float transmission;
     uint medium;
     vec3 sigma_thickness;
@@ -193,7 +193,7 @@ struct HitSurface {
 
 #define TEXEL(page, slot) hit_texture_or(id, slot, point.uvs, footprint, vec4(1.0))
 
-// The surface as seen along `direction`, by a ray that is as wide as `width` there.
+// The surface seen along `direction` by a ray (cone) of diameter `width` at the hit.
 HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
     HitSurface r;
     uint id = point.material;

@@ -1,4 +1,4 @@
-// Instances relative to the eye.
+// Instances of meshes, with transforms to rel space (relative to the eye).
 #ifndef INSTANCES_GLSL
 #define INSTANCES_GLSL
 #include "share/scene.glsl"

@@ -1,13 +1,16 @@
-// The material model: what the layers of a surface do with light. From the top: a clear coat; sheen; the base, which is the boundary of a
-// dielectric, a metal, or a mixture of both; below the boundary a diffuse ground, or what lets light through
-// (glTF 2.0 appendix B; KHR_materials_clearcoat, sheen, specular, ior, transmission).
+// The layered material model: the lobes of a BSDF from the clear coat down to the diffuse base layer.
+// The layers from the top: a clear coat; sheen; the base, which is a dielectric interface, a conductor, or a mixture of
+// both; below the dielectric interface a diffuse base layer, or transmission (glTF 2.0 appendix B; KHR_materials_clearcoat,
+// sheen, specular, ior, transmission).
 //
-// Each layer is written once: its Fresnel reflectance, its lobe towards a direction (evaluate), a direction of its lobe (sample), its
-// directional albedo for light from all around. A layer leaves to those below what it does not reflect:
-//   1 − F(V·H) by the half vector, for lobes of single scattering;
-//   1 − its albedo at the viewer's angle for `ggx-multi`, so that no surface sends more than it receives;
-//   1 − F(N·V) for a lobe of one direction.
-// Where to read: Pharr, Jakob and Humphreys, PBRT 4, chapter 9; Walter et al. 2007; Heitz 2014 and 2018; Turquin 2019.
+// Each layer has its Fresnel reflectance, its lobe towards a direction (evaluate), a sampled direction of its lobe
+// (sample), and its directional albedo in a uniform environment. A layer leaves to the layers below it the energy that it
+// does not reflect:
+//   1 − F(V·H) at the half vector, for lobes of single scattering;
+//   1 − its directional albedo at the viewer's angle for `ggx-multi`, so that no surface sends more than it receives;
+//   1 − F(N·V) for a specular (delta) lobe.
+// Rough lobes are sampled by the VNDF (distribution of visible normals). Where to read: pbrt 4, chapter 9; Walter et al.
+// 2007; Heitz 2014 and 2018; Turquin 2019. Assumes: unit vectors in world axes, on the viewer's side; α = roughness².
 #ifndef LAYERS_GLSL
 #define LAYERS_GLSL
 #include "lib/brdf.glsl"
@@ -16,13 +19,14 @@
 #include "lib/snell.glsl"
 #include "lib/surface.glsl"
 
-layout(constant) const bool TRANSMISSIVE = false; // some material lets light through
+layout(constant) const bool TRANSMISSIVE = false; // some material transmits light
 
 // --------------------------------------------------------------------------------------------------------------------
 // Fresnel reflectance of each layer
 
-// Reflectance of the boundary from n1 to n2 as its share between that at normal and that at grazing incidence: 1 where the
-// reflection is total, 0 where the indices are equal: Schlick's curve rises at grazing incidence whatever they are.
+// Fresnel reflectance of the interface from n1 to n2, as its position between the values at normal and at grazing
+// incidence. 1 for total internal reflection; 0 for equal indices, where Schlick's curve would rise at grazing incidence
+// all the same.
 float boundary_share(float cos_in, float n1, float n2) {
     if (n1 == n2) return 0.0;
     if (FRESNEL == FRESNEL_EXACT) {
@@ -34,7 +38,8 @@ float boundary_share(float cos_in, float n1, float n2) {
     return n1 > n2 && sin2 >= 1.0 ? 1.0 : schlick_weight(cos_thin);
 }
 
-// Of the dielectric part. F0 may be tinted by KHR_materials_specular, so the exact curve is carried over as its share between F0 and 1.
+// Fresnel reflectance of the dielectric part. KHR_materials_specular may tint F0, so the exact curve is mapped to the range
+// from F0 to F90.
 vec3 fresnel_of_dielectric(Surface s, float cos_in) {
     if (FRESNEL == FRESNEL_SCHLICK) return schlick(s.f0_dielectric, s.f90_dielectric, cos_in);
     float r0 = nested_f0(s.n_outside, s.ior);
@@ -43,8 +48,8 @@ vec3 fresnel_of_dielectric(Surface s, float cos_in) {
     return s.f0_dielectric + (vec3(s.f90_dielectric) - s.f0_dielectric) * share;
 }
 
-// Of the metallic part. Metals given by a colour alone have no n and κ: Schlick on every rung. Of those that have them the colour is
-// F0, and what a texture does to it tints the exact curve.
+// Fresnel reflectance of the metallic part. Metals given by a colour have no n and κ: Schlick on every rung. For metals
+// with n and κ the colour is F0, and a texture's factor tints the exact curve.
 vec3 fresnel_of_metal(Surface s, float cos_in) {
     vec3 f = schlick(s.f0_metal, 1.0, cos_in);
     if (CONDUCTORS && FRESNEL == FRESNEL_EXACT) {
@@ -57,12 +62,13 @@ vec3 fresnel_of_metal(Surface s, float cos_in) {
     return f;
 }
 
-// Of the clear coat, a layer of COAT_INDEX. Schlick's curve keeps its F0 (KHR_materials_clearcoat) in every medium.
+// Fresnel reflectance of the clear coat, of index COAT_INDEX. Schlick's curve keeps its F0 (KHR_materials_clearcoat) in
+// every medium.
 float fresnel_of_coat(Surface s, float cos_in) {
     float f;
     if (FRESNEL == FRESNEL_EXACT) {
-        // In air from constants: drivers round what they know in another way, and both plans of a scene have to agree (from a selected
-        // index 6 pixels of ClearCoatTest do not).
+        // In air from constants: drivers round constant expressions differently, and both plans of a scene have to agree
+        // (with a selected index 6 pixels of ClearCoatTest do not).
         bool in_air = s.n_outside == 1.0;
         f = in_air ? fresnel_dielectric(cos_in, COAT_INDEX).F : fresnel_dielectric(cos_in, COAT_INDEX / s.n_outside).F;
     } else {
@@ -71,31 +77,31 @@ float fresnel_of_coat(Surface s, float cos_in) {
     return s.clearcoat * f;
 }
 
-// What the clear coat lets through to the eye.
+// Energy left under the clear coat, at the viewer's angle.
 float under_coat(Surface s) {
     return 1.0 - fresnel_of_coat(s, clamp(dot(s.n_coat, s.v), 0.0, 1.0));
 }
 
 // --------------------------------------------------------------------------------------------------------------------
-// Directional albedo of each layer: what it sends to the eye of light that is the same from all around
+// Directional albedo of each layer: the fraction of a uniform environment's radiance that it sends to the eye
 
-// Cosine at which Schlick's curve has the weight that the table has of a lobe: the exact curve at that angle stands for its mean over
-// the lobe, and is the exact curve itself where the lobe is narrow.
+// The cosine at which Schlick's weight equals the table's weight of a lobe. The exact curve at that angle stands for its
+// mean over the lobe; for a narrow lobe it is the exact curve itself.
 float mean_cosine(vec2 ab) {
     return 1.0 - pow(clamp(ab.y / max(ab.x + ab.y, 1e-6), 0.0, 1.0), 0.2);
 }
 
-// What the lobes of extensions over the base leave to it, at the viewer's angle.
+// Energy left to the base under the lobes of extensions, at the viewer's angle.
 float left_to_base(Surface s) {
     return SHEEN ? left_by_sheen(s, max(cosine(s.n, s.v), 1e-4)) : 1.0;
 }
 
 struct BaseAlbedo {
     vec3 dielectric; // of the dielectric part alone
-    vec3 base;       // of the mixture, under the lobes of extensions
+    vec3 base;       // of the mixture with the metallic part, under the lobes of extensions
 };
 
-// `ab` is the table's texel of the base.
+// `ab` is the table's texel for the base.
 BaseAlbedo albedo_of_base(Surface s, vec2 ab) {
     vec3 dielectric = s.f0_dielectric * ab.x + s.f90_dielectric * ab.y;
     vec3 base = s.f0 * ab.x + s.f90 * ab.y;
@@ -114,17 +120,17 @@ float albedo_of_coat(Surface s) {
     return s.clearcoat * (COAT_F0 * ab.x + ab.y);
 }
 
-// The table's texel of a surface's base.
+// The table's texel for the base of a surface.
 vec2 lobe_reflectance(Surface s) {
     return reflectance_of_lobe(dot(s.n, s.v), s.roughness);
 }
 
-// What the base leaves to the diffuse ground of light from all around.
+// Energy left to the diffuse base layer under the base's lobe, in a uniform environment.
 float ground_share(BaseAlbedo albedo) {
     return 1.0 - min(largest(albedo.dielectric), 1.0);
 }
 
-// What the diffuse ground, and the lobes over the base that send light in all directions, make of irradiance from all around.
+// Radiance that the diffuse base layer and the lobes of extensions (sheen) send for irradiance from a uniform environment.
 vec3 scattered_radiance(Surface s, BaseAlbedo albedo, vec3 irradiance) {
     vec3 scattered = s.diffuse * diffuse_brdf(ground_share(albedo));
     if (SHEEN) {
@@ -134,7 +140,7 @@ vec3 scattered_radiance(Surface s, BaseAlbedo albedo, vec3 irradiance) {
     return scattered * irradiance;
 }
 
-// Makes up for what single scattering loses, where the knob `brdf` says so.
+// Energy compensation for single scattering, where the knob `brdf` is `ggx-multi`.
 void compensate(inout Surface s) {
     if (BRDF == BRDF_GGX_MULTI) {
         vec2 ab = lobe_reflectance(s);
@@ -146,27 +152,28 @@ void compensate(inout Surface s) {
 // The layers together
 
 struct Layers {
-    Surface s;         // compensated; its diffuse albedo without what goes through
-    float cos_v;       // of the shading normal and the viewer, at least 1e-4
-    bool between;      // seen by a ray that knows its media, which the next three tell of
-    bool solid;        // the surface of a transparent body
-    float n1;          // index of the medium before
-    float n2;          // and behind, or of the dielectric part
-    bool sheet;        // lets light through and encloses nothing
-    bool delta;        // the base reflects and refracts into one direction each
+    Surface s;         // compensated; its diffuse albedo excludes what is transmitted
+    float cos_v;       // cosine between shading normal and viewer, at least 1e-4
+    bool between;      // the media on both sides are known, as for a ray: solid, n1 and n2 hold
+    bool solid;        // interface of a closed dielectric mesh
+    float n1;          // index of the medium on the viewer's side
+    float n2;          // index behind the interface, or of the dielectric part
+    bool sheet;        // thin-walled: transmits light and encloses no medium
+    bool delta;        // the base reflects and refracts as a specular (delta) lobe
     bool coat_delta;
-    vec3 f_dielectric; // reflectance at the viewer's angle: of the dielectric part …
-    vec3 f_base;       // … and of the mixture
-    bool total;        // nothing passes at that angle
-    float enters;      // what the base leaves to what lies below it, by the viewer's angle alone
-    float under;       // what the coat leaves
-    float left;        // and the lobes of extensions, to the base
-    vec3 tint;         // of what goes through
-    float transmits;   // share of what enters that goes through
-    vec4 shares;       // probabilities of coat, base, diffuse ground, through where paths choose; their sum is 1, or 0
+    vec3 f_dielectric; // Fresnel reflectance at the viewer's angle: of the dielectric part …
+    vec3 f_base;       // … and of its mixture with the metallic part
+    bool total;        // total internal reflection at that angle
+    float enters;      // energy left under the base, by the viewer's angle alone
+    float under;       // energy left under the clear coat
+    float left;        // energy left to the base under the lobes of extensions
+    vec3 tint;         // colour of transmitted light
+    float transmits;   // fraction of the entering light that is transmitted
+    vec4 shares;       // selection probabilities of coat, base, diffuse base layer, transmission for paths; their sum is 1, or 0
 };
 
-// Reflectance of the dielectric part by an angle. What tints it in air tints it between two media. `total`: nothing passes.
+// Fresnel reflectance of the dielectric part at an angle. A tint of F0 in air applies between two media too. `total`: total
+// internal reflection.
 vec3 fresnel_below_coat(Layers b, float cos_in, out bool total) {
     Surface s = b.s;
     total = false;
@@ -178,8 +185,8 @@ vec3 fresnel_below_coat(Layers b, float cos_in, out bool total) {
     return total ? vec3(1.0) : f0 + (vec3(s.f90_dielectric) - f0) * share;
 }
 
-// The layers of a surface whose base is a lobe, whatever its roughness, and which lets nothing through: for light from points and
-// from the prefiltered environment.
+// The layers of an opaque surface whose base is a rough lobe for every roughness: for lighting by punctual lights and by
+// the prefiltered environment.
 Layers layers_of(Surface s) {
     Layers b;
     b.s = s;
@@ -203,13 +210,13 @@ Layers layers_of(Surface s) {
     return b;
 }
 
-// What is sent in all directions, of light from all around.
+// Albedo of the diffuse base layer and of sheen, in a uniform environment.
 float scattered_share(Layers b) {
     float ground = mean(b.s.diffuse) * b.enters * b.left;
     return SHEEN ? ground + mean(b.s.sheen.rgb) * sheen_albedo(b.s, b.cos_v).x : ground;
 }
 
-// What goes straight through a surface that bends nothing.
+// Transmittance of a surface that does not deflect light.
 vec3 straight_transmittance(Layers b) {
     return b.tint * (b.transmits * (1.0 - largest(b.f_dielectric)) * b.under * b.left);
 }
@@ -218,36 +225,38 @@ vec3 straight_transmittance(Layers b) {
 // Evaluate
 
 struct BsdfEval {
-    vec3 f_cos; // BSDF times |cosθ|, of all lobes that are wider than one direction
-    float pdf;  // with which they are drawn, per solid angle
+    vec3 f_cos; // BSDF times |cosθ|, of all lobes but the delta ones
+    float pdf;  // density with which these lobes are sampled, per solid angle
 };
 
-// For light from the unit direction l on the viewer's side (lecture B2): what irradiance perpendicular to l becomes.
+// For light from the unit direction l on the viewer's side (lecture B2): radiance sent to the viewer per irradiance
+// perpendicular to l.
 BsdfEval evaluate_reflection(Layers b, vec3 l) {
     Surface s = b.s;
     BsdfEval r = BsdfEval(vec3(0.0), 0.0);
     float cos_l = cosine(s.n, l);
     const bool phong = BRDF == BRDF_BLINN_PHONG || BRDF == BRDF_BLINN_PHONG_RECIPROCAL;
-    // Self-shadow (lecture B9).
+    // Self-shadowing (lecture B9).
     if (cos_l > 0.0) {
         float enters = b.enters;
-        vec3 lobe = vec3(0.0);       // of the BRDF
-        vec3 lobe_alone = vec3(0.0); // and what is not multiplied by cosθ_l
+        vec3 lobe = vec3(0.0);       // the part of the BRDF that is multiplied by cosθ_l
+        vec3 lobe_alone = vec3(0.0); // the part that is not
         if (!b.delta) {
             HalfAngle h = phong ? phong_half_angle(s.n, l, s.v) : half_angle(s.n, l, s.v);
             if (phong) {
-                // k_s such that the lobe of B6 reflects F0 of the light at normal incidence in the limit of a narrow lobe: 0.31 F0
-                // for a shine of 0, 0.41 for 1, 0.81 for 10, 0.98 for 100 (numerics.md S13).
+                // k_s makes the albedo of B6's lobe at normal incidence F0 in the limit of a narrow lobe only (shininess →
+                // ∞). It is 0.31 F0 for a shininess of 0, 0.41 F0 for 1, 0.81 F0 for 10 and 0.98 F0 for 100 (numerics.md
+                // S13).
                 float shine = shine_from_alpha(s.alpha);
                 vec3 ks = s.f0 * ((shine + 2.0) * 0.5 * INV_PI);
                 float cosine_power = phong_lobe(h, shine);
-                // The bound of B6, k_d π + k_s 2π/(shine + 2) ≤ 1; B5 has none.
+                // The bound of B6, k_d π + k_s 2π/(shine + 2) ≤ 1; B5 has no bound.
                 enters = BRDF == BRDF_BLINN_PHONG ? 1.0 : 1.0 - largest(s.f0_dielectric);
                 if (BRDF == BRDF_BLINN_PHONG) lobe_alone = ks * (cosine_power * 0.25);
                 else lobe = ks * reciprocal_lobe(h, cosine_power);
             } else {
-                // What the dielectric's surface reflects does not reach the ground below; its largest component, so that a
-                // tinted F0 gives no complementary colour (KHR_materials_specular).
+                // Light reflected at the dielectric interface does not reach the diffuse base layer. The largest component
+                // counts, so that a tinted F0 gives no complementary colour (KHR_materials_specular).
                 bool total;
                 vec3 f_dielectric = fresnel_below_coat(b, h.cos_d, total);
                 vec3 f = mix(f_dielectric, fresnel_of_metal(s, h.cos_d), s.metallic);
@@ -259,7 +268,7 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
         }
         r.f_cos = (s.diffuse * diffuse_brdf(enters) + lobe) * cos_l;
         if (BRDF == BRDF_BLINN_PHONG) r.f_cos += lobe_alone;
-        // Of light from l to the eye sheen leaves the lesser of what it leaves of either (KHR_materials_sheen).
+        // For light from l to the eye, sheen leaves the smaller of its values for both directions (KHR_materials_sheen).
         if (SHEEN) r.f_cos = r.f_cos * min(b.left, left_by_sheen(s, cos_l)) + sheen_lobe(s, l, cos_l, b.cos_v);
         r.pdf += b.shares.z * cos_l * INV_PI;
     }
@@ -273,7 +282,7 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
             float coat_v = max(cosine(s.n_coat, s.v), 1e-4);
             float d = ggx_distribution(h.cos_h, h.sin2_h, s.clearcoat_alpha);
             float vis = ggx_visibility(coat_l, coat_v, s.clearcoat_alpha);
-            // Selected, not multiplied by 0: the textbook form of `vis` is no number at the horizon.
+            // Selected, not multiplied by 0: the textbook form of `vis` is NaN at the horizon.
             float lobe = coat_l > 0.0 ? d * vis * coat_l : 0.0;
             r.f_cos = r.f_cos * (BRDF == BRDF_GGX_MULTI ? b.under : 1.0 - f) + f * lobe;
             r.pdf += coat_l > 0.0 ? b.shares.x * mirrored_pdf(coat_v, h, s.clearcoat_alpha) : 0.0;
@@ -282,9 +291,10 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
     return r;
 }
 
-// For light from behind a rough surface. A sheet scatters as its mirror image does, to the other side. Between two media the half
-// vector that bends v into l is along n₁v + n₂l, and dω_h = n₂² |l·h| / (n₁ v·h + n₂ l·h)² dω_l (Walter et al. 2007); radiance is divided
-// by the square of the index here, so that n₂² falls out of the BSDF alone.
+// For light from behind a rough surface: the rough BTDF (Walter et al. 2007). A thin-walled surface scatters as its mirror
+// image does, to the other side. Between two media the half vector that refracts v into l is along n₁v + n₂l, and dω_h =
+// n₂² |l·h| / (n₁ v·h + n₂ l·h)² dω_l. Radiance is divided by the square of the index here, so the BSDF has no factor
+// n₁²/n₂²: BSDF times |cosθ| is transmittance times density.
 BsdfEval evaluate_transmission(Layers b, vec3 l) {
     Surface s = b.s;
     float cos_l = dot(s.n, l);
@@ -310,25 +320,25 @@ BsdfEval evaluate_transmission(Layers b, vec3 l) {
 
 struct LobeSample {
     vec3 direction;
-    vec3 weight;   // BSDF times |cosθ| over density, of this lobe alone and without the coat above it; 0: nothing goes there
-    bool straight; // nothing has bent it
+    vec3 weight;   // BSDF times |cosθ| over density, of this lobe without the coat above it; 0: no light
+    bool straight; // the direction is not deflected
 };
 
-// What masking and shadowing leave of r, mirrored at a half vector drawn for the viewer: nothing below the surface or its triangle.
+// Smith's G₂/G₁ for r, reflected at a half vector of the VNDF; 0 below the surface or its triangle.
 float unshadowed(vec3 n, vec3 v, vec3 r, vec3 n_triangle, float alpha) {
     float cos_r = dot(r, n);
     return dot(r, n_triangle) > 0.0 && cos_r > 0.0 ? smith_g2_over_g1(dot(n, v), cos_r, alpha) : 0.0;
 }
 
-// The half vector of an event: of the coat's lobe, or of the base's.
+// The half vector of an event, sampled from the VNDF of the coat's or of the base's lobe; the normal for a delta lobe.
 vec3 event_half_vector(Layers b, bool coat, vec2 u) {
     vec3 n = coat ? b.s.n_coat : b.s.n;
     bool delta = coat ? b.coat_delta : b.delta;
     return ROUGH && !delta ? half_vector(n, b.s.v, coat ? b.s.clearcoat_alpha : b.s.alpha, u) : n;
 }
 
-// Where what goes through leaves, r being the mirrored direction. Equal indices bend nothing, not even by a rounding. A sheet scatters as
-// its mirror image does, to the other side. `tir`: nothing does.
+// Direction of transmitted light; r is the reflected direction. Equal indices refract nothing, not even by a rounding. A
+// thin-walled surface scatters as its mirror image does, to the other side. `tir`: total internal reflection.
 vec3 through_direction(Layers b, vec3 h, vec3 r, out bool tir) {
     Surface s = b.s;
     vec3 direction = -s.v;
@@ -341,7 +351,7 @@ vec3 through_direction(Layers b, vec3 h, vec3 r, out bool tir) {
     return rough ? through : -on_side(-through, s.n_triangle);
 }
 
-// Whether nothing bends what goes through.
+// Whether transmitted light is not deflected.
 bool passes_straight(Layers b) {
     return !(ROUGH && !b.delta) && (b.sheet || b.n1 == b.n2);
 }
@@ -354,11 +364,11 @@ LobeSample sample_coat(Layers b, vec3 h) {
     return LobeSample(b.coat_delta ? on_side(r, s.n_triangle) : r, vec3(f * masking), false);
 }
 
-// Reflectance at a facet.
+// Fresnel reflectance at a microfacet.
 struct FacetFresnel {
     vec3 dielectric;
-    vec3 base;  // of the mixture
-    bool total; // nothing passes
+    vec3 base;  // of the mixture with the metallic part
+    bool total; // total internal reflection
 };
 
 FacetFresnel fresnel_at_facet(Layers b, vec3 h) {

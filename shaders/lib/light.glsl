@@ -1,13 +1,16 @@
-// Light that arrives at a surface (lecture R2–R4; KHR_lights_punctual) and the solid angles that lights fill. N is a
-// unit vector as 32 bits hold it. A zero vector is at a right angle to everything: no light.
+// Punctual lights, analytic area lights and solid angles: irradiance at a surface and sampling densities (lecture R2–R4).
+// Where to read: KHR_lights_punctual; pbrt 4, sections 4.2 (solid angle, densities) and 12.2 (point lights); RTR 4, section
+// 5.2. Twins: crates/optics/src/.
+// Assumes: metres, radiant intensity I, N a unit vector rounded to f32. A zero vector counts as perpendicular to
+// everything: no light.
 #ifndef LIGHT_GLSL
 #define LIGHT_GLSL
 #include "lib/arithmetic.glsl"
 #include "lib/constants.glsl"
 #include "lib/frame.glsl"
 
-// The renderer's rule for r → 0 (numerics.md 32): a point light is never nearer than this, in metres, so that
-// irradiance stays finite. It is part of point_falloff, not of light_point, which is I/r² and says +∞.
+// The renderer's limit for r → 0 (numerics.md 32), in metres: a point light is never nearer, so irradiance stays finite.
+// point_falloff has this limit; light_point does not: it is I/r² and returns +∞.
 const float LIGHT_RADIUS = 1e-12;
 
 struct LightDirectional {
@@ -16,7 +19,7 @@ struct LightDirectional {
 };
 
 // @eq R3 N14 N25: E cos⁺θ, cosθ = N·L/|L|; E is the irradiance perpendicular to L
-// L of any length from 1e-37 to 1e38: scaled by a power of two before it is squared.
+// L may have any length from 1e-37 to 1e38: it is scaled by a power of two before it is squared.
 // @lab arriving_light: lights_of_the_lecture_are_those_that_light_pictures
 LightDirectional light_directional(vec3 N, vec3 L, float E) {
     float cos_plus;
@@ -29,7 +32,7 @@ LightDirectional light_directional(vec3 N, vec3 L, float E) {
     return LightDirectional(cos_plus, E * cos_plus);
 }
 
-// I f²/r2, with f a power of two: in the order in which nothing leaves the range of floats unless the result does.
+// I f²/r2, with f a power of two, in an order in which no intermediate leaves the range of floats unless the result does.
 float over_square(float I, float r2, float f) {
     return abs(I) < 1.0 ? I * f / r2 * f : I / r2 * f * f;
 }
@@ -42,8 +45,8 @@ struct LightPoint {
 };
 
 // @eq R4 N32 N33: E_⊥ = I/r², E = E_⊥ cos⁺θ, of a light at Q with radiant intensity I on a surface at P
-// No smallest radius here: what exceeds the range of floats is +∞, never NaN. P = Q: r² = 0, cos⁺ = 0, E = 0, and E_⊥
-// is +∞ for I > 0, 0 otherwise. Q − P in pairs: it does not round.
+// No smallest radius here: values beyond the range of floats are +∞, never NaN. P = Q gives r² = 0, cos⁺ = 0, E = 0, and
+// E_⊥ = +∞ for I > 0, 0 otherwise. Q − P is a double-float: it does not round.
 // @lab arriving_light: lights_of_the_lecture_are_those_that_light_pictures
 LightPoint light_point(vec3 P, vec3 Q, vec3 N, float I) {
     LightPoint r;
@@ -72,7 +75,7 @@ LightPoint light_point(vec3 P, vec3 Q, vec3 N, float I) {
         r.r2 = d2 * back * back;
         r.cos_plus = max(cosine_in_range(c), 0.0);
         r.E_perp = d2 > 0.0 ? over_square(I, d2, f) : I > 0.0 ? plus_infinity() : 0.0;
-        // E_⊥ may exceed the range of floats and E not.
+        // E_⊥ may overflow where E does not.
         bool far = abs(r.E_perp) <= LARGEST;
         r.irradiance = r.cos_plus == 0.0 ? 0.0 : far ? r.E_perp * r.cos_plus : over_square(I * r.cos_plus, d2, f);
     }
@@ -81,8 +84,8 @@ LightPoint light_point(vec3 P, vec3 Q, vec3 N, float I) {
 
 // @eq R4 N32: E/I = max(min(1 − (r/range)⁴, 1), 0)/r², r at least LIGHT_RADIUS
 // @out falloff
-// On a surface that faces the light, ended smoothly at `range` (KHR_lights_punctual). inv_range2 = 1/range², 0 for
-// none.
+// On a surface that faces the light, with a smooth window that ends at `range` (KHR_lights_punctual). inv_range2 =
+// 1/range², 0 for no range.
 float point_falloff(float r2, float inv_range2) {
     float x = r2 * inv_range2;
     float window = clamp(1.0 - x * x, 0.0, 1.0);
@@ -91,8 +94,8 @@ float point_falloff(float r2, float inv_range2) {
 
 // @eq R4: share = clamp(scale cosθ + offset, 0, 1)²
 // @out share
-// Of a spot light's intensity at angle θ from its axis: the square of a ramp in the cosine between the two cones.
-// Compensated: the product and the sum round once, which is seen in narrow cones, whose scale is large.
+// Fraction of a spot light's intensity at angle θ from its axis: the square of a ramp in the cosine between the two cones.
+// Compensated: product and sum round once. This matters for narrow cones, whose scale is large.
 float spot_share(float cos_angle, float scale, float offset) {
     float ramp = cos_angle * scale + offset;
     if (ARITHMETIC == COMPENSATED) {
@@ -111,8 +114,8 @@ struct ArrivingLight {
 };
 
 // @eq R3 R4 N32: l = Q/|Q|, share = E_⊥/I = w/r² s, w and s of point_falloff and spot_share; infinitely far: l = Q, share 1
-// Light of the table at a point from which `to_light`, Q, leads to it, or that it comes from where it is infinitely far.
-// Irradiance perpendicular to l is I, or for a directional light E, times the share.
+// A light of the table seen from a point. `to_light`, Q, leads from the point to the light; for a light at infinity it is
+// the unit direction to it. Irradiance perpendicular to l is the share times I, or times E for a directional light.
 ArrivingLight arriving_light(vec3 to_light, bool directional, float inv_range2, vec3 axis, float spot_scale, float spot_offset) {
     float r2 = dot(to_light, to_light);
     vec3 l = directional ? to_light : to_light * inversesqrt(max(r2, 1e-30));
@@ -122,9 +125,9 @@ ArrivingLight arriving_light(vec3 to_light, bool directional, float inv_range2, 
 
 // @eq R2 N26: 1 − cosθ = q²/(1 + √(1 − q²)), q = radius/distance; the solid angle is 2π (1 − cosθ)
 // @out one_minus_cos
-// The cone in which a ball is seen: of lights with a shape and of what paths aim at. From inside a hemisphere, 1. At the
-// surface q² has rounded, and 1 − cosθ with it, by up to 2.5e-4: (1 − q)(1 + q) of distance ± radius would keep it, for a
-// root and a division more; the estimate does not depend on it, since density and cone are of one number.
+// The cone that a sphere subtends: of sphere lights and of the spheres of path guiding. From inside: a hemisphere, 1. At
+// the surface q² has rounded, and 1 − cosθ is off by up to 2.5e-4. (1 − q)(1 + q) from distance ± radius would avoid that
+// for a root and a division more. The estimate does not depend on it, since density and cone come from the same number.
 float sphere_cone(float radius2, float distance2) {
     float sin2 = min(radius2 / distance2, 1.0);
     return sin2 / (1.0 + sqrt(1.0 - sin2));
@@ -132,15 +135,16 @@ float sphere_cone(float radius2, float distance2) {
 
 // @eq N34 N35: t = d cosθ − √(r² − d² sin²θ), no less than 1e-6 d
 // @out t
-// How far it is to the near side of a ball, d away, in a direction at θ from its middle. From the surface itself, where
-// all of it cancels, the least.
+// Distance to the near side of a sphere whose centre is d away, along a direction at θ from the centre. At the surface
+// itself, where everything cancels, the lower limit holds.
 float ball_reach(float distance2, float radius, float cos_theta, float sin2_theta) {
     return max(sqrt(distance2) * cos_theta - sqrt(max(radius * radius - distance2 * sin2_theta, 0.0)), 1e-6 * sqrt(distance2));
 }
 
 // @eq R2: p(ω) = p(A) r²/cosθ
 // @out pdf
-// Density per solid angle of a place that was drawn per area, r away and turned by θ from the way to it.
+// Converts a density per area to a density per solid angle, for a point at distance r whose normal is at θ to the
+// direction.
 float density_per_solid_angle(float per_area, float r2, float cos_theta) {
     return per_area * r2 / cos_theta;
 }

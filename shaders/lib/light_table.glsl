@@ -1,4 +1,5 @@
-// The table of lights.
+// The table of lights and of shadow maps, read as texels.
+// Where to read: share/light.glsl (members and units). Assumes: positions relative to the eye.
 #ifndef LIGHT_TABLE_GLSL
 #define LIGHT_TABLE_GLSL
 
@@ -6,8 +7,9 @@
 
 layout(scene, rgba32f) readonly uniform imageBuffer lights;
 
-// Texels of a struct Light. After all lights the shadow maps: first texel across and down and texels a side, then the rows that lead from bvh space to
-// texels across and down of the image, depth, and 1, all times w (lib/shadow.glsl).
+// Texels of a struct Light. The shadow maps follow after all lights. Each has: first texel across, first texel down, and
+// texels per side; then the rows that transform bvh space to texels across and down, depth, and 1, all times w
+// (lib/shadow.glsl).
 const int LIGHT_TEXELS = 6;
 const int SHADOW_MAP_TEXELS = 5;
 const uint SHAPE_NONE = 0;

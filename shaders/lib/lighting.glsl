@@ -1,4 +1,6 @@
-// Radiance that a surface sends to the eye: emitted, from punctual lights, and from the environment.
+// Direct lighting of a surface: emission, punctual lights with shadows, and the environment (ambient and split sum).
+// Tiled light culling limits the lights to those of the pixel's tile (pass/tiles.comp). Where to read: RTR 4, sections 9.8,
+// 10.5 and 20.3. Assumes: world axes, positions relative to the eye, metres.
 #ifndef LIGHTING_GLSL
 #define LIGHTING_GLSL
 #include "lib/encode.glsl"
@@ -8,18 +10,18 @@
 #include "lib/layers.glsl"
 #include "lib/shadow.glsl"
 
-layout(constant) const uint LOCAL_LIGHTS = 0;       // point and spot lights after them; 0 where tiles list them
-layout(constant) const uint TILE_WORDS = 0;         // words of a tile's bit mask; 0 without lists
-layout(constant) const bool AMBIENT = false;        // irradiance of the environment on diffuse surfaces
-layout(constant) const bool REFLECTION = false;     // the prefiltered environment in specular ones
+layout(constant) const uint LOCAL_LIGHTS = 0;       // point and spot lights after the directional ones; 0 where tiles list them
+layout(constant) const uint TILE_WORDS = 0;         // 32-bit words of a tile's bit mask; 0 without tiled light culling
+layout(constant) const bool AMBIENT = false;        // ambient light: the environment's irradiance on diffuse surfaces
+layout(constant) const bool REFLECTION = false;     // the prefiltered environment in specular lobes
 
 layout(pass, scalar) readonly buffer TileLights { uint tile_lights[]; };
 
-// Reflected radiance over irradiance below which a light with a shadow is not looked for, and not shown either: the far
-// ends of lobes on polished surfaces, a ten-thousandth of what a grey one reflects.
+// Ratio of reflected radiance to irradiance below which a shadowed light casts no shadow ray and adds nothing. It cuts the
+// tails of lobes on polished surfaces: a grey surface reflects ten thousand times as much.
 const float FAINTEST_LOBE = 1.0 / 131072.0;
 
-// Light `index` of the table on a surface, as far as it is visible from there.
+// Radiance that light `index` of the table adds, with its shadow.
 vec3 light_on(Layers b, uint index) {
     Surface s = b.s;
     PunctualLight light = punctual_light_at(index, s.p_rel);
@@ -37,7 +39,7 @@ vec3 light_on(Layers b, uint index) {
     return result;
 }
 
-// The part of the lights that one dispatch goes through: indices of the table, and words of the tiles' masks.
+// The lights of one dispatch: indices of the table, and words of the tiles' bit masks.
 struct LightRange {
     uint first;
     uint end;
@@ -45,14 +47,14 @@ struct LightRange {
     uint end_word;
 };
 
-// Loop heads after which no further light is begun.
+// Loop iterations after which no further light is started.
 layout(constant) const uint LIGHT_BUDGET = 0xffffffffu;
 
 vec3 punctual_light(Layers b, ivec2 pixel, uint tiles_across, LightRange range) {
     vec3 sum = vec3(0.0);
     if (DIRECTIONAL_LIGHTS + LOCAL_LIGHTS + TILE_WORDS == 0) return sum;
-    // Lights of the tile as a bit mask, in ascending order whatever built it. Empty words are skipped in a loop of
-    // their own: lavapipe goes through a loop's body at least once, and a light is a long body.
+    // The lights of the tile are a bit mask, read in ascending order. A loop of its own skips empty words: lavapipe runs
+    // the body of a loop at least once, and the body for a light is long.
     int tile = int((uint(pixel.y) / TILE * tiles_across + uint(pixel.x) / TILE) * TILE_WORDS);
     uint next = range.first;
     uint word = range.first_word;
@@ -76,7 +78,7 @@ vec3 punctual_light(Layers b, ivec2 pixel, uint tiles_across, LightRange range) 
     return sum;
 }
 
-// Light from all around: irradiance on the diffuse part, the prefiltered map in the mirror direction on the specular
+// Environment lighting: irradiance on the diffuse part, the prefiltered map in the direction of reflection on the specular
 // part.
 vec3 environment_light(Surface s) {
     vec3 r = reflect_ray(-s.v, s.n).R;
@@ -92,7 +94,8 @@ vec3 environment_light(Surface s) {
     return result * s.occlusion;
 }
 
-// Light from `range`, and with `all_around` what does not come from lights as well; of a surface that is compensated.
+// Radiance to the eye of a compensated surface, from the lights in `range`; with `all_around` also emission and
+// environment.
 vec3 radiance_to_eye(Surface s, ivec2 pixel, uint tiles_across, LightRange range, bool all_around) {
     vec3 result = punctual_light(layers_of(s), pixel, tiles_across, range);
     vec3 around = CLEARCOAT ? s.emissive * under_coat(s) : s.emissive;

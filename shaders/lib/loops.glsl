@@ -1,13 +1,13 @@
-// Evaluations of loop heads: lavapipe ends all loops of an invocation in silence after 65,535 of them
-// (docs/decisions/lavapipe.md).
+// A limit on loop iterations: lavapipe ends all loops of an invocation silently after 65,535 of them.
+// Where to read: docs/decisions/lavapipe.md.
 #ifndef LOOPS_GLSL
 #define LOOPS_GLSL
 
-// Those so far by this invocation. No shader counts: crates/vulkan/src/loops.rs writes the counting into the SPIR-V of devices that need it.
-// What such a device gets is a variable of the invocation; it is shared memory here because the optimiser of the build leaves reads of that where
-// they stand.
+// Loop iterations of this invocation so far. No shader counts them: crates/vulkan/src/loops.rs inserts the counting into
+// the SPIR-V for devices that need it. Such a device gets a private variable. Here it is shared memory, because the build's
+// optimiser does not remove reads of that.
 shared uint loop_iterations;
-// Those it may spend. Eight pixels share the 65,535, and the longest of them counts in every loop: 40,000 of one's own leaves them
-// room.
+// Loop iterations that one invocation may use. Eight pixels share the 65,535, and in every loop the longest of them counts:
+// 40,000 of its own leave room for the others.
 layout(constant) const uint LOOP_BUDGET = 40000;
 #endif

@@ -1,5 +1,6 @@
-// Colour matching functions at 380, 385, … 780 nm: the tables under assets/cmf/, 0 outside their range. A test in
-// crates/optics/src/colour.rs holds them to those files. Source and licence: assets/cmf/README.md.
+// Colour matching functions at 380, 385, … 780 nm, from the tables under assets/cmf/; 0 outside their range.
+// A test in crates/optics/src/colour.rs compares them with those files. Source and licence: assets/cmf/README.md. Where to
+// read: pbrt 4, section 4.6 (colour).
 #ifndef MATCHING_FUNCTIONS_GLSL
 #define MATCHING_FUNCTIONS_GLSL
 
@@ -87,7 +88,7 @@ const vec3 CIE_1931_2DEG[81] = vec3[81](
     vec3(5.87065188e-05, 2.11999995e-05, 0),
     vec3(4.15099385e-05, 1.49899997e-05, 0));
 
-// Stiles & Burch 1959, 10°: amounts of the lamps of 645.16, 526.32 and 444.44 nm, all three negative somewhere.
+// Stiles & Burch 1959, 10°: amounts of the primaries at 645.16, 526.32 and 444.44 nm; each is negative somewhere.
 const vec3 STILES_BURCH_1959_10DEG[81] = vec3[81](
     vec3(0.0, 0.0, 0.0),
     vec3(0.0, 0.0, 0.0),

@@ -1,5 +1,6 @@
-// The table of materials as texels of four words: lavapipe fetches a texel in one go and a word of a storage buffer in
-// eight. Words as in share/scene.glsl.
+// The table of materials, read as texels of four words.
+// Texels, because lavapipe fetches one at once, and a word of a storage buffer in eight steps. Members and units:
+// share/scene.glsl. Where to read: glTF 2.0, section 3.9; KHR_texture_transform.
 #ifndef MATERIAL_GLSL
 #define MATERIAL_GLSL
 #include "lib/texels.glsl"
@@ -7,8 +8,8 @@
 
 layout(scene, rgba32ui) readonly uniform uimageBuffer material_texels;
 // @pages SLOTS
-// Of the struct Material; then, slot by slot, those of its textures: row of u, layer | row of v, coordinate set | for rays: first texel,
-// width and height, levels and flags (lib/hit.glsl).
+// Texels of one material: the struct Material; then three texels per texture slot: row of u and layer | row of v and
+// coordinate set | for rays: first texel, width and height, levels and flags (lib/hit.glsl).
 const int MATERIAL_SLOTS_AT = 9;
 const int SLOT_TEXELS = 3;
 const int MATERIAL_LOBES_AT = MATERIAL_SLOTS_AT + int(SLOTS) * SLOT_TEXELS;
@@ -29,13 +30,13 @@ vec4 material_texel(uint id, int i) {
 // @texels Material.sigma material_sigma(material_words)
 // @texels Material.grid material_grid(material_words)
 
-// Where a material's texture is read: KHR_texture_transform as two rows, which set of coordinates, and which layer of its page.
+// How a material's texture is read: KHR_texture_transform as two rows, the set of coordinates, and the layer of its page.
 struct TextureSlot {
     vec3 u_row;
     vec3 v_row;
     bool second_set;
     float layer;
-    int first; // texel of the table where what rays read begins
+    int first; // the slot's third texel of the table, for rays
 };
 
 TextureSlot texture_slot(uint material, uint slot) {
@@ -50,8 +51,8 @@ vec2 slot_coordinates(TextureSlot at, vec4 uv_sets) {
     return vec2(dot(at.u_row, set), dot(at.v_row, set));
 }
 
-// Where a texture is read of its page: coordinates and layer. The array index is the rounded third coordinate; a layer never bleeds
-// into the next.
+// Coordinates and layer in the texture's page, an array of images. The array index is the rounded third coordinate, so
+// neighbouring layers do not mix.
 vec3 page_coordinates(uint material, uint slot, vec4 uv_sets) {
     TextureSlot at = texture_slot(material, slot);
     return vec3(slot_coordinates(at, uv_sets), at.layer);

@@ -1,7 +1,10 @@
-// Which transparent media a point lies in. Solids may overlap, as water does with the wall of its glass: of the media
-// entered and not left, the one of the highest priority is there, of several the one entered last (Schmidt and Budge,
-// Journal of Graphics Tools 7(2) 2002, who let the lowest number win). Up to four, the last entered first; outside of
-// all is a vacuum. An entry is (priority + 2^15) << 16 | material + 1; 0 is none.
+// Nested dielectrics: the list of transparent media that a ray is in, and the present one by priority.
+// Solids may overlap, as water does with the wall of its glass. Of the media entered and not left, the one of highest
+// priority is present; of several with that priority, the one entered last. In Schmidt and Budge the lowest number wins.
+// Coincident interfaces are crossed as one by lib/boundary.glsl.
+// Where to read: Schmidt and Budge, Journal of Graphics Tools 7(2) 2002; pbrt 4, chapter 11 (transmittance).
+// Assumes: up to four media, the last entered first; outside of all is a vacuum. An entry is (priority + 2^15) << 16 |
+// material + 1; 0 is none.
 #ifndef MEDIA_GLSL
 #define MEDIA_GLSL
 #include "lib/material.glsl"
@@ -24,7 +27,7 @@ bool inside(uvec4 media, uint medium) {
     return any(equal(media, uvec4(medium)));
 }
 
-// Without the last entry of this medium; unchanged where there is none.
+// The list without this medium's latest entry; unchanged where there is none.
 uvec4 left(uvec4 media, uint medium) {
     bool x = media.x == medium;
     bool y = x || media.y == medium;
@@ -37,7 +40,7 @@ float index_of(uint medium) {
     return medium == 0 ? 1.0 : material_ior((medium & 0xffffu) - 1);
 }
 
-// What is left of light after a length in a medium, from p along a unit direction (lecture A1, A2).
+// Transmittance of a medium over a distance, from p along a unit direction (lecture A1, A2).
 vec3 absorbed(uint medium, vec3 p, vec3 direction, float distance) {
     vec3 sigma = medium == 0 ? vec3(0.0) : material_sigma((medium & 0xffffu) - 1);
     if (MARCH_STEPS != 0) {

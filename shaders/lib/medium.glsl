@@ -1,16 +1,19 @@
-// Absorption along a path (lecture A1, A2): σ in 1/m times a length in m is the optical depth τ, and e^(−τ) of the
-// radiance is left. Out of domain: a negative σ, length or κ counts as 0.
+// Absorption in media by the Beer–Lambert law, and quadrature of the optical depth by ray marching (lecture A1, A2).
+// σ in 1/m times a length in m is the optical depth τ; the transmittance is e^(−τ). For a heterogeneous medium τ is the
+// integral of σ along the ray (lib/sigma_grid.glsl).
+// Where to read: pbrt 4, section 11.2; RTR 4, section 14.1. Twins: crates/optics/src/. Out of domain: a negative σ, length
+// or κ counts as 0.
 #ifndef MEDIUM_GLSL
 #define MEDIUM_GLSL
 #include "lib/arithmetic.glsl"
 #include "lib/constants.glsl"
 
-// e^(−τ). Beyond 110 it is 0 whatever the rest is, and the rest may be larger than exp_pair takes.
+// Transmittance e^(−τ). Beyond 110 it is 0 for every lo, and lo may be larger than exp_pair allows.
 float transmittance(DoubleFloat tau) {
     return exp_pair(-tau.hi, tau.hi < 110.0 ? -tau.lo : 0.0);
 }
 
-// 1 − e^(−τ), T = e^(−τ): what T itself has no digits for where little is absorbed.
+// Absorptance 1 − e^(−τ), T = e^(−τ): T itself has no digits for it where little is absorbed.
 float absorptance(DoubleFloat tau, float T) {
     return T * (tau.hi < 110.0 ? tau.lo : 0.0) - expm1f(-tau.hi);
 }
@@ -23,8 +26,8 @@ struct BeerLambert {
 };
 
 // @eq A1 N27 N28 N29: L = L0 e^(−τ), τ = σd; one_minus_T = 1 − e^(−τ)
-// The rounding of σd alone costs T τ/2 ULP: its rest goes into the exponential. τ = 0 for σ = 0 or d = 0, whatever the
-// other is; +∞ where it exceeds the range. L as (L0 e^(−τ/2)) e^(−τ/2) where T leaves the range and L may not.
+// Rounding σd alone costs T τ/2 ULP, so its rounding error goes into the exponential. τ = 0 for σ = 0 or d = 0, whatever
+// the other is; +∞ where τ overflows. L is (L0 e^(−τ/2)) e^(−τ/2) where T underflows and L may not.
 BeerLambert beer_lambert(float L0, float sigma, float d) {
     BeerLambert r;
     if (ARITHMETIC == FAST) {
@@ -46,10 +49,10 @@ BeerLambert beer_lambert(float L0, float sigma, float d) {
 }
 
 // --------------------------------------------------------------------------------------------------------------------
-// Sums over steps
+// Quadrature: sums over the steps of a ray march
 
-// Adds one step's σ to the sum + rest of those before. Rests may be added in any order: no `precise`, of which glslang
-// would never end here.
+// Adds one step's σ to sum + rest. Rests may be added in any order, so they are not `precise`: with it glslang does not
+// terminate here.
 void add_absorption(inout float sum, inout float rest, float sigma) {
     if (ARITHMETIC == FAST) {
         sum += sigma;
@@ -60,7 +63,7 @@ void add_absorption(inout float sum, inout float rest, float sigma) {
     }
 }
 
-// 1 + m·2^-23, m the leading 23 bits of the word: a float in [1, 2) of any digits.
+// 1 + m·2^-23, with m the leading 23 bits of the word: a float in [1, 2).
 float scrambled(uint word) {
     return uintBitsToFloat(0x3f800000u | (word >> 9));
 }
@@ -74,14 +77,13 @@ struct BeerLambertSum {
     float one_minus_T;
 };
 
-// As it says: the statement so many times. Written out because lavapipe ends all loops of an invocation after 65,535
-// evaluations of their heads.
+// Repeats a statement. Unrolled, because lavapipe ends all loops of an invocation after 65,535 iterations.
 #define TIMES_8(statement) statement statement statement statement statement statement statement statement
 #define TIMES_64(statement) TIMES_8(TIMES_8(statement))
 
 // @eq A2 N30: τ = Σ σ_i Δs, σ_i = s0(1 + m_i 2^-23), m_i the leading 23 bits of (2654435761 i + seed) mod 2^32
-// A running sum of n floats loses n/2 ULP at worst: summed in pairs here; s0 and Δs, common to all steps, multiplied
-// in once. More than 2^21 steps are not taken: as for n = 0.
+// A plain running sum of n floats loses n/2 ULP at worst, so the sum is a double-float. s0 and Δs, common to all steps, are
+// multiplied in once. More than 2^21 steps count as n = 0.
 // @lab add_sigma: a_constant_grid_is_a_homogeneous_medium
 BeerLambertSum beer_lambert_sum(uint n, float s0, float ds, uint seed) {
     uint steps = n <= MOST_STEPS ? n : 0u;
@@ -125,7 +127,8 @@ const uint QUADRATURE_SIMPSON = 2;
 
 // @eq A2 N31: ∫σ ds ≈ Δs/w Σ (x σ(s_i) + y σ(s_i + Δs/2)) + Δs/w z (σ(S) − σ(0)), rule 0 left (slide), 1 midpoint, 2 Simpson
 // @out w
-// For weights (x, y, z, w): of first, second and fourth order. Simpson's sum with each step's end counted as the start of the next one.
+// Weights (x, y, z, w) of quadrature rules of first, second and fourth order. In Simpson's sum the end of each step is
+// counted as the start of the next.
 vec4 quadrature_weights(uint rule) {
     return rule == QUADRATURE_LEFT ? vec4(1.0, 0.0, 0.0, 1.0)
         : rule == QUADRATURE_MIDPOINT ? vec4(0.0, 1.0, 0.0, 1.0)
@@ -140,8 +143,8 @@ struct MarchOpticalDepth {
 };
 
 // @eq A2 N31: τ ≈ Σ σ(s_i) Δs of σ(s) = σ0 e^(−falloff s), s in [0, d]; rule 0 left (slide), 1 midpoint, 2 Simpson
-// An atmosphere's density: its integral σ0 (1 − e^(−falloff d))/falloff tells each rule's error. Steps are cut to
-// [1, 4096]; τ is at most the largest float. A negative falloff is a density that grows.
+// The optical depth of an exponential atmosphere: its integral σ0 (1 − e^(−falloff d))/falloff gives the error of each
+// rule. Steps are clamped to [1, 4096]; τ is at most the largest float. A negative falloff is a density that grows.
 // @lab mean_sigma: errors_fall_by_the_order_of_the_rule
 MarchOpticalDepth march_optical_depth(float sigma0, float falloff, float d, uint steps, uint rule) {
     uint n = clamp(steps, 1u, MOST_MARCHED);

@@ -1,6 +1,11 @@
-// One bounce of two paths: what they meet, what that sends to them, and where they go on (lecture R6). The light that arrives
-// along a path is estimated in two ways at each surface, by a place on what emits and by the direction that is followed anyway,
-// and both are weighted by the power heuristic.
+// Path tracing, one bounce: next event estimation with multiple importance sampling, and Russian roulette (lecture R6).
+// At each vertex two strategies estimate the light that arrives: a light sample with its shadow ray (next event
+// estimation), and the BSDF sample that continues the path. The power heuristic weights both (multiple importance sampling,
+// MIS). An interaction that does not deflect the path (a hole, a smooth thin-walled surface) starts no new vertex for MIS:
+// the shadow ray passes it as the path does.
+// Where to read: pbrt 4, sections 13.2 to 13.4 and 15.3 (wavefront path tracing); Veach 1997, chapter 9;
+// docs/decisions/paths.md.
+// Assumes: bvh space, metres; densities per solid angle; radiance divided by the square of the index of refraction.
 #ifndef PATH_GLSL
 #define PATH_GLSL
 #include "lib/bsdf.glsl"
@@ -8,10 +13,11 @@
 #include "lib/path_ray.glsl"
 #include "lib/work_count.glsl"
 
-layout(constant) const bool EMISSIVE_LIGHTS = false; // what emits lights the scene, and is not only seen
-layout(constant) const uint LIGHT_SAMPLES = 1; // places on lights that are looked for at each surface
+layout(constant) const bool EMISSIVE_LIGHTS = false; // emissive surfaces light the scene; otherwise they are only seen
+layout(constant) const uint LIGHT_SAMPLES = 1; // light samples (shadow rays) per vertex
 
-// From this surface on a path goes on with a probability that falls with its throughput.
+// Russian roulette from this vertex on: a path survives with a probability that falls with the path throughput, at most
+// MOST_LIKELY.
 const uint RUSSIAN_ROULETTE_FROM = 4;
 const float MOST_LIKELY = 0.95;
 
@@ -19,21 +25,21 @@ float lost = 0.0;
 float most_lost = 0.0;
 uint path_rays = 0;
 
-// A light that is looked for.
+// A shadow ray: the visibility test for a light sample.
 struct ShadowRay {
     vec3 origin;
     vec3 to_light;
-    float t_max;       // negative: none
+    float t_max;       // negative: no shadow ray
     uint source_face;
     uvec4 media;
-    vec3 contribution; // if nothing is in between
+    vec3 contribution; // what the light adds to the path if nothing occludes it
 };
 
 bool is_finite(vec3 v) {
     return all(lessThanEqual(abs(v), vec3(LARGEST)));
 }
 
-// Light that is no number, or infinite, is counted with the first place where it was met, and left out of the picture.
+// Replaces NaN or infinite radiance by 0, counts it, and stores where the first one occurred.
 vec3 finite_or_zero(vec3 light, uvec2 pixel, uint material, uint surface) {
     bool good = is_finite(light);
     if (!good) {
@@ -46,7 +52,7 @@ vec3 finite_or_zero(vec3 light, uvec2 pixel, uint material, uint surface) {
     return good ? light : vec3(0.0);
 }
 
-// What a hit is on the way of something that goes straight on.
+// A hit and its boundary, for a ray that may pass undeflected.
 struct Interaction {
     HitSurface hit;
     Boundary boundary;
@@ -60,12 +66,12 @@ Interaction interaction_at(HitPoint point, uvec4 media, vec3 direction) {
     return r;
 }
 
-// How far a light is looked for: what touches it does not shadow it, and t is a few roundings off.
+// End of the shadow ray: four roundings before the light, so that a surface touching the light does not occlude it.
 float shadow_ray_t_max(ShadowRay shadow_ray) {
     return shadow_ray.t_max == 1.0 ? 1.0 - 4.0 / 16777216.0 : shadow_ray.t_max;
 }
 
-// What the medium leaves of a light that nothing stands before.
+// Transmittance of the medium along a shadow ray without occluders.
 vec3 unoccluded_transmittance(ShadowRay shadow_ray) {
     uint medium = present_medium(shadow_ray.media);
     float size = vector_length(shadow_ray.to_light);
@@ -73,8 +79,8 @@ vec3 unoccluded_transmittance(ShadowRay shadow_ray) {
     return absorbs ? absorbed(medium, shadow_ray.origin, shadow_ray.to_light / size, size) : vec3(1.0);
 }
 
-// How much of a light arrives: what lies on the straight way there attenuates it. What a path finds by going straight through is
-// the same, so that both may be weighted against each other.
+// Transmittance of everything on the straight shadow ray. It equals what a path gets that passes the same surfaces
+// undeflected, so MIS may weight both strategies against each other.
 vec3 shadow_ray_transmittance(ShadowRay shadow_ray) {
     vec3 through = vec3(shadow_ray.t_max > 0.0 ? 1.0 : 0.0);
     float size = vector_length(shadow_ray.to_light);
@@ -89,7 +95,7 @@ vec3 shadow_ray_transmittance(ShadowRay shadow_ray) {
         uint medium = present_medium(media);
         if (goes_on && ABSORPTION == ABSORPTION_PATH && medium != 0) {
             float end = at_surface ? found.t : min(shadow_ray.t_max, 1.0);
-            // Of what is infinitely far, light comes through no medium that has no end.
+            // The last segment to a light at infinity has no end: its absorption is not counted.
             float far = at_surface || shadow_ray.t_max == 1.0 ? (end - last.t) * size : 0.0;
             through *= absorbed(medium, shadow_ray.origin + shadow_ray.to_light * last.t, direction, far);
         }
@@ -112,7 +118,7 @@ vec3 shadow_ray_transmittance(ShadowRay shadow_ray) {
     return result;
 }
 
-// A light to be looked for from a surface, drawn from as many places as are looked for: what of it would go along the path.
+// The shadow ray for one of LIGHT_SAMPLES light samples at a vertex, with its MIS-weighted contribution.
 ShadowRay shadow_ray_to(Path p, Interaction interaction, bool scatters, vec3 front_origin, LightSample light, PathEval towards) {
     ShadowRay shadow_ray;
     float w = light.pdf > 0.0 ? mis_weight(light.pdf * float(LIGHT_SAMPLES), towards.pdf) : 1.0;
@@ -120,7 +126,7 @@ ShadowRay shadow_ray_to(Path p, Interaction interaction, bool scatters, vec3 fro
     bool wanted = scatters && largest(contribution) > 0.0;
     bool behind = dot(interaction.hit.n, light.to_light) < 0.0;
     shadow_ray.origin = behind ? ray_origin(interaction.hit.s.p_bvh, -interaction.hit.n, vec3(0.0)) : front_origin;
-    // Both ends are as they were drawn, wherever the ray starts.
+    // The sampled point on the light stays the same, wherever the ray starts.
     shadow_ray.to_light = light.t_max == 1.0 ? light.to_light + (front_origin - shadow_ray.origin) : light.to_light;
     shadow_ray.t_max = wanted ? light.t_max : -1.0;
     shadow_ray.source_face = interaction.hit.s.face;
@@ -129,8 +135,12 @@ ShadowRay shadow_ray_to(Path p, Interaction interaction, bool scatters, vec3 fro
     return shadow_ray;
 }
 
-// What a path meets: light that this sends along it, and the path as it goes on.
+// Shades one path vertex. Returns the radiance gathered there; also gives the shadow ray still to be traced, and the
+// continued path p.
+// Steps: 1. the interaction; 2. next event estimation; 3. light found by the path itself; 4. the BSDF sample; 5. further
+// light samples; 6. the continued path; 7. Russian roulette.
 vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRay shadow_ray) {
+    // 1. The interaction: absorption on the way, hit, boundary, BSDF.
     shadow_ray = ShadowRay(p.origin, vec3(0.0, 1.0, 0.0), -1.0, p.source_face, p.media, vec3(0.0));
     vec3 gathered = vec3(0.0);
     bool at_surface = found.triangle != NO_TRIANGLE;
@@ -146,16 +156,17 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     Layers b = bsdf.layers;
     uvec2 event = dimension_words(pixel, vertices_before, DIMENSION_EVENT);
     float x = unit_float(event.x);
-    // The back of what has one side only is not there for the eye.
+    // Single-sided surfaces are invisible from behind to the eye, as with back-face culling.
     bool unseen = (p.state & PATH_UNSCATTERED) != 0 && (hit_material(leaf) & ONE_SIDED_TRIANGLE) != 0 && !hit.front && !interaction.boundary.solid;
     bool passed_by = interaction.boundary.suppressed_by_priority || unseen || x >= hit.coverage;
     x = min(x / max(hit.coverage, 1e-6), 0.999999940395355);
 
-    // Light from a place on what emits.
+    // 2. Next event estimation: a light sample.
     LightSample light = LightSample(p.direction, -1.0, vec3(0.0), 0.0);
     bool scatters = at_surface && !passed_by && !hit.s.unlit && (!b.delta || b.shares.z > 0.0 || (CLEARCOAT && !b.coat_delta));
     vec3 front_origin = ray_origin(hit.s.p_bvh, hit.n, hit.s.v);
     if (EMITTERS > 0) light = sample_light(front_origin, dimension_words_of(pixel, vertices_before, DIMENSION_LIGHT, 0, LIGHT_SAMPLES));
+    // 3. Light found by the path itself: the environment, weighted by the power heuristic.
     if (ENVIRONMENT) {
         vec3 towards = at_surface ? light.to_light : p.direction;
         vec3 seen = environment_radiance(towards);
@@ -163,7 +174,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
         float w = p.pdf > 0.0 ? mis_weight(p.pdf, float(LIGHT_SAMPLES) * environment_pdf(p.direction)) : 1.0;
         if (!at_surface && !directly_visible) gathered = p.throughput * seen * w;
         if (SAMPLED_ENVIRONMENT && light.pdf > 0.0 && light.t_max == LARGEST) {
-            // Straight ahead there is the background, whatever lights the scene.
+            // A directly visible background replaces the environment, so no light comes from it straight ahead.
             bool hidden = directly_visible && dot(hit.n, light.to_light) < 0.0;
             light.arriving *= hidden ? vec3(0.0) : seen;
         }
@@ -172,10 +183,10 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     float background_share = mean(p.throughput);
     bool escaped = !at_surface && !SKY && (p.state & PATH_TRANSPARENT_SO_FAR) != 0;
 
-    // What the surface itself sends.
+    // 3. Light found by the path itself: emission of the surface, weighted by the power heuristic.
     if (at_surface && !passed_by) {
         vec3 emits = hit.s.unlit ? hit.s.base : hit.s.emissive * (CLEARCOAT ? under_coat(hit.s) : 1.0);
-        // One side may be dark.
+        // Single-sided surfaces emit on their front alone.
         bool shows = EMISSIVE_LIGHTS || (p.state & PATH_NON_SPECULAR) == 0;
         shows = shows && (hit.s.unlit || hit.front || (hit_material(leaf) & ONE_SIDED_TRIANGLE) == 0);
         float w = 1.0;
@@ -189,7 +200,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
         ends = ends || hit.s.unlit;
     }
 
-    // Where it goes on.
+    // 4. The BSDF sample that continues the path, and BSDF and density for both strategies.
     uint vertices = vertices_before + 1;
     if (!ends && vertices > trace_terms.interfaces) {
         lost += largest(p.throughput);
@@ -198,7 +209,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     }
     uvec2 words = dimension_words(pixel, vertices_before, DIMENSION_DIRECTION);
     BsdfSample drawn = bsdf_sample(bsdf, x, vec2(unit_float(words.x), unit_float(words.y)));
-    // One evaluation for the light's direction, one for that which was drawn: the same code, once.
+    // First the light's direction, then the sampled one, in a loop: the code exists once.
     vec3 along = normalize(light.to_light);
     PathEval towards_light = PathEval(vec3(0.0), 0.0, 0.0);
     PathEval on_path = PathEval(vec3(0.0), 0.0, 0.0);
@@ -211,7 +222,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
         shadow_ray = shadow_ray_to(p, interaction, scatters, front_origin, light, towards_light);
     }
     if (LIGHT_SAMPLES > 1) {
-        // The others are looked for here, one after the other.
+        // 5. Further light samples; their shadow rays are traced here, one after the other.
         for (uint i = 1; i < LIGHT_SAMPLES; i++) {
             LightSample other = sample_light(front_origin, dimension_words_of(pixel, vertices_before, DIMENSION_LIGHT, i, LIGHT_SAMPLES));
             if (SAMPLED_ENVIRONMENT && other.pdf > 0.0 && other.t_max == LARGEST) {
@@ -225,10 +236,11 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
             if (one.t_max > 0.0) gathered += finite_or_zero(one.contribution, pixel, hit.material, vertices_before) * arrives;
         }
     }
+    // 6. The continued path: throughput, start of the next ray, media.
     vec3 weight = drawn.delta ? drawn.weight : on_path.pdf > 0.0 ? on_path.f_cos / on_path.pdf : vec3(0.0);
     bool on_right_side = drawn.through == (dot(drawn.direction, hit.n) < 0.0);
     weight = passed_by ? vec3(1.0) : on_right_side || drawn.straight ? weight : vec3(0.0);
-    // Only what filters light lets the search for lights pass as well.
+    // The shadow ray passes surfaces of class FILTER only, so only those start no new vertex for MIS.
     bool unscattered = (passed_by || drawn.straight) && hit_class(leaf) == FILTER;
     p.throughput *= weight;
     p.distance_since_vertex = escaped ? background_share : unscattered ? p.distance_since_vertex + found.t : 0.0;
@@ -245,8 +257,8 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     flags &= behind ? ~0u : ~PATH_TRANSPARENT_SO_FAR;
     flags &= passed_by || drawn.straight ? ~0u : ~PATH_UNSCATTERED;
     flags |= !passed_by && !drawn.delta ? PATH_NON_SPECULAR : 0u;
-    // Less is left of a path that was aimed than of another, and that is no reason to end it: roulette asks what would be left if
-    // nothing were aimed at, or it would undo what aims are for.
+    // 7. Russian roulette uses the throughput that the path would have without path guiding. Guiding lowers the throughput
+    //    of guided paths; terminating those more often would undo it.
     float most = largest(p.throughput);
     if (PATH_GUIDING) {
         bool scattered = !passed_by && !drawn.delta && on_path.unguided_pdf > 0.0;
@@ -259,7 +271,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
         ends = ends || unit_float(event.y) >= survives;
         p.throughput /= max(survives, 1e-6);
     }
-    // What a path that has met nothing computes for a surface does not count.
+    // Terminated paths, and paths that hit nothing, keep no values of the surface computed above.
     p.throughput = finite_or_zero(ends ? vec3(0.0) : p.throughput, pixel, hit.material, vertices_before);
     shadow_ray.contribution = finite_or_zero(shadow_ray.contribution, pixel, hit.material, vertices_before);
     gathered = finite_or_zero(gathered, pixel, hit.material, vertices_before);
@@ -268,8 +280,10 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     return gathered;
 }
 
-// Two paths at once: rays are traced in pairs, surfaces one after the other, in code that is there once.
+// One bounce of two paths: their rays are traced in pairs, their surfaces shaded one after the other, so that the code
+// exists once.
 void bounce(inout Path a, inout Path b, uvec2 pixel_a, uvec2 pixel_b) {
+    // 1. Extend both paths to their next vertices.
     bool alive_a = (a.state & PATH_ALIVE) != 0;
     bool alive_b = (b.state & PATH_ALIVE) != 0;
     HitPair found = trace_pair(PairedRay(a.origin, a.direction, a.source_face, COINCIDENT_INTERFACES ? a.t_min : 0.0, alive_a ? LARGEST : -1.0),
@@ -279,6 +293,7 @@ void bounce(inout Path a, inout Path b, uvec2 pixel_a, uvec2 pixel_b) {
     vec3 gathered_a = vec3(0.0);
     vec3 gathered_b = vec3(0.0);
     ShadowRay shadow_a, shadow_b;
+    // 2. Shade both vertices.
     for (int i = 0; i < 2; i++) {
         Path p = a;
         Hit hit = found.a;
@@ -302,6 +317,7 @@ void bounce(inout Path a, inout Path b, uvec2 pixel_a, uvec2 pixel_b) {
             gathered_b = now;
         }
     }
+    // 3. Trace both shadow rays.
     if (EMITTERS > 0) {
         if (!alive_a) shadow_a.t_max = -1.0;
         if (!alive_b) shadow_b.t_max = -1.0;

@@ -1,12 +1,13 @@
-// Where paths begin: at the eye, through a point of the pixel.
+// Camera rays of path tracing: the first state of a path, through a random point of its pixel.
+// Where to read: pbrt 4, sections 5.1 and 8.8 (pixel reconstruction; here a box filter). Assumes: bvh space, metres.
 #ifndef PATH_BEGIN_GLSL
 #define PATH_BEGIN_GLSL
 #include "lib/own_tiles.glsl"
 #include "lib/path_ray.glsl"
 
-// The pixel that stands at a place of the first queue: tiles of 8x8 in strides over the picture, since lavapipe gives each of
-// its threads one contiguous piece of a dispatch; within a tile in Morton order, so that neighbours in a queue are neighbours
-// in the picture. One outside of the picture where a tile juts out.
+// The pixel at a position of the first queue. Tiles of 8x8 are taken in strides over the picture, since lavapipe gives each
+// of its threads one contiguous piece of a dispatch. Pixels of a tile are in Morton order, so neighbours in a queue are
+// neighbours in the picture. It lies outside the picture where a tile does.
 uvec2 pixel_at(uint place, uint stride) {
     uint turn = place / 64 * stride % own_tiles();
     uint lane = place % 64;
@@ -19,7 +20,8 @@ Path path_through(uvec2 pixel) {
     uvec2 words = dimension_words(pixel, 0, DIMENSION_PIXEL);
     c.jitter = vec2(unit_float(words.x), unit_float(words.y)) - 0.5;
     Path p;
-    // From the near plane, as what is rasterised; what lies beyond an orthographic camera's far one is seen all the same.
+    // Rays start at the near plane, as in rasterisation. Surfaces beyond the far plane of an orthographic camera stay
+    // visible.
     p.origin = trace_terms.bvh_from_rel + rel_from_pixel(c, ivec2(pixel), 1.0);
     p.direction = view_direction(c, ivec2(pixel));
     p.source_face = 0xffffffffu;

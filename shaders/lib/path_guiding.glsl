@@ -1,5 +1,9 @@
-// Balls that paths aim at from the cell of a grid in which they are: where light came from by way of what mirrors or bends it,
-// as far as a few photons told (src/transport/caustics.rs).
+// Path guiding: the guiding distribution of a grid cell, cones towards bounding spheres of specular interactions.
+// A few photons are traced on the host first (src/transport/photon_guiding.rs). The bounding spheres hold the points where
+// these photons were last reflected or refracted by a specular surface before they reached the cell. A fraction of the
+// directions at a diffuse surface is sampled in the cones that the spheres subtend.
+// Where to read: Jensen 1995 (sampling guided by photons); Vorba et al. 2019 (SIGGRAPH course on path guiding);
+// docs/decisions/paths.md. Assumes: bvh space, metres; densities per solid angle.
 #ifndef PATH_GUIDING_GLSL
 #define PATH_GUIDING_GLSL
 #include "lib/encode.glsl"
@@ -9,21 +13,21 @@
 
 layout(constant) const bool PATH_GUIDING = false;
 layout(paths, r32ui) readonly uniform uimageBuffer guiding_cells;
-layout(paths, rgba32ui) readonly uniform uimageBuffer guiding_spheres; // the grid, then the balls
+layout(paths, rgba32ui) readonly uniform uimageBuffer guiding_spheres; // the grid, then the bounding spheres
 // @texels GuidingGrid guiding_grid_at(guiding_spheres)
 uvec4 guiding_sphere_texel(uint index, int texel) {
     return imageLoad(guiding_spheres, GUIDING_GRID_TEXELS + int(index) + texel);
 }
 // @texels GuidingSphere guiding_sphere_at(guiding_sphere_texel)
 
-// Of the directions drawn for a diffuse surface (docs/decisions/paths.md).
+// Fraction of the directions at a diffuse surface that are guided (docs/decisions/paths.md).
 const float GUIDED_FRACTION = 0.25;
 
 struct GuidingCell {
     uint first;
-    uint count; // 0: none
-    uint last;  // of all balls
-    float cell; // metres
+    uint count; // 0: no guiding here
+    uint last;  // index of the last sphere of the grid
+    float cell; // side of a cell in metres
 };
 
 GuidingCell guiding_cell_at(vec3 p) {
@@ -36,11 +40,11 @@ GuidingCell guiding_cell_at(vec3 p) {
     return GuidingCell(word >> GUIDING_COUNT_BITS, inside ? count : 0u, grid.last_ball, 1.0 / grid.cells_per_metre);
 }
 
-// The directions in which a ball is seen: a cone, or a hemisphere from inside.
+// The cone of directions that a sphere subtends; from inside a hemisphere.
 struct Cone {
     vec3 axis;
     float spread; // 1 − cosine of its half angle
-    float share;  // of the cell's aims
+    float share;  // probability of the cone in its cell
 };
 
 Cone guiding_cone(GuidingCell at, uint i, vec3 p) {
@@ -52,7 +56,8 @@ Cone guiding_cone(GuidingCell at, uint i, vec3 p) {
     return Cone(to * inversesqrt(square), sphere_cone(radius * radius, square), radius_share.y);
 }
 
-// `u.x` chooses among them, and the place in the cone with what is left of it.
+// Samples the guiding distribution: u.x chooses a cone, and its position within the cone's probability is used for the
+// direction.
 vec3 guided_direction(GuidingCell at, vec3 p, vec2 u) {
     Cone cone = guiding_cone(at, 0, p);
     float first = 0.0;
@@ -71,7 +76,7 @@ vec3 guided_direction(GuidingCell at, vec3 p, vec2 u) {
     return (frame.t * turn.x + frame.b * turn.y) * across + cone.axis * (1.0 - down);
 }
 
-// Density of a unit direction among those, per solid angle.
+// Density of the guiding distribution for a unit direction, per solid angle.
 float guided_pdf(GuidingCell at, vec3 p, vec3 direction) {
     float sum = 0.0;
     for (uint i = 0; i < at.count; i++) {

@@ -1,16 +1,17 @@
-// Paths between two dispatches: by pixel, whatever their place in a queue. Four words at a time in buffers of their own: what
-// neighbours read lies together, and large pictures fit what one binding holds.
+// Path states in memory between two dispatches, by pixel, wherever the path stands in a queue.
+// Buffers of four words each: words that neighbours read lie together, and large pictures fit into one binding. Where to
+// read: pbrt 4, chapter 15 (structure of arrays); docs/decisions/paths.md.
 #ifndef PATH_STATE_GLSL
 #define PATH_STATE_GLSL
 #include "lib/path_ray.glsl"
 
-layout(constant) const bool KEEPS_MEDIA = false; // paths go through media
-layout(constant) const bool KEEPS_T_MIN = false; // something opaque lies against some of them
+layout(constant) const bool KEEPS_MEDIA = false; // paths cross media
+layout(constant) const bool KEEPS_T_MIN = false; // some interface coincides with an opaque surface
 
-layout(pass, scalar) buffer Origins { uvec4 origins[]; };          // and self
-layout(pass, scalar) buffer Directions { uvec4 directions[]; };    // and pdf
-layout(pass, scalar) buffer Throughputs { uvec4 throughputs[]; };  // and state
-layout(pass, scalar) buffer Sums { uvec4 sums[]; };                // and travelled
+layout(pass, scalar) buffer Origins { uvec4 origins[]; };          // origin, source_face
+layout(pass, scalar) buffer Directions { uvec4 directions[]; };    // direction, pdf
+layout(pass, scalar) buffer Throughputs { uvec4 throughputs[]; };  // throughput, state
+layout(pass, scalar) buffer Sums { uvec4 sums[]; };                // sum, distance_since_vertex
 layout(pass, scalar) buffer Media { uvec4 media[]; };
 layout(pass, scalar) buffer TMins { float t_mins[]; };
 

@@ -1,4 +1,6 @@
-// The nearest surface of a pixel, out of the G-buffer.
+// The primary surface of a pixel, reconstructed from the G-buffer.
+// Where to read: RTR 4, section 20.1 (deferred shading); docs/decisions/positions.md. Assumes: positions relative to the
+// eye, and in bvh space for rays; metres.
 #ifndef PRIMARY_GLSL
 #define PRIMARY_GLSL
 #include "lib/encode.glsl"
@@ -7,8 +9,8 @@
 #include "lib/instances.glsl"
 #include "lib/shadow.glsl"
 
-layout(constant) const bool IN_MEDIUM = false; // the eye is inside a transparent body
-// Places among the leaves of the scene's triangles.
+layout(constant) const bool IN_MEDIUM = false; // the eye is inside a transparent solid
+// Index of each triangle of the scene among the leaves of the BVH.
 layout(scene, scalar) readonly buffer LeafPlaces { uint leaf_places[]; };
 
 struct Primary {
@@ -16,7 +18,7 @@ struct Primary {
     HitSurface hit;
 };
 
-// What is left of the light from the nearest surface at the eye.
+// Transmittance of the medium around the eye, up to the primary surface.
 vec3 left_at_eye(Surface s) {
     vec3 left = vec3(1.0);
     if (IN_MEDIUM && ABSORPTION == ABSORPTION_PATH) {
@@ -26,18 +28,18 @@ vec3 left_at_eye(Surface s) {
     return left;
 }
 
-// Where the ray of a pixel meets the plane of the triangle that was drawn there. What depth and stored normal tell of
-// the point has roundings of its own, off the plane that rays meet.
+// Where the ray of a pixel meets the plane of the triangle drawn there. A position from depth and stored normal has
+// rounding errors of its own, off the plane that rays hit.
 HitPoint on_triangle(uint leaf, vec3 p_bvh, vec3 direction) {
-    // Parallel rays come from the pixel's point, all others from the eye.
+    // Orthographic rays come from the pixel's own point, all others from the eye.
     vec3 origin = camera.orthographic != 0 ? p_bvh : trace_terms.bvh_from_rel;
     ShearedTriangle t = sheared_from(triangle_at(leaf), origin, ray_shear(direction));
     float whole = t.det == 0.0 ? 1.0 : t.det;
     return hit_point_of(Hit(0.0, leaf, t.weights.y / whole, t.weights.z / whole), p_bvh, vec3(0.0));
 }
 
-// With `exact_normals`, the triangle's own where no texture has bent them: for rays that leave the surface. Light that is
-// looked up at the surface has the stored ones, which are there whether or not the scene calls for rays.
+// With `exact_normals` the normals are those of the triangle, unless a normal map has changed them: for rays that leave the
+// surface. Lighting at the surface uses the stored normals, which do not depend on whether the scene calls for rays.
 Primary primary_surface(ivec2 pixel, bool exact_normals) {
     Primary r;
     float z = stored_depth(pixel_index(pixel));
@@ -76,7 +78,7 @@ Primary primary_surface(ivec2 pixel, bool exact_normals) {
             }
         }
     }
-    // The boundaries of bodies lie between two media (lib/boundary.glsl).
+    // Interfaces of transparent solids lie between two media (lib/boundary.glsl).
     if (IN_MEDIUM && m.transmission == 0.0) seen_from(s, index_of(present_medium(s.media)));
     r.hit.s = s;
     r.hit.n = s.n_triangle;

@@ -1,19 +1,21 @@
-// Lights out of their table: points, and shapes about them.
+// Punctual lights (point, spot, directional) and analytic area lights (sphere, disk, rectangle), from the table of lights.
+// Where to read: KHR_lights_punctual; pbrt 4, sections 12.2 and 6.2.4 (sampling of spheres). Assumes: positions relative to
+// the eye, metres, cd.
 #ifndef PUNCTUAL_GLSL
 #define PUNCTUAL_GLSL
 #include "lib/light.glsl"
 #include "lib/light_table.glsl"
 
-layout(constant) const uint DIRECTIONAL_LIGHTS = 0; // lights [0, this) of the table
+layout(constant) const uint DIRECTIONAL_LIGHTS = 0; // directional lights are the first ones of the table, up to this index
 
 struct PunctualLight {
-    vec3 to_light;    // from the point, or the direction to what is infinitely far
-    vec3 l;           // the same with length 1
-    vec3 arriving;    // irradiance perpendicular to l, where nothing is in between
-    bool directional; // infinitely far
+    vec3 to_light;    // from the point; unit direction to a light at infinity
+    vec3 l;           // to_light, normalised
+    vec3 arriving;    // irradiance perpendicular to l, unoccluded
+    bool directional; // at infinity
 };
 
-// Light `index` of the table as a point sees it.
+// Light `index` of the table as seen from a point.
 PunctualLight punctual_light_at(uint index, vec3 p_rel) {
     Light light = light_at(index);
     PunctualLight r;
@@ -25,9 +27,9 @@ PunctualLight punctual_light_at(uint index, vec3 p_rel) {
     return r;
 }
 
-// Light that may arrive from one place of a light with a shape, told apart by a point of the unit square. It shines as evenly as
-// paper, with I along its axis from afar: L = I/(πr²) of balls and disks, I/A of rectangles, so that what is seen of a face is
-// I cosθ_light/r² however large it is.
+// A sample of an analytic area light: light from one point of it, by a point x of the unit square. The light is a
+// Lambertian emitter with intensity I along its axis from afar. L = I/(πr²) for spheres and disks, I/A for rectangles, so
+// that the irradiance from a face is I cosθ_light/r² whatever its size.
 PunctualLight shaped_light_at(uint index, vec3 p_rel, vec2 x) {
     PunctualLight r = punctual_light_at(index, p_rel);
     Light light = light_at(index);
@@ -37,10 +39,10 @@ PunctualLight shaped_light_at(uint index, vec3 p_rel, vec2 x) {
     float window = point_falloff(dot(middle, middle), light.inv_range2) * dot(middle, middle);
     vec2 around = cos_sin_of_turns(x.y);
     if (kind == SHAPE_SPHERE) {
-        // A direction of the cone in which the ball is seen, each as likely as any other (PBRT 4, section 6.2.4).
+        // Uniform sampling of the cone that the sphere subtends (pbrt 4, section 6.2.4).
         float d2 = dot(middle, middle);
         if (d2 <= light.extent * light.extent) {
-            // From inside nothing is seen of it.
+            // From inside the sphere is invisible.
             r.arriving = vec3(0.0);
             return r;
         }
@@ -51,7 +53,7 @@ PunctualLight shaped_light_at(uint index, vec3 p_rel, vec2 x) {
         vec3 l = r.l * cos_theta + (b.t * around.x + b.b * around.y) * sqrt(sin2);
         r.to_light = l * ball_reach(d2, light.extent, cos_theta, sin2);
         r.l = l;
-        // Ω L = 2π(1 − cosθ) I/(πr²).
+        // Irradiance Ω L = 2π(1 − cosθ) I/(πr²).
         r.arriving = light.color * (window * 2.0 * lost / (light.extent * light.extent));
         return r;
     }

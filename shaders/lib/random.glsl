@@ -1,9 +1,10 @@
-// Random numbers that depend on the pixel, the sample and the event of a path alone: whatever the order of the work, the
-// picture is the same.
+// Random numbers: a low-discrepancy Sobol sequence with Owen scrambling, keyed by pixel, sample and event.
+// They do not depend on the order of the work, so the picture does not either. Where to read: pbrt 4, section 8.7; Burley,
+// JCGT 9(4) 2020 (hash-based Owen scrambling); Laine and Karras 2011.
 #ifndef RANDOM_GLSL
 #define RANDOM_GLSL
 
-// A permutation of 32-bit words without visible structure (PCG; Jarzynski and Olano, JCGT 9(3) 2020).
+// A hash of 32-bit words (PCG; Jarzynski and Olano, JCGT 9(3) 2020).
 uint pcg(uint x) {
     uint state = x * 747796405u + 2891336453u;
     uint word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
@@ -14,13 +15,13 @@ uint hash(uvec3 key) {
     return pcg(key.x + pcg(key.y + pcg(key.z)));
 }
 
-// In [0, 1), the leading 24 bits.
+// The leading 24 bits as a number in [0, 1).
 float unit_float(uint word) {
     return float(word >> 8) * (1.0 / 16777216.0);
 }
 
-// Owen's scrambling in base 2, of a word whose first digit is the last bit: each bit is flipped or not by a hash of those
-// after it (Laine and Karras, EGSR 2011, with the constants of Vegdahl, "Building a better LK hash", 2021).
+// Owen scrambling in base 2, of a word whose first digit is its last bit: a hash of the bits after it decides whether a bit
+// is flipped (Laine and Karras, EGSR 2011, with the constants of Vegdahl, "Building a better LK hash", 2021).
 uint scrambled_backwards(uint x, uint seed) {
     x ^= x * 0x3d20adeau;
     x += seed;
@@ -30,8 +31,9 @@ uint scrambled_backwards(uint x, uint seed) {
     return x;
 }
 
-// Second dimension of Sobol's sequence, its first digit in the last bit: digit j is the sum mod 2 of C(i, j) times digit i
-// of the index. C(i, j) is odd where the bits of j are among those of i (Lucas), so five sums over one bit each do.
+// Second dimension of the Sobol sequence, with its first digit in the last bit. Digit j is the sum mod 2 of C(i, j) times
+// digit i of the index. C(i, j) is odd where the bits of j are among those of i (Lucas), so five sums over one bit each
+// suffice.
 uint sobol_second_backwards(uint index) {
     index ^= index >> 1 & 0x55555555u;
     index ^= index >> 2 & 0x33333333u;
@@ -41,9 +43,9 @@ uint sobol_second_backwards(uint index) {
     return index;
 }
 
-// A point in the unit square, as words, for one event of one sample of a pixel: the (0, 2)-sequence of Sobol, of which any 2^k
-// samples from a multiple of 2^k on have their share in each elementary interval, in an order and with a scrambling of their
-// own for each pixel, event and seed (Burley, JCGT 9(4) 2020).
+// A point in the unit square, as words, for one event of one sample of a pixel. It is the (0, 2)-sequence of Sobol: any 2^k
+// samples from a multiple of 2^k on are stratified, with their share in each elementary interval. Each pixel, event and
+// seed shuffles and scrambles the sequence in its own way (Burley, JCGT 9(4) 2020).
 uvec2 random_words(uvec2 pixel, uint event, uint seed, uint index) {
     uint key = hash(uvec3(pixel.x | pixel.y << 16, event, seed ^ 0x68bc21ebu));
     uint place = bitfieldReverse(scrambled_backwards(bitfieldReverse(index), key));

@@ -1,12 +1,14 @@
-// Rays against spheres, boxes and triangles, and where a ray begins and ends. A ray is origin + t direction, t ≥ 0, and
-// its direction has any length. Twins: crates/optics/src/ray.rs.
+// Ray intersection: spheres, boxes (slab test), watertight ray/triangle intersection, and ray origins off a surface.
+// Where to read: Woop, Benthin and Wald, JCGT 2(1) 2013 (watertight intersection); Haines et al., Ray Tracing Gems 7
+// (spheres); Ize, JCGT 2(2) 2013 (boxes); pbrt 4, section 6.8 (rounding error). Twins: crates/optics/src/ray.rs.
+// Assumes: a ray is origin + t direction, t ≥ 0, with a direction of any length.
 #ifndef RAY_GLSL
 #define RAY_GLSL
 #include "lib/arithmetic.glsl"
 #include "lib/frame.glsl"
 
-// t of a ray whose direction and lengths were scaled. One after the other: the quotient of the scales may be ∞, and
-// t be 0.
+// t of a ray whose direction and lengths were scaled. Two multiplications: the quotient of the scales may be ∞ where t is
+// 0.
 float unscaled(float t, float scale_of_direction, float scale_of_lengths) {
     precise float by_direction = t * scale_of_direction;
     precise float whole = by_direction * (1.0 / scale_of_lengths);
@@ -30,11 +32,12 @@ DoubleFloat times(DoubleFloat a, float s) {
 }
 
 // @eq N34 N35: f = origin − center, b = −f·d, D = r² − |f + (b/d²) d|², q = b ± √(d² D), t = (f² − r²)/q and q/d²
-// Haines et al., Ray Tracing Gems 7. b² − d²(f² − r²) is a small difference of large squares for a sphere far away; the
-// distance of its center from the line is not. Of b ± √… only the sum is formed, the other root is Vieta's. t0 ≤ t1 are
-// the crossings of the whole line, negative ones behind the origin. Compensated: f, f² − r² and the point next to
-// the center by pairs, for origins near the surface and rays that graze a distant sphere. No hit, or direction 0: 0, 0.
-// Pictures have triangles alone; of a ball that is a light, its near side is met as ball_reach has it.
+// Haines et al., Ray Tracing Gems 7. b² − d²(f² − r²) is a small difference of large squares for a distant sphere; the
+// distance of its centre from the line is not. Of b ± √… only the sum is formed; the other root is Vieta's. t0 ≤ t1 are the
+// intersections of the whole line, negative ones behind the origin. Compensated: f, f² − r² and the point next to the
+// centre are double-floats, for origins near the surface and rays that graze a distant sphere. Without a hit, or for
+// direction 0: 0, 0.
+// Pictures have triangles alone; the near side of a sphere light is found by ball_reach.
 // @lab ball_reach: lights_of_the_lecture_are_those_that_light_pictures
 RaySphere ray_sphere(vec3 origin, vec3 direction, vec3 center, float radius) {
     RaySphere r = RaySphere(false, 0.0, 0.0);
@@ -65,8 +68,8 @@ RaySphere ray_sphere(vec3 origin, vec3 direction, vec3 center, float radius) {
             c = squares_less(x, y, z, R);
             b = -df_add(df_add(times(x, d.x), times(y, d.y)), times(z, d.z)).hi;
             d2 = moves ? dot2(d, d).hi : 1.0;
-            // Any point h of the line near the foot of the perpendicular will do, if it lies exactly on the line: what
-            // is left of it along the line is taken off again.
+            // Any point h near the foot of the perpendicular will do if it lies exactly on the line: its component along
+            // the line is subtracted again.
             float s = b / d2;
             DoubleFloat hx = df_add(x, two_product(s, d.x));
             DoubleFloat hy = df_add(y, two_product(s, d.y));
@@ -89,24 +92,24 @@ RaySphere ray_sphere(vec3 origin, vec3 direction, vec3 center, float radius) {
     return r;
 }
 
-// A ray as boxes see it: near and far of a box are centre·inverse + start ∓ half·extent.
+// A ray prepared for slab tests: near and far t of a box are centre·inverse + start ∓ half·extent.
 struct BoxRay {
     vec3 inverse;
     vec3 start_near;
     vec3 start_far;
     vec3 extent;
-    int base; // first texel of the list of nodes
-    int end;  // place of the sentinel
+    int base; // first texel of the BVH's list of nodes
+    int end;  // index of its sentinel
 };
 
-// Beyond 1e20 a direction is parallel to the planes as far as any scene goes, and 0·∞ does not happen.
+// Beyond 1e20 a direction is parallel to the planes in every scene, and 0·∞ does not occur.
 vec3 inverse_direction(vec3 direction) {
     return clamp(1.0 / direction, -1e20, 1e20);
 }
 
-// Of boxes of floats: `offset`, 32 roundings of the largest coordinate in the scene, and 8 of the origin's on each side make
-// up for all roundings here, so that no box that is hit is missed. Ize (JCGT 2(2) 2013) makes the far end longer, by a
-// factor; a box that begins behind the origin has none to make longer.
+// For boxes in f32. `offset` is 32 roundings of the largest coordinate in the scene. It is added on each side with 8
+// roundings of the origin's coordinates: together they exceed all rounding errors here, so no hit is missed (a conservative
+// test). Ize (JCGT 2(2) 2013) lengthens the far end by a factor; that has no effect on a box that begins behind the origin.
 void of_boxes(inout BoxRay r, vec3 origin, vec3 inverse, float offset) {
     vec3 pad = abs(origin) * (8.0 / 16777216.0) * abs(inverse) + abs(inverse) * offset;
     r.inverse = inverse;
@@ -117,9 +120,8 @@ void of_boxes(inout BoxRay r, vec3 origin, vec3 inverse, float offset) {
 
 // @eq N36: max(near_x, near_y, near_z, t_min) ≤ min(far_x, far_y, far_z, t_max), t_min ≥ 0
 // @out hit
-// Whether a ray meets a box within [t_min, t_max], in integers: floats order as their bits do where they are positive, a
-// negative far end loses in any case, and min and max of integers are one instruction each where those of floats
-// are three.
+// Slab test of a ray and a box within [t_min, t_max], in integers. Positive floats order as their bits do, and a negative
+// far end fails in any case. min and max of integers are one instruction each; those of floats are three.
 bool meets(vec3 near, vec3 far, float t_min, float t_max) {
     ivec3 n = floatBitsToInt(near);
     ivec3 f = floatBitsToInt(far);
@@ -133,7 +135,7 @@ struct Slab {
 };
 
 // @eq N36: t_near = max(0, near_i), t_far = min(t_max, far_i), i = x, y, z; near, far = (centre − origin ∓ half)/direction
-// A box of a tree as traversal tests it, padded. `offset` is of the scene.
+// The slab test of BVH traversal, with its padding. `offset` is that of the scene.
 // @lab meets: every_way_finds_what_brute_force_finds
 Slab slab(vec3 origin, vec3 direction, vec3 centre, vec3 half_size, float offset, float t_max) {
     BoxRay r;
@@ -153,7 +155,7 @@ struct RayTriangle {
     float v;
 };
 
-// Coordinates in the order that puts the axis k last.
+// Coordinates permuted so that the axis k is last.
 vec3 axis_last(vec3 p, int k) {
     return k == 0 ? p.yzx : k == 1 ? p.zxy : p;
 }
@@ -164,13 +166,13 @@ int longest_axis(vec3 direction) {
     return abs(direction.x) == size ? 0 : abs(direction.y) == size ? 1 : 2;
 }
 
-// The shear that makes a ray the last axis, as rows of a matrix: of their entries two are 0 and 1, so that a product with
-// one rounds as x − s z does, and no coordinates need to be exchanged, which costs lavapipe two selects each.
+// The shear that makes a ray the last axis, as rows of a matrix. Two of its entries are 0 and 1, so a product with a row
+// rounds as x − s z does. The matrix also permutes the axes: exchanging coordinates costs lavapipe two selects each.
 struct Shear {
     vec3 x;
     vec3 y;
     vec3 z;
-    float dz;  // of the direction along the row z, never 0
+    float dz;  // component of the direction along the row z, never 0
 };
 
 Shear ray_shear(vec3 direction) {
@@ -179,7 +181,7 @@ Shear ray_shear(vec3 direction) {
     precise float dz = d.z == 0.0 ? 1.0 : d.z;
     precise vec2 shear = d.xy / dz;
     vec3 e = vec3(k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0);
-    // The axis after k is e turned once, the one after that turned twice.
+    // The axis after k is e rotated once, the one after that e rotated twice.
     return Shear(e.zxy - shear.x * e, e.yzx - shear.y * e, e, dz);
 }
 
@@ -188,27 +190,27 @@ float along(vec3 row, vec3 p) {
     return sum;
 }
 
-// a.x b.y − a.y b.x, and exactly the negative with a and b exchanged: an edge has one value in both its triangles.
+// a.x b.y − a.y b.x; exactly the negative with a and b exchanged. So an edge has one value in both of its triangles.
 float edge_function(vec2 a, vec2 b) {
     precise float e = a.x * b.y - a.y * b.x;
     return e;
 }
 
-// On which side of the edge from a to b the ray passes: the sign of its edge function, and where that is 0 the sign it
-// has for a ray moved by (ε, ε²). A ray that meets an edge or a corner thus meets one of the triangles there, not none
-// and not two, and crosses a closed surface an even number of times.
+// On which side of the edge from a to b the ray passes: the sign of the edge function. Where that is 0, the sign for a ray
+// moved by (ε, ε²). So a ray that meets an edge or a corner hits exactly one of the triangles there, and crosses a closed
+// surface an even number of times.
 float side_of_edge(float edge, vec2 a, vec2 b) {
     return edge != 0.0 ? edge : a.y != b.y ? a.y - b.y : b.x - a.x;
 }
 
 struct ShearedTriangle {
     bool inside;  // by side_of_edge
-    vec3 weights; // of the corners, times det
-    float det;    // twice the area across the ray
-    float depth;  // det times dz times the ray's parameter
+    vec3 weights; // barycentric weights of the corners, times det
+    float det;    // twice the area projected along the ray
+    float depth;  // det times dz times the ray's t
 };
 
-// Woop, Benthin and Wald, JCGT 2(1) 2013. Corners relative to the ray's origin.
+// Watertight ray/triangle intersection (Woop, Benthin and Wald, JCGT 2(1) 2013). Corners are relative to the ray's origin.
 ShearedTriangle sheared_triangle(Shear s, vec3 a, vec3 b, vec3 c) {
     vec2 qa = vec2(along(s.x, a), along(s.y, a));
     vec2 qb = vec2(along(s.x, b), along(s.y, b));
@@ -227,7 +229,7 @@ struct PairOfAxes {
     DoubleFloat y;
 };
 
-// (p − origin)·scale, sheared, in pairs
+// (p − origin)·scale, sheared, as double-floats
 PairOfAxes sheared_pair(vec3 p, vec3 origin, float scale, DoubleFloat shear_x, DoubleFloat shear_y) {
     DoubleFloat x = df_scale(two_sum(p.x, -origin.x), scale);
     DoubleFloat y = df_scale(two_sum(p.y, -origin.y), scale);
@@ -235,17 +237,17 @@ PairOfAxes sheared_pair(vec3 p, vec3 origin, float scale, DoubleFloat shear_x, D
     return PairOfAxes(df_add(x, df_negate(df_mul(shear_x, z))), df_add(y, df_negate(df_mul(shear_y, z))));
 }
 
-// The edge function of pairs: exactly the negative with a and b exchanged, too.
+// The edge function of double-floats; exactly the negative with a and b exchanged, too.
 DoubleFloat edge_of_pairs(PairOfAxes a, PairOfAxes b) {
     return df_add(df_mul(a.x, b.y), df_negate(df_mul(a.y, b.x)));
 }
 
 // @eq N37: point = origin + t direction = a + u (b − a) + v (c − a), u, v, 1 − u − v ≥ 0, t ≥ 0
-// Woop, Benthin and Wald, JCGT 2(1) 2013: the vertices are sheared so that the ray is the last axis; on which side of
-// an edge it passes depends on that edge alone, so that no ray slips between two triangles: unless one of
-// them is seen under less than 2.5e-7 rad, which is how coarse sheared coordinates are, and rounding turns it over.
-// Compensated: pairs, 1e-14 rad. Both sides are hit. Miss, edge-on or direction 0: all 0. Vertices and direction are
-// scaled by powers of two, which rounds nothing.
+// Watertight ray/triangle intersection (Woop, Benthin and Wald, JCGT 2(1) 2013). The vertices are sheared so that the ray
+// is the last axis. On which side of an edge it passes depends on that edge alone, so no ray slips between two triangles.
+// The exception is a triangle that subtends less than 2.5e-7 rad, the resolution of sheared coordinates, if rounding flips
+// it. Compensated: double-floats, 1e-14 rad. Both sides of a triangle are hit. A miss, a triangle edge-on, or direction 0:
+// all 0. Vertices and direction are scaled by powers of two, which rounds nothing.
 // @lab sheared_triangle: every_way_finds_what_brute_force_finds
 RayTriangle ray_triangle(vec3 origin, vec3 direction, vec3 a, vec3 b, vec3 c) {
     RayTriangle r = RayTriangle(false, 0.0, 0.0, 0.0);
@@ -271,7 +273,7 @@ RayTriangle ray_triangle(vec3 origin, vec3 direction, vec3 a, vec3 b, vec3 c) {
         float scale = scale_to_one(max(largest_component(pa), max(largest_component(pb), largest_component(pc))));
         Shear shear = ray_shear(direction * scale_d);
         ShearedTriangle s = sheared_triangle(shear, pa * scale, pb * scale, pc * scale);
-        // Weights of a, b and c, times twice the projected area.
+        // Barycentric weights of a, b and c, times twice the projected area.
         float wa = s.weights.x;
         float wb = s.weights.y;
         float wc = s.weights.z;
@@ -307,20 +309,22 @@ RayTriangle ray_triangle(vec3 origin, vec3 direction, vec3 a, vec3 b, vec3 c) {
 
 // @eq N38: p + (n + free) offset
 // @out q
-// The one place where a ray leaves a surface: moved off it along n, the geometric normal on the side it leaves to, by
-// `offset`, 32 roundings of the largest coordinate in the scene: a hit is off the plane of its triangle by a few of
-// them, and another surface there is found by a few off its own (tests/traversal.rs counts self-hits). And as far
-// along `free`, a direction known to be free: back to where the surface was seen from. A point in a corner may else
-// lie behind the other wall. No length of its own: scenes of any size and place are treated alike. Wächter and Binder
-// (Ray Tracing Gems 6) move each coordinate by its own roundings, which does not move along the normal.
+// The origin of every ray that leaves a surface. It is moved along n, the geometric normal on the side of departure, by
+// `offset`: 32 roundings of the largest coordinate in the scene. A hit is off the plane of its triangle by a few roundings,
+// and another surface is found there a few off its own (tests/traversal.rs counts self-intersections). It is also moved as
+// far along `free`, a direction known to be unoccluded: back towards the viewer. Without that a point in a corner may end
+// up behind the other wall.
+// The rule has no length of its own: it treats scenes of any size and position alike. Rejected: Wächter and Binder (Ray
+// Tracing Gems 6) move each coordinate by its own roundings, which is no motion along the normal.
 vec3 offset_origin(vec3 p, vec3 n, vec3 free, float offset) {
     return p + (n + free) * offset;
 }
 
 // @eq N39: P = a + u (b − a) + v (c − a)
 // @out P
-// Where a ray meets a triangle. origin + t direction (fast) carries the rounding of t, which is that of the distance to
-// the origin; the barycentrics' is that of the triangle's size. u and v are clamped to [0, 1].
+// The point where a ray meets a triangle, from barycentric coordinates: their error scales with the size of the triangle.
+// origin + t direction (fast) carries the rounding of t, which scales with the distance to the origin. u and v are clamped
+// to [0, 1].
 vec3 hit_point(vec3 origin, vec3 direction, float t, vec3 a, vec3 b, vec3 c, float u, float v) {
     vec2 uv = clamp(vec2(u, v), 0.0, 1.0);
     return ARITHMETIC == FAST ? origin + t * direction : a + (uv.x * (b - a) + uv.y * (c - a));
@@ -328,8 +332,8 @@ vec3 hit_point(vec3 origin, vec3 direction, float t, vec3 a, vec3 b, vec3 c, flo
 
 // @eq N33: p_rel = (p_hi + p_lo) − (eye_hi + eye_lo)
 // @out p_rel
-// Positions as pairs of floats, 1e-7 m apart at the Earth's radius; their difference is rounded once. Plain floats (the
-// tier fast takes the hi parts) are 6 cm apart at 1e6 m.
+// Positions are double-floats, 1e-7 m apart at the Earth's radius; their difference is rounded once. Plain floats (the tier
+// fast takes the hi parts) are 6 cm apart at 1e6 m.
 // @host src/upload/scene.rs: places of instances and lights around the eye
 vec3 camera_relative(vec3 p_hi, vec3 p_lo, vec3 eye_hi, vec3 eye_lo) {
     vec3 p_rel;

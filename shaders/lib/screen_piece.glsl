@@ -1,4 +1,5 @@
-// A pixel of the G-buffer as a piece of a plane on the screen.
+// A pixel of the G-buffer as a piece of a plane in screen space, for screen-space ray marching.
+// Where to read: docs/decisions/screen-space.md. Assumes: normalised device coordinates, reversed depth, geometric normals.
 #ifndef SCREEN_PIECE_GLSL
 #define SCREEN_PIECE_GLSL
 #include "lib/encode.glsl"
@@ -6,12 +7,12 @@
 
 struct ScreenPiece {
     float z;         // reversed depth at the pixel's centre; 0 where nothing was drawn
-    vec2 slope;      // how it grows with x and y of the screen
-    float width;     // of the pixel there
-    float thickness; // that and what the plane spans over the pixel
+    vec2 slope;      // change of z per unit of x and y
+    float width;     // width of the pixel at that depth, in z
+    float thickness; // width, plus the range of z that the plane spans over the pixel
 };
 
-// Reversed depth is 1/w times a constant, or linear where the view is parallel, so planes are planes in x, y and z of the
+// Reversed depth is 1/w times a constant, or linear in an orthographic view. So planes stay planes in x, y and z of the
 // screen: the viewing ray through (x, y) meets this one at 1/w ~ n·v(x, y).
 ScreenPiece screen_piece(ivec2 pixel) {
     ScreenPiece r;

@@ -1,6 +1,8 @@
-// How much of a light arrives at a point: what lies between stops it, or, where it is transparent, attenuates and colours
-// it on a straight line (lecture R5; a stated approximation: refraction would focus the light elsewhere). By rays; maps know
-// what stops light alone.
+// Shadows of punctual lights: shadow rays, transparent shadows, and shadow maps with percentage-closer filtering.
+// A shadow ray stops at opaque surfaces. Transparent surfaces attenuate and colour the light on a straight line (lecture
+// R5); this is an approximation, since refraction would focus the light elsewhere. Shadow maps hold opaque surfaces alone.
+// Where to read: RTR 4, sections 7.4 and 7.5; Reeves, Salesin and Cook 1987 (percentage-closer filtering);
+// docs/decisions/shadow-maps.md. Assumes: bvh space, metres; unit normals.
 #ifndef SHADOW_GLSL
 #define SHADOW_GLSL
 #include "lib/hit.glsl"
@@ -12,22 +14,23 @@ layout(constant) const uint SHADOWS = 0;     // rung of the knob `shadows`
 const uint SHADOW_OFF = 0;
 const uint SHADOW_MAP = 1;
 const uint SHADOW_RAY = 2;
-layout(constant) const bool FILTERS = false; // something masked, blended or transmissive is in the scene
+layout(constant) const bool FILTERS = false; // some surface of the scene is masked, blended or transmissive
 layout(constant) const uint ABSORPTION = 0;
 const uint ABSORPTION_OFF = 0;
 const uint ABSORPTION_NOMINAL = 1; // by the nominal thickness
-const uint ABSORPTION_PATH = 2;    // along the path
+const uint ABSORPTION_PATH = 2;    // along the ray
 
-// Maps of all lights in one image (pass/shadow_map.rs).
+// The shadow maps of all lights in one image (src/pass/shadow_map.rs).
 layout(scene) uniform sampler2D shadow_depth;
-// Of the numbers that a map's comparison rests on; see below.
+// Relative rounding error of the numbers that a map lookup depends on; derived at map_visibility.
 const float SHADOW_ROUNDINGS = 32.0 / 16777216.0;
 
 uint shadow_rays = 0;
-uint lights_cut_off = 0; // surfaces whose lights were not all gone through, for want of steps
+uint lights_cut_off = 0; // surfaces whose loop over lights ended early, at the limit of loop iterations
 
-// Reflectance of a dielectric between two media for light that does not bend: by the angle in the thinner one, so that there is no total
-// reflection on a straight line. What tints it in air tints it there. Equal indices reflect nothing, Schlick's curve or not.
+// Fresnel reflectance of a dielectric between two media for undeflected light. The angle counts in the thinner medium, so a
+// straight line has no total internal reflection. A tint of F0 in air applies here too. Equal indices reflect nothing;
+// Schlick's curve would.
 vec3 straight_reflectance(Surface s, float cos_v, float n1, float n2) {
     if (n1 == n2) return vec3(0.0);
     float ratio = max(n1, n2) / min(n1, n2);
@@ -39,7 +42,7 @@ vec3 straight_reflectance(Surface s, float cos_v, float n1, float n2) {
     return f0 + (vec3(s.f90_dielectric) - f0) * share;
 }
 
-// Colour of what goes through a surface: a solid is entered and left, and each takes the root of it.
+// Colour of transmitted light. A solid is entered and left, and each interface takes the square root of it.
 vec3 tint_through(vec3 base, bool sheet, bool front, vec3 nominal_depth) {
     vec3 tint = sheet ? base : sqrt(base);
     if (ABSORPTION != ABSORPTION_OFF) {
@@ -49,7 +52,7 @@ vec3 tint_through(vec3 base, bool sheet, bool front, vec3 nominal_depth) {
     return tint;
 }
 
-// What one surface lets through of light along `direction`, with the media before and after it.
+// Transmittance of one surface for light along `direction`; updates the list of media.
 vec3 filtered(HitPoint point, vec3 direction, inout uvec4 media) {
     HitSurface hit = hit_surface(point, direction, 0.0);
     float cos_v = abs(dot(point.n_smooth, direction));
@@ -74,44 +77,50 @@ vec3 filtered(HitPoint point, vec3 direction, inout uvec4 media) {
     return 1.0 - hit.coverage + hit.coverage * straight_transmittance(b);
 }
 
-// A hit that is known, with its barycentrics.
+// A known hit with its barycentric coordinates recomputed.
 Hit hit_again(vec3 origin, vec3 direction, float t, uint triangle) {
     ShearedTriangle s = sheared_from(triangle_at(triangle), origin, ray_shear(direction));
     float inverse = 1.0 / s.det;
     return Hit(t, triangle, s.weights.y * inverse, s.weights.z * inverse);
 }
 
-// Which of six maps along ±x, ±y, ±z shows what lies in direction d from the light.
+// Which of the six shadow maps along ±x, ±y, ±z covers direction d from the light.
 int cube_face(vec3 d) {
     vec3 a = abs(d);
     int axis = a.x >= max(a.y, a.z) ? 0 : a.y >= a.z ? 1 : 2;
     return 2 * axis + (d[axis] < 0.0 ? 1 : 0);
 }
 
-// Share of light `index` that arrives at p, in bvh space, by its map: n is the normal of p's surface on the side of the
-// light, to_light leads to it or is its direction, and p was computed from numbers as large as `size`.
+// Shadow map lookup: the share of light `index` that reaches p, in bvh space. n is the normal of p's surface on the side of
+// the light; to_light leads to the light or is its direction; p was computed from numbers as large as `size`.
 //
-// The four texels whose centres lie around p, less than a texel away across and down, are compared and the results
-// interpolated. Depth d is reversed: nearer to the light is larger. In texels and d, a plane is a plane.
+// Percentage-closer filtering. The four texels whose centres lie around p, less than a texel away across and down, are
+// compared, and the results are interpolated. Depth d is reversed: nearer to the light is larger. In texels and d, a plane
+// is a plane.
 //
-// What must not happen is that p is dark by a surface that it is on, or that it meets: light reaches both. At a centre c,
-// - a plane through p has the depth d_c = d_p + g·(c − p), g its slope. Of a convex body all the rest is behind it, and p is
-//   lit where d_c is no less than what is stored.
-// - What p's plane meets in a hollow may stand before it at c: say a plane of slope h, which has passed p's depth somewhere
-//   between p and c. Then its depth at p, d' + h·(p − c), is not before p's: d_p ≥ d' − (|h_x| + |h_y|). So that is what
-//   the map stores, d' less its change over a texel (pass/shadow_map.frag), and p is lit where d_p is no less than that.
-// Whichever is more favourable counts: max(d_c, d_p) ≥ stored. Both are shifts along a surface by up to a texel across and
-// down; so a shadow's edge lies within two texels (each way) of where it belongs, also where the surfaces touch.
-// What bends twice within a texel is not told from an edge.
+// Bias. No surface that contains p, or that meets another one at p, may shadow p. Let c be the centre of a texel.
+// 1. A plane through p has the depth d_c = d_p + g·(c − p) there, g its slope. The rest of a convex object lies behind it.
+//    So p is lit where d_c is no less than the stored depth.
+// 2. At a concave edge another surface meets the plane and may be in front of it at c: a plane of slope h, which has passed
+//    p's depth somewhere between p and c. Its depth at p, d' + h·(p − c), is not in front of p's: d_p ≥ d' − (|h_x| +
+//    |h_y|). So the map stores d' less its change over a texel (pass/shadow_map.frag), and p is lit where d_p is no less
+//    than the stored depth.
+// 3. The more favourable comparison counts: max(d_c, d_p) ≥ stored. Both shift along a surface by up to one texel across
+//    and down. So the edge of a shadow is within two texels (each way) of its true place, also where surfaces touch. A
+//    surface that bends twice within a texel cannot be distinguished from an edge.
 //
-// Roundings, in units of 2^-24: p is the middle of a pixel, with an error along the eye's ray. A triangle's depth 1/z
-// is interpolated to some 4 of its largest value in sight, 1/z_n, which is 4 z/z_n of z; seen at an angle it counts along the
-// normal, and h/z ≥ cos is the plane's distance over p's: 4 h z/z_n ≤ 4 z/cos of the frustum's corner: 8 of |p_rel|. The
-// map's depth likewise, 8 of the distance to a light near the scene, 8 of the scene's extent for others, and that again for
-// the products here. All of it is an offset along n, by `size` with 32: half of that, and as much to spare.
+// Rounding errors, in units of 2^-24.
+// 4. p is the middle of a pixel, with an error along the viewing ray. A triangle's depth 1/z is interpolated to some 4
+//    roundings of its largest visible value, 1/z_n: an error of 4 z/z_n of z. Along the normal it is multiplied by the
+//    cosine of the angle, which is at most h/z, the plane's distance over p's. 4 h z/z_n ≤ 4 z/cos, with the cosine of the
+//    frustum's corner: 8 of |p_rel|.
+// 5. The map's depth has such an error too: 8 of the distance to a light near the scene, 8 of the scene's extent for
+//    others, and as much again for the products here.
+// 6. All of it is an offset along n, with 32 times `size`: half of that is needed, the other half is spare.
 //
-// Rasterisers round vertices to parts of a pixel, and most interpolate depth between the rounded ones (View::snap): then p has the depth of
-// a point that far beside it, and is off the plane by that at most. What the map stores is less by the change over a whole texel already.
+// Vertex rounding. Rasterisers round vertices to fractions of a pixel, and most interpolate depth between the rounded ones
+// (View::snap). Then p has the depth of a point that far beside it, and is off the plane by at most that. The map already
+// stores less by the change over a whole texel.
 float map_visibility(vec3 p, vec3 n, vec3 to_light, uint index, float size) {
     Light light = light_at(index);
     int first = int(light.first_map) + (light.maps > 1.0 ? cube_face(-to_light) * SHADOW_MAP_TEXELS : 0);
@@ -125,19 +134,20 @@ float map_visibility(vec3 p, vec3 n, vec3 to_light, uint index, float size) {
     vec4 q = vec4(p + n * (trace_terms.offset + snap + (size + distance) * SHADOW_ROUNDINGS), 1.0);
     float w = dot(row_w, q);
     vec3 at = vec3(dot(row_u, q), dot(row_v, q), dot(row_d, q)) / w;
-    // Gradients of across, down and depth in space, times w. On the plane, ∇d = g_x ∇u + g_y ∇v + a multiple of n.
+    // Gradients in space of the coordinates across, down and depth, times w. On the plane, ∇d = g_x ∇u + g_y ∇v + a
+    // multiple of n.
     vec3 grad_u = row_u.xyz - at.x * row_w.xyz;
     vec3 grad_v = row_v.xyz - at.y * row_w.xyz;
     vec3 grad_d = row_d.xyz - at.z * row_w.xyz;
     vec3 v_n = cross(grad_v, n);
     float area = dot(grad_u, v_n);
     vec2 slope = area != 0.0 ? vec2(dot(grad_d, v_n), dot(grad_d, cross(n, grad_u))) / area : vec2(0.0);
-    // Nothing beyond the border is asked for but where there is no light.
+    // Clamped to the map's border: beyond it is no light.
     at.xy = clamp(at.xy, square.xy + 1.0, square.xy + square.z - 1.0);
     vec2 corner = floor(at.xy - 0.5) + 1.0;
     vec2 share = at.xy - 0.5 - floor(at.xy - 0.5);
     vec4 stored = textureGather(shadow_depth, corner / vec2(textureSize(shadow_depth, 0)));
-    // In the order of textureGather: left below, right below, right above, left above.
+    // In the order of textureGather: lower left, lower right, upper right, upper left.
     vec4 across = corner.x + vec4(-0.5, 0.5, 0.5, -0.5) - at.x;
     vec4 down = corner.y + vec4(0.5, 0.5, -0.5, -0.5) - at.y;
     vec4 plane = at.z + max(slope.x * across + slope.y * down, 0.0);
@@ -145,12 +155,13 @@ float map_visibility(vec3 p, vec3 n, vec3 to_light, uint index, float size) {
     return mix(mix(lit.w, lit.z, share.x), mix(lit.x, lit.y, share.x), share.y);
 }
 
-// p in bvh space, n the normal of its triangle, `self` its flat face, v to the viewer, `media` those on the light's
-// side. The light is at p + to_light, or in that direction where t_max is larger than 1.
+// Visibility by a shadow ray. p is in bvh space, n the normal of its triangle, source_face its coplanar group, v points to
+// the viewer, `media` are those on the light's side. The light is at p + to_light, or in that direction where t_max is
+// larger than 1.
 vec3 visibility(vec3 p, vec3 n, vec3 v, uint source_face, uvec4 media, vec3 to_light, float t_max, bool wanted) {
     vec3 origin = ray_origin(p, n, v);
     float length_of_direction = vector_length(to_light);
-    // What touches the light itself does not shadow it: t is a few roundings off.
+    // Four roundings before the light, so that a surface touching it does not occlude it.
     float end = t_max == 1.0 ? 1.0 - 4.0 / 16777216.0 : t_max;
     shadow_rays += wanted ? 1u : 0u;
     vec3 through = vec3(wanted ? 1.0 : 0.0);
@@ -158,7 +169,7 @@ vec3 visibility(vec3 p, vec3 n, vec3 v, uint source_face, uvec4 media, vec3 to_l
         bool blocked = trace(origin, to_light, source_face, FROM_ORIGIN, wanted ? end : -1.0, OPAQUE, true).triangle != NO_TRIANGLE;
         return blocked ? vec3(0.0) : through;
     }
-    // Four filters at a time.
+    // Transparent shadows: the surfaces that filter light are collected four at a time, nearest first.
     Hit last = FROM_ORIGIN;
     bool goes_on = wanted;
     do {
@@ -189,9 +200,9 @@ vec3 visibility(vec3 p, vec3 n, vec3 v, uint source_face, uvec4 media, vec3 to_l
     return through;
 }
 
-// Smooth normals turn away from a light later than the triangles do that they stand for, and those shadow themselves in
-// steps. The light fades out to where the triangle turns away (Chiang, Li and Burley, Taming the Shadow Terminator,
-// SIGGRAPH 2019 Talks).
+// The shadow terminator. Interpolated normals turn away from a light later than their triangles, which then shadow
+// themselves in steps. The light fades out towards where the triangle turns away (Chiang, Li and Burley, Taming the Shadow
+// Terminator, SIGGRAPH 2019 Talks).
 float terminator(vec3 n_smooth, vec3 n, vec3 l) {
     float cos_n = dot(n, l);
     float both = dot(n_smooth, l) * dot(n_smooth, n);

@@ -1,5 +1,7 @@
-// Sheen (KHR_materials_sheen): cloth, whose fibres stand off the surface and glow at its edges. Estevez and Kulla, "Production friendly
-// microfacet sheen BRDF", 2017. The twin in f64, which also makes the table: crates/scene/src/lobe/sheen.rs.
+// Sheen (KHR_materials_sheen): the lobe of cloth, whose fibres reflect at grazing angles.
+// Where to read: Estevez and Kulla, "Production friendly microfacet sheen BRDF", 2017; RTR 4, section 9.10 (cloth). The f64
+// twin, which also makes the table: crates/scene/src/lobe/sheen.rs. Assumes: unit vectors, perceptual roughness; α =
+// roughness².
 #ifndef SHEEN_GLSL
 #define SHEEN_GLSL
 #include "lib/constants.glsl"
@@ -7,7 +9,7 @@
 #include "lib/reflectance.glsl"
 #include "lib/surface.glsl"
 
-// The fit to the masking of fibres, between the numbers of α = 0 and of α = 1.
+// The fit of Estevez and Kulla to the masking function Λ, interpolated between α = 0 and α = 1.
 float sheen_lambda(float cos_n, float alpha) {
     float t = (1.0 - alpha) * (1.0 - alpha);
     float a = mix(21.5473, 25.3245, t);
@@ -21,26 +23,27 @@ float sheen_lambda(float cos_n, float alpha) {
     return exp(cos_n < 0.5 ? l : 2.0 * half_way - l);
 }
 
-// Of a white sheen, by the cosine with the normal: its directional albedo E, and the part of light from all around that comes in lower
-// than that, each by its own E: ∫ 2x E(x) dx from 0. The table has the root of the cosine, as most of E lies at the horizon.
+// By the cosine with the normal, for a white sheen. x: the directional albedo E. y: the part of a uniform environment's
+// light that arrives below that angle, weighted by E at its own angle, ∫ 2x E(x) dx from 0. The table is over the square
+// root of the cosine, as most of E lies at the horizon.
 vec2 sheen_albedo(Surface s, float cos_n) {
     return min(reflectance_texel(sqrt(clamp(cos_n, 0.0, 1.0)), max(s.sheen.a, LEAST_SHEEN_ROUGHNESS)).ba, 1.0);
 }
 
-// What sheen leaves to the base, of light from a direction or to one. For a pair of directions it is the lesser of the two.
+// Energy left to the base under sheen, for one direction. For a pair of directions the smaller value counts.
 float left_by_sheen(Surface s, float cos_n) {
     return 1.0 - largest(s.sheen.rgb) * sheen_albedo(s, cos_n).x;
 }
 
-// The same of light that is the same from all around, for what scatters it evenly: E falls from the horizon up, so that light from above
-// the viewer's angle is scaled by the viewer's E and light from below it by its own.
+// The same for a uniform environment above a diffuse base layer. E falls from the horizon upwards. So light from above the
+// viewer's angle is scaled by the viewer's E, and light from below it by its own.
 float left_by_sheen_of_all(Surface s, float cos_v) {
     vec2 e = sheen_albedo(s, cos_v);
     return 1.0 - largest(s.sheen.rgb) * (e.x * (1.0 - cos_v * cos_v) + e.y);
 }
 
-// The lobe for light from l, times cosθ. Below a roughness of 0.26, and less than 3° above the horizon, the fit sends more than it
-// receives (E up to 2.9): there it is scaled to what it receives.
+// The lobe for light from l, times cosθ. For a roughness below 0.26 and less than 3° above the horizon, the fit sends more
+// than it receives (E up to 2.9); there it is scaled to conserve energy.
 vec3 sheen_lobe(Surface s, vec3 l, float cos_l, float cos_v) {
     float roughness = max(s.sheen.a, LEAST_SHEEN_ROUGHNESS);
     float alpha = roughness * roughness;

@@ -1,5 +1,6 @@
-// Absorption that varies inside a body (lecture A2): its σ is a grid in the space of its object, summed along straight
-// segments.
+// Heterogeneous media: absorption σ on a grid in object space, integrated along a ray by ray marching (lecture A2).
+// The optical depth is a quadrature (left, midpoint or Simpson) of trilinear grid values along a straight segment. Where to
+// read: pbrt 4, sections 11.2 and 11.4 (media); docs/decisions/absorption.md. Assumes: bvh space, σ in 1/m.
 #ifndef SIGMA_GRID_GLSL
 #define SIGMA_GRID_GLSL
 #include "lib/medium.glsl"
@@ -7,7 +8,7 @@
 #include "lib/trace.glsl"
 #include "share/sigma_grid.glsl"
 
-layout(constant) const uint MARCH_STEPS = 0;        // of each segment, a multiple of 4; 0: no grid is marched
+layout(constant) const uint MARCH_STEPS = 0;        // steps of each segment, a multiple of 4; 0: no heterogeneous medium is marched
 layout(constant) const uint QUADRATURE = QUADRATURE_MIDPOINT;
 layout(constant) const bool MARCH_COLOURS = false;  // some grid has values for red, green and blue
 
@@ -23,14 +24,14 @@ uvec4 sigma_words(uint first, int i) {
 float sigma_in_cell(int texel, int next_layer, vec3 share) {
     SigmaCell low = sigma_cell_at(uint(texel));
     SigmaCell high = sigma_cell_at(uint(texel + next_layer));
-    // As a + (b − a) t, which is a to the last bit where b is.
+    // Interpolated as a + (b − a) t, which is a to the last bit where a = b.
     vec2 first_y = low.first_y + (high.first_y - low.first_y) * share.z;
     vec2 second_y = low.second_y + (high.second_y - low.second_y) * share.z;
     vec2 along = first_y + (second_y - first_y) * share.y;
     return along.x + (along.y - along.x) * share.x;
 }
 
-// σ at a place in the grid, trilinear; outside its edge goes on.
+// σ at a position in the grid, trilinear; outside, the values of the edge continue.
 vec3 sigma_at(SigmaGrid grid, vec3 place) {
     vec3 at = clamp(place, vec3(0.0), grid.last);
     vec3 cell = min(floor(at), max(grid.last - 1.0, 0.0));
@@ -54,8 +55,8 @@ void add_sigma(inout vec3 sum, inout vec3 rest, vec3 sigma) {
     }
 }
 
-// The mean of σ over a length d from p along a unit direction, by MARCH_STEPS steps of QUADRATURE: lecture A2 divided by d.
-// A segment's steps do not depend on its length. `at` is the grid's first texel.
+// The mean of σ over a length d from p along a unit direction: quadrature by MARCH_STEPS steps of the rule QUADRATURE
+// (lecture A2, divided by d). The number of steps does not depend on the length. `at` is the grid's first texel.
 vec3 mean_sigma(uint at, vec3 p, vec3 direction, float d) {
     SigmaGrid grid = sigma_grid_at(at);
     vec4 from = vec4(p, 1.0);

@@ -1,13 +1,15 @@
-// Directions at a smooth surface (lecture F1, F4–F6). v points to the surface, N to the side that v comes from, both unit
-// vectors as 32 bits hold them; n is n_transmitted / n_incident. Results have unit length. A zero v or N gives the
-// zero vector: no direction. N is taken as given: it is the caller's business to turn it to the ray's side.
+// Reflection and refraction at a smooth surface: directions, critical angle, Brewster angle (lecture F1, F4–F6).
+// Where to read: pbrt 4, section 9.3 (Snell's law). Twins: crates/optics/src/.
+// Assumes: v points to the surface, N to the side that v comes from, both unit vectors rounded to f32; n = n_transmitted /
+// n_incident. Results have unit length. A zero v or N gives the zero vector: no direction. The caller turns N to the ray's
+// side.
 #ifndef SNELL_GLSL
 #define SNELL_GLSL
 #include "lib/arithmetic.glsl"
 #include "lib/constants.glsl"
 
-// Divided by its length; the zero vector, and what is far from unit length, gives zero (lib/frame.glsl has the general
-// one).
+// Normalises a vector of about unit length. The zero vector, and one far from unit length, give zero (lib/frame.glsl has
+// the general safe_normalize).
 vec3 renormalised(vec3 v) {
     float v2 = dot(v, v);
     return v2 > 1e-30 && v2 < 1e30 ? v / sqrt(v2) : vec3(0.0);
@@ -19,8 +21,8 @@ struct Reflection {
 
 // @eq F4 N12: R = v + 2N cosα, cosα = −v·N
 // @name reflect
-// Renormalised: the length of a chain of 256 reflections drifts by 8.5e-6 otherwise. Divided by |N|², so that a rounded
-// N does not tilt the result.
+// Normalised again: otherwise the length drifts by 8.5e-6 over a chain of 256 reflections. Divided by |N|², so that a
+// rounded N does not tilt the result.
 Reflection reflect_ray(vec3 v, vec3 N) {
     vec3 r;
     if (ARITHMETIC == FAST) {
@@ -28,13 +30,13 @@ Reflection reflect_ray(vec3 v, vec3 N) {
     } else {
         float n2 = dot(N, N);
         vec3 mirrored = v - N * (2.0 * dot(N, v) / n2);
-        // Also vectors whose squares leave f32's range have no direction here.
+        // Vectors whose squares leave the range of f32 have no direction here either.
         r = renormalised(n2 > 1e-30 && n2 < 1e30 ? mirrored : vec3(0.0));
     }
     return Reflection(r);
 }
 
-// A direction that a smooth normal has sent to the wrong side of the triangle, mirrored in it.
+// Mirrors a direction to the front of its triangle where an interpolated normal has sent it behind.
 vec3 on_side(vec3 direction, vec3 n) {
     return direction - n * (2.0 * min(dot(direction, n), 0.0));
 }
@@ -47,12 +49,13 @@ struct Refraction {
 
 // @eq F1 F5 N11 N13: T = v/n + N(cosα/n − cosβ), disc = cos²β = 1 − sin²α/n²; disc < 0 is total internal reflection
 // @name refract
-// With g = n cosβ = √(cos²α + n² − 1), T = (v + N(cosα − g))/n and cosα − g = (1 − n²)/(cosα + g): nothing cancels, and
-// N⊥ = (v + N cosα)/sinα, 0/0 at normal incidence, is never formed. cos²α and the lengths of v and N, whose rounding
-// decides near the critical angle, come from dot2 and g² is summed in double-float: g² = n² − |N × v|² in plain f32
-// reported total reflection for rays up to 3e-7 on the wrong side.
-// Compensated: also the tangential part, as (N × v) × N from exact products. On total reflection T is the zero vector
-// and `tir` says so; so it is for n ≤ 0, for zero vectors and for any beyond 1e9.
+// With g = n cosβ = √(cos²α + n² − 1): T = (v + N(cosα − g))/n, and cosα − g = (1 − n²)/(cosα + g), where nothing cancels.
+// N⊥ = (v + N cosα)/sinα, which is 0/0 at normal incidence, is not needed.
+// Near the critical angle the rounding of cos²α and of the lengths of v and N decides. They come from dot2, and g² is
+// summed in double-float. Rejected: g² = n² − |N × v|² in plain f32 reported total internal reflection for rays up to 3e-7
+// on the wrong side.
+// Compensated: the tangential part too, as (N × v) × N from exact products. On total internal reflection T is the zero
+// vector and `tir` is true. The same for n ≤ 0, for zero vectors, and for any component beyond 1e9.
 Refraction refract_ray(vec3 v, vec3 N, float n) {
     Refraction r = Refraction(vec3(0.0), true, 0.0);
     if (ARITHMETIC == FAST) {
@@ -93,8 +96,8 @@ struct CriticalAngle {
 };
 
 // @eq F6: θ_c = arcsin(n_out/n_in), from the dense side: it exists for n_in > n_out
-// Not Brewster's angle. Taken as an arc tangent of sine and cosine: the cosine √((n_in − n_out)(n_in + n_out))/n_in
-// keeps its digits for nearly equal indices, where the arc sine has none. Without one: 90°, cosine 0.
+// Not Brewster's angle. It is the arc tangent of sine and cosine: the cosine √((n_in − n_out)(n_in + n_out))/n_in keeps its
+// digits for nearly equal indices, where the arc sine has none. Without a critical angle: 90°, cosine 0.
 // @lab fresnel_dielectric: both_angles_of_a_boundary_are_those_of_its_reflectance
 CriticalAngle critical_angle(float n_in, float n_out) {
     CriticalAngle r = CriticalAngle(n_in > n_out && n_out >= 0.0, 0.5 * PI, 90.0, 0.0);
@@ -117,7 +120,7 @@ struct BrewsterAngle {
 };
 
 // @eq F6: θ_B = arctan(n_out/n_in), where r_p = 0; it exists on both sides
-// By the sizes of the indices; 0 on both sides: 0.
+// Uses the magnitudes of the indices; 0 for both gives 0.
 // @lab fresnel_dielectric: both_angles_of_a_boundary_are_those_of_its_reflectance
 BrewsterAngle brewster_angle(float n_in, float n_out) {
     BrewsterAngle r = BrewsterAngle(0.0, 1.0);

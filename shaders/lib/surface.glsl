@@ -1,4 +1,6 @@
-// A surface point as the lighting sees it: what a material, its textures and a vertex tell of it.
+// A surface point as lighting sees it: geometry, and parameters from the material, its textures and the vertices.
+// Where to read: glTF 2.0, section 3.9 and appendix B; pbrt 4, chapter 9. Assumes: unit vectors in world axes, reflectances
+// in [0, 1].
 #ifndef SURFACE_GLSL
 #define SURFACE_GLSL
 #include "lib/fresnel.glsl"
@@ -7,7 +9,7 @@
 #include "lib/texels.glsl"
 #include "share/layers.glsl"
 
-// The knobs `brdf` and `fresnel` (src/plan/knobs/rungs.rs): one formula each, chosen when the pipeline is made.
+// The knobs `brdf` and `fresnel` (src/plan/knobs/rungs.rs): specialization selects one formula of each.
 layout(constant) const uint BRDF = 2;
 const uint BRDF_BLINN_PHONG = 0;
 const uint BRDF_BLINN_PHONG_RECIPROCAL = 1;
@@ -17,10 +19,11 @@ layout(constant) const uint FRESNEL = 0;
 const uint FRESNEL_SCHLICK = 0;
 const uint FRESNEL_EXACT = 1;
 layout(constant) const bool CLEARCOAT = false;
-layout(constant) const bool ROUGH = false; // some surface that rays meet is rough
-layout(constant) const bool CONDUCTORS = false; // some metal is given by its n and κ
-layout(constant) const uint LOBES_SEEN = 0;     // bit by LOBE_...: some material has the lobe
-// Smooth enough surfaces are mirrored by rays, rougher ones by the prefiltered environment (knobs `reflection`, `lobes`).
+layout(constant) const bool ROUGH = false; // some surface that rays hit is rough
+layout(constant) const bool CONDUCTORS = false; // some metal is a conductor with n and κ
+layout(constant) const uint LOBES_SEEN = 0;     // bit by LOBE_...: some material has that lobe
+// Surfaces up to this roughness are reflected by rays, rougher ones by the prefiltered environment (knobs `reflection`,
+// `lobes`).
 layout(constant) const bool MIRROR_RAYS = false;
 layout(constant) const float ROUGHEST_MIRROR = 0.0;
 
@@ -30,16 +33,16 @@ struct Surface {
     vec3 p_rel;
     vec3 n;              // shading normal
     vec3 n_coat;         // shading normal of the clear coat
-    vec3 v;              // to the viewer
-    vec3 diffuse;        // albedo of the diffuse part
+    vec3 v;              // unit vector to the viewer
+    vec3 diffuse;        // albedo of the diffuse base layer
     float metallic;
     vec3 f0_dielectric;
     float f90_dielectric;
-    vec3 f0;             // of the mixture of dielectric and metal
+    vec3 f0;             // of the mixture of dielectric and metallic part
     float f90;
     float ior;           // of the dielectric part
     float n_outside;     // index of the medium on the viewer's side
-    vec3 compensation;   // of light lost to single scattering: 1 but for `ggx-multi`
+    vec3 compensation;   // energy compensation of single scattering: 1 but for `ggx-multi`
     float alpha;         // roughness²
     float roughness;
     float occlusion;
@@ -51,18 +54,19 @@ struct Surface {
     bool unlit;
     vec3 base;
     vec3 f0_metal;
-    vec3 n_metal;        // index and extinction of a metal per channel; index 0 where a colour is all that is known
+    vec3 n_metal;        // index n and extinction κ of a conductor per channel; n = 0 for a metal given by its colour
     vec3 kappa_metal;
-    vec3 metal_tint;     // of those that have them: the colour over what they reflect at normal incidence
-    bool base_traced;    // mirrored by rays, not by the prefiltered environment
+    vec3 metal_tint;     // of conductors: the colour over the reflectance at normal incidence
+    bool base_traced;    // reflected by rays, not by the prefiltered environment
     bool coat_traced;
-    vec3 p_bvh;          // the same point where rays live (share/trace.glsl)
-    vec3 n_triangle;     // geometric normal, to the viewer
-    uint face;           // the flat face it lies in, which rays from it cannot meet
-    uvec4 media;         // those the viewer's side lies in (lib/media.glsl)
+    vec3 p_bvh;          // the same point in bvh space (share/trace.glsl)
+    vec3 n_triangle;     // geometric normal, on the viewer's side
+    uint face;           // coplanar group of its triangle, which rays from it cannot hit
+    uvec4 media;         // the media on the viewer's side (lib/media.glsl)
 };
 
-// Base colour, where texels and vertices say `varies`; in a band of wavelengths a number, and light of what is unlit.
+// Base colour; `varies` is the product of texel and vertex colour. In a band of wavelengths it is a number, and for unlit
+// materials light.
 vec3 base_from_texel(Material m, vec3 varies) {
     vec3 base = varies * m.base_color.rgb;
     if (SPECTRAL) {
@@ -77,7 +81,7 @@ vec3 base_from_texel(Material m, vec3 varies) {
     return base;
 }
 
-// Of the material m, which is number `id` of the table.
+// The surface of material m, whose number in the table is `id`.
 Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, vec3 v, vec3 p_rel) {
     Surface s;
     s.p_rel = p_rel;
@@ -118,7 +122,7 @@ Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, 
     s.sheen = vec4(0.0);
     if (SHEEN) {
         s.sheen = t.sheen * material_texel(id, MATERIAL_LOBES_AT + int(LOBE_SHEEN));
-        // In a band of wavelengths the factor is a number, and what texels say is still a colour.
+        // In a band of wavelengths the factor is a number, but the texel is still a colour.
         if (SPECTRAL && t.sheen.rgb != vec3(1.0)) s.sheen.rgb *= reflectance_of_rgb(t.sheen.rgb) / max(t.sheen.rgb, vec3(1e-6));
     }
     s.base_traced = MIRROR_RAYS && s.roughness <= ROUGHEST_MIRROR;
@@ -130,11 +134,11 @@ Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, 
     return s;
 }
 
-// The same surface in a medium of index n_outside on the viewer's side: what it reflects is a matter of relative indices. A metal
-// that is given by a colour alone has no index, and keeps it.
+// The same surface in a medium of index n_outside on the viewer's side: reflectance depends on relative indices. A metal
+// given by a colour alone has no index and keeps its reflectance.
 //
-// Where nothing changes every value is selected as it was: a quotient of equal numbers need not be 1 on a device, nor a mixture made
-// once more have the same last bit, and both plans of a scene have to agree.
+// If the index does not change, every value is selected unchanged: on some devices a quotient of equal numbers is not 1,
+// and a mixture computed twice differs in its last bit, but both plans of a scene have to agree.
 void seen_from(inout Surface s, float n_outside) {
     bool changes = n_outside != s.n_outside;
     vec3 dielectric_before = s.f0_dielectric;
@@ -142,7 +146,7 @@ void seen_from(inout Surface s, float n_outside) {
     float before = nested_f0(s.n_outside, s.ior);
     float ratio = before > 0.0 ? nested_f0(n_outside, s.ior) / before : 0.0;
     s.f0_dielectric = changes ? s.f0_dielectric * ratio : s.f0_dielectric;
-    // Between equal indices nothing is reflected, at no angle.
+    // Between equal indices nothing is reflected at any angle.
     s.f90_dielectric = n_outside == s.ior ? 0.0 : s.f90_dielectric;
     if (CONDUCTORS) {
         bool relative = changes && s.n_metal.x > 0.0;
@@ -152,7 +156,7 @@ void seen_from(inout Surface s, float n_outside) {
         s.n_metal = relative ? n : s.n_metal;
         s.kappa_metal = relative ? kappa : s.kappa_metal;
     }
-    // No second mixture by the same share: drivers that see two of them round both in another way.
+    // No second mix() with the same share: drivers that see two of them round both differently.
     vec3 mixture = s.f0 + (s.f0_dielectric - dielectric_before) * (1.0 - s.metallic);
     mixture += (s.f0_metal - metal_before) * s.metallic;
     s.f0 = changes ? mixture : s.f0;

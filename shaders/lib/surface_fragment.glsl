@@ -1,5 +1,6 @@
-// A surface at a fragment: the material's textures read, normals turned to the viewer. Shared by the G-buffer and by
-// the fragment list of see-through surfaces, which store the same quantities.
+// A rasterised surface at a fragment: textures read and normals turned to the viewer, for the G-buffer and the A-buffer.
+// Both store the same quantities (lib/gbuffer.glsl, lib/fragment_list.glsl). Where to read: glTF 2.0, section 3.9. Assumes:
+// positions relative to the eye, metres; world axes.
 #ifndef SURFACE_FRAGMENT_GLSL
 #define SURFACE_FRAGMENT_GLSL
 #include "lib/bent_normal.glsl"
@@ -16,16 +17,17 @@ layout(location = 5) flat in uvec3 ids;
 
 layout(push_constant, scalar) uniform Push { float lod_bias; uint strip; };
 
-// Of the scene. Where fragments cannot know it, `ids` has it all, and gl_PrimitiveID is made 0 (crates/vulkan/src/primitive_ids.rs).
+// Triangle of the scene. Where fragments cannot know it, `ids` holds all of it and gl_PrimitiveID is replaced by 0
+// (crates/vulkan/src/primitive_ids.rs).
 uint triangle() {
     return ids.z + uint(gl_PrimitiveID);
 }
 
 struct SurfaceFragment {
     Texels texels;
-    vec3 n_shading;     // unit, to the viewer's side of the face
-    vec3 n_coat;        // unit: of the clear coat, which does not follow the base's normal texture
-    vec3 n_geometric;   // unit, to the viewer
+    vec3 n_shading;     // unit, on the viewer's side of the face
+    vec3 n_coat;        // unit; the normal map of the base does not affect the clear coat
+    vec3 n_geometric;   // unit, on the viewer's side
 };
 
 vec4 page_texel(sampler2DArray page, uint slot) {
@@ -37,16 +39,16 @@ vec4 page_texel(sampler2DArray page, uint slot) {
 
 SurfaceFragment surface_fragment() {
     SurfaceFragment s;
-    // Not the varying's constant: perspective interpolation makes 0.99999994 of 1, which a half rounds to 0.9995.
+    // Not the interpolated constant: perspective interpolation turns 1 into 0.99999994, which a half rounds to 0.9995.
     s.texels = texels_of_nothing(HAS_COLOR ? vertex_color : vec4(1.0));
     READ_TEXELS(s.texels)
 
-    // The face's own normal from the positions of neighbouring fragments: they lie in the plane of the triangle.
+    // The geometric normal from positions of neighbouring fragments: they lie in the plane of the triangle.
     vec3 face = cross(dFdx(p_rel), dFdy(p_rel));
     vec3 view = camera.orthographic != 0 ? camera.forward : p_rel;
     face = dot(face, view) > 0.0 ? -face : face;
     float size = max(abs(face.x), max(abs(face.y), abs(face.z)));
-    // A face seen exactly edge-on has no extent on the screen: any normal to the viewer will do.
+    // A face seen exactly edge-on has no extent on the screen, so any normal towards the viewer will do.
     s.n_geometric = size > 0.0 ? normalize(face / size) : normalize(-view);
 
     vec3 n = normalize(n_rel);
@@ -57,7 +59,7 @@ SurfaceFragment surface_fragment() {
         s.n_shading = bent_normal(n, t_rel, vec3(texel.xy * material_at(ids.y).normal_scale, texel.z));
     }
     if (HAS_COAT_NORMAL) s.n_coat = bent_normal(n, t_rel, page_texel(clearcoat_normal_page, SLOT_CLEARCOAT_NORMAL).xyz * 2.0 - 1.0);
-    // From behind, the mapped normal is reversed as a whole (glTF 2.0 section 3.9.5, double sided).
+    // From behind the whole normal is reversed, normal map included (glTF 2.0, section 3.9.5, double sided).
     if (!gl_FrontFacing) {
         s.n_shading = -s.n_shading;
         s.n_coat = -s.n_coat;

@@ -1,7 +1,9 @@
-// What textures say of a place on a surface, each beside the factor of the material that it multiplies.
+// Texture values of a surface point, each next to the material's factor that it multiplies; texture slots and pages.
+// Where to read: glTF 2.0, section 3.9 and the KHR_materials extensions; docs/decisions/large-pages.md.
 //
-// A texture has a slot: the build counts the pages below, and SLOT_NAME is the number of NAME_page. Images of one size are layers of one
-// array, a page (src/upload/texture.rs); materials that read the same pages share a descriptor set of them.
+// Each texture of a material has a slot: the build counts the pages below, and SLOT_NAME is the number of NAME_page. Images
+// of one size are layers of an array, a page (src/upload/texture.rs). Materials that read the same pages share a descriptor
+// set.
 #ifndef TEXELS_GLSL
 #define TEXELS_GLSL
 #include "lib/constants.glsl"
@@ -21,12 +23,12 @@ layout(pages) uniform sampler2DArray thickness_page;
 layout(pages) uniform sampler2DArray sheen_color_page;
 layout(pages) uniform sampler2DArray sheen_roughness_page;
 
-// Lobes that extensions lay over the base (crates/scene/src/lobe/), each with a texel of numbers in the table of materials.
+// Lobes of extensions over the base (crates/scene/src/lobe/), each with a texel of parameters in the table of materials.
 const uint LOBES = 1;
 const uint LOBE_SHEEN = 0;
 
 struct Texels {
-    vec4 base; // times the colour of the vertices
+    vec4 base; // times the vertex colour
     float metallic;
     float roughness;
     float occlusion;
@@ -43,8 +45,8 @@ Texels texels_of_nothing(vec4 vertex_color) {
     return Texels(vertex_color, 1.0, 1.0, 1.0, vec3(1.0), 1.0, 1.0, 1.0, 1.0, 1.0, vec4(1.0));
 }
 
-// Reads all of them but the normals. TEXEL(page, slot) is a vec4, white where the material has no such texture: a rasterised surface has
-// samplers, what a ray meets has an index (lib/surface_fragment.glsl, lib/hit.glsl).
+// Reads all textures but the normal maps. TEXEL(page, slot) is a vec4, white where the material has no such texture.
+// Rasterised surfaces read samplers, ray hits read by index (lib/surface_fragment.glsl, lib/hit.glsl).
 #define READ_TEXELS(t) \
     t.base *= TEXEL(base_page, SLOT_BASE); \
     vec4 metallic_roughness = TEXEL(metallic_roughness_page, SLOT_METALLIC_ROUGHNESS); \
@@ -59,7 +61,8 @@ Texels texels_of_nothing(vec4 vertex_color) {
     t.thickness = TEXEL(thickness_page, SLOT_THICKNESS).g; \
     t.sheen = vec4(TEXEL(sheen_color_page, SLOT_SHEEN_COLOR).rgb, TEXEL(sheen_roughness_page, SLOT_SHEEN_ROUGHNESS).a);
 
-// The layers over and under the base, with the normal of the clear coat, in the words that the G-buffer and the fragment list keep:
+// The layers over and under the base, and the normal of the clear coat, packed into four words of the G-buffer and the
+// fragment list:
 //   clearcoat and its roughness (8 bits each), specular (16) | normal of the coat, octahedral (2 x 16) | transmission, thickness (16 each) |
 //   sheen (8 each)
 uvec4 packed_layers(Texels t, vec3 n_coat) {

@@ -1,6 +1,11 @@
-// Rays through the scene's bounding volume hierarchy: the nearest hit, or whether there is any. One interface, `trace`,
-// and three ways through the tree that return the same hits: along skip links with nodes of 16 bytes or of 32, or with
-// a stack (docs/decisions/rays.md). Triangles are in the order of the leaves, whatever the way.
+// BVH traversal: the nearest hit of a ray, or any hit. Stackless with skip pointers, or with a stack.
+// Three layouts of one bounding volume hierarchy return the same hits through one interface, `trace`. Stackless traversal
+// follows nodes in depth-first order; a node that is missed points to the next one outside its subtree (a skip pointer).
+// Nodes have 16 bytes (boxes on a grid) or 32 (boxes of floats). The third layout has both children's boxes in the parent
+// and a stack. Triangles are in the order of the leaves in all three.
+// Where to read: Smits 1998 (skip pointers); pbrt 4, section 7.3 (BVH); Woop, Benthin and Wald 2013 (watertight
+// intersection); docs/decisions/rays.md. Assumes: bvh space (share/trace.glsl), metres; t in units of the direction's
+// length.
 #ifndef TRACE_GLSL
 #define TRACE_GLSL
 #include "lib/loops.glsl"
@@ -9,10 +14,11 @@
 #include "share/trace.glsl"
 
 layout(constant) const uint TRAVERSAL = 0;
-const uint LINKS_16 = 0; // boxes in steps of a grid over the scene
-const uint LINKS_32 = 1; // boxes of floats
+const uint LINKS_16 = 0; // skip pointers, 16 bytes: boxes in steps of a grid over the scene
+const uint LINKS_32 = 1; // skip pointers, 32 bytes: boxes of floats
 const uint STACK = 2;
-// Lists of nodes ordered for each octant of directions, before the one for any hit, which is the only one without.
+// One list of nodes for each octant of ray directions, in front-to-back order, before the list for any-hit rays. Without
+// OCTANTS that last list is the only one.
 layout(constant) const bool OCTANTS = false;
 const int OCTANT_LISTS = 8;
 
@@ -25,9 +31,9 @@ layout(scene, scalar) uniform TraceBlock { TraceTerms trace_terms; };
 // @texels StackNode stack_node_at(bvh_nodes)
 // @texels BvhTriangle triangle_at(bvh_triangles)
 
-// What a ray stops at.
+// Classes of triangles that stop a ray.
 const uint OPAQUE = 1;
-const uint FILTER = 2; // masked, blended or transmissive: what is seen there decides
+const uint FILTER = 2; // masked, blended or transmissive: the material at the hit decides
 const uint NO_TRIANGLE = 0xffffffffu;
 
 struct Hit {
@@ -37,11 +43,11 @@ struct Hit {
     float v;
 };
 
-// Work done so far by this invocation.
+// Work counters of this invocation.
 uint node_visits = 0;
 uint triangle_tests = 0;
 
-// Where a ray that leaves a surface begins.
+// Origin of a ray that leaves a surface.
 vec3 ray_origin(vec3 p, vec3 n, vec3 free) {
     return offset_origin(p, n, free, trace_terms.offset);
 }
@@ -57,8 +63,8 @@ BoxRay box_ray(vec3 origin, vec3 direction, bool any_order) {
     int list = any_order || !OCTANTS ? OCTANTS ? OCTANT_LISTS : 0 : octant(direction);
     r.base = list * (r.end + 1);
     if (TRAVERSAL == LINKS_16) {
-        // Boxes are a grid unit larger than need be on each side, 1.5e-5 of the scene: more than the roundings here as
-        // long as the origin is within 80 times its extent.
+        // Boxes are one grid unit larger than necessary on each side, 1.5e-5 of the scene. This exceeds the roundings here
+        // as long as the origin is within 80 times the extent of the scene.
         vec3 unit = inverse * trace_terms.grid_unit;
         r.inverse = unit * (1.0 / float(1 << SLAB_BITS));
         r.start_near = (trace_terms.grid_middle - origin) * inverse;
@@ -70,10 +76,10 @@ BoxRay box_ray(vec3 origin, vec3 direction, bool any_order) {
     return r;
 }
 
-// One way through the tree, ready to go on.
+// State of a traversal.
 struct Traversal {
-    int node;  // the next node, or BoxRay.end
-    int leaf;  // triangles found and not tested yet, as a leaf of the tree; 0: none
+    int node;  // next node, or BoxRay.end
+    int leaf;  // triangles still to be tested, as a reference to a leaf; 0: none
     Hit hit;
 };
 
@@ -81,15 +87,17 @@ bool is_traversing(Traversal w, BoxRay r) {
     return w.node != r.end || w.leaf != 0;
 }
 
-// One node: to its children, which follow it, or along its link. A leaf is kept for later; if one is being kept
-// already, the walk waits. Selections only: lavapipe runs both sides of a branch.
+// Visits one node. A hit continues with the children, which follow it in the list; a miss follows the skip pointer. A leaf
+// is stored for test_triangle; while one is stored, the traversal waits at the next leaf. Only selections: lavapipe runs
+// both sides of a branch.
 void visit(inout Traversal w, BoxRay r, float t_min) {
     node_visits += w.node != r.end ? 1u : 0u;
     vec3 near, far;
     int word;
     if (TRAVERSAL == LINKS_16) {
         GridNode node = grid_node_at(uint(r.base + w.node));
-        // The whole word is the centre, in steps of which the half extent is a fraction.
+        // The whole word serves as the centre, in 2^-SLAB_BITS grid units: the half extent in its low bits is a fraction of
+        // a unit.
         vec3 half_extent = vec3(node.slabs & ((1 << SLAB_BITS) - 1));
         vec3 t = vec3(node.slabs) * r.inverse + r.start_near;
         vec3 e = half_extent * r.extent;
@@ -110,21 +118,21 @@ void visit(inout Traversal w, BoxRay r, float t_min) {
     bool wait = hit && leaf && w.leaf != 0;
     int next = hit || leaf ? w.node + 1 : word;
     next = wait ? w.node : next;
-    // The sentinel is a box as well, and may be hit.
+    // The sentinel is a box too, and may be hit.
     w.node = min(next, r.end);
     w.leaf = keep ? word : w.leaf;
 }
 
-// A ray as triangles see it.
+// A ray prepared for watertight ray/triangle intersection.
 struct TriangleRay {
     vec3 origin;
     Shear shear;
     float after;         // hits at this t or before do not count,
-    uint after_triangle; // but those of later triangles at the same t
-    uint source_face;           // the flat face it leaves, which it cannot meet again
+    uint after_triangle; // except those of later triangles at the same t
+    uint source_face;           // coplanar group that the ray leaves, which it cannot hit again
 };
 
-// The nearest four filters on the way to a light, in order; LARGEST where there are fewer.
+// The four nearest hits of class FILTER along a shadow ray, in order; LARGEST where there are fewer.
 struct Filters {
     vec4 t;
     uvec4 triangles;
@@ -141,7 +149,7 @@ void exchange(inout float t, inout uint triangle, inout float other_t, inout uin
     triangle = nearer ? old : triangle;
 }
 
-// Into its place, all in registers; the fifth falls off the end.
+// Insertion into the sorted list, all in registers; the fifth is dropped.
 void insert(inout Filters f, float t, uint triangle) {
     exchange(t, triangle, f.t.x, f.triangles.x);
     exchange(t, triangle, f.t.y, f.triangles.y);
@@ -149,13 +157,13 @@ void insert(inout Filters f, float t, uint triangle) {
     exchange(t, triangle, f.t.w, f.triangles.w);
 }
 
-// What a walk is for.
+// Purpose of a traversal.
 const uint NEAREST = 0;
 const uint ANY = 1;
-const uint TO_LIGHT = 2; // any opaque triangle ends it, filters are collected
+const uint TO_LIGHT = 2; // an opaque hit ends it; hits of class FILTER are collected
 
-// A triangle as a ray sees it. A function of its own: glslang never ends where a `precise` value comes from a member of what was
-// fetched at a place that depends on itself.
+// Shears a triangle for a ray. A function of its own: glslang does not terminate where a `precise` value comes from a
+// member of a value that was fetched at an index depending on itself.
 ShearedTriangle sheared_from(BvhTriangle triangle, vec3 origin, Shear shear) {
     precise vec3 a = triangle.a - origin;
     precise vec3 b = triangle.b - origin;
@@ -163,8 +171,8 @@ ShearedTriangle sheared_from(BvhTriangle triangle, vec3 origin, Shear shear) {
     return sheared_triangle(shear, a, b, c);
 }
 
-// One triangle of the leaf that is kept. The nearest counts, of two at the same t the first: any order of the tree finds
-// the same.
+// Tests one triangle of the stored leaf. The nearest hit counts, and of two at the same t the first triangle. So the result
+// does not depend on the traversal order.
 void test_triangle(inout Traversal w, inout Filters f, TriangleRay r, BoxRay b, uint classes, uint purpose) {
     bool pending = w.leaf != 0;
     triangle_tests += pending ? 1u : 0u;
@@ -186,7 +194,7 @@ void test_triangle(inout Traversal w, inout Filters f, TriangleRay r, BoxRay b, 
     w.hit.triangle = hit ? index : w.hit.triangle;
     w.hit.u = hit ? s.weights.y * inverse : w.hit.u;
     w.hit.v = hit ? s.weights.z * inverse : w.hit.v;
-    // The next triangle of the leaf: one more to begin with, one fewer.
+    // The leaf without its first triangle: the start increases by one, the count decreases by one.
     const int others = (1 << LEAF_BITS) - 1;
     int rest = (place & others) == 0 ? 0 : ~(place + others);
     w.leaf = pending ? rest : 0;
@@ -195,15 +203,16 @@ void test_triangle(inout Traversal w, inout Filters f, TriangleRay r, BoxRay b, 
     w.leaf = ended ? 0 : w.leaf;
 }
 
+// Stackless traversal along skip pointers: up to five nodes, then one triangle, until the list ends.
 Hit traverse_links(TriangleRay r, vec3 direction, float t_max, uint classes, uint purpose, inout Filters f) {
     BoxRay b = box_ray(r.origin, direction, purpose != NEAREST);
     Traversal w = Traversal(t_max > 0.0 ? 0 : b.end, 0, Hit(t_max, NO_TRIANGLE, 0.0, 0.0));
-    // Once more after a filter has been found: where lanes end at different times, lavapipe forgets for those that are through
-    // what their last iteration has put into `f`. Light on a ball of 12 rings, inside a body, missed the faces of the body
-    // in a third of the pixels.
+    // One more iteration after a filter was inserted. Where lanes leave the loop at different times, lavapipe loses what
+    // the last iteration of the finished lanes assigned to `f`. Without it, light on a sphere mesh of 12 rings inside a
+    // solid missed the faces of the solid in a third of the pixels.
     bool inserted;
-    // lavapipe goes through a loop's body at least once and through both sides of each branch in it: a fixed number of
-    // nodes, then one triangle, and one way out at the end.
+    // lavapipe runs a loop's body at least once and both sides of each branch in it. So the body is a fixed number of
+    // nodes, then one triangle, with a single exit at the end.
     do {
         visit(w, b, r.after);
         visit(w, b, r.after);
@@ -222,8 +231,8 @@ struct HitPair {
     Hit b;
 };
 
-// Two rays at once, turn about: what one waits for, the other computes. A node is a chain of fetch, conversion, comparison
-// and selection in which most of a processor idles.
+// Stackless traversal of two rays, interleaved: one computes while the other waits. A node is a chain of fetch, conversion,
+// comparison and selection that leaves most of a processor idle.
 HitPair traverse_links_pair(TriangleRay ra, vec3 da, float ta, TriangleRay rb, vec3 db, float tb, uint classes, uint purpose) {
     BoxRay ba = box_ray(ra.origin, da, purpose != NEAREST);
     BoxRay bb = box_ray(rb.origin, db, purpose != NEAREST);
@@ -247,12 +256,12 @@ HitPair traverse_links_pair(TriangleRay ra, vec3 da, float ta, TriangleRay rb, v
     return HitPair(a.hit, b.hit);
 }
 
-layout(constant) const uint STACK_SIZE = 1; // one more than the depth of the tree: the entry above the last is written, too
+layout(constant) const uint STACK_SIZE = 1; // one more than the depth of the BVH: the entry above the last one is written too
 
-// The tree with both children's boxes in the parent, the nearer child first, the other on a stack.
+// Traversal with a stack: both children's boxes are in the parent; the nearer child is next, the other goes onto the stack.
 Hit traverse_stack(TriangleRay r, vec3 direction, float t_max, uint classes, uint purpose, inout Filters f) {
     BoxRay b = box_ray(r.origin, direction, purpose != NEAREST);
-    // A reference is a node, or a leaf as in Walk; the sentinel ends the walk.
+    // A reference is a node or a leaf, as in Traversal; the sentinel ends the traversal.
     b.end = 0x7fffffff;
     Traversal w = Traversal(t_max > 0.0 ? 0 : b.end, 0, Hit(t_max, NO_TRIANGLE, 0.0, 0.0));
     bool inserted; // as in traverse_links
@@ -260,12 +269,13 @@ Hit traverse_stack(TriangleRay r, vec3 direction, float t_max, uint classes, uin
     int entries = 0;
     do {
         for (int i = 0; i < 2; i++) {
-            // A leaf waits for its turn while another is being tested.
+            // 1. A leaf waits while another one is being tested.
             bool at_leaf = w.node < 0;
             bool keep = at_leaf && w.leaf == 0;
             w.leaf = keep ? w.node : w.leaf;
             bool inner = w.node >= 0 && w.node != b.end;
             node_visits += inner ? 1u : 0u;
+            // 2. Test the boxes of both children.
             StackNode node = stack_node_at(uint(inner ? w.node : 0));
             vec3 tl = node.left_center * b.inverse;
             vec3 el = node.left_half_extent * b.extent;
@@ -277,12 +287,13 @@ Hit traverse_stack(TriangleRay r, vec3 direction, float t_max, uint classes, uin
             bool hit_r = inner && meets(near_r, tr + b.start_far + er, r.after, w.hit.t);
             float enter_l = max(near_l.x, max(near_l.y, near_l.z));
             float enter_r = max(near_r.x, max(near_r.y, near_r.z));
+            // 3. Continue with the nearer child that is hit.
             bool swap = enter_r < enter_l;
             int first = swap ? node.right : node.left;
             int second = swap ? node.left : node.right;
             bool both = hit_l && hit_r;
             int one = hit_l ? node.left : node.right;
-            // Written whatever comes: only where the next entry goes is decided.
+            // 4. The entry is always written; only the position of the next entry is selected.
             stack[min(entries, int(STACK_SIZE) - 1)] = second;
             entries += both ? 1 : 0;
             bool pop = keep || (inner && !hit_l && !hit_r);
@@ -303,24 +314,24 @@ Hit traverse(TriangleRay r, vec3 direction, float t_max, uint classes, uint purp
                               : traverse_links(r, direction, t_max, classes, purpose, f);
 }
 
-// The nearest hit of a triangle of these classes along origin + t direction that comes after the hit `after` and not
-// after t_max; or, with any_hit, any such hit, of which only that there is one is the same every way. A negative t_max asks
-// for nothing and costs next to nothing. `self` is the flat face that the origin lies in, or 0xffffffff: slivers of 7 m were
-// met again up to 7e-6 m away, and what is seen edge-on may be met at any t.
+// The nearest hit of a triangle of these classes along origin + t direction, after the hit `after` and up to t_max. With
+// any_hit: any such hit; which one depends on the layout of the BVH, whether there is one does not. A negative t_max finds
+// nothing and costs almost nothing. `source_face` is the coplanar group that the origin lies in, or 0xffffffff. It avoids
+// self-intersection: slivers of 7 m were hit again up to 7e-6 m away, and a triangle seen edge-on may be hit at any t.
 Hit trace(vec3 origin, vec3 direction, uint source_face, Hit after, float t_max, uint classes, bool any_hit) {
     Filters none;
     return traverse(TriangleRay(origin, ray_shear(direction), after.t, after.triangle, source_face), direction, t_max, classes,
                 any_hit ? ANY : NEAREST, none);
 }
 
-// Whether anything opaque lies on the way, and the nearest four filters after `after`.
+// Shadow ray: whether an opaque triangle occludes it; otherwise the four nearest filters after the hit `after`.
 bool trace_to_light(vec3 origin, vec3 direction, uint source_face, Hit after, float t_max, out Filters filters) {
     filters = NO_FILTERS;
     TriangleRay r = TriangleRay(origin, ray_shear(direction), after.t, after.triangle, source_face);
     return traverse(r, direction, t_max, OPAQUE | FILTER, TO_LIGHT, filters).triangle != NO_TRIANGLE;
 }
 
-// One of two rays: nothing up to `after` is met.
+// One ray of a pair; hits up to `after` do not count.
 struct PairedRay {
     vec3 origin;
     vec3 direction;
@@ -329,7 +340,7 @@ struct PairedRay {
     float t_max;
 };
 
-// Two rays at once.
+// Traces two rays at once.
 HitPair trace_pair(PairedRay a, PairedRay b, uint classes, bool any_hit) {
     TriangleRay ra = TriangleRay(a.origin, ray_shear(a.direction), a.after, NO_TRIANGLE, a.source_face);
     TriangleRay rb = TriangleRay(b.origin, ray_shear(b.direction), b.after, NO_TRIANGLE, b.source_face);
@@ -340,6 +351,6 @@ HitPair trace_pair(PairedRay a, PairedRay b, uint classes, bool any_hit) {
                    traverse_stack(rb, b.direction, b.t_max, classes, purpose, none));
 }
 
-// To begin with: t > 0.
+// Start of a search: every hit with t > 0 counts.
 const Hit FROM_ORIGIN = Hit(0.0, NO_TRIANGLE, 0.0, 0.0);
 #endif

@@ -1,4 +1,4 @@
-// The camera of the sample that is drawn.
+// The camera of the current sample, as a uniform block.
 #ifndef VIEW_GLSL
 #define VIEW_GLSL
 #include "lib/camera.glsl"

@@ -1,5 +1,6 @@
-// Adds one sample of every pixel to the film; the last one divides by their number. Of a picture by wavelengths a sample is the
-// sum of its bands, X, Y and Z each.
+// Accumulation: adds one sample of every pixel to the film; the last sample divides by their number.
+// The film holds scene-linear radiance with premultiplied alpha (coverage). In spectral rendering a sample is the sum of
+// its bands in X, Y, Z. Where to read: pbrt 4, section 5.4 (film).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

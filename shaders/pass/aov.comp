@@ -1,4 +1,5 @@
-// The G-buffer as arbitrary output variables: plain f32 words per pixel, in the order of AovPixel.
+// Arbitrary output variables (AOVs): the G-buffer as plain f32 words per pixel, in the order of AovPixel.
+// Assumes: positions relative to the eye in metres, normals in world axes (share/aov.glsl).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -29,7 +30,7 @@ void main() {
         result.roughness = float(id.x >> 16) * (1.0 / 65535.0) * m.roughness;
         result.metallic = texel.a * m.metallic;
         result.emissive = (STORED_EMISSIVE ? imageLoad(emissive, pixel).rgb : vec3(1.0)) * m.emissive;
-        // 0 is "nothing": ids count from 1.
+        // 0 means "nothing drawn": ids count from 1.
         result.material = 1 + (id.x & 0xffffu);
         result.instance = 1 + (id.y & INSTANCE_BITS);
     }

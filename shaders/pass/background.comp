@@ -1,4 +1,5 @@
-// What lies behind the scene, over the tiles where it is seen: the environment, or nothing.
+// The background: the environment, or nothing, over the tiles of the classification in which some pixel shows it.
+// Where to read: docs/decisions/work-tiles.md. Alpha is 1 for the environment and 0 for nothing (premultiplied alpha).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,6 +1,8 @@
-// Which 8x8 tiles hold surfaces and which hold background: two lists and the sizes of their dispatches. A branch saves
-// nothing on lavapipe, which runs both sides for every group of eight pixels; not dispatching does. Tiles are listed in
-// whatever order they are found: each one writes only its own pixels.
+// Tile classification: lists of the 8x8 tiles with surfaces and with background, and the sizes of their indirect
+// dispatches.
+// A branch in the later passes saves nothing on lavapipe, which runs both sides for every group of eight pixels; not
+// dispatching a tile does. The order of a list is arbitrary: each tile writes only its own pixels.
+// Where to read: docs/decisions/work-tiles.md; RTR 4, section 20.3.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,4 +1,5 @@
-// Which 8x8 tiles of a strip hold see-through fragments: a list and the size of the dispatch over it.
+// Tile classification: the 8x8 tiles of a strip with transparent fragments, and the size of their indirect dispatch.
+// Where to read: docs/decisions/work-tiles.md, docs/decisions/transparency.md (strips).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

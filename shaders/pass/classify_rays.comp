@@ -1,5 +1,5 @@
-// Which 8x8 tiles hold surfaces that call for rays: mirrors and what lets light through. A list and the size of the
-// dispatch over it; tiles are listed in whatever order they are found, each writes only its own pixels.
+// Tile classification: the 8x8 tiles with surfaces that send rays, reflective or transmissive, and their indirect dispatch.
+// The order of the list is arbitrary: each tile writes only its own pixels. Where to read: docs/decisions/work-tiles.md.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -8,7 +8,7 @@ layout(local_size_x = 64) in;
 #include "lib/surface.glsl"
 #include "lib/own_tiles.glsl"
 
-// Which surfaces are looked for.
+// Which surfaces the dispatch looks for.
 layout(constant) const bool FIND_MIRRORS = false;
 layout(constant) const bool FIND_TRANSMISSIVE = false;
 

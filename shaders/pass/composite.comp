@@ -1,6 +1,10 @@
-// See-through surfaces over what lies behind them, nearest first: radiance += T a L, T *= 1 − a + a t, where a is
-// coverage and t what the surface lets through. Repeated selection of the next nearest fragment sorts without moving
-// anything; n fragments cost n² steps. Where a driver limits the steps of an invocation, the fragments beyond are counted.
+// Order-independent transparency: composites the A-buffer's fragments of a pixel over the opaque surface, nearest first.
+// radiance += T a L, T *= 1 − a + a t, where T is the transmittance so far, a coverage and t the transmittance of the
+// surface. The result has premultiplied alpha. Selecting the next nearest fragment again and again sorts the per-pixel
+// linked list without moving anything; n fragments cost n² steps. Where a driver limits the loop iterations of an
+// invocation, the fragments beyond are counted.
+// Where to read: Carpenter 1984 (A-buffer); Yang et al. 2010 (per-pixel linked lists); RTR 4, section 5.5;
+// docs/decisions/transparency.md. Assumes: world axes, positions relative to the eye, reversed depth.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -24,9 +28,9 @@ layout(push_constant, scalar) uniform Push { uint end_row; };
 
 layout(constant) const bool BENDS = false;   // knob `refraction`: screen
 layout(constant) const bool MIRRORS = false; // knob `reflection`: screen
-layout(constant) const bool BEHIND_ALONE = false; // what comes through is kept, and nothing added
+layout(constant) const bool BEHIND_ALONE = false; // keeps only the background seen through the surfaces, without their own radiance
 
-// Whether key a comes after key b: farther (smaller depth); of coplanar ones the later drawn lies on top.
+// Whether key a comes after key b: farther away (smaller depth). Of coplanar fragments the one drawn later lies on top.
 bool after(uvec3 a, uvec3 b) {
     if (a.x != b.x) return a.x < b.x; // depth is in [0, 1]: its bits order as its values do
     if (a.y != b.y) return a.y < b.y;
@@ -46,11 +50,12 @@ void main() {
     vec3 through = vec3(1.0);
     uvec3 last = uvec3(0xffffffffu);
     LightRange all = LightRange(0, DIRECTIONAL_LIGHTS + LOCAL_LIGHTS, 0, TILE_WORDS);
-    vec2 shift = vec2(0.0); // of what lies behind, in pixels
+    vec2 shift = vec2(0.0); // offset in pixels of the refracted background
     bool nearest = true;
-    float entry = 0.0;      // depth of the nearest body
-    uint per_fragment = 0; // loop heads of the last fragment: its neighbours in the list see the same lights
+    float entry = 0.0;      // depth of the nearest transparent solid
+    uint per_fragment = 0; // loop iterations of the last fragment: its neighbours in the list see the same lights
     while (true) {
+        // 1. Select: the nearest fragment behind the last one.
         uint best = END_OF_LIST;
         uvec3 best_key = uvec3(0);
         uint before = loop_iterations;
@@ -67,6 +72,7 @@ void main() {
             if (!BEHIND_ALONE) atomicAdd(dropped, 1u);
             break;
         }
+        // 2. Unpack: the surface, from the node.
         last = best_key;
         uint at = best * NODE_WORDS;
         uint word = nodes[at + 4];
@@ -87,14 +93,15 @@ void main() {
         s.media = trace_terms.camera_media;
         float transmission = m.transmission * t.transmission;
         float scale = t.thickness * instances[nodes[at + 2]].scale;
+        // 3. Screen-space refraction: the offset where a solid is entered.
         if (BENDS) {
             bool body = (instances[nodes[at + 2]].flags & INSTANCE_SHEET) == 0 && m.transmission > 0.0 &&
                         (m.flags & MATERIAL_BLENDED) == 0;
             shift += body ? bent_shift(camera, pixel, p, direction, s.n, m.ior, m.thickness * scale) : vec2(0.0);
             entry = max(entry, body ? uintBitsToFloat(nodes[at + 1]) : 0.0);
         }
-        // What is not reflected goes through, tinted by the base colour and by absorption through the nominal thickness
-        // (A1): straight on, and with refraction `screen` bent where a body is entered.
+        // 4. Transmittance: light that is not reflected passes, tinted by the base colour and absorbed over the nominal
+        //    thickness (A1). It passes straight, or with refraction `screen` bent where a solid is entered.
         Layers b = layers_of(s);
         b.tint = s.base * exp(-m.sigma_thickness * scale);
         b.transmits = transmission * (1.0 - s.metallic);
@@ -102,19 +109,22 @@ void main() {
         b.under = CLEARCOAT ? under_coat(s) : 1.0;
         vec3 passes = straight_transmittance(b);
         s.diffuse *= 1.0 - transmission;
+        // 5. Lighting of the fragment.
         float alpha = blue_alpha.y;
         compensate(s);
         vec3 shown = radiance_to_eye(s, pixel, tiles_across, all, true);
-        // The nearest one alone: a march may take as many steps as the picture is wide.
+        // Screen-space reflection for the nearest fragment alone: a ray may march as many steps as the picture is wide.
         if (MIRRORS) shown = not_negative(shown + mirrored_on_screen(s, nearest));
         nearest = false;
+        // 6. Composite front to back.
         sum += through * alpha * shown;
         through *= 1.0 - alpha + alpha * passes;
         per_fragment = loop_iterations - before;
     }
+    // 7. The background, over which the fragments lie.
     vec4 behind = imageLoad(radiance, pixel);
     if (BENDS) {
-        // The nearest pixel of the picture; what lies in front of a body is not seen through them.
+        // The nearest pixel of the picture. Surfaces in front of the solid are not seen through it.
         ivec2 bent = clamp(pixel + ivec2(floor(shift + 0.5)), ivec2(0), ivec2(camera.size) - 1);
         int from = bent.y * int(camera.size.x) + bent.x;
         if (stored_depth(from) < entry) behind = seen[from];

@@ -1,4 +1,6 @@
-// Every see-through fragment in front of the opaque surfaces goes to its pixel's list (lib/fragment_list.glsl).
+// Order-independent transparency: appends transparent fragments in front of the opaque surface to per-pixel linked lists.
+// This builds the A-buffer (lib/fragment_list.glsl); composite.comp reads it. Where to read: Carpenter 1984; Yang et al.
+// 2010; Vulkan specification, "Early Fragment Test" (a hidden fragment is discarded before it writes).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -19,11 +21,11 @@ void main() {
     bool covers = (m.flags & MATERIAL_BLENDED) != 0;
     if (!covers) alpha = 1.0;
     if (MASKED && t.base.a * m.base_color.a < m.alpha_cutoff) return;
-    // A fragment without coverage leaves no trace; NaN coverage must not vanish here, it is counted later.
+    // A fragment without coverage is dropped. NaN coverage stays: it is counted later.
     if (alpha <= 0.0) return;
     uint slot = atomicAdd(counters[strip], 1u);
     uint at = slot * NODE_WORDS;
-    // The counter runs on past the end, so that the host learns how many slots the frame needs.
+    // The counter continues beyond the end of the buffer, so the host learns how many nodes the frame needs.
     if (at + NODE_WORDS > uint(nodes.length())) return;
     nodes[at + 0] = imageAtomicExchange(heads, ivec2(gl_FragCoord.xy), slot);
     nodes[at + 1] = floatBitsToUint(gl_FragCoord.z);

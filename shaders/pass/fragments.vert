@@ -1,4 +1,4 @@
-// See-through surfaces: the G-buffer's vertex stage as it is.
+// Transparent surfaces: the G-buffer's vertex stage, unchanged.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

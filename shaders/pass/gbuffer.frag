@@ -1,5 +1,6 @@
-// The nearest opaque surface of every pixel. What is constant over a material stays in the material table: an
-// untextured material is exact, a textured one as exact as its texels.
+// The G-buffer of deferred shading: writes the nearest opaque surface of every pixel.
+// Values that are constant over a material stay in the material table: an untextured material is exact, a textured one as
+// exact as its texels. Where to read: RTR 4, section 20.1; docs/decisions/gbuffer.md.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -9,10 +10,10 @@
 layout(location = 0) out vec4 out_base;     // RGBA16F: base colour, metallic
 layout(location = 1) out uvec4 out_normals; // lib/normals.glsl
 layout(location = 2) out uvec2 out_ids;     // RG32UI: material | roughness << 16, instance | back face << 23 | occlusion << 24
-layout(location = 3) out uint out_triangle; // R32UI, where the plan has rays: the triangle of the scene
+layout(location = 3) out uint out_triangle; // R32UI, where the plan has rays: triangle of the scene
 layout(location = 4) out vec4 out_emissive; // RGBA16F, where the plan has it
 layout(location = 5) out uvec4 out_layers;  // RGBA32UI, where the plan has it: lib/texels.glsl, packed_layers
-layout(location = 6) out vec4 out_position; // RGBA32F, where the plan has it: depth, place relative to the eye
+layout(location = 6) out vec4 out_position; // RGBA32F, where the plan has it: depth, position relative to the eye
 
 void main() {
     SurfaceFragment s = surface_fragment();

@@ -1,4 +1,4 @@
-// Opaque surfaces: object space to clip space.
+// Opaque surfaces: the vertex stage of the G-buffer, from object space to clip space.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,6 +1,9 @@
-// Reflection and refraction: from the primary surfaces of the G-buffer a tree of rays through the scene, over the tiles
-// that call for it. At each surface a ray is mirrored (coat, base) and refracted or let through; the branches are
-// followed one by one, the last one first, and summed in that order (lecture F4, F5, R6).
+// Reflection and refraction by recursive ray tracing (Whitted), from the primary surfaces of the G-buffer.
+// At each surface a ray splits into reflection (coat, base) and refraction or transmission: a tree of branches. They are
+// followed depth first with an explicit stack, the last one first, and summed in that order (lecture F4, F5, R6). Rough
+// lobes send one ray each, sampled by the VNDF. Only tiles of the classification are dispatched.
+// Where to read: Whitted 1980; pbrt 4, sections 9.3 to 9.7; docs/decisions/rays.md. Assumes: bvh space, metres; radiance
+// divided by the square of the index of refraction.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -18,49 +21,48 @@ layout(pass, rgba32f) uniform image2D radiance;
 layout(pass, scalar) readonly buffer RayTiles { uint ray_tiles[]; };
 layout(pass, scalar) readonly buffer Sizes { WorkSize rays_size; } work;
 
-layout(constant) const bool MASKED_HITS = false; // some surface has holes
-layout(constant) const uint PENDING = 1;         // branches that can wait at once
-// Of all that is followed, what is added: 0 all, 1 what the first surface mirrored, 2 what it let through. Nothing is left
-// out for that: which ray is followed next, and which random numbers it has, depends on all that were before.
+layout(constant) const bool MASKED_HITS = false; // some surface is alpha-tested
+layout(constant) const uint PENDING = 1;         // greatest number of waiting branches
+// Which branches are added: 0 all, 1 those that the first surface reflected, 2 those that it transmitted. All branches are
+// traced in any case: the order of the branches and their random numbers depend on all earlier ones.
 layout(constant) const uint FIRST_EVENT = 0;
-// A branch that would add less than this share of what it meets is not followed. The sum of all that is cut off is
-// counted.
+// A branch of smaller throughput is not followed. The sum of these losses is counted.
 const float FAINTEST = 1.0 / 512.0;
 
-// What a ray was sent for.
+// The event that created a ray.
 const uint BY_REFLECTION = 0;
-const uint BY_REFRACTION = 1; // or straight through
+const uint BY_REFRACTION = 1; // or transmitted undeflected
 
 struct Branch {
     vec3 origin;      // bvh space
     vec3 direction;
-    uint source_face;        // the flat face it leaves
+    uint source_face;        // coplanar group of the triangle that it leaves
     vec3 throughput;
     uvec4 media;
-    float from;       // nothing up to this t is met
-    float width;      // of the ray at its origin, for the level of textures
-    float spread;     // and what it grows by per metre
-    uint events;      // surfaces met before | what it was sent for << 8 | only let through so far << 9 | first event << 10
+    float from;       // surfaces up to this t are not hit
+    float width;      // diameter of the ray cone at its origin, for the mip level of textures
+    float spread;     // growth of the diameter per metre
+    uint events;      // surfaces met before | event << 8 | only transmitted so far << 9 | first event << 10
 };
-// What a surface has sent, the last one first, in registers: an array that is indexed is memory, which lavapipe writes word
-// by word and lane by lane, and most surfaces send one or two. The last one is followed next, the others wait in memory.
+// Branches that the current surface has sent, the last one first, in registers. An indexed array is in memory, which
+// lavapipe writes word by word and lane by lane, and most surfaces send one or two. The last branch is followed next; the
+// others wait in the stack `pending`.
 const int MOST_SENT = 4;
 Branch sent[MOST_SENT];
 uint sent_now = 0;
 Branch pending[PENDING];
 uint waiting = 0;
-// Directions in which the environment is to be looked at, with what it is weighted by: those of the first surface wait for
-// those of the second.
+// Lookups of the environment still to be made, with their weights: those of the first surface wait for those of the second.
 const int MOST_LOOKS = 2 * MOST_SENT;
 vec3 looks_at[MOST_LOOKS];
 vec3 looks_with[MOST_LOOKS];
 uint looks = 0;
 vec3 sum = vec3(0.0);
-float escaped = 0.0; // share of the pixel where nothing lies behind what is transparent
+float escaped = 0.0; // share of the pixel that shows the background through transparent surfaces
 float lost = 0.0;
 uint reflection_rays = 0;
 uint refraction_rays = 0;
-uint first_event = 0; // of the branch that is followed, as FIRST_EVENT has it; 0 at the first surface
+uint first_event = 0; // of the current branch, in the values of FIRST_EVENT; 0 at the primary surface
 
 vec3 wanted(uint events, vec3 light) {
     return FIRST_EVENT == 0 || events >> 10 == FIRST_EVENT ? light : vec3(0.0);
@@ -76,7 +78,7 @@ void look(vec3 direction, vec3 throughput) {
     looks++;
 }
 
-// All looks so far, in one place: a sampled image is a call that spills every register.
+// Makes all pending lookups in one place of the code: a sampled image is a call that spills every register.
 void see_environment() {
     do {
         vec3 seen = ENVIRONMENT ? environment_radiance(looks_at[0]) : vec3(0.0);
@@ -98,14 +100,14 @@ void send(Branch branch) {
         sent[0] = branch;
         sent_now++;
     }
-    // What is not followed sees the environment: nearer than nothing to what would have been found.
+    // A branch that is not followed gets the environment's radiance: a better estimate than black.
     if (weight > 0.0 && !follows) {
         lost += weight;
         look(branch.direction, wanted(branch.events, branch.throughput));
     }
 }
 
-// The branch to follow: the last one sent, or else the last one that waits.
+// The next branch: the last one sent, or the last one that waits.
 Branch next_branch() {
     do {
         bool waits = sent_now > 1;
@@ -125,15 +127,15 @@ Branch next_branch() {
     return next;
 }
 
-// Whether a ray is sent to see what the base of a surface mirrors: inside a body there is no environment.
+// Whether the base's reflection is traced by a ray. Inside a solid there is no environment to look up.
 bool mirrored_by_ray(HitSurface hit, Boundary boundary) {
     return hit.s.base_traced || (boundary.solid && boundary.medium_in != 0);
 }
 
-// Of the numbers that random points are drawn by, those of coats.
+// Flag in the event number that gives coats random numbers of their own.
 const uint COAT_EVENT = 0x80000000u;
 
-// Sends what a ray along `direction` is split into at a surface.
+// Splits a ray along `ray.direction` at a surface into its branches.
 void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixel) {
     Surface s = hit.s;
     vec3 direction = ray.direction;
@@ -148,7 +150,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     uint count = (ray.events & 0xffu) + 1;
     uint only_through = ray.events & 0x200u;
 
-    // Straight on: past what is not covered, and through a boundary that another medium displaces.
+    // 1. Undeflected: past the uncovered part, and through an interface suppressed by priority.
     next.origin = ray_origin(s.p_bvh, boundary.touches_opaque ? hit.n : -hit.n, vec3(0.0));
     next.direction = direction;
     next.media = boundary.suppressed_by_priority ? boundary.media_out : ray.media;
@@ -159,7 +161,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     next.from = 0.0;
     vec3 weight = boundary.suppressed_by_priority || s.unlit ? vec3(0.0) : ray.throughput * hit.coverage;
 
-    // The coat, the base's mirror image, and what goes through: each lobe in turn.
+    // 2. Reflection by the clear coat.
     Layers b = layers_at(hit, boundary);
     uint event = reflection_rays + refraction_rays;
     next.origin = ray_origin(s.p_bvh, hit.n, s.v);
@@ -175,6 +177,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
         send(next);
         weight *= b.under;
     }
+    // 3. Reflection by the base.
     vec2 u = vec2(0.0);
     if (ROUGH) u = random_point(pixel, event, trace_terms.seed, trace_terms.sample_index);
     vec3 h = event_half_vector(b, false, u);
@@ -185,6 +188,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     next.throughput = mirrored_by_ray(hit, boundary) ? weight * mirrored.weight : vec3(0.0);
     next.spread = ray.spread + (ROUGH && !b.delta ? s.alpha : 0.0);
     send(next);
+    // 4. Refraction, or transmission through a thin-walled surface.
     if (TRANSMISSIVE) {
         LobeSample through = sample_transmission(b, h, fresnel);
         next.origin = ray_origin(s.p_bvh, -hit.n, vec3(0.0));
@@ -201,6 +205,7 @@ void main() {
     if (place >= work.rays_size.count) return;
     ivec2 pixel = first_pixel(ray_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
+    // 1. The primary surface, from the G-buffer, and its branches.
     Primary primary = primary_surface(pixel, true);
     if (!primary.drawn) return;
     HitSurface hit = primary.hit;
@@ -218,10 +223,11 @@ void main() {
     split(hit, boundary, ray, cone, uvec2(pixel));
     bool more = sent_now > 0;
     do {
+        // 2. Follow the next branch to its hit.
         bool goes_on = more;
         ray = next_branch();
         if (FIRST_EVENT != 0) first_event = ray.events >> 10;
-        // Holes of masks are passed by.
+        // Passes the holes of alpha-tested surfaces.
         Hit found = Hit(COINCIDENT_INTERFACES ? ray.from : 0.0, NO_TRIANGLE, 0.0, 0.0);
         HitPoint point;
         bool at_surface;
@@ -232,14 +238,15 @@ void main() {
             if (at_surface) point = hit_point_of(found, ray.origin, ray.direction);
             hole = MASKED_HITS && at_surface && loop_iterations < LOOP_BUDGET && hit_is_hole(point);
         } while (hole);
-        // What outlives the loop is assigned under a condition: lavapipe goes on with lanes that are through, and what it
-        // computes for them then is nothing.
+        // Values that live after the loop are assigned under the lane's condition: lavapipe continues to run lanes that
+        // have finished, and their results are meaningless.
         if (goes_on) {
             bool reflected_ray = (ray.events >> 8 & 1u) == BY_REFLECTION;
             reflection_rays += reflected_ray ? 1u : 0u;
             refraction_rays += reflected_ray ? 0u : 1u;
             uint medium = present_medium(ray.media);
             if (ABSORPTION == ABSORPTION_PATH && medium != 0) ray.throughput *= absorbed(medium, ray.origin, ray.direction, at_surface ? found.t : 0.0);
+            // 3. Light the hit and split the branch there, or look up the environment.
             if (at_surface) {
                 cone = ray.width + ray.spread * found.t;
                 hit = hit_surface(point, ray.direction, cone * exp2(trace_terms.lod_bias));
@@ -249,7 +256,7 @@ void main() {
                 if (TRANSMISSIVE && !boundary.solid) seen_from(s, index_of(boundary.medium_in));
                 compensate(s);
                 s.diffuse *= 1.0 - hit.transmits;
-                // What a ray is sent for is not looked up as well.
+                // Light traced by a ray is not looked up as well.
                 s.base_traced = mirrored_by_ray(hit, boundary);
                 LightRange all = LightRange(0, DIRECTIONAL_LIGHTS + LOCAL_LIGHTS, 0, 0);
                 vec3 weight = ray.throughput * hit.coverage;
@@ -265,7 +272,7 @@ void main() {
         more = sent_now > 0 || waiting > 0;
         more = more && loop_iterations < LOOP_BUDGET;
     } while (more);
-    // Out of steps: what waits is not followed.
+    // 4. At the limit of loop iterations the waiting branches are dropped and counted.
     for (int i = 0; i < MOST_SENT; i++) lost += sent_now > i ? largest(sent[i].throughput) : 0.0;
     while (waiting > 0) {
         waiting--;

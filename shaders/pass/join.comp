@@ -1,5 +1,6 @@
-// The film: the mean of all samples, out of one sum of them, or of two whose random numbers have nothing in common; each is the sum of
-// its whole blocks and of the block that is under way.
+// The film: the mean of all samples, from one sum, or from two sums with independent random numbers.
+// Each sum is that of its complete blocks and of the unfinished block. Where to read: docs/decisions/shards.md (blocks of
+// samples).
 #version 460
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(pass, rgba32f) readonly uniform image2D total_a;
@@ -7,7 +8,7 @@ layout(pass, rgba32f) readonly uniform image2D open_a;
 layout(pass, rgba32f) readonly uniform image2D total_b;
 layout(pass, rgba32f) readonly uniform image2D open_b;
 layout(pass, rgba32f) writeonly uniform image2D film;
-// Whether they hold anything: in place of one that does not another is bound.
+// Whether each image holds a sum: an image without one is bound to a substitute.
 layout(push_constant) uniform Push { float scale; uint has_total_a; uint has_open_a; uint has_total_b; uint has_open_b; };
 
 void main() {

@@ -1,5 +1,6 @@
-// Deferred lighting: the radiance of each pixel's nearest surface, over the tiles that have one. What rays mirror or
-// refract is added by interact.comp.
+// Deferred lighting: the radiance of each pixel's nearest surface, over the tiles with surfaces (tile classification).
+// Light along reflected and refracted rays is added by interact.comp. Where to read: RTR 4, section 20.1. Assumes: world
+// axes, positions relative to the eye.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -13,7 +14,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(pass, rgba32f) uniform image2D radiance;
 layout(pass, scalar) readonly buffer SurfaceTiles { uint surface_tiles[]; };
 layout(pass, scalar) readonly buffer Sizes { WorkSize surface_size; WorkSize background_size; } work;
-// Where shadows are rays, lights are divided among dispatches: lavapipe ends long loops (pass/light.rs).
+// With shadow rays the lights are divided among dispatches: lavapipe ends long loops (src/pass/lighting.rs).
 layout(push_constant, scalar) uniform Push { LightRange range; uint first_dispatch; };
 
 void main() {
@@ -27,8 +28,8 @@ void main() {
     s.diffuse *= 1.0 - primary.hit.transmits;
     bool hidden = false;
     if (IN_MEDIUM && primary.hit.transmits > 0.0 && s.metallic < 1.0 && !primary.hit.sheet) {
-        // As interact.comp has it: from inside a body mirror images are sent for, and a body of higher priority has no
-        // boundary here.
+        // As in interact.comp: inside a solid reflections are traced by rays, and an interface suppressed by priority does
+        // nothing.
         s.base_traced = true;
         uint medium = material_at(primary.hit.material).medium;
         uvec4 beyond = primary.hit.front ? entered(s.media, medium) : left(s.media, medium);

@@ -1,5 +1,6 @@
-// Mirror images of what the picture shows, over the tiles that have smooth surfaces: where the mirrored ray meets something
-// on the screen, its radiance takes the place of the environment's, which the lighting has put there.
+// Screen-space reflection over the tiles with smooth surfaces.
+// Where the reflected ray hits a surface on the screen, its radiance replaces the environment's, which lighting has added.
+// Where to read: McGuire and Mara, JCGT 3(4) 2014; docs/decisions/screen-space.md.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,5 +1,6 @@
-// One bounce of all paths in a queue, two in each invocation: what each meets is added to its pixel, and entries of paths that
-// are through are marked.
+// Wavefront path tracing: one bounce of all paths in a queue, two per invocation.
+// Radiance is added to the path's sum; entries of terminated paths are marked, and stream compaction removes them
+// (queue_count.comp, queue_scan.comp, queue_next.comp). Where to read: pbrt 4, chapter 15; docs/decisions/paths.md.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -24,7 +25,7 @@ void end_of(Path p, uint place, uint pixel) {
 }
 
 void main() {
-    // Neighbouring groups of eight: what runs together lies together in the picture.
+    // Neighbouring groups of eight entries: lanes that run together are neighbours in the picture.
     uint lane = gl_LocalInvocationID.x;
     uint place = listed_tile(gl_WorkGroupID) * PATHS_IN_GROUP + (lane >> 3) * 16 + (lane & 7u);
     uint entry_a = place < size.paths.count ? queue[place] : TERMINATED;

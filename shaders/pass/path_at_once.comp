@@ -1,5 +1,6 @@
-// All bounces of two paths in one invocation: the film that the queues make, to the last bit, without any state in memory. What
-// tests hold them to.
+// Path tracing without queues: all bounces of two paths in one invocation, without path states in memory.
+// Tests compare the wavefront version with this one: both films are equal to the last bit. Where to read:
+// docs/decisions/paths.md.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -23,8 +24,8 @@ void main() {
     Path b = path_through(pixel_b);
     if (!inside_a) a.state = 0;
     if (!inside_b) b.state = 0;
-    // Once more when both are through: where lanes end at different times, lavapipe forgets what the last turn of those that
-    // are through has assigned.
+    // One more iteration after both paths have terminated: where lanes leave a loop at different times, lavapipe loses what
+    // the last iteration of the finished lanes assigned.
     bool more;
     do {
         more = ((a.state | b.state) & PATH_ALIVE) != 0 && loop_iterations < LOOP_BUDGET;

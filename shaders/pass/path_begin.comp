@@ -1,4 +1,4 @@
-// The first queue of paths, one through each pixel.
+// Wavefront path tracing: makes the first queue, one camera ray through each pixel.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,7 +1,10 @@
-// One level of the environment prefiltered with the GGX lobe of α = 16 / width of the level: the lobe is the same
-// number of texels wide on every level, so the same number of samples serves them all. N = V = R as in Karis 2013, where f cos / pdf of a
-// sample is F G1(l). Summed as differences from what lies in the middle of the lobe: a map that is the same everywhere
-// stays so to the last bit.
+// One level of the prefiltered environment (split sum): the map convolved with the GGX lobe of α = 16 / width of the level.
+// The lobe is the same number of texels wide on every level, so one number of samples serves all. N = V = R as in Karis
+// 2013, where f cos / pdf of a sample is F G1(l). Filtered importance sampling: each sample reads the mip level that fits
+// its density.
+// Sums are of differences from the texel in the middle of the lobe: a uniform map stays uniform to the last bit.
+// Where to read: Karis 2013; Křivánek and Colbert, GPU Gems 3, chapter 20 (2007); RTR 4, section 10.5. Assumes: world axes,
+// equirectangular maps.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -23,7 +26,7 @@ void main() {
     vec3 middle = textureLod(environment_map, equirectangular_from_direction(n), 0.0).rgb;
     vec3 sum = vec3(0.0);
     float weight = 0.0;
-    float texel = 4.0 * PI / (base_width * base_width * 0.5); // solid angle of a texel at the equator, roughly
+    float texel = 4.0 * PI / (base_width * base_width * 0.5); // approximate solid angle of a texel at the equator
     for (uint i = 0; i < SAMPLES; i++) {
         float x = (float(i) + 0.5) / float(SAMPLES);
         vec2 around = cos_sin_of_turns(float(bitfieldReverse(i)) * 2.3283064365386963e-10);
@@ -32,7 +35,7 @@ void main() {
         vec3 l = 2.0 * dot(n, h) * h - n;
         float cos_l = dot(n, l);
         if (cos_l > 0.0) {
-            // Each sample stands for 1 / (N pdf) of solid angle: read the level whose texels are that large.
+            // Each sample stands for a solid angle of 1 / (N pdf): read the mip level whose texels are that large.
             float pdf = ggx_distribution(n, h, alpha) * 0.25;
             float lod = 0.5 * log2(1.0 / (float(SAMPLES) * pdf * texel));
             float masking = smith_g2_over_g1(1.0, cos_l, alpha);
@@ -41,6 +44,6 @@ void main() {
             weight += masking;
         }
     }
-    // Their rounding is that of the middle: below 0 by as much.
+    // The sum's rounding error is that of the middle texel: the result may be negative by as much.
     level[at.y * size.x + at.x] = vec4(max(middle + sum / max(weight, 1e-6), 0.0), 1.0);
 }

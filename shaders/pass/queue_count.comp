@@ -1,4 +1,5 @@
-// How many paths go on, in each chunk of a queue.
+// Stream compaction, step 1 of 3: counts the surviving paths in each chunk of a queue.
+// Where to read: Harris, Sengupta and Owens, GPU Gems 3, chapter 39 (2007); lib/queue.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

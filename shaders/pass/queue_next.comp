@@ -1,4 +1,5 @@
-// The next queue: the paths that go on, in the order they had.
+// Stream compaction, step 3 of 3: scatters the surviving paths into the next queue, in order.
+// Where to read: Harris, Sengupta and Owens, GPU Gems 3, chapter 39 (2007); lib/queue.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,4 +1,7 @@
-// Where the paths of each chunk stand in the next queue, and how long that is: running sums, by one workgroup.
+// Stream compaction, step 2 of 3: exclusive prefix sum (scan) over the counts of the chunks, by one workgroup.
+// A chunk's prefix sum is the position of its first survivor in the next queue; the total is the length of that queue,
+// which sets its indirect dispatches. Where to read: Harris, Sengupta and Owens, GPU Gems 3, chapter 39 (2007);
+// lib/queue.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,4 +1,6 @@
-// How near the surfaces of each 8x8 tile come: rays over the screen cross in one step what lies behind them.
+// The nearest depth of each 8x8 tile, with which screen-space ray marching skips tiles in one step.
+// A minimum-depth pyramid of one level. Where to read: docs/decisions/screen-space.md. Assumes: reversed depth, so the
+// nearest is the largest.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -18,7 +20,7 @@ void main() {
     for (uint y = first.y; y < last.y; y++) {
         for (uint x = first.x; x < last.x; x++) {
             ScreenPiece piece = screen_piece(ivec2(x, y));
-            // Half a pixel to every side, and as much again as the next tile's pieces may differ by.
+            // Half a pixel to each side, and as much again for the difference to pieces of the next tile.
             nearest = max(nearest, piece.z > 0.0 ? piece.z + 2.0 * piece.thickness : 0.0);
         }
     }

@@ -1,4 +1,6 @@
-// The depth of what stops light. lib/shadow.glsl says what is stored and why.
+// Shadow maps: the depth of opaque surfaces as seen by a light, with the bias that lib/shadow.glsl derives.
+// Where to read: RTR 4, section 7.4; docs/decisions/shadow-maps.md. Assumes: reversed depth; the stored value is farther
+// from the light by the change over one texel.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -15,7 +17,7 @@ void main() {
     if (MASKED) {
         Material m = material_at(material);
         float a = m.base_color.a * (HAS_COLOR ? alpha : 1.0);
-        // The finest level, as rays to lights read it: a texel of the map tells of its centre, not of its area.
+        // The finest mip level, as shadow rays read it: a texel of the map represents its centre, not its area.
         if ((TEXTURES & (1u << SLOT_BASE)) != 0) a *= textureLod(base_page, page_coordinates(material, SLOT_BASE, uv), 0.0).a;
         if (a < m.alpha_cutoff) discard;
     }

@@ -1,10 +1,10 @@
-// Casters as a light sees them: object space to the light's clip space.
+// Shadow maps: casters as a light sees them, from object space to the light's clip space.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 #include "share/scene.glsl"
 
-// Relative to the middle of the scene, not to the eye.
+// Transforms relative to the middle of the scene, not to the eye.
 layout(pass, scalar) readonly buffer Casters { Instance casters[]; };
 layout(push_constant, scalar) uniform Push { mat4 clip_from_scene; };
 

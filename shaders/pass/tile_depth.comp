@@ -1,5 +1,6 @@
-// Nearest and farthest view depth of each 16x16 tile. With see-through surfaces the near end is the camera and, where
-// the background shows, the far end is infinity: they are lit by the same lists.
+// Tiled light culling, step 1: nearest and farthest view depth of each 16x16 tile.
+// With transparent surfaces the near end is the camera, and the far end is infinity where the background shows: the same
+// lists light them. Where to read: RTR 4, section 20.3; docs/decisions/light-lists.md.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,5 +1,7 @@
-// Which point and spot lights reach which 16x16 tile: one invocation per tile and word of 32 lights, each light's sphere
-// against the tile's four side planes and its range of depths. A bit mask cannot overflow and has one order.
+// Tiled light culling, step 2: which point and spot lights reach which 16x16 tile, as a bit mask per tile.
+// One invocation handles a tile and a word of 32 lights. It tests the sphere of each light against the tile's four side
+// planes and its range of depths. A bit mask cannot overflow and has one order. Where to read: RTR 4, section 20.3;
+// docs/decisions/light-lists.md.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -22,7 +24,8 @@ void main() {
     uint bits = 0;
     if (range.x <= range.y) {
         ivec2 corner = ivec2(tile % tiles_across, tile / tiles_across) * int(TILE);
-        // Ray displacements at the tile's borders, half a pixel wider than any sample of it.
+        // The side planes, as displacements of the viewing ray at the tile's borders, half a pixel wider than any sample of
+        // the tile.
         vec2 scale = 2.0 / vec2(camera.size);
         vec2 low = (vec2(corner) - 0.5) * scale - 1.0;
         vec2 high = (vec2(corner + int(TILE)) + 0.5) * scale - 1.0;
@@ -43,7 +46,8 @@ void main() {
                 float x = dot(light.position, r) / r2;
                 float y = dot(light.position, u) / u2;
                 float w = parallel ? 1.0 : z;
-                // Signed distances to the planes x = low.x w …: their normals are not unit, so the radius grows instead.
+                // Signed distances to the planes x = low.x w …: their normals are not unit vectors, so the radius is scaled
+                // instead.
                 float rx = radius * (parallel ? 1.0 : sqrt(1.0 + r2 * max(low.x * low.x, high.x * high.x))) * inversesqrt(r2);
                 float ry = radius * (parallel ? 1.0 : sqrt(1.0 + u2 * max(low.y * low.y, high.y * high.y))) * inversesqrt(u2);
                 hit = z + radius >= range.x && z - radius <= range.y && x - low.x * w >= -rx && high.x * w - x >= -rx &&

@@ -1,4 +1,6 @@
-// Film to display: counts what is not a radiance, exposes, bends, encodes (lecture C4).
+// Tone mapping: film to display. Counts invalid values, applies exposure, tone curve and the sRGB encoding (lecture C4).
+// The film has premultiplied alpha: radiance is divided by alpha before the tone curve. Where to read: RTR 4, section 8.2;
+// docs/colour.md.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -6,11 +8,12 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "lib/colour.glsl"
 
 layout(constant) const uint CURVE = 0;
-layout(constant) const bool DESATURATES = false; // colours outside of Rec. 709 lose saturation, not their luminance
+layout(constant) const bool DESATURATES = false; // colours outside the gamut of Rec. 709 lose saturation, not luminance
 layout(pass, rgba32f) readonly uniform image2D film;
 layout(pass, scalar) writeonly buffer Display { uint display[]; };
 layout(pass, scalar) buffer Counts { uint nan; uint inf; uint negative; uint ran; };
-// `background` is display-linear and lies behind what is not covered; its alpha 0 keeps the picture transparent.
+// `background` is display-linear and lies behind pixels of coverage below 1; with its alpha 0 the picture stays
+// transparent.
 layout(push_constant, scalar) uniform Push { vec4 background; float exposure; float scale; uint canary; };
 
 const uint INFINITY_BITS = 0x7f800000u;
@@ -23,15 +26,15 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     ivec2 size = imageSize(film);
     if (any(greaterThanEqual(pixel, size))) return;
-    // By which the host sees that a device has run what it was given.
+    // Shows the host that the device has run the dispatch.
     if (pixel == ivec2(0)) ran = canary;
     vec4 value = imageLoad(film, pixel) * scale;
-    // Counted before anything clamps: max(NaN, 0) is 0.
-    // By their bits: a compiler may assume that there are none, and drop a comparison.
+    // Counted before anything clamps: max(NaN, 0) is 0. By bits: a compiler may assume that NaN and infinity do not occur,
+    // and remove a comparison.
     uvec4 bits = floatBitsToUint(value) & 0x7fffffffu;
     if (any(greaterThan(bits, uvec4(INFINITY_BITS)))) atomicAdd(nan, 1u);
     if (any(equal(bits, uvec4(INFINITY_BITS)))) atomicAdd(inf, 1u);
-    // Of a picture by wavelengths even white comes back with roundings.
+    // In spectral rendering even white has rounding errors.
     float rounding = DESATURATES ? -1e-4 * max(value.r, max(value.g, value.b)) : 0.0;
     if (any(lessThan(value, vec4(rounding)))) atomicAdd(negative, 1u);
     float alpha = clamp(value.a, 0.0, 1.0);

@@ -1,5 +1,6 @@
-// Rays out of a buffer, hits into a buffer: the traversal alone, for its tests and its measurements. An invocation takes
-// one ray, or two that lie 8 apart, so that neighbours stay together in a group of 8.
+// BVH traversal alone, for tests and measurements: rays from a buffer, hits into a buffer.
+// An invocation traces one ray, or two that are 8 apart, so that neighbours stay together in a group of 8. Where to read:
+// lib/trace.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -11,9 +12,9 @@ layout(local_size_x = 64) in;
 layout(constant) const bool ANY_HIT = false;
 layout(constant) const bool PAIRS = false;
 layout(constant) const bool COUNT = false;
-layout(pass, rgba32ui) readonly uniform uimageBuffer rays; // origin, t_max | direction, the flat face it leaves
+layout(pass, rgba32ui) readonly uniform uimageBuffer rays; // origin, t_max | direction, source face (coplanar group it leaves)
 layout(pass, scalar) writeonly buffer Hits { Hit hits[]; };
-// Workgroups are cut into one contiguous piece per thread on lavapipe; blocks of 32 of them are dealt out in turn.
+// lavapipe cuts workgroups into one contiguous piece per thread, so blocks of 32 of them are dealt out in turn.
 layout(push_constant, scalar) uniform Push { uint count; uint blocks; };
 
 struct RayRead {

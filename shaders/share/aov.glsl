@@ -1,4 +1,5 @@
-// One pixel of arbitrary output variables.
+// Arbitrary output variables (AOVs) of one pixel.
+// Where to read: pbrt 4, section 5.4 (GBufferFilm). Assumes: metres, world axes.
 #ifndef SHARE_AOV_GLSL
 #define SHARE_AOV_GLSL
 struct AovPixel {
@@ -6,7 +7,7 @@ struct AovPixel {
     vec3 normal;           // shading normal
     vec3 geometric_normal;
     vec3 albedo;
-    float distance;        // from the eye; along the view direction where the camera is orthographic
+    float distance;        // from the eye; in an orthographic view along the view direction
     float roughness;
     float metallic;
     vec3 emissive;

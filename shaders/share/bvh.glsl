@@ -1,13 +1,17 @@
-// The tree of boxes over the scene, and its triangles. Shaders read them as texels of four words.
+// The bounding volume hierarchy (BVH) of the scene: nodes of its three layouts, and triangles, as texels of four words.
+// Where to read: Smits 1998 (skip pointers); pbrt 4, section 7.3; docs/decisions/rays.md. Assumes: bvh space
+// (share/trace.glsl), metres.
 #ifndef SHARE_BVH_GLSL
 #define SHARE_BVH_GLSL
 
-// A reference to a node is its index, one to a leaf is negative: ~(first triangle << LEAF_BITS | how many − 1).
+// A reference to a node is its index. A reference to a leaf is negative: ~(first triangle << LEAF_BITS | number of
+// triangles − 1).
 const int LEAF_BITS = 3;
 
-// Of a list: `word` is a leaf, or where to go on when the box is missed.
+// Nodes for stackless traversal, in depth-first order: `word` is a leaf, or the skip pointer, the next node if the box is
+// missed.
 struct GridNode {
-    ivec3 slabs; // of each axis the box's centre << SLAB_BITS | half extent, in steps of a grid over the scene
+    ivec3 slabs; // per axis the box's centre << SLAB_BITS | half extent, in steps of a grid over the scene
     int word;
 };
 const int SLAB_BITS = 16;
@@ -19,7 +23,7 @@ struct FloatNode {
     uint pad;
 };
 
-// Of the tree that is walked with a stack: the boxes of both children, and what they are, a node or a leaf.
+// Node for traversal with a stack: boxes and references (a node or a leaf) of both children.
 struct StackNode {
     vec3 left_center;
     int left;
@@ -31,13 +35,13 @@ struct StackNode {
     uint pad_half_extent;
 };
 
-// In the order of the leaves; corners run counter-clockwise around the front, whatever mirrored the object.
+// Triangles in the order of the leaves. Corners run counter-clockwise around the front, also where the object is mirrored.
 struct BvhTriangle {
     vec3 a;
     uint stops;   // OPAQUE or FILTER
     vec3 b;
-    uint face;    // the flat face that it is part of
+    uint face;    // coplanar group of the triangle
     vec3 c;
-    float picked; // probability per area with which paths draw it as a light; 0 where it is none
+    float picked; // density per area of light sampling on it; 0 where it is no emitter
 };
 #endif

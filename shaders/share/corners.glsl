@@ -1,14 +1,15 @@
-// What lies at the corners of triangles, for rays. Shaders read it as texels of four words.
+// Vertex attributes at the corners of triangles, for ray hits, as texels of four words.
+// Assumes: world axes; triangles in the order of the BVH's leaves.
 #ifndef SHARE_CORNERS_GLSL
 #define SHARE_CORNERS_GLSL
 
 struct CornerFrame {
     vec3 normal_a;
-    uint material;      // | ..._TRIANGLE
+    uint material;      // material | ..._TRIANGLE
     vec3 normal_b;
-    float scale;        // how long a metre of the object is in the world
+    float scale;        // length in the world of one metre of the object
     vec3 normal_c;
-    float uv_per_metre; // how dense texture coordinates are
+    float uv_per_metre; // density of texture coordinates
 };
 const uint MATERIAL_OF_TRIANGLE = 0xffffu;
 const uint SHEET_TRIANGLE = 0x10000u;
@@ -21,14 +22,14 @@ struct CornerUvs {
     vec2 pad;
 };
 
-// With their handedness.
+// Tangents in xyz, handedness in w.
 struct CornerTangents {
     vec4 a;
     vec4 b;
     vec4 c;
 };
 
-// RGBA as halves.
+// RGBA as half floats.
 struct CornerColors {
     uvec2 a;
     uvec2 b;
@@ -36,7 +37,7 @@ struct CornerColors {
     uvec2 pad;
 };
 
-// Of one triangle, in world axes.
+// Everything at the corners of one triangle.
 struct Corners {
     CornerFrame frame;
     CornerUvs uvs;           // where HIT_UVS

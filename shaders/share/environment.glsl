@@ -1,4 +1,5 @@
-// The environment as light: irradiance as nine spherical-harmonic coefficients, and how the map is turned.
+// Environment lighting: irradiance as nine spherical-harmonic coefficients, rotation and scale of the map.
+// Where to read: Ramamoorthi and Hanrahan 2001; RTR 4, section 10.6.
 #ifndef SHARE_ENVIRONMENT_GLSL
 #define SHARE_ENVIRONMENT_GLSL
 struct EnvironmentTerms {

@@ -1,9 +1,10 @@
-// Sizes of dispatches that the device itself decides.
+// Sizes of indirect dispatches, which the device itself computes.
+// Where to read: Vulkan specification, VkDispatchIndirectCommand.
 #ifndef SHARE_TILES_GLSL
 #define SHARE_TILES_GLSL
 
-// A VkDispatchIndirectCommand, and the number of tiles listed: the last row of workgroups may run past it. Every Vulkan
-// device dispatches 65535 workgroups along x; longer lists go on along y.
+// A VkDispatchIndirectCommand, and the number of listed tiles: the last row of workgroups may exceed it. Every Vulkan
+// device dispatches at least 65535 workgroups along x; longer lists continue along y.
 struct WorkSize {
     uint x;
     uint y;
@@ -11,9 +12,9 @@ struct WorkSize {
     uint count;
 };
 
-// Sizes of the dispatches over a queue.
+// Sizes of the dispatches over a queue of paths.
 struct QueueSize {
-    WorkSize paths;  // two paths in each invocation; `count` is that of entries
-    WorkSize chunks; // an invocation for each chunk of entries
+    WorkSize paths;  // two paths per invocation; `count` is the number of entries
+    WorkSize chunks; // one invocation per chunk of entries
 };
 #endif

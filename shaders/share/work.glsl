@@ -1,4 +1,4 @@
-// What the passes that send rays count. Sums are pairs: low, high.
+// Work counters of the passes with rays. Sums are pairs of words: low, high.
 #ifndef SHARE_WORK_GLSL
 #define SHARE_WORK_GLSL
 struct WorkCounts {
@@ -7,14 +7,14 @@ struct WorkCounts {
     uint shadow[2];
     uint node_visits[2];
     uint triangle_tests[2];
-    uint unmatched_exits[2]; // left without having been entered
-    uint lights_cut_off[2];   // surfaces at which the loop over lights was left before its end
-    uint lost[2];             // throughput that was not followed, in steps of 2^-16, summed over pixels
-    uint most_lost;           // the largest of a pixel, as the bits of a float
-    uint indirect[2];         // rays of paths
-    uint not_finite;          // estimates of paths that were no numbers, and left out
-    uint not_finite_event;    // where the first of them was met: the surface of its path, counted from 1
-    uint not_finite_pixel;    // x | y << 16
+    uint unmatched_exits[2]; // exits from media without an entry
+    uint lights_cut_off[2];   // surfaces whose loop over lights ended early
+    uint lost[2];             // throughput of branches and paths cut off, in steps of 2^-16, summed over pixels
+    uint most_lost;           // the largest loss of one pixel, as the bits of a float
+    uint indirect[2];         // rays of paths, without shadow rays
+    uint not_finite;          // path contributions that were NaN or infinite, and were dropped
+    uint not_finite_event;    // vertex of the first of those, counted from 1 along its path
+    uint not_finite_pixel;    // pixel of the first of those, x | y << 16
     uint not_finite_material;
 };
 #endif
