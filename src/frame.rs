@@ -1111,7 +1111,8 @@ impl Renderer {
         self.surfaces(camera, false)
     }
 
-    /// For each material of the scene, the number of pixels whose nearest surface at the centre has it, transparent ones included.
+    /// Called-for pixels: for each material of the scene, the number of pixels whose nearest surface at the centre has it, transparent ones
+    /// included.
     ///
     /// # Errors
     /// When the driver fails.

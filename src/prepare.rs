@@ -81,7 +81,7 @@ impl Original {
             let start = Instant::now();
             let bvh = Bvh::build(normal().borrow()).map_err(|error| format!("{error:#}"))?;
             let build_ms = start.elapsed().as_secs_f64() * 1e3;
-            tracing::info!("a tree of {} triangles, in {build_ms:.1} ms", bvh.triangles.len());
+            tracing::info!("built a BVH of {} triangles in {build_ms:.1} ms", bvh.triangles.len());
             Ok((Arc::new(bvh), build_ms))
         });
         built.clone().map_err(|error| anyhow!(error))
@@ -152,8 +152,8 @@ fn planned(scene: &mut Scene, conditions: &Conditions<'_>) -> Result<(Plan, Soli
     let form = canonicalise(scene);
     prune_unused(scene, reads);
     if scene.triangles() == 0 {
-        let why = if triangles == 0 { "the scene has 0 triangles" } else { "alpha leaves nothing of its surfaces" };
-        bail!("{}: there is nothing to draw, {why}", scene.name);
+        let why = if triangles == 0 { "it has 0 triangles" } else { "all of its surfaces have alpha 0" };
+        bail!("{}: the scene has nothing to draw: {why}", scene.name);
     }
     if needs_lights(forced) && scene.lights.iter().all(|light| light.proxy) {
         add_dark_lights(scene);
@@ -242,21 +242,21 @@ fn odd_triangles(scene: &Scene, bvh: &Bvh, solids: &Solids) -> Vec<String> {
     const MOST: usize = 4;
     let mut warnings = Vec::new();
     if bvh.dropped > 0 {
-        warnings.push(format!("{} triangles without area are left out for rays", bvh.dropped));
+        warnings.push(format!("{} triangles without area are left out of ray tracing", bvh.dropped));
     }
     let name = |instance: u32| &scene.meshes[scene.instances[instance as usize].mesh].name;
     let is_body = |instance: u32| solids.solid[instance as usize];
     let mut pairs = twins(bvh).into_iter().filter(|([a, b], _)| a == b || !(is_body(*a) || is_body(*b)));
     warnings.extend(pairs.by_ref().take(MOST).map(|([a, b], count)| {
         format!(
-            "{count} triangles of mesh \"{}\" lie exactly in triangles of mesh \"{}\": one of each is seen",
+            "{count} triangles of mesh \"{}\" duplicate triangles of mesh \"{}\"; one of each pair is drawn",
             name(b),
             name(a)
         )
     }));
     let more = pairs.count();
     if more > 0 {
-        warnings.push(format!("triangles of {more} more pairs of meshes lie exactly in each other"));
+        warnings.push(format!("{more} more pairs of meshes have duplicate triangles"));
     }
     warnings
 }

@@ -142,3 +142,32 @@ fn plain_data_knows_no_vulkan() {
         }
     }
 }
+
+/// Types that stand twice on purpose: data and its place on the device, truth and what is judged by it, builds with and without a window.
+const HONEST_TWINS: &[&str] = &["Hit", "Image", "Instance", "Ray", "ViewArgs"];
+
+#[test]
+fn a_type_name_means_one_thing() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut all = Vec::new();
+    sources(&root.join("src"), &mut all);
+    for entry in std::fs::read_dir(root.join("crates")).expect("the crates") {
+        sources(&entry.expect("a crate").path().join("src"), &mut all);
+    }
+    let mut found: std::collections::BTreeMap<String, BTreeSet<String>> = std::collections::BTreeMap::new();
+    for path in all {
+        let text = std::fs::read_to_string(&path).expect("a source");
+        for line in text.lines() {
+            let line =
+                ["pub(crate) ", "pub(super) ", "pub "].iter().find_map(|word| line.strip_prefix(word)).unwrap_or(line);
+            let Some(rest) = ["struct ", "enum ", "trait "].iter().find_map(|word| line.strip_prefix(word)) else {
+                continue;
+            };
+            let name: String = rest.chars().take_while(|c| c.is_alphanumeric()).collect();
+            found.entry(name).or_default().insert(path.strip_prefix(root).expect("inside").display().to_string());
+        }
+    }
+    assert!(found.len() > 400, "{} types", found.len());
+    found.retain(|name, places| places.len() > 1 && !HONEST_TWINS.contains(&name.as_str()));
+    assert!(found.is_empty(), "types of one name: {found:#?}");
+}

@@ -181,8 +181,8 @@ const FRAGMENTS: &[&str] = &[
     "[reset dropped fragments]",
     "[reset fragment counters]",
     "[reset fragment work size]",
-    "[see-through fragments]",
-    "[see-through lighting]",
+    "[transparent fragments]",
+    "[transparent lighting]",
     "classify_fragments",
     "composite",
     "fragments",
@@ -212,7 +212,7 @@ fn glass() -> Material {
     }
 }
 
-const NONE: &str = "no material in use has it";
+const NONE: &str = "no visible material uses it";
 
 #[test]
 fn surfaces_bring_their_targets() {
@@ -276,7 +276,7 @@ fn media_bring_their_code() {
         made.add(Shape::cuboid(DVec3::splat(0.1)), glass(), at(0.1 + gap, 0.0, 0.0));
         made
     };
-    let reason = "no transparent body lies against another surface";
+    let reason = "no transparent mesh touches another surface";
     Case {
         brings: &[&["interact.coincident_interfaces"]],
         ..Case::new("coincident interfaces", reason, slabs(0.01), slabs(0.0))
@@ -286,9 +286,9 @@ fn media_bring_their_code() {
 
 #[test]
 fn light_from_all_around_is_there_where_it_is_seen() {
-    let scatters = "no material in use scatters light";
+    let scatters = "no visible material scatters light";
     Case { brings: &[&["light.ambient"]], ..Case::hidden("ambient light", scatters, metal(0.5), chalk()) }.check();
-    let mirrors = "no material in use mirrors anything";
+    let mirrors = "no visible material has specular reflection";
     Case {
         brings: &[&["prefiltered environment", "light.reflection"]],
         ..Case::hidden("environment reflection", mirrors, chalk(), metal(0.5))
@@ -310,7 +310,7 @@ fn light_from_all_around_is_there_where_it_is_seen() {
         ..around
     }
     .check();
-    let even = "the environment is the same everywhere";
+    let even = "the environment is the same in all directions";
     let prefiltered = Case::new("prefiltered environment", even, ball(metal(0.5), None), ball(metal(0.5), None));
     let environments = [Some(Environment::constant([0.3, 0.4, 0.5])), Some(Environment::studio())];
     let [without, with] = Case { environments, same: false, brings: &[], ..prefiltered }.check();
@@ -323,7 +323,7 @@ fn light_from_all_around_is_there_where_it_is_seen() {
 fn aims() {
     Case {
         choices: &["indirect=path", "lights=area:1", "guiding=photons"],
-        brings: &[&["path guiding", "guiding cells", "path.path_guiding"]],
+        brings: &[&["guiding spheres", "guiding cells", "path.path_guiding"]],
         ..Case::hidden("path guiding", NONE, metal(0.3), metal(0.0))
     }
     .check();
@@ -369,7 +369,7 @@ fn lights_are_there_where_something_is_lit() {
     };
     let dark = || [None, None];
     let gray = || unlit([0.5, 0.6, 0.7]);
-    let reason = "all materials in use are unlit";
+    let reason = "all visible materials are unlit";
     let scenes = || [lit(ball(gray(), None), 1), lit(ball(gray(), Some(chalk())), 1)];
     let [without, with] = scenes();
     let off = &["shadows=off"];
@@ -416,7 +416,7 @@ fn lights_are_there_where_something_is_lit() {
     }
     .check();
     let (without, with) = (lit(ball(chalk(), None), 15), lit(ball(chalk(), None), 16));
-    let lists = Case::new("tiled light culling", "few point and spot lights", without, with);
+    let lists = Case::new("tiled light culling", "there are too few point and spot lights", without, with);
     Case {
         environments: dark(),
         same: false,
@@ -462,7 +462,7 @@ fn black_textures_call_for_nothing() {
         ("emissive textures", [0, 0, 0, 255], |m, t| (m.emissive, m.emissive_texture) = ([5.0; 3], Some(t))),
         ("refraction", [0, 255, 255, 255], |m, t| (m.transmission, m.transmission_texture) = (1.0, Some(t))),
         ("clear coat", [0, 255, 255, 255], |m, t| (m.clearcoat, m.clearcoat_texture) = (1.0, Some(t))),
-        ("mirrors", [255, 255, 0, 255], |m, t| {
+        ("reflection", [255, 255, 0, 255], |m, t| {
             (m.metallic, m.specular, m.metallic_roughness_texture) = (1.0, 0.0, Some(t));
         }),
     ];
@@ -517,7 +517,7 @@ fn dark_lights_are_no_lights() {
     let mut dark = ball(lambert([0.5; 3]), None);
     dark.light([0.0; 3], lamp(1.0));
     let dark = draw(&dark.0, None, &[]);
-    assert_eq!(state(&dark.plan, "shadows"), ("not needed", "all lights of the scene are dark".to_owned()));
+    assert_eq!(state(&dark.plan, "shadows"), ("not needed", "all lights have zero intensity".to_owned()));
     assert!(dark.plan.rays.is_none());
     assert!(dark.film.rgba.iter().all(|pixel| pixel[..3] == [0.0; 3]));
 }
@@ -542,7 +542,7 @@ fn lights_out_of_range_are_no_lights() {
     let mut far = ball(chalk(), None);
     far.light([10.0; 3], lamp(-12.0, 10.9));
     let far = draw(&far.0, None, &[]);
-    assert_eq!(state(&far.plan, "shadows"), ("not needed", "no light of the scene reaches anything".to_owned()));
+    assert_eq!(state(&far.plan, "shadows"), ("not needed", "no light reaches the scene".to_owned()));
     assert!(far.plan.rays.is_none());
     // As far as it says, and a little more, it is one.
     let mut touching = ball(chalk(), None);

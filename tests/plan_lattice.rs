@@ -206,7 +206,7 @@ fn scene(ways: &Ways, choice: &Choice) -> Made {
     }
     if ways.blended {
         let veil = Material { base_color: [0.2, 0.9, 0.3, 0.5], alpha_mode: AlphaMode::Blend, ..rough.clone() };
-        // First among the see-through ones.
+        // First among the transparent ones.
         made.0.materials.insert(0, Material { name: "veil".to_owned(), ..veil });
         made.0.meshes.iter_mut().for_each(|mesh| mesh.material += 1);
         let mesh = made.mesh(Shape::panel(1.0, 1.0), rough.clone());

@@ -39,7 +39,7 @@ fn degrees(a: DVec3, b: DVec3) -> f64 {
     a.cross(b).length().atan2(a.dot(b)).to_degrees()
 }
 
-/// What the G-buffer pass draws: see-through surfaces have a pass of their own.
+/// What the G-buffer pass draws: transparent surfaces have a pass of their own.
 fn without_transparent(scene: &Scene) -> Scene {
     let mut opaque = scene.clone();
     for mesh in &mut opaque.meshes {

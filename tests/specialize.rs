@@ -190,6 +190,6 @@ fn every_loop_counts_where_the_count_is_read() {
         assert_eq!(added, if reads { loops(stage.words) } else { 0 });
         counted_programs += usize::from(reads);
     }
-    // Lighting, reflection and refraction, see-through surfaces, paths.
+    // Lighting, reflection and refraction, transparent surfaces, paths.
     assert!(counted_programs >= 4, "{counted_programs}");
 }

@@ -13,7 +13,7 @@ use etalon_testing::gpu::{Gpu, bits};
 const PICTURES: &[(&str, Model, &[&str])] = &[
     // Lists per tile of 683 lights.
     ("lamps", Model::Local, &["samples=1"]),
-    // Mirrors on the screen and see-through surfaces.
+    // Mirrors on the screen and transparent surfaces.
     ("blend", Model::Local, &["reflection=screen", "refraction=screen", "samples=1"]),
     // Rays.
     ("etalon", Model::Recursive, &["samples=4"]),

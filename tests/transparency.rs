@@ -1,4 +1,4 @@
-//! See-through surfaces against the over operator: far to near, in f64, whatever the order in which they were drawn. Panes
+//! Transparent surfaces against the over operator: far to near, in f64, whatever the order in which they were drawn. Panes
 //! are unlit, so that coverage and order are all there is to get wrong.
 
 use etalon::frame::{Background, Settings};

@@ -2,7 +2,7 @@
 //! shaders/pass/composite.comp).
 //!
 //! Read Carpenter 1984, "The A-buffer, an Antialiased Hidden Surface Method"; Real-Time Rendering (4th ed.), section 5.5;
-//! docs/decisions/see-through.md.
+//! docs/decisions/transparency.md.
 
 use anyhow::Result;
 

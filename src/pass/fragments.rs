@@ -2,7 +2,7 @@
 //! shaders/pass/fragments.*).
 //!
 //! Read Carpenter 1984, "The A-buffer, an Antialiased Hidden Surface Method"; Yang et al. 2010, "Real-Time Concurrent Linked
-//! List Construction on the GPU"; Real-Time Rendering (4th ed.), section 5.5; docs/decisions/see-through.md.
+//! List Construction on the GPU"; Real-Time Rendering (4th ed.), section 5.5; docs/decisions/transparency.md.
 
 use std::sync::Arc;
 
@@ -103,7 +103,7 @@ impl FragmentLists {
         let wanted = most + most / 16 + 1024;
         if wanted > limit {
             if self.strips == self.size[1] {
-                bail!("one row of the picture has {most} see-through fragments, this device holds {limit}");
+                bail!("one row of the picture has {most} transparent fragments, this device holds {limit}");
             }
             self.strips = (self.strips * 2).min(self.size[1]);
             self.counters =

@@ -1,9 +1,10 @@
-//! Raster G-buffer: the nearest opaque surface of every pixel (shaders/pass/gbuffer.*).
+//! The G-buffer: attributes of the nearest opaque surface of every pixel, rasterised for deferred shading
+//! (shaders/pass/gbuffer.*).
 //!
-//! 24 bytes a pixel beside depth: RGBA16F base colour and metallic, two octahedral normals (RG32UI, or as the knob
-//! `normals` says), RG32UI ids, roughness and occlusion; 16 more for positions where the knob `position` stores them; 4 for
-//! triangles where there are rays, 8 for emissive textures and 16 for layers where the plan has them. docs/decisions/gbuffer.md has
-//! what narrower and wider choices cost.
+//! Read Real-Time Rendering (4th ed.), section 20.1 (deferred shading). 24 bytes a pixel beside depth: RGBA16F base colour and
+//! metallic, two octahedral normals (RG32UI, or as the knob `normals` says), RG32UI ids, roughness and occlusion. 16 more for
+//! positions where the knob `position` stores them; 4 for triangles with rays, 8 for emissive textures and 16 for layers
+//! where the plan has them. docs/decisions/gbuffer.md has the cost of narrower and wider formats.
 
 use std::sync::Arc;
 
@@ -17,8 +18,8 @@ use crate::upload::scene::SceneOnDevice;
 
 const POSITION: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
-/// Words of two octahedral normals (shaders/lib/normals.glsl): every device draws to such formats and stores them, which is not so of
-/// RGBA16_SNORM.
+/// Format of the normals, two octahedral encodings as integer words (shaders/lib/normals.glsl): every device supports these
+/// formats as colour attachments and storage images, unlike RGBA16_SNORM.
 fn normal_format(normals: Normals) -> vk::Format {
     match normals {
         Normals::Oct16 => vk::Format::R32_UINT,
@@ -31,21 +32,21 @@ fn normal_format(normals: Normals) -> vk::Format {
 pub struct GBuffer {
     /// Reversed depth; 0 where nothing was drawn.
     pub depth: Image,
-    /// The same depth as texels, row by row: what the passes after it read. The copy costs half a millisecond at 1280x720.
+    /// The same depth as a texel buffer in row order, for later passes. The copy costs half a millisecond at 1280x720.
     depth_rows: Buffer,
     /// Base colour and metallic texels.
     pub base: Image,
-    /// Shading and geometric normal.
+    /// Shading normal and geometric normal.
     pub normals: Image,
-    /// Depth and position, where positions are stored, and the same as texels.
+    /// Depth and position, where positions are stored, as an image and as a texel buffer.
     positions: Option<(Image, Buffer)>,
     /// Material, roughness, instance, occlusion.
     pub ids: Image,
-    /// Triangle of the scene; one pixel where the plan has no rays.
+    /// Index of the triangle in the scene; one texel where the plan has no rays.
     pub triangles: Image,
-    /// Emissive texels; one pixel where the plan has none.
+    /// Emissive colours; one texel where the plan has none.
     pub emissive: Image,
-    /// Layer texels; one pixel where the plan has none.
+    /// Clear coat, specular and transmission; one texel where the plan has none.
     pub layers: Image,
     size: [u32; 2],
     with: [bool; 3],
@@ -97,7 +98,7 @@ impl GBuffer {
         })
     }
 
-    /// What passes read of it.
+    /// Bindings of the passes that read the G-buffer.
     #[must_use]
     pub fn bind(&self) -> lib::gbuffer::Bind<'_> {
         lib::gbuffer::Bind {
@@ -112,7 +113,7 @@ impl GBuffer {
     }
 }
 
-/// Draws surfaces: the nearest of each pixel stays.
+/// Draws surfaces with a depth test: the nearest surface of each pixel is kept.
 ///
 /// # Errors
 /// When the driver refuses what a pipeline binds.
@@ -123,14 +124,14 @@ pub fn gbuffer<'a>(
     lod_bias: f32,
     draws: Vec<Draw<'a>>,
 ) -> Result<()> {
-    // Only depth is cleared: the other targets are read where depth says that something was drawn.
+    // Only depth is cleared: later passes read the other targets only where depth shows a surface.
     let color = |image| Some(ColorTarget { image, clear: None });
     let [triangles, emissive, layers] = target.with;
     let mut colors = vec![color(&target.base), color(&target.normals), color(&target.ids)];
     for (image, exists) in [(&target.triangles, triangles), (&target.emissive, emissive), (&target.layers, layers)] {
         colors.push(color(image).filter(|_| exists));
     }
-    // What is read of pixels that nothing was drawn at is their depth.
+    // The positions' depth is also read at pixels without a surface, so this target is cleared.
     colors.push(target.positions.as_ref().map(|(image, _)| ColorTarget { image, clear: Some([0; 4]) }));
     while colors.last().is_some_and(Option::is_none) {
         colors.pop();

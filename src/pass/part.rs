@@ -1,4 +1,4 @@
-//! Parts of a picture: its light by what first happened to it, on the way back from the eye.
+//! Parts of a picture as layers: light by its first interaction, counted from the eye.
 
 use std::sync::Arc;
 
@@ -9,18 +9,18 @@ use crate::gpu::{Buffer, Device, Image, ImageDesc, Place};
 use crate::plan::rungs::{Reflection, Refraction};
 use crate::plan::{Knobs, Plan, Refused, Setting};
 
-/// Light that rays bring to the surface that a pixel shows. A picture is the sum of both parts and of what that surface
-/// itself emits, scatters and takes from the prefiltered environment.
+/// Light that rays bring to a pixel's surface. A picture is the sum of both parts and of the surface's own emission, scattered
+/// light and reflection of the prefiltered environment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
-    /// By rays that the surface, or its coat, mirrored first.
+    /// Light of rays that the surface, or its coat, reflected first.
     Reflection = 1,
-    /// By rays that went through it first, bent or straight on.
+    /// Light of rays that passed through the surface first, refracted or straight.
     Refraction = 2,
 }
 
 impl Part {
-    /// The name of its layer, and of the knob that sends its rays.
+    /// The name of the part's layer, and of the knob that sends its rays.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -29,31 +29,31 @@ impl Part {
         }
     }
 
-    /// Whether the plan sends any rays that may begin in this way.
+    /// Whether the plan sends rays of this part.
     #[must_use]
     pub fn called_for(self, plan: &Plan) -> bool {
-        // Inside a body its own boundary is mirrored by rays, whatever the rung for mirrors.
+        // Inside a closed mesh its boundary reflects by rays, whatever the rung of `reflection`.
         plan.rays.is_some_and(|rays| rays.refraction || (self == Self::Reflection && rays.mirrors))
     }
 }
 
-/// A part on the device.
+/// A part's images on the device.
 pub struct PartOnDevice {
-    /// Which one.
+    /// The part.
     pub part: Part,
-    /// Of the sample drawn last.
+    /// Radiance of the last sample.
     pub radiance: Image,
-    /// A copy for the rung `screen` of `refraction`; next to nothing with another one.
+    /// A copy for screen-space refraction; a dummy otherwise.
     pub seen: Buffer,
-    /// The mean of the samples, where there is more than one.
+    /// Mean of the samples, when there is more than one sample or band.
     pub film: Option<Image>,
 }
 
 impl PartOnDevice {
-    /// Images of `size` pixels.
+    /// Creates images of `size` pixels.
     ///
     /// # Errors
-    /// When no ray makes this part under the chosen rungs, or memory is short.
+    /// When the chosen rungs send no rays of this part, or memory is short.
     pub fn new(device: &Arc<Device>, plan: &Plan, knobs: &Knobs, part: Part, size: [u32; 2]) -> Result<Self> {
         let name = part.name();
         if plan.paths.is_some() {

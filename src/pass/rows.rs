@@ -1,14 +1,14 @@
-//! How long lists of workgroups are dispatched, and which tiles of the picture are drawn.
+//! Dispatch sizes for lists of tiles, and shares of a picture's tiles.
 
 use crate::shader::lib::work_tile::{ROW, WORK_TILE};
 
-/// A share of the picture: of its tiles of 8x8 pixels, row by row, every `of`-th from the `index`-th on. Tiles side by side take about
-/// the same time, so that shares do.
+/// A share of the picture: every `of`-th tile of 8x8 pixels, in row order, from tile `index` on. Neighbouring tiles take similar
+/// time, so shares do, too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TileShare {
-    /// The first tile, less than `of`.
+    /// Index of the first tile, less than `of`.
     pub index: u32,
-    /// Into how many shares the picture is divided.
+    /// Number of shares.
     pub of: u32,
 }
 
@@ -16,31 +16,31 @@ impl TileShare {
     /// The whole picture.
     pub const ALL: Self = Self { index: 0, of: 1 };
 
-    /// How many tiles of a picture of `size` pixels are in it (shaders/lib/own_tiles.glsl).
+    /// Number of tiles of a picture of `size` pixels in this share (shaders/lib/own_tiles.glsl).
     #[must_use]
     pub fn tiles(self, size: [u32; 2]) -> u32 {
         let all = size[0].div_ceil(WORK_TILE) * size[1].div_ceil(WORK_TILE);
         all.saturating_sub(self.index).div_ceil(self.of)
     }
 
-    /// Whether it has the tile of a pixel.
+    /// Whether the share contains the tile of a pixel.
     #[must_use]
     pub fn has(self, [x, y]: [u32; 2], width: u32) -> bool {
         (y / WORK_TILE * width.div_ceil(WORK_TILE) + x / WORK_TILE) % self.of == self.index
     }
 }
 
-/// A dispatch of `count` workgroups in rows; the shader takes its place from `listed_tile`.
+/// Size of a dispatch of `count` workgroups in rows; `listed_tile` of the shader computes the linear index.
 #[must_use]
 pub fn rows_of(count: u32) -> [u32; 3] {
     [count.min(ROW), count.div_ceil(ROW), 1]
 }
 
-/// Stride in which `count` workgroups go over a picture, around its end: lavapipe gives each of its threads one contiguous
-/// piece of a dispatch, and what costs most is often in one part of the picture.
+/// Stride in which `count` workgroups visit the tiles of a picture, modulo `count`: lavapipe gives each of its threads one
+/// contiguous piece of a dispatch, and expensive pixels are often in one part of the picture.
 ///
-/// About the golden section of `count`, which spreads any number of workgroups evenly; without a divisor in common, so that
-/// each has its turn; and the product with any turn fits 32 bits.
+/// The stride is about `count` times the golden section, which spreads any number of workgroups evenly. It is coprime to
+/// `count`, so every tile is visited once, and its product with any index fits 32 bits.
 #[must_use]
 pub fn stride(count: u32) -> u32 {
     let gcd = |mut a: u32, mut b: u32| {
@@ -63,8 +63,8 @@ mod tests {
         for count in [1, 2, 3, 4, 6, 12, 30, 225, 900, 2310, 8160, 65_536] {
             let place = |turn: u32| turn.checked_mul(stride(count)).expect("32 bits") % count;
             let mut places: Vec<u32> = (0..count).map(place).collect();
-            // Of the first half of the turns, a half lies in each half of the picture: the discrepancy of the golden
-            // section grows with the logarithm.
+            // A half of the first half of the workgroups lies in each half of the picture: the discrepancy of the golden section
+            // grows with the logarithm.
             let early = places[..count as usize / 2].iter().filter(|&&place| place < count / 2).count();
             assert!(early.abs_diff(count as usize / 4) <= 1 + count.ilog2() as usize, "{count}: {early}");
             places.sort_unstable();

@@ -1,8 +1,9 @@
-//! What lights see: depth maps from where they are, drawn once per scene (shaders/pass/shadow_map.*, lib/shadow.glsl).
+//! Shadow maps: depth maps from the lights, drawn once per scene (shaders/pass/shadow_map.*, lib/shadow.glsl).
 //!
-//! Neither lights nor geometry depend on the eye, so nor do the maps: they live in the space of rays, whose origin is the
-//! middle of the scene, and pictures from other cameras cost nothing more. All maps are squares of one image, an atlas:
-//! layers of an array would have to be of one size. docs/decisions/shadow-maps.md says how sizes and bias were chosen.
+//! Read Williams 1978, "Casting Curved Shadows on Curved Surfaces"; Real-Time Rendering (4th ed.), section 7.4 (shadow maps,
+//! shadow bias, slope offset). Neither lights nor geometry depend on the eye, so the maps are in bvh space and serve all
+//! cameras. All maps are squares in one image, an atlas: the layers of an array would need one size.
+//! docs/decisions/shadow-maps.md explains sizes and bias.
 
 use std::f64::consts::FRAC_PI_3;
 use std::sync::Arc;
@@ -20,42 +21,42 @@ use crate::shader::lib::light_table::{LIGHT_TEXELS, SHADOW_MAP_TEXELS};
 use crate::shader::{SCENE, lib, shadow_map};
 use crate::upload::scene::{LightMaps, SceneOnDevice};
 
-/// Texels a side of the image that holds all maps, at most: what every device allows, and 64 MiB of depth.
+/// Largest side of the atlas in texels: every device allows it, and it is 64 MiB of depth.
 const ATLAS: u32 = 4096;
-/// Texels a side of a light's only map where there is room …
+/// Largest side of a light's single map, in texels.
 const FLAT: u32 = 2048;
-/// … and of each of six: of those four go once around.
+/// Largest side of each of the six maps of a cube, in texels; four of them go around the horizon.
 const CUBE: u32 = FLAT / 2;
-/// The smallest of the six. A texel is 1.4° then; coarser ones would show blots for shadows.
+/// Smallest side of a cube's map. A texel is then 1.4° wide; coarser maps would show blotches.
 const SMALLEST_CUBE: u32 = 64;
-/// Texels around what a map has to show, for its filter: 2x2 texels around a point, and one for its rounding.
+/// Border around the visible region, in texels, for the filter: 2x2 texels around a point, and one for rounding.
 const BORDER: f64 = 2.0;
-/// Half angle up to which a light has one map, of a spot light's cone or of the scene seen from outside; a plane stretches
-/// as the tangent's square towards its edge, and wider ones have six, all around.
+/// Largest half angle for a single map, of a spot light's cone or of the scene seen from outside. A plane is stretched by the
+/// squared tangent towards its edge, so wider lights get a cube of six maps.
 const WIDEST_CONE: f64 = FRAC_PI_3;
-/// Radii of the scene from which on a light is so far that its depth lies between planes around the scene: numbers as large as
-/// the distance then hide nothing of it.
+/// Distance of a light, in radii of the scene, from which on its depth range encloses the scene: depths relative to a large
+/// distance would lose precision.
 const FAR: f64 = 4.0;
-/// Texels of the table of lights per map.
+/// Texels per map in the light table.
 const FACE_TEXELS: usize = SHADOW_MAP_TEXELS as usize;
 
-/// The maps; next to nothing where the plan has none.
+/// The atlas of shadow maps; a dummy where the plan has none.
 pub struct ShadowMaps {
     depth: Image,
-    /// GPU time of the drawing.
+    /// GPU times of the passes that drew the maps.
     pub times: Vec<PassTime>,
 }
 
-/// One map: rows of clip_from_scene, where `scene` is the space of rays.
+/// One map: rows of the matrix clip_from_scene, where `scene` is bvh space.
 #[derive(Debug, Clone, Copy)]
 struct Face {
     clip: [DVec4; 4],
-    /// First texel across and down, and texels a side.
+    /// First texel in x and y, and side in texels.
     square: [u32; 3],
 }
 
 impl ShadowMaps {
-    /// Draws the maps of all lights.
+    /// Draws the shadow maps of all lights.
     ///
     /// # Errors
     /// When there are too many lights, or memory is short.
@@ -88,7 +89,7 @@ impl ShadowMaps {
         let mut faces: Vec<Face> = Vec::new();
         let mut first = vec![0; lights.len()];
         let mut infinite = vec![false; lights.len()];
-        // Large squares first: what follows along the curve then starts at a multiple of its own size.
+        // Large squares first: along the Morton curve each following square then starts at a multiple of its own size.
         let mut next = 0;
         for large in [true, false] {
             for (index, light) in lights.iter().enumerate().filter(|(_, light)| cone(light, bounds).is_some() == large)
@@ -118,7 +119,7 @@ impl ShadowMaps {
         Ok(Self { depth, times })
     }
 
-    /// All maps: reversed depth, 0 where nothing was drawn.
+    /// The atlas: reversed depth, 0 where nothing was drawn.
     #[must_use]
     pub fn depth(&self) -> Sampled<'_> {
         Sampled { image: &self.depth, sampler: SamplerDesc::NEAREST }
@@ -126,7 +127,7 @@ impl ShadowMaps {
 }
 
 impl Face {
-    /// Its square, and the rows that lead to (across, down, depth, 1) times w, in texels of the atlas.
+    /// The light table's texels of the map: its square, and the matrix rows to (x, y, depth, 1) times w, in texels of the atlas.
     fn texels(&self) -> [[f32; 4]; FACE_TEXELS] {
         let [x, y, side] = self.square.map(f64::from);
         let [cx, cy, cz, cw] = self.clip;
@@ -136,8 +137,8 @@ impl Face {
         [[x as f32, y as f32, side as f32, 0.0], row(across), row(down), row(cz), row(cw)]
     }
 
-    /// Whether anything of a box may lie within the map: it is not wholly on the wrong side of one of its planes. What is
-    /// no number is drawn.
+    /// Whether a box (centre, half extent) may intersect the map's frustum: it is not entirely outside of one plane. A NaN
+    /// counts as visible.
     fn sees(&self, middle: DVec3, half: DVec3) -> bool {
         let [x, y, z, w] = self.clip;
         ![w + x, w - x, w + y, w - y, w - z].iter().any(|plane| {
@@ -151,7 +152,7 @@ impl Face {
     }
 }
 
-/// Draws every caster into every map.
+/// Draws all shadow casters into all maps.
 fn draw(
     device: &Arc<Device>,
     scene: &SceneOnDevice,
@@ -181,8 +182,8 @@ fn draw(
     frame.finish()
 }
 
-/// Axis and half angle of the cone that one map of a light shows: of the light's own and the one around the scene the
-/// narrower. `None` where that is too wide for one. A directional light's has no angle.
+/// Axis and half angle of the cone of a light's single map: the narrower of the light's own cone and the one around the
+/// scene. `None` when it is too wide for one map. The angle of a directional light is 0.
 fn cone(light: &Light, bounds: Bounds) -> Option<(DVec3, f64)> {
     let around = |position: DVec3| {
         let to_middle = bounds.center() - position;
@@ -200,7 +201,7 @@ fn cone(light: &Light, bounds: Bounds) -> Option<(DVec3, f64)> {
     (half <= WIDEST_CONE).then_some((axis, half))
 }
 
-/// Whether a map's depth is near/z, with an infinite far plane; else it lies between planes around the scene.
+/// Whether depth is near/z with an infinite far plane; otherwise the planes enclose the scene.
 fn has_infinite_far(light: &Light, bounds: Bounds, anchor: DVec3) -> bool {
     match light.kind {
         LightKind::Directional { .. } => false,
@@ -210,7 +211,7 @@ fn has_infinite_far(light: &Light, bounds: Bounds, anchor: DVec3) -> bool {
     }
 }
 
-/// Texels a side of the maps of lights with one, and of those with six: as many as there is room for.
+/// Sides of single maps and of cube maps in texels, as large as fit the atlas together.
 fn sides(flats: usize, cubes: usize) -> Option<[u32; 2]> {
     let fits = |&[flat, cube]: &[u32; 2]| {
         let area = |side: u32, count: usize| u64::from(side) * u64::from(side) * count as u64;
@@ -219,13 +220,13 @@ fn sides(flats: usize, cubes: usize) -> Option<[u32; 2]> {
     (0..).map(|halved| [FLAT >> halved, CUBE >> halved]).take_while(|&[_, cube]| cube >= SMALLEST_CUBE).find(fits)
 }
 
-/// The square number `index` of the smallest along Morton's curve, which fills squares one after the other.
+/// Position of smallest square number `index` along the Morton curve, which fills squares one after the other.
 fn along_curve(index: u32) -> [u32; 2] {
     let every_second = |bits: u32| (0..16).fold(0, |sum, i| sum | (bits >> (2 * i) & 1) << i);
     [every_second(index) * SMALLEST_CUBE, every_second(index >> 1) * SMALLEST_CUBE]
 }
 
-/// Rows of clip_from_scene of a light's maps of `side` texels.
+/// Rows of clip_from_scene for each map of a light, of `side` texels.
 fn clip_rows(light: &Light, side: u32, bounds: Bounds, anchor: DVec3) -> Vec<[DVec4; 4]> {
     let widen = f64::from(side) / (f64::from(side) - 2.0 * BORDER);
     let radius = bounds.radius().max(f64::MIN_POSITIVE);
@@ -234,21 +235,21 @@ fn clip_rows(light: &Light, side: u32, bounds: Bounds, anchor: DVec3) -> Vec<[DV
         let outside = (position - position.clamp(bounds.min, bounds.max)).length();
         // A corner's ray is this much longer than its depth.
         let slant = (1.0 + 2.0 * tan * tan).sqrt();
-        // Reversed floating depth has the same relative precision for every near distance (numerics.md 42).
+        // Reversed floating-point depth has the same relative precision for every near distance (numerics.md 42).
         let near = (0.5 * outside).max(1e-5 * radius) / slant;
         let row = |axis: DVec3, scale: f64| (axis * scale).extend(-axis.dot(eye) * scale);
         let down = forward.cross(right);
         let depth = if has_infinite_far(light, bounds, anchor) {
             DVec4::W * near
         } else {
-            // Over z: 1 at the near end of the sphere around the scene, 0 at the far one.
+            // Over z: 1 at the near end of the sphere around the scene, 0 at the far end.
             let reach = radius * (1.0 + 2.0_f64.powi(-8));
             (-forward).extend(reach) * ((-forward.dot(eye) - reach) / (2.0 * reach))
         };
         [row(right, 1.0 / tan), row(down, 1.0 / tan), depth, row(forward, 1.0)]
     };
     let cube = |position: DVec3| {
-        // As `cube_face` in shaders/lib/shadow.glsl counts them: +x, −x, +y, −y, +z, −z.
+        // The order of `cube_face` in shaders/lib/shadow.glsl: +x, −x, +y, −y, +z, −z.
         let axes = [DVec3::X, DVec3::Y, DVec3::Z];
         (0..6).map(|i| from(position, axes[i / 2] * [1.0, -1.0][i % 2], axes[(i / 2 + 1) % 3], widen)).collect()
     };
@@ -256,12 +257,12 @@ fn clip_rows(light: &Light, side: u32, bounds: Bounds, anchor: DVec3) -> Vec<[DV
         LightKind::Directional { direction } => {
             let right = direction.any_orthonormal_vector();
             let down = direction.cross(right);
-            // The box around the scene as the light sees it: its middle is the anchor, but for a scene with vertices that
-            // are nowhere.
+            // The box around the scene in the light's axes. Its centre is the anchor, except for scenes with vertices that are not
+            // finite.
             let (middle, half) = (bounds.center() - anchor, (bounds.max - bounds.min) * 0.5);
             let reach = |axis: DVec3| axis.abs().dot(half).max(1e-6 * radius);
             let row = |axis: DVec3, scale: f64| (axis * scale).extend(-axis.dot(middle) * scale);
-            // Depth 1 − a where the scene begins and a where it ends: roundings neither clip it nor make it nothing.
+            // Depth is 1 − a where the scene begins and a where it ends, so rounding neither clips nor zeroes it.
             let depth = row(-direction, 0.5 * (1.0 - 2.0_f64.powi(-16)) / reach(direction)) + DVec4::W * 0.5;
             vec![[row(right, 1.0 / (widen * reach(right))), row(down, 1.0 / (widen * reach(down))), depth, DVec4::W]]
         }

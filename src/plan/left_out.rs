@@ -21,15 +21,15 @@ pub(super) fn left_out(
     let by_rays = transmission.by_rays;
     let straight = |m: &Material| m.transmission > 0.0 && !(transmission.bends && m.alpha_mode != AlphaMode::Blend);
     let clear = |m: &Material| straight(m) || (m.transmission > 0.0 && !by_rays);
-    say(&straight, "transmits light that goes straight on: refraction is off, or the material is blended");
-    say(&|m| clear(m) && m.roughness > 0.1, "transmits through a rough surface: shown clear");
+    say(&straight, "transmits light without refraction: refraction is off, or the material is alpha-blended");
+    say(&|m| clear(m) && m.roughness > 0.1, "has a rough surface that transmits light; it is drawn smooth");
     let casts = |m: &Material| !shadow_maps || casts_in_maps(m);
-    say(&|m| !casts(m), "casts no shadow: the maps of shadows=map hold opaque and masked surfaces alone");
+    say(&|m| !casts(m), "casts no shadow: shadow maps (shadows=map) contain only opaque and masked surfaces");
     let (absorption, marches) = (knobs.absorption, by_rays && knobs.absorption.steps() > 0);
     let varies = |m: &Material| m.marched_sigma().is_some();
     let instead = format!(
-        "has a grid of sigma, of which {absorption} with {} takes the mean; refraction=ray with absorption=march:4 to march:64 goes \
-         through it",
+        "has a grid of sigma, but {absorption} with {} uses only its mean; refraction=ray with absorption=march:4 to march:64 marches \
+         through the grid",
         knobs.refraction
     );
     say(&|m| varies(m) && !marches && absorption != Absorption::Off, &instead);
@@ -41,13 +41,13 @@ pub(super) fn left_out(
     }
     let (lobes, reflection) = (knobs.lobes, knobs.reflection);
     if lobes != Lobes::default() && reflection != Reflection::Ray {
-        warnings.push(format!("{lobes} changes nothing: {reflection} sends no rays"));
+        warnings.push(format!("{lobes} changes nothing: {reflection} traces no rays"));
     } else if lobes != Lobes::All && knobs.indirect == Indirect::Path {
-        warnings.push(format!("{lobes} changes nothing: indirect=path draws from every lobe"));
+        warnings.push(format!("{lobes} changes nothing: indirect=path samples every lobe"));
     }
     let rule = knobs.quadrature;
     if rule != Quadrature::default() && !(marches && surfaces.any(varies)) {
-        warnings.push(format!("{rule} changes nothing: no medium is marched"));
+        warnings.push(format!("{rule} changes nothing: no medium is ray-marched"));
     }
     warnings
 }

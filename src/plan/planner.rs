@@ -126,11 +126,13 @@ impl Planner<'_> {
         let emissive = decisions.decide(EffectId::EmissiveTextures, cause);
         let cause = surfaces.cause(|m| m.clearcoat > 0.0, |m| format!("has clearcoat {}", m.clearcoat));
         let clearcoat = decisions.decide(EffectId::ClearCoat, cause);
-        let cause =
-            surfaces.cause(|m| has_layers(m) || m.clearcoat > 0.0, |_| "has a coat or layer textures".to_owned());
+        let cause = surfaces.cause(
+            |m| has_layers(m) || m.clearcoat > 0.0,
+            |_| "has a clear coat or textures of material layers".to_owned(),
+        );
         let layers = decisions.decide(EffectId::Layers, cause);
-        let cause =
-            surfaces.cause(|m| m.conductor.is_some() && m.metallic > 0.0, |_| "is a metal with n and kappa".to_owned());
+        let cause = surfaces
+            .cause(|m| m.conductor.is_some() && m.metallic > 0.0, |_| "is a conductor with n and kappa".to_owned());
         let conductors = decisions.decide(EffectId::Conductors, cause);
         let mut lobes = 0;
         for (place, lobe) in LOBES.iter().enumerate() {
@@ -152,7 +154,7 @@ impl Planner<'_> {
         let cause = surfaces.cause(
             |m| is_transparent(m, by_rays),
             |m| match m.alpha_mode {
-                AlphaMode::Blend => format!("is alpha-blended, {} opaque at most", m.base_color[3]),
+                AlphaMode::Blend => format!("is alpha-blended with opacity {} or less", m.base_color[3]),
                 _ => format!("has transmission {}", m.transmission),
             },
         );
@@ -160,7 +162,7 @@ impl Planner<'_> {
         let size =
             |m: &Material| m.sigma.as_ref().map_or([0; 3], |grid| grid.size()).map(|n| n.to_string()).join(" x ");
         let cause =
-            surfaces.cause(|m| m.marched_sigma().is_some(), |m| format!("has a grid of {} values of sigma", size(m)));
+            surfaces.cause(|m| m.marched_sigma().is_some(), |m| format!("has a grid of {} sigma values", size(m)));
         let grid = surfaces.find(|m| m.marched_sigma().is_some()).map(size);
         let cause = cause.with_some("grid", grid.as_slice());
         // Without refracting rays every transmissive surface is rendered as thin-walled.
@@ -170,7 +172,7 @@ impl Planner<'_> {
         };
         let marched = decisions.decide_with(EffectId::HeterogeneousMedia, by_knob, cause) && by_rays;
         let steps = if marched { knobs.absorption.steps() } else { 0 };
-        let cause = Cause::when(marched, format!("{steps} steps of each segment"), "no medium is marched");
+        let cause = Cause::when(marched, format!("{steps} steps per segment"), "no medium is ray-marched");
         decisions.decide_with(EffectId::Quadrature, knobs.quadrature.choice().allows(true), cause);
         let colours = surroundings.forced == ForcedEffects::All
             || surfaces.any(|m| m.marched_sigma().is_some_and(|grid| grid.channels() > 1));
@@ -190,18 +192,20 @@ impl Planner<'_> {
         };
         let rung = knobs.reflection;
         let shiny = surfaces.any(|m| !m.unlit && (mirrors(m) || m.clearcoat > 0.0));
-        let cause = shown(shiny, "no material in use mirrors anything");
+        let cause = shown(shiny, "no visible material has specular reflection");
         let reflection = decisions.decide_with(
             EffectId::EnvironmentReflection,
             unless_paths(paths, rung.choice().allows(rung != Reflection::Off)),
             cause,
         );
         let cause = match (reflection, there_is) {
-            (false, _) => Cause::against("no environment is mirrored"),
+            (false, _) => Cause::against("no surface reflects the environment"),
             (_, false) => Cause::against("there is no environment"),
-            _ => {
-                Cause::when(!surroundings.constant, "the environment varies", "the environment is the same everywhere")
-            }
+            _ => Cause::when(
+                !surroundings.constant,
+                "the environment varies",
+                "the environment is the same in all directions",
+            ),
         };
         let prefilter = decisions.decide(EffectId::PrefilteredEnvironment, cause) && reflection;
         // A texture only lowers the factor.
@@ -209,7 +213,7 @@ impl Planner<'_> {
         let smooth = |m: &Material| surfaces::is_smooth(m, roughest);
         let cause = surfaces.cause(smooth, |m| match (mirrors(m) && m.roughness <= roughest, m.clearcoat > 0.0) {
             (true, _) => format!("has roughness {}", m.roughness),
-            (false, true) => format!("has a coat of roughness {}", m.clearcoat_roughness),
+            (false, true) => format!("has a clear coat with roughness {}", m.clearcoat_roughness),
             (false, false) => "has a roughness texture".to_owned(),
         });
         let by_rung = rung.choice().allows(matches!(rung, Reflection::Screen | Reflection::Ray));
@@ -225,7 +229,7 @@ impl Planner<'_> {
             transparent_mirrors: on_screen(true) && transmission.transparency,
             refraction: transmission.bends && !transmission.by_rays,
         };
-        let cause = shown(surfaces.any(scatters), "no material in use scatters light");
+        let cause = shown(surfaces.any(scatters), "no visible material scatters light");
         let by_rung = knobs.indirect.choice().allows(knobs.indirect != Indirect::Off);
         let ambient = decisions.decide_with(EffectId::AmbientLight, unless_paths(paths, by_rung), cause);
         let environment = environment || reflection || ambient;
@@ -262,11 +266,11 @@ impl Planner<'_> {
         let proxies = scene.lights.iter().filter(|light| light.shines() && replaced(light)).count();
         let cause = match (scene.lights.is_empty(), useful_lights > 0, lit) {
             (true, ..) => Cause::against("the scene has no lights"),
-            (_, false, _) if proxies > 0 => Cause::against("surfaces light in place of the lights that stand for them"),
-            (_, false, _) if dark == scene.lights.len() => Cause::against("all lights of the scene are dark"),
-            (_, false, _) => Cause::against("no light of the scene reaches anything"),
-            (.., false) => Cause::against("all materials in use are unlit"),
-            _ => Cause::of(format!("{directional} directional, {local} point and spot lights")),
+            (_, false, _) if proxies > 0 => Cause::against("emissive surfaces replace the proxy lights"),
+            (_, false, _) if dark == scene.lights.len() => Cause::against("all lights have zero intensity"),
+            (_, false, _) => Cause::against("no light reaches the scene"),
+            (.., false) => Cause::against("all visible materials are unlit"),
+            _ => Cause::of(format!("{directional} directional lights, {local} point and spot lights")),
         };
         let counts = |cause: Cause| match scene.lights.is_empty() {
             true => cause,
@@ -284,7 +288,7 @@ impl Planner<'_> {
             counts(cause),
         );
         let cause = match (local >= TILES_FROM, ranged > 0) {
-            (false, _) => Cause::against("few point and spot lights"),
+            (false, _) => Cause::against("there are too few point and spot lights"),
             (_, false) => Cause::against("no light has a range"),
             _ => counts(Cause::of(format!("{ranged} of {local} point and spot lights have a range"))),
         };
@@ -296,8 +300,8 @@ impl Planner<'_> {
     fn paths(&mut self) -> Option<Paths> {
         let Self { scene, surfaces, decisions, knobs, surroundings, paths, .. } = self;
         let cause = match surfaces.any(|m| !m.unlit) {
-            true => Cause::of("light goes from surface to surface"),
-            false => Cause::when(*paths, "the knob says so", "no surface in use sends light"),
+            true => Cause::of("surfaces scatter light onto each other"),
+            false => Cause::when(*paths, "indirect=path is set", "no visible surface scatters light"),
         };
         let kept = decisions.decide_with(EffectId::PathTracing, knobs.indirect.choice().allows(*paths), cause);
         let sends_light = |m: &Material| match m.unlit {
@@ -305,26 +309,28 @@ impl Planner<'_> {
             false => m.emissive != [0.0; 3],
         };
         let cause = match kept {
-            true => surfaces.cause(sends_light, |m| if m.unlit { "is shown as it is" } else { "emits" }.to_owned()),
-            false => Cause::against("no paths are followed"),
+            true => surfaces.cause(sends_light, |m| {
+                if m.unlit { "is unlit and emits its base colour" } else { "emits light" }.to_owned()
+            }),
+            false => Cause::against("path tracing is off"),
         };
         let by_lights = knobs.lights.choice().allows(knobs.lights != rungs::Lights::Points);
         let emitting = decisions.decide_with(EffectId::EmissiveLights, by_lights, cause);
         let shaped = scene.lights.iter().find(|light| light.shines() && light.extent.is_some());
         let cause = match (kept, shaped) {
-            (false, _) => Cause::against("no paths are followed"),
-            (_, None) => Cause::against("no light has a shape"),
-            (_, Some(light)) => Cause::of(format!("light \"{}\" has a shape", light.name)),
+            (false, _) => Cause::against("path tracing is off"),
+            (_, None) => Cause::against("no light has an area"),
+            (_, Some(light)) => Cause::of(format!("light \"{}\" has an area", light.name)),
         };
         let shaped = decisions.decide_with(EffectId::AreaLights, by_lights, cause);
         let smooth = surfaces.cause(is_smooth, |m| {
-            let does = if m.transmission > 0.0 { "bends" } else { "mirrors" };
-            format!("{does} light without spreading it")
+            let does = if m.transmission > 0.0 { "refracts" } else { "reflects" };
+            format!("{does} light specularly")
         });
         let around = surroundings.environment && !surroundings.constant;
         let cause = match (kept, emitting || around) {
-            (false, _) => Cause::against("no paths are followed"),
-            (_, false) => Cause::against("paths meet no light by chance"),
+            (false, _) => Cause::against("path tracing is off"),
+            (_, false) => Cause::against("no light can be hit by a path"),
             _ => smooth,
         };
         let guided = decisions.decide_with(
@@ -344,9 +350,9 @@ impl Planner<'_> {
             scene.lights.iter().find(|light| light.shines() && (light.spectrum.is_some() || differ(&light.color)));
         let cause = surfaces.cause(by_wavelength, |m| {
             match (&m.reflectance, &m.emission, &m.conductor) {
-                (Some(_), ..) => "has a reflectance by wavelength",
-                (_, Some(_), _) => "has a spectrum of its own",
-                (.., Some(_)) => "is a metal with n and kappa",
+                (Some(_), ..) => "has a spectral reflectance",
+                (_, Some(_), _) => "has an emission spectrum",
+                (.., Some(_)) => "is a conductor with n and kappa",
                 _ if m.dispersion.disperses(f64::from(m.ior)) => "has dispersion",
                 _ => "is coloured",
             }
@@ -354,19 +360,19 @@ impl Planner<'_> {
         });
         let cause = match (cause.called_for, light, surroundings.environment && !surroundings.grey) {
             (true, ..) => cause,
-            _ if surfaces.with_colours().is_some() => Cause::of("vertices are coloured"),
+            _ if surfaces.with_colours().is_some() => Cause::of("some vertices are coloured"),
             (_, Some(light), _) => Cause::of(format!("light \"{}\" is coloured", light.name)),
             (.., true) => Cause::of("the environment is coloured"),
-            _ => Cause::against("everything is grey: all wavelengths make the same picture"),
+            _ => Cause::against("everything is grey: all wavelengths give the same picture"),
         };
         let by_colour = knobs.colour.choice().allows(bands > 0);
         let spectral = decisions.decide_apart(EffectId::SpectralRendering, by_colour, cause);
         let cause = match transmission.bends {
             true => surfaces.cause(Material::disperses, |m| {
                 let n = |nm| m.dispersion.index(f64::from(m.ior), nm);
-                format!("has n {:.4} at 450 nm and {:.4} at 650 nm", n(450.0), n(650.0))
+                format!("has n = {:.4} at 450 nm and {:.4} at 650 nm", n(450.0), n(650.0))
             }),
-            false => Cause::against("nothing is bent"),
+            false => Cause::against("no surface refracts light"),
         };
         let disperses = decisions.decide_apart(EffectId::Dispersion, by_colour, cause);
         (if spectral { bands } else { 0 }, disperses && spectral)
@@ -381,7 +387,8 @@ impl Planner<'_> {
             return None;
         }
         let holes = |m: &Material| matches!(m.alpha_mode, AlphaMode::Mask(_));
-        let masked = decisions.decide(EffectId::AlphaTest, surfaces.cause(holes, |_| "has holes".to_owned()));
+        let masked =
+            decisions.decide(EffectId::AlphaTest, surfaces.cause(holes, |_| "is alpha-tested (masked)".to_owned()));
         // A path that refracts is not a straight shadow ray.
         let lets_through = |m: &Material| {
             holes(m)
@@ -389,8 +396,8 @@ impl Planner<'_> {
                 || (m.transmission > 0.0 && (!*paths || m.ior == 1.0 || surfaces.is_sheet(m)))
         };
         let cause = match shadows || *paths {
-            true => surfaces.cause(lets_through, |_| "lets light through".to_owned()),
-            false => Cause::against("no rays look for lights"),
+            true => surfaces.cause(lets_through, |_| "is masked, blended or transmissive".to_owned()),
+            false => Cause::against("no shadow rays are traced"),
         };
         let filters = decisions.decide(EffectId::TransparentShadows, cause);
         let cause = surfaces.cause(|m| m.transmission > 0.0, |m| format!("has transmission {}", m.transmission));
@@ -407,14 +414,12 @@ impl Planner<'_> {
         };
         let rough = decisions.decide(
             EffectId::GlossyReflection,
-            surfaces.cause(rough, |m| format!("sends rays at roughness {}", m.roughness)),
+            surfaces.cause(rough, |m| format!("scatters rays at roughness {}", m.roughness)),
         );
         let rough_transmission = |m: &Material| m.transmission > 0.0 && m.roughness > SMOOTHEST;
         let cause = match *paths {
-            true => {
-                surfaces.cause(rough_transmission, |m| format!("lets light through with roughness {}", m.roughness))
-            }
-            false => Cause::against("no paths are followed"),
+            true => surfaces.cause(rough_transmission, |m| format!("transmits light with roughness {}", m.roughness)),
+            false => Cause::against("path tracing is off"),
         };
         let rough_transmission = decisions.decide(EffectId::RoughTransmission, cause);
         let absorbs = |m: &Material| m.absorbs() && m.transmission > 0.0 && m.thickness > 0.0;

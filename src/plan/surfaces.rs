@@ -135,7 +135,7 @@ impl<'a> Surfaces<'a> {
         let found: Vec<&Used> = self.used.iter().filter(|used| test(used.material)).collect();
         let Some(first) = found.first() else {
             let form = &self.facts.form;
-            return Cause::against("no material in use has it")
+            return Cause::against("no visible material uses it")
                 .with_some("black textures", &form.black)
                 .with_some("alpha 1 everywhere", &form.opaque)
                 .with_some("alpha 0 everywhere", &form.unseen);
@@ -157,11 +157,11 @@ impl<'a> Surfaces<'a> {
     pub(super) fn body(&self, material: &Material) -> String {
         let used = self.used.iter().find(|used| std::ptr::eq(used.material, material));
         let closed = match used.map(|used| (used.closed, used.instances)) {
-            Some((closed, all)) if closed == all => "closed".to_owned(),
-            Some((closed, all)) if closed > 0 => format!("closed in {closed} of {all} places"),
-            _ => "a sheet".to_owned(),
+            Some((closed, all)) if closed == all => "closed mesh".to_owned(),
+            Some((closed, all)) if closed > 0 => format!("closed mesh in {closed} of {all} instances"),
+            _ => "thin-walled".to_owned(),
         };
-        let bends = if material.ior == 1.0 { ", which bends nothing" } else { "" };
+        let bends = if material.ior == 1.0 { " (no refraction)" } else { "" };
         format!(
             "has transmission {}, thickness {} m, n = {}{bends}; {closed}",
             material.transmission, material.thickness, material.ior

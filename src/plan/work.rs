@@ -203,8 +203,8 @@ impl Plan {
             state: if touching { EffectState::Kept } else { EffectState::NotCalledFor },
             choice: None,
             cause: match touching {
-                true => "some transparent body lies against another surface",
-                false => "no transparent body lies against another surface",
+                true => "a transparent mesh touches another surface",
+                false => "no transparent mesh touches another surface",
             }
             .to_owned(),
             evidence: Evidence::new(),

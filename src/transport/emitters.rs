@@ -1,6 +1,6 @@
 //! Light sampling by power: the discrete distribution over lights, emissive triangles and the environment (lecture R2–R4).
 //!
-//! Read pbrt (4th ed.), sections 12.6 (light sampling), 12.5 (infinite area lights) and 2.4 (inversion method).
+//! Read pbrt (4th ed.), sections 12.6 (light sampling), 12.5 (infinite area lights) and 2.3 (inversion method).
 //! Importance sampling inverts a CDF: cumulative probabilities are 32-bit fixed point, a random 32-bit word selects a bin by
 //! binary search, and every bin has at least one word. Units: radiance in the scene's units, areas in square metres.
 

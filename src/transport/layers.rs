@@ -3,7 +3,8 @@
 //! of the energy, then a direction of its lobe.
 //!
 //! Read pbrt (4th ed.), chapter 9 (BSDFs) and section 14.3 (layered materials); Schmidt and Budge 2002, "Simple Nested
-//! Dielectrics in Ray Traced Images"; the glTF extensions KHR_materials_clearcoat, _specular, _transmission and _volume.
+//! Dielectrics in Ray Traced Images"; the glTF extensions `KHR_materials_clearcoat`, `KHR_materials_specular`,
+//! `KHR_materials_transmission` and `KHR_materials_volume`.
 //!
 //! From the top: a clear coat; the base, which is a dielectric interface, a conductor, or a mixture of both; below the
 //! interface a diffuse base layer, or transmission. A layer passes on the energy left under its Fresnel reflectance at the
@@ -464,7 +465,7 @@ mod tests {
         }
     }
 
-    /// Glossy directions stay on their side; a specular lobe has the same reflected and refracted direction for all random numbers.
+    /// Glossy directions stay on their side; a specular lobe has one reflected and one refracted direction for all random numbers.
     #[test]
     fn directions_leave_on_the_side_of_their_layer() {
         let direction = DVec3::new(0.6, 0.0, -0.8);

@@ -2,9 +2,9 @@
 //!
 //! Read Jensen 1995, "Importance Driven Path Tracing using the Photon Map"; pbrt (4th ed.), section 13.4 (path tracing).
 //! BSDF sampling at a diffuse surface rarely hits the small part of a sphere in which the lamp is seen, and the path is then
-//! very bright (a caustic). A few photons are therefore traced from the lights first. For each cell of a grid over the scene, the points
-//! that photons last left before they arrived in the cell are covered by a few bounding spheres. A path in the cell samples
-//! the cones of these spheres.
+//! very bright (a caustic). A few photons are therefore traced from the lights first. For each cell of a grid over the
+//! scene, a few bounding spheres cover the points that photons last left before they arrived in the cell. A path in the
+//! cell samples the cones of these spheres.
 //!
 //! The guiding distribution only changes how often paths take a direction. The mixture density with BSDF sampling divides the
 //! estimate, so the expected picture is the same, however few or wrong the photons are.

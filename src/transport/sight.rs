@@ -1,7 +1,7 @@
 //! Number of transparent surfaces along straight lines of sight: a lower bound for the surfaces that a path must cross to
 //! reach what is behind them. Refracted and internally reflected paths cross more.
 //!
-//! Read docs/decisions/interfaces.md. `etalon plan` uses the bound to choose the knob `interfaces`.
+//! Read docs/decisions/interfaces.md. `etalon plan` prints the light that each rung of `interfaces` loses along these lines.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;

@@ -187,7 +187,7 @@ fn parts_make_the_whole() {
     assert!(at.join("all/report.html").exists());
     etalon(at, &["cost", "--merge", "p1", "all/pictures", "-o", "b"], &[]).failed(1, "cost.json");
     etalon(at, &["cost", "--merge", "p2", "-o", "b"], &[]).failed(1, "part 1/2 is missing");
-    etalon(at, &["cost", "--merge", "p1", "p1", "-o", "b"], &[]).failed(1, "part 1/2 is there twice");
+    etalon(at, &["cost", "--merge", "p1", "p1", "-o", "b"], &[]).failed(1, "part 1/2 is given twice");
     assert!(!at.join("b/cost.json").exists());
 }
 
@@ -226,9 +226,9 @@ fn one_approximation_has_two_lines_and_a_verdict() {
         lines.len() == 3 && lines[0].starts_with("fresnel=schlick") && lines[1].starts_with("fresnel=exact"),
         "{said}"
     );
-    assert!(lines[2].contains("more error by"), "{said}");
+    assert!(lines[2].contains("adds an error of"), "{said}");
     let said = compare("study:radiance", "absorption=off,path", &["--set", "samples=1"]).succeeded().stdout;
-    assert!(said.contains("the same to the last bit"), "{said}");
+    assert!(said.contains("bit-identical"), "{said}");
     let global = ["--model", "global", "--set", "samples=4", "--json"];
     let json: Value =
         serde_json::from_str(&compare("study:cornell", "interfaces=1,32", &global).succeeded().stdout).expect("JSON");
@@ -272,7 +272,7 @@ fn a_budget_that_measures_nothing_says_which_would() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
     let all = ["cost", "study:pool", "-o", "a", "--size", "1280x720", "--device", "cpu", "--budget", "1"];
-    etalon(at, &all, &HASTY).failed(1, "measures something");
+    etalon(at, &all, &HASTY).failed(1, "is too small");
     let page = std::fs::read_to_string(at.join("a/report.html")).expect("a page");
     assert!(page.contains("Nothing was measured") && page.contains("--budget"), "{page}");
     assert!(!at.join("a/cost.json").exists());
@@ -297,7 +297,9 @@ fn a_budget_without_time_for_all_pixels_measures_fewer() {
         assert_eq!(all.replace("4096x2304", &format!("{width}x{}", table["size"][1])), few);
         assert!(number(&at_size["gpu_ms"]["median"]) > number(&point["gpu_ms"]["median"]), "{at_size} {point}");
     }
-    assert!(list(&table, "warnings").iter().any(|w| w.as_str().is_some_and(|w| w.contains("no time for pictures of"))));
+    assert!(
+        list(&table, "warnings").iter().any(|w| w.as_str().is_some_and(|w| w.contains("too small for pictures of")))
+    );
     let page = std::fs::read_to_string(at.join("a/report.html")).expect("a page");
     assert!(page.contains("at 4096×2304"), "{page}");
 }
@@ -313,7 +315,7 @@ fn what_contradicts_a_run_is_refused() {
         (&["-o", "a", "--model", "global"], "cost chooses the rungs itself"),
         (&["-o", "a", "--max-error", "0.1"], "--max-error"),
         (&["-o", "a", "--reference-samples", "5"], "expected 4, 16"),
-        (&["-o", "full"], "is not empty and holds no run of cost"),
+        (&["-o", "full"], "is not empty and does not hold a run of cost"),
         (&["-o", "a", "--judge", "none.png"], "none.png"),
     ] {
         let all = [&["cost", "study:radiance", "--device", "cpu", "--size", "8x8"], arguments].concat();

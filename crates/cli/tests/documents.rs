@@ -302,7 +302,8 @@ fn the_page_of_the_gbuffer_has_its_formats() {
 fn the_page_of_devices_names_each_requirement() {
     let page = std::fs::read_to_string(root().join("docs/device.md")).expect("a page");
     let device = std::fs::read_to_string(root().join("crates/vulkan/src/device.rs")).expect("a source");
-    let features: Vec<&str> = device.split("\"feature ").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+    let features: Vec<&str> =
+        device.split("\"feature ").skip(1).filter_map(|rest| rest.split(['"', ' ']).next()).collect();
     assert!(features.len() >= 5, "{features:?}");
     for feature in features {
         assert!(page.contains(feature), "docs/device.md does not name {feature}");

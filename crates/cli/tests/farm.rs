@@ -68,7 +68,7 @@ fn parts_are_the_picture_of_one_run() {
         ("study:cornell --model global --set samples=256", "samples", 5),
         // Rays, parts of the picture and layers of surfaces.
         ("study:etalon --set samples=4 --aov reflection,normal,material", "tiles", 3),
-        // See-through surfaces, and more samples than blocks without halves.
+        // Transparent surfaces, and more samples than blocks without halves.
         ("study:blend --model local --set samples=64", "tiles", 2),
         ("study:blend --model local --set samples=64", "samples", 3),
         // Layers of halves, and a background that is no light.

@@ -96,6 +96,6 @@ fn cost_builds_one_tree() {
     let folder = tempfile::tempdir().expect("a folder");
     let arguments = ["-v", "cost", "study:pool", "--device", "cpu", "--size", "16x9", "--compare", "shadows=off,ray"];
     let run = program::etalon(folder.path(), &arguments, &program::HASTY).succeeded();
-    let built = run.stderr.lines().filter(|line| line.contains("a tree of")).count();
+    let built = run.stderr.lines().filter(|line| line.contains("built a BVH of")).count();
     assert_eq!(built, 1, "{}", run.stderr);
 }

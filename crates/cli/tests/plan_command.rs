@@ -84,7 +84,7 @@ fn a_plan_knows_what_the_camera_sees() {
     };
     let glass = pixels(&plan, "refraction");
     assert!(glass > 100 && glass < 48 * 27, "{glass}");
-    assert!(effect(&plan, "refraction")["reason"].as_str().expect("a reason").ends_with("closed"), "{plan}");
+    assert!(effect(&plan, "refraction")["reason"].as_str().expect("a reason").ends_with("closed mesh"), "{plan}");
     let expected = &plan["expected"];
     let most = expected["interfaces"].as_u64().expect("a number");
     assert!(most > 8, "{most}");
@@ -123,7 +123,7 @@ fn what_is_left_out_has_a_price() {
     assert!(of("reflection")["spirv_bytes"].as_i64() > Some(10_000), "{costs:?}");
     assert!(costs.iter().all(|cost| cost["frame_ms"].is_f64()), "{costs:?}");
     let by = |cost: &Value| {
-        ["path tracing", "spectral rendering"].iter().any(|name| cost["effect"] == *name) || cost["by"] == "asked for"
+        ["path tracing", "spectral rendering"].iter().any(|name| cost["effect"] == *name) || cost["by"] == "forced on"
     };
     assert!(costs.iter().all(by), "{costs:?}");
     assert_eq!(of("path tracing")["by"], "shadows=ray, reflection=ray, refraction=ray, indirect=path");
@@ -148,7 +148,7 @@ fn everything_can_be_planned() {
     // Bodies that touch are another picture, and so is dispersion.
     assert_eq!(count(&full, "not needed"), 2);
     let reasons = full["effects"].to_string();
-    assert!(reasons.contains("asked for, although no material in use has it"), "{reasons}");
+    assert!(reasons.contains("asked for, although no visible material uses it"), "{reasons}");
     assert!(full["pipelines"].as_array().expect("a list").len() > lean["pipelines"].as_array().expect("a list").len());
 }
 

@@ -1,8 +1,7 @@
-//! Scene-linear pictures as OpenEXR.
-//!
-//! Written: one part, scan lines, ZIP with 16 rows a block, channels `R G B A` and `name.channel` for every AOV, so
-//! that every viewer shows the picture and finds the rest. Read: scan lines or tiles, any compression and sample type
-//! that the `exr` crate decodes.
+//! OpenEXR files of scene-linear pictures and AOVs.
+//!  Read the OpenEXR file layout specification (openexr.com). Written files have one part, scan lines, ZIP with 16 rows per
+//! block, channels `R G B A` and `name.channel` for every AOV, so that all viewers show the picture and find the AOVs. Read
+//! files may have scan lines or tiles, and any compression and sample type that the `exr` crate decodes.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -15,10 +14,10 @@ use exr::prelude::{
 
 use super::{Aov, AovData, MAX_PIXELS, Picture};
 
-/// A file of fewer bytes cannot hold a picture of this many times as many sample bytes, whatever its compression.
+/// Largest plausible ratio of sample bytes to file bytes for any compression; files beyond it are refused.
 const MOST_EXPANSION: u64 = 1 << 14;
 
-/// Writes `picture` and its AOVs to `path`, whole or not at all; see [`encode_exr`].
+/// Writes `picture` and its AOVs to `path`, completely or not at all; see [`encode_exr`].
 pub fn write_exr(path: &Path, picture: &Picture, aovs: &[Aov], metadata: &[(String, String)]) -> Result<()> {
     let bytes = encode_exr(picture, aovs, metadata).with_context(|| format!("writing {}", path.display()))?;
     super::file::write(path, &bytes)
@@ -26,16 +25,16 @@ pub fn write_exr(path: &Path, picture: &Picture, aovs: &[Aov], metadata: &[(Stri
 
 /// OpenEXR file with the picture as f32 channels `R G B A` and each AOV as f32 or u32 channels `name.channel`.
 ///
-/// `metadata` become text attributes. Every bit pattern survives, NaN included. The same input gives the same bytes:
-/// no time is recorded and the attributes are in the order of their names.
+/// `metadata` become text attributes. Every bit pattern is preserved, NaN included. The same input gives the same bytes:
+/// no time is recorded, and attributes are in the order of their names.
 pub fn encode_exr(picture: &Picture, aovs: &[Aov], metadata: &[(String, String)]) -> Result<Vec<u8>> {
     encode(picture, aovs, metadata, Encoding::SMALL_LOSSLESS)
 }
 
-/// The same without compression, for files that a program reads again soon: 1280x720 pixels take a tenth of the time.
+/// [`encode_exr`] without compression and metadata, for temporary files: 1280x720 pixels take a tenth of the time.
 ///
 /// # Errors
-/// As [`encode_exr`].
+/// The errors of [`encode_exr`].
 pub fn encode_exr_quickly(picture: &Picture, aovs: &[Aov]) -> Result<Vec<u8>> {
     encode(picture, aovs, &[], Encoding::UNCOMPRESSED)
 }
@@ -83,7 +82,7 @@ fn encode(picture: &Picture, aovs: &[Aov], metadata: &[(String, String)], encodi
 }
 
 fn channel(name: &str, samples: FlatSamples) -> Result<AnyChannel<FlatSamples>> {
-    // Text of the exr crate is Latin-1 and a name of a channel ends at a zero byte.
+    // Text of the exr crate is Latin-1, and a channel name ends at a zero byte.
     let plain = !name.is_empty() && name.len() < 256 && name.bytes().all(|byte| byte.is_ascii_graphic());
     ensure!(plain, "{name:?} cannot be the name of a channel: only printable ASCII without spaces can");
     Ok(AnyChannel::new(Text::from(name), samples))
@@ -91,9 +90,9 @@ fn channel(name: &str, samples: FlatSamples) -> Result<AnyChannel<FlatSamples>> 
 
 /// Adds text attributes at the end of the header of a one-part file.
 ///
-/// The exr crate keeps attributes of this kind in a hash map and writes them in the map's order, which differs from run
-/// to run. Added here, they are in the order of their names. The table of block offsets that follows the header moves
-/// along.
+/// The exr crate keeps such attributes in a hash map and writes them in its order, which differs from run to run. Here
+/// they are inserted in the order of their names. The table of block offsets that follows the header is shifted
+/// accordingly.
 fn insert_attributes(bytes: &mut Vec<u8>, metadata: &[(String, String)], blocks: usize) -> Result<()> {
     let mut sorted: Vec<&(String, String)> = metadata.iter().collect();
     sorted.sort();
@@ -123,7 +122,7 @@ fn insert_attributes(bytes: &mut Vec<u8>, metadata: &[(String, String)], blocks:
         offset.copy_from_slice(&(u64::from_le_bytes(old) + added.len() as u64).to_le_bytes());
     }
     if long_names {
-        // Bit 10 of the version field: names may have up to 255 bytes instead of 31.
+        // Bit 10 of the version field allows names of up to 255 bytes instead of 31.
         bytes[5] |= 0x04;
     }
     bytes.splice(end..end, added);
@@ -143,11 +142,11 @@ fn header_end(bytes: &[u8]) -> Option<usize> {
     Some(at)
 }
 
-/// Which channels of a file make the picture.
+/// Channels of a file that form the picture.
 enum ChannelSource {
-    /// Colour channels by name, with the name that alpha would have.
+    /// Colour channels by name, and the name of an alpha channel.
     Colour { red: Text, green: Text, blue: Text, alpha: Text },
-    /// One luminance channel for all three.
+    /// One luminance channel for all three colours.
     Grey,
 }
 
@@ -157,12 +156,12 @@ pub fn read_exr(path: &Path) -> Result<Picture> {
     decode_exr(&bytes).with_context(|| format!("reading {}", path.display()))
 }
 
-/// The picture of an OpenEXR file.
+/// Decodes the picture of an OpenEXR file.
 ///
-/// Takes `R G B` and `A` of the first part that has them, else the first complete `prefix.R .G .B` (a file with
-/// layers only, such as Blender's), else the luminance `Y` as grey. Half and 32-bit integer samples become f32,
-/// missing alpha is 1. The display window is the picture: what the file stores outside it is dropped, what it does
-/// not store is transparent black. Chromaticities are not applied.
+/// Takes `R G B` and `A` of the first part that has them, else the first complete `prefix.R .G .B` (files with
+/// layers only, such as Blender's), else the luminance `Y` as grey. Half and 32-bit integer samples become f32;
+/// missing alpha is 1. The picture is the display window: data outside it is dropped, and missing data inside it is
+/// transparent black. Chromaticities are not applied.
 pub fn decode_exr(bytes: &[u8]) -> Result<Picture> {
     let plain = |error: exr::error::Error| match error {
         exr::error::Error::Invalid(text) => anyhow!("the file is damaged: {text}"),
@@ -227,14 +226,14 @@ pub fn decode_exr(bytes: &[u8]) -> Result<Picture> {
     Ok(picture)
 }
 
-/// Pixels as the file stores them, with their extent: the data window.
+/// Size and pixels of the data window.
 type Stored = (Vec2<usize>, Vec<[f32; 4]>);
 
 fn blank<Channels>(size: Vec2<usize>, _: &Channels) -> Stored {
     (size, vec![[0.0; 4]; size.area()])
 }
 
-/// Refuses sizes that no memory holds or that so short a file cannot mean.
+/// Refuses pictures too large for memory, or implausibly large for the file size.
 fn guard(meta: &MetaData, length: u64) -> Result<()> {
     for header in &meta.headers {
         for size in [header.layer_size, header.shared_attributes.display_window.size] {
@@ -295,14 +294,14 @@ pub struct Channels {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// Full name (`R`, `normal.X`) and `width * height` samples of each, in the order of their names.
+    /// Full names (`R`, `normal.X`) with `width * height` samples each, in the order of the names.
     pub list: Vec<(String, AovData)>,
 }
 
-/// Text attributes of the first part, such as those that [`encode_exr`] is given.
+/// Text attributes of the first part, such as the metadata of [`encode_exr`].
 ///
 /// # Errors
-/// When the bytes are no OpenEXR file.
+/// The bytes are not an OpenEXR file.
 pub fn texts(bytes: &[u8]) -> Result<Vec<(String, String)>> {
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|error| anyhow!("{error}"))?;
     guard(&meta, bytes.len() as u64)?;
@@ -317,16 +316,16 @@ pub fn texts(bytes: &[u8]) -> Result<Vec<(String, String)>> {
     Ok(others.filter_map(text).collect())
 }
 
-/// Every channel of the first flat part, with the extent of its data window; half samples become f32.
+/// Reads all channels of the first flat part, with the size of its data window; half samples become f32.
 pub fn read_channels(path: &Path) -> Result<Channels> {
     let bytes = super::file::read(path)?;
     decode_channels(&bytes).with_context(|| format!("reading {}", path.display()))
 }
 
-/// The same for bytes in memory.
+/// [`read_channels`] for bytes in memory.
 ///
 /// # Errors
-/// When the bytes are no OpenEXR file, or end too early.
+/// The bytes are not an OpenEXR file, or are truncated.
 pub fn decode_channels(bytes: &[u8]) -> Result<Channels> {
     let read = || -> Result<_> {
         let meta = MetaData::read_from_buffered(Cursor::new(&bytes), false).map_err(|error| anyhow!("{error}"))?;

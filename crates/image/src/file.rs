@@ -1,4 +1,4 @@
-//! Files that are either whole or absent: bytes are written beside the target, then renamed over it.
+//! Atomic file writes (a temporary file renamed over the target), and error messages of file operations.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Write};
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, anyhow, ensure};
 use tempfile::{Builder, NamedTempFile};
 
-/// Says in a few words why an operation on a file failed, for the end of a sentence.
+/// The cause of a failed file operation in a few words, for the end of a sentence.
 pub fn cause(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::PermissionDenied => "permission denied".into(),
@@ -21,7 +21,7 @@ pub fn cause(error: &io::Error) -> String {
     }
 }
 
-/// Why an operation on a file failed: what a caller may look for in an [`anyhow::Error`].
+/// A failed file operation, for downcasting an [`anyhow::Error`].
 #[derive(Debug)]
 pub struct Failed(io::Error);
 
@@ -33,14 +33,14 @@ impl std::fmt::Display for Failed {
 
 impl std::error::Error for Failed {}
 
-/// Whether an error comes of a disk, or of somebody's share of it, that is full: the same may be possible later.
+/// Whether an error means a full disk or an exceeded quota: a later attempt may succeed.
 #[must_use]
 pub fn is_full(error: &anyhow::Error) -> bool {
     let full = |error: &Failed| matches!(error.0.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
     error.chain().any(|cause| cause.downcast_ref().is_some_and(full))
 }
 
-/// Whole contents of `path`, with one sentence when it cannot be read.
+/// Reads the content of `path`; the error is one sentence.
 pub fn read(path: &Path) -> Result<Vec<u8>> {
     let bytes = File::open(path).and_then(|mut file| {
         let mut bytes = Vec::new();
@@ -50,12 +50,12 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
     bytes.map_err(|error| anyhow!("reading {}: {}", path.display(), cause(&error)))
 }
 
-/// Makes `path` hold exactly `bytes`, or leaves it as it was.
+/// Replaces the content of `path` with `bytes` atomically: on failure the old content remains.
 ///
-/// A link is followed and what it points at is replaced; a device or pipe is written to directly, because renaming
-/// over `/dev/null` would replace the device. A new file gets the permissions that an ordinary new file gets, an
-/// existing one keeps its own. The bytes are not forced to the disk: the promise is about other programs that look,
-/// not about power cuts.
+/// A symbolic link is followed and its target is replaced. A device or pipe is written to directly, because renaming
+/// over `/dev/null` would replace the device. A new file gets default permissions, and an existing file keeps its
+/// permissions. The bytes are not synchronised to the disk: other programs never see a partial file, but a power
+/// failure may lose it.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     write_inner(path, bytes).with_context(|| format!("writing {}", path.display()))
 }
@@ -72,7 +72,7 @@ fn write_inner(path: &Path, bytes: &[u8]) -> Result<()> {
         if !found.is_file() {
             return OpenOptions::new().write(true).open(path).and_then(|mut file| file.write_all(bytes)).map_err(plain);
         }
-        // Renaming would get past a write-protected file without asking.
+        // Renaming would bypass the write protection of an existing file.
         OpenOptions::new().write(true).open(path).map_err(plain)?;
     }
     let target = if before.is_some() { fs::canonicalize(path).map_err(plain)? } else { path.to_path_buf() };
@@ -81,14 +81,14 @@ fn write_inner(path: &Path, bytes: &[u8]) -> Result<()> {
     if let Some(found) = before {
         beside.as_file().set_permissions(found.permissions()).map_err(plain)?;
     }
-    // A failed persist hands the temporary file back inside the error; dropping that removes it.
+    // The error of a failed persist holds the temporary file; dropping it removes the file.
     beside.persist(&target).map_err(|error| plain(error.error))?;
     Ok(())
 }
 
-/// Finds out before a long render whether its output can be written at the end.
+/// Checks before a long render that its output can be written.
 ///
-/// Creates a file in the folder of `path` and removes it again; an existing file is opened for writing, unchanged.
+/// Creates a file in the folder of `path` and removes it; an existing file is opened for writing and not changed.
 pub fn check_writable(path: &Path) -> Result<()> {
     let check = || -> Result<()> {
         match fs::metadata(path) {
@@ -109,7 +109,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
     check().with_context(|| format!("checking that {} can be written", path.display()))
 }
 
-/// An empty file in the folder of `target` that removes itself unless it is kept.
+/// A temporary file in the folder of `target` that is removed unless it is persisted.
 fn beside(target: &Path) -> Result<NamedTempFile> {
     ensure!(target.file_name().is_some(), "the path names no file");
     let folder = match target.parent() {
@@ -120,14 +120,14 @@ fn beside(target: &Path) -> Result<NamedTempFile> {
     builder.prefix(".etalon-").suffix(".part");
     #[cfg(unix)]
     {
-        // tempfile asks for 0600; with 0666 the umask decides, as for every other new file.
+        // tempfile requests mode 0600; with 0666 the umask decides, as for other new files.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     builder.tempfile_in(&folder).map_err(|error| match error.kind() {
         io::ErrorKind::NotFound => anyhow!("the folder {} does not exist", folder.display()),
         io::ErrorKind::NotADirectory => anyhow!("{} is not a folder", folder.display()),
-        // tempfile appends its own file name to the text of the error, which would only confuse.
+        // tempfile appends its own file name to the error, which would confuse.
         io::ErrorKind::PermissionDenied
         | io::ErrorKind::StorageFull
         | io::ErrorKind::QuotaExceeded
@@ -136,7 +136,7 @@ fn beside(target: &Path) -> Result<NamedTempFile> {
     })
 }
 
-/// Where the program keeps what it can make again: `etalon` in `$XDG_CACHE_HOME` or `~/.cache`.
+/// Folder for reproducible data: `etalon` in `$XDG_CACHE_HOME` or `~/.cache`.
 pub fn cache_folder() -> Option<PathBuf> {
     let home = || std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cache"));
     let folder = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).or_else(home);
@@ -145,8 +145,7 @@ pub fn cache_folder() -> Option<PathBuf> {
 
 /// Hash of an output as 32 hexadecimal digits: XXH3 with 128 bits, seed 0, most significant digit first.
 ///
-/// The same bytes give the same digits on every machine and in every version; it tells files apart and proves nothing
-/// against an attacker.
+/// Equal bytes have equal hashes on all machines and in all versions. The hash identifies files and is not cryptographic.
 pub fn hash(bytes: &[u8]) -> String {
     format!("{:032x}", xxhash_rust::xxh3::xxh3_128(bytes))
 }

@@ -1,20 +1,20 @@
-//! What two halves of a picture's samples, drawn with random numbers that have nothing in common, say of its error.
+//! Monte Carlo variance from two independent halves of a picture's samples: an unbiased error estimate, relative MSE, convergence rate.
 
 use serde::Serialize;
 
-/// The error of a mean of samples, estimated from its halves.
+/// Error estimate of a mean of samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SampleError {
-    /// Samples of each pixel.
+    /// Samples per pixel.
     pub samples: u32,
-    /// Mean over pixels and colours of squared error over squared value plus 0.01, as `diff --metric relmse` has it.
+    /// Mean over pixels and colours of squared error over squared value plus 0.01, as in `diff --metric relmse`.
     pub relmse: f64,
     /// Root of the mean squared error.
     pub rmse: f64,
 }
 
-/// Of sums of `samples / 2` samples each. Their means a and b have errors of the same variance that do not depend on each
-/// other, so that (a − b)²/4 is the variance of the picture (a + b)/2 in the mean.
+/// Error estimate from two sums of `samples / 2` samples each. Their means a and b have independent errors of equal
+/// variance, so that (a − b)²/4 has the variance of the picture (a + b)/2 as expected value.
 #[must_use]
 pub fn error_of_halves(sums: [&[[f32; 4]]; 2], samples: u32) -> SampleError {
     let scale = 1.0 / f64::from(samples);
@@ -31,8 +31,8 @@ pub fn error_of_halves(sums: [&[[f32; 4]]; 2], samples: u32) -> SampleError {
     SampleError { samples, relmse: relative / count, rmse: (squared / count).sqrt() }
 }
 
-/// Slope of the logarithm of the root of `relmse` over that of samples, by least squares: −0.5 where samples do not depend on
-/// each other. `None` for fewer than two.
+/// Convergence rate: slope of log √relmse over log samples, by least squares; −0.5 for independent samples.
+/// `None` for fewer than two estimates.
 #[must_use]
 pub fn slope(errors: &[SampleError]) -> Option<f64> {
     let points: Vec<(f64, f64)> =
@@ -49,7 +49,7 @@ mod tests {
 
     #[test]
     fn halves_tell_the_error_of_their_mean() {
-        // Each half has errors of ±0.2 about 1: so has their mean ±0.1√2 in the root mean square.
+        // Each half has errors of ±0.2 around 1, so the root mean square error of the mean is 0.1√2.
         let half = |signs: [f32; 4]| -> Vec<[f32; 4]> { signs.iter().map(|s| [8.0 * (1.0 + 0.2 * s); 4]).collect() };
         let (a, b) = (half([1.0, 1.0, -1.0, -1.0]), half([1.0, -1.0, 1.0, -1.0]));
         let error = error_of_halves([&a, &b], 16);

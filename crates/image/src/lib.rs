@@ -1,8 +1,8 @@
-//! Pictures as data: reading, writing, comparing.
+//! Pictures: reading, writing, tone mapping and comparison.
 //!
-//! Nothing here knows Vulkan. A render ends in a [`Picture`] of scene-linear radiance; [`exr`] keeps it as it is,
-//! [`tone`] brings it to display values and [`png`] keeps those. [`metric`] compares two pictures, [`mod@file`] puts bytes
-//! on disk so that a partial file is never seen.
+//! A render results in a [`Picture`] of scene-linear radiance. [`exr`] stores it without loss, [`tone`] maps it to display
+//! values, and [`png`] stores those. [`metric`] compares two pictures, and [`mod@file`] writes files atomically. Nothing here
+//! uses Vulkan. Colours are linear Rec. 709 unless they are display values.
 
 pub mod exr;
 pub mod file;
@@ -13,9 +13,9 @@ pub mod tone;
 
 use serde::Serialize;
 
-/// Largest picture that is read or written, in pixels: 16384 x 8192, the largest environment map in common use.
+/// Largest picture to read or write, in pixels: 16384 x 8192, the largest environment map in common use.
 ///
-/// The limit keeps a damaged header from asking for more memory than the machine has.
+/// With the limit, a damaged header cannot request more memory than the machine has.
 pub const MAX_PIXELS: u64 = 1 << 27;
 
 /// A scene-linear picture.
@@ -29,21 +29,21 @@ pub struct Picture {
     pub rgba: Vec<[f32; 4]>,
 }
 
-/// One further quantity per pixel ("arbitrary output variable"), stored beside the radiance in an EXR.
+/// Arbitrary output variable: a further quantity per pixel, stored beside the radiance in an EXR.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Aov {
     /// Prefix of its channels in the file: `normal` gives `normal.X`, `normal.Y`, `normal.Z`.
     pub name: String,
     /// Channel names in sample order: `["R", "G", "B"]`, `["X", "Y", "Z"]`, `["Z"]`, `["id"]`.
     pub channels: Vec<String>,
-    /// `width * height * channels.len()` samples, rows from the top, the channels of a pixel side by side.
+    /// `width * height * channels.len()` samples, rows from the top, channels interleaved.
     pub samples: AovData,
 }
 
 /// Samples of an [`Aov`].
 #[derive(Debug, Clone, PartialEq)]
 pub enum AovData {
-    /// Measured quantities.
+    /// Continuous quantities.
     F32(Vec<f32>),
     /// Identifiers and counts.
     U32(Vec<u32>),
@@ -64,7 +64,7 @@ impl AovData {
     }
 }
 
-/// What the colour samples of a picture hold, counted before anything clamps: `image` of the report.
+/// Statistics of a picture's samples before any clamping: `image` of the report.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Statistics {
     /// Pixels across.
@@ -86,12 +86,12 @@ pub struct Statistics {
 }
 
 impl Picture {
-    /// A picture of one colour.
+    /// A picture of constant colour.
     pub fn filled(width: u32, height: u32, rgba: [f32; 4]) -> Self {
         Self { width, height, rgba: vec![rgba; width as usize * height as usize] }
     }
 
-    /// Counts and extremes of the samples, in one pass and f64.
+    /// Counts and extremes of the samples, in one pass, with sums in f64.
     pub fn statistics(&self) -> Statistics {
         let mut found = Statistics {
             width: self.width,

@@ -1,8 +1,8 @@
-//! How far two pictures are apart.
-//!
-//! Two display pictures are compared in display values 0..=1, two scene-linear ones in radiance; mixing them has no
-//! meaning and is refused. The first picture is the reference. A pixel with a sample that is not finite in either
-//! picture is left out of every figure and counted, so that a NaN neither spreads nor hides.
+//! Image difference metrics: FLIP, SSIM, PSNR, MSE and relatives.
+//!  Read Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", HPG 2020; Wang et al., "Image Quality
+//! Assessment: From Error Visibility to Structural Similarity", 2004. Two display pictures are compared in display values
+//! 0..=1, two scene-linear pictures in radiance; other pairs are refused. The first picture is the reference. A pixel with a
+//! non-finite sample in either picture is excluded from all values and counted.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use strum::{EnumMessage, IntoStaticStr, VariantArray};
 use super::png::Display;
 use super::{Picture, exr, file, png, tone};
 
-/// A figure for the difference of two pictures.
+/// A metric of the difference of two pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, EnumMessage, IntoStaticStr, VariantArray, Serialize)]
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
@@ -37,7 +37,7 @@ pub enum Metric {
 }
 
 impl Metric {
-    /// All of them.
+    /// All metrics.
     pub const ALL: &[Self] = Self::VARIANTS;
 
     /// Name on the command line and in JSON.

@@ -1,11 +1,13 @@
-//! Display pictures: 8-bit sRGB out as PNG, in from PNG, JPEG and WebP.
+//! Display pictures in 8-bit sRGB: written as PNG, read from PNG, JPEG and WebP.
+//!
+//! Read the PNG specification (W3C) for the chunks `sRGB`, `gAMA`, `cHRM` and `tEXt`.
 
 use std::io::Cursor;
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, ensure};
 
-/// A picture of display values: what a screen shows, not what light does.
+/// A picture of display values, after tone mapping.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Display {
     /// Pixels across.
@@ -16,19 +18,19 @@ pub struct Display {
     pub rgba: Vec<[u8; 4]>,
 }
 
-/// PNG file with the pixels of `rgba`: four bytes a pixel, rows from the top, sRGB-encoded, straight alpha.
+/// PNG file of the pixels `rgba`: four bytes per pixel, rows from the top, sRGB-encoded, straight alpha.
 ///
-/// Without `has_alpha` the fourth byte is dropped and the file holds RGB. The `sRGB` chunk (perceptual intent) says
-/// how to read the bytes, together with the `gAMA` and `cHRM` that the PNG specification asks for beside it, so that
-/// no viewer guesses. The same input gives the same file.
+/// Without `has_alpha` the fourth byte is dropped and the file holds RGB. The `sRGB` chunk (perceptual intent)
+/// states the encoding, together with the `gAMA` and `cHRM` that the PNG specification recommends beside it. The same input
+/// gives the same file.
 pub fn encode_png(width: u32, height: u32, rgba: &[u8], has_alpha: bool) -> Result<Vec<u8>> {
     encode_png_with([width, height], rgba, has_alpha, &[])
 }
 
-/// The same with texts (`tEXt`): keyword and text in Latin-1.
+/// [`encode_png`] with texts (`tEXt`): keyword and text in Latin-1.
 ///
 /// # Errors
-/// As [`encode_png`], or when a keyword is none.
+/// The errors of [`encode_png`], and an invalid keyword.
 pub fn encode_png_with(
     [width, height]: [u32; 2],
     rgba: &[u8],
@@ -49,7 +51,7 @@ pub fn encode_png_with(
         encoder.set_depth(::png::BitDepth::Eight);
         encoder.set_source_srgb(::png::SrgbRenderingIntent::Perceptual);
         encoder.set_compression(::png::Compression::Fast);
-        // One fixed filter: choosing one for each row costs more time than it saves in bytes on rendered pictures.
+        // One fixed filter: on rendered pictures a choice per row costs more time than it saves in bytes.
         encoder.set_filter(::png::Filter::Paeth);
         for (keyword, text) in texts {
             encoder.add_text_chunk(keyword.clone(), text.clone())?;
@@ -68,10 +70,10 @@ pub fn encode_png_with(
     encode().with_context(|| format!("encoding a PNG of {width}x{height} pixels"))
 }
 
-/// Texts of a PNG and its pixels, whole: every byte is read and every checksum compared.
+/// Decodes the pixels and texts of a PNG, reading all bytes and verifying all checksums.
 ///
 /// # Errors
-/// When the bytes are no PNG, or end too early.
+/// The bytes are not a PNG, or are truncated.
 pub fn decode_png_with(bytes: &[u8]) -> Result<(Display, Vec<(String, String)>)> {
     let mut decoder = ::png::Decoder::new(Cursor::new(bytes));
     decoder.set_transformations(::png::Transformations::EXPAND | ::png::Transformations::ALPHA);
@@ -91,10 +93,10 @@ pub fn decode_png_with(bytes: &[u8]) -> Result<(Display, Vec<(String, String)>)>
     Ok((Display { width: frame.width, height: frame.height, rgba }, texts))
 }
 
-/// An animated PNG of pictures of one size, for ever in a circle, each for `seconds[0] / seconds[1]` of a second.
+/// An animated PNG of pictures of one size, in an endless loop, each shown for `seconds[0] / seconds[1]` of a second.
 ///
 /// # Errors
-/// When there is no picture, or they are not of one size.
+/// There is no picture, or the sizes differ.
 pub fn encode_animation(pictures: &[Display], [seconds, of]: [u16; 2]) -> Result<Vec<u8>> {
     let first = pictures.first().context("encoding an animation: there are no pictures")?;
     let (width, height) = (first.width, first.height);
@@ -119,16 +121,16 @@ pub fn encode_animation(pictures: &[Display], [seconds, of]: [u16; 2]) -> Result
     encode().with_context(|| format!("encoding an animation of {width}x{height} pixels"))
 }
 
-/// Reads a PNG, JPEG or WebP as 8-bit sRGB; the contents decide, not the extension.
+/// Reads a PNG, JPEG or WebP as 8-bit sRGB; the content decides, not the extension.
 ///
-/// Sixteen-bit samples are rounded to eight, grey becomes three equal colours, a palette is looked up, missing alpha
+/// Sixteen-bit samples are rounded to eight, grey becomes three equal colours, palettes are resolved, missing alpha
 /// is 255. Colour profiles are not applied.
 pub fn read_display(path: &Path) -> Result<Display> {
     let bytes = super::file::read(path)?;
     decode_display(&bytes).with_context(|| format!("reading {}", path.display()))
 }
 
-/// The same for bytes in memory.
+/// [`read_display`] for bytes in memory.
 pub fn decode_display(bytes: &[u8]) -> Result<Display> {
     let mut reader = ::image::ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
     let known = [::image::ImageFormat::Png, ::image::ImageFormat::Jpeg, ::image::ImageFormat::WebP];

@@ -1,4 +1,4 @@
-//! What a device offers less, and how a program comes to see it.
+//! Description of a less capable device, and the environment in which a program sees it.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -7,39 +7,39 @@ use std::path::{Path, PathBuf};
 use ash::vk;
 use serde::Deserialize;
 
-/// The file that the layer reads.
+/// Environment variable with the path of the description file.
 pub(crate) const VARIABLE: &str = "ETALON_MASK";
 
-/// What a device offers less than the one that does the work. Names are Vulkan's.
+/// Capabilities that the described device lacks, compared with the device of the machine. Names are those of Vulkan.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Description {
-    /// What it is called, and why it is like that.
+    /// Name of the device, and the reason for its description.
     pub name: String,
-    /// `cpu`, `discrete` or `integrated`.
+    /// Device type: `cpu`, `discrete` or `integrated`.
     #[serde(rename = "type")]
     pub kind: Option<String>,
     /// Vulkan version.
     pub api: Option<[u32; 2]>,
-    /// Features that it has not.
+    /// Features that it lacks.
     pub without_features: Vec<String>,
-    /// Extensions that it has not.
+    /// Extensions that it lacks.
     pub without_extensions: Vec<String>,
-    /// Limits, where they are lower.
+    /// Limits that are lower.
     pub limits: BTreeMap<String, u64>,
-    /// Uses that it has no formats for.
+    /// Formats that it lacks, by use.
     pub without_formats: BTreeMap<String, Vec<String>>,
-    /// Properties that none of its kinds of memory has.
+    /// Memory properties that none of its memory types has.
     pub without_memory: Vec<String>,
-    /// Subgroups do not add.
+    /// No arithmetic operations in subgroups.
     pub without_subgroup_arithmetic: bool,
-    /// Queues have no timestamps.
+    /// No timestamps in queues.
     pub without_timestamps: bool,
-    /// What is expected of a program: words that its refusal has. Empty: it draws.
+    /// Words in the program's expected refusal. Empty: the program is expected to render.
     pub refused: Vec<String>,
 }
 
-/// Sets to `false` what is listed, of the features of one struct.
+/// Sets the listed features of one struct to `false`.
 macro_rules! without {
     ($listed:expr, $features:expr, $($field:ident = $name:literal),+ $(,)?) => {
         for name in $listed {
@@ -51,7 +51,7 @@ macro_rules! without {
     };
 }
 
-/// Lowers what is listed, of the limits of one struct.
+/// Lowers the listed limits of one struct.
 macro_rules! lowered {
     ($listed:expr, $limits:expr, $($field:ident = $name:literal),+ $(,)?) => {
         for (name, &most) in $listed {
@@ -64,16 +64,16 @@ macro_rules! lowered {
 }
 
 impl Description {
-    /// Reads the file that the environment names.
+    /// Reads the file that the environment variable names.
     pub(crate) fn from_environment() -> io::Result<Self> {
         let path = std::env::var_os(VARIABLE).ok_or_else(|| io::Error::other(format!("{VARIABLE} is not set")))?;
         Self::read(Path::new(&path))
     }
 
-    /// Reads a file.
+    /// Reads a description file.
     ///
     /// # Errors
-    /// When it is not there, or says what no description can.
+    /// The file is missing or invalid.
     pub fn read(path: &Path) -> io::Result<Self> {
         let text = std::fs::read_to_string(path)?;
         serde_json::from_str(&text).map_err(|error| io::Error::other(format!("{}: {error}", path.display())))
@@ -172,16 +172,16 @@ impl Description {
     }
 }
 
-/// A folder with the layer's manifest, for programs that a test starts.
+/// A folder with the layer's manifest, for programs that tests start.
 pub struct Mask {
     folder: PathBuf,
 }
 
 impl Mask {
-    /// Writes the manifest of the layer to a folder. The library lies beside the test that asks.
+    /// Writes the layer's manifest to a folder. The layer's library must lie beside the test executable.
     ///
     /// # Errors
-    /// When the folder cannot be written, or there is no such library.
+    /// The folder cannot be written, or the library is missing.
     pub fn in_folder(folder: &Path) -> io::Result<Self> {
         let beside = std::env::current_exe()?;
         let name = format!("{}etalon_mask{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
@@ -204,7 +204,7 @@ impl Mask {
         Ok(Self { folder: folder.to_owned() })
     }
 
-    /// The environment in which a program sees the device that a file describes.
+    /// Environment variables under which a program sees the described device.
     #[must_use]
     pub fn variables(&self, description: &Path) -> [(&'static str, String); 3] {
         [

@@ -1,6 +1,6 @@
-//! The layer: what asks a device what it offers, answered by the device and then lowered. All else goes straight to it.
+//! The Vulkan layer: device queries go to the next layer, and their results are lowered. All other calls are passed through.
 //!
-//! LunarG, "Architecture of the Vulkan Loader Interfaces", layer interface version 2.
+//! Read LunarG, "Architecture of the Vulkan Loader Interfaces", layer interface version 2.
 
 use std::ffi::{CStr, c_char, c_void};
 use std::ptr;
@@ -10,7 +10,7 @@ use ash::vk;
 
 use crate::description::Description;
 
-/// What the loader and a layer agree on.
+/// `VkNegotiateLayerInterface`, by which loader and layer agree on a version.
 #[repr(C)]
 struct Negotiation {
     kind: i32,
@@ -21,7 +21,7 @@ struct Negotiation {
     physical_device_proc: Option<vk::PFN_vkGetInstanceProcAddr>,
 }
 
-/// The next layer, in the loader's list of those that an instance is made by.
+/// `VkLayerInstanceLink`: the next layer in the loader's chain for an instance.
 #[repr(C)]
 struct Link {
     next: *mut Link,
@@ -40,7 +40,7 @@ struct LinkInfo {
 /// `VK_LAYER_LINK_INFO`.
 const LINK_INFO: i32 = 0;
 
-/// What comes after the layer, and what is lowered of it. Tests start programs with one instance: the last one counts.
+/// Functions of the next layer, and the description. Test programs create one instance; with several, the last one counts.
 struct Below {
     description: Description,
     properties: vk::PFN_vkGetPhysicalDeviceProperties,
@@ -60,14 +60,14 @@ fn below() -> &'static Below {
     BELOW.get().expect("an instance was made")
 }
 
-/// The loader's first call.
+/// First call of the loader.
 ///
 /// # Safety
-/// The loader calls it, with a struct of version 2.
+/// Called by the loader, with a struct of version 2.
 #[unsafe(no_mangle)]
 #[allow(unreachable_pub, private_interfaces, reason = "the loader finds it by its name")]
 pub unsafe extern "system" fn vkNegotiateLoaderLayerInterfaceVersion(asked: *mut Negotiation) -> vk::Result {
-    // SAFETY: as the loader promises.
+    // SAFETY: guaranteed by the loader.
     let asked = unsafe { &mut *asked };
     asked.version = asked.version.min(2);
     asked.instance_proc = Some(instance_proc);
@@ -77,14 +77,14 @@ pub unsafe extern "system" fn vkNegotiateLoaderLayerInterfaceVersion(asked: *mut
 }
 
 unsafe extern "system" fn instance_proc(instance: vk::Instance, name: *const c_char) -> vk::PFN_vkVoidFunction {
-    /// As the pointer that Vulkan hands out for all functions.
+    /// A function as the pointer type that Vulkan returns for all functions.
     macro_rules! ours {
         ($function:ident as $kind:ty) => {
-            // SAFETY: who asks by name casts it back to the type of that name.
+            // SAFETY: a caller that asks by name casts the pointer back to the type of that name.
             Some(unsafe { std::mem::transmute::<$kind, unsafe extern "system" fn()>($function as $kind) })
         };
     }
-    // SAFETY: a name that ends in 0.
+    // SAFETY: a string with a terminating 0.
     match unsafe { CStr::from_ptr(name) }.to_bytes() {
         b"vkGetInstanceProcAddr" => ours!(instance_proc as vk::PFN_vkGetInstanceProcAddr),
         b"vkCreateInstance" => ours!(create_instance as vk::PFN_vkCreateInstance),
@@ -100,7 +100,7 @@ unsafe extern "system" fn instance_proc(instance: vk::Instance, name: *const c_c
         b"vkGetPhysicalDeviceMemoryProperties" => ours!(memory as vk::PFN_vkGetPhysicalDeviceMemoryProperties),
         b"vkGetPhysicalDeviceMemoryProperties2" => ours!(memory2 as vk::PFN_vkGetPhysicalDeviceMemoryProperties2),
         b"vkEnumerateDeviceExtensionProperties" => ours!(extensions as vk::PFN_vkEnumerateDeviceExtensionProperties),
-        // SAFETY: the next one's own function.
+        // SAFETY: the function of the next layer.
         _ => NEXT.get().and_then(|next| unsafe { next(instance, name) }),
     }
 }
@@ -117,7 +117,7 @@ unsafe extern "system" fn create_instance(
             return vk::Result::ERROR_INITIALIZATION_FAILED;
         }
     };
-    // SAFETY: the loader's chain has the link of this layer, which is to be moved on to the next one's.
+    // SAFETY: the loader's chain holds the link of this layer, which must be advanced to the next layer's.
     unsafe {
         let mut at = (*info).p_next.cast::<LinkInfo>().cast_mut();
         while !at.is_null()
@@ -131,7 +131,7 @@ unsafe extern "system" fn create_instance(
         let next = (*(*at).link).instance_proc;
         (*at).link = (*(*at).link).next;
         let _ = NEXT.set(next);
-        /// A function of the next layer, by its name.
+        /// Looks up a function of the next layer by name.
         macro_rules! next {
             ($instance:expr, $name:literal, $kind:ty) => {
                 match next($instance, $name.as_ptr()) {
@@ -178,7 +178,7 @@ unsafe extern "system" fn create_instance(
 }
 
 unsafe extern "system" fn properties(device: vk::PhysicalDevice, to: *mut vk::PhysicalDeviceProperties) {
-    // SAFETY: the caller's struct, filled by the next.
+    // SAFETY: the caller's struct, filled by the next layer.
     unsafe {
         (below().properties)(device, to);
         below().description.lower_properties(&mut *to);
@@ -187,7 +187,7 @@ unsafe extern "system" fn properties(device: vk::PhysicalDevice, to: *mut vk::Ph
 
 unsafe extern "system" fn properties2(device: vk::PhysicalDevice, to: *mut vk::PhysicalDeviceProperties2<'_>) {
     let description = &below().description;
-    // SAFETY: the caller's chain, filled by the next; each struct has the type that it says.
+    // SAFETY: the caller's chain, filled by the next layer; each struct has the type of its `s_type`.
     unsafe {
         (below().properties2)(device, to);
         description.lower_properties(&mut (*to).properties);
@@ -206,7 +206,7 @@ unsafe extern "system" fn properties2(device: vk::PhysicalDevice, to: *mut vk::P
 }
 
 unsafe extern "system" fn features(device: vk::PhysicalDevice, to: *mut vk::PhysicalDeviceFeatures) {
-    // SAFETY: the caller's struct, filled by the next.
+    // SAFETY: the caller's struct, filled by the next layer.
     unsafe {
         (below().features)(device, to);
         below().description.lower_features(&mut *to);
@@ -215,7 +215,7 @@ unsafe extern "system" fn features(device: vk::PhysicalDevice, to: *mut vk::Phys
 
 unsafe extern "system" fn features2(device: vk::PhysicalDevice, to: *mut vk::PhysicalDeviceFeatures2<'_>) {
     let description = &below().description;
-    // SAFETY: as for properties.
+    // SAFETY: the caller's chain, filled by the next layer; each struct has the type of its `s_type`.
     unsafe {
         (below().features2)(device, to);
         description.lower_features(&mut (*to).features);
@@ -233,13 +233,13 @@ unsafe extern "system" fn features2(device: vk::PhysicalDevice, to: *mut vk::Phy
     }
 }
 
-/// The structs of a chain.
+/// The structs of a `pNext` chain.
 ///
 /// # Safety
-/// It is one, and lives as long as it is gone through.
+/// `first` is such a chain, and it outlives the iterator.
 unsafe fn chain(first: *mut c_void) -> impl Iterator<Item = *mut vk::BaseOutStructure<'static>> {
     let first = first.cast::<vk::BaseOutStructure<'static>>();
-    // SAFETY: as the caller says.
+    // SAFETY: guaranteed by the caller.
     std::iter::successors((!first.is_null()).then_some(first), |at| unsafe {
         let next = (**at).p_next;
         (!next.is_null()).then_some(next)
@@ -247,7 +247,7 @@ unsafe fn chain(first: *mut c_void) -> impl Iterator<Item = *mut vk::BaseOutStru
 }
 
 unsafe extern "system" fn format(device: vk::PhysicalDevice, of: vk::Format, to: *mut vk::FormatProperties) {
-    // SAFETY: the caller's struct, filled by the next.
+    // SAFETY: the caller's struct, filled by the next layer.
     unsafe {
         (below().format)(device, of, to);
         below().description.lower_format(of, &mut *to);
@@ -255,7 +255,7 @@ unsafe extern "system" fn format(device: vk::PhysicalDevice, of: vk::Format, to:
 }
 
 unsafe extern "system" fn memory(device: vk::PhysicalDevice, to: *mut vk::PhysicalDeviceMemoryProperties) {
-    // SAFETY: the caller's struct, filled by the next.
+    // SAFETY: the caller's struct, filled by the next layer.
     unsafe {
         (below().memory)(device, to);
         below().description.lower_memory(&mut *to);
@@ -263,7 +263,7 @@ unsafe extern "system" fn memory(device: vk::PhysicalDevice, to: *mut vk::Physic
 }
 
 unsafe extern "system" fn memory2(device: vk::PhysicalDevice, to: *mut vk::PhysicalDeviceMemoryProperties2<'_>) {
-    // SAFETY: the caller's struct, filled by the next.
+    // SAFETY: the caller's struct, filled by the next layer.
     unsafe {
         (below().memory2)(device, to);
         below().description.lower_memory(&mut (*to).memory_properties);
@@ -276,7 +276,7 @@ unsafe extern "system" fn extensions(
     count: *mut u32,
     to: *mut vk::ExtensionProperties,
 ) -> vk::Result {
-    // SAFETY: asked for the number first, as everybody does, then for all; the caller's array holds as many as it says.
+    // SAFETY: callers ask for the count first, then for all; the caller's array holds that many elements.
     unsafe {
         let next = below().extensions;
         let mut all_count = 0;

@@ -1,11 +1,12 @@
-//! Twins of shaders/lib/arithmetic.glsl: the same functions by the standard library's f64, of arguments that are f32
-//! values. Domains and values outside them are those of the shader.
+//! Twins of shaders/lib/arithmetic.glsl: error-free transformations, double-float arithmetic and elementary functions, in f64.
+//!  Read Knuth, TAOCP volume 2, 4.2.2 (two-sum), and docs/numerics.md. Arguments are values of f32. Domains, and results
+//! outside them, are those of the shader.
 
 use glam::DVec3;
 
 use super::catalogue::{Axis, EXACT, Equation, Output, Region, SplitMix64, columns, ulp, vector};
 
-/// hi + lo = `value` + `rest`, with hi an f32 value; lo is 0 where hi is beyond f32.
+/// hi + lo = `value` + `rest`, with hi a value of f32; lo is 0 when hi is outside the range of f32.
 fn pair(value: f64, rest: f64) -> [f64; 2] {
     let hi = f64::from(value as f32);
     [hi, if hi.is_finite() { (value - hi) + rest } else { 0.0 }]
@@ -115,7 +116,7 @@ pub fn atan2f(y: f64, x: f64) -> f64 {
     if x == 0.0 && y == 0.0 { 0.0 } else { y.atan2(x) }
 }
 
-/// Moderate numbers, and pairs that nearly cancel.
+/// Two numbers of moderate size, or a pair that nearly cancels.
 fn pair_of_numbers(d: &mut SplitMix64) -> Vec<f32> {
     let a = (d.sign() * d.log(1e-6, 1e6)) as f32;
     let b = if d.below(2) == 0 { d.near(&[a, -a]) } else { (d.sign() * d.log(1e-6, 1e6)) as f32 };
@@ -145,11 +146,11 @@ const DOUBLES: &[Region] = &[Region {
     },
 }];
 
-/// hi and lo of an exact operation.
+/// Bounds of hi and lo of an error-free operation.
 const EXACT_PAIR: &[Output] =
     &[Output { name: "hi", bound: "exact", allowed: EXACT }, Output { name: "lo", bound: "exact", allowed: EXACT }];
 
-/// hi rounds the sum of both; what lo must hold depends on it, and is tested as a sum (crates/verify/tests/equations.rs).
+/// hi is the rounded sum. The exact lo depends on hi, so both are tested as a sum (crates/verify/tests/equations.rs).
 const ROUNDED_PAIR: &[Output] = &[
     Output { name: "hi", bound: "1 ulp", allowed: |c| c.ulps(1.0) },
     Output { name: "lo", bound: "1.5 ulp of hi", allowed: |c| 1.5 * ulp(c.exact[0]) },

@@ -1,5 +1,7 @@
-//! Reflection models, as the lecture (B1–B6) and the papers have them: Walter et al. 2007 (GGX), Heitz 2014 (Smith),
-//! Veach 1997 (the power heuristic), Turquin 2019 (compensation). Directions are normalised first.
+//! BRDF models of the lecture (B1–B6): Lambert, Phong, GGX with Smith masking-shadowing, VNDF sampling, and the MIS power
+//! heuristic.
+//!  Read Walter et al. 2007 (GGX); Heitz, JCGT 3(2) 2014 (Smith) and JCGT 7(4) 2018 (VNDF); Veach 1997 (the power heuristic);
+//! Turquin 2019 (energy compensation). Directions are normalised first.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,7 +9,7 @@ use glam::DVec3;
 
 use super::catalogue::{Axis, Case, EXACT, Equation, Output, Region, SplitMix64, columns, ulp, vector};
 
-/// cosθ of the angle between two directions; 0 for a zero vector.
+/// Cosine of the angle between two directions; 0 for a zero vector.
 pub(super) fn cosine(a: DVec3, b: DVec3) -> f64 {
     a.normalize_or_zero().dot(b.normalize_or_zero())
 }
@@ -22,7 +24,7 @@ pub fn lambert(n: DVec3, l: DVec3, lin: f64, kd: f64) -> [f64; 2] {
 /// @eq B1: cosδ, sin²δ of N and L/|L| + V/|V|, and the square of that sum. NaN for the angle where L = −V.
 #[must_use]
 pub fn half_angle(n: DVec3, l: DVec3, v: DVec3) -> (f64, f64, f64) {
-    // p L + q V = (L + V)(p + q)/2 + (L − V)(p − q)/2: for L near −V the normalised vectors would leave nine digits.
+    // p L + q V = (L + V)(p + q)/2 + (L − V)(p − q)/2: for L near −V the sum of normalised vectors would have nine digits.
     let (sum, difference) = (l + v, l - v);
     let (p, q) = (1.0 / l.length(), 1.0 / v.length());
     let p_less_q = -sum.dot(difference) * p * q / (l.length() + v.length());
@@ -61,7 +63,7 @@ pub fn reciprocal_phong(n: DVec3, l: DVec3, v: DVec3, [lin, kd, ks, shine]: [f64
     [s2, fr_spec, lin * (kd + fr_spec) * cos_in]
 }
 
-/// D of cosine and sin²; the sum of squares instead of c²(α² − 1) + 1, which loses the peak of α = 1e-5 in f64 too.
+/// D from cosine and sin². The sum of squares replaces c²(α² − 1) + 1, which loses the peak of α = 1e-5 even in f64.
 fn distribution(cos_h: f64, sin2_h: f64, alpha: f64) -> f64 {
     if cos_h > 0.0 { alpha * alpha / (PI * (cos_h * cos_h * alpha * alpha + sin2_h).powi(2)) } else { 0.0 }
 }
@@ -78,7 +80,7 @@ pub fn ggx_d(n: DVec3, h: DVec3, alpha: f64) -> [f64; 3] {
 #[must_use]
 pub fn ggx_lambda(cos_v: f64, alpha: f64) -> f64 {
     let tan2 = (1.0 - cos_v) * (1.0 + cos_v) / (cos_v * cos_v);
-    // √(1 + x) − 1 for small x.
+    // √(1 + x) − 1 without cancellation for small x.
     let x = alpha * alpha * tan2;
     0.5 * x / ((1.0 + x).sqrt() + 1.0)
 }
@@ -108,7 +110,7 @@ pub fn ggx(n: DVec3, l: DVec3, v: DVec3, alpha: f64, f0: f64) -> [f64; 5] {
         return [f64::NAN; 5];
     }
     let (cos_h, sin2_h, s2) = half_angle(n, l, v);
-    // The step at N·H = 0 is rounding's.
+    // At N·H = 0 rounding decides the side of the step.
     let d = if cos_h.abs() > 3e-7 { distribution(cos_h, sin2_h, alpha) } else { f64::NAN };
     let [_, _, g2, _] = ggx_g(cos_l, cos_v, alpha);
     let f = ggx_f(f0, 0.5 * s2.sqrt());
@@ -205,22 +207,22 @@ pub fn mis_weight(p: f64, q: f64) -> f64 {
 }
 
 // --------------------------------------------------------------------------------------------------------------------
-// Where they are tested
+// Test regions
 
 const AXES: [DVec3; 6] = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z];
 
-/// An axis, against which f32 has cosines of 1e-8 and less, or any direction.
+/// A coordinate axis, with which f32 directions have cosines of 1e-8 and less, or a random direction.
 pub(super) fn normal(d: &mut SplitMix64) -> DVec3 {
     if d.below(5) < 2 { AXES[d.below(6)] } else { d.direction() }
 }
 
-/// A direction at that cosine.
+/// A direction at a given cosine from `from`.
 pub(super) fn at_cosine(d: &mut SplitMix64, from: DVec3, cosine: f64) -> DVec3 {
     let across = d.perpendicular(from);
     from * cosine + across * ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt()
 }
 
-/// Any, grazing, almost normal.
+/// A cosine: uniform, grazing, or near 1.
 pub(super) fn cosine_in(d: &mut SplitMix64) -> f64 {
     match d.below(8) {
         0..3 => d.unit(),
@@ -234,31 +236,31 @@ fn alpha(d: &mut SplitMix64) -> f64 {
     if d.below(8) == 0 { f64::from(d.near(&[1e-5, 1e-3, 0.1, 1.0])).clamp(1e-5, 1.0) } else { d.log(1e-5, 1.0) }
 }
 
-/// Rounded to f32, so that what follows sees the direction that the shader gets.
+/// Rounds to f32, so that later steps use the direction that the shader gets.
 fn rounded(v: DVec3) -> DVec3 {
     v.as_vec3().as_dvec3()
 }
 
-/// N around which L and V have their half vector at `angle`.
+/// N at `angle` from the half vector of L and V.
 fn around_half(d: &mut SplitMix64, l: DVec3, v: DVec3, angle: f64) -> DVec3 {
     let s = rounded(l).normalize() + rounded(v).normalize();
     let h = if s.length() > 1e-9 { s.normalize() } else { d.perpendicular(l) };
     d.at_angle(h, angle)
 }
 
-/// L and V: by an angle apart, or nearly opposite.
+/// L and V at a random angle, or nearly opposite.
 fn pair(d: &mut SplitMix64, opposite: bool) -> [DVec3; 2] {
     let l = if opposite && d.below(3) == 0 { AXES[d.below(6)] } else { d.direction() };
     let angle = if opposite { PI - d.log(1e-7, 1.0) } else { d.between(0.0, 2.5) };
     [l, d.at_angle(l, angle)]
 }
 
-/// L_in, k_d, k_s and a shine.
+/// L_in, k_d, k_s and the shininess.
 fn strengths(d: &mut SplitMix64, shine: f64) -> [f32; 4] {
     [d.log(1e-3, 1e6) as f32, d.unit() as f32, d.unit() as f32, shine as f32]
 }
 
-/// A shine, and δ at which its lobe is e^-13.8 or more.
+/// A shininess, and δ for which the lobe is at least e^-13.8.
 fn in_lobe(d: &mut SplitMix64) -> (f64, f64) {
     let shine = d.log(1.0, 1e7);
     let depth = if d.below(2) == 0 { d.between(0.0, 13.8) } else { d.log(1e-6, 13.8) };
@@ -358,29 +360,29 @@ fn ggx_row(vectors: [DVec3; 3], alpha: f64, d: &mut SplitMix64) -> Vec<f32> {
 }
 
 // --------------------------------------------------------------------------------------------------------------------
-// What is promised
+// Error bounds
 
-/// Error of a cosine from exact products, over the lengths (numerics.md 25 demands 32 ulp).
+/// Error of a cosine from exact products, over the lengths (row 25 of docs/numerics.md requires 32 ulp).
 pub(super) fn grazing_allowed(exact: f64) -> f64 {
     8.0 * ulp(exact) + 1e-14
 }
 
-/// Error of a plain sum: three products and two sums round to 1e-7 at most, and the two lengths, which it does not divide
-/// by, are off by 5.2e-8 each where the components are alike.
+/// Error of a cosine by plain sums: three products and two sums round to at most 1e-7, and each of the two lengths, which are not
+/// divided out, is off by 5.2e-8 for components of equal size.
 pub(super) fn cosine_allowed(case: &Case<'_>, exact: f64) -> f64 {
     case.tiered(1.0e-7 + 1.04e-7 * exact.abs(), 8.0 * ulp(exact) + 1e-14)
 }
 
-/// Turn of the half vector by rounding, in radians: L + V, less its part along L − V, and H each to 2^-24 of a component.
+/// Rotation of the half vector by rounding, in radians: L + V, minus its part along L − V, and H, each to 2^-24 of a component.
 const TURN: f64 = 2e-7;
 
-/// Error of the cosine of the half vector, whose length inversesqrt leaves off by 2 ulp.
+/// Error of the cosine of the half vector, whose length is off by 2 ulp of inversesqrt.
 fn half_cosine_allowed(case: &Case<'_>, exact: f64) -> f64 {
     let turn = TURN * (1.0 - exact * exact).max(0.0).sqrt();
     case.tiered(1.0e-7 + 1.6e-7 * exact.abs() + turn, 8.0 * ulp(exact) + 1e-14)
 }
 
-/// Error of sin² for that of the angle.
+/// Error of sin² that results from the error of the angle.
 fn sin2_allowed(case: &Case<'_>, sin2: f64, ulps: f64) -> f64 {
     let turn = case.tiered(TURN, 1e-13);
     ulps * ulp(sin2) + (2.0 * sin2.sqrt() + turn) * turn
@@ -392,9 +394,9 @@ fn phong_vectors(x: &[f64]) -> (f64, f64, f64, f64) {
     (cosine(n, l), cos_delta, sin2_delta, s2)
 }
 
-/// Error of the lobe (numerics.md 17). Stable: d ln f = −shine tanδ dδ, with the turn of the half vector for dδ and 1e-5
-/// for exp and log. For narrow lobes that is √(2 shine |ln f|) dδ, 4e-7 √shine at |ln f| = 2. Beyond 45° that of the
-/// cosine. Compensated (8 + 6 |ln f|) ulp.
+/// Error of the lobe (row 17 of docs/numerics.md). Stable: d ln f = −shine tanδ dδ, where dδ is the rotation of the half
+/// vector, and 1e-5 for exp and log. For narrow lobes it is √(2 shine |ln f|) dδ, 4e-7 √shine at |ln f| = 2. Beyond 45° it is
+/// that of the cosine. Compensated: (8 + 6 |ln f|) ulp.
 fn lobe_allowed(case: &Case<'_>) -> f64 {
     let (_, cos_delta, sin2_delta, _) = phong_vectors(case.inputs);
     let shine = case.inputs[12];
@@ -405,16 +407,16 @@ fn lobe_allowed(case: &Case<'_>) -> f64 {
     let depth = -spec.ln();
     let stable = shine * (sin2_delta.sqrt() / cos_delta * TURN + TURN * TURN) + 1e-5;
     let wide = if sin2_delta > 0.45 { shine * 2e-7 / cos_delta } else { 0.0 };
-    // A lobe below the normal range has no digits, whatever it is divided by later.
+    // A lobe below the normal range of f32 has no correct digits, whatever divides it later.
     case.tiered((stable + wide) * spec, (8.0 + 6.0 * depth) * ulp(spec)) + f64::from(f32::MIN_POSITIVE)
 }
 
-/// Where the sign of N·L is the rounding's.
+/// Whether rounding decides the sign of N·L.
 fn at_terminator(cos_in: f64) -> bool {
     cos_in.abs() < 1e-14
 }
 
-/// G₂ and G₂/(4 cosθ_l cosθ_v) of cosines that are off by `error` at most: relative to a cosine, and no further than all.
+/// Relative error of G₂ and G₂/(4 cosθ_l cosθ_v) that results from the cosines: the sum of their relative errors.
 fn grazing(case: &Case<'_>) -> f64 {
     let n = vector(case.inputs, 0);
     let part = |l: DVec3| {
@@ -424,7 +426,7 @@ fn grazing(case: &Case<'_>) -> f64 {
     part(vector(case.inputs, 3)) + part(vector(case.inputs, 6))
 }
 
-/// Relative error of D: that of the angle, by d ln D = 4 s ds/(c²α² + s²), over numerics.md 20.
+/// Relative error of D that results from the angle, d ln D = 4 s ds/(c²α² + s²), beyond row 20 of docs/numerics.md.
 fn d_part(case: &Case<'_>, alpha: f64) -> f64 {
     let (_, cos_h, sin2_h, _) = phong_vectors(case.inputs);
     let denominator = cos_h * cos_h * alpha * alpha + sin2_h;
@@ -449,7 +451,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output {
                 name: "cos_h",
                 bound: "1.2e-7 + 1.6e-7 |cos| + a turn of 2e-7 rad; compensated 8 ulp + 1e-14",
-                // Not cut to 1, as the forms of the laboratory are.
+                // Not clamped to 1, unlike the laboratory functions.
                 allowed: |c| half_cosine_allowed(c, c.x()) + c.tiered(2e-8, 0.0),
             },
             Output {
@@ -611,7 +613,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output {
                 name: "cos_delta",
                 bound: "1.2e-7 + 1.6e-7 |cos| + a turn of 2e-7 rad; compensated 8 ulp + 1e-14",
-                // Not cut to 1, as the forms of the laboratory are.
+                // Not clamped to 1, unlike the laboratory functions.
                 allowed: |c| half_cosine_allowed(c, c.x()) + c.tiered(2e-8, 0.0),
             },
             Output {
@@ -711,7 +713,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
                 allowed: |c| cosine_allowed(c, c.x()),
             },
             Output { name: "sin2_h", bound: "8 ulp", allowed: |c| c.ulps(8.0) },
-            // Both lengths to the fourth power are 7 of the stable tier's, sin² twice is 9.
+            // In the stable tier both lengths to the fourth power cost 7 ulp, and sin² twice 9.
             Output { name: "D", bound: "18 ulp; compensated 12 ulp", allowed: |c| c.ulps(c.tiered(18.0, 12.0)) },
         ],
         axis: Axis { name: "α", log: true, of: |x| x[6], column: 2, relative: true },
@@ -934,8 +936,8 @@ pub(super) const EQUATIONS: &[Equation] = &[
     },
 ];
 
-/// Relative error of (L + V)². Stable: of two rounded lengths (1.7 ulp), of their sum twice, of its square; where only the
-/// lengths differ, the removal of that leaves 2^-24 of it.
+/// Relative error of (L + V)². Stable: two rounded lengths (1.7 ulp), their sum twice, and its square; when only the lengths
+/// differ, removing that difference leaves 2^-24 of it.
 fn lv2_part(case: &Case<'_>, s2: f64) -> f64 {
     let (l, v) = (vector(case.inputs, 3).length(), vector(case.inputs, 6).length());
     case.tiered(5.0, 4.0) * ulp(s2) / s2 + case.tiered(4.8e-7 * (l - v).abs() / s2.sqrt(), 0.0)
@@ -953,26 +955,26 @@ fn ggx_d_row(d: &mut SplitMix64, n: DVec3, angle: f64, alpha: f64) -> Vec<f32> {
     row
 }
 
-/// Error of Schlick's curve for that of V·H.
+/// Error of Schlick's approximation that results from V·H.
 fn f_error(case: &Case<'_>) -> f64 {
     let (_, _, _, s2) = phong_vectors(case.inputs);
     (1.0 - case.inputs[10]) * 5.0 * (1.0 - 0.5 * s2.sqrt()).max(0.0).powi(4) * 2e-7
 }
 
-/// Relative error of f_r beyond the rounding of its factors.
+/// Relative error of f_r without the rounding of its factors.
 fn factors(case: &Case<'_>) -> f64 {
     d_part(case, case.inputs[9]) + grazing(case) + f_error(case) / case.exact[2]
 }
 
-/// cosδ, sin²δ, two that the lobe does not read, and the shine.
+/// cosδ, sin²δ, two values that the lobe ignores, and the shininess.
 fn lobe_row(d: &mut SplitMix64, delta: f64, shine: f64) -> Vec<f32> {
     vec![delta.cos() as f32, delta.sin().powi(2) as f32, d.unit() as f32, d.unit() as f32, shine as f32]
 }
 
 const VISIBLE_BOUND: &str = "1e-6 + (2e-7/w, at most 5e-4)/|h before normalising|, w = √(1 − |p|²) at the disk's edge";
 
-/// The point of the disk is off by 2e-7, and what is left of the unit above it by that over its height w; the half vector that
-/// is made of it may be as short as α.
+/// Bound: the point on the disk is off by 2e-7, and the height w above it by 2e-7 over w; the half vector made from both may be
+/// as short as α.
 fn visible_allowed(case: &Case<'_>) -> f64 {
     let x = case.inputs;
     let v = vector(x, 0);
@@ -986,7 +988,7 @@ fn visible_allowed(case: &Case<'_>) -> f64 {
     1e-6 + (2e-7 / w).min(5e-4) / DVec3::new(x[3] * h.x, x[3] * h.y, h.z).length()
 }
 
-/// In f32 and below 1, as random numbers are.
+/// Rounds to f32 below 1, like random numbers.
 fn below_one(u: f64) -> f32 {
     (u as f32).min(1.0_f32.next_down())
 }

@@ -1,28 +1,30 @@
-//! What the catalogue says of an equation: its twin, where it is tested, what error is allowed.
+//! Catalogue entries of equations: twin, test regions and error bounds.
+//!
+//! Read docs/numerics.md. Bounds are absolute errors or units in the last place (ulp) of f32.
 
 use glam::DVec3;
 use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
-/// Rungs of the knob `arithmetic`.
+/// Tiers of f32 arithmetic: the rungs of the knob `arithmetic`.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, EnumMessage, IntoStaticStr, VariantArray, serde::Serialize,
 )]
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
 pub enum Tier {
-    /// The formula as on the slide. No bound is promised.
+    /// The textbook formula as written, without an error bound.
     Fast,
-    /// Rewritten so that nothing cancels, at the same class of cost.
+    /// Rewritten without cancellation, at about the same cost.
     Stable,
-    /// Sums and products in double-float where that is what is left to gain.
+    /// Double-float sums and products (pairs of f32) where they reduce the error further.
     Compensated,
 }
 
 impl Tier {
-    /// All, cheapest first.
+    /// All tiers, cheapest first.
     pub const ALL: [Self; 3] = [Self::Fast, Self::Stable, Self::Compensated];
 
-    /// As on the command line.
+    /// Name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
         self.into()
@@ -32,58 +34,58 @@ impl Tier {
 /// One equation.
 #[derive(Debug)]
 pub struct Equation {
-    /// Name in tables and vector files; the shader's tag has the same.
+    /// Name in tables and vector files, equal to the name in the shader's tag.
     pub name: &'static str,
-    /// Input columns to output columns, exact as far as f64 goes. NaN where the output has no meaning.
+    /// Maps input columns to output columns, exact within f64. NaN where an output is undefined.
     pub twin: fn(&[f64]) -> Vec<f64>,
-    /// Where it is tested.
+    /// Parts of the domain from which test inputs are drawn.
     pub regions: &'static [Region],
     /// Bounds, in the order of the output columns.
     pub outputs: &'static [Output],
-    /// What its error is plotted against.
+    /// Abscissa of the error plot.
     pub axis: Axis,
-    /// The largest magnitude at which it must still answer without a NaN, sense or no sense. Below 0: its callers keep to its
-    /// domain, and it is not asked out of it.
+    /// Largest magnitude of inputs outside the domain for which the result, though possibly meaningless, must not be NaN. Below
+    /// 0: callers keep to the domain, and inputs outside it are not tested.
     pub extreme: f32,
 }
 
-/// A part of the domain with a way to draw inputs from it.
+/// A part of the domain with a random generator of inputs.
 #[derive(Debug)]
 pub struct Region {
-    /// What is special about it.
+    /// Description of the part.
     pub name: &'static str,
-    /// Its part of the cases, relative to the others.
+    /// Relative weight of the region among all cases.
     pub share: u32,
-    /// One case: input columns, each a value of f32.
+    /// Draws the input columns of one case; each is a value of f32.
     pub draw: fn(&mut SplitMix64) -> Vec<f32>,
 }
 
-/// One output column and what is promised for it.
+/// An output column and its error bound.
 #[derive(Debug)]
 pub struct Output {
     /// Column name.
     pub name: &'static str,
-    /// The promise in words.
+    /// The error bound in words.
     pub bound: &'static str,
-    /// The largest absolute error allowed in a case; infinite where nothing is promised.
+    /// The largest absolute error allowed in a case; infinite without a bound.
     pub allowed: fn(&Case<'_>) -> f64,
 }
 
-/// A case as a bound sees it.
+/// The data of a case from which a bound is computed.
 #[derive(Debug, Clone, Copy)]
 pub struct Case<'a> {
-    /// Stable or compensated: fast has no bounds.
+    /// Stable or compensated: the fast tier has no bounds.
     pub tier: Tier,
     /// Input columns.
     pub inputs: &'a [f64],
     /// Exact output columns.
     pub exact: &'a [f64],
-    /// The column in question.
+    /// Index of the output column.
     pub column: usize,
 }
 
 impl Case<'_> {
-    /// The exact value.
+    /// The exact value of the column.
     #[must_use]
     pub fn x(&self) -> f64 {
         self.exact[self.column]
@@ -95,52 +97,52 @@ impl Case<'_> {
         count * ulp(self.x())
     }
 
-    /// `part` of the exact value's size.
+    /// `part` times the magnitude of the exact value.
     #[must_use]
     pub fn rel(&self, part: f64) -> f64 {
         part * self.x().abs()
     }
 
-    /// One or the other by tier.
+    /// The first value for the stable tier, the second for the compensated one.
     #[must_use]
     pub fn tiered(&self, stable: f64, compensated: f64) -> f64 {
         if self.tier == Tier::Compensated { compensated } else { stable }
     }
 }
 
-/// The quantity that errors are plotted against.
+/// Abscissa of an error plot.
 #[derive(Debug, Clone, Copy)]
 pub struct Axis {
-    /// Its name with the unit.
+    /// Name with unit.
     pub name: &'static str,
-    /// Whether the plot is logarithmic in it.
+    /// Whether the axis is logarithmic.
     pub log: bool,
-    /// It, from the input columns.
+    /// The quantity, from the input columns.
     pub of: fn(&[f64]) -> f64,
     /// The output column whose error is plotted.
     pub column: usize,
-    /// Whether the error is plotted relative to the exact value: not that of a vector's component, which may be near 0.
+    /// Whether the error is relative to the exact value; not for components of vectors, which may be near 0.
     pub relative: bool,
 }
 
-/// Distance between neighbouring values of f32 at `x`.
+/// Unit in the last place: distance between neighbouring values of f32 at `x`.
 #[must_use]
 pub fn ulp(x: f64) -> f64 {
     let size = x.abs();
     if !size.is_finite() || size > f64::from(f32::MAX) {
         return 2_f64.powi(104);
     }
-    // f64's own exponent is that of f32 but for what lies below its normal range.
+    // f32 and f64 have the same exponent, except below the normal range of f32.
     let exponent = ((size.to_bits() >> 52) as i32 - 1023).max(-126);
     2_f64.powi(exponent - 23)
 }
 
-/// Random numbers of one seed: SplitMix64 (Steele, Lea, Flood 2014), the same on every machine.
+/// SplitMix64 (Steele, Lea, Flood 2014): a random number generator with the same sequence on every machine.
 #[derive(Debug, Clone)]
 pub struct SplitMix64(u64);
 
 impl SplitMix64 {
-    /// The stream of `seed`.
+    /// The sequence of `seed`.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(seed)
@@ -180,7 +182,7 @@ impl SplitMix64 {
         (self.unit() * count as f64) as usize
     }
 
-    /// One of `values`, or a neighbour at most three floats away.
+    /// One of `values`, or a neighbour at most three values of f32 away.
     pub fn near(&mut self, values: &[f32]) -> f32 {
         let value = values[self.below(values.len())];
         let steps = self.below(7) as i32 - 3;
@@ -199,7 +201,7 @@ impl SplitMix64 {
         DVec3::new(r * phi.cos(), r * phi.sin(), z)
     }
 
-    /// A direction at `angle` radians from the unit vector `from`, anywhere around it.
+    /// A direction at `angle` radians from the unit vector `from`, at a random azimuth.
     pub fn at_angle(&mut self, from: DVec3, angle: f64) -> DVec3 {
         let across = self.perpendicular(from);
         from * angle.cos() + across * angle.sin()
@@ -216,23 +218,23 @@ impl SplitMix64 {
     }
 }
 
-/// Columns of vectors, rounded to f32.
+/// Components of vectors as columns, rounded to f32.
 #[must_use]
 pub fn columns(vectors: &[DVec3]) -> Vec<f32> {
     vectors.iter().flat_map(|v| [v.x as f32, v.y as f32, v.z as f32]).collect()
 }
 
-/// The vector in three columns from `first` on.
+/// The vector in three columns starting at `first`.
 #[must_use]
 pub fn vector(inputs: &[f64], first: usize) -> DVec3 {
     DVec3::from_slice(&inputs[first..first + 3])
 }
 
-/// 1 for true.
+/// 1 for true, 0 for false.
 #[must_use]
 pub fn flag(set: bool) -> f64 {
     f64::from(u8::from(set))
 }
 
-/// Bound of flags and of values that must be exact.
+/// Bound of flags and of outputs that must be exact.
 pub const EXACT: fn(&Case<'_>) -> f64 = |_| 0.0;

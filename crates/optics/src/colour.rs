@@ -1,28 +1,30 @@
-//! From spectra to colour, as the lecture has it (C1–C3), with dispersion (F1) and black bodies; the display's transfer
-//! function (C4).
+//! Spectra to colour (lecture C1–C3): colour matching functions, spectral upsampling, Sellmeier and Cauchy dispersion (F1),
+//! Planck's law, and the sRGB transfer function (C4).
+//!
+//! Read pbrt 4.4 to 4.6; IEC 61966-2-1; docs/colour.md. Wavelengths are in nm unless a name ends in `_um`.
 
 use std::sync::LazyLock;
 
 use super::catalogue::{Axis, Case, Equation, Output, Region, SplitMix64};
 
-/// Samples of a spectrum: 380, 385, … 780 nm.
+/// Number of samples of a spectrum: 380, 385, … 780 nm.
 pub const SAMPLES: usize = 81;
 
-/// CIE 1931, 2°: x̄ ȳ z̄.
+/// Colour matching functions x̄ ȳ z̄ of CIE 1931, 2°.
 pub static CIE_1931_2DEG: LazyLock<[[f64; 3]; SAMPLES]> =
     LazyLock::new(|| table(include_str!("../assets/cmf/cmf_cie1931_2deg_5nm.csv")));
 
-/// Stiles & Burch 1959, 10°: r̄ ḡ b̄.
+/// Colour matching functions r̄ ḡ b̄ of Stiles & Burch 1959, 10°.
 pub static STILES_BURCH_1959_10DEG: LazyLock<[[f64; 3]; SAMPLES]> =
     LazyLock::new(|| table(include_str!("../assets/cmf/cmf_stiles_burch1959_10deg_5nm.csv")));
 
-/// Wavelength of a sample, nm.
+/// Wavelength of a sample in nm.
 #[must_use]
 pub fn wavelength(sample: usize) -> f64 {
     380.0 + 5.0 * sample as f64
 }
 
-/// Rows `nm,a,b,c` of values of f32; 0 outside the file's range.
+/// Parses rows `nm,a,b,c` as values of f32; 0 outside the range of the file.
 fn table(text: &str) -> [[f64; 3]; SAMPLES] {
     let mut all = [[0.0; 3]; SAMPLES];
     for line in text.lines().skip(1) {
@@ -33,12 +35,12 @@ fn table(text: &str) -> [[f64; 3]; SAMPLES] {
     all
 }
 
-/// 5 nm sums of a spectrum with three functions.
+/// Integrals of a spectrum with three functions, as sums of steps of 5 nm.
 fn matched(spectrum: &[f64], functions: &[[f64; 3]; SAMPLES]) -> [f64; 3] {
     [0, 1, 2].map(|k| 5.0 * spectrum.iter().zip(functions).map(|(s, f)| s * f[k]).sum::<f64>())
 }
 
-/// The same of absolute values: what the sums' rounding is measured by.
+/// Sums of absolute values, the scale of the rounding error of [`matched`].
 fn magnitude(spectrum: &[f64], functions: &[[f64; 3]; SAMPLES]) -> [f64; 3] {
     [0, 1, 2].map(|k| 5.0 * spectrum.iter().zip(functions).map(|(s, f)| (s * f[k]).abs()).sum::<f64>())
 }
@@ -51,7 +53,7 @@ fn times(rows: &[[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
     rows.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
-/// |row| · |v| for each row.
+/// |row| · |v| for each row, the scale of the product's rounding error.
 fn magnitude_of_product(v: [f64; 3]) -> [f64; 3] {
     times(&XYZ_TO_SRGB.map(|row| row.map(f64::abs)), v.map(f64::abs))
 }
@@ -71,7 +73,7 @@ pub fn cmf_integral(spectrum: &[f64]) -> [f64; 9] {
     [x, y, z, r, g, b, r10, g10, b10]
 }
 
-/// Samples of A e^(−((λ − μ)/w)²/2).
+/// Samples of the Gaussian A e^(−((λ − μ)/w)²/2).
 fn gaussian(a: f64, mu: f64, width: f64) -> Vec<f64> {
     (0..SAMPLES).map(|i| a * (-((wavelength(i) - mu) / width).powi(2) / 2.0).exp()).collect()
 }
@@ -123,7 +125,7 @@ const PLANCK: f64 = 6.62607015e-34;
 const LIGHT: f64 = 299_792_458.0;
 const BOLTZMANN: f64 = 1.380649e-23;
 
-/// hc/(λkT) of λ in µm, T in K.
+/// x = hc/(λkT) of Planck's law, with λ in µm and T in K.
 fn quantum(lambda_um: f64, t: f64) -> f64 {
     PLANCK * LIGHT / (lambda_um * 1e-6 * BOLTZMANN * t)
 }
@@ -166,7 +168,7 @@ fn encode_allowed(case: &Case<'_>) -> f64 {
     if case.inputs[0] <= 1.0 { case.ulps(8.0).min(2.5e-7) } else { case.ulps(8.0) }
 }
 
-/// numerics.md 50: 81 roundings of the sum of magnitudes.
+/// Bound of a sum, row 50 of docs/numerics.md: 81 roundings of the sum of magnitudes.
 const SUM: f64 = 81.0 * 5.960464477539063e-8;
 
 /// Outputs X Y Z sR sG sB r10 g10 b10.
@@ -181,7 +183,7 @@ fn integral_allowed(case: &Case<'_>) -> f64 {
     SUM * part
 }
 
-/// Outputs X Y Z r10 g10 b10. Samples below the range of f32 may count as 0.
+/// Outputs X Y Z r10 g10 b10. Samples below the range of f32 may be flushed to 0.
 fn gaussian_allowed(case: &Case<'_>) -> f64 {
     let [a, mu, width] = [case.inputs[0], case.inputs[1], case.inputs[2]];
     let functions = if case.column < 3 { &CIE_1931_2DEG } else { &STILES_BURCH_1959_10DEG };
@@ -190,20 +192,20 @@ fn gaussian_allowed(case: &Case<'_>) -> f64 {
         + magnitude(&[lost; SAMPLES], functions)[case.column % 3]
 }
 
-/// The polynomial's rounding, 3 units of 2^-24 of its terms' sizes, times the sigmoid's slope, and 5 ulp; compensated
-/// the latter alone.
+/// Bound: the rounding error of the polynomial, 3 units of 2^-24 of the magnitudes of its terms, times the slope of the sigmoid,
+/// plus 5 ulp. The compensated tier has the 5 ulp alone.
 fn upsampled_allowed(case: &Case<'_>) -> f64 {
     let [lambda, c0, c1, c2] = [case.inputs[0], case.inputs[1], case.inputs[2], case.inputs[3]];
     let x = (c0 * lambda + c1) * lambda + c2;
     let terms = (c0 * lambda * lambda).abs() + (c1 * lambda).abs() + c2.abs();
     let error = 3.0 * 2_f64.powi(-24) * terms;
-    // The slope falls away from 0: where it is largest within the error.
+    // The slope decreases away from 0; this is its largest value within the error.
     let nearest = (x.abs() - error).max(0.0);
     let slope = 0.5 * nearest.mul_add(nearest, 1.0).powf(-1.5);
     case.tiered(error * slope, 0.0) + case.ulps(5.0)
 }
 
-/// Two lines, a bell and noise of either sign, in a mixture.
+/// A random mixture of two lines, a Gaussian and noise of either sign.
 fn spectrum(d: &mut SplitMix64) -> Vec<f32> {
     let scale = d.log(1e-3, 1e6);
     let (mu, width) = (d.between(380.0, 780.0), d.log(2.0, 200.0));
@@ -216,7 +218,7 @@ fn spectrum(d: &mut SplitMix64) -> Vec<f32> {
     all
 }
 
-/// Coefficients of x = a u² + b u + c, u = (λ − 580)/200, as the fit gives them.
+/// Coefficients of x = a u² + b u + c, u = (λ − 580)/200, in the range of fitted reflectances.
 fn coefficients(d: &mut SplitMix64) -> Vec<f32> {
     let size = d.log(0.1, 300.0);
     let [a, b, c] = [0; 3].map(|_| size * d.between(-1.0, 1.0));
@@ -225,7 +227,7 @@ fn coefficients(d: &mut SplitMix64) -> Vec<f32> {
     vec![lambda as f32, (a * s * s) as f32, (s * (b - 2.0 * a * m)) as f32, (a * m * m - b * m + c) as f32]
 }
 
-/// Sellmeier's B and C of N-BK7, SF10, water, diamond, as docs/colour.md has them.
+/// Sellmeier coefficients B and C of N-BK7, SF10, water and diamond, from docs/colour.md.
 const MEDIA: [[f64; 8]; 4] = [
     [1.03961212, 0.231792344, 1.01046945, 0.0, 0.00600069867, 0.0200179144, 103.560653, 0.0],
     [1.61625977, 0.259229334, 1.07762317, 0.0, 0.0127534559, 0.0581983954, 116.60768, 0.0],
@@ -418,7 +420,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
         outputs: &[Output {
             name: "L",
             bound: "6 ulp, where hc/(λkT) < 87",
-            // Beyond, what is left is below 1e-38 of 2hc²/λ⁵.
+            // Beyond, the value is below 1e-38 of 2hc²/λ⁵.
             allowed: |c| if quantum(c.inputs[0], c.inputs[1]) < 87.0 { c.ulps(6.0) } else { c.x() },
         }],
         axis: Axis { name: "hc/(λkT)", log: true, of: |x| quantum(x[0], x[1]), column: 0, relative: true },
@@ -479,7 +481,7 @@ mod tests {
         assert!(a[6] < 0.0, "500 nm is matched only with red on its own side");
     }
 
-    /// docs/colour.md: refractiveindex.info's values at 587.6 nm.
+    /// Values of refractiveindex.info at 587.6 nm, from docs/colour.md.
     #[test]
     fn media_have_their_published_indices() {
         for (medium, n) in MEDIA.iter().zip([1.516798, 1.728245, 1.333402, 2.417481]) {

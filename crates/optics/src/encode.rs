@@ -1,4 +1,6 @@
-//! What comes back of a stored quantity. A round trip's truth is what went in; its bound is the format's step.
+//! Round trips of encoded quantities: octahedral normals, depth, sRGB bytes, equirectangular coordinates.
+//!  Read RTR 16.6 for quantised vertex data. The exact value of a round trip is its input; its error bound is the step of the
+//! format.
 
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, SQRT_2, TAU};
@@ -37,16 +39,16 @@ pub fn direction_from_equirectangular(uv: DVec2) -> DVec3 {
     DVec3::new(elevation.cos() * phi.cos(), elevation.sin(), elevation.cos() * phi.sin())
 }
 
-// The map is stretched most at the middle of a face, where steps (x, y) are √6 √(x² + xy + y²) radians: a hexagonal
-// lattice. The nearest step by coordinates is at most half a step off in both, 3/√2. numerics.md 16 has the largest of
-// 200,000 directions, 1 or 2 % below; the best of four steps would have at most the lattice's covering radius, √2.
+// The octahedral map is stretched most at the centre of a face, where steps (x, y) are √6 √(x² + xy + y²) radians: a hexagonal
+// lattice. Rounding the coordinates is off by at most half a step in both, 3/√2. The largest error of 200,000 directions in row
+// 16 of docs/numerics.md is 1 or 2 % below; the best of four steps would have at most the lattice's covering radius, √2.
 const NEAREST: f64 = 1.5 * SQRT_2;
 
 fn steps(case: &Case<'_>) -> f64 {
     2_f64.powf(case.inputs[3] - 1.0) - 1.0
 }
 
-/// `part` of a step, with the curvature of the sphere within a step, and f32's own rounding.
+/// `part` of a step in degrees, with the curvature of the sphere within a step and the rounding of f32.
 fn degrees(case: &Case<'_>, part: f64) -> f64 {
     (part / steps(case) * (1.0 + 1.0 / steps(case)) + 3e-7).to_degrees()
 }

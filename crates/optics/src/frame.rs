@@ -1,5 +1,7 @@
-//! Directions and frames, as geometry defines them. Differences of two f32 are exact in f64 where their exponents are
-//! less than 29 apart, and products always: the cross product of f32 vectors is nearly exact.
+//! Directions, tangent frames and normals.
+//!  Read pbrt 3.3 and 3.10; Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 6(1) 2017. Differences of two f32 are
+//! exact in f64 when their exponents differ by less than 29, and products always are: the cross product of f32 vectors is
+//! nearly exact.
 
 use glam::{DMat3, DVec3};
 
@@ -30,7 +32,7 @@ pub fn angle_between(u: DVec3, v: DVec3) -> f64 {
 pub fn orthonormal_basis(n: DVec3) -> (DVec3, DVec3) {
     let n = n.normalize();
     let s = if n.z < 0.0 { -1.0 } else { 1.0 };
-    // 1/(s + n_z) without a difference: n_z and s have one sign.
+    // 1/(s + n_z) without cancellation: n_z and s have the same sign.
     let part = 1.0 / (1.0 + n.z.abs());
     let t = DVec3::new(1.0 - n.x * n.x * part, -n.x * n.y * part, -s * n.x);
     let b = DVec3::new(-s * n.x * n.y * part, s * (1.0 - n.y * n.y * part), -n.y);
@@ -46,7 +48,7 @@ pub fn basis_gram(_n: DVec3) -> f64 {
 /// @eq N41: the normal n under the linear map with columns a, b, c, by the inverse transpose.
 #[must_use]
 pub fn transformed_normal(a: DVec3, b: DVec3, c: DVec3, n: DVec3) -> DVec3 {
-    // Unit columns, whose lengths return at the components of n: (M S)^-T = M^-T S^-1.
+    // Normalised columns; their lengths divide the components of n: (M S)^-T = M^-T S^-1.
     let lengths = DVec3::new(a.length(), b.length(), c.length());
     let unit = DMat3::from_cols(a / lengths.x, b / lengths.y, c / lengths.z);
     let scaled = n / lengths;
@@ -61,7 +63,7 @@ pub fn triangle_normal(a: DVec3, b: DVec3, c: DVec3) -> (DVec3, bool) {
     (if degenerate { DVec3::NAN } else { doubled.normalize() }, degenerate)
 }
 
-/// Two unit vectors with an angle between them: small, any, or nearly π.
+/// Two unit vectors at a small angle, a random angle, or an angle near π.
 fn units_apart(d: &mut SplitMix64, angle: f64) -> Vec<f32> {
     let u = d.direction();
     let v = d.at_angle(u, angle);
@@ -142,8 +144,8 @@ fn map_and_normal(d: &mut SplitMix64, map: DMat3) -> Vec<f32> {
     columns(&[map.x_axis, map.y_axis, map.z_axis, d.direction()])
 }
 
-/// How far the sum of the three cofactor columns is from a plain one: the sum of its terms' sizes over its own, with
-/// the columns' products for the crosses. 1 for orthogonal columns and a normal along one of them.
+/// Condition number of the sum of the three cofactor columns: the sum of the magnitudes of its terms over the magnitude of the
+/// sum, with products of column lengths for the cross products. 1 for orthogonal columns and a normal along one of them.
 fn cofactor_condition(x: &[f64]) -> f64 {
     let [a, b, c] = [0, 3, 6].map(|k| vector(x, k));
     let n = vector(x, 9).normalize();
@@ -156,7 +158,7 @@ fn map_allowed(case: &Case<'_>) -> f64 {
     (1.2e-7 * cofactor_condition(case.inputs)).max(2e-7)
 }
 
-/// |ab||ac| over twice the area: what the rounding of the edges is multiplied by.
+/// Condition number of a sliver's normal: |ab||ac| over twice the area, the factor of the edges' rounding errors.
 fn sliver(x: &[f64]) -> f64 {
     let (a, b, c) = (vector(x, 0), vector(x, 3), vector(x, 6));
     let (u, v) = (b - a, c - a);
@@ -167,7 +169,7 @@ fn normal_allowed(case: &Case<'_>) -> f64 {
     case.tiered(1e-7 + 2_f64.powi(-22) * sliver(case.inputs), 2e-7)
 }
 
-/// A triangle with an edge of about `size` and the height `height` over it, somewhere within `reach`.
+/// A triangle with an edge of about `size` and the height `height` above it, within `reach` of the origin.
 fn triangle(d: &mut SplitMix64, reach: f64, size: f64, height: f64) -> Vec<f32> {
     let a = d.direction() * reach * d.unit();
     let along = d.direction();

@@ -1,5 +1,6 @@
-//! Reflectance of smooth surfaces, as textbooks write it (lecture F2, F3; Born & Wolf, Principles of Optics, 1.5.2 and
-//! 14.2). n is n_transmitted / n_incident.
+//! Fresnel reflectance of smooth surfaces, dielectrics and conductors (lecture F2, F3).
+//!
+//! Read Born & Wolf, Principles of Optics, 1.5.2 and 14.2; pbrt 9.3. n is n_transmitted / n_incident.
 
 use super::catalogue::{Axis, Case, Equation, Output, Region, SplitMix64, flag};
 
@@ -19,13 +20,13 @@ pub fn schlick(f0: f64, f90: f64, cos_in: f64) -> f64 {
 #[must_use]
 pub fn fresnel_schlick(cos_in: f64, n: f64, kappa: f64) -> [f64; 2] {
     let f0 = normal_reflectance(n, kappa);
-    // A cosine rounded to above 1 is 1.
+    // A cosine that was rounded to more than 1 counts as 1.
     [f0, schlick(f0, 1.0, cos_in)]
 }
 
-/// n cosθ_t squared; products of f32 are exact in f64, so only the sum rounds.
+/// (n cosθ_t)²; products of f32 are exact in f64, so only the sum rounds.
 fn refracted_square(cos_in: f64, n: f64) -> f64 {
-    // The sum in the order that leaves the small difference for last.
+    // This order leaves the small difference for last.
     let (c2, n2) = (cos_in * cos_in, n * n);
     if n2 > c2 { (n2 - 1.0) + c2 } else { (c2 - 1.0) + n2 }
 }
@@ -80,7 +81,7 @@ fn div([a, b]: Complex, [c, d]: Complex) -> Complex {
 
 fn root([re, im]: Complex) -> Complex {
     let size = re.hypot(im);
-    // The larger part first; the other from 2pq = im.
+    // The larger part first; the other follows from 2pq = im.
     if re >= 0.0 {
         let p = (0.5 * (size + re)).sqrt();
         [p, if p > 0.0 { 0.5 * im / p } else { 0.0 }]
@@ -128,7 +129,7 @@ pub fn conductor_absorbed(cos_in: f64, n: f64, kappa: f64) -> [f64; 3] {
     [s, p, 0.5 * (s + p)]
 }
 
-/// A cosine: uniform, grazing, nearly normal, or a special one.
+/// A cosine: uniform, grazing, near normal incidence, or a special value.
 fn cosine(d: &mut SplitMix64) -> f64 {
     match d.below(8) {
         0..4 => d.unit(),
@@ -168,7 +169,7 @@ const CRITICAL: Region = Region {
 const ANYWHERE: Region =
     Region { name: "0.05 < n < 20", share: 4, draw: |d| vec![cosine(d) as f32, log_index(d) as f32] };
 
-/// Cosines whose squares leave the range of f32, half of them where there is no boundary.
+/// Cosines whose squares are outside the range of f32, half of the cases for n = 1.
 const FAR_GRAZING: Region = Region {
     name: "cosines to 1e-37, n = 1",
     share: 1,
@@ -178,15 +179,15 @@ const FAR_GRAZING: Region = Region {
     },
 };
 
-/// Rounding of g² = c² + n² − 1: what cancels is summed to 2^-32 in the stable tier, the terms themselves to 2^-46 in the
-/// compensated one.
+/// Rounding error of g² = c² + n² − 1: cancelling terms are summed to 2^-32 in the stable tier, and the terms themselves to
+/// 2^-46 in the compensated one.
 fn rounding_of_g2(case: &Case<'_>) -> f64 {
     let (c, n) = (case.inputs[0], case.inputs[1]);
     let terms = c.min(n).powi(2) + (1.0 - c.max(n)).powi(2);
     case.tiered(2_f64.powi(-32) * terms, 2_f64.powi(-46) * c.max(n).max(1.0).powi(2))
 }
 
-/// Absolute error of g that this leaves.
+/// Absolute error of g that results from [`rounding_of_g2`].
 fn error_of_g(case: &Case<'_>) -> f64 {
     let (c, n) = (case.inputs[0], case.inputs[1]);
     let rounding = rounding_of_g2(case);
@@ -194,7 +195,7 @@ fn error_of_g(case: &Case<'_>) -> f64 {
     (g2 + rounding).max(0.0).sqrt() - (g2 - rounding).max(0.0).sqrt()
 }
 
-/// Near Brewster's angle r_p is a small difference: 12 ulp of the size of its terms. Compensated it is summed exactly.
+/// Bound near Brewster's angle, where r_p is a small difference: 12 ulp of its terms. The compensated tier sums exactly.
 fn brewster(case: &Case<'_>) -> f64 {
     let (c, n) = (case.inputs[0], case.inputs[1]);
     let g = refracted_square(c, n).max(0.0).sqrt();
@@ -203,7 +204,7 @@ fn brewster(case: &Case<'_>) -> f64 {
     case.tiered(if part.is_finite() { 12.0 * super::ulp(part * terms) } else { 0.0 }, 0.0)
 }
 
-/// What it makes of r_s and r_p: |dr_s/dg| = 2c/(c + g)², |dr_p/dg| = 2n²c/(n²c + g)².
+/// Error of r_s and r_p that results from g: |dr_s/dg| = 2c/(c + g)², |dr_p/dg| = 2n²c/(n²c + g)².
 fn through_g(case: &Case<'_>) -> [f64; 2] {
     let (c, n) = (case.inputs[0], case.inputs[1]);
     let g = refracted_square(c, n).max(0.0).sqrt();
@@ -262,7 +263,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
         ],
         outputs: &[Output { name: "F0", bound: "8 ulp", allowed: |c| c.ulps(8.0) }],
         axis: Axis { name: "κ", log: true, of: |x| x[1], column: 0, relative: true },
-        // Only indices of metals of files reach it.
+        // Only indices of metals in files are that large.
         extreme: -1.0,
     },
     Equation {
@@ -448,8 +449,8 @@ fn is_metal(x: &[f64]) -> bool {
     x[2] > x[1].max(0.5)
 }
 
-/// What the error of g makes of F and R_s near the critical angle of a nearly transparent conductor: twice the change of
-/// an amplitude, at most 2c/|c + g|² and 2|m²|c/|m²c + g|² per g.
+/// Error of F and R_s that results from g near the critical angle of a nearly transparent conductor: twice the change of
+/// an amplitude, at most 2c/|c + g|² and 2|m²|c/|m²c + g|² per unit of g.
 fn conductor_slack(case: &Case<'_>) -> f64 {
     let (c, n, k) = (case.inputs[0], case.inputs[1], case.inputs[2]);
     if is_metal(case.inputs) || c == 0.0 {
@@ -467,9 +468,8 @@ fn conductor_slack(case: &Case<'_>) -> f64 {
     2.0 * error * (2.0 * c / s).max(2.0 * m2[0].hypot(m2[1]) * c / p)
 }
 
-/// What rounding leaves of R_p near Brewster's angle, where r_p = (m² − 1)(c²(m² + 1) − 1)/(m²c + g)² is a small
-/// difference: 2|r_p|δ + δ² with δ an eighth of 12 ulp of the terms; they are summed in pairs, what is left is R_p's
-/// own smallness.
+/// Rounding error of R_p near Brewster's angle, where r_p = (m² − 1)(c²(m² + 1) − 1)/(m²c + g)² is a small difference: 2|r_p|δ
+/// + δ² with δ an eighth of 12 ulp of the terms. Pairs of floats sum the terms, so the remaining error is that of a small R_p.
 fn conductor_brewster(case: &Case<'_>) -> f64 {
     let (c, n, k) = (case.inputs[0], case.inputs[1], case.inputs[2]);
     if is_metal(case.inputs) || c == 0.0 {

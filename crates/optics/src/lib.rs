@@ -1,9 +1,8 @@
-//! The lecture's formulas as the textbooks write them, in f64: one twin for every tagged function of `shaders/lib/`, in
-//! the file and under the name it has there.
-//!
-//! Twins are not transcriptions of the shaders, or they would share their mistakes. Inputs are values of f32, so that
-//! products of two are exact in f64; directions are normalised first. Beside its twin each equation has the regions it is
-//! tested in and the error that is promised there: [`Equation`].
+//! Reference implementations in f64 (twins) of all tagged functions of `shaders/lib/`, written from the textbook formulas of the
+//! lecture. File and function names are those of the shader.
+//!  Read docs/verified.md. A twin is not transcribed from the shader, because a transcription repeats its mistakes. Inputs are
+//! values of f32, so that products of two are exact in f64; directions are normalised first. Beside its twin each equation has
+//! its test regions and its error bounds: [`Equation`].
 
 pub mod catalogue;
 
@@ -21,7 +20,7 @@ pub mod spectra;
 
 pub use catalogue::{Axis, Case, Equation, Output, Region, SplitMix64, Tier, ulp};
 
-/// Every equation, by subject.
+/// All equations, by subject.
 pub fn equations() -> impl Iterator<Item = &'static Equation> {
     let subjects = [
         arithmetic::EQUATIONS,

@@ -1,4 +1,6 @@
-//! Light that arrives at a surface (lecture R2–R4), and solid angles. Directions are normalised first.
+//! Light that arrives at a surface (lecture R2–R4): punctual lights, spheres, and solid angles. Directions are normalised first.
+//!
+//! Read pbrt 4.1, 4.2 and 12; KHR_lights_punctual.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -30,7 +32,7 @@ pub fn light_point(p: DVec3, q: DVec3, n: DVec3, intensity: f64) -> [f64; 4] {
     [r2, cos_plus, e, if decided { e * cos_plus } else { f64::NAN }]
 }
 
-/// Least distance of a point light, m (shaders/lib/light.glsl).
+/// Smallest distance of a point light in m (shaders/lib/light.glsl).
 pub const LIGHT_RADIUS: f64 = 1e-12;
 
 /// @eq R4: irradiance per intensity of a point light with a range (KHR_lights_punctual).
@@ -84,7 +86,7 @@ fn point_row(p: DVec3, l: DVec3, n: DVec3, intensity: f64) -> Vec<f32> {
     row
 }
 
-/// From a surface with normal N a vector to the light: any side, `distance` long.
+/// A vector of length `distance` from a surface with normal N to a light on either side.
 fn to_light(d: &mut SplitMix64, n: DVec3, distance: f64) -> DVec3 {
     let c = cosine_in(d) * if d.below(4) == 0 { -1.0 } else { 1.0 };
     at_cosine(d, n, c) * distance
@@ -242,7 +244,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             draw: |d| {
                 let inner = d.log(1e-2, 1.5);
                 let outer = (inner + d.log(1e-3, 1.0)).min(FRAC_PI_2);
-                // KHR_lights_punctual: cones nearer than 0.001 in the cosine are one.
+                // KHR_lights_punctual: cones whose cosines differ by less than 0.001 are treated as 0.001 apart.
                 let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-3);
                 let angle = d.between(0.9 * inner, 1.1 * outer);
                 vec![angle.cos() as f32, scale as f32, (-outer.cos() * scale) as f32]

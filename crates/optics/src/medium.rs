@@ -1,4 +1,6 @@
-//! Absorption along a path, as the lecture has it (A1, A2).
+//! Absorption along a path (lecture A1, A2): Beer-Lambert transmittance, and quadratures of heterogeneous media.
+//!
+//! Read pbrt 11.2. σ is in 1/m.
 
 use super::catalogue::{Axis, Case, EXACT, Equation, Output, Region, SplitMix64};
 
@@ -39,8 +41,8 @@ pub fn march_optical_depth(sigma0: f64, falloff: f64, d: f64) -> [f64; 2] {
     [tau, (-tau).exp()]
 }
 
-/// The error of a rule's sum of smooth σ: d Δs^p/c max|σ^(p)|, p and c 1 and 2 for the left sum, 2 and 24 for the
-/// midpoints, 4 and 2880 for Simpson's.
+/// Error bound of a quadrature of smooth σ: d Δs^p/c max|σ^(p)|, with p and c 1 and 2 for the left sum, 2 and 24 for
+/// midpoints, 4 and 2880 for Simpson's rule.
 #[must_use]
 pub fn quadrature_error(sigma0: f64, falloff: f64, d: f64, steps: f64, rule: usize) -> f64 {
     let (order, divisor) = [(1, 2.0), (2, 24.0), (4, 2880.0)][rule];
@@ -48,8 +50,8 @@ pub fn quadrature_error(sigma0: f64, falloff: f64, d: f64, steps: f64, rule: usi
     d * step.powi(order) / divisor * sigma0 * (-falloff * d).exp().max(1.0)
 }
 
-/// τ of a march: the rule's error and the rounding. Each exponential has that of its argument, 3 units of 2^-24 times
-/// itself, and 4 of its own; mean and product add 4.
+/// Bound of the marched τ: the error of the quadrature and the rounding. Each exponential has 3 units of 2^-24 times its
+/// argument, plus 4 units of its own; mean and product add 4.
 fn march_allowed(case: &Case<'_>) -> f64 {
     let x = case.inputs;
     let tau = march_optical_depth(x[0], x[1], x[2])[0];
@@ -58,16 +60,16 @@ fn march_allowed(case: &Case<'_>) -> f64 {
     error + (8.0 + 3.0 * growth) * 2_f64.powi(-24) * (tau + error)
 }
 
-/// σ, d with an optical depth of `tau`.
+/// σ and d with an optical depth of `tau`.
 fn path(d: &mut SplitMix64, tau: f64) -> [f32; 2] {
     let sigma = d.log(1e-3, 1e8);
     [sigma as f32, (tau / sigma) as f32]
 }
 
-/// n, s0, ds, seed of about the optical depth `tau`; s0 a power of two, so that every σ_i is a value of f32.
+/// n, s0, ds and seed of about the optical depth `tau`; s0 is a power of two, so that every σ_i is a value of f32.
 fn steps(d: &mut SplitMix64, n: f64, tau: f64) -> Vec<f32> {
     let s0 = 2_f64.powi(d.below(21) as i32 - 10);
-    // Of all 32 bits; verify adds the digits that a float has not.
+    // Seeds over all 32 bits; verify adds the low digits that a float does not have.
     let seed = (d.unit() * 4294967040.0) as f32;
     vec![n.floor() as f32, s0 as f32, (tau / (1.5 * n * s0)) as f32, seed]
 }
@@ -172,7 +174,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
                     steps(d, n, tau)
                 },
             },
-            // 11.7 ulp were seen there by a reader that rounded the seed to f32.
+            // Seen by a reader that rounded the seed to f32: 11.7 ulp in this region.
             Region {
                 name: "up to 20,000 steps, τ to 87",
                 share: 4,
@@ -219,7 +221,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
 mod tests {
     use super::*;
 
-    /// The sums as the textbooks write them: within the bound, and the error of their order.
+    /// The sums as in textbooks: within the bound, with the error of their order.
     #[test]
     fn the_rules_are_of_order_one_two_and_four() {
         let (sigma0, falloff, d) = (2.0, 0.5, 10.0);
@@ -242,7 +244,7 @@ mod tests {
         }
     }
 
-    /// A homogeneous medium is the limit of one that thins out.
+    /// A homogeneous medium is the limit of a falling σ.
     #[test]
     fn no_falloff_is_homogeneous() {
         let [tau, _] = march_optical_depth(0.3, 0.0, 7.0);

@@ -1,5 +1,6 @@
-//! Rays by the equations of lines and planes. Differences of f32 inputs are exact in f64 or nearly so, and so are their
-//! products.
+//! Intersections of rays with spheres, boxes and triangles, and ray origins, by the equations of lines and planes.
+//!
+//! Read pbrt 6; RTR 22. Differences of f32 inputs are exact or nearly exact in f64, and so are their products.
 
 use glam::DVec3;
 
@@ -10,7 +11,7 @@ use super::catalogue::{Axis, Case, EXACT, Equation, Output, Region, SplitMix64, 
 pub fn ray_sphere(origin: DVec3, direction: DVec3, center: DVec3, radius: f64) -> [f64; 3] {
     let f = origin - center;
     let (d2, b) = (direction.length_squared(), -f.dot(direction));
-    // The discriminant over 4 d²: by the distance of the center from the line, in which nothing is squared twice.
+    // The discriminant over 4 d², from the distance of the centre to the line: nothing is squared twice.
     let disc = radius * radius - f.cross(direction).length_squared() / d2;
     if disc < 0.0 {
         return [0.0, f64::NAN, f64::NAN];
@@ -87,16 +88,16 @@ pub fn camera_relative(p: [DVec3; 2], eye: [DVec3; 2]) -> DVec3 {
     (p[0] - eye[0]) + (p[1] - eye[1])
 }
 
-/// A ray and a sphere as the bounds see them, for a direction of unit length.
+/// Quantities of a ray of unit direction and a sphere, for error bounds.
 struct Approach {
-    /// Distance of origin and center.
+    /// Distance of origin and centre.
     f: f64,
-    /// r² − l² and its allowed error.
+    /// r² − l² and its error bound.
     disc: f64,
     disc_error: f64,
     /// f² − r².
     c: f64,
-    /// |q|, the larger of the roots' sizes.
+    /// |q|, the larger magnitude of the roots.
     q: f64,
     r: f64,
 }
@@ -107,14 +108,14 @@ fn approach(case: &Case<'_>) -> Approach {
     let l = f.cross(d).length() / d.length();
     let f_length = f.length();
     let disc = r * r - l * l;
-    // Stable: l is a difference of vectors as long as f, each rounded. Compensated: the square of a pair, rounded once.
+    // Stable: l is a difference of vectors of length f, each rounded. Compensated: the square of a pair, rounded once.
     let stable = 2_f64.powi(-24) * (5.0 * l * f_length + 4.0 * r * r) + 2_f64.powi(-42) * f_length * f_length;
     let compensated = 2_f64.powi(-42) * (f_length * r + r * r) + 2_f64.powi(-60) * f_length * f_length;
     let q = f.dot(d).abs() / d.length() + disc.max(0.0).sqrt();
     Approach { f: f_length, disc, disc_error: case.tiered(stable, compensated), c: f_length * f_length - r * r, q, r }
 }
 
-/// The error of √disc, for a direction of unit length.
+/// Error of √disc, for a direction of unit length.
 fn root_error(a: &Approach) -> f64 {
     if a.disc > 2.0 * a.disc_error { a.disc_error / a.disc.sqrt() } else { (3.0 * a.disc_error).sqrt() }
 }
@@ -124,7 +125,7 @@ fn root_allowed(case: &Case<'_>) -> f64 {
     if a.disc <= a.disc_error {
         return f64::INFINITY;
     }
-    // f² − r² near the surface: each square is rounded. In the root of larger size it does not occur.
+    // f² − r² near the surface: each square is rounded. The root of larger magnitude does not use it.
     let smaller = case.x().abs() * vector(case.inputs, 3).length() < 0.999 * a.q;
     let part =
         if smaller { case.tiered(8.0 * 2_f64.powi(-24) * (a.f * a.f + a.r * a.r) / a.c.abs(), 0.0) } else { 0.0 };
@@ -139,7 +140,7 @@ fn sphere_case(d: &mut SplitMix64, center: DVec3, radius: f64, origin: DVec3, di
     all
 }
 
-/// A ray from `distance` away that passes a sphere's center at `impact` radii.
+/// A ray from `distance` that passes the centre of a sphere at `impact` radii.
 fn toward_sphere(d: &mut SplitMix64, distance: f64, impact: f64) -> Vec<f32> {
     let (radius, along) = (d.log(0.1, 10.0), d.direction());
     let origin = d.direction() * d.unit();
@@ -153,7 +154,7 @@ fn box_case(d: &mut SplitMix64, parallel: bool) -> Vec<f32> {
     let boxed = columns(&[d.direction() * d.log(0.1, 1e3), DVec3::from_array([0; 3].map(|_| d.log(1e-3, 10.0)))]);
     let exact: Vec<f64> = boxed.iter().map(|&x| f64::from(x)).collect();
     let (centre, half) = (vector(&exact, 0), vector(&exact, 3));
-    // Inside, past it, or at an edge or a corner.
+    // Targets inside the box, beside it, or on a face, an edge or a corner.
     let target = DVec3::from_array([0, 1, 2].map(|k| {
         let part = [-1.0, 1.0, d.between(-1.0, 1.0), d.between(-1.5, 1.5)][d.below(4)];
         centre[k] + part * half[k]
@@ -178,8 +179,8 @@ fn box_of(x: &[f64]) -> [f64; 2] {
     interval(vector(x, 0), vector(x, 3), vector(x, 6), vector(x, 9), x[13])
 }
 
-/// How much earlier the padded interval may begin and how much later end: by the pad of the axis that decides, 8 roundings
-/// of the origin and the scene's offset, and as much again for the roundings that it is there for.
+/// Tolerance of the padded interval: how much earlier it may begin and later end. It is the pad of the deciding axis, 8 roundings
+/// of the origin and the scene's offset, and once more for the rounding errors that the pad covers.
 fn box_slack(x: &[f64]) -> [f64; 2] {
     let [near, far] = box_of(x);
     let pad = |end: f64| {
@@ -193,7 +194,7 @@ fn box_slack(x: &[f64]) -> [f64; 2] {
     [pad(near), pad(far)]
 }
 
-/// A triangle of about unit size around `center`, and a ray from `distance` towards a place in or beside it.
+/// A triangle of about unit size around `center`, and a ray from `distance` towards a point in or beside it.
 fn toward_triangle(d: &mut SplitMix64, distance: f64, scale: f64) -> Vec<f32> {
     let center = d.direction();
     let [a, b, c] = [0; 3].map(|_| center + d.direction());
@@ -205,7 +206,7 @@ fn toward_triangle(d: &mut SplitMix64, distance: f64, scale: f64) -> Vec<f32> {
     columns(&[origin * scale, direction * length, a * scale, b * scale, c * scale])
 }
 
-/// What the rounding of sheared coordinates does to u, v and 1 − u − v, and to t.
+/// Errors of u, v and 1 − u − v, and of t, that result from the rounding of sheared coordinates.
 fn triangle_errors(case: &Case<'_>) -> [f64; 2] {
     let x = case.inputs;
     let [o, d, a, b, c] = [0, 3, 6, 9, 12].map(|k| vector(x, k));
@@ -228,7 +229,7 @@ fn triangle_errors(case: &Case<'_>) -> [f64; 2] {
     [weights, 2.0 * weights * spread + 8.0 * 2_f64.powi(-24) * most]
 }
 
-/// Whether rounding may decide that the ray misses.
+/// Whether the ray may miss within rounding errors.
 fn undecided(case: &Case<'_>) -> bool {
     let x = case.inputs;
     let [o, d, a, b, c] = [0, 3, 6, 9, 12].map(|k| vector(x, k));
@@ -252,7 +253,7 @@ fn pair_of(p: DVec3) -> [DVec3; 2] {
     [hi, p - hi]
 }
 
-/// A ray that meets a triangle of about unit size, and t, u, v of the meeting; not seen edge-on.
+/// A ray that hits a triangle of about unit size, not edge-on, and t, u, v of the hit.
 fn ray_to_point(d: &mut SplitMix64) -> Vec<f32> {
     loop {
         let place = d.direction() * d.between(0.0, 2.0);
@@ -364,7 +365,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
                 bound: "no box is missed; one missed by less than the pads may be hit",
                 allowed: |c| {
                     let [near, far] = box_of(c.inputs);
-                    // Beside a plane that the ray is parallel to: by the pad of lengths.
+                    // A ray parallel to a plane that lies beside the box, within the pad in lengths.
                     let beside = (0..3).any(|k| {
                         let gap = (c.inputs[6 + k] - c.inputs[k]).abs() - c.inputs[9 + k];
                         c.inputs[3 + k] == 0.0 && gap > 0.0 && gap <= 4.0 * c.inputs[12]

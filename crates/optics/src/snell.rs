@@ -1,4 +1,6 @@
-//! Directions at a smooth surface, as the lecture has them (F4–F6). Directions are normalised first.
+//! Reflected and refracted directions at a smooth surface (lecture F4–F6): Snell's law. Directions are normalised first.
+//!
+//! Read pbrt 9.3; Born & Wolf, Principles of Optics, 1.5.
 
 use glam::DVec3;
 
@@ -41,7 +43,7 @@ pub fn brewster_angle(n_in: f64, n_out: f64) -> [f64; 2] {
     [theta, n_in / n_in.hypot(n_out)]
 }
 
-/// v, N with an angle of incidence of `angle`.
+/// v and N with the angle of incidence `angle` in radians.
 fn incident(d: &mut SplitMix64, angle: f64) -> [DVec3; 2] {
     let n = d.direction();
     [-d.at_angle(n, angle), n]
@@ -54,12 +56,12 @@ fn with_index(d: &mut SplitMix64, angle: f64, n: f64) -> Vec<f32> {
     all
 }
 
-/// cos β squared and its sensitivity: n and disc of a case.
+/// n and disc = cos²β of a case, which determine the sensitivity of the direction.
 fn refraction(case: &Case<'_>) -> (f64, f64) {
     (case.inputs[6], case.exact[4])
 }
 
-/// numerics.md 11: 2^-22 (1 + 1/(n² √disc)). Compensated: 5e-7, which near the critical angle is the rounding of the
+/// Row 11 of docs/numerics.md: 2^-22 (1 + 1/(n² √disc)). Compensated: 5e-7, near the critical angle the rounding of the
 /// compensated cosine, a relative 2^-24 of g.
 fn direction_allowed(case: &Case<'_>) -> f64 {
     let (n, disc) = refraction(case);

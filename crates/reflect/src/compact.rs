@@ -1,5 +1,6 @@
-//! Ids without gaps. The optimiser numbers what it makes and throws most of it away: `interact` came with ids up to 862,000 for some
-//! 60,000 results. Drivers keep a table by id, which lavapipe clears for each pipeline.
+//! SPIR-V id compaction: renumbers ids without gaps.
+//!  Read the SPIR-V specification, 2.3 (physical layout). The optimiser numbers values and removes most of them: `interact` had
+//! ids up to 862,000 for about 60,000 results. Drivers keep a table by id, which lavapipe clears for each pipeline.
 
 use std::collections::HashMap;
 
@@ -13,7 +14,7 @@ type Grammar = HashMap<u32, &'static Instruction<'static>>;
 const HEADER: usize = 5;
 const BOUND: usize = 3;
 
-/// `words` with ids from 1 on, in the order in which they are first met.
+/// `words` with ids from 1 on, in the order of their first occurrence.
 pub(crate) fn compacted(mut words: Vec<u32>) -> Result<Vec<u32>> {
     let grammar: Grammar = INSTRUCTION_TABLE.iter().map(|known| (known.opcode as u32, known)).collect();
     let mut numbers: HashMap<u32, u32> = HashMap::new();
@@ -31,7 +32,7 @@ pub(crate) fn compacted(mut words: Vec<u32>) -> Result<Vec<u32>> {
     Ok(words)
 }
 
-/// Places of the ids in an instruction.
+/// Positions of the ids in an instruction.
 fn ids(grammar: &Grammar, instruction: &[u32]) -> Result<Vec<usize>> {
     let known = |opcode: u32| grammar.get(&opcode).ok_or_else(|| format!("unknown SPIR-V opcode {opcode}"));
     let mut found = Vec::new();
@@ -59,13 +60,13 @@ fn ids(grammar: &Grammar, instruction: &[u32]) -> Result<Vec<usize>> {
                     at += 2;
                 }
                 OperandKind::LiteralString => {
-                    // Up to the word with the zero at its end.
+                    // Up to the word with the terminating 0.
                     while instruction[at].to_le_bytes().iter().all(|&byte| byte != 0) {
                         at += 1;
                     }
                     at += 1;
                 }
-                // What follows them is a matter of their value.
+                // The remaining operands depend on the value of the mask; all are ids.
                 OperandKind::ImageOperands => {
                     found.extend(at + 1..instruction.len());
                     at = instruction.len();
@@ -87,7 +88,8 @@ fn ids(grammar: &Grammar, instruction: &[u32]) -> Result<Vec<usize>> {
                     }
                     at = instruction.len();
                 }
-                // An instruction of its own, without its results: only extraction has numbers, after the first operand.
+                // The operand is an opcode with its operands, without results: only extraction has literals, after the first
+                // operand.
                 OperandKind::LiteralSpecConstantOpInteger => {
                     let operands = known(instruction[at])?
                         .operands

@@ -1,4 +1,4 @@
-//! GLSL to SPIR-V by glslang: what build.rs does for all shaders, and the viewer for those that change (feature `reload`).
+//! GLSL to SPIR-V by glslang: used by build.rs for all shaders, and by the viewer for changed shaders (feature `reload`).
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -10,7 +10,7 @@ use super::files::Result;
 use super::interface::{Interface, PassSlots};
 use super::reflect::Stage;
 
-/// Does something with each of `work` by name, as many at once as there are cores; `tool` is what each thread does it with.
+/// Maps each named item of `work` in parallel, with one thread per core; each thread has its own `tool`.
 pub(crate) fn on_all_cores<Tool, W: Send, R: Send>(
     work: impl IntoIterator<Item = (String, W)>,
     tool: impl Fn() -> Result<Tool> + Sync,
@@ -35,20 +35,20 @@ pub(crate) fn on_all_cores<Tool, W: Send, R: Send>(
     Ok(made.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// The stages of a program.
+/// A program: its compiled stages.
 pub(crate) struct Program {
     pub(crate) stages: Vec<Stage>,
     pub(crate) slots: PassSlots,
 }
 
-/// How shaders are compiled.
+/// Configuration of shader compilation.
 pub(crate) struct Recipe {
     compiler: shaderc::Compiler,
-    /// The folder `shaders`, which all includes are written from: one rule, whatever file includes.
+    /// The folder `shaders`; all includes are relative to it, in whichever file.
     pub(crate) root: PathBuf,
-    /// Who declares what, and its numbers.
+    /// All declarations with their numbers.
     pub(crate) interface: Interface,
-    /// Names of specialization constants whose code is left out.
+    /// Specialization constants whose code is removed.
     without: Vec<String>,
 }
 
@@ -58,7 +58,7 @@ impl Recipe {
         Ok(Self { compiler, root: root.to_owned(), interface: Interface::read(root)?, without })
     }
 
-    /// Compiles the files of a program, all stages of which bind the same.
+    /// Compiles the files of a program; its stages share their bindings.
     pub(crate) fn program(&self, paths: &[PathBuf]) -> Result<Program> {
         let mut texts = Vec::new();
         for path in paths {
@@ -75,7 +75,7 @@ impl Recipe {
         self.compile(&kinds, &texts)
     }
 
-    /// Compiles a text of that name.
+    /// Compiles a source text under a name.
     pub(crate) fn source(&self, kind: shaderc::ShaderKind, name: String, source: &str) -> Result<Program> {
         self.compile(&[kind], &[(name, source.to_owned())])
     }

@@ -1,9 +1,9 @@
-//! What the SPIR-V of an equation must be: checked at every build, on what reflection sees and on what ships.
+//! Checks of the SPIR-V of equations at every build, both on the unoptimised module and on the shipped one.
 //!
 //! - no RelaxedPrecision: every value has 32 bits;
-//! - NoContraction wherever the source says `precise`, or compensated sums return zero residuals (docs/numerics.md 2);
-//! - loop heads stay below what lavapipe evaluates: it ends all loops of an invocation in silence after 65,535;
-//! - which built-ins with loose precision each tier reaches, as a list for docs/equations.md.
+//! - NoContraction wherever the source has `precise`; otherwise compensated sums have zero residuals (docs/numerics.md 2);
+//! - loop iterations stay below lavapipe's limit: it silently ends all loops of an invocation after 65,535;
+//! - the built-ins of loose precision that each tier reaches, as a list for docs/equations.md.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,14 +15,14 @@ use crate::files::Result;
 use crate::reflect::Stage;
 use crate::reflect::{Names, word};
 
-/// Loop heads that one call may evaluate.
+/// Largest number of loop iterations of one call.
 const HEADS: u32 = 60_000;
 
-/// What an equation's code turned out to be.
+/// Facts about the code of an equation.
 pub(crate) struct Facts {
     /// Extended instructions reached in each tier: fast, stable, compensated.
     pub(crate) builtins: [BTreeSet<String>; 3],
-    /// Most evaluations of loop heads in one call.
+    /// Largest number of loop iterations in one call.
     pub(crate) heads: u32,
 }
 
@@ -77,7 +77,7 @@ pub(crate) fn check(name: &str, module: &Module, shipped: &[u32], sources: &BTre
     Ok(facts)
 }
 
-/// What ships has no RelaxedPrecision anywhere, and keeps NoContraction where the source asked for it.
+/// Checks that the shipped module has no RelaxedPrecision, and has NoContraction where the source has `precise`.
 pub(crate) fn decorations(name: &str, module: &Module, shipped: &[u32]) -> Result<()> {
     if shipped_decorations(shipped).any(|d| d == Decoration::RelaxedPrecision as u32) {
         return Err(format!("{name}: RelaxedPrecision in what ships"));
@@ -90,7 +90,7 @@ pub(crate) fn decorations(name: &str, module: &Module, shipped: &[u32]) -> Resul
     Ok(())
 }
 
-/// Names of the functions that a program calls (glslang leaves out what is never called).
+/// Names of the functions that a program calls (glslang removes functions without calls).
 pub(crate) fn called(stages: &[Stage]) -> BTreeSet<String> {
     let of = |stage: &Stage| {
         let names = Names::new(&stage.module);
@@ -103,8 +103,8 @@ pub(crate) fn called(stages: &[Stage]) -> BTreeSet<String> {
     stages.iter().flat_map(of).collect()
 }
 
-/// Whether a function that loops calls another one that does. Stricter than a call inside the loop: which blocks belong to
-/// a loop is not looked at.
+/// Whether a function with a loop calls another function with a loop. Stricter than a call inside the loop: the blocks of
+/// the loop are not determined.
 fn calls_in_loops(
     function: &str,
     functions: &BTreeMap<u32, &Function>,
@@ -143,7 +143,7 @@ const EXACT: &[GLOp] = &[
     GLOp::FindILsb,
 ];
 
-/// Decorations in SPIR-V of any version: rspirv 0.13 cannot load what ships.
+/// Decorations in SPIR-V of any version: rspirv 0.13 cannot load the version that ships.
 fn shipped_decorations(words: &[u32]) -> impl Iterator<Item = u32> {
     let mut at = 5;
     std::iter::from_fn(move || {
@@ -159,7 +159,7 @@ fn shipped_decorations(words: &[u32]) -> impl Iterator<Item = u32> {
     })
 }
 
-/// Walks the blocks of `function` that the tier reaches, and the functions they call, each call anew.
+/// Traverses the blocks of `function` that the tier reaches, and recursively the functions of each call.
 fn reach(
     function: u32,
     tier: u32,

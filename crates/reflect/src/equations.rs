@@ -1,17 +1,17 @@
-//! Tagged functions of `shaders/lib/` and the probe that evaluates each on a device.
+//! Tagged functions of `shaders/lib/`, and the probe that evaluates each on a device.
 //!
 //! ```text
 //! // @eq F3 N2: r_s = −(n² − 1)/(c + g)²
-//! // @name refract          only where the function's own name is a GLSL built-in
-//! // @out F                 only where it returns a plain value
-//! // @host src/FILE: what    where no pass calls it: the host code that computes it for pictures
-//! // @lab FUNCTION: test     where none does either: what draws instead, and the test that they are equal
+//! // @name refract          only if the function's own name is a GLSL built-in
+//! // @out F                 only if it returns a plain value
+//! // @host src/FILE: what   if no pass calls it: the host code that computes it for pictures
+//! // @lab FUNCTION: test    if neither does: the function that passes call instead, and the test of their equality
 //! FresnelDielectric fresnel_dielectric(float cos_in, float n) {
 //! ```
 //!
-//! Parameters are the input columns in order, members of the result the output columns. A probe is
-//! `outputs = function(inputs)` for one case per invocation, columns one after the other. Inputs are words: the bits of
-//! a float, or the whole number that a `uint` is, of which a float would hold 24 bits.
+//! Parameters are the input columns in order, and members of the result are the output columns. A probe computes
+//! `outputs = function(inputs)` for one case per invocation, and stores column after column. Inputs are words: the bits of
+//! a float, or a `uint`, of which a float would hold 24 bits.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -25,38 +25,38 @@ pub(crate) struct Equation {
     pub(crate) function: String,
     /// Name in tables and vector files.
     pub(crate) name: String,
-    /// Ids of the lecture and rows of docs/numerics.md.
+    /// Ids of the lecture, and rows of docs/numerics.md.
     pub(crate) ids: Vec<String>,
     /// The formula, in one line.
     pub(crate) formula: String,
     /// File under `shaders/lib/`, without `.glsl`.
     pub(crate) subject: String,
-    /// Line of its tag there, counted from 1.
+    /// Line of the tag in the file, counted from 1.
     pub(crate) line: usize,
     pub(crate) inputs: Vec<String>,
-    /// Those of the inputs that are whole numbers of 32 bits.
+    /// Inputs that are 32-bit integers.
     pub(crate) whole: Vec<String>,
     pub(crate) outputs: Vec<String>,
-    /// Host code that computes it for pictures: file, what.
+    /// Host code that computes the function for pictures: file, description.
     pub(crate) host: Option<(String, String)>,
-    /// The function that draws instead, and the test that holds them together.
+    /// The function that passes call instead, and the test of their equality.
     pub(crate) lab: Option<(String, String)>,
-    /// GLSL of its probe.
+    /// GLSL of the probe.
     pub(crate) probe: String,
 }
 
-/// A function of `shaders/lib/` as the contract check sees it.
+/// Facts about the source of a function of `shaders/lib/`, for the contract check.
 #[derive(Default)]
 pub(crate) struct Source {
-    /// Whether its body asks for `precise`.
+    /// Whether its body has `precise`.
     pub(crate) precise: bool,
-    /// Loops in its body.
+    /// Number of loops in its body.
     pub(crate) loops: usize,
-    /// `@iterations N` of its loops.
+    /// The bounds `@iterations N` of its loops.
     pub(crate) heads: Vec<u32>,
 }
 
-/// What the sources say.
+/// All functions of `shaders/lib/`.
 pub(crate) struct Library {
     pub(crate) equations: Vec<Equation>,
     /// By function name; overloads are joined.
@@ -114,7 +114,7 @@ struct Head {
     parameters: Vec<(String, String)>,
 }
 
-/// The head in `text` up to its `{`; `None` for what is no function.
+/// Parses the head in `text` up to its `{`; `None` if it is not a function.
 fn head(text: &str) -> Option<Head> {
     let (before, rest) = text.split_once('(')?;
     let (parameters, _) = rest.split_once(')')?;
@@ -135,7 +135,7 @@ fn is_head(line: &str) -> bool {
     line.starts_with(|c: char| c.is_ascii_alphabetic()) && line.contains('(') && !line.contains('=')
 }
 
-/// Lines between a tag and its function.
+/// Optional tags of a function.
 #[derive(Default)]
 struct Notes {
     renamed: Option<String>,
@@ -144,7 +144,7 @@ struct Notes {
     lab: Option<(String, String)>,
 }
 
-/// Functions start in the first column; their bodies end with `}` in the first column.
+/// Reads the tagged functions of a file. Functions start in the first column, and their bodies end with `}` in the first column.
 fn read(path: &Path, text: &str, structs: &Structs, library: &mut Library) -> Result<()> {
     let lines: Vec<&str> = text.lines().collect();
     let mut tag: Option<(usize, Vec<String>, String)> = None;
@@ -291,7 +291,7 @@ fn components(ty: &str) -> Option<usize> {
     }
 }
 
-/// The expression that fetches one parameter; its columns are appended to `inputs`.
+/// GLSL expression that fetches one parameter; its columns are appended to `inputs`.
 fn argument(ty: &str, name: &str, structs: &Structs, inputs: &mut Vec<String>) -> Result<String> {
     let mut word = |column: String| {
         inputs.push(column);

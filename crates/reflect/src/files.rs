@@ -1,12 +1,12 @@
-//! Files of shaders, and names made of theirs.
+//! Shader files, and names derived from file names.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// An error is a sentence, with file and line where it has them.
+/// Errors are one sentence, with file and line if known.
 pub(crate) type Result<T, E = String> = std::result::Result<T, E>;
 
-/// The files of a folder, in order; none where there is no such folder: passes need no library.
+/// Files of a folder in order; empty if the folder does not exist, because passes do not need a library.
 pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     if !folder.exists() {
         return Ok(Vec::new());
@@ -21,7 +21,7 @@ pub(crate) fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// `SurfaceTiles` as `surface_tiles`.
+/// Snake case: `SurfaceTiles` becomes `surface_tiles`.
 pub(crate) fn snake(name: &str) -> String {
     let mut out = String::new();
     for (i, c) in name.chars().enumerate() {

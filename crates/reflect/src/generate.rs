@@ -1,5 +1,5 @@
-//! Rust out of what shaders declare: one module per file of `shaders/lib/` with what it owns, one per program with what it is made
-//! of, and the structs of `shaders/share/`.
+//! Rust code generation from shader declarations: a module per file of `shaders/lib/` with its declarations, a module per program
+//! with its bindings, and the structs of `shaders/share/`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -13,21 +13,21 @@ use super::interface::{File, Interface, SETS, Shared};
 use super::reflect::{Binding, Declared, Names, Struct, all_constants, declared, local_size, stage_flag, structs};
 use rspirv::spirv::Op;
 
-/// A program as Rust sees it.
+/// A program with its declarations.
 pub(crate) struct Reflected<'p> {
     program: &'p Program,
     all: Declared,
 }
 
-/// What all programs declare together.
+/// All programs with their joint declarations.
 pub(crate) struct Programs<'p> {
     interface: &'p Interface,
     programs: BTreeMap<&'p str, Reflected<'p>>,
-    /// Kind of each binding, by file and name; of shared sets under the names of those.
+    /// Kind of each binding, by file and name; for shared sets, by set.
     kinds: BTreeMap<(String, String), &'static str>,
     /// Type and default of each constant.
     constants: BTreeMap<String, (&'static str, String)>,
-    /// The bindings of each shared set, with all that read them.
+    /// Bindings of each shared set, joined over all programs that read them.
     shared: BTreeMap<&'static str, BTreeMap<u32, Binding>>,
 }
 
@@ -67,7 +67,7 @@ impl<'p> Programs<'p> {
         Ok(all)
     }
 
-    /// What a program asks of a device, held against what Etalon asks of devices (crates/vulkan/src/limits.rs) when Rust compiles it.
+    /// Compile-time check that a program stays within the device limits that Etalon requires (crates/vulkan/src/limits.rs).
     fn within_limits(&self, name: &str, declared: &Declared) -> Result<String> {
         let own = declared.bindings.values().filter(|b| b.set == 0);
         let held = |count: usize, what: &str, limit: &str| {
@@ -79,7 +79,7 @@ impl<'p> Programs<'p> {
             0 => String::new(),
             count => held(count, "push descriptors", "PUSH_DESCRIPTORS"),
         };
-        // A set counts as a whole, whatever the program reads of it.
+        // A set counts with all its bindings, including those that the program does not read.
         let sets = shared_sets(self.interface, declared)?;
         let shared: Vec<&Binding> = sets.iter().flat_map(|set| self.shared[set].values()).collect();
         for stage in ["VERTEX", "FRAGMENT", "COMPUTE"] {
@@ -133,7 +133,7 @@ impl<'p> Programs<'p> {
         Ok(code)
     }
 
-    /// The module of one library file.
+    /// The module of a library file.
     fn group(&self, code: &mut String, file: &File, groups: &mut Vec<(String, String)>) -> Result<()> {
         let mut body = file.shared.iter().map(shared_constant).collect::<String>();
         let mut has_constants = false;
@@ -161,7 +161,7 @@ impl<'p> Programs<'p> {
             );
             groups.push((file.stem.clone(), file.about.clone()));
         }
-        // Pages go by the names of their textures: `PAGES` has all of them.
+        // Pages have the names of their textures; `PAGES` lists them.
         for (set, name) in [("pass", "Bind"), ("scene", "Scene"), ("paths", "Paths")] {
             let mut names: Vec<&str> = Vec::new();
             for d in file.declarations.iter().filter(|d| d.kind == set && !d.name.contains("_as_")) {
@@ -210,7 +210,7 @@ impl<'p> Programs<'p> {
         if !compute && !raster {
             return Err(format!("shaders/pass/{name}: a program is one .comp, or a .vert with a .frag"));
         }
-        // Files of the program itself are called by their paths, those of the library by their stems.
+        // Files of the program itself are named by their paths, library files by their stems.
         let is_own = |owner: &str| owner.contains('/');
         let (mut groups, mut fields, mut resources) = (BTreeSet::new(), String::new(), String::new());
         for Binding { name, kind, access, .. } in all.bindings.values().filter(|b| b.set == 0) {
@@ -321,7 +321,7 @@ fn bits(ty: &str, value: &str) -> String {
     }
 }
 
-/// A comment as documentation.
+/// Converts a comment to a doc sentence.
 fn sentence(text: &str) -> String {
     let mut chars = text.chars();
     let first = chars.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
@@ -334,7 +334,7 @@ fn shared_constant(Shared { name, ty, value, about }: &Shared) -> String {
     format!("    /// {about}\n    pub const {name}: {ty} = {value};\n")
 }
 
-/// A struct with asserts on where its members lie.
+/// A struct with compile-time checks of its member offsets.
 fn rust_struct(Struct { name, members, size }: &Struct, about: &BTreeMap<String, String>) -> String {
     let mut text = about.get("").map(|text| format!("    /// {text}\n")).unwrap_or_default();
     text += &format!(
@@ -363,7 +363,7 @@ fn binding_literal(Binding { name, slot, kind, access, stages, .. }: &Binding) -
     )
 }
 
-/// The shared sets of a program, in the order of their numbers, from the first one on.
+/// The shared sets of a program, in the order of their numbers, without gaps.
 fn shared_sets(interface: &Interface, all: &Declared) -> Result<Vec<&'static str>> {
     let last = all.bindings.values().map(|b| b.set).max().unwrap_or(0);
     let mut sets = Vec::new();
@@ -372,7 +372,7 @@ fn shared_sets(interface: &Interface, all: &Declared) -> Result<Vec<&'static str
         let read: BTreeSet<_> = of_number.map(|b| interface.set_of(&b.name)).collect();
         match read.into_iter().collect::<Vec<_>>()[..] {
             [set] => sets.push(set),
-            // One that lies before another is bound, whatever is read of it.
+            // A set before another one is bound, whether or not the program reads it.
             [] if number == 1 => sets.push(SETS[1].0),
             ref read => return Err(format!("a program reads the sets {read:?}, of which there is one at a time")),
         }
@@ -430,10 +430,9 @@ pub(crate) fn literal(interface: &Interface, name: &str, program: &Program, all:
     ))
 }
 
-/// The table of equations, each with its probe. All probes bind the same two buffers: `src/shader.rs` has one struct.
-///
-/// Each function says how it reaches pictures: a pass calls it, or `@host`, or `@lab` a function that a pass calls. What
-/// neither a pass nor a probe reaches is an error, where the `whole` of the shaders is built.
+/// The table of equations, each with its probe. All probes bind the same two buffers, so `src/shader.rs` has one struct.
+///  Each function states how pictures use it: a pass calls it, or it has `@host`, or `@lab` with a function that a pass calls.
+/// When all shaders are built (`whole`), a function that neither a pass nor a probe reaches is an error.
 pub(crate) fn probes(recipe: &Recipe, programs: &BTreeMap<String, Program>, whole: bool) -> Result<String> {
     let library = equations::library(&recipe.root.join("lib"))?;
     let work = library.equations.iter().map(|equation| (equation.name.clone(), equation));
@@ -501,7 +500,7 @@ pub(crate) fn probes(recipe: &Recipe, programs: &BTreeMap<String, Program>, whol
     Ok(format!("/// Every tagged equation, by file and place.\npub static PROBES: &[Probe] = &[\n{table}];\n"))
 }
 
-/// `shaders/share/` in Rust: its structs as memory has them, and its constants.
+/// `shaders/share/` in Rust: structs with their memory layout, and constants.
 pub(crate) fn share(recipe: &Recipe, programs: &BTreeMap<String, Program>) -> Result<String> {
     let mut found: BTreeMap<String, Struct> = BTreeMap::new();
     for stage in programs.values().flat_map(|program| &program.stages) {
@@ -510,9 +509,9 @@ pub(crate) fn share(recipe: &Recipe, programs: &BTreeMap<String, Program>) -> Re
             if line.operands.is_empty() {
                 continue;
             }
-            // A struct that Rust has no type for is not one of `share/`.
+            // A struct without a Rust type does not belong to `share/`.
             for one in structs(&names, id).unwrap_or_default() {
-                // Of two, the one that lies in a buffer and the one in registers, either will do: layouts are scalar.
+                // The buffer and register versions of a struct are interchangeable: layouts are scalar.
                 found.insert(one.name.clone(), one);
             }
         }

@@ -1,4 +1,4 @@
-//! What shaders declare without a number, and the numbers they get.
+//! Shader interface: declarations without numbers, and the ids, sets and slots that they are assigned.
 //!
 //! ```text
 //! layout(constant) const uint BRDF = 2;                                  specialization constant
@@ -6,23 +6,23 @@
 //! layout(scene, rgba32f) readonly uniform imageBuffer lights;            set 1: written once per renderer
 //! layout(pages) uniform sampler2DArray base_page;                        set 2: written once per combination of textures
 //! layout(paths, rgba32ui) readonly uniform uimageBuffer emitters;        set 2 of paths: written once per renderer
-//! const uint SHAPE_SPHERE = 1;                                           the host's, too
+//! const uint SHAPE_SPHERE = 1;                                           shared with the host
 //! ```
 //!
-//! A struct of `shaders/share/` that lies in a buffer view, texel by texel, is read by a function that the build writes:
+//! A struct of `shaders/share/` in a texel buffer view is read by a function that the build generates:
 //!
 //! ```text
 //! // @texels Material material_at(material_words)        material_words(uint index, int texel) fetches a uvec4
-//! // @texels BvhTriangle triangle_at(bvh_triangles)      of a binding with nothing but such structs
+//! // @texels BvhTriangle triangle_at(bvh_triangles)      of a binding that holds only such structs
 //! // @texels Material.sigma material_sigma(...)          one member alone
 //! ```
 //!
-//! A page is a texture of a material, and its slot there: SLOT_BASE is the number of `base_page`. `// @pages SLOTS` counts them.
+//! A page is a texture of a material with its slot: SLOT_BASE is the number of `base_page`. `// @pages SLOTS` counts the pages.
 //!
-//! A member whose comment begins with `where CONSTANT` is left out where that constant is false; such a struct is read member by
+//! A member whose comment begins with `where CONSTANT` is omitted when that constant is false; such a struct is read member by
 //! member.
 //!
-//! A declaration stands on one line. Constants, and bindings of all sets but a pass's own, have one number in all programs, and one
+//! A declaration is one line. Constants, and bindings of all sets but a pass's own, have one number in all programs, and one
 //! file that declares them. Bindings of a pass are numbered from 0 in each program.
 
 use std::collections::BTreeMap;
@@ -32,45 +32,45 @@ use std::path::{Path, PathBuf};
 use super::files::{Result, files, snake, stem};
 use super::reflect::{Member, Struct};
 
-/// The kinds of descriptor sets, and their numbers. A program reads `pages` or `paths`, never both.
+/// Kinds of descriptor sets with their set numbers. A program reads `pages` or `paths`, never both.
 pub(crate) const SETS: [(&str, u32); 4] = [("pass", 0), ("scene", 1), ("pages", 2), ("paths", 2)];
 
-/// The tag of the line that becomes the number of pages.
+/// Tag of the line that is replaced by the number of pages.
 const PAGE_COUNT: &str = "// @pages ";
 
-/// A constant that the host shares: `const uint NAME = 3;`, and in `shaders/share/` `const float NAME = 1.5;`.
+/// A constant shared with the host: `const uint NAME = 3;`, and in `shaders/share/` `const float NAME = 1.5;`.
 pub(crate) struct Shared {
     pub(crate) name: String,
-    /// As Rust names it.
+    /// Rust type.
     pub(crate) ty: &'static str,
     pub(crate) value: String,
-    /// The comment behind it.
+    /// The comment after the declaration.
     pub(crate) about: String,
 }
 
-/// One line that declares something.
+/// A declaration.
 pub(crate) struct Declaration {
     /// `constant`, or one of [`SETS`].
     pub(crate) kind: String,
     pub(crate) name: String,
-    /// The comment behind it.
+    /// The comment after the declaration.
     pub(crate) about: String,
 }
 
-/// What one file declares.
+/// Declarations of one file.
 pub(crate) struct File {
     pub(crate) stem: String,
     /// Folder under `shaders/`.
     pub(crate) folder: &'static str,
-    /// Its first line, without the slashes.
+    /// The first line of the file, without slashes.
     pub(crate) about: String,
     pub(crate) declarations: Vec<Declaration>,
     pub(crate) shared: Vec<Shared>,
-    /// The constant that counts the pages, where it is this file's.
+    /// The constant that counts the pages, if this file declares it.
     page_count: Option<String>,
 }
 
-/// What all files declare, with the numbers that hold in every program.
+/// Declarations of all files, with the numbers that are common to all programs.
 pub(crate) struct Interface {
     root: PathBuf,
     pub(crate) files: Vec<File>,
@@ -80,15 +80,15 @@ pub(crate) struct Interface {
     structs: BTreeMap<String, Vec<Field>>,
 }
 
-/// A member of a struct, as its line declares it.
+/// A member declaration of a struct.
 struct Field {
     ty: String,
     name: String,
-    /// The constant without which it is left out.
+    /// Constant; the member is omitted when it is false.
     condition: Option<String>,
 }
 
-/// The bindings of one program's own set, and the file of each.
+/// Slot and file of each binding in a program's own set.
 pub(crate) type PassSlots = BTreeMap<String, (u32, String)>;
 
 impl Interface {
@@ -132,7 +132,7 @@ impl Interface {
         for (number, id) in all.constants.values_mut().enumerate() {
             *id = number as u32;
         }
-        // Sets of one number share its slots: a file that a program includes may declare what the program never reads.
+        // Sets of one number share slots: a program may include a file whose declarations it never reads.
         let mut next: BTreeMap<u32, u32> = BTreeMap::new();
         for (set, number) in &SETS[1..] {
             let of_set = |name: &String| owners.contains_key(&format!("{set} {name}"));
@@ -162,13 +162,13 @@ impl Interface {
         Ok(all)
     }
 
-    /// The file that declares a constant or a binding that all programs share.
+    /// The file that declares a constant or a shared binding.
     pub(crate) fn owner(&self, kind: &str, name: &str) -> Option<&File> {
         let declares = |file: &&File| file.declarations.iter().any(|d| d.kind == kind && base(&d.name) == name);
         self.files.iter().find(declares)
     }
 
-    /// The kind of set that a binding belongs to which all programs share.
+    /// The kind of set of a shared binding.
     pub(crate) fn set_of(&self, name: &str) -> &'static str {
         SETS[1..].iter().find(|(set, _)| self.owner(set, name).is_some()).map_or("", |(set, _)| set)
     }
@@ -178,12 +178,12 @@ impl Interface {
         self.constants[name]
     }
 
-    /// The slot of a binding that all programs share.
+    /// The slot of a shared binding.
     pub(crate) fn slot(&self, name: &str) -> u32 {
         self.slots[name]
     }
 
-    /// Numbers the bindings of a program's own set, by the order in which its texts and what they include declare them.
+    /// Numbers the bindings of a program's own set, in the order of declaration in its sources and their includes.
     pub(crate) fn pass_slots(&self, texts: &[(String, String)]) -> Result<PassSlots> {
         let mut slots = PassSlots::new();
         let mut seen = Vec::new();
@@ -216,7 +216,8 @@ impl Interface {
         Ok(())
     }
 
-    /// A text with its numbers. Constants in `without` are ordinary ones, false or 0: the compiler leaves out what they guard.
+    /// Inserts the numbers into a source text. Constants in `without` become ordinary constants, false or 0, so that the
+    /// compiler removes the code they guard.
     pub(crate) fn numbered(&self, text: &str, slots: &PassSlots, without: &[String]) -> Result<String> {
         let mut out = String::with_capacity(text.len() + 1024);
         for line in text.lines() {
@@ -262,8 +263,8 @@ impl Interface {
 }
 
 impl Interface {
-    /// The function that reads a struct or a member out of texels of four words: `Material material_at(material_words)`. On one line,
-    /// so that the compiler's messages keep their places.
+    /// Generates the function of a tag `Material material_at(material_words)`, which reads a struct or a member from texels of
+    /// four words. It is one line, so that line numbers in compiler messages stay correct.
     fn reader(&self, tag: &str) -> Result<String> {
         let wrong = || format!("// @texels {tag}: expected `STRUCT FUNCTION(FETCH)`, of a struct of shaders/share/");
         let (what, rest) = tag.split_once(' ').ok_or_else(wrong)?;
@@ -297,7 +298,7 @@ impl Interface {
         Ok(format!("{ty} {name}(uint index) {{ {texels}return {value}; }}"))
     }
 
-    /// Words of the members that are always there, and what others add in texels: ` + (CONSTANT ? 2 : 0)`.
+    /// Words of the unconditional members, and a GLSL expression for texels of conditional ones: ` + (CONSTANT ? 2 : 0)`.
     fn size(&self, fields: &[Field]) -> Result<(usize, String)> {
         let (mut words, mut optional) = (0, String::new());
         for Field { ty, name, condition } in fields {
@@ -314,7 +315,7 @@ impl Interface {
         Ok((words, optional))
     }
 
-    /// What begins with the word `word` of the texels t0, t1 ...: `uintBitsToFloat(t0.xyz)`.
+    /// GLSL expression for the value that begins at the word `word` of the texels t0, t1 ...: `uintBitsToFloat(t0.xyz)`.
     fn value(&self, ty: &str, word: &mut usize) -> Result<String> {
         if let Some(fields) = self.structs.get(ty) {
             let members = fields.iter().map(|field| self.value(&field.ty, word)).collect::<Result<Vec<_>>>()?;
@@ -324,7 +325,7 @@ impl Interface {
         let words: Vec<usize> = (*word..*word + count).collect();
         *word += count;
         let letter = |w: &usize| ["x", "y", "z", "w"][w % 4];
-        // One swizzle where it lies in one texel.
+        // One swizzle if all words are in one texel.
         let bits = match words[0] / 4 == words[count - 1] / 4 {
             true => format!("t{}.{}", words[0] / 4, words.iter().map(letter).collect::<String>()),
             false => {
@@ -339,7 +340,7 @@ impl Interface {
         })
     }
 
-    /// A struct of which shaders read some members and never all, as it is with all of them.
+    /// A struct that has conditional members, with all of them present: shaders never read it whole.
     pub(crate) fn with_all_members(&self, name: &str) -> Result<Option<Struct>> {
         let Some(fields) = self.structs.get(name) else { return Ok(None) };
         if fields.iter().all(|field| field.condition.is_none()) {
@@ -359,7 +360,7 @@ impl Interface {
     }
 }
 
-/// What a scalar or a vector is made of, as Rust names it, and how many.
+/// Component type in Rust, and number of components, of a scalar or a vector.
 fn scalars(ty: &str) -> Option<(&'static str, usize)> {
     let count = |digits: &str| digits.parse().ok().filter(|n| (2..=4).contains(n));
     match ty {
@@ -372,7 +373,7 @@ fn scalars(ty: &str) -> Option<(&'static str, usize)> {
     }
 }
 
-/// Structs of a file: each member on a line of its own.
+/// Structs of a file; each member is on its own line.
 fn structs(text: &str) -> BTreeMap<String, Vec<Field>> {
     let mut all = BTreeMap::new();
     let mut open: Option<(String, Vec<Field>)> = None;
@@ -398,7 +399,7 @@ fn page_slot(name: &str) -> String {
     format!("SLOT_{}", name.trim_end_matches("_page").to_uppercase())
 }
 
-/// NAME_as_FORMAT is the binding NAME, read in another format.
+/// The binding NAME of `NAME_as_FORMAT`, which reads it in another format.
 fn base(name: &str) -> &str {
     name.split_once("_as_").map_or(name, |(of, _)| of)
 }
@@ -416,7 +417,7 @@ fn file(path: &Path, folder: &'static str, text: &str) -> Result<File> {
             ));
         }
         file.declarations.extend(declaration(line));
-        // Whole numbers of `lib/` are the host's, too; other numbers only where `share/` says so.
+        // Integer constants of `lib/` are shared with the host, other constants only in `share/`.
         file.shared.extend(shared(line).filter(|constant| constant.ty != "f32" || folder == "share"));
     }
     Ok(file)
@@ -439,7 +440,7 @@ fn declaration(line: &str) -> Option<Declaration> {
     let name = if kind == "constant" {
         word(code.split_once(" = ")?.0)?
     } else if let Some((block, instance)) = code.split_once('{').zip(code.rsplit_once('}')).map(|(a, b)| (a.0, b.1)) {
-        // A block without an instance name is known by its own.
+        // A block without an instance name has the name of its type.
         word(instance).or_else(|| Some(snake(&word(block)?)))?
     } else {
         word(code.split(';').next()?)?
@@ -447,7 +448,7 @@ fn declaration(line: &str) -> Option<Declaration> {
     Some(Declaration { kind: kind.to_owned(), name, about })
 }
 
-/// A constant that is one number.
+/// Parses a constant of one number.
 fn shared(line: &str) -> Option<Shared> {
     let (code, about) = comment(line);
     let (head, value) = code.strip_prefix("const ")?.split_once(" = ")?;

@@ -1,14 +1,15 @@
-//! GLSL under a folder `shaders/` becomes SPIR-V 1.6 and plain Rust that describes it, at build time.
+//! Build-time shader compilation and SPIR-V reflection: GLSL in a folder `shaders/` becomes SPIR-V 1.6 and Rust code that
+//! describes it.
 //!
-//! 1. `shaders/pass/NAME.comp`, or `NAME.vert` with `NAME.frag`, is one program. Each stage is compiled twice by glslang
-//!    (crate shaderc): without optimisation for reflection, which needs the names, and with it for shipping.
+//! 1. `shaders/pass/NAME.comp`, or `NAME.vert` with `NAME.frag`, is one program. glslang (crate shaderc) compiles each stage
+//!    twice: without optimisation for reflection, which needs the names, and with optimisation for shipping.
 //! 2. rspirv reads the bindings, their access (`readonly`/`writeonly` survive as NonWritable/NonReadable), push
 //!    constants, specialization constants, vertex inputs and local size.
-//! 3. Every function of `shaders/lib/` tagged `@eq` gets a probe, a program that evaluates it (`src/equations.rs`), and
-//!    its SPIR-V is held to a contract (`src/contract.rs`).
-//! 4. `shaders.rs` gets a module per library file and per program: bindings as named fields, so that a forgotten one does not
-//!    compile, specialization and push constants as structs (`src/generate.rs`). `share.rs` gets the structs of
-//!    `shaders/share/`. Who declares what and gets which number: `src/interface.rs`.
+//! 3. Every function of `shaders/lib/` tagged `@eq` gets a probe, a program that evaluates it (`src/equations.rs`), and its
+//! SPIR-V is checked (`src/contract.rs`). 4. `shaders.rs` gets a module per library file and per program, with specialization
+//! and push constants as structs (`src/generate.rs`). Bindings are named fields, so that a missing binding is a compile error.
+//! `share.rs` gets the structs of
+//!    `shaders/share/`. `src/interface.rs` assigns the numbers.
 //!
 //! Errors are printed as `file:line: message` by the compiler itself.
 
@@ -28,11 +29,11 @@ use std::path::{Path, PathBuf};
 use compile::Recipe;
 use files::{Result, files, stem};
 
-/// Compiles and describes what is under `shaders`: writes `shaders.rs` and `share.rs` into `out_dir`. Code behind the specialization
-/// constants `without` is not built at all.
+/// Compiles and reflects the shaders under `shaders`, and writes `shaders.rs` and `share.rs` into `out_dir`. Code guarded by the
+/// specialization constants `without` is removed.
 ///
 /// # Errors
-/// What the compiler says, as `file:line: message`, or what keeps a shader from being described.
+/// Compiler messages as `file:line: message`, or the fault of a declaration.
 pub fn build(shaders: &Path, out_dir: &Path, without: &[String]) -> Result<(), String> {
     let recipe = Recipe::new(shaders, without.to_vec())?;
     if let Some(name) = without.iter().find(|name| recipe.interface.owner("constant", name).is_none()) {
@@ -64,29 +65,29 @@ pub fn build(shaders: &Path, out_dir: &Path, without: &[String]) -> Result<(), S
     write("share.rs", generate::share(&recipe, &programs)?)
 }
 
-/// A binding of a program: its set, name and slot, and its kind and access by the names of the generated Rust.
+/// A binding of a program: set, name, slot, and kind and access in the names of the generated Rust.
 pub type Binding = (u32, String, u32, &'static str, &'static str);
 
-/// A program, compiled for itself.
+/// A program compiled separately.
 pub struct Compiled {
     /// SPIR-V of each stage.
     pub stages: Vec<Vec<u32>>,
-    /// All of them, by set and slot.
+    /// Bindings by set and slot.
     pub bindings: Vec<Binding>,
     /// Specialization constants by id.
     pub constants: Vec<(u32, String)>,
     /// Vertex inputs: location, components.
     pub inputs: Vec<(u32, u32)>,
-    /// Of push constants.
+    /// Size of the push constants in bytes.
     pub push_bytes: u32,
-    /// Invocations of a workgroup.
+    /// Size of a workgroup in invocations.
     pub local_size: [u32; 3],
 }
 
 /// Compiles the program `name` under `shaders`.
 ///
 /// # Errors
-/// As [`build`].
+/// The errors of [`build`].
 pub fn program(shaders: &Path, name: &str) -> Result<Compiled, String> {
     let stages = Recipe::new(shaders, Vec::new())?.program(&sources(shaders, name)?)?.stages;
     let all = reflect::declared(&stages)?;
@@ -101,17 +102,17 @@ pub fn program(shaders: &Path, name: &str) -> Result<Compiled, String> {
     })
 }
 
-/// The files that the program `name` is made of: its stages and all that they include.
+/// Source files of the program `name`: its stages and all their includes.
 ///
 /// # Errors
-/// When the folder cannot be read.
+/// The folder cannot be read.
 pub fn parts(shaders: &Path, name: &str) -> Result<BTreeSet<PathBuf>, String> {
     let mut parts = BTreeSet::new();
     sources(shaders, name)?.into_iter().for_each(|path| include(shaders, path, &mut parts));
     Ok(parts)
 }
 
-/// The files of a program, in the order of its stages.
+/// Stage files of a program, in the order of the stages.
 fn sources(shaders: &Path, name: &str) -> Result<Vec<PathBuf>> {
     let all = files(&shaders.join("pass"))?;
     Ok(all.into_iter().filter(|path| stem(path) == name).collect())

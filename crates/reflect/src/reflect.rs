@@ -1,7 +1,7 @@
-//! What compiled shaders declare, by rspirv: bindings with their access (`readonly`/`writeonly` survive as NonWritable/NonReadable),
+//! SPIR-V reflection by rspirv: bindings with their access (`readonly`/`writeonly` survive as NonWritable/NonReadable),
 //! specialization constants, vertex inputs, push constants, structs and local size.
-//!
-//! Names and types are those of the module without optimisations; a binding or a constant that nothing in what ships reads is none.
+//!  Read the SPIR-V specification, chapter 3, for decorations. Names and types come from the unoptimised module; bindings and
+//! constants that the shipped module does not read are omitted.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -10,7 +10,7 @@ use rspirv::spirv::{Decoration, Dim, ExecutionMode, Op, StorageClass};
 
 use super::files::{Result, snake};
 
-/// One compiled shader: what it declares, and the words that ship.
+/// A compiled shader stage: its declarations, and the words that ship.
 pub(crate) struct Stage {
     pub(crate) kind: shaderc::ShaderKind,
     pub(crate) module: Module,
@@ -28,7 +28,7 @@ pub(crate) struct Binding {
     pub(crate) stages: BTreeSet<&'static str>,
 }
 
-/// Decorations and names of a module by id, so that a lookup is one map access.
+/// Decorations and names of a module by id, for constant-time look-up.
 pub(crate) struct Names<'m> {
     pub(crate) module: &'m Module,
     pub(crate) names: HashMap<u32, &'m str>,
@@ -99,7 +99,7 @@ impl<'m> Names<'m> {
         self.decorations.get(&(id, decoration)).map(|values| values.first().copied().unwrap_or(0))
     }
 
-    /// Whether every member of a block carries the decoration: how glslang writes `readonly buffer`.
+    /// Whether every member of a block has the decoration, which is how glslang writes `readonly buffer`.
     pub(crate) fn all_members(&self, block: u32, decoration: Decoration) -> bool {
         let count = self.types[&block].operands.len() as u32;
         (0..count).all(|i| self.member_decorations.contains_key(&(block, i, decoration)))
@@ -134,7 +134,7 @@ impl<'m> Names<'m> {
         })
     }
 
-    /// Where a member lies: as the module says, or, of what lies in no buffer, under the scalar layout.
+    /// Offset of a member: that of the module, or under the scalar layout if the struct is not in a buffer.
     pub(crate) fn offset(&self, block: u32, member: u32) -> Result<u32> {
         let told = self.member_decorations.get(&(block, member, Decoration::Offset));
         match told.and_then(|values| values.first().copied()) {
@@ -191,7 +191,7 @@ pub(crate) fn bindings(stage: &Stage, names: &Names) -> Result<Vec<Binding>> {
             _ => return Err(format!("{}: {name}: unknown kind of binding", stage.path)),
         };
         if name.is_empty() {
-            // A block without an instance name is known by its own.
+            // A block without an instance name has the name of its type.
             name = snake(names.name(pointee));
         }
         // NAME_as_FORMAT is the binding NAME, read in another format.
@@ -203,7 +203,7 @@ pub(crate) fn bindings(stage: &Stage, names: &Names) -> Result<Vec<Binding>> {
     Ok(found)
 }
 
-/// What is left of the declarations in what ships.
+/// Declarations that the shipped module uses.
 struct Live {
     /// Set and slot of each variable.
     bindings: BTreeSet<(u32, u32)>,
@@ -211,7 +211,7 @@ struct Live {
 }
 
 impl Live {
-    /// Read by hand: rspirv 0.13 cannot load SPIR-V 1.6.
+    /// Parsed by hand: rspirv 0.13 cannot load SPIR-V 1.6.
     fn of(words: &[u32]) -> Self {
         let (mut sets, mut slots) = (HashMap::new(), HashMap::new());
         let mut live = Self { bindings: BTreeSet::new(), constants: BTreeSet::new() };
@@ -242,7 +242,7 @@ pub(crate) fn stage_flag(kind: shaderc::ShaderKind) -> &'static str {
     }
 }
 
-/// Specialization constants of what ships: id → (name, Rust type, default as a Rust literal).
+/// Specialization constants of the shipped module: id → (name, Rust type, default as a Rust literal).
 pub(crate) fn constants(stage: &Stage, names: &Names) -> Result<BTreeMap<u32, (String, &'static str, String)>> {
     let live = Live::of(&stage.words);
     let mut found = spec_constants(names)?;
@@ -250,7 +250,7 @@ pub(crate) fn constants(stage: &Stage, names: &Names) -> Result<BTreeMap<u32, (S
     Ok(found)
 }
 
-/// All that a module declares: name → (Rust type, default).
+/// All specialization constants of the unoptimised module: name → (Rust type, default).
 pub(crate) fn all_constants(names: &Names) -> Result<BTreeMap<String, (&'static str, String)>> {
     Ok(spec_constants(names)?.into_values().map(|(name, ty, default)| (name, (ty, default))).collect())
 }
@@ -303,14 +303,14 @@ pub(crate) fn vertex_inputs(stage: &Stage, names: &Names) -> Result<BTreeMap<u32
     Ok(found)
 }
 
-/// The block of push constants: its type.
+/// Type of the push-constant block.
 pub(crate) fn push_block(names: &Names) -> Option<u32> {
     let mut variables = names.module.types_global_values.iter().filter(|line| line.class.opcode == Op::Variable);
     let block = variables.find(|line| matches!(line.operands[0], Operand::StorageClass(StorageClass::PushConstant)))?;
     Some(word(&names.types[&block.result_type?].operands[1]))
 }
 
-/// A member of a struct, as Rust has it.
+/// A struct member in Rust.
 #[derive(Clone, PartialEq)]
 pub(crate) struct Member {
     pub(crate) name: String,
@@ -318,7 +318,7 @@ pub(crate) struct Member {
     pub(crate) offset: u32,
 }
 
-/// A struct that lies in memory.
+/// A struct with a memory layout.
 #[derive(Clone, PartialEq)]
 pub(crate) struct Struct {
     pub(crate) name: String,
@@ -326,7 +326,7 @@ pub(crate) struct Struct {
     pub(crate) size: u32,
 }
 
-/// A struct with those it is made of, the innermost first.
+/// A struct with its nested structs, the innermost first.
 pub(crate) fn structs(names: &Names, id: u32) -> Result<Vec<Struct>> {
     let mut all = Vec::new();
     let mut members = Vec::new();
@@ -366,13 +366,13 @@ pub(crate) fn local_size(module: &Module) -> [u32; 3] {
         .unwrap_or([1; 3])
 }
 
-/// What the stages of one program declare together.
+/// Joint declarations of the stages of one program.
 pub(crate) struct Declared {
-    /// By set and slot.
+    /// Bindings by set and slot.
     pub(crate) bindings: BTreeMap<(u32, u32), Binding>,
     pub(crate) constants: BTreeMap<u32, (String, &'static str, String)>,
     pub(crate) inputs: BTreeMap<u32, (String, u32)>,
-    /// Push constants, with the structs they are made of; the last one is the block.
+    /// Push constants: nested structs first, the block last.
     pub(crate) push: Vec<Struct>,
 }
 

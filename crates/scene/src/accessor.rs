@@ -1,4 +1,4 @@
-//! Typed data out of glTF buffers, with every byte range checked before it is read.
+//! glTF accessors: typed data from buffers, with every byte range checked before reading (glTF 2.0 sections 3.6.2 and 3.11).
 
 use anyhow::{Context, Result, bail, ensure};
 use gltf::json::{
@@ -8,19 +8,19 @@ use gltf::json::{
 
 use super::container::Document;
 
-/// Most bytes that an accessor without a buffer view may stand for: its zeros cost the file nothing, so nothing else
-/// bounds them.
+/// Largest size in bytes of an accessor without a buffer view: its zeros take no space in the file, so the file size does not
+/// bound them.
 const MAX_IMPLIED_BYTES: u64 = 256 << 20;
 
-/// An accessor whose byte ranges are known to be inside their buffers.
+/// An accessor whose byte ranges lie inside their buffers.
 pub(crate) struct Accessor<'a> {
     index: usize,
-    /// Elements.
+    /// Number of elements.
     pub(crate) count: usize,
     component: ComponentType,
     shape: Type,
     normalized: bool,
-    /// Bytes from the first element on, with the distance between elements; `None` means zeros.
+    /// Bytes from the first element on, and the distance between elements; `None` means zeros.
     base: Option<(&'a [u8], usize)>,
     sparse: Option<Sparse<'a>>,
 }
@@ -30,7 +30,7 @@ struct Sparse<'a> {
     values: &'a [u8],
 }
 
-/// Bytes of one element and of one of its columns: matrix columns start at multiples of four bytes.
+/// Size in bytes of one element and of one of its columns: matrix columns start at multiples of four bytes.
 fn element_size(shape: Type, component: ComponentType) -> usize {
     let size = component.size();
     match shape {
@@ -40,7 +40,7 @@ fn element_size(shape: Type, component: ComponentType) -> usize {
     }
 }
 
-/// `count` elements of `size` bytes every `stride` bytes from `offset` on, or what is wrong with that.
+/// The byte range of `count` elements of `size` bytes, every `stride` bytes from `offset` on. The error names the fault.
 fn window<'a>(
     what: &str,
     view: usize,
@@ -66,7 +66,7 @@ fn window<'a>(
 }
 
 impl<'a> Accessor<'a> {
-    /// Looks accessor `index` up and checks all its ranges.
+    /// Looks up accessor `index` and checks all its ranges.
     pub(crate) fn new(document: &'a Document<'_>, index: usize) -> Result<Self> {
         let json = document.root.accessors.get(index).with_context(|| {
             format!("accessor {index} does not exist; the file has {}", document.root.accessors.len())
@@ -125,7 +125,7 @@ impl<'a> Accessor<'a> {
         Ok(Self { index, count, component, shape, normalized: json.normalized, base, sparse })
     }
 
-    /// Elements as `N` floats: normalised integers become fractions, others keep their value.
+    /// Elements as `N` floats: normalised integers become fractions, other integers keep their value.
     pub(crate) fn floats<const N: usize>(&self) -> Result<Vec<[f32; N]>> {
         let expected = match N {
             1 => Type::Scalar,
@@ -151,7 +151,7 @@ impl<'a> Accessor<'a> {
         })
     }
 
-    /// Vertex colours: three or four components, alpha 1 where there is none.
+    /// Vertex colours: three or four components; alpha is 1 with three.
     pub(crate) fn colors(&self) -> Result<Vec<[f32; 4]>> {
         match self.shape {
             Type::Vec3 => Ok(self.floats::<3>()?.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()),
@@ -171,7 +171,7 @@ impl<'a> Accessor<'a> {
         Ok(out.into_flattened())
     }
 
-    /// Joint numbers, four to an element.
+    /// Joint indices, four per element.
     pub(crate) fn joints(&self) -> Result<Vec<[u16; 4]>> {
         ensure!(self.shape == Type::Vec4, "accessor {} holds {:?} elements, not joints", self.index, self.shape);
         Ok(match self.component {
@@ -186,7 +186,7 @@ impl<'a> Accessor<'a> {
             && let (Some((bytes, stride)), None) = (self.base, &self.sparse)
             && stride == 4 * N
         {
-            // The common case is a plain copy.
+            // Fast path for tightly packed floats.
             let mut out = vec![[0.0; N]; self.count];
             bytemuck::cast_slice_mut::<f32, u8>(out.as_flattened_mut()).copy_from_slice(bytes);
             return out;

@@ -1,32 +1,33 @@
-//! Cameras: where the picture is taken from (README, "Conventions").
+//! Cameras: position, orientation and projection.
+//!
+//! Read glTF 2.0 section 3.10 and README, "Conventions". The camera looks along −Z.
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 use super::Bounds;
 
-/// A camera in the world. It looks along −Z of its frame; +X is right and +Y up in the picture.
+/// A camera in the world. It looks along −Z of its frame; +X is to the right and +Y is up in the picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
-    /// Name from the file, or what made it.
+    /// Name from the file, or of the generator.
     pub name: String,
-    /// Rigid placement: orthonormal axes and the eye as translation.
+    /// Rigid transform: orthonormal axes, and the eye as translation.
     pub world_from_camera: DAffine3,
-    /// How directions become pixels.
+    /// Perspective or orthographic projection.
     pub projection: Projection,
 }
 
 /// The two projections of glTF 2.0 section 3.10.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Projection {
-    /// Pinhole: vertical field of view in radians, in (0, π); `aspect` (width / height) is the file's wish and is
-    /// ignored where the output has its own; `near` in metres when the file names it.
+    /// Pinhole camera. glTF's `aspectRatio` is not stored: the output size gives the aspect ratio.
     Perspective {
-        /// Vertical field of view in radians.
+        /// Vertical field of view in radians, in (0, π).
         fov_y: f64,
-        /// Near distance in metres, where the file gives one.
+        /// Near distance in metres, if the file gives one.
         near: Option<f64>,
     },
-    /// Parallel rays: half the height of the picture in metres; `near` and `far` along the view direction.
+    /// Parallel rays, with near and far distances along the view direction.
     Orthographic {
         /// Half the picture's height in metres (glTF `ymag`).
         half_height: f64,
@@ -37,17 +38,17 @@ pub enum Projection {
     },
 }
 
-/// Vertical field of view where nothing says otherwise, in radians (40°).
+/// Default vertical field of view in radians (40°).
 pub const DEFAULT_FOV_Y: f64 = 0.698_131_700_797_731_8;
 
-/// Why a camera cannot be made.
+/// Errors of [`Camera::looking_at`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CameraError {
-    /// The target lies on the eye.
+    /// The target equals the eye.
     NoDirection,
-    /// The up direction is zero or along the view.
+    /// The up direction is zero or parallel to the view direction.
     NoUp,
-    /// Something is NaN or infinite.
+    /// An argument is NaN or infinite.
     NotFinite,
 }
 
@@ -67,7 +68,7 @@ impl Camera {
     /// A perspective camera at `eye` that looks at `target` with `up` upwards in the picture; `fov_y` in radians.
     ///
     /// # Errors
-    /// When these do not give a frame of reference.
+    /// The arguments are not finite, or do not define a frame.
     pub fn looking_at(eye: DVec3, target: DVec3, up: DVec3, fov_y: f64) -> Result<Self, CameraError> {
         if !(eye.is_finite() && target.is_finite() && up.is_finite() && fov_y.is_finite()) {
             return Err(CameraError::NotFinite);
@@ -75,7 +76,7 @@ impl Camera {
         let forward = (target - eye).try_normalize().ok_or(CameraError::NoDirection)?;
         let up = up.try_normalize().ok_or(CameraError::NoUp)?;
         let right = forward.cross(up);
-        // Within a ten-thousandth of a degree of parallel the picture's roll would be rounding noise.
+        // Closer than a ten-thousandth of a degree to parallel, the roll of the picture would be rounding noise.
         if right.length() < 1e-6 {
             return Err(CameraError::NoUp);
         }
@@ -88,7 +89,7 @@ impl Camera {
         })
     }
 
-    /// A camera that looks at a box from the front, a little from the right and from above, and just fits it.
+    /// A camera in front of a box, somewhat to the right and above, with the box just inside the picture.
     #[must_use]
     pub fn framing(bounds: Bounds, aspect: f64, fov_y: f64) -> Self {
         const MARGIN: f64 = 1.06;
@@ -107,7 +108,7 @@ impl Camera {
                 .max(offset.dot(right).abs() / tangent.x + toward)
                 .max(offset.dot(up).abs() / tangent.y + toward);
         }
-        // A single point still needs some distance.
+        // A box of one point has size 0.
         let distance = if distance > 0.0 { distance } else { 1.0 };
         let frame = DMat3::from_cols(right, up, backward);
         Self {

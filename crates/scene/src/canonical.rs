@@ -1,21 +1,24 @@
-//! The same scene said more simply: what texels and vertices make of the factors of its materials. Nothing that is seen
-//! changes, but that what covers wholly is opaque in every respect: it casts shadows in maps, and bends what it transmits.
+//! Canonical form of a scene: constant folding of material factors with the texels and vertex colours that multiply them.
+//!
+//! Black textures set their factor to 0, and alpha of 1 everywhere makes a material opaque. The picture stays the same, with one
+//! exception: a material that becomes opaque casts shadows in shadow maps and refracts the light that it transmits.
+//! Read glTF 2.0 section 3.9.4 (alpha modes). Assumes decoded images.
 
 use super::material::TextureRef;
 use super::{AlphaMode, Image, Material, Mesh, Scene, Shared};
 
-/// What turned out to be simpler than it was written, by names.
+/// Names of the materials and meshes that canonicalisation simplified, for messages.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct CanonicalForm {
-    /// Textures that are black in the channels that multiply a factor: "emission of \"lamp\"".
+    /// Textures that are black in all channels that multiply their factor: "emission of \"lamp\"".
     pub black: Vec<String>,
-    /// Materials that blend or have holes, and an alpha of 1 everywhere: read as opaque.
+    /// Alpha-blended or alpha-tested materials whose alpha is 1 everywhere: they became opaque.
     pub opaque: Vec<String>,
-    /// Meshes of which alpha leaves nothing.
+    /// Meshes that alpha makes invisible everywhere: their triangles are removed.
     pub unseen: Vec<String>,
 }
 
-/// Brings a scene to that form.
+/// Brings a scene into canonical form.
 pub fn canonicalise(scene: &mut Scene) -> CanonicalForm {
     let mut form = CanonicalForm::default();
     let Scene { materials, meshes, images, .. } = scene;
@@ -29,10 +32,10 @@ pub fn canonicalise(scene: &mut Scene) -> CanonicalForm {
     form
 }
 
-/// Sets to 0 each factor whose texture is black in the channels that multiply it, and forgets the texture where nothing else
-/// is read from it: 0 times the factor.
+/// Sets each factor to 0 whose texture is black in the channels that multiply it, and returns the names of these factors. The
+/// texture is removed unless other channels of it are read.
 fn fold_black(material: &mut Material, images: &[Image]) -> Vec<&'static str> {
-    // Found out at the first texel that is not black, which most textures have near their start.
+    // Stops at the first texel that is not black, which most textures have near their start.
     let black = |texture: Option<TextureRef>, channels: &[usize]| {
         texture.is_some_and(|texture| {
             let mut texels = images[texture.image].rgba.as_chunks::<4>().0.iter();
@@ -55,7 +58,7 @@ fn fold_black(material: &mut Material, images: &[Image]) -> Vec<&'static str> {
         material.clearcoat_texture = None;
         found.push("clear coat");
     }
-    // Roughness is in the same texture.
+    // G of the same texture is roughness, so the texture stays.
     if black(material.metallic_roughness_texture, &[2]) && material.metallic > 0.0 {
         material.metallic = 0.0;
         found.push("metal");
@@ -63,7 +66,7 @@ fn fold_black(material: &mut Material, images: &[Image]) -> Vec<&'static str> {
     found
 }
 
-/// Alpha that is 1 everywhere covers; alpha that is nowhere above the cutoff, or 0 where it blends, leaves nothing.
+/// Folds alpha: 1 everywhere makes the material opaque; below the cutoff, or 0 when blended, everywhere empties the mesh.
 fn fold_alpha(index: usize, material: &mut Material, meshes: &mut [Mesh], images: &[Image], form: &mut CanonicalForm) {
     if material.alpha_mode == AlphaMode::Opaque {
         return;
@@ -82,7 +85,7 @@ fn fold_alpha(index: usize, material: &mut Material, meshes: &mut [Mesh], images
         let least = material.base_color[3] * of_vertices(1.0, f32::min);
         let most = material.base_color[3] * texels_most * of_vertices(1.0, f32::max);
         let (whole, nothing) = match material.alpha_mode {
-            // Filtering may lower what is not 1 by a rounding.
+            // Texture filtering rounds, and may lower an alpha below 1.
             AlphaMode::Mask(cutoff) => (texels_least == 1.0 && least > cutoff, most < cutoff),
             _ => (texels_least == 1.0 && least >= 1.0, most <= 0.0),
         };
@@ -92,7 +95,7 @@ fn fold_alpha(index: usize, material: &mut Material, meshes: &mut [Mesh], images
             *mesh = Mesh { name: std::mem::take(&mut mesh.name), material: index, ..Mesh::default() };
         }
     }
-    // What no mesh has is not called anything, and does not weigh the texels that it shares.
+    // A material without meshes is not reported. As opaque it keeps alpha weights out of the mip levels of textures it shares.
     if covers {
         material.alpha_mode = AlphaMode::Opaque;
         form.opaque.extend(used.then(|| material.name.clone()));
@@ -130,7 +133,7 @@ mod tests {
     #[test]
     fn alpha_is_read_by_its_values() {
         use AlphaMode::{Blend, Mask, Opaque};
-        // Mode, factor, one of two texels, vertices: what it becomes, and whether anything is left.
+        // Alpha mode, alpha factor, alpha of one of two texels, alpha of vertices; expected alpha mode, whether triangles are left.
         type Case = (AlphaMode, f32, Option<u8>, &'static [f32], AlphaMode, bool);
         let cases: [Case; 15] = [
             (Blend, 1.0, None, &[], Opaque, true),

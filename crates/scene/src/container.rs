@@ -1,7 +1,7 @@
-//! Bytes of a glTF file: GLB chunks, JSON, buffers and URIs.
+//! Container of a glTF file: GLB chunks, JSON, buffers and URIs.
 //!
-//! After [`Document::open`] every index in the JSON that the `gltf` crate knows of is in range, every buffer has the
-//! length its JSON claims, and the node hierarchy has not been looked at yet.
+//! Read glTF 2.0 sections 2.8 (URIs), 3.6.1 (buffers) and 4 (GLB). After [`Document::open`] every index in the JSON that the `gltf`
+//! crate knows of is in range, and every buffer has the length that the JSON states. The node hierarchy is not checked yet.
 
 use std::{
     borrow::Cow,
@@ -17,7 +17,7 @@ use gltf::json::{
 
 use super::lobe::LOBES;
 
-/// Extensions whose effect is read, beside those of lobes.
+/// Supported extensions, without those of [`LOBES`].
 const SUPPORTED_EXTENSIONS: &[&str] = &[
     "EXT_texture_webp",
     "KHR_lights_punctual",
@@ -34,25 +34,25 @@ const SUPPORTED_EXTENSIONS: &[&str] = &[
     "KHR_texture_transform",
 ];
 
-/// Whether the effect of an extension is read: what decides what a file may require.
+/// Whether an extension is supported, so that `extensionsRequired` may name it.
 fn is_supported(name: &str) -> bool {
     SUPPORTED_EXTENSIONS.contains(&name) || LOBES.iter().any(|lobe| lobe.extension == name)
 }
 
-/// Extensions that hide the data itself, so the advice can be more helpful than "unknown".
+/// Compression extensions that make the data unreadable; their error message recommends decompression.
 const COMPRESSIONS: &[&str] = &["EXT_meshopt_compression", "KHR_draco_mesh_compression", "KHR_texture_basisu"];
 
 /// A glTF file with its buffers in memory.
 pub(crate) struct Document<'a> {
-    /// The checked JSON.
+    /// The JSON with checked indices.
     pub(crate) root: Root,
     /// One byte string per buffer, exactly `byteLength` long.
     pub(crate) buffers: Vec<Cow<'a, [u8]>>,
-    /// Folder that relative URIs start from.
+    /// Base folder of relative URIs.
     pub(crate) folder: PathBuf,
 }
 
-/// The two parts of a GLB file, or a plain JSON file without the second.
+/// The JSON and binary chunks of a GLB file, or the JSON of a `.gltf` file alone.
 struct Parts<'a> {
     json: &'a [u8],
     binary: Option<&'a [u8]>,
@@ -86,7 +86,7 @@ impl<'a> Document<'a> {
         Ok(Self { root, buffers, folder })
     }
 
-    /// The same with buffers of its own, for as long as one likes.
+    /// The document with its buffers copied, without borrows.
     pub(crate) fn into_owned(self) -> Document<'static> {
         let Self { root, buffers, folder } = self;
         let buffers = buffers.into_iter().map(|buffer| Cow::Owned(buffer.into_owned())).collect();
@@ -114,7 +114,7 @@ impl<'a> Document<'a> {
         Ok((&bytes[start as usize..end as usize], stride))
     }
 
-    /// The bytes behind a URI: `data:` or a path relative to the file.
+    /// The content of a URI: `data:` or a path relative to the file.
     pub(crate) fn resolve(&self, uri: &str) -> Result<Vec<u8>> {
         resolve(uri, &self.folder)
     }
@@ -150,7 +150,7 @@ fn split_glb(bytes: &[u8]) -> Result<Parts<'_>> {
         match &kind.to_le_bytes() {
             b"JSON" if json.is_none() => json = Some(data),
             b"BIN\0" if json.is_some() && binary.is_none() => binary = Some(data),
-            // The specification asks readers to skip chunks they do not know.
+            // glTF 2.0 section 4.4: readers skip chunks of unknown types.
             _ => ensure!(json.is_some(), "the first GLB chunk is not JSON"),
         }
         at += 8 + size;
@@ -185,9 +185,9 @@ fn check_extensions(root: &Root, warnings: &mut Vec<String>) -> Result<()> {
     Ok(())
 }
 
-/// Runs the `gltf` crate's validation, less the parts that are stricter than reading needs.
+/// Runs the `gltf` crate's validation, and tolerates what reading does not need.
 fn check_references(root: &Root) -> Result<()> {
-    // The crate's check of a primitive looks its POSITION accessor up without a bound, so that one goes first.
+    // The crate looks up a primitive's POSITION accessor without a bounds check, so this index is checked first.
     let accessors = root.accessors.len();
     for (m, mesh) in root.meshes.iter().enumerate() {
         for (p, primitive) in mesh.primitives.iter().enumerate() {
@@ -208,10 +208,10 @@ fn check_references(root: &Root) -> Result<()> {
         }
         let place = path().0;
         let tolerated = match flaw {
-            // `extensionsRequired` has been judged by our own list.
+            // `is_supported` has checked `extensionsRequired`.
             Flaw::Unsupported => true,
-            // Bounds in the accessor are not used; an accessor without a buffer view holds zeros; a texture may take
-            // its picture from an extension; an attribute with an unknown name is not read.
+            // Not needed for reading: min and max of accessors; an accessor without a buffer view holds zeros; a texture may
+            // take its image from an extension; an attribute of unknown name is ignored.
             Flaw::Missing => {
                 let is_bound = place.ends_with(".min") || place.ends_with(".max");
                 let is_zeros = place.starts_with("accessors[") && place.ends_with(".bufferView");
@@ -280,7 +280,7 @@ fn read_buffer<'a>(
     })
 }
 
-/// A URI shortened for a message: `data:` URIs can be megabytes.
+/// A URI shortened for messages: `data:` URIs can be megabytes.
 pub(crate) fn short_uri(uri: &str) -> String {
     if uri.chars().count() <= 80 { uri.to_owned() } else { format!("{}…", uri.chars().take(60).collect::<String>()) }
 }
@@ -320,7 +320,7 @@ fn decode_data_uri(data: &str) -> Result<Vec<u8>> {
     }
 }
 
-/// Base64 of RFC 4648, standard or URL alphabet, padding optional.
+/// Decodes Base64 of RFC 4648, standard or URL alphabet, padding optional.
 fn decode_base64(text: &[u8]) -> Result<Vec<u8>> {
     let mut out = Vec::with_capacity(text.len() / 4 * 3 + 3);
     let (mut bits, mut count) = (0_u32, 0_u32);

@@ -1,7 +1,8 @@
-//! Environment light: an equirectangular radiance map (README, "Conventions").
+//! Environment light: an equirectangular environment map of radiance (README, "Conventions").
 //!
+//! Read pbrt 12.5; Ramamoorthi and Hanrahan, "An Efficient Representation for Irradiance Environment Maps", 2001.
 //! Lookup for a world direction d: u = atan2(d.z, d.x) / 2π + 0.5, v = 0.5 − asin(d.y) / π; u to the right, v down
-//! from the top row, bilinear, wrapping in u.
+//! from the top row, bilinear, periodic in u.
 
 use std::f64::consts::{PI, TAU};
 use std::io::Cursor;
@@ -14,31 +15,31 @@ use rayon::prelude::*;
 
 use etalon_image::{MAX_PIXELS, exr, file};
 
-/// Linear Rec. 709 radiance on an equirectangular grid.
+/// Equirectangular map of linear Rec. 709 radiance.
 #[derive(Debug, Clone)]
 pub struct Environment {
-    /// Path or the name of the generator.
+    /// Path, or name of the generator.
     pub name: String,
-    /// Pixels across (full turn).
+    /// Pixels across (360° of longitude).
     pub width: u32,
-    /// Pixels down (top pole to bottom pole).
+    /// Pixels down (north pole to south pole).
     pub height: u32,
     /// `width * height` radiances, rows from the top, finite and never negative.
     pub radiance: Vec<[f32; 3]>,
 }
 
 impl Environment {
-    /// Reads a Radiance `.hdr` or an OpenEXR map; the contents decide, not the extension.
+    /// Reads a Radiance `.hdr` or an OpenEXR map; the content decides, not the extension.
     ///
-    /// Also gives warnings, each one sentence: texels that were NaN, infinite or negative and became 0, a shape other
-    /// than two to one, an exposure that the file records and that was divided out. Alpha of an EXR is dropped.
+    /// Also returns warnings, one sentence each: texels that were NaN, infinite or negative and became 0, an aspect ratio other
+    /// than two to one, an exposure in the file that was divided out. Alpha of an EXR is dropped.
     pub fn load(path: &Path) -> Result<(Self, Vec<String>)> {
         let bytes = file::read(path)?;
         let name = path.display().to_string();
         Self::decode(&name, &bytes).with_context(|| format!("reading the environment {name}"))
     }
 
-    /// The same for bytes in memory.
+    /// Decodes a map from bytes in memory; `name` is for messages.
     pub fn decode(name: &str, bytes: &[u8]) -> Result<(Self, Vec<String>)> {
         let mut warnings = Vec::new();
         let (width, height, mut radiance) = if bytes.starts_with(b"#?") {
@@ -53,7 +54,7 @@ impl Environment {
         let mut cleaned = 0u64;
         for texel in &mut radiance {
             let usable = texel.map(|sample| if sample.is_finite() && sample > 0.0 { sample } else { 0.0 });
-            // Comparing floats: NaN differs from everything, -0 equals 0, which is what should count.
+            // Float comparison: NaN differs from everything and counts, −0 equals 0 and does not.
             cleaned += u64::from(*texel != usable);
             *texel = usable;
         }
@@ -71,40 +72,40 @@ impl Environment {
         Ok((Self { name: name.to_owned(), width, height, radiance }, warnings))
     }
 
-    /// The same radiance from everywhere; negative and non-finite channels are 0.
+    /// A map of constant radiance; negative and non-finite channels are 0.
     pub fn constant(rgb: [f32; 3]) -> Self {
         let rgb = rgb.map(|sample| if sample.is_finite() { sample.max(0.0) } else { 0.0 });
         Self { name: "constant".into(), width: 4, height: 2, radiance: vec![rgb; 8] }
     }
 
-    /// Whether the same light comes from everywhere.
+    /// Whether the radiance is the same in all directions.
     #[must_use]
     pub fn is_constant(&self) -> bool {
         self.radiance.iter().all(|texel| Some(texel) == self.radiance.first())
     }
 
-    /// Whether all its light is grey.
+    /// Whether all radiance is grey.
     #[must_use]
     pub fn is_grey(&self) -> bool {
         self.radiance.iter().all(|[r, g, b]| r == g && g == b)
     }
 
-    /// Nothing from anywhere, in as many texels as the studio has: what takes its place costs as much.
+    /// A black map of the studio's size, so that it costs as much as the studio.
     #[must_use]
     pub fn dark() -> Self {
         let (width, height) = (512_u32, 256_u32);
         Self { name: "dark".into(), width, height, radiance: vec![[0.0; 3]; (width * height) as usize] }
     }
 
-    /// The built-in light for a scene that has none: a neutral photographic studio, 512x256.
+    /// Built-in environment for a scene without lights: a neutral photographic studio, 512x256.
     ///
-    /// A bluish-white sky over a darker grey floor, and three soft boxes: the key from the upper left in front (seen
-    /// from a camera on +Z), a weaker fill from the right, a rim light behind. Every edge is a C2 ramp several texels
-    /// wide, so the grid holds the function without aliasing. Mean radiance is 0.83, the largest near 12.
+    /// A bluish-white sky over a darker grey floor, and three soft boxes: the key light from the upper left in front (seen
+    /// from a camera on +Z), a weaker fill light from the right, a rim light behind. Every edge is a C2 ramp several texels
+    /// wide, so the map has no aliasing. Mean radiance is 0.83, the largest near 12.
     pub fn studio() -> Self {
         let (width, height) = (512u32, 256u32);
         let boxes = [
-            // Towards, half width and height as tangents of angles, radiance.
+            // Direction, half width and half height as tangents of angles, radiance.
             SoftBox::new(DVec3::new(-0.62, 0.58, 0.68), [0.31, 0.40], [12.4, 12.0, 11.5]),
             SoftBox::new(DVec3::new(0.90, 0.22, 0.42), [0.30, 0.46], [2.7, 2.8, 3.0]),
             SoftBox::new(DVec3::new(0.38, 0.52, -0.86), [0.52, 0.17], [6.6, 6.7, 7.0]),
@@ -122,10 +123,10 @@ impl Environment {
         Self { name: "studio".into(), width, height, radiance }
     }
 
-    /// Bilinear lookup of the radiance from a unit direction in world space: the f64 twin of the shader's.
+    /// Bilinear lookup of the radiance from a unit direction in world space: the f64 twin of the shader's lookup.
     ///
-    /// Texel centres are at half-integers, u wraps, v stops at the poles' rows. A d.y outside -1..=1 by rounding is
-    /// cut. Deliberately written as the convention says, not as the quickest way.
+    /// Texel centres are at half-integers, u is periodic, v is clamped to the rows at the poles. A d.y outside −1 … 1 by rounding
+    /// is clamped. The code follows the convention literally, at the cost of speed.
     pub fn sample(&self, direction: DVec3) -> [f64; 3] {
         let u = direction.z.atan2(direction.x) / TAU + 0.5;
         let v = 0.5 - direction.y.clamp(-1.0, 1.0).asin() / PI;
@@ -145,17 +146,17 @@ impl Environment {
         })
     }
 
-    /// Mean radiance over all directions, texels weighted by their exact solid angles.
+    /// Mean radiance over all directions; texels are weighted by their exact solid angles.
     pub fn mean(&self) -> [f64; 3] {
         let dc = self.irradiance_sh9()[0];
-        // The first harmonic is 1 / sqrt(4 pi); its integral over the sphere is sqrt(4 pi).
+        // The first harmonic is 1 / sqrt(4π); its integral over the sphere is sqrt(4π).
         dc.map(|coefficient| coefficient / (4.0 * PI).sqrt())
     }
 
     /// Projection of the radiance onto the nine real spherical harmonics up to degree 2, for [`irradiance`].
     ///
-    /// Order and axes: 1; y, z, x; xy, yz, 3z²-1, xz, x²-y², all of the world direction, with the constants of
-    /// Ramamoorthi & Hanrahan 2001, equation 3. A texel counts as constant over its cell and the integrals of the
+    /// Order and axes: 1; y, z, x; xy, yz, 3z²−1, xz, x²−y², all of the world direction, with the constants of
+    /// Ramamoorthi & Hanrahan 2001, equation 3. A texel counts as constant over its cell, and the integrals of the
     /// harmonics over the cell are in closed form, so a constant map is projected without any error but rounding. Rows
     /// are added in order: the result does not depend on the number of threads.
     pub fn irradiance_sh9(&self) -> [[f64; 3]; 9] {
@@ -205,13 +206,13 @@ impl Environment {
 const K: [f64; 5] =
     [0.28209479177387814, 0.4886025119029199, 1.0925484305920792, 0.31539156525252005, 0.5462742152960396];
 
-/// What one row of texels adds to the nine coefficients, from its moments over longitude.
+/// Contribution of one row of texels to the nine coefficients, from its moments over longitude.
 fn row_harmonics(row: usize, height: usize, moments: &[[f64; 3]; 5]) -> [[f64; 3]; 9] {
     let latitude = |edge: usize| (0.5 - edge as f64 / height as f64) * PI;
     let (s1, c1) = latitude(row).sin_cos();
     let (s0, c0) = latitude(row + 1).sin_cos();
     let height_of_row = latitude(row) - latitude(row + 1);
-    // Integrals over s = sin(latitude), which is the world's y, of 1, s, s², c, cs and c² with c = cos(latitude).
+    // Integrals over s = sin(latitude), the world's y, of 1, s, s², c, cs and c² with c = cos(latitude).
     let one = s1 - s0;
     let s = (s1 * s1 - s0 * s0) / 2.0;
     let ss = (s1 * s1 * s1 - s0 * s0 * s0) / 3.0;
@@ -240,11 +241,11 @@ fn row_harmonics(row: usize, height: usize, moments: &[[f64; 3]; 5]) -> [[f64; 3
     sum
 }
 
-/// Irradiance in W/m² per W/(m² sr) on a surface with unit normal `n` under the radiance of `sh9`.
+/// Irradiance in W/m² on a surface with unit normal `n`, from the radiance coefficients `sh9` in W/(m² sr).
 ///
 /// E(n) = Σ A_l L_lm Y_lm(n) with the cosine lobe's A = π, 2π/3, π/4 (Ramamoorthi & Hanrahan 2001, equations 7 and
-/// 8). Degrees above 2 are left out, which the cosine lobe damps to a few per cent; the result may be slightly negative
-/// opposite a small strong light. A diffuse surface reflects albedo / π times this.
+/// 8). Degrees above 2 are omitted; the cosine lobe damps them to a few per cent. The result may be slightly negative
+/// opposite a small strong light. A diffuse surface reflects the radiance albedo / π times E.
 pub fn irradiance(sh9: &[[f64; 3]; 9], n: DVec3) -> [f64; 3] {
     let harmonics = sh9_basis(n);
     let lobe = [PI, TAU / 3.0, TAU / 3.0, TAU / 3.0, PI / 4.0, PI / 4.0, PI / 4.0, PI / 4.0, PI / 4.0];
@@ -267,7 +268,7 @@ pub fn sh9_basis(d: DVec3) -> [f64; 9] {
     ]
 }
 
-/// World direction of map coordinates, the inverse of the lookup: u and v in 0..=1.
+/// World direction of the map coordinates u and v, both in 0 … 1; the inverse of the lookup.
 pub fn direction(u: f64, v: f64) -> DVec3 {
     let (sin_longitude, cos_longitude) = ((u - 0.5) * TAU).sin_cos();
     let (s, c) = ((0.5 - v) * PI).sin_cos();
@@ -282,7 +283,7 @@ fn decode_hdr(name: &str, bytes: &[u8], warnings: &mut Vec<String>) -> Result<(u
     let pixels = u64::from(width) * u64::from(height);
     ensure!(pixels > 0, "the picture has no pixels");
     ensure!(pixels <= MAX_PIXELS, "{width}x{height} pixels are too many; {MAX_PIXELS} are the most that are read");
-    // Run-length coding turns 2 bytes into 127 at best in the usual form, a few into more in the oldest one.
+    // Run-length coding expands 2 bytes to 127 at best in the usual form, and a few bytes to more in the oldest form.
     ensure!(
         pixels <= (bytes.len() as u64).saturating_mul(1024),
         "the file is damaged: {} bytes cannot hold {width}x{height} pixels",
@@ -305,7 +306,7 @@ fn decode_hdr(name: &str, bytes: &[u8], warnings: &mut Vec<String>) -> Result<(u
     Ok((width, height, radiance))
 }
 
-/// A bright rounded rectangle on the studio's far wall.
+/// A bright rounded rectangle on the studio's wall.
 struct SoftBox {
     towards: DVec3,
     right: DVec3,
@@ -321,7 +322,7 @@ impl SoftBox {
         Self { towards, right, up: towards.cross(right), half, radiance }
     }
 
-    /// How much of the box's radiance comes from a direction: 0..=1.
+    /// Fraction of the box's radiance in a direction, 0 … 1.
     fn weight(&self, d: DVec3) -> f64 {
         let depth = d.dot(self.towards);
         if depth <= 0.1 {
@@ -329,15 +330,15 @@ impl SoftBox {
         }
         let x = d.dot(self.right) / depth / self.half[0];
         let y = d.dot(self.up) / depth / self.half[1];
-        // A fourth-power ellipse: a rectangle with generous corners and no crease.
+        // Superellipse of the fourth power: a rectangle with wide round corners and no crease.
         let radius = (x.powi(4) + y.powi(4)).sqrt().sqrt();
         let edge = 1.0 - ramp((radius - 0.78) / 0.44);
-        // Brighter in the middle, as a lamp behind cloth is.
+        // Brighter in the middle, like a lamp behind cloth.
         edge * (1.0 - 0.25 * (radius * radius).min(1.5))
     }
 }
 
-/// 0 below 0, 1 above 1, between them 6t⁵ - 15t⁴ + 10t³: continuous with two derivatives.
+/// Smooth step of two continuous derivatives: 0 below 0, 1 above 1, 6t⁵ − 15t⁴ + 10t³ between.
 fn ramp(t: f64) -> f64 {
     let t = t.clamp(0.0, 1.0);
     t * t * t * (t * (6.0 * t - 15.0) + 10.0)
@@ -350,7 +351,7 @@ fn studio_radiance(d: DVec3, boxes: &[SoftBox; 3]) -> [f64; 3] {
     let sky = [0.34, 0.36, 0.385].map(|horizon| horizon * (1.0 - zenith));
     let top = [0.50, 0.55, 0.62].map(|top| top * zenith);
     let lit = [0, 1, 2].map(|index: usize| boxes[index].weight(d));
-    // Boxes hide the wall behind them instead of adding to it.
+    // Boxes cover the wall behind them; their radiance is not added to it.
     let hidden: f64 = lit.iter().map(|weight| 1.0 - weight).product();
     [0, 1, 2].map(|c| {
         let wall = floor * (1.0 - above) + (sky[c] + top[c]) * above;

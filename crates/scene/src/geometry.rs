@@ -1,8 +1,8 @@
-//! What meshes need before they can be drawn: clean triangles, normals, tangents, texture coordinates.
+//! Mesh preparation: clean triangles, normals, tangent space (MikkTSpace), texture coordinates.
 //!
-//! The steps work on one [`Mesh`] in place and report what they had to change as counts; the caller turns those into
-//! sentences. Arithmetic on file data is f64: slivers keep their normal (a difference of f32 coordinates and the
-//! products of such differences are nearly exact in f64).
+//! Read glTF 2.0 section 3.7.2.1 (meshes, attributes). The steps change one [`Mesh`] in place and count their repairs; the caller
+//! reports the counts. Arithmetic on file data is f64, so that slivers keep their normal: differences of f32 coordinates and the
+//! products of such differences are nearly exact in f64.
 
 use std::collections::HashMap;
 
@@ -11,23 +11,23 @@ use glam::{DVec3, Vec3};
 
 use super::{Mesh, Shared};
 
-/// Counts of things that [`finish`] had to work around.
+/// Number of faults that [`finish`] repaired, by kind.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Repairs {
     /// Triangles with a corner at NaN or infinity.
     pub(crate) not_finite: usize,
-    /// Triangles without area, dropped because a flat normal does not exist for them.
+    /// Triangles without area, dropped because they have no flat normal.
     pub(crate) no_area: usize,
-    /// Vertex normals that were zero or not finite, replaced by the normal of a face.
+    /// Vertex normals that were zero or not finite, replaced by the area-weighted mean of the faces around the vertex.
     pub(crate) bad_normals: usize,
-    /// Vertex tangents that were zero or not finite, replaced by some perpendicular.
+    /// Vertex tangents that were zero or not finite, replaced by an arbitrary perpendicular.
     pub(crate) bad_tangents: usize,
     /// Texture coordinates or colours that were not finite, replaced by zero.
     pub(crate) bad_attributes: usize,
 }
 
 impl Repairs {
-    /// One sentence for each kind that happened.
+    /// One sentence for each kind of fault that occurred.
     pub(crate) fn sentences(&self, place: &str) -> Vec<String> {
         [
             (self.not_finite, "triangle(s) with a corner that is not finite were dropped"),
@@ -43,8 +43,8 @@ impl Repairs {
     }
 }
 
-/// Turns decoded attributes into a drawable mesh: normals flat where there are none, tangents from texture set
-/// `tangent_set` where they are asked for and absent.
+/// Completes a mesh of decoded attributes: adds flat normals if it has none, and tangents from texture-coordinate set
+/// `tangent_set` if requested and missing.
 pub(crate) fn finish(mesh: &mut Mesh, tangent_set: Option<usize>) -> Repairs {
     let mut repairs = Repairs { not_finite: drop_not_finite(mesh), ..Repairs::default() };
     compact(mesh);
@@ -53,7 +53,7 @@ pub(crate) fn finish(mesh: &mut Mesh, tangent_set: Option<usize>) -> Repairs {
     }
     repairs.bad_attributes += zero_not_finite(&mut mesh.colors);
     if mesh.normals.is_empty() {
-        // Tangents of a file are meaningless without its normals.
+        // Tangents in a file are relative to its normals, so without normals they are dropped.
         mesh.tangents = Shared::default();
         repairs.no_area = flatten(mesh);
     } else {
@@ -71,7 +71,7 @@ fn position(mesh: &Mesh, index: u32) -> DVec3 {
     Vec3::from(mesh.positions[index as usize]).as_dvec3()
 }
 
-/// Twice the area of a triangle as a vector along its normal.
+/// Normal of a triangle with the length of twice its area.
 fn area_vector(mesh: &Mesh, corners: [u32; 3]) -> DVec3 {
     let [a, b, c] = corners.map(|i| position(mesh, i));
     (b - a).cross(c - a)
@@ -114,7 +114,7 @@ fn gather(mesh: &mut Mesh, sources: &[u32]) {
     pick(&mut mesh.colors, sources);
 }
 
-/// Leaves out vertices that no triangle uses: they would count in bounds and cost memory.
+/// Removes vertices without triangles: they would enlarge the bounds and cost memory.
 fn compact(mesh: &mut Mesh) {
     let mut used = vec![false; mesh.positions.len()];
     mesh.indices.iter().for_each(|&i| used[i as usize] = true);
@@ -134,7 +134,7 @@ fn compact(mesh: &mut Mesh) {
     gather(mesh, &sources);
 }
 
-/// Gives every triangle its own three vertices and their flat normal; returns how many had no area.
+/// Gives every triangle its own three vertices with a flat normal; returns the number of triangles without area.
 fn flatten(mesh: &mut Mesh) -> usize {
     let mut normals = Vec::with_capacity(mesh.indices.len());
     let mut sources = Vec::with_capacity(mesh.indices.len());
@@ -172,7 +172,7 @@ fn normalize_normals(mesh: &mut Mesh) -> usize {
     if bad.is_empty() {
         return 0;
     }
-    // Sum of the faces around the vertex, weighted by area.
+    // Area-weighted sum of the faces around the vertex.
     let mut sums: HashMap<usize, DVec3> = bad.iter().map(|&i| (i, DVec3::ZERO)).collect();
     for &triangle in mesh.indices.as_chunks::<3>().0 {
         for corner in triangle {
@@ -187,7 +187,7 @@ fn normalize_normals(mesh: &mut Mesh) -> usize {
     bad.len()
 }
 
-/// Some unit vector perpendicular to `normal`.
+/// An arbitrary unit vector perpendicular to `normal`.
 fn perpendicular(normal: [f32; 3]) -> [f32; 3] {
     Vec3::from(normal).any_orthonormal_vector().to_array()
 }
@@ -209,7 +209,7 @@ fn normalize_tangents(mesh: &mut Mesh) -> usize {
     bad
 }
 
-/// The mesh as the tangent generator sees it, and one tangent per corner as it answers.
+/// Adapter from a mesh to the MikkTSpace generator, with one resulting tangent per corner.
 struct TangentCorners<'a> {
     mesh: &'a Mesh,
     set: usize,
@@ -240,7 +240,7 @@ impl Geometry for TangentCorners<'_> {
     }
 
     fn tex_coord(&self, face: usize, corner: usize) -> [f32; 2] {
-        // MikkTSpace takes v upwards, glTF downwards; handedness in glTF files is baked for the flipped coordinate.
+        // MikkTSpace assumes v upwards, glTF downwards; glTF files are baked with the handedness of the flipped coordinate.
         let [u, v] = self.mesh.uvs[self.set].get(self.vertex(face, corner)).copied().unwrap_or_default();
         [u, 1.0 - v]
     }
@@ -253,10 +253,10 @@ impl Geometry for TangentCorners<'_> {
     }
 }
 
-/// MikkTSpace tangents; a vertex whose corners disagree is split.
+/// Generates MikkTSpace tangents; a vertex whose corners have different tangents is split.
 fn generate(mesh: &mut Mesh, set: usize) {
     let mut corners = TangentCorners { mesh, set, tangents: vec![[1.0, 0.0, 0.0, 1.0]; mesh.indices.len()] };
-    // The generator's error type has no values.
+    // The error type of the generator is uninhabited.
     let _ = generate_tangents(&mut corners);
     let per_corner = corners.tangents;
     let mut sources: Vec<u32> = (0..mesh.positions.len() as u32).collect();

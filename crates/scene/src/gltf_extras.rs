@@ -1,4 +1,6 @@
-//! `extras.etalon` of glTF materials and lights: what the standard's extensions have no word for.
+//! `extras.etalon` of glTF materials and lights: data without a glTF extension, such as spectra, n and κ, and grids of σ.
+//!
+//! Read docs/scene-input.md, which lists all keys.
 
 use std::f64::consts::{PI, TAU};
 use std::{collections::BTreeMap, sync::Arc};
@@ -16,24 +18,24 @@ use super::{
 };
 use etalon_optics::spectra::{self, Dispersion, Emission, Spectrum};
 
-/// Exponent of the narrowest lobe that a roughness stands for (`MIN_ROUGHNESS`).
+/// Largest Phong shininess: the exponent at the smallest roughness (`MIN_ROUGHNESS`).
 const MOST_SHINE: f64 = 1e8;
 
-/// Keys that are planned and that nothing looks at yet.
+/// Reserved keys that are not read yet.
 const NOT_READ_YET: &[&str] = &["brdf"];
 
-/// Wavelengths that a spectrum may tell of, nm: those that the CIE has matching functions for.
+/// Range in nm of wavelengths in spectra: that of the CIE colour matching functions.
 const SEEN: [f64; 2] = [360.0, 830.0];
 
-/// The part of `extras` that is ours.
+/// The `etalon` member of `extras`.
 #[derive(Deserialize)]
 struct Extras {
-    /// Text until it is known to be an object, and its values until their key is known: what is wrong has a name then.
+    /// Raw text until its type is known, as are its values until their key is known: error messages can then name the key.
     etalon: Option<Box<RawValue>>,
 }
 
-/// Puts what `extras.etalon` says into a material whose extensions have been read; `file_ior` is the index that
-/// KHR_materials_ior gave. Returns what is worth a warning.
+/// Applies `extras.etalon` to a material whose extensions have been read; `file_ior` is the index of
+/// KHR_materials_ior. Returns warnings.
 pub(crate) fn apply(extras: &json::Extras, file_ior: Option<f32>, m: &mut Material) -> Result<Vec<String>> {
     let entries = entries(extras)?;
     let mut warnings = Vec::new();
@@ -73,7 +75,7 @@ pub(crate) fn apply(extras: &json::Extras, file_ior: Option<f32>, m: &mut Materi
     if let Some(n) = n {
         ensure!(n.iter().all(|&x| x > 0.0), "extras.etalon n: an index of refraction lies above 0");
     }
-    // Numbers beside a preset replace its own.
+    // Explicit numbers override those of the preset.
     let (preset_n, preset_kappa) = match preset {
         Some(Substance::Metal(metal)) => {
             let index = metal.index();
@@ -145,8 +147,8 @@ pub(crate) fn apply(extras: &json::Extras, file_ior: Option<f32>, m: &mut Materi
     Ok(warnings)
 }
 
-/// Puts what `extras.etalon` says into a light. Returns what is worth a warning.
-/// `across` is the direction of the first side of a rectangle.
+/// Applies `extras.etalon` to a light; `across` is the direction of the first side of a rectangle.
+/// Returns warnings.
 pub(crate) fn apply_to_light(extras: &json::Extras, light: &mut Light, across: DVec3) -> Result<Vec<String>> {
     let mut warnings = Vec::new();
     for (key, text) in &entries(extras)? {
@@ -166,7 +168,7 @@ pub(crate) fn apply_to_light(extras: &json::Extras, light: &mut Light, across: D
     Ok(warnings)
 }
 
-/// The shape of a light: radius of a ball or a disk, width and height of a rectangle, in metres of the world.
+/// Extent of an area light: radius of a sphere or a disk, width and height of a rectangle, in metres of world space.
 fn extent(key: &str, text: &str, light: &Light, across: DVec3) -> Result<Extent> {
     let lengths = match key {
         "rectangle" => serde_json::from_str::<[f64; 2]>(text),
@@ -185,9 +187,9 @@ fn extent(key: &str, text: &str, light: &Light, across: DVec3) -> Result<Extent>
     }
 }
 
-/// The entries of `extras.etalon`; none where there is no such thing.
+/// The entries of `extras.etalon`; empty without this key.
 fn entries(extras: &json::Extras) -> Result<BTreeMap<String, Box<RawValue>>> {
-    // Other programs may keep anything in `extras`; only an object can have our key.
+    // Other programs may store any JSON in `extras`; only an object can have our key.
     let Some(text) = extras.as_ref().map(|raw| raw.get()).filter(|text| text.starts_with('{')) else {
         return Ok(BTreeMap::new());
     };
@@ -196,7 +198,7 @@ fn entries(extras: &json::Extras) -> Result<BTreeMap<String, Box<RawValue>>> {
     serde_json::from_str(ours.get()).context("extras.etalon")
 }
 
-/// What a parser says, which repeats what it finds, as long as it may be and with its line breaks.
+/// A parser's error without control characters, cut to 120 characters: parsers quote the file.
 fn told(error: &serde_json::Error) -> anyhow::Error {
     anyhow!("{}", error.to_string().replace(char::is_control, " ").chars().take(120).collect::<String>())
 }
@@ -255,7 +257,7 @@ fn reflectance(text: &str, warnings: &mut Vec<String>) -> Result<Spectrum> {
     Ok(Spectrum::Table(rows.into()))
 }
 
-/// Wavelengths ascend, values are finite and never negative.
+/// Checks that wavelengths ascend and that values are finite and not negative.
 fn check_table(rows: &[[f64; 2]], warnings: &mut Vec<String>) -> Result<()> {
     ensure!(rows.len() > 1, "the table has {} rows, a spectrum at least two", rows.len());
     ensure!(rows.as_flattened().iter().all(|x| x.is_finite()), "the table has a number that is not finite");
@@ -299,7 +301,7 @@ fn cauchy_of(text: &str) -> Result<Dispersion> {
     check_index(Dispersion::Cauchy { a, b })
 }
 
-/// A formula that gives an index everywhere.
+/// Checks that the formula gives an index at all visible wavelengths.
 fn check_index(dispersion: Dispersion) -> Result<Dispersion> {
     let visible = spectra::VISIBLE;
     for nm in (visible.from as u32..=visible.to as u32).map(f64::from) {
@@ -309,8 +311,8 @@ fn check_index(dispersion: Dispersion) -> Result<Dispersion> {
     Ok(dispersion)
 }
 
-/// Makes a material a metal of that index. Its base colour becomes the reflectance at normal incidence, so that models
-/// that know no more than that show the same metal.
+/// Makes a material a conductor of that index. The base colour becomes the reflectance at normal incidence, so that models
+/// without complex indices show the same metal.
 fn conductor(m: &mut Material, index: [[f32; 2]; 3], warnings: &mut Vec<String>) -> Result<()> {
     ensure!(
         m.transmission == 0.0,
@@ -328,13 +330,13 @@ fn conductor(m: &mut Material, index: [[f32; 2]; 3], warnings: &mut Vec<String>)
     Ok(())
 }
 
-/// The beginning of a text that a file may have made as long as it likes.
+/// The beginning of a text of arbitrary length, for messages.
 fn shortened(text: &str) -> String {
     const MOST: usize = 40;
     if text.chars().count() <= MOST { text.to_owned() } else { text.chars().take(MOST).chain(['…']).collect() }
 }
 
-/// A value as JSON, for messages.
+/// A value as JSON for messages.
 fn shown(value: &Value) -> String {
     shortened(&value.to_string())
 }
@@ -346,7 +348,7 @@ fn integer(value: &Value) -> Result<i32> {
         .with_context(|| format!("{} is not a whole number of 32 bits", shown(value)))
 }
 
-/// Numbers go from the text into their list: as values of any kind they would take ten times as much memory.
+/// Parses a grid of σ. Numbers are parsed directly into their list: as JSON values they would take ten times as much memory.
 fn grid(text: &str) -> Result<SigmaGrid> {
     // An unknown key is an error here: a misspelt `min` would move the grid.
     #[derive(Deserialize)]
@@ -371,7 +373,7 @@ fn substance(value: &Value) -> Result<Substance> {
     })
 }
 
-/// A number, or one for each of red, green and blue; none is negative.
+/// A number, or one for each of red, green and blue; none negative.
 fn three(value: &Value) -> Result<[f64; 3]> {
     let channels = match value {
         Value::Number(number) => [number.as_f64(); 3],
@@ -383,14 +385,14 @@ fn three(value: &Value) -> Result<[f64; 3]> {
     Ok([r, g, b])
 }
 
-/// One number that is not negative.
+/// A number that is not negative.
 fn exponent(value: &Value) -> Result<f64> {
     let number = value.as_f64().with_context(|| format!("{} is not a number", shown(value)))?;
     ensure!(number >= 0.0, "{} is negative", shown(value));
     Ok(number)
 }
 
-/// The numbers of lecture B5 and B6, k_d and k_s in 1/sr, as the base that the other rungs of `brdf` draw.
+/// Converts k_d and k_s (in 1/sr) of lecture B5 and B6 to the base layer that the non-Phong rungs of `brdf` evaluate.
 fn phong(
     m: &mut Material,
     kd: Option<[f64; 3]>,
@@ -406,7 +408,7 @@ fn phong(
         Some(kd) => kd.map(|k| PI * k),
         None => [0, 1, 2].map(|i| f64::from(m.base_color[i])),
     };
-    // k_d = 0.3183 is 1/π rounded up.
+    // Tolerates k_d = 0.3183, which is 1/π rounded up.
     if let Some(&most) = albedo.iter().find(|&&x| x > 1.0001) {
         warnings.push(format!("extras.etalon kd {} sends more light than it receives and is read as 1/π", most / PI));
     }
@@ -434,13 +436,13 @@ fn phong(
     Ok(())
 }
 
-/// An index of refraction, or one each for red, green and blue.
+/// An index of refraction, or one for each of red, green and blue.
 fn index(value: &Value, key: &str, warnings: &mut Vec<String>) -> Result<[f32; 3]> {
     let [r, g, b] = three(value)?;
     let greatest = r.max(g).max(b);
     if greatest > f64::from(INFINITE_IOR) {
         warnings.push(format!("extras.etalon {key} {greatest:e} is clamped to {INFINITE_IOR:e}"));
     }
-    // The square of an index must still be a number.
+    // The square of an index must be finite in f32.
     Ok([r, g, b].map(|x| x.min(f64::from(INFINITE_IOR)) as f32))
 }

@@ -1,8 +1,8 @@
-//! glTF 2.0 into a [`Scene`].
+//! glTF 2.0 import into a [`Scene`].
 //!
-//! The file's hierarchy is flattened: one [`Instance`] for each primitive of each mesh node. Geometry is shared
-//! between nodes unless a skin or a morph bends it. Files are not trusted: every index is checked before use and
-//! every failure is a sentence.
+//! Read glTF 2.0 chapter 3. The node hierarchy is flattened: one [`Instance`] for each primitive of each mesh node. Nodes share
+//! geometry unless a skin or morph targets deform it. Files are not trusted: every index is checked before use, and every
+//! failure is reported in one sentence.
 
 use std::{
     collections::{HashMap, HashSet},
@@ -31,15 +31,15 @@ use super::{
     thin::{self, Stroke},
 };
 
-/// What is the same at all moments of a file's animation, by its place in the file.
+/// Static parts of a file, by their index in the file, cached over all times of its animation.
 #[derive(Default)]
 struct StillParts {
     images: HashMap<usize, Image>,
-    /// Of primitives that nothing bends: mesh, primitive.
+    /// Undeformed primitives, by mesh and primitive.
     resting: HashMap<(usize, usize), Mesh>,
 }
 
-/// A file that is read at one moment after another: what the moments share is read once.
+/// A file that is read at several times of its animation; static parts are read once.
 pub(crate) struct GltfFile {
     path: PathBuf,
     document: Document<'static>,
@@ -102,7 +102,7 @@ fn read(
     })
 }
 
-/// A primitive as messages call it.
+/// Name of a primitive for messages.
 fn place(document: &Document<'_>, mesh: usize, primitive: usize) -> String {
     match document.root.meshes.get(mesh).and_then(|m| m.name.as_deref()) {
         Some(name) => format!("mesh {mesh} \"{name}\" primitive {primitive}"),
@@ -110,7 +110,7 @@ fn place(document: &Document<'_>, mesh: usize, primitive: usize) -> String {
     }
 }
 
-/// Bounds of the data of meshes that no shown node uses: a broken file is an error whichever part is looked at.
+/// Checks the ranges of all meshes, including those that no node of the scene uses: a broken file is always an error.
 fn check_unseen_meshes(document: &Document<'_>) -> Result<()> {
     for (m, mesh) in document.root.meshes.iter().enumerate() {
         for (p, primitive) in mesh.primitives.iter().enumerate() {
@@ -156,10 +156,10 @@ fn check_ranges(document: &Document<'_>, primitive: &json::mesh::Primitive) -> R
     Ok(())
 }
 
-/// What bends a mesh at one node; equal nodes share geometry.
+/// Deformation of a mesh at one node; nodes with equal poses share geometry.
 struct Pose {
     weights: Vec<f32>,
-    /// World placement of each joint times its inverse bind matrix.
+    /// World transform of each joint times its inverse bind matrix.
     joints: Option<Vec<DAffine3>>,
 }
 
@@ -169,7 +169,7 @@ impl Pose {
     }
 }
 
-/// A primitive to be read, and the nodes it stands at.
+/// A primitive to be built, and the nodes that instantiate it.
 struct PrimitiveJob {
     mesh: usize,
     primitive: usize,
@@ -177,7 +177,7 @@ struct PrimitiveJob {
     nodes: Vec<usize>,
 }
 
-/// A primitive that has been read.
+/// A built primitive.
 struct BuiltPrimitive {
     mesh: Mesh,
     /// Corner pairs (lines) or single corners (points) that become thin triangles.
@@ -191,7 +191,7 @@ struct InstancePlacer<'d, 'b, 'w> {
     materials: &'w mut Vec<Material>,
     warnings: &'w mut Vec<String>,
     jobs: Vec<PrimitiveJob>,
-    /// Attributes that nothing reads are read nevertheless.
+    /// Unused attributes are read, too: nothing is pruned.
     everything: bool,
 }
 
@@ -214,7 +214,7 @@ impl<'d, 'b, 'w> InstancePlacer<'d, 'b, 'w> {
         self.document.root.meshes[job.mesh].primitives[job.primitive].material.map(|m| m.value())
     }
 
-    /// Takes from the materials what cannot be seen; `None` for `ambience` keeps it all.
+    /// Prunes the textures of all materials; `None` for `ambient` prunes nothing. Returns the reasons.
     fn prune_unused(&mut self, ambient: Option<bool>) -> Vec<String> {
         let Some(ambient) = ambient else { return Vec::new() };
         self.everything = false;
@@ -233,7 +233,7 @@ impl<'d, 'b, 'w> InstancePlacer<'d, 'b, 'w> {
         unread
     }
 
-    /// Meshes and their places; those that nothing bends are `resting`, for the moments to come.
+    /// Builds meshes and instances; undeformed meshes are cached in `resting` for other times of the animation.
     fn run(self, resting: &mut HashMap<(usize, usize), Mesh>) -> Result<(Vec<Mesh>, Vec<Instance>)> {
         let (document, materials): (_, &[Material]) = (self.document, self.materials);
         let (jobs, everything) = (&self.jobs, self.everything);
@@ -285,7 +285,7 @@ impl<'d, 'b, 'w> InstancePlacer<'d, 'b, 'w> {
         self.document.root.nodes[node].name.clone().unwrap_or_else(|| format!("node {node}"))
     }
 
-    /// A skinned mesh is already in the world: its joints say where, and its node does not count.
+    /// Transform of an instance. Skinned meshes are in world space already: their joints replace the node's transform.
     fn placement(&self, job: &PrimitiveJob, node: usize) -> DAffine3 {
         if job.pose.joints.is_some() { DAffine3::IDENTITY } else { self.nodes.world_from_node[node] }
     }
@@ -362,7 +362,7 @@ impl<'d, 'b, 'w> InstancePlacer<'d, 'b, 'w> {
     }
 }
 
-/// Columns b×c, c×a, a×b: the inverse transpose times the determinant, without a division.
+/// Cofactor matrix, columns b×c, c×a, a×b: the inverse transpose times the determinant, without a division.
 fn cofactors(m: &DMat3) -> DMat3 {
     let (a, b, c) = (m.x_axis, m.y_axis, m.z_axis);
     DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b))
@@ -387,7 +387,7 @@ fn build(
     let positions = get(Semantic::Positions)?.context("it has no POSITION attribute")?.floats::<3>()?;
     let many = root.meshes[job.mesh].primitives.len() > 1;
     let name = root.meshes[job.mesh].name.clone().unwrap_or_else(|| format!("mesh {}", job.mesh));
-    // Primitives without a material get glTF's default one, which is the last.
+    // Primitives without a material get glTF's default material, the last one.
     let material = json.material.map_or(materials.len() - 1, |m| m.value());
     let read = Coordinates::of(&materials[material]);
     let uvs = |set: usize| match get(Semantic::TexCoords(set as u32))? {
@@ -480,12 +480,12 @@ fn strokes(mode: Mode, indices: &[u32]) -> Option<Vec<Stroke>> {
     })
 }
 
-/// Triangles as a list, and how many indices were left over.
+/// Triangle list of a primitive, and the number of indices left over.
 fn triangles(mode: Mode, mut indices: Vec<u32>) -> (Vec<u32>, usize) {
     let distinct = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
     match mode {
         Mode::TriangleStrip => {
-            // Strips are stitched with triangles that repeat a corner; those are no geometry.
+            // Strips are stitched with degenerate triangles that repeat a corner; these are dropped.
             let turn = |(i, w): (usize, &[u32])| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] };
             (indices.windows(3).enumerate().map(turn).filter(distinct).flatten().collect(), 0)
         }
@@ -577,7 +577,7 @@ fn read_skin<'d>(
     Ok(Skin { sets, unweighted })
 }
 
-/// Moves a mesh into the world by its joints; true if that mirrors most of it, so that its faces must be turned.
+/// Skins a mesh into world space. Returns true if that mirrors most of it, so that the winding must be reversed.
 fn bend(mesh: &mut Mesh, skin: &Skin, joints: &[DAffine3]) -> bool {
     let mut mirrored = 0_usize;
     for vertex in 0..mesh.positions.len() {
@@ -593,7 +593,7 @@ fn bend(mesh: &mut Mesh, skin: &Skin, joints: &[DAffine3]) -> bool {
                 }
             }
         }
-        // Weights stored in bytes do not add up to one exactly.
+        // Weights stored in bytes do not add up to exactly one.
         blend.matrix3 *= 1.0 / total;
         blend.translation /= total;
         let turn = |m: DMat3, v: DVec3| (m * v).normalize_or_zero().as_vec3().to_array();
@@ -659,7 +659,7 @@ fn projection(camera: &json::Camera) -> Result<Projection> {
     }
 }
 
-/// The placement without scale, shear and mirroring: the view direction is kept, then the upward one.
+/// Rigid part of a transform, without scale, shear and mirroring: keeps the view direction, then the up direction.
 fn rigid(world_from_node: &DAffine3) -> Option<DAffine3> {
     let m = world_from_node.matrix3;
     let backward = m.z_axis.try_normalize()?;
@@ -718,13 +718,13 @@ fn lights(document: &Document<'_>, nodes: &Nodes, warnings: &mut Vec<String>) ->
     Ok(lights)
 }
 
-/// A unit vector at right angles to a unit axis, as near to another as can be.
+/// The unit vector perpendicular to a unit axis that is nearest to `x`.
 fn side(x: DVec3, axis: DVec3) -> DVec3 {
     let x = x.normalize_or_zero();
     (x - axis * x.dot(axis)).try_normalize().unwrap_or_else(|| axis.any_orthonormal_vector())
 }
 
-/// Cone angles with `0 ≤ inner < outer ≤ π/2`.
+/// Clamps cone angles to `0 ≤ inner < outer ≤ π/2`.
 fn cone(inner: f32, outer: f32, place: &str, warnings: &mut Vec<String>) -> (f64, f64) {
     const SMALLEST: f64 = 1e-4;
     let (inner_asked, outer_asked) = (f64::from(inner), f64::from(outer));

@@ -1,4 +1,6 @@
-//! glTF materials, textures and pictures into [`Material`] and [`Image`].
+//! glTF materials, textures and images, converted to [`Material`] and [`Image`].
+//!
+//! Read glTF 2.0 sections 3.8 and 3.9, and the KHR_materials_* extensions.
 
 use std::collections::HashMap;
 
@@ -25,10 +27,10 @@ use super::{
 };
 use etalon_optics::spectra;
 
-/// Materials of the whole file, and which of its images their textures are of.
+/// Materials of the whole file, and the file's images that their textures use.
 pub(crate) struct Materials {
     pub(crate) materials: Vec<Material>,
-    /// By [`TextureRef::image`], until [`Materials::decode`].
+    /// Image in the file, by [`TextureRef::image`], until [`Materials::decode`].
     files: Vec<usize>,
 }
 
@@ -59,11 +61,11 @@ struct Webp {
 struct MaterialReader<'d, 'b, 'w> {
     document: &'d Document<'b>,
     warnings: &'w mut Vec<String>,
-    /// Scene image of each file image, once a material refers to it.
+    /// Scene image of each image in the file, once a material refers to it.
     image_slots: Vec<Option<usize>>,
-    /// File image of each scene image.
+    /// Image in the file of each scene image.
     used_images: Vec<usize>,
-    /// Words for messages: `material 3 "Glass"`.
+    /// Prefix of messages: `material 3 "Glass"`.
     place: String,
 }
 
@@ -89,8 +91,8 @@ pub(crate) fn read(document: &Document<'_>, warnings: &mut Vec<String>) -> Resul
 }
 
 impl Materials {
-    /// Decodes, in parallel, the pictures that the materials still name and that are not `known` by their place in the file. The others
-    /// are opened as far as their header, so that a broken file is not called sound.
+    /// Decodes, in parallel, the images that the materials still use and that are not in `known`, a cache by index in the file.
+    /// Reads the headers of all other images, so that a broken file is always an error.
     pub(crate) fn decode(&mut self, document: &Document<'_>, known: &mut HashMap<usize, Image>) -> Result<Vec<Image>> {
         let first = known.is_empty();
         let mut places = vec![None; self.files.len()];
@@ -111,7 +113,7 @@ impl Materials {
     }
 }
 
-/// Hands the encoded bytes of image `index` and its name to `then`, and puts the name into what goes wrong.
+/// Passes the name and the encoded bytes of image `index` to `then`, and adds the name to its error.
 fn with_bytes<T>(document: &Document<'_>, index: usize, then: impl FnOnce(String, &[u8]) -> Result<T>) -> Result<T> {
     let json = document.root.images.get(index).with_context(|| format!("image {index} does not exist"))?;
     let name = match (&json.name, &json.uri) {
@@ -141,7 +143,7 @@ impl MaterialReader<'_, '_, '_> {
         self.warnings.push(format!("{}: {what}", self.place));
     }
 
-    /// A factor that the specification keeps in 0 … 1.
+    /// Clamps a factor to 0 … 1 (glTF 2.0) with a warning.
     fn unit(&mut self, value: f32, name: &str) -> f32 {
         let clamped = value.clamp(0.0, 1.0);
         if clamped != value {
@@ -150,7 +152,7 @@ impl MaterialReader<'_, '_, '_> {
         clamped
     }
 
-    /// A factor that the specification keeps from being negative.
+    /// Clamps a factor to non-negative values (glTF 2.0) with a warning.
     fn positive(&mut self, value: f32, name: &str) -> f32 {
         let clamped = value.clamp(0.0, f32::MAX);
         if clamped != value {
@@ -280,8 +282,8 @@ impl MaterialReader<'_, '_, '_> {
         Ok(of)
     }
 
-    /// KHR_materials_ior allows 0 ("infinite": a perfect reflector) and everything from 1 on. A medium may have less
-    /// than 1, too; no light gets into one of 0.
+    /// Checks the index of KHR_materials_ior, which allows 0 ("infinite": a perfect reflector) and everything from 1 on. Indices
+    /// between 0 and 1 are accepted, too. A transmissive material needs an index above 0.
     fn ior(&mut self, ior: f32, transmission: f32) -> Result<f32> {
         ensure!(
             ior > 0.0 || transmission == 0.0,
@@ -324,7 +326,7 @@ impl MaterialReader<'_, '_, '_> {
         let webp = json.extensions.as_ref().map(|e| parse::<Webp>(&e.others, "EXT_texture_webp"));
         let source = match webp.transpose()?.flatten() {
             Some(webp) => webp.source,
-            // The crate's stand-in for a texture without a source.
+            // The crate's placeholder for a texture without a source.
             None if json.source.value() == u32::MAX as usize => {
                 self.warn(&format!("texture {texture} has no picture that can be read, and is left out"));
                 return Ok(None);
@@ -346,7 +348,7 @@ impl MaterialReader<'_, '_, '_> {
             uv_set = 0;
         }
         let uv_transform = transform.map_or(Affine2::IDENTITY, |t| {
-            // v points down, so a counter-clockwise turn of the coordinates is a negative angle.
+            // v points down, so a counter-clockwise rotation of the coordinates is a negative angle.
             Affine2::from_scale_angle_translation(Vec2::from(t.scale.0), -t.rotation.0, Vec2::from(t.offset.0))
         });
         ensure!(uv_transform.is_finite(), "the transform of texture {texture} is not finite");
@@ -363,7 +365,7 @@ fn wrap(mode: &Checked<WrappingMode>) -> Wrap {
     }
 }
 
-/// Only filters that ask for nearest texels are obeyed; the others get the best there is.
+/// Nearest-texel filters are used as written; all others become trilinear with mip levels.
 fn sampler(json: &json::texture::Sampler) -> Sampler {
     let min = json.min_filter.and_then(|f| if let Checked::Valid(f) = f { Some(f) } else { None });
     Sampler {

@@ -1,7 +1,8 @@
-//! Scenes as data: what a file says, in world units, before any device sees it.
+//! Scene description: meshes, instances, materials, images, lights and cameras, in world units and before upload.
 //!
-//! Nothing here knows Vulkan. A [`Scene`] comes from [`load`] (glTF, OBJ) or from [`crate::study`];
-//! the passes upload it. Lengths are metres, the world is right-handed with +Y up as in glTF 2.0 section 3.4.
+//! A [`Scene`] comes from [`load`] (glTF, OBJ) or from [`crate::study`]; the passes upload it. Nothing here uses Vulkan.
+//! Read glTF 2.0, sections 3.4 to 3.11.
+//! Assumes metres and a right-handed world with +Y up (glTF 2.0 section 3.4).
 
 mod accessor;
 pub mod camera;
@@ -39,21 +40,21 @@ pub use prune::{AmbientLight, Prune};
 pub use shared::{Mark, Shared};
 pub use sigma::SigmaGrid;
 
-/// What [`load`] may be told.
+/// Options of [`load`].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LoadOptions {
-    /// Animation time in seconds at which the scene is frozen; all animations of the file play together, each
+    /// Animation time in seconds at which the scene is frozen. All animations of the file play together, each
     /// channel clamped to its own range. `None` is the rest pose stored in the file: node transforms and default
-    /// weights as written, skins evaluated with them.
+    /// weights as written, with skins evaluated from them.
     pub time: Option<f64>,
-    /// What is read of it.
+    /// Which textures and vertex attributes are left unread.
     pub prune: Prune,
 }
 
 /// Reads a scene from a glTF 2.0 file (`.gltf`, `.glb`) or a Wavefront file (`.obj`).
 ///
 /// # Errors
-/// One sentence when printed with `{:#}`: the file, the place in it and what is wrong there.
+/// One sentence when printed with `{:#}`: the file, the place in the file and the fault there.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let scene = match extension.as_str() {
@@ -68,7 +69,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     Ok(scene)
 }
 
-/// A scene that is looked at one moment after another: its file is read once, and all moments share what does not move.
+/// An animated scene: its file is read once, and all moments of the animation share the static parts.
 pub struct Source {
     kind: Kind,
     prune: Prune,
@@ -79,7 +80,7 @@ enum Kind {
         file: Box<gltf_import::GltfFile>,
         name: String,
     },
-    /// Nothing moves.
+    /// A scene without animation.
     Still(Box<Scene>),
 }
 
@@ -87,7 +88,7 @@ impl Source {
     /// Opens a file that [`load`] reads.
     ///
     /// # Errors
-    /// As [`load`].
+    /// The errors of [`load`].
     pub fn open(path: &Path, prune: Prune) -> Result<Self> {
         let is_gltf = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb"));
         if !is_gltf {
@@ -98,17 +99,17 @@ impl Source {
         Ok(Self { kind: Kind::Gltf { file, name }, prune })
     }
 
-    /// A scene that does not move.
+    /// A source for a scene without animation.
     #[must_use]
     pub fn still(scene: Scene) -> Self {
         Self { kind: Kind::Still(Box::new(scene)), prune: Prune::Nothing }
     }
 
-    /// The scene at a moment of its animation; `None` is its rest pose. What [`load`] gives, to the last bit; its warnings of what does
-    /// not move are those of the first moment.
+    /// The scene at `time` seconds of its animation; `None` is its rest pose. The result equals that of [`load`], to the last bit.
+    /// Warnings about static parts are those of the first moment.
     ///
     /// # Errors
-    /// As [`load`].
+    /// The errors of [`load`].
     pub fn at(&mut self, time: Option<f64>) -> Result<Scene> {
         match &mut self.kind {
             Kind::Still(scene) => Ok(Scene::clone(scene)),
@@ -122,37 +123,37 @@ impl Source {
     }
 }
 
-/// Everything a picture is made from.
+/// A whole scene, as the renderer receives it.
 #[derive(Debug, Clone, Default)]
 pub struct Scene {
-    /// What the user asked for: a path or `study:NAME`.
+    /// The name the user gave: a path or `study:NAME`.
     pub name: String,
-    /// Geometry in object space; drawn only through [`Scene::instances`].
+    /// Geometry in object space; only [`Scene::instances`] are drawn.
     pub meshes: Vec<Mesh>,
     /// Placements of meshes in the world.
     pub instances: Vec<Instance>,
     /// Surface descriptions; never empty once meshes exist (glTF's default material is appended when needed).
     pub materials: Vec<Material>,
-    /// Decoded pictures that materials refer to.
+    /// Decoded images of the materials' textures.
     pub images: Vec<Image>,
     /// Punctual lights in world space.
     pub lights: Vec<Light>,
-    /// Intensity of the built-in studio where the user names no environment; `None`: 1 for a scene without lights of its
-    /// own, and no studio beside lights.
+    /// Scale of the built-in studio environment when the user names no environment. `None`: 1 for a scene without lights of its
+    /// own, and no studio in a scene with lights.
     pub studio: Option<f32>,
     /// Cameras in world space, in the order of the file's nodes.
     pub cameras: Vec<Camera>,
-    /// Seconds after which nothing moves any more; `None` where there is no animation.
+    /// Length of the animation in seconds; `None` without animation.
     pub duration: Option<f64>,
-    /// Textures and texture coordinates that are not read, with the reason, a sentence each.
+    /// Textures and texture coordinates that were pruned as unused, one sentence each with the reason.
     pub unread: Vec<String>,
-    /// Things that were read around: each one sentence that names the file, the place and the consequence.
+    /// Faults that reading worked around: one sentence each with the file, the place and the consequence.
     pub warnings: Vec<String>,
 }
 
 /// Triangles that share one material, in object space.
 ///
-/// Points and lines of a file have become thin triangles by the time a mesh exists.
+/// Points and lines of a file become thin triangles before a mesh exists.
 #[derive(Debug, Clone, Default)]
 pub struct Mesh {
     /// Name from the file, for messages and object labels.
@@ -167,7 +168,7 @@ pub struct Mesh {
     pub uvs: [Shared<[f32; 2]>; 2],
     /// Linear vertex colours with alpha; one per position or empty (white).
     pub colors: Shared<[f32; 4]>,
-    /// Three indices a triangle, each below `positions.len()`; counter-clockwise seen from the front.
+    /// Three indices per triangle, each below `positions.len()`; counter-clockwise seen from the front.
     pub indices: Shared<u32>,
     /// Index into [`Scene::materials`].
     pub material: usize,
@@ -180,12 +181,12 @@ pub struct Instance {
     pub name: String,
     /// Index into [`Scene::meshes`].
     pub mesh: usize,
-    /// Affine placement in f64, so that a chain of nodes far from the origin keeps its millimetres.
+    /// Affine placement in f64, so that a chain of nodes far from the origin keeps millimetres.
     /// May mirror (negative determinant) and scale non-uniformly.
     pub world_from_object: DAffine3,
 }
 
-/// A decoded picture: 8-bit RGBA rows from the top.
+/// A decoded image: 8-bit RGBA rows from the top.
 #[derive(Debug, Clone, Default)]
 pub struct Image {
     /// Name or URI, for messages.
@@ -194,7 +195,7 @@ pub struct Image {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// `width * height * 4` bytes, as stored: not premultiplied, not linearised.
+    /// `width * height * 4` bytes, as stored: alpha not premultiplied, colour not linearised.
     pub rgba: Shared<u8>,
 }
 
@@ -208,13 +209,13 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Half the diagonal: the radius of the sphere around the box, in metres.
+    /// Half the diagonal in metres: the radius of the bounding sphere of the box.
     #[must_use]
     pub fn radius(&self) -> f64 {
         (self.max - self.min).length() * 0.5
     }
 
-    /// Middle of the box.
+    /// Centre of the box.
     #[must_use]
     pub fn center(&self) -> DVec3 {
         (self.min + self.max) * 0.5
@@ -222,7 +223,7 @@ impl Bounds {
 }
 
 impl Scene {
-    /// World-space box around every vertex that has a finite place; `None` for a scene without any.
+    /// World-space box of every vertex with a finite position; `None` for a scene without such a vertex.
     #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {
         let mut bounds: Option<Bounds> = None;
@@ -242,14 +243,14 @@ impl Scene {
         bounds
     }
 
-    /// The place of each instance's first triangle among those of the scene, instance by instance.
+    /// Index of each instance's first triangle in the scene's triangle list, which runs instance by instance.
     #[must_use]
     pub fn first_triangles(&self) -> Vec<u32> {
         let counts = self.instances.iter().map(|i| (self.meshes[i.mesh].indices.len() / 3) as u32);
         counts.scan(0, |next, count| Some(std::mem::replace(next, *next + count))).collect()
     }
 
-    /// Triangles as drawn: instances counted.
+    /// Number of triangles over all instances.
     #[must_use]
     pub fn triangles(&self) -> usize {
         self.instances.iter().map(|i| self.meshes[i.mesh].indices.len() / 3).sum()

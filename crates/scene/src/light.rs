@@ -1,11 +1,13 @@
-//! Punctual lights (lecture R3, R4; KHR_lights_punctual), in world space.
+//! Punctual and analytic area lights (lecture R3, R4; KHR_lights_punctual), in world space.
+//!
+//! Read KHR_lights_punctual, and pbrt 12 for lights with and without extent.
 
 use glam::DVec3;
 
 use super::Bounds;
 use etalon_optics::spectra::Emission;
 
-/// A light without extent.
+/// A punctual light, or an analytic area light if it has an extent.
 #[derive(Debug, Clone)]
 pub struct Light {
     /// Name from the file.
@@ -13,58 +15,58 @@ pub struct Light {
     /// Linear Rec. 709 colour times strength: radiant intensity I (cd) for point and spot lights,
     /// perpendicular irradiance E (lx) for directional ones. Never negative.
     pub color: [f32; 3],
-    /// Its light by wavelength, whose colour `color` is then; `None`: that of D65 behind a coloured glass.
+    /// Spectrum, whose colour `color` then is; `None`: the spectrum of D65 filtered to `color`.
     pub spectrum: Option<Emission>,
-    /// Its shape, where it has one (knob `lights`); its colour is then the intensity along its axis, or of the whole of a ball.
+    /// Shape of an analytic area light (knob `lights`). `color` is then the intensity along the axis, or of the whole sphere.
     pub extent: Option<Extent>,
-    /// What kind, with its geometry.
+    /// Kind and geometry.
     pub kind: LightKind,
-    /// Stands for a surface that emits, where such surfaces light nothing: where they do, it is dark. In study scenes; no file says it.
+    /// Proxy light for an emissive surface, in study scenes only: it is black when emissive surfaces are lights themselves.
     pub proxy: bool,
 }
 
 impl Light {
-    /// Whether any light comes from it.
+    /// Whether the light has a colour above 0.
     #[must_use]
     pub fn shines(&self) -> bool {
         self.color != [0.0; 3]
     }
 
-    /// Whether some of it reaches a box; true where its range leaves that open.
+    /// Whether the light reaches some part of a box; true for lights without a range.
     #[must_use]
     pub fn reaches(&self, bounds: &Bounds) -> bool {
         let (LightKind::Point { position, range } | LightKind::Spot { position, range, .. }) = self.kind else {
             return true;
         };
         let distance = (position - position.clamp(bounds.min, bounds.max)).length();
-        // Distances on the device have roundings, of 1e-7 of the coordinates about the eye.
+        // Margin for the device: its distances have rounding errors of 1e-7 of the coordinates relative to the eye.
         range.is_none_or(|range| distance < range * (1.0 + 1e-3))
     }
 }
 
-/// Shape of a light that shines as evenly as paper: the same radiance from every place in every direction.
+/// Shape of an analytic area light. It emits diffusely, with the same radiance at every point and in every direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Extent {
-    /// A ball about a point light.
+    /// A sphere around a point light.
     Sphere {
-        /// Metres.
+        /// Radius in metres.
         radius: f64,
     },
-    /// A round face about a spot light, which looks along its axis.
+    /// A disk around a spot light, perpendicular to the axis.
     Disk {
-        /// Metres.
+        /// Radius in metres.
         radius: f64,
     },
-    /// A rectangular one.
+    /// A rectangle around a spot light, perpendicular to the axis.
     Rectangle {
-        /// Half of its first side, metres.
+        /// Half of the first side, as a vector in metres.
         across: DVec3,
-        /// Half the length of its second, which is at right angles to the first and to the axis.
+        /// Half the length of the second side in metres, perpendicular to the first side and to the axis.
         half_height: f64,
     },
 }
 
-/// Geometry of a light.
+/// Kind and geometry of a light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LightKind {
     /// Parallel rays that travel along `direction` (unit, away from the light).
@@ -72,14 +74,14 @@ pub enum LightKind {
         /// Unit direction in which the light travels.
         direction: DVec3,
     },
-    /// All directions from one position.
+    /// Emits into all directions from one position.
     Point {
         /// Position in metres.
         position: DVec3,
         /// Distance beyond which the light is cut off smoothly (KHR_lights_punctual), if any.
         range: Option<f64>,
     },
-    /// A cone from one position along `direction`.
+    /// Emits into a cone around `direction` from one position.
     Spot {
         /// Position in metres.
         position: DVec3,

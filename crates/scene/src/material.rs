@@ -1,4 +1,7 @@
-//! Materials: the glTF 2.0 metallic-roughness model with its extensions, and OBJ/MTL folded into the same fields.
+//! Materials: the glTF 2.0 metallic-roughness model with its extensions; OBJ/MTL is converted to the same fields.
+//!
+//! Read glTF 2.0 section 3.9 and appendix B, and the KHR_materials_* extensions named at the fields.
+//! Factors are linear Rec. 709, and a texture multiplies its factor.
 
 use std::sync::Arc;
 
@@ -8,7 +11,7 @@ use super::SigmaGrid;
 use super::lobe::{self, LOBES, Lobe, LobeOf};
 use etalon_optics::spectra::{Dispersion, Emission, Spectrum};
 
-/// One surface description. Factors are linear Rec. 709; a texture multiplies its factor.
+/// A surface description, with the factors and textures of all supported extensions.
 #[derive(Debug, Clone)]
 pub struct Material {
     /// Name from the file.
@@ -29,22 +32,22 @@ pub struct Material {
     pub normal_scale: f32,
     /// Ambient occlusion in R (linear).
     pub occlusion_texture: Option<TextureRef>,
-    /// How much of the occlusion is applied, 0 … 1.
+    /// Strength of the occlusion, 0 … 1.
     pub occlusion_strength: f32,
     /// Emitted radiance (emissive factor times strength), W/(m² sr) per channel.
     pub emissive: [f32; 3],
     /// Emissive texture (sRGB).
     pub emissive_texture: Option<TextureRef>,
-    /// What alpha means.
+    /// How alpha is used.
     pub alpha_mode: AlphaMode,
     /// Back faces are drawn, with the normal turned to the viewer.
     pub double_sided: bool,
-    /// Base colour is shown as it is (KHR_materials_unlit).
+    /// The base colour is the radiance, without lighting (KHR_materials_unlit).
     pub unlit: bool,
-    /// Index of refraction n (KHR_materials_ior); 1.5 unless the file says otherwise.
+    /// Index of refraction n (KHR_materials_ior); 1.5 by default.
     pub ior: f32,
-    /// Complex index [n, κ] of the metallic part, red first, where it is known; `base_color` holds its reflectance at
-    /// normal incidence then. Not beside transmission.
+    /// Complex index [n, κ] of the metallic part as a conductor, red first, if known; `base_color` is then its reflectance at
+    /// normal incidence. `None` for transmissive materials.
     pub conductor: Option<[[f32; 2]; 3]>,
     /// Strength of the dielectric specular reflection (KHR_materials_specular).
     pub specular: f32,
@@ -54,19 +57,19 @@ pub struct Material {
     pub specular_color: [f32; 3],
     /// Colour of F0 (sRGB).
     pub specular_color_texture: Option<TextureRef>,
-    /// Share of the non-reflected light that passes through (KHR_materials_transmission).
+    /// Fraction of the non-reflected light that is transmitted (KHR_materials_transmission).
     pub transmission: f32,
     /// Transmission in R (linear).
     pub transmission_texture: Option<TextureRef>,
-    /// Thickness in metres of object space below the surface (KHR_materials_volume); 0 is a thin sheet.
+    /// Thickness in metres of object space below the surface (KHR_materials_volume); 0 is a thin-walled surface.
     pub thickness: f32,
     /// Thickness in G (linear).
     pub thickness_texture: Option<TextureRef>,
-    /// Distance in metres after which white light has become `attenuation_color`; infinite for clear media.
+    /// Distance in metres after which white light has the colour `attenuation_color`; infinite for clear media.
     pub attenuation_distance: f32,
-    /// See `attenuation_distance`.
+    /// Transmittance over `attenuation_distance`, linear Rec. 709.
     pub attenuation_color: [f32; 3],
-    /// Absorption that varies inside the body, beside what `attenuation_distance` says (`extras.etalon.sigma`).
+    /// Heterogeneous absorption inside the solid, added to that of `attenuation_distance` (`extras.etalon.sigma`).
     pub sigma: Option<Arc<SigmaGrid>>,
     /// Strength of a clear coat of n = 1.5 (KHR_materials_clearcoat).
     pub clearcoat: f32,
@@ -78,32 +81,32 @@ pub struct Material {
     pub clearcoat_roughness_texture: Option<TextureRef>,
     /// Tangent-space normals of the coat.
     pub clearcoat_normal_texture: Option<TextureRef>,
-    /// The lobes that extensions lay over the base, in the order of [`LOBES`].
+    /// Lobes of extensions over the base layer, in the order of [`LOBES`].
     pub lobes: [LobeOf; lobe::COUNT],
-    /// Which solid's medium fills the place where transmissive solids overlap: that of the higher priority, and on a tie
-    /// the one entered last (`extras.etalon.priority`).
+    /// Priority among overlapping transmissive solids (nested dielectrics): the medium with the highest priority fills the overlap,
+    /// and on a tie the medium entered last (`extras.etalon.priority`).
     pub priority: i32,
-    /// How n varies over visible light (KHR_materials_dispersion, `extras.etalon`); `ior` is that of yellow light.
+    /// Dispersion: n by wavelength (KHR_materials_dispersion, `extras.etalon`). `ior` is n at the Fraunhofer d line.
     pub dispersion: Dispersion,
-    /// Reflectance by wavelength of the base, whose colour `base_color` is then; without a base colour texture.
+    /// Reflectance of the base by wavelength; `base_color` is its colour. Only without a base colour texture.
     pub reflectance: Option<Spectrum>,
-    /// What it emits by wavelength, whose colour `emissive` is then; without an emissive texture.
+    /// Emitted radiance by wavelength; `emissive` is its colour. Only without an emissive texture.
     pub emission: Option<Emission>,
-    /// n and κ of the metallic part by wavelength, beside `conductor`.
+    /// n and κ of the metallic part by wavelength, in addition to `conductor`.
     pub conductor_spectra: Option<[Spectrum; 2]>,
-    /// k_d, k_s and shine were told (`extras.etalon`). They are kept as the base colour π k_d, the F0 2π k_s/(shine + 2) and the roughness
-    /// (2/(shine + 2))^¼; the Phong rungs of the knob `brdf` show them as lecture B5 and B6 are written.
+    /// The file gives k_d, k_s and shininess (`extras.etalon`). They are stored as the base colour π k_d, the F0 2π k_s/(shine + 2)
+    /// and the roughness (2/(shine + 2))^¼. The Phong rungs of the knob `brdf` evaluate lecture B5 and B6 as written.
     pub phong: bool,
 }
 
 impl Material {
-    /// Whether κ of all that is given by n and κ is well above 0, as `is_metallic` of shaders/lib/fresnel.glsl has it.
+    /// Whether κ is well above 0 in all three channels, by the same test as `is_metallic` of shaders/lib/fresnel.glsl.
     #[must_use]
     pub fn is_metallic(&self) -> bool {
         self.conductor.iter().flatten().all(|&[n, kappa]| kappa > n.max(0.5))
     }
 
-    /// The textures that it may have, by the names that shaders know them by (`NAME_page` in shaders/lib/texels.glsl).
+    /// All texture slots with their shader names (`NAME_page` in shaders/lib/texels.glsl) and the meaning of their texels.
     pub fn textures(&self) -> impl Iterator<Item = (&'static str, Meaning, Option<TextureRef>)> {
         use Meaning::{Color, Data};
         let own = [
@@ -125,12 +128,12 @@ impl Material {
         }))
     }
 
-    /// The lobes over the base, those that it has not among them.
+    /// All lobes over the base, including those with factor 0.
     pub fn lobes(&self) -> impl Iterator<Item = (&'static Lobe, &LobeOf)> {
         LOBES.iter().copied().zip(&self.lobes)
     }
 
-    /// The same, to be changed.
+    /// All texture slots, mutable.
     pub(crate) fn textures_mut(&mut self) -> impl Iterator<Item = &mut Option<TextureRef>> {
         let own = [
             &mut self.base_color_texture,
@@ -149,25 +152,25 @@ impl Material {
         own.into_iter().chain(self.lobes.iter_mut().flat_map(|of| &mut of.textures))
     }
 
-    /// Whether light is lost on its way through the medium.
+    /// Whether the medium absorbs.
     #[must_use]
     pub fn absorbs(&self) -> bool {
         (self.attenuation_distance.is_finite() && self.attenuation_color.iter().any(|&c| c < 1.0))
             || self.marched_sigma().is_some()
     }
 
-    /// Whether light of different wavelengths goes different ways through it.
+    /// Whether the medium disperses: wavelengths refract into different directions.
     #[must_use]
     pub fn disperses(&self) -> bool {
         self.transmission > 0.0 && self.dispersion.disperses(f64::from(self.ior))
     }
 
-    /// n and κ at a wavelength in nm, of the metal where that is known.
+    /// n and κ of the metallic part at a wavelength in nm.
     #[must_use]
     pub fn complex_index(&self, nm: f64) -> [f64; 2] {
         match (&self.conductor_spectra, &self.conductor) {
             (Some(spectra), _) => spectra.each_ref().map(|spectrum| spectrum.at(nm)),
-            // Three lamps: the nearest.
+            // Without spectra: the index at the nearest of the three wavelengths of lecture C1.
             (None, Some([red, green, blue])) => {
                 let lamp = if nm > 585.0 {
                     red
@@ -182,29 +185,29 @@ impl Material {
         }
     }
 
-    /// The grid of σ of a body that light enters.
+    /// The grid of σ of a transmissive solid, unless it is 0 everywhere; paths march through it.
     #[must_use]
     pub fn marched_sigma(&self) -> Option<&SigmaGrid> {
         self.sigma.as_deref().filter(|grid| self.transmission > 0.0 && self.thickness > 0.0 && !grid.is_zero())
     }
 }
 
-/// glTF 2.0 section 3.9.4.
+/// Alpha modes of glTF 2.0 section 3.9.4.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum AlphaMode {
     /// Alpha is ignored.
     #[default]
     Opaque,
-    /// Fragments below the cutoff do not exist, the others are opaque.
+    /// Alpha test: fragments below the cutoff are discarded, the others are opaque.
     Mask(
         /// Alpha cutoff.
         f32,
     ),
-    /// Alpha is coverage, composited over what lies behind.
+    /// Alpha is coverage, composited over the background.
     Blend,
 }
 
-/// How the bytes of an image are meant.
+/// Encoding of an image's bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Meaning {
     /// sRGB-encoded colour, linear alpha.
@@ -213,7 +216,7 @@ pub enum Meaning {
     Data,
 }
 
-/// A texture as a material uses it.
+/// A reference to an image with coordinates and sampling.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TextureRef {
     /// Index into [`super::Scene::images`].
@@ -226,7 +229,7 @@ pub struct TextureRef {
     pub sampler: Sampler,
 }
 
-/// glTF sampler. Minification is always trilinear with mips unless the file asks for nearest.
+/// A glTF sampler. Minification is always trilinear with mip levels unless the file asks for nearest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Sampler {
     /// Along u.
@@ -241,13 +244,13 @@ pub struct Sampler {
     pub mips: bool,
 }
 
-/// What a texture coordinate outside 0 … 1 means.
+/// Addressing of texture coordinates outside 0 … 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub enum Wrap {
-    /// The picture repeats.
+    /// The image repeats.
     #[default]
     Repeat,
-    /// The picture repeats mirrored.
+    /// The image repeats mirrored.
     Mirror,
     /// The edge texel continues.
     Clamp,
@@ -260,7 +263,7 @@ impl Default for Sampler {
 }
 
 impl Default for Material {
-    /// glTF's default material: white, fully rough metal factors of section 3.9.2.
+    /// glTF's default material, the default values of section 3.9.2: white, metallic 1, roughness 1.
     fn default() -> Self {
         Self {
             name: "default".to_owned(),

@@ -1,4 +1,6 @@
-//! The node hierarchy of a glTF file at one moment: local transforms, animation, placement in the world (all in f64).
+//! Node hierarchy of a glTF file at one time: local transforms, animation and world transforms, all in f64.
+//!
+//! Read glTF 2.0 sections 3.5 (scenes and nodes), 3.11 (animations) and appendix C (interpolation).
 
 use anyhow::{Context, Result, bail, ensure};
 use glam::{DAffine3, DMat4, DQuat, DVec3, DVec4};
@@ -10,15 +12,15 @@ use gltf::json::{
 
 use super::{accessor::Accessor, container::Document};
 
-/// Every node with its placement.
+/// All nodes with their world transforms.
 pub(crate) struct Nodes {
-    /// Placement of each node in the world.
+    /// World transform of each node.
     pub(crate) world_from_node: Vec<DAffine3>,
-    /// Nodes that belong to the scene shown, in the order of the file.
+    /// Nodes of the rendered scene, in the order of the file.
     pub(crate) shown: Vec<usize>,
-    /// Morph weights that an animation gives a node.
+    /// Morph weights of nodes whose weights are animated.
     pub(crate) animated_weights: Vec<Option<Vec<f32>>>,
-    /// The last keyframe of all animations, in seconds; `None` where there are none.
+    /// Time of the last keyframe of all animations, in seconds; `None` without animations.
     pub(crate) duration: Option<f64>,
 }
 
@@ -40,7 +42,7 @@ impl Local {
     }
 }
 
-/// A node as messages call it.
+/// Name of a node for messages.
 pub(crate) fn label(document: &Document<'_>, index: usize) -> String {
     match document.root.nodes.get(index).and_then(|n| n.name.as_deref()) {
         Some(name) => format!("node {index} \"{name}\""),
@@ -49,7 +51,7 @@ pub(crate) fn label(document: &Document<'_>, index: usize) -> String {
 }
 
 impl Nodes {
-    /// Evaluates the hierarchy at `time`, or at rest.
+    /// Evaluates the hierarchy at `time` in seconds, or in the rest pose.
     pub(crate) fn new(document: &Document<'_>, time: Option<f64>, warnings: &mut Vec<String>) -> Result<Self> {
         let nodes = &document.root.nodes;
         let mut locals: Vec<Local> =
@@ -90,7 +92,7 @@ fn unit_quaternion(xyzw: [f64; 4]) -> Option<DQuat> {
     (length.is_finite() && length > 1e-12).then(|| q / length)
 }
 
-/// The parent of each node; a node with two parents, or one above itself, is an error.
+/// Parent of each node. A node with two parents, or a node that is its own ancestor, is an error.
 fn parents(document: &Document<'_>) -> Result<Vec<Option<usize>>> {
     let nodes = &document.root.nodes;
     let mut parents: Vec<Option<usize>> = vec![None; nodes.len()];
@@ -108,7 +110,7 @@ fn parents(document: &Document<'_>) -> Result<Vec<Option<usize>>> {
     Ok(parents)
 }
 
-/// World placements, parents before children. With one parent each, what no root leads to is a loop.
+/// World transforms, parents before children. Each node has at most one parent, so a node that no root reaches is in a cycle.
 fn place(document: &Document<'_>, parents: &[Option<usize>], locals: &[Local]) -> Result<Vec<DAffine3>> {
     let nodes = &document.root.nodes;
     let mut world: Vec<Option<DAffine3>> = vec![None; nodes.len()];
@@ -151,13 +153,13 @@ fn shown(document: &Document<'_>, parents: &[Option<usize>], warnings: &mut Vec<
     (0..root.nodes.len()).filter(|&i| is_shown[i]).collect()
 }
 
-/// Where `time` falls among keyframes.
+/// Position of a time among keyframes.
 struct Moment {
-    /// Key at or before the time.
+    /// Last keyframe at or before the time.
     key: usize,
-    /// Fraction of the way to the next key; 0 at and beyond both ends.
+    /// Fraction of the way to the next keyframe; 0 before the first and after the last.
     fraction: f64,
-    /// Seconds between the two keys.
+    /// Seconds between the two keyframes.
     span: f64,
 }
 
@@ -170,7 +172,7 @@ fn moment(times: &[[f32; 1]], time: f64) -> Moment {
     Moment { key: after - 1, fraction: (time - a) / (b - a), span: b - a }
 }
 
-/// One channel's value: `width` values of `N` numbers per key (`width` is 1 except for morph weights).
+/// Values of one channel: `width` values of `N` numbers per keyframe (`width` is 1 except for morph weights).
 struct Track<const N: usize> {
     values: Vec<[f64; N]>,
     width: usize,
@@ -188,7 +190,7 @@ impl<const N: usize> Track<N> {
         let blend = |f: &dyn Fn(usize) -> f64| std::array::from_fn(f);
         match self.interpolation {
             Interpolation::CubicSpline => {
-                // Each key holds in-tangent, value, out-tangent; the tangents are per second.
+                // A keyframe holds in-tangent, value and out-tangent; tangents are per second.
                 let v0 = value(key, 1);
                 if t == 0.0 {
                     return v0;
@@ -216,7 +218,7 @@ impl<const N: usize> Track<N> {
     }
 }
 
-/// The last keyframe of all animations; what cannot be read is told when a moment of it is asked for.
+/// Time of the last keyframe of all animations. Unreadable samplers are skipped here; evaluation at a time reports them.
 fn duration(document: &Document<'_>) -> Option<f64> {
     let samplers = document.root.animations.iter().flat_map(|animation| &animation.samplers);
     let times = samplers.filter_map(|sampler| Accessor::new(document, sampler.input.value()).ok()?.floats::<1>().ok());

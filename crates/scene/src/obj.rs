@@ -1,6 +1,6 @@
-//! Wavefront OBJ with MTL into a [`Scene`]: the format of the Phong numbers.
+//! Wavefront OBJ with MTL, imported into a [`Scene`]: the file format of Phong materials.
 //!
-//! How MTL's numbers become a metallic-roughness material is written down in `docs/scene-input.md`.
+//! Read `docs/scene-input.md` for the conversion of MTL to metallic-roughness materials. Lengths in files are metres.
 
 use std::{
     borrow::Cow,
@@ -21,10 +21,10 @@ use super::{
     thin::{self, Stroke},
 };
 
-/// Corners of a polygon beyond which it is cut as a fan, because cutting ears is quadratic.
+/// Largest polygon that is triangulated by ear clipping, which is quadratic; larger ones become triangle fans.
 const MAX_EARS: usize = 2_000;
 
-/// Reads an `.obj` file and the material libraries it names.
+/// Reads an `.obj` file and its material libraries.
 pub(crate) fn load(path: &Path, prune: Prune) -> Result<Scene> {
     let bytes = fs::read(path).context("the file cannot be read")?;
     let text = String::from_utf8_lossy(&bytes);
@@ -43,7 +43,7 @@ pub(crate) fn load(path: &Path, prune: Prune) -> Result<Scene> {
     Ok(scene)
 }
 
-/// Lines without comments, a backslash at the end joining the next one; numbered by their first line from 1.
+/// Lines without comments, numbered by their first line from 1. A backslash at the end of a line joins it with the next.
 fn logical_lines(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
     let mut lines = text.lines().enumerate();
     std::iter::from_fn(move || {
@@ -65,13 +65,13 @@ fn logical_lines(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
     })
 }
 
-/// A multiplicative hash: corners are small numbers, and a million of them should not wait for a cryptographic one.
+/// A multiplicative hash: keys are small numbers, and for a million of them a cryptographic hash is slow.
 #[derive(Default)]
 struct CornerHasher(u64);
 
 impl Hasher for CornerHasher {
     fn finish(&self) -> u64 {
-        // The table takes its bits from both ends.
+        // The hash table uses bits from both ends.
         self.0 ^ self.0 >> 32
     }
 
@@ -95,7 +95,7 @@ impl Hasher for CornerHasher {
 /// A corner of a face: position, texture coordinate, normal.
 type Corner = (u32, Option<u32>, Option<u32>);
 
-/// Faces in a row that share object, material and the presence of normals.
+/// Consecutive faces of equal object, material and presence of normals.
 #[derive(Default)]
 struct ObjGroup {
     name: String,
@@ -103,7 +103,7 @@ struct ObjGroup {
     smooth: bool,
     corners: Vec<Corner>,
     strokes: Vec<Stroke>,
-    /// Vertices of the strokes: `corners` and `strokes` never mix in one group.
+    /// Vertices of points and lines; a group has either these or `corners`.
     stroke_corners: Vec<Corner>,
 }
 
@@ -121,11 +121,11 @@ struct ObjReader {
     by_name: HashMap<String, usize>,
     pictures: Vec<ObjPicture>,
     warnings: Vec<String>,
-    /// A library was missing, so unknown material names have been explained.
+    /// A material library is missing; this warning explains unknown material names, too.
     library_missing: bool,
 }
 
-/// A picture of a material: colour, and opacity from another file.
+/// Image of a material: colour, and opacity from another file.
 #[derive(Debug, Clone, PartialEq)]
 struct ObjPicture {
     color: Option<PathBuf>,
@@ -169,7 +169,7 @@ impl ObjReader {
             "vt" => {
                 let u = number(words.next())?;
                 let v = words.next().map_or(Ok(0.0), |w| number(Some(w)))?;
-                // Rows of pictures are counted from the top here, from the bottom in OBJ.
+                // Image rows count from the top here, and from the bottom in OBJ.
                 self.uvs.push([u, 1.0 - v]);
             }
             "vn" => self.normals.push(numbers::<3>(&mut words)?),
@@ -208,7 +208,7 @@ impl ObjReader {
         }
     }
 
-    /// `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 1, or from the end when negative.
+    /// Parses `v`, `v/vt`, `v//vn` or `v/vt/vn`: indices from 1, or from the end if negative.
     fn corner(&self, word: &str) -> Result<Corner> {
         fn index(text: &str, count: usize, what: &str) -> Result<u32> {
             let i: i64 = text.parse().map_err(|_| anyhow!("\"{text}\" is not an index"))?;
@@ -227,7 +227,7 @@ impl ObjReader {
         Ok((position, uv, normal))
     }
 
-    /// The group that the next face belongs to.
+    /// The group of the next face.
     fn group(&mut self, smooth: bool, strokes: bool) -> &mut ObjGroup {
         let fits = |g: &ObjGroup| {
             g.material == self.material
@@ -258,7 +258,7 @@ impl ObjReader {
         Ok(())
     }
 
-    /// The names after `mtllib`: several, or one with spaces in it.
+    /// Reads the libraries after `mtllib`: several names, or one name with spaces.
     fn library(&mut self, names: &str) -> Result<()> {
         let whole = self.folder.join(clean(names));
         let paths: Vec<PathBuf> = if whole.is_file() {
@@ -334,7 +334,7 @@ impl ObjReader {
         self.materials.push(material);
     }
 
-    /// Index of a picture, the same for the same files.
+    /// Index of an image; equal files share an index.
     fn picture(&mut self, picture: ObjPicture) -> usize {
         self.pictures.iter().position(|p| *p == picture).unwrap_or_else(|| {
             self.pictures.push(picture);
@@ -371,7 +371,7 @@ impl ObjReader {
         Ok(scene)
     }
 
-    /// Takes from the materials what cannot be seen. There are no lights in such a file.
+    /// Prunes the textures of all materials; OBJ files have no lights. Returns the reasons.
     fn prune_unused(&mut self, prune: Prune, groups: &[ObjGroup]) -> Vec<String> {
         let Some(ambient) = prune.ambient(0) else { return Vec::new() };
         let used: HashSet<usize> = groups.iter().filter_map(|group| group.material).collect();
@@ -379,7 +379,7 @@ impl ObjReader {
         materials.flat_map(|(i, m)| prune_textures(m, used.contains(&i), ambient)).collect()
     }
 
-    /// Decodes, in parallel, the pictures that the materials still name.
+    /// Decodes, in parallel, the images that the materials still use.
     fn decode(&mut self) -> Result<Vec<Image>> {
         let mut places = vec![None; self.pictures.len()];
         let mut wanted = Vec::new();
@@ -448,12 +448,12 @@ impl ObjReader {
     }
 }
 
-/// File names of MTL often come from Windows.
+/// Cleans a file name of MTL, which often has quotes and backslashes of Windows.
 fn clean(name: &str) -> String {
     name.trim().trim_matches('"').replace('\\', "/")
 }
 
-/// A polygon as triangles of its corner numbers: ears cut off in the plane of its area vector.
+/// Triangulates a polygon by ear clipping in the plane of its area vector; returns corner numbers.
 fn triangulate(corners: &[DVec3]) -> Vec<[usize; 3]> {
     let n = corners.len();
     let fan = || (1..n - 1).map(|i| [0, i, i + 1]).collect();
@@ -472,7 +472,7 @@ fn triangulate(corners: &[DVec3]) -> Vec<[usize; 3]> {
     let mut out = Vec::with_capacity(n - 2);
     while left.len() > 3 {
         let m = left.len();
-        // Beginning at corner 1 makes convex polygons the fan that everybody expects.
+        // Starting at corner 1 turns convex polygons into the usual fan.
         let ear = (1..=m).map(|i| i % m).find(|&i| {
             let (a, b, c) = (left[(i + m - 1) % m], left[i], left[(i + 1) % m]);
             turn(a, b, c) > 0.0
@@ -480,7 +480,7 @@ fn triangulate(corners: &[DVec3]) -> Vec<[usize; 3]> {
                     p == a || p == b || p == c || turn(a, b, p) < 0.0 || turn(b, c, p) < 0.0 || turn(c, a, p) < 0.0
                 })
         });
-        // A polygon that crosses itself may have no ear; any corner will do then.
+        // A self-intersecting polygon may have no ear; any corner will do.
         let i = ear.unwrap_or(1);
         out.push([left[(i + m - 1) % m], left[i], left[(i + 1) % m]]);
         left.remove(i);
@@ -519,7 +519,7 @@ fn decode(picture: &ObjPicture) -> Result<Image> {
     }
 }
 
-/// A texture statement: its file and the options that are understood.
+/// A texture statement: file and supported options.
 #[derive(Debug, Clone, PartialEq)]
 struct Map {
     path: String,
@@ -546,7 +546,7 @@ impl Map {
             for i in 0..most {
                 let word = rest.split_whitespace().next().unwrap_or("");
                 let value = word.parse::<f32>();
-                // Vectors may be shorter than three; what is no number then is the file.
+                // Vectors may have fewer than three components; a word that is not a number is the file name.
                 if is_vector && value.is_err() && i > 0 {
                     break;
                 }
@@ -568,7 +568,7 @@ impl Map {
 
     fn reference(&self, image: usize) -> TextureRef {
         let wrap = if self.clamp { Wrap::Clamp } else { Wrap::Repeat };
-        // OBJ scales and shifts a coordinate that grows upwards; ours grows downwards.
+        // OBJ scales and shifts a coordinate that points up; ours points down.
         let ([su, sv], [ou, ov]) = (self.scale, self.offset);
         let shift =
             if self.scale == [1.0; 2] && self.offset == [0.0; 2] { Vec2::ZERO } else { Vec2::new(ou, 1.0 - sv - ov) };
@@ -581,7 +581,7 @@ impl Map {
     }
 }
 
-/// The statements of one MTL material.
+/// Statements of one MTL material.
 #[derive(Debug, Clone, Default)]
 struct Mtl {
     kd: Option<[f32; 3]>,
@@ -602,7 +602,7 @@ struct Mtl {
 fn color(text: &str) -> Result<[f32; 3]> {
     let mut words = text.split_whitespace();
     let r = number(words.next())?;
-    // Green and blue may be left out and are red's value then.
+    // Green and blue are optional and default to red.
     let Some(g) = words.next() else { return Ok([r; 3]) };
     let rgb = [r, number(Some(g))?, number(words.next())?];
     ensure!(rgb.iter().all(|x| x.is_finite()), "the colour {text} is not finite");
@@ -639,7 +639,7 @@ impl Mtl {
         Ok(())
     }
 
-    /// What no surface does, and what is drawn instead.
+    /// Warnings about physically impossible values, and the values that replace them.
     fn beyond_nature(&self) -> Vec<String> {
         let mut said = Vec::new();
         for (keyword, share) in [("Kd", self.kd), ("Ks", self.ks), ("Tf", self.tf)] {
@@ -651,11 +651,11 @@ impl Mtl {
         if let Some(out) = self.ke.iter().flatten().find(|x| **x < 0.0) {
             said.push(format!("Ke {out} would take light away and is read as 0"));
         }
-        // Lecture B6's bound k_s ≤ (shine + 2)/2π (1 − π k_d) with what MTL files mean: Kd = π k_d is an albedo, and Ks the
-        // lobe's share, 2π k_s/(shine + 2).
+        // Lecture B6's bound k_s ≤ (shine + 2)/2π (1 − π k_d), in the meaning of MTL files: Kd = π k_d is an albedo, and Ks =
+        // 2π k_s/(shine + 2) is the albedo of the lobe.
         if let (false, Some(kd), Some(ks)) = (matches!(self.illum, Some(0 | 1 | 4 | 6 | 7 | 9)), self.kd, self.ks) {
             let most = (0..3).map(|i| kd[i].clamp(0.0, 1.0) + ks[i].clamp(0.0, 1.0)).fold(0.0, f32::max);
-            // Two decimals that round up to 1 in the sum are nobody's mistake.
+            // Tolerates values of two decimals whose sum is rounded up.
             if most > 1.005 {
                 said.push(format!(
                     "Kd + Ks is {most:.2}, more light than there is; of Kd the share is drawn that Ks lets into the surface"
@@ -699,7 +699,7 @@ impl Mtl {
             m.transmission = 1.0;
             let tint = self.tf.unwrap_or([1.0; 3]).map(|x| x.clamp(0.0, 1.0));
             m.base_color = [tint[0], tint[1], tint[2], 1.0];
-            // 6 and 7 ask for refraction: a solid body. 4 and 9 are glass without it: a thin sheet.
+            // illum 6 and 7 refract: a solid. illum 4 and 9 are glass without refraction: a thin-walled surface.
             m.thickness = if matches!(illum, 6 | 7) && self.ni.is_some_and(|n| n > 1.0) { 1.0 } else { 0.0 };
         } else if d < 1.0 {
             m.base_color[3] = d;
@@ -715,7 +715,7 @@ mod tests {
 
     #[test]
     fn a_concave_polygon_keeps_its_area() {
-        // An arrowhead: the reflex corner 3 forbids a fan from corner 0 of the other kind.
+        // An arrowhead: corner 3 is reflex, so a fan from corner 0 or 2 would leave the polygon.
         let p = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (3.0, 1.0)].map(|(x, y)| DVec3::new(x, y, 1.0));
         for shift in 0..4 {
             let turned: Vec<DVec3> = (0..4).map(|i| p[(i + shift) % 4]).collect();

@@ -1,4 +1,4 @@
-//! Decoding pictures: PNG, JPEG and WebP into 8-bit RGBA, guarded against files that claim absurd sizes.
+//! Image decoding: PNG, JPEG and WebP into 8-bit RGBA, with limits against files that claim absurd sizes.
 
 use std::io::Cursor;
 
@@ -7,13 +7,13 @@ use image::{ImageFormat, ImageReader, Limits};
 
 use super::Image;
 
-/// Largest width and height: what every Vulkan 1.3 device of interest can hold in one 2D image.
+/// Largest width and height in texels, which every Vulkan 1.3 device of interest supports for a 2D image.
 const MAX_SIDE: u32 = 16_384;
-/// Most memory a decoder may take for one picture.
+/// Largest memory in bytes for decoding one image.
 const MAX_DECODE_BYTES: u64 = 2 << 30;
 
 fn reader(bytes: &[u8]) -> Result<ImageReader<Cursor<&[u8]>>> {
-    // The first bytes decide; files often carry the wrong MIME type or ending.
+    // The magic bytes decide: files often have the wrong MIME type or extension.
     let format = image::guess_format(bytes).ok();
     let Some(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP)) = format else {
         bail!("the data is not PNG, JPEG or WebP");
@@ -27,12 +27,12 @@ fn reader(bytes: &[u8]) -> Result<ImageReader<Cursor<&[u8]>>> {
     Ok(reader)
 }
 
-/// Decoders answer in several lines and repeat their sources; a message here is one sentence.
+/// An error in one sentence: decoders write several lines and repeat their sources.
 fn refusal(what: &str, error: &image::ImageError) -> anyhow::Error {
     anyhow!("{what}: {}", error.to_string().split_whitespace().collect::<Vec<_>>().join(" "))
 }
 
-/// Decodes a whole picture.
+/// Decodes an image.
 pub(crate) fn decode(name: String, bytes: &[u8]) -> Result<Image> {
     let picture = reader(bytes)?.decode().map_err(|e| refusal("the picture cannot be decoded", &e))?.into_rgba8();
     let (width, height) = picture.dimensions();
@@ -42,7 +42,7 @@ pub(crate) fn decode(name: String, bytes: &[u8]) -> Result<Image> {
     Ok(Image { name, width, height, rgba: picture.into_raw().into() })
 }
 
-/// Reads no further than the header: enough to tell a picture from something else.
+/// Reads the header only, enough to recognise a supported image.
 pub(crate) fn probe(bytes: &[u8]) -> Result<()> {
     reader(bytes)?.into_dimensions().map_err(|e| refusal("the picture's header cannot be read", &e))?;
     Ok(())

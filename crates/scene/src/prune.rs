@@ -1,32 +1,35 @@
-//! What of a scene's textures and texture coordinates a picture may depend on: the rest is neither decoded nor uploaded.
+//! Pruning: textures and texture coordinates that cannot affect the picture are neither decoded nor uploaded.
+//!
+//! Read glTF 2.0 section 3.9 for the factors that decide it. Each pruned texture or attribute is reported with its reason.
 
 use super::lobe::LOBES;
 use super::material::TextureRef;
 use super::{Material, Scene, Shared};
 
-/// What is read of a scene.
+/// Which unused data is pruned from a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Prune {
-    /// All that materials name, whatever comes of it.
+    /// Nothing: every texture that a material names is read.
     #[default]
     Nothing,
-    /// What can be seen.
+    /// Textures and attributes that cannot affect the picture.
     Unused(AmbientLight),
 }
 
-/// When occlusion may be seen: it takes from light that comes from all around, and from mirror images of the screen.
+/// Whether the picture has ambient light, the only light that occlusion textures darken. Environment light and reflections
+/// in screen space count as ambient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AmbientLight {
-    /// Never.
+    /// No.
     Absent,
-    /// If the scene has no lights of its own.
+    /// Only if the scene has no lights of its own.
     WithoutLights,
-    /// Always.
+    /// Yes.
     Present,
 }
 
 impl Prune {
-    /// Whether occlusion may be seen, and whether anything may be left out, for a scene with so many lights.
+    /// Whether a scene with this number of lights has ambient light; `None` when nothing is pruned.
     pub(crate) fn ambient(self, lights: usize) -> Option<bool> {
         match self {
             Self::Nothing => None,
@@ -37,8 +40,8 @@ impl Prune {
     }
 }
 
-/// Takes the textures from a material that nothing of the picture depends on, and says of each which and why. `used`: some
-/// mesh that is drawn has it. `ambience`: occlusion may be seen.
+/// Removes the textures of a material that cannot affect the picture; returns one sentence per texture with the reason.
+/// `used`: some mesh with triangles has the material. `ambient`: the picture has ambient light.
 pub(crate) fn prune_textures(m: &mut Material, used: bool, ambient: bool) -> Vec<String> {
     let mut unread = Vec::new();
     let name = m.name.clone();
@@ -78,10 +81,10 @@ pub(crate) fn prune_textures(m: &mut Material, used: bool, ambient: bool) -> Vec
     unread
 }
 
-/// Sets of texture coordinates that the textures of a material read, those that are kept, and that which tangents follow.
+/// Texture-coordinate sets of a material: `sets` are read by its textures, `tangents` is the set of its normal textures.
 pub(crate) struct Coordinates {
     pub(crate) sets: [bool; 2],
-    /// With the first set where there is any texture: it tells rays how dense texels are.
+    /// Sets that are kept. A textured material keeps set 0: ray tracing computes the texel density from it.
     pub(crate) kept: [bool; 2],
     pub(crate) tangents: Option<usize>,
 }
@@ -95,7 +98,7 @@ impl Coordinates {
     }
 }
 
-/// Takes from a whole scene what nothing of the picture depends on.
+/// Prunes textures, texture coordinates and tangents that cannot affect the picture from a whole scene.
 pub fn prune_unused(scene: &mut Scene, prune: Prune) {
     let Some(ambient) = prune.ambient(scene.lights.len()) else { return };
     let mut used = vec![false; scene.materials.len()];

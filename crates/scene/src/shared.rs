@@ -1,9 +1,9 @@
-//! Lists that scenes share until one of them changes its own.
+//! Copy-on-write lists: clones of a scene share them until one clone changes its own.
 
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Weak};
 
-/// A list that clones share: a clone costs a count, and a change makes the list its owner's own.
+/// A copy-on-write list: a clone increments a reference count, and a change of a shared list copies it.
 ///
 /// ```
 /// use etalon_scene::Shared;
@@ -17,20 +17,20 @@ use std::sync::{Arc, Weak};
 pub struct Shared<T>(Arc<Vec<T>>);
 
 impl<T> Shared<T> {
-    /// Whether both are one list in memory.
+    /// Whether both are the same list in memory.
     #[must_use]
     pub fn is_same(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
     }
 
-    /// What tells this list in memory from all others, also when it is gone.
+    /// An identity of this list in memory that is never reused, even after the list is dropped.
     #[must_use]
     pub fn mark(&self) -> Mark<T> {
         Mark(Arc::downgrade(&self.0))
     }
 }
 
-/// Which list in memory it was: equal marks are of one list. It keeps nothing of the list.
+/// Identity of a list in memory: equal marks belong to one list. A mark does not keep the list alive.
 #[derive(Debug, Clone)]
 pub struct Mark<T>(Weak<Vec<T>>);
 

@@ -1,4 +1,6 @@
-//! Absorption that varies inside a body: a grid of σ in the space of an object (lecture A2).
+//! Heterogeneous medium: a grid of absorption coefficients σ in object space (lecture A2).
+//!
+//! Read pbrt 11.4 (GridMedium) and docs/scene-input.md. The medium absorbs and does not scatter.
 
 use std::collections::HashSet;
 
@@ -7,10 +9,10 @@ use glam::{DAffine3, DVec3, Vec3};
 
 use super::{Mesh, Scene};
 
-/// Values that one grid may hold, points times channels: 2^24.
+/// Largest number of values in one grid, points times channels: 2^24.
 const MOST_VALUES: u64 = 1 << 24;
 
-/// σ at the points of a grid, trilinear between them; outside of the grid's box its edge goes on.
+/// σ at the points of a grid, trilinear between them; outside the grid's box the value at the nearest point of the box holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SigmaGrid {
     size: [usize; 3],
@@ -19,13 +21,13 @@ pub struct SigmaGrid {
 }
 
 impl SigmaGrid {
-    /// A grid of `size` points along x, y and z, the first of them on one side of the box and the last on the other; one
-    /// point along an axis is constant along it. `values` are in 1/m of the world, as an attenuation distance is in metres
-    /// of the world: one a point, or red, green and blue, x fastest, then y. `bounds` is the box in the object's space;
-    /// `None` is that of its mesh.
+    /// A grid of `size` points along x, y and z; the first and last points of an axis lie on opposite sides of the box. With one
+    /// point along an axis, σ is constant along it. `values` are in 1/m of world space (as attenuation distances are in metres of
+    /// world space): one per point, or red, green and blue; x varies fastest, then y. `bounds` is the box in object space;
+    /// `None` is the bounding box of the mesh.
     ///
     /// # Errors
-    /// One sentence when sizes, number of values, a value or the box cannot be meant.
+    /// One sentence when a size, the number of values, a value or the box is invalid.
     pub fn new(size: [u64; 3], values: Vec<f32>, bounds: Option<[DVec3; 2]>) -> Result<Self> {
         let [x, y, z] = size;
         ensure!(x > 0 && y > 0 && z > 0, "a grid of {x} x {y} x {z} points has none");
@@ -57,19 +59,19 @@ impl SigmaGrid {
         Ok(Self { size: size.map(|n| n as usize), values, bounds })
     }
 
-    /// Points along x, y and z.
+    /// Number of points along x, y and z.
     #[must_use]
     pub fn size(&self) -> [usize; 3] {
         self.size
     }
 
-    /// 1, or 3 for red, green and blue.
+    /// Number of channels: 1, or 3 for red, green and blue.
     #[must_use]
     pub fn channels(&self) -> usize {
         self.values.len() / self.size.iter().product::<usize>()
     }
 
-    /// σ at a point of the grid.
+    /// σ at a grid point, in 1/m.
     #[must_use]
     pub fn at(&self, [x, y, z]: [usize; 3], channel: usize) -> f32 {
         let point = (z * self.size[1] + y) * self.size[0] + x;
@@ -77,7 +79,7 @@ impl SigmaGrid {
         self.values[point * channels + channel.min(channels - 1)]
     }
 
-    /// Whether nothing is absorbed anywhere.
+    /// Whether σ is 0 everywhere.
     #[must_use]
     pub fn is_zero(&self) -> bool {
         self.values.iter().all(|&v| v == 0.0)
@@ -88,7 +90,7 @@ impl SigmaGrid {
         self.values.iter_mut().for_each(|v| *v *= factor);
     }
 
-    /// The mean of σ over the grid's box. A point on a side counts for half a cell there.
+    /// Mean of σ over the grid's box, in 1/m. A point on a side of the box counts for half a cell along that axis.
     #[must_use]
     pub fn mean(&self) -> [f64; 3] {
         let [nx, ny, nz] = self.size;
@@ -108,8 +110,8 @@ impl SigmaGrid {
         sum.map(|s| s / weights)
     }
 
-    /// Leads from the space of the object, whose mesh this is, to places in the grid: 0 at the first point of an axis, 1 at
-    /// the next.
+    /// Transform from the object space of `mesh` to grid coordinates: 0 at the first point of an axis, 1 at
+    /// the second.
     #[must_use]
     pub fn grid_from_object(&self, mesh: &Mesh) -> DAffine3 {
         let [min, max] = self.bounds.unwrap_or_else(|| {
@@ -117,7 +119,7 @@ impl SigmaGrid {
             [all().fold(DVec3::INFINITY, DVec3::min), all().fold(DVec3::NEG_INFINITY, DVec3::max)]
         });
         let cells = DVec3::from(self.size.map(|n| (n - 1) as f64));
-        // An axis of one point has no cells, and a flat box nothing along it.
+        // An axis of one point has no cells, and a flat box has no extent.
         let scale = DVec3::from([0, 1, 2].map(|i| if max[i] > min[i] { cells[i] / (max[i] - min[i]) } else { 0.0 }));
         let scale = if scale.is_finite() { scale } else { DVec3::ZERO };
         let shift = if min.is_finite() { -min * scale } else { DVec3::ZERO };
@@ -125,8 +127,8 @@ impl SigmaGrid {
     }
 }
 
-/// Gives each instance whose material has a grid a material of its own, and a mesh that names it: the grid is at another
-/// place in the world for each. Nothing happens where that is so already.
+/// Gives each instance with a grid its own material and its own mesh that refers to it, because the grid has a different world
+/// transform in each. Does nothing when each instance has its own already.
 pub fn one_medium_each(scene: &mut Scene) {
     if scene.materials.iter().all(|m| m.sigma.is_none()) {
         return;
@@ -162,7 +164,7 @@ mod tests {
 
     #[test]
     fn the_mean_is_that_of_the_field_and_not_of_the_points() {
-        // x² between points of a line: the trapezium rule, by hand.
+        // x² linear between four points of a line: the trapezoid rule, by hand.
         let grid = SigmaGrid::new([4, 1, 1], vec![0.0, 1.0, 4.0, 9.0], None).expect("a grid");
         assert!((grid.mean()[1] - (0.5 + 2.5 + 6.5) / 3.0).abs() < 1e-12);
         let grid = SigmaGrid::new([2, 2, 2], vec![3.0; 24], None).expect("three channels");
@@ -195,7 +197,7 @@ mod tests {
         one_medium_each(&mut scene);
         let material = |i: &Instance| scene.meshes[i.mesh].material;
         assert_eq!(scene.instances.iter().map(material).collect::<Vec<_>>(), [1, 2, 0, 0, 3]);
-        // The last one has its mesh to itself.
+        // The last instance is the only one of its mesh, so the mesh is not copied.
         assert_eq!((scene.meshes.len(), scene.materials.len(), scene.instances[4].mesh), (4, 4, 2));
         one_medium_each(&mut scene);
         assert_eq!((scene.meshes.len(), scene.materials.len()), (4, 4));

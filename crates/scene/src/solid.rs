@@ -1,7 +1,9 @@
-//! Which meshes are bodies that light passes through, and which of them contain a point.
+//! Closed dielectric meshes (solids) and thin-walled surfaces, and the solids that contain a point.
 //!
-//! A ray that refracts has to know when it is inside. That question has an answer only where the surface separates an
-//! inside from an outside, so a transmissive mesh is a solid when it is closed, and a thin sheet otherwise.
+//! Refraction needs the side of the surface on which a ray is, and only a watertight mesh separates an inside from an outside. A
+//! transmissive mesh is therefore a solid if it is closed, and a thin-walled surface otherwise.
+//! Read Schmidt and Budge, "Simple Nested Dielectrics in Ray Traced Images", journal of graphics tools, 2002;
+//! KHR_materials_volume. Assumes triangles counter-clockwise from the front.
 
 use std::collections::HashMap;
 
@@ -9,32 +11,31 @@ use glam::{DVec3, Vec3};
 
 use super::{AlphaMode, Bounds, Instance, Mesh, Scene};
 
-/// Below this share of the sum of its parts' magnitudes a volume is rounding: a mesh of a million triangles adds up
-/// errors of 1e-16 each.
+/// A volume below this fraction of the sum of its terms' magnitudes is rounding error: the sum over a mesh of a million triangles
+/// has errors of 1e-16 each.
 const NO_VOLUME: f64 = 1e-12;
 
-/// What the transmissive instances of a scene are; one entry per instance.
+/// Solids and thin-walled surfaces among the instances of a scene; each list has one entry per instance.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Solids {
-    /// Transmissive bodies.
+    /// Closed transmissive meshes.
     pub solid: Vec<bool>,
-    /// Transmissive, and to be read as a thin sheet of its nominal thickness: blended, thickness 0, or a mesh that bounds no
-    /// volume. False for surfaces that transmit nothing.
+    /// Transmissive thin-walled surfaces, of their nominal thickness: blended, thickness 0, or a mesh that bounds no volume. False
+    /// for surfaces that do not transmit.
     pub sheet: Vec<bool>,
-    /// A transmissive solid whose triangles are wound the wrong way round, seen in object space: the front of each
-    /// looks inwards. A mirrored placement does not count.
+    /// Solids with reversed winding in object space: the front faces look inwards. A mirrored placement does not count.
     pub flipped: Vec<bool>,
-    /// Such a solid whose vertex normals look inwards with them. Normals may be right where the winding is not.
+    /// Flipped solids whose vertex normals look inwards, too. A mesh may have correct normals with reversed winding.
     pub normals_flipped: Vec<bool>,
-    /// One sentence for each mesh that is not what its material says.
+    /// One sentence for each mesh whose geometry contradicts its material.
     pub warnings: Vec<String>,
 }
 
-/// Whether a mesh separates an inside from an outside: every directed edge has as many opposite ones.
+/// Whether a mesh is closed (watertight): every directed edge occurs as often as the opposite one.
 ///
-/// Vertices are the same when their positions are, to the last bit (and −0 is 0): normals and texture coordinates part
-/// vertices along seams that are no gaps. Triangles with two corners in one place have no part in this. Surfaces may
-/// touch or cross themselves, and several may make up one mesh. A mesh without triangles is not closed.
+/// Vertices are welded by position, to the last bit (−0 equals 0), because seams of normals and texture coordinates duplicate
+/// vertices without a gap. Triangles with two corners in one place are ignored. The mesh need not be manifold: surfaces may
+/// touch or cross themselves, and several may form one mesh. A mesh without triangles is not closed.
 #[must_use]
 pub fn is_closed(mesh: &Mesh) -> bool {
     let mut names = HashMap::with_capacity(mesh.positions.len());
@@ -64,10 +65,10 @@ fn corners(mesh: &Mesh) -> impl Iterator<Item = [DVec3; 3]> {
     mesh.indices.as_chunks::<3>().0.iter().map(move |triangle| triangle.map(at))
 }
 
-/// The volume that a closed mesh bounds in object space: positive when its fronts look outwards, 0 when it is rounding.
+/// Volume of a closed mesh in object space: positive when its fronts look outwards, 0 when it is below rounding error.
 fn signed_volume(mesh: &Mesh) -> f64 {
     let all = || mesh.positions.iter().map(|&p| Vec3::from(p).as_dvec3());
-    // About the mesh's own middle: far from its origin the tetrahedra would be large and cancel.
+    // Tetrahedra from the middle of the mesh: from a distant origin they would be large and cancel.
     let middle = (all().fold(DVec3::INFINITY, DVec3::min) + all().fold(DVec3::NEG_INFINITY, DVec3::max)) * 0.5;
     let (mut sum, mut magnitude) = (0.0, 0.0);
     for [a, b, c] in corners(mesh) {
@@ -78,7 +79,7 @@ fn signed_volume(mesh: &Mesh) -> f64 {
     if sum.abs() > NO_VOLUME * magnitude { sum / 6.0 } else { 0.0 }
 }
 
-/// Whether the vertex normals of a mesh lie, on the whole, on the front side of its triangles.
+/// Whether the vertex normals of a mesh lie, in sum, on the front side of its triangles.
 fn normals_follow_faces(mesh: &Mesh) -> bool {
     let agreement = mesh.indices.as_chunks::<3>().0.iter().zip(corners(mesh)).map(|(triangle, [a, b, c])| {
         let smooth: DVec3 = triangle.iter().map(|&i| Vec3::from(mesh.normals[i as usize]).as_dvec3()).sum();
@@ -87,7 +88,7 @@ fn normals_follow_faces(mesh: &Mesh) -> bool {
     agreement.filter(|x| x.is_finite()).sum::<f64>() >= 0.0
 }
 
-/// What a mesh with a thickness turns out to be.
+/// Class of a transmissive mesh with a thickness: closed, closed with reversed winding, not closed, or closed without volume.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Body {
     Solid,
@@ -107,7 +108,7 @@ fn body(mesh: &Mesh) -> Body {
     }
 }
 
-/// Tells solids from sheets among the transmissive instances; each mesh is looked at once.
+/// Classifies the transmissive instances as solids or thin-walled surfaces; each mesh is tested once.
 #[must_use]
 pub fn solids(scene: &Scene) -> Solids {
     let mut warnings = Vec::new();
@@ -116,7 +117,7 @@ pub fn solids(scene: &Scene) -> Solids {
     for instance in &scene.instances {
         let mesh = &scene.meshes[instance.mesh];
         let material = &scene.materials[mesh.material];
-        // What blends lets light straight through.
+        // Alpha-blended surfaces do not refract.
         let blends = material.alpha_mode == AlphaMode::Blend;
         if material.transmission <= 0.0 || material.thickness <= 0.0 || blends {
             solid.push(false);
@@ -149,12 +150,11 @@ pub fn solids(scene: &Scene) -> Solids {
     Solids { solid, sheet, flipped, normals_flipped, warnings }
 }
 
-/// The transmissive solids that contain a point, as indices of instances, the one with the largest box first: for
-/// bodies inside one another that is from the outside in.
+/// Transmissive solids that contain a point, as indices of instances, the one with the largest box first: nested solids come
+/// from the outside in.
 ///
-/// A body contains the point when the surface winds around it: the sum of the signed solid angles under which its
-/// triangles are seen is ±4π inside and 0 outside, whatever the winding and however the placement mirrors. On the
-/// surface itself the answer is either.
+/// The test is the winding number: the signed solid angles of the triangles, seen from the point, sum to ±4π inside and to 0
+/// outside, for any winding and mirroring. On the surface itself the result is either.
 #[must_use]
 pub fn media_at(scene: &Scene, solids: &Solids, p_world: DVec3) -> Vec<usize> {
     let mut media = Vec::new();
@@ -174,7 +174,7 @@ pub fn media_at(scene: &Scene, solids: &Solids, p_world: DVec3) -> Vec<usize> {
     media.into_iter().map(|(_, i)| i).collect()
 }
 
-/// How many bodies one point may be in at most, as far as their boxes in world axes tell.
+/// Upper bound on the number of solids that contain one point, by their bounding boxes in world axes.
 #[must_use]
 pub fn deepest_nesting(scene: &Scene, solids: &Solids) -> usize {
     let bodies = scene.instances.iter().zip(&solids.solid).filter(|(_, solid)| **solid);
@@ -182,12 +182,12 @@ pub fn deepest_nesting(scene: &Scene, solids: &Solids) -> usize {
         bodies.map(|(instance, _)| seen_from(&scene.meshes[instance.mesh], instance, DVec3::ZERO)).collect();
     boxes.sort_by(|a, b| a.min.x.total_cmp(&b.min.x));
     let meet = |a: &Bounds, b: &Bounds| a.min.cmple(b.max).all() && b.min.cmple(a.max).all();
-    // Of boxes that have a point in common the one that begins last along x meets all the others.
+    // Boxes with a point in common: the one whose x range starts last overlaps all the others.
     let met = |i: usize| boxes[..i].iter().filter(|other| meet(&boxes[i], other)).count() + 1;
     (0..boxes.len()).map(met).max().unwrap_or_default()
 }
 
-/// The box around an instance in world axes, relative to a point.
+/// Bounding box of an instance in world axes, relative to a point.
 fn seen_from(mesh: &Mesh, instance: &Instance, p_world: DVec3) -> Bounds {
     let linear = instance.world_from_object.matrix3;
     let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -199,7 +199,7 @@ fn seen_from(mesh: &Mesh, instance: &Instance, p_world: DVec3) -> Bounds {
     Bounds { min: min + offset, max: max + offset }
 }
 
-/// How often a placed mesh winds around a point: the signed solid angles of its triangles over 4π.
+/// Winding number of an instance about a point: the signed solid angles of its triangles over 4π.
 ///
 /// tan(Ω/2) = a·(b×c) / (|a||b||c| + (a·b)|c| + (b·c)|a| + (c·a)|b|) for corners a, b, c seen from the point
 /// (van Oosterom & Strackee, "The solid angle of a plane triangle", IEEE Trans. Biomed. Eng. 30, 125, 1983).

@@ -1,33 +1,33 @@
 //! Points and lines as thin triangles: octahedra and four-sided boxes with flat outward normals.
 //!
-//! Their thickness is a share of the whole scene's size, so they are built in the world, after everything else is
-//! known, and placed by a translation alone.
+//! Read glTF 2.0 section 3.7.2 (point and line primitives). The thickness is a fraction of the size of the whole scene.
+//! Strokes are therefore built in world axes after all other geometry, and placed by a translation alone.
 
 use glam::{DAffine3, DVec3, Vec3};
 
 use super::{Bounds, Instance, Mesh, Scene};
 
-/// Half-thickness as a share of the scene's bounding diagonal.
+/// Half the thickness, as a fraction of the scene's bounding diagonal.
 const HALF_THICKNESS: f64 = 0.002;
 
-/// A point or a line, by its vertices.
+/// A point or a line, by vertex indices.
 #[derive(Clone, Copy)]
 pub(crate) enum Stroke {
     Point(u32),
     Line(u32, u32),
 }
 
-/// Strokes over the vertices of one mesh, and the places where they are drawn.
+/// Strokes over the vertices of one mesh, and the instances that draw them.
 pub(crate) struct StrokeGroup {
-    /// Name and world placement of each.
+    /// Name and world transform of each instance.
     pub(crate) placements: Vec<(String, DAffine3)>,
-    /// Vertices with their attributes; its triangles and normals are not looked at.
+    /// Vertices with their attributes; its triangles and normals are ignored.
     pub(crate) mesh: Mesh,
-    /// What to draw.
+    /// Points and lines to build.
     pub(crate) strokes: Vec<Stroke>,
 }
 
-/// Turns strokes into meshes and instances; their thickness comes from the bounds of everything.
+/// Appends a mesh and an instance for each group and placement; the thickness comes from the bounds of the whole scene.
 pub(crate) fn add(groups: &[StrokeGroup], meshes: &mut Vec<Mesh>, instances: &mut Vec<Instance>) {
     if groups.is_empty() {
         return;
@@ -72,16 +72,16 @@ pub(crate) fn add(groups: &[StrokeGroup], meshes: &mut Vec<Mesh>, instances: &mu
     }
 }
 
-/// What a vertex carries besides its position.
+/// A vertex of a stroke.
 #[derive(Clone, Copy)]
 struct Corner {
     /// World position.
     position: DVec3,
-    /// Index of the vertex that the other attributes are copied from.
+    /// Index of the source vertex for colour and texture coordinates.
     source: usize,
 }
 
-/// Collects thin geometry around an origin.
+/// Collects stroke geometry relative to an origin.
 struct StrokeBuilder<'a> {
     origin: DVec3,
     radius: f64,
@@ -90,7 +90,7 @@ struct StrokeBuilder<'a> {
 }
 
 impl<'a> StrokeBuilder<'a> {
-    /// Geometry `radius` thick on each side; colours and texture coordinates come from `attributes`.
+    /// Strokes with half-thickness `radius` in metres; colours and texture coordinates come from `attributes`.
     fn new(origin: DVec3, radius: f64, attributes: &'a Mesh) -> Self {
         let out = Mesh { name: attributes.name.clone(), material: attributes.material, ..Mesh::default() };
         Self { origin, radius, attributes, out }
@@ -135,7 +135,7 @@ impl<'a> StrokeBuilder<'a> {
             Corner { position: end.position + (u * x + v * y) * (self.radius * std::f64::consts::FRAC_1_SQRT_2), ..end }
         };
         let rings: [[Corner; 4]; 2] = [a, b].map(|end| std::array::from_fn(|k| side(end, k)));
-        // u, v, along is right-handed or left-handed as the pair comes out; the normals settle the order.
+        // The handedness of (u, v, along) is arbitrary; it decides the order of the corners.
         let right = u.cross(v).dot(along) > 0.0;
         for k in 0..4 {
             let quad = [rings[0][k], rings[0][(k + 1) % 4], rings[1][(k + 1) % 4], rings[1][k]];
@@ -148,7 +148,7 @@ impl<'a> StrokeBuilder<'a> {
         self.face(along, if right { far } else { back(far) });
     }
 
-    /// The mesh and where it stands.
+    /// The mesh and its translation to the world.
     fn finish(self) -> (Mesh, DAffine3) {
         (self.out, DAffine3::from_translation(self.origin))
     }

@@ -1,46 +1,48 @@
-//! A scene in one band of wavelengths: the same materials and lights, whose colours are numbers and whose light is X, Y, Z
-//! (lecture C3; docs/decisions/spectra.md).
+//! A scene in one band of wavelengths, for spectral rendering: colours of materials become one number, and light becomes
+//! X, Y, Z (lecture C3; docs/decisions/spectra.md).
+//!
+//! Read pbrt 4.5 and 4.6. Colours without a spectrum are upsampled (`etalon_optics::spectra::Upsampling`).
 
 use super::lobe::{self, LOBES};
 use super::{Light, Material, Scene};
 use etalon_optics::spectra::{Band, Spectrum, Upsampling, light_from_rgb};
 
-/// What the materials of a scene are by wavelength.
+/// Spectra of all materials of a scene.
 pub struct Wavelengths {
     curves: Vec<Curves>,
-    /// Some base varies over its surface.
+    /// The base colour of some material varies over its surface.
     pub vary: bool,
 }
 
-/// Of one material.
+/// Spectra of one material.
 struct Curves {
-    /// `None`: it is found for the colour of each place.
+    /// Base reflectance; `None`: the shader upsamples the colour at each point.
     base: Option<Spectrum>,
-    /// What texels and vertices say multiplies the base.
+    /// Textures or vertex colours multiply the base.
     varies: bool,
-    /// Of at most 1, and what it is multiplied by.
+    /// Specular colour as a spectrum of at most 1, and its scale.
     specular: (Spectrum, f32),
-    /// What is left after the attenuation distance.
+    /// Transmittance over the attenuation distance.
     attenuation: Spectrum,
-    /// n and κ.
+    /// n and κ of the conductor.
     metal: Option<[Spectrum; 2]>,
-    /// Colours of the lobes over the base.
+    /// Colours of the lobes over the base layer.
     lobes: [Option<Spectrum>; lobe::COUNT],
 }
 
-/// What a frame shows of the light.
+/// The wavelengths of one frame: a band, or a part of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slice {
-    /// A band of the picture: what reflects is its mean over it.
+    /// Band of the picture: reflectances are means over it.
     pub band: Band,
-    /// All of the band, or a part of it that stands for all: light is that of the part, and so is what bends it.
+    /// The whole band, or a part that represents it: emission and refractive index are those of the part.
     pub part: Band,
-    /// X, Y, Z of light that is red, green, blue.
+    /// X, Y, Z of red, green and blue light, scaled from the part to the band.
     pub light_from_rgb: [[f64; 3]; 3],
 }
 
 impl Slice {
-    /// Of a part of a band.
+    /// A slice for a part of a band.
     #[must_use]
     pub fn new(band: Band, part: Band) -> Self {
         let mut slice = Self { band, part, light_from_rgb: light_from_rgb(&part) };
@@ -49,13 +51,13 @@ impl Slice {
         slice
     }
 
-    /// How many of such parts the band has.
+    /// Width of the band over that of the part.
     #[must_use]
     pub fn weight(&self) -> f64 {
         (self.band.to - self.band.from) / (self.part.to - self.part.from)
     }
 
-    /// X, Y, Z of a light, in its own unit.
+    /// X, Y, Z of a light in the band, in the unit of the light.
     #[must_use]
     pub fn light(&self, light: &Light) -> [f32; 3] {
         let of_rgb = |k: usize| (0..3).map(|i| f64::from(light.color[i]) * self.light_from_rgb[i][k]).sum::<f64>();
@@ -67,20 +69,20 @@ impl Slice {
     }
 }
 
-/// A material in a band, and what of it is still told as red, green and blue.
+/// A material in a band of wavelengths; the flags name the colours that are still RGB.
 pub struct Banded {
-    /// Numbers stand three times where colours stood.
+    /// The material, with three equal numbers in place of each colour.
     pub material: Material,
-    /// `base_color` is: texels or vertices multiply it.
+    /// `base_color` is RGB: textures or vertex colours multiply it.
     pub base_rgb: bool,
-    /// What texels or vertices say is, and `base_color` is a number.
+    /// Textures or vertex colours are RGB, and `base_color` is a number.
     pub varies_rgb: bool,
-    /// `emissive` is: as all light that has no spectrum of its own.
+    /// `emissive` is RGB, as is all light without a spectrum of its own.
     pub emissive_rgb: bool,
 }
 
 impl Wavelengths {
-    /// Fits what is told as colours.
+    /// Collects the spectra of all materials; colours without a spectrum are upsampled.
     #[must_use]
     pub fn new(scene: &Scene, upsampling: Upsampling) -> Self {
         let spectrum = |rgb: [f32; 3]| upsampling.reflectance(rgb.map(f64::from));
@@ -93,7 +95,7 @@ impl Wavelengths {
             let varies = m.base_color_texture.is_some() || coloured;
             let told = m.reflectance.clone().or_else(|| m.conductor.map(|_| Spectrum::Constant(1.0)));
             let found = || (!varies).then(|| spectrum([r, g, b]));
-            // F0 is multiplied by it before it is cut to 1.
+            // F0 is multiplied by the scale before it is clamped to 1.
             let most = m.specular_color.iter().copied().fold(1.0, f32::max);
             Curves {
                 base: if m.unlit { None } else { told.or_else(found) },
@@ -144,7 +146,7 @@ impl Wavelengths {
     }
 }
 
-/// n and κ that are told at the three lamps of lecture C1, red first: linear between.
+/// n and κ given at the three wavelengths of lecture C1, red first, as spectra linear between them.
 fn between_lamps(index: [[f32; 2]; 3]) -> [Spectrum; 2] {
     const LAMPS: [f64; 3] = [645.16, 526.32, 444.44];
     [0, 1].map(|part| {

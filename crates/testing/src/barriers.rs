@@ -1,10 +1,12 @@
-//! The proof that barriers are needed: a validation that sees nothing would prove nothing of a frame that is clean.
+//! Test that pipeline barriers are necessary: validation must report a hazard without them, or a clean report proves nothing.
+//!
+//! Read the Vulkan specification, chapter "Synchronization and Cache Control".
 
 use etalon::gpu::Frame;
 
 use super::gpu::Gpu;
 
-/// Validation's errors after a frame, with or without its buffer barriers.
+/// Validation errors of a frame, with or without its buffer barriers.
 fn errors_of<T>(
     forget: bool,
     make: impl Fn(&Gpu) -> T,
@@ -21,11 +23,11 @@ fn errors_of<T>(
     gpu.errors()
 }
 
-/// Fails unless synchronization validation finds nothing in a frame with its derived barriers, and a hazard in the same frame
-/// without them. `make` makes what the frame uses, `describe` the frame.
+/// Asserts that synchronization validation reports no hazard in a frame with its derived barriers, and reports one in the same
+/// frame without them. `make` creates the resources, and `describe` the frame.
 ///
 /// # Panics
-/// Where it finds something else.
+/// Validation reports otherwise.
 pub fn are_needed<T>(name: &str, make: impl Fn(&Gpu) -> T, describe: impl for<'a> Fn(&'a T, &'a Gpu) -> Frame<'a>) {
     let clean = errors_of(false, &make, &describe);
     assert!(clean.is_empty(), "{name}, with barriers: {clean:?}");

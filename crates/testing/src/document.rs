@@ -1,11 +1,11 @@
-//! Blocks of Markdown pages that a program writes: between `<!-- generated: NAME -->` and `<!-- end -->`.
+//! Generated blocks of Markdown pages: the text between `<!-- generated: NAME -->` and `<!-- end -->`.
 
 use std::path::Path;
 
-/// `text` with the block replaced; `None` where the page has no such block.
+/// `text` with the block replaced; `None` if the page has no such block.
 ///
 /// # Panics
-/// Where the block has no end.
+/// The block has no end.
 #[must_use]
 pub fn replaced(text: &str, name: &str, block: &str) -> Option<String> {
     let begin = format!("<!-- generated: {name} -->\n");
@@ -14,10 +14,10 @@ pub fn replaced(text: &str, name: &str, block: &str) -> Option<String> {
     Some(format!("{}\n{}\n\n{}", &text[..at], block.trim_end(), &text[end..]))
 }
 
-/// Asserts that a page has this block; with the variable `ETALON_BLESS` it writes the block instead.
+/// Asserts that a page has this block; if the environment variable `ETALON_BLESS` is set, writes the block instead.
 ///
 /// # Panics
-/// Where the page has no such block, or another one.
+/// The page has no such block, or a different one.
 pub fn says(page: &Path, name: &str, block: &str) {
     let text = std::fs::read_to_string(page).unwrap_or_else(|error| panic!("{}: {error}", page.display()));
     let fresh = replaced(&text, name, block).unwrap_or_else(|| panic!("{} has no block {name}", page.display()));

@@ -1,4 +1,6 @@
-//! The white furnace: before light of 1 from everywhere, a body that takes nothing away shows as 1, and so not at all.
+//! The furnace test: in a white environment of radiance 1, a body that absorbs nothing has radiance 1 everywhere, so it is invisible.
+//!
+//! Read: Heitz, "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", 2014, section 5 (white furnace).
 
 use etalon::frame::Settings;
 use etalon::plan::{Knobs, Model};
@@ -8,16 +10,16 @@ use etalon::scene::{Material, Scene};
 use super::gpu::Gpu;
 use super::made::lambert;
 
-/// What a picture in a furnace shows.
+/// Result of a furnace test.
 #[derive(Debug, Clone, Copy)]
 pub struct FurnaceRadiance {
-    /// Mean of the pixels' green.
+    /// Mean of green over all pixels.
     pub mean: f64,
-    /// Its standard error, over the pixels.
+    /// Standard error of the mean, from the variance over the pixels.
     pub error: f64,
 }
 
-/// Materials that take nothing away, by name.
+/// Materials that absorb nothing, with names.
 #[must_use]
 pub fn whites() -> [(&'static str, Material); 4] {
     let metal = |roughness: f32| Material { metallic: 1.0, roughness, specular: 1.0, ..lambert([1.0; 3]) };
@@ -26,7 +28,7 @@ pub fn whites() -> [(&'static str, Material); 4] {
     [("lambert", lambert([1.0; 3])), ("mirror", metal(0.0)), ("glass", glass), ("rough metal", metal(0.5))]
 }
 
-/// The scene's shapes in one material, without its lights.
+/// The scene with one material on all meshes, without its lights.
 #[must_use]
 pub fn in_one_material(mut scene: Scene, white: &Material) -> Scene {
     scene.lights.clear();
@@ -38,10 +40,10 @@ pub fn in_one_material(mut scene: Scene, white: &Material) -> Scene {
     scene
 }
 
-/// What the scene shows by paths before light of 1 from everywhere, at 48x27 pixels with `samples` each.
+/// Path traces the scene under radiance 1 from all directions, at 48x27 pixels with `samples` per pixel.
 ///
 /// # Panics
-/// Where it cannot be drawn.
+/// Rendering fails.
 #[must_use]
 pub fn shown(gpu: &Gpu, scene: &Scene, samples: u32) -> FurnaceRadiance {
     let mut knobs = Knobs::of(Model::Global);

@@ -1,4 +1,4 @@
-//! Writes small glTF files for tests: JSON by hand, one buffer, as GLB or as JSON with a data URI.
+//! Builder of small glTF files for tests: hand-written JSON and one buffer, as GLB or as JSON with a data URI.
 
 #![allow(clippy::unwrap_used, reason = "a test may stop where it stands")]
 
@@ -6,25 +6,25 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-/// A component of an accessor: i8.
+/// Component type i8.
 pub const BYTE: u32 = 5120;
-/// u8.
+/// Component type u8.
 pub const UNSIGNED_BYTE: u32 = 5121;
-/// i16.
+/// Component type i16.
 pub const SHORT: u32 = 5122;
-/// u16.
+/// Component type u16.
 pub const UNSIGNED_SHORT: u32 = 5123;
-/// u32.
+/// Component type u32.
 pub const UNSIGNED_INT: u32 = 5125;
-/// f32.
+/// Component type f32.
 pub const FLOAT: u32 = 5126;
 
-/// A glTF file in the making.
+/// A glTF file under construction.
 #[derive(Clone)]
 pub struct Builder {
-    /// What is written so far.
+    /// The JSON so far.
     pub json: Value,
-    /// Of its one buffer.
+    /// Content of the one buffer.
     pub bytes: Vec<u8>,
 }
 
@@ -33,7 +33,7 @@ pub fn f32s(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|v| v.to_le_bytes()).collect()
 }
 
-/// Little-endian bytes of 16-bit numbers, signed ones by their bits.
+/// Little-endian bytes of 16-bit integers; cast signed ones to u16.
 pub fn u16s(values: &[u16]) -> Vec<u8> {
     values.iter().flat_map(|v| v.to_le_bytes()).collect()
 }
@@ -45,12 +45,12 @@ impl Default for Builder {
 }
 
 impl Builder {
-    /// With an asset and nothing else.
+    /// A file with an asset and nothing else.
     pub fn new() -> Self {
         Self { json: json!({ "asset": { "version": "2.0" } }), bytes: Vec::new() }
     }
 
-    /// Appends to a top-level list and returns the index.
+    /// Appends a value to a top-level list and returns its index.
     pub fn push(&mut self, list: &str, value: Value) -> usize {
         if self.json[list].is_null() {
             self.json[list] = json!([]);
@@ -60,7 +60,7 @@ impl Builder {
         list.len() - 1
     }
 
-    /// A view of new bytes, and its index.
+    /// Adds a buffer view of new bytes and returns its index.
     pub fn view(&mut self, bytes: &[u8], stride: Option<usize>) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let mut view = json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() });
@@ -71,13 +71,13 @@ impl Builder {
         self.push("bufferViews", view)
     }
 
-    /// An accessor over new bytes.
+    /// Adds an accessor for new bytes and returns its index.
     pub fn accessor(&mut self, bytes: &[u8], component: u32, shape: &str, count: usize) -> usize {
         let view = self.view(bytes, None);
         self.push("accessors", json!({ "bufferView": view, "componentType": component, "type": shape, "count": count }))
     }
 
-    /// Packed floats, their number a multiple of the shape's width.
+    /// Adds an accessor of packed floats; their number is a multiple of the shape's width.
     pub fn floats(&mut self, shape: &str, values: &[f32]) -> usize {
         let width = match shape {
             "SCALAR" => 1,
@@ -89,17 +89,17 @@ impl Builder {
         self.accessor(&f32s(values), FLOAT, shape, values.len() / width)
     }
 
-    /// An accessor of indices.
+    /// Adds an accessor of indices.
     pub fn indices(&mut self, values: &[u16]) -> usize {
         self.accessor(&u16s(values), UNSIGNED_SHORT, "SCALAR", values.len())
     }
 
-    /// A mesh of one primitive.
+    /// Adds a mesh of one primitive.
     pub fn mesh(&mut self, primitive: Value) -> usize {
         self.push("meshes", json!({ "primitives": [primitive] }))
     }
 
-    /// A node that is a root of scene 0.
+    /// Adds a node as a root of scene 0.
     pub fn root(&mut self, node: Value) -> usize {
         let node = self.push("nodes", node);
         if self.json["scenes"].is_null() {
@@ -109,7 +109,7 @@ impl Builder {
         node
     }
 
-    /// The triangle (0,0,0), (1,0,0), (0,1,0) as an accessor.
+    /// Adds the triangle (0,0,0), (1,0,0), (0,1,0) as an accessor of positions.
     pub fn triangle(&mut self) -> usize {
         self.floats("VEC3", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0])
     }
@@ -145,27 +145,27 @@ impl Builder {
         out
     }
 
-    /// Writes it into a folder as GLB.
+    /// Writes the file into a folder as GLB.
     pub fn save_glb(&self, folder: &Path) -> PathBuf {
         let path = folder.join("scene.glb");
         std::fs::write(&path, self.glb()).unwrap();
         path
     }
 
-    /// JSON with the buffer under `uri`, which the caller provides for.
+    /// Writes the JSON into a folder; the caller provides the buffer at `uri`.
     pub fn save_gltf(&self, folder: &Path, uri: &str) -> PathBuf {
         let path = folder.join("scene.gltf");
         std::fs::write(&path, self.finished_json(Some(uri.to_owned()))).unwrap();
         path
     }
 
-    /// Its buffer as a data URI.
+    /// The buffer as a data URI.
     pub fn data_uri(&self) -> String {
         format!("data:application/octet-stream;base64,{}", base64(&self.bytes))
     }
 }
 
-/// Bytes as base64.
+/// Base64 of bytes.
 pub fn base64(bytes: &[u8]) -> String {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut out = String::new();

@@ -1,4 +1,4 @@
-//! A device under validation, and the short ways to a picture that the tests share.
+//! A device under validation, and helpers that render pictures for tests.
 //!
 //! Core and synchronization validation are on; an error message fails the test that owns the [`Gpu`] when it ends.
 
@@ -13,13 +13,13 @@ use etalon::scene::{Camera, Scene};
 use etalon::share::AovPixel;
 use etalon::upload::view::View;
 
-/// The software device with validation on, which tests of one program share (`crates/vulkan/src/open.rs`).
+/// The software device with validation, shared by the tests of a program (`crates/vulkan/src/open.rs`).
 pub struct Gpu {
     /// The device.
     pub device: Arc<Device>,
-    /// The test looks for errors itself.
+    /// Errors do not fail the test: it checks them itself.
     pub expects_errors: bool,
-    /// Held to the end.
+    /// Guard of shared or exclusive use, until the end of the test.
     _place: Place,
 }
 
@@ -31,28 +31,28 @@ enum Place {
 static PLACES: RwLock<()> = RwLock::new(());
 
 impl Gpu {
-    /// Opens it; a machine without it fails the test.
+    /// Opens the software device for shared use; a machine without it fails the test.
     pub fn open() -> Self {
         let place = Place::Shared { _guard: PLACES.read().unwrap_or_else(PoisonError::into_inner) };
         Self::opened(place, Device::open)
     }
 
-    /// The same while no other test of this program has it: for tests that count what is made, or that expect errors.
+    /// [`Gpu::open`] for exclusive use in this program: for tests that count created objects, or that expect errors.
     pub fn alone() -> Self {
         let place = Place::Own { _guard: PLACES.write().unwrap_or_else(PoisonError::into_inner) };
         Self::opened(place, Device::open)
     }
 
-    /// The same for programs that make hundreds of pipelines for a few pixels each: lavapipe compiles them without LLVM's
-    /// optimisations, to the same bits (`study:etalon` and `study:cornell` along paths were compared) in 0.6 of the time; and it
-    /// draws on the thread of its queue, since waking others takes longer than what they do for so few pixels (tests/furnace.rs:
-    /// 43 s for 65 s on two cores, of which 15 s went into waking).
+    /// [`Gpu::open`] for programs with hundreds of pipelines for a few pixels each. lavapipe compiles without LLVM's
+    /// optimisations, in 0.6 of the time and to the same bits (compared for `study:etalon` and `study:cornell` with path
+    /// tracing). It renders on the thread of its queue, because waking other threads takes longer than rendering so few pixels
+    /// (tests/furnace.rs: 43 s instead of 65 s on two cores, where waking took 15 s).
     pub fn hasty() -> Self {
         in_haste();
         Self::open()
     }
 
-    /// The same as [`Gpu::hasty`], on a device that takes turns as beside a window.
+    /// [`Gpu::hasty`] for exclusive use, on a device with time-sliced submission as in the viewer.
     pub fn time_sliced() -> Self {
         in_haste();
         let place = Place::Own { _guard: PLACES.write().unwrap_or_else(PoisonError::into_inner) };
@@ -66,7 +66,7 @@ impl Gpu {
         }
     }
 
-    /// What validation calls errors, so far.
+    /// Validation errors so far.
     pub fn errors(&self) -> Vec<String> {
         let messages = self.device.messages();
         messages.into_iter().filter(|m| m.severity == Severity::Error).map(|m| m.text).collect()
@@ -82,7 +82,7 @@ impl Gpu {
         self.shot(scene, None, settings).1
     }
 
-    /// What is rendered, and the scene-linear picture, from the scene's first camera.
+    /// Renders from the scene's first camera; returns the result and the scene-linear picture.
     pub fn shot(&self, scene: &Scene, environment: Option<&Environment>, settings: Settings) -> (Rendered, Picture) {
         let mut renderer = self.renderer(scene, environment, settings);
         let rendered = renderer.render(&scene.cameras[0], &mut |_| ()).expect("a picture");
@@ -90,7 +90,7 @@ impl Gpu {
         (rendered, film)
     }
 
-    /// Picture, G-buffer and view of one renderer.
+    /// Picture, G-buffer and view of one rendering.
     pub fn all(&self, scene: &Scene, camera: &Camera, settings: Settings) -> (Picture, Vec<AovPixel>, View) {
         let mut renderer = self.renderer(scene, None, settings);
         renderer.render(camera, &mut |_| ()).expect("a picture");
@@ -102,7 +102,7 @@ impl Gpu {
 
 impl Drop for Gpu {
     fn drop(&mut self) {
-        // A second panic while one unwinds would hide the first.
+        // A second panic during unwinding would hide the first.
         if !std::thread::panicking() && !self.expects_errors {
             let errors = self.errors();
             assert!(errors.is_empty(), "validation: {}", errors.join("\n"));
@@ -114,7 +114,7 @@ impl Drop for Gpu {
 fn in_haste() {
     static SET: Once = Once::new();
     SET.call_once(|| {
-        // SAFETY: every test of such a program begins here, and nothing has read the environment but Rust's own start.
+        // SAFETY: every test of such a program begins here, and only Rust's start-up code has read the environment before.
         unsafe {
             std::env::set_var("GALLIVM_PERF", "nopt");
             std::env::set_var("LP_NUM_THREADS", "0");
@@ -122,15 +122,15 @@ fn in_haste() {
     });
 }
 
-/// One sample per pixel, at the pixel centres, of a picture of `size`.
+/// Settings with one sample per pixel, at the pixel centres.
 pub fn settings(size: [u32; 2]) -> Settings {
     Settings { size, knobs: knobs(&["samples=1"]), ..Settings::default() }
 }
 
-/// The local model without shadows, and with some other rungs.
+/// The local model without shadows, and with the given rungs.
 pub fn knobs(choices: &[&str]) -> Knobs {
     let mut knobs = Knobs::of(Model::Local);
-    // What most tests compare with has no shadows.
+    // Most reference values are without shadows.
     knobs.set("shadows=off").expect("a rung");
     for choice in choices {
         knobs.set(choice).expect("a rung");

@@ -1,6 +1,7 @@
-//! What a surface reflects of a light, in f64 and from the formulas: glTF 2.0 appendix B, Walter et al. 2007 and Heitz 2014
-//! (GGX), Blinn's lobe as the lecture has it (B5, B6), KHR_materials_clearcoat, Fresnel's equations with complex numbers.
-//! And a body to see it on: a convex dome of flat facets, which neither shadow nor light each other.
+//! Reference BRDF of a surface in f64, from the formulas: GGX, the Blinn-Phong lobes of the lecture (B5, B6), clear coat, Fresnel
+//! equations with complex numbers. A convex dome of flat facets displays it; the facets neither shadow nor light each other.
+//!
+//! Read glTF 2.0 appendix B; Walter et al. 2007 and Heitz 2014 (GGX); KHR_materials_clearcoat.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,11 +12,11 @@ use etalon::plan::{Knobs, Model};
 use etalon::scene::{Camera, Instance, Material, Mesh, Projection, Scene};
 use glam::{DAffine3, DVec2, DVec3};
 
-/// Every model of light transport.
+/// All models of light transport.
 pub const MODELS: [Model; 3] = [Model::Local, Model::Recursive, Model::Global];
 
-/// A model with one sample per pixel and exact normals; what the rungs leave to each test comes with `choices`. The local model
-/// has no shadows: maps have an error of their own, which tests/shadow_map.rs is about.
+/// Settings of a model with one sample per pixel and exact normals; `choices` sets further rungs. The local model
+/// has no shadows: tests/shadow_map.rs covers the errors of shadow maps.
 pub fn model(model: Model, size: [u32; 2], choices: &[&str]) -> Settings {
     let mut knobs = Knobs::of(model);
     let all = ["samples=1", "normals=f32"].iter().chain(choices);
@@ -39,11 +40,11 @@ fn times(a: Complex, b: Complex) -> Complex {
     [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
 }
 
-/// The unpolarised reflectance of what has the complex index n + iκ: |r_s|² and |r_p|² of Fresnel's equations, in the mean.
+/// Unpolarised reflectance for the complex index n + iκ: the mean of |r_s|² and |r_p|² of the Fresnel equations.
 pub fn fresnel(cos_in: f64, n: f64, kappa: f64) -> f64 {
     let m = [n, kappa];
     let [re, im] = over([1.0 - cos_in * cos_in, 0.0], times(m, m));
-    // cosθ_t = √(1 − sin²θ/m²), the root with a real part that is not negative.
+    // cosθ_t = √(1 − sin²θ/m²), the root with non-negative real part.
     let (re, im) = (1.0 - re, -im);
     let size = re.hypot(im);
     let cos_t = [((size + re) / 2.0).max(0.0).sqrt(), ((size - re) / 2.0).max(0.0).sqrt().copysign(im)];
@@ -54,25 +55,25 @@ pub fn fresnel(cos_in: f64, n: f64, kappa: f64) -> f64 {
     (s[0] * s[0] + s[1] * s[1] + p[0] * p[0] + p[1] * p[1]) / 2.0
 }
 
-/// Schlick's curve.
+/// Schlick's approximation.
 pub fn schlick(f0: DVec3, f90: f64, cos: f64) -> DVec3 {
     f0 + (DVec3::splat(f90) - f0) * (1.0 - cos).max(0.0).powi(5)
 }
 
-/// Reflectance of the dielectric part at an angle.
+/// Reflectance of the dielectric part; `cos` is V·H.
 pub fn dielectric(m: &Material, exact: bool, cos: f64) -> DVec3 {
     let r0 = ((f64::from(m.ior) - 1.0) / (f64::from(m.ior) + 1.0)).powi(2);
     let specular = f64::from(m.specular);
     let f0 = (rgb(m.specular_color) * r0).min(DVec3::ONE) * specular;
     if exact {
-        // Where nothing tints it that is Fresnel's curve itself; a tinted one has its share of the way from F0 to F90.
+        // Untinted, it is the exact Fresnel reflectance; tinted, the exact curve interpolates between F0 and F90.
         let share = (fresnel(cos, f64::from(m.ior), 0.0) - r0) / (1.0 - r0);
         return f0 + (DVec3::splat(specular) - f0) * share;
     }
     schlick(f0, specular, cos)
 }
 
-/// Reflectance of the metallic part.
+/// Reflectance of the metallic part; `cos` is V·H.
 pub fn metal(m: &Material, exact: bool, cos: f64) -> DVec3 {
     match m.conductor {
         Some(index) if exact => DVec3::from(index.map(|[n, kappa]| fresnel(cos, f64::from(n), f64::from(kappa)))),
@@ -80,7 +81,7 @@ pub fn metal(m: &Material, exact: bool, cos: f64) -> DVec3 {
     }
 }
 
-/// A colour in f64.
+/// A colour as f64.
 pub fn rgb(color: [f32; 3]) -> DVec3 {
     DVec3::from(color.map(f64::from))
 }
@@ -90,7 +91,7 @@ pub fn base(m: &Material) -> DVec3 {
     DVec3::new(m.base_color[0].into(), m.base_color[1].into(), m.base_color[2].into())
 }
 
-/// α of a roughness; below 0.01 nothing is drawn.
+/// α of a roughness, which is clamped to at least 0.01 as in the shaders.
 pub fn alpha(roughness: f32) -> f64 {
     f64::from(roughness).max(0.01).powi(2)
 }
@@ -107,7 +108,7 @@ pub fn ggx(n: DVec3, l: DVec3, v: DVec3, alpha: f64) -> f64 {
     d / (1.0 + lambda(cos_l) + lambda(cos_v)) / (4.0 * cos_l * cos_v)
 }
 
-/// What a GGX lobe reflects in all directions with F = 1, and with F = (1 − V·H)⁵ (midpoint rule in cosθ and φ).
+/// Directional albedo of a GGX lobe with F = 1, and with F = (1 − V·H)⁵ (midpoint rule in cosθ and φ).
 pub fn reflectances(cos_v: f64, alpha: f64) -> [f64; 2] {
     const CELLS: i32 = 240;
     let v = DVec3::new((1.0 - cos_v * cos_v).sqrt(), 0.0, cos_v);
@@ -122,20 +123,20 @@ pub fn reflectances(cos_v: f64, alpha: f64) -> [f64; 2] {
             sum[1] += lobe * (1.0 - v.dot((l + v).normalize())).powi(5);
         }
     }
-    // Half of the directions about the normal are the mirror image of the others.
+    // By symmetry, half of the directions around the normal suffice.
     sum.map(|sum| sum * TAU / f64::from(CELLS * CELLS))
 }
 
-/// The rungs that choose a formula.
+/// Rungs that choose formulas.
 #[derive(Debug, Clone, Copy)]
 pub struct Rungs {
-    /// The lobe.
+    /// The specular lobe.
     pub brdf: Brdf,
-    /// Fresnel's equations instead of Schlick's curve.
+    /// Exact Fresnel equations instead of Schlick's approximation.
     pub exact: bool,
 }
 
-/// BRDF times cosθ_l of a rough surface without what it transmits.
+/// BRDF times cosθ_l of an opaque rough surface.
 pub fn reflected(m: &Material, rungs: Rungs, n: DVec3, l: DVec3, v: DVec3) -> DVec3 {
     let (cos_l, h) = (n.dot(l), (l + v).normalize());
     let metallic = f64::from(m.metallic);
@@ -146,14 +147,14 @@ pub fn reflected(m: &Material, rungs: Rungs, n: DVec3, l: DVec3, v: DVec3) -> DV
         let f_dielectric = dielectric(m, rungs.exact, h.dot(v));
         let f = f_dielectric.lerp(metal(m, rungs.exact, h.dot(v)), metallic);
         let f0 = dielectric(m, false, 1.0).lerp(base(m), metallic);
-        // α² = 2/(shine + 2); k_s so that all light from the normal is reflected as F0 says.
+        // α² = 2/(shine + 2); k_s gives the reflectance F0 at normal incidence.
         let shine = 2.0 / (a * a) - 2.0;
         let k_s = f0 * (shine + 2.0) / TAU;
         let power = n.dot(h).max(0.0).powf(shine);
         result = match rungs.brdf {
-            // B5 knows no cosine beside the lobe; the quarter is |L + V|² of B6 at normal incidence.
+            // B5 has no cosine factor in the lobe; the quarter is 1/|L + V|² of B6 at normal incidence.
             Brdf::BlinnPhong => diffuse * cos_l + k_s * power / 4.0,
-            // The bound of B6, k_d π + k_s 2π/(shine + 2) ≤ 1: the ground has what F0 leaves.
+            // The bound of B6, k_d π + k_s 2π/(shine + 2) ≤ 1: the diffuse base gets the energy left by F0.
             Brdf::BlinnPhongReciprocal => {
                 let ground = diffuse * (1.0 - dielectric(m, false, 1.0).max_element());
                 (ground + k_s * power / (l + v).length_squared()) * cos_l
@@ -162,7 +163,7 @@ pub fn reflected(m: &Material, rungs: Rungs, n: DVec3, l: DVec3, v: DVec3) -> DV
             Brdf::GgxMulti => {
                 let [whole, grazing] = reflectances(n.dot(v), a);
                 let compensation = DVec3::ONE + f0 * (1.0 / whole - 1.0);
-                // What the whole lobe leaves goes below it.
+                // The diffuse base gets the energy left under the specular layer.
                 let f0 = dielectric(m, false, 1.0);
                 let reflects = f0 * (whole - grazing) + DVec3::splat(f64::from(m.specular) * grazing);
                 let kept = (reflects * compensation).max_element();
@@ -174,25 +175,25 @@ pub fn reflected(m: &Material, rungs: Rungs, n: DVec3, l: DVec3, v: DVec3) -> DV
     result * (1.0 - coat) + DVec3::splat(coat * ggx(n, l, v, alpha(m.clearcoat_roughness)) * cos_l.max(0.0))
 }
 
-/// One flat face of a dome, and the pixels that see nothing else.
+/// A flat facet of the dome, and the pixels that see only this facet.
 #[derive(Clone)]
 pub struct Facet {
-    /// Its normal.
+    /// Normal.
     pub n: DVec3,
-    /// Index of its material.
+    /// Index of the material.
     pub material: usize,
-    /// Pixels that see it.
+    /// Indices of pixels inside the facet.
     pub pixels: Vec<usize>,
 }
 
-/// Angles between the facets' normals and the axis, towards the viewer.
+/// Angles in degrees between the facets' normals and the axis, towards the viewer.
 pub const TILTS: [f64; 6] = [0.0, 18.0, 36.0, 52.0, 66.0, 78.0];
 const SECTORS: usize = 24;
-/// Of the flat top, and the width of each ring around it, seen from the front.
+/// Radius of the flat top, and width of each ring around it, seen from the front.
 const TOP: f64 = 4.0;
 const RING: f64 = 2.0;
 const HALF: f64 = TOP + 5.0 * RING + 0.5;
-/// Pixels of a picture of a dome.
+/// Size of a picture of the dome in pixels.
 pub const DOME: [u32; 2] = [80, 80];
 
 fn facet_at(p: DVec2) -> Option<(usize, usize)> {
@@ -203,7 +204,7 @@ fn facet_at(p: DVec2) -> Option<(usize, usize)> {
     (ring < TILTS.len() as f64).then_some((ring.max(0.0) as usize, sector as usize))
 }
 
-/// A dome about the z axis seen down that axis in a parallel view; its sectors have the materials in turn.
+/// A dome around the z axis in an orthographic view along the axis; the materials repeat over its sectors.
 pub fn dome(materials: &[Material]) -> (Scene, Vec<Facet>) {
     assert!(SECTORS.is_multiple_of(materials.len()));
     let mut scene = Scene { name: "dome".to_owned(), materials: materials.to_vec(), ..Scene::default() };
@@ -217,7 +218,7 @@ pub fn dome(materials: &[Material]) -> (Scene, Vec<Facet>) {
         for sector in 0..SECTORS {
             let at = |edge: f64, level: usize| {
                 let (sin, cos) = ((sector as f64 + edge) / SECTORS as f64 * TAU).sin_cos();
-                // Corners lie further out than the middle of an edge.
+                // Corners are farther out than the middle of an edge.
                 let out = radii[level] / (PI / SECTORS as f64).cos();
                 DVec3::new(out * cos, out * sin, heights[level])
             };
@@ -230,7 +231,7 @@ pub fn dome(materials: &[Material]) -> (Scene, Vec<Facet>) {
                 name: format!("facet {ring} {sector}"),
                 positions: corners.map(|p| p.as_vec3().to_array()).to_vec().into(),
                 normals: vec![n.as_vec3().to_array(); 4].into(),
-                // The top's two inner corners are one.
+                // The two inner corners of a top facet coincide.
                 indices: if ring == 0 { vec![0, 1, 2].into() } else { vec![0, 1, 2, 0, 2, 3].into() },
                 material,
                 ..Mesh::default()
@@ -269,8 +270,8 @@ pub fn dome(materials: &[Material]) -> (Scene, Vec<Facet>) {
     (scene, facets)
 }
 
-/// Largest error of a film of the dome, relative to what is expected of each channel or, where that is less, to `floor` of the
-/// brightest that the material shows.
+/// Largest error of a picture of the dome, relative to the expected value of each channel, or to `floor` times the brightest
+/// value of the material if that is larger.
 pub fn worst(film: &Picture, facets: &[Facet], floor: f64, expected: impl Fn(&Facet) -> DVec3) -> f64 {
     let wants: Vec<DVec3> = facets.iter().map(&expected).collect();
     let mut most = (0.0, String::new());
@@ -280,7 +281,7 @@ pub fn worst(film: &Picture, facets: &[Facet], floor: f64, expected: impl Fn(&Fa
         for &pixel in &facet.pixels {
             for c in 0..3 {
                 let got = f64::from(film.rgba[pixel][c]);
-                // Lobes fainter than that are not looked for where there are shadows (shaders/lib/lighting.glsl).
+                // With shadows, fainter lobes are skipped (shaders/lib/lighting.glsl).
                 if got == 0.0 && want[c] < 5.0 / 131_072.0 {
                     continue;
                 }

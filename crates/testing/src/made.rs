@@ -1,19 +1,19 @@
-//! Small scenes made on the spot.
+//! Small scenes built in code.
 
 use etalon::scene::{AlphaMode, Camera, Instance, Light, LightKind, Material, Mesh, Projection, Scene};
 use etalon::study::shape::Shape;
 use glam::{DAffine3, DMat3, DVec3};
 
-/// A scene in the making.
+/// A scene under construction.
 pub struct Made(pub Scene);
 
 impl Made {
-    /// Nothing yet.
+    /// An empty scene.
     pub fn new(name: &str) -> Self {
         Self(Scene { name: name.to_owned(), ..Scene::default() })
     }
 
-    /// Adds a mesh and its material, and tells its index; it is not placed yet.
+    /// Adds a mesh with its material, without an instance; returns the index of the mesh.
     pub fn mesh(&mut self, shape: Shape, material: Material) -> usize {
         self.0.materials.push(material);
         self.0.meshes.push(Mesh {
@@ -28,45 +28,45 @@ impl Made {
         self.0.meshes.len() - 1
     }
 
-    /// Places a mesh.
+    /// Adds an instance of a mesh.
     pub fn place(&mut self, mesh: usize, world_from_object: DAffine3) {
         self.0.instances.push(Instance { name: "made".to_owned(), mesh, world_from_object });
     }
 
-    /// Adds a mesh of one placement.
+    /// Adds a mesh with one instance.
     pub fn add(&mut self, shape: Shape, material: Material, world_from_object: DAffine3) {
         let mesh = self.mesh(shape, material);
         self.place(mesh, world_from_object);
     }
 
-    /// Adds a light; its colour has the unit of `Light::color`: cd, or lx where it is directional.
+    /// Adds a light; `color` has the unit of `Light::color`: cd, or lx for directional lights.
     pub fn light(&mut self, color: [f32; 3], kind: LightKind) {
         self.0.lights.push(Light { name: "made".to_owned(), color, spectrum: None, extent: None, kind, proxy: false });
     }
 
-    /// From `eye` to `target`; the picture is `half_height` high either way where it is orthographic.
+    /// Adds a camera at `eye` that looks at `target`.
     pub fn camera(&mut self, eye: DVec3, target: DVec3, projection: Projection) {
         self.0.cameras.push(Camera { projection, ..looking(eye, target) });
     }
 
-    /// A parallel view down −Z from z = 10 on the square |y| ≤ `half_height`.
+    /// Adds an orthographic camera along −Z at z = 10 that sees the square |y| ≤ `half_height`.
     pub fn front(&mut self, half_height: f64) {
         self.camera(DVec3::Z * 10.0, DVec3::ZERO, orthographic(half_height));
     }
 }
 
-/// A camera of 0.7 rad, upright.
+/// An upright perspective camera with a vertical field of view of 0.7 rad.
 pub fn looking(eye: DVec3, target: DVec3) -> Camera {
     let up = if (target - eye).normalize().y.abs() > 0.999 { DVec3::NEG_Z } else { DVec3::Y };
     Camera::looking_at(eye, target, up, 0.7).expect("a camera")
 }
 
-/// A vertical field of view in degrees.
+/// A perspective projection; vertical field of view in degrees.
 pub fn perspective(degrees: f64) -> Projection {
     Projection::Perspective { fov_y: degrees.to_radians(), near: None }
 }
 
-/// Half the height of the picture in metres.
+/// An orthographic projection; half the height of the picture in metres.
 pub fn orthographic(half_height: f64) -> Projection {
     Projection::Orthographic { half_height, near: 0.5, far: 40.0 }
 }
@@ -76,12 +76,12 @@ pub fn at(x: f64, y: f64, z: f64) -> DAffine3 {
     DAffine3::from_translation(DVec3::new(x, y, z))
 }
 
-/// Exact quarter turns about +Y: no rounding in the matrix.
+/// An exact quarter turn about +Y: no rounding in the matrix.
 pub fn quarter_turn() -> DAffine3 {
     DAffine3::from_mat3(DMat3::from_cols(DVec3::NEG_Z, DVec3::Y, DVec3::X))
 }
 
-/// A perfect Lambert reflector of one colour: no specular part at all.
+/// A Lambertian reflector without a specular lobe.
 pub fn lambert(albedo: [f32; 3]) -> Material {
     let [r, g, b] = albedo;
     Material {
@@ -94,22 +94,22 @@ pub fn lambert(albedo: [f32; 3]) -> Material {
     }
 }
 
-/// Shown as it is.
+/// An unlit material: its colour is the radiance.
 pub fn unlit(color: [f32; 3]) -> Material {
     Material { unlit: true, ..lambert(color) }
 }
 
-/// An unlit pane whose alpha is coverage.
+/// An unlit, alpha-blended material.
 pub fn pane(color: [f32; 3], alpha: f32) -> Material {
     let [r, g, b] = color;
     Material { base_color: [r, g, b, alpha], alpha_mode: AlphaMode::Blend, ..unlit(color) }
 }
 
-/// The same numbers on every machine, uniform in 0 … 1 (splitmix64).
+/// SplitMix64: uniform random numbers in [0, 1), the same sequence on every machine.
 pub struct Random(pub u64);
 
 impl Random {
-    /// Uniform in 0..1.
+    /// Uniform in [0, 1).
     pub fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -118,12 +118,12 @@ impl Random {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Uniform in low..high.
+    /// Uniform in [low, high).
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// Fisher–Yates.
+    /// Fisher–Yates shuffle.
     pub fn shuffle<T>(&mut self, all: &mut [T]) {
         for i in (1..all.len()).rev() {
             let j = (self.unit() * (i + 1) as f64) as usize;

@@ -1,11 +1,11 @@
-//! Equations on the device, row by row.
+//! Evaluation of equations on the device, one row of inputs per case.
 
 use etalon::optics::Tier;
 use etalon_verify::{Cases, Entry};
 
 use crate::gpu::Gpu;
 
-/// The tiers that promise something.
+/// Tiers with error bounds.
 pub const PROMISING: [Tier; 2] = [Tier::Stable, Tier::Compensated];
 
 /// An equation by name.
@@ -24,13 +24,13 @@ pub fn evaluate(gpu: &Gpu, name: &str, tier: Tier, rows: &[Vec<f32>]) -> Vec<Vec
     (0..rows.len()).map(|row| (0..width).map(|column| outputs[column * rows.len() + row]).collect()).collect()
 }
 
-/// One value: output `output` of the equation for these inputs.
+/// Output `output` of the equation for one row of inputs.
 pub fn value(gpu: &Gpu, name: &str, tier: Tier, inputs: &[f32], output: &str) -> f64 {
     let column = column(name, output);
     f64::from(evaluate(gpu, name, tier, &[inputs.to_vec()])[0][column])
 }
 
-/// Place of an output.
+/// Index of an output column.
 pub fn column(name: &str, output: &str) -> usize {
     entry(name).probe.outputs.iter().position(|known| *known == output).expect("an output")
 }

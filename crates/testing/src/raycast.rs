@@ -1,19 +1,19 @@
-//! An independent oracle: what each pixel of a scene sees first, in f64 on the CPU.
+//! Reference ray caster: the first hit of each pixel, in f64 on the CPU, with a watertight ray/triangle test.
 //!
-//! It shares nothing with the renderer but the scene's types: its own matrices, its own tree, its own triangle test
-//! (Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2013, whose edge functions make neighbours
-//! agree about the edge between them, so no ray slips through a closed mesh).
+//! Read Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1) 2013. Only the scene types are shared with the
+//! renderer; matrices, BVH and triangle test are separate. Edge functions of neighbouring triangles agree on their common edge,
+//! so no ray passes through a closed mesh.
 
 use etalon::scene::{AlphaMode, Camera, Projection, Scene, TextureRef, Wrap};
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
-/// What a ray may meet.
+/// Options of intersection.
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
-    /// Alpha-blended surfaces count as if they were opaque; otherwise rays pass them.
+    /// Alpha-blended surfaces are opaque; otherwise rays pass through them.
     pub blend: bool,
-    /// Base-colour textures (level 0, bilinear) count in albedo and in the cut-out of masked materials.
+    /// Base-colour textures (level 0, bilinear) count in the albedo and in the alpha test.
     pub textures: bool,
 }
 
@@ -23,60 +23,60 @@ impl Default for Options {
     }
 }
 
-/// The first surface along a ray, all in world space.
+/// The first hit along a ray, in world space.
 #[derive(Debug, Clone, Copy)]
 pub struct Hit {
-    /// In the world.
+    /// Position in metres.
     pub position: DVec3,
-    /// From the ray's origin, in metres: for a perspective camera the distance from the eye.
+    /// Distance from the ray's origin in metres; for a perspective camera the distance from the eye.
     pub distance: f64,
     /// Unit normal of the triangle, facing the viewer.
     pub geometric_normal: DVec3,
-    /// Unit interpolated vertex normal; turned over when a back face is seen.
+    /// Unit interpolated vertex normal, flipped on back faces.
     pub shading_normal: DVec3,
-    /// Index of its material.
+    /// Index of the material.
     pub material: usize,
-    /// Index of its instance.
+    /// Index of the instance.
     pub instance: usize,
-    /// Triangle of the instance's mesh: its indices start at three times this.
+    /// Triangle of the instance's mesh: its indices start at three times this number.
     pub triangle: usize,
-    /// Weights of the triangle's three vertices, in the order of the mesh's indices; they add up to one.
+    /// Weights of the triangle's three vertices, in the order of the mesh's indices; their sum is one.
     pub barycentric: [f64; 3],
-    /// Texture coordinates of set 0; zero where the mesh has none.
+    /// Texture coordinates of set 0; zero if the mesh has none.
     pub uv: DVec2,
-    /// Linear base colour: factor, vertex colour and (on request) texture.
+    /// Linear base colour: product of factor, vertex colour and, if enabled, texture.
     pub albedo: DVec3,
-    /// Opacity from the same three.
+    /// Opacity: product of the same three factors.
     pub alpha: f64,
-    /// The triangle is seen from its front.
+    /// The front face is hit.
     pub front: bool,
 }
 
 /// A pixel of [`picture`].
 #[derive(Debug, Clone, Copy)]
 pub struct Pixel {
-    /// What is met first.
+    /// The first hit.
     pub hit: Option<Hit>,
-    /// A pixel among the eight around sees another object, a face at another angle, another depth, or nothing where
-    /// this one sees something: comparisons had better stay away.
+    /// Silhouette or crease: one of the eight neighbours sees another object, another normal, another depth, or nothing where
+    /// this pixel has a hit. Comparisons skip such pixels.
     pub edge: bool,
 }
 
-/// A ray with the stretch of it that counts.
+/// A ray with its valid interval.
 #[derive(Debug, Clone, Copy)]
 pub struct Ray {
-    /// Where it starts.
+    /// Origin.
     pub origin: DVec3,
-    /// Unit.
+    /// Unit direction.
     pub direction: DVec3,
-    /// What lies nearer is not met.
+    /// Smallest distance of a hit.
     pub nearest: f64,
-    /// Nor what lies farther.
+    /// Largest distance of a hit.
     pub farthest: f64,
 }
 
 impl Ray {
-    /// From `origin` along `direction`, without end.
+    /// A ray without limits; `direction` is normalised.
     pub fn new(origin: DVec3, direction: DVec3) -> Self {
         Self { origin, direction: direction.normalize(), nearest: 0.0, farthest: f64::INFINITY }
     }
@@ -93,7 +93,7 @@ pub fn camera_ray(camera: &Camera, width: u32, height: u32, x: f64, y: f64) -> R
         Projection::Perspective { fov_y, near } => {
             let tan = (0.5 * fov_y).tan();
             let local = DVec3::new(right * aspect * tan, up * tan, -1.0);
-            // `near` is a depth along the axis; along a slanted ray it is further away.
+            // `near` is a depth along the axis; the distance along an oblique ray is larger.
             let nearest = near.unwrap_or(0.0) * local.length();
             Ray { nearest, ..Ray::new(frame.translation, frame.matrix3 * local) }
         }
@@ -105,10 +105,10 @@ pub fn camera_ray(camera: &Camera, width: u32, height: u32, x: f64, y: f64) -> R
     }
 }
 
-/// What every pixel centre sees, rows from the top.
+/// The first hit at every pixel centre, rows from the top.
 pub fn picture(scene: &Scene, camera: &Camera, width: u32, height: u32, options: Options) -> Vec<Pixel> {
     let world = World::new(scene, options);
-    // One pixel more on every side, so that the border's pixels have eight neighbours too.
+    // One more pixel on each side, so that border pixels have eight neighbours, too.
     let stride = width as usize + 2;
     let hits: Vec<Option<Hit>> = (0..stride * (height as usize + 2))
         .into_par_iter()
@@ -136,14 +136,14 @@ fn differ(a: &Option<Hit>, b: &Option<Hit>) -> bool {
             a.instance != b.instance
                 || a.front != b.front
                 || a.geometric_normal.dot(b.geometric_normal) < 0.9
-                // Off the plane of the face: a jump in depth, also where a grazing view makes depth itself steep.
+                // Distance from the plane of the face: detects jumps in depth, and tolerates steep depth at grazing angles.
                 || a.geometric_normal.dot(b.position - a.position).abs() > 0.01 * a.distance
         }
         _ => true,
     }
 }
 
-/// A triangle in world space, its vertices in the order in which they run counter-clockwise seen from the front.
+/// A triangle in world space, its vertices counter-clockwise seen from the front.
 struct WorldTriangle {
     p: [DVec3; 3],
     instance: u32,
@@ -153,19 +153,19 @@ struct WorldTriangle {
 struct RaycastNode {
     min: DVec3,
     max: DVec3,
-    /// Leaf: first triangle and how many. Inner node: the second child (the first one follows its parent) and zero.
+    /// Leaf: first triangle and count. Inner node: index of the second child and zero (the first child follows its parent).
     first: u32,
     count: u32,
 }
 
-/// Per instance: what turns normals, and whether it mirrors.
+/// Normal transform of an instance.
 struct InstanceFrame {
-    /// Inverse transpose of the placement's linear part.
+    /// Inverse transpose of the linear part of the transform.
     normal: DMat3,
     mirrored: bool,
 }
 
-/// A scene made ready for rays.
+/// A scene with its BVH.
 pub struct World<'a> {
     scene: &'a Scene,
     options: Options,
@@ -174,7 +174,7 @@ pub struct World<'a> {
     nodes: Vec<RaycastNode>,
 }
 
-/// What the triangle test knows: distance and weights of the world triangle's vertices.
+/// Result of the triangle test: distance, and weights of the world triangle's vertices.
 #[derive(Clone, Copy)]
 struct TriangleHit {
     distance: f64,
@@ -183,7 +183,7 @@ struct TriangleHit {
 }
 
 impl<'a> World<'a> {
-    /// Moves every triangle into the world and sorts them into a tree.
+    /// Transforms every triangle to world space and builds the BVH.
     pub fn new(scene: &'a Scene, options: Options) -> Self {
         let mut frames = Vec::new();
         let mut triangles = Vec::new();
@@ -191,7 +191,7 @@ impl<'a> World<'a> {
             let mesh = &scene.meshes[instance.mesh];
             let linear = instance.world_from_object.matrix3;
             let mirrored = linear.determinant() < 0.0;
-            // The cofactor matrix is the inverse transpose up to the determinant, and exists for flattened things too.
+            // The cofactor matrix is the inverse transpose times the determinant, and exists for singular transforms, too.
             let normal = DMat3::from_cols(
                 linear.y_axis.cross(linear.z_axis),
                 linear.z_axis.cross(linear.x_axis),
@@ -219,14 +219,14 @@ impl<'a> World<'a> {
         world
     }
 
-    /// Builds the tree over `triangles[begin..end]`, halving at the median centroid of the widest axis.
+    /// Builds the BVH over `triangles[begin..end]`, split at the median centroid of the widest axis.
     fn split(&mut self, triangles: &mut [WorldTriangle], begin: usize, end: usize) {
         let part = &mut triangles[begin..end];
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for p in part.iter().flat_map(|t| t.p) {
             (min, max) = (min.min(p), max.max(p));
         }
-        // The slab test rounds; a wider box may cost a visit, a narrower one a hit.
+        // The slab test rounds: a wider box may cost a visit, a narrower one may lose a hit.
         let slack = (min.abs().max(max.abs())).max_element() * 1e-14;
         let node = self.nodes.len();
         self.nodes.push(RaycastNode {
@@ -249,7 +249,7 @@ impl<'a> World<'a> {
         self.split(triangles, begin + middle, end);
     }
 
-    /// The first surface along the ray.
+    /// The first hit along the ray.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         let shear = Shear::new(ray);
         let inverse = ray.direction.recip();
@@ -271,7 +271,7 @@ impl<'a> World<'a> {
                 if distance < ray.nearest || distance <= 0.0 || distance > limit {
                     continue;
                 }
-                // Of two faces at one distance the earlier in the scene wins, whatever the tree's order.
+                // Ties in distance: the triangle that is first in the scene wins, independent of the order of the BVH.
                 let order = |t: usize| (self.triangles[t].instance, self.triangles[t].index);
                 if best.is_some_and(|b| b.0.distance == distance && order(b.0.triangle) < order(t)) {
                     continue;
@@ -285,8 +285,8 @@ impl<'a> World<'a> {
         best.map(|b| b.1)
     }
 
-    /// Everything about a candidate, or nothing when its material says that it does not exist from this side or at
-    /// this place.
+    /// The complete hit of a candidate; `None` if its material is culled from this side or fails the alpha test at
+    /// this point.
     fn surface(&self, ray: &Ray, candidate: &TriangleHit) -> Option<Hit> {
         let triangle = &self.triangles[candidate.triangle];
         let instance = triangle.instance as usize;
@@ -346,8 +346,8 @@ impl<'a> World<'a> {
         })
     }
 
-    /// Level 0 of a colour texture, bilinear (or nearest where the sampler asks for it), linearised before the
-    /// weights are applied.
+    /// Level 0 of a colour texture, bilinear (or nearest if the sampler requests it), linearised before
+    /// filtering.
     fn sample_srgb(&self, texture: &TextureRef, uv: DVec2) -> [f64; 4] {
         let image = &self.scene.images[texture.image];
         let m = texture.uv_transform;
@@ -409,7 +409,7 @@ fn crosses(node: &RaycastNode, ray: &Ray, inverse: DVec3, limit: f64) -> bool {
     enter <= leave * (1.0 + 1e-14)
 }
 
-/// The frame of the watertight test: the ray becomes the unit z axis.
+/// Sheared frame of the watertight test: the ray becomes the unit z axis.
 struct Shear {
     kx: usize,
     ky: usize,
@@ -428,13 +428,13 @@ impl Shear {
         Self { kx, ky, kz, sx: d[kx] / d[kz], sy: d[ky] / d[kz], sz: 1.0 / d[kz] }
     }
 
-    /// Distance along the ray and the weights of the three vertices, seen from either side.
+    /// Distance along the ray and weights of the three vertices, for hits from either side.
     fn triangle(&self, ray: &Ray, p: &[DVec3; 3]) -> Option<(f64, [f64; 3])> {
         let [a, b, c] = p.map(|p| {
             let p = p - ray.origin;
             DVec3::new(p[self.kx] - self.sx * p[self.kz], p[self.ky] - self.sy * p[self.kz], p[self.kz] * self.sz)
         });
-        // Each is the exact negative of the neighbour's function for the same edge.
+        // Each edge function is the exact negative of the neighbour's for the same edge.
         let u = c.x * b.y - c.y * b.x;
         let v = a.x * c.y - a.y * c.x;
         let w = b.x * a.y - b.y * a.x;

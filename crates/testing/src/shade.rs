@@ -1,7 +1,7 @@
-//! Direct light in f64, in the textbook's form: what the lighting passes must arrive at.
+//! Reference direct lighting in f64, in textbook form, for comparison with the lighting passes.
 //!
-//! Written from the formulas (glTF 2.0 appendix B, Walter et al. 2007, Heitz 2014, KHR_lights_punctual), not from the
-//! shaders: another form of D, of the visibility and of the spot's ramp.
+//! Read glTF 2.0 appendix B; Walter et al. 2007; Heitz 2014; KHR_lights_punctual. It is written from these formulas and not from
+//! the shaders: D, the masking-shadowing term and the spot's falloff have another form.
 
 use std::f64::consts::PI;
 
@@ -10,9 +10,9 @@ use etalon::share::AovPixel;
 use etalon::upload::view::View;
 use glam::DVec3;
 
-/// A surface point seen from `v`.
+/// A surface point with its material.
 pub struct Point {
-    /// In the world.
+    /// Position in metres.
     pub position: DVec3,
     /// Shading normal.
     pub n: DVec3,
@@ -20,17 +20,17 @@ pub struct Point {
     pub v: DVec3,
     /// Base colour.
     pub albedo: DVec3,
-    /// From 0 to 1.
+    /// Metallic, 0 to 1.
     pub metallic: f64,
-    /// Perceptual, from 0 to 1.
+    /// Perceptual roughness, 0 to 1.
     pub roughness: f64,
     /// Index of refraction.
     pub ior: f64,
-    /// Weight of the dielectric reflection.
+    /// Strength of the dielectric specular reflection.
     pub specular: f64,
 }
 
-/// Irradiance perpendicular to the light's direction, and that direction.
+/// Irradiance perpendicular to the direction to the light, and that direction.
 pub fn incident(light: &Light, position: DVec3) -> (DVec3, DVec3) {
     let color = DVec3::from(light.color.map(f64::from));
     let from = |place: DVec3, range: Option<f64>| {
@@ -54,7 +54,7 @@ pub fn incident(light: &Light, position: DVec3) -> (DVec3, DVec3) {
     }
 }
 
-/// BRDF of glTF's metallic-roughness model times cosθ: Lambert under Schlick's Fresnel beside GGX.
+/// BRDF of glTF's metallic-roughness model times cosθ: Lambert under a Fresnel-weighted layer, plus GGX.
 pub fn reflected(p: &Point, l: DVec3) -> DVec3 {
     let (n_l, n_v) = (p.n.dot(l), p.n.dot(p.v).max(1e-4));
     if n_l <= 0.0 {
@@ -74,7 +74,7 @@ pub fn reflected(p: &Point, l: DVec3) -> DVec3 {
     (diffuse + f * (d * g2 / (4.0 * n_l * n_v))) * n_l
 }
 
-/// All lights of the scene.
+/// Radiance reflected from all lights of the scene.
 pub fn direct(scene: &Scene, p: &Point) -> DVec3 {
     scene.lights.iter().fold(DVec3::ZERO, |sum, light| {
         let (l, e) = incident(light, p.position);
@@ -82,7 +82,7 @@ pub fn direct(scene: &Scene, p: &Point) -> DVec3 {
     })
 }
 
-/// The point behind a pixel of the G-buffer.
+/// The surface point of a pixel of the G-buffer.
 pub fn point(scene: &Scene, pixel: &AovPixel, view: &View, orthographic: bool) -> Point {
     let p_rel = glam::Vec3::from(pixel.p_rel).as_dvec3();
     let material = &scene.materials[pixel.material as usize - 1];

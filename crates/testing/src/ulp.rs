@@ -1,8 +1,8 @@
-//! Distances between numbers of the device and exact ones.
+//! Errors of device results in units in the last place (ulp).
 
 pub use etalon::optics::catalogue::ulp;
 
-/// Distance of `got` from the exact `want`, in units in the last place of f32 at `want`; infinite where `got` is no number.
+/// Distance of `got` from the exact `want`, in units in the last place of f32 at `want`; infinite if `got` is NaN.
 ///
 /// ```
 /// use etalon_testing::ulp::ulps;
@@ -16,10 +16,10 @@ pub fn ulps(got: f32, want: f64) -> f64 {
     if apart.is_nan() { f64::INFINITY } else { apart }
 }
 
-/// Fails unless `got` lies within `most` units in the last place of the exact `want`.
+/// Asserts that `got` is within `most` units in the last place of the exact `want`.
 ///
 /// # Panics
-/// Where it does not.
+/// The distance is larger.
 #[track_caller]
 pub fn assert_ulps(what: &str, got: f32, want: f64, most: f64) {
     let apart = ulps(got, want);

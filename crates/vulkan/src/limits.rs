@@ -2,7 +2,7 @@
 //!
 //! Read the Vulkan specification, chapter Limits.
 
-/// Push descriptors of a pass (`maxPushDescriptors`); every device allows 32.
+/// Push descriptors of a pass (`maxPushDescriptors`); every device with the extension allows 32 or more.
 pub const PUSH_DESCRIPTORS: u32 = 12;
 /// Storage images and storage texel buffers in one shader stage.
 pub const STORAGE_IMAGES: u32 = 16;

@@ -1,36 +1,38 @@
-//! Indices of refraction by wavelength (lecture F1).
+//! Dispersion: index of refraction by wavelength (lecture F1), by the formulas of Sellmeier and Cauchy or by Abbe number.
+//!
+//! Read KHR_materials_dispersion and docs/colour.md.
 
 use crate::colour::{cauchy, sellmeier};
 
-/// Wavelength of the yellow line of helium, nm: what an index without a wavelength is for.
+/// Fraunhofer d line, the yellow line of helium, in nm: the wavelength of an index given without one.
 pub const FRAUNHOFER_D: f64 = 587.5618;
 
-/// How the index of a medium depends on the wavelength.
+/// Dependence of the index on the wavelength.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Dispersion {
-    /// Not at all.
+    /// Constant index.
     #[default]
     None,
-    /// 20/V_d, with the index at the d line told beside it (KHR_materials_dispersion).
+    /// 20/V_d of the Abbe number V_d; the index at the d line is given beside it (KHR_materials_dispersion).
     Abbe(f64),
-    /// n² = 1 + Σ B λ²/(λ² − C), λ and √C in µm.
+    /// Sellmeier's formula n² = 1 + Σ B λ²/(λ² − C), λ and √C in µm.
     Sellmeier {
-        /// No unit.
+        /// B, without unit.
         b: [f64; 4],
-        /// µm².
+        /// C in µm².
         c: [f64; 4],
     },
-    /// n = A + B/λ², B in µm².
+    /// Cauchy's formula n = A + B/λ².
     Cauchy {
-        /// No unit.
+        /// A, without unit.
         a: f64,
-        /// µm².
+        /// B in µm².
         b: f64,
     },
 }
 
 impl Dispersion {
-    /// The index at a wavelength in nm, of a medium whose index at the d line is `n_d`; at least 1.
+    /// Index at a wavelength in nm, at least 1; `n_d` is the index at the d line.
     #[must_use]
     pub fn index(&self, n_d: f64, nm: f64) -> f64 {
         match self {
@@ -42,7 +44,7 @@ impl Dispersion {
         }
     }
 
-    /// Whether it varies over visible light.
+    /// Whether the index differs between 400 and 700 nm.
     #[must_use]
     pub fn disperses(&self, n_d: f64) -> bool {
         self.index(n_d, 400.0) != self.index(n_d, 700.0)
@@ -58,7 +60,7 @@ mod tests {
         let (n_d, v_d) = (1.5168, 64.17);
         let medium = Dispersion::Abbe(20.0 / v_d);
         let [d, f, c] = [FRAUNHOFER_D, 486.13, 656.27].map(|nm| medium.index(n_d, nm));
-        // The extension rounds its constants: V_d comes out to a per mille.
+        // The extension rounds its constants, so V_d is correct to a per mille.
         assert!(
             (d - n_d).abs() < 1e-4 && ((d - 1.0) / (f - c) / v_d - 1.0).abs() < 2e-3,
             "{d} {}",

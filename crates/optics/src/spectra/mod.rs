@@ -1,8 +1,9 @@
-//! Light and matter by wavelength (lecture C1–C3, F1, F8): spectra, bands of wavelengths, and what colours stand for.
+//! Spectra for spectral rendering (lecture C1–C3, F1, F8): bands of wavelengths, light sources, metals, and RGB conversions.
 //!
-//! A picture by wavelengths is drawn band by band. In a band all that reflects, transmits or bends is a number, its mean over the
-//! band, and light is the tristimulus X, Y, Z of what it sends in the band: light and matching functions are multiplied before
-//! they are averaged, so that a line is never missed, wherever in its band it lies. The film is the sum over the bands.
+//! Read pbrt 4.5 and 4.6; docs/decisions/spectra.md. A spectral picture is rendered band by band. In a band each reflectance,
+//! transmittance and index is one number, its mean over the band. Light is the tristimulus X, Y, Z of its emission in the band:
+//! spectrum and colour matching functions are multiplied before averaging, so that no spectral line is lost, wherever in the
+//! band it lies. The film is the sum over the bands.
 
 mod dispersion;
 mod upsampling;
@@ -14,42 +15,42 @@ use std::sync::{Arc, LazyLock};
 
 use crate::colour::{CIE_1931_2DEG, SAMPLES, XYZ_TO_SRGB, blackbody, upsampled_reflectance, wavelength};
 
-/// What tristimulus values are of; one observer per picture.
+/// Observer of all tristimulus values.
 pub const OBSERVER: &str = "CIE 1931 2°";
 
-/// Wavelengths that pictures are made of, nm (lecture R7).
+/// Range of wavelengths of pictures, nm (lecture R7).
 pub const VISIBLE: Band = Band { from: 380.0, to: 780.0 };
 
-/// Integrals are sums over steps of this length, nm, or shorter ones: the data are linear over ten of them.
+/// Largest integration step in nm: the data are linear over ten steps.
 const STEP: f64 = 0.5;
 
-/// Light of lines from this width on, nm, is kept: exactly in whole bands, to a thousandth in parts of them.
+/// Narrowest line in nm that integration preserves: exactly in whole bands, to a thousandth in parts of bands.
 const NARROWEST: f64 = 0.05;
 
-/// Wavelengths from … to, nm.
+/// An interval of wavelengths in nm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Band {
-    /// The shortest.
+    /// Shortest wavelength.
     pub from: f64,
-    /// The longest.
+    /// Longest wavelength.
     pub to: f64,
 }
 
 impl Band {
-    /// Part `index` of `count` equal ones.
+    /// Part `index` of `count` equal parts.
     #[must_use]
     pub fn part(&self, index: u32, count: u32) -> Self {
         let at = |i: u32| self.from + (self.to - self.from) * f64::from(i) / f64::from(count);
         Self { from: at(index), to: at(index + 1) }
     }
 
-    /// Half way.
+    /// Middle wavelength.
     #[must_use]
     pub fn middle(&self) -> f64 {
         0.5 * (self.from + self.to)
     }
 
-    /// The mean of a function of the wavelength.
+    /// Mean of a function of the wavelength over the band.
     pub fn mean(&self, f: impl Fn(f64) -> f64) -> f64 {
         self.mean_of(|nm| [f(nm)])[0]
     }
@@ -69,25 +70,25 @@ impl Band {
     }
 }
 
-/// A function of the wavelength.
+/// A spectrum: a function of the wavelength.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Spectrum {
-    /// The same everywhere.
+    /// The same value at all wavelengths.
     Constant(f64),
-    /// Wavelength, nm, and value, ascending: linear between them, constant beyond.
+    /// Rows of wavelength in nm and value, ascending: linear interpolation, constant outside.
     Table(Arc<[[f64; 2]]>),
-    /// Planck's radiance at so many kelvin.
+    /// Black-body radiance by Planck's law, for a temperature in kelvin.
     BlackBody(f64),
     /// CIE illuminant A.
     IlluminantA,
-    /// A sum of the three curves of assets/spectra/rgb_basis.csv.
+    /// A weighted sum of the three reflectance curves of assets/spectra/rgb_basis.csv.
     Basis([f64; 3]),
     /// Jakob and Hanika's sigmoid of c0 λ² + c1 λ + c2.
     Sigmoid([f64; 3]),
 }
 
 impl Spectrum {
-    /// Its value at a wavelength in nm.
+    /// Value at a wavelength in nm.
     #[must_use]
     pub fn at(&self, nm: f64) -> f64 {
         match self {
@@ -120,28 +121,28 @@ impl Spectrum {
         mean.map(|mean| mean * (band.to - band.from))
     }
 
-    /// Steps of integrals, nm: an eighth of the narrowest that a table tells apart.
+    /// Integration step in nm: an eighth of the narrowest interval of a table.
     fn step(&self) -> f64 {
         let Self::Table(rows) = self else { return STEP };
-        // Of two rows at one place, as at the ends of a light's table, the width is none.
+        // Two rows at one wavelength, as at the ends of a light's table, have width 0 and do not count.
         let widths = rows.windows(2).map(|pair| pair[1][0] - pair[0][0]).filter(|&width| width > 1e-3);
         (widths.fold(f64::INFINITY, f64::min) / 8.0).clamp(NARROWEST / 8.0, STEP)
     }
 
-    /// X, Y, Z of what light of this spectrum sends in a band, where its luminance Y over all bands is 1.
+    /// X, Y, Z of light of this spectrum in a band, where Y over all bands is 1.
     #[must_use]
     pub fn light_in(&self, band: &Band) -> [f64; 3] {
         let all = self.integral(&VISIBLE)[1];
         self.integral(band).map(|part| if all > 0.0 { part / all } else { 0.0 })
     }
 
-    /// Linear Rec. 709 of light of this spectrum and luminance 1.
+    /// Linear Rec. 709 colour of light of this spectrum with luminance 1.
     #[must_use]
     pub fn light_rgb(&self) -> [f64; 3] {
         rgb_from_xyz(self.light_in(&VISIBLE))
     }
 
-    /// Linear Rec. 709 of a surface of this reflectance under D65.
+    /// Linear Rec. 709 colour of a surface of this reflectance under D65.
     #[must_use]
     pub fn reflectance_rgb(&self) -> [f64; 3] {
         let d65 = d65();
@@ -149,7 +150,7 @@ impl Spectrum {
         rgb_from_xyz(sum.map(|sum| sum * (VISIBLE.to - VISIBLE.from) / d65.integral(&VISIBLE)[1]))
     }
 
-    /// A table; what lies outside of it is dark.
+    /// An emission table, 0 outside its range.
     #[must_use]
     pub fn light_table(rows: &[[f64; 2]]) -> Self {
         let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Self::Constant(0.0) };
@@ -157,7 +158,7 @@ impl Spectrum {
         Self::Table([&ends[..1], rows, &ends[1..]].concat().into())
     }
 
-    /// Column `column` of a file of assets/spectra.
+    /// Column `column` of a file in assets/spectra.
     fn column(text: &str, column: usize) -> Self {
         let row = |line: &str| {
             let mut cells = line.split(',').map(|cell| cell.parse().expect("a number"));
@@ -167,40 +168,40 @@ impl Spectrum {
     }
 }
 
-/// Light of a known spectrum.
+/// Emission: a spectrum with an absolute luminance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Emission {
-    /// Its shape.
+    /// Relative spectrum.
     pub spectrum: Spectrum,
-    /// Y of all of it, in the unit of the quantity that it is of.
+    /// Y over all wavelengths, in the unit of the emitted quantity.
     pub luminance: f64,
-    /// ∫ S ȳ dλ.
+    /// ∫ S ȳ dλ of the relative spectrum.
     whole: f64,
 }
 
 impl Emission {
-    /// Of a light that is told as linear Rec. 709 beside its spectrum: of the colour only its luminance counts.
+    /// Emission of a light that has a spectrum and a linear Rec. 709 colour: only the luminance of the colour counts.
     #[must_use]
     pub fn new(spectrum: Spectrum, rgb: [f32; 3]) -> Self {
         let [r, g, b] = rgb.map(f64::from);
         Self::of_luminance(spectrum, 0.2126 * r + 0.7152 * g + 0.0722 * b)
     }
 
-    /// Of a spectrum, and Y of all of it.
+    /// Emission of a spectrum with luminance Y over all wavelengths.
     #[must_use]
     pub fn of_luminance(spectrum: Spectrum, luminance: f64) -> Self {
         let whole = spectrum.integral(&VISIBLE)[1];
         Self { spectrum, luminance, whole }
     }
 
-    /// X, Y, Z of what it sends in a band.
+    /// X, Y, Z of the emission in a band.
     #[must_use]
     pub fn in_band(&self, band: &Band) -> [f64; 3] {
         let scale = if self.whole > 0.0 { self.luminance / self.whole } else { 0.0 };
         self.spectrum.integral(band).map(|part| part * scale)
     }
 
-    /// Linear Rec. 709, what lies outside of it cut off.
+    /// Linear Rec. 709 colour, clamped to the gamut.
     #[must_use]
     pub fn rgb(&self) -> [f32; 3] {
         self.spectrum.light_rgb().map(|x| (x.max(0.0) * self.luminance) as f32)
@@ -211,15 +212,15 @@ const ILLUMINANTS: &str = include_str!("../../assets/spectra/illuminants.csv");
 const METALS: &str = include_str!("../../assets/spectra/metals.csv");
 const CHART: &str = include_str!("../../assets/spectra/chart.csv");
 
-/// Light sources by the names that files may use: CIE's illuminants, and `e`, the same power at every wavelength.
+/// Illuminants by the names that files may use: those of the CIE, and `e` with equal power at every wavelength.
 pub const LIGHTS: &[&str] = &["a", "d65", "e", "f2", "f11"];
 
-/// Daylight.
+/// CIE illuminant D65 (daylight).
 fn d65() -> Spectrum {
     Spectrum::column(ILLUMINANTS, 0)
 }
 
-/// The spectrum of a light of that name.
+/// The spectrum of an illuminant by name.
 #[must_use]
 pub fn illuminant(name: &str) -> Option<Spectrum> {
     match name {
@@ -239,14 +240,14 @@ pub fn metal(name: &str) -> Option<[Spectrum; 2]> {
     Some([0, 1].map(|part| Spectrum::column(METALS, 2 * index + part)))
 }
 
-/// The patches of a ColorChecker, row by row, with their names.
+/// Names and reflectances of the patches of a ColorChecker, row by row.
 #[must_use]
 pub fn chart() -> Vec<(String, Spectrum)> {
     let names = CHART.lines().next().unwrap_or_default().split(',').skip(1);
     names.enumerate().map(|(i, name)| (name.replace('_', " "), Spectrum::column(CHART, i))).collect()
 }
 
-/// Between samples of a table of three functions; 0 outside of it.
+/// Linear interpolation in a table of three functions; 0 outside.
 fn interpolated(table: &[[f64; 3]; SAMPLES], nm: f64) -> [f64; 3] {
     let at = (nm - wavelength(0)) / (wavelength(1) - wavelength(0));
     let last = (SAMPLES - 1) as f64;
@@ -258,12 +259,12 @@ fn interpolated(table: &[[f64; 3]; SAMPLES], nm: f64) -> [f64; 3] {
     [0, 1, 2].map(|k| table[first][k] + share * (table[first + 1][k] - table[first][k]))
 }
 
-/// x̄, ȳ, z̄.
+/// Colour matching functions x̄, ȳ, z̄ at a wavelength.
 fn matching(nm: f64) -> [f64; 3] {
     interpolated(&CIE_1931_2DEG, nm)
 }
 
-/// Reflectances whose colours under D65 are red, green and blue: they add up to 1.
+/// Three reflectances that sum to 1 and are red, green and blue under D65.
 fn basis(nm: f64) -> [f64; 3] {
     static BASIS: LazyLock<[[f64; 3]; SAMPLES]> = LazyLock::new(|| {
         let curves = [0, 1, 2].map(|i| Spectrum::column(include_str!("../../assets/spectra/rgb_basis.csv"), i));
@@ -272,14 +273,14 @@ fn basis(nm: f64) -> [f64; 3] {
     interpolated(&BASIS, nm.clamp(VISIBLE.from, VISIBLE.to))
 }
 
-/// Shares of red, green and blue in a band: what makes a number of three, for quantities that add up.
+/// Weights of red, green and blue in a band, which convert an additive RGB quantity to one number.
 #[must_use]
 pub fn shares(band: &Band) -> [f64; 3] {
     band.mean_of(basis)
 }
 
-/// Columns: X, Y, Z in a band of light that is told as linear Rec. 709, red, green and blue. Such light is a sum of what the
-/// three curves reflect of D65; over all bands it has its colour again.
+/// Columns: X, Y, Z in a band of red, green and blue linear Rec. 709 light. RGB light is D65 filtered by the three basis
+/// reflectances; summed over all bands it has its colour again.
 #[must_use]
 pub fn light_from_rgb(band: &Band) -> [[f64; 3]; 3] {
     static D65: LazyLock<(Spectrum, f64)> = LazyLock::new(|| {
@@ -296,8 +297,8 @@ pub fn light_from_rgb(band: &Band) -> [[f64; 3]; 3] {
     [0, 1, 2].map(|primary| [0, 1, 2].map(|k| mean[3 * primary + k] * scale))
 }
 
-/// Rows: linear Rec. 709 from X, Y, Z by IEC 61966-2-1, each divided by what it makes of D65, so that this light is white to the
-/// last digit: the four digits of the standard are off by up to 6e-4 for these tables.
+/// Rows: linear Rec. 709 from X, Y, Z by IEC 61966-2-1, each row divided by its value for D65, so that D65 is exactly white: with
+/// the standard's four digits it is off by up to 6e-4 for these tables.
 pub static RGB_FROM_XYZ: LazyLock<[[f64; 3]; 3]> = LazyLock::new(|| {
     let white = d65().light_in(&VISIBLE);
     XYZ_TO_SRGB.map(|row| {
@@ -306,7 +307,7 @@ pub static RGB_FROM_XYZ: LazyLock<[[f64; 3]; 3]> = LazyLock::new(|| {
     })
 });
 
-/// Linear Rec. 709 of X, Y, Z; negative where the colour lies outside of it.
+/// Linear Rec. 709 of X, Y, Z; negative outside the gamut.
 #[must_use]
 pub fn rgb_from_xyz(xyz: [f64; 3]) -> [f64; 3] {
     RGB_FROM_XYZ.map(|row| (0..3).map(|k| row[k] * xyz[k]).sum())
@@ -320,7 +321,7 @@ mod tests {
         (0..3).all(|k| (a[k] - b[k]).abs() <= tolerance)
     }
 
-    /// Integrals over bands are those of the equations, which sum over steps of 5 nm.
+    /// Integrals over bands equal those of the equations, which sum over steps of 5 nm.
     #[test]
     fn bands_add_up_to_the_matching_of_the_lecture() {
         use crate::colour::{cmf_gaussian, cmf_integral, planck, xyz_to_srgb};
@@ -336,7 +337,7 @@ mod tests {
             near(rgb_from_xyz([x, y, z]).map(|c| c / y), xyz_to_srgb([x, y, z]).map(|c| c / y), 1e-3),
             "{r} {g} {b}"
         );
-        // Of a lamp told by its temperature the shape is Planck's: the ratio of two wavelengths.
+        // A light given by its temperature has Planck's spectrum: compare the ratio of two wavelengths.
         let lamp = Spectrum::BlackBody(2856.0);
         let at = |nm: f64| planck(14_387_768.8 / (nm * 2856.0)) / nm.powi(5);
         assert!((lamp.at(700.0) / lamp.at(450.0) / (at(700.0) / at(450.0)) - 1.0).abs() < 1e-6);
@@ -370,7 +371,7 @@ mod tests {
         }
     }
 
-    /// CIE 15: chromaticities of the illuminants.
+    /// Chromaticities of the illuminants, CIE 15.
     #[test]
     fn illuminants_have_their_chromaticities() {
         for (name, x, y) in [
@@ -390,12 +391,12 @@ mod tests {
 
     #[test]
     fn bands_add_up_and_lines_are_not_missed() {
-        // A line of 1 nm, anywhere.
+        // Spectral lines of various widths.
         for (nm, width) in [(404.7, 0.5), (435.8, 0.05), (546.1, 0.1), (555.0, 1.0), (611.5, 2.0)] {
             let line = Spectrum::light_table(&[[nm - width, 0.0], [nm, 1.0], [nm + width, 0.0]]);
             for bands in [8, 16, 32, 32 * 64] {
                 let sum: f64 = (0..bands).map(|i| line.light_in(&VISIBLE.part(i, bands))[1]).sum();
-                // Steps of whole bands are those of all light; those of narrower parts are shorter.
+                // Whole bands use the steps of all wavelengths; narrower parts use shorter steps.
                 let bound = if bands > 32 { 1e-3 } else { 1e-12 };
                 assert!((sum - 1.0).abs() < bound, "{nm} in {bands} bands: {sum}");
             }
@@ -404,8 +405,8 @@ mod tests {
 
     #[test]
     fn metals_have_the_indices_of_the_lamps() {
-        // docs/colour.md, section 7, gold at 645.16, 526.32 and 444.44 nm: linear between the wavelengths of the source, here
-        // between those and steps of 5 nm.
+        // docs/colour.md, section 7: gold at 645.16, 526.32 and 444.44 nm, linear between the wavelengths of the source; this
+        // table is linear between those and steps of 5 nm.
         let [n, kappa] = metal("gold").unwrap();
         for (nm, wanted) in [(645.16, [0.1635, 3.5543]), (526.32, [0.5828, 2.1542]), (444.44, [1.4022, 1.9248])] {
             assert!((n.at(nm) - wanted[0]).abs() < 0.01 && (kappa.at(nm) - wanted[1]).abs() < 0.01, "{nm}");

@@ -1,5 +1,7 @@
-//! Reflectances for colours (knob `upsampling`): the fit of Jakob and Hanika, "A low-dimensional function space for efficient
-//! spectral upsampling" (Eurographics 2019), and sums of three curves, which need no fit.
+//! Spectral upsampling: reflectance spectra for RGB colours (knob `upsampling`).
+//!  Read Jakob and Hanika, "A Low-Dimensional Function Space for Efficient Spectral Upsampling", Eurographics 2019 (a fitted
+//! sigmoid); Mallett and Yuksel, "Spectral Primary Decomposition for Rendering with sRGB Reflectance", EGSR 2019 (a sum of
+//! three curves, which needs no fit). Colours are linear Rec. 709 in [0, 1] under D65.
 
 use std::sync::LazyLock;
 
@@ -8,30 +10,30 @@ use rayon::prelude::*;
 use super::{Band, Spectrum, VISIBLE, d65, matching, rgb_from_xyz};
 use crate::colour::{SAMPLES, upsampled_reflectance, wavelength};
 
-/// How a reflectance is found for a colour.
+/// Method of spectral upsampling.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Upsampling {
-    /// A sum of three curves that add up to 1 (assets/spectra/rgb_basis.csv).
+    /// A sum of three curves that sum to 1 (assets/spectra/rgb_basis.csv).
     MallettYuksel,
-    /// A sigmoid of a parabola, fitted: smoother than any such sum, as measured reflectances are.
+    /// A sigmoid of a fitted parabola: smoother than a sum of three curves, like measured reflectances.
     JakobHanika,
 }
 
 impl Upsampling {
-    /// The reflectance of a linear Rec. 709 colour in [0, 1] as D65 shows it.
+    /// Reflectance spectrum of a linear Rec. 709 colour under D65; the colour is clamped to [0, 1].
     #[must_use]
     pub fn reflectance(self, rgb: [f64; 3]) -> Spectrum {
         let rgb = rgb.map(|x| x.clamp(0.0, 1.0));
         match self {
             Self::MallettYuksel => Spectrum::Basis(rgb),
-            // Greys have no shape.
+            // Grey: a constant spectrum, without a fit.
             Self::JakobHanika if rgb[0] == rgb[1] && rgb[1] == rgb[2] => Spectrum::Constant(rgb[0]),
             Self::JakobHanika => Spectrum::Sigmoid(fit(rgb)),
         }
     }
 }
 
-/// 5 nm weights that make X, Y, Z of a reflectance under D65, whose own Y is 1.
+/// Weights, in steps of 5 nm, that give X, Y, Z of a reflectance under D65 with Y = 1.
 static WEIGHTS: LazyLock<[[f64; 3]; SAMPLES]> = LazyLock::new(|| {
     let d65 = d65();
     let mut weights = [[0.0; 3]; SAMPLES];
@@ -51,18 +53,18 @@ static WEIGHTS: LazyLock<[[f64; 3]; SAMPLES]> = LazyLock::new(|| {
     weights.map(|w| w.map(|x| x / white))
 });
 
-/// λ = 580 + 200 u nm: the parabola's coefficients are of one size in u.
+/// λ = 580 + 200 u nm: in u the coefficients of the parabola have similar magnitudes.
 const MIDDLE: f64 = 580.0;
 const REACH: f64 = 200.0;
 
-/// A darkest and a brightest value: the sigmoid reaches 0 and 1 at infinity only.
+/// Smallest and largest fitted value: the sigmoid reaches 0 and 1 only at infinity.
 const ENDS: [f64; 2] = [1e-5, 1.0 - 1e-5];
 
-/// Coefficients of λ², λ and 1 by Levenberg's and Marquardt's method on differences in L*a*b*.
+/// Coefficients of λ², λ and 1, by the Levenberg-Marquardt method on differences in L*a*b*.
 fn fit(rgb: [f64; 3]) -> [f64; 3] {
     let rgb = rgb.map(|x| x.clamp(ENDS[0], ENDS[1]));
     let wanted = lab(xyz_of_rgb(rgb));
-    // From the grey of the same luminance.
+    // Start with the grey of the same luminance.
     let grey = (0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]).clamp(0.01, 0.99);
     let mut c = [0.0, 0.0, (grey - 0.5) / (grey * (1.0 - grey)).sqrt()];
     let mut damping = 1e-3;
@@ -81,7 +83,7 @@ fn fit(rgb: [f64; 3]) -> [f64; 3] {
             damping *= 4.0;
         }
     }
-    // a u² + b u + c in λ.
+    // Coefficients of a u² + b u + c, converted from u to λ.
     let [a, b, c] = c;
     let (a, b, c) = (a / (REACH * REACH), b / REACH, c);
     [a, b - 2.0 * a * MIDDLE, a * MIDDLE * MIDDLE - b * MIDDLE + c]
@@ -106,7 +108,7 @@ fn lab(xyz: [f64; 3]) -> [f64; 3] {
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }
 
-/// The cube root with its straight start, and its derivative, of each over the white's.
+/// For X, Y and Z over the white's: the cube root with its linear part near 0, and the derivative.
 fn lab_terms(xyz: [f64; 3]) -> [(f64, f64); 3] {
     static WHITE: LazyLock<[f64; 3]> = LazyLock::new(|| xyz_of_rgb([1.0; 3]));
     const START: f64 = 6.0 / 29.0;
@@ -120,7 +122,7 @@ fn lab_terms(xyz: [f64; 3]) -> [(f64, f64); 3] {
     })
 }
 
-/// L*a*b* of what the coefficients reflect, less what is wanted; rows of its derivatives by them.
+/// L*a*b* of the reflectance minus the target, and the rows of the Jacobian by the coefficients.
 fn residual(c: [f64; 3], wanted: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
     let mut xyz = [0.0; 3];
     let mut by = [[0.0; 3]; 3];
@@ -148,7 +150,7 @@ fn residual(c: [f64; 3], wanted: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
     ([0, 1, 2].map(|k| got[k] - wanted[k]), rows)
 }
 
-/// (JᵀJ + d diag JᵀJ)⁻¹ Jᵀ e.
+/// Step of Levenberg and Marquardt, (JᵀJ + d diag JᵀJ)⁻¹ Jᵀ e.
 fn solve(rows: [[f64; 3]; 3], error: [f64; 3], damping: f64) -> [f64; 3] {
     let j = glam::DMat3::from_cols_array_2d(&rows).transpose();
     let mut normal = j.transpose() * j;
@@ -159,18 +161,19 @@ fn solve(rows: [[f64; 3]; 3], error: [f64; 3], damping: f64) -> [f64; 3] {
     (normal.inverse() * (j.transpose() * glam::DVec3::from(error))).to_array()
 }
 
-/// Reflectances of colours that a texture may have, fitted at the corners of a grid over the square roots of red, green and blue.
+/// Upsampled reflectances for texture colours, fitted at the corners of a grid over the square roots of red, green and blue.
 pub struct Grid {
-    /// Corners a side.
+    /// Corners per axis.
     pub side: u32,
     coefficients: Vec<[f64; 3]>,
 }
 
 impl Grid {
-    /// Corners a side: between them reflectances are off by 0.02 at most, at saturated ends, and 0.0003 in the mean of random colours.
+    /// Corners per axis. The interpolated reflectance is off by at most 0.02, at saturated ends, and by 0.0003 in the mean of
+    /// random colours.
     const SIDE: u32 = 32;
 
-    /// With all corners fitted, once.
+    /// The grid with all corners, fitted once per process.
     #[must_use]
     pub fn fitted() -> &'static Self {
         static GRID: LazyLock<Grid> = LazyLock::new(Grid::fit_all);
@@ -181,7 +184,7 @@ impl Grid {
         let side = Self::SIDE;
         let at = |i: u32| (f64::from(i) / f64::from(side - 1)).powi(2);
         let corner = |i: u32| match [i % side, i / side % side, i / side / side] {
-            // Their fit, without its search: no slope.
+            // Grey corners have a closed form: a constant spectrum.
             [r, g, b] if r == g && g == b => {
                 let grey = at(r).clamp(1e-13, 1.0 - 1e-13);
                 [0.0, 0.0, (grey - 0.5) / (grey * (1.0 - grey)).sqrt()]
@@ -194,7 +197,7 @@ impl Grid {
     /// Square roots of the means over a band, red fastest.
     #[must_use]
     pub fn roots(&self, band: &Band) -> Vec<f32> {
-        // Sigmoids of parabolas are smooth: the mean of eight is the mean.
+        // Sigmoids of parabolas are smooth: eight points give the mean.
         const POINTS: u32 = 8;
         let mean = |c: &[f64; 3]| {
             let sum: f64 = (0..POINTS).map(|i| upsampled_reflectance(band.part(i, POINTS).middle(), *c)).sum();
@@ -220,14 +223,14 @@ mod tests {
             for method in [Upsampling::MallettYuksel, Upsampling::JakobHanika] {
                 let back = colour_of(&method.reflectance(rgb));
                 for k in 0..3 {
-                    // The fit takes reflectances for linear over 5 nm.
+                    // The fit treats reflectances as linear over 5 nm.
                     assert!((back[k] - rgb[k]).abs() < 4e-4, "{method:?} {rgb:?}: {back:?}");
                 }
             }
         }
     }
 
-    /// As shaders/lib/spectrum.glsl interpolates.
+    /// Interpolation of shaders/lib/spectrum.glsl.
     fn interpolated(side: u32, roots: &[f32], rgb: [f64; 3]) -> f64 {
         let at = rgb.map(|x| x.sqrt() * f64::from(side - 1));
         let cell = at.map(|x| (x as u32).min(side - 2));

@@ -1,37 +1,40 @@
-//! Lobes that extensions of glTF lay over the base of a material: a row of a table each. What reads files, decides the plan, splits
-//! wavelengths and fills the table of materials goes through the rows and knows none of them by name. How light leaves by a lobe is a
-//! file of shaders/lib/, which shaders/lib/layers.glsl includes.
+//! Lobes over the base layer: one row of a table for each glTF extension. File import, planning, spectral rendering and material
+//! upload loop over the rows without naming a lobe. The BRDF of a lobe is a file of shaders/lib/, included by
+//! shaders/lib/layers.glsl.
+//!
+//! Read the KHR_materials_* extension of each lobe, and pbrt 9 for BRDFs.
 
 pub mod sheen;
 
 use super::{Meaning, TextureRef};
 
-/// For a perceptual roughness a row of so many steps from the horizon up, in the lobe's own measure.
+/// A row of a directional-albedo table for a perceptual roughness: values at the given number of steps, from the horizon up.
+/// The lobe defines the two values of a step.
 pub type TableRow = fn(f64, usize) -> Vec<[f64; 2]>;
 
-/// What an extension says of a lobe.
+/// A lobe: its extension, parameters and properties.
 pub struct Lobe {
-    /// As plans call its effect.
+    /// Name of the lobe's effect in plans.
     pub name: &'static str,
-    /// The extension.
+    /// Name of the glTF extension.
     pub extension: &'static str,
-    /// What in a scene calls for it, and what it brings into a plan: a row of docs/plan.md.
+    /// What in a scene calls for the effect, and what the effect adds to a plan: a row of docs/plan.md.
     pub row: [&'static str; 2],
-    /// Its numbers by their names in JSON, each with how many it has: four at most together, of 0 … 1, absent ones 0. Without the first
-    /// there is no lobe. One of three is a colour.
+    /// Factors: name in JSON and number of components. At most four components together, each in 0 … 1 with default 0. The lobe is
+    /// off when the first factor is 0. A factor of three components is a colour.
     pub factors: &'static [(&'static str, usize)],
-    /// Its textures: name in JSON, name in shaders/lib/texels.glsl, how its bytes are meant. They multiply the numbers.
+    /// Textures, which multiply the factors: name in JSON, name in shaders/lib/texels.glsl, meaning of the texels.
     pub textures: &'static [(&'static str, &'static str, Meaning)],
-    /// It sends light in all directions.
+    /// The lobe is non-specular: it scatters into all directions.
     pub scatters: bool,
-    /// Its part of the table of directional reflectance.
+    /// The lobe's part of the table of directional albedo.
     pub albedo: Option<TableRow>,
 }
 
-/// All of them, in the order of `LOBE_…` in shaders/lib/.
+/// All lobes, in the order of `LOBE_…` in shaders/lib/.
 pub static LOBES: [&Lobe; COUNT] = [&sheen::SHEEN];
 
-// The table of directional reflectance has room for one (src/upload/environment.rs).
+// The table of directional albedo has room for one lobe (src/upload/environment.rs).
 const _: () = {
     let (mut place, mut with_albedo) = (0, 0);
     while place < COUNT {
@@ -41,32 +44,32 @@ const _: () = {
     assert!(with_albedo <= 1, "a second lobe with an albedo needs a table of its own");
 };
 
-/// How many there are.
+/// Number of lobes.
 pub const COUNT: usize = 1;
 
-/// A lobe of one material.
+/// Parameters of a lobe in one material.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LobeOf {
-    /// In the order of [`Lobe::factors`].
+    /// Factors in the order of [`Lobe::factors`].
     pub factors: [f32; 4],
-    /// In the order of [`Lobe::textures`].
+    /// Textures in the order of [`Lobe::textures`].
     pub textures: [Option<TextureRef>; 2],
 }
 
 impl Lobe {
-    /// Its colour, if it has one.
+    /// The colour factor, if the lobe has one.
     #[must_use]
     pub fn colour(&self, of: &LobeOf) -> Option<[f32; 3]> {
         (self.factors[0].1 == 3).then(|| [of.factors[0], of.factors[1], of.factors[2]])
     }
 
-    /// Whether the material has it at all.
+    /// Whether the lobe's first factor is above 0.
     #[must_use]
     pub fn is_on(&self, of: &LobeOf) -> bool {
         of.factors[..self.factors[0].1].iter().any(|&factor| factor > 0.0)
     }
 
-    /// For a plan's reason: what the material says of it.
+    /// The factors as text, for the reason in a plan.
     #[must_use]
     pub fn says(&self, of: &LobeOf) -> String {
         let mut factors = of.factors.iter();

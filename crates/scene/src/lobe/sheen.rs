@@ -1,15 +1,17 @@
-//! Sheen (KHR_materials_sheen): cloth, whose fibres stand off the surface and glow at its edges. Estevez and Kulla, "Production friendly
-//! microfacet sheen BRDF", 2017. The twin of shaders/lib/sheen.glsl, and the table that it reads.
+//! Sheen (KHR_materials_sheen): the grazing-angle lobe of cloth, whose fibres stand off the surface.
+//!
+//! Read Estevez and Kulla, "Production Friendly Microfacet Sheen BRDF", 2017. This file is the twin of shaders/lib/sheen.glsl, and
+//! computes the table of directional albedo for it.
 
 use std::f64::consts::{PI, TAU};
 
 use super::Lobe;
 use crate::Meaning::{Color, Data};
 
-/// Perceptual roughness below which sheen grows no sharper: `LEAST_SHEEN_ROUGHNESS` of the shaders.
+/// Lower bound of the perceptual roughness: `LEAST_SHEEN_ROUGHNESS` of the shaders.
 pub const LEAST_ROUGHNESS: f32 = 0.07;
 
-/// KHR_materials_sheen.
+/// The row of KHR_materials_sheen.
 pub static SHEEN: Lobe = Lobe {
     name: "sheen",
     extension: "KHR_materials_sheen",
@@ -20,7 +22,7 @@ pub static SHEEN: Lobe = Lobe {
     albedo: Some(table_row),
 };
 
-/// The lobe of a white sheen for two directions, D V, by their cosines and that of the half vector with the normal.
+/// D V of white sheen, in 1/sr, from the cosines of both directions and of the half vector with the normal.
 #[must_use]
 pub fn sheen(cos_l: f64, cos_v: f64, cos_h: f64, roughness: f64) -> f64 {
     let alpha = roughness.max(f64::from(LEAST_ROUGHNESS)).powi(2);
@@ -38,7 +40,7 @@ fn lambda(cos: f64, alpha: f64) -> f64 {
     if cos < 0.5 { l(cos).exp() } else { (2.0 * l(0.5) - l(1.0 - cos)).exp() }
 }
 
-/// E, the directional albedo of a white sheen, within 5e-4 of itself.
+/// E, the directional albedo of white sheen, with a relative error of at most 5e-4.
 #[must_use]
 pub fn albedo(cos_v: f64, roughness: f64) -> f64 {
     const ELEVATIONS: u32 = 128;
@@ -46,12 +48,12 @@ pub fn albedo(cos_v: f64, roughness: f64) -> f64 {
     let sin_v = (1.0 - cos_v * cos_v).max(0.0).sqrt();
     let mut sum = 0.0;
     for i in 0..ELEVATIONS {
-        // The square of even steps: they are small at the horizon, where most of it lies.
+        // Quadratic steps: they are small at the horizon, where most of the lobe lies.
         let x = (f64::from(i) + 0.5) / f64::from(ELEVATIONS);
         let cos_l = x * x;
         let sin_l = (1.0 - cos_l * cos_l).sqrt();
         for k in 0..AZIMUTHS {
-            // One half of the turn is as the other.
+            // The lobe is symmetric: half a turn suffices.
             let azimuth = (f64::from(k) + 0.5) / f64::from(AZIMUTHS) * PI;
             let cos_between = cos_l * cos_v + sin_l * sin_v * azimuth.cos();
             let cos_h = ((cos_l + cos_v) / (2.0 + 2.0 * cos_between).sqrt()).min(1.0);
@@ -61,8 +63,8 @@ pub fn albedo(cos_v: f64, roughness: f64) -> f64 {
     sum * TAU / f64::from(ELEVATIONS * AZIMUTHS)
 }
 
-/// E, and the part of light from all around that comes in lower, each by its own E but at most 1: ∫ 2x E(x) dx from 0 to cosθ. Over the
-/// root of the cosine, u: x = u², 2x dx = 4u³ du.
+/// One row of the table: for each cosθ, E and the albedo for uniform light below the angle, ∫ 2x min(E(x), 1) dx from 0 to cosθ.
+/// The steps are even in u = √cosθ: x = u², 2x dx = 4u³ du.
 fn table_row(roughness: f64, side: usize) -> Vec<[f64; 2]> {
     let step = 1.0 / (side - 1) as f64;
     let of_all = |u: f64, e: f64| 4.0 * u.powi(3) * e.min(1.0);
@@ -72,7 +74,7 @@ fn table_row(roughness: f64, side: usize) -> Vec<[f64; 2]> {
         let u = i as f64 * step;
         let e = albedo((u * u).max(1e-8), roughness);
         let here = of_all(u, e);
-        // The trapezoid rule; the first piece is 0 to its third power.
+        // Trapezoid rule; in the first interval the integrand is of third order and counts as 0.
         below += 0.5 * (before + here) * if i == 0 { 0.0 } else { step };
         before = here;
         row.push([e, below]);
@@ -84,7 +86,7 @@ fn table_row(roughness: f64, side: usize) -> Vec<[f64; 2]> {
 mod tests {
     use super::*;
 
-    /// E is the mean over directions of the lobe, here by another rule and ten times as many of them.
+    /// E is the integral of the lobe over directions, here by another quadrature with ten times as many directions.
     #[test]
     fn the_albedo_is_that_of_the_lobe() {
         for (cos_v, roughness) in [(0.02, 0.3), (0.3, 0.5), (0.7, 0.8), (1.0, 1.0), (0.1, 0.15)] {

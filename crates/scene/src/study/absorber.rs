@@ -1,7 +1,7 @@
-//! Lecture A1, A2: a medium takes the same share of light from every metre. Bodies of it before a white wall of light bend
-//! nothing, so that what is seen through each is e^(−σ d): a row of blocks, each twice as thick as the one before, a wedge, a
-//! block whose σ falls off along it, and one whose σ falls off along the line of sight: there sums of few steps are wrong, and
-//! smoothly so, as a rule's order wants it.
+//! Study scene of homogeneous and heterogeneous absorption (lecture A1, A2): transmittance e^(−σ d) before a white emitter.
+//!  Read pbrt 11.2. All media have n = 1 and do not refract. The scene has a row of blocks, each twice as thick as the one
+//! before, a wedge, a block whose σ falls along its length, and one whose σ falls along the line of sight. In the last block
+//! quadratures with few steps have errors, and the errors vary smoothly with the order of the rule.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use super::build::{StudyBuilder, at, emitter, glass};
 use super::shape::Shape;
 use crate::{Material, Scene, SigmaGrid};
 
-/// After this many metres white light has the medium's colour.
+/// Attenuation distance in metres.
 const DISTANCE: f32 = 0.1;
 const COLOR: [f32; 3] = [0.2, 0.55, 0.85];
 
@@ -31,10 +31,10 @@ pub(super) fn scene() -> Scene {
     }
     let wedge = b.material(tea("wedge", 0.3));
     let outline = [DVec2::new(-0.47, 0.0), DVec2::new(0.47, -0.15), DVec2::new(0.47, 0.15)];
-    // Drawn out upwards.
+    // Extruded upwards.
     let lying = at(0.0, 0.24, 0.0, 0.0) * glam::DAffine3::from_rotation_x(-std::f64::consts::FRAC_PI_2);
     b.add("wedge", Shape::prism(&outline, 0.16), wedge, lying);
-    // σ of 30 e^(−8 x) per metre along its length, told at points.
+    // σ of 30 e^(−8 x) per metre along its length, as grid points.
     let falling = |size: [u64; 3], values: Vec<f32>, name: &str, thickness: f32| {
         let grid = SigmaGrid::new(size, values, None).expect("a point a value");
         Material { sigma: Some(Arc::new(grid)), ..glass(name, 1.0, thickness) }
@@ -42,7 +42,7 @@ pub(super) fn scene() -> Scene {
     let along = (0..65).map(|i| (30.0 * (-8.0 * 0.56 * f64::from(i) / 64.0).exp()) as f32);
     let graded = b.material(falling([65, 1, 1], along.collect(), "graded", 0.1));
     b.add("graded block", Shape::cuboid(DVec3::new(0.56, 0.16, 0.1)), graded, at(-0.19, -0.24, 0.0, 0.0));
-    // 27 e^(−18 z) from its front: more points than any rule takes, so that not they are what a rule misses.
+    // 27 e^(−18 z) from its front: more points than steps of any rule, so that the error is that of the rule.
     let into = (0..513).map(|i| (27.0 * (-18.0 * 0.4 * (1.0 - f64::from(i) / 512.0)).exp()) as f32);
     let deep = b.material(falling([1, 1, 513], into.collect(), "deep", 0.4));
     b.add("deep block", Shape::cuboid(DVec3::new(0.32, 0.16, 0.4)), deep, at(0.31, -0.24, 0.0, 0.0));

@@ -1,5 +1,6 @@
-//! Coverage: panes of known colour, opacity and order in front of a striped board. All are unlit, so that what a
-//! pixel must show is the plain composite of what lies behind it, far to near.
+//! Study scene of alpha blending and alpha testing: unlit panes of known colour, opacity and order in front of a striped board.
+//!
+//! Read RTR 5.5. All surfaces are unlit, so that the expected pixel is the plain composite with the background, far to near.
 
 use glam::DVec3;
 
@@ -32,16 +33,16 @@ pub(super) fn scene() -> Scene {
     let sheet = |b: &mut StudyBuilder, name: &str, material: usize| b.mesh(name, Shape::panel(0.8, 0.8), material);
     let panes = [sheet(&mut b, "red pane", red), sheet(&mut b, "green pane", green), sheet(&mut b, "blue pane", blue)];
 
-    // Left: three overlapping panes, listed near to far, which is the wrong way round for painting.
+    // Left: three overlapping panes, listed near to far, the wrong order for painting.
     for (i, (name, depth)) in [("near red", 0.4), ("middle green", 0.2), ("far blue", 0.0)].into_iter().enumerate() {
         let shift = 0.25 * (i as f64 - 1.0);
         b.place(name, panes[i], at(-1.25 + shift, 0.25 * (1.0 - i as f64), depth, 0.0));
     }
-    // Middle: two panes through each other; which one is nearer changes at the crossing line.
+    // Middle: two intersecting panes; their depth order changes at the crossing line.
     b.place("crossing red", panes[0], at(0.1, 0.0, 0.2, 40.0));
     b.place("crossing blue", panes[2], at(0.1, 0.0, 0.2, -40.0));
 
-    // Right: a mask with holes, whose fragments are there or not, between two panes.
+    // Right: an alpha-tested surface between two panes.
     let holes = b.picture("holes", 128, |x, y| {
         let (x, y) = (f64::from(x % 32) - 15.5, f64::from(y % 32) - 15.5);
         [0.9, 0.75, 0.2, (0.5 + (x.hypot(y) - 9.0) / 4.0).clamp(0.0, 1.0)]

@@ -1,4 +1,4 @@
-//! Puts a study scene together; the only place that knows how the types of [`crate`] are filled.
+//! Builder of study scenes: fills the types of [`crate`].
 
 use glam::{Affine2, DAffine3, DMat3, DVec3};
 
@@ -8,13 +8,13 @@ use crate::{
     Camera, Image, Instance, Light, LightKind, Material, Mesh, Projection, Sampler, Scene, Shared, TextureRef,
 };
 
-/// A scene in the making.
+/// A scene under construction.
 pub(super) struct StudyBuilder {
     scene: Scene,
 }
 
 impl StudyBuilder {
-    /// An empty scene called `study:NAME`.
+    /// An empty scene named `study:NAME`.
     pub(super) fn new(name: &str) -> Self {
         Self { scene: Scene { name: format!("study:{name}"), ..Scene::default() } }
     }
@@ -24,7 +24,7 @@ impl StudyBuilder {
         self.scene.materials.len() - 1
     }
 
-    /// A square picture whose texels are linear colours, stored with the sRGB curve.
+    /// A square image of linear colours, stored with the sRGB transfer function.
     pub(super) fn picture(&mut self, name: &str, size: u32, texel: impl Fn(u32, u32) -> [f64; 4]) -> TextureRef {
         let mut rgba = Vec::with_capacity((size * size * 4) as usize);
         for y in 0..size {
@@ -43,7 +43,7 @@ impl StudyBuilder {
         }
     }
 
-    /// A checker of two linear greys, eight squares across one repeat.
+    /// A checkerboard of two linear colours, eight squares across one repeat.
     pub(super) fn checker(&mut self, name: &str, dark: [f64; 3], light: [f64; 3]) -> TextureRef {
         self.picture(name, 256, |x, y| {
             let [r, g, b] = if (x / 32 + y / 32) % 2 == 0 { dark } else { light };
@@ -68,7 +68,7 @@ impl StudyBuilder {
         self.scene.instances.push(Instance { name: name.to_owned(), mesh, world_from_object });
     }
 
-    /// A mesh that is drawn once, under its own name.
+    /// A mesh with one instance of the same name.
     pub(super) fn add(&mut self, name: &str, shape: Shape, material: usize, world_from_object: DAffine3) {
         let mesh = self.mesh(name, shape, material);
         self.place(name, mesh, world_from_object);
@@ -78,17 +78,17 @@ impl StudyBuilder {
         self.shine(Light { name: name.to_owned(), color, spectrum: None, extent: None, kind, proxy: false });
     }
 
-    /// A light with everything about it.
+    /// Adds a light with all its properties.
     pub(super) fn shine(&mut self, light: Light) {
         self.scene.lights.push(light);
     }
 
-    /// A light that stands for an emitting surface where such surfaces light nothing.
+    /// Adds a proxy light for an emissive surface, for models without emissive triangles as area lights.
     pub(super) fn proxy(&mut self, name: &str, color: [f32; 3], kind: LightKind) {
         self.shine(Light { name: name.to_owned(), color, spectrum: None, extent: None, kind, proxy: true });
     }
 
-    /// A pinhole camera with a vertical field of view in degrees; the near distance is left to the renderer.
+    /// Adds a pinhole camera with a vertical field of view in degrees; the renderer chooses the near distance.
     pub(super) fn camera(&mut self, name: &str, eye: DVec3, target: DVec3, fov_y_degrees: f64) {
         self.scene.cameras.push(Camera {
             name: name.to_owned(),
@@ -97,7 +97,7 @@ impl StudyBuilder {
         });
     }
 
-    /// Adds the built-in studio to the scene's own lights, for surfaces that need something to mirror.
+    /// Adds the built-in studio environment to the scene's own lights, for surfaces that need an environment to reflect.
     pub(super) fn studio(&mut self, intensity: f32) {
         self.scene.studio = Some(intensity);
     }
@@ -107,8 +107,8 @@ impl StudyBuilder {
     }
 }
 
-/// A frame at `position` whose +Z points along `forward`, with +Y as high as it can be; straight up and down take
-/// −Z of the world as their up.
+/// A frame at `position` whose +Z points along `forward`, with +Y as vertical as possible; for vertical `forward`, −Z of the
+/// world is up.
 pub(super) fn facing(position: DVec3, forward: DVec3) -> DAffine3 {
     let z = forward.normalize();
     let up = if z.y.abs() > 0.999_999 { DVec3::NEG_Z } else { DVec3::Y };
@@ -116,23 +116,23 @@ pub(super) fn facing(position: DVec3, forward: DVec3) -> DAffine3 {
     DAffine3::from_mat3_translation(DMat3::from_cols(x, z.cross(x), z), position)
 }
 
-/// A frame at `(x, y, z)` turned about +Y by an angle in degrees.
+/// A frame at `(x, y, z)`, rotated about +Y by an angle in degrees.
 pub(super) fn at(x: f64, y: f64, z: f64, turn_degrees: f64) -> DAffine3 {
     DAffine3::from_translation(DVec3::new(x, y, z)) * DAffine3::from_rotation_y(turn_degrees.to_radians())
 }
 
-/// A rough or smooth non-metal of one colour.
+/// A dielectric of one colour.
 pub(super) fn dielectric(name: &str, color: [f32; 3], roughness: f32) -> Material {
     let [r, g, b] = color;
     Material { name: name.to_owned(), base_color: [r, g, b, 1.0], metallic: 0.0, roughness, ..Material::default() }
 }
 
-/// A metal whose reflectance at normal incidence is `f0`.
+/// A metal of reflectance `f0` at normal incidence.
 pub(super) fn metal(name: &str, f0: [f32; 3], roughness: f32) -> Material {
     Material { metallic: 1.0, ..dielectric(name, f0, roughness) }
 }
 
-/// A metal of known complex index.
+/// A conductor of known n and κ.
 pub(super) fn conductor(name: &str, known: Metal, roughness: f32) -> Material {
     Material {
         conductor: Some(known.index()),
@@ -141,22 +141,22 @@ pub(super) fn conductor(name: &str, known: Metal, roughness: f32) -> Material {
     }
 }
 
-/// A smooth non-metal of a known medium.
+/// A smooth dielectric of known index and dispersion.
 pub(super) fn medium(name: &str, known: Medium) -> Material {
     Material { ior: known.n as f32, dispersion: known.dispersion, ..dielectric(name, [1.0; 3], 0.0) }
 }
 
-/// A clear body of index `ior`. Its true surfaces bound it, so any thickness above zero says "a volume".
+/// A clear solid of index `ior`. Its mesh bounds the volume, so any thickness above 0 will do.
 pub(super) fn glass(name: &str, ior: f32, thickness: f32) -> Material {
     Material { transmission: 1.0, ior, thickness, ..dielectric(name, [1.0; 3], 0.0) }
 }
 
-/// A surface that emits and reflects nothing.
+/// A black surface that emits `radiance`, W/(m² sr).
 pub(super) fn emitter(name: &str, radiance: [f32; 3]) -> Material {
     Material { emissive: radiance, specular: 0.0, ..dielectric(name, [0.0; 3], 1.0) }
 }
 
-/// A linear value as an sRGB byte (IEC 61966-2-1).
+/// sRGB encoding of a linear value as a byte (IEC 61966-2-1).
 fn srgb8(linear: f64) -> u8 {
     let v = linear.clamp(0.0, 1.0);
     let encoded = if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };

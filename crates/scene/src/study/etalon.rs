@@ -1,5 +1,5 @@
-//! The default picture: two half-silvered plates that face each other, and around them one of everything that
-//! reflects, refracts or shines, on a photographer's sweep.
+//! The default study scene: two half-silvered plates that face each other, among reflective, refractive and emissive
+//! objects in front of a curved backdrop.
 
 use glam::{DAffine3, DVec2, DVec3};
 
@@ -19,7 +19,7 @@ pub(super) fn scene() -> Scene {
     let crown = b.material(glass("crown glass", 1.517, 0.16));
     b.add("glass ball", Shape::sphere(0.085, 48), crown, at(0.13, 0.0851, 0.33, 0.0));
 
-    // Equilateral, lying on one side: edge 0.16, the centroid a third of the height above the table.
+    // Equilateral, lying on one side: edge 0.16, centroid a third of the height above the table.
     let flint = b.material(glass("flint glass", 1.62, 0.12));
     let (half, foot, tip) = (0.08, -0.046_188, 0.092_376);
     let triangle = [DVec2::new(-half, foot), DVec2::new(half, foot), DVec2::new(0.0, tip)];
@@ -34,21 +34,21 @@ pub(super) fn scene() -> Scene {
     b.finish()
 }
 
-/// Matt floor and backdrop. The floor's checker is faint enough to stay behind the subject and clear enough to be
-/// seen in a mirror.
+/// Matt floor and backdrop. The contrast of the checkerboard is low, so that it does not distract, and still visible in
+/// reflections.
 fn table(b: &mut StudyBuilder) {
     let checker = b.checker("table checker", [0.30, 0.30, 0.31], [0.43, 0.42, 0.41]);
     let matt = b.material(Material { base_color_texture: Some(checker), ..dielectric("table", [1.0; 3], 0.9) });
-    // One repeat of eight squares on half a metre: 7 m by 3.5 m, from behind the camera to the backdrop.
+    // One repeat of eight squares per half metre: 7 m by 3.5 m, from behind the camera to the backdrop.
     b.add("table", Shape::plane(7.0, 3.5, 1).repeat_uv(14.0, 7.0), matt, at(0.0, 0.0, 0.65, 0.0));
     let paper = b.material(dielectric("backdrop", [0.36, 0.36, 0.37], 0.9));
     b.add("backdrop", Shape::backdrop(7.0, -1.1, 0.6, 2.6), paper, DAffine3::IDENTITY);
 }
 
-/// The etalon itself. The plates stand near enough to each other for a chain of images, and open enough to
-/// look in.
+/// The etalon itself: plates near enough for a chain of reflections, and far enough apart for a view between
+/// them.
 fn plates(b: &mut StudyBuilder) {
-    // Part metal, part clear glass: the metallic share reflects, the rest lets through.
+    // Partly metal, partly clear glass: the metallic fraction reflects, the rest transmits.
     let silver = b.material(Material {
         base_color: [0.96, 0.96, 0.97, 1.0],
         metallic: 0.55,
@@ -57,19 +57,19 @@ fn plates(b: &mut StudyBuilder) {
     let plate = b.mesh("plate", Shape::cuboid(DVec3::new(0.012, 0.46, 0.36)), silver);
     let turn = -24.0;
     for (name, across) in [("left plate", -0.17), ("right plate", 0.17)] {
-        // A hair above the table: touching faces would leave it open which one is hit.
+        // A small gap above the table avoids coincident interfaces, where the nearest hit is ambiguous.
         b.place(name, plate, at(-0.14, 0.2301, -0.06, turn) * at(across, 0.0, 0.0, 0.0));
     }
 }
 
-/// A glazed bowl with water. The water's side and foot lie inside the bowl's wall, so that no two surfaces coincide.
+/// A glazed bowl of water. The water's side and bottom lie inside the bowl's wall, so that no surfaces coincide.
 fn basin(b: &mut StudyBuilder) {
     let glaze = b.material(dielectric("glazed clay", [0.05, 0.12, 0.20], 0.25));
     let p = DVec2::new;
     let bowl = [
         line(p(0.0, 0.0), p(0.15, 0.0)),
         line(p(0.15, 0.0), p(0.19, 0.062)),
-        // The rim, rounded from outside over the top.
+        // The rim, rounded from the outside over the top.
         arc(p(0.184, 0.062), 0.006, 0.0, std::f64::consts::PI, 8),
         line(p(0.178, 0.062), p(0.142, 0.012)),
         line(p(0.142, 0.012), p(0.0, 0.012)),
@@ -86,8 +86,8 @@ fn basin(b: &mut StudyBuilder) {
     b.add("water", Shape::lathe(&body, 96), water, at(0.42, 0.0001, 0.0, 0.0));
 }
 
-/// A ball that glows on a thin stand. Its point light hangs below the ball: inside it, its own ball would
-/// shadow it. It ends before the backdrop, where the ball's shadow would tell.
+/// An emissive ball on a thin stand. Its proxy light hangs below the ball, because the ball would shadow a light inside it. Its
+/// range ends before the backdrop, where the ball's shadow would be visible.
 fn lamp(b: &mut StudyBuilder) {
     let (x, z, radius, height) = (0.56, -0.62, 0.05, 0.30);
     let brass = b.material(metal("brass", [0.89, 0.76, 0.43], 0.3));
@@ -106,7 +106,7 @@ fn lamp(b: &mut StudyBuilder) {
     b.proxy("lamp", [0.60, 0.36, 0.15], LightKind::Point { position, range: Some(1.1) });
 }
 
-/// Two soft boxes, for the shine on glass and metal, and the lights that stand for them where only points light.
+/// Two soft boxes for highlights on glass and metal, with their proxy lights.
 fn studio(b: &mut StudyBuilder) {
     let middle = DVec3::new(0.0, 0.15, 0.0);
     let key = b.material(emitter("key soft box", [5.0, 5.0, 5.0]));
@@ -118,7 +118,7 @@ fn studio(b: &mut StudyBuilder) {
 
     let direction = (middle - key_at).normalize();
     let kind = LightKind::Spot {
-        // In front of the panel, whose back would otherwise count as an occluder.
+        // In front of the panel, whose back would otherwise occlude the light.
         position: key_at + direction * 0.05,
         direction,
         range: None,

@@ -1,4 +1,4 @@
-//! Scenes with parameters, for tests and measurements.
+//! Generated scenes with parameters, for tests and measurements.
 
 use glam::{DAffine3, DVec3};
 
@@ -6,7 +6,7 @@ use super::build::{StudyBuilder, at, dielectric, emitter};
 use super::shape::Shape;
 use crate::{LightKind, Material, Projection, Scene};
 
-/// PCG-XSH-RR 64/32 (O'Neill 2014): the same numbers on every machine.
+/// PCG-XSH-RR 64/32 (O'Neill 2014): a random number generator with the same sequence on every machine.
 struct Pcg(u64);
 
 impl Pcg {
@@ -17,7 +17,7 @@ impl Pcg {
         shifted.rotate_right((state >> 59) as u32)
     }
 
-    /// Uniform in 0 … 1, without 1.
+    /// A uniform random number in [0, 1).
     fn unit(&mut self) -> f64 {
         f64::from(self.next()) / 4_294_967_296.0
     }
@@ -27,8 +27,8 @@ impl Pcg {
     }
 }
 
-/// 1024 boxes on a plane of 64 m and `count` coloured point lights of range 5 m among them. A larger count keeps the
-/// lights of a smaller one in their places.
+/// 1024 boxes on a plane of 64 m, with `count` coloured point lights of range 5 m among them. A larger count keeps the
+/// positions of the first lights.
 #[must_use]
 pub fn lights(count: usize) -> Scene {
     let mut b = StudyBuilder::new(&format!("lights({count})"));
@@ -56,7 +56,7 @@ pub fn lights(count: usize) -> Scene {
     b.finish()
 }
 
-/// One ball of about `triangles` triangles with hills and dents, 2 m across.
+/// A bumpy sphere of about `triangles` triangles, 2 m across.
 #[must_use]
 pub fn sphere_field(triangles: usize) -> Scene {
     let mut b = StudyBuilder::new(&format!("sphere_field({triangles})"));
@@ -68,19 +68,19 @@ pub fn sphere_field(triangles: usize) -> Scene {
     b.finish()
 }
 
-/// One square per distance, all turned to a camera at the origin that looks along −Z, all of the same size in the
-/// picture, side by side; square `i` emits radiance (i + 1, 1, 1), so that a picture tells them apart.
+/// One square per distance, facing a camera at the origin that looks along −Z, side by side and of equal size in the
+/// picture. Square `i` emits radiance (i + 1, 1, 1) and is thereby identified.
 #[must_use]
 pub fn quads_at(distances: &[f64]) -> Scene {
     let mut b = StudyBuilder::new(&format!("quads_at({})", distances.len()));
     let count = distances.len().max(1) as f64;
-    // Angular tangents: the row spans ±0.6 across, inside a 16:9 picture of 40° (±0.647).
+    // Tangents of angles: the row spans ±0.6 across, inside a 16:9 picture of 40° (±0.647).
     let pitch = 1.2 / count;
     for (i, &distance) in distances.iter().enumerate() {
         let glow = b.material(emitter(&format!("emitter {i}"), [i as f32 + 1.0, 1.0, 1.0]));
         let side = (pitch * 0.8).min(0.6);
         let x = (i as f64 + 0.5) * pitch - 0.6;
-        // The size is in the placement, so that the mesh is exact in f32 at any distance.
+        // The scale is in the transform, so that the mesh is exact in f32 at any distance.
         let frame = at(x * distance, 0.0, -distance, 0.0) * DAffine3::from_scale(DVec3::splat(side * distance));
         b.add(&format!("quad {i}"), Shape::panel(1.0, 1.0), glow, frame);
     }
@@ -88,8 +88,8 @@ pub fn quads_at(distances: &[f64]) -> Scene {
     b.finish()
 }
 
-/// A textured plane, `size` metres square with `repeats` repeats of an 8 by 8 checker, from eye height to the
-/// horizon: the case that asks most of texture filters.
+/// A textured plane of `size` by `size` metres with `repeats` repeats of an 8 by 8 checkerboard, from eye height to the
+/// horizon: the hardest case for texture filtering.
 #[must_use]
 pub fn checker_plane(size: f64, repeats: f64) -> Scene {
     let mut b = StudyBuilder::new("checker_plane");
@@ -102,9 +102,8 @@ pub fn checker_plane(size: f64, repeats: f64) -> Scene {
     b.finish()
 }
 
-/// The same scene in other units and at another place: everything grows by `factor` around the origin and then moves
-/// by `offset`. Its picture stays the same, because intensities grow with the square of lengths and absorption
-/// lengths with lengths.
+/// The scene scaled by `factor` around the origin and then moved by `offset`. The picture stays the same, because
+/// intensities scale with the square of lengths, and attenuation distances with lengths.
 #[must_use]
 pub fn at_scale(mut scene: Scene, factor: f64, offset: DVec3) -> Scene {
     let moved = |p: DVec3| p * factor + offset;
@@ -113,7 +112,7 @@ pub fn at_scale(mut scene: Scene, factor: f64, offset: DVec3) -> Scene {
         instance.world_from_object = grow * instance.world_from_object;
     }
     for material in &mut scene.materials {
-        // Thickness is in object space and grows with the placement; this one is in the world.
+        // Thickness is in object space and scales with the transform; the attenuation distance is in world space.
         material.attenuation_distance *= factor as f32;
         if let Some(grid) = &mut material.sigma {
             std::sync::Arc::make_mut(grid).scale(1.0 / factor as f32);
@@ -121,7 +120,7 @@ pub fn at_scale(mut scene: Scene, factor: f64, offset: DVec3) -> Scene {
     }
     for light in &mut scene.lights {
         match &mut light.kind {
-            // Parallel rays carry irradiance, which knows no lengths.
+            // A directional light gives irradiance, which does not depend on lengths.
             LightKind::Directional { .. } => continue,
             LightKind::Point { position, range } | LightKind::Spot { position, range, .. } => {
                 *position = moved(*position);

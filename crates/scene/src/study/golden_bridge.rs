@@ -1,6 +1,8 @@
-//! Lecture B7: the lamps of a bridge over water at night. What the ripples mirror of each is a streak towards the eye, long
-//! upright and narrow across: the half vector of a grazing direction hardly moves along it. Blinn and Phong's lobe as the lecture
-//! has it (`brdf=blinn-phong`) is not reciprocal and cannot show that; with a denominator it can, and microfacets do.
+//! Study scene of grazing specular lobes (lecture B7): the lamps of a bridge over rippled water at night.
+//!
+//! Read RTR 9.8. Each reflection is a streak towards the eye, long vertically and narrow across, because near grazing angles the
+//! half vector hardly changes along the streak. The Blinn-Phong lobe of the lecture (`brdf=blinn-phong`) is not reciprocal and
+//! has no such streak; with a denominator it has one, as do microfacets.
 
 use glam::DVec3;
 
@@ -27,7 +29,7 @@ pub(super) fn scene() -> Scene {
         let x = (f64::from(i) - 5.0) * 8.0;
         b.place(&format!("post {i}"), post, at(x, 7.1, -89.8, 0.0));
         b.place(&format!("lamp {i}"), lamp, at(x, 9.1, -89.8, 0.0));
-        // The intensity of the ball's disc, before it.
+        // Intensity of the proxy light, in front of the ball: radiance times the ball's disk of π 0.09 m².
         let color = [90.0, 55.0, 22.0].map(|radiance| radiance * std::f32::consts::PI * 0.09);
         b.proxy(&format!("lamp {i}"), color, LightKind::Point { position: DVec3::new(x, 9.1, -89.4), range: None });
     }

@@ -1,5 +1,6 @@
-//! Lecture A2: smoke that no two rays lose as much in. It only absorbs, blue more than red, so that its shadow is graded
-//! and warm.
+//! Study scene of a heterogeneous medium (lecture A2): absorbing smoke that attenuates every ray differently.
+//!
+//! Read pbrt 11.2. Blue is absorbed more than red, so the shadow is soft and warm.
 
 use std::sync::Arc;
 
@@ -9,9 +10,9 @@ use super::build::{StudyBuilder, at, dielectric, glass};
 use super::shape::Shape;
 use crate::{LightKind, Material, Scene, SigmaGrid};
 
-/// Edges of the body that holds the smoke, in metres: nothing is seen of it.
+/// Edges in metres of the invisible closed mesh that bounds the smoke.
 const BODY: DVec3 = DVec3::new(1.6, 2.0, 1.6);
-/// Points of its grid.
+/// Points of the grid of σ.
 const POINTS: [usize; 3] = [32, 40, 32];
 
 pub(super) fn scene() -> Scene {
@@ -24,7 +25,7 @@ pub(super) fn scene() -> Scene {
     let grid = SigmaGrid::new(POINTS.map(|n| n as u64), plume(), None).expect("as many values as points and channels");
     let smoke = b.material(Material { sigma: Some(Arc::new(grid)), ..glass("smoke", 1.0, 1.6) });
     b.add("smoke", Shape::cuboid(BODY), smoke, at(0.0, 0.5 * BODY.y + 0.001, 0.0, 0.0));
-    // One ball in the smoke, one beside it.
+    // One ball inside the smoke, one beside it.
     let clay = b.material(dielectric("clay", [0.80, 0.42, 0.26], 0.6));
     let ball = b.mesh("ball", Shape::sphere(0.22, 48), clay);
     b.place("veiled ball", ball, at(-0.12, 0.62, -0.30, 0.0));
@@ -35,7 +36,7 @@ pub(super) fn scene() -> Scene {
     b.finish()
 }
 
-/// σ of a plume that rises, winds and spreads: its total through any level is the same. None is left at the body's sides.
+/// σ of a rising, winding and widening plume: the integral over each level is the same. σ is 0 at the sides of the mesh.
 fn plume() -> Vec<f32> {
     let mut values = Vec::new();
     for z in 0..POINTS[2] {

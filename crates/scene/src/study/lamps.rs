@@ -1,4 +1,5 @@
-//! Lecture R3 and R4: point lights of several ranges, a spot's cone and a directional light over a plane.
+//! Study scene of punctual lights (lecture R3, R4): point lights of several ranges, a spot light and a directional light over a
+//! plane.
 
 use glam::{DAffine3, DVec3};
 
@@ -19,7 +20,7 @@ pub(super) fn scene() -> Scene {
     b.add("column", Shape::cylinder(0.35, 1.6, 48), clay, at(1.0, 0.0001, -1.1, 0.0));
     b.add("ring", Shape::torus(0.5, 0.18, 64), gloss, at(2.9, 0.1801, -0.2, 0.0));
 
-    // The same intensity at the same height, cut off ever further away; the last one never.
+    // Equal intensity at equal height, with increasing range; the last light has no range.
     for (i, (range, color)) in [
         (Some(1.0), [2.2, 0.8, 0.6]),
         (Some(2.0), [0.7, 2.0, 0.8]),

@@ -1,5 +1,7 @@
-//! Lecture B4–B8: rows of balls whose roughness grows to the right. Non-metals carry their colour in the diffuse
-//! part and reflect white, metals colour the reflection, a clear coat reflects white over either.
+//! Study scene of the material model (lecture B4–B8): rows of balls with roughness increasing to the right.
+//!
+//! Dielectrics have a coloured diffuse base and a white specular lobe, metals a coloured specular lobe, and a clear coat reflects
+//! white over either.
 
 use glam::DVec3;
 
@@ -8,7 +10,7 @@ use super::shape::Shape;
 use crate::substance::GOLD;
 use crate::{LightKind, Material, Scene};
 
-/// Balls in a row.
+/// Balls per row.
 const COLUMNS: u32 = 7;
 
 pub(super) fn scene() -> Scene {

@@ -1,4 +1,5 @@
-//! Lecture F8: the Fresnel curve over wavelength tells gold from copper. Four polished balls of real metals.
+//! Study scene of conductors (lecture F8): four polished balls of real metals, whose colour is their Fresnel curve over
+//! wavelength.
 
 use glam::DVec3;
 

@@ -1,6 +1,8 @@
-//! Lecture C1–C3: two surfaces may have one colour under one light and two under another, because light and reflectance are
-//! multiplied wavelength by wavelength. In three booths lies the same chart; of each patch the left half has the reflectance that
-//! was measured, the right half one that was found for its colour in daylight.
+//! Study scene of metamers (lecture C1–C3): a colour chart in three booths of different illuminants.
+//!
+//! Read Wyszecki and Stiles, Color Science, 1982. Two reflectances may have one colour under one light and two under another,
+//! because light and reflectance are multiplied at each wavelength. The left half of each patch has the measured reflectance, the
+//! right half a reflectance upsampled from its colour in daylight.
 
 use glam::DVec3;
 
@@ -9,15 +11,15 @@ use super::shape::Shape;
 use crate::{Light, LightKind, Material, Scene};
 use etalon_optics::spectra::{Emission, chart, illuminant};
 
-/// Patches across, and their pitch in metres.
+/// Patches across, and their spacing in metres.
 const COLUMNS: usize = 6;
 const PITCH: f64 = 0.1;
-/// The booths' lights: daylight, a filament, and a fluorescent lamp of three narrow bands.
+/// Illuminants of the booths: daylight, incandescent light, and a fluorescent lamp of three narrow bands.
 const LIGHTS: [&str; 3] = ["d65", "a", "f11"];
 
 pub(super) fn scene() -> Scene {
     let mut b = StudyBuilder::new("metamers");
-    // Without a surface that mirrors: what is seen is the reflectance alone.
+    // Without a specular lobe: the picture shows the reflectance alone.
     let matt = |name: &str, color: [f32; 3]| Material { specular: 0.0, ..dielectric(name, color, 1.0) };
     let grey = b.material(matt("booth", [0.18; 3]));
     let back = b.mesh("booth back", Shape::panel(0.72, 0.72), grey);
@@ -37,7 +39,7 @@ pub(super) fn scene() -> Scene {
         let x = (booth as f64 - 1.0) * 0.72;
         b.place(&format!("{name} back"), back, at(x, 0.0, -0.01, 0.0));
         for hand in [-1.0, 1.0] {
-            // A wall on each side keeps the lights apart.
+            // A wall on each side separates the illuminants.
             b.place(&format!("{name} side {hand}"), side, at(x + hand * 0.355, 0.0, 0.14, -90.0 * hand));
         }
         for (i, patch) in halves.iter().enumerate() {

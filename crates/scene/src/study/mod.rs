@@ -1,7 +1,7 @@
-//! The built-in study scenes, generated; no files needed.
+//! Built-in study scenes, generated without files.
 //!
-//! One file per scene, put together by one builder from the shapes of [`shape`]; scenes that take parameters, for
-//! tests and measurements, are in [`generate`].
+//! One file per scene; all use one builder and the shapes of [`shape`]. Scenes with parameters, for tests and
+//! measurements, are in [`generate`].
 
 mod absorber;
 mod blend;
@@ -26,7 +26,7 @@ use anyhow::{Result, bail};
 
 use crate::Scene;
 
-/// Study scenes with one line about each, the default one first.
+/// Names of the study scenes, each with a description of one line; the default scene is first.
 pub const SCENES: [(&str, &str); 15] = [
     ("etalon", "half-silvered plates that mirror each other, a prism, a gold and a glass ball, water in a basin"),
     ("materials", "plastic, metal, clear coat and emission, from smooth to rough"),
@@ -45,7 +45,7 @@ pub const SCENES: [(&str, &str); 15] = [
     ("torture", "the hard cases in one scene"),
 ];
 
-/// Their names.
+/// Names of the study scenes, in the order of [`SCENES`].
 pub const NAMES: [&str; SCENES.len()] = {
     let mut names = [""; SCENES.len()];
     let mut i = 0;

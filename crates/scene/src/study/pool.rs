@@ -1,5 +1,7 @@
-//! Lecture F7: a swimmer below water sees the whole sky inside Snell's window, a circle of half-angle
-//! asin(1/1.333) = 48.6° about the zenith, and around it the pool in a perfect mirror.
+//! Study scene of total internal reflection (lecture F7): Snell's window, seen by a swimmer below water.
+//!
+//! Read RTR 9.5. The whole sky fits into a circle of half-angle asin(1/1.333) = 48.6° around the zenith; outside it the
+//! water surface is a perfect mirror of the pool.
 
 use glam::{DAffine3, DVec2, DVec3};
 
@@ -7,11 +9,11 @@ use super::build::{StudyBuilder, at, dielectric, emitter, glass, metal};
 use super::shape::{Shape, arc, line};
 use crate::{LightKind, Material, Sampler, Scene, TextureRef, Wrap};
 
-/// Length, depth and width of the water, whose surface is at y = 0.
+/// Length, depth and width of the water in metres; its surface is at y = 0.
 const POOL: DVec3 = DVec3::new(9.0, 2.4, 5.6);
-/// How far the rim stands above the water: low enough to hide half a degree of sky at most.
+/// Height of the rim above the water in metres: it hides at most half a degree of sky.
 const RIM: f64 = 0.02;
-/// How far the water reaches into the walls and the floor, so that no two surfaces coincide.
+/// Depth in metres to which the water reaches into the walls and the floor, so that no surfaces coincide.
 const INTO_WALL: f64 = 0.005;
 
 pub(super) fn scene() -> Scene {
@@ -23,7 +25,7 @@ pub(super) fn scene() -> Scene {
         ..glass("water", 1.333, POOL.y as f32)
     });
     let body = POOL + DVec3::new(2.0 * INTO_WALL, INTO_WALL, 2.0 * INTO_WALL);
-    // Half the height as the mesh stores it, so that the surface is at 0 to the last bit.
+    // Half the height as rounded in the mesh, so that the surface is at exactly 0.
     let half = f64::from((0.5 * body.y) as f32);
     b.add("water", Shape::cuboid(body), water, at(0.0, -half, 0.0, 0.0));
     ladder(&mut b);
@@ -32,7 +34,7 @@ pub(super) fn scene() -> Scene {
     sky(&mut b);
     lamps(&mut b);
     let swimmer = DVec3::new(-1.4, -1.5, -0.8);
-    // The dome as ambient light, for what the lamps do not reach.
+    // The sky as ambient light where the lamps do not reach.
     b.studio(0.3);
     b.camera("swimmer", swimmer, swimmer + DVec3::Y, 115.0);
     b.camera("surface", DVec3::new(4.6, 3.2, 7.4), DVec3::new(-0.5, -0.5, -0.3), 42.0);
@@ -42,7 +44,7 @@ pub(super) fn scene() -> Scene {
 /// Matt tiles of 20 cm with grout, and a deck around them whose edge lies inside the tiled wall.
 fn basin(b: &mut StudyBuilder) {
     let tiles = b.picture("tiles", 256, |x, y| {
-        // Two texels of 32 are grout: 12.5 mm, more than a pool has, to be seen from its other end.
+        // Two texels of 32 are grout: 12.5 mm, wider than in a real pool, to be visible from the other end.
         let (column, row) = (x / 32, y / 32);
         let [r, g, b] = match (x % 32 < 2 || y % 32 < 2, (column + row) % 2) {
             (true, _) => [0.08, 0.10, 0.11],
@@ -52,7 +54,7 @@ fn basin(b: &mut StudyBuilder) {
         [r, g, b, 1.0]
     });
     let tiled = b.material(Material { base_color_texture: Some(tiles), ..dielectric("tiles", [1.0; 3], 0.9) });
-    // One repeat of eight tiles on 1.6 m.
+    // One repeat of eight tiles per 1.6 m.
     let tub = Shape::tub(POOL + DVec3::Y * RIM, 0.4, 0.2).repeat_uv(0.625, 0.625);
     b.add("basin", tub, tiled, at(0.0, RIM, 0.0, 0.0));
     let stone = b.material(dielectric("stone", [0.46, 0.40, 0.33], 0.9));
@@ -84,7 +86,7 @@ fn ladder(b: &mut StudyBuilder) {
     }
 }
 
-/// One on the floor, where the swimmer sees it only in the mirror outside the window, and one that floats.
+/// A ball on the floor, visible to the swimmer only by total reflection outside the window, and a floating ball.
 fn balls(b: &mut StudyBuilder) {
     let red = b.material(dielectric("red rubber", [0.70, 0.06, 0.04], 0.6));
     b.add("ball", Shape::sphere(0.35, 48), red, at(3.1, -POOL.y + 0.3501, -0.9, 0.0));
@@ -92,14 +94,14 @@ fn balls(b: &mut StudyBuilder) {
     b.add("float", Shape::sphere(0.2, 48), yellow, at(0.9, 0.04, 1.1, 0.0));
 }
 
-/// What the window compresses: low things near its rim, high ones near its middle.
+/// Objects above the water: low ones appear near the rim of the window, high ones near its centre.
 fn things_above(b: &mut StudyBuilder) {
     let board = b.material(dielectric("board", [0.10, 0.30, 0.62], 0.5));
     b.add("diving board", Shape::cuboid(DVec3::new(3.6, 0.06, 0.5)), board, at(-4.2, 1.03, -0.6, 0.0));
     let white = b.material(dielectric("white paint", [0.75; 3], 0.7));
     b.add("board stand", Shape::cuboid(DVec3::new(0.35, 1.05, 0.42)), white, at(-5.5, 0.495, -0.6, 0.0));
 
-    // Bands of half a metre, equal in height and so ever thinner towards the rim of the window.
+    // Bands of half a metre: equal in height, hence thinner towards the rim of the window.
     let bands =
         b.picture("bands", 64, |_, y| if (y / 8) % 2 == 0 { [0.75, 0.08, 0.05, 1.0] } else { [0.8, 0.8, 0.8, 1.0] });
     let banded = b.material(Material { base_color_texture: Some(bands), ..dielectric("banded pole", [1.0; 3], 0.7) });
@@ -113,14 +115,14 @@ fn things_above(b: &mut StudyBuilder) {
     b.add("parasol stand", Shape::cylinder(0.03, 2.3, 24), white, at(x, -0.05, z, 0.0));
 }
 
-/// A dome that shines inwards, from the zenith down past the horizon, so that the window is bright up to its rim.
+/// A dome that emits inwards, from the zenith to below the horizon, so that the window is bright up to its rim.
 fn sky(b: &mut StudyBuilder) {
     let radius = 14.0;
     let lowest = -20.0_f64.to_radians();
-    // From the top downwards the right of the direction of travel is the inside.
+    // Downwards from the top, the right of the direction of travel is the inside.
     let outline = arc(DVec2::ZERO, 1.0, std::f64::consts::FRAC_PI_2, lowest, 44);
     let outline = outline.into_iter().map(|(p, n)| (p * radius, n)).collect();
-    // v runs from the lowest ring up to the zenith.
+    // v runs from the lowest ring to the zenith.
     let gradient = b.picture("sky", 128, |_, y| {
         let elevation = ((f64::from(y) + 0.5) / 128.0 * 110.0 - 20.0).max(0.0) / 90.0;
         let mix = |zenith: f64, horizon: f64| zenith + (horizon - zenith) * (1.0 - elevation).powi(3);
@@ -131,7 +133,7 @@ fn sky(b: &mut StudyBuilder) {
     b.add("sky", Shape::lathe(&[outline], 96), shine, DAffine3::IDENTITY);
 }
 
-/// The sun, and two lamps in the walls that light the pool where light does not pass the surface.
+/// The sun, and two lamps in the walls for models whose light does not pass the water surface.
 fn lamps(b: &mut StudyBuilder) {
     let direction = DVec3::new(0.45, -1.0, -0.35).normalize();
     b.light("sun", [3.2, 3.0, 2.7], LightKind::Directional { direction });

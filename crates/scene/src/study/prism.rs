@@ -1,5 +1,6 @@
-//! Lecture F1: the index of refraction depends on the wavelength. A slit of white light seen through a prism of dense flint is as
-//! many slits as there are colours, and a white bar has coloured edges.
+//! Study scene of dispersion (lecture F1): a slit and a white bar of light, seen through a prism of dense flint glass.
+//!  Read pbrt 9.3. The index of refraction depends on the wavelength: the slit appears once in each colour, and the bar has
+//! coloured edges.
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
@@ -8,15 +9,15 @@ use super::shape::Shape;
 use crate::substance::SF10;
 use crate::{LightKind, Material, Scene};
 
-/// Angle between the two faces that light goes through, in radians.
+/// Apex angle between the two refracting faces, in radians.
 const APEX: f64 = std::f64::consts::FRAC_PI_4;
-/// From the prism to the eye, and to the slit, in metres.
+/// Distances from the prism to the eye and to the slit, in metres.
 const TO_EYE: f64 = 1.2;
 const TO_SLIT: f64 = 3.0;
 
 pub(super) fn scene() -> Scene {
     let mut b = StudyBuilder::new("prism");
-    // Turned so that yellow light passes with the least deviation: the ray inside is parallel to the base.
+    // Minimum deviation at the Fraunhofer d line: the ray inside is parallel to the base.
     let deviation = 2.0 * (SF10.n * (0.5 * APEX).sin()).asin() - APEX;
     let flint = b.material(Material { thickness: 0.1, transmission: 1.0, roughness: 0.0, ..medium("flint", SF10) });
     let length = 0.24;
@@ -26,11 +27,11 @@ pub(super) fn scene() -> Scene {
     let upright = DMat3::from_cols(apex, DVec3::Y.cross(apex), DVec3::Y);
     b.add("prism", Shape::prism(&outline, 0.24), flint, DAffine3::from_mat3(upright));
 
-    // What it shows lies around the corner.
+    // The slit lies in the deviated direction.
     let to_slit = DVec3::new(-deviation.sin(), 0.0, -deviation.cos());
     let across = DVec3::Y.cross(-to_slit);
     let white = b.material(emitter("white", [1.0; 3]));
-    // Its light is spread over many times its width.
+    // Brighter than the bar, because dispersion spreads the slit to many times its width.
     let bright = b.material(emitter("bright", [6.0; 3]));
     let black = b.material(dielectric("velvet", [0.004; 3], 1.0));
     let place = |x: f64, y: f64, back: f64| facing(to_slit * (TO_SLIT + back) + across * x + DVec3::Y * y, -to_slit);

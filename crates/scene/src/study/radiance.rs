@@ -1,5 +1,5 @@
-//! Lecture R1: surfaces of the same radiance look the same whatever their distance and tilt. Every visible pixel of
-//! every panel and ball here shows radiance 1, in all three channels.
+//! Study scene of radiance (lecture R1): radiance does not depend on distance and tilt. All visible pixels of all panels
+//! and balls have radiance 1, in all three channels.
 
 use glam::DVec3;
 
@@ -10,10 +10,10 @@ use crate::{Material, Scene};
 pub(super) fn scene() -> Scene {
     let mut b = StudyBuilder::new("radiance");
     let emitting = b.material(Material { double_sided: true, ..emitter("emitter of radiance 1", [1.0; 3]) });
-    // The same radiance by the other road: shown as it is.
+    // The same radiance by an unlit material.
     let unlit =
         b.material(Material { unlit: true, double_sided: true, ..dielectric("unlit of radiance 1", [1.0; 3], 1.0) });
-    // Columns go away from the camera, each panel as large in the picture as its neighbours before the tilt; rows tilt.
+    // Columns recede from the camera, and all panels have the same size in the picture before the tilt; rows are tilted.
     let (near, across) = (3.0, 0.44);
     for (row, material) in [emitting, unlit].into_iter().enumerate() {
         let panel = b.mesh(&format!("panel {row}"), Shape::panel(1.0, 1.0), material);
@@ -27,7 +27,7 @@ pub(super) fn scene() -> Scene {
             b.place(&format!("panel {row} at {distance:.1} m, turned {tilt} degrees"), panel, frame);
         }
     }
-    // A ball shows every tilt there is.
+    // A ball has all tilts.
     for (i, (x, distance)) in [(-0.72, 3.0), (-0.24, 6.0), (0.24, 12.0), (0.72, 24.0)].into_iter().enumerate() {
         let scale = distance / near;
         b.add(&format!("ball {i}"), Shape::sphere(0.09 * scale, 48), emitting, at(x * scale, 0.0, -distance, 0.0));

@@ -1,13 +1,13 @@
 //! Shapes of the study scenes: triangles with unit normals and one texture-coordinate set, in object space.
 //!
-//! Every shape is wound counter-clockwise seen from its outside. Points that several faces share come from the same
-//! computation, so that they are equal to the last bit and closed shapes have no cracks.
+//! Every shape is counter-clockwise seen from its outside. Points shared by several faces come from the same
+//! computation, so that they are equal to the last bit and closed shapes are watertight.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DVec2, DVec3};
 
-/// Triangles of one surface, not yet given a name and a material.
+/// Triangles of one surface, without a name and a material.
 #[derive(Debug, Clone, Default)]
 pub struct Shape {
     /// Object-space positions in metres.
@@ -16,20 +16,20 @@ pub struct Shape {
     pub normals: Vec<[f32; 3]>,
     /// Texture coordinates, one per position: u to the right and v down, seen from the outside.
     pub uvs: Vec<[f32; 2]>,
-    /// Three indices a triangle, counter-clockwise seen from the outside.
+    /// Three indices per triangle, counter-clockwise seen from the outside.
     pub indices: Vec<u32>,
 }
 
-/// One smooth stretch of an outline: points with their unit normals. Neighbouring stretches meet in a hard edge.
+/// A smooth part of an outline: points with their unit normals. Neighbouring parts meet in a hard edge.
 type Stretch = Vec<(DVec2, DVec2)>;
 
-/// Sines and cosines of the right angles leave residues near 1e-17, and an outline that should close on itself or
-/// touch its axis must do so exactly; no study shape has detail below a nanometre.
+/// Rounds a point to nanometres. Sines and cosines of right angles have residues near 1e-17, but a closed outline must meet
+/// itself or its axis exactly. No study shape has detail below a nanometre.
 fn snap(p: DVec2) -> DVec2 {
     (p * 1e9).round() * 1e-9
 }
 
-/// A straight stretch; its normal lies to the right of the direction of travel.
+/// A straight part; its normal points to the right of the direction of travel.
 #[must_use]
 pub(crate) fn line(from: DVec2, to: DVec2) -> Stretch {
     let along = (to - from).normalize();
@@ -37,7 +37,7 @@ pub(crate) fn line(from: DVec2, to: DVec2) -> Stretch {
     vec![(snap(from), n), (snap(to), n)]
 }
 
-/// An arc from angle `from` to `to` in radians; counter-clockwise arcs have their normals outwards, others inwards.
+/// An arc from angle `from` to `to` in radians; normals point outwards on counter-clockwise arcs, inwards on others.
 #[must_use]
 pub(crate) fn arc(center: DVec2, radius: f64, from: f64, to: f64, steps: u32) -> Stretch {
     let sign = if to > from { 1.0 } else { -1.0 };
@@ -59,7 +59,7 @@ impl Shape {
         index
     }
 
-    /// Two triangles of a four-cornered face; a pair of corners in the same place leaves one triangle.
+    /// Two triangles of a quadrilateral; if two corners coincide, one triangle.
     fn quad(&mut self, [a, b, c, d]: [u32; 4]) {
         for [i, j, k] in [[a, b, c], [a, c, d]] {
             let [p, q, r] = [i, j, k].map(|v| self.positions[v as usize]);
@@ -69,13 +69,13 @@ impl Shape {
         }
     }
 
-    /// Triangles in the shape.
+    /// Number of triangles.
     #[must_use]
     pub fn triangles(&self) -> usize {
         self.indices.len() / 3
     }
 
-    /// The same surface with its texture repeated `u` by `v` times.
+    /// The shape with its texture repeated `u` by `v` times.
     #[must_use]
     pub fn repeat_uv(mut self, u: f64, v: f64) -> Self {
         for uv in &mut self.uvs {
@@ -84,7 +84,7 @@ impl Shape {
         self
     }
 
-    /// A horizontal rectangle around the origin that faces +Y, in `cells` by `cells` quads.
+    /// A horizontal rectangle around the origin that faces +Y, of `cells` by `cells` quads.
     #[must_use]
     pub fn plane(size_x: f64, size_z: f64, cells: u32) -> Self {
         let mut shape = Self::default();
@@ -106,7 +106,7 @@ impl Shape {
         shape
     }
 
-    /// An upright rectangle around the origin that faces +Z.
+    /// A vertical rectangle around the origin that faces +Z.
     #[must_use]
     pub fn panel(width: f64, height: f64) -> Self {
         let mut shape = Self::default();
@@ -120,7 +120,7 @@ impl Shape {
     #[must_use]
     pub fn cuboid(size: DVec3) -> Self {
         let mut shape = Self::default();
-        // Per face: outward normal, the direction of u, the direction against v; the last two span the face
+        // Per face: outward normal, direction of u, direction against v; the last two span the face
         // counter-clockwise.
         let faces = [
             (DVec3::X, DVec3::NEG_Z, DVec3::Y),
@@ -145,12 +145,12 @@ impl Shape {
     pub fn sphere(radius: f64, rings: u32) -> Self {
         let rings = rings.max(2);
         let outline = arc(DVec2::ZERO, 1.0, -FRAC_PI_2, FRAC_PI_2, rings);
-        // Scaled after the fact, so that every radius has the same directions.
+        // Scaled last, so that spheres of all radii have the same directions.
         let outline = outline.into_iter().map(|(p, n)| (p * radius, n)).collect();
         Self::lathe(&[outline], rings * 2)
     }
 
-    /// An upright closed cylinder that stands on the plane y = 0.
+    /// A vertical closed cylinder that stands on the plane y = 0.
     #[must_use]
     pub fn cylinder(radius: f64, height: f64, segments: u32) -> Self {
         let (foot, top) = (DVec2::new(radius, 0.0), DVec2::new(radius, height));
@@ -158,20 +158,21 @@ impl Shape {
         Self::lathe(&[line(DVec2::ZERO, foot), line(foot, top), line(top, axis)], segments)
     }
 
-    /// A horizontal disc around the origin that faces +Y.
+    /// A horizontal disk around the origin that faces +Y.
     #[must_use]
     pub fn disc(radius: f64, segments: u32) -> Self {
         Self::lathe(&[line(DVec2::new(radius, 0.0), DVec2::ZERO)], segments)
     }
 
-    /// A torus around the Y axis: `ring` from the axis to the middle of the tube, `tube` the radius of the tube.
+    /// A torus around the Y axis: `ring` is the distance from the axis to the centre of the tube, `tube` its radius.
     #[must_use]
     pub fn torus(ring: f64, tube: f64, segments: u32) -> Self {
         Self::lathe(&[arc(DVec2::new(ring, 0.0), tube, 0.0, TAU, (segments / 2).max(3))], segments)
     }
 
-    /// Turns an outline in the half plane (distance from the axis, y) around the Y axis. The outside lies to the
-    /// right of the direction of travel, so a closed body is outlined from the foot of its axis outwards and up.
+    /// A surface of revolution: an outline in the half plane (distance from the axis, y), rotated around the Y axis. The
+    /// outside lies to the right of the direction of travel, so the outline of a closed body runs from the bottom of its axis
+    /// outwards and up.
     #[must_use]
     pub(crate) fn lathe(outline: &[Stretch], segments: u32) -> Self {
         let mut shape = Self::default();
@@ -185,7 +186,7 @@ impl Shape {
                     travelled += p.distance(stretch[i - 1].0);
                 }
                 for j in 0..=segments {
-                    // The seam's two copies take the same angle, hence the same bits.
+                    // Both copies of the seam use the same angle, hence the same bits.
                     let (sin, cos) = (TAU * f64::from(j % segments) / f64::from(segments)).sin_cos();
                     let uv = DVec2::new(1.0 - f64::from(j) / f64::from(segments), 1.0 - travelled / length);
                     shape.push(DVec3::new(p.x * cos, p.y, p.x * sin), DVec3::new(n.x * cos, n.y, n.x * sin), uv);
@@ -202,7 +203,7 @@ impl Shape {
         shape
     }
 
-    /// A straight prism around the origin: a convex polygon, counter-clockwise in the XY plane, drawn out along Z.
+    /// A straight prism around the origin: a convex polygon, counter-clockwise in the XY plane, extruded along Z.
     #[must_use]
     pub fn prism(polygon: &[DVec2], depth: f64) -> Self {
         let mut shape = Self::default();
@@ -234,13 +235,13 @@ impl Shape {
         shape
     }
 
-    /// A rectangular tub, open above: the cavity is `inner` wide, deep (Y) and long, the walls around it `wall` and the
-    /// floor below it `floor` thick. The origin is the middle of the opening. Texture coordinates are in metres, counted
-    /// from the corners of the cavity.
+    /// A rectangular tub, open at the top: `inner` is the width, depth (Y) and length of the cavity, `wall` and `floor` are the
+    /// thicknesses. The origin is the centre of the opening. Texture coordinates are in metres from the corners
+    /// of the cavity.
     #[must_use]
     pub fn tub(inner: DVec3, wall: f64, floor: f64) -> Self {
         let mut shape = Self::default();
-        // Corners of a level rectangle, clockwise seen from above.
+        // Corners of a horizontal rectangle, clockwise seen from above.
         let ring = |x: f64, y: f64, z: f64| [(-x, -z), (x, -z), (x, z), (-x, z)].map(|(x, z)| DVec3::new(x, y, z));
         let (x, z) = (inner.x * 0.5, inner.z * 0.5);
         let foot = ring(x + wall, -inner.y - floor, z + wall);
@@ -271,11 +272,11 @@ impl Shape {
         shape
     }
 
-    /// The back of a photographer's sweep: from the floor's end at z = `back` it bends up, with radius `bend`, into a
-    /// wall that ends at y = `top`; `width` across. Texture coordinates are in metres.
+    /// A curved backdrop: from the floor's end at z = `back` it bends up, with radius `bend`, into a wall that ends at
+    /// y = `top`; `width` across. Texture coordinates are in metres.
     #[must_use]
     pub fn backdrop(width: f64, back: f64, bend: f64, top: f64) -> Self {
-        // Outline in (−z, y); the surface lies to the left of travel, where an arc's normals would have to point in.
+        // Outline in (−z, y); the surface lies to the left of travel, where normals of an arc would have to point inwards.
         let curve = arc(DVec2::new(-back, bend), bend, -FRAC_PI_2, 0.0, 24);
         let wall = line(DVec2::new(-back + bend, bend), DVec2::new(-back + bend, top));
         let mut shape = Self::default();
@@ -299,8 +300,8 @@ impl Shape {
         shape
     }
 
-    /// A sphere of about `triangles` triangles whose radius swells and sinks by a tenth, with the normals of the
-    /// true surface; it has detail at every scale down to a twentieth of its size.
+    /// A sphere of about `triangles` triangles whose radius varies by a tenth, with the normals of the exact
+    /// surface; it has detail at all scales down to a twentieth of its size.
     #[must_use]
     pub fn displaced_sphere(radius: f64, triangles: usize) -> Self {
         // 4 r (r − 1) = triangles, solved for r.
@@ -314,7 +315,7 @@ impl Shape {
         };
         for (position, normal) in shape.positions.iter_mut().zip(&mut shape.normals) {
             let d = DVec3::from(position.map(f64::from)).normalize();
-            // The surface is the zero of |p| − swell(p / |p|); its gradient is the normal.
+            // The surface is the zero set of |p| − swell(p / |p|); its gradient is the normal.
             let f = |p: DVec3| p.length() - swell(p.normalize());
             let p = d * swell(d);
             let h = 1e-5;

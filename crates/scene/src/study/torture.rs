@@ -1,5 +1,6 @@
-//! The hard cases as one picture: what is drawn right only where the arithmetic is. Everything lies ten kilometres from the origin
-//! (positions), before a plane mirror that shows its back.
+//! Study scene of numerically hard cases, ten kilometres from the origin and in front of a plane mirror that shows the back.
+//!
+//! Read docs/numerics.md, which explains each case.
 
 use glam::{DAffine3, DVec2, DVec3};
 
@@ -8,7 +9,7 @@ use super::shape::Shape;
 use crate::substance::SILVER;
 use crate::{LightKind, Material, Scene};
 
-/// Where the scene lies: sums of such numbers in f32 are good to half a millimetre.
+/// Position of the scene in metres: f32 sums of such numbers have errors up to half a millimetre.
 const FAR: DVec3 = DVec3::new(10_000.3, 0.0, -7_000.7);
 
 pub(super) fn scene() -> Scene {
@@ -19,7 +20,7 @@ pub(super) fn scene() -> Scene {
     let checker = b.checker("floor checker", [0.25; 3], [0.5, 0.49, 0.47]);
     let matt = b.material(Material { base_color_texture: Some(checker), ..dielectric("floor", [1.0; 3], 0.9) });
     b.add("floor", Shape::plane(6.0, 6.0, 1).repeat_uv(12.0, 12.0), matt, here(0.0, 0.0, 0.0, 0.0));
-    // Seen at angles down to a degree (Fresnel, shadow rays, and a mirrored mirror).
+    // Seen at angles down to one degree: Fresnel terms, shadow rays, and repeated reflection.
     let silver = b.material(conductor("silver", SILVER, 0.0));
     b.add("back mirror", Shape::panel(2.6, 1.2), silver, far * facing(DVec3::new(0.0, 0.62, -1.1), DVec3::Z));
     b.add("mirror strip", Shape::cuboid(DVec3::new(0.16, 0.002, 2.0)), silver, here(0.62, 0.001_1, 0.0, 0.0));
@@ -28,20 +29,20 @@ pub(super) fn scene() -> Scene {
     let polished = b.material(metal("polished", [0.9, 0.7, 0.5], 0.01));
     b.add("polished ball", Shape::sphere(0.12, 64), polished, here(-0.72, 0.1201, 0.0, 0.0));
 
-    // Two thousand triangles a thousand times as long as wide, whose normals are differences of nearly equal numbers.
+    // Two thousand triangles a thousand times as long as wide: their normals are differences of nearly equal numbers.
     let paper = b.material(dielectric("paper", [0.7, 0.3, 0.25], 0.8));
     let tilted = DAffine3::from_rotation_x(1.2);
     b.add("needles", Shape::disc(0.16, 2000), paper, here(-0.36, 0.18, -0.2, 0.0) * tilted);
 
-    // Faces −Z exactly, where the shortest way to a basis around a normal divides by zero: the mirror shows it.
+    // Faces exactly −Z, where the simplest tangent frame around a normal divides by zero; visible in the mirror.
     let board = b.material(dielectric("board", [0.25, 0.45, 0.7], 0.9));
     b.add("board", Shape::panel(0.34, 0.3), board, far * facing(DVec3::new(0.0, 0.16, -0.35), DVec3::NEG_Z));
 
-    // Bends by a hundredth of a degree: n² − 1 + cos² is a difference of nearly equal numbers.
+    // Refracts by a hundredth of a degree: n² − 1 + cos² is a difference of nearly equal numbers.
     let faint = b.material(glass("faint glass", 1.0003, 0.2));
     b.add("faint block", Shape::cuboid(DVec3::new(0.2, 0.2, 0.2)), faint, here(0.02, 0.1002, 0.18, 30.0));
 
-    // Light inside meets the sides at the critical angle of 41.8° and about it.
+    // Light inside meets the sides at angles around the critical angle of 41.8°.
     let crown = b.material(glass("crown glass", 1.5, 0.2));
     let (half, foot, tip) = (0.12, -0.046_188 * 1.5, 0.092_376 * 1.5);
     let triangle = [DVec2::new(-half, foot), DVec2::new(half, foot), DVec2::new(0.0, tip)];
@@ -52,7 +53,7 @@ pub(super) fn scene() -> Scene {
     b.place("front plate", plate, here(0.95, 0.1002, 0.05, -20.0));
     b.place("rear plate", plate, here(0.95, 0.1002, 0.05, -20.0) * at(0.0, 0.0, -0.010_02, 0.0));
 
-    // A lamp of a millimetre and one of a metre; the intensity of its stand-in is π r² times its radiance.
+    // Emitters of a millimetre and a metre; the intensity of a proxy light is π r² times the radiance.
     let spark = b.material(emitter("spark", [2.0e5, 1.8e5, 1.5e5]));
     b.add("spark", Shape::sphere(0.001, 16), spark, here(-0.95, 0.55, 0.5, 0.0));
     let position = FAR + DVec3::new(-0.95, 0.548, 0.5);
