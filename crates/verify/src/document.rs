@@ -1,4 +1,4 @@
-//! `docs/equations.md` and `docs/verified.md` out of the sources and the catalogue.
+//! Generates `docs/equations.md` and `docs/verified.md` from the sources and the catalogue.
 
 use std::fmt::Write as _;
 
@@ -6,18 +6,18 @@ use super::catalogue;
 use super::statements::{By, STATEMENTS};
 use etalon::shader::{PROBES, Probe};
 
-/// The page: every equation with its function, columns, bounds and built-ins.
+/// The page `docs/equations.md`: every equation with its function, inputs, bounds and built-ins.
 #[must_use]
 pub fn equations() -> String {
     let mut page = String::from(
         "# Equations\n\n\
          Written by a test (`crates/verify/tests/catalogue.rs`) from the tags in `shaders/lib/` and the bounds in `crates/optics/src/`.\n\
          Ids are those of [lecture.md](lecture.md); N and a number is a row of [numerics.md](numerics.md).\n\
-         `etalon verify` judges the bounds on a device; the tier `fast` has none. Built-ins are those whose precision\n\
-         is the device's own (Vulkan, \"Precision of Individual Operations\"), by tier where they differ. How each reaches\n\
-         pictures is said last: by passes that call it, by host code, or as a form of the laboratory (of the lecture, or of\n\
-         [functions.md](functions.md)) that a test holds to the function that draws. [verified.md](verified.md) has\n\
-         the same by id, with study scenes and tests.\n",
+         `etalon verify` checks the bounds on a device; the tier `fast` has no bounds. Built-ins are listed where their precision\n\
+         depends on the device (Vulkan, \"Precision of Individual Operations\"), by tier if the tiers differ. The last line says how\n\
+         pictures use the function: passes call it, or host code computes it. A laboratory form (of the lecture, or of\n\
+         [functions.md](functions.md)) is not called by pictures; a test compares it with the function that pictures use.\n\
+         [verified.md](verified.md) lists the functions by id, with study scenes and tests.\n",
     );
     let mut subject = "";
     for entry in catalogue() {
@@ -45,40 +45,40 @@ pub fn equations() -> String {
         );
         let _ = writeln!(page, "- {}", reached(probe));
         if probe.loop_heads > 0 {
-            let _ = writeln!(page, "- loop heads in one call: at most {}", probe.loop_heads);
+            let _ = writeln!(page, "- loop iterations per call: at most {}", probe.loop_heads);
         }
     }
     page
 }
 
-/// How a function reaches pictures.
+/// How a function contributes to pictures, for `docs/equations.md`.
 fn reached(probe: &Probe) -> String {
     let list = |names: &[&str]| format!("`{}`", names.join("`, `"));
     match (probe.host, probe.lab) {
         (Some((file, what)), _) => format!("computed by [{file}](../{file}): {what}"),
         (_, Some((draws, test))) => {
-            format!("laboratory form; `{draws}` draws, in {}; test `{test}`", list(probe.drawn_by))
+            format!("laboratory form; pictures use `{draws}`, in {}; test `{test}`", list(probe.drawn_by))
         }
         _ => format!("called by: {}", list(probe.passes)),
     }
 }
 
-/// The page: for every statement of the lecture and every hard case its functions, how they reach pictures, the study scene
-/// that shows it, the test that holds it, and the page that tells of it.
+/// The page `docs/verified.md`: for every statement of the lecture and every hard case its functions, how they reach pictures, the study
+/// scene that shows it, the test that checks it, and the page that explains it.
 #[must_use]
 pub fn verified() -> String {
     let mut page = String::from(
         "# What is verified is what draws\n\n\
          Written by a test (`crates/verify/tests/catalogue.rs`) from the tags in `shaders/lib/` and `crates/verify/src/statements.rs`. Ids are those\n\
          of [lecture.md](lecture.md); N and a number is a row of [numerics.md](numerics.md). A function is called by passes of\n\
-         `shaders/pass/`, or computed by host code that makes the picture, or it is a form of the laboratory that a test holds\n\
-         to the function that draws instead. The build fails for a function of `shaders/lib/` that neither a pass nor an\n\
-         equation reaches.\n\n",
+         `shaders/pass/`, or computed by host code of the renderer, or it is a laboratory form: pictures do not call it, and a test\n\
+         compares it with the function that they use. The build fails if neither a pass nor an equation uses a function of\n\
+         `shaders/lib/`.\n\n",
     );
     let count = |way: fn(&Probe) -> bool| PROBES.iter().filter(|probe| way(probe)).count();
     let _ = write!(
         page,
-        "{} equations: {} called by passes, {} computed by the host, {} of the laboratory.\n\n\
+        "{} equations: {} called by passes, {} computed by the host, {} laboratory forms.\n\n\
          | id | function | reaches pictures by | study scene | test | page |\n|---|---|---|---|---|---|\n",
         PROBES.len(),
         count(|probe| !probe.passes.is_empty()),
@@ -108,16 +108,16 @@ pub fn verified() -> String {
     page
 }
 
-/// The same in a cell.
+/// How a function contributes to pictures, for a table cell of `docs/verified.md`.
 fn way(probe: &Probe) -> String {
     match (probe.host, probe.lab) {
         (Some((file, _)), _) => format!("host: {file}"),
-        (_, Some((draws, _))) => format!("laboratory: `{draws}` draws"),
+        (_, Some((draws, _))) => format!("laboratory form: pictures use `{draws}`"),
         _ => probe.passes.join(", "),
     }
 }
 
-/// Input names, a long series by its ends.
+/// Input names; of more than 16 names only the first and the last.
 #[must_use]
 pub fn inputs(names: &[&str]) -> String {
     match names {
@@ -126,7 +126,7 @@ pub fn inputs(names: &[&str]) -> String {
     }
 }
 
-/// Built-ins by tier, in one list where they are the same.
+/// Built-ins by tier; equal lists are merged.
 fn builtins(tiers: [&[&str]; 3]) -> String {
     let names = |list: &[&str]| if list.is_empty() { "none".to_owned() } else { list.join(" ") };
     let [fast, stable, compensated] = tiers;

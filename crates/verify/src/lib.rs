@@ -1,7 +1,9 @@
-//! The shipped shader functions against their f64 twins, on a device.
+//! Verification of the shipped shader functions against their f64 twins on a device (`etalon verify`). docs/equations.md lists functions
+//! and bounds.
 //!
-//! [`catalogue`] joins what build.rs found in `shaders/lib/` with what `optics` says of it. [`Cases`] draws inputs and asks
-//! the twin, or takes both from a vector file ([`vectors`]). [`evaluate`] runs the probe, [`judge`] compares.
+//! [`catalogue`] joins the functions that build.rs found in `shaders/lib/` with the twins and bounds of the crate `optics`. [`Cases`] draws
+//! random inputs and evaluates the twin, or takes both from a vector file ([`vectors`]). [`evaluate`] runs a function on the device by its
+//! probe (a generated compute program), and [`judge`] compares.
 
 pub mod arguments;
 pub mod curve;
@@ -19,56 +21,56 @@ use etalon::gpu::{Buffer, Device, Frame, Place};
 use etalon::optics::{self, Case, Equation, SplitMix64, Tier, ulp};
 use etalon::shader::{PROBES, Probe, ProbeBind, lib};
 
-/// Written to every output before a probe runs: a NaN that no arithmetic makes.
+/// Bit pattern written to every output before a probe runs: a NaN that no arithmetic produces.
 const POISON: u32 = 0x7fc0_dead;
 
-/// Cases in one dispatch: 2^14 workgroups of 64, below every device's limit.
+/// Cases per dispatch: 2^14 workgroups of 64 invocations, below the limit of every device.
 const BATCH: usize = 1 << 20;
 
-/// One equation: the shader's side and the twin's.
+/// An equation with its shader function and its twin.
 #[derive(Debug, Clone, Copy)]
 pub struct Entry {
-    /// The tagged function and its program.
+    /// Tagged shader function and its program.
     pub probe: &'static Probe,
-    /// Twin, regions, bounds.
+    /// Twin, input regions and error bounds.
     pub equation: &'static Equation,
 }
 
-/// Every equation that has both sides, in the order of the sources.
+/// Every equation with a shader function and a twin, in the order of the sources.
 #[must_use]
 pub fn catalogue() -> Vec<Entry> {
     let twin = |probe: &Probe| optics::equations().find(|equation| equation.name == probe.name);
     PROBES.iter().filter_map(|probe| Some(Entry { probe, equation: twin(probe)? })).collect()
 }
 
-/// The equation of that name.
+/// Finds an equation by name.
 ///
 /// # Errors
-/// One sentence with the names there are.
+/// One sentence that lists all names.
 pub fn find(name: &str) -> Result<Entry> {
     let all = catalogue();
     let found = all.iter().find(|entry| entry.probe.name == name).copied();
     found.ok_or_else(|| {
         let names: Vec<_> = all.iter().map(|entry| entry.probe.name).collect();
-        anyhow::anyhow!("no function is called \"{name}\"; there are {}", names.join(", "))
+        anyhow::anyhow!("no function is called \"{name}\"; the functions are {}", names.join(", "))
     })
 }
 
-/// Inputs with what is expected of them. Columns lie one after the other, as the probe reads them.
+/// Test cases: inputs with expected outputs.
 #[derive(Debug, Clone)]
 pub struct Cases {
-    /// How many.
+    /// Number of cases.
     pub count: usize,
-    /// Input columns: values of f32, and whole numbers of 32 bits where the function takes such.
+    /// Inputs column by column: f32 values, or 32-bit integers for whole-number inputs.
     pub inputs: Vec<f64>,
-    /// Exact outputs, row by row; NaN where nothing is expected.
+    /// Expected outputs row by row, in f64; NaN where nothing is expected.
     pub exact: Vec<f64>,
-    /// Output columns that something is expected of.
+    /// For each output column, whether it is judged.
     pub judged: Vec<bool>,
 }
 
 impl Cases {
-    /// `count` cases from the regions of the equation, each region's share of them, with the twin's outputs.
+    /// Draws `count` random cases from the input regions of the equation, in proportion to their shares; the twin gives the outputs.
     #[must_use]
     pub fn draw(entry: &Entry, count: usize, seed: u64) -> Self {
         let equation = entry.equation;
@@ -83,7 +85,7 @@ impl Cases {
                 let mut row: Vec<f64> = (region.draw)(&mut draw).into_iter().map(f64::from).collect();
                 for (x, name) in row.iter_mut().zip(entry.probe.inputs) {
                     if entry.probe.whole.contains(name) && *x >= 16_777_216.0 {
-                        // The digits that a float has not.
+                        // Random low digits that a float cannot hold.
                         *x = (*x + draw.below(ulp(*x) as usize) as f64).min(f64::from(u32::MAX));
                     }
                 }
@@ -93,7 +95,7 @@ impl Cases {
         Self::from_rows(entry, &rows)
     }
 
-    /// These inputs with the twin's outputs.
+    /// Cases with given inputs; the twin gives the outputs.
     #[must_use]
     pub fn from_rows<T: Copy + Into<f64> + Sync>(entry: &Entry, rows: &[Vec<T>]) -> Self {
         let exact = rows.par_iter().flat_map_iter(|row| {
@@ -108,7 +110,7 @@ impl Cases {
         }
     }
 
-    /// One case's inputs.
+    /// Inputs of one case.
     #[must_use]
     pub fn row(&self, row: usize) -> Vec<f64> {
         (0..self.inputs.len() / self.count).map(|column| self.inputs[column * self.count + row]).collect()
@@ -119,22 +121,22 @@ fn by_columns<T: Copy + Into<f64>>(rows: &[Vec<T>], width: usize) -> Vec<f64> {
     (0..width).flat_map(|column| rows.iter().map(move |row| row[column].into())).collect()
 }
 
-/// What a probe returned.
+/// Results of a probe.
 #[derive(Debug, Clone)]
 pub struct Evaluated {
-    /// Output columns, one after the other.
+    /// Outputs column by column.
     pub outputs: Vec<f32>,
-    /// GPU time of the dispatches, without compilation: those of the second run.
+    /// GPU milliseconds of the dispatches of a second run, without compilation.
     pub ms: f64,
 }
 
-/// Evaluates a function in a tier for `count` cases.
+/// Evaluates a function in a tier for `count` cases on the device.
 ///
 /// # Errors
-/// When the device fails, or the function left an output unwritten.
+/// When the device fails, or when the function leaves an output unwritten.
 ///
 /// # Panics
-/// When the number of columns is not the function's.
+/// When the number of input columns is not that of the function.
 pub fn evaluate(
     device: &Arc<Device>,
     probe: &'static Probe,
@@ -156,7 +158,7 @@ pub fn evaluate(
         let to = Buffer::new(device, "outputs of a probe", bytes as u64, Place::Readback)?;
         let bind = ProbeBind { probe, inputs: &from, outputs: &to };
         let constants = lib::arithmetic::Constants { arithmetic: tier as u32 };
-        // The first run compiles; the second is timed.
+        // The first run compiles; the second run is timed.
         for run in 0..2 {
             let mut frame = Frame::new(device);
             frame.fill("poison", &to, POISON);
@@ -183,42 +185,42 @@ pub fn evaluate(
     Ok(Evaluated { outputs, ms })
 }
 
-/// The errors of one output column.
+/// Errors of one output column.
 #[derive(Debug, Clone)]
 pub struct Figures {
-    /// Cases in which something was expected.
+    /// Number of judged cases.
     pub cases: usize,
-    /// Largest error in units of the last place of the exact value.
+    /// Largest error in ulp (units in the last place) of the exact value.
     pub max_ulp: f64,
-    /// Largest relative error, where the exact value is not 0.
+    /// Largest relative error over cases whose exact value is not 0.
     pub max_rel: f64,
     /// Largest absolute error.
     pub max_abs: f64,
-    /// NaN, and infinities where the exact value is none.
+    /// Number of NaN results, and of infinite results whose exact value is finite.
     pub non_finite: usize,
-    /// No case exceeds its bound. The tier fast has none.
+    /// Whether every case keeps its bound; always true for the tier fast, which has no bounds.
     pub pass: bool,
-    /// The case nearest to its bound, or farthest beyond.
+    /// Case with the largest ratio of error to bound.
     pub worst: Option<Worst>,
 }
 
-/// One case.
+/// The worst case.
 #[derive(Debug, Clone)]
 pub struct Worst {
-    /// Its place among the cases, from 0.
+    /// Index of the case, from 0.
     pub row: usize,
-    /// Input columns.
+    /// Inputs.
     pub inputs: Vec<f64>,
-    /// From the device.
+    /// Result of the device.
     pub got: f32,
-    /// From the twin or the file.
+    /// Expected value of the twin or the file.
     pub expected: f64,
-    /// Error over allowed error.
+    /// Ratio of error to allowed error.
     pub excess: f64,
 }
 
-/// Absolute error of `got`: 0 where a value too small for f32's normal numbers came out as zero or as a denormal, which
-/// every Vulkan device may do, and where one too large came out as infinity or as the largest number.
+/// Absolute error of `got`. It is 0 where the exact value underflows the normal numbers of f32 and `got` is zero or denormal, which Vulkan
+/// allows, and where the exact value overflows and `got` is infinite or the largest number.
 fn absolute_error(got: f32, exact: f64) -> f64 {
     let value = f64::from(got);
     if exact.abs() >= f64::from(f32::MAX) && value.abs() >= f64::from(f32::MAX) && value.signum() == exact.signum() {
@@ -230,7 +232,7 @@ fn absolute_error(got: f32, exact: f64) -> f64 {
     (value - exact).abs()
 }
 
-/// Compares the outputs of a tier with what is exact: one set of figures per output column.
+/// Compares the outputs of a tier with the expected outputs; returns figures for each output column.
 #[must_use]
 pub fn judge(entry: &Entry, tier: Tier, cases: &Cases, outputs: &[f32]) -> Vec<Figures> {
     let width = entry.equation.outputs.len();
@@ -244,11 +246,11 @@ pub fn judge(entry: &Entry, tier: Tier, cases: &Cases, outputs: &[f32]) -> Vec<F
             let got = outputs[column * cases.count + row];
             let inputs = cases.row(row);
             let error = absolute_error(got, exact[column]);
-            // The tier fast promises nothing; its worst case is the one farthest beyond the stable tier's bound.
+            // The tier fast has no bounds; its worst case is measured by the bound of the tier stable.
             let judged = if tier == Tier::Fast { Tier::Stable } else { tier };
             let allowed = (output.allowed)(&Case { tier: judged, inputs: &inputs, exact, column });
-            // Outside of its domain an equation's bound may be no number, where a file expects the documented value:
-            // exactly that is demanded.
+            // Outside the domain of an equation the bound may be NaN although a file expects the documented value; the result must then be
+            // exact.
             let allowed = if allowed.is_nan() { 0.0 } else { allowed };
             let excess = match (error.is_nan(), error <= allowed) {
                 (true, _) => f64::INFINITY,
@@ -289,7 +291,7 @@ pub fn judge(entry: &Entry, tier: Tier, cases: &Cases, outputs: &[f32]) -> Vec<F
 
 fn merge(a: Figures, b: Figures) -> Figures {
     let worst = match (a.worst, b.worst) {
-        // Of equals the first: the result does not depend on how the work was cut.
+        // Among equal cases the first wins, so that the result does not depend on the division of the work.
         (Some(x), Some(y)) => Some(if y.excess > x.excess || (y.excess == x.excess && y.row < x.row) { y } else { x }),
         (x, y) => x.or(y),
     };
@@ -304,13 +306,13 @@ fn merge(a: Figures, b: Figures) -> Figures {
     }
 }
 
-/// Inputs from outside every domain: zeros, ones, denormals, huge numbers of either sign, in any mixture.
+/// Hostile inputs, mostly outside the domain: zeros, ones, denormals and huge numbers of either sign, in random combinations.
 fn hostile(entry: &Entry, count: usize, seed: u64) -> Vec<f64> {
     let huge = entry.equation.extreme;
     let values =
         [0.0, -0.0, 1.0, -1.0, 0.5, -2.0, 1e-6, -1e-6, 1e-20, -1e-20, 1e-38, 1e-44, 1e10, huge, -huge, huge * 0.1];
     let mut draw = SplitMix64::new(seed);
-    // Column by column: half of the entries are extreme, so that some cases have a single one.
+    // Half of the entries are extreme, so that some cases have a single extreme input.
     let mut value = || {
         let extreme = draw.below(2) == 0;
         let pick = values[draw.below(values.len())].clamp(-huge, huge);
@@ -319,7 +321,7 @@ fn hostile(entry: &Entry, count: usize, seed: u64) -> Vec<f64> {
     (0..count * entry.probe.inputs.len()).map(|_| value()).collect()
 }
 
-/// How many of `count` hostile cases gave a NaN, and the inputs of the first.
+/// Number of `count` hostile cases that return NaN, and the inputs of the first.
 ///
 /// # Errors
 /// When the device fails.

@@ -1,4 +1,4 @@
-//! Error against angle, index, shine: one SVG per equation, one line per tier.
+//! Plots of the error of an equation over an input such as angle, index or shininess, as SVG with one line per tier.
 
 use anyhow::{Result, anyhow};
 use plotters::prelude::*;
@@ -8,11 +8,11 @@ use etalon::optics::Tier;
 
 const SIZE: (u32, u32) = (760, 440);
 const BINS: usize = 96;
-/// Errors below this are drawn on the floor: an eighth of an ulp.
+/// Smaller errors are drawn at this value: an eighth of an ulp.
 const FLOOR: f64 = 7.45e-9;
 const CEILING: f64 = 1e3;
 
-/// Largest error of the plotted column in each bin of the axis: (axis value, error).
+/// Largest error of the plotted column in each bin of the axis; `None` for bins without cases.
 fn series(entry: &Entry, cases: &Cases, outputs: &[f32], range: (f64, f64)) -> Vec<Option<f64>> {
     let axis = entry.equation.axis;
     let width = entry.equation.outputs.len();
@@ -58,7 +58,7 @@ pub fn svg(entry: &Entry, cases: &Cases, tiers: &[(Tier, &[f32])]) -> Result<Opt
         root.fill(&WHITE).map_err(|e| failed(&e))?;
         let mut builder = ChartBuilder::on(&root);
         builder.caption(title, ("sans-serif", 18)).margin(12).x_label_area_size(42).y_label_area_size(64);
-        // The two kinds of axes are two types of charts.
+        // Linear and logarithmic axes have different chart types.
         macro_rules! draw {
             ($x:expr) => {{
                 let mut chart = builder.build_cartesian_2d($x, (FLOOR..CEILING).log_scale()).map_err(|e| failed(&e))?;
@@ -82,7 +82,7 @@ pub fn svg(entry: &Entry, cases: &Cases, tiers: &[(Tier, &[f32])]) -> Result<Opt
                         if axis.log { low * (high / low).powf(part) } else { low + (high - low) * part }
                     };
                     let step = |(bin, error): (usize, f64)| [(edge(bin), error), (edge(bin + 1), error)];
-                    // One line per run of bins with cases: nothing is drawn across a gap.
+                    // One line per run of bins with cases, so that no line crosses a gap.
                     let known: Vec<(usize, f64)> =
                         bins.iter().enumerate().filter_map(|(bin, error)| Some((bin, (*error)?))).collect();
                     for run in known.chunk_by(|a, b| b.0 == a.0 + 1) {

@@ -1,26 +1,26 @@
-//! The statements of the lecture and the hard cases of docs/numerics.md: in which study scene each is seen, which test holds
-//! it, which page tells of it, and why some have no function. [`document::verified`](super::document::verified) makes
-//! docs/verified.md of it, crates/verify/tests/catalogue.rs checks it.
+//! Table of the lecture's statements and the hard cases of docs/numerics.md: for each the study scene that shows it, the test that checks
+//! it, the page that explains it, and why some have no function. [`document::verified`](super::document::verified) generates
+//! docs/verified.md from the table, and crates/verify/tests/catalogue.rs checks it.
 
-/// One id.
+/// A statement of the lecture or a hard case.
 #[derive(Debug, Clone, Copy)]
 pub struct Statement {
-    /// Of docs/lecture.md, or N and a row of docs/numerics.md.
+    /// Id of docs/lecture.md, or N and a row of docs/numerics.md.
     pub id: &'static str,
-    /// Study scene that shows it.
+    /// Study scene that shows the statement.
     pub scene: &'static str,
-    /// The test that holds what is drawn to it: of a picture where there is one.
+    /// Test that checks the statement, on pictures if possible.
     pub test: &'static str,
-    /// Page under docs/.
+    /// Page under docs/ that explains the statement.
     pub page: &'static str,
-    /// Equations that answer for it though they are not tagged with it, or why there is none.
+    /// Equations of the statement.
     pub by: By,
 }
 
-/// What answers for an id.
+/// Equations of a statement.
 #[derive(Debug, Clone, Copy)]
 pub enum By {
-    /// The equations tagged with it.
+    /// The equations tagged with the id.
     Tags,
     /// These equations.
     Equations(&'static [&'static str]),
@@ -148,7 +148,7 @@ pub const STATEMENTS: &[Statement] = &[
     of("N42", "etalon", "study_scenes_are_where_the_rays_find_them", NUMERICS),
     by(
         of("N43", "blend", "any_opacity_is_good_to_a_half_float", "decisions/gbuffer.md"),
-        By::Nothing("what is stored in halves are texels and opacities, which are at most 1: none is cut off"),
+        By::Nothing("half floats store only texels and opacities of at most 1: no value is clamped"),
     ),
     of("N44", "etalon", "a_whole_render_shows_the_twin_s_bytes_over_its_background", NUMERICS),
     of("N45", "materials", "eight_bit_colours_survive_decoding_and_encoding", NUMERICS),
