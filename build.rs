@@ -1,9 +1,9 @@
-//! Shaders become SPIR-V and typed Rust: `crates/reflect` says how.
+//! Build script: compiles the shaders to SPIR-V and generates typed Rust by `crates/reflect`.
 
 use std::path::{Path, PathBuf};
 use std::{env, process};
 
-/// Names of specialization constants whose code is not built at all: what `./x bench --bench price` compares with.
+/// Specialization constants, separated by commas, whose code is not compiled: the baseline of `./x bench --bench price`.
 const WITHOUT: &str = "ETALON_WITHOUT";
 
 fn main() {

@@ -1,4 +1,4 @@
-//! Two pictures of a scene, by other rungs of one knob, and how far apart they are.
+//! Renders a scene with two rungs of one knob, and prints the difference of the pictures.
 //!
 //!     cargo run --release --example compare -- study:etalon shadows=map shadows=ray
 #![allow(clippy::print_stdout, reason = "an example shows what it does")]

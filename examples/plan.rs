@@ -1,4 +1,4 @@
-//! What a scene calls for, and why; no device is needed.
+//! Prints the effects that a scene calls for, with reasons; no device is needed.
 //!
 //!     cargo run --example plan -- study:pool
 #![allow(clippy::print_stdout, reason = "an example shows what it does")]

@@ -1,4 +1,4 @@
-//! A glTF file, or a built-in scene, to a picture in memory, and from there to a PNG file.
+//! Renders a glTF file or a built-in scene to a picture in memory, and encodes it as a PNG file.
 //!
 //!     cargo run --release --example render -- model.glb model.png
 #![allow(clippy::print_stdout, reason = "an example shows what it does")]

@@ -1,4 +1,4 @@
-//! Shaders of one's own become SPIR-V and typed Rust as Etalon's do.
+//! Compiles the shaders of this crate to SPIR-V and generates typed Rust, in the same way as Etalon.
 
 use std::path::{Path, PathBuf};
 

@@ -234,7 +234,7 @@ fn measure(
     let contents = setup.contents();
     let run = |budget_s: u32| -> Result<Table> {
         if !folder.join("run.json").exists() || budget_s != QUICK_S {
-            // What is left of something that was not finished.
+            // Remove the remains of an unfinished run.
             let _ = std::fs::remove_dir_all(folder);
         }
         setup.bench(options, settings.clone(), |bench| {

@@ -262,7 +262,7 @@ fn say(args: &CostArgs, compared: &Compared) -> Result<ExitCode> {
     for (rung, ms) in rungs.iter().zip(gpu_ms) {
         let error = if *rung == price.to {
             let error = 100.0 * price.shown_delta.median.max(0.0).sqrt();
-            format!("{error:.3} % of the range, FLIP {:.4}", price.flip_between)
+            format!("error {error:.3} %, FLIP {:.4}", price.flip_between)
         } else {
             "baseline".to_owned()
         };

@@ -18,7 +18,7 @@ pub struct DiffArgs {
     /// Reference picture
     #[arg(value_name = "A")]
     pub a: PathBuf,
-    /// Picture to judge
+    /// Picture to compare with the reference
     #[arg(value_name = "B")]
     pub b: PathBuf,
     /// Metric to print

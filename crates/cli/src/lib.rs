@@ -75,7 +75,7 @@ fn packages(error: &NotOpened) -> Option<&'static str> {
 
 /// Prints the `openjd_fail` message of Open Job Description with the error text.
 pub fn fail_openjd(text: &str) {
-    // The exit code follows in any case: a closed pipe is no error here.
+    // A closed pipe is ignored: the exit code reports the failure anyway.
     drop(print(&format!("openjd_fail: {}", text.replace('\n', " "))));
 }
 

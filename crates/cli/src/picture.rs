@@ -185,7 +185,7 @@ pub(super) fn format_of(path: &Path) -> Result<Format> {
     match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
         Some("png") => Ok(Format::Png),
         Some("exr") => Ok(Format::Exr),
-        _ => bail!("--output {}: only .png and .exr are written", path.display()),
+        _ => bail!("--output {}: only .png and .exr can be written", path.display()),
     }
 }
 

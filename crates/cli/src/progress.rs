@@ -108,7 +108,10 @@ impl Steps {
             *last = Instant::now();
             let left =
                 begun.elapsed().as_secs_f64() / f64::from(progress.done) * f64::from(progress.of - progress.done);
-            eprintln!("{}/{} samples, estimated error {relative:.1} %, at most {left:.0} s left", progress.done, progress.of);
+            eprintln!(
+                "{}/{} samples, estimated error {relative:.1} %, at most {left:.0} s left",
+                progress.done, progress.of
+            );
         }
     }
 

@@ -139,11 +139,11 @@ pub struct PlanFacts {
     pub effects: Vec<Effect>,
     /// Samples per pixel.
     pub samples: u32,
-    /// Passes of a frame in order.
+    /// Passes of a sample, in order.
     pub passes: Vec<String>,
     /// Pipelines.
     pub pipelines: Vec<PipelineFact>,
-    /// Buffers and images that outlive a frame or feed one, by label.
+    /// Buffers and images on the device, by label, without staging buffers.
     pub buffers: Vec<Created>,
     /// Textures and texture coordinates of the scene that are neither decoded nor uploaded, with the reason.
     pub unread: Vec<String>,

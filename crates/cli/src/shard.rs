@@ -49,7 +49,10 @@ pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<Exi
     ensure!(args.repeat == 1, "--repeat does not work with --shard: a part of a picture is drawn once");
     ensure!(args.within.is_none(), "--within chooses rungs for one process; with --shard choose rungs with --set");
     ensure!(args.picture.plan != PlanExtent::ExplainCost, "--plan explain-cost works with a whole picture only");
-    ensure!(args.report.is_none(), "--report: a part file holds its own report; `etalon merge --report` writes the report of all parts");
+    ensure!(
+        args.report.is_none(),
+        "--report: a part file holds its own report; `etalon merge --report` writes the report of all parts"
+    );
     let [output] = &args.output[..] else {
         bail!("--shard {index}/{of}: name the one file of this part with -o, for example -o {index}.part")
     };
@@ -61,7 +64,8 @@ pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<Exi
         "--max-error: a process that draws a part does not know the error of the whole picture; choose --set samples"
     );
     let stopped = Arc::new(AtomicBool::new(false));
-    signal_hook::flag::register(signal_hook::consts::SIGTERM, stopped.clone()).context("installing the handler of SIGTERM")?;
+    signal_hook::flag::register(signal_hook::consts::SIGTERM, stopped.clone())
+        .context("installing the handler of SIGTERM")?;
     let steps = Steps::new(args.progress, quiet);
     steps.step(&format!("loading {}", args.scene.scene), 1);
     let prune = args.picture.prune(&args.scene, &settings.knobs);
@@ -78,10 +82,7 @@ pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<Exi
             settings.size[1]
         );
     } else {
-        ensure!(
-            settings.parts.is_empty(),
-            "--split samples: --aov reflection and refraction need --split tiles"
-        );
+        ensure!(settings.parts.is_empty(), "--split samples: --aov reflection and refraction need --split tiles");
     }
     let scene = contents(setup.opened.scene(), setup.opened.environment());
     let device = setup.device.clone();

@@ -128,14 +128,14 @@ fn parts_that_do_not_belong_together_are_named() {
     other[place..place + 8].copy_from_slice(b"ELSEWHER");
     std::fs::write(at.join("i2"), other).expect("a file");
     for (parts, said) in [
-        ("a1", "of 2 parts these are missing: 2"),
+        ("a1", "of 2 parts, these are missing: 2"),
         ("a1 a2 a2", "are the same part, 2 of 2"),
         ("a1 b2", "setting seed, 0 and 3"),
         ("a1 c2", "knob brdf, ggx and blinn-phong"),
-        ("a1 d2", "two divisions of the picture: 1 of 2 by tiles"),
-        ("a1 e2", "of two scenes"),
-        ("a1 f2.exr", "f2.exr is no part of a picture"),
-        ("a1 g2", "g2 is no part of a picture, or was cut short"),
+        ("a1 d2", "two different divisions of the picture: 1 of 2 by tiles"),
+        ("a1 e2", "they show two scenes"),
+        ("a1 f2.exr", "f2.exr is not a part of a picture"),
+        ("a1 g2", "g2 is not a part of a picture, or it is truncated"),
         ("a1 h2", "h2"),
         ("a1 i2", "two devices"),
         ("a1 nowhere", "nowhere"),
@@ -166,7 +166,7 @@ fn what_cannot_be_divided_is_refused() {
         ("--shard 1/9 -o a", 1, "fewer tiles"),
         ("--shard 1/2 -o a --split samples --set samples=1", 1, "1 samples are added in 1 blocks"),
         ("--frames 1-2 -o a.png", 1, "need a frame number"),
-        ("--frames 1-2 -o {frame:x}.png", 1, "stands for nothing"),
+        ("--frames 1-2 -o {frame:x}.png", 1, "is not a placeholder"),
         ("--frames 5-1", 2, "larger frame to a smaller"),
         ("--frames 1-2", 1, "nothing in study:cornell moves"),
         ("--turntable 0", 2, "--turntable"),
@@ -283,7 +283,7 @@ fn a_part_that_is_told_to_end_keeps_what_it_has() {
         match ended {
             Some(143) => {
                 if at.join("1.part").exists() {
-                    run(at, "merge 1.part -o all.exr").failed(1, "is not drawn to its end");
+                    run(at, "merge 1.part -o all.exr").failed(1, "is incomplete");
                 }
             }
             Some(0) => break,

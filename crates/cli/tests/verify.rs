@@ -113,19 +113,27 @@ fn bad_vector_files_get_a_sentence() {
         (
             "fresnel_dielectric.csv",
             "cos_in,n,m,=F\n1,1,1,1\n",
-            "fresnel_dielectric has no input \"m\", it has cos_in n",
+            "fresnel_dielectric has no input \"m\"; its inputs are cos_in n",
         ),
-        ("fresnel_dielectric.csv", "cos_in,n,=G\n1,1,1\n", "fresnel_dielectric has no output \"G\", it has F rs"),
-        ("fresnel_dielectric.csv", "cos_in,n,n,=F\n1,1,1,1\n", "the column \"n\" is there twice"),
-        ("fresnel_dielectric.csv", "cos_in,n\n1,1\n", "no column is an expected output"),
-        ("fresnel_dielectric.csv", "cos_in,n,=F\n1,nan,1\n", "line 2: n is \"nan\": inputs are finite"),
-        ("fresnel_dielectric.csv", "cos_in,n,=F\n1,1.5,0.04\n1,inf,1\n", "line 3: n is \"inf\": inputs are finite"),
-        ("fresnel_dielectric.csv", "cos_in,n,=F\n1,x,1\n", "line 2: n is \"x\", no number"),
+        (
+            "fresnel_dielectric.csv",
+            "cos_in,n,=G\n1,1,1\n",
+            "fresnel_dielectric has no output \"G\"; its outputs are F rs",
+        ),
+        ("fresnel_dielectric.csv", "cos_in,n,n,=F\n1,1,1,1\n", "the column \"n\" occurs twice"),
+        ("fresnel_dielectric.csv", "cos_in,n\n1,1\n", "the file has no expected output"),
+        ("fresnel_dielectric.csv", "cos_in,n,=F\n1,nan,1\n", "line 2: n is \"nan\", but inputs must be finite"),
+        (
+            "fresnel_dielectric.csv",
+            "cos_in,n,=F\n1,1.5,0.04\n1,inf,1\n",
+            "line 3: n is \"inf\", but inputs must be finite",
+        ),
+        ("fresnel_dielectric.csv", "cos_in,n,=F\n1,x,1\n", "line 2: n is \"x\", which is not a number"),
         ("fresnel_dielectric.csv", "cos_in,n,=F\n1,1.5\n", "line: 2"),
-        ("fresnel_dielectric.csv", "cos_in,n,=F\n", "it has no rows"),
-        ("fresnel_dielectric.csv", "cos_in,n,=F\n1,1.5,\n", "no cell of its expected outputs holds a number"),
+        ("fresnel_dielectric.csv", "cos_in,n,=F\n", "the file has no rows"),
+        ("fresnel_dielectric.csv", "cos_in,n,=F\n1,1.5,\n", "no cell of the expected outputs contains a number"),
         ("fresnel_dielectric.csv", "", "the input \"cos_in\" of fresnel_dielectric has no column"),
-        ("nothing.csv", "x,=y\n1,1\n", "no function is called \"nothing\"; there are two_sum"),
+        ("nothing.csv", "x,=y\n1,1\n", "no function is called \"nothing\"; the functions are two_sum"),
     ];
     for (name, content, said) in bad {
         vectors(name, content, &[]).failed(1, said);

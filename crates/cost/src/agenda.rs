@@ -1,4 +1,5 @@
-//! What a run draws, in which order: every rung that the scene calls for, changed alone, beside presets.
+//! List of the pictures of a run, in order: presets, and one-factor-at-a-time changes of every knob that the scene calls for. See
+//! docs/cost.md, "A run".
 
 use anyhow::{Context as _, Result};
 use serde::{Deserialize, Serialize};
@@ -8,58 +9,58 @@ use super::table::{Family, KnobState};
 use super::warm::Bench;
 use etalon::plan::{EffectState, KNOBS, Knob, Knobs, Model, Plan};
 
-/// A rung that one knob is set to.
+/// Change of one knob relative to a base.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Change {
-    /// The knob.
+    /// Name of the knob.
     pub knob: String,
-    /// Its rung in the base.
+    /// Rung in the base.
     pub from: String,
-    /// And in the picture.
+    /// Rung in the picture.
     pub to: String,
 }
 
-/// A picture to be drawn.
+/// A picture to draw.
 #[derive(Debug, Clone)]
 pub struct Task {
-    /// Unique in a run.
+    /// Name, unique in a run.
     pub name: String,
-    /// Where it comes from.
+    /// Family of the picture.
     pub family: Family,
-    /// Its rungs.
+    /// Knobs of the picture.
     pub knobs: Knobs,
-    /// What was changed of its base, where that is all.
+    /// The one knob that differs from the base; `None` where the picture has no base.
     pub change: Option<Change>,
 }
 
-/// Which of a scene's knobs are called for.
+/// Every knob, with whether the scene calls for it and the reason.
 pub struct States(Vec<(&'static Knob, bool, String)>);
 
-/// The pictures of a run but for those of the search.
+/// The pictures of a run, except those of the search.
 pub struct Agenda {
-    /// The preset that rungs are changed of.
+    /// The preset `local`, base of the changes in `of_local`.
     pub local: Knobs,
-    /// The reference's rungs with few samples and three colours, of which others are changed.
+    /// The reference's rungs with few samples and RGB, base of the changes in `of_exact`.
     pub plain: Knobs,
-    /// Presets, and more samples of them.
+    /// Presets, also with more samples.
     pub presets: Vec<Task>,
-    /// `local` with one rung changed.
+    /// `local` with one knob changed.
     pub of_local: Vec<Task>,
-    /// `exact` with one rung changed.
+    /// `exact` with one knob changed.
     pub of_exact: Vec<Task>,
     /// The reference's rungs with other numbers of samples.
     pub ladder: Vec<Task>,
-    /// Whether orders of quadrature are told.
+    /// Whether to measure the orders of the quadrature rules.
     pub orders: bool,
 }
 
-/// Whether some effect that a knob shapes is planned: a sentence for or against it.
+/// Whether a plan contains an effect of the knob, with a sentence for or against it.
 fn called_for(knob: &Knob, plans: &[Plan]) -> (bool, String) {
     if knob.rungs.len() < 2 {
-        return (false, format!("{} is its only rung", knob.rungs[0]));
+        return (false, format!("{} is the only rung", knob.rungs[0]));
     }
     if knob.effects.is_empty() {
-        return (true, "shapes every surface".to_owned());
+        return (true, "affects every surface".to_owned());
     }
     let mut against = String::new();
     for id in knob.effects {
@@ -82,7 +83,7 @@ fn called_for(knob: &Knob, plans: &[Plan]) -> (bool, String) {
 }
 
 impl States {
-    /// By the plans of the reference's rungs, of `local` and of `recursive`.
+    /// States from the plans of the reference's rungs, of `local` and of `recursive`.
     ///
     /// # Errors
     /// When the scene has nothing to draw.
@@ -103,12 +104,12 @@ impl States {
         self.called_for().any(|known| known.name == knob)
     }
 
-    /// Those that it calls for.
+    /// The knobs that the scene calls for.
     pub fn called_for(&self) -> impl Iterator<Item = &'static Knob> {
         self.0.iter().filter(|(_, called_for, _)| *called_for).map(|(knob, ..)| *knob)
     }
 
-    /// For the table.
+    /// The states as rows of the table.
     #[must_use]
     pub fn list(&self) -> Vec<KnobState> {
         let state = |(knob, called_for, reason): &(&'static Knob, bool, String)| KnobState {
@@ -121,7 +122,8 @@ impl States {
         self.0.iter().map(state).collect()
     }
 
-    /// Every rung of every knob that is called for and `wanted`, one changed at a time; none twice.
+    /// One task for each rung that `wanted` accepts of each knob that the scene calls for, with one knob changed. A rung whose plan equals
+    /// that of the base is skipped.
     fn changes(
         &self,
         bench: &Bench<'_>,
@@ -138,7 +140,7 @@ impl States {
                 if knob.name == "upsampling" && knobs.colour.bands() == 0 {
                     continue;
                 }
-                // What the plan does not tell apart is told apart by constants.
+                // These knobs change specialization constants only, so that plans do not differ.
                 let by_constants = ["fresnel", "brdf", "arithmetic", "upsampling", "lights", "absorption"];
                 let same = |other: Plan| other.draws_as(&plan) && other.kept().eq(plan.kept());
                 if !by_constants.contains(&knob.name) && bench.plan(&knobs).is_ok_and(same) {
@@ -157,7 +159,7 @@ fn changed(family: Family, knob: &Knob, from: &str, to: &str, knobs: Knobs) -> T
     Task { name: format!("{word} {}={to}", knob.name), family, knobs, change: Some(change) }
 }
 
-/// What `local` is changed to. Of samples and wavelengths a few rungs say enough.
+/// Rungs to which `local` is changed; only some rungs of `samples` and `colour`.
 fn of_local(knob: &Knob, rung: &str) -> bool {
     match knob.name {
         "samples" => matches!(rung, "1" | "16" | "64"),
@@ -167,7 +169,7 @@ fn of_local(knob: &Knob, rung: &str) -> bool {
     }
 }
 
-/// What the reference's rungs are changed to. Noise is what samples, places and aims buy, and the presets show it.
+/// Rungs to which the reference's rungs are changed. Samples, light samples and path guiding change noise, which the presets show.
 fn of_exact(knob: &Knob, rung: &str) -> bool {
     match knob.name {
         "samples" | "colour" => false,
@@ -178,8 +180,8 @@ fn of_exact(knob: &Knob, rung: &str) -> bool {
 }
 
 impl Agenda {
-    /// `reference`: its rungs, of whose colours none has more bands; `samples_ms`: GPU time of one of its samples, and of one with
-    /// three colours; `budget_ms`: of all, where it is limited.
+    /// Makes the list. `reference`: knobs of the reference. The two times are GPU milliseconds of one sample of the reference and of one
+    /// sample in RGB. `priced`: samples of the pictures in `of_exact`, if given. `budget_ms`: time budget of the run.
     ///
     /// # Errors
     /// When the scene has nothing to draw.
@@ -195,7 +197,7 @@ impl Agenda {
         let three_colours = set(reference, "colour", "rgb")?;
         let base = set(&three_colours, "samples", "4")?;
         let exact_changes = states.changes(bench, Family::Exact, &base, &of_exact)?;
-        // Two turns of both pictures, for a third of the budget.
+        // Two interleaved renders of picture and base, for a third of the budget.
         let most = budget_ms / 3.0 / (4.0 * exact_changes.len().max(1) as f64);
         let priced = priced.unwrap_or_else(|| super::reference::samples_within(plain_ms, most).min(16));
         let priced_rung = priced.to_string();
@@ -216,14 +218,14 @@ impl Agenda {
         })
     }
 
-    /// Samples of pictures that are priced from the reference's rungs.
+    /// Samples of the pictures whose base is `exact`.
     #[must_use]
     pub fn priced(&self) -> u32 {
         self.plain.samples.count()
     }
 }
 
-/// Bands of wavelengths beside three colours; what has more than the reference has nothing to be compared with.
+/// Spectral rendering compared with RGB, up to the number of bands of the reference.
 fn wavelengths(states: &States, reference: &Knobs, plain: &Knobs) -> Result<Vec<Task>> {
     let rungs: &[&str] = match (states.calls_for("colour"), reference.colour.bands()) {
         (false, _) => &[],
@@ -250,7 +252,7 @@ fn presets(most: u32) -> Result<Vec<Task>> {
     Ok(all)
 }
 
-/// Between what is priced and the reference: what is quicker than a twentieth of the budget.
+/// The reference's rungs with other numbers of samples; each takes less than a twentieth of the budget.
 fn ladder(reference: &Knobs, priced: u32, each_ms: f64, budget_ms: f64) -> Result<Vec<Task>> {
     let affordable = |n: &u32| *n != priced && *n < reference.samples.count().max(priced + 1) * 4;
     let quick = |n: &u32| f64::from(*n) * each_ms < 0.05 * budget_ms;

@@ -1,4 +1,5 @@
-//! Two tables of one scene laid side by side: what took how long on each device, with which error and which work.
+//! Comparison of two tables of one scene, for example from two devices: GPU time, error, work counts and compiler statistics of each
+//! picture.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,27 +11,27 @@ use etalon::gpu::Compiled;
 /// A picture that both tables have.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Beside {
-    /// Its name.
+    /// Name of the picture.
     pub picture: String,
-    /// GPU time of each.
+    /// GPU milliseconds in each table.
     pub gpu_ms: [f64; 2],
-    /// Error of each against its own reference.
+    /// Error in each table, against the reference of that table.
     pub error: [f64; 2],
-    /// Whether all counts of work are the same.
+    /// Whether all work counts are equal.
     pub same_work: bool,
-    /// Those that are not, as shares of the first.
+    /// Work counts that differ, as the ratio second over first.
     pub other_work: Vec<String>,
-    /// What each driver's compiler made of the programs, where one of both tells.
+    /// Compiler statistics of the programs, if a driver reports any.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub compiled: Vec<CompiledBeside>,
 }
 
-/// What two compilers made of a program.
+/// Compiler statistics of a program in both tables.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CompiledBeside {
-    /// Its name.
+    /// Name of the program.
     pub program: String,
-    /// Of each; empty where the driver does not tell.
+    /// Statistics in each table; empty where the driver reports none.
     pub stages: [Vec<Compiled>; 2],
 }
 
@@ -47,7 +48,7 @@ impl CompiledBeside {
 }
 
 impl Beside {
-    /// What both tables drew with the same rungs, in the order of the first.
+    /// The pictures that both tables have with the same rungs, in the order of the first table.
     #[must_use]
     pub fn of(a: &Table, b: &Table) -> Vec<Self> {
         let pair = |point: &Point| {

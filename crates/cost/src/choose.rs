@@ -1,12 +1,12 @@
-//! Rungs for a budget, out of a table that was measured before.
+//! Chooses a point of a measured table for a time or error budget.
 
 use super::table::{Point, REFERENCE, Table};
 
-/// What the middle of three times of one picture scatters by.
+/// Safety factor for times: the scatter of the median of three times of one picture.
 pub const SPARE: f64 = 1.05;
 
-/// Points that take no longer than so many milliseconds of GPU time, with some to spare: the least error first. The middle of their
-/// times counts: who chooses one draws it to see whether the machine is as quick as it was.
+/// Points whose median GPU time is at most `ms` divided by [`SPARE`], sorted by error. The caller times the chosen point again, because
+/// the machine may be slower than when the table was measured.
 #[must_use]
 pub fn within(table: &Table, ms: f64) -> Vec<&Point> {
     let fits = |point: &&Point| point.gpu_ms.median * SPARE <= ms;
@@ -15,26 +15,26 @@ pub fn within(table: &Table, ms: f64) -> Vec<&Point> {
     all
 }
 
-/// The quickest point whose error is no more than this, as far as the reference's noise tells: the upper end of its interval.
+/// The fastest point whose error is at most `error`, judged by the upper end of its confidence interval.
 #[must_use]
 pub fn at_most(table: &Table, error: f64) -> Option<&Point> {
     let fits = |point: &&Point| point.errors.error.high <= error;
     drawn(table).filter(fits).min_by(|a, b| a.gpu_ms.median.total_cmp(&b.gpu_ms.median))
 }
 
-/// The quickest of all.
+/// The fastest point.
 #[must_use]
 pub fn quickest(table: &Table) -> Option<&Point> {
     drawn(table).min_by(|a, b| a.gpu_ms.median.total_cmp(&b.gpu_ms.median))
 }
 
-/// The one with the least error.
+/// The point with the least error, judged by the upper end of its confidence interval.
 #[must_use]
 pub fn most_exact(table: &Table) -> Option<&Point> {
     drawn(table).min_by(|a, b| a.errors.error.high.total_cmp(&b.errors.error.high))
 }
 
-/// The reference is what others are held against, and may be of many pictures.
+/// All points except the reference, which may be the mean of many pictures.
 fn drawn(table: &Table) -> impl Iterator<Item = &Point> {
     table.points.iter().filter(|point| point.name != REFERENCE)
 }

@@ -1,4 +1,4 @@
-//! Rungs as words of a command line.
+//! Knobs as command-line options.
 
 use std::collections::BTreeMap;
 
@@ -6,22 +6,22 @@ use anyhow::{Context as _, Result};
 
 use etalon::plan::{Knobs, Model};
 
-/// `knobs` with one on another rung.
+/// `knobs` with one knob set to another rung.
 pub fn set(knobs: &Knobs, knob: &str, rung: &str) -> Result<Knobs> {
     knobs.with(knob, rung).with_context(|| format!("setting {knob}={rung}"))
 }
 
-/// Rungs by name.
+/// Rungs by knob.
 pub fn named(knobs: &Knobs) -> BTreeMap<String, String> {
     knobs.list().into_iter().map(|(knob, rung)| (knob.to_owned(), rung.to_owned())).collect()
 }
 
-/// `--model` and `--set` of some rungs: the preset that leaves least to be said.
+/// `--model` and `--set` options for these knobs, with the preset that needs the fewest `--set` options.
 #[must_use]
 pub fn arguments(knobs: &Knobs) -> String {
     let rest = |model: Model| -> Vec<String> {
         let preset = Knobs::of(model).list();
-        // Of glass that disperses the model of paths takes bands of wavelengths, unless told otherwise.
+        // --model global selects spectral rendering for dispersive glass unless `colour` is given.
         let said = |knob: &str| model == Model::Global && knob == "colour";
         let others = knobs.list().into_iter().zip(preset).filter(|(a, b)| a != b || said(a.0));
         others.map(|((knob, rung), _)| format!("--set {knob}={rung}")).collect()

@@ -1,4 +1,4 @@
-//! The price of one approximation: two rungs of one knob, drawn in turns, all others alike.
+//! Paired measurement of one approximation (`etalon cost --compare`): two rungs of one knob, timed interleaved, all other knobs equal.
 
 use anyhow::{Context as _, Result, bail, ensure};
 use serde::Serialize;
@@ -13,31 +13,31 @@ use etalon::image::metric::{AnyPicture, Metric, compare, map_rgba};
 use etalon::image::png::encode_png;
 use etalon::plan::{Knob, Knobs};
 
-/// What is said of two pictures: a time, and an error in squares of three sides.
+/// Number of statements about the pair (for the Bonferroni correction): a time, and an error for three block sizes.
 const STATEMENTS: usize = 4;
 
-/// Two rungs.
+/// Result of comparing two rungs.
 #[derive(Debug, Serialize)]
 pub struct Compared {
-    /// The knob.
+    /// Name of the knob.
     pub knob: &'static str,
-    /// The rungs: of the two the more exact one last, against which the other is in error.
+    /// The rungs; the last is the more exact one and the baseline for the error of the first.
     pub rungs: [&'static str; 2],
-    /// GPU time of each.
+    /// GPU milliseconds of each rung.
     pub gpu_ms: [Interval; 2],
-    /// What the first costs and buys beside the last.
+    /// Cost of the first rung relative to the last.
     pub price: Price,
-    /// Where an eye sees most of it.
+    /// Pixel with the largest FLIP error.
     pub worst_pixel: WorstPixel,
     /// PNG files of the rungs and of FLIP's error map between them.
     #[serde(skip)]
     pub pictures: [Vec<u8>; 3],
 }
 
-/// Draws both, `knobs` being those of all others.
+/// Draws and times both rungs of `wanted` (`KNOB=A,B`); `knobs` sets all other knobs.
 ///
 /// # Errors
-/// When there are no such two rungs, or one of them contradicts another knob or cannot be drawn.
+/// When there are no such rungs, or when one of them contradicts another knob or cannot be drawn.
 pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<Compared> {
     let parts = wanted.split_once('=').and_then(|(knob, rungs)| Some((knob, rungs.split_once(',')?)));
     let Some((name, (a, b))) = parts else {

@@ -1,5 +1,8 @@
-//! How far a picture is from a reference that has an error of its own, and what two pictures along the same paths would differ by
-//! without noise.
+//! Unbiased squared differences of noisy pictures: the error of a picture against a reference that is itself a Monte Carlo estimate, and
+//! the difference of two path-traced pictures without their noise.
+//!
+//! The estimates use pairs of half buffers with independent random numbers; docs/cost.md, "Error", derives them. Metrics: FLIP
+//! (Andersson et al. 2020), CIEDE2000, and the relative mean squared error.
 
 use anyhow::Result;
 use palette::color_difference::Ciede2000;
@@ -13,27 +16,27 @@ use etalon::image::metric::{AnyPicture, Comparison, Metric, compare};
 use etalon::image::png::Display;
 use etalon::image::tone::ViewTransform;
 
-/// Added to squares that are divided by, as everywhere.
+/// Added to the squared radiance of the reference in the denominator of the relative squared error.
 const FLOOR: f64 = 0.01;
 
-/// Squares of which a spread can be told.
+/// Least number of pixel blocks for which a variance is estimated.
 const FEWEST: usize = 16;
-/// Sides in pixels of the squares over which noisy pictures are compared.
+/// Side lengths in pixels of the blocks over which noisy pictures are averaged and compared.
 const SIDES: [u32; 3] = [1, 4, 16];
 
-/// What errors are errors against.
+/// The reference that errors are measured against.
 pub struct Truth {
-    /// Radiance.
+    /// Radiance of the reference.
     pub film: Picture,
-    /// The mean of one half of its samples.
+    /// Half buffer: mean of one half of the samples.
     pub half: Picture,
-    /// What is shown of them.
+    /// Estimates of the display values without noise.
     pub shown: ShownReference,
-    /// As it is shown.
+    /// Display values of the reference.
     pub display: Display,
 }
 
-/// Squared differences of a pixel's colours over the squares of the reference's.
+/// Product of two differences of a pixel, over the squared radiance of the reference; mean over the channels.
 fn relative(x: [f32; 4], y: [f32; 4], reference: [f32; 4]) -> f64 {
     let term = |c: usize| {
         let (x, y, r) = (f64::from(x[c]), f64::from(y[c]), f64::from(reference[c]));
@@ -47,10 +50,10 @@ fn minus(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
 }
 
 impl Truth {
-    /// Errors of a picture, and FLIP's map of them.
+    /// Errors of a picture, and the FLIP error map.
     ///
-    /// With T what the reference R = T + e converges to, (X − R)² is (X − T)² + e² in the mean, and its spread that of 2(X − T)e;
-    /// e² is what the reference's halves tell.
+    /// The reference is R = T + e, where T is its limit and e its noise. The expected value of (X − R)² is (X − T)² + e², and its variance
+    /// comes from 2(X − T)e. The half buffers of the reference estimate e².
     ///
     /// # Errors
     /// When the pictures cannot be compared.
@@ -87,7 +90,7 @@ impl Truth {
     }
 }
 
-/// Mean CIEDE2000 of two displayed pictures.
+/// Mean CIEDE2000 colour difference of two displayed pictures.
 fn delta_e(a: &Display, b: &Display) -> f64 {
     let lab = |pixel: &[u8; 4]| -> Lab { Srgb::new(pixel[0], pixel[1], pixel[2]).into_format::<f32>().into_color() };
     let one = |(a, b): (&[u8; 4], &[u8; 4])| if a == b { 0.0 } else { f64::from(lab(a).difference(lab(b))) };
@@ -102,19 +105,21 @@ fn delta_e(a: &Display, b: &Display) -> f64 {
     sum / a.rgba.len().max(1) as f64
 }
 
-/// Displayed values 0 to 1 of a half of a picture's samples, channel by channel.
+/// Display values 0 to 1 of a half buffer, RGB per pixel.
 pub type Shown = Vec<[f32; 3]>;
 
-/// What a display shows of radiance.
+/// Display values of radiance.
 #[must_use]
 pub fn shown(picture: &Picture, view: &ViewTransform) -> Shown {
     picture.rgba.par_iter().map(|pixel| view.shown(*pixel).map(|value| value as f32)).collect()
 }
 
-/// The mean squared difference of displayed values of what two pictures converge to, in squares of `side` by `side` pixels. Their
-/// halves A and B share no random numbers, so that the product of both differences is the square without noise in the mean; the
-/// spread over the squares says how well that is known. Displayed values are bounded: single pixels that are far too bright count as
-/// much as others. Larger squares have less noise, and see no difference that is finer than they are.
+/// Unbiased estimate of the mean squared difference between the limits of two pictures, in display values averaged over blocks of
+/// `side` × `side` pixels.
+///
+/// The half buffers A and B of each picture share no random numbers, so the expected product of the two differences is the square
+/// without noise. The variance over the blocks gives the standard error. Display values are bounded, so that fireflies count no more
+/// than other pixels. Larger blocks have less noise, but hide finer differences.
 #[must_use]
 pub fn unbiased_squared_difference(a: &[Shown; 2], b: &[Shown; 2], width: usize, side: usize) -> Estimate {
     let across = width / side;
@@ -135,57 +140,57 @@ pub fn unbiased_squared_difference(a: &[Shown; 2], b: &[Shown; 2], width: usize,
     let n = products.len().max(1) as f64;
     let middle = products.iter().sum::<f64>() / n;
     if products.len() < FEWEST {
-        // Of displayed values no mean square is above 1: nothing is known.
+        // Too few blocks: the deviation is the largest possible mean square of display values, 1.
         return Estimate { mean: middle, deviation: 1.0, bias: 0.0 };
     }
     let spread = products.iter().map(|p| (p - middle) * (p - middle)).sum::<f64>() / (n - 1.0);
     Estimate { mean: middle, deviation: (spread / n).sqrt(), bias: 0.0 }
 }
 
-/// The same in squares of several sides, the finest first.
+/// [`unbiased_squared_difference`] for several block sizes, the smallest first.
 #[must_use]
 pub fn in_blocks(a: &[Shown; 2], b: &[Shown; 2], width: usize) -> Vec<(u32, Estimate)> {
     SIDES.map(|side| (side, unbiased_squared_difference(a, b, width, side as usize))).into()
 }
 
-/// Which of them tells most: the finest that is told from nothing, or the finest.
+/// The smallest block size with a significant difference, or else the smallest block size.
 #[must_use]
 pub fn significant(squares: &[(u32, Estimate)], standard_errors: f64) -> Option<(u32, Estimate)> {
     squares.iter().find(|(_, found)| found.is_above(standard_errors)).or(squares.first()).copied()
 }
 
-/// What a reference would show without its noise: two estimates that share no random numbers, from its even and its odd samples.
+/// Display values of a reference without its noise: two estimates with independent random numbers, from its even and odd samples.
 ///
-/// A tone curve is not straight: what is shown of n samples is off in the mean, of twice as many samples by a factor r less. Where noise
-/// has a variance and the curve is smooth, r is 1/2; where few paths bring most light, it is nearer to 1. It is told by what is shown of
-/// quarters, halves and all of the samples, over the whole picture, and the rest of the geometric series is added (Aitken; with 1/2 it is
-/// the jackknife of Quenouille). `study:pool` shows 0.345, 0.396, 0.437 and 0.463 of 2, 4, 8 and 16 samples: the last factor, 0.62, is
-/// nearer to what follows than the one before, 0.80.
+/// The tone curve is not linear, so the display values of n samples are biased. The bias of twice as many samples is smaller by a factor
+/// r. For a smooth curve and noise with finite variance r is 1/2; where few paths carry most of the light, r is closer to 1. The mean
+/// brightness of quarters, halves and all of the samples gives r, and the rest of the geometric series is added (Aitken extrapolation;
+/// for r = 1/2 it is the jackknife of Quenouille). The mean display values of `study:pool` are 0.345, 0.396, 0.437 and 0.463 for 2, 4, 8
+/// and 16 samples: the last factor, 0.62, predicts the following values better than the one before, 0.80.
 pub struct ShownReference {
-    /// The two.
+    /// The two estimates.
     estimates: [Shown; 2],
-    /// What the rest of the series may be off by, as a root mean square over the picture.
+    /// Bound of the remaining bias, as a root mean square over the picture.
     off: f64,
 }
 
-/// Factors that are believed: beyond, what is left is more than all that is known.
+/// Range to which r is clamped; for larger r the extrapolated rest would exceed the known values.
 const BELIEVED: [f64; 2] = [0.3, 0.85];
-/// Change of the mean displayed value below which the factor is that of rounding.
+/// Change of the mean display value below which r would be rounding noise.
 const NO_CURVE: f64 = 1e-5;
-/// Side in pixels of the squares in which changes are told without noise, at most, and how many there are at least.
+/// Largest side in pixels of the blocks in which the change is estimated, and their least number.
 const SQUARE: usize = 16;
 const SQUARES: usize = 32;
-/// What is shown was off by up to so many times the rest of the series: 0.9 (`study:cornell`), 0.5 (`lamps`), 0.6 (`nested`) and 2.2
-/// (`pool`, whose water few paths light) times, with 16 samples against 1024 and 4096.
+/// Factor of the bias bound. The measured bias was 0.9 (`study:cornell`), 0.5 (`lamps`), 0.6 (`nested`) and 2.2 (`pool`, whose water few
+/// paths light) times the rest of the series, for 16 samples against 1024 and 4096.
 const CAUTION: f64 = 3.0;
 
-/// Sums over pixels and colours that an error and its uncertainty are made of.
+/// Sums over pixels and channels for an error and its standard error.
 #[derive(Default, Clone, Copy)]
 struct SquaredSums {
     value: f64,
-    /// The variance that the reference's noise gives it.
+    /// Variance of `value` due to the noise of the reference.
     variance: f64,
-    /// Squares of what it goes with.
+    /// Squared factors by which the bias of the reference enters `value`.
     weight: f64,
 }
 
@@ -198,8 +203,8 @@ impl SquaredSums {
         }
     }
 
-    /// Means over so many pixels: the value, its standard error, and the weight. A pixel's colours have their noise in common: as if one
-    /// of them told that of all three.
+    /// Means over `pixels` pixels: value, standard error and weight. The noise of the three channels of a pixel is treated as fully
+    /// correlated.
     fn means(self, pixels: usize) -> [f64; 3] {
         let n = 3.0 * pixels.max(1) as f64;
         [self.value / n, (3.0 * self.variance.max(0.0)).sqrt() / n, self.weight / n]
@@ -207,8 +212,8 @@ impl SquaredSums {
 }
 
 impl ShownReference {
-    /// Of the means of parts of a reference's samples, in order, those of the even and of the odd samples in turns: two of each, or
-    /// another power of two.
+    /// Estimates from the means of consecutive parts of the samples, alternately of even and odd samples; two parts of each, or another
+    /// power of two.
     #[must_use]
     pub fn of(parts: &[Picture], view: &ViewTransform) -> Self {
         let pieces = |parts: &[&Picture], side: usize| -> Shown {
@@ -219,7 +224,7 @@ impl ShownReference {
             (0..pieces[0].len()).into_par_iter().map(mean).collect()
         };
         let all: Vec<&Picture> = parts.iter().collect();
-        // Per half: what is shown of its own halves, in the mean, and of all of it.
+        // For each half buffer: mean display values of its own two halves, and display values of all of it.
         let levels = [0, 1].map(|half| {
             let own: Vec<&Picture> = parts.iter().skip(half).step_by(2).collect();
             [pieces(&own, own.len() / 2), pieces(&own, own.len())]
@@ -236,7 +241,7 @@ impl ShownReference {
             all.iter().zip(before).map(|(a, b)| std::array::from_fn(|c| a[c] + rest * (a[c] - b[c]))).collect()
         };
         let estimates = [estimate(&levels[0]), estimate(&levels[1])];
-        // How far a half is from its own halves, of which the other half tells the square without noise; what the film is from here on.
+        // Change from the halves of a half buffer to the half buffer, squared without noise by means of the other half buffer.
         let side = ((parts[0].rgba.len() / SQUARES) as f64).sqrt() as usize;
         let change = unbiased_squared_difference(
             &[levels[0][1].clone(), levels[1][1].clone()],
@@ -248,16 +253,16 @@ impl ShownReference {
         Self { estimates, off: CAUTION * change * factor * factor / (1.0 - factor) }
     }
 
-    /// Of a picture that is taken for the truth.
+    /// A picture that is taken as exact.
     #[must_use]
     pub fn exact(display: &Display) -> Self {
         let values: Shown = display.rgba.iter().map(values).collect();
         Self { estimates: [values.clone(), values], off: 0.0 }
     }
 
-    /// Means of what `of` makes of a pixel's colour: of both estimates, and the squared variance of the noise of one. Neighbours have
-    /// about the same variance and no random numbers in common: the product of both pixels' (j₁ − j₂)² is 4v² in the mean whatever the
-    /// noise is distributed like, which that of one pixel's is not.
+    /// Means over the picture of `of(pixel, channel, [j₁, j₂], v²)`, where j₁ and j₂ are the estimates and v is the variance of their noise.
+    /// Neighbouring pixels have about the same v and independent random numbers. So the expected product of their (j₁ − j₂)² is 4v² for any
+    /// noise distribution; the square within one pixel would depend on the distribution.
     fn means(&self, of: impl Fn(usize, usize, [f64; 2], f64) -> SquaredSums + Sync) -> [f64; 3] {
         let [j1, j2] = &self.estimates;
         let square = |i: usize, c: usize| (f64::from(j1[i][c]) - f64::from(j2[i][c])).powi(2);
@@ -267,7 +272,7 @@ impl ShownReference {
                 .map(|c| of(i, c, [j1[i][c], j2[i][c]].map(f64::from), 0.25 * square(i, c) * square(neighbour(i), c)));
             all.fold(SquaredSums::default(), SquaredSums::add)
         };
-        // In pieces of one size, so that sums are the same on every machine.
+        // Blocks of fixed size make the sums equal on every machine.
         let pixels: Vec<usize> = (0..j1.len()).collect();
         let pieces: Vec<SquaredSums> = pixels
             .par_chunks(4096)
@@ -276,11 +281,11 @@ impl ShownReference {
         pieces.into_iter().fold(SquaredSums::default(), SquaredSums::add).means(j1.len())
     }
 
-    /// The mean squared error of displayed values 0 to 1 against what the reference converges to.
+    /// Unbiased mean squared error of display values 0 to 1 against the limit of the reference.
     ///
-    /// With estimates j = t + e of the truth t, (x − j₁)(x − j₂) is (x − t)² in the mean: no noise adds a square to it. With e of
-    /// variance v its own is 2(x − t)²v + v², and the mean of (x − j₁)(x − j₂)(j₁ − j₂)² is 2(x − t)²v − 2v². Where t is off by β, the
-    /// root of the mean square is by no more (the triangle's inequality).
+    /// With estimates j = t + e of the limit t, the expected value of (x − j₁)(x − j₂) is (x − t)²: independent noise adds no square. If e
+    /// has variance v, the product has variance 2(x − t)²v + v², and the expected value of (x − j₁)(x − j₂)(j₁ − j₂)² is 2(x − t)²v − 2v².
+    /// If t has a bias of β (root mean square), the root of the mean squared error is off by at most β (triangle inequality).
     #[must_use]
     pub fn error(&self, x: &Display) -> Estimate {
         let [mean, deviation, _] = self.means(|i, c, [j1, j2], squared| {
@@ -291,9 +296,9 @@ impl ShownReference {
         Estimate { mean, deviation, bias: 2.0 * mean.max(0.0).sqrt() * self.off + self.off * self.off }
     }
 
-    /// How much more the mean squared error of displayed values is of `x` than of `b`: x² − b² − (x − b)(j₁ + j₂), linear in the
-    /// truth, so that what noise both pictures' errors have in common is gone. Where the truth is off by β, it is by no more than twice
-    /// the product of β and the root mean square of x − b (Cauchy and Schwarz).
+    /// Unbiased difference of the mean squared errors of `x` and `b`: x² − b² − (x − b)(j₁ + j₂). It is linear in the reference, so that the
+    /// noise common to both errors cancels. A bias β of the reference changes it by at most 2β times the root mean square of x − b
+    /// (Cauchy–Schwarz inequality).
     #[must_use]
     pub fn more_error(&self, x: &Display, b: &Display) -> Estimate {
         let [mean, deviation, weight] = self.means(|i, c, [j1, j2], _| {
@@ -304,8 +309,7 @@ impl ShownReference {
         Estimate { mean, deviation, bias: 2.0 * weight.sqrt() * self.off }
     }
 
-    /// The root mean squared error of displayed values that can just be told from none at so many standard errors: what the reference
-    /// resolves.
+    /// Resolution of the reference: the least root mean squared error of display values that is significant at so many standard errors.
     #[must_use]
     pub fn resolution(&self, standard_errors: f64) -> f64 {
         let [_, deviation, _] =
@@ -315,7 +319,7 @@ impl ShownReference {
     }
 }
 
-/// The mean of some pictures of one size.
+/// Mean of pictures of one size.
 pub(super) fn mean_of(pictures: &[&Picture]) -> Picture {
     let [width, height] = [pictures[0].width, pictures[0].height];
     let mean =
@@ -334,7 +338,7 @@ mod tests {
 
     const PLAIN: ViewTransform = ViewTransform { curve: ToneMap::Linear, exposure: 0.0, background: None };
 
-    /// Uniform in −1 … 1.
+    /// Uniform random number in −1 … 1.
     fn noise(index: usize) -> f32 {
         let mut x = (index as u64).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -369,7 +373,7 @@ mod tests {
         let (a, b) = (picture(|i| 0.5 + 0.02 * noise(i)), picture(|i| 0.5 + 0.02 * noise(i + 100_000)));
         let film = picture(|i| 0.5 * (a.rgba[i][0] + b.rgba[i][0]));
         let truth = Truth { shown: ShownReference::exact(&shown(&film)), display: shown(&film), film, half: a };
-        // Off by 0.05 everywhere: 0.0025 / (0.25 + 0.01).
+        // An error of 0.05 everywhere: 0.0025 / (0.25 + 0.01).
         let off = picture(|_| 0.55);
         let (errors, _) = truth.errors(&off, &shown(&off)).unwrap();
         let expected = 0.0025 / 0.26;
@@ -384,7 +388,7 @@ mod tests {
         Display { width: 64, height: 64, rgba: vec![[byte, byte, byte, 255]; 64 * 64] }
     }
 
-    /// Two estimates of 0.55 with noise, without a curve.
+    /// Two estimates of 0.55 with noise, without a tone curve.
     fn noisy(seed: usize, of: f32) -> ShownReference {
         let half =
             |seed: usize| -> Shown { (0..64 * 64).map(|i| [0.55 + of * noise(i + seed * 100_000); 3]).collect() };
@@ -403,17 +407,17 @@ mod tests {
         let expected = square(128.0) - square(140.0);
         let found = noisy(1, 0.2).more_error(&flat(128), &flat(140));
         assert!(holds(found, expected) && found.is_above(4.0), "{found:?} {expected}");
-        // Two that are as far off: nothing is sure, whatever noise says.
+        // Both pictures have the same error, so the difference must not be significant.
         let found = noisy(2, 0.2).more_error(&flat(137), &flat(143));
         assert!(holds(found, 0.0), "{found:?}");
-        // What is told from none is more than the reference resolves.
+        // Errors above the resolution are significant.
         let (noise, right) = (noisy(3, 0.2), flat(140));
         assert!(!noise.error(&right).is_above(3.0), "{:?}", noise.error(&right));
         let resolution = noise.resolution(3.0);
         let off = ((0.55 + 1.5 * resolution) * 255.0).round() as u8;
         assert!(noise.error(&flat(off)).is_above(3.0), "{resolution} {:?}", noise.error(&flat(off)));
         assert!((resolution / noisy(3, 0.1).resolution(3.0) - 2.0).abs() < 1e-3);
-        // The intervals cover the truth in about 95 of 100 draws.
+        // The confidence intervals cover the true value in about 95 of 100 draws.
         let covered = |of: &dyn Fn(ShownReference) -> Estimate, truth: f64| {
             (10..110).filter(|&seed| holds(of(noisy(seed, 0.3)), truth)).count()
         };
@@ -423,14 +427,14 @@ mod tests {
         assert!(more >= 90 && error >= 90 && none >= 90, "{more}, {error} and {none} of 100");
     }
 
-    /// sRGB's curve bends: it shows noise as darkness, that of fewer samples as more of it.
+    /// The sRGB curve is concave: noise darkens display values, and fewer samples darken them more.
     #[test]
     fn what_a_curve_makes_of_noise_is_taken_away() {
         let truth = srgb_encode(0.3);
         let byte = (truth * 255.0).round() as u8;
         let [x, b] = [byte + 6, byte - 6].map(|byte| f64::from(byte) / 255.0);
         let expected = (x - truth).powi(2) - (b - truth).powi(2);
-        // Noise of a variance; and light that one of fifty parts finds, which is clipped there.
+        // Noise with finite variance; and light that one of fifty parts finds, which is clipped by the display.
         let even = |i: usize| 0.3 + 0.25 * noise(i);
         let rare = |i: usize| if noise(i) > 0.96 { 0.05 + 0.25 * 50.0 } else { 0.05 };
         for (name, value) in [("even", &even as &dyn Fn(usize) -> f32), ("rare", &rare)] {
@@ -440,7 +444,7 @@ mod tests {
             assert!(holds(found, expected), "{name}: {found:?} {expected}");
             let error = reference.error(&flat(byte));
             assert!(error.interval().low < 1e-5 && error.interval().high > 0.0, "{name}: {error:?}");
-            // Taken as it is shown, the film is off by more.
+            // The display values of the film itself have a larger bias.
             let film = mean_of(&parts.iter().collect::<Vec<_>>());
             let bent = super::shown(&film, &PLAIN).iter().map(|v| f64::from(v[0]) - truth).sum::<f64>() / 4096.0;
             let off = 2.0 * (x - b) * bent.abs();
@@ -459,7 +463,7 @@ mod tests {
         let other = [half(3, 0.05), half(4, 0.05)];
         let found = unbiased_squared_difference(&a, &other, 64, 1);
         assert!(holds(found, 0.0025) && found.is_above(2.0), "{found:?}");
-        // Too little for pixels, but not for squares.
+        // Too small for single pixels, but significant in blocks.
         let little = [half(3, 0.02), half(4, 0.02)];
         let found_in = |b: &[Shown; 2]| significant(&in_blocks(&a, b, 64), 3.0).expect("squares");
         let (side, found) = found_in(&little);

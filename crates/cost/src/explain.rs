@@ -1,4 +1,5 @@
-//! The price of effects that a plan leaves out: each is planned nevertheless, alone, and drawn in turns with the plan as it is.
+//! Measures the cost of effects that a plan leaves out (`--plan explain-cost`). Each effect is enabled alone, and the pictures with and
+//! without it are timed interleaved (paired measurement). See docs/plan.md.
 
 use std::time::Instant;
 
@@ -13,48 +14,48 @@ use etalon::prepare::Original;
 use etalon::scene::Camera;
 use etalon::scene::environment::Environment;
 
-/// Pictures drawn of each plan, in turns.
+/// Number of timed pictures of each plan.
 const ROUNDS: usize = 7;
 
-/// What an effect would have cost.
+/// Cost of an effect relative to the plan without it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Price {
-    /// Its name.
+    /// Name of the effect.
     pub effect: &'static str,
-    /// `not needed`: the picture would be the same. `switched off`: it would be that of another rung.
+    /// `not needed`: the picture with the effect is the same. `switched off`: it is that of another rung.
     pub state: &'static str,
-    /// How it was planned: `asked for`, or the rungs that allow it.
+    /// How the effect was enabled: `forced on`, or the rungs that allow it.
     pub by: String,
-    /// Why it could not be drawn, if so: no figure says anything then.
+    /// Error if the plan with the effect cannot be drawn; all figures are then 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fails: Option<String>,
-    /// Milliseconds more for the first picture, with everything made anew: caches of the driver may be warm.
+    /// Additional milliseconds for the first picture, with all objects created anew; the driver's cache may be warm.
     pub start_ms: f64,
-    /// Milliseconds more for a sample of each pixel: the middle of the differences between pictures drawn in turns …
+    /// Additional milliseconds for one sample of every pixel: median of the paired differences.
     pub frame_ms: f64,
-    /// … and the smallest and the largest of them.
+    /// Smallest and largest paired difference in milliseconds.
     pub frame_range_ms: [f64; 2],
-    /// Share of the plan's own time for it.
+    /// `frame_ms` as a fraction of the time without the effect.
     pub frame_share: f64,
-    /// Pipelines more.
+    /// Additional pipelines.
     pub pipelines: i64,
-    /// SPIR-V more that the driver is given.
+    /// Additional bytes of SPIR-V for the driver.
     pub spirv_bytes: i64,
-    /// Buffers and images more, in bytes.
+    /// Additional bytes of buffers and images.
     pub bytes: i64,
 }
 
-/// What is drawn, and from where.
+/// Scene, camera and settings of the measurement.
 pub struct Subject<'a> {
-    /// Where it is drawn: on a device of its own for each plan.
+    /// Choice of the device; each plan opens its own Vulkan device.
     pub device: &'a DeviceChoice,
     /// The scene.
     pub original: &'a Original,
-    /// Light from all around.
+    /// Environment map.
     pub environment: Option<&'a Environment>,
-    /// How; one sample of each pixel is measured.
+    /// Settings of the renderer; one sample per pixel is measured.
     pub settings: Settings,
-    /// From where.
+    /// The camera.
     pub camera: &'a Camera,
 }
 
@@ -76,7 +77,7 @@ impl Price {
     }
 }
 
-/// A plan that has been drawn once.
+/// Renderer of a plan that has been drawn once, with its start-up costs.
 struct DrawnPlan {
     renderer: Renderer,
     start_ms: f64,
@@ -86,10 +87,10 @@ struct DrawnPlan {
 }
 
 impl Subject<'_> {
-    /// Prices of all effects that this plan leaves out, in its order. `progress` hears of each.
+    /// Measures all effects of `effects` that the plan leaves out, in order. `progress` is called with the name of each.
     ///
     /// # Errors
-    /// When something cannot be drawn.
+    /// When the plan without them cannot be drawn.
     pub fn prices(&self, effects: &[Effect], progress: &mut dyn FnMut(&str)) -> Result<Vec<Price>> {
         let mut plain = self.plan(ForcedEffects::None, &[])?;
         let mut prices = Vec::new();
@@ -100,7 +101,7 @@ impl Subject<'_> {
                 _ => Vec::new(),
             };
             let (forced, by) = match rungs.is_empty() {
-                true => (ForcedEffects::One(effect.id), "asked for".to_owned()),
+                true => (ForcedEffects::One(effect.id), "forced on".to_owned()),
                 false => (ForcedEffects::None, rungs.join(", ")),
             };
             let price = match self.plan(forced, &rungs).and_then(|mut with| self.price(effect, &mut plain, &mut with)) {
@@ -112,7 +113,7 @@ impl Subject<'_> {
         Ok(prices)
     }
 
-    /// Draws both in turns. `None`: nothing is planned otherwise, since the effect needs others that are left out too.
+    /// Times both plans interleaved. `None` where both plans draw the same, because the effect needs other effects that are left out.
     fn price(&self, effect: &Effect, plain: &mut DrawnPlan, with: &mut DrawnPlan) -> Result<Option<Price>> {
         if plain.renderer.plan().draws_as(with.renderer.plan()) {
             return Ok(None);
@@ -140,7 +141,7 @@ impl Subject<'_> {
         }))
     }
 
-    /// Makes everything for a plan, on a device that has made nothing yet, and draws once.
+    /// Creates all objects for a plan on a new device, and draws once.
     fn plan(&self, forced: ForcedEffects, rungs: &[String]) -> Result<DrawnPlan> {
         let device = Device::open(self.device, false)?;
         let mut settings = Settings { forced, ..self.settings.clone() };
@@ -170,7 +171,7 @@ impl Subject<'_> {
     }
 }
 
-/// The rungs that allow an effect which a knob has dropped: those of the recursive model, and those that paths need.
+/// The rungs that enable an effect that a knob has switched off: those of the recursive model, or those that path tracing needs.
 fn allowing(effect: EffectId, dropped_by: Choice) -> Vec<Choice> {
     let paths = [Shadows::Ray.choice(), Reflection::Ray.choice(), Refraction::Ray.choice(), Indirect::Path.choice()];
     let by_lights = [Lights::Area1.choice(), Guiding::Photons.choice()];

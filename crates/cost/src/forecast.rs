@@ -1,4 +1,4 @@
-//! How long the rest of a run takes: what each picture is expected to, scaled by how right that was so far.
+//! Predicts the remaining time of a run: the sum of estimated picture times, corrected by the ratio of measured to estimated time so far.
 
 use std::collections::VecDeque;
 
@@ -6,23 +6,23 @@ use super::warm::turns;
 use etalon::plan::Knobs;
 use etalon::plan::rungs::{Indirect, Reflection, Refraction, Shadows};
 
-/// Seconds for what is done once for each picture, at least: uploading, compiling, comparing, writing.
+/// Least seconds of fixed work per picture: uploading, compiling, comparing, writing.
 const ONCE_S: f64 = 0.4;
 
-/// What is still to be drawn.
+/// Estimated times of the pictures that are still to be drawn.
 #[derive(Debug, Default)]
 pub struct Forecast {
-    /// Milliseconds of a sample along paths, in three colours or in one band.
+    /// Milliseconds of a path-traced sample, in RGB or in one band.
     pub path_ms: f64,
-    /// Of a sample of the preset `local`.
+    /// Milliseconds of a sample of the preset `local`.
     pub raster_ms: f64,
-    /// Seconds that uploading and compiling the preset `local` took.
+    /// Seconds of uploading and compiling the preset `local`.
     pub start_s: f64,
-    /// Pictures are timed again until they took so long.
+    /// Total milliseconds after which a picture is not timed again.
     pub enough_ms: f64,
-    /// Seconds of each picture to come, in order.
+    /// Estimated seconds of each coming picture, in order.
     coming: VecDeque<f64>,
-    /// Seconds that were expected of those that were drawn, and that they took.
+    /// Estimated and measured seconds of the pictures drawn so far.
     was: [f64; 2],
 }
 
@@ -40,45 +40,45 @@ impl Forecast {
         sample * f64::from(knobs.samples.count()) * f64::from(knobs.colour.bands().max(1))
     }
 
-    /// A picture to come, drawn in turns with another.
+    /// Adds a coming picture, which is timed interleaved with its base.
     pub fn expect(&mut self, knobs: &Knobs, base: &Knobs) {
         let ms = self.picture_ms(knobs);
         let warm = ms * 2.0_f64.min(f64::from(knobs.samples.count())) / f64::from(knobs.samples.count());
         let all = warm + turns(ms, self.enough_ms) as f64 * (ms + self.picture_ms(base));
-        // Rungs are programs of their own, and those that send rays are longer ones.
+        // Each rung compiles its own programs; those that trace rays are longer.
         let programs = if by_rays(knobs) { 2.0 } else { 1.0 };
         self.coming.push_back(ONCE_S.max(programs * self.start_s) + all / 1e3);
     }
 
-    /// The next one begins: its expected seconds. It, and what comes after it, are `left`.
+    /// Removes the next picture and returns its estimated seconds.
     pub fn begin(&mut self) -> f64 {
         self.coming.pop_front().unwrap_or(ONCE_S)
     }
 
-    /// The expected seconds of the next one.
+    /// Estimated seconds of the next picture.
     #[must_use]
     pub fn next(&self) -> f64 {
         self.coming.front().copied().unwrap_or(ONCE_S)
     }
 
-    /// So many are not drawn.
+    /// Removes the next `count` pictures, which are not drawn.
     pub fn skip(&mut self, count: usize) {
         self.coming.drain(..count.min(self.coming.len()));
     }
 
-    /// One is there.
+    /// Records the estimated and the measured seconds of a drawn picture.
     pub fn took(&mut self, expected: f64, seconds: f64) {
         self.was = [self.was[0] + expected, self.was[1] + seconds];
     }
 
-    /// Seconds left.
+    /// Estimated seconds of all coming pictures, corrected.
     #[must_use]
     pub fn left(&self) -> f64 {
         self.as_it_went(self.coming.iter().sum())
     }
 
-    /// What was expected, by what it turned out to be so far. One picture says little: the first ten seconds are taken as they were
-    /// expected.
+    /// Corrects an estimate by the ratio of measured to estimated time so far. Ten seconds of correct estimates are added as a prior, because
+    /// one picture is little evidence.
     #[must_use]
     pub fn as_it_went(&self, seconds: f64) -> f64 {
         let [expected, took] = self.was;
@@ -97,7 +97,7 @@ mod tests {
         let (local, exact) = (Knobs::of(Model::Local), Knobs::exact());
         (0..10).for_each(|_| forecast.expect(&local, &local));
         forecast.expect(&exact, &exact);
-        // 64 samples in 32 bands: one picture that is drawn once, and its base.
+        // 64 samples in 32 bands: the picture is drawn once, and its base once.
         let exact_s = 100.0 * 64.0 * 32.0 * (2.0 + 2.0 / 64.0) / 1e3 + ONCE_S;
         let local_s = (10.0 * 2.0 + 7.0 * 80.0) / 1e3 + ONCE_S;
         assert!((forecast.left() - 10.0 * local_s - exact_s).abs() < 1e-9, "{}", forecast.left());

@@ -1,6 +1,7 @@
-//! What pictures say once the reference is as good as it gets: errors, prices, and which of them nothing beats.
+//! Evaluates the drawn pictures against the final reference: errors, costs of rungs, the Pareto frontier of error and GPU time, and
+//! recommended settings. See docs/cost.md, "Frontier and recommended settings".
 //!
-//! Drawing and judging are apart, so that pictures which were drawn before a better reference was there are judged by it.
+//! Evaluation is separate from drawing, so that pictures drawn early are compared with the final, better reference.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -21,90 +22,90 @@ use etalon::image::metric::{AnyPicture, Comparison, map_rgba};
 use etalon::image::png::{Display, read_display};
 use etalon::image::{Picture, exr, file, png};
 
-/// Half of the side of what is shown of the worst pixel.
+/// Half side in pixels of the detail around the worst pixel.
 const AROUND: i64 = 20;
-/// A step along the frontier that is recommended whatever the wish: so much less squared error for so much more time.
+/// A step along the frontier is always worth taking if it reduces the squared error to this factor for at most this factor of time.
 const CHEAP: [f64; 2] = [0.6, 2.0];
-/// How far below the line a corner is, of the whole way in logarithms: what is less is no corner, and the quick setting stands.
+/// Least distance of a corner (knee) below the line, as a fraction of the line in logarithms; without a corner `quick` is also `balanced`.
 const CORNER: f64 = 0.05;
-/// The reference is recommended where nothing else comes so near to what it resolves.
+/// The reference itself is recommended as `exact` where no other point has an error below this multiple of its resolution.
 const FAR: f64 = 2.0;
-/// Two times of which the longer is no more than so many times the shorter are the same.
+/// Two times count as equal if their ratio is at most this.
 const SAME_TIME: f64 = 1.02;
 
-/// A picture as it was drawn and timed.
+/// A picture as drawn and timed, stored as `points/NAME.json`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Record {
-    /// Unique in a run.
+    /// Name, unique in a run.
     pub name: String,
-    /// Where it comes from.
+    /// Family of the picture.
     pub family: Family,
-    /// Rungs.
+    /// Rungs by knob.
     pub knobs: BTreeMap<String, String>,
-    /// GPU milliseconds of each picture …
+    /// GPU milliseconds of each timed render.
     pub ms: Vec<f64>,
-    /// … and of the base's, drawn in turns with them.
+    /// GPU milliseconds of the base, timed interleaved with `ms`.
     pub baseline_ms: Vec<f64>,
-    /// Wall time of a start.
+    /// Wall milliseconds of the start: uploading and compiling.
     pub start_ms: f64,
     /// GPU milliseconds of each pass.
     pub passes: Vec<(String, f64)>,
-    /// Relative mean squared error by chance alone, of pictures by paths.
+    /// Relative mean squared error due to Monte Carlo noise alone; only of path tracing.
     pub noise: Option<f64>,
-    /// Counts that are the same on every machine.
+    /// Work counts, equal on every machine.
     pub work: BTreeMap<String, u64>,
-    /// What the driver's compiler made of each program, where it tells.
+    /// Compiler statistics of each program, if the driver reports any.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub compiled: BTreeMap<String, Vec<Compiled>>,
-    /// Draws it again.
+    /// Command that draws the picture again.
     pub command: String,
-    /// Hash of the picture's file.
+    /// Hash of the picture file.
     pub image: String,
-    /// Stem of its files: the picture in `pictures`, and its radiance in `points`.
+    /// Stem of the file names: the picture in `pictures`, its radiance in `points`.
     pub picture: String,
-    /// What was changed of its base, and what both pictures say of each other.
+    /// Change relative to the base, and the comparison of both pictures.
     pub pair: Option<(Change, Pair)>,
 }
 
-/// What is needed to judge.
+/// Input of the evaluation.
 pub struct Judge<'a> {
-    /// What errors are told against.
+    /// The reference picture.
     pub truth: &'a Truth,
-    /// What is said of it.
+    /// Facts of the reference.
     pub reference: &'a Reference,
-    /// The run's folder.
+    /// Folder of the run.
     pub folder: &'a Path,
 }
 
-/// What was found.
+/// Result of the evaluation.
 pub struct Judged {
     /// A point for each record, and the reference.
     pub points: Vec<Point>,
-    /// See the table.
+    /// [`Table::frontier`](super::table::Table::frontier).
     pub frontier: Vec<usize>,
-    /// See the table.
+    /// [`Table::recommended`](super::table::Table::recommended).
     pub recommended: Vec<Recommended>,
-    /// Of each record that changed one knob.
+    /// Cost of each record that changed one knob.
     pub prices: Vec<Price>,
-    /// What a statement had to be away from nothing.
+    /// Standard errors from zero that make a statement significant.
     pub standard_errors: f64,
 }
 
 impl Judge<'_> {
-    /// A picture as it was drawn.
+    /// Display values of a drawn picture.
     ///
     /// # Errors
-    /// When its file cannot be read.
+    /// When the picture's file cannot be read.
     pub fn display(&self, record: &Record) -> Result<Display> {
         read_display(&self.folder.join("pictures").join(format!("{}.png", record.picture)))
     }
 
-    /// Judges all, and writes the maps of their errors.
+    /// Evaluates all records, and writes error maps.
     ///
     /// # Errors
     /// When a picture cannot be read, compared or written.
     pub fn judge(&self, records: &[Record]) -> Result<Judged> {
-        // Of each price an error, in squares of three sides, and a time; of each point whether it is better than another.
+        // Number of statements for the Bonferroni correction: per price an error for three block sizes and a time, per point a comparison.
         let prices = records.iter().filter(|record| record.pair.is_some()).count();
         let statements = 4 * prices + records.len();
         let sure = standard_errors(statements, MANY);
@@ -127,7 +128,7 @@ impl Judge<'_> {
         let mut prices = Vec::new();
         for (i, record) in records.iter().enumerate() {
             let Some((change, pair)) = &record.pair else { continue };
-            let base = base(record.family).context("a base is drawn before what is changed of it")?;
+            let base = base(record.family).context("a base must be drawn before its changes")?;
             let local = record.family == Family::Local;
             let more = local.then(|| self.truth.shown.more_error(&displays[i], &displays[base]));
             let clock = clocks[usize::from(!local)];
@@ -144,19 +145,24 @@ impl Judge<'_> {
         Ok(Judged { points, frontier, recommended, prices, standard_errors: sure })
     }
 
-    /// Judges a picture that another program drew.
+    /// Evaluates a picture of another program.
     ///
     /// # Errors
-    /// When it has another size, or cannot be compared.
+    /// When the picture has another size, or cannot be compared.
     pub fn other(&self, name: &str, picture: &AnyPicture, settings: &Settings) -> Result<Other> {
         let (film, display, radiance) = match picture {
             AnyPicture::Linear(film) => (film.clone(), display_of(film, settings), true),
-            // Its radiance is not known: errors of radiance are those of none.
+            // The file has no radiance: its radiance errors are 0.
             AnyPicture::Display(display) => (self.truth.film.clone(), display.clone(), false),
         };
         let [width, height] = settings.size;
         let size = [display.width, display.height];
-        ensure!(size == settings.size, "judging {name}: it is {}x{}, the reference {width}x{height}", size[0], size[1]);
+        ensure!(
+            size == settings.size,
+            "comparing {name} with the reference: it has {}x{} pixels, the reference has {width}x{height}",
+            size[0],
+            size[1]
+        );
         let (errors, _) = self.truth.errors(&film, &display)?;
         let mean = |film: &Picture, c: usize| film.rgba.iter().map(|p| f64::from(p[c])).sum::<f64>();
         let ratio = || [0, 1, 2].map(|c| mean(&film, c) / mean(&self.truth.film, c));
@@ -189,13 +195,12 @@ impl Judge<'_> {
         })
     }
 
-    /// Places of the points that no other beats in time and error at once, the quickest first, the reference last. Each has less
-    /// error than the one before by more than the reference's noise, or it is not there; and of two that take the same time the
-    /// better one.
+    /// Pareto frontier: indices of the points that no other point beats in time and error at once, the fastest first, the reference last.
+    /// Each point has significantly less error than the one before. Of two points with equal times the better one is kept.
     fn frontier(&self, points: &[Point], displays: &[Display], sure: f64) -> Vec<usize> {
         let reference = points.iter().position(|point| point.name == REFERENCE);
         let time = |i: usize| points[i].gpu_ms.median;
-        // What takes longer than the reference and is no better is beaten by it.
+        // The reference dominates every point that takes longer.
         let limit = reference.map_or(f64::INFINITY, time);
         let mut order: Vec<usize> = (0..displays.len()).filter(|&i| time(i) < limit).collect();
         order.sort_by(|&a, &b| time(a).total_cmp(&time(b)));
@@ -215,9 +220,10 @@ impl Judge<'_> {
     }
 }
 
-/// Of the frontier the quickest from which no step is cheap, the one farthest below the line from there to the most exact, and that:
-/// the reference itself where nothing comes near to it. What differs from `local` by one knob may owe its place to two errors that undo
-/// each other: presets and what the search found are meant as they are.
+/// Recommended settings from the frontier. `quick` is the fastest point from which no step is cheap ([`CHEAP`]). `exact` is the most exact
+/// point, or the reference where no point comes close to it. `balanced` is the knee: the point farthest below the line between both, in
+/// logarithms. Only presets and results of the search take part, because `local` with one knob changed may be on the frontier due to two
+/// errors that cancel.
 fn recommended(points: &[Point], frontier: &[usize]) -> Vec<Recommended> {
     let (time, error) = (|i: usize| points[i].gpu_ms.median, |i: usize| points[i].error());
     let meant =
@@ -240,7 +246,7 @@ fn recommended(points: &[Point], frontier: &[usize]) -> Vec<Recommended> {
     while let Some(next) = cheap(quick) {
         quick = next;
     }
-    // Where the corner of a curve is, in logarithms (Satopää et al. 2011).
+    // Knee of the curve in logarithms (Satopää et al. 2011).
     let part = |value: f64, [from, to]: [f64; 2]| {
         if from == to { 0.0 } else { (value.max(1e-9) / from.max(1e-9)).ln() / (to.max(1e-9) / from.max(1e-9)).ln() }
     };
@@ -251,24 +257,24 @@ fn recommended(points: &[Point], frontier: &[usize]) -> Vec<Recommended> {
     named.map(|(setting, point)| Recommended { setting: setting.to_owned(), point }).into()
 }
 
-/// Times of a picture and of the base that it was drawn in turns with, as quick as the machine was in the middle of the run, where that
-/// base took so many milliseconds: the times of points are told so, too.
+/// Scales the interleaved times of a picture and its base so that the median of the base is `base_ms`, its median over the whole run. The
+/// times of points are normalised the same way.
 fn in_the_middle([ms, baseline_ms]: [&[f64]; 2], base_ms: f64) -> [Vec<f64>; 2] {
     let factor = base_ms / Interval::of(baseline_ms).median;
     let factor = if factor.is_finite() && factor > 0.0 { factor } else { 1.0 };
     [ms, baseline_ms].map(|all| all.iter().map(|ms| factor * ms).collect())
 }
 
-/// Times as if the machine had been as quick all along: each is told as so many times the base's that was drawn in turns with it,
-/// and the base's is the middle of all of its own. Whoever draws the picture again finds the machine somewhere else: the ends are
-/// as far apart as those of the turns and those of the base over the whole run together.
+/// Times normalised by the paired baseline, as if the machine had been equally fast all along: the ratio of a picture to its interleaved
+/// base, times the median of the base over the run. The interval covers later runs too: its ends combine the extremes of the ratios with
+/// the extremes of the base over the whole run.
 fn normalise_by_baseline(records: &[Record]) -> Vec<Interval> {
     let of_exact = |record: &Record| record.family == Family::Exact;
     let bases = [false, true].map(|exact| {
         let in_turns = || records.iter().filter(move |r| of_exact(r) == exact && !r.baseline_ms.is_empty());
         let all: Vec<f64> = in_turns().flat_map(|r| r.baseline_ms.iter().copied()).collect();
         let medians: Vec<f64> = in_turns().map(|r| Interval::of(&r.baseline_ms).median).collect();
-        // A device without timestamps tells 0 of every picture, which is no base.
+        // A device without timestamps reports 0 for every picture, which cannot be a baseline.
         let timed = all.iter().all(|&ms| ms > 0.0);
         (!all.is_empty() && timed).then(|| Interval { median: Interval::of(&medians).median, ..Interval::of(&all) })
     });
@@ -292,8 +298,8 @@ fn normalise_by_baseline(records: &[Record]) -> Vec<Interval> {
     records.iter().map(of).collect()
 }
 
-/// The reference as a point: its error is what it resolves. It is timed once: the ends of its time are as far apart as those of the
-/// picture with its rungs and fewer samples.
+/// The reference as a point. Its error is its resolution. It is timed once; the relative interval of its time is that of the point
+/// `exact`.
 fn the_reference(reference: &Reference, wandered: Option<Interval>) -> Point {
     let relmse = reference.own_error * reference.own_error;
     let share = |end: f64, median: f64| if median > 0.0 { reference.gpu_ms * end / median } else { reference.gpu_ms };
@@ -325,14 +331,14 @@ fn the_reference(reference: &Reference, wandered: Option<Interval>) -> Point {
     }
 }
 
-/// What draws the reference, or, where it has many rounds, a picture with about as many samples.
+/// Command that draws the reference, or a picture with about as many samples if the reference has several rounds.
 fn drawing(reference: &Reference) -> String {
     let [first, ..] = &reference.rounds[..] else { return reference.command.clone() };
     let rung = 4_u32.pow((f64::from(reference.samples).log2() / 2.0).round().min(6.0) as u32);
     reference.command.replace(&format!("samples={}", first.samples), &format!("samples={rung}"))
 }
 
-/// The reference and the picture around the worst pixel, side by side and four times as large.
+/// PNG of the reference and the picture around the worst pixel, side by side, enlarged four times.
 fn around(flip: &Comparison, pictures: [&Vec<[u8; 4]>; 2]) -> Result<Vec<u8>> {
     let [wx, wy] = flip.worst.map(i64::from);
     let side = 2 * AROUND;
@@ -371,7 +377,7 @@ mod tests {
 
     #[test]
     fn what_a_change_adds_is_a_part_of_what_its_picture_takes() {
-        // The machine was half as quick when the second picture was drawn in turns with the base.
+        // The machine was half as fast while the second picture and the base were timed.
         let all = [record("local", &[50.0, 50.0], &[]), record("a", &[80.0], &[50.0]), record("b", &[300.0], &[100.0])];
         let times = normalise_by_baseline(&all);
         let base = times[0].median;

@@ -1,8 +1,8 @@
-//! What approximations and effects cost, measured on the user's scene and device (docs/cost.md).
+//! Measures what approximations and effects cost, in error and GPU time, on a scene and a device (docs/cost.md).
 //!
-//! [`sweep::Sweep`] draws the scene's reference, every rung alone and some combinations: [`agenda`] says which, [`measure`] draws them,
-//! [`reference`](mod@reference) is what they are held against, [`judge`] says how far they are from it. [`table::Table`] is what was found,
-//! [`report`] the page that shows it. [`explain`] prices effects that a plan leaves out.
+//! [`sweep::Sweep`] draws a reference, every rung alone, and some combinations of rungs. [`agenda`] lists the pictures, [`measure`] draws
+//! and times them, [`reference`](mod@reference) draws the picture that they are compared with, and [`judge`] computes their errors. The
+//! result is [`table::Table`]; [`report`] writes it as an HTML page. [`explain`] measures effects that a plan leaves out.
 
 pub mod agenda;
 pub mod beside;

@@ -1,4 +1,4 @@
-//! Draws and times pictures, writes each as it is drawn, and reads those that an interrupted run has drawn already.
+//! Draws and times the pictures of a run. Each picture is written when it is drawn; an interrupted run reads the pictures that it finds.
 
 use std::path::Path;
 use std::time::Instant;
@@ -14,43 +14,43 @@ use super::warm::{Bench, Measurement, WarmRenderer};
 use etalon::image::{exr, file};
 use etalon::plan::Knobs;
 
-/// A file name for a point.
+/// File name of a point.
 fn stem(name: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '.' { c } else { '-' };
     name.chars().map(plain).collect()
 }
 
-/// A base that others are drawn in turns with.
+/// A warmed-up baseline that other pictures are timed interleaved with.
 pub struct Base {
     warm: WarmRenderer,
     measured: Measurement,
 }
 
-/// What is measured with, and what was measured.
+/// State of a run: how to measure, and the measurements so far.
 pub struct Measuring<'a> {
-    /// What draws.
+    /// Bench that draws.
     pub bench: &'a Bench<'a>,
-    /// Where results go.
+    /// Folder of the results.
     pub folder: &'a Path,
-    /// The first words of every command.
+    /// Beginning of every printed command.
     pub command: &'a str,
-    /// This part of so many, counted from 1.
+    /// Index (from 1) and number of the parts of a sharded run.
     pub shard: [u32; 2],
-    /// Pictures are timed again until they took so long.
+    /// Total milliseconds after which a picture is not timed again.
     pub enough_ms: f64,
-    /// The clock.
+    /// Clock of the run.
     pub pace: Pace<'a>,
-    /// What was drawn.
+    /// Measurements so far.
     pub records: Vec<Record>,
-    /// What a reader should know.
+    /// Warnings for the report.
     pub warnings: Vec<String>,
 }
 
 impl Measuring<'_> {
-    /// A base: drawn anew in every run, because others are drawn in turns with it.
+    /// Draws a base. Every run draws its bases anew, because other pictures are timed interleaved with them.
     ///
     /// # Errors
-    /// When it cannot be drawn or written.
+    /// When the base cannot be drawn or written.
     pub fn base(&mut self, task: &Task, progress: &mut dyn FnMut(Step<'_>)) -> Result<Base> {
         let expected = self.pace.tell(&task.name, progress);
         let begun = Instant::now();
@@ -61,8 +61,8 @@ impl Measuring<'_> {
         Ok(Base { warm, measured })
     }
 
-    /// A picture, in turns with a base. `None` where another part of the run draws it, there is no time for it, or it cannot be drawn:
-    /// that is told, and the others are drawn.
+    /// Draws a picture, timed interleaved with a base. `None` where another shard draws it, where there is no time for it, or where it cannot
+    /// be drawn; a failure becomes a warning and the run goes on.
     ///
     /// # Errors
     /// When files cannot be read or written.
@@ -93,7 +93,7 @@ impl Measuring<'_> {
         let (start_ms, measured) = match drawn {
             Ok(drawn) => drawn,
             Err(error) => {
-                self.warnings.push(format!("\"{}\" cannot be drawn here: {error:#}", task.name));
+                self.warnings.push(format!("\"{}\" cannot be drawn on this device: {error:#}", task.name));
                 return Ok(None);
             }
         };
@@ -102,7 +102,7 @@ impl Measuring<'_> {
         Ok(Some(record))
     }
 
-    /// What an interrupted run has drawn of the same rungs under this name.
+    /// The record of an interrupted run with the same name and knobs.
     fn known(&self, name: &str, knobs: &Knobs) -> Result<Option<Record>> {
         let path = self.folder.join("points").join(format!("{}.json", stem(name)));
         if !path.exists() {
@@ -113,7 +113,7 @@ impl Measuring<'_> {
         Ok(Some(record).filter(|record| record.knobs == named(knobs)))
     }
 
-    /// Writes a picture and what was measured of it, that last.
+    /// Writes a picture and then its record.
     fn keep(
         &mut self,
         task: &Task,

@@ -1,8 +1,8 @@
-//! How quickly the sum through media that vary comes near to the integral: the error of each rule by its number of steps, and the
-//! order that it tells (lecture A2, numerics S8).
+//! Order of convergence of the quadrature rules for ray marching in heterogeneous media: the error of each rule by its number of steps
+//! (lecture A2, numerics S8).
 //!
-//! Drawn with rays, whose pictures with one sample differ by the sum alone: no noise has to be told from the error, as there is in
-//! prices from the reference's rungs.
+//! The pictures are ray-traced with one sample. They differ only by the quadrature, so that no noise hides the error; path-traced
+//! pictures would have noise.
 
 use anyhow::{Context as _, Result, ensure};
 
@@ -12,15 +12,15 @@ use super::warm::Bench;
 use etalon::image::Picture;
 use etalon::plan::{Knobs, Model};
 
-/// Steps that are tried; the truth has as many as the last, with Simpson's rule.
+/// Numbers of steps; the reference has the last number of steps and Simpson's rule.
 const STEPS: [u32; 5] = [4, 8, 16, 32, 64];
 const RULES: [&str; 3] = ["left", "midpoint", "simpson"];
 
-/// Below this share of the picture an error is that of f32.
+/// Relative error below which f32 rounding dominates.
 const ROUNDING: f64 = 1e-8;
 
-/// The middle of the slopes of log error over log steps from each number of steps to the next: where a grid's kinks or rounding end
-/// the descent, most of them come before.
+/// Estimated order: median of the slopes of log error over log steps between neighbouring numbers of steps. The median ignores the last
+/// slopes, where kinks of the grid or rounding stop the convergence.
 #[must_use]
 pub fn order(steps: &[u32], errors: &[f64]) -> Option<f64> {
     let told: Vec<(f64, f64)> =
@@ -43,13 +43,13 @@ fn knobs(steps: u32, rule: &str) -> Result<Knobs> {
     Ok(knobs)
 }
 
-/// How many pictures [`orders`] draws.
+/// Number of pictures that [`orders`] draws.
 pub const PICTURES: usize = RULES.len() * STEPS.len();
 
-/// Draws every rule with every number of steps; `tell` hears of each before.
+/// Draws every rule with every number of steps; calls `tell` before each picture.
 ///
 /// # Errors
-/// When something cannot be drawn.
+/// When a picture cannot be drawn, or contains NaN or infinity.
 pub fn orders(bench: &Bench<'_>, tell: &mut dyn FnMut(&str)) -> Result<Vec<QuadratureOrder>> {
     let mut films: Vec<(Picture, f64)> = Vec::new();
     for (rule, steps) in RULES.iter().flat_map(|rule| STEPS.map(|steps| (rule, steps))) {
@@ -59,15 +59,15 @@ pub fn orders(bench: &Bench<'_>, tell: &mut dyn FnMut(&str)) -> Result<Vec<Quadr
         films.push((warm.renderer.film()?, ms));
     }
     let finite = |(film, _): &(Picture, f64)| film.rgba.iter().flatten().all(|value| value.is_finite());
-    ensure!(films.iter().all(finite), "some picture has values that are no numbers");
-    let truth = &films.last().context("there are rules")?.0;
+    ensure!(films.iter().all(finite), "a picture has NaN or infinite radiance");
+    let truth = &films.last().context("the list of rules is empty")?.0;
     let whole = mean_square(truth, |i, c| f64::from(truth.rgba[i][c])).sqrt().max(f64::MIN_POSITIVE);
     let of = |rule: usize| {
         let films = &films[rule * STEPS.len()..(rule + 1) * STEPS.len()];
         let error = |(film, _): &(Picture, f64)| {
             mean_square(truth, |i, c| f64::from(film.rgba[i][c]) - f64::from(truth.rgba[i][c])).sqrt() / whole
         };
-        // The truth has no error that can be told.
+        // The reference itself has no error.
         let told = STEPS.len() - usize::from(rule + 1 == RULES.len());
         let errors: Vec<f64> = films[..told].iter().map(error).collect();
         QuadratureOrder {
@@ -92,9 +92,9 @@ mod tests {
             let found = order(&STEPS, &errors).unwrap();
             assert!((found - f64::from(p)).abs() < 1e-9, "{found}");
         }
-        // What rounding hides has no slope.
+        // Errors hidden by rounding have no slope.
         assert_eq!(order(&STEPS, &[1e-3, 1e-9, 3e-9, 2e-9, 1e-9]), None);
-        // Nor has what kinks leave.
+        // A last step limited by kinks does not change the median.
         let kinks = order(&STEPS[..4], &[1e-2, 1e-2 / 16.0, 1e-2 / 256.0, 2e-5]).unwrap();
         assert!((kinks - 4.0).abs() < 1e-9, "{kinks}");
     }

@@ -1,39 +1,39 @@
-//! How far a run is, how long the rest takes, and what there is no time for.
+//! Clock of a run: progress, remaining time, and the decision which pictures the time budget leaves out.
 
 use std::time::Instant;
 
 use super::forecast::Forecast;
 
-/// How far it is.
+/// Progress of a run.
 pub struct Step<'a> {
-    /// What is drawn now.
+    /// Name of the picture that is drawn now.
     pub name: &'a str,
-    /// Pictures done.
+    /// Number of pictures done.
     pub done: usize,
-    /// Of so many.
+    /// Number of all pictures.
     pub of: usize,
-    /// Seconds left, as far as what was drawn tells.
+    /// Estimated seconds left.
     pub left_s: f64,
 }
 
-/// Seconds that judging a picture and showing it take, before any was judged.
+/// Initial estimate of the seconds to evaluate a picture and show it in the report.
 const JUDGED_S: f64 = 0.05;
 
-/// A run's clock.
+/// Clock of a run.
 pub struct Pace<'a> {
     start: Instant,
     budget_s: f64,
-    /// Whether what the budget has no time for is left out.
+    /// Whether pictures beyond the budget are left out.
     ends: bool,
-    /// Whether somebody asked the run to end.
+    /// Whether the user asked to stop the run.
     stopped: &'a dyn Fn() -> bool,
-    /// Seconds that judging a picture and showing it take.
+    /// Estimated seconds to evaluate a picture and show it in the report.
     judged_s: f64,
-    /// Seconds that are not there for pictures, but for the reference.
+    /// Seconds reserved for the reference.
     pub reserved_s: f64,
-    /// Seconds for what comes after all of that is drawn.
+    /// Seconds reserved for work after all pictures are drawn.
     pub after_s: f64,
-    /// What pictures are expected to take.
+    /// Estimated times of the coming pictures.
     pub forecast: Forecast,
     done: usize,
     of: usize,
@@ -42,7 +42,7 @@ pub struct Pace<'a> {
 }
 
 impl<'a> Pace<'a> {
-    /// It begins now.
+    /// Starts the clock.
     pub fn new(budget_s: f64, ends: bool, stopped: &'a dyn Fn() -> bool) -> Self {
         let forecast = Forecast::default();
         let (done, of, left_out, left_out_s, reserved_s) = (0, 0, 0, 0.0, 0.0);
@@ -62,50 +62,50 @@ impl<'a> Pace<'a> {
         }
     }
 
-    /// Seconds since it began.
+    /// Seconds since the start.
     #[must_use]
     pub fn took_s(&self) -> f64 {
         self.start.elapsed().as_secs_f64()
     }
 
-    /// Seconds that the budget leaves for drawing: judging and showing what was drawn comes after.
+    /// Seconds that the budget leaves for drawing, without the time to evaluate and show the drawn pictures.
     #[must_use]
     pub fn left_s(&self) -> f64 {
         let after = self.judged_s * self.done as f64 + self.after_s;
         if (self.stopped)() { 0.0 } else { self.budget_s - after - self.took_s() }
     }
 
-    /// So many pictures more are to come.
+    /// Adds `count` coming pictures.
     pub fn expects(&mut self, count: usize) {
         self.of += count;
     }
 
-    /// What judging and showing so many pictures took.
+    /// Records the seconds that evaluating and showing `pictures` pictures took.
     pub fn judged(&mut self, pictures: usize, seconds: f64) {
         self.judged_s = (1.2 * seconds / pictures.max(1) as f64).max(JUDGED_S);
     }
 
-    /// The next picture begins: the seconds that are expected of it.
+    /// Reports that the next picture begins, and returns its estimated seconds.
     pub fn tell(&mut self, name: &str, progress: &mut dyn FnMut(Step<'_>)) -> f64 {
         progress(Step { name, done: self.done, of: self.of.max(self.done + 1), left_s: self.until_end() });
         self.done += 1;
         self.forecast.begin()
     }
 
-    /// Seconds until the end: those of what is to come, or of the budget.
+    /// Seconds until the end: the estimate for the coming pictures, limited by the budget.
     fn until_end(&self) -> f64 {
         let after = self.judged_s * self.of as f64;
         let rest = self.forecast.left() + after;
         if self.ends { rest.max(0.0).min((self.budget_s - self.took_s()).max(0.0)) } else { rest }
     }
 
-    /// The seconds that are left for all, where a budget ends the run.
+    /// Seconds left of the budget, or of the estimate where the budget does not end the run.
     #[must_use]
     pub fn all_left_s(&self) -> f64 {
         if self.ends { (self.budget_s - self.took_s()).max(0.0) } else { self.forecast.left() }
     }
 
-    /// Whether there is no time for a picture, which is then counted.
+    /// Whether there is no time for a picture; the picture is then counted as left out.
     pub fn too_late(&mut self, expected: f64) -> bool {
         let seconds = self.forecast.as_it_went(expected);
         let late = (self.stopped)() || self.ends && seconds + self.judged_s + self.reserved_s > self.left_s();
@@ -116,7 +116,7 @@ impl<'a> Pace<'a> {
         late
     }
 
-    /// There is no time for the next so many either.
+    /// Leaves out the next `count` pictures.
     pub fn leave_out(&mut self, count: usize) {
         for _ in 0..count {
             self.left_out_s += self.forecast.begin();
@@ -124,27 +124,27 @@ impl<'a> Pace<'a> {
         self.left_out += count;
     }
 
-    /// So many that were expected are not needed.
+    /// Removes `count` coming pictures that are not needed.
     pub fn skip(&mut self, count: usize) {
         self.of = self.of.saturating_sub(count);
         self.forecast.skip(count);
     }
 
-    /// Which picture this is, counted from 1.
+    /// Number of the current picture, from 1.
     #[must_use]
     pub fn place(&self) -> usize {
         self.done
     }
 
-    /// What a reader should know of what was left out.
+    /// Warning about the pictures that were left out.
     #[must_use]
     pub fn warning(&self) -> Option<String> {
         if (self.stopped)() {
-            return Some("the run was ended before all of its pictures were drawn".to_owned());
+            return Some("the run was stopped before all pictures were drawn".to_owned());
         }
         (self.left_out > 0).then(|| {
             format!(
-                "{} of {} pictures were not drawn, because the budget of {:.0} s ended: about --budget {:.0} would draw all of them",
+                "{} of {} pictures were not drawn because the budget of {:.0} s ended; --budget {:.0} should be enough for all of them",
                 self.left_out,
                 self.of,
                 self.budget_s,

@@ -1,6 +1,7 @@
-//! Time and error of every rung at some size, from pictures of few pixels: nothing is drawn at that size.
+//! Predicts the time and error of every rung at a size from renders with few pixels (`etalon plan --forecast`); nothing is drawn at that
+//! size.
 //!
-//! Errors are those of few pixels; times grow with pixels as two sizes tell.
+//! Errors are taken over from the small picture. Times are extrapolated by the growth between two small sizes. See docs/cost.md.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -15,38 +16,39 @@ use super::sweep::{Listener, Sweep, SweepExtent};
 use super::table::{Point, REFERENCE, Table};
 use super::warm::Bench;
 
-/// Pixels that are drawn, at most, unless something else is asked for.
+/// Default limit for the number of pixels that are drawn.
 pub const PIXELS: f64 = 160.0 * 90.0;
-/// What an error scatters by beside noise, because few pixels sample edges and small things by chance (measured: docs/cost.md).
+/// Relative scatter of an error in addition to noise, because few pixels sample edges and small objects by chance (measured:
+/// docs/cost.md).
 const OTHER_PIXELS: f64 = 0.15;
 
-/// What a picture is expected to take, and how far off it will be.
+/// Predicted time and error of a picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Prediction {
-    /// Its name in a table of `cost`.
+    /// Name of the picture in a table of `cost`.
     pub picture: String,
-    /// Its rungs.
+    /// Rungs by knob.
     pub knobs: BTreeMap<String, String>,
-    /// Milliseconds of GPU time.
+    /// GPU milliseconds.
     pub gpu_ms: Interval,
-    /// Error, of displayed values 0 to 1.
+    /// Error of display values 0 to 1.
     pub error: Interval,
 }
 
-/// Where it is tried, and for how long.
+/// Settings of the run with few pixels.
 pub struct Trial<'a> {
     /// An empty folder.
     pub folder: &'a Path,
-    /// How much is drawn.
+    /// Budget of the run.
     pub extent: SweepExtent,
-    /// Of so many pixels at most.
+    /// Largest number of pixels.
     pub pixels: f64,
 }
 
-/// Expectations of every picture that a run of `cost` would draw and that there was time for.
+/// Predicts every picture that a run of `cost` would draw and for which there was time.
 ///
 /// # Errors
-/// When something cannot be drawn or written.
+/// When a picture cannot be drawn or written.
 pub fn predict(bench: &Bench<'_>, trial: &Trial<'_>, progress: &mut dyn FnMut(Step<'_>)) -> Result<Vec<Prediction>> {
     let size = bench.settings.size;
     let few = resized(bench, fewer(size, (pixels(size) / trial.pixels).max(1.0)));
@@ -69,18 +71,18 @@ pub fn predict(bench: &Bench<'_>, trial: &Trial<'_>, progress: &mut dyn FnMut(St
     Ok(table.points.iter().filter(|point| point.name != REFERENCE).map(of).collect())
 }
 
-/// How right predictions were.
+/// Quality of predictions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Score {
-    /// Pictures that were both foretold and measured, with errors that the reference tells.
+    /// Number of pictures that were both predicted and measured, with errors above the resolution of the reference.
     pub pictures: usize,
     /// Rank correlation of errors and of times (Spearman 1904), −1 to 1.
     pub rank: [f64; 2],
-    /// Errors and times that lie in their predictions' intervals.
+    /// Number of errors and of times that lie in their predicted intervals.
     pub covered: [usize; 2],
 }
 
-/// Holds predictions against what was measured.
+/// Compares predictions with a measured table.
 #[must_use]
 pub fn score(predictions: &[Prediction], table: &Table) -> Score {
     let found = |p: &Prediction| table.points.iter().find(|point| point.name == p.picture && point.knobs == p.knobs);
@@ -99,7 +101,7 @@ pub fn score(predictions: &[Prediction], table: &Table) -> Score {
     Score { pictures: pairs.len(), rank, covered }
 }
 
-/// Places in order; equal values share the mean of theirs.
+/// Ranks of the values, from 0; equal values get their mean rank.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let place = |x: &f64| {
         let (less, same) = values.iter().fold((0, 0), |(l, s), v| (l + usize::from(v < x), s + usize::from(v == x)));

@@ -1,4 +1,5 @@
-//! What one picture costs and buys beside another that has one knob on another rung.
+//! Cost of changing one knob: paired comparison of a picture with its base, in time and error, with significance tests and a verdict in
+//! words.
 
 use anyhow::Result;
 use serde::{Deserialize, Serialize};
@@ -11,31 +12,31 @@ use super::warm::Measurement;
 use etalon::image::Picture;
 use etalon::image::metric::{AnyPicture, Metric, compare};
 
-/// Times of one program on the same rungs differ by so much between two places in memory: less is no difference of the rungs.
+/// Relative time difference of one program at two places in memory; a smaller difference does not come from the rungs.
 const SAME_PROGRAM: f64 = 0.02;
-/// Spread of the logarithms of two times whose turns tell none, and how well that is known.
+/// Default standard deviation of the logarithm of time ratios, and its degrees of freedom, where no ratio was repeated.
 const NO_TURNS: (f64, f64) = (0.05, 5.0);
 
-/// What two pictures say of each other, whatever the reference.
+/// Comparison of a picture with its base, independent of the reference.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Pair {
-    /// Mean FLIP between both.
+    /// Mean FLIP error between both pictures.
     pub flip: f64,
-    /// Whether they are the same to the last bit.
+    /// Whether the pictures are bit-identical.
     pub same: bool,
-    /// The mean squared difference of displayed values of what both converge to, in squares of several sides; of pictures by paths.
+    /// Mean squared difference between the limits of both pictures in display values, by block side in pixels; only of path tracing.
     pub squares: Vec<(u32, Estimate)>,
-    /// Of a knob that changes chance alone: relative mean squared error by chance over that of the base.
+    /// Relative mean squared error due to noise, over that of the base; only of knobs that change noise alone.
     pub noise_ratio: Option<f64>,
-    /// Of a knob that changes rounding alone, where no chance is in the pictures: mean radiance over that of the base.
+    /// Mean radiance over that of the base; only of knobs that change rounding alone, in pictures without noise.
     #[serde(default)]
     pub brightness: Option<f64>,
 }
 
-/// Mean radiance differs by so much at most where rounding alone does (measured: docs/cost.md).
+/// Largest relative change of the mean radiance due to rounding (measured: docs/cost.md).
 const BY_ROUNDING: f64 = 2e-5;
 
-/// Radiance of all pixels and channels.
+/// Sum of the radiance of all pixels and channels.
 fn sum(film: &Picture) -> f64 {
     film.rgba.iter().map(|p| p[..3].iter().copied().map(f64::from).sum::<f64>()).sum()
 }
@@ -61,13 +62,14 @@ impl Pair {
             },
             brightness: (change.knob == "arithmetic" && measured.halves.is_none())
                 .then(|| sum(&measured.film) / sum(&base.film))
-                // Where all is black there is nothing to compare.
+                // Black pictures have no ratio.
                 .filter(|ratio| ratio.is_finite()),
         })
     }
 }
 
-/// How well times are known: the spread of the logarithms of ratios within their turns, over all pictures drawn in turns with one base.
+/// Uncertainty of time ratios: the standard deviation of their logarithms within a picture, pooled over all pictures with one base, and
+/// its degrees of freedom.
 #[derive(Debug, Clone, Copy)]
 pub struct TimeNoise {
     deviation: f64,
@@ -79,7 +81,7 @@ fn logs(ms: &[f64], baseline_ms: &[f64]) -> Vec<f64> {
 }
 
 impl TimeNoise {
-    /// By the turns of some pictures: each its own times and those of the base.
+    /// Estimate from the interleaved times of several pictures and their base.
     #[must_use]
     pub fn of<'a>(turns: impl Iterator<Item = (&'a [f64], &'a [f64])>) -> Self {
         let groups: Vec<Vec<f64>> = turns.map(|(ms, others)| logs(ms, others)).collect();
@@ -87,7 +89,7 @@ impl TimeNoise {
         Self { deviation, freedom }
     }
 
-    /// Whether a picture takes more or less time than its base, one of so many statements.
+    /// Whether the time difference between a picture and its base is significant, as one of `statements` statements.
     fn tells(&self, ms: &[f64], baseline_ms: &[f64], statements: usize) -> bool {
         let logs = logs(ms, baseline_ms);
         let error = self.deviation / (logs.len().max(1) as f64).sqrt();
@@ -95,19 +97,19 @@ impl TimeNoise {
     }
 }
 
-/// Times of a picture and of its base in turns.
+/// Interleaved times of a picture and its base.
 #[derive(Clone, Copy)]
 pub struct PairedTimes<'a> {
-    /// Its own, in milliseconds.
+    /// Milliseconds of the picture.
     pub ms: &'a [f64],
-    /// The base's.
+    /// Milliseconds of the base.
     pub baseline_ms: &'a [f64],
-    /// How well both are known.
+    /// Uncertainty of the ratios.
     pub clock: TimeNoise,
 }
 
-/// The price of a change. `more_error`: how much more mean squared error it has than its base, where a reference tells that; `None`
-/// of pictures by paths, which are compared with each other. It is of no point yet, and `flip_delta` is FLIP between both.
+/// Cost of a change. `more_error` is the difference of the mean squared errors of picture and base against a reference; `None` for
+/// path-traced pictures, which are compared with each other. The caller sets `point`; `flip_delta` is the FLIP error between both.
 #[must_use]
 pub fn price(
     change: &Change,
@@ -153,7 +155,7 @@ pub fn price(
     price
 }
 
-/// Whether a change is one of chance alone: the light is the same in the mean.
+/// Whether a change affects the noise alone, not the expected value.
 fn by_chance(change: &Change) -> bool {
     match change.knob.as_str() {
         "guiding" => true,
@@ -162,7 +164,7 @@ fn by_chance(change: &Change) -> bool {
     }
 }
 
-/// What a price says, in a sentence; nothing of errors that a reference cannot tell.
+/// Verdict in words; it states only significant differences.
 fn verdict(price: &Price) -> String {
     let median = price.gpu_ms_delta.median;
     let (longer, shorter) = (price.takes_longer(), price.saves());
@@ -171,39 +173,43 @@ fn verdict(price: &Price) -> String {
     } else if shorter {
         format!("saves {:.1} ms (−{:.0} %)", -median, -100.0 * price.share)
     } else {
-        "takes the same time as far as can be told".to_owned()
+        "no measurable time difference".to_owned()
     };
     let flip = price.flip_between;
     let error = price.shown_delta;
     let seen = if price.same {
-        "the picture is the same to the last bit".to_owned()
+        "the picture is bit-identical".to_owned()
     } else if let Some(ratio) = price.noise_ratio {
-        format!("the same light, {:.2} times the noise", ratio.sqrt())
+        format!("the same mean with {:.2} times the noise", ratio.sqrt())
     } else if flip < INVISIBLE {
-        format!("nobody sees it (FLIP {flip:.4} between both)")
+        format!("no visible difference (FLIP {flip:.4})")
     } else if price.base != Family::Exact && !price.error_told {
-        format!("which is nearer to the truth cannot be told from the reference's noise (FLIP {flip:.3} between both)")
+        format!("the noise of the reference hides which picture is more accurate (FLIP {flip:.3} between them)")
     } else if price.base != Family::Exact && error.median < 0.0 {
         let less = 100.0 * (-error.median).sqrt();
-        let undoes = if price.undoes_another() { ", though it approximates more: it undoes another error" } else { "" };
-        format!("less error by {less:.2} % of the range (FLIP {flip:.3} between both){undoes}")
+        let undoes =
+            if price.undoes_another() { ", although it approximates more: it cancels another error" } else { "" };
+        format!("removes an error of {less:.2} % (FLIP {flip:.3} between the pictures){undoes}")
     } else if price.is_seen() {
-        // From the reference's rungs a cheaper one is wrong; a dearer one says what they leave out.
+        // Relative to the reference's rungs, a cheaper rung has an error; a more exact one shows what the reference leaves out.
         let more = match (price.base, price.to_more_exact()) {
             (Family::Exact, false) => "an error of",
-            (Family::Exact, true) => "another picture by",
-            _ => "more error by",
+            (Family::Exact, true) => "a difference of",
+            _ => "adds an error of",
         };
-        let squares =
-            if price.squares > 1 { format!(" in squares of {} pixels", price.squares) } else { String::new() };
-        format!("{more} {:.2} % of the range{squares} (FLIP {flip:.3} between both)", 100.0 * error.median.sqrt())
+        let squares = if price.squares > 1 {
+            format!(" averaged over blocks {} pixels wide", price.squares)
+        } else {
+            String::new()
+        };
+        format!("{more} {:.2} %{squares} (FLIP {flip:.3} between the pictures)", 100.0 * error.median.sqrt())
     } else {
-        format!("no error beyond noise (FLIP {flip:.3} between both)")
+        format!("no error above the noise (FLIP {flip:.3} between the pictures)")
     };
     let nearer = price.base != Family::Exact && price.error_told && error.median < 0.0;
     let seen = match price.brightness {
         Some(ratio) if (ratio - 1.0).abs() > BY_ROUNDING => format!(
-            "{seen}; the mean brightness changes by {:+.4} %, which rounding alone does not do: one of both is wrong here",
+            "{seen}; the mean brightness changes by {:+.4} %, more than rounding can: one of the two rungs is wrong here",
             100.0 * (ratio - 1.0)
         ),
         _ => seen,
@@ -229,9 +235,12 @@ mod tests {
                 PairedTimes { ms: &[10.0], baseline_ms: &[10.0], clock: TimeNoise { deviation: 0.01, freedom: 9.0 } };
             price(&change, &pair, Some(Estimate::default()), turns, 100, 4.0).verdict
         };
-        // π off by a thousandth in the lobe of a tier: study:lamps and study:materials at 160x90.
-        assert!(said(0.999_947_5).contains("one of both is wrong here") && said(0.999_962_4).contains("wrong here"));
-        // The tiers as they are, there and in study:metals.
+        // Measured with an error of one thousandth in π in the lobe of one tier: study:lamps and study:materials at 160x90.
+        assert!(
+            said(0.999_947_5).contains("one of the two rungs is wrong here")
+                && said(0.999_962_4).contains("wrong here")
+        );
+        // The real tiers, in these scenes and in study:metals.
         assert!(![1.0, 1.000_000_9, 1.000_007_3].iter().any(|&same| said(same).contains("wrong here")));
     }
 
@@ -248,7 +257,7 @@ mod tests {
             clock.tells(&ms, &others, 100)
         };
         assert!(tells(1.2) && tells(0.9));
-        // All seven turns may agree, and it is still what two places in memory differ by.
+        // All seven ratios may agree, and still the difference may come from the place in memory.
         assert!(!tells(1.03) && !tells(1.0));
         assert!(!clock.tells(&[], &[], 100));
     }

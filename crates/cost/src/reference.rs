@@ -1,9 +1,9 @@
-//! What errors are errors against: the scene with every knob on the rung that approximates least, and as many samples as it takes to
-//! tell errors, or as there is time for.
+//! The reference picture, which errors are measured against: every knob on its most exact rung, with as many samples as the errors
+//! require or the time budget allows. See docs/cost.md.
 //!
-//! It is the mean of rounds, each a picture with random numbers of its own that a command draws again. A later run goes on with the
-//! rounds of an earlier one. How many samples are wanted is planned from a pilot whose samples are not used, and what there is time for
-//! from the clock: neither looks at what the reference says, so that stopping there makes nothing seem sure that is not.
+//! The reference is the mean of rounds; each round is a picture with its own random seed that a command can draw again. A later run
+//! continues the rounds of an earlier one. The number of samples is planned from a pilot, whose samples are not used again, and from the
+//! clock. Neither depends on the samples of the reference, so that stopping does not bias the significance tests (no optional stopping).
 
 use std::path::Path;
 use std::time::Instant;
@@ -23,82 +23,83 @@ use etalon::image::png::Display;
 use etalon::image::{Aov, AovData, Picture, exr, file, png, tone};
 use etalon::plan::Knobs;
 
-/// Bands of wavelengths that a reference may have, and samples that it has at least before it has more bands.
+/// Numbers of bands of wavelengths of a reference, and its least samples before it gets more bands.
 pub(super) const BANDS: [u32; 3] = [32, 16, 8];
 const FEWEST_SAMPLES: u32 = 16;
-/// Samples without which no parts tell the error.
+/// Least samples of a reference: four parts are needed to estimate its error.
 const LEAST_SAMPLES: f64 = 4.0;
 /// Samples of a pilot.
 const PILOT: u32 = 4;
-/// Pixels of a pilot, about: what a sample takes and how noisy it is goes with them.
+/// Approximate number of pixels of a pilot; time and noise of a sample are scaled by pixels.
 const PILOT_PIXELS: f64 = 160.0 * 90.0;
-/// A pilot of bands may take four times as long as one of three colours: the driver's cache may hold the programs of three colours alone
-/// (study:metals: 9 s after 2.4). It is drawn where that is no more than this share of the budget.
+/// A pilot with bands may take this many times as long as a pilot in RGB, because the driver's cache may hold only the programs for RGB
+/// (study:metals: 9 s after 2.4 s). It is drawn only if that is at most the following fraction of the budget.
 const BANDS_TAKE: f64 = 4.0;
 const PILOT_SHARE: f64 = 0.6;
-/// Statements that a report makes, about: what is wanted of a reference is planned for so many.
+/// Approximate number of statements of a report, for the Bonferroni correction when samples are planned.
 const STATEMENTS: usize = 150;
-/// A round takes no more than this share of the seconds left: nothing ends it, and the machine may become slower meanwhile.
+/// Largest fraction of the seconds left that a round may take: a round cannot be stopped, and the machine may become slower.
 const AT_ONCE: f64 = 0.7;
-/// Rounds of one run at most: each is a picture that is begun anew.
+/// Largest number of rounds of one run: each round starts a new picture.
 const MOST_ROUNDS: usize = 16;
 
-/// A budget that is spent before there is a reference of four samples.
+/// The budget is too small for a reference of four samples.
 #[derive(Debug, Clone, Copy, thiserror::Error)]
 #[error(
-    "the budget of {budget_s:.0} s is spent before there is a reference of 4 samples, which takes {least_s:.0} s with what comes before \
-     it: --budget {enough_s}, or a smaller --size, measures something"
+    "the budget of {budget_s:.0} s is too small: a reference of 4 samples with its preparation takes {least_s:.0} s; use --budget \
+     {enough_s} or a smaller --size"
 )]
 pub struct NotMeasured {
-    /// Seconds that were given.
+    /// Seconds of the budget.
     pub budget_s: f64,
-    /// Seconds until there is a reference.
+    /// Seconds until a reference of four samples is drawn.
     pub least_s: f64,
-    /// Seconds that measure something.
+    /// Seconds of a sufficient budget.
     pub enough_s: u32,
 }
 
-/// A run whose budget has no time for so many samples of three colours measures a picture of fewer pixels: pictures by paths alone
+/// A run whose budget has no time for this many samples in RGB measures a picture with fewer pixels: all path-traced pictures together
 /// take about as many (measured: docs/cost.md).
 const WHOLE: f64 = 100.0;
 
-/// What was found out before it is drawn.
+/// Results of the pilot, from which the reference is planned.
 #[derive(Debug, Clone)]
 pub struct Pilot {
-    /// Of how many pixels it is, a side.
+    /// Planned size of the reference in pixels.
     pub size: [u32; 2],
-    /// Its rungs, `samples` being whatever they are.
+    /// Planned knobs of the reference; `samples` is not set yet.
     pub knobs: Knobs,
     /// GPU milliseconds of a sample.
     pub each_ms: f64,
-    /// Of a sample with three colours.
+    /// GPU milliseconds of a sample in RGB.
     pub plain_ms: f64,
-    /// Samples after which it resolves what it should, as far as the pilot tells.
+    /// Estimated samples for the resolution [`RESOLVED`].
     pub wanted: u32,
-    /// What a reader should know.
+    /// Warnings for the report.
     pub warnings: Vec<String>,
 }
 
-/// The means of four parts of a picture's samples, of the even and of the odd ones in turns.
+/// Means of four consecutive parts of a picture's samples, alternately of even and odd samples.
 type Parts = Vec<Picture>;
 
-/// Rounds, and what they came to.
+/// A reference as the mean of its rounds.
 pub struct Refined {
     parts: Parts,
     rounds: Vec<Round>,
     knobs: Knobs,
-    /// The file that the only round's command writes.
+    /// PNG file of the only round; `None` for several rounds.
     png: Option<Vec<u8>>,
 }
 
-/// The largest of the rungs 1, 4, 16, … that takes no longer than so many milliseconds; 4 at least, without which no parts tell
-/// the error.
+/// The largest of 4096, 1024, 256, 64 and 16 samples that take at most `limit_ms`, else 4, the least number of samples for an error
+/// estimate.
 #[must_use]
 pub fn samples_within(ms_each: f64, limit_ms: f64) -> u32 {
     [4096, 1024, 256, 64, 16].into_iter().find(|&n| f64::from(n) * ms_each <= limit_ms).unwrap_or(4)
 }
 
-/// Random numbers of a round, which nobody chooses by chance: what shares some with the reference is nearer to it than to the truth.
+/// Random seed of a round. A user is unlikely to choose the same seed: a picture that shares random numbers with the reference would seem
+/// closer to the truth than it is.
 fn seed_of(seed: u32, round: usize) -> u32 {
     seed ^ 0x2a2a_2a2a ^ (round as u32).wrapping_mul(0x9e37_79b9)
 }
@@ -113,7 +114,7 @@ fn told_by_wavelength(bench: &Bench<'_>) -> bool {
     materials || scene.lights.iter().any(|light| light.spectrum.is_some())
 }
 
-/// The mean of two pictures by their samples.
+/// Mean of two pictures, weighted by their samples.
 fn joined(a: &Picture, b: &Picture, samples: [u32; 2]) -> Picture {
     let share = f64::from(samples[1]) / (f64::from(samples[0]) + f64::from(samples[1]));
     let mean = |(a, b): (&[f32; 4], &[f32; 4])| {
@@ -122,13 +123,13 @@ fn joined(a: &Picture, b: &Picture, samples: [u32; 2]) -> Picture {
     Picture { width: a.width, height: a.height, rgba: a.rgba.iter().zip(&b.rgba).map(mean).collect() }
 }
 
-/// The last of so many parts of samples of which the mean, and that of all before, are known.
+/// The last of `parts` equal parts, from the mean of all parts and the mean of all parts before it.
 fn last_part(all: &Picture, before: &Picture, parts: f32) -> Picture {
     let part = |(a, b): (&[f32; 4], &[f32; 4])| std::array::from_fn(|c| parts * a[c] - (parts - 1.0) * b[c]);
     Picture { width: all.width, height: all.height, rgba: all.rgba.iter().zip(&before.rgba).map(part).collect() }
 }
 
-/// The mean of all even, or of all odd samples.
+/// Half buffer: mean of all even (`odd` = 0) or all odd (`odd` = 1) samples.
 fn half(parts: &Parts, odd: usize) -> Picture {
     mean_of(&parts.iter().skip(odd).step_by(2).collect::<Vec<_>>())
 }
@@ -137,7 +138,7 @@ fn all(parts: &Parts) -> Picture {
     mean_of(&parts.iter().collect::<Vec<_>>())
 }
 
-/// Draws a picture by paths; parts of its samples, its file, and its GPU time.
+/// Draws a path-traced picture; returns the parts of its samples, its PNG file and its GPU milliseconds.
 fn draw(
     bench: &Bench<'_>,
     knobs: &Knobs,
@@ -145,7 +146,7 @@ fn draw(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<(Parts, Vec<u8>, f64)> {
     let samples = knobs.samples.count();
-    ensure!(samples >= 4, "{samples} samples have no parts: our mistake");
+    ensure!(samples >= 4, "{samples} samples cannot be split into parts: a bug of Etalon");
     let each = samples / 2;
     let mut renderer = bench.renderer(knobs, seed)?;
     let mut drawing = renderer.begin(bench.camera, samples);
@@ -158,7 +159,7 @@ fn draw(
         }
         if done.is_multiple_of(each) {
             let Some(now) = renderer.half_means_alone()? else {
-                bail!("a reference by paths has no halves: our mistake")
+                bail!("a path-traced reference has no half buffers: a bug of Etalon")
             };
             let count = (done / each) as f32;
             parts.extend(match &before {
@@ -176,18 +177,18 @@ fn draw(
     Ok((parts, renderer.png(&rendered)?, total(&rendered)))
 }
 
-/// What a pilot's picture says.
+/// Measurements of a pilot picture.
 struct Look {
     parts: Parts,
     /// GPU milliseconds of a sample.
     each_ms: f64,
-    /// Samples after which it would resolve what a reference should.
+    /// Estimated samples for the resolution [`RESOLVED`].
     wanted: f64,
 }
 
 fn look(bench: &Bench<'_>, colour: &str) -> Result<Look> {
     let knobs = set(&set(&Knobs::exact(), "samples", &PILOT.to_string())?, "colour", colour)?;
-    // What compiling takes is no sample's time.
+    // Compile first, so that the time of a sample does not contain it.
     bench.warm_up(&knobs)?;
     let (parts, _, ms) = draw(bench, &knobs, bench.settings.seed, &mut |_| ())?;
     let samples = f64::from(PILOT);
@@ -197,11 +198,11 @@ fn look(bench: &Bench<'_>, colour: &str) -> Result<Look> {
 }
 
 impl Pilot {
-    /// Draws a few samples. `called_for`: whether the scene calls for the knob `colour`; `budget_ms`: what the run may take, and
-    /// `share` what the reference may of it; `may_shrink`: whether fewer pixels than the bench's may be measured.
+    /// Draws a few samples and plans the reference. `called_for`: whether the scene calls for the knob `colour`. `budget_ms`: time budget of
+    /// the run; `share`: fraction of it for the reference. `may_shrink`: whether to measure fewer pixels if the budget is small.
     ///
     /// # Errors
-    /// When they cannot be drawn.
+    /// When the pilot cannot be drawn.
     pub fn draw(bench: &Bench<'_>, called_for: bool, [budget_ms, share]: [f64; 2], may_shrink: bool) -> Result<Self> {
         let begun = Instant::now();
         let asked = bench.settings.size;
@@ -209,7 +210,7 @@ impl Pilot {
         let bench = &resized(bench, few);
         let plain = look(bench, "rgb")?;
         let by_wavelength = called_for && told_by_wavelength(bench);
-        // Bands are programs of their own: compiling them takes about as long again.
+        // Spectral rendering has its own programs, which must be compiled too.
         let mut has_time = BANDS_TAKE * begun.elapsed().as_secs_f64() * 1e3 < PILOT_SHARE * budget_ms;
         let bands = if by_wavelength && has_time { Some(look(bench, "spectral:8")?) } else { None };
         let mut seen = bands.filter(|bands| differ(bench, &plain.parts, &bands.parts));
@@ -226,14 +227,13 @@ impl Pilot {
         let sizes = (0..).map(|n| fewer(asked, 4.0_f64.powi(n))).take_while(|size| pixels(*size) > pixels(few));
         let size = if may_shrink { sizes.chain([few]).find(fits).unwrap_or(few) } else { asked };
         let more = pixels(size) / pixels(few);
-        // What is resolved goes with the root of the samples, and with the fourth root of the pixels.
+        // The resolution scales with the square root of the samples and with the fourth root of the pixels.
         let wanted = |look: &Look| (look.wanted / more.sqrt()).ceil().clamp(4.0, 4096.0) as u32;
         let plain_ms = more * plain.each_ms;
         let rungs = |colour: &str| set(&Knobs::exact(), "colour", colour);
         let Some(seen) = seen else {
-            let same = "bands of wavelengths change nothing in this picture that is more than noise: the reference has three colours";
-            let short = "the budget has no time for bands of wavelengths, by which the scene tells something: the reference has three \
-                         colours";
+            let same = "spectral rendering changes nothing significant in this picture: the reference is drawn in RGB";
+            let short = "the budget has no time for spectral rendering, although the scene has spectra: the reference is drawn in RGB";
             let why = if by_wavelength && !has_time { short } else { same };
             let warnings = if called_for { vec![why.to_owned()] } else { Vec::new() };
             let knobs = rungs("rgb")?;
@@ -242,14 +242,14 @@ impl Pilot {
         let each_ms = |bands: u32| more * seen.each_ms * f64::from(bands) / 8.0;
         let affordable = |bands: &u32| samples_within(each_ms(*bands), share * budget_ms) >= FEWEST_SAMPLES;
         let bands = BANDS.into_iter().find(affordable).unwrap_or(8);
-        // Each band has random numbers of its own.
+        // Each band has its own random numbers.
         let wanted = (wanted(&seen) * 8).div_ceil(bands).max(FEWEST_SAMPLES);
         let knobs = rungs(&format!("spectral:{bands}"))?;
         Ok(Self { size, knobs, each_ms: each_ms(bands), plain_ms, wanted, warnings: Vec::new() })
     }
 }
 
-/// Whether two pictures differ by more than noise.
+/// Whether the difference of two pictures is significant.
 fn differ(bench: &Bench<'_>, a: &Parts, b: &Parts) -> bool {
     let (view, size) = (bench.settings.view_transform(), bench.settings.size);
     let halves = |parts: &Parts| -> [Shown; 2] { [0, 1].map(|odd| shown(&half(parts, odd), &view)) };
@@ -259,10 +259,10 @@ fn differ(bench: &Bench<'_>, a: &Parts, b: &Parts) -> bool {
 }
 
 impl Refined {
-    /// One more round of so many samples, after those of `known`.
+    /// Draws one more round of `samples` samples, after the rounds of `known`.
     ///
     /// # Errors
-    /// When it cannot be drawn.
+    /// When the round cannot be drawn.
     pub fn round(
         known: Option<Self>,
         bench: &Bench<'_>,
@@ -285,7 +285,7 @@ impl Refined {
         })
     }
 
-    /// Samples of each pixel.
+    /// Samples per pixel.
     #[must_use]
     pub fn samples(&self) -> u32 {
         self.rounds.iter().map(|round| round.samples).sum()
@@ -301,31 +301,31 @@ impl Refined {
         self.rounds.iter().map(|round| round.gpu_ms).sum()
     }
 
-    /// Its sides in pixels.
+    /// Width and height in pixels.
     #[must_use]
     pub fn size(&self) -> [u32; 2] {
         self.parts.first().map_or([0, 0], |part| [part.width, part.height])
     }
 
-    /// Its rungs; those of its first round's samples.
+    /// Knobs of the reference, with the samples of the first round.
     #[must_use]
     pub fn knobs(&self) -> &Knobs {
         &self.knobs
     }
 
-    /// Whether one run should not draw more rounds.
+    /// Whether this run has drawn its largest number of rounds; `before` is the number of rounds at its start.
     #[must_use]
     pub fn has_many_rounds(&self, before: usize) -> bool {
         self.rounds.len() - before >= MOST_ROUNDS
     }
 
-    /// How many.
+    /// Number of rounds.
     #[must_use]
     pub fn rounds(&self) -> usize {
         self.rounds.len()
     }
 
-    /// What errors are told against.
+    /// The reference picture, ready for error measurements.
     #[must_use]
     pub fn truth(&self, settings: &Settings) -> Truth {
         let (film, half) = (all(&self.parts), half(&self.parts, 0));
@@ -335,7 +335,8 @@ impl Refined {
         Truth { film, half, shown, display }
     }
 
-    /// What is said of it; `command`: the first words of every command, `priced`: samples of pictures that are priced from it.
+    /// Facts of the reference for the table, and its PNG file. `command`: beginning of every printed command. `priced`: samples of the
+    /// pictures with base `exact`.
     ///
     /// # Errors
     /// When pictures cannot be compared or encoded.
@@ -380,10 +381,10 @@ impl Refined {
         Ok((reference, png))
     }
 
-    /// Writes all that a later run goes on with: the film with its parts, and `reference` last.
+    /// Writes the files from which a later run continues: the film with its parts, the PNG, and then `reference`.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// When a file cannot be written.
     pub fn write(&self, folder: &Path, reference: &Reference, png: &[u8]) -> Result<()> {
         let part = |(i, part): (usize, &Picture)| Aov {
             name: format!("part_{i}"),
@@ -396,10 +397,10 @@ impl Refined {
         file::write(&folder.join("reference.json"), serde_json::to_string_pretty(reference)?.as_bytes())
     }
 
-    /// What [`Refined::write`] wrote, and what it said; `None` where nothing was written.
+    /// Reads the files of [`Refined::write`]; `None` where there are none.
     ///
     /// # Errors
-    /// When it is not what was written.
+    /// When a file is damaged.
     pub fn read(folder: &Path) -> Result<Option<(Self, Reference)>> {
         let path = folder.join("reference.json");
         if !path.exists() {
@@ -435,7 +436,7 @@ impl Refined {
     }
 }
 
-/// A film as a display shows it.
+/// Display values of a film.
 pub(super) fn display_of(film: &Picture, settings: &Settings) -> Display {
     let pixel = |v: [f32; 3]| {
         let [r, g, b] = v.map(|v| tone::quantise(f64::from(v)));
@@ -445,7 +446,7 @@ pub(super) fn display_of(film: &Picture, settings: &Settings) -> Display {
     Display { width: film.width, height: film.height, rgba }
 }
 
-/// Draws rounds until it resolves what it should, or `time_for` says that there is no time for another of so many samples.
+/// Draws rounds until the reference has `wanted` samples or `seconds_left` leaves no time for another round.
 ///
 /// # Errors
 /// When a round cannot be drawn.

@@ -1,7 +1,7 @@
-//! The score of a run: what the other files do, in order.
+//! Sequence of a run of `etalon cost`.
 //!
-//! A first round of the reference, presets and every rung of `local`, a search for combinations, every rung of the reference's, and with
-//! what time is left more rounds of the reference. Then all is judged by it.
+//! A first round of the reference; presets and every rung relative to `local`; a search for combinations; every rung relative to the
+//! reference's rungs; in the remaining time, more rounds of the reference. Then all pictures are evaluated against it.
 
 use std::time::Instant;
 
@@ -27,33 +27,34 @@ use etalon::image::file;
 use etalon::image::metric::AnyPicture;
 use etalon::plan::Knobs;
 
-/// Shares of the budget: for the reference before prices are drawn from its rungs, and for pictures of the size that was asked for where
+/// Fractions of the budget: for the reference before the changes relative to `exact` are drawn, and for pictures of the requested size if
 /// fewer pixels are measured.
 const REFERENCE_SHARE: f64 = 0.4;
 const AFTER_SHARE: f64 = 0.08;
-/// Share of the budget for the first round of the reference.
+/// Fraction of the budget for the first round of the reference.
 const FIRST_SHARE: f64 = 0.12;
-/// Seconds of a budget from which on a page is written before the end.
+/// Budgets from this many seconds on write a preliminary report.
 const EARLY_S: f64 = 90.0;
-/// What finding out how times grow with pixels is taken to cost: four starts, and samples by paths. A guess on the safe side.
+/// Estimated time to measure the growth of times with pixels: seconds for four starts, and a number of path-traced samples. Chosen rather
+/// too large.
 const GROWTH_S: f64 = 1.6;
 const GROWTH_SAMPLES: f64 = 10.0;
 /// A picture is drawn twice, the first time to compile.
 const TWICE: f64 = 2.0;
 
-/// A run of some size.
+/// A run at a measured size.
 pub(super) struct Run<'a> {
-    /// What is asked for.
+    /// The requested run.
     pub sweep: &'a Sweep<'a>,
-    /// What draws, in that size.
+    /// Bench with the measured size.
     pub bench: Bench<'a>,
-    /// The first words of every command.
+    /// Beginning of every printed command.
     pub command: &'a str,
-    /// What is known before anything is drawn.
+    /// Results of the pilot.
     pub pilot: Pilot,
 }
 
-/// What is found out beside pictures.
+/// Results of a run other than pictures.
 #[derive(Default)]
 struct Found {
     search: Vec<Tried>,
@@ -62,10 +63,10 @@ struct Found {
 }
 
 impl Sweep<'_> {
-    /// Measures, and writes each picture as it is drawn.
+    /// Runs all measurements; each picture is written when it is drawn.
     ///
     /// # Errors
-    /// When something cannot be drawn or written.
+    /// When the budget is too small, or when the reference cannot be drawn or a file cannot be written.
     pub fn run(&self, listener: &mut Listener<'_>) -> Result<Table> {
         self.claim_folder()?;
         let budget_s = f64::from(self.extent.budget_s);
@@ -89,7 +90,7 @@ impl Sweep<'_> {
 }
 
 impl Run<'_> {
-    /// Measures. `begun`: the reference as far as an interrupted run has drawn it.
+    /// Runs all measurements. `begun`: the rounds of the reference that an interrupted run has drawn.
     pub(super) fn measure(
         &self,
         states: &States,
@@ -109,14 +110,14 @@ impl Run<'_> {
         let mut refined = self.first_round(begun, &m.pace, listener)?;
         found.warnings.extend(pilot.warnings.iter().cloned());
         let rungs = refined.knobs().clone();
-        // What is given a number of samples is the same whatever the clock says.
+        // With a given number of samples the pictures must not depend on the clock.
         let priced = reference_samples.map(|samples| if samples >= 256 { 16 } else { 4 });
         let each = [pilot.each_ms, pilot.plain_ms];
         let agenda = Agenda::new(bench, states, &rungs, each, priced, budget_s * 1e3)?;
         let (mut truth, mut reference) = self.describe(&refined, agenda.priced())?;
         let mut local = m.base(&base_task("local", Family::Preset, &agenda.local), listener.step)?;
         self.expect(&mut m, &agenda);
-        // One answer beside `local` comes before the reference's share.
+        // One preset besides `local` is drawn even if the reference needs the rest of the budget.
         let (first, presets) = agenda.presets.split_at(1.min(agenda.presets.len()));
         for task in first {
             m.picture(task, &mut local, listener.step)?;
@@ -124,11 +125,11 @@ impl Run<'_> {
         if ends {
             let share = REFERENCE_SHARE * budget_s - reference.gpu_ms / 1e3;
             let missing = f64::from(pilot.wanted.saturating_sub(refined.samples())) * refined.each_ms() / 1e3;
-            // What is too little for a round is there for pictures.
+            // Time that is too short for a round is left to pictures.
             let round = 4.0 * refined.each_ms() / 1e3;
             m.pace.reserved_s = Some(share.min(missing)).filter(|seconds| *seconds >= round).unwrap_or(0.0);
         }
-        // First what answers most, should the budget end.
+        // The most informative pictures come first, in case the budget ends.
         for task in presets.iter().chain(&agenda.of_local) {
             m.picture(task, &mut local, listener.step)?;
         }
@@ -143,7 +144,7 @@ impl Run<'_> {
             m.picture(task, &mut local, listener.step)?;
         }
         if ends {
-            // Its share comes before prices that nobody could believe without it.
+            // The reference gets its share before the changes relative to `exact`, whose errors need a good reference.
             let share = std::mem::take(&mut m.pace.reserved_s);
             refined = self.more(refined, &m.pace, pilot.wanted, share, listener)?;
             (truth, reference) = self.describe(&refined, agenda.priced())?;
@@ -169,7 +170,7 @@ impl Run<'_> {
         }
         if agenda.plain.colour != rungs.colour {
             found.warnings.push(format!(
-                "the reference has {} bands of wavelengths, of {} at most; knobs other than colour are priced in three colours",
+                "the reference has {} of at most {} bands of wavelengths; knobs other than colour are measured in RGB",
                 rungs.colour.bands(),
                 BANDS[0]
             ));
@@ -185,16 +186,16 @@ impl Run<'_> {
         Ok(table)
     }
 
-    /// Whether fewer pixels are measured than were asked for.
+    /// Whether fewer pixels are measured than requested.
     fn is_smaller(&self) -> bool {
         self.bench.settings.size != self.sweep.bench.settings.size
     }
 
-    /// The reference as far as it is drawn before anything else: what an interrupted or an earlier run has drawn, or a first round.
+    /// The reference of an interrupted or earlier run, or else a first round.
     fn first_round(&self, begun: Option<Refined>, pace: &Pace<'_>, listener: &mut Listener<'_>) -> Result<Refined> {
         let SweepExtent { budget_s, reference_samples, .. } = self.sweep.extent;
         let (budget_s, pilot) = (f64::from(budget_s), &self.pilot);
-        // What cannot be read is drawn again.
+        // A reference that cannot be read is drawn again.
         let kept = || Some(Refined::read(&(self.sweep.kept)(self.command)?).ok()??.0);
         if let Some(known) = begun.or_else(|| if reference_samples.is_none() { kept() } else { None }) {
             return Ok(known);
@@ -208,7 +209,7 @@ impl Run<'_> {
                 samples_within(pilot.each_ms, FIRST_SHARE * budget_s * 1e3).min(pilot.wanted.next_power_of_two().max(4))
             }
         };
-        // The next rung at least, where a power of two is none.
+        // Round up to a rung: rungs are powers of four.
         let samples = if samples.trailing_zeros() % 2 == 1 { 2 * samples } else { samples };
         let left_s = |at: &Progress| f64::from(at.of - at.done) * pilot.each_ms / 1e3 + (1.0 - FIRST_SHARE) * budget_s;
         let refined = Refined::round(None, &self.bench, &pilot.knobs, samples, &mut |at| {
@@ -218,7 +219,7 @@ impl Run<'_> {
         Ok(refined)
     }
 
-    /// More rounds of the reference, for so many seconds at most.
+    /// Draws more rounds of the reference, for at most `seconds` seconds.
     fn more(
         &self,
         refined: Refined,
@@ -235,7 +236,7 @@ impl Run<'_> {
         })
     }
 
-    /// What errors are told against, and what is said of it; both are written.
+    /// The reference picture and its facts; writes both.
     fn describe(&self, refined: &Refined, priced: u32) -> Result<(Truth, Reference)> {
         let truth = refined.truth(&self.bench.settings);
         let (reference, png) = refined.describe(&truth, self.command, priced, &self.bench)?;
@@ -244,7 +245,7 @@ impl Run<'_> {
         Ok((truth, reference))
     }
 
-    /// Tells the clock what is to come.
+    /// Adds the coming pictures to the clock.
     fn expect(&self, m: &mut Measuring<'_>, agenda: &Agenda) {
         let pilot = &self.pilot;
         let (local, plain) = (&agenda.local, &agenda.plain);
@@ -267,7 +268,7 @@ impl Run<'_> {
         pace.expects(1 + count.iter().sum::<usize>() + PICTURES + if with_orders { orders::PICTURES } else { 0 });
     }
 
-    /// Every rung of the reference's rungs, changed alone.
+    /// Draws every change relative to `exact`.
     fn prices_of_exact(&self, m: &mut Measuring<'_>, agenda: &Agenda, listener: &mut Listener<'_>) -> Result<()> {
         let next = m.pace.forecast.next();
         if m.pace.too_late(next) {
@@ -281,7 +282,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Orders of the rules of quadrature: one part of a run in shards draws them.
+    /// Measures the orders of the quadrature rules; in a sharded run the first shard draws them.
     fn orders(
         &self,
         m: &mut Measuring<'_>,
@@ -313,12 +314,14 @@ impl Run<'_> {
                 file::write(&path, serde_json::to_string_pretty(&orders)?.as_bytes())?;
                 found.orders = orders;
             }
-            Err(error) => m.warnings.push(format!("\"orders\" cannot be drawn here: {error:#}")),
+            Err(error) => {
+                m.warnings.push(format!("the orders of quadrature cannot be measured on this device: {error:#}"))
+            }
         }
         Ok(())
     }
 
-    /// The recommended settings at the size that was asked for: drawn in the seconds that are left, or foretold.
+    /// Times of the recommended settings at the requested size: measured if there are seconds left, else extrapolated.
     fn at_size(&self, table: &Table, mut left_s: f64) -> Result<RequestedSize> {
         let asked = self.sweep.bench.settings.size;
         let begun = Instant::now();
@@ -359,24 +362,23 @@ impl Run<'_> {
     ) -> Table {
         let mut warnings = Vec::new();
         if self.bench.device.info().kind == "cpu" {
-            warnings
-                .push("a software device: GPU times are those of this processor, and of what else it does".to_owned());
+            warnings.push("software device: GPU times depend on this CPU and on its other load".to_owned());
         }
         if judged.points.iter().all(|point| point.gpu_ms.high == 0.0) {
-            warnings.push("this device tells no times: errors are measured here, prices are not".to_owned());
+            warnings.push("this device has no timestamps: errors are measured, times are not".to_owned());
         }
         if self.is_smaller() {
             let ([w, h], [x, y]) = (self.sweep.bench.settings.size, self.bench.settings.size);
             warnings.push(format!(
-                "the budget has no time for pictures of {w}x{h}: all is measured at {x}x{y}, and only the recommended settings are timed \
-                 at {w}x{h} too; a larger --budget measures all of it there"
+                "the budget is too small for pictures of {w}x{h}: everything is measured at {x}x{y}, and only the recommended settings are \
+                 also timed at {w}x{h}; a larger --budget measures everything there"
             ));
         }
         warnings.extend(found.warnings.iter().chain(&m.warnings).cloned());
         if !reference.converged {
             warnings.push(format!(
-                "the reference's noise hides differences below {:.2} % of the range after {} samples; the aim is {:.1} %: a second run \
-                 goes on with it",
+                "do not trust differences below {:.2} %: the reference is still noisy after {} samples (target {:.1} %); run the same \
+                 command again to improve the reference",
                 100.0 * reference.resolution,
                 reference.samples,
                 100.0 * RESOLVED

@@ -1,4 +1,4 @@
-//! Combinations of rungs that single prices promise something of.
+//! Greedy search for combinations of rungs, guided by the measured costs of single changes.
 
 use std::collections::BTreeMap;
 
@@ -13,16 +13,16 @@ use super::statistics::{Estimate, Interval, MANY, mean, standard_errors};
 use super::table::{Family, INVISIBLE, Price, Tried};
 use etalon::plan::{KNOBS, Knobs};
 
-/// Pictures that the search may draw.
+/// Largest number of pictures that the search draws.
 pub const PICTURES: usize = 8;
-/// Statements of a search, about: what each rung adds, and whether each step is one.
+/// Approximate number of statements of a search, for the Bonferroni correction: the error of each rung, and each step.
 const STATEMENTS: usize = 100;
-/// Share of the squared error that a step has to promise to take away.
+/// Least fraction of the squared error that a step must be predicted to remove.
 const WORTH: f64 = 0.01;
-/// Mean squared difference of displayed values below which the search leaves out what it pays for: a thousandth of their range.
+/// Mean squared difference of display values below which a costly rung counts as useless: (a thousandth of their range)².
 const NOTHING: f64 = 1e-6;
 
-/// What a rung adds to the squared error and to the time of `local`.
+/// Change of squared error and time when one knob of `local` is set to a rung.
 struct Rung {
     knob: &'static str,
     to: &'static str,
@@ -34,7 +34,7 @@ fn task(name: String, knobs: &Knobs) -> Task {
     Task { name, family: Family::Search, knobs: knobs.clone(), change: None }
 }
 
-/// What each rung of `local` was found to add.
+/// Measured changes of each rung relative to `local`, and the time of `local` in milliseconds.
 fn rungs(records: &[Record], judge: &Judge<'_>) -> Result<(Vec<Rung>, f64)> {
     let Some(local) = records.iter().find(|record| record.name == "local") else { return Ok((Vec::new(), 0.0)) };
     let base_ms = Interval::of(&local.ms).median;
@@ -55,8 +55,8 @@ fn rungs(records: &[Record], judge: &Judge<'_>) -> Result<(Vec<Rung>, f64)> {
     Ok((all, base_ms))
 }
 
-/// From the quickest rungs towards less error, a rung further at a time: that which single prices promise most of for its time, and kept
-/// only if the picture has less error by more than the reference's noise.
+/// Greedy search from the fastest rungs towards less error. Each step applies the change to a more exact rung with the best predicted
+/// error reduction per millisecond, and is kept only if the drawn picture has significantly less error.
 ///
 /// # Errors
 /// When files cannot be read or written.
@@ -95,14 +95,14 @@ pub fn search(
             for &to in knob.rungs {
                 let measured =
                     to == knob.rung(local) || rungs.iter().any(|rung| rung.knob == knob.name && rung.to == to);
-                // A rung that approximates more and has less error undoes another error: it is no improvement of its own.
+                // A rung that approximates more but has less error cancels another error: it is no improvement of its own.
                 let further = knobs.with(knob.name, to).filter(|then| knob.place(then) > knob.place(&knobs));
                 let possible = further.is_some();
                 if !measured || !possible || refused.contains(&(knob.name, to)) {
                     continue;
                 }
                 let then = at(knob.name, to);
-                // What cannot be told from nothing promises nothing; its time counts all the same.
+                // An error change that is not significant counts as 0; its time counts.
                 let told = |more: Estimate| if more.is_significant(sure) { more.mean } else { 0.0 };
                 let gain = told(now.0) - told(then.0);
                 let ms = (then.1 - now.1).max(0.01 * base_ms);
@@ -141,7 +141,8 @@ fn local_rung(knobs: &Knobs, name: &str) -> &'static str {
     KNOBS.iter().find(|knob| knob.name == name).map_or("", |knob| knob.rung(knobs))
 }
 
-/// The exact rungs less all that cost time and changed nothing that is seen: whether it is still so together.
+/// Draws the exact rungs without all rungs that cost time and change nothing visible, and checks that the combination still changes
+/// nothing. `None` where no rung is useless, or where there is no time.
 ///
 /// # Errors
 /// When files cannot be read or written.
@@ -152,7 +153,7 @@ pub fn without_waste(
     base: &mut Base,
     progress: &mut dyn FnMut(Step<'_>),
 ) -> Result<Option<Tried>> {
-    // Of each knob the rung that saves most of those that change nothing.
+    // For each knob the rung that saves most time without a visible change.
     let mut best: BTreeMap<&str, &Price> = BTreeMap::new();
     for price in prices.iter().filter(|price| price.base == Family::Exact && price.saves()) {
         let unseen = price.flip_between < INVISIBLE || !price.error_told;

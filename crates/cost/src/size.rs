@@ -1,7 +1,7 @@
-//! Sizes of the same picture: what is measured of fewer pixels, and what it says of more.
+//! Extrapolation of errors and times between sizes of the same picture.
 //!
-//! What an error is in the mean over a picture depends little on how many pixels sample it. A time is one part for each picture and one
-//! for each pixel, which two sizes tell.
+//! The mean error of a picture depends little on the number of pixels. A time is the sum of a constant per picture and a constant per
+//! pixel; measurements at two sizes determine both.
 
 use anyhow::Result;
 
@@ -12,31 +12,31 @@ use super::warm::Bench;
 use etalon::frame::Settings;
 use etalon::plan::{Knobs, Model};
 
-/// What a time scatters by beside noise, because caches are filled otherwise (measured: docs/cost.md).
+/// Relative scatter of an extrapolated time in addition to noise, because caches behave differently (measured: docs/cost.md).
 const OTHER_SIZE: f64 = 0.25;
 
-/// Pictures of which the quickest counts take so many milliseconds, or are five.
+/// Total milliseconds of the renders of which the fastest counts, unless there are five.
 const ENOUGH_MS: f64 = 300.0;
 
-/// How many pixels a picture has.
+/// Number of pixels.
 #[must_use]
 pub fn pixels(size: [u32; 2]) -> f64 {
     size.map(f64::from).iter().product()
 }
 
-/// A size with so many times fewer pixels.
+/// A size with about `times` times fewer pixels.
 #[must_use]
 pub fn fewer(size: [u32; 2], times: f64) -> [u32; 2] {
     size.map(|side| (f64::from(side) / times.sqrt()).round().max(1.0) as u32)
 }
 
-/// The same picture with another number of pixels.
+/// The bench with another size of the picture.
 #[must_use]
 pub fn resized<'a>(bench: &Bench<'a>, size: [u32; 2]) -> Bench<'a> {
     Bench { settings: Settings { size, ..bench.settings.clone() }, ..*bench }
 }
 
-/// How times grow from one size to another: the factors of pictures by paths, and of all others.
+/// Growth factors of times from one size to another, for path-traced pictures and for all others.
 #[derive(Debug, Clone, Copy)]
 pub struct Growth {
     paths: f64,
@@ -44,11 +44,11 @@ pub struct Growth {
 }
 
 impl Growth {
-    /// From the bench's size to `size`, by what both kinds of pictures take at the bench's and at a quarter of it: those of the exact
-    /// rungs in three colours, which every run has compiled, and those of `local`.
+    /// Growth from the bench's size to `size`. Times are measured at the bench's size and at a quarter of its pixels, with the exact rungs in
+    /// RGB, which every run has compiled, and with `local`.
     ///
     /// # Errors
-    /// When they cannot be drawn.
+    /// When a picture cannot be drawn.
     pub fn of(bench: &Bench<'_>, size: [u32; 2]) -> Result<Self> {
         let times = pixels(size) / pixels(bench.settings.size);
         let factor = |knobs: &Knobs| -> Result<f64> {
@@ -60,14 +60,14 @@ impl Growth {
         Ok(Self { paths, others: factor(&Knobs::of(Model::Local))? })
     }
 
-    /// As if all of a time went with pixels: what is known without drawing anything.
+    /// Growth in proportion to pixels, without measuring.
     #[must_use]
     pub fn by_pixels(bench: &Bench<'_>, size: [u32; 2]) -> Self {
         let times = pixels(size) / pixels(bench.settings.size);
         Self { paths: times, others: times }
     }
 
-    /// What a point's time becomes.
+    /// Extrapolated time of a point.
     #[must_use]
     pub fn of_time(&self, point: &Point) -> Interval {
         let by_paths = point.knobs.get("indirect").is_some_and(|rung| rung == "path");
@@ -81,7 +81,7 @@ impl Growth {
     }
 }
 
-/// The share of a time that does not go with pixels, by two sizes.
+/// Fraction of a time that does not depend on the number of pixels, measured at two sizes.
 fn share_of_a_picture(bench: &Bench<'_>, knobs: &Knobs) -> Result<f64> {
     let time = |bench: &Bench<'_>| -> Result<f64> {
         let mut warm = bench.warm_up(knobs)?;

@@ -1,24 +1,24 @@
-//! Estimates and how sure they are, where many statements are made at once.
+//! Estimates with standard errors, and significance tests with a Bonferroni correction for many simultaneous statements.
 
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
-/// Chance that any one of a report's statements is wrong by noise alone.
+/// Family-wise error rate: probability that any statement of a report is wrong due to noise.
 const LEVEL: f64 = 0.01;
 
-/// A number and how well it is known.
+/// A number with an interval: the range of measurements, or a confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
-    /// In the middle.
+    /// Median or estimate.
     pub median: f64,
-    /// At least.
+    /// Lower end.
     pub low: f64,
-    /// At most.
+    /// Upper end.
     pub high: f64,
 }
 
 impl Interval {
-    /// The middle and both ends of some numbers, at least one.
+    /// Median, minimum and maximum of at least one number.
     #[must_use]
     pub fn of(values: &[f64]) -> Self {
         let mut sorted = values.to_vec();
@@ -28,7 +28,7 @@ impl Interval {
         Self { median: 0.5 * (at(n.saturating_sub(1) / 2) + at(n / 2)), low: at(0), high: at(n.saturating_sub(1)) }
     }
 
-    /// The root of a mean square, which is not below 0.
+    /// Square root of an interval of mean squares; negative values count as 0.
     #[must_use]
     pub fn root(&self) -> Self {
         let root = |square: f64| square.max(0.0).sqrt();
@@ -36,57 +36,57 @@ impl Interval {
     }
 }
 
-/// A number that was estimated.
+/// An estimate with its standard error and a bound of its bias.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
-    /// In the mean.
+    /// Mean.
     pub mean: f64,
-    /// Its standard error.
+    /// Standard error of the mean.
     pub deviation: f64,
-    /// What it may be off by beside noise, whatever the noise is.
+    /// Bound of the bias.
     pub bias: f64,
 }
 
 impl Estimate {
-    /// Two standard errors either way, and what it may be off by.
+    /// Confidence interval of two standard errors (95 %), widened by the bound of the bias.
     #[must_use]
     pub fn interval(&self) -> Interval {
         let reach = 2.0 * self.deviation + self.bias;
         Interval { median: self.mean, low: self.mean - reach, high: self.mean + reach }
     }
 
-    /// Whether it is above 0 by more than so many standard errors and what it may be off by.
+    /// Whether the mean is significantly above 0: by more than `standard_errors` standard errors and the bound of the bias.
     #[must_use]
     pub fn is_above(&self, standard_errors: f64) -> bool {
         self.mean > standard_errors * self.deviation + self.bias
     }
 
-    /// Whether it is below 0 by more than that.
+    /// Whether the mean is significantly below 0.
     #[must_use]
     pub fn is_below(&self, standard_errors: f64) -> bool {
         -self.mean > standard_errors * self.deviation + self.bias
     }
 
-    /// Whether it is one or the other.
+    /// Whether the mean differs significantly from 0.
     #[must_use]
     pub fn is_significant(&self, standard_errors: f64) -> bool {
         self.is_above(standard_errors) || self.is_below(standard_errors)
     }
 }
 
-/// How many standard errors one of so many statements has to be away from nothing, so that all of them together are wrong with a
-/// chance of one in a hundred (Bonferroni). Standard errors that were themselves estimated from few numbers are less sure:
-/// `freedom` is how many, less what was estimated from them (Student 1908).
+/// Number of standard errors from zero that makes one of `statements` statements significant, so that the probability of any wrong
+/// statement is at most 1 % (two-sided test, Bonferroni correction). It is a quantile of Student's t distribution with `freedom` degrees
+/// of freedom of the standard error (Student 1908).
 #[must_use]
 pub fn standard_errors(statements: usize, freedom: f64) -> f64 {
     let tail = LEVEL / (2.0 * statements.max(1) as f64);
     StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(f64::INFINITY, |t| t.inverse_cdf(1.0 - tail))
 }
 
-/// Degrees of freedom from which nobody tells Student's distribution from the normal one: those of pixels.
+/// Degrees of freedom of estimates over pixels, for which Student's t distribution is practically normal.
 pub const MANY: f64 = 1e4;
 
-/// The standard deviation of numbers about the mean of their group, and its degrees of freedom. Groups of one tell nothing.
+/// Pooled standard deviation within groups, and its degrees of freedom; `None` where every group has a single number.
 #[must_use]
 pub fn pooled(groups: &[Vec<f64>]) -> Option<(f64, f64)> {
     let (mut squares, mut freedom) = (0.0, 0.0);
@@ -98,7 +98,7 @@ pub fn pooled(groups: &[Vec<f64>]) -> Option<(f64, f64)> {
     (freedom > 0.0).then(|| ((squares / freedom).sqrt(), freedom))
 }
 
-/// The mean of some numbers, at least one.
+/// Mean of at least one number.
 #[must_use]
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn more_statements_take_more() {
-        // Quantiles of the normal distribution at 0.995 and 0.99995, and Student's with 2 at 0.995 (tables).
+        // Tabulated quantiles: normal distribution at 0.995 and 0.99995, Student's t with 2 degrees of freedom at 0.995.
         assert!((standard_errors(1, MANY) - 2.576).abs() < 2e-3, "{}", standard_errors(1, MANY));
         assert!((standard_errors(100, MANY) - 3.891).abs() < 5e-3, "{}", standard_errors(100, MANY));
         assert!((standard_errors(1, 2.0) - 9.925).abs() < 1e-3, "{}", standard_errors(1, 2.0));
@@ -118,7 +118,7 @@ mod tests {
 
     #[test]
     fn groups_have_one_spread() {
-        // Two about 1 and 10, both with a deviation of √2 from one degree of freedom each.
+        // Groups about 1 and 10, each with a deviation of √2 and one degree of freedom.
         let (deviation, freedom) = pooled(&[vec![0.0, 2.0], vec![9.0, 11.0], vec![5.0]]).expect("a spread");
         assert!((deviation - 2.0_f64.sqrt()).abs() < 1e-12 && freedom == 2.0);
         assert!(pooled(&[vec![1.0]]).is_none());

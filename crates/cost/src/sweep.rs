@@ -1,4 +1,4 @@
-//! A run of `etalon cost`: what is asked for, its folder, and joining its parts (`run.rs` measures).
+//! Request of a run of `etalon cost`, its folder, and the merge of a sharded run. `run.rs` measures.
 
 use std::path::{Path, PathBuf};
 
@@ -13,50 +13,50 @@ use super::warm::Bench;
 use etalon::image::file;
 use etalon::image::metric::AnyPicture;
 
-/// How much is measured.
+/// Extent of a run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SweepExtent {
-    /// Seconds to be spent.
+    /// Time budget in seconds.
     pub budget_s: u32,
-    /// Samples of the reference, whatever that takes; `None`: what the budget allows.
+    /// Samples of the reference, regardless of the time; `None`: as many as the budget allows.
     pub reference_samples: Option<u32>,
-    /// This part of so many, counted from 1.
+    /// Index (from 1) and number of the parts of a sharded run.
     pub shard: [u32; 2],
 }
 
-/// A run.
+/// Request of a run.
 pub struct Sweep<'a> {
-    /// What draws.
+    /// Bench with the requested size.
     pub bench: Bench<'a>,
-    /// Where the results go.
+    /// Folder of the results.
     pub folder: &'a Path,
-    /// How much is measured.
+    /// Extent of the run.
     pub extent: SweepExtent,
-    /// The first words of every command of a size.
+    /// Beginning of every printed command at a size.
     pub command: &'a dyn Fn([u32; 2]) -> String,
-    /// What the scene is called.
+    /// Name of the scene.
     pub scene: &'a str,
-    /// Hash of all that is drawn: a file may change under its name.
+    /// Hash of the scene and the environment: a file may change without changing its name.
     pub contents: &'a str,
-    /// Where an earlier run of what a command draws left its reference, which this one goes on with.
+    /// Folder with the reference of an earlier run of a command, which this run continues.
     pub kept: &'a dyn Fn(&str) -> Option<PathBuf>,
-    /// Whether fewer pixels may be measured where the budget has no time for all.
+    /// Whether to measure fewer pixels if the budget is too small for all.
     pub may_shrink: bool,
-    /// Pictures of other programs that are judged too, by name.
+    /// Pictures of other programs to evaluate, by name.
     pub others: &'a [(String, AnyPicture)],
-    /// Whether somebody asked the run to end with what there is.
+    /// Whether the user asked to stop the run.
     pub stopped: &'a dyn Fn() -> bool,
 }
 
-/// What hears of a run.
+/// Callbacks of a run.
 pub struct Listener<'a> {
-    /// Each picture before it is drawn.
+    /// Called before each picture is drawn.
     pub step: &'a mut dyn FnMut(Step<'_>),
-    /// What is known before the end, of long runs.
+    /// Called with a preliminary table in long runs.
     pub early: &'a mut dyn FnMut(&Table) -> Result<()>,
 }
 
-/// What two runs must have in common for one to go on with the other's pictures.
+/// Identity of a run: an interrupted run is continued only if it is equal.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct SweepIdentity {
     program: String,
@@ -68,7 +68,7 @@ struct SweepIdentity {
 }
 
 impl<'a> Sweep<'a> {
-    /// A run of which nothing but the table is wanted: it goes on with no earlier one, and its commands are not told.
+    /// A run for its table alone: it continues no earlier run and records no commands.
     #[must_use]
     pub fn alone(bench: Bench<'a>, folder: &'a Path, extent: SweepExtent) -> Self {
         Self {
@@ -87,7 +87,7 @@ impl<'a> Sweep<'a> {
 }
 
 impl Sweep<'_> {
-    /// A folder is that of one run: new, or one that was interrupted.
+    /// Claims the folder for this run: it must be new, or of the same interrupted run.
     pub(super) fn claim_folder(&self) -> Result<()> {
         let identity = SweepIdentity {
             program: env!("CARGO_PKG_VERSION").to_owned(),
@@ -100,11 +100,11 @@ impl Sweep<'_> {
         let path = self.folder.join("run.json");
         if path.exists() {
             let known: SweepIdentity = serde_json::from_slice(&file::read(&path)?)
-                .with_context(|| format!("reading {}: it is not that of a run of cost", path.display()))?;
+                .with_context(|| format!("reading {}: it does not describe a run of cost", path.display()))?;
             ensure!(
                 known == identity,
-                "{} holds another run (`{}` with seed {}, a budget of {} s, part {}/{}, on {}), or one of a scene that has changed \
-                 since: name another folder, or remove it",
+                "{} holds another run (`{}` with seed {}, a budget of {} s, part {}/{}, on {}), or the scene has changed since that \
+                 run: name another folder, or remove this one",
                 self.folder.display(),
                 known.command,
                 known.seed,
@@ -115,7 +115,7 @@ impl Sweep<'_> {
             );
         } else {
             if self.folder.exists() && self.folder.read_dir().is_ok_and(|mut all| all.next().is_some()) {
-                bail!("{} is not empty and holds no run of cost: name another folder", self.folder.display());
+                bail!("{} is not empty and does not hold a run of cost: name another folder", self.folder.display());
             }
             make(self.folder)?;
             file::write(&path, serde_json::to_string_pretty(&identity)?.as_bytes())?;
@@ -137,22 +137,22 @@ impl Sweep<'_> {
 
 fn make(folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder)
-        .map_err(|e| anyhow::anyhow!("making the folder {}: {}", folder.display(), file::cause(&e)))
+        .map_err(|e| anyhow::anyhow!("creating the folder {}: {}", folder.display(), file::cause(&e)))
 }
 
-/// Joins the parts of a run into `folder`: their pictures are judged together by the reference that they have in common.
+/// Merges the parts of a sharded run into `folder` and evaluates all pictures against their common reference.
 ///
 /// # Errors
-/// When they are not the parts of one run, or something cannot be read or written.
+/// When the folders are not the parts of one run, or when a file cannot be read or written.
 pub fn merge(parts: &[PathBuf], folder: &Path, settings: &etalon::frame::Settings) -> Result<Table> {
     let read = |part: &PathBuf| -> Result<Table> {
         let path = part.join("cost.json");
         serde_json::from_slice(&file::read(&path)?).with_context(|| format!("reading {}", path.display()))
     };
     let mut table = Table::merge(parts.iter().map(read).collect::<Result<_>>()?)?;
-    let first = parts.first().context("merging: there is nothing to merge")?;
+    let first = parts.first().context("merging: no folders are given")?;
     let (refined, reference) =
-        Refined::read(first)?.with_context(|| format!("reading {}: it has no reference", first.display()))?;
+        Refined::read(first)?.with_context(|| format!("reading {}: the folder has no reference", first.display()))?;
     for name in ["points", "pictures"] {
         make(&folder.join(name))?;
         for part in parts {

@@ -1,4 +1,4 @@
-//! What a run of `etalon cost` found, as data: `cost.json` (schema `etalon.cost/1`) and `cost.csv`.
+//! Results of a run of `etalon cost` as data: `cost.json` (schema `etalon.cost/1`) and `cost.csv`. See docs/cost.md.
 
 use std::collections::BTreeMap;
 
@@ -9,253 +9,253 @@ use super::statistics::Interval;
 use etalon::gpu::Compiled;
 use etalon::plan::{Knob, Knobs, Model};
 
-/// The document.
+/// The document `cost.json`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Table {
     /// `etalon.cost/1`.
     pub schema: String,
     /// Version of the program.
     pub program: String,
-    /// Where it was measured.
+    /// Device of the measurements.
     pub device: DeviceName,
     /// Path or `study:NAME`.
     pub scene: String,
-    /// The first words of every command: all that a picture depends on beside its knobs.
+    /// Beginning of every command: all that a picture depends on except its knobs.
     pub command: String,
-    /// Pixels.
+    /// Measured size in pixels.
     pub size: [u32; 2],
-    /// The pixels that were asked for, where the budget had no time for them.
+    /// Requested size, if the budget was too small for it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub asked: Option<RequestedSize>,
-    /// What every error is an error against.
+    /// The reference of all errors.
     pub reference: Reference,
-    /// Which knobs the scene calls for.
+    /// All knobs, with whether the scene calls for them.
     pub knobs: Vec<KnobState>,
-    /// Everything that was drawn.
+    /// All pictures.
     pub points: Vec<Point>,
-    /// Places in `points` of those that nothing beats in time and error at once, the quickest first, the reference last: each is
-    /// nearer to the truth than the one before by more than noise.
+    /// Pareto frontier: indices into `points`, the fastest first, the reference last. Each point has significantly less error than the one
+    /// before.
     pub frontier: Vec<usize>,
-    /// The settings that the frontier recommends.
+    /// Recommended settings on the frontier.
     #[serde(default)]
     pub recommended: Vec<Recommended>,
-    /// Standard errors that a statement had to be away from nothing, there being so many statements.
+    /// Standard errors from zero that make a statement significant (Bonferroni correction).
     #[serde(default)]
     pub standard_errors: f64,
-    /// What changing one knob bought and cost.
+    /// Costs of changing one knob.
     pub prices: Vec<Price>,
-    /// How the search for better combinations went, a step each.
+    /// Steps of the search for combinations.
     pub search: Vec<Tried>,
     /// Pictures of other programs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub others: Vec<Other>,
-    /// How the rules of quadrature come near to the integral, where media vary.
+    /// Convergence of the quadrature rules; only for scenes with heterogeneous media.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub orders: Vec<QuadratureOrder>,
-    /// What is worth knowing before a figure is believed.
+    /// Warnings about the measurements.
     pub warnings: Vec<String>,
-    /// Which part of how many, counted from 1.
+    /// Index (from 1) and number of the parts of a sharded run.
     pub shard: [u32; 2],
-    /// Seconds that were given, and taken.
+    /// Time budget in seconds.
     pub budget_s: f64,
-    /// See `budget_s`; those of an interrupted run are not known to the one that went on with it.
+    /// Seconds taken, without those of an interrupted run that was continued.
     pub took_s: f64,
 }
 
 /// A device by name.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DeviceName {
-    /// Marketing name.
+    /// Name that the device reports.
     pub name: String,
-    /// Driver in words.
+    /// Name of the driver.
     pub driver: String,
-    /// Its version.
+    /// Version of the driver.
     pub version: String,
     /// `cpu`, `discrete`, …
     #[serde(rename = "type")]
     pub kind: String,
 }
 
-/// The scene's own reference: every knob on the rung that approximates least.
+/// The scene's reference: every knob on its most exact rung.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Reference {
-    /// Its rungs.
+    /// Rungs by knob.
     pub knobs: BTreeMap<String, String>,
-    /// Samples of each pixel.
+    /// Samples per pixel.
     pub samples: u32,
-    /// Those of pictures whose prices are told from its rungs.
+    /// Samples of the pictures whose base is `exact`.
     pub priced_samples: u32,
-    /// GPU time of the picture.
+    /// GPU milliseconds of all rounds.
     pub gpu_ms: f64,
-    /// Root of its relative mean squared error against what it converges to, which its halves tell.
+    /// Root of the relative mean squared error of the reference against its limit, estimated from its half buffers.
     pub own_error: f64,
-    /// Mean of FLIP's error against what it converges to: that of one half of its samples against all, whose difference is as
-    /// large as that error.
+    /// Mean FLIP error of the reference against its limit, estimated by the FLIP error of one half buffer against the whole, whose
+    /// difference has the same size.
     pub own_flip: f64,
-    /// The least error, of displayed values 0 to 1, that can be told from none.
+    /// Resolution: least error of display values 0 to 1 that is significant.
     pub resolution: f64,
-    /// Whether that is at most [`RESOLVED`].
+    /// Whether `resolution` is at most [`RESOLVED`].
     pub converged: bool,
-    /// The pictures with random numbers of their own that it is the mean of.
+    /// Pictures with different random seeds, whose mean is the reference.
     pub rounds: Vec<Round>,
-    /// Makes it again, or the first of its rounds.
+    /// Command that draws the reference, or its first round.
     pub command: String,
-    /// Hash of the picture's file.
+    /// Hash of the picture file.
     pub image: String,
 }
 
-/// A picture that a reference is made of.
+/// One of the pictures whose mean is the reference.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Round {
-    /// Chooses its random numbers.
+    /// Random seed.
     pub seed: u32,
-    /// Samples of each pixel.
+    /// Samples per pixel.
     pub samples: u32,
-    /// GPU time that it took.
+    /// GPU milliseconds.
     pub gpu_ms: f64,
 }
 
-/// Error that a reference has to resolve to be called converged: a step and a quarter of eight bits.
+/// Largest resolution of a converged reference: 1.25 steps of eight-bit display values.
 pub const RESOLVED: f64 = 0.005;
 
-/// A setting that the page recommends.
+/// A recommended setting.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Recommended {
     /// `quick`, `balanced` or `exact`.
     pub setting: String,
-    /// Its place in `points`.
+    /// Index into `points`.
     pub point: usize,
 }
 
-/// The size that was asked for, of which fewer pixels were measured.
+/// The requested size, where fewer pixels were measured.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct RequestedSize {
-    /// Pixels.
+    /// Requested size in pixels.
     pub size: [u32; 2],
-    /// The recommended settings there, in the order of `recommended`.
+    /// The recommended settings at this size, in the order of `recommended`.
     pub settings: Vec<AtSize>,
 }
 
-/// A picture of the size that was asked for.
+/// Time of a picture at the requested size.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct AtSize {
-    /// GPU time with everything compiled.
+    /// GPU milliseconds of a warmed-up renderer.
     pub gpu_ms: Interval,
-    /// Whether it was drawn; otherwise its time is foretold from that of fewer pixels.
+    /// Whether the picture was drawn; otherwise its time is extrapolated from fewer pixels.
     pub measured: bool,
-    /// Draws it.
+    /// Command that draws the picture.
     pub command: String,
 }
 
-/// A knob in this scene.
+/// State of a knob in this scene.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct KnobState {
-    /// Its name.
+    /// Name of the knob.
     pub knob: String,
-    /// Whether some effect that it shapes is planned for the scene.
+    /// Whether an effect of the knob is planned for the scene.
     pub called_for: bool,
-    /// Which, or why none.
+    /// The planned effect, or the reason why there is none.
     pub reason: String,
-    /// The lecture's statements behind it.
+    /// Ids of the lecture's statements about the knob.
     pub lecture: Vec<String>,
-    /// What it approximates.
+    /// Quantity that the knob approximates.
     pub about: String,
 }
 
-/// Where a point comes from.
+/// Family of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Family {
-    /// A preset, with other numbers of samples.
+    /// A preset, also with other numbers of samples.
     Preset,
-    /// The preset `local` with one rung changed.
+    /// The preset `local` with one knob changed.
     Local,
-    /// The reference's rungs, with one changed or none, and fewer samples.
+    /// The reference's rungs with fewer samples, and one knob changed or none.
     Exact,
-    /// Found by the search.
+    /// A result of the search.
     Search,
 }
 
-/// Place and size of the largest error.
+/// Position and value of the largest FLIP error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WorstPixel {
     /// Column.
     pub x: u32,
     /// Row from the top.
     pub y: u32,
-    /// FLIP's error there.
+    /// FLIP error of the pixel.
     pub error: f64,
 }
 
-/// How far a picture is from the reference.
+/// Errors of a picture against the reference.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Errors {
-    /// Root of the mean squared error of displayed values 0 to 1 against what the reference converges to: two standard errors of
-    /// the square either way.
+    /// Root mean squared error of display values 0 to 1 against the limit of the reference, with the 95 % confidence interval (two
+    /// standard errors of the mean square).
     pub error: Interval,
-    /// Mean of FLIP's error of the displayed pictures.
+    /// Mean FLIP error of the displayed pictures.
     pub flip_mean: f64,
-    /// What 95 of 100 pixels stay below.
+    /// 95th percentile of the FLIP error over pixels.
     pub flip_p95: f64,
-    /// Relative mean squared error of the radiance, less what the reference's own noise adds; with two standard errors, as far as
-    /// that noise makes it uncertain.
+    /// Relative mean squared error of the radiance, without the part that the reference's noise adds, with the 95 % confidence interval
+    /// due to that noise.
     pub relmse: Interval,
-    /// Root mean squared error of the radiance, as it is.
+    /// Root mean squared error of the radiance, including the reference's noise.
     pub rmse: f64,
-    /// Mean CIEDE2000 of the displayed colours.
+    /// Mean CIEDE2000 colour difference of the displayed pictures.
     pub delta_e_mean: f64,
-    /// Where FLIP's error is largest.
+    /// Pixel with the largest FLIP error.
     pub worst_pixel: WorstPixel,
 }
 
-/// One picture: how it was made, what it took and how far off it is.
+/// A picture with its knobs, times and errors.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Point {
-    /// Unique in the table.
+    /// Name, unique in the table.
     pub name: String,
-    /// Where it comes from.
+    /// Family of the picture.
     pub family: Family,
-    /// Rungs.
+    /// Rungs by knob.
     pub knobs: BTreeMap<String, String>,
-    /// GPU time of a picture with everything compiled: the middle, the shortest and the longest.
+    /// GPU milliseconds of a warmed-up renderer: median, shortest and longest.
     pub gpu_ms: Interval,
-    /// How many were timed.
+    /// Number of timed renders.
     pub timed: usize,
-    /// Milliseconds of wall time before that: uploading, making pipelines, compiling, and one or two samples.
+    /// Wall milliseconds of the start: uploading, creating and compiling pipelines, and one or two samples.
     pub start_ms: f64,
     /// GPU milliseconds of each pass.
     pub passes: Vec<(String, f64)>,
-    /// Against the reference.
+    /// Errors against the reference.
     #[serde(flatten)]
     pub errors: Errors,
-    /// Relative mean squared error by chance alone, which halves tell; of pictures by paths.
+    /// Relative mean squared error due to noise alone, estimated from half buffers; only of path tracing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<f64>,
-    /// Counts that are the same on every machine.
+    /// Work counts, equal on every machine.
     pub work: BTreeMap<String, u64>,
-    /// What the driver's compiler made of each program (registers, spills, size of code, in its own words), where it tells.
+    /// Compiler statistics of each program (registers, spills, code size, as the driver names them), if the driver reports any.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub compiled: BTreeMap<String, Vec<Compiled>>,
-    /// Draws it again.
+    /// Command that draws the picture again.
     pub command: String,
-    /// Hash of the picture's file.
+    /// Hash of the picture file.
     pub image: String,
-    /// Stem of its files in the folder `pictures`.
+    /// Stem of the file names in the folder `pictures`.
     pub picture: String,
 }
 
 impl Point {
-    /// What the frontier is drawn by: the root mean squared error of displayed values. Unlike FLIP it can be told without the
-    /// reference's noise; squares of radiance would be those of a few pixels that paths make far too bright.
+    /// The error of the frontier: root mean squared error of display values. Unlike FLIP, it has an estimate without the reference's
+    /// noise; squared radiance would be dominated by a few fireflies.
     #[must_use]
     pub fn error(&self) -> f64 {
         self.errors.error.median
     }
 
-    /// Its rungs as knobs.
+    /// The rungs as [`Knobs`].
     ///
     /// # Errors
-    /// When this program has no such knob or rung.
+    /// When this version of the program has no such knob or rung.
     pub fn rungs(&self) -> Result<Knobs> {
         let mut knobs = Knobs::of(Model::Local);
         for (knob, rung) in &self.knobs {
@@ -266,85 +266,84 @@ impl Point {
     }
 }
 
-/// A picture that another program drew of the same scene, from the same place.
+/// A picture of the same scene from the same camera, drawn by another program.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Other {
-    /// Its file.
+    /// Name of the file.
     pub file: String,
-    /// Against the reference; of a file of display values without those of radiance.
+    /// Errors against the reference; radiance errors are 0 for a file with display values.
     #[serde(flatten)]
     pub errors: Errors,
-    /// Mean radiance over that of the reference in red, green and blue; of OpenEXR.
+    /// Mean radiance over that of the reference in red, green and blue; only of OpenEXR files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_ratio: Option<[f64; 3]>,
 }
 
-/// What changing one knob bought and cost.
+/// Cost of changing one knob, by paired measurement with the base.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Price {
-    /// The knob.
+    /// Name of the knob.
     pub knob: String,
-    /// Rung it was on.
+    /// Rung in the base.
     pub from: String,
-    /// Rung it was set to.
+    /// Rung in the picture.
     pub to: String,
-    /// `local` or `exact`: the rungs of all others.
+    /// Base, `local` or `exact`: the rungs of all other knobs.
     pub base: Family,
-    /// The point.
+    /// Name of the point.
     pub point: String,
-    /// Milliseconds of GPU time more: the middle and both ends of pictures drawn in turns.
+    /// Additional GPU milliseconds: median, minimum and maximum of the paired differences.
     pub gpu_ms_delta: Interval,
-    /// How many turns.
+    /// Number of paired times.
     pub turns: usize,
-    /// The same as a share of the base's.
+    /// `gpu_ms_delta` as a fraction of the base's time.
     pub share: f64,
-    /// FLIP between the two pictures; from `exact` with the same random numbers, so that noise is in both alike.
+    /// FLIP error between the two pictures; with base `exact` both have the same random numbers and so similar noise.
     pub flip_between: f64,
-    /// More of FLIP's mean error against the reference.
+    /// Difference of the mean FLIP errors against the reference.
     pub flip_delta: f64,
-    /// More of the mean squared error of displayed values 0 to 1 against the reference; from `exact` the mean squared difference of
-    /// what both pictures converge to, of which halves give a mean without noise, with two standard errors either way.
+    /// With base `local`: difference of the mean squared errors of display values 0 to 1 against the reference. With base `exact`: mean
+    /// squared difference between the limits of both pictures, without noise. With the 95 % confidence interval (two standard errors).
     pub shown_delta: Interval,
-    /// Whether that is more than the noise of both pictures, or that of the reference: its sign is known.
+    /// Whether `shown_delta` is significant, so that its sign is known.
     #[serde(default)]
     pub error_told: bool,
-    /// Whether the difference of time is more than that of two runs of one program.
+    /// Whether the time difference is significant.
     #[serde(default)]
     pub time_told: bool,
-    /// Side in pixels of the squares over which displayed values were averaged for that: 1, or more where single pixels are too noisy
-    /// to tell anything.
+    /// Side in pixels of the blocks over which display values were averaged: 1, or more where single pixels are too noisy.
     pub squares: u32,
-    /// Of a knob that changes chance alone: its relative mean squared error by chance over that of the base.
+    /// Relative mean squared error due to noise, over that of the base; only of knobs that change noise alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_ratio: Option<f64>,
-    /// Of a knob that changes rounding alone: mean radiance over the base's, where no chance is in both.
+    /// Mean radiance over that of the base; only of knobs that change rounding alone, in pictures without noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub brightness: Option<f64>,
-    /// Whether the pictures are the same to the last bit.
+    /// Whether the pictures are bit-identical.
     pub same: bool,
     /// Whether the scene calls for the knob.
     pub called_for: bool,
-    /// In a sentence.
+    /// Verdict in words.
     pub verdict: String,
 }
 
-/// FLIP below which nobody sees a difference: half of a step of eight bits.
+/// FLIP error below which a difference is invisible: half a step of eight-bit display values.
 pub const INVISIBLE: f64 = 0.002;
 
 impl Price {
-    /// Whether it takes longer than the base.
+    /// Whether the change takes significantly longer than the base.
     #[must_use]
     pub fn takes_longer(&self) -> bool {
         self.time_told && self.share > 0.0
     }
 
-    /// Whether it takes less time than the base.
+    /// Whether the change takes significantly less time than the base.
     #[must_use]
     pub fn saves(&self) -> bool {
         self.time_told && self.share < 0.0
     }
 
-    /// Whether it went to a rung further on in its knob's list.
+    /// Whether the change goes to a more exact rung: rungs are listed from cheap to exact.
     #[must_use]
     pub fn to_more_exact(&self) -> bool {
         let rungs = Knob::named(&self.knob).map_or(&[][..], |knob| knob.rungs);
@@ -352,13 +351,13 @@ impl Price {
         place(&self.to) > place(&self.from)
     }
 
-    /// Whether it has less error though it approximates more: the error that it adds is against one that the base has.
+    /// Whether the change reduces the error although it approximates more: its error cancels another error of the base.
     #[must_use]
     pub fn undoes_another(&self) -> bool {
         self.base == Family::Local && self.error_told && self.shown_delta.median < 0.0 && !self.to_more_exact()
     }
 
-    /// Whether an eye sees it, and it is more than the noise of paths that went apart.
+    /// Whether the change is visible and, for path tracing, significant: different paths alone also cause visible noise.
     #[must_use]
     pub fn is_seen(&self) -> bool {
         let beyond_noise = self.base != Family::Exact || self.error_told;
@@ -366,31 +365,31 @@ impl Price {
     }
 }
 
-/// How a rule of quadrature comes near to the integral (lecture A2).
+/// Convergence of a quadrature rule (lecture A2).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct QuadratureOrder {
     /// Rung of the knob `quadrature`.
     pub rule: String,
-    /// Steps of each segment.
+    /// Numbers of steps per segment.
     pub steps: Vec<u32>,
-    /// Root mean squared difference of radiance to that with most steps, over the root mean square of what is all around.
+    /// Root mean squared difference of radiance from the picture with most steps, over the root mean squared radiance of that picture.
     pub errors: Vec<f64>,
-    /// GPU milliseconds of the picture.
+    /// GPU milliseconds of the pictures.
     pub gpu_ms: Vec<f64>,
-    /// p of error ~ steps^−p where rounding does not hide it; `None` where fewer than two errors are left.
+    /// Order p in error ~ steps^−p; `None` where rounding leaves fewer than two errors.
     pub order: Option<f64>,
 }
 
 /// A step of the search.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Tried {
-    /// What was changed.
+    /// The change in words.
     pub change: String,
-    /// Error that single prices promised.
+    /// Error predicted from the costs of single changes.
     pub promised: f64,
-    /// And what was found.
+    /// Measured error.
     pub found: f64,
-    /// Whether it was kept.
+    /// Whether the step was kept.
     pub kept: bool,
 }
 
@@ -398,7 +397,7 @@ pub struct Tried {
 pub const REFERENCE: &str = "reference";
 
 impl Table {
-    /// The knobs that the scene calls for and that a point has on other rungs than the reference.
+    /// The simplified knobs of a point: those that the scene calls for and whose rungs differ from the reference.
     #[must_use]
     pub fn given_up(&self, point: &Point) -> String {
         let other = |knob: &KnobState| {
@@ -409,7 +408,7 @@ impl Table {
         if all.is_empty() { "nothing".to_owned() } else { all.join(", ") }
     }
 
-    /// The points as comma-separated values, a line each.
+    /// The points as comma-separated values, one line per point.
     ///
     /// # Errors
     /// Never: it is written to memory.
@@ -472,13 +471,13 @@ impl Table {
         Ok(all.into_inner()?)
     }
 
-    /// One table of the parts that shards of one run measured, whose points are not judged together yet.
+    /// Joins the tables of the shards of one run. The points are not yet evaluated together.
     ///
     /// # Errors
-    /// When they are not of one scene, one reference and one kind of device.
+    /// When the tables are not of one scene, one reference and one driver, or when a shard is missing or duplicate.
     pub fn merge(parts: Vec<Self>) -> Result<Self> {
         let mut parts = parts.into_iter();
-        let Some(mut all) = parts.next() else { bail!("merging: there is nothing to merge") };
+        let Some(mut all) = parts.next() else { bail!("merging: no tables are given") };
         let of = all.shard[1];
         let mut drawn = vec![all.shard[0]];
         for part in parts {
@@ -491,10 +490,10 @@ impl Table {
                 ensure!(a == b, "merging: two parts have different {what}, {a} and {b}");
             }
             if all.device != part.device {
-                all.warnings.push(format!("times are those of {} and {}", all.device.name, part.device.name));
+                all.warnings.push(format!("times were measured on {} and on {}", all.device.name, part.device.name));
             }
-            ensure!(part.shard[1] == of, "merging: two parts are of {of} and of {}", part.shard[1]);
-            ensure!(!drawn.contains(&part.shard[0]), "merging: part {}/{of} is there twice", part.shard[0]);
+            ensure!(part.shard[1] == of, "merging: one run has {of} parts, another has {}", part.shard[1]);
+            ensure!(!drawn.contains(&part.shard[0]), "merging: part {}/{of} is given twice", part.shard[0]);
             drawn.push(part.shard[0]);
             for point in part.points {
                 if all.points.iter().all(|known| known.name != point.name) {
@@ -516,7 +515,7 @@ impl Table {
             bail!("merging: part {missing}/{of} is missing");
         }
         all.shard = [1, 1];
-        // The reference is the last.
+        // The reference comes last.
         all.points.sort_by_key(|point| point.name == REFERENCE);
         Ok(all)
     }

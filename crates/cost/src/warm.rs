@@ -1,4 +1,4 @@
-//! Pictures taken for a measurement: warm, in turns with another, with everything that is to be known of them.
+//! Measurements with warmed-up renderers, interleaved with a baseline (paired A/B measurement).
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,14 +17,14 @@ use etalon::prepare::Original;
 use etalon::scene::Camera;
 use etalon::scene::environment::Environment;
 
-/// Pictures of one plan are timed until there are so many …
+/// Largest number of timed renders of a picture.
 const MOST: usize = 7;
-/// … or they took so many milliseconds; two at least …
+/// Total milliseconds after which a picture is not timed again; at least two renders are timed.
 pub const ENOUGH_MS: f64 = 1000.0;
-/// … unless one takes so long.
+/// A picture that takes at least this many milliseconds is timed once.
 const LONG_MS: f64 = 6000.0;
 
-/// How many pictures that take so long are timed.
+/// Number of timed renders of a picture that takes `ms` milliseconds.
 pub(super) fn turns(ms: f64, enough_ms: f64) -> usize {
     match ms {
         ms if ms >= LONG_MS => 1,
@@ -32,61 +32,61 @@ pub(super) fn turns(ms: f64, enough_ms: f64) -> usize {
     }
 }
 
-/// The same for a run of so many seconds: a short one draws more pictures instead.
+/// Total milliseconds of timed renders per picture in a run of `budget_s` seconds: short runs draw more pictures instead.
 pub(super) fn enough_ms(budget_s: f64) -> f64 {
     (ENOUGH_MS * budget_s / 480.0).clamp(0.15 * ENOUGH_MS, ENOUGH_MS)
 }
 
-/// What is drawn, from where, on what.
+/// Scene, camera, device and settings of all measurements.
 pub struct Bench<'a> {
     /// The device.
     pub device: &'a Arc<Device>,
     /// The scene.
     pub original: &'a Original,
-    /// Light from all around.
+    /// Environment map.
     pub environment: Option<&'a Environment>,
-    /// All but the knobs.
+    /// Settings of the renderer; the knobs are replaced for each picture.
     pub settings: Settings,
-    /// From where.
+    /// The camera.
     pub camera: &'a Camera,
 }
 
-/// Rungs that are ready to be drawn: uploaded, and with every shader compiled.
+/// A warmed-up renderer: the scene is uploaded and every shader is compiled.
 pub struct WarmRenderer {
-    /// What draws them.
+    /// The renderer.
     pub renderer: Renderer,
-    /// Wall time until the first samples were there.
+    /// Wall milliseconds of the warm-up.
     pub start_ms: f64,
 }
 
-/// A picture.
+/// A picture with its times.
 pub struct Measurement {
     /// Radiance.
     pub film: Picture,
-    /// Both halves of its samples as they would be shown, of pictures by paths.
+    /// Display values of both half buffers; only of path tracing.
     pub halves: Option<[Shown; 2]>,
-    /// Relative mean squared error by chance, which those tell.
+    /// Relative mean squared error due to noise, estimated from the half buffers.
     pub noise: Option<f64>,
-    /// As it is shown.
+    /// Display values.
     pub display: Display,
-    /// And as a file.
+    /// PNG file.
     pub png: Vec<u8>,
-    /// GPU milliseconds of each that was timed.
+    /// GPU milliseconds of each timed render.
     pub ms: Vec<f64>,
-    /// Of the others that were drawn in turns with them.
+    /// GPU milliseconds of the baseline, timed interleaved with `ms`.
     pub baseline_ms: Vec<f64>,
-    /// GPU milliseconds of each pass.
+    /// Median GPU milliseconds of each pass.
     pub passes: Vec<(String, f64)>,
-    /// Counts.
+    /// Work counts.
     pub work: BTreeMap<String, u64>,
-    /// What the driver's compiler made of each program, where it tells.
+    /// Compiler statistics of each program, if the driver reports any.
     pub compiled: BTreeMap<String, Vec<Compiled>>,
-    /// Samples of each pixel.
+    /// Samples per pixel.
     pub samples: u32,
 }
 
 impl Measurement {
-    /// Whether its radiance is this to the last bit.
+    /// Whether the radiance is bit-identical to `film`.
     #[must_use]
     pub fn is(&self, film: &Picture) -> bool {
         bytemuck::cast_slice::<_, u8>(&self.film.rgba) == bytemuck::cast_slice::<_, u8>(&film.rgba)
@@ -110,7 +110,7 @@ fn counts(work: &Work) -> BTreeMap<String, u64> {
 }
 
 impl Bench<'_> {
-    /// What these rungs call for; nothing is uploaded for that.
+    /// The plan for these knobs, without uploading anything.
     ///
     /// # Errors
     /// When the scene has nothing to draw.
@@ -119,10 +119,10 @@ impl Bench<'_> {
         self.original.plan(&settings.conditions(self.environment)?)
     }
 
-    /// Draws two samples, which compiles everything.
+    /// Warms up a renderer: uploads the scene and draws two samples, which compiles everything.
     ///
     /// # Errors
-    /// When these rungs cannot be drawn.
+    /// When these knobs cannot be drawn.
     pub fn warm_up(&self, knobs: &Knobs) -> Result<WarmRenderer> {
         let start = Instant::now();
         let mut renderer = self.renderer(knobs, self.settings.seed)?;
@@ -130,10 +130,10 @@ impl Bench<'_> {
         Ok(WarmRenderer { renderer, start_ms: start.elapsed().as_secs_f64() * 1e3 })
     }
 
-    /// What draws these rungs with these random numbers; nothing is drawn yet.
+    /// A renderer for these knobs and this random seed, without drawing.
     ///
     /// # Errors
-    /// When these rungs cannot be drawn.
+    /// When these knobs cannot be drawn.
     pub fn renderer(&self, knobs: &Knobs, seed: u32) -> Result<Renderer> {
         let settings = Settings { knobs: knobs.clone(), seed, max_error: None, ..self.settings.clone() };
         Renderer::new(self.device, self.original, self.environment, settings)
@@ -158,7 +158,7 @@ impl Bench<'_> {
         Ok(total(&warm.renderer.render(self.camera, &mut |_| ())?))
     }
 
-    /// Draws and times, in turns with `other` where there is one, until pictures took so many milliseconds.
+    /// Draws and times a picture, interleaved with the baseline `other` if given, until the renders took `enough_ms` milliseconds.
     ///
     /// # Errors
     /// When the driver fails.
@@ -181,7 +181,7 @@ impl Bench<'_> {
         if let Some((other, _)) = &mut other {
             baseline_ms.push(self.time(other)?);
         }
-        // What cannot be told from its base has no more to say.
+        // A picture that is bit-identical to its base needs no more timing.
         let enough_ms = if same { 0.0 } else { enough_ms };
         while ms.len() < turns(ms[0], enough_ms) {
             let again = warm.renderer.render(self.camera, &mut |_| ())?;

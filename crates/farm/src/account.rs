@@ -1,4 +1,4 @@
-//! What workers tell of themselves, laid side by side on a page.
+//! Report about the workers of a distributed picture or sequence: time line, scaling and devices, as an HTML page.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,33 +11,33 @@ use serde_json::Value;
 use crate::part::{Part, PartHeader};
 use crate::worker::FarmWorker;
 
-/// What one process did.
+/// Work of one process.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shift {
-    /// Who, where, when.
+    /// The process.
     pub worker: FarmWorker,
-    /// What it drew, in words.
+    /// Its work in words.
     pub what: String,
-    /// When each of its pictures was begun and done, in seconds since 1970; none for a part of a picture.
+    /// Start and end of each of its pictures in seconds since 1970; empty for a part of a picture.
     pub pictures: Vec<[f64; 2]>,
 }
 
-/// A time line and figures of some shifts.
+/// Summary of the work of several processes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Account {
-    /// In the order in which they began.
+    /// Work of each process, by start.
     pub shifts: Vec<Shift>,
-    /// Seconds from the first beginning to the last end.
+    /// Seconds from the first start to the last end.
     pub took_s: f64,
-    /// Seconds of all processes together.
+    /// Sum of the seconds of all processes.
     pub busy_s: f64,
-    /// Most processes at one time.
+    /// Largest number of simultaneous processes.
     pub at_once: usize,
-    /// Devices with their drivers, and how many processes ran on each.
+    /// Number of processes by device and driver.
     pub devices: BTreeMap<String, usize>,
 }
 
-/// Frames in the account of a sequence.
+/// A picture in the report of a sequence.
 #[derive(Deserialize)]
 struct AccountPicture {
     frame: i32,
@@ -49,10 +49,10 @@ struct AccountPicture {
 }
 
 impl Shift {
-    /// What a file tells: a part, or the account that `render --report` wrote of a sequence, or `merge --report` of a picture.
+    /// Reads the work records of a file: a part, a report of `render --report` about a sequence, or a report of `merge --report`.
     ///
     /// # Errors
-    /// When the file tells of no work.
+    /// When the file is none of these.
     pub fn read(path: &Path) -> Result<Vec<Self>> {
         let bytes = etalon::image::file::read(path)?;
         if bytes.first() != Some(&b'{') {
@@ -81,7 +81,7 @@ impl Shift {
                 Ok(workers.into_iter().enumerate().map(shift).collect())
             }
             _ => bail!(
-                "{}: neither a part of a picture nor an account of a sequence or of a merged picture",
+                "{}: this file is neither a part of a picture nor a report of a sequence or of a merged picture",
                 path.display()
             ),
         }
@@ -89,33 +89,33 @@ impl Shift {
 }
 
 impl Account {
-    /// Of some shifts.
+    /// Summarises the work of several processes.
     ///
     /// # Errors
-    /// When there are none.
+    /// When `shifts` is empty.
     pub fn of(mut shifts: Vec<Shift>) -> Result<Self> {
         shifts.sort_by(|a, b| a.worker.began.total_cmp(&b.worker.began));
-        let Some(first) = shifts.first() else { bail!("an account of no work") };
+        let Some(first) = shifts.first() else { bail!("the files record no work") };
         let began = first.worker.began;
         let ended = shifts.iter().map(|shift| shift.worker.ended).fold(began, f64::max);
         let mut devices = BTreeMap::new();
         for shift in &shifts {
             *devices.entry(shift.worker.device.join(", ")).or_default() += 1;
         }
-        // At some beginning there are most.
+        // The number of simultaneous processes has its maximum at some start.
         let at = |when: f64| shifts.iter().filter(|s| s.worker.began <= when && when < s.worker.ended).count();
         let at_once = shifts.iter().map(|shift| at(shift.worker.began)).max().unwrap_or_default().max(1);
         let busy_s = shifts.iter().map(|shift| shift.worker.ended - shift.worker.began).sum();
         Ok(Self { took_s: ended - began, busy_s, at_once, devices, shifts })
     }
 
-    /// How many processes were at work, in the mean: as many as at most, were the farm ideal.
+    /// Mean number of busy processes; an ideal farm reaches [`Account::at_once`].
     #[must_use]
     pub fn at_work(&self) -> f64 {
         if self.took_s > 0.0 { self.busy_s / self.took_s } else { 1.0 }
     }
 
-    /// A page with the time line.
+    /// The HTML page.
     #[must_use]
     pub fn page(&self) -> String {
         const WIDTH: f64 = 900.0;
@@ -138,19 +138,19 @@ impl Account {
                     h1 { (self.shifts.len()) " processes, " (format!("{:.1} s", self.took_s)) }
                     @if self.devices.len() > 1 {
                         p.warning {
-                            "Mixed farm: the processes ran on " (self.devices.len()) " devices or drivers. They round otherwise, and a \
-                             picture that they drew together is not that of one run."
+                            "Mixed farm: the processes ran on " (self.devices.len()) " devices or drivers. Their rounding may differ, so a \
+                             picture that they drew together may differ from that of one run."
                         }
                     }
                     table {
-                        tr { th { "processes at one time" } td { (self.at_once) } }
-                        tr { th { "seconds of all processes" } td { (format!("{:.1}", self.busy_s)) } }
-                        tr { th { "processes at work, in the mean" } td { (format!("{:.2}", self.at_work())) ", "
-                            (share(self.at_work(), self.at_once as f64)) " of the ideal" } }
-                        tr { th { "before the first sample" } td { (share(prepared, self.busy_s)) " of their time" } }
+                        tr { th { "largest number of simultaneous processes" } td { (self.at_once) } }
+                        tr { th { "sum of the seconds of all processes" } td { (format!("{:.1}", self.busy_s)) } }
+                        tr { th { "mean number of busy processes" } td { (format!("{:.2}", self.at_work())) ", "
+                            (share(self.at_work(), self.at_once as f64)) " of the largest number" } }
+                        tr { th { "preparation before the first sample" } td { (share(prepared, self.busy_s)) " of the time of all processes" } }
                     }
                     h2 { "Time line" }
-                    p { "A bar is a process; its light part is what comes before the first sample, and lines are pictures." }
+                    p { "Each bar is a process. Its light part is the time before the first sample; lines mark the starts of pictures." }
                     div.wide {
                         svg viewBox=(format!("0 0 {} {height}", WIDTH + 220.0)) role="img" aria-label="time line of the processes" {
                             @for (row, shift) in self.shifts.iter().enumerate() {
@@ -176,7 +176,7 @@ impl Account {
                     }
                     h2 { "Processes" }
                     table {
-                        tr { th { "host" } th { "process" } th { "drew" } th { "from, s" } th { "to, s" } th { "before, s" } }
+                        tr { th { "host" } th { "process" } th { "work" } th { "start, s" } th { "end, s" } th { "preparation, s" } }
                         @for shift in &self.shifts {
                             tr {
                                 td { (shift.worker.host) }

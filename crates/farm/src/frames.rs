@@ -1,35 +1,35 @@
-//! Which frames of a sequence there are, in the grammar of Open Job Description (template schema 2023-09, `<IntRangeExpr>`): numbers and
-//! ranges with a step, separated by commas: `1-100:2,105`.
+//! Frame lists of a sequence, in the grammar of Open Job Description (template schema 2023-09, `<IntRangeExpr>`): numbers and ranges with
+//! an optional step, separated by commas, for example `1-100:2,105`.
 
 use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 
-/// Frames of one sequence at most: a typing mistake should not fill the memory.
+/// Largest number of frames of a sequence, so that a typing mistake does not fill the memory.
 const MOST: i64 = 1_000_000;
 
-/// Numbers of frames, ascending.
+/// Frame numbers in ascending order.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Frames(Vec<i32>);
 
-/// Why a text names no frames.
+/// Error of parsing a frame list.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NotFrames {
-    /// It is no list of numbers and ranges.
-    #[error("\"{0}\" is no frame and no range of frames, such as 7, 1-100 or 1-100:2")]
+    /// An element is neither a number nor a range.
+    #[error("\"{0}\" is neither a frame nor a range of frames; examples are 7, 1-100 and 1-100:2")]
     NoRange(String),
-    /// A range runs backwards, or takes no steps.
-    #[error("\"{0}\" goes from a larger frame to a smaller one, or has no step above 0")]
+    /// A range runs backwards, or its step is not positive.
+    #[error("\"{0}\" goes from a larger frame to a smaller one, or its step is not above 0")]
     Backwards(String),
-    /// One frame is in two of the ranges.
+    /// A frame is in two ranges.
     #[error("frame {0} is named twice")]
     Twice(i32),
-    /// More than a million.
-    #[error("more than {MOST} frames")]
+    /// More than a million frames.
+    #[error("the list has more than {MOST} frames")]
     TooMany,
 }
 
 impl Frames {
-    /// Frames 0 up to `count`.
+    /// Frames 0 to `count` − 1.
     #[must_use]
     pub fn first(count: u32) -> Self {
         Self((0..count as i32).collect())
@@ -41,22 +41,22 @@ impl Frames {
         &self.0
     }
 
-    /// Every `of`-th, from the `index`-th on (counted from 1): what process `index` of `of` draws. Neighbours take about the same time,
-    /// so that shares do.
+    /// The share of process `index` (from 1) of `of`: every `of`-th frame from the `index`-th on. Neighbouring frames take similar time, and
+    /// so do the shares.
     #[must_use]
     pub fn share(&self, [index, of]: [u32; 2]) -> Self {
         Self(self.0.iter().copied().skip(index as usize - 1).step_by(of as usize).collect())
     }
 }
 
-/// A number at the start of a text, with what follows it.
+/// Parses a number at the start of a text; returns it with the rest of the text.
 fn number(text: &str) -> Option<(i64, &str)> {
     let digits = text.strip_prefix('-').unwrap_or(text);
     let end = text.len() - digits.len() + digits.find(|c: char| !c.is_ascii_digit()).unwrap_or(digits.len());
     Some((text[..end].parse::<i32>().ok()?.into(), &text[end..]))
 }
 
-/// First, last and step of a range.
+/// Parses a range; returns first frame, last frame and step.
 fn range(text: &str) -> Option<[i64; 3]> {
     let (first, rest) = number(text)?;
     if rest.is_empty() {
@@ -94,7 +94,7 @@ impl FromStr for Frames {
 }
 
 impl Display for Frames {
-    /// The shortest list of numbers and of ranges without a step: `1-3,5`.
+    /// The shortest list of numbers and ranges without a step, for example `1-3,5`.
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let mut runs: Vec<[i32; 2]> = Vec::new();
         for &frame in &self.0 {

@@ -1,4 +1,4 @@
-//! What a picture is made of: two files with one identity are the same picture to the last bit.
+//! Identity of a picture: two files with equal identity hold the same picture, bit for bit.
 
 use std::collections::BTreeMap;
 
@@ -9,24 +9,24 @@ use etalon::scene::environment::Environment;
 use etalon::scene::{Camera, Scene};
 use serde::{Deserialize, Serialize};
 
-/// Everything that decides the bits of a picture, in words that can be compared and told.
+/// Everything that determines the bits of a picture, as text.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Identity {
-    /// Of the program, and a hash of its shaders: what was built of other sources is another one.
+    /// Version of the program with a hash of its shaders.
     pub version: String,
-    /// What the user called the scene; it decides nothing.
+    /// Name of the scene as given by the user; it does not enter the comparison.
     pub name: String,
-    /// Hash of all that is drawn, whatever files it came from.
+    /// Hash of the scene and the environment; file names do not enter it.
     pub scene: String,
-    /// From where.
+    /// Camera.
     pub camera: String,
-    /// Pixels.
+    /// Size in pixels.
     pub size: [u32; 2],
-    /// Rung of every knob.
+    /// Rungs by knob.
     pub knobs: BTreeMap<String, String>,
-    /// Whatever else is set, by name.
+    /// All other settings by name.
     pub settings: BTreeMap<String, String>,
-    /// Device, driver and its version: other ones round otherwise.
+    /// Device, driver and driver version: other devices may round differently.
     pub device: [String; 3],
 }
 
@@ -37,13 +37,13 @@ fn version() -> String {
     format!("{}+{:016x}", env!("CARGO_PKG_VERSION"), all.digest())
 }
 
-/// Device, driver and its version: other ones round otherwise.
+/// Device, driver and driver version.
 #[must_use]
 pub fn device_name(info: &DeviceInfo) -> [String; 3] {
     [&info.name, &info.driver, &info.version].map(Clone::clone)
 }
 
-/// Hash of all that is drawn of a scene in an environment, whatever files it came from: 32 hexadecimal digits.
+/// Hash of a scene and its environment in memory, as 32 hexadecimal digits; file names do not enter it.
 #[must_use]
 pub fn contents(scene: &Scene, environment: Option<&Environment>) -> String {
     let mut all = xxhash_rust::xxh3::Xxh3::new();
@@ -69,7 +69,7 @@ pub fn contents(scene: &Scene, environment: Option<&Environment>) -> String {
 }
 
 impl Identity {
-    /// Of a picture; `scene` is what [`contents`] says.
+    /// The identity of a picture; `scene` is the hash of [`contents`].
     #[must_use]
     pub fn of(name: &str, scene: String, camera: &Camera, settings: &Settings, device: &DeviceInfo) -> Self {
         let knobs = settings.knobs.list().into_iter().map(|(knob, rung)| (knob.to_owned(), rung.to_owned()));
@@ -79,7 +79,7 @@ impl Identity {
             Background::Transparent => "transparent".to_owned(),
             Background::Color([r, g, b]) => format!("#{r:02x}{g:02x}{b:02x}"),
         };
-        // Debug of a float is the shortest text that is read back as the same bits.
+        // Debug formats a float as the shortest text that parses to the same bits.
         let numbers = [
             ("background", behind),
             ("forced", format!("{:?}", settings.forced)),
@@ -103,42 +103,42 @@ impl Identity {
         }
     }
 
-    /// A hash of it: 32 hexadecimal digits.
+    /// Hash of the identity as 32 hexadecimal digits.
     #[must_use]
     pub fn fingerprint(&self) -> String {
         let decides = Self { name: String::new(), ..self.clone() };
         etalon::image::file::hash(serde_json::to_string(&decides).unwrap_or_default().as_bytes())
     }
 
-    /// Nothing, where both are the same picture.
+    /// Checks that both identities are of the same picture.
     ///
     /// # Errors
-    /// What differs first, in words.
+    /// The first difference in words.
     pub fn same_as(&self, other: &Self) -> Result<()> {
         let version = (&self.version, &other.version);
         if version.0 != version.1 {
-            bail!("drawn by etalon {} and {}", version.0, version.1);
+            bail!("they were drawn by etalon {} and {}", version.0, version.1);
         }
         if self.scene != other.scene {
-            bail!("of two scenes, \"{}\" ({}) and \"{}\" ({})", self.name, self.scene, other.name, other.scene);
+            bail!("they show two scenes, \"{}\" ({}) and \"{}\" ({})", self.name, self.scene, other.name, other.scene);
         }
         if self.size != other.size {
             let [a, b] = [self.size, other.size].map(|[w, h]| format!("{w}x{h}"));
-            bail!("of two sizes, {a} and {b}");
+            bail!("they have two sizes, {a} and {b}");
         }
         if self.camera != other.camera {
-            bail!("seen by two cameras");
+            bail!("they were drawn from two cameras");
         }
         for (what, mine, others) in [("knob", &self.knobs, &other.knobs), ("setting", &self.settings, &other.settings)]
         {
             if let Some((name, value)) = mine.iter().find(|(name, value)| others.get(*name) != Some(value)) {
                 let other = others.get(name).map_or("none", String::as_str);
-                bail!("drawn with two values of the {what} {name}, {value} and {other}");
+                bail!("they were drawn with two values of the {what} {name}, {value} and {other}");
             }
         }
         if self.device != other.device {
             bail!(
-                "drawn on two devices, \"{}\" and \"{}\": they round otherwise",
+                "they were drawn on two devices, \"{}\" and \"{}\", whose rounding may differ",
                 self.device.join(", "),
                 other.device.join(", ")
             );

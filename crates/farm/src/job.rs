@@ -1,13 +1,14 @@
-//! Files for engines: the same command for each task, with its share, and a task that joins parts where there are any.
+//! Job files for render-farm engines: each task runs the same command with its own share, and for a still picture a last task joins the
+//! parts.
 //!
-//! Etalon brings no scheduler. Templates are in `crates/farm/templates/`; what stands between `@` in them is filled in here.
+//! Etalon has no scheduler. The templates are in `crates/farm/templates/`; placeholders between `@` are filled in here.
 
 use anyhow::{Result, bail, ensure};
 use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use crate::frames::Frames;
 
-/// What runs the tasks.
+/// Engine that runs the tasks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, EnumMessage, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "lowercase")]
 pub enum Engine {
@@ -25,32 +26,32 @@ pub enum Engine {
     Kubernetes,
 }
 
-/// What is drawn, and by how many tasks.
+/// Work of a job, and its number of tasks.
 #[derive(Debug, Clone)]
 pub struct JobWork {
-    /// For file names and labels.
+    /// Name for file names and labels.
     pub name: String,
-    /// The program, as workers find it.
+    /// Path of the program on the workers.
     pub program: String,
-    /// The folder in which it runs.
+    /// Folder in which the program runs.
     pub here: String,
-    /// Arguments of `render` as they were given, without outputs where the work is a single picture.
+    /// Arguments of `render`; for a single picture without its outputs.
     pub arguments: Vec<String>,
-    /// The same without frames.
+    /// Arguments of `render` without `--frames`.
     pub arguments_alone: Vec<String>,
-    /// Outputs of a single picture; none for a sequence, whose arguments have them.
+    /// Outputs of a single picture; empty for a sequence, whose arguments contain them.
     pub outputs: Vec<String>,
-    /// The frames of a sequence.
+    /// Frames of a sequence.
     pub frames: Option<Frames>,
-    /// Tasks.
+    /// Number of tasks.
     pub count: u32,
     /// Seconds that a task should take.
     pub seconds: u32,
-    /// Folder of parts and logs.
+    /// Folder for parts and logs.
     pub folder: String,
 }
 
-/// One word of a command line as a shell reads it.
+/// A word of a command line, quoted for a POSIX shell if necessary.
 #[must_use]
 pub fn word(text: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=+%".contains(c);
@@ -65,7 +66,7 @@ fn words(all: &[String]) -> String {
     all.iter().map(|text| word(text)).collect::<Vec<_>>().join(" ")
 }
 
-/// A name as DNS allows it.
+/// A name with the characters that DNS labels allow, at most 50.
 fn dns(name: &str) -> String {
     let plain: String =
         name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect();
@@ -79,17 +80,17 @@ fn json(text: &str) -> String {
 }
 
 impl JobWork {
-    /// The file for an engine.
+    /// Text of the job file for an engine.
     ///
     /// # Errors
-    /// When an argument has a character that the engine's file cannot hold.
+    /// When there are no tasks, or when an argument has a line break.
     pub fn file(&self, engine: Engine) -> Result<String> {
         let Self { count, folder, outputs, .. } = self;
-        ensure!(*count > 0, "a job of no tasks");
+        ensure!(*count > 0, "a job needs at least one task");
         let is_still = !outputs.is_empty();
         let arguments = words(&self.arguments);
         if arguments.contains('\n') {
-            bail!("an argument has a line break, which a job file cannot hold");
+            bail!("an argument contains a line break, which a job file cannot contain");
         }
         let merge = match is_still {
             true => {
@@ -156,7 +157,7 @@ impl JobWork {
             ("OUTPUT_OPENCUE", part("#IFRAME#")),
             ("JS_OUTPUT", if is_still { format!(" + \" -o {folder}/\" + i + \".part\"") } else { String::new() }),
         ];
-        // Twice: what is filled in has places of its own.
+        // Twice: some replacements contain placeholders.
         let mut text = template.to_owned();
         for _ in 0..2 {
             for (name, value) in &pieces {

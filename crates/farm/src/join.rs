@@ -1,4 +1,4 @@
-//! The whole of its parts: the film that one process would have made, to the last bit.
+//! Joins the parts of a picture into the film that one process would draw, bit for bit.
 
 use std::path::PathBuf;
 
@@ -11,36 +11,35 @@ use crate::identity::Identity;
 use crate::part::{Part, PartHeader, Split};
 use crate::worker::FarmWorker;
 
-/// A picture that several processes drew.
+/// A joined picture.
 #[derive(Debug)]
 pub struct Joined {
-    /// What it is.
+    /// Identity of the picture.
     pub identity: Identity,
-    /// Means of the samples, with coverage as alpha.
+    /// Mean of the samples, with coverage as alpha.
     pub film: Picture,
-    /// Means of the even and of the odd samples, where they have random numbers of their own.
+    /// Half buffers: means of the even and of the odd samples; only of path tracing.
     pub halves: Option<[Picture; 2]>,
-    /// What those say of the picture's error.
+    /// Error estimated from the half buffers.
     pub error: Option<SampleError>,
-    /// Pictures beside it, and layers of its surfaces.
+    /// Additional layers.
     pub aovs: Vec<Aov>,
-    /// Samples of each pixel.
+    /// Samples per pixel.
     pub samples: u32,
-    /// Bands of wavelengths that each has; 0: three colours.
+    /// Bands of wavelengths per sample; 0 for RGB.
     pub bands: u32,
-    /// What rays did.
+    /// Work counts of the rays.
     pub work: Work,
-    /// Pixels whose list of transparent surfaces was cut short.
+    /// Pixels whose list of transparent surfaces was truncated.
     pub dropped: u32,
-    /// Who drew it, by part.
+    /// Processes that drew the parts, by part.
     pub workers: Vec<FarmWorker>,
 }
 
 /// Reads parts and joins them.
 ///
 /// # Errors
-/// When a file is no part or is cut short, when parts are of different pictures, when one is missing or there twice, or is not drawn to
-/// its end.
+/// When a file is not a part or is truncated, when parts belong to different pictures, or when a part is missing, duplicate or incomplete.
 pub fn join(paths: &[PathBuf]) -> Result<Joined> {
     let mut parts = Vec::with_capacity(paths.len());
     for path in paths {
@@ -51,14 +50,14 @@ pub fn join(paths: &[PathBuf]) -> Result<Joined> {
     for (path, part) in &parts[1..] {
         let path = path.display();
         if let Err(why) = first.head.identity.same_as(&part.head.identity) {
-            bail!("{first_path} and {path} are no parts of one picture: {why:#}");
+            bail!("{first_path} and {path} are not parts of one picture: {why:#}");
         }
         let of =
             |head: &PartHeader| (head.shard[1], head.split, head.samples, head.bands, head.halves, head.parts.clone());
         let same = of(&first.head) == of(&part.head);
         ensure!(
             same,
-            "{first_path} and {path} are parts of two divisions of the picture: {} and {}",
+            "{first_path} and {path} are parts of two different divisions of the picture: {} and {}",
             told(first),
             told(part)
         );
@@ -74,12 +73,12 @@ pub fn join(paths: &[PathBuf]) -> Result<Joined> {
         .filter(|i| !parts.iter().any(|(_, part)| part.head.shard[0] == *i))
         .map(|i| i.to_string())
         .collect();
-    ensure!(missing.is_empty(), "of {count} parts these are missing: {}", missing.join(", "));
+    ensure!(missing.is_empty(), "of {count} parts, these are missing: {}", missing.join(", "));
     for (path, part) in &parts {
         let (done, [from, end]) = (part.drawn_to(), part.head.wanted);
         ensure!(
             part.is_whole(),
-            "{} is not drawn to its end: {} of {} samples; run its command again, it goes on from there",
+            "{} is incomplete: it has {} of {} samples; run its command again to continue it",
             path.display(),
             done - from,
             end - from
@@ -94,7 +93,7 @@ fn told(part: &Part) -> String {
     format!("{index} of {of} by {split} of {samples} samples")
 }
 
-/// Of all parts of one picture, in their order.
+/// Joins all parts of one picture, given in order.
 fn whole(mut parts: Vec<Part>) -> Joined {
     let work = parts.iter().fold(Work::default(), |work, part| work.with(&part.head.work));
     let workers = parts.iter().map(|part| part.head.worker.clone()).collect();
@@ -102,7 +101,7 @@ fn whole(mut parts: Vec<Part>) -> Joined {
     let mut aovs = std::mem::take(&mut parts[0].aovs);
     let PartHeader { identity, shard: [_, of], split, samples, bands, halves, parts: names, .. } =
         parts[0].head.clone();
-    // A pixel belongs to one part by tiles, a sample to one by samples.
+    // Parts by tiles have different pixels; parts by samples have the same pixels.
     let dropped =
         if split == Split::Tiles { dropped.iter().sum() } else { dropped.into_iter().max().unwrap_or_default() };
     let [width, _] = identity.size;
@@ -138,7 +137,7 @@ fn whole(mut parts: Vec<Part>) -> Joined {
     }));
     let both = (halves == 2).then(|| [0, 1].map(|half| scale(&sums[half], 2.0 / samples as f32)));
     let error = (halves == 2).then(|| error_of_halves([&sums[0].rgba, &sums[1].rgba], samples));
-    // As shaders/pass/join.comp and accumulate.comp have it.
+    // The same arithmetic as shaders/pass/join.comp and accumulate.comp.
     let film = match &sums[..] {
         [a, b] => Picture {
             rgba: a.rgba.iter().zip(&b.rgba).map(|(a, b)| std::array::from_fn(|i| (a[i] + b[i]) * mean)).collect(),

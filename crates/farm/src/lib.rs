@@ -1,8 +1,8 @@
-//! Work that is split over processes and machines, and joined to the bits of one run.
+//! Distributed rendering: work split over processes and machines, whose joined result is bit-identical to one run. See docs/farm.md.
 //!
-//! Etalon has no scheduler: it makes work that any engine can split. [`frames`] says which frames a process draws, [`names`] which files
-//! they go to, [`identity`] what a file is a picture of, [`part`] keeps the part of a still that one process drew, [`join`] makes the
-//! whole of the parts, [`job`] writes files for engines, and [`account`] lays side by side what the workers tell of themselves.
+//! Etalon has no scheduler; it writes job files for existing engines. [`frames`] selects the frames of a process, [`names`] the file
+//! names, and [`identity`] identifies the picture of a file. [`part`] stores the part of a still picture that one process drew, and
+//! [`join`] joins the parts. [`job`] writes job files, and [`account`] a report about the workers.
 
 pub mod account;
 pub mod frames;

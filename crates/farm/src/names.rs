@@ -1,8 +1,8 @@
-//! Names of the files of a sequence: `out/{camera}.{frame:04}.png`.
+//! File name patterns of a sequence, for example `out/{camera}.{frame:04}.png`.
 
 use std::path::{Path, PathBuf};
 
-/// A path with places for what tells the pictures of a sequence apart.
+/// A path with placeholders for frame number and camera name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pattern {
     text: String,
@@ -12,27 +12,27 @@ pub struct Pattern {
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum NamePiece {
     Text(String),
-    /// Digits at least.
+    /// Frame number, with the least number of digits.
     Frame(usize),
     Camera,
 }
 
-/// Why a path is no pattern.
+/// Error of parsing a pattern.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NotPattern {
     /// A brace is not closed.
     #[error("{0}: a brace is not closed")]
     Open(String),
-    /// Something else stands in braces.
-    #[error("{0}: {{{1}}} stands for nothing; {{frame}}, {{frame:04}} and {{camera}} do")]
+    /// An unknown placeholder.
+    #[error("{0}: {{{1}}} is not a placeholder; use {{frame}}, {{frame:04}} or {{camera}}")]
     Unknown(String, String),
 }
 
 impl Pattern {
-    /// Reads a path.
+    /// Parses a path.
     ///
     /// # Errors
-    /// When what stands in braces means nothing.
+    /// When a brace is not closed, or when a placeholder is unknown.
     pub fn of(path: &Path) -> Result<Self, NotPattern> {
         let text = path.to_string_lossy().into_owned();
         let mut pieces = Vec::new();
@@ -65,13 +65,13 @@ impl Pattern {
         self.pieces.contains(&NamePiece::Camera)
     }
 
-    /// As it was written.
+    /// The pattern as given.
     #[must_use]
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// The path of one picture. Characters of a camera's name that a file's name cannot have become hyphens.
+    /// The path of one picture. In camera names, characters other than letters, digits, `.`, `_` and `-` become hyphens.
     #[must_use]
     pub fn path(&self, frame: i32, camera: &str) -> PathBuf {
         let plain = |c: char| if c.is_alphanumeric() || "._-".contains(c) { c } else { '-' };

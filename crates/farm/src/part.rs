@@ -1,8 +1,8 @@
-//! The part of a still that one process drew: an OpenEXR file of sums, with what they are sums of.
+//! File format for the part of a still picture that one process drew: an OpenEXR file with sums of samples.
 //!
-//! Any viewer of OpenEXR shows it. The first sum is the picture's R G B A; the others are layers `sum1`, `sum2`, …, and what the picture
-//! has as layers beside it is `aov.NAME`. What the file is a part of is the text attribute `etalon.part`, a JSON document of schema
-//! `etalon.part/1` with a hash of all samples: it reveals a truncated or changed file.
+//! Any OpenEXR viewer shows a part. The first sum is stored as R G B A, the others as layers `sum1`, `sum2`, …, and additional layers of
+//! the picture as `aov.NAME`. The text attribute `etalon.part` is a JSON document of schema `etalon.part/1`. It identifies the picture and
+//! has a hash of all samples, which reveals a truncated or changed file.
 
 use std::path::Path;
 
@@ -17,83 +17,83 @@ use crate::worker::FarmWorker;
 const SCHEMA: &str = "etalon.part/1";
 const ATTRIBUTE: &str = "etalon.part";
 
-/// How a still is divided.
+/// Division of a still picture into parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Split {
-    /// Every n-th tile of 8x8 pixels, with all samples.
+    /// By tiles: every n-th tile of 8x8 pixels, with all samples.
     Tiles,
-    /// All pixels, with some of the samples.
+    /// By samples: all pixels, with some of the samples.
     Samples,
 }
 
-/// What a part is a part of.
+/// Header of a part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PartHeader {
     /// `etalon.part/1`.
     pub schema: String,
-    /// The picture.
+    /// Identity of the picture.
     pub identity: Identity,
-    /// Which part, counted from 1, of how many.
+    /// Index of the part, from 1, and number of parts.
     pub shard: [u32; 2],
-    /// Of what kind.
+    /// Division of the picture.
     pub split: Split,
-    /// Samples of each pixel that the whole picture has.
+    /// Samples per pixel of the whole picture.
     pub samples: u32,
-    /// Bands of wavelengths that each sample has; 0: three colours.
+    /// Bands of wavelengths per sample; 0 for RGB.
     pub bands: u32,
-    /// Sums that the samples go to by turns.
+    /// Number of sums among which the samples alternate: 2 with half buffers, else 1.
     pub halves: usize,
-    /// Further pictures beside it that are sums of samples, by name.
+    /// Names of additional pictures that are sums of samples.
     pub parts: Vec<String>,
-    /// What the sums are of: samples from, up to. Those of a part by tiles are one piece, those of one by samples a piece for each
-    /// block that whoever draws all of them adds by itself.
+    /// Sample ranges `[from, end)` of the sums. A part by tiles has one piece; a part by samples has one piece for each block of samples
+    /// that a single process also adds separately.
     pub pieces: Vec<[u32; 2]>,
-    /// The samples that make the part whole.
+    /// Sample range of the complete part.
     pub wanted: [u32; 2],
-    /// What rays did.
+    /// Work counts of the rays.
     pub work: Work,
-    /// Pixels whose list of transparent surfaces was cut short.
+    /// Pixels whose list of transparent surfaces was truncated.
     pub dropped: u32,
-    /// Who drew it.
+    /// Process that drew the part.
     pub worker: FarmWorker,
-    /// Of all samples.
+    /// Hash of all samples.
     hash: String,
 }
 
 /// A part in memory.
 #[derive(Debug, Clone)]
 pub struct Part {
-    /// What it is.
+    /// Header.
     pub head: PartHeader,
-    /// Of each piece its sums, those of parts last.
+    /// Sums of each piece; those of additional pictures come last.
     pub sums: Vec<Vec<Picture>>,
-    /// Layers of the whole picture; the first part has them.
+    /// Layers of the whole picture; only in the first part.
     pub aovs: Vec<Aov>,
 }
 
-/// Pieces of a picture as the renderer tells them, with what they are pieces of.
+/// Pieces of a picture as drawn by the renderer, with the facts for the header.
 #[derive(Debug)]
 pub struct Drawn {
-    /// The picture.
+    /// Identity of the picture.
     pub identity: Identity,
-    /// Which part, counted from 1, of how many.
+    /// Index of the part, from 1, and number of parts.
     pub shard: [u32; 2],
-    /// Of what kind.
+    /// Division of the picture.
     pub split: Split,
-    /// Samples of each pixel that the whole picture has.
+    /// Samples per pixel of the whole picture.
     pub samples: u32,
-    /// Bands of wavelengths.
+    /// Bands of wavelengths per sample; 0 for RGB.
     pub bands: u32,
-    /// Names of the pictures beside it.
+    /// Names of additional pictures.
     pub parts: Vec<String>,
-    /// The samples that make the part whole.
+    /// Sample range of the complete part.
     pub wanted: [u32; 2],
-    /// What there is of them, in their order.
+    /// Drawn pieces, in order.
     pub pieces: Vec<Sums>,
     /// Layers of the whole picture.
     pub aovs: Vec<Aov>,
-    /// Who drew it.
+    /// Process that drew the part.
     pub worker: FarmWorker,
 }
 
@@ -103,14 +103,14 @@ fn hash(sums: &[Vec<Picture>]) -> String {
 }
 
 impl Part {
-    /// Of what was drawn, at least one piece.
+    /// Makes a part of at least one drawn piece.
     ///
     /// # Errors
-    /// When there is none.
+    /// When there are no pieces.
     pub fn of(drawn: Drawn) -> Result<Self> {
         let Drawn { identity, shard, split, samples, bands, parts, wanted, pieces, aovs, worker } = drawn;
-        let Some(last) = pieces.last() else { bail!("nothing of it is drawn yet") };
-        // What a part by tiles knows is of all its samples, those of pieces are of each piece.
+        let Some(last) = pieces.last() else { bail!("no sample of the part is drawn yet") };
+        // A part by tiles has one piece with all counts; a part by samples has counts for each piece.
         let work = pieces.iter().fold(Work::default(), |work, piece| work.with(&piece.work));
         let dropped = pieces.iter().map(|piece| piece.dropped).max().unwrap_or_default();
         let halves = last.sums.len() - parts.len();
@@ -136,23 +136,23 @@ impl Part {
         Ok(Self { head, sums, aovs })
     }
 
-    /// The sample up to which it is drawn.
+    /// End of the drawn sample range.
     #[must_use]
     pub fn drawn_to(&self) -> u32 {
         self.head.pieces.last().map_or(self.head.wanted[0], |piece| piece[1])
     }
 
-    /// Whether nothing of it is missing.
+    /// Whether the part is complete.
     #[must_use]
     pub fn is_whole(&self) -> bool {
         self.drawn_to() == self.head.wanted[1]
     }
 
-    /// What to go on with, of a part by tiles.
+    /// The sums, to continue drawing the part.
     #[must_use]
     pub fn into_sums(self) -> Vec<Sums> {
         let PartHeader { pieces, work, dropped, .. } = self.head;
-        // The counts of all pieces are with the first one.
+        // The first piece carries the counts of all pieces.
         let known = |place: usize| if place == 0 { (work, dropped) } else { (Work::default(), 0) };
         let of = |(place, (samples, sums)): (usize, ([u32; 2], Vec<Picture>))| {
             let (work, dropped) = known(place);
@@ -161,13 +161,13 @@ impl Part {
         pieces.into_iter().zip(self.sums).enumerate().map(of).collect()
     }
 
-    /// The bytes of its file.
+    /// The bytes of the part's file.
     ///
     /// # Errors
     /// When encoding fails.
     pub fn encode(&self) -> Result<Vec<u8>> {
         let mut all = self.sums.iter().flatten();
-        let first = all.next().ok_or_else(|| anyhow!("a part without sums: our mistake"))?;
+        let first = all.next().ok_or_else(|| anyhow!("a part has no sums: a bug of Etalon"))?;
         let channels = || ["R", "G", "B", "A"].map(str::to_owned).to_vec();
         let layer = |(place, sum): (usize, &Picture)| Aov {
             name: format!("sum{}", place + 1),
@@ -176,31 +176,37 @@ impl Part {
         };
         let mut layers: Vec<Aov> = all.enumerate().map(layer).collect();
         layers.extend(self.aovs.iter().map(|aov| Aov { name: format!("aov.{}", aov.name), ..aov.clone() }));
-        let head = serde_json::to_string(&self.head).context("writing what a part is of")?;
+        let head = serde_json::to_string(&self.head).context("writing the header of a part")?;
         exr::encode_exr(first, &layers, &[(ATTRIBUTE.to_owned(), head)])
     }
 
     /// Reads a part.
     ///
     /// # Errors
-    /// When the file is none, or is not whole.
+    /// When the file is not a part, or when it is truncated or damaged.
     pub fn read(path: &Path) -> Result<Self> {
         let place = path.display();
         let bytes = file::read(path)?;
-        let texts = exr::texts(&bytes).map_err(|_| anyhow!("{place} is no part of a picture, or was cut short"))?;
+        let texts =
+            exr::texts(&bytes).map_err(|_| anyhow!("{place} is not a part of a picture, or it is truncated"))?;
         let text = texts.iter().find(|(name, _)| name == ATTRIBUTE).map(|(_, text)| text);
-        let text = text.ok_or_else(|| anyhow!("{place} is no part of a picture: render --shard writes those"))?;
-        let head: PartHeader = serde_json::from_str(text).with_context(|| format!("{place}: what it is a part of"))?;
-        ensure!(head.schema == SCHEMA, "{place} is of schema {}, this program reads {SCHEMA}", head.schema);
-        let channels = exr::decode_channels(&bytes).map_err(|_| anyhow!("{place} was cut short, or is damaged"))?;
+        let text = text.ok_or_else(|| anyhow!("{place} is not a part of a picture; render --shard writes parts"))?;
+        let head: PartHeader =
+            serde_json::from_str(text).with_context(|| format!("{place}: reading the header of the part"))?;
+        ensure!(head.schema == SCHEMA, "{place} has schema {}, but this program reads {SCHEMA}", head.schema);
+        let channels = exr::decode_channels(&bytes).map_err(|_| anyhow!("{place} is truncated or damaged"))?;
         let size = [channels.width, channels.height];
-        ensure!(size == head.identity.size, "{place} is damaged: {size:?} pixels for {:?}", head.identity.size);
+        ensure!(
+            size == head.identity.size,
+            "{place} is damaged: it has {size:?} pixels instead of {:?}",
+            head.identity.size
+        );
         let of = |prefix: &str| -> Result<Picture> {
             let samples = |channel: &str| -> Result<&Vec<f32>> {
                 let name = format!("{prefix}{channel}");
                 match channels.list.iter().find(|(known, _)| *known == name) {
                     Some((_, AovData::F32(samples))) => Ok(samples),
-                    _ => bail!("{place} is damaged: there is no channel {name}"),
+                    _ => bail!("{place} is damaged: the channel {name} is missing"),
                 }
             };
             let [r, g, b, a] = [samples("R")?, samples("G")?, samples("B")?, samples("A")?];
@@ -213,13 +219,13 @@ impl Part {
         let sums: Vec<Vec<Picture>> = (0..head.pieces.len()).map(piece).collect::<Result<_>>()?;
         ensure!(
             !sums.is_empty() && hash(&sums) == head.hash,
-            "{place} is damaged: its samples are not those that were written"
+            "{place} is damaged: its samples have changed since it was written"
         );
         Ok(Self { aovs: aovs(&channels), head, sums })
     }
 }
 
-/// Layers beside the sums, put together again of their channels.
+/// Additional layers, assembled from their channels.
 fn aovs(channels: &exr::Channels) -> Vec<Aov> {
     let mut all: Vec<(String, Vec<(String, &AovData)>)> = Vec::new();
     for (name, samples) in &channels.list {

@@ -1,23 +1,23 @@
-//! What a process tells of itself.
+//! Record of a process: host, device and times.
 
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
-/// Who drew something, where, and when.
+/// The process that drew a part or a sequence.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct FarmWorker {
-    /// The machine's name.
+    /// Host name.
     pub host: String,
-    /// Number of the process.
+    /// Process id.
     pub process: u32,
-    /// Seconds since 1970, when it began …
+    /// Start in seconds since 1970.
     pub began: f64,
-    /// … and when it had done.
+    /// End in seconds since 1970.
     pub ended: f64,
-    /// Device, driver and its version.
+    /// Device, driver and driver version.
     pub device: [String; 3],
-    /// Seconds before its first sample: opening, reading, compiling, uploading.
+    /// Seconds before the first sample: opening, reading, compiling, uploading.
     pub prepared_s: f64,
 }
 
@@ -26,7 +26,7 @@ fn since_1970(time: SystemTime) -> f64 {
 }
 
 impl FarmWorker {
-    /// This process, which began so long ago.
+    /// The record of this process, which has been running for `running` and needed `prepared` before its first sample.
     #[must_use]
     pub fn here(device: [String; 3], running: Duration, prepared: Duration) -> Self {
         let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok().or_else(|| std::env::var("HOSTNAME").ok());

@@ -6,9 +6,9 @@
 //! 2. rspirv reads the bindings, their access (`readonly`/`writeonly` survive as NonWritable/NonReadable), push
 //!    constants, specialization constants, vertex inputs and local size.
 //! 3. Every function of `shaders/lib/` tagged `@eq` gets a probe, a program that evaluates it (`src/equations.rs`), and its
-//! SPIR-V is checked (`src/contract.rs`). 4. `shaders.rs` gets a module per library file and per program, with specialization
-//! and push constants as structs (`src/generate.rs`). Bindings are named fields, so that a missing binding is a compile error.
-//! `share.rs` gets the structs of
+//!    SPIR-V is checked (`src/contract.rs`).
+//! 4. `shaders.rs` gets a module per library file and per program, with specialization and push constants as structs
+//!    (`src/generate.rs`). Bindings are named fields, so that a missing binding is a compile error. `share.rs` gets the structs of
 //!    `shaders/share/`. `src/interface.rs` assigns the numbers.
 //!
 //! Errors are printed as `file:line: message` by the compiler itself.

@@ -69,7 +69,7 @@ fn of_normal(n: [f32; 3]) -> [u8; 4] {
 const NOTHING: [u8; 4] = [24, 24, 26, 255];
 
 impl SurfaceLayer {
-    /// RGBA8 pixels of the layer. Must not be called for [`SurfaceLayer::Radiance`], which is the picture itself.
+    /// RGBA8 pixels of the layer. [`SurfaceLayer::Radiance`] is the picture itself and gives plain grey here.
     #[must_use]
     pub fn draw(self, surfaces: &PixelSurfaces) -> Vec<u8> {
         let farthest = surfaces.pixels.iter().map(|p| p.distance).fold(0.0, f32::max).max(1e-9);

@@ -1,4 +1,5 @@
-//! What the window wants and what the thread that draws has to show: all that goes between the two.
+//! State shared by the window and the render thread: the window's request ([`RenderRequest`]) and the render thread's results
+//! ([`RenderState`]).
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -16,118 +17,118 @@ use etalon::share::AovPixel;
 use etalon::transport::events::Event;
 use etalon_cost::table::Table;
 
-/// A scene as it comes out of a file.
+/// A loaded scene.
 pub struct Loaded {
-    /// Its name.
+    /// Name of the scene.
     pub name: String,
     /// The scene.
     pub original: Original,
-    /// What lights it from all around, and how strongly.
+    /// Environment map and the factor of its radiance.
     pub environment: Option<(Arc<Environment>, f32)>,
-    /// The camera that it begins with.
+    /// Initial camera.
     pub camera: Camera,
-    /// What was read around.
+    /// Warnings of the loader.
     pub warnings: Vec<String>,
-    /// Prices of rungs, where they were measured on this device.
+    /// Costs of rungs, if `etalon cost` has measured this picture on this device.
     pub prices: Option<Arc<Table>>,
-    /// The camera frames the scene for a size: for another it is another.
+    /// Whether the camera was computed to frame the scene: it then depends on the size of the picture.
     pub framed: bool,
-    /// Rungs that it is drawn with where nobody chose others.
+    /// Knobs to start with, if the scene changes those of the command line.
     pub knobs: Option<Knobs>,
 }
 
-/// Which scene: the one of the command line, or another file, at its own time or another.
+/// Request for a scene: file, animation time and size of the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OpenRequest<'a> {
-    /// `None`: that of the command line.
+    /// Scene file; `None`: that of the command line.
     pub file: Option<&'a Path>,
-    /// Seconds; `None`: as the command line says, or at rest.
+    /// Animation time in seconds; `None`: that of the command line, or the rest pose.
     pub time: Option<f64>,
-    /// Of the picture.
+    /// Size of the picture in pixels.
     pub size: [u32; 2],
 }
 
-/// Where scenes come from.
+/// Loader of scenes.
 pub trait SceneSource: Send {
-    /// Reads a scene, and all that belongs to it on this device.
+    /// Reads a scene with its environment, and the costs measured on this device.
     ///
     /// # Errors
-    /// One sentence with file and cause.
+    /// One sentence with the file and the cause.
     fn open(&self, asked: OpenRequest<'_>, device: &DeviceInfo) -> Result<Loaded>;
 
-    /// The scene alone, at another moment, and the camera that it begins with.
+    /// Reads only the scene at another animation time, with its initial camera.
     ///
     /// # Errors
-    /// As [`SceneSource::open`].
+    /// The errors of [`SceneSource::open`].
     fn moment(&self, asked: OpenRequest<'_>) -> Result<(Scene, Camera)>;
 }
 
-/// From where a scene is seen.
+/// Viewpoint of the picture.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Viewpoint {
-    /// The camera that it begins with, wherever that is at this time.
+    /// The initial camera of the scene, at the current animation time.
     Own,
-    /// A camera of the file, likewise.
+    /// A camera of the file by name, at the current animation time.
     Named(String),
-    /// Any other.
+    /// Any other camera.
     Free(Camera),
 }
 
 impl Viewpoint {
-    /// The camera.
+    /// The camera of this viewpoint.
     ///
     /// # Errors
-    /// When the file has no camera of that name any more.
+    /// When the file no longer has a camera of that name.
     pub fn camera<'a>(&'a self, loaded: &'a Loaded) -> Result<&'a Camera> {
         match self {
             Self::Own => Ok(&loaded.camera),
             Self::Free(camera) => Ok(camera),
             Self::Named(name) => {
                 let found = loaded.original.scene().cameras.iter().find(|camera| camera.name == *name);
-                found.with_context(|| format!("{}: there is no camera \"{name}\"", loaded.name))
+                found.with_context(|| format!("{}: the scene has no camera \"{name}\"", loaded.name))
             }
         }
     }
 }
 
-/// A pixel that is asked about.
+/// A pixel to inspect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pick {
-    /// Another number: asked anew.
+    /// Number of the inspection; a new number inspects again.
     pub number: u64,
-    /// Across and down.
+    /// Column and row.
     pub pixel: [u32; 2],
 }
 
-/// What is to be seen.
+/// What the window asks the render thread to draw.
 #[derive(Clone)]
 pub struct RenderRequest {
-    /// Another number: another scene.
+    /// Number of the scene; a new number loads a scene.
     pub scene: u64,
-    /// Its file; `None`: that of the command line.
+    /// Scene file; `None`: that of the command line.
     pub file: Option<PathBuf>,
-    /// At which time; `None`: that of the command line, or at rest.
+    /// Animation time in seconds; `None`: that of the command line, or the rest pose.
     pub time: Option<f64>,
-    /// From where.
+    /// Viewpoint.
     pub from: Viewpoint,
-    /// How.
+    /// Settings of the renderer.
     pub settings: Settings,
-    /// Rungs of a second picture to compare with.
+    /// Knobs of a second picture for comparison.
     pub other: Option<Knobs>,
-    /// The view moves: quickly, rather than well.
+    /// Whether the view moves: the picture is then drawn small, with one sample.
     pub moving: bool,
-    /// Surfaces at the pixels are wanted, too.
+    /// Whether to read the surfaces at the pixels.
     pub surfaces: bool,
-    /// A pixel whose ray is to be followed.
+    /// Pixel whose ray is traced.
     pub picked: Option<Pick>,
-    /// Code of shaders in place of what was built.
+    /// Shader code that replaces built code.
     pub code: Arc<Vec<Replacement>>,
-    /// Nothing more.
+    /// Ends the render thread.
     pub quit: bool,
 }
 
 impl RenderRequest {
-    /// A scene of the command line, seen as it is found.
+    /// Request for the scene of the command line from its initial camera.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
         Self {
@@ -149,7 +150,7 @@ impl RenderRequest {
         OpenRequest { file: self.file.as_deref(), time: self.time, size: self.settings.size }
     }
 
-    /// Whether the same is to be drawn, however it is shown.
+    /// Whether both requests draw the same picture; display settings may differ.
     #[must_use]
     pub fn is_same_picture(&self, other: &Self) -> bool {
         let marks = |w: &Self| (w.scene, w.time, w.moving, w.quit);
@@ -161,7 +162,7 @@ impl RenderRequest {
             && Arc::ptr_eq(&self.code, &other.code)
     }
 
-    /// Whether the same is to be seen.
+    /// Whether both requests draw and show the same.
     #[must_use]
     pub fn is_as(&self, other: &Self) -> bool {
         let marks = |w: &Self| (w.surfaces, w.picked, w.settings.tonemap, w.settings.exposure);
@@ -169,28 +170,28 @@ impl RenderRequest {
     }
 }
 
-/// What there is to be known of a scene.
+/// Facts of a scene for the panels.
 #[derive(Clone)]
 pub struct SceneFacts {
-    /// Which scene.
+    /// Number of the scene.
     pub scene: u64,
-    /// Its time, as it was wanted.
+    /// Requested animation time.
     pub time: Option<f64>,
-    /// Seconds that it lasts.
+    /// Duration of the animation in seconds; `None` where nothing moves.
     pub duration: Option<f64>,
-    /// Name.
+    /// Name of the scene.
     pub name: String,
-    /// Box around it.
+    /// Bounding box.
     pub bounds: Bounds,
-    /// Where it is seen from first.
+    /// Initial camera.
     pub home: Camera,
-    /// It frames the scene: no words but its own place name it.
+    /// Whether the initial camera was computed to frame the scene; a command must then give it by eye and target.
     pub framed: bool,
-    /// Rungs that the scene is drawn with at first.
+    /// Knobs to start with, if the scene changes those of the command line.
     pub knobs: Option<Knobs>,
-    /// Those of the file.
+    /// Cameras of the file.
     pub cameras: Vec<Camera>,
-    /// Triangles, instances, lights.
+    /// Numbers of triangles, instances and lights.
     pub counts: [usize; 3],
     /// Materials.
     pub materials: Vec<Material>,
@@ -198,16 +199,16 @@ pub struct SceneFacts {
     pub instances: Vec<String>,
     /// Lights.
     pub lights: Vec<Light>,
-    /// What was read around.
+    /// Warnings of the loader.
     pub warnings: Vec<String>,
-    /// Prices of rungs, where they were measured.
+    /// Costs of rungs, if they were measured.
     pub prices: Option<Arc<Table>>,
 }
 
 impl SceneFacts {
     pub(super) fn of(wanted: &RenderRequest, loaded: &Loaded) -> Result<Self> {
         let scene = loaded.original.scene();
-        let bounds = scene.bounds().with_context(|| format!("{}: there is nothing to draw", loaded.name))?;
+        let bounds = scene.bounds().with_context(|| format!("{}: the scene has nothing to draw", loaded.name))?;
         Ok(Self {
             scene: wanted.scene,
             time: wanted.time,
@@ -228,41 +229,41 @@ impl SceneFacts {
     }
 }
 
-/// A picture, perhaps under way.
+/// A picture, finished or in progress.
 #[derive(Clone)]
 pub struct Shown {
-    /// Counts up, over both sides.
+    /// Version, which counts up over both sides.
     pub version: u64,
-    /// As a display shows it.
+    /// Display values, RGBA8.
     pub rgba: Arc<Vec<u8>>,
-    /// Pixels.
+    /// Size in pixels.
     pub size: [u32; 2],
-    /// Samples of so many.
+    /// Samples drawn, and samples in total.
     pub samples: [u32; 2],
-    /// Drawn while the view moved.
+    /// Whether it was drawn while the view moved.
     pub moving: bool,
-    /// Time of the scene, as it was wanted.
+    /// Requested animation time.
     pub time: Option<f64>,
-    /// Rungs that it was drawn with.
+    /// Knobs of the picture.
     pub knobs: Knobs,
-    /// GPU time of each pass, of a sample.
+    /// GPU time of each pass, per sample.
     pub passes: Vec<PassTime>,
-    /// Rays of a sample.
+    /// Rays per sample.
     pub rays: u64,
-    /// Values that are no radiances.
+    /// Counts of NaN, infinite and negative pixels.
     pub counts: Counts,
-    /// Root of the relative mean squared error that its own samples tell; of pictures by paths.
+    /// Estimated relative error (root of the relative mean squared error); only of path tracing.
     pub error: Option<f64>,
 }
 
 impl Shown {
-    /// Whether no sample is left to be drawn, of a picture that does not move.
+    /// Whether all samples are drawn and the view does not move.
     #[must_use]
     pub fn is_done(&self) -> bool {
         !self.moving && self.samples[0] == self.samples[1]
     }
 
-    /// GPU milliseconds of a sample.
+    /// GPU milliseconds per sample.
     #[must_use]
     pub fn ms(&self) -> f64 {
         self.passes.iter().map(|pass| pass.ms).sum()
@@ -272,75 +273,75 @@ impl Shown {
 /// Surfaces at the pixel centres of a picture.
 #[derive(Clone)]
 pub struct PixelSurfaces {
-    /// Row by row.
+    /// Surfaces, row by row.
     pub pixels: Arc<Vec<AovPixel>>,
-    /// Radiance of the same pixels, of each side.
+    /// Radiance of the same pixels, for each side.
     pub radiance: Vec<Arc<Vec<[f32; 4]>>>,
-    /// Pixels across and down.
+    /// Width and height in pixels.
     pub size: [u32; 2],
-    /// What positions are relative to.
+    /// Eye position, which positions are relative to.
     pub eye: glam::DVec3,
-    /// From where they are seen.
+    /// Camera of the picture.
     pub seen_from: Camera,
-    /// The pictures that they were read with.
+    /// Versions of the pictures that they were read with.
     pub versions: [Option<u64>; 2],
 }
 
-/// One side of the window: all of it, or what is left or right of the wipe.
+/// One side of the window: the whole picture, or the part left or right of the wipe line.
 #[derive(Clone, Default)]
 pub struct Side {
     /// The picture.
     pub shown: Option<Shown>,
     /// Every effect with its reason.
     pub effects: Arc<[Effect]>,
-    /// What the plan warns of.
+    /// Warnings of the plan.
     pub warnings: Arc<[String]>,
 }
 
-/// How far both sides are from each other.
+/// Difference between both sides.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Difference {
-    /// Of which pictures.
+    /// Versions of the compared pictures.
     pub versions: [u64; 2],
-    /// Mean FLIP of what is seen.
+    /// Mean FLIP error of the display values.
     pub flip: f64,
 }
 
-/// What a pixel's ray meets.
+/// Events along the ray of an inspected pixel.
 #[derive(Clone)]
 pub struct Trace {
-    /// Of which question …
+    /// Number of the inspection.
     pub number: u64,
-    /// … and pixel.
+    /// Inspected pixel.
     pub pixel: [u32; 2],
-    /// In the order in which they were found: what follows from one comes after it.
+    /// Events in the order in which they were found; an event comes after the event that it follows from.
     pub events: Vec<Event>,
-    /// From where it was asked.
+    /// Camera at the time of the inspection.
     pub seen_from: Camera,
-    /// Pixels of the picture.
+    /// Size of the picture in pixels.
     pub size: [u32; 2],
 }
 
-/// What the worker has to say.
+/// Results of the render thread.
 #[derive(Clone, Default)]
 pub struct RenderState {
     /// The scene.
     pub facts: Option<Arc<SceneFacts>>,
-    /// The picture, and the one it is compared with.
+    /// The picture, and the picture it is compared with.
     pub sides: [Side; 2],
-    /// How far both are from each other.
+    /// Difference between both sides.
     pub difference: Option<Difference>,
-    /// Surfaces, where they are wanted.
+    /// Surfaces, if requested.
     pub surfaces: Option<PixelSurfaces>,
-    /// A pixel's ray, where it is wanted.
+    /// Ray of the inspected pixel, if requested.
     pub trace: Option<Arc<Trace>>,
-    /// What it is doing, when that takes long.
+    /// Current long operation.
     pub busy: Option<String>,
-    /// What went wrong last.
+    /// Last error.
     pub error: Option<String>,
-    /// A scene that could not be read: the one before stays.
+    /// Number of a scene that could not be read; the previous scene stays.
     pub failed: Option<u64>,
-    /// The device is gone: nothing more will be drawn.
+    /// Whether the device was lost; nothing more will be drawn.
     pub lost: bool,
 }
 
@@ -351,45 +352,45 @@ impl RenderState {
         self.sides[0].shown.as_ref()
     }
 
-    /// Numbers of the pictures that are seen.
+    /// Versions of the shown pictures.
     #[must_use]
     pub fn versions(&self) -> [Option<u64>; 2] {
         self.sides.each_ref().map(|side| side.shown.as_ref().map(|shown| shown.version))
     }
 
-    /// Surfaces of the pictures that are seen; `None` until they are read.
+    /// Surfaces of the shown pictures; `None` until they are read.
     #[must_use]
     pub fn now(&self) -> Option<&PixelSurfaces> {
         self.surfaces.as_ref().filter(|surfaces| surfaces.versions == self.versions())
     }
 
-    /// How far the pictures that are seen are from each other.
+    /// Difference between the shown pictures; `None` until they are compared.
     #[must_use]
     pub fn difference(&self) -> Option<Difference> {
         self.difference.filter(|known| known.versions.map(Some) == self.versions())
     }
 }
 
-/// What is wanted and what is seen, between two threads.
+/// Request and results, shared by two threads.
 pub struct SharedState {
     pub(super) wanted: Mutex<(RenderRequest, u64)>,
     pub(super) changed: Condvar,
     pub(super) seen: Mutex<RenderState>,
 }
 
-/// Locks without caring about a panic elsewhere: what is wanted and seen is whole at any time.
+/// Locks a mutex and ignores poisoning: request and results are consistent at any time.
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl SharedState {
-    /// Begins with something wanted.
+    /// Starts with a request.
     #[must_use]
     pub fn new(wanted: RenderRequest) -> Self {
         Self { wanted: Mutex::new((wanted, 1)), changed: Condvar::new(), seen: Mutex::default() }
     }
 
-    /// Wants something else.
+    /// Changes the request and wakes the render thread.
     pub fn want(&self, change: impl FnOnce(&mut RenderRequest)) {
         let mut wanted = lock(&self.wanted);
         change(&mut wanted.0);
@@ -397,13 +398,13 @@ impl SharedState {
         self.changed.notify_one();
     }
 
-    /// What there is to be seen.
+    /// A copy of the results.
     #[must_use]
     pub fn seen(&self) -> RenderState {
         lock(&self.seen).clone()
     }
 
-    /// Takes an error off the screen.
+    /// Clears the last error.
     pub fn dismiss(&self) {
         lock(&self.seen).error = None;
     }

@@ -1,4 +1,5 @@
-//! The thread that loads and draws: it looks at what is wanted before each sample, and shows what it has after some.
+//! The render thread: loads scenes and draws progressively. Before each sample it reads the request of the window; after some samples it
+//! publishes the picture.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -17,24 +18,24 @@ use etalon::plan::Knobs;
 use etalon::plan::rungs::{Indirect, Reflection, Refraction};
 use etalon::transport::events::{EventTracer, Limits};
 
-/// Milliseconds that a picture may take while the view moves: it gets smaller until it does.
+/// Time limit in milliseconds for a picture while the view moves; the resolution is reduced until the picture keeps it.
 const MOVING_MS: f64 = 40.0;
-/// Sides of pictures while the view moves: the window's over one of these.
+/// Divisors of the width and height while the view moves.
 const SMALLER: [u32; 6] = [1, 2, 3, 4, 6, 8];
-/// The same where nobody knows yet how long a pixel takes.
+/// Divisor while the time per pixel is unknown.
 const UNKNOWN: u32 = 4;
-/// Between two looks at a picture under way.
+/// Least time between two publications of a picture in progress.
 const LOOK: Duration = Duration::from_millis(100);
-/// Share of a pixel's light below which its ray is not followed.
+/// Fraction of a pixel's light below which its ray is not traced further.
 const LEAST_SHARE: f64 = 0.002;
 
-/// What draws one side of the window.
+/// Renderer of one side of the window.
 struct DrawnSide {
     renderer: Renderer,
-    /// Of the renderer.
+    /// Settings of the renderer.
     settings: Settings,
     drawing: Option<Drawing>,
-    /// What the sample under way took so far.
+    /// Time spent on the current sample so far.
     spent: Duration,
     looked: Instant,
 }
@@ -50,27 +51,27 @@ impl DrawnSide {
         self.drawing.as_ref().is_none_or(Drawing::is_done)
     }
 
-    /// How much of its picture is drawn.
+    /// Fraction of the samples that are drawn.
     fn progress(&self) -> f64 {
         self.drawing.as_ref().map_or(0.0, |drawing| f64::from(drawing.samples()) / f64::from(drawing.of().max(1)))
     }
 }
 
-/// The scene and what draws it.
+/// The loaded scene with its renderers.
 struct LoadedRenderers {
     scene: u64,
     time: Option<f64>,
     loaded: Loaded,
     sides: Vec<DrawnSide>,
-    /// Wall nanoseconds of a pixel of a sample, of each side; 0: nobody knows.
+    /// Wall nanoseconds per pixel and sample for each side; 0 while unknown.
     ns_per_pixel: [f64; 2],
-    /// Settings that could not be drawn: they are not tried again.
+    /// Settings that could not be drawn and are not tried again.
     refused: [Option<Settings>; 2],
-    /// Made when a ray is followed for the first time.
+    /// Tracer for inspected pixels, made at the first inspection.
     tracer: Option<EventTracer>,
 }
 
-/// Settings of a side, with the environment as strong as the scene says.
+/// Settings of a side, with the environment intensity scaled by the factor of the scene.
 fn settings_of(loaded: &Loaded, wanted: &RenderRequest, side: usize) -> Settings {
     let share = loaded.environment.as_ref().map_or(1.0, |(_, share)| *share);
     let settings = wanted.settings.clone();
@@ -78,7 +79,7 @@ fn settings_of(loaded: &Loaded, wanted: &RenderRequest, side: usize) -> Settings
     Settings { environment_intensity: settings.environment_intensity * share, knobs, ..settings }
 }
 
-/// Whether a renderer for the one draws the other as well.
+/// Whether a renderer made for `a` can draw `b`.
 fn same_renderer(a: &Settings, b: &Settings) -> bool {
     a.knobs == b.knobs
         && a.background == b.background
@@ -88,10 +89,10 @@ fn same_renderer(a: &Settings, b: &Settings) -> bool {
         && a.forced == b.forced
 }
 
-/// Says that there is something to be seen.
+/// Wakes the window because the results have changed.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
 
-/// What a worker goes through.
+/// State of the render thread.
 pub struct Worker {
     device: Arc<Device>,
     shared: Arc<SharedState>,
@@ -99,14 +100,14 @@ pub struct Worker {
     wake: Wake,
     stage: Option<LoadedRenderers>,
     version: u64,
-    /// Code of shaders that is drawn with in place of what was built.
+    /// Shader code that replaces built code.
     code: Arc<Vec<Replacement>>,
-    /// Pictures that are compared, or will be next; `None`: nobody compares.
+    /// Pictures that are being compared, or are compared next; `None` while no comparison runs.
     comparing: Arc<Mutex<Option<(Shown, Shown)>>>,
 }
 
 impl Worker {
-    /// Loads and draws until nothing more is wanted.
+    /// Loads and draws until the request has `quit`, or the device is lost.
     pub fn run(device: Arc<Device>, shared: Arc<SharedState>, source: Box<dyn SceneSource>, wake: Wake) {
         let (code, comparing) = (lock(&shared.wanted).0.code.clone(), Arc::default());
         let mut worker = Self { device, shared, source, wake, stage: None, version: 0, code, comparing };
@@ -118,14 +119,14 @@ impl Worker {
                 while wanted.1 == known && worker.is_idle() {
                     wanted = worker.shared.changed.wait(wanted).unwrap_or_else(PoisonError::into_inner);
                 }
-                // Whoever interrupts holds this lock, and wants something else.
+                // The window interrupts the device while it holds this lock and changes the request.
                 worker.device.resume();
                 wanted.clone()
             };
             if wanted.quit {
                 return;
             }
-            // A sample is drawn after each change: a scene that never rests is seen, too.
+            // A sample is drawn after each change, so that a scene in permanent motion is shown too.
             let begun = if number == known { Ok(()) } else { worker.begin(&wanted, last.as_ref()) };
             let result = begun.and_then(|()| worker.refine(&wanted));
             known = number;
@@ -156,7 +157,7 @@ impl Worker {
         (self.wake)();
     }
 
-    /// Something else is wanted.
+    /// Takes over a changed request.
     fn begin(&mut self, wanted: &RenderRequest, last: Option<&RenderRequest>) -> Result<()> {
         let renewed = !Arc::ptr_eq(&self.code, &wanted.code);
         if renewed {
@@ -174,7 +175,7 @@ impl Worker {
         let Some(stage) = &mut self.stage else { return Ok(()) };
         let camera = wanted.from.camera(&stage.loaded)?;
         let same_view = last.is_some_and(|last| {
-            // What is the scene's own may have moved with its time.
+            // A camera of the scene may have moved with the animation time.
             (&last.from, last.moving) == (&wanted.from, wanted.moving) && tried == Some(at)
         });
         let ns: f64 = stage.ns_per_pixel.iter().take(stage.sides.len()).sum();
@@ -208,7 +209,7 @@ impl Worker {
         self.trace(wanted, last)
     }
 
-    /// Reads a scene and makes ready to draw it; what cannot be read, or drawn, leaves the one before.
+    /// Loads a scene and its renderer; if that fails, the previous scene stays.
     fn load(&mut self, wanted: &RenderRequest) -> Result<()> {
         let name = wanted.file.as_ref().map_or("the scene".to_owned(), |file| file.display().to_string());
         self.say(|seen| seen.busy = Some(format!("reading {name}")));
@@ -224,7 +225,7 @@ impl Worker {
         Ok(())
     }
 
-    /// The same scene at another time.
+    /// Goes to another animation time of the scene.
     fn go_to(&mut self, wanted: &RenderRequest) -> Result<()> {
         let Some(stage) = &self.stage else { return Ok(()) };
         let (scene, camera) = self.source.moment(wanted.asked())?;
@@ -239,7 +240,7 @@ impl Worker {
             framed: *framed,
             knobs: knobs.clone(),
         };
-        // Times of samples are much the same from one moment to the next.
+        // The time per sample changes little between animation times.
         let ns = stage.ns_per_pixel;
         let (mut stage, facts) = self.ready(wanted, loaded)?;
         stage.ns_per_pixel = ns;
@@ -247,7 +248,7 @@ impl Worker {
         Ok(())
     }
 
-    /// A scene with what draws it, and what there is to be known of it.
+    /// Makes the renderer and the facts of a loaded scene.
     fn ready(&self, wanted: &RenderRequest, loaded: Loaded) -> Result<(LoadedRenderers, SceneFacts)> {
         let facts = SceneFacts::of(wanted, &loaded)?;
         let side = DrawnSide::new(&self.device, &loaded, settings_of(&loaded, wanted, 0))?;
@@ -271,7 +272,7 @@ impl Worker {
         });
     }
 
-    /// As many sides as are wanted, with their rungs; those that cannot be drawn leave what is there.
+    /// Makes a renderer for each requested side with its knobs; a side that cannot be drawn keeps its picture.
     fn follow_knobs(&mut self, wanted: &RenderRequest, renewed: bool) -> Result<()> {
         let Some(stage) = &mut self.stage else { return Ok(()) };
         if wanted.other.is_none() {
@@ -296,7 +297,7 @@ impl Worker {
         Ok(())
     }
 
-    /// Plans and uploads one side for other rungs.
+    /// Plans and uploads one side with other knobs.
     fn plan(&mut self, settings: Settings, index: usize) -> Result<()> {
         self.say(|seen| seen.busy = Some("uploading and compiling".to_owned()));
         let Some(stage) = &mut self.stage else { return Ok(()) };
@@ -305,7 +306,7 @@ impl Worker {
             Ok(side) => {
                 stage.refused[index] = None;
                 if index < stage.sides.len() {
-                    // Other rungs take other times: the next sample tells.
+                    // The time per pixel is unknown for other knobs until the next sample.
                     stage.ns_per_pixel[index] = 0.0;
                     stage.sides[index] = side;
                 } else {
@@ -316,7 +317,7 @@ impl Worker {
                 Ok(())
             }
             Err(error) if is_lost(&error) => Err(error),
-            // What can be drawn goes on.
+            // The sides that can be drawn go on.
             Err(error) => {
                 stage.refused[index] = Some(settings);
                 self.say(|seen| (seen.busy, seen.error) = (None, Some(format!("{error:#}"))));
@@ -334,14 +335,14 @@ impl Worker {
         });
     }
 
-    /// One more sample, or band of it, of the side that is less far; of both that which was shown longer ago.
+    /// Draws one more sample, or a band of it, for the side with less progress; with equal progress, for the side published longer ago.
     fn refine(&mut self, wanted: &RenderRequest) -> Result<()> {
         let Some(stage) = &mut self.stage else { return Ok(()) };
         let unfinished = stage.sides.iter_mut().enumerate().filter(|(_, side)| !side.is_done());
         let order = |a: &DrawnSide, b: &DrawnSide| a.progress().total_cmp(&b.progress()).then(a.looked.cmp(&b.looked));
         let Some((index, side)) = unfinished.min_by(|a, b| order(a.1, b.1)) else { return Ok(()) };
         let Some(drawing) = &mut side.drawing else { return Ok(()) };
-        // While the view moves each picture is seen, all its bands: the next is not better.
+        // While the view moves, each picture is drawn to its end with all bands: the next one would not be better.
         drawing.interruptible = !wanted.moving;
         let (begun, before) = (Instant::now(), drawing.samples());
         side.renderer.step(drawing)?;
@@ -352,7 +353,7 @@ impl Worker {
         if drawing.samples() == before {
             return Ok(());
         }
-        // The first sample compiles; what is quicker is believed at once.
+        // The first sample includes compilation, so a faster time replaces the estimate at once.
         let [width, height] = side.settings.size;
         let ns = std::mem::take(&mut side.spent).as_secs_f64() * 1e9 / f64::from(width) / f64::from(height);
         let known = stage.ns_per_pixel[index];
@@ -389,7 +390,7 @@ impl Worker {
         Ok(())
     }
 
-    /// What is asked of pictures that are finished.
+    /// Reads surfaces and compares sides when the pictures are finished.
     fn finish(&mut self, wanted: &RenderRequest) -> Result<()> {
         if wanted.moving {
             return Ok(());
@@ -411,7 +412,8 @@ impl Worker {
         Ok(())
     }
 
-    /// Compares both sides, on a thread of its own: that takes longer than a piece of a pass. Of what is asked meanwhile it does the last.
+    /// Compares both sides on a separate thread, because FLIP takes longer than a time slice of a pass. Of the pictures that arrive
+    /// meanwhile, only the latest are compared.
     fn compare(&self, left: Shown, right: Shown) {
         let runs = lock(&self.comparing).replace((left, right)).is_some();
         if runs {
@@ -428,7 +430,7 @@ impl Worker {
                 let versions = [left.version, right.version];
                 match compare(Metric::Flip, &picture(&left), &picture(&right)) {
                     Ok(found) => lock(&shared.seen).difference = Some(Difference { versions, flip: found.value }),
-                    Err(error) => lock(&shared.seen).error = Some(format!("comparing both sides: {error:#}")),
+                    Err(error) => lock(&shared.seen).error = Some(format!("comparing the two sides: {error:#}")),
                 }
                 wake();
                 let mut next = lock(&comparing);
@@ -440,7 +442,7 @@ impl Worker {
         };
         if let Err(error) = std::thread::Builder::new().name("comparing".to_owned()).spawn(work) {
             *lock(&self.comparing) = None;
-            self.say(|seen| seen.error = Some(format!("comparing both sides: {error}")));
+            self.say(|seen| seen.error = Some(format!("comparing the two sides: {error}")));
         }
     }
 
@@ -464,7 +466,7 @@ impl Worker {
         Ok(())
     }
 
-    /// Follows the ray of a pixel that is asked about, seen from where it was asked: whoever moves sees it from elsewhere.
+    /// Traces the ray of the inspected pixel from the camera of the inspection; the user may have moved since.
     fn trace(&mut self, wanted: &RenderRequest, last: Option<&RenderRequest>) -> Result<()> {
         let Some(picked) = wanted.picked else {
             let known = lock(&self.shared.seen).trace.is_some();
@@ -486,7 +488,7 @@ impl Worker {
         let tracer = match stage.tracer.take() {
             Some(tracer) => tracer,
             None => {
-                let bvh = stage.loaded.original.bvh().context("following the ray of a pixel")?;
+                let bvh = stage.loaded.original.bvh().context("tracing the ray of a pixel")?;
                 EventTracer::new(stage.loaded.original.scene(), bvh)
             }
         };
@@ -499,7 +501,7 @@ impl Worker {
     }
 }
 
-/// How far the rays of a picture with these rungs go.
+/// Limits for tracing a pixel's ray, as in a picture with these knobs.
 fn limits_of(knobs: &Knobs) -> Limits {
     let rays = knobs.reflection == Reflection::Ray || knobs.refraction == Refraction::Ray;
     let paths = knobs.indirect == Indirect::Path;
@@ -511,7 +513,7 @@ fn limits_of(knobs: &Knobs) -> Limits {
     }
 }
 
-/// The largest of some sizes that takes no longer than a picture may while the view moves.
+/// The largest size that keeps [`MOVING_MS`] while the view moves.
 fn smaller(size: [u32; 2], ns_per_pixel: f64) -> [u32; 2] {
     if ns_per_pixel == 0.0 {
         return size.map(|side| side.div_ceil(UNKNOWN));
@@ -530,7 +532,7 @@ mod tests {
     fn pictures_get_smaller_until_they_are_quick() {
         assert_eq!(smaller([1280, 720], 0.0), [320, 180]);
         assert_eq!(smaller([1280, 720], 40.0), [1280, 720]);
-        // 92 ms whole, 23 at half the side.
+        // 92 ms at full size, 23 ms at half the width and height.
         assert_eq!(smaller([1280, 720], 100.0), [640, 360]);
         assert_eq!(smaller([1281, 721], 1e6), [161, 91]);
         assert_eq!(smaller([3, 1], 1e9), [1, 1]);

@@ -1,12 +1,12 @@
-//! A pass of one's own after Etalon's: its shader counts the stops of the film where it lies, on the device. What it binds, reads and
-//! writes is taken from its GLSL, and so are the barriers.
+//! A custom compute pass after Etalon's passes: it counts the pixels of the film by stops, on the device. Bindings, access and
+//! barriers are derived from its GLSL.
 #![allow(clippy::print_stdout, reason = "an example shows what it does")]
 
 use etalon::frame::Settings;
 use etalon::gpu::{Buffer, Device, DeviceChoice, Frame, Place};
 use etalon::open::Opened;
 
-/// What build.rs made of `shaders/`.
+/// Rust code that build.rs generated from `shaders/`.
 #[allow(dead_code, unused_imports, missing_docs, unreachable_pub, reason = "generated")]
 mod shader {
     use ash::vk;

@@ -1,4 +1,5 @@
-//! Which setting to use, what it gives up, and how far that is to be trusted.
+//! First sections of the page: recommended settings, what they simplify, how far to trust the measurements, and a comparison with the
+//! reference.
 
 use std::path::Path;
 
@@ -10,7 +11,7 @@ use super::{digits, error, percent, plain, time, title, words};
 use crate::statistics::Interval;
 use crate::table::{AtSize, Point, REFERENCE, RESOLVED, Recommended, Table};
 
-/// What a recommended point takes at the size that was asked for.
+/// Time of a recommended point at the requested size, in words.
 fn at_size<'a>(table: &'a Table, point: &Point) -> Option<(String, &'a AtSize)> {
     let asked = table.asked.as_ref()?;
     let place =
@@ -20,18 +21,18 @@ fn at_size<'a>(table: &'a Table, point: &Point) -> Option<(String, &'a AtSize)> 
     Some((format!("{about}{} at {}×{}", time(at.gpu_ms.median), asked.size[0], asked.size[1]), at))
 }
 
-/// The time of a point, where it may be at the size that was asked for.
+/// Time of a point, at the requested size if known.
 fn takes(table: &Table, point: &Point) -> String {
     at_size(table, point).map_or_else(|| time(point.gpu_ms.median), |(words, _)| words)
 }
 
-/// The shortest and the longest of the times that a point took at the size that was asked for.
+/// Shortest and longest time of a point, at the requested size if known.
 fn spread(table: &Table, point: &Point) -> String {
     let Interval { low, high, .. } = at_size(table, point).map_or(point.gpu_ms, |(_, at)| at.gpu_ms);
     if high > low { format!(" ({} to {})", time(low), time(high)) } else { String::new() }
 }
 
-/// A recommended point with the settings that it is recommended for: one may be more than one of them.
+/// Recommended points, each with all settings (`quick`, `balanced`, `exact`) that it is recommended for.
 fn recommended(table: &Table) -> Vec<(Vec<&str>, &Point)> {
     let mut all: Vec<(Vec<&str>, &Point)> = Vec::new();
     for Recommended { setting, point } in &table.recommended {
@@ -44,19 +45,19 @@ fn recommended(table: &Table) -> Vec<(Vec<&str>, &Point)> {
     all
 }
 
-/// The answer in a sentence.
+/// The recommendation in a sentence.
 pub(super) fn lead(table: &Table) -> Markup {
     let all = recommended(table);
     let balanced = all.iter().find(|(settings, _)| settings.contains(&"balanced"));
     let Some((_, point)) = balanced else {
-        return html! { "Nothing that was drawn is quicker than the reference: there is nothing to choose." };
+        return html! { "No picture is faster than the reference: there is nothing to choose." };
     };
     let seen = table.prices.iter().any(|price| !price.same && price.flip_between >= crate::table::INVISIBLE);
     html! {
-        "Use " b { (title(point)) } ": a picture takes " (takes(table, point)) " on this device, with an " (words::link("error", "error"))
+        "Use " b { (title(point)) } ": a picture takes " (takes(table, point)) " on this device and has an " (words::link("error", "error"))
         " of " (percent(point.error())) " of the range from black to white."
         @if !table.reference.converged {
-            " The " (words::link("reference", "reference")) " still has noise: what differs by less than " (percent(table.reference.resolution)) " cannot be told apart."
+            " The " (words::link("reference", "reference")) " is still noisy: do not trust differences below " (percent(table.reference.resolution)) "."
         }
         @if !seen { " No knob changes this picture visibly." }
     }
@@ -75,8 +76,8 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
                     img src=(picture) width=(size(table)[0]) height=(size(table)[1]) alt={ "Picture of the setting " (title(point)) };
                     table.facts { tbody {
                         tr { th scope="row" { "time" } td { b { (takes(table, point)) } (spread(table, point)) @if table.asked.is_some() { ", " (time(point.gpu_ms.median)) " at " (table.size[0]) "×" (table.size[1]) } } }
-                        tr { th scope="row" { "error" } td { @if point.name == REFERENCE { "noise below " b { (percent(point.error())) } "; the others are compared with it" } @else { (error(point)) } } }
-                        tr { th scope="row" { "given up" } td { (given_up(table, point)) } }
+                        tr { th scope="row" { "error" } td { @if point.name == REFERENCE { "noise below " b { (percent(point.error())) } "; the other pictures are compared with the reference" } @else { (error(point)) } } }
+                        tr { th scope="row" { "simplified" } td { (given_up(table, point)) } }
                     } }
                     @if point.name == REFERENCE && table.reference.rounds.len() > 1 { p.quiet { "A picture of about this quality:" } }
                     p.command { code { (command.replace(" --repeat 3", "")) } button.copy type="button" { "copy" } }
@@ -86,13 +87,13 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
         .collect::<Result<Vec<Markup>>>()?;
     Ok(html! {
         section #settings {
-            h2 { "Which setting" }
+            h2 { "Recommended settings" }
             div.settings { @for card in &cards { (card) } }
         }
     })
 }
 
-/// What a point gives up, the most telling first and the rest in one number; each with what its knob approximates.
+/// Simplified knobs of a point: the first four, and the rest folded; each with a description of its knob as a tooltip.
 fn given_up(table: &Table, point: &Point) -> Markup {
     let all = table.given_up(point);
     let list: Vec<&str> = all.split(", ").collect();
@@ -112,7 +113,7 @@ fn given_up(table: &Table, point: &Point) -> Markup {
     }
 }
 
-/// How sure all of it is.
+/// Quality of the reference, device and warnings.
 pub(super) fn trust(table: &Table) -> Markup {
     let r = &table.reference;
     let rounds = if r.rounds.len() > 1 { format!(", the mean of {} pictures", r.rounds.len()) } else { String::new() };
@@ -121,21 +122,21 @@ pub(super) fn trust(table: &Table) -> Markup {
             h2 { "How far to trust it" }
             p.verdict.good[r.converged].poor[!r.converged] {
                 @if r.converged {
-                    "The " (words::link("reference", "reference")) " has converged: an " (words::link("error", "error")) " of " (percent(r.resolution)) " or more can be told from none. Two pictures can be compared more finely, because both are held against the same noise."
+                    "The " (words::link("reference", "reference")) " has converged: an " (words::link("error", "error")) " of " (percent(r.resolution)) " or more is significant. The difference between two pictures is known more precisely, because both are compared with the same noisy reference."
                 } @else {
-                    "The " (words::link("reference", "reference")) " still has noise, which hides differences below " (percent(r.resolution)) "; the aim is "
-                    (plain(100.0 * RESOLVED)) " %. Run the same command again: it goes on with this reference."
+                    "The " (words::link("reference", "reference")) " is still noisy: do not trust differences below " (percent(r.resolution)) ". The target is "
+                    (plain(100.0 * RESOLVED)) " %. Run the same command again to improve this reference."
                 }
-                " A difference that may be noise has a question mark. All statements of this page together "
-                "are wrong by noise in at most 1 of 100 runs (each is " (digits(table.standard_errors)) " standard errors from zero)."
+                " A question mark marks a difference that may be noise. In at most 1 of 100 runs is any statement of this page "
+                "wrong due to noise (each is at least " (digits(table.standard_errors)) " standard errors from zero)."
             }
             table.facts { tbody {
                 tr { th scope="row" { "scene" } td { (table.scene) ", " (table.size[0]) "×" (table.size[1]) } }
                 tr { th scope="row" { "device" } td { (table.device.name) " (" (table.device.kind) "), " (table.device.driver) " " (table.device.version) } }
                 tr { th scope="row" { "reference" } td {
-                    (r.samples) " samples of each pixel" (rounds) ", " (time(r.gpu_ms)) " of GPU time; its noise is " (digits(r.own_flip)) " in " (words::link("flip", "FLIP"))
+                    (r.samples) " samples per pixel" (rounds) ", " (time(r.gpu_ms)) " of GPU time; its noise is " (digits(r.own_flip)) " in " (words::link("flip", "FLIP"))
                 } }
-                tr { th scope="row" { (if r.rounds.len() > 1 { "the first of them" } else { "made by" }) } td { code { (r.command) } } }
+                tr { th scope="row" { (if r.rounds.len() > 1 { "first picture" } else { "command" }) } td { code { (r.command) } } }
             } }
             @if !table.warnings.is_empty() {
                 ul.warnings { @for warning in &table.warnings { li { (warning) } } }
@@ -144,27 +145,27 @@ pub(super) fn trust(table: &Table) -> Markup {
     }
 }
 
-/// Each recommended picture over the reference, with a line between them that one can move.
+/// A picture over the reference with a movable dividing line.
 pub(super) fn slider(table: &Table, folder: &Path) -> Result<Markup> {
     let reference = embedded(&folder.join("reference.png"))?;
     let all = recommended(table);
     let [width, height] = size(table);
     Ok(html! {
         section #compare {
-            h2 { "Beside the reference" }
+            h2 { "Comparison with the reference" }
             @if !all.is_empty() {
-                p { label { "On the left " select #left {
+                p { label { "Left: " select #left {
                     @for (settings, point) in &all { option value=(format!("pictures/{}.png", point.picture)) { (settings.join(" and ")) ": " (title(point)) } }
                     @for point in table.points.iter().filter(|point| point.picture != "reference" && all.iter().all(|(_, known)| known.name != point.name)) {
                         option value=(format!("pictures/{}.png", point.picture)) { (title(point)) }
                     }
-                } } ", on the right the reference." }
+                } } "; right: the reference." }
             }
             div.slider style="--at:50%" {
                 img src=(reference) width=(width) height=(height) alt="The reference";
                 @if let Some((_, point)) = all.first() {
                     img.over src=(format!("pictures/{}.png", point.picture)) width=(width) height=(height) alt="The chosen picture";
-                    input type="range" min="0" max="100" value="50" aria-label="Where the chosen picture ends and the reference begins";
+                    input type="range" min="0" max="100" value="50" aria-label="Position of the line between the chosen picture and the reference";
                 }
             }
         }

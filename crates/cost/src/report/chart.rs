@@ -1,4 +1,4 @@
-//! Charts.
+//! Charts as SVG: error against GPU time with the Pareto frontier, and convergence of the quadrature rules.
 
 use std::collections::BTreeSet;
 
@@ -7,14 +7,14 @@ use maud::{Markup, html};
 use super::{anchor, class, digits, percent, plain, time, title};
 use crate::table::{Family, QuadratureOrder, Table};
 
-/// Width and height of the charts, in their own units.
+/// Width and height of the charts in SVG units.
 const CHART: [f64; 2] = [760.0, 420.0];
-/// Room for labels: left, right, top, bottom.
+/// Margins for labels: left, right, top, bottom.
 const MARGIN: [f64; 4] = [64.0, 16.0, 32.0, 44.0];
-/// Width of a letter and height of a line, about.
+/// Approximate width of a letter and height of a line.
 const LETTER: [f64; 2] = [6.6, 14.0];
 
-/// Where a logarithm falls.
+/// A logarithmic axis.
 struct ChartAxis {
     low: f64,
     high: f64,
@@ -23,20 +23,20 @@ struct ChartAxis {
 }
 
 impl ChartAxis {
-    /// Around some numbers above 0.
+    /// An axis that contains some numbers above 0.
     fn around(values: impl Iterator<Item = f64> + Clone, from: f64, to: f64) -> Self {
         let high = values.clone().fold(1e-9, f64::max);
         let low = values.fold(high, f64::min).max(1e-9);
         Self { low: low / 1.4, high: high * 1.4, from, to }
     }
 
-    /// No value is outside.
+    /// Position of a value; values outside are clamped.
     fn at(&self, value: f64) -> f64 {
         let part = (value.clamp(self.low, self.high) / self.low).ln() / (self.high / self.low).ln();
         self.from + part * (self.to - self.from)
     }
 
-    /// Whole steps of 1, 2 and 5.
+    /// Ticks at 1, 2 and 5 times powers of ten, fewer on long axes.
     fn ticks(&self) -> Vec<f64> {
         let decades = (self.high / self.low).log10();
         let steps: &[f64] = if decades > 3.0 {
@@ -54,7 +54,7 @@ impl ChartAxis {
     }
 }
 
-/// Error against time of every picture.
+/// Chart of error against time of every picture.
 pub(super) fn errors(table: &Table) -> Markup {
     let [width, height] = CHART;
     let [left, right, top, bottom] = MARGIN;
@@ -86,7 +86,7 @@ pub(super) fn errors(table: &Table) -> Markup {
                 a.point href=(anchor(p)) data-point=(p.picture) {
                     title { (title(p)) ": " (time(p.gpu_ms.median)) ", error " (percent(p.error())) }
                     circle class={ (class(p.family)) @if on { " on" } } cx=(cx) cy=(cy) r=(if on { 6.0 } else { 4.0 }) {}
-                    // A finger's width.
+                    // An invisible larger circle for touch screens.
                     circle.touch cx=(cx) cy=(cy) r="11" {}
                 }
             }
@@ -102,11 +102,12 @@ pub(super) fn errors(table: &Table) -> Markup {
     }
 }
 
-/// Names of the frontier's points, where they lie on no point and on no other name: beside it, above or below.
+/// Positions of the labels of the frontier's points, beside, above or below a point. A label that would overlap a point, the line or
+/// another label is left out.
 fn labels(table: &Table, place: &dyn Fn(usize) -> [f64; 2]) -> Vec<(usize, [f64; 2], &'static str)> {
     let mut boxes: Vec<[f64; 4]> =
         (0..table.points.len()).map(place).map(|[x, y]| [x - 5.0, x + 5.0, y - 5.0, y + 5.0]).collect();
-    // The line between them in short pieces.
+    // Boxes along the line of the frontier.
     for pair in table.frontier.windows(2) {
         let [[ax, ay], [bx, by]] = [place(pair[0]), place(pair[1])];
         let pieces = ((bx - ax).hypot(by - ay) / 4.0).ceil().max(1.0);
@@ -150,7 +151,7 @@ fn labels(table: &Table, place: &dyn Fn(usize) -> [f64; 2]) -> Vec<(usize, [f64;
     placed
 }
 
-/// Orders of the rules of quadrature.
+/// Chart and table of the convergence of the quadrature rules.
 pub(super) fn orders(table: &Table) -> Markup {
     let ([width, height], [left, right, top, bottom]) = (CHART, MARGIN);
     let all = || table.orders.iter().flat_map(|order| order.errors.iter().copied().filter(|error| *error > 0.0));
@@ -173,7 +174,7 @@ pub(super) fn orders(table: &Table) -> Markup {
                 line.grid x1=(left) x2=(width - right) y1=(y.at(tick)) y2=(y.at(tick)) {}
                 text.tick x=(left - 8.0) y=(y.at(tick) + 4.0) text-anchor="end" { (digits(tick)) }
             }
-            text.axis x=((left + width - right) * 0.5) y=(height - 8.0) text-anchor="middle" { "steps of each segment" }
+            text.axis x=((left + width - right) * 0.5) y=(height - 8.0) text-anchor="middle" { "steps per segment" }
             text.axis x="8" y="20" { "error" }
             @for order in &table.orders {
                 polyline.pareto points=(line(order)) {}

@@ -1,7 +1,7 @@
-//! `report.html`: a page that shows a [`Table`]: first which setting to use and how far to trust it, then everything else.
+//! `report.html`: an HTML page of a [`Table`]. It starts with the recommended settings and how far to trust the measurements.
 //!
-//! The pictures of the answer are in it; those of every point are beside it in the folder `pictures`, and loaded when they are
-//! looked at. Nothing is loaded from anywhere else.
+//! The pictures of the recommended settings are embedded. The pictures of all points lie beside the page in the folder `pictures` and are
+//! loaded on demand. Nothing is loaded from anywhere else.
 
 mod answer;
 mod chart;
@@ -21,7 +21,7 @@ use super::table::{Family, Point, REFERENCE, Table};
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 
-/// Colours of causes and passes, told apart by those who see few of them (Okabe and Ito 2008).
+/// Colours of causes and passes, from a palette for colour-blind readers (Okabe and Ito 2008).
 const COLOURS: [[u8; 3]; 8] = [
     [230, 159, 0],
     [86, 180, 233],
@@ -38,7 +38,7 @@ fn hex(index: usize) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
-/// A number with three digits that say something.
+/// A number with three significant digits.
 fn digits(x: f64) -> String {
     match x.abs() {
         0.0 => "0".to_owned(),
@@ -55,7 +55,7 @@ fn percent(x: f64) -> String {
     format!("{} %", digits(100.0 * x))
 }
 
-/// A number of an axis, or one that was chosen: without digits that say nothing.
+/// A number without trailing zeros, for axes and exact values.
 fn plain(x: f64) -> String {
     let text = digits(x);
     if text.contains('.') && !text.contains('e') {
@@ -65,28 +65,28 @@ fn plain(x: f64) -> String {
     }
 }
 
-/// A time in the unit that one would say it in.
+/// A time in milliseconds or seconds.
 fn time(ms: f64) -> String {
     if ms >= 1000.0 { format!("{} s", digits(ms / 1000.0)) } else { format!("{} ms", digits(ms)) }
 }
 
-/// An error with its interval.
+/// An error with its confidence interval.
 fn error(point: &Point) -> Markup {
     let e = &point.errors.error;
     html! { b { (percent(e.median)) } " (" (digits(100.0 * e.low)) " to " (digits(100.0 * e.high)) ")" }
 }
 
-/// What a point is called on the page.
+/// Title of a point on the page.
 fn title(point: &Point) -> String {
     match (point.family, point.name.strip_prefix("search: ")) {
-        (Family::Search, Some("quickest")) => "the quickest of every knob".to_owned(),
-        (Family::Search, Some("exact without waste")) => "exact, less what is wasted".to_owned(),
+        (Family::Search, Some("quickest")) => "fastest rung of every knob".to_owned(),
+        (Family::Search, Some("exact without waste")) => "reference quality, useless rungs off".to_owned(),
         (Family::Search, Some(step)) => format!("combination {}", step.trim_start_matches("step ")),
         _ => point.name.clone(),
     }
 }
 
-/// Where the page shows a point.
+/// Link to a point on the page.
 fn anchor(point: &Point) -> String {
     if point.name == REFERENCE { "#trust".to_owned() } else { format!("#p-{}", point.picture) }
 }
@@ -100,7 +100,7 @@ fn class(family: Family) -> &'static str {
     }
 }
 
-/// A part of the page that opens when it is asked for.
+/// A section of the page that is folded until it is opened.
 fn folded(id: &str, name: &str, about: Markup, content: Markup) -> Markup {
     html! {
         details id=(id) {
@@ -123,7 +123,7 @@ fn head(title: &str) -> Markup {
     }
 }
 
-/// The page; `folder` holds the pictures, and the page lies beside it.
+/// The page of a table; `folder` holds the pictures and lies beside the page.
 ///
 /// # Errors
 /// When a picture cannot be read.
@@ -146,59 +146,59 @@ pub fn page(table: &Table, folder: &Path) -> Result<String> {
                     section #frontier {
                         h2 { "Error against time" }
                         p {
-                            "Each point is a picture. GPU time goes across and "
-                            (words::link("error", "error")) " up, both logarithmic. The line joins the "
-                            (words::link("frontier", "frontier")) ". Below the broken line nothing can be told: that is the noise of the "
-                            (words::link("reference", "reference")) ". Point at a dot, or step through them with Tab."
+                            "Each point is a picture, by GPU time (horizontal) and "
+                            (words::link("error", "error")) " (vertical) on logarithmic axes. The line joins the best trade-offs, the "
+                            (words::link("frontier", "frontier")) ". Errors below the dashed line are hidden by the noise of the "
+                            (words::link("reference", "reference")) ". Hover a point for details, or step through the points with Tab."
                         }
                         div.chart-and-card {
                             (chart::errors(table))
-                            aside #card { p.quiet { "Point at a dot." } }
+                            aside #card { p.quiet { "Hover a point for details." } }
                         }
                         (tables::frontier(table))
                     }
                     (prices::matters(table))
-                    (folded("prices", "The price of each rung alone", html! {
-                        "One " (words::link("rung", "knob")) " changed, all others as in the preset " em { "local" } ", or on the reference's rungs with fewer samples ("
-                        em { "exact" } "). Error is what the change adds or takes away; errors add by their squares, so that 1 % less of 3 % leaves 2.8 %. From exact it is the difference of what both pictures converge to. A question mark stands where noise hides it."
+                    (folded("prices", "Cost of changing one knob", html! {
+                        "One " (words::link("rung", "knob")) " is changed; all others are as in the preset " em { "local" } ", or on the reference's rungs with fewer samples ("
+                        em { "exact" } "). Error is what the change adds (+) or removes (−). Errors add by their squares: removing 1 % from 3 % leaves 2.8 %. With base exact it is the difference between the limits of both pictures. A question mark means that noise hides the difference."
                     }, prices::table(table)))
                     (folded("tornado", "Time and visible change of each knob", html! {
-                        "To the left the time that a change takes or saves, to the right " (words::link("flip", "FLIP")) " between both pictures. Both scales are linear; bars that are longer than a scale are cut. Pale bars are no more than noise."
+                        "Left: the time that a change takes or saves. Right: " (words::link("flip", "FLIP")) " between both pictures. Both scales are linear; longer bars are cut. Pale bars may be noise."
                     }, prices::tornado(table)))
                     @if let Some(causes) = causes {
-                        (folded("causes", "What would help each pixel most", html! {
-                            "The picture of the preset " em { "local" } ", and for each pixel the change of one knob that brings it nearest to the reference. Only changes whose error is told take part. Dark pixels are not brought nearer by any."
+                        (folded("causes", "Most helpful change for each pixel", html! {
+                            "The picture of the preset " em { "local" } ", and for each pixel the change of one knob that brings it closest to the reference. Only changes with a significant error take part. No change improves dark pixels."
                         }, causes))
                     }
                     @if !table.others.is_empty() {
                         (folded("others", "Pictures of other programs", html! {
-                            "Held against the same reference. The mean is that of radiance over the reference's, in red, green and blue."
+                            "Compared with the same reference. The mean is the mean radiance over that of the reference, in red, green and blue."
                         }, tables::others(table)))
                     }
                     @if !table.orders.is_empty() {
-                        (folded("orders", "Orders of quadrature", html! {
-                            "The error of the sum through media that vary, by its steps: rays with one sample, so that no noise is in it, against " em { "simpson" } " with 64 steps; root mean square, as a share of the picture's. Both logarithmic: the slope is the order."
+                        (folded("orders", "Order of the quadrature rules", html! {
+                            "Error of the integral through heterogeneous media by the number of steps, against " em { "simpson" } " with 64 steps: root mean square, relative to that of the picture. Ray tracing with one sample has no noise here. Both axes are logarithmic, so that the slope is the order."
                         }, chart::orders(table)))
                     }
-                    (folded("passes", "Where the time goes", html! {
-                        "Shares of GPU time of the frontier's pictures by pass. Beside them stands the wall time of a start: uploading, and compiling what no picture before had compiled."
+                    (folded("passes", "GPU time per pass", html! {
+                        "GPU time of the frontier's pictures, divided by pass, with the wall time of the start: uploading, and compiling what no earlier picture compiled."
                     }, tables::passes(table)))
-                    (folded("knobs", "What the scene calls for", html! {
-                        "A knob is called for where some effect that it shapes is planned for this scene. The others change nothing here and are not priced."
+                    (folded("knobs", "Knobs that the scene calls for", html! {
+                        "The scene calls for a knob if its plan contains an effect of that knob. The other knobs change nothing here and are not measured."
                     }, tables::knobs(table)))
                     @if !table.search.is_empty() {
                         (folded("search", "The search for combinations", html! {
-                            "Each step takes what single prices promise most of for its time, and is kept if the picture has less error by more than noise. Where the promise was not kept, two knobs do not add up."
+                            "Each step applies the change with the best predicted gain per millisecond. It is kept if the error falls significantly. Where prediction and measurement differ, two knobs interact."
                         }, tables::search(table)))
                     }
-                    (folded("pictures", "Every picture", html! { "Each with the map of its error and its worst pixel." }, pictures::gallery(table)))
-                    (folded("words", "Words", html! { "What the terms of this page mean." }, words::list()))
+                    (folded("pictures", "Every picture", html! { "Each with its error map and its worst pixel." }, pictures::gallery(table)))
+                    (folded("words", "Terms", html! { "Meaning of the terms on this page." }, words::list()))
                     (words::statements(table))
                 }
                 footer {
                     p {
                         "Etalon " (table.program) ", " (table.points.len()) " pictures, " (format!("{:.0}", table.took_s)) " s of the "
-                        (format!("{:.0}", table.budget_s)) " s asked for. The same numbers are in cost.json and cost.csv. Pictures are read from the folder pictures beside this page."
+                        (format!("{:.0}", table.budget_s)) " s budget. The same numbers are in cost.json and cost.csv. Pictures are read from the folder pictures beside this page."
                     }
                 }
                 script { (PreEscaped(SCRIPT)) }
@@ -208,7 +208,7 @@ pub fn page(table: &Table, folder: &Path) -> Result<String> {
     Ok(page.into_string())
 }
 
-/// The page of a run whose budget was too small for anything.
+/// The page of a run whose budget was too small to measure anything.
 #[must_use]
 pub fn nothing(scene: &str, why: &NotMeasured) -> String {
     let title = format!("What accuracy costs: {scene}");

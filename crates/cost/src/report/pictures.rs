@@ -1,4 +1,4 @@
-//! Pictures in the page and beside it.
+//! Pictures embedded in the page and linked from it.
 
 use std::path::Path;
 
@@ -13,17 +13,17 @@ use super::{COLOURS, digits, error, hex, percent, time, title, words};
 use crate::table::{Family, Point, REFERENCE, Table};
 use etalon::image::png::{Display, encode_png, read_display};
 
-/// Quality of the pictures in the page; the folder `pictures` has them as they are.
+/// JPEG quality of embedded pictures; the folder `pictures` has lossless files.
 const QUALITY: u8 = 82;
-/// Pixels of a picture in the page, at most: larger ones are beside it.
+/// Largest number of pixels of an embedded picture.
 const MOST_PIXELS: u32 = 640 * 360;
 
-/// How large pictures are, so that the page does not grow when they come.
+/// Size of the pictures for the layout, so that the page does not jump when they load.
 pub(super) fn size(table: &Table) -> [u32; 2] {
     table.size
 }
 
-/// A picture as a part of the page, halved until it is not large.
+/// A picture as a data URL, halved until it has at most [`MOST_PIXELS`] pixels.
 pub(super) fn embedded(path: &Path) -> Result<String> {
     let mut picture = read_display(path)?;
     while picture.width * picture.height > MOST_PIXELS {
@@ -32,7 +32,7 @@ pub(super) fn embedded(path: &Path) -> Result<String> {
     jpeg(&picture)
 }
 
-/// Every second pixel of every second row, the mean of it and its neighbours.
+/// A picture at half the size: means of 2×2 pixels.
 fn halved(picture: &Display) -> Display {
     let (width, height) = ((picture.width / 2).max(1), (picture.height / 2).max(1));
     let at =
@@ -50,7 +50,7 @@ fn jpeg(picture: &Display) -> Result<String> {
         .rgba
         .iter()
         .flat_map(|&[r, g, b, a]| {
-            // Nothing shows as the grey that a PNG's viewer might put there.
+            // Transparent pixels are composited over grey, as picture viewers do.
             let over = |c: u8| ((u32::from(c) * u32::from(a) + 119 * u32::from(255 - a)) / 255) as u8;
             [over(r), over(g), over(b)]
         })
@@ -61,11 +61,11 @@ fn jpeg(picture: &Display) -> Result<String> {
     Ok(format!("data:image/jpeg;base64,{}", STANDARD.encode(bytes)))
 }
 
-/// Every picture, its error, the worst of it and how to draw it.
+/// Gallery of all pictures with error maps, worst pixels and commands.
 pub(super) fn gallery(table: &Table) -> Markup {
     let [width, height] = size(table);
     html! {
-        p { label { "Only pictures with " input.filter type="search" data-of="gallery"; } }
+        p { label { "Filter pictures: " input.filter type="search" data-of="gallery"; } }
         div.gallery #gallery {
             @for point in table.points.iter().filter(|point| point.name != REFERENCE) { (shown(point, table, [width, height])) }
         }
@@ -75,7 +75,7 @@ pub(super) fn gallery(table: &Table) -> Markup {
 fn shown(point: &Point, table: &Table, [width, height]: [u32; 2]) -> Markup {
     let file = |end: &str| format!("pictures/{}{end}", point.picture);
     let e = &point.errors;
-    let noise = point.noise.map(|noise| format!(", by chance alone {}", percent(noise.sqrt())));
+    let noise = point.noise.map(|noise| format!(", of which noise {}", percent(noise.sqrt())));
     html! {
         article id={ "p-" (point.picture) } data-name=(point.picture) {
             h3 { (title(point)) }
@@ -85,24 +85,25 @@ fn shown(point: &Point, table: &Table, [width, height]: [u32; 2]) -> Markup {
                 figure { img.pixels loading="lazy" width="328" height="160" src=(file(".worst.png")) alt="The worst pixel: the reference on the left, the picture on the right"; figcaption { "worst pixel " (e.worst_pixel.x) ", " (e.worst_pixel.y) ": reference, picture" } }
             }
             p.figures {
-                span { b { (time(point.gpu_ms.median)) } " (" (digits(point.gpu_ms.low)) " to " (digits(point.gpu_ms.high)) " ms, " (point.timed) " timed)" }
+                span { b { (time(point.gpu_ms.median)) } " (" (digits(point.gpu_ms.low)) " to " (digits(point.gpu_ms.high)) " ms, " (point.timed) " renders)" }
                 span { (words::link("error", "error")) " " (error(point)) }
-                span { (words::link("flip", "FLIP")) " " (digits(e.flip_mean)) ", 95 of 100 pixels below " (digits(e.flip_p95)) }
+                span { (words::link("flip", "FLIP")) " " (digits(e.flip_mean)) ", 95th percentile " (digits(e.flip_p95)) }
                 span { (words::link("relmse", "√relMSE")) " " (percent(e.relmse.median.max(0.0).sqrt())) (noise.unwrap_or_default()) }
                 span { (words::link("delta-e", "ΔE2000")) " " (digits(e.delta_e_mean)) }
             }
-            p.given { "Given up: " (table.given_up(point)) }
+            p.given { "Simplified: " (table.given_up(point)) }
             p.command { code { (point.command) } button.copy type="button" { "copy" } }
         }
     }
 }
 
-/// For each pixel of `local` the change that brings it nearest to the reference, as a picture with a legend.
+/// For each pixel of `local` the change that brings it closest to the reference, as a picture with a legend; `None` where no change is
+/// significant.
 pub(super) fn causes(table: &Table, pictures: &Path) -> Result<Option<Markup>> {
     let Some(local) = table.points.iter().find(|point| point.name == "local") else { return Ok(None) };
     let open = |name: &str| read_display(&pictures.join(format!("{name}.png")));
     let (reference, base) = (open("reference")?, open(&local.picture)?);
-    // What noise cannot tell would only show the reference's.
+    // Changes that are not significant would only show the noise of the reference.
     let others: Vec<&Point> = table
         .points
         .iter()
@@ -125,7 +126,7 @@ pub(super) fn causes(table: &Table, pictures: &Path) -> Result<Option<Markup>> {
     if others.is_empty() {
         return Ok(None);
     }
-    // Squared error that each change takes away where it is the best.
+    // Squared error that each change removes where it is the best.
     let mut gains = vec![0.0; others.len()];
     for ((after, index), before) in best.iter().zip(&before) {
         if let Some(gain) = gains.get_mut(*index) {
@@ -133,7 +134,7 @@ pub(super) fn causes(table: &Table, pictures: &Path) -> Result<Option<Markup>> {
         }
     }
     let total: f64 = before.iter().sum::<f64>().max(1e-9);
-    // What takes away less than half a percent has no colour.
+    // Changes that remove less than half a percent get no colour.
     let mut order: Vec<usize> = (0..others.len()).filter(|&i| gains[i] > 0.005 * total).collect();
     order.sort_by(|&a, &b| gains[b].total_cmp(&gains[a]));
     order.truncate(COLOURS.len() - 1);
@@ -142,7 +143,7 @@ pub(super) fn causes(table: &Table, pictures: &Path) -> Result<Option<Markup>> {
         .zip(&before)
         .flat_map(|((after, index), before)| {
             let colour = order.iter().position(|i| i == index).map_or([40; 3], |place| COLOURS[place]);
-            // As bright as the share of the pixel's error that goes away.
+            // Brightness is the fraction of the pixel's error that the change removes.
             let share = if *before > 0.0 { ((before - after) / before).sqrt().max(0.25) } else { 0.0 };
             let [r, g, b] = colour.map(|c| (f64::from(c) * share) as u8);
             [r, g, b, 255]
@@ -156,7 +157,7 @@ pub(super) fn causes(table: &Table, pictures: &Path) -> Result<Option<Markup>> {
     Ok(Some(html! {
         div.pair {
             figure { img src=(picture) width=(base.width) height=(base.height) alt="The picture of the preset local"; figcaption { "local" } }
-            figure { img src=(map) width=(base.width) height=(base.height) alt="Each pixel in the colour of the change that helps it most"; figcaption { "what would help most" } }
+            figure { img src=(map) width=(base.width) height=(base.height) alt="Each pixel in the colour of its most helpful change"; figcaption { "most helpful change" } }
         }
         p.legend {
             @for (place, &index) in order.iter().enumerate() {

@@ -1,23 +1,23 @@
-//! What each knob costs and buys, in words, in a table and in bars.
+//! Costs of changing one knob: in words, as a table, and as a tornado chart.
 
 use maud::{Markup, html};
 
 use super::{class, digits, percent, time, words};
 use crate::table::{Family, INVISIBLE, Price, Table};
 
-/// Error that a price changes, without a sign.
+/// Error that a change adds or removes, without sign.
 fn bought(price: &Price) -> f64 {
     price.shown_delta.median.abs().sqrt()
 }
 
-/// Changes of `local` that matter most, as a list of at most so many.
+/// Largest number of changes in a list.
 const MOST: usize = 6;
 
 fn from_to(price: &Price) -> Markup {
     html! { b { (price.knob) } " " (price.from) " → " (price.to) }
 }
 
-/// What matters here and what is wasted here.
+/// Sections about the changes that matter and about useless rungs.
 pub(super) fn matters(table: &Table) -> Markup {
     let of = |family: Family| table.prices.iter().filter(move |price| price.base == family);
     let nearer = |p: &&Price| p.error_told && p.shown_delta.median < 0.0 && !p.undoes_another();
@@ -36,59 +36,59 @@ pub(super) fn matters(table: &Table) -> Markup {
     let hidden = table.prices.iter().filter(|p| !p.error_told && !p.same && p.flip_between >= INVISIBLE).count();
     let spent = |price: &Price| {
         html! {
-            @if price.takes_longer() { ", for " (time(price.gpu_ms_delta.median)) " more" }
-            @else if price.saves() { ", and saves " (time(-price.gpu_ms_delta.median)) }
-            @else { ", in about the same time" }
+            @if price.takes_longer() { ", takes " (time(price.gpu_ms_delta.median)) " more" }
+            @else if price.saves() { ", saves " (time(-price.gpu_ms_delta.median)) }
+            @else { ", same time" }
         }
     };
     let error = |name: &str| table.points.iter().find(|point| point.name == name).map(|point| percent(point.error()));
     let changes = |price: &Price| {
-        html! { (from_to(price)) ": " @if let (Some(base), Some(now)) = (error("local"), error(&price.point)) { (base) " → " (now) } (spent(price)) @if price.flip_between < INVISIBLE { ", which no eye sees" } }
+        html! { (from_to(price)) ": " @if let (Some(base), Some(now)) = (error("local"), error(&price.point)) { (base) " → " (now) } (spent(price)) @if price.flip_between < INVISIBLE { ", not visible" } }
     };
     html! {
         section #matters {
-            h2 { "What matters here" }
-            @if better.is_empty() && worse.is_empty() { p { "No change of one knob of " em { "local" } " has an effect on its error that can be told." } }
+            h2 { "Changes that matter here" }
+            @if better.is_empty() && worse.is_empty() { p { "No change of one knob of " em { "local" } " has a significant effect on the error." } }
             @if !better.is_empty() {
-                p { "From " (words::link("preset", "local")) ", these lower the " (words::link("error", "error")) ", from that of " em { "local" } " to their own:" }
+                p { "Relative to " (words::link("preset", "local")) ", these changes lower the " (words::link("error", "error")) " (of " em { "local" } " → with the change):" }
                 ul { @for price in &better { li { (changes(price)) } } }
             }
             @if !worse.is_empty() {
-                p { "and these raise it:" }
+                p { "These changes raise the error:" }
                 ul { @for price in &worse { li { (changes(price)) } } }
             }
             @if !undoing.is_empty() {
-                p { "These have less error though they approximate more: what they do wrong cancels something else that " em { "local" } " does wrong. None is recommended." }
+                p { "These changes lower the error although they approximate more: their error cancels another error of " em { "local" } ". They are not recommended." }
                 ul { @for price in &undoing { li { (changes(price)) } } }
             }
-            h2 { "What is wasted here" }
-            @if wasted.is_empty() && unseen.is_empty() { p { "Nothing that was drawn costs time without an effect." } }
-            @if !unseen.is_empty() { p { "Nobody sees which rung these knobs are on: " (unseen.join(", ")) "." } }
+            h2 { "Useless here" }
+            @if wasted.is_empty() && unseen.is_empty() { p { "No measured rung costs time without an effect." } }
+            @if !unseen.is_empty() { p { "No visible effect here: " (unseen.join(", ")) "." } }
             @if !wasted.is_empty() {
-                ul { @for price in &wasted { li { (from_to(price)) " (" (class(price.base)) ") takes " (time(price.gpu_ms_delta.median)) " more and changes nothing that can be told" } } }
+                ul { @for price in &wasted { li { (from_to(price)) " (" (class(price.base)) ") takes " (time(price.gpu_ms_delta.median)) " more without a measurable change" } } }
             }
-            @if hidden > 0 { p.quiet { "Of " (hidden) " more changes the noise hides whether they help." } }
+            @if hidden > 0 { p.quiet { "For " (hidden) " more changes, noise hides whether they help." } }
         }
     }
 }
 
-/// Whether it was priced and no rung of it can be seen.
+/// Whether the knob was measured and no rung of it makes a visible difference.
 fn harmless(table: &Table, knob: &str) -> bool {
     let mut all = table.prices.iter().filter(|price| price.knob == knob).peekable();
     all.peek().is_some() && all.all(|price| price.same || price.flip_between < INVISIBLE)
 }
 
-/// All prices, with a field that leaves out what does not contain a word, and columns that sort.
+/// Table of all changes, with a filter field and sortable columns.
 pub(super) fn table(table: &Table) -> Markup {
     let mut all: Vec<&Price> = table.prices.iter().collect();
     let worth =
         |price: &Price| if price.error_told { bought(price) / price.gpu_ms_delta.median.abs().max(0.05) } else { 0.0 };
     all.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
     html! {
-        p { label { "Only rows with " input.filter type="search" data-of="prices-table"; } }
+        p { label { "Filter rows: " input.filter type="search" data-of="prices-table"; } }
         div.scroll { table.sortable #prices-table {
             thead { tr {
-                @for (name, number) in [("knob", false), ("from → to", false), ("others", false), ("time", true), ("of the base's", true), ("error", true), ("FLIP", true), ("in words", false)] {
+                @for (name, number) in [("knob", false), ("from → to", false), ("base", false), ("time", true), ("time %", true), ("error", true), ("FLIP", true), ("verdict", false)] {
                     th scope="col" class=(if number { "number" } else { "" }) { button type="button" { (name) } }
                 }
             } }
@@ -120,18 +120,18 @@ fn point_of<'a>(table: &'a Table, price: &Price) -> &'a str {
     table.points.iter().find(|point| point.name == price.point).map_or("", |point| &point.picture)
 }
 
-/// Time and visible change of every knob's changes as bars.
+/// Tornado chart: time and visible change of each change as bars.
 pub(super) fn tornado(table: &Table) -> Markup {
     let mut all: Vec<&Price> = table.prices.iter().filter(|price| !price.same).collect();
     all.sort_by(|a, b| b.flip_between.total_cmp(&a.flip_between));
     all.truncate(24);
-    // One change that takes forty times as long would leave no room for the others.
+    // Limit the scale: one change that takes forty times as long would leave no room for the others.
     let most_time = all.iter().map(|p| p.share.abs()).fold(1e-3, f64::max).min(2.0);
     let most_seen = all.iter().map(|p| p.flip_between).fold(1e-6, f64::max);
     let part = |value: f64, most: f64| format!("width:{:.1}%", 100.0 * (value.abs() / most).min(1.0));
     html! {
         div.tornado role="img" aria-label="Time and visible change of every change" {
-            div.bars-row.quiet { span { "change" } span.bar-left { "time, of the base's; the scale ends at " (format!("{:.0} %", 100.0 * most_time)) } span { "FLIP; the scale ends at " (digits(most_seen)) } }
+            div.bars-row.quiet { span { "change" } span.bar-left { "time relative to the base; scale ends at " (format!("{:.0} %", 100.0 * most_time)) } span { "FLIP; scale ends at " (digits(most_seen)) } }
             @for price in all {
                 @let seen = price.is_seen() || price.base == Family::Local;
                 div.bars-row {

@@ -1,4 +1,4 @@
-//! Tables and bars of all that was drawn.
+//! Tables and bar charts of the page.
 
 use std::collections::BTreeMap;
 
@@ -7,12 +7,12 @@ use maud::{Markup, html};
 use super::{COLOURS, anchor, digits, error, hex, percent, time, title, words};
 use crate::table::{Point, REFERENCE, Table};
 
-/// The frontier as a list: what each of its points gives up.
+/// Table of the frontier with the simplified knobs of each point.
 pub(super) fn frontier(table: &Table) -> Markup {
     html! {
         div.scroll { table {
-            caption { "The frontier, from the quickest to the most exact" }
-            thead { tr { th scope="col" { "picture" } th.number scope="col" { "time" } th.number scope="col" { "error" } th scope="col" { "given up" } } }
+            caption { "The frontier, from fastest to most exact" }
+            thead { tr { th scope="col" { "picture" } th.number scope="col" { "time" } th.number scope="col" { "error" } th scope="col" { "simplified" } } }
             tbody {
                 @for p in table.frontier.iter().filter_map(|&i| table.points.get(i)) {
                     tr {
@@ -27,7 +27,7 @@ pub(super) fn frontier(table: &Table) -> Markup {
     }
 }
 
-/// Where the time of the frontier goes.
+/// Bar chart of GPU time per pass for the points of the frontier.
 pub(super) fn passes(table: &Table) -> Markup {
     let points: Vec<&Point> =
         table.frontier.iter().filter_map(|&i| table.points.get(i)).filter(|point| !point.passes.is_empty()).collect();
@@ -65,7 +65,7 @@ pub(super) fn passes(table: &Table) -> Markup {
     }
 }
 
-/// Which knobs are called for, and why.
+/// Table of the knobs, with whether the scene calls for them and why.
 pub(super) fn knobs(table: &Table) -> Markup {
     html! {
         div.scroll { table {
@@ -85,11 +85,11 @@ pub(super) fn knobs(table: &Table) -> Markup {
     }
 }
 
-/// The steps of the search.
+/// Table of the steps of the search.
 pub(super) fn search(table: &Table) -> Markup {
     html! {
         div.scroll { table {
-            thead { tr { th scope="col" { "change" } th.number scope="col" { "promised error" } th.number scope="col" { "found" } th scope="col" { "kept" } } }
+            thead { tr { th scope="col" { "change" } th.number scope="col" { "predicted error" } th.number scope="col" { "measured" } th scope="col" { "kept" } } }
             tbody {
                 @for tried in &table.search {
                     tr { th scope="row" { (tried.change) } td.number { (percent(tried.promised)) } td.number { (percent(tried.found)) } td { @if tried.kept { "yes" } @else { "no" } } }
@@ -99,7 +99,7 @@ pub(super) fn search(table: &Table) -> Markup {
     }
 }
 
-/// Pictures of other programs.
+/// Table of pictures of other programs.
 pub(super) fn others(table: &Table) -> Markup {
     html! {
         div.scroll { table {

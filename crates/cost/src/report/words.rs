@@ -1,4 +1,4 @@
-//! Terms where they stand: links to what they mean, and the lecture's statements behind rungs.
+//! Glossary of the page: links from terms to their definitions, and the lecture's statements about knobs.
 
 use std::collections::BTreeSet;
 
@@ -7,70 +7,70 @@ use maud::{Markup, html};
 use crate::table::Table;
 use etalon::lecture::statement;
 
-/// Name on the page, term, and meaning.
+/// Id, term and definition.
 const WORDS: [(&str, &str, &str); 9] = [
     (
         "error",
         "error",
-        "How far a picture is from the truth: the root mean squared difference of displayed values, in percent of their range from black to white. 1 % is two and a half of the 256 steps of a display. The truth is what the reference converges to; its noise is measured out of the number, and the interval says how well that went (two standard errors).",
+        "Root mean squared difference between the displayed values of a picture and of the exact picture, in percent of their range from black to white. 1 % is two and a half of the 256 steps of a display. The exact picture is the limit of the reference. The estimate is corrected for the noise of the reference; the interval is the 95 % confidence interval (two standard errors).",
     ),
     (
         "reference",
         "reference",
-        "The scene drawn along paths with every knob on the rung that approximates least, and as many samples as there was time for. Its own noise hides differences that are smaller than a number which the page gives.",
+        "The scene drawn by path tracing with every knob on its most exact rung, and with as many samples as there was time for. Its noise hides small differences; the page gives the limit.",
     ),
     (
         "frontier",
         "frontier",
-        "The pictures that nothing beats in time and error at once (Pareto's). Each has less error than every quicker one by more than noise.",
+        "Pareto frontier: the pictures that no other picture beats in time and error at once. Each has significantly less error than every faster one.",
     ),
     (
         "rung",
         "knob and rung",
-        "A knob is one choice of how accurately something is computed, such as shadows; its rungs go from cheap to exact. --set KNOB=RUNG chooses one.",
+        "A knob is a choice between approximations of one quantity, such as shadows. Its rungs go from cheap to exact. --set KNOB=RUNG chooses one.",
     ),
     (
         "preset",
         "local, recursive, global",
-        "Presets of all knobs: light from lights alone; with ideal mirrors and glass by rays; along paths, with light from surfaces too.",
+        "Presets of all knobs. local: direct light only. recursive: adds ray-traced shadows, reflections and refraction. global: path tracing with full indirect light.",
     ),
     (
         "exact",
         "exact",
-        "The reference's rungs with few samples: what is changed of it shows what a rung is worth where all else is right.",
+        "The reference's rungs with few samples. A change relative to exact shows the effect of a rung when everything else is right.",
     ),
     (
         "flip",
         "FLIP",
-        "What an eye sees when it flips between two pictures on a display, from 0 to 1 (Andersson et al. 2020). Nobody sees less than 0.002. Noise of either picture counts as a difference.",
+        "Perceived difference when one flips between two pictures on a display, from 0 to 1 (Andersson et al. 2020). Below 0.002 a difference is invisible. Noise of either picture counts as a difference.",
     ),
     (
         "relmse",
         "√relMSE",
-        "Root of the mean squared error of radiance, each pixel over its own square plus 0.01. A few pixels that are far too bright can make it large.",
+        "Root of the relative mean squared error of radiance: each squared error is divided by the squared radiance of the reference plus 0.01. A few fireflies can make it large.",
     ),
-    ("delta-e", "ΔE2000", "CIEDE2000, the distance of two displayed colours; 1 is about what can just be seen."),
+    ("delta-e", "ΔE2000", "CIEDE2000, the difference of two displayed colours; about 1 is just noticeable."),
 ];
 
-/// A term that leads to what it means.
+/// A link from a term to its definition.
 pub(super) fn link(id: &str, text: &str) -> Markup {
     let meaning = WORDS.iter().find(|(known, ..)| *known == id).map_or("", |(_, _, meaning)| meaning);
     html! { a.term href={ "#w-" (id) } title=(meaning) { (text) } }
 }
 
-/// What all of them mean.
+/// List of all definitions.
 pub(super) fn list() -> Markup {
     html! {
         dl { @for (id, term, meaning) in WORDS { dt id={ "w-" (id) } { (term) } dd { (meaning) } } }
     }
 }
 
-/// An id of the lecture, which leads to what it says.
+/// A link from an id of the lecture to its statement.
 pub(super) fn lecture(id: &str) -> Markup {
     html! { a href={ "#s-" (id) } title=(statement(id).unwrap_or_default()) { (id) } }
 }
 
-/// What the lecture says under the ids that knobs of this scene name.
+/// The lecture's statements about the knobs.
 pub(super) fn statements(table: &Table) -> Markup {
     let ids: BTreeSet<&String> = table.knobs.iter().flat_map(|knob| &knob.lecture).collect();
     let list = html! {
@@ -79,7 +79,7 @@ pub(super) fn statements(table: &Table) -> Markup {
     super::folded(
         "statements",
         "The lecture's statements",
-        html! { "What the knobs approximate; the same ids are in the shaders and in docs/lecture.md." },
+        html! { "Statements that the knobs approximate. The shaders and docs/lecture.md use the same ids." },
         list,
     )
 }

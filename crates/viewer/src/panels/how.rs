@@ -1,4 +1,4 @@
-//! The left panel: how the scene is drawn.
+//! The left panel: display settings, animation time, cameras, comparison, model and knobs.
 
 use egui::{RichText, Ui};
 
@@ -8,7 +8,7 @@ use crate::shared::RenderState;
 use etalon::image::tone::ToneMap;
 use etalon::plan::{Effect, EffectId, EffectState, KNOBS, Knobs, Model};
 
-/// How it is drawn: display, time, cameras, what it is compared with, model and knobs.
+/// Shows the panel.
 pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     ui.heading("Display");
     egui::Grid::new("display").num_columns(2).show(ui, |ui| {
@@ -26,7 +26,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
         let turned = egui::Slider::new(&mut state.settings.environment_rotation, -180.0..=180.0).suffix("°");
         state.moved |= ui.add(turned).changed();
         ui.end_row();
-        ui.label("shows");
+        ui.label("view");
         let name = LAYERS.iter().find(|(layer, _)| *layer == state.layer).map_or("", |(_, name)| name);
         egui::ComboBox::from_id_salt("layer").selected_text(name).show_ui(ui, |ui| {
             for (layer, name) in LAYERS {
@@ -85,7 +85,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     });
 }
 
-/// Time of a scene that moves.
+/// Controls of the animation time; nothing for a scene without animation.
 fn time(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     let Some(duration) = seen.facts.as_ref().and_then(|facts| facts.duration) else { return };
     ui.separator();
@@ -100,14 +100,14 @@ fn time(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
             state.clock.set(seconds, duration);
             state.moved = true;
         }
-        let at_rest = ui.add_enabled(state.clock.time.is_some(), egui::Button::new("as begun"));
-        if at_rest.on_hover_text("the time of the command line, or the pose at rest").clicked() {
+        let at_rest = ui.add_enabled(state.clock.time.is_some(), egui::Button::new("Reset time"));
+        if at_rest.on_hover_text("back to the time of the command line, or to the rest pose").clicked() {
             state.clock.stop();
         }
     });
 }
 
-/// What is compared, and which side is chosen.
+/// Controls of the comparison: on or off, and the edited side.
 fn sides(ui: &mut Ui, state: &mut PanelState) {
     let mut compares = state.other.is_some();
     if ui.checkbox(&mut compares, "compare two settings (V)").changed() {
@@ -120,7 +120,7 @@ fn sides(ui: &mut Ui, state: &mut PanelState) {
         ui.selectable_value(&mut state.side, 0, "left");
         ui.selectable_value(&mut state.side, 1, "right");
         ui.separator();
-        if ui.button("reference").on_hover_text("the rung of every knob that approximates least").clicked() {
+        if ui.button("reference").on_hover_text("set every knob to its most exact rung").clicked() {
             state.set_knobs(Knobs::exact());
         }
         if ui.button("swap").clicked()
@@ -131,7 +131,7 @@ fn sides(ui: &mut Ui, state: &mut PanelState) {
     });
 }
 
-/// Why none of the effects that a knob shapes is planned; `None` where one is, or it shapes every surface.
+/// The reason why no effect of a knob is planned; `None` where one is planned, or where the knob affects every surface.
 fn called_for(known: &[Effect], effects: &[EffectId]) -> Option<String> {
     let found = |id: &EffectId| known.iter().find(|effect| effect.id == *id);
     let all: Vec<_> = effects.iter().filter_map(found).collect();
@@ -139,7 +139,7 @@ fn called_for(known: &[Effect], effects: &[EffectId]) -> Option<String> {
     none.then(|| all[0].reason())
 }
 
-/// What a rung was measured to cost and to be wrong by, from `local` or the reference's rungs.
+/// Measured time and FLIP difference of a rung, relative to the preset `local` or to the reference's rungs; empty if not measured.
 fn price(seen: &RenderState, knob: &str, rung: &str) -> String {
     let Some(table) = seen.facts.as_ref().and_then(|facts| facts.prices.as_ref()) else { return String::new() };
     let found = table.prices.iter().find(|price| price.knob == knob && price.to == rung);

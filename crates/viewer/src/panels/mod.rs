@@ -1,4 +1,4 @@
-//! The panels: egui over what the worker has seen. They change [`PanelState`] and ask for the rest by [`Action`].
+//! The panels (egui), drawn from the results of the render thread. They change [`PanelState`] and request everything else by [`Action`].
 
 mod how;
 mod picture;
@@ -19,79 +19,79 @@ use etalon::frame::Settings;
 use etalon::gpu::{DeviceInfo, PassTime};
 use etalon::plan::{KNOBS, Knobs};
 
-/// Pictures whose pass times are remembered.
+/// Number of pictures whose pass times the chart shows.
 const HISTORY: usize = 120;
-/// Of a second: one picture of a film.
+/// Animation step of one frame in seconds.
 const FILM_STEP: f64 = 1.0 / 24.0;
 
-/// What the panels ask for.
+/// Requests of the panels to the window.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Action {
-    /// Read another file.
+    /// Open a file.
     Open(PathBuf),
-    /// Write the picture.
+    /// Save the picture as PNG.
     Screenshot,
-    /// Write the radiance.
+    /// Save the radiance as EXR.
     Exr,
-    /// Put the command that draws this on the clipboard.
+    /// Copy the command that draws this view to the clipboard.
     CopyCommand,
-    /// Take the last error off the screen.
+    /// Clear the last error.
     Dismiss,
     /// Close the window.
     Quit,
 }
 
-/// What is looked at, and how.
+/// State of the user interface.
 pub struct PanelState {
-    /// Where from; `None` until there is a scene.
+    /// Camera; `None` until a scene is loaded.
     pub navigation: Option<Navigation>,
-    /// How it is drawn; the size is the picture's.
+    /// Settings of the renderer, with the size of the picture.
     pub settings: Settings,
-    /// Rungs of a second picture, right of the wipe.
+    /// Knobs of a second picture, right of the wipe line.
     pub other: Option<Knobs>,
-    /// The side whose rungs are chosen: 0 left, 1 right.
+    /// Side whose knobs are edited: 0 left, 1 right.
     pub side: usize,
-    /// The knob that arrow keys turn, by its place in the table; `None`: none was turned yet.
+    /// Index of the knob that arrow keys change; `None` until one is selected.
     pub knob: Option<usize>,
-    /// Where the wipe is, as a share of the picture's width.
+    /// Position of the wipe line as a fraction of the picture's width.
     pub wipe: f32,
-    /// Time of the scene.
+    /// Animation time.
     pub clock: Clock,
-    /// What is shown of it.
+    /// Layer that is shown.
     pub layer: SurfaceLayer,
-    /// Whether panels lie beside it.
+    /// Whether the panels are shown.
     pub panels: bool,
-    /// Whether the keys are told.
+    /// Whether the help with all keys is shown.
     pub help: bool,
-    /// A pixel that was asked about.
+    /// Inspected pixel.
     pub picked: Option<Pick>,
-    /// Something that was done.
+    /// Message about a finished action.
     pub message: Option<String>,
-    /// The view moved in this frame.
+    /// Whether the view moved in this frame.
     pub moved: bool,
-    /// Left, top, right, bottom of the picture in pixels of the window.
+    /// Left, top, right and bottom of the picture in pixels of the window.
     pub place: [i32; 4],
-    /// Files that were opened, the last first.
+    /// Recently opened files, the latest first.
     pub recent: Vec<PathBuf>,
-    /// What draws.
+    /// Device that draws.
     pub device: DeviceInfo,
-    /// To choose a file with.
+    /// File dialog.
     pub dialog: FileDialog,
     /// Pass times of the last pictures.
     pub history: VecDeque<Vec<PassTime>>,
     history_version: u64,
-    /// Pixels that were asked about so far.
+    /// Number of inspections so far.
     picks: u64,
-    /// What was found at the last of them.
+    /// Facts of the inspected pixel.
     pixel: Option<pixel::PixelFacts>,
-    /// The event under the pointer.
+    /// Index of the event under the pointer.
     pointed: Option<usize>,
-    /// Seconds of the interface when the scene's time went on last.
+    /// Time of the user interface in seconds when the animation last advanced.
     played_at: f64,
 }
 
 impl PanelState {
-    /// Begins with settings.
+    /// Initial state.
     #[must_use]
     pub fn new(settings: Settings, device: DeviceInfo, recent: Vec<PathBuf>) -> Self {
         Self {
@@ -111,7 +111,7 @@ impl PanelState {
             place: [0; 4],
             recent,
             device,
-            // Its field of search is dark on black in a light window (0.15).
+            // The search field of egui_file_dialog 0.15 is dark on black in a light theme.
             dialog: FileDialog::new()
                 .show_search(false)
                 .add_file_filter_extensions("scenes", vec!["glb", "gltf", "obj"])
@@ -125,25 +125,25 @@ impl PanelState {
         }
     }
 
-    /// Whether surfaces at the pixels have to be known.
+    /// Whether the surfaces at the pixels are needed.
     #[must_use]
     pub fn wants_surfaces(&self) -> bool {
         self.layer != SurfaceLayer::Radiance || self.picked.is_some() || self.other.is_some()
     }
 
-    /// The first column of the window that is right of the wipe.
+    /// First column of the window right of the wipe line.
     #[must_use]
     pub fn wipe_column(&self) -> i32 {
         let [left, _, right, _] = self.place;
         left + (self.wipe * (right - left) as f32).round() as i32
     }
 
-    /// Compares with the same rungs, to begin with, or no longer.
+    /// Starts a comparison with a copy of the knobs, or ends it.
     fn compare(&mut self, compares: bool) {
         (self.other, self.side) = (compares.then(|| self.settings.knobs.clone()), usize::from(compares));
     }
 
-    /// Rungs of the side that is chosen.
+    /// Knobs of the edited side.
     fn knobs(&self) -> &Knobs {
         self.other.as_ref().filter(|_| self.side == 1).unwrap_or(&self.settings.knobs)
     }
@@ -155,7 +155,7 @@ impl PanelState {
         }
     }
 
-    /// Goes to the next knob or the one before.
+    /// Selects the next (`by` = 1) or the previous (`by` = −1) knob.
     fn choose_knob(&mut self, by: isize) {
         let count = KNOBS.len() as isize;
         let at = self.knob.map_or(if by > 0 { 0 } else { count - 1 }, |at| (at as isize + by).rem_euclid(count));
@@ -163,7 +163,7 @@ impl PanelState {
         self.tell_knob();
     }
 
-    /// Turns the chosen knob to the next rung that goes with the others, or to the one before; in a circle.
+    /// Sets the selected knob to the next or the previous rung that the other knobs allow, cyclically.
     fn turn_knob(&mut self, forth: bool) {
         let at = *self.knob.get_or_insert(0);
         let knob = &KNOBS[at];
@@ -182,7 +182,7 @@ impl PanelState {
         self.message = Some(format!("{}={}: {}", knob.name, knob.rung(self.knobs()), knob.about));
     }
 
-    /// Whether a file is being chosen: keys are words then.
+    /// Whether the file dialog is open: keys then type text.
     fn is_asking(&self) -> bool {
         *self.dialog.state() == DialogState::Open
     }
@@ -192,7 +192,7 @@ impl PanelState {
     }
 }
 
-/// One frame of the interface.
+/// Shows one frame of the user interface; returns the requested actions.
 pub fn show(root: &mut Ui, state: &mut PanelState, seen: &RenderState) -> Vec<Action> {
     let mut actions = Vec::new();
     state.moved = false;
@@ -225,7 +225,7 @@ pub fn show(root: &mut Ui, state: &mut PanelState, seen: &RenderState) -> Vec<Ac
     actions
 }
 
-/// Lets the time of a scene that is played go on, once the last one is seen: what is drawn slowly is played slowly, and not in jumps.
+/// Advances a playing animation once the picture of the last time is shown. A scene that is drawn slowly plays slowly, without jumps.
 fn play(ui: &Ui, state: &mut PanelState, seen: &RenderState) {
     let now = ui.input(|input| input.time);
     let since = now - std::mem::replace(&mut state.played_at, now);
@@ -236,12 +236,12 @@ fn play(ui: &Ui, state: &mut PanelState, seen: &RenderState) {
     ui.ctx().request_repaint();
     match seen.shown().is_some_and(|shown| shown.time == state.clock.time) {
         true => state.clock.advance(since.min(0.1), duration),
-        // The time goes on counting from the last picture.
+        // The elapsed time is counted from the last picture.
         false => state.played_at = now - since,
     }
 }
 
-/// The file, the device and the picture's state, in a line; where that is short, words make room for buttons.
+/// The top bar: file, device, state of the picture, and buttons. In a narrow window the text is truncated, not the buttons.
 fn bar(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, actions: &mut Vec<Action>) {
     let (mut opened, mut asked) = (None, Vec::new());
     let helps = &mut state.help;
@@ -268,10 +268,8 @@ fn bar(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, actions: &mut Ve
         }
         ui.separator();
         if device.kind == "cpu" {
-            ui.colored_label(ui.visuals().warn_fg_color, "software device, no GPU").on_hover_text(format!(
-                "{} ({}): every pixel is computed by the processor",
-                device.name, device.driver
-            ));
+            ui.colored_label(ui.visuals().warn_fg_color, "Software rendering (no GPU)")
+                .on_hover_text(format!("{} ({}): the CPU computes every pixel", device.name, device.driver));
         } else {
             ui.weak(&device.name).on_hover_text(&device.driver);
         }
@@ -284,8 +282,8 @@ fn bar(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, actions: &mut Ve
         }
         let wrong = seen.shown().map_or(0, |shown| shown.counts.nan + shown.counts.inf);
         if wrong > 0 {
-            ui.colored_label(ui.visuals().error_fg_color, format!("{wrong} pixels are no numbers"))
-                .on_hover_text("shows: NaN and infinity");
+            ui.colored_label(ui.visuals().error_fg_color, format!("{wrong} invalid pixels (NaN or infinite)"))
+                .on_hover_text("view: NaN and infinity shows them");
         }
     };
     let buttons = |ui: &mut Ui| {
@@ -305,7 +303,7 @@ fn bar(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, actions: &mut Ve
     actions.extend(opened.into_iter().chain(asked));
 }
 
-/// What went wrong, what takes long, what was done.
+/// Messages over the picture: the last error, the current long operation, or a finished action.
 fn notices(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     let area = |id: &str, offset: f32| {
         egui::Area::new(egui::Id::new(id.to_owned())).anchor(egui::Align2::CENTER_BOTTOM, egui::vec2(0.0, offset))
@@ -322,7 +320,7 @@ fn notices(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     if let Some(said) = said {
         area("said", -64.0).show(ui.ctx(), |ui| {
             egui::Frame::popup(ui.style()).show(ui, |ui| {
-                // An area is as narrow as its words can be broken, unless it is told.
+                // Without a minimum width, egui makes the area as narrow as the line breaks allow.
                 ui.set_min_width((7.0 * said.len() as f32).min(640.0));
                 ui.set_max_width(640.0);
                 ui.label(said)
@@ -337,20 +335,20 @@ const KEYS: &[(&str, &str)] = &[
     ("right drag", "look around"),
     ("wheel, pinch", "zoom"),
     ("W X A D Q Z", "fly forwards, back, left, right, up, down"),
-    ("F", "fit the scene"),
-    ("R, Home", "back to the first view"),
-    ("Ctrl+Z", "take the last movement back"),
+    ("F", "frame the whole scene"),
+    ("R, Home", "reset the view"),
+    ("Ctrl+Z", "undo camera move"),
     ("1 to 9", "cameras of the file"),
-    ("Space; comma, full stop", "play; a picture back, forth"),
+    ("Space; comma, full stop", "play or pause; one frame back, forward"),
     ("V", "compare two settings"),
-    ("up, down; left, right", "choose a knob; turn it"),
-    ("Ctrl+click", "ask about a pixel, and see its rays"),
+    ("up, down; left, right", "select a knob; change its rung"),
+    ("Ctrl+click", "inspect a pixel and its rays"),
     ("O", "open a file"),
-    ("P", "panels"),
-    ("S, E, C", "write PNG, write EXR, copy the command"),
-    ("Escape", "away with messages and help"),
-    ("Ctrl+Q", "close"),
-    ("H, ?", "this"),
+    ("P", "show or hide the panels"),
+    ("S, E, C", "save a PNG, save an EXR, copy the command"),
+    ("Escape", "close messages and help"),
+    ("Ctrl+Q", "quit"),
+    ("H, ?", "show or hide this help"),
 ];
 
 fn help(ui: &mut Ui, state: &mut PanelState) {
@@ -385,7 +383,7 @@ fn keys(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, actions: &mut V
     if ui.ctx().text_edit_focused() || state.is_asking() {
         return;
     }
-    // A key that is held down is pressed once; knobs and times go on.
+    // A held key counts once here; for knobs and animation time (`count` below) it repeats.
     let pressed = |key: Key| {
         ui.input_mut(|input| {
             let again =
@@ -412,7 +410,7 @@ fn keys(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, actions: &mut V
         (state.help, state.message, state.picked) = (false, None, None);
         actions.push(Action::Dismiss);
     }
-    // As often as they were pressed: a slow picture may see several at once.
+    // Each key press counts: a slow frame may receive several at once.
     let count = |key: Key| ui.input_mut(|input| input.count_and_consume_key(Modifiers::NONE, key));
     (0..count(Key::ArrowUp)).for_each(|_| state.choose_knob(-1));
     (0..count(Key::ArrowDown)).for_each(|_| state.choose_knob(1));

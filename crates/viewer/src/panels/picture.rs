@@ -1,4 +1,4 @@
-//! The picture itself: what the pointer does there, the wipe, and rays drawn over it.
+//! The picture area: mouse and keyboard navigation, the wipe line of a comparison, and rays drawn over the picture.
 
 use egui::{Align2, Color32, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, Sense, Stroke, Ui};
 use glam::{DVec2, DVec3};
@@ -11,10 +11,10 @@ use etalon::plan::KNOBS;
 use etalon::scene::{Camera, Projection};
 use etalon::transport::events::Way;
 
-/// Sizes of the scene that flying covers in a second.
+/// Flying speed in sizes of the scene per second.
 const PACE: f64 = 0.5;
 
-/// What is left of the window.
+/// Shows the picture in the part of the window that the panels leave free.
 pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     let rect = ui.available_rect_before_wrap();
     let scale = ui.ctx().pixels_per_point();
@@ -44,7 +44,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
         }
         state.moved = true;
     }
-    // Two fingers on a touchpad come in points, and orbit; a wheel comes in lines.
+    // A touchpad scrolls in points and orbits; a wheel scrolls in lines and zooms.
     let fingers = touchpad(ui);
     if let Some(by) = fingers.filter(|_| response.hovered()) {
         let by = DVec2::new(f64::from(by.x), f64::from(by.y)) / f64::from(rect.height().max(1.0));
@@ -55,7 +55,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
         }
         state.moved = true;
     } else if response.hovered() && (scroll.y != 0.0 || pinch != 1.0) {
-        // A notch of a wheel is some 50 points; fingers spread by e are 1/0.15 notches.
+        // One notch of a wheel is about 50 points; fingers spread by e are 1/0.15 notches.
         navigation.zoom(f64::from(scroll.y) / 50.0 + f64::from(pinch.ln()) / 0.1625);
         state.moved = true;
     }
@@ -87,7 +87,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     }
 }
 
-/// By how much two fingers went; with Ctrl they zoom, as pinching does.
+/// Movement of a two-finger scroll on a touchpad; `None` with Ctrl, which zooms as pinching does.
 fn touchpad(ui: &Ui) -> Option<egui::Vec2> {
     ui.input(|input| {
         let by = |event: &egui::Event| match event {
@@ -100,7 +100,7 @@ fn touchpad(ui: &Ui) -> Option<egui::Vec2> {
     })
 }
 
-/// The line between both sides, and what each took.
+/// The wipe line between both sides, and a label with the figures of each side.
 fn wipe(ui: &mut Ui, rect: Rect, state: &mut PanelState, seen: &RenderState) {
     let scale = ui.ctx().pixels_per_point();
     let x = state.wipe_column() as f32 / scale;
@@ -123,20 +123,20 @@ fn wipe(ui: &mut Ui, rect: Rect, state: &mut PanelState, seen: &RenderState) {
     }
 }
 
-/// What one side of the wipe is drawn with, what that took, and how wrong it is.
+/// Label of one side: knobs that differ from the other side, time, samples and error.
 fn account(side: usize, seen: &RenderState) -> Option<String> {
     let shown = seen.sides[side].shown.as_ref()?;
     let other = seen.sides[1 - side].shown.as_ref().map_or(&shown.knobs, |other| &other.knobs);
     let differs = KNOBS.iter().filter(|knob| knob.place(&shown.knobs) != knob.place(other));
     let own: Vec<String> = differs.map(|knob| format!("{}={}", knob.name, knob.rung(&shown.knobs))).collect();
-    // All that differs would cover the picture.
+    // A list of all differences would cover the picture.
     let few = if own.len() > 3 { format!("{} and {} more", own[..3].join(" "), own.len() - 3) } else { own.join(" ") };
     let [done, of] = shown.samples;
     let mut lines = vec![
         format!("{}  {few}", ["left", "right"][side]),
-        format!("{:.1} ms, {} rays a sample, {done} of {of}", shown.ms(), shown.rays),
+        format!("{:.1} ms and {} rays per sample, {done} of {of} samples", shown.ms(), shown.rays),
     ];
-    lines.extend(shown.error.map(|error| format!("relative error {:.2} % by its own samples", 100.0 * error)));
+    lines.extend(shown.error.map(|error| format!("estimated relative error {:.1} %", 100.0 * error)));
     let table = seen.facts.as_ref().and_then(|facts| facts.prices.as_ref());
     let known = table.and_then(|table| {
         let is_this = |point: &&etalon_cost::table::Point| {
@@ -144,11 +144,11 @@ fn account(side: usize, seen: &RenderState) -> Option<String> {
         };
         table.points.iter().find(is_this)
     });
-    lines.extend(known.map(|point| format!("error {:.2} % of the range, by cost", 100.0 * point.error())));
+    lines.extend(known.map(|point| format!("error {:.2} %, measured by etalon cost", 100.0 * point.error())));
     if side == 1 {
         lines.push(match seen.difference() {
-            Some(difference) => format!("FLIP {:.4} between both", difference.flip),
-            None => "compared when both are done".to_owned(),
+            Some(difference) => format!("FLIP {:.4} between the two sides", difference.flip),
+            None => "FLIP: waiting for both sides".to_owned(),
         });
     }
     Some(lines.join("\n"))
@@ -161,7 +161,7 @@ fn label(painter: &egui::Painter, at: Pos2, align: Align2, text: &str) {
     painter.galley(rect.min, galley, Color32::WHITE);
 }
 
-/// Radiance of both sides at the pixel under the pointer, and the angle under which its surface is seen.
+/// Radiance of both sides at the pixel under the pointer, and the angle between the view direction and the normal.
 fn under_pointer(ui: &Ui, rect: Rect, under: Option<[u32; 2]>, seen: &RenderState) {
     let (Some([x, y]), Some(surfaces)) = (under, seen.now()) else { return };
     let [width, height] = surfaces.size;
@@ -181,10 +181,10 @@ fn under_pointer(ui: &Ui, rect: Rect, under: Option<[u32; 2]>, seen: &RenderStat
     label(&ui.painter_at(rect), rect.center_top() + egui::vec2(0.0, 8.0), Align2::CENTER_TOP, &text);
 }
 
-/// The rays of a pixel, from wherever the scene is seen now.
+/// Draws the rays of the inspected pixel as seen by the current camera.
 fn rays(painter: &egui::Painter, rect: Rect, camera: &Camera, trace: &Trace, pointed: Option<usize>) {
     for (index, event) in trace.events.iter().enumerate() {
-        // What leaves the scene has no end: some of it is enough.
+        // A ray that leaves the scene has no end: draw a quarter of it.
         let leaves = event.interaction.is_none() && !matches!(event.way, Way::ToLight(_));
         let to = if leaves { event.from.lerp(event.to, 0.25) } else { event.to };
         let Some([a, b]) = on_screen(camera, rect, [event.from, to]) else { continue };
@@ -201,14 +201,14 @@ fn rays(painter: &egui::Painter, rect: Rect, camera: &Camera, trace: &Trace, poi
     }
 }
 
-/// Where a line of the world lies on the screen; `None` where it is behind the eye.
+/// Projects a world-space line to the screen, clipped at the near side; `None` where it is behind the eye.
 fn on_screen(camera: &Camera, rect: Rect, ends: [DVec3; 2]) -> Option<[Pos2; 2]> {
     let aspect = f64::from(rect.width()) / f64::from(rect.height().max(1.0));
     let camera_from_world = camera.world_from_camera.inverse();
     let [mut a, mut b] = ends.map(|p| camera_from_world.transform_point3(p));
     let half = match camera.projection {
         Projection::Perspective { fov_y, .. } => {
-            // A thousandth of the way to the farther end is near enough to the eye.
+            // Clip at a thousandth of the distance of the farther end.
             let near = -1e-3 * a.z.abs().max(b.z.abs());
             if a.z > near && b.z > near {
                 return None;
@@ -234,7 +234,7 @@ mod tests {
     fn lines_meet_the_pixels_that_they_are_seen_in() {
         let camera = Camera::looking_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, 90_f64.to_radians()).expect("a camera");
         let rect = Rect::from_min_max(Pos2::new(100.0, 50.0), Pos2::new(300.0, 150.0));
-        // 45 degrees up and, by the picture's shape, twice as far to the right.
+        // 45 degrees up, and twice as far to the right because of the 2:1 aspect ratio.
         let seen = on_screen(&camera, rect, [DVec3::new(0.0, 0.0, -5.0), DVec3::new(4.0, 2.0, -2.0)]);
         let [a, b] = seen.expect("before the eye");
         assert!(

@@ -1,4 +1,4 @@
-//! A pixel that was asked about: its surface, its indices by wavelength, what its ray meets, and the equations of that.
+//! The inspected pixel: its surface, its refractive index by wavelength, the events along its ray, and their equations.
 
 use egui::{Color32, Pos2, Sense, Stroke, Ui};
 use glam::DVec3;
@@ -12,21 +12,21 @@ use etalon::share::AovPixel;
 use etalon::spectra::VISIBLE;
 use etalon::transport::events::{Event, GREEN, Interaction, Way};
 
-/// What lies at a pixel, as it was found when it was asked about.
+/// Surface and radiance of a pixel at the time of the inspection.
 pub(super) struct PixelFacts {
     surface: AovPixel,
-    /// Of each side.
+    /// Radiance of each side.
     radiance: Vec<[f32; 4]>,
     eye: DVec3,
 }
 
-/// Cosine of the angle between the normal and the way to the eye.
+/// Cosine of the angle between the normal and the direction to the eye.
 pub(super) fn incidence(p: &AovPixel) -> f64 {
     let [normal, way] = [p.normal, p.p_rel].map(|v| DVec3::from(v.map(f64::from)));
     (-way.normalize_or_zero().dot(normal)).clamp(-1.0, 1.0)
 }
 
-/// Takes what is known of the pixel, while the scene is seen from where it was asked about; whether it is.
+/// Stores the facts of the pixel while the camera is still that of the inspection; returns whether it is.
 fn look(state: &mut PanelState, trace: &Trace, seen: &RenderState) -> bool {
     if state.navigation.as_ref().is_none_or(|navigation| navigation.camera() != trace.seen_from) {
         return false;
@@ -44,12 +44,12 @@ fn look(state: &mut PanelState, trace: &Trace, seen: &RenderState) -> bool {
 
 pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     let Some(picked) = state.picked else {
-        ui.weak("Ctrl+click a pixel to ask about it.");
+        ui.weak("Ctrl+click a pixel to inspect it.");
         return;
     };
     let (Some(trace), Some(scene)) = (seen.trace.as_ref().filter(|trace| trace.number == picked.number), &seen.facts)
     else {
-        ui.weak("once the picture is finished …");
+        ui.weak("available when the picture is finished");
         return;
     };
     let is_there = look(state, trace, seen);
@@ -58,12 +58,12 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
             let interaction = trace.events.first().and_then(|event| event.interaction);
             surface(ui, trace.pixel, facts, scene, interaction);
         }
-        None if is_there => drop(ui.weak("once the picture is finished …")),
-        None => drop(ui.weak("the view moved before the picture was finished: Ctrl+Z goes back")),
+        None if is_there => drop(ui.weak("available when the picture is finished")),
+        None => drop(ui.weak("the view moved before the picture was finished; Ctrl+Z undoes the move")),
     }
     ui.separator();
-    ui.strong("What its ray meets").on_hover_text(
-        "followed in f64 by textbook formulas, for green light, without textures of normals; seen from elsewhere, too: orbit",
+    ui.strong("Ray of the pixel").on_hover_text(
+        "traced in f64 with textbook formulas for green light, without normal maps; orbit to see the rays from another side",
     );
     for (index, event) in trace.events.iter().enumerate() {
         if told(ui, event, depth(&trace.events, index), scene) {
@@ -71,7 +71,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
         }
     }
     ui.separator();
-    ui.strong("Its equations").on_hover_text("lines of shaders/lib that hold the formula; point at one to see it");
+    ui.strong("Equations").on_hover_text("lines of shaders/lib with these formulas; hover a line to see its formula");
     for probe in used(&trace.events, &scene.materials, &scene.lights, &state.settings.knobs) {
         let ids = probe.ids.join(" ");
         let text = format!("{ids}  {}  {}.glsl:{}", probe.name, probe.subject, probe.line);
@@ -79,7 +79,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     }
 }
 
-/// The surface at the pixel.
+/// Table of the surface at the pixel.
 fn surface(ui: &mut Ui, [x, y]: [u32; 2], facts: &PixelFacts, scene: &SceneFacts, interaction: Option<Interaction>) {
     let p = &facts.surface;
     let material = (p.material as usize).checked_sub(1).and_then(|index| scene.materials.get(index));
@@ -91,7 +91,7 @@ fn surface(ui: &mut Ui, [x, y]: [u32; 2], facts: &PixelFacts, scene: &SceneFacts
         };
         let three = |v: [f32; 3]| format!("{:.5} {:.5} {:.5}", v[0], v[1], v[2]);
         row("pixel", format!("{x}, {y}"));
-        for (name, radiance) in ["radiance", "on the right"].into_iter().zip(&facts.radiance) {
+        for (name, radiance) in ["radiance", "radiance, right"].into_iter().zip(&facts.radiance) {
             row(name, three([radiance[0], radiance[1], radiance[2]]));
         }
         if p.material == 0 {
@@ -105,7 +105,7 @@ fn surface(ui: &mut Ui, [x, y]: [u32; 2], facts: &PixelFacts, scene: &SceneFacts
         row("position, m", format!("{:.4} {:.4} {:.4}", position.x, position.y, position.z));
         row("distance, m", format!("{:.5}", p.distance));
         row("normal", three(p.normal));
-        row("triangle's", three(p.geometric_normal));
+        row("face normal", three(p.geometric_normal));
         row("albedo", three(p.albedo));
         row("roughness", format!("{:.4}", p.roughness));
         row("metallic", format!("{:.4}", p.metallic));
@@ -119,23 +119,23 @@ fn surface(ui: &mut Ui, [x, y]: [u32; 2], facts: &PixelFacts, scene: &SceneFacts
     }
 }
 
-/// Whether the index of refraction depends on the wavelength.
+/// Whether the refractive index of a dielectric depends on the wavelength.
 fn varies(m: &Material) -> bool {
     m.conductor.is_none() && m.dispersion.disperses(f64::from(m.ior))
 }
 
-/// n and κ, at three wavelengths where they differ, and the share that is mirrored of green light and, where only the index decides, of
-/// the others.
+/// Rows with n and κ, at three wavelengths where they differ, and the Fresnel reflectance of green light. Where only the index decides,
+/// the other wavelengths have their reflectance too.
 fn indices(row: &mut impl FnMut(&str, String), m: &Material, interaction: Interaction) {
     let [green, _] = m.complex_index(GREEN);
     if m.metallic >= 1.0 && m.conductor.is_none() {
-        row("n, κ", "not told: base colour is F0".to_owned());
+        row("n, κ", "not given (F0 = base colour)".to_owned());
     } else if m.conductor.is_none() && !varies(m) {
         row("n", format!("{green:.4}"));
     } else {
         for nm in [650.0, GREEN, 450.0] {
             let [n, kappa] = m.complex_index(nm);
-            // Other light has another ratio where the medium on one of the sides disperses.
+            // The ratio depends on the wavelength where the medium on one side disperses.
             let ratio =
                 if interaction.ratio < 1.0 { interaction.ratio * green / n } else { interaction.ratio * n / green };
             let share = if kappa > 0.0 {
@@ -146,10 +146,10 @@ fn indices(row: &mut impl FnMut(&str, String), m: &Material, interaction: Intera
             row(&format!("n, κ at {nm} nm"), format!("{n:.4} {kappa:.4}, F {:.2} %", 100.0 * share));
         }
     }
-    row("Fresnel", format!("{:.3} % mirrored", 100.0 * interaction.reflected));
+    row("Fresnel", format!("{:.3} % reflected", 100.0 * interaction.reflected));
 }
 
-/// n and κ over visible light.
+/// Plot of n and κ over the visible wavelengths.
 fn curves(ui: &mut Ui, m: &Material) {
     let (rect, _) = ui.allocate_exact_size(egui::vec2(ui.available_width(), 64.0), Sense::hover());
     ui.painter().rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
@@ -173,12 +173,12 @@ fn curves(ui: &mut Ui, m: &Material) {
     }
 }
 
-/// How many rays led to an event.
+/// Number of events before an event on its path.
 fn depth(events: &[Event], index: usize) -> usize {
     std::iter::successors(events[index].after, |&before| events[before].after).count()
 }
 
-/// Colour of a ray.
+/// Colour in which a ray is drawn.
 pub(super) fn colour(event: &Event) -> Color32 {
     match (event.way, event.interaction) {
         (Way::Seen, _) => Color32::WHITE,
@@ -190,7 +190,7 @@ pub(super) fn colour(event: &Event) -> Color32 {
     }
 }
 
-/// One event in words; whether the pointer is on it.
+/// Shows one event as text; returns whether the pointer is on it.
 fn told(ui: &mut Ui, event: &Event, depth: usize, scene: &SceneFacts) -> bool {
     let name = |interaction: &Interaction| {
         let material = scene.materials.get(interaction.material).map_or("", |m| &m.name);
@@ -203,27 +203,27 @@ fn told(ui: &mut Ui, event: &Event, depth: usize, scene: &SceneFacts) -> bool {
         (Way::ToLight(index), interaction) => {
             let light = scene.lights.get(index).map_or("", |light| &light.name);
             match interaction {
-                None => format!("to light {index} {light}: {length:.3} m, free"),
+                None => format!("to light {index} {light}: {length:.3} m, not blocked"),
                 Some(interaction) => {
                     let lets_through = scene.materials.get(interaction.material).is_some_and(|m| m.transmission > 0.0);
-                    let how = if lets_through { ", which lets light through, lies" } else { " stands" };
-                    format!("to light {index} {light}: {}{how} before it", name(interaction))
+                    let how = if lets_through { "partly blocked" } else { "blocked" };
+                    format!("to light {index} {light}: {how} by {}", name(interaction))
                 }
             }
         }
         (way, interaction) => {
             let way = match way {
-                Way::Seen => "seen",
-                Way::Mirrored => "mirrored",
-                Way::Bent => "bent",
-                _ => "straight on",
+                Way::Seen => "eye ray",
+                Way::Mirrored => "reflected",
+                Way::Bent => "refracted",
+                _ => "transmitted straight",
             };
             match interaction {
-                None => format!("{way} {share}: out of the scene"),
+                None => format!("{way} {share}: leaves the scene"),
                 Some(interaction) => {
-                    let thrown = if interaction.total { ", totally reflected (F6)" } else { "" };
+                    let thrown = if interaction.total { ", total internal reflection (F6)" } else { "" };
                     format!(
-                        "{way} {share}: {} after {length:.4} m, {:.2}°, n₂/n₁ {:.4}, mirrors {:.2} %{thrown}",
+                        "{way} {share}: {} after {length:.4} m, {:.2}°, n₂/n₁ {:.4}, reflects {:.2} %{thrown}",
                         name(interaction),
                         interaction.cos.acos().to_degrees(),
                         interaction.ratio,

@@ -1,4 +1,4 @@
-//! The right panel: what is seen, and why.
+//! The right panel: the inspected pixel, GPU time per pass, and the plan with its reasons.
 
 use egui::{Color32, Sense, Ui};
 
@@ -7,7 +7,7 @@ use crate::shared::RenderState;
 use etalon::gpu::PassTime;
 use etalon::plan::EffectState;
 
-/// Colours of passes, told apart by those who see few of them (Okabe and Ito 2008).
+/// Colours of passes, from a palette for colour-blind readers (Okabe and Ito 2008).
 const COLOURS: [Color32; 8] = [
     Color32::from_rgb(230, 159, 0),
     Color32::from_rgb(86, 180, 233),
@@ -19,12 +19,12 @@ const COLOURS: [Color32; 8] = [
     Color32::from_rgb(150, 150, 150),
 ];
 
-/// What is seen: a picked pixel, times, the plan.
+/// Shows the panel.
 pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     ui.heading("Pixel");
     pixel::show(ui, state, seen);
     ui.separator();
-    ui.heading("Time of the passes");
+    ui.heading("GPU time per pass");
     times(ui, state);
     ui.separator();
     ui.heading("Plan");
@@ -46,12 +46,12 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     }
 }
 
-/// Pass times of the last pictures, one upon the other.
+/// Stacked bar chart of the pass times of the last pictures, and a list of the passes.
 fn times(ui: &mut Ui, state: &PanelState) {
     let Some(last) = state.history.back() else { return };
     let total = |passes: &Vec<PassTime>| passes.iter().map(|pass| pass.ms).sum::<f64>();
     let most = state.history.iter().map(total).fold(1e-6, f64::max);
-    // The dearest passes have a colour, all others the last.
+    // The slowest passes have their own colours; all others share the last colour.
     let mut order: Vec<(&str, f64)> = last.iter().map(|pass| (pass.name.as_str(), pass.ms)).collect();
     order.sort_by(|a, b| b.1.total_cmp(&a.1));
     let place =
@@ -71,7 +71,7 @@ fn times(ui: &mut Ui, state: &PanelState) {
             bottom = top;
         }
     }
-    ui.weak(format!("{:.1} ms of GPU time for a sample, at most {most:.1} here", total(last)));
+    ui.weak(format!("{:.1} ms per sample (chart maximum {most:.1} ms)", total(last)));
     egui::Grid::new("passes").num_columns(3).min_col_width(10.0).show(ui, |ui| {
         for (name, ms) in &order {
             let (dot, _) = ui.allocate_exact_size(egui::vec2(10.0, 10.0), Sense::hover());

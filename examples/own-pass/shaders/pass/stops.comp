@@ -1,4 +1,4 @@
-// How bright pixels are, in stops over or under middle grey: a histogram of whole stops from -8 to 7.
+// Histogram of pixel brightness in whole stops from -8 to 7, relative to middle grey.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 layout(local_size_x = 8, local_size_y = 8) in;
