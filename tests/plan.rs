@@ -423,7 +423,7 @@ fn lights_are_there_where_something_is_lit() {
         brings: &[&[
             "tile depths",
             "tile light masks",
-            "[light lists]",
+            "[tiled light culling]",
             "[tile depths]",
             "light.local_lights",
             "light.tile_words",

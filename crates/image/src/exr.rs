@@ -1,5 +1,6 @@
 //! OpenEXR files of scene-linear pictures and AOVs.
-//!  Read the OpenEXR file layout specification (openexr.com). Written files have one part, scan lines, ZIP with 16 rows per
+//!
+//! Read the OpenEXR file layout specification (openexr.com). Written files have one part, scan lines, ZIP with 16 rows per
 //! block, channels `R G B A` and `name.channel` for every AOV, so that all viewers show the picture and find the AOVs. Read
 //! files may have scan lines or tiles, and any compression and sample type that the `exr` crate decodes.
 

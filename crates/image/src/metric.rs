@@ -1,5 +1,6 @@
-//! Image difference metrics: FLIP, SSIM, PSNR, MSE and relatives.
-//!  Read Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", HPG 2020; Wang et al., "Image Quality
+//! Image difference metrics: FLIP, SSIM, PSNR, mean squared error and relative mean squared error.
+//!
+//! Read Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", HPG 2020; Wang et al., "Image Quality
 //! Assessment: From Error Visibility to Structural Similarity", 2004. Two display pictures are compared in display values
 //! 0..=1, two scene-linear pictures in radiance; other pairs are refused. The first picture is the reference. A pixel with a
 //! non-finite sample in either picture is excluded from all values and counted.
@@ -56,7 +57,7 @@ impl Metric {
     }
 }
 
-/// A picture of either kind.
+/// A scene-linear or a display picture.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AnyPicture {
     /// Scene-linear radiance, from OpenEXR.
@@ -112,9 +113,9 @@ impl AnyPicture {
 /// Result of a comparison.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
-    /// Which figure.
+    /// The metric.
     pub metric: Metric,
-    /// Its value; positive infinity for psnr of equal pictures.
+    /// Value of the metric; positive infinity for psnr of equal pictures.
     pub value: f64,
     /// Pixels across.
     pub width: u32,
@@ -129,7 +130,7 @@ pub struct Comparison {
     pub map: Vec<f32>,
     /// Column and row of the pixel with the largest error of the map.
     pub worst: [u32; 2],
-    /// That error.
+    /// Error of that pixel.
     pub worst_error: f64,
 }
 

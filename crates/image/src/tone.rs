@@ -1,5 +1,6 @@
 //! Tone mapping: scene-linear radiance to display values by tone curves and the sRGB transfer function, in f64.
-//!  Read RTR 8.2; IEC 61966-2-1; the source of each curve is beside it. These functions are the reference for the GLSL
+//!
+//! Read RTR 8.2; IEC 61966-2-1; the source of each curve is beside it. These functions are the reference for the GLSL
 //! functions of the same names. A curve maps exposed linear Rec. 709 radiance to linear display light in 0..=1; [`srgb_encode`]
 //! and [`quantise`] follow. Before the curve, NaN and negative samples become 0, and values above [`LARGEST`], infinity
 //! included, become [`LARGEST`]: no curve returns NaN. The caller counts such samples beforehand.

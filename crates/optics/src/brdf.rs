@@ -1,6 +1,7 @@
 //! BRDF models of the lecture (B1–B6): Lambert, Phong, GGX with Smith masking-shadowing, VNDF sampling, and the MIS power
 //! heuristic.
-//!  Read Walter et al. 2007 (GGX); Heitz, JCGT 3(2) 2014 (Smith) and JCGT 7(4) 2018 (VNDF); Veach 1997 (the power heuristic);
+//!
+//! Read Walter et al. 2007 (GGX); Heitz, JCGT 3(2) 2014 (Smith) and JCGT 7(4) 2018 (VNDF); Veach 1997 (the power heuristic);
 //! Turquin 2019 (energy compensation). Directions are normalised first.
 
 use std::f64::consts::{PI, TAU};

@@ -1,5 +1,6 @@
 //! Round trips of encoded quantities: octahedral normals, depth, sRGB bytes, equirectangular coordinates.
-//!  Read RTR 16.6 for quantised vertex data. The exact value of a round trip is its input; its error bound is the step of the
+//!
+//! Read RTR 16.6 for quantised vertex data. The exact value of a round trip is its input; its error bound is the step of the
 //! format.
 
 use glam::{DVec2, DVec3};

@@ -1,5 +1,6 @@
 //! Directions, tangent frames and normals.
-//!  Read pbrt 3.3 and 3.10; Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 6(1) 2017. Differences of two f32 are
+//!
+//! Read pbrt 3.3 and 3.10; Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 6(1) 2017. Differences of two f32 are
 //! exact in f64 when their exponents differ by less than 29, and products always are: the cross product of f32 vectors is
 //! nearly exact.
 

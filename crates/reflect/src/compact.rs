@@ -1,5 +1,6 @@
 //! SPIR-V id compaction: renumbers ids without gaps.
-//!  Read the SPIR-V specification, 2.3 (physical layout). The optimiser numbers values and removes most of them: `interact` had
+//!
+//! Read the SPIR-V specification, 2.3 (physical layout). The optimiser numbers values and removes most of them: `interact` had
 //! ids up to 862,000 for about 60,000 results. Drivers keep a table by id, which lavapipe clears for each pipeline.
 
 use std::collections::HashMap;

@@ -59,7 +59,7 @@ pub(crate) struct Source {
 /// All functions of `shaders/lib/`.
 pub(crate) struct Library {
     pub(crate) equations: Vec<Equation>,
-    /// By function name; overloads are joined.
+    /// Functions by name; overloads are joined.
     pub(crate) functions: BTreeMap<String, Source>,
 }
 

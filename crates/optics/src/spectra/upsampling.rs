@@ -1,5 +1,6 @@
 //! Spectral upsampling: reflectance spectra for RGB colours (knob `upsampling`).
-//!  Read Jakob and Hanika, "A Low-Dimensional Function Space for Efficient Spectral Upsampling", Eurographics 2019 (a fitted
+//!
+//! Read Jakob and Hanika, "A Low-Dimensional Function Space for Efficient Spectral Upsampling", Eurographics 2019 (a fitted
 //! sigmoid); Mallett and Yuksel, "Spectral Primary Decomposition for Rendering with sRGB Reflectance", EGSR 2019 (a sum of
 //! three curves, which needs no fit). Colours are linear Rec. 709 in [0, 1] under D65.
 
