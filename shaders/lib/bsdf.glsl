@@ -68,7 +68,7 @@ bool is_straight(Layers b) {
 struct PathEval {
     vec3 f_cos;         // BSDF times |cosθ|, of all lobes but the delta ones
     float pdf;          // density with which bsdf_sample draws the direction, per solid angle
-    float unguided_pdf; // the same without path guiding
+    float unguided_pdf; // solid-angle density without path guiding
 };
 
 // For light from the unit direction l, on either side of the surface.

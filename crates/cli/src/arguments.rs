@@ -65,7 +65,7 @@ pub const EXIT_CODES: [(u8, &str); 6] = [
         1,
         "failed, with a sentence; or `diff` found more than `--max`, `verify` a broken bound, `devices` no usable device",
     ),
-    (2, "wrong usage"),
+    (2, "the command line does not parse: an unknown option, a missing or malformed value"),
     (AGAIN, "worth trying again: the device was lost, or the disk is full"),
     (130, "ended by Ctrl-C"),
     (ENDED, "a part of a picture that was ended by SIGTERM, with the samples it had"),

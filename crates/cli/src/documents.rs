@@ -3,7 +3,7 @@
 
 use std::fmt::Write as _;
 
-use etalon::gpu::{Access, BindingKind, Program};
+use etalon::gpu::{Access, Program};
 use etalon::plan::{EffectId, KNOBS, Knob};
 use etalon::shader;
 use etalon::study;
@@ -96,7 +96,7 @@ fn knobs() -> String {
 }
 
 fn effects() -> String {
-    let mut table = String::from("| effect | called for by | what it brings |\n|---|---|---|\n");
+    let mut table = String::from("| effect | what in a scene needs it | what it brings |\n|---|---|---|\n");
     for effect in EffectId::all() {
         let [cause, brings] = effect.row();
         let _ = writeln!(table, "| {} | {cause} | {brings} |", effect.name());
@@ -159,52 +159,33 @@ fn barrier() -> String {
     let after = composite.access.masks(composite.stages);
     // A barrier makes writes available; reads need only be waited for.
     let writes = Access::StorageWrite.masks(light.stages).access;
-    let kind = if light.kind == BindingKind::StorageImage { "a storage image" } else { "a buffer" };
-    let mut text = String::from("```text\n");
-    let _ = writeln!(text, "shaders/pass/light.comp           {}", declaration("light", "radiance"));
-    let _ = writeln!(text, "        │                         the qualifier, or none, decides the access");
-    let _ = writeln!(text, "        ▼");
-    let _ = writeln!(
-        text,
-        "crates/reflect/src/reflect.rs     Binding {{ name: \"radiance\", kind: {:?}, access: {:?} }}",
-        light.kind, light.access
-    );
-    let _ = writeln!(
-        text,
-        "        │                         light::Bind gets a field `radiance`: without it nothing compiles"
-    );
-    let _ = writeln!(text, "        ▼");
-    let _ = writeln!(
-        text,
-        "src/pass/light.rs                 frame.compute_indirect(\"lighting\", &light::Bind {{ radiance, .. }}, ..)"
-    );
-    let _ = writeln!(text, "        ▼");
-    let _ = writeln!(
-        text,
-        "crates/vulkan/src/frame.rs        Use {{ resource: radiance, access: {:?} }}: {kind}",
-        light.access
-    );
-    let _ = writeln!(text, "        ▼");
-    let _ = writeln!(
-        text,
-        "crates/vulkan/src/access.rs       masks(): stages {:?}, access {:?}, layout {:?}",
-        masks.stages, masks.access, masks.layout
-    );
-    let _ = writeln!(text, "        ▼");
-    let _ = writeln!(
-        text,
-        "crates/vulkan/src/sync.rs         barriers(): the uses of all passes in order → the barriers before each pass"
-    );
-    let _ = writeln!(text, "        ▼");
-    let _ = writeln!(
-        text,
-        "crates/vulkan/src/recording.rs    vkCmdPipelineBarrier2 before the pass \"transparent lighting\":"
-    );
-    let _ = writeln!(
-        text,
-        "                                  wait for {:?}, make {:?} available → before {:?} does {:?}",
-        masks.stages, writes, after.stages, after.access
-    );
-    text.push_str("```\n");
-    text
+    format!(
+        r#"```text
+shaders/pass/light.comp           {declaration}
+        │                         the qualifier, or none, decides the access
+        ▼
+crates/reflect/src/reflect.rs     Binding {{ name: "radiance", kind: {kind:?}, access: {access:?} }}
+        │                         light::Bind gets a field `radiance`: without it nothing compiles
+        ▼
+src/pass/light.rs                 frame.compute_indirect("lighting", &light::Bind {{ radiance, .. }}, ..)
+        ▼
+crates/vulkan/src/frame.rs        Use {{ resource: radiance, access: {access:?} }}
+        ▼
+crates/vulkan/src/access.rs       masks(): stages {stages:?}, access {reads:?}, layout {layout:?}
+        ▼
+crates/vulkan/src/sync.rs         barriers(): the uses of all passes in order → the barriers before each pass
+        ▼
+crates/vulkan/src/recording.rs    vkCmdPipelineBarrier2 before the pass "transparent lighting":
+                                  wait for {stages:?}, make {writes:?} available → before {next:?} does {then:?}
+```
+"#,
+        declaration = declaration("light", "radiance"),
+        kind = light.kind,
+        access = light.access,
+        stages = masks.stages,
+        reads = masks.access,
+        layout = masks.layout,
+        next = after.stages,
+        then = after.access,
+    )
 }

@@ -1,6 +1,6 @@
 //! Study scene of numerically hard cases, ten kilometres from the origin and in front of a plane mirror that shows the back.
 //!
-//! Read docs/numerics.md, which explains each case.
+//! Read docs/numerics.md for the errors of f32 in such cases.
 
 use glam::{DAffine3, DVec2, DVec3};
 
