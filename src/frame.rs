@@ -2,103 +2,59 @@
 //!
 //! Read docs/frame.md; Real-Time Rendering (4th ed.), chapter 20 for deferred shading; pbrt (4th ed.), chapters 5 (film) and
 //! 13 (path tracing). A picture is the mean of samples; each sample is one [`Frame`] per band of wavelengths. The input is a
-//! [`Prepared`] scene: planned, with its BVH.
+//! [`Prepared`] scene: planned, with its BVH. `settings`, `targets`, `drawing`, `rendered` and `readback` are what the frame
+//! is drawn by, into, how far it is, what it comes with, and how the host gets it.
 
-use std::collections::BTreeMap;
+mod drawing;
+mod readback;
+mod rendered;
+mod settings;
+mod targets;
+
 use std::sync::Arc;
 
 use anyhow::{Result, bail, ensure};
-use ash::vk;
 
-use crate::gpu::{Buffer, DescriptorSet, Device, Frame, Image, ImageDesc, PassPlan, PassTime, Place};
-use crate::image::halves::{SampleError, error_of_halves};
-use crate::image::tone::{ToneMap, ViewTransform};
-use crate::image::{Picture, png};
+pub use self::drawing::Drawing;
+pub use self::readback::shown;
+pub use self::rendered::{NotFinite, Progress, Rendered, Sums, Work};
+pub use self::settings::{Background, NEUTRAL_GREY, Settings};
+use self::settings::{check_size, display_background};
+use self::targets::Targets;
+use crate::gpu::{Buffer, DescriptorSet, Device, Frame, Image, PassPlan, Place};
+use crate::image::Picture;
+use crate::image::tone::ToneMap;
 use crate::pass::accumulate::accumulate;
-use crate::pass::aov::aov;
 use crate::pass::background::background;
-use crate::pass::classify::{RayTiles, WorkLists, classify, classify_fragments};
+use crate::pass::classify::{classify, classify_fragments};
 use crate::pass::composite::{Behind, composite};
 use crate::pass::fragments::{FragmentLists, fragments};
-use crate::pass::gbuffer::{GBuffer, gbuffer};
+use crate::pass::gbuffer::gbuffer;
 use crate::pass::interact::interact;
 use crate::pass::light::light;
 use crate::pass::lighting::Lighting;
 use crate::pass::mirror::mirror;
 pub use crate::pass::part::Part;
 use crate::pass::part::PartOnDevice;
-use crate::pass::path::{PathsOnDevice, paths};
+use crate::pass::path::paths;
 pub use crate::pass::rows::TileShare;
-use crate::pass::screen::{OnScreen, screen_tiles};
+use crate::pass::screen::screen_tiles;
 use crate::pass::shadow_map::ShadowMaps;
-use crate::pass::sum::{Sample, Sum, block_of, join};
-use crate::pass::tiles::{Tiles, tiles};
-use crate::pass::tonemap::{Counts, Display, tonemap};
-use crate::plan::rungs::Indirect;
-use crate::plan::{Ability, ForcedEffects, Knobs, Plan, Refused, Setting};
-use crate::prepare::{Conditions, Original, Prepared};
+use crate::pass::sum::{Sample, block_of, join};
+use crate::pass::tiles::tiles;
+use crate::pass::tonemap::{Counts, tonemap};
+use crate::plan::{Ability, Plan, Refused, Setting};
+use crate::prepare::{Original, Prepared};
 use crate::scene::Camera;
 use crate::scene::environment::Environment;
 use crate::scene::wavelengths::Slice;
-use crate::share::{self, AovPixel};
+use crate::share;
 use crate::spectra::VISIBLE;
-use crate::transport::emitters::Sky;
 use crate::upload::environment::{EnvironmentOnDevice, EnvironmentRotation};
-use crate::upload::rays::{BvhFacts, RaysOnDevice, Traversal};
+use crate::upload::rays::{BvhFacts, RaysOnDevice};
 use crate::upload::scene::SceneOnDevice;
 use crate::upload::shared::{Library, OnDevice};
 use crate::upload::view::{View, jitter};
-
-/// Refuses a size that no image or buffer of the device can hold.
-fn check_size(device: &Device, knobs: &Knobs, size: [u32; 2]) -> Result<()> {
-    let limit = device.max_image_size();
-    if size.contains(&0) || size.iter().any(|&side| side > limit) {
-        let why = format!("{}x{}: a picture has 1 to {limit} pixels a side on this device", size[0], size[1]);
-        return Err(Refused::error(Setting::Size, why));
-    }
-    let pixels = u64::from(size[0]) * u64::from(size[1]);
-    // Paths store four words per pixel in one buffer, everything else one.
-    let bytes = if knobs.indirect == Indirect::Path { 16 } else { 4 };
-    if pixels * bytes > device.max_storage_bytes() {
-        let most = device.max_storage_bytes() / bytes;
-        let why = format!("{}x{}: this device holds at most {most} pixels in one picture", size[0], size[1]);
-        return Err(Refused::error(Setting::Size, why));
-    }
-    Ok(())
-}
-
-/// The background behind the scene.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum Background {
-    /// The environment if there is one, otherwise nothing, which a PNG shows as [`NEUTRAL_GREY`].
-    #[default]
-    Default,
-    /// The environment.
-    Environment,
-    /// Nothing: transparent in every output.
-    Transparent,
-    /// A display colour (sRGB bytes).
-    Color([u8; 3]),
-}
-
-impl Background {
-    /// Composites a background colour behind the picture's premultiplied alpha.
-    pub fn lay_behind(self, picture: &mut Picture) {
-        if let Self::Color(color) = self {
-            let behind = color.map(|byte| crate::image::tone::srgb_decode(f64::from(byte) / 255.0) as f32);
-            for pixel in &mut picture.rgba {
-                let rest = 1.0 - pixel[3];
-                for (value, behind) in pixel.iter_mut().zip(behind) {
-                    *value += rest * behind;
-                }
-                pixel[3] = 1.0;
-            }
-        }
-    }
-}
-
-/// Grey behind a scene without environment, as sRGB bytes.
-pub const NEUTRAL_GREY: [u8; 3] = [119; 3];
 
 /// Largest number of lights on a driver that limits loops to 65,535 iterations: one iteration per light.
 const MOST_LIGHTS: usize = 60_000;
@@ -112,221 +68,6 @@ const MOST_SAMPLES: u32 = 1 << 16;
 const MOST_PARTS: u32 = 64;
 /// Largest number of parts of a band when rendering to a target error.
 const PARTS_BEFORE_AN_END: u32 = 8;
-
-/// Settings of a picture: everything that is constant over the frames of a sequence.
-#[derive(Debug, Clone)]
-pub struct Settings {
-    /// Width and height in pixels.
-    pub size: [u32; 2],
-    /// Rungs of all knobs.
-    pub knobs: Knobs,
-    /// Tone curve of the display output.
-    pub tonemap: ToneMap,
-    /// Exposure in stops.
-    pub exposure: f32,
-    /// Background behind the scene.
-    pub background: Background,
-    /// Factor on the environment's radiance.
-    pub environment_intensity: f32,
-    /// Rotation of the environment about +Y, in degrees.
-    pub environment_rotation: f32,
-    /// Seed of the random numbers.
-    pub seed: u32,
-    /// Target error: samples are drawn until the root of [`SampleError::relmse`] is at most this, whatever the knob `samples`.
-    pub max_error: Option<f64>,
-    /// Traces all bounces of a path in one dispatch instead of a wavefront: the same film, for comparison.
-    pub paths_at_once: bool,
-    /// BVH traversal; `None` selects the one that suits the device and the scene.
-    pub traversal: Option<Traversal>,
-    /// Effects that are planned although the scene does not call for them.
-    pub forced: ForcedEffects,
-    /// Parts of the picture that are stored as layers of their own; each costs one more pass of the recursive rays.
-    pub parts: Vec<Part>,
-    /// The share of the picture's tiles that is drawn; the rest is black.
-    pub share: TileShare,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            size: [1280, 720],
-            knobs: Knobs::default(),
-            tonemap: ToneMap::default(),
-            exposure: 0.0,
-            background: Background::default(),
-            environment_intensity: 1.0,
-            environment_rotation: 0.0,
-            seed: 0,
-            max_error: None,
-            paths_at_once: false,
-            traversal: None,
-            forced: ForcedEffects::default(),
-            parts: Vec::new(),
-            share: TileShare::ALL,
-        }
-    }
-}
-
-impl Settings {
-    /// The conditions under which a scene in this environment is prepared.
-    ///
-    /// # Errors
-    /// When the background is an environment and there is none.
-    pub fn conditions<'a>(&'a self, environment: Option<&'a Environment>) -> Result<Conditions<'a>> {
-        let background = match self.background {
-            Background::Default | Background::Environment => environment.is_some(),
-            Background::Transparent | Background::Color(_) => false,
-        };
-        if self.background == Background::Environment && environment.is_none() {
-            let why = "env: there is no environment (none was asked for, or the scene has lights of its own)";
-            return Err(Refused::error(Setting::Background, why.to_owned()));
-        }
-        let Self { environment_intensity: intensity, environment_rotation: rotation, .. } = *self;
-        let sky = environment.map(|map| Sky { map, intensity, rotation });
-        Ok(Conditions { knobs: &self.knobs, forced: self.forced, sky, background })
-    }
-
-    /// Display-linear colour behind the scene in the display output; `None` for a transparent output.
-    fn behind(&self) -> Option<[f64; 3]> {
-        match self.background {
-            Background::Color(bytes) => Some(bytes),
-            Background::Transparent => None,
-            Background::Default | Background::Environment => Some(NEUTRAL_GREY),
-        }
-        .map(|bytes| bytes.map(|byte| crate::image::tone::srgb_decode(f64::from(byte) / 255.0)))
-    }
-
-    /// The view transform from a film of this picture to the display output.
-    #[must_use]
-    pub fn view_transform(&self) -> ViewTransform {
-        ViewTransform { curve: self.tonemap, exposure: self.exposure, background: self.behind() }
-    }
-}
-
-/// A rendered picture.
-pub struct Rendered {
-    /// RGBA8, sRGB-encoded, rows from the top.
-    pub display: Vec<u8>,
-    /// Whether `display` has transparency.
-    pub has_alpha: bool,
-    /// Pixels with NaN, infinite or negative values, counted before any clamp.
-    pub counts: Counts,
-    /// Pixels whose list of transparent fragments was too long for one invocation, in the worst sample: the farthest
-    /// fragments were dropped.
-    pub dropped: u32,
-    /// Work counts of the rays, summed over the samples.
-    pub work: Work,
-    /// GPU time per pass, summed over the samples, in the order of the frame.
-    pub passes: Vec<PassTime>,
-    /// Samples of each pixel.
-    pub samples: u32,
-    /// Error estimates from the two halves of the samples, at powers of two and at the end; for path tracing only.
-    pub errors: Vec<SampleError>,
-}
-
-/// Progress of a picture.
-#[derive(Debug, Clone, Copy)]
-pub struct Progress {
-    /// Samples drawn.
-    pub done: u32,
-    /// Total number of samples, unless the target error stops earlier.
-    pub of: u32,
-    /// Error estimate of the picture after this sample, when one was made.
-    pub error: Option<SampleError>,
-}
-
-/// Work counts of a picture: the same on every device with the same BVH traversal.
-#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Work {
-    /// Reflection rays.
-    pub reflection: u64,
-    /// Refraction rays.
-    pub refraction: u64,
-    /// Shadow rays.
-    pub shadow: u64,
-    /// Rays of path tracing.
-    pub indirect: u64,
-    /// Visited BVH nodes.
-    pub node_visits: u64,
-    /// Ray/triangle tests.
-    pub triangle_tests: u64,
-    /// Exits from closed dielectric meshes that the path had not entered.
-    pub unmatched_exits: u64,
-    /// Estimates of paths with NaN or infinite radiance, which were discarded.
-    pub not_finite: u64,
-    /// The first discarded estimate.
-    pub first_not_finite: Option<NotFinite>,
-    /// Surfaces at which the loop over lights stopped early, because the driver would have ended it.
-    pub lights_cut_off: u64,
-    /// Light of truncated paths, summed over all pixels of all frames: the truncated share of a pixel's light, in parts of 65536.
-    pub lost: u64,
-    /// Share of a pixel's light in truncated paths: the mean over all pixels of the picture.
-    pub mean_lost: f64,
-    /// Share of a pixel's light in truncated paths: the largest of all pixels.
-    pub most_lost: f32,
-}
-
-/// Place of a NaN or infinite radiance.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct NotFinite {
-    /// Column and row of the pixel.
-    pub pixel: [u32; 2],
-    /// Index into the scene's materials.
-    pub material: u32,
-    /// Index of the surface along the path, counted from 1.
-    pub event: u32,
-}
-
-impl Work {
-    fn add(&mut self, counts: &share::WorkCounts) {
-        let sum = |[low, high]: [u32; 2]| u64::from(high) << 32 | u64::from(low);
-        self.reflection += sum(counts.reflection);
-        self.refraction += sum(counts.refraction);
-        self.shadow += sum(counts.shadow);
-        self.indirect += sum(counts.indirect);
-        self.node_visits += sum(counts.node_visits);
-        self.triangle_tests += sum(counts.triangle_tests);
-        self.unmatched_exits += sum(counts.unmatched_exits);
-        self.lights_cut_off += sum(counts.lights_cut_off);
-        self.lost += sum(counts.lost);
-        self.not_finite += u64::from(counts.not_finite);
-        if self.first_not_finite.is_none() && counts.not_finite > 0 {
-            self.first_not_finite = Some(NotFinite {
-                pixel: [counts.not_finite_pixel & 0xffff, counts.not_finite_pixel >> 16],
-                material: counts.not_finite_material,
-                event: counts.not_finite_event,
-            });
-        }
-        self.most_lost = self.most_lost.max(f32::from_bits(counts.most_lost));
-    }
-
-    /// The counts with `mean_lost` for a picture of this size and number of frames.
-    #[must_use]
-    pub fn of(mut self, [width, height]: [u32; 2], frames: u32) -> Self {
-        self.mean_lost = self.lost as f64 / 65536.0 / (f64::from(width) * f64::from(height) * f64::from(frames));
-        self
-    }
-
-    /// The sum of two counts.
-    #[must_use]
-    pub fn with(self, other: &Self) -> Self {
-        Self {
-            reflection: self.reflection + other.reflection,
-            refraction: self.refraction + other.refraction,
-            shadow: self.shadow + other.shadow,
-            indirect: self.indirect + other.indirect,
-            node_visits: self.node_visits + other.node_visits,
-            triangle_tests: self.triangle_tests + other.triangle_tests,
-            unmatched_exits: self.unmatched_exits + other.unmatched_exits,
-            not_finite: self.not_finite + other.not_finite,
-            first_not_finite: self.first_not_finite.or(other.first_not_finite),
-            lights_cut_off: self.lights_cut_off + other.lights_cut_off,
-            lost: self.lost + other.lost,
-            mean_lost: 0.0,
-            most_lost: self.most_lost.max(other.most_lost),
-        }
-    }
-}
 
 /// A scene on a device, ready to be rendered from any camera.
 pub struct Renderer {
@@ -345,138 +86,6 @@ pub struct Renderer {
     sets: [DescriptorSet; 2],
     /// Number of samples in the last picture so far, and in the complete picture.
     drawn: [u32; 2],
-}
-
-/// All resources whose size depends on the picture's.
-struct Targets {
-    ray_tiles: RayTiles,
-    gbuffer: GBuffer,
-    tiles: Tiles,
-    work: WorkLists,
-    lists: Option<FragmentLists>,
-    radiance: Image,
-    screen: OnScreen,
-    /// Sums of samples, when there is more than one. Path tracing sums even and odd samples separately: their random numbers
-    /// are independent, so the difference of the two means estimates the picture's error.
-    sums: Vec<Sum>,
-    /// Mean of the samples, when it is not one of the sums.
-    film: Option<Image>,
-    parts: Vec<PartOnDevice>,
-    paths: Option<PathsOnDevice>,
-    display: Display,
-}
-
-impl Targets {
-    fn new(device: &Arc<Device>, plan: &Plan, settings: &Settings, touching: bool) -> Result<Self> {
-        let size = settings.size;
-        let target = |name| {
-            let usage = vk::ImageUsageFlags::STORAGE;
-            Image::new(device, name, ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], usage))
-        };
-        let part = |&part: &Part| PartOnDevice::new(device, plan, &settings.knobs, part, size);
-        let sums = match (plan.samples, plan.paths) {
-            (1, _) if plan.bands == 0 => Vec::new(),
-            (1, _) | (_, None) => vec![Sum::new(device, "sum of samples", size, plan.samples, plan.bands)?],
-            (samples, Some(_)) => {
-                let half = |name: &str| Sum::new(device, name, size, samples.div_ceil(2), plan.bands);
-                vec![half("sum of even samples")?, half("sum of odd samples")?]
-            }
-        };
-        let is_sum = sums.is_empty() || (sums.len() == 1 && sums[0].is_plain());
-        Ok(Self {
-            ray_tiles: RayTiles::new(device, plan, size)?,
-            gbuffer: GBuffer::new(device, plan, size)?,
-            tiles: Tiles::new(device, plan, size)?,
-            work: WorkLists::new(device, size, settings.share)?,
-            lists: if plan.transparency { Some(FragmentLists::new(device, size)?) } else { None },
-            radiance: target("radiance")?,
-            screen: OnScreen::new(device, plan, size)?,
-            sums,
-            film: if is_sum { None } else { Some(target("film")?) },
-            parts: settings.parts.iter().map(part).collect::<Result<_>>()?,
-            paths: plan
-                .paths
-                .map(|paths| PathsOnDevice::new(device, paths, plan, touching, (size, settings.share)))
-                .transpose()?,
-            display: Display::new(device, size)?,
-        })
-    }
-}
-
-/// Sums of samples, as processes that render one picture together exchange them.
-#[derive(Debug, Clone)]
-pub struct Sums {
-    /// First sample, and one past the last.
-    pub samples: [u32; 2],
-    /// Sums of the samples: one, or one each of even and odd samples; then the sums of [`Settings::parts`].
-    pub sums: Vec<Picture>,
-    /// Work counts of the rays.
-    pub work: Work,
-    /// As [`Rendered::dropped`].
-    pub dropped: u32,
-}
-
-/// A picture in progress.
-pub struct Drawing {
-    /// Whether [`Device::interrupt`] may abandon a sample before it is added to the sum; the next step draws it again.
-    pub interruptible: bool,
-    view: View,
-    /// Index of the next sample, and of its next band.
-    next: [u32; 2],
-    count: u32,
-    /// First sample of the drawing; `end` is one past the last.
-    from: u32,
-    end: u32,
-    /// Whether the drawing is a part whose sums another process continues.
-    is_part: bool,
-    times: Times,
-    dropped: u32,
-    work: Work,
-    errors: Vec<SampleError>,
-    enough: bool,
-}
-
-impl Drawing {
-    fn new(view: View, count: u32) -> Self {
-        Self {
-            interruptible: false,
-            view,
-            next: [0, 0],
-            count,
-            from: 0,
-            end: count,
-            is_part: false,
-            times: Times::default(),
-            dropped: 0,
-            work: Work::default(),
-            errors: Vec::new(),
-            enough: false,
-        }
-    }
-
-    /// Number of completed samples.
-    #[must_use]
-    pub fn samples(&self) -> u32 {
-        self.next[0]
-    }
-
-    /// Samples per pixel of the complete picture.
-    #[must_use]
-    pub fn of(&self) -> u32 {
-        self.count
-    }
-
-    /// Whether all bands of the last sample are complete, and there is a sample.
-    #[must_use]
-    pub fn is_whole(&self) -> bool {
-        self.next[1] == 0 && self.next[0] > 0
-    }
-
-    /// Whether the drawing is complete.
-    #[must_use]
-    pub fn is_done(&self) -> bool {
-        self.enough || self.next[0] == self.end
-    }
 }
 
 impl Renderer {
@@ -982,7 +591,6 @@ impl Renderer {
     ///
     /// # Errors
     /// When the driver fails.
-    /// When the driver fails.
     pub fn passes(&mut self, camera: &Camera) -> Result<Vec<PassPlan>> {
         let count = self.plan.samples;
         let view = View::new(camera, self.settings.size, self.scene.bounds);
@@ -999,165 +607,6 @@ impl Renderer {
         Ok(passes)
     }
 
-    /// The scene-linear film of the last picture, over the background colour.
-    ///
-    /// # Errors
-    /// When the driver fails.
-    pub fn film(&self) -> Result<Picture> {
-        let mut picture = self.film_alone()?;
-        self.settings.background.lay_behind(&mut picture);
-        Ok(picture)
-    }
-
-    /// The film without a background colour, its coverage as alpha: the input of [`Settings::view_transform`].
-    ///
-    /// # Errors
-    /// When the driver fails.
-    pub fn film_alone(&self) -> Result<Picture> {
-        self.read(self.film_on_device())
-    }
-
-    /// The film on the device, for passes of other programs: linear RGBA in f32, without a background colour.
-    #[must_use]
-    pub fn film_on_device(&self) -> &Image {
-        let Targets { film, sums, radiance, .. } = &self.targets;
-        film.as_ref().or(sums.first().map(|sum| &sum.total)).unwrap_or(radiance)
-    }
-
-    /// A part of the film of the last picture; `None` unless [`Settings::parts`] names it. Its alpha is undefined.
-    ///
-    /// # Errors
-    /// When the driver fails.
-    pub fn part(&self, part: Part) -> Result<Option<Picture>> {
-        self.targets.parts.iter().find(|kept| kept.part == part).map(|kept| self.read(kept.film())).transpose()
-    }
-
-    /// The sum of `samples` samples in blocks of `block`, read back.
-    fn sum(&self, sum: &Sum, samples: u32, block: u32) -> Result<Picture> {
-        let mut images = sum.images(samples, block).into_iter().flatten();
-        let Some(first) = images.next() else { bail!("a sum of no samples was asked for: our mistake") };
-        let mut all = self.read(first)?;
-        for other in images {
-            let other = self.read(other)?;
-            for (sum, value) in all.rgba.iter_mut().flatten().zip(other.rgba.iter().flatten()) {
-                *sum += value;
-            }
-        }
-        Ok(all)
-    }
-
-    /// The sums of even and of odd samples, after `samples` of `count`.
-    fn half_sums(&self, samples: u32, count: u32) -> Result<[Picture; 2]> {
-        let (of_sums, block) = self.samples_of_sums(samples, count);
-        let sum = |half: usize| self.sum(&self.targets.sums[half], of_sums[half], block);
-        Ok([sum(0)?, sum(1)?])
-    }
-
-    /// Error estimate from the two halves after `samples` samples.
-    fn error(&self, samples: u32, count: u32) -> Result<SampleError> {
-        let [a, b] = self.half_sums(samples, count)?;
-        Ok(error_of_halves([&a.rgba, &b.rgba], samples))
-    }
-
-    /// The means of the two halves of the last picture's samples, over the background colour; `None` when there is one sum.
-    ///
-    /// # Errors
-    /// When the driver fails.
-    pub fn half_means(&self) -> Result<Option<[Picture; 2]>> {
-        let mut halves = self.half_means_alone()?;
-        halves.iter_mut().flatten().for_each(|half| self.settings.background.lay_behind(half));
-        Ok(halves)
-    }
-
-    /// The means of the two halves without a background colour, their coverage as alpha.
-    ///
-    /// # Errors
-    /// When the driver fails.
-    pub fn half_means_alone(&self) -> Result<Option<[Picture; 2]>> {
-        if self.halves() < 2 {
-            return Ok(None);
-        }
-        let [samples, count] = self.drawn;
-        let scale = 2.0 / samples as f32;
-        let mut halves = self.half_sums(samples, count)?;
-        halves.iter_mut().flat_map(|half| half.rgba.iter_mut().flatten()).for_each(|value| *value *= scale);
-        Ok(Some(halves))
-    }
-
-    fn write(&self, film: &Image, picture: &Picture) -> Result<()> {
-        let source = Buffer::with_data(&self.device, "staging", &picture.rgba)?;
-        let mut frame = Frame::new(&self.device);
-        frame.upload("upload sum", &source, film, 0, &[0]);
-        frame.finish().map(drop)
-    }
-
-    fn read(&self, film: &Image) -> Result<Picture> {
-        let [width, height] = self.settings.size;
-        let bytes = 16 * u64::from(width) * u64::from(height);
-        let target = Buffer::new(&self.device, "film read back", bytes, Place::Readback)?;
-        let mut frame = Frame::new(&self.device);
-        frame.download("read film", film, &target);
-        frame.read_back(&target);
-        frame.finish()?;
-        let rgba = target.read(|all| bytemuck::pod_collect_to_vec(&all[..bytes as usize]));
-        Ok(Picture { width, height, rgba })
-    }
-
-    /// The G-buffer at the pixel centres as AOVs, with the view whose eye `p_rel` is relative to.
-    ///
-    /// # Errors
-    /// When the driver fails.
-    pub fn aovs(&mut self, camera: &Camera) -> Result<(Vec<AovPixel>, View)> {
-        self.surfaces(camera, false)
-    }
-
-    /// Called-for pixels: for each material of the scene, the number of pixels whose nearest surface at the centre has it, transparent ones
-    /// included.
-    ///
-    /// # Errors
-    /// When the driver fails.
-    pub fn pixels_by_material(&mut self, camera: &Camera) -> Result<Vec<u64>> {
-        let (surfaces, _) = self.surfaces(camera, true)?;
-        let mut counts = Vec::new();
-        for material in surfaces.iter().filter_map(|pixel| (pixel.material as usize).checked_sub(1)) {
-            if counts.len() <= material {
-                counts.resize(material + 1, 0);
-            }
-            counts[material] += 1;
-        }
-        Ok(counts)
-    }
-
-    /// The surfaces at the pixel centres; with `all`, transparent surfaces, too.
-    fn surfaces(&mut self, camera: &Camera, all: bool) -> Result<(Vec<AovPixel>, View)> {
-        let [width, height] = self.settings.size;
-        let view = View::new(camera, self.settings.size, self.scene.bounds);
-        self.scene.set_view(&view);
-        self.scene.upload_band(None);
-        self.camera.write(bytemuck::bytes_of(&view.shared(jitter(0, 1))));
-        let mut frame = self.frame();
-        let mut draws = self.scene.draws(false, self.rays.inside());
-        if all {
-            draws.extend(self.scene.draws(true, self.rays.inside()));
-        }
-        gbuffer(&mut frame, &self.scene, &self.targets.gbuffer, 0.0, draws)?;
-        frame.finish()?;
-        // One readback holds as many rows as a storage buffer binding allows.
-        let row_bytes = u64::from(width) * size_of::<AovPixel>() as u64;
-        let rows = ((self.device.max_storage_bytes() / row_bytes) as u32).clamp(1, height);
-        let pixels = Buffer::new(&self.device, "AOVs", row_bytes * u64::from(rows), Place::Readback)?;
-        let mut all: Vec<AovPixel> = Vec::with_capacity(width as usize * height as usize);
-        for first in (0..height).step_by(rows as usize) {
-            let end = (first + rows).min(height);
-            let mut frame = self.frame();
-            aov(&mut frame, self.library(), &self.targets.gbuffer, &pixels, [first, end])?;
-            frame.finish()?;
-            let bytes = (row_bytes * u64::from(end - first)) as usize;
-            all.extend(pixels.read(|words| bytemuck::pod_collect_to_vec::<u8, AovPixel>(&words[..bytes])));
-        }
-        Ok((all, view))
-    }
-
     /// Figures of the BVH; `None` when the plan sends no rays.
     #[must_use]
     pub fn bvh(&self) -> Option<BvhFacts> {
@@ -1168,72 +617,5 @@ impl Renderer {
     #[must_use]
     pub fn device(&self) -> &Arc<Device> {
         &self.device
-    }
-
-    /// PNG bytes of a picture.
-    ///
-    /// # Errors
-    /// When encoding fails.
-    pub fn png(&self, rendered: &Rendered) -> Result<Vec<u8>> {
-        let [width, height] = self.settings.size;
-        png::encode_png(width, height, &rendered.display, rendered.has_alpha)
-    }
-}
-
-/// Tone maps a film that was rendered elsewhere, with these settings: RGBA8 (sRGB-encoded, rows from the top), whether it has
-/// transparency, and the counts of NaN, infinite and negative pixels. `spectral` marks a film of spectral rendering.
-///
-/// # Errors
-/// When the driver fails.
-pub fn shown(
-    device: &Arc<Device>,
-    film: &Picture,
-    settings: &Settings,
-    spectral: bool,
-) -> Result<(Vec<u8>, bool, Counts)> {
-    let size = [film.width, film.height];
-    let desc = ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], vk::ImageUsageFlags::STORAGE);
-    let image = Image::new(device, "film", desc)?;
-    let source = Buffer::with_data(device, "staging", &film.rgba)?;
-    let display = Display::new(device, size)?;
-    let mut frame = Frame::new(device);
-    frame.upload("upload film", &source, &image, 0, &[0]);
-    let (background, has_alpha) = display_background(settings);
-    let Settings { tonemap: curve, exposure, .. } = *settings;
-    tonemap(&mut frame, (&image, 1.0), &display, curve as u32, exposure, background, spectral)?;
-    frame.finish()?;
-    Ok((display.pixels.read(<[u8]>::to_vec), has_alpha, display.counts()?))
-}
-
-/// Display-linear colour behind the scene with alpha 1, or all 0; and whether the display output is transparent.
-fn display_background(settings: &Settings) -> ([f32; 4], bool) {
-    match settings.behind() {
-        Some(colour) => {
-            let [r, g, b] = colour.map(|light| light as f32);
-            ([r, g, b, 1.0], false)
-        }
-        None => ([0.0; 4], true),
-    }
-}
-
-/// Pass times summed by name, in order of first appearance.
-#[derive(Clone, Default)]
-struct Times {
-    order: Vec<String>,
-    sums: BTreeMap<String, f64>,
-}
-
-impl Times {
-    fn add(&mut self, passes: Vec<PassTime>) {
-        for PassTime { name, ms } in passes {
-            if !self.sums.contains_key(&name) {
-                self.order.push(name.clone());
-            }
-            *self.sums.entry(name).or_default() += ms;
-        }
-    }
-
-    fn list(self) -> Vec<PassTime> {
-        self.order.into_iter().map(|name| PassTime { ms: self.sums[&name], name }).collect()
     }
 }

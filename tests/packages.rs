@@ -82,7 +82,21 @@ fn every_crate_says_what_it_is() {
     }
 }
 
-/// The table of docs/tour.md: a crate stands below those that it uses.
+/// Arrows from each crate to those that it uses, as a Mermaid diagram; an arrow that a path of other arrows implies is left out.
+fn diagram(crates: &BTreeMap<&str, (&str, BTreeSet<&str>)>) -> String {
+    fn reaches(crates: &BTreeMap<&str, (&str, BTreeSet<&str>)>, from: &str, to: &str) -> bool {
+        crates[from].1.iter().any(|next| *next == to || reaches(crates, next, to))
+    }
+    let mut text = String::from("```mermaid\nflowchart TD\n");
+    for (name, (_, used)) in crates {
+        for to in used.iter().filter(|to| !used.iter().any(|other| reaches(crates, other, to))) {
+            text += &format!("    {name} --> {to}\n");
+        }
+    }
+    text + "```\n"
+}
+
+/// The table and the diagram of docs/tour.md: a crate stands below those that it uses.
 #[test]
 fn the_tour_shows_the_crates() {
     let metadata = metadata();
@@ -109,7 +123,9 @@ fn the_tour_shows_the_crates() {
             placed.insert(name);
         }
     }
-    says(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/tour.md"), "crates", &table);
+    let tour = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/tour.md");
+    says(&tour, "crates", &table);
+    says(&tour, "crate diagram", &diagram(&crates));
 }
 
 #[test]

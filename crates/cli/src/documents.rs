@@ -2,9 +2,14 @@
 //! `<!-- end -->`, and a test (`crates/cli/tests/documents.rs`) compares the block with what stands here.
 
 use std::fmt::Write as _;
+use std::sync::Arc;
 
-use etalon::gpu::{Access, Program};
-use etalon::plan::{EffectId, KNOBS, Knob};
+use anyhow::Result;
+use etalon::frame::Settings;
+use etalon::gpu::{Access, Device, Program};
+use etalon::open::Opened;
+use etalon::plan::rungs::Model;
+use etalon::plan::{EffectId, ForcedEffects, KNOBS, Knob, Knobs};
 use etalon::shader;
 use etalon::study;
 
@@ -118,6 +123,73 @@ fn exit_codes() -> String {
         let _ = writeln!(table, "| {code} | {meaning} |");
     }
     table
+}
+
+/// The first sentence of the comment that opens a program's shader: the last stage that has a file says what the pass computes.
+fn purpose(program: &Program) -> Option<(String, String)> {
+    ["comp", "frag", "vert"].into_iter().find_map(|stage| {
+        let name = format!("{}.{stage}", program.name);
+        let text = std::fs::read_to_string(format!("{}/pass/{name}", shader::SOURCES)).ok()?;
+        let opening: Vec<&str> = text.lines().map_while(|line| line.strip_prefix("// ")).collect();
+        let opening = opening.join(" ");
+        let end = opening.find(". ").unwrap_or(opening.len());
+        Some((name, opening[..end].to_owned()))
+    })
+}
+
+/// Frames with passes that no preset of a model draws: a study scene, a model, and a further option.
+const OTHER_FRAMES: &[(&str, Model, &str)] = &[
+    ("metals", Model::Recursive, "--set reflection=screen"),
+    ("nested", Model::Recursive, "--set refraction=screen"),
+    ("cornell", Model::Recursive, "--plan full"),
+];
+
+/// The passes of the study scenes' frames in their order, with the first frame that has each: those of path tracing, or all others.
+/// It draws nothing but what is drawn before the first sample (shadow maps).
+///
+/// # Errors
+/// When a scene does not fit the device, or the driver fails.
+pub fn passes(device: &Arc<Device>, of_paths: bool) -> Result<String> {
+    let models: &[Model] = if of_paths { &[Model::Global] } else { &[Model::Local, Model::Recursive] };
+    let presets = models.iter().flat_map(|model| study::NAMES.map(|name| (name, *model, "")));
+    // Pass, its rank among the passes of its name in one frame, columns of the shader, first frame.
+    let mut all: Vec<(String, usize, String, String)> = Vec::new();
+    for (scene, model, choice) in presets.chain(OTHER_FRAMES.iter().copied().filter(|_| !of_paths)) {
+        let mut settings = Settings { size: [32, 18], knobs: Knobs::of(model), ..Settings::default() };
+        match choice.strip_prefix("--set ") {
+            Some(choice) => settings.knobs.set(choice)?,
+            None if choice.is_empty() => {}
+            None => settings.forced = ForcedEffects::All,
+        }
+        let opened = Opened::load(&format!("study:{scene}"))?;
+        let camera = opened.camera(settings.size)?;
+        let mut renderer = opened.renderer(device, settings)?;
+        let mut next = 0;
+        let mut before: Vec<String> = Vec::new();
+        for pass in renderer.passes(&camera)? {
+            let rank = before.iter().filter(|name| **name == pass.name).count();
+            let again = before.last() == Some(&pass.name);
+            before.push(pass.name.clone());
+            // The next shadow map, or the next surface of the paths.
+            if again || (of_paths && rank > 0) {
+                continue;
+            }
+            let known = all.iter().position(|(name, of_name, ..)| *name == pass.name && *of_name == rank);
+            if known.is_none() {
+                let found = pass.pipelines.first().and_then(|(program, _)| purpose(program));
+                let about = found.map_or(" | ".to_owned(), |(file, about)| format!("`{file}` | {}", cell(&about)));
+                let model = format!("{model:?}").to_lowercase();
+                let frame = format!("study:{scene} --model {model} {choice}").trim_end().to_owned();
+                all.insert(next, (pass.name, rank, about, frame));
+            }
+            next = known.unwrap_or(next) + 1;
+        }
+    }
+    let mut table = String::from("| pass | shader | what it is | first frame that has it |\n|---|---|---|---|\n");
+    for (name, _, about, frame) in &all {
+        let _ = writeln!(table, "| {name} | {about} | `{frame}` |");
+    }
+    Ok(table)
 }
 
 /// What each program reads and writes, as the reflection of its SPIR-V has it.

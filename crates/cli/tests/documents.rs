@@ -6,6 +6,7 @@ use std::process::Command;
 
 use etalon_cli::documents;
 use etalon_testing::document::replaced;
+use etalon_testing::gpu::Gpu;
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().expect("the repository")
@@ -33,7 +34,10 @@ fn pages() -> Vec<(String, String)> {
 
 #[test]
 fn generated_tables_are_those_of_the_program() {
-    let blocks: BTreeMap<&str, String> = documents::blocks().into_iter().collect();
+    let mut blocks: BTreeMap<&str, String> = documents::blocks().into_iter().collect();
+    let device = &Gpu::open().device;
+    let passes = |of_paths| documents::passes(device, of_paths).expect("the passes of the study scenes");
+    blocks.extend([("passes", passes(false)), ("passes of path tracing", passes(true))]);
     let mut seen = BTreeSet::new();
     let mut old = Vec::new();
     for (page, text) in pages() {
