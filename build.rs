@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::{env, process};
 
-/// Specialization constants, separated by commas, whose code is not compiled: the baseline of `./x bench --bench price`.
+/// Specialization constants, separated by commas, whose code is not compiled: the baseline of
+/// `./x bench --bench price`.
 const WITHOUT: &str = "ETALON_WITHOUT";
 
 fn main() {

@@ -1,5 +1,5 @@
-//! Frame times of generated scenes and of knobs' rungs, interleaved so that drift of the machine hits all alike, printed
-//! as medians with their spread and as ratios to the first row of each group. `./x bench`.
+//! Frame times of generated scenes and of knobs' rungs, interleaved so that drift of the machine hits all alike,
+//! printed as medians with their spread and as ratios to the first row of each group. `./x bench`.
 
 use std::io::Write as _;
 use std::sync::Arc;

@@ -1,6 +1,6 @@
-//! What rays cost against the share of the picture that calls for them: a wall of 144 tiles of 80 pixels, of which none to
-//! all are mirrors of a scene behind the eye. Prints the passes' times, the straight line through them, and how far off it
-//! they are.
+//! What rays cost against the share of the picture that calls for them: a wall of 144 tiles of 80 pixels, of which none
+//! to all are mirrors of a scene behind the eye. Prints the passes' times, the straight line through them, and how far
+//! off it they are.
 //!
 //! `./x bench --bench mirrors`
 #![allow(missing_docs, clippy::print_stdout, reason = "a program whose figures go to standard output")]

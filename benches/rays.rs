@@ -1,8 +1,9 @@
-//! Rays per second of the traversal, beside Embree's rtcIntersect1 and rtcOccluded1 on as many threads in the same run, where
-//! Debian's libembree-dev and a C++ compiler are there. By the CPU time of the process over the number of threads: what other
-//! work on the machine does to wall time does not count.
+//! Rays per second of the traversal, beside Embree's rtcIntersect1 and rtcOccluded1 on as many threads in the same run,
+//! where Debian's libembree-dev and a C++ compiler are there. By the CPU time of the process over the number of
+//! threads: what other work on the machine does to wall time does not count.
 //!
-//! `./x bench --bench rays [-- FILE.glb ...]`; without files two generated scenes of 70 thousand and a million triangles.
+//! `./x bench --bench rays [-- FILE.glb ...]`; without files two generated scenes of 70 thousand and a million
+//! triangles.
 #![allow(missing_docs, clippy::print_stdout, reason = "a program whose figures go to standard output")]
 
 use std::f64::consts::TAU;

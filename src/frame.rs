@@ -1,9 +1,9 @@
 //! The renderer: the whole frame, one call per pass, top to bottom. Read `Renderer::sample` first.
 //!
-//! Read docs/frame.md; Real-Time Rendering (4th ed.), chapter 20 for deferred shading; pbrt (4th ed.), chapters 5 (film) and
-//! 13 (path tracing). A picture is the mean of samples; each sample is one [`Frame`] per band of wavelengths. The input is a
-//! [`Prepared`] scene: planned, with its BVH. `settings`, `targets`, `drawing`, `rendered` and `readback` are what the frame
-//! is drawn by, into, how far it is, what it comes with, and how the host gets it.
+//! Read docs/frame.md; Real-Time Rendering (4th ed.), chapter 20 for deferred shading; pbrt (4th ed.), chapters 5
+//! (film) and 13 (path tracing). A picture is the mean of samples; each sample is one [`Frame`] per band of
+//! wavelengths. The input is a [`Prepared`] scene: planned, with its BVH. `settings`, `targets`, `drawing`, `rendered`
+//! and `readback` are what the frame is drawn by, into, how far it is, what it comes with, and how the host gets it.
 
 mod drawing;
 mod readback;
@@ -104,7 +104,8 @@ impl Renderer {
         Self::of(device, prepared, environment, settings)
     }
 
-    /// Uploads a prepared scene and prefilters its environment; environment and settings must be those of the preparation.
+    /// Uploads a prepared scene and prefilters its environment; environment and settings must be those of the
+    /// preparation.
     ///
     /// # Errors
     /// When the size is out of range, the device lacks what the plan needs, or the scene does not fit the device.
@@ -262,8 +263,8 @@ impl Renderer {
         drawing
     }
 
-    /// Sample indices at which processes may split a picture so that their sums add up to those of one process: the first sample
-    /// of each block, and the number of all samples.
+    /// Sample indices at which processes may split a picture so that their sums add up to those of one process: the
+    /// first sample of each block, and the number of all samples.
     #[must_use]
     pub fn block_starts(&self) -> Vec<u32> {
         let (count, halves) = (self.plan.samples, self.halves());
@@ -271,8 +272,9 @@ impl Renderer {
         (0..count).step_by(block as usize).chain([count]).collect()
     }
 
-    /// Begins a part of a picture: samples `from` to before `end`, both from [`Renderer::block_starts`]. A part has sums that
-    /// other processes continue, but no picture. It continues from `known`, the sums of the samples before `from`.
+    /// Begins a part of a picture: samples `from` to before `end`, both from [`Renderer::block_starts`]. A part has
+    /// sums that other processes continue, but no picture. It continues from `known`, the sums of the samples before
+    /// `from`.
     ///
     /// # Errors
     /// When the driver fails.
@@ -418,15 +420,15 @@ impl Renderer {
         let TileShare { index: first, of } = self.settings.share;
         let camera = share::Camera { tiles: [first, of], ..view.shared(jitter(index, count)) };
         self.camera.write(bytemuck::bytes_of(&camera));
-        // The two halves of path tracing have independent random numbers, and so have the bands: their noise is uncorrelated
-        // and partly cancels in the sum.
+        // The two halves of path tracing have independent random numbers, and so have the bands: their noise is
+        // uncorrelated and partly cancels in the sum.
         let [at, half] = [index / self.halves(), index % self.halves()];
         let seed = self.settings.seed.wrapping_mul(2).wrapping_add(half).wrapping_add(band.wrapping_mul(0x9e37_79b9));
         self.rays.set_view(view, at, count, seed);
     }
 
-    /// Number of parts of each band in pictures with dispersion, a power of two: one for each sample of a half up to a limit,
-    /// which is low when rendering to a target error, so that the error can be estimated early.
+    /// Number of parts of each band in pictures with dispersion, a power of two: one for each sample of a half up to a
+    /// limit, which is low when rendering to a target error, so that the error can be estimated early.
     fn parts(&self, count: u32) -> u32 {
         let halves = self.halves();
         let limit = if self.settings.max_error.is_some() { PARTS_BEFORE_AN_END } else { MOST_PARTS };
@@ -468,7 +470,8 @@ impl Renderer {
     fn sample(&self, count: u32, band: u32) -> Result<Frame<'_>> {
         let Self { plan, scene, rays, targets, .. } = self;
         let Targets { gbuffer: g, tiles: lists_of_lights, work, lists, radiance, parts, screen, .. } = targets;
-        // Each of n samples per pixel stands for 1/n of the pixel's area, so the texture level of detail is biased by -log2(n)/2.
+        // Each of n samples per pixel stands for 1/n of the pixel's area, so the texture level of detail is biased by
+        // -log2(n)/2.
         let lod_bias = -0.5 * (count as f32).log2();
         let library = self.library();
         let Settings { size, share, .. } = self.settings;
@@ -586,8 +589,8 @@ impl Renderer {
         Ok(frame)
     }
 
-    /// The passes of a first picture from a camera, without drawing it: those before all samples, those of one sample, and those
-    /// after all samples. Pipelines are created where the driver reports statistics of them.
+    /// The passes of a first picture from a camera, without drawing it: those before all samples, those of one sample,
+    /// and those after all samples. Pipelines are created where the driver reports statistics of them.
     ///
     /// # Errors
     /// When the driver fails.

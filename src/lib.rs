@@ -1,8 +1,8 @@
 //! # Etalon: a Vulkan renderer
 //!
-//! Etalon reads glTF (and OBJ/MTL) and writes radiance: a raster G-buffer, deferred lighting, reflection and refraction by
-//! rays, or path tracing, then tone mapping. It is written directly against `ash`. The field's books are *Physically Based
-//! Rendering* (pbrt, fourth edition), *Real-Time Rendering* (fourth edition) and the Vulkan specification.
+//! Etalon reads glTF (and OBJ/MTL) and writes radiance: a raster G-buffer, deferred lighting, reflection and refraction
+//! by rays, or path tracing, then tone mapping. It is written directly against `ash`. The field's books are *Physically
+//! Based Rendering* (pbrt, fourth edition), *Real-Time Rendering* (fourth edition) and the Vulkan specification.
 //!
 //! ```text
 //! cli ─► viewer ─► cost ─► etalon      the program; a window; what rungs and effects cost
@@ -18,8 +18,8 @@
 //! This crate is the second line. The crates below it are re-exported here: [`gpu`] (`etalon-vulkan`), [`scene`]
 //! and [`study`] (`etalon-scene`), [`image`] (`etalon-image`), [`optics`] and [`spectra`] (`etalon-optics`).
 //!
-//! Start at [`frame::Renderer`]: its private `sample` is the whole frame, one call per pass, top to bottom. Then read one
-//! pass, its shader and its formulas:
+//! Start at [`frame::Renderer`]: its private `sample` is the whole frame, one call per pass, top to bottom. Then read
+//! one pass, its shader and its formulas:
 //!
 //! 1. [`pass::light`] names its inputs and outputs and records one dispatch;
 //! 2. `shaders/pass/light.comp` fetches, calls, stores;
@@ -33,23 +33,24 @@
 //! [`spectra`] has spectra of light and matter. [`scene::wavelengths`] turns a scene into the same scene in one band of
 //! wavelengths, and a frame draws one such band.
 //!
-//! A pass declares nothing by hand. build.rs (`etalon-reflect`) reads `readonly` and `writeonly` from the compiled GLSL and
-//! writes, per program, a module in [`shader`]: `PROGRAM` with the access of each binding, `Bind` with one named field per
-//! binding, `Constants`. [`gpu::Access`] is the one table that maps an access to Vulkan's stages, accesses and layouts.
-//! Structs of host and shaders are in [`share`]; a difference from the GLSL does not compile.
+//! A pass declares nothing by hand. build.rs (`etalon-reflect`) reads `readonly` and `writeonly` from the compiled GLSL
+//! and writes, per program, a module in [`shader`]: `PROGRAM` with the access of each binding, `Bind` with one named
+//! field per binding, `Constants`. [`gpu::Access`] is the one table that maps an access to Vulkan's stages, accesses
+//! and layouts. Structs of host and shaders are in [`share`]; a difference from the GLSL does not compile.
 //!
-//! [`plan::Plan`] is made before any Vulkan object from the scene's values and the [`plan::Knobs`]: a pass, an image or a
-//! piece of shader code exists only if the plan has it. [`prepare::Prepared`] is a scene with its plan and its BVH. [`scene`]
-//! reads untrusted files; [`study`] generates scenes without files; [`image`] stores and compares pictures. [`transport`] has
-//! the host's part of light transport: BVH, light sampling tables, photons for path guiding.
+//! [`plan::Plan`] is made before any Vulkan object from the scene's values and the [`plan::Knobs`]: a pass, an image or
+//! a piece of shader code exists only if the plan has it. [`prepare::Prepared`] is a scene with its plan and its BVH.
+//! [`scene`] reads untrusted files; [`study`] generates scenes without files; [`image`] stores and compares pictures.
+//! [`transport`] has the host's part of light transport: BVH, light sampling tables, photons for path guiding.
 //!
-//! Each formula of `shaders/lib/` with a tag `@eq` has a twin in [`optics`]: the same name, in f64, with an error bound. The
-//! crate `etalon-verify` runs the shader's formula on the device and compares.
+//! Each formula of `shaders/lib/` with a tag `@eq` has a twin in [`optics`]: the same name, in f64, with an error
+//! bound. The crate `etalon-verify` runs the shader's formula on the device and compares.
 //!
 //! Lengths are metres, the world is right-handed with +Y up. On the device positions are relative to the eye (`p_rel`);
 //! differences are computed in f64. Depth is reversed. `unsafe` is allowed in [`gpu`] only.
 //!
-//! The modules below are in reading order. `docs/tour.md` goes through them one by one, `docs/frame.md` through the passes.
+//! The modules below are in reading order. `docs/tour.md` goes through them one by one, `docs/frame.md` through the
+//! passes.
 
 pub mod open;
 

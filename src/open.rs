@@ -13,7 +13,7 @@ use crate::plan::Plan;
 use crate::prepare::{Original, Prepared};
 use crate::scene::camera::DEFAULT_FOV_Y;
 use crate::scene::environment::Environment;
-use crate::scene::{Camera, LoadOptions, Prune, Scene, Source};
+use crate::scene::{Camera, LoadOptions, Scene, Source};
 use crate::study;
 
 /// A scene, its environment, and a default camera. Clones share the large data.
@@ -50,6 +50,8 @@ pub struct Opened {
 pub fn scene(name: &str, options: &LoadOptions) -> Result<Scene> {
     match name.strip_prefix("study:") {
         Some(_) if options.time.is_some() => bail!("{name} has no animation: there is no time to draw it at"),
+        Some(_) if options.scene.is_some() => bail!("{name} is one scene: there is none to choose"),
+        Some(_) if options.variant.is_some() => bail!("{name} has no variants of its materials"),
         Some(study) => study::load(study),
         None => crate::scene::load(Path::new(name), options),
     }
@@ -59,10 +61,10 @@ pub fn scene(name: &str, options: &LoadOptions) -> Result<Scene> {
 ///
 /// # Errors
 /// As [`scene()`].
-pub fn source(name: &str, prune: Prune) -> Result<Source> {
+pub fn source(name: &str, options: LoadOptions) -> Result<Source> {
     match name.strip_prefix("study:") {
-        Some(study) => study::load(study).map(Source::still),
-        None => Source::open(Path::new(name), prune),
+        Some(_) => scene(name, &LoadOptions { time: None, ..options }).map(Source::still),
+        None => Source::open(Path::new(name), options),
     }
 }
 
@@ -84,8 +86,8 @@ impl Opened {
         Ok(Self::new(scene(name, &LoadOptions::default())?, Some(Environment::studio()), false))
     }
 
-    /// A scene in an environment. The environment lights the scene if it `is_asked_for`, if the scene has no lights, or if the
-    /// scene requests it.
+    /// A scene in an environment. The environment lights the scene if it `is_asked_for`, if the scene has no lights, or
+    /// if the scene requests it.
     #[must_use]
     pub fn new(scene: Scene, environment: Option<Environment>, is_asked_for: bool) -> Self {
         let warnings = scene.warnings.clone();

@@ -32,8 +32,8 @@ pub struct Conditions<'a> {
     pub background: bool,
 }
 
-/// A scene as it was read. Clones, and everything prepared from them, share its lists and the one BVH of its triangles, which
-/// is built when rays are first needed.
+/// A scene as it was read. Clones, and everything prepared from them, share its lists and the one BVH of its triangles,
+/// which is built when rays are first needed.
 #[derive(Debug, Clone, Default)]
 pub struct Original {
     scene: Scene,
@@ -62,7 +62,8 @@ impl Original {
         &self.scene
     }
 
-    /// The BVH of the scene's canonical form. Its triangles are those of every plan: a plan omits only textures and lights.
+    /// The BVH of the scene's canonical form. Its triangles are those of every plan: a plan omits only textures and
+    /// lights.
     ///
     /// # Errors
     /// When the scene has more triangles than a BVH holds.
@@ -236,8 +237,8 @@ impl Hierarchy {
     }
 }
 
-/// Warnings about degenerate triangles, and about coincident triangles of which only one is visible. Coincident interfaces of
-/// closed dielectric meshes are legitimate.
+/// Warnings about degenerate triangles, and about coincident triangles of which only one is visible. Coincident
+/// interfaces of closed dielectric meshes are legitimate.
 fn odd_triangles(scene: &Scene, bvh: &Bvh, solids: &Solids) -> Vec<String> {
     const MOST: usize = 4;
     let mut warnings = Vec::new();

@@ -1,6 +1,6 @@
-//! The programs of `shaders/pass/` as the build generates them: one module each with `PROGRAM`, `Bind`, `Constants`, `Push`;
-//! bindings and constants of each file of `shaders/lib/` ([`lib`], [`Library`]); and the tagged equations of `shaders/lib/`,
-//! each with a program that evaluates it.
+//! The programs of `shaders/pass/` as the build generates them: one module each with `PROGRAM`, `Bind`, `Constants`,
+//! `Push`; bindings and constants of each file of `shaders/lib/` ([`lib`], [`Library`]); and the tagged equations of
+//! `shaders/lib/`, each with a program that evaluates it.
 //!
 //! Read shaders/README.md and docs/equations.md.
 
@@ -54,8 +54,8 @@ pub struct Probe {
 }
 
 impl Probe {
-    /// An input as a 32-bit word for the program: the bits of a float, or an integer. Values out of range become the nearest
-    /// representable one.
+    /// An input as a 32-bit word for the program: the bits of a float, or an integer. Values out of range become the
+    /// nearest representable one.
     #[must_use]
     pub fn word(&self, column: usize, value: f64) -> u32 {
         if self.whole.contains(&self.inputs[column]) { value as u32 } else { (value as f32).to_bits() }

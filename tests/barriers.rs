@@ -1,5 +1,5 @@
-//! The barriers are needed: the same passes without them are reported as hazards by synchronization validation, and with
-//! them nothing is. Otherwise a validation that sees nothing would prove nothing.
+//! The barriers are needed: the same passes without them are reported as hazards by synchronization validation, and
+//! with them nothing is. Otherwise a validation that sees nothing would prove nothing.
 
 use ash::vk;
 use etalon::frame::TileShare;

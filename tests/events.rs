@@ -1,4 +1,4 @@
-//! What a pixel's ray meets, against what is known of plates, balls, metals and shadows.
+//! The events of a pixel's rays, compared with closed forms for plates, spheres, metals and shadows.
 
 use etalon::optics::fresnel::fresnel_dielectric;
 use etalon::prepare::Original;
@@ -65,7 +65,7 @@ fn a_plate_shifts_a_ray_and_shares_its_light() {
     assert!((out.share - (1.0 - reflected).powi(2)).abs() < 1e-6 && out.interaction.is_none());
     let (_, mirrored) = after(&events, Some(first), Way::Mirrored).expect("a mirror image");
     assert!(((mirrored.to - mirrored.from).normalize() - DVec3::new(0.6, 0.0, 0.8)).length() < 1e-6);
-    // Shares of what ends add up to all light but what is too little to be followed.
+    // The weights of all rays that end add up to 1, less the weight of rays below the cutoff.
     let ends = |index: usize| events.iter().all(|event| event.after != Some(index));
     let sum: f64 = events.iter().enumerate().filter(|(i, _)| ends(*i)).map(|(_, event)| event.share).sum();
     assert!(sum > 0.98 && sum <= 1.0 + 1e-9, "{sum}");
@@ -89,7 +89,7 @@ fn steep_rays_stay_inside() {
 }
 
 #[test]
-fn one_body_in_another_has_the_ratio_of_both() {
+fn nested_dielectrics_refract_by_the_ratio_of_their_indices() {
     let mut made = Made::new("nested");
     made.add(Shape::cuboid(DVec3::splat(4.0)), glass(1.3), at(0.0, 0.0, 0.0));
     made.add(Shape::cuboid(DVec3::splat(2.0)), glass(1.7), at(0.0, 0.0, 0.0));
@@ -106,9 +106,10 @@ fn one_body_in_another_has_the_ratio_of_both() {
     assert!(ratios.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6), "{ratios:?}");
 }
 
-/// Entered twice, left twice: where the second begins and the first ends nothing changes (shaders/lib/media.glsl).
+/// A ray enters twice and leaves twice. Where the second mesh begins and where the first ends, the medium does not
+/// change (shaders/lib/media.glsl).
 #[test]
-fn two_bodies_of_one_glass_that_overlap_are_one() {
+fn overlapping_meshes_of_one_glass_act_as_one() {
     let mut made = Made::new("overlap");
     made.add(Shape::cuboid(DVec3::splat(2.0)), glass(1.5), at(0.0, 0.0, 0.0));
     let second = Instance { world_from_object: at(0.1, 0.1, 1.0), ..made.0.instances[0].clone() };
@@ -177,7 +178,7 @@ fn a_sheet_tints_what_goes_straight_through() {
 }
 
 #[test]
-fn what_stands_before_a_light_is_told() {
+fn events_name_what_occludes_a_light() {
     let mut made = Made::new("shadow");
     made.add(Shape::cuboid(DVec3::new(8.0, 0.1, 8.0)), lambert([0.5; 3]), at(0.0, -0.05, 0.0));
     made.add(Shape::cuboid(DVec3::new(1.0, 0.1, 1.0)), lambert([0.5; 3]), at(0.0, 2.0, 0.0));

@@ -1,4 +1,4 @@
-//! The plan of what a scene calls for and the plan of everything give the same picture, to the last bit.
+//! The plan of a scene's effects and the plan of all effects give the same picture, to the last bit.
 
 use std::path::{Path, PathBuf};
 
@@ -38,7 +38,8 @@ fn draw(gpu: &Gpu, scene: &Scene, knobs: &Knobs, forced: ForcedEffects) -> (Pict
 /// Effects that no demand includes: each makes another picture, or one with other roundings, wherever it is.
 const APART: [&str; 3] = ["coincident interfaces", "spectral rendering", "dispersion"];
 
-/// Both plans of a scene as it was loaded for each. Everything is kept in the one but what a knob drops, and what stands apart.
+/// Both plans of a scene as it was loaded for each. Everything is kept in the one but what a knob drops, and what
+/// stands apart.
 fn is_the_same(gpu: &Gpu, name: &str, [lean, full]: [&Scene; 2], knobs: &Knobs) {
     let (planned, _) = draw(gpu, lean, knobs, ForcedEffects::None);
     let (everything, effects) = draw(gpu, full, knobs, ForcedEffects::All);
@@ -55,8 +56,8 @@ fn knobs(model: Model, choices: &[&str]) -> Knobs {
     knobs
 }
 
-/// Every `step`th study scene from one on. A full plan takes seconds to compile: each scene is drawn under some of the knobs, and all of
-/// them under several.
+/// Every `step`th study scene from one on. A full plan takes seconds to compile: each scene is drawn under some of the
+/// knobs, and all of them under several.
 fn studies(from: usize, step: usize, knobs: &Knobs) {
     let names: Vec<&str> = study::NAMES.iter().copied().skip(from).step_by(step).collect();
     some_studies(&names, knobs);
@@ -146,9 +147,9 @@ fn pair(ball: Material, panel: Material) -> Made {
     made
 }
 
-/// What one surface has is not seen on another: cases in which it once was.
+/// A property of one surface does not change another surface. Each case failed once.
 #[test]
-fn surfaces_leave_each_other_alone() {
+fn surfaces_do_not_affect_each_other() {
     let gpu = Gpu::hasty();
     let mirror = || Material { metallic: 1.0, roughness: 0.0, ..Material::default() };
     let glass = || Material { metallic: 0.0, roughness: 0.5, transmission: 1.0, thickness: 0.1, ..Material::default() };
@@ -159,7 +160,7 @@ fn surfaces_leave_each_other_alone() {
     // Occlusion is seen on mirror images of the screen, without light from all around too.
     let occluded = Material { occlusion_texture: Some(texture()), roughness: 0.1, ..mirror() };
     is_same("occlusion", &pair(lambert([0.5; 3]), occluded), &["reflection=screen", "shadows=off"]);
-    // How dense the texels of the second coordinates are is told by the first ones.
+    // The first texture coordinates decide the texel density of the second ones.
     let second = Material { base_color_texture: Some(TextureRef { uv_set: 1, ..texture() }), ..lambert([1.0; 3]) };
     let mut made = pair(second, mirror());
     made.0.meshes[0].uvs[1] = made.0.meshes[0].uvs[0].iter().map(|[u, v]| [9.0 * u, 9.0 * v]).collect();

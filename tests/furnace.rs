@@ -4,11 +4,11 @@ use etalon::study;
 use etalon_testing::furnace::{FurnaceRadiance, in_one_material, shown, whites};
 use etalon_testing::gpu::Gpu;
 
-/// Light that takes more than the 32 surfaces of a path to come out, of Lambert's 1: 0.8 % between the walls of `cornell`, 0.5 % in
-/// the glass of `nested`, measured with 256 samples; elsewhere less.
+/// Light that takes more than the 32 surfaces of a path to come out, of Lambert's 1: 0.8 % between the walls of
+/// `cornell`, 0.5 % in the glass of `nested`, measured with 256 samples; elsewhere less.
 const KEPT: f64 = 0.01;
-/// What rough metals may send beyond what they receive: the texels of their table are good to 6e-4 in the mean, its lines between
-/// them to 5e-4.
+/// What rough metals may send beyond what they receive: the texels of their table are good to 6e-4 in the mean, its
+/// lines between them to 5e-4.
 const TABLE: f64 = 1e-3;
 
 #[test]

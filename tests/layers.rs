@@ -1,4 +1,5 @@
-//! The order of the renderer's rooms, read from its sources: who may know whom. What crates may know of each other cargo says.
+//! The order of the renderer's rooms, read from its sources: who may know whom. What crates may know of each other
+//! cargo says.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -143,8 +144,8 @@ fn plain_data_knows_no_vulkan() {
     }
 }
 
-/// Types of one name in two crates: data and its place on the device, truth and what is judged by it, source and what it becomes. No
-/// further one may join them.
+/// Types of one name in two crates: data and its place on the device, truth and what is judged by it, source and what
+/// it becomes. No further one may join them.
 const OF_ONE_NAME: &[&str] = &[
     "Binding", "Column", "Compiled", "Display", "Drawn", "Equation", "Facts", "Format", "Grid", "Hit", "Image",
     "Instance", "Part", "Place", "Point", "Price", "Program", "Ray", "Shared", "Source", "Stage", "View", "ViewArgs",

@@ -1,6 +1,6 @@
 //! Radiance against closed forms: one light over one Lambert plane, where the answer is a line of algebra; many lights
-//! against an f64 sum over all of them (support/shade.rs), which finds a light that a tile's list lost; emitters; and the
-//! environment, inside which a white body must vanish.
+//! against an f64 sum over all of them (crates/testing/src/shade.rs), which finds a light that a tile's list lost;
+//! emitters; and the environment, inside which a white body must vanish.
 
 use std::f64::consts::PI;
 
@@ -31,8 +31,8 @@ fn on_wall(i: usize, size: [u32; 2]) -> DVec3 {
     DVec3::new((2.0 * x / w - 1.0) * w / h, 1.0 - 2.0 * y / h, 0.0)
 }
 
-/// Largest relative error of the film against `expected` per pixel, over the brightest expected value of a channel times
-/// `floor` where the expected value is smaller than that.
+/// Largest relative error of the film against `expected` per pixel, over the brightest expected value of a channel
+/// times `floor` where the expected value is smaller than that.
 fn worst(film: &Picture, floor: f64, expected: impl Fn(usize) -> DVec3) -> f64 {
     let all: Vec<DVec3> = (0..film.rgba.len()).map(expected).collect();
     let brightest = all.iter().fold(0.0_f64, |m, e| m.max(e.max_element()));
@@ -91,8 +91,8 @@ fn a_point_light_falls_with_the_square_of_the_distance_and_ends_at_its_range() {
                 assert!(film.rgba.iter().all(|p| p[..3] == [0.0; 3]), "range {range:?} at {z}");
                 continue;
             }
-            // The wall's depth is good to an ulp of 1 over a range of 40 m: 1.2e-6 m, and cosθ / r² has three powers of it;
-            // where the window closes it is a difference of ones, whose error is absolute and has four more.
+            // The wall's depth is good to an ulp of 1 over a range of 40 m: 1.2e-6 m, and cosθ / r² has three powers of
+            // it; where the window closes it is a difference of ones, whose error is absolute and has four more.
             let error = worst(&film, if range.is_some() { 1.0 } else { 0.01 }, expected);
             eprintln!("range {range:?}, height {z}: {error:e}");
             assert!(error < 2e-6 + 12e-6 / z, "range {range:?}, height {z}: {error:e}");
@@ -141,8 +141,8 @@ fn a_spot_has_a_squared_ramp_between_its_cones() {
             let (l, e) = etalon_testing::shade::incident(&light, on_wall(i, SIZE) * half_height);
             e * 0.5 / PI * l.z
         });
-        // The ramp's slope over cosθ is 1 / (cos inner − cos outer), and it is squared: twice that is what errors of cosθ
-        // grow by. These are 1.2e-6 m (see above) at 1.5 m times sinθ, and four roundings of half an ulp of 1.
+        // The ramp's slope over cosθ is 1 / (cos inner − cos outer), and it is squared: twice that is what errors of
+        // cosθ grow by. These are 1.2e-6 m (see above) at 1.5 m times sinθ, and four roundings of half an ulp of 1.
         let slope = 2.0 / (inner.cos() - outer.cos());
         eprintln!("{inner} to {outer}: {error:e}");
         assert!(error < 3e-6 + (8e-7 * outer.sin() + 2.4e-7) * slope, "{inner} to {outer}: {error:e}");
@@ -251,8 +251,8 @@ fn lists_of_lights_per_tile_lose_no_light() {
             }
             let error = against_all_lights(&gpu, &scene, orthographic, size);
             eprintln!("{count} lights, parallel {orthographic}: {error:e}");
-            // Grazing light is the worst: cosθ has an absolute error of 1.2e-7 (numerics.md 25) and pixels count from 1e-3
-            // of the brightest on, which is 1e-4.
+            // Grazing light is the worst: cosθ has an absolute error of 1.2e-7 (numerics.md 25) and pixels count from
+            // 1e-3 of the brightest on, which is 1e-4.
             assert!(error < 1e-4, "{count} lights, parallel {orthographic}: {error:e}");
         }
     }
@@ -380,13 +380,14 @@ fn ball(material: Material) -> Scene {
 }
 
 #[test]
-fn a_white_body_vanishes_in_a_white_furnace() {
+fn a_white_object_vanishes_in_a_white_furnace() {
     let gpu = Gpu::open();
     let radiance = [0.25_f32, 1.0, 3.0];
     let environment = Environment::constant(radiance);
     let mirror = Material { base_color: [1.0; 4], metallic: 1.0, roughness: 0.0, ..Material::default() };
     // A Lambert body: nine harmonics of a constant are one, c = L √(4π) π / √(4π); its constants have six digits in the
-    // shader: 0.282095 against 0.2820948 is 8e-7, and the coefficients sum 2048 terms and more. A mirror has F0 = F90 = 1 and no shadowing at roughness 0.01: the split sum's two factors add to one, to 1e-5.
+    // shader: 0.282095 against 0.2820948 is 8e-7, and the coefficients sum 2048 terms and more. A mirror has F0 = F90 =
+    // 1 and no shadowing at roughness 0.01: the split sum's two factors add to one, to 1e-5.
     for (name, material, bound) in [("Lambert", lambert([1.0; 3]), 4e-6), ("mirror", mirror, 2e-5)] {
         let (_, film) = gpu.shot(&ball(material), Some(&environment), settings(SIZE));
         let mut error = 0.0_f64;
@@ -401,8 +402,8 @@ fn a_white_body_vanishes_in_a_white_furnace() {
     }
 }
 
-/// A rough white metal loses to single scattering what `ggx-multi` gives back: its directional reflectance, A + B of the
-/// table, divides out to a rounding where F0 = F90 = 1.
+/// A rough white metal loses to single scattering what `ggx-multi` gives back: its directional reflectance, A + B of
+/// the table, divides out to a rounding where F0 = F90 = 1.
 #[test]
 fn a_rough_metal_is_dark_in_the_furnace_until_compensated() {
     let gpu = Gpu::open();
@@ -526,8 +527,8 @@ fn behind_the_scene_is_the_environment_turned_as_asked() {
             let y = 1.0 - 2.0 * ((i as u32 / SIZE[0]) as f64 + 0.5) / f64::from(SIZE[1]);
             let [right, up, forward] = view.axes;
             let d = (forward + right * (x * view.half.x) + up * (y * view.half.y)).normalize();
-            // The map turned by +θ about +Y shows at d what lies at d turned back: azimuth atan2(z, x) falls as +Y turns
-            // x towards −z, so turning back adds θ to it.
+            // The map turned by +θ about +Y shows at d what lies at d turned back: azimuth atan2(z, x) falls as +Y
+            // turns x towards −z, so turning back adds θ to it.
             let (sin, cos) = turn.sin_cos();
             let into_map = DVec3::new(cos * d.x - sin * d.z, d.y, sin * d.x + cos * d.z);
             let want = environment.sample(into_map);

@@ -1,5 +1,5 @@
-//! Rough mirrors by rays (knob `lobes`): the mean over the samples of a lobe is the integral of BRDF times cosine, worked
-//! out in f64 over the only thing that there is to be mirrored.
+//! Rough mirrors by rays (knob `lobes`): the mean over the samples of a lobe is the integral of BRDF times cosine,
+//! worked out in f64 over the only thing that there is to be mirrored.
 
 use etalon::frame::Settings;
 use etalon::optics::brdf;
@@ -76,8 +76,8 @@ fn settings(choices: &[&str]) -> Settings {
     settings
 }
 
-/// Compares the picture, pixel by pixel, with `expected` at each pixel's point. The samples of a pixel are random: it is
-/// their mean over all pixels that must agree, to four times the deviation that the pixels' own scatter gives it.
+/// Compares the picture, pixel by pixel, with `expected` at each pixel's point. The samples of a pixel are random: it
+/// is their mean over all pixels that must agree, to four times the deviation that the pixels' own scatter gives it.
 fn agrees(name: &str, surface: Material, choices: &[&str], expected: impl Fn(DVec3) -> [f64; 3]) {
     let gpu = Gpu::open();
     let scene = before_a_card(surface);
@@ -143,7 +143,7 @@ fn light_lost_to_single_scattering_is_given_back_to_rays() {
 
 /// What is rougher than the knob says sends no rays: without an environment nothing is mirrored.
 #[test]
-fn what_is_rougher_is_left_to_the_environment() {
+fn rougher_lobes_are_left_to_the_environment() {
     let gpu = Gpu::open();
     for (roughness, lobes, glows) in [(0.35, "lobes=0.2", false), (0.35, "lobes=0.5", true), (0.8, "lobes=0.5", false)]
     {
@@ -153,8 +153,8 @@ fn what_is_rougher_is_left_to_the_environment() {
     }
 }
 
-/// The table of directional reflectance at its edge: the roughest metal in a white furnace, without rays. The table's sum is
-/// good to 4e-3 (src/upload/environment.rs).
+/// The table of directional reflectance at its edge: the roughest metal in a white furnace, without rays. The table's
+/// sum is good to 4e-3 (src/upload/environment.rs).
 #[test]
 fn the_roughest_metal_loses_in_a_furnace_what_the_integral_says() {
     let gpu = Gpu::open();

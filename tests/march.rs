@@ -39,7 +39,7 @@ fn smoke(grid: SigmaGrid) -> Material {
     }
 }
 
-/// A grid over `bounds` whose values are told by point and channel.
+/// A grid over `bounds`; a function of point and channel gives its values.
 fn filled(
     size: [usize; 3],
     bounds: [DVec3; 2],
@@ -107,8 +107,8 @@ impl Body {
         (self.frame.matrix3.inverse().transpose() * outwards).normalize()
     }
 
-    /// The segment of a ray inside as it is marched, which starts `off` below the face that it enters by, and where the ray
-    /// starts behind, `off` outside of the other.
+    /// The segment of a ray inside as it is marched, which starts `off` below the face that it enters by, and where the
+    /// ray starts behind, `off` outside of the other.
     fn segment(&self, o: DVec3, d: DVec3, off: f64) -> Option<[DVec3; 3]> {
         let [near, _] = self.span(o, d)?;
         let p = o + d * near;
@@ -215,9 +215,9 @@ fn sums_are_those_of_f64_and_midpoints_are_exact_where_sigma_is_linear() {
 fn errors_fall_by_the_order_of_the_rule() {
     let gpu = Gpu::open();
     let size = [8, 6];
-    // e^(−10 z/m) over 0.6 m. Simpson's error is (h k)⁴/2880 of the integral, 5e-4 for 4 steps and 2e-6 for 16. Between its
-    // points the grid is linear, which any rule that looks at points only takes for the curve itself: (k/4096)² · 0.6²/12 =
-    // 2e-7 of the integral, and less than any error here.
+    // e^(−10 z/m) over 0.6 m. Simpson's error is (h k)⁴/2880 of the integral, 5e-4 for 4 steps and 2e-6 for 16. Between
+    // its points the grid is linear, which any rule that looks at points only takes for the curve itself: (k/4096)² ·
+    // 0.6²/12 = 2e-7 of the integral, and less than any error here.
     let (made, body) = slab(4097, 1, |depth, _| 8.0 * (-10.0 * depth).exp());
     for (rule, factor, steps) in
         [("left", 2.0, [8, 16, 32, 64]), ("midpoint", 4.0, [8, 16, 32, 64]), ("simpson", 16.0, [4, 8, 16, 0])]
@@ -240,8 +240,8 @@ fn errors_fall_by_the_order_of_the_rule() {
             .collect();
         eprintln!("{rule}: {errors:?} for {steps:?} steps");
         for pair in errors.windows(2) {
-            // Terms of the next order: (h k)² of 2.25 for 4 steps against coefficients that fall by 40. And places are good
-            // to 5e-8 m, which is 5e-7 of σ here.
+            // Terms of the next order: (h k)² of 2.25 for 4 steps against coefficients that fall by 40. And places are
+            // good to 5e-8 m, which is 5e-7 of σ here.
             let off = (pair[1] - pair[0] / factor).abs();
             assert!(off < 0.1 * pair[0] / factor + 5e-7, "{rule}: {errors:?}, {off:e}");
         }
@@ -290,7 +290,8 @@ fn a_constant_grid_is_a_homogeneous_medium() {
 
 // ---------------------------------------------------------------------------------------------------- places
 
-/// Bodies with rough grids of every kind: turned, mirrored, scaled unevenly; the last two are one mesh and one material.
+/// Bodies with rough grids of every kind: turned, mirrored, scaled unevenly; the last two are one mesh and one
+/// material.
 fn bodies(moved: DVec3) -> Vec<Body> {
     let mut random = Random(3);
     let bounds = [DVec3::new(-0.4, -0.3, -0.5), DVec3::new(0.3, 0.4, 0.25)];
@@ -314,7 +315,7 @@ fn bodies(moved: DVec3) -> Vec<Body> {
 }
 
 #[test]
-fn grids_stay_in_their_bodies_wherever_these_are() {
+fn grids_move_with_their_meshes() {
     let gpu = Gpu::open();
     let size = [96, 54];
     for (name, moved) in [("here", DVec3::ZERO), ("10 km away", DVec3::new(9e3, -2e3, 4e3))] {
@@ -394,7 +395,8 @@ fn light_that_passes_a_grid_is_weakened_along_its_own_way() {
     let size = [96, 54];
     let bounds = [DVec3::splat(-0.2), DVec3::splat(0.2)];
     let mut random = Random(5);
-    // Three bodies in a row: six surfaces, more than one traversal takes along. The light of the last picture is in one.
+    // Three bodies in a row: six surfaces, more than one traversal takes along. The light of the last picture is in
+    // one.
     let row: Vec<Body> = [0.35, 0.85, 1.4]
         .into_iter()
         .map(|height| {
@@ -465,9 +467,9 @@ fn light_that_passes_a_grid_is_weakened_along_its_own_way() {
     }
 }
 
-/// Facets of a ball part the lanes of a software device: its rays end at different times.
+/// The facets of a sphere make the lanes of a software device diverge: their rays end at different times.
 #[test]
-fn light_reaches_into_a_body_through_its_grid() {
+fn light_reaches_into_a_mesh_through_its_grid() {
     let gpu = Gpu::open();
     let size = [64, 48];
     let mut random = Random(9);

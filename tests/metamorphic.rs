@@ -65,7 +65,8 @@ fn ten_kilometres_away_it_looks_the_same() {
         for offset in [DVec3::new(1e4, 0.0, 0.0), DVec3::new(-7e3, 1e4, 3e3)] {
             let there = gpu.film(&at_scale(scene.clone(), 1.0, offset), settings(SIZE));
             // f64 keeps 1e-12 m at 10 km; a difference to the eye may round to the other f32 neighbour. Reflected light
-            // then changes by a few ulps, 1e-5 with the lobe's slope, and centres on outlines may fall to the other side.
+            // then changes by a few ulps, 1e-5 with the lobe's slope, and centres on outlines may fall to the other
+            // side.
             same_but_outlines(&here, &there, &scene, 1e-5, &format!("moved by {offset}"));
         }
     }
@@ -92,8 +93,8 @@ fn the_order_of_triangles_and_of_their_corners_does_not_show() {
         }
         let there = gpu.film(&turned, settings(SIZE));
         // The rasteriser interpolates from the first corner: normals may round to the next of the octahedron's, 3.7e-3
-        // degrees off (numerics.md 16); the lobe of the glossiest material (α = 0.04) has relative slopes to 1.5 / α per
-        // radian, which makes 2.4e-3. Texels round to half floats, 2^-11.
+        // degrees off (numerics.md 16); the lobe of the glossiest material (α = 0.04) has relative slopes to 1.5 / α
+        // per radian, which makes 2.4e-3. Texels round to half floats, 2^-11.
         same_but_outlines(&here, &there, &scene, 3e-3, "corners turned");
     }
 }

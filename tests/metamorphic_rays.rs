@@ -1,6 +1,6 @@
 //! What must not change a picture that rays make: units, place, the order of triangles and of lights, and which way the
-//! world is turned. Rays that have crossed many curved surfaces tell any rounding apart: there it is counted how many pixels
-//! differ.
+//! world is turned. Rays that have crossed many curved surfaces amplify any rounding: there it is counted how many
+//! pixels differ.
 
 use etalon::frame::Settings;
 use etalon::image::Picture;
@@ -40,8 +40,8 @@ fn compare(a: &Picture, b: &Picture, bound: f32, most: usize, what: &str) {
     assert!(many <= most, "{what}: {many} pixels differ by more than {bound:e}, {most} may");
 }
 
-/// A metre may be a micrometre or a thousand kilometres: every length is scaled exactly, and nothing in the passes has a
-/// length of its own.
+/// A metre may be a micrometre or a thousand kilometres: every length is scaled exactly, and nothing in the passes has
+/// a length of its own.
 #[test]
 fn powers_of_two_are_only_units() {
     let gpu = Gpu::open();
@@ -68,9 +68,9 @@ fn ten_kilometres_away_it_looks_the_same() {
     }
 }
 
-/// Another order of triangles is another tree with the same hits. But which triangles follow each other decides what is taken
-/// as one flat face, and rays from rough surfaces graze the other half of it: in the pool, whose parasol does that, 25
-/// pixels differ.
+/// Another order of triangles is another tree with the same hits. But which triangles follow each other decides what is
+/// taken as one flat face, and rays from rough surfaces graze the other half of it: in the pool, whose parasol does
+/// that, 25 pixels differ.
 #[test]
 fn the_order_of_triangles_does_not_show() {
     let gpu = Gpu::open();

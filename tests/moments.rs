@@ -7,7 +7,7 @@ use etalon::frame::{Renderer, Settings, TileShare};
 use etalon::open;
 use etalon::plan::{Knobs, Model};
 use etalon::scene::environment::Environment;
-use etalon::scene::{Camera, Prune, Scene, Source};
+use etalon::scene::{Camera, LoadOptions, Prune, Scene, Source};
 use etalon_testing::gpu::{Gpu, bits};
 
 fn settings(model: Model, samples: &str) -> Settings {
@@ -55,13 +55,13 @@ fn moments_of_an_animation_are_drawn_as_if_each_were_the_first() {
             eprintln!("skipped: {} is absent", path.display());
             continue;
         }
-        let source = Source::open(&path, Prune::Nothing).unwrap();
+        let source = Source::open(&path, LoadOptions { prune: Prune::Nothing, ..LoadOptions::default() }).unwrap();
         same_at_all_moments(&gpu, source, &[None, Some(0.2), Some(0.9)], &settings(model, samples));
     }
     assert_eq!(gpu.errors(), Vec::<String>::new());
 }
 
-/// Another plan, other lights, other textures: what is kept is what is the same.
+/// Another plan, other lights, other textures: the renderer keeps only the parts that do not change.
 #[test]
 fn what_has_nothing_in_common_is_drawn_anew() {
     let gpu = Gpu::open();

@@ -19,8 +19,8 @@ fn optics(size: [u32; 2], more: &[&str]) -> Settings {
     Settings { knobs: knobs(&[&rungs[..], more].concat()), ..settings(size) }
 }
 
-/// How far rays start off surfaces in a scene whose largest coordinate, counted from the middle of its box, is `extent`:
-/// 32 roundings of it, as shaders/lib/trace.glsl says.
+/// How far rays start off surfaces in a scene whose largest coordinate, counted from the middle of its box, is
+/// `extent`: 32 roundings of it, as shaders/lib/trace.glsl says.
 fn offset(extent: f64) -> f64 {
     32.0 * extent * 2.0_f64.powi(-24)
 }
@@ -91,8 +91,8 @@ fn a_plane_mirror_shows_what_a_mirrored_camera_sees() {
         let mut scene = patterns();
         let eye = DVec3::new(2.2, 0.4, 3.0);
         let camera = Camera { projection, ..looking(eye, DVec3::new(0.3, 0.0, 0.0)) };
-        // The mirror lies in z = 0, and the camera as it sees it behind. A reflected picture is a picture of the reflected
-        // frame with left and right exchanged.
+        // The mirror lies in z = 0, and the camera as it sees it behind. A reflected picture is a picture of the
+        // reflected frame with left and right exchanged.
         let m = camera.world_from_camera.matrix3;
         let flip = |v: DVec3| DVec3::new(v.x, v.y, -v.z);
         let frame = DMat3::from_cols(-flip(m.x_axis), flip(m.y_axis), flip(m.z_axis));
@@ -170,8 +170,8 @@ fn a_tilted_mirror_shows_every_place_where_it_is() {
         }
         eprintln!("tilt {tilt}: {worst:e} m over {compared} pixels");
         assert!(compared > 1000);
-        // The ray starts `offset` off along the normal and again towards the eye; along a reflected ray of slope up to 5
-        // that is as many times as far. Rounded directions add 1e-7 of 6 m.
+        // The ray starts `offset` off along the normal and again towards the eye; along a reflected ray of slope up to
+        // 5 that is as many times as far. Rounded directions add 1e-7 of 6 m.
         assert!(worst < 2.0 * offset(4.0) * 5.0 + 3e-6, "tilt {tilt}: {worst:e}");
     }
 }
@@ -203,8 +203,8 @@ fn a_slab_shifts_what_is_behind_it_sideways() {
             let want = straight - v.truncate().normalize() * (shift / cos_a);
             let (place, share) = on_card(pixel, 13.0);
             let (tan_a, tan_b) = (sin_a / cos_a, sin_a / n / cos_b);
-            // Behind each of the surfaces the ray starts `offset` further along the normal; the card's 13 m are read off
-            // from three rounded numbers.
+            // Behind each of the surfaces the ray starts `offset` further along the normal; the card's 13 m are read
+            // off from three rounded numbers.
             let bound = offset(6.5) * (tan_a + tan_b) + 13.0 * 2.0_f64.powi(-22) / (cos_a * cos_a);
             let error = (place - want).length();
             assert!(error < bound, "{d} m of {n} at {:.1}°: {error:e} m, {bound:e}", cos_a.acos().to_degrees());
@@ -249,9 +249,9 @@ fn a_glass_ball_maps_places_as_an_exact_sphere_does() {
         card(&mut made, 4.0, at(0.0, 0.0, far));
         made.camera(DVec3::new(0.1, 0.3, 3.0), DVec3::new(0.0, 0.0, 0.0), perspective(30.0));
         let film = gpu.film(&made.0, optics(size, &["interfaces=2"]));
-        // Normals at the corners are the directions from the middle, so those between them are so too, of the facet's own
-        // points: each facet refracts as a concentric sphere through its point would. A facet lies below the sphere by no
-        // more than the half diagonal of its cells says, √2/2 of π/rings.
+        // Normals at the corners are the directions from the middle, so those between them are so too, of the facet's
+        // own points: each facet refracts as a concentric sphere through its point would. A facet lies below the sphere
+        // by no more than the half diagonal of its cells says, √2/2 of π/rings.
         let low = radius * (std::f64::consts::FRAC_1_SQRT_2 * std::f64::consts::PI / f64::from(rings)).cos();
         let (mut worst, mut compared, mut used, mut sum) = (0.0_f64, 0, 0.0_f64, 0.0);
         for (i, &pixel) in film.rgba.iter().enumerate() {
@@ -355,8 +355,8 @@ fn snells_window_is_as_wide_as_the_critical_angle() {
         let i = y.floor() as usize * 160 + x.floor() as usize;
         bright.rgba[i][..3].iter().zip(&dark.rgba[i][..3]).any(|(a, b)| a - b > 1e-3)
     };
-    // Things stand in front of the rim here and there, in the water and above: where a path by Snell's law does not end at
-    // the sky all the way up to the rim, nothing can be measured.
+    // Things stand in front of the rim here and there, in the water and above: where a path by Snell's law does not end
+    // at the sky all the way up to the rim, nothing can be measured.
     let mut air = scene.clone();
     let is = |i: usize, name: &str| scene.materials[scene.meshes[scene.instances[i].mesh].material].name == name;
     air.instances =
@@ -474,8 +474,8 @@ fn a_wedge_absorbs_by_the_length_of_each_path() {
                 }
                 eprintln!("scale {scale}, {rung}, {fresnel}: {worst:e}, {inside} pixels, {least:.3} to {most:.3} m");
                 assert!(inside > 500 && least < 0.02 * scale && most > 0.4 * scale);
-                // The inner ray starts `offset` below the surface it enters by, up to 2 of that along the ray; the largest
-                // sigma is 1.2 per metre. With boxes of 2.9 m that is 1e-5; the plate moves the ray sideways by
+                // The inner ray starts `offset` below the surface it enters by, up to 2 of that along the ray; the
+                // largest sigma is 1.2 per metre. With boxes of 2.9 m that is 1e-5; the plate moves the ray sideways by
                 // as much again.
                 assert!(worst < if behind_plate { 2e-5 } else { 1e-5 }, "scale {scale}, {rung}, {fresnel}: {worst:e}");
             }
@@ -606,7 +606,8 @@ fn beyond_the_critical_angle_all_light_stays_inside() {
                 beyond += 1;
             } else if angle < critical - 1e-6 {
                 let want = fresnel_dielectric(d.y, 1.0 / f64::from(n))[0];
-                // Towards the critical angle F rises ever steeper: two roundings of the cosine count as much as it says.
+                // Towards the critical angle F rises ever steeper: two roundings of the cosine count as much as it
+                // says.
                 let beside =
                     [-1.2e-7, 1.2e-7].map(|e| (fresnel_dielectric(d.y + e, 1.0 / f64::from(n))[0] - want).abs());
                 let bound = 2e-6 * want + beside[0].max(beside[1]);
@@ -778,7 +779,7 @@ fn turned(x: f64, y: f64, z: f64, axis: DVec3, angle: f64) -> DAffine3 {
 }
 
 #[test]
-fn paths_through_bodies_in_one_another_are_those_of_the_media_that_win() {
+fn rays_through_nested_dielectrics_follow_the_medium_of_highest_priority() {
     let gpu = Gpu::open();
     let block = Body {
         frame: turned(0.0, 0.0, 0.0, DVec3::new(1.0, 2.0, 0.5), 0.4),
@@ -822,7 +823,7 @@ fn paths_through_bodies_in_one_another_are_those_of_the_media_that_win() {
 }
 
 #[test]
-fn bodies_of_one_index_are_one_body() {
+fn closed_meshes_of_equal_index_act_as_one() {
     let gpu = Gpu::open();
     let size = [80, 45];
     let (color, distance) = ([0.4, 0.7, 0.9_f32], 0.8);
@@ -895,8 +896,9 @@ fn lights() -> [LightKind; 3] {
 /// Half way to the lights.
 const BETWEEN: DVec3 = DVec3::new(1.75, 0.25, 1.5);
 
-/// The share of the light that arrives at each pixel of the wall, by the picture without shadows, against `want` in f64 at
-/// the point that the pixel shows. Points where that differs a tenth of a millimetre beside are left out; all must be few.
+/// The share of the light that arrives at each pixel of the wall, by the picture without shadows, against `want` in f64
+/// at the point that the pixel shows. Points where that differs a tenth of a millimetre beside are left out; all must
+/// be few.
 fn against_shares(gpu: &Gpu, made: &Made, bound: f64, want: impl Fn(DVec3, DVec3, f64) -> DVec3) -> [f64; 2] {
     let size = [128, 72];
     let film = gpu.film(&made.0, optics(size, &["shadows=ray"]));
@@ -934,7 +936,7 @@ fn against_shares(gpu: &Gpu, made: &Made, bound: f64, want: impl Fn(DVec3, DVec3
 }
 
 #[test]
-fn an_opaque_body_casts_its_shadow_where_f64_has_it() {
+fn an_opaque_object_casts_its_shadow_where_f64_has_it() {
     let gpu = Gpu::open();
     for kind in lights() {
         let mut made = lit_wall(kind);
@@ -967,7 +969,7 @@ fn an_opaque_body_casts_its_shadow_where_f64_has_it() {
 }
 
 #[test]
-fn coloured_sheets_and_bodies_colour_the_light_that_passes_them() {
+fn coloured_sheets_and_closed_meshes_colour_the_light_that_passes_them() {
     let gpu = Gpu::open();
     for kind in lights() {
         // A sheet: its colour once and one boundary's transmission.
@@ -1038,10 +1040,11 @@ fn light_passes_the_holes_of_a_mask() {
     }
 }
 
-// ---------------------------------------------------------------------------------------------------- what should not be
+// ---------------------------------------------------------------------------------------------------- what should not
+// be
 
-/// Everything white and clear in a room that shines with radiance 1 all around: each path ends there, so every pixel is 1
-/// less what was not followed.
+/// Everything white and clear in a room that shines with radiance 1 all around: each path ends there, so every pixel is
+/// 1 less what was not followed.
 fn in_a_furnace(gpu: &Gpu, made: &mut Made, fresnel: &str) -> (Rendered, Vec<String>, f64) {
     glowing_room(made, 8.0);
     let settings = optics([80, 45], &["interfaces=16", fresnel]);
@@ -1183,7 +1186,7 @@ fn turned_over_glass_looks_as_it_would_the_right_way_round() {
 }
 
 #[test]
-fn bodies_that_share_a_face_lose_no_light() {
+fn closed_meshes_with_a_common_face_lose_no_light() {
     let gpu = Gpu::open();
     for (name, gap, n) in
         [("touching", 0.0, [1.5, 1.333]), ("twins", -0.6, [1.5, 1.5]), ("far apart", 0.5, [1.5, 1.333])]
@@ -1202,7 +1205,8 @@ fn bodies_that_share_a_face_lose_no_light() {
 #[test]
 fn an_eye_on_the_glass_sees() {
     let gpu = Gpu::open();
-    // On the front face of a block, in its plane to the last bit, looking in, out and along it; and on an edge and a corner.
+    // On the front face of a block, in its plane to the last bit, looking in, out and along it; and on an edge and a
+    // corner.
     for (name, eye) in [
         ("on a face", DVec3::new(0.1, 0.2, 0.5)),
         ("on an edge", DVec3::new(0.1, 0.5, 0.5)),
@@ -1243,8 +1247,8 @@ fn what_is_not_followed_is_reported() {
         for (more, b) in &pictures[i..] {
             let (mut most, mut mean) = (0.0_f64, 0.0);
             for (p, q) in a.rgba.iter().zip(&b.rgba) {
-                // Nothing shines brighter than 1, and each mirror takes some: a branch that is not followed carries no more
-                // than its weight. None brings less than nothing.
+                // Nothing shines brighter than 1, and each mirror takes some: a branch that is not followed carries no
+                // more than its weight. None brings less than nothing.
                 let missing = (0..3).map(|c| f64::from(q[c]) - f64::from(p[c])).fold(0.0, f64::max);
                 assert!((0..3).all(|c| q[c] >= p[c] - 1e-6));
                 most = most.max(missing);
@@ -1302,7 +1306,7 @@ fn two_slabs_that_touch_shift_a_ray_as_both_do() {
 }
 
 #[test]
-fn two_bodies_of_one_index_that_touch_are_as_one() {
+fn coincident_interfaces_of_equal_index_vanish() {
     let gpu = Gpu::open();
     let picture = |cuts: &[f64], moved: DVec3| {
         let mut made = Made::new("cut");
@@ -1332,10 +1336,11 @@ fn two_bodies_of_one_index_that_touch_are_as_one() {
 }
 
 #[test]
-fn what_lies_against_a_body_is_seen_through_it() {
+fn what_touches_a_closed_mesh_is_seen_through_it() {
     let gpu = Gpu::open();
-    // A card right under a slab, as a glass stands on a table, and a little off it; the same with facets that are small beside
-    // the card's two; and two bodies, one in the other, with a common bottom on the card, or the inner one a little higher.
+    // A card right under a slab, as a glass stands on a table, and a little off it; the same with facets that are small
+    // beside the card's two; and two bodies, one in the other, with a common bottom on the card, or the inner one a
+    // little higher.
     for (name, size, inner) in [("slab", 1.0, false), ("small", 0.01, false), ("two", 1.0, true)] {
         let picture = |gap: f64| {
             let mut made = Made::new(name);
@@ -1403,7 +1408,7 @@ fn every_level_of_a_texture_is_read_where_it_lies() {
 }
 
 #[test]
-fn light_to_an_eye_inside_a_body_is_absorbed_on_its_way() {
+fn light_to_an_eye_inside_a_medium_is_absorbed() {
     let gpu = Gpu::open();
     let color = [0.3, 0.6, 0.9_f32];
     for (projection, moved) in [(perspective(60.0), 0.0), (orthographic(1.5), 900.0)] {
@@ -1514,8 +1519,8 @@ fn what_lies_behind_the_holes_of_masks_is_seen_in_mirrors() {
 #[test]
 fn a_light_behind_many_sheets_is_as_dark_beside_them_as_a_blocked_one() {
     let gpu = Gpu::open();
-    // Strips finer than a group of lanes, opaque and not, over eleven sheets: one lane is through at once, the next one goes
-    // on behind the fourth sheet and the eighth.
+    // Strips finer than a group of lanes, opaque and not, over eleven sheets: one lane is through at once, the next one
+    // goes on behind the fourth sheet and the eighth.
     let mut made = Made::new("comb");
     made.add(Shape::panel(20.0, 20.0), lambert([0.5; 3]), DAffine3::IDENTITY);
     let clear = Material { thickness: 0.0, specular: 0.0, base_color: [0.95, 0.95, 0.95, 1.0], ..glass(1.0) };

@@ -1,5 +1,5 @@
-//! What the crates promise those who depend on them, read from cargo: no window and no command line below the program, and the
-//! oldest compiler that a crate states is enough for all that it is built from.
+//! What the crates promise those who depend on them, read from cargo: no window and no command line below the program,
+//! and the oldest compiler that a crate states is enough for all that it is built from.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
@@ -82,7 +82,8 @@ fn every_crate_says_what_it_is() {
     }
 }
 
-/// Arrows from each crate to those that it uses, as a Mermaid diagram; an arrow that a path of other arrows implies is left out.
+/// Arrows from each crate to those that it uses, as a Mermaid diagram; an arrow that a path of other arrows implies is
+/// left out.
 fn diagram(crates: &BTreeMap<&str, (&str, BTreeSet<&str>)>) -> String {
     fn reaches(crates: &BTreeMap<&str, (&str, BTreeSet<&str>)>, from: &str, to: &str) -> bool {
         crates[from].1.iter().any(|next| *next == to || reaches(crates, next, to))

@@ -60,8 +60,8 @@ fn is_traced(material: &Material) -> bool {
     material.transmission > 0.0 || material.metallic > 0.0 || material.clearcoat > 0.0
 }
 
-/// The same scene where such surfaces are black, as far as `which` says so: what is left of the picture where the primary
-/// surface sends rays is its own light.
+/// The same scene where such surfaces are black, as far as `which` says so: what is left of the picture where the
+/// primary surface sends rays is its own light.
 fn without(scene: &Scene, which: impl Fn(&Material) -> bool) -> Scene {
     let mut scene = scene.clone();
     for material in &mut scene.materials {
@@ -73,8 +73,8 @@ fn without(scene: &Scene, which: impl Fn(&Material) -> bool) -> Scene {
     scene
 }
 
-/// Mirrors and glass, smooth and rough, before, beside and within each other, on a floor that an environment lights, behind
-/// a blended pane. The smooth metal emits some light of its own; what a coat covers would be weakened by it.
+/// Mirrors and glass, smooth and rough, before, beside and within each other, on a floor that an environment lights,
+/// behind a blended pane. The smooth metal emits some light of its own; what a coat covers would be weakened by it.
 fn crowd() -> Made {
     let mut made = Made::new("crowd");
     let mut random = etalon_testing::made::Random(5);
@@ -147,7 +147,7 @@ fn a_picture_is_the_sum_of_its_parts_and_what_is_left_without_rays() {
 
 /// Where bodies are laid over the picture of the opaque surfaces, what those mirror is bent and weakened with it.
 #[test]
-fn mirror_images_seen_through_bodies_on_the_screen_are_bent_with_the_picture() {
+fn screen_space_refraction_bends_mirror_images_with_the_picture() {
     let gpu = Gpu::open();
     let scene = crowd().0;
     for refraction in ["refraction=screen", "refraction=off"] {
@@ -256,7 +256,7 @@ fn direction(camera: &Camera, size: [u32; 2], i: usize) -> DVec3 {
 }
 
 #[test]
-fn a_mirror_has_no_refraction_and_a_body_of_nothing_no_reflection() {
+fn a_mirror_has_no_refraction_and_a_mesh_of_index_one_no_reflection() {
     let gpu = Gpu::open();
     for (material, part) in [(metal(0.0), 0), (glass(1.0), 1)] {
         let mut made = Made::new("one part");

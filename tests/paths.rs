@@ -1,5 +1,5 @@
-//! Paths of light against truth: furnaces, rooms whose light is known in closed form, and the same film whatever the order of
-//! the work.
+//! Paths of light against truth: furnaces, rooms whose light is known in closed form, and the same film whatever the
+//! order of the work.
 
 use etalon::frame::Settings;
 use etalon::image::Picture;
@@ -26,7 +26,7 @@ fn draw(gpu: &Gpu, scene: &Scene, environment: Option<&Environment>, settings: S
     gpu.shot(scene, environment, settings).1
 }
 
-/// Mean of a channel over a picture, its standard error as pixels tell it, and the largest value.
+/// Mean of a channel over a picture, its standard error estimated from the pixels, and the largest value.
 fn spread(picture: &Picture, channel: usize) -> [f64; 3] {
     let all: Vec<f64> = picture.rgba.iter().map(|pixel| f64::from(pixel[channel])).collect();
     let n = all.len() as f64;
@@ -48,7 +48,7 @@ fn white_metal(roughness: f32) -> Material {
     Material { metallic: 1.0, roughness, specular: 1.0, ..lambert([1.0; 3]) }
 }
 
-/// A matt floor a metre below a light with a shape, and what it must be: E/π times the floor's 0.5.
+/// A diffuse floor a metre below an area light, and its expected radiance: E/π times the albedo 0.5.
 fn under(light: Light, expected: f64) -> (Scene, f64) {
     let mut made = Made::new("floor");
     made.add(Shape::panel(0.02, 0.02), lambert([0.5; 3]), DAffine3::IDENTITY);
@@ -75,8 +75,8 @@ fn lights_with_a_shape_light_as_their_form_factors_say() {
     let face = |direction: DVec3| LightKind::Spot { position, direction, range: None, inner: right, outer: right };
     // π r²/(1 + r²) over the disk's area times its intensity.
     let disk = |r: f64| 2.0 / (1.0 + r * r);
-    // Of a rectangle before the middle of a plane, four quarters a by b (Howell, A Catalog of Radiation Heat Transfer Configuration
-    // Factors, B-3): E = L/2 (A atan(b/√(1 + a²)) + …), L = I/(4ab).
+    // Of a rectangle before the middle of a plane, four quarters a by b (Howell, A Catalog of Radiation Heat Transfer
+    // Configuration Factors, B-3): E = L/2 (A atan(b/√(1 + a²)) + …), L = I/(4ab).
     let rectangle = |a: f64, b: f64| {
         let (ra, rb) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
         let quarter = 0.5 * (a / ra * (b / ra).atan() + b / rb * (a / rb).atan());
@@ -111,9 +111,10 @@ fn lights_with_a_shape_light_as_their_form_factors_say() {
     }
 }
 
-/// However many places are looked for, the light is the same, and there is less noise; queues and one dispatch agree to the last bit.
+/// The number of light samples per vertex changes the noise and not the mean. Queues and one dispatch agree to the last
+/// bit.
 #[test]
-fn more_places_on_lights_are_the_same_light_with_less_noise() {
+fn more_light_samples_reduce_noise_and_keep_the_mean() {
     let gpu = Gpu::open();
     let mut scene = etalon::study::load("cornell").expect("a scene");
     scene.lights.clear();
@@ -121,7 +122,7 @@ fn more_places_on_lights_are_the_same_light_with_less_noise() {
     let mut means = Vec::new();
     for places in ["area:1", "area:4", "area:16"] {
         let rung = format!("lights={places}");
-        // One surface after the eye's: what N places tell apart is direct light.
+        // One bounce: only the noise of direct light depends on the number of light samples.
         let film = draw(&gpu, &scene, None, settings([32, 18], &["samples=16", "interfaces=1", &rung]));
         let halves = |k: usize| film.rgba.iter().map(|p| f64::from(p[k])).collect::<Vec<_>>();
         let green = halves(1);
@@ -164,7 +165,7 @@ fn shapes_cast_soft_shadows() {
 }
 
 #[test]
-fn nothing_white_shows_before_light_from_everywhere() {
+fn white_objects_vanish_in_a_furnace_of_paths() {
     let gpu = Gpu::open();
     let sky = Environment::constant([1.0; 3]);
     let glass =
@@ -226,7 +227,7 @@ fn parallel_squares(distance: f64) -> Scene {
 }
 
 #[test]
-fn squares_light_each_other_by_their_form_factor() {
+fn squares_exchange_light_by_their_form_factor() {
     let gpu = Gpu::open();
     // Of parallel unit squares at a distance of 1, 0.5 and 2 (Howell, catalogue of configuration factors, C-11).
     let form_factor = |c: f64| {
@@ -249,7 +250,7 @@ fn squares_light_each_other_by_their_form_factor() {
 }
 
 #[test]
-fn a_bright_spot_of_the_sky_is_found() {
+fn a_bright_spot_of_the_environment_is_sampled() {
     let gpu = Gpu::open();
     let mut sky = Environment::constant([0.2; 3]);
     (sky.width, sky.height) = (64, 32);
@@ -304,8 +305,8 @@ fn light_from_points_and_from_afar_is_what_the_local_model_says() {
     }
 }
 
-/// A matt floor that a lamp beside it lights only by way of a mirror above both: the lamp sends upwards. Its mirror image is a
-/// rectangle at 1.5 m.
+/// A matt floor that a lamp beside it lights only by way of a mirror above both: the lamp sends upwards. Its mirror
+/// image is a rectangle at 1.5 m.
 fn by_a_mirror() -> (Made, f64) {
     let mut made = Made::new("by a mirror");
     made.add(Shape::panel(0.02, 0.02), lambert([0.5; 3]), DAffine3::IDENTITY);
@@ -314,7 +315,8 @@ fn by_a_mirror() -> (Made, f64) {
     let down = DAffine3::from_translation(DVec3::Z) * DAffine3::from_rotation_x(std::f64::consts::PI);
     made.add(Shape::panel(6.0, 6.0), Material { double_sided: false, ..white_metal(0.0) }, down);
     made.front(0.008);
-    // Of a parallel rectangle with a corner on the normal (Howell, B-3), and a difference of two such.
+    // The form factor of a parallel rectangle with a corner on the normal (Howell, B-3), and the difference of two of
+    // them.
     let corner = |x: f64, y: f64| {
         let (a, b) = (x / 1.5, y / 1.5);
         let (ra, rb) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
@@ -325,7 +327,7 @@ fn by_a_mirror() -> (Made, f64) {
 }
 
 #[test]
-fn aims_take_the_noise_and_leave_the_mean() {
+fn path_guiding_reduces_noise_and_keeps_the_mean() {
     let gpu = Gpu::open();
     let (made, radiance) = by_a_mirror();
     let [off, aims] = ["guiding=off", "guiding=photons"].map(|guiding| {
@@ -340,7 +342,7 @@ fn aims_take_the_noise_and_leave_the_mean() {
 }
 
 #[test]
-fn aims_are_where_light_is_mirrored() {
+fn guiding_spheres_lie_where_light_is_mirrored() {
     let (made, _) = by_a_mirror();
     let scene = &made.0;
     let bvh = Bvh::build(scene).expect("a hierarchy");
@@ -359,7 +361,8 @@ fn aims_are_where_light_is_mirrored() {
         // A cell and its neighbours see no more of the mirror in which the lamp is than this.
         assert!((ball.middle - seen).abs().max_element() < 0.2 + 3.0 * aims.cell, "{ball:?}, not near {seen}");
     }
-    // Without a mirror light comes from nowhere but the lamp: where it is rough, and where it is smooth without a reflectance.
+    // Without a mirror light comes from nowhere but the lamp: where it is rough, and where it is smooth without a
+    // reflectance.
     let not_mirrors: [fn(&mut Material); 2] = [|m| m.roughness = 1.0, |m| (m.metallic, m.specular) = (0.0, 0.0)];
     for change in not_mirrors {
         let mut matt = made.0.clone();
@@ -402,7 +405,7 @@ fn what_lies_behind_tinted_glass_is_weakened_in_alpha() {
 }
 
 #[test]
-fn what_emits_lights_only_where_a_knob_says_so() {
+fn emissive_surfaces_are_lights_only_where_a_knob_says_so() {
     let gpu = Gpu::open();
     let scene = parallel_squares(1.0);
     let picture = draw(&gpu, &scene, None, settings([8, 8], &["samples=4", "lights=points"]));
@@ -418,7 +421,7 @@ fn what_emits_lights_only_where_a_knob_says_so() {
 }
 
 #[test]
-fn a_lamp_is_drawn_by_its_power_and_the_sky_where_it_is_bright() {
+fn lights_are_sampled_by_power_and_the_environment_by_radiance() {
     let scene = etalon::study::load("cornell").unwrap();
     let emitters = Emitters::of(&scene, None, true);
     // The point light, which the plan takes out, and the two triangles of the panel, 1.3 m by 1.05 m of radiance 12.
@@ -436,7 +439,8 @@ fn a_lamp_is_drawn_by_its_power_and_the_sky_where_it_is_bright() {
     let share = |row: usize| sky.words[row + 1].wrapping_sub(sky.words[row]);
     assert!(share(63) > 1 << 30 && share(64) > 1 << 30 && share(65) > 1 << 30);
     assert!((0..63).chain(66..255).all(|row| share(row) == 1));
-    // Directions lie around it, and turn as what is seen of it does: into the environment by the angle, out of it back.
+    // Sampled directions lie around the bright spot. They turn with the environment: by the angle into it, and back out
+    // of it.
     let cell = std::f64::consts::PI / 256.0;
     for rotation in [0.0_f32, 50.0] {
         let sky = Emitters::of(&Scene::default(), around(&map, rotation), true).environment;

@@ -1,5 +1,5 @@
-//! What must hold of the shaders' formulas together, on the device: energy, reciprocity, Snell's law there and back, the
-//! furnace, and the lecture's quiz.
+//! What must hold of the shaders' formulas together, on the device: energy, reciprocity, Snell's law there and back,
+//! the furnace, and the lecture's quiz.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

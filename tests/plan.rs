@@ -1,5 +1,5 @@
-//! What a scene does not call for is not there, and nothing is missed: the same scene with a surface that calls for it, out
-//! of sight, is planned with it and gives the same picture to the last bit.
+//! A plan has no pass or buffer that its scene does not call for, and the picture does not change: a hidden surface
+//! that calls for an effect adds the effect to the plan, and the picture is the same to the last bit.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -91,8 +91,8 @@ struct Case {
     scenes: [Made; 2],
     environments: [Option<Environment>; 2],
     choices: &'static [&'static str],
-    /// What it brings: `image or buffer`, `[pass]`, `program`, `program.constant`; nothing else may come or go. Programs
-    /// that are new bring their constants.
+    /// What it brings: `image or buffer`, `[pass]`, `program`, `program.constant`; nothing else may come or go.
+    /// Programs that are new bring their constants.
     brings: &'static [&'static [&'static str]],
     /// The pictures are the same to the last bit: what calls for the effect cannot be seen.
     same: bool,
@@ -167,7 +167,7 @@ const TILES: &[&str] = &[
     "[reset ray work size]",
     "classify_rays",
 ];
-/// Lists of what is laid over the picture.
+/// Buffers of the per-pixel fragment lists.
 const FRAGMENTS: &[&str] = &[
     "dropped fragments",
     "empty fragment work size",
@@ -318,9 +318,9 @@ fn light_from_all_around_is_there_where_it_is_seen() {
     assert!(bytes(&without) < 1000 && bytes(&with) > 1_000_000, "{}, {}", bytes(&without), bytes(&with));
 }
 
-/// No photon reaches what is hidden: aims are there, and nothing is aimed at.
+/// The scene calls for path guiding, so its buffers exist; no photon reaches the hidden mirror, so they hold no sphere.
 #[test]
-fn aims() {
+fn path_guiding_brings_its_tables() {
     Case {
         choices: &["indirect=path", "lights=area:1", "guiding=photons"],
         brings: &[&["guiding spheres", "guiding cells", "path.path_guiding"]],
@@ -435,8 +435,8 @@ fn lights_are_there_where_something_is_lit() {
     .check();
 }
 
-/// Neither mirrors nor scattered light are needed for what is seen through glass: all that enters a ball leaves it, which at
-/// the middle is 1 − F0 of a white environment; the rest is mirrored.
+/// Neither mirrors nor scattered light are needed for what is seen through glass: all that enters a ball leaves it,
+/// which at the middle is 1 − F0 of a white environment; the rest is mirrored.
 #[test]
 fn glass_shows_the_environment_whatever_surfaces_do() {
     let environment = Environment::constant([1.0; 3]);
@@ -550,8 +550,8 @@ fn lights_out_of_range_are_no_lights() {
     assert_eq!(draw(&touching.0, None, &[]).plan.local_lights, 1);
 }
 
-/// What alpha says by its values: a surface that blends with an alpha of 1 is planned and drawn as an opaque one, one with 0
-/// as none.
+/// What alpha says by its values: a surface that blends with an alpha of 1 is planned and drawn as an opaque one, one
+/// with 0 as none.
 #[test]
 fn alpha_calls_for_what_it_does() {
     let environment = Environment::studio();

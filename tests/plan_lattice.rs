@@ -1,5 +1,6 @@
 //! Every plan once: tiny scenes for all ways in which lights are looked for, surfaces mirror and let light through, and
-//! everything else so spread over them that any two things meet. Each is drawn under core and synchronization validation.
+//! everything else so spread over them that any two things meet. Each is drawn under core and synchronization
+//! validation.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
@@ -358,8 +359,8 @@ fn draw_all(share: &str) {
     for (i, (ways, choice)) in spread().iter().enumerate().filter(|(_, (ways, _))| ways.shadows == share) {
         let (plan, film) = drawn(&gpu, ways, choice, ForcedEffects::None, false);
         assert_eq!(Ways::of(&plan), *ways, "{choice:?}: {:#?}", plan.effects);
-        // The pictures of everything take as long again: a sixth of them. All 144 were compared once: 143 were the same to the
-        // last bit, one differed in one pixel by two roundings, with no single effect at fault.
+        // The pictures of everything take as long again: a sixth of them. All 144 were compared once: 143 were the same
+        // to the last bit, one differed in one pixel by two roundings, with no single effect at fault.
         if i % 6 == 0 {
             let (_, full) = drawn(&gpu, ways, choice, ForcedEffects::All, false);
             let named: Vec<_> = FACTORS.iter().zip(choice).map(|(f, &c)| (f.name, f.levels[c])).collect();
@@ -502,8 +503,8 @@ fn needs(a: &str, b: &str) -> bool {
     a == b || NEEDS.iter().any(|(x, y)| *x == a && needs(y, b))
 }
 
-/// Every effect is kept in some plan and not called for in another, and any two are kept together, and each without the other
-/// unless it needs it.
+/// Every effect is kept in some plan and not called for in another, and any two are kept together, and each without the
+/// other unless it needs it.
 #[test]
 fn any_two_effects_are_kept_together_and_apart() {
     let mut states: BTreeMap<&'static str, BTreeSet<&'static str>> = BTreeMap::new();
@@ -544,7 +545,7 @@ const OF_PATHS: [&str; 5] =
 /// Effects of another rung of `colour`: tests/spectra.rs has them.
 const OF_WAVELENGTHS: [&str; 2] = ["spectral rendering", "dispersion"];
 
-/// Every other effect but the one that only the hierarchy of triangles tells.
+/// Every other effect, except the one that only the hierarchy of triangles decides.
 const NAMES: [&str; 22] = [
     "absorption",
     "alpha test in rays",

@@ -1,7 +1,7 @@
 //! The G-buffer against an independent oracle: every pixel of several scenes is traced in f64 on the CPU
-//! (support/raycast.rs), and what the rasteriser stored there must be the same surface, at the same place, with the same
-//! normals, ids and material numbers. Pixels next to an edge of the picture's content are left to the coverage test,
-//! which lets hit and miss disagree there and nowhere else.
+//! (crates/testing/src/raycast.rs), and what the rasteriser stored there must be the same surface, at the same place,
+//! with the same normals, ids and material numbers. Pixels next to an edge of the picture's content are left to the
+//! coverage test, which lets hit and miss disagree there and nowhere else.
 
 use etalon::frame::Settings;
 use etalon::plan::is_transparent;
@@ -81,8 +81,8 @@ fn compare_stored(gpu: &Gpu, scene: &Scene, camera: &Camera, stored: &[&str]) ->
         let vector = |v: [f32; 3]| Vec3::from(v).as_dvec3();
         worst.position = worst.position.max((vector(got.p_rel) + view.eye).distance(want.position) / scale);
         worst.distance = worst.distance.max((f64::from(got.distance) - want.distance).abs() / scale);
-        // Rasterisers snap vertices to 1/256 of a pixel, so a centre that close to the border of two facets may belong to
-        // either: the nearest of the facets within 1/128 of a pixel counts.
+        // Rasterisers snap vertices to 1/256 of a pixel, so a centre that close to the border of two facets may belong
+        // to either: the nearest of the facets within 1/128 of a pixel counts.
         let normal = vector(got.geometric_normal);
         let mut angle = degrees(normal, want.geometric_normal);
         if angle > 0.02 {
@@ -115,12 +115,13 @@ fn compare_stored(gpu: &Gpu, scene: &Scene, camera: &Camera, stored: &[&str]) ->
     worst
 }
 
-/// What is promised, away from edges. Positions come from an f32 depth and an f32 ray: a few ulps of the distance, which
-/// is a few scene sizes; the plane of depth through a triangle is a quotient by its area, so the slivers at a ball's pole
-/// cost ten times more: 1e-5. Interpolated normals are good to f32 and stored as octahedra of 2 x 16 bits, whose rounding
-/// is at most 3.7e-3 degrees (numerics.md 16). The face normal is a difference of neighbouring positions: an ulp of the
-/// distance over the width of a pixel, 2^-23 / (0.7 rad / 90) = 9e-4 degrees, some of these beside the octahedron's.
-/// The base colour of what has no texture is not computed with: equal bits, asserted where it is seen.
+/// What is promised, away from edges. Positions come from an f32 depth and an f32 ray: a few ulps of the distance,
+/// which is a few scene sizes; the plane of depth through a triangle is a quotient by its area, so the slivers at a
+/// ball's pole cost ten times more: 1e-5. Interpolated normals are good to f32 and stored as octahedra of 2 x 16 bits,
+/// whose rounding is at most 3.7e-3 degrees (numerics.md 16). The face normal is a difference of neighbouring
+/// positions: an ulp of the distance over the width of a pixel, 2^-23 / (0.7 rad / 90) = 9e-4 degrees, some of these
+/// beside the octahedron's. The base colour of what has no texture is not computed with: equal bits, asserted where it
+/// is seen.
 fn check(worst: &Worst, name: &str) {
     eprintln!("{name}: {worst:?}");
     assert!(worst.compared * 3 > worst.edges && worst.compared > 300, "{name}: nearly nothing was compared: {worst:?}");
@@ -134,7 +135,7 @@ fn check(worst: &Worst, name: &str) {
 }
 
 #[test]
-fn study_scenes_are_where_the_rays_find_them() {
+fn the_gbuffer_of_study_scenes_agrees_with_ray_casts() {
     let gpu = Gpu::open();
     for name in ["etalon", "materials", "cornell", "metals", "lamps"] {
         let scene = study::load(name).expect("a study scene");
@@ -142,10 +143,11 @@ fn study_scenes_are_where_the_rays_find_them() {
     }
 }
 
-/// Octahedra of 2 x n bits are off by at most 0.95°, 0.059° and 0.0037° (numerics.md 16), and by no less than a third of that
-/// somewhere on a ball; as floats normals are as good as they are interpolated (2e-4°), and stored positions as depth's.
+/// Octahedra of 2 x n bits are off by at most 0.95°, 0.059° and 0.0037° (numerics.md 16), and by no less than a third
+/// of that somewhere on a ball; as floats normals are as good as they are interpolated (2e-4°), and stored positions as
+/// depth's.
 #[test]
-fn what_is_stored_in_fewer_bits_is_off_by_as_much() {
+fn quantised_values_are_off_by_their_quantisation_error() {
     let gpu = Gpu::open();
     let scene = study::load("materials").expect("a study scene");
     let worst = |rung| compare_stored(&gpu, &scene, &scene.cameras[0], &[rung]);
@@ -161,8 +163,9 @@ fn what_is_stored_in_fewer_bits_is_off_by_as_much() {
     }
 }
 
-/// Every pass that reads the G-buffer reads it as it is stored: pictures by rays and of the screen are the same but for what the
-/// angles say. A normal off by an angle e changes a mirror's or a lobe's picture by so many e: 0.94° to 0.06° is 16 times less.
+/// Every pass that reads the G-buffer reads it as it is stored: pictures by rays and of the screen are the same but for
+/// what the angles say. A normal off by an angle e changes a mirror's or a lobe's picture by so many e: 0.94° to 0.06°
+/// is 16 times less.
 #[test]
 fn every_reader_knows_how_it_is_stored() {
     let gpu = Gpu::open();
@@ -291,7 +294,8 @@ fn edges_between_triangles_do_not_show_in_a_texture() {
         }
         eprintln!("{cells} cells a side: {most:e} over {seen} pixels");
         assert!(seen > 3000, "{seen} pixels");
-        // lavapipe weighs texels and levels with 8 bits: a step of 1/256 of the contrast (0.88) in each of u, v and level.
+        // lavapipe weighs texels and levels with 8 bits: a step of 1/256 of the contrast (0.88) in each of u, v and
+        // level.
         assert!(most < 3.0 * 0.88 / 256.0, "{cells} cells a side: {most:e}");
     }
 }

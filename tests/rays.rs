@@ -105,8 +105,8 @@ fn hit_on_triangle(d: &mut SplitMix64, size: f64) -> Vec<f32> {
     [vec![0.0; 7], columns(&[a, b, c]), vec![u as f32, v as f32]].concat()
 }
 
-/// Hit points of triangles, moved off them as rays are, by 32 roundings of the largest coordinate, or by a fixed length: how
-/// many are not strictly on the side of the normal, and the largest shift.
+/// Hit points of triangles, moved off them as rays are, by 32 roundings of the largest coordinate, or by a fixed
+/// length: how many are not strictly on the side of the normal, and the largest shift.
 fn moved_off(gpu: &Gpu, fixed: Option<f32>, hits: &[Vec<f32>], size: f64) -> (usize, f64) {
     let points = evaluated(gpu, "hit_point", Tier::Stable, hits);
     let corners: Vec<Vec<f32>> = hits.iter().map(|hit| hit[7..16].to_vec()).collect();

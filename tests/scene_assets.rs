@@ -145,11 +145,14 @@ fn moments_of_a_source_are_what_is_loaded_and_share_what_does_not_move() {
         files.retain(|path| path.extension().is_some_and(|e| e == "glb" || e == "gltf"));
         files.sort();
         let path = &files[0];
-        let mut source = scene::Source::open(path, scene::Prune::Nothing).unwrap();
+        let mut source =
+            scene::Source::open(path, LoadOptions { prune: scene::Prune::Nothing, ..LoadOptions::default() }).unwrap();
         let mut first: Option<Scene> = None;
         for time in [None, Some(0.0), Some(0.4), Some(1.3), None] {
             let known = source.at(time).unwrap();
-            let loaded = scene::load(path, &LoadOptions { time, prune: scene::Prune::Nothing }).unwrap();
+            let loaded =
+                scene::load(path, &LoadOptions { time, prune: scene::Prune::Nothing, ..LoadOptions::default() })
+                    .unwrap();
             let all = |scene: &Scene| {
                 let Scene { meshes, instances, materials, images, lights, cameras, duration, .. } = scene;
                 format!("{meshes:?}{instances:?}{materials:?}{images:?}{lights:?}{cameras:?}{duration:?}")

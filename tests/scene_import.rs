@@ -229,7 +229,7 @@ fn strips_and_fans_turn_all_their_triangles_the_same_way() {
 }
 
 #[test]
-fn points_and_lines_become_thin_bodies_that_scale_with_the_scene() {
+fn points_and_lines_become_thin_meshes_that_scale_with_the_scene() {
     let square = [0.0, 0.0, 0.0, 3.0, 0.0, 0.0, 3.0, 4.0, 0.0, 0.0, 4.0, 0.0];
     for (mode, bodies, triangles) in [(0, 4, 8), (1, 2, 12), (2, 4, 12), (3, 3, 12)] {
         for scale in [1.0, 100.0] {
@@ -530,7 +530,7 @@ fn etalon_extras_are_read_into_the_material() {
 }
 
 #[test]
-fn etalon_extras_tell_of_wavelengths() {
+fn etalon_extras_describe_spectra() {
     let one = |etalon: serde_json::Value| {
         let mut b = with_etalon(etalon, json!({}));
         b.json["materials"][0]["emissiveFactor"] = json!([1, 1, 1]);
@@ -579,7 +579,7 @@ fn etalon_extras_tell_of_wavelengths() {
 }
 
 #[test]
-fn spectra_that_cannot_be_meant_are_told_by_name() {
+fn impossible_spectra_are_reported_by_name() {
     for (etalon, said) in [
         (json!({ "emission": "sun" }), "\"sun\" is no illuminant; these are: a, d65, e, f2, f11"),
         (json!({ "emission": { "blackbody": 20 } }), "a black body of 20 K"),
@@ -1068,7 +1068,7 @@ fn a_picture_that_cannot_be_decoded_names_file_image_and_cause() {
     let view = b.view(b"no picture at all", None);
     b.json["images"][0] = json!({ "bufferView": view, "mimeType": "image/png", "name": "leaf" });
     let text = sentence(&b);
-    assert!(text.contains("scene.glb: image 0 \"leaf\": the data is not PNG, JPEG or WebP"), "{text}");
+    assert!(text.contains("scene.glb: image 0 \"leaf\": the data is not PNG, JPEG, WebP or KTX2"), "{text}");
 }
 
 #[test]
@@ -1179,7 +1179,8 @@ fn other_endings_are_refused_by_name() {
     assert_eq!(error, "loading a.fbx: only .gltf, .glb and .obj files are supported");
 }
 
-/// What no picture depends on is neither decoded nor kept, and each is named with its reason; read for everything, all is there.
+/// What no picture depends on is neither decoded nor kept, and each is named with its reason; read for everything, all
+/// is there.
 #[test]
 fn what_cannot_be_seen_is_not_read() {
     let read = |material: serde_json::Value, reads| {
@@ -1233,5 +1234,5 @@ fn a_broken_picture_that_nothing_reads_is_an_error() {
     let path = builder.save_glb(folder.path());
     let reads = Prune::Unused(AmbientLight::Present);
     let error = scene::load(&path, &LoadOptions { prune: reads, ..LoadOptions::default() }).unwrap_err();
-    assert!(format!("{error:#}").contains("not PNG, JPEG or WebP"), "{error:#}");
+    assert!(format!("{error:#}").contains("not PNG, JPEG, WebP or KTX2"), "{error:#}");
 }

@@ -1,5 +1,5 @@
-//! The rungs `screen`: mirror images against an f64 ray cast of the reflected ray, which also says whether what it meets is in
-//! the picture at all; the view through bodies against Snell's law and their nominal thickness.
+//! The rungs `screen`: mirror images against an f64 ray cast of the reflected ray, which also says whether what it
+//! meets is in the picture at all; the view through bodies against Snell's law and their nominal thickness.
 
 use etalon::frame::{Rendered, Settings};
 use etalon::image::Picture;
@@ -24,8 +24,8 @@ fn mirror() -> Material {
     Material { metallic: 1.0, roughness: 0.0, double_sided: true, ..Material::default() }
 }
 
-/// A wall of square cells in the plane z = 0, unlit, whose colours tell which they are: column and row in red and green
-/// over blue.
+/// A wall of square cells in the plane z = 0, unlit, whose colours encode their position: column and row in red and
+/// green over blue.
 fn cells(made: &mut Made, columns: u32, rows: u32, edge: f64, world_from_wall: DAffine3) {
     for (i, j) in (0..columns).flat_map(|i| (0..rows).map(move |j| (i, j))) {
         let color = [(i + 1) as f32 / 16.0, (j + 1) as f32 / 16.0, 1.0];
@@ -93,8 +93,8 @@ struct Counted {
     invented: usize,
 }
 
-/// Compares the pixels in which instance 0 mirrors something with the ray cast. Nothing lights the scene and there is no
-/// environment: what a mirror shows comes off the screen.
+/// Compares the pixels in which instance 0 mirrors something with the ray cast. Nothing lights the scene and there is
+/// no environment: what a mirror shows comes off the screen.
 fn against_rays(film: &Picture, scene: &Scene, bound: f64) -> Counted {
     let size = [film.width, film.height];
     let world = World::new(scene, PLAIN);
@@ -311,7 +311,8 @@ fn a_plate_shifts_what_lies_behind_by_its_nominal_thickness() {
         let mut made = plate(Shape::cuboid(DVec3::new(6.0, 6.0, 0.4)), glass(thickness as f32), degrees, tilt);
         made.front(0.5);
         let film = gpu.film(&made.0, on(&["refraction=screen"]));
-        // Lecture F5 by angles: α to the normal outside, β inside; the shift is along the normal's part across the view.
+        // Lecture F5 by angles: α to the normal outside, β inside; the shift is along the normal's part across the
+        // view.
         let n = made.0.instances[0].world_from_object.transform_vector3(DVec3::Z).normalize();
         let alpha = n.z.acos();
         let beta = (alpha.sin() / 1.5).asin();
@@ -343,7 +344,7 @@ fn a_plate_shifts_what_lies_behind_by_its_nominal_thickness() {
     }
 }
 
-/// What a parallel view cannot tell: the exit point as the eye sees it.
+/// The exit point as seen from the eye. A parallel view cannot check it.
 #[test]
 fn a_ball_bends_every_ray_by_its_own_normal() {
     let gpu = Gpu::open();
@@ -395,7 +396,7 @@ fn sheets_shift_nothing() {
 }
 
 #[test]
-fn what_stands_before_a_body_is_not_seen_through_it() {
+fn refraction_shows_nothing_in_front_of_the_glass() {
     let gpu = Gpu::open();
     let mut made = plate(Shape::cuboid(DVec3::new(6.0, 6.0, 0.4)), glass(0.4), 40.0, 0.0);
     made.add(Shape::panel(0.3, 6.0), unlit([4.0, 4.0, 1.0]), at(0.1, 0.0, 3.0));

@@ -1,5 +1,5 @@
-//! Shadow maps against visibility in f64 (support/raycast.rs): where edges lie, that nothing lit is dark and nothing dark
-//! is lit beyond the band that the map's texels leave open, at any scale, and what does not cast.
+//! Shadow maps against visibility in f64 (crates/testing/src/raycast.rs): where edges lie, that nothing lit is dark and
+//! nothing dark is lit beyond the band that the map's texels leave open, at any scale, and what does not cast.
 //!
 //! One Lambert scene is drawn with shadows=off and with shadows=map: their ratio is the share of the light that the map
 //! lets through. Facets have their own normals here, so that no terminator is in it.
@@ -170,8 +170,8 @@ fn wrong(scene: &Scene, shares: &[Option<f64>], instances: std::ops::Range<usize
             let is_lit = seen.first(&world, p).is_none_or(|(_, before)| before < same / cos);
             let across = direction.any_orthonormal_vector();
             let down = direction.cross(across);
-            // A point of the surface is judged if all light around it, as far as the band reaches, meets the same: it is
-            // lit, and so is all of a connected surface; or all is stopped before it gets to the point's plane.
+            // A point of the surface is judged if all light around it, as far as the band reaches, meets the same: it
+            // is lit, and so is all of a connected surface; or all is stopped before it gets to the point's plane.
             let clear = (0..48).all(|i| {
                 let (ring, turn) = (f64::from(i / 12 + 1) / 4.0, f64::from(i % 12) / 12.0 * std::f64::consts::TAU);
                 let off = (across * turn.cos() + down * turn.sin()) * (ring * reach);
@@ -188,7 +188,8 @@ fn wrong(scene: &Scene, shares: &[Option<f64>], instances: std::ops::Range<usize
             });
             Some(match (clear, is_lit) {
                 (false, _) => [0, 0, 0, 0, 1],
-                // At a right angle to the light the stored normals' 16 bits are seen in the terminator: 0.998 at cos 0.002.
+                // At a right angle to the light the stored normals' 16 bits are seen in the terminator: 0.998 at cos
+                // 0.002.
                 (true, true) => [usize::from(share < 0.99), 0, 1, 0, 0],
                 (true, false) => [0, usize::from(share > 1e-3), 0, 1, 0],
             })
@@ -245,9 +246,10 @@ fn hollows_have_no_seams() {
     }
 }
 
-/// A shadow's edge on a floor lies where f64 has it: a square blind above it, each kind of light, seen from so near that
-/// a texel has many pixels. Whether a texel is covered is decided at its centre, and between covered and free centres the
-/// share is interpolated: half of it is reached within a texel of the edge, and all of it within the four around.
+/// A shadow's edge on a floor lies where f64 has it: a square blind above it, each kind of light, seen from so near
+/// that a texel has many pixels. Whether a texel is covered is decided at its centre, and between covered and free
+/// centres the share is interpolated: half of it is reached within a texel of the edge, and all of it within the four
+/// around.
 #[test]
 fn edges_lie_where_they_should_within_a_texel() {
     let gpu = Gpu::open();
@@ -284,7 +286,7 @@ fn edges_lie_where_they_should_within_a_texel() {
                 n * n.dot(middle - shadow(DVec3::new(0.0, 0.7, 0.0))).signum()
             };
             let (direction, _) = seen.ray(middle);
-            // Texels across the ray, told on the floor.
+            // Texels across the ray, measured on the floor.
             let texel = seen.texel(middle) / -direction.y;
             let half_height = 8.0 * texel;
             // Below the blind, so that it is not in the way.
@@ -409,8 +411,8 @@ fn glass_and_blended_surfaces_cast_nothing() {
     }
 }
 
-/// Pixels of `a` and `b` that differ by more than a hundredth of the brightest, where `b` does not change within two pixels
-/// by being shadowed: by how much of `off` is left of it.
+/// Pixels of `a` and `b` that differ by more than a hundredth of the brightest, where `b` does not change within two
+/// pixels by being shadowed: by how much of `off` is left of it.
 fn unlike(a: &Picture, b: &Picture, off: &Picture) -> [usize; 2] {
     let (width, height) = (a.width as i32, a.height as i32);
     let at = |x: i32, y: i32| (y.clamp(0, height - 1) * width + x.clamp(0, width - 1)) as usize;
@@ -518,7 +520,7 @@ fn many_lights_stay_within_the_budget() {
     assert!(text.contains("1000 lights") && text.contains("shadows=ray") && text.contains("shadows=off"), "{text}");
 }
 
-/// Triangles far smaller than texels, whose slopes the rasteriser tells badly: still next to nothing lit is dark on
+/// Triangles far smaller than texels, whose slopes the rasteriser computes badly: still almost no lit pixel is dark on
 /// them. (Edges of their shadow on the floor lie closer to them than a few of these texels.)
 #[test]
 fn meshes_finer_than_texels_are_not_spotted() {

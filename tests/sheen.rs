@@ -1,5 +1,5 @@
-//! Sheen (KHR_materials_sheen) in pictures of all three models against its formulas in f64: under a light, before light that is the same
-//! from everywhere, by its textures, and from a file.
+//! Sheen (KHR_materials_sheen) in pictures of all three models against its formulas in f64: under a light, before light
+//! that is the same from everywhere, by its textures, and from a file.
 
 use etalon::plan::Model;
 use etalon::plan::rungs::Brdf;
@@ -47,7 +47,8 @@ fn factors(m: &Material) -> (DVec3, f64) {
     (DVec3::new(r, g, b), roughness)
 }
 
-/// What the whole material makes of light from l: the base under the lesser of two scales, the lobe, and over both the coat.
+/// What the whole material makes of light from l: the base under the lesser of two scales, the lobe, and over both the
+/// coat.
 fn expected(m: &Material, n: DVec3, l: DVec3, v: DVec3) -> DVec3 {
     let rungs = Rungs { brdf: Brdf::Ggx, exact: false };
     let bare = Material { clearcoat: 0.0, ..m.clone() };
@@ -66,8 +67,8 @@ fn expected(m: &Material, n: DVec3, l: DVec3, v: DVec3) -> DVec3 {
     result * (1.0 - coat_f) + reflected(&black, rungs, n, l, v)
 }
 
-/// The table of E has 32 steps each way: its lines are off by 4e-3 of the white that they scale. Within 0.1° of the horizon they are off
-/// by more, where light makes next to nothing: pixels count from a tenth of the brightest on.
+/// The table of E has 32 steps each way: its lines are off by 4e-3 of the white that they scale. Within 0.1° of the
+/// horizon they are off by more, where light makes next to nothing: pixels count from a tenth of the brightest on.
 const TABLE: f64 = 4e-3;
 const BRIGHT: f64 = 0.1;
 
@@ -91,8 +92,9 @@ fn cloth_reflects_a_light_as_estevez_and_kulla_say() {
     }
 }
 
-/// White cloth on a white ground before light from everywhere sends c E(V), and of the ground what the lesser of both scales leaves: with
-/// cosines x below the viewer's, 1 − c (E(V) (1 − cos²) + ∫ 2x E(x) dx). Never more than it receives.
+/// White cloth on a white ground before light from everywhere sends c E(V), and of the ground what the lesser of both
+/// scales leaves: with cosines x below the viewer's, 1 − c (E(V) (1 − cos²) + ∫ 2x E(x) dx). Never more than it
+/// receives.
 fn furnace(m: &Material, cos_v: f64) -> DVec3 {
     let (color, roughness) = factors(m);
     let steps = 400;
@@ -175,7 +177,7 @@ fn textures_multiply_its_colour_and_roughness() {
 }
 
 #[test]
-fn a_file_tells_of_it() {
+fn a_file_describes_sheen() {
     let mut b = Builder::new();
     let position = b.triangle();
     b.push(

@@ -114,7 +114,7 @@ fn one_flaw_opens_a_mesh_and_what_is_none_does_not() {
 }
 
 #[test]
-fn every_transmissive_body_of_the_study_scenes_is_closed_and_wound_outwards() {
+fn every_transmissive_mesh_of_the_study_scenes_is_closed_and_wound_outwards() {
     let mut bodies = 0;
     for name in study::NAMES {
         let scene = study::load(name).expect("a listed name loads");
@@ -203,7 +203,7 @@ fn nested_cubes_are_listed_from_the_outside_in() {
 }
 
 #[test]
-fn bodies_in_each_other_are_counted_by_their_boxes() {
+fn nested_meshes_are_counted_by_their_boxes() {
     let place = |x: f64| DAffine3::from_translation(DVec3::new(x, 0.0, 0.0));
     let deepest = |parts: &[(f64, f64)]| {
         let scene = scene_of(parts.iter().map(|&(edge, x)| (cube("cube", edge), place(x))).collect());

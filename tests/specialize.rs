@@ -1,5 +1,5 @@
-//! What is left of the shaders once their constants are known: valid SPIR-V without constants to be told, whatever they
-//! are, and much less of it. That it computes the same is what all tests of pictures and equations rest on.
+//! Specialized shaders are valid SPIR-V without specialization constants, for all values of the constants, and they are
+//! much smaller. All tests of pictures and equations check that they compute the same.
 
 use etalon::gpu::{
     specialized, with_float_controls, with_loops_counted, with_tables_in_storage, without_primitive_ids,
@@ -23,7 +23,7 @@ fn op(instruction: &[u32]) -> Op {
     Op::from_u32(instruction[0] & 0xffff).expect("a known instruction")
 }
 
-/// Number of each constant that a module may be told, with the values that it may have here: what counts something is at
+/// Id of each specialization constant of a module, with the values that it may have here: what counts something is at
 /// least 1.
 fn constants(words: &[u32]) -> Vec<(u32, Vec<u32>)> {
     let all = instructions(words);

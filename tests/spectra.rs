@@ -1,5 +1,6 @@
-//! Pictures by wavelengths against truth: the tables of docs/colour.md for a chart of known reflectances, angles of dispersion
-//! against Sellmeier and Snell in f64, Beer and Lambert band by band, and lines that keep their colour wherever they go.
+//! Pictures by wavelengths against truth: the tables of docs/colour.md for a chart of known reflectances, angles of
+//! dispersion against Sellmeier and Snell in f64, Beer and Lambert band by band, and lines that keep their colour
+//! wherever they go.
 
 use etalon::frame::Settings;
 use etalon::image::Picture;
@@ -97,8 +98,9 @@ fn reflected(light: &[(Band, [f64; 3])], reflectance: &Spectrum, times: i32) -> 
     sum
 }
 
-/// To 0.3. Of 120 figures one is further off: the largest difference of 8 bands under F11 after two reflections, 8.2 for 7.9. There
-/// spectra are linear between 5 nm, as the CIE has it for these lamps; the tables were made with a rounder curve through its lines.
+/// To 0.3. Of 120 figures one is further off: the largest difference of 8 bands under F11 after two reflections, 8.2
+/// for 7.9. There spectra are linear between 5 nm, as the CIE has it for these lamps; the tables were made with a
+/// rounder curve through its lines.
 fn check(got: [f64; 2], wanted: [f64; 2], what: &str) {
     eprintln!("{what}: {:.2} / {:.2}, docs/colour.md {} / {}", got[0], got[1], wanted[0], wanted[1]);
     assert!(
@@ -225,8 +227,8 @@ fn what_varies_is_upsampled_like_what_does_not() {
     }
     made.light([std::f32::consts::PI; 3], LightKind::Directional { direction: DVec3::NEG_Z });
     made.front(1.0);
-    // The grid's interpolation; sums of three curves need none. By paths, which decode texels to 2e-6 of themselves, where
-    // lavapipe's samplers, asked by the raster passes, are off by up to 1.5e-3.
+    // The grid's interpolation; sums of three curves need none. By paths, which decode texels to 2e-6 of themselves,
+    // where lavapipe's samplers, asked by the raster passes, are off by up to 1.5e-3.
     for (method, bound) in [("jakob-hanika", 2e-3), ("mallett-yuksel", 1e-5)] {
         let mut knobs = Knobs::of(Model::Global);
         let choices = ["samples=1", "colour=spectral:16", &format!("upsampling={method}")].map(str::to_owned);
@@ -263,8 +265,8 @@ fn refract(d: DVec2, normal: DVec2, n: f64) -> DVec2 {
     d / n + normal * (cos / n - cos_t)
 }
 
-/// Where a ray from the eye of `study:prism`, level with the ground, meets the wall of the slit, across from its middle.
-/// Coordinates are x and z; `x` is the tangent of the angle to the camera's axis.
+/// Where a ray from the eye of `study:prism`, level with the ground, meets the wall of the slit, across from its
+/// middle. Coordinates are x and z; `x` is the tangent of the angle to the camera's axis.
 fn lateral(x: f64, n: f64) -> f64 {
     let apex = std::f64::consts::FRAC_PI_4;
     let deviation = 2.0 * (1.72825 * (0.5 * apex).sin()).asin() - apex;
@@ -376,7 +378,7 @@ fn without_dispersion_there_are_no_fringes() {
         let got = centroid(&film, expected);
         assert!((got - expected).abs() < 0.5, "{got}, not {expected}");
     }
-    // White light, which is drawn in bands because daylight is told by wavelength here.
+    // White light, drawn in bands because daylight is given by wavelength here.
     let white = Emission::of_luminance(illuminant("d65").expect("daylight"), 6.0);
     let film =
         gpu.film(&prism(Some(white), Some(Dispersion::None)), recursive(&["samples=4", "colour=spectral:16"], PRISM));
@@ -431,8 +433,8 @@ fn white_is_white_in_every_model_and_number_of_bands() {
     }
 }
 
-/// What is seen through the blocks of `study:absorber` is Σ light · T^(d/distance), band by band, and through the graded ones
-/// e^(−∫σ).
+/// What is seen through the blocks of `study:absorber` is Σ light · T^(d/distance), band by band, and through the
+/// graded ones e^(−∫σ).
 #[test]
 fn media_take_their_share_of_every_band() {
     let gpu = Gpu::open();
@@ -512,7 +514,8 @@ fn what_is_grey_needs_no_bands() {
     assert!(draw("colour=rgb") == draw("colour=spectral:16"));
 }
 
-/// Paths see the same as the tree of rays where both follow all there is: level rays through the prism.
+/// Path tracing and recursive rays give the same picture where both follow all light: horizontal rays through the
+/// prism.
 #[test]
 fn paths_disperse_as_the_tree_of_rays_does() {
     let gpu = Gpu::open();
@@ -537,7 +540,8 @@ fn paths_disperse_as_the_tree_of_rays_does() {
     }
 }
 
-/// A board behind panes, under a sun and a lamp: `told` says how its colours are told.
+/// A board behind panes, under a sun and a lamp. `told` adds a shape with its colour as a factor, texel or vertex
+/// colour.
 fn board(told: impl Fn(&mut Made, Shape, Material, [f32; 3], f64)) -> Scene {
     let mut made = Made::new("told");
     told(&mut made, Shape::panel(1.0, 2.0), lambert([1.0; 3]), [0.8, 0.3, 0.1], -1.5);
@@ -557,9 +561,10 @@ fn board(told: impl Fn(&mut Made, Shape, Material, [f32; 3], f64)) -> Scene {
     made.0
 }
 
-/// Vertex colours, texels and factors say the same: what lets light through, what mirrors, what is brighter than white.
+/// Vertex colours, texels and factors give the same picture of transmissive and metallic surfaces, and of specular
+/// colours above 1.
 #[test]
-fn colours_are_the_same_however_they_are_told() {
+fn vertex_colours_texels_and_factors_give_the_same_colour() {
     let gpu = Gpu::open();
     let times = |m: &Material, rgb: [f32; 3]| {
         let [r, g, b, a] = m.base_color;

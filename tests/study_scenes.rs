@@ -66,7 +66,7 @@ fn check_winding(name: &str, positions: &[[f32; 3]], normals: &[[f32; 3]], indic
     }
 }
 
-/// Edges that do not occur exactly once in each direction, with vertices told apart by position alone.
+/// Edges that do not occur exactly once in each direction. Vertices of equal position are one vertex.
 fn open_edges(shape: &Shape) -> usize {
     // Adding zero turns −0 into 0.
     let key = |i: u32| shape.positions[i as usize].map(|v| (v + 0.0).to_bits());

@@ -1,4 +1,4 @@
-//! A device that takes turns with a window draws in short pieces what others draw at once: the same picture, bit by bit.
+//! Time-sliced submission draws the same picture in short pieces as one submission does, to the last bit.
 
 use std::time::Duration;
 

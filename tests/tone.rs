@@ -1,6 +1,6 @@
-//! The display pass against crates/image/src/tone.rs: a film is put on the device as it is, so that the curves meet every
-//! radiance they may ever meet, and the bytes that come back are compared with the f64 twins. NaN, infinity and negative
-//! values are counted before anything clamps, and none of them disturbs its neighbours.
+//! The display pass against crates/image/src/tone.rs: a film is put on the device as it is, so that the curves meet
+//! every radiance they may ever meet, and the bytes that come back are compared with the f64 twins. NaN, infinity and
+//! negative values are counted before anything clamps, and none of them disturbs its neighbours.
 
 use ash::vk;
 use etalon::frame::{Background, NEUTRAL_GREY, Settings};
@@ -97,9 +97,10 @@ fn every_curve_shows_the_bytes_of_its_twin() {
                 let byte = quantise(want[c]);
                 off += usize::from(byte != got[c]);
                 most = most.max(byte.abs_diff(got[c]));
-                // What f32 does to a display value: pow is good to 33 ulps on lavapipe (numerics.md, 2), 2e-6, beside a few
-                // roundings; AgX's polynomial has coefficients to 40 and the outset another 1.2, 50 · 2^-24 · a few. A byte
-                // can then differ only where the exact value lies that close to a rounding boundary, and only by one.
+                // What f32 does to a display value: pow is good to 33 ulps on lavapipe (numerics.md, 2), 2e-6, beside a
+                // few roundings; AgX's polynomial has coefficients to 40 and the outset another 1.2, 50 · 2^-24 · a
+                // few. A byte can then differ only where the exact value lies that close to a rounding boundary, and
+                // only by one.
                 let slack = if curve == ToneMap::Agx { 1e-5 } else { 3e-6 };
                 assert!(is_right(got[c], want[c], slack), "{curve:?}: {rgba:?} shows {got:?}, twin {want:?}");
             }

@@ -1,5 +1,5 @@
-//! Transparent surfaces against the over operator: far to near, in f64, whatever the order in which they were drawn. Panes
-//! are unlit, so that coverage and order are all there is to get wrong.
+//! Transparent surfaces against the over operator: far to near, in f64, whatever the order in which they were drawn.
+//! Panes are unlit, so that coverage and order are all there is to get wrong.
 
 use etalon::frame::{Background, Settings};
 use etalon::image::Picture;
@@ -159,8 +159,8 @@ fn the_study_of_blending_shows_the_over_operator() {
     let film = whole(&gpu, &scene, settings([160, 90]));
     let (worst, left_out) = against_over(&film, &scene, 2e-3);
     eprintln!("{worst:e}, left out {left_out}");
-    // Texels pass through half floats, rounded downwards: 2^-11 for each of up to three surfaces. What changes by as much
-    // over a 64th of a pixel is left out.
+    // Texels pass through half floats, rounded downwards: 2^-11 for each of up to three surfaces. What changes by as
+    // much over a 64th of a pixel is left out.
     assert!(left_out < 160 * 90 / 5, "{left_out}");
     assert!(worst < 3.0 * 2.0_f64.powi(-11) + 2e-4, "{worst:e}");
 }
@@ -251,7 +251,8 @@ fn coverage_reaches_the_picture_with_a_transparent_background() {
 
 #[test]
 fn clear_sheets_tint_and_absorb_by_their_thickness() {
-    // Refraction `off`, straight on and unlit: what passes is base · (1 − F0) · attenuation^(thickness · scale / distance).
+    // Refraction `off`, straight on and unlit: what passes is base · (1 − F0) · attenuation^(thickness · scale /
+    // distance).
     let gpu = Gpu::open();
     for (ior, scale, thickness) in [(1.0_f32, 1.0, 0.5_f32), (1.5, 1.0, 0.25), (2.0, 3.0, 0.25), (1.5, 1.0, 0.0)] {
         let mut made = Made::new("sheet");
@@ -355,9 +356,9 @@ fn memory_s_old_contents_are_not_counted_as_dropped() {
     assert_eq!(rendered.dropped, 0);
 }
 
-/// `panes` sheets of white glass, 1 cm apart, under `lights` lights that are as strong together however many they are. With
-/// `stairs` each pane reaches less far to the right than the one before it, so that pixels beside each other see other
-/// numbers of them.
+/// `panes` sheets of white glass, 1 cm apart, under `lights` lights that are as strong together however many they are.
+/// With `stairs` each pane reaches less far to the right than the one before it, so that pixels beside each other see
+/// other numbers of them.
 fn lit_stack(panes: usize, lights: usize, stairs: bool) -> Scene {
     let mut made = Made::new("lit stack");
     let sheet = Material { base_color: [1.0, 1.0, 1.0, 0.03], alpha_mode: AlphaMode::Blend, ..lambert([1.0; 3]) };
@@ -440,9 +441,9 @@ fn glass_beside_a_nearer_wall_is_lit_through_the_background_s_part_of_its_tile()
     }
 }
 
-/// The lists begin with one node a pixel. A pane over the whole picture fills them; a sliver that only the second sample
-/// meets overflows them, so that this sample is drawn again. The second picture of the same renderer has room from the
-/// start: it must be the same.
+/// The lists begin with one node a pixel. A pane over the whole picture fills them; a sliver that only the second
+/// sample meets overflows them, so that this sample is drawn again. The second picture of the same renderer has room
+/// from the start: it must be the same.
 #[test]
 fn a_sample_that_is_drawn_again_counts_once() {
     let gpu = Gpu::open();

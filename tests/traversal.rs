@@ -1,5 +1,5 @@
-//! The traversal alone: what rays meet, by three ways through the tree and by brute force in f64, and that a ray neither
-//! meets the surface it leaves nor slips out of a closed one, at any scale.
+//! The traversal alone: what rays meet, by three ways through the tree and by brute force in f64, and that a ray
+//! neither meets the surface it leaves nor slips out of a closed one, at any scale.
 
 use etalon::pass::trace_rays::{Hit, Mode, Ray, Tracer};
 use etalon::scene::Scene;
@@ -86,11 +86,11 @@ fn meets(ray: &Ray, corners: &[[f32; 3]; 3]) -> Option<(f64, f64)> {
     (inside > -1e-4 && t > -1e-4 * t.abs().max(1.0) && t.is_finite()).then_some((t, inside))
 }
 
-/// All ways find the same hits to the last bit, alone and in pairs, and they are those that brute force in f64 finds. Where a
-/// ray passes within 1e-5 of an edge, or two hits lie within 1e-5 of each other, f32 may decide otherwise: counted as
-/// doubtful, and few.
+/// All traversals find the same hits to the last bit, alone and in pairs, and the hits agree with brute force in f64.
+/// Where a ray passes within 1e-5 of an edge, or two hits lie within 1e-5 of each other, f32 may decide otherwise:
+/// counted as doubtful, and few.
 #[test]
-fn every_way_finds_what_brute_force_finds() {
+fn every_traversal_finds_what_brute_force_finds() {
     let gpu = Gpu::open();
     let scene = scene();
     let bvh = Bvh::build(&scene).expect("a tree");
@@ -169,8 +169,8 @@ fn work_is_counted_exactly() {
     assert_eq!(whole, parts);
 }
 
-/// Points on every triangle, an eighth each on edges and in corners, and directions away from it: outwards as steep as it
-/// gets and down to 1e-6 above it, inwards to other faces. As the passes send them: from `ray_origin`.
+/// Points on every triangle, an eighth each on edges and in corners, and directions away from it: outwards as steep as
+/// it gets and down to 1e-6 above it, inwards to other faces. As the passes send them: from `ray_origin`.
 fn leaving(bvh: &Bvh, tracer: &Tracer, count: usize, outwards: bool, random: &mut Random) -> Vec<Ray> {
     let offset = tracer.rays().offset();
     (0..count)
@@ -230,10 +230,10 @@ fn tally(hits: &[Hit], is_so: impl Fn(&Hit) -> bool) -> [usize; 2] {
 }
 
 /// Convex closed bodies: a ray that leaves outwards meets nothing, one that leaves inwards meets the other side. Three
-/// million rays, a third of those outwards at angles down to 1e-6 from the surface. From exactly on an edge a ray along the
-/// other face may meet it: of bodies 200 times longer than thick 2 in 10,000 do.
+/// million rays, a third of those outwards at angles down to 1e-6 from the surface. From exactly on an edge a ray along
+/// the other face may meet it: of bodies 200 times longer than thick 2 in 10,000 do.
 #[test]
-fn rays_neither_meet_what_they_leave_nor_slip_out() {
+fn rays_neither_hit_their_own_surface_nor_leak() {
     let gpu = Gpu::open();
     let turn = DAffine3::from_axis_angle(DVec3::new(0.3, 0.5, -0.8).normalize(), 1.1);
     let bodies: [(&str, Shape, DVec3); 5] = [

@@ -1,5 +1,6 @@
-//! What a material says of itself is what its picture shows: lobes, layers and Fresnel's curves of all three models against f64
-//! closed forms (support/lobe.rs), on a dome whose facets stand at many angles to the eye and the light; and exchanging the two.
+//! What a material says of itself is what its picture shows: lobes, layers and Fresnel's curves of all three models
+//! against f64 closed forms (crates/testing/src/lobe.rs), on a dome whose facets stand at many angles to the eye and
+//! the light; and exchanging the two.
 
 use etalon::frame::Settings;
 use etalon::image::Picture;
@@ -27,8 +28,8 @@ fn plastic(base_color: [f32; 3], roughness: f32) -> Material {
     Material { specular: 1.0, roughness, ..lambert(base_color) }
 }
 
-/// Rough surfaces of every kind without layers. None reflects more than it receives, diffuse part and F0 together, so that no
-/// bound on the energy of a model has anything to take away.
+/// Rough surfaces of every kind without layers. None reflects more than it receives, diffuse part and F0 together, so
+/// that no bound on the energy of a model has anything to take away.
 fn rough() -> [Material; 6] {
     let tinted =
         Material { ior: 1.8, specular: 0.6, specular_color: [1.0, 0.5, 0.25], ..plastic([0.2, 0.5, 0.3], 0.55) };
@@ -53,8 +54,9 @@ fn lit(gpu: &Gpu, materials: &[Material], light: DVec3, of: Model, choices: &[&s
     })
 }
 
-/// A facet's normal and the light's direction have roundings of 1e-7, which a lobe of exponent 245 (roughness 0.3) makes some 3e-5
-/// of at half of its height, where sin²δ counts 245 times over; and pixels count from 1e-3 of the brightest on.
+/// A facet's normal and the light's direction have roundings of 1e-7, which a lobe of exponent 245 (roughness 0.3)
+/// makes some 3e-5 of at half of its height, where sin²δ counts 245 times over; and pixels count from 1e-3 of the
+/// brightest on.
 const LOBES: f64 = 1e-4;
 const FAINT: f64 = 1e-3;
 
@@ -83,7 +85,8 @@ fn compensated_ggx_gives_back_what_single_scattering_loses() {
     let gpu = Gpu::hasty();
     for of in MODELS {
         let error = lit(&gpu, &rough(), LIGHTS[0], of, &["brdf=ggx-multi", "fresnel=schlick"], FAINT);
-        // The table of directional reflectance E is good to 4e-3 (src/upload/environment.rs), and E is 0.6 at least here.
+        // The table of directional reflectance E is good to 4e-3 (src/upload/environment.rs), and E is 0.6 at least
+        // here.
         assert!(error < 1e-2, "{of:?}: {error:e}");
     }
 }
@@ -148,7 +151,8 @@ fn smooth_mirrors_show_fresnels_curve_over_all_angles() {
     assert!(error < 2e-2, "{error:e}");
 }
 
-/// Over what is black, all that a coat in such light shows is its own reflectance; over a mirror, what that reflects besides, less it.
+/// Over what is black, all that a coat in such light shows is its own reflectance; over a mirror, what that reflects
+/// besides, less it.
 #[test]
 fn a_smooth_coat_mirrors_what_is_around_and_takes_that_from_its_base() {
     let gpu = Gpu::hasty();
@@ -173,8 +177,8 @@ fn a_smooth_coat_mirrors_what_is_around_and_takes_that_from_its_base() {
                 .lerp(etalon_testing::lobe::metal(m, false, facet.n.z), m.metallic.into());
             f * (1.0 - coat) + coat
         };
-        // The deferred pass has the coat's normal to 6.5e-5, and at 78° the curve falls by 2 per radian of what is 0.4; the table is
-        // good to 4e-3 of what is 1 (here 0.04).
+        // The deferred pass has the coat's normal to 6.5e-5, and at 78° the curve falls by 2 per radian of what is 0.4;
+        // the table is good to 4e-3 of what is 1 (here 0.04).
         let bound = if of == Model::Local { 2e-2 } else { 4e-4 };
         eprint!("{of:?} black ");
         let error = worst(&film, &of_materials([0, 1]), 1e-3, expected);
@@ -187,7 +191,7 @@ fn a_smooth_coat_mirrors_what_is_around_and_takes_that_from_its_base() {
     }
 }
 
-/// The twin that photons and the picked pixel go by is the material of pictures: what coat and base mirror of such light.
+/// The twin that photons and the picked pixel use has the material of pictures: coat and base reflect such light alike.
 #[test]
 fn what_the_host_says_of_coats_and_bases_is_what_pictures_show() {
     let gpu = Gpu::hasty();
@@ -233,8 +237,8 @@ fn a_clear_coat_of_index_one_and_a_half_reflects_and_takes_that_from_its_base() 
     ];
     for (of, light) in MODELS.into_iter().zip([LIGHTS[0], LIGHTS[1], LIGHTS[1]]) {
         for brdf in ["brdf=ggx", "brdf=blinn-phong-reciprocal"] {
-            // The deferred pass has the coat's normal to 6.5e-5 (octahedra of 2 x 16 bits): a lobe of α = 0.09 falls by 22 per radian
-            // of its half vector, and a cosine of the twentieth of the brightest or more by 20.
+            // The deferred pass has the coat's normal to 6.5e-5 (octahedra of 2 x 16 bits): a lobe of α = 0.09 falls by
+            // 22 per radian of its half vector, and a cosine of the twentieth of the brightest or more by 20.
             let (floor, bound) = if of == Model::Global { (FAINT, LOBES) } else { (0.05, 3e-3) };
             let error = lit(&gpu, &materials, light, of, &[brdf, "fresnel=schlick"], floor);
             assert!(error < bound, "{of:?}, {brdf}: {error:e}");
@@ -261,14 +265,15 @@ fn a_clear_coat_keeps_from_the_eye_what_it_reflects_of_emitted_light() {
             etalon_testing::lobe::rgb(glow)
                 * (1.0 - coat * etalon_testing::lobe::schlick(DVec3::splat(0.04), 1.0, facet.n.z).x)
         });
-        // A cosine to 1e-7, five times over; the deferred pass has the coat's normal to 6.5e-5 (octahedra of 2 x 16 bits), and the
-        // curve's slope is 2 at 78°.
+        // A cosine to 1e-7, five times over; the deferred pass has the coat's normal to 6.5e-5 (octahedra of 2 x 16
+        // bits), and the curve's slope is 2 at 78°.
         let bound = if of == Model::Global { 3e-6 } else { 1.5e-4 };
         assert!(error < bound, "{of:?}: {error:e}");
     }
 }
 
-/// BRDFs of four surfaces in one plane, by channel: radiance over irradiance, from a picture seen along −`v` in light along −`l`.
+/// BRDFs of four surfaces in one plane, by channel: radiance over irradiance, from a picture seen along −`v` in light
+/// along −`l`.
 fn brdfs(gpu: &Gpu, materials: &[Material; 4], of: Model, choices: &[&str], l: DVec3, v: DVec3) -> [DVec3; 4] {
     let mut made = Made::new("exchange");
     for (i, material) in materials.iter().enumerate() {
@@ -350,7 +355,7 @@ fn head_on(material: Material) -> Scene {
 
 /// π F0 D(0)/4 = F0/(4α²) of a lobe that is looked at from where the light is.
 #[test]
-fn at_normal_incidence_a_lobe_tells_f0_over_four_alpha_squared() {
+fn at_normal_incidence_a_lobe_is_f0_over_four_alpha_squared() {
     let gpu = Gpu::hasty();
     let draw = |of: Model, material: &Material| -> DVec3 {
         let settings: Settings = model(of, [8, 8], &["brdf=ggx", "fresnel=schlick"]);
@@ -525,7 +530,8 @@ fn a_slanted_sheet_lets_through_what_it_does_not_reflect() {
             let passes = 1.0 - etalon_testing::lobe::dielectric(m, fresnel == "fresnel=exact", facet.n.z).x;
             etalon_testing::lobe::rgb(behind) * etalon_testing::lobe::base(m) * (f64::from(m.transmission) * passes)
         });
-        // Of 64 even points one too many or too few goes through; the deferred pass has these normals in 2 x 16 bits, 6.5e-5.
+        // Of 64 even points one too many or too few goes through; the deferred pass has these normals in 2 x 16 bits,
+        // 6.5e-5.
         let bound = match of {
             Model::Local => 2e-4,
             Model::Recursive => 1e-5,
@@ -535,7 +541,8 @@ fn a_slanted_sheet_lets_through_what_it_does_not_reflect() {
     }
 }
 
-/// k_d, k_s in 1/sr and shine as a scene tells them (`extras.etalon`; crates/scene/src/gltf_extras.rs keeps them like this).
+/// k_d, k_s in 1/sr and shine as a scene gives them (`extras.etalon`; crates/scene/src/gltf_extras.rs keeps them like
+/// this).
 fn told(kd: [f32; 3], ks: [f32; 3], shine: f32) -> Material {
     Material {
         specular: 1.0,
@@ -547,7 +554,7 @@ fn told(kd: [f32; 3], ks: [f32; 3], shine: f32) -> Material {
 }
 
 #[test]
-fn told_numbers_of_phong_are_drawn_as_b5_and_b6_are_written() {
+fn phong_coefficients_of_a_scene_give_b5_and_b6() {
     let gpu = Gpu::hasty();
     // The second sends more than it receives by B5, which nothing forbids.
     let of = [([0.1, 0.2, 0.05], [0.3, 0.2, 0.4], 20.0), ([0.05; 3], [1.414, 0.7, 0.2], 3.0)];
@@ -577,8 +584,8 @@ fn told_numbers_of_phong_are_drawn_as_b5_and_b6_are_written() {
     }
 }
 
-/// Before light that is the same from everywhere a rough coat over black shows its directional albedo, along paths too: each direction is
-/// weighted by the density that it was drawn with.
+/// Before light that is the same from everywhere a rough coat over black shows its directional albedo, along paths too:
+/// each direction is weighted by the density that it was drawn with.
 #[test]
 fn a_rough_coat_over_black_sends_its_albedo_along_paths() {
     let gpu = Gpu::hasty();

@@ -1,6 +1,7 @@
-//! What a light, an environment, a camera and a place say of themselves is what the picture shows, in all three models: lights with
-//! and without a shape on slanted surfaces, the environment turned and dimmed, radiance over distance and tilt, Snell's window, and
-//! objects where their instances and the camera put them. Against closed forms and integrals in f64.
+//! What a light, an environment, a camera and a place say of themselves is what the picture shows, in all three models:
+//! lights with and without a shape on slanted surfaces, the environment turned and dimmed, radiance over distance and
+//! tilt, Snell's window, and objects where their instances and the camera put them. Against closed forms and integrals
+//! in f64.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -73,9 +74,9 @@ fn points_cones_and_what_is_far_light_as_their_formulas_say() {
                 error = error.max((pixel(&film, x, y) - want).abs().max_element());
             }
             eprintln!("{of:?}, {what}: {:.1e}", error / brightest);
-            // Of what changes by 20 % over a pixel of a steep ramp, 64 even points have 0.2/√12/8, and the worst of 144 pixels four
-            // times that. Without them a depth is good to 1.2e-6 m of 1 m (tests/light.rs), over cosines that the steepest ramp takes
-            // 0.04 of, and squared.
+            // Of what changes by 20 % over a pixel of a steep ramp, 64 even points have 0.2/√12/8, and the worst of 144
+            // pixels four times that. Without them a depth is good to 1.2e-6 m of 1 m (tests/light.rs), over cosines
+            // that the steepest ramp takes 0.04 of, and squared.
             let bound = if of == Model::Global { 3e-2 } else { 6e-5 };
             assert!(brightest > 0.1 && error < bound * brightest, "{of:?}, {what}: {error:e} of {brightest}");
         }
@@ -171,7 +172,7 @@ fn lights_with_a_shape_light_slanted_surfaces_as_the_integral_over_them_says() {
     }
 }
 
-/// Brighter to one side: the harmonics up to degree 2 tell all of it, in cells as fine as this.
+/// Brighter to one side: spherical harmonics up to degree 2 represent it exactly, in cells as fine as this.
 fn uneven() -> Environment {
     let (width, height) = (128_u32, 64_u32);
     let radiance = (0..width * height).map(|i| {
@@ -189,7 +190,8 @@ fn into_map(d: DVec3, degrees: f32) -> DVec3 {
     DVec3::new(cos * d.x - sin * d.z, d.y, sin * d.x + cos * d.z)
 }
 
-/// A cosine lobe leaves 2/3 of what is linear in the direction, and 1/4 of degree 2 (Ramamoorthi and Hanrahan 2001), over π.
+/// A cosine lobe leaves 2/3 of what is linear in the direction, and 1/4 of degree 2 (Ramamoorthi and Hanrahan 2001),
+/// over π.
 fn diffuse_of_uneven(d: DVec3) -> DVec3 {
     DVec3::new(
         1.0 + (0.6 * d.x + 0.3 * d.y) * 2.0 / 3.0,
@@ -236,7 +238,8 @@ fn a_turned_and_dimmed_environment_lights_and_is_mirrored_from_where_it_is() {
             DVec3::from(environment.sample(into_map(r, degrees))) * f64::from(intensity)
         });
         eprintln!("{of:?}, turned {degrees}: Lambert {off:.1e}, mirror {error:.1e}");
-        // A pixel of 64 paths has some 3 %, and a facet at least four pixels. Cells of 2.8° flatten what is linear by 3e-4.
+        // A pixel of 64 paths has some 3 %, and a facet at least four pixels. Cells of 2.8° flatten what is linear by
+        // 3e-4.
         let bound = if of == Model::Global { 0.05 } else { 1e-3 };
         assert!(off < bound, "{of:?}, turned {degrees}: {off:e}");
         // Weights of texels in 8 bits; the prefiltered map is a level of its own, and its table good to 4e-3.
@@ -279,9 +282,10 @@ fn a_panels_radiance_is_the_same_at_any_distance_and_tilt() {
     }
 }
 
-/// Lecture F7: from below, the rim of total reflection lies at asin(1/1.333) = 48.607° from the zenith. Seen through 2.4° about it.
+/// Lecture F7: from below, the rim of total reflection lies at asin(1/1.333) = 48.607° from the zenith. Seen through
+/// 2.4° about it.
 #[test]
-fn snells_window_ends_where_it_should_to_a_tenth_of_a_degree() {
+fn snells_window_ends_where_it_should_to_a_twentieth_of_a_degree() {
     let gpu = Gpu::hasty();
     let n = f64::from(1.333_f32);
     let rim = (1.0 / n).asin().to_degrees();
@@ -328,8 +332,9 @@ fn snells_window_ends_where_it_should_to_a_tenth_of_a_degree() {
     }
 }
 
-/// Lecture F5: a slanted slab moves what lies behind it to the side by t sin(α − β)/cosβ, sinα = n sinβ: rays are bent as they
-/// enter and bent back as they leave. One bend and the way through the nominal thickness (`refraction=screen`): by that sin(α − β).
+/// Lecture F5: a slanted slab moves what lies behind it to the side by t sin(α − β)/cosβ, sinα = n sinβ: rays are bent
+/// as they enter and bent back as they leave. One bend and the way through the nominal thickness (`refraction=screen`):
+/// by that sin(α − β).
 #[test]
 fn a_slab_moves_what_lies_behind_it_by_snells_law() {
     let gpu = Gpu::hasty();
@@ -339,7 +344,7 @@ fn a_slab_moves_what_lies_behind_it_by_snells_law() {
         transmission: 1.0,
         thickness: thickness as f32,
         ior: 1.5,
-        // Nothing is reflected, so that all that is seen is what is bent.
+        // Nothing is reflected, so only refracted light is seen.
         specular: 0.0,
         roughness: 0.0,
         ..lambert([1.0; 3])
@@ -422,7 +427,8 @@ fn cameras_and_instances_put_things_where_the_geometry_says() {
     }
 }
 
-/// How much of the picture a panel 1.3 m wide and 0.9 m high covers: its sides over those of what is seen at its distance.
+/// How much of the picture a panel 1.3 m wide and 0.9 m high covers: its sides over those of what is seen at its
+/// distance.
 #[test]
 fn a_panel_is_as_large_in_the_picture_as_field_of_view_and_aspect_say() {
     let gpu = Gpu::hasty();
@@ -440,7 +446,8 @@ fn a_panel_is_as_large_in_the_picture_as_field_of_view_and_aspect_say() {
             let film = gpu.film(&made.0, model(of, size, &["samples=64"]));
             let covered = film.rgba.iter().map(|p| f64::from(p[1])).sum::<f64>() / film.rgba.len() as f64;
             eprintln!("{of:?}, {what}: {covered:.5} for {want:.5}");
-            // 64 even points of a pixel tell where its edge is to 1/64 of it or so; the panel is 10 pixels wide at least.
+            // 64 even points of a pixel locate its edge to about 1/64 of the pixel; the panel is 10 pixels wide at
+            // least.
             assert!((covered / want - 1.0).abs() < 3e-3, "{of:?}, {what}: {covered} for {want}");
         }
     }

@@ -10,7 +10,8 @@ use glam::{DAffine3, DVec3};
 
 const WATER: f32 = 1.333;
 
-/// A smooth plate under water, seen from within: all around it is a room whose walls send 1. The plate is turned about the vertical.
+/// A smooth plate under water, seen from within: all around it is a room whose walls send 1. The plate is turned about
+/// the vertical.
 fn plate_under_water(plate: Material, degrees: f64) -> Scene {
     let mut made = Made::new("under water");
     let water =
@@ -55,8 +56,8 @@ fn mirrors_under_water_reflect_by_relative_indices() {
                 for pixel in &film.rgba {
                     let got = DVec3::from([pixel[0], pixel[1], pixel[2]].map(f64::from));
                     let off = ((got - expected) / expected).abs().max_element();
-                    // The field of view is 0.1° either way, by which the plastic's curve moves 1 % at 60°; indices are f32, and
-                    // the plastic's F0 is the square of a difference of them.
+                    // The field of view is 0.1° either way, by which the plastic's curve moves 1 % at 60°; indices are
+                    // f32, and the plastic's F0 is the square of a difference of them.
                     assert!(off < 2e-2, "{of:?}, {name} at {degrees}°: {got} for {expected}");
                 }
                 // In air it would be something else, by more than that.
@@ -71,7 +72,8 @@ fn mirrors_under_water_reflect_by_relative_indices() {
     }
 }
 
-/// A coat over what is black, under fresnel=exact: Fresnel's equations for index 1.5, not Schlick's curve, in every model.
+/// A coat over what is black, under fresnel=exact: Fresnel's equations for index 1.5, not Schlick's curve, in every
+/// model.
 #[test]
 fn coats_follow_fresnels_equations_where_the_rung_says_exact() {
     let gpu = Gpu::hasty();

@@ -1,6 +1,6 @@
-//! What textures, vertices and alpha say of a surface is what its picture shows, in all three models: a board of tiles, each with a
-//! texture of eight texels, against what the formats' specifications make of each texel (glTF 2.0, KHR_texture_transform,
-//! KHR_materials_clearcoat, _specular, _transmission, _volume).
+//! What textures, vertices and alpha say of a surface is what its picture shows, in all three models: a board of tiles,
+//! each with a texture of eight texels, against what the formats' specifications make of each texel (glTF 2.0,
+//! KHR_texture_transform, KHR_materials_clearcoat, _specular, _transmission, _volume).
 
 use etalon::image::Picture;
 use etalon::plan::Model;
@@ -19,7 +19,8 @@ use serde_json::json;
 /// Pixels of a tile's side, and tiles in a row.
 const TILE: u32 = 8;
 const ROW: usize = 6;
-/// All light arrives along this irradiance from the eye, unless a test says otherwise: what a white Lambert surface shows is 1.
+/// All light arrives along this irradiance from the eye, unless a test says otherwise: what a white Lambert surface
+/// shows is 1.
 const PI: f32 = std::f32::consts::PI;
 
 /// Four texels across and two down, no two alike in any channel.
@@ -124,8 +125,8 @@ fn agrees(film: &Picture, tiles: &[Tile], bound: f64, name: &str) {
 /// What textures make of a base colour is kept in halves, of 11 bits: 2.4e-4 each for texel and product.
 const TEXTURED: f64 = 6e-4;
 
-/// Bytes in sRGB are decoded to 2e-6 by rays; by lavapipe's texture unit to a quarter of a step, which is 1.1 % of the least byte here.
-/// A byte that were read as a linear number would be seven times as much.
+/// Bytes in sRGB are decoded to 2e-6 by rays; by lavapipe's texture unit to a quarter of a step, which is 1.1 % of the
+/// least byte here. A byte that were read as a linear number would be seven times as much.
 fn of_colours(of: Model) -> f64 {
     if of == Model::Global { TEXTURED } else { 1.2e-2 }
 }
@@ -323,8 +324,8 @@ fn a_coat_has_a_normal_texture_of_its_own() {
     ];
     for of in MODELS {
         let film = lit(&gpu, &tiles, vec![image.clone(), other.0.clone()], towards, of);
-        // The coat's normal is kept as an octahedron in 2 x 16 bits, off by 3.7e-3 degrees at most, which the lobe's slope of 4 per
-        // radian here makes 3e-4 of.
+        // The coat's normal is kept as an octahedron in 2 x 16 bits, off by 3.7e-3 degrees at most, which the lobe's
+        // slope of 4 per radian here makes 3e-4 of.
         let bound = if of == Model::Global { 1e-5 } else { 4e-4 };
         agrees(&film, &tiles, bound, &format!("{of:?}"));
     }
@@ -441,8 +442,8 @@ fn alpha_covers_its_share_of_what_lies_behind() {
         let film = gpu.film(&made.0, model(of, size, &["fresnel=schlick"]));
         agrees(&film, &tiles, of_colours(of), &format!("{of:?}"));
     }
-    // Paths meet it or not, at points that are spread evenly: of 64 no more than one too many (shaders/lib/random.glsl), of a step of
-    // 3 at most.
+    // Paths meet it or not, at points that are spread evenly: of 64 no more than one too many
+    // (shaders/lib/random.glsl), of a step of 3 at most.
     let film = gpu.film(&made.0, model(Model::Global, size, &["samples=64", "fresnel=schlick"]));
     agrees(&film, &tiles, 0.1, "Global");
     for (i, tile) in tiles.iter().enumerate() {
@@ -477,9 +478,10 @@ fn a_sheet_lets_through_its_colour_times_its_transmission() {
     agrees(&film, &tiles, 0.1, "Global");
 }
 
-/// Bodies a metre apart, seen through their faces: exp(−σd) of the wall behind, whatever bends where nothing is oblique.
+/// Bodies a metre apart, seen through their faces: exp(−σd) of the wall behind, whatever bends where nothing is
+/// oblique.
 #[test]
-fn a_body_absorbs_by_the_way_through_it_or_by_its_nominal_thickness() {
+fn closed_meshes_absorb_by_path_length_or_nominal_thickness() {
     let gpu = Gpu::hasty();
     // Without reflection: see the sheet.
     let body = Material {
@@ -515,8 +517,8 @@ fn a_body_absorbs_by_the_way_through_it_or_by_its_nominal_thickness() {
     }
 }
 
-/// By the local model and along paths. (The recursive model reads no texel of the thickness of what is nearest to the eye:
-/// shaders/lib/primary.glsl.)
+/// By the local model and along paths. (The recursive model reads no texel of the thickness of what is nearest to the
+/// eye: shaders/lib/primary.glsl.)
 #[test]
 fn a_sheets_thickness_is_in_green() {
     let gpu = Gpu::hasty();
@@ -544,8 +546,9 @@ fn a_sheets_thickness_is_in_green() {
     }
 }
 
-/// One face whose texture coordinates, transform and tangents come from a file: without tangents of its own those are made from the
-/// coordinates, so that what bends the normal to the right is to the right of the picture that is mirrored, too.
+/// One face whose texture coordinates, transform and tangents come from a file: without tangents of its own those are
+/// made from the coordinates, so that what bends the normal to the right is to the right of the picture that is
+/// mirrored, too.
 #[test]
 fn a_file_says_transforms_scales_and_sets_of_its_textures() {
     let gpu = Gpu::hasty();
@@ -646,7 +649,8 @@ fn a_file_says_transforms_scales_and_sets_of_its_textures() {
     }
 }
 
-/// The same tile as an object, and turned over by its instance: what mirrors an object mirrors its tangent space with it.
+/// The same tile as an object, and turned over by its instance: what mirrors an object mirrors its tangent space with
+/// it.
 #[test]
 fn a_mirrored_object_has_its_bumps_mirrored() {
     let gpu = Gpu::hasty();

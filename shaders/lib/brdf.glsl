@@ -141,7 +141,7 @@ struct Lambert {
 };
 
 // @eq B2 B4 B9 N25: L = L_in k_d cos⁺θ, cosθ = N·L
-// @lab diffuse_brdf: laboratory_forms_are_made_of_what_draws
+// @lab diffuse_brdf: laboratory_forms_agree_with_the_functions_of_pictures
 Lambert lambert(vec3 N, vec3 L, float Lin, float kd) {
     float c = grazing_cosine(N, L);
     float cos_plus = ARITHMETIC == FAST ? max(c, 0.0) : max(cosine_in_range(c), 0.0);
@@ -176,6 +176,7 @@ float reciprocal_lobe(HalfAngle a, float lobe) {
     return ARITHMETIC == FAST || a.sum2 > 0.0 ? lobe / a.sum2 : 0.0;
 }
 
+// The Blinn-Phong model: its terms and the reflected radiance.
 struct BlinnPhong {
     float cos_in;
     float cos_delta;
@@ -186,7 +187,7 @@ struct BlinnPhong {
 
 // @eq B5 B9 N9 N17 N19: L = L_in (k_d cos⁺θ + k_s (cos⁺δ)^shine), cosδ = N·H, H = (L + V)/|L + V|
 // Self-shadowing: spec and L are 0 for cosθ < 0, not for cosθ = 0. V may point anywhere, as in the lecture's shade().
-// @lab phong_lobe: laboratory_forms_are_made_of_what_draws
+// @lab phong_lobe: laboratory_forms_agree_with_the_functions_of_pictures
 BlinnPhong blinn_phong(vec3 N, vec3 L, vec3 V, float Lin, float kd, float ks, float shine) {
     BlinnPhong r;
     HalfAngle a = phong_half_angle(N, L, V);
@@ -213,7 +214,7 @@ struct ReciprocalPhong {
 
 // @eq B6 N17 N18: L = L_in (k_d + f_s) cos⁺θ, f_s = k_s (cos⁺δ)^shine/(L + V)²
 // The BRDF is symmetric in L and V (reciprocity). f_s is 0 for cosθ < 0, and so is L.
-// @lab reciprocal_lobe: laboratory_forms_are_made_of_what_draws
+// @lab reciprocal_lobe: laboratory_forms_agree_with_the_functions_of_pictures
 ReciprocalPhong reciprocal_phong(vec3 N, vec3 L, vec3 V, float Lin, float kd, float ks, float shine) {
     HalfAngle a = phong_half_angle(N, L, V);
     float c = grazing_cosine(N, L);
@@ -266,7 +267,7 @@ struct GgxD {
 };
 
 // @eq B1 N9 N20: D = α²/(π (cos²θ_h α² + sin²θ_h)²), 0 for cosθ_h ≤ 0
-// @lab ggx_distribution: laboratory_forms_are_made_of_what_draws
+// @lab ggx_distribution: laboratory_forms_agree_with_the_functions_of_pictures
 GgxD ggx_d(vec3 N, vec3 H, float alpha) {
     float cos_h = cosine(N, H);
     float sin2_h = sine_squared(ARITHMETIC == STABLE && cos_h < 0.0 ? -N : N, H);
@@ -333,7 +334,7 @@ struct GgxG {
 
 // @eq B1 N23: G₁ = 1/(1 + Λ), G₂ = 1/(1 + Λ_l + Λ_v), Vis = G₂/(4 N·L N·V)
 // Λ → ∞ at 90°, where G₁ = 2c/(c + √(c² + α² sin²)) goes to 0 with all its digits. Cosines are clamped to [0, 1].
-// @lab ggx_visibility: laboratory_forms_are_made_of_what_draws
+// @lab ggx_visibility: laboratory_forms_agree_with_the_functions_of_pictures
 GgxG ggx_g(float NoL, float NoV, float alpha) {
     GgxG r;
     if (ARITHMETIC == FAST) {
@@ -358,7 +359,7 @@ GgxG ggx_g(float NoL, float NoV, float alpha) {
 
 // @eq F2 N1: F = F0 + (1 − F0)(1 − V·H)⁵
 // @out F
-// @lab schlick: laboratory_forms_are_made_of_what_draws
+// @lab schlick: laboratory_forms_agree_with_the_functions_of_pictures
 float ggx_f(float F0, float VoH) {
     float f0 = ARITHMETIC == FAST ? F0 : clamp(F0, 0.0, 1.0);
     return schlick(vec3(f0), 1.0, VoH).x;
@@ -374,7 +375,7 @@ struct Ggx {
 
 // @eq B1 B2 B3: f_r = D G₂ F/(4 N·L N·V)
 // V·H is |L + V|/2. f_r is 0 where L or V is below the surface.
-// @lab ggx_distribution: laboratory_forms_are_made_of_what_draws
+// @lab ggx_distribution: laboratory_forms_agree_with_the_functions_of_pictures
 Ggx ggx(vec3 N, vec3 L, vec3 V, float alpha, float F0) {
     HalfAngle h = half_angle(N, L, V);
     float NoL = grazing_cosine(N, L);

@@ -99,7 +99,7 @@ struct BsdfSample {
     bool straight; // and is not deflected
 };
 
-// `x` chooses the lobe, `u` the direction within it.
+// Importance sampling of the BSDF: `x` chooses the lobe, `u` the direction within it.
 BsdfSample bsdf_sample(Bsdf bsdf, float x, vec2 u) {
     Layers b = bsdf.layers;
     Surface s = b.s;

@@ -23,7 +23,7 @@ struct XyzToSrgb {
 
 // @eq C2: linear sRGB of X, Y, Z, white at D65, by the four-digit matrix of IEC 61966-2-1
 // X, Y and Z stay below 5e37, or the sums overflow.
-// @host crates/optics/src/spectra/mod.rs: what turns the film of bands into a picture
+// @host crates/optics/src/spectra/mod.rs: converts the film of bands to RGB; a test compares its matrix with this function
 XyzToSrgb xyz_to_srgb(float X, float Y, float Z) {
     vec3 rgb = linear_srgb(vec3(X, Y, Z));
     return XyzToSrgb(rgb.r, rgb.g, rgb.b);
@@ -43,7 +43,7 @@ struct CmfIntegral {
 
 // @eq C1 C2 N50: X = ∫S x̄ dλ as 5 nm sums over 380 … 780 nm, r10 g10 b10 the three lamps of Stiles & Burch that match
 // Plain sums: 81 terms cost 81 roundings at worst. Samples stay below 1e34 in magnitude, or the sums overflow.
-// @host crates/optics/src/spectra/mod.rs: light of a band as X, Y, Z, over steps of 0.5 nm
+// @host crates/optics/src/spectra/mod.rs: integrates bands in steps of 0.5 nm; a test compares their sum with this function
 CmfIntegral cmf_integral(float s[81]) {
     vec3 xyz = vec3(0.0);
     vec3 rgb10 = vec3(0.0);
@@ -77,7 +77,7 @@ float gaussian(float lambda, float mu, DoubleFloat scale) {
 
 // @eq C1 C2: as cmf_integral, of S = A e^(−((λ − μ)/w)²/2) at the same wavelengths
 // |μ| is clamped to 1e6 nm, |w| to [1e-6, 1e6] nm; |A| stays below 1e34, or the sums overflow.
-// @host crates/optics/src/spectra/mod.rs: light of a band as X, Y, Z, of a spectrum in the shape of a bell
+// @host crates/optics/src/spectra/mod.rs: integrates bands in steps of 0.5 nm; a test checks this function against cmf_integral
 CmfGaussian cmf_gaussian(float A, float mu_nm, float width_nm) {
     float mu = clamp(mu_nm, -1e6, 1e6);
     float w = clamp(abs(width_nm), 1e-6, 1e6);
@@ -108,7 +108,7 @@ CmfGaussian cmf_gaussian(float A, float mu_nm, float width_nm) {
 // @eq C3: S(x) = 1/2 + x/(2√(1 + x²))
 // @out S
 // For x < 0 it is 1/(2(1 + x² − x√(1 + x²))): the difference loses the digits of a small S. |x| is clamped to 1e18.
-// @host crates/optics/src/spectra/upsampling.rs: reflectances of colours
+// @host crates/optics/src/spectra/upsampling.rs: evaluates reflectances by upsampled_reflectance; a test compares it with this function
 float spectrum_sigmoid(float x) {
     float S;
     if (ARITHMETIC == FAST) {
@@ -127,7 +127,7 @@ float spectrum_sigmoid(float x) {
 // Spectral upsampling by Jakob and Hanika 2019: a smooth reflectance in (0, 1) for every colour. Compensated: the
 // polynomial is a double-float, because its terms of several hundred cancel to a few. λ is clamped to [0, 1e6] nm,
 // coefficients to ±1e20.
-// @host crates/optics/src/spectra/upsampling.rs: reflectances of colours
+// @host crates/optics/src/spectra/upsampling.rs: averages the reflectance of a colour over a band
 float upsampled_reflectance(float lambda_nm, float c0, float c1, float c2) {
     float lambda = clamp(lambda_nm, 0.0, 1e6);
     vec3 c = clamp(vec3(c0, c1, c2), -1e20, 1e20);
@@ -153,7 +153,7 @@ struct Sellmeier {
 // The Sellmeier equation with four terms, of which glasses use three (B.w = 0). λ²/(λ² − C) = 1 + C/(λ² − C), in the form
 // that does not cancel. λ is clamped to [1e-6, 1e9] µm, B, C and the quotients to ±1e18. A term at its own resonance is 0.
 // t < −1, inside an absorption band, gives n = 0.
-// @host crates/optics/src/spectra/dispersion.rs: the index of a medium in a band
+// @host crates/optics/src/spectra/dispersion.rs: computes the refractive index of a medium in a band
 Sellmeier sellmeier(float lambda_um, vec4 B, vec4 C) {
     float lambda = clamp(lambda_um, 1e-6, 1e9);
     float l2 = lambda * lambda;
@@ -171,7 +171,7 @@ Sellmeier sellmeier(float lambda_um, vec4 B, vec4 C) {
 // @eq F1: n = A + B/λ², λ in µm
 // @out n
 // Cauchy's equation: an adjustable approximation, not measured data. λ is clamped to [1e-6, 1e9] µm, n to [0, 1e9].
-// @host crates/optics/src/spectra/dispersion.rs: the index of a medium in a band
+// @host crates/optics/src/spectra/dispersion.rs: computes the refractive index of a medium in a band
 float cauchy(float lambda_um, float A, float B) {
     float lambda = clamp(lambda_um, 1e-6, 1e9);
     return clamp(A + B / (lambda * lambda), 0.0, 1e9);
@@ -183,7 +183,7 @@ float cauchy(float lambda_um, float A, float B) {
 // @eq N48: 1/(e^x − 1), x = hc/(λkT)
 // @out y
 // The Planck distribution without its factor. 0 from x = 88 on, where e^x overflows; 2^126 for x → 0 and x ≤ 0.
-// @host crates/optics/src/spectra/mod.rs: lamps told by their temperature
+// @host crates/optics/src/spectra/mod.rs: computes black-body spectra by blackbody; a test compares them with this function
 float planck(float x) {
     float y;
     if (ARITHMETIC == FAST) {
@@ -202,7 +202,7 @@ const float RADIATION_2_LO = 2.2035184e-4;
 // @out L
 // Planck's law, spectral radiance. hc/(λkT) is a double-float: the exponential multiplies its rounding error by its value,
 // up to 88. λ is clamped to [1e-3, 1e4] µm, T to [1e-3, 1e12] K. 0 where the exponent exceeds 88.
-// @host crates/optics/src/spectra/mod.rs: lamps told by their temperature
+// @host crates/optics/src/spectra/mod.rs: computes the spectra of lights that are given by a temperature
 float blackbody(float lambda_um, float T) {
     float lambda = clamp(lambda_um, 1e-3, 1e4);
     float kelvin = clamp(T, 1e-3, 1e12);
@@ -247,7 +247,7 @@ float srgb_decode(float x) {
 // @eq C4 N44 N45: IEC 61966-2-1: encode 12.92 x or 1.055 x^(1/2.4) − 0.055, decode its inverse
 // Negative values give 0; above 1 the power continues. A gamma of 2.2 is another curve, off by 0.034. The tier fast has the
 // same formula with built-in powers, so that it does not change the look of a picture.
-// @lab srgb_encode: laboratory_forms_are_made_of_what_draws
+// @lab srgb_encode: laboratory_forms_agree_with_the_functions_of_pictures
 Srgb srgb(float x) {
     return Srgb(srgb_encode(x), srgb_decode(x));
 }

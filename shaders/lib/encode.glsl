@@ -50,7 +50,7 @@ vec3 unit_or_z(vec3 n) {
 
 // @eq N16: d = decode(round(encode(n)·m)/m), m = 2^(bits − 1) − 1
 // Each component is rounded to the nearest step, as a texture unit stores it. bits is clamped to [2, 24].
-// @lab unit_from_octahedral: what_is_stored_in_fewer_bits_is_off_by_as_much
+// @lab unit_from_octahedral: quantised_values_are_off_by_their_quantisation_error
 OctahedralRoundTrip octahedral_round_trip(vec3 n, uint bits) {
     vec3 unit = unit_or_z(n);
     float steps = snorm_steps(bits);
@@ -63,7 +63,7 @@ OctahedralRoundTrip octahedral_round_trip(vec3 n, uint bits) {
 // Reversed infinite depth: the floats of d have the same relative density at every distance. The tier fast is the standard
 // depth d = far (z − near)/(z (far − near)), which is nearly 1 for most z; only that tier uses `far`. A point nearer than
 // `near` > 0 comes back at `near`, and one with near/z = 0 at infinity. near ≤ 0 gives 0.
-// @lab view_depth: study_scenes_are_where_the_rays_find_them
+// @lab view_depth: the_gbuffer_of_study_scenes_agrees_with_ray_casts
 float depth_round_trip(float z, float near, float far) {
     float z_back;
     if (ARITHMETIC == FAST) {

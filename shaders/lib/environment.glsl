@@ -41,7 +41,7 @@ vec3 prefiltered_radiance(vec3 direction, float alpha) {
     return light_of_environment(textureLod(prefiltered, at, prefiltered_level(alpha)).rgb);
 }
 
-// Irradiance from nine spherical-harmonic coefficients.
+// Ambient light: irradiance from nine spherical-harmonic coefficients, without visibility.
 vec3 environment_irradiance(vec3 n) {
     vec3 d = into_environment(n);
     vec3 e = environment.irradiance[0] * 0.282095;

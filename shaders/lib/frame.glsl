@@ -64,7 +64,7 @@ vec3 cross_of_units(vec3 u, vec3 v) {
 // @out angle
 // arccos(u·v) keeps no digits for small angles. Both arguments scale with |u||v|, so rounded lengths do not matter. Kahan's
 // 2 atan2(|u − v|, |u + v|) is sensitive to them. Lengths are about 1; a zero vector gives 0.
-// @lab atan2f: laboratory_forms_are_made_of_what_draws
+// @lab atan2f: laboratory_forms_agree_with_the_functions_of_pictures
 float angle_between(vec3 u, vec3 v) {
     float angle;
     if (ARITHMETIC == FAST) {
@@ -134,7 +134,7 @@ OrthonormalBasis orthonormal_basis(vec3 n) {
 // @eq N15: the largest of |t·t − 1|, |b·b − 1|, |t·b|, |t·n|, |b·n|
 // @out gram
 // Deviation of a basis from orthonormality, by exact products. NaN counts as 3e38, so that a maximum cannot hide it.
-// @lab orthonormal_basis: laboratory_forms_are_made_of_what_draws
+// @lab orthonormal_basis: laboratory_forms_agree_with_the_functions_of_pictures
 float basis_gram(vec3 n) {
     OrthonormalBasis basis = orthonormal_basis(n);
     float tt = df_add(dot2(basis.t, basis.t), DoubleFloat(-1.0, 0.0)).hi;
@@ -151,7 +151,7 @@ float basis_gram(vec3 n) {
 // needs no division by the determinant, which is 0 already for lengths of 1e-14. The sign of the determinant keeps the
 // fronts of mirrored meshes in front. Each column is scaled by its own power of two, and n is scaled to undo the effect on
 // the cofactors. Where M or n leaves no direction: the zero vector.
-// @host src/upload/scene.rs: the matrix that carries normals of an instance
+// @host src/upload/scene.rs: computes the normal matrix of an instance; a test compares it with this function
 vec3 transformed_normal(vec3 a, vec3 b, vec3 c, vec3 n) {
     vec3 N;
     if (ARITHMETIC == FAST) {
@@ -229,7 +229,7 @@ TriangleNormal triangle_normal(vec3 a, vec3 b, vec3 c) {
 // @eq Q5: N = (a x, b y, c z)/|…|, half the gradient of a x² + b y² + c z²
 // @out N
 // The normal of a level surface is the gradient of its function. At the centre: the zero vector.
-// @host crates/scene/src/study/shape.rs: the normals of balls
+// @host crates/scene/src/study/shape.rs: computes the normals of spheres; a test compares them with this function
 vec3 quadric_normal(vec3 p, vec3 k) {
     vec3 n;
     if (ARITHMETIC == FAST) {

@@ -42,7 +42,7 @@ struct FresnelSchlick {
 };
 
 // @eq F2 N1: F = F0 + (1 − F0)(1 − cosθ)⁵, F0 = ((n − 1)² + κ²)/((n + 1)² + κ²)
-// @lab schlick: laboratory_forms_are_made_of_what_draws
+// @lab schlick: laboratory_forms_agree_with_the_functions_of_pictures
 FresnelSchlick fresnel_schlick(float cos_in, float n, float kappa) {
     float index = clamp(n, 0.0, LARGEST_INDEX);
     float k = clamp(kappa, 0.0, LARGEST_INDEX);

@@ -291,10 +291,10 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
     return r;
 }
 
-// For light from behind a rough surface: the rough BTDF (Walter et al. 2007). A thin-walled surface scatters as its mirror
-// image does, to the other side. Between two media the half vector that refracts v into l is along n₁v + n₂l, and dω_h =
-// n₂² |l·h| / (n₁ v·h + n₂ l·h)² dω_l. Radiance is divided by the square of the index here, so the BSDF has no factor
-// n₁²/n₂²: BSDF times |cosθ| is transmittance times density.
+// Rough transmission, for light from behind a rough surface: the rough BTDF (Walter et al. 2007). A thin-walled surface
+// scatters as its mirror image does, to the other side. Between two media the half vector that refracts v into l is along
+// n₁v + n₂l, and dω_h = n₂² |l·h| / (n₁ v·h + n₂ l·h)² dω_l. Radiance is divided by the square of the index here, so the
+// BSDF has no factor n₁²/n₂²: BSDF times |cosθ| is transmittance times density.
 BsdfEval evaluate_transmission(Layers b, vec3 l) {
     Surface s = b.s;
     float cos_l = dot(s.n, l);

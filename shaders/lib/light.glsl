@@ -20,7 +20,7 @@ struct LightDirectional {
 
 // @eq R3 N14 N25: E cos⁺θ, cosθ = N·L/|L|; E is the irradiance perpendicular to L
 // L may have any length from 1e-37 to 1e38: it is scaled by a power of two before it is squared.
-// @lab arriving_light: lights_of_the_lecture_are_those_that_light_pictures
+// @lab arriving_light: lights_of_the_lecture_agree_with_those_of_pictures
 LightDirectional light_directional(vec3 N, vec3 L, float E) {
     float cos_plus;
     if (ARITHMETIC == FAST) {
@@ -47,7 +47,7 @@ struct LightPoint {
 // @eq R4 N32 N33: E_⊥ = I/r², E = E_⊥ cos⁺θ, of a light at Q with radiant intensity I on a surface at P
 // No smallest radius here: values beyond the range of floats are +∞, never NaN. P = Q gives r² = 0, cos⁺ = 0, E = 0, and
 // E_⊥ = +∞ for I > 0, 0 otherwise. Q − P is a double-float: it does not round.
-// @lab arriving_light: lights_of_the_lecture_are_those_that_light_pictures
+// @lab arriving_light: lights_of_the_lecture_agree_with_those_of_pictures
 LightPoint light_point(vec3 P, vec3 Q, vec3 N, float I) {
     LightPoint r;
     if (ARITHMETIC == FAST) {

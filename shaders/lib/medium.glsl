@@ -1,6 +1,6 @@
 // Absorption in media by the Beer–Lambert law, and quadrature of the optical depth by ray marching (lecture A1, A2).
-// σ in 1/m times a length in m is the optical depth τ; the transmittance is e^(−τ). For a heterogeneous medium τ is the
-// integral of σ along the ray (lib/sigma_grid.glsl).
+// The absorption coefficient σ in 1/m times a length in m is the optical depth τ; the transmittance is e^(−τ). For a
+// heterogeneous medium τ is the integral of σ along the ray (lib/sigma_grid.glsl).
 // Where to read: pbrt 4, section 11.2; RTR 4, section 14.1. Twins: crates/optics/src/. Out of domain: a negative σ, length
 // or κ counts as 0.
 #ifndef MEDIUM_GLSL

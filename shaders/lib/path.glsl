@@ -137,8 +137,8 @@ ShadowRay shadow_ray_to(Path p, Interaction interaction, bool scatters, vec3 fro
 
 // Shades one path vertex. Returns the radiance gathered there; also gives the shadow ray still to be traced, and the
 // continued path p.
-// Steps: 1. the interaction; 2. next event estimation; 3. light found by the path itself; 4. the BSDF sample; 5. further
-// light samples; 6. the continued path; 7. Russian roulette.
+// Steps: 1. the interaction; 2. next event estimation; light found by the path itself: 3a. the environment, 3b. emission
+// of the surface; 4. the BSDF sample; 5. further light samples; 6. the continued path; 7. Russian roulette.
 vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRay shadow_ray) {
     // 1. The interaction: absorption on the way, hit, boundary, BSDF.
     shadow_ray = ShadowRay(p.origin, vec3(0.0, 1.0, 0.0), -1.0, p.source_face, p.media, vec3(0.0));
@@ -166,7 +166,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     bool scatters = at_surface && !passed_by && !hit.s.unlit && (!b.delta || b.shares.z > 0.0 || (CLEARCOAT && !b.coat_delta));
     vec3 front_origin = ray_origin(hit.s.p_bvh, hit.n, hit.s.v);
     if (EMITTERS > 0) light = sample_light(front_origin, dimension_words_of(pixel, vertices_before, DIMENSION_LIGHT, 0, LIGHT_SAMPLES));
-    // 3. Light found by the path itself: the environment, weighted by the power heuristic.
+    // 3a. Light found by the path itself: the environment, weighted by the power heuristic.
     if (ENVIRONMENT) {
         vec3 towards = at_surface ? light.to_light : p.direction;
         vec3 seen = environment_radiance(towards);
@@ -183,7 +183,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     float background_share = mean(p.throughput);
     bool escaped = !at_surface && !SKY && (p.state & PATH_TRANSPARENT_SO_FAR) != 0;
 
-    // 3. Light found by the path itself: emission of the surface, weighted by the power heuristic.
+    // 3b. Light found by the path itself: emission of the surface, weighted by the power heuristic.
     if (at_surface && !passed_by) {
         vec3 emits = hit.s.unlit ? hit.s.base : hit.s.emissive * (CLEARCOAT ? under_coat(hit.s) : 1.0);
         // Single-sided surfaces emit on their front alone.

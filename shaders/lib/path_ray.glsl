@@ -7,22 +7,24 @@
 #include "lib/trace.glsl"
 
 struct Path {
-    vec3 origin;      // bvh space
-    uint source_face;        // coplanar group of the triangle that the ray leaves
+    vec3 origin;       // bvh space
+    uint source_face;  // coplanar group of the triangle that the ray leaves
     vec3 direction;
-    float pdf;        // of the direction, at the last vertex for MIS; 0 where no light sample could have found the same light
+    float pdf;         // of the direction, at the last vertex for MIS; 0 where no light sample could have found the same light
     vec3 throughput;
-    uint state;       // surfaces met | PATH_... | with PATH_GUIDING, as a half: density over density without guiding
+    uint state;        // surfaces met | PATH_... | with PATH_GUIDING, as a half: density over density without guiding
     uvec4 media;
-    float distance_since_vertex;  // since that vertex; of a path that escaped: its share of the background
-    float t_min;      // surfaces up to this t are not hit
-    vec3 sum;         // radiance gathered so far
+    // Length of the path from its last vertex for MIS to `origin`. Once the path has PATH_ESCAPED_TO_BACKGROUND, this
+    // member holds the share of the background instead (radiance_of).
+    float distance_since_vertex;
+    float t_min;       // surfaces up to this t are not hit
+    vec3 sum;          // radiance gathered so far
 };
 const uint PATH_ALIVE = 0x100u;
-const uint PATH_TRANSPARENT_SO_FAR = 0x200u;    // only transmitted or passed by so far: the background is directly visible
-const uint PATH_UNSCATTERED = 0x400u; // not deflected since the eye
-const uint PATH_NON_SPECULAR = 0x800u;   // some surface has scattered it (diffuse or rough lobe)
-const uint PATH_ESCAPED_TO_BACKGROUND = 0x1000u;    // it left the scene with PATH_TRANSPARENT_SO_FAR
+const uint PATH_TRANSPARENT_SO_FAR = 0x200u;     // only transmitted or passed by so far: the background is directly visible
+const uint PATH_UNSCATTERED = 0x400u;            // not deflected since the eye
+const uint PATH_NON_SPECULAR = 0x800u;           // some surface has scattered it (diffuse or rough lobe)
+const uint PATH_ESCAPED_TO_BACKGROUND = 0x1000u; // it left the scene with PATH_TRANSPARENT_SO_FAR
 const uint PATH_SURFACES = 0xffu;
 
 float guiding_pdf_ratio(Path p) {

@@ -38,7 +38,7 @@ DoubleFloat times(DoubleFloat a, float s) {
 // centre are double-floats, for origins near the surface and rays that graze a distant sphere. Without a hit, or for
 // direction 0: 0, 0.
 // Pictures have triangles alone; the near side of a sphere light is found by ball_reach.
-// @lab ball_reach: lights_of_the_lecture_are_those_that_light_pictures
+// @lab ball_reach: lights_of_the_lecture_agree_with_those_of_pictures
 RaySphere ray_sphere(vec3 origin, vec3 direction, vec3 center, float radius) {
     RaySphere r = RaySphere(false, 0.0, 0.0);
     if (ARITHMETIC == FAST) {
@@ -136,7 +136,7 @@ struct Slab {
 
 // @eq N36: t_near = max(0, near_i), t_far = min(t_max, far_i), i = x, y, z; near, far = (centre − origin ∓ half)/direction
 // The slab test of BVH traversal, with its padding. `offset` is that of the scene.
-// @lab meets: every_way_finds_what_brute_force_finds
+// @lab meets: every_traversal_finds_what_brute_force_finds
 Slab slab(vec3 origin, vec3 direction, vec3 centre, vec3 half_size, float offset, float t_max) {
     BoxRay r;
     of_boxes(r, origin, inverse_direction(direction), offset);
@@ -248,7 +248,7 @@ DoubleFloat edge_of_pairs(PairOfAxes a, PairOfAxes b) {
 // The exception is a triangle that subtends less than 2.5e-7 rad, the resolution of sheared coordinates, if rounding flips
 // it. Compensated: double-floats, 1e-14 rad. Both sides of a triangle are hit. A miss, a triangle edge-on, or direction 0:
 // all 0. Vertices and direction are scaled by powers of two, which rounds nothing.
-// @lab sheared_triangle: every_way_finds_what_brute_force_finds
+// @lab sheared_triangle: every_traversal_finds_what_brute_force_finds
 RayTriangle ray_triangle(vec3 origin, vec3 direction, vec3 a, vec3 b, vec3 c) {
     RayTriangle r = RayTriangle(false, 0.0, 0.0, 0.0);
     if (ARITHMETIC == FAST) {
@@ -334,7 +334,7 @@ vec3 hit_point(vec3 origin, vec3 direction, float t, vec3 a, vec3 b, vec3 c, flo
 // @out p_rel
 // Positions are double-floats, 1e-7 m apart at the Earth's radius; their difference is rounded once. Plain floats (the tier
 // fast takes the hi parts) are 6 cm apart at 1e6 m.
-// @host src/upload/scene.rs: places of instances and lights around the eye
+// @host src/upload/scene.rs: computes camera-relative positions of instances and lights
 vec3 camera_relative(vec3 p_hi, vec3 p_lo, vec3 eye_hi, vec3 eye_lo) {
     vec3 p_rel;
     if (ARITHMETIC == FAST) {

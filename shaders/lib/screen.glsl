@@ -20,8 +20,8 @@ float until_negative(float a, float b) {
     return b < 0.0 ? max(a, 0.0) / -b : LARGEST;
 }
 
-// The pixel (row by row) where a ray from a surface first hits a surface of the picture. -1 if it leaves the picture or the
-// depth range, passes behind everything, or hits a surface from behind.
+// Screen-space reflection: the pixel (row by row) where a ray from a surface first hits a surface of the picture. -1 if it
+// leaves the picture or the depth range, passes behind everything, or hits a surface from behind.
 //
 // 1. The ray is a straight line in x, y and z of the screen; each pixel holds a piece of a plane (lib/screen_piece.glsl).
 // 2. A hit is where the ray's distance in front of the piece falls through 0 within the step.

@@ -36,7 +36,7 @@ const uint BY_REFRACTION = 1; // or transmitted undeflected
 struct Branch {
     vec3 origin;      // bvh space
     vec3 direction;
-    uint source_face;        // coplanar group of the triangle that it leaves
+    uint source_face; // coplanar group of the triangle that it leaves
     vec3 throughput;
     uvec4 media;
     float from;       // surfaces up to this t are not hit

@@ -80,7 +80,8 @@ impl Renderer {
         Ok(error_of_halves([&a.rgba, &b.rgba], samples))
     }
 
-    /// The means of the two halves of the last picture's samples, over the background colour; `None` when there is one sum.
+    /// The means of the two halves of the last picture's samples, over the background colour; `None` when there is one
+    /// sum.
     ///
     /// # Errors
     /// When the driver fails.
@@ -132,8 +133,8 @@ impl Renderer {
         self.surfaces(camera, false)
     }
 
-    /// Called-for pixels: for each material of the scene, the number of pixels whose nearest surface at the centre has it, transparent ones
-    /// included.
+    /// Called-for pixels: for each material of the scene, the number of pixels whose nearest surface at the centre has
+    /// it, transparent ones included.
     ///
     /// # Errors
     /// When the driver fails.
@@ -189,8 +190,9 @@ impl Renderer {
     }
 }
 
-/// Tone maps a film that was rendered elsewhere, with these settings: RGBA8 (sRGB-encoded, rows from the top), whether it has
-/// transparency, and the counts of NaN, infinite and negative pixels. `spectral` marks a film of spectral rendering.
+/// Tone maps a film that was rendered elsewhere, with these settings: RGBA8 (sRGB-encoded, rows from the top), whether
+/// it has transparency, and the counts of NaN, infinite and negative pixels. `spectral` marks a film of spectral
+/// rendering.
 ///
 /// # Errors
 /// When the driver fails.

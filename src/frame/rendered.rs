@@ -62,7 +62,8 @@ pub struct Work {
     pub first_not_finite: Option<NotFinite>,
     /// Surfaces at which the loop over lights stopped early, because the driver would have ended it.
     pub lights_cut_off: u64,
-    /// Light of truncated paths, summed over all pixels of all frames: the truncated share of a pixel's light, in parts of 65536.
+    /// Light of truncated paths, summed over all pixels of all frames: the truncated share of a pixel's light, in parts
+    /// of 65536.
     pub lost: u64,
     /// Share of a pixel's light in truncated paths: the mean over all pixels of the picture.
     pub mean_lost: f64,

@@ -28,8 +28,8 @@ pub(super) struct Targets {
     pub(super) lists: Option<FragmentLists>,
     pub(super) radiance: Image,
     pub(super) screen: OnScreen,
-    /// Sums of samples, when there is more than one. Path tracing sums even and odd samples separately: their random numbers
-    /// are independent, so the difference of the two means estimates the picture's error.
+    /// Sums of samples, when there is more than one. Path tracing sums even and odd samples separately: their random
+    /// numbers are independent, so the difference of the two means estimates the picture's error.
     pub(super) sums: Vec<Sum>,
     /// Mean of the samples, when it is not one of the sums.
     pub(super) film: Option<Image>,

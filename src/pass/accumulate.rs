@@ -8,8 +8,8 @@ use crate::gpu::{Frame, Image};
 use crate::shader::{Library, accumulate, lib};
 use crate::upload::spectrum::rgb_from_xyz;
 
-/// Adds `radiance` to `film` and multiplies the sum by `scale`; `first` overwrites the film. With `bands` above 0, `radiance` is
-/// one band of wavelengths in CIE XYZ.
+/// Adds `radiance` to `film` and multiplies the sum by `scale`; `first` overwrites the film. With `bands` above 0,
+/// `radiance` is one band of wavelengths in CIE XYZ.
 ///
 /// # Errors
 /// When the driver refuses a descriptor or a layout.

@@ -1,5 +1,6 @@
-//! Tile classification: lists of the 8x8 tiles with surfaces, background, transparent fragments or rays, and the arguments of
-//! indirect dispatches over them (shaders/pass/classify.comp, classify_fragments.comp, classify_rays.comp).
+//! Tile classification: lists of the 8x8 tiles with surfaces, background, transparent fragments or rays, and the
+//! arguments of indirect dispatches over them (shaders/pass/classify.comp, classify_fragments.comp,
+//! classify_rays.comp).
 //!
 //! Read Real-Time Rendering (4th ed.), chapter 20 (efficient shading), and docs/decisions/work-tiles.md.
 

@@ -1,8 +1,8 @@
-//! Order-independent transparency, second pass: sorts, lights and composites the per-pixel linked lists of fragments (A-buffer,
-//! shaders/pass/composite.comp).
+//! Order-independent transparency, second pass: sorts, lights and composites the per-pixel linked lists of fragments
+//! (A-buffer, shaders/pass/composite.comp).
 //!
-//! Read Carpenter 1984, "The A-buffer, an Antialiased Hidden Surface Method"; Real-Time Rendering (4th ed.), section 5.5;
-//! docs/decisions/transparency.md.
+//! Read Carpenter 1984, "The A-buffer, an Antialiased Hidden Surface Method"; Real-Time Rendering (4th ed.), section
+//! 5.5; docs/decisions/transparency.md.
 
 use anyhow::Result;
 
@@ -25,8 +25,8 @@ pub struct Behind<'a> {
     pub part: Option<Part>,
 }
 
-/// Composites the fragments of one strip over the picture behind them, nearest first. Screen-space lookups see the opaque
-/// surfaces only.
+/// Composites the fragments of one strip over the picture behind them, nearest first. Screen-space lookups see the
+/// opaque surfaces only.
 ///
 /// # Errors
 /// When the driver refuses a descriptor or a layout.

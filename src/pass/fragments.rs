@@ -1,8 +1,8 @@
 //! Order-independent transparency, first pass: transparent surfaces into per-pixel linked lists of fragments (A-buffer,
 //! shaders/pass/fragments.*).
 //!
-//! Read Carpenter 1984, "The A-buffer, an Antialiased Hidden Surface Method"; Yang et al. 2010, "Real-Time Concurrent Linked
-//! List Construction on the GPU"; Real-Time Rendering (4th ed.), section 5.5; docs/decisions/transparency.md.
+//! Read Carpenter 1984, "The A-buffer, an Antialiased Hidden Surface Method"; Yang et al. 2010, "Real-Time Concurrent
+//! Linked List Construction on the GPU"; Real-Time Rendering (4th ed.), section 5.5; docs/decisions/transparency.md.
 
 use std::sync::Arc;
 
@@ -18,7 +18,8 @@ use crate::upload::scene::SceneOnDevice;
 /// Bytes of one fragment.
 const NODE_BYTES: u64 = 4 * lib::fragment_list::NODE_WORDS as u64;
 
-/// Per-pixel linked lists of fragments (A-buffer), built in horizontal strips so that any number of fragments fits memory.
+/// Per-pixel linked lists of fragments (A-buffer), built in horizontal strips so that any number of fragments fits
+/// memory.
 pub struct FragmentLists {
     /// First fragment of each pixel's list.
     pub heads: Image,
@@ -85,7 +86,8 @@ impl FragmentLists {
             .collect()
     }
 
-    /// Whether the fragments of the last frame fitted. If not, the buffer has grown (or the strips have shrunk): draw again.
+    /// Whether the fragments of the last frame fitted. If not, the buffer has grown (or the strips have shrunk): draw
+    /// again.
     ///
     /// # Errors
     /// When memory is short.

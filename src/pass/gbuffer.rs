@@ -1,10 +1,11 @@
 //! The G-buffer: attributes of the nearest opaque surface of every pixel, rasterised for deferred shading
 //! (shaders/pass/gbuffer.*).
 //!
-//! Read Real-Time Rendering (4th ed.), section 20.1 (deferred shading). 24 bytes a pixel beside depth: RGBA16F base colour and
-//! metallic, two octahedral normals (RG32UI, or as the knob `normals` says), RG32UI ids, roughness and occlusion. 16 more for
-//! positions where the knob `position` stores them; 4 for triangles with rays, 8 for emissive textures and 16 for layers
-//! where the plan has them. docs/decisions/gbuffer.md has the cost of narrower and wider formats.
+//! Read Real-Time Rendering (4th ed.), section 20.1 (deferred shading). 24 bytes a pixel beside depth: RGBA16F base
+//! colour and metallic, two octahedral normals (RG32UI, or as the knob `normals` says), RG32UI ids, roughness and
+//! occlusion. 16 more for positions where the knob `position` stores them; 4 for triangles with rays, 8 for emissive
+//! textures and 16 for layers where the plan has them. docs/decisions/gbuffer.md has the cost of narrower and wider
+//! formats.
 
 use std::sync::Arc;
 
@@ -18,8 +19,8 @@ use crate::upload::scene::SceneOnDevice;
 
 const POSITION: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
-/// Format of the normals, two octahedral encodings as integer words (shaders/lib/normals.glsl): every device supports these
-/// formats as colour attachments and storage images, unlike RGBA16_SNORM.
+/// Format of the normals, two octahedral encodings as integer words (shaders/lib/normals.glsl): every device supports
+/// these formats as colour attachments and storage images, unlike RGBA16_SNORM.
 fn normal_format(normals: Normals) -> vk::Format {
     match normals {
         Normals::Oct16 => vk::Format::R32_UINT,

@@ -1,7 +1,8 @@
-//! Recursive ray tracing of reflection and refraction, by indirect dispatch over ray tiles (shaders/pass/interact.comp).
+//! Recursive ray tracing of reflection and refraction, by indirect dispatch over ray tiles
+//! (shaders/pass/interact.comp).
 //!
-//! Read Whitted 1980, "An Improved Illumination Model for Shaded Display"; Schmidt and Budge 2002, "Simple Nested Dielectrics in
-//! Ray Traced Images"; docs/decisions/rays.md. The G-buffer replaces camera rays.
+//! Read Whitted 1980, "An Improved Illumination Model for Shaded Display"; Schmidt and Budge 2002, "Simple Nested
+//! Dielectrics in Ray Traced Images"; docs/decisions/rays.md. The G-buffer replaces camera rays.
 
 use anyhow::Result;
 
@@ -17,8 +18,8 @@ use crate::shader::interact;
 /// truncated.
 const SPARE_BRANCHES: u32 = 4;
 
-/// Adds reflected and refracted light at the surfaces of the G-buffer to `radiance`. With a part, only light of the part is
-/// added: all rays are traced once more, over the same tiles.
+/// Adds reflected and refracted light at the surfaces of the G-buffer to `radiance`. With a part, only light of the
+/// part is added: all rays are traced once more, over the same tiles.
 ///
 /// # Errors
 /// When the driver refuses a descriptor or a layout.

@@ -22,7 +22,8 @@ pub fn light<'a>(
     radiance: &'a Image,
 ) -> Result<()> {
     let mut library = lighting.library;
-    // Without shadow rays, and with the eye outside of closed meshes, the pass sends no ray: one pipeline for all plans.
+    // Without shadow rays, and with the eye outside of closed meshes, the pass sends no ray: one pipeline for all
+    // plans.
     if !library.gbuffer.stored_triangles {
         library.trace = lib::trace::Constants::default();
         library.hit = lib::hit::Constants::default();

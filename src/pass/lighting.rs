@@ -6,8 +6,8 @@ use crate::plan::Plan;
 use crate::shader::Library;
 use crate::shader::light::LightRange;
 
-/// Lights per dispatch when each sends a shadow ray: a traversal takes some 20 to 200 loop iterations, of 65,535 that lavapipe
-/// grants an invocation.
+/// Lights per dispatch when each sends a shadow ray: a traversal takes some 20 to 200 loop iterations, of 65,535 that
+/// lavapipe grants an invocation.
 const LIGHTS_AT_ONCE: u32 = 64;
 
 /// Inputs of the passes that light surfaces.
@@ -25,9 +25,9 @@ pub struct Lighting<'a> {
     pub share: TileShare,
 }
 
-/// The ranges of lights for each dispatch: directional lights, then local ones, at most [`LIGHTS_AT_ONCE`] each. The last
-/// directional range takes the first local one if both are small. Local lights are divided at the same indices with and
-/// without tiled light culling, so the sums are bit-identical.
+/// The ranges of lights for each dispatch: directional lights, then local ones, at most [`LIGHTS_AT_ONCE`] each. The
+/// last directional range takes the first local one if both are small. Local lights are divided at the same indices
+/// with and without tiled light culling, so the sums are bit-identical.
 fn parts(directional: u32, local: u32, listed: bool) -> Vec<LightRange> {
     let of =
         |count: u32| (0..count).step_by(LIGHTS_AT_ONCE as usize).map(move |i| [i, (i + LIGHTS_AT_ONCE).min(count)]);

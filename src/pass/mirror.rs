@@ -1,7 +1,7 @@
 //! Screen-space reflections (SSR), by indirect dispatch over ray tiles (shaders/pass/mirror.comp).
 //!
-//! Read Real-Time Rendering (4th ed.), section 11.6.5 (screen-space methods); McGuire and Mara 2014, "Efficient GPU Screen-Space
-//! Ray Tracing"; docs/decisions/screen-space.md.
+//! Read Real-Time Rendering (4th ed.), section 11.6.5 (screen-space methods); McGuire and Mara 2014, "Efficient GPU
+//! Screen-Space Ray Tracing"; docs/decisions/screen-space.md.
 
 use anyhow::Result;
 

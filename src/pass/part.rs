@@ -9,8 +9,8 @@ use crate::gpu::{Buffer, Device, Image, ImageDesc, Place};
 use crate::plan::rungs::{Reflection, Refraction};
 use crate::plan::{Knobs, Plan, Refused, Setting};
 
-/// Light that rays bring to a pixel's surface. A picture is the sum of both parts and of the surface's own emission, scattered
-/// light and reflection of the prefiltered environment.
+/// Light that rays bring to a pixel's surface. A picture is the sum of both parts and of the surface's own emission,
+/// scattered light and reflection of the prefiltered environment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
     /// Light of rays that the surface, or its coat, reflected first.

@@ -1,8 +1,9 @@
 //! Wavefront path tracing: one dispatch per bounce over a queue of pixels, with stream compaction in between
 //! (shaders/pass/path.comp); or all bounces in one dispatch (path_at_once.comp), for comparison in tests.
 //!
-//! Read pbrt (4th ed.), chapter 15 (wavefront rendering) and sections 13.2 to 13.4; Laine, Karras and Aila 2013, "Megakernels
-//! Considered Harmful"; docs/decisions/paths.md. Estimates use next event estimation with multiple importance sampling.
+//! Read pbrt (4th ed.), chapter 15 (wavefront rendering) and sections 13.2 to 13.4; Laine, Karras and Aila 2013,
+//! "Megakernels Considered Harmful"; docs/decisions/paths.md. Estimates use next event estimation with multiple
+//! importance sampling.
 
 use std::sync::Arc;
 
@@ -121,8 +122,8 @@ pub fn paths<'a>(
     Ok(())
 }
 
-/// Stream compaction: the next queue holds the paths that are not terminated, in the same order. Three dispatches: count per
-/// chunk, prefix sum (scan) over the chunks, scatter.
+/// Stream compaction: the next queue holds the paths that are not terminated, in the same order. Three dispatches:
+/// count per chunk, prefix sum (scan) over the chunks, scatter.
 fn compact<'a>(frame: &mut Frame<'a>, paths: &'a PathsOnDevice, from: usize, to: usize) -> Result<()> {
     let (queue, sizes, chunks) = (&paths.queues[from], &paths.sizes[from], &paths.chunks);
     let bind = queue_count::Bind { queue, sizes, chunks };

@@ -2,8 +2,8 @@
 
 use crate::shader::lib::work_tile::{ROW, WORK_TILE};
 
-/// A share of the picture: every `of`-th tile of 8x8 pixels, in row order, from tile `index` on. Neighbouring tiles take similar
-/// time, so shares do, too.
+/// A share of the picture: every `of`-th tile of 8x8 pixels, in row order, from tile `index` on. Neighbouring tiles
+/// take similar time, so shares do, too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TileShare {
     /// Index of the first tile, less than `of`.
@@ -36,11 +36,11 @@ pub fn rows_of(count: u32) -> [u32; 3] {
     [count.min(ROW), count.div_ceil(ROW), 1]
 }
 
-/// Stride in which `count` workgroups visit the tiles of a picture, modulo `count`: lavapipe gives each of its threads one
-/// contiguous piece of a dispatch, and expensive pixels are often in one part of the picture.
+/// Stride in which `count` workgroups visit the tiles of a picture, modulo `count`: lavapipe gives each of its threads
+/// one contiguous piece of a dispatch, and expensive pixels are often in one part of the picture.
 ///
-/// The stride is about `count` times the golden section, which spreads any number of workgroups evenly. It is coprime to
-/// `count`, so every tile is visited once, and its product with any index fits 32 bits.
+/// The stride is about `count` times the golden section, which spreads any number of workgroups evenly. It is coprime
+/// to `count`, so every tile is visited once, and its product with any index fits 32 bits.
 #[must_use]
 pub fn stride(count: u32) -> u32 {
     let gcd = |mut a: u32, mut b: u32| {
@@ -63,8 +63,8 @@ mod tests {
         for count in [1, 2, 3, 4, 6, 12, 30, 225, 900, 2310, 8160, 65_536] {
             let place = |turn: u32| turn.checked_mul(stride(count)).expect("32 bits") % count;
             let mut places: Vec<u32> = (0..count).map(place).collect();
-            // A half of the first half of the workgroups lies in each half of the picture: the discrepancy of the golden section
-            // grows with the logarithm.
+            // A half of the first half of the workgroups lies in each half of the picture: the discrepancy of the
+            // golden section grows with the logarithm.
             let early = places[..count as usize / 2].iter().filter(|&&place| place < count / 2).count();
             assert!(early.abs_diff(count as usize / 4) <= 1 + count.ilog2() as usize, "{count}: {early}");
             places.sort_unstable();

@@ -1,4 +1,5 @@
-//! The picture as input of screen-space reflection and refraction, with a per-tile depth bound (shaders/lib/screen.glsl).
+//! The picture as input of screen-space reflection and refraction, with a per-tile depth bound
+//! (shaders/lib/screen.glsl).
 //!
 //! Read docs/decisions/screen-space.md.
 

@@ -1,8 +1,8 @@
 //! Shadow maps: depth maps from the lights, drawn once per scene (shaders/pass/shadow_map.*, lib/shadow.glsl).
 //!
-//! Read Williams 1978, "Casting Curved Shadows on Curved Surfaces"; Real-Time Rendering (4th ed.), section 7.4 (shadow maps,
-//! shadow bias, slope offset). Neither lights nor geometry depend on the eye, so the maps are in bvh space and serve all
-//! cameras. All maps are squares in one image, an atlas: the layers of an array would need one size.
+//! Read Williams 1978, "Casting Curved Shadows on Curved Surfaces"; Real-Time Rendering (4th ed.), section 7.4 (shadow
+//! maps, shadow bias, slope offset). Neither lights nor geometry depend on the eye, so the maps are in bvh space and
+//! serve all cameras. All maps are squares in one image, an atlas: the layers of an array would need one size.
 //! docs/decisions/shadow-maps.md explains sizes and bias.
 
 use std::f64::consts::FRAC_PI_3;
@@ -31,11 +31,11 @@ const CUBE: u32 = FLAT / 2;
 const SMALLEST_CUBE: u32 = 64;
 /// Border around the visible region, in texels, for the filter: 2x2 texels around a point, and one for rounding.
 const BORDER: f64 = 2.0;
-/// Largest half angle for a single map, of a spot light's cone or of the scene seen from outside. A plane is stretched by the
-/// squared tangent towards its edge, so wider lights get a cube of six maps.
+/// Largest half angle for a single map, of a spot light's cone or of the scene seen from outside. A plane is stretched
+/// by the squared tangent towards its edge, so wider lights get a cube of six maps.
 const WIDEST_CONE: f64 = FRAC_PI_3;
-/// Distance of a light, in radii of the scene, from which on its depth range encloses the scene: depths relative to a large
-/// distance would lose precision.
+/// Distance of a light, in radii of the scene, from which on its depth range encloses the scene: depths relative to a
+/// large distance would lose precision.
 const FAR: f64 = 4.0;
 /// Texels per map in the light table.
 const FACE_TEXELS: usize = SHADOW_MAP_TEXELS as usize;
@@ -127,7 +127,8 @@ impl ShadowMaps {
 }
 
 impl Face {
-    /// The light table's texels of the map: its square, and the matrix rows to (x, y, depth, 1) times w, in texels of the atlas.
+    /// The light table's texels of the map: its square, and the matrix rows to (x, y, depth, 1) times w, in texels of
+    /// the atlas.
     fn texels(&self) -> [[f32; 4]; FACE_TEXELS] {
         let [x, y, side] = self.square.map(f64::from);
         let [cx, cy, cz, cw] = self.clip;
@@ -137,8 +138,8 @@ impl Face {
         [[x as f32, y as f32, side as f32, 0.0], row(across), row(down), row(cz), row(cw)]
     }
 
-    /// Whether a box (centre, half extent) may intersect the map's frustum: it is not entirely outside of one plane. A NaN
-    /// counts as visible.
+    /// Whether a box (centre, half extent) may intersect the map's frustum: it is not entirely outside of one plane. A
+    /// NaN counts as visible.
     fn sees(&self, middle: DVec3, half: DVec3) -> bool {
         let [x, y, z, w] = self.clip;
         ![w + x, w - x, w + y, w - y, w - z].iter().any(|plane| {
@@ -257,8 +258,8 @@ fn clip_rows(light: &Light, side: u32, bounds: Bounds, anchor: DVec3) -> Vec<[DV
         LightKind::Directional { direction } => {
             let right = direction.any_orthonormal_vector();
             let down = direction.cross(right);
-            // The box around the scene in the light's axes. Its centre is the anchor, except for scenes with vertices that are not
-            // finite.
+            // The box around the scene in the light's axes. Its centre is the anchor, except for scenes with vertices
+            // that are not finite.
             let (middle, half) = (bounds.center() - anchor, (bounds.max - bounds.min) * 0.5);
             let reach = |axis: DVec3| axis.abs().dot(half).max(1e-6 * radius);
             let row = |axis: DVec3, scale: f64| (axis * scale).extend(-axis.dot(middle) * scale);

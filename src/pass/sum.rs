@@ -1,8 +1,8 @@
 //! Sums of samples in blocks, so that a split render is bit-identical (shaders/pass/accumulate.comp, join.comp).
 //!
-//! Read docs/decisions/shards.md. The samples of a picture are added in blocks of equal size, first to last, and then the
-//! blocks. The blocks depend only on the number of samples. Processes that draw different blocks therefore produce the same
-//! sum as one process, to the last bit: a sum in single precision depends on its order.
+//! Read docs/decisions/shards.md. The samples of a picture are added in blocks of equal size, first to last, and then
+//! the blocks. The blocks depend only on the number of samples. Processes that draw different blocks therefore produce
+//! the same sum as one process, to the last bit: a sum in single precision depends on its order.
 
 use std::sync::Arc;
 
@@ -75,8 +75,8 @@ impl Sum {
         self.open.is_none()
     }
 
-    /// Adds a sample, or one band of it. The total restarts with the block that contains the sample `from`, and is multiplied by
-    /// `scale` whenever a block has been added.
+    /// Adds a sample, or one band of it. The total restarts with the block that contains the sample `from`, and is
+    /// multiplied by `scale` whenever a block has been added.
     ///
     /// # Errors
     /// When the driver refuses a descriptor or a layout.

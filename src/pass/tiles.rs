@@ -1,4 +1,5 @@
-//! Tiled light culling: the point and spot lights that reach each 16x16 tile (shaders/pass/tile_depth.comp, tiles.comp).
+//! Tiled light culling: the point and spot lights that reach each 16x16 tile (shaders/pass/tile_depth.comp,
+//! tiles.comp).
 //!
 //! Read Real-Time Rendering (4th ed.), section 20.3 (tiled shading), and docs/decisions/light-lists.md.
 

@@ -9,7 +9,8 @@ use anyhow::{Result, ensure};
 use crate::gpu::{Buffer, Device, Frame, Image, Place};
 use crate::shader::tonemap;
 
-/// A known word that the pass writes back: neither a count nor a fill pattern, it proves that the device executes commands.
+/// A known word that the pass writes back: neither a count nor a fill pattern, it proves that the device executes
+/// commands.
 const CANARY: u32 = 0x65_74_61_6c;
 
 /// The host-visible output of the last pass.
@@ -61,9 +62,9 @@ impl Display {
     }
 }
 
-/// Multiplies a film by `scale`, exposes it by `exposure` stops, applies tone curve number `curve`, and encodes sRGB. `background`
-/// is display-linear with alpha 1, or all 0 to keep transparency. With `desaturates`, colours outside of Rec. 709 keep
-/// their luminance.
+/// Multiplies a film by `scale`, exposes it by `exposure` stops, applies tone curve number `curve`, and encodes sRGB.
+/// `background` is display-linear with alpha 1, or all 0 to keep transparency. With `desaturates`, colours outside of
+/// Rec. 709 keep their luminance.
 ///
 /// # Errors
 /// When the driver refuses a descriptor or a layout.

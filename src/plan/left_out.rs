@@ -5,7 +5,8 @@ use super::knobs::rungs::{Absorption, Indirect, Lobes, Quadrature, Reflection};
 use super::surfaces::{Surfaces, Transmission, casts_in_maps};
 use crate::scene::{AlphaMode, Material};
 
-/// One sentence for each property of these surfaces that the chosen rungs do not show, and for each rung without effect.
+/// One sentence for each property of these surfaces that the chosen rungs do not show, and for each rung without
+/// effect.
 pub(super) fn left_out(
     surfaces: &Surfaces,
     knobs: &Knobs,

@@ -245,8 +245,8 @@ impl Planner<'_> {
         let replaced = |light: &Light| light.proxy && followed.is_some_and(|paths| paths.emitting);
         let useful = |light: &Light| light.shines() && reaches(light) && !replaced(light);
         let useful_lights = scene.lights.iter().filter(|light| useful(light)).count();
-        // Black placeholder lights keep loops non-empty when lights are forced but absent. Beside real lights they would waste
-        // shadow maps.
+        // Black placeholder lights keep loops non-empty when lights are forced but absent. Beside real lights they
+        // would waste shadow maps.
         let is_forced = needs_lights(surroundings.forced);
         let proxy = is_forced && useful_lights == 0;
         // At most two placeholders.

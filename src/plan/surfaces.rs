@@ -16,14 +16,15 @@ pub(super) struct Transmission {
     pub(super) march: March,
 }
 
-/// Whether a surface is drawn by order-independent transparency: an alpha-blended surface, or a transmissive one when no rays
-/// refract (`refracting_rays`).
+/// Whether a surface is drawn by order-independent transparency: an alpha-blended surface, or a transmissive one when
+/// no rays refract (`refracting_rays`).
 #[must_use]
 pub fn is_transparent(material: &Material, refracting_rays: bool) -> bool {
     material.alpha_mode == AlphaMode::Blend || (material.transmission > 0.0 && !refracting_rays)
 }
 
-/// Whether a surface is drawn into shadow maps. Transparent and transmissive surfaces are not: light passes unattenuated.
+/// Whether a surface is drawn into shadow maps. Transparent and transmissive surfaces are not: light passes
+/// unattenuated.
 #[must_use]
 pub fn casts_in_maps(material: &Material) -> bool {
     !is_transparent(material, false)

@@ -33,7 +33,8 @@ pub struct Plan {
     pub ambient: bool,
     /// The environment is the background.
     pub sky: bool,
-    /// Passes for order-independent transparency: alpha-blended surfaces, and transmissive ones without refracting rays.
+    /// Passes for order-independent transparency: alpha-blended surfaces, and transmissive ones without refracting
+    /// rays.
     pub transparency: bool,
     /// For each light of the scene, whether it is kept.
     pub lights: Vec<bool>,
@@ -43,18 +44,20 @@ pub struct Plan {
     pub local_lights: u32,
     /// Tiled light culling.
     pub tiles: bool,
-    /// The table of directional albedo: for the split sum of an environment, and for energy compensation of multiple scattering.
+    /// The table of directional albedo: for the split sum of an environment, and for energy compensation of multiple
+    /// scattering.
     pub reflectance: bool,
     /// Shadow maps for the lights.
     pub shadow_maps: bool,
     /// Ray tracing with the BVH; `None` when no pass sends rays.
     pub rays: Option<Rays>,
-    /// Path tracing, which replaces all other passes that light surfaces. `None`: direct light from punctual lights, and
-    /// recursive rays from smooth surfaces.
+    /// Path tracing, which replaces all other passes that light surfaces. `None`: direct light from punctual lights,
+    /// and recursive rays from smooth surfaces.
     pub paths: Option<Paths>,
     /// Screen-space reflection and refraction.
     pub screen: Screen,
-    /// Perceptual roughness up to which surfaces reflect by rays or in screen space instead of the prefiltered environment.
+    /// Perceptual roughness up to which surfaces reflect by rays or in screen space instead of the prefiltered
+    /// environment.
     pub roughest_mirror: f32,
     /// Number of bands of wavelengths, rendered one after the other; 0 for RGB.
     pub bands: u32,
@@ -66,7 +69,8 @@ pub struct Plan {
     pub samples: u32,
     /// Every effect with its state and reason.
     pub effects: Vec<Effect>,
-    /// Textures and texture coordinates of the scene that are neither decoded nor uploaded, with reasons, one sentence each.
+    /// Textures and texture coordinates of the scene that are neither decoded nor uploaded, with reasons, one sentence
+    /// each.
     pub unread: Vec<String>,
     /// Parts of this scene that the chosen rungs simplify or omit, one sentence each.
     pub warnings: Vec<String>,
@@ -159,8 +163,8 @@ pub struct Screen {
     pub mirrors: bool,
     /// Screen-space reflection of the nearest transparent surfaces.
     pub transparent_mirrors: bool,
-    /// Screen-space refraction: a transmissive surface shows the picture where the refracted ray leaves it. Transmissive
-    /// surfaces are then drawn as transparent surfaces.
+    /// Screen-space refraction: a transmissive surface shows the picture where the refracted ray leaves it.
+    /// Transmissive surfaces are then drawn as transparent surfaces.
     pub refraction: bool,
 }
 

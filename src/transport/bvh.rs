@@ -1,22 +1,22 @@
 //! Bounding volume hierarchy (BVH) over the triangles of a scene, and its memory layouts for traversal.
 //!
-//! Read pbrt (4th ed.), section 7.3; docs/decisions/rays.md. `ploc.rs` builds the topology (PLOC); the figure [`Bvh::sah`]
-//! is the surface area heuristic.
+//! Read pbrt (4th ed.), section 7.3; docs/decisions/rays.md. `ploc.rs` builds the topology (PLOC); the figure
+//! [`Bvh::sah`] is the surface area heuristic.
 //!
 //! Rays need all triangles in one space whose coordinates f32 can represent: **bvh space**, the world's axes in metres
 //! with the origin at the anchor, the centre of the scene. A view adds one vector to positions relative to its eye.
 //!
 //! The tree is binary. There are two layouts:
 //!
-//! - A **list with skip pointers** (threaded BVH, [`Bvh::links`]) for stackless traversal: nodes in depth-first order, each
-//!   inner node with a link to the node after its subtree. A ray that hits a box continues with the next node, one that
-//!   misses follows the link. Inner nodes whose box is hardly smaller than their parent's are omitted. A list fixes the
-//!   order of siblings, so there is one list per octant of directions (nearest hit) and one that visits small boxes with
-//!   many nodes first (any hit).
+//! - A **list with skip pointers** (threaded BVH, [`Bvh::links`]) for stackless traversal: nodes in depth-first order,
+//!   each inner node with a link to the node after its subtree. A ray that hits a box continues with the next node, one
+//!   that misses follows the link. Inner nodes whose box is hardly smaller than their parent's are omitted. A list
+//!   fixes the order of siblings, so there is one list per octant of directions (nearest hit) and one that visits small
+//!   boxes with many nodes first (any hit).
 //! - **Nodes with both children's boxes** ([`Bvh::stack_nodes`]) for traversal with a stack.
 //!
-//! Boxes are centre and half extent, in f32 or in 16 bits of a [`Grid`] over the scene. All are conservative: they contain
-//! their triangles with a margin, so a slab test in f32 misses none.
+//! Boxes are centre and half extent, in f32 or in 16 bits of a [`Grid`] over the scene. All are conservative: they
+//! contain their triangles with a margin, so a slab test in f32 misses none.
 
 use std::sync::atomic::{AtomicU64, Ordering as Memory};
 
@@ -42,14 +42,14 @@ const MAX_COORDINATE: f32 = 4.253_529_6e37; // 2^125
 /// Margin around a quantised box in units of the grid: one unit, and more than the rounding of f64.
 const SPARE_UNITS: f64 = 1.0 + 1.0 / 1_048_576.0;
 
-/// Margin around a box in f32, relative to the largest coordinate: four rounding errors of f32, the error of a slab test for
-/// rays from anywhere in the scene.
+/// Margin around a box in f32, relative to the largest coordinate: four rounding errors of f32, the error of a slab
+/// test for rays from anywhere in the scene.
 const SPARE_FLOAT: f64 = 1.0 / 4_194_304.0;
 
-/// Ratio of surface areas, inner node to nearest listed ancestor, below which a list keeps the inner node. A box with two
-/// children that a share p of the rays hits costs 1 + 2 p tests, or 2 without it: it pays for p under 1/2. With deeper
-/// subtrees it pays a little longer: at 70 thousand triangles a ray took 36.9 tests with all boxes, 36.8, 35.5, 35.3 and
-/// 36.0 with 0.4, 0.5, 0.6 and 0.7, and 35.0 with the optimum by dynamic programming.
+/// Ratio of surface areas, inner node to nearest listed ancestor, below which a list keeps the inner node. A box with
+/// two children that a share p of the rays hits costs 1 + 2 p tests, or 2 without it: it pays for p under 1/2. With
+/// deeper subtrees it pays a little longer: at 70 thousand triangles a ray took 36.9 tests with all boxes, 36.8, 35.5,
+/// 35.3 and 36.0 with 0.4, 0.5, 0.6 and 0.7, and 35.0 with the optimum by dynamic programming.
 const WORTH_TESTING: f64 = 0.6;
 
 /// Unit of the grid along an axis without extent, relative to the largest coordinate: 16 rounding errors of f32.
@@ -58,7 +58,8 @@ const LEAST_UNIT: f64 = 1.0 / 1_048_576.0;
 /// A triangle in bvh space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Triangle {
-    /// Corners in bvh space, in the mesh's order. A vertex that triangles of one instance share is bit-identical in all of them.
+    /// Corners in bvh space, in the mesh's order. A vertex that triangles of one instance share is bit-identical in all
+    /// of them.
     pub corners: [[f32; 3]; 3],
     /// Index into [`Scene::instances`].
     pub instance: u32,
@@ -73,8 +74,8 @@ impl Triangle {
         self.corners.iter().fold(Aabb::EMPTY, |all, &corner| all.union(&Aabb { min: corner, max: corner }))
     }
 
-    /// Whether a ray can hit the triangle: its corners are finite in f32, and its area is not zero. Differences of f32 and their
-    /// products are nearly exact in f64, so a sliver does not count as degenerate.
+    /// Whether a ray can hit the triangle: its corners are finite in f32, and its area is not zero. Differences of f32
+    /// and their products are nearly exact in f64, so a sliver does not count as degenerate.
     fn is_solid(&self) -> bool {
         let held = self.corners.iter().flatten().all(|x| x.abs() < MAX_COORDINATE);
         let [a, b, c] = self.corners.map(|corner| Vec3::from(corner).as_dvec3());
@@ -116,8 +117,8 @@ impl Node {
 /// The order of siblings in a list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Order {
-    /// Front to back: the nearer child first, along the axis in which the children's centres differ most, for directions
-    /// whose component i is negative where bit i is set.
+    /// Front to back: the nearer child first, along the axis in which the children's centres differ most, for
+    /// directions whose component i is negative where bit i is set.
     Octant(u8),
     /// The child with less surface area per node of its subtree first.
     AnyHit,
@@ -167,8 +168,8 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Centre and half extent of a box, rounded outwards by at least a unit. Rays use the whole word as the centre; the half
-    /// extent in its low bits then adds a fraction of a unit to the centre.
+    /// Centre and half extent of a box, rounded outwards by at least a unit. Rays use the whole word as the centre; the
+    /// half extent in its low bits then adds a fraction of a unit to the centre.
     fn encode(&self, bounds: &Aabb) -> [i32; 3] {
         [0, 1, 2].map(|axis| {
             let (middle, unit) = (f64::from(self.middle[axis]), f64::from(self.unit[axis]));
@@ -191,8 +192,8 @@ pub struct Bvh {
     pub nodes: Vec<Node>,
     /// Depth: edges from the root to the deepest leaf.
     pub depth: u32,
-    /// Surface area heuristic (SAH): expected cost of a ray that hits the root's box, 1 for each inner node and each triangle of
-    /// a leaf, weighted by the surface area of the node's box.
+    /// Surface area heuristic (SAH): expected cost of a ray that hits the root's box, 1 for each inner node and each
+    /// triangle of a leaf, weighted by the surface area of the node's box.
     pub sah: f64,
     /// Number of omitted triangles: corners that are not finite in bvh space, or no area.
     pub dropped: usize,
@@ -273,8 +274,8 @@ impl Bvh {
         weighted.sum::<f64>() / self.nodes[0].bounds().half_area()
     }
 
-    /// Checks the invariants of every traversal: each node but the root is the child of exactly one earlier node, each triangle
-    /// is in exactly one leaf, boxes contain their contents, and the depth is correct.
+    /// Checks the invariants of every traversal: each node but the root is the child of exactly one earlier node, each
+    /// triangle is in exactly one leaf, boxes contain their contents, and the depth is correct.
     ///
     /// # Errors
     /// One sentence: the first thing that is wrong.
@@ -357,8 +358,8 @@ impl Bvh {
         Grid { middle, unit }
     }
 
-    /// Whether 16-bit boxes are precise enough: at least half of the leaves' boxes are four or more units long along their
-    /// longest axis.
+    /// Whether 16-bit boxes are precise enough: at least half of the leaves' boxes are four or more units long along
+    /// their longest axis.
     #[must_use]
     pub fn fits_grid(&self) -> bool {
         let unit = self.grid().unit;
@@ -383,8 +384,8 @@ impl Bvh {
         sizes
     }
 
-    /// The nodes that a list keeps: all leaves, and inner nodes so much smaller than their nearest listed ancestor that a miss
-    /// of their box saves more tests than the test of the box costs.
+    /// The nodes that a list keeps: all leaves, and inner nodes so much smaller than their nearest listed ancestor that
+    /// a miss of their box saves more tests than the test of the box costs.
     fn listed(&self) -> Vec<bool> {
         let mut listed = vec![true; self.nodes.len()];
         let mut area_above = vec![f64::INFINITY; self.nodes.len()];
@@ -416,8 +417,8 @@ impl Bvh {
         }
     }
 
-    /// The nodes as a list with skip pointers, closed by a sentinel: a node of zeros whose link points to itself. Indices count
-    /// nodes, not texels.
+    /// The nodes as a list with skip pointers, closed by a sentinel: a node of zeros whose link points to itself.
+    /// Indices count nodes, not texels.
     #[must_use]
     pub fn links(&self, order: Order, format: Format) -> Vec<[u32; 4]> {
         let listed = self.listed();
@@ -467,8 +468,9 @@ impl Bvh {
         orders.par_iter().map(|&order| self.links(order, format)).collect()
     }
 
-    /// The inner nodes in depth-first order, one [`StackNode`] each, for traversal with a stack. The root is node 0. A missing
-    /// child (the right one of a single leaf, both without triangles) has a box of negative extent that no ray hits.
+    /// The inner nodes in depth-first order, one [`StackNode`] each, for traversal with a stack. The root is node 0. A
+    /// missing child (the right one of a single leaf, both without triangles) has a box of negative extent that no ray
+    /// hits.
     #[must_use]
     pub fn stack_nodes(&self) -> Vec<[u32; 4]> {
         let spare = self.reach() * SPARE_FLOAT;

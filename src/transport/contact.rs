@@ -1,4 +1,5 @@
-//! Coincident geometry: closed dielectric meshes that touch other surfaces (coincident interfaces), and duplicate triangles.
+//! Coincident geometry: closed dielectric meshes that touch other surfaces (coincident interfaces), and duplicate
+//! triangles.
 //!
 //! Read docs/decisions/rays.md. Rays cross coincident interfaces together, because they are closer than the ray offset.
 
@@ -84,8 +85,8 @@ fn touches(bvh: &Bvh, triangle: &Triangle, distance: f64) -> bool {
     false
 }
 
-/// Whether the corners of `small` lie in the plane of `large`. The plane of a small triangle is not accurate over the extent
-/// of a large one, so the caller tests both ways.
+/// Whether the corners of `small` lie in the plane of `large`. The plane of a small triangle is not accurate over the
+/// extent of a large one, so the caller tests both ways.
 fn in_plane(large: &Triangle, small: &Triangle, distance: f64) -> bool {
     let [a, b, c] = corners(large);
     let n = (b - a).cross(c - a).normalize_or_zero();

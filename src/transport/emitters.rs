@@ -1,8 +1,10 @@
-//! Light sampling by power: the discrete distribution over lights, emissive triangles and the environment (lecture R2–R4).
+//! Light sampling by power: the discrete distribution over lights, emissive triangles and the environment (lecture
+//! R2–R4).
 //!
 //! Read pbrt (4th ed.), sections 12.6 (light sampling), 12.5 (infinite area lights) and 2.3 (inversion method).
-//! Importance sampling inverts a CDF: cumulative probabilities are 32-bit fixed point, a random 32-bit word selects a bin by
-//! binary search, and every bin has at least one word. Units: radiance in the scene's units, areas in square metres.
+//! Importance sampling inverts a CDF: cumulative probabilities are 32-bit fixed point, a random 32-bit word selects a
+//! bin by binary search, and every bin has at least one word. Units: radiance in the scene's units, areas in square
+//! metres.
 
 use glam::{DMat3, DVec3};
 
@@ -48,8 +50,8 @@ pub struct Emitters {
     pub environment: EnvironmentCdf,
 }
 
-/// Environment CDF: a piecewise-constant distribution over cells of the map. The marginal CDF over rows comes first, then, row
-/// by row, the conditional CDF over columns.
+/// Environment CDF: a piecewise-constant distribution over cells of the map. The marginal CDF over rows comes first,
+/// then, row by row, the conditional CDF over columns.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct EnvironmentCdf {
     /// Number of columns.
@@ -73,8 +75,8 @@ pub struct Sky<'a> {
     pub rotation: f32,
 }
 
-/// CDF in 32-bit fixed point: for each weight the first word of its bin and its probability (bin size over 2³²). No bin is
-/// empty; weights without a finite positive sum give equal bins.
+/// CDF in 32-bit fixed point: for each weight the first word of its bin and its probability (bin size over 2³²). No bin
+/// is empty; weights without a finite positive sum give equal bins.
 fn shares(weights: &[f64]) -> Vec<(u32, f64)> {
     const ALL: f64 = 4_294_967_296.0;
     let count = weights.len() as f64;
@@ -103,8 +105,8 @@ fn is_emitter(material: &Material) -> bool {
         && material.clearcoat == 0.0
 }
 
-/// Power of a light relative to π, the power of one side of a square metre of radiance 1. A directional light's power is that
-/// through the scene's largest cross-section.
+/// Power of a light relative to π, the power of one side of a square metre of radiance 1. A directional light's power
+/// is that through the scene's largest cross-section.
 fn power(light: &Light, radius: f64) -> f64 {
     use std::f64::consts::PI;
     let towards = match light.kind {
@@ -246,8 +248,8 @@ impl EnvironmentCdf {
         Self { columns, rows, words, rotation: 0.0 }
     }
 
-    /// Samples a world-space direction with two random words: `sample_environment` of shaders/lib/emitters.glsl without the jitter
-    /// within a cell.
+    /// Samples a world-space direction with two random words: `sample_environment` of shaders/lib/emitters.glsl without
+    /// the jitter within a cell.
     #[must_use]
     pub fn direction(&self, words: [u32; 2]) -> DVec3 {
         let (columns, rows) = (self.columns as usize, self.rows as usize);

@@ -1,9 +1,9 @@
-//! Recursive ray tracing of one pixel on the host (lecture R1 to R6): reflected and refracted rays, and shadow rays to each
-//! light from scattering surfaces.
+//! Recursive ray tracing of one pixel on the host (lecture R1 to R6): reflected and refracted rays, and shadow rays to
+//! each light from scattering surfaces.
 //!
-//! Read Whitted 1980, "An Improved Illumination Model for Shaded Display". The rays explain a pixel to a user; no picture is
-//! made of them. They are in f64 and use textbook formulas. Normals are those of the corners, without normal maps; media
-//! and energy shares are those of green light.
+//! Read Whitted 1980, "An Improved Illumination Model for Shaded Display". The rays explain a pixel to a user; no
+//! picture is made of them. They are in f64 and use textbook formulas. Normals are those of the corners, without normal
+//! maps; media and energy shares are those of green light.
 
 use std::sync::Arc;
 

@@ -1,14 +1,14 @@
 //! Layered BSDF in f64: the twin of shaders/lib/layers.glsl for rays on the host, which are photons
-//! ([`super::photon_guiding`]) and the ray of a picked pixel ([`super::events`]). BSDF sampling chooses a layer by its share
-//! of the energy, then a direction of its lobe.
+//! ([`super::photon_guiding`]) and the ray of a picked pixel ([`super::events`]). BSDF sampling chooses a layer by its
+//! share of the energy, then a direction of its lobe.
 //!
 //! Read pbrt (4th ed.), chapter 9 (BSDFs) and section 14.3 (layered materials); Schmidt and Budge 2002, "Simple Nested
 //! Dielectrics in Ray Traced Images"; the glTF extensions `KHR_materials_clearcoat`, `KHR_materials_specular`,
 //! `KHR_materials_transmission` and `KHR_materials_volume`.
 //!
 //! From the top: a clear coat; the base, which is a dielectric interface, a conductor, or a mixture of both; below the
-//! interface a diffuse base layer, or transmission. A layer passes on the energy left under its Fresnel reflectance at the
-//! ray's angle. Fresnel terms are exact. Textures and vertex colours are ignored: they count as 1.
+//! interface a diffuse base layer, or transmission. A layer passes on the energy left under its Fresnel reflectance at
+//! the ray's angle. Fresnel terms are exact. Textures and vertex colours are ignored: they count as 1.
 
 use glam::DVec3;
 
@@ -21,7 +21,8 @@ use crate::scene::{AlphaMode, Scene};
 use crate::share::COAT_INDEX;
 pub use crate::share::MIN_ROUGHNESS as SMOOTHEST;
 
-/// The media around a ray as materials, in the order in which the ray entered them (nested dielectrics, shaders/lib/media.glsl).
+/// The media around a ray as materials, in the order in which the ray entered them (nested dielectrics,
+/// shaders/lib/media.glsl).
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Media(Vec<usize>);
 
@@ -38,8 +39,8 @@ impl Media {
         self.0.iter().copied().max_by_key(|&material| scene.materials[material].priority)
     }
 
-    /// The interface at a surface for a ray in these media (nested dielectrics, shaders/lib/boundary.glsl). `front`: the ray meets
-    /// the outer side; `index`: index of refraction of a material at the ray's wavelength.
+    /// The interface at a surface for a ray in these media (nested dielectrics, shaders/lib/boundary.glsl). `front`:
+    /// the ray meets the outer side; `index`: index of refraction of a material at the ray's wavelength.
     #[must_use]
     pub fn cross(
         &self,
@@ -129,8 +130,8 @@ fn base_color(m: &Material) -> DVec3 {
     rgb([r, g, b])
 }
 
-/// Fresnel reflectance of the interface, normalised: 0 is its value at normal incidence, 1 at grazing incidence and under total
-/// reflection; 0 between equal indices.
+/// Fresnel reflectance of the interface, normalised: 0 is its value at normal incidence, 1 at grazing incidence and
+/// under total reflection; 0 between equal indices.
 fn boundary_share(cos: f64, before: f64, behind: f64) -> f64 {
     if before == behind {
         return 0.0;
@@ -139,8 +140,8 @@ fn boundary_share(cos: f64, before: f64, behind: f64) -> f64 {
     ((fresnel_dielectric(cos, behind / before)[0] - f0) / (1.0 - f0).max(1e-12)).clamp(0.0, 1.0)
 }
 
-/// Fresnel reflectance of the dielectric part, from the normalised reflectance `share`. KHR_materials_specular tints F0, so
-/// the exact curve is rescaled between F0 and F90; a tint in air applies between two media, too.
+/// Fresnel reflectance of the dielectric part, from the normalised reflectance `share`. KHR_materials_specular tints
+/// F0, so the exact curve is rescaled between F0 and F90; a tint in air applies between two media, too.
 fn fresnel_of_dielectric(m: &Material, at: &Boundary, share: f64) -> DVec3 {
     let specular = f64::from(m.specular);
     let in_air = nested_f0(1.0, at.ior);
@@ -151,8 +152,8 @@ fn fresnel_of_dielectric(m: &Material, at: &Boundary, share: f64) -> DVec3 {
     f0 + (DVec3::splat(f90) - f0) * share
 }
 
-/// Fresnel reflectance of the conductor part, in a medium: Schlick's approximation when only a colour is known; otherwise n
-/// and κ, tinted by the ratio of the colour to their reflectance at normal incidence.
+/// Fresnel reflectance of the conductor part, in a medium: Schlick's approximation when only a colour is known;
+/// otherwise n and κ, tinted by the ratio of the colour to their reflectance at normal incidence.
 fn fresnel_of_metal(m: &Material, n_outside: f64, cos: f64) -> DVec3 {
     let f0 = base_color(m);
     let curve = |f0: f64, index: Option<[f64; 2]>| match index {
@@ -211,7 +212,8 @@ impl Layers {
         self.shares[layer as usize]
     }
 
-    /// Whether a layer scatters (diffuse or glossy) instead of having a specular (delta) lobe: its roughness exceeds `roughest`.
+    /// Whether a layer scatters (diffuse or glossy) instead of having a specular (delta) lobe: its roughness exceeds
+    /// `roughest`.
     #[must_use]
     pub fn spreads(&self, layer: Layer, roughest: f32) -> bool {
         match layer {
@@ -227,7 +229,8 @@ impl Layers {
         Layer::ALL.into_iter().any(|layer| self.share(layer) != DVec3::ZERO && self.spreads(layer, roughest))
     }
 
-    /// Samples a layer in proportion to its mean energy share; `None` when the light is absorbed. `x` is uniform in [0, 1).
+    /// Samples a layer in proportion to its mean energy share; `None` when the light is absorbed. `x` is uniform in [0,
+    /// 1).
     #[must_use]
     pub fn sample(&self, x: f64) -> Option<Layer> {
         let mut before = 0.0;
@@ -237,8 +240,8 @@ impl Layers {
         })
     }
 
-    /// The half vector of reflection or refraction of light from `direction`: the normal for a specular lobe, otherwise a visible
-    /// normal (VNDF) sampled with two uniform numbers in [0, 1).
+    /// The half vector of reflection or refraction of light from `direction`: the normal for a specular lobe, otherwise
+    /// a visible normal (VNDF) sampled with two uniform numbers in [0, 1).
     #[must_use]
     pub fn half_vector(&self, layer: Layer, direction: DVec3, n: DVec3, u: [f64; 2]) -> DVec3 {
         if !self.spreads(layer, SMOOTHEST) {
@@ -251,9 +254,9 @@ impl Layers {
         x * h.x + y * h.y + n * h.z
     }
 
-    /// The outgoing direction of light from `direction` at a half vector, for any layer but the diffuse one. The shading normal
-    /// and the geometric normal are on the side of the incident light. `None` when a rough lobe leaves on the wrong side, and
-    /// beyond the critical angle.
+    /// The outgoing direction of light from `direction` at a half vector, for any layer but the diffuse one. The
+    /// shading normal and the geometric normal are on the side of the incident light. `None` when a rough lobe leaves
+    /// on the wrong side, and beyond the critical angle.
     #[must_use]
     pub fn direction(&self, layer: Layer, direction: DVec3, [n, flat]: [DVec3; 2], h: DVec3) -> Option<DVec3> {
         let rough = self.spreads(layer, SMOOTHEST);
@@ -273,8 +276,8 @@ impl Layers {
     }
 }
 
-/// Keeps a direction on one side of the geometric normal `flat`: a specular direction on the wrong side is mirrored back, a
-/// rough one is discarded.
+/// Keeps a direction on one side of the geometric normal `flat`: a specular direction on the wrong side is mirrored
+/// back, a rough one is discarded.
 fn on_side(direction: DVec3, flat: DVec3, rough: bool) -> Option<DVec3> {
     let wrong = direction.dot(flat).min(0.0);
     (!rough || wrong == 0.0).then(|| direction - 2.0 * wrong * flat)
@@ -465,7 +468,8 @@ mod tests {
         }
     }
 
-    /// Glossy directions stay on their side; a specular lobe has one reflected and one refracted direction for all random numbers.
+    /// Glossy directions stay on their side; a specular lobe has one reflected and one refracted direction for all
+    /// random numbers.
     #[test]
     fn directions_leave_on_the_side_of_their_layer() {
         let direction = DVec3::new(0.6, 0.0, -0.8);

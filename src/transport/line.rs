@@ -1,7 +1,7 @@
 //! Ray casting through the BVH on the host, in f64: a slab test per box, an intersection test per triangle.
 //!
-//! Read Möller and Trumbore 1997, "Fast, Minimum Storage Ray/Triangle Intersection"; Real-Time Rendering (4th ed.), chapter 22.
-//! Coordinates are in bvh space.
+//! Read Möller and Trumbore 1997, "Fast, Minimum Storage Ray/Triangle Intersection"; Real-Time Rendering (4th ed.),
+//! chapter 22. Coordinates are in bvh space.
 
 use glam::DVec3;
 
@@ -23,8 +23,8 @@ pub(super) struct Crossing<'a> {
 pub(super) struct Facing {
     /// Whether the line meets the front side; fronts of closed meshes face outwards.
     pub(super) front: bool,
-    /// Unit shading normal, interpolated from the corners, on the line's side. The geometric normal replaces it where it faces
-    /// away, near silhouettes, or is NaN.
+    /// Unit shading normal, interpolated from the corners, on the line's side. The geometric normal replaces it where
+    /// it faces away, near silhouettes, or is NaN.
     pub(super) normal: DVec3,
     /// Unit geometric normal on the line's side.
     pub(super) flat: DVec3,
@@ -60,8 +60,8 @@ impl Crossing<'_> {
     }
 }
 
-/// Calls `crossed` with each intersection of a line from `origin` (bvh space) with t > `from`, in no order. The return value
-/// of `crossed` is the new upper limit of t.
+/// Calls `crossed` with each intersection of a line from `origin` (bvh space) with t > `from`, in no order. The return
+/// value of `crossed` is the new upper limit of t.
 pub(super) fn traverse<'a>(
     bvh: &'a Bvh,
     origin: DVec3,

@@ -1,6 +1,8 @@
-//! The host's part of light transport: BVH, light sampling tables, photons for path guiding, and the rays of one picked pixel.
+//! The host's part of light transport: BVH, light sampling tables, photons for path guiding, and the rays of one picked
+//! pixel.
 //!
-//! Read pbrt (4th ed.), chapters 7 and 12 to 14. This module uses scenes and no Vulkan; [`crate::upload`] uploads its results.
+//! Read pbrt (4th ed.), chapters 7 and 12 to 14. This module uses scenes and no Vulkan; [`crate::upload`] uploads its
+//! results.
 
 mod aabb;
 pub mod bvh;

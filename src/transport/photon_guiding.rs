@@ -1,13 +1,13 @@
 //! Path guiding by photons: the guiding distribution of path tracing, from photon mapping.
 //!
-//! Read Jensen 1995, "Importance Driven Path Tracing using the Photon Map"; pbrt (4th ed.), section 13.4 (path tracing).
-//! BSDF sampling at a diffuse surface rarely hits the small part of a sphere in which the lamp is seen, and the path is then
-//! very bright (a caustic). A few photons are therefore traced from the lights first. For each cell of a grid over the
-//! scene, a few bounding spheres cover the points that photons last left before they arrived in the cell. A path in the
-//! cell samples the cones of these spheres.
+//! Read Jensen 1995, "Importance Driven Path Tracing using the Photon Map"; pbrt (4th ed.), section 13.4 (path
+//! tracing). BSDF sampling at a diffuse surface rarely hits the small part of a sphere in which the lamp is seen, and
+//! the path is then very bright (a caustic). A few photons are therefore traced from the lights first. For each cell of
+//! a grid over the scene, a few bounding spheres cover the points that photons last left before they arrived in the
+//! cell. A path in the cell samples the cones of these spheres.
 //!
-//! The guiding distribution only changes how often paths take a direction. The mixture density with BSDF sampling divides the
-//! estimate, so the expected picture is the same, however few or wrong the photons are.
+//! The guiding distribution only changes how often paths take a direction. The mixture density with BSDF sampling
+//! divides the estimate, so the expected picture is the same, however few or wrong the photons are.
 
 use std::collections::HashMap;
 
@@ -166,8 +166,8 @@ impl PhotonWorld<'_> {
         }
     }
 
-    /// Traces one photon to the first diffuse or glossy surface after a specular one, and to the next from there: caustics are
-    /// small and bright, and light other surfaces.
+    /// Traces one photon to the first diffuse or glossy surface after a specular one, and to the next from there:
+    /// caustics are small and bright, and light other surfaces.
     fn follow(&self, number: u64) -> impl Iterator<Item = Photon> {
         let mut found = [None; 2];
         let mut random = PhotonRandom(number);
@@ -303,9 +303,9 @@ impl PhotonGuiding {
     }
 }
 
-/// At most [`MOST_SPHERES`] spheres that cover the points, chosen greedily: each is the candidate with the best score among the
-/// points not yet covered. BSDF sampling alone finds a sphere of radius r with a variance of (points)²/r²; the score and
-/// the probability are proportional to its root.
+/// At most [`MOST_SPHERES`] spheres that cover the points, chosen greedily: each is the candidate with the best score
+/// among the points not yet covered. BSDF sampling alone finds a sphere of radius r with a variance of (points)²/r²;
+/// the score and the probability are proportional to its root.
 fn spheres(points: &[DVec3], cell: f64) -> Vec<GuidingBall> {
     let mut left = points.to_vec();
     let mut found: Vec<GuidingBall> = Vec::new();
@@ -321,7 +321,8 @@ fn spheres(points: &[DVec3], cell: f64) -> Vec<GuidingBall> {
         found.push(GuidingBall { middle, radius: MARGIN * radius, share: score });
         left.retain(|p| p.distance_squared(middle) > radius * radius);
     }
-    // Probabilities are exact in half floats: if they did not sum to 1, the sampled density would differ from the computed one.
+    // Probabilities are exact in half floats: if they did not sum to 1, the sampled density would differ from the
+    // computed one.
     let sum: f64 = found.iter().map(|sphere| sphere.share).sum();
     found.iter_mut().for_each(|sphere| sphere.share = (sphere.share / sum * SHARES).floor().max(1.0) / SHARES);
     let others: f64 = found.iter().skip(1).map(|sphere| sphere.share).sum();

@@ -1,15 +1,15 @@
 //! BVH construction: parallel locally-ordered clustering (PLOC), then two optimisations of the crate `obvhs`.
 //!
 //! Read Meister and Bittner 2018, "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy Construction" and
-//! "Parallel Reinsertion for Bounding Volume Hierarchy Optimization". Clustering sorts boxes by Morton code. Each box finds
-//! the neighbour within a search radius whose common box has the smallest surface area, and mutual nearest neighbours
-//! merge, until one cluster is left. Reinsertion then moves subtrees to lower the surface area heuristic (SAH), and small
-//! subtrees collapse into leaves.
+//! "Parallel Reinsertion for Bounding Volume Hierarchy Optimization". Clustering sorts boxes by Morton code. Each box
+//! finds the neighbour within a search radius whose common box has the smallest surface area, and mutual nearest
+//! neighbours merge, until one cluster is left. Reinsertion then moves subtrees to lower the surface area heuristic
+//! (SAH), and small subtrees collapse into leaves.
 //!
-//! The clustering is implemented here, because a round of the crate's merges only mutual pairs, and in some scenes that is
-//! one pair a round: 20 000 equal boxes in a row, such as the posts of a fence, took it 6.3 s and 20 000 nested boxes
-//! 12.7 s, both growing with the square. Here both sides of a pair break ties the same way, and a round with too few mutual
-//! pairs merges neighbours in order.
+//! The clustering is implemented here, because a round of the crate's merges only mutual pairs, and in some scenes that
+//! is one pair a round: 20 000 equal boxes in a row, such as the posts of a fence, took it 6.3 s and 20 000 nested
+//! boxes 12.7 s, both growing with the square. Here both sides of a pair break ties the same way, and a round with too
+//! few mutual pairs merges neighbours in order.
 
 use obvhs::bvh2::leaf_collapser::collapse;
 use obvhs::bvh2::node::Bvh2Node;
@@ -20,29 +20,30 @@ use rayon::prelude::*;
 
 use super::aabb::Aabb;
 
-/// Search radius: neighbours on either side. With 14 a million triangles of one surface take 0.1 s longer at equal cost; a
-/// building of 390 000 costs 0.3 to 1.8 % less.
+/// Search radius: neighbours on either side. With 14 a million triangles of one surface take 0.1 s longer at equal
+/// cost; a building of 390 000 costs 0.3 to 1.8 % less.
 const RADIUS: usize = 8;
 
-/// A round with fewer than one mutual pair in this many clusters merges in order instead. Of a million triangles one pair in
-/// two to six clusters is mutual until ten thousand clusters are left; the first round in order comes below two thousand.
+/// A round with fewer than one mutual pair in this many clusters merges in order instead. Of a million triangles one
+/// pair in two to six clusters is mutual until ten thousand clusters are left; the first round in order comes below two
+/// thousand.
 const STALLED: usize = 16;
 
-/// Share of the nodes in the first pass of reinsertion, before and after leaves collapse. 0.1 before takes 120 ms more at a
-/// million triangles and gains 0.4 %.
+/// Share of the nodes in the first pass of reinsertion, before and after leaves collapse. 0.1 before takes 120 ms more
+/// at a million triangles and gains 0.4 %.
 const REINSERTED: [f32; 2] = [0.05, 0.1];
 
 /// Largest number of triangles in a collapsed leaf.
 const LEAF: u32 = 4;
 
-/// Cost of an inner node relative to a triangle test, for collapsing (SAH). With 2 a third of the nodes disappears; a ray
-/// takes 3 % fewer steps and tests 30 to 40 % more triangles.
+/// Cost of an inner node relative to a triangle test, for collapsing (SAH). With 2 a third of the nodes disappears; a
+/// ray takes 3 % fewer steps and tests 30 to 40 % more triangles.
 const STEP: f32 = 1.0;
 
 /// A BVH with one leaf entry per box. There must be at least one box; all are finite, and not all are one point.
 ///
-/// The same boxes give the same tree on any number of threads. Only the topology of the result is meaningful: its boxes are
-/// scaled.
+/// The same boxes give the same tree on any number of threads. Only the topology of the result is meaningful: its boxes
+/// are scaled.
 pub(super) fn arrange(boxes: &[Aabb]) -> Bvh2 {
     let (mut tree, by_order) = cluster(boxes);
     // Many merges in order mean that boxes are nested. Reinsertion then takes time that grows with the square (200 000:
@@ -55,8 +56,8 @@ pub(super) fn arrange(boxes: &[Aabb]) -> Bvh2 {
     tree
 }
 
-/// The boxes, scaled so that the longest side of the scene is 1 … 2: surface areas neither overflow nor underflow. A power of
-/// two changes no comparison.
+/// The boxes, scaled so that the longest side of the scene is 1 … 2: surface areas neither overflow nor underflow. A
+/// power of two changes no comparison.
 fn scaled(boxes: &[Aabb]) -> (Aabb, Vec<obvhs::aabb::Aabb>) {
     let all = boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b));
     let side = (0..3).map(|axis| all.size(axis)).fold(0.0, f64::max);
@@ -123,8 +124,8 @@ fn cluster(boxes: &[Aabb]) -> (Bvh2, usize) {
     (tree, by_order)
 }
 
-/// The neighbour whose common box with cluster `i` has the smallest surface area. Ties are broken by `i ^ j`, which is the same
-/// from both sides: in a row of equal boxes 0 finds 1 and 2 finds 3.
+/// The neighbour whose common box with cluster `i` has the smallest surface area. Ties are broken by `i ^ j`, which is
+/// the same from both sides: in a row of equal boxes 0 finds 1 and 2 finds 3.
 fn nearest(clusters: &[Bvh2Node], i: usize) -> usize {
     let own = *clusters[i].aabb();
     let (mut best, mut least) = (i, f32::INFINITY);

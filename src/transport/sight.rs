@@ -1,7 +1,8 @@
-//! Number of transparent surfaces along straight lines of sight: a lower bound for the surfaces that a path must cross to
-//! reach what is behind them. Refracted and internally reflected paths cross more.
+//! Number of transparent surfaces along straight lines of sight: a lower bound for the surfaces that a path must cross
+//! to reach what is behind them. Refracted and internally reflected paths cross more.
 //!
-//! Read docs/decisions/interfaces.md. `etalon plan` prints the light that each rung of `interfaces` loses along these lines.
+//! Read docs/decisions/interfaces.md. `etalon plan` prints the light that each rung of `interfaces` loses along these
+//! lines.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -18,8 +19,8 @@ const LINES: u32 = 160;
 pub struct Sight {
     /// Largest number of transparent surfaces on one line, before the first opaque one.
     pub most: u32,
-    /// For each number of surfaces from 0 up to `most`: the largest share of light behind that many surfaces, over all lines
-    /// with more surfaces. A path that ends there loses this share.
+    /// For each number of surfaces from 0 up to `most`: the largest share of light behind that many surfaces, over all
+    /// lines with more surfaces. A path that ends there loses this share.
     pub left: Vec<f64>,
 }
 
@@ -54,7 +55,8 @@ pub fn along_lines(scene: &Scene, bvh: &Bvh, camera: &Camera, size: [u32; 2]) ->
     Sight { most: most as u32, left: left.collect() }
 }
 
-/// The line of sight through a point of the picture (−1 … 1 to the right and up): origin and unit direction in world space.
+/// The line of sight through a point of the picture (−1 … 1 to the right and up): origin and unit direction in world
+/// space.
 pub(super) fn line_through(camera: &Camera, aspect: f64, at: DVec2) -> (DVec3, DVec3) {
     let m = camera.world_from_camera.matrix3;
     let eye = camera.world_from_camera.translation;
@@ -70,8 +72,8 @@ pub(super) fn line_through(camera: &Camera, aspect: f64, at: DVec2) -> (DVec3, D
     }
 }
 
-/// The share of light left behind each transparent surface along a line, before the first opaque one. `origin` is in bvh
-/// space.
+/// The share of light left behind each transparent surface along a line, before the first opaque one. `origin` is in
+/// bvh space.
 fn shares(scene: &Scene, bvh: &Bvh, origin: DVec3, direction: DVec3) -> Vec<f64> {
     let mut found: Vec<(f64, u32, f64)> = Vec::new();
     let mut opaque = f64::INFINITY;

@@ -1,4 +1,5 @@
-//! The light sampling tables of path tracing on the device (shaders/lib/emitters.glsl): light sampling by power, environment CDF.
+//! The light sampling tables of path tracing on the device (shaders/lib/emitters.glsl): light sampling by power,
+//! environment CDF.
 //!
 //! [`crate::transport::emitters`] computes them.
 

@@ -2,8 +2,8 @@
 //! directional albedo (shaders/pass/prefilter.comp).
 //!
 //! Read Karis 2013, "Real Shading in Unreal Engine 4", for the split sum; Ramamoorthi and Hanrahan 2001, "An Efficient
-//! Representation for Irradiance Environment Maps"; Real-Time Rendering (4th ed.), chapter 10. Prefiltering runs once per map
-//! and is stored in the user's cache folder; the file name contains a hash of the map and of the shader.
+//! Representation for Irradiance Environment Maps"; Real-Time Rendering (4th ed.), chapter 10. Prefiltering runs once
+//! per map and is stored in the user's cache folder; the file name contains a hash of the map and of the shader.
 
 use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
@@ -171,8 +171,8 @@ fn box_chain(environment: &Environment) -> Levels {
     }
 }
 
-/// Mip levels of the prefiltered map, of halving width from at most [`WIDEST`] to [`NARROWEST`] texels: level 0 is the map,
-/// every other level is filtered with the GGX lobe of α = 16 / width.
+/// Mip levels of the prefiltered map, of halving width from at most [`WIDEST`] to [`NARROWEST`] texels: level 0 is the
+/// map, every other level is filtered with the GGX lobe of α = 16 / width.
 fn prefilter(device: &Arc<Device>, sky: &Image, chain: &Levels) -> Result<Levels> {
     let first = chain.iter().position(|(width, ..)| *width <= WIDEST).unwrap_or(chain.len() - 1);
     let (width, height, base) = &chain[first];
@@ -238,10 +238,11 @@ fn cache_file(device: &Device, chain: &Levels) -> Option<PathBuf> {
 }
 
 /// Directional albedo of the GGX lobe, split into the factors of F0 and F90 (split sum, Karis 2013):
-/// A = ∫ (1 − (1 − V·H)⁵) G₂ V·H / (N·H N·V), B the same integral with (1 − V·H)⁵, over the distribution of half vectors.
+/// A = ∫ (1 − (1 − V·H)⁵) G₂ V·H / (N·H N·V), B the same integral with (1 − V·H)⁵, over the distribution of half
+/// vectors.
 ///
-/// The table is computed once per process, in two forms: with the albedo of an extension's lobe in the other channels, or
-/// without.
+/// The table is computed once per process, in two forms: with the albedo of an extension's lobe in the other channels,
+/// or without.
 fn reflectance_table(lobes: u32) -> &'static [Texel] {
     static TABLES: [OnceLock<Vec<Texel>>; 2] = [const { OnceLock::new() }; 2];
     let side = REFLECTANCE as usize;
@@ -260,9 +261,10 @@ fn reflectance_table(lobes: u32) -> &'static [Texel] {
     TABLES[usize::from(over.is_some())].get_or_init(|| (0..side).into_par_iter().flat_map_iter(row).collect())
 }
 
-/// Importance sampling of the visible normals (VNDF, Heitz 2018): each sample's weight is G₂ / G₁(V), at most 1, so the sum
-/// never exceeds the received energy. 512 samples are accurate to 3e-3, and to 6e-4 in the mean over the table's texels;
-/// with 128, white metals of roughness 0.5 reflected 1.002 of the received light. Sampling D alone needs 4096 for 4e-3.
+/// Importance sampling of the visible normals (VNDF, Heitz 2018): each sample's weight is G₂ / G₁(V), at most 1, so the
+/// sum never exceeds the received energy. 512 samples are accurate to 3e-3, and to 6e-4 in the mean over the table's
+/// texels; with 128, white metals of roughness 0.5 reflected 1.002 of the received light. Sampling D alone needs 4096
+/// for 4e-3.
 fn directional_reflectance(cos_v: f64, roughness: f64) -> [f64; 2] {
     const SAMPLES: u32 = 512;
     let alpha = roughness * roughness;

@@ -1,4 +1,5 @@
-//! Uploads: the device's buffers and images of a prepared scene, one file per table, and the descriptor sets that bind them.
+//! Uploads: the device's buffers and images of a prepared scene, one file per table, and the descriptor sets that bind
+//! them.
 //!
 //! Read docs/frame.md. Uploads happen before the first frame; [`crate::pass`] reads them.
 

@@ -1,8 +1,8 @@
 //! Ray tracing data on the device: the BVH in the layout of its traversal, triangles, and shading data of their corners
 //! (shaders/lib/trace.glsl, hit.glsl).
 //!
-//! Read pbrt (4th ed.), section 7.3 (BVH), and docs/decisions/rays.md. Coordinates are in bvh space: world axes, metres, origin
-//! at the anchor.
+//! Read pbrt (4th ed.), section 7.3 (BVH), and docs/decisions/rays.md. Coordinates are in bvh space: world axes,
+//! metres, origin at the anchor.
 
 use std::mem::offset_of;
 use std::sync::Arc;
@@ -33,8 +33,8 @@ use crate::transport::bvh::{Format, Order, Triangle};
 use crate::transport::emitters::{EmitterSource, Emitters};
 use crate::transport::photon_guiding::PhotonGuiding;
 
-/// Largest size of the eight octant-ordered node lists in bytes, some two million nodes of 16 bytes: they are eight copies of
-/// the BVH.
+/// Largest size of the eight octant-ordered node lists in bytes, some two million nodes of 16 bytes: they are eight
+/// copies of the BVH.
 const MOST_ORDERED_BYTES: usize = 256 << 20;
 
 /// The BVH traversal.
@@ -43,7 +43,8 @@ const MOST_ORDERED_BYTES: usize = 256 << 20;
 pub enum Traversal {
     /// Stackless traversal by skip pointers (threaded BVH), with quantised nodes of 16 bytes.
     Links16 = LINKS_16 as isize,
-    /// Stackless traversal by skip pointers, with nodes of 32 bytes, for scenes whose boxes are too small for a 16-bit grid.
+    /// Stackless traversal by skip pointers, with nodes of 32 bytes, for scenes whose boxes are too small for a 16-bit
+    /// grid.
     Links32 = LINKS_32 as isize,
     /// Traversal with a stack; nodes of 64 bytes hold the boxes of both children.
     Stack = STACK as isize,
@@ -140,14 +141,20 @@ impl RaysOnDevice {
         };
         let &Hierarchy { ref bvh, build_ms, offset, touching, .. } = hierarchy;
         let start = std::time::Instant::now();
+        // The traversal: without a stack where the driver limits loops, with 16-bit boxes where these are precise
+        // enough.
         let by_links = if bvh.fits_grid() { Traversal::Links16 } else { Traversal::Links32 };
         let default = if device.limits_loops() { by_links } else { Traversal::Stack };
         let traversal = traversal.unwrap_or(default);
         let format = if traversal == Traversal::Links32 { Format::Float } else { Format::Quantised };
+        // One node list per octant of directions is front to back for every ray, as long as eight copies of the BVH are
+        // small.
         let ordered = Order::OCTANTS.len() * bvh.nodes.len() * format.texels() * 16;
         let octants = traversal != Traversal::Stack && ordered <= MOST_ORDERED_BYTES;
+        // Surfaces that shadow rays may pass, by instance and then by triangle.
         let filter: Vec<bool> = (0..scene.instances.len()).map(|i| is_filter(scene, solids, plan, i)).collect();
         let filters: Vec<bool> = bvh.triangles.iter().map(|t| filter[t.instance as usize]).collect();
+        // The nodes in the layout of the traversal. A walk along links ends at the sentinel.
         let (nodes, sentinel) = match traversal {
             Traversal::Stack => (bvh.stack_nodes(), 0),
             Traversal::Links16 | Traversal::Links32 => {
@@ -156,6 +163,7 @@ impl RaysOnDevice {
                 (lists.concat(), lists[0].len() / format.texels() - 1)
             }
         };
+        // A ray ignores the coplanar group that it starts from: groups of the meshes, numbered through the scene.
         let first_triangle = scene.first_triangles();
         let faces_of_meshes: Vec<Vec<u32>> = scene.meshes.par_iter().map(flat_faces).collect();
         let faces: Vec<u32> = bvh
@@ -167,12 +175,14 @@ impl RaysOnDevice {
             })
             .collect();
         let corners = CornerTable::of(scene, solids, rays, plan.paths.is_some());
+        // Paths that hit an emissive triangle need its density as a light sample: its probability over its area.
         let mut picked = vec![0.0; scene.triangles()];
         for emitter in &emitters.list {
             if let EmitterSource::Triangle { index, area, .. } = emitter.source {
                 picked[index as usize] = (emitter.probability / area) as f32;
             }
         }
+        // Triangles in leaf order, with the front counter-clockwise also where the instance is mirrored.
         let triangles: Vec<BvhTriangle> = bvh
             .triangles
             .par_iter()
@@ -184,6 +194,7 @@ impl RaysOnDevice {
                 BvhTriangle { a, stops, b, face, c, picked }
             })
             .collect();
+        // The way back from a triangle of the scene to its leaf; dropped triangles have none.
         let mut leaf_places = vec![u32::MAX; scene.triangles()];
         for (place, t) in bvh.triangles.iter().enumerate() {
             leaf_places[(first_triangle[t.instance as usize] + t.primitive) as usize] = place as u32;
@@ -349,9 +360,10 @@ fn is_filter(scene: &Scene, solids: &Solids, plan: &Plan, instance: usize) -> bo
     }
 }
 
-/// The coplanar group of each triangle of a mesh, identified by its first triangle: consecutive triangles with a common edge
-/// in one plane, within the precision of the coordinates. A ray that leaves such a group cannot hit it again. The group
-/// prevents self-intersection with the other half of a quad seen edge-on, where an intersection test is not reliable.
+/// The coplanar group of each triangle of a mesh, identified by its first triangle: consecutive triangles with a common
+/// edge in one plane, within the precision of the coordinates. A ray that leaves such a group cannot hit it again. The
+/// group prevents self-intersection with the other half of a quad seen edge-on, where an intersection test is not
+/// reliable.
 fn flat_faces(mesh: &Mesh) -> Vec<u32> {
     let at = |i: u32| glam::Vec3::from(mesh.positions[i as usize]).as_dvec3();
     let mut faces: Vec<u32> = Vec::with_capacity(mesh.indices.len() / 3);

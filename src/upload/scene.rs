@@ -111,7 +111,8 @@ pub struct SceneOnDevice {
     pub grids: SigmaGrids,
     /// Instances, relative to the eye of the current view.
     pub instances: Buffer,
-    /// Lights, relative to the eye of the current view: directional first, `LIGHT_TEXELS` each; then the shadow map table.
+    /// Lights, relative to the eye of the current view: directional first, `LIGHT_TEXELS` each; then the shadow map
+    /// table.
     pub lights: Buffer,
     lights_cpu: Vec<Light>,
     /// Shadow maps of each light, stored in its last texel.
@@ -162,8 +163,8 @@ fn stream<T: bytemuck::NoUninit>(
 }
 
 impl SceneOnDevice {
-    /// Uploads a scene and moves decoded images and geometry out of it. `anchor` is the origin of bvh space. Textures in
-    /// `before` are reused when they hold the same images.
+    /// Uploads a scene and moves decoded images and geometry out of it. `anchor` is the origin of bvh space. Textures
+    /// in `before` are reused when they hold the same images.
     ///
     /// # Errors
     /// When the scene does not fit the device.
@@ -390,8 +391,8 @@ impl SceneOnDevice {
         self.page_sets.iter().zip(&self.page_materials).map(|(set, m)| set.bind(entries(m))).collect()
     }
 
-    /// The draws of all instances with transparent or with opaque materials, in the file's order. With `inside`, back faces of
-    /// transmissive materials are drawn, too, because the eye is inside a closed dielectric mesh.
+    /// The draws of all instances with transparent or with opaque materials, in the file's order. With `inside`, back
+    /// faces of transmissive materials are drawn, too, because the eye is inside a closed dielectric mesh.
     #[must_use]
     pub fn draws(&self, transparency: bool, inside: bool) -> Vec<Draw<'_>> {
         self.placements
@@ -405,8 +406,8 @@ impl SceneOnDevice {
             .collect()
     }
 
-    /// The draws of all surfaces in shadow maps, without culling, as a shadow ray stops at either side; only instances whose
-    /// world-space bounding box (centre, half extent) passes `is_seen`.
+    /// The draws of all surfaces in shadow maps, without culling, as a shadow ray stops at either side; only instances
+    /// whose world-space bounding box (centre, half extent) passes `is_seen`.
     #[must_use]
     pub fn casters(&self, is_seen: impl Fn(DVec3, DVec3) -> bool) -> Vec<Draw<'_>> {
         let material = |p: &Placement| &self.materials_cpu[self.meshes[p.mesh].material];
@@ -519,9 +520,10 @@ fn upsampling(knobs: &Knobs) -> Upsampling {
     }
 }
 
-/// The constants of a material. F0 of a dielectric is ((n − 1) / (n + 1))², tinted and scaled by KHR_materials_specular.
-/// Optical depth is −ln(attenuation colour) · thickness / attenuation distance (lecture A1, KHR_materials_volume). A grid of
-/// σ that is not marched (`grid` is 0) adds its mean. In a band, `shares` are the band's shares of red, green and blue.
+/// The constants of a material. F0 of a dielectric is ((n − 1) / (n + 1))², tinted and scaled by
+/// KHR_materials_specular. Optical depth is −ln(attenuation colour) · thickness / attenuation distance (lecture A1,
+/// KHR_materials_volume). A grid of σ that is not marched (`grid` is 0) adds its mean. In a band, `shares` are the
+/// band's shares of red, green and blue.
 fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32, shares: Option<[f64; 3]>) -> share::Material {
     let r = (m.ior - 1.0) / (m.ior + 1.0);
     let absorbs = knobs.absorption != rungs::Absorption::Off;
@@ -575,9 +577,9 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32, shares:
     }
 }
 
-/// F0 and base colour from which shaders/lib/layers.glsl reconstructs k_s and k_d of the scene. B5 lacks (L + V)² in the
-/// denominator of its lobe, which is 4 at normal incidence. B6 scales the diffuse base layer by the energy that F0 leaves, so
-/// the colour is divided by it where specular and diffuse together reflect no more than they receive.
+/// F0 and base colour from which shaders/lib/layers.glsl reconstructs k_s and k_d of the scene. B5 lacks (L + V)² in
+/// the denominator of its lobe, which is 4 at normal incidence. B6 scales the diffuse base layer by the energy that F0
+/// leaves, so the colour is divided by it where specular and diffuse together reflect no more than they receive.
 fn phong(m: &Material, knobs: &Knobs, f0: [f32; 3]) -> ([f32; 3], [f32; 3]) {
     let [red, green, blue, _] = m.base_color;
     let r = (m.ior - 1.0) / (m.ior + 1.0);
@@ -596,8 +598,8 @@ pub fn cofactors(m: DMat3) -> DMat3 {
     DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
 }
 
-/// Normals transform by the cofactor matrix, which needs no division and tolerates a singular matrix. The determinant's sign
-/// keeps them outside of mirrored objects, and a power of two keeps them in range (numerics.md 41).
+/// Normals transform by the cofactor matrix, which needs no division and tolerates a singular matrix. The determinant's
+/// sign keeps them outside of mirrored objects, and a power of two keeps them in range (numerics.md 41).
 fn shared_instance(placement: &Placement, eye: DVec3, material: usize) -> share::Instance {
     let m = placement.world_from_object.matrix3;
     let determinant = m.determinant();
@@ -677,7 +679,8 @@ pub(crate) struct LightMaps {
     pub(crate) infinite_far: bool,
 }
 
-/// A medium in the ray's list of media (shaders/lib/media.glsl): priority of nested dielectrics, and material index plus 1.
+/// A medium in the ray's list of media (shaders/lib/media.glsl): priority of nested dielectrics, and material index
+/// plus 1.
 #[must_use]
 pub fn medium(material: &Material, index: usize) -> u32 {
     let priority = (material.priority.clamp(-0x7fff, 0x7fff) + 0x8000) as u32;

@@ -84,8 +84,8 @@ impl<'a> OnDevice<'a> {
         vec![scene.bind(self.scene_entries()), paths.bind(self.path_entries())]
     }
 
-    /// Specialization constants of `shaders/lib/`; `tile_words` is the number of words of a tile's light mask. A pass that needs
-    /// other values changes its own copy and states why.
+    /// Specialization constants of `shaders/lib/`; `tile_words` is the number of words of a tile's light mask. A pass
+    /// that needs other values changes its own copy and states why.
     #[must_use]
     pub fn library(&self, plan: &Plan, knobs: &Knobs, tile_words: u32) -> Library {
         let &Self { scene, rays, .. } = self;

@@ -35,8 +35,8 @@ pub struct SpectrumConstants {
 }
 
 impl SpectrumOnDevice {
-    /// Buffers for spectral or RGB rendering, with an upsampling grid if `fitted`: reflectances of textures or vertex colours
-    /// are then fitted sigmoids.
+    /// Buffers for spectral or RGB rendering, with an upsampling grid if `fitted`: reflectances of textures or vertex
+    /// colours are then fitted sigmoids.
     ///
     /// # Errors
     /// When memory is short.

@@ -13,7 +13,8 @@ pub(super) fn pack_half_2x16([x, y]: [f16; 2]) -> u32 {
     u32::from(x.to_bits()) | u32::from(y.to_bits()) << 16
 }
 
-/// A buffer with `data` in the device's fastest memory: written directly on a CPU device, through a staging buffer on others.
+/// A buffer with `data` in the device's fastest memory: written directly on a CPU device, through a staging buffer on
+/// others.
 ///
 /// # Errors
 /// When the data does not fit the device.

@@ -1,7 +1,7 @@
 //! Textures as pages: images of one size and transfer function are the layers of one array image, with mip levels.
 //!
-//! Read Real-Time Rendering (4th ed.), section 6.2 (mipmapping); the Vulkan specification, chapter Image Operations. lavapipe
-//! cannot index arrays of sampled images, but an array layer is only a coordinate.
+//! Read Real-Time Rendering (4th ed.), section 6.2 (mipmapping); the Vulkan specification, chapter Image Operations.
+//! lavapipe cannot index arrays of sampled images, but an array layer is only a coordinate.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -73,8 +73,9 @@ impl TextureRequest {
 }
 
 impl Textures {
-    /// Uploads the images of the scene's materials and, with `for_rays`, a buffer of all mip levels. Pixels are moved out of the
-    /// scene image by image, so only one decoded image exists twice at a time. `before` is reused when it holds the same images.
+    /// Uploads the images of the scene's materials and, with `for_rays`, a buffer of all mip levels. Pixels are moved
+    /// out of the scene image by image, so only one decoded image exists twice at a time. `before` is reused when it
+    /// holds the same images.
     ///
     /// # Errors
     /// When memory is short or an image is larger than the device allows.
@@ -119,7 +120,8 @@ impl Textures {
                     usage: vk::ImageUsageFlags::SAMPLED,
                 },
             )?;
-            // Two images at a time: their mip levels are computed in parallel, and their staging buffers exist together.
+            // Two images at a time: their mip levels are computed in parallel, and their staging buffers exist
+            // together.
             for (chunk_index, chunk) in images.chunks(2).enumerate() {
                 let chains: Vec<Vec<u8>> = chunk
                     .par_iter()
@@ -278,8 +280,8 @@ fn srgb_from_linear() -> &'static [u8] {
     })
 }
 
-/// The base level and all mip levels: box filter of 2x2 texels (3 along an odd side), colour in linear light. With `weighted`
-/// alpha weights the colours, so that invisible texels do not bleed into visible ones.
+/// The base level and all mip levels: box filter of 2x2 texels (3 along an odd side), colour in linear light. With
+/// `weighted` alpha weights the colours, so that invisible texels do not bleed into visible ones.
 fn mip_chain(rgba: &[u8], width: u32, height: u32, levels: u32, meaning: Meaning, weighted: bool) -> Vec<u8> {
     let offsets = level_offsets(width, height, levels);
     let bytes = offsets.last().copied().unwrap_or(0) as usize + 4;

@@ -55,11 +55,11 @@ impl View {
         2.0 * self.half.y / f64::from(self.size[1])
     }
 
-    /// Largest distance between a surface and its point reconstructed from depth, on a device that snaps vertices by up to
-    /// `pixels` pixels before it interpolates depth: in metres, and relative to the point's largest coordinate.
+    /// Largest distance between a surface and its point reconstructed from depth, on a device that snaps vertices by up
+    /// to `pixels` pixels before it interpolates depth: in metres, and relative to the point's largest coordinate.
     ///
-    /// Depth d is linear on the screen. With vertices snapped by up to s pixels, a pixel at x has d(x − δ), |δ| ≤ s. This is
-    /// the depth of a surface point at most s pixels away, which bounds the distance.
+    /// Depth d is linear on the screen. With vertices snapped by up to s pixels, a pixel at x has d(x − δ), |δ| ≤ s.
+    /// This is the depth of a surface point at most s pixels away, which bounds the distance.
     #[must_use]
     pub fn snap(&self, pixels: f64) -> [f64; 2] {
         let off = pixels * self.pixel_angle();
@@ -71,7 +71,8 @@ impl View {
     #[must_use]
     pub fn shared(&self, jitter: DVec2) -> share::Camera {
         let [right, up, forward] = self.axes;
-        // Rows of clip_from_rel. In Vulkan's clip space y points down. A sample at +j pixels moves the world by −j pixels.
+        // Rows of clip_from_rel. In Vulkan's clip space y points down. A sample at +j pixels moves the world by −j
+        // pixels.
         let shift = -2.0 * jitter / DVec2::new(f64::from(self.size[0]), f64::from(self.size[1]));
         let (w, w0) = if self.orthographic { (DVec3::ZERO, 1.0) } else { (forward, 0.0) };
         let x = right / self.half.x + w * shift.x;
@@ -106,8 +107,9 @@ impl View {
     }
 }
 
-/// A near distance that clips nothing of a scene seen from outside, and very little from inside. Reversed floating-point
-/// depth has the same relative precision for every near distance (numerics.md 42), so a small one costs nothing.
+/// A near distance that clips nothing of a scene seen from outside, and very little from inside. Reversed
+/// floating-point depth has the same relative precision for every near distance (numerics.md 42), so a small one costs
+/// nothing.
 fn near_distance(eye: DVec3, bounds: Option<Bounds>) -> f64 {
     let Some(bounds) = bounds else { return 0.01 };
     let radius = bounds.radius().max(1e-6);

@@ -1,7 +1,7 @@
 //! Chooses rungs for a time or error budget (`render --within`, `--max-error`) from measurements of `etalon cost`.
 //!
-//! The measurements are of the same picture on the same device, and are kept in the cache folder. Where there are none, a quick run
-//! measures first. See docs/cost.md, "Budgets of pictures".
+//! The measurements are of the same picture on the same device, and are kept in the cache folder. Where there are none,
+//! a quick run measures first. See docs/cost.md, "Budgets of pictures".
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -76,8 +76,8 @@ pub(super) fn command(scene: &SceneOptions, picture: &PictureOptions, device: &D
     format!("etalon render {}", [scene.words(), picture.words(), device.words()].concat().join(" "))
 }
 
-/// Cache folder of the measurements of a picture on a device. The name is a hash of the program version, the command, the scene
-/// contents, the device and its driver.
+/// Cache folder of the measurements of a picture on a device. The name is a hash of the program version, the command,
+/// the scene contents, the device and its driver.
 fn folder(command: &str, contents: &str, info: &DeviceInfo) -> Option<PathBuf> {
     let version = env!("CARGO_PKG_VERSION");
     let known = [version, command, contents, &info.name, &info.driver, &info.version].join("\n");
@@ -96,7 +96,8 @@ pub(super) fn known(command: &str, contents: &str, info: &DeviceInfo) -> Option<
     serde_json::from_slice(&bytes).ok()
 }
 
-/// Copies the table and the reference of a finished run to the cache. Where the cache cannot be written, later budgets measure again.
+/// Copies the table and the reference of a finished run to the cache. Where the cache cannot be written, later budgets
+/// measure again.
 pub(super) fn keep(command: &str, setup: &Setup, from: &Path) {
     let Some(to) = folder(command, &setup.contents(), setup.device.info()) else { return };
     let copy = || -> Result<()> {
@@ -135,8 +136,9 @@ impl Budget {
         Ok(picture.max_error()?.map(Self::MaxError))
     }
 
-    /// Chooses rungs. A time limit gets the rungs with the least error that keep the limit when they are timed now; an error limit gets
-    /// the fastest rungs that keep it. Where no measured rungs keep the limit, the closest ones are chosen.
+    /// Chooses rungs. A time limit gets the rungs with the least error that keep the limit when they are timed now; an
+    /// error limit gets the fastest rungs that keep it. Where no measured rungs keep the limit, the closest ones are
+    /// chosen.
     ///
     /// # Errors
     /// When nothing can be measured.
@@ -264,8 +266,8 @@ fn measure(
     file::write(&folder.join("cost.json"), serde_json::to_string_pretty(&table)?.as_bytes())
 }
 
-/// The point with the least error that takes at most `ms` milliseconds, by the table and by the median of three renders now. If the
-/// machine is slower than when the table was measured, the same factor is assumed for all points.
+/// The point with the least error that takes at most `ms` milliseconds, by the table and by the median of three renders
+/// now. If the machine is slower than when the table was measured, the same factor is assumed for all points.
 fn first_that_fits<'a>(table: &'a Table, ms: f64, bench: &Bench<'_>) -> Result<Option<&'a Point>> {
     let mut slower = 1.0_f64;
     for _ in 0..TRIALS {
@@ -282,8 +284,8 @@ fn first_that_fits<'a>(table: &'a Table, ms: f64, bench: &Bench<'_>) -> Result<O
 }
 
 impl Chosen {
-    /// Measures the error of a picture against the reference, and its GPU time. Where the time is above the limit, the picture is drawn
-    /// twice more, and the median counts.
+    /// Measures the error of a picture against the reference, and its GPU time. Where the time is above the limit, the
+    /// picture is drawn twice more, and the median counts.
     ///
     /// # Errors
     /// When the picture cannot be drawn again.

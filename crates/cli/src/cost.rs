@@ -1,5 +1,5 @@
-//! `etalon cost`: measures the error and the GPU time of every rung that a scene calls for, and writes the report with the Pareto
-//! frontier. The measurements are made by the crate `etalon_cost`; docs/cost.md describes them.
+//! `etalon cost`: measures the error and the GPU time of every rung that a scene calls for, and writes the report with
+//! the Pareto frontier. The measurements are made by the crate `etalon_cost`; docs/cost.md describes them.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -38,7 +38,8 @@ pub struct CostArgs {
     picture: PictureOptions,
     #[command(flatten)]
     device: DeviceOptions,
-    /// Time budget in seconds: it determines the samples of the reference; pictures for which there is no time are left out
+    /// Time budget in seconds: it determines the samples of the reference; pictures for which there is no time are left
+    /// out
     #[arg(long, value_name = "SECONDS", default_value_t = 240, value_parser = clap::value_parser!(u32).range(1..))]
     budget: u32,
     /// Samples of the reference, regardless of the budget
@@ -56,7 +57,8 @@ pub struct CostArgs {
     /// Also compare a picture of another program with the reference: OpenEXR or PNG of the same size
     #[arg(long, value_name = "FILE", conflicts_with_all = ["merge", "compare", "beside"])]
     judge: Vec<PathBuf>,
-    /// Compare two rungs of one knob only: interleaved timing, two lines and a verdict; with -o also both pictures and their difference
+    /// Compare two rungs of one knob only: interleaved timing, two lines and a verdict; with -o also both pictures and
+    /// their difference
     #[arg(long, value_name = "KNOB=A,B", conflicts_with_all = ["shard", "reference_samples", "budget"])]
     compare: Option<String>,
     /// Print cost.json as well
@@ -229,7 +231,8 @@ fn beside(args: &CostArgs, folders: [&PathBuf; 2]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The first Ctrl-C ends the run after the picture in progress and keeps its results; the second ends the program at once.
+/// The first Ctrl-C ends the run after the picture in progress and keeps its results; the second ends the program at
+/// once.
 fn listen(stopped: &Arc<AtomicBool>) {
     let stopped = stopped.clone();
     let heard = ctrlc::set_handler(move || {

@@ -1,4 +1,5 @@
-//! `etalon devices`: lists the Vulkan devices, the features that each lacks, and the device that Etalon uses by default.
+//! `etalon devices`: lists the Vulkan devices, the features that each lacks, and the device that Etalon uses by
+//! default.
 
 use std::process::ExitCode;
 

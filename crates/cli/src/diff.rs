@@ -12,7 +12,8 @@ use super::choices::one_of;
 use etalon::image::metric::{AnyPicture, Comparison, Metric, compare, map_rgba};
 use etalon::image::{file, png};
 
-/// Compare two pictures of the same size: two OpenEXR files by radiance, or two PNG, JPEG or WebP files by display values
+/// Compare two pictures of the same size: two OpenEXR files by radiance, or two PNG, JPEG or WebP files by display
+/// values
 #[derive(Debug, Clone, Args)]
 pub struct DiffArgs {
     /// Reference picture
@@ -24,11 +25,12 @@ pub struct DiffArgs {
     /// Metric to print
     #[arg(long, value_parser = one_of::<Metric>(), default_value = Metric::Flip.name())]
     pub metric: Metric,
-    /// Exit with code 1 if the value is above X; for psnr and ssim, which grow with similarity, if it is below X. Pictures with NaN or
-    /// infinite pixels fail every limit
+    /// Exit with code 1 if the value is above X; for psnr and ssim, which grow with similarity, if it is below X.
+    /// Pictures with NaN or infinite pixels fail every limit
     #[arg(long, value_name = "X", allow_negative_numbers = true)]
     pub max: Option<f64>,
-    /// Write the error of each pixel as PNG: FLIP in magma colours, other metrics as absolute difference in grey (white is 1)
+    /// Write the error of each pixel as PNG: FLIP in magma colours, other metrics as absolute difference in grey (white
+    /// is 1)
     #[arg(short, long, value_name = "FILE.png")]
     pub output: Option<PathBuf>,
     /// Print one JSON document instead of the number
@@ -69,7 +71,8 @@ struct WorstDifference {
     error: f64,
 }
 
-/// Runs the command: the result goes to stdout, notes go to stderr. The exit code is 0 within the limit or without one, else 1.
+/// Runs the command: the result goes to stdout, notes go to stderr. The exit code is 0 within the limit or without one,
+/// else 1.
 pub fn run(args: &DiffArgs) -> Result<ExitCode> {
     let (a, b) = (args.a.display().to_string(), args.b.display().to_string());
     ensure!(!args.max.is_some_and(f64::is_nan), "--max NaN: expected a number");

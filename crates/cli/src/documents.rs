@@ -1,4 +1,5 @@
-//! Tables of the documentation that the program writes itself: a page has a block between `<!-- generated: NAME -->` and
+//! Tables of the documentation that the program writes itself: a page has a block between `<!-- generated: NAME -->`
+//! and
 //! `<!-- end -->`, and a test (`crates/cli/tests/documents.rs`) compares the block with what stands here.
 
 use std::fmt::Write as _;
@@ -73,7 +74,8 @@ fn render_options() -> String {
     table
 }
 
-/// The rungs of a knob: that of `recursive` bold, that of `local` in italics, that of `global` underlined, where they differ.
+/// The rungs of a knob: that of `recursive` bold, that of `local` in italics, that of `global` underlined, where they
+/// differ.
 fn rungs(knob: &Knob) -> String {
     let [local, recursive, global] = knob.presets;
     let mark = |rung: &&'static str| match () {
@@ -125,7 +127,8 @@ fn exit_codes() -> String {
     table
 }
 
-/// The first sentence of the comment that opens a program's shader: the last stage that has a file says what the pass computes.
+/// The first sentence of the comment that opens a program's shader: the last stage that has a file says what the pass
+/// computes.
 fn purpose(program: &Program) -> Option<(String, String)> {
     ["comp", "frag", "vert"].into_iter().find_map(|stage| {
         let name = format!("{}.{stage}", program.name);
@@ -144,8 +147,8 @@ const OTHER_FRAMES: &[(&str, Model, &str)] = &[
     ("cornell", Model::Recursive, "--plan full"),
 ];
 
-/// The passes of the study scenes' frames in their order, with the first frame that has each: those of path tracing, or all others.
-/// It draws nothing but what is drawn before the first sample (shadow maps).
+/// The passes of the study scenes' frames in their order, with the first frame that has each: those of path tracing, or
+/// all others. It draws nothing but what is drawn before the first sample (shadow maps).
 ///
 /// # Errors
 /// When a scene does not fit the device, or the driver fails.

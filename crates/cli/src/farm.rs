@@ -26,7 +26,8 @@ pub struct FarmArgs {
 enum FarmCommand {
     /// Write a job file for an engine: tasks that each draw a share, and a task that joins parts
     Job(JobArgs),
-    /// Write an HTML page about the processes, with time line, scaling and devices, from parts and from reports of sequences and merges
+    /// Write an HTML page about the processes, with time line, scaling and devices, from parts and from reports of
+    /// sequences and merges
     Report(ReportArgs),
 }
 

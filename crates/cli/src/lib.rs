@@ -1,4 +1,5 @@
-//! The subcommands of the program `etalon`, one module each, with what all of them share: error sentences and lines on stdout.
+//! The subcommands of the program `etalon`, one module each, with what all of them share: error sentences and lines on
+//! stdout.
 
 pub mod arguments;
 mod budget;
@@ -33,8 +34,8 @@ use anyhow::{Context as _, Result};
 use etalon::gpu::{NotOpened, is_lost};
 use etalon::plan::{Refused, Setting};
 
-/// Formats an error chain as one sentence. Settings of the library are named as command-line options; where a part of Vulkan is
-/// missing, the sentence names the Debian packages that provide it.
+/// Formats an error chain as one sentence. Settings of the library are named as command-line options; where a part of
+/// Vulkan is missing, the sentence names the Debian packages that provide it.
 #[must_use]
 pub fn told(error: &anyhow::Error) -> String {
     let cause = |cause: &(dyn std::error::Error + 'static)| {
@@ -56,8 +57,8 @@ pub fn told(error: &anyhow::Error) -> String {
     error.chain().map(cause).collect::<Vec<_>>().join(": ")
 }
 
-/// Whether the same command may succeed later or on another machine: the device was lost, or a disk is full. Render-farm engines
-/// retry such tasks.
+/// Whether the same command may succeed later or on another machine: the device was lost, or a disk is full.
+/// Render-farm engines retry such tasks.
 #[must_use]
 pub fn is_worth_another_try(error: &anyhow::Error) -> bool {
     is_lost(error) || etalon::image::file::is_full(error)

@@ -1,4 +1,5 @@
-//! `etalon merge`: joins the parts of a picture that several processes drew. The result is bit-identical to the picture of one process.
+//! `etalon merge`: joins the parts of a picture that several processes drew. The result is bit-identical to the picture
+//! of one process.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

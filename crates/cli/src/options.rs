@@ -1,5 +1,5 @@
-//! Command-line options that several subcommands share, and their conversion to cameras, environments and renderer settings. clap
-//! prints the doc comments of options as help texts.
+//! Command-line options that several subcommands share, and their conversion to cameras, environments and renderer
+//! settings. clap prints the doc comments of options as help texts.
 
 use std::path::PathBuf;
 
@@ -54,7 +54,15 @@ pub struct SceneOptions {
     /// A .glb, .gltf or .obj file, or a built-in scene as study:NAME
     #[arg(default_value = "study:etalon")]
     pub scene: String,
-    /// Camera of the file, by name or index [default: the first camera; if the file has none, a camera that frames the scene]
+    /// Scene of the file, by name or index [default: the one that the file names]
+    #[arg(id = "scene_of_file", long = "scene", value_name = "NAME|INDEX")]
+    pub scene_of_file: Option<String>,
+    /// Variant of the file's materials, by name or index (KHR_materials_variants) [default: the materials of the
+    /// primitives]
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub variant: Option<String>,
+    /// Camera of the file, by name or index [default: the first camera; if the file has none, a camera that frames the
+    /// scene]
     #[arg(long, value_name = "NAME|INDEX", conflicts_with_all = ["eye", "target", "up"])]
     pub camera: Option<String>,
     /// Eye position in metres
@@ -98,15 +106,16 @@ pub struct PictureOptions {
     /// Set a knob to a rung, for example samples=16; repeatable
     #[arg(long = "set", value_name = "KNOB=RUNG")]
     pub set: Vec<String>,
-    /// Which effects to prepare: those that the scene calls for; or every effect that the knobs allow, for the same picture; or those
-    /// that the scene calls for, with a table of what each other effect would cost here
+    /// Which effects to prepare: those that the scene calls for; or every effect that the knobs allow, for the same
+    /// picture; or those that the scene calls for, with a table of what each other effect would cost here
     #[arg(long, value_enum, value_name = "scene|full|explain-cost", default_value_t = PlanExtent::Scene)]
     pub plan: PlanExtent,
     /// Random seed: another seed gives the picture other noise
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..1 << 31))]
     pub seed: u32,
-    /// Pick the fastest rungs whose error against the scene's reference is at most this, for example 0.02 or 2% (measures first if
-    /// `cost` has not been run). With --model global: draw samples until the estimated relative error of the picture is at most this
+    /// Pick the fastest rungs whose error against the scene's reference is at most this, for example 0.02 or 2%
+    /// (measures first if `cost` has not been run). With --model global: draw samples until the estimated relative
+    /// error of the picture is at most this
     #[arg(long, value_name = "E")]
     pub max_error: Option<String>,
     /// Exposure in stops; changes display outputs only
@@ -123,7 +132,8 @@ pub struct DeviceOptions {
     /// Device, by a part of its name, its index or its kind [default: the best device]
     #[arg(long, value_name = "NAME|INDEX|cpu|gpu")]
     pub device: Option<String>,
-    /// Check Vulkan calls and synchronization hazards with the Khronos validation layer; any validation error fails the run
+    /// Check Vulkan calls and synchronization hazards with the Khronos validation layer; any validation error fails the
+    /// run
     #[arg(long)]
     pub validate: bool,
 }
@@ -176,6 +186,8 @@ impl SceneOptions {
         let mut option = |name: &str, value: Option<String>| {
             all.extend(value.map(|value| format!("--{name} {}", word(&value))));
         };
+        option("scene", self.scene_of_file.clone());
+        option("variant", self.variant.clone());
         option("camera", self.camera.clone());
         option("eye", self.eye.map(point));
         option("target", self.target.map(point));
@@ -216,10 +228,20 @@ impl SceneOptions {
     /// # Errors
     /// One sentence with the file, the place in it and the cause.
     pub fn load(&self, prune: Prune) -> Result<Scene> {
-        etalon::open::scene(&self.scene, &LoadOptions { time: self.time()?, prune })
+        etalon::open::scene(&self.scene, &self.load_options(prune)?)
     }
 
-    /// Loads the environment of `--env`, or the built-in studio, which lights scenes without lights. Returns it with warnings.
+    /// How the scene's file is read.
+    ///
+    /// # Errors
+    /// The errors of [`SceneOptions::time`].
+    pub fn load_options(&self, prune: Prune) -> Result<LoadOptions> {
+        let (scene, variant) = (self.scene_of_file.clone(), self.variant.clone());
+        Ok(LoadOptions { time: self.time()?, prune, scene, variant })
+    }
+
+    /// Loads the environment of `--env`, or the built-in studio, which lights scenes without lights. Returns it with
+    /// warnings.
     ///
     /// # Errors
     /// One sentence with the file and the cause.
@@ -301,8 +323,8 @@ impl PictureOptions {
         all
     }
 
-    /// Selects spectral rendering (`colour=spectral:16`) for scenes with dispersive glass under `--model global`, unless `--set colour`
-    /// is given.
+    /// Selects spectral rendering (`colour=spectral:16`) for scenes with dispersive glass under `--model global`,
+    /// unless `--set colour` is given.
     ///
     /// # Errors
     /// Never: the rung exists.

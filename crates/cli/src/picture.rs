@@ -1,5 +1,5 @@
-//! Parts shared by all forms of `etalon render`: options, arbitrary output variables (AOV layers of an EXR), and warnings about a
-//! drawn picture.
+//! Parts shared by all forms of `etalon render`: options, arbitrary output variables (AOV layers of an EXR), and
+//! warnings about a drawn picture.
 
 use std::path::{Path, PathBuf};
 
@@ -24,22 +24,24 @@ use etalon_farm::part::Split;
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Sequences and shards")]
 pub struct SequenceOptions {
-    /// Draw these frames: numbers and ranges such as 1-100:2,105. Frame F shows the animation at --time plus F / fps seconds. Each output
-    /// name contains the frame number as {frame} or {frame:04}. Frames whose files are complete and hold the same picture are not drawn again
+    /// Draw these frames: numbers and ranges such as 1-100:2,105. Frame F shows the animation at --time plus F / fps
+    /// seconds. Each output name contains the frame number as {frame} or {frame:04}. Frames whose files are complete
+    /// and hold the same picture are not drawn again
     #[arg(long, value_name = "RANGE", allow_hyphen_values = true)]
     pub frames: Option<Frames>,
     /// Frames per second [default: 24]
     #[arg(long, value_name = "N")]
     pub fps: Option<f64>,
-    /// Turn the camera around --target, or the middle of the scene, by 1/N of a circle per frame; the animation stands still unless --fps
-    /// is given [default frames: 0 to N - 1]
+    /// Turn the camera around --target, or the middle of the scene, by 1/N of a circle per frame; the animation stands
+    /// still unless --fps is given [default frames: 0 to N - 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub turntable: Option<u32>,
-    /// Draw from these cameras of the file, by name or index, or from all of them. Each output name contains the camera name as {camera}
+    /// Draw from these cameras of the file, by name or index, or from all of them. Each output name contains the camera
+    /// name as {camera}
     #[arg(long, value_name = "NAME,...|all", value_delimiter = ',', conflicts_with_all = ["camera", "eye", "target", "up", "fov"])]
     pub cameras: Vec<String>,
-    /// Draw the I-th of N shares: every N-th picture of a sequence, or a part of a single picture into the file of -o. `etalon merge` joins
-    /// the parts into the picture that one run draws, bit for bit
+    /// Draw the I-th of N shares: every N-th picture of a sequence, or a part of a single picture into the file of -o.
+    /// `etalon merge` joins the parts into the picture that one run draws, bit for bit
     #[arg(long, value_name = "I/N", value_parser = shard)]
     pub shard: Option<[u32; 2]>,
     /// How to divide a single picture: by tiles of pixels, or by samples into at most 64 parts
@@ -79,19 +81,20 @@ impl SequenceOptions {
 pub struct RenderArgs {
     #[command(flatten)]
     pub(super) scene: SceneOptions,
-    /// Output file: .png (display) or .exr (scene-linear radiance); repeatable [default: the scene's name with .png]. A sequence can also
-    /// write an animated preview, .apng; a part of a picture has exactly one output
+    /// Output file: .png (display) or .exr (scene-linear radiance); repeatable [default: the scene's name with .png]. A
+    /// sequence can also write an animated preview, .apng; a part of a picture has exactly one output
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) picture: PictureOptions,
-    /// Pick the most accurate rungs that render within this GPU time, in milliseconds (measures first if `cost` has not been run)
+    /// Pick the most accurate rungs that render within this GPU time, in milliseconds (measures first if `cost` has not
+    /// been run)
     #[arg(long, value_name = "MS")]
     pub(super) within: Option<String>,
     #[command(flatten)]
     pub(super) device: DeviceOptions,
-    /// Additional EXR layers: the nearest opaque surface at each pixel centre; the radiance of rays that were first reflected
-    /// (reflection) or first refracted (refraction); variance and half buffers of path tracing
+    /// Additional EXR layers: the nearest opaque surface at each pixel centre; the radiance of rays that were first
+    /// reflected (reflection) or first refracted (refraction); variance and half buffers of path tracing
     #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,...")]
     pub(super) aov: Vec<AovName>,
     /// Draw the picture N times and fail unless all results are bit-identical
@@ -318,7 +321,8 @@ fn layer(pixels: &[AovPixel], view: &View, name: AovName) -> Aov {
     let vectors = |get: &dyn Fn(&AovPixel) -> [f32; 3]| AovData::F32(pixels.iter().flat_map(get).collect());
     let numbers = |get: &dyn Fn(&AovPixel) -> f32| AovData::F32(pixels.iter().map(get).collect());
     let (rgb, xyz): (&[&str], &[&str]) = (&["R", "G", "B"], &["X", "Y", "Z"]);
-    // World positions are added in f64: far from the origin f32 is precise enough only for positions relative to the eye.
+    // World positions are added in f64: far from the origin f32 is precise enough only for positions relative to the
+    // eye.
     let world = |p: &AovPixel| {
         if drawn(p) { (glam::Vec3::from(p.p_rel).as_dvec3() + view.eye).as_vec3().to_array() } else { [0.0; 3] }
     };

@@ -1,5 +1,5 @@
-//! `etalon plan`: reports which effects a scene calls for and why, and what drawing takes (passes, pipelines, memory, rays), without
-//! drawing. See docs/plan.md.
+//! `etalon plan`: reports which effects a scene calls for and why, and what drawing takes (passes, pipelines, memory,
+//! rays), without drawing. See docs/plan.md.
 
 use std::collections::BTreeMap;
 use std::process::ExitCode;
@@ -90,7 +90,8 @@ fn sight(opened: &Opened, camera: &Camera, settings: &Settings) -> Result<Option
     Ok(Some(along_lines(&scene, &*opened.original.bvh()?, camera, settings.size)))
 }
 
-/// A warning about light that `interfaces` surfaces per path cannot follow along the lines of sight; `None` where they suffice.
+/// A warning about light that `interfaces` surfaces per path cannot follow along the lines of sight; `None` where they
+/// suffice.
 fn lost(sight: &Sight, interfaces: u32) -> Option<String> {
     let more = match sight.most {
         0..=32 => format!("--set interfaces={} traces all of them", sight.most.next_power_of_two()),

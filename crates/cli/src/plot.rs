@@ -95,7 +95,8 @@ fn over(text: &str) -> Result<Over> {
 /// Runs the command.
 ///
 /// # Errors
-/// One sentence: an unknown function, column or input, a range that is none, a device that fails, a file that cannot be written.
+/// One sentence: an unknown function, column or input, a range that is none, a device that fails, a file that cannot be
+/// written.
 pub fn run(args: &PlotArgs) -> Result<ExitCode> {
     let output = args.output.clone().unwrap_or_else(|| format!("{}.svg", args.function).into());
     let svg = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"));
@@ -148,7 +149,16 @@ pub fn run(args: &PlotArgs) -> Result<ExitCode> {
     for curve in &drawn.differences {
         let worst = curve.points.iter().copied().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         if let Some((x, y)) = worst {
-            print(&format!("{}: at most {y:.4} at {} = {x:.4}", curve.label, plot.over.name))?;
+            // The label names the first curve, a minus sign, and the second curve.
+            let side = if y > 0.0 {
+                " (the first is above the second)"
+            } else if y < 0.0 {
+                " (the first is below the second)"
+            } else {
+                ""
+            };
+            let (label, over) = (&curve.label, &plot.over.name);
+            print(&format!("{label}: largest difference {:.4}{side} at {over} = {x:.4}", y.abs()))?;
         }
     }
     print(&output.display().to_string())?;

@@ -95,7 +95,8 @@ impl Steps {
         }
     }
 
-    /// Reports the samples and the estimated error of a picture. Without a bar it is a line at powers of two, at most once a second.
+    /// Reports the samples and the estimated error of a picture. Without a bar it is a line at powers of two, at most
+    /// once a second.
     pub(super) fn sampled(&self, progress: Progress, begun: Instant, last: &mut Instant) {
         self.at(progress.done);
         self.done(f64::from(progress.done) / f64::from(progress.of.max(1)));

@@ -1,4 +1,5 @@
-//! `render --report FILE`: the JSON report of a run, schema `etalon.report/1`, and the JSON form of a plan, schema `etalon.plan/1`.
+//! `render --report FILE`: the JSON report of a run, schema `etalon.report/1`, and the JSON form of a plan, schema
+//! `etalon.plan/1`.
 
 use std::collections::BTreeMap;
 
@@ -30,8 +31,8 @@ pub struct Report {
     pub plan: PlanFacts,
     /// GPU time per pass over the repeats.
     pub passes: Vec<PassFacts>,
-    /// Wall time of each phase in milliseconds. `bvh` is a part of `upload`. `pipelines` runs on its own thread during `upload` and
-    /// `frame`, in parallel with other work; the driver compiles a pipeline at its first use.
+    /// Wall time of each phase in milliseconds. `bvh` is a part of `upload`. `pipelines` runs on its own thread during
+    /// `upload` and `frame`, in parallel with other work; the driver compiles a pipeline at its first use.
     pub phases_ms: BTreeMap<&'static str, f64>,
     /// Work counts, equal on every machine.
     pub work: WorkFacts,
@@ -289,18 +290,21 @@ pub struct WorkFacts {
     pub node_visits: u64,
     /// Triangles tested by rays.
     pub triangle_tests: u64,
-    /// Rays that left a transparent mesh without having entered it: the mesh is open, or meshes overlap without priorities.
+    /// Rays that left a transparent mesh without having entered it: the mesh is open, or meshes overlap without
+    /// priorities.
     pub unmatched_exits: u64,
     /// Path estimates that were NaN or infinite and were left out of the picture.
     pub not_finite: u64,
     /// Pixel, path vertex and material of the first such estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_not_finite: Option<NotFinite>,
-    /// Fraction of a pixel's light that was cut off because a path met too many surfaces or its throughput became too small.
+    /// Fraction of a pixel's light that was cut off because a path met too many surfaces or its throughput became too
+    /// small.
     pub cut_off: CutOff,
 }
 
-/// Path throughput that was cut off. The missing radiance of a pixel is at most this fraction of the largest radiance in the scene.
+/// Path throughput that was cut off. The missing radiance of a pixel is at most this fraction of the largest radiance
+/// in the scene.
 #[derive(Debug, Serialize)]
 pub struct CutOff {
     /// Mean over all pixels.

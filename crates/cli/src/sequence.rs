@@ -1,5 +1,5 @@
-//! `etalon render` of a sequence: frames of an animation, a turntable, or several cameras. Data that all pictures share is read, uploaded
-//! and compiled once. See docs/farm.md.
+//! `etalon render` of a sequence: frames of an animation, a turntable, or several cameras. Data that all pictures share
+//! is read, uploaded and compiled once. See docs/farm.md.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

@@ -24,8 +24,8 @@ pub struct Setup {
     pub opened: Opened,
 }
 
-/// Opens the device, reads the environment and loads the scene in parallel. A missing device is a separate result, so that callers
-/// can go on without one.
+/// Opens the device, reads the environment and loads the scene in parallel. A missing device is a separate result, so
+/// that callers can go on without one.
 ///
 /// # Errors
 /// One sentence with the file, the place in it and the cause; an error of the scene comes first.
@@ -44,7 +44,8 @@ pub fn open(scene: &SceneOptions, prune: Prune, device: &DeviceOptions) -> Resul
     Ok((opened, device?))
 }
 
-/// Opens a scene that is drawn at several animation times: the file, the scene at `--time`, the environment and the device.
+/// Opens a scene that is drawn at several animation times: the file, the scene at `--time`, the environment and the
+/// device.
 ///
 /// # Errors
 /// The errors of [`open`]; a missing device is one of them.
@@ -53,11 +54,12 @@ pub fn open_source(
     prune: Prune,
     device: &DeviceOptions,
 ) -> Result<(Source, Scene, Option<Environment>, Arc<Device>)> {
-    let time = options.time()?;
+    let load = options.load_options(prune)?;
+    let time = load.time;
     let (device, loaded, environment) = std::thread::scope(|scope| {
         let device = scope.spawn(|| Device::open(&device.choice(), device.validate));
         let environment = scope.spawn(|| options.load_environment());
-        let loaded = etalon::open::source(&options.scene, prune).and_then(|mut source| {
+        let loaded = etalon::open::source(&options.scene, load).and_then(|mut source| {
             let scene = source.at(time)?;
             Ok((source, scene))
         });

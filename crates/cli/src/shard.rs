@@ -1,4 +1,5 @@
-//! `etalon render --shard` of one picture: draws the part of one process, and resumes a part that was stopped. See docs/farm.md.
+//! `etalon render --shard` of one picture: draws the part of one process, and resumes a part that was stopped. See
+//! docs/farm.md.
 
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -27,7 +28,8 @@ const KEEP: Duration = Duration::from_secs(1);
 /// Exit code after SIGTERM, as shells define it.
 const TERMINATED: u8 = super::arguments::ENDED;
 
-/// Division into tiles, or into samples if the plan uses screen-space reflection or refraction, which read the whole picture.
+/// Division into tiles, or into samples if the plan uses screen-space reflection or refraction, which read the whole
+/// picture.
 fn split(args: &RenderArgs, plan: &Plan) -> Result<Split> {
     let looks = plan.screen != etalon::plan::Screen::default();
     match args.sequence.split.map(Split::from) {

@@ -1,5 +1,5 @@
-//! `etalon verify`: compares the shipped shader functions on a device with their f64 twins. The evaluation is in the crate
-//! `etalon_verify`; docs/equations.md lists functions and bounds.
+//! `etalon verify`: compares the shipped shader functions on a device with their f64 twins. The evaluation is in the
+//! crate `etalon_verify`; docs/equations.md lists functions and bounds.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -24,8 +24,8 @@ use etalon_verify::{self, Cases, Entry, Figures, Worst, document, plot, vectors}
 /// Hostile cases (inputs outside the domain) per function and tier.
 const HOSTILE: usize = 4096;
 
-/// Compare every shader function on the device with its double-precision reference (f64 twin), in three tiers: `fast` is the textbook
-/// form and has no bounds, `stable` is used for pictures, `compensated` is the most accurate
+/// Compare every shader function on the device with its double-precision reference (f64 twin), in three tiers: `fast`
+/// is the textbook form and has no bounds, `stable` is used for pictures, `compensated` is the most accurate
 #[derive(Debug, Clone, Args)]
 pub struct VerifyArgs {
     /// Only this function; repeatable. With --vectors: the function of the file [default: the stem of the file name]

@@ -1,4 +1,5 @@
-//! `etalon cost`: a run is whole or goes on, its figures are those that its commands give, and its parts make the whole.
+//! `etalon cost`: a run is whole or goes on, its figures are those that its commands give, and its parts make the
+//! whole.
 
 #[path = "support/program.rs"]
 mod program;
@@ -93,7 +94,7 @@ fn a_run_is_what_its_commands_draw() {
     let csv = std::fs::read_to_string(at.join("a/cost.csv")).expect("cost.csv");
     assert_eq!(csv.lines().count(), points.len() + 1);
 
-    // A knob that the scene does not call for is told and not priced.
+    // A knob that the scene does not call for is reported and not priced.
     let knob = |name: &str| list(&table, "knobs").iter().find(|k| k["knob"] == name).expect("a knob");
     assert_eq!(
         (&knob("refraction")["called_for"], &knob("shadows")["called_for"]),
@@ -192,7 +193,7 @@ fn parts_make_the_whole() {
 }
 
 #[test]
-fn a_scene_that_calls_for_nothing_is_told_so() {
+fn a_scene_that_calls_for_nothing_has_a_report() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
     std::fs::write(at.join("t.mtl"), "newmtl m\nKd 0 0 0\nKe 0.5 0.5 0.5\nillum 0\n").expect("a file");

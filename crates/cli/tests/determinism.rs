@@ -1,6 +1,6 @@
 //! The same picture, to the last bit, every time: from one renderer drawn twice, from two renderers, and from programs
-//! that give lavapipe no, one or two threads beside the main one. Fragment lists, work lists and sums over samples are the
-//! places where an order could show.
+//! that give lavapipe no, one or two threads beside the main one. Fragment lists, work lists and sums over samples are
+//! the places where an order could show.
 
 #[path = "support/program.rs"]
 mod program;

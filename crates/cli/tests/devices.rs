@@ -1,4 +1,5 @@
-//! Devices that one does not own: the one here, lowered to what files describe, draws the same picture or is refused for what it lacks.
+//! Devices that one does not own: the one here, lowered to what files describe, draws the same picture or is refused
+//! for what it lacks.
 
 use std::path::{Path, PathBuf};
 
@@ -36,8 +37,8 @@ impl<'a> Masked<'a> {
     }
 }
 
-/// Shadow maps; paths past textures. Nothing that fragments see is textured: lavapipe 22.3 chooses other mip levels where places of textures
-/// lie in storage buffers (docs/decisions/helper-invocations.md).
+/// Shadow maps; paths past textures. Nothing that fragments see is textured: lavapipe 22.3 chooses other mip levels
+/// where places of textures lie in storage buffers (docs/decisions/helper-invocations.md).
 const PICTURES: [[&str; 3]; 2] = [["study:cornell", "--model", "local"], ["study:metals", "--model", "global"]];
 
 #[test]

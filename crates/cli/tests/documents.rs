@@ -173,7 +173,8 @@ fn commands() -> Vec<(String, Vec<String>)> {
 fn every_printed_command_is_one_of_the_program() {
     let mut wrong = Vec::new();
     for (page, call) in commands() {
-        // Words that stand for something, such as SCENE or a column's explanation, end what can be held against the program.
+        // Words that stand for something, such as SCENE or a column's explanation, end what can be held against the
+        // program.
         let prose = call.iter().any(|word| word.len() > 2 && word.chars().all(|c| c.is_uppercase() || c == '.'));
         let words = std::iter::once("etalon".to_owned()).chain(call.iter().cloned());
         if let Err(error) = etalon_cli::arguments::command().try_get_matches_from(words) {
@@ -251,7 +252,8 @@ fn rows(page: &str) -> Vec<Vec<String>> {
     lines.map(|line| line.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect()).collect()
 }
 
-/// The glossary's rows are `term | meaning | where in the code | where to read | Hungarian`; a place is a file with a word of it.
+/// The glossary's rows are `term | meaning | where in the code | where to read | Hungarian`; a place is a file with a
+/// word of it.
 #[test]
 fn the_glossary_leads_to_code_that_uses_the_term() {
     let rows = rows("docs/glossary.md");
@@ -271,16 +273,16 @@ fn the_glossary_leads_to_code_that_uses_the_term() {
         if meaning.len() < 15 || source.is_empty() || hungarian.is_empty() {
             wrong.push(format!("{term} has an empty cell"));
         }
-        let files: Vec<&str> = place.split('`').skip(1).step_by(2).collect();
-        let (paths, symbols): (Vec<&str>, Vec<&str>) = files.iter().partition(|word| word.contains('/'));
-        let texts: Vec<String> =
-            paths.iter().filter_map(|path| std::fs::read_to_string(root().join(path)).ok()).collect();
-        if texts.len() != paths.len() || texts.is_empty() {
-            wrong.push(format!("{term}: one of {paths:?} is not there"));
-        }
-        for symbol in symbols {
-            if !texts.iter().any(|text| text.contains(symbol)) {
-                wrong.push(format!("{term}: {symbol} is in none of {paths:?}"));
+        // A symbol belongs to the file named last before it.
+        let mut files: Vec<(&str, String)> = Vec::new();
+        for word in place.split('`').skip(1).step_by(2) {
+            if word.contains('/') {
+                match std::fs::read_to_string(root().join(word)) {
+                    Ok(text) => files.push((word, text)),
+                    Err(error) => wrong.push(format!("{term}: {word}: {error}")),
+                }
+            } else if !files.last().is_some_and(|(_, text)| text.contains(word)) {
+                wrong.push(format!("{term}: {word} is not in {:?}", files.last().map(|(path, _)| path)));
             }
         }
         // The file named first implements the term. Comments break lines anywhere.
@@ -289,8 +291,8 @@ fn the_glossary_leads_to_code_that_uses_the_term() {
             plain(&lines.collect::<Vec<_>>().join(" "))
         };
         let short = term.split(" (").next().unwrap_or(&term).to_owned();
-        if !texts.first().is_some_and(|text| flat(text).contains(&short)) {
-            wrong.push(format!("{term} is not said in {:?}", paths.first()));
+        if !files.first().is_some_and(|(_, text)| flat(text).contains(&short)) {
+            wrong.push(format!("{term} is not said in {:?}", files.first().map(|(path, _)| path)));
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");

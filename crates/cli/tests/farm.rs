@@ -1,5 +1,5 @@
-//! Work that is split: what processes draw together is, to the last bit, what one draws, and what is missing, there twice, cut short or
-//! of another picture is named.
+//! Work that is split: what processes draw together is, to the last bit, what one draws, and what is missing, there
+//! twice, cut short or of another picture is named.
 
 #[path = "support/program.rs"]
 mod program;

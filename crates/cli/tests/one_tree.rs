@@ -1,5 +1,5 @@
-//! A scene is held once and its tree built once, whoever draws it how often: the window with two settings side by side and a picked
-//! pixel, and `cost` with its dozens of renderers.
+//! A scene is held once and its tree built once, whoever draws it how often: the window with two settings side by side
+//! and a picked pixel, and `cost` with its dozens of renderers.
 
 #[path = "support/program.rs"]
 mod program;

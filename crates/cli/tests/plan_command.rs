@@ -1,5 +1,6 @@
-//! `etalon plan` says beforehand what `etalon render` then does: the same effects with the same reasons, the same passes in
-//! the same order, the same pipelines with the same constants, and no buffer or image that does not come to be.
+//! `etalon plan` says beforehand what `etalon render` then does: the same effects with the same reasons, the same
+//! passes in the same order, the same pipelines with the same constants, and no buffer or image that does not come to
+//! be.
 
 #[path = "support/program.rs"]
 mod program;

@@ -1,5 +1,5 @@
-//! The viewer in a real window on a display of its own, moved by synthetic hands: what it shows is what `render` draws, by the command
-//! that it copies, bit by bit.
+//! The viewer in a real window on a display of its own, moved by synthetic hands: what it shows is what `render` draws,
+//! by the command that it copies, bit by bit.
 
 #[path = "support/program.rs"]
 mod program;
@@ -174,8 +174,8 @@ fn animated(folder: &Path) -> PathBuf {
     b.save_glb(folder)
 }
 
-/// Time, by keys: the window is at a time that its command says, and the file's camera goes with it. Then a wipe between two settings:
-/// left of the line is what one command draws, right of it what the other does.
+/// Time, by keys: the window is at a time that its command says, and the file's camera goes with it. Then a wipe
+/// between two settings: left of the line is what one command draws, right of it what the other does.
 #[test]
 fn time_passes_and_settings_are_compared() {
     let Some(display) = Display::start() else { return };
@@ -228,7 +228,8 @@ fn time_passes_and_settings_are_compared() {
     assert!(!words.contains("Validation Error") && !words.contains("panicked"), "{words}");
 }
 
-/// Every knob by the keys of the window, rung by rung, with validation: the command says so, and some pictures are compared.
+/// Every knob by the keys of the window, rung by rung, with validation: the command says so, and some pictures are
+/// compared.
 #[test]
 fn every_knob_turns_in_the_window() {
     let Some(display) = Display::start() else { return };
@@ -300,8 +301,8 @@ impl SceneSource for Study {
     }
 }
 
-/// The thread that draws, without a window: every rung of every knob one after the other, each wanted while the one before is under
-/// way. What it shows in the end is what a renderer of those rungs draws.
+/// The thread that draws, without a window: every rung of every knob one after the other, each wanted while the one
+/// before is under way. What it shows in the end is what a renderer of those rungs draws.
 #[test]
 fn every_knob_turns_while_pictures_are_drawn() {
     let gpu = Gpu::hasty();

@@ -4,12 +4,12 @@
 //! cargo run -p etalon-cost --example contradictions -- A/cost.json B/cost.json …
 //! ```
 //!
-//! of each pair of files the first is judged. Counted are signs of errors and of times, what is said to be wasted, steps of the frontier,
-//! and how many intervals of errors cover what the second run found.
+//! of each pair of files the first is judged. Counted are signs of errors and of times, what is said to be wasted,
+//! steps of the frontier, and how many intervals of errors cover what the second run found.
 //!
-//! Of two folders the pictures of the first are judged by the reference of the second, which `--reference-samples N --seed S
-//! --shard 2/1000` draws alone; maps of errors in the first folder become those against it. Times, and prices from the reference's
-//! rungs, are not compared then.
+//! Of two folders the pictures of the first are judged by the reference of the second, which
+//! `--reference-samples N --seed S --shard 2/1000` draws alone; maps of errors in the first folder become those against
+//! it. Times, and prices from the reference's rungs, are not compared then.
 
 #![expect(clippy::print_stdout, reason = "a program that prints what it finds")]
 
@@ -55,7 +55,8 @@ fn compare(a: &Table, b: &Table, measured: bool, count: &mut Count) {
         }
         let told = |x: &Price| if x.error_told { x.shown_delta.median.signum() } else { 0.0 };
         if now.error_told {
-            // What nobody else can tell is not contradicted; the other sign is, or an interval that leaves no room for this one.
+            // A reference without a significant sign contradicts nothing. The opposite sign is a contradiction, and so
+            // is an interval that excludes this one.
             let rules_out = match now.base {
                 Family::Local => told(truth) * told(now) < 0.0,
                 _ => truth.shown_delta.high <= 0.0,

@@ -1,5 +1,5 @@
-//! List of the pictures of a run, in order: presets, and one-factor-at-a-time changes of every knob that the scene calls for. See
-//! docs/cost.md, "A run".
+//! List of the pictures of a run, in order: presets, and one-factor-at-a-time changes of every knob that the scene
+//! calls for. See docs/cost.md, "A run".
 
 use anyhow::{Context as _, Result};
 use serde::{Deserialize, Serialize};
@@ -122,8 +122,8 @@ impl States {
         self.0.iter().map(state).collect()
     }
 
-    /// One task for each rung that `wanted` accepts of each knob that the scene calls for, with one knob changed. A rung whose plan equals
-    /// that of the base is skipped.
+    /// One task for each rung that `wanted` accepts of each knob that the scene calls for, with one knob changed. A
+    /// rung whose plan equals that of the base is skipped.
     fn changes(
         &self,
         bench: &Bench<'_>,
@@ -169,7 +169,8 @@ fn of_local(knob: &Knob, rung: &str) -> bool {
     }
 }
 
-/// Rungs to which the reference's rungs are changed. Samples, light samples and path guiding change noise, which the presets show.
+/// Rungs to which the reference's rungs are changed. Samples, light samples and path guiding change noise, which the
+/// presets show.
 fn of_exact(knob: &Knob, rung: &str) -> bool {
     match knob.name {
         "samples" | "colour" => false,
@@ -180,8 +181,9 @@ fn of_exact(knob: &Knob, rung: &str) -> bool {
 }
 
 impl Agenda {
-    /// Makes the list. `reference`: knobs of the reference. The two times are GPU milliseconds of one sample of the reference and of one
-    /// sample in RGB. `priced`: samples of the pictures in `of_exact`, if given. `budget_ms`: time budget of the run.
+    /// Makes the list. `reference`: knobs of the reference. The two times are GPU milliseconds of one sample of the
+    /// reference and of one sample in RGB. `priced`: samples of the pictures in `of_exact`, if given. `budget_ms`: time
+    /// budget of the run.
     ///
     /// # Errors
     /// When the scene has nothing to draw.

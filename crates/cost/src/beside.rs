@@ -1,5 +1,5 @@
-//! Comparison of two tables of one scene, for example from two devices: GPU time, error, work counts and compiler statistics of each
-//! picture.
+//! Comparison of two tables of one scene, for example from two devices: GPU time, error, work counts and compiler
+//! statistics of each picture.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -5,8 +5,8 @@ use super::table::{Point, REFERENCE, Table};
 /// Safety factor for times: the scatter of the median of three times of one picture.
 pub const SPARE: f64 = 1.05;
 
-/// Points whose median GPU time is at most `ms` divided by [`SPARE`], sorted by error. The caller times the chosen point again, because
-/// the machine may be slower than when the table was measured.
+/// Points whose median GPU time is at most `ms` divided by [`SPARE`], sorted by error. The caller times the chosen
+/// point again, because the machine may be slower than when the table was measured.
 #[must_use]
 pub fn within(table: &Table, ms: f64) -> Vec<&Point> {
     let fits = |point: &&Point| point.gpu_ms.median * SPARE <= ms;

@@ -1,4 +1,5 @@
-//! Paired measurement of one approximation (`etalon cost --compare`): two rungs of one knob, timed interleaved, all other knobs equal.
+//! Paired measurement of one approximation (`etalon cost --compare`): two rungs of one knob, timed interleaved, all
+//! other knobs equal.
 
 use anyhow::{Context as _, Result, bail, ensure};
 use serde::Serialize;

@@ -1,8 +1,8 @@
-//! Unbiased squared differences of noisy pictures: the error of a picture against a reference that is itself a Monte Carlo estimate, and
-//! the difference of two path-traced pictures without their noise.
+//! Unbiased squared differences of noisy pictures: the error of a picture against a reference that is itself a Monte
+//! Carlo estimate, and the difference of two path-traced pictures without their noise.
 //!
-//! The estimates use pairs of half buffers with independent random numbers; docs/cost.md, "Error", derives them. Metrics: FLIP
-//! (Andersson et al. 2020), CIEDE2000, and the relative mean squared error.
+//! The estimates use pairs of half buffers with independent random numbers; docs/cost.md, "Error", derives them.
+//! Metrics: FLIP (Andersson et al. 2020), CIEDE2000, and the relative mean squared error.
 
 use anyhow::Result;
 use palette::color_difference::Ciede2000;
@@ -52,8 +52,8 @@ fn minus(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
 impl Truth {
     /// Errors of a picture, and the FLIP error map.
     ///
-    /// The reference is R = T + e, where T is its limit and e its noise. The expected value of (X − R)² is (X − T)² + e², and its variance
-    /// comes from 2(X − T)e. The half buffers of the reference estimate e².
+    /// The reference is R = T + e, where T is its limit and e its noise. The expected value of (X − R)² is (X − T)² +
+    /// e², and its variance comes from 2(X − T)e. The half buffers of the reference estimate e².
     ///
     /// # Errors
     /// When the pictures cannot be compared.
@@ -114,12 +114,12 @@ pub fn shown(picture: &Picture, view: &ViewTransform) -> Shown {
     picture.rgba.par_iter().map(|pixel| view.shown(*pixel).map(|value| value as f32)).collect()
 }
 
-/// Unbiased estimate of the mean squared difference between the limits of two pictures, in display values averaged over blocks of
-/// `side` × `side` pixels.
+/// Unbiased estimate of the mean squared difference between the limits of two pictures, in display values averaged over
+/// blocks of `side` × `side` pixels.
 ///
-/// The half buffers A and B of each picture share no random numbers, so the expected product of the two differences is the square
-/// without noise. The variance over the blocks gives the standard error. Display values are bounded, so that fireflies count no more
-/// than other pixels. Larger blocks have less noise, but hide finer differences.
+/// The half buffers A and B of each picture share no random numbers, so the expected product of the two differences is
+/// the square without noise. The variance over the blocks gives the standard error. Display values are bounded, so that
+/// fireflies count no more than other pixels. Larger blocks have less noise, but hide finer differences.
 #[must_use]
 pub fn unbiased_squared_difference(a: &[Shown; 2], b: &[Shown; 2], width: usize, side: usize) -> Estimate {
     let across = width / side;
@@ -159,13 +159,15 @@ pub fn significant(squares: &[(u32, Estimate)], standard_errors: f64) -> Option<
     squares.iter().find(|(_, found)| found.is_above(standard_errors)).or(squares.first()).copied()
 }
 
-/// Display values of a reference without its noise: two estimates with independent random numbers, from its even and odd samples.
+/// Display values of a reference without its noise: two estimates with independent random numbers, from its even and
+/// odd samples.
 ///
-/// The tone curve is not linear, so the display values of n samples are biased. The bias of twice as many samples is smaller by a factor
-/// r. For a smooth curve and noise with finite variance r is 1/2; where few paths carry most of the light, r is closer to 1. The mean
-/// brightness of quarters, halves and all of the samples gives r, and the rest of the geometric series is added (Aitken extrapolation;
-/// for r = 1/2 it is the jackknife of Quenouille). The mean display values of `study:pool` are 0.345, 0.396, 0.437 and 0.463 for 2, 4, 8
-/// and 16 samples: the last factor, 0.62, predicts the following values better than the one before, 0.80.
+/// The tone curve is not linear, so the display values of n samples are biased. The bias of twice as many samples is
+/// smaller by a factor r. For a smooth curve and noise with finite variance r is 1/2; where few paths carry most of the
+/// light, r is closer to 1. The mean brightness of quarters, halves and all of the samples gives r, and the rest of the
+/// geometric series is added (Aitken extrapolation; for r = 1/2 it is the jackknife of Quenouille). The mean display
+/// values of `study:pool` are 0.345, 0.396, 0.437 and 0.463 for 2, 4, 8 and 16 samples: the last factor, 0.62, predicts
+/// the following values better than the one before, 0.80.
 pub struct ShownReference {
     /// The two estimates.
     estimates: [Shown; 2],
@@ -180,8 +182,8 @@ const NO_CURVE: f64 = 1e-5;
 /// Largest side in pixels of the blocks in which the change is estimated, and their least number.
 const SQUARE: usize = 16;
 const SQUARES: usize = 32;
-/// Factor of the bias bound. The measured bias was 0.9 (`study:cornell`), 0.5 (`lamps`), 0.6 (`nested`) and 2.2 (`pool`, whose water few
-/// paths light) times the rest of the series, for 16 samples against 1024 and 4096.
+/// Factor of the bias bound. The measured bias was 0.9 (`study:cornell`), 0.5 (`lamps`), 0.6 (`nested`) and 2.2
+/// (`pool`, whose water few paths light) times the rest of the series, for 16 samples against 1024 and 4096.
 const CAUTION: f64 = 3.0;
 
 /// Sums over pixels and channels for an error and its standard error.
@@ -203,8 +205,8 @@ impl SquaredSums {
         }
     }
 
-    /// Means over `pixels` pixels: value, standard error and weight. The noise of the three channels of a pixel is treated as fully
-    /// correlated.
+    /// Means over `pixels` pixels: value, standard error and weight. The noise of the three channels of a pixel is
+    /// treated as fully correlated.
     fn means(self, pixels: usize) -> [f64; 3] {
         let n = 3.0 * pixels.max(1) as f64;
         [self.value / n, (3.0 * self.variance.max(0.0)).sqrt() / n, self.weight / n]
@@ -212,8 +214,8 @@ impl SquaredSums {
 }
 
 impl ShownReference {
-    /// Estimates from the means of consecutive parts of the samples, alternately of even and odd samples; two parts of each, or another
-    /// power of two.
+    /// Estimates from the means of consecutive parts of the samples, alternately of even and odd samples; two parts of
+    /// each, or another power of two.
     #[must_use]
     pub fn of(parts: &[Picture], view: &ViewTransform) -> Self {
         let pieces = |parts: &[&Picture], side: usize| -> Shown {
@@ -241,7 +243,8 @@ impl ShownReference {
             all.iter().zip(before).map(|(a, b)| std::array::from_fn(|c| a[c] + rest * (a[c] - b[c]))).collect()
         };
         let estimates = [estimate(&levels[0]), estimate(&levels[1])];
-        // Change from the halves of a half buffer to the half buffer, squared without noise by means of the other half buffer.
+        // Change from the halves of a half buffer to the half buffer, squared without noise by means of the other half
+        // buffer.
         let side = ((parts[0].rgba.len() / SQUARES) as f64).sqrt() as usize;
         let change = unbiased_squared_difference(
             &[levels[0][1].clone(), levels[1][1].clone()],
@@ -260,9 +263,10 @@ impl ShownReference {
         Self { estimates: [values.clone(), values], off: 0.0 }
     }
 
-    /// Means over the picture of `of(pixel, channel, [j₁, j₂], v²)`, where j₁ and j₂ are the estimates and v is the variance of their noise.
-    /// Neighbouring pixels have about the same v and independent random numbers. So the expected product of their (j₁ − j₂)² is 4v² for any
-    /// noise distribution; the square within one pixel would depend on the distribution.
+    /// Means over the picture of `of(pixel, channel, [j₁, j₂], v²)`, where j₁ and j₂ are the estimates and v is the
+    /// variance of their noise. Neighbouring pixels have about the same v and independent random numbers. So the
+    /// expected product of their (j₁ − j₂)² is 4v² for any noise distribution; the square within one pixel would depend
+    /// on the distribution.
     fn means(&self, of: impl Fn(usize, usize, [f64; 2], f64) -> SquaredSums + Sync) -> [f64; 3] {
         let [j1, j2] = &self.estimates;
         let square = |i: usize, c: usize| (f64::from(j1[i][c]) - f64::from(j2[i][c])).powi(2);
@@ -283,9 +287,10 @@ impl ShownReference {
 
     /// Unbiased mean squared error of display values 0 to 1 against the limit of the reference.
     ///
-    /// With estimates j = t + e of the limit t, the expected value of (x − j₁)(x − j₂) is (x − t)²: independent noise adds no square. If e
-    /// has variance v, the product has variance 2(x − t)²v + v², and the expected value of (x − j₁)(x − j₂)(j₁ − j₂)² is 2(x − t)²v − 2v².
-    /// If t has a bias of β (root mean square), the root of the mean squared error is off by at most β (triangle inequality).
+    /// With estimates j = t + e of the limit t, the expected value of (x − j₁)(x − j₂) is (x − t)²: independent noise
+    /// adds no square. If e has variance v, the product has variance 2(x − t)²v + v², and the expected value of (x −
+    /// j₁)(x − j₂)(j₁ − j₂)² is 2(x − t)²v − 2v². If t has a bias of β (root mean square), the root of the mean squared
+    /// error is off by at most β (triangle inequality).
     #[must_use]
     pub fn error(&self, x: &Display) -> Estimate {
         let [mean, deviation, _] = self.means(|i, c, [j1, j2], squared| {
@@ -296,9 +301,9 @@ impl ShownReference {
         Estimate { mean, deviation, bias: 2.0 * mean.max(0.0).sqrt() * self.off + self.off * self.off }
     }
 
-    /// Unbiased difference of the mean squared errors of `x` and `b`: x² − b² − (x − b)(j₁ + j₂). It is linear in the reference, so that the
-    /// noise common to both errors cancels. A bias β of the reference changes it by at most 2β times the root mean square of x − b
-    /// (Cauchy–Schwarz inequality).
+    /// Unbiased difference of the mean squared errors of `x` and `b`: x² − b² − (x − b)(j₁ + j₂). It is linear in the
+    /// reference, so that the noise common to both errors cancels. A bias β of the reference changes it by at most 2β
+    /// times the root mean square of x − b (Cauchy–Schwarz inequality).
     #[must_use]
     pub fn more_error(&self, x: &Display, b: &Display) -> Estimate {
         let [mean, deviation, weight] = self.means(|i, c, [j1, j2], _| {
@@ -309,7 +314,8 @@ impl ShownReference {
         Estimate { mean, deviation, bias: 2.0 * weight.sqrt() * self.off }
     }
 
-    /// Resolution of the reference: the least root mean squared error of display values that is significant at so many standard errors.
+    /// Resolution of the reference: the least root mean squared error of display values that is significant at so many
+    /// standard errors.
     #[must_use]
     pub fn resolution(&self, standard_errors: f64) -> f64 {
         let [_, deviation, _] =

@@ -1,5 +1,5 @@
-//! Measures the cost of effects that a plan leaves out (`--plan explain-cost`). Each effect is enabled alone, and the pictures with and
-//! without it are timed interleaved (paired measurement). See docs/plan.md.
+//! Measures the cost of effects that a plan leaves out (`--plan explain-cost`). Each effect is enabled alone, and the
+//! pictures with and without it are timed interleaved (paired measurement). See docs/plan.md.
 
 use std::time::Instant;
 
@@ -87,7 +87,8 @@ struct DrawnPlan {
 }
 
 impl Subject<'_> {
-    /// Measures all effects of `effects` that the plan leaves out, in order. `progress` is called with the name of each.
+    /// Measures all effects of `effects` that the plan leaves out, in order. `progress` is called with the name of
+    /// each.
     ///
     /// # Errors
     /// When the plan without them cannot be drawn.
@@ -113,7 +114,8 @@ impl Subject<'_> {
         Ok(prices)
     }
 
-    /// Times both plans interleaved. `None` where both plans draw the same, because the effect needs other effects that are left out.
+    /// Times both plans interleaved. `None` where both plans draw the same, because the effect needs other effects that
+    /// are left out.
     fn price(&self, effect: &Effect, plain: &mut DrawnPlan, with: &mut DrawnPlan) -> Result<Option<Price>> {
         if plain.renderer.plan().draws_as(with.renderer.plan()) {
             return Ok(None);
@@ -171,7 +173,8 @@ impl Subject<'_> {
     }
 }
 
-/// The rungs that enable an effect that a knob has switched off: those of the recursive model, or those that path tracing needs.
+/// The rungs that enable an effect that a knob has switched off: those of the recursive model, or those that path
+/// tracing needs.
 fn allowing(effect: EffectId, dropped_by: Choice) -> Vec<Choice> {
     let paths = [Shadows::Ray.choice(), Reflection::Ray.choice(), Refraction::Ray.choice(), Indirect::Path.choice()];
     let by_lights = [Lights::Area1.choice(), Guiding::Photons.choice()];

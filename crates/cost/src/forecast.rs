@@ -1,4 +1,5 @@
-//! Predicts the remaining time of a run: the sum of estimated picture times, corrected by the ratio of measured to estimated time so far.
+//! Predicts the remaining time of a run: the sum of estimated picture times, corrected by the ratio of measured to
+//! estimated time so far.
 
 use std::collections::VecDeque;
 
@@ -77,8 +78,8 @@ impl Forecast {
         self.as_it_went(self.coming.iter().sum())
     }
 
-    /// Corrects an estimate by the ratio of measured to estimated time so far. Ten seconds of correct estimates are added as a prior, because
-    /// one picture is little evidence.
+    /// Corrects an estimate by the ratio of measured to estimated time so far. Ten seconds of correct estimates are
+    /// added as a prior, because one picture is little evidence.
     #[must_use]
     pub fn as_it_went(&self, seconds: f64) -> f64 {
         let [expected, took] = self.was;

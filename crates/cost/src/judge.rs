@@ -1,5 +1,5 @@
-//! Evaluates the drawn pictures against the final reference: errors, costs of rungs, the Pareto frontier of error and GPU time, and
-//! recommended settings. See docs/cost.md, "Frontier and recommended settings".
+//! Evaluates the drawn pictures against the final reference: errors, costs of rungs, the Pareto frontier of error and
+//! GPU time, and recommended settings. See docs/cost.md, "Frontier and recommended settings".
 //!
 //! Evaluation is separate from drawing, so that pictures drawn early are compared with the final, better reference.
 
@@ -24,11 +24,14 @@ use etalon::image::{Picture, exr, file, png};
 
 /// Half side in pixels of the detail around the worst pixel.
 const AROUND: i64 = 20;
-/// A step along the frontier is always worth taking if it reduces the squared error to this factor for at most this factor of time.
+/// A step along the frontier is always worth taking if it reduces the squared error to this factor for at most this
+/// factor of time.
 const CHEAP: [f64; 2] = [0.6, 2.0];
-/// Least distance of a corner (knee) below the line, as a fraction of the line in logarithms; without a corner `quick` is also `balanced`.
+/// Least distance of a corner (knee) below the line, as a fraction of the line in logarithms; without a corner `quick`
+/// is also `balanced`.
 const CORNER: f64 = 0.05;
-/// The reference itself is recommended as `exact` where no other point has an error below this multiple of its resolution.
+/// The reference itself is recommended as `exact` where no other point has an error below this multiple of its
+/// resolution.
 const FAR: f64 = 2.0;
 /// Two times count as equal if their ratio is at most this.
 const SAME_TIME: f64 = 1.02;
@@ -105,7 +108,8 @@ impl Judge<'_> {
     /// # Errors
     /// When a picture cannot be read, compared or written.
     pub fn judge(&self, records: &[Record]) -> Result<Judged> {
-        // Number of statements for the Bonferroni correction: per price an error for three block sizes and a time, per point a comparison.
+        // Number of statements for the Bonferroni correction: per price an error for three block sizes and a time, per
+        // point a comparison.
         let prices = records.iter().filter(|record| record.pair.is_some()).count();
         let statements = 4 * prices + records.len();
         let sure = standard_errors(statements, MANY);
@@ -195,8 +199,9 @@ impl Judge<'_> {
         })
     }
 
-    /// Pareto frontier: indices of the points that no other point beats in time and error at once, the fastest first, the reference last.
-    /// Each point has significantly less error than the one before. Of two points with equal times the better one is kept.
+    /// Pareto frontier: indices of the points that no other point beats in time and error at once, the fastest first,
+    /// the reference last. Each point has significantly less error than the one before. Of two points with equal times
+    /// the better one is kept.
     fn frontier(&self, points: &[Point], displays: &[Display], sure: f64) -> Vec<usize> {
         let reference = points.iter().position(|point| point.name == REFERENCE);
         let time = |i: usize| points[i].gpu_ms.median;
@@ -220,10 +225,10 @@ impl Judge<'_> {
     }
 }
 
-/// Recommended settings from the frontier. `quick` is the fastest point from which no step is cheap ([`CHEAP`]). `exact` is the most exact
-/// point, or the reference where no point comes close to it. `balanced` is the knee: the point farthest below the line between both, in
-/// logarithms. Only presets and results of the search take part, because `local` with one knob changed may be on the frontier due to two
-/// errors that cancel.
+/// Recommended settings from the frontier. `quick` is the fastest point from which no step is cheap ([`CHEAP`]).
+/// `exact` is the most exact point, or the reference where no point comes close to it. `balanced` is the knee: the
+/// point farthest below the line between both, in logarithms. Only presets and results of the search take part, because
+/// `local` with one knob changed may be on the frontier due to two errors that cancel.
 fn recommended(points: &[Point], frontier: &[usize]) -> Vec<Recommended> {
     let (time, error) = (|i: usize| points[i].gpu_ms.median, |i: usize| points[i].error());
     let meant =
@@ -257,17 +262,17 @@ fn recommended(points: &[Point], frontier: &[usize]) -> Vec<Recommended> {
     named.map(|(setting, point)| Recommended { setting: setting.to_owned(), point }).into()
 }
 
-/// Scales the interleaved times of a picture and its base so that the median of the base is `base_ms`, its median over the whole run. The
-/// times of points are normalised the same way.
+/// Scales the interleaved times of a picture and its base so that the median of the base is `base_ms`, its median over
+/// the whole run. The times of points are normalised the same way.
 fn in_the_middle([ms, baseline_ms]: [&[f64]; 2], base_ms: f64) -> [Vec<f64>; 2] {
     let factor = base_ms / Interval::of(baseline_ms).median;
     let factor = if factor.is_finite() && factor > 0.0 { factor } else { 1.0 };
     [ms, baseline_ms].map(|all| all.iter().map(|ms| factor * ms).collect())
 }
 
-/// Times normalised by the paired baseline, as if the machine had been equally fast all along: the ratio of a picture to its interleaved
-/// base, times the median of the base over the run. The interval covers later runs too: its ends combine the extremes of the ratios with
-/// the extremes of the base over the whole run.
+/// Times normalised by the paired baseline, as if the machine had been equally fast all along: the ratio of a picture
+/// to its interleaved base, times the median of the base over the run. The interval covers later runs too: its ends
+/// combine the extremes of the ratios with the extremes of the base over the whole run.
 fn normalise_by_baseline(records: &[Record]) -> Vec<Interval> {
     let of_exact = |record: &Record| record.family == Family::Exact;
     let bases = [false, true].map(|exact| {
@@ -298,8 +303,8 @@ fn normalise_by_baseline(records: &[Record]) -> Vec<Interval> {
     records.iter().map(of).collect()
 }
 
-/// The reference as a point. Its error is its resolution. It is timed once; the relative interval of its time is that of the point
-/// `exact`.
+/// The reference as a point. Its error is its resolution. It is timed once; the relative interval of its time is that
+/// of the point `exact`.
 fn the_reference(reference: &Reference, wandered: Option<Interval>) -> Point {
     let relmse = reference.own_error * reference.own_error;
     let share = |end: f64, median: f64| if median > 0.0 { reference.gpu_ms * end / median } else { reference.gpu_ms };
@@ -386,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_without_timestamps_tells_no_time() {
+    fn a_device_without_timestamps_reports_no_time() {
         let all = [record("local", &[0.0], &[]), record("a", &[0.0, 0.0], &[0.0, 0.0])];
         assert!(normalise_by_baseline(&all).iter().all(|time| time.median == 0.0 && time.high == 0.0));
         let [ms, baseline_ms] = in_the_middle([&all[1].ms, &all[1].baseline_ms], 0.0);

@@ -1,8 +1,9 @@
 //! Measures what approximations and effects cost, in error and GPU time, on a scene and a device (docs/cost.md).
 //!
-//! [`sweep::Sweep`] draws a reference, every rung alone, and some combinations of rungs. [`agenda`] lists the pictures, [`measure`] draws
-//! and times them, [`reference`](mod@reference) draws the picture that they are compared with, and [`judge`] computes their errors. The
-//! result is [`table::Table`]; [`report`] writes it as an HTML page. [`explain`] measures effects that a plan leaves out.
+//! [`sweep::Sweep`] draws a reference, every rung alone, and some combinations of rungs. [`agenda`] lists the pictures,
+//! [`measure`] draws and times them, [`reference`](mod@reference) draws the picture that they are compared with, and
+//! [`judge`] computes their errors. The result is [`table::Table`]; [`report`] writes it as an HTML page. [`explain`]
+//! measures effects that a plan leaves out.
 
 pub mod agenda;
 pub mod beside;

@@ -1,4 +1,5 @@
-//! Draws and times the pictures of a run. Each picture is written when it is drawn; an interrupted run reads the pictures that it finds.
+//! Draws and times the pictures of a run. Each picture is written when it is drawn; an interrupted run reads the
+//! pictures that it finds.
 
 use std::path::Path;
 use std::time::Instant;
@@ -61,8 +62,8 @@ impl Measuring<'_> {
         Ok(Base { warm, measured })
     }
 
-    /// Draws a picture, timed interleaved with a base. `None` where another shard draws it, where there is no time for it, or where it cannot
-    /// be drawn; a failure becomes a warning and the run goes on.
+    /// Draws a picture, timed interleaved with a base. `None` where another shard draws it, where there is no time for
+    /// it, or where it cannot be drawn; a failure becomes a warning and the run goes on.
     ///
     /// # Errors
     /// When files cannot be read or written.

@@ -1,8 +1,8 @@
-//! Order of convergence of the quadrature rules for ray marching in heterogeneous media: the error of each rule by its number of steps
-//! (lecture A2, numerics S8).
+//! Order of convergence of the quadrature rules for ray marching in heterogeneous media: the error of each rule by its
+//! number of steps (lecture A2, numerics S8).
 //!
-//! The pictures are ray-traced with one sample. They differ only by the quadrature, so that no noise hides the error; path-traced
-//! pictures would have noise.
+//! The pictures are ray-traced with one sample. They differ only by the quadrature, so that no noise hides the error;
+//! path-traced pictures would have noise.
 
 use anyhow::{Context as _, Result, ensure};
 
@@ -19,8 +19,8 @@ const RULES: [&str; 3] = ["left", "midpoint", "simpson"];
 /// Relative error below which f32 rounding dominates.
 const ROUNDING: f64 = 1e-8;
 
-/// Estimated order: median of the slopes of log error over log steps between neighbouring numbers of steps. The median ignores the last
-/// slopes, where kinks of the grid or rounding stop the convergence.
+/// Estimated order: median of the slopes of log error over log steps between neighbouring numbers of steps. The median
+/// ignores the last slopes, where kinks of the grid or rounding stop the convergence.
 #[must_use]
 pub fn order(steps: &[u32], errors: &[f64]) -> Option<f64> {
     let told: Vec<(f64, f64)> =

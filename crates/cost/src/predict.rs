@@ -1,7 +1,8 @@
-//! Predicts the time and error of every rung at a size from renders with few pixels (`etalon plan --forecast`); nothing is drawn at that
-//! size.
+//! Predicts the time and error of every rung at a size from renders with few pixels (`etalon plan --forecast`); nothing
+//! is drawn at that size.
 //!
-//! Errors are taken over from the small picture. Times are extrapolated by the growth between two small sizes. See docs/cost.md.
+//! Errors are taken over from the small picture. Times are extrapolated by the growth between two small sizes. See
+//! docs/cost.md.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,8 +19,8 @@ use super::warm::Bench;
 
 /// Default limit for the number of pixels that are drawn.
 pub const PIXELS: f64 = 160.0 * 90.0;
-/// Relative scatter of an error in addition to noise, because few pixels sample edges and small objects by chance (measured:
-/// docs/cost.md).
+/// Relative scatter of an error in addition to noise, because few pixels sample edges and small objects by chance
+/// (measured: docs/cost.md).
 const OTHER_PIXELS: f64 = 0.15;
 
 /// Predicted time and error of a picture.

@@ -1,5 +1,5 @@
-//! Cost of changing one knob: paired comparison of a picture with its base, in time and error, with significance tests and a verdict in
-//! words.
+//! Cost of changing one knob: paired comparison of a picture with its base, in time and error, with significance tests
+//! and a verdict in words.
 
 use anyhow::Result;
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,8 @@ pub struct Pair {
     pub flip: f64,
     /// Whether the pictures are bit-identical.
     pub same: bool,
-    /// Mean squared difference between the limits of both pictures in display values, by block side in pixels; only of path tracing.
+    /// Mean squared difference between the limits of both pictures in display values, by block side in pixels; only of
+    /// path tracing.
     pub squares: Vec<(u32, Estimate)>,
     /// Relative mean squared error due to noise, over that of the base; only of knobs that change noise alone.
     pub noise_ratio: Option<f64>,
@@ -68,8 +69,8 @@ impl Pair {
     }
 }
 
-/// Uncertainty of time ratios: the standard deviation of their logarithms within a picture, pooled over all pictures with one base, and
-/// its degrees of freedom.
+/// Uncertainty of time ratios: the standard deviation of their logarithms within a picture, pooled over all pictures
+/// with one base, and its degrees of freedom.
 #[derive(Debug, Clone, Copy)]
 pub struct TimeNoise {
     deviation: f64,
@@ -108,8 +109,9 @@ pub struct PairedTimes<'a> {
     pub clock: TimeNoise,
 }
 
-/// Cost of a change. `more_error` is the difference of the mean squared errors of picture and base against a reference; `None` for
-/// path-traced pictures, which are compared with each other. The caller sets `point`; `flip_delta` is the FLIP error between both.
+/// Cost of a change. `more_error` is the difference of the mean squared errors of picture and base against a reference;
+/// `None` for path-traced pictures, which are compared with each other. The caller sets `point`; `flip_delta` is the
+/// FLIP error between both.
 #[must_use]
 pub fn price(
     change: &Change,
@@ -191,7 +193,8 @@ fn verdict(price: &Price) -> String {
             if price.undoes_another() { ", although it approximates more: it cancels another error" } else { "" };
         format!("removes an error of {less:.2} % (FLIP {flip:.3} between the pictures){undoes}")
     } else if price.is_seen() {
-        // Relative to the reference's rungs, a cheaper rung has an error; a more exact one shows what the reference leaves out.
+        // Relative to the reference's rungs, a cheaper rung has an error; a more exact one shows what the reference
+        // leaves out.
         let more = match (price.base, price.to_more_exact()) {
             (Family::Exact, false) => "an error of",
             (Family::Exact, true) => "a difference of",
@@ -235,7 +238,8 @@ mod tests {
                 PairedTimes { ms: &[10.0], baseline_ms: &[10.0], clock: TimeNoise { deviation: 0.01, freedom: 9.0 } };
             price(&change, &pair, Some(Estimate::default()), turns, 100, 4.0).verdict
         };
-        // Measured with an error of one thousandth in π in the lobe of one tier: study:lamps and study:materials at 160x90.
+        // Measured with an error of one thousandth in π in the lobe of one tier: study:lamps and study:materials at
+        // 160x90.
         assert!(
             said(0.999_947_5).contains("one of the two rungs is wrong here")
                 && said(0.999_962_4).contains("wrong here")
@@ -245,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn times_that_differ_by_chance_are_not_told() {
+    fn times_that_differ_by_chance_are_not_significant() {
         let turns = |ratio: f64| -> (Vec<f64>, Vec<f64>) {
             let noise = [0.99, 1.02, 1.0, 0.98, 1.01, 1.0, 1.005];
             (noise.iter().map(|n| 10.0 * ratio * n).collect(), vec![10.0; 7])

@@ -1,9 +1,10 @@
-//! The reference picture, which errors are measured against: every knob on its most exact rung, with as many samples as the errors
-//! require or the time budget allows. See docs/cost.md.
+//! The reference picture, which errors are measured against: every knob on its most exact rung, with as many samples as
+//! the errors require or the time budget allows. See docs/cost.md.
 //!
-//! The reference is the mean of rounds; each round is a picture with its own random seed that a command can draw again. A later run
-//! continues the rounds of an earlier one. The number of samples is planned from a pilot, whose samples are not used again, and from the
-//! clock. Neither depends on the samples of the reference, so that stopping does not bias the significance tests (no optional stopping).
+//! The reference is the mean of rounds; each round is a picture with its own random seed that a command can draw again.
+//! A later run continues the rounds of an earlier one. The number of samples is planned from a pilot, whose samples are
+//! not used again, and from the clock. Neither depends on the samples of the reference, so that stopping does not bias
+//! the significance tests (no optional stopping).
 
 use std::path::Path;
 use std::time::Instant;
@@ -32,13 +33,15 @@ const LEAST_SAMPLES: f64 = 4.0;
 const PILOT: u32 = 4;
 /// Approximate number of pixels of a pilot; time and noise of a sample are scaled by pixels.
 const PILOT_PIXELS: f64 = 160.0 * 90.0;
-/// A pilot with bands may take this many times as long as a pilot in RGB, because the driver's cache may hold only the programs for RGB
-/// (study:metals: 9 s after 2.4 s). It is drawn only if that is at most the following fraction of the budget.
+/// A pilot with bands may take this many times as long as a pilot in RGB, because the driver's cache may hold only the
+/// programs for RGB (study:metals: 9 s after 2.4 s). It is drawn only if that is at most the following fraction of the
+/// budget.
 const BANDS_TAKE: f64 = 4.0;
 const PILOT_SHARE: f64 = 0.6;
 /// Approximate number of statements of a report, for the Bonferroni correction when samples are planned.
 const STATEMENTS: usize = 150;
-/// Largest fraction of the seconds left that a round may take: a round cannot be stopped, and the machine may become slower.
+/// Largest fraction of the seconds left that a round may take: a round cannot be stopped, and the machine may become
+/// slower.
 const AT_ONCE: f64 = 0.7;
 /// Largest number of rounds of one run: each round starts a new picture.
 const MOST_ROUNDS: usize = 16;
@@ -58,8 +61,8 @@ pub struct NotMeasured {
     pub enough_s: u32,
 }
 
-/// A run whose budget has no time for this many samples in RGB measures a picture with fewer pixels: all path-traced pictures together
-/// take about as many (measured: docs/cost.md).
+/// A run whose budget has no time for this many samples in RGB measures a picture with fewer pixels: all path-traced
+/// pictures together take about as many (measured: docs/cost.md).
 const WHOLE: f64 = 100.0;
 
 /// Results of the pilot, from which the reference is planned.
@@ -91,15 +94,15 @@ pub struct Refined {
     png: Option<Vec<u8>>,
 }
 
-/// The largest of 4096, 1024, 256, 64 and 16 samples that take at most `limit_ms`, else 4, the least number of samples for an error
-/// estimate.
+/// The largest of 4096, 1024, 256, 64 and 16 samples that take at most `limit_ms`, else 4, the least number of samples
+/// for an error estimate.
 #[must_use]
 pub fn samples_within(ms_each: f64, limit_ms: f64) -> u32 {
     [4096, 1024, 256, 64, 16].into_iter().find(|&n| f64::from(n) * ms_each <= limit_ms).unwrap_or(4)
 }
 
-/// Random seed of a round. A user is unlikely to choose the same seed: a picture that shares random numbers with the reference would seem
-/// closer to the truth than it is.
+/// Random seed of a round. A user is unlikely to choose the same seed: a picture that shares random numbers with the
+/// reference would seem closer to the truth than it is.
 fn seed_of(seed: u32, round: usize) -> u32 {
     seed ^ 0x2a2a_2a2a ^ (round as u32).wrapping_mul(0x9e37_79b9)
 }
@@ -198,8 +201,9 @@ fn look(bench: &Bench<'_>, colour: &str) -> Result<Look> {
 }
 
 impl Pilot {
-    /// Draws a few samples and plans the reference. `called_for`: whether the scene calls for the knob `colour`. `budget_ms`: time budget of
-    /// the run; `share`: fraction of it for the reference. `may_shrink`: whether to measure fewer pixels if the budget is small.
+    /// Draws a few samples and plans the reference. `called_for`: whether the scene calls for the knob `colour`.
+    /// `budget_ms`: time budget of the run; `share`: fraction of it for the reference. `may_shrink`: whether to measure
+    /// fewer pixels if the budget is small.
     ///
     /// # Errors
     /// When the pilot cannot be drawn.
@@ -335,8 +339,8 @@ impl Refined {
         Truth { film, half, shown, display }
     }
 
-    /// Facts of the reference for the table, and its PNG file. `command`: beginning of every printed command. `priced`: samples of the
-    /// pictures with base `exact`.
+    /// Facts of the reference for the table, and its PNG file. `command`: beginning of every printed command. `priced`:
+    /// samples of the pictures with base `exact`.
     ///
     /// # Errors
     /// When pictures cannot be compared or encoded.

@@ -1,7 +1,8 @@
 //! Sequence of a run of `etalon cost`.
 //!
-//! A first round of the reference; presets and every rung relative to `local`; a search for combinations; every rung relative to the
-//! reference's rungs; in the remaining time, more rounds of the reference. Then all pictures are evaluated against it.
+//! A first round of the reference; presets and every rung relative to `local`; a search for combinations; every rung
+//! relative to the reference's rungs; in the remaining time, more rounds of the reference. Then all pictures are
+//! evaluated against it.
 
 use std::time::Instant;
 
@@ -27,16 +28,16 @@ use etalon::image::file;
 use etalon::image::metric::AnyPicture;
 use etalon::plan::Knobs;
 
-/// Fractions of the budget: for the reference before the changes relative to `exact` are drawn, and for pictures of the requested size if
-/// fewer pixels are measured.
+/// Fractions of the budget: for the reference before the changes relative to `exact` are drawn, and for pictures of the
+/// requested size if fewer pixels are measured.
 const REFERENCE_SHARE: f64 = 0.4;
 const AFTER_SHARE: f64 = 0.08;
 /// Fraction of the budget for the first round of the reference.
 const FIRST_SHARE: f64 = 0.12;
 /// Budgets from this many seconds on write a preliminary report.
 const EARLY_S: f64 = 90.0;
-/// Estimated time to measure the growth of times with pixels: seconds for four starts, and a number of path-traced samples. Chosen rather
-/// too large.
+/// Estimated time to measure the growth of times with pixels: seconds for four starts, and a number of path-traced
+/// samples. Chosen rather too large.
 const GROWTH_S: f64 = 1.6;
 const GROWTH_SAMPLES: f64 = 10.0;
 /// A picture is drawn twice, the first time to compile.
@@ -325,6 +326,7 @@ impl Run<'_> {
     fn at_size(&self, table: &Table, mut left_s: f64) -> Result<RequestedSize> {
         let asked = self.sweep.bench.settings.size;
         let begun = Instant::now();
+        // How times grow with pixels is measured if that fits into the seconds left.
         let growth = match left_s > GROWTH_S + GROWTH_SAMPLES * self.pilot.plain_ms / 1e3 {
             true => Growth::of(&self.bench, asked)?,
             false => Growth::by_pixels(&self.bench, asked),
@@ -333,10 +335,12 @@ impl Run<'_> {
         let begins = (self.sweep.command)(asked);
         let mut settings: Vec<AtSize> = Vec::new();
         for (place, Recommended { point, .. }) in table.recommended.iter().enumerate() {
+            // Two of quick, balanced and exact may be the same point, which is timed once.
             if let Some(same) = table.recommended[..place].iter().position(|known| known.point == *point) {
                 settings.push(settings[same].clone());
                 continue;
             }
+            // An extrapolated time, replaced by a measured one while seconds are left.
             let point = &table.points[*point];
             let command = point.command.replacen(self.command, &begins, 1);
             let mut at = AtSize { gpu_ms: growth.of_time(point), measured: false, command };
@@ -360,6 +364,7 @@ impl Run<'_> {
         states: &States,
         found: &Found,
     ) -> Table {
+        // Warnings about what limits the table as a whole: the device, the size, the reference.
         let mut warnings = Vec::new();
         if self.bench.device.info().kind == "cpu" {
             warnings.push("software device: GPU times depend on this CPU and on its other load".to_owned());

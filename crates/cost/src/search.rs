@@ -19,7 +19,8 @@ pub const PICTURES: usize = 8;
 const STATEMENTS: usize = 100;
 /// Least fraction of the squared error that a step must be predicted to remove.
 const WORTH: f64 = 0.01;
-/// Mean squared difference of display values below which a costly rung counts as useless: (a thousandth of their range)².
+/// Mean squared difference of display values below which a costly rung counts as useless: (a thousandth of their
+/// range)².
 const NOTHING: f64 = 1e-6;
 
 /// Change of squared error and time when one knob of `local` is set to a rung.
@@ -55,8 +56,8 @@ fn rungs(records: &[Record], judge: &Judge<'_>) -> Result<(Vec<Rung>, f64)> {
     Ok((all, base_ms))
 }
 
-/// Greedy search from the fastest rungs towards less error. Each step applies the change to a more exact rung with the best predicted
-/// error reduction per millisecond, and is kept only if the drawn picture has significantly less error.
+/// Greedy search from the fastest rungs towards less error. Each step applies the change to a more exact rung with the
+/// best predicted error reduction per millisecond, and is kept only if the drawn picture has significantly less error.
 ///
 /// # Errors
 /// When files cannot be read or written.
@@ -95,7 +96,8 @@ pub fn search(
             for &to in knob.rungs {
                 let measured =
                     to == knob.rung(local) || rungs.iter().any(|rung| rung.knob == knob.name && rung.to == to);
-                // A rung that approximates more but has less error cancels another error: it is no improvement of its own.
+                // A rung that approximates more but has less error cancels another error: it is no improvement of its
+                // own.
                 let further = knobs.with(knob.name, to).filter(|then| knob.place(then) > knob.place(&knobs));
                 let possible = further.is_some();
                 if !measured || !possible || refused.contains(&(knob.name, to)) {
@@ -141,8 +143,8 @@ fn local_rung(knobs: &Knobs, name: &str) -> &'static str {
     KNOBS.iter().find(|knob| knob.name == name).map_or("", |knob| knob.rung(knobs))
 }
 
-/// Draws the exact rungs without all rungs that cost time and change nothing visible, and checks that the combination still changes
-/// nothing. `None` where no rung is useless, or where there is no time.
+/// Draws the exact rungs without all rungs that cost time and change nothing visible, and checks that the combination
+/// still changes nothing. `None` where no rung is useless, or where there is no time.
 ///
 /// # Errors
 /// When files cannot be read or written.

@@ -1,7 +1,7 @@
 //! Extrapolation of errors and times between sizes of the same picture.
 //!
-//! The mean error of a picture depends little on the number of pixels. A time is the sum of a constant per picture and a constant per
-//! pixel; measurements at two sizes determine both.
+//! The mean error of a picture depends little on the number of pixels. A time is the sum of a constant per picture and
+//! a constant per pixel; measurements at two sizes determine both.
 
 use anyhow::Result;
 
@@ -12,7 +12,8 @@ use super::warm::Bench;
 use etalon::frame::Settings;
 use etalon::plan::{Knobs, Model};
 
-/// Relative scatter of an extrapolated time in addition to noise, because caches behave differently (measured: docs/cost.md).
+/// Relative scatter of an extrapolated time in addition to noise, because caches behave differently (measured:
+/// docs/cost.md).
 const OTHER_SIZE: f64 = 0.25;
 
 /// Total milliseconds of the renders of which the fastest counts, unless there are five.
@@ -44,8 +45,8 @@ pub struct Growth {
 }
 
 impl Growth {
-    /// Growth from the bench's size to `size`. Times are measured at the bench's size and at a quarter of its pixels, with the exact rungs in
-    /// RGB, which every run has compiled, and with `local`.
+    /// Growth from the bench's size to `size`. Times are measured at the bench's size and at a quarter of its pixels,
+    /// with the exact rungs in RGB, which every run has compiled, and with `local`.
     ///
     /// # Errors
     /// When a picture cannot be drawn.

@@ -1,4 +1,5 @@
-//! Estimates with standard errors, and significance tests with a Bonferroni correction for many simultaneous statements.
+//! Estimates with standard errors, and significance tests with a Bonferroni correction for many simultaneous
+//! statements.
 
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
@@ -55,7 +56,8 @@ impl Estimate {
         Interval { median: self.mean, low: self.mean - reach, high: self.mean + reach }
     }
 
-    /// Whether the mean is significantly above 0: by more than `standard_errors` standard errors and the bound of the bias.
+    /// Whether the mean is significantly above 0: by more than `standard_errors` standard errors and the bound of the
+    /// bias.
     #[must_use]
     pub fn is_above(&self, standard_errors: f64) -> bool {
         self.mean > standard_errors * self.deviation + self.bias
@@ -74,9 +76,9 @@ impl Estimate {
     }
 }
 
-/// Number of standard errors from zero that makes one of `statements` statements significant, so that the probability of any wrong
-/// statement is at most 1 % (two-sided test, Bonferroni correction). It is a quantile of Student's t distribution with `freedom` degrees
-/// of freedom of the standard error (Student 1908).
+/// Number of standard errors from zero that makes one of `statements` statements significant, so that the probability
+/// of any wrong statement is at most 1 % (two-sided test, Bonferroni correction). It is a quantile of Student's t
+/// distribution with `freedom` degrees of freedom of the standard error (Student 1908).
 #[must_use]
 pub fn standard_errors(statements: usize, freedom: f64) -> f64 {
     let tail = LEVEL / (2.0 * statements.max(1) as f64);
@@ -110,7 +112,8 @@ mod tests {
 
     #[test]
     fn more_statements_take_more() {
-        // Tabulated quantiles: normal distribution at 0.995 and 0.99995, Student's t with 2 degrees of freedom at 0.995.
+        // Tabulated quantiles: normal distribution at 0.995 and 0.99995, Student's t with 2 degrees of freedom at
+        // 0.995.
         assert!((standard_errors(1, MANY) - 2.576).abs() < 2e-3, "{}", standard_errors(1, MANY));
         assert!((standard_errors(100, MANY) - 3.891).abs() < 5e-3, "{}", standard_errors(100, MANY));
         assert!((standard_errors(1, 2.0) - 9.925).abs() < 1e-3, "{}", standard_errors(1, 2.0));
@@ -125,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_far_from_nothing_is_told() {
+    fn estimates_far_from_zero_are_significant() {
         let far = Estimate { mean: 1.0, deviation: 0.2, bias: 0.0 };
         assert!(far.is_above(4.0) && !far.is_above(6.0) && !far.is_below(0.0));
         let off = Estimate { bias: 0.3, ..far };

@@ -33,8 +33,8 @@ pub struct Table {
     pub knobs: Vec<KnobState>,
     /// All pictures.
     pub points: Vec<Point>,
-    /// Pareto frontier: indices into `points`, the fastest first, the reference last. Each point has significantly less error than the one
-    /// before.
+    /// Pareto frontier: indices into `points`, the fastest first, the reference last. Each point has significantly less
+    /// error than the one before.
     pub frontier: Vec<usize>,
     /// Recommended settings on the frontier.
     #[serde(default)]
@@ -89,8 +89,8 @@ pub struct Reference {
     pub gpu_ms: f64,
     /// Root of the relative mean squared error of the reference against its limit, estimated from its half buffers.
     pub own_error: f64,
-    /// Mean FLIP error of the reference against its limit, estimated by the FLIP error of one half buffer against the whole, whose
-    /// difference has the same size.
+    /// Mean FLIP error of the reference against its limit, estimated by the FLIP error of one half buffer against the
+    /// whole, whose difference has the same size.
     pub own_flip: f64,
     /// Resolution: least error of display values 0 to 1 that is significant.
     pub resolution: f64,
@@ -190,15 +190,15 @@ pub struct WorstPixel {
 /// Errors of a picture against the reference.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Errors {
-    /// Root mean squared error of display values 0 to 1 against the limit of the reference, with the 95 % confidence interval (two
-    /// standard errors of the mean square).
+    /// Root mean squared error of display values 0 to 1 against the limit of the reference, with the 95 % confidence
+    /// interval (two standard errors of the mean square).
     pub error: Interval,
     /// Mean FLIP error of the displayed pictures.
     pub flip_mean: f64,
     /// 95th percentile of the FLIP error over pixels.
     pub flip_p95: f64,
-    /// Relative mean squared error of the radiance, without the part that the reference's noise adds, with the 95 % confidence interval
-    /// due to that noise.
+    /// Relative mean squared error of the radiance, without the part that the reference's noise adds, with the 95 %
+    /// confidence interval due to that noise.
     pub relmse: Interval,
     /// Root mean squared error of the radiance, including the reference's noise.
     pub rmse: f64,
@@ -233,7 +233,8 @@ pub struct Point {
     pub noise: Option<f64>,
     /// Work counts, equal on every machine.
     pub work: BTreeMap<String, u64>,
-    /// Compiler statistics of each program (registers, spills, code size, as the driver names them), if the driver reports any.
+    /// Compiler statistics of each program (registers, spills, code size, as the driver names them), if the driver
+    /// reports any.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub compiled: BTreeMap<String, Vec<Compiled>>,
     /// Command that draws the picture again.
@@ -245,8 +246,8 @@ pub struct Point {
 }
 
 impl Point {
-    /// The error of the frontier: root mean squared error of display values. Unlike FLIP, it has an estimate without the reference's
-    /// noise; squared radiance would be dominated by a few fireflies.
+    /// The error of the frontier: root mean squared error of display values. Unlike FLIP, it has an estimate without
+    /// the reference's noise; squared radiance would be dominated by a few fireflies.
     #[must_use]
     pub fn error(&self) -> f64 {
         self.errors.error.median
@@ -302,8 +303,9 @@ pub struct Price {
     pub flip_between: f64,
     /// Difference of the mean FLIP errors against the reference.
     pub flip_delta: f64,
-    /// With base `local`: difference of the mean squared errors of display values 0 to 1 against the reference. With base `exact`: mean
-    /// squared difference between the limits of both pictures, without noise. With the 95 % confidence interval (two standard errors).
+    /// With base `local`: difference of the mean squared errors of display values 0 to 1 against the reference. With
+    /// base `exact`: mean squared difference between the limits of both pictures, without noise. With the 95 %
+    /// confidence interval (two standard errors).
     pub shown_delta: Interval,
     /// Whether `shown_delta` is significant, so that its sign is known.
     #[serde(default)]
@@ -311,7 +313,8 @@ pub struct Price {
     /// Whether the time difference is significant.
     #[serde(default)]
     pub time_told: bool,
-    /// Side in pixels of the blocks over which display values were averaged: 1, or more where single pixels are too noisy.
+    /// Side in pixels of the blocks over which display values were averaged: 1, or more where single pixels are too
+    /// noisy.
     pub squares: u32,
     /// Relative mean squared error due to noise, over that of the base; only of knobs that change noise alone.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -357,7 +360,8 @@ impl Price {
         self.base == Family::Local && self.error_told && self.shown_delta.median < 0.0 && !self.to_more_exact()
     }
 
-    /// Whether the change is visible and, for path tracing, significant: different paths alone also cause visible noise.
+    /// Whether the change is visible and, for path tracing, significant: different paths alone also cause visible
+    /// noise.
     #[must_use]
     pub fn is_seen(&self) -> bool {
         let beyond_noise = self.base != Family::Exact || self.error_told;
@@ -372,7 +376,8 @@ pub struct QuadratureOrder {
     pub rule: String,
     /// Numbers of steps per segment.
     pub steps: Vec<u32>,
-    /// Root mean squared difference of radiance from the picture with most steps, over the root mean squared radiance of that picture.
+    /// Root mean squared difference of radiance from the picture with most steps, over the root mean squared radiance
+    /// of that picture.
     pub errors: Vec<f64>,
     /// GPU milliseconds of the pictures.
     pub gpu_ms: Vec<f64>,

@@ -32,7 +32,8 @@ pub(super) fn turns(ms: f64, enough_ms: f64) -> usize {
     }
 }
 
-/// Total milliseconds of timed renders per picture in a run of `budget_s` seconds: short runs draw more pictures instead.
+/// Total milliseconds of timed renders per picture in a run of `budget_s` seconds: short runs draw more pictures
+/// instead.
 pub(super) fn enough_ms(budget_s: f64) -> f64 {
     (ENOUGH_MS * budget_s / 480.0).clamp(0.15 * ENOUGH_MS, ENOUGH_MS)
 }
@@ -158,7 +159,8 @@ impl Bench<'_> {
         Ok(total(&warm.renderer.render(self.camera, &mut |_| ())?))
     }
 
-    /// Draws and times a picture, interleaved with the baseline `other` if given, until the renders took `enough_ms` milliseconds.
+    /// Draws and times a picture, interleaved with the baseline `other` if given, until the renders took `enough_ms`
+    /// milliseconds.
     ///
     /// # Errors
     /// When the driver fails.

@@ -49,7 +49,8 @@ struct AccountPicture {
 }
 
 impl Shift {
-    /// Reads the work records of a file: a part, a report of `render --report` about a sequence, or a report of `merge --report`.
+    /// Reads the work records of a file: a part, a report of `render --report` about a sequence, or a report of
+    /// `merge --report`.
     ///
     /// # Errors
     /// When the file is none of these.
@@ -156,9 +157,11 @@ impl Account {
                             @for (row, shift) in self.shifts.iter().enumerate() {
                                 @let y = ROW * row as f64;
                                 @let FarmWorker { began, ended, prepared_s, host, process, .. } = &shift.worker;
-                                rect.prepare x=(x(*began)) y=(y) width=(x(began + prepared_s.min(ended - began)) - x(*began)) height=(ROW - 6.0) {}
+                                rect.prepare x=(x(*began)) y=(y)
+                                    width=(x(began + prepared_s.min(ended - began)) - x(*began)) height=(ROW - 6.0) {}
                                 rect.draw x=(x(began + prepared_s.min(ended - began))) y=(y)
-                                    width=((x(*ended) - x(began + prepared_s.min(ended - began))).max(1.0)) height=(ROW - 6.0) {}
+                                    width=((x(*ended) - x(began + prepared_s.min(ended - began))).max(1.0))
+                                    height=(ROW - 6.0) {}
                                 @for [from, _] in &shift.pictures {
                                     line.picture x1=(x(*from)) x2=(x(*from)) y1=(y) y2=(y + ROW - 6.0) {}
                                 }
@@ -197,8 +200,11 @@ impl Account {
 
 const STYLE: &str = "
 :root { color-scheme: light dark; --ink: #1b1b1b; --paper: #fff; --bar: #2b6cb0; --light: #9cc3ea; --line: #fff; }
-@media (prefers-color-scheme: dark) { :root { --ink: #e8e8e8; --paper: #161616; --bar: #5b9bd9; --light: #2c4f70; --line: #161616; } }
-body { font: 16px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--paper); max-width: 72rem; margin: 2rem auto; padding: 0 1rem; }
+@media (prefers-color-scheme: dark) {
+:root { --ink: #e8e8e8; --paper: #161616; --bar: #5b9bd9; --light: #2c4f70; --line: #161616; }
+}
+body { font: 16px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--paper);
+max-width: 72rem; margin: 2rem auto; padding: 0 1rem; }
 table { border-collapse: collapse; } th, td { text-align: left; padding: .15rem 1rem .15rem 0; font-weight: normal; }
 td { font-variant-numeric: tabular-nums; }
 .wide { overflow-x: auto; } svg { min-width: 700px; width: 100%; } svg text { font-size: 11px; fill: currentColor; }
@@ -227,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mixed_farm_is_told() {
+    fn a_mixed_farm_is_reported() {
         let account = Account::of(vec![shift(0.0, 1.0, "x"), shift(0.0, 1.0, "y")]).expect("shifts");
         assert_eq!(account.devices.len(), 2);
         assert!(account.page().contains("Mixed farm"));

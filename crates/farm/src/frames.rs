@@ -1,5 +1,5 @@
-//! Frame lists of a sequence, in the grammar of Open Job Description (template schema 2023-09, `<IntRangeExpr>`): numbers and ranges with
-//! an optional step, separated by commas, for example `1-100:2,105`.
+//! Frame lists of a sequence, in the grammar of Open Job Description (template schema 2023-09, `<IntRangeExpr>`):
+//! numbers and ranges with an optional step, separated by commas, for example `1-100:2,105`.
 
 use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
@@ -41,8 +41,8 @@ impl Frames {
         &self.0
     }
 
-    /// The share of process `index` (from 1) of `of`: every `of`-th frame from the `index`-th on. Neighbouring frames take similar time, and
-    /// so do the shares.
+    /// The share of process `index` (from 1) of `of`: every `of`-th frame from the `index`-th on. Neighbouring frames
+    /// take similar time, and so do the shares.
     #[must_use]
     pub fn share(&self, [index, of]: [u32; 2]) -> Self {
         Self(self.0.iter().copied().skip(index as usize - 1).step_by(of as usize).collect())

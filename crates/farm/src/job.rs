@@ -1,5 +1,5 @@
-//! Job files for render-farm engines: each task runs the same command with its own share, and for a still picture a last task joins the
-//! parts.
+//! Job files for render-farm engines: each task runs the same command with its own share, and for a still picture a
+//! last task joins the parts.
 //!
 //! Etalon has no scheduler. The templates are in `crates/farm/templates/`; placeholders between `@` are filled in here.
 

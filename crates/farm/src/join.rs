@@ -39,7 +39,8 @@ pub struct Joined {
 /// Reads parts and joins them.
 ///
 /// # Errors
-/// When a file is not a part or is truncated, when parts belong to different pictures, or when a part is missing, duplicate or incomplete.
+/// When a file is not a part or is truncated, when parts belong to different pictures, or when a part is missing,
+/// duplicate or incomplete.
 pub fn join(paths: &[PathBuf]) -> Result<Joined> {
     let mut parts = Vec::with_capacity(paths.len());
     for path in paths {

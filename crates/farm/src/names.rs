@@ -71,7 +71,8 @@ impl Pattern {
         &self.text
     }
 
-    /// The path of one picture. In camera names, characters other than letters, digits, `.`, `_` and `-` become hyphens.
+    /// The path of one picture. In camera names, characters other than letters, digits, `.`, `_` and `-` become
+    /// hyphens.
     #[must_use]
     pub fn path(&self, frame: i32, camera: &str) -> PathBuf {
         let plain = |c: char| if c.is_alphanumeric() || "._-".contains(c) { c } else { '-' };

@@ -1,8 +1,8 @@
 //! File format for the part of a still picture that one process drew: an OpenEXR file with sums of samples.
 //!
-//! Any OpenEXR viewer shows a part. The first sum is stored as R G B A, the others as layers `sum1`, `sum2`, …, and additional layers of
-//! the picture as `aov.NAME`. The text attribute `etalon.part` is a JSON document of schema `etalon.part/1`. It identifies the picture and
-//! has a hash of all samples, which reveals a truncated or changed file.
+//! Any OpenEXR viewer shows a part. The first sum is stored as R G B A, the others as layers `sum1`, `sum2`, …, and
+//! additional layers of the picture as `aov.NAME`. The text attribute `etalon.part` is a JSON document of schema
+//! `etalon.part/1`. It identifies the picture and has a hash of all samples, which reveals a truncated or changed file.
 
 use std::path::Path;
 
@@ -46,8 +46,8 @@ pub struct PartHeader {
     pub halves: usize,
     /// Names of additional pictures that are sums of samples.
     pub parts: Vec<String>,
-    /// Sample ranges `[from, end)` of the sums. A part by tiles has one piece; a part by samples has one piece for each block of samples
-    /// that a single process also adds separately.
+    /// Sample ranges `[from, end)` of the sums. A part by tiles has one piece; a part by samples has one piece for each
+    /// block of samples that a single process also adds separately.
     pub pieces: Vec<[u32; 2]>,
     /// Sample range of the complete part.
     pub wanted: [u32; 2],

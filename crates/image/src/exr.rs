@@ -1,8 +1,8 @@
 //! OpenEXR files of scene-linear pictures and AOVs.
 //!
-//! Read the OpenEXR file layout specification (openexr.com). Written files have one part, scan lines, ZIP with 16 rows per
-//! block, channels `R G B A` and `name.channel` for every AOV, so that all viewers show the picture and find the AOVs. Read
-//! files may have scan lines or tiles, and any compression and sample type that the `exr` crate decodes.
+//! Read the OpenEXR file layout specification (openexr.com). Written files have one part, scan lines, ZIP with 16 rows
+//! per block, channels `R G B A` and `name.channel` for every AOV, so that all viewers show the picture and find the
+//! AOVs. Read files may have scan lines or tiles, and any compression and sample type that the `exr` crate decodes.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -26,8 +26,8 @@ pub fn write_exr(path: &Path, picture: &Picture, aovs: &[Aov], metadata: &[(Stri
 
 /// OpenEXR file with the picture as f32 channels `R G B A` and each AOV as f32 or u32 channels `name.channel`.
 ///
-/// `metadata` become text attributes. Every bit pattern is preserved, NaN included. The same input gives the same bytes:
-/// no time is recorded, and attributes are in the order of their names.
+/// `metadata` become text attributes. Every bit pattern is preserved, NaN included. The same input gives the same
+/// bytes: no time is recorded, and attributes are in the order of their names.
 pub fn encode_exr(picture: &Picture, aovs: &[Aov], metadata: &[(String, String)]) -> Result<Vec<u8>> {
     encode(picture, aovs, metadata, Encoding::SMALL_LOSSLESS)
 }
@@ -169,10 +169,12 @@ pub fn decode_exr(bytes: &[u8]) -> Result<Picture> {
         exr::error::Error::NotSupported(text) => anyhow!("this kind of OpenEXR file is not supported: {text}"),
         other => anyhow!("{other}"),
     };
+    // The header alone decides whether the pixels may be read: a damaged one could ask for any amount of memory.
     ensure!(bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]), "the contents are not OpenEXR");
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(plain)?;
     guard(&meta, bytes.len() as u64)?;
 
+    // Pixels of the data window, by the channels that the header offers.
     let source = find_source(&meta)?;
     let reader = exr::image::read::read().no_deep_data().largest_resolution_level().specific_channels();
     let (position, display, (size, stored)) = match source {
@@ -207,6 +209,7 @@ pub fn decode_exr(bytes: &[u8]) -> Result<Picture> {
             (position, image.attributes.display_window, image.layer_data.channel_data.pixels)
         }
     };
+    // The picture is the display window: what the data window has of it is copied, and the rest stays transparent.
     if position == display.position && size == display.size {
         return Ok(Picture { width: size.x() as u32, height: size.y() as u32, rgba: stored });
     }

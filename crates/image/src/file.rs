@@ -145,7 +145,8 @@ pub fn cache_folder() -> Option<PathBuf> {
 
 /// Hash of an output as 32 hexadecimal digits: XXH3 with 128 bits, seed 0, most significant digit first.
 ///
-/// Equal bytes have equal hashes on all machines and in all versions. The hash identifies files and is not cryptographic.
+/// Equal bytes have equal hashes on all machines and in all versions. The hash identifies files and is not
+/// cryptographic.
 pub fn hash(bytes: &[u8]) -> String {
     format!("{:032x}", xxhash_rust::xxh3::xxh3_128(bytes))
 }

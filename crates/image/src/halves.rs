@@ -1,4 +1,5 @@
-//! Monte Carlo variance from two independent halves of a picture's samples: an unbiased error estimate, relative MSE, convergence rate.
+//! Monte Carlo variance from two independent halves of a picture's samples: an unbiased error estimate, relative MSE,
+//! convergence rate.
 
 use serde::Serialize;
 

@@ -1,8 +1,8 @@
 //! Pictures: reading, writing, tone mapping and comparison.
 //!
-//! A render results in a [`Picture`] of scene-linear radiance. [`exr`] stores it without loss, [`tone`] maps it to display
-//! values, and [`png`] stores those. [`metric`] compares two pictures, and [`mod@file`] writes files atomically. Nothing here
-//! uses Vulkan. Colours are linear Rec. 709 unless they are display values.
+//! A render results in a [`Picture`] of scene-linear radiance. [`exr`] stores it without loss, [`tone`] maps it to
+//! display values, and [`png`] stores those. [`metric`] compares two pictures, and [`mod@file`] writes files
+//! atomically. Nothing here uses Vulkan. Colours are linear Rec. 709 unless they are display values.
 
 pub mod exr;
 pub mod file;
@@ -25,7 +25,8 @@ pub struct Picture {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// `width * height` pixels, rows from the top: Rec. 709 radiance premultiplied by coverage, then coverage 0..=1.
+    /// `width * height` pixels with premultiplied alpha, rows from the top: Rec. 709 radiance times coverage, then
+    /// coverage 0..=1.
     pub rgba: Vec<[f32; 4]>,
 }
 

@@ -1,9 +1,9 @@
 //! Image difference metrics: FLIP, SSIM, PSNR, mean squared error and relative mean squared error.
 //!
 //! Read Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", HPG 2020; Wang et al., "Image Quality
-//! Assessment: From Error Visibility to Structural Similarity", 2004. Two display pictures are compared in display values
-//! 0..=1, two scene-linear pictures in radiance; other pairs are refused. The first picture is the reference. A pixel with a
-//! non-finite sample in either picture is excluded from all values and counted.
+//! Assessment: From Error Visibility to Structural Similarity", 2004. Two display pictures are compared in display
+//! values 0..=1, two scene-linear pictures in radiance; other pairs are refused. The first picture is the reference. A
+//! pixel with a non-finite sample in either picture is excluded from all values and counted.
 
 use std::path::Path;
 

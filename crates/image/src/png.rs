@@ -20,8 +20,8 @@ pub struct Display {
 
 /// PNG file of the pixels `rgba`: four bytes per pixel, rows from the top, sRGB-encoded, straight alpha.
 ///
-/// Without `has_alpha` the fourth byte is dropped and the file holds RGB. The `sRGB` chunk (perceptual intent)
-/// states the encoding, together with the `gAMA` and `cHRM` that the PNG specification recommends beside it. The same input
+/// Without `has_alpha` the fourth byte is dropped and the file holds RGB. The `sRGB` chunk (perceptual intent) states
+/// the encoding, together with the `gAMA` and `cHRM` that the PNG specification recommends beside it. The same input
 /// gives the same file.
 pub fn encode_png(width: u32, height: u32, rgba: &[u8], has_alpha: bool) -> Result<Vec<u8>> {
     encode_png_with([width, height], rgba, has_alpha, &[])

@@ -1,9 +1,9 @@
 //! Tone mapping: scene-linear radiance to display values by tone curves and the sRGB transfer function, in f64.
 //!
 //! Read RTR 8.2; IEC 61966-2-1; the source of each curve is beside it. These functions are the reference for the GLSL
-//! functions of the same names. A curve maps exposed linear Rec. 709 radiance to linear display light in 0..=1; [`srgb_encode`]
-//! and [`quantise`] follow. Before the curve, NaN and negative samples become 0, and values above [`LARGEST`], infinity
-//! included, become [`LARGEST`]: no curve returns NaN. The caller counts such samples beforehand.
+//! functions of the same names. A curve maps exposed linear Rec. 709 radiance to linear display light in 0..=1;
+//! [`srgb_encode`] and [`quantise`] follow. Before the curve, NaN and negative samples become 0, and values above
+//! [`LARGEST`], infinity included, become [`LARGEST`]: no curve returns NaN. The caller counts such samples beforehand.
 
 use serde::Serialize;
 use strum::{EnumMessage, IntoStaticStr, VariantArray};
@@ -119,7 +119,8 @@ pub const AGX_EV: [f64; 2] = [-12.47393, 4.026069];
 
 /// AgX base look: inset, log2 encoding, the sixth-degree polynomial of its contrast curve, outset, exponent 2.2.
 ///
-/// The exponent inverts the display encoding at the end of AgX, because the sRGB transfer function follows every curve here.
+/// The exponent inverts the display encoding at the end of AgX, because the sRGB transfer function follows every curve
+/// here.
 pub fn agx(rgb: [f64; 3]) -> [f64; 3] {
     let [low, high] = AGX_EV;
     let curve = transform(&AGX_IN, rgb.map(usable)).map(|v| {
@@ -150,7 +151,8 @@ pub fn khronos_neutral(rgb: [f64; 3]) -> [f64; 3] {
     unit(rgb.map(|x| x * (new_peak / peak)).map(|x| x * (1.0 - g) + new_peak * g))
 }
 
-/// Desaturates a colour towards the grey of equal luminance until no component is negative, for colours outside Rec. 709.
+/// Desaturates a colour towards the grey of equal luminance until no component is negative, for colours outside
+/// Rec. 709.
 #[must_use]
 pub fn desaturated(rgb: [f64; 3]) -> [f64; 3] {
     let luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
@@ -191,8 +193,8 @@ pub struct ViewTransform {
 }
 
 impl ViewTransform {
-    /// Display values 0 to 1 of linear RGBA, not rounded to bytes. Negative components occur for spectral colours outside Rec.
-    /// 709; such colours are desaturated at constant luminance.
+    /// Display values 0 to 1 of linear RGBA, not rounded to bytes. Negative components occur for spectral colours
+    /// outside Rec. 709; such colours are desaturated at constant luminance.
     #[must_use]
     pub fn shown(&self, rgba: [f32; 4]) -> [f64; 3] {
         let alpha = f64::from(rgba[3]).clamp(0.0, 1.0);

@@ -1,4 +1,5 @@
-//! The Vulkan layer: device queries go to the next layer, and their results are lowered. All other calls are passed through.
+//! The Vulkan layer: device queries go to the next layer, and their results are lowered. All other calls are passed
+//! through.
 //!
 //! Read LunarG, "Architecture of the Vulkan Loader Interfaces", layer interface version 2.
 
@@ -40,7 +41,8 @@ struct LinkInfo {
 /// `VK_LAYER_LINK_INFO`.
 const LINK_INFO: i32 = 0;
 
-/// Functions of the next layer, and the description. Test programs create one instance; with several, the last one counts.
+/// Functions of the next layer, and the description. Test programs create one instance; with several, the last one
+/// counts.
 struct Below {
     description: Description,
     properties: vk::PFN_vkGetPhysicalDeviceProperties,

@@ -1,4 +1,5 @@
-//! Twins of shaders/lib/arithmetic.glsl: error-free transformations, double-float arithmetic and elementary functions, in f64.
+//! Twins of shaders/lib/arithmetic.glsl: error-free transformations, double-float arithmetic and elementary functions,
+//! in f64.
 //!
 //! Read Knuth, TAOCP volume 2, 4.2.2 (two-sum), and docs/numerics.md. Arguments are values of f32. Domains, and results
 //! outside them, are those of the shader.

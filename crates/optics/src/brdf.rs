@@ -1,8 +1,8 @@
-//! BRDF models of the lecture (B1–B6): Lambert, Phong, GGX with Smith masking-shadowing, VNDF sampling, and the MIS power
-//! heuristic.
+//! BRDF models of the lecture (B1–B6): Lambert, Phong, GGX with Smith masking-shadowing, VNDF sampling, and the MIS
+//! power heuristic.
 //!
-//! Read Walter et al. 2007 (GGX); Heitz, JCGT 3(2) 2014 (Smith) and JCGT 7(4) 2018 (VNDF); Veach 1997 (the power heuristic);
-//! Turquin 2019 (energy compensation). Directions are normalised first.
+//! Read Walter et al. 2007 (GGX); Heitz, JCGT 3(2) 2014 (Smith) and JCGT 7(4) 2018 (VNDF); Veach 1997 (the power
+//! heuristic); Turquin 2019 (energy compensation). Directions are normalised first.
 
 use std::f64::consts::{PI, TAU};
 
@@ -25,7 +25,8 @@ pub fn lambert(n: DVec3, l: DVec3, lin: f64, kd: f64) -> [f64; 2] {
 /// @eq B1: cosδ, sin²δ of N and L/|L| + V/|V|, and the square of that sum. NaN for the angle where L = −V.
 #[must_use]
 pub fn half_angle(n: DVec3, l: DVec3, v: DVec3) -> (f64, f64, f64) {
-    // p L + q V = (L + V)(p + q)/2 + (L − V)(p − q)/2: for L near −V the sum of normalised vectors would have nine digits.
+    // p L + q V = (L + V)(p + q)/2 + (L − V)(p − q)/2: for L near −V the sum of normalised vectors would have nine
+    // digits.
     let (sum, difference) = (l + v, l - v);
     let (p, q) = (1.0 / l.length(), 1.0 / v.length());
     let p_less_q = -sum.dot(difference) * p * q / (l.length() + v.length());
@@ -138,8 +139,8 @@ pub fn mirrored_pdf(cos_v: f64, cos_h: f64, sin2_h: f64, alpha: f64) -> f64 {
     ggx_distribution(cos_h, sin2_h, alpha) / (1.0 + ggx_lambda(cos_v, alpha)) / (4.0 * cos_v)
 }
 
-/// @eq B1: a half vector among those that the viewer sees (Heitz, JCGT 7(4) 2018): v stretched by α, a point of the disk
-/// across it moved by what is seen of the lower half, back on the hemisphere, and stretched again.
+/// @eq B1: a half vector among those that the viewer sees (Heitz, JCGT 7(4) 2018): v stretched by α, a point of the
+/// disk across it moved by what is seen of the lower half, back on the hemisphere, and stretched again.
 #[must_use]
 pub fn visible_half_vector(v: DVec3, alpha: f64, u: [f64; 2]) -> DVec3 {
     let vh = DVec3::new(alpha * v.x, alpha * v.y, v.z).normalize();
@@ -368,13 +369,14 @@ pub(super) fn grazing_allowed(exact: f64) -> f64 {
     8.0 * ulp(exact) + 1e-14
 }
 
-/// Error of a cosine by plain sums: three products and two sums round to at most 1e-7, and each of the two lengths, which are not
-/// divided out, is off by 5.2e-8 for components of equal size.
+/// Error of a cosine by plain sums: three products and two sums round to at most 1e-7, and each of the two lengths,
+/// which are not divided out, is off by 5.2e-8 for components of equal size.
 pub(super) fn cosine_allowed(case: &Case<'_>, exact: f64) -> f64 {
     case.tiered(1.0e-7 + 1.04e-7 * exact.abs(), 8.0 * ulp(exact) + 1e-14)
 }
 
-/// Rotation of the half vector by rounding, in radians: L + V, minus its part along L − V, and H, each to 2^-24 of a component.
+/// Rotation of the half vector by rounding, in radians: L + V, minus its part along L − V, and H, each to 2^-24 of a
+/// component.
 const TURN: f64 = 2e-7;
 
 /// Error of the cosine of the half vector, whose length is off by 2 ulp of inversesqrt.
@@ -395,9 +397,9 @@ fn phong_vectors(x: &[f64]) -> (f64, f64, f64, f64) {
     (cosine(n, l), cos_delta, sin2_delta, s2)
 }
 
-/// Error of the lobe (row 17 of docs/numerics.md). Stable: d ln f = −shine tanδ dδ, where dδ is the rotation of the half
-/// vector, and 1e-5 for exp and log. For narrow lobes it is √(2 shine |ln f|) dδ, 4e-7 √shine at |ln f| = 2. Beyond 45° it is
-/// that of the cosine. Compensated: (8 + 6 |ln f|) ulp.
+/// Error of the lobe (row 17 of docs/numerics.md). Stable: d ln f = −shine tanδ dδ, where dδ is the rotation of the
+/// half vector, and 1e-5 for exp and log. For narrow lobes it is √(2 shine |ln f|) dδ, 4e-7 √shine at |ln f| = 2.
+/// Beyond 45° it is that of the cosine. Compensated: (8 + 6 |ln f|) ulp.
 fn lobe_allowed(case: &Case<'_>) -> f64 {
     let (_, cos_delta, sin2_delta, _) = phong_vectors(case.inputs);
     let shine = case.inputs[12];
@@ -937,8 +939,8 @@ pub(super) const EQUATIONS: &[Equation] = &[
     },
 ];
 
-/// Relative error of (L + V)². Stable: two rounded lengths (1.7 ulp), their sum twice, and its square; when only the lengths
-/// differ, removing that difference leaves 2^-24 of it.
+/// Relative error of (L + V)². Stable: two rounded lengths (1.7 ulp), their sum twice, and its square; when only the
+/// lengths differ, removing that difference leaves 2^-24 of it.
 fn lv2_part(case: &Case<'_>, s2: f64) -> f64 {
     let (l, v) = (vector(case.inputs, 3).length(), vector(case.inputs, 6).length());
     case.tiered(5.0, 4.0) * ulp(s2) / s2 + case.tiered(4.8e-7 * (l - v).abs() / s2.sqrt(), 0.0)
@@ -974,8 +976,8 @@ fn lobe_row(d: &mut SplitMix64, delta: f64, shine: f64) -> Vec<f32> {
 
 const VISIBLE_BOUND: &str = "1e-6 + (2e-7/w, at most 5e-4)/|h before normalising|, w = √(1 − |p|²) at the disk's edge";
 
-/// Bound: the point on the disk is off by 2e-7, and the height w above it by 2e-7 over w; the half vector made from both may be
-/// as short as α.
+/// Bound: the point on the disk is off by 2e-7, and the height w above it by 2e-7 over w; the half vector made from
+/// both may be as short as α.
 fn visible_allowed(case: &Case<'_>) -> f64 {
     let x = case.inputs;
     let v = vector(x, 0);

@@ -44,8 +44,8 @@ pub struct Equation {
     pub outputs: &'static [Output],
     /// Abscissa of the error plot.
     pub axis: Axis,
-    /// Largest magnitude of inputs outside the domain for which the result, though possibly meaningless, must not be NaN. Below
-    /// 0: callers keep to the domain, and inputs outside it are not tested.
+    /// Largest magnitude of inputs outside the domain for which the result, though possibly meaningless, must not be
+    /// NaN. Below 0: callers keep to the domain, and inputs outside it are not tested.
     pub extreme: f32,
 }
 

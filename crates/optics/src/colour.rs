@@ -1,5 +1,5 @@
-//! Spectra to colour (lecture C1–C3): colour matching functions, spectral upsampling, Sellmeier and Cauchy dispersion (F1),
-//! Planck's law, and the sRGB transfer function (C4).
+//! Spectra to colour (lecture C1–C3): colour matching functions, spectral upsampling, Sellmeier and Cauchy dispersion
+//! (F1), Planck's law, and the sRGB transfer function (C4).
 //!
 //! Read pbrt 4.4 to 4.6; IEC 61966-2-1; docs/colour.md. Wavelengths are in nm unless a name ends in `_um`.
 
@@ -192,8 +192,8 @@ fn gaussian_allowed(case: &Case<'_>) -> f64 {
         + magnitude(&[lost; SAMPLES], functions)[case.column % 3]
 }
 
-/// Bound: the rounding error of the polynomial, 3 units of 2^-24 of the magnitudes of its terms, times the slope of the sigmoid,
-/// plus 5 ulp. The compensated tier has the 5 ulp alone.
+/// Bound: the rounding error of the polynomial, 3 units of 2^-24 of the magnitudes of its terms, times the slope of the
+/// sigmoid, plus 5 ulp. The compensated tier has the 5 ulp alone.
 fn upsampled_allowed(case: &Case<'_>) -> f64 {
     let [lambda, c0, c1, c2] = [case.inputs[0], case.inputs[1], case.inputs[2], case.inputs[3]];
     let x = (c0 * lambda + c1) * lambda + c2;

@@ -1,7 +1,7 @@
 //! Round trips of encoded quantities: octahedral normals, depth, sRGB bytes, equirectangular coordinates.
 //!
-//! Read RTR 16.6 for quantised vertex data. The exact value of a round trip is its input; its error bound is the step of the
-//! format.
+//! Read RTR 16.6 for quantised vertex data. The exact value of a round trip is its input; its error bound is the step
+//! of the format.
 
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, SQRT_2, TAU};
@@ -40,9 +40,10 @@ pub fn direction_from_equirectangular(uv: DVec2) -> DVec3 {
     DVec3::new(elevation.cos() * phi.cos(), elevation.sin(), elevation.cos() * phi.sin())
 }
 
-// The octahedral map is stretched most at the centre of a face, where steps (x, y) are √6 √(x² + xy + y²) radians: a hexagonal
-// lattice. Rounding the coordinates is off by at most half a step in both, 3/√2. The largest error of 200,000 directions in row
-// 16 of docs/numerics.md is 1 or 2 % below; the best of four steps would have at most the lattice's covering radius, √2.
+// The octahedral map is stretched most at the centre of a face, where steps (x, y) are √6 √(x² + xy + y²) radians: a
+// hexagonal lattice. Rounding the coordinates is off by at most half a step in both, 3/√2. The largest error of 200,000
+// directions in row 16 of docs/numerics.md is 1 or 2 % below; the best of four steps would have at most the lattice's
+// covering radius, √2.
 const NEAREST: f64 = 1.5 * SQRT_2;
 
 fn steps(case: &Case<'_>) -> f64 {

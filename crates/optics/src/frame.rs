@@ -1,8 +1,8 @@
 //! Directions, tangent frames and normals.
 //!
-//! Read pbrt 3.3 and 3.10; Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 6(1) 2017. Differences of two f32 are
-//! exact in f64 when their exponents differ by less than 29, and products always are: the cross product of f32 vectors is
-//! nearly exact.
+//! Read pbrt 3.3 and 3.10; Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 6(1) 2017. Differences of two
+//! f32 are exact in f64 when their exponents differ by less than 29, and products always are: the cross product of f32
+//! vectors is nearly exact.
 
 use glam::{DMat3, DVec3};
 
@@ -145,8 +145,9 @@ fn map_and_normal(d: &mut SplitMix64, map: DMat3) -> Vec<f32> {
     columns(&[map.x_axis, map.y_axis, map.z_axis, d.direction()])
 }
 
-/// Condition number of the sum of the three cofactor columns: the sum of the magnitudes of its terms over the magnitude of the
-/// sum, with products of column lengths for the cross products. 1 for orthogonal columns and a normal along one of them.
+/// Condition number of the sum of the three cofactor columns: the sum of the magnitudes of its terms over the magnitude
+/// of the sum, with products of column lengths for the cross products. 1 for orthogonal columns and a normal along one
+/// of them.
 fn cofactor_condition(x: &[f64]) -> f64 {
     let [a, b, c] = [0, 3, 6].map(|k| vector(x, k));
     let n = vector(x, 9).normalize();

@@ -179,8 +179,8 @@ const FAR_GRAZING: Region = Region {
     },
 };
 
-/// Rounding error of g² = c² + n² − 1: cancelling terms are summed to 2^-32 in the stable tier, and the terms themselves to
-/// 2^-46 in the compensated one.
+/// Rounding error of g² = c² + n² − 1: cancelling terms are summed to 2^-32 in the stable tier, and the terms
+/// themselves to 2^-46 in the compensated one.
 fn rounding_of_g2(case: &Case<'_>) -> f64 {
     let (c, n) = (case.inputs[0], case.inputs[1]);
     let terms = c.min(n).powi(2) + (1.0 - c.max(n)).powi(2);
@@ -195,7 +195,8 @@ fn error_of_g(case: &Case<'_>) -> f64 {
     (g2 + rounding).max(0.0).sqrt() - (g2 - rounding).max(0.0).sqrt()
 }
 
-/// Bound near Brewster's angle, where r_p is a small difference: 12 ulp of its terms. The compensated tier sums exactly.
+/// Bound near Brewster's angle, where r_p is a small difference: 12 ulp of its terms. The compensated tier sums
+/// exactly.
 fn brewster(case: &Case<'_>) -> f64 {
     let (c, n) = (case.inputs[0], case.inputs[1]);
     let g = refracted_square(c, n).max(0.0).sqrt();
@@ -449,8 +450,8 @@ fn is_metal(x: &[f64]) -> bool {
     x[2] > x[1].max(0.5)
 }
 
-/// Error of F and R_s that results from g near the critical angle of a nearly transparent conductor: twice the change of
-/// an amplitude, at most 2c/|c + g|² and 2|m²|c/|m²c + g|² per unit of g.
+/// Error of F and R_s that results from g near the critical angle of a nearly transparent conductor: twice the change
+/// of an amplitude, at most 2c/|c + g|² and 2|m²|c/|m²c + g|² per unit of g.
 fn conductor_slack(case: &Case<'_>) -> f64 {
     let (c, n, k) = (case.inputs[0], case.inputs[1], case.inputs[2]);
     if is_metal(case.inputs) || c == 0.0 {
@@ -468,8 +469,10 @@ fn conductor_slack(case: &Case<'_>) -> f64 {
     2.0 * error * (2.0 * c / s).max(2.0 * m2[0].hypot(m2[1]) * c / p)
 }
 
-/// Rounding error of R_p near Brewster's angle, where r_p = (m² − 1)(c²(m² + 1) − 1)/(m²c + g)² is a small difference: 2|r_p|δ
-/// + δ² with δ an eighth of 12 ulp of the terms. Pairs of floats sum the terms, so the remaining error is that of a small R_p.
+/// Rounding error of R_p near Brewster's angle, where r_p = (m² − 1)(c²(m² + 1) − 1)/(m²c + g)² is a small difference:
+/// 2|r_p|δ
+/// + δ² with δ an eighth of 12 ulp of the terms. Pairs of floats sum the terms, so the remaining error is that of a
+///   small R_p.
 fn conductor_brewster(case: &Case<'_>) -> f64 {
     let (c, n, k) = (case.inputs[0], case.inputs[1], case.inputs[2]);
     if is_metal(case.inputs) || c == 0.0 {

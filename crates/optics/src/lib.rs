@@ -1,9 +1,9 @@
-//! Reference implementations in f64 (twins) of all tagged functions of `shaders/lib/`, written from the textbook formulas of the
-//! lecture. File and function names are those of the shader.
+//! Reference implementations in f64 (twins) of all tagged functions of `shaders/lib/`, written from the textbook
+//! formulas of the lecture. File and function names are those of the shader.
 //!
-//! Read docs/verified.md. A twin is not transcribed from the shader, because a transcription repeats its mistakes. Inputs are
-//! values of f32, so that products of two are exact in f64; directions are normalised first. Beside its twin each equation has
-//! its test regions and its error bounds: [`Equation`].
+//! Read docs/verified.md. A twin is not transcribed from the shader, because a transcription repeats its mistakes.
+//! Inputs are values of f32, so that products of two are exact in f64; directions are normalised first. Beside its twin
+//! each equation has its test regions and its error bounds: [`Equation`].
 
 pub mod catalogue;
 

@@ -1,4 +1,5 @@
-//! Light that arrives at a surface (lecture R2–R4): punctual lights, spheres, and solid angles. Directions are normalised first.
+//! Light that arrives at a surface (lecture R2–R4): punctual lights, spheres, and solid angles. Directions are
+//! normalised first.
 //!
 //! Read pbrt 4.1, 4.2 and 12; KHR_lights_punctual.
 
@@ -67,7 +68,8 @@ pub fn arriving_light(to_light: DVec3, directional: bool, inv_range2: f64, spot:
     [l.x, l.y, l.z, share]
 }
 
-/// @eq N34: the smaller root of |t l − c|² = r² for a unit direction l at θ from a ball's middle c, no less than 1e-6 |c|.
+/// @eq N34: the smaller root of |t l − c|² = r² for a unit direction l at θ from a ball's middle c, no less than
+/// 1e-6 |c|.
 #[must_use]
 pub fn ball_reach(distance2: f64, radius: f64, cos_theta: f64, sin2_theta: f64) -> f64 {
     let d = distance2.sqrt();

@@ -24,8 +24,8 @@ pub fn beer_lambert_sum(n: u32, s0: f64, ds: f64, seed: u32) -> [f64; 3] {
     [tau, (-tau).exp(), -(-tau).exp_m1()]
 }
 
-/// @eq A2: weights of a step's first point and middle, of what the end of all counts more than the beginning, and what all is
-/// divided by: left sums, midpoints, Simpson's rule (1, 4, 1 over 6) with neighbouring ends joined.
+/// @eq A2: weights of a step's first point and middle, of what the end of all counts more than the beginning, and what
+/// all is divided by: left sums, midpoints, Simpson's rule (1, 4, 1 over 6) with neighbouring ends joined.
 #[must_use]
 pub fn quadrature_weights(rule: usize) -> [f64; 4] {
     [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0], [1.0 + 1.0, 4.0, 1.0, 6.0]][rule.min(2)]
@@ -50,8 +50,8 @@ pub fn quadrature_error(sigma0: f64, falloff: f64, d: f64, steps: f64, rule: usi
     d * step.powi(order) / divisor * sigma0 * (-falloff * d).exp().max(1.0)
 }
 
-/// Bound of the marched τ: the error of the quadrature and the rounding. Each exponential has 3 units of 2^-24 times its
-/// argument, plus 4 units of its own; mean and product add 4.
+/// Bound of the marched τ: the error of the quadrature and the rounding. Each exponential has 3 units of 2^-24 times
+/// its argument, plus 4 units of its own; mean and product add 4.
 fn march_allowed(case: &Case<'_>) -> f64 {
     let x = case.inputs;
     let tau = march_optical_depth(x[0], x[1], x[2])[0];

@@ -179,8 +179,8 @@ fn box_of(x: &[f64]) -> [f64; 2] {
     interval(vector(x, 0), vector(x, 3), vector(x, 6), vector(x, 9), x[13])
 }
 
-/// Tolerance of the padded interval: how much earlier it may begin and later end. It is the pad of the deciding axis, 8 roundings
-/// of the origin and the scene's offset, and once more for the rounding errors that the pad covers.
+/// Tolerance of the padded interval: how much earlier it may begin and later end. It is the pad of the deciding axis, 8
+/// roundings of the origin and the scene's offset, and once more for the rounding errors that the pad covers.
 fn box_slack(x: &[f64]) -> [f64; 2] {
     let [near, far] = box_of(x);
     let pad = |end: f64| {

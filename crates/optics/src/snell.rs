@@ -1,4 +1,5 @@
-//! Reflected and refracted directions at a smooth surface (lecture F4–F6): Snell's law. Directions are normalised first.
+//! Reflected and refracted directions at a smooth surface (lecture F4–F6): Snell's law. Directions are normalised
+//! first.
 //!
 //! Read pbrt 9.3; Born & Wolf, Principles of Optics, 1.5.
 

@@ -1,7 +1,8 @@
 //! SPIR-V id compaction: renumbers ids without gaps.
 //!
-//! Read the SPIR-V specification, 2.3 (physical layout). The optimiser numbers values and removes most of them: `interact` had
-//! ids up to 862,000 for about 60,000 results. Drivers keep a table by id, which lavapipe clears for each pipeline.
+//! Read the SPIR-V specification, 2.3 (physical layout). The optimiser numbers values and removes most of them:
+//! `interact` had ids up to 862,000 for about 60,000 results. Drivers keep a table by id, which lavapipe clears for
+//! each pipeline.
 
 use std::collections::HashMap;
 
@@ -89,8 +90,8 @@ fn ids(grammar: &Grammar, instruction: &[u32]) -> Result<Vec<usize>> {
                     }
                     at = instruction.len();
                 }
-                // The operand is an opcode with its operands, without results: only extraction has literals, after the first
-                // operand.
+                // The operand is an opcode with its operands, without results: only extraction has literals, after the
+                // first operand.
                 OperandKind::LiteralSpecConstantOpInteger => {
                     let operands = known(instruction[at])?
                         .operands

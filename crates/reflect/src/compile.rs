@@ -1,4 +1,5 @@
-//! GLSL to SPIR-V by glslang: used by build.rs for all shaders, and by the viewer for changed shaders (feature `reload`).
+//! GLSL to SPIR-V by glslang: used by build.rs for all shaders, and by the viewer for changed shaders (feature
+//! `reload`).
 
 use std::collections::BTreeMap;
 use std::fs;

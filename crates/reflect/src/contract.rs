@@ -1,7 +1,8 @@
 //! Checks of the SPIR-V of equations at every build, both on the unoptimised module and on the shipped one.
 //!
 //! - no RelaxedPrecision: every value has 32 bits;
-//! - NoContraction wherever the source has `precise`; otherwise compensated sums have zero residuals (docs/numerics.md 2);
+//! - NoContraction wherever the source has `precise`; otherwise compensated sums have zero residuals (docs/numerics.md
+//!   2);
 //! - loop iterations stay below lavapipe's limit: it silently ends all loops of an invocation after 65,535;
 //! - the built-ins of loose precision that each tier reaches, as a list for docs/equations.md.
 
@@ -103,8 +104,8 @@ pub(crate) fn called(stages: &[Stage]) -> BTreeSet<String> {
     stages.iter().flat_map(of).collect()
 }
 
-/// Whether a function with a loop calls another function with a loop. Stricter than a call inside the loop: the blocks of
-/// the loop are not determined.
+/// Whether a function with a loop calls another function with a loop. Stricter than a call inside the loop: the blocks
+/// of the loop are not determined.
 fn calls_in_loops(
     function: &str,
     functions: &BTreeMap<u32, &Function>,

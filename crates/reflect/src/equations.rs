@@ -10,8 +10,8 @@
 //! ```
 //!
 //! Parameters are the input columns in order, and members of the result are the output columns. A probe computes
-//! `outputs = function(inputs)` for one case per invocation, and stores column after column. Inputs are words: the bits of
-//! a float, or a `uint`, of which a float would hold 24 bits.
+//! `outputs = function(inputs)` for one case per invocation, and stores column after column. Inputs are words: the bits
+//! of a float, or a `uint`, of which a float would hold 24 bits.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -144,7 +144,8 @@ struct Notes {
     lab: Option<(String, String)>,
 }
 
-/// Reads the tagged functions of a file. Functions start in the first column, and their bodies end with `}` in the first column.
+/// Reads the tagged functions of a file. Functions start in the first column, and their bodies end with `}` in the
+/// first column.
 fn read(path: &Path, text: &str, structs: &Structs, library: &mut Library) -> Result<()> {
     let lines: Vec<&str> = text.lines().collect();
     let mut tag: Option<(usize, Vec<String>, String)> = None;
@@ -153,6 +154,7 @@ fn read(path: &Path, text: &str, structs: &Structs, library: &mut Library) -> Re
     while at < lines.len() {
         let line = lines[at];
         let place = || format!("{}:{}", path.display(), at + 1);
+        // Tags are kept until the head of a function takes them.
         if let Some(rest) = line.strip_prefix("// @eq ") {
             let (ids, formula) =
                 rest.split_once(": ").ok_or_else(|| format!("{}: expected `@eq IDS: formula`", place()))?;
@@ -179,6 +181,7 @@ fn read(path: &Path, text: &str, structs: &Structs, library: &mut Library) -> Re
                 notes.lab = pair
             };
         } else if is_head(without_comment(line)) {
+            // A head may span lines: up to its `{`.
             let mut joined = String::new();
             let mut end = at;
             while end < lines.len() && !joined.contains('{') {
@@ -187,6 +190,8 @@ fn read(path: &Path, text: &str, structs: &Structs, library: &mut Library) -> Re
                 end += 1;
             }
             if let Some(head) = head(&joined) {
+                // The body is read for what the contract check holds against the SPIR-V: `precise`, loops and their
+                // bounds.
                 let mut source = Source { precise: joined.contains("precise "), ..Source::default() };
                 let one_line = joined.contains('}');
                 while end < lines.len() && !one_line && lines[end] != "}" {
@@ -198,6 +203,7 @@ fn read(path: &Path, text: &str, structs: &Structs, library: &mut Library) -> Re
                     }
                     end += 1;
                 }
+                // Overloads count as one function.
                 let known = library.functions.entry(head.name.clone()).or_default();
                 known.precise |= source.precise;
                 known.loops += source.loops;
@@ -225,6 +231,7 @@ fn equation(
     structs: &Structs,
 ) -> Result<Equation> {
     let Notes { renamed, out, host, lab } = notes;
+    // Parameters become input columns, and the call's arguments fetch them.
     let (mut inputs, mut whole) = (Vec::new(), Vec::new());
     let mut arguments = Vec::new();
     for (ty, name) in &head.parameters {
@@ -233,6 +240,7 @@ fn equation(
             whole.push(name.clone());
         }
     }
+    // The result becomes output columns: members of a struct by their names, a plain value by `@out`.
     let mut outputs = Vec::new();
     let mut stores = String::new();
     if let Some(members) = structs.get(&head.returns) {
@@ -246,6 +254,7 @@ fn equation(
         let name = out.ok_or("a plain result needs `@out NAME`")?;
         store(&head.returns, &name, "result", &mut outputs, &mut stores)?;
     }
+    // The probe calls the function for one case per invocation.
     let Head { returns, name: function, .. } = head;
     let probe = format!(
         "#version 460

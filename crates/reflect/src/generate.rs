@@ -1,5 +1,5 @@
-//! Rust code generation from shader declarations: a module per file of `shaders/lib/` with its declarations, a module per program
-//! with its bindings, and the structs of `shaders/share/`.
+//! Rust code generation from shader declarations: a module per file of `shaders/lib/` with its declarations, a module
+//! per program with its bindings, and the structs of `shaders/share/`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -67,7 +67,8 @@ impl<'p> Programs<'p> {
         Ok(all)
     }
 
-    /// Compile-time check that a program stays within the device limits that Etalon requires (crates/vulkan/src/limits.rs).
+    /// Compile-time check that a program stays within the device limits that Etalon requires
+    /// (crates/vulkan/src/limits.rs).
     fn within_limits(&self, name: &str, declared: &Declared) -> Result<String> {
         let own = declared.bindings.values().filter(|b| b.set == 0);
         let held = |count: usize, what: &str, limit: &str| {
@@ -111,11 +112,11 @@ impl<'p> Programs<'p> {
         for (set, bindings) in &self.shared {
             let table: String = bindings.values().map(binding_literal).collect();
             code += &format!(
-                "/// What a descriptor set `{set}` holds.\npub static {}: SetLayout = SetLayout {{ name: \"{set}\", bindings: &[\n{table}] }};\n",
+                "/// Layout of the descriptor set `{set}`.\npub static {}: SetLayout = SetLayout {{ name: \"{set}\", bindings: &[\n{table}] }};\n",
                 set.to_uppercase(),
             );
         }
-        code += "/// What each file of `shaders/lib/` owns.\npub mod lib {\n    use super::*;\n";
+        code += "/// The declarations of each file of `shaders/lib/`.\npub mod lib {\n    use super::*;\n";
         let mut groups = Vec::new();
         for file in self.interface.files.iter().filter(|file| file.folder == "lib") {
             self.group(&mut code, file, &mut groups)?;
@@ -183,11 +184,11 @@ impl<'p> Programs<'p> {
                 }
             }
             body += &format!(
-                "    /// Its bindings in the set `{set}`.\n    #[derive(Clone, Copy)]\n    pub struct {name}<'a> {{\n{fields}    }}\n"
+                "    /// Bindings of this file in the descriptor set `{set}`.\n    #[derive(Clone, Copy)]\n    pub struct {name}<'a> {{\n{fields}    }}\n"
             );
             if set != "pass" {
                 body += &format!(
-                    "    impl<'a> {name}<'a> {{\n        /// Slots and what is in them.\n        #[must_use]\n        pub fn entries(&self) -> Vec<(u32, Resource<'a>)> {{ vec![\n{entries}        ] }}\n    }}\n"
+                    "    impl<'a> {name}<'a> {{\n        /// The slot and the resource of each binding.\n        #[must_use]\n        pub fn entries(&self) -> Vec<(u32, Resource<'a>)> {{ vec![\n{entries}        ] }}\n    }}\n"
                 );
             }
         }
@@ -250,11 +251,11 @@ impl<'p> Programs<'p> {
             }
         }
         if library {
-            own += "        /// Those of the library.\n        pub library: Library,\n";
+            own += "        /// Specialization constants of the library.\n        pub library: Library,\n";
             defaults += "                library: Library::default(),\n";
         }
         let push = match all.push.last() {
-            None => "    /// It has no push constants.\n    pub type Push = ();\n".to_owned(),
+            None => "    /// The program has no push constants.\n    pub type Push = ();\n".to_owned(),
             Some(_) => all.push.iter().map(|s| rust_struct(s, &BTreeMap::new())).collect(),
         };
         let life = if fields.is_empty() { "" } else { "<'a>" };
@@ -267,7 +268,7 @@ pub mod {name} {{
     use super::*;
     /// The program.
     pub static PROGRAM: Program = {literal};
-    /// What it binds for itself.
+    /// Bindings of the program's own descriptor set.
     #[derive(Clone, Copy)]
     pub struct Bind{life} {{
 {fields}    }}
@@ -430,8 +431,10 @@ pub(crate) fn literal(interface: &Interface, name: &str, program: &Program, all:
     ))
 }
 
-/// The table of equations, each with its probe. All probes bind the same two buffers, so `src/shader.rs` has one struct.
-///  Each function states how pictures use it: a pass calls it, or it has `@host`, or `@lab` with a function that a pass calls.
+/// The table of equations, each with its probe. All probes bind the same two buffers, so `src/shader.rs` has one
+/// struct.
+///  Each function states how pictures use it: a pass calls it, or it has `@host`, or `@lab` with a function that a pass
+///  calls.
 /// When all shaders are built (`whole`), a function that neither a pass nor a probe reaches is an error.
 pub(crate) fn probes(recipe: &Recipe, programs: &BTreeMap<String, Program>, whole: bool) -> Result<String> {
     let library = equations::library(&recipe.root.join("lib"))?;
@@ -477,7 +480,8 @@ pub(crate) fn probes(recipe: &Recipe, programs: &BTreeMap<String, Program>, whol
         table += &format!(
             "    Probe {{
         name: {name:?}, subject: {subject:?}, line: {line}, formula: {formula:?},
-        ids: {}, inputs: {}, whole: {}, outputs: {}, builtins: [{fast}, {stable}, {compensated}], loop_heads: {}, passes: {},
+        ids: {}, inputs: {}, whole: {}, outputs: {}, builtins: [{fast}, {stable}, {compensated}], loop_heads: {},
+        passes: {},
         host: {host:?}, lab: {lab:?}, drawn_by: {},
         program: {{ static PROGRAM: Program = {literal}; &PROGRAM }},
     }},\n",
@@ -497,7 +501,7 @@ pub(crate) fn probes(recipe: &Recipe, programs: &BTreeMap<String, Program>, whol
     if table.is_empty() {
         return Ok(String::new());
     }
-    Ok(format!("/// Every tagged equation, by file and place.\npub static PROBES: &[Probe] = &[\n{table}];\n"))
+    Ok(format!("/// Every tagged equation, by file and line.\npub static PROBES: &[Probe] = &[\n{table}];\n"))
 }
 
 /// `shaders/share/` in Rust: structs with their memory layout, and constants.

@@ -1,12 +1,12 @@
 //! Shader interface: declarations without numbers, and the ids, sets and slots that they are assigned.
 //!
 //! ```text
-//! layout(constant) const uint BRDF = 2;                                  specialization constant
-//! layout(pass, rgba32f) uniform image2D radiance;                        set 0: pushed with each dispatch or draw
-//! layout(scene, rgba32f) readonly uniform imageBuffer lights;            set 1: written once per renderer
-//! layout(pages) uniform sampler2DArray base_page;                        set 2: written once per combination of textures
-//! layout(paths, rgba32ui) readonly uniform uimageBuffer emitters;        set 2 of paths: written once per renderer
-//! const uint SHAPE_SPHERE = 1;                                           shared with the host
+//! layout(constant) const uint BRDF = 2;                               specialization constant
+//! layout(pass, rgba32f) uniform image2D radiance;                     set 0: pushed with each dispatch or draw
+//! layout(scene, rgba32f) readonly uniform imageBuffer lights;         set 1: written once per renderer
+//! layout(pages) uniform sampler2DArray base_page;                     set 2: written once per combination of textures
+//! layout(paths, rgba32ui) readonly uniform uimageBuffer emitters;     set 2 of paths: written once per renderer
+//! const uint SHAPE_SPHERE = 1;                                        shared with the host
 //! ```
 //!
 //! A struct of `shaders/share/` in a texel buffer view is read by a function that the build generates:
@@ -17,13 +17,14 @@
 //! // @texels Material.sigma material_sigma(...)          one member alone
 //! ```
 //!
-//! A page is a texture of a material with its slot: SLOT_BASE is the number of `base_page`. `// @pages SLOTS` counts the pages.
+//! A page is a texture of a material with its slot: SLOT_BASE is the number of `base_page`. `// @pages SLOTS` counts
+//! the pages.
 //!
-//! A member whose comment begins with `where CONSTANT` is omitted when that constant is false; such a struct is read member by
-//! member.
+//! A member whose comment begins with `where CONSTANT` is omitted when that constant is false; such a struct is read
+//! member by member.
 //!
-//! A declaration is one line. Constants, and bindings of all sets but a pass's own, have one number in all programs, and one
-//! file that declares them. Bindings of a pass are numbered from 0 in each program.
+//! A declaration is one line. Constants, and bindings of all sets but a pass's own, have one number in all programs,
+//! and one file that declares them. Bindings of a pass are numbered from 0 in each program.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -216,8 +217,8 @@ impl Interface {
         Ok(())
     }
 
-    /// Inserts the numbers into a source text. Constants in `without` become ordinary constants, false or 0, so that the
-    /// compiler removes the code they guard.
+    /// Inserts the numbers into a source text. Constants in `without` become ordinary constants, false or 0, so that
+    /// the compiler removes the code they guard.
     pub(crate) fn numbered(&self, text: &str, slots: &PassSlots, without: &[String]) -> Result<String> {
         let mut out = String::with_capacity(text.len() + 1024);
         for line in text.lines() {
@@ -263,8 +264,8 @@ impl Interface {
 }
 
 impl Interface {
-    /// Generates the function of a tag `Material material_at(material_words)`, which reads a struct or a member from texels of
-    /// four words. It is one line, so that line numbers in compiler messages stay correct.
+    /// Generates the function of a tag `Material material_at(material_words)`, which reads a struct or a member from
+    /// texels of four words. It is one line, so that line numbers in compiler messages stay correct.
     fn reader(&self, tag: &str) -> Result<String> {
         let wrong = || format!("// @texels {tag}: expected `STRUCT FUNCTION(FETCH)`, of a struct of shaders/share/");
         let (what, rest) = tag.split_once(' ').ok_or_else(wrong)?;
@@ -298,7 +299,8 @@ impl Interface {
         Ok(format!("{ty} {name}(uint index) {{ {texels}return {value}; }}"))
     }
 
-    /// Words of the unconditional members, and a GLSL expression for texels of conditional ones: ` + (CONSTANT ? 2 : 0)`.
+    /// Words of the unconditional members, and a GLSL expression for texels of conditional ones:
+    /// ` + (CONSTANT ? 2 : 0)`.
     fn size(&self, fields: &[Field]) -> Result<(usize, String)> {
         let (mut words, mut optional) = (0, String::new());
         for Field { ty, name, condition } in fields {
@@ -315,7 +317,8 @@ impl Interface {
         Ok((words, optional))
     }
 
-    /// GLSL expression for the value that begins at the word `word` of the texels t0, t1 ...: `uintBitsToFloat(t0.xyz)`.
+    /// GLSL expression for the value that begins at the word `word` of the texels t0, t1 ...:
+    /// `uintBitsToFloat(t0.xyz)`.
     fn value(&self, ty: &str, word: &mut usize) -> Result<String> {
         if let Some(fields) = self.structs.get(ty) {
             let members = fields.iter().map(|field| self.value(&field.ty, word)).collect::<Result<Vec<_>>>()?;

@@ -1,15 +1,15 @@
-//! Build-time shader compilation and SPIR-V reflection: GLSL in a folder `shaders/` becomes SPIR-V 1.6 and Rust code that
-//! describes it.
+//! Build-time shader compilation and SPIR-V reflection: GLSL in a folder `shaders/` becomes SPIR-V 1.6 and Rust code
+//! that describes it.
 //!
-//! 1. `shaders/pass/NAME.comp`, or `NAME.vert` with `NAME.frag`, is one program. glslang (crate shaderc) compiles each stage
-//!    twice: without optimisation for reflection, which needs the names, and with optimisation for shipping.
+//! 1. `shaders/pass/NAME.comp`, or `NAME.vert` with `NAME.frag`, is one program. glslang (crate shaderc) compiles each
+//!    stage twice: without optimisation for reflection, which needs the names, and with optimisation for shipping.
 //! 2. rspirv reads the bindings, their access (`readonly`/`writeonly` survive as NonWritable/NonReadable), push
 //!    constants, specialization constants, vertex inputs and local size.
-//! 3. Every function of `shaders/lib/` tagged `@eq` gets a probe, a program that evaluates it (`src/equations.rs`), and its
-//!    SPIR-V is checked (`src/contract.rs`).
+//! 3. Every function of `shaders/lib/` tagged `@eq` gets a probe, a program that evaluates it (`src/equations.rs`), and
+//!    its SPIR-V is checked (`src/contract.rs`).
 //! 4. `shaders.rs` gets a module per library file and per program, with specialization and push constants as structs
-//!    (`src/generate.rs`). Bindings are named fields, so that a missing binding is a compile error. `share.rs` gets the structs of
-//!    `shaders/share/`. `src/interface.rs` assigns the numbers.
+//!    (`src/generate.rs`). Bindings are named fields, so that a missing binding is a compile error. `share.rs` gets the
+//!    structs of `shaders/share/`. `src/interface.rs` assigns the numbers.
 //!
 //! Errors are printed as `file:line: message` by the compiler itself.
 
@@ -29,8 +29,8 @@ use std::path::{Path, PathBuf};
 use compile::Recipe;
 use files::{Result, files, stem};
 
-/// Compiles and reflects the shaders under `shaders`, and writes `shaders.rs` and `share.rs` into `out_dir`. Code guarded by the
-/// specialization constants `without` is removed.
+/// Compiles and reflects the shaders under `shaders`, and writes `shaders.rs` and `share.rs` into `out_dir`. Code
+/// guarded by the specialization constants `without` is removed.
 ///
 /// # Errors
 /// Compiler messages as `file:line: message`, or the fault of a declaration.

@@ -1,8 +1,8 @@
 //! SPIR-V reflection by rspirv: bindings with their access (`readonly`/`writeonly` survive as NonWritable/NonReadable),
 //! specialization constants, vertex inputs, push constants, structs and local size.
 //!
-//! Read the SPIR-V specification, chapter 3, for decorations. Names and types come from the unoptimised module; bindings and
-//! constants that the shipped module does not read are omitted.
+//! Read the SPIR-V specification, chapter 3, for decorations. Names and types come from the unoptimised module;
+//! bindings and constants that the shipped module does not read are omitted.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 

@@ -1,4 +1,5 @@
-//! glTF accessors: typed data from buffers, with every byte range checked before reading (glTF 2.0 sections 3.6.2 and 3.11).
+//! glTF accessors: typed data from buffers, with every byte range checked before reading (glTF 2.0 sections 3.6.2 and
+//! 3.11).
 
 use anyhow::{Context, Result, bail, ensure};
 use gltf::json::{
@@ -8,8 +9,8 @@ use gltf::json::{
 
 use super::container::Document;
 
-/// Largest size in bytes of an accessor without a buffer view: its zeros take no space in the file, so the file size does not
-/// bound them.
+/// Largest size in bytes of an accessor without a buffer view: its zeros take no space in the file, so the file size
+/// does not bound them.
 const MAX_IMPLIED_BYTES: u64 = 256 << 20;
 
 /// An accessor whose byte ranges lie inside their buffers.
@@ -40,7 +41,8 @@ fn element_size(shape: Type, component: ComponentType) -> usize {
     }
 }
 
-/// The byte range of `count` elements of `size` bytes, every `stride` bytes from `offset` on. The error names the fault.
+/// The byte range of `count` elements of `size` bytes, every `stride` bytes from `offset` on. The error names the
+/// fault.
 fn window<'a>(
     what: &str,
     view: usize,
@@ -148,6 +150,17 @@ impl<'a> Accessor<'a> {
             (I16, false) => self.decode(|b: [u8; 2]| f32::from(i16::from_le_bytes(b))),
             (U16, false) => self.decode(|b: [u8; 2]| f32::from(u16::from_le_bytes(b))),
             (U32, false) => self.decode(|b: [u8; 4]| u32::from_le_bytes(b) as f32),
+        })
+    }
+
+    /// All numbers of the elements one after the other, converted as [`Accessor::floats`] does.
+    pub(crate) fn numbers(&self) -> Result<Vec<f32>> {
+        Ok(match self.shape {
+            Type::Scalar => self.floats::<1>()?.into_flattened(),
+            Type::Vec2 => self.floats::<2>()?.into_flattened(),
+            Type::Vec3 => self.floats::<3>()?.into_flattened(),
+            Type::Vec4 => self.floats::<4>()?.into_flattened(),
+            other => bail!("accessor {} holds {other:?} elements, not numbers or vectors", self.index),
         })
     }
 

@@ -1,8 +1,9 @@
-//! Canonical form of a scene: constant folding of material factors with the texels and vertex colours that multiply them.
+//! Canonical form of a scene: constant folding of material factors with the texels and vertex colours that multiply
+//! them.
 //!
-//! Black textures set their factor to 0, and alpha of 1 everywhere makes a material opaque. The picture stays the same, with one
-//! exception: a material that becomes opaque casts shadows in shadow maps and refracts the light that it transmits.
-//! Read glTF 2.0 section 3.9.4 (alpha modes). Assumes decoded images.
+//! Black textures set their factor to 0, and alpha of 1 everywhere makes a material opaque. The picture stays the same,
+//! with one exception: a material that becomes opaque casts shadows in shadow maps and refracts the light that it
+//! transmits. Read glTF 2.0 section 3.9.4 (alpha modes). Assumes decoded images.
 
 use super::material::TextureRef;
 use super::{AlphaMode, Image, Material, Mesh, Scene, Shared};
@@ -32,8 +33,8 @@ pub fn canonicalise(scene: &mut Scene) -> CanonicalForm {
     form
 }
 
-/// Sets each factor to 0 whose texture is black in the channels that multiply it, and returns the names of these factors. The
-/// texture is removed unless other channels of it are read.
+/// Sets each factor to 0 whose texture is black in the channels that multiply it, and returns the names of these
+/// factors. The texture is removed unless other channels of it are read.
 fn fold_black(material: &mut Material, images: &[Image]) -> Vec<&'static str> {
     // Stops at the first texel that is not black, which most textures have near their start.
     let black = |texture: Option<TextureRef>, channels: &[usize]| {
@@ -66,7 +67,8 @@ fn fold_black(material: &mut Material, images: &[Image]) -> Vec<&'static str> {
     found
 }
 
-/// Folds alpha: 1 everywhere makes the material opaque; below the cutoff, or 0 when blended, everywhere empties the mesh.
+/// Folds alpha: 1 everywhere makes the material opaque; below the cutoff, or 0 when blended, everywhere empties the
+/// mesh.
 fn fold_alpha(index: usize, material: &mut Material, meshes: &mut [Mesh], images: &[Image], form: &mut CanonicalForm) {
     if material.alpha_mode == AlphaMode::Opaque {
         return;
@@ -95,7 +97,8 @@ fn fold_alpha(index: usize, material: &mut Material, meshes: &mut [Mesh], images
             *mesh = Mesh { name: std::mem::take(&mut mesh.name), material: index, ..Mesh::default() };
         }
     }
-    // A material without meshes is not reported. As opaque it keeps alpha weights out of the mip levels of textures it shares.
+    // A material without meshes is not reported. As opaque it keeps alpha weights out of the mip levels of textures it
+    // shares.
     if covers {
         material.alpha_mode = AlphaMode::Opaque;
         form.opaque.extend(used.then(|| material.name.clone()));
@@ -133,7 +136,8 @@ mod tests {
     #[test]
     fn alpha_is_read_by_its_values() {
         use AlphaMode::{Blend, Mask, Opaque};
-        // Alpha mode, alpha factor, alpha of one of two texels, alpha of vertices; expected alpha mode, whether triangles are left.
+        // Alpha mode, alpha factor, alpha of one of two texels, alpha of vertices; expected alpha mode, whether
+        // triangles are left.
         type Case = (AlphaMode, f32, Option<u8>, &'static [f32], AlphaMode, bool);
         let cases: [Case; 15] = [
             (Blend, 1.0, None, &[], Opaque, true),

@@ -1,7 +1,8 @@
 //! Container of a glTF file: GLB chunks, JSON, buffers and URIs.
 //!
-//! Read glTF 2.0 sections 2.8 (URIs), 3.6.1 (buffers) and 4 (GLB). After [`Document::open`] every index in the JSON that the `gltf`
-//! crate knows of is in range, and every buffer has the length that the JSON states. The node hierarchy is not checked yet.
+//! Read glTF 2.0 sections 2.8 (URIs), 3.6.1 (buffers) and 4 (GLB). After [`Document::open`] every index in the JSON
+//! that the `gltf` crate knows of is in range, every buffer has the length that the JSON states, and compressed
+//! geometry is decoded. The node hierarchy is not checked yet.
 
 use std::{
     borrow::Cow,
@@ -15,11 +16,17 @@ use gltf::json::{
     validation::{Checked, Error as Flaw, Validate},
 };
 
+use super::decompress::{decompress, is_fallback};
+use super::lenient::{self, PointerChannel};
 use super::lobe::LOBES;
 
 /// Supported extensions, without those of [`LOBES`].
 const SUPPORTED_EXTENSIONS: &[&str] = &[
+    "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
     "EXT_texture_webp",
+    "KHR_animation_pointer",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
     "KHR_materials_dispersion",
@@ -31,6 +38,9 @@ const SUPPORTED_EXTENSIONS: &[&str] = &[
     "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "KHR_node_visibility",
+    "KHR_texture_basisu",
     "KHR_texture_transform",
 ];
 
@@ -38,9 +48,6 @@ const SUPPORTED_EXTENSIONS: &[&str] = &[
 fn is_supported(name: &str) -> bool {
     SUPPORTED_EXTENSIONS.contains(&name) || LOBES.iter().any(|lobe| lobe.extension == name)
 }
-
-/// Compression extensions that make the data unreadable; their error message recommends decompression.
-const COMPRESSIONS: &[&str] = &["EXT_meshopt_compression", "KHR_draco_mesh_compression", "KHR_texture_basisu"];
 
 /// A glTF file with its buffers in memory.
 pub(crate) struct Document<'a> {
@@ -50,6 +57,8 @@ pub(crate) struct Document<'a> {
     pub(crate) buffers: Vec<Cow<'a, [u8]>>,
     /// Base folder of relative URIs.
     pub(crate) folder: PathBuf,
+    /// Channels of animations that name their property by a JSON pointer.
+    pub(crate) pointers: Vec<PointerChannel>,
 }
 
 /// The JSON and binary chunks of a GLB file, or the JSON of a `.gltf` file alone.
@@ -71,26 +80,64 @@ impl<'a> Document<'a> {
             parts.json.trim_ascii_start().starts_with(b"{"),
             "the JSON cannot be read as glTF 2.0: it does not begin with an object"
         );
-        let root: Root = json::deserialize::from_slice(parts.json)
-            .map_err(|e| anyhow!("the JSON cannot be read as glTF 2.0: {e}"))?;
-        check_asset(&root)?;
+        let (mut root, pointers) = match json::deserialize::from_slice(parts.json) {
+            Ok(root) => (root, Vec::new()),
+            Err(error) => lenient::read(parts.json, warnings)
+                .map_err(|_| anyhow!("the JSON cannot be read as glTF 2.0: {error}"))?,
+        };
+        check_asset(&root, warnings)?;
         check_extensions(&root, warnings)?;
-        check_references(&root)?;
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        let buffers = root
+        let mut buffers = root
             .buffers
             .iter()
             .enumerate()
             .map(|(index, buffer)| read_buffer(index, buffer, parts.binary, &folder))
             .collect::<Result<Vec<_>>>()?;
-        Ok(Self { root, buffers, folder })
+        decompress(&mut root, &mut buffers)?;
+        check_references(&root)?;
+        Ok(Self { root, buffers, folder, pointers })
+    }
+
+    /// Gives each primitive its material of a variant (KHR_materials_variants), by name or index.
+    pub(crate) fn choose_variant(&mut self, wanted: &str) -> Result<()> {
+        let root = &mut self.root;
+        let variants = root.extensions.as_ref().and_then(|extensions| extensions.khr_materials_variants.as_ref());
+        let names: Vec<&str> =
+            variants.map_or_else(Vec::new, |all| all.variants.iter().map(|variant| variant.name.as_str()).collect());
+        let by_index = || wanted.parse::<usize>().ok().filter(|&index| index < names.len());
+        let found = names.iter().position(|name| *name == wanted).or_else(by_index).with_context(|| {
+            let names: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
+            match names.is_empty() {
+                true => format!("there is no variant \"{wanted}\"; the file has none"),
+                false => format!("there is no variant \"{wanted}\"; the file has {}", names.join(", ")),
+            }
+        })?;
+        let materials = root.materials.len();
+        for (m, mesh) in root.meshes.iter_mut().enumerate() {
+            for (p, primitive) in mesh.primitives.iter_mut().enumerate() {
+                let mappings = primitive.extensions.as_ref().and_then(|e| e.khr_materials_variants.as_ref());
+                let mut mappings = mappings.map_or(&[][..], |all| &all.mappings).iter();
+                let Some(mapping) = mappings.find(|mapping| mapping.variants.contains(&(found as u32))) else {
+                    continue;
+                };
+                ensure!(
+                    (mapping.material as usize) < materials,
+                    "mesh {m} primitive {p}: the variant \"{}\" names material {}, but the file has {materials}",
+                    names[found],
+                    mapping.material
+                );
+                primitive.material = Some(json::Index::new(mapping.material));
+            }
+        }
+        Ok(())
     }
 
     /// The document with its buffers copied, without borrows.
     pub(crate) fn into_owned(self) -> Document<'static> {
-        let Self { root, buffers, folder } = self;
+        let Self { root, buffers, folder, pointers } = self;
         let buffers = buffers.into_iter().map(|buffer| Cow::Owned(buffer.into_owned())).collect();
-        Document { root, buffers, folder }
+        Document { root, buffers, folder, pointers }
     }
 
     /// The bytes of a buffer view and its stride.
@@ -101,23 +148,24 @@ impl<'a> Document<'a> {
         let buffer = view.buffer.value();
         let bytes =
             self.buffers.get(buffer).with_context(|| format!("buffer view {index}: there is no buffer {buffer}"))?;
-        let start = view.byte_offset.unwrap_or_default().0;
-        let end =
-            start.checked_add(view.byte_length.0).filter(|&end| end <= bytes.len() as u64).with_context(|| {
-                format!(
-                    "buffer view {index} spans {} bytes from byte {start} of buffer {buffer}, which has {} bytes",
-                    view.byte_length.0,
-                    bytes.len()
-                )
-            })?;
+        let (what, of) = (format!("buffer view {index}"), format!("buffer {buffer}"));
+        let bytes = view_of(&what, &of, bytes, view.byte_offset.unwrap_or_default().0, view.byte_length.0)?;
         let stride = view.byte_stride.map(|s| s.0).filter(|&s| s != 0);
-        Ok((&bytes[start as usize..end as usize], stride))
+        Ok((bytes, stride))
     }
 
     /// The content of a URI: `data:` or a path relative to the file.
     pub(crate) fn resolve(&self, uri: &str) -> Result<Vec<u8>> {
         resolve(uri, &self.folder)
     }
+}
+
+/// The `length` bytes from byte `start` on; `what` spans them, `of` has the bytes.
+pub(crate) fn view_of<'b>(what: &str, of: &str, bytes: &'b [u8], start: u64, length: u64) -> Result<&'b [u8]> {
+    let end = start.checked_add(length).filter(|&end| end <= bytes.len() as u64).with_context(|| {
+        format!("{what} spans {length} bytes from byte {start} of {of}, which has {} bytes", bytes.len())
+    })?;
+    Ok(&bytes[start as usize..end as usize])
 }
 
 /// Little-endian word at `at`; `None` past the end.
@@ -158,23 +206,26 @@ fn split_glb(bytes: &[u8]) -> Result<Parts<'_>> {
     Ok(Parts { json: json.context("the GLB file has no JSON chunk")?, binary })
 }
 
-fn check_asset(root: &Root) -> Result<()> {
+fn check_asset(root: &Root, warnings: &mut Vec<String>) -> Result<()> {
     let version = &root.asset.version;
     ensure!(
         version.split('.').next() == Some("2"),
         "the file is glTF version \"{version}\"; only version 2.0 is supported"
     );
     if let Some(min) = &root.asset.min_version {
-        ensure!(min == "2.0", "the file needs a reader of glTF version \"{min}\"; only version 2.0 is supported");
+        ensure!(
+            ["2.0", "2.1"].contains(&min.as_str()),
+            "the file needs a reader of glTF version \"{min}\"; only version 2.0 is supported"
+        );
+        if min == "2.1" {
+            warnings.push("the file asks for glTF 2.1, a draft; it is read as glTF 2.0".to_owned());
+        }
     }
     Ok(())
 }
 
 fn check_extensions(root: &Root, warnings: &mut Vec<String>) -> Result<()> {
     for name in &root.extensions_required {
-        if COMPRESSIONS.contains(&name.as_str()) {
-            bail!("the file requires the extension {name}, which is not decoded; export it without that compression");
-        }
         ensure!(is_supported(name), "the file requires the extension {name}, which is not supported");
     }
     for name in &root.extensions_used {
@@ -210,8 +261,8 @@ fn check_references(root: &Root) -> Result<()> {
         let tolerated = match flaw {
             // `is_supported` has checked `extensionsRequired`.
             Flaw::Unsupported => true,
-            // Not needed for reading: min and max of accessors; an accessor without a buffer view holds zeros; a texture may
-            // take its image from an extension; an attribute of unknown name is ignored.
+            // Not needed for reading: min and max of accessors; an accessor without a buffer view holds zeros; a
+            // texture may take its image from an extension; an attribute of unknown name is ignored.
             Flaw::Missing => {
                 let is_bound = place.ends_with(".min") || place.ends_with(".max");
                 let is_zeros = place.starts_with("accessors[") && place.ends_with(".bufferView");
@@ -260,6 +311,9 @@ fn read_buffer<'a>(
     folder: &Path,
 ) -> Result<Cow<'a, [u8]>> {
     let claimed = buffer.byte_length.0;
+    if is_fallback(buffer) {
+        return Ok(Cow::Borrowed(&[]));
+    }
     let bytes = match (&buffer.uri, binary) {
         (Some(uri), _) => Cow::Owned(resolve(uri, folder).with_context(|| format!("buffer {index}"))?),
         (None, Some(binary)) if index == 0 => Cow::Borrowed(binary),

@@ -31,8 +31,8 @@ pub struct Environment {
 impl Environment {
     /// Reads a Radiance `.hdr` or an OpenEXR map; the content decides, not the extension.
     ///
-    /// Also returns warnings, one sentence each: texels that were NaN, infinite or negative and became 0, an aspect ratio other
-    /// than two to one, an exposure in the file that was divided out. Alpha of an EXR is dropped.
+    /// Also returns warnings, one sentence each: texels that were NaN, infinite or negative and became 0, an aspect
+    /// ratio other than two to one, an exposure in the file that was divided out. Alpha of an EXR is dropped.
     pub fn load(path: &Path) -> Result<(Self, Vec<String>)> {
         let bytes = file::read(path)?;
         let name = path.display().to_string();
@@ -99,9 +99,9 @@ impl Environment {
 
     /// Built-in environment for a scene without lights: a neutral photographic studio, 512x256.
     ///
-    /// A bluish-white sky over a darker grey floor, and three soft boxes: the key light from the upper left in front (seen
-    /// from a camera on +Z), a weaker fill light from the right, a rim light behind. Every edge is a C2 ramp several texels
-    /// wide, so the map has no aliasing. Mean radiance is 0.83, the largest near 12.
+    /// A bluish-white sky over a darker grey floor, and three soft boxes: the key light from the upper left in front
+    /// (seen from a camera on +Z), a weaker fill light from the right, a rim light behind. Every edge is a C2 ramp
+    /// several texels wide, so the map has no aliasing. Mean radiance is 0.83, the largest near 12.
     pub fn studio() -> Self {
         let (width, height) = (512u32, 256u32);
         let boxes = [
@@ -125,8 +125,8 @@ impl Environment {
 
     /// Bilinear lookup of the radiance from a unit direction in world space: the f64 twin of the shader's lookup.
     ///
-    /// Texel centres are at half-integers, u is periodic, v is clamped to the rows at the poles. A d.y outside −1 … 1 by rounding
-    /// is clamped. The code follows the convention literally, at the cost of speed.
+    /// Texel centres are at half-integers, u is periodic, v is clamped to the rows at the poles. A d.y outside −1 … 1
+    /// by rounding is clamped. The code follows the convention literally, at the cost of speed.
     pub fn sample(&self, direction: DVec3) -> [f64; 3] {
         let u = direction.z.atan2(direction.x) / TAU + 0.5;
         let v = 0.5 - direction.y.clamp(-1.0, 1.0).asin() / PI;

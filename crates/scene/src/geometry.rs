@@ -1,8 +1,8 @@
 //! Mesh preparation: clean triangles, normals, tangent space (MikkTSpace), texture coordinates.
 //!
-//! Read glTF 2.0 section 3.7.2.1 (meshes, attributes). The steps change one [`Mesh`] in place and count their repairs; the caller
-//! reports the counts. Arithmetic on file data is f64, so that slivers keep their normal: differences of f32 coordinates and the
-//! products of such differences are nearly exact in f64.
+//! Read glTF 2.0 section 3.7.2.1 (meshes, attributes). The steps change one [`Mesh`] in place and count their repairs;
+//! the caller reports the counts. Arithmetic on file data is f64, so that slivers keep their normal: differences of f32
+//! coordinates and the products of such differences are nearly exact in f64.
 
 use std::collections::HashMap;
 
@@ -240,7 +240,8 @@ impl Geometry for TangentCorners<'_> {
     }
 
     fn tex_coord(&self, face: usize, corner: usize) -> [f32; 2] {
-        // MikkTSpace assumes v upwards, glTF downwards; glTF files are baked with the handedness of the flipped coordinate.
+        // MikkTSpace assumes v upwards, glTF downwards; glTF files are baked with the handedness of the flipped
+        // coordinate.
         let [u, v] = self.mesh.uvs[self.set].get(self.vertex(face, corner)).copied().unwrap_or_default();
         [u, 1.0 - v]
     }

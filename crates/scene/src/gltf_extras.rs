@@ -1,4 +1,5 @@
-//! `extras.etalon` of glTF materials and lights: data without a glTF extension, such as spectra, n and κ, and grids of σ.
+//! `extras.etalon` of glTF materials and lights: data without a glTF extension, such as spectra, n and κ, and grids of
+//! σ.
 //!
 //! Read docs/scene-input.md, which lists all keys.
 
@@ -30,7 +31,8 @@ const SEEN: [f64; 2] = [360.0, 830.0];
 /// The `etalon` member of `extras`.
 #[derive(Deserialize)]
 struct Extras {
-    /// Raw text until its type is known, as are its values until their key is known: error messages can then name the key.
+    /// Raw text until its type is known, as are its values until their key is known: error messages can then name the
+    /// key.
     etalon: Option<Box<RawValue>>,
 }
 
@@ -311,8 +313,8 @@ fn check_index(dispersion: Dispersion) -> Result<Dispersion> {
     Ok(dispersion)
 }
 
-/// Makes a material a conductor of that index. The base colour becomes the reflectance at normal incidence, so that models
-/// without complex indices show the same metal.
+/// Makes a material a conductor of that index. The base colour becomes the reflectance at normal incidence, so that
+/// models without complex indices show the same metal.
 fn conductor(m: &mut Material, index: [[f32; 2]; 3], warnings: &mut Vec<String>) -> Result<()> {
     ensure!(
         m.transmission == 0.0,
@@ -348,7 +350,8 @@ fn integer(value: &Value) -> Result<i32> {
         .with_context(|| format!("{} is not a whole number of 32 bits", shown(value)))
 }
 
-/// Parses a grid of σ. Numbers are parsed directly into their list: as JSON values they would take ten times as much memory.
+/// Parses a grid of σ. Numbers are parsed directly into their list: as JSON values they would take ten times as much
+/// memory.
 fn grid(text: &str) -> Result<SigmaGrid> {
     // An unknown key is an error here: a misspelt `min` would move the grid.
     #[derive(Deserialize)]

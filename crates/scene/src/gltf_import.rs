@@ -1,8 +1,8 @@
 //! glTF 2.0 import into a [`Scene`].
 //!
-//! Read glTF 2.0 chapter 3. The node hierarchy is flattened: one [`Instance`] for each primitive of each mesh node. Nodes share
-//! geometry unless a skin or morph targets deform it. Files are not trusted: every index is checked before use, and every
-//! failure is reported in one sentence.
+//! Read glTF 2.0 chapter 3. The node hierarchy is flattened: one [`Instance`] for each primitive of each mesh node.
+//! Nodes share geometry unless a skin or morph targets deform it. Files are not trusted: every index is checked before
+//! use, and every failure is reported in one sentence.
 
 use std::{
     collections::{HashMap, HashSet},
@@ -25,7 +25,7 @@ use super::{
     Camera, Image, Instance, Light, LightKind, LoadOptions, Material, Mesh, Projection, Scene, Shared,
     accessor::Accessor,
     container::Document,
-    geometry, gltf_extras, gltf_material,
+    geometry, gltf_extras, gltf_material, lenient,
     nodes::{Nodes, label},
     prune::{Coordinates, prune_textures, unused_coordinates},
     thin::{self, Stroke},
@@ -48,15 +48,15 @@ pub(crate) struct GltfFile {
 }
 
 impl GltfFile {
-    pub(crate) fn open(path: &Path) -> Result<Self> {
+    pub(crate) fn open(path: &Path, options: &LoadOptions) -> Result<Self> {
         let bytes = fs::read(path).context("the file cannot be read")?;
         let mut warnings = Vec::new();
-        let document = Document::open(&bytes, path, &mut warnings)?.into_owned();
+        let document = opened(&bytes, path, options, &mut warnings)?.into_owned();
         Ok(Self { path: path.to_owned(), document, warnings, known: StillParts::default() })
     }
 
     pub(crate) fn at(&mut self, options: &LoadOptions) -> Result<Scene> {
-        read(&self.document, &self.path, options, self.warnings.clone(), &mut self.known)
+        read(&mut self.document, &self.path, options, self.warnings.clone(), &mut self.known)
     }
 }
 
@@ -64,18 +64,46 @@ impl GltfFile {
 pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let bytes = fs::read(path).context("the file cannot be read")?;
     let mut warnings = Vec::new();
-    let document = Document::open(&bytes, path, &mut warnings)?;
-    read(&document, path, options, warnings, &mut StillParts::default())
+    let mut document = opened(&bytes, path, options, &mut warnings)?;
+    read(&mut document, path, options, warnings, &mut StillParts::default())
 }
 
+fn opened<'b>(bytes: &'b [u8], path: &Path, options: &LoadOptions, warnings: &mut Vec<String>) -> Result<Document<'b>> {
+    let mut document = Document::open(bytes, path, warnings)?;
+    if let Some(variant) = &options.variant {
+        document.choose_variant(variant)?;
+    }
+    Ok(document)
+}
+
+/// The scene at the time of the options; the document is the same afterwards.
 fn read(
+    document: &mut Document<'_>,
+    path: &Path,
+    options: &LoadOptions,
+    warnings: Vec<String>,
+    known: &mut StillParts,
+) -> Result<Scene> {
+    match options.time.filter(|_| !document.pointers.is_empty()) {
+        Some(time) => {
+            let posed = lenient::at(document, time)?;
+            let resting = std::mem::replace(&mut document.root, posed);
+            let scene = read_posed(document, path, options, warnings, known);
+            document.root = resting;
+            scene
+        }
+        None => read_posed(document, path, options, warnings, known),
+    }
+}
+
+fn read_posed(
     document: &Document<'_>,
     path: &Path,
     options: &LoadOptions,
     mut warnings: Vec<String>,
     known: &mut StillParts,
 ) -> Result<Scene> {
-    let nodes = Nodes::new(document, options.time, &mut warnings)?;
+    let nodes = Nodes::new(document, options, &mut warnings)?;
     let mut materials = gltf_material::read(document, &mut warnings)?;
     if known.resting.is_empty() {
         check_unseen_meshes(document)?;
@@ -256,7 +284,11 @@ impl<'d, 'b, 'w> InstancePlacer<'d, 'b, 'w> {
         let mut warnings = Vec::new();
         for (job, built) in jobs.iter().zip(built) {
             warnings.extend(built.warnings);
-            let placements: Vec<_> = job.nodes.iter().map(|&node| (node, self.placement(job, node))).collect();
+            let placements: Vec<_> = job
+                .nodes
+                .iter()
+                .flat_map(|&node| self.placements(job, node).into_iter().map(move |at| (node, at)))
+                .collect();
             if !built.strokes.is_empty() {
                 let placements = placements.into_iter().map(|(node, world)| (self.node_name(node), world)).collect();
                 strokes.push(thin::StrokeGroup { placements, mesh: built.mesh, strokes: built.strokes });
@@ -285,9 +317,15 @@ impl<'d, 'b, 'w> InstancePlacer<'d, 'b, 'w> {
         self.document.root.nodes[node].name.clone().unwrap_or_else(|| format!("node {node}"))
     }
 
-    /// Transform of an instance. Skinned meshes are in world space already: their joints replace the node's transform.
-    fn placement(&self, job: &PrimitiveJob, node: usize) -> DAffine3 {
-        if job.pose.joints.is_some() { DAffine3::IDENTITY } else { self.nodes.world_from_node[node] }
+    /// Transforms of a node's instances. Skinned meshes are in world space already: their joints replace the node's
+    /// transform.
+    fn placements(&self, job: &PrimitiveJob, node: usize) -> Vec<DAffine3> {
+        let world_from_node = self.nodes.world_from_node[node];
+        match (&job.pose.joints, &self.nodes.copies[node]) {
+            (Some(_), _) => vec![DAffine3::IDENTITY],
+            (None, None) => vec![world_from_node],
+            (None, Some(copies)) => copies.iter().map(|copy| world_from_node * *copy).collect(),
+        }
     }
 
     fn jobs(&self) -> Result<Vec<PrimitiveJob>> {

@@ -52,11 +52,14 @@ struct KhrDispersion {
     dispersion: f32,
 }
 
-/// EXT_texture_webp.
+/// An extension that names the picture of a texture in another format.
 #[derive(Deserialize)]
-struct Webp {
+struct OtherSource {
     source: usize,
 }
+
+/// Such extensions, the preferred one first.
+const OTHER_SOURCES: [&str; 2] = ["KHR_texture_basisu", "EXT_texture_webp"];
 
 struct MaterialReader<'d, 'b, 'w> {
     document: &'d Document<'b>,
@@ -91,8 +94,8 @@ pub(crate) fn read(document: &Document<'_>, warnings: &mut Vec<String>) -> Resul
 }
 
 impl Materials {
-    /// Decodes, in parallel, the images that the materials still use and that are not in `known`, a cache by index in the file.
-    /// Reads the headers of all other images, so that a broken file is always an error.
+    /// Decodes, in parallel, the images that the materials still use and that are not in `known`, a cache by index in
+    /// the file. Reads the headers of all other images, so that a broken file is always an error.
     pub(crate) fn decode(&mut self, document: &Document<'_>, known: &mut HashMap<usize, Image>) -> Result<Vec<Image>> {
         let first = known.is_empty();
         let mut places = vec![None; self.files.len()];
@@ -282,8 +285,8 @@ impl MaterialReader<'_, '_, '_> {
         Ok(of)
     }
 
-    /// Checks the index of KHR_materials_ior, which allows 0 ("infinite": a perfect reflector) and everything from 1 on. Indices
-    /// between 0 and 1 are accepted, too. A transmissive material needs an index above 0.
+    /// Checks the index of KHR_materials_ior, which allows 0 ("infinite": a perfect reflector) and everything from 1
+    /// on. Indices between 0 and 1 are accepted, too. A transmissive material needs an index above 0.
     fn ior(&mut self, ior: f32, transmission: f32) -> Result<f32> {
         ensure!(
             ior > 0.0 || transmission == 0.0,
@@ -323,9 +326,12 @@ impl MaterialReader<'_, '_, '_> {
             .textures
             .get(texture)
             .with_context(|| format!("texture {texture} does not exist; the file has {}", root.textures.len()))?;
-        let webp = json.extensions.as_ref().map(|e| parse::<Webp>(&e.others, "EXT_texture_webp"));
-        let source = match webp.transpose()?.flatten() {
-            Some(webp) => webp.source,
+        let others = json.extensions.as_ref().map(|extensions| &extensions.others);
+        let other =
+            others.and_then(|others| OTHER_SOURCES.iter().find(|name| others.contains_key(**name)).zip(Some(others)));
+        let other = other.map(|(name, others)| parse::<OtherSource>(others, name)).transpose()?.flatten();
+        let source = match other {
+            Some(other) => other.source,
             // The crate's placeholder for a texture without a source.
             None if json.source.value() == u32::MAX as usize => {
                 self.warn(&format!("texture {texture} has no picture that can be read, and is left out"));

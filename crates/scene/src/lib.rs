@@ -1,18 +1,21 @@
 //! Scene description: meshes, instances, materials, images, lights and cameras, in world units and before upload.
 //!
-//! A [`Scene`] comes from [`load`] (glTF, OBJ) or from [`crate::study`]; the passes upload it. Nothing here uses Vulkan.
-//! Read glTF 2.0, sections 3.4 to 3.11.
-//! Assumes metres and a right-handed world with +Y up (glTF 2.0 section 3.4).
+//! A [`Scene`] comes from [`load`] (glTF, OBJ) or from [`crate::study`]; the passes upload it. Nothing here uses
+//! Vulkan. Read glTF 2.0, sections 3.4 to 3.11. Assumes metres and a right-handed world with +Y up (glTF 2.0 section
+//! 3.4).
 
 mod accessor;
 pub mod camera;
 pub mod canonical;
 mod container;
+#[doc(hidden)]
+pub mod decompress;
 pub mod environment;
 mod geometry;
 mod gltf_extras;
 mod gltf_import;
 mod gltf_material;
+mod lenient;
 pub mod light;
 pub mod lobe;
 pub mod material;
@@ -41,7 +44,7 @@ pub use shared::{Mark, Shared};
 pub use sigma::SigmaGrid;
 
 /// Options of [`load`].
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct LoadOptions {
     /// Animation time in seconds at which the scene is frozen. All animations of the file play together, each
     /// channel clamped to its own range. `None` is the rest pose stored in the file: node transforms and default
@@ -49,6 +52,10 @@ pub struct LoadOptions {
     pub time: Option<f64>,
     /// Which textures and vertex attributes are left unread.
     pub prune: Prune,
+    /// Scene of the file, by name or index; `None` is the file's default scene.
+    pub scene: Option<String>,
+    /// Variant of the materials (KHR_materials_variants), by name or index; `None` is the file's default.
+    pub variant: Option<String>,
 }
 
 /// Reads a scene from a glTF 2.0 file (`.gltf`, `.glb`) or a Wavefront file (`.obj`).
@@ -59,6 +66,9 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let scene = match extension.as_str() {
         "gltf" | "glb" => gltf_import::load(path, options),
+        "obj" if options.scene.is_some() || options.variant.is_some() => {
+            bail!("loading {}: a Wavefront file has no scenes and no variants to choose", path.display())
+        }
         "obj" => obj::load(path, options.prune),
         _ => {
             bail!("loading {}: only .gltf, .glb and .obj files are supported", path.display())
@@ -72,7 +82,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
 /// An animated scene: its file is read once, and all moments of the animation share the static parts.
 pub struct Source {
     kind: Kind,
-    prune: Prune,
+    options: LoadOptions,
 }
 
 enum Kind {
@@ -89,24 +99,24 @@ impl Source {
     ///
     /// # Errors
     /// The errors of [`load`].
-    pub fn open(path: &Path, prune: Prune) -> Result<Self> {
+    pub fn open(path: &Path, options: LoadOptions) -> Result<Self> {
         let is_gltf = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb"));
         if !is_gltf {
-            return Ok(Self::still(load(path, &LoadOptions { time: None, prune })?));
+            return Ok(Self::still(load(path, &LoadOptions { time: None, ..options })?));
         }
         let name = path.display().to_string();
-        let file = Box::new(gltf_import::GltfFile::open(path).with_context(|| format!("loading {name}"))?);
-        Ok(Self { kind: Kind::Gltf { file, name }, prune })
+        let file = Box::new(gltf_import::GltfFile::open(path, &options).with_context(|| format!("loading {name}"))?);
+        Ok(Self { kind: Kind::Gltf { file, name }, options })
     }
 
     /// A source for a scene without animation.
     #[must_use]
     pub fn still(scene: Scene) -> Self {
-        Self { kind: Kind::Still(Box::new(scene)), prune: Prune::Nothing }
+        Self { kind: Kind::Still(Box::new(scene)), options: LoadOptions::default() }
     }
 
-    /// The scene at `time` seconds of its animation; `None` is its rest pose. The result equals that of [`load`], to the last bit.
-    /// Warnings about static parts are those of the first moment.
+    /// The scene at `time` seconds of its animation; `None` is its rest pose. The result equals that of [`load`], to
+    /// the last bit. Warnings about static parts are those of the first moment.
     ///
     /// # Errors
     /// The errors of [`load`].
@@ -114,8 +124,8 @@ impl Source {
         match &mut self.kind {
             Kind::Still(scene) => Ok(Scene::clone(scene)),
             Kind::Gltf { file, name } => {
-                let options = LoadOptions { time, prune: self.prune };
-                let mut scene = file.at(&options).with_context(|| format!("loading {name}"))?;
+                self.options.time = time;
+                let mut scene = file.at(&self.options).with_context(|| format!("loading {name}"))?;
                 sigma::one_medium_each(&mut scene);
                 Ok(scene)
             }
@@ -138,8 +148,8 @@ pub struct Scene {
     pub images: Vec<Image>,
     /// Punctual lights in world space.
     pub lights: Vec<Light>,
-    /// Scale of the built-in studio environment when the user names no environment. `None`: 1 for a scene without lights of its
-    /// own, and no studio in a scene with lights.
+    /// Scale of the built-in studio environment when the user names no environment. `None`: 1 for a scene without
+    /// lights of its own, and no studio in a scene with lights.
     pub studio: Option<f32>,
     /// Cameras in world space, in the order of the file's nodes.
     pub cameras: Vec<Camera>,

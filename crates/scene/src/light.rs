@@ -17,11 +17,13 @@ pub struct Light {
     pub color: [f32; 3],
     /// Spectrum, whose colour `color` then is; `None`: the spectrum of D65 filtered to `color`.
     pub spectrum: Option<Emission>,
-    /// Shape of an analytic area light (knob `lights`). `color` is then the intensity along the axis, or of the whole sphere.
+    /// Shape of an analytic area light (knob `lights`). `color` is then the intensity along the axis, or of the whole
+    /// sphere.
     pub extent: Option<Extent>,
     /// Kind and geometry.
     pub kind: LightKind,
-    /// Proxy light for an emissive surface, in study scenes only: it is black when emissive surfaces are lights themselves.
+    /// Proxy light for an emissive surface, in study scenes only: it is black when emissive surfaces are lights
+    /// themselves.
     pub proxy: bool,
 }
 

@@ -46,8 +46,8 @@ pub struct Material {
     pub unlit: bool,
     /// Index of refraction n (KHR_materials_ior); 1.5 by default.
     pub ior: f32,
-    /// Complex index [n, κ] of the metallic part as a conductor, red first, if known; `base_color` is then its reflectance at
-    /// normal incidence. `None` for transmissive materials.
+    /// Complex index [n, κ] of the metallic part as a conductor, red first, if known; `base_color` is then its
+    /// reflectance at normal incidence. `None` for transmissive materials.
     pub conductor: Option<[[f32; 2]; 3]>,
     /// Strength of the dielectric specular reflection (KHR_materials_specular).
     pub specular: f32,
@@ -83,8 +83,8 @@ pub struct Material {
     pub clearcoat_normal_texture: Option<TextureRef>,
     /// Lobes of extensions over the base layer, in the order of [`LOBES`].
     pub lobes: [LobeOf; lobe::COUNT],
-    /// Priority among overlapping transmissive solids (nested dielectrics): the medium with the highest priority fills the overlap,
-    /// and on a tie the medium entered last (`extras.etalon.priority`).
+    /// Priority among overlapping transmissive solids (nested dielectrics): the medium with the highest priority fills
+    /// the overlap, and on a tie the medium entered last (`extras.etalon.priority`).
     pub priority: i32,
     /// Dispersion: n by wavelength (KHR_materials_dispersion, `extras.etalon`). `ior` is n at the Fraunhofer d line.
     pub dispersion: Dispersion,
@@ -94,8 +94,9 @@ pub struct Material {
     pub emission: Option<Emission>,
     /// n and κ of the metallic part by wavelength, in addition to `conductor`.
     pub conductor_spectra: Option<[Spectrum; 2]>,
-    /// The file gives k_d, k_s and shininess (`extras.etalon`). They are stored as the base colour π k_d, the F0 2π k_s/(shine + 2)
-    /// and the roughness (2/(shine + 2))^¼. The Phong rungs of the knob `brdf` evaluate lecture B5 and B6 as written.
+    /// The file gives k_d, k_s and shininess (`extras.etalon`). They are stored as the base colour π k_d, the F0 2π
+    /// k_s/(shine + 2) and the roughness (2/(shine + 2))^¼. The Phong rungs of the knob `brdf` evaluate lecture B5 and
+    /// B6 as written.
     pub phong: bool,
 }
 
@@ -106,7 +107,8 @@ impl Material {
         self.conductor.iter().flatten().all(|&[n, kappa]| kappa > n.max(0.5))
     }
 
-    /// All texture slots with their shader names (`NAME_page` in shaders/lib/texels.glsl) and the meaning of their texels.
+    /// All texture slots with their shader names (`NAME_page` in shaders/lib/texels.glsl) and the meaning of their
+    /// texels.
     pub fn textures(&self) -> impl Iterator<Item = (&'static str, Meaning, Option<TextureRef>)> {
         use Meaning::{Color, Data};
         let own = [

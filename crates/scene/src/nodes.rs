@@ -2,7 +2,7 @@
 //!
 //! Read glTF 2.0 sections 3.5 (scenes and nodes), 3.11 (animations) and appendix C (interpolation).
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use glam::{DAffine3, DMat4, DQuat, DVec3, DVec4};
 use gltf::json::{
     self,
@@ -10,12 +10,19 @@ use gltf::json::{
     validation::Checked,
 };
 
-use super::{accessor::Accessor, container::Document};
+use serde_json::Value;
+
+use super::{LoadOptions, accessor::Accessor, container::Document};
+
+/// Largest number of copies of one node: more instances than the G-buffer's index holds.
+const MOST_COPIES: usize = 1 << 23;
 
 /// All nodes with their world transforms.
 pub(crate) struct Nodes {
     /// World transform of each node.
     pub(crate) world_from_node: Vec<DAffine3>,
+    /// Transforms of the copies of a node's mesh (EXT_mesh_gpu_instancing), in the node's space; `None` for one copy.
+    pub(crate) copies: Vec<Option<Vec<DAffine3>>>,
     /// Nodes of the rendered scene, in the order of the file.
     pub(crate) shown: Vec<usize>,
     /// Morph weights of nodes whose weights are animated.
@@ -52,18 +59,22 @@ pub(crate) fn label(document: &Document<'_>, index: usize) -> String {
 
 impl Nodes {
     /// Evaluates the hierarchy at `time` in seconds, or in the rest pose.
-    pub(crate) fn new(document: &Document<'_>, time: Option<f64>, warnings: &mut Vec<String>) -> Result<Self> {
+    pub(crate) fn new(document: &Document<'_>, options: &LoadOptions, warnings: &mut Vec<String>) -> Result<Self> {
         let nodes = &document.root.nodes;
         let mut locals: Vec<Local> =
             nodes.iter().enumerate().map(|(i, n)| local(n, &label(document, i), warnings)).collect();
         let mut animated_weights = vec![None; nodes.len()];
-        if let Some(time) = time {
+        if let Some(time) = options.time {
             animate(document, time, &mut locals, &mut animated_weights)?;
         }
         let parents = parents(document)?;
         let world_from_node = place(document, &parents, &locals)?;
-        let shown = shown(document, &parents, warnings);
-        Ok(Self { world_from_node, shown, animated_weights, duration: duration(document) })
+        let shown = shown(document, options.scene.as_deref(), &parents, warnings)?;
+        let mut copies = vec![None; nodes.len()];
+        for &node in &shown {
+            copies[node] = instances(document, node).with_context(|| label(document, node))?;
+        }
+        Ok(Self { world_from_node, copies, shown, animated_weights, duration: duration(document) })
     }
 }
 
@@ -110,7 +121,8 @@ fn parents(document: &Document<'_>) -> Result<Vec<Option<usize>>> {
     Ok(parents)
 }
 
-/// World transforms, parents before children. Each node has at most one parent, so a node that no root reaches is in a cycle.
+/// World transforms, parents before children. Each node has at most one parent, so a node that no root reaches is in a
+/// cycle.
 fn place(document: &Document<'_>, parents: &[Option<usize>], locals: &[Local]) -> Result<Vec<DAffine3>> {
     let nodes = &document.root.nodes;
     let mut world: Vec<Option<DAffine3>> = vec![None; nodes.len()];
@@ -129,10 +141,69 @@ fn place(document: &Document<'_>, parents: &[Option<usize>], locals: &[Local]) -
         .collect()
 }
 
-fn shown(document: &Document<'_>, parents: &[Option<usize>], warnings: &mut Vec<String>) -> Vec<usize> {
+/// KHR_node_visibility: the node and everything below it can be hidden.
+fn is_visible(node: &json::Node) -> bool {
+    let extension = node.extensions.as_ref().and_then(|extensions| extensions.others.get("KHR_node_visibility"));
+    extension.and_then(|value| value.get("visible")).and_then(Value::as_bool).unwrap_or(true)
+}
+
+/// EXT_mesh_gpu_instancing: the transforms of a node's copies.
+fn instances(document: &Document<'_>, node: usize) -> Result<Option<Vec<DAffine3>>> {
+    const NAME: &str = "EXT_mesh_gpu_instancing";
+    let extensions = document.root.nodes[node].extensions.as_ref();
+    let Some(value) = extensions.and_then(|extensions| extensions.others.get(NAME)) else { return Ok(None) };
+    let attributes =
+        value.get("attributes").and_then(Value::as_object).with_context(|| format!("{NAME}: attributes"))?;
+    let accessor = |name: &str| -> Result<Option<Accessor<'_>>> {
+        let Some(index) = attributes.get(name) else { return Ok(None) };
+        let index = index.as_u64().and_then(|index| usize::try_from(index).ok());
+        let index = index.with_context(|| format!("{NAME}: {name} is no index of an accessor"))?;
+        Accessor::new(document, index).map(Some).with_context(|| format!("{NAME}: {name}"))
+    };
+    let (translations, rotations, scales) = (accessor("TRANSLATION")?, accessor("ROTATION")?, accessor("SCALE")?);
+    let counts: Vec<usize> = [&translations, &rotations, &scales].into_iter().flatten().map(|a| a.count).collect();
+    let Some(&count) = counts.first() else { return Ok(None) };
+    ensure!(counts.iter().all(|&other| other == count), "{NAME}: its attributes have {counts:?} elements");
+    ensure!(count <= MOST_COPIES, "{NAME}: {count} copies, more than {MOST_COPIES}");
+    let translations = translations.map_or_else(|| Ok(vec![[0.0; 3]; count]), |a| a.floats::<3>())?;
+    let rotations = rotations.map_or_else(|| Ok(vec![[0.0, 0.0, 0.0, 1.0]; count]), |a| a.floats::<4>())?;
+    let scales = scales.map_or_else(|| Ok(vec![[1.0; 3]; count]), |a| a.floats::<3>())?;
+    let copies = translations.iter().zip(&rotations).zip(&scales).enumerate().map(|(i, ((t, r), s))| {
+        let rotation = unit_quaternion(r.map(f64::from)).with_context(|| format!("{NAME}: rotation {i}"))?;
+        let [scale, translation] = [s, t].map(|v| DVec3::from(v.map(f64::from)));
+        ensure!(scale.is_finite() && translation.is_finite(), "{NAME}: copy {i} is not finite");
+        Ok(DAffine3::from_scale_rotation_translation(scale, rotation, translation))
+    });
+    copies.collect::<Result<_>>().map(Some)
+}
+
+/// The scene of the file that is rendered: by the index or the name that was asked for, else the default, else the
+/// first.
+fn chosen_scene<'d>(root: &'d json::Root, wanted: Option<&str>) -> Result<Option<&'d json::Scene>> {
+    let Some(wanted) = wanted else { return Ok(root.scenes.get(root.scene.map_or(0, |scene| scene.value()))) };
+    let by_name = root.scenes.iter().find(|scene| scene.name.as_deref() == Some(wanted));
+    let by_index = || wanted.parse::<usize>().ok().and_then(|index| root.scenes.get(index));
+    let found = by_name.or_else(by_index).ok_or_else(|| {
+        let names = root.scenes.iter().enumerate();
+        let names: Vec<String> = names
+            .map(|(i, scene)| scene.name.as_ref().map_or_else(|| i.to_string(), |name| format!("{i} \"{name}\"")))
+            .collect();
+        match names.is_empty() {
+            true => anyhow!("there is no scene \"{wanted}\"; the file has none"),
+            false => anyhow!("there is no scene \"{wanted}\"; the file has {}", names.join(", ")),
+        }
+    })?;
+    Ok(Some(found))
+}
+
+fn shown(
+    document: &Document<'_>,
+    scene: Option<&str>,
+    parents: &[Option<usize>],
+    warnings: &mut Vec<String>,
+) -> Result<Vec<usize>> {
     let root = &document.root;
-    let scene = root.scene.map_or(0, |s| s.value());
-    let mut stack: Vec<usize> = match root.scenes.get(scene) {
+    let mut stack: Vec<usize> = match chosen_scene(root, scene)? {
         Some(scene) => scene.nodes.iter().map(json::Index::value).collect(),
         None => (0..root.nodes.len()).filter(|&i| parents[i].is_none()).collect(),
     };
@@ -146,11 +217,11 @@ fn shown(document: &Document<'_>, parents: &[Option<usize>], warnings: &mut Vec<
     }
     let mut is_shown = vec![false; root.nodes.len()];
     while let Some(i) = stack.pop() {
-        if !std::mem::replace(&mut is_shown[i], true) {
+        if is_visible(&root.nodes[i]) && !std::mem::replace(&mut is_shown[i], true) {
             stack.extend(root.nodes[i].children.iter().flatten().map(json::Index::value));
         }
     }
-    (0..root.nodes.len()).filter(|&i| is_shown[i]).collect()
+    Ok((0..root.nodes.len()).filter(|&i| is_shown[i]).collect())
 }
 
 /// Position of a time among keyframes.
@@ -172,53 +243,55 @@ fn moment(times: &[[f32; 1]], time: f64) -> Moment {
     Moment { key: after - 1, fraction: (time - a) / (b - a), span: b - a }
 }
 
-/// Values of one channel: `width` values of `N` numbers per keyframe (`width` is 1 except for morph weights).
-struct Track<const N: usize> {
-    values: Vec<[f64; N]>,
+/// Values of a sampler: `width` numbers per keyframe, and two tangents as wide with cubic splines.
+struct Track {
+    values: Vec<f64>,
     width: usize,
     interpolation: Interpolation,
     moment: Moment,
 }
 
-impl<const N: usize> Track<N> {
-    fn at(&self, lane: usize, slerp: bool) -> [f64; N] {
+impl Track {
+    /// The numbers at the moment; `as_rotation` interpolates linearly between unit quaternions by slerp.
+    fn at(&self, as_rotation: bool) -> Vec<f64> {
         let Moment { key, fraction: t, span } = self.moment;
         let value = |key: usize, part: usize| {
             let parts = if self.interpolation == Interpolation::CubicSpline { 3 } else { 1 };
-            self.values[(key * parts + part) * self.width + lane]
+            let start = (key * parts + part) * self.width;
+            &self.values[start..start + self.width]
         };
-        let blend = |f: &dyn Fn(usize) -> f64| std::array::from_fn(f);
         match self.interpolation {
             Interpolation::CubicSpline => {
                 // A keyframe holds in-tangent, value and out-tangent; tangents are per second.
                 let v0 = value(key, 1);
                 if t == 0.0 {
-                    return v0;
+                    return v0.to_vec();
                 }
                 let (b0, a1, v1) = (value(key, 2), value(key + 1, 0), value(key + 1, 1));
                 let (t2, t3) = (t * t, t * t * t);
-                blend(&|i| {
+                let hermite = |i: usize| {
                     (2.0 * t3 - 3.0 * t2 + 1.0) * v0[i]
                         + span * (t3 - 2.0 * t2 + t) * b0[i]
                         + (3.0 * t2 - 2.0 * t3) * v1[i]
                         + span * (t3 - t2) * a1[i]
-                })
+                };
+                (0..self.width).map(hermite).collect()
             }
             Interpolation::Linear if t > 0.0 => {
                 let (v0, v1) = (value(key, 0), value(key + 1, 0));
-                if slerp {
-                    let q = |v: [f64; N]| unit_quaternion(std::array::from_fn(|i| v[i])).unwrap_or(DQuat::IDENTITY);
-                    let turned = q(v0).slerp(q(v1), t).to_array();
-                    return blend(&|i| turned[i]);
+                if let (true, &[ax, ay, az, aw], &[bx, by, bz, bw]) = (as_rotation, v0, v1) {
+                    let q = |xyzw: [f64; 4]| unit_quaternion(xyzw).unwrap_or(DQuat::IDENTITY);
+                    return q([ax, ay, az, aw]).slerp(q([bx, by, bz, bw]), t).to_array().to_vec();
                 }
-                blend(&|i| v0[i] + t * (v1[i] - v0[i]))
+                v0.iter().zip(v1).map(|(v0, v1)| v0 + t * (v1 - v0)).collect()
             }
-            _ => value(key, 0),
+            _ => value(key, 0).to_vec(),
         }
     }
 }
 
-/// Time of the last keyframe of all animations. Unreadable samplers are skipped here; evaluation at a time reports them.
+/// Time of the last keyframe of all animations. Unreadable samplers are skipped here; evaluation at a time reports
+/// them.
 fn duration(document: &Document<'_>) -> Option<f64> {
     let samplers = document.root.animations.iter().flat_map(|animation| &animation.samplers);
     let times = samplers.filter_map(|sampler| Accessor::new(document, sampler.input.value()).ok()?.floats::<1>().ok());
@@ -237,6 +310,36 @@ fn animate(document: &Document<'_>, time: f64, locals: &mut [Local], weights: &m
     Ok(())
 }
 
+/// The numbers of a sampler at a time.
+pub(crate) fn sampled(
+    document: &Document<'_>,
+    animation: &json::Animation,
+    sampler: usize,
+    time: f64,
+    as_rotation: bool,
+) -> Result<Vec<f64>> {
+    let sampler = animation.samplers.get(sampler).context("it names a sampler that does not exist")?;
+    let Checked::Valid(interpolation) = sampler.interpolation else { bail!("its interpolation is unknown") };
+    let times = Accessor::new(document, sampler.input.value())?.floats::<1>()?;
+    ensure!(!times.is_empty(), "it has no keyframes");
+    ensure!(
+        times.iter().all(|t| t[0].is_finite()) && times.windows(2).all(|w| w[0][0] < w[1][0]),
+        "its keyframe times do not increase"
+    );
+    let values = Accessor::new(document, sampler.output.value())?.numbers()?;
+    let keys = times.len() * if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
+    let width = values.len() / keys;
+    ensure!(
+        values.len() == keys * width && width > 0,
+        "{} keyframes need a multiple of {keys} values, but accessor {} has {}",
+        times.len(),
+        sampler.output.value(),
+        values.len()
+    );
+    let values = values.into_iter().map(f64::from).collect();
+    Ok(Track { values, width, interpolation, moment: moment(&times, time) }.at(as_rotation))
+}
+
 fn apply(
     document: &Document<'_>,
     animation: &json::Animation,
@@ -245,35 +348,11 @@ fn apply(
     locals: &mut [Local],
     weights: &mut [Option<Vec<f32>>],
 ) -> Result<()> {
-    let sampler = animation.samplers.get(channel.sampler.value()).context("it names a sampler that does not exist")?;
-    let (Checked::Valid(interpolation), Checked::Valid(property)) = (&sampler.interpolation, &channel.target.path)
-    else {
-        bail!("its interpolation or target is unknown");
-    };
-    let times = Accessor::new(document, sampler.input.value())?.floats::<1>()?;
-    ensure!(!times.is_empty(), "it has no keyframes");
-    ensure!(
-        times.iter().all(|t| t[0].is_finite()) && times.windows(2).all(|w| w[0][0] < w[1][0]),
-        "its keyframe times do not increase"
-    );
-    let output = Accessor::new(document, sampler.output.value())?;
-    let parts = if *interpolation == Interpolation::CubicSpline { 3 } else { 1 };
-    let keys = times.len() * parts;
-    let width = if *property == Property::MorphTargetWeights { output.count / keys } else { 1 };
-    ensure!(
-        output.count == keys * width && width > 0,
-        "{} keyframes need a multiple of {keys} values, but accessor {} has {}",
-        times.len(),
-        sampler.output.value(),
-        output.count
-    );
+    let Checked::Valid(property) = channel.target.path else { bail!("its target is unknown") };
+    let values = sampled(document, animation, channel.sampler.value(), time, property == Property::Rotation)?;
     let node = channel.target.node.value();
-    let moment = moment(&times, time);
-    let interpolation = *interpolation;
-    if *property == Property::MorphTargetWeights {
-        let values = output.floats::<1>()?.into_iter().map(|v| v.map(f64::from)).collect();
-        let track = Track { values, width, interpolation, moment };
-        weights[node] = Some((0..width).map(|lane| track.at(lane, false)[0] as f32).collect());
+    if property == Property::MorphTargetWeights {
+        weights[node] = Some(values.into_iter().map(|weight| weight as f32).collect());
         return Ok(());
     }
     if let Local::Matrix(m) = locals[node] {
@@ -281,17 +360,22 @@ fn apply(
         locals[node] = Local::Parts { translation, rotation, scale };
     }
     let Local::Parts { translation, rotation, scale } = &mut locals[node] else { return Ok(()) };
-    if *property == Property::Rotation {
-        let values = output.floats::<4>()?.into_iter().map(|v| v.map(f64::from)).collect();
-        let track = Track { values, width, interpolation, moment };
-        *rotation = unit_quaternion(track.at(0, true)).context("its rotation at this time is no quaternion")?;
-    } else {
-        let values = output.floats::<3>()?.into_iter().map(|v| v.map(f64::from)).collect();
-        let track = Track { values, width, interpolation, moment };
-        let value = DVec3::from(track.at(0, false));
-        *(if *property == Property::Scale { scale } else { translation }) = value;
-    }
+    let (into, numbers) = match property {
+        Property::Rotation => {
+            let xyzw = values.try_into().map_err(|values: Vec<f64>| wrong_width(values.len(), 4))?;
+            *rotation = unit_quaternion(xyzw).context("its rotation at this time is no quaternion")?;
+            return Ok(());
+        }
+        Property::Scale => (scale, values),
+        _ => (translation, values),
+    };
+    let xyz: [f64; 3] = numbers.try_into().map_err(|values: Vec<f64>| wrong_width(values.len(), 3))?;
+    *into = DVec3::from(xyz);
     Ok(())
+}
+
+fn wrong_width(found: usize, expected: usize) -> anyhow::Error {
+    anyhow!("a keyframe has {found} numbers, not {expected}")
 }
 
 #[cfg(test)]
@@ -313,11 +397,11 @@ mod tests {
     fn a_cubic_spline_follows_its_hermite_polynomial() {
         // The cubic x³ on [0, 2]: values 0 and 8, slopes 0 and 12 per second.
         let track = Track {
-            values: vec![[0.0], [0.0], [0.0], [12.0], [8.0], [0.0]],
+            values: vec![0.0, 0.0, 0.0, 12.0, 8.0, 0.0],
             width: 1,
             interpolation: Interpolation::CubicSpline,
             moment: moment(&[[0.0], [2.0]], 1.5),
         };
-        assert!((track.at(0, false)[0] - 3.375).abs() < 1e-12);
+        assert!((track.at(false)[0] - 3.375).abs() < 1e-12);
     }
 }

@@ -43,7 +43,8 @@ pub(crate) fn load(path: &Path, prune: Prune) -> Result<Scene> {
     Ok(scene)
 }
 
-/// Lines without comments, numbered by their first line from 1. A backslash at the end of a line joins it with the next.
+/// Lines without comments, numbered by their first line from 1. A backslash at the end of a line joins it with the
+/// next.
 fn logical_lines(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
     let mut lines = text.lines().enumerate();
     std::iter::from_fn(move || {
@@ -651,8 +652,8 @@ impl Mtl {
         if let Some(out) = self.ke.iter().flatten().find(|x| **x < 0.0) {
             said.push(format!("Ke {out} would take light away and is read as 0"));
         }
-        // Lecture B6's bound k_s ≤ (shine + 2)/2π (1 − π k_d), in the meaning of MTL files: Kd = π k_d is an albedo, and Ks =
-        // 2π k_s/(shine + 2) is the albedo of the lobe.
+        // Lecture B6's bound k_s ≤ (shine + 2)/2π (1 − π k_d), in the meaning of MTL files: Kd = π k_d is an albedo,
+        // and Ks = 2π k_s/(shine + 2) is the albedo of the lobe.
         if let (false, Some(kd), Some(ks)) = (matches!(self.illum, Some(0 | 1 | 4 | 6 | 7 | 9)), self.kd, self.ks) {
             let most = (0..3).map(|i| kd[i].clamp(0.0, 1.0) + ks[i].clamp(0.0, 1.0)).fold(0.0, f32::max);
             // Tolerates values of two decimals whose sum is rounded up.

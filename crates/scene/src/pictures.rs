@@ -1,11 +1,16 @@
-//! Image decoding: PNG, JPEG and WebP into 8-bit RGBA, with limits against files that claim absurd sizes.
+//! Image decoding: PNG, JPEG, WebP and KTX2 with Basis Universal data into 8-bit RGBA, with limits against files that
+//! claim absurd sizes.
+//!
+//! Read KHR_texture_basisu and the KTX 2.0 specification.
 
 use std::io::Cursor;
 
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use basisu::{DecodeFlags, SourceFormat, TargetFormat, Transcoder};
 use image::{ImageFormat, ImageReader, Limits};
 
 use super::Image;
+use super::container::view_of;
 
 /// Largest width and height in texels, which every Vulkan 1.3 device of interest supports for a 2D image.
 const MAX_SIDE: u32 = 16_384;
@@ -16,7 +21,7 @@ fn reader(bytes: &[u8]) -> Result<ImageReader<Cursor<&[u8]>>> {
     // The magic bytes decide: files often have the wrong MIME type or extension.
     let format = image::guess_format(bytes).ok();
     let Some(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP)) = format else {
-        bail!("the data is not PNG, JPEG or WebP");
+        bail!("the data is not PNG, JPEG, WebP or KTX2");
     };
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = Limits::default();
@@ -32,8 +37,85 @@ fn refusal(what: &str, error: &image::ImageError) -> anyhow::Error {
     anyhow!("{what}: {}", error.to_string().split_whitespace().collect::<Vec<_>>().join(" "))
 }
 
+/// Place of offset and length of the key/value data in the header of a KTX2 file.
+const KEY_VALUE_WORDS: std::ops::Range<usize> = 56..64;
+/// Bytes of a UASTC block of 4 by 4 texels.
+const BLOCK_BYTES: u64 = 16;
+
+/// The first bytes of a KTX2 file.
+const KTX2_MAGIC: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n";
+
+/// Reads the header of a KTX2 file of the kind that KHR_texture_basisu allows: one two-dimensional picture. Returns its
+/// size.
+fn ktx2_size(bytes: &[u8]) -> Result<[u32; 2]> {
+    // The header alone: the crate's reader of data format descriptors adds sizes of hostile files without a check.
+    let header =
+        bytes.first_chunk::<{ ktx2::Header::LENGTH }>().ok_or_else(|| anyhow!("the KTX2 header ends early"))?;
+    let header =
+        ktx2::Header::from_bytes(header).map_err(|error| anyhow!("the KTX2 header cannot be read: {error}"))?;
+    let [width, height] = [header.pixel_width, header.pixel_height];
+    ensure!(
+        (1..=MAX_SIDE).contains(&width) && (1..=MAX_SIDE).contains(&height),
+        "the picture of {width}x{height} texels has no side of 1 to {MAX_SIDE}"
+    );
+    ensure!(
+        header.pixel_depth == 0 && header.layer_count <= 1 && header.face_count == 1,
+        "the KTX2 file is no single two-dimensional picture"
+    );
+    let scheme = header.supercompression_scheme.map_or(0, |scheme| scheme.value());
+    ensure!(header.format.is_none() && scheme <= 2, "the KTX2 file does not hold Basis Universal data");
+    let levels = header.level_count.max(1);
+    ensure!(levels <= 1 + width.max(height).ilog2(), "{levels} mip levels are too many");
+    // The transcoder adds and allocates by these words without a check.
+    let index = header.index;
+    let sections = [
+        (u64::from(index.dfd_byte_offset), u64::from(index.dfd_byte_length)),
+        (u64::from(index.kvd_byte_offset), u64::from(index.kvd_byte_length)),
+        (index.sgd_byte_offset, index.sgd_byte_length),
+    ];
+    for (offset, length) in sections {
+        view_of("a section that the KTX2 header names", "the file", bytes, offset, length)?;
+    }
+    let blocks = u64::from(width.div_ceil(4)) * u64::from(height.div_ceil(4));
+    for level in 0..levels as usize {
+        let at = ktx2::Header::LENGTH + level * ktx2::LevelIndex::LENGTH;
+        let words = bytes.get(at..).and_then(|rest| rest.first_chunk()).context("the KTX2 level index ends early")?;
+        let level = ktx2::LevelIndex::from_bytes(words);
+        view_of("a mip level", "the KTX2 file", bytes, level.byte_offset, level.byte_length)?;
+        ensure!(
+            level.uncompressed_byte_length <= blocks * BLOCK_BYTES,
+            "a level of the KTX2 file claims {} bytes for {blocks} blocks",
+            level.uncompressed_byte_length
+        );
+    }
+    Ok([width, height])
+}
+
+pub(crate) fn decode_ktx2(name: String, bytes: &[u8]) -> Result<Image> {
+    let [width, height] = ktx2_size(bytes)?;
+    let fault = |error: basisu::Error| anyhow!("the Basis Universal data cannot be decoded: {error:?}");
+    // The transcoder walks key/value data without checking its lengths, and a still picture needs none: the copy has
+    // none.
+    let mut file = bytes.to_vec();
+    file[KEY_VALUE_WORDS].fill(0);
+    let transcoder = Transcoder::new(&file).map_err(fault)?;
+    let source = transcoder.source_format();
+    ensure!(
+        matches!(source, SourceFormat::Etc1s | SourceFormat::UastcLdr),
+        "the KTX2 file holds {source:?}; KHR_texture_basisu has ETC1S and UASTC"
+    );
+    // Mip levels of the file are not read: its picture gets mip levels as all others do.
+    let rgba = transcoder.transcode(0, TargetFormat::Rgba32, DecodeFlags::NONE).map_err(fault)?;
+    let expected = 4 * width as usize * height as usize;
+    ensure!(rgba.len() == expected, "the Basis Universal data has {} bytes for {width}x{height} texels", rgba.len());
+    Ok(Image { name, width, height, rgba: rgba.into() })
+}
+
 /// Decodes an image.
 pub(crate) fn decode(name: String, bytes: &[u8]) -> Result<Image> {
+    if bytes.starts_with(KTX2_MAGIC) {
+        return decode_ktx2(name, bytes);
+    }
     let picture = reader(bytes)?.decode().map_err(|e| refusal("the picture cannot be decoded", &e))?.into_rgba8();
     let (width, height) = picture.dimensions();
     if width == 0 || height == 0 {
@@ -44,6 +126,9 @@ pub(crate) fn decode(name: String, bytes: &[u8]) -> Result<Image> {
 
 /// Reads the header only, enough to recognise a supported image.
 pub(crate) fn probe(bytes: &[u8]) -> Result<()> {
+    if bytes.starts_with(KTX2_MAGIC) {
+        return ktx2_size(bytes).map(drop);
+    }
     reader(bytes)?.into_dimensions().map_err(|e| refusal("the picture's header cannot be read", &e))?;
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! Pruning: textures and texture coordinates that cannot affect the picture are neither decoded nor uploaded.
 //!
-//! Read glTF 2.0 section 3.9 for the factors that decide it. Each pruned texture or attribute is reported with its reason.
+//! Read glTF 2.0 section 3.9 for the factors that decide it. Each pruned texture or attribute is reported with its
+//! reason.
 
 use super::lobe::LOBES;
 use super::material::TextureRef;
@@ -16,8 +17,8 @@ pub enum Prune {
     Unused(AmbientLight),
 }
 
-/// Whether the picture has ambient light, the only light that occlusion textures darken. Environment light and reflections
-/// in screen space count as ambient.
+/// Whether the picture has ambient light, the only light that occlusion textures darken. Environment light and
+/// reflections in screen space count as ambient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AmbientLight {
     /// No.
@@ -81,7 +82,8 @@ pub(crate) fn prune_textures(m: &mut Material, used: bool, ambient: bool) -> Vec
     unread
 }
 
-/// Texture-coordinate sets of a material: `sets` are read by its textures, `tangents` is the set of its normal textures.
+/// Texture-coordinate sets of a material: `sets` are read by its textures, `tangents` is the set of its normal
+/// textures.
 pub(crate) struct Coordinates {
     pub(crate) sets: [bool; 2],
     /// Sets that are kept. A textured material keeps set 0: ray tracing computes the texel density from it.

@@ -12,7 +12,8 @@ use super::{Mesh, Scene};
 /// Largest number of values in one grid, points times channels: 2^24.
 const MOST_VALUES: u64 = 1 << 24;
 
-/// σ at the points of a grid, trilinear between them; outside the grid's box the value at the nearest point of the box holds.
+/// σ at the points of a grid, trilinear between them; outside the grid's box the value at the nearest point of the box
+/// holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SigmaGrid {
     size: [usize; 3],
@@ -21,9 +22,10 @@ pub struct SigmaGrid {
 }
 
 impl SigmaGrid {
-    /// A grid of `size` points along x, y and z; the first and last points of an axis lie on opposite sides of the box. With one
-    /// point along an axis, σ is constant along it. `values` are in 1/m of world space (as attenuation distances are in metres of
-    /// world space): one per point, or red, green and blue; x varies fastest, then y. `bounds` is the box in object space;
+    /// A grid of `size` points along x, y and z; the first and last points of an axis lie on opposite sides of the box.
+    /// With one point along an axis, σ is constant along it. `values` are in 1/m of world space (as attenuation
+    /// distances are in metres of world space): one per point, or red, green and blue; x varies fastest, then y.
+    /// `bounds` is the box in object space;
     /// `None` is the bounding box of the mesh.
     ///
     /// # Errors
@@ -127,8 +129,8 @@ impl SigmaGrid {
     }
 }
 
-/// Gives each instance with a grid its own material and its own mesh that refers to it, because the grid has a different world
-/// transform in each. Does nothing when each instance has its own already.
+/// Gives each instance with a grid its own material and its own mesh that refers to it, because the grid has a
+/// different world transform in each. Does nothing when each instance has its own already.
 pub fn one_medium_each(scene: &mut Scene) {
     if scene.materials.iter().all(|m| m.sigma.is_none()) {
         return;

@@ -1,9 +1,9 @@
 //! Closed dielectric meshes (solids) and thin-walled surfaces, and the solids that contain a point.
 //!
-//! Refraction needs the side of the surface on which a ray is, and only a watertight mesh separates an inside from an outside. A
-//! transmissive mesh is therefore a solid if it is closed, and a thin-walled surface otherwise.
-//! Read Schmidt and Budge, "Simple Nested Dielectrics in Ray Traced Images", journal of graphics tools, 2002;
-//! KHR_materials_volume. Assumes triangles counter-clockwise from the front.
+//! Refraction needs the side of the surface on which a ray is, and only a watertight mesh separates an inside from an
+//! outside. A transmissive mesh is therefore a solid if it is closed, and a thin-walled surface otherwise. Read Schmidt
+//! and Budge, "Simple Nested Dielectrics in Ray Traced Images", journal of graphics tools, 2002; KHR_materials_volume.
+//! Assumes triangles counter-clockwise from the front.
 
 use std::collections::HashMap;
 
@@ -11,8 +11,8 @@ use glam::{DVec3, Vec3};
 
 use super::{AlphaMode, Bounds, Instance, Mesh, Scene};
 
-/// A volume below this fraction of the sum of its terms' magnitudes is rounding error: the sum over a mesh of a million triangles
-/// has errors of 1e-16 each.
+/// A volume below this fraction of the sum of its terms' magnitudes is rounding error: the sum over a mesh of a million
+/// triangles has errors of 1e-16 each.
 const NO_VOLUME: f64 = 1e-12;
 
 /// Solids and thin-walled surfaces among the instances of a scene; each list has one entry per instance.
@@ -20,8 +20,8 @@ const NO_VOLUME: f64 = 1e-12;
 pub struct Solids {
     /// Closed transmissive meshes.
     pub solid: Vec<bool>,
-    /// Transmissive thin-walled surfaces, of their nominal thickness: blended, thickness 0, or a mesh that bounds no volume. False
-    /// for surfaces that do not transmit.
+    /// Transmissive thin-walled surfaces, of their nominal thickness: blended, thickness 0, or a mesh that bounds no
+    /// volume. False for surfaces that do not transmit.
     pub sheet: Vec<bool>,
     /// Solids with reversed winding in object space: the front faces look inwards. A mirrored placement does not count.
     pub flipped: Vec<bool>,
@@ -33,9 +33,10 @@ pub struct Solids {
 
 /// Whether a mesh is closed (watertight): every directed edge occurs as often as the opposite one.
 ///
-/// Vertices are welded by position, to the last bit (−0 equals 0), because seams of normals and texture coordinates duplicate
-/// vertices without a gap. Triangles with two corners in one place are ignored. The mesh need not be manifold: surfaces may
-/// touch or cross themselves, and several may form one mesh. A mesh without triangles is not closed.
+/// Vertices are welded by position, to the last bit (−0 equals 0), because seams of normals and texture coordinates
+/// duplicate vertices without a gap. Triangles with two corners in one place are ignored. The mesh need not be
+/// manifold: surfaces may touch or cross themselves, and several may form one mesh. A mesh without triangles is not
+/// closed.
 #[must_use]
 pub fn is_closed(mesh: &Mesh) -> bool {
     let mut names = HashMap::with_capacity(mesh.positions.len());
@@ -88,7 +89,8 @@ fn normals_follow_faces(mesh: &Mesh) -> bool {
     agreement.filter(|x| x.is_finite()).sum::<f64>() >= 0.0
 }
 
-/// Class of a transmissive mesh with a thickness: closed, closed with reversed winding, not closed, or closed without volume.
+/// Class of a transmissive mesh with a thickness: closed, closed with reversed winding, not closed, or closed without
+/// volume.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Body {
     Solid,
@@ -150,11 +152,11 @@ pub fn solids(scene: &Scene) -> Solids {
     Solids { solid, sheet, flipped, normals_flipped, warnings }
 }
 
-/// Transmissive solids that contain a point, as indices of instances, the one with the largest box first: nested solids come
-/// from the outside in.
+/// Transmissive solids that contain a point, as indices of instances, the one with the largest box first: nested solids
+/// come from the outside in.
 ///
-/// The test is the winding number: the signed solid angles of the triangles, seen from the point, sum to ±4π inside and to 0
-/// outside, for any winding and mirroring. On the surface itself the result is either.
+/// The test is the winding number: the signed solid angles of the triangles, seen from the point, sum to ±4π inside and
+/// to 0 outside, for any winding and mirroring. On the surface itself the result is either.
 #[must_use]
 pub fn media_at(scene: &Scene, solids: &Solids, p_world: DVec3) -> Vec<usize> {
     let mut media = Vec::new();

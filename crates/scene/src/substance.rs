@@ -1,4 +1,5 @@
-//! Optical constants: refractive indices of named substances (lecture F1), metals as n and κ, dielectrics by Sellmeier formulas.
+//! Optical constants: refractive indices of named substances (lecture F1), metals as n and κ, dielectrics by Sellmeier
+//! formulas.
 //!
 //! Read pbrt 9.3 and 9.4. The source of each constant is beside it.
 
@@ -19,8 +20,8 @@ pub(crate) struct Metal {
     lamps: ComplexIndex,
 }
 
-/// Gold, silver and copper: Johnson & Christy, "Optical constants of the noble metals", Phys. Rev. B 6, 4370 (1972), as tabulated
-/// by refractiveindex.info (CC0 1.0), interpolated linearly between its wavelengths.
+/// Gold, silver and copper: Johnson & Christy, "Optical constants of the noble metals", Phys. Rev. B 6, 4370 (1972), as
+/// tabulated by refractiveindex.info (CC0 1.0), interpolated linearly between its wavelengths.
 pub(crate) const GOLD: Metal = Metal { name: "gold", lamps: [(0.1635, 3.5543), (0.5828, 2.1542), (1.4022, 1.9248)] };
 pub(crate) const SILVER: Metal =
     Metal { name: "silver", lamps: [(0.0534, 4.3718), (0.0520, 3.3753), (0.0400, 2.5953)] };
@@ -44,8 +45,8 @@ const fn sellmeier(n: f64, b: [f64; 4], c: [f64; 4]) -> Medium {
     Medium { n, dispersion: Dispersion::Sellmeier { b, c } }
 }
 
-/// Water relative to air at 20 °C; IAPWS R9-97 gives 1.3330, the index of lecture F7. Dispersion: Daimon & Masumura, Appl. Opt.
-/// 46, 3811 (2007), whose Sellmeier formula gives 1.3334.
+/// Water relative to air at 20 °C; IAPWS R9-97 gives 1.3330, the index of lecture F7. Dispersion: Daimon & Masumura,
+/// Appl. Opt. 46, 3811 (2007), whose Sellmeier formula gives 1.3334.
 const WATER: Medium = sellmeier(
     1.333,
     [0.568_402_756_5, 0.172_617_739_1, 0.020_861_895_78, 0.113_074_868_8],
@@ -125,7 +126,8 @@ mod tests {
         for (name, substance) in SUBSTANCES {
             let Substance::Dielectric(Medium { n, dispersion }) = substance else { continue };
             let by_formula = dispersion.index(*n, FRAUNHOFER_D);
-            // Half a unit in the last digit of the constants, and the rounding of the catalogues; water is rounded more.
+            // Half a unit in the last digit of the constants, and the rounding of the catalogues; water is rounded
+            // more.
             let rounded = if *name == "water" { 5e-4 } else { 6e-6 };
             assert!(
                 (by_formula - n).abs() < rounded || *name == "diamond" && (by_formula - n).abs() < 5e-5,

@@ -1,5 +1,5 @@
-//! A scene in one band of wavelengths, for spectral rendering: colours of materials become one number, and light becomes
-//! X, Y, Z (lecture C3; docs/decisions/spectra.md).
+//! A scene in one band of wavelengths, for spectral rendering: colours of materials become one number, and light
+//! becomes X, Y, Z (lecture C3; docs/decisions/spectra.md).
 //!
 //! Read pbrt 4.5 and 4.6. Colours without a spectrum are upsampled (`etalon_optics::spectra::Upsampling`).
 

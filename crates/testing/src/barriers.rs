@@ -1,4 +1,5 @@
-//! Test that pipeline barriers are necessary: validation must report a hazard without them, or a clean report proves nothing.
+//! Test that pipeline barriers are necessary: validation must report a hazard without them, or a clean report proves
+//! nothing.
 //!
 //! Read the Vulkan specification, chapter "Synchronization and Cache Control".
 
@@ -23,8 +24,8 @@ fn errors_of<T>(
     gpu.errors()
 }
 
-/// Asserts that synchronization validation reports no hazard in a frame with its derived barriers, and reports one in the same
-/// frame without them. `make` creates the resources, and `describe` the frame.
+/// Asserts that synchronization validation reports no hazard in a frame with its derived barriers, and reports one in
+/// the same frame without them. `make` creates the resources, and `describe` the frame.
 ///
 /// # Panics
 /// Validation reports otherwise.

@@ -1,6 +1,8 @@
-//! The furnace test: in a white environment of radiance 1, a body that absorbs nothing has radiance 1 everywhere, so it is invisible.
+//! The furnace test: in a white environment of radiance 1, a body that absorbs nothing has radiance 1 everywhere, so it
+//! is invisible.
 //!
-//! Read: Heitz, "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", 2014, section 5 (white furnace).
+//! Read: Heitz, "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", 2014, section 5 (white
+//! furnace).
 
 use etalon::frame::Settings;
 use etalon::plan::{Knobs, Model};

@@ -44,9 +44,9 @@ impl Gpu {
     }
 
     /// [`Gpu::open`] for programs with hundreds of pipelines for a few pixels each. lavapipe compiles without LLVM's
-    /// optimisations, in 0.6 of the time and to the same bits (compared for `study:etalon` and `study:cornell` with path
-    /// tracing). It renders on the thread of its queue, because waking other threads takes longer than rendering so few pixels
-    /// (tests/furnace.rs: 43 s instead of 65 s on two cores, where waking took 15 s).
+    /// optimisations, in 0.6 of the time and to the same bits (compared for `study:etalon` and `study:cornell` with
+    /// path tracing). It renders on the thread of its queue, because waking other threads takes longer than rendering
+    /// so few pixels (tests/furnace.rs: 43 s instead of 65 s on two cores, where waking took 15 s).
     pub fn hasty() -> Self {
         in_haste();
         Self::open()
@@ -114,7 +114,8 @@ impl Drop for Gpu {
 fn in_haste() {
     static SET: Once = Once::new();
     SET.call_once(|| {
-        // SAFETY: every test of such a program begins here, and only Rust's start-up code has read the environment before.
+        // SAFETY: every test of such a program begins here, and only Rust's start-up code has read the environment
+        // before.
         unsafe {
             std::env::set_var("GALLIVM_PERF", "nopt");
             std::env::set_var("LP_NUM_THREADS", "0");

@@ -1,5 +1,6 @@
-//! Reference BRDF of a surface in f64, from the formulas: GGX, the Blinn-Phong lobes of the lecture (B5, B6), clear coat, Fresnel
-//! equations with complex numbers. A convex dome of flat facets displays it; the facets neither shadow nor light each other.
+//! Reference BRDF of a surface in f64, from the formulas: GGX, the Blinn-Phong lobes of the lecture (B5, B6), clear
+//! coat, Fresnel equations with complex numbers. A convex dome of flat facets displays it; the facets neither shadow
+//! nor light each other.
 //!
 //! Read glTF 2.0 appendix B; Walter et al. 2007 and Heitz 2014 (GGX); KHR_materials_clearcoat.
 
@@ -270,8 +271,8 @@ pub fn dome(materials: &[Material]) -> (Scene, Vec<Facet>) {
     (scene, facets)
 }
 
-/// Largest error of a picture of the dome, relative to the expected value of each channel, or to `floor` times the brightest
-/// value of the material if that is larger.
+/// Largest error of a picture of the dome, relative to the expected value of each channel, or to `floor` times the
+/// brightest value of the material if that is larger.
 pub fn worst(film: &Picture, facets: &[Facet], floor: f64, expected: impl Fn(&Facet) -> DVec3) -> f64 {
     let wants: Vec<DVec3> = facets.iter().map(&expected).collect();
     let mut most = (0.0, String::new());

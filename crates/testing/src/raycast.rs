@@ -1,8 +1,8 @@
 //! Reference ray caster: the first hit of each pixel, in f64 on the CPU, with a watertight ray/triangle test.
 //!
-//! Read Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1) 2013. Only the scene types are shared with the
-//! renderer; matrices, BVH and triangle test are separate. Edge functions of neighbouring triangles agree on their common edge,
-//! so no ray passes through a closed mesh.
+//! Read Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1) 2013. Only the scene types are shared
+//! with the renderer; matrices, BVH and triangle test are separate. Edge functions of neighbouring triangles agree on
+//! their common edge, so no ray passes through a closed mesh.
 
 use etalon::scene::{AlphaMode, Camera, Projection, Scene, TextureRef, Wrap};
 use glam::{DMat3, DVec2, DVec3};
@@ -57,8 +57,8 @@ pub struct Hit {
 pub struct Pixel {
     /// The first hit.
     pub hit: Option<Hit>,
-    /// Silhouette or crease: one of the eight neighbours sees another object, another normal, another depth, or nothing where
-    /// this pixel has a hit. Comparisons skip such pixels.
+    /// Silhouette or crease: one of the eight neighbours sees another object, another normal, another depth, or nothing
+    /// where this pixel has a hit. Comparisons skip such pixels.
     pub edge: bool,
 }
 
@@ -136,7 +136,8 @@ fn differ(a: &Option<Hit>, b: &Option<Hit>) -> bool {
             a.instance != b.instance
                 || a.front != b.front
                 || a.geometric_normal.dot(b.geometric_normal) < 0.9
-                // Distance from the plane of the face: detects jumps in depth, and tolerates steep depth at grazing angles.
+                // Distance from the plane of the face: detects jumps in depth, and tolerates steep depth at grazing
+                // angles.
                 || a.geometric_normal.dot(b.position - a.position).abs() > 0.01 * a.distance
         }
         _ => true,
@@ -153,7 +154,8 @@ struct WorldTriangle {
 struct RaycastNode {
     min: DVec3,
     max: DVec3,
-    /// Leaf: first triangle and count. Inner node: index of the second child and zero (the first child follows its parent).
+    /// Leaf: first triangle and count. Inner node: index of the second child and zero (the first child follows its
+    /// parent).
     first: u32,
     count: u32,
 }
@@ -191,7 +193,8 @@ impl<'a> World<'a> {
             let mesh = &scene.meshes[instance.mesh];
             let linear = instance.world_from_object.matrix3;
             let mirrored = linear.determinant() < 0.0;
-            // The cofactor matrix is the inverse transpose times the determinant, and exists for singular transforms, too.
+            // The cofactor matrix is the inverse transpose times the determinant, and exists for singular transforms,
+            // too.
             let normal = DMat3::from_cols(
                 linear.y_axis.cross(linear.z_axis),
                 linear.z_axis.cross(linear.x_axis),

@@ -1,7 +1,7 @@
 //! Reference direct lighting in f64, in textbook form, for comparison with the lighting passes.
 //!
-//! Read glTF 2.0 appendix B; Walter et al. 2007; Heitz 2014; KHR_lights_punctual. It is written from these formulas and not from
-//! the shaders: D, the masking-shadowing term and the spot's falloff have another form.
+//! Read glTF 2.0 appendix B; Walter et al. 2007; Heitz 2014; KHR_lights_punctual. It is written from these formulas and
+//! not from the shaders: D, the masking-shadowing term and the spot's falloff have another form.
 
 use std::f64::consts::PI;
 

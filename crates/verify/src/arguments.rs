@@ -1,7 +1,7 @@
 //! Inputs of an equation as a person types them: `name=value`, and vectors by an angle in the plane of incidence.
 //!
-//! A vector `L` of the columns `Lx Ly Lz` is given as `L=30` (degrees from +Z, towards +X), as `L=0,3,4`, or column by column.
-//! Values are rounded to f32, which is what the shader gets.
+//! A vector `L` of the columns `Lx Ly Lz` is given as `L=30` (degrees from +Z, towards +X), as `L=0,3,4`, or column by
+//! column. Values are rounded to f32, which is what the shader gets.
 
 use std::collections::BTreeMap;
 

@@ -1,5 +1,5 @@
-//! Curves of equations over one input, as SVG: the functions of the shaders as a device evaluates them, and below them the
-//! difference to another function (the error of a model, not of its arithmetic; [`plot`](super::plot) draws that).
+//! Curves of equations over one input, as SVG: the functions of the shaders as a device evaluates them, and below them
+//! the difference to another function (the error of a model, not of its arithmetic; [`plot`](super::plot) draws that).
 
 use std::sync::Arc;
 

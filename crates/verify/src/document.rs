@@ -63,8 +63,8 @@ fn reached(probe: &Probe) -> String {
     }
 }
 
-/// The page `docs/verified.md`: for every statement of the lecture and every hard case its functions, how they reach pictures, the study
-/// scene that shows it, the test that checks it, and the page that explains it.
+/// The page `docs/verified.md`: for every statement of the lecture and every hard case its functions, how they reach
+/// pictures, the study scene that shows it, the test that checks it, and the page that explains it.
 #[must_use]
 pub fn verified() -> String {
     let mut page = String::from(
@@ -73,7 +73,8 @@ pub fn verified() -> String {
          of [lecture.md](lecture.md); N and a number is a row of [numerics.md](numerics.md). A function is called by passes of\n\
          `shaders/pass/`, or computed by host code of the renderer, or it is a laboratory form: pictures do not call it, and a test\n\
          compares it with the function that they use. The build fails if neither a pass nor an equation uses a function of\n\
-         `shaders/lib/`.\n\n",
+         `shaders/lib/`. Names are those of `etalon eval`. In GLSL `reflect` and `refract` are called `reflect_ray` and `refract_ray`,\n\
+         because GLSL has built-ins of these names. Rows F2 to F5 of lecture.md name the functions that call theirs.\n\n",
     );
     let count = |way: fn(&Probe) -> bool| PROBES.iter().filter(|probe| way(probe)).count();
     let _ = write!(

@@ -1,9 +1,9 @@
-//! Verification of the shipped shader functions against their f64 twins on a device (`etalon verify`). docs/equations.md lists functions
-//! and bounds.
+//! Verification of the shipped shader functions against their f64 twins on a device (`etalon verify`).
+//! docs/equations.md lists functions and bounds.
 //!
-//! [`catalogue`] joins the functions that build.rs found in `shaders/lib/` with the twins and bounds of the crate `optics`. [`Cases`] draws
-//! random inputs and evaluates the twin, or takes both from a vector file ([`vectors`]). [`evaluate`] runs a function on the device by its
-//! probe (a generated compute program), and [`judge`] compares.
+//! [`catalogue`] joins the functions that build.rs found in `shaders/lib/` with the twins and bounds of the crate
+//! `optics`. [`Cases`] draws random inputs and evaluates the twin, or takes both from a vector file ([`vectors`]).
+//! [`evaluate`] runs a function on the device by its probe (a generated compute program), and [`judge`] compares.
 
 pub mod arguments;
 pub mod curve;
@@ -70,7 +70,8 @@ pub struct Cases {
 }
 
 impl Cases {
-    /// Draws `count` random cases from the input regions of the equation, in proportion to their shares; the twin gives the outputs.
+    /// Draws `count` random cases from the input regions of the equation, in proportion to their shares; the twin gives
+    /// the outputs.
     #[must_use]
     pub fn draw(entry: &Entry, count: usize, seed: u64) -> Self {
         let equation = entry.equation;
@@ -219,8 +220,8 @@ pub struct Worst {
     pub excess: f64,
 }
 
-/// Absolute error of `got`. It is 0 where the exact value underflows the normal numbers of f32 and `got` is zero or denormal, which Vulkan
-/// allows, and where the exact value overflows and `got` is infinite or the largest number.
+/// Absolute error of `got`. It is 0 where the exact value underflows the normal numbers of f32 and `got` is zero or
+/// denormal, which Vulkan allows, and where the exact value overflows and `got` is infinite or the largest number.
 fn absolute_error(got: f32, exact: f64) -> f64 {
     let value = f64::from(got);
     if exact.abs() >= f64::from(f32::MAX) && value.abs() >= f64::from(f32::MAX) && value.signum() == exact.signum() {
@@ -249,8 +250,8 @@ pub fn judge(entry: &Entry, tier: Tier, cases: &Cases, outputs: &[f32]) -> Vec<F
             // The tier fast has no bounds; its worst case is measured by the bound of the tier stable.
             let judged = if tier == Tier::Fast { Tier::Stable } else { tier };
             let allowed = (output.allowed)(&Case { tier: judged, inputs: &inputs, exact, column });
-            // Outside the domain of an equation the bound may be NaN although a file expects the documented value; the result must then be
-            // exact.
+            // Outside the domain of an equation the bound may be NaN although a file expects the documented value; the
+            // result must then be exact.
             let allowed = if allowed.is_nan() { 0.0 } else { allowed };
             let excess = match (error.is_nan(), error <= allowed) {
                 (true, _) => f64::INFINITY,
@@ -306,7 +307,8 @@ fn merge(a: Figures, b: Figures) -> Figures {
     }
 }
 
-/// Hostile inputs, mostly outside the domain: zeros, ones, denormals and huge numbers of either sign, in random combinations.
+/// Hostile inputs, mostly outside the domain: zeros, ones, denormals and huge numbers of either sign, in random
+/// combinations.
 fn hostile(entry: &Entry, count: usize, seed: u64) -> Vec<f64> {
     let huge = entry.equation.extreme;
     let values =

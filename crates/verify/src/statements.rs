@@ -1,6 +1,7 @@
-//! Table of the lecture's statements and the hard cases of docs/numerics.md: for each the study scene that shows it, the test that checks
-//! it, the page that explains it, and why some have no function. [`document::verified`](super::document::verified) generates
-//! docs/verified.md from the table, and crates/verify/tests/catalogue.rs checks it.
+//! Table of the lecture's statements and the hard cases of docs/numerics.md: for each the study scene that shows it,
+//! the test that checks it, the page that explains it, and why some have no function.
+//! [`document::verified`](super::document::verified) generates docs/verified.md from the table, and
+//! crates/verify/tests/catalogue.rs checks it.
 
 /// A statement of the lecture or a hard case.
 #[derive(Debug, Clone, Copy)]
@@ -56,7 +57,7 @@ pub const STATEMENTS: &[Statement] = &[
     of("R3", "lamps", "a_directional_light_gives_irradiance_times_albedo_over_pi_times_cosine", LECTURE),
     of("R4", "lamps", "a_point_light_falls_with_the_square_of_the_distance_and_ends_at_its_range", LECTURE),
     by(
-        of("R5", "lamps", "an_opaque_body_casts_its_shadow_where_f64_has_it", "decisions/rays.md"),
+        of("R5", "lamps", "an_opaque_object_casts_its_shadow_where_f64_has_it", "decisions/rays.md"),
         By::Nothing("visibility is an algorithm: the knob `shadows`"),
     ),
     by(
@@ -83,9 +84,9 @@ pub const STATEMENTS: &[Statement] = &[
     of("B3", "materials", "light_and_camera_may_be_exchanged", NUMERICS),
     of("B4", "lamps", "a_directional_light_gives_irradiance_times_albedo_over_pi_times_cosine", LECTURE),
     of("B5", "golden-bridge", "blinn_phong_is_off_by_the_ratio_of_the_cosines_when_they_are", NUMERICS),
-    of("B6", "golden-bridge", "told_numbers_of_phong_are_drawn_as_b5_and_b6_are_written", NUMERICS),
+    of("B6", "golden-bridge", "phong_coefficients_of_a_scene_give_b5_and_b6", NUMERICS),
     by(
-        of("B7", "golden-bridge", "laboratory_forms_are_made_of_what_draws", LECTURE),
+        of("B7", "golden-bridge", "laboratory_forms_agree_with_the_functions_of_pictures", LECTURE),
         By::Equations(&["phong_lobe", "reciprocal_lobe", "ggx_distribution"]),
     ),
     by(
@@ -112,40 +113,40 @@ pub const STATEMENTS: &[Statement] = &[
     of("N6", "metals", "the_textbook_form_is_worse_where_numerics_says_so", NUMERICS),
     of("N7", "metals", "reflected_and_transmitted_power_are_one", NUMERICS),
     of("N8", "metals", BOUNDS, NUMERICS),
-    of("N9", "materials", "laboratory_forms_are_made_of_what_draws", NUMERICS),
+    of("N9", "materials", "laboratory_forms_agree_with_the_functions_of_pictures", NUMERICS),
     of("N10", "etalon", "lookup_follows_the_convention", NUMERICS),
     of("N11", "pool", "refraction_obeys_snell_and_can_be_undone", NUMERICS),
     of("N12", "nested", "a_chain_of_reflections_keeps_its_length", NUMERICS),
     of("N13", "nested", "refraction_obeys_snell_and_can_be_undone", NUMERICS),
     of("N14", "torture", "powers_of_two_are_only_units", NUMERICS),
-    of("N15", "materials", "laboratory_forms_are_made_of_what_draws", NUMERICS),
-    of("N16", "materials", "what_is_stored_in_fewer_bits_is_off_by_as_much", "decisions/gbuffer.md"),
-    of("N17", "golden-bridge", "laboratory_forms_are_made_of_what_draws", NUMERICS),
-    of("N18", "golden-bridge", "laboratory_forms_are_made_of_what_draws", NUMERICS),
+    of("N15", "materials", "laboratory_forms_agree_with_the_functions_of_pictures", NUMERICS),
+    of("N16", "materials", "quantised_values_are_off_by_their_quantisation_error", "decisions/gbuffer.md"),
+    of("N17", "golden-bridge", "laboratory_forms_agree_with_the_functions_of_pictures", NUMERICS),
+    of("N18", "golden-bridge", "laboratory_forms_agree_with_the_functions_of_pictures", NUMERICS),
     of("N19", "golden-bridge", "no_tier_of_arithmetic_makes_nan_of_a_scene", NUMERICS),
-    of("N20", "materials", "laboratory_forms_are_made_of_what_draws", NUMERICS),
+    of("N20", "materials", "laboratory_forms_agree_with_the_functions_of_pictures", NUMERICS),
     of("N21", "materials", "a_rough_metal_mirrors_the_lobe_of_what_is_around", NUMERICS),
     of("N22", "materials", "the_roughest_metal_loses_in_a_furnace_what_the_integral_says", NUMERICS),
-    of("N23", "materials", "laboratory_forms_are_made_of_what_draws", NUMERICS),
-    of("N24", "cornell", "squares_light_each_other_by_their_form_factor", "decisions/paths.md"),
-    of("N25", "lamps", "laboratory_forms_are_made_of_what_draws", NUMERICS),
+    of("N23", "materials", "laboratory_forms_agree_with_the_functions_of_pictures", NUMERICS),
+    of("N24", "cornell", "squares_exchange_light_by_their_form_factor", "decisions/paths.md"),
+    of("N25", "lamps", "laboratory_forms_agree_with_the_functions_of_pictures", NUMERICS),
     of("N26", "lamps", "lights_with_a_shape_light_as_their_form_factors_say", "decisions/paths.md"),
     of("N27", "absorber", "the_textbook_form_is_worse_where_numerics_says_so", NUMERICS),
     of("N28", "absorber", "a_wedge_absorbs_by_the_length_of_each_path", NUMERICS),
     of("N29", "absorber", "out_of_domain_values_are_the_documented_ones", NUMERICS),
     of("N30", "haze", "whole_numbers_keep_all_their_digits", NUMERICS),
     of("N31", "haze", "errors_fall_by_the_order_of_the_rule", "decisions/absorption.md"),
-    of("N32", "lamps", "lights_of_the_lecture_are_those_that_light_pictures", NUMERICS),
+    of("N32", "lamps", "lights_of_the_lecture_agree_with_those_of_pictures", NUMERICS),
     of("N33", "etalon", "ten_kilometres_away_it_looks_the_same", NUMERICS),
-    of("N34", "cornell", "lights_of_the_lecture_are_those_that_light_pictures", NUMERICS),
-    of("N35", "cornell", "lights_of_the_lecture_are_those_that_light_pictures", NUMERICS),
-    of("N36", "torture", "every_way_finds_what_brute_force_finds", "decisions/rays.md"),
+    of("N34", "cornell", "lights_of_the_lecture_agree_with_those_of_pictures", NUMERICS),
+    of("N35", "cornell", "lights_of_the_lecture_agree_with_those_of_pictures", NUMERICS),
+    of("N36", "torture", "every_traversal_finds_what_brute_force_finds", "decisions/rays.md"),
     of("N37", "torture", "no_ray_passes_between_two_triangles_with_a_common_edge", "decisions/rays.md"),
-    of("N38", "torture", "rays_neither_meet_what_they_leave_nor_slip_out", "decisions/rays.md"),
+    of("N38", "torture", "rays_neither_hit_their_own_surface_nor_leak", "decisions/rays.md"),
     of("N39", "torture", "a_ray_starts_on_the_right_side_of_its_surface", NUMERICS),
     of("N40", "torture", "a_sliver_of_large_coordinates_has_the_normal_of_exact_arithmetic", NUMERICS),
     of("N41", "etalon", "mirrored_and_stretched_placements_stay_outside_out", NUMERICS),
-    of("N42", "etalon", "study_scenes_are_where_the_rays_find_them", NUMERICS),
+    of("N42", "etalon", "the_gbuffer_of_study_scenes_agrees_with_ray_casts", NUMERICS),
     by(
         of("N43", "blend", "any_opacity_is_good_to_a_half_float", "decisions/gbuffer.md"),
         By::Nothing("half floats store only texels and opacities of at most 1: no value is clamped"),
@@ -153,7 +154,7 @@ pub const STATEMENTS: &[Statement] = &[
     of("N44", "etalon", "a_whole_render_shows_the_twin_s_bytes_over_its_background", NUMERICS),
     of("N45", "materials", "eight_bit_colours_survive_decoding_and_encoding", NUMERICS),
     of("N46", "prism", "a_prism_bends_each_wavelength_as_sellmeier_and_snell_say", NUMERICS),
-    of("N47", "nested", "bodies_of_one_index_are_one_body", NUMERICS),
+    of("N47", "nested", "closed_meshes_of_equal_index_act_as_one", NUMERICS),
     of("N48", "metamers", "illuminants_have_their_chromaticities", COLOUR),
     of("N49", "cornell", "a_room_is_as_bright_as_its_walls_emit_and_keep", "decisions/paths.md"),
     of("N50", "prism", "white_is_white_in_every_model_and_number_of_bands", COLOUR),

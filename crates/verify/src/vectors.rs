@@ -7,12 +7,13 @@ use anyhow::{Context as _, Result, ensure};
 
 use super::{Cases, Entry, find};
 
-/// Reads a vector file for `function`, by default the stem of the file name. Empty cells and `nan` in expected outputs expect nothing.
-/// Inputs are rounded to f32; whole-number inputs (a count, a seed) written without a fraction keep all 32 bits.
+/// Reads a vector file for `function`, by default the stem of the file name. Empty cells and `nan` in expected outputs
+/// expect nothing. Inputs are rounded to f32; whole-number inputs (a count, a seed) written without a fraction keep all
+/// 32 bits.
 ///
 /// # Errors
-/// One sentence with the file and the line: the file is unreadable, the function is unknown, a column is unknown, missing, duplicate or of
-/// uneven length, a cell is not a number, or an input is not a finite f32.
+/// One sentence with the file and the line: the file is unreadable, the function is unknown, a column is unknown,
+/// missing, duplicate or of uneven length, a cell is not a number, or an input is not a finite f32.
 pub fn load(path: &Path, function: Option<&str>) -> Result<(Entry, Cases)> {
     let text = std::fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();

@@ -241,7 +241,7 @@ fn alike(what: &str, tier: Tier, form: &[f64], draws: &[f64], rel: f64, abs: f64
 
 /// The forms of the lecture and of docs/functions.md that no pass calls, against the functions that draw.
 #[test]
-fn laboratory_forms_are_made_of_what_draws() {
+fn laboratory_forms_agree_with_the_functions_of_pictures() {
     const ROWS: usize = 20_000;
     let gpu = Gpu::open();
     for tier in PROMISING {
@@ -339,7 +339,7 @@ fn laboratory_forms_are_made_of_what_draws() {
 
 /// Lights as the lecture has them, at a surface, against the light that passes ask the table for.
 #[test]
-fn lights_of_the_lecture_are_those_that_light_pictures() {
+fn lights_of_the_lecture_agree_with_those_of_pictures() {
     const ROWS: usize = 20_000;
     let gpu = Gpu::open();
     let mut draw = SplitMix64::new(23);

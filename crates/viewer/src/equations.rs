@@ -1,5 +1,5 @@
-//! Finds the equations of `shaders/lib/` that contribute to a pixel, from the events along its ray and the knobs of the picture.
-//! docs/equations.md lists all equations.
+//! Finds the equations of `shaders/lib/` that contribute to a pixel, from the events along its ray and the knobs of the
+//! picture. docs/equations.md lists all equations.
 
 use etalon::plan::Knobs;
 use etalon::plan::rungs::{Absorption, Brdf, Fresnel, Lights};

@@ -1,5 +1,5 @@
-//! False-colour views of the surfaces at the pixel centres (albedo, normals, distance, …), which the window can show in place of the
-//! picture.
+//! False-colour views of the surfaces at the pixel centres (albedo, normals, distance, …), which the window can show in
+//! place of the picture.
 
 use glam::Vec3;
 

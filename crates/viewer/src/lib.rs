@@ -1,7 +1,7 @@
 //! The desktop viewer: a winit window, egui panels, and a render thread. See docs/view.md.
 //!
-//! The render thread ([`worker`]) loads the scene and draws samples progressively; before each sample it reads the current request. The
-//! window shows the latest picture. It redraws only after an event, at most once in 16 ms.
+//! The render thread ([`worker`]) loads the scene and draws samples progressively; before each sample it reads the
+//! current request. The window shows the latest picture. It redraws only after an event, at most once in 16 ms.
 
 pub mod clock;
 pub mod equations;

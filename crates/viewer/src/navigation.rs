@@ -1,5 +1,5 @@
-//! Camera navigation: orbit, pan, zoom (dolly), look around and fly, with the conventions of desktop viewers. Independent of the
-//! window, so that tests can drive it.
+//! Camera navigation: orbit, pan, zoom (dolly), look around and fly, with the conventions of desktop viewers.
+//! Independent of the window, so that tests can drive it.
 
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 
@@ -56,15 +56,15 @@ impl Navigation {
         new
     }
 
-    /// The current camera. A moved camera is rebuilt from the rounded options of [`Navigation::words`], so that the copied command draws
-    /// the same picture.
+    /// The current camera. A moved camera is rebuilt from the rounded options of [`Navigation::words`], so that the
+    /// copied command draws the same picture.
     #[must_use]
     pub fn camera(&self) -> Camera {
         self.words().map_or_else(|| self.view.clone(), |(camera, _)| camera)
     }
 
-    /// The current camera as `--eye`, `--target` and `--fov`, with the camera that these options give. `None` where the camera was not
-    /// moved, is orthographic, or looks straight up or down.
+    /// The current camera as `--eye`, `--target` and `--fov`, with the camera that these options give. `None` where the
+    /// camera was not moved, is orthographic, or looks straight up or down.
     #[must_use]
     pub fn words(&self) -> Option<(Camera, String)> {
         let Projection::Perspective { fov_y, .. } = self.view.projection else { return None };

@@ -1,5 +1,5 @@
-//! Shader hot reload (feature `reload`): recompiles shaders when their files change, the same way as build.rs. A shader that does not
-//! compile, or whose interface differs from the built one, changes nothing and is reported.
+//! Shader hot reload (feature `reload`): recompiles shaders when their files change, the same way as build.rs. A shader
+//! that does not compile, or whose interface differs from the built one, changes nothing and is reported.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -18,8 +18,8 @@ const SETTLED: Duration = Duration::from_millis(200);
 /// Result of compiling: all stages that replace built ones, or the compiler's message.
 pub type Compiled = Result<Arc<Vec<Replacement>>, String>;
 
-/// Watches the shader folder `root`, recompiles programs whose files change, and calls `told` with each result, until the returned
-/// watcher is dropped.
+/// Watches the shader folder `root`, recompiles programs whose files change, and calls `told` with each result, until
+/// the returned watcher is dropped.
 ///
 /// # Errors
 /// When there is no such folder.
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn changes_are_compiled_and_mistakes_are_told() {
+    fn changes_are_compiled_and_mistakes_are_reported() {
         let folder = tempfile::tempdir().expect("a folder");
         let root = folder.path().join("shaders");
         copied(Path::new(etalon::shader::SOURCES), &root);

@@ -1,5 +1,5 @@
-//! State shared by the window and the render thread: the window's request ([`RenderRequest`]) and the render thread's results
-//! ([`RenderState`]).
+//! State shared by the window and the render thread: the window's request ([`RenderRequest`]) and the render thread's
+//! results ([`RenderState`]).
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};

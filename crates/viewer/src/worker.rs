@@ -1,5 +1,5 @@
-//! The render thread: loads scenes and draws progressively. Before each sample it reads the request of the window; after some samples it
-//! publishes the picture.
+//! The render thread: loads scenes and draws progressively. Before each sample it reads the request of the window;
+//! after some samples it publishes the picture.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -335,7 +335,8 @@ impl Worker {
         });
     }
 
-    /// Draws one more sample, or a band of it, for the side with less progress; with equal progress, for the side published longer ago.
+    /// Draws one more sample, or a band of it, for the side with less progress; with equal progress, for the side
+    /// published longer ago.
     fn refine(&mut self, wanted: &RenderRequest) -> Result<()> {
         let Some(stage) = &mut self.stage else { return Ok(()) };
         let unfinished = stage.sides.iter_mut().enumerate().filter(|(_, side)| !side.is_done());
@@ -412,8 +413,8 @@ impl Worker {
         Ok(())
     }
 
-    /// Compares both sides on a separate thread, because FLIP takes longer than a time slice of a pass. Of the pictures that arrive
-    /// meanwhile, only the latest are compared.
+    /// Compares both sides on a separate thread, because FLIP takes longer than a time slice of a pass. Of the pictures
+    /// that arrive meanwhile, only the latest are compared.
     fn compare(&self, left: Shown, right: Shown) {
         let runs = lock(&self.comparing).replace((left, right)).is_some();
         if runs {

@@ -1,7 +1,7 @@
 //! Statistics of compiled pipelines from the driver's compiler: registers, spills, code size.
 //!
-//! Read the Vulkan documentation of `VK_KHR_pipeline_executable_properties`. RADV of Mesa 25.0 has the extension, lavapipe
-//! of 22.3 has not. Names and units of the figures are the driver's own.
+//! Read the Vulkan documentation of `VK_KHR_pipeline_executable_properties`. RADV of Mesa 25.0 has the extension,
+//! lavapipe of 22.3 has not. Names and units of the figures are the driver's own.
 
 use std::collections::BTreeMap;
 

@@ -1,8 +1,8 @@
 //! Instance, physical devices, and the logical device with its queue, allocator and caches.
 //!
-//! Read the Vulkan specification, chapters Initialization, Devices and Queues, Features and Limits; validation reports through
-//! `VK_EXT_debug_utils`. One queue executes everything, and one timeline semaphore counts its submissions. Features that
-//! every device must have are listed in `Instance::missing`, optional features in `offers.rs`.
+//! Read the Vulkan specification, chapters Initialization, Devices and Queues, Features and Limits; validation reports
+//! through `VK_EXT_debug_utils`. One queue executes everything, and one timeline semaphore counts its submissions.
+//! Features that every device must have are listed in `Instance::missing`, optional features in `offers.rs`.
 
 use std::ffi::{CStr, CString, FromBytesUntilNulError, c_char, c_void};
 use std::mem::ManuallyDrop;
@@ -224,7 +224,8 @@ impl Instance {
         Candidate { info, missing, offers, physical, is_lavapipe }
     }
 
-    /// Required features and limits that the device lacks, each with the Mesa version that has it where an update helps.
+    /// Required features and limits that the device lacks, each with the Mesa version that has it where an update
+    /// helps.
     fn missing(
         &self,
         physical: vk::PhysicalDevice,
@@ -295,7 +296,8 @@ pub(super) const QUEUE: vk::QueueFlags =
 
 impl Drop for Instance {
     fn drop(&mut self) {
-        // SAFETY: the device, the only child, is destroyed; the messenger is destroyed before the box that it writes to.
+        // SAFETY: the device, the only child, is destroyed; the messenger is destroyed before the box that it writes
+        // to.
         unsafe {
             if let Some((utils, messenger)) = &self.debug {
                 utils.destroy_debug_utils_messenger(*messenger, None);
@@ -441,8 +443,8 @@ impl Device {
             .shader_storage_image_extended_formats(true)
             .full_draw_index_uint32(offers.large_indices)
             .geometry_shader(offers.primitive_ids)
-            // Reads out of bounds are harmless in texel buffers; robust buffer access keeps them so in the storage buffers that
-            // replace them.
+            // Reads out of bounds are harmless in texel buffers; robust buffer access keeps them so in the storage
+            // buffers that replace them.
             .robust_buffer_access(!offers.texel_buffers);
         let mut v12 = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true).scalar_block_layout(true);
         let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
@@ -559,8 +561,8 @@ impl Device {
         self.info.kind == "cpu"
     }
 
-    /// Largest distance in pixels by which the rasteriser snaps vertices to its sub-pixel grid before it interpolates depth.
-    /// lavapipe rasterises coverage from snapped vertices and depth from exact ones, so its value is 0.
+    /// Largest distance in pixels by which the rasteriser snaps vertices to its sub-pixel grid before it interpolates
+    /// depth. lavapipe rasterises coverage from snapped vertices and depth from exact ones, so its value is 0.
     #[must_use]
     pub fn snap_pixels(&self) -> f64 {
         // Half a grid step in x and in y.
@@ -629,8 +631,8 @@ impl Device {
 
 impl Drop for Device {
     fn drop(&mut self) {
-        // SAFETY: every buffer, image and frame holds an `Arc` of the device, so none exists any more; the allocator is dropped
-        // before the device that it allocates from.
+        // SAFETY: every buffer, image and frame holds an `Arc` of the device, so none exists any more; the allocator is
+        // dropped before the device that it allocates from.
         unsafe {
             let _ = self.raw.device_wait_idle();
             lock(&self.caches).destroy(&self.raw);

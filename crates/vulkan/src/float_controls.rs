@@ -1,8 +1,9 @@
-//! Float controls: execution modes that make f32 arithmetic keep signed zeros, infinities and NaN, and round to nearest even.
+//! Float controls: execution modes that make f32 arithmetic keep signed zeros, infinities and NaN, and round to nearest
+//! even.
 //!
-//! Read the SPIR-V specification, section Execution Modes (`SignedZeroInfNanPreserve`, `RoundingModeRTE`), and the Vulkan
-//! specification, `VkPhysicalDeviceFloatControlsProperties`. Without these modes a compiler may assume that no infinities
-//! and NaN occur, and may choose the rounding of compensated sums.
+//! Read the SPIR-V specification, section Execution Modes (`SignedZeroInfNanPreserve`, `RoundingModeRTE`), and the
+//! Vulkan specification, `VkPhysicalDeviceFloatControlsProperties`. Without these modes a compiler may assume that no
+//! infinities and NaN occur, and may choose the rounding of compensated sums.
 
 use spirv::{Capability, ExecutionMode, Op};
 

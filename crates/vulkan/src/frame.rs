@@ -2,8 +2,8 @@
 //!
 //! Read the Vulkan specification, chapters Render Pass (Dynamic Rendering), Dispatching Commands, Drawing Commands and
 //! Queries. Passes are plain data (`Vec<Pass>`) until [`Frame::finish`] records them in order, submits them, and waits.
-//! Labels, object names, timestamps and barriers are automatic. New pipelines are created on another thread, and while a
-//! pass waits for its pipeline, the device already executes the earlier passes.
+//! Labels, object names, timestamps and barriers are automatic. New pipelines are created on another thread, and while
+//! a pass waits for its pipeline, the device already executes the earlier passes.
 
 use std::cell::Cell;
 use std::collections::HashMap;
@@ -576,8 +576,8 @@ impl<'a> Frame<'a> {
         let keys: Vec<&PipelineKey> = wanted.iter().collect();
         let count = if device.time_slices.taken { 2 } else { 2 * passes.len() as u32 };
         let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(count.max(1));
-        // SAFETY: command buffers are recorded here, submitted once, and waited for before anything is freed. Every handle in
-        // them is borrowed for `'a`, which ends after this function.
+        // SAFETY: command buffers are recorded here, submitted once, and waited for before anything is freed. Every
+        // handle in them is borrowed for `'a`, which ends after this function.
         let outcome = unsafe {
             let made = if timed { device.raw.create_query_pool(&info, None) } else { Ok(vk::QueryPool::null()) };
             let queries = made.context("creating timestamps")?;

@@ -1,4 +1,5 @@
-//! A thin Vulkan 1.3 layer: devices, memory, pipelines, descriptor sets, and frames whose pipeline barriers are derived.
+//! A thin Vulkan 1.3 layer: devices, memory, pipelines, descriptor sets, and frames whose pipeline barriers are
+//! derived.
 //!
 //! Read the Vulkan specification, chapters Devices and Queues, Synchronization and Cache Control, Pipelines, Resource
 //! Descriptors and Memory Allocation. The crate contains no renderer.

@@ -12,7 +12,8 @@ pub const STORAGE_BUFFERS: u32 = 16;
 pub const STORAGE_BUFFERS_AND_TABLES: u32 = 24;
 /// Colour attachments of a raster pass.
 pub const COLOR_TARGETS: u32 = 7;
-/// Texels that a texel buffer must hold for lookup tables to be texel buffers: a picture's depths, textures of a small scene.
+/// Texels that a texel buffer must hold for lookup tables to be texel buffers: a picture's depths, textures of a small
+/// scene.
 pub const LEAST_TEXELS: u32 = 1 << 22;
 /// Uniform buffers in one shader stage. lavapipe 22.3 inlines uniforms that conditions depend on, and writes past its
 /// table of them for the fourth uniform buffer of a stage or a later one: it crashes while it creates the pipeline

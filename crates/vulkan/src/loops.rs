@@ -32,8 +32,8 @@ impl Counter {
     }
 }
 
-/// `words` with `loop_iterations` as a private variable of each invocation, which every loop header increments. It is the
-/// constant 0 and free where `counts` is false or no instruction reads it.
+/// `words` with `loop_iterations` as a private variable of each invocation, which every loop header increments. It is
+/// the constant 0 and free where `counts` is false or no instruction reads it.
 ///
 /// # Panics
 /// When a module that counts has more than one function: the build's optimiser leaves one.

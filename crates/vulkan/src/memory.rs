@@ -66,8 +66,8 @@ fn prefer_large_pages(allocation: &Allocation) {
     let page = rustix::param::page_size();
     let first = (start.as_ptr() as usize - allocation.offset() as usize) / page * page;
     let end = (start.as_ptr() as usize + allocation.size() as usize).next_multiple_of(page);
-    // SAFETY: the advice changes only the speed of memory. Contents stay, also in the rest of the first and last page, and
-    // the advice may outlive the block. A kernel without huge pages ignores it.
+    // SAFETY: the advice changes only the speed of memory. Contents stay, also in the rest of the first and last page,
+    // and the advice may outlive the block. A kernel without huge pages ignores it.
     let _ = unsafe {
         rustix::mm::madvise(
             std::ptr::with_exposed_provenance_mut(first),
@@ -78,8 +78,8 @@ fn prefer_large_pages(allocation: &Allocation) {
 }
 
 impl Buffer {
-    /// A buffer of `bytes` bytes with every usage of a shader or copy. A buffer of 0 bytes is a dummy to bind where no shader
-    /// reads, and is named [`NOTHING`].
+    /// A buffer of `bytes` bytes with every usage of a shader or copy. A buffer of 0 bytes is a dummy to bind where no
+    /// shader reads, and is named [`NOTHING`].
     ///
     /// # Errors
     /// When memory is short.

@@ -9,8 +9,8 @@ use super::limits::{LEAST_TEXELS, PUSH_DESCRIPTORS};
 /// Optional features and limits of a device, beyond the required ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct Offers {
-    /// Fragment shaders read `gl_PrimitiveID` (feature geometryShader). Without it each triangle has vertices of its own, and
-    /// the vertex index gives the triangle's number.
+    /// Fragment shaders read `gl_PrimitiveID` (feature geometryShader). Without it each triangle has vertices of its
+    /// own, and the vertex index gives the triangle's number.
     pub primitive_ids: bool,
     /// Vertex indices above 2^24 (feature fullDrawIndexUint32).
     pub large_indices: bool,

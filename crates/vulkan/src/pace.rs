@@ -1,4 +1,5 @@
-//! State of time-sliced submission (`time_slices.rs`): milliseconds per workgroup of each dispatch, and requests to interrupt.
+//! State of time-sliced submission (`time_slices.rs`): milliseconds per workgroup of each dispatch, and requests to
+//! interrupt.
 
 use std::collections::HashMap;
 use std::sync::Mutex;

@@ -24,7 +24,8 @@ pub(super) struct Pipelines<'k> {
     slots: HashMap<&'k PipelineKey, OnceLock<Result<vk::Pipeline, vk::Result>>>,
 }
 
-/// On drop, completes every pending pipeline with an error: waiting threads return even when the creating thread panics.
+/// On drop, completes every pending pipeline with an error: waiting threads return even when the creating thread
+/// panics.
 struct Settled<'p, 'k>(&'p Pipelines<'k>);
 
 impl Drop for Settled<'_, '_> {
@@ -129,7 +130,8 @@ impl Device {
         Ok(layout)
     }
 
-    /// Runs `meanwhile` while another thread creates those pipelines of `keys` that do not exist yet, in the order of `keys`.
+    /// Runs `meanwhile` while another thread creates those pipelines of `keys` that do not exist yet, in the order of
+    /// `keys`.
     ///
     /// One thread creates pipelines, not several, and under validation none beside the calling thread
     /// (docs/decisions/specialization.md).
@@ -249,7 +251,8 @@ impl Device {
             let replaced = lock(&self.caches).replaced.get(&(program.name, index)).cloned();
             let words = specialized(replaced.as_deref().unwrap_or(stage.words), &key.constants);
             let mut words = with_loops_counted(&words, self.limits_loops());
-            // lavapipe keeps them without a request (tests of bits and of NaN hold there); the cost of a request was not measured.
+            // lavapipe keeps them without a request (tests of bits and of NaN hold there); the cost of a request was
+            // not measured.
             if !self.is_lavapipe() {
                 words = with_float_controls(&words, self.offers());
             }
@@ -310,7 +313,8 @@ impl Device {
         let raster_state = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
         let multisample =
             vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
-        // Reversed depth: nearer is greater. Equal depth passes, so the later of two coplanar draws wins on every device.
+        // Reversed depth: nearer is greater. Equal depth passes, so the later of two coplanar draws wins on every
+        // device.
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
             .depth_test_enable(raster.depth.is_some())
             .depth_write_enable(raster.depth.is_some_and(|(_, write)| write))

@@ -1,9 +1,9 @@
 //! Presentation of pictures in a window: a swapchain, a blit per picture, and the egui user interface over them.
 //!
 //! Read the Vulkan specification, chapter Window System Integration (`vkAcquireNextImageKHR`, `vkQueuePresentKHR`). A
-//! swapchain that is out of date or lost is a state, not an error. A picture comes from the host through a staging buffer
-//! and is blitted, so that the window shows the bytes of the display output: the swapchain has a UNORM format, which does
-//! not encode the sRGB bytes again. One frame is in flight.
+//! swapchain that is out of date or lost is a state, not an error. A picture comes from the host through a staging
+//! buffer and is blitted, so that the window shows the bytes of the display output: the swapchain has a UNORM format,
+//! which does not encode the sRGB bytes again. One frame is in flight.
 
 use std::sync::Arc;
 
@@ -30,7 +30,8 @@ pub struct PlacedPicture<'a> {
     pub size: [u32; 2],
     /// Version of the contents; a new number causes an upload.
     pub version: u64,
-    /// Left, top, right, bottom in pixels of the window; a rectangle of another size than the picture is filtered linearly.
+    /// Left, top, right, bottom in pixels of the window; a rectangle of another size than the picture is filtered
+    /// linearly.
     pub place: [i32; 4],
     /// Columns of the window that show the picture: first, and one past the last.
     pub columns: [i32; 2],
@@ -496,7 +497,8 @@ impl Presenter {
             .command_buffer_infos(&buffers)
             .signal_semaphore_infos(&signals);
         let queue = lock(&self.device.queue);
-        // SAFETY: the fence is not in use, the command buffer is recorded, and its resources live until the fence is signalled.
+        // SAFETY: the fence is not in use, the command buffer is recorded, and its resources live until the fence is
+        // signalled.
         unsafe {
             self.device.raw.reset_fences(&[self.finished]).context("showing a picture")?;
             self.device.raw.queue_submit2(*queue, &[info], self.finished).context("showing a picture")
@@ -506,7 +508,8 @@ impl Presenter {
 
 impl Drop for Presenter {
     fn drop(&mut self) {
-        // SAFETY: nothing is in use once the device is idle; the surface goes after its swapchain and before the window.
+        // SAFETY: nothing is in use once the device is idle; the surface goes after its swapchain and before the
+        // window.
         unsafe {
             let queue = lock(&self.device.queue);
             let _ = self.device.raw.queue_wait_idle(*queue);
@@ -559,7 +562,8 @@ unsafe fn change(
     unsafe { raw.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().image_memory_barriers(&[barrier])) };
 }
 
-/// Corners of the visible part of a picture, in the picture's and in the window's pixels; `None` when nothing is visible.
+/// Corners of the visible part of a picture, in the picture's and in the window's pixels; `None` when nothing is
+/// visible.
 fn clipped(placed: &PlacedPicture<'_>, window: [u32; 2]) -> Option<[[[i32; 2]; 2]; 2]> {
     let [left, top, right, bottom] = placed.place;
     let (low, high) = ([left, top], [right, bottom]);

@@ -1,7 +1,8 @@
 //! Recording of passes into command buffers: pipeline barriers, debug labels, and a timestamp pair around each pass.
 //!
-//! Read the Vulkan specification, chapters Command Buffers, Synchronization and Cache Control (Timeline Semaphores), Queries
-//! (Timestamp Queries) and Resource Descriptors (Push Descriptor Updates). One timeline semaphore counts submissions.
+//! Read the Vulkan specification, chapters Command Buffers, Synchronization and Cache Control (Timeline Semaphores),
+//! Queries (Timestamp Queries) and Resource Descriptors (Push Descriptor Updates). One timeline semaphore counts
+//! submissions.
 
 use std::cell::Cell;
 use std::collections::HashMap;
@@ -120,7 +121,8 @@ pub(super) struct Recording<'f> {
 }
 
 impl Recording<'_> {
-    /// Records passes into one command buffer, or several while pipelines are still being created; milliseconds of each pass.
+    /// Records passes into one command buffer, or several while pipelines are still being created; milliseconds of each
+    /// pass.
     ///
     /// # Safety
     /// Every handle of the passes is alive, and nothing else is recorded with the pool.
@@ -137,7 +139,8 @@ impl Recording<'_> {
             }
             let record_all = || {
                 for (index, (pass, barriers)) in passes.into_iter().zip(barriers).enumerate() {
-                    // Validation finds hazards only within one command buffer, so under validation all passes share one.
+                    // Validation finds hazards only within one command buffer, so under validation all passes share
+                    // one.
                     if index > 0 && !device.validates() && !pipelines.ready(&pass.pipelines) {
                         submit(device, used[used.len() - 1])?;
                         used.push(begin(device, from)?);
@@ -185,9 +188,9 @@ pub(super) unsafe fn write_first_timestamp(
     queries: vk::QueryPool,
     index: u32,
 ) {
-    // lavapipe takes a timestamp only at its next flush, which would be after a dispatch that runs at once (measured: 0.05 ms
-    // for a tone map of 7.5 ms). A barrier flushes. A barrier between no stages is no dependency: it hides no hazard from
-    // validation and costs nothing on a GPU.
+    // lavapipe takes a timestamp only at its next flush, which would be after a dispatch that runs at once (measured:
+    // 0.05 ms for a tone map of 7.5 ms). A barrier flushes. A barrier between no stages is no dependency: it hides no
+    // hazard from validation and costs nothing on a GPU.
     let nothing = [vk::MemoryBarrier2::default()];
     // SAFETY: the command buffer is recording; the pool has the query.
     unsafe {
@@ -318,7 +321,8 @@ pub(super) unsafe fn bind_sets(
     sets: &[vk::DescriptorSet],
 ) {
     if !sets.is_empty() {
-        // SAFETY: the command buffer is recording; the sets match the layout and are alive until the frame has finished.
+        // SAFETY: the command buffer is recording; the sets match the layout and are alive until the frame has
+        // finished.
         unsafe { device.raw.cmd_bind_descriptor_sets(commands, point, layout.pipeline, 1, sets, &[]) };
     }
 }
@@ -334,7 +338,8 @@ pub(super) unsafe fn bind_own(
 ) {
     match (own, &device.push) {
         (Own::Set(set), _) => {
-            // SAFETY: the command buffer is recording; the set matches the layout and is alive until the frame has finished.
+            // SAFETY: the command buffer is recording; the set matches the layout and is alive until the frame has
+            // finished.
             unsafe { device.raw.cmd_bind_descriptor_sets(commands, point, layout.pipeline, 0, &[*set], &[]) };
         }
         (Own::Pushed(descriptors), Some(push)) if !descriptors.is_empty() => {

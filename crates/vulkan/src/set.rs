@@ -1,7 +1,8 @@
-//! Descriptor sets that are written once and bound by many dispatches: scene data, light and path data, textures of materials.
+//! Descriptor sets that are written once and bound by many dispatches: scene data, light and path data, textures of
+//! materials.
 //!
-//! Read the Vulkan specification, chapter Resource Descriptors, section Descriptor Sets. Each set has a descriptor pool of
-//! its own.
+//! Read the Vulkan specification, chapter Resource Descriptors, section Descriptor Sets. Each set has a descriptor pool
+//! of its own.
 
 use std::sync::Arc;
 
@@ -86,7 +87,8 @@ impl DescriptorSet {
     pub fn new(device: &Arc<Device>, layout: &'static SetLayout, entries: &[(u32, Resource<'_>)]) -> Result<Self> {
         let creating = || format!("creating a descriptor set of the {}", layout.name);
         let pooled = Pooled::new(device, layout.bindings, device.set_layout(layout)?, creating)?;
-        // lavapipe 22.3 follows every descriptor of a set, even those that the program does not read (docs/decisions/lavapipe.md).
+        // lavapipe 22.3 follows every descriptor of a set, even those that the program does not read
+        // (docs/decisions/lavapipe.md).
         let is_whole = layout.bindings.iter().all(|b| entries.iter().any(|(slot, _)| *slot == b.slot));
         let make = || -> Result<(Buffer, Image)> {
             let format = vk::Format::R32G32B32A32_SFLOAT;

@@ -1,7 +1,8 @@
-//! Reflection data of the shaders, as the build generates it: programs, bindings, specialization constants, vertex inputs.
+//! Reflection data of the shaders, as the build generates it: programs, bindings, specialization constants, vertex
+//! inputs.
 //!
-//! Read the Vulkan specification, chapters Shaders and Resource Descriptors, and shaders/README.md. `crates/reflect` reads the
-//! data out of the SPIR-V.
+//! Read the Vulkan specification, chapters Shaders and Resource Descriptors, and shaders/README.md. `crates/reflect`
+//! reads the data out of the SPIR-V.
 
 use ash::vk;
 

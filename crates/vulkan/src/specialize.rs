@@ -1,11 +1,12 @@
-//! Specialization constants folded into SPIR-V: constant folding and dead-branch elimination before the driver compiles.
+//! Specialization constants folded into SPIR-V: constant folding and dead-branch elimination before the driver
+//! compiles.
 //!
 //! Read the Vulkan specification, chapter Pipelines, section Specialization Constants, and the SPIR-V specification,
-//! sections Structured Control Flow and Specialization. `VkSpecializationInfo` would set the constants, too, but then the
-//! driver reads, inlines and optimises every rung of every knob before it discards most of them: of the 1.06 MB of
-//! `interact`, a frame uses some 6 %, and lavapipe spent 0.48 s on one core creating the pipelines of a frame. One pass over
-//! the words takes some milliseconds here and removes the unreachable blocks. The optimiser of SPIRV-Tools does this and more, but
-//! takes 0.5 s to load such a module.
+//! sections Structured Control Flow and Specialization. `VkSpecializationInfo` would set the constants, too, but then
+//! the driver reads, inlines and optimises every rung of every knob before it discards most of them: of the 1.06 MB of
+//! `interact`, a frame uses some 6 %, and lavapipe spent 0.48 s on one core creating the pipelines of a frame. One pass
+//! over the words takes some milliseconds here and removes the unreachable blocks. The optimiser of SPIRV-Tools does
+//! this and more, but takes 0.5 s to load such a module.
 
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
@@ -161,11 +162,12 @@ impl Module<'_> {
 /// `words` with specialization constants as ordinary constants, and without unreachable blocks.
 ///
 /// `constants` are pairs of id and value; the others keep their defaults. The result computes the same as a driver that
-/// specialises `words`. Decided branches become unconditional, and a phi loses the operands of unreachable predecessors.
-/// Nothing else changes.
+/// specialises `words`. Decided branches become unconditional, and a phi loses the operands of unreachable
+/// predecessors. Nothing else changes.
 ///
 /// # Panics
-/// When the words are not SPIR-V, or have constants of other than 32 bits: glslang's output for Etalon's shaders has none.
+/// When the words are not SPIR-V, or have constants of other than 32 bits: glslang's output for Etalon's shaders has
+/// none.
 #[must_use]
 pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
     let places = instructions(words, HEADER);
@@ -283,7 +285,8 @@ impl Function {
                 }
             }
         }
-        // A conditional branch without a merge instruction exits a construct: its target must stay that construct's merge block.
+        // A conditional branch without a merge instruction exits a construct: its target must stay that construct's
+        // merge block.
         let exits = blocks.iter().filter(|block| block.merge.is_none());
         let exits = exits.filter(|block| op(words, &block.end) == Some(Op::BranchConditional));
         let exits = exits.flat_map(|block| words[block.end.start + 2..block.end.start + 4].iter().copied()).collect();
@@ -328,8 +331,8 @@ impl Function {
         self.reached[from] && self.targets(module, from).contains(&to.label)
     }
 
-    /// Labels that a block branches to. A loop's back edge and a selection with exits from within keep both targets, because
-    /// structured control flow needs them.
+    /// Labels that a block branches to. A loop's back edge and a selection with exits from within keep both targets,
+    /// because structured control flow needs them.
     fn targets(&self, module: &Module<'_>, block: usize) -> Vec<u32> {
         let block = &self.blocks[block];
         let words = &module.words[block.end.clone()];
@@ -439,8 +442,8 @@ impl Function {
         }
     }
 
-    /// Whether the block keeps its merge instruction. A decided selection loses it; a decided switch keeps it, because blocks
-    /// within may exit to its merge block.
+    /// Whether the block keeps its merge instruction. A decided selection loses it; a decided switch keeps it, because
+    /// blocks within may exit to its merge block.
     fn keeps_merge(&self, module: &Module<'_>, block: usize) -> bool {
         let is_if = op(module.words, &self.blocks[block].end) == Some(Op::BranchConditional);
         let is_loop = self.blocks[block].merges(module.words).1.is_some();

@@ -99,8 +99,8 @@ fn merged(uses: &[Use]) -> Vec<(ResourceId, bool, Masks)> {
                 known.access |= masks.access;
                 known.writes |= masks.writes;
                 if known.layout != masks.layout {
-                    // The only legal mixture is a depth image that one pass tests and samples (DEPTH_READ_ONLY allows both). Any
-                    // other mixture is a bug of the caller.
+                    // The only legal mixture is a depth image that one pass tests and samples (DEPTH_READ_ONLY allows
+                    // both). Any other mixture is a bug of the caller.
                     let depth = vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL;
                     let sampled = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
                     let legal =

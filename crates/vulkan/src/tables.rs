@@ -3,9 +3,9 @@
 //! Read the Vulkan specification, chapter Resource Descriptors (Storage Texel Buffer, Storage Buffer) and the SPIR-V
 //! specification (`OpImageRead`, `OpAccessChain`). `imageBuffer` is the fastest fetch on lavapipe
 //! (docs/decisions/lavapipe.md). Elsewhere its views hold too little: 65,536 texels on SwiftShader, 2^27 on NVIDIA and
-//! Intel, which six textures of 4096 x 4096 fill. Shaders are written for texel buffers; this file rewrites their SPIR-V: a
-//! texel buffer becomes an array of the same numbers in a storage buffer, and nothing else changes. Robust buffer access
-//! (`device.rs`) keeps reads out of bounds harmless.
+//! Intel, which six textures of 4096 x 4096 fill. Shaders are written for texel buffers; this file rewrites their
+//! SPIR-V: a texel buffer becomes an array of the same numbers in a storage buffer, and nothing else changes. Robust
+//! buffer access (`device.rs`) keeps reads out of bounds harmless.
 
 use std::collections::{BTreeMap, HashMap};
 

@@ -1,9 +1,9 @@
 //! Time-sliced submission: long dispatches are split so that a frame beside a window never blocks the queue for long.
 //!
 //! Read the Vulkan specification, chapters Dispatching Commands (`vkCmdDispatchBase`) and Command Buffers. Each pass is
-//! submitted and waited for by itself. A long dispatch is submitted in pieces of workgroups: each piece has as many groups
-//! as would take [`PIECE_MS`] at the measured time per group of the piece before. The host must know the number of groups,
-//! so the arguments of an indirect dispatch are read back first.
+//! submitted and waited for by itself. A long dispatch is submitted in pieces of workgroups: each piece has as many
+//! groups as would take [`PIECE_MS`] at the measured time per group of the piece before. The host must know the number
+//! of groups, so the arguments of an indirect dispatch are read back first.
 
 use std::sync::atomic::Ordering;
 
@@ -36,8 +36,8 @@ impl Device {
         self.time_slices.interrupted.store(false, Ordering::Relaxed);
     }
 
-    /// Draws frames that [`Device::interrupt`] may abandon between two pieces, under time-sliced submission. An abandoned
-    /// frame ends with [`crate::Interrupted`].
+    /// Draws frames that [`Device::interrupt`] may abandon between two pieces, under time-sliced submission. An
+    /// abandoned frame ends with [`crate::Interrupted`].
     pub fn interruptible<T>(&self, draw: impl FnOnce() -> T) -> T {
         self.time_slices.interruptible.store(true, Ordering::Relaxed);
         let drawn = draw();

@@ -1,7 +1,7 @@
 //! Window handles: the instance extensions and the surface of a window.
 //!
-//! Read the Vulkan specification, chapter Window System Integration, and the documentation of the crates `raw-window-handle`
-//! and `ash-window`.
+//! Read the Vulkan specification, chapter Window System Integration, and the documentation of the crates
+//! `raw-window-handle` and `ash-window`.
 
 use std::ffi::c_char;
 

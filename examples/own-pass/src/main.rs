@@ -1,5 +1,5 @@
-//! A custom compute pass after Etalon's passes: it counts the pixels of the film by stops, on the device. Bindings, access and
-//! barriers are derived from its GLSL.
+//! A custom compute pass after Etalon's passes: it counts the pixels of the film by stops, on the device. Bindings,
+//! access and barriers are derived from its GLSL.
 #![allow(clippy::print_stdout, reason = "an example shows what it does")]
 
 use etalon::frame::Settings;

@@ -1,4 +1,5 @@
-//! Knobs: the settings of quality. Each knob is an approximation with rungs, as types ([`rungs`]) and as a table of data.
+//! Knobs: the settings of quality. Each knob is an approximation with rungs, as types ([`rungs`]) and as a table of
+//! data.
 
 #[macro_use]
 mod macros;

@@ -1,8 +1,8 @@
 //! The knobs as types: each one's approximation, its rungs from cheap to exact, and its rungs in the three models.
 //!
-//! Read docs/plan.md; the ids under `lecture` are statements of docs/lecture.md. Knobs, models and effects have their names
-//! only here: a renamed variant is a compile error wherever it is used. Users type the text beside a variant, and reports
-//! and the generated tables of the documentation print it.
+//! Read docs/plan.md; the ids under `lecture` are statements of docs/lecture.md. Knobs, models and effects have their
+//! names only here: a renamed variant is a compile error wherever it is used. Users type the text beside a variant, and
+//! reports and the generated tables of the documentation print it.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -366,8 +366,8 @@ knob! {
 }
 
 impl Normals {
-    /// Tolerance for |n − stored n|² of the encoding, at least twice the largest error (numerics 16: 0.95°, 0.059°, 0.0037°). A
-    /// smaller bend of a normal texture is lost.
+    /// Tolerance for |n − stored n|² of the encoding, at least twice the largest error (numerics 16: 0.95°, 0.059°,
+    /// 0.0037°). A smaller bend of a normal texture is lost.
     #[must_use]
     pub fn error2(self) -> f32 {
         match self {

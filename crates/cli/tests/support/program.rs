@@ -35,7 +35,8 @@ impl Run {
     }
 }
 
-/// Where many pipelines draw few pixels, the driver's optimisations and threads cost more than they save; the bits are the same.
+/// Where many pipelines draw few pixels, the driver's optimisations and threads cost more than they save; the bits are
+/// the same.
 pub const HASTY: [(&str, &str); 2] = [("GALLIVM_PERF", "nopt"), ("LP_NUM_THREADS", "0")];
 
 /// Where the driver keeps what it compiled: the same for all tests, whose own caches are theirs alone.

@@ -171,7 +171,8 @@ impl<'a> Viewer<'a> {
         let text = std::fs::read_to_string(format!("/proc/{}/stat", self.program.id())).expect("a process");
         let after_name = text.rsplit(')').next().expect("numbers");
         let numbers: Vec<i64> = after_name.split_whitespace().filter_map(|word| word.parse().ok()).collect();
-        // Of the process, from the third on: utime and stime are the 14th and 15th, and the state is no number. In ticks of 10 ms.
+        // Of the process, from the third on: utime and stime are the 14th and 15th, and the state is no number. In
+        // ticks of 10 ms.
         Duration::from_millis(10 * (numbers[10] + numbers[11]) as u64)
     }
 

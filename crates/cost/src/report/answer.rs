@@ -1,5 +1,5 @@
-//! First sections of the page: recommended settings, what they simplify, how far to trust the measurements, and a comparison with the
-//! reference.
+//! First sections of the page: recommended settings, what they simplify, how far to trust the measurements, and a
+//! comparison with the reference.
 
 use std::path::Path;
 

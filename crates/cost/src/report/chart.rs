@@ -102,8 +102,8 @@ pub(super) fn errors(table: &Table) -> Markup {
     }
 }
 
-/// Positions of the labels of the frontier's points, beside, above or below a point. A label that would overlap a point, the line or
-/// another label is left out.
+/// Positions of the labels of the frontier's points, beside, above or below a point. A label that would overlap a
+/// point, the line or another label is left out.
 fn labels(table: &Table, place: &dyn Fn(usize) -> [f64; 2]) -> Vec<(usize, [f64; 2], &'static str)> {
     let mut boxes: Vec<[f64; 4]> =
         (0..table.points.len()).map(place).map(|[x, y]| [x - 5.0, x + 5.0, y - 5.0, y + 5.0]).collect();

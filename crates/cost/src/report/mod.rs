@@ -1,7 +1,8 @@
-//! `report.html`: an HTML page of a [`Table`]. It starts with the recommended settings and how far to trust the measurements.
+//! `report.html`: an HTML page of a [`Table`]. It starts with the recommended settings and how far to trust the
+//! measurements.
 //!
-//! The pictures of the recommended settings are embedded. The pictures of all points lie beside the page in the folder `pictures` and are
-//! loaded on demand. Nothing is loaded from anywhere else.
+//! The pictures of the recommended settings are embedded. The pictures of all points lie beside the page in the folder
+//! `pictures` and are loaded on demand. Nothing is loaded from anywhere else.
 
 mod answer;
 mod chart;

@@ -67,7 +67,9 @@ pub(super) fn gallery(table: &Table) -> Markup {
     html! {
         p { label { "Filter pictures: " input.filter type="search" data-of="gallery"; } }
         div.gallery #gallery {
-            @for point in table.points.iter().filter(|point| point.name != REFERENCE) { (shown(point, table, [width, height])) }
+            @for point in table.points.iter().filter(|point| point.name != REFERENCE) {
+                (shown(point, table, [width, height]))
+            }
         }
     }
 }
@@ -97,8 +99,8 @@ fn shown(point: &Point, table: &Table, [width, height]: [u32; 2]) -> Markup {
     }
 }
 
-/// For each pixel of `local` the change that brings it closest to the reference, as a picture with a legend; `None` where no change is
-/// significant.
+/// For each pixel of `local` the change that brings it closest to the reference, as a picture with a legend; `None`
+/// where no change is significant.
 pub(super) fn causes(table: &Table, pictures: &Path) -> Result<Option<Markup>> {
     let Some(local) = table.points.iter().find(|point| point.name == "local") else { return Ok(None) };
     let open = |name: &str| read_display(&pictures.join(format!("{name}.png")));

@@ -140,7 +140,10 @@ pub(super) fn tornado(table: &Table) -> Markup {
                         small { (format!("{:+.0} %", 100.0 * price.share).replace('-', "−")) }
                         i class=(if price.share < 0.0 { "saves" } else { "takes" }) .noise[!price.time_told] style=(part(price.share, most_time)) {}
                     }
-                    span.bar-right { i.seen.noise[!seen] style=(part(price.flip_between, most_seen)) {} small { (digits(price.flip_between)) } }
+                    span.bar-right {
+                        i.seen.noise[!seen] style=(part(price.flip_between, most_seen)) {}
+                        small { (digits(price.flip_between)) }
+                    }
                 }
             }
         }

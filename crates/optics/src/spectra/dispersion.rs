@@ -1,4 +1,5 @@
-//! Dispersion: index of refraction by wavelength (lecture F1), by the formulas of Sellmeier and Cauchy or by Abbe number.
+//! Dispersion: index of refraction by wavelength (lecture F1), by the formulas of Sellmeier and Cauchy or by Abbe
+//! number.
 //!
 //! Read KHR_materials_dispersion and docs/colour.md.
 

@@ -1,9 +1,10 @@
-//! Spectra for spectral rendering (lecture C1–C3, F1, F8): bands of wavelengths, light sources, metals, and RGB conversions.
+//! Spectra for spectral rendering (lecture C1–C3, F1, F8): bands of wavelengths, light sources, metals, and RGB
+//! conversions.
 //!
-//! Read pbrt 4.5 and 4.6; docs/decisions/spectra.md. A spectral picture is rendered band by band. In a band each reflectance,
-//! transmittance and index is one number, its mean over the band. Light is the tristimulus X, Y, Z of its emission in the band:
-//! spectrum and colour matching functions are multiplied before averaging, so that no spectral line is lost, wherever in the
-//! band it lies. The film is the sum over the bands.
+//! Read pbrt 4.5 and 4.6; docs/decisions/spectra.md. A spectral picture is rendered band by band. In a band each
+//! reflectance, transmittance and index is one number, its mean over the band. Light is the tristimulus X, Y, Z of its
+//! emission in the band: spectrum and colour matching functions are multiplied before averaging, so that no spectral
+//! line is lost, wherever in the band it lies. The film is the sum over the bands.
 
 mod dispersion;
 mod upsampling;
@@ -279,8 +280,8 @@ pub fn shares(band: &Band) -> [f64; 3] {
     band.mean_of(basis)
 }
 
-/// Columns: X, Y, Z in a band of red, green and blue linear Rec. 709 light. RGB light is D65 filtered by the three basis
-/// reflectances; summed over all bands it has its colour again.
+/// Columns: X, Y, Z in a band of red, green and blue linear Rec. 709 light. RGB light is D65 filtered by the three
+/// basis reflectances; summed over all bands it has its colour again.
 #[must_use]
 pub fn light_from_rgb(band: &Band) -> [[f64; 3]; 3] {
     static D65: LazyLock<(Spectrum, f64)> = LazyLock::new(|| {
@@ -297,8 +298,8 @@ pub fn light_from_rgb(band: &Band) -> [[f64; 3]; 3] {
     [0, 1, 2].map(|primary| [0, 1, 2].map(|k| mean[3 * primary + k] * scale))
 }
 
-/// Rows: linear Rec. 709 from X, Y, Z by IEC 61966-2-1, each row divided by its value for D65, so that D65 is exactly white: with
-/// the standard's four digits it is off by up to 6e-4 for these tables.
+/// Rows: linear Rec. 709 from X, Y, Z by IEC 61966-2-1, each row divided by its value for D65, so that D65 is exactly
+/// white: with the standard's four digits it is off by up to 6e-4 for these tables.
 pub static RGB_FROM_XYZ: LazyLock<[[f64; 3]; 3]> = LazyLock::new(|| {
     let white = d65().light_in(&VISIBLE);
     XYZ_TO_SRGB.map(|row| {
@@ -344,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn light_told_as_rgb_has_its_colour_again() {
+    fn light_given_as_rgb_keeps_its_colour() {
         for bands in [1, 8, 16, 32] {
             let mut sum = [[0.0; 3]; 3];
             for i in 0..bands {
@@ -405,8 +406,8 @@ mod tests {
 
     #[test]
     fn metals_have_the_indices_of_the_lamps() {
-        // docs/colour.md, section 7: gold at 645.16, 526.32 and 444.44 nm, linear between the wavelengths of the source; this
-        // table is linear between those and steps of 5 nm.
+        // docs/colour.md, section 7: gold at 645.16, 526.32 and 444.44 nm, linear between the wavelengths of the
+        // source; this table is linear between those and steps of 5 nm.
         let [n, kappa] = metal("gold").unwrap();
         for (nm, wanted) in [(645.16, [0.1635, 3.5543]), (526.32, [0.5828, 2.1542]), (444.44, [1.4022, 1.9248])] {
             assert!((n.at(nm) - wanted[0]).abs() < 0.01 && (kappa.at(nm) - wanted[1]).abs() < 0.01, "{nm}");

@@ -1,8 +1,8 @@
 //! Spectral upsampling: reflectance spectra for RGB colours (knob `upsampling`).
 //!
-//! Read Jakob and Hanika, "A Low-Dimensional Function Space for Efficient Spectral Upsampling", Eurographics 2019 (a fitted
-//! sigmoid); Mallett and Yuksel, "Spectral Primary Decomposition for Rendering with sRGB Reflectance", EGSR 2019 (a sum of
-//! three curves, which needs no fit). Colours are linear Rec. 709 in [0, 1] under D65.
+//! Read Jakob and Hanika, "A Low-Dimensional Function Space for Efficient Spectral Upsampling", Eurographics 2019 (a
+//! fitted sigmoid); Mallett and Yuksel, "Spectral Primary Decomposition for Rendering with sRGB Reflectance", EGSR 2019
+//! (a sum of three curves, which needs no fit). Colours are linear Rec. 709 in [0, 1] under D65.
 
 use std::sync::LazyLock;
 
@@ -162,7 +162,8 @@ fn solve(rows: [[f64; 3]; 3], error: [f64; 3], damping: f64) -> [f64; 3] {
     (normal.inverse() * (j.transpose() * glam::DVec3::from(error))).to_array()
 }
 
-/// Upsampled reflectances for texture colours, fitted at the corners of a grid over the square roots of red, green and blue.
+/// Upsampled reflectances for texture colours, fitted at the corners of a grid over the square roots of red, green and
+/// blue.
 pub struct Grid {
     /// Corners per axis.
     pub side: u32,
@@ -170,8 +171,8 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Corners per axis. The interpolated reflectance is off by at most 0.02, at saturated ends, and by 0.0003 in the mean of
-    /// random colours.
+    /// Corners per axis. The interpolated reflectance is off by at most 0.02, at saturated ends, and by 0.0003 in the
+    /// mean of random colours.
     const SIDE: u32 = 32;
 
     /// The grid with all corners, fitted once per process.

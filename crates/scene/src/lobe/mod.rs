@@ -1,5 +1,5 @@
-//! Lobes over the base layer: one row of a table for each glTF extension. File import, planning, spectral rendering and material
-//! upload loop over the rows without naming a lobe. The BRDF of a lobe is a file of shaders/lib/, included by
+//! Lobes over the base layer: one row of a table for each glTF extension. File import, planning, spectral rendering and
+//! material upload loop over the rows without naming a lobe. The BRDF of a lobe is a file of shaders/lib/, included by
 //! shaders/lib/layers.glsl.
 //!
 //! Read the KHR_materials_* extension of each lobe, and pbrt 9 for BRDFs.
@@ -8,8 +8,8 @@ pub mod sheen;
 
 use super::{Meaning, TextureRef};
 
-/// A row of a directional-albedo table for a perceptual roughness: values at the given number of steps, from the horizon up.
-/// The lobe defines the two values of a step.
+/// A row of a directional-albedo table for a perceptual roughness: values at the given number of steps, from the
+/// horizon up. The lobe defines the two values of a step.
 pub type TableRow = fn(f64, usize) -> Vec<[f64; 2]>;
 
 /// A lobe: its extension, parameters and properties.
@@ -20,8 +20,8 @@ pub struct Lobe {
     pub extension: &'static str,
     /// What in a scene calls for the effect, and what the effect adds to a plan: a row of docs/plan.md.
     pub row: [&'static str; 2],
-    /// Factors: name in JSON and number of components. At most four components together, each in 0 … 1 with default 0. The lobe is
-    /// off when the first factor is 0. A factor of three components is a colour.
+    /// Factors: name in JSON and number of components. At most four components together, each in 0 … 1 with default 0.
+    /// The lobe is off when the first factor is 0. A factor of three components is a colour.
     pub factors: &'static [(&'static str, usize)],
     /// Textures, which multiply the factors: name in JSON, name in shaders/lib/texels.glsl, meaning of the texels.
     pub textures: &'static [(&'static str, &'static str, Meaning)],

@@ -1,7 +1,7 @@
 //! Sheen (KHR_materials_sheen): the grazing-angle lobe of cloth, whose fibres stand off the surface.
 //!
-//! Read Estevez and Kulla, "Production Friendly Microfacet Sheen BRDF", 2017. This file is the twin of shaders/lib/sheen.glsl, and
-//! computes the table of directional albedo for it.
+//! Read Estevez and Kulla, "Production Friendly Microfacet Sheen BRDF", 2017. This file is the twin of
+//! shaders/lib/sheen.glsl, and computes the table of directional albedo for it.
 
 use std::f64::consts::{PI, TAU};
 
@@ -63,8 +63,8 @@ pub fn albedo(cos_v: f64, roughness: f64) -> f64 {
     sum * TAU / f64::from(ELEVATIONS * AZIMUTHS)
 }
 
-/// One row of the table: for each cosθ, E and the albedo for uniform light below the angle, ∫ 2x min(E(x), 1) dx from 0 to cosθ.
-/// The steps are even in u = √cosθ: x = u², 2x dx = 4u³ du.
+/// One row of the table: for each cosθ, E and the albedo for uniform light below the angle, ∫ 2x min(E(x), 1) dx from 0
+/// to cosθ. The steps are even in u = √cosθ: x = u², 2x dx = 4u³ du.
 fn table_row(roughness: f64, side: usize) -> Vec<[f64; 2]> {
     let step = 1.0 / (side - 1) as f64;
     let of_all = |u: f64, e: f64| 4.0 * u.powi(3) * e.min(1.0);

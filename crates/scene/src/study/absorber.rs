@@ -1,8 +1,9 @@
-//! Study scene of homogeneous and heterogeneous absorption (lecture A1, A2): transmittance e^(−σ d) before a white emitter.
+//! Study scene of homogeneous and heterogeneous absorption (lecture A1, A2): transmittance e^(−σ d) before a white
+//! emitter.
 //!
-//! Read pbrt 11.2. All media have n = 1 and do not refract. The scene has a row of blocks, each twice as thick as the one
-//! before, a wedge, a block whose σ falls along its length, and one whose σ falls along the line of sight. In the last block
-//! quadratures with few steps have errors, and the errors vary smoothly with the order of the rule.
+//! Read pbrt 11.2. All media have n = 1 and do not refract. The scene has a row of blocks, each twice as thick as the
+//! one before, a wedge, a block whose σ falls along its length, and one whose σ falls along the line of sight. In the
+//! last block quadratures with few steps have errors, and the errors vary smoothly with the order of the rule.
 
 use std::sync::Arc;
 

@@ -1,6 +1,8 @@
-//! Study scene of alpha blending and alpha testing: unlit panes of known colour, opacity and order in front of a striped board.
+//! Study scene of alpha blending and alpha testing: unlit panes of known colour, opacity and order in front of a
+//! striped board.
 //!
-//! Read RTR 5.5. All surfaces are unlit, so that the expected pixel is the plain composite with the background, far to near.
+//! Read RTR 5.5. All surfaces are unlit, so that the expected pixel is the plain composite with the background, far to
+//! near.
 
 use glam::DVec3;
 

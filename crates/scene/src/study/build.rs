@@ -97,7 +97,8 @@ impl StudyBuilder {
         });
     }
 
-    /// Adds the built-in studio environment to the scene's own lights, for surfaces that need an environment to reflect.
+    /// Adds the built-in studio environment to the scene's own lights, for surfaces that need an environment to
+    /// reflect.
     pub(super) fn studio(&mut self, intensity: f32) {
         self.scene.studio = Some(intensity);
     }
@@ -107,8 +108,8 @@ impl StudyBuilder {
     }
 }
 
-/// A frame at `position` whose +Z points along `forward`, with +Y as vertical as possible; for vertical `forward`, −Z of the
-/// world is up.
+/// A frame at `position` whose +Z points along `forward`, with +Y as vertical as possible; for vertical `forward`, −Z
+/// of the world is up.
 pub(super) fn facing(position: DVec3, forward: DVec3) -> DAffine3 {
     let z = forward.normalize();
     let up = if z.y.abs() > 0.999_999 { DVec3::NEG_Z } else { DVec3::Y };

@@ -1,7 +1,7 @@
 //! Study scene of global illumination (lecture R6): the Cornell box, whose colour bleeding needs the global model.
 //!
-//! Read Goral et al., "Modeling the Interaction of Light Between Diffuse Surfaces", 1984. Proportions follow the later data of
-//! Cornell University's page at a hundredth of its millimetres, rotated so that the camera looks along −Z.
+//! Read Goral et al., "Modeling the Interaction of Light Between Diffuse Surfaces", 1984. Proportions follow the later
+//! data of Cornell University's page at a hundredth of its millimetres, rotated so that the camera looks along −Z.
 
 use glam::DVec3;
 
@@ -39,8 +39,9 @@ pub(super) fn scene() -> Scene {
     let tall = Shape::cuboid(DVec3::new(1.65, 3.30, 1.65));
     b.add("tall block", tall, white, at(-0.905, 1.6501, -3.51, 17.2));
 
-    // The panel and the proxy light are the same lamp: 1.3 m by 1.05 m of radiance 12 has the axial intensity 16.4. The proxy's
-    // 16.4 lights models with punctual lights only. The panel hangs a little below the ceiling, and the proxy below the panel.
+    // The panel and the proxy light are the same lamp: 1.3 m by 1.05 m of radiance 12 has the axial intensity 16.4. The
+    // proxy's 16.4 lights models with punctual lights only. The panel hangs a little below the ceiling, and the proxy
+    // below the panel.
     let glow = b.material(emitter("lamp", [12.0, 12.0, 12.0]));
     let lamp = DVec3::new(0.0, HEIGHT - 0.01, -2.795);
     b.add("ceiling panel", Shape::panel(1.3, 1.05), glow, facing(lamp, DVec3::NEG_Y));

@@ -86,8 +86,8 @@ fn basin(b: &mut StudyBuilder) {
     b.add("water", Shape::lathe(&body, 96), water, at(0.42, 0.0001, 0.0, 0.0));
 }
 
-/// An emissive ball on a thin stand. Its proxy light hangs below the ball, because the ball would shadow a light inside it. Its
-/// range ends before the backdrop, where the ball's shadow would be visible.
+/// An emissive ball on a thin stand. Its proxy light hangs below the ball, because the ball would shadow a light inside
+/// it. Its range ends before the backdrop, where the ball's shadow would be visible.
 fn lamp(b: &mut StudyBuilder) {
     let (x, z, radius, height) = (0.56, -0.62, 0.05, 0.30);
     let brass = b.material(metal("brass", [0.89, 0.76, 0.43], 0.3));

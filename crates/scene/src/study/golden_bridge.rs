@@ -1,8 +1,8 @@
 //! Study scene of grazing specular lobes (lecture B7): the lamps of a bridge over rippled water at night.
 //!
-//! Read RTR 9.8. Each reflection is a streak towards the eye, long vertically and narrow across, because near grazing angles the
-//! half vector hardly changes along the streak. The Blinn-Phong lobe of the lecture (`brdf=blinn-phong`) is not reciprocal and
-//! has no such streak; with a denominator it has one, as do microfacets.
+//! Read RTR 9.8. Each reflection is a streak towards the eye, long vertically and narrow across, because near grazing
+//! angles the half vector hardly changes along the streak. The Blinn-Phong lobe of the lecture (`brdf=blinn-phong`) is
+//! not reciprocal and has no such streak; with a denominator it has one, as do microfacets.
 
 use glam::DVec3;
 

@@ -36,7 +36,8 @@ pub(super) fn scene() -> Scene {
     b.finish()
 }
 
-/// σ of a rising, winding and widening plume: the integral over each level is the same. σ is 0 at the sides of the mesh.
+/// σ of a rising, winding and widening plume: the integral over each level is the same. σ is 0 at the sides of the
+/// mesh.
 fn plume() -> Vec<f32> {
     let mut values = Vec::new();
     for z in 0..POINTS[2] {

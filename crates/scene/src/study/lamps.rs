@@ -1,5 +1,5 @@
-//! Study scene of punctual lights (lecture R3, R4): point lights of several ranges, a spot light and a directional light over a
-//! plane.
+//! Study scene of punctual lights (lecture R3, R4): point lights of several ranges, a spot light and a directional
+//! light over a plane.
 
 use glam::{DAffine3, DVec3};
 

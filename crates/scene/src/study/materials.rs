@@ -1,7 +1,7 @@
 //! Study scene of the material model (lecture B4–B8): rows of balls with roughness increasing to the right.
 //!
-//! Dielectrics have a coloured diffuse base and a white specular lobe, metals a coloured specular lobe, and a clear coat reflects
-//! white over either.
+//! Dielectrics have a coloured diffuse base and a white specular lobe, metals a coloured specular lobe, and a clear
+//! coat reflects white over either.
 
 use glam::DVec3;
 

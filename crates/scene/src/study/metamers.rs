@@ -1,8 +1,8 @@
 //! Study scene of metamers (lecture C1–C3): a colour chart in three booths of different illuminants.
 //!
-//! Read Wyszecki and Stiles, Color Science, 1982. Two reflectances may have one colour under one light and two under another,
-//! because light and reflectance are multiplied at each wavelength. The left half of each patch has the measured reflectance, the
-//! right half a reflectance upsampled from its colour in daylight.
+//! Read Wyszecki and Stiles, Color Science, 1982. Two reflectances may have one colour under one light and two under
+//! another, because light and reflectance are multiplied at each wavelength. The left half of each patch has the
+//! measured reflectance, the right half a reflectance upsampled from its colour in daylight.
 
 use glam::DVec3;
 

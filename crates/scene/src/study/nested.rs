@@ -1,8 +1,9 @@
-//! Study scene of nested dielectrics: an air bubble in ice in water in glass, as overlapping closed meshes with priorities.
+//! Study scene of nested dielectrics: an air bubble in ice in water in glass, as overlapping closed meshes with
+//! priorities.
 //!
-//! Read Schmidt and Budge, "Simple Nested Dielectrics in Ray Traced Images", 2002. No interfaces coincide, and no mesh is cut
-//! to fit another. The water reaches into the wall of the glass, the ice lies in the water and the bubble in the ice. In an
-//! overlap the medium with the higher priority counts.
+//! Read Schmidt and Budge, "Simple Nested Dielectrics in Ray Traced Images", 2002. No interfaces coincide, and no mesh
+//! is cut to fit another. The water reaches into the wall of the glass, the ice lies in the water and the bubble in the
+//! ice. In an overlap the medium with the higher priority counts.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

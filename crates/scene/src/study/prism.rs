@@ -1,7 +1,7 @@
 //! Study scene of dispersion (lecture F1): a slit and a white bar of light, seen through a prism of dense flint glass.
 //!
-//! Read pbrt 9.3. The index of refraction depends on the wavelength: the slit appears once in each colour, and the bar has
-//! coloured edges.
+//! Read pbrt 9.3. The index of refraction depends on the wavelength: the slit appears once in each colour, and the bar
+//! has coloured edges.
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 

@@ -1,5 +1,5 @@
-//! Study scene of radiance (lecture R1): radiance does not depend on distance and tilt. All visible pixels of all panels
-//! and balls have radiance 1, in all three channels.
+//! Study scene of radiance (lecture R1): radiance does not depend on distance and tilt. All visible pixels of all
+//! panels and balls have radiance 1, in all three channels.
 
 use glam::DVec3;
 
@@ -13,7 +13,8 @@ pub(super) fn scene() -> Scene {
     // The same radiance by an unlit material.
     let unlit =
         b.material(Material { unlit: true, double_sided: true, ..dielectric("unlit of radiance 1", [1.0; 3], 1.0) });
-    // Columns recede from the camera, and all panels have the same size in the picture before the tilt; rows are tilted.
+    // Columns recede from the camera, and all panels have the same size in the picture before the tilt; rows are
+    // tilted.
     let (near, across) = (3.0, 0.44);
     for (row, material) in [emitting, unlit].into_iter().enumerate() {
         let panel = b.mesh(&format!("panel {row}"), Shape::panel(1.0, 1.0), material);

@@ -23,8 +23,8 @@ pub struct Shape {
 /// A smooth part of an outline: points with their unit normals. Neighbouring parts meet in a hard edge.
 type Stretch = Vec<(DVec2, DVec2)>;
 
-/// Rounds a point to nanometres. Sines and cosines of right angles have residues near 1e-17, but a closed outline must meet
-/// itself or its axis exactly. No study shape has detail below a nanometre.
+/// Rounds a point to nanometres. Sines and cosines of right angles have residues near 1e-17, but a closed outline must
+/// meet itself or its axis exactly. No study shape has detail below a nanometre.
 fn snap(p: DVec2) -> DVec2 {
     (p * 1e9).round() * 1e-9
 }
@@ -170,9 +170,9 @@ impl Shape {
         Self::lathe(&[arc(DVec2::new(ring, 0.0), tube, 0.0, TAU, (segments / 2).max(3))], segments)
     }
 
-    /// A surface of revolution: an outline in the half plane (distance from the axis, y), rotated around the Y axis. The
-    /// outside lies to the right of the direction of travel, so the outline of a closed body runs from the bottom of its axis
-    /// outwards and up.
+    /// A surface of revolution: an outline in the half plane (distance from the axis, y), rotated around the Y axis.
+    /// The outside lies to the right of the direction of travel, so the outline of a closed body runs from the bottom
+    /// of its axis outwards and up.
     #[must_use]
     pub(crate) fn lathe(outline: &[Stretch], segments: u32) -> Self {
         let mut shape = Self::default();
@@ -235,8 +235,8 @@ impl Shape {
         shape
     }
 
-    /// A rectangular tub, open at the top: `inner` is the width, depth (Y) and length of the cavity, `wall` and `floor` are the
-    /// thicknesses. The origin is the centre of the opening. Texture coordinates are in metres from the corners
+    /// A rectangular tub, open at the top: `inner` is the width, depth (Y) and length of the cavity, `wall` and `floor`
+    /// are the thicknesses. The origin is the centre of the opening. Texture coordinates are in metres from the corners
     /// of the cavity.
     #[must_use]
     pub fn tub(inner: DVec3, wall: f64, floor: f64) -> Self {
@@ -276,7 +276,8 @@ impl Shape {
     /// y = `top`; `width` across. Texture coordinates are in metres.
     #[must_use]
     pub fn backdrop(width: f64, back: f64, bend: f64, top: f64) -> Self {
-        // Outline in (−z, y); the surface lies to the left of travel, where normals of an arc would have to point inwards.
+        // Outline in (−z, y); the surface lies to the left of travel, where normals of an arc would have to point
+        // inwards.
         let curve = arc(DVec2::new(-back, bend), bend, -FRAC_PI_2, 0.0, 24);
         let wall = line(DVec2::new(-back + bend, bend), DVec2::new(-back + bend, top));
         let mut shape = Self::default();

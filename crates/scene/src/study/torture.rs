@@ -1,4 +1,5 @@
-//! Study scene of numerically hard cases, ten kilometres from the origin and in front of a plane mirror that shows the back.
+//! Study scene of numerically hard cases, ten kilometres from the origin and in front of a plane mirror that shows the
+//! back.
 //!
 //! Read docs/numerics.md for the errors of f32 in such cases.
 

@@ -20,7 +20,7 @@ import numpy as np
 from mpmath import mp, mpc, mpf
 
 DIGITS = 120  # the worst loss is below 70: 1 - exp(-1e-30), sin^2 of a 1e-30 rotation
-TABLES = pathlib.Path(__file__).resolve().parents[2] / "assets" / "cmf"
+TABLES = pathlib.Path(__file__).resolve().parents[4] / "assets" / "cmf"
 MIN_NORMAL = 2.0**-126
 MAX = float(np.finfo(np.float32).max)
 

@@ -139,7 +139,8 @@ fn called_for(known: &[Effect], effects: &[EffectId]) -> Option<String> {
     none.then(|| all[0].reason())
 }
 
-/// Measured time and FLIP difference of a rung, relative to the preset `local` or to the reference's rungs; empty if not measured.
+/// Measured time and FLIP difference of a rung, relative to the preset `local` or to the reference's rungs; empty if
+/// not measured.
 fn price(seen: &RenderState, knob: &str, rung: &str) -> String {
     let Some(table) = seen.facts.as_ref().and_then(|facts| facts.prices.as_ref()) else { return String::new() };
     let found = table.prices.iter().find(|price| price.knob == knob && price.to == rung);

@@ -1,4 +1,5 @@
-//! The panels (egui), drawn from the results of the render thread. They change [`PanelState`] and request everything else by [`Action`].
+//! The panels (egui), drawn from the results of the render thread. They change [`PanelState`] and request everything
+//! else by [`Action`].
 
 mod how;
 mod picture;
@@ -225,7 +226,8 @@ pub fn show(root: &mut Ui, state: &mut PanelState, seen: &RenderState) -> Vec<Ac
     actions
 }
 
-/// Advances a playing animation once the picture of the last time is shown. A scene that is drawn slowly plays slowly, without jumps.
+/// Advances a playing animation once the picture of the last time is shown. A scene that is drawn slowly plays slowly,
+/// without jumps.
 fn play(ui: &Ui, state: &mut PanelState, seen: &RenderState) {
     let now = ui.input(|input| input.time);
     let since = now - std::mem::replace(&mut state.played_at, now);
@@ -241,7 +243,8 @@ fn play(ui: &Ui, state: &mut PanelState, seen: &RenderState) {
     }
 }
 
-/// The top bar: file, device, state of the picture, and buttons. In a narrow window the text is truncated, not the buttons.
+/// The top bar: file, device, state of the picture, and buttons. In a narrow window the text is truncated, not the
+/// buttons.
 fn bar(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, actions: &mut Vec<Action>) {
     let (mut opened, mut asked) = (None, Vec::new());
     let helps = &mut state.help;

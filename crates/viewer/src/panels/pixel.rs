@@ -124,8 +124,8 @@ fn varies(m: &Material) -> bool {
     m.conductor.is_none() && m.dispersion.disperses(f64::from(m.ior))
 }
 
-/// Rows with n and κ, at three wavelengths where they differ, and the Fresnel reflectance of green light. Where only the index decides,
-/// the other wavelengths have their reflectance too.
+/// Rows with n and κ, at three wavelengths where they differ, and the Fresnel reflectance of green light. Where only
+/// the index decides, the other wavelengths have their reflectance too.
 fn indices(row: &mut impl FnMut(&str, String), m: &Material, interaction: Interaction) {
     let [green, _] = m.complex_index(GREEN);
     if m.metallic >= 1.0 && m.conductor.is_none() {

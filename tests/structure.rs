@@ -1,0 +1,224 @@
+//! Structure of glTF files: scenes, variants, hidden nodes, instancing, animation by pointers, and legal ways to write
+//! JSON.
+//!
+//! Read glTF 2.0 section 3.5, KHR_materials_variants, KHR_node_visibility, EXT_mesh_gpu_instancing and
+//! KHR_animation_pointer.
+
+#![allow(clippy::unwrap_used, reason = "a test may stop where it stands")]
+
+use std::path::Path;
+
+use etalon::scene::{LoadOptions, Scene, Source, load};
+use etalon_testing::gltf_builder::{Builder, base64};
+use glam::DVec3;
+use serde_json::{Value, json};
+
+fn loaded(builder: &Builder, options: &LoadOptions) -> anyhow::Result<Scene> {
+    let folder = tempfile::tempdir().unwrap();
+    load(&builder.save_glb(folder.path()), options)
+}
+
+fn refusal(builder: &Builder, options: &LoadOptions) -> String {
+    format!("{:#}", loaded(builder, options).map(|_| ()).expect_err("it loads"))
+}
+
+/// A file with one triangle as mesh 0 and nothing placed.
+fn one_triangle() -> Builder {
+    let mut builder = Builder::new();
+    let positions = builder.triangle();
+    builder.mesh(json!({ "attributes": { "POSITION": positions } }));
+    builder
+}
+
+fn names(scene: &Scene) -> Vec<&str> {
+    scene.instances.iter().map(|instance| instance.name.as_str()).collect()
+}
+
+#[test]
+fn a_scene_of_the_file_is_chosen_by_name_or_index() {
+    let mut builder = one_triangle();
+    builder.json["nodes"] = json!([{ "name": "a", "mesh": 0 }, { "name": "b", "mesh": 0 }]);
+    builder.json["scenes"] = json!([{ "nodes": [0] }, { "name": "second", "nodes": [1] }]);
+    let with = |scene: Option<&str>| LoadOptions { scene: scene.map(str::to_owned), ..LoadOptions::default() };
+    for (wanted, shown) in [(None, "a"), (Some("0"), "a"), (Some("1"), "b"), (Some("second"), "b")] {
+        assert_eq!(names(&loaded(&builder, &with(wanted)).unwrap()), [shown], "{wanted:?}");
+    }
+    let said = refusal(&builder, &with(Some("third")));
+    assert!(said.ends_with("there is no scene \"third\"; the file has 0, 1 \"second\""), "{said}");
+}
+
+#[test]
+fn a_variant_gives_primitives_its_materials() {
+    let mut builder = one_triangle();
+    builder.json["materials"] = json!([{ "name": "plain" }, { "name": "red" }, { "name": "blue" }]);
+    builder.json["extensionsUsed"] = json!(["KHR_materials_variants"]);
+    builder.json["extensions"] =
+        json!({ "KHR_materials_variants": { "variants": [{ "name": "evening" }, { "name": "night" }] } });
+    builder.json["meshes"][0]["primitives"][0]["material"] = json!(0);
+    builder.json["meshes"][0]["primitives"][0]["extensions"] = json!({ "KHR_materials_variants": {
+        "mappings": [{ "material": 1, "variants": [0] }, { "material": 2, "variants": [1] }]
+    } });
+    builder.root(json!({ "mesh": 0 }));
+    let with = |variant: Option<&str>| LoadOptions { variant: variant.map(str::to_owned), ..LoadOptions::default() };
+    for (wanted, name) in [(None, "plain"), (Some("evening"), "red"), (Some("night"), "blue"), (Some("1"), "blue")] {
+        let scene = loaded(&builder, &with(wanted)).unwrap();
+        assert_eq!(scene.materials[scene.meshes[0].material].name, name, "{wanted:?}");
+    }
+    let said = refusal(&builder, &with(Some("noon")));
+    assert!(said.ends_with("there is no variant \"noon\"; the file has \"evening\", \"night\""), "{said}");
+    builder.json["meshes"][0]["primitives"][0]["extensions"]["KHR_materials_variants"]["mappings"][0]["material"] =
+        json!(9);
+    let said = refusal(&builder, &with(Some("evening")));
+    assert!(said.contains("mesh 0 primitive 0: the variant \"evening\" names material 9"), "{said}");
+}
+
+#[test]
+fn hidden_nodes_hide_what_is_below_them() {
+    let mut builder = one_triangle();
+    let hidden = json!({ "KHR_node_visibility": { "visible": false } });
+    builder.json["nodes"] = json!([
+        { "name": "root", "mesh": 0, "children": [1, 2] },
+        { "name": "hidden", "mesh": 0, "extensions": hidden, "children": [3] },
+        { "name": "shown", "mesh": 0, "extensions": { "KHR_node_visibility": { "visible": true } } },
+        { "name": "below", "mesh": 0 },
+    ]);
+    builder.json["scenes"] = json!([{ "nodes": [0] }]);
+    builder.json["extensionsUsed"] = json!(["KHR_node_visibility"]);
+    assert_eq!(names(&loaded(&builder, &LoadOptions::default()).unwrap()), ["root", "shown"]);
+}
+
+#[test]
+fn instancing_places_a_copy_for_each_element() {
+    let mut builder = one_triangle();
+    let at = [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]];
+    let translations = builder.floats("VEC3", at.as_flattened());
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    // The third is turned by a quarter about +Z.
+    let rotations =
+        builder.floats("VEC4", [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, half, half]].as_flattened());
+    let scales = builder.floats("VEC3", [[1.0; 3], [2.0; 3], [1.0; 3]].as_flattened());
+    let attributes = json!({ "TRANSLATION": translations, "ROTATION": rotations, "SCALE": scales });
+    builder.root(json!({
+        "mesh": 0, "translation": [10, 0, 0],
+        "extensions": { "EXT_mesh_gpu_instancing": { "attributes": attributes } },
+    }));
+    builder.json["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
+    builder.json["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing"]);
+    let scene = loaded(&builder, &LoadOptions::default()).unwrap();
+    assert_eq!((scene.meshes.len(), scene.instances.len()), (1, 3));
+    let ends: Vec<DVec3> = scene.instances.iter().map(|i| i.world_from_object.transform_point3(DVec3::X)).collect();
+    for (end, expected) in ends.iter().zip([[12.0, 0.0, 0.0], [12.0, 2.0, 0.0], [10.0, 1.0, 3.0]]) {
+        assert!(end.distance(DVec3::from(expected)) < 1e-6, "{end}");
+    }
+    builder.json["accessors"][translations]["count"] = json!(2);
+    let said = refusal(&builder, &LoadOptions::default());
+    assert!(said.contains("EXT_mesh_gpu_instancing: its attributes have [2, 3, 3] elements"), "{said}");
+}
+
+/// Adds a channel that animates the property at a JSON pointer from the first value to the second in a second.
+fn animate(builder: &mut Builder, pointer: &str, shape: &str, values: &[f32], interpolation: &str) {
+    let input = builder.floats("SCALAR", &[0.0, 1.0]);
+    let output = builder.floats(shape, values);
+    let sampler = json!({ "input": input, "output": output, "interpolation": interpolation });
+    let target = json!({ "path": "pointer", "extensions": { "KHR_animation_pointer": { "pointer": pointer } } });
+    builder.push("animations", json!({ "samplers": [sampler], "channels": [{ "sampler": 0, "target": target }] }));
+    builder.json["extensionsUsed"] = json!(["KHR_animation_pointer", "KHR_node_visibility", "KHR_materials_ior"]);
+}
+
+#[test]
+fn pointers_animate_nodes_materials_and_visibility() {
+    let mut builder = one_triangle();
+    builder.json["materials"] = json!([{ "name": "m" }]);
+    builder.json["meshes"][0]["primitives"][0]["material"] = json!(0);
+    builder.root(json!({ "name": "moved", "mesh": 0 }));
+    builder.root(json!({ "name": "blinking", "mesh": 0 }));
+    animate(&mut builder, "/nodes/0/translation", "VEC3", &[0.0, 0.0, 0.0, 4.0, 0.0, 0.0], "LINEAR");
+    animate(&mut builder, "/nodes/1/extensions/KHR_node_visibility/visible", "SCALAR", &[1.0, 0.0], "STEP");
+    let colour = "/materials/0/pbrMetallicRoughness/baseColorFactor";
+    animate(&mut builder, colour, "VEC4", &[1.0, 1.0, 1.0, 1.0, 0.0, 0.5, 1.0, 1.0], "LINEAR");
+    animate(&mut builder, "/materials/0/extensions/KHR_materials_ior/ior", "SCALAR", &[1.5, 2.5], "LINEAR");
+    let folder = tempfile::tempdir().unwrap();
+    let path = builder.save_glb(folder.path());
+    let at = |time: Option<f64>| load(&path, &LoadOptions { time, ..LoadOptions::default() }).unwrap();
+
+    let rest = at(None);
+    assert_eq!(names(&rest), ["moved", "blinking"]);
+    assert_eq!(rest.materials[0].base_color, [1.0; 4]);
+    let middle = at(Some(0.5));
+    assert_eq!(names(&middle), ["moved", "blinking"]);
+    assert_eq!(middle.instances[0].world_from_object.translation, DVec3::new(2.0, 0.0, 0.0));
+    assert_eq!(middle.materials[0].base_color, [0.5, 0.75, 1.0, 1.0]);
+    assert_eq!(middle.materials[0].ior, 2.0);
+    assert_eq!(names(&at(Some(1.0))), ["moved"]);
+    assert_eq!(rest.duration, Some(1.0));
+
+    // One file read once gives the same scenes.
+    let mut source = Source::open(&path, LoadOptions::default()).unwrap();
+    for time in [Some(0.25), None, Some(1.0), Some(0.5)] {
+        let (again, alone) = (source.at(time).unwrap(), at(time));
+        assert_eq!(names(&again), names(&alone));
+        assert_eq!(again.materials[0].base_color, alone.materials[0].base_color);
+    }
+}
+
+#[test]
+fn pointers_to_nothing_are_refused_by_name() {
+    let mut builder = one_triangle();
+    builder.root(json!({ "mesh": 0 }));
+    animate(&mut builder, "/nodes/7/translation", "VEC3", &[0.0; 6], "LINEAR");
+    assert!(loaded(&builder, &LoadOptions::default()).is_ok());
+    let said = refusal(&builder, &LoadOptions { time: Some(0.5), ..LoadOptions::default() });
+    assert!(said.contains("the pointer /nodes/7/translation: there is no element 7"), "{said}");
+}
+
+#[test]
+fn legal_json_that_the_schema_crate_refuses_is_read() {
+    // Whole numbers as 1.0, a scene without nodes, a channel without a target.
+    let mut builder = one_triangle();
+    builder.root(json!({ "name": "a", "mesh": 0 }));
+    builder.json["scenes"].as_array_mut().unwrap().push(json!({ "name": "empty" }));
+    let times = builder.floats("SCALAR", &[0.0, 1.0]);
+    let values = builder.floats("VEC3", &[0.0; 6]);
+    builder.json["animations"] = json!([{
+        "samplers": [{ "input": times, "output": values }],
+        "channels": [{ "sampler": 0, "target": { "path": "translation" } }],
+    }]);
+    let plain = loaded(&builder, &LoadOptions::default()).unwrap();
+    assert_eq!(names(&plain), ["a"]);
+    assert_eq!(plain.warnings, ["scene.glb: animation 0 channel 0 has no target node and is ignored"]);
+
+    fn as_floats(value: &mut Value) {
+        match value {
+            Value::Number(number) => *value = json!(number.as_f64().unwrap()),
+            Value::Array(values) => values.iter_mut().for_each(as_floats),
+            Value::Object(members) => members.values_mut().for_each(as_floats),
+            _ => {}
+        }
+    }
+    let uri = format!("data:application/octet-stream;base64,{}", base64(&builder.bytes));
+    let mut json = builder.json.clone();
+    json["buffers"] = json!([{ "byteLength": builder.bytes.len(), "uri": uri }]);
+    as_floats(&mut json);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.gltf");
+    std::fs::write(&path, json.to_string()).unwrap();
+    assert!(std::fs::read_to_string(&path).unwrap().contains("\"byteLength\":36.0"));
+    let floats = load(&path, &LoadOptions::default()).unwrap();
+    assert_eq!(floats.meshes[0].positions[..], plain.meshes[0].positions[..]);
+
+    // What is broken is still named as before.
+    std::fs::write(&path, r#"{ "asset": { "version": 2 } }"#).unwrap();
+    let said = format!("{:#}", load(Path::new(&path), &LoadOptions::default()).map(|_| ()).unwrap_err());
+    assert!(said.contains("the JSON cannot be read as glTF 2.0"), "{said}");
+}
+
+#[test]
+fn a_draft_version_is_read_with_a_warning() {
+    let mut builder = one_triangle();
+    builder.root(json!({ "mesh": 0 }));
+    builder.json["asset"]["minVersion"] = json!("2.1");
+    let scene = loaded(&builder, &LoadOptions::default()).unwrap();
+    assert_eq!(scene.warnings, ["scene.glb: the file asks for glTF 2.1, a draft; it is read as glTF 2.0"]);
+    builder.json["asset"]["minVersion"] = json!("3.0");
+    assert!(refusal(&builder, &LoadOptions::default()).contains("\"3.0\""));
+}
