@@ -25,6 +25,7 @@ use crate::gpu::{Buffer, DescriptorSet, Device, Frame, Image, PassPlan, Place};
 use crate::image::Picture;
 use crate::image::tone::ToneMap;
 use crate::pass::accumulate::accumulate;
+use crate::pass::ambient::ambient;
 use crate::pass::background::background;
 use crate::pass::classify::{classify, classify_fragments};
 use crate::pass::composite::{Behind, composite};
@@ -50,7 +51,8 @@ use crate::scene::environment::Environment;
 use crate::scene::wavelengths::Slice;
 use crate::share;
 use crate::spectra::VISIBLE;
-use crate::upload::environment::{EnvironmentOnDevice, EnvironmentRotation};
+use crate::transport::emitters::Sky;
+use crate::upload::environment::{EnvironmentOnDevice, EnvironmentRotation, sky_directions};
 use crate::upload::rays::{BvhFacts, RaysOnDevice};
 use crate::upload::scene::SceneOnDevice;
 use crate::upload::shared::{Library, OnDevice};
@@ -80,6 +82,8 @@ pub struct Renderer {
     rays: RaysOnDevice,
     shadow_maps: ShadowMaps,
     environment: EnvironmentOnDevice,
+    /// Directions of ambient occlusion.
+    sky_directions: Option<Buffer>,
     targets: Targets,
     camera: Buffer,
     /// The scene's descriptor sets, which all programs read.
@@ -163,6 +167,7 @@ impl Renderer {
             warnings.push(format!("layer {}: no surface of this scene sends such rays, the layer is 0", part.name()));
         }
         // A forced environment effect without an environment uses a black one.
+        let environment_map = environment;
         let dark = (plan.environment && environment.is_none()).then(Environment::dark);
         let turn =
             EnvironmentRotation { intensity: settings.environment_intensity, rotation: settings.environment_rotation };
@@ -180,6 +185,12 @@ impl Renderer {
             Some(around) => around,
             None => EnvironmentOnDevice::new(device, &plan, environment.or(dark.as_ref()), turn)?,
         };
+        let sky = environment_map.or(dark.as_ref()).map(|map| Sky {
+            map,
+            intensity: settings.environment_intensity,
+            rotation: settings.environment_rotation,
+        });
+        let sky_directions = sky_directions(device, &plan, sky, settings.seed)?;
         let shadow_maps = ShadowMaps::new(device, &plan, &name, &mut scene, rays.anchor())?;
         let camera = Buffer::new(device, "camera", size_of::<share::Camera>() as u64, Place::Upload)?;
         let on_device = OnDevice {
@@ -192,6 +203,7 @@ impl Renderer {
         Ok(Self {
             sets: on_device.write(device)?,
             environment,
+            sky_directions,
             shadow_maps,
             scene,
             rays,
@@ -498,6 +510,9 @@ impl Renderer {
             classify(&mut frame, library, g, work)?;
         }
         light(&mut frame, lighting, g, work, radiance)?;
+        if let Some(directions) = &self.sky_directions {
+            ambient(&mut frame, lighting, g, work, directions, radiance)?;
+        }
         background(&mut frame, lighting, g, work, radiance)?;
         if let Some(with) = plan.rays.filter(|rays| rays.mirrors || rays.refraction) {
             interact(&mut frame, lighting, with, g, &self.targets.ray_tiles, radiance, None)?;

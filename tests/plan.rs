@@ -111,6 +111,8 @@ impl Case {
 
     fn check(self) -> [Drawn; 2] {
         let Self { effect, reason, scenes, environments, choices, brings, same } = self;
+        // Ambient occlusion is a case of its own: its rays would call for what other effects bring.
+        let choices = &[&["indirect=ambient"], choices].concat();
         let [without, with] = [0, 1].map(|i| draw(&scenes[i].0, environments[i].as_ref(), choices));
         assert_eq!(state(&without.plan, effect), ("not needed", reason.to_owned()), "{effect}");
         assert_eq!(state(&with.plan, effect).0, "used", "{effect}: {}", state(&with.plan, effect).1);
@@ -284,6 +286,14 @@ fn media_bring_their_code() {
     .check();
 }
 
+/// What ambient occlusion brings to a scene without lights and mirrors, with its environment.
+const OF_OCCLUSION: &[&[&str]] = &[
+    &["BVH nodes", "BVH triangles", "corners for rays", "leaf places", "[reset work counts]", "work counts"],
+    &["G-buffer triangles", "light.stored_triangles"],
+    &["environment", "background.sky", "directional reflectance"],
+    &["[ambient occlusion]", "ambient", "sky directions"],
+];
+
 #[test]
 fn light_from_all_around_is_there_where_it_is_seen() {
     let scatters = "no visible material scatters light";
@@ -299,6 +309,15 @@ fn light_from_all_around_is_there_where_it_is_seen() {
     Case {
         brings: &[&["prefiltered environment", "light.reflection"]],
         ..Case::hidden("environment reflection", mirrors, air, metal(0.5))
+    }
+    .check();
+    let occluded = Case::new("ambient occlusion", "there is no environment", ball(chalk(), None), ball(chalk(), None));
+    Case {
+        environments: [None, Some(Environment::studio())],
+        choices: &["indirect=occlusion:4"],
+        same: false,
+        brings: OF_OCCLUSION,
+        ..occluded
     }
     .check();
     let around =

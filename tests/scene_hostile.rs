@@ -263,7 +263,7 @@ fn glb_headers_and_chunks_are_checked() {
         refuse(&path)
     };
     for (at, value, expected) in [
-        (0, 0, "magic"),
+        (0, 0, "it is no GLB file"),
         (4, 1, "version 1"),
         (8, 99, "says 99 bytes"),
         (12, u32::MAX, "GLB chunk 0 claims 4294967295 bytes"),

@@ -4,7 +4,7 @@
 #ifndef LIGHTING_GLSL
 #define LIGHTING_GLSL
 #include "lib/encode.glsl"
-#include "lib/environment.glsl"
+#include "lib/environment_light.glsl"
 #include "lib/light_tile.glsl"
 #include "lib/punctual.glsl"
 #include "lib/layers.glsl"
@@ -12,8 +12,6 @@
 
 layout(constant) const uint LOCAL_LIGHTS = 0;       // point and spot lights after the directional ones; 0 where tiles list them
 layout(constant) const uint TILE_WORDS = 0;         // 32-bit words of a tile's bit mask; 0 without tiled light culling
-layout(constant) const bool AMBIENT = false;        // ambient light: the environment's irradiance on diffuse surfaces
-layout(constant) const bool REFLECTION = false;     // the prefiltered environment in specular lobes
 
 layout(pass, scalar) readonly buffer TileLights { uint tile_lights[]; };
 
@@ -76,22 +74,6 @@ vec3 punctual_light(Layers b, ivec2 pixel, uint tiles_across, LightRange range) 
         sum += light_on(b, index);
     }
     return sum;
-}
-
-// Environment lighting: irradiance on the diffuse part, the prefiltered map in the direction of reflection on the specular
-// part.
-vec3 environment_light(Surface s) {
-    vec3 r = reflect_ray(-s.v, s.n).R;
-    BaseAlbedo albedo = albedo_of_base(s, lobe_reflectance(s));
-    vec3 result = vec3(0.0);
-    if (AMBIENT) result += scattered_radiance(s, albedo, environment_irradiance(s.n));
-    if (REFLECTION && !s.base_traced) result += albedo.base * prefiltered_radiance(r, s.alpha);
-    if (CLEARCOAT) {
-        vec3 coat_r = reflect_ray(-s.v, s.n_coat).R;
-        result *= BRDF == BRDF_GGX_MULTI ? 1.0 - min(albedo_of_coat(s), 1.0) : under_coat(s);
-        if (REFLECTION && !s.coat_traced) result += albedo_of_coat(s) * prefiltered_radiance(coat_r, s.clearcoat_alpha);
-    }
-    return result * s.occlusion;
 }
 
 // Radiance to the eye of a compensated surface, from the lights in `range`; with `all_around` also emission and

@@ -7,7 +7,7 @@
 #extension GL_KHR_shader_subgroup_arithmetic : require
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "lib/lighting.glsl"
-#include "lib/primary.glsl"
+#include "lib/lit_surface.glsl"
 #include "lib/work_count.glsl"
 #include "lib/work_tile.glsl"
 
@@ -22,23 +22,12 @@ void main() {
     if (place >= work.surface_size.count) return;
     ivec2 pixel = first_pixel(surface_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
-    Primary primary = primary_surface(pixel, false);
-    if (!primary.drawn) return;
-    Surface s = primary.hit.s;
-    s.diffuse *= 1.0 - primary.hit.transmits;
-    bool hidden = false;
-    if (IN_MEDIUM && primary.hit.transmits > 0.0 && s.metallic < 1.0 && !primary.hit.sheet) {
-        // As in interact.comp: inside a solid reflections are traced by rays, and an interface suppressed by priority does
-        // nothing.
-        s.base_traced = true;
-        uint medium = material_at(primary.hit.material).medium;
-        uvec4 beyond = primary.hit.front ? entered(s.media, medium) : left(s.media, medium);
-        hidden = present_medium(beyond) == present_medium(s.media);
-    }
-    compensate(s);
+    LitSurface lit = lit_surface(pixel);
+    if (!lit.drawn) return;
+    Surface s = lit.s;
     uint tiles_across = (camera.size.x + TILE - 1) / TILE;
     vec3 result = radiance_to_eye(s, pixel, tiles_across, range, first_dispatch != 0) * left_at_eye(s);
-    if (hidden) result = vec3(0.0);
+    if (lit.suppressed) result = vec3(0.0);
     if (first_dispatch == 0) result += imageLoad(radiance, pixel).rgb;
     imageStore(radiance, pixel, vec4(result, 1.0));
     if (SHADOWS == SHADOW_RAY) count_rays(0, 0, 0.0, 0.0);

@@ -24,11 +24,15 @@ pub fn light<'a>(
     let mut library = lighting.library;
     // Without shadow rays, and with the eye outside of closed meshes, the pass sends no ray: one pipeline for all
     // plans.
-    if !library.gbuffer.stored_triangles {
+    if !(lighting.shadow_rays() || library.primary.in_medium) {
         library.trace = lib::trace::Constants::default();
         library.hit = lib::hit::Constants::default();
         library.sigma_grid = lib::sigma_grid::Constants::default();
         library.shadow = lib::shadow::Constants { shadows: library.shadow.shadows, ..Default::default() };
+    }
+    if lighting.plan.occlusion_rays() > 0 {
+        // The pass of ambient occlusion adds the environment's light.
+        library.environment_light = lib::environment_light::Constants::default();
     }
     let constants = light::Constants { library };
     let bind = light::Bind {

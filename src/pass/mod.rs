@@ -4,6 +4,7 @@
 //! `shaders/lib/`.
 
 pub mod accumulate;
+pub mod ambient;
 pub mod aov;
 pub mod background;
 pub mod classify;

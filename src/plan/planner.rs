@@ -105,6 +105,8 @@ struct MirrorImages {
     mirrored: bool,
     prefilter: bool,
     ambient: bool,
+    /// Rays of ambient occlusion.
+    occlusion: u32,
     roughest: f32,
     by_rays: bool,
     screen: Screen,
@@ -232,8 +234,13 @@ impl Planner<'_> {
         let cause = shown(surfaces.any(scatters), "no visible material scatters light");
         let by_rung = knobs.indirect.choice().allows(knobs.indirect != Indirect::Off);
         let ambient = decisions.decide_with(EffectId::AmbientLight, unless_paths(paths, by_rung), cause);
+        let cause = shown(ambient || reflection, "no surface is lit by an environment");
+        let rays = knobs.indirect.occlusion_rays();
+        let by_rung = knobs.indirect.choice().allows(rays > 0);
+        let occluded = decisions.decide_with(EffectId::AmbientOcclusion, unless_paths(paths, by_rung), cause);
         let environment = environment || reflection || ambient;
-        MirrorImages { environment, mirrored: reflection, prefilter, ambient, roughest, by_rays, screen }
+        let occlusion = if occluded { rays } else { 0 };
+        MirrorImages { environment, mirrored: reflection, prefilter, ambient, occlusion, roughest, by_rays, screen }
     }
 
     fn lights(&mut self, followed: Option<Paths>) -> Lights {
@@ -383,7 +390,8 @@ impl Planner<'_> {
         let Self { surfaces, decisions, knobs, surroundings, paths, .. } = self;
         let shadows = lights.shadows && knobs.shadows == Shadows::Ray;
         let (refraction, mirrors) = (transmission.by_rays, images.by_rays);
-        if !(shadows || mirrors || refraction || *paths) {
+        let occlusion = images.occlusion;
+        if !(shadows || mirrors || refraction || *paths || occlusion > 0) {
             return None;
         }
         let holes = |m: &Material| matches!(m.alpha_mode, AlphaMode::Mask(_));
@@ -395,7 +403,7 @@ impl Planner<'_> {
                 || m.alpha_mode == AlphaMode::Blend
                 || (m.transmission > 0.0 && (!*paths || m.ior == 1.0 || surfaces.is_sheet(m)))
         };
-        let cause = match shadows || *paths {
+        let cause = match shadows || *paths || occlusion > 0 {
             true => surfaces.cause(lets_through, |_| "is masked, blended or transmissive".to_owned()),
             false => Cause::against("no shadow rays are traced"),
         };
@@ -434,6 +442,7 @@ impl Planner<'_> {
         Some(Rays {
             shadows,
             mirrors,
+            occlusion,
             refraction,
             transmissive,
             masked,

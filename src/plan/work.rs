@@ -83,6 +83,8 @@ pub struct Rays {
     pub shadows: bool,
     /// Reflection rays from surfaces up to [`Plan::roughest_mirror`].
     pub mirrors: bool,
+    /// Rays of ambient occlusion over the hemisphere of each surface in the picture; 0 without it.
+    pub occlusion: u32,
     /// Refraction rays at transmissive surfaces, which are then in the G-buffer.
     pub refraction: bool,
     /// Rays can hit transmissive surfaces.
@@ -169,6 +171,12 @@ pub struct Screen {
 }
 
 impl Plan {
+    /// Rays of ambient occlusion over the hemisphere of each surface in the picture; 0 without it.
+    #[must_use]
+    pub fn occlusion_rays(&self) -> u32 {
+        self.rays.map_or(0, |rays| rays.occlusion)
+    }
+
     /// Ray marching through grids of σ.
     #[must_use]
     pub fn march(&self) -> March {

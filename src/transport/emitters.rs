@@ -6,6 +6,8 @@
 //! bin by binary search, and every bin has at least one word. Units: radiance in the scene's units, areas in square
 //! metres.
 
+use std::f64::consts::{PI, TAU};
+
 use glam::{DMat3, DVec3};
 
 use crate::image::tone::srgb_decode;
@@ -212,7 +214,8 @@ const MOST_ROWS: u32 = 256;
 
 impl EnvironmentCdf {
     /// The CDF in proportion to each cell's mean radiance times its solid angle.
-    fn of(map: &Environment) -> Self {
+    #[must_use]
+    pub fn of(map: &Environment) -> Self {
         let (rows, columns) = (map.height.min(MOST_ROWS), map.width.min(2 * MOST_ROWS));
         let (width, height) = (map.width as usize, map.height as usize);
         // Neighbouring texels count, too, because bilinear interpolation mixes them in.
@@ -246,6 +249,47 @@ impl EnvironmentCdf {
             words.extend(shares(row).into_iter().map(|(first, _)| first));
         }
         Self { columns, rows, words, rotation: 0.0 }
+    }
+
+    /// The cell of two numbers in [0, 1), and where in it they are: column, row, and fractions across and down.
+    fn cell(&self, [x, y]: [f64; 2]) -> ([usize; 2], [f64; 2]) {
+        const ALL: f64 = 4_294_967_296.0;
+        let (columns, rows) = (self.columns as usize, self.rows as usize);
+        let find = |firsts: &[u32], at: f64| {
+            let word = at * ALL;
+            let found = firsts.partition_point(|&first| f64::from(first) <= word).max(1) - 1;
+            let (first, next) = (f64::from(firsts[found]), firsts.get(found + 1).map_or(ALL, |&next| f64::from(next)));
+            (found, ((word - first) / (next - first)).clamp(0.0, 1.0))
+        };
+        let (row, down) = find(&self.words[..rows], y);
+        let (column, across) = find(&self.words[rows + row * columns..][..columns], x);
+        ([column, row], [across, down])
+    }
+
+    /// A direction in the map's axes, from two numbers in [0, 1).
+    #[must_use]
+    pub fn sample(&self, numbers: [f64; 2]) -> DVec3 {
+        let ([column, row], [across, down]) = self.cell(numbers);
+        let at = |i: usize, part: f64, of: u32| (i as f64 + part) / f64::from(of);
+        direction(at(column, across, self.columns), at(row, down, self.rows))
+    }
+
+    /// Density per solid angle of a direction in the map's axes.
+    #[must_use]
+    pub fn density(&self, d: DVec3) -> f64 {
+        const ALL: f64 = 4_294_967_296.0;
+        let (columns, rows) = (self.columns as usize, self.rows as usize);
+        let [u, v] = [d.z.atan2(d.x) / TAU + 0.5, 0.5 - d.y.clamp(-1.0, 1.0).asin() / PI];
+        let row = ((v * rows as f64) as usize).min(rows - 1);
+        let column = ((u * columns as f64) as usize).min(columns - 1);
+        let share = |firsts: &[u32], i: usize| {
+            (firsts.get(i + 1).map_or(ALL, |&next| f64::from(next)) - f64::from(firsts[i])) / ALL
+        };
+        let probability =
+            share(&self.words[..rows], row) * share(&self.words[rows + row * columns..][..columns], column);
+        // Samples are even over v within a cell, so the density has the sine of the direction itself.
+        let sin = (1.0 - d.y * d.y).max(1e-12).sqrt();
+        probability * (rows * columns) as f64 / (2.0 * PI * PI * sin)
     }
 
     /// Samples a world-space direction with two random words: `sample_environment` of shaders/lib/emitters.glsl without

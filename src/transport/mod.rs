@@ -14,3 +14,4 @@ mod line;
 pub mod photon_guiding;
 mod ploc;
 pub mod sight;
+pub mod sky_directions;

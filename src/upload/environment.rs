@@ -19,7 +19,9 @@ use crate::plan::Plan;
 use crate::scene::environment::Environment;
 use crate::scene::lobe::LOBES;
 use crate::shader::prefilter;
-use crate::share;
+use crate::share::{self, SkyDirection};
+use crate::transport;
+use crate::transport::emitters::Sky;
 
 /// Largest width of the prefiltered map's level 0; a wider environment enters at the first mip level that fits.
 const WIDEST: u32 = 1024;
@@ -296,6 +298,20 @@ fn directional_reflectance(cos_v: f64, roughness: f64) -> [f64; 2] {
         }
     }
     sum.map(|s| s / f64::from(SAMPLES))
+}
+
+/// The directions of ambient occlusion for all samples of a pixel; `None` without it.
+///
+/// # Errors
+/// When memory is short.
+pub fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, seed: u32) -> Result<Option<Buffer>> {
+    let Some(sky) = sky.filter(|_| plan.occlusion_rays() > 0) else { return Ok(None) };
+    let directions = transport::sky_directions::sky_directions(sky, plan.occlusion_rays() * plan.samples, seed);
+    let directions: Vec<SkyDirection> = directions
+        .iter()
+        .map(|at| SkyDirection { direction: at.direction.as_vec3().to_array(), weight: at.weight.map(|w| w as f32) })
+        .collect();
+    Buffer::with_data(device, "sky directions", &directions).map(Some)
 }
 
 #[cfg(test)]

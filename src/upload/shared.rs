@@ -110,6 +110,12 @@ impl<'a> OnDevice<'a> {
                 cdf_rows: emitters.rows,
                 cdf_search_steps: binary_search_steps(emitters.columns.max(emitters.rows)),
             },
+            ambient_occlusion: lib::ambient_occlusion::Constants {
+                occlusion_rays: with.occlusion,
+                // Screen-space reflection takes away the whole lobe of the environment, so it has to be whole.
+                lobe_rays: if plan.screen.mirrors { 0 } else { with.occlusion.div_ceil(4) },
+            },
+            environment_light: lib::environment_light::Constants { ambient: plan.ambient, reflection: plan.reflection },
             environment: lib::environment::Constants { sky: plan.sky, environment: plan.environment },
             fresnel: lib::fresnel::Constants { faint_conductors: plan.faint_conductors },
             gbuffer: lib::gbuffer::Constants {
@@ -117,7 +123,7 @@ impl<'a> OnDevice<'a> {
                 positions: plan.stored.positions,
                 stored_emissive: plan.emissive,
                 stored_layers: plan.layers,
-                stored_triangles: shadow_rays || rays.inside(),
+                stored_triangles: shadow_rays || rays.inside() || with.occlusion > 0,
                 stored_transmission: with.refraction,
             },
             gbuffer_interface: lib::gbuffer_interface::Constants::default(),
@@ -129,8 +135,6 @@ impl<'a> OnDevice<'a> {
                 // With tiled light culling no pixel loops over all local lights.
                 local_lights: if plan.tiles { 0 } else { plan.local_lights },
                 tile_words,
-                ambient: plan.ambient,
-                reflection: plan.reflection,
                 light_budget: u32::MAX,
             },
             loops: match scene.device().limits_loops() {

@@ -105,7 +105,7 @@ fn pictures_that_cannot_be_compared() {
     let error = compare(Metric::Mse, &grey(2, 3, 0), &grey(3, 2, 0)).unwrap_err().to_string();
     assert_eq!(error, "the pictures have different sizes, 2x3 and 3x2");
     let error = compare(Metric::Mse, &grey(2, 2, 0), &linear(2, 2, 0.0)).unwrap_err().to_string();
-    assert_eq!(error, "one picture holds scene-linear radiance and the other display values");
+    assert_eq!(error, "cannot compare a picture of radiance (EXR) with one of display values (PNG, JPEG, WebP)");
 }
 
 #[test]

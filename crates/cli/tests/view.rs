@@ -201,13 +201,13 @@ fn time_passes_and_settings_are_compared() {
     viewer.key(V, None);
     let knob = KNOBS.iter().position(|knob| knob.name == "indirect").expect("a knob");
     (0..=knob).for_each(|_| viewer.key(DOWN, None));
-    viewer.key(LEFT, None);
+    // From the model's ambient occlusion by sixteen rays over four rays and plain ambient light to none.
+    (0..3).for_each(|_| viewer.key(LEFT, None));
     viewer.key(ESCAPE, None);
     viewer.key(C, None);
     let left = viewer.line();
     viewer.key(ESCAPE, None);
     assert_eq!(left, played, "the left side is as before");
-    // From the model's ambient light to none.
     let (size, expected_left) = drawn(folder, &left);
     let (_, expected_right) = drawn(folder, &left.replace("-o picture.png", "--set indirect=off -o picture.png"));
     // The first rows and the last are covered by figures.

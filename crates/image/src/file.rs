@@ -106,7 +106,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
         }
         Ok(())
     };
-    check().with_context(|| format!("checking that {} can be written", path.display()))
+    check().with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// A temporary file in the folder of `target` that is removed unless it is persisted.

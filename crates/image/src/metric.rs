@@ -150,7 +150,7 @@ pub fn compare(metric: Metric, a: &AnyPicture, b: &AnyPicture) -> Result<Compari
         b.size().1
     );
     if a.space() != b.space() {
-        bail!("one picture holds scene-linear radiance and the other display values");
+        bail!("cannot compare a picture of radiance (EXR) with one of display values (PNG, JPEG, WebP)");
     }
     ensure!(width > 0 && height > 0, "the pictures have no pixels");
     let (mut first, mut second) = (a.values(), b.values());

@@ -174,7 +174,7 @@ fn word(bytes: &[u8], at: usize) -> Option<u32> {
 }
 
 fn split_glb(bytes: &[u8]) -> Result<Parts<'_>> {
-    ensure!(bytes.starts_with(b"glTF"), "the file does not begin with the GLB magic \"glTF\"");
+    ensure!(bytes.starts_with(b"glTF"), "it is no GLB file: its header \"glTF\" is missing");
     let version = word(bytes, 4).context("the GLB header ends early")?;
     ensure!(version == 2, "the GLB header says version {version}; only version 2 is supported");
     let length = word(bytes, 8).context("the GLB header ends early")?;
@@ -230,7 +230,7 @@ fn check_extensions(root: &Root, warnings: &mut Vec<String>) -> Result<()> {
     }
     for name in &root.extensions_used {
         if !is_supported(name) {
-            warnings.push(format!("the optional extension {name} is not supported; the scene is read without it"));
+            warnings.push(format!("{name} is not supported and is ignored"));
         }
     }
     Ok(())

@@ -94,18 +94,22 @@ fn ktx2_size(bytes: &[u8]) -> Result<[u32; 2]> {
 pub(crate) fn decode_ktx2(name: String, bytes: &[u8]) -> Result<Image> {
     let [width, height] = ktx2_size(bytes)?;
     let fault = |error: basisu::Error| anyhow!("the Basis Universal data cannot be decoded: {error:?}");
-    // The transcoder walks key/value data without checking its lengths, and a still picture needs none: the copy has
-    // none.
+    // The transcoder walks key/value data without checking its lengths, and a still picture needs none: the copy has none.
     let mut file = bytes.to_vec();
     file[KEY_VALUE_WORDS].fill(0);
-    let transcoder = Transcoder::new(&file).map_err(fault)?;
-    let source = transcoder.source_format();
-    ensure!(
-        matches!(source, SourceFormat::Etc1s | SourceFormat::UastcLdr),
-        "the KTX2 file holds {source:?}; KHR_texture_basisu has ETC1S and UASTC"
-    );
-    // Mip levels of the file are not read: its picture gets mip levels as all others do.
-    let rgba = transcoder.transcode(0, TargetFormat::Rgba32, DecodeFlags::NONE).map_err(fault)?;
+    let transcode = || {
+        let transcoder = Transcoder::new(&file).map_err(fault)?;
+        let source = transcoder.source_format();
+        ensure!(
+            matches!(source, SourceFormat::Etc1s | SourceFormat::UastcLdr),
+            "the KTX2 file holds {source:?}; KHR_texture_basisu has ETC1S and UASTC"
+        );
+        // Mip levels of the file are not read: its picture gets mip levels as all others do.
+        transcoder.transcode(0, TargetFormat::Rgba32, DecodeFlags::NONE).map_err(fault)
+    };
+    // Broken Huffman tables lead the transcoder past the end of its own lists, which it takes for a mistake of its own.
+    let rgba = std::panic::catch_unwind(transcode)
+        .map_err(|_| anyhow!("the Basis Universal data cannot be decoded: its tables are broken"))??;
     let expected = 4 * width as usize * height as usize;
     ensure!(rgba.len() == expected, "the Basis Universal data has {} bytes for {width}x{height} texels", rgba.len());
     Ok(Image { name, width, height, rgba: rgba.into() })

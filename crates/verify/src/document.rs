@@ -71,8 +71,8 @@ pub fn verified() -> String {
         "# What is verified is what draws\n\n\
          Written by a test (`crates/verify/tests/catalogue.rs`) from the tags in `shaders/lib/` and `crates/verify/src/statements.rs`. Ids are those\n\
          of [lecture.md](lecture.md); N and a number is a row of [numerics.md](numerics.md). A function is called by passes of\n\
-         `shaders/pass/`, or computed by host code of the renderer, or it is a laboratory form: pictures do not call it, and a test\n\
-         compares it with the function that they use. The build fails if neither a pass nor an equation uses a function of\n\
+         `shaders/pass/`, or computed by host code of the renderer (by its twin, or in another way, and a test compares the two), or it\n\
+         is a laboratory form: pictures do not call it, and a test compares it with the function that they use. The build fails if neither a pass nor an equation uses a function of\n\
          `shaders/lib/`. Names are those of `etalon eval`. In GLSL `reflect` and `refract` are called `reflect_ray` and `refract_ray`,\n\
          because GLSL has built-ins of these names. Rows F2 to F5 of lecture.md name the functions that call theirs.\n\n",
     );

@@ -134,8 +134,8 @@ impl Knobs {
     /// Whether ambient occlusion can be visible: on the environment's light, or on screen-space reflections.
     #[must_use]
     pub fn show_occlusion(&self, environment: bool) -> bool {
-        // Path tracing computes occlusion itself.
-        if self.indirect == Indirect::Path {
+        // Paths and rays of ambient occlusion compute it themselves.
+        if self.indirect == Indirect::Path || self.indirect.occlusion_rays() > 0 {
             return false;
         }
         let around = self.indirect != Indirect::Off || self.reflection != Reflection::Off;

@@ -38,6 +38,8 @@ effects! {
         "a surface or clear coat that is smooth enough for the rung of `lobes`" => "by rays: the BVH, tile lists, the ray tree; in screen space: a copy of the picture, passes",
     AmbientLight = "ambient light":
         "an environment, and a surface with a diffuse part" => "code",
+    AmbientOcclusion = "ambient occlusion":
+        "the environment's light on a surface, with `indirect=occlusion:N`" => "the BVH, a pass",
     PunctualLights = "punctual lights":
         "a light that shines and reaches a surface that it lights" => "the light table; code",
     Shadows = "shadows":
@@ -126,10 +128,10 @@ pub struct Knob {
 pub enum Model {
     /// Direct light with shadow maps; the environment as ambient light and reflection.
     Local,
-    /// Adds ray-traced shadows, reflection and refraction.
+    /// Adds ray-traced shadows, ambient occlusion, reflections and refraction.
     #[default]
     Recursive,
-    /// Path tracing: indirect light between all surfaces.
+    /// Path tracing: full indirect light.
     Global,
 }
 
@@ -262,12 +264,23 @@ knob! {
 }
 
 knob! {
-    Indirect = "indirect" { Off = "off", Ambient = "ambient", Path = "path" }
-    presets: [Ambient, Ambient, Path],
+    Indirect = "indirect" {
+        Off = "off", Ambient = "ambient", Occlusion4 = "occlusion:4", Occlusion16 = "occlusion:16",
+        Occlusion64 = "occlusion:64", Path = "path",
+    }
+    presets: [Ambient, Occlusion16, Path],
     exact: Path,
     lecture: ["R6"],
-    effects: [PathTracing, AmbientLight],
-    about: "indirect light: none, unshadowed ambient light of the environment, path tracing",
+    effects: [PathTracing, AmbientLight, AmbientOcclusion],
+    about: "indirect light: none, unshadowed ambient light of the environment, the same with N rays of ambient occlusion, path tracing",
+}
+
+impl Indirect {
+    /// Rays of ambient occlusion; 0 for rungs without it.
+    #[must_use]
+    pub fn occlusion_rays(self) -> u32 {
+        number(self.name(), "occlusion:").unwrap_or(0)
+    }
 }
 
 knob! {

@@ -1,0 +1,100 @@
+// Ray-traced ambient occlusion: light of the environment on a surface, with the visibility of the environment.
+// 1. Irradiance. Directions l are drawn from the environment's radiance and from the sphere, once for all pixels
+//    (src/transport/sky_directions.rs), with weights w = L/p. Σ w cos θ V / Σ w cos θ is the share of the irradiance that
+//    arrives; it multiplies the irradiance without occluders. The ratio is 1 where nothing occludes, whatever the
+//    directions are, and neighbouring pixels have no noise between them.
+// 2. Lobes. Rays sampled by the VNDF give the share of the lobe that sees the environment; it multiplies the prefiltered
+//    radiance (split sum).
+// 3. Interreflection. An occluded direction sees another surface. It is taken to have the same albedo ρ and the same
+//    irradiance E as this one, as inside a concavity: E = V E₀ + (1 − V) ρ E, so E = V E₀ / (1 − ρ (1 − V)).
+// Where to read: RTR 4, section 11.3 (ambient occlusion, interreflections); Stewart and Langer 1997 (concavities).
+// Assumes: bvh space, metres; a compensated surface.
+#ifndef AMBIENT_OCCLUSION_GLSL
+#define AMBIENT_OCCLUSION_GLSL
+#include "lib/environment_light.glsl"
+#include "lib/loops.glsl"
+#include "lib/random.glsl"
+#include "lib/shadow.glsl"
+#include "share/sky_direction.glsl"
+
+layout(constant) const uint OCCLUSION_RAYS = 1; // for each sample of a pixel
+layout(constant) const uint LOBE_RAYS = 1;      // in each specular lobe; 0: lobes are not occluded
+
+layout(pass, scalar) readonly buffer SkyDirections { SkyDirection sky_directions[]; };
+
+// Events of the random numbers, after those of reflection and refraction. All pixels have the same numbers.
+const uint BASE_LOBE_EVENT = 0x400u;
+const uint COAT_LOBE_EVENT = 0x401u;
+
+vec3 visibility_of_environment(Surface s, vec3 direction, bool wanted) {
+    return visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, direction, LARGEST, wanted);
+}
+
+// Share of the irradiance that arrives. Directions between the triangle's plane and that of the interpolated normal count
+// nowhere: a smooth convex mesh does not occlude itself.
+vec3 visible_irradiance(Surface s) {
+    vec3 seen = vec3(0.0);
+    vec3 all = vec3(0.0);
+    for (uint i = 0; i < OCCLUSION_RAYS && loop_iterations < LOOP_BUDGET; i++) {
+        SkyDirection sky = sky_directions[trace_terms.sample_index * OCCLUSION_RAYS + i];
+        float cos_l = dot(s.n_triangle, sky.direction) > 0.0 ? max(dot(s.n, sky.direction), 0.0) : 0.0;
+        vec3 weight = light_of_environment(sky.weight) * cos_l;
+        seen += weight * visibility_of_environment(s, sky.direction, cos_l > 0.0);
+        all += weight;
+    }
+    return mix(vec3(1.0), seen / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
+}
+
+// Share of a specular lobe that sees the environment, by the weights of its directions.
+vec3 visible_lobe(Surface s, vec3 n, float alpha, uint event) {
+    vec3 seen = vec3(0.0);
+    float all = 0.0;
+    for (uint i = 0; i < LOBE_RAYS && loop_iterations < LOOP_BUDGET; i++) {
+        uint index = trace_terms.sample_index * LOBE_RAYS + i;
+        vec3 h = half_vector(n, s.v, alpha, random_point(uvec2(0), event, trace_terms.seed, index));
+        vec3 r = reflect_ray(-s.v, h).R;
+        float weight = unshadowed(n, s.v, r, s.n_triangle, alpha);
+        seen += weight * visibility_of_environment(s, r, weight > 0.0);
+        all += weight;
+    }
+    return all > 0.0 ? seen / all : vec3(1.0);
+}
+
+// Irradiance in a concavity of this albedo: `irradiance` without occluders, of which the share `visible` arrives.
+vec3 concavity_irradiance(vec3 irradiance, vec3 visible, vec3 albedo) {
+    return irradiance * visible / (1.0 - min(albedo, 0.98) * (1.0 - visible));
+}
+
+// The radiance in a lobe of which the share `visible` sees the environment. Not mix(): a driver's compiler expands that in one
+// of two ways, by what else stands in the program.
+vec3 partly_occluded(vec3 open, vec3 beside, vec3 visible) {
+    precise vec3 seen = open * visible;
+    precise vec3 occluded = beside * (1.0 - visible);
+    precise vec3 sum = seen + occluded;
+    return sum;
+}
+
+vec3 occluded_environment_light(Surface s) {
+    BaseAlbedo albedo = albedo_of_base(s, lobe_reflectance(s));
+    // The albedo of diffuse reflection, by an irradiance of π, and that of the lobes.
+    vec3 all = scattered_radiance(s, albedo, vec3(PI)) + albedo.base;
+    vec3 unoccluded = environment_irradiance(s.n);
+    vec3 irradiance = concavity_irradiance(unoccluded, visible_irradiance(s), all);
+    // The radiance of what occludes.
+    vec3 beside = min(all, 0.98) * irradiance * INV_PI;
+    vec3 mirrored = vec3(0.0);
+    vec3 coat_mirrored = vec3(0.0);
+    if (REFLECTION && !s.base_traced) {
+        mirrored = prefiltered_radiance(reflect_ray(-s.v, s.n).R, s.alpha);
+        if (LOBE_RAYS > 0) mirrored = partly_occluded(mirrored, beside, visible_lobe(s, s.n, s.alpha, BASE_LOBE_EVENT));
+    }
+    if (CLEARCOAT && REFLECTION && !s.coat_traced) {
+        coat_mirrored = prefiltered_radiance(reflect_ray(-s.v, s.n_coat).R, s.clearcoat_alpha);
+        if (LOBE_RAYS > 0) {
+            vec3 visible = visible_lobe(s, s.n_coat, s.clearcoat_alpha, COAT_LOBE_EVENT);
+            coat_mirrored = partly_occluded(coat_mirrored, beside, visible);
+        }
+    }
+    return environment_light_of(s, albedo, irradiance, mirrored, coat_mirrored);
+}
+#endif

@@ -1,0 +1,36 @@
+// Light of the environment on the layers of a surface, from its irradiance and from the radiance in its lobes' directions.
+// Where to read: RTR 4, sections 10.5 and 10.6 (environment lighting, split sum). Assumes: a compensated surface.
+#ifndef ENVIRONMENT_LIGHT_GLSL
+#define ENVIRONMENT_LIGHT_GLSL
+#include "lib/environment.glsl"
+#include "lib/layers.glsl"
+
+layout(constant) const bool AMBIENT = false;        // ambient light: the environment's irradiance on diffuse surfaces
+layout(constant) const bool REFLECTION = false;     // the prefiltered environment in specular lobes
+
+// `mirrored` is the radiance that arrives in the lobe of the base, `coat_mirrored` in that of the coat.
+vec3 environment_light_of(Surface s, BaseAlbedo albedo, vec3 irradiance, vec3 mirrored, vec3 coat_mirrored) {
+    vec3 result = vec3(0.0);
+    if (AMBIENT) result += scattered_radiance(s, albedo, irradiance);
+    if (REFLECTION && !s.base_traced) result += albedo.base * mirrored;
+    if (CLEARCOAT) {
+        result *= BRDF == BRDF_GGX_MULTI ? 1.0 - min(albedo_of_coat(s), 1.0) : under_coat(s);
+        if (REFLECTION && !s.coat_traced) result += albedo_of_coat(s) * coat_mirrored;
+    }
+    return result * s.occlusion;
+}
+
+// Without visibility: the irradiance, and the prefiltered map in the direction of reflection.
+vec3 environment_light(Surface s) {
+    BaseAlbedo albedo = albedo_of_base(s, lobe_reflectance(s));
+    vec3 irradiance = vec3(0.0);
+    vec3 mirrored = vec3(0.0);
+    vec3 coat_mirrored = vec3(0.0);
+    if (AMBIENT) irradiance = environment_irradiance(s.n);
+    if (REFLECTION && !s.base_traced) mirrored = prefiltered_radiance(reflect_ray(-s.v, s.n).R, s.alpha);
+    if (CLEARCOAT && REFLECTION && !s.coat_traced) {
+        coat_mirrored = prefiltered_radiance(reflect_ray(-s.v, s.n_coat).R, s.clearcoat_alpha);
+    }
+    return environment_light_of(s, albedo, irradiance, mirrored, coat_mirrored);
+}
+#endif

@@ -1,0 +1,35 @@
+//! Environment lighting with ray-traced ambient occlusion (shaders/pass/ambient.comp).
+//!
+//! Read Real-Time Rendering (4th ed.), section 11.3, and docs/decisions/ambient-occlusion.md.
+
+use anyhow::Result;
+
+use super::classify::WorkLists;
+use super::gbuffer::GBuffer;
+use super::lighting::Lighting;
+use crate::gpu::{Buffer, Frame, Image};
+use crate::shader::ambient;
+
+/// Adds the environment's light to `radiance` at pixels with a surface, by indirect dispatch over the list of surface
+/// tiles.
+///
+/// # Errors
+/// When the driver refuses a descriptor or a layout.
+pub fn ambient<'a>(
+    frame: &mut Frame<'a>,
+    lighting: &Lighting<'a>,
+    gbuffer: &'a GBuffer,
+    work: &'a WorkLists,
+    sky_directions: &'a Buffer,
+    radiance: &'a Image,
+) -> Result<()> {
+    let bind = ambient::Bind {
+        gbuffer: gbuffer.bind(),
+        ambient_occlusion: crate::shader::lib::ambient_occlusion::Bind { sky_directions },
+        radiance,
+        surface_tiles: &work.surface,
+        work: &work.sizes,
+    };
+    let constants = ambient::Constants { library: lighting.library };
+    frame.compute_indirect("ambient occlusion", &bind, &constants, &(), &work.sizes, 0)
+}

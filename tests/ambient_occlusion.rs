@@ -1,0 +1,137 @@
+//! Ambient occlusion: the environment's light with visibility, against f64 ray casts and in closed form.
+//!
+//! Read docs/decisions/ambient-occlusion.md.
+
+use etalon::frame::Settings;
+use etalon::image::Picture;
+use etalon::plan::rungs::EffectId;
+use etalon::scene::environment::Environment;
+use etalon::scene::{Material, Scene};
+use etalon::study::shape::Shape;
+use etalon::transport::emitters::Sky;
+use etalon::transport::sky_directions::sky_directions;
+use etalon_testing::gpu::{Gpu, knobs, settings};
+use etalon_testing::made::{Made, orthographic, perspective};
+use etalon_testing::raycast::{Options, Ray, World, picture};
+use glam::{DAffine3, DMat3, DVec3};
+
+/// A diffuse material without a specular lobe.
+fn matt(albedo: [f32; 3]) -> Material {
+    let [r, g, b] = albedo;
+    Material { base_color: [r, g, b, 1.0], specular: 0.0, roughness: 1.0, metallic: 0.0, ..Material::default() }
+}
+
+fn turned(axis: DVec3, degrees: f64, position: DVec3) -> DAffine3 {
+    DAffine3 { matrix3: DMat3::from_axis_angle(axis, degrees.to_radians()), translation: position }
+}
+
+fn film(gpu: &Gpu, scene: &Scene, environment: &Environment, size: [u32; 2], choices: &[&str]) -> Picture {
+    let choices = [&["reflection=off", "refraction=off", "shadows=off"], choices].concat();
+    gpu.shot(scene, Some(environment), Settings { knobs: knobs(&choices), ..settings(size) }).1
+}
+
+/// A floor with three panels that stand on it.
+fn panels() -> Scene {
+    let mut made = Made::new("panels");
+    made.add(Shape::plane(6.0, 6.0, 1), matt([0.7, 0.5, 0.3]), DAffine3::IDENTITY);
+    for (x, z, degrees) in [(-0.9, 0.2, 25.0), (0.4, -0.6, -40.0), (1.1, 0.5, 75.0)] {
+        let place = turned(DVec3::Y, degrees, DVec3::new(x, 0.5, z));
+        made.add(Shape::panel(0.8, 1.0), Material { double_sided: true, ..matt([0.2, 0.6, 0.8]) }, place);
+    }
+    made.camera(DVec3::new(1.5, 2.0, 3.5), DVec3::new(0.0, 0.3, 0.0), perspective(40.0));
+    made.0
+}
+
+#[test]
+fn the_share_that_arrives_is_that_of_ray_casts() {
+    let (gpu, scene, map) = (Gpu::open(), panels(), Environment::studio());
+    let size = [96, 64];
+    let plain = film(&gpu, &scene, &map, size, &["samples=1", "indirect=ambient"]);
+    let occluded = film(&gpu, &scene, &map, size, &["samples=1", "indirect=occlusion:16"]);
+    let directions = sky_directions(Sky { map: &map, intensity: 1.0, rotation: 0.0 }, 16, 0);
+    let options = Options { blend: true, textures: false };
+    let world = World::new(&scene, options);
+    let seen = picture(&scene, &scene.cameras[0], size[0], size[1], options);
+    let (mut compared, mut off, mut darker) = (0, 0, 0);
+    for (i, pixel) in seen.iter().enumerate() {
+        let Some(hit) = pixel.hit.as_ref().filter(|_| !pixel.edge) else { continue };
+        let n = hit.geometric_normal;
+        let origin = hit.position + n * 1e-5;
+        let (mut sum, mut all) = ([0.0; 3], [0.0; 3]);
+        for at in &directions {
+            let cos = n.dot(at.direction).max(0.0);
+            let free = cos > 0.0 && world.closest(&Ray::new(origin, at.direction)).is_none();
+            for channel in 0..3 {
+                all[channel] += at.weight[channel] * cos;
+                sum[channel] += if free { at.weight[channel] * cos } else { 0.0 };
+            }
+        }
+        let albedo = if hit.position.y < 1e-3 { [0.7, 0.5, 0.3] } else { [0.2, 0.6, 0.8] };
+        let mut worst = 0.0_f64;
+        for channel in 0..3 {
+            let share = sum[channel] / all[channel];
+            let expected = share / (1.0 - albedo[channel] * (1.0 - share));
+            let got = f64::from(occluded.rgba[i][channel]) / f64::from(plain.rgba[i][channel]);
+            worst = worst.max((got - expected).abs());
+            darker += usize::from(share < 0.9);
+        }
+        compared += 1;
+        // A ray that grazes an edge may fall on either side in f32.
+        off += usize::from(worst > 1e-4);
+    }
+    eprintln!("{compared} pixels, {off} off, {darker} darker by a tenth");
+    assert!(compared > 3000 && darker > 1000, "{compared} pixels, {darker} darker");
+    assert!(off * 200 <= compared, "{off} of {compared} pixels are off");
+}
+
+#[test]
+fn an_open_surface_has_plain_ambient_light() {
+    let (gpu, map) = (Gpu::open(), Environment::studio());
+    let mut made = Made::new("open");
+    let tilt = turned(DVec3::new(1.0, 1.0, 0.0).normalize(), 20.0, DVec3::ZERO);
+    made.add(Shape::panel(2.0, 2.0), matt([0.8, 0.8, 0.8]), tilt);
+    made.front(0.5);
+    let size = [32, 32];
+    let plain = film(&gpu, &made.0, &map, size, &["samples=4", "indirect=ambient"]);
+    for rung in ["indirect=occlusion:4", "indirect=occlusion:16", "indirect=occlusion:64"] {
+        let open = film(&gpu, &made.0, &map, size, &["samples=4", rung]);
+        for (a, b) in plain.rgba.iter().zip(&open.rgba) {
+            for channel in 0..3 {
+                assert!((a[channel] / b[channel] - 1.0).abs() < 1e-5, "{rung}: {a:?}, not {b:?}");
+            }
+        }
+    }
+}
+
+/// Beside a wall without end half of the irradiance arrives, and the wall gives back ρ of its own: E = E₀/2 / (1 − ρ/2).
+#[test]
+fn beside_a_wall_half_of_the_environment_arrives() {
+    let (gpu, map) = (Gpu::open(), Environment::constant([1.0; 3]));
+    let mut made = Made::new("wall");
+    made.add(Shape::plane(400.0, 400.0, 1), matt([0.6, 0.6, 0.6]), DAffine3::IDENTITY);
+    let wall = turned(DVec3::Y, 90.0, DVec3::new(0.0, 100.0, 0.0));
+    made.add(Shape::panel(400.0, 200.0), matt([0.6, 0.6, 0.6]), wall);
+    made.camera(DVec3::new(0.1, 5.0, 0.0), DVec3::new(0.1, 0.0, 0.0), orthographic(0.02));
+    let size = [16, 16];
+    let got = film(&gpu, &made.0, &map, size, &["samples=16", "indirect=occlusion:64"]);
+    let expected = 0.6 * 0.5 / (1.0 - 0.6 * 0.5);
+    for pixel in &got.rgba {
+        let ratio = f64::from(pixel[0]) / expected;
+        // 1,024 directions; the wall ends at 63 degrees less than the horizon's last degree.
+        assert!((ratio - 1.0).abs() < 0.02, "{pixel:?}, not {expected}");
+    }
+}
+
+#[test]
+fn the_plan_has_it_only_with_an_environment() {
+    let (gpu, map) = (Gpu::open(), Environment::studio());
+    let settings = || Settings { knobs: knobs(&["indirect=occlusion:16", "shadows=off"]), ..settings([32, 32]) };
+    let with = gpu.renderer(&panels(), Some(&map), settings());
+    assert_eq!(with.plan().occlusion_rays(), 16);
+    let mut without = gpu.renderer(&panels(), None, settings());
+    assert_eq!(without.plan().occlusion_rays(), 0);
+    assert!(without.plan().rays.is_none(), "no BVH is built");
+    let camera = panels().cameras[0].clone();
+    let passes = without.passes(&camera).expect("passes");
+    assert!(passes.iter().all(|pass| pass.name != EffectId::AmbientOcclusion.name()));
+}
