@@ -90,7 +90,7 @@ const FACTORS: &[Factor] = &[
     Factor { name: "interfaces", levels: &["1", "8"] },
     Factor { name: "absorption", levels: &["off", "thickness", "path", "march:4"] },
     Factor { name: "quadrature", levels: &["left", "midpoint", "simpson"] },
-    Factor { name: "indirect", levels: &["off", "ambient", "occlusion:4"] },
+    Factor { name: "indirect", levels: &["off", "ambient"] },
     Factor { name: "arithmetic", levels: &["fast", "stable", "compensated"] },
     Factor { name: "environment", levels: &["none", "constant", "studio"] },
     Factor { name: "background", levels: &["default", "transparent"] },
@@ -489,7 +489,6 @@ fn planned(ways: &Ways, choice: &Choice, knobs: Knobs) -> Plan {
 const NEEDS: &[(&str, &str)] = &[
     ("absorption", "transmissive hits"),
     ("ambient light", "environment"),
-    ("ambient occlusion", "environment"),
     ("clear coat", "material layers"),
     ("tiled light culling", "punctual lights"),
     ("transparent shadows", "shadows"),
@@ -548,11 +547,10 @@ const OF_PATHS: [&str; 5] =
 const OF_WAVELENGTHS: [&str; 2] = ["spectral rendering", "dispersion"];
 
 /// Every other effect, except the one that only the hierarchy of triangles decides.
-const NAMES: [&str; 23] = [
+const NAMES: [&str; 22] = [
     "absorption",
     "alpha test in rays",
     "ambient light",
-    "ambient occlusion",
     "clear coat",
     "conductors with n and kappa",
     "emissive textures",

@@ -1176,7 +1176,7 @@ fn mtl_materials_beyond_nature_are_drawn_with_a_warning() {
 #[test]
 fn other_endings_are_refused_by_name() {
     let error = format!("{:#}", scene::load(Path::new("a.fbx"), &LoadOptions::default()).unwrap_err());
-    assert_eq!(error, "loading a.fbx: only .gltf, .glb and .obj files are supported");
+    assert_eq!(error, "loading a.fbx: only .gltf, .glb, .obj, .stl and .ply files are supported");
 }
 
 /// What no picture depends on is neither decoded nor kept, and each is named with its reason; read for everything, all

@@ -60,13 +60,18 @@ vec3 visible_lobe(Surface s, vec3 n, float alpha, uint event) {
     return all > 0.0 ? seen / all : vec3(1.0);
 }
 
-// Irradiance in a concavity of this albedo: `irradiance` without occluders, of which the share `visible` arrives.
+// Irradiance in a concavity of this albedo: `irradiance` without occluders, of which the share `visible` arrives. Here and below
+// every step is precise: a driver's compiler turns x (1 − a) + y a into an interpolation of its own, in one of two ways, by
+// what else stands in the program.
 vec3 concavity_irradiance(vec3 irradiance, vec3 visible, vec3 albedo) {
-    return irradiance * visible / (1.0 - min(albedo, 0.98) * (1.0 - visible));
+    precise vec3 occluded = 1.0 - visible;
+    precise vec3 given_back = min(albedo, 0.98) * occluded;
+    precise vec3 kept = 1.0 - given_back;
+    precise vec3 arriving = irradiance * visible;
+    return arriving / kept;
 }
 
-// The radiance in a lobe of which the share `visible` sees the environment. Not mix(): a driver's compiler expands that in one
-// of two ways, by what else stands in the program.
+// The radiance in a lobe of which the share `visible` sees the environment.
 vec3 partly_occluded(vec3 open, vec3 beside, vec3 visible) {
     precise vec3 seen = open * visible;
     precise vec3 occluded = beside * (1.0 - visible);
@@ -76,12 +81,14 @@ vec3 partly_occluded(vec3 open, vec3 beside, vec3 visible) {
 
 vec3 occluded_environment_light(Surface s) {
     BaseAlbedo albedo = albedo_of_base(s, lobe_reflectance(s));
-    // The albedo of diffuse reflection, by an irradiance of π, and that of the lobes.
-    vec3 all = scattered_radiance(s, albedo, vec3(PI)) + albedo.base;
+    // The albedo of diffuse reflection, by an irradiance of 1, and that of the lobes.
+    precise vec3 diffuse = scattered_radiance(s, albedo, vec3(1.0)) * PI;
+    precise vec3 all = diffuse + albedo.base;
     vec3 unoccluded = environment_irradiance(s.n);
     vec3 irradiance = concavity_irradiance(unoccluded, visible_irradiance(s), all);
     // The radiance of what occludes.
-    vec3 beside = min(all, 0.98) * irradiance * INV_PI;
+    precise vec3 given_back = min(all, 0.98) * irradiance;
+    precise vec3 beside = given_back * INV_PI;
     vec3 mirrored = vec3(0.0);
     vec3 coat_mirrored = vec3(0.0);
     if (REFLECTION && !s.base_traced) {

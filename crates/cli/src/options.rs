@@ -51,7 +51,7 @@ impl PlanExtent {
 /// Scene, camera, animation time and environment.
 #[derive(Debug, Clone, Args)]
 pub struct SceneOptions {
-    /// A .glb, .gltf or .obj file, or a built-in scene as study:NAME
+    /// A .glb, .gltf, .obj, .stl or .ply file, or a built-in scene as study:NAME
     #[arg(default_value = "study:etalon")]
     pub scene: String,
     /// Scene of the file, by name or index [default: the one that the file names]

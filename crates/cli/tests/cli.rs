@@ -55,7 +55,7 @@ fn mistakes_end_in_one_sentence_and_no_file() {
     let out = ["-o", "out.png"];
     for (arguments, code, said) in [
         (vec!["missing.glb"], 1, "missing.glb"),
-        (vec!["scene.stl"], 1, "only .gltf, .glb and .obj"),
+        (vec!["scene.fbx"], 1, "only .gltf, .glb, .obj"),
         (vec!["broken.glb"], 1, "broken.glb"),
         (vec!["empty.gltf"], 1, "nothing to draw"),
         (vec!["loop.gltf"], 1, "loop.gltf"),
@@ -68,7 +68,7 @@ fn mistakes_end_in_one_sentence_and_no_file() {
         (vec!["scene.glb", "--set", "samples=5"], 1, "no rung"),
         (vec!["scene.glb", "--set", "normals=f16"], 1, "it has oct16, oct24, oct32, f32"),
         (vec!["scene.glb", "--model", "global", "--set", "reflection=off"], 1, "contradicts indirect=path"),
-        (vec!["scene.glb", "--set", "lights=area:1"], 1, "contradicts indirect=occlusion:16"),
+        (vec!["scene.glb", "--set", "lights=area:1"], 1, "contradicts indirect=ambient"),
         (vec!["scene.glb", "--model", "local", "--max-error", "2%"], 1, "only paths tell their error"),
         (vec!["scene.glb", "--max-error", "0%"], 1, "expected a fraction above 0"),
         (vec!["scene.glb", "--model", "global", "--max-error", "none"], 1, "expected a fraction above 0"),

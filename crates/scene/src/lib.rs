@@ -19,6 +19,7 @@ mod lenient;
 pub mod light;
 pub mod lobe;
 pub mod material;
+mod mesh_files;
 mod nodes;
 mod obj;
 mod pictures;
@@ -58,7 +59,7 @@ pub struct LoadOptions {
     pub variant: Option<String>,
 }
 
-/// Reads a scene from a glTF 2.0 file (`.gltf`, `.glb`) or a Wavefront file (`.obj`).
+/// Reads a scene from a glTF 2.0 file (`.gltf`, `.glb`), a Wavefront file (`.obj`), or a mesh (`.stl`, `.ply`).
 ///
 /// # Errors
 /// One sentence when printed with `{:#}`: the file, the place in the file and the fault there.
@@ -66,12 +67,14 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let scene = match extension.as_str() {
         "gltf" | "glb" => gltf_import::load(path, options),
-        "obj" if options.scene.is_some() || options.variant.is_some() => {
-            bail!("loading {}: a Wavefront file has no scenes and no variants to choose", path.display())
+        "obj" | "stl" | "ply" if options.scene.is_some() || options.variant.is_some() => {
+            bail!("loading {}: only glTF files have scenes and variants to choose", path.display())
         }
         "obj" => obj::load(path, options.prune),
+        "stl" => mesh_files::load_stl(path),
+        "ply" => mesh_files::load_ply(path),
         _ => {
-            bail!("loading {}: only .gltf, .glb and .obj files are supported", path.display())
+            bail!("loading {}: only .gltf, .glb, .obj, .stl and .ply files are supported", path.display())
         }
     };
     let mut scene = scene.with_context(|| format!("loading {}", path.display()))?;

@@ -97,7 +97,7 @@ enum Woken {
 }
 
 /// File name extensions of scene files, buffers and textures.
-const PARTS: [&str; 9] = ["glb", "gltf", "bin", "obj", "mtl", "png", "jpg", "jpeg", "webp"];
+const PARTS: [&str; 12] = ["glb", "gltf", "bin", "obj", "mtl", "stl", "ply", "png", "jpg", "jpeg", "webp", "ktx2"];
 /// Time without another change before a file is read again.
 const SETTLED: Duration = Duration::from_millis(300);
 

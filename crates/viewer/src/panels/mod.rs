@@ -115,7 +115,7 @@ impl PanelState {
             // The search field of egui_file_dialog 0.15 is dark on black in a light theme.
             dialog: FileDialog::new()
                 .show_search(false)
-                .add_file_filter_extensions("scenes", vec!["glb", "gltf", "obj"])
+                .add_file_filter_extensions("scenes", vec!["glb", "gltf", "obj", "stl", "ply"])
                 .default_file_filter("scenes"),
             history: VecDeque::new(),
             history_version: 0,
