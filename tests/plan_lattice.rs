@@ -427,7 +427,6 @@ fn paths_call_for_what_they_may_meet() {
     }
     for name in [
         "ambient light",
-        "ambient occlusion",
         "tiled light culling",
         "environment reflection",
         "reflection",
@@ -512,7 +511,8 @@ fn any_two_effects_are_kept_together_and_apart() {
     let mut seen = BTreeSet::new();
     for (ways, choice) in spread() {
         let plan = planned(ways, choice, knobs(ways, choice));
-        let elsewhere = [OF_PATHS.as_slice(), &OF_WAVELENGTHS].concat();
+        // tests/plan.rs and tests/ambient_occlusion.rs have ambient occlusion.
+        let elsewhere = [OF_PATHS.as_slice(), &OF_WAVELENGTHS, &["ambient occlusion"]].concat();
         for a in plan.effects.iter().filter(|effect| !elsewhere.contains(&effect.id.name())) {
             states.entry(a.id.name()).or_default().insert(a.state.name());
         }
