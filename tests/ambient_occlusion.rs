@@ -103,7 +103,8 @@ fn an_open_surface_has_plain_ambient_light() {
     }
 }
 
-/// Beside a wall without end half of the irradiance arrives, and the wall gives back ρ of its own: E = E₀/2 / (1 − ρ/2).
+/// Beside a wall without end half of the irradiance arrives, and the wall gives back ρ of its own:
+/// E = E₀/2 / (1 − ρ/2).
 #[test]
 fn beside_a_wall_half_of_the_environment_arrives() {
     let (gpu, map) = (Gpu::open(), Environment::constant([1.0; 3]));

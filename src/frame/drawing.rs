@@ -6,7 +6,8 @@ use crate::upload::view::View;
 
 /// A picture in progress.
 pub struct Drawing {
-    /// Whether [`Device::interrupt`] may abandon a sample before it is added to the sum; the next step draws it again.
+    /// Whether [`Device::interrupt`](crate::gpu::Device::interrupt) may abandon a sample before it is added to the sum;
+    /// the next step draws it again.
     pub interruptible: bool,
     pub(super) view: View,
     /// Index of the next sample, and of its next band.

@@ -138,7 +138,8 @@ impl Work {
 pub struct Sums {
     /// First sample, and one past the last.
     pub samples: [u32; 2],
-    /// Sums of the samples: one, or one each of even and odd samples; then the sums of [`Settings::parts`].
+    /// Sums of the samples: one, or one each of even and odd samples; then the sums of
+    /// [`Settings::parts`](super::Settings::parts).
     pub sums: Vec<Picture>,
     /// Work counts of the rays.
     pub work: Work,

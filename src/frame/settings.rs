@@ -83,7 +83,8 @@ pub struct Settings {
     pub environment_rotation: f32,
     /// Seed of the random numbers.
     pub seed: u32,
-    /// Target error: samples are drawn until the root of [`SampleError::relmse`] is at most this, whatever the knob
+    /// Target error: samples are drawn until the root of
+    /// [`SampleError::relmse`](crate::image::halves::SampleError::relmse) is at most this, whatever the knob
     /// `samples`.
     pub max_error: Option<f64>,
     /// Traces all bounces of a path in one dispatch instead of a wavefront: the same film, for comparison.

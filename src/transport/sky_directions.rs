@@ -1,8 +1,8 @@
 //! Directions in which rays of ambient occlusion look at the environment.
 //!
-//! Read Real-Time Rendering (4th ed.), section 11.3; Agarwal et al. 2003, "Structured Importance Sampling of Environment
-//! Maps". Every second direction is drawn from the environment's radiance, the others from the whole sphere; both parts
-//! follow a low-discrepancy sequence, so that the first directions of any number cover the sphere.
+//! Read Real-Time Rendering (4th ed.), section 11.3; Agarwal et al. 2003, "Structured Importance Sampling of
+//! Environment Maps". Every second direction is drawn from the environment's radiance, the others from the whole
+//! sphere; both parts follow a low-discrepancy sequence, so that the first directions of any number cover the sphere.
 
 use std::f64::consts::{PI, TAU};
 

@@ -94,7 +94,8 @@ fn ktx2_size(bytes: &[u8]) -> Result<[u32; 2]> {
 pub(crate) fn decode_ktx2(name: String, bytes: &[u8]) -> Result<Image> {
     let [width, height] = ktx2_size(bytes)?;
     let fault = |error: basisu::Error| anyhow!("the Basis Universal data cannot be decoded: {error:?}");
-    // The transcoder walks key/value data without checking its lengths, and a still picture needs none: the copy has none.
+    // The transcoder walks key/value data without checking its lengths, and a still picture needs none: the copy has
+    // none.
     let mut file = bytes.to_vec();
     file[KEY_VALUE_WORDS].fill(0);
     let transcode = || {

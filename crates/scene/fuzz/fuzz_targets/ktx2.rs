@@ -1,4 +1,5 @@
-//! Any bytes as a KTX2 file of at most 256 by 256 texels. Panics of the transcoder become errors, so they do not end the run.
+//! Any bytes as a KTX2 file of at most 256 by 256 texels. Panics of the transcoder become errors, so they do not end
+//! the run.
 #![no_main]
 
 use etalon_scene::decompress::streams;
