@@ -311,7 +311,8 @@ fn light_from_all_around_is_there_where_it_is_seen() {
         ..Case::hidden("environment reflection", mirrors, air, metal(0.5))
     }
     .check();
-    let occluded = Case::new("ambient occlusion", "there is no environment", ball(chalk(), None), ball(chalk(), None));
+    let glow = || ball(Material { emissive: [0.5; 3], ..chalk() }, None);
+    let occluded = Case::new("ambient occlusion", "there is no environment", glow(), glow());
     Case {
         environments: [None, Some(Environment::studio())],
         choices: &["indirect=occlusion:4"],
