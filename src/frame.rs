@@ -2,8 +2,9 @@
 //!
 //! Read docs/frame.md; Real-Time Rendering (4th ed.), chapter 20 for deferred shading; pbrt (4th ed.), chapters 5
 //! (film) and 13 (path tracing). A picture is the mean of samples; each sample is one [`Frame`] per band of
-//! wavelengths. The input is a [`Prepared`] scene: planned, with its BVH. `settings`, `targets`, `drawing`, `rendered`
-//! and `readback` are what the frame is drawn by, into, how far it is, what it comes with, and how the host gets it.
+//! wavelengths. The input is a [`Prepared`] scene: planned, with its BVH. Beside it: `settings` of
+//! a picture, `targets` (images and buffers of its size), `drawing` (how far a picture is), `rendered` (results and
+//! counts), `readback` (what the host reads).
 
 mod drawing;
 mod readback;
@@ -51,7 +52,6 @@ use crate::scene::environment::Environment;
 use crate::scene::wavelengths::Slice;
 use crate::share;
 use crate::spectra::VISIBLE;
-use crate::transport::emitters::Sky;
 use crate::upload::environment::{EnvironmentOnDevice, EnvironmentRotation, sky_directions};
 use crate::upload::rays::{BvhFacts, RaysOnDevice};
 use crate::upload::scene::SceneOnDevice;
@@ -167,10 +167,11 @@ impl Renderer {
             warnings.push(format!("layer {}: no surface of this scene sends such rays, the layer is 0", part.name()));
         }
         // A forced environment effect without an environment uses a black one.
-        let environment_map = environment;
         let dark = (plan.environment && environment.is_none()).then(Environment::dark);
         let turn =
             EnvironmentRotation { intensity: settings.environment_intensity, rotation: settings.environment_rotation };
+        let sky = environment.or(dark.as_ref()).map(|map| settings.sky(map));
+        let sky_directions = sky_directions(device, &plan, sky, settings.seed)?;
         let touching = rays.constants.touching;
         // If both plans draw the same work, targets and environment are reused.
         let (textures, around, targets) = match before {
@@ -185,12 +186,6 @@ impl Renderer {
             Some(around) => around,
             None => EnvironmentOnDevice::new(device, &plan, environment.or(dark.as_ref()), turn)?,
         };
-        let sky = environment_map.or(dark.as_ref()).map(|map| Sky {
-            map,
-            intensity: settings.environment_intensity,
-            rotation: settings.environment_rotation,
-        });
-        let sky_directions = sky_directions(device, &plan, sky, settings.seed)?;
         let shadow_maps = ShadowMaps::new(device, &plan, &name, &mut scene, rays.anchor())?;
         let camera = Buffer::new(device, "camera", size_of::<share::Camera>() as u64, Place::Upload)?;
         let on_device = OnDevice {

@@ -1338,9 +1338,8 @@ fn coincident_interfaces_of_equal_index_vanish() {
 #[test]
 fn what_touches_a_closed_mesh_is_seen_through_it() {
     let gpu = Gpu::open();
-    // A card right under a slab, as a glass stands on a table, and a little off it; the same with facets that are small
-    // beside the card's two; and two bodies, one in the other, with a common bottom on the card, or the inner one a
-    // little higher.
+    // The slab lies on a card, as a glass stands on a table, or a little above it. "small" has facets that are small beside
+    // the card's two. "two" has one closed mesh in another: both stand on the card, or the inner one is a little higher.
     for (name, size, inner) in [("slab", 1.0, false), ("small", 0.01, false), ("two", 1.0, true)] {
         let picture = |gap: f64| {
             let mut made = Made::new(name);

@@ -1,4 +1,4 @@
-//! Pictures by wavelengths against truth: the tables of docs/colour.md for a chart of known reflectances, angles of
+//! Spectral pictures are compared with the tables of docs/colour.md for a chart of known reflectances, angles of
 //! dispersion against Sellmeier and Snell in f64, Beer and Lambert band by band, and lines that keep their colour
 //! wherever they go.
 

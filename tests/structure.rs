@@ -65,7 +65,7 @@ fn a_variant_gives_primitives_its_materials() {
         assert_eq!(scene.materials[scene.meshes[0].material].name, name, "{wanted:?}");
     }
     let said = refusal(&builder, &with(Some("noon")));
-    assert!(said.ends_with("there is no variant \"noon\"; the file has \"evening\", \"night\""), "{said}");
+    assert!(said.ends_with("there is no variant \"noon\"; the file has 0 \"evening\", 1 \"night\""), "{said}");
     builder.json["meshes"][0]["primitives"][0]["extensions"]["KHR_materials_variants"]["mappings"][0]["material"] =
         json!(9);
     let said = refusal(&builder, &with(Some("evening")));

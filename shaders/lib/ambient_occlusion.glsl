@@ -60,9 +60,9 @@ vec3 visible_lobe(Surface s, vec3 n, float alpha, uint event) {
     return all > 0.0 ? seen / all : vec3(1.0);
 }
 
-// Irradiance in a concavity of this albedo: `irradiance` without occluders, of which the share `visible` arrives. Here and below
-// every step is precise: a driver's compiler turns x (1 − a) + y a into an interpolation of its own, in one of two ways, by
-// what else stands in the program.
+// Irradiance in a concavity of this albedo: `irradiance` without occluders, of which the share `visible` arrives. Here and
+// below every step is precise: a driver's compiler turns x (1 − a) + y a into an interpolation of its own, in one of two
+// ways, by what else stands in the program.
 vec3 concavity_irradiance(vec3 irradiance, vec3 visible, vec3 albedo) {
     precise vec3 occluded = 1.0 - visible;
     precise vec3 given_back = min(albedo, 0.98) * occluded;

@@ -134,9 +134,13 @@ impl Settings {
             let why = "env: there is no environment (none was asked for, or the scene has lights of its own)";
             return Err(Refused::error(Setting::Background, why.to_owned()));
         }
-        let Self { environment_intensity: intensity, environment_rotation: rotation, .. } = *self;
-        let sky = environment.map(|map| Sky { map, intensity, rotation });
+        let sky = environment.map(|map| self.sky(map));
         Ok(Conditions { knobs: &self.knobs, forced: self.forced, sky, background })
+    }
+
+    /// The environment as these settings turn and scale it.
+    pub(super) fn sky<'a>(&self, map: &'a Environment) -> Sky<'a> {
+        Sky { map, intensity: self.environment_intensity, rotation: self.environment_rotation }
     }
 
     /// Display-linear colour behind the scene in the display output; `None` for a transparent output.

@@ -77,10 +77,12 @@ pub struct Sky<'a> {
     pub rotation: f32,
 }
 
+/// Number of 32-bit words: all bins of a CDF together.
+const ALL: f64 = 4_294_967_296.0;
+
 /// CDF in 32-bit fixed point: for each weight the first word of its bin and its probability (bin size over 2³²). No bin
 /// is empty; weights without a finite positive sum give equal bins.
 fn shares(weights: &[f64]) -> Vec<(u32, f64)> {
-    const ALL: f64 = 4_294_967_296.0;
     let count = weights.len() as f64;
     let sum: f64 = weights.iter().sum();
     let even = !(sum > 0.0 && sum.is_finite());
@@ -227,7 +229,7 @@ impl EnvironmentCdf {
         let mut sums = Vec::with_capacity(rows as usize);
         for row in 0..rows {
             let (top, bottom) = range(row, rows, height);
-            let sin = ((f64::from(row) + 0.5) / f64::from(rows) * std::f64::consts::PI).sin();
+            let sin = ((f64::from(row) + 0.5) / f64::from(rows) * PI).sin();
             let mut sum = 0.0;
             for column in 0..columns {
                 let (left, right) = range(column, columns, width);
@@ -253,7 +255,6 @@ impl EnvironmentCdf {
 
     /// The cell of two numbers in [0, 1), and where in it they are: column, row, and fractions across and down.
     fn cell(&self, [x, y]: [f64; 2]) -> ([usize; 2], [f64; 2]) {
-        const ALL: f64 = 4_294_967_296.0;
         let (columns, rows) = (self.columns as usize, self.rows as usize);
         let find = |firsts: &[u32], at: f64| {
             let word = at * ALL;
@@ -277,7 +278,6 @@ impl EnvironmentCdf {
     /// Density per solid angle of a direction in the map's axes.
     #[must_use]
     pub fn density(&self, d: DVec3) -> f64 {
-        const ALL: f64 = 4_294_967_296.0;
         let (columns, rows) = (self.columns as usize, self.rows as usize);
         let [u, v] = [d.z.atan2(d.x) / TAU + 0.5, 0.5 - d.y.clamp(-1.0, 1.0).asin() / PI];
         let row = ((v * rows as f64) as usize).min(rows - 1);
@@ -296,12 +296,10 @@ impl EnvironmentCdf {
     /// the jitter within a cell.
     #[must_use]
     pub fn direction(&self, words: [u32; 2]) -> DVec3 {
-        let (columns, rows) = (self.columns as usize, self.rows as usize);
-        let row = self.words[..rows].partition_point(|&first| first <= words[1]) - 1;
-        let of_row = &self.words[rows + row * columns..][..columns];
-        let column = of_row.partition_point(|&first| first <= words[0]) - 1;
-        let middle = |i: usize, of: usize| (i as f64 + 0.5) / of as f64;
-        DMat3::from_rotation_y(self.rotation.to_radians()) * direction(middle(column, columns), middle(row, rows))
+        let ([column, row], _) = self.cell(words.map(|word| f64::from(word) / ALL));
+        let middle = |i: usize, of: u32| (i as f64 + 0.5) / f64::from(of);
+        let found = direction(middle(column, self.columns), middle(row, self.rows));
+        DMat3::from_rotation_y(self.rotation.to_radians()) * found
     }
 }
 

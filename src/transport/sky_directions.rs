@@ -35,9 +35,9 @@ pub fn sky_directions(sky: Sky<'_>, count: u32, seed: u32) -> Vec<SkyDirection> 
         let direction = match index % 2 {
             0 => cdf.sample([x, y]),
             _ => {
-                let z = 1.0 - 2.0 * y;
-                let across = (1.0 - z * z).max(0.0).sqrt();
-                DVec3::new(across * (TAU * x).cos(), z, across * (TAU * x).sin())
+                let height = 1.0 - 2.0 * y;
+                let across = (1.0 - height * height).max(0.0).sqrt();
+                DVec3::new(across * (TAU * x).cos(), height, across * (TAU * x).sin())
             }
         };
         // The density of a direction is the mean of both parts' densities.

@@ -159,10 +159,10 @@ pub fn passes(device: &Arc<Device>, of_paths: bool) -> Result<String> {
     let mut all: Vec<(String, usize, String, String)> = Vec::new();
     for (scene, model, choice) in presets.chain(OTHER_FRAMES.iter().copied().filter(|_| !of_paths)) {
         let mut settings = Settings { size: [32, 18], knobs: Knobs::of(model), ..Settings::default() };
-        match choice.strip_prefix("--set ") {
-            Some(choice) => settings.knobs.set(choice)?,
-            None if choice.is_empty() => {}
-            None => settings.forced = ForcedEffects::All,
+        match choice.split_once(' ') {
+            Some(("--set", choice)) => settings.knobs.set(choice)?,
+            Some(("--plan", "full")) => settings.forced = ForcedEffects::All,
+            _ => anyhow::ensure!(choice.is_empty(), "{choice}: OTHER_FRAMES has --set or --plan full"),
         }
         let opened = Opened::load(&format!("study:{scene}"))?;
         let camera = opened.camera(settings.size)?;

@@ -103,16 +103,8 @@ impl<'a> Document<'a> {
     pub(crate) fn choose_variant(&mut self, wanted: &str) -> Result<()> {
         let root = &mut self.root;
         let variants = root.extensions.as_ref().and_then(|extensions| extensions.khr_materials_variants.as_ref());
-        let names: Vec<&str> =
-            variants.map_or_else(Vec::new, |all| all.variants.iter().map(|variant| variant.name.as_str()).collect());
-        let by_index = || wanted.parse::<usize>().ok().filter(|&index| index < names.len());
-        let found = names.iter().position(|name| *name == wanted).or_else(by_index).with_context(|| {
-            let names: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
-            match names.is_empty() {
-                true => format!("there is no variant \"{wanted}\"; the file has none"),
-                false => format!("there is no variant \"{wanted}\"; the file has {}", names.join(", ")),
-            }
-        })?;
+        let names: Vec<&str> = variants.iter().flat_map(|all| &all.variants).map(|one| one.name.as_str()).collect();
+        let found = by_name_or_index("variant", wanted, &names.iter().map(|name| Some(*name)).collect::<Vec<_>>())?;
         let materials = root.materials.len();
         for (m, mesh) in root.meshes.iter_mut().enumerate() {
             for (p, primitive) in mesh.primitives.iter_mut().enumerate() {
@@ -158,6 +150,17 @@ impl<'a> Document<'a> {
     pub(crate) fn resolve(&self, uri: &str) -> Result<Vec<u8>> {
         resolve(uri, &self.folder)
     }
+}
+
+/// Index of the item of a list with this name, or with this index; the error lists what there is.
+pub(crate) fn by_name_or_index(kind: &str, wanted: &str, names: &[Option<&str>]) -> Result<usize> {
+    let by_index = || wanted.parse::<usize>().ok().filter(|&index| index < names.len());
+    names.iter().position(|name| *name == Some(wanted)).or_else(by_index).with_context(|| {
+        let item = |(i, name): (usize, &Option<&str>)| name.map_or(i.to_string(), |name| format!("{i} \"{name}\""));
+        let there: Vec<String> = names.iter().enumerate().map(item).collect();
+        let there = if there.is_empty() { "none".to_owned() } else { there.join(", ") };
+        format!("there is no {kind} \"{wanted}\"; the file has {there}")
+    })
 }
 
 /// The `length` bytes from byte `start` on; `what` spans them, `of` has the bytes.

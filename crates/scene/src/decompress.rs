@@ -12,7 +12,7 @@ use draco_core::{DataType, DecodeLimits, DecoderBuffer, FaceIndex, Mesh, MeshDec
 use gltf::json::accessor::{ComponentType, GenericComponentType};
 use gltf::json::validation::{Checked, USize64};
 use gltf::json::{self, Accessor, Buffer, Index, Root, buffer};
-use meshoptimizer_rs::{self as meshoptimizer, codec as meshopt};
+use meshoptimizer_rs::{Workspace, codec as meshopt};
 use rayon::prelude::*;
 use serde::Deserialize;
 use serde_json::{Map, Value};
@@ -72,27 +72,17 @@ pub(crate) fn decompress(root: &mut Root, buffers: &mut Vec<Cow<'_, [u8]>>) -> R
     draco_primitives(root, buffers, &mut left)
 }
 
-/// Appends a buffer and returns a view of all its bytes.
-fn append(root: &mut Root, buffers: &mut Vec<Cow<'_, [u8]>>, bytes: Vec<u8>) -> buffer::View {
-    let length = USize64(bytes.len() as u64);
+/// Appends a buffer of these bytes.
+fn append(root: &mut Root, buffers: &mut Vec<Cow<'_, [u8]>>, bytes: Vec<u8>) -> Index<Buffer> {
     root.buffers.push(Buffer {
-        byte_length: length,
+        byte_length: USize64(bytes.len() as u64),
         name: None,
         uri: None,
         extensions: None,
         extras: json::Extras::default(),
     });
     buffers.push(Cow::Owned(bytes));
-    buffer::View {
-        buffer: Index::new((root.buffers.len() - 1) as u32),
-        byte_length: length,
-        byte_offset: None,
-        byte_stride: None,
-        name: None,
-        target: None,
-        extensions: None,
-        extras: json::Extras::default(),
-    }
+    Index::new((root.buffers.len() - 1) as u32)
 }
 
 /// Takes the decoded size of a stream from what is left of the limit.
@@ -138,9 +128,9 @@ fn meshopt_views(root: &mut Root, buffers: &mut Vec<Cow<'_, [u8]>>, left: &mut u
         })
         .collect::<Result<_>>()?;
     for ((index, _, stream), bytes) in jobs.into_iter().zip(decoded) {
-        let fresh = append(root, buffers, bytes);
+        let buffer = append(root, buffers, bytes);
         let view = &mut root.buffer_views[index];
-        view.buffer = fresh.buffer;
+        view.buffer = buffer;
         view.byte_offset = None;
         // Only attributes are strided; the stride of indices is that of the accessor.
         if stream.mode == "ATTRIBUTES" {
@@ -152,7 +142,7 @@ fn meshopt_views(root: &mut Root, buffers: &mut Vec<Cow<'_, [u8]>>, left: &mut u
 
 /// Decodes a stream of `count` elements of `byte_stride` bytes.
 fn meshopt_stream(stream: &MeshoptView, source: &[u8]) -> Result<Vec<u8>> {
-    let mut workspace = meshoptimizer::Workspace::default();
+    let mut workspace = Workspace::default();
     let (count, stride) = (stream.count, stream.byte_stride);
     let decoded = match stream.mode.as_str() {
         "ATTRIBUTES" => {
@@ -164,11 +154,7 @@ fn meshopt_stream(stream: &MeshoptView, source: &[u8]) -> Result<Vec<u8>> {
         "INDICES" => meshopt::decode_index_sequence(count, stride, source, &mut workspace),
         other => bail!("its mode \"{other}\" is unknown"),
     };
-    let fault = |what: &str| {
-        let what = what.to_owned();
-        move |error: meshoptimizer::Error| anyhow!("{what}: {error}")
-    };
-    let mut bytes = decoded.map_err(fault("its stream cannot be decoded"))?;
+    let mut bytes = decoded.map_err(|error| anyhow!("its stream cannot be decoded: {error}"))?;
     let filtered = match stream.filter.as_str() {
         "NONE" => Ok(()),
         "OCTAHEDRAL" => meshopt::decode_filter_oct(&mut bytes, count, stride, &mut workspace),
@@ -177,7 +163,7 @@ fn meshopt_stream(stream: &MeshoptView, source: &[u8]) -> Result<Vec<u8>> {
         "COLOR" => meshopt::decode_filter_color(&mut bytes, count, stride, &mut workspace),
         other => bail!("its filter \"{other}\" is unknown"),
     };
-    filtered.map_err(fault(&format!("its filter {}", stream.filter)))?;
+    filtered.map_err(|error| anyhow!("its filter {}: {error}", stream.filter))?;
     Ok(bytes)
 }
 
@@ -341,8 +327,18 @@ fn fill(
     count: usize,
     bytes: Vec<u8>,
 ) -> Result<()> {
-    let view = append(root, buffers, bytes);
-    root.buffer_views.push(view);
+    let byte_length = USize64(bytes.len() as u64);
+    let buffer = append(root, buffers, bytes);
+    root.buffer_views.push(buffer::View {
+        buffer,
+        byte_length,
+        byte_offset: None,
+        byte_stride: None,
+        name: None,
+        target: None,
+        extensions: None,
+        extras: json::Extras::default(),
+    });
     let view = Index::new(u32::try_from(root.buffer_views.len() - 1)?);
     let into = &mut root.accessors[accessor];
     into.buffer_view = Some(view);

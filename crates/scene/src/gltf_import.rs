@@ -6,11 +6,10 @@
 
 use std::{
     collections::{HashMap, HashSet},
-    fs,
     path::{Path, PathBuf},
 };
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, ensure};
 use glam::{DAffine3, DMat3, DMat4, DVec3, Mat4, Vec3};
 use gltf::json::{
     self,
@@ -49,7 +48,7 @@ pub(crate) struct GltfFile {
 
 impl GltfFile {
     pub(crate) fn open(path: &Path, options: &LoadOptions) -> Result<Self> {
-        let bytes = fs::read(path).map_err(|error| anyhow!(etalon_image::file::cause(&error)))?;
+        let bytes = super::contents(path)?;
         let mut warnings = Vec::new();
         let document = opened(&bytes, path, options, &mut warnings)?.into_owned();
         Ok(Self { path: path.to_owned(), document, warnings, known: StillParts::default() })
@@ -62,7 +61,7 @@ impl GltfFile {
 
 /// Reads a `.gltf` or `.glb` file.
 pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
-    let bytes = fs::read(path).map_err(|error| anyhow!(etalon_image::file::cause(&error)))?;
+    let bytes = super::contents(path)?;
     let mut warnings = Vec::new();
     let mut document = opened(&bytes, path, options, &mut warnings)?;
     read(&mut document, path, options, warnings, &mut StillParts::default())

@@ -327,9 +327,13 @@ impl MaterialReader<'_, '_, '_> {
             .get(texture)
             .with_context(|| format!("texture {texture} does not exist; the file has {}", root.textures.len()))?;
         let others = json.extensions.as_ref().map(|extensions| &extensions.others);
-        let other =
-            others.and_then(|others| OTHER_SOURCES.iter().find(|name| others.contains_key(**name)).zip(Some(others)));
-        let other = other.map(|(name, others)| parse::<OtherSource>(others, name)).transpose()?.flatten();
+        let mut other = None;
+        for name in OTHER_SOURCES {
+            other = match (other, others) {
+                (None, Some(others)) => parse::<OtherSource>(others, name)?,
+                (found, _) => found,
+            };
+        }
         let source = match other {
             Some(other) => other.source,
             // The crate's placeholder for a texture without a source.

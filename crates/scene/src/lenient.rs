@@ -86,18 +86,13 @@ pub(crate) fn at(document: &Document<'_>, time: f64) -> Result<Root> {
         let place = || format!("animation {animation}: the pointer {pointer}");
         let json = document.root.animations.get(*animation).with_context(place)?;
         let numbers = sampled(document, json, *sampler, time, pointer.ends_with("/rotation")).with_context(place)?;
+        let number = |x: f64| Number::from_f64(x).map(Value::Number).context("a value is not finite");
         let member = pointer.rsplit('/').next().unwrap_or_default();
         let new = match numbers[..] {
             // Booleans are stored as 0 and 1, and are not interpolated.
-            [number] if member == "visible" => Value::Bool(number != 0.0),
-            [number] if member != "weights" => Number::from_f64(number).map(Value::Number).with_context(place)?,
-            _ => numbers
-                .iter()
-                .copied()
-                .map(Number::from_f64)
-                .map(|n| n.map(Value::Number))
-                .collect::<Option<_>>()
-                .with_context(place)?,
+            [one] if member == "visible" => Value::Bool(one != 0.0),
+            [one] if member != "weights" => number(one).with_context(place)?,
+            _ => numbers.iter().map(|x| number(*x)).collect::<Result<_>>().with_context(place)?,
         };
         set(&mut value, pointer, new).with_context(place)?;
     }

@@ -82,6 +82,11 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     Ok(scene)
 }
 
+/// The content of a file; the error is its cause alone, for the caller names the file.
+fn contents(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).map_err(|error| anyhow::anyhow!(etalon_image::file::cause(&error)))
+}
+
 /// An animated scene: its file is read once, and all moments of the animation share the static parts.
 pub struct Source {
     kind: Kind,

@@ -1,20 +1,19 @@
 //! Mesh files without materials: STL (stereolithography) and PLY (Stanford polygons).
 //!
 //! The crates `stl_io` and `ply-rs-bw` parse; this file makes a scene of one grey, rough, two-sided surface. STL has +Z
-//! up, as printers have it, and flat normals of its own making. PLY may have normals, vertex colours in sRGB and
-//! texture coordinates; a PLY file without faces is a cloud of points.
+//! up, as printers have it, and flat normals of its own making. PLY may have normals, vertex colours in sRGB; a PLY file without faces is a cloud of points.
 
 use std::io::Cursor;
 use std::path::Path;
 
-use anyhow::{Context, Result, anyhow, ensure};
-use etalon_image::{file, tone};
+use anyhow::{Context, Result, bail};
+use etalon_image::tone;
 use glam::{DAffine3, DMat3};
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 
 use super::thin::{self, Stroke, StrokeGroup};
-use super::{Instance, Material, Mesh, Scene, Shared, geometry};
+use super::{Instance, Material, Mesh, Scene, Shared, contents, geometry};
 
 /// The surface of a file that has no materials.
 fn surface() -> Material {
@@ -26,10 +25,6 @@ fn surface() -> Material {
         double_sided: true,
         ..Material::default()
     }
-}
-
-fn bytes_of(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).map_err(|error| anyhow!(file::cause(&error)))
 }
 
 fn empty(path: &Path) -> Mesh {
@@ -74,7 +69,7 @@ fn scene_of(path: &Path, mut mesh: Mesh, world_from_object: DAffine3, mut warnin
 
 /// Reads an `.stl` file, text or binary. Coordinates are metres.
 pub(crate) fn load_stl(path: &Path) -> Result<Scene> {
-    let read = stl_io::read_stl(&mut Cursor::new(bytes_of(path)?)).context("it cannot be read as STL")?;
+    let read = stl_io::read_stl(&mut Cursor::new(contents(path)?)).context("it cannot be read as STL")?;
     let mut mesh = empty(path);
     mesh.positions = read.vertices.iter().map(|vertex| vertex.0).collect::<Vec<_>>().into();
     mesh.indices = read.faces.iter().flat_map(|face| face.vertices.map(|i| i as u32)).collect::<Vec<_>>().into();
@@ -89,7 +84,6 @@ struct PlyElement {
     position: [f32; 3],
     normal: [Option<f32>; 3],
     color: [Option<f32>; 4],
-    uv: [Option<f32>; 2],
     corners: Vec<u32>,
 }
 
@@ -121,8 +115,6 @@ impl PropertyAccess for PlyElement {
             "green" => self.color[1] = Some(value * scale),
             "blue" => self.color[2] = Some(value * scale),
             "alpha" => self.color[3] = Some(value * scale),
-            "u" | "s" | "texture_u" => self.uv[0] = Some(value),
-            "v" | "t" | "texture_v" => self.uv[1] = Some(value),
             _ => return PropertyAccessResult::Ignored,
         }
         PropertyAccessResult::Set
@@ -130,7 +122,10 @@ impl PropertyAccess for PlyElement {
 }
 
 /// The values of an attribute, if every vertex has it.
-fn all<const N: usize>(vertices: &[PlyElement], of: impl Fn(&PlyElement) -> [Option<f32>; N]) -> Shared<[f32; N]> {
+fn attribute<const N: usize>(
+    vertices: &[PlyElement],
+    of: impl Fn(&PlyElement) -> [Option<f32>; N],
+) -> Shared<[f32; N]> {
     let values: Option<Vec<[f32; N]>> = vertices
         .iter()
         .map(|vertex| {
@@ -143,7 +138,7 @@ fn all<const N: usize>(vertices: &[PlyElement], of: impl Fn(&PlyElement) -> [Opt
 
 /// Reads a `.ply` file, text or binary of either byte order. Coordinates are metres.
 pub(crate) fn load_ply(path: &Path) -> Result<Scene> {
-    let bytes = bytes_of(path)?;
+    let bytes = contents(path)?;
     let read = Parser::<PlyElement>::new().read_ply(&mut Cursor::new(bytes)).context("it cannot be read as PLY")?;
     let none = Vec::new();
     let vertices = read.payload.get("vertex").unwrap_or(&none);
@@ -151,17 +146,16 @@ pub(crate) fn load_ply(path: &Path) -> Result<Scene> {
     let count = u32::try_from(vertices.len()).context("it has more than 2^32 vertices")?;
     let mut mesh = empty(path);
     mesh.positions = vertices.iter().map(|vertex| vertex.position).collect::<Vec<_>>().into();
-    mesh.normals = all(vertices, |vertex| vertex.normal);
-    mesh.uvs[0] = all(vertices, |vertex| vertex.uv);
+    mesh.normals = attribute(vertices, |vertex| vertex.normal);
     let linear = |value: f32| tone::srgb_decode(f64::from(value.clamp(0.0, 1.0))) as f32;
-    mesh.colors = all(vertices, |vertex| {
+    mesh.colors = attribute(vertices, |vertex| {
         let [r, g, b, a] = vertex.color;
         [r.map(linear), g.map(linear), b.map(linear), a.or(Some(1.0))]
     });
     let mut triangles = Vec::new();
     for (face, PlyElement { corners, .. }) in faces.iter().enumerate() {
         if let Some(wrong) = corners.iter().find(|&&corner| corner >= count) {
-            ensure!(*wrong < count, "face {face} names vertex {wrong}, but there are {count}");
+            bail!("face {face} names vertex {wrong}, but there are {count}");
         }
         // Polygons as fans.
         triangles.extend(corners.windows(2).skip(1).flat_map(|edge| [corners[0], edge[0], edge[1]]));

@@ -12,7 +12,11 @@ use gltf::json::{
 
 use serde_json::Value;
 
-use super::{LoadOptions, accessor::Accessor, container::Document};
+use super::{
+    LoadOptions,
+    accessor::Accessor,
+    container::{Document, by_name_or_index},
+};
 
 /// Largest number of copies of one node: more instances than the G-buffer's index holds.
 const MOST_COPIES: usize = 1 << 23;
@@ -181,19 +185,8 @@ fn instances(document: &Document<'_>, node: usize) -> Result<Option<Vec<DAffine3
 /// first.
 fn chosen_scene<'d>(root: &'d json::Root, wanted: Option<&str>) -> Result<Option<&'d json::Scene>> {
     let Some(wanted) = wanted else { return Ok(root.scenes.get(root.scene.map_or(0, |scene| scene.value()))) };
-    let by_name = root.scenes.iter().find(|scene| scene.name.as_deref() == Some(wanted));
-    let by_index = || wanted.parse::<usize>().ok().and_then(|index| root.scenes.get(index));
-    let found = by_name.or_else(by_index).ok_or_else(|| {
-        let names = root.scenes.iter().enumerate();
-        let names: Vec<String> = names
-            .map(|(i, scene)| scene.name.as_ref().map_or_else(|| i.to_string(), |name| format!("{i} \"{name}\"")))
-            .collect();
-        match names.is_empty() {
-            true => anyhow!("there is no scene \"{wanted}\"; the file has none"),
-            false => anyhow!("there is no scene \"{wanted}\"; the file has {}", names.join(", ")),
-        }
-    })?;
-    Ok(Some(found))
+    let names: Vec<Option<&str>> = root.scenes.iter().map(|scene| scene.name.as_deref()).collect();
+    Ok(Some(&root.scenes[by_name_or_index("scene", wanted, &names)?]))
 }
 
 fn shown(

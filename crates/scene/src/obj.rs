@@ -26,7 +26,7 @@ const MAX_EARS: usize = 2_000;
 
 /// Reads an `.obj` file and its material libraries.
 pub(crate) fn load(path: &Path, prune: Prune) -> Result<Scene> {
-    let bytes = fs::read(path).map_err(|error| anyhow!(etalon_image::file::cause(&error)))?;
+    let bytes = super::contents(path)?;
     let text = String::from_utf8_lossy(&bytes);
     let mut reader = ObjReader {
         folder: path.parent().unwrap_or(Path::new("")).to_owned(),

@@ -272,7 +272,7 @@ knob! {
     exact: Path,
     lecture: ["R6"],
     effects: [PathTracing, AmbientLight, AmbientOcclusion],
-    about: "indirect light: none, unshadowed ambient light of the environment, the same with N rays of ambient occlusion, path tracing",
+    about: "indirect light: none, ambient light without visibility, ambient light with N rays of ambient occlusion, path tracing",
 }
 
 impl Indirect {
