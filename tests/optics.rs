@@ -1338,8 +1338,9 @@ fn coincident_interfaces_of_equal_index_vanish() {
 #[test]
 fn what_touches_a_closed_mesh_is_seen_through_it() {
     let gpu = Gpu::open();
-    // The slab lies on a card, as a glass stands on a table, or a little above it. "small" has facets that are small beside
-    // the card's two. "two" has one closed mesh in another: both stand on the card, or the inner one is a little higher.
+    // The slab lies on a card, as a glass stands on a table, or a little above it. "small" has facets that are small
+    // beside the card's two. "two" has one closed mesh in another: both stand on the card, or the inner one is a little
+    // higher.
     for (name, size, inner) in [("slab", 1.0, false), ("small", 0.01, false), ("two", 1.0, true)] {
         let picture = |gap: f64| {
             let mut made = Made::new(name);

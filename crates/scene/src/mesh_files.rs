@@ -1,7 +1,8 @@
 //! Mesh files without materials: STL (stereolithography) and PLY (Stanford polygons).
 //!
 //! The crates `stl_io` and `ply-rs-bw` parse; this file makes a scene of one grey, rough, two-sided surface. STL has +Z
-//! up, as printers have it, and flat normals of its own making. PLY may have normals, vertex colours in sRGB; a PLY file without faces is a cloud of points.
+//! up, as printers have it, and flat normals of its own making. PLY may have normals, vertex colours in sRGB; a PLY
+//! file without faces is a cloud of points.
 
 use std::io::Cursor;
 use std::path::Path;
