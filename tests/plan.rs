@@ -9,6 +9,7 @@ use etalon::gpu::NOTHING;
 use etalon::image::Picture;
 use etalon::plan::{Knobs, Plan};
 use etalon::scene::environment::Environment;
+use etalon::scene::lobe::{ANISOTROPY, DIFFUSE_TRANSMISSION, IRIDESCENCE};
 use etalon::scene::material::{Sampler, TextureRef};
 use etalon::scene::{AlphaMode, Image, LightKind, Material, Scene, SigmaGrid};
 use etalon::study::shape::Shape;
@@ -198,6 +199,9 @@ const SCREEN: &[&str] = &[
     "screen_tiles",
 ];
 const TEXTURES: &[&str] = &["texture coordinates 0"];
+/// What textures of lobes and directions are stored in.
+const LOBE_TARGET: &[&str] =
+    &["G-buffer lobes", "G-buffer lobe rows", "[copy lobes]", "light.stored_lobes", "light.specular_colors"];
 
 fn chalk() -> Material {
     lambert([0.5, 0.6, 0.7])
@@ -238,6 +242,27 @@ fn surfaces_bring_their_targets() {
     Case {
         brings: &[TEXTURES, &["G-buffer layers", "gbuffer.textures", "light.stored_layers"]],
         ..Case::new("material layers", NONE, ball(metal(0.5), None), with)
+    }
+    .check();
+
+    let mut with = ball(metal(0.5), Some(metal(0.5)));
+    let texture = one_colour(&mut with, [9, 9, 9, 9]);
+    with.0.materials[2].specular_color_texture = Some(texture);
+    Case {
+        brings: &[TEXTURES, LOBE_TARGET, &["gbuffer.textures", "gbuffer.lobe_texels"]],
+        ..Case::new("textures of lobes", NONE, ball(metal(0.5), None), with)
+    }
+    .check();
+    for (lobe, name) in [(IRIDESCENCE, "iridescence"), (DIFFUSE_TRANSMISSION, "diffuse transmission")] {
+        let mut with = metal(0.5);
+        with.lobes[lobe].factors = [1.0, 1.3, 100.0, 300.0];
+        Case { brings: &[&["light.lobes_seen"]], ..Case::hidden(name, NONE, metal(0.5), with) }.check();
+    }
+    let mut brushed = metal(0.5);
+    brushed.lobes[ANISOTROPY].factors = [1.0, 0.0, 0.0, 0.0];
+    Case {
+        brings: &[LOBE_TARGET, &["light.lobes_seen", "gbuffer.anisotropic", "gbuffer.lobe_texels"]],
+        ..Case::hidden("anisotropy", NONE, metal(0.5), brushed)
     }
     .check();
 

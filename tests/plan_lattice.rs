@@ -10,6 +10,7 @@ use etalon::image::Picture;
 use etalon::plan::{EffectState, Facts, ForcedEffects, Knobs, Plan, Surroundings};
 use etalon::scene::canonical::canonicalise;
 use etalon::scene::environment::Environment;
+use etalon::scene::lobe::{ANISOTROPY, DIFFUSE_TRANSMISSION, IRIDESCENCE, SHEEN};
 use etalon::scene::material::{Sampler, TextureRef};
 use etalon::scene::prune::prune_unused;
 use etalon::scene::{AlphaMode, AmbientLight, Image, LightKind, Material, Prune, SigmaGrid};
@@ -101,6 +102,10 @@ const FACTORS: &[Factor] = &[
     Factor { name: "layers", levels: &["no", "yes"] },
     Factor { name: "coat", levels: &["no", "yes"] },
     Factor { name: "cloth", levels: &["no", "yes"] },
+    Factor { name: "brushed", levels: &["no", "yes"] },
+    Factor { name: "film", levels: &["no", "yes"] },
+    Factor { name: "leaf", levels: &["no", "yes"] },
+    Factor { name: "specular colours", levels: &["no", "yes"] },
     Factor { name: "metal", levels: &["none", "colour", "n and kappa"] },
     Factor { name: "holes", levels: &["no", "yes"] },
     Factor { name: "bent normals", levels: &["no", "yes"] },
@@ -254,9 +259,28 @@ fn scene(ways: &Ways, choice: &Choice) -> Made {
     }
     if is("cloth", "yes") {
         let mut cloth = rough.clone();
-        // Sheen is the first of them.
-        cloth.lobes[0].factors = [0.8, 0.6, 0.9, 0.5];
+        cloth.lobes[SHEEN].factors = [0.8, 0.6, 0.9, 0.5];
         add(&mut made, "cloth", cloth);
+    }
+    if is("brushed", "yes") {
+        let mut brushed = Material { metallic: 1.0, ..rough.clone() };
+        brushed.lobes[ANISOTROPY].factors = [0.7, 0.4, 0.0, 0.0];
+        add(&mut made, "brushed", brushed);
+        let mesh = made.0.meshes.last_mut().expect("a mesh");
+        mesh.tangents = vec![[1.0, 0.0, 0.0, 1.0]; mesh.positions.len()].into();
+    }
+    if is("film", "yes") {
+        let mut film = rough.clone();
+        film.lobes[IRIDESCENCE].factors = [0.9, 1.4, 100.0, 350.0];
+        add(&mut made, "film", film);
+    }
+    if is("leaf", "yes") {
+        let mut leaf = rough.clone();
+        leaf.lobes[DIFFUSE_TRANSMISSION].factors = [0.5, 0.3, 0.9, 0.2];
+        add(&mut made, "leaf", leaf);
+    }
+    if is("specular colours", "yes") {
+        add(&mut made, "coloured gloss", Material { specular_color_texture: Some(texture), ..rough.clone() });
     }
     if !is("metal", "none") {
         let conductor = is("metal", "n and kappa").then_some([[0.2, 3.1], [0.4, 2.4], [1.4, 1.9]]);
@@ -488,6 +512,7 @@ fn planned(ways: &Ways, choice: &Choice, knobs: Knobs) -> Plan {
 const NEEDS: &[(&str, &str)] = &[
     ("absorption", "transmissive hits"),
     ("ambient light", "environment"),
+    ("anisotropy", "textures of lobes"),
     ("clear coat", "material layers"),
     ("tiled light culling", "punctual lights"),
     ("transparent shadows", "shadows"),
@@ -547,17 +572,20 @@ const OF_PATHS: [&str; 5] =
 const OF_WAVELENGTHS: [&str; 2] = ["spectral rendering", "dispersion"];
 
 /// Every other effect, except the one that only the hierarchy of triangles decides.
-const NAMES: [&str; 22] = [
+const NAMES: [&str; 26] = [
     "absorption",
     "alpha test in rays",
     "ambient light",
+    "anisotropy",
     "clear coat",
     "conductors with n and kappa",
+    "diffuse transmission",
     "emissive textures",
     "environment",
     "environment reflection",
     "glossy reflection",
     "heterogeneous media",
+    "iridescence",
     "material layers",
     "order-independent transparency",
     "prefiltered environment",
@@ -567,6 +595,7 @@ const NAMES: [&str; 22] = [
     "refraction",
     "shadows",
     "sheen",
+    "textures of lobes",
     "tiled light culling",
     "transmissive hits",
     "transparent shadows",

@@ -45,7 +45,8 @@ vec3 visible_irradiance(Surface s) {
     return mix(vec3(1.0), seen / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
 }
 
-// Share of a specular lobe that sees the environment, by the weights of its directions.
+// Share of a specular lobe that sees the environment, by the weights of its directions. An anisotropic lobe counts as a
+// round one of the α across.
 vec3 visible_lobe(Surface s, vec3 n, float alpha, uint event) {
     vec3 seen = vec3(0.0);
     float all = 0.0;
@@ -92,7 +93,7 @@ vec3 occluded_environment_light(Surface s) {
     vec3 mirrored = vec3(0.0);
     vec3 coat_mirrored = vec3(0.0);
     if (REFLECTION && !s.base_traced) {
-        mirrored = prefiltered_radiance(reflect_ray(-s.v, s.n).R, s.alpha);
+        mirrored = radiance_in_base_lobe(s);
         if (LOBE_RAYS > 0) mirrored = partly_occluded(mirrored, beside, visible_lobe(s, s.n, s.alpha, BASE_LOBE_EVENT));
     }
     if (CLEARCOAT && REFLECTION && !s.coat_traced) {

@@ -79,22 +79,25 @@ Boundary boundary_at(HitSurface hit, uvec4 media, vec3 direction) {
 Layers layers_at(HitSurface hit, Boundary boundary) {
     Layers b;
     b.s = hit.s;
-    b.s.diffuse *= 1.0 - hit.transmits;
+    keep_diffuse(b.s, 1.0 - hit.transmits);
     b.between = true;
     b.solid = boundary.solid;
     b.sheet = boundary.sheet;
     b.n1 = index_of(boundary.medium_in);
     b.n2 = boundary.solid ? index_of(boundary.medium_out) : b.s.ior;
     if (TRANSMISSIVE && !boundary.solid) seen_from(b.s, b.n1);
-    b.delta = !ROUGH || b.s.roughness <= MIN_ROUGHNESS || (b.solid && b.n1 == b.n2);
+    b.delta = !ROUGH || (b.s.roughness <= MIN_ROUGHNESS && !is_anisotropic(b.s)) || (b.solid && b.n1 == b.n2);
     b.coat_delta = !ROUGH || b.s.clearcoat_roughness <= MIN_ROUGHNESS;
     if (!b.delta) compensate(b.s);
     b.cos_v = max(cosine(b.s.n, b.s.v), 1e-4);
-    b.f_dielectric = fresnel_below_coat(b, b.cos_v, b.total);
-    b.f_base = mix(b.f_dielectric, fresnel_of_metal(b.s, b.cos_v), b.s.metallic);
+    FacetFresnel f = fresnel_below_coat(b, b.cos_v);
+    b.f_dielectric = f.dielectric;
+    b.f_base = f.base;
+    b.total = f.total;
     b.enters = 1.0 - largest(b.f_dielectric);
     if (ROUGH && BRDF == BRDF_GGX_MULTI && !b.delta) b.enters = ground_share(albedo_of_base(b.s, lobe_reflectance(b.s)));
     b.left = left_to_base(b.s);
+    b.through_share = diffuse_through_share(b.s);
     b.under = 1.0;
     if (CLEARCOAT) {
         b.under = under_coat(b.s);

@@ -455,9 +455,9 @@ float mirrored_pdf(float cos_v, HalfAngle h, float alpha) {
 // @eq B1: H of density D max(V·H, 0) G₁/cosθ_v: a point of a disk, moved up by what the viewer sees of the hemisphere below
 // @out h
 // Sampling of the VNDF, the distribution of visible normals (Heitz, JCGT 7(4) 2018). v and h are in the frame of the
-// normal.
-vec3 visible_half_vector(vec3 v, float alpha, vec2 u) {
-    vec3 stretched = normalize(vec3(alpha * v.xy, v.z));
+// normal, and `alphas` are α along its first and its second axis.
+vec3 visible_half_vector(vec3 v, vec2 alphas, vec2 u) {
+    vec3 stretched = normalize(vec3(alphas * v.xy, v.z));
     float across2 = dot(stretched.xy, stretched.xy);
     vec3 t = across2 > 0.0 ? vec3(-stretched.y, stretched.x, 0.0) * inversesqrt(across2) : vec3(1.0, 0.0, 0.0);
     vec3 b = cross(stretched, t);
@@ -465,14 +465,14 @@ vec3 visible_half_vector(vec3 v, float alpha, vec2 u) {
     float s = 0.5 * (1.0 + stretched.z);
     disk.y = (1.0 - s) * sqrt(max(1.0 - disk.x * disk.x, 0.0)) + s * disk.y;
     vec3 h = disk.x * t + disk.y * b + sqrt(max(1.0 - dot(disk, disk), 0.0)) * stretched;
-    return normalize(vec3(alpha * h.xy, max(h.z, 0.0)));
+    return normalize(vec3(alphas * h.xy, max(h.z, 0.0)));
 }
 
 // A half vector sampled from the VNDF, in the space of n and v.
 vec3 half_vector(vec3 n, vec3 v, float alpha, vec2 u) {
     OrthonormalBasis frame = orthonormal_basis(n);
     vec3 local = vec3(dot(v, frame.t), dot(v, frame.b), max(dot(v, n), 1e-4));
-    vec3 h = visible_half_vector(local, alpha, u);
+    vec3 h = visible_half_vector(local, vec2(alpha), u);
     return frame.t * h.x + frame.b * h.y + n * h.z;
 }
 

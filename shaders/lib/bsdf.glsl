@@ -80,10 +80,14 @@ PathEval bsdf_evaluate(Bsdf b, vec3 l) {
         BsdfEval behind = evaluate_transmission(b.layers, l);
         if (dot(b.n, l) < 0.0) e = behind;
     }
+    if (DIFFUSE_TRANSMISSION) {
+        BsdfEval behind = evaluate_diffuse_transmission(b.layers, l);
+        if (dot(b.n, l) < 0.0) e = BsdfEval(e.f_cos + behind.f_cos, e.pdf + behind.pdf);
+    }
     PathEval r = PathEval(e.f_cos, e.pdf, e.pdf);
     if (PATH_GUIDING) {
         float cos_l = dot(b.layers.s.n, l);
-        float instead = b.guided * b.layers.shares.z;
+        float instead = b.guided * b.layers.shares.z * (1.0 - b.layers.through_share);
         bool guided = above && cos_l > 0.0 && instead > 0.0;
         if (guided) r.pdf += instead * (guided_pdf(b.guiding, b.p_bvh, l) - cos_l * INV_PI);
     }
@@ -97,6 +101,7 @@ struct BsdfSample {
     bool delta;
     bool through;  // the direction leaves behind the surface
     bool straight; // and is not deflected
+    bool diffuse;  // sampled from the diffuse base layer
 };
 
 // Importance sampling of the BSDF: `x` chooses the lobe, `u` the direction within it.
@@ -111,7 +116,7 @@ BsdfSample bsdf_sample(Bsdf bsdf, float x, vec2 u) {
     bool delta = (coat ? b.coat_delta : b.delta) && !diffuse;
     vec3 h = event_half_vector(b, coat, u);
     vec3 mirrored = reflect_ray(-s.v, h).R;
-    BsdfSample r = BsdfSample(delta ? on_side(mirrored, s.n_triangle) : mirrored, vec3(0.0), delta, through, false);
+    BsdfSample r = BsdfSample(delta ? on_side(mirrored, s.n_triangle) : mirrored, vec3(0.0), delta, through, false, diffuse);
     // A delta lobe returns its weight, at the viewer's angle. For rough lobes the caller evaluates the whole BSDF instead.
     vec3 weight = b.f_base * (b.under * b.left);
     float share = b.shares.y;
@@ -132,16 +137,25 @@ BsdfSample bsdf_sample(Bsdf bsdf, float x, vec2 u) {
         }
     }
     if (r.delta) r.weight = share > 0.0 ? weight / share : vec3(0.0);
+    // Of the diffuse light the part `through_share` leaves on the other side: `x` within its lobe chooses.
+    bool other_side = false;
+    if (DIFFUSE_TRANSMISSION) {
+        float within = (x - b.shares.x - b.shares.y) / max(b.shares.z, 1e-6);
+        other_side = diffuse && within < b.through_share;
+        r.through = r.through || other_side;
+    }
     if (diffuse) {
         OrthonormalBasis frame = orthonormal_basis(s.n);
         // Choose the strategy with u.x and rescale it: stratification survives.
-        bool guided = PATH_GUIDING && u.x < bsdf.guided;
-        float across = PATH_GUIDING && !guided ? (u.x - bsdf.guided) / (1.0 - bsdf.guided) : u.x;
+        float guides = DIFFUSE_TRANSMISSION && other_side ? 0.0 : bsdf.guided;
+        bool guided = PATH_GUIDING && u.x < guides;
+        float across = PATH_GUIDING && !guided ? (u.x - guides) / (1.0 - guides) : u.x;
         vec3 l = cosine_sample(across, u.y).L;
         r.direction = frame.t * l.x + frame.b * l.y + s.n * l.z;
         if (PATH_GUIDING) {
-            if (guided) r.direction = guided_direction(bsdf.guiding, bsdf.p_bvh, vec2(u.x / bsdf.guided, u.y));
+            if (guided) r.direction = guided_direction(bsdf.guiding, bsdf.p_bvh, vec2(u.x / guides, u.y));
         }
+        if (DIFFUSE_TRANSMISSION) r.direction = other_side ? r.direction - 2.0 * dot(r.direction, s.n) * s.n : r.direction;
     }
     return r;
 }

@@ -12,12 +12,40 @@ layout(constant) const bool REFLECTION = false;     // the prefiltered environme
 vec3 environment_light_of(Surface s, BaseAlbedo albedo, vec3 irradiance, vec3 mirrored, vec3 coat_mirrored) {
     vec3 result = vec3(0.0);
     if (AMBIENT) result += scattered_radiance(s, albedo, irradiance);
+    // What comes through from behind has no visibility, with ambient occlusion neither.
+    if (AMBIENT && DIFFUSE_TRANSMISSION) result += transmitted_radiance(s, albedo, environment_irradiance(-s.n));
     if (REFLECTION && !s.base_traced) result += albedo.base * mirrored;
     if (CLEARCOAT) {
         result *= BRDF == BRDF_GGX_MULTI ? 1.0 - min(albedo_of_coat(s), 1.0) : under_coat(s);
         if (REFLECTION && !s.coat_traced) result += albedo_of_coat(s) * coat_mirrored;
     }
     return result * s.occlusion;
+}
+
+// Narrow lobes that make up an anisotropic one.
+const uint LOBE_PARTS = 8;
+
+// The radiance of the environment in the lobe of the base. An anisotropic lobe is the sum of round ones, of the α across it,
+// around half vectors spread along its wide direction: variances add, so these have α² = α_t² − α_b² along and 0 across.
+vec3 radiance_in_base_lobe(Surface s) {
+    vec3 result = prefiltered_radiance(reflect_ray(-s.v, s.n).R, s.alpha);
+    if (ANISOTROPY) {
+        if (is_anisotropic(s)) {
+            vec2 alphas = vec2(sqrt(max(s.alpha_along * s.alpha_along - s.alpha * s.alpha, 0.0)), SMALLEST_ALPHA);
+            vec3 sum = vec3(0.0);
+            float weights = 0.0;
+            for (uint i = 0; i < LOBE_PARTS; i++) {
+                vec2 u = vec2((float(i) + 0.5) / float(LOBE_PARTS), unit_float(bitfieldReverse(i)));
+                vec3 r = reflect_ray(-s.v, anisotropic_half_vector(s, alphas, u)).R;
+                vec3 to = in_lobe_frame(s, r);
+                float weight = to.z > 0.0 ? anisotropic_g2_over_g1(in_lobe_frame(s, s.v), to, base_alphas(s)) : 0.0;
+                sum += weight * prefiltered_radiance(r, s.alpha);
+                weights += weight;
+            }
+            result = weights > 0.0 ? sum / weights : result;
+        }
+    }
+    return result;
 }
 
 // Without visibility: the irradiance, and the prefiltered map in the direction of reflection.
@@ -27,7 +55,7 @@ vec3 environment_light(Surface s) {
     vec3 mirrored = vec3(0.0);
     vec3 coat_mirrored = vec3(0.0);
     if (AMBIENT) irradiance = environment_irradiance(s.n);
-    if (REFLECTION && !s.base_traced) mirrored = prefiltered_radiance(reflect_ray(-s.v, s.n).R, s.alpha);
+    if (REFLECTION && !s.base_traced) mirrored = radiance_in_base_lobe(s);
     if (CLEARCOAT && REFLECTION && !s.coat_traced) {
         coat_mirrored = prefiltered_radiance(reflect_ray(-s.v, s.n_coat).R, s.clearcoat_alpha);
     }

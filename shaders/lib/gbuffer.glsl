@@ -15,6 +15,7 @@ layout(constant) const float NORMAL_ERROR2 = 1e-7;    // |n − stored n|² that
 layout(constant) const bool POSITIONS = false;        // positions are stored beside depth (knob `position`)
 layout(constant) const bool STORED_EMISSIVE = false;
 layout(constant) const bool STORED_LAYERS = false;
+layout(constant) const bool STORED_LOBES = false;
 layout(constant) const bool STORED_TRIANGLES = false;
 layout(constant) const bool STORED_TRANSMISSION = false; // transmissive surfaces are stored too
 
@@ -30,6 +31,9 @@ layout(pass, rg32ui) readonly uniform uimage2D ids; // material | roughness << 1
 layout(pass, rgba16f) readonly uniform image2D emissive; // texel
 layout(pass, rgba32ui) readonly uniform uimage2D layers; // lib/texels.glsl, packed_layers
 layout(pass, r32ui) readonly uniform uimage2D triangles; // triangle of the scene
+
+// lib/texels.glsl, packed_lobes, row by row. A buffer, because a shader may have 16 storage images on some devices.
+layout(pass, scalar) readonly buffer Lobes { uvec4 lobes[]; };
 
 // Octahedral encodings of the shading normal (xy) and the geometric normal (zw).
 vec4 stored_normals(ivec2 pixel) {

@@ -24,7 +24,7 @@ void main() {
     Instance instance = instances[gl_InstanceIndex];
     p_rel = instance.rel_from_object * vec4(position, 1.0);
     n_rel = instance.normal_from_object * normal;
-    t_rel = HAS_NORMAL || HAS_COAT_NORMAL ? vec4(mat3(instance.rel_from_object) * tangent.xyz, tangent.w * instance.handedness) : vec4(0);
+    t_rel = HAS_NORMAL || HAS_COAT_NORMAL || ANISOTROPIC ? vec4(mat3(instance.rel_from_object) * tangent.xyz, tangent.w * instance.handedness) : vec4(0);
     uv = TEXTURES != 0 ? vec4(uv0, uv1) : vec4(0);
     vertex_color = HAS_COLOR ? color : vec4(1);
     ids = uvec3(gl_InstanceIndex, instance.material, instance.first_triangle + (SHARED_VERTICES ? 0u : uint(gl_VertexIndex) / 3));

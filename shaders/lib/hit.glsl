@@ -3,6 +3,7 @@
 // metres; world axes.
 #ifndef HIT_GLSL
 #define HIT_GLSL
+#include "lib/anisotropy.glsl"
 #include "lib/bent_normal.glsl"
 #include "lib/encode.glsl"
 #include "lib/surface.glsl"
@@ -14,7 +15,7 @@ layout(constant) const uint HIT_TEXTURES = 0;
 layout(constant) const bool HIT_COLORS = false;     // some mesh has vertex colours
 layout(constant) const bool HIT_SECOND_UVS = false; // some texture reads the second texture coordinates
 const bool HIT_UVS = HIT_TEXTURES != 0;
-const bool HIT_TANGENTS = (HIT_TEXTURES & (1u << SLOT_NORMAL | 1u << SLOT_CLEARCOAT_NORMAL)) != 0;
+layout(constant) const bool HIT_TANGENTS = false; // normal maps, or a lobe with a direction
 
 // In the order of the BVH's leaves.
 layout(scene, rgba32ui) readonly uniform uimageBuffer hit_corners;
@@ -215,6 +216,11 @@ HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
         vec3 texel = hit_texture_or(id, SLOT_CLEARCOAT_NORMAL, point.uvs, footprint, vec4(0.5, 0.5, 1.0, 1.0)).xyz * 2.0 - 1.0;
         vec3 bent = bent_normal(point.n_smooth, point.t_smooth, texel);
         n_coat = has_hit_texture(id, SLOT_CLEARCOAT_NORMAL) ? bent : n_coat;
+    }
+    if (ANISOTROPY) {
+        bool textured = has_hit_texture(id, SLOT_ANISOTROPY);
+        t.tangent = anisotropy_direction(n, point.t_smooth, textured ? anisotropy.rg * 2.0 - 1.0 : vec2(1.0, 0.0),
+                                         lobe_factors(id, LOBE_ANISOTROPY).yz);
     }
     r.front = dot(point.n, direction) <= 0.0;
     float side = r.front ? 1.0 : -1.0;

@@ -1,7 +1,7 @@
 // The layered material model: the lobes of a BSDF from the clear coat down to the diffuse base layer.
 // The layers from the top: a clear coat; sheen; the base, which is a dielectric interface, a conductor, or a mixture of
 // both; below the dielectric interface a diffuse base layer, or transmission (glTF 2.0 appendix B; KHR_materials_clearcoat,
-// sheen, specular, ior, transmission).
+// sheen, anisotropy, iridescence, diffuse_transmission, specular, ior, transmission).
 //
 // Each layer has its Fresnel reflectance, its lobe towards a direction (evaluate), a sampled direction of its lobe
 // (sample), and its directional albedo in a uniform environment. A layer leaves to the layers below it the energy that it
@@ -13,11 +13,14 @@
 // 2007; Heitz 2014 and 2018; Turquin 2019. Assumes: unit vectors in world axes, on the viewer's side; α = roughness².
 #ifndef LAYERS_GLSL
 #define LAYERS_GLSL
+#include "lib/anisotropy.glsl"
 #include "lib/brdf.glsl"
+#include "lib/random.glsl"
 #include "lib/reflectance.glsl"
 #include "lib/sheen.glsl"
 #include "lib/snell.glsl"
 #include "lib/surface.glsl"
+#include "lib/thin_film.glsl"
 
 layout(constant) const bool TRANSMISSIVE = false; // some material transmits light
 
@@ -38,9 +41,29 @@ float boundary_share(float cos_in, float n1, float n2) {
     return n1 > n2 && sin2 >= 1.0 ? 1.0 : schlick_weight(cos_thin);
 }
 
-// Fresnel reflectance of the dielectric part. KHR_materials_specular may tint F0, so the exact curve is mapped to the range
-// from F0 to F90.
-vec3 fresnel_of_dielectric(Surface s, float cos_in) {
+// The film over the base, at an angle whose cosine in the medium n1 outside is cos_in (lib/thin_film.glsl).
+Film film_of(Surface s, float cos_in, float n1) {
+    return film_at(cos_in, n1, s.film.y, s.film.z);
+}
+
+// Fresnel reflectance `bare` of a dielectric base of index n2, with the film over it. KHR_materials_specular scales F0, and
+// here the whole.
+vec3 under_film(Surface s, Film film, vec3 bare, float n1, float n2) {
+    float r0 = nested_f0(n1, n2);
+    vec3 scale = r0 > 0.0 ? min(s.f0_dielectric / r0, 1.0) : vec3(1.0);
+    vec3 coated = scale * film_over_dielectric(film, n2);
+    return s.film.x > 0.0 ? bare + (coated - bare) * s.film.x : bare;
+}
+
+// Fresnel reflectance `bare` of a metal, with the film over it.
+vec3 metal_under_film(Surface s, Film film, vec3 bare) {
+    vec3 coated = film_over_metal(film, schlick(s.f0_metal, 1.0, film.cos_film));
+    return s.film.x > 0.0 ? bare + (coated - bare) * s.film.x : bare;
+}
+
+// Fresnel reflectance of the dielectric part without its film. KHR_materials_specular may tint F0, so the exact curve is
+// mapped to the range from F0 to F90.
+vec3 bare_dielectric(Surface s, float cos_in) {
     if (FRESNEL == FRESNEL_SCHLICK) return schlick(s.f0_dielectric, s.f90_dielectric, cos_in);
     float r0 = nested_f0(s.n_outside, s.ior);
     float n = s.n_outside == 1.0 ? s.ior : s.ior / s.n_outside;
@@ -48,7 +71,7 @@ vec3 fresnel_of_dielectric(Surface s, float cos_in) {
     return s.f0_dielectric + (vec3(s.f90_dielectric) - s.f0_dielectric) * share;
 }
 
-// Fresnel reflectance of the metallic part. Metals given by a colour have no n and κ: Schlick on every rung. For metals
+// Fresnel reflectance of the metallic part without its film. Metals given by a colour have no n and κ: Schlick on every rung. For metals
 // with n and κ the colour is F0, and a texture's factor tints the exact curve.
 vec3 fresnel_of_metal(Surface s, float cos_in) {
     vec3 f = schlick(s.f0_metal, 1.0, cos_in);
@@ -58,6 +81,21 @@ vec3 fresnel_of_metal(Surface s, float cos_in) {
                                     fresnel_conductor(cos_in, s.n_metal.g, s.kappa_metal.g).F,
                                     fresnel_conductor(cos_in, s.n_metal.b, s.kappa_metal.b).F);
         }
+    }
+    return f;
+}
+
+// Fresnel reflectance of both parts, with the film.
+struct BaseFresnel {
+    vec3 dielectric;
+    vec3 metal;
+};
+
+BaseFresnel fresnel_of_base(Surface s, float cos_in) {
+    BaseFresnel f = BaseFresnel(bare_dielectric(s, cos_in), fresnel_of_metal(s, cos_in));
+    if (IRIDESCENCE) {
+        Film film = film_of(s, cos_in, s.n_outside);
+        f = BaseFresnel(under_film(s, film, f.dielectric, s.n_outside, s.ior), metal_under_film(s, film, f.metal));
     }
     return f;
 }
@@ -83,6 +121,65 @@ float under_coat(Surface s) {
 }
 
 // --------------------------------------------------------------------------------------------------------------------
+// The GGX lobe of the base, round or anisotropic. A surface without anisotropy takes the round formulas in every plan.
+
+bool is_anisotropic(Surface s) {
+    return s.alpha_along != s.alpha;
+}
+
+vec2 base_alphas(Surface s) {
+    return vec2(s.alpha_along, s.alpha);
+}
+
+// A direction in the frame of the base's lobe.
+vec3 in_lobe_frame(Surface s, vec3 w) {
+    return vec3(dot(w, s.tangent), dot(w, cross(s.n, s.tangent)), dot(w, s.n));
+}
+
+float base_g2_over_g1(Surface s, vec3 v, vec3 l) {
+    float g = smith_g2_over_g1(dot(s.n, v), dot(s.n, l), s.alpha);
+    if (ANISOTROPY) g = is_anisotropic(s) ? anisotropic_g2_over_g1(in_lobe_frame(s, v), in_lobe_frame(s, l), base_alphas(s)) : g;
+    return g;
+}
+
+// G₁ of the viewer times D of a half vector.
+float base_visible_normals(Surface s, float cos_v, vec3 h) {
+    float g_d = smith_g1(cos_v, s.alpha) * ggx_distribution(s.n, h, s.alpha);
+    if (ANISOTROPY) {
+        float root = anisotropic_root(in_lobe_frame(s, s.v), base_alphas(s));
+        float d = anisotropic_distribution(cosine(s.n, h), sine_squared(s.n, h), share_along(in_lobe_frame(s, h)), base_alphas(s));
+        g_d = is_anisotropic(s) ? 2.0 * cos_v / (cos_v + root) * d : g_d;
+    }
+    return g_d;
+}
+
+// A half vector of the base's anisotropic lobe, sampled from the VNDF.
+vec3 anisotropic_half_vector(Surface s, vec2 alphas, vec2 u) {
+    vec3 v = in_lobe_frame(s, s.v);
+    vec3 h = visible_half_vector(vec3(v.xy, max(v.z, 1e-4)), alphas, u);
+    return s.tangent * h.x + cross(s.n, s.tangent) * h.y + s.n * h.z;
+}
+
+// Directions of the Hammersley set that average an anisotropic lobe: the mean is within 0.035 of the integral (f64, seven
+// elevations, four azimuths, five materials). A round lobe of some mean α is off by up to 0.24.
+const uint LOBE_DIRECTIONS = 32;
+
+// Factors of F0 and F90 in the directional albedo of the base's anisotropic lobe (as lib/reflectance.glsl of a round one).
+vec2 anisotropic_reflectance(Surface s) {
+    vec2 sum = vec2(0.0);
+    for (uint i = 0; i < LOBE_DIRECTIONS; i++) {
+        vec2 u = vec2((float(i) + 0.5) / float(LOBE_DIRECTIONS), unit_float(bitfieldReverse(i)));
+        vec3 h = anisotropic_half_vector(s, base_alphas(s), u);
+        vec3 r = reflect_ray(-s.v, h).R;
+        vec3 to = in_lobe_frame(s, r);
+        float weight = to.z > 0.0 ? anisotropic_g2_over_g1(in_lobe_frame(s, s.v), to, base_alphas(s)) : 0.0;
+        float grazing = schlick_weight(dot(s.v, h));
+        sum += weight * vec2(1.0 - grazing, grazing);
+    }
+    return sum / float(LOBE_DIRECTIONS);
+}
+
+// --------------------------------------------------------------------------------------------------------------------
 // Directional albedo of each layer: the fraction of a uniform environment's radiance that it sends to the eye
 
 // The cosine at which Schlick's weight equals the table's weight of a lobe. The exact curve at that angle stands for its
@@ -105,11 +202,11 @@ struct BaseAlbedo {
 BaseAlbedo albedo_of_base(Surface s, vec2 ab) {
     vec3 dielectric = s.f0_dielectric * ab.x + s.f90_dielectric * ab.y;
     vec3 base = s.f0 * ab.x + s.f90 * ab.y;
-    if (FRESNEL == FRESNEL_EXACT) {
-        float cos_m = mean_cosine(ab);
-        vec3 f_dielectric = fresnel_of_dielectric(s, cos_m);
-        dielectric = f_dielectric * (ab.x + ab.y);
-        base = mix(f_dielectric, fresnel_of_metal(s, cos_m), s.metallic) * (ab.x + ab.y);
+    if (FRESNEL == FRESNEL_EXACT || IRIDESCENCE) {
+        BaseFresnel f = fresnel_of_base(s, mean_cosine(ab));
+        bool at_mean = FRESNEL == FRESNEL_EXACT || s.film.x > 0.0;
+        dielectric = at_mean ? f.dielectric * (ab.x + ab.y) : dielectric;
+        base = at_mean ? mix(f.dielectric, f.metal, s.metallic) * (ab.x + ab.y) : base;
     }
     return BaseAlbedo(dielectric * s.compensation, base * s.compensation * left_to_base(s));
 }
@@ -120,14 +217,25 @@ float albedo_of_coat(Surface s) {
     return s.clearcoat * (COAT_F0 * ab.x + ab.y);
 }
 
-// The table's texel for the base of a surface.
+// The table's texel for the base of a surface; of an anisotropic lobe the same factors by a sum.
 vec2 lobe_reflectance(Surface s) {
-    return reflectance_of_lobe(dot(s.n, s.v), s.roughness);
+    vec2 ab = reflectance_of_lobe(dot(s.n, s.v), s.roughness);
+    if (ANISOTROPY) {
+        if (is_anisotropic(s)) ab = anisotropic_reflectance(s);
+    }
+    return ab;
 }
 
 // Energy left to the diffuse base layer under the base's lobe, in a uniform environment.
 float ground_share(BaseAlbedo albedo) {
     return 1.0 - min(largest(albedo.dielectric), 1.0);
+}
+
+// Radiance that diffuse transmission sends for irradiance on the other side.
+vec3 transmitted_radiance(Surface s, BaseAlbedo albedo, vec3 irradiance) {
+    vec3 scattered = s.diffuse_through * diffuse_brdf(ground_share(albedo));
+    if (SHEEN) scattered *= left_by_sheen(s, max(cosine(s.n, s.v), 1e-4));
+    return scattered * irradiance;
 }
 
 // Radiance that the diffuse base layer and the lobes of extensions (sheen) send for irradiance from a uniform environment.
@@ -167,22 +275,48 @@ struct Layers {
     float enters;      // energy left under the base, by the viewer's angle alone
     float under;       // energy left under the clear coat
     float left;        // energy left to the base under the lobes of extensions
+    float through_share; // fraction of the diffuse light that diffuse transmission sends to the other side
     vec3 tint;         // colour of transmitted light
     float transmits;   // fraction of the entering light that is transmitted
     vec4 shares;       // selection probabilities of coat, base, diffuse base layer, transmission for paths; their sum is 1, or 0
 };
 
-// Fresnel reflectance of the dielectric part at an angle. A tint of F0 in air applies between two media too. `total`: total
-// internal reflection.
-vec3 fresnel_below_coat(Layers b, float cos_in, out bool total) {
+// Fresnel reflectance of the base at an angle.
+struct FacetFresnel {
+    vec3 dielectric;
+    vec3 base;  // of the mixture with the metallic part
+    bool total; // total internal reflection
+};
+
+// A tint of F0 in air applies between two media too.
+FacetFresnel fresnel_below_coat(Layers b, float cos_in) {
     Surface s = b.s;
-    total = false;
-    if (!b.between) return fresnel_of_dielectric(s, cos_in);
-    float share = boundary_share(cos_in, b.n1, b.n2);
-    float in_air = nested_f0(1.0, s.ior);
-    vec3 f0 = b.solid ? s.f0_dielectric * (in_air > 0.0 ? nested_f0(b.n1, b.n2) / in_air : 0.0) : s.f0_dielectric;
-    total = b.solid && share >= 1.0;
-    return total ? vec3(1.0) : f0 + (vec3(s.f90_dielectric) - f0) * share;
+    FacetFresnel f;
+    f.total = false;
+    if (b.between) {
+        float share = boundary_share(cos_in, b.n1, b.n2);
+        float in_air = nested_f0(1.0, s.ior);
+        vec3 f0 = b.solid ? s.f0_dielectric * (in_air > 0.0 ? nested_f0(b.n1, b.n2) / in_air : 0.0) : s.f0_dielectric;
+        f.total = b.solid && share >= 1.0;
+        f.dielectric = f0 + (vec3(s.f90_dielectric) - f0) * share;
+    } else {
+        f.dielectric = bare_dielectric(s, cos_in);
+    }
+    vec3 metal = fresnel_of_metal(s, cos_in);
+    if (IRIDESCENCE) {
+        float n1 = b.between ? b.n1 : s.n_outside;
+        Film film = film_of(s, cos_in, n1);
+        f.dielectric = under_film(s, film, f.dielectric, n1, b.between ? b.n2 : s.ior);
+        metal = metal_under_film(s, film, metal);
+    }
+    f.dielectric = f.total ? vec3(1.0) : f.dielectric;
+    f.base = mix(f.dielectric, metal, s.metallic);
+    return f;
+}
+
+float diffuse_through_share(Surface s) {
+    float through = mean(s.diffuse_through);
+    return DIFFUSE_TRANSMISSION && through > 0.0 ? through / (mean(s.diffuse) + through) : 0.0;
 }
 
 // The layers of an opaque surface whose base is a rough lobe for every roughness: for lighting by punctual lights and by
@@ -204,6 +338,7 @@ Layers layers_of(Surface s) {
     b.enters = BRDF == BRDF_GGX_MULTI ? ground_share(albedo_of_base(s, lobe_reflectance(s))) : 1.0;
     b.under = CLEARCOAT && BRDF == BRDF_GGX_MULTI ? 1.0 - min(albedo_of_coat(s), 1.0) : 1.0;
     b.left = left_to_base(s);
+    b.through_share = diffuse_through_share(s);
     b.tint = vec3(0.0);
     b.transmits = 0.0;
     b.shares = vec4(0.0);
@@ -213,12 +348,36 @@ Layers layers_of(Surface s) {
 // Albedo of the diffuse base layer and of sheen, in a uniform environment.
 float scattered_share(Layers b) {
     float ground = mean(b.s.diffuse) * b.enters * b.left;
+    if (DIFFUSE_TRANSMISSION) ground += mean(b.s.diffuse_through) * b.enters * b.left;
     return SHEEN ? ground + mean(b.s.sheen.rgb) * sheen_albedo(b.s, b.cos_v).x : ground;
 }
 
 // Transmittance of a surface that does not deflect light.
 vec3 straight_transmittance(Layers b) {
     return b.tint * (b.transmits * (1.0 - largest(b.f_dielectric)) * b.under * b.left);
+}
+
+struct BaseLobe {
+    float value; // D times G₂/(4 cosθ_l cosθ_v)
+    float pdf;   // density of directions reflected at half vectors of the VNDF
+};
+
+BaseLobe base_lobe(Layers b, vec3 l, float cos_l, HalfAngle h) {
+    Surface s = b.s;
+    BaseLobe r;
+    float d = ggx_distribution(h.cos_h, h.sin2_h, s.alpha);
+    r.value = d * ggx_visibility(cos_l, b.cos_v, s.alpha);
+    r.pdf = mirrored_pdf(b.cos_v, h, s.alpha);
+    if (ANISOTROPY) {
+        vec3 from = in_lobe_frame(s, s.v);
+        vec3 to = in_lobe_frame(s, l);
+        vec2 alphas = base_alphas(s);
+        float d_along = anisotropic_distribution(h.cos_h, h.sin2_h, share_along(from + to), alphas);
+        float vis = anisotropic_visibility(vec3(to.xy, cos_l), vec3(from.xy, b.cos_v), alphas);
+        float g1 = 2.0 * b.cos_v / (b.cos_v + anisotropic_root(vec3(from.xy, b.cos_v), alphas));
+        if (is_anisotropic(s)) r = BaseLobe(d_along * vis, g1 * d_along / (4.0 * b.cos_v));
+    }
+    return r;
 }
 
 // --------------------------------------------------------------------------------------------------------------------
@@ -243,6 +402,7 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
         vec3 lobe_alone = vec3(0.0); // the part that is not
         if (!b.delta) {
             HalfAngle h = phong ? phong_half_angle(s.n, l, s.v) : half_angle(s.n, l, s.v);
+            BaseLobe base = base_lobe(b, l, cos_l, h);
             if (phong) {
                 // k_s makes the albedo of B6's lobe at normal incidence F0 in the limit of a narrow lobe only (shininess →
                 // ∞). It is 0.31 F0 for a shininess of 0, 0.41 F0 for 1, 0.81 F0 for 10 and 0.98 F0 for 100 (numerics.md
@@ -257,20 +417,17 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
             } else {
                 // Light reflected at the dielectric interface does not reach the diffuse base layer. The largest component
                 // counts, so that a tinted F0 gives no complementary colour (KHR_materials_specular).
-                bool total;
-                vec3 f_dielectric = fresnel_below_coat(b, h.cos_d, total);
-                vec3 f = mix(f_dielectric, fresnel_of_metal(s, h.cos_d), s.metallic);
-                if (BRDF == BRDF_GGX) enters = 1.0 - largest(f_dielectric);
-                float d = ggx_distribution(h.cos_h, h.sin2_h, s.alpha);
-                lobe = f * s.compensation * (d * ggx_visibility(cos_l, b.cos_v, s.alpha));
+                FacetFresnel f = fresnel_below_coat(b, h.cos_d);
+                if (BRDF == BRDF_GGX) enters = 1.0 - largest(f.dielectric);
+                lobe = f.base * s.compensation * base.value;
             }
-            r.pdf += b.shares.y * mirrored_pdf(b.cos_v, h, s.alpha);
+            r.pdf += b.shares.y * base.pdf;
         }
         r.f_cos = (s.diffuse * diffuse_brdf(enters) + lobe) * cos_l;
         if (BRDF == BRDF_BLINN_PHONG) r.f_cos += lobe_alone;
         // For light from l to the eye, sheen leaves the smaller of its values for both directions (KHR_materials_sheen).
         if (SHEEN) r.f_cos = r.f_cos * min(b.left, left_by_sheen(s, cos_l)) + sheen_lobe(s, l, cos_l, b.cos_v);
-        r.pdf += b.shares.z * cos_l * INV_PI;
+        r.pdf += b.shares.z * (1.0 - b.through_share) * cos_l * INV_PI;
     }
     if (CLEARCOAT) {
         if (b.coat_delta) {
@@ -291,6 +448,26 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
     return r;
 }
 
+// Diffuse transmission, for light from the unit direction l on the other side (KHR_materials_diffuse_transmission): the
+// light enters as it does from the mirrored direction, and leaves in all directions.
+BsdfEval evaluate_diffuse_transmission(Layers b, vec3 l) {
+    Surface s = b.s;
+    float cos_l = -cosine(s.n, l);
+    vec3 mirrored = l + 2.0 * cos_l * s.n;
+    float enters = b.enters;
+    if (BRDF == BRDF_GGX && !b.delta) {
+        enters = 1.0 - largest(fresnel_below_coat(b, 0.5 * length(mirrored + s.v)).dielectric);
+    }
+    if (BRDF == BRDF_BLINN_PHONG) enters = 1.0;
+    if (BRDF == BRDF_BLINN_PHONG_RECIPROCAL) enters = 1.0 - largest(s.f0_dielectric);
+    float left = b.left;
+    if (SHEEN) left = min(left, left_by_sheen(s, max(cos_l, 1e-4)));
+    float under = CLEARCOAT ? b.under : 1.0;
+    vec3 f_cos = s.diffuse_through * (diffuse_brdf(enters) * max(cos_l, 0.0) * left * under);
+    float pdf = b.shares.z * b.through_share * max(cos_l, 0.0) * INV_PI;
+    return BsdfEval(f_cos, pdf);
+}
+
 // Rough transmission, for light from behind a rough surface: the rough BTDF (Walter et al. 2007). A thin-walled surface
 // scatters as its mirror image does, to the other side. Between two media the half vector that refracts v into l is along
 // n₁v + n₂l, and dω_h = n₂² |l·h| / (n₁ v·h + n₂ l·h)² dω_l. Radiance is divided by the square of the index here, so the
@@ -307,10 +484,8 @@ BsdfEval evaluate_transmission(Layers b, vec3 l) {
     float denominator = b.n1 * v_h + b.n2 * l_h;
     float stretch = b.sheet ? 0.25 / max(v_h, 1e-6) : b.n2 * b.n2 * abs(l_h) / max(denominator * denominator, 1e-12);
     bool meets_facet = cos_l < 0.0 && !b.delta && b.transmits > 0.0 && v_h > 0.0 && (b.sheet || l_h < 0.0);
-    float pdf = smith_g1(b.cos_v, s.alpha) * ggx_distribution(s.n, h, s.alpha) * v_h / b.cos_v * stretch;
-    bool total;
-    vec3 f_dielectric = fresnel_below_coat(b, v_h, total);
-    float share = b.transmits * (1.0 - largest(f_dielectric)) * smith_g2_over_g1(b.cos_v, cos_l, s.alpha);
+    float pdf = base_visible_normals(s, b.cos_v, h) * v_h / b.cos_v * stretch;
+    float share = b.transmits * (1.0 - largest(fresnel_below_coat(b, v_h).dielectric)) * base_g2_over_g1(s, s.v, l);
     float under = (CLEARCOAT ? b.under : 1.0) * b.left;
     return meets_facet ? BsdfEval(b.tint * (share * pdf * under), b.shares.w * pdf) : BsdfEval(vec3(0.0), 0.0);
 }
@@ -330,11 +505,20 @@ float unshadowed(vec3 n, vec3 v, vec3 r, vec3 n_triangle, float alpha) {
     return dot(r, n_triangle) > 0.0 && cos_r > 0.0 ? smith_g2_over_g1(dot(n, v), cos_r, alpha) : 0.0;
 }
 
+// The same for the base's lobe.
+float unshadowed_base(Surface s, vec3 r) {
+    return dot(r, s.n_triangle) > 0.0 && dot(r, s.n) > 0.0 ? base_g2_over_g1(s, s.v, r) : 0.0;
+}
+
 // The half vector of an event, sampled from the VNDF of the coat's or of the base's lobe; the normal for a delta lobe.
 vec3 event_half_vector(Layers b, bool coat, vec2 u) {
     vec3 n = coat ? b.s.n_coat : b.s.n;
     bool delta = coat ? b.coat_delta : b.delta;
-    return ROUGH && !delta ? half_vector(n, b.s.v, coat ? b.s.clearcoat_alpha : b.s.alpha, u) : n;
+    vec3 h = ROUGH && !delta ? half_vector(n, b.s.v, coat ? b.s.clearcoat_alpha : b.s.alpha, u) : n;
+    if (ANISOTROPY && ROUGH) {
+        if (!coat && is_anisotropic(b.s)) h = anisotropic_half_vector(b.s, base_alphas(b.s), u);
+    }
+    return h;
 }
 
 // Direction of transmitted light; r is the reflected direction. Equal indices refract nothing, not even by a rounding. A
@@ -365,24 +549,14 @@ LobeSample sample_coat(Layers b, vec3 h) {
 }
 
 // Fresnel reflectance at a microfacet.
-struct FacetFresnel {
-    vec3 dielectric;
-    vec3 base;  // of the mixture with the metallic part
-    bool total; // total internal reflection
-};
-
 FacetFresnel fresnel_at_facet(Layers b, vec3 h) {
-    FacetFresnel f;
-    float cos_h = clamp(dot(h, b.s.v), 0.0, 1.0);
-    f.dielectric = fresnel_below_coat(b, cos_h, f.total);
-    f.base = mix(f.dielectric, fresnel_of_metal(b.s, cos_h), b.s.metallic);
-    return f;
+    return fresnel_below_coat(b, clamp(dot(h, b.s.v), 0.0, 1.0));
 }
 
 LobeSample sample_base(Layers b, vec3 h, FacetFresnel f) {
     Surface s = b.s;
     vec3 r = reflect_ray(-s.v, h).R;
-    float masking = ROUGH && !b.delta ? unshadowed(s.n, s.v, r, s.n_triangle, s.alpha) : 1.0;
+    float masking = ROUGH && !b.delta ? unshadowed_base(s, r) : 1.0;
     return LobeSample(b.delta ? on_side(r, s.n_triangle) : r, f.base * s.compensation * (masking * b.left), false);
 }
 
@@ -394,7 +568,7 @@ LobeSample sample_transmission(Layers b, vec3 h, FacetFresnel f) {
     vec3 through = through_direction(b, h, r, tir);
     bool straight = passes_straight(b);
     bool passes = straight || (dot(through, s.n_triangle) < 0.0 && !(b.solid && (f.total || tir)));
-    float masking = rough ? smith_g2_over_g1(dot(s.n, s.v), dot(through, s.n), s.alpha) : 1.0;
+    float masking = rough ? base_g2_over_g1(s, s.v, through) : 1.0;
     if (rough && b.sheet) masking = dot(r, s.n) > 0.0 ? masking : 0.0;
     vec3 weight = b.tint * (b.transmits * (1.0 - largest(f.dielectric)) * masking * b.left);
     return LobeSample(through, passes ? weight : vec3(0.0), straight);

@@ -24,6 +24,15 @@ vec3 light_on(Layers b, uint index) {
     Surface s = b.s;
     PunctualLight light = punctual_light_at(index, s.p_rel);
     vec3 result = evaluate_reflection(b, light.l).f_cos * light.arriving;
+    if (DIFFUSE_TRANSMISSION) {
+        // Light from behind: seen from there, the surface is turned over.
+        result += evaluate_diffuse_transmission(b, light.l).f_cos * light.arriving;
+        if (dot(s.n, light.l) < 0.0) {
+            s.n = -s.n;
+            s.n_triangle = -s.n_triangle;
+            s.v = reflect(s.v, s.n);
+        }
+    }
     if (SHADOWS != 0) {
         result *= terminator(s.n, s.n_triangle, light.l);
         bool wanted = largest(result) > FAINTEST_LOBE * largest(light.arriving);

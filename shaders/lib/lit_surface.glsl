@@ -13,7 +13,7 @@ struct LitSurface {
 LitSurface lit_surface(ivec2 pixel) {
     Primary primary = primary_surface(pixel, false);
     LitSurface r = LitSurface(primary.drawn, false, primary.hit.s);
-    r.s.diffuse *= 1.0 - primary.hit.transmits;
+    keep_diffuse(r.s, 1.0 - primary.hit.transmits);
     if (IN_MEDIUM && primary.hit.transmits > 0.0 && r.s.metallic < 1.0 && !primary.hit.sheet) {
         // As in interact.comp: inside a solid reflections are traced by rays, and an interface suppressed by priority does
         // nothing.

@@ -56,6 +56,7 @@ Primary primary_surface(ivec2 pixel, bool exact_normals) {
     if (STORED_EMISSIVE) t.emissive = imageLoad(emissive, pixel).rgb;
     vec3 n_coat = n;
     if (STORED_LAYERS) unpack_layers(imageLoad(layers, pixel), t, n_coat);
+    if (STORED_LOBES) unpack_lobes(lobes[pixel_index(pixel)], t);
     Material m = material_at(material);
     vec3 p_rel = POSITIONS && r.drawn ? stored_position(pixel_index(pixel)) : rel_from_pixel(camera, pixel, r.drawn ? z : 1.0);
     Surface s = surface_from_texels(material, m, t, n, n_coat, -view_direction(camera, pixel), p_rel);

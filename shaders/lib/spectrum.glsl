@@ -9,12 +9,17 @@
 
 layout(constant) const bool SPECTRAL = false; // spectral rendering: the picture is drawn band by band
 layout(constant) const uint GRID_SIDE = 0;    // points per side of the upsampling grid; 0: reflectances are sums of R, G and B
-// Texels: X, Y, Z of red, green and blue light in the band | shares of red, green and blue in the band | the upsampling
+// Texels: X, Y, Z of red, green and blue light in the band (w of red: its middle in nm) | shares of red, green and blue in the band | the upsampling
 // grid over the square roots of red, green and blue, cell by cell, red fastest. A cell holds square roots of reflectances:
 // at its corner, at the next red, the next green, and both.
 layout(scene, rgba32f) readonly uniform imageBuffer spectrum;
 const int SHARES_AT = 3;
 const int GRID_AT = 4;
+
+// Middle of the current band, or of the part of it that represents it, in nm.
+float band_wavelength() {
+    return imageLoad(spectrum, 0).w;
+}
 
 // Light given as linear Rec. 709, in the current band.
 vec3 light_of_rgb(vec3 rgb) {

@@ -21,6 +21,7 @@ const uint FRESNEL_EXACT = 1;
 layout(constant) const bool CLEARCOAT = false;
 layout(constant) const bool ROUGH = false; // some surface that rays hit is rough
 layout(constant) const bool CONDUCTORS = false; // some metal is a conductor with n and κ
+layout(constant) const bool SPECULAR_COLORS = false; // some texture gives the colour of F0
 layout(constant) const uint LOBES_SEEN = 0;     // bit by LOBE_...: some material has that lobe
 // Surfaces up to this roughness are reflected by rays, rougher ones by the prefiltered environment (knobs `reflection`,
 // `lobes`).
@@ -28,6 +29,10 @@ layout(constant) const bool MIRROR_RAYS = false;
 layout(constant) const float ROUGHEST_MIRROR = 0.0;
 
 const bool SHEEN = (LOBES_SEEN & (1u << LOBE_SHEEN)) != 0;
+// The lobes of Blinn-Phong are round.
+const bool ANISOTROPY = (LOBES_SEEN & (1u << LOBE_ANISOTROPY)) != 0 && BRDF >= BRDF_GGX;
+const bool IRIDESCENCE = (LOBES_SEEN & (1u << LOBE_IRIDESCENCE)) != 0;
+const bool DIFFUSE_TRANSMISSION = (LOBES_SEEN & (1u << LOBE_DIFFUSE_TRANSMISSION)) != 0;
 
 struct Surface {
     vec3 p_rel;
@@ -35,6 +40,7 @@ struct Surface {
     vec3 n_coat;         // shading normal of the clear coat
     vec3 v;              // unit vector to the viewer
     vec3 diffuse;        // albedo of the diffuse base layer
+    vec3 diffuse_through; // albedo of diffuse transmission
     float metallic;
     vec3 f0_dielectric;
     float f90_dielectric;
@@ -43,7 +49,10 @@ struct Surface {
     float ior;           // of the dielectric part
     float n_outside;     // index of the medium on the viewer's side
     vec3 compensation;   // energy compensation of single scattering: 1 but for `ggx-multi`
-    float alpha;         // roughness²
+    float alpha;         // roughness²; with anisotropy α across `tangent`
+    float alpha_along;   // α along `tangent`: `alpha` without anisotropy
+    vec3 tangent;        // unit direction of anisotropy, perpendicular to n
+    vec3 film;           // iridescence: factor, index of the film, its thickness in nm (lib/thin_film.glsl)
     float roughness;
     float occlusion;
     vec3 emissive;
@@ -81,6 +90,18 @@ vec3 base_from_texel(Material m, vec3 varies) {
     return base;
 }
 
+// A colour of a lobe. In a band of wavelengths the factor is a number, but the texel is still a colour.
+vec3 lobe_color(vec3 factor, vec3 texel) {
+    vec3 color = texel * factor;
+    if (SPECTRAL && texel != vec3(1.0)) color *= reflectance_of_rgb(texel) / max(texel, vec3(1e-6));
+    return color;
+}
+
+// Factors of lobe number `lobe` of a material (crates/scene/src/lobe/).
+vec4 lobe_factors(uint id, uint lobe) {
+    return material_texel(id, MATERIAL_LOBES_AT + int(lobe));
+}
+
 // The surface of material m, whose number in the table is `id`.
 Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, vec3 v, vec3 p_rel) {
     Surface s;
@@ -92,8 +113,16 @@ Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, 
     s.base = base_from_texel(m, t.base.rgb);
     float metal = t.metallic * m.metallic;
     s.diffuse = s.base * (1.0 - metal);
+    s.diffuse_through = vec3(0.0);
+    if (DIFFUSE_TRANSMISSION) {
+        vec4 factors = lobe_factors(id, LOBE_DIFFUSE_TRANSMISSION);
+        float through = factors.x * t.diffuse_transmission.a;
+        s.diffuse_through = lobe_color(factors.yzw, t.diffuse_transmission.rgb) * (through * (1.0 - metal));
+        s.diffuse *= 1.0 - through;
+    }
     s.metallic = metal;
     s.f0_dielectric = m.f0 * t.specular;
+    if (SPECULAR_COLORS) s.f0_dielectric = lobe_color(m.f0, t.specular_color) * t.specular;
     s.f90_dielectric = m.f90 * t.specular;
     s.f0_metal = s.base;
     s.n_metal = vec3(0.0);
@@ -113,6 +142,18 @@ Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, 
     s.compensation = vec3(1.0);
     s.roughness = max(t.roughness * m.roughness, MIN_ROUGHNESS);
     s.alpha = s.roughness * s.roughness;
+    s.alpha_along = s.alpha;
+    s.tangent = t.tangent;
+    if (ANISOTROPY) {
+        float strength = lobe_factors(id, LOBE_ANISOTROPY).x * t.anisotropy;
+        s.alpha_along += (1.0 - s.alpha) * (strength * strength);
+        s.tangent = normalize(t.tangent - n * dot(n, t.tangent));
+    }
+    s.film = vec3(0.0);
+    if (IRIDESCENCE) {
+        vec4 factors = lobe_factors(id, LOBE_IRIDESCENCE);
+        s.film = vec3(factors.x * t.iridescence.x, factors.y, factors.z + (factors.w - factors.z) * t.iridescence.y);
+    }
     s.occlusion = 1.0 + m.occlusion_strength * (t.occlusion - 1.0);
     s.emissive = t.emissive * m.emissive;
     if (SPECTRAL && (m.flags & MATERIAL_EMISSIVE_RGB) != 0) s.emissive = light_of_rgb(s.emissive);
@@ -121,9 +162,8 @@ Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, 
     s.clearcoat_alpha = s.clearcoat_roughness * s.clearcoat_roughness;
     s.sheen = vec4(0.0);
     if (SHEEN) {
-        s.sheen = t.sheen * material_texel(id, MATERIAL_LOBES_AT + int(LOBE_SHEEN));
-        // In a band of wavelengths the factor is a number, but the texel is still a colour.
-        if (SPECTRAL && t.sheen.rgb != vec3(1.0)) s.sheen.rgb *= reflectance_of_rgb(t.sheen.rgb) / max(t.sheen.rgb, vec3(1e-6));
+        vec4 factors = lobe_factors(id, LOBE_SHEEN);
+        s.sheen = vec4(lobe_color(factors.rgb, t.sheen.rgb), t.sheen.a * factors.a);
     }
     s.base_traced = MIRROR_RAYS && s.roughness <= ROUGHEST_MIRROR;
     s.coat_traced = MIRROR_RAYS && s.clearcoat_roughness <= ROUGHEST_MIRROR;
@@ -132,6 +172,12 @@ Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, 
     s.face = 0xffffffffu;
     s.media = uvec4(0);
     return s;
+}
+
+// Leaves a fraction of the light that enters the surface to its diffuse base layer: the rest is transmitted.
+void keep_diffuse(inout Surface s, float fraction) {
+    s.diffuse *= fraction;
+    if (DIFFUSE_TRANSMISSION) s.diffuse_through *= fraction;
 }
 
 // The same surface in a medium of index n_outside on the viewer's side: reflectance depends on relative indices. A metal

@@ -3,6 +3,7 @@
 // positions relative to the eye, metres; world axes.
 #ifndef SURFACE_FRAGMENT_GLSL
 #define SURFACE_FRAGMENT_GLSL
+#include "lib/anisotropy.glsl"
 #include "lib/bent_normal.glsl"
 #include "lib/gbuffer_interface.glsl"
 #include "lib/material.glsl"
@@ -63,6 +64,11 @@ SurfaceFragment surface_fragment() {
     if (!gl_FrontFacing) {
         s.n_shading = -s.n_shading;
         s.n_coat = -s.n_coat;
+    }
+    if (ANISOTROPIC) {
+        bool textured = (TEXTURES & (1u << SLOT_ANISOTROPY)) != 0;
+        vec2 rotation = material_texel(ids.y, MATERIAL_LOBES_AT + int(LOBE_ANISOTROPY)).yz;
+        s.texels.tangent = anisotropy_direction(s.n_shading, t_rel, textured ? anisotropy.rg * 2.0 - 1.0 : vec2(1.0, 0.0), rotation);
     }
     return s;
 }

@@ -22,10 +22,19 @@ layout(pages) uniform sampler2DArray transmission_page;
 layout(pages) uniform sampler2DArray thickness_page;
 layout(pages) uniform sampler2DArray sheen_color_page;
 layout(pages) uniform sampler2DArray sheen_roughness_page;
+layout(pages) uniform sampler2DArray specular_color_page;
+layout(pages) uniform sampler2DArray anisotropy_page;
+layout(pages) uniform sampler2DArray iridescence_page;
+layout(pages) uniform sampler2DArray iridescence_thickness_page;
+layout(pages) uniform sampler2DArray diffuse_transmission_page;
+layout(pages) uniform sampler2DArray diffuse_transmission_color_page;
 
-// Lobes of extensions over the base (crates/scene/src/lobe/), each with a texel of parameters in the table of materials.
-const uint LOBES = 1;
+// Lobes of extensions (crates/scene/src/lobe/), each with a texel of parameters in the table of materials.
+const uint LOBES = 4;
 const uint LOBE_SHEEN = 0;
+const uint LOBE_ANISOTROPY = 1;
+const uint LOBE_IRIDESCENCE = 2;
+const uint LOBE_DIFFUSE_TRANSMISSION = 3;
 
 struct Texels {
     vec4 base; // times the vertex colour
@@ -39,10 +48,16 @@ struct Texels {
     float transmission;
     float thickness;
     vec4 sheen; // colour, roughness
+    vec3 specular_color;
+    float anisotropy;          // strength
+    vec3 tangent;              // unit direction along which the base's lobe is wide, world axes
+    vec2 iridescence;          // factor, thickness
+    vec4 diffuse_transmission; // colour, factor
 };
 
 Texels texels_of_nothing(vec4 vertex_color) {
-    return Texels(vertex_color, 1.0, 1.0, 1.0, vec3(1.0), 1.0, 1.0, 1.0, 1.0, 1.0, vec4(1.0));
+    return Texels(vertex_color, 1.0, 1.0, 1.0, vec3(1.0), 1.0, 1.0, 1.0, 1.0, 1.0, vec4(1.0), vec3(1.0), 1.0, vec3(1.0, 0.0, 0.0), vec2(1.0),
+                  vec4(1.0));
 }
 
 // Reads all textures but the normal maps. TEXEL(page, slot) is a vec4, white where the material has no such texture.
@@ -59,7 +74,13 @@ Texels texels_of_nothing(vec4 vertex_color) {
     t.specular = TEXEL(specular_page, SLOT_SPECULAR).a; \
     t.transmission = TEXEL(transmission_page, SLOT_TRANSMISSION).r; \
     t.thickness = TEXEL(thickness_page, SLOT_THICKNESS).g; \
-    t.sheen = vec4(TEXEL(sheen_color_page, SLOT_SHEEN_COLOR).rgb, TEXEL(sheen_roughness_page, SLOT_SHEEN_ROUGHNESS).a);
+    t.sheen = vec4(TEXEL(sheen_color_page, SLOT_SHEEN_COLOR).rgb, TEXEL(sheen_roughness_page, SLOT_SHEEN_ROUGHNESS).a); \
+    t.specular_color = TEXEL(specular_color_page, SLOT_SPECULAR_COLOR).rgb; \
+    vec3 anisotropy = TEXEL(anisotropy_page, SLOT_ANISOTROPY).rgb; \
+    t.anisotropy = anisotropy.b; \
+    t.iridescence = vec2(TEXEL(iridescence_page, SLOT_IRIDESCENCE).r, TEXEL(iridescence_thickness_page, SLOT_IRIDESCENCE_THICKNESS).g); \
+    t.diffuse_transmission = vec4(TEXEL(diffuse_transmission_color_page, SLOT_DIFFUSE_TRANSMISSION_COLOR).rgb, \
+                                  TEXEL(diffuse_transmission_page, SLOT_DIFFUSE_TRANSMISSION).a);
 
 // The layers over and under the base, and the normal of the clear coat, packed into four words of the G-buffer and the
 // fragment list:
@@ -81,5 +102,23 @@ void unpack_layers(uvec4 words, inout Texels t, out vec3 n_coat) {
     t.thickness = below.y;
     t.sheen = unpackUnorm4x8(words.w);
     n_coat = unit_from_octahedral(unpackUnorm2x16(words.y) * 2.0 - 1.0);
+}
+
+// What textures and tangents give to further lobes, packed into four more words:
+//   specular colour, iridescence (8 bits each) | direction of anisotropy, octahedral (2 x 16) | thickness of iridescence (16),
+//   strength of anisotropy (16) | diffuse transmission: colour, factor (8 each)
+uvec4 packed_lobes(Texels t) {
+    return uvec4(packUnorm4x8(vec4(t.specular_color, t.iridescence.x)), packUnorm2x16(octahedral_from_unit(t.tangent) * 0.5 + 0.5),
+                 packUnorm2x16(vec2(t.iridescence.y, t.anisotropy)), packUnorm4x8(t.diffuse_transmission));
+}
+
+void unpack_lobes(uvec4 words, inout Texels t) {
+    vec4 specular = unpackUnorm4x8(words.x);
+    vec2 numbers = unpackUnorm2x16(words.z);
+    t.specular_color = specular.rgb;
+    t.iridescence = vec2(specular.a, numbers.x);
+    t.anisotropy = numbers.y;
+    t.tangent = unit_from_octahedral(unpackUnorm2x16(words.y) * 2.0 - 1.0);
+    t.diffuse_transmission = unpackUnorm4x8(words.w);
 }
 #endif

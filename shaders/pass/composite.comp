@@ -26,6 +26,7 @@ layout(pass, scalar) readonly buffer Tiles { uint fragment_tiles[]; };
 layout(pass, scalar) readonly buffer Sizes { WorkSize tiles_size; } work;
 layout(push_constant, scalar) uniform Push { uint end_row; };
 
+const uint NODE_WORDS = STORED_LOBES ? LEAST_NODE_WORDS + LOBE_WORDS : LEAST_NODE_WORDS;
 layout(constant) const bool BENDS = false;   // knob `refraction`: screen
 layout(constant) const bool MIRRORS = false; // knob `reflection`: screen
 layout(constant) const bool BEHIND_ALONE = false; // keeps only the background seen through the surfaces, without their own radiance
@@ -86,6 +87,7 @@ void main() {
         t.emissive = vec3(unpackHalf2x16(nodes[at + 8]), blue_alpha.x);
         vec3 n_coat;
         unpack_layers(uvec4(nodes[at + 11], nodes[at + 12], nodes[at + 13], nodes[at + 14]), t, n_coat);
+        if (STORED_LOBES) unpack_lobes(uvec4(nodes[at + 15], nodes[at + 16], nodes[at + 17], nodes[at + 18]), t);
         vec3 n = unit_from_octahedral(unpackSnorm2x16(nodes[at + 7]));
         vec3 p = rel_from_pixel(camera, pixel, uintBitsToFloat(nodes[at + 1]));
         Surface s = surface_from_texels(word & 0xffffu, m, t, n, n_coat, -direction, p);
@@ -105,10 +107,10 @@ void main() {
         Layers b = layers_of(s);
         b.tint = s.base * exp(-m.sigma_thickness * scale);
         b.transmits = transmission * (1.0 - s.metallic);
-        b.f_dielectric = fresnel_of_dielectric(s, clamp(dot(s.n, s.v), 0.0, 1.0));
+        b.f_dielectric = fresnel_of_base(s, clamp(dot(s.n, s.v), 0.0, 1.0)).dielectric;
         b.under = CLEARCOAT ? under_coat(s) : 1.0;
         vec3 passes = straight_transmittance(b);
-        s.diffuse *= 1.0 - transmission;
+        keep_diffuse(s, 1.0 - transmission);
         // 5. Lighting of the fragment.
         float alpha = blue_alpha.y;
         compensate(s);

@@ -13,6 +13,8 @@ layout(pass, r32ui) uniform uimage2D heads;
 layout(pass, scalar) buffer Counters { uint counters[]; };
 layout(pass, scalar) writeonly buffer Nodes { uint nodes[]; };
 
+const uint NODE_WORDS = LOBE_TEXELS ? LEAST_NODE_WORDS + LOBE_WORDS : LEAST_NODE_WORDS;
+
 void main() {
     SurfaceFragment s = surface_fragment();
     Texels t = s.texels;
@@ -43,4 +45,11 @@ void main() {
     nodes[at + 12] = layers.y;
     nodes[at + 13] = layers.z;
     nodes[at + 14] = layers.w;
+    if (LOBE_TEXELS) {
+        uvec4 lobes = packed_lobes(t);
+        nodes[at + 15] = lobes.x;
+        nodes[at + 16] = lobes.y;
+        nodes[at + 17] = lobes.z;
+        nodes[at + 18] = lobes.w;
+    }
 }

@@ -14,6 +14,7 @@ layout(location = 3) out uint out_triangle; // R32UI, where the plan has rays: t
 layout(location = 4) out vec4 out_emissive; // RGBA16F, where the plan has it
 layout(location = 5) out uvec4 out_layers;  // RGBA32UI, where the plan has it: lib/texels.glsl, packed_layers
 layout(location = 6) out vec4 out_position; // RGBA32F, where the plan has it: depth, position relative to the eye
+layout(location = 7) out uvec4 out_lobes;   // RGBA32UI, where the plan has it: lib/texels.glsl, packed_lobes
 
 void main() {
     SurfaceFragment s = surface_fragment();
@@ -27,4 +28,5 @@ void main() {
     out_emissive = vec4(s.texels.emissive, 1.0);
     out_layers = packed_layers(s.texels, s.n_coat);
     out_position = vec4(gl_FragCoord.z, p_rel);
+    out_lobes = packed_lobes(s.texels);
 }

@@ -255,7 +255,7 @@ void main() {
                 Surface s = hit.s;
                 if (TRANSMISSIVE && !boundary.solid) seen_from(s, index_of(boundary.medium_in));
                 compensate(s);
-                s.diffuse *= 1.0 - hit.transmits;
+                keep_diffuse(s, 1.0 - hit.transmits);
                 // Light traced by a ray is not looked up as well.
                 s.base_traced = mirrored_by_ray(hit, boundary);
                 LightRange all = LightRange(0, DIRECTIONAL_LIGHTS + LOCAL_LIGHTS, 0, 0);

@@ -60,7 +60,7 @@ impl Targets {
             gbuffer: GBuffer::new(device, plan, size)?,
             tiles: Tiles::new(device, plan, size)?,
             work: WorkLists::new(device, size, settings.share)?,
-            lists: if plan.transparency { Some(FragmentLists::new(device, size)?) } else { None },
+            lists: if plan.transparency { Some(FragmentLists::new(device, plan, size)?) } else { None },
             radiance: target("radiance")?,
             screen: OnScreen::new(device, plan, size)?,
             sums,

@@ -12,11 +12,15 @@ use ash::vk;
 use super::classify::{FragmentTiles, TILE};
 use super::gbuffer::GBuffer;
 use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Frame, Image, ImageDesc, Place, Raster};
+use crate::plan::Plan;
 use crate::shader::{fragments, lib};
 use crate::upload::scene::SceneOnDevice;
 
 /// Bytes of one fragment.
-const NODE_BYTES: u64 = 4 * lib::fragment_list::NODE_WORDS as u64;
+fn node_bytes(plan: &Plan) -> u64 {
+    use lib::fragment_list::{LEAST_NODE_WORDS, LOBE_WORDS};
+    4 * u64::from(LEAST_NODE_WORDS + if plan.lobe_texels { LOBE_WORDS } else { 0 })
+}
 
 /// Per-pixel linked lists of fragments (A-buffer), built in horizontal strips so that any number of fragments fits
 /// memory.
@@ -33,6 +37,7 @@ pub struct FragmentLists {
     pub work: FragmentTiles,
     strips: u32,
     size: [u32; 2],
+    node_bytes: u64,
     device: Arc<Device>,
 }
 
@@ -50,9 +55,10 @@ impl FragmentLists {
     ///
     /// # Errors
     /// When memory is short.
-    pub fn new(device: &Arc<Device>, size: [u32; 2]) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, plan: &Plan, size: [u32; 2]) -> Result<Self> {
         let pixels = u64::from(size[0]) * u64::from(size[1]);
-        let limit = device.max_storage_bytes() / NODE_BYTES;
+        let node_bytes = node_bytes(plan);
+        let limit = device.max_storage_bytes() / node_bytes;
         Ok(Self {
             heads: Image::new(
                 device,
@@ -64,12 +70,13 @@ impl FragmentLists {
                     vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::COLOR_ATTACHMENT,
                 ),
             )?,
-            nodes: Buffer::new(device, "fragment list nodes", pixels.min(limit) * NODE_BYTES, Place::Device)?,
+            nodes: Buffer::new(device, "fragment list nodes", pixels.min(limit) * node_bytes, Place::Device)?,
             counters: Buffer::new(device, "fragment counters", 4, Place::Readback)?,
             dropped: Buffer::new(device, "dropped fragments", 4, Place::Readback)?,
             work: FragmentTiles::new(device, size)?,
             strips: 1,
             size,
+            node_bytes,
             device: device.clone(),
         })
     }
@@ -97,10 +104,10 @@ impl FragmentLists {
             .counters
             .read(|bytes| bytemuck::cast_slice::<u8, u32>(bytes)[..strips].iter().copied().max().unwrap_or_default());
         let most = u64::from(most);
-        if most * NODE_BYTES <= self.nodes.bytes() {
+        if most * self.node_bytes <= self.nodes.bytes() {
             return Ok(true);
         }
-        let limit = self.device.max_storage_bytes() / NODE_BYTES;
+        let limit = self.device.max_storage_bytes() / self.node_bytes;
         // Space for the next samples, whose edges fall a little differently.
         let wanted = most + most / 16 + 1024;
         if wanted > limit {
@@ -111,8 +118,8 @@ impl FragmentLists {
             self.counters =
                 Buffer::new(&self.device, "fragment counters", 4 * u64::from(self.strips), Place::Readback)?;
         }
-        if self.nodes.bytes() < wanted.min(limit) * NODE_BYTES {
-            let bytes = wanted.min(limit) * NODE_BYTES;
+        if self.nodes.bytes() < wanted.min(limit) * self.node_bytes {
+            let bytes = wanted.min(limit) * self.node_bytes;
             self.nodes = Buffer::new(&self.device, "fragment list nodes", bytes, Place::Device)?;
         }
         Ok(false)

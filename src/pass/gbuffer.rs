@@ -4,7 +4,7 @@
 //! Read Real-Time Rendering (4th ed.), section 20.1 (deferred shading). 24 bytes a pixel beside depth: RGBA16F base
 //! colour and metallic, two octahedral normals (RG32UI, or as the knob `normals` says), RG32UI ids, roughness and
 //! occlusion. 16 more for positions where the knob `position` stores them; 4 for triangles with rays, 8 for emissive
-//! textures and 16 for layers where the plan has them. docs/decisions/gbuffer.md has the cost of narrower and wider
+//! textures, 16 for layers and 16 for lobes where the plan has them. docs/decisions/gbuffer.md has the cost of narrower and wider
 //! formats.
 
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use std::sync::Arc;
 use anyhow::Result;
 use ash::vk;
 
-use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Draw, Frame, Image, ImageDesc, Place, Raster};
+use crate::gpu::{Buffer, ColorTarget, DepthTarget, Device, Draw, Frame, Image, ImageDesc, NOTHING, Place, Raster};
 use crate::plan::{Normals, Plan};
 use crate::shader::{gbuffer, lib};
 use crate::upload::scene::SceneOnDevice;
@@ -49,6 +49,8 @@ pub struct GBuffer {
     pub emissive: Image,
     /// Clear coat, specular and transmission; one texel where the plan has none.
     pub layers: Image,
+    /// Texels of lobes where the plan has them, as an image, and as a buffer in row order that passes read.
+    lobes: (Option<Image>, Buffer),
     size: [u32; 2],
     with: [bool; 3],
 }
@@ -73,6 +75,13 @@ impl GBuffer {
             let image = Image::new(device, "G-buffer positions", ImageDesc::flat(POSITION, size[0], size[1], usage))?;
             Ok((image, Buffer::texels(device, "G-buffer position rows", bytes, Place::Device, POSITION)?))
         });
+        let lobes = plan.lobe_texels.then(|| -> Result<_> {
+            let bytes = 16 * u64::from(size[0]) * u64::from(size[1]);
+            let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC;
+            let format = vk::Format::R32G32B32A32_UINT;
+            let image = Image::new(device, "G-buffer lobes", ImageDesc::flat(format, size[0], size[1], usage))?;
+            Ok((image, Buffer::new(device, "G-buffer lobe rows", bytes, Place::Device)?))
+        });
         let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
         Ok(Self {
             depth: Image::new(
@@ -94,6 +103,10 @@ impl GBuffer {
             triangles: target("G-buffer triangles", vk::Format::R32_UINT, with[0])?,
             emissive: target("G-buffer emissive", vk::Format::R16G16B16A16_SFLOAT, with[1])?,
             layers: target("G-buffer layers", vk::Format::R32G32B32A32_UINT, with[2])?,
+            lobes: lobes.transpose()?.map_or_else(
+                || Buffer::new(device, NOTHING, 16, Place::Device).map(|rows| (None, rows)),
+                |(image, rows)| Ok((Some(image), rows)),
+            )?,
             size,
             with,
         })
@@ -109,6 +122,7 @@ impl GBuffer {
             ids: &self.ids,
             emissive: &self.emissive,
             layers: &self.layers,
+            lobes: &self.lobes.1,
             triangles: &self.triangles,
         }
     }
@@ -126,7 +140,7 @@ pub fn gbuffer<'a>(
     draws: Vec<Draw<'a>>,
 ) -> Result<()> {
     // Only depth is cleared: later passes read the other targets only where depth shows a surface.
-    let color = |image| Some(ColorTarget { image, clear: None });
+    let color = |image: &'a Image| Some(ColorTarget { image, clear: None });
     let [triangles, emissive, layers] = target.with;
     let mut colors = vec![color(&target.base), color(&target.normals), color(&target.ids)];
     for (image, exists) in [(&target.triangles, triangles), (&target.emissive, emissive), (&target.layers, layers)] {
@@ -134,6 +148,7 @@ pub fn gbuffer<'a>(
     }
     // The positions' depth is also read at pixels without a surface, so this target is cleared.
     colors.push(target.positions.as_ref().map(|(image, _)| ColorTarget { image, clear: Some([0; 4]) }));
+    colors.push(target.lobes.0.as_ref().and_then(color));
     while colors.last().is_some_and(Option::is_none) {
         colors.pop();
     }
@@ -150,6 +165,9 @@ pub fn gbuffer<'a>(
     frame.download("copy depth", &target.depth, &target.depth_rows);
     if let Some((image, texels)) = &target.positions {
         frame.download("copy positions", image, texels);
+    }
+    if let (Some(image), rows) = &target.lobes {
+        frame.download("copy lobes", image, rows);
     }
     Ok(())
 }

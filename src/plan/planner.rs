@@ -8,10 +8,11 @@ use super::knobs::Knobs;
 use super::knobs::rungs::{self, Absorption, Brdf, EffectId, Guiding, Indirect, Reflection, Refraction, Shadows};
 use super::left_out::left_out;
 use super::surfaces::{
-    self, Surfaces, Transmission, by_wavelength, has_layers, is_transparent, mirrors, refracts, scatters,
+    self, Surfaces, Transmission, by_wavelength, has_layers, has_lobe_texels, is_transparent, mirrors, refracts,
+    scatters,
 };
 use super::work::{Attenuation, March, Paths, Plan, Rays, Screen, Stored};
-use crate::scene::lobe::LOBES;
+use crate::scene::lobe::{LOBES, SHEEN};
 use crate::scene::{AlphaMode, Light, LightKind, Material, Scene};
 use crate::transport::layers::{SMOOTHEST, is_smooth};
 
@@ -54,6 +55,7 @@ impl Plan {
         Self {
             emissive: layers.emissive,
             layers: layers.layers,
+            lobe_texels: layers.lobe_texels,
             clearcoat: layers.clearcoat,
             conductors: layers.conductors,
             // n and κ of each band of wavelengths are only known when the band is rendered.
@@ -74,7 +76,7 @@ impl Plan {
                 || images.screen != Screen::default()
                 || (surroundings.forced == ForcedEffects::All && paths.is_none())
                 || knobs.brdf == Brdf::GgxMulti
-                || layers.lobes != 0,
+                || layers.lobes & 1 << SHEEN != 0,
             shadow_maps,
             lights: lights.kept,
             rays,
@@ -96,6 +98,7 @@ struct LayerDecisions {
     emissive: bool,
     clearcoat: bool,
     layers: bool,
+    lobe_texels: bool,
     conductors: bool,
     lobes: u32,
 }
@@ -133,6 +136,8 @@ impl Planner<'_> {
             |_| "has a clear coat or textures of material layers".to_owned(),
         );
         let layers = decisions.decide(EffectId::Layers, cause);
+        let cause = surfaces.cause(has_lobe_texels, |_| "has textures of lobes or a lobe with a direction".to_owned());
+        let lobe_texels = decisions.decide(EffectId::LobeTexels, cause);
         let cause = surfaces
             .cause(|m| m.conductor.is_some() && m.metallic > 0.0, |_| "is a conductor with n and kappa".to_owned());
         let conductors = decisions.decide(EffectId::Conductors, cause);
@@ -143,7 +148,7 @@ impl Planner<'_> {
             lobes |= u32::from(decisions.decide(EffectId::Lobe(place), cause)) << place;
         }
         // A coat's parameters are stored in the G-buffer target of the layers.
-        LayerDecisions { emissive, clearcoat, layers: layers || clearcoat, conductors, lobes }
+        LayerDecisions { emissive, clearcoat, layers: layers || clearcoat, lobe_texels, conductors, lobes }
     }
 
     fn transmission(&mut self) -> Transmission {

@@ -3,6 +3,7 @@
 use super::effect::Cause;
 use super::facts::Facts;
 use super::work::March;
+use crate::scene::lobe::SHEEN;
 use crate::scene::{AlphaMode, Material, Meaning, Scene};
 pub use crate::transport::layers::mirrors;
 
@@ -53,6 +54,7 @@ pub(super) fn by_wavelength(m: &Material) -> bool {
         || m.dispersion.disperses(f64::from(m.ior))
         || m.marched_sigma().is_some_and(|grid| grid.channels() > 1)
         || m.lobes().any(|(lobe, of)| lobe.colour(of).is_some_and(|colour| differ(&colour)))
+        || m.lobes().any(|(lobe, of)| lobe.by_wavelength && lobe.is_on(of))
         || m.textures().any(|(.., meaning, texture)| meaning == Meaning::Color && texture.is_some())
 }
 
@@ -77,8 +79,14 @@ pub(super) fn has_layers(material: &Material) -> bool {
         material.thickness_texture,
     ]
     .iter()
-    .chain(material.lobes.iter().flat_map(|of| &of.textures))
+    .chain(&material.lobes[SHEEN].textures)
     .any(Option::is_some)
+}
+
+/// Whether textures or tangents give a surface what `packed_lobes` of shaders/lib/texels.glsl holds.
+pub(super) fn has_lobe_texels(material: &Material) -> bool {
+    let others = material.lobes.iter().skip(SHEEN + 1).flat_map(|of| &of.textures);
+    material.has_direction() || others.chain([&material.specular_color_texture]).any(Option::is_some)
 }
 
 /// The materials in use, with facts about their surfaces.

@@ -13,6 +13,8 @@ pub struct Plan {
     pub emissive: bool,
     /// A G-buffer target for clear coat, specular and transmission texels and the coat's normal.
     pub layers: bool,
+    /// A G-buffer target for texels of the specular colour and of lobes, and for the direction of anisotropy.
+    pub lobe_texels: bool,
     /// Code for the clear coat.
     pub clearcoat: bool,
     /// Code for conductors with n and κ.

@@ -250,7 +250,7 @@ impl Layers {
         let roughness = self.roughness[usize::from(layer != Layer::Coat)];
         let (x, y) = n.any_orthonormal_pair();
         let v = DVec3::new(-direction.dot(x), -direction.dot(y), -direction.dot(n));
-        let h = visible_half_vector(v, f64::from(roughness).powi(2), u);
+        let h = visible_half_vector(v, [f64::from(roughness).powi(2); 2], u);
         x * h.x + y * h.y + n * h.z
     }
 

@@ -390,8 +390,12 @@ fn flat_faces(mesh: &Mesh) -> Vec<u32> {
 const _: () = assert!(Order::OCTANTS.len() == OCTANT_LISTS as usize);
 
 /// Constants that keep all attributes of the corners.
-const EVERYTHING: lib::hit::Constants =
-    lib::hit::Constants { hit_textures: (1 << lib::material::SLOTS) - 1, hit_colors: true, hit_second_uvs: true };
+const EVERYTHING: lib::hit::Constants = lib::hit::Constants {
+    hit_textures: (1 << lib::material::SLOTS) - 1,
+    hit_tangents: true,
+    hit_colors: true,
+    hit_second_uvs: true,
+};
 
 /// Shading data of the corners of triangles.
 struct CornerTable<'a> {
@@ -420,13 +424,14 @@ impl<'a> CornerTable<'a> {
             let mesh = &scene.meshes[instance.mesh];
             let material = &scene.materials[mesh.material];
             contents.hit_textures |= texture_bits(material);
+            contents.hit_tangents |= texture_bits(material) & BENT != 0 || material.has_direction();
             contents.hit_second_uvs |= material.textures().any(|(.., t)| t.is_some_and(|t| t.uv_set == 1));
             contents.hit_colors |= !mesh.colors.is_empty();
         }
         let parts = [
             (offset_of!(share::Corners, uvs), size_of::<CornerUvs>(), contents.hit_textures != 0),
             (offset_of!(share::Corners, second_uvs), size_of::<CornerUvs>(), contents.hit_second_uvs),
-            (offset_of!(share::Corners, tangents), size_of::<CornerTangents>(), contents.hit_textures & BENT != 0),
+            (offset_of!(share::Corners, tangents), size_of::<CornerTangents>(), contents.hit_tangents),
             (offset_of!(share::Corners, colors), size_of::<CornerColors>(), contents.hit_colors),
         ];
         let left_out = |texel: &usize| {

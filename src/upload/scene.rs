@@ -20,7 +20,7 @@ use crate::gpu::{
 use crate::optics::ray::camera_relative;
 use crate::plan::rungs::{self, Brdf};
 use crate::plan::{Knobs, Plan, casts_in_maps, is_transparent, mirrors};
-use crate::scene::lobe::{self, LobeOf};
+use crate::scene::lobe::{self, LOBES, LobeOf};
 use crate::scene::solid::Solids;
 use crate::scene::wavelengths::{Banded, Slice, Wavelengths};
 use crate::scene::{AlphaMode, Bounds, Extent, Light, LightKind, Material, Meaning, Scene, SigmaGrid, TextureRef};
@@ -38,6 +38,10 @@ pub(super) const BENT: u32 = 1 << lib::texels::SLOT_NORMAL | 1 << lib::texels::S
 const LIGHT_TEXELS: usize = lib::light_table::LIGHT_TEXELS as usize;
 const _: () = assert!(size_of::<share::Light>() == 16 * LIGHT_TEXELS);
 const _: () = assert!(lobe::COUNT == lib::texels::LOBES as usize);
+const _: () = assert!(lobe::SHEEN == lib::texels::LOBE_SHEEN as usize);
+const _: () = assert!(lobe::ANISOTROPY == lib::texels::LOBE_ANISOTROPY as usize);
+const _: () = assert!(lobe::IRIDESCENCE == lib::texels::LOBE_IRIDESCENCE as usize);
+const _: () = assert!(lobe::DIFFUSE_TRANSMISSION == lib::texels::LOBE_DIFFUSE_TRANSMISSION as usize);
 const _: () = assert!(size_of::<share::Material>() == 16 * lib::material::MATERIAL_SLOTS_AT as usize);
 
 /// Ranges of a mesh in the scene's buffers.
@@ -119,6 +123,7 @@ pub struct SceneOnDevice {
     light_shadows: Vec<LightMaps>,
     refraction: bool,
     stored_normals: lib::normals::Constants,
+    lobe_texels: bool,
     /// Textures for rasterisation and for rays.
     pub textures: Textures,
     /// Per material, index of its set in [`SceneOnDevice::pages`].
@@ -307,6 +312,7 @@ impl SceneOnDevice {
             lights_cpu,
             refraction: plan.rays.is_some_and(|rays| rays.refraction),
             stored_normals: lib::normals::Constants { normals: plan.stored.normals as u32 },
+            lobe_texels: plan.lobe_texels,
             textures,
             page_of_material,
             page_materials,
@@ -451,6 +457,8 @@ impl SceneOnDevice {
             textures: texture_bits(material) & if mesh.has_tangents { u32::MAX } else { !BENT },
             has_color: mesh.has_colors,
             masked: matches!(material.alpha_mode, AlphaMode::Mask(_)),
+            anisotropic: material.has_direction(),
+            lobe_texels: self.lobe_texels,
             shared_vertices: self.device.offers().primitive_ids,
         };
         Draw {
@@ -499,7 +507,7 @@ fn material_table(
     for ((material, lobes), slots) in materials.zip(slots.chunks_exact(MATERIAL_LOBES_AT - constants)) {
         table.extend_from_slice(bytemuck::cast_slice(std::slice::from_ref(&material)));
         table.extend_from_slice(slots);
-        table.extend(lobes.map(|of| of.factors.map(f32::to_bits)));
+        table.extend(LOBES.iter().zip(lobes).map(|(lobe, of)| (lobe.texel)(of.factors).map(f32::to_bits)));
     }
     table
 }

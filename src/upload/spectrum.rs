@@ -59,7 +59,8 @@ impl SpectrumOnDevice {
     pub fn upload_band(&mut self, slice: &Slice) {
         let band = &slice.band;
         let column = |v: [f64; 3]| [v[0] as f32, v[1] as f32, v[2] as f32, 0.0];
-        let [red, green, blue] = slice.light_from_rgb.map(column);
+        let [mut red, green, blue] = slice.light_from_rgb.map(column);
+        red[3] = slice.part.middle() as f32;
         self.texels.write_at(0, bytemuck::cast_slice(&[red, green, blue, column(shares(band))]));
         let Some(grid) = self.grid else { return };
         if !self.known.iter().any(|(known, _)| known == band) {

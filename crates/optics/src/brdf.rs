@@ -139,11 +139,48 @@ pub fn mirrored_pdf(cos_v: f64, cos_h: f64, sin2_h: f64, alpha: f64) -> f64 {
     ggx_distribution(cos_h, sin2_h, alpha) / (1.0 + ggx_lambda(cos_v, alpha)) / (4.0 * cos_v)
 }
 
-/// @eq B1: a half vector among those that the viewer sees (Heitz, JCGT 7(4) 2018): v stretched by α, a point of the
-/// disk across it moved by what is seen of the lower half, back on the hemisphere, and stretched again.
+/// @eq B1: the anisotropic GGX distribution (Heitz 2014, equation 72); `along2` is the share of sin²θ_h along the first
+/// axis.
 #[must_use]
-pub fn visible_half_vector(v: DVec3, alpha: f64, u: [f64; 2]) -> DVec3 {
-    let vh = DVec3::new(alpha * v.x, alpha * v.y, v.z).normalize();
+pub fn anisotropic_distribution(cos_h: f64, sin2_h: f64, along2: f64, alphas: [f64; 2]) -> f64 {
+    if cos_h <= 0.0 {
+        return 0.0;
+    }
+    let [t, b] = alphas;
+    let slopes = sin2_h * (along2 / (t * t) + (1.0 - along2) / (b * b)) + 1.0 - sin2_h;
+    1.0 / (PI * t * b * slopes * slopes)
+}
+
+/// @eq B1 N22: cosθ (1 + 2Λ) of a direction in the frame of an anisotropic lobe.
+#[must_use]
+pub fn anisotropic_root(w: DVec3, alphas: [f64; 2]) -> f64 {
+    DVec3::new(alphas[0] * w.x, alphas[1] * w.y, w.z).length()
+}
+
+fn anisotropic_lambda(w: DVec3, alphas: [f64; 2]) -> f64 {
+    (anisotropic_root(w, alphas) / w.z - 1.0) / 2.0
+}
+
+/// @eq B1 N23: G₂/(4 cosθ_l cosθ_v) of an anisotropic lobe, height-correlated (Heitz 2014).
+#[must_use]
+pub fn anisotropic_visibility(l: DVec3, v: DVec3, alphas: [f64; 2]) -> f64 {
+    let g2 = 1.0 / (1.0 + anisotropic_lambda(l, alphas) + anisotropic_lambda(v, alphas));
+    g2 / (4.0 * l.z * v.z)
+}
+
+/// @eq B1 N22: (1 + Λ_v)/(1 + Λ_v + Λ_l) of an anisotropic lobe.
+#[must_use]
+pub fn anisotropic_g2_over_g1(v: DVec3, l: DVec3, alphas: [f64; 2]) -> f64 {
+    let [v, l] = [v, l].map(|w| DVec3::new(w.x, w.y, w.z.abs().max(1e-4)));
+    let [by_v, by_l] = [v, l].map(|w| anisotropic_lambda(w, alphas));
+    (1.0 + by_v) / (1.0 + by_v + by_l)
+}
+
+/// @eq B1: a half vector among those that the viewer sees (Heitz, JCGT 7(4) 2018): v stretched by α along both axes, a
+/// point of the disk across it moved by what is seen of the lower half, back on the hemisphere, and stretched again.
+#[must_use]
+pub fn visible_half_vector(v: DVec3, alphas: [f64; 2], u: [f64; 2]) -> DVec3 {
+    let vh = DVec3::new(alphas[0] * v.x, alphas[1] * v.y, v.z).normalize();
     let t1 = if vh.x == 0.0 && vh.y == 0.0 { DVec3::X } else { DVec3::new(-vh.y, vh.x, 0.0).normalize() };
     let t2 = vh.cross(t1);
     let (r, phi) = (u[0].sqrt(), TAU * u[1]);
@@ -151,7 +188,7 @@ pub fn visible_half_vector(v: DVec3, alpha: f64, u: [f64; 2]) -> DVec3 {
     let s = 0.5 * (1.0 + vh.z);
     let p2 = (1.0 - s) * (1.0 - p1 * p1).max(0.0).sqrt() + s * across;
     let h = p1 * t1 + p2 * t2 + (1.0 - p1 * p1 - p2 * p2).max(0.0).sqrt() * vh;
-    DVec3::new(alpha * h.x, alpha * h.y, h.z.max(0.0)).normalize()
+    DVec3::new(alphas[0] * h.x, alphas[1] * h.y, h.z.max(0.0)).normalize()
 }
 
 /// @eq B1: G₂/G₁ of the viewer, cosines from 1e-4 on.
@@ -236,6 +273,12 @@ pub(super) fn cosine_in(d: &mut SplitMix64) -> f64 {
 
 fn alpha(d: &mut SplitMix64) -> f64 {
     if d.below(8) == 0 { f64::from(d.near(&[1e-5, 1e-3, 0.1, 1.0])).clamp(1e-5, 1.0) } else { d.log(1e-5, 1.0) }
+}
+
+/// A direction above the horizon, at least 1e-4 above it.
+fn above(d: &mut SplitMix64) -> DVec3 {
+    let angle = if d.below(2) == 0 { d.between(1e-3, 1.5707) } else { d.log(1e-4, 1.5) };
+    d.at_angle(DVec3::Z, angle)
 }
 
 /// Rounds to f32, so that later steps use the direction that the shader gets.
@@ -867,15 +910,17 @@ pub(super) const EQUATIONS: &[Equation] = &[
     },
     Equation {
         name: "visible_half_vector",
-        twin: |x| visible_half_vector(vector(x, 0), x[3], [x[4], x[5]]).to_array().to_vec(),
+        twin: |x| visible_half_vector(vector(x, 0), [x[3], x[4]], [x[5], x[6]]).to_array().to_vec(),
         regions: &[Region {
             name: "viewers to the horizon",
             share: 1,
             draw: |d| {
                 let angle = if d.below(2) == 0 { d.between(1e-3, 1.57) } else { d.log(1e-4, 1.5) };
                 let v = d.at_angle(DVec3::Z, angle);
-                let alpha = alpha(d);
-                [columns(&[v]), vec![alpha as f32, below_one(d.unit()), below_one(d.unit())]].concat()
+                let along = alpha(d);
+                let across = if d.below(2) == 0 { along } else { alpha(d) };
+                let rest = vec![along as f32, across as f32, below_one(d.unit()), below_one(d.unit())];
+                [columns(&[v]), rest].concat()
             },
         }],
         outputs: &[
@@ -883,7 +928,60 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "hy", bound: "as hx", allowed: visible_allowed },
             Output { name: "hz", bound: "as hx", allowed: visible_allowed },
         ],
-        axis: Axis { name: "u_x", log: false, of: |x| x[4], column: 0, relative: false },
+        axis: Axis { name: "u_x", log: false, of: |x| x[5], column: 0, relative: false },
+        extreme: -1.0,
+    },
+    Equation {
+        name: "anisotropic_distribution",
+        twin: |x| vec![anisotropic_distribution(x[0], x[1], x[2], [x[3], x[4]])],
+        regions: &[Region {
+            name: "in the lobe and its tail",
+            share: 1,
+            draw: |d| {
+                let alphas = [alpha(d), alpha(d)];
+                let wide = alphas[0].max(alphas[1]);
+                let sin2 = (wide * d.log(1e-3, 1e3)).atan().sin().powi(2);
+                vec![(1.0 - sin2).sqrt() as f32, sin2 as f32, d.unit() as f32, alphas[0] as f32, alphas[1] as f32]
+            },
+        }],
+        outputs: &[Output { name: "D", bound: "24 ulp", allowed: |c| c.ulps(24.0) }],
+        axis: Axis { name: "α_t", log: true, of: |x| x[3], column: 0, relative: true },
+        extreme: -1.0,
+    },
+    Equation {
+        name: "anisotropic_root",
+        twin: |x| vec![anisotropic_root(vector(x, 0), [x[3], x[4]])],
+        regions: &[Region {
+            name: "any direction above",
+            share: 1,
+            draw: |d| [columns(&[above(d)]), vec![alpha(d) as f32, alpha(d) as f32]].concat(),
+        }],
+        outputs: &[Output { name: "root", bound: "4 ulp", allowed: |c| c.ulps(4.0) }],
+        axis: Axis { name: "z", log: true, of: |x| x[2], column: 0, relative: true },
+        extreme: -1.0,
+    },
+    Equation {
+        name: "anisotropic_visibility",
+        twin: |x| vec![anisotropic_visibility(vector(x, 0), vector(x, 3), [x[6], x[7]])],
+        regions: &[Region {
+            name: "any directions above",
+            share: 1,
+            draw: |d| [columns(&[above(d), above(d)]), vec![alpha(d) as f32, alpha(d) as f32]].concat(),
+        }],
+        outputs: &[Output { name: "Vis", bound: "10 ulp", allowed: |c| c.ulps(10.0) }],
+        axis: Axis { name: "N·L", log: true, of: |x| x[2], column: 0, relative: true },
+        extreme: -1.0,
+    },
+    Equation {
+        name: "anisotropic_g2_over_g1",
+        twin: |x| vec![anisotropic_g2_over_g1(vector(x, 0), vector(x, 3), [x[6], x[7]])],
+        regions: &[Region {
+            name: "any directions above",
+            share: 1,
+            draw: |d| [columns(&[above(d), above(d)]), vec![alpha(d) as f32, alpha(d) as f32]].concat(),
+        }],
+        outputs: &[Output { name: "share", bound: "12 ulp", allowed: |c| c.ulps(12.0) }],
+        axis: Axis { name: "N·L", log: true, of: |x| x[5], column: 0, relative: true },
         extreme: -1.0,
     },
     Equation {
@@ -981,14 +1079,14 @@ const VISIBLE_BOUND: &str = "1e-6 + (2e-7/w, at most 5e-4)/|h before normalising
 fn visible_allowed(case: &Case<'_>) -> f64 {
     let x = case.inputs;
     let v = vector(x, 0);
-    let vh = DVec3::new(x[3] * v.x, x[3] * v.y, v.z).normalize();
-    let (r, phi) = (x[4].sqrt(), TAU * x[5]);
+    let vh = DVec3::new(x[3] * v.x, x[4] * v.y, v.z).normalize();
+    let (r, phi) = (x[5].sqrt(), TAU * x[6]);
     let (p1, s) = (r * phi.cos(), 0.5 * (1.0 + vh.z));
     let p2 = (1.0 - s) * (1.0 - p1 * p1).max(0.0).sqrt() + s * r * phi.sin();
     let w = (1.0 - p1 * p1 - p2 * p2).max(0.0).sqrt();
     let t1 = if vh.x == 0.0 && vh.y == 0.0 { DVec3::X } else { DVec3::new(-vh.y, vh.x, 0.0).normalize() };
     let h = p1 * t1 + p2 * vh.cross(t1) + w * vh;
-    1e-6 + (2e-7 / w).min(5e-4) / DVec3::new(x[3] * h.x, x[3] * h.y, h.z).length()
+    1e-6 + (2e-7 / w).min(5e-4) / DVec3::new(x[3] * h.x, x[4] * h.y, h.z).length()
 }
 
 /// Rounds to f32 below 1, like random numbers.

@@ -21,10 +21,12 @@ use gltf::json::{
 use rayon::prelude::*;
 
 use super::{
-    Camera, Image, Instance, Light, LightKind, LoadOptions, Material, Mesh, Projection, Scene, Shared,
+    Camera, Instance, Light, LightKind, LoadOptions, Material, Mesh, Projection, Scene, Shared,
     accessor::Accessor,
     container::Document,
-    geometry, gltf_extras, gltf_material, lenient,
+    geometry, gltf_extras,
+    gltf_material::{self, KnownImages},
+    lenient,
     nodes::{Nodes, label},
     prune::{Coordinates, prune_textures, unused_coordinates},
     thin::{self, Stroke},
@@ -33,7 +35,7 @@ use super::{
 /// Static parts of a file, by their index in the file, cached over all times of its animation.
 #[derive(Default)]
 struct StillParts {
-    images: HashMap<usize, Image>,
+    images: KnownImages,
     /// Undeformed primitives, by mesh and primitive.
     resting: HashMap<(usize, usize), Mesh>,
 }

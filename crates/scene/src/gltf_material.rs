@@ -22,7 +22,7 @@ use super::{
     AlphaMode, Image, Material, Sampler, TextureRef, Wrap,
     container::{Document, short_uri},
     gltf_extras,
-    lobe::{LOBES, Lobe, LobeOf},
+    lobe::{Factor, LOBES, Lobe, LobeOf},
     pictures,
 };
 use etalon_optics::spectra;
@@ -30,8 +30,28 @@ use etalon_optics::spectra;
 /// Materials of the whole file, and the file's images that their textures use.
 pub(crate) struct Materials {
     pub(crate) materials: Vec<Material>,
-    /// Image in the file, by [`TextureRef::image`], until [`Materials::decode`].
-    files: Vec<usize>,
+    /// Source of each image, by [`TextureRef::image`], until [`Materials::decode`].
+    sources: Vec<ImageSource>,
+}
+
+/// Where the texels of an image come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct ImageSource {
+    /// Index of the image in the file.
+    file: usize,
+    /// The bits of a glossiness factor: the image is then the roughness 1 − factor · alpha, in G.
+    glossiness: Option<u32>,
+}
+
+impl ImageSource {
+    fn decode(self, document: &Document<'_>) -> Result<Image> {
+        let mut image = with_bytes(document, self.file, pictures::decode)?;
+        if let Some(factor) = self.glossiness.map(f32::from_bits) {
+            let roughness = |alpha: u8| (255.0 - factor * f32::from(alpha)).round() as u8;
+            image.rgba = image.rgba.as_chunks::<4>().0.iter().flat_map(|t| [0, roughness(t[3]), 0, 255]).collect();
+        }
+        Ok(image)
+    }
 }
 
 /// KHR_materials_clearcoat, which the `gltf` crate does not know.
@@ -43,6 +63,29 @@ struct Clearcoat {
     clearcoat_roughness_factor: f32,
     clearcoat_roughness_texture: Option<json::texture::Info>,
     clearcoat_normal_texture: Option<json::material::NormalTexture>,
+}
+
+/// KHR_materials_pbrSpecularGlossiness, which is archived.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+struct SpecularGlossiness {
+    diffuse_factor: [f32; 4],
+    diffuse_texture: Option<json::texture::Info>,
+    specular_factor: [f32; 3],
+    glossiness_factor: f32,
+    specular_glossiness_texture: Option<json::texture::Info>,
+}
+
+impl Default for SpecularGlossiness {
+    fn default() -> Self {
+        Self {
+            diffuse_factor: [1.0; 4],
+            diffuse_texture: None,
+            specular_factor: [1.0; 3],
+            glossiness_factor: 1.0,
+            specular_glossiness_texture: None,
+        }
+    }
 }
 
 /// KHR_materials_dispersion, which the `gltf` crate does not know.
@@ -61,13 +104,14 @@ struct OtherSource {
 /// Such extensions, the preferred one first.
 const OTHER_SOURCES: [&str; 2] = ["KHR_texture_basisu", "EXT_texture_webp"];
 
+/// Decoded images by their source.
+pub(crate) type KnownImages = HashMap<ImageSource, Image>;
+
 struct MaterialReader<'d, 'b, 'w> {
     document: &'d Document<'b>,
     warnings: &'w mut Vec<String>,
-    /// Scene image of each image in the file, once a material refers to it.
-    image_slots: Vec<Option<usize>>,
-    /// Image in the file of each scene image.
-    used_images: Vec<usize>,
+    /// Source of each scene image.
+    used_images: Vec<ImageSource>,
     /// Prefix of messages: `material 3 "Glass"`.
     place: String,
 }
@@ -75,13 +119,7 @@ struct MaterialReader<'d, 'b, 'w> {
 /// Reads every material of the file.
 pub(crate) fn read(document: &Document<'_>, warnings: &mut Vec<String>) -> Result<Materials> {
     let root = &document.root;
-    let mut reader = MaterialReader {
-        document,
-        warnings,
-        image_slots: vec![None; root.images.len()],
-        used_images: Vec::new(),
-        place: String::new(),
-    };
+    let mut reader = MaterialReader { document, warnings, used_images: Vec::new(), place: String::new() };
     let mut materials = Vec::with_capacity(root.materials.len() + 1);
     for (index, json) in root.materials.iter().enumerate() {
         reader.place = match &json.name {
@@ -90,29 +128,30 @@ pub(crate) fn read(document: &Document<'_>, warnings: &mut Vec<String>) -> Resul
         };
         materials.push(reader.material(index, json).with_context(|| reader.place.clone())?);
     }
-    Ok(Materials { materials, files: reader.used_images })
+    Ok(Materials { materials, sources: reader.used_images })
 }
 
 impl Materials {
-    /// Decodes, in parallel, the images that the materials still use and that are not in `known`, a cache by index in
-    /// the file. Reads the headers of all other images, so that a broken file is always an error.
-    pub(crate) fn decode(&mut self, document: &Document<'_>, known: &mut HashMap<usize, Image>) -> Result<Vec<Image>> {
+    /// Decodes, in parallel, the images that the materials still use and that are not in `known`, a cache by source.
+    /// Reads the headers of all other images, so that a broken file is always an error.
+    pub(crate) fn decode(&mut self, document: &Document<'_>, known: &mut KnownImages) -> Result<Vec<Image>> {
         let first = known.is_empty();
-        let mut places = vec![None; self.files.len()];
+        let mut places = vec![None; self.sources.len()];
         let mut wanted = Vec::new();
         for texture in self.materials.iter_mut().flat_map(Material::textures_mut).flatten() {
             texture.image = *places[texture.image].get_or_insert_with(|| {
-                wanted.push(self.files[texture.image]);
+                wanted.push(self.sources[texture.image]);
                 wanted.len() - 1
             });
         }
-        for i in (0..document.root.images.len()).filter(|i| first && !wanted.contains(i)) {
+        for i in (0..document.root.images.len()).filter(|&i| first && wanted.iter().all(|source| source.file != i)) {
             with_bytes(document, i, |_, bytes| pictures::probe(bytes))?;
         }
-        let missing: Vec<usize> = wanted.iter().copied().filter(|i| !known.contains_key(i)).collect();
-        let decoded: Vec<_> = missing.par_iter().map(|&i| Ok((i, decode(document, i)?))).collect::<Result<_>>()?;
+        let missing: Vec<ImageSource> = wanted.iter().copied().filter(|source| !known.contains_key(source)).collect();
+        let decoded: Vec<_> =
+            missing.par_iter().map(|&source| Ok((source, source.decode(document)?))).collect::<Result<_>>()?;
         known.extend(decoded);
-        Ok(wanted.iter().map(|i| known[i].clone()).collect())
+        Ok(wanted.iter().map(|source| known[source].clone()).collect())
     }
 }
 
@@ -133,10 +172,6 @@ fn with_bytes<T>(document: &Document<'_>, index: usize, then: impl FnOnce(String
     .context(what)
 }
 
-fn decode(document: &Document<'_>, index: usize) -> Result<Image> {
-    with_bytes(document, index, pictures::decode)
-}
-
 fn parse<'v, T: Deserialize<'v>>(others: &'v Map<String, Value>, name: &str) -> Result<Option<T>> {
     others.get(name).map(|v| T::deserialize(v).with_context(|| format!("the extension {name}"))).transpose()
 }
@@ -148,9 +183,14 @@ impl MaterialReader<'_, '_, '_> {
 
     /// Clamps a factor to 0 … 1 (glTF 2.0) with a warning.
     fn unit(&mut self, value: f32, name: &str) -> f32 {
-        let clamped = value.clamp(0.0, 1.0);
+        self.within(value, [0.0, 1.0], name)
+    }
+
+    /// Clamps a factor to its range with a warning.
+    fn within(&mut self, value: f32, [least, most]: [f32; 2], name: &str) -> f32 {
+        let clamped = value.clamp(least, most);
         if clamped != value {
-            self.warn(&format!("{name} {value} lies outside 0 … 1 and is clamped"));
+            self.warn(&format!("{name} {value} lies outside {least} … {most} and is clamped"));
         }
         clamped
     }
@@ -210,6 +250,12 @@ impl MaterialReader<'_, '_, '_> {
 
     fn extensions(&mut self, m: &mut Material, json: &json::extensions::material::Material) -> Result<()> {
         m.unlit = json.unlit.is_some();
+        if let Some(glossy) = parse::<SpecularGlossiness>(&json.others, "KHR_materials_pbrSpecularGlossiness")? {
+            self.specular_glossiness(m, &glossy)?;
+        }
+        if json.others.contains_key("KHR_materials_volume_scatter") {
+            self.warn("scattering inside the volume (KHR_materials_volume_scatter) is not drawn; its absorption is");
+        }
         if let Some(strength) = &json.emissive_strength {
             let strength = self.positive(strength.emissive_strength.0, "the emissive strength");
             m.emissive = m.emissive.map(|e| (e * strength).min(f32::MAX));
@@ -219,9 +265,6 @@ impl MaterialReader<'_, '_, '_> {
             m.specular_texture = self.texture(specular.specular_texture.as_ref())?;
             m.specular_color = specular.specular_color_factor.0.map(|x| self.positive(x, "the specular colour"));
             m.specular_color_texture = self.texture(specular.specular_color_texture.as_ref())?;
-            if m.specular_color_texture.is_some() {
-                self.warn("the specular colour texture is not drawn; its factor is");
-            }
         }
         if let Some(transmission) = &json.transmission {
             m.transmission = self.unit(transmission.transmission_factor.0, "the transmission factor");
@@ -264,18 +307,47 @@ impl MaterialReader<'_, '_, '_> {
         Ok(())
     }
 
+    /// A material by specular colour and glossiness, as a dielectric of n = 1.5 whose F0 has that colour
+    /// (KHR_materials_specular allows any): the curve of Fresnel's equations stays that of a dielectric. The diffuse
+    /// part gets 1 − F at the half vector, where the extension gives it 1 − F0 for all angles.
+    fn specular_glossiness(&mut self, m: &mut Material, json: &SpecularGlossiness) -> Result<()> {
+        m.base_color = json.diffuse_factor.map(|x| self.unit(x, "the diffuse factor"));
+        m.base_color_texture = self.texture(json.diffuse_texture.as_ref())?;
+        m.metallic = 0.0;
+        let f0 = ((m.ior - 1.0) / (m.ior + 1.0)).powi(2);
+        m.specular_color = json.specular_factor.map(|x| self.unit(x, "the specular factor") / f0);
+        m.specular_color_texture = self.texture(json.specular_glossiness_texture.as_ref())?;
+        let glossiness = self.unit(json.glossiness_factor, "the glossiness factor");
+        m.roughness = 1.0 - glossiness;
+        m.metallic_roughness_texture = m.specular_color_texture.map(|texture| {
+            m.roughness = 1.0;
+            let file = self.used_images[texture.image].file;
+            TextureRef { image: self.image(ImageSource { file, glossiness: Some(glossiness.to_bits()) }), ..texture }
+        });
+        Ok(())
+    }
+
+    /// Index of the scene image with this source.
+    fn image(&mut self, source: ImageSource) -> usize {
+        let place = self.used_images.iter().position(|used| *used == source);
+        place.unwrap_or_else(|| {
+            self.used_images.push(source);
+            self.used_images.len() - 1
+        })
+    }
+
     fn lobe(&mut self, lobe: &Lobe, said: &Value) -> Result<LobeOf> {
         let mut of = LobeOf::default();
         let mut factors = of.factors.iter_mut();
-        for &(name, count) in lobe.factors {
+        for &Factor { name, count, default, range } in lobe.factors {
             let numbers: Vec<f32> = match said.get(name) {
-                None => vec![0.0; count],
+                None => vec![default; count],
                 Some(value) if count == 1 => vec![f32::deserialize(value).context(name)?],
                 Some(value) => Vec::deserialize(value).context(name)?,
             };
             ensure!(numbers.len() == count, "{name} has {} numbers, not {count}", numbers.len());
             for (number, factor) in numbers.into_iter().zip(factors.by_ref()) {
-                *factor = self.unit(number, name);
+                *factor = self.within(number, range, name);
             }
         }
         for (texture, &(name, ..)) in of.textures.iter_mut().zip(lobe.textures) {
@@ -343,13 +415,9 @@ impl MaterialReader<'_, '_, '_> {
             }
             None => json.source.value(),
         };
-        let slot = self.image_slots.get_mut(source);
         let count = root.images.len();
-        let slot = slot.with_context(|| format!("texture {texture} names image {source}, but the file has {count}"))?;
-        let image = *slot.get_or_insert_with(|| {
-            self.used_images.push(source);
-            self.used_images.len() - 1
-        });
+        ensure!(source < count, "texture {texture} names image {source}, but the file has {count}");
+        let image = self.image(ImageSource { file: source, glossiness: None });
         let mut uv_set = transform.and_then(|t| t.tex_coord).unwrap_or(tex_coord);
         if uv_set > 1 {
             self.warn(&format!(

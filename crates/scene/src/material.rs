@@ -135,6 +135,12 @@ impl Material {
         LOBES.iter().copied().zip(&self.lobes)
     }
 
+    /// Whether a lobe has a direction in the surface, so that meshes of the material need tangents.
+    #[must_use]
+    pub fn has_direction(&self) -> bool {
+        self.lobes().any(|(lobe, of)| lobe.has_direction && lobe.is_on(of))
+    }
+
     /// All texture slots, mutable.
     pub(crate) fn textures_mut(&mut self) -> impl Iterator<Item = &mut Option<TextureRef>> {
         let own = [

@@ -76,14 +76,14 @@ pub(crate) fn prune_textures(m: &mut Material, used: bool, ambient: bool) -> Vec
     forget(&mut m.clearcoat_normal_texture, "clear coat normal", coat);
     let mirrors = unless(m.specular > 0.0, "no dielectric part of it mirrors anything");
     forget(&mut m.specular_texture, "specular", lit.or(mirrors));
-    forget(&mut m.specular_color_texture, "specular colour", Some("this texture is not supported"));
+    forget(&mut m.specular_color_texture, "specular colour", lit.or(mirrors));
     forget(&mut m.transmission_texture, "transmission", transmits);
     forget(&mut m.thickness_texture, "thickness", transmits.or(unless(m.thickness > 0.0, "the thickness is 0")));
     unread
 }
 
 /// Texture-coordinate sets of a material: `sets` are read by its textures, `tangents` is the set of its normal
-/// textures.
+/// textures or of its anisotropy.
 pub(crate) struct Coordinates {
     pub(crate) sets: [bool; 2],
     /// Sets that are kept. A textured material keeps set 0: ray tracing computes the texel density from it.
@@ -95,7 +95,13 @@ impl Coordinates {
     pub(crate) fn of(m: &Material) -> Self {
         let textures: Vec<TextureRef> = m.textures().filter_map(|(.., texture)| texture).collect();
         let reads = |set| textures.iter().any(|t| t.uv_set as usize & 1 == set);
-        let tangents = m.normal_texture.or(m.clearcoat_normal_texture).map(|t| t.uv_set as usize & 1);
+        let set = |texture: TextureRef| texture.uv_set as usize & 1;
+        let directed = m.lobes().find(|(lobe, of)| lobe.has_direction && lobe.is_on(of));
+        let tangents = m
+            .normal_texture
+            .or(m.clearcoat_normal_texture)
+            .map(set)
+            .or(directed.map(|(_, of)| of.textures.iter().flatten().next().copied().map_or(0, set)));
         Self { sets: [reads(0), reads(1)], kept: [reads(0) || reads(1), reads(1)], tangents }
     }
 }

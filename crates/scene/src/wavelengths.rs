@@ -123,9 +123,9 @@ impl Wavelengths {
             ior: m.dispersion.index(f64::from(m.ior), slice.part.middle()) as f32,
             ..m.clone()
         };
-        for (of, colour) in material.lobes.iter_mut().zip(&curves.lobes) {
-            if let Some(colour) = colour {
-                of.factors[..3].fill(mean(colour));
+        for ((lobe, of), colour) in LOBES.iter().zip(&mut material.lobes).zip(&curves.lobes) {
+            if let (Some(components), Some(colour)) = (lobe.colour_components(), colour) {
+                of.factors[components].fill(mean(colour));
             }
         }
         if let Some(base) = &curves.base {

@@ -18,6 +18,8 @@ effects! {
         "a clear coat above 0" => "the G-buffer target of layers; code",
     Layers = "material layers":
         "a clear coat, or textures of coat, specular, transmission or thickness" => "a G-buffer target; code",
+    LobeTexels = "textures of lobes":
+        "an anisotropic material, or textures of the specular colour, of anisotropy, iridescence or diffuse transmission" => "a G-buffer target; code",
     Conductors = "conductors with n and kappa":
         "a metal given by n and kappa" => "code",
     Refraction = "refraction":

@@ -5,7 +5,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::Lobe;
+use super::{Factor, Lobe};
 use crate::Meaning::{Color, Data};
 
 /// Lower bound of the perceptual roughness: `LEAST_SHEEN_ROUGHNESS` of the shaders.
@@ -16,10 +16,13 @@ pub static SHEEN: Lobe = Lobe {
     name: "sheen",
     extension: "KHR_materials_sheen",
     row: ["a sheen colour above 0", "code, part of the table of directional albedo"],
-    factors: &[("sheenColorFactor", 3), ("sheenRoughnessFactor", 1)],
+    factors: &[Factor::unit("sheenColorFactor", 3, 0.0), Factor::unit("sheenRoughnessFactor", 1, 0.0)],
     textures: &[("sheenColorTexture", "sheen_color", Color), ("sheenRoughnessTexture", "sheen_roughness", Data)],
     scatters: true,
+    has_direction: false,
+    by_wavelength: false,
     albedo: Some(table_row),
+    texel: |factors| factors,
 };
 
 /// D V of white sheen, in 1/sr, from the cosines of both directions and of the half vector with the normal.

@@ -1,6 +1,6 @@
 //! Builder of study scenes: fills the types of [`crate`].
 
-use glam::{Affine2, DAffine3, DMat3, DVec3};
+use glam::{Affine2, DAffine3, DMat3, DVec3, Vec3};
 
 use super::shape::Shape;
 use crate::substance::{Medium, Metal};
@@ -62,6 +62,16 @@ impl StudyBuilder {
             ..Mesh::default()
         });
         self.scene.meshes.len() - 1
+    }
+
+    /// Gives a mesh tangents around its y axis, as grooves of turning have.
+    pub(super) fn turned_on_a_lathe(&mut self, mesh: usize) {
+        let mesh = &mut self.scene.meshes[mesh];
+        let tangent = |n: &[f32; 3]| {
+            let [x, y, z] = Vec3::Y.cross(Vec3::from(*n)).try_normalize().unwrap_or(Vec3::X).to_array();
+            [x, y, z, 1.0]
+        };
+        mesh.tangents = mesh.normals.iter().map(tangent).collect();
     }
 
     pub(super) fn place(&mut self, name: &str, mesh: usize, world_from_object: DAffine3) {

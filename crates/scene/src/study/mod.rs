@@ -8,6 +8,7 @@ mod blend;
 mod build;
 mod cornell;
 mod etalon;
+mod finishes;
 pub mod generate;
 mod golden_bridge;
 mod haze;
@@ -27,9 +28,10 @@ use anyhow::{Result, bail};
 use crate::Scene;
 
 /// Names of the study scenes, each with a description of one line; the default scene is first.
-pub const SCENES: [(&str, &str); 15] = [
+pub const SCENES: [(&str, &str); 16] = [
     ("etalon", "half-silvered plates that mirror each other, a prism, a gold and a glass ball, water in a basin"),
     ("materials", "plastic, metal, clear coat and emission, from smooth to rough"),
+    ("finishes", "brushed metal, thin films, cloth and leaves"),
     ("lamps", "punctual lights: point, spot and directional"),
     ("radiance", "emitters of equal radiance at different distance and tilt"),
     ("cornell", "a box with a red and a green wall, lit by a panel"),
@@ -61,6 +63,7 @@ pub fn load(name: &str) -> Result<Scene> {
     Ok(match name {
         "etalon" => etalon::scene(),
         "materials" => materials::scene(),
+        "finishes" => finishes::scene(),
         "lamps" => lamps::scene(),
         "radiance" => radiance::scene(),
         "cornell" => cornell::scene(),
