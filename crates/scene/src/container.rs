@@ -17,39 +17,8 @@ use gltf::json::{
 };
 
 use super::decompress::{decompress, is_fallback};
+use super::extensions::is_supported;
 use super::lenient::{self, PointerChannel};
-use super::lobe::LOBES;
-
-/// Supported extensions, without those of [`LOBES`].
-const SUPPORTED_EXTENSIONS: &[&str] = &[
-    "EXT_mesh_gpu_instancing",
-    "EXT_meshopt_compression",
-    "EXT_texture_webp",
-    "KHR_animation_pointer",
-    "KHR_draco_mesh_compression",
-    "KHR_lights_punctual",
-    "KHR_materials_clearcoat",
-    "KHR_materials_dispersion",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_pbrSpecularGlossiness",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_unlit",
-    "KHR_materials_variants",
-    "KHR_materials_volume",
-    "KHR_materials_volume_scatter",
-    "KHR_mesh_quantization",
-    "KHR_meshopt_compression",
-    "KHR_node_visibility",
-    "KHR_texture_basisu",
-    "KHR_texture_transform",
-];
-
-/// Whether an extension is supported, so that `extensionsRequired` may name it.
-fn is_supported(name: &str) -> bool {
-    SUPPORTED_EXTENSIONS.contains(&name) || LOBES.iter().any(|lobe| lobe.extension == name)
-}
 
 /// A glTF file with its buffers in memory.
 pub(crate) struct Document<'a> {
@@ -69,9 +38,8 @@ struct Parts<'a> {
     binary: Option<&'a [u8]>,
 }
 
-impl<'a> Document<'a> {
-    /// Parses and checks `bytes`, and reads every buffer the file names.
-    pub(crate) fn open(bytes: &'a [u8], path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
+impl<'a> Parts<'a> {
+    fn of(bytes: &'a [u8], path: &Path) -> Result<Self> {
         let is_glb = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb"));
         let parts = if is_glb || bytes.starts_with(b"glTF") {
             split_glb(bytes)?
@@ -82,6 +50,19 @@ impl<'a> Document<'a> {
             parts.json.trim_ascii_start().starts_with(b"{"),
             "the JSON cannot be read as glTF 2.0: it does not begin with an object"
         );
+        Ok(parts)
+    }
+}
+
+/// The JSON of a file, before any of it is checked.
+pub(crate) fn json_of<'a>(bytes: &'a [u8], path: &Path) -> Result<&'a [u8]> {
+    Ok(Parts::of(bytes, path)?.json)
+}
+
+impl<'a> Document<'a> {
+    /// Parses and checks `bytes`, and reads every buffer the file names.
+    pub(crate) fn open(bytes: &'a [u8], path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
+        let parts = Parts::of(bytes, path)?;
         let (mut root, pointers) = match json::deserialize::from_slice(parts.json) {
             Ok(root) => (root, Vec::new()),
             Err(error) => lenient::read(parts.json, warnings)

@@ -11,6 +11,7 @@ mod container;
 #[doc(hidden)]
 pub mod decompress;
 pub mod environment;
+pub mod extensions;
 mod geometry;
 mod gltf_extras;
 mod gltf_import;
@@ -32,6 +33,7 @@ pub mod substance;
 mod thin;
 pub mod wavelengths;
 
+use std::io::Read as _;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
@@ -59,13 +61,36 @@ pub struct LoadOptions {
     pub variant: Option<String>,
 }
 
-/// Reads a scene from a glTF 2.0 file (`.gltf`, `.glb`), a Wavefront file (`.obj`), or a mesh (`.stl`, `.ply`).
+/// File name extensions of the files that [`load`] reads, in lower case; upper case is read as well.
+pub const EXTENSIONS: [&str; 5] = ["gltf", "glb", "obj", "stl", "ply"];
+
+/// The path that stands for standard input.
+const STANDARD_INPUT: &str = "-";
+
+fn is_standard_input(path: &Path) -> bool {
+    path.as_os_str() == STANDARD_INPUT
+}
+
+/// The name of a file in messages.
+fn said(path: &Path) -> String {
+    if is_standard_input(path) { "standard input".to_owned() } else { path.display().to_string() }
+}
+
+/// The extension of a path in lower case. Standard input is read as glTF: its first bytes tell GLB from JSON.
+fn extension(path: &Path) -> String {
+    if is_standard_input(path) {
+        return "gltf".to_owned();
+    }
+    path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase()
+}
+
+/// Reads a scene from a glTF 2.0 file (`.gltf`, `.glb`), a Wavefront file (`.obj`), or a mesh (`.stl`, `.ply`). The
+/// path `-` is a glTF 2.0 file on standard input, which can be read once; its relative URIs start at the working folder.
 ///
 /// # Errors
 /// One sentence when printed with `{:#}`: the file, the place in the file and the fault there.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-    let scene = match extension.as_str() {
+    let scene = match extension(path).as_str() {
         "gltf" | "glb" => gltf_import::load(path, options),
         "obj" | "stl" | "ply" if options.scene.is_some() || options.variant.is_some() => {
             bail!("loading {}: only glTF files have scenes and variants to choose", path.display())
@@ -74,17 +99,26 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
         "stl" => mesh_files::load_stl(path),
         "ply" => mesh_files::load_ply(path),
         _ => {
-            bail!("loading {}: only .gltf, .glb, .obj, .stl and .ply files are supported", path.display())
+            let [others @ .., last] = EXTENSIONS.map(|known| format!(".{known}"));
+            bail!("loading {}: only {} and {last} files are supported", path.display(), others.join(", "))
         }
     };
-    let mut scene = scene.with_context(|| format!("loading {}", path.display()))?;
+    let mut scene = scene.with_context(|| format!("loading {}", said(path)))?;
     sigma::one_medium_each(&mut scene);
     Ok(scene)
 }
 
 /// The content of a file; the error is its cause alone, for the caller names the file.
 fn contents(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).map_err(|error| anyhow::anyhow!(etalon_image::file::cause(&error)))
+    let read = || match is_standard_input(path) {
+        true => {
+            let mut bytes = Vec::new();
+            std::io::stdin().lock().read_to_end(&mut bytes)?;
+            Ok(bytes)
+        }
+        false => std::fs::read(path),
+    };
+    read().map_err(|error| anyhow::anyhow!(etalon_image::file::cause(&error)))
 }
 
 /// An animated scene: its file is read once, and all moments of the animation share the static parts.
@@ -108,11 +142,10 @@ impl Source {
     /// # Errors
     /// The errors of [`load`].
     pub fn open(path: &Path, options: LoadOptions) -> Result<Self> {
-        let is_gltf = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb"));
-        if !is_gltf {
+        if !["gltf", "glb"].contains(&extension(path).as_str()) {
             return Ok(Self::still(load(path, &LoadOptions { time: None, ..options })?));
         }
-        let name = path.display().to_string();
+        let name = said(path);
         let file = Box::new(gltf_import::GltfFile::open(path, &options).with_context(|| format!("loading {name}"))?);
         Ok(Self { kind: Kind::Gltf { file, name }, options })
     }
