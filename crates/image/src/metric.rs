@@ -69,13 +69,16 @@ pub enum AnyPicture {
 impl AnyPicture {
     /// Reads a picture; the contents decide, not the extension.
     pub fn load(path: &Path) -> Result<Self> {
-        let bytes = file::read(path)?;
-        let decoded = if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
-            exr::decode_exr(&bytes).map(Self::Linear)
+        Self::decode(&file::read(path)?).with_context(|| format!("reading {}", path.display()))
+    }
+
+    /// Decodes the contents of a file: OpenEXR, PNG, JPEG or WebP.
+    pub fn decode(bytes: &[u8]) -> Result<Self> {
+        if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+            exr::decode_exr(bytes).map(Self::Linear)
         } else {
-            png::decode_display(&bytes).map(Self::Display)
-        };
-        decoded.with_context(|| format!("reading {}", path.display()))
+            png::decode_display(bytes).map(Self::Display)
+        }
     }
 
     /// Width and height in pixels.
