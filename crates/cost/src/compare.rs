@@ -35,11 +35,11 @@ pub struct Compared {
     pub pictures: [Vec<u8>; 3],
 }
 
-/// Draws and times both rungs of `wanted` (`KNOB=A,B`); `knobs` sets all other knobs.
+/// The knob of `wanted` (`KNOB=A,B`) and `knobs` with each of its rungs, the more exact one last.
 ///
 /// # Errors
-/// When there are no such rungs, or when one of them contradicts another knob or cannot be drawn.
-pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<Compared> {
+/// When there are no such rungs, or when one of them contradicts another knob.
+pub fn pair(knobs: &Knobs, wanted: &str) -> Result<(&'static Knob, [Knobs; 2])> {
     let parts = wanted.split_once('=').and_then(|(knob, rungs)| Some((knob, rungs.split_once(',')?)));
     let Some((name, (a, b))) = parts else {
         bail!("--compare {wanted}: expected KNOB=A,B, for example fresnel=schlick,exact");
@@ -54,7 +54,15 @@ pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<C
     let (first, last) = (first?, last?);
     let knob = Knob::named(name).context("a knob of the table")?;
     ensure!(first != last, "--compare {wanted}: both are the same rung");
-    let [first, last] = if knob.place(&first) < knob.place(&last) { [first, last] } else { [last, first] };
+    Ok((knob, if knob.place(&first) < knob.place(&last) { [first, last] } else { [last, first] }))
+}
+
+/// Draws and times both rungs of `wanted` (`KNOB=A,B`); `knobs` sets all other knobs.
+///
+/// # Errors
+/// The errors of [`pair`], and when one of the rungs cannot be drawn.
+pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<Compared> {
+    let (knob, [first, last]) = pair(knobs, wanted)?;
     let mut exact = bench.warm_up(&last)?;
     let truth = bench.measure(&mut exact, None, ENOUGH_MS)?;
     let mut warm = bench.warm_up(&first)?;
