@@ -233,8 +233,34 @@ impl Renderer {
         samples: u32,
         progress: &mut dyn FnMut(Progress),
     ) -> Result<Rendered> {
-        let mut drawing = self.begin(camera, samples);
+        let drawing = self.begin(camera, samples);
+        self.finish(drawing, progress, &|| false)
+    }
+
+    /// Renders the scene from a camera until `is_stopped`: the picture then has the samples drawn so far, at least one.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn render_until(
+        &mut self,
+        camera: &Camera,
+        progress: &mut dyn FnMut(Progress),
+        is_stopped: &dyn Fn() -> bool,
+    ) -> Result<Rendered> {
+        let drawing = self.begin(camera, self.plan.samples);
+        self.finish(drawing, progress, is_stopped)
+    }
+
+    fn finish(
+        &mut self,
+        mut drawing: Drawing,
+        progress: &mut dyn FnMut(Progress),
+        is_stopped: &dyn Fn() -> bool,
+    ) -> Result<Rendered> {
         while !drawing.is_done() {
+            if drawing.is_whole() && is_stopped() {
+                return self.picture(&drawing);
+            }
             let known = drawing.errors.len();
             self.step(&mut drawing)?;
             if drawing.next[1] == 0 {
