@@ -1,37 +1,56 @@
 //! The command line as a whole: commands, the options that all of them have, and what is generated from it.
 
+use std::ffi::{OsStr, OsString};
+use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::{Context as _, Result};
+use clap::builder::StyledStr;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, CommandFactory as _, Parser, Subcommand};
 use clap_complete::Shell;
+use etalon::plan::Knob;
+use etalon::scene::EXTENSIONS;
 
+use super::heading;
+use super::interrupt::INTERRUPTED;
 use super::options::When;
-use super::{cost, devices, diff, eval, farm, merge, picture, plan, plot, print, render, verify, view};
+use super::{cost, devices, diff, eval, farm, lists, merge, picture, plan, plot, print, render, verify, view};
 
 /// A Vulkan renderer written directly against ash: glTF in, radiance out.
 #[derive(Parser)]
-#[command(name = "etalon", version, propagate_version = true)]
+#[command(name = "etalon", version, propagate_version = true, after_help = EXAMPLES)]
 pub struct Arguments {
     /// What is to be done.
     #[command(subcommand)]
     pub command: Command,
     /// Print errors only
-    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    #[arg(short, long, global = true, conflicts_with = "verbose", help_heading = heading::MESSAGES)]
     pub quiet: bool,
-    /// Say more: -v for times and decisions, -vv for everything
-    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    /// Say more: -v for whole tables, times and decisions, -vv for everything
+    #[arg(short, long, global = true, action = clap::ArgAction::Count, help_heading = heading::MESSAGES)]
     pub verbose: u8,
     /// Colour in messages (NO_COLOR is honoured)
-    #[arg(long, global = true, value_enum, default_value_t = When::Auto)]
+    #[arg(long, global = true, value_enum, default_value_t = When::Auto, help_heading = heading::MESSAGES)]
     pub color: When,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+    etalon scenes
+    etalon render study:pool -o pool.png
+    etalon plan study:pool
+    etalon knobs reflection
+
+`etalon FILE` opens FILE in the window, as `etalon view FILE` does.";
 
 /// The commands.
 #[derive(Subcommand)]
 #[expect(missing_docs, reason = "clap would print a variant's documentation in place of the command's own")]
 pub enum Command {
     Render(Box<picture::RenderArgs>),
+    Scenes(lists::ScenesArgs),
+    Knobs(lists::KnobsArgs),
     Plan(Box<plan::PlanArgs>),
     Diff(diff::DiffArgs),
     Devices(devices::DevicesArgs),
@@ -48,6 +67,7 @@ pub enum Command {
 
 /// Print completions for a shell, to be put where it looks for them
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "Examples:\n    etalon completions bash")]
 pub struct CompletionsArgs {
     /// The shell
     #[arg(value_enum)]
@@ -56,6 +76,7 @@ pub struct CompletionsArgs {
 
 /// Print the manual page in roff, for `man -l -`
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "Examples:\n    etalon manual")]
 pub struct ManualArgs {}
 
 /// What the program's exit codes mean; the first three are those of every command.
@@ -65,11 +86,17 @@ pub const EXIT_CODES: [(u8, &str); 6] = [
         1,
         "failed, with a sentence; or `diff` found more than `--max`, `verify` a broken bound, `devices` no usable device",
     ),
-    (2, "the command line does not parse: an unknown option, a missing or malformed value"),
+    (
+        WRONG,
+        "wrong usage: an unknown option, a value that is missing, malformed or unknown, or options that contradict",
+    ),
     (AGAIN, "worth trying again: the device was lost, or the disk is full"),
-    (130, "ended by Ctrl-C"),
+    (INTERRUPTED, "ended by Ctrl-C; with `render --keep` the outputs have the samples drawn so far"),
     (ENDED, "a part of a picture that was ended by SIGTERM, with the samples it had"),
 ];
+
+/// Wrong usage: the code that clap has for command lines that do not parse.
+pub const WRONG: u8 = 2;
 
 /// Worth trying again: EX_TEMPFAIL of sysexits.h.
 pub const AGAIN: u8 = 75;
@@ -83,19 +110,75 @@ pub fn command() -> clap::Command {
     Arguments::command()
 }
 
+/// The words of a command line, where a scene in place of a command means `view`: `etalon scene.glb`.
+#[must_use]
+pub fn with_command(mut words: Vec<OsString>) -> Vec<OsString> {
+    let is_option = |word: &OsString| word.len() > 1 && word.as_encoded_bytes().starts_with(b"-");
+    let mut at = 1;
+    while let Some(option) = words.get(at).filter(|word| is_option(word)) {
+        at += if option == "--color" { 2 } else { 1 };
+    }
+    if words.get(at).is_some_and(|word| is_scene(word)) {
+        words.insert(at, "view".into());
+    }
+    words
+}
+
+/// Whether a word is a scene and no command: a study scene, an existing file, or a name as files of scenes have it.
+fn is_scene(word: &OsStr) -> bool {
+    let text = word.to_string_lossy();
+    if command().get_subcommands().any(|sub| sub.get_name() == text) || text == "help" {
+        return false;
+    }
+    let is_known = |extension: &OsStr| EXTENSIONS.iter().any(|known| extension.eq_ignore_ascii_case(known));
+    text.starts_with("study:") || Path::new(word).extension().is_some_and(is_known) || Path::new(word).is_file()
+}
+
+/// Parses a command line. An option that has the name of a knob gets a tip about `--set`; clap's tip to pass an unknown
+/// option as a value is left out, because no scene and no picture is meant by it.
+///
+/// # Errors
+/// clap's, which also stand for `--help` and `--version`.
+pub fn parse(words: Vec<OsString>) -> Result<Arguments, clap::Error> {
+    Arguments::try_parse_from(with_command(words)).map_err(|mut error| {
+        if error.kind() != ErrorKind::UnknownArgument {
+            return error;
+        }
+        if let Some(ContextValue::StyledStrs(mut tips)) = error.remove(ContextKind::Suggested) {
+            tips.retain(|tip| !tip.to_string().contains("as a value"));
+            error.insert(ContextKind::Suggested, ContextValue::StyledStrs(tips));
+        }
+        let wrong = match error.get(ContextKind::InvalidArg) {
+            Some(ContextValue::String(name)) => name.trim_start_matches('-').to_owned(),
+            _ => String::new(),
+        };
+        if let Some(knob) = Knob::named(&wrong) {
+            let tip = format!("{wrong} is a knob: --set {wrong}={}", knob.presets[1]);
+            error.remove(ContextKind::SuggestedArg);
+            // clap's usage line is about the option that it would have suggested.
+            error.remove(ContextKind::Usage);
+            error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![StyledStr::from(tip)]));
+        }
+        error
+    })
+}
+
 /// Runs the command that was chosen.
 ///
 /// # Errors
 /// Those of the command.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let (quiet, whole) = (arguments.quiet, arguments.verbose > 0);
     match &arguments.command {
-        Command::Render(args) => render::run(args, arguments.quiet),
-        Command::Diff(args) => diff::run(args),
+        Command::Render(args) => render::run(args, quiet),
+        Command::Scenes(args) => lists::scenes(args),
+        Command::Knobs(args) => lists::knobs(args),
+        Command::Diff(args) => diff::run(args, whole),
         Command::Devices(args) => devices::run(args),
         Command::View(args) => view::run(args),
-        Command::Plan(args) => plan::run(args),
-        Command::Cost(args) => cost::run(args, arguments.quiet),
-        Command::Verify(args) => verify::run(args, arguments.quiet),
+        Command::Plan(args) => plan::run(args, whole),
+        Command::Cost(args) => cost::run(args, quiet),
+        Command::Verify(args) => verify::run(args, quiet, whole),
         Command::Merge(args) => merge::run(args),
         Command::Farm(args) => farm::run(args),
         Command::Eval(args) => eval::run(args),

@@ -16,6 +16,7 @@ use etalon::frame::{Rendered, Renderer, Settings};
 use etalon::gpu::DeviceInfo;
 use etalon::image::file;
 use etalon::image::png::Display;
+use etalon::plan::rungs::Indirect;
 use etalon::plan::{ForcedEffects, Knobs};
 use etalon::scene::Camera;
 use etalon_cost::choose::{SPARE, at_most, most_exact, quickest, within};
@@ -118,22 +119,22 @@ impl Budget {
     /// The budget that the options give; `None` where the user chooses the rungs.
     ///
     /// # Errors
-    /// One sentence for an invalid number, and for options that contradict the budget.
-    pub(super) fn of(within: Option<&str>, picture: &PictureOptions) -> Result<Option<Self>> {
+    /// One sentence for options that contradict the budget.
+    pub(super) fn of(within: Option<f64>, picture: &PictureOptions) -> Result<Option<Self>> {
         let chosen = !picture.set.is_empty() || picture.model.is_some();
-        if let Some(text) = within {
-            let number = text.strip_suffix("ms").unwrap_or(text).trim().parse::<f64>().ok();
-            let Some(ms) = number.filter(|ms| *ms > 0.0 && ms.is_finite()) else {
-                bail!("--within {text}: expected milliseconds above 0, for example 8 or 8ms");
-            };
-            ensure!(!chosen, "--within {text} contradicts --model and --set: --within chooses the rungs itself");
-            ensure!(picture.max_error.is_none(), "--within {text} contradicts --max-error: give only one limit");
-            return Ok(Some(Self::Within(ms)));
+        match (within, picture.max_error) {
+            (Some(_), _) if chosen => {
+                bail!("--within contradicts --model and --set: --within chooses the rungs itself")
+            }
+            (Some(_), Some(_)) => bail!("--within contradicts --max-error: give only one limit"),
+            (Some(ms), None) => Ok(Some(Self::Within(ms))),
+            (None, Some(_)) if chosen => {
+                let paths = picture.knobs()?.indirect == Indirect::Path;
+                ensure!(paths, "--max-error: only paths tell their error; add --model global, or choose no rungs");
+                Ok(None)
+            }
+            (None, limit) => Ok(limit.map(Self::MaxError)),
         }
-        if chosen || picture.max_error.is_none() {
-            return Ok(None);
-        }
-        Ok(picture.max_error()?.map(Self::MaxError))
     }
 
     /// Chooses rungs. A time limit gets the rungs with the least error that keep the limit when they are timed now; an

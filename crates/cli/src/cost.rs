@@ -3,23 +3,25 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
 
 use super::budget::{command, keep, kept};
+use super::heading;
+use super::interrupt::Interrupt;
 use super::options::{DeviceOptions, PictureOptions, PlanExtent as Planned, SceneOptions, shard};
 use super::print;
 use super::progress::{ProgressForm, Steps};
 use super::setup::Setup;
+use super::usage;
+use etalon::frame::Settings;
 use etalon::gpu::Severity;
 use etalon::image::file;
 use etalon::image::metric::AnyPicture;
 use etalon::scene::Prune;
 use etalon_cost::beside::Beside;
-use etalon_cost::compare::{Compared, compare_rungs};
+use etalon_cost::compare::{Compared, compare_rungs, pair};
 use etalon_cost::pace::Step;
 use etalon_cost::reference::NotMeasured;
 use etalon_cost::report;
@@ -28,6 +30,10 @@ use etalon_cost::table::Table;
 
 /// Measure what each approximation costs in a scene: its error against the scene's reference, and its GPU time
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+Examples:
+    etalon cost study:nested --compare fresnel=schlick,exact --size 320x180
+    etalon cost study:nested --size 320x180 -o nested-cost")]
 pub struct CostArgs {
     #[command(flatten)]
     scene: SceneOptions,
@@ -40,33 +46,59 @@ pub struct CostArgs {
     device: DeviceOptions,
     /// Time budget in seconds: it determines the samples of the reference; pictures for which there is no time are left
     /// out
-    #[arg(long, value_name = "SECONDS", default_value_t = 240, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "SECONDS", default_value_t = 240, value_parser = clap::value_parser!(u32).range(1..), help_heading = heading::SWEEP)]
     budget: u32,
     /// Samples of the reference, regardless of the budget
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = reference_samples, help_heading = heading::SWEEP)]
     reference_samples: Option<u32>,
     /// Draw only the I-th of N parts; each part needs its own folder, and --merge joins the folders
-    #[arg(long, value_name = "I/N", value_parser = shard, requires = "reference_samples")]
+    #[arg(long, value_name = "I/N", value_parser = shard, requires = "reference_samples", help_heading = heading::SWEEP)]
     shard: Option<[u32; 2]>,
     /// Join the parts of a run from these folders instead of measuring
-    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["shard", "reference_samples", "compare"])]
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["shard", "reference_samples", "compare"], help_heading = heading::SWEEP)]
     merge: Vec<PathBuf>,
     /// Compare two finished runs of one scene, for example on two devices, instead of measuring
-    #[arg(long, value_names = ["DIR", "DIR"], num_args = 2, conflicts_with_all = ["shard", "reference_samples", "compare", "merge"])]
+    #[arg(long, value_names = ["DIR", "DIR"], num_args = 2, conflicts_with_all = ["shard", "reference_samples", "compare", "merge"], help_heading = heading::COMPARISON)]
     beside: Vec<PathBuf>,
     /// Also compare a picture of another program with the reference: OpenEXR or PNG of the same size
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["merge", "compare", "beside"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["merge", "compare", "beside"], help_heading = heading::COMPARISON)]
     judge: Vec<PathBuf>,
     /// Compare two rungs of one knob only: interleaved timing, two lines and a verdict; with -o also both pictures and
     /// their difference
-    #[arg(long, value_name = "KNOB=A,B", conflicts_with_all = ["shard", "reference_samples", "budget"])]
+    #[arg(long, value_name = "KNOB=A,B", conflicts_with_all = ["shard", "reference_samples", "budget"], help_heading = heading::COMPARISON)]
     compare: Option<String>,
     /// Print cost.json as well
     #[arg(long)]
     json: bool,
     /// Form of the progress messages
-    #[arg(long, value_enum, default_value_t = ProgressForm::Auto)]
+    #[arg(long, value_enum, default_value_t = ProgressForm::Auto, help_heading = heading::MESSAGES)]
     pub progress: ProgressForm,
+}
+
+impl CostArgs {
+    /// Checks what can be checked before the scene is loaded.
+    fn check(&self, settings: &Settings) -> Result<()> {
+        match &self.compare {
+            Some(wanted) => drop(pair(&settings.knobs, wanted)?),
+            None => ensure!(
+                self.picture.set.is_empty() && self.picture.model.is_none(),
+                "--model and --set: cost chooses the rungs itself; only with --compare KNOB=A,B do they set the other knobs"
+            ),
+        }
+        ensure!(self.picture.plan == Planned::Scene, "--plan: cost always plans the effects that the scene calls for");
+        ensure!(self.compare.is_some() || self.output.is_some(), "--output: name a folder for the report");
+        ensure!(
+            settings.max_error.is_none(),
+            "--max-error: cost draws many pictures and ends none of them by its error"
+        );
+        Ok(())
+    }
+}
+
+/// Number of samples of a reference.
+fn reference_samples(text: &str) -> Result<u32, String> {
+    let is_power_of_four = |n: &u32| n.is_power_of_two() && n.trailing_zeros() % 2 == 0 && (4..=4096).contains(n);
+    text.parse().ok().filter(is_power_of_four).ok_or_else(|| "expected 4, 16, 64, 256, 1024 or 4096".to_owned())
 }
 
 /// Runs the command.
@@ -83,20 +115,12 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
         return beside(args, [a, b]);
     }
     let settings = args.picture.settings(&args.scene)?;
+    usage(args.check(&settings))?;
     let others: Vec<(String, AnyPicture)> = args
         .judge
         .iter()
         .map(|path| Ok((path.display().to_string(), AnyPicture::load(path)?)))
         .collect::<Result<_>>()?;
-    let compared = args.compare.is_some();
-    if !compared && (!args.picture.set.is_empty() || args.picture.model.is_some()) {
-        bail!(
-            "--model and --set: cost chooses the rungs itself; only with --compare KNOB=A,B do they set the other knobs"
-        );
-    }
-    ensure!(args.picture.plan == Planned::Scene, "--plan: cost always plans the effects that the scene calls for");
-    ensure!(compared || args.output.is_some(), "--output: name a folder for the report");
-    ensure!(settings.max_error.is_none(), "--max-error: cost draws many pictures and ends none of them by its error");
     let steps = Steps::new(args.progress, quiet);
     steps.step(&format!("loading {}", args.scene.scene), 1);
     let setup = Setup::load(&args.scene, Prune::Nothing, &args.device)?;
@@ -122,21 +146,14 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
     }
     let contents = setup.contents();
     let sized = |size: [u32; 2]| command(&args.scene, &PictureOptions { size, ..args.picture.clone() }, &args.device);
-    let stopped = Arc::new(AtomicBool::new(false));
-    listen(&stopped);
+    let interrupt = Interrupt::listen("stopping after this picture; results so far are kept");
     let measured = setup.bench(&args.scene, settings, |bench| {
-        let samples = args.reference_samples;
-        if let Some(samples) =
-            samples.filter(|n| !n.is_power_of_two() || n.trailing_zeros() % 2 == 1 || *n < 4 || *n > 4096)
-        {
-            bail!("--reference-samples {samples}: expected 4, 16, 64, 256, 1024 or 4096");
-        }
         let sweep = Sweep {
             bench,
             folder: &output,
             extent: SweepExtent {
                 budget_s: args.budget,
-                reference_samples: samples,
+                reference_samples: args.reference_samples,
                 shard: args.shard.unwrap_or([1, 1]),
             },
             command: &sized,
@@ -145,7 +162,7 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
             kept: &|command| kept(command, &setup),
             may_shrink: true,
             others: &others,
-            stopped: &|| stopped.load(Ordering::Relaxed),
+            stopped: &|| interrupt.is_asked(),
         };
         sweep.run(&mut Listener {
             step: &mut |step: Step<'_>| steps.of(step.name, step.done, step.of, step.left_s),
@@ -229,21 +246,6 @@ fn beside(args: &CostArgs, folders: [&PathBuf; 2]) -> Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// The first Ctrl-C ends the run after the picture in progress and keeps its results; the second ends the program at
-/// once.
-fn listen(stopped: &Arc<AtomicBool>) {
-    let stopped = stopped.clone();
-    let heard = ctrlc::set_handler(move || {
-        if stopped.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-        tracing::warn!("stopping after this picture; results so far are kept; press Ctrl-C again to stop at once");
-    });
-    if let Err(error) = heard {
-        tracing::info!("Ctrl-C cannot end the run early: {error}");
-    }
 }
 
 /// Fails the run on an error of the validation layer.

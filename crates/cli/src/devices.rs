@@ -12,6 +12,7 @@ use etalon::gpu::{Candidate, candidates};
 
 /// List the Vulkan devices, the features that they lack, and the device used by default
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "Examples:\n    etalon devices\n    etalon devices --json")]
 pub struct DevicesArgs {
     /// Print one JSON document
     #[arg(long)]

@@ -8,13 +8,17 @@ use comfy_table::{Table, presets};
 use serde_json::json;
 
 use super::options::DeviceOptions;
-use super::print;
+use super::{print, usage};
 use etalon::gpu::Device;
 use etalon::optics::{Case, Tier, ulp};
-use etalon_verify::{Cases, arguments, evaluate, find};
+use etalon_verify::{Cases, Entry, arguments, evaluate, find};
 
 /// Evaluate one shader function at one point: three tiers on the device, the f64 twin, the error in ulps, the bound
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+Examples:
+    etalon eval critical_angle n_in=10 n_out=1
+    etalon eval fresnel_dielectric cos_in=0.2 n=1.5 --json")]
 pub struct EvalArgs {
     /// The function; `etalon verify --list` names them
     function: String,
@@ -29,16 +33,24 @@ pub struct EvalArgs {
     json: bool,
 }
 
+impl EvalArgs {
+    /// The function and its inputs.
+    fn point(&self) -> Result<(Entry, Vec<f64>)> {
+        let entry = find(&self.function)?;
+        let values = arguments::parse(&self.inputs)?;
+        let mut used = Vec::new();
+        let row = arguments::row(&entry, &values, &mut used)?;
+        arguments::all_used(&values, &used, &[entry])?;
+        Ok((entry, row))
+    }
+}
+
 /// Runs the command.
 ///
 /// # Errors
 /// One sentence: an unknown function, an input that is missing, unknown or no number, a device that fails.
 pub fn run(args: &EvalArgs) -> Result<ExitCode> {
-    let entry = find(&args.function)?;
-    let values = arguments::parse(&args.inputs)?;
-    let mut used = Vec::new();
-    let row = arguments::row(&entry, &values, &mut used)?;
-    arguments::all_used(&values, &used, &[entry])?;
+    let (entry, row) = usage(args.point())?;
     let cases = Cases::from_rows(&entry, std::slice::from_ref(&row));
     let device = Device::open(&args.device.choice(), args.device.validate)?;
     let mut tiers = Vec::new();

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context as _, Result, anyhow, bail, ensure};
+use anyhow::{Context as _, Result, anyhow, ensure};
 use clap::{Args, Parser, Subcommand};
 use serde_json::Value;
 
 use super::choices::one_of;
-use super::picture::RenderArgs;
-use super::print;
+use super::picture::{RenderArgs, default_stem};
+use super::{print, usage};
 use etalon::image::file;
 use etalon_farm::account::{Account, Shift};
 use etalon_farm::frames::Frames;
@@ -17,6 +17,10 @@ use etalon_farm::job::{Engine, JobWork};
 
 /// Write job files for engines that split work over machines, and a report about their workers
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+Examples:
+    etalon farm job --engine slurm --tasks 4 -- study:pool --model global
+    etalon farm job --engine openjd --minutes 5 --seconds 20 -o job.yaml -- study:pool --turntable 90 -o {frame:04}.png")]
 pub struct FarmArgs {
     #[command(subcommand)]
     command: FarmCommand,
@@ -128,20 +132,14 @@ fn without(arguments: &[String], names: &[&str]) -> Vec<String> {
     left
 }
 
-fn write_job(args: &JobArgs) -> Result<()> {
-    args.output.iter().try_for_each(|path| file::check_writable(path))?;
+/// The arguments of `etalon render`, parsed and checked.
+fn rendering(arguments: &[String]) -> Result<RenderArgs> {
     // The error sentence is that of `etalon render`.
-    let Render { render } = Render::try_parse_from(&args.arguments).map_err(|error| anyhow!("{}", error.render()))?;
+    let Render { render } = Render::try_parse_from(arguments).map_err(|error| anyhow!("{}", error.render()))?;
     let sequence = &render.sequence;
     ensure!(sequence.shard.is_none(), "--shard: the job file gives each task its own share; leave this option out");
-    let settings = render.render_settings()?;
-    let frames = match (&sequence.frames, sequence.turntable) {
-        (Some(frames), _) => Some(frames.clone()),
-        (None, Some(count)) => Some(Frames::first(count)),
-        (None, None) => None,
-    };
-    let pictures = frames.as_ref().map_or(1, |frames| frames.numbers().len());
-    let is_still = frames.is_none();
+    ensure!(render.scene.scene != "-", "-: each task reads the scene again; name a file");
+    let is_still = sequence.frames.is_none() && sequence.turntable.is_none();
     ensure!(
         !is_still || sequence.cameras.is_empty(),
         "--cameras: several pictures are divided by frames; add --frames or --turntable"
@@ -154,6 +152,20 @@ fn write_job(args: &JobArgs) -> Result<()> {
         is_still || !render.output.iter().any(|path| path.extension().is_some_and(|e| e == "apng")),
         "--output: one process makes an animated preview from all frames; when they are drawn, run `etalon render` itself once more"
     );
+    Ok(render)
+}
+
+fn write_job(args: &JobArgs) -> Result<()> {
+    let render = usage(rendering(&args.arguments))?;
+    args.output.iter().try_for_each(|path| file::check_writable(path))?;
+    let settings = render.render_settings()?;
+    let frames = match (&render.sequence.frames, render.sequence.turntable) {
+        (Some(frames), _) => Some(frames.clone()),
+        (None, Some(count)) => Some(Frames::first(count)),
+        (None, None) => None,
+    };
+    let pictures = frames.as_ref().map_or(1, |frames| frames.numbers().len());
+    let is_still = frames.is_none();
     let seconds_of_task = args.minutes.map_or(300.0, |minutes| minutes * 60.0);
     ensure!(seconds_of_task >= 1.0 && seconds_of_task.is_finite(), "--minutes: a task must take at least one second");
     let count = match (args.tasks, &args.cost, args.seconds) {
@@ -165,12 +177,12 @@ fn write_job(args: &JobArgs) -> Result<()> {
         }
         (None, None, Some(seconds)) => tasks(seconds * pictures as f64, seconds_of_task)?,
         (None, None, None) => {
-            bail!("--minutes: the time of a picture is unknown; add --cost DIR of `etalon cost`, or --seconds")
+            let why = "--minutes: the time of a picture is unknown; add --cost DIR of `etalon cost`, or --seconds";
+            return usage(Err(anyhow!("{why}")));
         }
     };
     let count = if is_still { count } else { count.min(pictures as u32) };
-    let name = render.scene.scene.strip_prefix("study:").map_or_else(|| Path::new(&render.scene.scene), Path::new);
-    let name = name.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let name = default_stem(&render.scene.scene)?;
     let here = match &args.here {
         Some(here) => here.clone(),
         None => std::env::current_dir().context("finding the current folder")?,

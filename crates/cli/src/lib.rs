@@ -9,7 +9,11 @@ pub mod devices;
 pub mod diff;
 pub mod documents;
 pub mod eval;
+pub mod extensions;
 pub mod farm;
+mod heading;
+mod interrupt;
+pub mod lists;
 pub mod merge;
 pub mod options;
 pub mod picture;
@@ -21,6 +25,7 @@ pub mod report;
 pub mod sequence;
 pub mod setup;
 mod shard;
+mod summary;
 pub mod verify;
 #[cfg(feature = "window")]
 pub mod view;
@@ -64,6 +69,29 @@ pub fn is_worth_another_try(error: &anyhow::Error) -> bool {
     is_lost(error) || etalon::image::file::is_full(error)
 }
 
+/// A wrong value of an option, or options that contradict each other: exit code 2.
+#[derive(Debug)]
+pub struct WrongUsage(String);
+
+impl std::fmt::Display for WrongUsage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for WrongUsage {}
+
+/// Whether the command line is wrong: exit code 2.
+#[must_use]
+pub fn is_wrong_usage(error: &anyhow::Error) -> bool {
+    error.downcast_ref::<WrongUsage>().is_some()
+}
+
+/// Marks the error of a check of options as wrong usage. Such checks need neither files nor a device.
+pub(crate) fn usage<T>(checked: Result<T>) -> Result<T> {
+    checked.map_err(|error| WrongUsage(told(&error)).into())
+}
+
 /// Debian packages that provide what is missing; `None` for every other error.
 fn packages(error: &NotOpened) -> Option<&'static str> {
     match error {
@@ -80,9 +108,15 @@ pub fn fail_openjd(text: &str) {
     drop(print(&format!("openjd_fail: {}", text.replace('\n', " "))));
 }
 
-/// Prints one line to stdout. A closed pipe (EPIPE) is no error: the reader has read enough.
+/// Prints one line to stdout.
 fn print(line: &str) -> Result<()> {
-    match writeln!(io::stdout().lock(), "{line}") {
+    print_bytes(format!("{line}\n").as_bytes())
+}
+
+/// Writes bytes to stdout. A closed pipe (EPIPE) is no error: the reader has read enough.
+fn print_bytes(bytes: &[u8]) -> Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_all(bytes).and_then(|()| out.flush()) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         other => other.context("writing to stdout"),
     }

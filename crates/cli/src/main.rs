@@ -3,13 +3,12 @@
 use std::io::IsTerminal as _;
 use std::process::ExitCode;
 
-use clap::Parser as _;
-use etalon_cli::arguments::{self, AGAIN, Arguments, Command};
+use etalon_cli::arguments::{self, AGAIN, Command, WRONG};
 use etalon_cli::options::When;
 use etalon_cli::progress::ProgressForm;
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = arguments::parse(std::env::args_os().collect()).unwrap_or_else(|error| error.exit());
     let color = match arguments.color {
         When::Always => true,
         When::Never => false,
@@ -41,6 +40,10 @@ fn main() -> ExitCode {
         if form == ProgressForm::Openjd {
             etalon_cli::fail_openjd(&text);
         }
-        if etalon_cli::is_worth_another_try(&error) { ExitCode::from(AGAIN) } else { ExitCode::FAILURE }
+        match &error {
+            error if etalon_cli::is_wrong_usage(error) => ExitCode::from(WRONG),
+            error if etalon_cli::is_worth_another_try(error) => ExitCode::from(AGAIN),
+            _ => ExitCode::FAILURE,
+        }
     })
 }

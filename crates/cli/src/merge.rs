@@ -9,10 +9,10 @@ use clap::{Args, ValueEnum as _};
 use serde::Serialize;
 
 use super::options::DeviceOptions;
-use super::picture::{AovName, Format, format_of, layer_between};
-use super::print;
+use super::picture::{AovName, Format, are_same, format_of, layer_between};
 use super::report::{WorkFacts, WrittenFile};
 use super::shard::display_settings;
+use super::{print, usage};
 use etalon::frame::shown;
 use etalon::gpu::Device;
 use etalon::image::halves::SampleError;
@@ -23,6 +23,11 @@ use etalon_farm::worker::FarmWorker;
 
 /// Join the parts that `render --shard` wrote into the picture that one run draws, bit for bit
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+Examples:
+    etalon render study:pool --shard 1/2 -o 1.part
+    etalon render study:pool --shard 2/2 -o 2.part
+    etalon merge 1.part 2.part -o pool.png")]
 pub struct MergeArgs {
     /// Parts in any order
     #[arg(required = true, value_name = "PART")]
@@ -51,19 +56,29 @@ struct MergeReport<'a> {
     outputs: Vec<WrittenFile>,
 }
 
+impl MergeArgs {
+    /// The outputs with their formats; no two are one file.
+    fn outputs(&self) -> Result<Vec<(&Path, Format)>> {
+        let mut outputs: Vec<(&Path, Format)> = Vec::new();
+        for path in &self.output {
+            let format = format_of(path)?;
+            let is_part = self.parts.iter().any(|part| are_same(part, path));
+            ensure!(!is_part, "--output {}: this file is one of the parts", path.display());
+            let is_named = outputs.iter().any(|(other, _)| are_same(other, path));
+            ensure!(!is_named, "--output {}: this file is named twice", path.display());
+            outputs.push((path, format));
+        }
+        Ok(outputs)
+    }
+}
+
 /// Runs the command.
 ///
 /// # Errors
 /// One sentence with the part that is missing, duplicate, truncated or of another picture.
 pub fn run(args: &MergeArgs) -> Result<ExitCode> {
-    let mut outputs: Vec<(&Path, Format)> = Vec::new();
-    for path in &args.output {
-        let format = format_of(path)?;
-        ensure!(!args.parts.contains(path), "--output {}: this file is one of the parts", path.display());
-        file::check_writable(path)?;
-        outputs.push((path, format));
-    }
-    args.report.iter().try_for_each(|path| file::check_writable(path))?;
+    let outputs = usage(args.outputs())?;
+    args.output.iter().chain(&args.report).try_for_each(|path| file::check_writable(path))?;
     let joined = join(&args.parts)?;
     let settings = display_settings(&joined.identity);
     let display = match outputs.iter().any(|(_, format)| *format == Format::Png) {

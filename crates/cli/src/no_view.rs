@@ -18,5 +18,8 @@ pub struct ViewArgs {
 /// Always.
 pub fn run(args: &ViewArgs) -> Result<ExitCode> {
     let arguments = args.arguments.join(" ");
-    bail!("view {arguments}: this build has no window; `./x run view {arguments}` builds one (cargo feature `window`)")
+    bail!(
+        "view {arguments}: this build has no window (cargo feature `window`); `./x run view {arguments}` builds one, and \
+         `etalon render SCENE` writes a picture"
+    )
 }

@@ -8,6 +8,8 @@ use clap::{Args, ValueEnum};
 use glam::DVec3;
 
 use super::choices::one_of;
+use super::heading;
+use super::usage;
 use etalon::frame::{Background, Settings, TileShare};
 use etalon::gpu::DeviceChoice;
 use etalon::image::tone::ToneMap;
@@ -15,6 +17,7 @@ use etalon::plan::{ForcedEffects, Knobs, Model};
 use etalon::scene::camera::{Camera, DEFAULT_FOV_Y};
 use etalon::scene::environment::Environment;
 use etalon::scene::{AmbientLight, LoadOptions, Prune, Scene};
+use etalon::study;
 use etalon_farm::job::word;
 
 /// When to print colour or progress.
@@ -27,6 +30,13 @@ pub enum When {
     /// Never.
     Never,
 }
+
+/// A time of a scene's animation, in seconds; `None` is the rest pose.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct AnimationTime(pub Option<f64>);
+
+/// Pixels of the longest side that an image may have on any Vulkan device; most have half of that.
+const LONGEST_SIDE: u32 = 32768;
 
 /// Which effects a plan contains.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -51,46 +61,46 @@ impl PlanExtent {
 /// Scene, camera, animation time and environment.
 #[derive(Debug, Clone, Args)]
 pub struct SceneOptions {
-    /// A .glb, .gltf, .obj, .stl or .ply file, or a built-in scene as study:NAME
+    /// A .glb, .gltf, .obj, .stl or .ply file, - for glTF on standard input, or a built-in scene as study:NAME
     #[arg(default_value = "study:etalon")]
     pub scene: String,
     /// Scene of the file, by name or index [default: the one that the file names]
-    #[arg(id = "scene_of_file", long = "scene", value_name = "NAME|INDEX")]
+    #[arg(id = "scene_of_file", long = "scene", value_name = "NAME|INDEX", help_heading = heading::SCENE)]
     pub scene_of_file: Option<String>,
     /// Variant of the file's materials, by name or index (KHR_materials_variants) [default: the materials of the
     /// primitives]
-    #[arg(long, value_name = "NAME|INDEX")]
+    #[arg(long, value_name = "NAME|INDEX", help_heading = heading::SCENE)]
     pub variant: Option<String>,
     /// Camera of the file, by name or index [default: the first camera; if the file has none, a camera that frames the
     /// scene]
-    #[arg(long, value_name = "NAME|INDEX", conflicts_with_all = ["eye", "target", "up"])]
+    #[arg(long, value_name = "NAME|INDEX", conflicts_with_all = ["eye", "target", "up"], help_heading = heading::CAMERA)]
     pub camera: Option<String>,
     /// Eye position in metres
-    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true, help_heading = heading::CAMERA)]
     pub eye: Option<DVec3>,
     /// Point to look at [default: the middle of the scene]
-    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true, requires = "eye")]
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true, requires = "eye", help_heading = heading::CAMERA)]
     pub target: Option<DVec3>,
     /// Direction that points up in the picture [default: 0,1,0]
-    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true, requires = "eye")]
+    #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true, requires = "eye", help_heading = heading::CAMERA)]
     pub up: Option<DVec3>,
     /// Vertical field of view in degrees, for cameras that do not come from the file [default: 40]
-    #[arg(long, value_name = "DEG", conflicts_with = "camera")]
+    #[arg(long, value_name = "DEG", value_parser = field_of_view, allow_hyphen_values = true, conflicts_with = "camera", help_heading = heading::CAMERA)]
     pub fov: Option<f64>,
     /// Animation time in seconds, or none for the rest pose stored in the file
-    #[arg(long, value_name = "SECONDS|none", default_value = "none", allow_hyphen_values = true)]
-    pub time: String,
+    #[arg(long, value_name = "SECONDS|none", value_parser = time, default_value = "none", allow_hyphen_values = true, help_heading = heading::SCENE)]
+    pub time: AnimationTime,
     /// Environment map, or none [default: built-in studio lighting if the file contains no lights]
-    #[arg(long, value_name = "FILE.hdr|FILE.exr|none")]
+    #[arg(long, value_name = "FILE.hdr|FILE.exr|none", help_heading = heading::LIGHT)]
     pub env: Option<String>,
     /// Factor for the radiance of the environment
-    #[arg(long, value_name = "K", default_value_t = 1.0)]
+    #[arg(long, value_name = "K", value_parser = factor, default_value_t = 1.0, allow_hyphen_values = true, help_heading = heading::LIGHT)]
     pub env_intensity: f32,
     /// Rotation of the environment about +Y in degrees
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(long, value_name = "DEG", value_parser = finite, default_value_t = 0.0, allow_hyphen_values = true, help_heading = heading::LIGHT)]
     pub env_rotation: f32,
     /// Background behind the scene [default: the environment; without one, transparent in EXR and grey in PNG]
-    #[arg(long, value_name = "env|transparent|#rrggbb", value_parser = background)]
+    #[arg(long, value_name = "env|transparent|#rrggbb", value_parser = background, help_heading = heading::LIGHT)]
     pub background: Option<Background>,
 }
 
@@ -98,31 +108,31 @@ pub struct SceneOptions {
 #[derive(Debug, Clone, Args)]
 pub struct PictureOptions {
     /// Width and height in pixels
-    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size, help_heading = heading::PICTURE)]
     pub size: [u32; 2],
     /// How much light transport is simulated [default: recursive]
-    #[arg(long, value_parser = one_of::<Model>())]
+    #[arg(long, value_parser = one_of::<Model>(), help_heading = heading::QUALITY)]
     pub model: Option<Model>,
-    /// Set a knob to a rung, for example samples=16; repeatable
-    #[arg(long = "set", value_name = "KNOB=RUNG")]
+    /// Set a knob to a rung, for example samples=16; repeatable. `etalon knobs` lists them
+    #[arg(long = "set", value_name = "KNOB=RUNG", help_heading = heading::QUALITY)]
     pub set: Vec<String>,
     /// Which effects to prepare: those that the scene calls for; or every effect that the knobs allow, for the same
     /// picture; or those that the scene calls for, with a table of what each other effect would cost here
-    #[arg(long, value_enum, value_name = "scene|full|explain-cost", default_value_t = PlanExtent::Scene)]
+    #[arg(long, value_enum, value_name = "scene|full|explain-cost", default_value_t = PlanExtent::Scene, help_heading = heading::QUALITY)]
     pub plan: PlanExtent,
     /// Random seed: another seed gives the picture other noise
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..1 << 31))]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..1 << 31), help_heading = heading::QUALITY)]
     pub seed: u32,
     /// Pick the fastest rungs whose error against the scene's reference is at most this, for example 0.02 or 2%
     /// (measures first if `cost` has not been run). With --model global: draw samples until the estimated relative
     /// error of the picture is at most this
-    #[arg(long, value_name = "E")]
-    pub max_error: Option<String>,
+    #[arg(long, value_name = "E", value_parser = error_limit, help_heading = heading::QUALITY)]
+    pub max_error: Option<f64>,
     /// Exposure in stops; changes display outputs only
-    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(long, value_name = "EV", value_parser = finite, default_value_t = 0.0, allow_hyphen_values = true, help_heading = heading::PICTURE)]
     pub exposure: f32,
     /// Tone curve; changes display outputs only
-    #[arg(long, value_parser = one_of::<ToneMap>(), default_value = ToneMap::default().name())]
+    #[arg(long, value_parser = one_of::<ToneMap>(), default_value = ToneMap::default().name(), help_heading = heading::PICTURE)]
     pub tonemap: ToneMap,
 }
 
@@ -130,11 +140,11 @@ pub struct PictureOptions {
 #[derive(Debug, Clone, Args)]
 pub struct DeviceOptions {
     /// Device, by a part of its name, its index or its kind [default: the best device]
-    #[arg(long, value_name = "NAME|INDEX|cpu|gpu")]
+    #[arg(long, value_name = "NAME|INDEX|cpu|gpu", help_heading = heading::DEVICE)]
     pub device: Option<String>,
     /// Check Vulkan calls and synchronization hazards with the Khronos validation layer; any validation error fails the
     /// run
-    #[arg(long)]
+    #[arg(long, help_heading = heading::DEVICE)]
     pub validate: bool,
 }
 
@@ -145,6 +155,49 @@ fn vector(text: &str) -> Result<DVec3, String> {
         [x, y, z] if numbers.iter().all(|n| n.is_finite()) => Ok(DVec3::new(x, y, z)),
         _ => Err("expected three finite numbers, X,Y,Z".to_owned()),
     }
+}
+
+/// A vector with a length above 0.
+fn direction(text: &str) -> Result<DVec3, String> {
+    vector(text)
+        .and_then(|v| if v == DVec3::ZERO { Err("expected a vector other than 0,0,0".to_owned()) } else { Ok(v) })
+}
+
+/// A number that `accept` accepts, else the sentence that says what is expected.
+fn number<T: std::str::FromStr>(text: &str, accept: impl Fn(&T) -> bool, expected: &str) -> Result<T, String> {
+    text.trim().parse().ok().filter(accept).ok_or_else(|| format!("expected {expected}"))
+}
+
+fn finite(text: &str) -> Result<f32, String> {
+    number(text, |x: &f32| x.is_finite(), "a finite number")
+}
+
+fn factor(text: &str) -> Result<f32, String> {
+    number(text, |x: &f32| x.is_finite() && *x >= 0.0, "a finite number of at least 0")
+}
+
+fn field_of_view(text: &str) -> Result<f64, String> {
+    number(text, |x: &f64| *x > 0.0 && *x < 180.0, "an angle between 0 and 180 degrees")
+}
+
+fn time(text: &str) -> Result<AnimationTime, String> {
+    match text {
+        "none" => Ok(AnimationTime(None)),
+        text => number(text, |x: &f64| x.is_finite(), "seconds, or none").map(|seconds| AnimationTime(Some(seconds))),
+    }
+}
+
+/// An error limit as a fraction: `2%` is 0.02.
+fn error_limit(text: &str) -> Result<f64, String> {
+    let (text, scale) = text.strip_suffix('%').map_or((text, 1.0), |number| (number, 0.01));
+    let accept = |x: &f64| *x > 0.0 && x.is_finite();
+    number(text, accept, "a fraction above 0, for example 0.02 or 2%").map(|fraction| fraction * scale)
+}
+
+/// GPU time in milliseconds.
+pub(super) fn milliseconds(text: &str) -> Result<f64, String> {
+    let text = text.strip_suffix("ms").unwrap_or(text);
+    number(text, |x: &f64| *x > 0.0 && x.is_finite(), "milliseconds above 0, for example 8 or 8ms")
 }
 
 /// Parses a shard I/N, with I from 1 to N.
@@ -159,6 +212,10 @@ pub(super) fn shard(text: &str) -> Result<[u32; 2], String> {
 fn size(text: &str) -> Result<[u32; 2], String> {
     let parts: Option<(u32, u32)> = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     match parts {
+        Some((0, _) | (_, 0)) => Err("width and height must be at least one pixel".to_owned()),
+        Some((w, h)) if w.max(h) > LONGEST_SIDE => {
+            Err(format!("no device draws more than {LONGEST_SIDE} pixels a side"))
+        }
         Some((w, h)) => Ok([w, h]),
         None => Err("expected WIDTHxHEIGHT, for example 1280x720".to_owned()),
     }
@@ -177,6 +234,12 @@ pub(super) fn background(text: &str) -> Result<Background, String> {
     }
 }
 
+/// A point in messages, with the digits of a number of 32 bits.
+fn point(p: DVec3) -> String {
+    let [x, y, z] = p.as_vec3().to_array();
+    format!("{x},{y},{z}")
+}
+
 impl SceneOptions {
     /// These options as command-line words; options at their defaults are left out.
     #[must_use]
@@ -193,7 +256,7 @@ impl SceneOptions {
         option("target", self.target.map(point));
         option("up", self.up.map(point));
         option("fov", self.fov.map(|fov| fov.to_string()));
-        option("time", (self.time != "none").then(|| self.time.clone()));
+        option("time", self.time.0.map(|time| time.to_string()));
         option("env", self.env.clone());
         option("env-intensity", (self.env_intensity != 1.0).then(|| self.env_intensity.to_string()));
         option("env-rotation", (self.env_rotation != 0.0).then(|| self.env_rotation.to_string()));
@@ -209,18 +272,39 @@ impl SceneOptions {
         all
     }
 
-    /// Animation time in seconds; `None` is the rest pose.
+    /// Checks what can be checked before the scene is loaded.
     ///
     /// # Errors
-    /// When `--time` is neither `none` nor a finite number.
-    pub fn time(&self) -> Result<Option<f64>> {
-        match self.time.as_str() {
-            "none" => Ok(None),
-            text => match text.parse::<f64>() {
-                Ok(seconds) if seconds.is_finite() => Ok(Some(seconds)),
-                _ => bail!("--time {text}: expected seconds, or none"),
-            },
+    /// One sentence: an unknown study scene, an option that study scenes do not have, or options that contradict.
+    pub fn check(&self) -> Result<()> {
+        if let Some(name) = self.scene.strip_prefix("study:") {
+            let chooses = self.time.0.is_some() || self.scene_of_file.is_some() || self.variant.is_some();
+            if chooses || !study::NAMES.contains(&name) {
+                // It fails without generating a scene.
+                self.load(Prune::Nothing)?;
+            }
         }
+        if self.env.as_deref() == Some("none") {
+            if self.env_intensity != 1.0 || self.env_rotation != 0.0 {
+                bail!("--env none contradicts --env-intensity and --env-rotation: there is no environment");
+            }
+            Settings { background: self.background.unwrap_or_default(), ..Settings::default() }.conditions(None)?;
+        }
+        if let (Some(eye), Some(target)) = (self.eye, self.target) {
+            self.looking(eye, target)?;
+        }
+        Ok(())
+    }
+
+    /// The camera of `--eye`, `--up` and `--fov`, towards `target`.
+    fn looking(&self, eye: DVec3, target: DVec3) -> Result<Camera> {
+        Camera::looking_at(eye, target, self.up.unwrap_or(DVec3::Y), self.fov_y())
+            .with_context(|| format!("--eye {} --target {}", point(eye), point(target)))
+    }
+
+    /// The vertical field of view of cameras that do not come from the file, in radians.
+    fn fov_y(&self) -> f64 {
+        self.fov.map_or(DEFAULT_FOV_Y, f64::to_radians)
     }
 
     /// Loads the scene at the animation time.
@@ -228,16 +312,14 @@ impl SceneOptions {
     /// # Errors
     /// One sentence with the file, the place in it and the cause.
     pub fn load(&self, prune: Prune) -> Result<Scene> {
-        etalon::open::scene(&self.scene, &self.load_options(prune)?)
+        etalon::open::scene(&self.scene, &self.load_options(prune))
     }
 
     /// How the scene's file is read.
-    ///
-    /// # Errors
-    /// The errors of [`SceneOptions::time`].
-    pub fn load_options(&self, prune: Prune) -> Result<LoadOptions> {
+    #[must_use]
+    pub fn load_options(&self, prune: Prune) -> LoadOptions {
         let (scene, variant) = (self.scene_of_file.clone(), self.variant.clone());
-        Ok(LoadOptions { time: self.time()?, prune, scene, variant })
+        LoadOptions { time: self.time.0, prune, scene, variant }
     }
 
     /// Loads the environment of `--env`, or the built-in studio, which lights scenes without lights. Returns it with
@@ -246,13 +328,7 @@ impl SceneOptions {
     /// # Errors
     /// One sentence with the file and the cause.
     pub fn load_environment(&self) -> Result<(Option<Environment>, Vec<String>)> {
-        if !(self.env_intensity.is_finite() && self.env_intensity >= 0.0 && self.env_rotation.is_finite()) {
-            bail!("--env-intensity must be a finite number of at least 0, and --env-rotation a finite number");
-        }
         match self.env.as_deref() {
-            Some("none") if self.env_intensity != 1.0 || self.env_rotation != 0.0 => {
-                bail!("--env none contradicts --env-intensity and --env-rotation: there is no environment")
-            }
             Some("none") => Ok((None, Vec::new())),
             Some(path) => Environment::load(&PathBuf::from(path)).map(|(map, warnings)| (Some(map), warnings)),
             None => Ok((Some(Environment::studio()), Vec::new())),
@@ -276,17 +352,9 @@ impl SceneOptions {
     /// # Errors
     /// One sentence when the file has no such camera, or when eye, target and up direction define none.
     pub fn choose_camera(&self, scene: &Scene, size: [u32; 2]) -> Result<Camera> {
-        let fov_y = match self.fov {
-            None => DEFAULT_FOV_Y,
-            Some(degrees) if degrees > 0.0 && degrees < 180.0 => degrees.to_radians(),
-            Some(degrees) => bail!("--fov {degrees}: expected a field of view between 0 and 180 degrees"),
-        };
         let bounds = scene.bounds().ok_or_else(|| anyhow!("{}: the scene has nothing to draw", scene.name))?;
         if let Some(eye) = self.eye {
-            let target = self.target.unwrap_or_else(|| bounds.center());
-            let up = self.up.unwrap_or(DVec3::Y);
-            return Camera::looking_at(eye, target, up, fov_y)
-                .with_context(|| format!("--eye {eye} --target {target}"));
+            return self.looking(eye, self.target.unwrap_or_else(|| bounds.center()));
         }
         if let Some(wanted) = &self.camera {
             let names = || scene.cameras.iter().map(|c| format!("\"{}\"", c.name)).collect::<Vec<_>>().join(", ");
@@ -303,7 +371,7 @@ impl SceneOptions {
         }
         match scene.cameras.first() {
             Some(camera) if self.fov.is_none() => Ok(camera.clone()),
-            _ => etalon::open::framing(scene, size, fov_y),
+            _ => etalon::open::framing(scene, size, self.fov_y()),
         }
     }
 }
@@ -348,20 +416,6 @@ impl PictureOptions {
         Ok(knobs)
     }
 
-    /// The error limit of `--max-error` as a fraction: `2%` is 0.02.
-    pub(super) fn max_error(&self) -> Result<Option<f64>> {
-        let Some(text) = &self.max_error else { return Ok(None) };
-        let (number, scale) = text.strip_suffix('%').map_or((text.as_str(), 1.0), |number| (number, 0.01));
-        let error = number.trim().parse::<f64>().ok().map(|number| number * scale);
-        let Some(error) = error.filter(|error| *error > 0.0 && error.is_finite()) else {
-            bail!("--max-error {text}: expected a fraction above 0, for example 0.02 or 2%");
-        };
-        if self.set.iter().any(|choice| choice.starts_with("samples=")) {
-            bail!("--max-error {text} contradicts --set samples: give only one of them to end the sampling");
-        }
-        Ok(Some(error))
-    }
-
     /// Which textures and attributes loading may prune, as far as this is known before the scene is read.
     #[must_use]
     pub fn prune(&self, scene: &SceneOptions, knobs: &Knobs) -> Prune {
@@ -376,16 +430,18 @@ impl PictureOptions {
         }
     }
 
-    /// Settings of the renderer.
+    /// Settings of the renderer. Nothing of the scene is read yet.
     ///
     /// # Errors
-    /// One sentence for an invalid size, exposure or error limit, and the errors of [`PictureOptions::knobs`].
+    /// Wrong usage: the errors of [`PictureOptions::knobs`] and [`SceneOptions::check`], and two ends of the sampling.
     pub fn settings(&self, scene: &SceneOptions) -> Result<Settings> {
-        if self.size.contains(&0) {
-            bail!("--size {}x{}: width and height must be at least one pixel", self.size[0], self.size[1]);
-        }
-        if !self.exposure.is_finite() {
-            bail!("--exposure {}: expected a finite number of stops", self.exposure);
+        usage(self.checked(scene))
+    }
+
+    fn checked(&self, scene: &SceneOptions) -> Result<Settings> {
+        scene.check()?;
+        if self.max_error.is_some() && self.set.iter().any(|choice| choice.starts_with("samples=")) {
+            bail!("--max-error contradicts --set samples: give only one of them to end the sampling");
         }
         Ok(Settings {
             size: self.size,
@@ -396,7 +452,7 @@ impl PictureOptions {
             environment_intensity: scene.env_intensity,
             environment_rotation: scene.env_rotation,
             seed: self.seed,
-            max_error: self.max_error()?,
+            max_error: self.max_error,
             paths_at_once: false,
             traversal: None,
             forced: self.plan.forced(),

@@ -3,14 +3,16 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, anyhow, bail};
+use anyhow::{Context as _, Result, anyhow, bail, ensure};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 
-use super::options::{DeviceOptions, PictureOptions, SceneOptions, shard};
+use super::heading;
+use super::options::{DeviceOptions, PictureOptions, SceneOptions, milliseconds, shard};
 use super::progress::ProgressForm;
+use super::usage;
 use etalon::frame::{Part, Rendered, Renderer, Settings};
-use etalon::image::{Aov, AovData, Picture};
+use etalon::image::{Aov, AovData, Picture, file, png};
 use etalon::plan::rungs::Indirect;
 use etalon::plan::{Knobs, Plan};
 use etalon::scene::Camera;
@@ -22,7 +24,7 @@ use etalon_farm::part::Split;
 
 /// Options of `render` for several pictures and for several processes.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Sequences and shards")]
+#[command(next_help_heading = heading::SEQUENCE)]
 pub struct SequenceOptions {
     /// Draw these frames: numbers and ranges such as 1-100:2,105. Frame F shows the animation at --time plus F / fps
     /// seconds. Each output name contains the frame number as {frame} or {frame:04}. Frames whose files are complete
@@ -78,33 +80,45 @@ impl SequenceOptions {
 
 /// Draw a picture of a scene
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+Examples:
+    etalon render study:pool -o pool.png -o pool.exr
+    etalon render study:cornell --model global --set samples=16 -o cornell.png
+    etalon render study:metals --eye 0,1.5,4 --fov 30 --background transparent -o metals.png
+    etalon render scene.glb --size 640x360 --validate --report report.json -o scene.exr
+    etalon render study:lamps --turntable 3 -o lamps.{frame:04}.png
+    etalon render - -o - < scene.glb > picture.png")]
 pub struct RenderArgs {
     #[command(flatten)]
     pub(super) scene: SceneOptions,
-    /// Output file: .png (display) or .exr (scene-linear radiance); repeatable [default: the scene's name with .png]. A
-    /// sequence can also write an animated preview, .apng; a part of a picture has exactly one output
-    #[arg(short, long, value_name = "FILE")]
+    /// Output file: .png (display) or .exr (scene-linear radiance), or - for a PNG on standard output; repeatable
+    /// [default: the scene's name with .png, which replaces only a picture of the same scene]. A sequence can also write
+    /// an animated preview, .apng; a part of a picture has exactly one output
+    #[arg(short, long, value_name = "FILE", help_heading = heading::OUTPUT)]
     pub(super) output: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) picture: PictureOptions,
     /// Pick the most accurate rungs that render within this GPU time, in milliseconds (measures first if `cost` has not
     /// been run)
-    #[arg(long, value_name = "MS")]
-    pub(super) within: Option<String>,
+    #[arg(long, value_name = "MS", value_parser = milliseconds, help_heading = heading::QUALITY)]
+    pub(super) within: Option<f64>,
     #[command(flatten)]
     pub(super) device: DeviceOptions,
     /// Additional EXR layers: the nearest opaque surface at each pixel centre; the radiance of rays that were first
     /// reflected (reflection) or first refracted (refraction); variance and half buffers of path tracing
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,...")]
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,...", help_heading = heading::OUTPUT)]
     pub(super) aov: Vec<AovName>,
     /// Draw the picture N times and fail unless all results are bit-identical
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), help_heading = heading::QUALITY)]
     pub(super) repeat: u32,
+    /// On Ctrl-C write the picture with the samples drawn so far, and end with exit code 130
+    #[arg(long, conflicts_with_all = ["repeat", "frames", "turntable", "cameras", "shard"], help_heading = heading::OUTPUT)]
+    pub(super) keep: bool,
     /// Write a JSON report of the run
-    #[arg(long, value_name = "FILE.json")]
+    #[arg(long, value_name = "FILE.json", help_heading = heading::OUTPUT)]
     pub(super) report: Option<PathBuf>,
     /// Form of the progress messages
-    #[arg(long, value_enum, default_value_t = ProgressForm::Auto)]
+    #[arg(long, value_enum, default_value_t = ProgressForm::Auto, help_heading = heading::MESSAGES)]
     pub progress: ProgressForm,
     #[command(flatten)]
     pub(super) sequence: SequenceOptions,
@@ -175,6 +189,53 @@ impl AovName {
     pub(super) fn of_halves(self) -> bool {
         matches!(self, Self::Variance | Self::HalfA | Self::HalfB)
     }
+}
+
+/// Whether a path stands for standard input or standard output.
+pub(super) fn is_standard(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// File name without extension of a picture that has no `-o`.
+///
+/// # Errors
+/// Wrong usage: the scene has no name.
+pub(super) fn default_stem(scene: &str) -> Result<String> {
+    let checked = || -> Result<String> {
+        ensure!(scene != "-", "--output: name the output with -o, because a scene on standard input has no name");
+        let name = scene.strip_prefix("study:").map_or_else(|| Path::new(scene), Path::new);
+        let stem = name.file_stem().with_context(|| format!("{scene}: this path names no file"))?;
+        Ok(stem.to_string_lossy().into_owned())
+    };
+    usage(checked())
+}
+
+/// Text in a PNG that has no `-o`: it marks the scene, so that no scene of the same name replaces the picture.
+pub(super) fn scene_text(scene: &str) -> (String, String) {
+    // Only a hash: pictures are shown to people who need not know the folders of this machine.
+    let path = std::fs::canonicalize(scene).unwrap_or_else(|_| PathBuf::from(scene));
+    ("etalon.scene".to_owned(), file::hash(path.as_os_str().as_encoded_bytes()))
+}
+
+/// Refuses to replace a picture by one of another scene where the user has named no output.
+///
+/// # Errors
+/// When the file exists, unless it is a picture of this scene whose output was not named either.
+pub(super) fn check_same_scene(path: &Path, scene: &str) -> Result<()> {
+    let Ok(bytes) = std::fs::read(path) else { return Ok(()) };
+    let is_same = png::decode_png_with(&bytes).is_ok_and(|(_, texts)| texts.contains(&scene_text(scene)));
+    let path = path.display();
+    ensure!(is_same, "{path} exists and may be a picture of another scene: name the output; -o {path} replaces it");
+    Ok(())
+}
+
+/// Whether two paths name one file.
+pub(super) fn are_same(a: &Path, b: &Path) -> bool {
+    let whole = |path: &Path| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Some((std::fs::canonicalize(folder).ok()?, path.file_name()?.to_owned()))
+    };
+    a == b || whole(a).zip(whole(b)).is_some_and(|(a, b)| a == b)
 }
 
 /// File format of an output path.

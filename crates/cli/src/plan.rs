@@ -2,19 +2,21 @@
 //! rays), without drawing. See docs/plan.md.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::process::ExitCode;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, ensure};
 use clap::Args;
 use comfy_table::{ContentArrangement, Table, presets};
 
 use super::options::{DeviceOptions, PictureOptions, PlanExtent as Planned, SceneOptions};
-use super::print;
 use super::report::{Expected, PlanFacts};
 use super::setup::{self, Setup};
+use super::{extensions, heading, print, usage};
 use etalon::frame::{Renderer, Settings};
 use etalon::open::Opened;
 use etalon::plan::rungs::Interfaces;
+use etalon::plan::{Effect, EffectState};
 use etalon::scene::Camera;
 use etalon::scene::canonical::canonicalise;
 use etalon::transport::sight::{Sight, along_lines};
@@ -23,7 +25,16 @@ use etalon_cost::predict::{PIXELS, Prediction, Trial, predict};
 use etalon_cost::sweep::SweepExtent;
 
 /// Show which effects a scene calls for and why, and what drawing takes
+///
+/// With -v it also lists the effects that are not needed, the pipelines, and what is not loaded. A folder in place of the
+/// scene gives a table of the glTF extensions that the files below it need, and the files that cannot be read.
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+Examples:
+    etalon plan study:pool
+    etalon plan -v study:pool --model global
+    etalon plan - --json < scene.glb
+    etalon plan models")]
 pub struct PlanArgs {
     #[command(flatten)]
     scene: SceneOptions,
@@ -32,7 +43,7 @@ pub struct PlanArgs {
     #[command(flatten)]
     device: DeviceOptions,
     /// Predict the time and the error of each rung at this size, from pictures with few pixels
-    #[arg(long)]
+    #[arg(long, help_heading = heading::QUALITY)]
     forecast: bool,
     /// Print one JSON document
     #[arg(long)]
@@ -46,8 +57,13 @@ const FORECAST_S: u32 = 60;
 ///
 /// # Errors
 /// One sentence with the action, its object and the cause.
-pub fn run(args: &PlanArgs) -> Result<ExitCode> {
+pub fn run(args: &PlanArgs, whole: bool) -> Result<ExitCode> {
     let mut settings = args.picture.settings(&args.scene)?;
+    if Path::new(&args.scene.scene).is_dir() {
+        usage(args.check_folder())?;
+        extensions::run(Path::new(&args.scene.scene), args.json)?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let (opened, device) = setup::open(&args.scene, args.picture.prune(&args.scene, &settings.knobs), &args.device)?;
     args.picture.colour_of(opened.scene(), &mut settings.knobs)?;
     let camera = args.scene.choose_camera(opened.scene(), settings.size)?;
@@ -75,9 +91,24 @@ pub fn run(args: &PlanArgs) -> Result<ExitCode> {
     if args.json {
         print(&serde_json::to_string_pretty(&facts)?)?;
     } else {
-        print(&text(&facts))?;
+        print(&text(&facts, whole))?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+impl PlanArgs {
+    /// Refuses options about a picture: files of a folder are only read.
+    fn check_folder(&self) -> Result<()> {
+        let PictureOptions { set, model, max_error, plan, .. } = &self.picture;
+        let is_plain = set.is_empty() && model.is_none() && max_error.is_none() && *plan == Planned::Scene;
+        let is_alone = self.scene.words().len() == 1 && self.device.device.is_none() && !self.device.validate;
+        ensure!(
+            is_plain && is_alone && !self.forecast,
+            "{}: this is a folder, whose files are only read; the one option for it is --json",
+            self.scene.scene
+        );
+        Ok(())
+    }
 }
 
 /// Transparent surfaces along the lines of sight; `None` where no material transmits light.
@@ -231,9 +262,11 @@ fn forecast_table(predictions: &[Prediction]) -> Table {
     all
 }
 
-fn text(facts: &PlanFacts) -> String {
+/// The plan in words. `whole` lists also what the scene does not need.
+fn text(facts: &PlanFacts, whole: bool) -> String {
     let mut effects = table(&["effect", "state", "rung", "pixels", "reason"]);
-    for effect in &facts.effects {
+    let is_needed = |effect: &&Effect| effect.state != EffectState::NotCalledFor;
+    for effect in facts.effects.iter().filter(|effect| whole || is_needed(effect)) {
         let pixels = effect.evidence.get("pixels").map_or("", String::as_str);
         effects.add_row([effect.id.name(), effect.state.name(), effect.rung(), pixels, &effect.reason()]);
     }
@@ -248,6 +281,7 @@ fn text(facts: &PlanFacts) -> String {
     for (name, (count, bytes)) in &programs {
         pipelines.add_row([(*name).to_owned(), count.to_string(), format!("{:.1}", *bytes as f64 / 1e3)]);
     }
+    let pipelines = if whole { format!("{pipelines}\n\n") } else { String::new() };
     let (bytes, rounds) = facts.expected.as_ref().map_or((0, 0), |expected| (expected.bytes, expected.ray_rounds));
     let spirv: usize = facts.pipelines.iter().map(|pipeline| pipeline.spirv_bytes).sum();
     let loses: Vec<String> = facts
@@ -262,16 +296,27 @@ fn text(facts: &PlanFacts) -> String {
         most => format!("lines of sight pass through up to {most} transparent surfaces; {}\n", loses.join(", ")),
     };
     let unread: String = facts.unread.iter().map(|unread| format!("not loaded: {unread}\n")).collect();
+    let unread = if whole { unread } else { String::new() };
+    let left = facts.effects.len() - facts.effects.iter().filter(is_needed).count();
+    let left = match (whole, facts.unread.len()) {
+        (true, _) => String::new(),
+        (false, 0) => format!("{left} effects are not needed (-v lists them)\n"),
+        (false, n) => {
+            format!("{left} effects are not needed, {n} textures or coordinates are not loaded (-v lists them)\n")
+        }
+    };
     let costs = if facts.costs.is_empty() { String::new() } else { format!("{}\n", cost_table(&facts.costs)) };
     let forecast =
         if facts.forecast.is_empty() { String::new() } else { format!("\n{}\n", forecast_table(&facts.forecast)) };
     let warnings: String = facts.warnings.iter().map(|warning| format!("warning: {warning}\n")).collect();
     if facts.expected.is_none() {
-        return format!("{effects}\n\n{} samples per pixel\n{unread}{warnings}", facts.samples).trim_end().to_owned();
+        return format!("{effects}\n\n{} samples per pixel\n{left}{unread}{warnings}", facts.samples)
+            .trim_end()
+            .to_owned();
     }
     format!(
-        "{effects}\n\n{} samples per pixel; passes of each sample: {}\n\n{pipelines}\n\n{} pipelines with {:.0} KB of SPIR-V; {} \
-         buffers and images with {:.1} MB; at least {rounds} ray dispatches in a row\n{sight}{unread}{costs}{forecast}{warnings}",
+        "{effects}\n\n{} samples per pixel; passes of each sample: {}\n\n{pipelines}{} pipelines with {:.0} KB of SPIR-V; {} \
+         buffers and images with {:.1} MB; at least {rounds} ray dispatches in a row\n{sight}{left}{unread}{costs}{forecast}{warnings}",
         facts.samples,
         facts.passes.join(", "),
         facts.pipelines.len(),

@@ -1,6 +1,6 @@
 //! `etalon plot`: a shader function over one of its inputs as SVG, beside another function.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context as _, Result, ensure};
@@ -8,7 +8,7 @@ use clap::Args;
 
 use super::choices::one_of;
 use super::options::DeviceOptions;
-use super::print;
+use super::{print, usage};
 use etalon::gpu::Device;
 use etalon::image::file;
 use etalon::optics::Tier;
@@ -17,6 +17,9 @@ use etalon_verify::{Entry, arguments, find};
 
 /// Draw a shader function over one of its inputs as SVG; with --against another function and the difference below
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+Examples:
+    etalon plot fresnel_dielectric --over cos_in=0..1 --against fresnel_schlick n=1.5 kappa=0 -o fresnel.svg")]
 pub struct PlotArgs {
     /// The function; `etalon verify --list` names them
     function: String,
@@ -92,16 +95,10 @@ fn over(text: &str) -> Result<Over> {
     Ok(Over { name: name.to_owned(), range })
 }
 
-/// Runs the command.
-///
-/// # Errors
-/// One sentence: an unknown function, column or input, a range that is none, a device that fails, a file that cannot be
-/// written.
-pub fn run(args: &PlotArgs) -> Result<ExitCode> {
-    let output = args.output.clone().unwrap_or_else(|| format!("{}.svg", args.function).into());
+/// The plot that the options describe.
+fn checked(args: &PlotArgs, output: &Path) -> Result<Plot> {
     let svg = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"));
     ensure!(svg, "{} cannot be written: a plot is an .svg file", output.display());
-    file::check_writable(&output)?;
     let entry = find(&args.function)?;
     let against = args.against.as_deref().map(find).transpose()?;
     let of = column(&entry, args.column.as_deref(), against.as_ref())?;
@@ -130,7 +127,7 @@ pub fn run(args: &PlotArgs) -> Result<ExitCode> {
     };
     let over = over(&args.over)?;
     ensure!(!args.log || over.range[0] > 0.0, "--log: the range of --over has to begin above 0");
-    let plot = Plot {
+    Ok(Plot {
         entry,
         column: of,
         over,
@@ -142,7 +139,18 @@ pub fn run(args: &PlotArgs) -> Result<ExitCode> {
         tier: args.tier,
         log: args.log,
         error: args.error,
-    };
+    })
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// One sentence: an unknown function, column or input, a range that is none, a device that fails, a file that cannot be
+/// written.
+pub fn run(args: &PlotArgs) -> Result<ExitCode> {
+    let output = args.output.clone().unwrap_or_else(|| format!("{}.svg", args.function).into());
+    let plot = usage(checked(args, &output))?;
+    file::check_writable(&output)?;
     let device = Device::open(&args.device.choice(), args.device.validate)?;
     let drawn = plot.draw(&device)?;
     file::write(&output, drawn.svg.as_bytes())?;

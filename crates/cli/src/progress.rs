@@ -31,6 +31,12 @@ pub enum ProgressForm {
 /// Least time between two progress lines.
 const PAUSE: Duration = Duration::from_secs(1);
 
+/// A bar for `of` parts of a step. A step of one part has no count, and nothing to estimate its end by.
+fn bar_style(of: u32) -> ProgressStyle {
+    let template = if of > 1 { "{msg:<24} {wide_bar} {pos}/{len} {elapsed}, {eta} left" } else { "{msg} {elapsed}" };
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
 /// Prints the steps of a command in one of the forms of [`ProgressForm`].
 pub(super) struct Steps {
     form: ProgressForm,
@@ -52,8 +58,7 @@ impl Steps {
         };
         let bar = (form == ProgressForm::Always).then(|| {
             let bar = ProgressBar::with_draw_target(Some(1), ProgressDrawTarget::stderr());
-            let style = ProgressStyle::with_template("{msg:<24} {wide_bar} {pos}/{len} {elapsed}, {eta} left");
-            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            bar.set_style(bar_style(1));
             bar
         });
         Self { form, bar, begun: Instant::now(), told: Cell::new(None), share: Cell::new([0.0, 1.0]) }
@@ -61,6 +66,7 @@ impl Steps {
 
     pub(super) fn step(&self, message: &str, of: u32) {
         if let Some(bar) = &self.bar {
+            bar.set_style(bar_style(of));
             bar.set_message(message.to_owned());
             bar.set_length(u64::from(of));
             bar.set_position(0);
@@ -120,6 +126,7 @@ impl Steps {
     pub(super) fn of(&self, name: &str, done: usize, of: usize, left_s: f64) {
         let left = format!("about {left_s:.0} s left");
         if let Some(bar) = &self.bar {
+            bar.set_style(bar_style(of as u32));
             bar.set_message(format!("{name}, {left}"));
             bar.set_length(of as u64);
             bar.set_position(done as u64);

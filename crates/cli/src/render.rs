@@ -1,19 +1,23 @@
 //! `etalon render` of one picture. Sequences are drawn in `sequence.rs`, parts of a picture in `shard.rs`.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::io::{self, IsTerminal as _};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Result, anyhow, bail, ensure};
 use serde_json::json;
 
 use super::budget::{Budget, Chosen, command};
+use super::interrupt::{INTERRUPTED, Interrupt};
 use super::options::PlanExtent;
-use super::picture::{Format, RenderArgs, check_halves, format_of, layers, metadata, settings_size, warn_about};
+use super::picture::{
+    Format, RenderArgs, are_same, check_halves, check_same_scene, default_stem, format_of, is_standard, layers,
+    metadata, scene_text, settings_size, warn_about,
+};
 use super::plan::cost_table;
-use super::print;
-use super::progress::Steps;
+use super::progress::{ProgressForm, Steps};
 use super::report::{
     ColourFacts, MemoryFacts, PassFacts, PipelineFacts, PlanFacts, Report, Sampling, SceneReport, Spread, Validation,
     WrittenFile, knob_map,
@@ -21,9 +25,11 @@ use super::report::{
 use super::sequence;
 use super::setup::Setup;
 use super::shard;
+use super::summary::{Sources, sentence};
+use super::{print, print_bytes, usage};
 use etalon::frame::Rendered;
 use etalon::gpu::Severity;
-use etalon::image::{Picture, exr, file};
+use etalon::image::{Picture, exr, file, png};
 use etalon::scene::{Prune, Scene};
 
 /// Wall time of named phases, in milliseconds.
@@ -55,9 +61,10 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let now = Instant::now();
     let mut phases =
         Phases { start: now, last: now, all: BTreeMap::from(["bvh", "pipelines"].map(|name| (name, 0.0))) };
-    let outputs = outputs(args)?;
-    let budget = Budget::of(args.within.as_deref(), &args.picture)?;
     let mut settings = args.render_settings()?;
+    let budget = usage(Budget::of(args.within, &args.picture))?;
+    usage(check_halves(&args.aov, &settings))?;
+    let outputs = outputs(args)?;
     let steps = Steps::new(args.progress, quiet);
     phases.end("start");
 
@@ -87,9 +94,9 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     }
     let facts = facts(setup.opened.scene());
 
-    check_halves(&args.aov, &settings)?;
     steps.step("uploading", 1);
     let knobs = settings.knobs.clone();
+    let sources = Sources::of(setup.opened.scene(), &args.scene);
     let explained = (args.picture.plan == PlanExtent::ExplainCost).then(|| (setup.clone(), settings.clone()));
     let (mut renderer, camera) = setup.renderer(&args.scene, settings)?;
     phases.end("upload");
@@ -116,11 +123,16 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     }
     let needs_film =
         args.report.is_some() || outputs.iter().any(|(_, format)| *format == Format::Exr) || args.repeat > 1;
+    let interrupt = args
+        .keep
+        .then(|| Interrupt::listen("stopping after this sample; the picture with the samples so far is written"));
+    let is_stopped = || interrupt.as_ref().is_some_and(Interrupt::is_asked);
     for round in 0..args.repeat {
         steps.step("drawing", samples);
         let mut clock = Instant::now();
         let begun = clock;
-        let rendered = renderer.render(&camera, &mut |progress| steps.sampled(progress, begun, &mut clock))?;
+        let mut progress = |progress| steps.sampled(progress, begun, &mut clock);
+        let rendered = renderer.render_until(&camera, &mut progress, &is_stopped)?;
         phases.end("frame");
         let film = if needs_film { Some(renderer.film()?) } else { None };
         phases.end("readback");
@@ -139,7 +151,8 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         }
     }
     let (rendered, film) = first.ok_or_else(|| anyhow!("nothing was drawn"))?;
-    if let Some(chosen) = &mut chosen {
+    let is_cut = is_stopped() && rendered.samples < samples;
+    if let Some(chosen) = chosen.as_mut().filter(|_| !is_cut) {
         chosen.check(&rendered, args.picture.size, &mut renderer, &camera)?;
     }
     let aovs = if args.aov.is_empty() { Vec::new() } else { layers(&mut renderer, &camera, &args.aov)? };
@@ -151,9 +164,17 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     for (index, (path, format)) in outputs.iter().enumerate() {
         let bytes = match (format, &film) {
             (Format::Exr, Some(film)) => exr::encode_exr(film, &aovs, &metadata(args, renderer.plan()))?,
+            _ if args.output.is_empty() => {
+                let texts = [scene_text(&args.scene.scene)];
+                png::encode_png_with(args.picture.size, &rendered.display, rendered.has_alpha, &texts)?
+            }
             _ => renderer.png(&rendered)?,
         };
-        file::write(path, &bytes)?;
+        if is_standard(path) {
+            print_bytes(&bytes)?;
+        } else {
+            file::write(path, &bytes)?;
+        }
         written.push(WrittenFile { path: path.display().to_string(), hash: file::hash(&bytes) });
         steps.at(index as u32 + 1);
     }
@@ -200,9 +221,15 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         };
         file::write(path, serde_json::to_string_pretty(&report)?.as_bytes())?;
     }
+    steps.tell(&sentence(args.picture.size, &rendered, phases.start.elapsed(), &sources.lit_by(renderer.plan())));
     drop(steps);
-    for (path, _) in &outputs {
-        print(&path.display().to_string())?;
+    if !outputs.iter().any(|(path, _)| is_standard(path)) {
+        for (path, _) in &outputs {
+            print(&path.display().to_string())?;
+        }
+    }
+    if is_cut {
+        return Ok(ExitCode::from(INTERRUPTED));
     }
     if let Some(text) = chosen.as_ref().and_then(Chosen::broken) {
         bail!("{text}");
@@ -213,27 +240,37 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Checks formats and writability of the outputs before any work is done.
+/// Checks formats and names of the outputs, then whether they can be written, before any work is done.
 fn outputs(args: &RenderArgs) -> Result<Vec<(PathBuf, Format)>> {
-    let mut paths = args.output.clone();
-    if paths.is_empty() {
-        let name = args.scene.scene.strip_prefix("study:").map_or_else(|| Path::new(&args.scene.scene), Path::new);
-        paths.push(PathBuf::from(name.file_stem().unwrap_or_default()).with_extension("png"));
-    }
-    let mut all = Vec::new();
-    for path in paths {
-        let format = format_of(&path)?;
-        file::check_writable(&path)?;
-        if all.iter().any(|(known, _)| *known == path) {
-            bail!("--output {}: this file is named twice", path.display());
+    let all = match &args.output[..] {
+        [] => {
+            let path = PathBuf::from(format!("{}.png", default_stem(&args.scene.scene)?));
+            check_same_scene(&path, &args.scene.scene)?;
+            vec![(path, Format::Png)]
         }
-        all.push((path, format));
-    }
-    if let Some(report) = &args.report {
-        file::check_writable(report)?;
-    }
+        paths => usage(named(paths, args))?,
+    };
     if !args.aov.is_empty() && !all.iter().any(|(_, format)| *format == Format::Exr) {
-        bail!("--aov: layers are written to an EXR; add -o FILE.exr");
+        return usage(Err(anyhow!("--aov: layers are written to an EXR; add -o FILE.exr")));
+    }
+    let files = all.iter().map(|(path, _)| path).filter(|path| !is_standard(path));
+    files.chain(&args.report).try_for_each(|path| file::check_writable(path))?;
+    Ok(all)
+}
+
+/// The outputs of `-o` with their formats; no two are one file.
+fn named(paths: &[PathBuf], args: &RenderArgs) -> Result<Vec<(PathBuf, Format)>> {
+    let mut all: Vec<(PathBuf, Format)> = Vec::new();
+    for path in paths {
+        let format = if is_standard(path) { Format::Png } else { format_of(path)? };
+        if is_standard(path) {
+            ensure!(!io::stdout().is_terminal(), "--output -: standard output is a terminal; redirect it to a file");
+            let is_used = args.progress == ProgressForm::Openjd;
+            ensure!(!is_used, "--output - contradicts --progress openjd, which writes to standard output too");
+        }
+        let mut others = all.iter().map(|(other, _)| other).chain(&args.report);
+        ensure!(!others.any(|other| are_same(other, path)), "--output {}: this file is named twice", path.display());
+        all.push((path.clone(), format));
     }
     Ok(all)
 }

@@ -10,11 +10,14 @@ use glam::{DAffine3, DVec3};
 use serde::Serialize;
 
 use super::options::{PlanExtent, SceneOptions};
-use super::picture::{Format, RenderArgs, check_halves, format_of, layers, metadata, settings_size, warn_about};
-use super::print;
+use super::picture::{
+    Format, RenderArgs, check_halves, check_same_scene, default_stem, format_of, layers, metadata, scene_text,
+    settings_size, warn_about,
+};
 use super::progress::Steps;
 use super::report::{Validation, WrittenFile};
 use super::setup;
+use super::{print, usage};
 use etalon::frame::{Renderer, Settings};
 use etalon::gpu::{Device, Severity};
 use etalon::image::png::{self, Display};
@@ -84,12 +87,11 @@ fn wanted(args: &RenderArgs) -> Result<SequenceRequest> {
         (None, None) => Frames::first(1),
     };
     let many = all.numbers().len() > 1;
-    let mut outputs = Vec::new();
+    let (mut outputs, mut named) = (Vec::new(), Vec::new());
     let mut preview = None;
     let mut given = args.output.clone();
     if given.is_empty() {
-        let name = args.scene.scene.strip_prefix("study:").map_or_else(|| Path::new(&args.scene.scene), Path::new);
-        let stem = name.file_stem().unwrap_or_default().to_string_lossy().replace(['{', '}'], "-");
+        let stem = default_stem(&args.scene.scene)?.replace(['{', '}'], "-");
         let camera = if options.cameras.is_empty() { "" } else { ".{camera}" };
         given.push(PathBuf::from(format!("{stem}{camera}{}.png", if many { ".{frame:04}" } else { "" })));
     }
@@ -99,6 +101,8 @@ fn wanted(args: &RenderArgs) -> Result<SequenceRequest> {
             continue;
         }
         let format = format_of(&path)?;
+        ensure!(!named.contains(&path), "--output {}: this file is named twice", path.display());
+        named.push(path.clone());
         let pattern = Pattern::of(&path).context("--output")?;
         ensure!(
             !many || pattern.has_frame(),
@@ -131,16 +135,25 @@ fn wanted(args: &RenderArgs) -> Result<SequenceRequest> {
     );
     let share = options.shard.unwrap_or([1, 1]);
     let frames = all.share(share).numbers().to_vec();
+    Ok(SequenceRequest { frames, moves, turns: options.turntable, fps, outputs, preview })
+}
+
+/// Checks that the outputs can be written.
+fn check_writable(args: &RenderArgs, request: &SequenceRequest) -> Result<()> {
     let unnamed = [String::new()];
-    for (pattern, _) in &outputs {
-        for camera in if options.cameras.is_empty() { &unnamed[..] } else { &options.cameras } {
-            for &frame in frames.iter().take(1).chain(frames.last()) {
-                file::check_writable(&pattern.path(frame, camera))?;
+    for (pattern, _) in &request.outputs {
+        let cameras = &args.sequence.cameras;
+        for camera in if cameras.is_empty() { &unnamed[..] } else { cameras } {
+            for &frame in request.frames.iter().take(1).chain(request.frames.last()) {
+                let path = pattern.path(frame, camera);
+                if args.output.is_empty() {
+                    check_same_scene(&path, &args.scene.scene)?;
+                }
+                file::check_writable(&path)?;
             }
         }
     }
-    preview.iter().chain(&args.report).try_for_each(|path| file::check_writable(path))?;
-    Ok(SequenceRequest { frames, moves, turns: options.turntable, fps, outputs, preview })
+    request.preview.iter().chain(&args.report).try_for_each(|path| file::check_writable(path))
 }
 
 /// The camera rotated about the axis `up` through `center` by the fraction `part` of a full turn.
@@ -200,9 +213,10 @@ fn holds(path: &Path, format: Format, picture: &str) -> Option<(Vec<u8>, Option<
 /// One sentence with the action, its object and the cause; an error of a picture also names its frame.
 pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let begun = Instant::now();
-    let wanted = wanted(args)?;
     let mut settings = args.render_settings()?;
-    check_halves(&args.aov, &settings)?;
+    usage(check_halves(&args.aov, &settings))?;
+    let wanted = usage(wanted(args))?;
+    check_writable(args, &wanted)?;
     let steps = Steps::new(args.progress, quiet);
     steps.step(&format!("loading {}", args.scene.scene), 1);
     let prune = args.picture.prune(&args.scene, &settings.knobs);
@@ -226,7 +240,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let fixed = cameras(&args.scene, names, &still, settings.size)?;
     let middle = still.bounds().ok_or_else(|| anyhow!("{}: the scene has nothing to draw", still.name))?.center();
     let (center, up) = (args.scene.target.unwrap_or(middle), args.scene.up.unwrap_or(DVec3::Y));
-    let base_time = args.scene.time()?;
+    let base_time = args.scene.time.0;
     let mut drawer = Drawer { args, device: &device, renderer: None, moved: true, settings };
     let mut pictures: Vec<PictureRecord> = Vec::new();
     let mut shown: Vec<Display> = Vec::new();
@@ -364,18 +378,16 @@ impl Drawer<'_> {
         told.draw_ms = drawing.elapsed().as_secs_f64() * 1e3;
         warn_about(&rendered, settings_size(&args.picture), &self.settings.knobs, renderer.plan().bands);
         let writing = Instant::now();
-        let mut texts = metadata(args, renderer.plan());
-        texts.push((KEY.to_owned(), picture));
+        let mut marks = vec![(KEY.to_owned(), picture)];
+        if args.output.is_empty() {
+            marks.push(scene_text(&args.scene.scene));
+        }
+        let texts = [metadata(args, renderer.plan()), marks.clone()].concat();
         let aovs = if args.aov.is_empty() { Vec::new() } else { layers(renderer, camera, &args.aov)? };
         for (path, format) in files {
             let bytes = match format {
                 Format::Exr => exr::encode_exr(&renderer.film()?, &aovs, &texts)?,
-                Format::Png => png::encode_png_with(
-                    self.settings.size,
-                    &rendered.display,
-                    rendered.has_alpha,
-                    &texts[texts.len() - 1..],
-                )?,
+                Format::Png => png::encode_png_with(self.settings.size, &rendered.display, rendered.has_alpha, &marks)?,
             };
             file::write(path, &bytes)?;
             told.outputs.push(WrittenFile { path: path.display().to_string(), hash: file::hash(&bytes) });

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use anyhow::{Result, anyhow};
 
 use super::options::{DeviceOptions, SceneOptions};
+use super::usage;
 use etalon::frame::{Renderer, Settings};
 use etalon::gpu::Device;
 use etalon::open::Opened;
-use etalon::plan::Effect;
+use etalon::plan::{Effect, Refused};
 use etalon::scene::environment::Environment;
 use etalon::scene::{Camera, Prune, Scene, Source};
 use etalon_cost::explain::{Price, Subject};
@@ -54,7 +55,7 @@ pub fn open_source(
     prune: Prune,
     device: &DeviceOptions,
 ) -> Result<(Source, Scene, Option<Environment>, Arc<Device>)> {
-    let load = options.load_options(prune)?;
+    let load = options.load_options(prune);
     let time = load.time;
     let (device, loaded, environment) = std::thread::scope(|scope| {
         let device = scope.spawn(|| Device::open(&device.choice(), device.validate));
@@ -132,6 +133,13 @@ impl Setup {
     /// When the scene has no such camera or nothing to draw, or when it does not fit the device.
     pub fn renderer(self, options: &SceneOptions, settings: Settings) -> Result<(Renderer, Camera)> {
         let camera = options.choose_camera(self.opened.scene(), settings.size)?;
-        Ok((self.opened.renderer(&self.device, settings)?, camera))
+        let renderer = self.opened.renderer(&self.device, settings);
+        // What the plan or the device refuses is a wrong value of an option.
+        let is_setting = |error: &anyhow::Error| error.downcast_ref::<Refused>().is_some();
+        let renderer = match renderer {
+            Err(error) if is_setting(&error) => usage(Err(error)),
+            renderer => renderer,
+        };
+        Ok((renderer?, camera))
     }
 }

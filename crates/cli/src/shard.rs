@@ -1,6 +1,7 @@
 //! `etalon render --shard` of one picture: draws the part of one process, and resumes a part that was stopped. See
 //! docs/farm.md.
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,11 +10,11 @@ use std::time::{Duration, Instant};
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::options::PlanExtent;
-use super::picture::{RenderArgs, check_halves, layers};
-use super::print;
+use super::picture::{RenderArgs, check_halves, is_standard, layers};
 use super::progress::Steps;
 use super::report::Validation;
 use super::setup::Setup;
+use super::{print, usage};
 use etalon::frame::{Renderer, Settings, Sums, TileShare};
 use etalon::gpu::Severity;
 use etalon::image::file;
@@ -41,13 +42,8 @@ fn split(args: &RenderArgs, plan: &Plan) -> Result<Split> {
     }
 }
 
-/// Runs the command.
-///
-/// # Errors
-/// One sentence with the action, its object and the cause.
-pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<ExitCode> {
-    let begun = Instant::now();
-    let [index, of] = shard;
+/// The output of a part, after a check of the options that are about whole pictures.
+fn only_output<'a>(args: &'a RenderArgs, [index, of]: [u32; 2], settings: &Settings) -> Result<&'a PathBuf> {
     ensure!(args.repeat == 1, "--repeat does not work with --shard: a part of a picture is drawn once");
     ensure!(args.within.is_none(), "--within chooses rungs for one process; with --shard choose rungs with --set");
     ensure!(args.picture.plan != PlanExtent::ExplainCost, "--plan explain-cost works with a whole picture only");
@@ -58,13 +54,25 @@ pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<Exi
     let [output] = &args.output[..] else {
         bail!("--shard {index}/{of}: name the one file of this part with -o, for example -o {index}.part")
     };
-    file::check_writable(output)?;
-    let mut settings = args.render_settings()?;
-    check_halves(&args.aov, &settings)?;
+    ensure!(!is_standard(output), "--output -: a part is continued from its file; name one");
+    check_halves(&args.aov, settings)?;
     ensure!(
         settings.max_error.is_none(),
         "--max-error: a process that draws a part does not know the error of the whole picture; choose --set samples"
     );
+    Ok(output)
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// One sentence with the action, its object and the cause.
+pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<ExitCode> {
+    let begun = Instant::now();
+    let [index, of] = shard;
+    let mut settings = args.render_settings()?;
+    let output = usage(only_output(args, shard, &settings))?;
+    file::check_writable(output)?;
     let stopped = Arc::new(AtomicBool::new(false));
     signal_hook::flag::register(signal_hook::consts::SIGTERM, stopped.clone())
         .context("installing the handler of SIGTERM")?;

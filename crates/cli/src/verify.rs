@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Result, anyhow};
 use clap::Args;
 use comfy_table::{Cell, CellAlignment, Table, presets};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -14,7 +14,7 @@ use serde_json::{Map, Value, json};
 
 use super::choices::one_of;
 use super::options::{DeviceOptions, When};
-use super::print;
+use super::{heading, print, usage};
 use etalon::gpu::{Device, DeviceInfo, Severity};
 use etalon::image::file;
 use etalon::optics::Tier;
@@ -26,7 +26,14 @@ const HOSTILE: usize = 4096;
 
 /// Compare every shader function on the device with its double-precision reference (f64 twin), in three tiers: `fast`
 /// is the textbook form and has no bounds, `stable` is used for pictures, `compensated` is the most accurate
+///
+/// It prints the bounds that do not hold and a verdict, with -v the errors of every output.
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+Examples:
+    etalon verify --cases 1000
+    etalon verify -v --function refract
+    etalon verify --list")]
 pub struct VerifyArgs {
     /// Only this function; repeatable. With --vectors: the function of the file [default: the stem of the file name]
     #[arg(long, value_name = "NAME")]
@@ -56,7 +63,7 @@ pub struct VerifyArgs {
     #[arg(long)]
     pub json: bool,
     /// Progress on standard error
-    #[arg(long, value_enum, default_value_t = When::Auto)]
+    #[arg(long, value_enum, default_value_t = When::Auto, help_heading = heading::MESSAGES)]
     pub progress: When,
 }
 
@@ -93,20 +100,22 @@ impl Finding {
 ///
 /// # Errors
 /// For an unknown function, an unreadable vector file, a device that fails, or a folder that cannot be written.
-pub fn run(args: &VerifyArgs, quiet: bool) -> Result<ExitCode> {
+pub fn run(args: &VerifyArgs, quiet: bool, whole: bool) -> Result<ExitCode> {
+    let functions = usage(chosen(args))?;
     if args.list {
-        return list(args);
+        return list(args, functions);
+    }
+    if args.vectors.is_some() {
+        let count = args.function.len();
+        usage(if count < 2 { Ok(()) } else { Err(anyhow!("--vectors takes one --function, but {count} were given")) })?;
     }
     let given = match &args.vectors {
-        Some(path) => {
-            ensure!(args.function.len() < 2, "--vectors takes one --function, but {} were given", args.function.len());
-            Some(vectors::load(path, args.function.first().map(String::as_str))?)
-        }
+        Some(path) => Some(vectors::load(path, args.function.first().map(String::as_str))?),
         None => None,
     };
     let entries = match &given {
         Some((entry, _)) => vec![*entry],
-        None => chosen(args)?,
+        None => functions,
     };
     // Each tier once, in a fixed order, however often it was named.
     let tiers: Vec<Tier> =
@@ -150,8 +159,11 @@ pub fn run(args: &VerifyArgs, quiet: bool) -> Result<ExitCode> {
         };
         print(&serde_json::to_string_pretty(&document)?)?;
     } else {
-        print(&table(&findings).to_string())?;
-        for finding in &findings {
+        let shown = |finding: &Finding, figures: &Figures| whole || (finding.tier != Tier::Fast && !figures.pass);
+        if findings.iter().any(|finding| finding.figures.iter().any(|figures| shown(finding, figures))) {
+            print(&table(&findings, shown).to_string())?;
+        }
+        for finding in findings.iter().filter(|finding| whole || !finding.passes()) {
             if let Some((count @ 1.., first)) = &finding.hostile {
                 let inputs = first.as_deref().map_or(String::new(), |row| named(finding.entry.probe, row));
                 let verdict = if finding.tier == Tier::Fast { "not promised" } else { "FAILS" };
@@ -225,8 +237,7 @@ fn chosen(args: &VerifyArgs) -> Result<Vec<Entry>> {
 }
 
 /// Prints every function with its inputs and outputs.
-fn list(args: &VerifyArgs) -> Result<ExitCode> {
-    let entries = chosen(args)?;
+fn list(args: &VerifyArgs, entries: Vec<Entry>) -> Result<ExitCode> {
     if args.json {
         let functions: Vec<_> = entries
             .iter()
@@ -259,7 +270,8 @@ fn list(args: &VerifyArgs) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn table(findings: &[Finding]) -> Table {
+/// The rows of the outputs that are `shown`.
+fn table(findings: &[Finding], shown: impl Fn(&Finding, &Figures) -> bool) -> Table {
     let mut table = Table::new();
     table.load_preset(presets::NOTHING);
     table.set_header([
@@ -284,7 +296,7 @@ fn table(findings: &[Finding]) -> Table {
     }
     for finding in findings {
         for (output, figures) in finding.entry.equation.outputs.iter().zip(&finding.figures) {
-            if figures.cases == 0 {
+            if figures.cases == 0 || !shown(finding, figures) {
                 continue;
             }
             let (verdict, bound) = match (finding.tier, figures.pass) {

@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 use clap::Args;
 
 use super::budget;
-use super::options::{DeviceOptions, PictureOptions, PlanExtent, SceneOptions};
+use super::options::{AnimationTime, DeviceOptions, PictureOptions, PlanExtent, SceneOptions};
+use super::{heading, usage};
 use etalon::frame::Settings;
 use etalon::gpu::{DeviceInfo, Severity};
 use etalon::image::file;
@@ -21,6 +22,10 @@ use etalon_viewer::{Start, View, run as run_window};
 
 /// Open a window that shows the scene, with its plan, pass times, and the rays and equations of a pixel
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+Examples:
+    etalon view study:pool
+    etalon view scene.glb --size 1600x900 --set samples=16")]
 pub struct ViewArgs {
     #[command(flatten)]
     scene: SceneOptions,
@@ -29,7 +34,7 @@ pub struct ViewArgs {
     #[command(flatten)]
     device: DeviceOptions,
     /// Start without panels; the key P shows them
-    #[arg(long)]
+    #[arg(long, help_heading = heading::WINDOW)]
     bare: bool,
 }
 
@@ -69,6 +74,22 @@ impl SceneSource for ViewArgs {
     }
 }
 
+impl ViewArgs {
+    /// Refuses options that the viewer has no use for.
+    fn check(&self) -> Result<()> {
+        ensure!(
+            self.picture.max_error.is_none(),
+            "--max-error: the viewer always draws all samples; use this option with `render`"
+        );
+        ensure!(
+            self.picture.plan != PlanExtent::ExplainCost,
+            "--plan explain-cost: the viewer does not measure the cost of effects; use this option with `plan` or `render`"
+        );
+        ensure!(self.scene.scene != "-", "-: the viewer reads its file again; name a file");
+        Ok(())
+    }
+}
+
 /// The options for another file or another time. For another file, camera and time of the first file are dropped.
 fn asked_for(options: &SceneOptions, file: Option<&Path>, time: Option<f64>) -> SceneOptions {
     let options = match file {
@@ -79,11 +100,11 @@ fn asked_for(options: &SceneOptions, file: Option<&Path>, time: Option<f64>) -> 
             eye: None,
             target: None,
             up: None,
-            time: "none".to_owned(),
+            time: AnimationTime(None),
             ..options.clone()
         },
     };
-    SceneOptions { time: time.map_or(options.time, |time| time.to_string()), ..options }
+    SceneOptions { time: time.map_or(options.time, |time| AnimationTime(Some(time))), ..options }
 }
 
 /// The `etalon render` command that draws a view.
@@ -142,14 +163,7 @@ fn keep(recent: &[PathBuf]) {
 /// # Errors
 /// One sentence when there is no display or no device, or when a file cannot be read.
 pub fn run(args: &ViewArgs) -> Result<ExitCode> {
-    if let Some(error) = &args.picture.max_error {
-        bail!("--max-error {error}: the viewer always draws all samples; use this option with `render`");
-    }
-    if args.picture.plan == PlanExtent::ExplainCost {
-        bail!(
-            "--plan explain-cost: the viewer does not measure the cost of effects; use this option with `plan` or `render`"
-        );
-    }
+    usage(args.check())?;
     let settings = args.picture.settings(&args.scene)?;
     let told = args.clone();
     let first = (!args.scene.scene.starts_with("study:")).then(|| PathBuf::from(&args.scene.scene));

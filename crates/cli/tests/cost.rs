@@ -61,9 +61,9 @@ fn a_run_is_what_its_commands_draw() {
     // The error is that of the pictures as they are shown, less the reference's noise.
     for name in ["local", "recursive"] {
         let picture = format!("a/pictures/{name}.png");
-        let said =
-            etalon(at, &["diff", "a/pictures/reference.png", &picture, "--metric", "rmse"], &[]).succeeded().stdout;
-        let (with_noise, found) = (said.trim().parse::<f64>().expect("a number"), &named(&table, name)["error"]);
+        let diff = ["diff", "a/pictures/reference.png", &picture, "--metric", "rmse", "--json"];
+        let said: Value = serde_json::from_str(&etalon(at, &diff, &[]).succeeded().stdout).expect("JSON");
+        let (with_noise, found) = (number(&said["value"]), &named(&table, name)["error"]);
         assert!(number(&found["median"]) < with_noise && with_noise < number(&found["high"]) + 0.05, "{said} {found}");
     }
 
@@ -134,9 +134,9 @@ fn a_run_is_what_its_commands_draw() {
         let run = render(&limit);
         assert!(run.code == Some(1) && run.stderr.contains(said) && at.join("w.png").exists(), "{limit:?} {run:?}");
     }
-    render(&["--within", "8", "--set", "samples=1"]).failed(1, "contradicts --model and --set");
-    render(&["--within", "8", "--max-error", "2%"]).failed(1, "contradicts --max-error");
-    render(&["--within", "soon"]).failed(1, "expected milliseconds");
+    render(&["--within", "8", "--set", "samples=1"]).failed(2, "contradicts --model and --set");
+    render(&["--within", "8", "--max-error", "2%"]).failed(2, "contradicts --max-error");
+    render(&["--within", "soon"]).failed(2, "expected milliseconds");
 
     // Without cost.json a folder is that of a run that was interrupted: what it has is not drawn again.
     for file in ["cost.json", "points/local-shadows-ray.json", "points/exact-fresnel-schlick.json"] {
@@ -239,9 +239,9 @@ fn one_approximation_has_two_lines_and_a_verdict() {
         ("fresnel=exact,exact", "both are the same rung"),
         ("gloss=1,2", "no knob is called"),
     ] {
-        compare("study:radiance", wanted, &[]).failed(1, expected);
+        compare("study:radiance", wanted, &[]).failed(2, expected);
     }
-    compare("study:radiance", "reflection=off,ray", &["--model", "global"]).failed(1, "contradicts indirect=path");
+    compare("study:radiance", "reflection=off,ray", &["--model", "global"]).failed(2, "contradicts indirect=path");
 }
 
 #[test]
@@ -311,16 +311,16 @@ fn what_contradicts_a_run_is_refused() {
     let at = folder.path();
     std::fs::create_dir(at.join("full")).expect("a folder");
     std::fs::write(at.join("full/note.txt"), "mine").expect("a file");
-    for (arguments, expected) in [
-        (&["-o", "a", "--set", "samples=4"][..], "cost chooses the rungs itself"),
-        (&["-o", "a", "--model", "global"], "cost chooses the rungs itself"),
-        (&["-o", "a", "--max-error", "0.1"], "--max-error"),
-        (&["-o", "a", "--reference-samples", "5"], "expected 4, 16"),
-        (&["-o", "full"], "is not empty and does not hold a run of cost"),
-        (&["-o", "a", "--judge", "none.png"], "none.png"),
+    for (arguments, code, expected) in [
+        (&["-o", "a", "--set", "samples=4"][..], 2, "cost chooses the rungs itself"),
+        (&["-o", "a", "--model", "global"], 2, "cost chooses the rungs itself"),
+        (&["-o", "a", "--max-error", "0.1"], 2, "--max-error"),
+        (&["-o", "a", "--reference-samples", "5"], 2, "expected 4, 16"),
+        (&["-o", "full"], 1, "is not empty and does not hold a run of cost"),
+        (&["-o", "a", "--judge", "none.png"], 1, "none.png"),
     ] {
         let all = [&["cost", "study:radiance", "--device", "cpu", "--size", "8x8"], arguments].concat();
-        etalon(at, &all, &[]).failed(1, expected);
+        etalon(at, &all, &[]).failed(code, expected);
     }
     assert!(!at.join("a/cost.json").exists());
     assert_eq!(std::fs::read_to_string(at.join("full/note.txt")).expect("a file"), "mine");

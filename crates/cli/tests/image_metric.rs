@@ -133,7 +133,7 @@ fn the_command_judges() {
     let map = folder.path().join("map.png");
     let judge = |metric, max| {
         let (a, b, output) = (a.clone(), b.clone(), Some(map.clone()));
-        run(&DiffArgs { a, b, metric, max, output, json: true }).unwrap()
+        run(&DiffArgs { a, b, metric, max, output, json: true }, false).unwrap()
     };
     // ExitCode compares only through its debug text.
     let same = |got: ExitCode, expected: ExitCode| assert_eq!(format!("{got:?}"), format!("{expected:?}"));
@@ -152,7 +152,7 @@ fn the_command_judges() {
     write_exr(&broken, &picture, &[], &[]).unwrap();
     let args =
         DiffArgs { a: broken.clone(), b: broken, metric: Metric::Mse, max: Some(9.0), output: None, json: false };
-    same(run(&args).unwrap(), ExitCode::FAILURE);
+    same(run(&args, false).unwrap(), ExitCode::FAILURE);
 
     let args = DiffArgs {
         a: a.clone(),
@@ -162,8 +162,11 @@ fn the_command_judges() {
         output: None,
         json: false,
     };
-    let error = format!("{:#}", run(&args).unwrap_err());
+    let error = format!("{:#}", run(&args, false).unwrap_err());
     assert!(error.ends_with("no.png: no such file or folder"), "{error}");
     let args = DiffArgs { a, b, metric: Metric::Mse, max: None, output: Some("map.jpg".into()), json: false };
-    assert_eq!(run(&args).unwrap_err().to_string(), "--output map.jpg: the error map can only be written as .png");
+    assert_eq!(
+        run(&args, false).unwrap_err().to_string(),
+        "--output map.jpg: the error map can only be written as .png"
+    );
 }

@@ -62,10 +62,15 @@ fn a_plan_can_be_read() {
     let folder = tempfile::tempdir().expect("a folder");
     let all = [&["plan", "study:pool", "--set", "quadrature=left"][..], &COMMON].concat();
     let text = etalon(folder.path(), &all, &HASTY).succeeded().stdout;
-    for said in ["refraction", "has transmission 1", "not needed", "reflection and refraction", "interact", "MB"] {
+    for said in ["refraction", "has transmission 1", "effects are not needed", "reflection and refraction", "MB"] {
         assert!(text.contains(said), "\"{said}\" is not in {text}");
     }
     assert!(text.contains("warning: quadrature=left changes nothing"), "{text}");
+    // What the scene does not need, and the programs, are asked for.
+    let asked = ["clear coat", "interact "];
+    assert!(asked.iter().all(|said| !text.contains(said)), "{text}");
+    let whole = etalon(folder.path(), &[&all[..], &["-v"]].concat(), &HASTY).succeeded().stdout;
+    assert!(asked.iter().all(|said| whole.contains(said)) && whole.contains("not loaded: "), "{whole}");
     assert!(!folder.path().join("pool.png").exists());
 }
 
@@ -156,14 +161,14 @@ fn everything_can_be_planned() {
 #[test]
 fn what_cannot_be_planned_is_an_error() {
     let folder = tempfile::tempdir().expect("a folder");
-    let failed = |arguments: &[&str], said| {
-        etalon(folder.path(), &[&["plan"], arguments].concat(), &[]).failed(1, said);
+    let failed = |arguments: &[&str], code, said| {
+        etalon(folder.path(), &[&["plan"], arguments].concat(), &[]).failed(code, said);
     };
-    failed(&["missing.glb"], "missing.glb");
-    failed(&["study:etalon", "--set", "gloss=1"], "no knob is called \"gloss\"");
-    failed(&["study:etalon", "--camera", "nobody"], "nobody");
-    failed(&["study:etalon", "--set", "interfaces=0"], "interfaces=0 contradicts refraction=ray");
-    failed(&["study:etalon", "--set", "samples=5"], "the nearest is 4");
+    failed(&["missing.glb"], 1, "missing.glb");
+    failed(&["study:etalon", "--set", "gloss=1"], 2, "no knob is called \"gloss\"");
+    failed(&["study:etalon", "--camera", "nobody"], 1, "nobody");
+    failed(&["study:etalon", "--set", "interfaces=0"], 2, "interfaces=0 contradicts refraction=ray");
+    failed(&["study:etalon", "--set", "samples=5"], 2, "the nearest is 4");
 }
 
 #[test]
