@@ -79,7 +79,9 @@ impl CostArgs {
     /// Checks what can be checked before the scene is loaded.
     fn check(&self, settings: &Settings) -> Result<()> {
         match &self.compare {
-            Some(wanted) => drop(pair(&settings.knobs, wanted)?),
+            Some(wanted) => {
+                pair(&settings.knobs, wanted)?;
+            }
             None => ensure!(
                 self.picture.set.is_empty() && self.picture.model.is_none(),
                 "--model and --set: cost chooses the rungs itself; only with --compare KNOB=A,B do they set the other knobs"
@@ -97,7 +99,8 @@ impl CostArgs {
 
 /// Number of samples of a reference.
 fn reference_samples(text: &str) -> Result<u32, String> {
-    let is_power_of_four = |n: &u32| n.is_power_of_two() && n.trailing_zeros() % 2 == 0 && (4..=4096).contains(n);
+    let is_power_of_four =
+        |n: &u32| n.is_power_of_two() && n.trailing_zeros().is_multiple_of(2) && (4..=4096).contains(n);
     text.parse().ok().filter(is_power_of_four).ok_or_else(|| "expected 4, 16, 64, 256, 1024 or 4096".to_owned())
 }
 

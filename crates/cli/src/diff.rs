@@ -149,7 +149,7 @@ pub fn run(args: &DiffArgs, whole: bool) -> Result<ExitCode> {
             let Comparison { value, width, height, space, worst: [x, y], worst_error, .. } = &found;
             format!(
                 "{name} {value}\n{about}\n{width}x{height} pixels, compared as {space}; the largest error, {}, is at {x},{y}",
-                short(f64::from(*worst_error))
+                short(*worst_error)
             )
         }
     };

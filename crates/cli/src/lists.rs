@@ -1,5 +1,5 @@
-//! `etalon scenes` and `etalon knobs`: what is built in and what can be set. Names, rungs and sentences are those of the
-//! library's own tables.
+//! `etalon scenes` and `etalon knobs`: what is built in and what can be set. Names, rungs and sentences are those of
+//! the library's own tables.
 
 use std::process::ExitCode;
 

@@ -132,7 +132,12 @@ pub struct PictureOptions {
     #[arg(long, value_name = "EV", value_parser = finite, default_value_t = 0.0, allow_hyphen_values = true, help_heading = heading::PICTURE)]
     pub exposure: f32,
     /// Tone curve; changes display outputs only
-    #[arg(long, value_parser = one_of::<ToneMap>(), default_value = ToneMap::default().name(), help_heading = heading::PICTURE)]
+    #[arg(
+        long,
+        value_parser = one_of::<ToneMap>(),
+        default_value = ToneMap::default().name(),
+        help_heading = heading::PICTURE
+    )]
     pub tonemap: ToneMap,
 }
 

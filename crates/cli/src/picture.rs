@@ -92,8 +92,8 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub(super) scene: SceneOptions,
     /// Output file: .png (display) or .exr (scene-linear radiance), or - for a PNG on standard output; repeatable
-    /// [default: the scene's name with .png, which replaces only a picture of the same scene]. A sequence can also write
-    /// an animated preview, .apng; a part of a picture has exactly one output
+    /// [default: the scene's name with .png, which replaces only a picture of the same scene]. A sequence can also
+    /// write an animated preview, .apng; a part of a picture has exactly one output
     #[arg(short, long, value_name = "FILE", help_heading = heading::OUTPUT)]
     pub(super) output: Vec<PathBuf>,
     #[command(flatten)]

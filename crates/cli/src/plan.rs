@@ -26,8 +26,8 @@ use etalon_cost::sweep::SweepExtent;
 
 /// Show which effects a scene calls for and why, and what drawing takes
 ///
-/// With -v it also lists the effects that are not needed, the pipelines, and what is not loaded. A folder in place of the
-/// scene gives a table of the glTF extensions that the files below it need, and the files that cannot be read.
+/// With -v it also lists the effects that are not needed, the pipelines, and what is not loaded. A folder in place of
+/// the scene gives a table of the glTF extensions that the files below it need, and the files that cannot be read.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = "\
 Examples:

@@ -1,5 +1,6 @@
-//! What the command line says about itself and does with paths: help and its examples, lists of scenes and knobs, scenes
-//! in place of commands, standard input and output, names of outputs, the last line of a picture, folders, Ctrl-C.
+//! What the command line says about itself and does with paths: help and its examples, lists of scenes and knobs,
+//! scenes in place of commands, standard input and output, names of outputs, the last line of a picture, folders,
+//! Ctrl-C.
 
 #[path = "support/program.rs"]
 mod program;

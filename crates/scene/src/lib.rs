@@ -85,7 +85,8 @@ fn extension(path: &Path) -> String {
 }
 
 /// Reads a scene from a glTF 2.0 file (`.gltf`, `.glb`), a Wavefront file (`.obj`), or a mesh (`.stl`, `.ply`). The
-/// path `-` is a glTF 2.0 file on standard input, which can be read once; its relative URIs start at the working folder.
+/// path `-` is a glTF 2.0 file on standard input, which can be read once; its relative URIs start at the working
+/// folder.
 ///
 /// # Errors
 /// One sentence when printed with `{:#}`: the file, the place in the file and the fault there.
