@@ -146,7 +146,9 @@ pub fn parse(words: Vec<OsString>) -> Result<Arguments, clap::Error> {
         }
         if let Some(ContextValue::StyledStrs(mut tips)) = error.remove(ContextKind::Suggested) {
             tips.retain(|tip| !tip.to_string().contains("as a value"));
-            error.insert(ContextKind::Suggested, ContextValue::StyledStrs(tips));
+            if !tips.is_empty() {
+                error.insert(ContextKind::Suggested, ContextValue::StyledStrs(tips));
+            }
         }
         let wrong = match error.get(ContextKind::InvalidArg) {
             Some(ContextValue::String(name)) => name.trim_start_matches('-').to_owned(),

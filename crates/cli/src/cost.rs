@@ -30,6 +30,8 @@ use etalon_cost::table::Table;
 
 /// Measure what each approximation costs in a scene: its error against the scene's reference, and its GPU time
 #[derive(Debug, Clone, Args)]
+// Both are refused here, with a sentence.
+#[command(mut_arg("max_error", |arg| arg.hide(true)), mut_arg("plan", |arg| arg.hide(true)))]
 #[command(after_help = "\
 Examples:
     etalon cost study:nested --compare fresnel=schlick,exact --size 320x180
@@ -125,7 +127,7 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
         .map(|path| Ok((path.display().to_string(), AnyPicture::load(path)?)))
         .collect::<Result<_>>()?;
     let steps = Steps::new(args.progress, quiet);
-    steps.step(&format!("loading {}", args.scene.scene), 1);
+    steps.step(&format!("loading {}", args.scene.said()), 1);
     let setup = Setup::load(&args.scene, Prune::Nothing, &args.device)?;
     for warning in &setup.opened.warnings {
         tracing::warn!("{warning}");

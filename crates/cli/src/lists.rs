@@ -128,7 +128,7 @@ fn described(knob: &Knob) -> String {
     }
     let mut text = format!("{}: {}\n\n{rungs}\n", knob.name, knob.about);
     if knob.effects.is_empty() {
-        text += "\nEvery surface of every scene has it.\n";
+        text += "\nIt concerns every surface of every scene.\n";
     } else {
         let mut effects = table(&["effect", "what in a scene needs it", "what it brings into a picture"]);
         for effect in knob.effects {

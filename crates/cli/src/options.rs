@@ -277,6 +277,12 @@ impl SceneOptions {
         all
     }
 
+    /// The scene in messages.
+    #[must_use]
+    pub fn said(&self) -> &str {
+        if self.scene == "-" { "standard input" } else { &self.scene }
+    }
+
     /// Checks what can be checked before the scene is loaded.
     ///
     /// # Errors

@@ -117,11 +117,11 @@ pub struct RenderArgs {
     /// Write a JSON report of the run
     #[arg(long, value_name = "FILE.json", help_heading = heading::OUTPUT)]
     pub(super) report: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) sequence: SequenceOptions,
     /// Form of the progress messages
     #[arg(long, value_enum, default_value_t = ProgressForm::Auto, help_heading = heading::MESSAGES)]
     pub progress: ProgressForm,
-    #[command(flatten)]
-    pub(super) sequence: SequenceOptions,
 }
 
 impl RenderArgs {

@@ -284,16 +284,18 @@ fn text(facts: &PlanFacts, whole: bool) -> String {
     let pipelines = if whole { format!("{pipelines}\n\n") } else { String::new() };
     let (bytes, rounds) = facts.expected.as_ref().map_or((0, 0), |expected| (expected.bytes, expected.ray_rounds));
     let spirv: usize = facts.pipelines.iter().map(|pipeline| pipeline.spirv_bytes).sum();
-    let loses: Vec<String> = facts
+    let loses: String = facts
         .expected
         .iter()
         .flat_map(|expected| &expected.lost)
         .filter(|(_, lost)| **lost > 0.0)
-        .map(|(rung, lost)| format!("interfaces={rung} would lose up to {:.1} % of the light of a pixel", 100.0 * lost))
+        .map(|(rung, lost)| {
+            format!("; interfaces={rung} would lose up to {:.1} % of the light of a pixel", 100.0 * lost)
+        })
         .collect();
     let sight = match facts.expected.as_ref().map_or(0, |expected| expected.interfaces) {
         0 => String::new(),
-        most => format!("lines of sight pass through up to {most} transparent surfaces; {}\n", loses.join(", ")),
+        most => format!("lines of sight pass through up to {most} transparent surfaces{loses}\n"),
     };
     let unread: String = facts.unread.iter().map(|unread| format!("not loaded: {unread}\n")).collect();
     let unread = if whole { unread } else { String::new() };

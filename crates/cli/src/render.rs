@@ -68,7 +68,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let steps = Steps::new(args.progress, quiet);
     phases.end("start");
 
-    steps.step(&format!("loading {}", args.scene.scene), 1);
+    steps.step(&format!("loading {}", args.scene.said()), 1);
     let prune = if budget.is_some() { Prune::Nothing } else { args.picture.prune(&args.scene, &settings.knobs) };
     let setup = Setup::load(&args.scene, prune, &args.device)?;
     phases.end("load");

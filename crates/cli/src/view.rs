@@ -22,6 +22,8 @@ use etalon_viewer::{Start, View, run as run_window};
 
 /// Open a window that shows the scene, with its plan, pass times, and the rays and equations of a pixel
 #[derive(Debug, Clone, Args)]
+// It is refused here, with a sentence.
+#[command(mut_arg("max_error", |arg| arg.hide(true)))]
 #[command(after_help = "\
 Examples:
     etalon view study:pool

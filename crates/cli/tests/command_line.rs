@@ -126,6 +126,11 @@ fn options_are_in_groups() {
     assert_eq!(heading("--within"), heading("--max-error"));
     assert_ne!(heading("--color"), heading("--env"));
     assert_eq!(heading("--progress"), heading("--color"));
+    // What a command refuses is not in its help.
+    for (command, refused) in [("cost", "--max-error"), ("cost", "--plan"), ("view", "--max-error")] {
+        let help = etalon(folder.path(), &[command, "--help"], &[]).succeeded().stdout;
+        assert!(!help.contains(refused), "{command}: {help}");
+    }
 }
 
 #[test]
