@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use anyhow::{Context as _, Result, bail, ensure};
+use anyhow::{Context as _, Result, bail};
 use serde::Serialize;
 
 use super::options::{DeviceOptions, PictureOptions, SceneOptions};
@@ -16,7 +16,6 @@ use etalon::frame::{Rendered, Renderer, Settings};
 use etalon::gpu::DeviceInfo;
 use etalon::image::file;
 use etalon::image::png::Display;
-use etalon::plan::rungs::Indirect;
 use etalon::plan::{ForcedEffects, Knobs};
 use etalon::scene::Camera;
 use etalon_cost::choose::{SPARE, at_most, most_exact, quickest, within};
@@ -128,11 +127,7 @@ impl Budget {
             }
             (Some(_), Some(_)) => bail!("--within contradicts --max-error: give only one limit"),
             (Some(ms), None) => Ok(Some(Self::Within(ms))),
-            (None, Some(_)) if chosen => {
-                let paths = picture.knobs()?.indirect == Indirect::Path;
-                ensure!(paths, "--max-error: only paths tell their error; add --model global, or choose no rungs");
-                Ok(None)
-            }
+            (None, Some(_)) if chosen => picture.check_error_is_told().map(|()| None),
             (None, limit) => Ok(limit.map(Self::MaxError)),
         }
     }

@@ -81,10 +81,12 @@ impl std::fmt::Display for WrongUsage {
 
 impl std::error::Error for WrongUsage {}
 
-/// Whether the command line is wrong: exit code 2.
+/// Whether the command line is wrong: exit code 2. So are settings that the plan or the device refuses, but for an error
+/// that was not reached with all samples.
 #[must_use]
 pub fn is_wrong_usage(error: &anyhow::Error) -> bool {
-    error.downcast_ref::<WrongUsage>().is_some()
+    let is_refused = |refused: &Refused| refused.setting != Setting::MaxError;
+    error.is::<WrongUsage>() || error.downcast_ref().is_some_and(is_refused)
 }
 
 /// Marks the error of a check of options as wrong usage. Such checks need neither files nor a device.

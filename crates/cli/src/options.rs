@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, Result, anyhow, bail};
+use anyhow::{Context as _, Result, anyhow, bail, ensure};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 
@@ -13,6 +13,7 @@ use super::usage;
 use etalon::frame::{Background, Settings, TileShare};
 use etalon::gpu::DeviceChoice;
 use etalon::image::tone::ToneMap;
+use etalon::plan::rungs::Indirect;
 use etalon::plan::{ForcedEffects, Knobs, Model};
 use etalon::scene::camera::{Camera, DEFAULT_FOV_Y};
 use etalon::scene::environment::Environment;
@@ -425,6 +426,16 @@ impl PictureOptions {
         let mut knobs = Knobs::of(self.model.unwrap_or_default());
         knobs.set_all(&self.set)?;
         Ok(knobs)
+    }
+
+    /// Checks that `--max-error` can end the sampling.
+    ///
+    /// # Errors
+    /// When the knobs follow no paths, and the errors of [`PictureOptions::knobs`].
+    pub fn check_error_is_told(&self) -> Result<()> {
+        let is_told = self.max_error.is_none() || self.knobs()?.indirect == Indirect::Path;
+        ensure!(is_told, "--max-error: only paths tell their error; add --model global");
+        Ok(())
     }
 
     /// Which textures and attributes loading may prune, as far as this is known before the scene is read.

@@ -59,6 +59,7 @@ const FORECAST_S: u32 = 60;
 /// One sentence with the action, its object and the cause.
 pub fn run(args: &PlanArgs, whole: bool) -> Result<ExitCode> {
     let mut settings = args.picture.settings(&args.scene)?;
+    usage(args.picture.check_error_is_told())?;
     if Path::new(&args.scene.scene).is_dir() {
         usage(args.check_folder())?;
         extensions::run(Path::new(&args.scene.scene), args.json)?;

@@ -76,6 +76,7 @@ fn wanted(args: &RenderArgs) -> Result<SequenceRequest> {
     ensure!(args.repeat == 1, "--repeat draws one picture again; it does not work with a sequence");
     ensure!(args.within.is_none(), "--within chooses rungs for one picture; for a sequence choose rungs with --set");
     ensure!(args.picture.plan != PlanExtent::ExplainCost, "--plan explain-cost works with one picture only");
+    args.picture.check_error_is_told()?;
     let fps = options.fps.unwrap_or(FPS);
     ensure!(fps.is_finite() && fps > 0.0, "--fps {fps}: expected a number above 0");
     let moves = options.frames.is_some() && (options.turntable.is_none() || options.fps.is_some())

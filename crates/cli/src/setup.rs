@@ -5,11 +5,10 @@ use std::sync::Arc;
 use anyhow::{Result, anyhow};
 
 use super::options::{DeviceOptions, SceneOptions};
-use super::usage;
 use etalon::frame::{Renderer, Settings};
 use etalon::gpu::Device;
 use etalon::open::Opened;
-use etalon::plan::{Effect, Refused};
+use etalon::plan::Effect;
 use etalon::scene::environment::Environment;
 use etalon::scene::{Camera, Prune, Scene, Source};
 use etalon_cost::explain::{Price, Subject};
@@ -133,13 +132,6 @@ impl Setup {
     /// When the scene has no such camera or nothing to draw, or when it does not fit the device.
     pub fn renderer(self, options: &SceneOptions, settings: Settings) -> Result<(Renderer, Camera)> {
         let camera = options.choose_camera(self.opened.scene(), settings.size)?;
-        let renderer = self.opened.renderer(&self.device, settings);
-        // What the plan or the device refuses is a wrong value of an option.
-        let is_setting = |error: &anyhow::Error| error.downcast_ref::<Refused>().is_some();
-        let renderer = match renderer {
-            Err(error) if is_setting(&error) => usage(Err(error)),
-            renderer => renderer,
-        };
-        Ok((renderer?, camera))
+        Ok((self.opened.renderer(&self.device, settings)?, camera))
     }
 }
