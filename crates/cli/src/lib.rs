@@ -81,8 +81,8 @@ impl std::fmt::Display for WrongUsage {
 
 impl std::error::Error for WrongUsage {}
 
-/// Whether the command line is wrong: exit code 2. So are settings that the plan or the device refuses, but for an error
-/// that was not reached with all samples.
+/// Whether the command line is wrong: exit code 2. So are settings that the plan or the device refuses, but for an
+/// error that was not reached with all samples.
 #[must_use]
 pub fn is_wrong_usage(error: &anyhow::Error) -> bool {
     let is_refused = |refused: &Refused| refused.setting != Setting::MaxError;
