@@ -47,9 +47,11 @@ struct Film {
     float cos_film;   // within the film
     vec2 outer;       // amplitudes of the outer face, both polarisations
     bool total;       // total internal reflection there
-    float cos_phi;    // in a band of wavelengths …
-    vec3 harmonics[3]; // … otherwise the means of cos mφ, m = 1 to 3. For |q| ≤ 0.05, films on glass, the rest is below 2e-5;
-                       // for |q| ≤ 0.3, dense films on metals, below 2q⁴/(1 − q) = 2.4 %
+    // In a band of wavelengths cosφ. Otherwise the means of cosφ, cos 2φ and cos 3φ: for |q| ≤ 0.05, films on glass, the rest is
+    // below 2e-5; for |q| ≤ 0.3, dense films on metals, below 2q⁴/(1 − q) = 2.4 %.
+    vec3 cos_phi;
+    vec3 cos_2_phi;
+    vec3 cos_3_phi;
 };
 
 // Amplitudes r_s and r_p of the interface from n1 to n2, from the cosines on both sides. The differences cancel for nearly
@@ -69,19 +71,18 @@ Film film_at(float cos_in, float n1, float n, float thickness) {
     film.cos_film = sqrt(max(cos2, 0.0));
     film.outer = interface_amplitudes(cos_in, film.cos_film, n1, n);
     float path = 2.0 * n * thickness * film.cos_film;
-    film.cos_phi = 1.0;
-    for (int m = 0; m < 3; m++) film.harmonics[m] = vec3(1.0);
-    if (SPECTRAL) film.cos_phi = cos(2.0 * PI * fract(path / band_wavelength()));
-    else for (int m = 0; m < 3; m++) film.harmonics[m] = film_sensitivity(float(m + 1) * path);
+    film.cos_phi = SPECTRAL ? vec3(cos(2.0 * PI * fract(path / band_wavelength()))) : film_sensitivity(path);
+    film.cos_2_phi = film_sensitivity(2.0 * path);
+    film.cos_3_phi = film_sensitivity(3.0 * path);
     return film;
 }
 
 // Reflectance for one polarisation, with the amplitude ρ of the inner face.
 vec3 film_reflectance(Film film, float a, vec3 rho) {
-    if (SPECTRAL) return vec3(film_reflectance(a, rho.x, film.cos_phi));
     vec3 q = -a * rho;
-    vec3 sum = vec3(1.0) + 2.0 * q * (film.harmonics[0] + q * (film.harmonics[1] + q * film.harmonics[2]));
-    return clamp(1.0 - (1.0 - a * a) * (1.0 - rho * rho) / (1.0 - q * q) * sum, 0.0, 1.0);
+    vec3 sum = vec3(1.0) + 2.0 * q * (film.cos_phi + q * (film.cos_2_phi + q * film.cos_3_phi));
+    vec3 series = clamp(1.0 - (1.0 - a * a) * (1.0 - rho * rho) / (1.0 - q * q) * sum, 0.0, 1.0);
+    return SPECTRAL ? vec3(film_reflectance(a, rho.x, film.cos_phi.x)) : series;
 }
 
 // Reflectance of the film over a dielectric of index n2, unpolarised.
