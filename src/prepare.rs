@@ -232,7 +232,7 @@ impl Hierarchy {
     fn of(scene: &Scene, (bvh, build_ms): Tree, solids: &Solids, rays: Rays) -> Self {
         let extent = bvh.triangles.iter().flat_map(|t| t.corners.iter().flatten()).fold(0.0_f32, |m, x| m.max(x.abs()));
         let offset = ray_offset(extent.into());
-        let touching = rays.refraction && has_coincident_interfaces(&bvh, &solids.solid, offset);
+        let touching = rays.refraction && has_coincident_interfaces(&bvh, &solids.body, offset);
         Self { build_ms, offset, touching, warnings: odd_triangles(scene, &bvh, solids), bvh }
     }
 }

@@ -91,7 +91,7 @@ const FACTORS: &[Factor] = &[
     Factor { name: "interfaces", levels: &["1", "8"] },
     Factor { name: "absorption", levels: &["off", "thickness", "path", "march:4"] },
     Factor { name: "quadrature", levels: &["left", "midpoint", "simpson"] },
-    Factor { name: "indirect", levels: &["off", "ambient"] },
+    Factor { name: "indirect", levels: &["off", "ambient", "occlusion:4"] },
     Factor { name: "arithmetic", levels: &["fast", "stable", "compensated"] },
     Factor { name: "environment", levels: &["none", "constant", "studio"] },
     Factor { name: "background", levels: &["default", "transparent"] },
@@ -512,6 +512,7 @@ fn planned(ways: &Ways, choice: &Choice, knobs: Knobs) -> Plan {
 const NEEDS: &[(&str, &str)] = &[
     ("absorption", "transmissive hits"),
     ("ambient light", "environment"),
+    ("ambient occlusion", "environment"),
     ("anisotropy", "textures of lobes"),
     ("clear coat", "material layers"),
     ("tiled light culling", "punctual lights"),
@@ -536,8 +537,7 @@ fn any_two_effects_are_kept_together_and_apart() {
     let mut seen = BTreeSet::new();
     for (ways, choice) in spread() {
         let plan = planned(ways, choice, knobs(ways, choice));
-        // tests/plan.rs and tests/ambient_occlusion.rs have ambient occlusion.
-        let elsewhere = [OF_PATHS.as_slice(), &OF_WAVELENGTHS, &["ambient occlusion"]].concat();
+        let elsewhere = [OF_PATHS.as_slice(), &OF_WAVELENGTHS].concat();
         for a in plan.effects.iter().filter(|effect| !elsewhere.contains(&effect.id.name())) {
             states.entry(a.id.name()).or_default().insert(a.state.name());
         }
@@ -572,10 +572,11 @@ const OF_PATHS: [&str; 5] =
 const OF_WAVELENGTHS: [&str; 2] = ["spectral rendering", "dispersion"];
 
 /// Every other effect, except the one that only the hierarchy of triangles decides.
-const NAMES: [&str; 26] = [
+const NAMES: [&str; 27] = [
     "absorption",
     "alpha test in rays",
     "ambient light",
+    "ambient occlusion",
     "anisotropy",
     "clear coat",
     "conductors with n and kappa",

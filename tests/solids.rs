@@ -1,8 +1,13 @@
 //! What is a solid, and which solids a point lies in: against closed forms.
 
+use etalon::frame::Settings;
+use etalon::plan::{Knobs, Model};
+use etalon::scene::environment::Environment;
 use etalon::scene::solid::{Solids, deepest_nesting, is_closed, media_at, solids};
 use etalon::scene::{Instance, Material, Mesh, Scene};
 use etalon::study::{self, shape::Shape};
+use etalon_testing::gpu::{Gpu, largest_difference};
+use etalon_testing::made::looking;
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 
 fn mesh(name: &str, shape: Shape) -> Mesh {
@@ -311,4 +316,91 @@ fn holes_and_hollows_are_outside() {
     ] {
         assert_eq!(media_at(&scene, &found, p), expected, "{p}");
     }
+}
+
+/// The faces of a mesh, dealt to `count` meshes.
+fn dealt(whole: &Mesh, count: usize) -> Vec<Mesh> {
+    let part = |k: usize| {
+        let triangles = whole.indices.chunks_exact(3).enumerate().filter(|(i, _)| i / 2 % count == k);
+        let indices: Vec<u32> = triangles.flat_map(|(_, t)| t.to_vec()).collect();
+        Mesh { name: format!("part {k}"), indices: indices.into(), material: k, ..whole.clone() }
+    };
+    (0..count).map(part).collect()
+}
+
+fn in_parts(count: usize, turn: bool) -> Scene {
+    let whole = if turn { turned(cube("cube", 1.0)) } else { cube("cube", 1.0) };
+    let mut scene = scene_of(dealt(&whole, count).into_iter().map(|part| (part, DAffine3::IDENTITY)).collect());
+    scene.materials = vec![glass(); count];
+    scene
+}
+
+#[test]
+fn meshes_that_close_each_others_edges_bound_one_body() {
+    for turn in [false, true] {
+        let scene = in_parts(3, turn);
+        let found = solids(&scene);
+        assert_eq!((found.solid.clone(), found.sheet.clone()), (vec![true; 3], vec![false; 3]));
+        assert_eq!((found.body.clone(), found.medium.clone()), (vec![Some(0); 3], vec![0; 3]));
+        assert_eq!(found.flipped, [turn; 3]);
+        assert_eq!(media_at(&scene, &found, DVec3::splat(0.3)), [0], "inside");
+        assert!(media_at(&scene, &found, DVec3::splat(0.6)).is_empty(), "outside");
+    }
+    // An opaque lid closes a body, too, and is none of its own.
+    let mut lid = in_parts(3, false);
+    lid.materials[1].transmission = 0.0;
+    let found = solids(&lid);
+    assert_eq!((found.solid.clone(), found.body.clone()), (vec![true, false, true], vec![Some(0); 3]));
+    assert_eq!(media_at(&lid, &found, DVec3::splat(0.3)), [0]);
+}
+
+#[test]
+fn parts_of_other_media_or_elsewhere_bound_no_body() {
+    let mut two = in_parts(2, false);
+    two.materials[1].ior = 1.3;
+    let mut moved = in_parts(2, false);
+    moved.instances[1].world_from_object = DAffine3::from_translation(DVec3::X);
+    let mut missing = in_parts(3, false);
+    missing.instances.pop();
+    for (name, scene) in [("another index", two), ("another place", moved), ("a part is missing", missing)] {
+        let found = solids(&scene);
+        assert_eq!(found.solid, [false, false], "{name}");
+        assert_eq!(found.warnings.len(), 2, "{name}: {:?}", found.warnings);
+    }
+}
+
+/// A body refracts and absorbs as it does in one mesh, from outside and from inside.
+#[test]
+fn a_body_of_several_meshes_looks_like_one() {
+    let gpu = Gpu::hasty();
+    let inside = DVec3::new(0.1, 0.2, 0.3);
+    for (model, eye) in [
+        (Model::Recursive, DVec3::new(1.0, 1.5, 3.0)),
+        (Model::Recursive, inside),
+        (Model::Global, DVec3::new(1.0, 1.5, 3.0)),
+    ] {
+        let drawn = |count: usize| {
+            let mut scene = in_parts(count, false);
+            for material in &mut scene.materials {
+                *material = Material {
+                    attenuation_distance: 0.5,
+                    attenuation_color: [0.3, 0.6, 0.9],
+                    roughness: 0.0,
+                    ..glass()
+                };
+            }
+            scene.cameras.push(looking(eye, DVec3::ZERO));
+            let knobs = knobs(&["samples=1", "interfaces=4"], model);
+            gpu.shot(&scene, Some(&Environment::studio()), Settings { size: [48, 48], knobs, ..Settings::default() }).1
+        };
+        let difference = largest_difference(&drawn(1), &drawn(3), 1.0);
+        assert!(difference < 1e-4, "{model:?} from {eye}: {difference}");
+    }
+}
+
+fn knobs(choices: &[&str], model: Model) -> Knobs {
+    let mut knobs = Knobs::of(model);
+    let choices: Vec<String> = choices.iter().map(|&choice| choice.to_owned()).collect();
+    knobs.set_all(&choices).expect("rungs");
+    knobs
 }

@@ -34,6 +34,20 @@ float plus_infinity() {
     return uintBitsToFloat(0x7f800000u);
 }
 
+// x (1 − t) + y t. Not mix(): drivers compile it in one of two ways, by what else stands in the program, but all plans of a
+// scene have to agree to the bit.
+vec3 blend(vec3 x, vec3 y, float t) {
+    precise vec3 kept = x * (1.0 - t);
+    precise vec3 sum = kept + y * t;
+    return sum;
+}
+
+float blend(float x, float y, float t) {
+    precise float kept = x * (1.0 - t);
+    precise float sum = kept + y * t;
+    return sum;
+}
+
 // 2^n, n in [-126, 127].
 float power_of_two(int n) {
     return intBitsToFloat((n + 127) << 23);

@@ -23,7 +23,7 @@ vec3 environment_light_of(Surface s, BaseAlbedo albedo, vec3 irradiance, vec3 mi
 }
 
 // Narrow lobes that make up an anisotropic one.
-const uint LOBE_PARTS = 8;
+const uint LOBE_PARTS = 16;
 
 // The radiance of the environment in the lobe of the base. An anisotropic lobe is the sum of round ones, of the α across it,
 // around half vectors spread along its wide direction: variances add, so these have α² = α_t² − α_b² along and 0 across.
@@ -35,8 +35,7 @@ vec3 radiance_in_base_lobe(Surface s) {
             vec3 sum = vec3(0.0);
             float weights = 0.0;
             for (uint i = 0; i < LOBE_PARTS; i++) {
-                vec2 u = vec2((float(i) + 0.5) / float(LOBE_PARTS), unit_float(bitfieldReverse(i)));
-                vec3 r = reflect_ray(-s.v, anisotropic_half_vector(s, alphas, u)).R;
+                vec3 r = reflect_ray(-s.v, anisotropic_half_vector(s, alphas, half_turn_point(i, LOBE_PARTS))).R;
                 vec3 to = in_lobe_frame(s, r);
                 float weight = to.z > 0.0 ? anisotropic_g2_over_g1(in_lobe_frame(s, s.v), to, base_alphas(s)) : 0.0;
                 sum += weight * prefiltered_radiance(r, s.alpha);

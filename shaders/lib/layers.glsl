@@ -160,16 +160,23 @@ vec3 anisotropic_half_vector(Surface s, vec2 alphas, vec2 u) {
     return s.tangent * h.x + cross(s.n, s.tangent) * h.y + s.n * h.z;
 }
 
-// Directions of the Hammersley set that average an anisotropic lobe: the mean is within 0.035 of the integral (f64, seven
-// elevations, four azimuths, five materials). A round lobe of some mean α is off by up to 0.24.
+// Point i of `count` points of the unit square for the VNDF: half of them the Hammersley set, the others turned by half a turn.
+// The frame of the VNDF turns by half a turn where a view crosses the lobe's axis: with these points nothing is seen of that.
+vec2 half_turn_point(uint i, uint count) {
+    uint pair = i % (count / 2);
+    float turn = i < count / 2 ? 0.0 : 0.5;
+    return vec2((float(pair) + 0.5) / float(count / 2), 0.5 * unit_float(bitfieldReverse(pair)) + turn);
+}
+
+// Directions that average an anisotropic lobe: the mean is within 0.037 of the integral (f64, seven elevations, five azimuths,
+// five materials). A round lobe of some mean α is off by up to 0.24.
 const uint LOBE_DIRECTIONS = 32;
 
 // Factors of F0 and F90 in the directional albedo of the base's anisotropic lobe (as lib/reflectance.glsl of a round one).
 vec2 anisotropic_reflectance(Surface s) {
     vec2 sum = vec2(0.0);
     for (uint i = 0; i < LOBE_DIRECTIONS; i++) {
-        vec2 u = vec2((float(i) + 0.5) / float(LOBE_DIRECTIONS), unit_float(bitfieldReverse(i)));
-        vec3 h = anisotropic_half_vector(s, base_alphas(s), u);
+        vec3 h = anisotropic_half_vector(s, base_alphas(s), half_turn_point(i, LOBE_DIRECTIONS));
         vec3 r = reflect_ray(-s.v, h).R;
         vec3 to = in_lobe_frame(s, r);
         float weight = to.z > 0.0 ? anisotropic_g2_over_g1(in_lobe_frame(s, s.v), to, base_alphas(s)) : 0.0;
@@ -206,7 +213,7 @@ BaseAlbedo albedo_of_base(Surface s, vec2 ab) {
         BaseFresnel f = fresnel_of_base(s, mean_cosine(ab));
         bool at_mean = FRESNEL == FRESNEL_EXACT || s.film.x > 0.0;
         dielectric = at_mean ? f.dielectric * (ab.x + ab.y) : dielectric;
-        base = at_mean ? mix(f.dielectric, f.metal, s.metallic) * (ab.x + ab.y) : base;
+        base = at_mean ? blend(f.dielectric, f.metal, s.metallic) * (ab.x + ab.y) : base;
     }
     return BaseAlbedo(dielectric * s.compensation, base * s.compensation * left_to_base(s));
 }
@@ -310,7 +317,7 @@ FacetFresnel fresnel_below_coat(Layers b, float cos_in) {
         metal = metal_under_film(s, film, metal);
     }
     f.dielectric = f.total ? vec3(1.0) : f.dielectric;
-    f.base = mix(f.dielectric, metal, s.metallic);
+    f.base = blend(f.dielectric, metal, s.metallic);
     return f;
 }
 

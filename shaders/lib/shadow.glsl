@@ -152,7 +152,7 @@ float map_visibility(vec3 p, vec3 n, vec3 to_light, uint index, float size) {
     vec4 down = corner.y + vec4(0.5, 0.5, -0.5, -0.5) - at.y;
     vec4 plane = at.z + max(slope.x * across + slope.y * down, 0.0);
     vec4 lit = vec4(greaterThanEqual(plane, stored));
-    return mix(mix(lit.w, lit.z, share.x), mix(lit.x, lit.y, share.x), share.y);
+    return blend(blend(lit.w, lit.z, share.x), blend(lit.x, lit.y, share.x), share.y);
 }
 
 // Visibility by a shadow ray. p is in bvh space, n the normal of its triangle, source_face its coplanar group, v points to

@@ -135,8 +135,8 @@ Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, 
             s.metal_tint = s.f0_metal / normal_reflectance(s.n_metal, s.kappa_metal);
         }
     }
-    s.f0 = mix(s.f0_dielectric, s.f0_metal, metal);
-    s.f90 = mix(s.f90_dielectric, 1.0, metal);
+    s.f0 = blend(s.f0_dielectric, s.f0_metal, metal);
+    s.f90 = blend(s.f90_dielectric, 1.0, metal);
     s.ior = m.ior;
     s.n_outside = 1.0;
     s.compensation = vec3(1.0);

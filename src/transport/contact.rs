@@ -11,13 +11,14 @@ use rayon::prelude::*;
 
 use super::bvh::{Aabb, Bvh, Node, Triangle};
 
-/// Whether some triangle of an instance with `is_body` lies within `distance` metres of the plane of another instance's
-/// triangle, and their bounding boxes overlap. Coplanar triangles whose boxes overlap count even when the triangles do
+/// Whether some triangle of a body lies within `distance` metres of the plane of a triangle of another body or of another
+/// instance, and their bounding boxes overlap. `bodies`: the body of each instance (`Solids::body`). Coplanar triangles whose boxes overlap count even when the triangles do
 /// not: that costs only time. Shells of one mesh that touch each other are not searched: near the pole of a sphere,
 /// triangles that are not even neighbours are coplanar.
 #[must_use]
-pub fn has_coincident_interfaces(bvh: &Bvh, is_body: &[bool], distance: f64) -> bool {
-    bvh.triangles.par_iter().filter(|t| is_body[t.instance as usize]).any(|t| touches(bvh, t, distance))
+pub fn has_coincident_interfaces(bvh: &Bvh, bodies: &[Option<usize>], distance: f64) -> bool {
+    let is_body = |t: &&Triangle| bodies[t.instance as usize].is_some();
+    bvh.triangles.par_iter().filter(is_body).any(|t| touches(bvh, t, bodies, distance))
 }
 
 /// Duplicate triangles: for each pair of instances (equal indices for duplicates within one instance), the number of
@@ -52,7 +53,7 @@ pub fn twins(bvh: &Bvh) -> BTreeMap<[u32; 2], usize> {
     found
 }
 
-fn touches(bvh: &Bvh, triangle: &Triangle, distance: f64) -> bool {
+fn touches(bvh: &Bvh, triangle: &Triangle, bodies: &[Option<usize>], distance: f64) -> bool {
     let around = triangle.bounds();
     let apart = |other: &Aabb| {
         (0..3).any(|i| {
@@ -72,7 +73,7 @@ fn touches(bvh: &Bvh, triangle: &Triangle, distance: f64) -> bool {
             Node::Leaf { first, count, .. } => {
                 let inside = &bvh.triangles[*first as usize..(*first + *count) as usize];
                 let coincides = |other: &Triangle| {
-                    other.instance != triangle.instance
+                    bodies[other.instance as usize] != bodies[triangle.instance as usize]
                         && !apart(&other.bounds())
                         && (in_plane(triangle, other, distance) || in_plane(other, triangle, distance))
                 };
@@ -124,10 +125,10 @@ mod tests {
     fn small_and_large_faces_in_one_plane_touch_both_ways() {
         let offset = 32.0 * 5.0 * 2_f64.powi(-24);
         let bvh = squares(&[(10.0, 0.5), (0.01, 0.5), (1.0, 0.501)]);
-        assert!(has_coincident_interfaces(&bvh, &[true, false, false], offset));
-        assert!(has_coincident_interfaces(&bvh, &[false, true, false], offset));
-        assert!(!has_coincident_interfaces(&bvh, &[false, false, true], offset), "a millimetre is no contact");
-        assert!(!has_coincident_interfaces(&bvh, &[false; 3], offset));
+        assert!(has_coincident_interfaces(&bvh, &[Some(0), None, None], offset));
+        assert!(has_coincident_interfaces(&bvh, &[None, Some(1), None], offset));
+        assert!(!has_coincident_interfaces(&bvh, &[None, None, Some(2)], offset), "a millimetre is no contact");
+        assert!(!has_coincident_interfaces(&bvh, &[None; 3], offset));
     }
 
     #[test]

@@ -31,7 +31,8 @@ impl Media {
     #[must_use]
     pub fn at(scene: &Scene, solids: &Solids, p_world: DVec3) -> Self {
         let bodies = media_at(scene, solids, p_world);
-        Self(bodies.into_iter().map(|instance| scene.meshes[scene.instances[instance].mesh].material).collect())
+        let material = |instance: usize| scene.meshes[scene.instances[instance].mesh].material;
+        Self(bodies.into_iter().map(|instance| solids.medium[material(instance)]).collect())
     }
 
     /// The medium of the highest priority; of several the one entered last.
@@ -58,14 +59,15 @@ impl Media {
         if !solids.solid[instance] {
             return Boundary { before: of(present), behind: ior, ior, body: false, hidden: false, beyond };
         }
-        let entered = self.0.iter().rposition(|&known| known == material);
+        let medium = solids.medium[material];
+        let entered = self.0.iter().rposition(|&known| known == medium);
         match (front, entered) {
-            (true, _) => beyond.0.push(material),
+            (true, _) => beyond.0.push(medium),
             (false, Some(place)) => drop(beyond.0.remove(place)),
             (false, None) => {}
         }
         // A medium that the ray leaves without having entered it was around the ray from its start.
-        let here = if front || entered.is_some() { present } else { Some(material) };
+        let here = if front || entered.is_some() { present } else { Some(medium) };
         let there = beyond.present(scene);
         Boundary { before: of(here), behind: of(there), ior, body: true, hidden: here == there, beyond }
     }

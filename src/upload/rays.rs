@@ -297,7 +297,7 @@ impl RaysOnDevice {
         let mut camera_media = [0; 4];
         if sample_index == 0 {
             for &instance in &media_at(&self.bodies, &self.solids, view.eye) {
-                let material = self.bodies.meshes[self.bodies.instances[instance].mesh].material;
+                let material = self.solids.medium[self.bodies.meshes[self.bodies.instances[instance].mesh].material];
                 camera_media.copy_within(0..3, 1);
                 camera_media[0] = medium(&self.bodies.materials[material], material);
             }
@@ -523,11 +523,11 @@ impl<'a> CornerTable<'a> {
     }
 }
 
-/// The geometry of the instances that are closed dielectric meshes, under the same indices; other meshes are empty.
+/// The geometry of the instances that bound media, under the same indices; other meshes are empty.
 fn bodies(scene: &Scene, solids: &Solids, rays: Rays) -> Scene {
     let mut wanted = vec![false; scene.meshes.len()];
-    for (instance, &solid) in scene.instances.iter().zip(&solids.solid) {
-        wanted[instance.mesh] |= rays.refraction && solid;
+    for (instance, body) in scene.instances.iter().zip(&solids.body) {
+        wanted[instance.mesh] |= rays.refraction && body.is_some();
     }
     let mesh = |(mesh, &wanted): (&Mesh, &bool)| Mesh {
         positions: if wanted { mesh.positions.clone() } else { Shared::default() },

@@ -124,6 +124,8 @@ pub struct SceneOnDevice {
     refraction: bool,
     stored_normals: lib::normals::Constants,
     lobe_texels: bool,
+    /// The material whose medium each material has ([`Solids::medium`]).
+    media: Vec<usize>,
     /// Textures for rasterisation and for rays.
     pub textures: Textures,
     /// Per material, index of its set in [`SceneOnDevice::pages`].
@@ -257,7 +259,8 @@ impl SceneOnDevice {
         let instance_bytes = (scene.instances.len() * size_of::<share::Instance>()) as u64;
         let map_texels = if plan.shadow_maps { 6 * lib::light_table::SHADOW_MAP_TEXELS as usize } else { 0 };
         let light_bytes = (lights_cpu.len() * (LIGHT_TEXELS + map_texels) * 16) as u64;
-        let shared = |(i, m): (usize, &Material)| (shared_material(m, i, knobs, grids.places[i], None), m.lobes);
+        let media = solids.medium.clone();
+        let shared = |(i, m): (usize, &Material)| (shared_material(m, media[i], knobs, grids.places[i], None), m.lobes);
         let table = material_table(scene.materials.iter().enumerate().map(shared), &texture_slots_of);
         let texel_format = vk::Format::R32G32B32A32_UINT;
         let page_sets = page_materials
@@ -313,6 +316,7 @@ impl SceneOnDevice {
             refraction: plan.rays.is_some_and(|rays| rays.refraction),
             stored_normals: lib::normals::Constants { normals: plan.stored.normals as u32 },
             lobe_texels: plan.lobe_texels,
+            media,
             textures,
             page_of_material,
             page_materials,
@@ -347,9 +351,12 @@ impl SceneOnDevice {
         let Some(wavelengths) = &self.wavelengths else { return };
         let shared = |(i, m): (usize, &Material)| {
             let place = self.grids.places[i];
-            let Some(slice) = slice else { return (shared_material(m, i, &self.knobs, place, None), m.lobes) };
+            let Some(slice) = slice else {
+                return (shared_material(m, self.media[i], &self.knobs, place, None), m.lobes);
+            };
             let Banded { material, base_rgb, varies_rgb, emissive_rgb } = wavelengths.material(i, m, slice);
-            let mut shared = shared_material(&material, i, &self.knobs, place, Some(spectra::shares(&slice.band)));
+            let mut shared =
+                shared_material(&material, self.media[i], &self.knobs, place, Some(spectra::shares(&slice.band)));
             shared.flags |= if base_rgb { share::MATERIAL_BASE_RGB } else { 0 };
             shared.flags |= if varies_rgb { share::MATERIAL_VARIES_RGB } else { 0 };
             shared.flags |= if emissive_rgb { share::MATERIAL_EMISSIVE_RGB } else { 0 };
@@ -531,7 +538,7 @@ fn upsampling(knobs: &Knobs) -> Upsampling {
 /// The constants of a material. F0 of a dielectric is ((n − 1) / (n + 1))², tinted and scaled by
 /// KHR_materials_specular. Optical depth is −ln(attenuation colour) · thickness / attenuation distance (lecture A1,
 /// KHR_materials_volume). A grid of σ that is not marched (`grid` is 0) adds its mean. In a band, `shares` are the
-/// band's shares of red, green and blue.
+/// band's shares of red, green and blue. `index`: the material whose medium it has.
 fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32, shares: Option<[f64; 3]>) -> share::Material {
     let r = (m.ior - 1.0) / (m.ior + 1.0);
     let absorbs = knobs.absorption != rungs::Absorption::Off;

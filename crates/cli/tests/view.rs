@@ -201,8 +201,8 @@ fn time_passes_and_settings_are_compared() {
     viewer.key(V, None);
     let knob = KNOBS.iter().position(|knob| knob.name == "indirect").expect("a knob");
     (0..=knob).for_each(|_| viewer.key(DOWN, None));
-    // From the model's ambient light to none.
-    viewer.key(LEFT, None);
+    // From the model's ambient occlusion by sixteen rays over four rays and plain ambient light to none.
+    (0..3).for_each(|_| viewer.key(LEFT, None));
     viewer.key(ESCAPE, None);
     viewer.key(C, None);
     let left = viewer.line();

@@ -1,25 +1,32 @@
 //! Closed dielectric meshes (solids) and thin-walled surfaces, and the solids that contain a point.
 //!
 //! Refraction needs the side of the surface on which a ray is, and only a watertight mesh separates an inside from an
-//! outside. A transmissive mesh is therefore a solid if it is closed, and a thin-walled surface otherwise. Read Schmidt
+//! outside. A transmissive mesh is therefore a solid if it is closed, alone or with meshes that continue its edges, and a
+//! thin-walled surface otherwise. Read Schmidt
 //! and Budge, "Simple Nested Dielectrics in Ray Traced Images", journal of graphics tools, 2002; KHR_materials_volume.
 //! Assumes triangles counter-clockwise from the front.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use glam::{DVec3, Vec3};
 
-use super::{AlphaMode, Bounds, Instance, Mesh, Scene};
+use super::{AlphaMode, Bounds, Instance, Material, Mesh, Scene};
 
 /// A volume below this fraction of the sum of its terms' magnitudes is rounding error: the sum over a mesh of a million
 /// triangles has errors of 1e-16 each.
 const NO_VOLUME: f64 = 1e-12;
 
-/// Solids and thin-walled surfaces among the instances of a scene; each list has one entry per instance.
+/// Solids and thin-walled surfaces among the instances of a scene; each list has one entry per instance, `medium` one
+/// per material.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Solids {
-    /// Closed transmissive meshes.
+    /// Closed transmissive meshes, and transmissive parts of closed bodies of several meshes.
     pub solid: Vec<bool>,
+    /// The body that an instance bounds, by its first instance. A closed mesh is a body of its own. The parts of a body of
+    /// several meshes have one number, opaque parts too. `None` for surfaces that bound no body.
+    pub body: Vec<Option<usize>>,
+    /// The material whose medium a material has inside: the first one of a body of several materials, usually itself.
+    pub medium: Vec<usize>,
     /// Transmissive thin-walled surfaces, of their nominal thickness: blended, thickness 0, or a mesh that bounds no
     /// volume. False for surfaces that do not transmit.
     pub sheet: Vec<bool>,
@@ -39,26 +46,26 @@ pub struct Solids {
 /// closed.
 #[must_use]
 pub fn is_closed(mesh: &Mesh) -> bool {
-    let mut names = HashMap::with_capacity(mesh.positions.len());
-    let welded: Vec<u32> = mesh
-        .positions
-        .iter()
-        .map(|p| {
-            let next = names.len() as u32;
-            *names.entry(p.map(|x| (x + 0.0).to_bits())).or_insert(next)
-        })
-        .collect();
+    mesh.indices.as_chunks::<3>().0.iter().any(|&[a, b, c]| a != b && b != c && c != a) && rim(mesh).is_empty()
+}
+
+/// A directed edge: the bits of both ends, the smaller first.
+type Edge = [[u32; 3]; 2];
+
+/// The open edges of a mesh, welded by position: how much more often each is run from its smaller to its larger end than
+/// back.
+fn rim(mesh: &Mesh) -> HashMap<Edge, i64> {
+    let at = |i: u32| mesh.positions[i as usize].map(|x| (x + 0.0).to_bits());
     let mut edges = Vec::with_capacity(mesh.indices.len());
     for triangle in mesh.indices.as_chunks::<3>().0 {
-        let [a, b, c] = triangle.map(|i| welded[i as usize]);
+        let [a, b, c] = triangle.map(at);
         if a != b && b != c && c != a {
-            edges.extend([(a, b), (b, c), (c, a)].map(|(p, q)| (p.min(q), p.max(q), if p < q { 1 } else { -1 })));
+            edges.extend([(a, b), (b, c), (c, a)].map(|(p, q)| ([p.min(q), p.max(q)], if p < q { 1 } else { -1 })));
         }
     }
     edges.sort_unstable();
-    let ends = |edge: &(u32, u32, i64)| (edge.0, edge.1);
-    !edges.is_empty()
-        && edges.chunk_by(|e, f| ends(e) == ends(f)).all(|same| same.iter().map(|e| e.2).sum::<i64>() == 0)
+    let same = edges.chunk_by(|e, f| e.0 == f.0);
+    same.map(|same| (same[0].0, same.iter().map(|e| e.1).sum())).filter(|&(_, count)| count != 0).collect()
 }
 
 fn corners(mesh: &Mesh) -> impl Iterator<Item = [DVec3; 3]> {
@@ -66,13 +73,14 @@ fn corners(mesh: &Mesh) -> impl Iterator<Item = [DVec3; 3]> {
     mesh.indices.as_chunks::<3>().0.iter().map(move |triangle| triangle.map(at))
 }
 
-/// Volume of a closed mesh in object space: positive when its fronts look outwards, 0 when it is below rounding error.
-fn signed_volume(mesh: &Mesh) -> f64 {
-    let all = || mesh.positions.iter().map(|&p| Vec3::from(p).as_dvec3());
+/// Volume in object space of what meshes bound together: positive when their fronts look outwards, 0 when it is below
+/// rounding error.
+fn signed_volume(meshes: &[&Mesh]) -> f64 {
+    let all = || meshes.iter().flat_map(|mesh| mesh.positions.iter()).map(|&p| Vec3::from(p).as_dvec3());
     // Tetrahedra from the middle of the mesh: from a distant origin they would be large and cancel.
     let middle = (all().fold(DVec3::INFINITY, DVec3::min) + all().fold(DVec3::NEG_INFINITY, DVec3::max)) * 0.5;
     let (mut sum, mut magnitude) = (0.0, 0.0);
-    for [a, b, c] in corners(mesh) {
+    for [a, b, c] in meshes.iter().flat_map(|mesh| corners(mesh)) {
         let six = (a - middle).dot((b - middle).cross(c - middle));
         sum += six;
         magnitude += six.abs();
@@ -100,76 +108,153 @@ enum Body {
 }
 
 fn body(mesh: &Mesh) -> Body {
-    if !is_closed(mesh) {
-        return Body::Open;
-    }
-    match signed_volume(mesh) {
+    if is_closed(mesh) { closed_body(&[mesh]) } else { Body::Open }
+}
+
+fn closed_body(meshes: &[&Mesh]) -> Body {
+    match signed_volume(meshes) {
         v if v > 0.0 => Body::Solid,
         v if v < 0.0 => Body::InsideOut,
         _ => Body::Empty,
     }
 }
 
+/// Whether light in both materials meets the same medium inside.
+fn same_medium(a: &Material, b: &Material) -> bool {
+    let of = |m: &Material| (m.ior, m.attenuation_distance, m.attenuation_color, m.priority, m.dispersion);
+    of(a) == of(b) && a.sigma.is_none() && b.sigma.is_none()
+}
+
+/// Whether a material refracts as the boundary of a medium where its mesh is closed. Alpha-blended surfaces do not refract.
+fn bounds_medium(m: &Material) -> bool {
+    m.transmission > 0.0 && m.thickness > 0.0 && m.alpha_mode != AlphaMode::Blend
+}
+
+/// Bodies of several meshes, such as the primitives of one glTF mesh: an open transmissive mesh, and meshes in the same
+/// place whose open edges close its own. Each is a list of instances, the first one transmissive. Parts that transmit have one
+/// medium.
+fn joint_bodies(scene: &Scene, open: &[usize]) -> Vec<Vec<usize>> {
+    let material = |instance: usize| &scene.materials[scene.meshes[scene.instances[instance].mesh].material];
+    let place = |instance: usize| scene.instances[instance].world_from_object.to_cols_array().map(f64::to_bits);
+    let places: HashSet<[u64; 12]> = open.iter().map(|&i| place(i)).collect();
+    let mut rims: HashMap<usize, HashMap<Edge, i64>> = HashMap::new();
+    let mut at_edge: HashMap<([u64; 12], Edge), Vec<usize>> = HashMap::new();
+    for i in (0..scene.instances.len()).filter(|&i| !open.is_empty() && places.contains(&place(i))) {
+        let rim = rims.entry(scene.instances[i].mesh).or_insert_with(|| rim(&scene.meshes[scene.instances[i].mesh]));
+        for &edge in rim.keys() {
+            at_edge.entry((place(i), edge)).or_default().push(i);
+        }
+    }
+    let mut joined: HashSet<usize> = HashSet::new();
+    let mut bodies = Vec::new();
+    for &first in open {
+        let mut parts = vec![first];
+        let mut open_edges = rims[&scene.instances[first].mesh].clone();
+        while let Some((&edge, &count)) = open_edges.iter().min() {
+            let closes = |&&i: &&usize| {
+                let fits = !bounds_medium(material(i)) || same_medium(material(first), material(i));
+                let opposite = rims[&scene.instances[i].mesh].get(&edge).is_some_and(|other| other * count < 0);
+                fits && opposite && !parts.contains(&i) && !joined.contains(&i)
+            };
+            let Some(&next) = at_edge[&(place(first), edge)].iter().find(closes) else { break };
+            for (&edge, &count) in &rims[&scene.instances[next].mesh] {
+                let sum = open_edges.entry(edge).or_default();
+                *sum += count;
+                if *sum == 0 {
+                    open_edges.remove(&edge);
+                }
+            }
+            parts.push(next);
+        }
+        if open_edges.is_empty() && !joined.contains(&first) {
+            joined.extend(&parts);
+            bodies.push(parts);
+        }
+    }
+    bodies
+}
+
 /// Classifies the transmissive instances as solids or thin-walled surfaces; each mesh is tested once.
 #[must_use]
 pub fn solids(scene: &Scene) -> Solids {
-    let mut warnings = Vec::new();
-    let mut bodies: Vec<Option<Body>> = vec![None; scene.meshes.len()];
-    let (mut solid, mut sheet, mut flipped, mut normals_flipped) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for instance in &scene.instances {
-        let mesh = &scene.meshes[instance.mesh];
-        let material = &scene.materials[mesh.material];
-        // Alpha-blended surfaces do not refract.
-        let blends = material.alpha_mode == AlphaMode::Blend;
-        if material.transmission <= 0.0 || material.thickness <= 0.0 || blends {
-            solid.push(false);
-            sheet.push(material.transmission > 0.0);
-            flipped.push(false);
-            normals_flipped.push(false);
+    let count = scene.instances.len();
+    let mesh = |instance: usize| &scene.meshes[scene.instances[instance].mesh];
+    let material = |instance: usize| &scene.materials[mesh(instance).material];
+    let mut of_meshes: Vec<Option<Body>> = vec![None; scene.meshes.len()];
+    let mut classes: Vec<Option<Body>> = (0..count)
+        .map(|i| {
+            let known = &mut of_meshes[scene.instances[i].mesh];
+            bounds_medium(material(i)).then(|| *known.get_or_insert_with(|| body(mesh(i))))
+        })
+        .collect();
+    let is_solid = |class: Option<Body>| matches!(class, Some(Body::Solid | Body::InsideOut));
+    let mut body: Vec<Option<usize>> = (0..count).map(|i| is_solid(classes[i]).then_some(i)).collect();
+    let mut medium: Vec<usize> = (0..scene.materials.len()).collect();
+    let open: Vec<usize> = (0..count).filter(|&i| classes[i] == Some(Body::Open)).collect();
+    for parts in joint_bodies(scene, &open) {
+        let whole = closed_body(&parts.iter().map(|&i| mesh(i)).collect::<Vec<_>>());
+        if !is_solid(Some(whole)) {
             continue;
         }
-        let body = *bodies[instance.mesh].get_or_insert_with(|| {
-            let body = body(mesh);
-            let what = match body {
-                Body::Solid => return body,
-                Body::InsideOut => "is inside out: its faces are turned",
-                Body::Open => "is not closed: read as a thin sheet of its nominal thickness",
-                Body::Empty => "bounds no volume: read as a thin sheet of its nominal thickness",
-            };
-            let grid = if material.sigma.is_some() && body != Body::InsideOut {
-                ", its grid of sigma by its mean"
-            } else {
-                ""
-            };
-            warnings.push(format!("mesh \"{}\" transmits light and {what}{grid}", mesh.name));
-            body
-        });
-        solid.push(matches!(body, Body::Solid | Body::InsideOut));
-        sheet.push(matches!(body, Body::Open | Body::Empty));
-        flipped.push(body == Body::InsideOut);
-        normals_flipped.push(body == Body::InsideOut && normals_follow_faces(mesh));
+        for &i in &parts {
+            body[i] = Some(parts[0]);
+            if bounds_medium(material(i)) {
+                classes[i] = Some(whole);
+                let [a, b] = [parts[0], i].map(|i| medium[mesh(i).material]);
+                medium.iter_mut().filter(|of| **of == a.max(b)).for_each(|of| *of = a.min(b));
+            }
+        }
     }
-    Solids { solid, sheet, flipped, normals_flipped, warnings }
+    let mut warned = HashSet::new();
+    let mut warnings = Vec::new();
+    for i in (0..count).filter(|&i| classes[i].is_some()) {
+        let what = match classes[i] {
+            Some(Body::InsideOut) => "is inside out: its faces are turned",
+            Some(Body::Open) => "is not closed: read as a thin sheet of its nominal thickness",
+            Some(Body::Empty) => "bounds no volume: read as a thin sheet of its nominal thickness",
+            _ => continue,
+        };
+        let flat = material(i).sigma.is_some() && classes[i] != Some(Body::InsideOut);
+        let grid = if flat { ", its grid of sigma by its mean" } else { "" };
+        if warned.insert(scene.instances[i].mesh) {
+            warnings.push(format!("mesh \"{}\" transmits light and {what}{grid}", mesh(i).name));
+        }
+    }
+    let inside_out = |i: usize| classes[i] == Some(Body::InsideOut);
+    Solids {
+        solid: (0..count).map(|i| is_solid(classes[i])).collect(),
+        body,
+        medium,
+        sheet: (0..count).map(|i| material(i).transmission > 0.0 && !is_solid(classes[i])).collect(),
+        flipped: (0..count).map(inside_out).collect(),
+        normals_flipped: (0..count).map(|i| inside_out(i) && normals_follow_faces(mesh(i))).collect(),
+        warnings,
+    }
 }
 
-/// Transmissive solids that contain a point, as indices of instances, the one with the largest box first: nested solids
-/// come from the outside in.
+/// Bodies that contain a point, by their first instance ([`Solids::body`]), the one with the largest box first: nested
+/// solids come from the outside in.
 ///
 /// The test is the winding number: the signed solid angles of the triangles, seen from the point, sum to ±4π inside and
 /// to 0 outside, for any winding and mirroring. On the surface itself the result is either.
 #[must_use]
 pub fn media_at(scene: &Scene, solids: &Solids, p_world: DVec3) -> Vec<usize> {
-    let mut media = Vec::new();
+    let mut bodies: BTreeMap<usize, (Vec<usize>, Bounds)> = BTreeMap::new();
     for (i, instance) in scene.instances.iter().enumerate() {
-        let mesh = &scene.meshes[instance.mesh];
-        if !solids.solid[i] {
-            continue;
+        if let Some(body) = solids.body[i] {
+            let bounds = seen_from(&scene.meshes[instance.mesh], instance, p_world);
+            let (parts, all) = bodies.entry(body).or_insert_with(|| (Vec::new(), bounds));
+            parts.push(i);
+            *all = Bounds { min: all.min.min(bounds.min), max: all.max.max(bounds.max) };
         }
-        let bounds = seen_from(mesh, instance, p_world);
+    }
+    let mut media = Vec::new();
+    for (body, (parts, bounds)) in bodies {
         let is_near = bounds.min.cmple(DVec3::ZERO).all() && bounds.max.cmpge(DVec3::ZERO).all();
-        if is_near && winding_number(mesh, instance, p_world).abs() > 0.5 {
+        let winding = |&i: &usize| winding_number(&scene.meshes[scene.instances[i].mesh], &scene.instances[i], p_world);
+        if is_near && parts.iter().map(winding).sum::<f64>().abs() > 0.5 {
             let size = bounds.max - bounds.min;
-            media.push((size.x * size.y * size.z, i));
+            media.push((size.x * size.y * size.z, body));
         }
     }
     media.sort_by(|a, b| b.0.total_cmp(&a.0));

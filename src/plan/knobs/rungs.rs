@@ -130,7 +130,7 @@ pub struct Knob {
 pub enum Model {
     /// Direct light with shadow maps; the environment as ambient light and reflection.
     Local,
-    /// Adds ray-traced shadows, reflections and refraction.
+    /// Adds ray-traced shadows, ambient occlusion, reflections and refraction.
     #[default]
     Recursive,
     /// Path tracing: full indirect light.
@@ -270,7 +270,7 @@ knob! {
         Off = "off", Ambient = "ambient", Occlusion4 = "occlusion:4", Occlusion16 = "occlusion:16",
         Occlusion64 = "occlusion:64", Path = "path",
     }
-    presets: [Ambient, Ambient, Path],
+    presets: [Ambient, Occlusion16, Path],
     exact: Path,
     lecture: ["R6"],
     effects: [PathTracing, AmbientLight, AmbientOcclusion],
