@@ -314,7 +314,7 @@ fn media_bring_their_code() {
 /// What ambient occlusion brings to a scene without lights and mirrors, with its environment.
 const OF_OCCLUSION: &[&[&str]] = &[
     &["BVH nodes", "BVH triangles", "corners for rays", "leaf places", "[reset work counts]", "work counts"],
-    &["G-buffer triangles", "light.stored_triangles"],
+    &["G-buffer triangles"],
     &["environment", "background.sky", "directional reflectance"],
     &["[ambient occlusion]", "ambient", "sky directions"],
 ];

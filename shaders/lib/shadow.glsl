@@ -74,7 +74,7 @@ vec3 filtered(HitPoint point, vec3 direction, inout uvec4 media) {
     b.transmits = hit.transmits * (1.0 - hit.s.metallic);
     b.f_dielectric = straight_reflectance(hit.s, cos_v, n1, n2);
     b.under = CLEARCOAT ? 1.0 - fresnel_of_coat(hit.s, cos_v) : 1.0;
-    return 1.0 - hit.coverage + hit.coverage * straight_transmittance(b);
+    return blend(vec3(1.0), straight_transmittance(b), hit.coverage);
 }
 
 // A known hit with its barycentric coordinates recomputed.

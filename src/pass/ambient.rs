@@ -30,6 +30,9 @@ pub fn ambient<'a>(
         surface_tiles: &work.surface,
         work: &work.sizes,
     };
-    let constants = ambient::Constants { library: lighting.library };
+    let mut library = lighting.library;
+    // Rays start on the triangles. Lights with shadow maps are looked up from depth, whether or not there is this pass.
+    library.gbuffer.stored_triangles = true;
+    let constants = ambient::Constants { library };
     frame.compute_indirect("ambient occlusion", &bind, &constants, &(), &work.sizes, 0)
 }

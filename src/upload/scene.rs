@@ -573,7 +573,8 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32, shares:
         // An interface between equal indices reflects nothing, at no angle.
         f90: if m.ior == 1.0 { 0.0 } else { m.specular },
         ior: m.ior,
-        occlusion_strength: m.occlusion_strength,
+        // Rays compute what occlusion textures approximate.
+        occlusion_strength: if knobs.indirect.occlusion_rays() > 0 { 0.0 } else { m.occlusion_strength },
         normal_scale: m.normal_scale,
         alpha_cutoff,
         transmission: m.transmission,

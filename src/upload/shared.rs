@@ -124,7 +124,7 @@ impl<'a> OnDevice<'a> {
                 stored_emissive: plan.emissive,
                 stored_layers: plan.layers,
                 stored_lobes: plan.lobe_texels,
-                stored_triangles: shadow_rays || rays.inside() || with.occlusion > 0,
+                stored_triangles: shadow_rays || rays.inside(),
                 stored_transmission: with.refraction,
             },
             gbuffer_interface: lib::gbuffer_interface::Constants::default(),
