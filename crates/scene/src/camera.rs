@@ -2,9 +2,7 @@
 //!
 //! Read glTF 2.0 section 3.10 and README, "Conventions". The camera looks along −Z.
 
-use glam::{DAffine3, DMat3, DVec2, DVec3};
-
-use super::Bounds;
+use glam::{DAffine3, DMat3, DVec3};
 
 /// A camera in the world. It looks along −Z of its frame; +X is to the right and +Y is up in the picture.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,54 +86,11 @@ impl Camera {
             projection: Projection::Perspective { fov_y, near: None },
         })
     }
-
-    /// A camera in front of a box, somewhat to the right and above, with the box just inside the picture.
-    #[must_use]
-    pub fn framing(bounds: Bounds, aspect: f64, fov_y: f64) -> Self {
-        const MARGIN: f64 = 1.06;
-        let backward = DVec3::new(0.4, 0.35, 1.0).normalize();
-        let right = DVec3::Y.cross(backward).normalize();
-        let up = backward.cross(right);
-        let tangent = DVec2::new((fov_y * 0.5).tan() * aspect, (fov_y * 0.5).tan()) / MARGIN;
-        let mut distance = 0.0_f64;
-        for corner in 0..8 {
-            let pick = |bit: i32, min: f64, max: f64| if corner >> bit & 1 == 0 { min } else { max };
-            let (min, max) = (bounds.min, bounds.max);
-            let offset =
-                DVec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z)) - bounds.center();
-            let toward = offset.dot(backward);
-            distance = distance
-                .max(offset.dot(right).abs() / tangent.x + toward)
-                .max(offset.dot(up).abs() / tangent.y + toward);
-        }
-        // A box of one point has size 0.
-        let distance = if distance > 0.0 { distance } else { 1.0 };
-        let frame = DMat3::from_cols(right, up, backward);
-        Self {
-            name: "framing".to_owned(),
-            world_from_camera: DAffine3::from_mat3_translation(frame, bounds.center() + backward * distance),
-            projection: Projection::Perspective { fov_y, near: None },
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn framing_contains_the_box() {
-        let bounds = Bounds { min: DVec3::new(-1.0, 2.0, -3.0), max: DVec3::new(4.0, 2.5, 7.0) };
-        for aspect in [0.3, 1.0, 3.0] {
-            let camera = Camera::framing(bounds, aspect, 0.7);
-            let to_camera = camera.world_from_camera.inverse();
-            for corner in [bounds.min, bounds.max, DVec3::new(-1.0, 2.5, 7.0), DVec3::new(4.0, 2.0, -3.0)] {
-                let p = to_camera.transform_point3(corner);
-                let tangent = 0.35_f64.tan();
-                assert!(p.z < 0.0 && (p.y / -p.z).abs() < tangent && (p.x / -p.z).abs() < tangent * aspect);
-            }
-        }
-    }
 
     #[test]
     fn impossible_cameras_are_errors() {

@@ -12,6 +12,7 @@ mod container;
 pub mod decompress;
 pub mod environment;
 pub mod extensions;
+pub mod framing;
 mod geometry;
 mod gltf_extras;
 mod gltf_import;

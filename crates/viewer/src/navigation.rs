@@ -3,7 +3,6 @@
 
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 
-use etalon::scene::camera::DEFAULT_FOV_Y;
 use etalon::scene::{Bounds, Camera, Projection};
 
 /// Rotation in radians for a drag over the height of the window.
@@ -164,17 +163,18 @@ impl Navigation {
     pub fn fit(&mut self, aspect: f64) {
         self.keep();
         self.moved = true;
-        let fov_y = match self.view.projection {
-            Projection::Perspective { fov_y, .. } => fov_y,
-            Projection::Orthographic { .. } => DEFAULT_FOV_Y,
-        };
-        let narrow = (fov_y * 0.5).tan() * aspect.min(1.0);
-        // The bounding sphere touches the sides of the picture.
-        self.distance = self.size / narrow.atan().sin();
-        if let Projection::Orthographic { half_height, .. } = &mut self.view.projection {
-            *half_height = self.size / aspect.min(1.0);
+        match &mut self.view.projection {
+            Projection::Perspective { fov_y, .. } => {
+                let frame = self.view.world_from_camera.matrix3;
+                self.view.world_from_camera = Camera::facing(self.bounds, frame, aspect, *fov_y).world_from_camera;
+                self.distance = self.distance_to_middle();
+            }
+            Projection::Orthographic { half_height, .. } => {
+                *half_height = self.size / aspect.min(1.0);
+                self.distance = 2.0 * self.size;
+                self.view.world_from_camera.translation = self.bounds.center() - self.forward() * self.distance;
+            }
         }
-        self.view.world_from_camera.translation = self.bounds.center() - self.forward() * self.distance;
     }
 
     /// Rotates the camera about an axis through the point `pivot`.
