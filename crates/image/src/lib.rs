@@ -7,6 +7,7 @@
 pub mod exr;
 pub mod file;
 pub mod halves;
+pub mod meter;
 pub mod metric;
 pub mod png;
 pub mod tone;
