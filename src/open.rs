@@ -3,18 +3,38 @@
 //! Read examples/render.rs, and docs/scene-input.md for the formats.
 
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use anyhow::{Result, anyhow, bail};
+use serde::Serialize;
 
-use crate::frame::{Renderer, Settings};
+use crate::frame::{Background, Renderer, Settings, TileShare};
 use crate::gpu::Device;
-use crate::plan::Plan;
+use crate::image::meter::Meter;
+use crate::plan::rungs::Indirect;
+use crate::plan::{Knobs, Plan};
 use crate::prepare::{Original, Prepared};
 use crate::scene::camera::DEFAULT_FOV_Y;
 use crate::scene::environment::Environment;
 use crate::scene::{Camera, LoadOptions, Scene, Source};
 use crate::study;
+use crate::transport::emitters::emitted;
+
+/// Intensity of the studio as fill light beside the lights of a file: one stop below the studio that lights a file
+/// without lights, so that the file's lights stay the key light. At a quarter, the bronze of LightsPunctualLamp is black
+/// where its lamps do not reach; at 1, the lamps are lost in the daylight.
+const FILL: f32 = 0.5;
+
+/// Emissive surfaces light a scene, and no studio is added, if the light that they send through the scene's bounding
+/// sphere is at least this fraction of what the studio sends in. CornellBox has 1.13, EmissiveStrengthTest 0.09.
+const EMISSIVE: f64 = 0.02;
+/// Mean radiance of the studio.
+const STUDIO: f64 = 0.83;
+
+/// Pixels of the longer side of a metered picture.
+const METERED_SIDE: u32 = 160;
+/// Samples of a metered picture, at most.
+const METERED_SAMPLES: u32 = 4;
 
 /// A scene, its environment, and a default camera. Clones share the large data.
 ///
@@ -39,8 +59,35 @@ pub struct Opened {
     pub original: Original,
     environment: Option<Environment>,
     is_asked_for: bool,
+    /// Whether the scene is a file, for which the built-in studio is chosen by what the file contains.
+    is_file: bool,
+    /// Light of the emissive surfaces as a fraction of the studio's, of the first frame: a sequence is lit alike.
+    emission: OnceLock<f64>,
+    /// Whether the light is chosen for models that follow the light of surfaces; `None`: by the knobs of each picture.
+    follows: Option<bool>,
     /// Warnings of the readers about skipped parts of the scene's file and of the environment's, one sentence each.
     pub warnings: Vec<String>,
+}
+
+/// What lights a picture, and why.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LitBy {
+    /// Name of the environment map that lights the scene.
+    pub environment: Option<String>,
+    /// Factor of its radiance from the rule below; `--env-intensity` multiplies it.
+    pub factor: f32,
+    /// Number of punctual and area lights of the scene, without those that stand for emissive surfaces.
+    pub lights: usize,
+    /// Whether strong emissive surfaces light others.
+    pub emissive_surfaces: bool,
+    /// One sentence.
+    pub sentence: String,
+}
+
+/// Whether `scene` is the name of a file and not of a study scene.
+#[must_use]
+pub fn is_file(scene: &str) -> bool {
+    !scene.starts_with("study:")
 }
 
 /// Loads a scene by name: a path, or `study:` and the name of a study scene.
@@ -68,13 +115,13 @@ pub fn source(name: &str, options: LoadOptions) -> Result<Source> {
     }
 }
 
-/// A camera that sees the whole scene.
+/// A camera that frames the whole scene ([`Scene::framing`]).
 ///
 /// # Errors
 /// When the scene has nothing to draw.
 pub fn framing(scene: &Scene, size: [u32; 2], fov_y: f64) -> Result<Camera> {
-    let bounds = scene.bounds().ok_or_else(|| anyhow!("{}: there is nothing to draw", scene.name))?;
-    Ok(Camera::framing(bounds, f64::from(size[0]) / f64::from(size[1]), fov_y))
+    let aspect = f64::from(size[0]) / f64::from(size[1]);
+    scene.framing(aspect, fov_y).ok_or_else(|| anyhow!("{}: there is nothing to draw", scene.name))
 }
 
 impl Opened {
@@ -83,7 +130,8 @@ impl Opened {
     /// # Errors
     /// One sentence with file, place and cause.
     pub fn load(name: &str) -> Result<Self> {
-        Ok(Self::new(scene(name, &LoadOptions::default())?, Some(Environment::studio()), false))
+        let scene = scene(name, &LoadOptions::default())?;
+        Ok(Self { is_file: is_file(name), ..Self::new(scene, Some(Environment::studio()), false) })
     }
 
     /// A scene in an environment. The environment lights the scene if it `is_asked_for`, if the scene has no lights, or
@@ -91,7 +139,22 @@ impl Opened {
     #[must_use]
     pub fn new(scene: Scene, environment: Option<Environment>, is_asked_for: bool) -> Self {
         let warnings = scene.warnings.clone();
-        Self { original: scene.into(), environment, is_asked_for, warnings }
+        Self {
+            original: scene.into(),
+            environment,
+            is_asked_for,
+            is_file: false,
+            emission: OnceLock::new(),
+            follows: None,
+            warnings,
+        }
+    }
+
+    /// A scene that was read by `name` in an environment. If it is a file and the environment is not asked for, what
+    /// the file contains decides how the environment lights it ([`Opened::lit_by`]).
+    #[must_use]
+    pub fn named(name: &str, scene: Scene, environment: Option<Environment>, is_asked_for: bool) -> Self {
+        Self { is_file: is_file(name), ..Self::new(scene, environment, is_asked_for) }
     }
 
     /// Replaces the scene by another frame of its animation, in the same environment.
@@ -114,11 +177,130 @@ impl Opened {
     /// The environment that lights the scene, and settings with the scene's environment intensity.
     #[must_use]
     pub fn lit(&self, mut settings: Settings) -> (Option<&Environment>, Settings) {
-        let scene = self.scene();
-        let of_scene = || scene.studio.or(scene.lights.is_empty().then_some(1.0));
-        let share = if self.is_asked_for { Some(1.0) } else { of_scene() };
+        let (share, _) = self.share(&settings.knobs);
         settings.environment_intensity *= share.unwrap_or(1.0);
         (self.environment.as_ref().filter(|_| share.is_some()), settings)
+    }
+
+    /// Factor of the environment, `None` where it does not light the scene, and the reason.
+    ///
+    /// Asked for, it lights as it is; a scene built by code says itself. For a file:
+    /// - where paths follow the light of emissive surfaces and there is enough of it, the author lit the scene with them
+    ///   and a studio would drown them;
+    /// - beside lights it is a fill light ([`FILL`]): nearly all viewers show a file's lights in an environment, and
+    ///   authors count on it;
+    /// - without lights it is all the light there is. That includes emissive surfaces in models that do not follow their
+    ///   light: they would hang in a black picture.
+    fn share(&self, knobs: &Knobs) -> (Option<f32>, &'static str) {
+        let scene = self.scene();
+        let is_followed = self.follows.unwrap_or(knobs.indirect == Indirect::Path);
+        match (self.is_asked_for, scene.studio) {
+            (true, _) => (Some(1.0), "as asked for"),
+            (_, Some(studio)) => (Some(studio), "as the scene says"),
+            _ if self.is_file && is_followed && self.is_lit_by_emission() => {
+                (None, "without the built-in studio, which --background env adds")
+            }
+            _ if scene.lights.is_empty() && !is_followed && self.is_lit_by_emission() => (
+                Some(1.0),
+                "because the scene has no lights but emissive surfaces, whose light only --model global follows",
+            ),
+            _ if scene.lights.is_empty() => (Some(1.0), "because the scene has no lights"),
+            _ if self.is_file => (Some(FILL), "as fill light, which --env none removes"),
+            _ => (None, ""),
+        }
+    }
+
+    /// Keeps the light that these knobs choose for all other knobs, too: for pictures that are compared.
+    pub fn keep_light(&mut self, knobs: &Knobs) {
+        self.follows = Some(knobs.indirect == Indirect::Path);
+    }
+
+    /// Whether the environment depends on the knobs of a picture.
+    #[must_use]
+    pub fn has_light_by_knobs(&self) -> bool {
+        self.is_file && !self.is_asked_for && self.scene().studio.is_none() && self.is_lit_by_emission()
+    }
+
+    /// Whether the scene's emissive surfaces send a considerable amount of light ([`EMISSIVE`]).
+    fn is_lit_by_emission(&self) -> bool {
+        self.emission() >= EMISSIVE
+    }
+
+    /// Light that emissive surfaces send out through the scene's bounding sphere, over what the studio sends in.
+    fn emission(&self) -> f64 {
+        *self.emission.get_or_init(|| {
+            let radius = self.scene().bounds().map_or(0.0, |bounds| bounds.radius());
+            let sphere = 4.0 * std::f64::consts::PI * radius * radius;
+            if sphere > 0.0 { emitted(self.scene()) / (STUDIO * sphere) } else { 0.0 }
+        })
+    }
+
+    /// What lights a picture with these knobs.
+    #[must_use]
+    pub fn lit_by(&self, knobs: &Knobs) -> LitBy {
+        let (share, why) = self.share(knobs);
+        let environment = self.environment.as_ref().filter(|_| share.is_some()).map(|map| map.name.clone());
+        let lights = self.scene().lights.iter().filter(|light| !light.proxy).count();
+        let emissive_surfaces = knobs.indirect == Indirect::Path && self.emission() > 0.0;
+        let factor = share.filter(|_| environment.is_some()).unwrap_or(0.0);
+        let mut by = Vec::new();
+        if lights > 0 {
+            by.push(format!("{lights} light{}", if lights == 1 { "" } else { "s" }));
+        }
+        if emissive_surfaces {
+            by.push("emissive surfaces".to_owned());
+        }
+        let at = if factor == 1.0 { String::new() } else { format!(" at intensity {factor}") };
+        let mut rest = String::new();
+        match environment.as_deref() {
+            Some("studio") => by.push(format!("the built-in studio{at} {why}")),
+            Some(name) => by.push(format!("{name}{at}")),
+            None if by.is_empty() => {
+                by.push("nothing: the scene has no lights, and there is no environment".to_owned());
+            }
+            None if !why.is_empty() && self.environment.is_some() => rest = format!(", {why}"),
+            None => {}
+        }
+        let sentence = format!("lit by {}{rest}", by.join(" and "));
+        LitBy { environment, factor, lights, emissive_surfaces, sentence }
+    }
+
+    /// Whether the default exposure may show this scene white or black: lights of any unit, environments of any
+    /// radiance, strong emission, or no light. A file in the studio, whose mean radiance is 0.8, is right at 0 stops, and
+    /// scenes that are built in are made for 0.
+    #[must_use]
+    pub fn is_of_unknown_brightness(&self, settings: &Settings) -> bool {
+        let scene = self.scene();
+        let is_bright = |c: &f32| *c > 1.0;
+        self.is_file
+            && (!scene.lights.is_empty()
+                || self.lit(settings.clone()).0.is_none_or(|map| map.name != "studio")
+                || settings.environment_intensity != 1.0
+                || scene.materials.iter().any(|material| material.emissive.iter().any(is_bright)))
+    }
+
+    /// Meters the surfaces that a camera sees, in a picture of few pixels drawn with these settings. `None` where it
+    /// sees no surface.
+    ///
+    /// # Errors
+    /// When the scene does not fit the device, or the driver fails.
+    pub fn meter(&self, device: &Arc<Device>, settings: &Settings, camera: &Camera) -> Result<Option<Meter>> {
+        let [width, height] = settings.size.map(u64::from);
+        let longer = width.max(height).max(1);
+        let side = |side: u64| ((side * u64::from(METERED_SIDE)).div_ceil(longer) as u32).max(1);
+        let settings = Settings {
+            // Uncovered pixels are told by their alpha.
+            background: Background::Transparent,
+            size: if longer > u64::from(METERED_SIDE) { [side(width), side(height)] } else { settings.size },
+            max_error: None,
+            parts: Vec::new(),
+            share: TileShare::ALL,
+            ..settings.clone()
+        };
+        let view = settings.view_transform();
+        let mut renderer = self.clone().renderer(device, settings)?;
+        renderer.render_samples(camera, METERED_SAMPLES, &mut |_| ())?;
+        Ok(Meter::of(renderer.film_alone()?.rgba.into_iter(), &view))
     }
 
     /// The first camera of the scene, or one that frames it.

@@ -217,7 +217,7 @@ fn models_of_the_shared_assets() {
     let knobs = knobs(Model::Recursive, &["samples=1"]);
     for path in all {
         let load = |reads| etalon::scene::load(&path, &LoadOptions { prune: reads, ..LoadOptions::default() });
-        let lean = load(Prune::Unused(AmbientLight::WithoutLights)).expect("a scene");
+        let lean = load(Prune::Unused(AmbientLight::Present)).expect("a scene");
         let full = load(Prune::Nothing).expect("a scene");
         is_the_same(&gpu, &path.display().to_string(), [&lean, &full], &knobs);
     }

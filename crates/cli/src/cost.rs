@@ -8,6 +8,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
 
 use super::budget::{command, keep, kept};
+use super::exposure;
 use super::heading;
 use super::interrupt::Interrupt;
 use super::options::{DeviceOptions, PictureOptions, PlanExtent as Planned, SceneOptions, shard};
@@ -128,10 +129,20 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
         .collect::<Result<_>>()?;
     let steps = Steps::new(args.progress, quiet);
     steps.step(&format!("loading {}", args.scene.said()), 1);
-    let setup = Setup::load(&args.scene, Prune::Nothing, &args.device)?;
+    let mut setup = Setup::load(&args.scene, Prune::Nothing, &args.device)?;
+    // All pictures are compared in one light.
+    setup.opened.keep_light(&settings.knobs);
     for warning in &setup.opened.warnings {
         tracing::warn!("{warning}");
     }
+    let camera = args.scene.choose_camera(setup.opened.scene(), settings.size)?;
+    let exposure = exposure::choose(args.picture.exposure, &setup.opened, &setup.device, &settings, &camera)?;
+    if let Some(sentence) = exposure.sentence.as_ref().filter(|_| !quiet) {
+        steps.say(sentence);
+    }
+    let settings = Settings { exposure: exposure.stops, ..settings };
+    let picture = exposure.told(&args.picture);
+    let scene = args.scene.told(&setup.opened, &settings.knobs);
     if let Some(wanted) = &args.compare {
         let mut knobs = settings.knobs.clone();
         args.picture.colour_of(setup.opened.scene(), &mut knobs)?;
@@ -150,7 +161,7 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
         return say(args, &compared);
     }
     let contents = setup.contents();
-    let sized = |size: [u32; 2]| command(&args.scene, &PictureOptions { size, ..args.picture.clone() }, &args.device);
+    let sized = |size: [u32; 2]| command(&scene, &PictureOptions { size, ..picture.clone() }, &args.device);
     let interrupt = Interrupt::listen("stopping after this picture; results so far are kept");
     let measured = setup.bench(&args.scene, settings, |bench| {
         let sweep = Sweep {

@@ -9,6 +9,7 @@ pub mod devices;
 pub mod diff;
 pub mod documents;
 pub mod eval;
+pub mod exposure;
 pub mod extensions;
 pub mod farm;
 mod heading;

@@ -8,11 +8,13 @@ use clap::{Args, ValueEnum};
 use glam::DVec3;
 
 use super::choices::one_of;
+use super::exposure::Exposure;
 use super::heading;
 use super::usage;
 use etalon::frame::{Background, Settings, TileShare};
 use etalon::gpu::DeviceChoice;
 use etalon::image::tone::ToneMap;
+use etalon::open::Opened;
 use etalon::plan::rungs::Indirect;
 use etalon::plan::{ForcedEffects, Knobs, Model};
 use etalon::scene::camera::{Camera, DEFAULT_FOV_Y};
@@ -91,7 +93,8 @@ pub struct SceneOptions {
     /// Animation time in seconds, or none for the rest pose stored in the file
     #[arg(long, value_name = "SECONDS|none", value_parser = time, default_value = "none", allow_hyphen_values = true, help_heading = heading::SCENE)]
     pub time: AnimationTime,
-    /// Environment map, or none [default: built-in studio lighting if the file contains no lights]
+    /// Environment map, or none [default: the built-in studio; as fill light if the file contains lights, and not if its
+    /// emissive surfaces light it with --model global]
     #[arg(long, value_name = "FILE.hdr|FILE.exr|none", help_heading = heading::LIGHT)]
     pub env: Option<String>,
     /// Factor for the radiance of the environment
@@ -129,9 +132,10 @@ pub struct PictureOptions {
     /// error of the picture is at most this
     #[arg(long, value_name = "E", value_parser = error_limit, help_heading = heading::QUALITY)]
     pub max_error: Option<f64>,
-    /// Exposure in stops; changes display outputs only
-    #[arg(long, value_name = "EV", value_parser = finite, default_value_t = 0.0, allow_hyphen_values = true, help_heading = heading::PICTURE)]
-    pub exposure: f32,
+    /// Exposure in stops, or auto: from the picture's own luminance. Changes display outputs only [default: 0; auto for
+    /// files that would be shown plain white or nearly black]
+    #[arg(long, value_name = "EV|auto", value_parser = exposure, allow_hyphen_values = true, help_heading = heading::PICTURE)]
+    pub exposure: Option<Exposure>,
     /// Tone curve; changes display outputs only
     #[arg(
         long,
@@ -184,6 +188,13 @@ fn factor(text: &str) -> Result<f32, String> {
 
 fn field_of_view(text: &str) -> Result<f64, String> {
     number(text, |x: &f64| *x > 0.0 && *x < 180.0, "an angle between 0 and 180 degrees")
+}
+
+fn exposure(text: &str) -> Result<Exposure, String> {
+    match text {
+        "auto" => Ok(Exposure::Auto),
+        text => number(text, |x: &f32| x.is_finite(), "a finite number of stops, or auto").map(Exposure::Stops),
+    }
 }
 
 fn time(text: &str) -> Result<AnimationTime, String> {
@@ -315,7 +326,7 @@ impl SceneOptions {
     }
 
     /// The vertical field of view of cameras that do not come from the file, in radians.
-    fn fov_y(&self) -> f64 {
+    pub(super) fn fov_y(&self) -> f64 {
         self.fov.map_or(DEFAULT_FOV_Y, f64::to_radians)
     }
 
@@ -334,8 +345,7 @@ impl SceneOptions {
         LoadOptions { time: self.time.0, prune, scene, variant }
     }
 
-    /// Loads the environment of `--env`, or the built-in studio, which lights scenes without lights. Returns it with
-    /// warnings.
+    /// Loads the environment of `--env`, or the built-in studio. Returns it with warnings.
     ///
     /// # Errors
     /// One sentence with the file and the cause.
@@ -344,6 +354,23 @@ impl SceneOptions {
             Some("none") => Ok((None, Vec::new())),
             Some(path) => Environment::load(&PathBuf::from(path)).map(|(map, warnings)| (Some(map), warnings)),
             None => Ok((Some(Environment::studio()), Vec::new())),
+        }
+    }
+
+    /// These options with the light of a picture written out, where other knobs would choose another light.
+    #[must_use]
+    pub fn told(&self, opened: &Opened, knobs: &Knobs) -> Self {
+        if !opened.has_light_by_knobs() {
+            return self.clone();
+        }
+        let lit_by = opened.lit_by(knobs);
+        match lit_by.environment {
+            Some(_) => Self {
+                background: self.background.or(Some(Background::Environment)),
+                env_intensity: self.env_intensity * lit_by.factor,
+                ..self.clone()
+            },
+            None => Self { env: Some("none".to_owned()), env_intensity: 1.0, env_rotation: 0.0, ..self.clone() },
         }
     }
 
@@ -393,8 +420,10 @@ impl PictureOptions {
     #[must_use]
     pub fn words(&self) -> Vec<String> {
         let mut all = vec![format!("--size {}x{}", self.size[0], self.size[1])];
-        if self.exposure != 0.0 {
-            all.push(format!("--exposure {}", self.exposure));
+        match self.exposure {
+            None => {}
+            Some(Exposure::Auto) => all.push("--exposure auto".to_owned()),
+            Some(Exposure::Stops(stops)) => all.push(format!("--exposure {stops}")),
         }
         if self.tonemap != ToneMap::default() {
             let name = self.tonemap.name();
@@ -441,13 +470,11 @@ impl PictureOptions {
     /// Which textures and attributes loading may prune, as far as this is known before the scene is read.
     #[must_use]
     pub fn prune(&self, scene: &SceneOptions, knobs: &Knobs) -> Prune {
-        let asked = scene.background == Some(Background::Environment);
         match (self.plan, scene.env.as_deref()) {
             (PlanExtent::Full, _) => Prune::Nothing,
             _ if !knobs.show_occlusion(true) => Prune::Unused(AmbientLight::Absent),
             _ if knobs.show_occlusion(false) => Prune::Unused(AmbientLight::Present),
             (_, Some("none")) => Prune::Unused(AmbientLight::Absent),
-            (_, None) if !asked => Prune::Unused(AmbientLight::WithoutLights),
             _ => Prune::Unused(AmbientLight::Present),
         }
     }
@@ -465,11 +492,15 @@ impl PictureOptions {
         if self.max_error.is_some() && self.set.iter().any(|choice| choice.starts_with("samples=")) {
             bail!("--max-error contradicts --set samples: give only one of them to end the sampling");
         }
+        let exposure = match self.exposure {
+            Some(Exposure::Stops(stops)) => stops,
+            Some(Exposure::Auto) | None => 0.0,
+        };
         Ok(Settings {
             size: self.size,
             knobs: self.knobs()?,
             tonemap: self.tonemap,
-            exposure: self.exposure,
+            exposure,
             background: scene.background.unwrap_or_default(),
             environment_intensity: scene.env_intensity,
             environment_rotation: scene.env_rotation,

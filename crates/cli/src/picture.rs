@@ -315,11 +315,29 @@ pub(super) fn warn_about(rendered: &Rendered, pixels: u64, knobs: &Knobs, bands:
             if knobs.interfaces.count() < 32 { "; try --set interfaces=32" } else { "" }
         );
     }
+    if let Some(what) = blank(&rendered.display) {
+        tracing::warn!("the picture is {what}: --exposure auto takes the exposure from its own luminance");
+    }
     if rendered.dropped > 0 {
         tracing::warn!(
             "{} pixels have more transparent surfaces than a shader invocation can sort; the farthest ones were left out",
             rendered.dropped
         );
+    }
+}
+
+/// What a picture shows where all covered pixels are black, or all are white; `None` for every other picture.
+fn blank(display: &[u8]) -> Option<&'static str> {
+    let covered = || display.as_chunks::<4>().0.iter().filter(|[.., alpha]| *alpha > 0);
+    // Bytes that no eye tells from black or white.
+    let all = |is: fn(&u8) -> bool| covered().all(|[r, g, b, _]| [r, g, b].into_iter().all(is));
+    covered().next()?;
+    if all(|byte| *byte <= 3) {
+        Some("black")
+    } else if all(|byte| *byte >= 252) {
+        Some("white")
+    } else {
+        None
     }
 }
 

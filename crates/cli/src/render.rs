@@ -10,6 +10,7 @@ use anyhow::{Result, anyhow, bail, ensure};
 use serde_json::json;
 
 use super::budget::{Budget, Chosen, command};
+use super::exposure;
 use super::interrupt::{INTERRUPTED, Interrupt};
 use super::options::PlanExtent;
 use super::picture::{
@@ -70,24 +71,36 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
 
     steps.step(&format!("loading {}", args.scene.said()), 1);
     let prune = if budget.is_some() { Prune::Nothing } else { args.picture.prune(&args.scene, &settings.knobs) };
-    let setup = Setup::load(&args.scene, prune, &args.device)?;
+    let mut setup = Setup::load(&args.scene, prune, &args.device)?;
     phases.end("load");
     let mut chosen = None;
+    if budget.is_none() {
+        args.picture.colour_of(setup.opened.scene(), &mut settings.knobs)?;
+    }
+    let camera = args.scene.choose_camera(setup.opened.scene(), settings.size)?;
+    let exposure = exposure::choose(args.picture.exposure, &setup.opened, &setup.device, &settings, &camera)?;
+    settings.exposure = exposure.stops;
+    phases.end("meter");
     if let Some(budget) = budget {
-        let command = command(&args.scene, &args.picture, &args.device);
+        // The chosen rungs were measured in this light.
+        setup.opened.keep_light(&settings.knobs);
+        let scene = args.scene.told(&setup.opened, &settings.knobs);
+        let command = command(&scene, &exposure.told(&args.picture), &args.device);
         let found = budget.choose([&args.scene.scene, &command], &args.scene, &setup, &settings, &steps)?;
         settings.max_error = None;
         settings.knobs = found.knobs.clone();
         chosen = Some(found);
         phases.end("choose");
-    } else {
-        args.picture.colour_of(setup.opened.scene(), &mut settings.knobs)?;
     }
     let device = setup.device.clone();
     let info = device.info().clone();
     if !quiet {
         let software = if info.kind == "cpu" { ", a software device" } else { "" };
         steps.say(&format!("drawing on {} ({}{software})", info.name, info.driver));
+    }
+    let lit_by = setup.opened.lit_by(&settings.knobs);
+    if !quiet {
+        [Some(&lit_by.sentence), exposure.sentence.as_ref()].into_iter().flatten().for_each(|line| steps.say(line));
     }
     for warning in &setup.opened.warnings {
         tracing::warn!("{warning}");
@@ -204,6 +217,8 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
             schema: "etalon.report/1",
             device: info,
             scene: facts,
+            lit_by,
+            exposure,
             knobs: knob_map(&knobs),
             plan,
             passes: pass_facts(&rounds),

@@ -6,10 +6,12 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::exposure::ExposureFacts;
 use etalon::frame::{NotFinite, Rendered, Work};
 use etalon::gpu::{Compiled, Created, Device, DeviceInfo, Message, Program, Severity};
 use etalon::image::Statistics;
 use etalon::image::halves::{SampleError, slope};
+use etalon::open::LitBy;
 use etalon::plan::{Effect, Knobs, Plan};
 use etalon::spectra;
 use etalon::upload::rays::BvhFacts;
@@ -25,6 +27,10 @@ pub struct Report {
     pub device: DeviceInfo,
     /// Scene that was drawn.
     pub scene: SceneReport,
+    /// What lights the scene.
+    pub lit_by: LitBy,
+    /// Exposure of the display outputs.
+    pub(super) exposure: ExposureFacts,
     /// Rung of every knob.
     pub knobs: BTreeMap<&'static str, &'static str>,
     /// Effects, passes, pipelines and buffers, with reasons.

@@ -9,6 +9,7 @@ use anyhow::{Context as _, Result, anyhow, bail, ensure};
 use glam::{DAffine3, DVec3};
 use serde::Serialize;
 
+use super::exposure::{self, ExposureFacts};
 use super::options::{PlanExtent, SceneOptions};
 use super::picture::{
     Format, RenderArgs, check_halves, check_same_scene, default_stem, format_of, layers, metadata, scene_text,
@@ -22,6 +23,7 @@ use etalon::frame::{Renderer, Settings};
 use etalon::gpu::{Device, Severity};
 use etalon::image::png::{self, Display};
 use etalon::image::{exr, file};
+use etalon::open::LitBy;
 use etalon::scene::{Camera, Scene};
 use etalon_farm::frames::Frames;
 use etalon_farm::identity::{Identity, device_name};
@@ -37,6 +39,8 @@ struct SequenceReport {
     schema: &'static str,
     worker: FarmWorker,
     shard: [u32; 2],
+    lit_by: LitBy,
+    exposure: ExposureFacts,
     pictures: Vec<PictureRecord>,
     #[serde(skip_serializing_if = "Option::is_none")]
     preview: Option<WrittenFile>,
@@ -228,9 +232,10 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
             rest.name
         );
     }
-    let mut opened = etalon::open::Opened::new(rest, environment, args.scene.asks_for_environment());
+    let mut opened =
+        etalon::open::Opened::named(&args.scene.scene, rest, environment, args.scene.asks_for_environment());
     args.picture.colour_of(opened.scene(), &mut settings.knobs)?;
-    let (_, settings) = opened.lit(settings);
+    let lit_by = opened.lit_by(&settings.knobs);
     for warning in &opened.warnings {
         tracing::warn!("{warning}");
     }
@@ -238,10 +243,25 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let still = opened.scene().clone();
     let frames_scene = args.scene.frames(&still) && args.sequence.cameras.is_empty();
     let names = &args.sequence.cameras;
-    let fixed = cameras(&args.scene, names, &still, settings.size)?;
     let middle = still.bounds().ok_or_else(|| anyhow!("{}: the scene has nothing to draw", still.name))?.center();
     let (center, up) = (args.scene.target.unwrap_or(middle), args.scene.up.unwrap_or(DVec3::Y));
+    let fixed = match wanted.turns {
+        Some(_) if frames_scene => {
+            let aspect = f64::from(settings.size[0]) / f64::from(settings.size[1]);
+            let camera = still.framing_of_turns(center, up, aspect, args.scene.fov_y());
+            vec![(String::new(), camera.ok_or_else(|| anyhow!("{}: the scene has nothing to draw", still.name))?)]
+        }
+        _ => cameras(&args.scene, names, &still, settings.size)?,
+    };
     let base_time = args.scene.time.0;
+    // All pictures have the exposure of the scene at --time from the first camera, whichever of them are drawn here.
+    let first = fixed.first().map(|(_, camera)| camera).ok_or_else(|| anyhow!("{}: no camera", still.name))?;
+    let exposure = exposure::choose(args.picture.exposure, &opened, &device, &settings, first)?;
+    settings.exposure = exposure.stops;
+    if !quiet {
+        [Some(&lit_by.sentence), exposure.sentence.as_ref()].into_iter().flatten().for_each(|line| steps.say(line));
+    }
+    let (_, settings) = opened.lit(settings);
     let mut drawer = Drawer { args, device: &device, renderer: None, moved: true, settings };
     let mut pictures: Vec<PictureRecord> = Vec::new();
     let mut shown: Vec<Display> = Vec::new();
@@ -297,7 +317,8 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     if let Some(path) = &args.report {
         let worker = FarmWorker::here(device_name(device.info()), begun.elapsed(), prepared.unwrap_or_default());
         let shard = args.sequence.shard.unwrap_or([1, 1]);
-        let account = SequenceReport { schema: "etalon.sequence/1", worker, shard, pictures, preview };
+        let account =
+            SequenceReport { schema: "etalon.sequence/1", worker, shard, lit_by, exposure, pictures, preview };
         file::write(path, serde_json::to_string_pretty(&account)?.as_bytes())?;
     }
     drop(steps);
@@ -360,7 +381,7 @@ impl Drawer<'_> {
             return Ok((told, display));
         }
         told.found = false;
-        let (environment, _) = opened.lit(Settings::default());
+        let (environment, _) = opened.lit(self.settings.clone());
         let renderer = match self.renderer.take() {
             Some(renderer) if !self.moved => renderer,
             Some(renderer) => renderer.next(&opened.original, environment)?,

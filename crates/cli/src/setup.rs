@@ -39,7 +39,7 @@ pub fn open(scene: &SceneOptions, prune: Prune, device: &DeviceOptions) -> Resul
     });
     let loaded = loaded?;
     let (environment, warnings) = environment??;
-    let mut opened = Opened::new(loaded, environment, scene.asks_for_environment());
+    let mut opened = Opened::named(&scene.scene, loaded, environment, scene.asks_for_environment());
     opened.warnings.extend(warnings);
     Ok((opened, device?))
 }

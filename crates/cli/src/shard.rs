@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail, ensure};
 
+use super::exposure;
 use super::options::PlanExtent;
 use super::picture::{RenderArgs, check_halves, is_standard, layers};
 use super::progress::Steps;
@@ -82,6 +83,13 @@ pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<Exi
     let setup = Setup::load(&args.scene, prune, &args.device)?;
     args.picture.colour_of(setup.opened.scene(), &mut settings.knobs)?;
     setup.opened.warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
+    let camera = args.scene.choose_camera(setup.opened.scene(), settings.size)?;
+    let exposure = exposure::choose(args.picture.exposure, &setup.opened, &setup.device, &settings, &camera)?;
+    settings.exposure = exposure.stops;
+    if !quiet {
+        let lit_by = setup.opened.lit_by(&settings.knobs);
+        [Some(&lit_by.sentence), exposure.sentence.as_ref()].into_iter().flatten().for_each(|line| steps.say(line));
+    }
     let split = split(args, &setup.opened.plan(settings.clone())?)?;
     if split == Split::Tiles {
         settings.share = TileShare { index: index - 1, of };

@@ -8,12 +8,13 @@ use anyhow::{Result, bail, ensure};
 use clap::Args;
 
 use super::budget;
+use super::exposure::{self, Exposure};
 use super::options::{AnimationTime, DeviceOptions, PictureOptions, PlanExtent, SceneOptions};
 use super::{heading, usage};
 use etalon::frame::Settings;
-use etalon::gpu::{DeviceInfo, Severity};
+use etalon::gpu::{Device, Severity};
 use etalon::image::file;
-use etalon::open::Opened;
+use etalon::open::{Opened, is_file};
 use etalon::scene::{Camera, Prune, Scene};
 use etalon_cost::command::arguments;
 use etalon_farm::identity::contents;
@@ -41,7 +42,7 @@ pub struct ViewArgs {
 }
 
 impl SceneSource for ViewArgs {
-    fn open(&self, asked: OpenRequest<'_>, device: &DeviceInfo) -> Result<Loaded> {
+    fn open(&self, asked: OpenRequest<'_>, device: &Arc<Device>) -> Result<Loaded> {
         let options = &asked_for(&self.scene, asked.file, asked.time);
         let scene = options.load(Prune::Nothing)?;
         let (environment, more) = options.load_environment()?;
@@ -50,12 +51,15 @@ impl SceneSource for ViewArgs {
         let chosen = self.picture.knobs()?;
         let mut knobs = chosen.clone();
         self.picture.colour_of(&scene, &mut knobs)?;
-        let mut opened = Opened::new(scene, environment, options.asks_for_environment());
+        let mut opened = Opened::named(&options.scene, scene, environment, options.asks_for_environment());
         opened.warnings.extend(more);
+        let settings = Settings { size: asked.size, knobs: knobs.clone(), ..self.picture.settings(options)? };
+        let exposure = exposure::choose(self.picture.exposure, &opened, device, &settings, &camera)?;
         // `cost` measures at the size of the command line, not at the size of the picture in the window.
-        let priced = budget::command(options, &self.picture, &self.device);
-        let prices = budget::known(&priced, &contents(opened.scene(), opened.environment()), device);
-        let (lit, as_lit) = opened.lit(Settings::default());
+        let priced = budget::command(&options.told(&opened, &chosen), &exposure.told(&self.picture), &self.device);
+        let prices = budget::known(&priced, &contents(opened.scene(), opened.environment()), device.info());
+        opened.warnings.extend(exposure.sentence);
+        let (lit, as_lit) = opened.lit(Settings { knobs: knobs.clone(), ..Settings::default() });
         Ok(Loaded {
             name: opened.scene().name.clone(),
             environment: lit.cloned().map(|map| (Arc::new(map), as_lit.environment_intensity)),
@@ -65,6 +69,7 @@ impl SceneSource for ViewArgs {
             warnings: opened.warnings.clone(),
             prices: prices.map(Arc::new),
             original: opened.original.clone(),
+            exposure: exposure.stops,
         })
     }
 
@@ -119,7 +124,8 @@ fn command(args: &ViewArgs, view: &View<'_>) -> String {
     scene.camera = view.named.map(str::to_owned).or(scene.camera);
     let picture = PictureOptions {
         size: view.settings.size,
-        exposure: view.settings.exposure,
+        exposure: Some(Exposure::Stops(view.settings.exposure))
+            .filter(|_| is_file(&scene.scene) || view.settings.exposure != 0.0),
         tonemap: view.settings.tonemap,
         ..args.picture.clone()
     };

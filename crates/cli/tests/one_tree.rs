@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use anyhow::{Result, bail};
 use etalon::frame::Settings;
-use etalon::gpu::{Device, DeviceChoice, DeviceInfo};
+use etalon::gpu::{Device, DeviceChoice};
 use etalon::open::Opened;
 use etalon::plan::{Knobs, Model};
 use etalon::prepare::Prepared;
@@ -22,7 +22,7 @@ use etalon_viewer::worker::Worker;
 struct Pool;
 
 impl SceneSource for Pool {
-    fn open(&self, asked: OpenRequest<'_>, _: &DeviceInfo) -> Result<Loaded> {
+    fn open(&self, asked: OpenRequest<'_>, _: &Arc<Device>) -> Result<Loaded> {
         let opened = Opened::load("study:pool")?;
         Ok(Loaded {
             name: opened.scene().name.clone(),
@@ -33,6 +33,7 @@ impl SceneSource for Pool {
             prices: None,
             framed: false,
             knobs: None,
+            exposure: 0.0,
         })
     }
 

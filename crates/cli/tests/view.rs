@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use anyhow::{Result, bail};
 use etalon::frame::Settings;
-use etalon::gpu::{DeviceInfo, Replacement};
+use etalon::gpu::{Device, Replacement};
 use etalon::plan::{KNOBS, Knobs, Model};
 use etalon::scene::{Camera, Scene};
 use etalon::study;
@@ -282,7 +282,7 @@ fn scene() -> Scene {
 struct Study;
 
 impl SceneSource for Study {
-    fn open(&self, _: OpenRequest<'_>, _: &DeviceInfo) -> Result<Loaded> {
+    fn open(&self, _: OpenRequest<'_>, _: &Arc<Device>) -> Result<Loaded> {
         let scene = scene();
         Ok(Loaded {
             name: scene.name.clone(),
@@ -293,6 +293,7 @@ impl SceneSource for Study {
             prices: None,
             framed: false,
             knobs: None,
+            exposure: 0.0,
         })
     }
 

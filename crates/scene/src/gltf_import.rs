@@ -111,7 +111,7 @@ fn read_posed(
     }
     let lights = lights(document, &nodes, &mut warnings)?;
     let mut placing = InstancePlacer::new(document, &nodes, &mut materials.materials, &mut warnings)?;
-    let unread = placing.prune_unused(options.prune.ambient(lights.len()));
+    let unread = placing.prune_unused(options.prune.ambient());
     let (meshes, instances) = placing.run(&mut known.resting)?;
     let images = materials.decode(document, &mut known.images)?;
     let cameras = cameras(document, &nodes, &mut warnings)?;

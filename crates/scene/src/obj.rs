@@ -374,7 +374,7 @@ impl ObjReader {
 
     /// Prunes the textures of all materials; OBJ files have no lights. Returns the reasons.
     fn prune_unused(&mut self, prune: Prune, groups: &[ObjGroup]) -> Vec<String> {
-        let Some(ambient) = prune.ambient(0) else { return Vec::new() };
+        let Some(ambient) = prune.ambient() else { return Vec::new() };
         let used: HashSet<usize> = groups.iter().filter_map(|group| group.material).collect();
         let materials = self.materials.iter_mut().enumerate();
         materials.flat_map(|(i, m)| prune_textures(m, used.contains(&i), ambient)).collect()

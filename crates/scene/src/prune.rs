@@ -23,19 +23,16 @@ pub enum Prune {
 pub enum AmbientLight {
     /// No.
     Absent,
-    /// Only if the scene has no lights of its own.
-    WithoutLights,
     /// Yes.
     Present,
 }
 
 impl Prune {
-    /// Whether a scene with this number of lights has ambient light; `None` when nothing is pruned.
-    pub(crate) fn ambient(self, lights: usize) -> Option<bool> {
+    /// Whether the picture has ambient light; `None` when nothing is pruned.
+    pub(crate) fn ambient(self) -> Option<bool> {
         match self {
             Self::Nothing => None,
             Self::Unused(AmbientLight::Absent) => Some(false),
-            Self::Unused(AmbientLight::WithoutLights) => Some(lights == 0),
             Self::Unused(AmbientLight::Present) => Some(true),
         }
     }
@@ -108,7 +105,7 @@ impl Coordinates {
 
 /// Prunes textures, texture coordinates and tangents that cannot affect the picture from a whole scene.
 pub fn prune_unused(scene: &mut Scene, prune: Prune) {
-    let Some(ambient) = prune.ambient(scene.lights.len()) else { return };
+    let Some(ambient) = prune.ambient() else { return };
     let mut used = vec![false; scene.materials.len()];
     for instance in &scene.instances {
         let mesh = &scene.meshes[instance.mesh];

@@ -515,6 +515,7 @@ impl OpenWindow {
                 _ => {
                     self.state.navigation = Some(Navigation::new(facts.home.clone(), facts.bounds, facts.framed));
                     self.state.settings.knobs = facts.knobs.clone().unwrap_or(self.state.settings.knobs.clone());
+                    self.state.settings.exposure = facts.exposure;
                 }
             }
             self.state.picked = None;

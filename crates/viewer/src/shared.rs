@@ -7,7 +7,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use anyhow::{Context as _, Result};
 
 use etalon::frame::Settings;
-use etalon::gpu::{DeviceInfo, PassTime, Replacement};
+use etalon::gpu::{Device, PassTime, Replacement};
 use etalon::pass::tonemap::Counts;
 use etalon::plan::{Effect, Knobs};
 use etalon::prepare::Original;
@@ -35,6 +35,8 @@ pub struct Loaded {
     pub framed: bool,
     /// Knobs to start with, if the scene changes those of the command line.
     pub knobs: Option<Knobs>,
+    /// Exposure to start with, in stops.
+    pub exposure: f32,
 }
 
 /// Request for a scene: file, animation time and size of the picture.
@@ -54,7 +56,7 @@ pub trait SceneSource: Send {
     ///
     /// # Errors
     /// One sentence with the file and the cause.
-    fn open(&self, asked: OpenRequest<'_>, device: &DeviceInfo) -> Result<Loaded>;
+    fn open(&self, asked: OpenRequest<'_>, device: &Arc<Device>) -> Result<Loaded>;
 
     /// Reads only the scene at another animation time, with its initial camera.
     ///
@@ -189,6 +191,8 @@ pub struct SceneFacts {
     pub framed: bool,
     /// Knobs to start with, if the scene changes those of the command line.
     pub knobs: Option<Knobs>,
+    /// Exposure to start with, in stops.
+    pub exposure: f32,
     /// Cameras of the file.
     pub cameras: Vec<Camera>,
     /// Numbers of triangles, instances and lights.
@@ -218,6 +222,7 @@ impl SceneFacts {
             home: loaded.camera.clone(),
             framed: loaded.framed,
             knobs: loaded.knobs.clone(),
+            exposure: loaded.exposure,
             cameras: scene.cameras.clone(),
             counts: [scene.triangles(), scene.instances.len(), scene.lights.len()],
             materials: scene.materials.clone(),

@@ -213,7 +213,7 @@ impl Worker {
     fn load(&mut self, wanted: &RenderRequest) -> Result<()> {
         let name = wanted.file.as_ref().map_or("the scene".to_owned(), |file| file.display().to_string());
         self.say(|seen| seen.busy = Some(format!("reading {name}")));
-        let found = self.source.open(wanted.asked(), self.device.info()).and_then(|loaded| {
+        let found = self.source.open(wanted.asked(), &self.device).and_then(|loaded| {
             self.say(|seen| seen.busy = Some("uploading and compiling".to_owned()));
             self.ready(wanted, loaded)
         });
@@ -229,7 +229,7 @@ impl Worker {
     fn go_to(&mut self, wanted: &RenderRequest) -> Result<()> {
         let Some(stage) = &self.stage else { return Ok(()) };
         let (scene, camera) = self.source.moment(wanted.asked())?;
-        let Loaded { name, environment, warnings, prices, framed, knobs, .. } = &stage.loaded;
+        let Loaded { name, environment, warnings, prices, framed, knobs, exposure, .. } = &stage.loaded;
         let loaded = Loaded {
             name: name.clone(),
             original: scene.into(),
@@ -239,6 +239,7 @@ impl Worker {
             prices: prices.clone(),
             framed: *framed,
             knobs: knobs.clone(),
+            exposure: *exposure,
         };
         // The time per sample changes little between animation times.
         let ns = stage.ns_per_pixel;
