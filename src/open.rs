@@ -21,8 +21,8 @@ use crate::study;
 use crate::transport::emitters::emitted;
 
 /// Intensity of the studio as fill light beside the lights of a file: one stop below the studio that lights a file
-/// without lights, so that the file's lights stay the key light. At a quarter, the bronze of LightsPunctualLamp is black
-/// where its lamps do not reach; at 1, the lamps are lost in the daylight.
+/// without lights, so that the file's lights stay the key light. At a quarter, the bronze of LightsPunctualLamp is
+/// black where its lamps do not reach; at 1, the lamps are lost in the daylight.
 const FILL: f32 = 0.5;
 
 /// Emissive surfaces light a scene, and no studio is added, if the light that they send through the scene's bounding
@@ -185,12 +185,12 @@ impl Opened {
     /// Factor of the environment, `None` where it does not light the scene, and the reason.
     ///
     /// Asked for, it lights as it is; a scene built by code says itself. For a file:
-    /// - where paths follow the light of emissive surfaces and there is enough of it, the author lit the scene with them
-    ///   and a studio would drown them;
-    /// - beside lights it is a fill light ([`FILL`]): nearly all viewers show a file's lights in an environment, and
-    ///   authors count on it;
-    /// - without lights it is all the light there is. That includes emissive surfaces in models that do not follow their
-    ///   light: they would hang in a black picture.
+    /// - where paths follow the light of emissive surfaces and there is enough of it, the author lit the scene with
+    ///   them, and a studio would drown them;
+    /// - beside lights it is a fill light ([`FILL`]), as in the glTF Sample Viewer: without it, what the lights do not
+    ///   reach is black;
+    /// - without lights it is all the light there is. That includes emissive surfaces in models that do not follow
+    ///   their light: they would hang in a black picture.
     fn share(&self, knobs: &Knobs) -> (Option<f32>, &'static str) {
         let scene = self.scene();
         let is_followed = self.follows.unwrap_or(knobs.indirect == Indirect::Path);
@@ -266,8 +266,8 @@ impl Opened {
     }
 
     /// Whether the default exposure may show this scene white or black: lights of any unit, environments of any
-    /// radiance, strong emission, or no light. A file in the studio, whose mean radiance is 0.8, is right at 0 stops, and
-    /// scenes that are built in are made for 0.
+    /// radiance, strong emission, or no light. A file in the studio, whose mean radiance is 0.8, is right at 0 stops,
+    /// and scenes that are built in are made for 0.
     #[must_use]
     pub fn is_of_unknown_brightness(&self, settings: &Settings) -> bool {
         let scene = self.scene();

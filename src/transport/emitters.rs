@@ -211,9 +211,9 @@ fn triangles(scene: &Scene, above: f64) -> Vec<(EmitterSource, f64)> {
     found
 }
 
-/// Power of a scene's emissive surfaces that next event estimation samples and that are brighter than white paper in the
-/// studio (radiance 1), relative to π: the sum of radiance times area in square metres, over both sides of two-sided
-/// ones. Dimmer ones are labels, screens and glowing letters, and no lamps: ClearCoatTest has 21 labels of radiance 1.
+/// Power of a scene's emissive surfaces that next event estimation samples and that are brighter than white paper in
+/// the studio (radiance 1), relative to π: the sum of radiance times area in square metres, over both sides of
+/// two-sided ones. Dimmer ones are labels, screens and glowing letters, and no lamps; ClearCoatTest has such labels.
 #[must_use]
 pub fn emitted(scene: &Scene) -> f64 {
     triangles(scene, 1.0).into_iter().map(|(_, power)| power / std::f64::consts::PI).sum()

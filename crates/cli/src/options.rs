@@ -93,8 +93,8 @@ pub struct SceneOptions {
     /// Animation time in seconds, or none for the rest pose stored in the file
     #[arg(long, value_name = "SECONDS|none", value_parser = time, default_value = "none", allow_hyphen_values = true, help_heading = heading::SCENE)]
     pub time: AnimationTime,
-    /// Environment map, or none [default: the built-in studio; as fill light if the file contains lights, and not if its
-    /// emissive surfaces light it with --model global]
+    /// Environment map, or none [default: the built-in studio; as fill light if the file contains lights, and not if
+    /// its emissive surfaces light it with --model global]
     #[arg(long, value_name = "FILE.hdr|FILE.exr|none", help_heading = heading::LIGHT)]
     pub env: Option<String>,
     /// Factor for the radiance of the environment

@@ -1,4 +1,5 @@
-//! A file shown with no option: its light and its exposure, and the sentences that say them (docs/decisions/first-look.md).
+//! A file shown with no option: its light and its exposure, and the sentences that say them
+//! (docs/decisions/first-look.md).
 
 #[path = "support/program.rs"]
 mod program;

@@ -1,7 +1,7 @@
 //! The default camera: the tightest view of a scene's vertices from a given direction.
 //!
-//! Extreme points decide it: see [`Camera::fitting`]. Everything is in f64 and relative to an anchor in the middle of the
-//! scene, so a scene far from the origin is framed as one at the origin.
+//! Extreme points decide it: see [`Camera::fitting`]. Everything is in f64 and relative to an anchor in the middle of
+//! the scene, so a scene far from the origin is framed as one at the origin.
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
@@ -57,8 +57,8 @@ impl Camera {
     /// `farthest` gives the point of the set that lies farthest in a direction, relative to `anchor`. With (x, y, z)
     /// along the axes and the eye e, a point is inside the right side of a frustum of slope t when
     /// x − e_x ≤ t (e_z − z), or x + t z ≤ e_x + t e_z. The largest x + t z of all points is that of one extreme point,
-    /// a; with b, the largest −x + t z, both sides hold when 2 t e_z ≥ a + b, and both points touch when e_z is that and
-    /// e_x = (a − b) / 2. The larger e_z of the two axes decides. No box or sphere is in between, so no room is lost.
+    /// a; with b, the largest −x + t z, both sides hold when 2 t e_z ≥ a + b, and both points touch when these are equal
+    /// and e_x = (a − b) / 2. The larger e_z of the two axes decides. No box or sphere is in between, so no room is lost.
     #[must_use]
     pub fn fitting(anchor: DVec3, farthest: &dyn Fn(DVec3) -> DVec3, frame: DMat3, aspect: f64, fov_y: f64) -> Self {
         let [right, up, backward] = [frame.x_axis, frame.y_axis, frame.z_axis];
@@ -98,7 +98,7 @@ fn centred(farthest: &dyn Fn(DVec3) -> DVec3, axis: DVec3, backward: DVec3, dist
         let (a, b) = (farthest(axis + backward * t), farthest(backward * t - axis));
         middle = 0.5 * ((a - b).dot(backward) * t + (a + b).dot(axis));
         let next = (a - b).dot(axis) / (2.0 * distance - (a + b).dot(backward));
-        if !(next > t) {
+        if next <= t || next.is_nan() {
             break;
         }
         t = next;
@@ -106,8 +106,8 @@ fn centred(farthest: &dyn Fn(DVec3) -> DVec3, axis: DVec3, backward: DVec3, dist
     middle
 }
 
-/// Axes of a camera whose eye lies in the direction [`FROM_THE_RIGHT`] of the middle of a box, with the box in the middle
-/// of its picture.
+/// Axes of a camera whose eye lies in the direction [`FROM_THE_RIGHT`] of the middle of a box, with the box in the
+/// middle of its picture.
 ///
 /// Fitted along that direction itself, the eye goes sideways and down until the box is in the middle, for its near side
 /// is larger: a cube no longer shows its top. So the camera is turned until the eye lies where it should. Each step
