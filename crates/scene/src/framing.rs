@@ -382,7 +382,7 @@ mod tests {
             far.translation - away,
             near.translation
         );
-        assert_eq!(far.matrix3, near.matrix3);
+        assert!(far.matrix3.abs_diff_eq(near.matrix3, 1e-6), "{far:?} {near:?}");
     }
 
     #[test]
