@@ -44,8 +44,8 @@ impl ExposureFacts {
 /// Chooses the exposure of a picture, or of all pictures of a sequence.
 ///
 /// The default meters only scenes whose brightness is unknown, and only corrects what could not be read: everything
-/// else keeps 0 stops, and costs nothing. Few pixels of the same picture are metered, so that a whole picture, its parts
-/// on other machines, and each frame of a sequence get the same exposure.
+/// else keeps 0 stops, and costs nothing. Few pixels of the same picture are metered, so that a whole picture, its
+/// parts on other machines, and each frame of a sequence get the same exposure.
 ///
 /// # Errors
 /// When the scene does not fit the device, or the driver fails.

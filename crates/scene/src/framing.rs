@@ -55,10 +55,10 @@ impl Camera {
     /// the margin, with equal room at opposite sides of the picture.
     ///
     /// `farthest` gives the point of the set that lies farthest in a direction, relative to `anchor`. With (x, y, z)
-    /// along the axes and the eye e, a point is inside the right side of a frustum of slope t when
-    /// x − e_x ≤ t (e_z − z), or x + t z ≤ e_x + t e_z. The largest x + t z of all points is that of one extreme point,
-    /// a; with b, the largest −x + t z, both sides hold when 2 t e_z ≥ a + b, and both points touch when these are equal
-    /// and e_x = (a − b) / 2. The larger e_z of the two axes decides. No box or sphere is in between, so no room is lost.
+    /// along the axes and the eye e, a point is inside the right side of a frustum of slope t when x − e_x ≤ t (e_z −
+    /// z), or x + t z ≤ e_x + t e_z. The largest x + t z of all points is that of one extreme point, a; with b, the
+    /// largest −x + t z, both sides hold when 2 t e_z ≥ a + b, and both points touch when these are equal and e_x =
+    /// (a − b) / 2. The larger e_z of the two axes decides. No box or sphere is in between, so no room is lost.
     #[must_use]
     pub fn fitting(anchor: DVec3, farthest: &dyn Fn(DVec3) -> DVec3, frame: DMat3, aspect: f64, fov_y: f64) -> Self {
         let [right, up, backward] = [frame.x_axis, frame.y_axis, frame.z_axis];
