@@ -12,7 +12,7 @@ use crate::frame::{Background, Renderer, Settings, TileShare};
 use crate::gpu::Device;
 use crate::image::meter::Meter;
 use crate::plan::rungs::Indirect;
-use crate::plan::{Knobs, Plan};
+use crate::plan::{EffectId, EffectState, Knobs, Plan};
 use crate::prepare::{Original, Prepared};
 use crate::scene::camera::DEFAULT_FOV_Y;
 use crate::scene::environment::Environment;
@@ -30,6 +30,9 @@ const FILL: f32 = 0.5;
 const EMISSIVE: f64 = 0.02;
 /// Mean radiance of the studio.
 const STUDIO: f64 = 0.83;
+
+/// Lights that are named before the others are counted.
+const NAMED: usize = 3;
 
 /// Pixels of the longer side of a metered picture.
 const METERED_SIDE: u32 = 160;
@@ -69,19 +72,64 @@ pub struct Opened {
     pub warnings: Vec<String>,
 }
 
+/// What may light a picture ([`Opened::sources`]): names alone, so that the scene's texels can be freed while they are
+/// uploaded.
+#[derive(Debug, Clone)]
+pub struct Sources {
+    lights: Vec<String>,
+    /// Whether some material emits.
+    emits: bool,
+    environment: Option<String>,
+    factor: f32,
+    why: &'static str,
+}
+
 /// What lights a picture, and why.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LitBy {
     /// Name of the environment map that lights the scene.
     pub environment: Option<String>,
-    /// Factor of its radiance from the rule below; `--env-intensity` multiplies it.
+    /// Factor of its radiance from the rule of [`Opened::lit`]; `--env-intensity` multiplies it.
     pub factor: f32,
-    /// Number of punctual and area lights of the scene, without those that stand for emissive surfaces.
+    /// Number of punctual and area lights that light the scene.
     pub lights: usize,
-    /// Whether strong emissive surfaces light others.
+    /// Whether the light of emissive surfaces is followed to others.
     pub emissive_surfaces: bool,
     /// One sentence.
     pub sentence: String,
+}
+
+impl Sources {
+    /// What lights the picture of a plan: lights by name, surfaces that emit, the environment.
+    #[must_use]
+    pub fn lit_by(self, plan: &Plan) -> LitBy {
+        let has = |id: EffectId| plan.effects.iter().any(|effect| effect.id == id && effect.state == EffectState::Kept);
+        let shine = has(EffectId::PunctualLights) || has(EffectId::AreaLights);
+        let kept = self.lights.iter().zip(&plan.lights).filter(|(_, is_kept)| shine && **is_kept);
+        let names: Vec<String> = kept.map(|(name, _)| format!("\"{name}\"")).collect();
+        // Paths find emission wherever they end; other models only show it.
+        let emissive_surfaces = self.emits && has(EffectId::PathTracing);
+        let environment = self.environment.filter(|_| has(EffectId::Environment));
+        let factor = if environment.is_some() { self.factor } else { 0.0 };
+        let mut by = Vec::new();
+        match &names[..] {
+            [] => {}
+            [one] => by.push(format!("the light {one}")),
+            all if all.len() <= NAMED => by.push(format!("the lights {}", all.join(", "))),
+            all => by.push(format!("the lights {} and {} more", all[..NAMED].join(", "), all.len() - NAMED)),
+        }
+        if emissive_surfaces {
+            by.push("emissive surfaces".to_owned());
+        }
+        by.extend(environment.as_deref().map(|name| {
+            let name =
+                if name == "studio" { "the built-in studio".to_owned() } else { format!("the environment {name}") };
+            if factor == 1.0 { name } else { format!("{name} at intensity {factor}") }
+        }));
+        let by = if by.is_empty() { "nothing".to_owned() } else { by.join(" and ") };
+        let sentence = format!("lit by {by}{}", self.why);
+        LitBy { environment, factor, lights: names.len(), emissive_surfaces, sentence }
+    }
 }
 
 /// Whether `scene` is the name of a file and not of a study scene.
@@ -151,7 +199,7 @@ impl Opened {
     }
 
     /// A scene that was read by `name` in an environment. If it is a file and the environment is not asked for, what
-    /// the file contains decides how the environment lights it ([`Opened::lit_by`]).
+    /// the file contains decides how the environment lights it ([`Opened::lit`]).
     #[must_use]
     pub fn named(name: &str, scene: Scene, environment: Option<Environment>, is_asked_for: bool) -> Self {
         Self { is_file: is_file(name), ..Self::new(scene, environment, is_asked_for) }
@@ -182,7 +230,7 @@ impl Opened {
         (self.environment.as_ref().filter(|_| share.is_some()), settings)
     }
 
-    /// Factor of the environment, `None` where it does not light the scene, and the reason.
+    /// Factor of the environment, `None` where it does not light the scene, and the reason at the end of a sentence.
     ///
     /// Asked for, it lights as it is; a scene built by code says itself. For a file:
     /// - where paths follow the light of emissive surfaces and there is enough of it, the author lit the scene with
@@ -195,17 +243,16 @@ impl Opened {
         let scene = self.scene();
         let is_followed = self.follows.unwrap_or(knobs.indirect == Indirect::Path);
         match (self.is_asked_for, scene.studio) {
-            (true, _) => (Some(1.0), "as asked for"),
-            (_, Some(studio)) => (Some(studio), "as the scene says"),
+            (true, _) => (Some(1.0), ""),
+            (_, Some(studio)) => (Some(studio), ""),
             _ if self.is_file && is_followed && self.is_lit_by_emission() => {
-                (None, "without the built-in studio, which --background env adds")
+                (None, ", without the built-in studio, which --background env adds")
             }
-            _ if scene.lights.is_empty() && !is_followed && self.is_lit_by_emission() => (
-                Some(1.0),
-                "because the scene has no lights but emissive surfaces, whose light only --model global follows",
-            ),
-            _ if scene.lights.is_empty() => (Some(1.0), "because the scene has no lights"),
-            _ if self.is_file => (Some(FILL), "as fill light, which --env none removes"),
+            _ if scene.lights.is_empty() && !is_followed && self.is_lit_by_emission() => {
+                (Some(1.0), ", because only --model global follows the light of its emissive surfaces")
+            }
+            _ if scene.lights.is_empty() => (Some(1.0), ""),
+            _ if self.is_file => (Some(FILL), " as fill light, which --env none removes"),
             _ => (None, ""),
         }
     }
@@ -235,34 +282,18 @@ impl Opened {
         })
     }
 
-    /// What lights a picture with these knobs.
+    /// What may light a picture with these knobs.
     #[must_use]
-    pub fn lit_by(&self, knobs: &Knobs) -> LitBy {
+    pub fn sources(&self, knobs: &Knobs) -> Sources {
         let (share, why) = self.share(knobs);
-        let environment = self.environment.as_ref().filter(|_| share.is_some()).map(|map| map.name.clone());
-        let lights = self.scene().lights.iter().filter(|light| !light.proxy).count();
-        let emissive_surfaces = knobs.indirect == Indirect::Path && self.emission() > 0.0;
-        let factor = share.filter(|_| environment.is_some()).unwrap_or(0.0);
-        let mut by = Vec::new();
-        if lights > 0 {
-            by.push(format!("{lights} light{}", if lights == 1 { "" } else { "s" }));
+        let scene = self.scene();
+        Sources {
+            lights: scene.lights.iter().map(|light| light.name.clone()).collect(),
+            emits: scene.materials.iter().any(|material| material.emissive != [0.0; 3]),
+            environment: self.environment.as_ref().filter(|_| share.is_some()).map(|map| map.name.clone()),
+            factor: share.unwrap_or(0.0),
+            why: if self.environment.is_some() { why } else { "" },
         }
-        if emissive_surfaces {
-            by.push("emissive surfaces".to_owned());
-        }
-        let at = if factor == 1.0 { String::new() } else { format!(" at intensity {factor}") };
-        let mut rest = String::new();
-        match environment.as_deref() {
-            Some("studio") => by.push(format!("the built-in studio{at} {why}")),
-            Some(name) => by.push(format!("{name}{at}")),
-            None if by.is_empty() => {
-                by.push("nothing: the scene has no lights, and there is no environment".to_owned());
-            }
-            None if !why.is_empty() && self.environment.is_some() => rest = format!(", {why}"),
-            None => {}
-        }
-        let sentence = format!("lit by {}{rest}", by.join(" and "));
-        LitBy { environment, factor, lights, emissive_surfaces, sentence }
     }
 
     /// Whether the default exposure may show this scene white or black: lights of any unit, environments of any

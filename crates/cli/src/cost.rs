@@ -137,9 +137,7 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
     }
     let camera = args.scene.choose_camera(setup.opened.scene(), settings.size)?;
     let exposure = exposure::choose(args.picture.exposure, &setup.opened, &setup.device, &settings, &camera)?;
-    if let Some(sentence) = exposure.sentence.as_ref().filter(|_| !quiet) {
-        steps.say(sentence);
-    }
+    exposure.sentence.iter().for_each(|line| steps.tell(line));
     let settings = Settings { exposure: exposure.stops, ..settings };
     let picture = exposure.told(&args.picture);
     let scene = args.scene.told(&setup.opened, &settings.knobs);

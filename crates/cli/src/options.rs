@@ -363,14 +363,15 @@ impl SceneOptions {
         if !opened.has_light_by_knobs() {
             return self.clone();
         }
-        let lit_by = opened.lit_by(knobs);
-        match lit_by.environment {
-            Some(_) => Self {
+        let settings =
+            Settings { knobs: knobs.clone(), environment_intensity: self.env_intensity, ..Settings::default() };
+        match opened.lit(settings) {
+            (Some(_), lit) => Self {
                 background: self.background.or(Some(Background::Environment)),
-                env_intensity: self.env_intensity * lit_by.factor,
+                env_intensity: lit.environment_intensity,
                 ..self.clone()
             },
-            None => Self { env: Some("none".to_owned()), env_intensity: 1.0, env_rotation: 0.0, ..self.clone() },
+            (None, _) => Self { env: Some("none".to_owned()), env_intensity: 1.0, env_rotation: 0.0, ..self.clone() },
         }
     }
 

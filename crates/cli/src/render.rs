@@ -26,7 +26,7 @@ use super::report::{
 use super::sequence;
 use super::setup::Setup;
 use super::shard;
-use super::summary::{Sources, sentence};
+use super::summary::sentence;
 use super::{print, print_bytes, usage};
 use etalon::frame::Rendered;
 use etalon::gpu::Severity;
@@ -98,10 +98,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         let software = if info.kind == "cpu" { ", a software device" } else { "" };
         steps.say(&format!("drawing on {} ({}{software})", info.name, info.driver));
     }
-    let lit_by = setup.opened.lit_by(&settings.knobs);
-    if !quiet {
-        [Some(&lit_by.sentence), exposure.sentence.as_ref()].into_iter().flatten().for_each(|line| steps.say(line));
-    }
+    exposure.sentence.iter().for_each(|line| steps.tell(line));
     for warning in &setup.opened.warnings {
         tracing::warn!("{warning}");
     }
@@ -109,7 +106,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
 
     steps.step("uploading", 1);
     let knobs = settings.knobs.clone();
-    let sources = Sources::of(setup.opened.scene(), &args.scene);
+    let sources = setup.opened.sources(&knobs);
     let explained = (args.picture.plan == PlanExtent::ExplainCost).then(|| (setup.clone(), settings.clone()));
     let (mut renderer, camera) = setup.renderer(&args.scene, settings)?;
     phases.end("upload");
@@ -126,6 +123,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         }
     }
 
+    let lit_by = sources.lit_by(renderer.plan());
     let samples = renderer.plan().samples;
     let mut rounds = Vec::new();
     let mut first: Option<(Rendered, Option<Picture>)> = None;
@@ -217,7 +215,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
             schema: "etalon.report/1",
             device: info,
             scene: facts,
-            lit_by,
+            lit_by: lit_by.clone(),
             exposure,
             knobs: knob_map(&knobs),
             plan,
@@ -236,7 +234,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         };
         file::write(path, serde_json::to_string_pretty(&report)?.as_bytes())?;
     }
-    steps.tell(&sentence(args.picture.size, &rendered, phases.start.elapsed(), &sources.lit_by(renderer.plan())));
+    steps.tell(&sentence(args.picture.size, &rendered, phases.start.elapsed(), &lit_by.sentence));
     drop(steps);
     if !outputs.iter().any(|(path, _)| is_standard(path)) {
         for (path, _) in &outputs {

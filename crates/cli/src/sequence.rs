@@ -235,7 +235,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let mut opened =
         etalon::open::Opened::named(&args.scene.scene, rest, environment, args.scene.asks_for_environment());
     args.picture.colour_of(opened.scene(), &mut settings.knobs)?;
-    let lit_by = opened.lit_by(&settings.knobs);
+    let lit_by = opened.sources(&settings.knobs).lit_by(&opened.plan(settings.clone())?);
     for warning in &opened.warnings {
         tracing::warn!("{warning}");
     }
@@ -258,9 +258,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let first = fixed.first().map(|(_, camera)| camera).ok_or_else(|| anyhow!("{}: no camera", still.name))?;
     let exposure = exposure::choose(args.picture.exposure, &opened, &device, &settings, first)?;
     settings.exposure = exposure.stops;
-    if !quiet {
-        [Some(&lit_by.sentence), exposure.sentence.as_ref()].into_iter().flatten().for_each(|line| steps.say(line));
-    }
+    [Some(&lit_by.sentence), exposure.sentence.as_ref()].into_iter().flatten().for_each(|line| steps.tell(line));
     let (_, settings) = opened.lit(settings);
     let mut drawer = Drawer { args, device: &device, renderer: None, moved: true, settings };
     let mut pictures: Vec<PictureRecord> = Vec::new();

@@ -86,11 +86,10 @@ pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<Exi
     let camera = args.scene.choose_camera(setup.opened.scene(), settings.size)?;
     let exposure = exposure::choose(args.picture.exposure, &setup.opened, &setup.device, &settings, &camera)?;
     settings.exposure = exposure.stops;
-    if !quiet {
-        let lit_by = setup.opened.lit_by(&settings.knobs);
-        [Some(&lit_by.sentence), exposure.sentence.as_ref()].into_iter().flatten().for_each(|line| steps.say(line));
-    }
-    let split = split(args, &setup.opened.plan(settings.clone())?)?;
+    let plan = setup.opened.plan(settings.clone())?;
+    let lit_by = setup.opened.sources(&settings.knobs).lit_by(&plan);
+    [Some(lit_by.sentence), exposure.sentence].iter().flatten().for_each(|line| steps.tell(line));
+    let split = split(args, &plan)?;
     if split == Split::Tiles {
         settings.share = TileShare { index: index - 1, of };
         ensure!(

@@ -174,7 +174,7 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode> {
     usage(args.check())?;
     let settings = args.picture.settings(&args.scene)?;
     let told = args.clone();
-    let first = (!args.scene.scene.starts_with("study:")).then(|| PathBuf::from(&args.scene.scene));
+    let first = is_file(&args.scene.scene).then(|| PathBuf::from(&args.scene.scene));
     let messages = run_window(Start {
         file: first,
         size: args.picture.size,

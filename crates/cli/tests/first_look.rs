@@ -128,7 +128,9 @@ fn what_lights_a_file_follows_from_what_it_contains() {
     let lit = |folder: &TempDir, more: &str| {
         let (said, report, _) = shown(folder, more);
         let lit_by = report["lit_by"].clone();
-        assert!(said.contains(lit_by["sentence"].as_str().expect("a sentence")), "{said}");
+        // The last line says it, and no other line does.
+        assert!(said.trim_end().ends_with(lit_by["sentence"].as_str().expect("a sentence")), "{said}");
+        assert_eq!(said.matches("lit by").count(), 1, "{said}");
         (lit_by["environment"].clone(), lit_by["factor"].clone(), lit_by["lights"].clone())
     };
     let plain = folder(white(), &[]);
