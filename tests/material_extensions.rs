@@ -219,7 +219,8 @@ fn sensitivity(path: f64) -> DVec3 {
     DVec3::from(rows.map(|[a, b, c]| (a * x + b * y + c * z) / (a + b + c)))
 }
 
-/// Reflectance of a film of thickness d over a dielectric, both polarisations, with as many harmonics as the shaders have.
+/// Reflectance of a film of thickness d over a dielectric, both polarisations, with as many harmonics as the shaders
+/// have.
 fn film(m: &Material, cos: f64) -> DVec3 {
     let [factor, n_film, _, d] = m.lobes[IRIDESCENCE].factors.map(f64::from);
     let cos_film = (1.0 - (1.0 - cos * cos) / (n_film * n_film)).sqrt();

@@ -63,7 +63,7 @@ vec3 metal_under_film(Surface s, Film film, vec3 bare) {
 
 // Fresnel reflectance of the dielectric part without its film. KHR_materials_specular may tint F0, so the exact curve is
 // mapped to the range from F0 to F90.
-vec3 bare_dielectric(Surface s, float cos_in) {
+vec3 fresnel_of_dielectric(Surface s, float cos_in) {
     if (FRESNEL == FRESNEL_SCHLICK) return schlick(s.f0_dielectric, s.f90_dielectric, cos_in);
     float r0 = nested_f0(s.n_outside, s.ior);
     float n = s.n_outside == 1.0 ? s.ior : s.ior / s.n_outside;
@@ -92,7 +92,7 @@ struct BaseFresnel {
 };
 
 BaseFresnel fresnel_of_base(Surface s, float cos_in) {
-    BaseFresnel f = BaseFresnel(bare_dielectric(s, cos_in), fresnel_of_metal(s, cos_in));
+    BaseFresnel f = BaseFresnel(fresnel_of_dielectric(s, cos_in), fresnel_of_metal(s, cos_in));
     if (IRIDESCENCE) {
         Film film = film_of(s, cos_in, s.n_outside);
         f = BaseFresnel(under_film(s, film, f.dielectric, s.n_outside, s.ior), metal_under_film(s, film, f.metal));
@@ -307,7 +307,7 @@ FacetFresnel fresnel_below_coat(Layers b, float cos_in) {
         f.total = b.solid && share >= 1.0;
         f.dielectric = f0 + (vec3(s.f90_dielectric) - f0) * share;
     } else {
-        f.dielectric = bare_dielectric(s, cos_in);
+        f.dielectric = fresnel_of_dielectric(s, cos_in);
     }
     vec3 metal = fresnel_of_metal(s, cos_in);
     if (IRIDESCENCE) {

@@ -4,8 +4,8 @@
 //! Read Real-Time Rendering (4th ed.), section 20.1 (deferred shading). 24 bytes a pixel beside depth: RGBA16F base
 //! colour and metallic, two octahedral normals (RG32UI, or as the knob `normals` says), RG32UI ids, roughness and
 //! occlusion. 16 more for positions where the knob `position` stores them; 4 for triangles with rays, 8 for emissive
-//! textures, 16 for layers and 16 for lobes where the plan has them. docs/decisions/gbuffer.md has the cost of narrower and wider
-//! formats.
+//! textures, 16 for layers and 16 for lobes where the plan has them. docs/decisions/gbuffer.md has the cost of narrower
+//! and wider formats.
 
 use std::sync::Arc;
 

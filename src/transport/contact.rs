@@ -11,10 +11,10 @@ use rayon::prelude::*;
 
 use super::bvh::{Aabb, Bvh, Node, Triangle};
 
-/// Whether some triangle of a body lies within `distance` metres of the plane of a triangle of another body or of another
-/// instance, and their bounding boxes overlap. `bodies`: the body of each instance (`Solids::body`). Coplanar triangles whose boxes overlap count even when the triangles do
-/// not: that costs only time. Shells of one mesh that touch each other are not searched: near the pole of a sphere,
-/// triangles that are not even neighbours are coplanar.
+/// Whether some triangle of a body lies within `distance` metres of the plane of a triangle of another body or of
+/// another instance, and their bounding boxes overlap. `bodies`: the body of each instance (`Solids::body`). Coplanar
+/// triangles whose boxes overlap count even when the triangles do not: that costs only time. Shells of one mesh that
+/// touch each other are not searched: near the pole of a sphere, triangles that are not even neighbours are coplanar.
 #[must_use]
 pub fn has_coincident_interfaces(bvh: &Bvh, bodies: &[Option<usize>], distance: f64) -> bool {
     let is_body = |t: &&Triangle| bodies[t.instance as usize].is_some();

@@ -133,7 +133,7 @@ fn bad_vector_files_get_a_sentence() {
         ("fresnel_dielectric.csv", "cos_in,n,=F\n", "the file has no rows"),
         ("fresnel_dielectric.csv", "cos_in,n,=F\n1,1.5,\n", "no cell of the expected outputs contains a number"),
         ("fresnel_dielectric.csv", "", "the input \"cos_in\" of fresnel_dielectric has no column"),
-        ("nothing.csv", "x,=y\n1,1\n", "no function is called \"nothing\"; the functions are two_sum"),
+        ("nothing.csv", "x,=y\n1,1\n", "no function is called \"nothing\"; the functions are anisotropic_distribution"),
     ];
     for (name, content, said) in bad {
         vectors(name, content, &[]).failed(1, said);

@@ -4,7 +4,7 @@
 //! Read Walter et al. 2007 (GGX); Heitz, JCGT 3(2) 2014 (Smith) and JCGT 7(4) 2018 (VNDF); Veach 1997 (the power
 //! heuristic); Turquin 2019 (energy compensation). Directions are normalised first.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DVec3;
 
@@ -277,7 +277,7 @@ fn alpha(d: &mut SplitMix64) -> f64 {
 
 /// A direction above the horizon, at least 1e-4 above it.
 fn above(d: &mut SplitMix64) -> DVec3 {
-    let angle = if d.below(2) == 0 { d.between(1e-3, 1.5707) } else { d.log(1e-4, 1.5) };
+    let angle = if d.below(2) == 0 { d.between(1e-3, FRAC_PI_2 - 1e-4) } else { d.log(1e-4, 1.5) };
     d.at_angle(DVec3::Z, angle)
 }
 

@@ -16,8 +16,8 @@ pub fn schlick(f0: f64, f90: f64, cos_in: f64) -> f64 {
     f0 + (f90 - f0) * (1.0 - cos_in).max(0.0).powi(5)
 }
 
-/// @eq F3: reflectance of a thin film for one wavelength (Airy; Born and Wolf, section 7.6.1): amplitudes a and ρ of its
-/// outer and its inner face, phase θ of a crossing there and back.
+/// @eq F3: reflectance of a thin film for one wavelength (Airy; Born and Wolf, section 7.6.1): amplitudes a and ρ of
+/// its outer and its inner face, phase θ of a crossing there and back.
 #[must_use]
 pub fn film_reflectance(a: f64, rho: f64, cos_theta: f64) -> f64 {
     let interference = 2.0 * a * rho * cos_theta;
@@ -285,14 +285,14 @@ pub(super) const EQUATIONS: &[Equation] = &[
         ],
         outputs: &[Output {
             name: "F",
-            bound: "8 ulp + 6e-7 |aρ|/(1 + a²ρ² + 2aρ cosθ)",
+            bound: "8 ulp + 4e-6 |aρ|/(1 + a²ρ² + 2aρ cosφ)",
             allowed: |c| {
                 let [a, rho, cos] = [0, 1, 2].map(|i| c.inputs[i]);
                 let product = a * rho;
-                c.ulps(8.0) + 6e-7 * product.abs() / (1.0 + product * product + 2.0 * product * cos)
+                c.ulps(8.0) + 4e-6 * product.abs() / (1.0 + product * product + 2.0 * product * cos)
             },
         }],
-        axis: Axis { name: "cosθ", log: false, of: |x| x[2], column: 0, relative: false },
+        axis: Axis { name: "cosφ", log: false, of: |x| x[2], column: 0, relative: false },
         extreme: -1.0,
     },
     Equation {

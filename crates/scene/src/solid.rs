@@ -1,10 +1,9 @@
 //! Closed dielectric meshes (solids) and thin-walled surfaces, and the solids that contain a point.
 //!
 //! Refraction needs the side of the surface on which a ray is, and only a watertight mesh separates an inside from an
-//! outside. A transmissive mesh is therefore a solid if it is closed, alone or with meshes that continue its edges, and a
-//! thin-walled surface otherwise. Read Schmidt
-//! and Budge, "Simple Nested Dielectrics in Ray Traced Images", journal of graphics tools, 2002; KHR_materials_volume.
-//! Assumes triangles counter-clockwise from the front.
+//! outside. A transmissive mesh is therefore a solid if it is closed, alone or with meshes that continue its edges, and
+//! a thin-walled surface otherwise. Read Schmidt and Budge, "Simple Nested Dielectrics in Ray Traced Images", journal
+//! of graphics tools, 2002; KHR_materials_volume. Assumes triangles counter-clockwise from the front.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -22,8 +21,8 @@ const NO_VOLUME: f64 = 1e-12;
 pub struct Solids {
     /// Closed transmissive meshes, and transmissive parts of closed bodies of several meshes.
     pub solid: Vec<bool>,
-    /// The body that an instance bounds, by its first instance. A closed mesh is a body of its own. The parts of a body of
-    /// several meshes have one number, opaque parts too. `None` for surfaces that bound no body.
+    /// The body that an instance bounds, by its first instance. A closed mesh is a body of its own. The parts of a body
+    /// of several meshes have one number, opaque parts too. `None` for surfaces that bound no body.
     pub body: Vec<Option<usize>>,
     /// The material whose medium a material has inside: the first one of a body of several materials, usually itself.
     pub medium: Vec<usize>,
@@ -52,8 +51,8 @@ pub fn is_closed(mesh: &Mesh) -> bool {
 /// A directed edge: the bits of both ends, the smaller first.
 type Edge = [[u32; 3]; 2];
 
-/// The open edges of a mesh, welded by position: how much more often each is run from its smaller to its larger end than
-/// back.
+/// The open edges of a mesh, welded by position: how much more often each is run from its smaller to its larger end
+/// than back.
 fn rim(mesh: &Mesh) -> HashMap<Edge, i64> {
     let at = |i: u32| mesh.positions[i as usize].map(|x| (x + 0.0).to_bits());
     let mut edges = Vec::with_capacity(mesh.indices.len());
@@ -125,14 +124,15 @@ fn same_medium(a: &Material, b: &Material) -> bool {
     of(a) == of(b) && a.sigma.is_none() && b.sigma.is_none()
 }
 
-/// Whether a material refracts as the boundary of a medium where its mesh is closed. Alpha-blended surfaces do not refract.
+/// Whether a material refracts as the boundary of a medium where its mesh is closed. Alpha-blended surfaces do not
+/// refract.
 fn bounds_medium(m: &Material) -> bool {
     m.transmission > 0.0 && m.thickness > 0.0 && m.alpha_mode != AlphaMode::Blend
 }
 
 /// Bodies of several meshes, such as the primitives of one glTF mesh: an open transmissive mesh, and meshes in the same
-/// place whose open edges close its own. Each is a list of instances, the first one transmissive. Parts that transmit have one
-/// medium.
+/// place whose open edges close its own. Each is a list of instances, the first one transmissive. Parts that transmit
+/// have one medium.
 fn joint_bodies(scene: &Scene, open: &[usize]) -> Vec<Vec<usize>> {
     let material = |instance: usize| &scene.materials[scene.meshes[scene.instances[instance].mesh].material];
     let place = |instance: usize| scene.instances[instance].world_from_object.to_cols_array().map(f64::to_bits);

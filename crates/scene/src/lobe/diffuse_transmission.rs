@@ -1,5 +1,5 @@
-//! Diffuse transmission (KHR_materials_diffuse_transmission): part of the light that enters leaves on the other side, in
-//! all directions: leaves, paper, lampshades.
+//! Diffuse transmission (KHR_materials_diffuse_transmission): part of the light that enters leaves on the other side,
+//! in all directions: leaves, paper, lampshades.
 //!
 //! Read the extension. The formula is `diffuse_transmission` of shaders/lib/layers.glsl.
 
