@@ -512,11 +512,11 @@ fn planned(ways: &Ways, choice: &Choice, knobs: Knobs) -> Plan {
 const NEEDS: &[(&str, &str)] = &[
     ("absorption", "transmissive hits"),
     ("ambient light", "environment"),
-    ("ambient occlusion", "environment"),
+    // Every scene here has a surface that scatters.
+    ("ambient occlusion", "ambient light"),
     ("anisotropy", "textures of lobes"),
     ("clear coat", "material layers"),
     ("tiled light culling", "punctual lights"),
-    ("transparent shadows", "shadows"),
     ("heterogeneous media", "absorption"),
     ("heterogeneous media", "refraction"),
     ("environment reflection", "environment"),

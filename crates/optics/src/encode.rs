@@ -117,9 +117,9 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Region { name: "between them", share: 1, draw: |d| [0; 3].map(|_| d.unit() as f32).to_vec() },
         ],
         outputs: &[
-            Output { name: "linearx", bound: "rel 2e-6", allowed: |c| c.rel(2e-6) },
-            Output { name: "lineary", bound: "rel 2e-6", allowed: |c| c.rel(2e-6) },
-            Output { name: "linearz", bound: "rel 2e-6", allowed: |c| c.rel(2e-6) },
+            Output { name: "linearx", bound: "rel 2.1e-6", allowed: |c| c.rel(2.1e-6) },
+            Output { name: "lineary", bound: "rel 2.1e-6", allowed: |c| c.rel(2.1e-6) },
+            Output { name: "linearz", bound: "rel 2.1e-6", allowed: |c| c.rel(2.1e-6) },
         ],
         axis: Axis { name: "x", log: false, of: |x| x[0], column: 0, relative: true },
         // Texels are bytes.
