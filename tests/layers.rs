@@ -23,7 +23,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "frame",
         &["frame", "pass", "upload", "gpu", "scene", "transport", "plan", "prepare", "image", "share", "spectra"],
     ),
-    ("open", &["frame", "gpu", "plan", "prepare", "scene", "study"]),
+    ("open", &["frame", "gpu", "image", "plan", "prepare", "scene", "study", "transport"]),
 ];
 
 /// Modules that know Vulkan.

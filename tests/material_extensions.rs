@@ -4,8 +4,9 @@
 use std::f64::consts::PI;
 
 use etalon::image::Picture;
-use etalon::optics::brdf::{anisotropic_distribution, anisotropic_visibility};
-use etalon::optics::fresnel::{film_reflectance, fresnel_dielectric, normal_reflectance};
+use etalon::optics::anisotropy::{anisotropic_distribution, anisotropic_visibility};
+use etalon::optics::fresnel::{fresnel_dielectric, normal_reflectance};
+use etalon::optics::thin_film::film_reflectance;
 use etalon::plan::Model;
 use etalon::scene::environment::Environment;
 use etalon::scene::lobe::{ANISOTROPY, DIFFUSE_TRANSMISSION, IRIDESCENCE};

@@ -249,7 +249,7 @@ fn surfaces_bring_their_targets() {
     let texture = one_colour(&mut with, [9, 9, 9, 9]);
     with.0.materials[2].specular_color_texture = Some(texture);
     Case {
-        brings: &[TEXTURES, LOBE_TARGET, &["gbuffer.textures", "gbuffer.lobe_texels"]],
+        brings: &[TEXTURES, LOBE_TARGET, &["gbuffer.textures"]],
         ..Case::new("textures of lobes", NONE, ball(metal(0.5), None), with)
     }
     .check();
@@ -261,7 +261,7 @@ fn surfaces_bring_their_targets() {
     let mut brushed = metal(0.5);
     brushed.lobes[ANISOTROPY].factors = [1.0, 0.0, 0.0, 0.0];
     Case {
-        brings: &[LOBE_TARGET, &["light.lobes_seen", "gbuffer.anisotropic", "gbuffer.lobe_texels"]],
+        brings: &[LOBE_TARGET, &["light.lobes_seen", "gbuffer.anisotropic"]],
         ..Case::hidden("anisotropy", NONE, metal(0.5), brushed)
     }
     .check();

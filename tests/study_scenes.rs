@@ -141,7 +141,12 @@ fn scenes_are_sound() {
             assert_eq!(mesh.normals.len(), count, "{label}");
             assert_eq!(mesh.uvs[0].len(), count, "{label}");
             assert!(mesh.uvs[0].as_flattened().iter().all(|v| v.is_finite()), "{label}");
-            assert!(mesh.tangents.is_empty() && mesh.colors.is_empty() && mesh.uvs[1].is_empty(), "{label}");
+            assert!(mesh.colors.is_empty() && mesh.uvs[1].is_empty(), "{label}");
+            // Only a lobe with a direction needs tangents.
+            let tangents = if scene.materials[mesh.material].has_direction() { count } else { 0 };
+            let are_units =
+                mesh.tangents.iter().all(|[x, y, z, w]| (x * x + y * y + z * z - 1.0).abs() < 1e-5 && *w == 1.0);
+            assert!(are_units && (mesh.tangents.is_empty() || mesh.tangents.len() == tangents), "{label}");
             assert!(!mesh.indices.is_empty() && mesh.indices.len() % 3 == 0, "{label}");
             assert!(mesh.indices.iter().all(|&i| (i as usize) < count), "{label}");
             assert!(mesh.material < scene.materials.len(), "{label}");

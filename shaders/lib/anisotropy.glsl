@@ -1,7 +1,7 @@
 // Anisotropy of GGX microfacets (KHR_materials_anisotropy): a lobe with α along one direction of the surface and another
 // α across it.
 // Where to read: Heitz 2014, section 5.3, and Heitz 2018 (VNDF); Burley 2012; pbrt 4, section 9.6. Twins:
-// crates/optics/src/brdf.rs. Assumes: unit vectors; `alphas` are α along and across, in (0, 1].
+// crates/optics/src/anisotropy.rs. Assumes: unit vectors; `alphas` are α along and across, in (0, 1].
 #ifndef ANISOTROPY_GLSL
 #define ANISOTROPY_GLSL
 #include "lib/brdf.glsl"

@@ -6,7 +6,7 @@
 // In a band of wavelengths the closed form holds at the band's middle. For red, green and blue each cos mφ is replaced by
 // its mean over the sensitivity of a channel.
 // Where to read: Born and Wolf, sections 1.5.2 and 7.6.1 (Fresnel's and Airy's formulae); Belcour and Barla 2017;
-// docs/decisions/materials.md. Twin: crates/optics/src/fresnel.rs. Assumes: amplitudes in [−1, 1]; lengths in nm.
+// docs/decisions/materials.md. Twin: crates/optics/src/thin_film.rs. Assumes: amplitudes in [−1, 1]; lengths in nm.
 #ifndef THIN_FILM_GLSL
 #define THIN_FILM_GLSL
 #include "lib/arithmetic.glsl"

@@ -121,7 +121,7 @@ fn what_is_left_out_has_a_price() {
         .filter(|effect| effect["state"] != "used" && !priced(&effect["name"]))
         .map(|e| e["name"].clone())
         .collect();
-    let mut alone = vec!["heterogeneous media", "quadrature", "prefiltered environment", "ambient occlusion"];
+    let mut alone = vec!["heterogeneous media", "quadrature", "prefiltered environment"];
     alone.extend(["emissive surfaces as lights", "analytic area lights", "path guiding", "dispersion"]);
     assert_eq!(without, alone);
     assert!(of("material layers")["bytes"].as_i64() > Some(48 * 27 * 8), "{costs:?}");

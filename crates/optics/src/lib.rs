@@ -7,6 +7,7 @@
 
 pub mod catalogue;
 
+pub mod anisotropy;
 pub mod arithmetic;
 pub mod brdf;
 pub mod colour;
@@ -18,12 +19,14 @@ pub mod medium;
 pub mod ray;
 pub mod snell;
 pub mod spectra;
+pub mod thin_film;
 
 pub use catalogue::{Axis, Case, Equation, Output, Region, SplitMix64, Tier, ulp};
 
 /// All equations, by subject.
 pub fn equations() -> impl Iterator<Item = &'static Equation> {
     let subjects = [
+        anisotropy::EQUATIONS,
         arithmetic::EQUATIONS,
         brdf::EQUATIONS,
         colour::EQUATIONS,
@@ -34,6 +37,7 @@ pub fn equations() -> impl Iterator<Item = &'static Equation> {
         medium::EQUATIONS,
         ray::EQUATIONS,
         snell::EQUATIONS,
+        thin_film::EQUATIONS,
     ];
     subjects.into_iter().flatten()
 }

@@ -131,12 +131,12 @@ fn frame(backward: DVec3) -> DMat3 {
 }
 
 /// The vertices of a mesh that its triangles use.
-struct Used<'a> {
+struct UsedVertices<'a> {
     mesh: &'a Mesh,
     is_used: Vec<bool>,
 }
 
-impl<'a> Used<'a> {
+impl<'a> UsedVertices<'a> {
     fn of(mesh: &'a Mesh) -> Self {
         let mut is_used = vec![false; mesh.positions.len()];
         for &index in mesh.indices.iter() {
@@ -155,7 +155,7 @@ impl<'a> Used<'a> {
 }
 
 /// World-space box of an instance's vertices.
-fn bounds_of(instance: &Instance, used: &Used<'_>) -> Option<Bounds> {
+fn bounds_of(instance: &Instance, used: &UsedVertices<'_>) -> Option<Bounds> {
     let points = used.points().map(|p| instance.world_from_object.transform_point3(p)).filter(|p| p.is_finite());
     points.map(|p| Bounds { min: p, max: p }).reduce(Bounds::union)
 }
@@ -182,7 +182,7 @@ impl Scene {
     /// larger than what stands on it does not count: it is cut by the picture, as in a photograph.
     #[must_use]
     pub fn framing(&self, aspect: f64, fov_y: f64) -> Option<Camera> {
-        let subject = Subject::of(self)?;
+        let subject = Framed::of(self)?;
         let size = subject.bounds.max - subject.bounds.min;
         let is_sheet = size.z <= SHEET * size.x.min(size.y);
         let axes = if is_sheet { frame(DVec3::Z) } else { aimed(subject.bounds, aspect, fov_y) };
@@ -193,7 +193,7 @@ impl Scene {
     /// The same for a scene that is turned about the axis `up` through `center`: it is inside the picture at each turn.
     #[must_use]
     pub fn framing_of_turns(&self, center: DVec3, up: DVec3, aspect: f64, fov_y: f64) -> Option<Camera> {
-        let subject = Subject::of(self)?;
+        let subject = Framed::of(self)?;
         let up = up.normalize_or(DVec3::Y);
         // Distance from the axis, and height along it.
         let circles: Vec<[f64; 2]> = subject
@@ -213,15 +213,15 @@ impl Scene {
 }
 
 /// What a default camera frames: the instances of a scene without a ground far larger than they are.
-struct Subject<'a> {
-    used: Vec<Used<'a>>,
+struct Framed<'a> {
+    used: Vec<UsedVertices<'a>>,
     placed: Vec<(&'a Instance, Bounds)>,
     bounds: Bounds,
 }
 
-impl<'a> Subject<'a> {
+impl<'a> Framed<'a> {
     fn of(scene: &'a Scene) -> Option<Self> {
-        let used: Vec<Used<'_>> = scene.meshes.iter().map(Used::of).collect();
+        let used: Vec<UsedVertices<'_>> = scene.meshes.iter().map(UsedVertices::of).collect();
         let mut placed: Vec<(&Instance, Bounds)> = scene
             .instances
             .iter()
