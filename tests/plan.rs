@@ -253,10 +253,12 @@ fn surfaces_bring_their_targets() {
         ..Case::new("textures of lobes", NONE, ball(metal(0.5), None), with)
     }
     .check();
-    for (lobe, name) in [(IRIDESCENCE, "iridescence"), (DIFFUSE_TRANSMISSION, "diffuse transmission")] {
-        let mut with = metal(0.5);
+    for (lobe, name, below) in
+        [(IRIDESCENCE, "iridescence", metal(0.5)), (DIFFUSE_TRANSMISSION, "diffuse transmission", chalk())]
+    {
+        let mut with = below.clone();
         with.lobes[lobe].factors = [1.0, 1.3, 100.0, 300.0];
-        Case { brings: &[&["light.lobes_seen"]], ..Case::hidden(name, NONE, metal(0.5), with) }.check();
+        Case { brings: &[&["light.lobes_seen"]], ..Case::hidden(name, NONE, below, with) }.check();
     }
     let mut brushed = metal(0.5);
     brushed.lobes[ANISOTROPY].factors = [1.0, 0.0, 0.0, 0.0];
