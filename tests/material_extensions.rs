@@ -184,7 +184,7 @@ fn its_texture_turns_and_weakens_the_lobe() {
     // Direction (0, 1) in bytes, and half the strength.
     let mut textured = with(ANISOTROPY, [strength, turn, 0.0, 0.0], gold(0.3));
     textured.lobes[ANISOTROPY].textures[0] = Some(texture(0));
-    let product = with(ANISOTROPY, [strength * 128.0 / 255.0, turn + 1.5708, 0.0, 0.0], gold(0.3));
+    let product = with(ANISOTROPY, [strength * 128.0 / 255.0, turn + std::f32::consts::FRAC_PI_2, 0.0, 0.0], gold(0.3));
     let made = |material: &Material| {
         let (mut scene, _) = dome(std::slice::from_ref(material));
         with_tangents(&mut scene);

@@ -1,5 +1,5 @@
-//! Anisotropic GGX microfacets: α along one direction of the surface and α across it. Directions are in the frame of the
-//! lobe: x along, y across, z the normal.
+//! Anisotropic GGX microfacets: α along one direction of the surface and α across it. Directions are in the frame of
+//! the lobe: x along, y across, z the normal.
 //!
 //! Read Heitz 2014, "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", section 5.3; pbrt 9.6.
 
