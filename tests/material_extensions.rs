@@ -3,6 +3,7 @@
 
 use std::f64::consts::PI;
 
+use etalon::frame::{Background, Settings};
 use etalon::image::Picture;
 use etalon::optics::anisotropy::{anisotropic_distribution, anisotropic_visibility};
 use etalon::optics::fresnel::{fresnel_dielectric, normal_reflectance};
@@ -418,6 +419,22 @@ fn a_white_leaf_vanishes_in_uniform_light() {
         for pixel in &film.rgba {
             assert!((f64::from(pixel[0]) - 0.5).abs() < bound, "{of:?}: {pixel:?}");
         }
+    }
+}
+
+/// The background does not count as light straight ahead, but light from behind that scatters in a leaf does.
+#[test]
+fn light_from_behind_shines_through_leaves_before_a_transparent_background() {
+    let gpu = Gpu::hasty();
+    let sky = Environment::constant([0.5; 3]);
+    let mut made = Made::new("leaf");
+    let leaf = leaf(1.0, [1.0; 3], Material { double_sided: true, ..lambert([1.0; 3]) });
+    made.add(Shape::panel(1.0, 1.0), leaf, DAffine3::IDENTITY);
+    made.front(0.5);
+    let settings = Settings { background: Background::Transparent, ..model(Model::Global, [16, 16], &["samples=64"]) };
+    let (_, film) = gpu.shot(&made.0, Some(&sky), settings);
+    for pixel in &film.rgba {
+        assert!((f64::from(pixel[0]) - 0.5).abs() < 2e-5 && pixel[3] == 1.0, "{pixel:?}");
     }
 }
 

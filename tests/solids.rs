@@ -352,6 +352,13 @@ fn meshes_that_close_each_others_edges_bound_one_body() {
     let found = solids(&lid);
     assert_eq!((found.solid.clone(), found.body.clone()), (vec![true, false, true], vec![Some(0); 3]));
     assert_eq!(media_at(&lid, &found, DVec3::splat(0.3)), [0]);
+    // A pane in a wall closes with it, and bounds no body: most of the surface is opaque.
+    let mut room = in_parts(3, false);
+    room.materials[1].transmission = 0.0;
+    room.materials[2].transmission = 0.0;
+    let found = solids(&room);
+    assert_eq!((found.solid.clone(), found.sheet.clone()), (vec![false; 3], vec![true, false, false]));
+    assert!(media_at(&room, &found, DVec3::splat(0.3)).is_empty());
 }
 
 #[test]

@@ -47,9 +47,8 @@ Film film_of(Surface s, float cos_in, float n1) {
 }
 
 // Fresnel reflectance `bare` of a dielectric base of index n2, with the film over it. KHR_materials_specular scales F0, and
-// here the whole.
-vec3 under_film(Surface s, Film film, vec3 bare, float n1, float n2) {
-    float r0 = nested_f0(n1, n2);
+// here the whole: r0 is what f0_dielectric would be without it.
+vec3 under_film(Surface s, Film film, vec3 bare, float n2, float r0) {
     vec3 scale = r0 > 0.0 ? min(s.f0_dielectric / r0, 1.0) : vec3(1.0);
     vec3 coated = scale * film_over_dielectric(film, n2);
     return s.film.x > 0.0 ? bare + (coated - bare) * s.film.x : bare;
@@ -95,7 +94,7 @@ BaseFresnel fresnel_of_base(Surface s, float cos_in) {
     BaseFresnel f = BaseFresnel(fresnel_of_dielectric(s, cos_in), fresnel_of_metal(s, cos_in));
     if (IRIDESCENCE) {
         Film film = film_of(s, cos_in, s.n_outside);
-        f = BaseFresnel(under_film(s, film, f.dielectric, s.n_outside, s.ior), metal_under_film(s, film, f.metal));
+        f = BaseFresnel(under_film(s, film, f.dielectric, s.ior, nested_f0(s.n_outside, s.ior)), metal_under_film(s, film, f.metal));
     }
     return f;
 }
@@ -241,7 +240,7 @@ float ground_share(BaseAlbedo albedo) {
 // Radiance that diffuse transmission sends for irradiance on the other side.
 vec3 transmitted_radiance(Surface s, BaseAlbedo albedo, vec3 irradiance) {
     vec3 scattered = s.diffuse_through * diffuse_brdf(ground_share(albedo));
-    if (SHEEN) scattered *= left_by_sheen(s, max(cosine(s.n, s.v), 1e-4));
+    if (SHEEN) scattered *= left_by_sheen_of_all(s, max(cosine(s.n, s.v), 1e-4));
     return scattered * irradiance;
 }
 
@@ -313,7 +312,9 @@ FacetFresnel fresnel_below_coat(Layers b, float cos_in) {
     if (IRIDESCENCE) {
         float n1 = b.between ? b.n1 : s.n_outside;
         Film film = film_of(s, cos_in, n1);
-        f.dielectric = under_film(s, film, f.dielectric, n1, b.between ? b.n2 : s.ior);
+        // Of a closed dielectric mesh f0_dielectric is that in air.
+        float r0 = b.solid ? nested_f0(1.0, s.ior) : nested_f0(n1, s.ior);
+        f.dielectric = under_film(s, film, f.dielectric, b.between ? b.n2 : s.ior, r0);
         metal = metal_under_film(s, film, metal);
     }
     f.dielectric = f.total ? vec3(1.0) : f.dielectric;
@@ -321,9 +322,12 @@ FacetFresnel fresnel_below_coat(Layers b, float cos_in) {
     return f;
 }
 
+// Of the light that scatters into all directions, the fraction that diffuse transmission sends to the other side.
 float diffuse_through_share(Surface s) {
     float through = mean(s.diffuse_through);
-    return DIFFUSE_TRANSMISSION && through > 0.0 ? through / (mean(s.diffuse) + through) : 0.0;
+    float reflected = mean(s.diffuse);
+    if (SHEEN) reflected += mean(s.sheen.rgb) * sheen_albedo(s, max(cosine(s.n, s.v), 1e-4)).x;
+    return DIFFUSE_TRANSMISSION && through > 0.0 ? through / (reflected + through) : 0.0;
 }
 
 // The layers of an opaque surface whose base is a rough lobe for every roughness: for lighting by punctual lights and by
@@ -357,6 +361,11 @@ float scattered_share(Layers b) {
     float ground = mean(b.s.diffuse) * b.enters * b.left;
     if (DIFFUSE_TRANSMISSION) ground += mean(b.s.diffuse_through) * b.enters * b.left;
     return SHEEN ? ground + mean(b.s.sheen.rgb) * sheen_albedo(b.s, b.cos_v).x : ground;
+}
+
+// Whether light from the other side reaches the viewer by diffuse transmission.
+bool shines_through(Layers b) {
+    return DIFFUSE_TRANSMISSION && largest(b.s.diffuse_through) > 0.0;
 }
 
 // Transmittance of a surface that does not deflect light.
@@ -461,15 +470,20 @@ BsdfEval evaluate_diffuse_transmission(Layers b, vec3 l) {
     Surface s = b.s;
     float cos_l = -cosine(s.n, l);
     vec3 mirrored = l + 2.0 * cos_l * s.n;
+    float cos_d = 0.5 * length(mirrored + s.v);
     float enters = b.enters;
     if (BRDF == BRDF_GGX && !b.delta) {
-        enters = 1.0 - largest(fresnel_below_coat(b, 0.5 * length(mirrored + s.v)).dielectric);
+        enters = 1.0 - largest(fresnel_below_coat(b, cos_d).dielectric);
     }
     if (BRDF == BRDF_BLINN_PHONG) enters = 1.0;
     if (BRDF == BRDF_BLINN_PHONG_RECIPROCAL) enters = 1.0 - largest(s.f0_dielectric);
     float left = b.left;
     if (SHEEN) left = min(left, left_by_sheen(s, max(cos_l, 1e-4)));
-    float under = CLEARCOAT ? b.under : 1.0;
+    float under = 1.0;
+    if (CLEARCOAT) {
+        bool by_albedo = BRDF == BRDF_GGX_MULTI || b.coat_delta;
+        under = by_albedo ? b.under : 1.0 - fresnel_of_coat(s, cos_d);
+    }
     vec3 f_cos = s.diffuse_through * (diffuse_brdf(enters) * max(cos_l, 0.0) * left * under);
     float pdf = b.shares.z * b.through_share * max(cos_l, 0.0) * INV_PI;
     return BsdfEval(f_cos, pdf);

@@ -26,8 +26,9 @@ vec3 light_on(Layers b, uint index) {
     vec3 result = evaluate_reflection(b, light.l).f_cos * light.arriving;
     if (DIFFUSE_TRANSMISSION) {
         // Light from behind: seen from there, the surface is turned over.
-        result += evaluate_diffuse_transmission(b, light.l).f_cos * light.arriving;
-        if (dot(s.n, light.l) < 0.0) {
+        vec3 through = evaluate_diffuse_transmission(b, light.l).f_cos * light.arriving;
+        if (largest(through) > 0.0) {
+            result = through;
             s.n = -s.n;
             s.n_triangle = -s.n_triangle;
             s.v = reflect(s.v, s.n);

@@ -175,7 +175,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
         if (!at_surface && !directly_visible) gathered = p.throughput * seen * w;
         if (SAMPLED_ENVIRONMENT && light.pdf > 0.0 && light.t_max == LARGEST) {
             // A directly visible background replaces the environment, so no light comes from it straight ahead.
-            bool hidden = directly_visible && dot(hit.n, light.to_light) < 0.0;
+            bool hidden = directly_visible && dot(hit.n, light.to_light) < 0.0 && !shines_through(b);
             light.arriving *= hidden ? vec3(0.0) : seen;
         }
     }
@@ -226,7 +226,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
         for (uint i = 1; i < LIGHT_SAMPLES; i++) {
             LightSample other = sample_light(front_origin, dimension_words_of(pixel, vertices_before, DIMENSION_LIGHT, i, LIGHT_SAMPLES));
             if (SAMPLED_ENVIRONMENT && other.pdf > 0.0 && other.t_max == LARGEST) {
-                bool hidden = (p.state & PATH_TRANSPARENT_SO_FAR) != 0 && !SKY && dot(hit.n, other.to_light) < 0.0;
+                bool hidden = (p.state & PATH_TRANSPARENT_SO_FAR) != 0 && !SKY && dot(hit.n, other.to_light) < 0.0 && !shines_through(b);
                 other.arriving *= hidden ? vec3(0.0) : environment_radiance(other.to_light);
             }
             ShadowRay one = shadow_ray_to(p, interaction, scatters, front_origin, other, bsdf_evaluate(bsdf, normalize(other.to_light)));

@@ -147,7 +147,7 @@ Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, 
     if (ANISOTROPY) {
         float strength = lobe_factors(id, LOBE_ANISOTROPY).x * t.anisotropy;
         s.alpha_along += (1.0 - s.alpha) * (strength * strength);
-        s.tangent = normalize(t.tangent - n * dot(n, t.tangent));
+        if (strength > 0.0) s.tangent = normalize(t.tangent - n * dot(n, t.tangent));
     }
     s.film = vec3(0.0);
     if (IRIDESCENCE) {
@@ -165,7 +165,9 @@ Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, 
         vec4 factors = lobe_factors(id, LOBE_SHEEN);
         s.sheen = vec4(lobe_color(factors.rgb, t.sheen.rgb), t.sheen.a * factors.a);
     }
-    s.base_traced = MIRROR_RAYS && s.roughness <= ROUGHEST_MIRROR;
+    // Of an anisotropic lobe its wide direction counts.
+    float widest = s.alpha_along != s.alpha ? sqrt(s.alpha_along) : s.roughness;
+    s.base_traced = MIRROR_RAYS && widest <= ROUGHEST_MIRROR;
     s.coat_traced = MIRROR_RAYS && s.clearcoat_roughness <= ROUGHEST_MIRROR;
     s.p_bvh = p_rel;
     s.n_triangle = n;

@@ -60,15 +60,15 @@ SurfaceFragment surface_fragment() {
         s.n_shading = bent_normal(n, t_rel, vec3(texel.xy * material_at(ids.y).normal_scale, texel.z));
     }
     if (HAS_COAT_NORMAL) s.n_coat = bent_normal(n, t_rel, page_texel(clearcoat_normal_page, SLOT_CLEARCOAT_NORMAL).xyz * 2.0 - 1.0);
-    // From behind the whole normal is reversed, normal map included (glTF 2.0, section 3.9.5, double sided).
-    if (!gl_FrontFacing) {
-        s.n_shading = -s.n_shading;
-        s.n_coat = -s.n_coat;
-    }
     if (ANISOTROPIC) {
         bool textured = (TEXTURES & (1u << SLOT_ANISOTROPY)) != 0;
         vec2 rotation = material_texel(ids.y, MATERIAL_LOBES_AT + int(LOBE_ANISOTROPY)).yz;
         s.texels.tangent = anisotropy_direction(s.n_shading, t_rel, textured ? anisotropy.rg * 2.0 - 1.0 : vec2(1.0, 0.0), rotation);
+    }
+    // From behind the whole normal is reversed, normal map included (glTF 2.0, section 3.9.5, double sided).
+    if (!gl_FrontFacing) {
+        s.n_shading = -s.n_shading;
+        s.n_coat = -s.n_coat;
     }
     return s;
 }

@@ -33,7 +33,8 @@ float film_reflectance(float a, float rho, float cos_phi) {
 // Gaussians over 1/λ (Belcour and Barla 2017), so the mean has a closed form.
 vec3 film_sensitivity(float path) {
     float k = 2.0 * PI * path * 1e-9;
-    vec4 gaussians = cos(vec4(1.6810e6, 1.7953e6, 2.2084e6, 2.2399e6) * k) * exp(vec4(-4.3278e9, -9.3046e9, -6.6121e9, -4.5282e9) * (k * k));
+    vec4 waves = cos(vec4(1.6810e6, 1.7953e6, 2.2084e6, 2.2399e6) * k);
+    vec4 gaussians = waves * exp(vec4(-4.3278e9, -9.3046e9, -6.6121e9, -4.5282e9) * (k * k));
     // X has two, weighted by their areas.
     vec3 xyz = vec3(0.846202 * gaussians.x + 0.153798 * gaussians.w, gaussians.yz);
     // Equal X, Y and Z are not white in Rec. 709: each channel is divided by its value for them.
@@ -48,7 +49,7 @@ struct Film {
     vec2 outer;       // amplitudes of the outer face, both polarisations
     bool total;       // total internal reflection there
     // In a band of wavelengths cosφ. Otherwise the means of cosφ, cos 2φ and cos 3φ: for |q| ≤ 0.05, films on glass, the rest is
-    // below 2e-5; for |q| ≤ 0.3, dense films on metals, below 2q⁴/(1 − q) = 2.4 %.
+    // below 2e-5; for |q| ≤ 0.3, dense films on metals, below 2q⁴/(1 − q) = 2.3 %.
     vec3 cos_phi;
     vec3 cos_2_phi;
     vec3 cos_3_phi;
@@ -78,7 +79,7 @@ Film film_at(float cos_in, float n1, float n, float thickness) {
 }
 
 // Reflectance for one polarisation, with the amplitude ρ of the inner face.
-vec3 film_reflectance(Film film, float a, vec3 rho) {
+vec3 film_in_channels(Film film, float a, vec3 rho) {
     vec3 q = -a * rho;
     vec3 sum = vec3(1.0) + 2.0 * q * (film.cos_phi + q * (film.cos_2_phi + q * film.cos_3_phi));
     vec3 series = clamp(1.0 - (1.0 - a * a) * (1.0 - rho * rho) / (1.0 - q * q) * sum, 0.0, 1.0);
@@ -89,7 +90,7 @@ vec3 film_reflectance(Film film, float a, vec3 rho) {
 vec3 film_over_dielectric(Film film, float n2) {
     float cos_behind = sqrt(max(1.0 - film.sin2 / (n2 * n2), 0.0));
     vec2 rho = interface_amplitudes(film.cos_film, cos_behind, film.n, n2);
-    vec3 f = 0.5 * (film_reflectance(film, film.outer.x, vec3(rho.x)) + film_reflectance(film, film.outer.y, vec3(rho.y)));
+    vec3 f = 0.5 * (film_in_channels(film, film.outer.x, vec3(rho.x)) + film_in_channels(film, film.outer.y, vec3(rho.y)));
     return film.total ? vec3(1.0) : f;
 }
 
@@ -97,7 +98,7 @@ vec3 film_over_dielectric(Film film, float n2) {
 // denser medium.
 vec3 film_over_metal(Film film, vec3 metal) {
     vec3 rho = sqrt(clamp(metal, 0.0, 1.0));
-    vec3 f = 0.5 * (film_reflectance(film, film.outer.x, -rho) + film_reflectance(film, film.outer.y, rho));
+    vec3 f = 0.5 * (film_in_channels(film, film.outer.x, -rho) + film_in_channels(film, film.outer.y, rho));
     return film.total ? vec3(1.0) : f;
 }
 #endif

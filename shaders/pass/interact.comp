@@ -186,7 +186,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     next.direction = mirrored.direction;
     next.events = count | BY_REFLECTION << 8;
     next.throughput = mirrored_by_ray(hit, boundary) ? weight * mirrored.weight : vec3(0.0);
-    next.spread = ray.spread + (ROUGH && !b.delta ? s.alpha : 0.0);
+    next.spread = ray.spread + (ROUGH && !b.delta ? max(s.alpha, s.alpha_along) : 0.0);
     send(next);
     // 4. Refraction, or transmission through a thin-walled surface.
     if (TRANSMISSIVE) {

@@ -415,21 +415,22 @@ impl Planner<'_> {
         let filters = decisions.decide(EffectId::TransparentShadows, cause);
         let cause = surfaces.cause(|m| m.transmission > 0.0, |m| format!("has transmission {}", m.transmission));
         let transmissive = decisions.decide(EffectId::TransmissiveHits, cause);
+        // An anisotropic lobe is wide along its direction, however smooth the material is across it.
+        let wider = |m: &Material, bound: f32| m.roughness > bound || m.has_direction();
         let rough = |m: &Material| {
             let coat = m.clearcoat > 0.0 && m.clearcoat_roughness > 0.0;
             if *paths {
                 let coat = m.clearcoat > 0.0 && m.clearcoat_roughness > SMOOTHEST;
-                return !m.unlit
-                    && (coat || (m.roughness > SMOOTHEST && (surfaces::mirrors(m) || m.transmission > 0.0)));
+                return !m.unlit && (coat || (wider(m, SMOOTHEST) && (surfaces::mirrors(m) || m.transmission > 0.0)));
             }
-            (mirrors && surfaces::is_smooth(m, images.roughest) && (m.roughness > 0.0 || coat))
-                || (m.transmission > 0.0 && m.roughness > 0.0)
+            (mirrors && surfaces::is_smooth(m, images.roughest) && (wider(m, 0.0) || coat))
+                || (m.transmission > 0.0 && wider(m, 0.0))
         };
         let rough = decisions.decide(
             EffectId::GlossyReflection,
             surfaces.cause(rough, |m| format!("scatters rays at roughness {}", m.roughness)),
         );
-        let rough_transmission = |m: &Material| m.transmission > 0.0 && m.roughness > SMOOTHEST;
+        let rough_transmission = |m: &Material| m.transmission > 0.0 && wider(m, SMOOTHEST);
         let cause = match *paths {
             true => surfaces.cause(rough_transmission, |m| format!("transmits light with roughness {}", m.roughness)),
             false => Cause::against("path tracing is off"),

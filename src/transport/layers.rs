@@ -306,7 +306,7 @@ pub fn mirrors(m: &Material) -> bool {
 /// Whether a surface has a specular (delta) lobe of reflection or transmission. A texture only lowers a factor.
 #[must_use]
 pub fn is_smooth(m: &Material) -> bool {
-    let base = m.roughness <= SMOOTHEST && (mirrors(m) || m.transmission > 0.0);
+    let base = m.roughness <= SMOOTHEST && !m.has_direction() && (mirrors(m) || m.transmission > 0.0);
     let coat = m.clearcoat > 0.0 && m.clearcoat_roughness <= SMOOTHEST;
     !m.unlit && coverage(m).is_some_and(|share| share > 0.0) && (base || coat)
 }

@@ -5,10 +5,10 @@
 use super::catalogue::{Axis, Equation, Output, Region};
 
 /// @eq F3: reflectance of a thin film for one wavelength (Airy; Born and Wolf, section 7.6.1): amplitudes a and ρ of
-/// its outer and its inner face, phase θ of a crossing there and back.
+/// its outer and its inner face, phase φ of a crossing there and back.
 #[must_use]
-pub fn film_reflectance(a: f64, rho: f64, cos_theta: f64) -> f64 {
-    let interference = 2.0 * a * rho * cos_theta;
+pub fn film_reflectance(a: f64, rho: f64, cos_phi: f64) -> f64 {
+    let interference = 2.0 * a * rho * cos_phi;
     (a * a + rho * rho + interference) / (1.0 + a * a * rho * rho + interference)
 }
 

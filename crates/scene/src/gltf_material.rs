@@ -250,9 +250,6 @@ impl MaterialReader<'_, '_, '_> {
 
     fn extensions(&mut self, m: &mut Material, json: &json::extensions::material::Material) -> Result<()> {
         m.unlit = json.unlit.is_some();
-        if let Some(glossy) = parse::<SpecularGlossiness>(&json.others, "KHR_materials_pbrSpecularGlossiness")? {
-            self.specular_glossiness(m, &glossy)?;
-        }
         if json.others.contains_key("KHR_materials_volume_scatter") {
             self.warn("scattering inside the volume (KHR_materials_volume_scatter) is not drawn; its absorption is");
         }
@@ -300,6 +297,10 @@ impl MaterialReader<'_, '_, '_> {
                 *of = self.lobe(lobe, value).with_context(|| format!("the extension {}", lobe.extension))?;
             }
         }
+        // After the index and the specular reflection, in whose place it stands.
+        if let Some(glossy) = parse::<SpecularGlossiness>(&json.others, "KHR_materials_pbrSpecularGlossiness")? {
+            self.specular_glossiness(m, &glossy)?;
+        }
         if let Some(dispersion) = parse::<KhrDispersion>(&json.others, "KHR_materials_dispersion")? {
             let abbe = f64::from(self.positive(dispersion.dispersion, "the dispersion"));
             m.dispersion = if abbe > 0.0 { spectra::Dispersion::Abbe(abbe) } else { spectra::Dispersion::None };
@@ -314,6 +315,7 @@ impl MaterialReader<'_, '_, '_> {
         m.base_color = json.diffuse_factor.map(|x| self.unit(x, "the diffuse factor"));
         m.base_color_texture = self.texture(json.diffuse_texture.as_ref())?;
         m.metallic = 0.0;
+        (m.ior, m.specular, m.specular_texture) = (1.5, 1.0, None);
         let f0 = ((m.ior - 1.0) / (m.ior + 1.0)).powi(2);
         m.specular_color = json.specular_factor.map(|x| self.unit(x, "the specular factor") / f0);
         m.specular_color_texture = self.texture(json.specular_glossiness_texture.as_ref())?;

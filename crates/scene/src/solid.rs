@@ -72,6 +72,11 @@ fn corners(mesh: &Mesh) -> impl Iterator<Item = [DVec3; 3]> {
     mesh.indices.as_chunks::<3>().0.iter().map(move |triangle| triangle.map(at))
 }
 
+/// Area of a mesh in object space.
+fn area(mesh: &Mesh) -> f64 {
+    corners(mesh).map(|[a, b, c]| 0.5 * (b - a).cross(c - a).length()).filter(|x| x.is_finite()).sum()
+}
+
 /// Volume in object space of what meshes bound together: positive when their fronts look outwards, 0 when it is below
 /// rounding error.
 fn signed_volume(meshes: &[&Mesh]) -> f64 {
@@ -148,6 +153,9 @@ fn joint_bodies(scene: &Scene, open: &[usize]) -> Vec<Vec<usize>> {
     let mut joined: HashSet<usize> = HashSet::new();
     let mut bodies = Vec::new();
     for &first in open {
+        if joined.contains(&first) {
+            continue;
+        }
         let mut parts = vec![first];
         let mut open_edges = rims[&scene.instances[first].mesh].clone();
         while let Some((&edge, &count)) = open_edges.iter().min() {
@@ -166,8 +174,15 @@ fn joint_bodies(scene: &Scene, open: &[usize]) -> Vec<Vec<usize>> {
             }
             parts.push(next);
         }
-        if open_edges.is_empty() && !joined.contains(&first) {
-            joined.extend(&parts);
+        // A pane in a wall closes with it, but the room behind is no glass: most of a body's surface transmits.
+        let area_of = |i: usize| area(&scene.meshes[scene.instances[i].mesh]);
+        let transmits = |&&i: &&usize| bounds_medium(material(i));
+        let whole: f64 = parts.iter().map(|&i| area_of(i)).sum();
+        let transmissive: f64 = parts.iter().filter(transmits).map(|&i| area_of(i)).sum();
+        let is_body = open_edges.is_empty() && 2.0 * transmissive >= whole;
+        // What stays open stays so from the other transmissive parts, too.
+        joined.extend(parts.iter().copied().filter(|i| is_body || transmits(&i)));
+        if is_body {
             bodies.push(parts);
         }
     }

@@ -1,7 +1,7 @@
 //! Diffuse transmission (KHR_materials_diffuse_transmission): part of the light that enters leaves on the other side,
 //! in all directions: leaves, paper, lampshades.
 //!
-//! Read the extension. The formula is `diffuse_transmission` of shaders/lib/layers.glsl.
+//! Read the extension. The formula is `evaluate_diffuse_transmission` of shaders/lib/layers.glsl.
 
 use super::{Factor, Lobe};
 use crate::Meaning::{Color, Data};

@@ -1,6 +1,6 @@
 //! Lobes of glTF extensions, over and below the base layer: one row of a table for each. File import, planning,
-//! spectral rendering and material upload loop over the rows without naming a lobe. The BRDF of a lobe is a file of
-//! shaders/lib/, included by shaders/lib/layers.glsl.
+//! spectral rendering and material upload loop over the rows without naming a lobe. The formulas of a lobe are in
+//! shaders/lib/: a file of its own, or shaders/lib/layers.glsl.
 //!
 //! Read the KHR_materials_* extension of each lobe, and pbrt 9 for BRDFs.
 
