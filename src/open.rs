@@ -320,7 +320,7 @@ impl Opened {
         let longer = width.max(height).max(1);
         let side = |side: u64| ((side * u64::from(METERED_SIDE)).div_ceil(longer) as u32).max(1);
         let settings = Settings {
-            // Uncovered pixels are told by their alpha.
+            // Where no surface is, alpha is 0.
             background: Background::Transparent,
             size: if longer > u64::from(METERED_SIDE) { [side(width), side(height)] } else { settings.size },
             max_error: None,

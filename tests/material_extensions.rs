@@ -178,32 +178,6 @@ fn a_white_brushed_metal_sends_what_its_lobe_keeps_of_uniform_light() {
     }
 }
 
-#[test]
-fn its_texture_turns_and_weakens_the_lobe() {
-    let gpu = Gpu::hasty();
-    let (strength, turn) = (0.8, 0.5);
-    // Direction (0, 1) in bytes, and half the strength.
-    let mut textured = with(ANISOTROPY, [strength, turn, 0.0, 0.0], gold(0.3));
-    textured.lobes[ANISOTROPY].textures[0] = Some(texture(0));
-    let product = with(ANISOTROPY, [strength * 128.0 / 255.0, turn + std::f32::consts::FRAC_PI_2, 0.0, 0.0], gold(0.3));
-    let made = |material: &Material| {
-        let (mut scene, _) = dome(std::slice::from_ref(material));
-        with_tangents(&mut scene);
-        let rgba = [128, 255, 128, 255].to_vec().into();
-        scene.images.push(Image { name: "direction".to_owned(), width: 1, height: 1, rgba });
-        for mesh in &mut scene.meshes {
-            mesh.uvs[0] = vec![[0.5; 2]; 4].into();
-        }
-        directional(scene, DVec3::new(0.2, 0.5, 1.0).normalize())
-    };
-    for of in MODELS {
-        let [a, b] = [&textured, &product].map(|m| gpu.film(&made(m), model(of, DOME, &["brdf=ggx"])));
-        // Byte 128 is 0.004 off the middle, which turns the lobe by 4e-3 rad.
-        let difference = largest_difference(&a, &b, 1.0);
-        assert!(difference < 0.03, "{of:?}: {difference}");
-    }
-}
-
 // ---------------------------------------------------------------------------------------------------------------------
 // Iridescence
 
@@ -278,7 +252,6 @@ fn a_film_reflects_as_airy_says_in_every_model() {
     }
 }
 
-/// A film between media of the same index as one of them is no film.
 #[test]
 fn a_film_without_thickness_changes_nothing() {
     let gpu = Gpu::hasty();
@@ -475,26 +448,58 @@ fn shadow_rays_start_on_the_side_of_the_light() {
 // ---------------------------------------------------------------------------------------------------------------------
 // Specular colour and specular-glossiness
 
+/// The dome in one material, lit from l, with one texel in all textures.
+fn of_one_texel(material: &Material, rgba: [u8; 4], l: DVec3) -> Scene {
+    let (mut scene, _) = dome(std::slice::from_ref(material));
+    with_tangents(&mut scene);
+    scene.images.push(Image { name: "texel".to_owned(), width: 1, height: 1, rgba: rgba.to_vec().into() });
+    for mesh in &mut scene.meshes {
+        mesh.uvs[0] = vec![[0.5; 2]; 4].into();
+    }
+    directional(scene, l.normalize())
+}
+
+/// A texture is the product with its texel, and something else than no texture.
 #[test]
-fn a_texture_colours_the_specular_reflection() {
+fn textures_multiply_the_factors_of_lobes() {
     let gpu = Gpu::hasty();
-    let told = Material { specular_color: [0.9, 2.0, 5.0], ..plastic([0.2, 0.1, 0.3], 0.4) };
-    let textured = Material { specular_color_texture: Some(texture(0)), ..told.clone() };
     let linear = |byte: f32| ((byte / 255.0 + 0.055) / 1.055).powf(2.4);
-    let product = Material { specular_color: [0.9 * linear(188.0), 2.0, 5.0 * linear(137.0)], ..told };
-    let made = |material: &Material| {
-        let (mut scene, _) = dome(std::slice::from_ref(material));
-        let rgba = [188, 255, 137, 9].to_vec().into();
-        scene.images.push(Image { name: "colour".to_owned(), width: 1, height: 1, rgba });
-        for mesh in &mut scene.meshes {
-            mesh.uvs[0] = vec![[0.5; 2]; 4].into();
-        }
-        directional(scene, DVec3::new(0.2, 0.5, 1.0).normalize())
+    let byte = |byte: f32| byte / 255.0;
+    let lobe = |lobe: usize, factors: [f32; 4], texel: [f32; 4], below: &Material| {
+        let plain = with(lobe, factors, below.clone());
+        let mut textured = plain.clone();
+        textured.lobes[lobe].textures = [Some(texture(0)), Some(texture(0))];
+        [plain, textured, with(lobe, texel, below.clone())]
     };
-    for of in MODELS {
-        let [a, b] = [&textured, &product].map(|m| gpu.film(&made(m), model(of, DOME, &[])));
-        // The texel is stored in bytes of linear light: half a step is 2e-3 of white.
-        assert!(largest_difference(&a, &b, 1.0) < 4e-3, "{of:?}");
+    let front = DVec3::new(0.2, 0.5, 1.0);
+    let glossy = Material { specular_color: [0.9, 2.0, 5.0], ..plastic([0.2, 0.1, 0.3], 0.4) };
+    let specular = [
+        glossy.clone(),
+        Material { specular_color_texture: Some(texture(0)), ..glossy.clone() },
+        Material { specular_color: [0.9 * linear(188.0), 2.0, 5.0 * linear(137.0)], ..glossy },
+    ];
+    // Of direction and strength: (0, 1) in bytes turns by a right angle. Byte 128 is 0.004 off the middle, which turns
+    // the lobe by 4e-3 rad.
+    let quarter = std::f32::consts::FRAC_PI_2;
+    let brushed = lobe(ANISOTROPY, [0.8, 0.5, 0.0, 0.0], [0.8 * byte(128.0), 0.5 + quarter, 0.0, 0.0], &gold(0.3));
+    let of_film = [0.9 * byte(150.0), 1.4, 100.0, 100.0 + 300.0 * byte(200.0)];
+    let film = lobe(IRIDESCENCE, [0.9, 1.4, 100.0, 400.0], of_film, &gold(0.3));
+    let of_leaf = [0.8 * byte(130.0), linear(188.0), 0.5, 0.9 * linear(137.0)];
+    let leaf = lobe(DIFFUSE_TRANSMISSION, [0.8, 1.0, 0.5, 0.9], of_leaf, &lambert([0.5; 3]));
+    for (what, texel, l, bound, [plain, textured, product]) in [
+        // Texels are stored in bytes of linear light: half a step is 2e-3 of white.
+        ("specular colour", [188, 255, 137, 9], front, 4e-3, specular),
+        ("anisotropy", [128, 255, 128, 255], front, 0.03, brushed),
+        ("iridescence", [150, 200, 7, 7], front, 4e-3, film),
+        ("diffuse transmission", [188, 255, 137, 130], DVec3::new(0.1, 0.05, -1.0), 4e-3, leaf),
+    ] {
+        // Paths would light the facets of the dome from inside.
+        for of in MODELS.into_iter().filter(|of| l.z > 0.0 || *of != Model::Global) {
+            let drawn = |m: &Material| gpu.film(&of_one_texel(m, texel, l), model(of, DOME, &["brdf=ggx"]));
+            let [without, a, b] = [&plain, &textured, &product].map(drawn);
+            let (off, changed) = (largest_difference(&a, &b, 1.0), largest_difference(&a, &without, 1.0));
+            assert!(off < bound && changed > 10.0 * bound, "{what}, {of:?}: off by {off}, changed by {changed}");
+        }
     }
 }
 

@@ -80,7 +80,7 @@ float depth_round_trip(float z, float near, float far) {
 
 // @eq N45: sRGB to linear by IEC 61966-2-1, of bytes
 // @out linear
-// x^2.4 as x² P(⁴√x), with a relative error of 2e-6. Rays decode single texels with it, as a texture unit does in hardware.
+// x^2.4 as x² P(⁴√x), with a relative error of 2.1e-6. Rays decode single texels with it, as a texture unit does in hardware.
 vec3 linear_from_srgb(vec3 x) {
     vec3 t = (x + 0.055) / 1.055;
     vec3 q = sqrt(sqrt(t));

@@ -128,7 +128,7 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
         .map(|path| Ok((path.display().to_string(), AnyPicture::load(path)?)))
         .collect::<Result<_>>()?;
     let steps = Steps::new(args.progress, quiet);
-    steps.step(&format!("loading {}", args.scene.said()), 1);
+    steps.step(&format!("loading {}", args.scene.label()), 1);
     let mut setup = Setup::load(&args.scene, Prune::Nothing, &args.device)?;
     // All pictures are compared in one light.
     setup.opened.keep_light(&settings.knobs);
@@ -139,8 +139,8 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
     let exposure = exposure::choose(args.picture.exposure, &setup.opened, &setup.device, &settings, &camera)?;
     exposure.sentence.iter().for_each(|line| steps.tell(line));
     let settings = Settings { exposure: exposure.stops, ..settings };
-    let picture = exposure.told(&args.picture);
-    let scene = args.scene.told(&setup.opened, &settings.knobs);
+    let picture = exposure.written_out(&args.picture);
+    let scene = args.scene.with_light_of(&setup.opened, &settings.knobs);
     if let Some(wanted) = &args.compare {
         let mut knobs = settings.knobs.clone();
         args.picture.colour_of(setup.opened.scene(), &mut knobs)?;

@@ -35,7 +35,7 @@ pub(super) struct ExposureFacts {
 
 impl ExposureFacts {
     /// The options of the same picture with its exposure written out where it was metered.
-    pub(super) fn told(&self, picture: &PictureOptions) -> PictureOptions {
+    pub(super) fn written_out(&self, picture: &PictureOptions) -> PictureOptions {
         let metered = (self.from == "metered").then_some(Exposure::Stops(self.stops));
         PictureOptions { exposure: metered.or(picture.exposure), ..picture.clone() }
     }

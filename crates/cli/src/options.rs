@@ -291,7 +291,7 @@ impl SceneOptions {
 
     /// The scene in messages.
     #[must_use]
-    pub fn said(&self) -> &str {
+    pub fn label(&self) -> &str {
         if self.scene == "-" { "standard input" } else { &self.scene }
     }
 
@@ -359,7 +359,7 @@ impl SceneOptions {
 
     /// These options with the light of a picture written out, where other knobs would choose another light.
     #[must_use]
-    pub fn told(&self, opened: &Opened, knobs: &Knobs) -> Self {
+    pub fn with_light_of(&self, opened: &Opened, knobs: &Knobs) -> Self {
         if !opened.has_light_by_knobs() {
             return self.clone();
         }

@@ -69,7 +69,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let steps = Steps::new(args.progress, quiet);
     phases.end("start");
 
-    steps.step(&format!("loading {}", args.scene.said()), 1);
+    steps.step(&format!("loading {}", args.scene.label()), 1);
     let prune = if budget.is_some() { Prune::Nothing } else { args.picture.prune(&args.scene, &settings.knobs) };
     let mut setup = Setup::load(&args.scene, prune, &args.device)?;
     phases.end("load");
@@ -84,8 +84,8 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     if let Some(budget) = budget {
         // The chosen rungs were measured in this light.
         setup.opened.keep_light(&settings.knobs);
-        let scene = args.scene.told(&setup.opened, &settings.knobs);
-        let command = command(&scene, &exposure.told(&args.picture), &args.device);
+        let scene = args.scene.with_light_of(&setup.opened, &settings.knobs);
+        let command = command(&scene, &exposure.written_out(&args.picture), &args.device);
         let found = budget.choose([&args.scene.scene, &command], &args.scene, &setup, &settings, &steps)?;
         settings.max_error = None;
         settings.knobs = found.knobs.clone();

@@ -223,7 +223,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let wanted = usage(wanted(args))?;
     check_writable(args, &wanted)?;
     let steps = Steps::new(args.progress, quiet);
-    steps.step(&format!("loading {}", args.scene.said()), 1);
+    steps.step(&format!("loading {}", args.scene.label()), 1);
     let prune = args.picture.prune(&args.scene, &settings.knobs);
     let (mut source, rest, environment, device) = setup::open_source(&args.scene, prune, &args.device)?;
     if wanted.moves && wanted.turns.is_none() && rest.duration.is_none() {

@@ -78,7 +78,7 @@ pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<Exi
     signal_hook::flag::register(signal_hook::consts::SIGTERM, stopped.clone())
         .context("installing the handler of SIGTERM")?;
     let steps = Steps::new(args.progress, quiet);
-    steps.step(&format!("loading {}", args.scene.said()), 1);
+    steps.step(&format!("loading {}", args.scene.label()), 1);
     let prune = args.picture.prune(&args.scene, &settings.knobs);
     let setup = Setup::load(&args.scene, prune, &args.device)?;
     args.picture.colour_of(setup.opened.scene(), &mut settings.knobs)?;

@@ -56,7 +56,11 @@ impl SceneSource for ViewArgs {
         let settings = Settings { size: asked.size, knobs: knobs.clone(), ..self.picture.settings(options)? };
         let exposure = exposure::choose(self.picture.exposure, &opened, device, &settings, &camera)?;
         // `cost` measures at the size of the command line, not at the size of the picture in the window.
-        let priced = budget::command(&options.told(&opened, &chosen), &exposure.told(&self.picture), &self.device);
+        let priced = budget::command(
+            &options.with_light_of(&opened, &chosen),
+            &exposure.written_out(&self.picture),
+            &self.device,
+        );
         let prices = budget::known(&priced, &contents(opened.scene(), opened.environment()), device.info());
         opened.warnings.extend(exposure.sentence);
         let (lit, as_lit) = opened.lit(Settings { knobs: knobs.clone(), ..Settings::default() });

@@ -429,7 +429,7 @@ fn ctrl_c_keeps_the_picture_where_asked() {
             .spawn()
             .expect("the program starts");
         let begun = Instant::now();
-        // A picture so far exists once the first estimate of its error is told.
+        // A picture so far exists once the first estimate of its error is printed.
         while !std::fs::read_to_string(at.join("stderr")).expect("a file").contains("samples, estimated error") {
             assert!(begun.elapsed() < Duration::from_secs(120), "nothing is drawn");
             assert_eq!(child.try_wait().expect("its state"), None, "it has ended");
