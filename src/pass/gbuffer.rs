@@ -18,6 +18,7 @@ use crate::shader::{gbuffer, lib};
 use crate::upload::scene::SceneOnDevice;
 
 const POSITION: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
+const LOBES: vk::Format = vk::Format::R32G32B32A32_UINT;
 
 /// Format of the normals, two octahedral encodings as integer words (shaders/lib/normals.glsl): every device supports
 /// these formats as colour attachments and storage images, unlike RGBA16_SNORM.
@@ -78,8 +79,7 @@ impl GBuffer {
         let lobes = plan.lobe_texels.then(|| -> Result<_> {
             let bytes = 16 * u64::from(size[0]) * u64::from(size[1]);
             let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC;
-            let format = vk::Format::R32G32B32A32_UINT;
-            let image = Image::new(device, "G-buffer lobes", ImageDesc::flat(format, size[0], size[1], usage))?;
+            let image = Image::new(device, "G-buffer lobes", ImageDesc::flat(LOBES, size[0], size[1], usage))?;
             Ok((image, Buffer::new(device, "G-buffer lobe rows", bytes, Place::Device)?))
         });
         let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;

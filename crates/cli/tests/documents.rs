@@ -314,6 +314,13 @@ fn the_page_of_the_gbuffer_has_its_formats() {
         assert!(row.contains(&format), "{name} is {format}: {row}");
         found += 1;
     }
+    // Targets of which passes read a copy.
+    for (key, name) in [("position", "POSITION"), ("lobes", "LOBES")] {
+        let line = source.lines().find(|line| line.starts_with(&format!("const {name}: "))).expect("a format");
+        let format = line.split("vk::Format::").nth(1).expect("a format").trim_end_matches(';');
+        let row = page.lines().find(|row| row.starts_with(&format!("| {key} "))).expect("a row");
+        assert!(row.contains(format), "{name} is {format}: {row}");
+    }
     assert!(found >= 5, "{found} targets");
 }
 
