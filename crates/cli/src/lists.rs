@@ -108,6 +108,7 @@ fn document(knob: &Knob) -> Value {
         "name": knob.name,
         "about": knob.about,
         "rungs": knob.rungs,
+        "rung_about": knob.rung_about,
         "presets": presets,
         "exact": knob.exact,
         "lecture": knob.lecture,
@@ -117,14 +118,14 @@ fn document(knob: &Knob) -> Value {
 
 /// A knob in words: what it approximates, its rungs, and what its effects need and bring.
 fn described(knob: &Knob) -> String {
-    let mut rungs = table(&["rung", "used by"]);
-    for rung in knob.rungs {
+    let mut rungs = table(&["rung", "what it does", "used by"]);
+    for (rung, about) in knob.rungs.iter().zip(knob.rung_about) {
         let models = Model::VARIANTS.iter().zip(knob.presets).filter(|(_, preset)| preset == rung);
         let mut uses: Vec<String> = models.map(|(model, _)| format!("--model {}", <&str>::from(*model))).collect();
         if *rung == knob.exact {
             uses.push("the reference of `etalon cost`".to_owned());
         }
-        rungs.add_row([*rung, &uses.join(", ")]);
+        rungs.add_row([*rung, *about, &uses.join(", ")]);
     }
     let mut text = format!("{}: {}\n\n{rungs}\n", knob.name, knob.about);
     if knob.effects.is_empty() {

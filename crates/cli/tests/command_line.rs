@@ -157,14 +157,22 @@ fn scenes_and_knobs_are_listed() {
     for (knob, json) in KNOBS.iter().zip(knobs["knobs"].as_array().expect("a list")) {
         assert!(table.lines().any(|line| line.trim_start().starts_with(knob.name)), "{}: {table}", knob.name);
         assert_eq!(
-            (&json["name"], &json["rungs"], &json["exact"]),
-            (&json!(knob.name), &json!(knob.rungs), &json!(knob.exact))
+            (&json["name"], &json["rungs"], &json["rung_about"], &json["exact"]),
+            (&json!(knob.name), &json!(knob.rungs), &json!(knob.rung_about), &json!(knob.exact))
         );
         assert_eq!(json["presets"]["local"], knob.presets[Model::Local as usize]);
         assert_eq!(json["presets"]["global"], knob.presets[Model::Global as usize]);
     }
     let shadows = run(&["knobs", "shadows"]);
-    for said in ["shadow maps", "map", "--model local", "R5", "depth images", "cost SCENE --compare shadows=off,ray"] {
+    for said in [
+        "shadow maps",
+        "No shadows: every light reaches every surface that faces it.",
+        "map",
+        "--model local",
+        "R5",
+        "depth images",
+        "cost SCENE --compare shadows=off,ray",
+    ] {
         assert!(shadows.contains(said), "{said}: {shadows}");
     }
     let one = document(&["knobs", "fresnel", "--json"]);

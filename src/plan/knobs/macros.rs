@@ -1,10 +1,10 @@
 //! Macros that turn the lists of knobs and effects (`rungs.rs`) into types.
 
-/// A type whose values are the rungs of a knob.
+/// A type whose values are the rungs of a knob. A rung's comment is one sentence: what it does, and what it loses.
 macro_rules! knob {
     (
         $(#[$doc:meta])*
-        $Type:ident = $name:literal { $( $Rung:ident = $rung:literal ),+ $(,)? }
+        $Type:ident = $name:literal { $( #[doc = $rung_about:expr] $Rung:ident = $rung:literal ),+ $(,)? }
         presets: [$local:ident, $recursive:ident, $global:ident],
         exact: $exact:ident,
         lecture: [$($lecture:literal),*],
@@ -15,7 +15,7 @@ macro_rules! knob {
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub enum $Type {
-            $( #[doc = concat!("`", $rung, "`.")] $Rung, )+
+            $( #[doc = concat!("`", $rung, "`:")] #[doc = $rung_about] $Rung, )+
         }
 
         impl $Type {
@@ -23,6 +23,8 @@ macro_rules! knob {
             /// All rungs, from cheap to exact.
             pub const RUNGS: &[Self] = &[$( Self::$Rung ),+];
             pub(super) const NAMES: &[&str] = &[$( $rung ),+];
+            // The text of a `///` comment begins with a space.
+            pub(super) const RUNG_ABOUT: &[&str] = &[$( $rung_about.trim_ascii() ),+];
             pub(super) const PRESETS: [Self; 3] = [Self::$local, Self::$recursive, Self::$global];
             pub(super) const EXACT: Self = Self::$exact;
             pub(super) const LECTURE: &[&str] = &[$( $lecture ),*];
@@ -70,6 +72,7 @@ macro_rules! knobs {
         pub static KNOBS: &[Knob] = &[$( Knob {
             name: $Type::NAME,
             rungs: $Type::NAMES,
+            rung_about: $Type::RUNG_ABOUT,
             presets: [$Type::PRESETS[0].name(), $Type::PRESETS[1].name(), $Type::PRESETS[2].name()],
             exact: $Type::EXACT.name(),
             lecture: $Type::LECTURE,

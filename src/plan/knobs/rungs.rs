@@ -110,6 +110,8 @@ pub struct Knob {
     pub name: &'static str,
     /// Names of the rungs, from cheap to exact.
     pub rungs: &'static [&'static str],
+    /// A sentence for each rung: what it does, and what it loses or approximates.
+    pub rung_about: &'static [&'static str],
     /// The rungs of the presets `local`, `recursive` and `global`.
     pub presets: [&'static str; 3],
     /// The rung with the least approximation.
@@ -143,7 +145,14 @@ fn number(rung: &str, prefix: &str) -> Option<u32> {
 }
 
 knob! {
-    Shadows = "shadows" { Off = "off", Map = "map", Ray = "ray" }
+    Shadows = "shadows" {
+        /// No shadows: every light reaches every surface that faces it.
+        Off = "off",
+        /// Shadow maps: edges are off by up to two texels, and transparent surfaces cast no shadow.
+        Map = "map",
+        /// A ray to each light: exact shadows, also of glass, which light crosses without bending.
+        Ray = "ray",
+    }
     presets: [Map, Ray, Ray],
     exact: Ray,
     lecture: ["R5"],
@@ -152,7 +161,12 @@ knob! {
 }
 
 knob! {
-    Fresnel = "fresnel" { Schlick = "schlick", Exact = "exact" }
+    Fresnel = "fresnel" {
+        /// Schlick's polynomial: the error is largest near grazing angles, and for metals.
+        Schlick = "schlick",
+        /// The Fresnel equations of dielectrics, and of conductors with n and κ.
+        Exact = "exact",
+    }
     presets: [Schlick, Exact, Exact],
     exact: Exact,
     lecture: ["F2", "F3"],
@@ -162,9 +176,13 @@ knob! {
 
 knob! {
     Brdf = "brdf" {
+        /// The empirical lobe of Blinn and Phong: neither reciprocal nor energy conserving.
         BlinnPhong = "blinn-phong",
+        /// Blinn-Phong divided by (L + V)², which makes it reciprocal; it is empirical as well.
         BlinnPhongReciprocal = "blinn-phong-reciprocal",
+        /// Microfacets of the GGX distribution: light between facets is lost, so rough surfaces are too dark.
         Ggx = "ggx",
+        /// GGX with compensation for the light that facets reflect several times; it is not reciprocal.
         GgxMulti = "ggx-multi",
     }
     presets: [Ggx, Ggx, GgxMulti],
@@ -175,7 +193,16 @@ knob! {
 }
 
 knob! {
-    Reflection = "reflection" { Off = "off", Environment = "environment", Screen = "screen", Ray = "ray" }
+    Reflection = "reflection" {
+        /// Smooth surfaces reflect nothing but the highlights of lights.
+        Off = "off",
+        /// Smooth surfaces reflect the environment alone, and no other surface.
+        Environment = "environment",
+        /// Reflections are looked up in the picture; what is hidden or outside of it is missing.
+        Screen = "screen",
+        /// Rays find what smooth surfaces reflect, again and again up to the rung of interfaces.
+        Ray = "ray",
+    }
     presets: [Environment, Ray, Ray],
     exact: Ray,
     lecture: ["F4"],
@@ -183,8 +210,25 @@ knob! {
     about: "specular reflection of smooth surfaces: none, of the environment, in screen space, by rays; rougher surfaces reflect the environment",
 }
 
+macro_rules! lobes_about {
+    ($roughness:literal) => {
+        concat!(
+            "Rays sample specular lobes up to roughness ",
+            $roughness,
+            "; rougher surfaces reflect the environment."
+        )
+    };
+}
+
 knob! {
-    Lobes = "lobes" { Narrow = "0.2", Half = "0.5", All = "1" }
+    Lobes = "lobes" {
+        #[doc = lobes_about!("0.2")]
+        Narrow = "0.2",
+        #[doc = lobes_about!("0.5")]
+        Half = "0.5",
+        /// Rays sample the specular lobe of every roughness, with more noise for rougher surfaces.
+        All = "1",
+    }
     presets: [Narrow, Narrow, All],
     exact: All,
     lecture: ["B1", "R6"],
@@ -205,7 +249,14 @@ impl Lobes {
 }
 
 knob! {
-    Refraction = "refraction" { Off = "off", Screen = "screen", Ray = "ray" }
+    Refraction = "refraction" {
+        /// Light passes transmissive surfaces straight, without bending.
+        Off = "off",
+        /// One bend by the nominal thickness, looked up in the picture: no second surface, no total reflection.
+        Screen = "screen",
+        /// Rays bend at every interface by Snell's law, with total reflection and nested media.
+        Ray = "ray",
+    }
     presets: [Off, Ray, Ray],
     exact: Ray,
     lecture: ["F5"],
@@ -213,8 +264,27 @@ knob! {
     about: "refraction: none, one interface in screen space, every interface by rays",
 }
 
+macro_rules! interfaces_about {
+    ($surfaces:literal) => {
+        concat!("A path ends after ", $surfaces, "; the report gives the light that this cuts off.")
+    };
+}
+
 knob! {
-    Interfaces = "interfaces" { One = "1", Two = "2", Four = "4", Eight = "8", Sixteen = "16", ThirtyTwo = "32" }
+    Interfaces = "interfaces" {
+        #[doc = interfaces_about!("1 surface")]
+        One = "1",
+        #[doc = interfaces_about!("2 surfaces")]
+        Two = "2",
+        #[doc = interfaces_about!("4 surfaces")]
+        Four = "4",
+        #[doc = interfaces_about!("8 surfaces")]
+        Eight = "8",
+        #[doc = interfaces_about!("16 surfaces")]
+        Sixteen = "16",
+        #[doc = interfaces_about!("32 surfaces")]
+        ThirtyTwo = "32",
+    }
     presets: [Eight, Eight, ThirtyTwo],
     exact: ThirtyTwo,
     lecture: ["R6"],
@@ -230,15 +300,29 @@ impl Interfaces {
     }
 }
 
+macro_rules! march_about {
+    ($steps:literal) => {
+        concat!("As path, and a grid of absorption coefficients is summed in ", $steps, " steps on each segment.")
+    };
+}
+
 knob! {
     Absorption = "absorption" {
+        /// Media absorb nothing: coloured glass and water are clear.
         Off = "off",
+        /// Absorption over the material's nominal thickness, whatever the way of the light.
         Thickness = "thickness",
+        /// Absorption over the length of each path in the medium; a grid counts as its mean.
         Path = "path",
+        #[doc = march_about!(4)]
         March4 = "march:4",
+        #[doc = march_about!(8)]
         March8 = "march:8",
+        #[doc = march_about!(16)]
         March16 = "march:16",
+        #[doc = march_about!(32)]
         March32 = "march:32",
+        #[doc = march_about!(64)]
         March64 = "march:64",
     }
     presets: [Thickness, Path, March32],
@@ -257,7 +341,14 @@ impl Absorption {
 }
 
 knob! {
-    Quadrature = "quadrature" { Left = "left", Midpoint = "midpoint", Simpson = "simpson" }
+    Quadrature = "quadrature" {
+        /// The value at the beginning of each step: order 1, the largest error.
+        Left = "left",
+        /// The value in the middle of each step: order 2, for the same number of values.
+        Midpoint = "midpoint",
+        /// Beginning, middle and end of each step with weights 1, 4 and 1: order 4, for twice the values.
+        Simpson = "simpson",
+    }
     presets: [Midpoint, Midpoint, Midpoint],
     exact: Simpson,
     lecture: ["A2"],
@@ -265,10 +356,26 @@ knob! {
     about: "quadrature rule of the marching steps, of order 1, 2 and 4",
 }
 
+macro_rules! occlusion_about {
+    ($rays:literal) => {
+        concat!("Light of the environment where ", $rays, " rays find no surface in its way; surfaces light no others.")
+    };
+}
+
 knob! {
     Indirect = "indirect" {
-        Off = "off", Ambient = "ambient", Occlusion4 = "occlusion:4", Occlusion16 = "occlusion:16",
-        Occlusion64 = "occlusion:64", Path = "path",
+        /// No ambient and no indirect light: what no light reaches is black.
+        Off = "off",
+        /// Light of the environment from all around, as if no surface were in its way.
+        Ambient = "ambient",
+        #[doc = occlusion_about!(4)]
+        Occlusion4 = "occlusion:4",
+        #[doc = occlusion_about!(16)]
+        Occlusion16 = "occlusion:16",
+        #[doc = occlusion_about!(64)]
+        Occlusion64 = "occlusion:64",
+        /// Paths carry light from surface to surface; their noise falls with the number of samples.
+        Path = "path",
     }
     presets: [Ambient, Occlusion16, Path],
     exact: Path,
@@ -285,8 +392,23 @@ impl Indirect {
     }
 }
 
+macro_rules! area_about {
+    ($samples:literal) => {
+        concat!("Lights and emissive surfaces have their extent, with ", $samples, " at each vertex of a path.")
+    };
+}
+
 knob! {
-    Lights = "lights" { Points = "points", Area1 = "area:1", Area4 = "area:4", Area16 = "area:16" }
+    Lights = "lights" {
+        /// Lights shine from points, with hard shadows; emissive surfaces are not sampled.
+        Points = "points",
+        #[doc = area_about!("1 sample")]
+        Area1 = "area:1",
+        #[doc = area_about!("4 samples")]
+        Area4 = "area:4",
+        #[doc = area_about!("16 samples")]
+        Area16 = "area:16",
+    }
     presets: [Points, Points, Area1],
     exact: Area1,
     lecture: ["R2"],
@@ -303,7 +425,12 @@ impl Lights {
 }
 
 knob! {
-    Guiding = "guiding" { Off = "off", Photons = "photons" }
+    Guiding = "guiding" {
+        /// Directions are sampled by the BSDF alone: caustics are noisy.
+        Off = "off",
+        /// A quarter of the directions of diffuse surfaces leads where photons came from: less noise in caustics.
+        Photons = "photons",
+    }
     presets: [Off, Off, Photons],
     exact: Photons,
     lecture: ["R6"],
@@ -311,14 +438,27 @@ knob! {
     about: "path guiding: BSDF sampling alone, or mixed with directions from which photons came by specular surfaces; the same mean",
 }
 
+macro_rules! samples_about {
+    ($samples:literal) => {
+        concat!($samples, " samples per pixel: the noise falls with the square root of their number.")
+    };
+}
+
 knob! {
     Samples = "samples" {
+        /// 1 sample per pixel: jagged edges, and the most noise.
         One = "1",
+        #[doc = samples_about!(4)]
         Four = "4",
+        #[doc = samples_about!(16)]
         Sixteen = "16",
+        #[doc = samples_about!(64)]
         SixtyFour = "64",
+        #[doc = samples_about!(256)]
         TwoHundredFiftySix = "256",
+        #[doc = samples_about!(1024)]
         Thousand = "1024",
+        #[doc = samples_about!(4096)]
         FourThousand = "4096",
     }
     presets: [Four, Four, SixtyFour],
@@ -336,8 +476,23 @@ impl Samples {
     }
 }
 
+macro_rules! spectral_about {
+    ($bands:literal) => {
+        concat!($bands, " bands of wavelengths, with dispersion, for ", $bands, " times the time.")
+    };
+}
+
 knob! {
-    Colour = "colour" { Rgb = "rgb", Spectral8 = "spectral:8", Spectral16 = "spectral:16", Spectral32 = "spectral:32" }
+    Colour = "colour" {
+        /// Red, green and blue: no dispersion, and other hues under light with a structured spectrum.
+        Rgb = "rgb",
+        #[doc = spectral_about!(8)]
+        Spectral8 = "spectral:8",
+        #[doc = spectral_about!(16)]
+        Spectral16 = "spectral:16",
+        #[doc = spectral_about!(32)]
+        Spectral32 = "spectral:32",
+    }
     presets: [Rgb, Rgb, Rgb],
     exact: Spectral32,
     lecture: ["C1", "C2", "C3"],
@@ -354,7 +509,12 @@ impl Colour {
 }
 
 knob! {
-    Upsampling = "upsampling" { MallettYuksel = "mallett-yuksel", JakobHanika = "jakob-hanika" }
+    Upsampling = "upsampling" {
+        /// A sum of three fixed curves (Mallett and Yuksel 2019), with the larger colour differences.
+        MallettYuksel = "mallett-yuksel",
+        /// A sigmoid fitted to each colour (Jakob and Hanika 2019), with the smaller colour differences.
+        JakobHanika = "jakob-hanika",
+    }
     presets: [JakobHanika, JakobHanika, JakobHanika],
     exact: JakobHanika,
     lecture: ["C3"],
@@ -363,7 +523,14 @@ knob! {
 }
 
 knob! {
-    Arithmetic = "arithmetic" { Fast = "fast", Stable = "stable", Compensated = "compensated" }
+    Arithmetic = "arithmetic" {
+        /// Textbook formulas: cancellation loses digits, most of all at grazing angles and in sharp highlights.
+        Fast = "fast",
+        /// Formulas without cancellation, for about the same time.
+        Stable = "stable",
+        /// Pairs of floats where stable still loses digits, for 5 to 20 times the operations.
+        Compensated = "compensated",
+    }
     presets: [Stable, Stable, Stable],
     exact: Compensated,
     lecture: [],
@@ -371,8 +538,23 @@ knob! {
     about: "floating-point form of the formulas of lighting and background",
 }
 
+macro_rules! octahedral_about {
+    ($bits:literal, $degrees:literal) => {
+        concat!($bits, " bits in octahedral encoding: a normal is off by at most ", $degrees, "°.")
+    };
+}
+
 knob! {
-    Normals = "normals" { Oct16 = "oct16", Oct24 = "oct24", Oct32 = "oct32", F32 = "f32" }
+    Normals = "normals" {
+        #[doc = octahedral_about!(16, "0.95")]
+        Oct16 = "oct16",
+        #[doc = octahedral_about!(24, "0.059")]
+        Oct24 = "oct24",
+        #[doc = octahedral_about!(32, "0.0037")]
+        Oct32 = "oct32",
+        /// Three floats: no error of encoding, for twice the memory of oct32.
+        F32 = "f32",
+    }
     presets: [Oct32, Oct32, Oct32],
     exact: F32,
     lecture: [],
@@ -394,7 +576,12 @@ impl Normals {
 }
 
 knob! {
-    Position = "position" { Depth = "depth", Stored = "stored" }
+    Position = "position" {
+        /// Computed from the depth of the pixel: the smaller error, and no memory of its own.
+        Depth = "depth",
+        /// Stored in a target of floats: more memory, and rounded once more.
+        Stored = "stored",
+    }
     presets: [Depth, Depth, Depth],
     exact: Depth,
     lecture: [],
@@ -421,6 +608,26 @@ mod tests {
         assert_eq!(Lights::RUNGS.iter().map(|rung| rung.places()).collect::<Vec<_>>(), [1, 1, 4, 16]);
         assert_eq!(Colour::RUNGS.iter().map(|rung| rung.bands()).collect::<Vec<_>>(), [0, 8, 16, 32]);
         assert_eq!(Guiding::Photons.to_string(), "guiding=photons");
+    }
+
+    #[test]
+    fn every_rung_has_a_sentence_of_its_own() {
+        for knob in KNOBS {
+            assert_eq!(knob.rung_about.len(), knob.rungs.len(), "{}", knob.name);
+            for (place, (rung, about)) in knob.rungs.iter().zip(knob.rung_about).enumerate() {
+                let told = format!("{}={rung}: {about}", knob.name);
+                assert!(
+                    about.ends_with('.') && !about[..about.len() - 1].ends_with(['.', ' ', ',', ':', ';']),
+                    "{told}"
+                );
+                assert!(about.starts_with(|first: char| first.is_uppercase() || first.is_numeric()), "{told}");
+                assert!((20..=120).contains(&about.chars().count()), "{told}");
+                assert!(!knob.rung_about[..place].contains(about), "{told}");
+                // A sentence that is the same for several numbers says which one it is about.
+                let number = rung.rsplit(':').next().filter(|number| number.parse::<u32>().is_ok_and(|n| n > 1));
+                assert!(number.is_none_or(|number| about.split(' ').any(|word| word == number)), "{told}");
+            }
+        }
     }
 
     #[test]
