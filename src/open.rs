@@ -16,7 +16,7 @@ use crate::plan::{EffectId, EffectState, Knobs, Plan};
 use crate::prepare::{Original, Prepared};
 use crate::scene::camera::DEFAULT_FOV_Y;
 use crate::scene::environment::Environment;
-use crate::scene::{Camera, LoadOptions, Scene, Source};
+use crate::scene::{Camera, LoadOptions, Scene, Source, completed};
 use crate::study;
 use crate::transport::emitters::emitted;
 
@@ -147,7 +147,7 @@ pub fn scene(name: &str, options: &LoadOptions) -> Result<Scene> {
         Some(_) if options.time.is_some() => bail!("{name} has no animation: there is no time to draw it at"),
         Some(_) if options.scene.is_some() => bail!("{name} is one scene: there is none to choose"),
         Some(_) if options.variant.is_some() => bail!("{name} has no variants of its materials"),
-        Some(study) => study::load(study),
+        Some(study) => completed(study::load(study)?, options),
         None => crate::scene::load(Path::new(name), options),
     }
 }

@@ -19,7 +19,7 @@ use etalon::plan::rungs::Indirect;
 use etalon::plan::{ForcedEffects, Knobs, Model};
 use etalon::scene::camera::{Camera, DEFAULT_FOV_Y};
 use etalon::scene::environment::Environment;
-use etalon::scene::{AmbientLight, LoadOptions, Prune, Scene};
+use etalon::scene::{AmbientLight, KeyLight, LoadOptions, Prune, Scene};
 use etalon::study;
 use etalon_farm::job::word;
 
@@ -93,10 +93,23 @@ pub struct SceneOptions {
     /// Animation time in seconds, or none for the rest pose stored in the file
     #[arg(long, value_name = "SECONDS|none", value_parser = time, default_value = "none", allow_hyphen_values = true, help_heading = heading::SCENE)]
     pub time: AnimationTime,
-    /// Environment map, or none [default: the built-in studio; as fill light if the file contains lights, and not if
+    /// Animation of the file that plays, by name or index, or all [default: those that do not move the same nodes]
+    #[arg(long, value_name = "NAME|INDEX|all", help_heading = heading::SCENE)]
+    pub animation: Option<String>,
+    /// Leave out a node with everything below it, by name or index; repeatable. Its cameras stay
+    #[arg(long, value_name = "NAME|INDEX", help_heading = heading::SCENE)]
+    pub hide: Vec<String>,
+    /// Show only this node with everything below it, by name or index; repeatable
+    #[arg(long, value_name = "NAME|INDEX", help_heading = heading::SCENE)]
+    pub only: Vec<String>,
+    /// Environment map, studio or none [default: the built-in studio; as fill light if the file contains lights, and not if
     /// its emissive surfaces light it with --model global]
-    #[arg(long, value_name = "FILE.hdr|FILE.exr|none", help_heading = heading::LIGHT)]
+    #[arg(long, value_name = "FILE.hdr|FILE.exr|studio|none", help_heading = heading::LIGHT)]
     pub env: Option<String>,
+    /// Add a directional light of LUX from AZIMUTH degrees about +Y (0: the front, +Z; 90: +X) and ELEVATION degrees
+    /// above the horizon
+    #[arg(long, value_name = "AZIMUTH,ELEVATION,LUX", value_parser = key_light, allow_hyphen_values = true, help_heading = heading::LIGHT)]
+    pub key_light: Option<KeyLight>,
     /// Factor for the radiance of the environment
     #[arg(long, value_name = "K", value_parser = factor, default_value_t = 1.0, allow_hyphen_values = true, help_heading = heading::LIGHT)]
     pub env_intensity: f32,
@@ -171,6 +184,14 @@ fn vector(text: &str) -> Result<DVec3, String> {
 fn direction(text: &str) -> Result<DVec3, String> {
     vector(text)
         .and_then(|v| if v == DVec3::ZERO { Err("expected a vector other than 0,0,0".to_owned()) } else { Ok(v) })
+}
+
+fn key_light(text: &str) -> Result<KeyLight, String> {
+    let DVec3 { x: azimuth, y: elevation, z: lux } = vector(text).map_err(|_| "expected AZIMUTH,ELEVATION,LUX")?;
+    if lux < 0.0 || lux > f64::from(f32::MAX) {
+        return Err("expected at least 0 lux".to_owned());
+    }
+    Ok(KeyLight { azimuth, elevation, lux: lux as f32 })
 }
 
 /// A number that `accept` accepts, else the sentence that says what is expected.
@@ -274,7 +295,11 @@ impl SceneOptions {
         option("up", self.up.map(point));
         option("fov", self.fov.map(|fov| fov.to_string()));
         option("time", self.time.0.map(|time| time.to_string()));
+        option("animation", self.animation.clone());
+        self.hide.iter().for_each(|node| option("hide", Some(node.clone())));
+        self.only.iter().for_each(|node| option("only", Some(node.clone())));
         option("env", self.env.clone());
+        option("key-light", self.key_light.map(|light| format!("{},{},{}", light.azimuth, light.elevation, light.lux)));
         option("env-intensity", (self.env_intensity != 1.0).then(|| self.env_intensity.to_string()));
         option("env-rotation", (self.env_rotation != 0.0).then(|| self.env_rotation.to_string()));
         option(
@@ -301,7 +326,8 @@ impl SceneOptions {
     /// One sentence: an unknown study scene, an option that study scenes do not have, or options that contradict.
     pub fn check(&self) -> Result<()> {
         if let Some(name) = self.scene.strip_prefix("study:") {
-            let chooses = self.time.0.is_some() || self.scene_of_file.is_some() || self.variant.is_some();
+            let chosen = [&self.scene_of_file, &self.variant, &self.animation];
+            let chooses = self.time.0.is_some() || chosen.into_iter().any(Option::is_some);
             if chooses || !study::NAMES.contains(&name) {
                 // It fails without generating a scene.
                 self.load(Prune::Nothing)?;
@@ -341,8 +367,16 @@ impl SceneOptions {
     /// How the scene's file is read.
     #[must_use]
     pub fn load_options(&self, prune: Prune) -> LoadOptions {
-        let (scene, variant) = (self.scene_of_file.clone(), self.variant.clone());
-        LoadOptions { time: self.time.0, prune, scene, variant }
+        LoadOptions {
+            time: self.time.0,
+            prune,
+            scene: self.scene_of_file.clone(),
+            variant: self.variant.clone(),
+            animation: self.animation.clone(),
+            hide: self.hide.clone(),
+            only: self.only.clone(),
+            key_light: self.key_light,
+        }
     }
 
     /// Loads the environment of `--env`, or the built-in studio. Returns it with warnings.
@@ -352,8 +386,8 @@ impl SceneOptions {
     pub fn load_environment(&self) -> Result<(Option<Environment>, Vec<String>)> {
         match self.env.as_deref() {
             Some("none") => Ok((None, Vec::new())),
+            Some("studio") | None => Ok((Some(Environment::studio()), Vec::new())),
             Some(path) => Environment::load(&PathBuf::from(path)).map(|(map, warnings)| (Some(map), warnings)),
-            None => Ok((Some(Environment::studio()), Vec::new())),
         }
     }
 

@@ -27,7 +27,8 @@ use super::{
     geometry, gltf_extras,
     gltf_material::{self, KnownImages},
     lenient,
-    nodes::{Nodes, label},
+    nodes::{Nodes, chosen_scene, end, label, playing},
+    outline::{Animation, Node, Outline, keys},
     prune::{Coordinates, prune_textures, unused_coordinates},
     thin::{self, Stroke},
 };
@@ -82,18 +83,19 @@ fn read(
     document: &mut Document<'_>,
     path: &Path,
     options: &LoadOptions,
-    warnings: Vec<String>,
+    mut warnings: Vec<String>,
     known: &mut StillParts,
 ) -> Result<Scene> {
+    let plays = playing(document, options, &mut warnings)?;
     match options.time.filter(|_| !document.pointers.is_empty()) {
         Some(time) => {
-            let posed = lenient::at(document, time)?;
+            let posed = lenient::at(document, &plays, time)?;
             let resting = std::mem::replace(&mut document.root, posed);
-            let scene = read_posed(document, path, options, warnings, known);
+            let scene = read_posed(document, path, options, &plays, warnings, known);
             document.root = resting;
             scene
         }
-        None => read_posed(document, path, options, warnings, known),
+        None => read_posed(document, path, options, &plays, warnings, known),
     }
 }
 
@@ -101,20 +103,22 @@ fn read_posed(
     document: &Document<'_>,
     path: &Path,
     options: &LoadOptions,
+    plays: &[bool],
     mut warnings: Vec<String>,
     known: &mut StillParts,
 ) -> Result<Scene> {
-    let nodes = Nodes::new(document, options, &mut warnings)?;
+    let nodes = Nodes::new(document, options, plays, &mut warnings)?;
     let mut materials = gltf_material::read(document, &mut warnings)?;
     if known.resting.is_empty() {
         check_unseen_meshes(document)?;
     }
-    let lights = lights(document, &nodes, &mut warnings)?;
+    let (lit_nodes, lights) = lights(document, &nodes, &mut warnings)?.into_iter().unzip::<_, _, Vec<_>, Vec<_>>();
     let mut placing = InstancePlacer::new(document, &nodes, &mut materials.materials, &mut warnings)?;
     let unread = placing.prune_unused(options.prune.ambient());
-    let (meshes, instances) = placing.run(&mut known.resting)?;
+    let (meshes, instances, placed_nodes) = placing.run(&mut known.resting)?;
     let images = materials.decode(document, &mut known.images)?;
-    let cameras = cameras(document, &nodes, &mut warnings)?;
+    let (eye_nodes, cameras) = cameras(document, &nodes, &mut warnings)?.into_iter().unzip::<_, _, Vec<_>, Vec<_>>();
+    let outline = outline(document, &nodes, options, plays, [&placed_nodes, &lit_nodes, &eye_nodes])?;
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     Ok(Scene {
         name: path.display().to_string(),
@@ -126,8 +130,62 @@ fn read_posed(
         studio: None,
         cameras,
         duration: nodes.duration,
+        outline,
         unread,
         warnings: warnings.into_iter().map(|w| format!("{file}: {w}")).collect(),
+    })
+}
+
+/// What the file contains. `users` are the nodes of instances, lights and cameras, in the order of their lists.
+fn outline(
+    document: &Document<'_>,
+    nodes: &Nodes,
+    options: &LoadOptions,
+    plays: &[bool],
+    users: [&[usize]; 3],
+) -> Result<Outline> {
+    let root = &document.root;
+    let or_index = |(i, name): (usize, Option<&str>)| name.map_or_else(|| i.to_string(), str::to_owned);
+    let names: Vec<Option<&str>> = root.nodes.iter().map(|node| node.name.as_deref()).collect();
+    let keys = keys(&names);
+    let is_shown: HashSet<usize> = nodes.shown.iter().copied().collect();
+    // Parents before their children, children in the order of the file.
+    let mut open: Vec<usize> = nodes.shown.clone();
+    open.retain(|&node| nodes.parents[node].is_none_or(|parent| !is_shown.contains(&parent)));
+    open.reverse();
+    let mut place = vec![None; root.nodes.len()];
+    let mut found: Vec<Node> = Vec::new();
+    while let Some(node) = open.pop() {
+        place[node] = Some(found.len());
+        found.push(Node {
+            name: names[node].map_or_else(|| format!("node {node}"), str::to_owned),
+            key: keys[node].clone(),
+            parent: nodes.parents[node].and_then(|parent| place[parent]),
+            hidden: nodes.hidden[node],
+            ..Node::default()
+        });
+        let children = root.nodes[node].children.iter().flatten().map(json::Index::value);
+        open.extend(children.filter(|child| is_shown.contains(child)).collect::<Vec<_>>().into_iter().rev());
+    }
+    for (list, users) in users.into_iter().enumerate() {
+        for (index, &node) in users.iter().enumerate() {
+            let Some(at) = place[node] else { continue };
+            let Node { instances, lights, cameras, .. } = &mut found[at];
+            [instances, lights, cameras][list].push(index);
+        }
+    }
+    let variants = root.extensions.as_ref().and_then(|extensions| extensions.khr_materials_variants.as_ref());
+    let animations = root.animations.iter().zip(plays).enumerate().map(|(i, (animation, &plays))| Animation {
+        name: or_index((i, animation.name.as_deref())),
+        seconds: end(document, animation).unwrap_or_default(),
+        plays,
+    });
+    Ok(Outline {
+        scenes: root.scenes.iter().map(|scene| scene.name.as_deref()).enumerate().map(or_index).collect(),
+        scene: chosen_scene(root, options.scene.as_deref())?,
+        variants: variants.iter().flat_map(|all| &all.variants).map(|one| one.name.clone()).collect(),
+        animations: animations.collect(),
+        nodes: found,
     })
 }
 
@@ -262,8 +320,8 @@ impl<'d, 'b, 'w> InstancePlacer<'d, 'b, 'w> {
         unread
     }
 
-    /// Builds meshes and instances; undeformed meshes are cached in `resting` for other times of the animation.
-    fn run(self, resting: &mut HashMap<(usize, usize), Mesh>) -> Result<(Vec<Mesh>, Vec<Instance>)> {
+    /// Builds meshes, instances, and the node of each instance; undeformed meshes are cached in `resting` for other times of the animation.
+    fn run(self, resting: &mut HashMap<(usize, usize), Mesh>) -> Result<(Vec<Mesh>, Vec<Instance>, Vec<usize>)> {
         let (document, materials): (_, &[Material]) = (self.document, self.materials);
         let (jobs, everything) = (&self.jobs, self.everything);
         let built = jobs
@@ -281,7 +339,7 @@ impl<'d, 'b, 'w> InstancePlacer<'d, 'b, 'w> {
         }
         let mut meshes: Vec<Mesh> = Vec::with_capacity(built.len());
         let mut instances = Vec::new();
-        let mut strokes = Vec::new();
+        let (mut strokes, mut stroke_nodes) = (Vec::new(), Vec::new());
         let mut warnings = Vec::new();
         for (job, built) in jobs.iter().zip(built) {
             warnings.extend(built.warnings);
@@ -291,6 +349,7 @@ impl<'d, 'b, 'w> InstancePlacer<'d, 'b, 'w> {
                 .flat_map(|&node| self.placements(job, node).into_iter().map(move |at| (node, at)))
                 .collect();
             if !built.strokes.is_empty() {
+                stroke_nodes.extend(placements.iter().map(|(node, _)| *node));
                 let placements = placements.into_iter().map(|(node, world)| (self.node_name(node), world)).collect();
                 strokes.push(thin::StrokeGroup { placements, mesh: built.mesh, strokes: built.strokes });
                 continue;
@@ -309,9 +368,10 @@ impl<'d, 'b, 'w> InstancePlacer<'d, 'b, 'w> {
         }
         self.warnings.append(&mut warnings);
         instances.sort_by_key(|(node, _)| *node);
-        let mut instances = instances.into_iter().map(|(_, instance)| instance).collect();
+        let (mut nodes, mut instances): (Vec<usize>, Vec<Instance>) = instances.into_iter().unzip();
         thin::add(&strokes, &mut meshes, &mut instances);
-        Ok((meshes, instances))
+        nodes.append(&mut stroke_nodes);
+        Ok((meshes, instances, nodes))
     }
 
     fn node_name(&self, node: usize) -> String {
@@ -333,7 +393,7 @@ impl<'d, 'b, 'w> InstancePlacer<'d, 'b, 'w> {
         let root = &self.document.root;
         let mut jobs: Vec<PrimitiveJob> = Vec::new();
         let mut shared: HashMap<(usize, usize), usize> = HashMap::new();
-        for &node in &self.nodes.shown {
+        for &node in self.nodes.shown.iter().filter(|&&node| !self.nodes.hidden[node]) {
             let Some(mesh) = root.nodes[node].mesh.map(|m| m.value()) else { continue };
             for primitive in 0..root.meshes[mesh].primitives.len() {
                 let pose = self.pose(node, mesh, primitive).with_context(|| label(self.document, node))?;
@@ -651,7 +711,8 @@ fn bend(mesh: &mut Mesh, skin: &Skin, joints: &[DAffine3]) -> bool {
     mirrored * 2 > mesh.positions.len()
 }
 
-fn cameras(document: &Document<'_>, nodes: &Nodes, warnings: &mut Vec<String>) -> Result<Vec<Camera>> {
+/// Cameras with their nodes.
+fn cameras(document: &Document<'_>, nodes: &Nodes, warnings: &mut Vec<String>) -> Result<Vec<(usize, Camera)>> {
     let root = &document.root;
     let mut cameras = Vec::new();
     for &node in &nodes.shown {
@@ -664,7 +725,8 @@ fn cameras(document: &Document<'_>, nodes: &Nodes, warnings: &mut Vec<String>) -
             continue;
         };
         let name = camera.name.clone().or_else(|| root.nodes[node].name.clone());
-        cameras.push(Camera { name: name.unwrap_or_else(|| format!("camera {index}")), world_from_camera, projection });
+        let name = name.unwrap_or_else(|| format!("camera {index}"));
+        cameras.push((node, Camera { name, world_from_camera, projection }));
     }
     Ok(cameras)
 }
@@ -707,11 +769,12 @@ fn rigid(world_from_node: &DAffine3) -> Option<DAffine3> {
     Some(DAffine3 { matrix3, translation: world_from_node.translation })
 }
 
-fn lights(document: &Document<'_>, nodes: &Nodes, warnings: &mut Vec<String>) -> Result<Vec<Light>> {
+/// Lights with their nodes.
+fn lights(document: &Document<'_>, nodes: &Nodes, warnings: &mut Vec<String>) -> Result<Vec<(usize, Light)>> {
     let root = &document.root;
     let all = root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()).map_or(&[][..], |l| &l.lights);
     let mut lights = Vec::new();
-    for &node in &nodes.shown {
+    for &node in nodes.shown.iter().filter(|&&node| !nodes.hidden[node]) {
         let Some(reference) = root.nodes[node].extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) else {
             continue;
         };
@@ -752,7 +815,7 @@ fn lights(document: &Document<'_>, nodes: &Nodes, warnings: &mut Vec<String>) ->
         let found = gltf_extras::apply_to_light(&json.extras, &mut light, side(world.matrix3.x_axis, direction))
             .with_context(|| place.clone())?;
         warnings.extend(found.into_iter().map(|warning| format!("{place}: {warning}")));
-        lights.push(light);
+        lights.push((node, light));
     }
     Ok(lights)
 }

@@ -14,10 +14,10 @@ use super::nodes::sampled;
 /// A channel of KHR_animation_pointer.
 #[derive(Debug, Clone)]
 pub(crate) struct PointerChannel {
-    animation: usize,
+    pub(crate) animation: usize,
     sampler: usize,
     /// JSON pointer to the animated property, such as `/nodes/3/translation`.
-    pointer: String,
+    pub(crate) pointer: String,
 }
 
 /// Reads JSON that the schema crate refuses as it is; channels with pointers are taken out of it.
@@ -78,10 +78,10 @@ fn whole_numbers(value: &mut Value) {
 }
 
 /// The file at a time of its animation: each property that a pointer animates has its value of that time.
-pub(crate) fn at(document: &Document<'_>, time: f64) -> Result<Root> {
+pub(crate) fn at(document: &Document<'_>, plays: &[bool], time: f64) -> Result<Root> {
     let mut value = serde_json::to_value(&document.root)?;
     complete(&mut value);
-    for channel in &document.pointers {
+    for channel in document.pointers.iter().filter(|channel| plays.get(channel.animation) == Some(&true)) {
         let PointerChannel { animation, sampler, pointer } = channel;
         let place = || format!("animation {animation}: the pointer {pointer}");
         let json = document.root.animations.get(*animation).with_context(place)?;

@@ -24,6 +24,7 @@ pub mod material;
 mod mesh_files;
 mod nodes;
 mod obj;
+pub mod outline;
 mod pictures;
 pub mod prune;
 mod shared;
@@ -41,8 +42,9 @@ use anyhow::{Context, Result, bail};
 use glam::{DAffine3, DVec3};
 
 pub use camera::{Camera, Projection};
-pub use light::{Extent, Light, LightKind};
+pub use light::{Extent, KeyLight, Light, LightKind};
 pub use material::{AlphaMode, Material, Meaning, Sampler, TextureRef, Wrap};
+pub use outline::Outline;
 pub use prune::{AmbientLight, Prune};
 pub use shared::{Mark, Shared};
 pub use sigma::SigmaGrid;
@@ -50,9 +52,8 @@ pub use sigma::SigmaGrid;
 /// Options of [`load`].
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LoadOptions {
-    /// Animation time in seconds at which the scene is frozen. All animations of the file play together, each
-    /// channel clamped to its own range. `None` is the rest pose stored in the file: node transforms and default
-    /// weights as written, with skins evaluated from them.
+    /// Animation time in seconds at which the scene is frozen, each channel clamped to its own range. `None` is the
+    /// rest pose stored in the file: node transforms and default weights as written, with skins evaluated from them.
     pub time: Option<f64>,
     /// Which textures and vertex attributes are left unread.
     pub prune: Prune,
@@ -60,6 +61,15 @@ pub struct LoadOptions {
     pub scene: Option<String>,
     /// Variant of the materials (KHR_materials_variants), by name or index; `None` is the file's default.
     pub variant: Option<String>,
+    /// Animation that plays, by name or index, or `all`. `None` plays all that do not contradict each other: an
+    /// animation that moves what an earlier one moves does not play.
+    pub animation: Option<String>,
+    /// Nodes that are left out with everything below them, by name or index. Their cameras stay.
+    pub hide: Vec<String>,
+    /// Nodes that alone are shown, with everything below them; empty: all of them.
+    pub only: Vec<String>,
+    /// A directional light beside those of the file.
+    pub key_light: Option<KeyLight>,
 }
 
 /// File name extensions of the files that [`load`] reads, in lower case; upper case is read as well.
@@ -105,8 +115,20 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
             bail!("loading {}: only {} and {last} files are supported", path.display(), others.join(", "))
         }
     };
-    let mut scene = scene.with_context(|| format!("loading {}", said(path)))?;
-    sigma::one_medium_each(&mut scene);
+    let mut scene = scene.and_then(|scene| completed(scene, options));
+    scene.iter_mut().for_each(sigma::one_medium_each);
+    scene.with_context(|| format!("loading {}", said(path)))
+}
+
+/// Completes a scene that was read or generated: its outline, and the options that need no file.
+///
+/// # Errors
+/// When the options name a node or an animation that is not there.
+pub fn completed(mut scene: Scene, options: &LoadOptions) -> Result<Scene> {
+    if scene.outline == Outline::default() {
+        outline::flat(&mut scene, options)?;
+    }
+    scene.lights.extend(options.key_light.map(KeyLight::light));
     Ok(scene)
 }
 
@@ -168,9 +190,9 @@ impl Source {
             Kind::Still(scene) => Ok(Scene::clone(scene)),
             Kind::Gltf { file, name } => {
                 self.options.time = time;
-                let mut scene = file.at(&self.options).with_context(|| format!("loading {name}"))?;
-                sigma::one_medium_each(&mut scene);
-                Ok(scene)
+                let mut scene = file.at(&self.options).and_then(|scene| completed(scene, &self.options));
+                scene.iter_mut().for_each(sigma::one_medium_each);
+                scene.with_context(|| format!("loading {name}"))
             }
         }
     }
@@ -196,8 +218,10 @@ pub struct Scene {
     pub studio: Option<f32>,
     /// Cameras in world space, in the order of the file's nodes.
     pub cameras: Vec<Camera>,
-    /// Length of the animation in seconds; `None` without animation.
+    /// Length of the animations that play, in seconds; `None` without animation.
     pub duration: Option<f64>,
+    /// What the file contains, for lists to choose from.
+    pub outline: Outline,
     /// Textures and texture coordinates that were pruned as unused, one sentence each with the reason.
     pub unread: Vec<String>,
     /// Faults that reading worked around: one sentence each with the file, the place and the consequence.
@@ -266,6 +290,13 @@ impl Bounds {
     #[must_use]
     pub fn radius(&self) -> f64 {
         (self.max - self.min).length() * 0.5
+    }
+
+    /// The eight corners of the box.
+    #[must_use]
+    pub fn corners(&self) -> [DVec3; 8] {
+        let ends = [self.min, self.max];
+        std::array::from_fn(|i| DVec3::new(ends[i & 1].x, ends[i >> 1 & 1].y, ends[i >> 2].z))
     }
 
     /// Centre of the box.

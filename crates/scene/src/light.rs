@@ -46,6 +46,35 @@ impl Light {
     }
 }
 
+/// A directional light that is added to a scene: where it comes from, and how strong it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KeyLight {
+    /// Direction that it comes from, in degrees about +Y: 0 is +Z, the front of a glTF model; 90 is +X.
+    pub azimuth: f64,
+    /// Height above the horizon in degrees.
+    pub elevation: f64,
+    /// Irradiance of a surface that faces it, in lux.
+    pub lux: f32,
+}
+
+impl KeyLight {
+    /// The light; its colour is white.
+    #[must_use]
+    pub fn light(self) -> Light {
+        let [(sin_a, cos_a), (sin_e, cos_e)] =
+            [self.azimuth, self.elevation].map(|degrees| degrees.to_radians().sin_cos());
+        let direction = -DVec3::new(sin_a * cos_e, sin_e, cos_a * cos_e);
+        Light {
+            name: "key light".to_owned(),
+            color: [self.lux; 3],
+            spectrum: None,
+            extent: None,
+            kind: LightKind::Directional { direction },
+            proxy: false,
+        }
+    }
+}
+
 /// Shape of an analytic area light. It emits diffusely, with the same radiance at every point and in every direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Extent {

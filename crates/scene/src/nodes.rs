@@ -2,6 +2,8 @@
 //!
 //! Read glTF 2.0 sections 3.5 (scenes and nodes), 3.11 (animations) and appendix C (interpolation).
 
+use std::collections::HashSet;
+
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use glam::{DAffine3, DMat4, DQuat, DVec3, DVec4};
 use gltf::json::{
@@ -16,6 +18,7 @@ use super::{
     LoadOptions,
     accessor::Accessor,
     container::{Document, by_name_or_index},
+    outline,
 };
 
 /// Largest number of copies of one node: more instances than the G-buffer's index holds.
@@ -29,9 +32,13 @@ pub(crate) struct Nodes {
     pub(crate) copies: Vec<Option<Vec<DAffine3>>>,
     /// Nodes of the rendered scene, in the order of the file.
     pub(crate) shown: Vec<usize>,
+    /// Which of all nodes the options hide: their meshes and lights are left out.
+    pub(crate) hidden: Vec<bool>,
+    /// Parent of each node.
+    pub(crate) parents: Vec<Option<usize>>,
     /// Morph weights of nodes whose weights are animated.
     pub(crate) animated_weights: Vec<Option<Vec<f32>>>,
-    /// Time of the last keyframe of all animations, in seconds; `None` without animations.
+    /// Time of the last keyframe of the animations that play, in seconds; `None` without animations.
     pub(crate) duration: Option<f64>,
 }
 
@@ -63,13 +70,18 @@ pub(crate) fn label(document: &Document<'_>, index: usize) -> String {
 
 impl Nodes {
     /// Evaluates the hierarchy at `time` in seconds, or in the rest pose.
-    pub(crate) fn new(document: &Document<'_>, options: &LoadOptions, warnings: &mut Vec<String>) -> Result<Self> {
+    pub(crate) fn new(
+        document: &Document<'_>,
+        options: &LoadOptions,
+        plays: &[bool],
+        warnings: &mut Vec<String>,
+    ) -> Result<Self> {
         let nodes = &document.root.nodes;
         let mut locals: Vec<Local> =
             nodes.iter().enumerate().map(|(i, n)| local(n, &label(document, i), warnings)).collect();
         let mut animated_weights = vec![None; nodes.len()];
         if let Some(time) = options.time {
-            animate(document, time, &mut locals, &mut animated_weights)?;
+            animate(document, plays, time, &mut locals, &mut animated_weights)?;
         }
         let parents = parents(document)?;
         let world_from_node = place(document, &parents, &locals)?;
@@ -78,7 +90,11 @@ impl Nodes {
         for &node in &shown {
             copies[node] = instances(document, node).with_context(|| label(document, node))?;
         }
-        Ok(Self { world_from_node, copies, shown, animated_weights, duration: duration(document) })
+        let names: Vec<Option<&str>> = nodes.iter().map(|node| node.name.as_deref()).collect();
+        let hidden = outline::hidden(options, &names, &parents)?;
+        let duration = document.root.animations.iter().zip(plays).filter(|(_, plays)| **plays);
+        let duration = duration.filter_map(|(animation, _)| end(document, animation)).reduce(f64::max);
+        Ok(Self { world_from_node, copies, shown, hidden, parents, animated_weights, duration })
     }
 }
 
@@ -183,10 +199,10 @@ fn instances(document: &Document<'_>, node: usize) -> Result<Option<Vec<DAffine3
 
 /// The scene of the file that is rendered: by the index or the name that was asked for, else the default, else the
 /// first.
-fn chosen_scene<'d>(root: &'d json::Root, wanted: Option<&str>) -> Result<Option<&'d json::Scene>> {
-    let Some(wanted) = wanted else { return Ok(root.scenes.get(root.scene.map_or(0, |scene| scene.value()))) };
+pub(crate) fn chosen_scene(root: &json::Root, wanted: Option<&str>) -> Result<usize> {
+    let Some(wanted) = wanted else { return Ok(root.scene.map_or(0, |scene| scene.value())) };
     let names: Vec<Option<&str>> = root.scenes.iter().map(|scene| scene.name.as_deref()).collect();
-    Ok(Some(&root.scenes[by_name_or_index("scene", wanted, &names)?]))
+    by_name_or_index("scene", wanted, &names)
 }
 
 fn shown(
@@ -196,7 +212,7 @@ fn shown(
     warnings: &mut Vec<String>,
 ) -> Result<Vec<usize>> {
     let root = &document.root;
-    let mut stack: Vec<usize> = match chosen_scene(root, scene)? {
+    let mut stack: Vec<usize> = match root.scenes.get(chosen_scene(root, scene)?) {
         Some(scene) => scene.nodes.iter().map(json::Index::value).collect(),
         None => (0..root.nodes.len()).filter(|&i| parents[i].is_none()).collect(),
     };
@@ -283,18 +299,67 @@ impl Track {
     }
 }
 
-/// Time of the last keyframe of all animations. Unreadable samplers are skipped here; evaluation at a time reports
-/// them.
-fn duration(document: &Document<'_>) -> Option<f64> {
-    let samplers = document.root.animations.iter().flat_map(|animation| &animation.samplers);
-    let times = samplers.filter_map(|sampler| Accessor::new(document, sampler.input.value()).ok()?.floats::<1>().ok());
+/// Time of the last keyframe of an animation. Unreadable samplers are skipped here; evaluation at a time reports them.
+pub(crate) fn end(document: &Document<'_>, animation: &json::Animation) -> Option<f64> {
+    let times = animation
+        .samplers
+        .iter()
+        .filter_map(|sampler| Accessor::new(document, sampler.input.value()).ok()?.floats::<1>().ok());
     let ends = times.filter_map(|times| times.last().map(|time| f64::from(time[0])));
     ends.filter(|end| end.is_finite()).reduce(f64::max)
 }
 
-fn animate(document: &Document<'_>, time: f64, locals: &mut [Local], weights: &mut [Option<Vec<f32>>]) -> Result<()> {
+/// Which animations play: the one that is asked for, all of them, or those that move nothing that an earlier one moves.
+pub(crate) fn playing(document: &Document<'_>, options: &LoadOptions, warnings: &mut Vec<String>) -> Result<Vec<bool>> {
+    let animations = &document.root.animations;
+    let names: Vec<Option<&str>> = animations.iter().map(|animation| animation.name.as_deref()).collect();
+    match options.animation.as_deref() {
+        Some("all") => return Ok(vec![true; animations.len()]),
+        Some(wanted) => {
+            let found = by_name_or_index("animation", wanted, &names)?;
+            return Ok((0..animations.len()).map(|index| index == found).collect());
+        }
+        None => {}
+    }
+    let mut moved = HashSet::new();
+    let mut plays = Vec::new();
+    for (index, animation) in animations.iter().enumerate() {
+        let nodes = animation.channels.iter().filter_map(|channel| match channel.target.path {
+            Checked::Valid(path) => Some(format!("{} {path:?}", channel.target.node.value())),
+            Checked::Invalid => None,
+        });
+        let pointers = document.pointers.iter().filter(|pointer| pointer.animation == index);
+        let targets: Vec<String> = nodes.chain(pointers.map(|pointer| pointer.pointer.clone())).collect();
+        plays.push(targets.iter().all(|target| !moved.contains(target)));
+        if plays[index] {
+            moved.extend(targets);
+        }
+    }
+    let quoted = |wanted: bool| {
+        let of = names.iter().zip(&plays).enumerate().filter(|(_, (_, plays))| **plays == wanted);
+        let quoted = of.map(|(i, (name, _))| name.map_or(i.to_string(), |name| format!("\"{name}\"")));
+        quoted.collect::<Vec<_>>().join(", ")
+    };
+    if options.time.is_some() && plays.contains(&false) {
+        warnings.push(format!(
+            "the animations {} do not play, for they move what others move: {} plays",
+            quoted(false),
+            quoted(true)
+        ));
+    }
+    Ok(plays)
+}
+
+fn animate(
+    document: &Document<'_>,
+    plays: &[bool],
+    time: f64,
+    locals: &mut [Local],
+    weights: &mut [Option<Vec<f32>>],
+) -> Result<()> {
     ensure!(time.is_finite(), "the animation time is not a number");
-    for (a, animation) in document.root.animations.iter().enumerate() {
+    let all = document.root.animations.iter().enumerate();
+    for (a, animation) in all.filter(|(a, _)| plays[*a]) {
         for (c, channel) in animation.channels.iter().enumerate() {
             apply(document, animation, channel, time, locals, weights)
                 .with_context(|| format!("animation {a} channel {c}"))?;
