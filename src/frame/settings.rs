@@ -65,7 +65,7 @@ impl Background {
 pub const NEUTRAL_GREY: [u8; 3] = [119; 3];
 
 /// Settings of a picture: everything that is constant over the frames of a sequence.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Width and height in pixels.
     pub size: [u32; 2],

@@ -92,6 +92,17 @@ pub struct Interaction {
     pub spreads: bool,
 }
 
+/// The triangle that a pixel shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SeenTriangle {
+    /// Index into the scene's instances.
+    pub instance: usize,
+    /// Index of the triangle in its mesh.
+    pub primitive: usize,
+    /// Barycentric coordinates of the second and the third corner.
+    pub uv: [f64; 2],
+}
+
 /// A scene with its BVH, ready for recursive ray tracing.
 pub struct EventTracer {
     bvh: Arc<Bvh>,
@@ -108,6 +119,15 @@ struct Pending {
     share: f64,
     surfaces: u32,
     media: Media,
+}
+
+/// The ray through the centre of a pixel: origin and unit direction in world space.
+fn pixel_line(camera: &Camera, size: [u32; 2], pixel: [u32; 2]) -> (DVec3, DVec3) {
+    let at = DVec2::new(
+        (f64::from(pixel[0]) + 0.5) / f64::from(size[0]) * 2.0 - 1.0,
+        1.0 - (f64::from(pixel[1]) + 0.5) / f64::from(size[1]) * 2.0,
+    );
+    line_through(camera, f64::from(size[0]) / f64::from(size[1]), at)
 }
 
 fn material(scene: &Scene, instance: usize) -> &Material {
@@ -132,11 +152,7 @@ impl EventTracer {
         pixel: [u32; 2],
         limits: &Limits,
     ) -> Vec<Event> {
-        let at = DVec2::new(
-            (f64::from(pixel[0]) + 0.5) / f64::from(size[0]) * 2.0 - 1.0,
-            1.0 - (f64::from(pixel[1]) + 0.5) / f64::from(size[1]) * 2.0,
-        );
-        let (from, direction) = line_through(camera, f64::from(size[0]) / f64::from(size[1]), at);
+        let (from, direction) = pixel_line(camera, size, pixel);
         let media = Media::at(scene, &self.solids, from);
         let mut open = vec![Pending { after: None, way: Way::Seen, from, direction, share: 1.0, surfaces: 0, media }];
         let mut events: Vec<Event> = Vec::new();
@@ -167,6 +183,15 @@ impl EventTracer {
             open.extend(next);
         }
         events
+    }
+
+    /// The triangle at the centre of a pixel of `camera`'s picture of `size` pixels; `None` where no surface is seen.
+    #[must_use]
+    pub fn triangle_at(&self, scene: &Scene, camera: &Camera, size: [u32; 2], pixel: [u32; 2]) -> Option<SeenTriangle> {
+        let (from, direction) = pixel_line(camera, size, pixel);
+        let crossing = self.nearest_seen(scene, from, direction)?;
+        let (instance, primitive) = (crossing.triangle.instance as usize, crossing.triangle.primitive as usize);
+        Some(SeenTriangle { instance, primitive, uv: crossing.uv })
     }
 
     fn nearest(&self, from: DVec3, direction: DVec3) -> Option<Crossing<'_>> {

@@ -7,7 +7,8 @@ use std::process::ExitCode;
 use anyhow::{Context as _, Result};
 use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{Args, CommandFactory as _, Parser, Subcommand};
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use clap_complete::Shell;
 use etalon::plan::Knob;
 use etalon::scene::EXTENSIONS;
@@ -140,7 +141,15 @@ fn is_scene(word: &OsStr) -> bool {
 /// # Errors
 /// clap's, which also stand for `--help` and `--version`.
 pub fn parse(words: Vec<OsString>) -> Result<Arguments, clap::Error> {
-    Arguments::try_parse_from(with_command(words)).map_err(|mut error| {
+    let parsed = command().try_get_matches_from(with_command(words)).and_then(|matches| {
+        let mut arguments = Arguments::from_arg_matches(&matches)?;
+        if let Command::View(view) = &mut arguments.command {
+            let given = |matches: &ArgMatches| matches.value_source("size") == Some(ValueSource::CommandLine);
+            view.size_is_given = matches.subcommand_matches("view").is_some_and(given);
+        }
+        Ok(arguments)
+    });
+    parsed.map_err(|mut error| {
         if error.kind() != ErrorKind::UnknownArgument {
             return error;
         }

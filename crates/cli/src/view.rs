@@ -4,27 +4,27 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
 
 use super::budget;
 use super::exposure::{self, Exposure};
 use super::options::{AnimationTime, DeviceOptions, PictureOptions, PlanExtent, SceneOptions};
 use super::{heading, usage};
-use etalon::frame::Settings;
+use etalon::frame::{Background, Settings};
 use etalon::gpu::{Device, Severity};
-use etalon::image::file;
 use etalon::open::{Opened, is_file};
-use etalon::scene::{Camera, Prune, Scene};
+use etalon::scene::{Camera, Prune, Scene, Source};
 use etalon_cost::command::arguments;
 use etalon_farm::identity::contents;
-use etalon_viewer::shared::{Loaded, OpenRequest, SceneSource};
+use etalon_viewer::shared::{Choice, Loaded, OpenRequest, SceneSource};
 use etalon_viewer::{Start, View, run as run_window};
 
 /// Open a window that shows the scene, with its plan, pass times, and the rays and equations of a pixel
 #[derive(Debug, Clone, Args)]
 // It is refused here, with a sentence.
 #[command(mut_arg("max_error", |arg| arg.hide(true)))]
+#[command(mut_arg("size", |arg| arg.help("Width and height of the window in pixels [default: those of the last run]").hide_default_value(true)))]
 #[command(after_help = "\
 Examples:
     etalon view study:pool
@@ -39,32 +39,59 @@ pub struct ViewArgs {
     /// Start without panels; the key P shows them
     #[arg(long, help_heading = heading::WINDOW)]
     bare: bool,
+    /// Whether --size is on the command line; without it, the window has the size of the last run.
+    #[arg(skip)]
+    pub(super) size_is_given: bool,
 }
 
-impl SceneSource for ViewArgs {
-    fn open(&self, asked: OpenRequest<'_>, device: &Arc<Device>) -> Result<Loaded> {
-        let options = &asked_for(&self.scene, asked.file, asked.time);
-        let scene = options.load(Prune::Nothing)?;
+/// Loader of scenes: an animated file is read once.
+struct FileSource {
+    args: ViewArgs,
+    /// The file that was read last, and how.
+    open: Option<(SceneOptions, Source)>,
+}
+
+impl FileSource {
+    /// The scene of these options at their time.
+    fn read(&mut self, options: &SceneOptions, again: bool) -> Result<Scene> {
+        let still = |options: &SceneOptions| SceneOptions { time: AnimationTime(None), ..options.clone() };
+        let is_same = |known: &SceneOptions| known.words() == still(options).words();
+        if again || self.open.as_ref().is_none_or(|(known, _)| !is_same(known)) {
+            let source = etalon::open::source(&options.scene, options.load_options(Prune::Nothing))?;
+            self.open = Some((still(options), source));
+        }
+        let (_, source) = self.open.as_mut().context("reading a scene")?;
+        source.at(options.time.0)
+    }
+}
+
+impl SceneSource for FileSource {
+    fn open(&mut self, asked: OpenRequest<'_>, device: &Arc<Device>) -> Result<Loaded> {
+        let options = &asked_for(&self.args.scene, asked.file, asked.choice, asked.time);
+        let scene = self.read(options, true)?;
+        let this = &self.args;
         let (environment, more) = options.load_environment()?;
         let camera = options.choose_camera(&scene, asked.size)?;
         let framed = options.frames(&scene);
-        let chosen = self.picture.knobs()?;
+        let chosen = this.picture.knobs()?;
         let mut knobs = chosen.clone();
-        self.picture.colour_of(&scene, &mut knobs)?;
+        this.picture.colour_of(&scene, &mut knobs)?;
         let mut opened = Opened::named(&options.scene, scene, environment, options.asks_for_environment());
         opened.warnings.extend(more);
-        let settings = Settings { size: asked.size, knobs: knobs.clone(), ..self.picture.settings(options)? };
-        let exposure = exposure::choose(self.picture.exposure, &opened, device, &settings, &camera)?;
+        let settings = Settings { size: asked.size, knobs: knobs.clone(), ..this.picture.settings(options)? };
+        let exposure = exposure::choose(this.picture.exposure, &opened, device, &settings, &camera)?;
         // `cost` measures at the size of the command line, not at the size of the picture in the window.
         let priced = budget::command(
             &options.with_light_of(&opened, &chosen),
-            &exposure.written_out(&self.picture),
-            &self.device,
+            &exposure.written_out(&this.picture),
+            &this.device,
         );
         let prices = budget::known(&priced, &contents(opened.scene(), opened.environment()), device.info());
         opened.warnings.extend(exposure.sentence);
         let (lit, as_lit) = opened.lit(Settings { knobs: knobs.clone(), ..Settings::default() });
+        let sources = Some(opened.sources(&knobs));
         Ok(Loaded {
+            sources,
             name: opened.scene().name.clone(),
             environment: lit.cloned().map(|map| (Arc::new(map), as_lit.environment_intensity)),
             camera,
@@ -77,9 +104,9 @@ impl SceneSource for ViewArgs {
         })
     }
 
-    fn moment(&self, asked: OpenRequest<'_>) -> Result<(Scene, Camera)> {
-        let options = asked_for(&self.scene, asked.file, asked.time);
-        let scene = options.load(Prune::Nothing)?;
+    fn moment(&mut self, asked: OpenRequest<'_>) -> Result<(Scene, Camera)> {
+        let options = asked_for(&self.args.scene, asked.file, asked.choice, asked.time);
+        let scene = self.read(&options, false)?;
         let camera = options.choose_camera(&scene, asked.size)?;
         Ok((scene, camera))
     }
@@ -101,8 +128,9 @@ impl ViewArgs {
     }
 }
 
-/// The options for another file or another time. For another file, camera and time of the first file are dropped.
-fn asked_for(options: &SceneOptions, file: Option<&Path>, time: Option<f64>) -> SceneOptions {
+/// The options for another file, another choice of what is shown, or another time. For another file, camera and time of
+/// the first file are dropped.
+fn asked_for(options: &SceneOptions, file: Option<&Path>, choice: &Choice, time: Option<f64>) -> SceneOptions {
     let options = match file {
         None => options.clone(),
         Some(path) => SceneOptions {
@@ -115,13 +143,42 @@ fn asked_for(options: &SceneOptions, file: Option<&Path>, time: Option<f64>) -> 
             ..options.clone()
         },
     };
-    SceneOptions { time: time.map_or(options.time, |time| AnimationTime(Some(time))), ..options }
+    let Choice { scene, variant, animation, hide, only, environment, key_light } = choice.clone();
+    SceneOptions {
+        scene_of_file: scene,
+        variant,
+        animation,
+        hide,
+        only,
+        env: environment,
+        key_light,
+        time: time.map_or(options.time, |time| AnimationTime(Some(time))),
+        ..options
+    }
+}
+
+/// What the command line chooses.
+fn choice_of(options: &SceneOptions) -> Choice {
+    Choice {
+        scene: options.scene_of_file.clone(),
+        variant: options.variant.clone(),
+        animation: options.animation.clone(),
+        hide: options.hide.clone(),
+        only: options.only.clone(),
+        environment: options.env.clone(),
+        key_light: options.key_light,
+    }
 }
 
 /// The `etalon render` command that draws a view.
 fn command(args: &ViewArgs, view: &View<'_>) -> String {
-    let mut scene = asked_for(&args.scene, view.file, view.time);
-    scene.env_rotation = view.settings.environment_rotation;
+    let mut scene = asked_for(&args.scene, view.file, view.choice, view.time);
+    if scene.env.as_deref() != Some("none") {
+        scene.env_rotation = view.settings.environment_rotation;
+        scene.env_intensity = view.settings.environment_intensity;
+    }
+    let background = view.settings.background;
+    scene.background = Some(background).filter(|background| *background != Background::Default);
     if view.camera.is_some() || view.named.is_some() {
         (scene.camera, scene.eye, scene.target, scene.up, scene.fov) = (None, None, None, None, None);
     }
@@ -147,29 +204,6 @@ fn command(args: &ViewArgs, view: &View<'_>) -> String {
     words.concat().join(" ")
 }
 
-/// File that lists recently opened files, one per line.
-fn notes() -> Option<PathBuf> {
-    Some(file::cache_folder()?.join("recent"))
-}
-
-fn recent() -> Vec<PathBuf> {
-    let text = notes().and_then(|path| std::fs::read_to_string(path).ok()).unwrap_or_default();
-    text.lines().map(PathBuf::from).filter(|path| path.is_file()).collect()
-}
-
-/// Stores the recent files. If the list cannot be written, they are known until the window is closed.
-fn keep(recent: &[PathBuf]) {
-    let text: String = recent.iter().map(|path| format!("{}\n", path.display())).collect();
-    let write = |path: PathBuf| {
-        path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
-        file::write(&path, text.as_bytes())
-    };
-    let written = notes().map(write);
-    if let Some(Err(error)) = written {
-        tracing::info!("the list of recent files cannot be written: {error:#}");
-    }
-}
-
 /// Runs the command.
 ///
 /// # Errors
@@ -181,15 +215,14 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode> {
     let first = is_file(&args.scene.scene).then(|| PathBuf::from(&args.scene.scene));
     let messages = run_window(Start {
         file: first,
-        size: args.picture.size,
+        size: args.size_is_given.then_some(args.picture.size),
         settings,
         device: args.device.choice(),
         validate: args.device.validate,
         panels: !args.bare,
-        source: Box::new(args.clone()),
+        choice: choice_of(&args.scene),
+        source: Box::new(FileSource { args: args.clone(), open: None }),
         command: Box::new(move |view| command(&told, view)),
-        recent: recent(),
-        keep: Box::new(keep),
         // A closed terminal does not close the window.
         said: Box::new(|command| drop(super::print(command))),
     })?;

@@ -143,6 +143,13 @@ pub fn cache_folder() -> Option<PathBuf> {
     folder.map(|folder| folder.join("etalon"))
 }
 
+/// Folder of the user's settings, by the XDG base directory specification; `None` where there is no home.
+pub fn config_folder() -> Option<PathBuf> {
+    let home = || std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".config"));
+    let folder = std::env::var_os("XDG_CONFIG_HOME").map(PathBuf::from).or_else(home);
+    folder.map(|folder| folder.join("etalon"))
+}
+
 /// Hash of an output as 32 hexadecimal digits: XXH3 with 128 bits, seed 0, most significant digit first.
 ///
 /// Equal bytes have equal hashes on all machines and in all versions. The hash identifies files and is not

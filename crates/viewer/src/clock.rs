@@ -4,18 +4,28 @@
 const STEP: f64 = 1e-3;
 
 /// Animation time of a scene.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clock {
     /// Seconds; `None` is the time of the command line, or the rest pose.
     pub time: Option<f64>,
     /// Whether the animation plays.
     pub playing: bool,
+    /// Seconds of the animation per second.
+    pub speed: f64,
+    /// Whether it begins again at its end.
+    pub repeats: bool,
+}
+
+impl Default for Clock {
+    fn default() -> Self {
+        Self { time: None, playing: false, speed: 1.0, repeats: true }
+    }
 }
 
 impl Clock {
     /// Stops, and returns to the time of the command line.
     pub fn stop(&mut self) {
-        *self = Self::default();
+        (self.time, self.playing) = (None, false);
     }
 
     /// Sets the time in seconds, clamped to 0 … `duration` and rounded to milliseconds.
@@ -24,10 +34,12 @@ impl Clock {
         self.time = Some(steps / STEP.recip());
     }
 
-    /// Advances a playing clock by some seconds; after `duration` it starts again at 0.
+    /// Advances a playing clock by some seconds of the user's time; after `duration` it starts again at 0, or stops.
     pub fn advance(&mut self, seconds: f64, duration: f64) {
         if self.playing && duration > 0.0 {
-            self.set((self.time.unwrap_or_default() + seconds).rem_euclid(duration), duration);
+            let at = self.time.unwrap_or_default() + seconds * self.speed;
+            self.playing = self.repeats || at < duration;
+            self.set(if self.repeats { at.rem_euclid(duration) } else { at }, duration);
         }
     }
 }
@@ -50,5 +62,10 @@ mod tests {
         assert_eq!(clock.time, Some(2.0), "what lasts no time stands");
         clock.stop();
         assert_eq!(clock, Clock::default());
+        (clock.playing, clock.speed, clock.repeats) = (true, 4.0, false);
+        clock.advance(0.1, 2.0);
+        assert_eq!(clock.time, Some(0.4));
+        clock.advance(1.0, 2.0);
+        assert_eq!((clock.time, clock.playing), (Some(2.0), false), "once");
     }
 }

@@ -3,6 +3,7 @@
 
 use glam::Vec3;
 
+use super::lookup::TriangleFacts;
 use super::shared::PixelSurfaces;
 use etalon::share::AovPixel;
 
@@ -29,12 +30,16 @@ pub enum SurfaceLayer {
     Instance,
     /// Emitted radiance.
     Emissive,
+    /// Edges of the triangles, over the picture.
+    Wireframe,
+    /// Texture coordinates of the first set, with squares of an eighth.
+    TextureCoordinates,
     /// Pixels with NaN or infinite radiance.
     NotFinite,
 }
 
 /// Every layer with its name.
-pub const LAYERS: [(SurfaceLayer, &str); 11] = [
+pub const LAYERS: [(SurfaceLayer, &str); 13] = [
     (SurfaceLayer::Radiance, "shaded"),
     (SurfaceLayer::Albedo, "albedo"),
     (SurfaceLayer::Normal, "normal"),
@@ -45,6 +50,8 @@ pub const LAYERS: [(SurfaceLayer, &str); 11] = [
     (SurfaceLayer::Material, "material"),
     (SurfaceLayer::Instance, "instance"),
     (SurfaceLayer::Emissive, "emissive"),
+    (SurfaceLayer::Wireframe, "wireframe"),
+    (SurfaceLayer::TextureCoordinates, "texture coordinates"),
     (SurfaceLayer::NotFinite, "NaN and infinity"),
 ];
 
@@ -66,9 +73,50 @@ fn of_normal(n: [f32; 3]) -> [u8; 4] {
     [x, y, z, 255]
 }
 
+/// Colour of texture coordinates: u is red, v is green, each from 0 to 1 within a repetition, in squares of an eighth.
+fn of_uv(uv: [f32; 2]) -> [u8; 4] {
+    let [u, v] = uv.map(|x| if x.is_finite() { x.rem_euclid(1.0) } else { 0.0 });
+    let square = ((u * 8.0) as u32 + (v * 8.0) as u32) % 2;
+    let light = if square == 0 { 1.0 } else { 0.75 };
+    let [r, g, b] = [55.0 + 200.0 * u, 55.0 + 200.0 * v, 90.0].map(|c| (c * light) as u8);
+    [r, g, b, 255]
+}
+
 const NOTHING: [u8; 4] = [24, 24, 26, 255];
 
 impl SurfaceLayer {
+    /// Whether the layer is drawn from the surfaces at the pixels.
+    #[must_use]
+    pub fn reads_surfaces(self) -> bool {
+        self != Self::Radiance && !self.reads_triangles()
+    }
+
+    /// Whether the layer is drawn from the triangles at the pixels.
+    #[must_use]
+    pub fn reads_triangles(self) -> bool {
+        matches!(self, Self::Wireframe | Self::TextureCoordinates)
+    }
+
+    /// RGBA8 pixels of a layer of triangles over a picture of the same size.
+    #[must_use]
+    pub fn draw_triangles(self, triangles: &[Option<TriangleFacts>], rgba: &[u8]) -> Vec<u8> {
+        let pixel = |(facts, shown): (&Option<TriangleFacts>, &[u8])| -> [u8; 4] {
+            let grey = [shown[0], shown[1], shown[2]].iter().map(|c| u16::from(*c)).sum::<u16>() / 6;
+            match (self, facts) {
+                (Self::TextureCoordinates, Some(TriangleFacts { uv: Some(uv), .. })) => of_uv(*uv),
+                (Self::Wireframe, Some(facts)) => {
+                    let line = (1.0 - facts.edge).clamp(0.0, 1.0);
+                    let base = 40.0 + f32::from(grey);
+                    let [r, g, b] = [255.0, 220.0, 120.0].map(|c| (base + (c - base) * line) as u8);
+                    [r, g, b, 255]
+                }
+                (_, Some(_)) => [grey as u8, grey as u8, grey as u8, 255],
+                (_, None) => NOTHING,
+            }
+        };
+        triangles.iter().zip(rgba.chunks_exact(4)).flat_map(pixel).collect()
+    }
+
     /// RGBA8 pixels of the layer. [`SurfaceLayer::Radiance`] is the picture itself and gives plain grey here.
     #[must_use]
     pub fn draw(self, surfaces: &PixelSurfaces) -> Vec<u8> {
@@ -87,7 +135,7 @@ impl SurfaceLayer {
                 return NOTHING;
             }
             match self {
-                Self::Radiance | Self::NotFinite => NOTHING,
+                Self::Radiance | Self::NotFinite | Self::Wireframe | Self::TextureCoordinates => NOTHING,
                 Self::Albedo => encoded(p.albedo.into()),
                 Self::Normal => of_normal(p.normal),
                 Self::GeometricNormal => of_normal(p.geometric_normal),

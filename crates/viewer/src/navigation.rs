@@ -14,10 +14,62 @@ const NEAREST: f64 = 1e-4;
 const FARTHEST: f64 = 1e3;
 /// Least angle in radians between the viewing direction and the vertical, where an orbit has no horizon.
 const POLE: f64 = 1e-3;
-/// Number of camera moves that can be undone.
-const HISTORY: usize = 64;
+/// Aspect ratio that cameras of a file are made for; glTF's own is not read.
+const MADE_FOR: f64 = 16.0 / 9.0;
 
-/// A camera with an orbit centre and an undo history.
+/// A view that can be returned to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    camera: Camera,
+    distance: f64,
+    moved: bool,
+    named: Option<String>,
+    framed: bool,
+}
+
+/// Directions that a scene is looked at from, as in drawings; the front of a glTF model is +Z.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// From +Z.
+    Front,
+    /// From −Z.
+    Back,
+    /// From +X.
+    Right,
+    /// From −X.
+    Left,
+    /// From +Y.
+    Top,
+    /// From −Y.
+    Bottom,
+}
+
+impl Side {
+    /// Every side with its name.
+    pub const ALL: [(Self, &str); 6] = [
+        (Self::Front, "Front"),
+        (Self::Back, "Back"),
+        (Self::Right, "Right"),
+        (Self::Left, "Left"),
+        (Self::Top, "Top"),
+        (Self::Bottom, "Bottom"),
+    ];
+
+    /// Unit vector from the scene to the eye.
+    #[must_use]
+    pub fn direction(self) -> DVec3 {
+        match self {
+            Self::Front => DVec3::Z,
+            Self::Back => DVec3::NEG_Z,
+            Self::Right => DVec3::X,
+            Self::Left => DVec3::NEG_X,
+            Self::Top => DVec3::Y,
+            Self::Bottom => DVec3::NEG_Y,
+        }
+    }
+}
+
+/// A camera with an orbit centre.
 #[derive(Debug, Clone)]
 pub struct Navigation {
     view: Camera,
@@ -27,12 +79,14 @@ pub struct Navigation {
     size: f64,
     bounds: Bounds,
     home: Camera,
-    before: Vec<(Camera, f64, bool, Option<String>)>,
     /// Whether the user moved the camera, or it was computed to frame the scene at one size.
     moved: bool,
     /// Name of the file's camera that was chosen; `None`: the first one.
     named: Option<String>,
+    /// Whether the initial camera was computed to frame the scene at the size of the picture.
     framed: bool,
+    /// Whether the current view was: it then fits any picture.
+    fits: bool,
 }
 
 impl Navigation {
@@ -46,10 +100,10 @@ impl Navigation {
             size,
             bounds,
             home,
-            before: Vec::new(),
             moved: framed,
             named: None,
             framed,
+            fits: framed,
         };
         new.distance = new.distance_to_middle();
         new
@@ -109,12 +163,24 @@ impl Navigation {
         (self.bounds.center() - self.eye()).dot(self.forward()).max(0.05 * self.size)
     }
 
-    /// Stores the view for [`Navigation::undo`]; called at the start of each movement.
-    pub fn keep(&mut self) {
-        if self.before.len() == HISTORY {
-            self.before.remove(0);
-        }
-        self.before.push((self.view.clone(), self.distance, self.moved, self.named.clone()));
+    /// The current view, to return to.
+    #[must_use]
+    pub fn view(&self) -> View {
+        let Self { view, distance, moved, named, fits, .. } = self;
+        View { camera: view.clone(), distance: *distance, moved: *moved, named: named.clone(), framed: *fits }
+    }
+
+    /// Returns to a view.
+    pub fn return_to(&mut self, to: View) {
+        (self.view, self.distance, self.moved, self.named, self.fits) =
+            (to.camera, to.distance, to.moved, to.named, to.framed);
+    }
+
+    /// The least aspect ratio of a picture of this view: in a narrower one, the sides of what a camera of the file
+    /// shows would be cut off. `None` for views that were computed to fit.
+    #[must_use]
+    pub fn least_aspect(&self) -> Option<f64> {
+        (!self.fits).then_some(MADE_FOR)
     }
 
     /// Takes over a scene that was read again; the camera stays where it is.
@@ -137,42 +203,50 @@ impl Navigation {
         }
     }
 
-    /// Undoes the last movement; returns false where there is none.
-    pub fn undo(&mut self) -> bool {
-        let Some((view, distance, moved, named)) = self.before.pop() else { return false };
-        (self.view, self.distance, self.moved, self.named) = (view, distance, moved, named);
-        true
-    }
-
     /// Returns to the initial camera.
     pub fn reset(&mut self) {
         self.go_to(self.home.clone(), None);
-        self.moved = self.framed;
+        (self.moved, self.fits) = (self.framed, self.framed);
     }
 
     /// Goes to a camera; `name` is its name in the file.
     pub fn go_to(&mut self, camera: Camera, name: Option<String>) {
-        self.keep();
         self.view = camera;
-        self.moved = false;
+        (self.moved, self.fits) = (false, false);
         self.named = name;
         self.distance = self.distance_to_middle();
     }
 
     /// Frames the whole scene without changing the viewing direction.
     pub fn fit(&mut self, aspect: f64) {
-        self.keep();
-        self.moved = true;
+        self.fit_box(self.bounds, aspect);
+    }
+
+    /// Frames the whole scene, seen from a side.
+    pub fn look_from(&mut self, side: Side, aspect: f64) {
+        // Straight up and down there is no horizon, and no command for the view.
+        let direction = (side.direction() + DVec3::Z * (POLE * side.direction().y.abs())).normalize();
+        let (center, distance) = (self.bounds.center(), 2.0 * self.size);
+        if let Ok(camera) = Camera::looking_at(center + direction * distance, center, DVec3::Y, 1.0) {
+            self.view.world_from_camera = camera.world_from_camera;
+        }
+        self.fit(aspect);
+    }
+
+    /// Frames a box without changing the viewing direction.
+    pub fn fit_box(&mut self, bounds: Bounds, aspect: f64) {
+        (self.moved, self.fits) = (true, true);
+        let size = bounds.radius().max(1e-6);
         match &mut self.view.projection {
             Projection::Perspective { fov_y, .. } => {
                 let frame = self.view.world_from_camera.matrix3;
-                self.view.world_from_camera = Camera::facing(self.bounds, frame, aspect, *fov_y).world_from_camera;
-                self.distance = self.distance_to_middle();
+                self.view.world_from_camera = Camera::facing(bounds, frame, aspect, *fov_y).world_from_camera;
+                self.distance = (bounds.center() - self.eye()).dot(self.forward()).max(0.05 * size);
             }
             Projection::Orthographic { half_height, .. } => {
-                *half_height = self.size / aspect.min(1.0);
-                self.distance = 2.0 * self.size;
-                self.view.world_from_camera.translation = self.bounds.center() - self.forward() * self.distance;
+                *half_height = size / aspect.min(1.0);
+                self.distance = 2.0 * size;
+                self.view.world_from_camera.translation = bounds.center() - self.forward() * self.distance;
             }
         }
     }
@@ -197,6 +271,15 @@ impl Navigation {
         self.turn(DVec3::Y, pivot, -by.x * TURN);
         let right = self.view.world_from_camera.matrix3.x_axis;
         self.turn(right, pivot, self.tilt(-by.y * TURN));
+    }
+
+    /// Turns towards a point, which becomes the orbit centre, and halves the distance to it.
+    pub fn focus(&mut self, at: DVec3) {
+        self.moved = true;
+        let from = self.eye() - at;
+        let Ok(turned) = Camera::looking_at(at + from * 0.5, at, DVec3::Y, 1.0) else { return };
+        self.view.world_from_camera = turned.world_from_camera;
+        self.distance = 0.5 * from.length();
     }
 
     /// Orbits about the orbit centre; `by` is a drag in window heights.
@@ -297,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn what_fits_is_seen_and_undone() {
+    fn what_fits_is_seen_and_can_be_returned_to() {
         let mut n = navigation();
         let home = n.eye();
         n.fly(DVec3::new(5.0, -2.0, 9.0));
@@ -311,12 +394,31 @@ mod tests {
                 assert!(p.z < 0.0 && (p.y / -p.z).abs() < tangent && (p.x / -p.z).abs() < tangent * aspect, "{p}");
             }
         }
+        let fitted = n.view();
         n.reset();
         assert_eq!(n.eye(), home);
-        for _ in 0..4 {
-            assert!(n.undo());
+        n.return_to(fitted.clone());
+        assert!(n.view() == fitted && n.eye() != home);
+    }
+
+    #[test]
+    fn sides_are_those_of_drawings() {
+        for (side, name) in Side::ALL {
+            let mut n = navigation();
+            n.look_from(side, 1.5);
+            let towards = (n.eye() - n.bounds.center()).normalize();
+            assert!(towards.dot(side.direction()) > 0.999_99 && n.words().is_some(), "{name}: {towards}");
+            assert!(n.least_aspect().is_none() && is_upright(&n.camera()), "{name}");
         }
-        assert!(!n.undo() && n.eye() != home, "flying was no kept movement");
+    }
+
+    #[test]
+    fn a_point_in_focus_is_in_the_middle() {
+        let mut n = navigation();
+        let at = DVec3::new(1.0, 0.5, -0.3);
+        let before = n.eye().distance(at);
+        n.focus(at);
+        assert!(n.target().abs_diff_eq(at, 1e-9) && (n.eye().distance(at) - 0.5 * before).abs() < 1e-9);
     }
 
     #[test]

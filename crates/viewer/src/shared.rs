@@ -5,19 +5,51 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 use anyhow::{Context as _, Result};
+use glam::DVec3;
 
 use etalon::frame::Settings;
 use etalon::gpu::{Device, PassTime, Replacement};
+use etalon::open::Sources;
 use etalon::pass::tonemap::Counts;
 use etalon::plan::{Effect, Knobs};
 use etalon::prepare::Original;
 use etalon::scene::environment::Environment;
-use etalon::scene::{Bounds, Camera, Light, Material, Scene};
+use etalon::scene::{Bounds, Camera, Instance, KeyLight, Light, Material, Outline, Scene};
 use etalon::share::AovPixel;
 use etalon::transport::events::Event;
 use etalon_cost::table::Table;
 
-/// A loaded scene.
+use super::lookup::PixelTriangles;
+
+/// What of a file is shown, and what lights it. As options of the command line.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Choice {
+    /// Scene of the file, by name or index; `None`: the one that the file names.
+    pub scene: Option<String>,
+    /// Variant of the materials; `None`: the materials of the primitives.
+    pub variant: Option<String>,
+    /// Animation that plays, or `all`; `None`: those that do not move the same nodes.
+    pub animation: Option<String>,
+    /// Nodes that are left out.
+    pub hide: Vec<String>,
+    /// Nodes that alone are shown; empty: all.
+    pub only: Vec<String>,
+    /// Environment map, `studio` or `none`; `None`: the default.
+    pub environment: Option<String>,
+    /// A directional light beside those of the file.
+    pub key_light: Option<KeyLight>,
+}
+
+impl Choice {
+    /// The choice for another file: its light alone.
+    #[must_use]
+    pub fn of_another_file(&self) -> Self {
+        Self { environment: self.environment.clone(), key_light: self.key_light, ..Self::default() }
+    }
+}
+
+/// A loaded scene. Clones share the large data.
+#[derive(Clone)]
 pub struct Loaded {
     /// Name of the scene.
     pub name: String,
@@ -37,6 +69,8 @@ pub struct Loaded {
     pub knobs: Option<Knobs>,
     /// Exposure to start with, in stops.
     pub exposure: f32,
+    /// What may light its pictures; `None` where it is not known.
+    pub sources: Option<Sources>,
 }
 
 /// Request for a scene: file, animation time and size of the picture.
@@ -44,6 +78,8 @@ pub struct Loaded {
 pub struct OpenRequest<'a> {
     /// Scene file; `None`: that of the command line.
     pub file: Option<&'a Path>,
+    /// What of the file is shown, and what lights it.
+    pub choice: &'a Choice,
     /// Animation time in seconds; `None`: that of the command line, or the rest pose.
     pub time: Option<f64>,
     /// Size of the picture in pixels.
@@ -56,13 +92,13 @@ pub trait SceneSource: Send {
     ///
     /// # Errors
     /// One sentence with the file and the cause.
-    fn open(&self, asked: OpenRequest<'_>, device: &Arc<Device>) -> Result<Loaded>;
+    fn open(&mut self, asked: OpenRequest<'_>, device: &Arc<Device>) -> Result<Loaded>;
 
     /// Reads only the scene at another animation time, with its initial camera.
     ///
     /// # Errors
     /// The errors of [`SceneSource::open`].
-    fn moment(&self, asked: OpenRequest<'_>) -> Result<(Scene, Camera)>;
+    fn moment(&mut self, asked: OpenRequest<'_>) -> Result<(Scene, Camera)>;
 }
 
 /// Viewpoint of the picture.
@@ -109,6 +145,8 @@ pub struct RenderRequest {
     pub scene: u64,
     /// Scene file; `None`: that of the command line.
     pub file: Option<PathBuf>,
+    /// What of the file is shown, and what lights it; a change counts with a new number of the scene.
+    pub choice: Choice,
     /// Animation time in seconds; `None`: that of the command line, or the rest pose.
     pub time: Option<f64>,
     /// Viewpoint.
@@ -123,6 +161,10 @@ pub struct RenderRequest {
     pub surfaces: bool,
     /// Pixel whose ray is traced.
     pub picked: Option<Pick>,
+    /// Number of a metering of the picture; a new number meters again.
+    pub meter: u64,
+    /// Whether to look up the triangles at the pixels.
+    pub triangles: bool,
     /// Shader code that replaces built code.
     pub code: Arc<Vec<Replacement>>,
     /// Ends the render thread.
@@ -136,6 +178,7 @@ impl RenderRequest {
         Self {
             scene: 0,
             file: None,
+            choice: Choice::default(),
             time: None,
             from: Viewpoint::Own,
             settings,
@@ -143,20 +186,25 @@ impl RenderRequest {
             moving: false,
             surfaces: false,
             picked: None,
+            meter: 0,
+            triangles: false,
             code: Arc::default(),
             quit: false,
         }
     }
 
     pub(super) fn asked(&self) -> OpenRequest<'_> {
-        OpenRequest { file: self.file.as_deref(), time: self.time, size: self.settings.size }
+        OpenRequest { file: self.file.as_deref(), choice: &self.choice, time: self.time, size: self.settings.size }
     }
 
     /// Whether both requests draw the same picture; display settings may differ.
     #[must_use]
     pub fn is_same_picture(&self, other: &Self) -> bool {
         let marks = |w: &Self| (w.scene, w.time, w.moving, w.quit);
-        let settings = |w: &Self| (w.settings.size, w.settings.environment_rotation);
+        let settings = |w: &Self| {
+            let Settings { size, environment_rotation, environment_intensity, background, .. } = w.settings;
+            (size, environment_rotation, environment_intensity, background)
+        };
         (marks(self), settings(self)) == (marks(other), settings(other))
             && self.from == other.from
             && self.settings.knobs == other.settings.knobs
@@ -167,7 +215,7 @@ impl RenderRequest {
     /// Whether both requests draw and show the same.
     #[must_use]
     pub fn is_as(&self, other: &Self) -> bool {
-        let marks = |w: &Self| (w.surfaces, w.picked, w.settings.tonemap, w.settings.exposure);
+        let marks = |w: &Self| (w.surfaces, w.triangles, w.picked, w.meter, w.settings.tonemap, w.settings.exposure);
         self.is_same_picture(other) && marks(self) == marks(other)
     }
 }
@@ -207,9 +255,28 @@ pub struct SceneFacts {
     pub warnings: Vec<String>,
     /// Costs of rungs, if they were measured.
     pub prices: Option<Arc<Table>>,
+    /// What the file contains.
+    pub outline: Outline,
+    /// Box of each instance in world space.
+    pub boxes: Vec<Bounds>,
+    /// Name, and width and height in pixels, of each image.
+    pub images: Vec<(String, [u32; 2])>,
+    /// Number of vertices over all meshes.
+    pub vertices: usize,
+    /// Name of the environment map that lights the scene.
+    pub environment: Option<String>,
 }
 
 impl SceneFacts {
+    /// Box of a node with everything below it; `None` where nothing of it is drawn.
+    #[must_use]
+    pub fn bounds_of(&self, node: usize) -> Option<Bounds> {
+        self.outline.nodes.get(node)?;
+        let boxes = self.outline.instances_within(node).into_iter().filter_map(|index| self.boxes.get(index).copied());
+        let all = boxes.reduce(|a, b| Bounds { min: a.min.min(b.min), max: a.max.max(b.max) });
+        all.filter(|bounds| bounds.min.is_finite() && bounds.max.is_finite())
+    }
+
     pub(super) fn of(wanted: &RenderRequest, loaded: &Loaded) -> Result<Self> {
         let scene = loaded.original.scene();
         let bounds = scene.bounds().with_context(|| format!("{}: the scene has nothing to draw", loaded.name))?;
@@ -230,8 +297,23 @@ impl SceneFacts {
             lights: scene.lights.clone(),
             warnings: loaded.warnings.clone(),
             prices: loaded.prices.clone(),
+            outline: scene.outline.clone(),
+            boxes: scene.instances.iter().map(|instance| box_of(scene, instance)).collect(),
+            images: scene.images.iter().map(|image| (image.name.clone(), [image.width, image.height])).collect(),
+            vertices: scene.meshes.iter().map(|mesh| mesh.positions.len()).sum(),
+            environment: loaded.environment.as_ref().map(|(map, _)| map.name.clone()),
         })
     }
+}
+
+/// Box of an instance in world space: that of the corners of its mesh's box.
+fn box_of(scene: &Scene, instance: &Instance) -> Bounds {
+    let empty = Bounds { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+    let add = |b: Bounds, p: DVec3| Bounds { min: b.min.min(p), max: b.max.max(p) };
+    let positions = scene.meshes[instance.mesh].positions.iter().map(|p| glam::Vec3::from(*p).as_dvec3());
+    let local = positions.filter(|p| p.is_finite()).fold(empty, add);
+    let corners = local.corners().map(|corner| instance.world_from_object.transform_point3(corner));
+    corners.into_iter().filter(|p| p.is_finite()).fold(empty, add)
 }
 
 /// A picture, finished or in progress.
@@ -259,6 +341,10 @@ pub struct Shown {
     pub counts: Counts,
     /// Estimated relative error (root of the relative mean squared error); only of path tracing.
     pub error: Option<f64>,
+    /// Seconds until the last sample, at the pace so far.
+    pub seconds_left: f64,
+    /// Fraction of the pixels with a channel at its largest value.
+    pub clipped: f32,
 }
 
 impl Shown {
@@ -299,6 +385,8 @@ pub struct Side {
     pub shown: Option<Shown>,
     /// Every effect with its reason.
     pub effects: Arc<[Effect]>,
+    /// What lights the picture; one sentence.
+    pub lit_by: Option<String>,
     /// Warnings of the plan.
     pub warnings: Arc<[String]>,
 }
@@ -338,6 +426,10 @@ pub struct RenderState {
     pub difference: Option<Difference>,
     /// Surfaces, if requested.
     pub surfaces: Option<PixelSurfaces>,
+    /// Triangles at the pixels, if requested.
+    pub triangles: Option<PixelTriangles>,
+    /// Number of the last metering, and the exposure in stops that it found; `None` where the picture is black.
+    pub metered: Option<(u64, Option<f32>)>,
     /// Ray of the inspected pixel, if requested.
     pub trace: Option<Arc<Trace>>,
     /// Current long operation.

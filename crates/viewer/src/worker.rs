@@ -6,12 +6,14 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
 
+use super::lookup::{PixelTriangles, triangles};
 use super::shared::{
     Difference, Loaded, Pick, PixelSurfaces, RenderRequest, RenderState, SceneFacts, SceneSource, SharedState, Shown,
     Trace, lock,
 };
 use etalon::frame::{Drawing, Renderer, Settings};
 use etalon::gpu::{Device, Interrupted, PassTime, Replacement, is_lost};
+use etalon::image::meter::Meter;
 use etalon::image::metric::{AnyPicture, Metric, compare};
 use etalon::image::png::Display;
 use etalon::plan::Knobs;
@@ -69,6 +71,17 @@ struct LoadedRenderers {
     refused: [Option<Settings>; 2],
     /// Tracer for inspected pixels, made at the first inspection.
     tracer: Option<EventTracer>,
+}
+
+impl LoadedRenderers {
+    /// Takes the tracer, or makes it.
+    fn tracer(&mut self) -> Result<EventTracer> {
+        if let Some(tracer) = self.tracer.take() {
+            return Ok(tracer);
+        }
+        let bvh = self.loaded.original.bvh().context("tracing the ray of a pixel")?;
+        Ok(EventTracer::new(self.loaded.original.scene(), bvh))
+    }
 }
 
 /// Settings of a side, with the environment intensity scaled by the factor of the scene.
@@ -227,20 +240,9 @@ impl Worker {
 
     /// Goes to another animation time of the scene.
     fn go_to(&mut self, wanted: &RenderRequest) -> Result<()> {
-        let Some(stage) = &self.stage else { return Ok(()) };
-        let (scene, camera) = self.source.moment(wanted.asked())?;
-        let Loaded { name, environment, warnings, prices, framed, knobs, exposure, .. } = &stage.loaded;
-        let loaded = Loaded {
-            name: name.clone(),
-            original: scene.into(),
-            environment: environment.clone(),
-            camera,
-            warnings: warnings.clone(),
-            prices: prices.clone(),
-            framed: *framed,
-            knobs: knobs.clone(),
-            exposure: *exposure,
-        };
+        let Self { source, stage: Some(stage), .. } = self else { return Ok(()) };
+        let (scene, camera) = source.moment(wanted.asked())?;
+        let loaded = Loaded { original: scene.into(), camera, ..stage.loaded.clone() };
         // The time per sample changes little between animation times.
         let ns = stage.ns_per_pixel;
         let (mut stage, facts) = self.ready(wanted, loaded)?;
@@ -268,8 +270,12 @@ impl Worker {
             if seen.facts.as_ref().is_some_and(|before| before.scene != facts.scene) {
                 (seen.sides[1], seen.difference) = Default::default();
             }
+            // The picture of another file does not stay under this one's name.
+            if seen.facts.as_ref().is_some_and(|before| before.name != facts.name) {
+                seen.sides[0].shown = None;
+            }
             seen.facts = Some(Arc::new(facts));
-            (seen.surfaces, seen.error) = (None, None);
+            (seen.surfaces, seen.triangles, seen.error) = (None, None, None);
         });
     }
 
@@ -330,9 +336,12 @@ impl Worker {
     fn tell_plan(&self, index: usize) {
         let Some(side) = self.stage.as_ref().and_then(|stage| stage.sides.get(index)) else { return };
         let warnings = [side.renderer.plan().warnings.clone(), side.renderer.warnings.clone()].concat();
+        let sources = self.stage.as_ref().and_then(|stage| stage.loaded.sources.clone());
+        let lit_by = sources.map(|sources| sources.lit_by(side.renderer.plan()).sentence);
         self.say(|seen| {
             (seen.sides[index].effects, seen.sides[index].warnings) =
                 (side.renderer.plan().effects.clone().into(), warnings.into());
+            seen.sides[index].lit_by = lit_by;
         });
     }
 
@@ -368,14 +377,22 @@ impl Worker {
     }
 
     fn show(&mut self, wanted: &RenderRequest, index: usize) -> Result<()> {
-        let Some(side) = self.stage.as_mut().and_then(|stage| stage.sides.get_mut(index)) else { return Ok(()) };
+        let Some(stage) = &mut self.stage else { return Ok(()) };
+        let sharing = stage.sides.iter().filter(|side| !side.is_done()).count().max(1);
+        let Some(side) = stage.sides.get_mut(index) else { return Ok(()) };
         let Some(drawing) = &side.drawing else { return Ok(()) };
         let rendered = side.renderer.picture(drawing)?;
         self.version += 1;
         let each = f64::from(rendered.samples.max(1));
         let work = rendered.work;
+        let (ns, pixels) =
+            (stage.ns_per_pixel[index], f64::from(side.settings.size[0]) * f64::from(side.settings.size[1]));
+        let remaining = f64::from(drawing.of().saturating_sub(rendered.samples));
+        let full = rendered.display.chunks_exact(4).filter(|p| p[..3].contains(&255)).count();
         let shown = Shown {
             version: self.version,
+            seconds_left: 1e-9 * ns * pixels * remaining * sharing as f64,
+            clipped: full as f32 / pixels as f32,
             rgba: Arc::new(rendered.display),
             size: side.settings.size,
             samples: [rendered.samples, drawing.of()],
@@ -400,6 +417,10 @@ impl Worker {
         if wanted.surfaces {
             self.read_surfaces(wanted)?;
         }
+        if wanted.triangles {
+            self.look_up_triangles(wanted)?;
+        }
+        self.meter(wanted)?;
         let shown = lock(&self.shared.seen).sides.each_ref().map(|side| side.shown.clone());
         if let ([Some(left), Some(right)], true) = (shown, wanted.other.is_some())
             && left.is_done()
@@ -468,6 +489,38 @@ impl Worker {
         Ok(())
     }
 
+    /// Looks up the triangles at the pixels of the picture.
+    fn look_up_triangles(&mut self, wanted: &RenderRequest) -> Result<()> {
+        let versions = lock(&self.shared.seen).versions();
+        if lock(&self.shared.seen).triangles.as_ref().is_some_and(|known| known.versions == versions) {
+            return Ok(());
+        }
+        self.say(|seen| seen.busy = Some("looking up triangles".to_owned()));
+        let Some(stage) = &mut self.stage else { return Ok(()) };
+        let (camera, size) = (wanted.from.camera(&stage.loaded)?.clone(), wanted.settings.size);
+        let tracer = stage.tracer()?;
+        let pixels = Arc::new(triangles(&tracer, stage.loaded.original.scene(), &camera, size));
+        stage.tracer = Some(tracer);
+        self.say(|seen| {
+            seen.busy = None;
+            seen.triangles = Some(PixelTriangles { pixels, size, versions });
+        });
+        Ok(())
+    }
+
+    /// Finds the exposure that shows the picture well, where the window asks for it.
+    fn meter(&mut self, wanted: &RenderRequest) -> Result<()> {
+        let known = lock(&self.shared.seen).metered.map_or(0, |(number, _)| number);
+        if known == wanted.meter {
+            return Ok(());
+        }
+        let Some(side) = self.stage.as_ref().and_then(|stage| stage.sides.first()) else { return Ok(()) };
+        let view = side.settings.view_transform();
+        let stops = Meter::of(side.renderer.film()?.rgba.into_iter(), &view).and_then(|meter| meter.stops());
+        self.say(|seen| seen.metered = Some((wanted.meter, stops)));
+        Ok(())
+    }
+
     /// Traces the ray of the inspected pixel from the camera of the inspection; the user may have moved since.
     fn trace(&mut self, wanted: &RenderRequest, last: Option<&RenderRequest>) -> Result<()> {
         let Some(picked) = wanted.picked else {
@@ -487,13 +540,7 @@ impl Worker {
             Some(known) => (known.seen_from.clone(), known.size),
             None => (wanted.from.camera(&stage.loaded)?.clone(), wanted.settings.size),
         };
-        let tracer = match stage.tracer.take() {
-            Some(tracer) => tracer,
-            None => {
-                let bvh = stage.loaded.original.bvh().context("tracing the ray of a pixel")?;
-                EventTracer::new(stage.loaded.original.scene(), bvh)
-            }
-        };
+        let tracer = stage.tracer()?;
         let limits = limits_of(&wanted.settings.knobs);
         let events = tracer.follow(stage.loaded.original.scene(), &seen_from, size, picked.pixel, &limits);
         stage.tracer = Some(tracer);

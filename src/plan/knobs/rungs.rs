@@ -139,6 +139,20 @@ pub enum Model {
     Global,
 }
 
+impl Model {
+    /// Its name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
+    /// One sentence of what it simulates.
+    #[must_use]
+    pub fn about(self) -> &'static str {
+        self.get_documentation().unwrap_or_default()
+    }
+}
+
 /// The number after a prefix in a rung's name; `None` for rungs without the prefix.
 fn number(rung: &str, prefix: &str) -> Option<u32> {
     rung.strip_prefix(prefix)?.parse().ok()

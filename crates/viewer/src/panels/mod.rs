@@ -1,45 +1,92 @@
 //! The panels (egui), drawn from the results of the render thread. They change [`PanelState`] and request everything
 //! else by [`Action`].
 
-mod how;
+pub mod commands;
+mod display;
+pub mod docks;
+mod light;
+mod menu;
+mod notices;
+mod options;
+pub mod overlay;
 mod picture;
 mod pixel;
-mod what;
+mod plan;
+mod scene;
+mod style;
+mod timing;
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, HashMap, VecDeque};
 use std::path::PathBuf;
 
-use egui::{Key, Modifiers, Ui};
+use egui::util::undoer::Undoer;
+use egui::{Key, Modifiers, TextureHandle, Ui};
 use egui_file_dialog::{DialogState, FileDialog};
+use glam::DVec3;
 
 use super::clock::Clock;
 use super::layer::SurfaceLayer;
-use super::navigation::Navigation;
-use super::shared::{Pick, RenderState};
+use super::navigation::{Navigation, View};
+use super::preferences::Preferences;
+use super::shared::{Choice, Pick, RenderState};
+use commands::{COMMANDS, Command};
+use docks::{Docks, Pane};
 use etalon::frame::Settings;
 use etalon::gpu::{DeviceInfo, PassTime};
-use etalon::plan::{KNOBS, Knobs};
+use etalon::plan::{KNOBS, Knobs, Model};
+pub use notices::Notices;
 
 /// Number of pictures whose pass times the chart shows.
 const HISTORY: usize = 120;
 /// Animation step of one frame in seconds.
 const FILM_STEP: f64 = 1.0 / 24.0;
+/// Time without a change in seconds after which the state can be returned to.
+const SETTLED: f32 = 0.5;
 
 /// Requests of the panels to the window.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Action {
-    /// Open a file.
+    /// Open a file, or a study scene by `study:NAME`.
     Open(PathBuf),
-    /// Save the picture as PNG.
-    Screenshot,
-    /// Save the radiance as EXR.
-    Exr,
+    /// Save what is shown as PNG, or the radiance as EXR, by the ending of the name.
+    Save(PathBuf),
+    /// Copy what is shown to the clipboard.
+    CopyPicture,
     /// Copy the command that draws this view to the clipboard.
     CopyCommand,
     /// Clear the last error.
     Dismiss,
+    /// Change between a window and the full screen.
+    FullScreen,
     /// Close the window.
     Quit,
+}
+
+/// What a click on the picture waits for: the surfaces at the pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Click {
+    Select,
+    Focus,
+    Measure,
+}
+
+/// What the file dialog was opened for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Asked {
+    Scene,
+    Environment,
+    Save,
+}
+
+/// What undo returns to.
+#[derive(Clone, PartialEq)]
+struct Undoable {
+    settings: Settings,
+    other: Option<Knobs>,
+    side: usize,
+    choice: Choice,
+    layer: SurfaceLayer,
+    view: Option<View>,
 }
 
 /// State of the user interface.
@@ -56,6 +103,8 @@ pub struct PanelState {
     pub knob: Option<usize>,
     /// Position of the wipe line as a fraction of the picture's width.
     pub wipe: f32,
+    /// What of the file is shown, and what lights it.
+    pub choice: Choice,
     /// Animation time.
     pub clock: Clock,
     /// Layer that is shown.
@@ -66,8 +115,14 @@ pub struct PanelState {
     pub help: bool,
     /// Inspected pixel.
     pub picked: Option<Pick>,
-    /// Message about a finished action.
-    pub message: Option<String>,
+    /// Selected node of the outline.
+    pub selected: Option<usize>,
+    /// Measured points in world space.
+    pub measured: Vec<DVec3>,
+    /// Number of the last metering that was asked for.
+    pub meter: u64,
+    /// Messages about finished actions.
+    pub notices: Notices,
     /// Whether the view moved in this frame.
     pub moved: bool,
     /// Left, top, right and bottom of the picture in pixels of the window.
@@ -76,17 +131,37 @@ pub struct PanelState {
     pub recent: Vec<PathBuf>,
     /// Device that draws.
     pub device: DeviceInfo,
+    /// What is remembered.
+    pub preferences: Preferences,
     /// File dialog.
     pub dialog: FileDialog,
     /// Pass times of the last pictures.
     pub history: VecDeque<Vec<PassTime>>,
+    asked: Asked,
+    /// Panel that comes before those that share its place.
+    forward: Option<Pane>,
     history_version: u64,
+    /// Passes in the order in which they were first seen: their colours.
+    passes: Vec<String>,
     /// Number of inspections so far.
     picks: u64,
     /// Facts of the inspected pixel.
     pixel: Option<pixel::PixelFacts>,
     /// Index of the event under the pointer.
     pointed: Option<usize>,
+    /// Whether clicks set points of a measurement.
+    measures: bool,
+    /// A click that waits for the surfaces at the pixels.
+    clicked: Option<(Click, [u32; 2])>,
+    /// Nodes of the tree whose children are listed.
+    expanded: BTreeSet<usize>,
+    /// Text that names of the tree contain.
+    filter: String,
+    /// Metering that is already applied.
+    metered: u64,
+    undoer: Undoer<Undoable>,
+    /// Small pictures of recent files.
+    small: HashMap<PathBuf, Option<TextureHandle>>,
     /// Time of the user interface in seconds when the animation last advanced.
     played_at: f64,
 }
@@ -94,7 +169,13 @@ pub struct PanelState {
 impl PanelState {
     /// Initial state.
     #[must_use]
-    pub fn new(settings: Settings, device: DeviceInfo, recent: Vec<PathBuf>) -> Self {
+    pub fn new(
+        settings: Settings,
+        choice: Choice,
+        device: DeviceInfo,
+        recent: Vec<PathBuf>,
+        preferences: Preferences,
+    ) -> Self {
         Self {
             navigation: None,
             settings,
@@ -102,26 +183,40 @@ impl PanelState {
             side: 0,
             knob: None,
             wipe: 0.5,
+            choice,
             clock: Clock::default(),
             layer: SurfaceLayer::Radiance,
             panels: true,
             help: false,
             picked: None,
-            message: None,
+            selected: None,
+            measured: Vec::new(),
+            meter: 0,
+            notices: Notices::default(),
             moved: false,
             place: [0; 4],
             recent,
             device,
-            // The search field of egui_file_dialog 0.15 is dark on black in a light theme.
-            dialog: FileDialog::new()
-                .show_search(false)
-                .add_file_filter_extensions("scenes", vec!["glb", "gltf", "obj", "stl", "ply"])
-                .default_file_filter("scenes"),
+            preferences,
+            dialog: FileDialog::new(),
             history: VecDeque::new(),
+            asked: Asked::Scene,
+            forward: None,
             history_version: 0,
+            passes: Vec::new(),
             picks: 0,
             pixel: None,
             pointed: None,
+            measures: false,
+            clicked: None,
+            expanded: BTreeSet::new(),
+            filter: String::new(),
+            metered: 0,
+            undoer: Undoer::with_settings(egui::util::undoer::Settings {
+                stable_time: SETTLED,
+                ..egui::util::undoer::Settings::default()
+            }),
+            small: HashMap::new(),
             played_at: 0.0,
         }
     }
@@ -129,7 +224,7 @@ impl PanelState {
     /// Whether the surfaces at the pixels are needed.
     #[must_use]
     pub fn wants_surfaces(&self) -> bool {
-        self.layer != SurfaceLayer::Radiance || self.picked.is_some() || self.other.is_some()
+        self.layer.reads_surfaces() || self.picked.is_some() || self.other.is_some() || self.clicked.is_some()
     }
 
     /// First column of the window right of the wipe line.
@@ -137,6 +232,17 @@ impl PanelState {
     pub fn wipe_column(&self) -> i32 {
         let [left, _, right, _] = self.place;
         left + (self.wipe * (right - left) as f32).round() as i32
+    }
+
+    /// Forgets what belongs to the scene before.
+    pub fn begin_scene(&mut self) {
+        (self.picked, self.selected, self.clicked) = (None, None, None);
+        self.measured.clear();
+        self.expanded.clear();
+        self.undoer = Undoer::with_settings(egui::util::undoer::Settings {
+            stable_time: SETTLED,
+            ..egui::util::undoer::Settings::default()
+        });
     }
 
     /// Starts a comparison with a copy of the knobs, or ends it.
@@ -180,7 +286,7 @@ impl PanelState {
 
     fn tell_knob(&mut self) {
         let Some(knob) = self.knob.map(|at| &KNOBS[at]) else { return };
-        self.message = Some(format!("{}={}: {}", knob.name, knob.rung(self.knobs()), knob.about));
+        self.notices.say(format!("{}={}: {}", knob.name, knob.rung(self.knobs()), knob.about));
     }
 
     /// Whether the file dialog is open: keys then type text.
@@ -191,6 +297,70 @@ impl PanelState {
     fn aspect(&self) -> f64 {
         f64::from(self.settings.size[0]) / f64::from(self.settings.size[1].max(1))
     }
+
+    /// Places of the panels; the default for a window of this width in points at the first call.
+    fn docks(&mut self, width: f32) -> &mut Docks {
+        self.preferences.docks.get_or_insert_with(|| Docks::new(width))
+    }
+
+    /// Opens the file dialog.
+    fn ask(&mut self, asked: Asked, name: &str, folder: Option<PathBuf>) {
+        // The search field of egui_file_dialog 0.15 is dark on black in a light theme.
+        let mut dialog = FileDialog::new().show_search(false);
+        if let Some(folder) = folder.filter(|folder| folder.is_dir()) {
+            dialog = dialog.initial_directory(folder);
+        }
+        self.dialog = match asked {
+            Asked::Scene => dialog
+                .title("Open a scene")
+                .add_file_filter_extensions("scenes", etalon::scene::EXTENSIONS.to_vec())
+                .default_file_filter("scenes"),
+            Asked::Environment => dialog
+                .title("Open an environment map")
+                .add_file_filter_extensions("environment maps", vec!["hdr", "exr"])
+                .default_file_filter("environment maps"),
+            Asked::Save => dialog
+                .title("Save the picture")
+                .add_save_extension("PNG: what is shown", "png")
+                .add_save_extension("EXR: radiance", "exr")
+                .default_save_extension("PNG: what is shown")
+                .default_file_name(name),
+        };
+        match asked {
+            Asked::Scene | Asked::Environment => self.dialog.pick_file(),
+            Asked::Save => self.dialog.save_file(),
+        }
+        self.asked = asked;
+    }
+
+    fn undoable(&self) -> Undoable {
+        // A view that follows the animation is the same view.
+        let view = self.navigation.as_ref().map(Navigation::view).filter(|_| !self.clock.playing);
+        let settings = Settings { size: [1, 1], ..self.settings.clone() };
+        let (other, side, choice, layer) = (self.other.clone(), self.side, self.choice.clone(), self.layer);
+        Undoable { settings, other, side, choice, layer, view }
+    }
+
+    fn return_to(&mut self, to: Undoable) {
+        self.settings = Settings { size: self.settings.size, ..to.settings };
+        (self.other, self.side, self.choice, self.layer) = (to.other, to.side, to.choice, to.layer);
+        if let (Some(navigation), Some(view)) = (&mut self.navigation, to.view) {
+            navigation.return_to(view);
+        }
+        self.moved = true;
+    }
+}
+
+/// The model whose preset differs least from some knobs, and the number of knobs that differ.
+#[must_use]
+pub fn nearest_model(knobs: &Knobs) -> (Model, usize) {
+    let differing = |model: &Model| {
+        let preset = Knobs::of(*model);
+        KNOBS.iter().filter(|knob| knob.place(&preset) != knob.place(knobs)).count()
+    };
+    let models = [Model::Recursive, Model::Global, Model::Local];
+    let nearest = models.into_iter().min_by_key(differing).unwrap_or_default();
+    (nearest, differing(&nearest))
 }
 
 /// Shows one frame of the user interface; returns the requested actions.
@@ -200,30 +370,75 @@ pub fn show(root: &mut Ui, state: &mut PanelState, seen: &RenderState) -> Vec<Ac
     state.pointed = None;
     if let Some(shown) = seen.shown().filter(|shown| shown.version != state.history_version && !shown.moving) {
         state.history_version = shown.version;
+        for pass in &shown.passes {
+            if !state.passes.contains(&pass.name) {
+                state.passes.push(pass.name.clone());
+            }
+        }
         state.history.push_back(shown.passes.clone());
         if state.history.len() > HISTORY {
             state.history.pop_front();
         }
     }
+    if let Some((number, stops)) = seen.metered.filter(|(number, _)| *number > state.metered) {
+        state.metered = number;
+        match stops {
+            Some(stops) => state.settings.exposure = stops,
+            None => state.notices.fail("the picture is black: no exposure shows it".to_owned()),
+        }
+    }
+    style::apply(root.ctx());
     keys(root, state, seen, &mut actions);
     if state.panels {
-        egui::Panel::top("bar").show(root, |ui| bar(ui, state, seen, &mut actions));
-        egui::Panel::left("how").default_size(280.0).show(root, |ui| {
-            egui::ScrollArea::vertical().show(ui, |ui| how::show(ui, state, seen));
-        });
-        egui::Panel::right("what").default_size(300.0).show(root, |ui| {
-            egui::ScrollArea::vertical().show(ui, |ui| what::show(ui, state, seen));
-        });
+        egui::Panel::top("bar").show(root, |ui| menu::show(ui, state, seen, &mut actions));
     }
     play(root, state, seen);
-    picture::show(root, state, seen);
-    state.dialog.update(root.ctx());
-    actions.extend(state.dialog.take_picked().map(Action::Open));
-    notices(root, state, seen);
-    if state.help {
-        help(root, state);
+    if state.panels {
+        let width = root.available_width();
+        state.docks(width);
+        if let Some(mut docks) = state.preferences.docks.take() {
+            docks.show(root, state, seen, &mut actions);
+            if let Some(pane) = state.forward.take() {
+                docks.set_open(pane, true);
+            }
+            state.preferences.docks = Some(docks);
+        }
+    } else {
+        picture::show(root, state, seen, &mut actions);
     }
+    dialogs(root, state, &mut actions);
+    notices::show(root, state, seen, &mut actions);
+    if state.help {
+        menu::help(root, state);
+    }
+    remember_change(root, state);
     actions
+}
+
+/// The file dialog, and what was picked in it.
+fn dialogs(ui: &Ui, state: &mut PanelState, actions: &mut Vec<Action>) {
+    state.dialog.update(ui.ctx());
+    let Some(path) = state.dialog.take_picked() else { return };
+    match state.asked {
+        Asked::Scene => actions.push(Action::Open(path)),
+        Asked::Environment => state.choice.environment = Some(path.display().to_string()),
+        Asked::Save => {
+            state.preferences.saved_in = path.parent().map(PathBuf::from);
+            actions.push(Action::Save(path));
+        }
+    }
+}
+
+/// Keeps a state that has settled, to return to.
+fn remember_change(ui: &Ui, state: &mut PanelState) {
+    if state.navigation.is_none() {
+        return;
+    }
+    let now = state.undoable();
+    state.undoer.feed_state(ui.input(|input| input.time), &now);
+    if state.undoer.is_in_flux() {
+        ui.ctx().request_repaint_after_secs(SETTLED);
+    }
 }
 
 /// Advances a playing animation once the picture of the last time is shown. A scene that is drawn slowly plays slowly,
@@ -243,134 +458,6 @@ fn play(ui: &Ui, state: &mut PanelState, seen: &RenderState) {
     }
 }
 
-/// The top bar: file, device, state of the picture, and buttons. In a narrow window the text is truncated, not the
-/// buttons.
-fn bar(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, actions: &mut Vec<Action>) {
-    let (mut opened, mut asked) = (None, Vec::new());
-    let helps = &mut state.help;
-    let dialog = &mut state.dialog;
-    let (recent, device) = (&state.recent, &state.device);
-    let facts = |ui: &mut Ui| {
-        ui.menu_button("Open", |ui| {
-            if ui.button("File … (O)").clicked() {
-                dialog.pick_file();
-                ui.close();
-            }
-            for path in recent {
-                if ui.button(path.display().to_string()).clicked() {
-                    opened = Some(Action::Open(path.clone()));
-                    ui.close();
-                }
-            }
-        });
-        let name = seen.facts.as_ref().map_or("no scene", |facts| &facts.name);
-        ui.strong(name);
-        if let Some(facts) = &seen.facts {
-            let [triangles, instances, lights] = facts.counts;
-            ui.weak(format!("{triangles} triangles, {instances} instances, {lights} lights"));
-        }
-        ui.separator();
-        if device.kind == "cpu" {
-            ui.colored_label(ui.visuals().warn_fg_color, "Software rendering (no GPU)")
-                .on_hover_text(format!("{} ({}): the CPU computes every pixel", device.name, device.driver));
-        } else {
-            ui.weak(&device.name).on_hover_text(&device.driver);
-        }
-        ui.separator();
-        if let Some(shown) = seen.shown() {
-            let [done, of] = shown.samples;
-            let ms = shown.ms();
-            let moving = if shown.moving { ", moving" } else { "" };
-            ui.label(format!("{}×{}{moving}: {done} of {of} samples, {ms:.1} ms each", shown.size[0], shown.size[1]));
-        }
-        let wrong = seen.shown().map_or(0, |shown| shown.counts.nan + shown.counts.inf);
-        if wrong > 0 {
-            ui.colored_label(ui.visuals().error_fg_color, format!("{wrong} invalid pixels (NaN or infinite)"))
-                .on_hover_text("view: NaN and infinity shows them");
-        }
-    };
-    let buttons = |ui: &mut Ui| {
-        egui::widgets::global_theme_preference_switch(ui);
-        if ui.button("Help").on_hover_text("H").clicked() {
-            *helps = !*helps;
-        }
-        for (name, key, action) in
-            [("Copy command", "C", Action::CopyCommand), ("EXR", "E", Action::Exr), ("PNG", "S", Action::Screenshot)]
-        {
-            if ui.button(name).on_hover_text(key).clicked() {
-                asked.push(action);
-            }
-        }
-    };
-    egui::Sides::new().shrink_left().truncate().show(ui, facts, buttons);
-    actions.extend(opened.into_iter().chain(asked));
-}
-
-/// Messages over the picture: the last error, the current long operation, or a finished action.
-fn notices(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
-    let area = |id: &str, offset: f32| {
-        egui::Area::new(egui::Id::new(id.to_owned())).anchor(egui::Align2::CENTER_BOTTOM, egui::vec2(0.0, offset))
-    };
-    if let Some(error) = &seen.error {
-        area("error", -16.0).show(ui.ctx(), |ui| {
-            egui::Frame::popup(ui.style()).show(ui, |ui| {
-                ui.set_max_width(640.0);
-                ui.colored_label(ui.visuals().error_fg_color, error);
-            });
-        });
-    }
-    let said = seen.busy.as_ref().map(|busy| format!("{busy} …")).or_else(|| state.message.clone());
-    if let Some(said) = said {
-        area("said", -64.0).show(ui.ctx(), |ui| {
-            egui::Frame::popup(ui.style()).show(ui, |ui| {
-                // Without a minimum width, egui makes the area as narrow as the line breaks allow.
-                ui.set_min_width((7.0 * said.len() as f32).min(640.0));
-                ui.set_max_width(640.0);
-                ui.label(said)
-            });
-        });
-    }
-}
-
-const KEYS: &[(&str, &str)] = &[
-    ("drag", "orbit"),
-    ("Shift+drag, middle drag", "pan"),
-    ("right drag", "look around"),
-    ("wheel, pinch", "zoom"),
-    ("W X A D Q Z", "fly forwards, back, left, right, up, down"),
-    ("F", "frame the whole scene"),
-    ("R, Home", "reset the view"),
-    ("Ctrl+Z", "undo camera move"),
-    ("1 to 9", "cameras of the file"),
-    ("Space; comma, full stop", "play or pause; one frame back, forward"),
-    ("V", "compare two settings"),
-    ("up, down; left, right", "select a knob; change its rung"),
-    ("Ctrl+click", "inspect a pixel and its rays"),
-    ("O", "open a file"),
-    ("P", "show or hide the panels"),
-    ("S, E, C", "save a PNG, save an EXR, copy the command"),
-    ("Escape", "close messages and help"),
-    ("Ctrl+Q", "quit"),
-    ("H, ?", "show or hide this help"),
-];
-
-fn help(ui: &mut Ui, state: &mut PanelState) {
-    let mut open = true;
-    let middle = ui.ctx().content_rect().center();
-    let window = egui::Window::new("Keys").pivot(egui::Align2::CENTER_CENTER).default_pos(middle);
-    window.open(&mut open).resizable(false).collapsible(false).show(ui.ctx(), |ui| {
-        egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
-            for (key, does) in KEYS {
-                ui.strong(*key);
-                ui.label(*does);
-                ui.end_row();
-            }
-        });
-        ui.label("Drop a file on the window to open it.");
-    });
-    state.help &= open;
-}
-
 fn go_to(state: &mut PanelState, seen: &RenderState, index: usize) {
     let camera = seen.facts.as_ref().and_then(|facts| facts.cameras.get(index));
     if let (Some(navigation), Some(camera)) = (&mut state.navigation, camera) {
@@ -386,73 +473,183 @@ fn keys(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, actions: &mut V
     if ui.ctx().text_edit_focused() || state.is_asking() {
         return;
     }
-    // A held key counts once here; for knobs and animation time (`count` below) it repeats.
-    let pressed = |key: Key| {
-        ui.input_mut(|input| {
-            let again =
-                |event: &egui::Event| matches!(event, egui::Event::Key { key: k, repeat: true, .. } if *k == key);
-            let repeats = input.events.iter().any(again);
-            input.consume_key(Modifiers::NONE, key) && !repeats
-        })
-    };
-    for (key, action) in [(Key::S, Action::Screenshot), (Key::E, Action::Exr), (Key::C, Action::CopyCommand)] {
-        if pressed(key) {
-            actions.push(action);
+    let open_menu = egui::Popup::is_any_open(ui.ctx());
+    if ui.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Escape)) {
+        if open_menu {
+            egui::Popup::close_all(ui.ctx());
+        } else {
+            close(state, actions);
+            ui.memory_mut(egui::Memory::stop_text_input);
         }
     }
-    if pressed(Key::O) {
-        state.dialog.pick_file();
+    // egui gives the clipboard's keys as events of their own.
+    if ui.input(|input| input.events.contains(&egui::Event::Copy)) {
+        actions.push(Action::CopyPicture);
     }
-    if pressed(Key::P) {
-        state.panels = !state.panels;
+    // A focused control has the keys that move within it: arrows, space, enter.
+    let focused = ui.memory(|memory| memory.focused().is_some());
+    let moves = [Key::ArrowUp, Key::ArrowDown, Key::ArrowLeft, Key::ArrowRight, Key::Space];
+    for entry in &COMMANDS {
+        for shortcut in entry.keys {
+            if (focused || open_menu) && moves.contains(&shortcut.logical_key) {
+                continue;
+            }
+            // Each press counts: a slow frame may receive several at once. A held key repeats only where that helps.
+            let held = ui.input(|input| {
+                let again = |event: &egui::Event| {
+                    matches!(event, egui::Event::Key { key, repeat: true, .. } if *key == shortcut.logical_key)
+                };
+                input.events.iter().any(again)
+            });
+            let count = ui.input_mut(|input| input.count_and_consume_key(shortcut.modifiers, shortcut.logical_key));
+            let count = if entry.repeats { count } else { count.min(usize::from(!held)) };
+            (0..count).for_each(|_| perform(ui, state, seen, entry.command, actions));
+        }
     }
-    if pressed(Key::H) | pressed(Key::Questionmark) {
-        state.help = !state.help;
+    let numbers = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8, Key::Num9];
+    let pressed = |key: Key| ui.input_mut(|input| input.consume_key(Modifiers::NONE, key));
+    if let Some(index) = numbers.into_iter().position(pressed) {
+        go_to(state, seen, index);
     }
-    if pressed(Key::Escape) {
-        (state.help, state.message, state.picked) = (false, None, None);
-        actions.push(Action::Dismiss);
+}
+
+/// Closes what is open, the uppermost first.
+fn close(state: &mut PanelState, actions: &mut Vec<Action>) {
+    if state.help {
+        state.help = false;
+        return;
     }
-    // Each key press counts: a slow frame may receive several at once.
-    let count = |key: Key| ui.input_mut(|input| input.count_and_consume_key(Modifiers::NONE, key));
-    (0..count(Key::ArrowUp)).for_each(|_| state.choose_knob(-1));
-    (0..count(Key::ArrowDown)).for_each(|_| state.choose_knob(1));
-    (0..count(Key::ArrowLeft)).for_each(|_| state.turn_knob(false));
-    (0..count(Key::ArrowRight)).for_each(|_| state.turn_knob(true));
-    if pressed(Key::V) {
-        state.compare(state.other.is_none());
+    state.notices.clear();
+    actions.push(Action::Dismiss);
+    if state.measures || !state.measured.is_empty() {
+        state.measures = false;
+        state.measured.clear();
+    } else if state.picked.is_some() {
+        state.picked = None;
+    } else {
+        state.selected = None;
     }
-    if let Some(duration) = seen.facts.as_ref().and_then(|facts| facts.duration) {
-        let steps = count(Key::Period) as f64 - count(Key::Comma) as f64;
-        if steps != 0.0 {
+}
+
+/// Performs a command of the menus or keys.
+fn perform(ui: &Ui, state: &mut PanelState, seen: &RenderState, command: Command, actions: &mut Vec<Action>) {
+    let aspect = state.aspect();
+    let duration = seen.facts.as_ref().and_then(|facts| facts.duration);
+    match command {
+        Command::Open => state.ask(Asked::Scene, "", state.recent.first().and_then(|path| Some(path.parent()?.into()))),
+        Command::Save => {
+            let name = seen.facts.as_ref().map_or("scene", |facts| &facts.name);
+            let name = picture_name(name);
+            state.ask(Asked::Save, &name, state.preferences.saved_in.clone());
+        }
+        Command::CopyPicture => actions.push(Action::CopyPicture),
+        Command::CopyCommand => actions.push(Action::CopyCommand),
+        Command::Quit => actions.push(Action::Quit),
+        Command::Undo | Command::Redo => {
+            let now = state.undoable();
+            let to = match command {
+                Command::Undo => state.undoer.undo(&now),
+                _ => state.undoer.redo(&now),
+            };
+            if let Some(to) = to.cloned() {
+                state.return_to(to);
+            }
+        }
+        Command::Hide | Command::Isolate => {
+            let outline = seen.facts.as_ref().map(|facts| &facts.outline);
+            let node = state.selected.and_then(|node| outline?.nodes.get(node));
+            match (node, command) {
+                (None, _) => state.notices.say("select something first: click it in the picture or in the tree".into()),
+                (Some(node), Command::Hide) => state.choice.hide.push(node.key.clone()),
+                (Some(node), _) => state.choice.only = vec![node.key.clone()],
+            }
+        }
+        Command::ShowAll => (state.choice.hide, state.choice.only) = Default::default(),
+        Command::Frame | Command::Reset | Command::Look(_) => {
+            let bounds = seen.facts.as_ref().and_then(|facts| facts.bounds_of(state.selected?));
+            let Some(navigation) = &mut state.navigation else { return };
+            match command {
+                Command::Look(side) => navigation.look_from(side, aspect),
+                Command::Reset => navigation.reset(),
+                _ => match bounds {
+                    Some(bounds) => navigation.fit_box(bounds, aspect),
+                    None => navigation.fit(aspect),
+                },
+            }
+            state.moved = true;
+        }
+        Command::Panels => state.panels = !state.panels,
+        Command::FullScreen => actions.push(Action::FullScreen),
+        Command::Larger => state.preferences.zoom = (state.preferences.zoom * 1.1).min(4.0),
+        Command::Smaller => state.preferences.zoom = (state.preferences.zoom / 1.1).max(0.5),
+        Command::Normal => state.preferences.zoom = 1.0,
+        Command::Compare => state.compare(state.other.is_none()),
+        Command::Measure => {
+            state.measures = !state.measures;
+            state.measured.clear();
+            if state.measures {
+                state.notices.say("click points in the picture; Escape ends".to_owned());
+            }
+        }
+        Command::Grid => state.preferences.overlays.grid = !state.preferences.overlays.grid,
+        Command::Play => state.clock.playing = duration.is_some() && !state.clock.playing,
+        Command::Forward | Command::Back => {
+            let Some(duration) = duration else { return };
             state.clock.playing = false;
             let at = (state.clock.time.unwrap_or_default() / FILM_STEP).round();
-            state.clock.set((at + steps) * FILM_STEP, duration);
+            let step = if command == Command::Forward { 1.0 } else { -1.0 };
+            state.clock.set((at + step) * FILM_STEP, duration);
         }
-        if pressed(Key::Space) {
-            state.clock.playing = !state.clock.playing;
-        }
+        Command::PreviousKnob => state.choose_knob(-1),
+        Command::NextKnob => state.choose_knob(1),
+        Command::PreviousRung => state.turn_knob(false),
+        Command::NextRung => state.turn_knob(true),
+        Command::Help => state.help = !state.help,
     }
-    let (fits, home) = (pressed(Key::F), pressed(Key::R) | pressed(Key::Home));
-    let numbers = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8, Key::Num9];
-    let camera = numbers.into_iter().position(pressed);
-    let (undone, quits) = ui.input_mut(|input| {
-        (input.consume_key(Modifiers::COMMAND, Key::Z), input.consume_key(Modifiers::COMMAND, Key::Q))
-    });
-    if quits {
-        actions.push(Action::Quit);
+    ui.ctx().request_repaint();
+}
+
+/// File name for a picture of a scene: the stem of the file's name, or the name of the study scene.
+fn picture_name(scene: &str) -> String {
+    let stem = match scene.strip_prefix("study:") {
+        Some(study) => study.to_owned(),
+        None => PathBuf::from(scene).file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned()),
+    };
+    format!("{}.png", if stem.is_empty() { "picture" } else { &stem })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_are_named_after_their_scene_alone() {
+        assert_eq!(picture_name("study:pool"), "pool.png");
+        assert_eq!(picture_name("/home/me/my models/Fox.v2.glb"), "Fox.v2.png");
+        assert_eq!(picture_name("/"), "picture.png");
     }
-    let aspect = state.aspect();
-    if let Some(navigation) = &mut state.navigation {
-        if fits {
-            navigation.fit(aspect);
+
+    #[test]
+    fn keys_do_one_thing() {
+        let mut seen = Vec::new();
+        for entry in &COMMANDS {
+            assert!(!entry.keys.is_empty(), "{} has no key", entry.name);
+            for shortcut in entry.keys {
+                assert!(!seen.contains(shortcut), "{}: {shortcut:?} has another command", entry.name);
+                seen.push(*shortcut);
+            }
         }
-        if home {
-            navigation.reset();
-        }
-        state.moved |= fits || home || (undone && navigation.undo());
+        // Keys that move, held: none of them writes a file, alone or beside one that does.
+        let moving = [Key::W, Key::S, Key::A, Key::D, Key::Q, Key::E];
+        assert!(seen.iter().all(|key| key.modifiers != Modifiers::NONE || !moving.contains(&key.logical_key)));
     }
-    if let Some(index) = camera {
-        go_to(state, seen, index);
+
+    #[test]
+    fn presets_are_their_own_nearest_models() {
+        for model in [Model::Local, Model::Recursive, Model::Global] {
+            assert_eq!(nearest_model(&Knobs::of(model)), (model, 0));
+        }
+        let changed = Knobs::of(Model::Global).with("samples", "4").expect("a rung");
+        assert_eq!(nearest_model(&changed), (Model::Global, 1));
     }
 }

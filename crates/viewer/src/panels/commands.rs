@@ -1,0 +1,166 @@
+//! Commands of the menus with their keys, written once: menus, keys and the help are made of this list.
+
+use egui::{Key, KeyboardShortcut, Modifiers};
+
+use crate::navigation::Side;
+
+/// What a menu entry or a key does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Command {
+    /// Open a file.
+    Open,
+    /// Save the picture under a name.
+    Save,
+    /// Copy the picture to the clipboard.
+    CopyPicture,
+    /// Copy the command that draws the picture.
+    CopyCommand,
+    /// Close the window.
+    Quit,
+    /// Take back the last change.
+    Undo,
+    /// Make the change again that was taken back.
+    Redo,
+    /// Hide what is selected.
+    Hide,
+    /// Show only what is selected.
+    Isolate,
+    /// Show everything.
+    ShowAll,
+    /// Frame what is selected, or the whole scene.
+    Frame,
+    /// Return to the initial camera.
+    Reset,
+    /// Look from a side.
+    Look(Side),
+    /// Show or hide the panels.
+    Panels,
+    /// Full screen.
+    FullScreen,
+    /// Larger text.
+    Larger,
+    /// Smaller text.
+    Smaller,
+    /// Text of normal size.
+    Normal,
+    /// Compare two settings.
+    Compare,
+    /// Measure distances.
+    Measure,
+    /// Show or hide the grid.
+    Grid,
+    /// Play or pause.
+    Play,
+    /// Next frame of the animation.
+    Forward,
+    /// Previous frame of the animation.
+    Back,
+    /// Next knob.
+    NextKnob,
+    /// Previous knob.
+    PreviousKnob,
+    /// Next rung of the knob.
+    NextRung,
+    /// Previous rung of the knob.
+    PreviousRung,
+    /// Show or hide the help.
+    Help,
+}
+
+/// A command with its place in the menus.
+pub struct Entry {
+    /// The command.
+    pub command: Command,
+    /// Title of its menu.
+    pub menu: &'static str,
+    /// Name in the menu and in the help.
+    pub name: &'static str,
+    /// Keys; the first is shown.
+    pub keys: &'static [KeyboardShortcut],
+    /// Whether the command repeats while the key is held.
+    pub repeats: bool,
+}
+
+const fn key(key: Key) -> KeyboardShortcut {
+    KeyboardShortcut::new(Modifiers::NONE, key)
+}
+
+const fn ctrl(key: Key) -> KeyboardShortcut {
+    KeyboardShortcut::new(Modifiers::COMMAND, key)
+}
+
+const fn shift(key: Key) -> KeyboardShortcut {
+    KeyboardShortcut::new(Modifiers::SHIFT, key)
+}
+
+const fn alt(key: Key) -> KeyboardShortcut {
+    KeyboardShortcut::new(Modifiers::ALT, key)
+}
+
+const CTRL_SHIFT: Modifiers = Modifiers::COMMAND.plus(Modifiers::SHIFT);
+
+const fn entry(menu: &'static str, command: Command, name: &'static str, keys: &'static [KeyboardShortcut]) -> Entry {
+    let repeats = matches!(
+        command,
+        Command::NextKnob
+            | Command::PreviousKnob
+            | Command::NextRung
+            | Command::PreviousRung
+            | Command::Forward
+            | Command::Back
+    );
+    Entry { command, menu, name, keys, repeats }
+}
+
+/// Every command, in the order of the menus.
+pub const COMMANDS: [Entry; 34] = [
+    entry("File", Command::Open, "Open …", &[ctrl(Key::O)]),
+    entry("File", Command::Save, "Save picture …", &[ctrl(Key::S)]),
+    entry("File", Command::CopyPicture, "Copy picture", &[KeyboardShortcut::new(CTRL_SHIFT, Key::C)]),
+    entry("File", Command::CopyCommand, "Copy command", &[key(Key::C)]),
+    entry("File", Command::Quit, "Quit", &[ctrl(Key::Q)]),
+    entry("Edit", Command::Undo, "Undo", &[ctrl(Key::Z)]),
+    entry("Edit", Command::Redo, "Redo", &[KeyboardShortcut::new(CTRL_SHIFT, Key::Z), ctrl(Key::Y)]),
+    entry("Edit", Command::Hide, "Hide selection", &[key(Key::H)]),
+    entry("Edit", Command::Isolate, "Show only selection", &[key(Key::Slash), shift(Key::H)]),
+    entry("Edit", Command::ShowAll, "Show all", &[alt(Key::H)]),
+    entry("Edit", Command::Compare, "Compare two settings", &[key(Key::V)]),
+    entry("Edit", Command::Measure, "Measure", &[key(Key::M)]),
+    entry("Edit", Command::PreviousKnob, "Previous option", &[key(Key::ArrowUp)]),
+    entry("Edit", Command::NextKnob, "Next option", &[key(Key::ArrowDown)]),
+    entry("Edit", Command::PreviousRung, "Previous setting", &[key(Key::ArrowLeft)]),
+    entry("Edit", Command::NextRung, "Next setting", &[key(Key::ArrowRight)]),
+    entry("View", Command::Frame, "Frame selection or scene", &[key(Key::F)]),
+    entry("View", Command::Reset, "Initial camera", &[key(Key::R), key(Key::Home)]),
+    entry("View", Command::Look(Side::Front), "From the front", &[ctrl(Key::Num1)]),
+    entry("View", Command::Look(Side::Right), "From the right", &[ctrl(Key::Num3)]),
+    entry("View", Command::Look(Side::Top), "From above", &[ctrl(Key::Num7)]),
+    entry("View", Command::Look(Side::Back), "From behind", &[ctrl(Key::Num2)]),
+    entry("View", Command::Look(Side::Left), "From the left", &[ctrl(Key::Num4)]),
+    entry("View", Command::Look(Side::Bottom), "From below", &[ctrl(Key::Num8)]),
+    entry("View", Command::Play, "Play or pause", &[key(Key::Space)]),
+    entry("View", Command::Back, "Previous frame", &[key(Key::Comma)]),
+    entry("View", Command::Forward, "Next frame", &[key(Key::Period)]),
+    entry("View", Command::Grid, "Grid and axes", &[key(Key::G)]),
+    entry("View", Command::Panels, "Panels", &[key(Key::P)]),
+    entry("View", Command::FullScreen, "Full screen", &[key(Key::F11)]),
+    entry("View", Command::Larger, "Larger text", &[ctrl(Key::Plus), ctrl(Key::Equals)]),
+    entry("View", Command::Smaller, "Smaller text", &[ctrl(Key::Minus)]),
+    entry("View", Command::Normal, "Normal text", &[ctrl(Key::Num0)]),
+    entry("Help", Command::Help, "Keys", &[key(Key::F1), key(Key::Questionmark)]),
+];
+
+/// Movements of the mouse and held keys, which are in no menu.
+pub const MOVEMENTS: &[(&str, &str)] = &[
+    ("drag", "orbit"),
+    ("Shift+drag, middle drag", "pan"),
+    ("right drag", "look around"),
+    ("wheel, pinch", "zoom"),
+    ("W S A D Q E", "fly forwards, back, left, right, down, up"),
+    ("1 to 9", "cameras of the file"),
+    ("click", "select; with Measure: set a point"),
+    ("double click", "turn to a point"),
+    ("Ctrl+click", "inspect a pixel and its rays"),
+    ("Tab, Shift+Tab", "next, previous control"),
+    ("Escape", "close what is open"),
+];
