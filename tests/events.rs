@@ -35,7 +35,7 @@ fn middle(scene: &Scene) -> Vec<Event> {
 
 /// The event that goes on from another by a way.
 fn after(events: &[Event], index: Option<usize>, way: Way) -> Option<(usize, Event)> {
-    events.iter().copied().enumerate().find(|(_, event)| event.after == index && event.way == way)
+    events.iter().cloned().enumerate().find(|(_, event)| event.after == index && event.way == way)
 }
 
 #[test]
@@ -78,13 +78,16 @@ fn steep_rays_stay_inside() {
     // Through a side face near its middle, far off the normal of the top.
     made.camera(DVec3::new(-3.0, -4.5, 0.1), DVec3::new(-1.0, 0.0, 0.1), perspective(30.0));
     let events = middle(&made.0);
-    let total = events.iter().filter(|event| event.interaction.is_some_and(|interaction| interaction.total)).count();
+    let total =
+        events.iter().filter(|event| event.interaction.as_ref().is_some_and(|interaction| interaction.total)).count();
     assert!(total > 0, "the top throws all back: {events:?}");
-    for (index, event) in
-        events.iter().enumerate().filter(|(_, event)| event.interaction.is_some_and(|interaction| interaction.total))
+    for (index, event) in events
+        .iter()
+        .enumerate()
+        .filter(|(_, event)| event.interaction.as_ref().is_some_and(|interaction| interaction.total))
     {
         assert!(after(&events, Some(index), Way::Bent).is_none(), "nothing goes on from {event:?}");
-        assert_eq!(event.interaction.map(|interaction| interaction.reflected), Some(1.0));
+        assert_eq!(event.interaction.as_ref().map(|interaction| interaction.reflected), Some(1.0));
     }
 }
 
@@ -98,7 +101,7 @@ fn nested_dielectrics_refract_by_the_ratio_of_their_indices() {
     let mut ratios = Vec::new();
     let mut at = after(&events, None, Way::Seen);
     while let Some((index, event)) = at {
-        ratios.extend(event.interaction.map(|interaction| interaction.ratio));
+        ratios.extend(event.interaction.as_ref().map(|interaction| interaction.ratio));
         at = after(&events, Some(index), Way::Bent);
     }
     let expected = [1.3, 1.7 / 1.3, 1.3 / 1.7, 1.0 / 1.3];
@@ -121,7 +124,7 @@ fn overlapping_meshes_of_one_glass_act_as_one() {
     loop {
         let on = [Way::Seen, Way::Bent, Way::Straight].into_iter().find_map(|way| after(&events, from, way));
         let Some((index, event)) = on else { break };
-        ways.push((event.way, event.interaction.map(|interaction| interaction.ratio)));
+        ways.push((event.way, event.interaction.as_ref().map(|interaction| interaction.ratio)));
         from = Some(index);
     }
     let expected = [
@@ -190,7 +193,7 @@ fn events_name_what_occludes_a_light() {
     let events = middle(&made.0);
     let (floor, seen) = after(&events, None, Way::Seen).expect("the floor");
     assert!(
-        seen.interaction.is_some_and(|interaction| interaction.instance == 0 && interaction.spreads)
+        seen.interaction.as_ref().is_some_and(|interaction| interaction.instance == 0 && interaction.spreads)
             && seen.to.length() < 1e-6,
         "{seen:?}"
     );

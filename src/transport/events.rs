@@ -2,8 +2,9 @@
 //! each light from scattering surfaces.
 //!
 //! Read Whitted 1980, "An Improved Illumination Model for Shaded Display". The rays explain a pixel to a user; no
-//! picture is made of them. They are in f64 and use textbook formulas. Normals are those of the corners, without normal
-//! maps; media and energy shares are those of green light.
+//! picture is made of them. They are in f64 and use textbook formulas. Materials and normals are those of the point that
+//! is met ([`super::surface_point`]); a clear coat has the normal of its base. Media and energy shares are those of green
+//! light.
 
 use std::sync::Arc;
 
@@ -16,7 +17,7 @@ use super::sight::line_through;
 use crate::scene::light::LightKind;
 use crate::scene::material::Material;
 use crate::scene::solid::{Solids, solids};
-use crate::scene::{Camera, Scene};
+use crate::scene::{AlphaMode, Camera, Scene};
 
 /// Largest number of events per pixel: their tree grows exponentially.
 const MOST_EVENTS: usize = 96;
@@ -55,7 +56,7 @@ pub enum Way {
 }
 
 /// A ray with its end point.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Event {
     /// Index of the event whose surface the ray leaves; `None` for the camera ray.
     pub after: Option<usize>,
@@ -72,20 +73,28 @@ pub struct Event {
 }
 
 /// A surface hit by a ray.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Interaction {
     /// Index into the scene's instances.
     pub instance: usize,
     /// Index into the scene's materials.
     pub material: usize,
+    /// That material at the point that is hit, without textures ([`SurfacePoint::material`]).
+    ///
+    /// [`SurfacePoint::material`]: super::surface_point::SurfacePoint::material
+    pub at: Arc<Material>,
+    /// Opacity by alpha; the rest of the light passes straight through.
+    pub opacity: f64,
     /// Unit normal on the ray's side.
     pub normal: DVec3,
     /// Cosine of the angle of incidence.
     pub cos: f64,
     /// Relative index of refraction: behind the surface over before it.
     pub ratio: f64,
-    /// Reflectance (F2, F3).
+    /// Reflectance of coat and base together (F2, F3).
     pub reflected: f64,
+    /// Reflectance of the dielectric and of the metallic part of the base, without a coat.
+    pub parts: [f64; 2],
     /// Whether reflection is total (F6).
     pub total: bool,
     /// Whether the surface scatters the remaining light, or is too rough to be followed.
@@ -134,6 +143,12 @@ fn material(scene: &Scene, instance: usize) -> &Material {
     &scene.materials[scene.meshes[scene.instances[instance].mesh].material]
 }
 
+/// Whether the alpha test cuts a surface out at a point.
+fn is_hole(scene: &Scene, crossing: &Crossing<'_>) -> bool {
+    let is_tested = matches!(material(scene, crossing.triangle.instance as usize).alpha_mode, AlphaMode::Mask(_));
+    is_tested && coverage(&crossing.point().material(scene)) == Some(0.0)
+}
+
 impl EventTracer {
     /// Prepares a scene with its BVH.
     #[must_use]
@@ -170,11 +185,11 @@ impl EventTracer {
                 continue;
             };
             let (interaction, next) = self.at_surface(scene, &ray, &crossing, limits);
-            event.interaction = Some(interaction);
+            event.interaction = Some(interaction.clone());
             events.push(event);
             if interaction.spreads {
                 let from = (index, to);
-                events.extend(self.to_lights(scene, from, interaction, ray.share, limits.proxies));
+                events.extend(self.to_lights(scene, from, &interaction, ray.share, limits.proxies));
             }
             // The strongest ray is followed first.
             let mut next: Vec<Pending> = next.into_iter().map(|ray| Pending { after: Some(index), ..ray }).collect();
@@ -194,18 +209,27 @@ impl EventTracer {
         Some(SeenTriangle { instance, primitive, uv: crossing.uv })
     }
 
-    fn nearest(&self, from: DVec3, direction: DVec3) -> Option<Crossing<'_>> {
-        line::nearest(&self.bvh, from - self.bvh.anchor, direction, 1e-6 * self.radius)
+    /// The nearest surface that light meets: holes of alpha-tested surfaces are skipped.
+    fn nearest(&self, scene: &Scene, from: DVec3, direction: DVec3) -> Option<Crossing<'_>> {
+        let mut behind = 1e-6 * self.radius;
+        loop {
+            let crossing = line::nearest(&self.bvh, from - self.bvh.anchor, direction, behind)?;
+            if !is_hole(scene, &crossing) {
+                return Some(crossing);
+            }
+            behind = crossing.t * (1.0 + 1e-9);
+        }
     }
 
-    /// The nearest visible surface: back faces of one-sided thin-walled surfaces are skipped.
+    /// The nearest visible surface: back faces of one-sided thin-walled surfaces and holes of alpha-tested ones are
+    /// skipped.
     fn nearest_seen(&self, scene: &Scene, from: DVec3, direction: DVec3) -> Option<Crossing<'_>> {
         let mut behind = 1e-6 * self.radius;
         loop {
             let crossing = line::nearest(&self.bvh, from - self.bvh.anchor, direction, behind)?;
             let instance = crossing.triangle.instance as usize;
             let is_seen = self.solids.solid[instance] || material(scene, instance).double_sided;
-            if is_seen || crossing.facing(scene, &self.solids, direction).front {
+            if (is_seen || crossing.facing(scene, &self.solids, direction, |n| n).front) && !is_hole(scene, &crossing) {
                 return Some(crossing);
             }
             behind = crossing.t * (1.0 + 1e-9);
@@ -221,23 +245,27 @@ impl EventTracer {
         limits: &Limits,
     ) -> (Interaction, Vec<Pending>) {
         let instance = crossing.triangle.instance as usize;
-        let m = material(scene, instance);
+        let point = crossing.point();
+        let m = &Arc::new(point.material(scene));
         let to = ray.from + ray.direction * crossing.t;
-        let facing = crossing.facing(scene, &self.solids, ray.direction);
+        let facing = crossing.facing(scene, &self.solids, ray.direction, |n| point.bent_normal(scene, n));
         let (normals, cos) = ([facing.normal, facing.flat], (-ray.direction.dot(facing.normal)).clamp(0.0, 1.0));
         let index = |m: &Material| m.dispersion.index(f64::from(m.ior), GREEN);
         let boundary = ray.media.cross(scene, &self.solids, instance, facing.front, index);
         let layers = Layers::of(m, &boundary, cos);
         let green = |layer: Layer| layers.share(layer).y;
-        // A surface whose alpha comes from a texture counts as opaque.
+        // Of a material without textures alpha is always known.
         let opacity = if boundary.hidden { 0.0 } else { coverage(m).unwrap_or(1.0) };
         let mut interaction = Interaction {
             instance,
             material: scene.meshes[scene.instances[instance].mesh].material,
+            at: m.clone(),
+            opacity,
             normal: facing.normal,
             cos,
             ratio: layers.ratio,
             reflected: green(Layer::Coat) + green(Layer::Base),
+            parts: layers.fresnel.map(|part| part.y),
             total: layers.total,
             spreads: layers.spreads_some(limits.roughest) && opacity > 0.0,
         };
@@ -256,7 +284,11 @@ impl EventTracer {
         }
         let mut next = Vec::new();
         if opacity < 1.0 {
-            next.push(leave(Way::Straight, ray.direction, 1.0 - opacity, &ray.media));
+            // Alpha is no interface: what shows through it is seen however few interfaces are followed.
+            next.push(Pending {
+                surfaces: ray.surfaces,
+                ..leave(Way::Straight, ray.direction, 1.0 - opacity, &ray.media)
+            });
         }
         let is_followed = |layer: &Layer| !layers.spreads(*layer, limits.roughest);
         // Slightly rough lobes are followed along their centre.
@@ -282,7 +314,7 @@ impl EventTracer {
         &self,
         scene: &Scene,
         (after, at): (usize, DVec3),
-        interaction: Interaction,
+        interaction: &Interaction,
         share: f64,
         proxies: bool,
     ) -> Vec<Event> {
@@ -295,18 +327,22 @@ impl EventTracer {
         lit.map(|(index, place)| {
             let way = place - at;
             let direction = way.normalize();
-            let crossing = self.nearest(at, direction).filter(|crossing| crossing.t < way.length());
+            let crossing = self.nearest(scene, at, direction).filter(|crossing| crossing.t < way.length());
             let interaction = crossing.map(|crossing| {
                 let instance = crossing.triangle.instance as usize;
                 let normal = crossing.normal(scene);
                 let cos = -direction.dot(normal);
+                let m = crossing.point().material(scene);
                 Interaction {
                     instance,
                     material: scene.meshes[scene.instances[instance].mesh].material,
+                    opacity: coverage(&m).unwrap_or(1.0),
+                    at: Arc::new(m),
                     normal: normal * cos.signum(),
                     cos: cos.abs(),
                     ratio: 1.0,
                     reflected: 0.0,
+                    parts: [0.0; 2],
                     total: false,
                     spreads: false,
                 }

@@ -8,7 +8,8 @@
 //!
 //! From the top: a clear coat; the base, which is a dielectric interface, a conductor, or a mixture of both; below the
 //! interface a diffuse base layer, or transmission. A layer passes on the energy left under its Fresnel reflectance at
-//! the ray's angle. Fresnel terms are exact. Textures and vertex colours are ignored: they count as 1.
+//! the ray's angle. Fresnel terms are exact. Only the factors of a material count: photons take texels and vertex
+//! colours as 1, and the rays of a picked pixel multiply them into the factors first ([`super::surface_point`]).
 
 use glam::DVec3;
 
@@ -115,6 +116,8 @@ pub struct Layers {
     shares: [DVec3; 4],
     /// Perceptual roughness of coat and of base.
     roughness: [f32; 2],
+    /// Fresnel reflectance of the dielectric and of the metallic part of the base, before the mixture of both.
+    pub fresnel: [DVec3; 2],
     /// Relative index of refraction: behind the surface over before it.
     pub ratio: f64,
     /// Whether the surface belongs to a closed dielectric mesh.
@@ -202,6 +205,7 @@ impl Layers {
         Self {
             shares: [DVec3::splat(coat * shown), below(base), below(ground), below(through)],
             roughness: [m.clearcoat_roughness, if straight { 0.0 } else { m.roughness }],
+            fresnel: [f_dielectric, f_metal],
             ratio: at.behind / at.before,
             body: at.body,
             total,

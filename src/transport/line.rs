@@ -6,6 +6,7 @@
 use glam::DVec3;
 
 use super::bvh::{Bvh, Node, Triangle};
+use super::surface_point::SurfacePoint;
 use crate::scene::Scene;
 use crate::scene::solid::Solids;
 
@@ -23,16 +24,28 @@ pub(super) struct Crossing<'a> {
 pub(super) struct Facing {
     /// Whether the line meets the front side; fronts of closed meshes face outwards.
     pub(super) front: bool,
-    /// Unit shading normal, interpolated from the corners, on the line's side. The geometric normal replaces it where
-    /// it faces away, near silhouettes, or is NaN.
+    /// Unit shading normal, interpolated from the corners and bent by the normal map, on the line's side. The geometric
+    /// normal replaces it where it faces away, near silhouettes, or is NaN.
     pub(super) normal: DVec3,
     /// Unit geometric normal on the line's side.
     pub(super) flat: DVec3,
 }
 
 impl Crossing<'_> {
-    /// The orientation for a line in `direction`.
-    pub(super) fn facing(&self, scene: &Scene, solids: &Solids, direction: DVec3) -> Facing {
+    /// The point of the surface.
+    pub(super) fn point(&self) -> SurfacePoint {
+        let Triangle { instance, primitive, .. } = *self.triangle;
+        SurfacePoint { instance: instance as usize, primitive: primitive as usize, uv: self.uv }
+    }
+
+    /// The orientation for a line in `direction`. `bend` applies a normal map to the interpolated normal.
+    pub(super) fn facing(
+        &self,
+        scene: &Scene,
+        solids: &Solids,
+        direction: DVec3,
+        bend: impl FnOnce(DVec3) -> DVec3,
+    ) -> Facing {
         let instance = self.triangle.instance as usize;
         let [a, b, c] = self.triangle.corners.map(|corner| DVec3::from(corner.map(f64::from)));
         let n = (b - a).cross(c - a).normalize();
@@ -40,8 +53,8 @@ impl Crossing<'_> {
         let faces = n.dot(direction) < 0.0;
         let flat = if faces { n } else { -n };
         let smooth = self.normal(scene);
-        let smooth = if smooth.dot(flat) < 0.0 { -smooth } else { smooth };
-        let normal = if -direction.dot(smooth) > 0.0 { smooth } else { flat };
+        let bent = if smooth.dot(flat) < 0.0 { -bend(smooth) } else { bend(smooth) };
+        let normal = if -direction.dot(bent) > 0.0 { bent } else { flat };
         Facing { front: (faces != mirrored) != solids.flipped[instance], normal, flat }
     }
 

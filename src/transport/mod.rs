@@ -15,3 +15,4 @@ pub mod photon_guiding;
 mod ploc;
 pub mod sight;
 pub mod sky_directions;
+pub mod surface_point;

@@ -205,7 +205,7 @@ impl PhotonWorld<'_> {
     fn meet(&self, met: &Crossing, beam: &Beam, random: &mut PhotonRandom) -> (bool, Option<(DVec3, Media)>) {
         let instance = met.triangle.instance as usize;
         let material = &self.scene.materials[self.scene.meshes[self.scene.instances[instance].mesh].material];
-        let facing = met.facing(self.scene, self.solids, beam.direction);
+        let facing = met.facing(self.scene, self.solids, beam.direction, |n| n);
         let boundary = beam.media.cross(self.scene, self.solids, instance, facing.front, |m| m.ior.into());
         if boundary.hidden {
             return (false, Some((beam.direction, boundary.beyond)));

@@ -142,7 +142,7 @@ impl Material {
     }
 
     /// All texture slots, mutable.
-    pub(crate) fn textures_mut(&mut self) -> impl Iterator<Item = &mut Option<TextureRef>> {
+    pub fn textures_mut(&mut self) -> impl Iterator<Item = &mut Option<TextureRef>> {
         let own = [
             &mut self.base_color_texture,
             &mut self.metallic_roughness_texture,

@@ -3,13 +3,13 @@
 
 use etalon::plan::Knobs;
 use etalon::plan::rungs::{Absorption, Brdf, Fresnel, Lights};
-use etalon::scene::{AlphaMode, Extent, Light, LightKind, Material};
+use etalon::scene::{AlphaMode, Extent, Light, LightKind};
 use etalon::shader::{PROBES, Probe};
 use etalon::spectra::Dispersion;
 use etalon::transport::events::{Event, Way};
 
 /// Names of the equations in the order of the events: from the eye along the ray, and the display encoding last.
-fn names(events: &[Event], materials: &[Material], lights: &[Light], knobs: &Knobs) -> Vec<&'static str> {
+fn names(events: &[Event], lights: &[Light], knobs: &Knobs) -> Vec<&'static str> {
     let mut all = Vec::new();
     for event in events {
         match event.way {
@@ -23,11 +23,9 @@ fn names(events: &[Event], materials: &[Material], lights: &[Light], knobs: &Kno
                 continue;
             }
         }
-        let Some((interaction, m)) =
-            event.interaction.and_then(|interaction| Some((interaction, materials.get(interaction.material)?)))
-        else {
-            continue;
-        };
+        let Some(interaction) = &event.interaction else { continue };
+        // At that point: a texture may say that it is no metal, though the factor does.
+        let m = &interaction.at;
         if m.unlit {
             continue;
         }
@@ -91,9 +89,9 @@ fn of_light(light: &Light, knobs: &Knobs) -> Vec<&'static str> {
 
 /// The equations that contribute to a pixel, each once.
 #[must_use]
-pub fn used(events: &[Event], materials: &[Material], lights: &[Light], knobs: &Knobs) -> Vec<&'static Probe> {
+pub fn used(events: &[Event], lights: &[Light], knobs: &Knobs) -> Vec<&'static Probe> {
     let mut found: Vec<&'static Probe> = Vec::new();
-    for name in names(events, materials, lights, knobs) {
+    for name in names(events, lights, knobs) {
         let probe = PROBES.iter().find(|probe| probe.name == name);
         found.extend(probe.filter(|probe| found.iter().all(|known| known.name != probe.name)));
     }
@@ -103,28 +101,35 @@ pub fn used(events: &[Event], materials: &[Material], lights: &[Light], knobs: &
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Arc;
+
     use etalon::plan::{KNOBS, Model};
+    use etalon::scene::Material;
     use etalon::transport::events::Interaction;
     use glam::DVec3;
 
-    /// One event of each kind on each of `materials` materials.
-    fn events(materials: usize) -> Vec<Event> {
+    /// One event of each kind on each of the materials.
+    fn events(materials: &[Material]) -> Vec<Event> {
         let ways =
             [Way::Seen, Way::Mirrored, Way::Bent, Way::Straight, Way::ToLight(0), Way::ToLight(1), Way::ToLight(2)];
-        let interaction = |material, total| Interaction {
+        let interaction = |at: &Material, total| Interaction {
             instance: 0,
-            material,
+            material: 0,
+            at: Arc::new(at.clone()),
+            opacity: 1.0,
             normal: DVec3::Y,
             cos: 1.0,
             ratio: 1.5,
             reflected: 0.04,
+            parts: [0.04, 0.9],
             total,
             spreads: true,
         };
         let event =
             |way, interaction| Event { after: None, way, from: DVec3::ZERO, to: DVec3::Y, share: 1.0, interaction };
-        let of =
-            |way| (0..materials).flat_map(move |m| [true, false].map(|total| event(way, Some(interaction(m, total)))));
+        let of = |way| {
+            materials.iter().flat_map(move |m| [true, false].map(|total| event(way, Some(interaction(m, total)))))
+        };
         ways.into_iter().flat_map(of).collect()
     }
 
@@ -156,7 +161,7 @@ mod tests {
                 [Model::Local, Model::Global].into_iter().flat_map(|m| knob.rungs.iter().map(move |r| (m, r)))
             {
                 let Some(knobs) = Knobs::of(model).with(knob.name, rung) else { continue };
-                for name in names(&events(materials.len()), &materials, &lights, &knobs) {
+                for name in names(&events(&materials), &lights, &knobs) {
                     let probe = PROBES.iter().find(|probe| probe.name == name).unwrap_or_else(|| panic!("{name}"));
                     assert!(probe.lab.is_none(), "{name} draws nothing");
                     seen += 1;
@@ -169,13 +174,26 @@ mod tests {
     #[test]
     fn rungs_choose_the_curve() {
         let glass = [Material { transmission: 1.0, metallic: 0.0, ..Material::default() }];
-        let list = |knobs: &Knobs| -> Vec<&str> {
-            used(&events(1), &glass, &[], knobs).iter().map(|probe| probe.name).collect()
-        };
+        let list =
+            |knobs: &Knobs| -> Vec<&str> { used(&events(&glass), &[], knobs).iter().map(|probe| probe.name).collect() };
         let exact = list(&Knobs::of(Model::Recursive));
         assert!(exact.contains(&"fresnel_dielectric") && !exact.contains(&"schlick"), "{exact:?}");
         let schlick = Knobs::of(Model::Recursive).with("fresnel", "schlick").expect("a rung");
         assert!(list(&schlick).contains(&"schlick"));
         assert!(!exact.contains(&"fresnel_conductor") && !exact.contains(&"sellmeier"));
+    }
+
+    #[test]
+    fn the_metal_of_the_point_chooses_the_curves() {
+        let list = |metallic: f32| -> Vec<&str> {
+            let point = Material { metallic, conductor: Some([[0.2, 3.0]; 3]), ..Material::default() };
+            let knobs = Knobs::of(Model::Recursive);
+            used(&events(&[point]), &[], &knobs).iter().map(|probe| probe.name).collect()
+        };
+        for (metallic, dielectric, metal) in [(0.0, true, false), (0.4, true, true), (1.0, false, true)] {
+            let found = list(metallic);
+            let has = |name: &str| found.contains(&name);
+            assert_eq!([has("fresnel_dielectric"), has("fresnel_conductor")], [dielectric, metal], "{metallic}");
+        }
     }
 }
