@@ -4,7 +4,7 @@
 //! with the renderer; matrices, BVH and triangle test are separate. Edge functions of neighbouring triangles agree on
 //! their common edge, so no ray passes through a closed mesh.
 
-use etalon::scene::{AlphaMode, Camera, Projection, Scene, TextureRef, Wrap};
+use etalon::scene::{AlphaMode, Camera, Meaning, Projection, Scene, TextureRef, Wrap};
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -323,7 +323,7 @@ impl<'a> World<'a> {
             }
         }
         if let Some(texture) = material.base_color_texture.filter(|_| self.options.textures) {
-            let texel = self.sample_srgb(&texture, uv(texture.uv_set as usize));
+            let [texel, ..] = texel(self.scene, &texture, uv(texture.uv_set as usize), Meaning::Color);
             for (value, texel) in color.iter_mut().zip(texel) {
                 *value *= texel;
             }
@@ -348,39 +348,45 @@ impl<'a> World<'a> {
             front,
         })
     }
+}
 
-    /// Level 0 of a colour texture, bilinear (or nearest if the sampler requests it), linearised before
-    /// filtering.
-    fn sample_srgb(&self, texture: &TextureRef, uv: DVec2) -> [f64; 4] {
-        let image = &self.scene.images[texture.image];
-        let m = texture.uv_transform;
-        let uv = m.matrix2.as_dmat2() * uv + m.translation.as_dvec2();
-        let (x, y) = (uv.x * f64::from(image.width), uv.y * f64::from(image.height));
-        let texel = |x: f64, y: f64| {
-            let x = wrap(x, image.width, texture.sampler.wrap_u);
-            let y = wrap(y, image.height, texture.sampler.wrap_v);
-            let at = (y * image.width as usize + x) * 4;
-            let [r, g, b, a] = [0, 1, 2, 3].map(|c| f64::from(image.rgba[at + c]) / 255.0);
-            [linear(r), linear(g), linear(b), a]
-        };
-        if texture.sampler.mag_nearest {
-            return texel(x.floor(), y.floor());
-        }
-        let (x0, y0) = ((x - 0.5).floor(), (y - 0.5).floor());
-        let (fx, fy) = (x - 0.5 - x0, y - 0.5 - y0);
-        let mut sum = [0.0; 4];
-        for (dx, dy, weight) in [
-            (0.0, 0.0, (1.0 - fx) * (1.0 - fy)),
-            (1.0, 0.0, fx * (1.0 - fy)),
-            (0.0, 1.0, (1.0 - fx) * fy),
-            (1.0, 1.0, fx * fy),
-        ] {
-            for (sum, texel) in sum.iter_mut().zip(texel(x0 + dx, y0 + dy)) {
-                *sum += weight * texel;
-            }
-        }
-        sum
+/// Level 0 of a texture at a coordinate, bilinear, or nearest if the sampler requests it: the value, and the least and
+/// greatest of the texels that it is made of. Colours are linearised before filtering.
+pub fn texel(scene: &Scene, texture: &TextureRef, uv: DVec2, meaning: Meaning) -> [[f64; 4]; 3] {
+    let image = &scene.images[texture.image];
+    let DVec2 { x, y } = texel_place(scene, texture, uv);
+    let texel = |x: f64, y: f64| {
+        let x = wrap(x, image.width, texture.sampler.wrap_u);
+        let y = wrap(y, image.height, texture.sampler.wrap_v);
+        let at = (y * image.width as usize + x) * 4;
+        let [r, g, b, a] = [0, 1, 2, 3].map(|c| f64::from(image.rgba[at + c]) / 255.0);
+        if meaning == Meaning::Color { [linear(r), linear(g), linear(b), a] } else { [r, g, b, a] }
+    };
+    if texture.sampler.mag_nearest {
+        return [texel(x.floor(), y.floor()); 3];
     }
+    let (x0, y0) = ((x - 0.5).floor(), (y - 0.5).floor());
+    let (fx, fy) = (x - 0.5 - x0, y - 0.5 - y0);
+    let [mut sum, mut least, mut most] = [[0.0; 4], [f64::INFINITY; 4], [f64::NEG_INFINITY; 4]];
+    for (dx, dy, weight) in [
+        (0.0, 0.0, (1.0 - fx) * (1.0 - fy)),
+        (1.0, 0.0, fx * (1.0 - fy)),
+        (0.0, 1.0, (1.0 - fx) * fy),
+        (1.0, 1.0, fx * fy),
+    ] {
+        for (channel, texel) in texel(x0 + dx, y0 + dy).into_iter().enumerate() {
+            sum[channel] += weight * texel;
+            (least[channel], most[channel]) = (least[channel].min(texel), most[channel].max(texel));
+        }
+    }
+    [sum, least, most]
+}
+
+/// The place of a coordinate in an image, in texels from the upper left corner.
+pub fn texel_place(scene: &Scene, texture: &TextureRef, uv: DVec2) -> DVec2 {
+    let image = &scene.images[texture.image];
+    let m = texture.uv_transform;
+    (m.matrix2.as_dmat2() * uv + m.translation.as_dvec2()) * DVec2::new(image.width.into(), image.height.into())
 }
 
 fn wrap(index: f64, size: u32, wrap: Wrap) -> usize {
