@@ -277,7 +277,11 @@ impl SceneFacts {
         all.filter(|bounds| bounds.min.is_finite() && bounds.max.is_finite())
     }
 
-    pub(super) fn of(wanted: &RenderRequest, loaded: &Loaded) -> Result<Self> {
+    /// Facts of a loaded scene.
+    ///
+    /// # Errors
+    /// When the scene has nothing to draw.
+    pub fn of(wanted: &RenderRequest, loaded: &Loaded) -> Result<Self> {
         let scene = loaded.original.scene();
         let bounds = scene.bounds().with_context(|| format!("{}: the scene has nothing to draw", loaded.name))?;
         Ok(Self {

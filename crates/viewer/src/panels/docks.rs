@@ -118,6 +118,14 @@ impl Docks {
     }
 }
 
+/// Scrolls to a control that the keyboard has reached.
+fn scroll_to_focus(ui: &Ui, state: &PanelState) {
+    let focused = state.focused.filter(|_| state.focus_is_new).and_then(|id| ui.ctx().read_response(id));
+    if let Some(rect) = focused.map(|response| response.rect).filter(|rect| ui.min_rect().contains_rect(*rect)) {
+        ui.scroll_to_rect(rect, None);
+    }
+}
+
 struct Shown<'a> {
     state: &'a mut PanelState,
     seen: &'a RenderState,
@@ -134,15 +142,18 @@ impl Behavior<Pane> for Shown<'_> {
         ui.painter().rect_filled(ui.max_rect(), 0.0, ui.visuals().panel_fill);
         egui::Frame::new().inner_margin(8).show(ui, |ui| {
             // Long names are cut or wrapped, so that nothing lies outside.
-            egui::ScrollArea::vertical().id_salt(pane.title()).auto_shrink(false).show(ui, |ui| match pane {
-                Pane::Picture => {}
-                Pane::Scene => scene::show(ui, state, seen, actions),
-                Pane::Light => light::show(ui, state, seen),
-                Pane::Options => options::show(ui, state, seen),
-                Pane::Display => display::show(ui, state, seen),
-                Pane::Pixel => pixel::show(ui, state, seen),
-                Pane::Timing => timing::show(ui, state, seen),
-                Pane::Plan => plan::show(ui, state, seen),
+            egui::ScrollArea::vertical().id_salt(pane.title()).auto_shrink(false).show(ui, |ui| {
+                match pane {
+                    Pane::Picture => {}
+                    Pane::Scene => scene::show(ui, state, seen, actions),
+                    Pane::Light => light::show(ui, state, seen),
+                    Pane::Options => options::show(ui, state, seen),
+                    Pane::Display => display::show(ui, state, seen),
+                    Pane::Pixel => pixel::show(ui, state, seen),
+                    Pane::Timing => timing::show(ui, state, seen),
+                    Pane::Plan => plan::show(ui, state, seen),
+                }
+                scroll_to_focus(ui, state);
             });
         });
         UiResponse::None

@@ -9,6 +9,9 @@ use crate::preferences::small;
 use crate::shared::RenderState;
 use etalon::study;
 
+/// Room of the device's name in points.
+const DEVICE: f32 = 190.0;
+
 /// Shows the bar. In a narrow window names are cut; menus and progress are not.
 pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, actions: &mut Vec<Action>) {
     egui::MenuBar::new().ui(ui, |ui| {
@@ -100,11 +103,20 @@ fn recent(ui: &mut Ui, state: &mut PanelState, actions: &mut Vec<Action>) {
     }
 }
 
-/// Name of the scene, device, and what is wrong with the picture.
+/// Name of the scene and the device.
 fn title(ui: &mut Ui, state: &PanelState, seen: &RenderState) {
     let name = seen.facts.as_ref().map_or("no scene", |facts| &facts.name);
     let file = std::path::Path::new(name).file_name().map_or(name, |file| file.to_str().unwrap_or(name));
-    ui.add(egui::Label::new(RichText::new(file).strong()).truncate()).on_hover_text(name);
+    // What is said of the device needs its room; the name has the rest.
+    let room = ui.available_width();
+    let device_room = if room > 2.0 * DEVICE { DEVICE } else { 0.0 };
+    ui.scope(|ui| {
+        ui.set_max_width((room - device_room).max(24.0));
+        ui.add(egui::Label::new(RichText::new(file).strong()).truncate()).on_hover_text(name);
+    });
+    if device_room == 0.0 {
+        return;
+    }
     let device = &state.device;
     if device.kind == "cpu" {
         let text = RichText::new("Software rendering (no GPU)").color(ui.visuals().warn_fg_color);
@@ -113,11 +125,6 @@ fn title(ui: &mut Ui, state: &PanelState, seen: &RenderState) {
     } else {
         let text = RichText::new(&device.name).weak();
         ui.add(egui::Label::new(text).truncate()).on_hover_text(&device.driver);
-    }
-    let wrong = seen.shown().map_or(0, |shown| shown.counts.nan + shown.counts.inf);
-    if wrong > 0 {
-        ui.colored_label(ui.visuals().error_fg_color, format!("{wrong} invalid pixels (NaN or infinite)"))
-            .on_hover_text("Display: the layer \"NaN and infinity\" shows them");
     }
 }
 
@@ -149,6 +156,11 @@ fn progress(ui: &mut Ui, seen: &RenderState) {
         shown.size[1],
         shown.ms()
     ));
+    let wrong = shown.counts.nan + shown.counts.inf;
+    if wrong > 0 {
+        ui.colored_label(ui.visuals().error_fg_color, format!("⚠ {wrong} NaN"))
+            .on_hover_text("Pixels that are NaN or infinite: the layer \"NaN and infinity\" of Display shows them");
+    }
     if !shown.is_done() {
         let part = done as f32 / of.max(1) as f32;
         let (rect, _) = ui.allocate_exact_size(egui::vec2(60.0, 6.0), egui::Sense::hover());

@@ -138,6 +138,10 @@ pub struct PanelState {
     /// Pass times of the last pictures.
     pub history: VecDeque<Vec<PassTime>>,
     asked: Asked,
+    /// Control that has the focus.
+    focused: Option<egui::Id>,
+    /// Whether it has it since the last frame alone.
+    focus_is_new: bool,
     /// Panel that comes before those that share its place.
     forward: Option<Pane>,
     history_version: u64,
@@ -201,6 +205,8 @@ impl PanelState {
             dialog: FileDialog::new(),
             history: VecDeque::new(),
             asked: Asked::Scene,
+            focused: None,
+            focus_is_new: false,
             forward: None,
             history_version: 0,
             passes: Vec::new(),
@@ -388,6 +394,9 @@ pub fn show(root: &mut Ui, state: &mut PanelState, seen: &RenderState) -> Vec<Ac
         }
     }
     style::apply(root.ctx());
+    let focused = root.memory(egui::Memory::focused);
+    state.focus_is_new = focused.is_some() && focused != state.focused;
+    state.focused = focused;
     keys(root, state, seen, &mut actions);
     if state.panels {
         egui::Panel::top("bar").show(root, |ui| menu::show(ui, state, seen, &mut actions));

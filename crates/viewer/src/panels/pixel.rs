@@ -533,6 +533,7 @@ mod tests {
             framed: false,
             knobs: None,
             exposure: 0.0,
+            sources: None,
         };
         let facts = SceneFacts::of(&RenderRequest::new(Settings::default()), &loaded).expect("a scene");
         (Arc::new(facts), events)

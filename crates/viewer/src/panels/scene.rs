@@ -67,13 +67,13 @@ fn choices(ui: &mut Ui, state: &mut PanelState, facts: &SceneFacts) {
     choose("variant", &outline.variants, Some("as the file says"), &mut state.choice.variant, 0);
 }
 
-/// What a node carries, in a few letters.
-fn content(node: &Node) -> &'static str {
+/// What a node carries: a sign and its name.
+fn content(node: &Node) -> (&'static str, &'static str) {
     match (node.instances.is_empty(), node.lights.is_empty(), node.cameras.is_empty()) {
-        (false, _, _) => "mesh",
-        (_, false, _) => "light",
-        (_, _, false) => "camera",
-        _ => "",
+        (false, _, _) => ("◼", "mesh"),
+        (_, false, _) => ("☀", "light"),
+        (_, _, false) => ("📷", "camera"),
+        _ => ("", "node"),
     }
 }
 
@@ -118,11 +118,14 @@ fn tree(ui: &mut Ui, state: &mut PanelState, facts: &SceneFacts) {
                 set_shown(state, facts, index, shown);
             }
             let name = if node.name.is_empty() { "(no name)" } else { &node.name };
-            let kind = content(node);
+            let (sign, kind) = content(node);
+            let about = format!("{name}: {kind}");
+            let name = format!("{sign} {name}");
+            let name = name.trim_start();
             let name = if node.hidden { RichText::new(name).weak() } else { RichText::new(name) };
             let is_selected = state.selected == Some(index);
             let label = egui::Button::selectable(is_selected, name).truncate();
-            let response = ui.add(label);
+            let response = ui.add(label).on_hover_text(about);
             if response.clicked() {
                 state.selected = (!is_selected).then_some(index);
             }
@@ -133,7 +136,6 @@ fn tree(ui: &mut Ui, state: &mut PanelState, facts: &SceneFacts) {
                 navigation.fit_box(bounds, aspect);
                 (state.moved, state.selected) = (true, Some(index));
             }
-            ui.weak(kind);
         });
     }
     if more > 0 {

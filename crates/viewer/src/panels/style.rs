@@ -35,7 +35,11 @@ pub(super) fn apply(context: &Context) {
     }
     context.data_mut(|data| data.insert_temp(done, true));
     for theme in [Theme::Dark, Theme::Light] {
-        context.style_mut_of(theme, |style| set(&mut style.visuals));
+        context.style_mut_of(theme, |style| {
+            set(&mut style.visuals);
+            // Bars beside what they scroll, not over it.
+            style.spacing.scroll = egui::style::ScrollStyle::solid();
+        });
     }
 }
 

@@ -1,0 +1,288 @@
+//! Every panel in windows of every size, at every scale: its controls by egui's own rectangles. Nothing is cut off at
+//! the sides, nothing overlaps, and the keyboard reaches everything.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use egui::{Context, Event, Key, Modifiers, RawInput, Rect, Shape, Vec2, ViewportId};
+use etalon::frame::Settings;
+use etalon::gpu::{DeviceInfo, PassTime};
+use etalon::pass::tonemap::Counts;
+use etalon::plan::Knobs;
+use etalon::scene::outline::{Animation, Node, Outline};
+use etalon_viewer::navigation::Navigation;
+use etalon_viewer::panels::docks::{Docks, Pane};
+use etalon_viewer::panels::{self, PanelState};
+use etalon_viewer::preferences::Preferences;
+use etalon_viewer::shared::{Choice, Loaded, RenderRequest, RenderState, SceneFacts, Shown, Side};
+
+/// A scene with something in every list, and names that are too long.
+fn loaded() -> Loaded {
+    let mut scene = etalon::study::load("torture").expect("a scene");
+    scene.name = "/home/somebody/a folder with a long name/models/a scene with a very long name indeed.gltf".to_owned();
+    let long = |i: usize| format!("a node with a long name that does not fit into any panel of the window, number {i}");
+    scene.outline = Outline {
+        scenes: vec!["one".to_owned(), long(0)],
+        scene: 0,
+        variants: vec![long(1), "beach".to_owned()],
+        animations: vec![
+            Animation { name: "walk".to_owned(), seconds: 1.0, plays: true },
+            Animation { name: long(2), seconds: 9.5, plays: false },
+        ],
+        nodes: (0..40)
+            .map(|i| Node {
+                name: if i % 3 == 0 { long(i) } else { format!("node {i}") },
+                key: i.to_string(),
+                parent: (i % 5 != 0).then(|| i - 1),
+                instances: if i < scene.instances.len() { vec![i] } else { Vec::new() },
+                ..Node::default()
+            })
+            .collect(),
+    };
+    scene.duration = Some(1.0);
+    Loaded {
+        name: scene.name.clone(),
+        camera: scene.cameras[0].clone(),
+        original: scene.into(),
+        environment: None,
+        warnings: vec!["the optional extension EXT_something_with_a_long_name is not supported and is ignored".into()],
+        prices: None,
+        framed: false,
+        knobs: None,
+        exposure: 0.0,
+        sources: None,
+    }
+}
+
+fn seen(loaded: &Loaded) -> RenderState {
+    let settings = Settings::default();
+    let facts = SceneFacts::of(&RenderRequest::new(settings), loaded).expect("facts");
+    let plan = etalon::open::Opened::new(loaded.original.scene().clone(), None, false).plan(Settings::default());
+    let shown = Shown {
+        version: 1,
+        rgba: Arc::new(vec![0; 4]),
+        size: [1, 1],
+        samples: [3, 16],
+        moving: false,
+        time: None,
+        knobs: Knobs::default(),
+        passes: ["G-buffer", "lighting", "reflection", "tone map"]
+            .map(|name| PassTime { name: name.to_owned(), ms: 12.5 })
+            .into_iter()
+            .collect(),
+        rays: 123_456,
+        counts: Counts { nan: 3, inf: 0, negative: 0 },
+        error: Some(0.1),
+        seconds_left: 75.0,
+        clipped: 0.5,
+    };
+    let side = Side {
+        shown: Some(shown),
+        effects: plan.expect("a plan").effects.into(),
+        warnings: Arc::new([]),
+        lit_by: Some("lit by the light \"lamp\" and the built-in studio at intensity 0.5 as fill light".to_owned()),
+    };
+    RenderState { facts: Some(Arc::new(facts)), sides: [side, Side::default()], ..RenderState::default() }
+}
+
+/// A window of `size` pixels at a scale, with one panel of each stack in front.
+struct Window {
+    context: Context,
+    state: PanelState,
+    size: Vec2,
+    scale: f32,
+    time: f64,
+}
+
+impl Window {
+    fn new(size: [f32; 2], scale: f32, theme: egui::ThemePreference, loaded: &Loaded, seen: &RenderState) -> Self {
+        let device = DeviceInfo {
+            name: "a graphics card with a long name".to_owned(),
+            driver: "a driver".to_owned(),
+            version: "1".to_owned(),
+            kind: "cpu",
+            api: "1.3".to_owned(),
+        };
+        let preferences = Preferences { docks: Some(Docks::new(size[0] / scale)), ..Preferences::default() };
+        let mut state = PanelState::new(Settings::default(), Choice::default(), device, Vec::new(), preferences);
+        let bounds = seen.facts.as_ref().expect("facts").bounds;
+        state.navigation = Some(Navigation::new(loaded.camera.clone(), bounds, false));
+        let context = Context::default();
+        context.set_theme(theme);
+        Self { context, state, size: Vec2::from(size) / scale, scale, time: 0.0 }
+    }
+
+    fn frame(&mut self, seen: &RenderState, events: Vec<Event>) -> egui::FullOutput {
+        self.time += 0.1;
+        let mut input = RawInput {
+            screen_rect: Some(Rect::from_min_size(egui::Pos2::ZERO, self.size)),
+            time: Some(self.time),
+            events,
+            focused: true,
+            ..RawInput::default()
+        };
+        if let Some(viewport) = input.viewports.get_mut(&ViewportId::ROOT) {
+            viewport.native_pixels_per_point = Some(self.scale);
+        }
+        let state = &mut self.state;
+        let mut output = self.context.clone().run_ui(input, |ui| drop(panels::show(ui, state, seen)));
+        // Nothing is drawn.
+        output.textures_delta.clear();
+        output
+    }
+
+    /// What is wrong with the controls of the last frame.
+    fn faults(&self, output: &egui::FullOutput) -> Vec<String> {
+        /// Overlap that nobody sees, in points.
+        const SEEN: f32 = 2.0;
+        let screen = Rect::from_min_size(egui::Pos2::ZERO, self.size).expand(0.6);
+        let mut faults = Vec::new();
+        self.context.viewport(|viewport| {
+            for (layer, widgets) in viewport.prev_pass.widgets.layers() {
+                let clickable: Vec<_> = widgets
+                    .iter()
+                    .filter(|w| w.sense.senses_click() && w.enabled && w.interact_rect.is_positive())
+                    .collect();
+                for (i, a) in clickable.iter().enumerate() {
+                    let (whole, seen) = (a.rect, a.interact_rect);
+                    if !screen.contains_rect(seen) {
+                        faults.push(format!("{layer:?}: a control lies outside: {seen:?}"));
+                    }
+                    // A scroll area cuts controls above and below, never at the sides.
+                    let is_control = whole.height() < 60.0;
+                    if is_control && (whole.left() < seen.left() - SEEN || whole.right() > seen.right() + SEEN) {
+                        faults.push(format!("{layer:?}: a control is cut off at the side: {whole:?} seen {seen:?}"));
+                    }
+                    for b in &clickable[i + 1..] {
+                        // The grips between panels reach over their borders; the ends of the axes in the corner cover
+                        // each other as axes do.
+                        let is_grip = |r: Rect| r.size().min_elem() < 8.0;
+                        let is_end = |r: Rect| r.width() == r.height() && r.width() <= 16.0;
+                        if is_grip(seen) || is_grip(b.interact_rect) || is_end(seen) && is_end(b.interact_rect) {
+                            continue;
+                        }
+                        let both = seen.intersect(b.interact_rect);
+                        let inside = |a: Rect, b: Rect| a.expand(0.6).contains_rect(b);
+                        if both.width() > SEEN
+                            && both.height() > SEEN
+                            && !inside(seen, b.interact_rect)
+                            && !inside(b.interact_rect, seen)
+                        {
+                            faults.push(format!("{layer:?}: controls overlap: {seen:?} and {:?}", b.interact_rect));
+                        }
+                    }
+                }
+            }
+        });
+        for clipped in &output.shapes {
+            let Shape::Text(text) = &clipped.shape else { continue };
+            let rect = text.galley.rect.translate(text.pos.to_vec2());
+            let (clip, words) = (clipped.clip_rect, text.galley.text());
+            let in_sight = clip.is_positive() && rect.top() < clip.bottom() && rect.bottom() > clip.top();
+            if in_sight
+                && !words.trim().is_empty()
+                && (rect.left() < clip.left() - 1.0 || rect.right() > clip.right() + 1.0)
+            {
+                faults.push(format!("words are cut off at the side: {words:?}: {rect:?} in {clip:?}"));
+            }
+        }
+        faults
+    }
+}
+
+const SIZES: [([f32; 2], f32); 7] = [
+    ([900.0, 600.0], 1.0),
+    ([1280.0, 720.0], 1.0),
+    ([1920.0, 1080.0], 1.0),
+    ([1800.0, 1200.0], 2.0),
+    ([1920.0, 1080.0], 2.0),
+    ([3840.0, 2160.0], 1.0),
+    ([3840.0, 2160.0], 2.0),
+];
+
+#[test]
+fn nothing_is_cut_off_and_nothing_overlaps() {
+    let loaded = loaded();
+    let seen = seen(&loaded);
+    let mut wrong = BTreeSet::new();
+    for (size, scale) in SIZES {
+        for theme in [egui::ThemePreference::Dark, egui::ThemePreference::Light] {
+            let mut window = Window::new(size, scale, theme, &loaded, &seen);
+            for (pane, title) in Pane::PANELS {
+                for special in ["", "comparing", "light", "help", "message"] {
+                    if let Some(docks) = &mut window.state.preferences.docks {
+                        docks.bring_forward(pane);
+                    }
+                    window.state.other = (special == "comparing").then(Knobs::exact);
+                    window.state.help = special == "help";
+                    window.state.choice.key_light = (special == "light").then_some(etalon::scene::KeyLight {
+                        azimuth: -45.0,
+                        elevation: 45.0,
+                        lux: 3.0,
+                    });
+                    if special == "light" {
+                        window.state.settings.background = etalon::frame::Background::Color([200, 100, 50]);
+                    }
+                    if special == "message" {
+                        window.state.notices.say("etalon render scene.glb ".repeat(12));
+                        window.state.notices.fail("saving a picture: the disk is full".to_owned());
+                    }
+                    // egui finds the sizes of new panels in the first frames.
+                    let mut output = window.frame(&seen, Vec::new());
+                    for _ in 0..4 {
+                        output = window.frame(&seen, Vec::new());
+                    }
+                    let found = window.faults(&output);
+                    wrong
+                        .extend(found.into_iter().map(|fault| format!("{title} {special} {size:?} ×{scale}: {fault}")));
+                    window.state.notices.clear();
+                }
+            }
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "{} faults:\n{}",
+        wrong.len(),
+        wrong.iter().take(60).cloned().collect::<Vec<_>>().join("\n")
+    );
+}
+
+#[test]
+fn the_keyboard_reaches_every_control() {
+    let loaded = loaded();
+    let seen = seen(&loaded);
+    let mut window = Window::new([1280.0, 720.0], 1.0, egui::ThemePreference::Dark, &loaded, &seen);
+    for (pane, title) in Pane::PANELS {
+        if let Some(docks) = &mut window.state.preferences.docks {
+            docks.bring_forward(pane);
+        }
+        (0..3).for_each(|_| drop(window.frame(&seen, Vec::new())));
+        let wanted: BTreeSet<_> = window.context.viewport(|viewport| {
+            let widgets = viewport.prev_pass.widgets.layers().flat_map(|(_, widgets)| widgets.to_vec());
+            widgets
+                .filter(|w| w.sense.is_focusable() && w.enabled && w.interact_rect.is_positive())
+                .map(|w| w.id.value())
+                .collect()
+        });
+        let mut reached = BTreeSet::new();
+        for _ in 0..400 {
+            let tab = Event::Key {
+                key: Key::Tab,
+                physical_key: None,
+                pressed: true,
+                repeat: false,
+                modifiers: Modifiers::NONE,
+            };
+            drop(window.frame(&seen, vec![tab]));
+            reached.extend(window.context.memory(|memory| memory.focused()).map(|id| id.value()));
+        }
+        let missed: Vec<_> = wanted.difference(&reached).collect();
+        assert!(
+            missed.is_empty() && !wanted.is_empty(),
+            "{title}: {} of {} are not reached",
+            missed.len(),
+            wanted.len()
+        );
+    }
+}
