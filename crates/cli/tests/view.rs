@@ -37,6 +37,13 @@ const LEFT: u32 = 0xff51;
 const RIGHT: u32 = 0xff53;
 const ESCAPE: u32 = 0xff1b;
 const CONTROL: u32 = 0xffe3;
+const ALT: u32 = 0xffe9;
+const RETURN: u32 = 0xff0d;
+const G: u32 = 0x67;
+const H: u32 = 0x68;
+const S: u32 = 0x73;
+const Y: u32 = 0x79;
+const ONE: u32 = 0x31;
 
 /// What a command draws, RGB.
 fn drawn(folder: &Path, command: &str) -> ([u32; 2], Vec<[u8; 3]>) {
@@ -383,4 +390,188 @@ fn every_knob_turns_while_pictures_are_drawn() {
     assert!(again.shown().expect("a picture").rgba == before.rgba, "another picture by the same code");
     shared.want(|wanted| wanted.quit = true);
     thread.join().expect("the thread ends");
+}
+
+/// Two triangles, left and right, with a variant that swaps their materials.
+fn two_triangles(folder: &Path) -> PathBuf {
+    let mut b = Builder::new();
+    let positions = b.accessor(&f32s(&[-1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.5, 0.0]), FLOAT, "VEC3", 3);
+    for (colour, other) in [([0.8, 0.1, 0.1, 1.0], 1), ([0.1, 0.2, 0.8, 1.0], 0)] {
+        let material = 1 - other;
+        let variants = json!({ "mappings": [{ "material": other, "variants": [0] }] });
+        b.push("materials", json!({ "pbrMetallicRoughness": { "baseColorFactor": colour, "metallicFactor": 0.0 } }));
+        b.push(
+            "meshes",
+            json!({ "primitives": [{
+                "attributes": { "POSITION": positions },
+                "material": material,
+                "extensions": { "KHR_materials_variants": variants },
+            }] }),
+        );
+    }
+    b.push("nodes", json!({ "mesh": 0, "name": "left", "translation": [-1.2, 0, 0] }));
+    b.push("nodes", json!({ "mesh": 1, "name": "right", "translation": [1.2, 0, 0] }));
+    b.json["extensionsUsed"] = json!(["KHR_materials_variants"]);
+    b.json["extensions"] = json!({ "KHR_materials_variants": { "variants": [{ "name": "swapped" }] } });
+    b.json["scenes"] = json!([{ "nodes": [0, 1] }]);
+    b.save_glb(folder)
+}
+
+/// Waits until the window, beside its panels, shows what its own command draws; returns the command and the picture.
+#[track_caller]
+fn shows_beside_panels(viewer: &mut Viewer<'_>, folder: &Path) -> (String, Vec<[u8; 3]>) {
+    std::thread::sleep(Duration::from_secs(1));
+    viewer.key(C, None);
+    let command = viewer.line();
+    let (size, expected) = drawn(folder, &command);
+    viewer.key(ESCAPE, None);
+    viewer.until(&format!("the picture of `{command}`"), |viewer| {
+        let (window, pixels) = viewer.pixels()?;
+        // It begins at the left, below the bar.
+        let rows = window[1].checked_sub(size[1])?;
+        let row = |y: u32, width: u32, of: &[[u8; 3]]| {
+            let from = (y * width) as usize;
+            of[from..from + size[0] as usize].to_vec()
+        };
+        let is_at =
+            |above: &u32| (0..size[1]).all(|y| row(above + y, window[0], &pixels) == row(y, size[0], &expected));
+        (0..=rows).find(is_at)
+    });
+    (command, expected)
+}
+
+/// What a user does with panels, by mouse and keys: each step is in the command that draws the picture.
+#[test]
+fn nodes_are_hidden_views_chosen_and_pictures_saved() {
+    let Some(display) = Display::start() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let file = two_triangles(folder);
+    let file = file.file_name().and_then(|name| name.to_str()).expect("a name").to_owned();
+    // Without the axes in the corner, the picture is nothing but the picture.
+    let preferences = json!({ "overlays": { "gizmo": false }, "saved_in": folder });
+    std::fs::create_dir_all(folder.join("config/etalon")).expect("a folder");
+    std::fs::write(folder.join("config/etalon/viewer.json"), preferences.to_string()).expect("a file");
+    let mut viewer = Viewer::open(&display, folder, &[&file, "--size", "900x600", "--validate"]);
+    let (first, both) = shows_beside_panels(&mut viewer, folder);
+    assert!(first.contains("--eye") && !first.contains("--hide"), "{first}");
+
+    // The left triangle is selected by a click, and hidden.
+    viewer.click(1, [180, 340]);
+    std::thread::sleep(Duration::from_secs(2));
+    viewer.key(H, None);
+    std::thread::sleep(Duration::from_secs(1));
+    let (hidden, one) = shows_beside_panels(&mut viewer, folder);
+    assert!(hidden.contains("--hide left") && one != both, "{hidden}");
+    viewer.key(Z, Some(CONTROL));
+    std::thread::sleep(Duration::from_secs(1));
+    viewer.key(ESCAPE, None);
+    let (undone, again) = shows_beside_panels(&mut viewer, folder);
+    assert!(undone == first && again == both, "{undone}");
+    viewer.key(Y, Some(CONTROL));
+    std::thread::sleep(Duration::from_secs(1));
+    let (redone, _) = shows_beside_panels(&mut viewer, folder);
+    assert_eq!(redone, hidden);
+    viewer.key(H, Some(ALT));
+    std::thread::sleep(Duration::from_secs(1));
+    let (all, _) = shows_beside_panels(&mut viewer, folder);
+    assert_eq!(all, first, "all are shown, from where one was");
+    viewer.key(ONE, Some(CONTROL));
+    let (front, _) = shows_beside_panels(&mut viewer, folder);
+    assert!(front != first && front.contains("--eye"), "{front}");
+
+    // Saved under the name that the dialog proposes, as it is shown.
+    viewer.key(S, Some(CONTROL));
+    std::thread::sleep(Duration::from_secs(1));
+    viewer.key(RETURN, None);
+    let saved = folder.join(file.replace(".glb", ".png"));
+    viewer.until("a saved picture", |_| saved.is_file().then_some(()));
+    std::thread::sleep(Duration::from_millis(500));
+    let (_, expected) = drawn(folder, &front);
+    let found: Vec<[u8; 3]> = image::open(&saved).expect("a picture").to_rgb8().pixels().map(|p| p.0).collect();
+    assert!(found == expected, "another picture is saved than is shown");
+
+    // A panel that is closed stays closed, and the window has its size of before.
+    viewer.resize([1000, 640]);
+    std::thread::sleep(Duration::from_secs(1));
+    let (code, words) = viewer.close();
+    assert_eq!(code, Some(0), "{words}");
+    assert!(!words.contains("Validation Error") && !words.contains("panicked"), "{words}");
+    let mut viewer = Viewer::open(&display, folder, &[&file]);
+    viewer.until("the size of before", |viewer| (viewer.pixels()?.0 == [1000, 640]).then_some(()));
+    shows_beside_panels(&mut viewer, folder);
+    // Small pictures of recent files.
+    let small = std::fs::read_dir(folder.join("cache/etalon/small")).expect("a folder").count();
+    assert_eq!(small, 1);
+    let (code, words) = viewer.close();
+    assert_eq!(code, Some(0), "{words}");
+}
+
+/// An idle window is idle, and thousands of interactions leave nothing behind.
+#[test]
+fn many_interactions_leave_nothing_behind() {
+    let Some(display) = Display::start() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let arguments = ["study:cornell", "--size", "640x360", "--model", "local", "--set", "samples=1"];
+    let mut viewer = Viewer::open(&display, folder, &arguments);
+    shows_beside_panels_once(&mut viewer);
+    let mut random = Random(11);
+    let mut act = |viewer: &mut Viewer<'_>, count: usize| {
+        let tabs = [[430, 35], [480, 35], [530, 35], [430, 200], [480, 200], [530, 200]];
+        for i in 0..count {
+            match i % 5 {
+                0 => viewer.click(1, tabs[random.between(0.0, 5.99) as usize]),
+                1 => viewer.key(G, None),
+                2 => viewer.point([random.between(0.0, 300.0) as i16, random.between(60.0, 300.0) as i16]),
+                3 => viewer.click(4 + (i as u8 / 5) % 2, [150, 180]),
+                _ => viewer.key(DOWN, None),
+            }
+            if i % 50 == 0 {
+                std::thread::sleep(Duration::from_millis(40));
+            }
+        }
+        std::thread::sleep(Duration::from_secs(2));
+    };
+    let count = 1500;
+    act(&mut viewer, count / 3);
+    let before = viewer.resident();
+    act(&mut viewer, count);
+    let after = viewer.resident();
+    let found = format!("{before} KiB after {} interactions, {after} KiB after {count} more", count / 3);
+    eprintln!("{found}");
+    assert!(after < before + before / 10, "{found}");
+    viewer.key(ESCAPE, None);
+    std::thread::sleep(Duration::from_secs(5));
+    let idle = viewer.cpu();
+    std::thread::sleep(Duration::from_secs(10));
+    let busy = viewer.cpu() - idle;
+    assert!(busy <= Duration::from_millis(20), "{busy:?} of ten idle seconds");
+    let (code, words) = viewer.close();
+    assert_eq!(code, Some(0), "{words}");
+}
+
+/// Waits for the first picture.
+fn shows_beside_panels_once(viewer: &mut Viewer<'_>) {
+    viewer.until("a picture", |viewer| {
+        let (window, pixels) = viewer.pixels()?;
+        let colours: std::collections::BTreeSet<[u8; 3]> =
+            (60..window[1] - 60).map(|y| pixels[(y * window[0] + 100) as usize]).collect();
+        (colours.len() > 20).then_some(())
+    });
+}
+
+/// The time from the start of the program until the window shows something, a picture or a sign of work.
+#[test]
+fn the_first_sign_comes_soon() {
+    let Some(display) = Display::start() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut viewer = Viewer::open(&display, folder.path(), &["study:pool", "--size", "900x600"]);
+    let begun = std::time::Instant::now();
+    viewer.until("a sign", |viewer| {
+        let (_, pixels) = viewer.pixels()?;
+        (pixels.iter().any(|pixel| *pixel != pixels[0])).then_some(())
+    });
+    // A time is no claim of a test: it is printed, and said where it is measured.
+    eprintln!("first sign {:.3} s after the window", begun.elapsed().as_secs_f64());
 }

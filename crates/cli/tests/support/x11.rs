@@ -177,6 +177,13 @@ impl<'a> Viewer<'a> {
         Duration::from_millis(10 * (numbers[10] + numbers[11]) as u64)
     }
 
+    /// Memory in use, in KiB.
+    pub fn resident(&self) -> u64 {
+        let text = std::fs::read_to_string(format!("/proc/{}/status", self.program.id())).expect("a process");
+        let line = text.lines().find_map(|line| line.strip_prefix("VmRSS:")).expect("a line");
+        line.split_whitespace().next().and_then(|number| number.parse().ok()).expect("a number")
+    }
+
     fn fake(&self, kind: u8, detail: u8, [x, y]: [i16; 2]) {
         let connection = &self.display.connection;
         connection.xtest_fake_input(kind, detail, 0, self.display.root, x, y, 0).expect("a request");

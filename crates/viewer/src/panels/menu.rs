@@ -141,7 +141,8 @@ fn duration(seconds: f64) -> String {
 /// Samples of the picture and the time that is left; from right to left.
 fn progress(ui: &mut Ui, seen: &RenderState) {
     let Some(shown) = seen.shown() else {
-        ui.label(seen.busy.clone().unwrap_or_else(|| "reading the scene".to_owned()));
+        let idle = if seen.error.is_some() { "no picture" } else { "reading the scene" };
+        ui.label(seen.busy.as_deref().unwrap_or(idle));
         return;
     };
     let [done, of] = shown.samples;

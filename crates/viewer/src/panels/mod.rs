@@ -498,22 +498,26 @@ fn keys(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, actions: &mut V
     // A focused control has the keys that move within it: arrows, space, enter.
     let focused = ui.memory(|memory| memory.focused().is_some());
     let moves = [Key::ArrowUp, Key::ArrowDown, Key::ArrowLeft, Key::ArrowRight, Key::Space];
-    for entry in &COMMANDS {
-        for shortcut in entry.keys {
-            if (focused || open_menu) && moves.contains(&shortcut.logical_key) {
-                continue;
-            }
-            // Each press counts: a slow frame may receive several at once. A held key repeats only where that helps.
-            let held = ui.input(|input| {
+    // egui takes Shift+H for H with something more: keys with more modifiers come first.
+    let mut shortcuts: Vec<_> =
+        COMMANDS.iter().flat_map(|entry| entry.keys.iter().map(move |key| (entry, key))).collect();
+    let count =
+        |modifiers: Modifiers| u8::from(modifiers.shift) + u8::from(modifiers.alt) + u8::from(modifiers.command);
+    shortcuts.sort_by_key(|(_, shortcut)| std::cmp::Reverse(count(shortcut.modifiers)));
+    for (entry, shortcut) in shortcuts {
+        if (focused || open_menu) && moves.contains(&shortcut.logical_key) {
+            continue;
+        }
+        // Each press counts: a slow frame may receive several at once. A held key repeats only where that helps.
+        let held = ui.input(|input| {
                 let again = |event: &egui::Event| {
                     matches!(event, egui::Event::Key { key, repeat: true, .. } if *key == shortcut.logical_key)
                 };
                 input.events.iter().any(again)
             });
-            let count = ui.input_mut(|input| input.count_and_consume_key(shortcut.modifiers, shortcut.logical_key));
-            let count = if entry.repeats { count } else { count.min(usize::from(!held)) };
-            (0..count).for_each(|_| perform(ui, state, seen, entry.command, actions));
-        }
+        let count = ui.input_mut(|input| input.count_and_consume_key(shortcut.modifiers, shortcut.logical_key));
+        let count = if entry.repeats { count } else { count.min(usize::from(!held)) };
+        (0..count).for_each(|_| perform(ui, state, seen, entry.command, actions));
     }
     let numbers = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8, Key::Num9];
     let pressed = |key: Key| ui.input_mut(|input| input.consume_key(Modifiers::NONE, key));
