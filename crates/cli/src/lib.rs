@@ -37,7 +37,7 @@ pub mod view;
 use std::io::{self, Write as _};
 
 use anyhow::{Context as _, Result};
-use etalon::gpu::{NotOpened, is_lost};
+use etalon::gpu::{DeviceChoice, NotOpened, is_lost};
 use etalon::plan::{Refused, Setting};
 
 /// Formats an error chain as one sentence. Settings of the library are named as command-line options; where a part of
@@ -83,11 +83,19 @@ impl std::fmt::Display for WrongUsage {
 impl std::error::Error for WrongUsage {}
 
 /// Whether the command line is wrong: exit code 2. So are settings that the plan or the device refuses, but for an
-/// error that was not reached with all samples.
+/// error that was not reached with all samples, and devices that do not exist.
 #[must_use]
 pub fn is_wrong_usage(error: &anyhow::Error) -> bool {
     let is_refused = |refused: &Refused| refused.setting != Setting::MaxError;
-    error.is::<WrongUsage>() || error.downcast_ref().is_some_and(is_refused)
+    let is_unknown = |error: &NotOpened| matches!(error, NotOpened::NoneLike { choice, .. } if is_certain(choice));
+    error.is::<WrongUsage>()
+        || error.downcast_ref().is_some_and(is_refused)
+        || error.downcast_ref().is_some_and(is_unknown)
+}
+
+/// Whether one device is asked for, by name or index.
+pub(crate) fn is_certain(choice: &DeviceChoice) -> bool {
+    matches!(choice, DeviceChoice::Name(_) | DeviceChoice::Index(_))
 }
 
 /// Marks the error of a check of options as wrong usage. Such checks need neither files nor a device.

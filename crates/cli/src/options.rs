@@ -424,24 +424,24 @@ impl SceneOptions {
     /// The camera that these options choose.
     ///
     /// # Errors
-    /// One sentence when the file has no such camera, or when eye, target and up direction define none.
+    /// Wrong usage when the file has no such camera, or when eye, target and up direction define none; one sentence when
+    /// there is nothing to draw.
     pub fn choose_camera(&self, scene: &Scene, size: [u32; 2]) -> Result<Camera> {
         let bounds = scene.bounds().ok_or_else(|| anyhow!("{}: the scene has nothing to draw", scene.name))?;
         if let Some(eye) = self.eye {
-            return self.looking(eye, self.target.unwrap_or_else(|| bounds.center()));
+            return usage(self.looking(eye, self.target.unwrap_or_else(|| bounds.center())));
         }
         if let Some(wanted) = &self.camera {
             let names = || scene.cameras.iter().map(|c| format!("\"{}\"", c.name)).collect::<Vec<_>>().join(", ");
-            return scene
+            let found = scene
                 .cameras
                 .iter()
                 .find(|camera| camera.name == *wanted)
-                .or_else(|| wanted.parse::<usize>().ok().and_then(|index| scene.cameras.get(index)))
-                .cloned()
-                .ok_or_else(|| match scene.cameras.len() {
-                    0 => anyhow!("--camera {wanted}: {} has no cameras", scene.name),
-                    _ => anyhow!("--camera {wanted}: no such camera; {} has the cameras {}", scene.name, names()),
-                });
+                .or_else(|| wanted.parse::<usize>().ok().and_then(|index| scene.cameras.get(index)));
+            return usage(found.cloned().ok_or_else(|| match scene.cameras.len() {
+                0 => anyhow!("--camera {wanted}: {} has no cameras", scene.name),
+                _ => anyhow!("--camera {wanted}: no such camera; {} has the cameras {}", scene.name, names()),
+            }));
         }
         match scene.cameras.first() {
             Some(camera) if self.fov.is_none() => Ok(camera.clone()),

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use anyhow::{Result, anyhow};
 
+use super::is_certain;
 use super::options::{DeviceOptions, SceneOptions};
 use etalon::frame::{Renderer, Settings};
 use etalon::gpu::Device;
@@ -30,18 +31,12 @@ pub struct Setup {
 /// # Errors
 /// One sentence with the file, the place in it and the cause; an error of the scene comes first.
 pub fn open(scene: &SceneOptions, prune: Prune, device: &DeviceOptions) -> Result<(Opened, Result<Arc<Device>>)> {
-    let (device, loaded, environment) = std::thread::scope(|scope| {
-        let device = scope.spawn(|| Device::open(&device.choice(), device.validate));
-        let environment = scope.spawn(|| scene.load_environment());
-        let loaded = scene.load(prune);
-        let join = |_| anyhow!("a loading thread failed");
-        (device.join().map_err(join), loaded, environment.join().map_err(join))
-    });
+    let (device, loaded, environment) = open_beside(device, scene, || scene.load(prune))?;
     let loaded = loaded?;
-    let (environment, warnings) = environment??;
+    let (environment, warnings) = environment?;
     let mut opened = Opened::named(&scene.scene, loaded, environment, scene.asks_for_environment());
     opened.warnings.extend(warnings);
-    Ok((opened, device?))
+    Ok((opened, device))
 }
 
 /// Opens a scene that is drawn at several animation times: the file, the scene at `--time`, the environment and the
@@ -56,20 +51,32 @@ pub fn open_source(
 ) -> Result<(Source, Scene, Option<Environment>, Arc<Device>)> {
     let load = options.load_options(prune);
     let time = load.time;
-    let (device, loaded, environment) = std::thread::scope(|scope| {
-        let device = scope.spawn(|| Device::open(&device.choice(), device.validate));
-        let environment = scope.spawn(|| options.load_environment());
-        let loaded = etalon::open::source(&options.scene, load).and_then(|mut source| {
-            let scene = source.at(time)?;
-            Ok((source, scene))
-        });
-        let join = |_| anyhow!("a loading thread failed");
-        (device.join().map_err(join), loaded, environment.join().map_err(join))
-    });
+    let (device, loaded, environment) = open_beside(device, options, || {
+        let mut source = etalon::open::source(&options.scene, load)?;
+        let scene = source.at(time)?;
+        Ok((source, scene))
+    })?;
     let (source, mut scene) = loaded?;
-    let (environment, warnings) = environment??;
+    let (environment, warnings) = environment?;
     scene.warnings.extend(warnings);
-    Ok((source, scene, environment, device??))
+    Ok((source, scene, environment, device?))
+}
+
+/// The device, the scene, and the environment with the warnings of its reader.
+type Beside<T> = (Result<Arc<Device>>, Result<T>, Result<(Option<Environment>, Vec<String>)>);
+
+/// Opens the device and reads the environment while `load` reads the scene. A device that is asked for by name or index
+/// is opened first, so that a wrong one is found before a large file is read.
+fn open_beside<T>(device: &DeviceOptions, scene: &SceneOptions, load: impl FnOnce() -> Result<T>) -> Result<Beside<T>> {
+    let choice = device.choice();
+    let first = is_certain(&choice).then(|| Device::open(&choice, device.validate)).transpose()?;
+    std::thread::scope(|scope| {
+        let device = scope.spawn(|| first.map_or_else(|| Device::open(&choice, device.validate), Ok));
+        let environment = scope.spawn(|| scene.load_environment());
+        let loaded = load();
+        let join = |_| anyhow!("a loading thread failed");
+        Ok((device.join().map_err(join)?, loaded, environment.join().map_err(join)?))
+    })
 }
 
 impl Setup {

@@ -162,7 +162,7 @@ fn an_old_output_survives_a_failure_and_is_replaced_by_success() {
     let folder = folder();
     let path = folder.path().join("out.png");
     std::fs::write(&path, "old").expect("a file");
-    render(folder.path(), &["-o", "out.png", "--camera", "nobody"]).failed(1, "nobody");
+    render(folder.path(), &["-o", "out.png", "--camera", "nobody"]).failed(2, "nobody");
     assert_eq!(std::fs::read(&path).expect("a file"), b"old");
     render(folder.path(), &["-o", "out.png"]).succeeded();
     assert_eq!(pixels(&path).dimensions(), (32, 18));

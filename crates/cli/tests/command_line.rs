@@ -227,6 +227,11 @@ fn wrong_values_are_found_before_the_scene_is_loaded() {
         assert!(!run.stderr.contains("loading"), "{wrong}: {run:?}");
         run.failed(2, "");
     }
+    for device in ["nothing", "99"] {
+        let run = etalon(folder.path(), &["render", "missing.glb", "--device", device], &[]);
+        assert!(!run.stderr.contains("no such file"), "{run:?}");
+        run.failed(2, "Vulkan offers");
+    }
     for wrong in [
         "render study:nothing",
         "render study:pool --time 1",

@@ -166,7 +166,7 @@ fn what_cannot_be_planned_is_an_error() {
     };
     failed(&["missing.glb"], 1, "missing.glb");
     failed(&["study:etalon", "--set", "gloss=1"], 2, "no knob is called \"gloss\"");
-    failed(&["study:etalon", "--camera", "nobody"], 1, "nobody");
+    failed(&["study:etalon", "--camera", "nobody"], 2, "nobody");
     failed(&["study:etalon", "--set", "interfaces=0"], 2, "interfaces=0 contradicts refraction=ray");
     failed(&["study:etalon", "--set", "samples=5"], 2, "the nearest is 4");
 }
