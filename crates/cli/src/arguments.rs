@@ -12,6 +12,8 @@ use clap::{ArgMatches, Args, CommandFactory as _, FromArgMatches as _, Parser, S
 use clap_complete::Shell;
 use etalon::plan::Knob;
 use etalon::scene::EXTENSIONS;
+use tracing::Level;
+use tracing_subscriber::filter::Targets;
 
 use super::heading;
 use super::interrupt::INTERRUPTED;
@@ -34,6 +36,22 @@ pub struct Arguments {
     /// Colour in messages (NO_COLOR is honoured)
     #[arg(long, global = true, value_enum, default_value_t = When::Auto, help_heading = heading::MESSAGES)]
     pub color: When,
+}
+
+impl Arguments {
+    /// Which messages are printed. Those of other libraries (the window's, about its screen) only where they are errors
+    /// or more is asked for: users cannot act on them.
+    #[must_use]
+    pub fn messages(&self) -> Targets {
+        let (own, others) = match (self.quiet, self.verbose) {
+            (true, _) => (Level::ERROR, Level::ERROR),
+            (_, 0) => (Level::WARN, Level::ERROR),
+            (_, 1) => (Level::INFO, Level::INFO),
+            _ => (Level::DEBUG, Level::DEBUG),
+        };
+        // Targets are compared by their beginnings: every crate of this workspace.
+        Targets::new().with_default(others).with_target("etalon", own)
+    }
 }
 
 const EXAMPLES: &str = "\

@@ -6,6 +6,8 @@ use std::process::ExitCode;
 use etalon_cli::arguments::{self, AGAIN, Command, WRONG};
 use etalon_cli::options::When;
 use etalon_cli::progress::ProgressForm;
+use tracing_subscriber::fmt;
+use tracing_subscriber::prelude::*;
 
 fn main() -> ExitCode {
     let arguments = arguments::parse(std::env::args_os().collect()).unwrap_or_else(|error| error.exit());
@@ -14,19 +16,8 @@ fn main() -> ExitCode {
         When::Never => false,
         When::Auto => std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none(),
     };
-    let level = match (arguments.quiet, arguments.verbose) {
-        (true, _) => tracing::Level::ERROR,
-        (_, 0) => tracing::Level::WARN,
-        (_, 1) => tracing::Level::INFO,
-        _ => tracing::Level::DEBUG,
-    };
-    tracing_subscriber::fmt()
-        .with_max_level(level)
-        .with_writer(std::io::stderr)
-        .with_ansi(color)
-        .with_target(false)
-        .without_time()
-        .init();
+    let lines = fmt::layer().with_writer(std::io::stderr).with_ansi(color).with_target(false).without_time();
+    tracing_subscriber::registry().with(lines).with(arguments.messages()).init();
     let result = arguments::run(&arguments);
     let form = match &arguments.command {
         Command::Render(args) => args.progress,

@@ -265,6 +265,22 @@ fn a_scene_alone_opens_the_window() {
 }
 
 #[test]
+fn messages_of_other_libraries_are_printed_on_request() {
+    let messages = |words: &[&str]| {
+        let words = [&["etalon"][..], words, &["devices"]].concat();
+        etalon_cli::arguments::parse(words.into_iter().map(Into::into).collect()).expect("a command").messages()
+    };
+    let window = "winit::platform_impl::linux::x11::monitor";
+    assert!(!messages(&[]).would_enable(window, &tracing::Level::WARN));
+    assert!(messages(&[]).would_enable(window, &tracing::Level::ERROR));
+    assert!(messages(&["-v"]).would_enable(window, &tracing::Level::WARN));
+    for own in ["etalon::frame", "etalon_cli::render", "etalon_viewer"] {
+        assert!(messages(&[]).would_enable(own, &tracing::Level::WARN), "{own}");
+        assert!(!messages(&["-q"]).would_enable(own, &tracing::Level::WARN), "{own}");
+    }
+}
+
+#[test]
 fn a_scene_comes_from_standard_input_and_a_picture_goes_to_standard_output() {
     let folder = folder();
     let at = folder.path();
