@@ -87,15 +87,20 @@ Examples:
     etalon render study:metals --eye 0,1.5,4 --fov 30 --background transparent -o metals.png
     etalon render scene.glb --size 640x360 --validate --report report.json -o scene.exr
     etalon render study:lamps --turntable 3 -o lamps.{frame:04}.png
-    etalon render - -o - < scene.glb > picture.png")]
+    etalon render - -o - < scene.glb > picture.png
+    etalon render scene.glb -o - --format exr > picture.exr")]
 pub struct RenderArgs {
     #[command(flatten)]
     pub(super) scene: SceneOptions,
-    /// Output file: .png (display) or .exr (scene-linear radiance), or - for a PNG on standard output; repeatable
-    /// [default: the scene's name with .png, which replaces only a picture of the same scene]. A sequence can also
-    /// write an animated preview, .apng; a part of a picture has exactly one output
+    /// Output file: .png (display) or .exr (scene-linear radiance), or - for standard output; repeatable [default: the
+    /// scene's name with .png, which replaces only a picture of the same scene]. A sequence can also write an animated
+    /// preview, .apng; a part of a picture has exactly one output
     #[arg(short, long, value_name = "FILE", help_heading = heading::OUTPUT)]
     pub(super) output: Vec<PathBuf>,
+    /// File format of outputs whose names end neither in .png nor in .exr, and of standard output [default: png on
+    /// standard output]
+    #[arg(long, value_enum, value_name = "png|exr", requires = "output", conflicts_with_all = ["frames", "turntable", "cameras", "shard"], help_heading = heading::OUTPUT)]
+    pub(super) format: Option<Format>,
     #[command(flatten)]
     pub(super) picture: PictureOptions,
     /// Pick the most accurate rungs that render within this GPU time, in milliseconds (measures first if `cost` has not
@@ -238,10 +243,12 @@ pub(super) fn are_same(a: &Path, b: &Path) -> bool {
     a == b || whole(a).zip(whole(b)).is_some_and(|(a, b)| a == b)
 }
 
-/// File format of an output path.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// File format of an output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Format {
+    /// Display values.
     Png,
+    /// Scene-linear radiance.
     Exr,
 }
 
@@ -250,6 +257,15 @@ pub(super) fn format_of(path: &Path) -> Result<Format> {
         Some("png") => Ok(Format::Png),
         Some("exr") => Ok(Format::Exr),
         _ => bail!("--output {}: only .png and .exr can be written", path.display()),
+    }
+}
+
+/// File format of an output of one picture; `asked` counts where the name of the output does not say it.
+pub(super) fn output_format(path: &Path, asked: Option<Format>) -> Result<Format> {
+    match asked {
+        _ if is_standard(path) => Ok(asked.unwrap_or(Format::Png)),
+        None => format_of(path),
+        Some(asked) => Ok(format_of(path).unwrap_or(asked)),
     }
 }
 

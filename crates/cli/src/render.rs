@@ -15,7 +15,7 @@ use super::interrupt::{INTERRUPTED, Interrupt};
 use super::options::PlanExtent;
 use super::picture::{
     Format, RenderArgs, are_same, check_halves, check_same_scene, default_stem, format_of, is_standard, layers,
-    metadata, scene_text, settings_size, warn_about,
+    metadata, output_format, scene_text, settings_size, warn_about,
 };
 use super::plan::cost_table;
 use super::progress::{ProgressForm, Steps};
@@ -275,7 +275,7 @@ fn outputs(args: &RenderArgs) -> Result<Vec<(PathBuf, Format)>> {
 fn named(paths: &[PathBuf], args: &RenderArgs) -> Result<Vec<(PathBuf, Format)>> {
     let mut all: Vec<(PathBuf, Format)> = Vec::new();
     for path in paths {
-        let format = if is_standard(path) { Format::Png } else { format_of(path)? };
+        let format = output_format(path, args.format)?;
         if is_standard(path) {
             ensure!(!io::stdout().is_terminal(), "--output -: standard output is a terminal; redirect it to a file");
             let is_used = args.progress == ProgressForm::Openjd;
@@ -285,6 +285,8 @@ fn named(paths: &[PathBuf], args: &RenderArgs) -> Result<Vec<(PathBuf, Format)>>
         ensure!(!others.any(|other| are_same(other, path)), "--output {}: this file is named twice", path.display());
         all.push((path.clone(), format));
     }
+    let is_idle = args.format.is_some() && all.iter().all(|(path, _)| format_of(path).is_ok());
+    ensure!(!is_idle, "--format: the names of all outputs end in their format already");
     Ok(all)
 }
 

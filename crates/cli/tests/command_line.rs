@@ -200,6 +200,8 @@ fn wrong_values_are_found_before_the_scene_is_loaded() {
         "--time abc",
         "--set foo=1",
         "-o x.jpg",
+        "-o x.png --format exr",
+        "--format exr",
         "--within 0",
         "--size 0x0",
         "--fov 0",
@@ -292,6 +294,11 @@ fn a_scene_comes_from_standard_input_and_a_picture_goes_to_standard_output() {
     assert!(run.code == Some(0) && bytes == picture, "{run:?}");
     let (bytes, run) = fed(at, &[&["render", "-", "-o", "also.png", "-o", "-"], &SMALL[..]].concat(), &scene);
     assert!(run.code == Some(0) && bytes == picture && std::fs::read(at.join("also.png")).is_ok_and(|b| b == picture));
+    let drawn = |output: &[&str]| fed(at, &[&["render", "-"], output, &SMALL[..]].concat(), &scene);
+    assert_eq!(drawn(&["-o", "also.exr", "-o", "unnamed", "--format", "png"]).1.code, Some(0));
+    assert!(std::fs::read(at.join("unnamed")).is_ok_and(|bytes| bytes == picture));
+    let (bytes, run) = drawn(&["-o", "-", "--format", "exr"]);
+    assert!(run.code == Some(0) && std::fs::read(at.join("also.exr")).is_ok_and(|radiance| radiance == bytes));
     let (_, run) = fed(at, &[&["plan", "-", "--json"], &SMALL[..]].concat(), &scene);
     let plan: Value = serde_json::from_str(&run.stdout).expect("JSON");
     assert_eq!(plan["schema"], "etalon.plan/1");
