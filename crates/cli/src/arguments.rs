@@ -18,7 +18,7 @@ use tracing_subscriber::filter::Targets;
 use super::heading;
 use super::interrupt::INTERRUPTED;
 use super::options::When;
-use super::{cost, devices, diff, eval, farm, lists, merge, picture, plan, plot, print, render, verify, view};
+use super::{cost, desktop, devices, diff, eval, farm, lists, merge, picture, plan, plot, print, render, verify, view};
 
 /// A Vulkan renderer written directly against ash: glTF in, radiance out.
 #[derive(Parser)]
@@ -80,6 +80,7 @@ pub enum Command {
     Farm(farm::FarmArgs),
     Eval(eval::EvalArgs),
     Plot(plot::PlotArgs),
+    Desktop(desktop::DesktopArgs),
     Completions(CompletionsArgs),
     Manual(ManualArgs),
 }
@@ -212,6 +213,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         Command::Farm(args) => farm::run(args),
         Command::Eval(args) => eval::run(args),
         Command::Plot(args) => plot::run(args),
+        Command::Desktop(args) => desktop::run(args, quiet),
         Command::Completions(args) => {
             let mut script = Vec::new();
             clap_complete::generate(args.shell, &mut command(), "etalon", &mut script);
