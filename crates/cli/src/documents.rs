@@ -28,7 +28,20 @@ pub fn blocks() -> Vec<(&'static str, String)> {
         ("exit codes", exit_codes()),
         ("bindings", bindings()),
         ("barrier", barrier()),
+        #[cfg(feature = "window")]
+        ("inputs", inputs()),
     ]
+}
+
+/// Mouse and keys of the viewer.
+#[cfg(feature = "window")]
+fn inputs() -> String {
+    let mut table = String::from("| input | does |\n|---|---|\n");
+    for (how, does) in etalon_viewer::panels::commands::inputs() {
+        let does = does.trim_end_matches(" …").to_lowercase();
+        let _ = writeln!(table, "| {how} | {does} |");
+    }
+    table
 }
 
 /// A cell of a Markdown table on one line.

@@ -10,7 +10,7 @@ use clap::Args;
 use super::budget;
 use super::exposure::{self, Exposure};
 use super::options::{AnimationTime, DeviceOptions, PictureOptions, PlanExtent, SceneOptions};
-use super::{heading, usage};
+use super::{desktop, heading, icon, usage};
 use etalon::frame::{Background, Settings};
 use etalon::gpu::{Device, Severity};
 use etalon::open::{Opened, is_file};
@@ -64,6 +64,9 @@ impl FileSource {
         source.at(options.time.0)
     }
 }
+
+/// Side of the window's icon in pixels.
+const ICON: u32 = 64;
 
 impl SceneSource for FileSource {
     fn open(&mut self, asked: OpenRequest<'_>, device: &Arc<Device>) -> Result<Loaded> {
@@ -216,6 +219,8 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode> {
     let messages = run_window(Start {
         file: first,
         size: args.size_is_given.then_some(args.picture.size),
+        id: desktop::ID,
+        icon: (ICON, icon::pixels(ICON)),
         settings,
         device: args.device.choice(),
         validate: args.device.validate,

@@ -50,6 +50,10 @@ pub struct View<'a> {
 pub struct Start {
     /// Size of the window in pixels; `None`: that of the last run, or the default.
     pub size: Option<[u32; 2]>,
+    /// Application id (Wayland) and class (X11) of the window: the name of its desktop entry.
+    pub id: &'static str,
+    /// Icon: side in pixels, and RGBA8.
+    pub icon: (u32, Vec<u8>),
     /// Settings of the renderer.
     pub settings: Settings,
     /// Device that draws.

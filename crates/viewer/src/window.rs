@@ -9,7 +9,9 @@ use std::time::{Duration, Instant};
 use anyhow::{Context as _, Result, anyhow, bail};
 use winit::dpi::PhysicalSize;
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
-use winit::window::{Window, WindowAttributes};
+#[cfg(all(unix, not(target_os = "macos")))]
+use winit::platform::x11::WindowAttributesExtX11;
+use winit::window::{Icon, Window, WindowAttributes};
 
 use super::layer::SurfaceLayer;
 use super::navigation::Navigation;
@@ -107,10 +109,12 @@ pub(crate) struct OpenWindow {
 
 impl OpenWindow {
     pub(crate) fn new(events: &ActiveEventLoop, start: Start, proxy: EventLoopProxy<Woken>) -> Result<Self> {
-        let Start { size, settings, device: which, validate, panels, choice, source, command, said, file } = start;
+        let Start { size, id, icon, settings, device: which, validate, panels, choice, source, command, said, file } =
+            start;
         let preferences = Preferences::load();
-        let window =
-            Arc::new(events.create_window(attributes(events, size, &preferences)).context("opening a window")?);
+        let window = Arc::new(
+            events.create_window(attributes(events, size, &preferences, id, icon)).context("opening a window")?,
+        );
         let (device, presenter) = Presenter::open(window.clone(), &which, validate)?;
         let recent = preferences::recent();
         let mut state = PanelState::new(settings.clone(), choice.clone(), device.info().clone(), recent, preferences);
@@ -638,15 +642,25 @@ impl OpenWindow {
 }
 
 /// Title, size and name of the window: the size that is asked for, or that of the last run, if the screen has room.
-fn attributes(events: &ActiveEventLoop, asked: Option<[u32; 2]>, preferences: &Preferences) -> WindowAttributes {
+fn attributes(
+    events: &ActiveEventLoop,
+    asked: Option<[u32; 2]>,
+    preferences: &Preferences,
+    id: &str,
+    (side, rgba): (u32, Vec<u8>),
+) -> WindowAttributes {
     let [mut width, mut height] = asked.or(preferences.size).unwrap_or(DEFAULT_SIZE);
     let screen = events.primary_monitor().or_else(|| events.available_monitors().next()).map(|monitor| monitor.size());
     if let (Some(screen), None) = (screen.filter(|screen| screen.width > 0), asked) {
         // Borders and bars of the desktop need some room.
         (width, height) = (width.min(screen.width * 19 / 20), height.min(screen.height * 9 / 10));
     }
-    Window::default_attributes()
-        .with_title("Etalon")
+    let named = Window::default_attributes().with_title("Etalon");
+    // On Wayland, the desktop entry of this name has the icon.
+    #[cfg(all(unix, not(target_os = "macos")))]
+    let named = WindowAttributesExtX11::with_name(named, id, id);
+    named
+        .with_window_icon(Icon::from_rgba(rgba, side, side).ok())
         .with_inner_size(PhysicalSize::new(width, height))
         .with_min_inner_size(PhysicalSize::new(160, 120))
 }

@@ -1,6 +1,6 @@
 //! Commands of the menus with their keys, written once: menus, keys and the help are made of this list.
 
-use egui::{Key, KeyboardShortcut, Modifiers};
+use egui::{Key, KeyboardShortcut, ModifierNames, Modifiers};
 
 use crate::navigation::Side;
 
@@ -150,8 +150,18 @@ pub const COMMANDS: [Entry; 34] = [
     entry("Help", Command::Help, "Keys", &[key(Key::F1), key(Key::Questionmark)]),
 ];
 
+/// Every input with what it does: the help of the window, and the table of docs/view.md.
+#[must_use]
+pub fn inputs() -> Vec<(String, &'static str)> {
+    let of = |entry: &Entry| {
+        let keys: Vec<String> = entry.keys.iter().map(|key| key.format(&ModifierNames::NAMES, false)).collect();
+        (keys.join(", "), entry.name)
+    };
+    MOVEMENTS.iter().map(|(how, does)| ((*how).to_owned(), *does)).chain(COMMANDS.iter().map(of)).collect()
+}
+
 /// Movements of the mouse and held keys, which are in no menu.
-pub const MOVEMENTS: &[(&str, &str)] = &[
+const MOVEMENTS: &[(&str, &str)] = &[
     ("drag", "orbit"),
     ("Shift+drag, middle drag", "pan"),
     ("right drag", "look around"),

@@ -2,7 +2,7 @@
 
 use egui::{RichText, Ui};
 
-use super::commands::{COMMANDS, MOVEMENTS};
+use super::commands::{COMMANDS, inputs};
 use super::docks::Pane;
 use super::{Action, PanelState, perform};
 use crate::preferences::small;
@@ -179,15 +179,9 @@ pub(super) fn help(ui: &mut Ui, state: &mut PanelState) {
     let window = window.open(&mut open).resizable(false).collapsible(false).max_height(content.height() - 80.0);
     window.vscroll(true).show(ui.ctx(), |ui| {
         egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
-            for (how, does) in MOVEMENTS {
-                ui.strong(*how);
-                ui.label(*does);
-                ui.end_row();
-            }
-            for entry in &COMMANDS {
-                let keys: Vec<String> = entry.keys.iter().map(|key| ui.ctx().format_shortcut(key)).collect();
-                ui.strong(keys.join(", "));
-                ui.label(entry.name);
+            for (how, does) in inputs() {
+                ui.strong(how);
+                ui.label(does);
                 ui.end_row();
             }
         });
