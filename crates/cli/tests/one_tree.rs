@@ -22,7 +22,7 @@ use etalon_viewer::worker::Worker;
 struct Pool;
 
 impl SceneSource for Pool {
-    fn open(&self, asked: OpenRequest<'_>, _: &Arc<Device>) -> Result<Loaded> {
+    fn open(&mut self, asked: OpenRequest<'_>, _: &Arc<Device>) -> Result<Loaded> {
         let opened = Opened::load("study:pool")?;
         Ok(Loaded {
             name: opened.scene().name.clone(),
@@ -34,10 +34,11 @@ impl SceneSource for Pool {
             framed: false,
             knobs: None,
             exposure: 0.0,
+            sources: None,
         })
     }
 
-    fn moment(&self, _: OpenRequest<'_>) -> Result<(Scene, Camera)> {
+    fn moment(&mut self, _: OpenRequest<'_>) -> Result<(Scene, Camera)> {
         bail!("nothing moves")
     }
 }

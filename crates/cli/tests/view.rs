@@ -214,11 +214,12 @@ fn time_passes_and_settings_are_compared() {
     (0..3).for_each(|_| viewer.key(LEFT, None));
     viewer.key(ESCAPE, None);
     viewer.key(C, None);
-    let left = viewer.line();
+    let right = viewer.line();
     viewer.key(ESCAPE, None);
-    assert_eq!(left, played, "the left side is as before");
-    let (size, expected_left) = drawn(folder, &left);
-    let (_, expected_right) = drawn(folder, &left.replace("-o picture.png", "--set indirect=off -o picture.png"));
+    let expected = played.replace("-o picture.png", "--set indirect=off -o picture.png");
+    assert_eq!(right, expected, "the command of the side that is edited");
+    let (size, expected_left) = drawn(folder, &played);
+    let (_, expected_right) = drawn(folder, &right);
     // The first rows and the last are covered by figures.
     let rows = 40..110;
     let differ = |found: &[[u8; 3]], expected: &[[u8; 3]], columns: std::ops::Range<u32>| {

@@ -20,6 +20,7 @@ use super::preferences::{self, Preferences};
 use super::shared::{self, Choice, RenderRequest, RenderState, SharedState, Viewpoint, lock};
 use super::worker::Worker;
 use super::{Start, View, Woken};
+use etalon::frame::Settings;
 use etalon::gpu::{Overlay, PlacedPicture, Presented, Presenter, Replacement};
 use etalon::image::{Picture, exr, file, png};
 use etalon::open::is_file;
@@ -522,10 +523,12 @@ impl OpenWindow {
         let navigation = self.state.navigation.as_ref();
         let moved = navigation.is_some_and(Navigation::moved);
         let camera = navigation.and_then(Navigation::words).map(|(_, words)| words);
+        // The command is that of the side that is edited.
+        let settings = Settings { knobs: self.state.knobs().clone(), ..self.state.settings.clone() };
         let view = View {
             file: self.file(),
             named: navigation.and_then(Navigation::named).filter(|_| !moved),
-            settings: &self.state.settings,
+            settings: &settings,
             choice: &self.choice,
             time: self.moment,
             camera,

@@ -286,3 +286,39 @@ fn the_keyboard_reaches_every_control() {
         );
     }
 }
+
+/// A menu and a drop-down close by Escape, and the key does nothing else.
+#[test]
+fn escape_closes_what_is_open() {
+    let loaded = loaded();
+    let seen = seen(&loaded);
+    let mut window = Window::new([1280.0, 720.0], 1.0, egui::ThemePreference::Dark, &loaded, &seen);
+    if let Some(docks) = &mut window.state.preferences.docks {
+        docks.bring_forward(Pane::Display);
+    }
+    window.state.selected = Some(0);
+    (0..3).for_each(|_| drop(window.frame(&seen, Vec::new())));
+    let press =
+        |key: Key| Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers: Modifiers::NONE };
+    // Of every control in turn: what a press of space opens is closed by Escape.
+    let mut opened = 0;
+    for _ in 0..60 {
+        drop(window.frame(&seen, vec![press(Key::Tab)]));
+        let before = (window.state.choice.clone(), window.state.selected);
+        drop(window.frame(&seen, vec![press(Key::Enter)]));
+        drop(window.frame(&seen, Vec::new()));
+        if egui::Popup::is_any_open(&window.context) {
+            opened += 1;
+            drop(window.frame(&seen, vec![press(Key::Escape)]));
+            drop(window.frame(&seen, Vec::new()));
+            assert!(!egui::Popup::is_any_open(&window.context), "it is still open");
+            assert_eq!((window.state.choice.clone(), window.state.selected), before, "Escape did something else");
+        }
+        window.state.selected = Some(0);
+        if window.state.is_asking() {
+            drop(window.frame(&seen, vec![press(Key::Escape)]));
+        }
+    }
+    // Four menus, and the drop-downs of tone curve and layer at least.
+    assert!(opened >= 6, "{opened} were opened");
+}

@@ -147,7 +147,8 @@ fn progress(ui: &mut Ui, seen: &RenderState) {
     };
     let [done, of] = shown.samples;
     let what = match (shown.moving, shown.is_done()) {
-        (true, _) => "moving".to_owned(),
+        // The whole picture follows when the view rests.
+        (true, _) => "preview".to_owned(),
         (_, true) => format!("{of} samples, done"),
         _ => format!("{done}/{of} samples, {} left", duration(shown.seconds_left)),
     };

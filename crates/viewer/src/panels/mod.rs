@@ -257,7 +257,8 @@ impl PanelState {
     }
 
     /// Knobs of the edited side.
-    fn knobs(&self) -> &Knobs {
+    #[must_use]
+    pub fn knobs(&self) -> &Knobs {
         self.other.as_ref().filter(|_| self.side == 1).unwrap_or(&self.settings.knobs)
     }
 
@@ -296,7 +297,8 @@ impl PanelState {
     }
 
     /// Whether the file dialog is open: keys then type text.
-    fn is_asking(&self) -> bool {
+    #[must_use]
+    pub fn is_asking(&self) -> bool {
         *self.dialog.state() == DialogState::Open
     }
 
@@ -312,7 +314,10 @@ impl PanelState {
     /// Opens the file dialog.
     fn ask(&mut self, asked: Asked, name: &str, folder: Option<PathBuf>) {
         // The search field of egui_file_dialog 0.15 is dark on black in a light theme.
-        let mut dialog = FileDialog::new().show_search(false);
+        let mut dialog = FileDialog::new()
+            .show_search(false)
+            .anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0])
+            .default_size([640.0, 400.0]);
         if let Some(folder) = folder.filter(|folder| folder.is_dir()) {
             dialog = dialog.initial_directory(folder);
         }
