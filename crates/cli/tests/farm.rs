@@ -175,7 +175,7 @@ fn what_cannot_be_divided_is_refused() {
         ("--turntable 2 -o a.apng", 2, "made from the pictures"),
         ("--turntable 2 -o {frame}.exr -o a.apng", 2, "made from PNG files"),
         ("--turntable 2 -o {frame}.png -o a.apng --shard 1/2", 2, "needs all frames"),
-        ("--cameras nobody -o {camera}.png", 1, "nobody"),
+        ("--cameras nobody -o {camera}.png", 2, "nobody"),
         ("--cameras all -o a.png", 2, "{camera}"),
         ("--turntable 2 --within 5", 2, "--within"),
     ] {
