@@ -90,6 +90,8 @@ pub(crate) struct OpenWindow {
     reads_at: Option<Instant>,
     /// Number of a scene that is read again; its camera stays.
     again: Option<u64>,
+    /// PNG file that is written when the picture is no preview.
+    writes_png: Option<PathBuf>,
     /// EXR file that is written when the radiance is there.
     writes_exr: Option<PathBuf>,
     /// What was chosen when the scene was last asked for.
@@ -175,6 +177,7 @@ impl OpenWindow {
             first: file,
             reads_at: None,
             again: None,
+            writes_png: None,
             writes_exr: None,
             choice,
             chooses_at: None,
@@ -417,6 +420,14 @@ impl OpenWindow {
         if self.objects.is_none() && seen.shown().is_some_and(shared::Shown::is_done) {
             self.objects = Some(self.device.objects());
         }
+        let is_whole = |shown: &shared::Shown| !shown.moving && shown.size == self.state.settings.size;
+        if self.moving_until.is_none()
+            && seen.shown().is_some_and(is_whole)
+            && let Some(path) = self.writes_png.take()
+        {
+            let written = self.write_png(seen, &path);
+            self.tell(written);
+        }
         if seen.now().is_some()
             && seen.shown().is_some_and(shared::Shown::is_done)
             && let Some(path) = self.writes_exr.take()
@@ -448,10 +459,7 @@ impl OpenWindow {
             Action::Save(path) if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr")) => {
                 self.writes_exr = Some(path);
             }
-            Action::Save(path) => {
-                let written = self.write_png(seen, &path);
-                self.tell(written);
-            }
+            Action::Save(path) => self.writes_png = Some(path),
             Action::CopyPicture => match self.picture(seen) {
                 Some(picture) => {
                     let ([width, height], rgba) = picture;

@@ -153,6 +153,8 @@ pub struct PanelState {
     pixel: Option<pixel::PixelFacts>,
     /// Index of the event under the pointer.
     pointed: Option<usize>,
+    /// Keys that were pressed alone and are held.
+    held: BTreeSet<Key>,
     /// Whether clicks set points of a measurement.
     measures: bool,
     /// A click that waits for the surfaces at the pixels.
@@ -213,6 +215,7 @@ impl PanelState {
             picks: 0,
             pixel: None,
             pointed: None,
+            held: BTreeSet::new(),
             measures: false,
             clicked: None,
             expanded: BTreeSet::new(),

@@ -137,7 +137,18 @@ fn navigate(ui: &Ui, rect: Rect, response: &egui::Response, state: &mut PanelSta
         navigation.zoom(f64::from(scroll.y) / 50.0 + f64::from(pinch.ln()) / 0.1625);
         state.moved = true;
     }
-    let pressed = |key: Key| ui.input(|input| input.key_down(key) && input.modifiers.is_none());
+    // Ctrl+S is no S, whichever of the two is let go first.
+    ui.input(|input| {
+        for event in &input.events {
+            if let egui::Event::Key { key, pressed: true, repeat: false, modifiers, .. } = event
+                && modifiers.is_none()
+            {
+                state.held.insert(*key);
+            }
+        }
+        state.held.retain(|key| input.key_down(*key) && input.modifiers.is_none());
+    });
+    let pressed = |key: Key| state.held.contains(&key);
     let axis = |more: Key, less: Key| f64::from(u8::from(pressed(more))) - f64::from(u8::from(pressed(less)));
     let way = DVec3::new(axis(Key::D, Key::A), axis(Key::E, Key::Q), axis(Key::W, Key::S));
     if way != DVec3::ZERO && !ui.ctx().text_edit_focused() && !asking {
