@@ -16,23 +16,23 @@ const END: f32 = 57.0;
 const TRANSMITTED: [[u8; 3]; 3] = [[0xff, 0xd1, 0x66], [0xff, 0x9f, 0x5a], [0xf4, 0x6d, 0x75]];
 
 /// An outline in units of the drawing, y down.
-enum Outline {
+enum IconOutline {
     /// A rectangle with round corners: left, top, width, height, radius.
     Rectangle([f32; 5]),
     /// Lines of a width with round ends and joints.
     Lines(Vec<[f32; 2]>, f32),
 }
 
-struct Shape {
-    outline: Outline,
+struct IconShape {
+    outline: IconOutline,
     colour: [u8; 3],
     opacity: f32,
 }
 
 /// The drawing, from back to front.
-fn shapes() -> Vec<Shape> {
-    let shape = |outline, colour, opacity| Shape { outline, colour, opacity };
-    let mut all = vec![shape(Outline::Rectangle([2.0, 2.0, 60.0, 60.0, 13.0]), [0x15, 0x1f, 0x2c], 1.0)];
+fn shapes() -> Vec<IconShape> {
+    let shape = |outline, colour, opacity| IconShape { outline, colour, opacity };
+    let mut all = vec![shape(IconOutline::Rectangle([2.0, 2.0, 60.0, 60.0, 13.0]), [0x15, 0x1f, 0x2c], 1.0)];
     // Reflections keep the ray's slope: it goes down by the same amount on each way between the faces.
     let slope = (FIRST - FROM[1]) / (FACES[1] - FROM[0]);
     let down = slope * (FACES[1] - FACES[0]);
@@ -44,16 +44,16 @@ fn shapes() -> Vec<Shape> {
         if index + 1 < TRANSMITTED.len() {
             ray.push([FACES[0], y + down]);
         }
-        all.push(shape(Outline::Lines(vec![leaves, [END, y + slope * (END - FACES[1])]], 3.0), colour, 1.0));
+        all.push(shape(IconOutline::Lines(vec![leaves, [END, y + slope * (END - FACES[1])]], 3.0), colour, 1.0));
     }
-    all.push(shape(Outline::Lines(ray, 3.0), [0xff, 0xff, 0xff], 1.0));
+    all.push(shape(IconOutline::Lines(ray, 3.0), [0xff, 0xff, 0xff], 1.0));
     for left in [FACES[0] - 5.0, FACES[1]] {
-        all.push(shape(Outline::Rectangle([left, 9.0, 5.0, 46.0, 2.0]), [0x8f, 0xc1, 0xea], 0.85));
+        all.push(shape(IconOutline::Rectangle([left, 9.0, 5.0, 46.0, 2.0]), [0x8f, 0xc1, 0xea], 0.85));
     }
     all
 }
 
-impl Outline {
+impl IconOutline {
     /// Signed distance from a point, negative inside.
     fn distance(&self, [x, y]: [f32; 2]) -> f32 {
         match self {
@@ -84,7 +84,7 @@ pub fn pixels(side: u32) -> Vec<u8> {
         let at = [(index % side) as f32 + 0.5, (index / side) as f32 + 0.5].map(|x| x * unit);
         // Colours are multiplied by their alpha, until the last shape is drawn.
         let mut drawn = [0.0_f32; 4];
-        for Shape { outline, colour, opacity } in &shapes {
+        for IconShape { outline, colour, opacity } in &shapes {
             // The area of the pixel inside a straight edge at this distance.
             let alpha = opacity * (0.5 - outline.distance(at) / unit).clamp(0.0, 1.0);
             let [r, g, b] = colour.map(|c| f32::from(c) / 255.0);
@@ -101,13 +101,13 @@ pub fn pixels(side: u32) -> Vec<u8> {
 /// The icon as SVG.
 #[must_use]
 pub fn svg() -> String {
-    let shape = |Shape { outline, colour: [r, g, b], opacity }: Shape| {
+    let shape = |IconShape { outline, colour: [r, g, b], opacity }: IconShape| {
         let colour = format!("#{r:02x}{g:02x}{b:02x}");
         match outline {
-            Outline::Rectangle([x, y, width, height, radius]) => html! {
+            IconOutline::Rectangle([x, y, width, height, radius]) => html! {
                 rect x=(x) y=(y) width=(width) height=(height) rx=(radius) fill=(colour) fill-opacity=(opacity) {}
             },
-            Outline::Lines(points, width) => {
+            IconOutline::Lines(points, width) => {
                 let points: Vec<String> = points.iter().map(|[x, y]| format!("{x:.2},{y:.2}")).collect();
                 html! {
                     polyline points=(points.join(" ")) fill="none" stroke=(colour) stroke-width=(width)

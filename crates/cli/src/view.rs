@@ -17,7 +17,7 @@ use etalon::open::{Opened, is_file};
 use etalon::scene::{Camera, Prune, Scene, Source};
 use etalon_cost::command::arguments;
 use etalon_farm::identity::contents;
-use etalon_viewer::shared::{Choice, Loaded, OpenRequest, SceneSource};
+use etalon_viewer::shared::{FileChoice, Loaded, OpenRequest, SceneSource};
 use etalon_viewer::{Start, View, run as run_window};
 
 /// Open a window that shows the scene, with its plan, pass times, and the rays and equations of a pixel
@@ -133,7 +133,7 @@ impl ViewArgs {
 
 /// The options for another file, another choice of what is shown, or another time. For another file, camera and time of
 /// the first file are dropped.
-fn asked_for(options: &SceneOptions, file: Option<&Path>, choice: &Choice, time: Option<f64>) -> SceneOptions {
+fn asked_for(options: &SceneOptions, file: Option<&Path>, choice: &FileChoice, time: Option<f64>) -> SceneOptions {
     let options = match file {
         None => options.clone(),
         Some(path) => SceneOptions {
@@ -146,7 +146,7 @@ fn asked_for(options: &SceneOptions, file: Option<&Path>, choice: &Choice, time:
             ..options.clone()
         },
     };
-    let Choice { scene, variant, animation, hide, only, environment, key_light } = choice.clone();
+    let FileChoice { scene, variant, animation, hide, only, environment, key_light } = choice.clone();
     SceneOptions {
         scene_of_file: scene,
         variant,
@@ -161,8 +161,8 @@ fn asked_for(options: &SceneOptions, file: Option<&Path>, choice: &Choice, time:
 }
 
 /// What the command line chooses.
-fn choice_of(options: &SceneOptions) -> Choice {
-    Choice {
+fn choice_of(options: &SceneOptions) -> FileChoice {
+    FileChoice {
         scene: options.scene_of_file.clone(),
         variant: options.variant.clone(),
         animation: options.animation.clone(),

@@ -28,7 +28,7 @@ use super::{
     gltf_material::{self, KnownImages},
     lenient,
     nodes::{Nodes, chosen_scene, end, label, playing},
-    outline::{Animation, Node, Outline, keys},
+    outline::{Animation, Outline, OutlineNode, keys},
     prune::{Coordinates, prune_textures, unused_coordinates},
     thin::{self, Stroke},
 };
@@ -154,15 +154,15 @@ fn outline(
     open.retain(|&node| nodes.parents[node].is_none_or(|parent| !is_shown.contains(&parent)));
     open.reverse();
     let mut place = vec![None; root.nodes.len()];
-    let mut found: Vec<Node> = Vec::new();
+    let mut found: Vec<OutlineNode> = Vec::new();
     while let Some(node) = open.pop() {
         place[node] = Some(found.len());
-        found.push(Node {
+        found.push(OutlineNode {
             name: names[node].map_or_else(|| format!("node {node}"), str::to_owned),
             key: keys[node].clone(),
             parent: nodes.parents[node].and_then(|parent| place[parent]),
             hidden: nodes.hidden[node],
-            ..Node::default()
+            ..OutlineNode::default()
         });
         let children = root.nodes[node].children.iter().flatten().map(json::Index::value);
         open.extend(children.filter(|child| is_shown.contains(child)).collect::<Vec<_>>().into_iter().rev());
@@ -170,7 +170,7 @@ fn outline(
     for (list, users) in users.into_iter().enumerate() {
         for (index, &node) in users.iter().enumerate() {
             let Some(at) = place[node] else { continue };
-            let Node { instances, lights, cameras, .. } = &mut found[at];
+            let OutlineNode { instances, lights, cameras, .. } = &mut found[at];
             [instances, lights, cameras][list].push(index);
         }
     }

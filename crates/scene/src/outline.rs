@@ -18,7 +18,7 @@ pub struct Outline {
     /// Animations of the file.
     pub animations: Vec<Animation>,
     /// Nodes of the scene; a parent comes before its children.
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<OutlineNode>,
 }
 
 /// An animation of the file.
@@ -34,7 +34,7 @@ pub struct Animation {
 
 /// A node of the tree.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Node {
+pub struct OutlineNode {
     /// Its name; without one, its index in the file.
     pub name: String,
     /// What [`LoadOptions::hide`] calls it: the name if no other node has it, else the index in the file.
@@ -120,13 +120,13 @@ pub(crate) fn flat(scene: &mut Scene, options: &LoadOptions) -> Result<()> {
     let nodes = all.iter().zip(keys(&names)).zip(&places).enumerate().map(|(index, ((name, key), place))| {
         let place: Vec<usize> = place.iter().copied().collect();
         let (instances, lights) = if index < count { (place, Vec::new()) } else { (Vec::new(), place) };
-        Node { name: name.clone(), key, instances, lights, hidden: hidden[index], ..Node::default() }
+        OutlineNode { name: name.clone(), key, instances, lights, hidden: hidden[index], ..OutlineNode::default() }
     });
-    let cameras = scene.cameras.iter().enumerate().map(|(index, camera)| Node {
+    let cameras = scene.cameras.iter().enumerate().map(|(index, camera)| OutlineNode {
         name: camera.name.clone(),
         key: (all.len() + index).to_string(),
         cameras: vec![index],
-        ..Node::default()
+        ..OutlineNode::default()
     });
     scene.outline = Outline { nodes: nodes.chain(cameras).collect(), ..Outline::default() };
     let mut at = hidden.iter();

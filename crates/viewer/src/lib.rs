@@ -27,7 +27,7 @@ use winit::window::WindowId;
 
 use etalon::frame::Settings;
 use etalon::gpu::{DeviceChoice, Message};
-use shared::{Choice, SceneSource};
+use shared::{FileChoice, SceneSource};
 use window::{FRAME, OpenWindow};
 
 /// A view, to be written as a command line.
@@ -43,7 +43,7 @@ pub struct View<'a> {
     /// Settings of the renderer.
     pub settings: &'a Settings,
     /// What of the file is shown, and what lights it.
-    pub choice: &'a Choice,
+    pub choice: &'a FileChoice,
 }
 
 /// Initial state of the viewer.
@@ -63,7 +63,7 @@ pub struct Start {
     /// Whether to show the panels.
     pub panels: bool,
     /// What of the file is shown, and what lights it.
-    pub choice: Choice,
+    pub choice: FileChoice,
     /// Loader of scenes.
     pub source: Box<dyn SceneSource>,
     /// Returns the command that draws a view.

@@ -23,7 +23,7 @@ use super::lookup::PixelTriangles;
 
 /// What of a file is shown, and what lights it. As options of the command line.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Choice {
+pub struct FileChoice {
     /// Scene of the file, by name or index; `None`: the one that the file names.
     pub scene: Option<String>,
     /// Variant of the materials; `None`: the materials of the primitives.
@@ -40,7 +40,7 @@ pub struct Choice {
     pub key_light: Option<KeyLight>,
 }
 
-impl Choice {
+impl FileChoice {
     /// The choice for another file: its light alone.
     #[must_use]
     pub fn of_another_file(&self) -> Self {
@@ -79,7 +79,7 @@ pub struct OpenRequest<'a> {
     /// Scene file; `None`: that of the command line.
     pub file: Option<&'a Path>,
     /// What of the file is shown, and what lights it.
-    pub choice: &'a Choice,
+    pub choice: &'a FileChoice,
     /// Animation time in seconds; `None`: that of the command line, or the rest pose.
     pub time: Option<f64>,
     /// Size of the picture in pixels.
@@ -146,7 +146,7 @@ pub struct RenderRequest {
     /// Scene file; `None`: that of the command line.
     pub file: Option<PathBuf>,
     /// What of the file is shown, and what lights it; a change counts with a new number of the scene.
-    pub choice: Choice,
+    pub choice: FileChoice,
     /// Animation time in seconds; `None`: that of the command line, or the rest pose.
     pub time: Option<f64>,
     /// Viewpoint.
@@ -178,7 +178,7 @@ impl RenderRequest {
         Self {
             scene: 0,
             file: None,
-            choice: Choice::default(),
+            choice: FileChoice::default(),
             time: None,
             from: Viewpoint::Own,
             settings,

@@ -17,7 +17,7 @@ use super::layer::SurfaceLayer;
 use super::navigation::Navigation;
 use super::panels::{self, Action, PanelState};
 use super::preferences::{self, Preferences};
-use super::shared::{self, Choice, RenderRequest, RenderState, SharedState, Viewpoint, lock};
+use super::shared::{self, FileChoice, RenderRequest, RenderState, SharedState, Viewpoint, lock};
 use super::worker::Worker;
 use super::{Start, View, Woken};
 use etalon::frame::Settings;
@@ -95,8 +95,8 @@ pub(crate) struct OpenWindow {
     /// EXR file that is written when the radiance is there.
     writes_exr: Option<PathBuf>,
     /// What was chosen when the scene was last asked for.
-    choice: Choice,
-    /// Choice whose request waits until it no longer changes.
+    choice: FileChoice,
+    /// FileChoice whose request waits until it no longer changes.
     chooses_at: Option<Instant>,
     /// Number of the scene whose small picture is kept.
     small: Option<u64>,

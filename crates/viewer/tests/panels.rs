@@ -9,12 +9,12 @@ use etalon::frame::Settings;
 use etalon::gpu::{DeviceInfo, PassTime};
 use etalon::pass::tonemap::Counts;
 use etalon::plan::Knobs;
-use etalon::scene::outline::{Animation, Node, Outline};
+use etalon::scene::outline::{Animation, Outline, OutlineNode};
 use etalon_viewer::navigation::Navigation;
 use etalon_viewer::panels::docks::{Docks, Pane};
 use etalon_viewer::panels::{self, PanelState};
 use etalon_viewer::preferences::Preferences;
-use etalon_viewer::shared::{Choice, Loaded, RenderRequest, RenderState, SceneFacts, Shown, Side};
+use etalon_viewer::shared::{FileChoice, Loaded, RenderRequest, RenderState, SceneFacts, Shown, Side};
 
 /// A scene with something in every list, and names that are too long.
 fn loaded() -> Loaded {
@@ -30,12 +30,12 @@ fn loaded() -> Loaded {
             Animation { name: long(2), seconds: 9.5, plays: false },
         ],
         nodes: (0..40)
-            .map(|i| Node {
+            .map(|i| OutlineNode {
                 name: if i % 3 == 0 { long(i) } else { format!("node {i}") },
                 key: i.to_string(),
                 parent: (i % 5 != 0).then(|| i - 1),
                 instances: if i < scene.instances.len() { vec![i] } else { Vec::new() },
-                ..Node::default()
+                ..OutlineNode::default()
             })
             .collect(),
     };
@@ -104,7 +104,7 @@ impl Window {
             api: "1.3".to_owned(),
         };
         let preferences = Preferences { docks: Some(Docks::new(size[0] / scale)), ..Preferences::default() };
-        let mut state = PanelState::new(Settings::default(), Choice::default(), device, Vec::new(), preferences);
+        let mut state = PanelState::new(Settings::default(), FileChoice::default(), device, Vec::new(), preferences);
         let bounds = seen.facts.as_ref().expect("facts").bounds;
         state.navigation = Some(Navigation::new(loaded.camera.clone(), bounds, false));
         let context = Context::default();

@@ -2,11 +2,11 @@
 
 use egui::{Key, KeyboardShortcut, ModifierNames, Modifiers};
 
-use crate::navigation::Side;
+use crate::navigation::ViewSide;
 
 /// What a menu entry or a key does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Command {
+pub enum MenuCommand {
     /// Open a file.
     Open,
     /// Save the picture under a name.
@@ -32,7 +32,7 @@ pub enum Command {
     /// Return to the initial camera.
     Reset,
     /// Look from a side.
-    Look(Side),
+    Look(ViewSide),
     /// Show or hide the panels.
     Panels,
     /// Full screen.
@@ -68,9 +68,9 @@ pub enum Command {
 }
 
 /// A command with its place in the menus.
-pub struct Entry {
+pub struct MenuEntry {
     /// The command.
-    pub command: Command,
+    pub command: MenuCommand,
     /// Title of its menu.
     pub menu: &'static str,
     /// Name in the menu and in the help.
@@ -99,61 +99,66 @@ const fn alt(key: Key) -> KeyboardShortcut {
 
 const CTRL_SHIFT: Modifiers = Modifiers::COMMAND.plus(Modifiers::SHIFT);
 
-const fn entry(menu: &'static str, command: Command, name: &'static str, keys: &'static [KeyboardShortcut]) -> Entry {
+const fn entry(
+    menu: &'static str,
+    command: MenuCommand,
+    name: &'static str,
+    keys: &'static [KeyboardShortcut],
+) -> MenuEntry {
     let repeats = matches!(
         command,
-        Command::NextKnob
-            | Command::PreviousKnob
-            | Command::NextRung
-            | Command::PreviousRung
-            | Command::Forward
-            | Command::Back
+        MenuCommand::NextKnob
+            | MenuCommand::PreviousKnob
+            | MenuCommand::NextRung
+            | MenuCommand::PreviousRung
+            | MenuCommand::Forward
+            | MenuCommand::Back
     );
-    Entry { command, menu, name, keys, repeats }
+    MenuEntry { command, menu, name, keys, repeats }
 }
 
 /// Every command, in the order of the menus.
-pub const COMMANDS: [Entry; 34] = [
-    entry("File", Command::Open, "Open …", &[ctrl(Key::O)]),
-    entry("File", Command::Save, "Save picture …", &[ctrl(Key::S)]),
-    entry("File", Command::CopyPicture, "Copy picture", &[KeyboardShortcut::new(CTRL_SHIFT, Key::C)]),
-    entry("File", Command::CopyCommand, "Copy command", &[key(Key::C)]),
-    entry("File", Command::Quit, "Quit", &[ctrl(Key::Q)]),
-    entry("Edit", Command::Undo, "Undo", &[ctrl(Key::Z)]),
-    entry("Edit", Command::Redo, "Redo", &[KeyboardShortcut::new(CTRL_SHIFT, Key::Z), ctrl(Key::Y)]),
-    entry("Edit", Command::Hide, "Hide selection", &[key(Key::H)]),
-    entry("Edit", Command::Isolate, "Show only selection", &[key(Key::Slash), shift(Key::H)]),
-    entry("Edit", Command::ShowAll, "Show all", &[alt(Key::H)]),
-    entry("Edit", Command::Compare, "Compare two settings", &[key(Key::V)]),
-    entry("Edit", Command::Measure, "Measure", &[key(Key::M)]),
-    entry("Edit", Command::PreviousKnob, "Previous option", &[key(Key::ArrowUp)]),
-    entry("Edit", Command::NextKnob, "Next option", &[key(Key::ArrowDown)]),
-    entry("Edit", Command::PreviousRung, "Previous setting", &[key(Key::ArrowLeft)]),
-    entry("Edit", Command::NextRung, "Next setting", &[key(Key::ArrowRight)]),
-    entry("View", Command::Frame, "Frame selection or scene", &[key(Key::F)]),
-    entry("View", Command::Reset, "Initial camera", &[key(Key::R), key(Key::Home)]),
-    entry("View", Command::Look(Side::Front), "From the front", &[ctrl(Key::Num1)]),
-    entry("View", Command::Look(Side::Right), "From the right", &[ctrl(Key::Num3)]),
-    entry("View", Command::Look(Side::Top), "From above", &[ctrl(Key::Num7)]),
-    entry("View", Command::Look(Side::Back), "From behind", &[ctrl(Key::Num2)]),
-    entry("View", Command::Look(Side::Left), "From the left", &[ctrl(Key::Num4)]),
-    entry("View", Command::Look(Side::Bottom), "From below", &[ctrl(Key::Num8)]),
-    entry("View", Command::Play, "Play or pause", &[key(Key::Space)]),
-    entry("View", Command::Back, "Previous frame", &[key(Key::Comma)]),
-    entry("View", Command::Forward, "Next frame", &[key(Key::Period)]),
-    entry("View", Command::Grid, "Grid and axes", &[key(Key::G)]),
-    entry("View", Command::Panels, "Panels", &[key(Key::P)]),
-    entry("View", Command::FullScreen, "Full screen", &[key(Key::F11)]),
-    entry("View", Command::Larger, "Larger text", &[ctrl(Key::Plus), ctrl(Key::Equals)]),
-    entry("View", Command::Smaller, "Smaller text", &[ctrl(Key::Minus)]),
-    entry("View", Command::Normal, "Normal text", &[ctrl(Key::Num0)]),
-    entry("Help", Command::Help, "Keys", &[key(Key::F1), key(Key::Questionmark)]),
+pub const COMMANDS: [MenuEntry; 34] = [
+    entry("File", MenuCommand::Open, "Open …", &[ctrl(Key::O)]),
+    entry("File", MenuCommand::Save, "Save picture …", &[ctrl(Key::S)]),
+    entry("File", MenuCommand::CopyPicture, "Copy picture", &[KeyboardShortcut::new(CTRL_SHIFT, Key::C)]),
+    entry("File", MenuCommand::CopyCommand, "Copy command", &[key(Key::C)]),
+    entry("File", MenuCommand::Quit, "Quit", &[ctrl(Key::Q)]),
+    entry("Edit", MenuCommand::Undo, "Undo", &[ctrl(Key::Z)]),
+    entry("Edit", MenuCommand::Redo, "Redo", &[KeyboardShortcut::new(CTRL_SHIFT, Key::Z), ctrl(Key::Y)]),
+    entry("Edit", MenuCommand::Hide, "Hide selection", &[key(Key::H)]),
+    entry("Edit", MenuCommand::Isolate, "Show only selection", &[key(Key::Slash), shift(Key::H)]),
+    entry("Edit", MenuCommand::ShowAll, "Show all", &[alt(Key::H)]),
+    entry("Edit", MenuCommand::Compare, "Compare two settings", &[key(Key::V)]),
+    entry("Edit", MenuCommand::Measure, "Measure", &[key(Key::M)]),
+    entry("Edit", MenuCommand::PreviousKnob, "Previous option", &[key(Key::ArrowUp)]),
+    entry("Edit", MenuCommand::NextKnob, "Next option", &[key(Key::ArrowDown)]),
+    entry("Edit", MenuCommand::PreviousRung, "Previous setting", &[key(Key::ArrowLeft)]),
+    entry("Edit", MenuCommand::NextRung, "Next setting", &[key(Key::ArrowRight)]),
+    entry("View", MenuCommand::Frame, "Frame selection or scene", &[key(Key::F)]),
+    entry("View", MenuCommand::Reset, "Initial camera", &[key(Key::R), key(Key::Home)]),
+    entry("View", MenuCommand::Look(ViewSide::Front), "From the front", &[ctrl(Key::Num1)]),
+    entry("View", MenuCommand::Look(ViewSide::Right), "From the right", &[ctrl(Key::Num3)]),
+    entry("View", MenuCommand::Look(ViewSide::Top), "From above", &[ctrl(Key::Num7)]),
+    entry("View", MenuCommand::Look(ViewSide::Back), "From behind", &[ctrl(Key::Num2)]),
+    entry("View", MenuCommand::Look(ViewSide::Left), "From the left", &[ctrl(Key::Num4)]),
+    entry("View", MenuCommand::Look(ViewSide::Bottom), "From below", &[ctrl(Key::Num8)]),
+    entry("View", MenuCommand::Play, "Play or pause", &[key(Key::Space)]),
+    entry("View", MenuCommand::Back, "Previous frame", &[key(Key::Comma)]),
+    entry("View", MenuCommand::Forward, "Next frame", &[key(Key::Period)]),
+    entry("View", MenuCommand::Grid, "Grid and axes", &[key(Key::G)]),
+    entry("View", MenuCommand::Panels, "Panels", &[key(Key::P)]),
+    entry("View", MenuCommand::FullScreen, "Full screen", &[key(Key::F11)]),
+    entry("View", MenuCommand::Larger, "Larger text", &[ctrl(Key::Plus), ctrl(Key::Equals)]),
+    entry("View", MenuCommand::Smaller, "Smaller text", &[ctrl(Key::Minus)]),
+    entry("View", MenuCommand::Normal, "Normal text", &[ctrl(Key::Num0)]),
+    entry("Help", MenuCommand::Help, "Keys", &[key(Key::F1), key(Key::Questionmark)]),
 ];
 
 /// Every input with what it does: the help of the window, and the table of docs/view.md.
 #[must_use]
 pub fn inputs() -> Vec<(String, &'static str)> {
-    let of = |entry: &Entry| {
+    let of = |entry: &MenuEntry| {
         let keys: Vec<String> = entry.keys.iter().map(|key| key.format(&ModifierNames::NAMES, false)).collect();
         (keys.join(", "), entry.name)
     };

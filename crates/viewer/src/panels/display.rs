@@ -2,10 +2,10 @@
 
 use egui::{Slider, Ui};
 
-use super::commands::Command;
+use super::commands::MenuCommand;
 use super::{PanelState, go_to, perform};
 use crate::layer::LAYERS;
-use crate::navigation::Side;
+use crate::navigation::ViewSide;
 use crate::shared::RenderState;
 use etalon::image::tone::ToneMap;
 
@@ -60,7 +60,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     ui.strong("View");
     let aspect = state.aspect();
     ui.horizontal_wrapped(|ui| {
-        for (side, name) in Side::ALL {
+        for (side, name) in ViewSide::ALL {
             if ui.button(name).clicked()
                 && let Some(navigation) = &mut state.navigation
             {
@@ -68,7 +68,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
                 state.moved = true;
             }
         }
-        for (command, name) in [(Command::Frame, "Frame"), (Command::Reset, "Initial")] {
+        for (command, name) in [(MenuCommand::Frame, "Frame"), (MenuCommand::Reset, "Initial")] {
             if ui.button(name).clicked() {
                 perform(ui, state, seen, command, &mut Vec::new());
             }

@@ -114,7 +114,7 @@ impl Docks {
 
     /// Shows every pane.
     pub(super) fn show(&mut self, ui: &mut Ui, state: &mut PanelState, seen: &RenderState, actions: &mut Vec<Action>) {
-        self.tree.ui(&mut Shown { state, seen, actions }, ui);
+        self.tree.ui(&mut PaneShower { state, seen, actions }, ui);
     }
 }
 
@@ -126,13 +126,13 @@ fn scroll_to_focus(ui: &Ui, state: &PanelState) {
     }
 }
 
-struct Shown<'a> {
+struct PaneShower<'a> {
     state: &'a mut PanelState,
     seen: &'a RenderState,
     actions: &'a mut Vec<Action>,
 }
 
-impl Behavior<Pane> for Shown<'_> {
+impl Behavior<Pane> for PaneShower<'_> {
     fn pane_ui(&mut self, ui: &mut Ui, _: TileId, pane: &mut Pane) -> UiResponse {
         let Self { state, seen, actions } = self;
         if *pane == Pane::Picture {

@@ -28,8 +28,8 @@ use super::clock::Clock;
 use super::layer::SurfaceLayer;
 use super::navigation::{Navigation, View};
 use super::preferences::Preferences;
-use super::shared::{Choice, Pick, RenderState};
-use commands::{COMMANDS, Command};
+use super::shared::{FileChoice, Pick, RenderState};
+use commands::{COMMANDS, MenuCommand};
 use docks::{Docks, Pane};
 use etalon::frame::Settings;
 use etalon::gpu::{DeviceInfo, PassTime};
@@ -84,7 +84,7 @@ struct Undoable {
     settings: Settings,
     other: Option<Knobs>,
     side: usize,
-    choice: Choice,
+    choice: FileChoice,
     layer: SurfaceLayer,
     view: Option<View>,
 }
@@ -104,7 +104,7 @@ pub struct PanelState {
     /// Position of the wipe line as a fraction of the picture's width.
     pub wipe: f32,
     /// What of the file is shown, and what lights it.
-    pub choice: Choice,
+    pub choice: FileChoice,
     /// Animation time.
     pub clock: Clock,
     /// Layer that is shown.
@@ -177,7 +177,7 @@ impl PanelState {
     #[must_use]
     pub fn new(
         settings: Settings,
-        choice: Choice,
+        choice: FileChoice,
         device: DeviceInfo,
         recent: Vec<PathBuf>,
         preferences: Preferences,
@@ -553,45 +553,47 @@ fn close(state: &mut PanelState, actions: &mut Vec<Action>) {
 }
 
 /// Performs a command of the menus or keys.
-fn perform(ui: &Ui, state: &mut PanelState, seen: &RenderState, command: Command, actions: &mut Vec<Action>) {
+fn perform(ui: &Ui, state: &mut PanelState, seen: &RenderState, command: MenuCommand, actions: &mut Vec<Action>) {
     let aspect = state.aspect();
     let duration = seen.facts.as_ref().and_then(|facts| facts.duration);
     match command {
-        Command::Open => state.ask(Asked::Scene, "", state.recent.first().and_then(|path| Some(path.parent()?.into()))),
-        Command::Save => {
+        MenuCommand::Open => {
+            state.ask(Asked::Scene, "", state.recent.first().and_then(|path| Some(path.parent()?.into())))
+        }
+        MenuCommand::Save => {
             let name = seen.facts.as_ref().map_or("scene", |facts| &facts.name);
             let name = picture_name(name);
             state.ask(Asked::Save, &name, state.preferences.saved_in.clone());
         }
-        Command::CopyPicture => actions.push(Action::CopyPicture),
-        Command::CopyCommand => actions.push(Action::CopyCommand),
-        Command::Quit => actions.push(Action::Quit),
-        Command::Undo | Command::Redo => {
+        MenuCommand::CopyPicture => actions.push(Action::CopyPicture),
+        MenuCommand::CopyCommand => actions.push(Action::CopyCommand),
+        MenuCommand::Quit => actions.push(Action::Quit),
+        MenuCommand::Undo | MenuCommand::Redo => {
             let now = state.undoable();
             let to = match command {
-                Command::Undo => state.undoer.undo(&now),
+                MenuCommand::Undo => state.undoer.undo(&now),
                 _ => state.undoer.redo(&now),
             };
             if let Some(to) = to.cloned() {
                 state.return_to(to);
             }
         }
-        Command::Hide | Command::Isolate => {
+        MenuCommand::Hide | MenuCommand::Isolate => {
             let outline = seen.facts.as_ref().map(|facts| &facts.outline);
             let node = state.selected.and_then(|node| outline?.nodes.get(node));
             match (node, command) {
                 (None, _) => state.notices.say("select something first: click it in the picture or in the tree".into()),
-                (Some(node), Command::Hide) => state.choice.hide.push(node.key.clone()),
+                (Some(node), MenuCommand::Hide) => state.choice.hide.push(node.key.clone()),
                 (Some(node), _) => state.choice.only = vec![node.key.clone()],
             }
         }
-        Command::ShowAll => (state.choice.hide, state.choice.only) = Default::default(),
-        Command::Frame | Command::Reset | Command::Look(_) => {
+        MenuCommand::ShowAll => (state.choice.hide, state.choice.only) = Default::default(),
+        MenuCommand::Frame | MenuCommand::Reset | MenuCommand::Look(_) => {
             let bounds = seen.facts.as_ref().and_then(|facts| facts.bounds_of(state.selected?));
             let Some(navigation) = &mut state.navigation else { return };
             match command {
-                Command::Look(side) => navigation.look_from(side, aspect),
-                Command::Reset => navigation.reset(),
+                MenuCommand::Look(side) => navigation.look_from(side, aspect),
+                MenuCommand::Reset => navigation.reset(),
                 _ => match bounds {
                     Some(bounds) => navigation.fit_box(bounds, aspect),
                     None => navigation.fit(aspect),
@@ -599,33 +601,33 @@ fn perform(ui: &Ui, state: &mut PanelState, seen: &RenderState, command: Command
             }
             state.moved = true;
         }
-        Command::Panels => state.panels = !state.panels,
-        Command::FullScreen => actions.push(Action::FullScreen),
-        Command::Larger => state.preferences.zoom = (state.preferences.zoom * 1.1).min(4.0),
-        Command::Smaller => state.preferences.zoom = (state.preferences.zoom / 1.1).max(0.5),
-        Command::Normal => state.preferences.zoom = 1.0,
-        Command::Compare => state.compare(state.other.is_none()),
-        Command::Measure => {
+        MenuCommand::Panels => state.panels = !state.panels,
+        MenuCommand::FullScreen => actions.push(Action::FullScreen),
+        MenuCommand::Larger => state.preferences.zoom = (state.preferences.zoom * 1.1).min(4.0),
+        MenuCommand::Smaller => state.preferences.zoom = (state.preferences.zoom / 1.1).max(0.5),
+        MenuCommand::Normal => state.preferences.zoom = 1.0,
+        MenuCommand::Compare => state.compare(state.other.is_none()),
+        MenuCommand::Measure => {
             state.measures = !state.measures;
             state.measured.clear();
             if state.measures {
                 state.notices.say("click points in the picture; Escape ends".to_owned());
             }
         }
-        Command::Grid => state.preferences.overlays.grid = !state.preferences.overlays.grid,
-        Command::Play => state.clock.playing = duration.is_some() && !state.clock.playing,
-        Command::Forward | Command::Back => {
+        MenuCommand::Grid => state.preferences.overlays.grid = !state.preferences.overlays.grid,
+        MenuCommand::Play => state.clock.playing = duration.is_some() && !state.clock.playing,
+        MenuCommand::Forward | MenuCommand::Back => {
             let Some(duration) = duration else { return };
             state.clock.playing = false;
             let at = (state.clock.time.unwrap_or_default() / FILM_STEP).round();
-            let step = if command == Command::Forward { 1.0 } else { -1.0 };
+            let step = if command == MenuCommand::Forward { 1.0 } else { -1.0 };
             state.clock.set((at + step) * FILM_STEP, duration);
         }
-        Command::PreviousKnob => state.choose_knob(-1),
-        Command::NextKnob => state.choose_knob(1),
-        Command::PreviousRung => state.turn_knob(false),
-        Command::NextRung => state.turn_knob(true),
-        Command::Help => state.help = !state.help,
+        MenuCommand::PreviousKnob => state.choose_knob(-1),
+        MenuCommand::NextKnob => state.choose_knob(1),
+        MenuCommand::PreviousRung => state.turn_knob(false),
+        MenuCommand::NextRung => state.turn_knob(true),
+        MenuCommand::Help => state.help = !state.help,
     }
     ui.ctx().request_repaint();
 }

@@ -9,7 +9,7 @@ use super::overlay::{self, AXES, Canvas, text};
 use super::pixel::{colour, incidence};
 use super::{Action, Click, PanelState};
 use crate::layer::SurfaceLayer;
-use crate::navigation::{Navigation, Side};
+use crate::navigation::{Navigation, ViewSide};
 use crate::shared::{Pick, PixelSurfaces, RenderState, Trace};
 use etalon::plan::KNOBS;
 use etalon::transport::events::Way;
@@ -226,8 +226,8 @@ fn gizmo(ui: &mut Ui, area: Rect, state: &mut PanelState) {
         return;
     }
     let camera_from_world = navigation.camera().world_from_camera.matrix3.transpose();
-    let mut ends: Vec<(Side, &str, DVec3)> =
-        Side::ALL.iter().map(|(side, name)| (*side, *name, camera_from_world * side.direction())).collect();
+    let mut ends: Vec<(ViewSide, &str, DVec3)> =
+        ViewSide::ALL.iter().map(|(side, name)| (*side, *name, camera_from_world * side.direction())).collect();
     // The farthest is drawn first.
     ends.sort_by(|a, b| a.2.z.total_cmp(&b.2.z));
     for (side, name, at) in ends {

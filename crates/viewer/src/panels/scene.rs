@@ -2,10 +2,10 @@
 
 use egui::{RichText, Ui};
 
-use super::commands::Command;
+use super::commands::MenuCommand;
 use super::{Action, PanelState, go_to, perform};
-use crate::shared::{Choice, RenderState, SceneFacts};
-use etalon::scene::outline::Node;
+use crate::shared::{FileChoice, RenderState, SceneFacts};
+use etalon::scene::outline::OutlineNode;
 
 /// Number of nodes up to which the whole tree is unfolded at first.
 const UNFOLDED: usize = 60;
@@ -21,13 +21,13 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, acti
     choices(ui, state, &facts);
     ui.horizontal_wrapped(|ui| {
         for (command, name) in [
-            (Command::Hide, "Hide"),
-            (Command::Isolate, "Show only"),
-            (Command::Frame, "Frame"),
-            (Command::ShowAll, "Show all"),
+            (MenuCommand::Hide, "Hide"),
+            (MenuCommand::Isolate, "Show only"),
+            (MenuCommand::Frame, "Frame"),
+            (MenuCommand::ShowAll, "Show all"),
         ] {
             let hides = !state.choice.hide.is_empty() || !state.choice.only.is_empty();
-            let enabled = if command == Command::ShowAll { hides } else { state.selected.is_some() };
+            let enabled = if command == MenuCommand::ShowAll { hides } else { state.selected.is_some() };
             if ui.add_enabled(enabled, egui::Button::new(name)).clicked() {
                 perform(ui, state, seen, command, actions);
             }
@@ -68,7 +68,7 @@ fn choices(ui: &mut Ui, state: &mut PanelState, facts: &SceneFacts) {
 }
 
 /// What a node carries: a sign and its name.
-fn content(node: &Node) -> (&'static str, &'static str) {
+fn content(node: &OutlineNode) -> (&'static str, &'static str) {
     match (node.instances.is_empty(), node.lights.is_empty(), node.cameras.is_empty()) {
         (false, _, _) => ("◼", "mesh"),
         (_, false, _) => ("☀", "light"),
@@ -146,7 +146,7 @@ fn tree(ui: &mut Ui, state: &mut PanelState, facts: &SceneFacts) {
 /// Shows or hides a node by the options of the command line.
 fn set_shown(state: &mut PanelState, facts: &SceneFacts, node: usize, shown: bool) {
     let key = &facts.outline.nodes[node].key;
-    let Choice { hide, only, .. } = &mut state.choice;
+    let FileChoice { hide, only, .. } = &mut state.choice;
     if !shown {
         hide.push(key.clone());
         return;

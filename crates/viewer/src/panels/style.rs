@@ -4,7 +4,7 @@ use egui::{Color32, Context, Theme, Visuals};
 
 /// Colour of secondary text.
 fn weak(dark: bool) -> Color32 {
-    if dark { Color32::from_gray(160) } else { Color32::from_gray(90) }
+    if dark { Color32::from_gray(172) } else { Color32::from_gray(90) }
 }
 
 /// Colour of ordinary text.
