@@ -222,3 +222,108 @@ fn a_draft_version_is_read_with_a_warning() {
     builder.json["asset"]["minVersion"] = json!("3.0");
     assert!(refusal(&builder, &LoadOptions::default()).contains("\"3.0\""));
 }
+
+/// A tree: root above arm and leg, arm above hand; a light at the hand, a camera at the leg.
+fn tree() -> Builder {
+    let mut builder = one_triangle();
+    builder.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+    builder.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [{ "name": "lamp", "type": "point" }] } });
+    builder.json["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 0.8, "znear": 0.1 } }]);
+    builder.json["nodes"] = json!([
+        { "name": "hand", "mesh": 0, "extensions": { "KHR_lights_punctual": { "light": 0 } } },
+        { "name": "root", "children": [3, 2] },
+        { "name": "leg", "mesh": 0, "camera": 0 },
+        { "name": "arm", "mesh": 0, "children": [0] },
+        { "name": "elsewhere", "mesh": 0 },
+    ]);
+    builder.json["scenes"] = json!([{ "nodes": [1] }]);
+    builder
+}
+
+#[test]
+fn the_outline_is_the_tree_of_the_scene() {
+    let builder = tree();
+    let scene = loaded(&builder, &LoadOptions::default()).unwrap();
+    let outline = &scene.outline;
+    let rows: Vec<_> = outline.nodes.iter().map(|node| (node.name.as_str(), node.parent)).collect();
+    assert_eq!(rows, [("root", None), ("arm", Some(0)), ("hand", Some(1)), ("leg", Some(0))]);
+    for (index, instance) in scene.instances.iter().enumerate() {
+        assert_eq!(outline.nodes[outline.node_of(index).unwrap()].name, instance.name);
+    }
+    assert_eq!((&outline.nodes[2].lights, &outline.nodes[3].cameras), (&vec![0], &vec![0]));
+    assert_eq!(outline.instances_within(1).len(), 2, "the arm with its hand");
+}
+
+#[test]
+fn nodes_are_hidden_and_alone_shown_with_what_is_below_them() {
+    let builder = tree();
+    let list = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+    let with = |hide: &[&str], only: &[&str]| {
+        loaded(&builder, &LoadOptions { hide: list(hide), only: list(only), ..LoadOptions::default() }).unwrap()
+    };
+    let hidden = with(&["arm"], &[]);
+    assert_eq!((names(&hidden), hidden.lights.len(), hidden.cameras.len()), (vec!["leg"], 0, 1));
+    let marks: Vec<bool> = hidden.outline.nodes.iter().map(|node| node.hidden).collect();
+    assert_eq!(marks, [false, true, true, false], "the tree stays whole");
+    assert_eq!(names(&with(&[], &["arm"])), ["hand", "arm"]);
+    assert_eq!(names(&with(&["hand"], &["arm"])), ["arm"]);
+    // A camera of what is hidden can still be looked through.
+    assert_eq!((names(&with(&["leg"], &[])).len(), with(&["leg"], &[]).cameras.len()), (2, 1));
+    let wrong = LoadOptions { hide: list(&["foot"]), ..LoadOptions::default() };
+    assert!(refusal(&builder, &wrong).contains("there is no node \"foot\""));
+    // Scenes without a tree have their instances as nodes.
+    let study =
+        etalon::open::scene("study:metals", &LoadOptions { hide: list(&["gold ball"]), ..LoadOptions::default() });
+    let study = study.unwrap();
+    assert!(!names(&study).contains(&"gold ball") && names(&study).contains(&"silver ball"));
+    assert!(study.outline.nodes.iter().any(|node| node.name == "gold ball" && node.hidden));
+    let node = study.outline.nodes.iter().find(|node| node.name == "silver ball").unwrap();
+    assert_eq!(study.instances[node.instances[0]].name, "silver ball");
+}
+
+#[test]
+fn animations_that_move_the_same_node_do_not_play_together() {
+    let mut builder = one_triangle();
+    builder.root(json!({ "name": "a", "mesh": 0 }));
+    builder.root(json!({ "name": "b", "mesh": 0 }));
+    animate(&mut builder, "/nodes/0/translation", "VEC3", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0], "LINEAR");
+    animate(&mut builder, "/nodes/0/translation", "VEC3", &[0.0, 0.0, 0.0, 0.0, 1.0, 0.0], "LINEAR");
+    animate(&mut builder, "/nodes/1/translation", "VEC3", &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0], "LINEAR");
+    for (index, name) in ["walk", "run", "wave"].into_iter().enumerate() {
+        builder.json["animations"][index]["name"] = json!(name);
+    }
+    let with = |animation: Option<&str>| {
+        let animation = animation.map(str::to_owned);
+        loaded(&builder, &LoadOptions { time: Some(1.0), animation, ..LoadOptions::default() }).unwrap()
+    };
+    let places = |scene: &Scene| [0, 1].map(|i| scene.instances[i].world_from_object.translation);
+    let default = with(None);
+    assert_eq!(places(&default), [DVec3::X, DVec3::Z], "the first of two, and what does not contradict it");
+    let said = default.warnings.join(" ");
+    assert!(said.contains("the animations \"run\" do not play") && said.contains("\"walk\", \"wave\""), "{said}");
+    let plays: Vec<bool> = default.outline.animations.iter().map(|animation| animation.plays).collect();
+    assert_eq!(plays, [true, false, true]);
+    assert_eq!(places(&with(Some("run"))), [DVec3::Y, DVec3::ZERO]);
+    assert_eq!(places(&with(Some("0"))), [DVec3::X, DVec3::ZERO]);
+    // All together, the last one wins, as in files where several channels name one property.
+    assert_eq!(places(&with(Some("all"))), [DVec3::Y, DVec3::Z]);
+    let wrong = LoadOptions { animation: Some("fly".to_owned()), ..LoadOptions::default() };
+    assert!(refusal(&builder, &wrong).contains("there is no animation \"fly\""));
+}
+
+#[test]
+fn a_key_light_comes_from_where_it_is_asked_to() {
+    let builder = tree();
+    let key = |azimuth: f64, elevation: f64| {
+        let key_light = Some(etalon::scene::KeyLight { azimuth, elevation, lux: 2.0 });
+        let scene = loaded(&builder, &LoadOptions { key_light, ..LoadOptions::default() }).unwrap();
+        let light = scene.lights.last().unwrap().clone();
+        assert_eq!((scene.lights.len(), light.color), (2, [2.0; 3]));
+        let etalon::scene::LightKind::Directional { direction } = light.kind else { panic!("{:?}", light.kind) };
+        -direction
+    };
+    let is = |found: DVec3, expected: DVec3| assert!(found.abs_diff_eq(expected, 1e-12), "{found} {expected}");
+    is(key(0.0, 0.0), DVec3::Z);
+    is(key(90.0, 0.0), DVec3::X);
+    is(key(0.0, 90.0), DVec3::Y);
+}
