@@ -189,9 +189,13 @@ fn surfaces(ui: &mut Ui, events: &[Event], facts: Option<&PixelFacts>, scene: &S
     let drawn = p.and_then(|p| rasterised(events, &line, p));
     for &index in &line {
         let Some(interaction) = &events[index].interaction else { continue };
+        let m = &interaction.at;
+        let alpha = (m.alpha_mode == AlphaMode::Blend).then(|| format!("alpha {:.2}", interaction.opacity));
+        let transmits = (m.transmission > 0.0).then(|| format!("transmission {:.2}", m.transmission));
+        let lets_through: Vec<String> = alpha.into_iter().chain(transmits).collect();
         let mut title = format!("{}. {}", number(events, index), name(interaction, scene));
-        if interaction.opacity < 1.0 {
-            title += &format!(" (alpha {:.2})", interaction.opacity);
+        if !lets_through.is_empty() {
+            title += &format!(" ({})", lets_through.join(", "));
         }
         ui.strong(title);
         table(ui, &events[index], interaction, facts.filter(|_| drawn == Some(index)), scene);
