@@ -19,7 +19,7 @@ use etalon::plan::rungs::Indirect;
 use etalon::plan::{ForcedEffects, Knobs, Model};
 use etalon::scene::camera::{Camera, DEFAULT_FOV_Y};
 use etalon::scene::environment::Environment;
-use etalon::scene::{AmbientLight, KeyLight, LoadOptions, Prune, Scene};
+use etalon::scene::{AmbientLight, KeyLight, LoadOptions, MissingImages, Prune, Scene};
 use etalon::study;
 use etalon_farm::job::word;
 
@@ -61,6 +61,15 @@ impl PlanExtent {
     }
 }
 
+/// What happens where an image of the scene is missing or broken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Missing {
+    /// The scene is refused.
+    Error,
+    /// A checker stands in the image's place, with a warning.
+    Checker,
+}
+
 /// Scene, camera, animation time and environment.
 #[derive(Debug, Clone, Args)]
 pub struct SceneOptions {
@@ -74,6 +83,10 @@ pub struct SceneOptions {
     /// primitives]
     #[arg(long, value_name = "NAME|INDEX", help_heading = heading::SCENE)]
     pub variant: Option<String>,
+    /// What happens where an image of the file is missing or broken: an error, or a checker in its place with a warning
+    /// [default: error; checker for `view`]
+    #[arg(long, value_enum, value_name = "error|checker", hide_possible_values = true, help_heading = heading::SCENE)]
+    pub missing: Option<Missing>,
     /// Camera of the file, by name or index [default: the first camera; if the file has none, a camera that frames the
     /// scene]
     #[arg(long, value_name = "NAME|INDEX", conflicts_with_all = ["eye", "target", "up"], help_heading = heading::CAMERA)]
@@ -289,6 +302,7 @@ impl SceneOptions {
         };
         option("scene", self.scene_of_file.clone());
         option("variant", self.variant.clone());
+        option("missing", (self.missing == Some(Missing::Checker)).then(|| "checker".to_owned()));
         option("camera", self.camera.clone());
         option("eye", self.eye.map(point));
         option("target", self.target.map(point));
@@ -376,6 +390,10 @@ impl SceneOptions {
             hide: self.hide.clone(),
             only: self.only.clone(),
             key_light: self.key_light,
+            missing: match self.missing {
+                None | Some(Missing::Error) => MissingImages::Error,
+                Some(Missing::Checker) => MissingImages::Checker,
+            },
         }
     }
 

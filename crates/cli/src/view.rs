@@ -3,18 +3,19 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
 
 use super::budget;
 use super::exposure::{self, Exposure};
-use super::options::{AnimationTime, DeviceOptions, PictureOptions, PlanExtent, SceneOptions};
+use super::options::{AnimationTime, DeviceOptions, Missing, PictureOptions, PlanExtent, SceneOptions};
 use super::{desktop, heading, icon, usage};
 use etalon::frame::{Background, Settings};
 use etalon::gpu::{Device, Severity};
 use etalon::open::{Opened, is_file};
-use etalon::scene::{Camera, Prune, Scene, Source};
+use etalon::scene::{Camera, Prune, REPLACED, Scene, Source};
 use etalon_cost::command::arguments;
 use etalon_farm::identity::contents;
 use etalon_viewer::shared::{FileChoice, Loaded, OpenRequest, SceneSource};
@@ -42,6 +43,9 @@ pub struct ViewArgs {
     /// Whether --size is on the command line; without it, the window has the size of the last run.
     #[arg(skip)]
     pub(super) size_is_given: bool,
+    /// Whether a checker stands in the place of an image of the shown scene: its `render` command then allows that.
+    #[arg(skip)]
+    has_checkers: Arc<AtomicBool>,
 }
 
 /// Loader of scenes: an animated file is read once.
@@ -57,7 +61,10 @@ impl FileSource {
         let still = |options: &SceneOptions| SceneOptions { time: AnimationTime(None), ..options.clone() };
         let is_same = |known: &SceneOptions| known.words() == still(options).words();
         if again || self.open.as_ref().is_none_or(|(known, _)| !is_same(known)) {
-            let source = etalon::open::source(&options.scene, options.load_options(Prune::Nothing))?;
+            // Unless the options say otherwise, with checkers in place of images that cannot be read.
+            let missing = options.missing.or(Some(Missing::Checker));
+            let read = SceneOptions { missing, ..options.clone() }.load_options(Prune::Nothing);
+            let source = etalon::open::source(&options.scene, read)?;
             self.open = Some((still(options), source));
         }
         let (_, source) = self.open.as_mut().context("reading a scene")?;
@@ -91,6 +98,7 @@ impl SceneSource for FileSource {
         );
         let prices = budget::known(&priced, &contents(opened.scene(), opened.environment()), device.info());
         opened.warnings.extend(exposure.sentence);
+        this.has_checkers.store(opened.warnings.iter().any(|warning| warning.ends_with(REPLACED)), Ordering::Relaxed);
         let (lit, as_lit) = opened.lit(Settings { knobs: knobs.clone(), ..Settings::default() });
         let sources = Some(opened.sources(&knobs));
         Ok(Loaded {
@@ -176,6 +184,7 @@ fn choice_of(options: &SceneOptions) -> FileChoice {
 /// The `etalon render` command that draws a view.
 fn command(args: &ViewArgs, view: &View<'_>) -> String {
     let mut scene = asked_for(&args.scene, view.file, view.choice, view.time);
+    scene.missing = args.has_checkers.load(Ordering::Relaxed).then_some(Missing::Checker);
     if scene.env.as_deref() != Some("none") {
         scene.env_rotation = view.settings.environment_rotation;
         scene.env_intensity = view.settings.environment_intensity;

@@ -252,6 +252,33 @@ fn wrong_values_are_found_before_the_scene_is_loaded() {
 }
 
 #[test]
+fn missing_images_are_an_error_or_a_checker() {
+    let folder = folder();
+    triangle(folder.path(), |json| {
+        json["images"] = json!([{ "uri": "gone.png" }]);
+        json["textures"] = json!([{ "source": 0 }]);
+        json["materials"] = json!([{ "emissiveTexture": { "index": 0 }, "emissiveFactor": [1, 1, 1] }]);
+        json["meshes"][0]["primitives"][0]["material"] = json!(0);
+    });
+    let render = |missing: &[&str]| {
+        let words = [&["render", "scene.glb", "-o", "out.png"], &SMALL[..], missing].concat();
+        etalon(folder.path(), &words, &HASTY)
+    };
+    for refused in [&[][..], &["--missing", "error"]] {
+        render(refused).failed(1, "image 0 \"gone.png\": gone.png: no such file");
+        assert!(!folder.path().join("out.png").exists());
+    }
+    let run = render(&["--missing", "checker"]).succeeded();
+    let warning =
+        "image 0 \"gone.png\" cannot be read (gone.png: no such file or folder): a checker stands in its place";
+    assert!(run.stderr.contains(warning), "{run:?}");
+    assert!(folder.path().join("out.png").exists());
+    etalon(folder.path(), &["plan", "scene.glb"], &[]).failed(1, "gone.png");
+    etalon(folder.path(), &["plan", "scene.glb", "--missing", "checker"], &[]).succeeded();
+    render(&["--missing", "nothing"]).failed(2, "nothing");
+}
+
+#[test]
 fn a_scene_alone_opens_the_window() {
     let folder = folder();
     std::fs::write(folder.path().join("notes"), "").expect("a file");

@@ -344,7 +344,7 @@ fn resolve(uri: &str, folder: &Path) -> Result<Vec<u8>> {
         short_uri(uri)
     );
     let path = folder.join(relative.as_ref());
-    fs::read(&path).with_context(|| format!("reading {}", path.display()))
+    fs::read(&path).map_err(|error| anyhow!("{}: {}", path.display(), etalon_image::file::cause(&error)))
 }
 
 fn decode_data_uri(data: &str) -> Result<Vec<u8>> {

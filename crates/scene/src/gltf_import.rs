@@ -116,7 +116,7 @@ fn read_posed(
     let mut placing = InstancePlacer::new(document, &nodes, &mut materials.materials, &mut warnings)?;
     let unread = placing.prune_unused(options.prune.ambient());
     let (meshes, instances, placed_nodes) = placing.run(&mut known.resting)?;
-    let images = materials.decode(document, &mut known.images)?;
+    let images = materials.decode(document, &mut known.images, options.missing, &mut warnings)?;
     let (eye_nodes, cameras) = cameras(document, &nodes, &mut warnings)?.into_iter().unzip::<_, _, Vec<_>, Vec<_>>();
     let outline = outline(document, &nodes, options, plays, [&placed_nodes, &lit_nodes, &eye_nodes])?;
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();

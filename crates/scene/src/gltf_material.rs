@@ -19,11 +19,11 @@ use serde_json::{Map, Value};
 
 use super::substance::INFINITE_IOR;
 use super::{
-    AlphaMode, Image, Material, Sampler, TextureRef, Wrap,
+    AlphaMode, Image, Material, MissingImages, Sampler, TextureRef, Wrap,
     container::{Document, short_uri},
     gltf_extras,
     lobe::{Factor, LOBES, Lobe, LobeOf},
-    pictures,
+    pictures::{self, ImageUse},
 };
 use etalon_optics::spectra;
 
@@ -133,8 +133,14 @@ pub(crate) fn read(document: &Document<'_>, warnings: &mut Vec<String>) -> Resul
 
 impl Materials {
     /// Decodes, in parallel, the images that the materials still use and that are not in `known`, a cache by source.
-    /// Reads the headers of all other images, so that a broken file is always an error.
-    pub(crate) fn decode(&mut self, document: &Document<'_>, known: &mut KnownImages) -> Result<Vec<Image>> {
+    /// Reads the headers of all other images, so that a broken file is found either way.
+    pub(crate) fn decode(
+        &mut self,
+        document: &Document<'_>,
+        known: &mut KnownImages,
+        missing: MissingImages,
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<Image>> {
         let first = known.is_empty();
         let mut places = vec![None; self.sources.len()];
         let mut wanted = Vec::new();
@@ -145,31 +151,48 @@ impl Materials {
             });
         }
         for i in (0..document.root.images.len()).filter(|&i| first && wanted.iter().all(|source| source.file != i)) {
-            with_bytes(document, i, |_, bytes| pictures::probe(bytes))?;
+            let name = image_name(document, i);
+            match (with_bytes(document, i, |_, bytes| pictures::probe(bytes)), missing) {
+                (Err(error), MissingImages::Checker) => {
+                    warnings.push(format!("{name} cannot be read ({error:#}); nothing that is drawn needs it"));
+                }
+                (read, _) => read.context(name)?,
+            }
         }
-        let missing: Vec<ImageSource> = wanted.iter().copied().filter(|source| !known.contains_key(source)).collect();
-        let decoded: Vec<_> =
-            missing.par_iter().map(|&source| Ok((source, source.decode(document)?))).collect::<Result<_>>()?;
-        known.extend(decoded);
+        let unknown: Vec<(usize, ImageSource)> =
+            wanted.iter().copied().enumerate().filter(|(_, source)| !known.contains_key(source)).collect();
+        let decoded: Vec<Result<Image>> = unknown.par_iter().map(|(_, source)| source.decode(document)).collect();
+        for ((image, source), read) in unknown.into_iter().zip(decoded) {
+            let of = ImageUse::of(&self.materials, image);
+            known.insert(source, missing.replace(read, &image_name(document, source.file), of, warnings)?);
+        }
         Ok(wanted.iter().map(|source| known[source].clone()).collect())
     }
 }
 
-/// Passes the name and the encoded bytes of image `index` to `then`, and adds the name to its error.
-fn with_bytes<T>(document: &Document<'_>, index: usize, then: impl FnOnce(String, &[u8]) -> Result<T>) -> Result<T> {
-    let json = document.root.images.get(index).with_context(|| format!("image {index} does not exist"))?;
-    let name = match (&json.name, &json.uri) {
-        (_, Some(uri)) if !uri.starts_with("data:") => short_uri(uri),
-        (Some(name), _) => name.clone(),
+/// Name of image `index`: that of its file, or the one that the JSON gives it.
+fn bare_name(document: &Document<'_>, index: usize) -> String {
+    match document.root.images.get(index).map(|json| (&json.name, &json.uri)) {
+        Some((_, Some(uri))) if !uri.starts_with("data:") => short_uri(uri),
+        Some((Some(name), _)) => name.clone(),
         _ => format!("image {index}"),
-    };
-    let what = format!("image {index} \"{name}\"");
+    }
+}
+
+/// Image `index` in messages.
+fn image_name(document: &Document<'_>, index: usize) -> String {
+    format!("image {index} \"{}\"", bare_name(document, index))
+}
+
+/// Passes the name and the encoded bytes of image `index` to `then`; the caller names the image in its error.
+fn with_bytes<T>(document: &Document<'_>, index: usize, then: impl FnOnce(String, &[u8]) -> Result<T>) -> Result<T> {
+    let json = document.root.images.get(index).context("it does not exist")?;
+    let name = bare_name(document, index);
     match (&json.uri, json.buffer_view) {
         (Some(uri), _) => document.resolve(uri).and_then(|bytes| then(name, &bytes)),
         (None, Some(view)) => document.view(view.value()).and_then(|(bytes, _)| then(name, bytes)),
         (None, None) => Err(anyhow::anyhow!("it has neither a URI nor a buffer view")),
     }
-    .context(what)
 }
 
 fn parse<'v, T: Deserialize<'v>>(others: &'v Map<String, Value>, name: &str) -> Result<Option<T>> {

@@ -45,9 +45,20 @@ pub use camera::{Camera, Projection};
 pub use light::{Extent, KeyLight, Light, LightKind};
 pub use material::{AlphaMode, Material, Meaning, Sampler, TextureRef, Wrap};
 pub use outline::Outline;
+pub use pictures::REPLACED;
 pub use prune::{AmbientLight, Prune};
 pub use shared::{Mark, Shared};
 pub use sigma::SigmaGrid;
+
+/// What happens where an image of a file is missing or broken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MissingImages {
+    /// The file is refused.
+    #[default]
+    Error,
+    /// A checker stands in the image's place, with a warning that ends in [`REPLACED`].
+    Checker,
+}
 
 /// Options of [`load`].
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -70,6 +81,8 @@ pub struct LoadOptions {
     pub only: Vec<String>,
     /// A directional light beside those of the file.
     pub key_light: Option<KeyLight>,
+    /// What happens where an image is missing or broken.
+    pub missing: MissingImages,
 }
 
 /// File name extensions of the files that [`load`] reads, in lower case; upper case is read as well.
@@ -107,7 +120,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
         "obj" | "stl" | "ply" if options.scene.is_some() || options.variant.is_some() => {
             bail!("loading {}: only glTF files have scenes and variants to choose", path.display())
         }
-        "obj" => obj::load(path, options.prune),
+        "obj" => obj::load(path, options),
         "stl" => mesh_files::load_stl(path),
         "ply" => mesh_files::load_ply(path),
         _ => {

@@ -16,7 +16,8 @@ use glam::{Affine2, DAffine3, DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::{
-    AlphaMode, Image, Instance, Material, Mesh, Sampler, Scene, TextureRef, Wrap, geometry, pictures,
+    AlphaMode, Image, Instance, LoadOptions, Material, Mesh, MissingImages, Sampler, Scene, TextureRef, Wrap, geometry,
+    pictures::{self, ImageUse},
     prune::{Prune, prune_textures},
     thin::{self, Stroke},
 };
@@ -25,7 +26,7 @@ use super::{
 const MAX_EARS: usize = 2_000;
 
 /// Reads an `.obj` file and its material libraries.
-pub(crate) fn load(path: &Path, prune: Prune) -> Result<Scene> {
+pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let bytes = super::contents(path)?;
     let text = String::from_utf8_lossy(&bytes);
     let mut reader = ObjReader {
@@ -36,7 +37,7 @@ pub(crate) fn load(path: &Path, prune: Prune) -> Result<Scene> {
     for (number, line) in logical_lines(&text) {
         reader.line(&line).with_context(|| format!("line {number}"))?;
     }
-    let mut scene = reader.finish(prune)?;
+    let mut scene = reader.finish(options)?;
     scene.name = path.display().to_string();
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     scene.warnings.iter_mut().for_each(|w| *w = format!("{file}: {w}"));
@@ -343,7 +344,7 @@ impl ObjReader {
         })
     }
 
-    fn finish(mut self, prune: Prune) -> Result<Scene> {
+    fn finish(mut self, options: &LoadOptions) -> Result<Scene> {
         if self.groups.iter().any(|g| g.material.is_none()) {
             let grey = Mtl { kd: Some([0.8; 3]), ..Mtl::default() };
             for group in self.groups.iter_mut().filter(|g| g.material.is_none()) {
@@ -352,8 +353,8 @@ impl ObjReader {
             self.materials.push(grey.fold("default"));
         }
         let groups = std::mem::take(&mut self.groups);
-        let unread = self.prune_unused(prune, &groups);
-        let images = self.decode()?;
+        let unread = self.prune_unused(options.prune, &groups);
+        let images = self.decode(options.missing)?;
         let built: Vec<(Mesh, Vec<Stroke>, Vec<String>)> = groups.into_par_iter().map(|g| self.build(g)).collect();
         let mut scene = Scene { images, unread, warnings: self.warnings, ..Scene::default() };
         let mut strokes = Vec::new();
@@ -381,7 +382,7 @@ impl ObjReader {
     }
 
     /// Decodes, in parallel, the images that the materials still use.
-    fn decode(&mut self) -> Result<Vec<Image>> {
+    fn decode(&mut self, missing: MissingImages) -> Result<Vec<Image>> {
         let mut places = vec![None; self.pictures.len()];
         let mut wanted = Vec::new();
         for texture in self.materials.iter_mut().flat_map(Material::textures_mut).flatten() {
@@ -390,7 +391,18 @@ impl ObjReader {
                 wanted.len() - 1
             });
         }
-        wanted.par_iter().map(|&picture| decode(picture)).collect()
+        let decoded: Vec<Result<(Image, Vec<String>)>> = wanted
+            .par_iter()
+            .enumerate()
+            .map(|(image, picture)| decode(picture, missing, ImageUse::of(&self.materials, image)))
+            .collect();
+        let mut images = Vec::new();
+        for decoded in decoded {
+            let (image, warnings) = decoded?;
+            images.push(image);
+            warnings.into_iter().for_each(|warning| self.warn(warning));
+        }
+        Ok(images)
     }
 
     fn build(&self, group: ObjGroup) -> (Mesh, Vec<Stroke>, Vec<String>) {
@@ -491,18 +503,23 @@ fn triangulate(corners: &[DVec3]) -> Vec<[usize; 3]> {
 }
 
 fn read_picture(path: &Path) -> Result<Image> {
-    let bytes = fs::read(path).with_context(|| format!("reading the texture {}", path.display()))?;
+    let bytes = fs::read(path).map_err(|error| anyhow!(etalon_image::file::cause(&error)))?;
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-    pictures::decode(name, &bytes).with_context(|| format!("the texture {}", path.display()))
+    pictures::decode(name, &bytes)
 }
 
-fn decode(picture: &ObjPicture) -> Result<Image> {
-    match (&picture.color, &picture.alpha) {
-        (Some(color), None) => read_picture(color),
+/// The image of a material, with warnings about checkers in it.
+fn decode(picture: &ObjPicture, missing: MissingImages, of: ImageUse) -> Result<(Image, Vec<String>)> {
+    let mut warnings = Vec::new();
+    let mut read = |path: &Path, of| {
+        missing.replace(read_picture(path), &format!("the texture {}", path.display()), of, &mut warnings)
+    };
+    let image = match (&picture.color, &picture.alpha) {
+        (Some(color), None) => read(color, of)?,
         (color, Some(alpha)) => {
-            let alpha = read_picture(alpha)?;
+            let alpha = read(alpha, ImageUse::Data)?;
             let mut out = match color {
-                Some(color) => read_picture(color)?,
+                Some(color) => read(color, of)?,
                 None => Image { rgba: vec![255; alpha.rgba.len()].into(), ..alpha.clone() },
             };
             let (w, h) = (out.width as usize, out.height as usize);
@@ -514,10 +531,11 @@ fn decode(picture: &ObjPicture) -> Result<Image> {
                     out.rgba[(y * w + x) * 4 + 3] = ((r + g + b) / 3) as u8;
                 }
             }
-            Ok(out)
+            out
         }
         (None, None) => bail!("a material has a picture without a file"),
-    }
+    };
+    Ok((image, warnings))
 }
 
 /// A texture statement: file and supported options.

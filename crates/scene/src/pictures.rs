@@ -9,13 +9,76 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use basisu::{DecodeFlags, SourceFormat, TargetFormat, Transcoder};
 use image::{ImageFormat, ImageReader, Limits};
 
-use super::Image;
 use super::container::view_of;
+use super::{Image, Material, Meaning, MissingImages};
 
 /// Largest width and height in texels, which every Vulkan 1.3 device of interest supports for a 2D image.
 const MAX_SIDE: u32 = 16_384;
 /// Largest memory in bytes for decoding one image.
 const MAX_DECODE_BYTES: u64 = 2 << 30;
+
+/// The end of the warning about an image that a checker replaces.
+pub const REPLACED: &str = "a checker stands in its place";
+
+/// What the texels of an image are, in the order in which it decides for an image of several uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum ImageUse {
+    Color,
+    /// Factors.
+    Data,
+    Normals,
+}
+
+impl ImageUse {
+    /// The use of an image by these materials.
+    pub(crate) fn of(materials: &[Material], image: usize) -> Self {
+        let slots = materials.iter().flat_map(Material::textures);
+        let uses = slots.filter(|(.., texture)| texture.is_some_and(|texture| texture.image == image)).map(
+            |(slot, meaning, _)| match (slot, meaning) {
+                ("normal" | "clearcoat_normal", _) => Self::Normals,
+                (_, Meaning::Color) => Self::Color,
+                (_, Meaning::Data) => Self::Data,
+            },
+        );
+        uses.min().unwrap_or(Self::Data)
+    }
+
+    /// 8 by 8 squares that are seen wherever the image was to be: magenta and black colours; factors kept and halved;
+    /// normals that are straight and tilted.
+    fn checker(self, name: &str) -> Image {
+        const SQUARES: u32 = 8;
+        // Not one: filtering would leave no square.
+        const SIDE: u32 = 8;
+        let texels = match self {
+            Self::Color => [[255, 0, 255, 255], [0, 0, 0, 255]],
+            Self::Data => [[255; 4], [128, 128, 128, 255]],
+            Self::Normals => [[128, 128, 255, 255], [166, 128, 249, 255]],
+        };
+        let side = SQUARES * SIDE;
+        let texel = |i: u32| texels[((i % side / SIDE + i / side / SIDE) % 2) as usize];
+        Image { name: name.to_owned(), width: side, height: side, rgba: (0..side * side).flat_map(texel).collect() }
+    }
+}
+
+impl MissingImages {
+    /// An image as it was read; or, where it cannot be read and this is allowed, a checker and a warning. `name` begins
+    /// the sentence.
+    pub(crate) fn replace(
+        self,
+        read: Result<Image>,
+        name: &str,
+        of: ImageUse,
+        warnings: &mut Vec<String>,
+    ) -> Result<Image> {
+        match (read, self) {
+            (Err(error), Self::Checker) => {
+                warnings.push(format!("{name} cannot be read ({error:#}): {REPLACED}"));
+                Ok(of.checker(name))
+            }
+            (read, _) => read.with_context(|| name.to_owned()),
+        }
+    }
+}
 
 fn reader(bytes: &[u8]) -> Result<ImageReader<Cursor<&[u8]>>> {
     // The magic bytes decide: files often have the wrong MIME type or extension.
