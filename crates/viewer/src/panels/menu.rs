@@ -21,6 +21,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, acti
         ui.separator();
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             progress(ui, seen);
+            warnings(ui, state, seen);
             ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| title(ui, state, seen));
         });
     });
@@ -135,6 +136,19 @@ fn duration(seconds: f64) -> String {
         s if s < 120.0 => format!("{s:.0} s"),
         s if s < 7200.0 => format!("{:.0} min", s / 60.0),
         s => format!("{:.0} h", s / 3600.0),
+    }
+}
+
+/// A sign that stays while there are warnings; a click shows them.
+fn warnings(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
+    let read = seen.facts.as_ref().map_or(0, |facts| facts.warnings.len());
+    let count = read + seen.sides[state.side].warnings.len();
+    if count == 0 {
+        return;
+    }
+    let text = RichText::new(format!("⚠ {count}")).color(ui.visuals().warn_fg_color);
+    if ui.button(text).on_hover_text("Warnings of the file and of the plan").clicked() {
+        state.forward = Some(Pane::Plan);
     }
 }
 
