@@ -221,7 +221,7 @@ fn time_passes_and_settings_are_compared() {
     let (size, expected_left) = drawn(folder, &played);
     let (_, expected_right) = drawn(folder, &right);
     // The first rows and the last are covered by figures.
-    let rows = 40..110;
+    let rows = 30..80;
     let differ = |found: &[[u8; 3]], expected: &[[u8; 3]], columns: std::ops::Range<u32>| {
         let places = rows.clone().flat_map(|y| columns.clone().map(move |x| (y * size[0] + x) as usize));
         places.filter(|&at| found[at] != expected[at]).count()

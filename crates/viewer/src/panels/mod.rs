@@ -296,7 +296,8 @@ impl PanelState {
 
     fn tell_knob(&mut self) {
         let Some(knob) = self.knob.map(|at| &KNOBS[at]) else { return };
-        self.notices.say(format!("{}={}: {}", knob.name, knob.rung(self.knobs()), knob.about));
+        let place = knob.place(self.knobs());
+        self.notices.say(format!("{}={}: {}", knob.name, knob.rungs[place], knob.rung_about[place]));
     }
 
     /// Whether the file dialog is open: keys then type text.

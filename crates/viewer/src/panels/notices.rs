@@ -66,7 +66,9 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, acti
         return;
     }
     let width = (right - left - 32.0).clamp(160.0, 640.0);
-    let place = egui::pos2(0.5 * (left + right), bottom - 12.0);
+    // The figures of a comparison stand at the bottom.
+    let above = if state.other.is_some() { 110.0 } else { 12.0 };
+    let place = egui::pos2(0.5 * (left + right), bottom - above);
     let area = egui::Area::new(egui::Id::new("notices")).pivot(egui::Align2::CENTER_BOTTOM).fixed_pos(place);
     area.order(egui::Order::Foreground).show(ui.ctx(), |ui| {
         ui.set_max_width(width);

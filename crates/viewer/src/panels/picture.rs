@@ -295,7 +295,10 @@ fn account(side: usize, seen: &RenderState) -> Option<String> {
     let [done, of] = shown.samples;
     let mut lines = vec![
         format!("{}  {few}", ["left", "right"][side]),
-        format!("{:.1} ms and {} rays per sample, {done} of {of} samples", shown.ms(), shown.rays),
+        // Short lines: both labels stand side by side.
+        format!("{done} of {of} samples"),
+        format!("{:.1} ms per sample", shown.ms()),
+        format!("{:.2} million rays per sample", shown.rays as f64 * 1e-6),
     ];
     lines.extend(shown.error.map(|error| format!("estimated relative error {:.1} %", 100.0 * error)));
     let table = seen.facts.as_ref().and_then(|facts| facts.prices.as_ref());
