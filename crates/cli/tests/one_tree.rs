@@ -24,18 +24,8 @@ struct Pool;
 impl SceneSource for Pool {
     fn open(&mut self, asked: OpenRequest<'_>, _: &Arc<Device>) -> Result<Loaded> {
         let opened = Opened::load("study:pool")?;
-        Ok(Loaded {
-            name: opened.scene().name.clone(),
-            camera: opened.camera(asked.size)?,
-            original: opened.original,
-            environment: None,
-            warnings: Vec::new(),
-            prices: None,
-            framed: false,
-            knobs: None,
-            exposure: 0.0,
-            sources: None,
-        })
+        let camera = opened.camera(asked.size)?;
+        Ok(Loaded::new(opened.original, camera))
     }
 
     fn moment(&mut self, _: OpenRequest<'_>) -> Result<(Scene, Camera)> {

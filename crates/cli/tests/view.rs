@@ -294,18 +294,8 @@ struct Study;
 impl SceneSource for Study {
     fn open(&mut self, _: OpenRequest<'_>, _: &Arc<Device>) -> Result<Loaded> {
         let scene = scene();
-        Ok(Loaded {
-            name: scene.name.clone(),
-            camera: scene.cameras[0].clone(),
-            original: scene.into(),
-            environment: None,
-            warnings: Vec::new(),
-            prices: None,
-            framed: false,
-            knobs: None,
-            exposure: 0.0,
-            sources: None,
-        })
+        let camera = scene.cameras[0].clone();
+        Ok(Loaded::new(scene, camera))
     }
 
     fn moment(&mut self, _: OpenRequest<'_>) -> Result<(Scene, Camera)> {

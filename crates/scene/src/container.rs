@@ -19,6 +19,7 @@ use gltf::json::{
 use super::decompress::{decompress, is_fallback};
 use super::extensions::is_supported;
 use super::lenient::{self, PointerChannel};
+use super::names::by_name_or_index;
 
 /// A glTF file with its buffers in memory.
 pub(crate) struct Document<'a> {
@@ -133,17 +134,6 @@ impl<'a> Document<'a> {
     pub(crate) fn resolve(&self, uri: &str) -> Result<Vec<u8>> {
         resolve(uri, &self.folder)
     }
-}
-
-/// Index of the item of a list with this name, or with this index; the error lists what there is.
-pub(crate) fn by_name_or_index(kind: &str, wanted: &str, names: &[Option<&str>]) -> Result<usize> {
-    let by_index = || wanted.parse::<usize>().ok().filter(|&index| index < names.len());
-    names.iter().position(|name| *name == Some(wanted)).or_else(by_index).with_context(|| {
-        let item = |(i, name): (usize, &Option<&str>)| name.map_or(i.to_string(), |name| format!("{i} \"{name}\""));
-        let there: Vec<String> = names.iter().enumerate().map(item).collect();
-        let there = if there.is_empty() { "none".to_owned() } else { there.join(", ") };
-        format!("there is no {kind} \"{wanted}\"; the file has {there}")
-    })
 }
 
 /// The `length` bytes from byte `start` on; `what` spans them, `of` has the bytes.

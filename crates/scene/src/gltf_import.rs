@@ -27,8 +27,9 @@ use super::{
     geometry, gltf_extras,
     gltf_material::{self, KnownImages},
     lenient,
+    names::keys,
     nodes::{Nodes, chosen_scene, end, label, playing},
-    outline::{Animation, Outline, OutlineNode, keys},
+    outline::{Animation, Outline, OutlineNode},
     prune::{Coordinates, prune_textures, unused_coordinates},
     thin::{self, Stroke},
 };

@@ -22,6 +22,7 @@ pub mod light;
 pub mod lobe;
 pub mod material;
 mod mesh_files;
+mod names;
 mod nodes;
 mod obj;
 pub mod outline;

@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 
-use super::container::by_name_or_index;
+use super::names::{by_name_or_index, keys};
 use super::{LoadOptions, Scene};
 
 /// The contents of a scene's file. Study scenes, OBJ, STL and PLY files have a flat tree: one node for each instance,
@@ -72,19 +72,6 @@ impl Outline {
     }
 }
 
-/// Keys of nodes, by their names: a name that two nodes have, or that is another's index, does not tell them apart.
-pub(crate) fn keys(names: &[Option<&str>]) -> Vec<String> {
-    let mut counts = std::collections::HashMap::new();
-    for name in names.iter().flatten() {
-        *counts.entry(*name).or_insert(0_usize) += 1;
-    }
-    let key = |(index, name): (usize, &Option<&str>)| match name {
-        Some(name) if counts[name] == 1 && !name.is_empty() => (*name).to_owned(),
-        _ => index.to_string(),
-    };
-    names.iter().enumerate().map(key).collect()
-}
-
 /// Which nodes the options hide; `parents` and `names` are those of all nodes.
 pub(crate) fn hidden(options: &LoadOptions, names: &[Option<&str>], parents: &[Option<usize>]) -> Result<Vec<bool>> {
     let marked = |wanted: &[String]| -> Result<Vec<bool>> {
@@ -138,12 +125,6 @@ pub(crate) fn flat(scene: &mut Scene, options: &LoadOptions) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_key_names_one_node() {
-        let names = [Some("a"), Some("b"), Some("a"), None, Some("")];
-        assert_eq!(keys(&names), ["0", "b", "2", "3", "4"]);
-    }
 
     #[test]
     fn what_is_below_a_hidden_node_is_hidden() {

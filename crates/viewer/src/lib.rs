@@ -6,6 +6,7 @@
 pub mod clock;
 pub mod equations;
 pub mod layer;
+pub mod layout;
 pub mod lookup;
 pub mod navigation;
 pub mod panels;

@@ -7,13 +7,32 @@ use serde::{Deserialize, Serialize};
 
 use etalon::image::file;
 
-use super::panels::docks::Docks;
-use super::panels::overlay::Overlays;
+use super::layout::Docks;
 
 /// Width of a small picture in pixels.
 const SMALL: u32 = 96;
 /// Number of recent files.
 const RECENT: usize = 10;
+
+/// What is drawn over the picture.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Overlays {
+    /// A grid on the floor of the scene, with the axes.
+    pub grid: bool,
+    /// Axes in the corner, whose ends choose views.
+    pub gizmo: bool,
+    /// The box of each instance.
+    pub boxes: bool,
+    /// Marks of lights and cameras.
+    pub lights: bool,
+}
+
+impl Default for Overlays {
+    fn default() -> Self {
+        Self { grid: false, gizmo: true, boxes: false, lights: false }
+    }
+}
 
 /// Preferences, kept as JSON in the user's configuration folder.
 #[derive(Clone, PartialEq, Serialize, Deserialize)]

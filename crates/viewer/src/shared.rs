@@ -73,6 +73,26 @@ pub struct Loaded {
     pub sources: Option<Sources>,
 }
 
+impl Loaded {
+    /// A scene without environment, prices and warnings, as it is seen by a camera of its own.
+    #[must_use]
+    pub fn new(original: impl Into<Original>, camera: Camera) -> Self {
+        let original = original.into();
+        Self {
+            name: original.scene().name.clone(),
+            original,
+            environment: None,
+            camera,
+            warnings: Vec::new(),
+            prices: None,
+            framed: false,
+            knobs: None,
+            exposure: 0.0,
+            sources: None,
+        }
+    }
+}
+
 /// Request for a scene: file, animation time and size of the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OpenRequest<'a> {

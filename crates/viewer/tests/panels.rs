@@ -10,8 +10,8 @@ use etalon::gpu::{DeviceInfo, PassTime};
 use etalon::pass::tonemap::Counts;
 use etalon::plan::Knobs;
 use etalon::scene::outline::{Animation, Outline, OutlineNode};
+use etalon_viewer::layout::{Docks, Pane};
 use etalon_viewer::navigation::Navigation;
-use etalon_viewer::panels::docks::{Docks, Pane};
 use etalon_viewer::panels::{self, PanelState};
 use etalon_viewer::preferences::Preferences;
 use etalon_viewer::shared::{FileChoice, Loaded, RenderRequest, RenderState, SceneFacts, Shown, Side};
@@ -40,18 +40,9 @@ fn loaded() -> Loaded {
             .collect(),
     };
     scene.duration = Some(1.0);
-    Loaded {
-        name: scene.name.clone(),
-        camera: scene.cameras[0].clone(),
-        original: scene.into(),
-        environment: None,
-        warnings: vec!["the optional extension EXT_something_with_a_long_name is not supported and is ignored".into()],
-        prices: None,
-        framed: false,
-        knobs: None,
-        exposure: 0.0,
-        sources: None,
-    }
+    let camera = scene.cameras[0].clone();
+    let warning = "the optional extension EXT_something_with_a_long_name is not supported and is ignored";
+    Loaded { warnings: vec![warning.to_owned()], ..Loaded::new(scene, camera) }
 }
 
 fn seen(loaded: &Loaded) -> RenderState {

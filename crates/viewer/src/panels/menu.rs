@@ -3,8 +3,8 @@
 use egui::{RichText, Ui};
 
 use super::commands::{COMMANDS, inputs};
-use super::docks::Pane;
 use super::{Action, PanelState, perform};
+use crate::layout::Pane;
 use crate::preferences::small;
 use crate::shared::RenderState;
 use etalon::study;

@@ -3,12 +3,12 @@
 
 pub mod commands;
 mod display;
-pub mod docks;
+mod docks;
 mod light;
 mod menu;
 mod notices;
 mod options;
-pub mod overlay;
+mod overlay;
 mod picture;
 mod pixel;
 mod plan;
@@ -26,11 +26,11 @@ use glam::DVec3;
 
 use super::clock::Clock;
 use super::layer::SurfaceLayer;
+use super::layout::{Docks, Pane};
 use super::navigation::{Navigation, View};
 use super::preferences::Preferences;
 use super::shared::{FileChoice, Pick, RenderState};
 use commands::{COMMANDS, MenuCommand};
-use docks::{Docks, Pane};
 use etalon::frame::Settings;
 use etalon::gpu::{DeviceInfo, PassTime};
 use etalon::plan::{KNOBS, Knobs, Model};
@@ -415,7 +415,7 @@ pub fn show(root: &mut Ui, state: &mut PanelState, seen: &RenderState) -> Vec<Ac
         let width = root.available_width();
         state.docks(width);
         if let Some(mut docks) = state.preferences.docks.take() {
-            docks.show(root, state, seen, &mut actions);
+            docks::show(&mut docks, root, state, seen, &mut actions);
             if let Some(pane) = state.forward.take() {
                 docks.set_open(pane, true);
             }

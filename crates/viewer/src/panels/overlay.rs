@@ -3,7 +3,6 @@
 
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke};
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 
 use super::PanelState;
 use crate::lookup::on_picture_of;
@@ -21,26 +20,6 @@ const GRID: Color32 = Color32::from_rgba_premultiplied(70, 70, 70, 90);
 /// Colours of the axes.
 pub(super) const AXES: [Color32; 3] =
     [Color32::from_rgb(230, 80, 70), Color32::from_rgb(110, 190, 60), Color32::from_rgb(90, 150, 250)];
-
-/// What is drawn over the picture.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Overlays {
-    /// A grid on the floor of the scene, with the axes.
-    pub grid: bool,
-    /// Axes in the corner, whose ends choose views.
-    pub gizmo: bool,
-    /// The box of each instance.
-    pub boxes: bool,
-    /// Marks of lights and cameras.
-    pub lights: bool,
-}
-
-impl Default for Overlays {
-    fn default() -> Self {
-        Self { grid: false, gizmo: true, boxes: false, lights: false }
-    }
-}
 
 /// The picture on the screen, as a painter of lines in the scene.
 pub(super) struct Canvas<'a> {

@@ -4,11 +4,11 @@
 use egui::{Align2, Color32, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, Sense, Stroke, Ui};
 use glam::{DVec2, DVec3};
 
-use super::docks::Pane;
 use super::overlay::{self, AXES, Canvas, text};
 use super::pixel::{colour, incidence};
 use super::{Action, Click, PanelState};
 use crate::layer::SurfaceLayer;
+use crate::layout::Pane;
 use crate::navigation::{Navigation, ViewSide};
 use crate::shared::{Pick, PixelSurfaces, RenderState, Trace};
 use etalon::plan::KNOBS;

@@ -527,18 +527,7 @@ mod tests {
         let tracer = EventTracer::new(original.scene(), original.bvh().expect("a tree"));
         let limits = Limits { surfaces: 1, roughest: 0.2, least_share: 0.01, proxies: true };
         let events = tracer.follow(original.scene(), &camera, [3, 3], [1, 1], &limits);
-        let loaded = Loaded {
-            name: String::new(),
-            original,
-            environment: None,
-            camera,
-            warnings: Vec::new(),
-            prices: None,
-            framed: false,
-            knobs: None,
-            exposure: 0.0,
-            sources: None,
-        };
+        let loaded = Loaded::new(original, camera);
         let facts = SceneFacts::of(&RenderRequest::new(Settings::default()), &loaded).expect("a scene");
         (Arc::new(facts), events)
     }
