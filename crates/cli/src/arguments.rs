@@ -7,16 +7,15 @@ use std::process::ExitCode;
 use anyhow::{Context as _, Result};
 use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::parser::ValueSource;
-use clap::{ArgMatches, Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
+use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use clap_complete::Shell;
 use etalon::plan::Knob;
 use etalon::scene::EXTENSIONS;
 use tracing::Level;
 use tracing_subscriber::filter::Targets;
 
+use super::exit_codes::EXIT_CODES;
 use super::heading;
-use super::interrupt::INTERRUPTED;
 use super::options::When;
 use super::{cost, desktop, devices, diff, eval, farm, lists, merge, picture, plan, plot, print, render, verify, view};
 
@@ -99,31 +98,6 @@ pub struct CompletionsArgs {
 #[command(after_help = "Examples:\n    etalon manual")]
 pub struct ManualArgs {}
 
-/// What the program's exit codes mean; the first three are those of every command.
-pub const EXIT_CODES: [(u8, &str); 6] = [
-    (0, "done"),
-    (
-        1,
-        "failed, with a sentence; or `diff` found more than `--max`, `verify` a broken bound, `devices` no usable device",
-    ),
-    (
-        WRONG,
-        "wrong usage: an unknown option, a value that is missing, malformed or unknown, or options that contradict",
-    ),
-    (AGAIN, "worth trying again: the device was lost, or the disk is full"),
-    (INTERRUPTED, "ended by Ctrl-C; with `render --keep` the outputs have the samples drawn so far"),
-    (ENDED, "a part of a picture that was ended by SIGTERM, with the samples it had"),
-];
-
-/// Wrong usage: the code that clap has for command lines that do not parse.
-pub const WRONG: u8 = 2;
-
-/// Worth trying again: EX_TEMPFAIL of sysexits.h.
-pub const AGAIN: u8 = 75;
-
-/// Ended by SIGTERM, as shells report it: 128 and the signal's number.
-pub const ENDED: u8 = 143;
-
 /// The command line as data, for help, manual and completions.
 #[must_use]
 pub fn command() -> clap::Command {
@@ -162,9 +136,8 @@ fn is_scene(word: &OsStr) -> bool {
 pub fn parse(words: Vec<OsString>) -> Result<Arguments, clap::Error> {
     let parsed = command().try_get_matches_from(with_command(words)).and_then(|matches| {
         let mut arguments = Arguments::from_arg_matches(&matches)?;
-        if let Command::View(view) = &mut arguments.command {
-            let given = |matches: &ArgMatches| matches.value_source("size") == Some(ValueSource::CommandLine);
-            view.size_is_given = matches.subcommand_matches("view").is_some_and(given);
+        if let (Command::View(view), Some(matches)) = (&mut arguments.command, matches.subcommand_matches("view")) {
+            view.complete(matches);
         }
         Ok(arguments)
     });

@@ -139,7 +139,7 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
     let exposure = exposure::choose(args.picture.exposure, &setup.opened, &setup.device, &settings, &camera)?;
     exposure.sentence.iter().for_each(|line| steps.tell(line));
     let settings = Settings { exposure: exposure.stops, ..settings };
-    let picture = exposure.written_out(&args.picture);
+    let picture = args.picture.with_exposure(&exposure);
     let scene = args.scene.with_light_of(&setup.opened, &settings.knobs);
     if let Some(wanted) = &args.compare {
         let mut knobs = settings.knobs.clone();

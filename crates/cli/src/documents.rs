@@ -14,7 +14,8 @@ use etalon::plan::{EffectId, ForcedEffects, KNOBS, Knob, Knobs};
 use etalon::shader;
 use etalon::study;
 
-use super::arguments::{EXIT_CODES, command};
+use super::arguments::command;
+use super::exit_codes::EXIT_CODES;
 
 /// The blocks by name.
 #[must_use]

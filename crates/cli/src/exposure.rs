@@ -5,7 +5,6 @@ use std::sync::Arc;
 use anyhow::Result;
 use serde::Serialize;
 
-use super::options::PictureOptions;
 use etalon::frame::Settings;
 use etalon::gpu::Device;
 use etalon::image::meter::Unreadable;
@@ -31,14 +30,6 @@ pub(super) struct ExposureFacts {
     /// What metering found; one sentence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) sentence: Option<String>,
-}
-
-impl ExposureFacts {
-    /// The options of the same picture with its exposure written out where it was metered.
-    pub(super) fn written_out(&self, picture: &PictureOptions) -> PictureOptions {
-        let metered = (self.from == "metered").then_some(Exposure::Stops(self.stops));
-        PictureOptions { exposure: metered.or(picture.exposure), ..picture.clone() }
-    }
 }
 
 /// Chooses the exposure of a picture, or of all pictures of a sequence.

@@ -10,6 +10,7 @@ pub mod devices;
 pub mod diff;
 pub mod documents;
 pub mod eval;
+pub mod exit_codes;
 pub mod exposure;
 pub mod extensions;
 pub mod farm;

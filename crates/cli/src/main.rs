@@ -3,7 +3,8 @@
 use std::io::IsTerminal as _;
 use std::process::ExitCode;
 
-use etalon_cli::arguments::{self, AGAIN, Command, WRONG};
+use etalon_cli::arguments::{self, Command};
+use etalon_cli::exit_codes::{AGAIN, WRONG};
 use etalon_cli::options::When;
 use etalon_cli::progress::ProgressForm;
 use tracing_subscriber::fmt;

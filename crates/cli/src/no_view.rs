@@ -3,13 +3,18 @@
 use std::process::ExitCode;
 
 use anyhow::{Result, bail};
-use clap::Args;
+use clap::{ArgMatches, Args};
 
 /// Open a window that shows the scene (not in this build)
 #[derive(Debug, Clone, Args)]
 pub struct ViewArgs {
     #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
     arguments: Vec<String>,
+}
+
+impl ViewArgs {
+    /// Nothing more is known from the matches.
+    pub(super) fn complete(&mut self, _: &ArgMatches) {}
 }
 
 /// Reports how to get a build with a window.

@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use glam::DVec3;
 
 use super::choices::one_of;
-use super::exposure::Exposure;
+use super::exposure::{Exposure, ExposureFacts};
 use super::heading;
 use super::usage;
 use etalon::frame::{Background, Settings, TileShare};
@@ -483,6 +483,12 @@ impl PictureOptions {
             all.push(format!("--tonemap {name}"));
         }
         all
+    }
+
+    /// These options with the exposure of a picture written out where it was metered.
+    pub(super) fn with_exposure(&self, facts: &ExposureFacts) -> Self {
+        let metered = (facts.from == "metered").then_some(Exposure::Stops(facts.stops));
+        Self { exposure: metered.or(self.exposure), ..self.clone() }
     }
 
     /// Selects spectral rendering (`colour=spectral:16`) for scenes with dispersive glass under `--model global`,

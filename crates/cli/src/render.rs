@@ -85,7 +85,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
         // The chosen rungs were measured in this light.
         setup.opened.keep_light(&settings.knobs);
         let scene = args.scene.with_light_of(&setup.opened, &settings.knobs);
-        let command = command(&scene, &exposure.written_out(&args.picture), &args.device);
+        let command = command(&scene, &args.picture.with_exposure(&exposure), &args.device);
         let found = budget.choose([&args.scene.scene, &command], &args.scene, &setup, &settings, &steps)?;
         settings.max_error = None;
         settings.knobs = found.knobs.clone();

@@ -28,7 +28,7 @@ use etalon_farm::worker::FarmWorker;
 /// Least time between two copies of the sums. The process writes the last copy when it receives SIGTERM.
 const KEEP: Duration = Duration::from_secs(1);
 /// Exit code after SIGTERM, as shells define it.
-const TERMINATED: u8 = super::arguments::ENDED;
+const TERMINATED: u8 = super::exit_codes::ENDED;
 
 /// Division into tiles, or into samples if the plan uses screen-space reflection or refraction, which read the whole
 /// picture.

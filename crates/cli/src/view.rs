@@ -6,7 +6,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context as _, Result, bail, ensure};
-use clap::Args;
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Args};
 
 use super::budget;
 use super::exposure::{self, Exposure};
@@ -42,7 +43,7 @@ pub struct ViewArgs {
     bare: bool,
     /// Whether --size is on the command line; without it, the window has the size of the last run.
     #[arg(skip)]
-    pub(super) size_is_given: bool,
+    size_is_given: bool,
     /// Whether a checker stands in the place of an image of the shown scene: its `render` command then allows that.
     #[arg(skip)]
     has_checkers: Arc<AtomicBool>,
@@ -93,7 +94,7 @@ impl SceneSource for FileSource {
         // `cost` measures at the size of the command line, not at the size of the picture in the window.
         let priced = budget::command(
             &options.with_light_of(&opened, &chosen),
-            &exposure.written_out(&this.picture),
+            &this.picture.with_exposure(&exposure),
             &this.device,
         );
         let prices = budget::known(&priced, &contents(opened.scene(), opened.environment()), device.info());
@@ -124,6 +125,11 @@ impl SceneSource for FileSource {
 }
 
 impl ViewArgs {
+    /// Takes over what only the matches know.
+    pub(super) fn complete(&mut self, matches: &ArgMatches) {
+        self.size_is_given = matches.value_source("size") == Some(ValueSource::CommandLine);
+    }
+
     /// Refuses options that the viewer has no use for.
     fn check(&self) -> Result<()> {
         ensure!(
