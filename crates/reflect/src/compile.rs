@@ -1,11 +1,13 @@
 //! GLSL to SPIR-V by glslang: used by build.rs for all shaders, and by the viewer for changed shaders (feature
 //! `reload`).
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use super::cache::{Cache, Key};
 use super::compact::compacted;
 use super::files::Result;
 use super::interface::{Interface, PassSlots};
@@ -51,12 +53,30 @@ pub(crate) struct Recipe {
     pub(crate) interface: Interface,
     /// Specialization constants whose code is removed.
     without: Vec<String>,
+    /// Optimised code of earlier builds.
+    pub(crate) cache: Cache,
+    /// Code of a small shader, by which another version of the compiler is known.
+    sample: String,
 }
 
+/// A shader of a few instructions with something to optimise.
+const SAMPLE: &str = "#version 460\nlayout(binding = 0) buffer B { float x[]; };\n\
+    void main() { float s = 0.0; for (int i = 0; i < 4; i++) { s += x[i] * 2.0; } x[0] = s; }";
+
 impl Recipe {
-    pub(crate) fn new(root: &Path, without: Vec<String>) -> Result<Self> {
+    pub(crate) fn new(root: &Path, without: Vec<String>, cache: Cache) -> Result<Self> {
         let compiler = shaderc::Compiler::new().map_err(|e| format!("shaderc: {e}"))?;
-        Ok(Self { compiler, root: root.to_owned(), interface: Interface::read(root)?, without })
+        let interface = Interface::read(root)?;
+        let mut new = Self { compiler, root: root.to_owned(), interface, without, cache, sample: String::new() };
+        let level = shaderc::OptimizationLevel::Performance;
+        let sample = shaderc::CompileOptions::new().map_err(|e| format!("shaderc: {e}")).and_then(|mut options| {
+            options.set_optimization_level(level);
+            let kind = shaderc::ShaderKind::Compute;
+            let made = new.compiler.compile_into_spirv(SAMPLE, kind, "sample", "main", Some(&options));
+            made.map(|made| format!("{:?}", made.as_binary())).map_err(|e| format!("shaderc: {e}"))
+        })?;
+        new.sample = sample;
+        Ok(new)
     }
 
     /// Compiles the files of a program; its stages share their bindings.
@@ -85,11 +105,18 @@ impl Recipe {
         let slots = self.interface.pass_slots(texts)?;
         let stage = |(&kind, (name, text)): (&shaderc::ShaderKind, &(String, String))| -> Result<Stage> {
             // rspirv 0.13 cannot load SPIR-V 1.6's OpExecutionModeId; the declarations are the same in 1.5.
-            let (zero, performance) = (shaderc::OptimizationLevel::Zero, shaderc::OptimizationLevel::Performance);
-            let plain = self.words(kind, name, text, &slots, zero, shaderc::SpirvVersion::V1_5, &[])?;
+            let (zero, level) = (shaderc::OptimizationLevel::Zero, shaderc::OptimizationLevel::Performance);
+            let read = RefCell::new(Key::new());
+            let plain = self.words(kind, name, text, &slots, zero, shaderc::SpirvVersion::V1_5, &[], &read)?;
             let module = rspirv::dr::load_words(plain).map_err(|e| format!("{name}: reflection: {e:?}"))?;
             let version = shaderc::SpirvVersion::V1_6;
-            let words = self.words(kind, name, text, &slots, performance, version, &self.without)?;
+            // What the compiler has just read, and all else that decides the code.
+            let mut key = read.into_inner();
+            let settings = format!("{kind:?} {level:?} {version:?} {:?} {}", self.without, self.sample);
+            key.add(&settings);
+            let unread = RefCell::new(Key::new());
+            let make = || self.words(kind, name, text, &slots, level, version, &self.without, &unread);
+            let words = self.cache.words(&key, make)?;
             Ok(Stage { kind, module, words, path: name.clone() })
         };
         let stages = kinds.iter().zip(texts).map(stage).collect::<Result<_>>()?;
@@ -106,6 +133,7 @@ impl Recipe {
         level: shaderc::OptimizationLevel,
         version: shaderc::SpirvVersion,
         without: &[String],
+        read: &RefCell<Key>,
     ) -> Result<Vec<u32>> {
         let mut options = shaderc::CompileOptions::new().map_err(|e| format!("shaderc: {e}"))?;
         options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
@@ -116,9 +144,11 @@ impl Recipe {
             let resolved = self.root.join(wanted);
             let content = fs::read_to_string(&resolved).map_err(|e| format!("{from} includes \"{wanted}\": {e}"))?;
             let content = self.interface.numbered(&content, slots, without)?;
+            read.borrow_mut().add(&content);
             Ok(shaderc::ResolvedInclude { resolved_name: resolved.display().to_string(), content })
         });
         let source = self.interface.numbered(source, slots, without)?;
+        read.borrow_mut().add(&source);
         let compiled = self.compiler.compile_into_spirv(&source, kind, name, "main", Some(&options));
         let artifact = compiled.map_err(|e| match e {
             shaderc::Error::CompilationError(_, log) => log,

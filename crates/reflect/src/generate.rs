@@ -441,7 +441,7 @@ pub(crate) fn probes(recipe: &Recipe, programs: &BTreeMap<String, Program>, whol
     let work = library.equations.iter().map(|equation| (equation.name.clone(), equation));
     let compiled = on_all_cores(
         work,
-        || Recipe::new(&recipe.root, Vec::new()),
+        || Recipe::new(&recipe.root, Vec::new(), recipe.cache.clone()),
         |recipe, equation| {
             let name = format!("probe/{}", equation.name);
             let program = recipe.source(shaderc::ShaderKind::Compute, name.clone(), &equation.probe)?;

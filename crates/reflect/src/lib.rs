@@ -13,6 +13,7 @@
 //!
 //! Errors are printed as `file:line: message` by the compiler itself.
 
+mod cache;
 mod compact;
 mod compile;
 mod contract;
@@ -26,6 +27,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use cache::Cache;
 use compile::Recipe;
 use files::{Result, files, stem};
 
@@ -35,7 +37,8 @@ use files::{Result, files, stem};
 /// # Errors
 /// Compiler messages as `file:line: message`, or the fault of a declaration.
 pub fn build(shaders: &Path, out_dir: &Path, without: &[String]) -> Result<(), String> {
-    let recipe = Recipe::new(shaders, without.to_vec())?;
+    let cache = Cache::beside(out_dir);
+    let recipe = Recipe::new(shaders, without.to_vec(), cache.clone())?;
     if let Some(name) = without.iter().find(|name| recipe.interface.owner("constant", name).is_none()) {
         return Err(format!("no shader has a constant {name}"));
     }
@@ -48,7 +51,7 @@ pub fn build(shaders: &Path, out_dir: &Path, without: &[String]) -> Result<(), S
     }
     let programs = compile::on_all_cores(
         sources,
-        || Recipe::new(shaders, without.to_vec()),
+        || Recipe::new(shaders, without.to_vec(), cache.clone()),
         |recipe, paths| {
             let program = recipe.program(&paths)?;
             for stage in program.stages.iter().filter(|_| without.is_empty()) {
@@ -59,6 +62,7 @@ pub fn build(shaders: &Path, out_dir: &Path, without: &[String]) -> Result<(), S
     )?;
     let mut code = generate::Programs::of(&recipe.interface, &programs)?.rust()?;
     code += &generate::probes(&recipe, &programs, without.is_empty())?;
+    cache.trim();
     let write =
         |name: &str, text: String| fs::write(out_dir.join(name), text).map_err(|e| format!("writing {name}: {e}"));
     write("shaders.rs", code)?;
@@ -89,7 +93,7 @@ pub struct Compiled {
 /// # Errors
 /// The errors of [`build`].
 pub fn program(shaders: &Path, name: &str) -> Result<Compiled, String> {
-    let stages = Recipe::new(shaders, Vec::new())?.program(&sources(shaders, name)?)?.stages;
+    let stages = Recipe::new(shaders, Vec::new(), Cache::default())?.program(&sources(shaders, name)?)?.stages;
     let all = reflect::declared(&stages)?;
     let binding = |b: &reflect::Binding| (b.set, b.name.clone(), b.slot, b.kind, b.access);
     Ok(Compiled {
