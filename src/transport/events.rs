@@ -2,9 +2,9 @@
 //! each light from scattering surfaces.
 //!
 //! Read Whitted 1980, "An Improved Illumination Model for Shaded Display". The rays explain a pixel to a user; no
-//! picture is made of them. They are in f64 and use textbook formulas. Materials and normals are those of the point that
-//! is met ([`super::surface_point`]); a clear coat has the normal of its base. Media and energy shares are those of green
-//! light.
+//! picture is made of them. They are in f64 and use textbook formulas. Materials and normals are those of the point
+//! that is met ([`super::surface_point`]); a clear coat has the normal of its base. Media and energy shares are those
+//! of green light.
 
 use std::sync::Arc;
 

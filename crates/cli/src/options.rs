@@ -115,8 +115,8 @@ pub struct SceneOptions {
     /// Show only this node with everything below it, by name or index; repeatable
     #[arg(long, value_name = "NAME|INDEX", help_heading = heading::SCENE)]
     pub only: Vec<String>,
-    /// Environment map, studio or none [default: the built-in studio; as fill light if the file contains lights, and not if
-    /// its emissive surfaces light it with --model global]
+    /// Environment map, studio or none [default: the built-in studio; as fill light if the file contains lights, and
+    /// not if its emissive surfaces light it with --model global]
     #[arg(long, value_name = "FILE.hdr|FILE.exr|studio|none", help_heading = heading::LIGHT)]
     pub env: Option<String>,
     /// Add a directional light of LUX from AZIMUTH degrees about +Y (0: the front, +Z; 90: +X) and ELEVATION degrees
@@ -442,8 +442,8 @@ impl SceneOptions {
     /// The camera that these options choose.
     ///
     /// # Errors
-    /// Wrong usage when the file has no such camera, or when eye, target and up direction define none; one sentence when
-    /// there is nothing to draw.
+    /// Wrong usage when the file has no such camera, or when eye, target and up direction define none; one sentence
+    /// when there is nothing to draw.
     pub fn choose_camera(&self, scene: &Scene, size: [u32; 2]) -> Result<Camera> {
         let bounds = scene.bounds().ok_or_else(|| anyhow!("{}: the scene has nothing to draw", scene.name))?;
         if let Some(eye) = self.eye {

@@ -1,5 +1,5 @@
-//! Optimised SPIR-V of earlier builds, by what it was made from. Optimisation takes most of the time of a build, and one
-//! edit changes few programs.
+//! Optimised SPIR-V of earlier builds, by what it was made from. Optimisation takes most of the time of a build, and
+//! one edit changes few programs.
 
 use std::fs;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};

@@ -321,7 +321,8 @@ impl<'d, 'b, 'w> InstancePlacer<'d, 'b, 'w> {
         unread
     }
 
-    /// Builds meshes, instances, and the node of each instance; undeformed meshes are cached in `resting` for other times of the animation.
+    /// Builds meshes, instances, and the node of each instance; undeformed meshes are cached in `resting` for other
+    /// times of the animation.
     fn run(self, resting: &mut HashMap<(usize, usize), Mesh>) -> Result<(Vec<Mesh>, Vec<Instance>, Vec<usize>)> {
         let (document, materials): (_, &[Material]) = (self.document, self.materials);
         let (jobs, everything) = (&self.jobs, self.everything);

@@ -50,6 +50,14 @@ struct DrawnLayer {
     version: u64,
 }
 
+/// A scene that was asked for.
+#[derive(Clone)]
+struct AskedScene {
+    /// Its file; `None`: that of the command line.
+    file: Option<PathBuf>,
+    choice: FileChoice,
+}
+
 /// The window, its panels and the connection to the render thread.
 pub(crate) struct OpenWindow {
     pub(crate) window: Arc<Window>,
@@ -61,8 +69,8 @@ pub(crate) struct OpenWindow {
     pub(crate) state: PanelState,
     command: Box<dyn Fn(&View<'_>) -> String>,
     said: Box<dyn Fn(&str)>,
-    /// File of each opened scene, by scene number; `None`: that of the command line.
-    files: Vec<Option<PathBuf>>,
+    /// Each scene that was asked for, by its number.
+    scenes: Vec<AskedScene>,
     scene: u64,
     /// Number of the scene that the navigation belongs to; `None` until one is loaded.
     navigated: Option<u64>,
@@ -94,14 +102,16 @@ pub(crate) struct OpenWindow {
     writes_png: Option<PathBuf>,
     /// EXR file that is written when the radiance is there.
     writes_exr: Option<PathBuf>,
-    /// What was chosen when the scene was last asked for.
-    choice: FileChoice,
+    /// What is chosen, as of the last frame.
+    chosen: FileChoice,
     /// FileChoice whose request waits until it no longer changes.
     chooses_at: Option<Instant>,
     /// Number of the scene whose small picture is kept.
     small: Option<u64>,
+    /// Number of the last scene that could not be read.
+    failed: Option<u64>,
     /// Whether the render thread ended by a panic.
-    failed: bool,
+    panicked: bool,
     /// Shader code that replaces built code.
     code: Arc<Vec<Replacement>>,
     /// Watches the shader files.
@@ -157,7 +167,7 @@ impl OpenWindow {
             state,
             command,
             said,
-            files: vec![None],
+            scenes: vec![AskedScene { file: None, choice: choice.clone() }],
             scene: 0,
             navigated: None,
             moment: None,
@@ -179,10 +189,11 @@ impl OpenWindow {
             again: None,
             writes_png: None,
             writes_exr: None,
-            choice,
+            chosen: choice,
             chooses_at: None,
             small: None,
-            failed: false,
+            failed: None,
+            panicked: false,
             code,
             #[cfg(feature = "reload")]
             _shaders: shaders,
@@ -309,13 +320,13 @@ impl OpenWindow {
             wanted.quit = true;
             self.device.interrupt();
         });
-        self.failed = self.worker.take().is_some_and(|worker| worker.join().is_err());
+        self.panicked = self.worker.take().is_some_and(|worker| worker.join().is_err());
         self.device.clone()
     }
 
     /// Whether the render thread ended by a panic.
     pub(crate) fn render_thread_failed(&self) -> bool {
-        self.failed
+        self.panicked
     }
 
     /// Watches the current file and the buffers and textures beside it for changes.
@@ -360,10 +371,19 @@ impl OpenWindow {
             self.reads_at = Some(Instant::now() + SETTLED);
             return;
         }
-        let same = self.files.get(self.scene as usize).cloned().flatten();
-        self.scene = self.files.len() as u64;
-        self.again = Some(self.scene);
-        self.files.push(same);
+        self.ask(self.asked().clone(), true);
+    }
+
+    /// Asks for a scene. `again`: it is the same one, and its camera stays.
+    fn ask(&mut self, asked: AskedScene, again: bool) {
+        self.scene = self.scenes.len() as u64;
+        self.again = again.then_some(self.scene).or(self.again);
+        self.scenes.push(asked);
+    }
+
+    /// The scene that was asked for last, and has not failed.
+    fn asked(&self) -> &AskedScene {
+        &self.scenes[self.scene as usize]
     }
 
     /// Pixels of the chosen layer; `None` for the shaded picture.
@@ -414,8 +434,14 @@ impl OpenWindow {
             navigation.moment(facts.home.clone(), &facts.cameras);
         }
         self.moment = seen.facts.as_ref().and_then(|facts| facts.time);
-        if seen.failed == Some(self.scene) {
-            self.scene = self.navigated.unwrap_or(self.scene);
+        if seen.failed == Some(self.scene) && self.failed != Some(self.scene) {
+            self.failed = Some(self.scene);
+            // The scene before stays, with what was chosen there.
+            if let Some(before) = self.navigated {
+                self.scene = before;
+                self.state.choice = self.asked().choice.clone();
+                self.chosen = self.state.choice.clone();
+            }
         }
         if self.objects.is_none() && seen.shown().is_some_and(shared::Shown::is_done) {
             self.objects = Some(self.device.objects());
@@ -450,11 +476,10 @@ impl OpenWindow {
     fn act(&mut self, action: Action, seen: &RenderState) {
         match action {
             Action::Open(path) => {
-                self.scene = self.files.len() as u64;
-                self.files.push(Some(path));
                 self.state.clock.stop();
-                self.choice = self.state.choice.of_another_file();
-                self.state.choice = self.choice.clone();
+                self.state.choice = self.state.choice.of_another_file();
+                self.chosen = self.state.choice.clone();
+                self.ask(AskedScene { file: Some(path), choice: self.chosen.clone() }, false);
             }
             Action::Save(path) if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr")) => {
                 self.writes_exr = Some(path);
@@ -501,29 +526,30 @@ impl OpenWindow {
 
     /// Asks for the scene again when something else of it was chosen. Sliders change often: it waits until they rest.
     fn follow_choice(&mut self) {
-        if self.state.choice == self.choice {
-            self.chooses_at = None;
-            return;
+        if self.state.choice != self.chosen {
+            self.chosen = self.state.choice.clone();
+            self.chooses_at = Some(self.drawn + SETTLED);
         }
-        let at = *self.chooses_at.get_or_insert(self.drawn + SETTLED);
-        if at > self.drawn || self.navigated != Some(self.scene) {
+        if self.chosen == self.asked().choice {
+            self.chooses_at = None;
+        }
+        let is_read = self.navigated == Some(self.scene) || self.failed == Some(self.scene);
+        if self.chooses_at.is_none_or(|at| at > self.drawn) || !is_read {
             return;
         }
         self.chooses_at = None;
-        let same = self.files.get(self.scene as usize).cloned().flatten();
-        // Other animations, scenes and files have times of their own.
-        if self.state.choice.scene != self.choice.scene || self.state.choice.animation != self.choice.animation {
+        let before = self.asked().clone();
+        // Other animations and scenes have times of their own, and other scenes are seen from elsewhere.
+        let other_scene = before.choice.scene != self.chosen.scene;
+        if other_scene || before.choice.animation != self.chosen.animation {
             self.state.clock.time = self.state.clock.time.map(|_| 0.0);
         }
-        self.choice = self.state.choice.clone();
-        self.scene = self.files.len() as u64;
-        self.again = Some(self.scene);
-        self.files.push(same);
+        self.ask(AskedScene { choice: self.chosen.clone(), ..before }, !other_scene);
     }
 
     /// File of the current scene; `None`: that of the command line.
     fn file(&self) -> Option<&Path> {
-        self.files.get(self.navigated? as usize)?.as_deref()
+        self.scenes[self.navigated? as usize].file.as_deref()
     }
 
     /// The command that draws this view; `None` where no command can.
@@ -537,7 +563,7 @@ impl OpenWindow {
             file: self.file(),
             named: navigation.and_then(Navigation::named).filter(|_| !moved),
             settings: &settings,
-            choice: &self.choice,
+            choice: &self.scenes[self.navigated.unwrap_or(self.scene) as usize].choice,
             time: self.moment,
             camera,
         };
@@ -561,8 +587,8 @@ impl OpenWindow {
         };
         let wanted = RenderRequest {
             scene: self.scene,
-            file: self.files.get(self.scene as usize).cloned().flatten(),
-            choice: self.choice.clone(),
+            file: self.asked().file.clone(),
+            choice: self.asked().choice.clone(),
             time: self.state.clock.time,
             from: self.state.navigation.as_ref().filter(|_| belongs).map_or(Viewpoint::Own, from),
             settings: self.state.settings.clone(),
