@@ -431,6 +431,27 @@ fn shows_beside_panels(viewer: &mut Viewer<'_>, folder: &Path) -> (String, Vec<[
     (command, expected)
 }
 
+/// Beside panels, in windows of several sizes and scales, with a camera of the file.
+#[test]
+fn the_picture_beside_panels_is_that_of_its_command() {
+    let Some(display) = Display::start() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    std::fs::create_dir_all(folder.join("config/etalon")).expect("a folder");
+    let preferences = json!({ "overlays": { "gizmo": false } });
+    std::fs::write(folder.join("config/etalon/viewer.json"), preferences.to_string()).expect("a file");
+    for (size, scale) in [("900x600", "1"), ("1280x720", "1"), ("1920x1080", "1"), ("1800x1100", "2")] {
+        let arguments = ["study:cornell", "--size", size, "--model", "local", "--set", "samples=1", "--validate"];
+        let scale = [("WINIT_X11_SCALE_FACTOR", scale)];
+        let mut viewer = Viewer::open_with(&display, folder, &arguments, &scale);
+        let (command, _) = shows_beside_panels(&mut viewer, folder);
+        assert!(!command.contains("--eye"), "{command}");
+        let (code, words) = viewer.close();
+        assert_eq!(code, Some(0), "{words}");
+        assert!(!words.contains("Validation Error") && !words.contains("panicked"), "{words}");
+    }
+}
+
 /// What a user does with panels, by mouse and keys: each step is in the command that draws the picture.
 #[test]
 fn nodes_are_hidden_views_chosen_and_pictures_saved() {

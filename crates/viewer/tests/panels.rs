@@ -313,3 +313,38 @@ fn escape_closes_what_is_open() {
     // Four menus, and the drop-downs of tone curve and layer at least.
     assert!(opened >= 6, "{opened} were opened");
 }
+
+/// The pointer over the middle of a control is over that control: nothing lies above it.
+#[test]
+fn the_mouse_reaches_every_control() {
+    let loaded = loaded();
+    let seen = seen(&loaded);
+    let mut reached = 0;
+    for (size, scale) in [([900.0, 600.0], 1.0), ([1280.0, 720.0], 1.0), ([3840.0, 2160.0], 2.0)] {
+        for (pane, title) in Pane::PANELS {
+            let mut window = Window::new(size, scale, egui::ThemePreference::Dark, &loaded, &seen);
+            if let Some(docks) = &mut window.state.preferences.docks {
+                docks.bring_forward(pane);
+            }
+            (0..5).for_each(|_| drop(window.frame(&seen, Vec::new())));
+            let controls: Vec<_> = window.context.viewport(|viewport| {
+                let widgets = viewport.prev_pass.widgets.layers().flat_map(|(_, widgets)| widgets.to_vec());
+                let wanted = widgets.filter(|w| w.sense.is_focusable() && w.enabled && w.interact_rect.is_positive());
+                wanted.map(|w| (w.id, w.interact_rect)).collect()
+            });
+            for (id, rect) in controls {
+                // The ends of the axes in the corner cover each other; tabs have their cross at the side.
+                if rect.width() == rect.height() && rect.width() <= 16.0 {
+                    continue;
+                }
+                let at = rect.left_center().lerp(rect.center(), if rect.width() > 40.0 { 0.5 } else { 1.0 });
+                drop(window.frame(&seen, vec![Event::PointerMoved(at)]));
+                let response = window.context.read_response(id);
+                let is_over = response.is_some_and(|response| response.contains_pointer());
+                assert!(is_over, "{title} {size:?} ×{scale}: {rect:?} is not reached at {at:?}");
+                reached += 1;
+            }
+        }
+    }
+    assert!(reached > 300, "{reached} controls");
+}
