@@ -7,8 +7,17 @@ use etalon::scene::{self, AmbientLight, Image, LoadOptions, MissingImages, Prune
 use etalon_testing::gltf_builder::{Builder, png};
 use serde_json::{Value, json};
 
-const CHECKER: LoadOptions =
-    LoadOptions { time: None, prune: Prune::Nothing, scene: None, variant: None, missing: MissingImages::Checker };
+const CHECKER: LoadOptions = LoadOptions {
+    time: None,
+    prune: Prune::Nothing,
+    scene: None,
+    variant: None,
+    missing: MissingImages::Checker,
+    animation: None,
+    hide: Vec::new(),
+    only: Vec::new(),
+    key_light: None,
+};
 
 /// A triangle whose material has a sound base colour image, and this one as emission.
 fn with_image(image: impl FnOnce(&mut Builder) -> Value) -> Builder {

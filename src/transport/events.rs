@@ -14,6 +14,7 @@ use super::bvh::Bvh;
 use super::layers::{Layer, Layers, Media, coverage};
 use super::line::{self, Crossing};
 use super::sight::line_through;
+use super::surface_point::SurfacePoint;
 use crate::scene::light::LightKind;
 use crate::scene::material::Material;
 use crate::scene::solid::{Solids, solids};
@@ -99,17 +100,6 @@ pub struct Interaction {
     pub total: bool,
     /// Whether the surface scatters the remaining light, or is too rough to be followed.
     pub spreads: bool,
-}
-
-/// The triangle that a pixel shows.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SeenTriangle {
-    /// Index into the scene's instances.
-    pub instance: usize,
-    /// Index of the triangle in its mesh.
-    pub primitive: usize,
-    /// Barycentric coordinates of the second and the third corner.
-    pub uv: [f64; 2],
 }
 
 /// A scene with its BVH, ready for recursive ray tracing.
@@ -200,13 +190,14 @@ impl EventTracer {
         events
     }
 
-    /// The triangle at the centre of a pixel of `camera`'s picture of `size` pixels; `None` where no surface is seen.
+    /// The point of a triangle at the centre of a pixel of `camera`'s picture of `size` pixels; `None` where no surface
+    /// is seen.
     #[must_use]
-    pub fn triangle_at(&self, scene: &Scene, camera: &Camera, size: [u32; 2], pixel: [u32; 2]) -> Option<SeenTriangle> {
+    pub fn point_at(&self, scene: &Scene, camera: &Camera, size: [u32; 2], pixel: [u32; 2]) -> Option<SurfacePoint> {
         let (from, direction) = pixel_line(camera, size, pixel);
         let crossing = self.nearest_seen(scene, from, direction)?;
         let (instance, primitive) = (crossing.triangle.instance as usize, crossing.triangle.primitive as usize);
-        Some(SeenTriangle { instance, primitive, uv: crossing.uv })
+        Some(SurfacePoint { instance, primitive, uv: crossing.uv })
     }
 
     /// The nearest surface that light meets: holes of alpha-tested surfaces are skipped.

@@ -42,6 +42,7 @@ use std::io::{self, Write as _};
 use anyhow::{Context as _, Result};
 use etalon::gpu::{DeviceChoice, NotOpened, is_lost};
 use etalon::plan::{Refused, Setting};
+use etalon::scene::UnreadableImage;
 
 /// Formats an error chain as one sentence. Settings of the library are named as command-line options; where a part of
 /// Vulkan is missing, the sentence names the Debian packages that provide it.
@@ -63,7 +64,11 @@ pub fn told(error: &anyhow::Error) -> String {
             None => cause.to_string(),
         }
     };
-    error.chain().map(cause).collect::<Vec<_>>().join(": ")
+    let mut sentence = error.chain().map(cause).collect::<Vec<_>>().join(": ");
+    if error.downcast_ref::<UnreadableImage>().is_some() {
+        sentence += "; --missing checker draws a checker in its place";
+    }
+    sentence
 }
 
 /// Whether the same command may succeed later or on another machine: the device was lost, or a disk is full.

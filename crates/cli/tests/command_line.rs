@@ -265,7 +265,7 @@ fn missing_images_are_an_error_or_a_checker() {
         etalon(folder.path(), &words, &HASTY)
     };
     for refused in [&[][..], &["--missing", "error"]] {
-        render(refused).failed(1, "image 0 \"gone.png\": gone.png: no such file");
+        render(refused).failed(1, "image 0 \"gone.png\": gone.png: no such file or folder; --missing checker");
         assert!(!folder.path().join("out.png").exists());
     }
     let run = render(&["--missing", "checker"]).succeeded();

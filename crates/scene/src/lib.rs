@@ -46,7 +46,7 @@ pub use camera::{Camera, Projection};
 pub use light::{Extent, KeyLight, Light, LightKind};
 pub use material::{AlphaMode, Material, Meaning, Sampler, TextureRef, Wrap};
 pub use outline::Outline;
-pub use pictures::REPLACED;
+pub use pictures::{REPLACED, UnreadableImage};
 pub use prune::{AmbientLight, Prune};
 pub use shared::{Mark, Shared};
 pub use sigma::SigmaGrid;

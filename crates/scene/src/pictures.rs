@@ -60,6 +60,17 @@ impl ImageUse {
     }
 }
 
+/// The context of an error: the name of an image that cannot be read, for which [`MissingImages::Checker`] is a way
+/// out.
+#[derive(Debug)]
+pub struct UnreadableImage(String);
+
+impl std::fmt::Display for UnreadableImage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
 impl MissingImages {
     /// An image as it was read; or, where it cannot be read and this is allowed, a checker and a warning. `name` begins
     /// the sentence.
@@ -75,7 +86,7 @@ impl MissingImages {
                 warnings.push(format!("{name} cannot be read ({error:#}): {REPLACED}"));
                 Ok(of.checker(name))
             }
-            (read, _) => read.with_context(|| name.to_owned()),
+            (read, _) => read.context(UnreadableImage(name.to_owned())),
         }
     }
 }

@@ -6,7 +6,8 @@ use glam::{DAffine3, DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use etalon::scene::{Camera, Projection, Scene};
-use etalon::transport::events::{EventTracer, SeenTriangle};
+use etalon::transport::events::EventTracer;
+use etalon::transport::surface_point::SurfacePoint;
 
 /// What the triangle at a pixel tells.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,7 +35,7 @@ pub fn triangles(tracer: &EventTracer, scene: &Scene, camera: &Camera, size: [u3
     let camera_from_world = camera.world_from_camera.inverse();
     let facts = |index: u32| {
         let pixel = [index % size[0], index / size[0]];
-        let seen = tracer.triangle_at(scene, camera, size, pixel)?;
+        let seen = tracer.point_at(scene, camera, size, pixel)?;
         Some(facts_of(scene, &camera_from_world, camera.projection, size, pixel, seen))
     };
     (0..size[0] * size[1]).into_par_iter().map(facts).collect()
@@ -46,7 +47,7 @@ fn facts_of(
     projection: Projection,
     size: [u32; 2],
     pixel: [u32; 2],
-    seen: SeenTriangle,
+    seen: SurfacePoint,
 ) -> TriangleFacts {
     let instance = &scene.instances[seen.instance];
     let mesh = &scene.meshes[instance.mesh];
