@@ -42,7 +42,7 @@ pub struct Preferences {
     pub theme: egui::ThemePreference,
     /// Factor of the size of text and controls.
     pub zoom: f32,
-    /// Width and height of the window in points of the desktop.
+    /// Width and height of the window in pixels.
     pub size: Option<[u32; 2]>,
     /// Place and size of the panels; `None`: the default for the window's size.
     pub docks: Option<Docks>,

@@ -19,6 +19,7 @@ mod timing;
 use std::collections::{BTreeSet, HashMap, VecDeque};
 use std::path::PathBuf;
 
+use egui::text_selection::LabelSelectionState;
 use egui::util::undoer::Undoer;
 use egui::{Key, Modifiers, TextureHandle, Ui};
 use egui_file_dialog::{DialogState, FileDialog};
@@ -500,8 +501,9 @@ fn keys(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, actions: &mut V
             ui.memory_mut(egui::Memory::stop_text_input);
         }
     }
-    // egui gives the clipboard's keys as events of their own.
-    if ui.input(|input| input.events.contains(&egui::Event::Copy)) {
+    // egui gives the clipboard's keys as events of their own. Ctrl+C is of selected text, if there is some.
+    let (copies, shift) = ui.input(|input| (input.events.contains(&egui::Event::Copy), input.modifiers.shift));
+    if copies && (shift || !ui.ctx().plugin::<LabelSelectionState>().lock().has_selection()) {
         actions.push(Action::CopyPicture);
     }
     // A focused control has the keys that move within it: arrows, space, enter.
