@@ -15,7 +15,7 @@ pub(crate) fn by_name_or_index(kind: &str, wanted: &str, names: &[Option<&str>])
     })
 }
 
-/// Keys of nodes, by their names: a name that two nodes have, or that is another's index, does not tell them apart.
+/// Keys of nodes: the name; the index for a name that two nodes have.
 pub(crate) fn keys(names: &[Option<&str>]) -> Vec<String> {
     let mut counts = HashMap::new();
     for name in names.iter().flatten() {
