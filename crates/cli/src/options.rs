@@ -298,7 +298,9 @@ impl SceneOptions {
         let point = |p: DVec3| format!("{},{},{}", p.x, p.y, p.z);
         let mut all = vec![word(&self.scene)];
         let mut option = |name: &str, value: Option<String>| {
-            all.extend(value.map(|value| format!("--{name} {}", word(&value))));
+            // A value that begins like an option is joined to its option.
+            let between = |value: &str| if value.starts_with('-') { '=' } else { ' ' };
+            all.extend(value.map(|value| format!("--{name}{}{}", between(&value), word(&value))));
         };
         option("scene", self.scene_of_file.clone());
         option("variant", self.variant.clone());
@@ -451,12 +453,7 @@ impl SceneOptions {
         }
         if let Some(wanted) = &self.camera {
             let names = || scene.cameras.iter().map(|c| format!("\"{}\"", c.name)).collect::<Vec<_>>().join(", ");
-            let found = scene
-                .cameras
-                .iter()
-                .find(|camera| camera.name == *wanted)
-                .or_else(|| wanted.parse::<usize>().ok().and_then(|index| scene.cameras.get(index)));
-            return usage(found.cloned().ok_or_else(|| match scene.cameras.len() {
+            return usage(scene.camera(wanted).cloned().ok_or_else(|| match scene.cameras.len() {
                 0 => anyhow!("--camera {wanted}: {} has no cameras", scene.name),
                 _ => anyhow!("--camera {wanted}: no such camera; {} has the cameras {}", scene.name, names()),
             }));

@@ -98,7 +98,9 @@ impl SceneSource for FileSource {
             &this.device,
         );
         let prices = budget::known(&priced, &contents(opened.scene(), opened.environment()), device.info());
-        opened.warnings.extend(exposure.sentence);
+        // A metered exposure is a choice of how it is shown; without one, nothing can be seen.
+        let is_metered = exposure.from == "metered";
+        opened.warnings.extend(exposure.sentence.clone().filter(|_| !is_metered));
         this.has_checkers.store(opened.warnings.iter().any(|warning| warning.ends_with(REPLACED)), Ordering::Relaxed);
         let (lit, as_lit) = opened.lit(Settings { knobs: knobs.clone(), ..Settings::default() });
         let sources = Some(opened.sources(&knobs));
@@ -113,6 +115,7 @@ impl SceneSource for FileSource {
             prices: prices.map(Arc::new),
             original: opened.original.clone(),
             exposure: exposure.stops,
+            exposure_from: exposure.sentence.filter(|_| is_metered),
         })
     }
 
@@ -191,10 +194,9 @@ fn choice_of(options: &SceneOptions) -> FileChoice {
 fn command(args: &ViewArgs, view: &View<'_>) -> String {
     let mut scene = asked_for(&args.scene, view.file, view.choice, view.time);
     scene.missing = args.has_checkers.load(Ordering::Relaxed).then_some(Missing::Checker);
-    if scene.env.as_deref() != Some("none") {
-        scene.env_rotation = view.settings.environment_rotation;
-        scene.env_intensity = view.settings.environment_intensity;
-    }
+    let dark = scene.env.as_deref() == Some("none");
+    scene.env_rotation = if dark { 0.0 } else { view.settings.environment_rotation };
+    scene.env_intensity = if dark { 1.0 } else { view.settings.environment_intensity };
     let background = view.settings.background;
     scene.background = Some(background).filter(|background| *background != Background::Default);
     if view.camera.is_some() || view.named.is_some() {

@@ -536,6 +536,27 @@ fn nodes_are_hidden_views_chosen_and_pictures_saved() {
     assert_eq!(small, 1);
     let (code, words) = viewer.close();
     assert_eq!(code, Some(0), "{words}");
+
+    // What is transparent is squares of grey in the window, and transparent in the file. Values of the command line
+    // that sliders do not reach stay as they are.
+    std::fs::remove_file(&saved).expect("a file");
+    let more = ["--background", "transparent", "--env-rotation", "270.25", "--exposure", "0.123"];
+    let arguments = [&[file.as_str(), "--set", "samples=1"], &more[..]].concat();
+    let mut viewer = Viewer::open(&display, folder, &arguments);
+    viewer.until("squares of grey", |viewer| viewer.pixels()?.1.contains(&[153; 3]).then_some(()));
+    viewer.key(C, None);
+    let command = viewer.line();
+    assert!(more.chunks(2).all(|option| command.contains(&option.join(" "))), "{command}");
+    viewer.key(S, Some(CONTROL));
+    std::thread::sleep(Duration::from_secs(1));
+    viewer.key(RETURN, None);
+    viewer.until("a saved picture", |_| saved.is_file().then_some(()));
+    std::thread::sleep(Duration::from_millis(500));
+    drawn(folder, &command);
+    let [saved, rendered] = [saved, folder.join("picture.png")].map(|path| image::open(path).expect("a picture"));
+    assert!(saved.color().has_alpha() && saved == rendered, "the saved picture is not that of its command");
+    let (code, words) = viewer.close();
+    assert_eq!(code, Some(0), "{words}");
 }
 
 /// An idle window is idle, and thousands of interactions leave nothing behind.

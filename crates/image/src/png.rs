@@ -18,6 +18,13 @@ pub struct Display {
     pub rgba: Vec<[u8; 4]>,
 }
 
+/// The colour of a pixel with straight alpha over another one; in display values, as picture viewers do.
+#[must_use]
+pub fn over([r, g, b, a]: [u8; 4], behind: u8) -> [u8; 3] {
+    let alpha = u32::from(a);
+    [r, g, b].map(|c| ((u32::from(c) * alpha + u32::from(behind) * (255 - alpha)) / 255) as u8)
+}
+
 /// PNG file of the pixels `rgba`: four bytes per pixel, rows from the top, sRGB-encoded, straight alpha.
 ///
 /// Without `has_alpha` the fourth byte is dropped and the file holds RGB. The `sRGB` chunk (perceptual intent) states

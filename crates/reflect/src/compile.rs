@@ -114,6 +114,7 @@ impl Recipe {
             let mut key = read.into_inner();
             let settings = format!("{kind:?} {level:?} {version:?} {:?} {}", self.without, self.sample);
             key.add(&settings);
+            [include_str!("compile.rs"), include_str!("compact.rs")].iter().for_each(|code| key.add(code));
             let unread = RefCell::new(Key::new());
             let make = || self.words(kind, name, text, &slots, level, version, &self.without, &unread);
             let words = self.cache.words(&key, make)?;

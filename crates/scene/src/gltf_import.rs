@@ -29,7 +29,7 @@ use super::{
     lenient,
     names::keys,
     nodes::{Nodes, chosen_scene, end, label, playing},
-    outline::{Animation, Outline, OutlineNode},
+    outline::{Animation, Named, Outline, OutlineNode},
     prune::{Coordinates, prune_textures, unused_coordinates},
     thin::{self, Stroke},
 };
@@ -146,7 +146,6 @@ fn outline(
     users: [&[usize]; 3],
 ) -> Result<Outline> {
     let root = &document.root;
-    let or_index = |(i, name): (usize, Option<&str>)| name.map_or_else(|| i.to_string(), str::to_owned);
     let names: Vec<Option<&str>> = root.nodes.iter().map(|node| node.name.as_deref()).collect();
     let keys = keys(&names);
     let is_shown: HashSet<usize> = nodes.shown.iter().copied().collect();
@@ -161,6 +160,7 @@ fn outline(
         found.push(OutlineNode {
             name: names[node].map_or_else(|| format!("node {node}"), str::to_owned),
             key: keys[node].clone(),
+            index: node,
             parent: nodes.parents[node].and_then(|parent| place[parent]),
             hidden: nodes.hidden[node],
             ..OutlineNode::default()
@@ -176,15 +176,20 @@ fn outline(
         }
     }
     let variants = root.extensions.as_ref().and_then(|extensions| extensions.khr_materials_variants.as_ref());
-    let animations = root.animations.iter().zip(plays).enumerate().map(|(i, (animation, &plays))| Animation {
-        name: or_index((i, animation.name.as_deref())),
+    // The word `all` chooses all of them.
+    let titles: Vec<Option<&str>> = root.animations.iter().map(|animation| animation.name.as_deref()).collect();
+    let titles = Named::list(&titles.iter().map(|name| name.filter(|name| *name != "all")).collect::<Vec<_>>());
+    let animations = root.animations.iter().zip(plays).zip(titles).map(|((animation, &plays), named)| Animation {
+        named,
         seconds: end(document, animation).unwrap_or_default(),
         plays,
     });
     Ok(Outline {
-        scenes: root.scenes.iter().map(|scene| scene.name.as_deref()).enumerate().map(or_index).collect(),
+        scenes: Named::list(&root.scenes.iter().map(|scene| scene.name.as_deref()).collect::<Vec<_>>()),
         scene: chosen_scene(root, options.scene.as_deref())?,
-        variants: variants.iter().flat_map(|all| &all.variants).map(|one| one.name.clone()).collect(),
+        variants: Named::list(
+            &variants.iter().flat_map(|all| &all.variants).map(|one| Some(&*one.name)).collect::<Vec<_>>(),
+        ),
         animations: animations.collect(),
         nodes: found,
     })

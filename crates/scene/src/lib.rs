@@ -321,6 +321,19 @@ impl Bounds {
 }
 
 impl Scene {
+    /// The camera that a user means by a word: its key, its name or its index; `None` where there is no such camera.
+    #[must_use]
+    pub fn camera(&self, wanted: &str) -> Option<&Camera> {
+        let names: Vec<Option<&str>> = self.cameras.iter().map(|camera| Some(camera.name.as_str())).collect();
+        names::position(wanted, &names).map(|index| &self.cameras[index])
+    }
+
+    /// The word by which [`Scene::camera`] finds each camera: its name if no other camera has it, else its index.
+    #[must_use]
+    pub fn camera_keys(&self) -> Vec<String> {
+        names::keys(&self.cameras.iter().map(|camera| Some(camera.name.as_str())).collect::<Vec<_>>())
+    }
+
     /// World-space box of every vertex with a finite position; `None` for a scene without such a vertex.
     #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {

@@ -5,16 +5,41 @@ use anyhow::{Result, bail};
 use super::names::{by_name_or_index, keys};
 use super::{LoadOptions, Scene};
 
+/// A part of the file that a user chooses.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Named {
+    /// Its name; without one, its index.
+    pub name: String,
+    /// The word that chooses it: the name if no other part has it, else the index.
+    pub key: String,
+}
+
+impl Named {
+    /// Parts with these names.
+    pub(crate) fn list(names: &[Option<&str>]) -> Vec<Self> {
+        let named = names.iter().zip(keys(names)).enumerate();
+        named.map(|(i, (name, key))| Self { name: name.map_or_else(|| i.to_string(), str::to_owned), key }).collect()
+    }
+
+    /// Index of the part that a user means by a word: a key, else a name, else an index.
+    #[must_use]
+    pub fn position(list: &[Self], wanted: &str) -> Option<usize> {
+        let by_index = || wanted.parse().ok().filter(|&index: &usize| index < list.len());
+        let by_key = list.iter().position(|part| part.key == wanted);
+        by_key.or_else(|| list.iter().position(|part| part.name == wanted)).or_else(by_index)
+    }
+}
+
 /// The contents of a scene's file. Study scenes, OBJ, STL and PLY files have a flat tree: one node for each instance,
 /// light and camera.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Outline {
-    /// Scenes of the file; a scene without name is called by its index.
-    pub scenes: Vec<String>,
+    /// Scenes of the file.
+    pub scenes: Vec<Named>,
     /// Index of the scene that was read.
     pub scene: usize,
     /// Variants of the materials (KHR_materials_variants).
-    pub variants: Vec<String>,
+    pub variants: Vec<Named>,
     /// Animations of the file.
     pub animations: Vec<Animation>,
     /// Nodes of the scene; a parent comes before its children.
@@ -24,8 +49,8 @@ pub struct Outline {
 /// An animation of the file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Animation {
-    /// Its name; without one, its index.
-    pub name: String,
+    /// Its name, and what `animation` of the options calls it.
+    pub named: Named,
     /// Time of its last keyframe in seconds; 0 where it has none.
     pub seconds: f64,
     /// Whether it moves the scene.
@@ -39,6 +64,8 @@ pub struct OutlineNode {
     pub name: String,
     /// What [`LoadOptions::hide`] calls it: the name if no other node has it, else the index in the file.
     pub key: String,
+    /// Its index in the file.
+    pub index: usize,
     /// Index of its parent into [`Outline::nodes`]; `None` for a root.
     pub parent: Option<usize>,
     /// Indices into [`Scene::instances`].
@@ -56,6 +83,18 @@ impl Outline {
     #[must_use]
     pub fn is_within(&self, node: usize, above: usize) -> bool {
         std::iter::successors(Some(node), |&at| self.nodes[at].parent).any(|at| at == above)
+    }
+
+    /// The node that [`LoadOptions::hide`] means by a word; `None` where the scene has no such node.
+    #[must_use]
+    pub fn node(&self, wanted: &str) -> Option<usize> {
+        let by_key = self.nodes.iter().position(|node| node.key == wanted);
+        let by_name = || self.nodes.iter().position(|node| node.name == wanted);
+        let by_index = || {
+            let index = wanted.trim_start_matches("index:").parse::<usize>().ok()?;
+            self.nodes.iter().position(|node| node.index == index)
+        };
+        by_key.or_else(by_name).or_else(by_index)
     }
 
     /// The node that an instance belongs to.
@@ -93,29 +132,30 @@ pub(crate) fn flat(scene: &mut Scene, options: &LoadOptions) -> Result<()> {
     }
     let instances = scene.instances.iter().map(|instance| instance.name.clone());
     let lights = scene.lights.iter().map(|light| light.name.clone());
-    let all: Vec<String> = instances.chain(lights).collect();
+    let cameras = scene.cameras.iter().map(|camera| camera.name.clone());
+    let all: Vec<String> = instances.chain(lights).chain(cameras).collect();
     let names: Vec<Option<&str>> = all.iter().map(|name| Some(name.as_str())).collect();
     let hidden = hidden(options, &names, &vec![None; names.len()])?;
     let count = scene.instances.len();
+    let first_camera = count + scene.lights.len();
     let kept = |range: std::ops::Range<usize>| {
         hidden[range].iter().scan(0, |next, hidden| {
             *next += usize::from(!hidden);
             Some((!hidden).then_some(*next - 1))
         })
     };
-    let places: Vec<Option<usize>> = kept(0..count).chain(kept(count..all.len())).collect();
-    let nodes = all.iter().zip(keys(&names)).zip(&places).enumerate().map(|(index, ((name, key), place))| {
-        let place: Vec<usize> = place.iter().copied().collect();
-        let (instances, lights) = if index < count { (place, Vec::new()) } else { (Vec::new(), place) };
-        OutlineNode { name: name.clone(), key, instances, lights, hidden: hidden[index], ..OutlineNode::default() }
+    let places: Vec<Option<usize>> = kept(0..count).chain(kept(count..first_camera)).collect();
+    let nodes = all.iter().zip(keys(&names)).enumerate().map(|(index, (name, key))| {
+        let mut node = OutlineNode { name: name.clone(), key, index, hidden: hidden[index], ..OutlineNode::default() };
+        if index < first_camera {
+            let users = if index < count { &mut node.instances } else { &mut node.lights };
+            users.extend(places[index]);
+        } else {
+            node.cameras.push(index - first_camera);
+        }
+        node
     });
-    let cameras = scene.cameras.iter().enumerate().map(|(index, camera)| OutlineNode {
-        name: camera.name.clone(),
-        key: (all.len() + index).to_string(),
-        cameras: vec![index],
-        ..OutlineNode::default()
-    });
-    scene.outline = Outline { nodes: nodes.chain(cameras).collect(), ..Outline::default() };
+    scene.outline = Outline { nodes: nodes.collect(), ..Outline::default() };
     let mut at = hidden.iter();
     scene.instances.retain(|_| !at.next().copied().unwrap_or_default());
     scene.lights.retain(|_| !at.next().copied().unwrap_or_default());

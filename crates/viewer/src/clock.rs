@@ -28,6 +28,14 @@ impl Clock {
         (self.time, self.playing) = (None, false);
     }
 
+    /// Plays or pauses; at the end of what does not repeat, it plays from the beginning.
+    pub fn toggle(&mut self, duration: f64) {
+        self.playing = !self.playing;
+        if self.playing && !self.repeats && self.time.is_some_and(|time| time >= duration) {
+            self.time = Some(0.0);
+        }
+    }
+
     /// Sets the time in seconds, clamped to 0 … `duration` and rounded to milliseconds.
     pub fn set(&mut self, seconds: f64, duration: f64) {
         let steps = (seconds.clamp(0.0, duration) / STEP).round();
@@ -67,5 +75,10 @@ mod tests {
         assert_eq!(clock.time, Some(0.4));
         clock.advance(1.0, 2.0);
         assert_eq!((clock.time, clock.playing), (Some(2.0), false), "once");
+        clock.toggle(2.0);
+        assert_eq!((clock.time, clock.playing), (Some(0.0), true), "and again");
+        clock.advance(0.1, 2.0);
+        clock.toggle(2.0);
+        assert_eq!((clock.time, clock.playing), (Some(0.4), false), "paused");
     }
 }

@@ -3,6 +3,7 @@
 //! The render thread ([`worker`]) loads the scene and draws samples progressively; before each sample it reads the
 //! current request. The window shows the latest picture. It redraws only after an event, at most once in 16 ms.
 
+pub mod choice;
 pub mod clock;
 pub mod equations;
 pub mod layer;
@@ -37,7 +38,7 @@ pub struct View<'a> {
     pub file: Option<&'a Path>,
     /// Options for eye, target and field of view.
     pub camera: Option<String>,
-    /// Name of a camera of the file.
+    /// Key of a camera of the file.
     pub named: Option<&'a str>,
     /// Animation time in seconds; `None`: that of the command line.
     pub time: Option<f64>,

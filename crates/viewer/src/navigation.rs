@@ -81,7 +81,7 @@ pub struct Navigation {
     home: Camera,
     /// Whether the user moved the camera, or it was computed to frame the scene at one size.
     moved: bool,
-    /// Name of the file's camera that was chosen; `None`: the first one.
+    /// Key of the file's camera that was chosen; `None`: the initial one.
     named: Option<String>,
     /// Whether the initial camera was computed to frame the scene at the size of the picture.
     framed: bool,
@@ -136,7 +136,7 @@ impl Navigation {
         self.moved
     }
 
-    /// Name of the file's camera that was chosen; `None`: the first one.
+    /// Key of the file's camera that was chosen; `None`: the initial one.
     #[must_use]
     pub fn named(&self) -> Option<&str> {
         self.named.as_deref()
@@ -183,21 +183,25 @@ impl Navigation {
         (!self.fits).then_some(MADE_FOR)
     }
 
-    /// Takes over a scene that was read again; the camera stays where it is.
-    pub fn stay(&mut self, home: Camera, bounds: Bounds) {
-        // The file's camera may have changed, so that its name no longer describes this view.
-        self.moved |= home != self.home || self.named.is_some();
-        (self.home, self.bounds, self.size) = (home, bounds, bounds.radius().max(1e-6));
+    /// Takes over a scene that was read again. A view that the user moved stays where it is; a camera of the file is
+    /// that of the new scene, `named` if it was chosen by name. Where that is gone, the view stays.
+    pub fn stay(&mut self, home: Camera, named: Option<&Camera>, bounds: Bounds, framed: bool) {
+        self.moved |= framed && !self.framed || self.named.is_some() && named.is_none();
+        (self.home, self.bounds, self.size, self.framed) = (home, bounds, bounds.radius().max(1e-6), framed);
+        self.follow(named);
     }
 
     /// Follows a change of the animation time: a camera of the file moves with its node unless the user moved it.
-    pub fn moment(&mut self, home: Camera, cameras: &[Camera]) {
-        if self.framed {
-            return;
+    pub fn moment(&mut self, home: Camera, named: Option<&Camera>) {
+        if !self.framed {
+            self.home = home;
+            self.follow(named);
         }
-        self.home = home;
+    }
+
+    /// Takes the place of the camera of the file that is looked through.
+    fn follow(&mut self, named: Option<&Camera>) {
         if !self.moved {
-            let named = cameras.iter().find(|camera| Some(&camera.name) == self.named.as_ref());
             self.view = named.unwrap_or(&self.home).clone();
             self.distance = self.distance_to_middle();
         }
@@ -209,11 +213,11 @@ impl Navigation {
         (self.moved, self.fits) = (self.framed, self.framed);
     }
 
-    /// Goes to a camera; `name` is its name in the file.
-    pub fn go_to(&mut self, camera: Camera, name: Option<String>) {
+    /// Goes to a camera; `key` is the word that chooses it in the file.
+    pub fn go_to(&mut self, camera: Camera, key: Option<String>) {
         self.view = camera;
         (self.moved, self.fits) = (false, false);
-        self.named = name;
+        self.named = key;
         self.distance = self.distance_to_middle();
     }
 
@@ -426,18 +430,27 @@ mod tests {
         let mut n = navigation();
         let at = |x: f64| Camera { world_from_camera: DAffine3::from_translation(DVec3::X * x), ..n.home.clone() };
         let (first, second, third) = (at(1.0), at(2.0), at(3.0));
-        n.moment(first.clone(), &[]);
+        n.moment(first.clone(), None);
         assert!(n.camera() == first && !n.moved());
-        n.stay(first, n.bounds);
-        assert!(!n.moved(), "a file that is read again with the same camera");
+        n.stay(second.clone(), None, n.bounds, false);
+        assert!(n.camera() == second && !n.moved(), "a file that is read again");
+        n.go_to(first.clone(), Some("a camera".to_owned()));
+        n.stay(first.clone(), Some(&third), n.bounds, false);
+        assert!(n.camera() == third && n.named() == Some("a camera") && !n.moved(), "a camera of the file stays one");
+        n.moment(first.clone(), Some(&second));
+        assert!(n.camera() == second);
+        n.stay(first.clone(), None, n.bounds, false);
+        assert!(n.moved() && n.eye() == DVec3::X * 2.0, "a camera that is gone leaves the view");
+        n.reset();
         n.orbit(DVec2::new(0.1, 0.0));
         let turned = n.camera();
-        n.moment(second.clone(), &[]);
+        n.moment(second.clone(), None);
+        n.stay(second.clone(), None, n.bounds, false);
         assert!(n.camera() == turned && n.moved());
         n.reset();
         assert!(n.camera() == second);
-        n.stay(third, n.bounds);
-        assert!(n.moved() && n.eye() == DVec3::X * 2.0, "it stays where it is, and is no camera of the file");
+        n.stay(third, None, n.bounds, true);
+        assert!(n.moved() && n.eye() == DVec3::X * 2.0, "the file lost its camera");
     }
 
     #[test]

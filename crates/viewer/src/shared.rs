@@ -14,39 +14,13 @@ use etalon::pass::tonemap::Counts;
 use etalon::plan::{Effect, Knobs};
 use etalon::prepare::Original;
 use etalon::scene::environment::Environment;
-use etalon::scene::{Bounds, Camera, Instance, KeyLight, Light, Material, Outline, Scene};
+use etalon::scene::{Bounds, Camera, Instance, Light, Material, Outline, Scene};
 use etalon::share::AovPixel;
 use etalon::transport::events::Event;
 use etalon_cost::table::Table;
 
+pub use super::choice::FileChoice;
 use super::lookup::PixelTriangles;
-
-/// What of a file is shown, and what lights it. As options of the command line.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct FileChoice {
-    /// Scene of the file, by name or index; `None`: the one that the file names.
-    pub scene: Option<String>,
-    /// Variant of the materials; `None`: the materials of the primitives.
-    pub variant: Option<String>,
-    /// Animation that plays, or `all`; `None`: those that do not move the same nodes.
-    pub animation: Option<String>,
-    /// Nodes that are left out.
-    pub hide: Vec<String>,
-    /// Nodes that alone are shown; empty: all.
-    pub only: Vec<String>,
-    /// Environment map, `studio` or `none`; `None`: the default.
-    pub environment: Option<String>,
-    /// A directional light beside those of the file.
-    pub key_light: Option<KeyLight>,
-}
-
-impl FileChoice {
-    /// The choice for another file: its light alone.
-    #[must_use]
-    pub fn of_another_file(&self) -> Self {
-        Self { environment: self.environment.clone(), key_light: self.key_light, ..Self::default() }
-    }
-}
 
 /// A loaded scene. Clones share the large data.
 #[derive(Clone)]
@@ -69,6 +43,8 @@ pub struct Loaded {
     pub knobs: Option<Knobs>,
     /// Exposure to start with, in stops.
     pub exposure: f32,
+    /// Where that exposure comes from; one sentence. `None` where it was chosen by the user.
+    pub exposure_from: Option<String>,
     /// What may light its pictures; `None` where it is not known.
     pub sources: Option<Sources>,
 }
@@ -88,6 +64,7 @@ impl Loaded {
             framed: false,
             knobs: None,
             exposure: 0.0,
+            exposure_from: None,
             sources: None,
         }
     }
@@ -126,7 +103,7 @@ pub trait SceneSource: Send {
 pub enum Viewpoint {
     /// The initial camera of the scene, at the current animation time.
     Own,
-    /// A camera of the file by name, at the current animation time.
+    /// A camera of the file by its key, at the current animation time.
     Named(String),
     /// Any other camera.
     Free(Camera),
@@ -141,10 +118,11 @@ impl Viewpoint {
         match self {
             Self::Own => Ok(&loaded.camera),
             Self::Free(camera) => Ok(camera),
-            Self::Named(name) => {
-                let found = loaded.original.scene().cameras.iter().find(|camera| camera.name == *name);
-                found.with_context(|| format!("{}: the scene has no camera \"{name}\"", loaded.name))
-            }
+            Self::Named(name) => loaded
+                .original
+                .scene()
+                .camera(name)
+                .with_context(|| format!("{}: the scene has no camera \"{name}\"", loaded.name)),
         }
     }
 }
@@ -220,7 +198,13 @@ impl RenderRequest {
     /// Whether both requests draw the same picture; display settings may differ.
     #[must_use]
     pub fn is_same_picture(&self, other: &Self) -> bool {
-        let marks = |w: &Self| (w.scene, w.time, w.moving, w.quit);
+        (self.moving, self.quit) == (other.moving, other.quit) && self.is_same_view(other)
+    }
+
+    /// Whether both requests draw the same picture once nothing moves; display settings may differ.
+    #[must_use]
+    pub fn is_same_view(&self, other: &Self) -> bool {
+        let marks = |w: &Self| (w.scene, w.time);
         let settings = |w: &Self| {
             let Settings { size, environment_rotation, environment_intensity, background, .. } = w.settings;
             (size, environment_rotation, environment_intensity, background)
@@ -261,8 +245,14 @@ pub struct SceneFacts {
     pub knobs: Option<Knobs>,
     /// Exposure to start with, in stops.
     pub exposure: f32,
+    /// Where that exposure comes from; one sentence.
+    pub exposure_from: Option<String>,
+    /// What was chosen of the file.
+    pub choice: FileChoice,
     /// Cameras of the file.
     pub cameras: Vec<Camera>,
+    /// The word that chooses each camera.
+    pub camera_keys: Vec<String>,
     /// Numbers of triangles, instances and lights.
     pub counts: [usize; 3],
     /// Materials.
@@ -288,6 +278,12 @@ pub struct SceneFacts {
 }
 
 impl SceneFacts {
+    /// The camera of the file with a key.
+    #[must_use]
+    pub fn camera(&self, key: &str) -> Option<&Camera> {
+        self.camera_keys.iter().position(|known| known == key).map(|index| &self.cameras[index])
+    }
+
     /// Box of a node with everything below it; `None` where nothing of it is drawn.
     #[must_use]
     pub fn bounds_of(&self, node: usize) -> Option<Bounds> {
@@ -307,14 +303,18 @@ impl SceneFacts {
         Ok(Self {
             scene: wanted.scene,
             time: wanted.time,
-            duration: scene.duration,
+            // What takes no time cannot be played.
+            duration: scene.duration.filter(|duration| *duration > 0.0),
             name: loaded.name.clone(),
             bounds,
             home: loaded.camera.clone(),
             framed: loaded.framed,
             knobs: loaded.knobs.clone(),
             exposure: loaded.exposure,
+            exposure_from: loaded.exposure_from.clone(),
+            choice: wanted.choice.clone(),
             cameras: scene.cameras.clone(),
+            camera_keys: scene.camera_keys(),
             counts: [scene.triangles(), scene.instances.len(), scene.lights.len()],
             materials: scene.materials.clone(),
             instances: scene.instances.iter().map(|instance| instance.name.clone()).collect(),
@@ -345,10 +345,16 @@ fn box_of(scene: &Scene, instance: &Instance) -> Bounds {
 pub struct Shown {
     /// Version, which counts up over both sides.
     pub version: u64,
-    /// Display values, RGBA8.
+    /// Display values, RGBA8 with straight alpha.
     pub rgba: Arc<Vec<u8>>,
+    /// The same over squares of grey where pixels are transparent.
+    pub opaque: Arc<Vec<u8>>,
+    /// Whether pixels may be transparent.
+    pub has_alpha: bool,
     /// Size in pixels.
     pub size: [u32; 2],
+    /// The request that it answers.
+    pub of: RenderRequest,
     /// Samples drawn, and samples in total.
     pub samples: [u32; 2],
     /// Whether it was drawn while the view moved.

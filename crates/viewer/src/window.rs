@@ -52,6 +52,21 @@ struct DrawnLayer {
     version: u64,
 }
 
+/// A picture that is written when it is drawn.
+struct PendingSave {
+    path: PathBuf,
+    /// The request whose picture it is; `None` until the next request is sent.
+    of: Option<RenderRequest>,
+    /// Whether the wait is announced.
+    is_told: bool,
+}
+
+impl PendingSave {
+    fn is_exr(&self) -> bool {
+        self.path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr"))
+    }
+}
+
 /// A scene that was asked for.
 #[derive(Clone)]
 struct AskedScene {
@@ -100,10 +115,7 @@ pub(crate) struct OpenWindow {
     reads_at: Option<Instant>,
     /// Number of a scene that is read again; its camera stays.
     again: Option<u64>,
-    /// PNG file that is written when the picture is no preview.
-    writes_png: Option<PathBuf>,
-    /// EXR file that is written when the radiance is there.
-    writes_exr: Option<PathBuf>,
+    saves: Vec<PendingSave>,
     /// What is chosen, as of the last frame.
     chosen: FileChoice,
     /// FileChoice whose request waits until it no longer changes.
@@ -189,8 +201,7 @@ impl OpenWindow {
             first: file,
             reads_at: None,
             again: None,
-            writes_png: None,
-            writes_exr: None,
+            saves: Vec::new(),
             chosen: choice,
             chooses_at: None,
             small: None,
@@ -247,6 +258,7 @@ impl OpenWindow {
         };
         let size = self.window.inner_size();
         let layer = self.drawn_layer(&seen);
+        self.save(&seen);
         let pictures = self.placed(&seen, layer.as_ref());
         self.window.pre_present_notify();
         if self.presenter.present([size.width, size.height], &pictures, overlay)? == Presented::Changed {
@@ -269,7 +281,7 @@ impl OpenWindow {
         let wipe = seen.sides[1].shown.as_ref().map_or(right, |_| self.state.wipe_column());
         let shown = seen.sides.iter().filter_map(|side| side.shown.as_ref());
         let placed = shown.zip([[left, wipe], [wipe, right]]).map(|(shown, columns)| PlacedPicture {
-            rgba: &shown.rgba,
+            rgba: &shown.opaque,
             size: shown.size,
             version: 2 * shown.version,
             place,
@@ -397,7 +409,7 @@ impl OpenWindow {
             let (size, rgba) = if layer.reads_triangles() {
                 let triangles = seen.triangles.as_ref().filter(|triangles| triangles.versions == versions)?;
                 let shown = seen.shown().filter(|shown| shown.size == triangles.size)?;
-                (triangles.size, layer.draw_triangles(&triangles.pixels, &shown.rgba))
+                (triangles.size, layer.draw_triangles(&triangles.pixels, &shown.opaque))
             } else {
                 let surfaces = seen.now().filter(|_| layer.reads_surfaces())?;
                 (surfaces.size, layer.draw(surfaces))
@@ -415,11 +427,15 @@ impl OpenWindow {
         if let Some(facts) = seen.facts.as_ref().filter(|facts| Some(facts.scene) != self.navigated) {
             self.navigated = Some(facts.scene);
             match (&mut self.state.navigation, self.again == Some(facts.scene)) {
-                (Some(navigation), true) => navigation.stay(facts.home.clone(), facts.bounds),
+                (Some(navigation), true) => {
+                    let named = navigation.named().and_then(|key| facts.camera(key));
+                    navigation.stay(facts.home.clone(), named, facts.bounds, facts.framed);
+                }
                 _ => {
                     self.state.navigation = Some(Navigation::new(facts.home.clone(), facts.bounds, facts.framed));
                     self.state.settings.knobs = facts.knobs.clone().unwrap_or(self.state.settings.knobs.clone());
                     self.state.settings.exposure = facts.exposure;
+                    facts.exposure_from.iter().for_each(|why| self.state.notices.say(why.clone()));
                 }
             }
             if self.again == Some(facts.scene) {
@@ -433,7 +449,8 @@ impl OpenWindow {
         } else if let (Some(facts), Some(navigation)) = (&seen.facts, &mut self.state.navigation)
             && facts.time != self.moment
         {
-            navigation.moment(facts.home.clone(), &facts.cameras);
+            let named = navigation.named().and_then(|key| facts.camera(key));
+            navigation.moment(facts.home.clone(), named);
         }
         self.moment = seen.facts.as_ref().and_then(|facts| facts.time);
         if seen.failed == Some(self.scene) && self.failed != Some(self.scene) {
@@ -448,34 +465,48 @@ impl OpenWindow {
         if self.objects.is_none() && seen.shown().is_some_and(shared::Shown::is_done) {
             self.objects = Some(self.device.objects());
         }
-        // A picture that is soon finished is saved then; others as they are.
-        let is_ready = |shown: &shared::Shown| {
-            let is_whole = !shown.moving && shown.size == self.state.settings.size;
-            is_whole && (shown.is_done() || shown.seconds_left > PATIENCE)
-        };
-        if self.moving_until.is_none()
-            && seen.shown().is_some_and(is_ready)
-            && let Some(path) = self.writes_png.take()
-        {
-            let written = self.write_png(seen, &path);
-            self.tell(written);
-        }
-        if seen.now().is_some()
-            && seen.shown().is_some_and(shared::Shown::is_done)
-            && let Some(path) = self.writes_exr.take()
-        {
-            let written = self.write_exr(seen, &path);
-            self.tell(written);
-        }
         if let (Some(scene), Some(shown)) = (self.navigated, seen.shown().filter(|shown| shown.is_done()))
             && self.small != Some(scene)
         {
             self.small = Some(scene);
             if let Some(path) = self.scene_file()
-                && let Err(error) = preferences::keep_small(&path, &shown.rgba, shown.size)
+                && let Err(error) = preferences::keep_small(&path, &shown.opaque, shown.size)
             {
                 tracing::info!("the small picture of {} cannot be written: {error:#}", path.display());
             }
+        }
+    }
+
+    /// Writes the pictures that were asked for once they are drawn. A picture that is soon finished is saved then, others
+    /// as they are; radiance is that of all samples.
+    fn save(&mut self, seen: &RenderState) {
+        let Some(sent) = self.sent.clone() else { return };
+        let display = |request: &RenderRequest| (request.settings.tonemap, request.settings.exposure);
+        let answers = |shown: &&shared::Shown| {
+            !shown.moving && shown.of.is_same_view(&sent) && display(&shown.of) == display(&sent)
+        };
+        let shown = seen.shown().filter(answers);
+        for mut save in std::mem::take(&mut self.saves) {
+            let name = save.path.display().to_string();
+            if save.of.as_ref().is_none_or(|of| !of.is_same_view(&sent)) {
+                self.state.notices.fail(format!("{name} is not written: the view changed before it was drawn"));
+                continue;
+            }
+            let is_ready = |shown: &shared::Shown| match save.is_exr() {
+                true => shown.is_done() && seen.now().is_some(),
+                false => (shown.is_done() || shown.seconds_left > PATIENCE) && self.picture(seen).is_some(),
+            };
+            if shown.is_some_and(is_ready) {
+                let written =
+                    if save.is_exr() { self.write_exr(seen, &save.path) } else { self.write_png(seen, &save.path) };
+                self.tell(written);
+                continue;
+            }
+            if !std::mem::replace(&mut save.is_told, true) {
+                let when = if save.is_exr() { "when all samples are drawn" } else { "when it is drawn" };
+                self.state.notices.say(format!("{name} is written {when}"));
+            }
+            self.saves.push(save);
         }
     }
 
@@ -487,10 +518,11 @@ impl OpenWindow {
                 self.chosen = self.state.choice.clone();
                 self.ask(AskedScene { file: Some(path), choice: self.chosen.clone() }, false);
             }
-            Action::Save(path) if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr")) => {
-                self.writes_exr = Some(path);
+            Action::Save(path) => {
+                // A picture of one time is saved.
+                self.state.clock.playing = false;
+                self.saves.push(PendingSave { path, of: None, is_told: false });
             }
-            Action::Save(path) => self.writes_png = Some(path),
             Action::CopyPicture => match self.picture(seen) {
                 Some(picture) => {
                     let ([width, height], rgba) = picture;
@@ -524,6 +556,7 @@ impl OpenWindow {
     }
 
     fn tell(&mut self, written: Result<String>) {
+        self.dirty = true;
         match written {
             Ok(text) => self.state.notices.say(text),
             Err(error) => self.state.notices.fail(format!("{error:#}")),
@@ -532,6 +565,11 @@ impl OpenWindow {
 
     /// Asks for the scene again when something else of it was chosen. Sliders change often: it waits until they rest.
     fn follow_choice(&mut self) {
+        let is_read = self.navigated == Some(self.scene) || self.failed == Some(self.scene);
+        if !is_read && self.again != Some(self.scene) {
+            // What is chosen now is of the scene before; only its light goes on.
+            self.state.choice = self.asked().choice.lit_as(&self.state.choice);
+        }
         if self.state.choice != self.chosen {
             self.chosen = self.state.choice.clone();
             self.chooses_at = Some(self.drawn + SETTLED);
@@ -539,7 +577,6 @@ impl OpenWindow {
         if self.chosen == self.asked().choice {
             self.chooses_at = None;
         }
-        let is_read = self.navigated == Some(self.scene) || self.failed == Some(self.scene);
         if self.chooses_at.is_none_or(|at| at > self.drawn) || !is_read {
             return;
         }
@@ -600,13 +637,16 @@ impl OpenWindow {
             settings: self.state.settings.clone(),
             other: self.state.other.clone(),
             moving: self.moving_until.is_some(),
-            surfaces: self.state.wants_surfaces() || self.writes_exr.is_some(),
+            surfaces: self.state.wants_surfaces() || self.saves.iter().any(PendingSave::is_exr),
             triangles: self.state.layer.reads_triangles(),
             meter: self.state.meter,
             picked: self.state.picked,
             code: self.code.clone(),
             quit: false,
         };
+        for save in &mut self.saves {
+            save.of.get_or_insert_with(|| wanted.clone());
+        }
         if self.sent.as_ref().is_none_or(|sent| !sent.is_as(&wanted)) {
             let is_over = self.sent.as_ref().is_some_and(|sent| !sent.is_same_picture(&wanted));
             self.sent = Some(wanted.clone());
@@ -621,8 +661,9 @@ impl OpenWindow {
 
     /// What the window shows, without panels: size in pixels and RGBA8. `None` before the first picture.
     fn picture(&self, seen: &RenderState) -> Option<([u32; 2], Vec<u8>)> {
-        if let Some(layer) = self.layer.as_ref().filter(|layer| layer.layer == self.state.layer) {
-            return Some((layer.size, layer.rgba.to_vec()));
+        if self.state.layer != SurfaceLayer::Radiance {
+            let is_this = |layer: &&DrawnLayer| layer.layer == self.state.layer && layer.of == seen.versions();
+            return self.layer.as_ref().filter(is_this).map(|layer| (layer.size, layer.rgba.to_vec()));
         }
         let left = seen.shown()?;
         let mut rgba = left.rgba.to_vec();
@@ -644,7 +685,8 @@ impl OpenWindow {
     fn write_png(&self, seen: &RenderState, path: &Path) -> Result<String> {
         let ([width, height], rgba) = self.picture(seen).context("there is no picture yet")?;
         self.mark(path);
-        file::write(path, &png::encode_png(width, height, &rgba, false)?)?;
+        let has_alpha = self.state.layer == SurfaceLayer::Radiance && seen.shown().is_some_and(|shown| shown.has_alpha);
+        file::write(path, &png::encode_png(width, height, &rgba, has_alpha)?)?;
         let unfinished = seen.shown().filter(|shown| !shown.is_done());
         let so_far = unfinished
             .map_or_else(String::new, |shown| format!(" ({} of {} samples)", shown.samples[0], shown.samples[1]));

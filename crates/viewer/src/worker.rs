@@ -15,7 +15,7 @@ use etalon::frame::{Drawing, Renderer, Settings};
 use etalon::gpu::{Device, Interrupted, PassTime, Replacement, is_lost};
 use etalon::image::meter::Meter;
 use etalon::image::metric::{AnyPicture, Metric, compare};
-use etalon::image::png::Display;
+use etalon::image::png::{Display, over};
 use etalon::plan::Knobs;
 use etalon::plan::rungs::{Indirect, Reflection, Refraction};
 use etalon::transport::events::{EventTracer, Limits};
@@ -28,6 +28,9 @@ const SMALLER: [u32; 6] = [1, 2, 3, 4, 6, 8];
 const UNKNOWN: u32 = 4;
 /// Least time between two publications of a picture in progress.
 const LOOK: Duration = Duration::from_millis(100);
+/// Display values of the squares behind transparent pixels, and their side in pixels.
+const GREYS: [u8; 2] = [102, 153];
+const SQUARE: u32 = 8;
 /// Fraction of a pixel's light below which its ray is not traced further.
 const LEAST_SHARE: f64 = 0.002;
 
@@ -389,12 +392,16 @@ impl Worker {
             (stage.ns_per_pixel[index], f64::from(side.settings.size[0]) * f64::from(side.settings.size[1]));
         let remaining = f64::from(drawing.of().saturating_sub(rendered.samples));
         let full = rendered.display.chunks_exact(4).filter(|p| p[..3].contains(&255)).count();
+        let rgba = Arc::new(rendered.display);
         let shown = Shown {
             version: self.version,
             seconds_left: 1e-9 * ns * pixels * remaining * sharing as f64,
             clipped: full as f32 / pixels as f32,
-            rgba: Arc::new(rendered.display),
+            opaque: if rendered.has_alpha { Arc::new(over_squares(&rgba, side.settings.size)) } else { rgba.clone() },
+            has_alpha: rendered.has_alpha,
+            rgba,
             size: side.settings.size,
+            of: wanted.clone(),
             samples: [rendered.samples, drawing.of()],
             moving: wanted.moving,
             time: wanted.time,
@@ -562,6 +569,17 @@ fn limits_of(knobs: &Knobs) -> Limits {
     }
 }
 
+/// A picture over squares of grey, RGBA8.
+fn over_squares(rgba: &[u8], [width, _]: [u32; 2]) -> Vec<u8> {
+    let pixels = rgba.chunks_exact(4).enumerate();
+    let opaque = pixels.flat_map(|(i, p)| {
+        let (x, y) = (i as u32 % width / SQUARE, i as u32 / width / SQUARE);
+        let [r, g, b] = over([p[0], p[1], p[2], p[3]], GREYS[(x + y) as usize % 2]);
+        [r, g, b, 255]
+    });
+    opaque.collect()
+}
+
 /// The largest size that keeps [`MOVING_MS`] while the view moves.
 fn smaller(size: [u32; 2], ns_per_pixel: f64) -> [u32; 2] {
     if ns_per_pixel == 0.0 {
@@ -585,5 +603,18 @@ mod tests {
         assert_eq!(smaller([1280, 720], 100.0), [640, 360]);
         assert_eq!(smaller([1281, 721], 1e6), [161, 91]);
         assert_eq!(smaller([3, 1], 1e9), [1, 1]);
+    }
+
+    #[test]
+    fn what_is_transparent_lies_over_squares() {
+        let clear: Vec<u8> = [9, 9, 9, 0].repeat(16 * 9);
+        let drawn = over_squares(&clear, [16, 9]);
+        let at = |x: usize, y: usize| drawn[(y * 16 + x) * 4..][..4].to_vec();
+        assert_eq!(
+            (at(0, 0), at(8, 0), at(7, 8)),
+            (vec![102, 102, 102, 255], vec![153; 3].into_iter().chain([255]).collect(), vec![153, 153, 153, 255])
+        );
+        assert_eq!(over_squares(&[200, 100, 50, 255], [1, 1]), [200, 100, 50, 255]);
+        assert_eq!(over_squares(&[200, 100, 0, 51], [1, 1]), [121, 101, 81, 255], "a fifth of it");
     }
 }

@@ -4,17 +4,22 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use egui::{Context, Event, Key, Modifiers, RawInput, Rect, Shape, Vec2, ViewportId};
+use egui::{Context, Event, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, Shape, Vec2, ViewportId};
 use etalon::frame::Settings;
 use etalon::gpu::{DeviceInfo, PassTime};
 use etalon::pass::tonemap::Counts;
 use etalon::plan::Knobs;
-use etalon::scene::outline::{Animation, Outline, OutlineNode};
+use etalon::scene::outline::{Animation, Named, Outline, OutlineNode};
+use etalon::share::AovPixel;
 use etalon_viewer::layout::{Docks, Pane};
 use etalon_viewer::navigation::Navigation;
 use etalon_viewer::panels::{self, PanelState};
 use etalon_viewer::preferences::Preferences;
-use etalon_viewer::shared::{FileChoice, Loaded, RenderRequest, RenderState, SceneFacts, Shown, Side};
+use etalon_viewer::shared::{FileChoice, Loaded, PixelSurfaces, RenderRequest, RenderState, SceneFacts, Shown, Side};
+
+fn named(name: &str) -> Named {
+    Named { name: name.to_owned(), key: name.to_owned() }
+}
 
 /// A scene with something in every list, and names that are too long.
 fn loaded() -> Loaded {
@@ -22,17 +27,18 @@ fn loaded() -> Loaded {
     scene.name = "/home/somebody/a folder with a long name/models/a scene with a very long name indeed.gltf".to_owned();
     let long = |i: usize| format!("a node with a long name that does not fit into any panel of the window, number {i}");
     scene.outline = Outline {
-        scenes: vec!["one".to_owned(), long(0)],
+        scenes: vec![named("one"), named(&long(0))],
         scene: 0,
-        variants: vec![long(1), "beach".to_owned()],
+        variants: vec![named(&long(1)), named("beach")],
         animations: vec![
-            Animation { name: "walk".to_owned(), seconds: 1.0, plays: true },
-            Animation { name: long(2), seconds: 9.5, plays: false },
+            Animation { named: named("walk"), seconds: 1.0, plays: true },
+            Animation { named: named(&long(2)), seconds: 9.5, plays: false },
         ],
         nodes: (0..40)
             .map(|i| OutlineNode {
                 name: if i % 3 == 0 { long(i) } else { format!("node {i}") },
                 key: i.to_string(),
+                index: i,
                 parent: (i % 5 != 0).then(|| i - 1),
                 instances: if i < scene.instances.len() { vec![i] } else { Vec::new() },
                 ..OutlineNode::default()
@@ -52,6 +58,9 @@ fn seen(loaded: &Loaded) -> RenderState {
     let shown = Shown {
         version: 1,
         rgba: Arc::new(vec![0; 4]),
+        opaque: Arc::new(vec![0; 4]),
+        has_alpha: false,
+        of: RenderRequest::new(Settings::default()),
         size: [1, 1],
         samples: [3, 16],
         moving: false,
@@ -347,4 +356,116 @@ fn the_mouse_reaches_every_control() {
         }
     }
     assert!(reached > 300, "{reached} controls");
+}
+
+/// Values of the command line beyond a slider's range, or with more decimals, are those of the command that is copied.
+#[test]
+fn showing_a_setting_does_not_change_it() {
+    let loaded = loaded();
+    let seen = seen(&loaded);
+    let mut window = Window::new([1280.0, 2000.0], 1.0, egui::ThemePreference::Dark, &loaded, &seen);
+    let light = etalon::scene::KeyLight { azimuth: 270.25, elevation: 12.345, lux: 5000.5 };
+    let settings = &mut window.state.settings;
+    (settings.exposure, settings.environment_rotation, settings.environment_intensity) = (-30.123_456, 270.0, 100.125);
+    window.state.choice.key_light = Some(light);
+    window.state.clock.time = Some(0.123_456_7);
+    for (pane, _) in Pane::PANELS {
+        if let Some(docks) = &mut window.state.preferences.docks {
+            docks.bring_forward(pane);
+        }
+        (0..3).for_each(|_| drop(window.frame(&seen, Vec::new())));
+    }
+    let settings = &window.state.settings;
+    let shown = (settings.exposure, settings.environment_rotation, settings.environment_intensity);
+    assert_eq!(shown, (-30.123_456, 270.0, 100.125));
+    assert_eq!((window.state.choice.key_light, window.state.clock.time), (Some(light), Some(0.123_456_7)));
+}
+
+/// A click waits for the surfaces at the pixels. It belongs to the view and the size that it was made in.
+#[test]
+fn a_click_into_another_view_is_forgotten() {
+    let loaded = loaded();
+    let mut seen = seen(&loaded);
+    let surfaces = |state: &PanelState| {
+        let size = state.settings.size;
+        let pixel = AovPixel {
+            p_rel: [0.0, 0.0, -1.0],
+            normal: [0.0, 0.0, 1.0],
+            geometric_normal: [0.0, 0.0, 1.0],
+            albedo: [0.5; 3],
+            distance: 1.0,
+            roughness: 0.5,
+            metallic: 0.0,
+            emissive: [0.0; 3],
+            material: 1,
+            instance: 1,
+        };
+        PixelSurfaces {
+            pixels: Arc::new(vec![pixel; (size[0] * size[1]) as usize]),
+            radiance: Vec::new(),
+            size,
+            eye: glam::DVec3::ZERO,
+            seen_from: state.navigation.as_ref().expect("a view").camera(),
+            versions: [Some(1), None],
+        }
+    };
+    for change in ["nothing", "the size", "the view"] {
+        let mut window = Window::new([1280.0, 720.0], 1.0, egui::ThemePreference::Dark, &loaded, &seen);
+        (0..3).for_each(|_| drop(window.frame(&seen, Vec::new())));
+        let [_, _, right, bottom] = window.state.place;
+        let at = Pos2::new(right as f32 - 200.0, bottom as f32 - 5.0);
+        let button = |pressed| Event::PointerButton {
+            pos: at,
+            button: PointerButton::Primary,
+            pressed,
+            modifiers: Modifiers::NONE,
+        };
+        drop(window.frame(&seen, vec![Event::PointerMoved(at)]));
+        drop(window.frame(&seen, vec![button(true)]));
+        drop(window.frame(&seen, vec![button(false)]));
+        assert!(window.state.wants_surfaces(), "the click waits");
+        match change {
+            "the size" => window.size *= 0.7,
+            "the view" => window.state.navigation.as_mut().expect("a view").orbit(glam::DVec2::new(0.1, 0.0)),
+            _ => {}
+        }
+        drop(window.frame(&seen, Vec::new()));
+        seen.surfaces = Some(surfaces(&window.state));
+        drop(window.frame(&seen, Vec::new()));
+        seen.surfaces = None;
+        assert!(!window.state.wants_surfaces(), "{change}: the click is answered or forgotten");
+        assert_eq!(window.state.selected, (change == "nothing").then_some(0), "{change}");
+    }
+}
+
+/// Undo returns to what was shown, never to a choice that could not be read.
+#[test]
+fn undo_passes_over_what_failed() {
+    let loaded = loaded();
+    let mut seen = seen(&loaded);
+    let mut window = Window::new([1280.0, 720.0], 1.0, egui::ThemePreference::Dark, &loaded, &seen);
+    let settle = |window: &mut Window, seen: &RenderState| (0..12).for_each(|_| drop(window.frame(seen, Vec::new())));
+    let undo = Event::Key {
+        key: Key::Z,
+        physical_key: None,
+        pressed: true,
+        repeat: false,
+        modifiers: Modifiers::COMMAND | Modifiers::CTRL,
+    };
+    let choose = |seen: &mut RenderState, choice: &FileChoice| {
+        let facts = SceneFacts { choice: choice.clone(), ..(**seen.facts.as_ref().expect("facts")).clone() };
+        seen.facts = Some(Arc::new(facts));
+    };
+    let hidden = FileChoice { hide: vec!["3".to_owned()], ..FileChoice::default() };
+    settle(&mut window, &seen);
+    window.state.choice = hidden.clone();
+    choose(&mut seen, &hidden);
+    settle(&mut window, &seen);
+    // This one is never shown; the window then returns to the one before.
+    window.state.choice = FileChoice { variant: Some("broken".to_owned()), ..hidden.clone() };
+    settle(&mut window, &seen);
+    window.state.choice = hidden;
+    settle(&mut window, &seen);
+    drop(window.frame(&seen, vec![undo]));
+    assert_eq!(window.state.choice, FileChoice::default());
 }

@@ -11,10 +11,12 @@ use maud::{Markup, html};
 
 use super::{COLOURS, digits, error, hex, percent, time, title, words};
 use crate::table::{Family, Point, REFERENCE, Table};
-use etalon::image::png::{Display, encode_png, read_display};
+use etalon::image::png::{Display, encode_png, over, read_display};
 
 /// JPEG quality of embedded pictures; the folder `pictures` has lossless files.
 const QUALITY: u8 = 82;
+/// What is behind transparent pixels.
+const GREY: u8 = 119;
 /// Largest number of pixels of an embedded picture.
 const MOST_PIXELS: u32 = 640 * 360;
 
@@ -46,15 +48,7 @@ fn halved(picture: &Display) -> Display {
 }
 
 fn jpeg(picture: &Display) -> Result<String> {
-    let rgb: Vec<u8> = picture
-        .rgba
-        .iter()
-        .flat_map(|&[r, g, b, a]| {
-            // Transparent pixels are composited over grey, as picture viewers do.
-            let over = |c: u8| ((u32::from(c) * u32::from(a) + 119 * u32::from(255 - a)) / 255) as u8;
-            [over(r), over(g), over(b)]
-        })
-        .collect();
+    let rgb: Vec<u8> = picture.rgba.iter().flat_map(|&pixel| over(pixel, GREY)).collect();
     let mut bytes = Vec::new();
     let encoder = &mut JpegEncoder::new_with_quality(&mut bytes, QUALITY);
     encoder.encode(&rgb, picture.width, picture.height, ExtendedColorType::Rgb8)?;

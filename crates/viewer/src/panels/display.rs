@@ -3,11 +3,13 @@
 use egui::{Slider, Ui};
 
 use super::commands::MenuCommand;
+use super::style::UNTOUCHED;
 use super::{PanelState, go_to, perform};
 use crate::layer::LAYERS;
 use crate::navigation::ViewSide;
 use crate::shared::RenderState;
 use etalon::image::tone::ToneMap;
+use etalon::scene::outline::Named;
 
 /// Fraction of clipped pixels from which it is said.
 const CLIPPED: f32 = 0.02;
@@ -17,6 +19,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     ui.strong("Exposure");
     ui.horizontal(|ui| {
         let exposure = Slider::new(&mut state.settings.exposure, -20.0..=20.0).suffix(" EV").max_decimals(2);
+        let exposure = exposure.clamping(UNTOUCHED);
         ui.add(exposure.drag_value_speed(0.05)).on_hover_text("Stops: each doubles the brightness");
         if ui.button("Auto").on_hover_text("From the picture's own luminance").clicked() {
             state.meter += 1;
@@ -25,6 +28,11 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
             state.settings.exposure = 0.0;
         }
     });
+    // The sentence is of the exposure that the scene began with.
+    let began = seen.facts.as_ref().filter(|facts| facts.exposure == state.settings.exposure);
+    if let Some(why) = began.and_then(|facts| facts.exposure_from.as_ref()) {
+        ui.weak(why);
+    }
     if let Some(shown) = seen.shown().filter(|shown| shown.clipped > CLIPPED) {
         let text = format!("⚠ {:.0} % of the pixels are clipped", 100.0 * shown.clipped);
         ui.colored_label(ui.visuals().warn_fg_color, text)
@@ -94,17 +102,18 @@ fn animation(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     ui.strong("Animation");
     let animations = &facts.outline.animations;
     if animations.len() > 1 {
-        let playing: Vec<&str> = animations.iter().filter(|one| one.plays).map(|one| one.name.as_str()).collect();
-        let text = state.choice.animation.clone().unwrap_or_else(|| playing.join(", "));
+        let playing: Vec<&str> = animations.iter().filter(|one| one.plays).map(|one| one.named.name.as_str()).collect();
+        let all = state.choice.animation.as_deref() == Some("all");
+        let text = if all { "all together".to_owned() } else { playing.join(", ") };
         egui::ComboBox::from_id_salt("animation")
             .width(ui.available_width() - 8.0)
             .truncate()
             .selected_text(text)
             .show_ui(ui, |ui| {
                 for animation in animations {
-                    let name = Some(animation.name.clone());
-                    let text = format!("{}, {:.2} s", animation.name, animation.seconds);
-                    ui.selectable_value(&mut state.choice.animation, name, text);
+                    let Named { name, key } = &animation.named;
+                    let text = format!("{name}, {:.2} s", animation.seconds);
+                    ui.selectable_value(&mut state.choice.animation, Some(key.clone()), text);
                 }
                 ui.selectable_value(&mut state.choice.animation, Some("all".to_owned()), "all together");
             });
@@ -113,10 +122,10 @@ fn animation(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     ui.horizontal(|ui| {
         let name = if state.clock.playing { "⏸" } else { "▶" };
         if ui.button(name).on_hover_text("Play or pause (Space)").clicked() {
-            state.clock.playing = !state.clock.playing;
+            state.clock.toggle(duration);
         }
         let mut seconds = state.clock.time.unwrap_or_default();
-        let slider = Slider::new(&mut seconds, 0.0..=duration).suffix(" s").max_decimals(3);
+        let slider = Slider::new(&mut seconds, 0.0..=duration).suffix(" s").max_decimals(3).clamping(UNTOUCHED);
         if ui.add(slider).changed() {
             state.clock.set(seconds, duration);
             state.moved = true;

@@ -1,7 +1,8 @@
 //! What lights the scene: the environment, its background, and a key light.
 
-use egui::Ui;
+use egui::{Slider, Ui};
 
+use super::style::UNTOUCHED;
 use super::{Asked, PanelState};
 use crate::shared::RenderState;
 use etalon::frame::Background;
@@ -51,10 +52,10 @@ fn environment(ui: &mut Ui, state: &mut PanelState) {
     let dark = state.choice.environment.as_deref() == Some("none");
     let settings = &mut state.settings;
     ui.add_enabled_ui(!dark, |ui| {
-        let intensity = egui::Slider::new(&mut settings.environment_intensity, 0.0..=16.0);
+        let intensity = Slider::new(&mut settings.environment_intensity, 0.0..=16.0).clamping(UNTOUCHED);
         let intensity = intensity.logarithmic(true).smallest_positive(0.01).text("intensity");
         state.moved |= ui.add(intensity).on_hover_text("Factor of the radiance of the environment").changed();
-        let turned = egui::Slider::new(&mut settings.environment_rotation, -180.0..=180.0);
+        let turned = Slider::new(&mut settings.environment_rotation, -180.0..=180.0).clamping(UNTOUCHED);
         state.moved |= ui.add(turned.suffix("°").text("rotation")).on_hover_text("Rotation about +Y").changed();
     });
 }
@@ -71,7 +72,7 @@ fn background(ui: &mut Ui, state: &mut PanelState) {
         };
         option(Background::Default, "default", "The environment; grey where there is none");
         option(Background::Environment, "environment", "The environment, which then lights the scene in any case");
-        option(Background::Transparent, "transparent", "Transparent in saved pictures, grey here");
+        option(Background::Transparent, "transparent", "Transparent in saved pictures, squares of grey here");
         option(Background::Color([128; 3]), "colour", "One colour");
     });
     if let Background::Color(mut colour) = now
@@ -87,12 +88,11 @@ fn key_light(ui: &mut Ui, state: &mut PanelState) {
     if checkbox.on_hover_text("A directional light beside those of the file").changed() {
         state.choice.key_light = on.then_some(KEY);
     }
-    let Some(mut light) = state.choice.key_light else { return };
-    let azimuth = egui::Slider::new(&mut light.azimuth, -180.0..=180.0).suffix("°").text("azimuth").max_decimals(0);
-    ui.add(azimuth).on_hover_text("Where it comes from: 0° is the front (+Z), 90° is +X");
-    let elevation = egui::Slider::new(&mut light.elevation, -90.0..=90.0).suffix("°").text("elevation").max_decimals(0);
-    ui.add(elevation);
-    let lux = egui::Slider::new(&mut light.lux, 0.0..=1000.0).logarithmic(true).smallest_positive(0.1).suffix(" lx");
-    ui.add(lux.text("strength"));
-    state.choice.key_light = Some(light);
+    let Some(light) = &mut state.choice.key_light else { return };
+    let azimuth = Slider::new(&mut light.azimuth, -180.0..=180.0).suffix("°").text("azimuth").max_decimals(0);
+    ui.add(azimuth.clamping(UNTOUCHED)).on_hover_text("Where it comes from: 0° is the front (+Z), 90° is +X");
+    let elevation = Slider::new(&mut light.elevation, -90.0..=90.0).suffix("°").text("elevation").max_decimals(0);
+    ui.add(elevation.clamping(UNTOUCHED));
+    let lux = Slider::new(&mut light.lux, 0.0..=1000.0).logarithmic(true).smallest_positive(0.1).suffix(" lx");
+    ui.add(lux.text("strength").clamping(UNTOUCHED));
 }

@@ -35,6 +35,7 @@ use commands::{COMMANDS, MenuCommand};
 use etalon::frame::Settings;
 use etalon::gpu::{DeviceInfo, PassTime};
 use etalon::plan::{KNOBS, Knobs, Model};
+use etalon::scene::Camera;
 pub use notices::Notices;
 
 /// Number of pictures whose pass times the chart shows.
@@ -69,6 +70,15 @@ enum Click {
     Select,
     Focus,
     Measure,
+}
+
+/// A click that waits, with the view that it was made in.
+#[derive(Debug, Clone, PartialEq)]
+struct Clicked {
+    click: Click,
+    pixel: [u32; 2],
+    size: [u32; 2],
+    seen_from: Camera,
 }
 
 /// What the file dialog was opened for.
@@ -159,7 +169,7 @@ pub struct PanelState {
     /// Whether clicks set points of a measurement.
     measures: bool,
     /// A click that waits for the surfaces at the pixels.
-    clicked: Option<(Click, [u32; 2])>,
+    clicked: Option<Clicked>,
     /// Nodes of the tree whose children are listed.
     expanded: BTreeSet<usize>,
     /// Text that names of the tree contain.
@@ -430,7 +440,7 @@ pub fn show(root: &mut Ui, state: &mut PanelState, seen: &RenderState) -> Vec<Ac
     if state.help {
         menu::help(root, state);
     }
-    remember_change(root, state);
+    remember_change(root, state, seen);
     actions
 }
 
@@ -448,9 +458,10 @@ fn dialogs(ui: &Ui, state: &mut PanelState, actions: &mut Vec<Action>) {
     }
 }
 
-/// Keeps a state that has settled, to return to.
-fn remember_change(ui: &Ui, state: &mut PanelState) {
-    if state.navigation.is_none() {
+/// Keeps a state that has settled, to return to; one whose choice cannot be read is none.
+fn remember_change(ui: &Ui, state: &mut PanelState, seen: &RenderState) {
+    let is_read = seen.facts.as_ref().is_some_and(|facts| facts.choice == state.choice);
+    if state.navigation.is_none() || !is_read {
         return;
     }
     let now = state.undoable();
@@ -478,9 +489,10 @@ fn play(ui: &Ui, state: &mut PanelState, seen: &RenderState) {
 }
 
 fn go_to(state: &mut PanelState, seen: &RenderState, index: usize) {
-    let camera = seen.facts.as_ref().and_then(|facts| facts.cameras.get(index));
-    if let (Some(navigation), Some(camera)) = (&mut state.navigation, camera) {
-        navigation.go_to(camera.clone(), Some(camera.name.clone()));
+    let Some(facts) = &seen.facts else { return };
+    let camera = facts.cameras.get(index).zip(facts.camera_keys.get(index));
+    if let (Some(navigation), Some((camera, key))) = (&mut state.navigation, camera) {
+        navigation.go_to(camera.clone(), Some(key.clone()));
         state.moved = true;
     }
 }
@@ -583,11 +595,11 @@ fn perform(ui: &Ui, state: &mut PanelState, seen: &RenderState, command: MenuCom
         }
         MenuCommand::Hide | MenuCommand::Isolate => {
             let outline = seen.facts.as_ref().map(|facts| &facts.outline);
-            let node = state.selected.and_then(|node| outline?.nodes.get(node));
+            let node = outline.zip(state.selected).filter(|(outline, node)| *node < outline.nodes.len());
             match (node, command) {
                 (None, _) => state.notices.say("select something first: click it in the picture or in the tree".into()),
-                (Some(node), MenuCommand::Hide) => state.choice.hide.push(node.key.clone()),
-                (Some(node), _) => state.choice.only = vec![node.key.clone()],
+                (Some((outline, node)), MenuCommand::Hide) => state.choice.hide(outline, node),
+                (Some((outline, node)), _) => state.choice.isolate(outline, node),
             }
         }
         MenuCommand::ShowAll => (state.choice.hide, state.choice.only) = Default::default(),
@@ -618,7 +630,7 @@ fn perform(ui: &Ui, state: &mut PanelState, seen: &RenderState, command: MenuCom
             }
         }
         MenuCommand::Grid => state.preferences.overlays.grid = !state.preferences.overlays.grid,
-        MenuCommand::Play => state.clock.playing = duration.is_some() && !state.clock.playing,
+        MenuCommand::Play => duration.into_iter().for_each(|duration| state.clock.toggle(duration)),
         MenuCommand::Forward | MenuCommand::Back => {
             let Some(duration) = duration else { return };
             state.clock.playing = false;

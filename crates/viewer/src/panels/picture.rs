@@ -6,11 +6,11 @@ use glam::{DVec2, DVec3};
 
 use super::overlay::{self, AXES, Canvas, text};
 use super::pixel::{colour, incidence};
-use super::{Action, Click, PanelState};
+use super::{Action, Click, Clicked, PanelState};
 use crate::layer::SurfaceLayer;
 use crate::layout::Pane;
 use crate::navigation::{Navigation, ViewSide};
-use crate::shared::{Pick, PixelSurfaces, RenderState, Trace};
+use crate::shared::{Pick, RenderState, Trace};
 use etalon::plan::KNOBS;
 use etalon::transport::events::Way;
 
@@ -160,30 +160,33 @@ fn navigate(ui: &Ui, rect: Rect, response: &egui::Response, state: &mut PanelSta
 
 /// Notes what a click is for; most clicks wait for the surfaces at the pixels.
 fn clicks(ui: &Ui, response: &egui::Response, under: Option<[u32; 2]>, state: &mut PanelState) {
-    let Some(pixel) = under else { return };
+    let (Some(pixel), Some(navigation)) = (under, &state.navigation) else { return };
+    let clicked = |click| Some(Clicked { click, pixel, size: state.settings.size, seen_from: navigation.camera() });
     if response.clicked() && ui.input(|input| input.modifiers.command) {
         state.picks += 1;
         state.picked = Some(Pick { number: state.picks, pixel });
         (state.pixel, state.forward) = (None, Some(Pane::Pixel));
     } else if response.double_clicked() && !state.measures {
-        state.clicked = Some((Click::Focus, pixel));
+        state.clicked = clicked(Click::Focus);
     } else if response.clicked() {
-        state.clicked = Some((if state.measures { Click::Measure } else { Click::Select }, pixel));
+        state.clicked = clicked(if state.measures { Click::Measure } else { Click::Select });
     }
 }
 
-/// Answers a click when the surfaces at the pixels are known.
+/// Answers a click when the surfaces at the pixels are known. A click into another view or size is forgotten.
 fn resolve(state: &mut PanelState, seen: &RenderState) {
-    let (Some((click, [x, y])), Some(surfaces), Some(facts)) = (state.clicked, seen.now(), &seen.facts) else { return };
-    let is_of = |surfaces: &PixelSurfaces| {
-        state.navigation.as_ref().is_some_and(|navigation| navigation.camera() == surfaces.seen_from)
-            && surfaces.size == state.settings.size
-    };
-    if !is_of(surfaces) {
+    let Some(Clicked { click, pixel: [x, y], size, seen_from }) = &state.clicked else { return };
+    let camera = state.navigation.as_ref().map(Navigation::camera);
+    if *size != state.settings.size || camera.as_ref() != Some(seen_from) {
+        state.clicked = None;
         return;
     }
+    let (Some(surfaces), Some(facts)) = (seen.now(), &seen.facts) else { return };
+    if surfaces.size != *size || surfaces.seen_from != *seen_from {
+        return;
+    }
+    let (click, p) = (*click, &surfaces.pixels[(y * size[0] + x) as usize]);
     state.clicked = None;
-    let p = &surfaces.pixels[(y * surfaces.size[0] + x) as usize];
     let at = surfaces.eye + DVec3::from(p.p_rel.map(f64::from));
     let instance = (p.instance as usize).checked_sub(1).filter(|_| p.material != 0);
     match (click, instance) {

@@ -4,8 +4,8 @@ use egui::{RichText, Ui};
 
 use super::commands::MenuCommand;
 use super::{Action, PanelState, go_to, perform};
-use crate::shared::{FileChoice, RenderState, SceneFacts};
-use etalon::scene::outline::OutlineNode;
+use crate::shared::{RenderState, SceneFacts};
+use etalon::scene::outline::{Named, OutlineNode};
 
 /// Number of nodes up to which the whole tree is unfolded at first.
 const UNFOLDED: usize = 60;
@@ -42,11 +42,16 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, acti
 /// Scenes and variants of the file.
 fn choices(ui: &mut Ui, state: &mut PanelState, facts: &SceneFacts) {
     let outline = &facts.outline;
-    let mut choose = |name: &str, list: &[String], none: Option<&str>, chosen: &mut Option<String>, now: usize| {
+    let mut choose = |name: &str, list: &[Named], none: Option<&str>, chosen: &mut Option<String>, now: usize| {
         if list.len() < 2 && none.is_none() || list.is_empty() {
             return;
         }
-        let text = chosen.clone().or_else(|| none.map(str::to_owned)).unwrap_or_else(|| list[now].clone());
+        let at = chosen.as_ref().and_then(|word| Named::position(list, word));
+        let text = match (at, none) {
+            (Some(at), _) => &list[at].name,
+            (None, Some(none)) => none,
+            (None, None) => &list[now].name,
+        };
         ui.horizontal(|ui| {
             ui.label(name);
             egui::ComboBox::from_id_salt(name)
@@ -57,8 +62,10 @@ fn choices(ui: &mut Ui, state: &mut PanelState, facts: &SceneFacts) {
                     if let Some(none) = none {
                         ui.selectable_value(chosen, None, none);
                     }
-                    for one in list {
-                        ui.selectable_value(chosen, Some(one.clone()), one);
+                    for (index, one) in list.iter().enumerate() {
+                        if ui.selectable_label(at == Some(index), &one.name).clicked() {
+                            *chosen = Some(one.key.clone());
+                        }
                     }
                 });
         });
@@ -115,7 +122,10 @@ fn tree(ui: &mut Ui, state: &mut PanelState, facts: &SceneFacts) {
             }
             let mut shown = !node.hidden;
             if ui.checkbox(&mut shown, "").on_hover_text("Show or hide the node with what is below it").changed() {
-                set_shown(state, facts, index, shown);
+                match shown {
+                    true => state.choice.show(&facts.outline, index),
+                    false => state.choice.hide(&facts.outline, index),
+                }
             }
             let name = if node.name.is_empty() { "(no name)" } else { &node.name };
             let (sign, kind) = content(node);
@@ -140,25 +150,6 @@ fn tree(ui: &mut Ui, state: &mut PanelState, facts: &SceneFacts) {
     }
     if more > 0 {
         ui.weak(format!("{more} more: find them by name, or fold branches"));
-    }
-}
-
-/// Shows or hides a node by the options of the command line.
-fn set_shown(state: &mut PanelState, facts: &SceneFacts, node: usize, shown: bool) {
-    let key = &facts.outline.nodes[node].key;
-    let FileChoice { hide, only, .. } = &mut state.choice;
-    if !shown {
-        hide.push(key.clone());
-        return;
-    }
-    // Nodes above it hide it as well.
-    let above = |other: &str| {
-        let index = facts.outline.nodes.iter().position(|node| node.key == other);
-        index.is_some_and(|index| facts.outline.is_within(node, index))
-    };
-    hide.retain(|other| !above(other));
-    if !only.is_empty() && !only.iter().any(|other| above(other)) {
-        only.push(key.clone());
     }
 }
 

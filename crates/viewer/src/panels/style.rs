@@ -1,6 +1,9 @@
 //! Colours of text, with a contrast of at least 4.5 : 1 (WCAG 2.2, success criterion 1.4.3).
 
-use egui::{Color32, Context, Theme, Visuals};
+use egui::{Color32, Context, SliderClamping, Theme, Visuals};
+
+/// Of a slider: a value of the command line beyond its range or with more decimals stays until it is edited.
+pub(super) const UNTOUCHED: SliderClamping = SliderClamping::Edits;
 
 /// Colour of secondary text.
 fn weak(dark: bool) -> Color32 {
