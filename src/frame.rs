@@ -168,8 +168,11 @@ impl Renderer {
         }
         // A forced environment effect without an environment uses a black one.
         let dark = (plan.environment && environment.is_none()).then(Environment::dark);
-        let turn =
-            EnvironmentRotation { intensity: settings.environment_intensity, rotation: settings.environment_rotation };
+        let turn = EnvironmentRotation {
+            intensity: settings.environment_intensity,
+            rotation: settings.environment_rotation,
+            blur: settings.background_blur,
+        };
         let sky = environment.or(dark.as_ref()).map(|map| settings.sky(map));
         let sky_directions = sky_directions(device, &plan, sky, settings.seed)?;
         let touching = rays.constants.touching;

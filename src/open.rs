@@ -322,6 +322,7 @@ impl Opened {
         let settings = Settings {
             // Where no surface is, alpha is 0.
             background: Background::Transparent,
+            background_blur: 0.0,
             size: if longer > u64::from(METERED_SIDE) { [side(width), side(height)] } else { settings.size },
             max_error: None,
             parts: Vec::new(),

@@ -30,6 +30,8 @@ pub struct Conditions<'a> {
     pub sky: Option<Sky<'a>>,
     /// Whether the environment is also the background.
     pub background: bool,
+    /// Whether it is blurred there.
+    pub blurred: bool,
 }
 
 /// A scene as it was read. Clones, and everything prepared from them, share its lists and the one BVH of its triangles,
@@ -140,7 +142,7 @@ pub fn ray_offset(extent: f64) -> f64 {
 
 /// Canonicalises a scene and plans it.
 fn planned(scene: &mut Scene, conditions: &Conditions<'_>) -> Result<(Plan, Solids)> {
-    let &Conditions { knobs, forced, sky, background } = conditions;
+    let &Conditions { knobs, forced, sky, background, blurred } = conditions;
     one_medium_each(scene);
     let triangles = scene.triangles();
     let shown = knobs.show_occlusion(sky.is_some());
@@ -165,6 +167,7 @@ fn planned(scene: &mut Scene, conditions: &Conditions<'_>) -> Result<(Plan, Soli
         constant: sky.is_some_and(|sky| Environment::is_constant(sky.map)),
         grey: sky.is_some_and(|sky| Environment::is_grey(sky.map)),
         sky: background,
+        blurred,
         forced,
     };
     let plan = Plan::new(scene, &facts, surroundings, knobs);
@@ -216,8 +219,14 @@ impl Prepared {
     /// # Errors
     /// When the scene has more triangles than a BVH holds.
     pub fn for_rays(scene: Scene) -> Result<Self> {
-        let surroundings =
-            Surroundings { environment: false, constant: false, grey: false, sky: false, forced: ForcedEffects::None };
+        let surroundings = Surroundings {
+            environment: false,
+            constant: false,
+            grey: false,
+            sky: false,
+            blurred: false,
+            forced: ForcedEffects::None,
+        };
         let facts = Facts::of(&scene, CanonicalForm::default());
         let rays = Rays::default();
         let plan = Plan { rays: Some(rays), ..Plan::new(&scene, &facts, surroundings, &Knobs::default()) };

@@ -32,8 +32,14 @@ struct Things {
 impl Things {
     fn new(gpu: &Gpu) -> Self {
         let size = [64, 36];
-        let surroundings =
-            Surroundings { environment: false, constant: false, grey: false, sky: false, forced: ForcedEffects::None };
+        let surroundings = Surroundings {
+            environment: false,
+            constant: false,
+            grey: false,
+            sky: false,
+            blurred: false,
+            forced: ForcedEffects::None,
+        };
         let plan = Plan::new(&Scene::default(), &Facts::default(), surroundings, &Knobs::default());
         let desc = ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], vk::ImageUsageFlags::STORAGE);
         let buffer = |name| Buffer::new(&gpu.device, name, 256, Place::Device).expect("a buffer");

@@ -6,10 +6,12 @@ use std::f64::consts::PI;
 
 use etalon::frame::{Background, Renderer, Settings};
 use etalon::image::Picture;
+use etalon::plan::{Knobs, Model};
 use etalon::scene::environment::{self, Environment};
 use etalon::scene::{LightKind, Material, Scene};
 use etalon::study::shape::Shape;
 use etalon::study::{self, generate};
+use etalon::upload::view::View;
 use etalon_testing::gpu::{Gpu, bits, knobs, largest_difference, settings};
 use etalon_testing::made::{Made, Random, at, lambert, unlit};
 use glam::{DAffine3, DVec3, Vec3};
@@ -498,6 +500,14 @@ fn gradient() -> Environment {
     Environment { name: "gradient".to_owned(), width, height, radiance }
 }
 
+/// Direction from the eye through the centre of a pixel.
+fn through_pixel(i: usize, view: &View) -> DVec3 {
+    let x = 2.0 * ((i as u32 % SIZE[0]) as f64 + 0.5) / f64::from(SIZE[0]) - 1.0;
+    let y = 1.0 - 2.0 * ((i as u32 / SIZE[0]) as f64 + 0.5) / f64::from(SIZE[1]);
+    let [right, up, forward] = view.axes;
+    (forward + right * (x * view.half.x) + up * (y * view.half.y)).normalize()
+}
+
 #[test]
 fn behind_the_scene_is_the_environment_turned_as_asked() {
     let gpu = Gpu::open();
@@ -523,10 +533,7 @@ fn behind_the_scene_is_the_environment_turned_as_asked() {
                 continue;
             }
             seen += 1;
-            let x = 2.0 * ((i as u32 % SIZE[0]) as f64 + 0.5) / f64::from(SIZE[0]) - 1.0;
-            let y = 1.0 - 2.0 * ((i as u32 / SIZE[0]) as f64 + 0.5) / f64::from(SIZE[1]);
-            let [right, up, forward] = view.axes;
-            let d = (forward + right * (x * view.half.x) + up * (y * view.half.y)).normalize();
+            let d = through_pixel(i, &view);
             // The map turned by +θ about +Y shows at d what lies at d turned back: azimuth atan2(z, x) falls as +Y
             // turns x towards −z, so turning back adds θ to it.
             let (sin, cos) = turn.sin_cos();
@@ -565,19 +572,98 @@ fn a_turned_environment_lights_as_the_turned_map_does() {
     assert!(etalon_testing::gpu::largest_difference(&a, &unturned, 1.0) > 0.5, "the turn shows");
 }
 
-#[test]
-fn a_rough_metal_mirrors_the_lobe_of_what_is_around() {
-    let gpu = Gpu::open();
-    // A lamp of 12° in a dim room; the map is as fine as its prefiltered levels.
+/// A lamp of 12° in a dim room; the map is as fine as its prefiltered levels.
+fn room() -> Environment {
     let lamp = DVec3::new(0.5, 0.35, 1.0).normalize();
     let texel = |i: u32| environment::direction((f64::from(i % 256) + 0.5) / 256.0, (f64::from(i / 256) + 0.5) / 128.0);
     let radiance = |i: u32| if texel(i).dot(lamp) > 12_f64.to_radians().cos() { [50.0_f32; 3] } else { [0.25; 3] };
-    let room = Environment {
-        name: "lamp".to_owned(),
-        width: 256,
-        height: 128,
-        radiance: (0..256 * 128).map(radiance).collect(),
-    };
+    let radiance = (0..256 * 128).map(radiance).collect();
+    Environment { name: "lamp".to_owned(), width: 256, height: 128, radiance }
+}
+
+/// A channel of a map through a GGX lobe about `n`: ∫ L D(h) G1(l) dω over the same with L = 1, for n = v = r.
+fn through_lobe(map: &Environment, n: DVec3, alpha: f64) -> f64 {
+    let (width, height) = (f64::from(map.width), f64::from(map.height));
+    let (mut sum, mut whole) = (0.0, 0.0);
+    for (i, radiance) in map.radiance.iter().enumerate() {
+        let (x, y) = (i as u32 % map.width, i as u32 / map.width);
+        let l = environment::direction((f64::from(x) + 0.5) / width, (f64::from(y) + 0.5) / height);
+        let cos_l = n.dot(l);
+        if cos_l > 0.0 {
+            let cos_h2 = 0.5 * (1.0 + cos_l);
+            let d = (cos_h2 * (alpha * alpha - 1.0) + 1.0).powi(-2);
+            let g1 = 2.0 / (1.0 + (1.0 + alpha * alpha * (cos_l.powi(-2) - 1.0)).sqrt());
+            let weight = d * g1 * (1.0 - l.y * l.y).sqrt();
+            sum += weight * f64::from(radiance[0]);
+            whole += weight;
+        }
+    }
+    sum / whole
+}
+
+/// What is seen directly is blurred, also through glass; what lights surfaces is the environment as it is.
+#[test]
+fn a_blurred_background_is_the_environment_through_a_lobe() {
+    let gpu = Gpu::open();
+    let room = room();
+    let glass = Material { transmission: 1.0, ior: 1.0, thickness: 1.0, ..lambert([1.0; 3]) };
+    let mut camera = etalon_testing::made::looking(DVec3::new(-1.0, 0.3, -4.0), DVec3::new(-0.4, 0.3, 1.0));
+    camera.projection = etalon_testing::made::perspective(80.0);
+    for model in [Model::Local, Model::Recursive, Model::Global] {
+        let mut knobs = Knobs::of(model);
+        knobs.set("samples=4").expect("a rung");
+        let shot = |material: &Material, background, background_blur| {
+            let settings = Settings { background, background_blur, knobs: knobs.clone(), ..settings(SIZE) };
+            let mut renderer = gpu.renderer(&ball(material.clone()), Some(&room), settings);
+            renderer.render(&camera, &mut |_| ()).expect("a picture");
+            (renderer.film().expect("the film"), renderer.aovs(&camera).expect("the G-buffer").1)
+        };
+        let solid = lambert([0.5; 3]);
+        let (clear, view) = shot(&solid, Background::Transparent, 0.0);
+        let (sharp, _) = shot(&solid, Background::Environment, 0.0);
+        for alpha in [0.25_f64, 0.5] {
+            let blur = alpha.sqrt() as f32;
+            let (blurred, _) = shot(&solid, Background::Environment, blur);
+            let (mut behind, mut covered, mut worst, mut brightest) = (0, 0, 0.0_f64, 0.0_f64);
+            for (i, pixel) in blurred.rgba.iter().enumerate() {
+                if clear.rgba[i][3] == 1.0 {
+                    assert_eq!(*pixel, sharp.rgba[i], "{model:?}, pixel {i}: another light");
+                    covered += 1;
+                } else if clear.rgba[i][3] == 0.0 && i % 7 == 0 {
+                    let d = through_pixel(i, &view);
+                    let want = through_lobe(&room, d, alpha);
+                    worst = worst.max((f64::from(pixel[0]) - want).abs());
+                    brightest = brightest.max(want);
+                    behind += 1;
+                }
+            }
+            eprintln!("{model:?}, alpha {alpha}: {worst} of {brightest}, {behind} behind, {covered} covered");
+            assert!(behind > 100 && covered > 20 && brightest > 1.0, "{model:?}: {behind} {covered} {brightest}");
+            // As for the metal below.
+            assert!(worst < 0.05 * brightest, "{model:?}, alpha {alpha}: {worst} of {brightest}");
+        }
+        // Glass of index 1 is not seen.
+        let (through, _) = shot(&glass, Background::Environment, 0.5);
+        let (without, _) = shot(&solid, Background::Environment, 0.5);
+        let open = |i: &usize| clear.rgba[*i][3] == 0.0;
+        let brightest = (0..without.rgba.len()).filter(open).fold(0.0_f32, |m, i| m.max(without.rgba[i][0]));
+        let of_sharp = shot(&glass, Background::Environment, 0.0).0;
+        let mut differs = 0;
+        for i in (0..through.rgba.len()).filter(|i| clear.rgba[*i][3] == 1.0) {
+            let d = through_pixel(i, &view);
+            let want = through_lobe(&room, d, 0.25);
+            let found = f64::from(through.rgba[i][0]);
+            assert!((found - want).abs() < 0.05 * f64::from(brightest), "{model:?}, {i}: {found} {want}");
+            differs += usize::from((of_sharp.rgba[i][0] - through.rgba[i][0]).abs() > 0.05);
+        }
+        assert!(differs > 10, "{model:?}: the blur does not show in the glass");
+    }
+}
+
+#[test]
+fn a_rough_metal_mirrors_the_lobe_of_what_is_around() {
+    let gpu = Gpu::open();
+    let room = room();
     let white = Environment { radiance: vec![[1.0; 3]; 256 * 128], ..room.clone() };
     for alpha in [0.125_f64, 0.25, 0.5] {
         let roughness = alpha.sqrt() as f32;
@@ -595,21 +681,7 @@ fn a_rough_metal_mirrors_the_lobe_of_what_is_around() {
             let down = (f64::from(y) + 0.5) / f64::from(SIZE[1]) * 2.0 - 1.0;
             let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
             let n = DVec3::new(across * tan * aspect, -down * tan, 1.0).normalize();
-            // ∫ L D(h) G1(l) dω over the same with L = 1, for n = v = r.
-            let (mut sum, mut whole) = (0.0, 0.0);
-            for t in 0..256 * 128 {
-                let l = texel(t);
-                let cos_l = n.dot(l);
-                if cos_l > 0.0 {
-                    let cos_h2 = 0.5 * (1.0 + cos_l);
-                    let d = (cos_h2 * (alpha * alpha - 1.0) + 1.0).powi(-2);
-                    let g1 = 2.0 / (1.0 + (1.0 + alpha * alpha * (cos_l.powi(-2) - 1.0)).sqrt());
-                    let weight = d * g1 * (1.0 - l.y * l.y).sqrt();
-                    sum += weight * f64::from(room.radiance[t as usize][0]);
-                    whole += weight;
-                }
-            }
-            let want = sum / whole;
+            let want = through_lobe(&room, n, alpha);
             let found = f64::from(of_room.rgba[i][0]) / f64::from(of_white.rgba[i][0]);
             worst = worst.max((found - want).abs());
             brightest = brightest.max(want);

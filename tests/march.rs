@@ -521,8 +521,14 @@ fn light_reaches_into_a_mesh_through_its_grid() {
 fn planned(scene: &Scene, choices: &[&str]) -> Plan {
     let mut knobs = Knobs::of(Model::Recursive);
     choices.iter().for_each(|choice| knobs.set(choice).expect("a rung"));
-    let surroundings =
-        Surroundings { environment: false, constant: false, grey: false, sky: false, forced: ForcedEffects::None };
+    let surroundings = Surroundings {
+        environment: false,
+        constant: false,
+        grey: false,
+        sky: false,
+        blurred: false,
+        forced: ForcedEffects::None,
+    };
     Plan::new(scene, &Facts::of(scene, CanonicalForm::default()), surroundings, &knobs)
 }
 

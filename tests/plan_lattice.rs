@@ -503,6 +503,7 @@ fn planned(ways: &Ways, choice: &Choice, knobs: Knobs) -> Plan {
         constant: environment == "constant",
         grey: false,
         sky: environment != "none",
+        blurred: false,
         forced: ForcedEffects::None,
     };
     Plan::new(&scene, &Facts::of(&scene, form), surroundings, &knobs)

@@ -10,7 +10,9 @@
 #include "share/environment.glsl"
 
 layout(constant) const bool SKY = false;         // the environment is visible as the background
+layout(constant) const bool BLURRED_BACKGROUND = false; // SKY: it is seen directly through a lobe
 layout(constant) const bool ENVIRONMENT = false; // rays that leave the scene see an environment
+const bool OTHER_BACKGROUND = !SKY || BLURRED_BACKGROUND; // what is seen directly is not the environment as it is
 layout(scene, scalar) uniform Environment { EnvironmentTerms environment; };
 layout(scene) uniform sampler2D sky;
 layout(scene) uniform sampler2D prefiltered; // mip chain: each level convolved with a wider lobe (pass/prefilter.comp)
@@ -39,6 +41,14 @@ float prefiltered_level(float alpha) {
 vec3 prefiltered_radiance(vec3 direction, float alpha) {
     vec2 at = equirectangular_from_direction(into_environment(direction));
     return light_of_environment(textureLod(prefiltered, at, prefiltered_level(alpha)).rgb);
+}
+
+// Radiance of the background, which is seen directly or through surfaces that transmit light: the environment, blurred
+// or not, or nothing. All other light comes from the environment itself.
+vec3 background_radiance(vec3 direction) {
+    if (!SKY) return vec3(0.0);
+    if (BLURRED_BACKGROUND) return prefiltered_radiance(direction, environment.blur);
+    return environment_radiance(direction);
 }
 
 // Ambient light: irradiance from nine spherical-harmonic coefficients, without visibility.

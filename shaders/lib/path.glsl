@@ -170,14 +170,13 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     if (ENVIRONMENT) {
         vec3 towards = at_surface ? light.to_light : p.direction;
         vec3 seen = environment_radiance(towards);
-        bool directly_visible = (p.state & PATH_TRANSPARENT_SO_FAR) != 0 && !SKY;
+        // The background replaces the environment where it is seen directly: straight ahead and through the surface.
+        bool directly_visible = OTHER_BACKGROUND && (p.state & PATH_TRANSPARENT_SO_FAR) != 0;
+        bool ahead = directly_visible && (!at_surface || dot(hit.n, light.to_light) < 0.0 && !shines_through(b));
+        if (ahead) seen = background_radiance(towards);
         float w = p.pdf > 0.0 ? mis_weight(p.pdf, float(LIGHT_SAMPLES) * environment_pdf(p.direction)) : 1.0;
-        if (!at_surface && !directly_visible) gathered = p.throughput * seen * w;
-        if (SAMPLED_ENVIRONMENT && light.pdf > 0.0 && light.t_max == LARGEST) {
-            // A directly visible background replaces the environment, so no light comes from it straight ahead.
-            bool hidden = directly_visible && dot(hit.n, light.to_light) < 0.0 && !shines_through(b);
-            light.arriving *= hidden ? vec3(0.0) : seen;
-        }
+        if (!at_surface) gathered = p.throughput * seen * w;
+        if (SAMPLED_ENVIRONMENT && light.pdf > 0.0 && light.t_max == LARGEST) light.arriving *= seen;
     }
     bool ends = !at_surface;
     float background_share = mean(p.throughput);
@@ -226,8 +225,8 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
         for (uint i = 1; i < LIGHT_SAMPLES; i++) {
             LightSample other = sample_light(front_origin, dimension_words_of(pixel, vertices_before, DIMENSION_LIGHT, i, LIGHT_SAMPLES));
             if (SAMPLED_ENVIRONMENT && other.pdf > 0.0 && other.t_max == LARGEST) {
-                bool hidden = (p.state & PATH_TRANSPARENT_SO_FAR) != 0 && !SKY && dot(hit.n, other.to_light) < 0.0 && !shines_through(b);
-                other.arriving *= hidden ? vec3(0.0) : environment_radiance(other.to_light);
+                bool ahead = OTHER_BACKGROUND && (p.state & PATH_TRANSPARENT_SO_FAR) != 0 && dot(hit.n, other.to_light) < 0.0 && !shines_through(b);
+                other.arriving *= ahead ? background_radiance(other.to_light) : environment_radiance(other.to_light);
             }
             ShadowRay one = shadow_ray_to(p, interaction, scatters, front_origin, other, bsdf_evaluate(bsdf, normalize(other.to_light)));
             one.t_max = alive ? one.t_max : -1.0;

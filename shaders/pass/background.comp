@@ -19,6 +19,6 @@ void main() {
     if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
     if (stored_depth(pixel_index(pixel)) != 0.0) return;
     vec4 result = vec4(0.0);
-    if (SKY) result = vec4(environment_radiance(view_direction(camera, pixel)), 1.0);
+    if (SKY) result = vec4(background_radiance(view_direction(camera, pixel)), 1.0);
     imageStore(radiance, pixel, result);
 }

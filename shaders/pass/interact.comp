@@ -263,8 +263,13 @@ void main() {
                 if (!boundary.suppressed_by_priority) sum += wanted(ray.events, weight * radiance_to_eye(s, pixel, 0, all, true));
                 split(hit, boundary, ray, cone, uvec2(pixel));
             } else {
-                bool clear = (ray.events & 0x200u) != 0 && !SKY;
-                if (!clear) look(ray.direction, wanted(ray.events, ray.throughput));
+                bool direct = (ray.events & 0x200u) != 0;
+                bool clear = direct && !SKY;
+                if (BLURRED_BACKGROUND && direct) {
+                    sum += wanted(ray.events, ray.throughput) * background_radiance(ray.direction);
+                } else if (!clear) {
+                    look(ray.direction, wanted(ray.events, ray.throughput));
+                }
                 escaped += clear ? (ray.throughput.r + ray.throughput.g + ray.throughput.b) * (1.0 / 3.0) : 0.0;
             }
         }

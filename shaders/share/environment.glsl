@@ -9,5 +9,6 @@ struct EnvironmentTerms {
     float intensity;
     float width;         // texels across level 0 of the prefiltered map
     float levels;        // its number of levels
+    float blur;          // α of the lobe that blurs the background
 };
 #endif

@@ -77,6 +77,9 @@ pub struct Settings {
     pub exposure: f32,
     /// Background behind the scene.
     pub background: Background,
+    /// Blur of an environment that is the background, 0 … 1: it is seen through a GGX lobe of this perceptual
+    /// roughness. Light, reflections and everything else come from the environment as it is.
+    pub background_blur: f32,
     /// Factor on the environment's radiance.
     pub environment_intensity: f32,
     /// Rotation of the environment about +Y, in degrees.
@@ -107,6 +110,7 @@ impl Default for Settings {
             tonemap: ToneMap::default(),
             exposure: 0.0,
             background: Background::default(),
+            background_blur: 0.0,
             environment_intensity: 1.0,
             environment_rotation: 0.0,
             seed: 0,
@@ -124,18 +128,33 @@ impl Settings {
     /// The conditions under which a scene in this environment is prepared.
     ///
     /// # Errors
-    /// When the background is an environment and there is none.
+    /// When the background is an environment and there is none, or is blurred and is none.
     pub fn conditions<'a>(&'a self, environment: Option<&'a Environment>) -> Result<Conditions<'a>> {
-        let background = match self.background {
-            Background::Default | Background::Environment => environment.is_some(),
-            Background::Transparent | Background::Color(_) => false,
-        };
+        let background = environment.is_some() && self.shows_environment();
         if self.background == Background::Environment && environment.is_none() {
             let why = "env: there is no environment (none was asked for, or the scene has lights of its own)";
             return Err(Refused::error(Setting::Background, why.to_owned()));
         }
+        if self.background_blur > 0.0 && !background {
+            let why = "blur: the background is not an environment";
+            return Err(Refused::error(Setting::Background, why.to_owned()));
+        }
         let sky = environment.map(|map| self.sky(map));
-        Ok(Conditions { knobs: &self.knobs, forced: self.forced, sky, background })
+        let blurred = self.background_blur > 0.0;
+        Ok(Conditions { knobs: &self.knobs, forced: self.forced, sky, background, blurred })
+    }
+
+    /// Whether the background is the environment, where there is one.
+    #[must_use]
+    pub fn shows_environment(&self) -> bool {
+        matches!(self.background, Background::Default | Background::Environment)
+    }
+
+    /// These settings without a blur of what is not shown.
+    #[must_use]
+    pub fn without_idle_blur(self, there_is_environment: bool) -> Self {
+        let blur = if there_is_environment && self.shows_environment() { self.background_blur } else { 0.0 };
+        Self { background_blur: blur, ..self }
     }
 
     /// The environment as these settings turn and scale it.

@@ -58,8 +58,14 @@ mod tests {
         let plan = |choices: &[&str]| {
             let mut knobs = Knobs::default();
             choices.iter().for_each(|choice| knobs.set(choice).unwrap());
-            let surroundings =
-                Surroundings { environment: true, constant: false, grey: false, sky: true, forced: ForcedEffects::All };
+            let surroundings = Surroundings {
+                environment: true,
+                constant: false,
+                grey: false,
+                sky: true,
+                blurred: false,
+                forced: ForcedEffects::All,
+            };
             Plan::new(&Scene::default(), &Facts::default(), surroundings, &knobs)
         };
         let refused = |choices: &[&str], ability: &Ability| plan(choices).check(ability).map_err(|e| e.to_string());

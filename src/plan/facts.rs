@@ -36,6 +36,8 @@ pub struct Surroundings {
     pub grey: bool,
     /// Whether the environment is also the background.
     pub sky: bool,
+    /// Whether it is blurred there.
+    pub blurred: bool,
     /// Effects that are planned although the scene does not call for them.
     pub forced: ForcedEffects,
 }

@@ -67,6 +67,7 @@ impl Plan {
             prefilter: images.prefilter,
             ambient: images.ambient,
             sky: surroundings.sky,
+            blurred: images.blurred,
             transparency: transmission.transparency,
             directional_lights: lights.directional,
             local_lights: lights.local,
@@ -107,6 +108,7 @@ struct MirrorImages {
     environment: bool,
     mirrored: bool,
     prefilter: bool,
+    blurred: bool,
     ambient: bool,
     /// Rays of ambient occlusion.
     occlusion: u32,
@@ -205,16 +207,22 @@ impl Planner<'_> {
             unless_paths(paths, rung.choice().allows(rung != Reflection::Off)),
             cause,
         );
-        let cause = match (reflection, there_is) {
+        // An environment that is the same everywhere is its own blur.
+        let blurred = surroundings.blurred && surroundings.sky && !surroundings.constant;
+        let cause = match (reflection || blurred, there_is) {
             (false, _) => Cause::against("no surface reflects the environment"),
             (_, false) => Cause::against("there is no environment"),
             _ => Cause::when(
                 !surroundings.constant,
-                "the environment varies",
+                if blurred {
+                    "the environment varies, and the background is blurred"
+                } else {
+                    "the environment varies"
+                },
                 "the environment is the same in all directions",
             ),
         };
-        let prefilter = decisions.decide(EffectId::PrefilteredEnvironment, cause) && reflection;
+        let prefilter = decisions.decide(EffectId::PrefilteredEnvironment, cause) && (reflection || blurred);
         // A texture only lowers the factor.
         let roughest = if rung == Reflection::Ray { knobs.lobes.roughest() } else { ROUGHEST_ON_SCREEN };
         let smooth = |m: &Material| surfaces::is_smooth(m, roughest);
@@ -245,7 +253,17 @@ impl Planner<'_> {
         let occluded = decisions.decide_with(EffectId::AmbientOcclusion, unless_paths(paths, by_rung), cause);
         let environment = environment || reflection || ambient;
         let occlusion = if occluded { rays } else { 0 };
-        MirrorImages { environment, mirrored: reflection, prefilter, ambient, occlusion, roughest, by_rays, screen }
+        MirrorImages {
+            environment,
+            mirrored: reflection,
+            prefilter,
+            blurred,
+            ambient,
+            occlusion,
+            roughest,
+            by_rays,
+            screen,
+        }
     }
 
     fn lights(&mut self, followed: Option<Paths>) -> Lights {

@@ -35,6 +35,8 @@ pub struct Plan {
     pub ambient: bool,
     /// The environment is the background.
     pub sky: bool,
+    /// The background is blurred.
+    pub blurred: bool,
     /// Passes for order-independent transparency: alpha-blended surfaces, and transmissive ones without refracting
     /// rays.
     pub transparency: bool,

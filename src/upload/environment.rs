@@ -39,13 +39,15 @@ pub struct EnvironmentOnDevice {
     pub terms: Buffer,
 }
 
-/// The user's scale and rotation of the environment.
+/// The user's scale, rotation and blur of the environment.
 #[derive(Debug, Clone, Copy)]
 pub struct EnvironmentRotation {
     /// Factor on the radiance.
     pub intensity: f32,
     /// Rotation about +Y in degrees.
     pub rotation: f32,
+    /// Perceptual roughness of the lobe that blurs the background.
+    pub blur: f32,
 }
 
 type Texel = [f32; 4];
@@ -97,6 +99,7 @@ impl EnvironmentOnDevice {
             intensity: turn.intensity,
             width: levels.first().map_or(1.0, |level| level.0 as f32),
             levels: levels.len() as f32,
+            blur: turn.blur * turn.blur,
         };
         Ok(Self { sky, prefiltered, reflectance, terms: Buffer::with_data(device, "environment terms", &[terms])? })
     }

@@ -116,7 +116,11 @@ impl<'a> OnDevice<'a> {
                 lobe_rays: if plan.screen.mirrors { 0 } else { with.occlusion.div_ceil(4) },
             },
             environment_light: lib::environment_light::Constants { ambient: plan.ambient, reflection: plan.reflection },
-            environment: lib::environment::Constants { sky: plan.sky, environment: plan.environment },
+            environment: lib::environment::Constants {
+                sky: plan.sky,
+                blurred_background: plan.blurred,
+                environment: plan.environment,
+            },
             fresnel: lib::fresnel::Constants { faint_conductors: plan.faint_conductors },
             gbuffer: lib::gbuffer::Constants {
                 normal_error2: plan.stored.normals.error2(),

@@ -109,7 +109,8 @@ pub struct SceneOptions {
     /// Animation of the file that plays, by name or index, or all [default: those that do not move the same nodes]
     #[arg(long, value_name = "NAME|INDEX|all", help_heading = heading::SCENE)]
     pub animation: Option<String>,
-    /// Leave out a node with everything below it, by name or index; repeatable. Its cameras stay
+    /// Leave out a node with everything below it, by name or index (index:N where N is a name); repeatable. Its
+    /// cameras stay
     #[arg(long, value_name = "NAME|INDEX", help_heading = heading::SCENE)]
     pub hide: Vec<String>,
     /// Show only this node with everything below it, by name or index; repeatable
@@ -132,6 +133,10 @@ pub struct SceneOptions {
     /// Background behind the scene [default: the environment; without one, transparent in EXR and grey in PNG]
     #[arg(long, value_name = "env|transparent|#rrggbb", value_parser = background, help_heading = heading::LIGHT)]
     pub background: Option<Background>,
+    /// Blur of an environment that is the background, 0 to 1: the perceptual roughness of a lobe that it is seen
+    /// through. Light and reflections stay as they are
+    #[arg(long, value_name = "K", value_parser = fraction, default_value_t = 0.0, allow_hyphen_values = true, help_heading = heading::LIGHT)]
+    pub background_blur: f32,
 }
 
 /// Size, model, knobs and display of a picture.
@@ -218,6 +223,10 @@ fn finite(text: &str) -> Result<f32, String> {
 
 fn factor(text: &str) -> Result<f32, String> {
     number(text, |x: &f32| x.is_finite() && *x >= 0.0, "a finite number of at least 0")
+}
+
+fn fraction(text: &str) -> Result<f32, String> {
+    number(text, |x: &f32| (0.0..=1.0).contains(x), "a number from 0 to 1")
 }
 
 fn field_of_view(text: &str) -> Result<f64, String> {
@@ -327,6 +336,7 @@ impl SceneOptions {
                 Background::Color([r, g, b]) => Some(format!("#{r:02x}{g:02x}{b:02x}")),
             }),
         );
+        option("background-blur", (self.background_blur != 0.0).then(|| self.background_blur.to_string()));
         all
     }
 
@@ -353,7 +363,11 @@ impl SceneOptions {
             if self.env_intensity != 1.0 || self.env_rotation != 0.0 {
                 bail!("--env none contradicts --env-intensity and --env-rotation: there is no environment");
             }
-            Settings { background: self.background.unwrap_or_default(), ..Settings::default() }.conditions(None)?;
+        }
+        let covered = matches!(self.background, Some(Background::Transparent | Background::Color(_)));
+        if self.env.as_deref() == Some("none") || covered {
+            let (background, background_blur) = (self.background.unwrap_or_default(), self.background_blur);
+            Settings { background, background_blur, ..Settings::default() }.conditions(None)?;
         }
         if let (Some(eye), Some(target)) = (self.eye, self.target) {
             self.looking(eye, target)?;
@@ -558,6 +572,7 @@ impl PictureOptions {
             tonemap: self.tonemap,
             exposure,
             background: scene.background.unwrap_or_default(),
+            background_blur: scene.background_blur,
             environment_intensity: scene.env_intensity,
             environment_rotation: scene.env_rotation,
             seed: self.seed,

@@ -197,6 +197,7 @@ fn command(args: &ViewArgs, view: &View<'_>) -> String {
     let dark = scene.env.as_deref() == Some("none");
     scene.env_rotation = if dark { 0.0 } else { view.settings.environment_rotation };
     scene.env_intensity = if dark { 1.0 } else { view.settings.environment_intensity };
+    scene.background_blur = view.settings.background_blur;
     let background = view.settings.background;
     scene.background = Some(background).filter(|background| *background != Background::Default);
     if view.camera.is_some() || view.named.is_some() {

@@ -82,6 +82,7 @@ impl Identity {
         // Debug formats a float as the shortest text that parses to the same bits.
         let numbers = [
             ("background", behind),
+            ("background-blur", format!("{:?}", settings.background_blur)),
             ("forced", format!("{:?}", settings.forced)),
             ("env-intensity", format!("{:?}", settings.environment_intensity)),
             ("env-rotation", format!("{:?}", settings.environment_rotation)),

@@ -206,8 +206,9 @@ impl RenderRequest {
     pub fn is_same_view(&self, other: &Self) -> bool {
         let marks = |w: &Self| (w.scene, w.time);
         let settings = |w: &Self| {
-            let Settings { size, environment_rotation, environment_intensity, background, .. } = w.settings;
-            (size, environment_rotation, environment_intensity, background)
+            let Settings { size, environment_rotation, environment_intensity, background, background_blur, .. } =
+                w.settings;
+            (size, environment_rotation, environment_intensity, background, background_blur)
         };
         (marks(self), settings(self)) == (marks(other), settings(other))
             && self.from == other.from

@@ -477,8 +477,8 @@ impl OpenWindow {
         }
     }
 
-    /// Writes the pictures that were asked for once they are drawn. A picture that is soon finished is saved then, others
-    /// as they are; radiance is that of all samples.
+    /// Writes the pictures that were asked for once they are drawn. A picture that is soon finished is saved then,
+    /// others as they are; radiance is that of all samples.
     fn save(&mut self, seen: &RenderState) {
         let Some(sent) = self.sent.clone() else { return };
         let display = |request: &RenderRequest| (request.settings.tonemap, request.settings.exposure);
@@ -601,7 +601,10 @@ impl OpenWindow {
         let moved = navigation.is_some_and(Navigation::moved);
         let camera = navigation.and_then(Navigation::words).map(|(_, words)| words);
         // The command is that of the side that is edited.
+        let facts = self.shared.seen().facts;
+        let there_is = facts.is_some_and(|facts| facts.environment.is_some());
         let settings = Settings { knobs: self.state.knobs().clone(), ..self.state.settings.clone() };
+        let settings = settings.without_idle_blur(there_is);
         let view = View {
             file: self.file(),
             named: navigation.and_then(Navigation::named).filter(|_| !moved),

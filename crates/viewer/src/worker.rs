@@ -92,13 +92,15 @@ fn settings_of(loaded: &Loaded, wanted: &RenderRequest, side: usize) -> Settings
     let share = loaded.environment.as_ref().map_or(1.0, |(_, share)| *share);
     let settings = wanted.settings.clone();
     let knobs = wanted.other.clone().filter(|_| side == 1).unwrap_or(settings.knobs);
-    Settings { environment_intensity: settings.environment_intensity * share, knobs, ..settings }
+    let settings = Settings { environment_intensity: settings.environment_intensity * share, knobs, ..settings };
+    settings.without_idle_blur(loaded.environment.is_some())
 }
 
 /// Whether a renderer made for `a` can draw `b`.
 fn same_renderer(a: &Settings, b: &Settings) -> bool {
     a.knobs == b.knobs
         && a.background == b.background
+        && a.background_blur == b.background_blur
         && a.environment_intensity == b.environment_intensity
         && a.environment_rotation == b.environment_rotation
         && a.seed == b.seed

@@ -19,7 +19,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     ui.separator();
     environment(ui, state);
     ui.separator();
-    background(ui, state);
+    background(ui, state, seen);
     ui.separator();
     key_light(ui, state);
 }
@@ -60,7 +60,7 @@ fn environment(ui: &mut Ui, state: &mut PanelState) {
     });
 }
 
-fn background(ui: &mut Ui, state: &mut PanelState) {
+fn background(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     ui.strong("Background");
     let now = state.settings.background;
     ui.horizontal_wrapped(|ui| {
@@ -80,6 +80,13 @@ fn background(ui: &mut Ui, state: &mut PanelState) {
     {
         state.settings.background = Background::Color(colour);
     }
+    let there_is = seen.facts.as_ref().is_some_and(|facts| facts.environment.is_some());
+    ui.add_enabled_ui(there_is && state.settings.shows_environment(), |ui| {
+        let blur = Slider::new(&mut state.settings.background_blur, 0.0..=1.0).text("blur").max_decimals(2);
+        let blur = ui.add(blur.clamping(UNTOUCHED));
+        state.moved |=
+            blur.on_hover_text("Blur of the environment behind the scene; light and reflections stay").changed();
+    });
 }
 
 fn key_light(ui: &mut Ui, state: &mut PanelState) {
