@@ -17,7 +17,9 @@ use tracing_subscriber::filter::Targets;
 use super::exit_codes::EXIT_CODES;
 use super::heading;
 use super::options::When;
-use super::{cost, desktop, devices, diff, eval, farm, lists, merge, picture, plan, plot, print, render, verify, view};
+use super::{
+    cost, desktop, devices, diff, eval, farm, lists, merge, passport, picture, plan, plot, print, render, verify, view,
+};
 
 /// A Vulkan renderer written directly against ash: glTF in, radiance out.
 #[derive(Parser)]
@@ -73,6 +75,7 @@ pub enum Command {
     Diff(diff::DiffArgs),
     Devices(devices::DevicesArgs),
     Verify(verify::VerifyArgs),
+    Passport(passport::PassportArgs),
     View(Box<view::ViewArgs>),
     Cost(Box<cost::CostArgs>),
     Merge(merge::MergeArgs),
@@ -182,6 +185,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         Command::Plan(args) => plan::run(args, whole),
         Command::Cost(args) => cost::run(args, quiet),
         Command::Verify(args) => verify::run(args, quiet, whole),
+        Command::Passport(args) => passport::run(args, quiet, whole),
         Command::Merge(args) => merge::run(args),
         Command::Farm(args) => farm::run(args),
         Command::Eval(args) => eval::run(args),

@@ -20,6 +20,7 @@ mod interrupt;
 pub mod lists;
 pub mod merge;
 pub mod options;
+pub mod passport;
 pub mod picture;
 pub mod plan;
 pub mod plot;

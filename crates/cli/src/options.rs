@@ -359,13 +359,11 @@ impl SceneOptions {
                 self.load(Prune::Nothing)?;
             }
         }
-        if self.env.as_deref() == Some("none") {
-            if self.env_intensity != 1.0 || self.env_rotation != 0.0 {
-                bail!("--env none contradicts --env-intensity and --env-rotation: there is no environment");
-            }
+        let dark = self.env.as_deref() == Some("none");
+        if dark && (self.env_intensity != 1.0 || self.env_rotation != 0.0) {
+            bail!("--env none contradicts --env-intensity and --env-rotation: there is no environment");
         }
-        let covered = matches!(self.background, Some(Background::Transparent | Background::Color(_)));
-        if self.env.as_deref() == Some("none") || covered {
+        if dark || matches!(self.background, Some(Background::Transparent | Background::Color(_))) {
             let (background, background_blur) = (self.background.unwrap_or_default(), self.background_blur);
             Settings { background, background_blur, ..Settings::default() }.conditions(None)?;
         }

@@ -1,5 +1,5 @@
-//! Devices that one does not own: the one here, lowered to what files describe, draws the same picture or is refused
-//! for what it lacks.
+//! Devices that one does not own: the one here, lowered to what files describe or to what passports say, draws the same
+//! picture or is refused for what it lacks.
 
 use std::path::{Path, PathBuf};
 
@@ -11,8 +11,9 @@ mod program;
 use program::{HASTY, Run, etalon};
 
 fn descriptions() -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/devices");
-    let files = std::fs::read_dir(folder).expect("a folder of descriptions");
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folders = [here.join("tests/devices"), here.join("../passport/passports")];
+    let files = folders.iter().flat_map(|folder| std::fs::read_dir(folder).expect("a folder of descriptions"));
     let mut files: Vec<PathBuf> = files.map(|file| file.expect("a file").path()).collect();
     files.sort();
     files
@@ -88,4 +89,32 @@ fn rays_need_addition_within_subgroups_and_shadow_maps_do_not() {
     let render = |model| ["render", "study:cornell", "--model", model, "--size", "8x8", "-o", "x.png"];
     masked.run(&render("local")).succeeded();
     masked.run(&render("global")).failed(1, "addition within subgroups");
+}
+
+/// A passport of a lowered device says what it lacks, and is a description of it.
+#[test]
+fn a_passport_of_a_described_device_is_its_description() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/devices/swiftshader.json");
+    let masked = Masked::new(folder.path(), &file);
+    // Sampled capabilities alone, without the time of measurements.
+    let arguments = ["passport", "--only", "arithmetic", "-o", "card.json"];
+    let run = masked.run(&arguments).succeeded();
+    assert!(run.stdout.contains("promises are held") && run.stdout.contains("card.json: written"), "{run:?}");
+    let wanted = Description::read(&file).expect("a description");
+    let found = Description::read(&folder.path().join("card.json")).expect("a passport");
+    for (wanted, found) in [
+        (&wanted.without_features, &found.without_features),
+        (&wanted.without_extensions, &found.without_extensions),
+        (&wanted.without_formats["R16G16B16A16_SNORM"], &found.without_formats["R16G16B16A16_SNORM"]),
+    ] {
+        assert!(wanted.iter().all(|lack| found.contains(lack)), "{wanted:?} are not all in {found:?}");
+    }
+    for (limit, most) in &wanted.limits {
+        assert!(found.limits[limit] <= *most, "{limit}");
+    }
+    let checked = etalon(folder.path(), &["passport", "--check", "card.json", "-v"], &[]).succeeded();
+    assert!(checked.stdout.contains("held    a * b keeps Vulkan's bound"), "{checked:?}");
+    std::fs::write(folder.path().join("other.json"), "{}").expect("a file");
+    etalon(folder.path(), &["passport", "--check", "other.json"], &[]).failed(1, "other.json: reading a passport");
 }

@@ -543,7 +543,12 @@ fn nodes_are_hidden_views_chosen_and_pictures_saved() {
     let more = ["--background", "transparent", "--env-rotation", "270.25", "--exposure", "0.123"];
     let arguments = [&[file.as_str(), "--set", "samples=1"], &more[..]].concat();
     let mut viewer = Viewer::open(&display, folder, &arguments);
-    viewer.until("squares of grey", |viewer| viewer.pixels()?.1.contains(&[153; 3]).then_some(()));
+    until_its_command(&mut viewer, "a view", |command| command.contains("--eye"));
+    let squares = |[r, g, b]: [u8; 3]| r == g && g == b && (r == 102 || r == 153);
+    viewer.until("squares of grey", |viewer| {
+        let (_, pixels) = viewer.pixels()?;
+        (pixels.into_iter().filter(|pixel| squares(*pixel)).count() > 10_000).then_some(())
+    });
     viewer.key(C, None);
     let command = viewer.line();
     assert!(more.chunks(2).all(|option| command.contains(&option.join(" "))), "{command}");
@@ -554,7 +559,8 @@ fn nodes_are_hidden_views_chosen_and_pictures_saved() {
     std::thread::sleep(Duration::from_millis(500));
     drawn(folder, &command);
     let [saved, rendered] = [saved, folder.join("picture.png")].map(|path| image::open(path).expect("a picture"));
-    assert!(saved.color().has_alpha() && saved == rendered, "the saved picture is not that of its command");
+    let found = [&saved, &rendered].map(|picture| (picture.width(), picture.height(), picture.color()));
+    assert!(saved.color().has_alpha() && saved == rendered, "{found:?} are not equal: `{command}`");
     let (code, words) = viewer.close();
     assert_eq!(code, Some(0), "{words}");
 }

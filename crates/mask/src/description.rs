@@ -39,6 +39,58 @@ pub struct Description {
     pub refused: Vec<String>,
 }
 
+/// What is read of a passport.
+#[derive(Deserialize)]
+struct MailedPassport {
+    device: MailedDevice,
+    capabilities: MailedCapabilities,
+}
+
+#[derive(Deserialize)]
+struct MailedDevice {
+    name: String,
+    #[serde(rename = "type")]
+    kind: String,
+}
+
+#[derive(Deserialize)]
+struct MailedCapabilities {
+    features: BTreeMap<String, bool>,
+    extensions: BTreeMap<String, bool>,
+    limits: BTreeMap<String, u64>,
+    formats: BTreeMap<String, Vec<String>>,
+    memory: Vec<Vec<String>>,
+    subgroup_arithmetic: bool,
+    timestamps: bool,
+}
+
+/// Uses of formats and properties of memory that can be lowered.
+const USES: [&str; 3] = ["COLOR_ATTACHMENT", "STORAGE_IMAGE", "SAMPLED_IMAGE_FILTER_LINEAR"];
+const MEMORY: [&str; 2] = ["HOST_CACHED", "DEVICE_LOCAL"];
+
+impl From<MailedPassport> for Description {
+    fn from(MailedPassport { device, capabilities: of }: MailedPassport) -> Self {
+        let absent = |has: BTreeMap<String, bool>| has.into_iter().filter(|(_, has)| !has).map(|(name, _)| name);
+        let lacks = |uses: &[String]| -> Vec<String> {
+            USES.into_iter().filter(|wanted| uses.iter().all(|has| has != wanted)).map(str::to_owned).collect()
+        };
+        let is_nowhere = |wanted: &&str| of.memory.iter().flatten().all(|has| has != wanted);
+        Self {
+            name: device.name,
+            kind: Some(device.kind),
+            api: None,
+            without_features: absent(of.features).collect(),
+            without_extensions: absent(of.extensions).collect(),
+            limits: of.limits,
+            without_formats: of.formats.iter().map(|(format, uses)| (format.clone(), lacks(uses))).collect(),
+            without_memory: MEMORY.into_iter().filter(is_nowhere).map(str::to_owned).collect(),
+            without_subgroup_arithmetic: !of.subgroup_arithmetic,
+            without_timestamps: !of.timestamps,
+            refused: Vec::new(),
+        }
+    }
+}
+
 /// Sets the listed features of one struct to `false`.
 macro_rules! without {
     ($listed:expr, $features:expr, $($field:ident = $name:literal),+ $(,)?) => {
@@ -70,13 +122,18 @@ impl Description {
         Self::read(Path::new(&path))
     }
 
-    /// Reads a description file.
+    /// Reads a description file, or a passport (`etalon passport`), whose capabilities it takes.
     ///
     /// # Errors
     /// The file is missing or invalid.
     pub fn read(path: &Path) -> io::Result<Self> {
         let text = std::fs::read_to_string(path)?;
-        serde_json::from_str(&text).map_err(|error| io::Error::other(format!("{}: {error}", path.display())))
+        let read = || -> serde_json::Result<Self> {
+            let whole: serde_json::Value = serde_json::from_str(&text)?;
+            let is_passport = whole["schema"].as_str().is_some_and(|schema| schema.starts_with("etalon.passport/"));
+            if is_passport { MailedPassport::deserialize(whole).map(Self::from) } else { serde_json::from_str(&text) }
+        };
+        read().map_err(|error| io::Error::other(format!("{}: {error}", path.display())))
     }
 
     pub(crate) fn lower_features(&self, features: &mut vk::PhysicalDeviceFeatures) {

@@ -29,7 +29,7 @@ use super::{
     lenient,
     names::keys,
     nodes::{Nodes, chosen_scene, end, label, playing},
-    outline::{Animation, Named, Outline, OutlineNode},
+    outline::{Animation, FilePart, Outline, OutlineNode},
     prune::{Coordinates, prune_textures, unused_coordinates},
     thin::{self, Stroke},
 };
@@ -178,16 +178,16 @@ fn outline(
     let variants = root.extensions.as_ref().and_then(|extensions| extensions.khr_materials_variants.as_ref());
     // The word `all` chooses all of them.
     let titles: Vec<Option<&str>> = root.animations.iter().map(|animation| animation.name.as_deref()).collect();
-    let titles = Named::list(&titles.iter().map(|name| name.filter(|name| *name != "all")).collect::<Vec<_>>());
+    let titles = FilePart::list(&titles.iter().map(|name| name.filter(|name| *name != "all")).collect::<Vec<_>>());
     let animations = root.animations.iter().zip(plays).zip(titles).map(|((animation, &plays), named)| Animation {
         named,
         seconds: end(document, animation).unwrap_or_default(),
         plays,
     });
     Ok(Outline {
-        scenes: Named::list(&root.scenes.iter().map(|scene| scene.name.as_deref()).collect::<Vec<_>>()),
+        scenes: FilePart::list(&root.scenes.iter().map(|scene| scene.name.as_deref()).collect::<Vec<_>>()),
         scene: chosen_scene(root, options.scene.as_deref())?,
-        variants: Named::list(
+        variants: FilePart::list(
             &variants.iter().flat_map(|all| &all.variants).map(|one| Some(&*one.name)).collect::<Vec<_>>(),
         ),
         animations: animations.collect(),

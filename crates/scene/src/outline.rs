@@ -7,14 +7,14 @@ use super::{LoadOptions, Scene};
 
 /// A part of the file that a user chooses.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Named {
+pub struct FilePart {
     /// Its name; without one, its index.
     pub name: String,
     /// The word that chooses it: the name if no other part has it, else the index.
     pub key: String,
 }
 
-impl Named {
+impl FilePart {
     /// Parts with these names.
     pub(crate) fn list(names: &[Option<&str>]) -> Vec<Self> {
         let named = names.iter().zip(keys(names)).enumerate();
@@ -35,11 +35,11 @@ impl Named {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Outline {
     /// Scenes of the file.
-    pub scenes: Vec<Named>,
+    pub scenes: Vec<FilePart>,
     /// Index of the scene that was read.
     pub scene: usize,
     /// Variants of the materials (KHR_materials_variants).
-    pub variants: Vec<Named>,
+    pub variants: Vec<FilePart>,
     /// Animations of the file.
     pub animations: Vec<Animation>,
     /// Nodes of the scene; a parent comes before its children.
@@ -50,7 +50,7 @@ pub struct Outline {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Animation {
     /// Its name, and what `animation` of the options calls it.
-    pub named: Named,
+    pub named: FilePart,
     /// Time of its last keyframe in seconds; 0 where it has none.
     pub seconds: f64,
     /// Whether it moves the scene.

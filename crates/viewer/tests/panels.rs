@@ -9,7 +9,7 @@ use etalon::frame::Settings;
 use etalon::gpu::{DeviceInfo, PassTime};
 use etalon::pass::tonemap::Counts;
 use etalon::plan::Knobs;
-use etalon::scene::outline::{Animation, Named, Outline, OutlineNode};
+use etalon::scene::outline::{Animation, FilePart, Outline, OutlineNode};
 use etalon::share::AovPixel;
 use etalon_viewer::layout::{Docks, Pane};
 use etalon_viewer::navigation::Navigation;
@@ -17,8 +17,8 @@ use etalon_viewer::panels::{self, PanelState};
 use etalon_viewer::preferences::Preferences;
 use etalon_viewer::shared::{FileChoice, Loaded, PixelSurfaces, RenderRequest, RenderState, SceneFacts, Shown, Side};
 
-fn named(name: &str) -> Named {
-    Named { name: name.to_owned(), key: name.to_owned() }
+fn named(name: &str) -> FilePart {
+    FilePart { name: name.to_owned(), key: name.to_owned() }
 }
 
 /// A scene with something in every list, and names that are too long.

@@ -390,7 +390,6 @@ pub struct Device {
     created: Mutex<Vec<Created>>,
     objects: AtomicU64,
     info: DeviceInfo,
-    #[cfg(feature = "window")]
     pub(super) physical: vk::PhysicalDevice,
     #[cfg(feature = "window")]
     pub(super) family: u32,
@@ -507,7 +506,6 @@ impl Device {
             created: Mutex::default(),
             objects: AtomicU64::new(0),
             info,
-            #[cfg(feature = "window")]
             physical,
             #[cfg(feature = "window")]
             family,

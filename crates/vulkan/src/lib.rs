@@ -12,6 +12,7 @@
 mod access;
 mod bind;
 mod cache;
+mod capabilities;
 mod choice;
 mod compiled;
 mod device;
@@ -42,6 +43,7 @@ mod window;
 pub use access::Access;
 pub use bind::{Bindings, Resource, Sampled};
 pub use cache::SamplerDesc;
+pub use capabilities::Capabilities;
 pub use choice::DeviceChoice;
 pub use compiled::Compiled;
 pub use device::{Candidate, Created, Device, DeviceInfo, Message, Severity, candidates, is_lost};

@@ -9,7 +9,7 @@ use crate::layer::LAYERS;
 use crate::navigation::ViewSide;
 use crate::shared::RenderState;
 use etalon::image::tone::ToneMap;
-use etalon::scene::outline::Named;
+use etalon::scene::outline::FilePart;
 
 /// Fraction of clipped pixels from which it is said.
 const CLIPPED: f32 = 0.02;
@@ -111,7 +111,7 @@ fn animation(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
             .selected_text(text)
             .show_ui(ui, |ui| {
                 for animation in animations {
-                    let Named { name, key } = &animation.named;
+                    let FilePart { name, key } = &animation.named;
                     let text = format!("{name}, {:.2} s", animation.seconds);
                     ui.selectable_value(&mut state.choice.animation, Some(key.clone()), text);
                 }

@@ -5,7 +5,7 @@ use egui::{RichText, Ui};
 use super::commands::MenuCommand;
 use super::{Action, PanelState, go_to, perform};
 use crate::shared::{RenderState, SceneFacts};
-use etalon::scene::outline::{Named, OutlineNode};
+use etalon::scene::outline::{FilePart, OutlineNode};
 
 /// Number of nodes up to which the whole tree is unfolded at first.
 const UNFOLDED: usize = 60;
@@ -42,11 +42,11 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, acti
 /// Scenes and variants of the file.
 fn choices(ui: &mut Ui, state: &mut PanelState, facts: &SceneFacts) {
     let outline = &facts.outline;
-    let mut choose = |name: &str, list: &[Named], none: Option<&str>, chosen: &mut Option<String>, now: usize| {
+    let mut choose = |name: &str, list: &[FilePart], none: Option<&str>, chosen: &mut Option<String>, now: usize| {
         if list.len() < 2 && none.is_none() || list.is_empty() {
             return;
         }
-        let at = chosen.as_ref().and_then(|word| Named::position(list, word));
+        let at = chosen.as_ref().and_then(|word| FilePart::position(list, word));
         let text = match (at, none) {
             (Some(at), _) => &list[at].name,
             (None, Some(none)) => none,

@@ -1,0 +1,285 @@
+//! What a device is, keeps and breaks: its capabilities, the errors of its arithmetic, `verify`, pictures of the study
+//! scenes and speeds, in one JSON file (`etalon passport`). See docs/passport.md.
+//!
+//! [`measure`] makes a [`Passport`], [`Passport::read`] reads and checks one. [`Passport::found`] derives the verdicts
+//! from the measurements: a file whose verdicts are others is refused. The tests take the capabilities of the passports
+//! in `passports/` for devices that one does not own (crate `etalon-mask`).
+
+pub mod arithmetic;
+pub mod equations;
+mod json;
+pub mod pictures;
+pub mod speed;
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use anyhow::{Context as _, Result, ensure};
+use etalon::gpu::{Capabilities, Device, DeviceInfo};
+use serde::{Deserialize, Serialize};
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
+
+use arithmetic::Arithmetic;
+use equations::EquationErrors;
+use pictures::Pictures;
+use speed::Speed;
+
+/// Rust code that build.rs generated from `shaders/`.
+#[allow(dead_code, unused_imports, missing_docs, unreachable_pub, reason = "generated")]
+mod shader {
+    use ash::vk;
+    use bytemuck::{Pod, Zeroable};
+    use etalon::gpu::*;
+
+    include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+}
+
+/// Schema of the file.
+pub const SCHEMA: &str = "etalon.passport/1";
+
+/// Part of a passport.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, EnumMessage, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase")]
+pub enum Section {
+    /// Errors of built-in functions and operations.
+    Arithmetic,
+    /// Errors of Etalon's equations.
+    Equations,
+    /// Study scenes.
+    Pictures,
+    /// Speeds.
+    Speed,
+}
+
+/// How much is measured.
+#[derive(Debug, Clone)]
+pub struct Scope {
+    /// Sections.
+    pub sections: Vec<Section>,
+    /// Inputs of a built-in function.
+    pub inputs: usize,
+    /// Inputs of an equation in a tier.
+    pub cases: usize,
+    /// Names of scenes that are drawn.
+    pub scenes: Vec<String>,
+    /// Size of pictures in pixels.
+    pub size: [u32; 2],
+    /// Bytes that are copied and loaded.
+    pub bytes: u64,
+    /// Milliseconds up to which dispatches are tried.
+    pub dispatch_ms: f64,
+}
+
+impl Default for Scope {
+    fn default() -> Self {
+        Self {
+            sections: Section::VARIANTS.to_vec(),
+            inputs: 1 << 22,
+            cases: 100_000,
+            scenes: etalon::study::NAMES.iter().map(|name| format!("study:{name}")).collect(),
+            size: [64, 36],
+            bytes: 64 << 20,
+            dispatch_ms: 500.0,
+        }
+    }
+}
+
+/// Device and system.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DeviceIdentity {
+    /// Marketing name.
+    pub name: String,
+    /// Name and version of the driver.
+    pub driver: String,
+    /// Version number of the driver.
+    pub version: String,
+    /// `cpu`, `discrete`, `integrated`, `virtual` or `other`.
+    #[serde(rename = "type")]
+    pub kind: String,
+    /// Vulkan version.
+    pub api: String,
+    /// Operating system and processor architecture.
+    pub system: String,
+    /// Processor cores.
+    pub cores: usize,
+}
+
+/// Something that Etalon relies on.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Promise {
+    /// What should hold.
+    pub promise: String,
+    /// Whether it does.
+    pub held: bool,
+    /// The figure behind it.
+    pub figure: String,
+}
+
+/// What is known of a device.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Passport {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// Version of Etalon.
+    pub etalon: String,
+    /// The device.
+    pub device: DeviceIdentity,
+    /// What it says of itself.
+    pub capabilities: Capabilities,
+    /// Errors of built-in functions.
+    pub arithmetic: Option<Arithmetic>,
+    /// Errors of Etalon's equations, by function and tier.
+    pub equations: Option<Vec<EquationErrors>>,
+    /// Study scenes.
+    pub pictures: Option<Pictures>,
+    /// Speeds.
+    pub speed: Option<Speed>,
+    /// What holds of what Etalon relies on.
+    pub promises: Vec<Promise>,
+    /// Seconds that the measurement took.
+    pub seconds: f64,
+}
+
+/// Measures a device; `told` is told each step. A section that fails is left out, and the failure is a broken promise;
+/// sections after a lost device are left out as well.
+///
+/// # Errors
+/// When nothing can be measured.
+pub fn measure(device: &Arc<Device>, scope: &Scope, told: &mut dyn FnMut(&str)) -> Result<Passport> {
+    let begun = Instant::now();
+    let DeviceInfo { name, driver, version, kind, api } = device.info().clone();
+    let system = format!("{} {}", std::env::consts::OS, std::env::consts::ARCH);
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut passport = Passport {
+        schema: SCHEMA.to_owned(),
+        etalon: env!("CARGO_PKG_VERSION").to_owned(),
+        device: DeviceIdentity { name, driver, version, kind: kind.to_owned(), api, system, cores },
+        capabilities: Capabilities::of(device),
+        arithmetic: None,
+        equations: None,
+        pictures: None,
+        speed: None,
+        promises: Vec::new(),
+        seconds: 0.0,
+    };
+    let scenes: Vec<&str> = scope.scenes.iter().map(String::as_str).collect();
+    let mut failed = Vec::new();
+    for &section in Section::VARIANTS {
+        let name: &'static str = section.into();
+        if !scope.sections.contains(&section) || failed.iter().any(|(_, error)| etalon::gpu::is_lost(error)) {
+            continue;
+        }
+        told(name);
+        let result = match section {
+            Section::Arithmetic => {
+                arithmetic::measure(device, scope.inputs).map(|found| passport.arithmetic = Some(found))
+            }
+            Section::Equations => {
+                equations::measure(device, scope.cases, told).map(|found| passport.equations = Some(found))
+            }
+            Section::Pictures => {
+                let found = pictures::measure(device, &scenes, scope.size, told);
+                found.map(|found| passport.pictures = Some(found))
+            }
+            Section::Speed => {
+                let found = speed::measure(device, scope.bytes, scenes[0], RAYS_AT, scope.dispatch_ms);
+                found.map(|found| passport.speed = Some(found))
+            }
+        };
+        failed.extend(result.err().map(|error| (name, error)));
+    }
+    passport.promises = passport.found();
+    passport.promises.extend(failed.into_iter().map(|(name, error)| Promise {
+        promise: format!("{FAILS}{name}"),
+        held: false,
+        figure: format!("{error:#}"),
+    }));
+    passport.seconds = json::short(begun.elapsed().as_secs_f64());
+    Ok(passport)
+}
+
+/// Size of the pictures whose rays are timed.
+const RAYS_AT: [u32; 2] = [160, 90];
+/// Beginning of the promise that a section can be measured.
+const FAILS: &str = "can be measured: ";
+
+impl Passport {
+    /// Reads a passport and checks it: its form, and its verdicts against its measurements.
+    ///
+    /// # Errors
+    /// One sentence with what is wrong.
+    pub fn read(text: &str) -> Result<Self> {
+        let passport: Self = serde_json::from_str(text).context("reading a passport")?;
+        ensure!(passport.schema == SCHEMA, "reading a passport: its schema is {:?}, not {SCHEMA:?}", passport.schema);
+        let own = passport.promises.iter().filter(|promise| !promise.promise.starts_with(FAILS));
+        let (own, found): (Vec<_>, Vec<_>) = (own.cloned().collect(), passport.found());
+        let other = found.iter().zip(&own).find(|(found, own)| found != own).map(|(found, _)| found);
+        if let Some(other) = other.or_else(|| found.get(own.len())) {
+            anyhow::bail!(
+                "reading a passport: by its measurements, \"{}\" is {}, {}; the file says otherwise",
+                other.promise,
+                if other.held { "held" } else { "broken" },
+                other.figure
+            );
+        }
+        ensure!(own.len() == found.len(), "reading a passport: it has verdicts without a measurement");
+        Ok(passport)
+    }
+
+    /// What holds of what Etalon relies on, by the measurements.
+    #[must_use]
+    pub fn found(&self) -> Vec<Promise> {
+        let mut found = Vec::new();
+        let mut promise = |promise: &str, held: bool, figure: String| {
+            found.push(Promise { promise: promise.to_owned(), held, figure });
+        };
+        if let Some(arithmetic) = &self.arithmetic {
+            for of in &arithmetic.builtins {
+                let figure = format!("{:.3} of what Vulkan allows, {:.1} ulp", of.of_allowed, of.max_ulp);
+                promise(&format!("{} keeps Vulkan's bound", of.name), of.of_allowed <= 1.0, figure);
+            }
+            let percent = 100.0 * arithmetic.precise_fused;
+            promise("precise products are rounded", percent == 0.0, format!("{percent:.1} % are not"));
+            let special = arithmetic.knows_nan && arithmetic.knows_infinity;
+            promise("NaN and infinity are kept", special, format!("min(NaN, 1) is {}", arithmetic.min_of_nan));
+            let rounds = matches!(arithmetic.half_rounds.as_str(), "nearest" | "down");
+            promise("halves are a neighbour", rounds, format!("they round {}", arithmetic.half_rounds));
+        }
+        if let Some(equations) = &self.equations {
+            let broken: Vec<String> =
+                equations.iter().filter(|e| !e.held).map(|e| format!("{} ({})", e.function, e.tier)).collect();
+            let figure = match broken.len() {
+                0 => format!("{} of {}", equations.len(), equations.len()),
+                count => format!("not {count} of {}: {}", equations.len(), broken.join(", ")),
+            };
+            promise("equations keep their bounds", broken.is_empty(), figure);
+        }
+        if let Some(pictures) = &self.pictures {
+            let count = pictures.scenes.len();
+            let all = count + pictures.refused.len();
+            promise("study scenes are drawn", pictures.refused.is_empty(), format!("{count} of {all}"));
+            let not_finite: u64 = pictures.scenes.iter().map(|scene| scene.not_finite).sum();
+            promise("radiance is finite", not_finite == 0, format!("{not_finite} pixels are not"));
+            for way in &pictures.ways {
+                let figure = format!("largest difference {:.1e}", way.largest);
+                promise(&format!("the same bits {}", way.way), way.same, figure);
+            }
+        }
+        if let Some(speed) = &self.speed {
+            let figure = format!("{:.0} ms", speed.longest_dispatch_ms);
+            promise("long dispatches end", !speed.lost, figure);
+        }
+        found
+    }
+
+    /// The file: JSON with a line for each scene and function.
+    ///
+    /// # Errors
+    /// Never: all values can be written.
+    pub fn to_json(&self) -> Result<String> {
+        Ok(json::text(self)?)
+    }
+}

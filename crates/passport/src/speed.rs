@@ -1,0 +1,221 @@
+//! Speed of a device: loads of each kind, copies, atomic additions, submissions, rays, and the longest dispatch.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use anyhow::Result;
+use ash::vk;
+use etalon::frame::Settings;
+use etalon::gpu::{Buffer, Device, Frame, Image, ImageDesc, Place, Sampled, SamplerDesc};
+use etalon::open::Opened;
+use etalon::plan::{Knobs, Model};
+use etalon::upload::rays::Traversal;
+use serde::{Deserialize, Serialize};
+
+use crate::json::short;
+use crate::shader::{load, spin};
+
+/// Loads of one invocation.
+const LOADS: u32 = 16;
+/// Columns of the image that is loaded from.
+const COLUMNS: u32 = 1024;
+/// Submissions that are timed.
+const SUBMISSIONS: usize = 100;
+
+/// RaySpeed per second of a traversal.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RaySpeed {
+    /// The traversal.
+    pub traversal: String,
+    /// Scene.
+    pub scene: String,
+    /// Millions of rays per second of the passes' time: rays of paths and shadow rays, with shading.
+    pub millions_per_second: f64,
+}
+
+/// Speeds of a device.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Speed {
+    /// Bytes that are copied or loaded.
+    pub bytes: u64,
+    /// 10^9 bytes per second of copies from buffer to buffer, read and written counted once.
+    pub copy: f64,
+    /// The same of loads of vectors from a storage buffer.
+    pub storage_buffer: f64,
+    /// From a storage texel buffer; `None` where tables lie in storage buffers.
+    pub texel_buffer: Option<f64>,
+    /// From a sampled image.
+    pub sampled_image: f64,
+    /// Millions of atomic additions per second to 256 counters.
+    pub atomics: f64,
+    /// Median microseconds of a submission that fills four bytes, until the host knows of its end.
+    pub submission_us: f64,
+    /// RaySpeed of paths.
+    pub rays: Vec<RaySpeed>,
+    /// Milliseconds of the longest dispatch that was tried; each was twice as long as the one before.
+    pub longest_dispatch_ms: f64,
+    /// Whether the device was lost by a longer one.
+    pub lost: bool,
+}
+
+/// Milliseconds of the quickest of three runs of a pass.
+fn quickest(run: impl Fn() -> Result<f64>) -> Result<f64> {
+    let times = [run()?, run()?, run()?];
+    Ok(times.into_iter().fold(f64::INFINITY, f64::min).max(1e-6))
+}
+
+/// 10^9 bytes per second.
+fn rate(bytes: u64, ms: f64) -> f64 {
+    short(bytes as f64 * 1e-6 / ms)
+}
+
+/// Times of the pass of a frame.
+fn timed<'a>(device: &Arc<Device>, name: &str, record: impl Fn(&mut Frame<'a>) -> Result<()>) -> Result<f64> {
+    quickest(|| {
+        let mut frame = Frame::new(device);
+        record(&mut frame)?;
+        Ok(frame.finish()?.iter().filter(|pass| pass.name == name).map(|pass| pass.ms).sum())
+    })
+}
+
+/// Loads of all kinds.
+struct Loads {
+    vectors: Buffer,
+    picture: Image,
+    nothing: Buffer,
+    no_texels: Buffer,
+    no_picture: Image,
+    sums: Buffer,
+    counters: Buffer,
+    invocations: u32,
+    texels: bool,
+}
+
+impl Loads {
+    fn new(device: &Arc<Device>, bytes: u64) -> Result<Self> {
+        let (format, texels) = (vk::Format::R32G32B32A32_SFLOAT, device.offers().texel_buffers);
+        let vectors = match texels {
+            true => Buffer::texels(device, "vectors", bytes, Place::Device, format)?,
+            false => Buffer::new(device, "vectors", bytes, Place::Device)?,
+        };
+        let invocations = (bytes / 16) as u32 / LOADS;
+        let rows = (bytes / 16) as u32 / COLUMNS;
+        let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
+        let picture = Image::new(device, "vectors of an image", ImageDesc::flat(format, COLUMNS, rows, usage))?;
+        let new = Self {
+            vectors,
+            picture,
+            nothing: Buffer::new(device, "nothing", 0, Place::Device)?,
+            no_texels: Buffer::texels(device, "no texels", 0, Place::Device, format)?,
+            no_picture: Image::nothing(device, format, vk::ImageUsageFlags::SAMPLED)?,
+            sums: Buffer::new(device, "sums", 4 * u64::from(invocations), Place::Device)?,
+            counters: Buffer::new(device, "counters", 4 * 256, Place::Device)?,
+            invocations,
+            texels,
+        };
+        let mut frame = Frame::new(device);
+        frame.fill("zeros", &new.vectors, 0);
+        frame.fill("zero", &new.counters, 0);
+        frame.clear("black", &new.picture);
+        frame.finish()?;
+        Ok(new)
+    }
+
+    fn ms(&self, device: &Arc<Device>, kind: u32) -> Result<f64> {
+        let is = |wanted: u32| kind == wanted;
+        let bind = load::Bind {
+            vectors: if is(0) { &self.vectors } else { &self.nothing },
+            texels: if is(1) { &self.vectors } else { &self.no_texels },
+            picture: Sampled {
+                image: if is(2) { &self.picture } else { &self.no_picture },
+                sampler: SamplerDesc::LINEAR,
+            },
+            sums: &self.sums,
+            counters: if is(3) { &self.counters } else { &self.nothing },
+        };
+        let push = load::Push { stride: self.invocations, loads: LOADS };
+        let groups = [self.invocations / 64, 1, 1];
+        timed(device, "loads", |frame| frame.compute("loads", &bind, &load::Constants { kind }, &push, groups))
+    }
+}
+
+fn rays(device: &Arc<Device>, scene: &str, size: [u32; 2]) -> Result<Vec<RaySpeed>> {
+    let opened = Opened::load(scene)?;
+    let camera = opened.camera(size)?;
+    let mut knobs = Knobs::of(Model::Global);
+    knobs.set("samples=4")?;
+    let each = |traversal: Traversal| {
+        let settings = Settings { size, knobs: knobs.clone(), traversal: Some(traversal), ..Settings::default() };
+        let mut renderer = Opened::load(scene)?.renderer(device, settings)?;
+        renderer.render(&camera, &mut |_| ())?;
+        let rendered = renderer.render(&camera, &mut |_| ())?;
+        let ms: f64 = rendered.passes.iter().map(|pass| pass.ms).sum();
+        let count = rendered.work.indirect + rendered.work.shadow;
+        let millions_per_second = short(count as f64 * 1e-3 / ms.max(1e-6));
+        Ok(RaySpeed {
+            traversal: format!("{traversal:?}").to_lowercase(),
+            scene: scene.to_owned(),
+            millions_per_second,
+        })
+    };
+    [Traversal::Links16, Traversal::Links32, Traversal::Stack].into_iter().map(each).collect()
+}
+
+/// Dispatches of doubling length, until one takes as long as `most` milliseconds. Returns the longest, and whether a
+/// longer one lost the device.
+fn longest(device: &Arc<Device>, most: f64) -> Result<(f64, bool)> {
+    let values = Buffer::new(device, "values", 4 << 16, Place::Device)?;
+    let (mut groups, mut longest) = (64, 0.0);
+    while longest < most && groups < 65_535 {
+        let mut frame = Frame::new(device);
+        frame.compute("long", &spin::Bind { values: &values }, &spin::Constants {}, &(), [groups, 1, 1])?;
+        match frame.finish() {
+            Ok(passes) => longest = passes.iter().map(|pass| pass.ms).fold(0.0, f64::max),
+            Err(error) if etalon::gpu::is_lost(&error) => return Ok((short(longest), true)),
+            Err(error) => return Err(error),
+        }
+        groups = (groups * 2).min(65_535);
+    }
+    Ok((short(longest), false))
+}
+
+/// Measures a device with so many bytes, rays of a scene at a size, and dispatches up to `most_ms`.
+///
+/// # Errors
+/// When the device fails, but not when a long dispatch loses it.
+pub fn measure(device: &Arc<Device>, bytes: u64, scene: &str, size: [u32; 2], most_ms: f64) -> Result<Speed> {
+    let loads = Loads::new(device, bytes)?;
+    let to = Buffer::new(device, "copy", bytes, Place::Device)?;
+    let copy = timed(device, "copy", |frame| {
+        frame.copy_buffer("copy", &loads.vectors, &to, bytes);
+        Ok(())
+    })?;
+    let mut submissions = (0..SUBMISSIONS)
+        .map(|_| {
+            let begun = Instant::now();
+            let mut frame = Frame::new(device);
+            frame.fill("four bytes", &loads.counters, 0);
+            frame.finish()?;
+            Ok(begun.elapsed().as_secs_f64() * 1e6)
+        })
+        .collect::<Result<Vec<f64>>>()?;
+    submissions.sort_by(f64::total_cmp);
+    let additions = f64::from(loads.invocations) * f64::from(LOADS);
+    let mut speed = Speed {
+        bytes,
+        copy: rate(bytes, copy),
+        storage_buffer: rate(bytes, loads.ms(device, 0)?),
+        texel_buffer: if loads.texels { Some(rate(bytes, loads.ms(device, 1)?)) } else { None },
+        sampled_image: rate(bytes, loads.ms(device, 2)?),
+        atomics: short(additions * 1e-3 / loads.ms(device, 3)?),
+        submission_us: short(submissions[SUBMISSIONS / 2]),
+        rays: rays(device, scene, size)?,
+        longest_dispatch_ms: 0.0,
+        lost: false,
+    };
+    // Last: nothing can be measured on a lost device.
+    (speed.longest_dispatch_ms, speed.lost) = longest(device, most_ms)?;
+    Ok(speed)
+}
