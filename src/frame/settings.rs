@@ -136,8 +136,8 @@ impl Settings {
             return Err(Refused::error(Setting::Background, why.to_owned()));
         }
         if self.background_blur > 0.0 && !background {
-            let why = "blur: the background is not an environment";
-            return Err(Refused::error(Setting::Background, why.to_owned()));
+            let why = format!("{}: the background is not an environment", self.background_blur);
+            return Err(Refused::error(Setting::BackgroundBlur, why));
         }
         let sky = environment.map(|map| self.sky(map));
         let blurred = self.background_blur > 0.0;

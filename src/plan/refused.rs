@@ -11,6 +11,8 @@ pub enum Setting {
     Size,
     /// The background behind the scene.
     Background,
+    /// The blur of an environment behind the scene.
+    BackgroundBlur,
     /// A part of the picture that is stored as a layer.
     Part,
     /// The target error of path tracing.
@@ -46,6 +48,7 @@ impl fmt::Display for Refused {
             Setting::Knob => "",
             Setting::Size => "size ",
             Setting::Background => "background ",
+            Setting::BackgroundBlur => "background blur ",
             Setting::Part => "part ",
             Setting::MaxError => "largest error ",
         };

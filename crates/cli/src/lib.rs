@@ -55,6 +55,7 @@ pub fn told(error: &anyhow::Error) -> String {
                 Setting::Knob => "--set",
                 Setting::Size => "--size",
                 Setting::Background => "--background",
+                Setting::BackgroundBlur => "--background-blur",
                 Setting::Part => "--aov",
                 Setting::MaxError => "--max-error",
             };

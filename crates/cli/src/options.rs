@@ -437,7 +437,13 @@ impl SceneOptions {
                 env_intensity: lit.environment_intensity,
                 ..self.clone()
             },
-            (None, _) => Self { env: Some("none".to_owned()), env_intensity: 1.0, env_rotation: 0.0, ..self.clone() },
+            (None, _) => Self {
+                env: Some("none".to_owned()),
+                env_intensity: 1.0,
+                env_rotation: 0.0,
+                background_blur: 0.0,
+                ..self.clone()
+            },
         }
     }
 

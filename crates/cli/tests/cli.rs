@@ -93,7 +93,11 @@ fn mistakes_end_in_one_sentence_and_no_file() {
         (vec!["scene.glb", "--env", "missing.hdr"], 1, "missing.hdr"),
         (vec!["scene.glb", "--env", "not.hdr"], 1, "not.hdr"),
         (vec!["scene.glb", "--env", "none", "--background", "env"], 2, "there is no environment"),
-        (vec!["scene.glb", "--env", "none", "--background-blur", "0.5"], 2, "the background is not an environment"),
+        (
+            vec!["scene.glb", "--env", "none", "--background-blur", "0.5"],
+            2,
+            "--background-blur 0.5: the background is not an environment",
+        ),
         (vec!["scene.glb", "--background", "#123456", "--background-blur", "0.5"], 2, "is not an environment"),
         (vec!["scene.glb", "--background-blur", "2"], 2, "a number from 0 to 1"),
         (vec!["scene.glb", "--env-intensity", "NaN"], 2, "--env-intensity"),
