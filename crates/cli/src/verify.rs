@@ -73,9 +73,17 @@ struct VerifyJson<'a> {
     device: &'a DeviceInfo,
     seed: Option<u64>,
     vectors: Option<String>,
+    /// Cases that are not judged, because the device flushes denormal numbers.
+    #[serde(skip_serializing_if = "is_none")]
+    tiny: usize,
     outputs: Vec<Value>,
     hostile: Vec<Value>,
     pass: bool,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde gives a reference")]
+fn is_none(count: &usize) -> bool {
+    *count == 0
 }
 
 /// The errors of a function in a tier.
@@ -109,7 +117,7 @@ pub fn run(args: &VerifyArgs, quiet: bool, whole: bool) -> Result<ExitCode> {
         let count = args.function.len();
         usage(if count < 2 { Ok(()) } else { Err(anyhow!("--vectors takes one --function, but {count} were given")) })?;
     }
-    let given = match &args.vectors {
+    let mut given = match &args.vectors {
         Some(path) => Some(vectors::load(path, args.function.first().map(String::as_str))?),
         None => None,
     };
@@ -126,18 +134,16 @@ pub fn run(args: &VerifyArgs, quiet: bool, whole: bool) -> Result<ExitCode> {
         std::fs::create_dir_all(folder).with_context(|| format!("creating {}", folder.display()))?;
     }
     let bar = progress(args, quiet, entries.len());
-    let mut findings = Vec::new();
+    let flushes = etalon_verify::flushes_denormals(&device)?;
+    let (mut findings, mut tiny) = (Vec::new(), 0);
     for entry in entries {
         bar.set_message(entry.probe.name);
-        let drawn;
-        let cases = match &given {
-            Some((_, cases)) => cases,
-            None => {
-                drawn = Cases::draw(&entry, args.cases as usize, args.seed);
-                &drawn
-            }
-        };
-        findings.extend(examine(args, &device, entry, cases, &tiers)?);
+        let given = given.take().map(|(_, cases)| cases);
+        let mut cases = given.unwrap_or_else(|| Cases::draw(&entry, args.cases as usize, args.seed));
+        if flushes {
+            tiny += cases.expect_nothing_of_tiny();
+        }
+        findings.extend(examine(args, &device, entry, &cases, &tiers)?);
         bar.inc(1);
     }
     bar.finish_and_clear();
@@ -153,6 +159,7 @@ pub fn run(args: &VerifyArgs, quiet: bool, whole: bool) -> Result<ExitCode> {
             device: device.info(),
             seed: args.vectors.is_none().then_some(args.seed),
             vectors: args.vectors.as_ref().map(|path| path.display().to_string()),
+            tiny,
             outputs: findings.iter().flat_map(json_rows).collect(),
             hostile: findings.iter().filter_map(json_hostile).collect(),
             pass,
@@ -177,6 +184,12 @@ pub fn run(args: &VerifyArgs, quiet: bool, whole: bool) -> Result<ExitCode> {
         let judged = findings.iter().filter(|f| f.tier != Tier::Fast).flat_map(|f| &f.figures).filter(|f| f.cases > 0);
         let (count, held) = judged.fold((0, 0), |(n, held), f| (n + 1, held + usize::from(f.pass)));
         print(&format!("{}, {}: {held} of {count} bounds hold", info.name, info.driver))?;
+        if flushes {
+            let least = etalon_verify::TINY;
+            print(&format!(
+                "the device flushes denormal numbers: {tiny} cases with numbers below {least:.0e} are not judged"
+            ))?;
+        }
         if count == 0 {
             print("the tier fast has no bounds: nothing was judged")?;
         }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use anyhow::Result;
 use etalon::gpu::Device;
 use etalon::optics::Tier;
-use etalon_verify::{Cases, catalogue, evaluate, judge};
+use etalon_verify::{Cases, catalogue, evaluate, flushes_denormals, judge};
 use serde::{Deserialize, Serialize};
 
 use crate::json::short;
@@ -28,15 +28,20 @@ pub struct EquationErrors {
     pub ns: f64,
 }
 
-/// Evaluates every equation for so many cases; `told` is told each function.
+/// Evaluates every equation for so many cases, on a device that flushes denormal numbers without those below
+/// [`etalon_verify::TINY`]; `told` is told each function.
 ///
 /// # Errors
 /// When the device fails.
 pub fn measure(device: &Arc<Device>, cases: usize, told: &mut dyn FnMut(&str)) -> Result<Vec<EquationErrors>> {
     let mut all = Vec::new();
+    let flushes = flushes_denormals(device)?;
     for entry in catalogue() {
         told(entry.probe.name);
-        let drawn = Cases::draw(&entry, cases, 1);
+        let mut drawn = Cases::draw(&entry, cases, 1);
+        if flushes {
+            drawn.expect_nothing_of_tiny();
+        }
         for tier in [Tier::Stable, Tier::Compensated] {
             let evaluated = evaluate(device, entry.probe, tier, &drawn.inputs, drawn.count)?;
             let figures = judge(&entry, tier, &drawn, &evaluated.outputs);

@@ -212,11 +212,13 @@ impl Passport {
     /// # Errors
     /// One sentence with what is wrong.
     pub fn read(text: &str) -> Result<Self> {
-        let passport: Self = serde_json::from_str(text).context("reading a passport")?;
+        let mut passport: Self = serde_json::from_str(text).context("reading a passport")?;
         ensure!(passport.schema == SCHEMA, "reading a passport: its schema is {:?}, not {SCHEMA:?}", passport.schema);
-        let own = passport.promises.iter().filter(|promise| !promise.promise.starts_with(FAILS));
-        let (own, found): (Vec<_>, Vec<_>) = (own.cloned().collect(), passport.found());
-        let other = found.iter().zip(&own).find(|(found, own)| found != own).map(|(found, _)| found);
+        let (failed, own): (Vec<_>, Vec<_>) =
+            std::mem::take(&mut passport.promises).into_iter().partition(|promise| promise.promise.starts_with(FAILS));
+        let found = passport.found();
+        let verdict = |promise: &Promise| (promise.promise.clone(), promise.held);
+        let other = found.iter().zip(&own).find(|(found, own)| verdict(found) != verdict(own)).map(|(found, _)| found);
         if let Some(other) = other.or_else(|| found.get(own.len())) {
             anyhow::bail!(
                 "reading a passport: by its measurements, \"{}\" is {}, {}; the file says otherwise",
@@ -226,6 +228,7 @@ impl Passport {
             );
         }
         ensure!(own.len() == found.len(), "reading a passport: it has verdicts without a measurement");
+        passport.promises = [found, failed].concat();
         Ok(passport)
     }
 

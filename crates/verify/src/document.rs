@@ -13,7 +13,8 @@ pub fn equations() -> String {
         "# Equations\n\n\
          Written by a test (`crates/verify/tests/catalogue.rs`) from the tags in `shaders/lib/` and the bounds in `crates/optics/src/`.\n\
          Ids are those of [lecture.md](lecture.md); N and a number is a row of [numerics.md](numerics.md).\n\
-         `etalon verify` checks the bounds on a device; the tier `fast` has no bounds. Built-ins are listed where their precision\n\
+         `etalon verify` checks the bounds on a device; the tier `fast` has no bounds. On a device that flushes denormal\n\
+         numbers it does not judge numbers below 2e-31, whose rounding errors are flushed. Built-ins are listed where their precision\n\
          depends on the device (Vulkan, \"Precision of Individual Operations\"), by tier if the tiers differ. The last line says how\n\
          pictures use the function: passes call it, or host code computes it. A laboratory form (of the lecture, or of\n\
          [functions.md](functions.md)) is not called by pictures; a test compares it with the function that pictures use.\n\

@@ -497,3 +497,22 @@ fn the_judge_sees_nan_infinity_and_what_is_beyond_a_bound() {
         assert!(etalon_verify::judge(&entry, Tier::Fast, &cases, &right).iter().all(|figures| figures.pass));
     }
 }
+
+/// A device that flushes denormal numbers is judged by all numbers whose rounding errors are none.
+#[test]
+fn tiny_numbers_are_not_judged_where_denormal_ones_are_flushed() {
+    let gpu = Gpu::open();
+    assert!(!etalon_verify::flushes_denormals(&gpu.device).expect("it runs"), "lavapipe keeps them");
+    let product = etalon_verify::find("two_product").expect("an equation");
+    // The high parts of four products, and their low parts.
+    let rows = [[1.0_f32, 2.0], [1e-35, 1.0], [1e-20, 1e-20], [0.0, 1.0]].map(|row| row.to_vec());
+    let (flushed, wrong) = ([2.0, 0.0, 0.0, 0.0], [3.0, 0.0, 0.0, 0.0]);
+    let passes = |cases: &Cases, high: [f32; 4]| {
+        let outputs = [high, [0.0; 4]].concat();
+        etalon_verify::judge(&product, Tier::Stable, cases, &outputs).swap_remove(0).pass
+    };
+    let mut cases = Cases::from_rows(&product, &rows);
+    assert!(!passes(&cases, flushed), "1e-35 is 1e-35");
+    assert_eq!(cases.expect_nothing_of_tiny(), 2);
+    assert!(passes(&cases, flushed) && !passes(&cases, wrong));
+}
