@@ -225,24 +225,24 @@ impl Opened {
     /// The environment that lights the scene, and settings with the scene's environment intensity.
     #[must_use]
     pub fn lit(&self, mut settings: Settings) -> (Option<&Environment>, Settings) {
-        let (share, _) = self.share(&settings.knobs);
+        let (share, _) = self.share(&settings);
         settings.environment_intensity *= share.unwrap_or(1.0);
         (self.environment.as_ref().filter(|_| share.is_some()), settings)
     }
 
     /// Factor of the environment, `None` where it does not light the scene, and the reason at the end of a sentence.
     ///
-    /// Asked for, it lights as it is; a scene built by code says itself. For a file:
+    /// Asked for, by itself or as the background, it lights as it is; a scene built by code says itself. For a file:
     /// - where paths follow the light of emissive surfaces and there is enough of it, the author lit the scene with
     ///   them, and a studio would drown them;
     /// - beside lights it is a fill light ([`FILL`]), as in the glTF Sample Viewer: without it, what the lights do not
     ///   reach is black;
     /// - without lights it is all the light there is. That includes emissive surfaces in models that do not follow
     ///   their light: they would hang in a black picture.
-    fn share(&self, knobs: &Knobs) -> (Option<f32>, &'static str) {
+    fn share(&self, settings: &Settings) -> (Option<f32>, &'static str) {
         let scene = self.scene();
-        let is_followed = self.follows.unwrap_or(knobs.indirect == Indirect::Path);
-        match (self.is_asked_for, scene.studio) {
+        let is_followed = self.follows.unwrap_or(settings.knobs.indirect == Indirect::Path);
+        match (self.is_asked_for || settings.background == Background::Environment, scene.studio) {
             (true, _) => (Some(1.0), ""),
             (_, Some(studio)) => (Some(studio), ""),
             _ if self.is_file && is_followed && self.is_lit_by_emission() => {
@@ -282,10 +282,10 @@ impl Opened {
         })
     }
 
-    /// What may light a picture with these knobs.
+    /// What may light a picture with these settings.
     #[must_use]
-    pub fn sources(&self, knobs: &Knobs) -> Sources {
-        let (share, why) = self.share(knobs);
+    pub fn sources(&self, settings: &Settings) -> Sources {
+        let (share, why) = self.share(settings);
         let scene = self.scene();
         Sources {
             lights: scene.lights.iter().map(|light| light.name.clone()).collect(),

@@ -47,8 +47,13 @@ vec3 prefiltered_radiance(vec3 direction, float alpha) {
 // or not, or nothing. All other light comes from the environment itself.
 vec3 background_radiance(vec3 direction) {
     if (!SKY) return vec3(0.0);
-    if (BLURRED_BACKGROUND) return prefiltered_radiance(direction, environment.blur);
-    return environment_radiance(direction);
+    vec3 sharp = environment_radiance(direction);
+    if (!BLURRED_BACKGROUND) return sharp;
+    // The first prefiltered level may be coarser than the map.
+    vec2 at = equirectangular_from_direction(into_environment(direction));
+    float level = prefiltered_level(environment.blur);
+    vec3 blurred = light_of_environment(textureLod(prefiltered, at, max(level, min(1.0, environment.levels - 1.0))).rgb);
+    return mix(sharp, blurred, min(level, 1.0));
 }
 
 // Ambient light: irradiance from nine spherical-harmonic coefficients, without visibility.

@@ -253,7 +253,8 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     p.media = into ? interaction.boundary.media_out : p.media;
     unmatched_exits += at_surface && interaction.boundary.unmatched_exit ? 1u : 0u;
     uint flags = p.state & (PATH_TRANSPARENT_SO_FAR | PATH_UNSCATTERED | PATH_NON_SPECULAR);
-    flags &= behind && !(DIFFUSE_TRANSMISSION && !passed_by && drawn.diffuse) ? ~0u : ~PATH_TRANSPARENT_SO_FAR;
+    // Behind a surface that transmits diffusely, light samples see the environment: so do all directions but straight ones.
+    flags &= behind && (passed_by || drawn.delta || !shines_through(b)) ? ~0u : ~PATH_TRANSPARENT_SO_FAR;
     flags &= passed_by || drawn.straight ? ~0u : ~PATH_UNSCATTERED;
     flags |= !passed_by && !drawn.delta ? PATH_NON_SPECULAR : 0u;
     // 7. Russian roulette uses the throughput that the path would have without path guiding. Guiding lowers the throughput

@@ -78,7 +78,7 @@ pub struct Settings {
     /// Background behind the scene.
     pub background: Background,
     /// Blur of an environment that is the background, 0 … 1: it is seen through a GGX lobe of this perceptual
-    /// roughness. Light, reflections and everything else come from the environment as it is.
+    /// roughness, directly and through what transmits light. Light and reflections come from the environment as it is.
     pub background_blur: f32,
     /// Factor on the environment's radiance.
     pub environment_intensity: f32,

@@ -429,8 +429,12 @@ impl SceneOptions {
         if !opened.has_light_by_knobs() {
             return self.clone();
         }
-        let settings =
-            Settings { knobs: knobs.clone(), environment_intensity: self.env_intensity, ..Settings::default() };
+        let settings = Settings {
+            knobs: knobs.clone(),
+            background: self.background.unwrap_or_default(),
+            environment_intensity: self.env_intensity,
+            ..Settings::default()
+        };
         match opened.lit(settings) {
             (Some(_), lit) => Self {
                 background: self.background.or(Some(Background::Environment)),

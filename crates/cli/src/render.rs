@@ -106,7 +106,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
 
     steps.step("uploading", 1);
     let knobs = settings.knobs.clone();
-    let sources = setup.opened.sources(&knobs);
+    let sources = setup.opened.sources(&settings);
     let explained = (args.picture.plan == PlanExtent::ExplainCost).then(|| (setup.clone(), settings.clone()));
     let (mut renderer, camera) = setup.renderer(&args.scene, settings)?;
     phases.end("upload");

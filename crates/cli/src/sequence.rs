@@ -235,7 +235,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let mut opened =
         etalon::open::Opened::named(&args.scene.scene, rest, environment, args.scene.asks_for_environment());
     args.picture.colour_of(opened.scene(), &mut settings.knobs)?;
-    let lit_by = opened.sources(&settings.knobs).lit_by(&opened.plan(settings.clone())?);
+    let lit_by = opened.sources(&settings).lit_by(&opened.plan(settings.clone())?);
     for warning in &opened.warnings {
         tracing::warn!("{warning}");
     }

@@ -87,7 +87,7 @@ pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<Exi
     let exposure = exposure::choose(args.picture.exposure, &setup.opened, &setup.device, &settings, &camera)?;
     settings.exposure = exposure.stops;
     let plan = setup.opened.plan(settings.clone())?;
-    let lit_by = setup.opened.sources(&settings.knobs).lit_by(&plan);
+    let lit_by = setup.opened.sources(&settings).lit_by(&plan);
     [Some(lit_by.sentence), exposure.sentence].iter().flatten().for_each(|line| steps.tell(line));
     let split = split(args, &plan)?;
     if split == Split::Tiles {

@@ -87,7 +87,8 @@ impl SceneSource for FileSource {
         let chosen = this.picture.knobs()?;
         let mut knobs = chosen.clone();
         this.picture.colour_of(&scene, &mut knobs)?;
-        let mut opened = Opened::named(&options.scene, scene, environment, options.asks_for_environment());
+        // Whether the environment is the background changes in the window.
+        let mut opened = Opened::named(&options.scene, scene, environment, options.env.is_some());
         opened.warnings.extend(more);
         let settings = Settings { size: asked.size, knobs: knobs.clone(), ..this.picture.settings(options)? };
         let exposure = exposure::choose(this.picture.exposure, &opened, device, &settings, &camera)?;
@@ -102,18 +103,18 @@ impl SceneSource for FileSource {
         let is_metered = exposure.from == "metered";
         opened.warnings.extend(exposure.sentence.clone().filter(|_| !is_metered));
         this.has_checkers.store(opened.warnings.iter().any(|warning| warning.ends_with(REPLACED)), Ordering::Relaxed);
-        let (lit, as_lit) = opened.lit(Settings { knobs: knobs.clone(), ..Settings::default() });
-        let sources = Some(opened.sources(&knobs));
+        if options.background_blur > 0.0 && opened.lit(settings).0.is_none() {
+            opened.warnings.push("--background-blur: the background is not an environment".to_owned());
+        }
         Ok(Loaded {
-            sources,
             name: opened.scene().name.clone(),
-            environment: lit.cloned().map(|map| (Arc::new(map), as_lit.environment_intensity)),
             camera,
             framed,
             knobs: (knobs != chosen).then_some(knobs),
             warnings: opened.warnings.clone(),
             prices: prices.map(Arc::new),
             original: opened.original.clone(),
+            light: Arc::new(opened),
             exposure: exposure.stops,
             exposure_from: exposure.sentence.filter(|_| is_metered),
         })

@@ -148,6 +148,10 @@ fn outline(
     let root = &document.root;
     let names: Vec<Option<&str>> = root.nodes.iter().map(|node| node.name.as_deref()).collect();
     let keys = keys(&names);
+    let mut first = HashMap::new();
+    for (index, name) in names.iter().enumerate() {
+        first.entry(*name).or_insert(index);
+    }
     let is_shown: HashSet<usize> = nodes.shown.iter().copied().collect();
     // Parents before their children, children in the order of the file.
     let mut open: Vec<usize> = nodes.shown.clone();
@@ -161,6 +165,7 @@ fn outline(
             name: names[node].map_or_else(|| format!("node {node}"), str::to_owned),
             key: keys[node].clone(),
             index: node,
+            is_named: names[node].is_some() && first[&names[node]] == node,
             parent: nodes.parents[node].and_then(|parent| place[parent]),
             hidden: nodes.hidden[node],
             ..OutlineNode::default()

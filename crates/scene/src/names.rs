@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use anyhow::{Context as _, Result};
 
 /// What an index is written after where the number alone is the name of another item.
-const INDEX: &str = "index:";
+pub(crate) const INDEX: &str = "index:";
 
 /// Index of the item that a user means: `index:N` is item N; any other word is the first item of this name, or the
 /// item of this index if none has the name. `None` where there is no such item.

@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 
-use super::names::{by_name_or_index, keys};
+use super::names::{INDEX, by_name_or_index, keys, position};
 use super::{LoadOptions, Scene};
 
 /// A part of the file that a user chooses.
@@ -24,7 +24,8 @@ impl FilePart {
     /// Index of the part that a user means by a word: a key, else a name, else an index.
     #[must_use]
     pub fn position(list: &[Self], wanted: &str) -> Option<usize> {
-        let by_index = || wanted.parse().ok().filter(|&index: &usize| index < list.len());
+        let digits = wanted.strip_prefix(INDEX).unwrap_or(wanted);
+        let by_index = || digits.parse().ok().filter(|&index: &usize| index < list.len());
         let by_key = list.iter().position(|part| part.key == wanted);
         by_key.or_else(|| list.iter().position(|part| part.name == wanted)).or_else(by_index)
     }
@@ -66,6 +67,8 @@ pub struct OutlineNode {
     pub key: String,
     /// Its index in the file.
     pub index: usize,
+    /// Whether [`LoadOptions::hide`] finds it by its name: it is the first of this name in the file.
+    pub is_named: bool,
     /// Index of its parent into [`Outline::nodes`]; `None` for a root.
     pub parent: Option<usize>,
     /// Indices into [`Scene::instances`].
@@ -89,9 +92,9 @@ impl Outline {
     #[must_use]
     pub fn node(&self, wanted: &str) -> Option<usize> {
         let by_key = self.nodes.iter().position(|node| node.key == wanted);
-        let by_name = || self.nodes.iter().position(|node| node.name == wanted);
+        let by_name = || self.nodes.iter().position(|node| node.is_named && node.name == wanted);
         let by_index = || {
-            let index = wanted.trim_start_matches("index:").parse::<usize>().ok()?;
+            let index = wanted.strip_prefix(INDEX).unwrap_or(wanted).parse::<usize>().ok()?;
             self.nodes.iter().position(|node| node.index == index)
         };
         by_key.or_else(by_name).or_else(by_index)
@@ -146,7 +149,14 @@ pub(crate) fn flat(scene: &mut Scene, options: &LoadOptions) -> Result<()> {
     };
     let places: Vec<Option<usize>> = kept(0..count).chain(kept(count..first_camera)).collect();
     let nodes = all.iter().zip(keys(&names)).enumerate().map(|(index, (name, key))| {
-        let mut node = OutlineNode { name: name.clone(), key, index, hidden: hidden[index], ..OutlineNode::default() };
+        let mut node = OutlineNode {
+            name: name.clone(),
+            key,
+            index,
+            is_named: position(name, &names) == Some(index),
+            hidden: hidden[index],
+            ..OutlineNode::default()
+        };
         if index < first_camera {
             let users = if index < count { &mut node.instances } else { &mut node.lights };
             users.extend(places[index]);
@@ -165,6 +175,27 @@ pub(crate) fn flat(scene: &mut Scene, options: &LoadOptions) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn parts_are_found_by_every_word_that_the_loader_knows() {
+        let names = [Some("a"), Some("0"), None, Some("a")];
+        let list = FilePart::list(&names);
+        for wanted in ["a", "0", "1", "2", "3", "4", "index:0", "index:1", "index:3", "index:9", "b"] {
+            assert_eq!(FilePart::position(&list, wanted), position(wanted, &names), "{wanted}");
+        }
+        let node = |name: &str, key: &str, index, is_named| OutlineNode {
+            name: name.to_owned(),
+            key: key.to_owned(),
+            index,
+            is_named,
+            ..OutlineNode::default()
+        };
+        // The file's first node "a" is in another scene.
+        let nodes = vec![node("a", "7", 7, false), node("b", "b", 4, true)];
+        let outline = Outline { nodes, ..Outline::default() };
+        let found = ["a", "7", "index:7", "b", "4", "5"].map(|word| outline.node(word));
+        assert_eq!(found, [None, Some(0), Some(0), Some(1), Some(1), None]);
+    }
 
     #[test]
     fn what_is_below_a_hidden_node_is_hidden() {

@@ -71,6 +71,7 @@ mod tests {
             key: key.to_owned(),
             index,
             parent,
+            is_named: key != "8",
             ..OutlineNode::default()
         };
         let nodes = vec![

@@ -9,11 +9,10 @@ use glam::DVec3;
 
 use etalon::frame::Settings;
 use etalon::gpu::{Device, PassTime, Replacement};
-use etalon::open::Sources;
+use etalon::open::Opened;
 use etalon::pass::tonemap::Counts;
 use etalon::plan::{Effect, Knobs};
 use etalon::prepare::Original;
-use etalon::scene::environment::Environment;
 use etalon::scene::{Bounds, Camera, Instance, Light, Material, Outline, Scene};
 use etalon::share::AovPixel;
 use etalon::transport::events::Event;
@@ -29,8 +28,8 @@ pub struct Loaded {
     pub name: String,
     /// The scene.
     pub original: Original,
-    /// Environment map and the factor of its radiance.
-    pub environment: Option<(Arc<Environment>, f32)>,
+    /// Its light: the environment, and the rule by which it lights a picture.
+    pub light: Arc<Opened>,
     /// Initial camera.
     pub camera: Camera,
     /// Warnings of the loader.
@@ -45,8 +44,6 @@ pub struct Loaded {
     pub exposure: f32,
     /// Where that exposure comes from; one sentence. `None` where it was chosen by the user.
     pub exposure_from: Option<String>,
-    /// What may light its pictures; `None` where it is not known.
-    pub sources: Option<Sources>,
 }
 
 impl Loaded {
@@ -56,8 +53,8 @@ impl Loaded {
         let original = original.into();
         Self {
             name: original.scene().name.clone(),
+            light: Arc::new(Opened::new(original.scene().clone(), None, false)),
             original,
-            environment: None,
             camera,
             warnings: Vec::new(),
             prices: None,
@@ -65,7 +62,6 @@ impl Loaded {
             knobs: None,
             exposure: 0.0,
             exposure_from: None,
-            sources: None,
         }
     }
 }
@@ -274,11 +270,18 @@ pub struct SceneFacts {
     pub images: Vec<(String, [u32; 2])>,
     /// Number of vertices over all meshes.
     pub vertices: usize,
-    /// Name of the environment map that lights the scene.
-    pub environment: Option<String>,
+    /// Its light.
+    pub light: Arc<Opened>,
 }
 
 impl SceneFacts {
+    /// Settings without a blur of what is not shown.
+    #[must_use]
+    pub fn without_idle_blur(&self, settings: Settings) -> Settings {
+        let is_lit = self.light.lit(settings.clone()).0.is_some();
+        settings.without_idle_blur(is_lit)
+    }
+
     /// The camera of the file with a key.
     #[must_use]
     pub fn camera(&self, key: &str) -> Option<&Camera> {
@@ -326,7 +329,7 @@ impl SceneFacts {
             boxes: scene.instances.iter().map(|instance| box_of(scene, instance)).collect(),
             images: scene.images.iter().map(|image| (image.name.clone(), [image.width, image.height])).collect(),
             vertices: scene.meshes.iter().map(|mesh| mesh.positions.len()).sum(),
-            environment: loaded.environment.as_ref().map(|(map, _)| map.name.clone()),
+            light: loaded.light.clone(),
         })
     }
 }
@@ -354,8 +357,9 @@ pub struct Shown {
     pub has_alpha: bool,
     /// Size in pixels.
     pub size: [u32; 2],
-    /// The request that it answers.
-    pub of: RenderRequest,
+    /// The request that it answers; `None` for a picture with rungs of before, where those that are asked for cannot be
+    /// drawn.
+    pub of: Option<RenderRequest>,
     /// Samples drawn, and samples in total.
     pub samples: [u32; 2],
     /// Whether it was drawn while the view moved.

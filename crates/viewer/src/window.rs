@@ -55,7 +55,10 @@ struct DrawnLayer {
 /// A picture that is written when it is drawn.
 struct PendingSave {
     path: PathBuf,
-    /// The request whose picture it is; `None` until the next request is sent.
+    /// Layer and position of the wipe line.
+    layer: SurfaceLayer,
+    wipe: f32,
+    /// The request whose picture it is; `None` until the scene is there.
     of: Option<RenderRequest>,
     /// Whether the wait is announced.
     is_told: bool,
@@ -482,24 +485,35 @@ impl OpenWindow {
     fn save(&mut self, seen: &RenderState) {
         let Some(sent) = self.sent.clone() else { return };
         let display = |request: &RenderRequest| (request.settings.tonemap, request.settings.exposure);
-        let answers = |shown: &&shared::Shown| {
-            !shown.moving && shown.of.is_same_view(&sent) && display(&shown.of) == display(&sent)
-        };
-        let shown = seen.shown().filter(answers);
+        let is_same = |of: &RenderRequest| of.is_same_view(&sent) && display(of) == display(&sent);
+        let answers = |shown: &shared::Shown| !shown.moving && shown.of.as_ref().is_some_and(is_same);
+        let sides = &seen.sides[..1 + usize::from(sent.other.is_some())];
+        let drawn: Vec<_> =
+            sides.iter().filter_map(|side| side.shown.as_ref()).filter(|shown| answers(shown)).collect();
+        let are_drawn = drawn.len() == sides.len();
         for mut save in std::mem::take(&mut self.saves) {
             let name = save.path.display().to_string();
-            if save.of.as_ref().is_none_or(|of| !of.is_same_view(&sent)) {
+            let is_kept = (save.layer, save.wipe) == (self.state.layer, self.state.wipe);
+            if !save.of.as_ref().is_none_or(is_same) || !is_kept {
                 self.state.notices.fail(format!("{name} is not written: the view changed before it was drawn"));
                 continue;
             }
-            let is_ready = |shown: &shared::Shown| match save.is_exr() {
-                true => shown.is_done() && seen.now().is_some(),
-                false => (shown.is_done() || shown.seconds_left > PATIENCE) && self.picture(seen).is_some(),
+            let is_ready = match save.is_exr() {
+                true => drawn.iter().all(|shown| shown.is_done()) && seen.now().is_some(),
+                false => {
+                    let soon = |shown: &&&shared::Shown| !shown.is_done() && shown.seconds_left <= PATIENCE;
+                    drawn.iter().find(soon).is_none() && self.picture(seen).is_some()
+                }
             };
-            if shown.is_some_and(is_ready) {
+            if are_drawn && is_ready {
                 let written =
                     if save.is_exr() { self.write_exr(seen, &save.path) } else { self.write_png(seen, &save.path) };
                 self.tell(written);
+                continue;
+            }
+            // What cannot be drawn is not awaited.
+            if let Some(error) = seen.error.as_ref().filter(|_| !are_drawn && seen.busy.is_none()) {
+                self.state.notices.fail(format!("{name} is not written: {error}"));
                 continue;
             }
             if !std::mem::replace(&mut save.is_told, true) {
@@ -521,7 +535,8 @@ impl OpenWindow {
             Action::Save(path) => {
                 // A picture of one time is saved.
                 self.state.clock.playing = false;
-                self.saves.push(PendingSave { path, of: None, is_told: false });
+                let (layer, wipe) = (self.state.layer, self.state.wipe);
+                self.saves.push(PendingSave { path, layer, wipe, of: None, is_told: false });
             }
             Action::CopyPicture => match self.picture(seen) {
                 Some(picture) => {
@@ -601,10 +616,11 @@ impl OpenWindow {
         let moved = navigation.is_some_and(Navigation::moved);
         let camera = navigation.and_then(Navigation::words).map(|(_, words)| words);
         // The command is that of the side that is edited.
-        let facts = self.shared.seen().facts;
-        let there_is = facts.is_some_and(|facts| facts.environment.is_some());
         let settings = Settings { knobs: self.state.knobs().clone(), ..self.state.settings.clone() };
-        let settings = settings.without_idle_blur(there_is);
+        let settings = match self.shared.seen().facts {
+            Some(facts) => facts.without_idle_blur(settings),
+            None => settings,
+        };
         let view = View {
             file: self.file(),
             named: navigation.and_then(Navigation::named).filter(|_| !moved),
@@ -647,8 +663,10 @@ impl OpenWindow {
             code: self.code.clone(),
             quit: false,
         };
-        for save in &mut self.saves {
-            save.of.get_or_insert_with(|| wanted.clone());
+        if self.navigated == Some(self.scene) {
+            for save in &mut self.saves {
+                save.of.get_or_insert_with(|| wanted.clone());
+            }
         }
         if self.sent.as_ref().is_none_or(|sent| !sent.is_as(&wanted)) {
             let is_over = self.sent.as_ref().is_some_and(|sent| !sent.is_same_picture(&wanted));
@@ -664,10 +682,15 @@ impl OpenWindow {
 
     /// What the window shows, without panels: size in pixels and RGBA8. `None` before the first picture.
     fn picture(&self, seen: &RenderState) -> Option<([u32; 2], Vec<u8>)> {
-        if self.state.layer != SurfaceLayer::Radiance {
-            let is_this = |layer: &&DrawnLayer| layer.layer == self.state.layer && layer.of == seen.versions();
-            return self.layer.as_ref().filter(is_this).map(|layer| (layer.size, layer.rgba.to_vec()));
+        if self.state.layer == SurfaceLayer::Radiance {
+            return self.shaded(seen);
         }
+        let is_this = |layer: &&DrawnLayer| layer.layer == self.state.layer && layer.of == seen.versions();
+        self.layer.as_ref().filter(is_this).map(|layer| (layer.size, layer.rgba.to_vec()))
+    }
+
+    /// The shaded picture, or both sides of the wipe line.
+    fn shaded(&self, seen: &RenderState) -> Option<([u32; 2], Vec<u8>)> {
         let left = seen.shown()?;
         let mut rgba = left.rgba.to_vec();
         if let Some(right) = seen.sides[1].shown.as_ref().filter(|right| right.size == left.size) {
@@ -686,7 +709,9 @@ impl OpenWindow {
     }
 
     fn write_png(&self, seen: &RenderState, path: &Path) -> Result<String> {
-        let ([width, height], rgba) = self.picture(seen).context("there is no picture yet")?;
+        // A layer that is not there yet is no reason to lose the last picture.
+        let picture = self.picture(seen).or_else(|| self.shaded(seen));
+        let ([width, height], rgba) = picture.context("there is no picture yet")?;
         self.mark(path);
         let has_alpha = self.state.layer == SurfaceLayer::Radiance && seen.shown().is_some_and(|shown| shown.has_alpha);
         file::write(path, &png::encode_png(width, height, &rgba, has_alpha)?)?;

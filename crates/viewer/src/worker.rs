@@ -18,6 +18,7 @@ use etalon::image::metric::{AnyPicture, Metric, compare};
 use etalon::image::png::{Display, over};
 use etalon::plan::Knobs;
 use etalon::plan::rungs::{Indirect, Reflection, Refraction};
+use etalon::scene::environment::Environment;
 use etalon::transport::events::{EventTracer, Limits};
 
 /// Time limit in milliseconds for a picture while the view moves; the resolution is reduced until the picture keeps it.
@@ -46,8 +47,8 @@ struct DrawnSide {
 }
 
 impl DrawnSide {
-    fn new(device: &Arc<Device>, loaded: &Loaded, settings: Settings) -> Result<Self> {
-        let environment = loaded.environment.as_ref().map(|(environment, _)| &**environment);
+    fn new(device: &Arc<Device>, loaded: &Loaded, wanted: &RenderRequest, index: usize) -> Result<Self> {
+        let (environment, settings) = lit(loaded, wanted, index);
         let renderer = Renderer::new(device, &loaded.original, environment, settings.clone())?;
         Ok(Self { renderer, settings, drawing: None, spent: Duration::ZERO, looked: Instant::now() })
     }
@@ -87,13 +88,12 @@ impl LoadedRenderers {
     }
 }
 
-/// Settings of a side, with the environment intensity scaled by the factor of the scene.
-fn settings_of(loaded: &Loaded, wanted: &RenderRequest, side: usize) -> Settings {
-    let share = loaded.environment.as_ref().map_or(1.0, |(_, share)| *share);
+/// The environment that lights a side, and its settings with the environment's intensity there.
+fn lit<'a>(loaded: &'a Loaded, wanted: &RenderRequest, side: usize) -> (Option<&'a Environment>, Settings) {
     let settings = wanted.settings.clone();
     let knobs = wanted.other.clone().filter(|_| side == 1).unwrap_or(settings.knobs);
-    let settings = Settings { environment_intensity: settings.environment_intensity * share, knobs, ..settings };
-    settings.without_idle_blur(loaded.environment.is_some())
+    let (environment, settings) = loaded.light.lit(Settings { knobs, ..settings });
+    (environment, settings.without_idle_blur(environment.is_some()))
 }
 
 /// Whether a renderer made for `a` can draw `b`.
@@ -259,7 +259,7 @@ impl Worker {
     /// Makes the renderer and the facts of a loaded scene.
     fn ready(&self, wanted: &RenderRequest, loaded: Loaded) -> Result<(LoadedRenderers, SceneFacts)> {
         let facts = SceneFacts::of(wanted, &loaded)?;
-        let side = DrawnSide::new(&self.device, &loaded, settings_of(&loaded, wanted, 0))?;
+        let side = DrawnSide::new(&self.device, &loaded, wanted, 0)?;
         let (scene, time) = (wanted.scene, wanted.time);
         let sides = vec![side];
         Ok((
@@ -296,24 +296,24 @@ impl Worker {
         }
         for index in 0..1 + usize::from(wanted.other.is_some()) {
             let Some(stage) = &mut self.stage else { return Ok(()) };
-            let settings = settings_of(&stage.loaded, wanted, index);
+            let (_, settings) = lit(&stage.loaded, wanted, index);
             let ready = stage.sides.get(index).is_some_and(|side| same_renderer(&side.settings, &settings)) && !renewed;
             let refused =
                 stage.refused[index].as_ref().is_some_and(|r| r.size == settings.size && same_renderer(r, &settings));
             if ready && stage.refused[index].take().is_some() {
                 self.say(|seen| seen.error = None);
             } else if !ready && (!refused || renewed) {
-                self.plan(settings, index)?;
+                self.plan(wanted, settings, index)?;
             }
         }
         Ok(())
     }
 
     /// Plans and uploads one side with other knobs.
-    fn plan(&mut self, settings: Settings, index: usize) -> Result<()> {
+    fn plan(&mut self, wanted: &RenderRequest, settings: Settings, index: usize) -> Result<()> {
         self.say(|seen| seen.busy = Some("uploading and compiling".to_owned()));
         let Some(stage) = &mut self.stage else { return Ok(()) };
-        let made = DrawnSide::new(&self.device, &stage.loaded, settings.clone());
+        let made = DrawnSide::new(&self.device, &stage.loaded, wanted, index);
         match made {
             Ok(side) => {
                 stage.refused[index] = None;
@@ -341,8 +341,8 @@ impl Worker {
     fn tell_plan(&self, index: usize) {
         let Some(side) = self.stage.as_ref().and_then(|stage| stage.sides.get(index)) else { return };
         let warnings = [side.renderer.plan().warnings.clone(), side.renderer.warnings.clone()].concat();
-        let sources = self.stage.as_ref().and_then(|stage| stage.loaded.sources.clone());
-        let lit_by = sources.map(|sources| sources.lit_by(side.renderer.plan()).sentence);
+        let light = self.stage.as_ref().map(|stage| stage.loaded.light.clone());
+        let lit_by = light.map(|light| light.sources(&side.settings).lit_by(side.renderer.plan()).sentence);
         self.say(|seen| {
             (seen.sides[index].effects, seen.sides[index].warnings) =
                 (side.renderer.plan().effects.clone().into(), warnings.into());
@@ -395,6 +395,8 @@ impl Worker {
         let remaining = f64::from(drawing.of().saturating_sub(rendered.samples));
         let full = rendered.display.chunks_exact(4).filter(|p| p[..3].contains(&255)).count();
         let rgba = Arc::new(rendered.display);
+        // Where what is asked for cannot be drawn, the renderer of before goes on.
+        let is_asked = same_renderer(&side.settings, &lit(&stage.loaded, wanted, index).1);
         let shown = Shown {
             version: self.version,
             seconds_left: 1e-9 * ns * pixels * remaining * sharing as f64,
@@ -403,7 +405,7 @@ impl Worker {
             has_alpha: rendered.has_alpha,
             rgba,
             size: side.settings.size,
-            of: wanted.clone(),
+            of: is_asked.then(|| wanted.clone()),
             samples: [rendered.samples, drawing.of()],
             moving: wanted.moving,
             time: wanted.time,
@@ -595,6 +597,8 @@ fn smaller(size: [u32; 2], ns_per_pixel: f64) -> [u32; 2] {
 
 #[cfg(test)]
 mod tests {
+    use etalon::frame::Background;
+
     use super::*;
 
     #[test]
@@ -605,6 +609,26 @@ mod tests {
         assert_eq!(smaller([1280, 720], 100.0), [640, 360]);
         assert_eq!(smaller([1281, 721], 1e6), [161, 91]);
         assert_eq!(smaller([3, 1], 1e9), [1, 1]);
+    }
+
+    #[test]
+    fn light_follows_what_is_chosen_in_the_window() {
+        let mut scene = etalon::study::load("lamps").expect("a scene");
+        scene.studio = None;
+        let camera = scene.cameras[0].clone();
+        let studio = Some(Environment::studio());
+        let opened = etalon::open::Opened::named("lamps.glb", scene.clone(), studio, false);
+        let loaded = Loaded { light: Arc::new(opened), ..Loaded::new(scene, camera) };
+        let of = |background| {
+            let settings = Settings { background, background_blur: 0.5, ..Settings::default() };
+            let (environment, settings) = lit(&loaded, &RenderRequest::new(settings), 0);
+            (environment.is_some(), settings.environment_intensity, settings.background_blur)
+        };
+        let (_, fill, _) = of(Background::Default);
+        assert!(fill > 0.0 && fill < 1.0, "{fill}");
+        assert_eq!(of(Background::Default), (true, fill, 0.5));
+        assert_eq!(of(Background::Environment), (true, 1.0, 0.5), "as `--background env` says");
+        assert_eq!(of(Background::Color([9; 3])), (true, fill, 0.0), "what is not shown is not blurred");
     }
 
     #[test]

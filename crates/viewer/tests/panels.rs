@@ -60,7 +60,7 @@ fn seen(loaded: &Loaded) -> RenderState {
         rgba: Arc::new(vec![0; 4]),
         opaque: Arc::new(vec![0; 4]),
         has_alpha: false,
-        of: RenderRequest::new(Settings::default()),
+        of: Some(RenderRequest::new(Settings::default())),
         size: [1, 1],
         samples: [3, 16],
         moving: false,

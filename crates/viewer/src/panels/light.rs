@@ -80,8 +80,8 @@ fn background(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     {
         state.settings.background = Background::Color(colour);
     }
-    let there_is = seen.facts.as_ref().is_some_and(|facts| facts.environment.is_some());
-    ui.add_enabled_ui(there_is && state.settings.shows_environment(), |ui| {
+    let lit = seen.facts.as_ref().is_some_and(|facts| facts.light.lit(state.settings.clone()).0.is_some());
+    ui.add_enabled_ui(lit && state.settings.shows_environment(), |ui| {
         let blur = Slider::new(&mut state.settings.background_blur, 0.0..=1.0).text("blur").max_decimals(2);
         let blur = ui.add(blur.clamping(UNTOUCHED));
         state.moved |=

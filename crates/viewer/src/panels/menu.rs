@@ -163,7 +163,7 @@ fn progress(ui: &mut Ui, seen: &RenderState) {
     let what = match (shown.moving, shown.is_done()) {
         // The whole picture follows when the view rests.
         (true, _) => "preview".to_owned(),
-        (_, true) => format!("{of} samples, done"),
+        (_, true) => format!("{of} sample{}, done", if of == 1 { "" } else { "s" }),
         _ => format!("{done}/{of} samples, {} left", duration(shown.seconds_left)),
     };
     ui.label(what).on_hover_text(format!(
