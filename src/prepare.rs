@@ -219,14 +219,7 @@ impl Prepared {
     /// # Errors
     /// When the scene has more triangles than a BVH holds.
     pub fn for_rays(scene: Scene) -> Result<Self> {
-        let surroundings = Surroundings {
-            environment: false,
-            constant: false,
-            grey: false,
-            sky: false,
-            blurred: false,
-            forced: ForcedEffects::None,
-        };
+        let surroundings = Surroundings::DARK;
         let facts = Facts::of(&scene, CanonicalForm::default());
         let rays = Rays::default();
         let plan = Plan { rays: Some(rays), ..Plan::new(&scene, &facts, surroundings, &Knobs::default()) };

@@ -7,7 +7,7 @@ use etalon::gpu::{Buffer, DescriptorSet, Frame, Image, ImageDesc, Place, Resourc
 use etalon::pass::classify::{WorkLists, classify};
 use etalon::pass::gbuffer::GBuffer;
 use etalon::pass::tonemap::{Display, tonemap};
-use etalon::plan::{Facts, ForcedEffects, Knobs, Plan, Surroundings};
+use etalon::plan::{Facts, Knobs, Plan, Surroundings};
 use etalon::scene::Scene;
 use etalon::shader::{Library, SCENE, lib};
 use etalon::share::Camera;
@@ -32,14 +32,7 @@ struct Things {
 impl Things {
     fn new(gpu: &Gpu) -> Self {
         let size = [64, 36];
-        let surroundings = Surroundings {
-            environment: false,
-            constant: false,
-            grey: false,
-            sky: false,
-            blurred: false,
-            forced: ForcedEffects::None,
-        };
+        let surroundings = Surroundings::DARK;
         let plan = Plan::new(&Scene::default(), &Facts::default(), surroundings, &Knobs::default());
         let desc = ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], vk::ImageUsageFlags::STORAGE);
         let buffer = |name| Buffer::new(&gpu.device, name, 256, Place::Device).expect("a buffer");

@@ -581,7 +581,8 @@ fn room() -> Environment {
     Environment { name: "lamp".to_owned(), width: 256, height: 128, radiance }
 }
 
-/// A channel of a map through a GGX lobe about `n`: ∫ L D(h) G1(l) dω over the same with L = 1, for n = v = r.
+/// Returns the first channel of a map filtered by a GGX lobe about `n`: ∫ L D(h) G1(l) dω over the same integral with
+/// L = 1, for n = v = r.
 fn through_lobe(map: &Environment, n: DVec3, alpha: f64) -> f64 {
     let (width, height) = (f64::from(map.width), f64::from(map.height));
     let (mut sum, mut whole) = (0.0, 0.0);

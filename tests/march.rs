@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use etalon::frame::Settings;
 use etalon::plan::rungs::Quadrature;
-use etalon::plan::{Attenuation, Facts, ForcedEffects, Knobs, Model, Plan, Surroundings};
+use etalon::plan::{Attenuation, Facts, Knobs, Model, Plan, Surroundings};
 use etalon::scene::canonical::CanonicalForm;
 use etalon::scene::{Camera, LightKind, Material, Scene, SigmaGrid};
 use etalon::study::shape::Shape;
@@ -521,14 +521,7 @@ fn light_reaches_into_a_mesh_through_its_grid() {
 fn planned(scene: &Scene, choices: &[&str]) -> Plan {
     let mut knobs = Knobs::of(Model::Recursive);
     choices.iter().for_each(|choice| knobs.set(choice).expect("a rung"));
-    let surroundings = Surroundings {
-        environment: false,
-        constant: false,
-        grey: false,
-        sky: false,
-        blurred: false,
-        forced: ForcedEffects::None,
-    };
+    let surroundings = Surroundings::DARK;
     Plan::new(scene, &Facts::of(scene, CanonicalForm::default()), surroundings, &knobs)
 }
 

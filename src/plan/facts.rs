@@ -41,3 +41,15 @@ pub struct Surroundings {
     /// Effects that are planned although the scene does not call for them.
     pub forced: ForcedEffects,
 }
+
+impl Surroundings {
+    /// No environment, and no forced effects.
+    pub const DARK: Self = Self {
+        environment: false,
+        constant: false,
+        grey: false,
+        sky: false,
+        blurred: false,
+        forced: ForcedEffects::None,
+    };
+}

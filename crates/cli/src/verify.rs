@@ -74,7 +74,7 @@ struct VerifyJson<'a> {
     seed: Option<u64>,
     vectors: Option<String>,
     /// Cases that are not judged, because the device flushes denormal numbers.
-    #[serde(skip_serializing_if = "is_none")]
+    #[serde(skip_serializing_if = "is_zero")]
     tiny: usize,
     outputs: Vec<Value>,
     hostile: Vec<Value>,
@@ -82,7 +82,7 @@ struct VerifyJson<'a> {
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde gives a reference")]
-fn is_none(count: &usize) -> bool {
+fn is_zero(count: &usize) -> bool {
     *count == 0
 }
 

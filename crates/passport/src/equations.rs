@@ -29,15 +29,15 @@ pub struct EquationErrors {
 }
 
 /// Evaluates every equation for so many cases, on a device that flushes denormal numbers without those below
-/// [`etalon_verify::TINY`]; `told` is told each function.
+/// [`etalon_verify::TINY`]; `progress` is called with the name of each function.
 ///
 /// # Errors
 /// When the device fails.
-pub fn measure(device: &Arc<Device>, cases: usize, told: &mut dyn FnMut(&str)) -> Result<Vec<EquationErrors>> {
+pub fn measure(device: &Arc<Device>, cases: usize, progress: &mut dyn FnMut(&str)) -> Result<Vec<EquationErrors>> {
     let mut all = Vec::new();
     let flushes = flushes_denormals(device)?;
     for entry in catalogue() {
-        told(entry.probe.name);
+        progress(entry.probe.name);
         let mut drawn = Cases::draw(&entry, cases, 1);
         if flushes {
             drawn.expect_nothing_of_tiny();

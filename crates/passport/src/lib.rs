@@ -143,12 +143,12 @@ pub struct Passport {
     pub seconds: f64,
 }
 
-/// Measures a device; `told` is told each step. A section that fails is left out, and the failure is a broken promise;
-/// sections after a lost device are left out as well.
+/// Measures a device; `progress` is called with the name of each step. A section that fails is left out, and the
+/// failure is a broken promise; sections after a lost device are left out as well.
 ///
 /// # Errors
 /// When nothing can be measured.
-pub fn measure(device: &Arc<Device>, scope: &Scope, told: &mut dyn FnMut(&str)) -> Result<Passport> {
+pub fn measure(device: &Arc<Device>, scope: &Scope, progress: &mut dyn FnMut(&str)) -> Result<Passport> {
     let begun = Instant::now();
     let DeviceInfo { name, driver, version, kind, api } = device.info().clone();
     let system = format!("{} {}", std::env::consts::OS, std::env::consts::ARCH);
@@ -172,16 +172,16 @@ pub fn measure(device: &Arc<Device>, scope: &Scope, told: &mut dyn FnMut(&str)) 
         if !scope.sections.contains(&section) || failed.iter().any(|(_, error)| etalon::gpu::is_lost(error)) {
             continue;
         }
-        told(name);
+        progress(name);
         let result = match section {
             Section::Arithmetic => {
                 arithmetic::measure(device, scope.inputs).map(|found| passport.arithmetic = Some(found))
             }
             Section::Equations => {
-                equations::measure(device, scope.cases, told).map(|found| passport.equations = Some(found))
+                equations::measure(device, scope.cases, progress).map(|found| passport.equations = Some(found))
             }
             Section::Pictures => {
-                let found = pictures::measure(device, &scenes, scope.size, told);
+                let found = pictures::measure(device, &scenes, scope.size, progress);
                 found.map(|found| passport.pictures = Some(found))
             }
             Section::Speed => {

@@ -73,13 +73,11 @@ struct Shot {
     ms: [f64; 2],
 }
 
-fn settings(model: Model, size: [u32; 2]) -> Settings {
+fn settings(model: Model, size: [u32; 2]) -> Result<Settings> {
     let mut knobs = Knobs::of(model);
     // One sample of what has no grain, four of paths.
-    let samples = if model == Model::Global { "samples=4" } else { "samples=1" };
-    // Every model has these rungs.
-    let _ = knobs.set(samples);
-    Settings { size, knobs, ..Settings::default() }
+    knobs.set(if model == Model::Global { "samples=4" } else { "samples=1" })?;
+    Ok(Settings { size, knobs, ..Settings::default() })
 }
 
 fn shot(device: &Arc<Device>, scene: &str, settings: Settings) -> Result<Shot> {
@@ -115,7 +113,7 @@ fn small(film: &Picture) -> Vec<[f32; 3]> {
 }
 
 fn drawn(device: &Arc<Device>, scene: &str, model: Model, size: [u32; 2]) -> Result<DrawnScene> {
-    let Shot { film, rendered, ms: [first_ms, second_ms] } = shot(device, scene, settings(model, size))?;
+    let Shot { film, rendered, ms: [first_ms, second_ms] } = shot(device, scene, settings(model, size)?)?;
     let mut passes = BTreeMap::new();
     for pass in &rendered.passes {
         let ms = passes.entry(pass.name.clone()).or_insert(0.0);
@@ -135,7 +133,7 @@ fn drawn(device: &Arc<Device>, scene: &str, model: Model, size: [u32; 2]) -> Res
 
 /// Draws a picture by paths in other ways.
 fn ways(device: &Arc<Device>, scene: &str, size: [u32; 2]) -> Result<Vec<SamePicture>> {
-    let usual = settings(Model::Global, size);
+    let usual = settings(Model::Global, size)?;
     let reference = shot(device, scene, usual.clone())?.film;
     let brightest = reference.rgba.iter().flat_map(|p| &p[..3]).fold(0.0_f32, |most, x| most.max(*x));
     let beside = |way: &str, film: &Picture| {
@@ -161,15 +159,20 @@ fn ways(device: &Arc<Device>, scene: &str, size: [u32; 2]) -> Result<Vec<SamePic
     Ok(found)
 }
 
-/// Draws scenes in all models at a size; `told` is told each picture.
+/// Draws scenes in all models at a size; `progress` is called with the name of each picture.
 ///
 /// # Errors
 /// When no picture can be drawn.
-pub fn measure(device: &Arc<Device>, scenes: &[&str], size: [u32; 2], told: &mut dyn FnMut(&str)) -> Result<Pictures> {
+pub fn measure(
+    device: &Arc<Device>,
+    scenes: &[&str],
+    size: [u32; 2],
+    progress: &mut dyn FnMut(&str),
+) -> Result<Pictures> {
     let mut pictures = Pictures { size, scenes: Vec::new(), refused: Vec::new(), ways: Vec::new() };
     for scene in scenes {
         for model in [Model::Local, Model::Recursive, Model::Global] {
-            told(&format!("{scene}, {}", model.name()));
+            progress(&format!("{scene}, {}", model.name()));
             match drawn(device, scene, model, size) {
                 Ok(drawn) => pictures.scenes.push(drawn),
                 Err(error) if etalon::gpu::is_lost(&error) => return Err(error),
@@ -178,7 +181,7 @@ pub fn measure(device: &Arc<Device>, scenes: &[&str], size: [u32; 2], told: &mut
         }
     }
     let first = scenes.first().context("drawing pictures: no scene was asked for")?;
-    told("one picture in several ways");
+    progress("one picture in several ways");
     match ways(device, first, size) {
         Ok(ways) => pictures.ways = ways,
         Err(error) if etalon::gpu::is_lost(&error) => return Err(error),
@@ -192,11 +195,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn small_pictures_are_means_with_four_digits() {
-        assert_eq!(
-            [123_456.0, 0.012_345_6, -9.999_9, 0.0, f64::NAN].map(short),
-            [123_500.0, 0.012_35, -10.0, 0.0, 0.0]
-        );
+    fn small_pictures_are_means() {
         let rgba = (0..16 * 8).map(|i| [if i % 16 < 2 { 1.0 } else { 0.25 }, i as f32, 0.0, 1.0]).collect();
         let found = small(&Picture { width: 16, height: 8, rgba });
         assert_eq!((found.len(), found[0][0], found[1][0]), (32, 1.0, 0.25));

@@ -22,7 +22,7 @@ const COLUMNS: u32 = 1024;
 /// Submissions that are timed.
 const SUBMISSIONS: usize = 100;
 
-/// RaySpeed per second of a traversal.
+/// Rays per second of a traversal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RaySpeed {
@@ -52,7 +52,7 @@ pub struct Speed {
     pub atomics: f64,
     /// Median microseconds of a submission that fills four bytes, until the host knows of its end.
     pub submission_us: f64,
-    /// RaySpeed of paths.
+    /// Rays of paths, by traversal.
     pub rays: Vec<RaySpeed>,
     /// Milliseconds of the longest dispatch that was tried; each was twice as long as the one before.
     pub longest_dispatch_ms: f64,
@@ -148,7 +148,7 @@ fn rays(device: &Arc<Device>, scene: &str, size: [u32; 2]) -> Result<Vec<RaySpee
     knobs.set("samples=4")?;
     let each = |traversal: Traversal| {
         let settings = Settings { size, knobs: knobs.clone(), traversal: Some(traversal), ..Settings::default() };
-        let mut renderer = Opened::load(scene)?.renderer(device, settings)?;
+        let mut renderer = opened.clone().renderer(device, settings)?;
         renderer.render(&camera, &mut |_| ())?;
         let rendered = renderer.render(&camera, &mut |_| ())?;
         let ms: f64 = rendered.passes.iter().map(|pass| pass.ms).sum();
@@ -167,16 +167,17 @@ fn rays(device: &Arc<Device>, scene: &str, size: [u32; 2]) -> Result<Vec<RaySpee
 /// longer one lost the device.
 fn longest(device: &Arc<Device>, most: f64) -> Result<(f64, bool)> {
     let values = Buffer::new(device, "values", 4 << 16, Place::Device)?;
-    let (mut groups, mut longest) = (64, 0.0);
-    while longest < most && groups < 65_535 {
+    // A row of workgroups, and then more rows: every device has 65,535 of each.
+    let (mut groups, mut longest) = ([64, 1, 1], 0.0);
+    while longest < most && groups[1] <= 1 << 15 {
         let mut frame = Frame::new(device);
-        frame.compute("long", &spin::Bind { values: &values }, &spin::Constants {}, &(), [groups, 1, 1])?;
+        frame.compute("long", &spin::Bind { values: &values }, &spin::Constants {}, &(), groups)?;
         match frame.finish() {
             Ok(passes) => longest = passes.iter().map(|pass| pass.ms).fold(0.0, f64::max),
             Err(error) if etalon::gpu::is_lost(&error) => return Ok((short(longest), true)),
             Err(error) => return Err(error),
         }
-        groups = (groups * 2).min(65_535);
+        groups[usize::from(groups[0] == 1 << 15)] *= 2;
     }
     Ok((short(longest), false))
 }

@@ -501,8 +501,8 @@ impl OpenWindow {
             let is_ready = match save.is_exr() {
                 true => drawn.iter().all(|shown| shown.is_done()) && seen.now().is_some(),
                 false => {
-                    let soon = |shown: &&&shared::Shown| !shown.is_done() && shown.seconds_left <= PATIENCE;
-                    drawn.iter().find(soon).is_none() && self.picture(seen).is_some()
+                    let is_awaited = |shown: &&shared::Shown| !shown.is_done() && shown.seconds_left <= PATIENCE;
+                    !drawn.iter().any(is_awaited) && self.picture(seen).is_some()
                 }
             };
             if are_drawn && is_ready {
