@@ -45,7 +45,7 @@ use crate::pass::shadow_map::ShadowMaps;
 use crate::pass::sum::{Sample, block_of, join};
 use crate::pass::tiles::tiles;
 use crate::pass::tonemap::{Counts, tonemap};
-use crate::plan::{Ability, Plan, Refused, Setting};
+use crate::plan::{Ability, Architecture, Plan, Refused, Setting};
 use crate::prepare::{Original, Prepared};
 use crate::scene::Camera;
 use crate::scene::environment::Environment;
@@ -152,6 +152,8 @@ impl Renderer {
             }
             (None, None) => {}
         }
+        plan.architecture =
+            settings.architecture.unwrap_or(if device.is_software() { Architecture::Cpu } else { Architecture::Gpu });
         plan.check(&Ability {
             device: device.info().name.clone(),
             adds_in_subgroups: device.offers().adds_in_subgroups,
@@ -531,7 +533,7 @@ impl Renderer {
             if plan.tiles {
                 tiles(&mut frame, plan, library, g, lists_of_lights)?;
             }
-            classify(&mut frame, library, g, work)?;
+            classify(&mut frame, (library, plan.architecture), g, work)?;
         }
         light(&mut frame, lighting, g, work, radiance)?;
         if let Some(directions) = &self.sky_directions {
@@ -565,7 +567,7 @@ impl Renderer {
             frame.fill("reset dropped fragments", &lists.dropped, 0);
             for strip in lists.strips() {
                 fragments(&mut frame, scene, g, lists, strip, lod_bias)?;
-                classify_fragments(&mut frame, library, &lists.heads, &lists.work, strip.rows)?;
+                classify_fragments(&mut frame, (library, plan.architecture), &lists.heads, &lists.work, strip.rows)?;
                 let behind = Behind { radiance, seen: &screen.seen, part: None };
                 composite(&mut frame, lighting, g, lists, screen, behind, strip.rows)?;
                 for PartOnDevice { part, radiance, seen, .. } in parts {

@@ -7,7 +7,7 @@ use etalon::gpu::{Buffer, DescriptorSet, Frame, Image, ImageDesc, Place, Resourc
 use etalon::pass::classify::{WorkLists, classify};
 use etalon::pass::gbuffer::GBuffer;
 use etalon::pass::tonemap::{Display, tonemap};
-use etalon::plan::{Facts, Knobs, Plan, Surroundings};
+use etalon::plan::{Architecture, Facts, Knobs, Plan, Surroundings};
 use etalon::scene::Scene;
 use etalon::shader::{Library, SCENE, lib};
 use etalon::share::Camera;
@@ -63,7 +63,7 @@ fn proves(name: &str, describe: impl for<'a> Fn(&'a Things, &mut Frame<'a>)) {
 fn sorting_tiles_waits_for_its_counters() {
     // copy → compute atomics on the sizes.
     proves("classify", |things, frame| {
-        classify(frame, Library::default(), &things.gbuffer, &things.work).expect("the pass")
+        classify(frame, (Library::default(), Architecture::default()), &things.gbuffer, &things.work).expect("the pass")
     });
 }
 
@@ -71,8 +71,10 @@ fn sorting_tiles_waits_for_its_counters() {
 fn sorting_tiles_again_waits_for_the_first_time() {
     // compute → copy → compute on the same lists; the tiles are written twice.
     proves("classify twice", |things, frame| {
-        classify(frame, Library::default(), &things.gbuffer, &things.work).expect("the pass");
-        classify(frame, Library::default(), &things.gbuffer, &things.work).expect("the pass");
+        classify(frame, (Library::default(), Architecture::default()), &things.gbuffer, &things.work)
+            .expect("the pass");
+        classify(frame, (Library::default(), Architecture::default()), &things.gbuffer, &things.work)
+            .expect("the pass");
     });
 }
 

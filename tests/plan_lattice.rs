@@ -5,7 +5,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
 
-use etalon::frame::{Background, Part, Settings};
+use etalon::frame::{Background, Part, Renderer, Settings};
+use etalon::gpu::Compiled;
 use etalon::image::Picture;
 use etalon::plan::{EffectState, Facts, ForcedEffects, Knobs, Plan, Surroundings};
 use etalon::scene::canonical::canonicalise;
@@ -13,7 +14,7 @@ use etalon::scene::environment::Environment;
 use etalon::scene::lobe::{ANISOTROPY, DIFFUSE_TRANSMISSION, IRIDESCENCE, SHEEN};
 use etalon::scene::material::{Sampler, TextureRef};
 use etalon::scene::prune::prune_unused;
-use etalon::scene::{AlphaMode, AmbientLight, Image, LightKind, Material, Prune, SigmaGrid};
+use etalon::scene::{AlphaMode, AmbientLight, Camera, Image, LightKind, Material, Prune, SigmaGrid};
 use etalon::study::shape::Shape;
 use etalon::upload::rays::Traversal;
 use etalon_testing::gpu::{Gpu, bits};
@@ -328,7 +329,6 @@ fn knobs(ways: &Ways, choice: &Choice) -> Knobs {
     knobs
 }
 
-/// Draws one plan of all.
 /// The same with paths, which need rays for everything.
 fn knobs_of_paths(ways: &Ways, choice: &Choice) -> Knobs {
     let mut knobs = knobs(ways, choice);
@@ -340,7 +340,7 @@ fn knobs_of_paths(ways: &Ways, choice: &Choice) -> Knobs {
     knobs
 }
 
-fn drawn(gpu: &Gpu, ways: &Ways, choice: &Choice, forced: ForcedEffects, by_paths: bool) -> (Plan, Picture) {
+fn renderer_of(gpu: &Gpu, ways: &Ways, choice: &Choice, forced: ForcedEffects, by_paths: bool) -> (Camera, Renderer) {
     let made = scene(ways, choice);
     let environment = match level(choice, "environment") {
         "none" => None,
@@ -368,8 +368,13 @@ fn drawn(gpu: &Gpu, ways: &Ways, choice: &Choice, forced: ForcedEffects, by_path
         forced,
         ..Settings::default()
     };
-    let mut renderer = gpu.renderer(&made.0, environment.as_ref(), settings);
-    let rendered = renderer.render(&made.0.cameras[0], &mut |_| ()).expect("a picture");
+    (made.0.cameras[0].clone(), gpu.renderer(&made.0, environment.as_ref(), settings))
+}
+
+/// Draws one plan of all.
+fn drawn(gpu: &Gpu, ways: &Ways, choice: &Choice, forced: ForcedEffects, by_paths: bool) -> (Plan, Picture) {
+    let (camera, mut renderer) = renderer_of(gpu, ways, choice, forced, by_paths);
+    let rendered = renderer.render(&camera, &mut |_| ()).expect("a picture");
     assert_eq!((rendered.counts.nan, rendered.counts.inf), (0, 0), "{ways:?} {choice:?}");
     let film = renderer.film().expect("the film");
     let seen = film.rgba.iter().filter(|pixel| pixel[0] > 0.0).count();
@@ -422,6 +427,30 @@ fn plans_with_paths() {
         assert!(different == 0, "{i}: {different} pixels differ: {ways:?} {named:?}");
     }
     assert!(gpu.errors().is_empty(), "{:?}", gpu.errors());
+}
+
+/// No kernel of any plan spills registers, where a driver tells (docs/decisions/architectures.md says how to run this
+/// without a GPU), and validation has nothing against their pipelines.
+#[test]
+fn compilers_spill_no_register() {
+    let Some(gpu) = Gpu::that_tells_compiled() else {
+        eprintln!("skipped: no driver here reports what its compiler made");
+        return;
+    };
+    let mut spilling = BTreeSet::new();
+    for (i, (ways, choice)) in spread().iter().enumerate() {
+        for by_paths in [false, true].into_iter().filter(|by_paths| !by_paths || i % 8 == 0) {
+            let (camera, mut renderer) = renderer_of(&gpu, ways, choice, ForcedEffects::None, by_paths);
+            for (program, constants) in
+                renderer.passes(&camera).expect("passes").iter().flat_map(|pass| &pass.pipelines)
+            {
+                let compiled = gpu.device.compiled(program, constants).expect("statistics");
+                let spilled: u64 = compiled.iter().filter_map(Compiled::footprint).map(|of| of.spilled).sum();
+                spilling.extend((spilled > 0).then(|| format!("{} in plan {i}: {spilled}", program.name)));
+            }
+        }
+    }
+    assert!(spilling.is_empty(), "{}: registers spilled: {spilling:#?}", gpu.device.info().name);
 }
 
 /// What paths may meet is planned where it is, and not where it is not; and nothing that they take the place of.

@@ -15,11 +15,11 @@ layout(pass, scalar) buffer Sums { uvec4 sums[]; };                // sum, dista
 layout(pass, scalar) buffer Media { uvec4 media[]; };
 layout(pass, scalar) buffer TMins { float t_mins[]; };
 
-Path path_of(uint pixel) {
+// Without `sum` and `distance_since_vertex`.
+Path path_without_sum(uint pixel) {
     uvec4 a = origins[pixel];
     uvec4 b = directions[pixel];
     uvec4 c = throughputs[pixel];
-    uvec4 d = sums[pixel];
     Path p;
     p.origin = uintBitsToFloat(a.xyz);
     p.source_face = a.w;
@@ -27,12 +27,20 @@ Path path_of(uint pixel) {
     p.pdf = uintBitsToFloat(b.w);
     p.throughput = uintBitsToFloat(c.xyz);
     p.state = c.w;
-    p.sum = uintBitsToFloat(d.xyz);
-    p.distance_since_vertex = uintBitsToFloat(d.w);
+    p.sum = vec3(0.0);
+    p.distance_since_vertex = 0.0;
     p.media = trace_terms.camera_media;
     if (KEEPS_MEDIA) p.media = media[pixel];
     p.t_min = 0.0;
     if (KEEPS_T_MIN) p.t_min = t_mins[pixel];
+    return p;
+}
+
+Path path_of(uint pixel) {
+    uvec4 d = sums[pixel];
+    Path p = path_without_sum(pixel);
+    p.sum = uintBitsToFloat(d.xyz);
+    p.distance_since_vertex = uintBitsToFloat(d.w);
     return p;
 }
 

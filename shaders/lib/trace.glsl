@@ -256,56 +256,68 @@ HitPair traverse_links_pair(TriangleRay ra, vec3 da, float ta, TriangleRay rb, v
     return HitPair(a.hit, b.hit);
 }
 
-layout(constant) const uint STACK_SIZE = 1; // one more than the depth of the BVH: the entry above the last one is written too
+// Invocations in a workgroup of every program that traces rays.
+const uint TRACING_LANES = 64;
+// Words of the stacks of a workgroup, as many entries as the BVH is deep; 1 where the traversal has none.
+layout(constant) const uint STACK_WORDS = 1;
+// Entry by entry: neighbouring invocations access neighbouring words.
+shared int traversal_stacks[STACK_WORDS];
 
-// Traversal with a stack: both children's boxes are in the parent; the nearer child is next, the other goes onto the stack.
+// Traversal with a stack, the one of GPUs: both children's boxes are in the parent; the nearer child is next, the other
+// goes onto the stack. Inner nodes, then the triangles of one leaf, with branches: an invocation fetches only what it
+// needs. The stack is in shared memory. As an array of the invocation, Mesa's compiler selects among registers or copies
+// the array (docs/decisions/architectures.md).
+// Where to read: Aila and Laine, Understanding the Efficiency of Ray Traversal on GPUs, HPG 2009 ("while-while").
 Hit traverse_stack(TriangleRay r, vec3 direction, float t_max, uint classes, uint purpose, inout Filters f) {
     BoxRay b = box_ray(r.origin, direction, purpose != NEAREST);
     // A reference is a node or a leaf, as in Traversal; the sentinel ends the traversal.
     b.end = 0x7fffffff;
+    uint bottom = gl_LocalInvocationIndex;
+    uint top = bottom;
     Traversal w = Traversal(t_max > 0.0 ? 0 : b.end, 0, Hit(t_max, NO_TRIANGLE, 0.0, 0.0));
-    bool inserted; // as in traverse_links
-    int stack[STACK_SIZE];
-    int entries = 0;
-    do {
-        for (int i = 0; i < 2; i++) {
-            // 1. A leaf waits while another one is being tested.
-            bool at_leaf = w.node < 0;
-            bool keep = at_leaf && w.leaf == 0;
-            w.leaf = keep ? w.node : w.leaf;
-            bool inner = w.node >= 0 && w.node != b.end;
-            node_visits += inner ? 1u : 0u;
-            // 2. Test the boxes of both children.
-            StackNode node = stack_node_at(uint(inner ? w.node : 0));
+    while (w.node != b.end) {
+        // 1. Inner nodes: the boxes of both children, until a leaf is met.
+        while (w.node >= 0 && w.node != b.end) {
+            node_visits++;
+            StackNode node = stack_node_at(uint(w.node));
             vec3 tl = node.left_center * b.inverse;
             vec3 el = node.left_half_extent * b.extent;
             vec3 tr = node.right_center * b.inverse;
             vec3 er = node.right_half_extent * b.extent;
             vec3 near_l = tl + b.start_near - el;
             vec3 near_r = tr + b.start_near - er;
-            bool hit_l = inner && meets(near_l, tl + b.start_far + el, r.after, w.hit.t);
-            bool hit_r = inner && meets(near_r, tr + b.start_far + er, r.after, w.hit.t);
+            bool hit_l = meets(near_l, tl + b.start_far + el, r.after, w.hit.t);
+            bool hit_r = meets(near_r, tr + b.start_far + er, r.after, w.hit.t);
             float enter_l = max(near_l.x, max(near_l.y, near_l.z));
             float enter_r = max(near_r.x, max(near_r.y, near_r.z));
-            // 3. Continue with the nearer child that is hit.
-            bool swap = enter_r < enter_l;
-            int first = swap ? node.right : node.left;
-            int second = swap ? node.left : node.right;
-            bool both = hit_l && hit_r;
-            int one = hit_l ? node.left : node.right;
-            // 4. The entry is always written; only the position of the next entry is selected.
-            stack[min(entries, int(STACK_SIZE) - 1)] = second;
-            entries += both ? 1 : 0;
-            bool pop = keep || (inner && !hit_l && !hit_r);
-            entries -= pop ? 1 : 0;
-            int popped = entries >= 0 ? stack[max(entries, 0)] : b.end;
-            entries = max(entries, 0);
-            w.node = inner && !pop ? (both ? first : one) : pop ? popped : w.node;
+            if (hit_l && hit_r) {
+                bool swap = enter_r < enter_l;
+                traversal_stacks[top] = swap ? node.left : node.right;
+                top += TRACING_LANES;
+                w.node = swap ? node.right : node.left;
+            } else if (hit_l || hit_r) {
+                w.node = hit_l ? node.left : node.right;
+            } else {
+                w.node = b.end;
+                if (top != bottom) {
+                    top -= TRACING_LANES;
+                    w.node = traversal_stacks[top];
+                }
+            }
         }
-        uvec4 known = f.triangles;
-        test_triangle(w, f, r, b, classes, purpose);
-        inserted = purpose == TO_LIGHT && any(notEqual(f.triangles, known));
-    } while (is_traversing(w, b) || inserted);
+        // 2. The triangles of the leaf. A hit may end the traversal.
+        if (w.node < 0) {
+            w.leaf = w.node;
+            while (w.leaf != 0) test_triangle(w, f, r, b, classes, purpose);
+            if (w.node != b.end) {
+                w.node = b.end;
+                if (top != bottom) {
+                    top -= TRACING_LANES;
+                    w.node = traversal_stacks[top];
+                }
+            }
+        }
+    }
     return w.hit;
 }
 

@@ -26,6 +26,9 @@ layout(constant) const uint PENDING = 1;         // greatest number of waiting b
 // Which branches are added: 0 all, 1 those that the first surface reflected, 2 those that it transmitted. All branches are
 // traced in any case: the order of the branches and their random numbers depend on all earlier ones.
 layout(constant) const uint FIRST_EVENT = 0;
+// On GPUs: a branch goes to the stack at once, and a lookup of the environment is made where it arises.
+// Otherwise both wait in registers (docs/decisions/architectures.md). The sums are the same, in the same order.
+layout(constant) const bool STACKS_AT_ONCE = false;
 // A branch of smaller throughput is not followed. The sum of these losses is counted.
 const float FAINTEST = 1.0 / 512.0;
 
@@ -52,12 +55,14 @@ Branch sent[MOST_SENT];
 uint sent_now = 0;
 Branch pending[PENDING];
 uint waiting = 0;
-// Lookups of the environment still to be made, with their weights: those of the first surface wait for those of the second.
+// Lookups of the environment still to be made, in order, with their weights: those of the first surface wait for those of
+// the second.
 const int MOST_LOOKS = 2 * MOST_SENT;
 vec3 looks_at[MOST_LOOKS];
 vec3 looks_with[MOST_LOOKS];
 uint looks = 0;
 vec3 sum = vec3(0.0);
+vec3 around = vec3(0.0); // sum of the lookups of the environment
 float escaped = 0.0; // share of the pixel that shows the background through transparent surfaces
 float lost = 0.0;
 uint reflection_rays = 0;
@@ -69,12 +74,14 @@ vec3 wanted(uint events, vec3 light) {
 }
 
 void look(vec3 direction, vec3 throughput) {
-    for (int i = MOST_LOOKS - 1; i > 0; i--) {
-        looks_at[i] = looks_at[i - 1];
-        looks_with[i] = looks_with[i - 1];
+    if (STACKS_AT_ONCE) {
+        around += throughput * (ENVIRONMENT ? environment_radiance(direction) : vec3(0.0));
+        return;
     }
-    looks_at[0] = direction;
-    looks_with[0] = throughput;
+    for (int i = 0; i < MOST_LOOKS; i++) {
+        looks_at[i] = i == looks ? direction : looks_at[i];
+        looks_with[i] = i == looks ? throughput : looks_with[i];
+    }
     looks++;
 }
 
@@ -82,7 +89,7 @@ void look(vec3 direction, vec3 throughput) {
 void see_environment() {
     do {
         vec3 seen = ENVIRONMENT ? environment_radiance(looks_at[0]) : vec3(0.0);
-        sum += looks > 0 ? looks_with[0] * seen : vec3(0.0);
+        around += looks > 0 ? looks_with[0] * seen : vec3(0.0);
         for (int i = 0; i < MOST_LOOKS - 1; i++) {
             looks_at[i] = looks_at[i + 1];
             looks_with[i] = looks_with[i + 1];
@@ -95,7 +102,10 @@ void send(Branch branch) {
     if (FIRST_EVENT != 0) branch.events |= (first_event == 0 ? 1 + (branch.events >> 8 & 1u) : first_event) << 10;
     float weight = largest(branch.throughput);
     bool follows = (branch.events & 0xffu) <= trace_terms.interfaces && weight >= FAINTEST && waiting + sent_now < PENDING;
-    if (weight > 0.0 && follows) {
+    if (weight > 0.0 && follows && STACKS_AT_ONCE) {
+        pending[waiting] = branch;
+        waiting++;
+    } else if (weight > 0.0 && follows) {
         for (int i = MOST_SENT - 1; i > 0; i--) sent[i] = sent[i - 1];
         sent[0] = branch;
         sent_now++;
@@ -109,6 +119,10 @@ void send(Branch branch) {
 
 // The next branch: the last one sent, or the last one that waits.
 Branch next_branch() {
+    if (STACKS_AT_ONCE) {
+        waiting -= waiting > 0 ? 1 : 0;
+        return pending[waiting];
+    }
     do {
         bool waits = sent_now > 1;
         Branch oldest = sent[1];
@@ -221,7 +235,7 @@ void main() {
 
     Boundary boundary = boundary_at(hit, ray.media, ray.direction);
     split(hit, boundary, ray, cone, uvec2(pixel));
-    bool more = sent_now > 0;
+    bool more = sent_now > 0 || waiting > 0;
     do {
         // 2. Follow the next branch to its hit.
         bool goes_on = more;
@@ -259,9 +273,10 @@ void main() {
                 // Light traced by a ray is not looked up as well.
                 s.base_traced = mirrored_by_ray(hit, boundary);
                 LightRange all = LightRange(0, DIRECTIONAL_LIGHTS + LOCAL_LIGHTS, 0, 0);
-                vec3 weight = ray.throughput * hit.coverage;
-                if (!boundary.suppressed_by_priority) sum += wanted(ray.events, weight * radiance_to_eye(s, pixel, 0, all, true));
+                vec3 weight = wanted(ray.events, ray.throughput * hit.coverage);
+                bool lit = !boundary.suppressed_by_priority;
                 split(hit, boundary, ray, cone, uvec2(pixel));
+                if (lit) sum += weight * radiance_to_eye(s, pixel, 0, all, true);
             } else {
                 bool direct = (ray.events & 0x200u) != 0;
                 bool clear = direct && !SKY;
@@ -273,7 +288,7 @@ void main() {
                 escaped += clear ? (ray.throughput.r + ray.throughput.g + ray.throughput.b) * (1.0 / 3.0) : 0.0;
             }
         }
-        if (goes_on || looks > 0) see_environment();
+        if (!STACKS_AT_ONCE && (goes_on || looks > 0)) see_environment();
         more = sent_now > 0 || waiting > 0;
         more = more && loop_iterations < LOOP_BUDGET;
     } while (more);
@@ -284,6 +299,6 @@ void main() {
         lost += largest(pending[waiting].throughput);
     }
     vec4 before = imageLoad(radiance, pixel);
-    imageStore(radiance, pixel, vec4(before.rgb + sum, before.a * (1.0 - min(escaped, 1.0))));
+    imageStore(radiance, pixel, vec4(before.rgb + (sum + around), before.a * (1.0 - min(escaped, 1.0))));
     if (FIRST_EVENT == 0) count_rays(reflection_rays, refraction_rays, lost, lost);
 }

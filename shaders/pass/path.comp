@@ -6,7 +6,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 layout(local_size_x = 64) in;
-#include "lib/path.glsl"
+#include "lib/path_pair.glsl"
 #include "lib/path_state.glsl"
 #include "lib/queue.glsl"
 

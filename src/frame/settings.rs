@@ -7,7 +7,7 @@ use crate::gpu::Device;
 use crate::image::Picture;
 use crate::image::tone::{ToneMap, ViewTransform};
 use crate::plan::rungs::Indirect;
-use crate::plan::{ForcedEffects, Knobs, Refused, Setting};
+use crate::plan::{Architecture, ForcedEffects, Knobs, Refused, Setting};
 use crate::prepare::Conditions;
 use crate::scene::environment::Environment;
 use crate::transport::emitters::Sky;
@@ -94,6 +94,8 @@ pub struct Settings {
     pub paths_at_once: bool,
     /// BVH traversal; `None` selects the one that suits the device and the scene.
     pub traversal: Option<Traversal>,
+    /// Architecture of the passes; `None` selects the one that suits the device.
+    pub architecture: Option<Architecture>,
     /// Effects that are planned although the scene does not call for them.
     pub forced: ForcedEffects,
     /// Parts of the picture that are stored as layers of their own; each costs one more pass of the recursive rays.
@@ -117,6 +119,7 @@ impl Default for Settings {
             max_error: None,
             paths_at_once: false,
             traversal: None,
+            architecture: None,
             forced: ForcedEffects::default(),
             parts: Vec::new(),
             share: TileShare::ALL,

@@ -12,7 +12,7 @@ use super::gbuffer::GBuffer;
 use super::lighting::Lighting;
 use super::rows::{TileShare, rows_of, stride};
 use crate::gpu::{Buffer, Device, Frame, Image, NOTHING, Place};
-use crate::plan::Plan;
+use crate::plan::{Architecture, Plan};
 use crate::shader::{Library, classify, classify_fragments, classify_rays as ray_program, lib};
 use crate::share::WorkSize;
 
@@ -23,7 +23,7 @@ pub const TILE: u32 = lib::work_tile::WORK_TILE;
 pub const WORK_BYTES: u64 = size_of::<WorkSize>() as u64;
 
 /// Arguments of an empty indirect dispatch.
-const EMPTY: WorkSize = WorkSize { x: 0, y: 1, z: 1, count: 0 };
+pub(super) const EMPTY: WorkSize = WorkSize { x: 0, y: 1, z: 1, count: 0 };
 
 /// The tiles of a strip that hold transparent fragments.
 pub struct FragmentTiles {
@@ -57,7 +57,7 @@ impl FragmentTiles {
 /// When the driver refuses a descriptor or a layout.
 pub fn classify_fragments<'a>(
     frame: &mut Frame<'a>,
-    library: Library,
+    (library, architecture): (Library, Architecture),
     heads: &'a Image,
     list: &'a FragmentTiles,
     rows: [u32; 2],
@@ -66,8 +66,8 @@ pub fn classify_fragments<'a>(
     let bind = classify_fragments::Bind { heads, sizes: &list.sizes, tiles: &list.tiles };
     let tiles = list.width.div_ceil(TILE) * (rows[1] - rows[0]).div_ceil(TILE);
     let groups = tiles.div_ceil(classify_fragments::PROGRAM.local_size[0]);
-    let push =
-        classify_fragments::Push { width: list.width, first_row: rows[0], end_row: rows[1], stride: stride(groups) };
+    let stride = stride(architecture, groups);
+    let push = classify_fragments::Push { width: list.width, first_row: rows[0], end_row: rows[1], stride };
     frame.compute("classify fragment tiles", &bind, &classify_fragments::Constants { library }, &push, rows_of(groups))
 }
 
@@ -105,7 +105,12 @@ impl WorkLists {
 ///
 /// # Errors
 /// When the driver refuses a descriptor or a layout.
-pub fn classify<'a>(frame: &mut Frame<'a>, library: Library, gbuffer: &'a GBuffer, lists: &'a WorkLists) -> Result<()> {
+pub fn classify<'a>(
+    frame: &mut Frame<'a>,
+    (library, architecture): (Library, Architecture),
+    gbuffer: &'a GBuffer,
+    lists: &'a WorkLists,
+) -> Result<()> {
     frame.copy_buffer("reset work sizes", &lists.empty, &lists.sizes, 2 * WORK_BYTES);
     let bind = classify::Bind {
         gbuffer: gbuffer.bind(),
@@ -114,7 +119,7 @@ pub fn classify<'a>(frame: &mut Frame<'a>, library: Library, gbuffer: &'a GBuffe
         background_tiles: &lists.background,
     };
     let groups = lists.tiles.div_ceil(classify::PROGRAM.local_size[0]);
-    let push = classify::Push { stride: stride(groups) };
+    let push = classify::Push { stride: stride(architecture, groups) };
     frame.compute("classify tiles", &bind, &classify::Constants { library }, &push, rows_of(groups))
 }
 
@@ -174,6 +179,6 @@ pub fn classify_rays<'a>(
         find_mirrors: calls.mirrors,
         find_transmissive: calls.transmissive,
     };
-    let push = ray_program::Push { stride: stride(groups) };
+    let push = ray_program::Push { stride: stride(lighting.plan.architecture, groups) };
     frame.compute("classify ray tiles", &bind, &constants, &push, rows_of(groups))
 }

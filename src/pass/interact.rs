@@ -11,7 +11,7 @@ use super::gbuffer::GBuffer;
 use super::lighting::Lighting;
 use super::part::Part;
 use crate::gpu::{Frame, Image};
-use crate::plan::Rays;
+use crate::plan::{Architecture, Rays};
 use crate::shader::interact;
 
 /// Pending rays beyond one per surface of a path: a surface may send four rays. Rays without a free slot are counted as
@@ -48,6 +48,7 @@ pub fn interact<'a>(
         masked_hits: with.masked,
         pending: with.interfaces + SPARE_BRANCHES,
         first_event: part.map_or(0, |part| part as u32),
+        stacks_at_once: lighting.plan.architecture == Architecture::Gpu,
     };
     let bind = interact::Bind {
         gbuffer: gbuffer.bind(),

@@ -1,26 +1,27 @@
-//! Wavefront path tracing: one dispatch per bounce over a queue of pixels, with stream compaction in between
-//! (shaders/pass/path.comp); or all bounces in one dispatch (path_at_once.comp), for comparison in tests.
+//! Wavefront path tracing: the paths' states in memory, and the two forms in which bounces follow each other: pairs of
+//! paths in one kernel per bounce (path_pairs.rs), or three kernels per bounce with one path per invocation
+//! (path_steps.rs). Or all bounces in one dispatch (shaders/pass/path_at_once.comp), for comparison in tests.
 //!
 //! Read pbrt (4th ed.), chapter 15 (wavefront rendering) and sections 13.2 to 13.4; Laine, Karras and Aila 2013,
-//! "Megakernels Considered Harmful"; docs/decisions/paths.md. Estimates use next event estimation with multiple
-//! importance sampling.
+//! "Megakernels Considered Harmful"; docs/decisions/paths.md and architectures.md. Estimates use next event estimation
+//! with multiple importance sampling.
 
 use std::sync::Arc;
 
 use anyhow::Result;
 
 use super::lighting::Lighting;
+use super::path_pairs::PathPairs;
+use super::path_states::PathStates;
+use super::path_steps::PathSteps;
 use super::rows::{TileShare, rows_of, stride};
-use crate::gpu::{Buffer, Device, Frame, Image, NOTHING, Place};
-use crate::plan::{Paths, Plan};
-use crate::shader::lib::queue::{CHUNK, PATHS_IN_GROUP};
-use crate::shader::{lib, path, path_at_once, path_begin, queue_count, queue_next, queue_scan};
-use crate::share::{QueueSize, WorkSize};
+use crate::gpu::{Device, Frame, Image};
+use crate::plan::{Architecture, Paths, Plan};
+use crate::shader::lib::queue::PATHS_IN_GROUP;
+use crate::shader::{lib, path_at_once, path_begin};
 
 /// Pixels per tile; the first queue consists of whole tiles.
 const TILE: u32 = lib::work_tile::WORK_TILE * lib::work_tile::WORK_TILE;
-const SIZE_BYTES: u64 = size_of::<QueueSize>() as u64;
-const CHUNKS_AT: u64 = std::mem::offset_of!(QueueSize, chunks) as u64;
 
 /// Size of the picture, and the share of its tiles that is drawn.
 type Pixels = ([u32; 2], TileShare);
@@ -29,13 +30,13 @@ type Pixels = ([u32; 2], TileShare);
 pub struct PathsOnDevice {
     /// Settings of path tracing.
     pub with: Paths,
-    states: [Buffer; 6],
-    queues: [Buffer; 2],
-    sizes: [Buffer; 2],
-    first_size: Buffer,
-    chunks: Buffer,
-    places: u32,
-    width: u32,
+    states: PathStates,
+    form: Form,
+}
+
+enum Form {
+    Pairs(PathPairs),
+    Steps(PathSteps),
 }
 
 impl PathsOnDevice {
@@ -45,45 +46,15 @@ impl PathsOnDevice {
     /// When memory is short.
     pub fn new(device: &Arc<Device>, with: Paths, plan: &Plan, touching: bool, pixels: Pixels) -> Result<Self> {
         let (size, share) = pixels;
-        let rays = plan.rays.unwrap_or_default();
-        let pixels = u64::from(size[0]) * u64::from(size[1]);
-        // All pixels of the tiles, including those outside of the picture.
-        let places = share.tiles(size) * TILE;
-        let words = |name, wanted: bool, words: u64| match wanted {
-            true => Buffer::new(device, name, 4 * words, Place::Device),
-            false => Buffer::new(device, NOTHING, 0, Place::Device),
-        };
-        let queue = || words("queue of paths", true, u64::from(places));
-        let queue_size = || Buffer::new(device, "queue size", SIZE_BYTES, Place::Device);
-        let [groups, rows, _] = rows_of(places.div_ceil(PATHS_IN_GROUP));
-        let [chunk_groups, chunk_rows, _] =
-            rows_of(places.div_ceil(CHUNK).div_ceil(queue_count::PROGRAM.local_size[0]));
-        let first_size = QueueSize {
-            paths: WorkSize { x: groups, y: rows, z: 1, count: places },
-            chunks: WorkSize { x: chunk_groups, y: chunk_rows, z: 1, count: 0 },
-        };
+        let (rays, places) = (plan.rays.unwrap_or_default(), share.tiles(size) * TILE);
         Ok(Self {
             with,
-            states: [
-                words("origins of paths", true, 4 * pixels)?,
-                words("directions of paths", true, 4 * pixels)?,
-                words("throughputs of paths", true, 4 * pixels)?,
-                words("light of paths", true, 4 * pixels)?,
-                words("media of paths", rays.transmissive, 4 * pixels)?,
-                words("what paths are after", touching, pixels)?,
-            ],
-            queues: [queue()?, queue()?],
-            sizes: [queue_size()?, queue_size()?],
-            first_size: Buffer::with_data(device, "first queue size", &[first_size])?,
-            chunks: words("chunks of a queue", true, u64::from(places.div_ceil(CHUNK)))?,
-            places,
-            width: size[0],
+            states: PathStates::new(device, rays, touching, size, places)?,
+            form: match plan.architecture {
+                Architecture::Cpu => Form::Pairs(PathPairs::new(device, places)?),
+                Architecture::Gpu => Form::Steps(PathSteps::new(device, rays, places, size)?),
+            },
         })
-    }
-
-    fn state(&self) -> lib::path_state::Bind<'_> {
-        let [origins, directions, throughputs, sums, media, t_mins] = &self.states;
-        lib::path_state::Bind { origins, directions, throughputs, sums, media, t_mins }
     }
 }
 
@@ -97,39 +68,23 @@ pub fn paths<'a>(
     paths: &'a PathsOnDevice,
     radiance: &'a Image,
 ) -> Result<()> {
-    let (library, interfaces) = (lighting.library, lighting.plan.rays.unwrap_or_default().interfaces);
-    let (places, tiles, stride) = (paths.places, paths.places / TILE, stride(paths.places / TILE));
+    let (library, places, tiles) = (lighting.library, paths.states.places, paths.states.places / TILE);
+    let stride = stride(lighting.plan.architecture, tiles);
     if paths.with.at_once {
         let push = path_at_once::Push { places, stride };
         let groups = rows_of(places.div_ceil(PATHS_IN_GROUP));
         let bind = path_at_once::Bind { radiance };
         return frame.compute("paths at once", &bind, &path_at_once::Constants { library }, &push, groups);
     }
-    frame.copy_buffer("reset queue size", &paths.first_size, &paths.sizes[0], SIZE_BYTES);
-    let bind = path_begin::Bind { path_state: paths.state(), queue: &paths.queues[0] };
+    let queue = match &paths.form {
+        Form::Pairs(pairs) => pairs.first(frame),
+        Form::Steps(steps) => steps.first(frame),
+    };
+    let bind = path_begin::Bind { path_state: paths.states.bind(), queue };
     let push = path_begin::Push { places, stride };
     frame.compute("camera rays", &bind, &path_begin::Constants { library }, &push, rows_of(tiles))?;
-    for bounce in 0..interfaces + 1 {
-        let [from, to] = if bounce % 2 == 0 { [0, 1] } else { [1, 0] };
-        let sizes = &paths.sizes[from];
-        let bind = path::Bind { path_state: paths.state(), radiance, queue: &paths.queues[from], sizes };
-        let push = path::Push { width: paths.width };
-        frame.compute_indirect("paths", &bind, &path::Constants { library }, &push, sizes, 0)?;
-        if bounce < interfaces {
-            compact(frame, paths, from, to)?;
-        }
+    match &paths.form {
+        Form::Pairs(pairs) => pairs.bounces(frame, lighting, &paths.states, radiance),
+        Form::Steps(steps) => steps.bounces(frame, lighting, &paths.states, (radiance, stride)),
     }
-    Ok(())
-}
-
-/// Stream compaction: the next queue holds the paths that are not terminated, in the same order. Three dispatches:
-/// count per chunk, prefix sum (scan) over the chunks, scatter.
-fn compact<'a>(frame: &mut Frame<'a>, paths: &'a PathsOnDevice, from: usize, to: usize) -> Result<()> {
-    let (queue, sizes, chunks) = (&paths.queues[from], &paths.sizes[from], &paths.chunks);
-    let bind = queue_count::Bind { queue, sizes, chunks };
-    frame.compute_indirect("queue count", &bind, &queue_count::Constants {}, &(), sizes, CHUNKS_AT)?;
-    let bind = queue_scan::Bind { sizes, chunks, next_sizes: &paths.sizes[to] };
-    frame.compute("queue prefix sum", &bind, &queue_scan::Constants {}, &(), [1, 1, 1])?;
-    let bind = queue_next::Bind { queue, sizes, chunks, next_queue: &paths.queues[to] };
-    frame.compute_indirect("queue scatter", &bind, &queue_next::Constants {}, &(), sizes, CHUNKS_AT)
 }

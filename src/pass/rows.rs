@@ -1,5 +1,6 @@
 //! Dispatch sizes for lists of tiles, and shares of a picture's tiles.
 
+use crate::plan::Architecture;
 use crate::shader::lib::work_tile::{ROW, WORK_TILE};
 
 /// A share of the picture: every `of`-th tile of 8x8 pixels, in row order, from tile `index` on. Neighbouring tiles
@@ -36,13 +37,17 @@ pub fn rows_of(count: u32) -> [u32; 3] {
     [count.min(ROW), count.div_ceil(ROW), 1]
 }
 
-/// Stride in which `count` workgroups visit the tiles of a picture, modulo `count`: lavapipe gives each of its threads
-/// one contiguous piece of a dispatch, and expensive pixels are often in one part of the picture.
+/// Stride in which `count` workgroups visit the tiles of a picture, modulo `count`.
 ///
-/// The stride is about `count` times the golden section, which spreads any number of workgroups evenly. It is coprime
-/// to `count`, so every tile is visited once, and its product with any index fits 32 bits.
+/// Workgroups of a GPU that run together share caches: neighbours take neighbouring tiles. A CPU (lavapipe) gives each
+/// of its threads one contiguous piece of a dispatch, and expensive pixels are often in one part of the picture: the
+/// stride is about `count` times the golden section, which spreads any number of workgroups evenly. It is coprime to
+/// `count`, so every tile is visited once, and its product with any index fits 32 bits.
 #[must_use]
-pub fn stride(count: u32) -> u32 {
+pub fn stride(architecture: Architecture, count: u32) -> u32 {
+    if architecture == Architecture::Gpu {
+        return 1;
+    }
     let gcd = |mut a: u32, mut b: u32| {
         while b != 0 {
             (a, b) = (b, a % b);
@@ -61,7 +66,7 @@ mod tests {
     #[test]
     fn strides_reach_every_workgroup_and_any_piece_is_from_everywhere() {
         for count in [1, 2, 3, 4, 6, 12, 30, 225, 900, 2310, 8160, 65_536] {
-            let place = |turn: u32| turn.checked_mul(stride(count)).expect("32 bits") % count;
+            let place = |turn: u32| turn.checked_mul(stride(Architecture::Cpu, count)).expect("32 bits") % count;
             let mut places: Vec<u32> = (0..count).map(place).collect();
             // A half of the first half of the workgroups lies in each half of the picture: the discrepancy of the
             // golden section grows with the logarithm.

@@ -6,9 +6,11 @@
 //! planner ─► left_out ─► surfaces ─► facts ─► effect ─► choice, effect_id
 //!    │                       │                  ▲              ▲
 //!    └───────────────────────┴──► work ─────────┴─► knobs ─────┘
+//!                                 └─► architecture
 //! ```
 
 mod ability;
+mod architecture;
 mod choice;
 mod effect;
 mod facts;
@@ -20,6 +22,7 @@ mod surfaces;
 mod work;
 
 pub use ability::Ability;
+pub use architecture::Architecture;
 pub use choice::Choice;
 pub use effect::{Effect, EffectState, Evidence, ForcedEffects};
 pub use facts::{Facts, Surroundings};

@@ -2,6 +2,7 @@
 //!
 //! Read docs/plan.md. The input is a scene in canonical form with its facts; the output is a [`Plan`].
 
+use super::architecture::Architecture;
 use super::effect::{Cause, Decisions, ForcedEffects, Verdict};
 use super::facts::{Facts, Surroundings};
 use super::knobs::Knobs;
@@ -87,6 +88,7 @@ impl Plan {
             bands,
             disperses,
             stored,
+            architecture: Architecture::default(),
             samples: knobs.samples.count(),
             effects: decisions.effects,
             unread: scene.unread.clone(),

@@ -2,6 +2,7 @@
 //!
 //! Read docs/plan.md. Every field turns passes, images or specialization constants on or off.
 
+use super::architecture::Architecture;
 use super::effect::{Effect, EffectState, Evidence, ForcedEffects};
 use super::knobs::Knobs;
 use super::knobs::rungs::{EffectId, Normals, Position, Quadrature};
@@ -69,6 +70,8 @@ pub struct Plan {
     pub disperses: bool,
     /// Encoding of normals and positions in the G-buffer; path tracing does not light from the G-buffer.
     pub stored: Stored,
+    /// The form of the passes, which the renderer chooses for its device.
+    pub architecture: Architecture,
     /// Samples per pixel.
     pub samples: u32,
     /// Every effect with its state and reason.

@@ -7,7 +7,7 @@
 use std::mem::offset_of;
 use std::sync::Arc;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use ash::vk;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -19,12 +19,12 @@ use super::scene::{BENT, cofactors as cofactors_of, medium, texture_bits};
 use super::table::{pack_half_2x16, upload};
 use super::view::View;
 use crate::gpu::{Buffer, Device, Frame, NOTHING, Place};
-use crate::plan::{Plan, Rays};
+use crate::plan::{Architecture, Plan, Rays};
 use crate::prepare::{Hierarchy, Prepared, ray_offset};
 use crate::scene::solid::{Solids, media_at};
 use crate::scene::{AlphaMode, Mesh, Scene, Shared};
 use crate::shader::lib;
-use crate::shader::lib::trace::{FILTER, LINKS_16, LINKS_32, OCTANT_LISTS, OPAQUE, STACK};
+use crate::shader::lib::trace::{FILTER, LINKS_16, LINKS_32, OCTANT_LISTS, OPAQUE, STACK, TRACING_LANES};
 use crate::share::{
     self, BvhTriangle, CornerColors, CornerFrame, CornerTangents, CornerUvs, MATERIAL_OF_TRIANGLE, ONE_SIDED_TRIANGLE,
     SHEET_TRIANGLE, TraceTerms, WorkCounts,
@@ -36,6 +36,10 @@ use crate::transport::photon_guiding::PhotonGuiding;
 /// Largest size of the eight octant-ordered node lists in bytes, some two million nodes of 16 bytes: they are eight
 /// copies of the BVH.
 const MOST_ORDERED_BYTES: usize = 256 << 20;
+
+/// Levels of the BVH that traversal with a stack follows: with one word per level and invocation, a workgroup's stacks
+/// fill the 16 KiB of shared memory that every Vulkan device has.
+const MOST_STACKED: u32 = 16_384 / 4 / TRACING_LANES;
 
 /// The BVH traversal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -82,8 +86,8 @@ pub struct TraceConstants {
     pub traversal: u32,
     /// Whether nearest-hit rays use octant-ordered node lists.
     pub octants: bool,
-    /// Entries of the traversal stack.
-    pub stack_size: u32,
+    /// Words of the traversal stacks of a workgroup.
+    pub stack_words: u32,
     /// Vertex attributes and texture slots that ray hits read.
     pub hit: lib::hit::Constants,
     /// [`BvhFacts::touching`].
@@ -93,7 +97,7 @@ pub struct TraceConstants {
 impl Default for TraceConstants {
     /// Constants of shaders that send no rays.
     fn default() -> Self {
-        Self { traversal: 0, octants: false, stack_size: 1, hit: lib::hit::Constants::default(), touching: false }
+        Self { traversal: 0, octants: false, stack_words: 1, hit: lib::hit::Constants::default(), touching: false }
     }
 }
 
@@ -141,11 +145,15 @@ impl RaysOnDevice {
         };
         let &Hierarchy { ref bvh, build_ms, offset, touching, .. } = hierarchy;
         let start = std::time::Instant::now();
-        // The traversal: without a stack where the driver limits loops, with 16-bit boxes where these are precise
-        // enough.
+        // The traversal: with a stack on GPUs, where it is small enough; 16-bit boxes where these are precise enough.
         let by_links = if bvh.fits_grid() { Traversal::Links16 } else { Traversal::Links32 };
-        let default = if device.limits_loops() { by_links } else { Traversal::Stack };
+        let stacks = plan.architecture == Architecture::Gpu && bvh.depth <= MOST_STACKED;
+        let default = if stacks { Traversal::Stack } else { by_links };
         let traversal = traversal.unwrap_or(default);
+        if traversal == Traversal::Stack && bvh.depth > MOST_STACKED {
+            let (name, depth) = (&scene.name, bvh.depth);
+            bail!("{name}: traversal with a stack follows at most {MOST_STACKED} levels of the BVH, it has {depth}");
+        }
         let format = if traversal == Traversal::Links32 { Format::Float } else { Format::Quantised };
         // One node list per octant of directions is front to back for every ray, as long as eight copies of the BVH are
         // small.
@@ -221,7 +229,7 @@ impl RaysOnDevice {
             constants: TraceConstants {
                 traversal: traversal as u32,
                 octants,
-                stack_size: if traversal == Traversal::Stack { bvh.depth + 1 } else { 1 },
+                stack_words: if traversal == Traversal::Stack { bvh.depth.max(1) * TRACING_LANES } else { 1 },
                 hit: corners.contents,
                 touching,
             },

@@ -189,7 +189,7 @@ impl<'a> OnDevice<'a> {
             trace: lib::trace::Constants {
                 traversal: rays.constants.traversal,
                 octants: rays.constants.octants,
-                stack_size: rays.constants.stack_size,
+                stack_words: rays.constants.stack_words,
             },
         }
     }

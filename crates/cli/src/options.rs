@@ -586,6 +586,7 @@ impl PictureOptions {
             seed: self.seed,
             max_error: self.max_error,
             paths_at_once: false,
+            architecture: None,
             traversal: None,
             forced: self.plan.forced(),
             parts: Vec::new(),

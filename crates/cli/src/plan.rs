@@ -10,7 +10,7 @@ use clap::Args;
 use comfy_table::{ContentArrangement, Table, presets};
 
 use super::options::{DeviceOptions, PictureOptions, PlanExtent as Planned, SceneOptions};
-use super::report::{Expected, PlanFacts};
+use super::report::{Expected, PipelineFact, PlanFacts};
 use super::setup::{self, Setup};
 use super::{extensions, heading, print, usage};
 use etalon::frame::{Renderer, Settings};
@@ -263,6 +263,21 @@ fn forecast_table(predictions: &[Prediction]) -> Table {
     all
 }
 
+/// Table of what the driver's compiler made of each pipeline; empty where the driver does not tell.
+fn footprints(pipelines: &[PipelineFact]) -> String {
+    let mut all = table(&["program", "stage", "registers", "spilled", "scratch B", "shared B", "code KB", "subgroups"]);
+    for pipeline in pipelines {
+        for compiled in &pipeline.compiled {
+            let Some(of) = compiled.footprint() else { continue };
+            let figures =
+                [of.registers, of.spilled, of.scratch_bytes, of.shared_bytes, of.code_bytes / 1024, of.subgroups];
+            let names = [pipeline.name.to_owned(), compiled.stage.clone()];
+            all.add_row(names.into_iter().chain(figures.map(|figure| figure.to_string())));
+        }
+    }
+    if all.is_empty() { String::new() } else { format!("{all}\n\n") }
+}
+
 /// The plan in words. `whole` lists also what the scene does not need.
 fn text(facts: &PlanFacts, whole: bool) -> String {
     let mut effects = table(&["effect", "state", "rung", "pixels", "reason"]);
@@ -282,7 +297,7 @@ fn text(facts: &PlanFacts, whole: bool) -> String {
     for (name, (count, bytes)) in &programs {
         pipelines.add_row([(*name).to_owned(), count.to_string(), format!("{:.1}", *bytes as f64 / 1e3)]);
     }
-    let pipelines = if whole { format!("{pipelines}\n\n") } else { String::new() };
+    let pipelines = if whole { format!("{pipelines}\n\n{}", footprints(&facts.pipelines)) } else { String::new() };
     let (bytes, rounds) = facts.expected.as_ref().map_or((0, 0), |expected| (expected.bytes, expected.ray_rounds));
     let spirv: usize = facts.pipelines.iter().map(|pipeline| pipeline.spirv_bytes).sum();
     let loses: String = facts

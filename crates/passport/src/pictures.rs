@@ -9,7 +9,7 @@ use etalon::frame::{Rendered, Settings};
 use etalon::gpu::{Device, DeviceChoice};
 use etalon::image::{Picture, file};
 use etalon::open::Opened;
-use etalon::plan::{Knobs, Model};
+use etalon::plan::{Architecture, Knobs, Model};
 use etalon::upload::rays::Traversal;
 use serde::{Deserialize, Serialize};
 
@@ -149,6 +149,10 @@ fn ways(device: &Arc<Device>, scene: &str, size: [u32; 2]) -> Result<Vec<SamePic
             &shot(device, scene, Settings { paths_at_once: true, ..usual.clone() })?.film,
         ),
     ];
+    for architecture in [Architecture::Cpu, Architecture::Gpu] {
+        let other = Settings { architecture: Some(architecture), ..usual.clone() };
+        found.push(beside(&format!("passes for {architecture:?}s"), &shot(device, scene, other)?.film));
+    }
     for traversal in [Traversal::Links16, Traversal::Links32, Traversal::Stack] {
         let other = Settings { traversal: Some(traversal), ..usual.clone() };
         found.push(beside(&format!("traversal {traversal:?}"), &shot(device, scene, other)?.film));

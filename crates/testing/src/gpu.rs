@@ -37,6 +37,14 @@ impl Gpu {
         Self::opened(place, Device::open)
     }
 
+    /// The first device whose driver reports what its compiler makes of pipelines, with validation; `None` where there
+    /// is none. It may draw nothing: Mesa's RADV compiles without a GPU (docs/decisions/architectures.md).
+    pub fn that_tells_compiled() -> Option<Self> {
+        let place = Place::Shared { _guard: PLACES.read().unwrap_or_else(PoisonError::into_inner) };
+        let device = Device::open(&DeviceChoice::Best, true).ok().filter(|device| device.tells_compiled())?;
+        Some(Self { device, expects_errors: false, _place: place })
+    }
+
     /// [`Gpu::open`] for exclusive use in this program: for tests that count created objects, or that expect errors.
     pub fn alone() -> Self {
         let place = Place::Own { _guard: PLACES.write().unwrap_or_else(PoisonError::into_inner) };

@@ -21,6 +21,39 @@ pub struct Compiled {
     pub figures: BTreeMap<String, f64>,
 }
 
+/// What an executable takes of the machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Footprint {
+    /// Vector registers of an invocation.
+    pub registers: u64,
+    /// Vector registers of a subgroup that the compiler keeps in memory for want of registers (spills).
+    pub spilled: u64,
+    /// Bytes of memory of a subgroup: arrays of the shader, and spills.
+    pub scratch_bytes: u64,
+    /// Bytes of shared memory of a workgroup.
+    pub shared_bytes: u64,
+    /// Bytes of machine code.
+    pub code_bytes: u64,
+    /// Subgroups that a SIMD unit runs at once (occupancy).
+    pub subgroups: u64,
+}
+
+impl Compiled {
+    /// The footprint, by the names that RADV gives its statistics; `None` for another driver's.
+    #[must_use]
+    pub fn footprint(&self) -> Option<Footprint> {
+        let figure = |name: &str| self.figures.get(name).map(|&figure| figure as u64);
+        Some(Footprint {
+            registers: figure("VGPRs")?,
+            spilled: figure("Spilled VGPRs")?,
+            scratch_bytes: figure("Scratch size")?,
+            shared_bytes: figure("LDS size")?,
+            code_bytes: figure("Code size")?,
+            subgroups: figure("Subgroups per SIMD")?,
+        })
+    }
+}
+
 /// A statistic as a number; `true` is 1.
 fn number(figure: &vk::PipelineExecutableStatisticKHR<'_>) -> f64 {
     use vk::PipelineExecutableStatisticFormatKHR as Format;

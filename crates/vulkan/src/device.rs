@@ -555,7 +555,8 @@ impl Device {
     }
 
     /// Whether the device is the CPU: its memory is the process's own.
-    pub(super) fn is_software(&self) -> bool {
+    #[must_use]
+    pub fn is_software(&self) -> bool {
         self.info.kind == "cpu"
     }
 

@@ -45,7 +45,7 @@ pub use bind::{Bindings, Resource, Sampled};
 pub use cache::SamplerDesc;
 pub use capabilities::Capabilities;
 pub use choice::DeviceChoice;
-pub use compiled::Compiled;
+pub use compiled::{Compiled, Footprint};
 pub use device::{Candidate, Created, Device, DeviceInfo, Message, Severity, candidates, is_lost};
 pub use error::{NotOpened, TooLarge};
 pub use float_controls::with_float_controls;

@@ -8,8 +8,9 @@ pub const PUSH_DESCRIPTORS: u32 = 12;
 pub const STORAGE_IMAGES: u32 = 16;
 /// Storage buffers in one shader stage.
 pub const STORAGE_BUFFERS: u32 = 16;
-/// Storage buffers in one shader stage where lookup tables are storage buffers (`tables.rs`).
-pub const STORAGE_BUFFERS_AND_TABLES: u32 = 24;
+/// Storage buffers in one shader stage where lookup tables are storage buffers (`tables.rs`). Vulkan's Roadmap 2022
+/// profile has 30.
+pub const STORAGE_BUFFERS_AND_TABLES: u32 = 28;
 /// Colour attachments of a raster pass.
 pub const COLOR_TARGETS: u32 = 7;
 /// Texels that a texel buffer must hold for lookup tables to be texel buffers: a picture's depths, textures of a small

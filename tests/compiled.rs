@@ -1,0 +1,89 @@
+//! What a driver's compiler makes of the kernels of all study scenes: no register is spilled, and every figure is within
+//! a tenth of the one in tests/compiled.json.
+//!
+//! It runs where a driver reports such figures; Mesa's RADV does, also without a GPU
+//! (docs/decisions/architectures.md). `ETALON_BLESS=1` writes the figures of the device into the file.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use etalon::frame::{Renderer, Settings};
+use etalon::gpu::{Compiled, Footprint};
+use etalon::plan::{Knobs, Model};
+use etalon::scene::environment::Environment;
+use etalon::study;
+use etalon_testing::gpu::Gpu;
+
+/// The largest figure of each kind over all scenes and models, of subgroups the smallest; by program and stage.
+type Figures = BTreeMap<String, Footprint>;
+
+fn joined(a: Footprint, b: Footprint) -> Footprint {
+    Footprint {
+        registers: a.registers.max(b.registers),
+        spilled: a.spilled.max(b.spilled),
+        scratch_bytes: a.scratch_bytes.max(b.scratch_bytes),
+        shared_bytes: a.shared_bytes.max(b.shared_bytes),
+        code_bytes: a.code_bytes.max(b.code_bytes),
+        subgroups: a.subgroups.min(b.subgroups),
+    }
+}
+
+fn figures(gpu: &Gpu) -> Figures {
+    let mut all = Figures::new();
+    let studio = Environment::studio();
+    for name in study::NAMES {
+        let scene = study::load(name).expect("a scene");
+        let share = scene.studio.or(scene.lights.is_empty().then_some(1.0));
+        for model in [Model::Local, Model::Recursive, Model::Global] {
+            let settings = Settings {
+                size: [320, 180],
+                knobs: Knobs::of(model),
+                environment_intensity: share.unwrap_or(1.0),
+                ..Settings::default()
+            };
+            let environment = share.map(|_| &studio);
+            let mut renderer = Renderer::new(&gpu.device, scene.clone(), environment, settings).expect("a renderer");
+            let passes = renderer.passes(&scene.cameras[0]).expect("passes");
+            for (program, constants) in passes.iter().flat_map(|pass| &pass.pipelines) {
+                for compiled in gpu.device.compiled(program, constants).expect("statistics") {
+                    let Some(of) = Compiled::footprint(&compiled) else { continue };
+                    let name = format!("{} {}", program.name, compiled.stage);
+                    all.entry(name).and_modify(|known| *known = joined(*known, of)).or_insert(of);
+                }
+            }
+        }
+    }
+    all
+}
+
+#[test]
+fn compiled_kernels_are_as_they_were() {
+    let Some(gpu) = Gpu::that_tells_compiled() else {
+        eprintln!("skipped: no driver here reports what its compiler made");
+        return;
+    };
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/compiled.json");
+    let text = std::fs::read_to_string(&path).expect("tests/compiled.json");
+    let mut known: BTreeMap<String, Figures> = serde_json::from_str(&text).expect("figures");
+    let (device, now) = (gpu.device.info().name.clone(), figures(&gpu));
+    let spilled: Vec<_> = now.iter().filter(|(_, of)| of.spilled > 0).collect();
+    assert!(spilled.is_empty(), "{device}: registers spilled: {spilled:#?}");
+    if std::env::var_os("ETALON_BLESS").is_some() {
+        known.insert(device, now);
+        std::fs::write(&path, serde_json::to_string_pretty(&known).expect("JSON") + "\n").expect("a written file");
+        return;
+    }
+    let Some(before) = known.get(&device) else {
+        eprintln!("skipped: tests/compiled.json has no figures of {device}");
+        return;
+    };
+    assert_eq!(before.keys().collect::<Vec<_>>(), now.keys().collect::<Vec<_>>(), "programs of {device}");
+    for (name, of) in before {
+        let words = |of: &Footprint| {
+            [of.registers, of.scratch_bytes, of.shared_bytes, of.code_bytes, of.subgroups].map(|word| word as f64)
+        };
+        for (a, b) in words(of).into_iter().zip(words(&now[name])) {
+            assert!((a - b).abs() <= 0.1 * a, "{device}: {name} was {of:?} and is {:?}", now[name]);
+        }
+    }
+}
