@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use etalon::frame::Settings;
 use etalon::gpu::Interrupted;
-use etalon::plan::{Knobs, Model};
+use etalon::plan::{Architecture, Knobs, Model};
 use etalon::scene::environment::Environment;
 use etalon::study;
 use etalon_testing::gpu::{Gpu, bits};
@@ -91,4 +91,33 @@ fn what_is_interrupted_goes_on() {
         assert!(bits(&renderer.film().expect("a film")) == whole, "another picture after {} ms", 3 * i);
     }
     assert!(interruptions > 4, "{interruptions} of 12");
+}
+
+/// Passes of known and short times are submitted together: a sample of paths has some hundred passes, and the host waits
+/// for it a few times.
+#[test]
+fn short_passes_share_submissions() {
+    let gpu = Gpu::time_sliced();
+    let scene = study::load("cornell").expect("a scene");
+    for architecture in [Architecture::Cpu, Architecture::Gpu] {
+        let settings = Settings {
+            size: [16, 9],
+            knobs: Knobs::of(Model::Global),
+            architecture: Some(architecture),
+            ..Settings::default()
+        };
+        let mut renderer = gpu.renderer(&scene, None, settings);
+        let passes = renderer.passes(&scene.cameras[0]).expect("passes").len();
+        let mut drawing = renderer.begin(&scene.cameras[0], 64);
+        let mut turns = Vec::new();
+        for _ in 0..16 {
+            let before = gpu.device.turns();
+            renderer.step(&mut drawing).expect("a sample");
+            turns.push(gpu.device.turns() - before);
+        }
+        let first = turns[0];
+        turns.sort_unstable();
+        assert!(passes > 90 && first > 60, "{passes} passes, {first} submissions of the first sample");
+        assert!(turns[8] <= 4, "submissions of {architecture:?}'s samples: {turns:?}");
+    }
 }

@@ -34,5 +34,5 @@ pub fn ambient<'a>(
     // Rays start on the triangles. Lights with shadow maps are looked up from depth, whether or not there is this pass.
     library.gbuffer.stored_triangles = true;
     let constants = ambient::Constants { library };
-    frame.compute_indirect("ambient occlusion", &bind, &constants, &(), &work.sizes, 0)
+    frame.compute_indirect("ambient occlusion", &bind, &constants, &(), work.surface_groups())
 }

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 
-use super::classify::{WORK_BYTES, WorkLists};
+use super::classify::WorkLists;
 use super::gbuffer::GBuffer;
 use super::lighting::Lighting;
 use crate::gpu::{Frame, Image};
@@ -22,5 +22,5 @@ pub fn background<'a>(
     let bind =
         background::Bind { gbuffer: gbuffer.bind(), radiance, background_tiles: &work.background, work: &work.sizes };
     let constants = background::Constants { library: lighting.library };
-    frame.compute_indirect("background", &bind, &constants, &(), &work.sizes, WORK_BYTES)
+    frame.compute_indirect("background", &bind, &constants, &(), work.background_groups())
 }

@@ -11,7 +11,7 @@ use anyhow::Result;
 use super::gbuffer::GBuffer;
 use super::lighting::Lighting;
 use super::rows::{TileShare, rows_of, stride};
-use crate::gpu::{Buffer, Device, Frame, Image, NOTHING, Place};
+use crate::gpu::{Buffer, Device, Frame, Image, IndirectGroups, NOTHING, Place};
 use crate::plan::{Architecture, Plan};
 use crate::shader::{Library, classify, classify_fragments, classify_rays as ray_program, lib};
 use crate::share::WorkSize;
@@ -36,6 +36,12 @@ pub struct FragmentTiles {
 }
 
 impl FragmentTiles {
+    /// One workgroup for each listed tile.
+    #[must_use]
+    pub fn groups(&self) -> IndirectGroups<'_> {
+        IndirectGroups { sizes: &self.sizes, offset: 0, most: self.tiles.bytes() / 4 }
+    }
+
     /// A list for a picture of `size` pixels.
     ///
     /// # Errors
@@ -84,6 +90,18 @@ pub struct WorkLists {
 }
 
 impl WorkLists {
+    /// One workgroup for each tile with surfaces.
+    #[must_use]
+    pub fn surface_groups(&self) -> IndirectGroups<'_> {
+        IndirectGroups { sizes: &self.sizes, offset: 0, most: u64::from(self.tiles) }
+    }
+
+    /// One workgroup for each tile with background.
+    #[must_use]
+    pub fn background_groups(&self) -> IndirectGroups<'_> {
+        IndirectGroups { sizes: &self.sizes, offset: WORK_BYTES, most: u64::from(self.tiles) }
+    }
+
     /// Lists for a share of a picture of `size` pixels.
     ///
     /// # Errors
@@ -142,6 +160,12 @@ pub struct RayTiles {
 }
 
 impl RayTiles {
+    /// One workgroup for each listed tile.
+    #[must_use]
+    pub fn groups(&self) -> IndirectGroups<'_> {
+        IndirectGroups { sizes: &self.sizes, offset: 0, most: self.tiles.bytes() / 4 }
+    }
+
     /// A list for a picture of `size` pixels; dummies where no pass of the plan uses it.
     ///
     /// # Errors

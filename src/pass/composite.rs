@@ -66,5 +66,5 @@ pub fn composite<'a>(
         work: &lists.work.sizes,
     };
     let push = composite::Push { end_row: rows[1] };
-    frame.compute_indirect(&name, &bind, &constants, &push, &lists.work.sizes, 0)
+    frame.compute_indirect(&name, &bind, &constants, &push, lists.work.groups())
 }

@@ -57,5 +57,5 @@ pub fn interact<'a>(
         ray_tiles: &tiles.tiles,
         work: &tiles.sizes,
     };
-    frame.compute_indirect(&name, &bind, &constants, &(), &tiles.sizes, 0)
+    frame.compute_indirect(&name, &bind, &constants, &(), tiles.groups())
 }

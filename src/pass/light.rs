@@ -44,7 +44,7 @@ pub fn light<'a>(
     };
     for (index, range) in lighting.ranges().into_iter().enumerate() {
         let push = light::Push { range, first_dispatch: u32::from(index == 0) };
-        frame.compute_indirect("lighting", &bind, &constants, &push, &work.sizes, 0)?;
+        frame.compute_indirect("lighting", &bind, &constants, &push, work.surface_groups())?;
     }
     Ok(())
 }

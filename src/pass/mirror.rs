@@ -37,5 +37,5 @@ pub fn mirror<'a>(
         work: &tiles.sizes,
     };
     let constants = mirror::Constants { library };
-    frame.compute_indirect("screen-space reflection", &bind, &constants, &(), &tiles.sizes, 0)
+    frame.compute_indirect("screen-space reflection", &bind, &constants, &(), tiles.groups())
 }

@@ -10,7 +10,7 @@ use anyhow::Result;
 use super::lighting::Lighting;
 use super::path_states::{PathStates, words};
 use super::rows::rows_of;
-use crate::gpu::{Buffer, Device, Frame, Image, Place};
+use crate::gpu::{Buffer, Device, Frame, Image, IndirectGroups, Place};
 use crate::shader::lib::queue::{CHUNK, PATHS_IN_GROUP};
 use crate::shader::{path, queue_count, queue_next, queue_scan};
 use crate::share::{QueueSize, WorkSize};
@@ -65,10 +65,11 @@ impl PathPairs {
         for bounce in 0..interfaces + 1 {
             let [from, to] = if bounce % 2 == 0 { [0, 1] } else { [1, 0] };
             let (queue, sizes) = (&self.queues[from], &self.sizes[from]);
+            let groups = IndirectGroups { sizes, offset: 0, most: u64::from(states.places.div_ceil(PATHS_IN_GROUP)) };
             let bind = path::Bind { path_state: states.bind(), radiance, queue, sizes };
-            frame.compute_indirect("paths", &bind, &path::Constants { library }, &path::Push { width }, sizes, 0)?;
+            frame.compute_indirect("paths", &bind, &path::Constants { library }, &path::Push { width }, groups)?;
             if bounce < interfaces {
-                self.compact(frame, from, to)?;
+                self.compact(frame, states.places, from, to)?;
             }
         }
         Ok(())
@@ -76,13 +77,15 @@ impl PathPairs {
 
     /// Stream compaction: the next queue holds the paths that are not terminated, in the same order. Three dispatches:
     /// count per chunk, prefix sum (scan) over the chunks, scatter.
-    fn compact<'a>(&'a self, frame: &mut Frame<'a>, from: usize, to: usize) -> Result<()> {
+    fn compact<'a>(&'a self, frame: &mut Frame<'a>, places: u32, from: usize, to: usize) -> Result<()> {
         let (queue, sizes, chunks) = (&self.queues[from], &self.sizes[from], &self.chunks);
+        let chunk_groups = places.div_ceil(CHUNK).div_ceil(queue_count::PROGRAM.local_size[0]);
+        let groups = IndirectGroups { sizes, offset: CHUNKS_AT, most: u64::from(chunk_groups) };
         let bind = queue_count::Bind { queue, sizes, chunks };
-        frame.compute_indirect("queue count", &bind, &queue_count::Constants {}, &(), sizes, CHUNKS_AT)?;
+        frame.compute_indirect("queue count", &bind, &queue_count::Constants {}, &(), groups)?;
         let bind = queue_scan::Bind { sizes, chunks, next_sizes: &self.sizes[to] };
         frame.compute("queue prefix sum", &bind, &queue_scan::Constants {}, &(), [1, 1, 1])?;
         let bind = queue_next::Bind { queue, sizes, chunks, next_queue: &self.queues[to] };
-        frame.compute_indirect("queue scatter", &bind, &queue_next::Constants {}, &(), sizes, CHUNKS_AT)
+        frame.compute_indirect("queue scatter", &bind, &queue_next::Constants {}, &(), groups)
     }
 }

@@ -11,7 +11,7 @@ use super::classify::{EMPTY, WORK_BYTES};
 use super::lighting::Lighting;
 use super::path_states::{PathStates, words};
 use super::rows::rows_of;
-use crate::gpu::{Buffer, Device, Frame, Image, Place};
+use crate::gpu::{Buffer, Device, Frame, Image, IndirectGroups, Place};
 use crate::plan::Rays;
 use crate::shader::lib::path_wavefront::STEP_GROUP;
 use crate::shader::{lib, path_end, path_extend, path_shade, path_shadow};
@@ -69,13 +69,14 @@ impl PathSteps {
             lib::path_shadow_ray::Bind { shadow_directions, shadow_contributions, shadow_media }
         };
         for bounce in 0..interfaces + 1 {
-            let at = u64::from(bounce) * WORK_BYTES;
+            let offset = u64::from(bounce) * WORK_BYTES;
+            let groups = IndirectGroups { sizes: &self.sizes, offset, most: u64::from(places.div_ceil(STEP_GROUP)) };
             let (bind, constants, push) = (
                 path_extend::Bind { path_state: states.bind(), path_wavefront: wavefront() },
                 path_extend::Constants { library },
                 path_extend::Push { width, places, bounce },
             );
-            frame.compute_indirect("extend paths", &bind, &constants, &push, &self.sizes, at)?;
+            frame.compute_indirect("extend paths", &bind, &constants, &push, groups)?;
             let (bind, constants, push) = (
                 path_shade::Bind {
                     path_state: states.bind(),
@@ -85,7 +86,7 @@ impl PathSteps {
                 path_shade::Constants { library },
                 path_shade::Push { width, places, bounce },
             );
-            frame.compute_indirect("shade paths", &bind, &constants, &push, &self.sizes, at)?;
+            frame.compute_indirect("shade paths", &bind, &constants, &push, groups)?;
             if library.emitters.emitters == 0 {
                 continue;
             }
@@ -98,7 +99,7 @@ impl PathSteps {
                 path_shadow::Constants { library },
                 path_shadow::Push { width, places, bounce },
             );
-            frame.compute_indirect("shadow rays", &bind, &constants, &push, &self.sizes, at)?;
+            frame.compute_indirect("shadow rays", &bind, &constants, &push, groups)?;
         }
         let bind = path_end::Bind { path_state: states.bind(), radiance };
         let push = path_end::Push { places, stride };

@@ -407,6 +407,7 @@ impl Device {
     ) -> Result<Arc<Self>> {
         let Candidate { info, physical, offers, is_lavapipe, .. } = choose(instance.candidates(surface)?, choice)?;
         let opening = || format!("opening device \"{}\"", info.name);
+        let is_software = info.kind == "cpu";
         // SAFETY: plain queries on a live instance.
         let (families, properties, extensions) = unsafe {
             (
@@ -509,7 +510,7 @@ impl Device {
             physical,
             #[cfg(feature = "window")]
             family,
-            time_slices: SliceTimes::new(time_slices),
+            time_slices: SliceTimes::new(time_slices, is_software),
             instance,
         });
         Ok(device)
@@ -607,7 +608,7 @@ impl Device {
     pub(super) fn note(&self, kind: &'static str, name: &str, bytes: u64) {
         self.objects.fetch_add(1, Ordering::Relaxed);
         // A window runs for hours: a list of every created object would grow without bound.
-        if self.time_slices.taken {
+        if self.time_slices.beside_window {
             return;
         }
         lock(&self.created).push(Created { kind, name: name.to_owned(), bytes });

@@ -19,7 +19,7 @@ use super::device::{Device, lock};
 use super::memory::{Buffer, Image};
 use super::pace::Interrupted;
 use super::recording::{
-    Dispatch, Groups, Own, Pass, RecordedWork, Recording, Target, bind_own, bind_sets, push_constants,
+    Dispatch, Groups, IndirectGroups, Own, Pass, RecordedWork, Recording, Target, bind_own, bind_sets, push_constants,
 };
 use super::set::{BoundSet, Pooled};
 use super::shader::{Program, SharedSet, Specialization as _};
@@ -240,7 +240,7 @@ impl<'a> Frame<'a> {
         self.dispatch(name, bindings, constants, push, Groups::Count(groups))
     }
 
-    /// One indirect dispatch; its three workgroup counts are at `offset` bytes of `sizes`.
+    /// One indirect dispatch of these workgroups.
     ///
     /// # Errors
     /// As [`Frame::compute`].
@@ -250,10 +250,9 @@ impl<'a> Frame<'a> {
         bindings: &B,
         constants: &B::Constants,
         push: &B::Push,
-        sizes: &'a Buffer,
-        offset: u64,
+        groups: IndirectGroups<'a>,
     ) -> Result<()> {
-        self.dispatch(name, bindings, constants, push, Groups::At(sizes, offset))
+        self.dispatch(name, bindings, constants, push, Groups::Indirect(groups))
     }
 
     fn dispatch<B: Bindings<'a>>(
@@ -268,7 +267,7 @@ impl<'a> Frame<'a> {
         let mut uses = Vec::new();
         let own = self.bind(&mut uses, program, &bindings.resources(), None)?;
         let sets = self.shared(&mut uses, program, None);
-        if let Groups::At(sizes, _) = groups {
+        if let Groups::Indirect(IndirectGroups { sizes, .. }) = groups {
             self.use_buffer(&mut uses, sizes, Access::IndirectRead, vk::ShaderStageFlags::empty());
         }
         let layout = self.device.layout(program)?;
@@ -574,7 +573,7 @@ impl<'a> Frame<'a> {
         let names: Vec<String> = passes.iter().map(|pass| pass.name.clone()).collect();
         let wanted: Vec<PipelineKey> = passes.iter().flat_map(|pass| pass.pipelines.clone()).collect();
         let keys: Vec<&PipelineKey> = wanted.iter().collect();
-        let count = if device.time_slices.taken { 2 } else { 2 * passes.len() as u32 };
+        let count = 2 * passes.len() as u32;
         let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(count.max(1));
         // SAFETY: command buffers are recorded here, submitted once, and waited for before anything is freed. Every
         // handle in them is borrowed for `'a`, which ends after this function.
@@ -587,7 +586,7 @@ impl<'a> Frame<'a> {
                 let (device, from, targets) = (&device, *from, &targets);
                 let begun = &begun;
                 let recording = Recording { device, from, targets, pipelines, queries, without_barriers, begun };
-                if device.time_slices.taken {
+                if device.time_slices.slice_ms.is_some() {
                     recording.in_turns(passes, &barriers)
                 } else {
                     recording.at_once(passes, &barriers)

@@ -57,6 +57,7 @@ pub use pace::Interrupted;
 #[cfg(feature = "window")]
 pub use present::{Overlay, PlacedPicture, Presented, Presenter};
 pub use primitive_ids::without_primitive_ids;
+pub use recording::IndirectGroups;
 pub use set::{BoundSet, DescriptorSet};
 pub use shader::{
     Binding, BindingKind, Constant, Program, Replacement, SetLayout, SharedSet, Specialization, Stage, VertexInput,

@@ -1,5 +1,4 @@
-//! State of time-sliced submission (`time_slices.rs`): milliseconds per workgroup of each dispatch, and requests to
-//! interrupt.
+//! State of time-sliced submission (`time_slices.rs`): what passes took, and requests to interrupt.
 
 use std::collections::HashMap;
 use std::sync::Mutex;
@@ -7,26 +6,52 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use anyhow::Result;
 
+/// Target duration of a submission beside a window, in milliseconds.
+const BESIDE_WINDOW_MS: f64 = 10.0;
+/// The same without a window: operating systems reset a GPU whose submission takes seconds (2 s on Windows, 10 s with
+/// amdgpu).
+const ALONE_MS: f64 = 100.0;
+
 /// A device's state of time-sliced submission.
 #[derive(Debug)]
 pub(super) struct SliceTimes {
-    /// Whether submission is time-sliced: a window shares the queue, so every submission is short.
-    pub(super) taken: bool,
-    /// Milliseconds per workgroup in the last dispatch of each pass name, under time-sliced submission.
-    pub(super) paces: Mutex<HashMap<String, f64>>,
+    /// Whether a window shares the queue.
+    pub(super) beside_window: bool,
+    /// Target duration of a submission in milliseconds; `None` where a frame is one submission: on a software device
+    /// without a window, which no operating system resets.
+    pub(super) slice_ms: Option<f64>,
+    /// What passes took, by name.
+    pub(super) paces: Mutex<HashMap<String, Pace>>,
     /// Number of dispatches that were split into more than one piece.
     pub(super) cut: AtomicU64,
+    /// Number of submissions that the host waited for.
+    pub(super) turns: AtomicU64,
     /// A caller has requested that the frame be abandoned; it takes effect while `interruptible` is set, too.
     pub(super) interrupted: AtomicBool,
     pub(super) interruptible: AtomicBool,
 }
 
+/// What passes of one name took.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Pace {
+    /// Milliseconds per workgroup of a dispatch, the mean of the last one that had workgroups; 0 before.
+    pub(super) per_group_ms: f64,
+    /// Milliseconds of each occurrence in the last frame that had it.
+    pub(super) last_ms: Vec<f64>,
+}
+
 impl SliceTimes {
-    pub(super) fn new(taken: bool) -> Self {
+    pub(super) fn new(beside_window: bool, is_software: bool) -> Self {
         Self {
-            taken,
+            beside_window,
+            slice_ms: match (beside_window, is_software) {
+                (true, _) => Some(BESIDE_WINDOW_MS),
+                (false, false) => Some(ALONE_MS),
+                (false, true) => None,
+            },
             paces: Mutex::default(),
             cut: AtomicU64::new(0),
+            turns: AtomicU64::new(0),
             interrupted: AtomicBool::new(false),
             interruptible: AtomicBool::new(false),
         }

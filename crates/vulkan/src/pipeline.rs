@@ -270,7 +270,7 @@ impl Device {
         }
         let Some(raster) = &key.raster else {
             let mut flags = self.capture();
-            if self.time_slices.taken {
+            if self.time_slices.slice_ms.is_some() {
                 flags |= vk::PipelineCreateFlags::DISPATCH_BASE;
             }
             let info = vk::ComputePipelineCreateInfo::default().flags(flags).stage(stages[0]).layout(layout);

@@ -80,17 +80,30 @@ impl Dispatch<'_> {
                     device.raw.cmd_dispatch_base(commands, x, y, z, across, down, deep);
                 }
                 (None, Groups::Count([x, y, z])) => device.raw.cmd_dispatch(commands, *x, *y, *z),
-                (None, Groups::At(sizes, offset)) => device.raw.cmd_dispatch_indirect(commands, sizes.raw, *offset),
+                (None, Groups::Indirect(IndirectGroups { sizes, offset, .. })) => {
+                    device.raw.cmd_dispatch_indirect(commands, sizes.raw, *offset);
+                }
             }
         }
     }
 }
 
-/// Number of workgroups: given by the host, or read by an indirect dispatch at an offset in bytes.
+/// Number of workgroups: given by the host, or read by an indirect dispatch.
 #[derive(Clone, Copy)]
 pub(super) enum Groups<'a> {
     Count([u32; 3]),
-    At(&'a Buffer, u64),
+    Indirect(IndirectGroups<'a>),
+}
+
+/// The workgroup counts of an indirect dispatch, which the device has computed.
+#[derive(Clone, Copy)]
+pub struct IndirectGroups<'a> {
+    /// The buffer that holds the three counts.
+    pub sizes: &'a Buffer,
+    /// Their offset in bytes.
+    pub offset: u64,
+    /// The largest number of workgroups that they may ask for.
+    pub most: u64,
 }
 
 /// The resource of a barrier.

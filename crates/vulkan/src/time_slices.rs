@@ -1,25 +1,31 @@
-//! Time-sliced submission: long dispatches are split so that a frame beside a window never blocks the queue for long.
+//! Time-sliced submission: a frame is as few submissions as are short, so that a window's queue is never blocked for long
+//! and no operating system resets a GPU.
 //!
-//! Read the Vulkan specification, chapters Dispatching Commands (`vkCmdDispatchBase`) and Command Buffers. Each pass is
-//! submitted and waited for by itself. A long dispatch is submitted in pieces of workgroups: each piece has as many
-//! groups as would take [`PIECE_MS`] at the measured time per group of the piece before. The host must know the number
-//! of groups, so the arguments of an indirect dispatch are read back first.
+//! Read the Vulkan specification, chapters Dispatching Commands (`vkCmdDispatchBase`) and Command Buffers. Passes whose
+//! time is known are recorded into one submission as long as they take no longer than a slice together, by their times in
+//! the frame before, and no longer than [`LONGEST_MS`] if every indirect dispatch had the most workgroups that it can
+//! have. A pass that is unknown or longer is submitted and waited for by itself; a long dispatch in pieces of workgroups:
+//! each piece has as many groups as would take a slice at the measured time per group of the piece before. The host must
+//! know the number of groups of such a dispatch, so the arguments of an indirect one are read back first.
 
+use std::collections::HashMap;
 use std::sync::atomic::Ordering;
+use std::time::Instant;
 
 use anyhow::{Context as _, Result};
 use ash::vk;
 
 use super::device::{Device, lock};
 use super::memory::{Buffer, Place};
+use super::pace::Pace;
 use super::recording::{
-    ALL, Dispatch, DispatchPiece, Groups, Pass, RecordedWork, Recording, begin, label, record_barriers, submit, wait,
-    write_first_timestamp,
+    ALL, Dispatch, DispatchPiece, Groups, IndirectGroups, Pass, RecordedWork, Recording, begin, label, record_barriers,
+    submit, wait, write_first_timestamp,
 };
 use super::sync::Barrier;
 
-/// Target duration of one submission in milliseconds.
-const PIECE_MS: f64 = 10.0;
+/// Most milliseconds that a submission of whole passes may take.
+const LONGEST_MS: f64 = 200.0;
 /// The first piece of a dispatch with unknown time per group is 1/32 of it.
 const FIRST: u64 = 32;
 /// Largest ratio of the groups of a piece to those of the piece before, which may have been fast by chance.
@@ -45,6 +51,12 @@ impl Device {
         drawn
     }
 
+    /// Number of submissions so far that the host waited for, under time-sliced submission.
+    #[must_use]
+    pub fn turns(&self) -> u64 {
+        self.time_slices.turns.load(Ordering::Relaxed)
+    }
+
     /// Number of dispatches so far that were split into more than one piece.
     #[must_use]
     pub fn cut(&self) -> u64 {
@@ -61,37 +73,239 @@ fn piece(groups: [u32; 3], done: u64, most: u64) -> DispatchPiece {
     DispatchPiece { base: [x, y, z].map(|at| at as u32), count: count.map(|n| n as u32) }
 }
 
+/// Whole passes in one command buffer that is being recorded.
+struct Batch {
+    commands: vk::CommandBuffer,
+    /// Passes in it, by index in the frame.
+    passes: Vec<usize>,
+    expected: Expected,
+}
+
+/// How long a pass will take, in milliseconds.
+#[derive(Clone, Copy, Default)]
+struct Expected {
+    /// As its times in the frame before say.
+    ms: f64,
+    /// If it has the most workgroups, each [`GROWTH`] times as expensive.
+    most_ms: f64,
+}
+
+impl std::ops::Add for Expected {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { ms: self.ms + other.ms, most_ms: self.most_ms + other.most_ms }
+    }
+}
+
+impl Expected {
+    /// The `occurrence`th pass of a name in a frame, by what passes of this name took; `None` where that is unknown.
+    fn of(pass: &Pass<'_>, occurrence: usize, pace: Option<&Pace>) -> Option<Self> {
+        let pace = pace?;
+        let ms = *pace.last_ms.get(occurrence)?;
+        let most = match &pass.work {
+            RecordedWork::Dispatch(Dispatch { groups: Groups::Indirect(groups), .. }) if pace.per_group_ms > 0.0 => {
+                pace.per_group_ms * groups.most as f64
+            }
+            RecordedWork::Dispatch(Dispatch { groups: Groups::Indirect(_), .. }) => return None,
+            _ => ms,
+        };
+        Some(Self { ms, most_ms: GROWTH * most.max(ms) })
+    }
+
+    fn fits(self, slice_ms: f64) -> bool {
+        self.ms <= slice_ms && self.most_ms <= LONGEST_MS
+    }
+}
+
+/// Time of a submission in milliseconds.
+struct Took {
+    /// Between timestamps, or by the host's clock where the device has none.
+    ms: f64,
+    /// By the host's clock, with the way to the device and back.
+    whole_ms: f64,
+}
+
+impl Took {
+    /// The host's clock where that is too long for timestamps to be believed: some drivers report 0.
+    fn believed_ms(&self) -> f64 {
+        if self.whole_ms > LONGEST_MS && self.ms < 0.5 * self.whole_ms { self.whole_ms } else { self.ms }
+    }
+}
+
+/// The counts of an indirect dispatch, copied beside the passes of a batch: three words each.
+const GROUPS_BYTES: u64 = 12;
+
 impl Recording<'_> {
-    /// Draws passes one after the other, each in its own submissions; milliseconds of each pass.
+    /// Draws passes one after the other, in submissions of about a slice; milliseconds of each pass.
     ///
     /// # Safety
     /// Every handle of the passes is alive, and nothing else is recorded with the pool.
     pub(super) unsafe fn in_turns(&self, passes: Vec<Pass<'_>>, barriers: &[Vec<Barrier>]) -> Result<Vec<f64>> {
-        let groups = Buffer::new(self.device, "groups", 12, Place::Readback)?;
-        // SAFETY: the caller guarantees both conditions.
-        passes.into_iter().zip(barriers).map(|(pass, barriers)| unsafe { self.draw(pass, barriers, &groups) }).collect()
+        let slice_ms = self.device.time_slices.slice_ms.unwrap_or(LONGEST_MS);
+        let room = Buffer::new(self.device, "groups", GROUPS_BYTES * passes.len().max(1) as u64, Place::Readback)?;
+        let mut drawn = Drawn { ms: vec![0.0; passes.len()], names: Vec::new(), groups: Vec::new() };
+        let mut seen: HashMap<String, usize> = HashMap::new();
+        let mut batch: Option<Batch> = None;
+        for (index, (pass, barriers)) in passes.into_iter().zip(barriers).enumerate() {
+            let occurrence = seen.entry(pass.name.clone()).or_default();
+            let expected = Expected::of(&pass, *occurrence, lock(&self.device.time_slices.paces).get(&pass.name));
+            *occurrence += 1;
+            drawn.names.push((pass.name.clone(), *occurrence - 1));
+            drawn.groups.push(None);
+            // Without timestamps only a pass by itself has a time.
+            let whole = expected.filter(|expected| self.queries != vk::QueryPool::null() && expected.fits(slice_ms));
+            // SAFETY: the caller guarantees both conditions; a batch is submitted before this function returns, or freed.
+            unsafe {
+                let fits = |batch: &Batch| whole.is_some_and(|whole| (batch.expected + whole).fits(slice_ms));
+                if batch.as_ref().is_some_and(|batch| !fits(batch)) {
+                    self.finish_batch(batch.take(), &room, &mut drawn)?;
+                }
+                match whole {
+                    Some(whole) => {
+                        let mut open = match batch.take() {
+                            Some(open) => open,
+                            None => self.begin_batch()?,
+                        };
+                        open.expected = open.expected + whole;
+                        open.passes.push(index);
+                        batch = Some(open);
+                        let recorded = self.record_whole(pass, barriers, index, batch.as_ref(), &room, &mut drawn);
+                        if let (Err(_), Some(open)) = (&recorded, batch.take_if(|_| recorded.is_err())) {
+                            self.device.raw.free_command_buffers(self.from, &[open.commands]);
+                        }
+                        recorded?;
+                    }
+                    None => drawn.ms[index] = self.draw(pass, barriers, &room, &mut drawn, index)?,
+                }
+            }
+        }
+        // SAFETY: as above.
+        unsafe { self.finish_batch(batch, &room, &mut drawn)? };
+        drawn.remember(&mut lock(&self.device.time_slices.paces));
+        Ok(drawn.ms)
     }
 
-    /// Draws a pass; its GPU time in milliseconds.
-    unsafe fn draw(&self, pass: Pass<'_>, barriers: &[Barrier], room: &Buffer) -> Result<f64> {
+    unsafe fn begin_batch(&self) -> Result<Batch> {
+        self.device.time_slices.go_on()?;
+        // SAFETY: the caller submits or frees the command buffer.
+        unsafe {
+            let commands = begin(self.device, self.from)?;
+            Ok(Batch { commands, passes: Vec::new(), expected: Expected::default() })
+        }
+    }
+
+    /// Records a whole pass into a batch.
+    unsafe fn record_whole(
+        &self,
+        pass: Pass<'_>,
+        barriers: &[Barrier],
+        index: usize,
+        batch: Option<&Batch>,
+        room: &Buffer,
+        drawn: &mut Drawn,
+    ) -> Result<()> {
+        let Some(&Batch { commands, .. }) = batch else { return Ok(()) };
+        let made = self.pipelines.wait_for(&pass.pipelines)?;
+        let query = 2 * index as u32;
+        // SAFETY: the command buffer is recording; the caller of `in_turns` keeps all handles alive.
+        unsafe {
+            self.device.raw.cmd_reset_query_pool(commands, self.queries, query, 2);
+            record_barriers(self.device, commands, barriers, self.targets, false);
+            if let RecordedWork::Dispatch(Dispatch { groups, .. }) = &pass.work {
+                drawn.groups[index] = match groups {
+                    Groups::Count(groups) => Some(Known::Now(groups.iter().map(|&n| u64::from(n)).product())),
+                    Groups::Indirect(groups) => {
+                        self.copy_groups(commands, *groups, room, GROUPS_BYTES * index as u64);
+                        Some(Known::InRoom)
+                    }
+                };
+            }
+            label(self.device, commands, Some(&pass.name));
+            write_first_timestamp(self.device, commands, self.queries, query);
+            match pass.work {
+                RecordedWork::Record(record) => record(self.device, commands, &made),
+                RecordedWork::Dispatch(work) => work.record(self.device, commands, made[0], None),
+            }
+            self.device.raw.cmd_write_timestamp2(commands, ALL, self.queries, query + 1);
+            label(self.device, commands, None);
+        }
+        Ok(())
+    }
+
+    /// Submits a batch and waits for it.
+    unsafe fn finish_batch(&self, batch: Option<Batch>, room: &Buffer, drawn: &mut Drawn) -> Result<()> {
+        let Some(Batch { commands, passes, .. }) = batch else { return Ok(()) };
+        let (device, raw) = (self.device, &self.device.raw);
+        let start = Instant::now();
+        // SAFETY: the command buffer is waited for before it is freed.
+        unsafe {
+            to_host(device, commands);
+            let submitted = submit(device, commands);
+            let waited = wait(device).with_context(|| {
+                let names: Vec<&str> = passes.iter().map(|&index| drawn.names[index].0.as_str()).collect();
+                format!("waiting for the passes {}", names.join(", "))
+            });
+            raw.free_command_buffers(self.from, &[commands]);
+            submitted.and(waited)?;
+        }
+        device.time_slices.turns.fetch_add(1, Ordering::Relaxed);
+        self.begun.set(self.begun.get() + passes.len());
+        let whole_ms = start.elapsed().as_secs_f64() * 1e3;
+        let times = passes.iter().map(|&index| self.ms_between(2 * index as u32)).collect::<Result<Vec<f64>>>()?;
+        let took = Took { ms: times.iter().sum(), whole_ms };
+        let missing = (took.believed_ms() - took.ms) / passes.len() as f64;
+        for (index, ms) in passes.into_iter().zip(times) {
+            drawn.ms[index] = ms + missing;
+            if let Some(known @ Known::InRoom) = &mut drawn.groups[index] {
+                let at = GROUPS_BYTES as usize * index;
+                let words: Vec<u32> = room.read(|bytes| bytemuck::pod_collect_to_vec(&bytes[at..at + 12]));
+                *known = Known::Now(words.into_iter().map(u64::from).product());
+            }
+        }
+        Ok(())
+    }
+
+    /// Milliseconds between two timestamps that have been written.
+    fn ms_between(&self, query: u32) -> Result<f64> {
+        let mut ticks = [0_u64; 2];
+        let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+        // SAFETY: the pool has both queries, whose commands have executed.
+        unsafe { self.device.raw.get_query_pool_results(self.queries, query, &mut ticks, flags) }
+            .context("reading timestamps")?;
+        let period = f64::from(self.device.limits.timestamp_period) * 1e-6;
+        Ok(ticks[1].saturating_sub(ticks[0]) as f64 * period)
+    }
+
+    /// Draws a pass by itself; its time in milliseconds.
+    unsafe fn draw(
+        &self,
+        pass: Pass<'_>,
+        barriers: &[Barrier],
+        room: &Buffer,
+        drawn: &mut Drawn,
+        index: usize,
+    ) -> Result<f64> {
         let made = self.pipelines.wait_for(&pass.pipelines)?;
         // SAFETY: as for `in_turns`.
         unsafe {
             let first = |commands| {
                 self.begun.set(self.begun.get() + 1);
-                record_barriers(self.device, commands, barriers, self.targets, false);
+                record_barriers(self.device, commands, barriers, self.targets, self.without_barriers);
             };
             let work = match pass.work {
                 RecordedWork::Record(record) => {
-                    return self.turn(&pass.name, first, |commands| record(self.device, commands, &made));
+                    let took = self.turn(&pass.name, first, |commands| record(self.device, commands, &made))?;
+                    return Ok(took.ms);
                 }
                 RecordedWork::Dispatch(work) => work,
             };
-            let known = lock(&self.device.time_slices.paces).get(&pass.name).copied();
+            let known = lock(&self.device.time_slices.paces).get(&pass.name).map(|pace| pace.per_group_ms);
             let groups = match work.groups {
                 Groups::Count(groups) => groups,
-                Groups::At(sizes, offset) => self.read_groups(sizes, offset, room)?,
+                Groups::Indirect(groups) => self.read_groups(groups, room)?,
             };
+            drawn.groups[index] = Some(Known::Now(groups.into_iter().map(u64::from).product()));
             self.pieces(&pass.name, &work, made[0], groups, known, first)
         }
     }
@@ -107,7 +321,8 @@ impl Recording<'_> {
         first: impl Fn(vk::CommandBuffer),
     ) -> Result<f64> {
         let all: u64 = groups.into_iter().map(u64::from).product();
-        let mut most = known.filter(|ms| *ms > 0.0).map_or(all.div_ceil(FIRST) as f64, |ms| PIECE_MS / ms);
+        let slice_ms = self.device.time_slices.slice_ms.unwrap_or(LONGEST_MS);
+        let mut most = known.filter(|ms| *ms > 0.0).map_or(all.div_ceil(FIRST) as f64, |ms| slice_ms / ms);
         let (mut done, mut total) = (0, 0.0);
         // A dispatch without groups is still submitted once, for its barriers.
         while done < all || done == 0 {
@@ -125,31 +340,29 @@ impl Recording<'_> {
                 }
             };
             // SAFETY: as above.
-            let ms = unsafe { self.turn(name, before, record)? };
-            total += ms;
+            let took = unsafe { self.turn(name, before, record)? };
+            total += took.ms;
             if count == 0 {
                 break;
             }
             self.device.time_slices.cut.fetch_add(u64::from(done == 0 && count < all), Ordering::Relaxed);
             done += count;
-            most = (PIECE_MS * count as f64 / ms.max(1e-9)).min(GROWTH * count as f64);
+            most = (slice_ms * count as f64 / took.believed_ms().max(1e-9)).min(GROWTH * count as f64);
         }
-        // The mean, not the last piece: some part is always cheap, and the next frame may begin with an expensive one.
-        lock(&self.device.time_slices.paces).insert(name.to_owned(), total / all.max(1) as f64);
         Ok(total)
     }
 
-    /// Submits commands once and waits for them; their GPU time in milliseconds.
+    /// Submits commands once and waits for them; their time in milliseconds, between timestamps and by the host's clock.
     unsafe fn turn(
         &self,
         name: &str,
         before: impl FnOnce(vk::CommandBuffer),
         record: impl FnOnce(vk::CommandBuffer),
-    ) -> Result<f64> {
+    ) -> Result<Took> {
         let (device, raw, timed) = (self.device, &self.device.raw, self.queries != vk::QueryPool::null());
         device.time_slices.go_on()?;
         // SAFETY: the command buffer is recorded here and waited for before it is freed.
-        unsafe {
+        let whole_ms = unsafe {
             let commands = begin(device, self.from)?;
             if timed {
                 raw.cmd_reset_query_pool(commands, self.queries, 0, 2);
@@ -164,42 +377,88 @@ impl Recording<'_> {
                 raw.cmd_write_timestamp2(commands, ALL, self.queries, 1);
             }
             label(device, commands, None);
+            let start = Instant::now();
             let submitted = submit(device, commands);
             let waited = wait(device).with_context(|| format!("waiting for the pass {name}"));
+            let whole_ms = start.elapsed().as_secs_f64() * 1e3;
             raw.free_command_buffers(self.from, &[commands]);
             submitted.and(waited)?;
-            let mut ticks = [0_u64; 2];
-            if timed {
-                let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-                raw.get_query_pool_results(self.queries, 0, &mut ticks, flags).context("reading timestamps")?;
-            }
-            let period = f64::from(device.limits.timestamp_period) * 1e-6;
-            Ok(ticks[1].saturating_sub(ticks[0]) as f64 * period)
-        }
+            whole_ms
+        };
+        device.time_slices.turns.fetch_add(1, Ordering::Relaxed);
+        Ok(Took { ms: if timed { self.ms_between(0)? } else { whole_ms }, whole_ms })
     }
 
     /// Reads back the workgroup count of an indirect dispatch.
-    unsafe fn read_groups(&self, sizes: &Buffer, offset: u64, room: &Buffer) -> Result<[u32; 3]> {
-        let copy = |commands| {
-            let region = vk::BufferCopy { src_offset: offset, dst_offset: 0, size: 12 };
-            let to_host = vk::MemoryBarrier2::default()
-                .src_stage_mask(vk::PipelineStageFlags2::ALL_TRANSFER)
-                .src_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
-                .dst_stage_mask(vk::PipelineStageFlags2::HOST)
-                .dst_access_mask(vk::AccessFlags2::HOST_READ);
-            // SAFETY: the command buffer is recording; both buffers are alive.
-            unsafe {
-                self.device.raw.cmd_copy_buffer(commands, sizes.raw, room.raw, &[region]);
-                let info = [to_host];
-                let info = vk::DependencyInfo::default().memory_barriers(&info);
-                self.device.raw.cmd_pipeline_barrier2(commands, &info);
-            }
-        };
+    unsafe fn read_groups(&self, groups: IndirectGroups<'_>, room: &Buffer) -> Result<[u32; 3]> {
         // SAFETY: the caller of `in_turns` keeps all handles alive.
-        unsafe { self.turn("how many groups", |commands| after_all(self.device, commands), copy)? };
+        unsafe {
+            let copy = |commands| {
+                self.copy_groups(commands, groups, room, 0);
+                to_host(self.device, commands);
+            };
+            self.turn("how many groups", |_| (), copy)?;
+        }
         let words: Vec<u32> = room.read(|bytes| bytemuck::pod_collect_to_vec(&bytes[..12]));
         Ok([words[0], words[1], words[2]])
     }
+
+    /// Copies the workgroup counts of an indirect dispatch to a place that the host reads.
+    unsafe fn copy_groups(&self, commands: vk::CommandBuffer, groups: IndirectGroups<'_>, room: &Buffer, at: u64) {
+        let region = vk::BufferCopy { src_offset: groups.offset, dst_offset: at, size: GROUPS_BYTES };
+        // The frame's own barriers do not know of this copy: it waits for everything, and everything for it.
+        // SAFETY: the command buffer is recording; both buffers are alive.
+        unsafe {
+            after_all(self.device, commands);
+            self.device.raw.cmd_copy_buffer(commands, groups.sizes.raw, room.raw, &[region]);
+            after_all(self.device, commands);
+        }
+    }
+}
+
+/// What a frame's passes took, and of how many workgroups.
+struct Drawn {
+    ms: Vec<f64>,
+    /// Name of each pass and its occurrence among those of the name.
+    names: Vec<(String, usize)>,
+    groups: Vec<Option<Known>>,
+}
+
+/// Workgroups of a dispatch: known, or where the device copies them.
+enum Known {
+    Now(u64),
+    InRoom,
+}
+
+impl Drawn {
+    /// Updates the times by name.
+    fn remember(&self, paces: &mut HashMap<String, Pace>) {
+        let mut sums: HashMap<&str, (f64, u64)> = HashMap::new();
+        for (((name, occurrence), &ms), groups) in self.names.iter().zip(&self.ms).zip(&self.groups) {
+            let pace = paces.entry(name.clone()).or_default();
+            pace.last_ms.truncate(*occurrence);
+            pace.last_ms.push(ms);
+            if let Some(Known::Now(groups)) = groups {
+                let sum = sums.entry(name).or_default();
+                *sum = (sum.0 + ms, sum.1 + groups);
+            }
+        }
+        // The mean: some part is always cheap, and the next frame may begin with an expensive one.
+        for (name, (ms, groups)) in sums.into_iter().filter(|(_, (_, groups))| *groups > 0) {
+            paces.entry(name.to_owned()).or_default().per_group_ms = ms / groups as f64;
+        }
+    }
+}
+
+/// Makes copies available to the host.
+unsafe fn to_host(device: &Device, commands: vk::CommandBuffer) {
+    let barrier = [vk::MemoryBarrier2::default()
+        .src_stage_mask(vk::PipelineStageFlags2::ALL_TRANSFER)
+        .src_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
+        .dst_stage_mask(vk::PipelineStageFlags2::HOST)
+        .dst_access_mask(vk::AccessFlags2::HOST_READ)];
+    // SAFETY: the command buffer is recording.
+    unsafe { device.raw.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().memory_barriers(&barrier)) };
 }
 
 /// Makes all earlier writes available to all later commands.
