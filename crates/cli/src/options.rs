@@ -187,6 +187,9 @@ pub struct DeviceOptions {
     /// run
     #[arg(long, help_heading = heading::DEVICE)]
     pub validate: bool,
+    /// The device was lost once: submissions are short. No option sets it.
+    #[arg(skip)]
+    pub short_submissions: bool,
 }
 
 fn vector(text: &str) -> Result<DVec3, String> {

@@ -12,7 +12,7 @@ use serde_json::json;
 use super::budget::{Budget, Chosen, command};
 use super::exposure;
 use super::interrupt::{INTERRUPTED, Interrupt};
-use super::options::PlanExtent;
+use super::options::{DeviceOptions, PlanExtent};
 use super::picture::{
     Format, RenderArgs, are_same, check_halves, check_same_scene, default_stem, format_of, is_standard, layers,
     metadata, output_format, scene_text, settings_size, warn_about,
@@ -29,7 +29,7 @@ use super::shard;
 use super::summary::sentence;
 use super::{print, print_bytes, usage};
 use etalon::frame::Rendered;
-use etalon::gpu::Severity;
+use etalon::gpu::{Severity, is_lost};
 use etalon::image::{Picture, exr, file, png};
 use etalon::scene::{Prune, Scene};
 
@@ -59,6 +59,18 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     if let Some(part) = args.sequence.shard {
         return shard::run(args, part, quiet);
     }
+    match draw(args, quiet) {
+        Err(error) if is_lost(&error) => {
+            tracing::warn!("{error:#}; the picture is drawn once more, in short submissions");
+            let device = DeviceOptions { short_submissions: true, ..args.device.clone() };
+            draw(&RenderArgs { device, ..args.clone() }, quiet)
+        }
+        drawn => drawn,
+    }
+}
+
+/// Draws one picture and writes it.
+fn draw(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let now = Instant::now();
     let mut phases =
         Phases { start: now, last: now, all: BTreeMap::from(["bvh", "pipelines"].map(|name| (name, 0.0))) };

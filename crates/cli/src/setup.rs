@@ -69,9 +69,13 @@ type Beside<T> = (Result<Arc<Device>>, Result<T>, Result<(Option<Environment>, V
 /// is opened first, so that a wrong one is found before a large file is read.
 fn open_beside<T>(device: &DeviceOptions, scene: &SceneOptions, load: impl FnOnce() -> Result<T>) -> Result<Beside<T>> {
     let choice = device.choice();
-    let first = is_certain(&choice).then(|| Device::open(&choice, device.validate)).transpose()?;
+    let open = || match device.short_submissions {
+        true => Device::open_time_sliced(&choice, device.validate),
+        false => Device::open(&choice, device.validate),
+    };
+    let first = is_certain(&choice).then(open).transpose()?;
     std::thread::scope(|scope| {
-        let device = scope.spawn(|| first.map_or_else(|| Device::open(&choice, device.validate), Ok));
+        let device = scope.spawn(|| first.map_or_else(open, Ok));
         let environment = scope.spawn(|| scene.load_environment());
         let loaded = load();
         let join = |_| anyhow!("a loading thread failed");

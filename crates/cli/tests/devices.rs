@@ -118,3 +118,37 @@ fn a_passport_of_a_described_device_is_its_description() {
     std::fs::write(folder.path().join("other.json"), "{}").expect("a file");
     etalon(folder.path(), &["passport", "--check", "other.json"], &[]).failed(1, "other.json: reading a passport");
 }
+
+/// The program on the device here with a fault.
+fn with_fault(folder: &Path, fault: &str, arguments: &[&str]) -> Run {
+    let file = folder.join("fault.json");
+    std::fs::write(&file, fault).expect("a written file");
+    let _ = std::fs::remove_file(file.with_extension("lost"));
+    Masked::new(folder, &file).run(arguments)
+}
+
+#[test]
+fn a_lost_device_is_tried_once_more_in_short_submissions() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let render = |to: &'static str| ["render", "study:metals", "--model", "global", "--size", "48x27", "-o", to];
+    etalon(folder.path(), &render("whole.exr"), &HASTY).succeeded();
+    // Before, while and after the picture is drawn.
+    for lost in [2, 6, 9] {
+        let fault = format!("{{ \"lost_at_submission\": {lost} }}");
+        let run = with_fault(folder.path(), &fault, &render("again.exr")).succeeded();
+        assert!(run.stderr.contains("once more, in short submissions"), "{lost}: {run:?}");
+        let diff = etalon(folder.path(), &["diff", "--metric", "mae", "whole.exr", "again.exr"], &[]).succeeded();
+        assert_eq!(diff.stdout, "mae 0\n", "lost at {lost}");
+    }
+}
+
+#[test]
+fn want_of_device_memory_is_an_error_and_leaves_no_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for allocation in [1, 2, 4] {
+        let fault = format!("{{ \"no_memory_from_allocation\": {allocation} }}");
+        let run = with_fault(folder.path(), &fault, &["render", "study:metals", "--size", "48x27", "-o", "x.png"]);
+        run.failed(1, "memory");
+        assert!(!folder.path().join("x.png").exists(), "allocation {allocation}");
+    }
+}

@@ -35,6 +35,11 @@ pub struct Description {
     pub without_subgroup_arithmetic: bool,
     /// No timestamps in queues.
     pub without_timestamps: bool,
+    /// Number of the submission, from 1, with which the device is lost, and every later one on it. Only the first device
+    /// is lost: the file `NAME.lost` beside the description says that it was.
+    pub lost_at_submission: Option<u64>,
+    /// Number of the memory allocation, from 1, from which on all fail for want of device memory.
+    pub no_memory_from_allocation: Option<u64>,
     /// Words in the program's expected refusal. Empty: the program is expected to render.
     pub refused: Vec<String>,
 }
@@ -86,6 +91,8 @@ impl From<MailedPassport> for Description {
             without_memory: MEMORY.into_iter().filter(is_nowhere).map(str::to_owned).collect(),
             without_subgroup_arithmetic: !of.subgroup_arithmetic,
             without_timestamps: !of.timestamps,
+            lost_at_submission: None,
+            no_memory_from_allocation: None,
             refused: Vec::new(),
         }
     }
@@ -116,6 +123,12 @@ macro_rules! lowered {
 }
 
 impl Description {
+    /// Whether no device was lost by the description that the environment variable names; from now on one was.
+    pub(crate) fn loses_its_first_device() -> bool {
+        let Some(path) = std::env::var_os(VARIABLE).map(PathBuf::from) else { return false };
+        std::fs::File::create_new(path.with_extension("lost")).is_ok()
+    }
+
     /// Reads the file that the environment variable names.
     pub(crate) fn from_environment() -> io::Result<Self> {
         let path = std::env::var_os(VARIABLE).ok_or_else(|| io::Error::other(format!("{VARIABLE} is not set")))?;

@@ -1,11 +1,12 @@
-//! The Vulkan layer: device queries go to the next layer, and their results are lowered. All other calls are passed
-//! through.
+//! The Vulkan layer: device queries go to the next layer, and their results are lowered; described faults take the place
+//! of submissions and allocations. All other calls are passed through.
 //!
 //! Read LunarG, "Architecture of the Vulkan Loader Interfaces", layer interface version 2.
 
 use std::ffi::{CStr, c_char, c_void};
 use std::ptr;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use ash::vk;
 
@@ -57,6 +58,8 @@ struct Below {
 
 static NEXT: OnceLock<vk::PFN_vkGetInstanceProcAddr> = OnceLock::new();
 static BELOW: OnceLock<Below> = OnceLock::new();
+/// The last instance that was made.
+static INSTANCE: AtomicU64 = AtomicU64::new(0);
 
 fn below() -> &'static Below {
     BELOW.get().expect("an instance was made")
@@ -73,23 +76,25 @@ pub unsafe extern "system" fn vkNegotiateLoaderLayerInterfaceVersion(asked: *mut
     let asked = unsafe { &mut *asked };
     asked.version = asked.version.min(2);
     asked.instance_proc = Some(instance_proc);
-    asked.device_proc = None;
+    asked.device_proc = Some(device_proc);
     asked.physical_device_proc = None;
     vk::Result::SUCCESS
 }
 
+/// A function as the pointer type that Vulkan returns for all functions.
+macro_rules! ours {
+    ($function:ident as $kind:ty) => {
+        // SAFETY: a caller that asks by name casts the pointer back to the type of that name.
+        Some(unsafe { std::mem::transmute::<$kind, unsafe extern "system" fn()>($function as $kind) })
+    };
+}
+
 unsafe extern "system" fn instance_proc(instance: vk::Instance, name: *const c_char) -> vk::PFN_vkVoidFunction {
-    /// A function as the pointer type that Vulkan returns for all functions.
-    macro_rules! ours {
-        ($function:ident as $kind:ty) => {
-            // SAFETY: a caller that asks by name casts the pointer back to the type of that name.
-            Some(unsafe { std::mem::transmute::<$kind, unsafe extern "system" fn()>($function as $kind) })
-        };
-    }
     // SAFETY: a string with a terminating 0.
     match unsafe { CStr::from_ptr(name) }.to_bytes() {
         b"vkGetInstanceProcAddr" => ours!(instance_proc as vk::PFN_vkGetInstanceProcAddr),
         b"vkCreateInstance" => ours!(create_instance as vk::PFN_vkCreateInstance),
+        b"vkCreateDevice" => ours!(create_device as vk::PFN_vkCreateDevice),
         b"vkGetPhysicalDeviceProperties" => ours!(properties as vk::PFN_vkGetPhysicalDeviceProperties),
         b"vkGetPhysicalDeviceProperties2" | b"vkGetPhysicalDeviceProperties2KHR" => {
             ours!(properties2 as vk::PFN_vkGetPhysicalDeviceProperties2)
@@ -148,6 +153,7 @@ unsafe extern "system" fn create_instance(
             return answer;
         }
         let instance = *made;
+        INSTANCE.store(vk::Handle::as_raw(instance), Ordering::Relaxed);
         let _ = BELOW.set(Below {
             description,
             properties: next!(instance, c"vkGetPhysicalDeviceProperties", vk::PFN_vkGetPhysicalDeviceProperties),
@@ -305,4 +311,127 @@ unsafe extern "system" fn extensions(
         *count = fit as u32;
         if fit < all.len() { vk::Result::INCOMPLETE } else { vk::Result::SUCCESS }
     }
+}
+
+/// `VkLayerDeviceLink`: the next layer in the loader's chain for a device.
+#[repr(C)]
+struct DeviceLink {
+    next: *mut DeviceLink,
+    instance_proc: vk::PFN_vkGetInstanceProcAddr,
+    device_proc: vk::PFN_vkGetDeviceProcAddr,
+}
+
+#[repr(C)]
+struct DeviceLinkInfo {
+    kind: vk::StructureType,
+    next: *const c_void,
+    function: i32,
+    link: *mut DeviceLink,
+}
+
+/// Functions of the next layer for devices: the same ones for all devices of a driver.
+struct DeviceBelow {
+    device_proc: vk::PFN_vkGetDeviceProcAddr,
+    submit: vk::PFN_vkQueueSubmit2,
+    allocate: vk::PFN_vkAllocateMemory,
+}
+
+static DEVICE_BELOW: OnceLock<DeviceBelow> = OnceLock::new();
+/// Submissions and allocations so far. The loader unloads the layer with the last instance.
+static SUBMISSIONS: AtomicU64 = AtomicU64::new(0);
+static LOST: AtomicBool = AtomicBool::new(false);
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+fn device_below() -> &'static DeviceBelow {
+    DEVICE_BELOW.get().expect("a device was made")
+}
+
+unsafe extern "system" fn create_device(
+    physical: vk::PhysicalDevice,
+    info: *const vk::DeviceCreateInfo<'_>,
+    allocator: *const vk::AllocationCallbacks<'_>,
+    made: *mut vk::Device,
+) -> vk::Result {
+    // SAFETY: the loader's chain holds the link of this layer, which must be advanced to the next layer's.
+    unsafe {
+        let mut at = (*info).p_next.cast::<DeviceLinkInfo>().cast_mut();
+        while !at.is_null()
+            && ((*at).kind != vk::StructureType::LOADER_DEVICE_CREATE_INFO || (*at).function != LINK_INFO)
+        {
+            at = (*at).next.cast::<DeviceLinkInfo>().cast_mut();
+        }
+        if at.is_null() {
+            return vk::Result::ERROR_INITIALIZATION_FAILED;
+        }
+        let (instance_proc, device_proc) = ((*(*at).link).instance_proc, (*(*at).link).device_proc);
+        (*at).link = (*(*at).link).next;
+        let instance = vk::Handle::from_raw(INSTANCE.load(Ordering::Relaxed));
+        let Some(create) = instance_proc(instance, c"vkCreateDevice".as_ptr()) else {
+            return vk::Result::ERROR_INITIALIZATION_FAILED;
+        };
+        let create = std::mem::transmute::<unsafe extern "system" fn(), vk::PFN_vkCreateDevice>(create);
+        let answer = create(physical, info, allocator, made);
+        if answer != vk::Result::SUCCESS {
+            return answer;
+        }
+        /// Looks up a function of the next layer by name.
+        macro_rules! next {
+            ($name:literal, $kind:ty) => {
+                match device_proc(*made, $name.as_ptr()) {
+                    Some(found) => std::mem::transmute::<unsafe extern "system" fn(), $kind>(found),
+                    None => return vk::Result::ERROR_INITIALIZATION_FAILED,
+                }
+            };
+        }
+        let _ = DEVICE_BELOW.set(DeviceBelow {
+            device_proc,
+            submit: next!(c"vkQueueSubmit2", vk::PFN_vkQueueSubmit2),
+            allocate: next!(c"vkAllocateMemory", vk::PFN_vkAllocateMemory),
+        });
+    }
+    vk::Result::SUCCESS
+}
+
+unsafe extern "system" fn device_proc(device: vk::Device, name: *const c_char) -> vk::PFN_vkVoidFunction {
+    // SAFETY: a string with a terminating 0.
+    match unsafe { CStr::from_ptr(name) }.to_bytes() {
+        b"vkGetDeviceProcAddr" => ours!(device_proc as vk::PFN_vkGetDeviceProcAddr),
+        b"vkQueueSubmit2" => ours!(submit as vk::PFN_vkQueueSubmit2),
+        b"vkAllocateMemory" => ours!(allocate as vk::PFN_vkAllocateMemory),
+        // SAFETY: the function of the next layer.
+        _ => unsafe { (device_below().device_proc)(device, name) },
+    }
+}
+
+unsafe extern "system" fn submit(
+    queue: vk::Queue,
+    count: u32,
+    infos: *const vk::SubmitInfo2<'_>,
+    fence: vk::Fence,
+) -> vk::Result {
+    let number = SUBMISSIONS.fetch_add(1, Ordering::Relaxed) + 1;
+    if let Some(lost) = below().description.lost_at_submission {
+        if number == lost && Description::loses_its_first_device() {
+            LOST.store(true, Ordering::Relaxed);
+        }
+        if LOST.load(Ordering::Relaxed) {
+            return vk::Result::ERROR_DEVICE_LOST;
+        }
+    }
+    // SAFETY: the caller's arguments.
+    unsafe { (device_below().submit)(queue, count, infos, fence) }
+}
+
+unsafe extern "system" fn allocate(
+    device: vk::Device,
+    info: *const vk::MemoryAllocateInfo<'_>,
+    allocator: *const vk::AllocationCallbacks<'_>,
+    memory: *mut vk::DeviceMemory,
+) -> vk::Result {
+    let number = ALLOCATIONS.fetch_add(1, Ordering::Relaxed) + 1;
+    if below().description.no_memory_from_allocation.is_some_and(|first| number >= first) {
+        return vk::Result::ERROR_OUT_OF_DEVICE_MEMORY;
+    }
+    // SAFETY: the caller's arguments.
+    unsafe { (device_below().allocate)(device, info, allocator, memory) }
 }

@@ -510,7 +510,7 @@ impl Device {
             physical,
             #[cfg(feature = "window")]
             family,
-            time_slices: SliceTimes::new(time_slices, is_software),
+            time_slices: SliceTimes::new(surface.is_some(), time_slices, is_software),
             instance,
         });
         Ok(device)

@@ -112,8 +112,8 @@ impl Device {
         Self::open_alone(choice, validate.then(|| Wish::Plain(choice.clone())), false)
     }
 
-    /// Opens a device as [`Device::open`] does, with time-sliced submission: every submission is short, as beside a
-    /// window.
+    /// Opens a device as [`Device::open`] does, with short submissions, as beside a window: for a device that was lost
+    /// under longer ones.
     ///
     /// # Errors
     /// As [`Device::open`].

@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use anyhow::Result;
 
-/// Target duration of a submission beside a window, in milliseconds.
-const BESIDE_WINDOW_MS: f64 = 10.0;
-/// The same without a window: operating systems reset a GPU whose submission takes seconds (2 s on Windows, 10 s with
+/// Target duration of a short submission in milliseconds, for devices beside a window and those that were lost.
+const SHORT_MS: f64 = 10.0;
+/// The same for other GPUs: operating systems reset a GPU whose submission takes seconds (2 s on Windows, 10 s with
 /// amdgpu).
-const ALONE_MS: f64 = 100.0;
+const USUAL_MS: f64 = 100.0;
 
 /// A device's state of time-sliced submission.
 #[derive(Debug)]
@@ -41,12 +41,12 @@ pub(super) struct Pace {
 }
 
 impl SliceTimes {
-    pub(super) fn new(beside_window: bool, is_software: bool) -> Self {
+    pub(super) fn new(beside_window: bool, short: bool, is_software: bool) -> Self {
         Self {
             beside_window,
-            slice_ms: match (beside_window, is_software) {
-                (true, _) => Some(BESIDE_WINDOW_MS),
-                (false, false) => Some(ALONE_MS),
+            slice_ms: match (short, is_software) {
+                (true, _) => Some(SHORT_MS),
+                (false, false) => Some(USUAL_MS),
                 (false, true) => None,
             },
             paces: Mutex::default(),

@@ -78,19 +78,19 @@ struct Batch {
     commands: vk::CommandBuffer,
     /// Passes in it, by index in the frame.
     passes: Vec<usize>,
-    expected: Expected,
+    expected: PassEstimate,
 }
 
 /// How long a pass will take, in milliseconds.
 #[derive(Clone, Copy, Default)]
-struct Expected {
+struct PassEstimate {
     /// As its times in the frame before say.
     ms: f64,
     /// If it has the most workgroups, each [`GROWTH`] times as expensive.
     most_ms: f64,
 }
 
-impl std::ops::Add for Expected {
+impl std::ops::Add for PassEstimate {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
@@ -98,7 +98,7 @@ impl std::ops::Add for Expected {
     }
 }
 
-impl Expected {
+impl PassEstimate {
     /// The `occurrence`th pass of a name in a frame, by what passes of this name took; `None` where that is unknown.
     fn of(pass: &Pass<'_>, occurrence: usize, pace: Option<&Pace>) -> Option<Self> {
         let pace = pace?;
@@ -149,7 +149,7 @@ impl Recording<'_> {
         let mut batch: Option<Batch> = None;
         for (index, (pass, barriers)) in passes.into_iter().zip(barriers).enumerate() {
             let occurrence = seen.entry(pass.name.clone()).or_default();
-            let expected = Expected::of(&pass, *occurrence, lock(&self.device.time_slices.paces).get(&pass.name));
+            let expected = PassEstimate::of(&pass, *occurrence, lock(&self.device.time_slices.paces).get(&pass.name));
             *occurrence += 1;
             drawn.names.push((pass.name.clone(), *occurrence - 1));
             drawn.groups.push(None);
@@ -191,7 +191,7 @@ impl Recording<'_> {
         // SAFETY: the caller submits or frees the command buffer.
         unsafe {
             let commands = begin(self.device, self.from)?;
-            Ok(Batch { commands, passes: Vec::new(), expected: Expected::default() })
+            Ok(Batch { commands, passes: Vec::new(), expected: PassEstimate::default() })
         }
     }
 
