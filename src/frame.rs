@@ -152,8 +152,7 @@ impl Renderer {
             }
             (None, None) => {}
         }
-        plan.architecture =
-            settings.architecture.unwrap_or(if device.is_software() { Architecture::Cpu } else { Architecture::Gpu });
+        plan.architecture = settings.architecture.unwrap_or(Architecture::of(device.is_software()));
         plan.check(&Ability {
             device: device.info().name.clone(),
             adds_in_subgroups: device.offers().adds_in_subgroups,
@@ -533,7 +532,7 @@ impl Renderer {
             if plan.tiles {
                 tiles(&mut frame, plan, library, g, lists_of_lights)?;
             }
-            classify(&mut frame, (library, plan.architecture), g, work)?;
+            classify(&mut frame, library, plan.architecture, g, work)?;
         }
         light(&mut frame, lighting, g, work, radiance)?;
         if let Some(directions) = &self.sky_directions {
@@ -567,7 +566,7 @@ impl Renderer {
             frame.fill("reset dropped fragments", &lists.dropped, 0);
             for strip in lists.strips() {
                 fragments(&mut frame, scene, g, lists, strip, lod_bias)?;
-                classify_fragments(&mut frame, (library, plan.architecture), &lists.heads, &lists.work, strip.rows)?;
+                classify_fragments(&mut frame, lighting, &lists.heads, &lists.work, strip.rows)?;
                 let behind = Behind { radiance, seen: &screen.seen, part: None };
                 composite(&mut frame, lighting, g, lists, screen, behind, strip.rows)?;
                 for PartOnDevice { part, radiance, seen, .. } in parts {

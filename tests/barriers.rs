@@ -63,7 +63,7 @@ fn proves(name: &str, describe: impl for<'a> Fn(&'a Things, &mut Frame<'a>)) {
 fn sorting_tiles_waits_for_its_counters() {
     // copy → compute atomics on the sizes.
     proves("classify", |things, frame| {
-        classify(frame, (Library::default(), Architecture::default()), &things.gbuffer, &things.work).expect("the pass")
+        classify(frame, Library::default(), Architecture::default(), &things.gbuffer, &things.work).expect("the pass")
     });
 }
 
@@ -71,10 +71,8 @@ fn sorting_tiles_waits_for_its_counters() {
 fn sorting_tiles_again_waits_for_the_first_time() {
     // compute → copy → compute on the same lists; the tiles are written twice.
     proves("classify twice", |things, frame| {
-        classify(frame, (Library::default(), Architecture::default()), &things.gbuffer, &things.work)
-            .expect("the pass");
-        classify(frame, (Library::default(), Architecture::default()), &things.gbuffer, &things.work)
-            .expect("the pass");
+        classify(frame, Library::default(), Architecture::default(), &things.gbuffer, &things.work).expect("the pass");
+        classify(frame, Library::default(), Architecture::default(), &things.gbuffer, &things.work).expect("the pass");
     });
 }
 

@@ -10,7 +10,7 @@ use etalon::scene::environment::Environment;
 use etalon::scene::material::{Sampler, TextureRef};
 use etalon::scene::{AlphaMode, AmbientLight, Camera, Image, LightKind, LoadOptions, Material, Prune, Scene};
 use etalon::study::{self, shape::Shape};
-use etalon_testing::gpu::{Gpu, bits};
+use etalon_testing::gpu::{Gpu, bits, studio_of};
 use etalon_testing::made::{Made, at, lambert, perspective};
 use glam::DVec3;
 
@@ -18,7 +18,7 @@ const SIZE: [u32; 2] = [48, 27];
 
 fn draw(gpu: &Gpu, scene: &Scene, knobs: &Knobs, forced: ForcedEffects) -> (Picture, Vec<Effect>) {
     let studio = Environment::studio();
-    let share = scene.studio.or(scene.lights.is_empty().then_some(1.0));
+    let share = studio_of(scene);
     let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
     let framing = || Camera::framing(scene.bounds().expect("something to draw"), aspect, DEFAULT_FOV_Y);
     let camera = scene.cameras.first().cloned().unwrap_or_else(framing);

@@ -429,15 +429,21 @@ fn plans_with_paths() {
     assert!(gpu.errors().is_empty(), "{:?}", gpu.errors());
 }
 
-/// No kernel of any plan spills registers, where a driver tells (docs/decisions/architectures.md says how to run this
-/// without a GPU), and validation has nothing against their pipelines.
+/// No kernel of any plan spills vector registers, and validation has nothing against the pipelines: on the devices and
+/// drivers of tests/compiled.json (docs/decisions/architectures.md says how to run this without a GPU).
 #[test]
 fn compilers_spill_no_register() {
     let Some(gpu) = Gpu::that_tells_compiled() else {
         eprintln!("skipped: no driver here reports what its compiler made");
         return;
     };
+    let device = format!("{}, {}", gpu.device.info().name, gpu.device.info().driver);
+    if !include_str!("compiled.json").contains(&device) {
+        eprintln!("skipped: tests/compiled.json has no figures of {device}");
+        return;
+    }
     let mut spilling = BTreeSet::new();
+    let mut told = 0;
     for (i, (ways, choice)) in spread().iter().enumerate() {
         for by_paths in [false, true].into_iter().filter(|by_paths| !by_paths || i % 8 == 0) {
             let (camera, mut renderer) = renderer_of(&gpu, ways, choice, ForcedEffects::None, by_paths);
@@ -445,12 +451,13 @@ fn compilers_spill_no_register() {
                 renderer.passes(&camera).expect("passes").iter().flat_map(|pass| &pass.pipelines)
             {
                 let compiled = gpu.device.compiled(program, constants).expect("statistics");
+                told += compiled.iter().filter(|compiled| compiled.footprint().is_some()).count();
                 let spilled: u64 = compiled.iter().filter_map(Compiled::footprint).map(|of| of.spilled).sum();
                 spilling.extend((spilled > 0).then(|| format!("{} in plan {i}: {spilled}", program.name)));
             }
         }
     }
-    assert!(spilling.is_empty(), "{}: registers spilled: {spilling:#?}", gpu.device.info().name);
+    assert!(told > 2000 && spilling.is_empty(), "{device}: {told} kernels, registers spilled: {spilling:#?}");
 }
 
 /// What paths may meet is planned where it is, and not where it is not; and nothing that they take the place of.

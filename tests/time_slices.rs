@@ -93,8 +93,8 @@ fn what_is_interrupted_goes_on() {
     assert!(interruptions > 4, "{interruptions} of 12");
 }
 
-/// Passes of known and short times are submitted together: a sample of paths has some hundred passes, and the host waits
-/// for it a few times.
+/// Passes of known and short times are submitted together: a sample of paths has some hundred passes, and the host
+/// waits for it a few times.
 #[test]
 fn short_passes_share_submissions() {
     let gpu = Gpu::time_sliced();

@@ -5,8 +5,8 @@
 #include "lib/own_tiles.glsl"
 #include "lib/path_ray.glsl"
 
-// The pixel at a position of the first queue. Tiles of 8x8 are taken in strides over the picture, since lavapipe gives each
-// of its threads one contiguous piece of a dispatch. Pixels of a tile are in Morton order, so neighbours in a queue are
+// The pixel at a position of the first queue. Tiles of 8x8 are taken in strides over the picture
+// (src/pass/rows.rs). Pixels of a tile are in Morton order, so neighbours in a queue are
 // neighbours in the picture. It lies outside the picture where a tile does.
 uvec2 pixel_at(uint place, uint stride) {
     uint turn = place / 64 * stride % own_tiles();

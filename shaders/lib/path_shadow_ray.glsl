@@ -1,9 +1,9 @@
 // Shadow rays in memory between two dispatches, by pixel.
-// Where to read: lib/path_wavefront.glsl.
+// Where to read: lib/path_steps.glsl.
 #ifndef PATH_SHADOW_RAY_GLSL
 #define PATH_SHADOW_RAY_GLSL
 #include "lib/path.glsl"
-#include "lib/path_wavefront.glsl"
+#include "lib/path_steps.glsl"
 
 layout(pass, scalar) buffer ShadowDirections { uvec4 shadow_directions[]; };        // to_light, t_max
 layout(pass, scalar) buffer ShadowContributions { vec3 shadow_contributions[]; };

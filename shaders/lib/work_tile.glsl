@@ -29,8 +29,8 @@ uint listed_tile(uvec3 workgroup) {
     return workgroup.y * ROW + workgroup.x;
 }
 
-// The tile, of `tiles`, that an invocation classifies, or a number beyond them. Workgroups cover the picture in strides
-// (src/pass/rows.rs), so any contiguous piece of a list has tiles from everywhere.
+// The tile, of `tiles`, that an invocation classifies, or a number beyond them. On CPUs workgroups cover the picture in
+// strides (src/pass/rows.rs), so any contiguous piece of a list has tiles from everywhere.
 uint scattered_tile(uint tiles, uint stride) {
     uint groups = (tiles + gl_WorkGroupSize.x - 1) / gl_WorkGroupSize.x;
     uint group = listed_tile(gl_WorkGroupID);

@@ -28,7 +28,7 @@ layout(constant) const uint PENDING = 1;         // greatest number of waiting b
 layout(constant) const uint FIRST_EVENT = 0;
 // On GPUs: a branch goes to the stack at once, and a lookup of the environment is made where it arises.
 // Otherwise both wait in registers (docs/decisions/architectures.md). The sums are the same, in the same order.
-layout(constant) const bool STACKS_AT_ONCE = false;
+layout(constant) const bool BRANCHES_IN_MEMORY = false;
 // A branch of smaller throughput is not followed. The sum of these losses is counted.
 const float FAINTEST = 1.0 / 512.0;
 
@@ -74,7 +74,7 @@ vec3 wanted(uint events, vec3 light) {
 }
 
 void look(vec3 direction, vec3 throughput) {
-    if (STACKS_AT_ONCE) {
+    if (BRANCHES_IN_MEMORY) {
         around += throughput * (ENVIRONMENT ? environment_radiance(direction) : vec3(0.0));
         return;
     }
@@ -102,7 +102,7 @@ void send(Branch branch) {
     if (FIRST_EVENT != 0) branch.events |= (first_event == 0 ? 1 + (branch.events >> 8 & 1u) : first_event) << 10;
     float weight = largest(branch.throughput);
     bool follows = (branch.events & 0xffu) <= trace_terms.interfaces && weight >= FAINTEST && waiting + sent_now < PENDING;
-    if (weight > 0.0 && follows && STACKS_AT_ONCE) {
+    if (weight > 0.0 && follows && BRANCHES_IN_MEMORY) {
         pending[waiting] = branch;
         waiting++;
     } else if (weight > 0.0 && follows) {
@@ -119,7 +119,7 @@ void send(Branch branch) {
 
 // The next branch: the last one sent, or the last one that waits.
 Branch next_branch() {
-    if (STACKS_AT_ONCE) {
+    if (BRANCHES_IN_MEMORY) {
         waiting -= waiting > 0 ? 1 : 0;
         return pending[waiting];
     }
@@ -288,7 +288,7 @@ void main() {
                 escaped += clear ? (ray.throughput.r + ray.throughput.g + ray.throughput.b) * (1.0 / 3.0) : 0.0;
             }
         }
-        if (!STACKS_AT_ONCE && (goes_on || looks > 0)) see_environment();
+        if (!BRANCHES_IN_MEMORY && (goes_on || looks > 0)) see_environment();
         more = sent_now > 0 || waiting > 0;
         more = more && loop_iterations < LOOP_BUDGET;
     } while (more);

@@ -1,5 +1,5 @@
 // Path tracing in steps: the light of all paths into the picture.
-// Where to read: lib/path_wavefront.glsl.
+// Where to read: lib/path_steps.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -11,7 +11,7 @@ layout(pass, rgba32f) writeonly uniform image2D radiance;
 layout(push_constant) uniform Push { uint places; uint stride; };
 
 void main() {
-    uint place = listed_tile(gl_WorkGroupID) * 64 + gl_LocalInvocationID.x;
+    uint place = listed_tile(gl_WorkGroupID) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
     if (place >= places) return;
     uvec2 pixel = pixel_at(place, stride);
     if (any(greaterThanEqual(pixel, camera.size))) return;

@@ -1,13 +1,12 @@
 // Path tracing in steps, 1 of 3: traces the ray of each path to its next vertex.
-// Where to read: lib/path_wavefront.glsl.
+// Where to read: lib/path_steps.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 layout(local_size_x = 64) in;
 #include "lib/add_work.glsl"
-#include "lib/boundary.glsl"
-#include "lib/path_wavefront.glsl"
+#include "lib/path_steps.glsl"
 
 void main() {
     uint entry = own_entry();
@@ -15,7 +14,7 @@ void main() {
     if (alive) {
         uvec4 a = origins[entry];
         vec3 direction = uintBitsToFloat(directions[entry].xyz);
-        float from = COINCIDENT_INTERFACES ? t_mins[entry] : 0.0;
+        float from = KEEPS_T_MIN ? t_mins[entry] : 0.0;
         Hit hit = trace(uintBitsToFloat(a.xyz), direction, a.w, Hit(from, NO_TRIANGLE, 0.0, 0.0), LARGEST, OPAQUE | FILTER, false);
         hits[entry] = uvec4(floatBitsToUint(hit.t), hit.triangle, floatBitsToUint(hit.u), floatBitsToUint(hit.v));
     }

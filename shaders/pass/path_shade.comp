@@ -1,6 +1,6 @@
 // Path tracing in steps, 2 of 3: shades the vertex of each path, and appends the paths that go on to the next queue.
 // The order of the next queue varies from run to run. Each path adds to its own pixel alone, so the film does not.
-// Where to read: lib/path_wavefront.glsl.
+// Where to read: lib/path_steps.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -25,13 +25,13 @@ void main() {
         if (EMITTERS > 0) store_shadow_ray(shadow_ray, entry);
         goes_on = (p.state & PATH_ALIVE) != 0;
     }
-    // One atomic addition per subgroup. `base` is 0 but in the invocation that added, so the maximum passes it to all.
+    // Three atomics per subgroup. `base` is 0 but in the invocation that added, so the maximum passes it to all.
     uint before = subgroupExclusiveAdd(goes_on ? 1u : 0u);
     uint appended = subgroupAdd(goes_on ? 1u : 0u);
     uint base = 0;
     if (subgroupElect() && appended > 0) {
         base = atomicAdd(sizes[bounce + 1].count, appended);
-        uint groups = (base + appended + STEP_GROUP - 1) / STEP_GROUP;
+        uint groups = (base + appended + gl_WorkGroupSize.x - 1) / gl_WorkGroupSize.x;
         atomicMax(sizes[bounce + 1].x, min(groups, ROW));
         atomicMax(sizes[bounce + 1].y, (groups + ROW - 1) / ROW);
     }

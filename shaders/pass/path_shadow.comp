@@ -1,5 +1,5 @@
 // Path tracing in steps, 3 of 3: traces the shadow ray of each path, and adds the light that arrives.
-// Where to read: lib/path_wavefront.glsl.
+// Where to read: lib/path_steps.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -63,7 +63,7 @@ impl FragmentTiles {
 /// When the driver refuses a descriptor or a layout.
 pub fn classify_fragments<'a>(
     frame: &mut Frame<'a>,
-    (library, architecture): (Library, Architecture),
+    lighting: &Lighting<'a>,
     heads: &'a Image,
     list: &'a FragmentTiles,
     rows: [u32; 2],
@@ -72,7 +72,7 @@ pub fn classify_fragments<'a>(
     let bind = classify_fragments::Bind { heads, sizes: &list.sizes, tiles: &list.tiles };
     let tiles = list.width.div_ceil(TILE) * (rows[1] - rows[0]).div_ceil(TILE);
     let groups = tiles.div_ceil(classify_fragments::PROGRAM.local_size[0]);
-    let stride = stride(architecture, groups);
+    let (library, stride) = (lighting.library, stride(lighting.plan.architecture, groups));
     let push = classify_fragments::Push { width: list.width, first_row: rows[0], end_row: rows[1], stride };
     frame.compute("classify fragment tiles", &bind, &classify_fragments::Constants { library }, &push, rows_of(groups))
 }
@@ -125,7 +125,8 @@ impl WorkLists {
 /// When the driver refuses a descriptor or a layout.
 pub fn classify<'a>(
     frame: &mut Frame<'a>,
-    (library, architecture): (Library, Architecture),
+    library: Library,
+    architecture: Architecture,
     gbuffer: &'a GBuffer,
     lists: &'a WorkLists,
 ) -> Result<()> {

@@ -48,7 +48,7 @@ pub fn interact<'a>(
         masked_hits: with.masked,
         pending: with.interfaces + SPARE_BRANCHES,
         first_event: part.map_or(0, |part| part as u32),
-        stacks_at_once: lighting.plan.architecture == Architecture::Gpu,
+        branches_in_memory: lighting.plan.architecture == Architecture::Gpu,
     };
     let bind = interact::Bind {
         gbuffer: gbuffer.bind(),

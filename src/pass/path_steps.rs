@@ -13,7 +13,6 @@ use super::path_states::{PathStates, words};
 use super::rows::rows_of;
 use crate::gpu::{Buffer, Device, Frame, Image, IndirectGroups, Place};
 use crate::plan::Rays;
-use crate::shader::lib::path_wavefront::STEP_GROUP;
 use crate::shader::{lib, path_end, path_extend, path_shade, path_shadow};
 use crate::share::WorkSize;
 
@@ -30,7 +29,7 @@ impl PathSteps {
     /// Queues of up to `places` paths, in a picture of `size` pixels.
     pub(super) fn new(device: &Arc<Device>, rays: Rays, places: u32, size: [u32; 2]) -> Result<Self> {
         let pixels = u64::from(size[0]) * u64::from(size[1]);
-        let [x, y, z] = rows_of(places.div_ceil(STEP_GROUP));
+        let [x, y, z] = rows_of(places.div_ceil(path_extend::PROGRAM.local_size[0]));
         let mut sizes = vec![WorkSize { x, y, z, count: places }];
         // A bounce appends to the queue of the next one, the last bounce too.
         sizes.resize(rays.interfaces as usize + 2, EMPTY);
@@ -63,16 +62,20 @@ impl PathSteps {
     ) -> Result<()> {
         let (library, interfaces) = (lighting.library, lighting.plan.rays.unwrap_or_default().interfaces);
         let PathStates { places, width, .. } = *states;
-        let wavefront = || lib::path_wavefront::Bind { queues: &self.queues, sizes: &self.sizes, hits: &self.hits };
+        let wavefront = || lib::path_steps::Bind { queues: &self.queues, sizes: &self.sizes, hits: &self.hits };
         let path_shadow_ray = || {
             let [shadow_directions, shadow_contributions, shadow_media] = &self.shadow_rays;
             lib::path_shadow_ray::Bind { shadow_directions, shadow_contributions, shadow_media }
         };
         for bounce in 0..interfaces + 1 {
             let offset = u64::from(bounce) * WORK_BYTES;
-            let groups = IndirectGroups { sizes: &self.sizes, offset, most: u64::from(places.div_ceil(STEP_GROUP)) };
+            let groups = IndirectGroups {
+                sizes: &self.sizes,
+                offset,
+                most: u64::from(places.div_ceil(path_extend::PROGRAM.local_size[0])),
+            };
             let (bind, constants, push) = (
-                path_extend::Bind { path_state: states.bind(), path_wavefront: wavefront() },
+                path_extend::Bind { path_state: states.bind(), path_steps: wavefront() },
                 path_extend::Constants { library },
                 path_extend::Push { width, places, bounce },
             );
@@ -80,7 +83,7 @@ impl PathSteps {
             let (bind, constants, push) = (
                 path_shade::Bind {
                     path_state: states.bind(),
-                    path_wavefront: wavefront(),
+                    path_steps: wavefront(),
                     path_shadow_ray: path_shadow_ray(),
                 },
                 path_shade::Constants { library },
@@ -93,7 +96,7 @@ impl PathSteps {
             let (bind, constants, push) = (
                 path_shadow::Bind {
                     path_state: states.bind(),
-                    path_wavefront: wavefront(),
+                    path_steps: wavefront(),
                     path_shadow_ray: path_shadow_ray(),
                 },
                 path_shadow::Constants { library },

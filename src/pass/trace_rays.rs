@@ -7,6 +7,7 @@ use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
 use crate::gpu::{Buffer, DescriptorSet, Device, Frame, Place};
+use crate::plan::Architecture;
 use crate::prepare::Prepared;
 use crate::scene::Scene;
 use crate::shader::{Library, SCENE, lib, trace_rays};
@@ -69,7 +70,8 @@ impl Tracer {
     /// # Errors
     /// When the BVH does not fit the device.
     pub fn new(device: &Arc<Device>, scene: &Scene, traversal: Option<Traversal>) -> Result<Self> {
-        let prepared = Prepared::for_rays(scene.clone())?;
+        let mut prepared = Prepared::for_rays(scene.clone())?;
+        prepared.plan.architecture = Architecture::of(device.is_software());
         Ok(Self { device: device.clone(), rays: RaysOnDevice::new(device, &prepared, traversal)? })
     }
 

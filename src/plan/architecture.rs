@@ -4,7 +4,7 @@
 
 use serde::Serialize;
 
-/// The kind of device that the passes are written for. Both forms draw the same film, bit by bit, on any one device.
+/// The kind of device that the passes are written for. On lavapipe both forms draw the same film, bit by bit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Architecture {
@@ -12,7 +12,25 @@ pub enum Architecture {
     /// instead of branches, no stack in traversal.
     #[default]
     Cpu,
-    /// Thousands of invocations that share registers and caches: one path per invocation, kernels that either traverse
-    /// or shade, traversal with branches and a stack in shared memory, neighbouring tiles in neighbouring workgroups.
+    /// Thousands of invocations that share registers and caches: one path per invocation, kernels for rays and kernels
+    /// for surfaces, traversal with branches and a stack in shared memory, neighbouring tiles in neighbouring
+    /// workgroups.
     Gpu,
+}
+
+impl Architecture {
+    /// The name of such devices.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cpu => "CPUs",
+            Self::Gpu => "GPUs",
+        }
+    }
+
+    /// The architecture of a device.
+    #[must_use]
+    pub fn of(is_software: bool) -> Self {
+        if is_software { Self::Cpu } else { Self::Gpu }
+    }
 }

@@ -550,3 +550,19 @@ fn bodies(scene: &Scene, solids: &Solids, rays: Rays) -> Scene {
         ..Scene::default()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shader::PROGRAMS;
+
+    #[test]
+    fn programs_that_trace_have_as_many_invocations_as_traversal_stacks() {
+        let traces = |program: &&&crate::gpu::Program| program.constants.iter().any(|c| c.name == "stack_words");
+        let tracing: Vec<_> = PROGRAMS.iter().filter(traces).collect();
+        assert!(tracing.len() > 6, "{}", tracing.len());
+        for program in tracing {
+            assert_eq!(program.local_size.iter().product::<u32>(), TRACING_LANES, "{}", program.name);
+        }
+    }
+}

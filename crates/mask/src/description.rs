@@ -35,8 +35,8 @@ pub struct Description {
     pub without_subgroup_arithmetic: bool,
     /// No timestamps in queues.
     pub without_timestamps: bool,
-    /// Number of the submission, from 1, with which the device is lost, and every later one on it. Only the first device
-    /// is lost: the file `NAME.lost` beside the description says that it was.
+    /// Number of the submission, from 1, with which the device is lost, and every later one on it. Only the first
+    /// device is lost: the file `NAME.lost` beside the description says that it was.
     pub lost_at_submission: Option<u64>,
     /// Number of the memory allocation, from 1, from which on all fail for want of device memory.
     pub no_memory_from_allocation: Option<u64>,

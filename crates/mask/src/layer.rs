@@ -1,5 +1,5 @@
-//! The Vulkan layer: device queries go to the next layer, and their results are lowered; described faults take the place
-//! of submissions and allocations. All other calls are passed through.
+//! The Vulkan layer: device queries go to the next layer, and their results are lowered; described faults take the
+//! place of submissions and allocations. All other calls are passed through.
 //!
 //! Read LunarG, "Architecture of the Vulkan Loader Interfaces", layer interface version 2.
 

@@ -151,7 +151,8 @@ fn ways(device: &Arc<Device>, scene: &str, size: [u32; 2]) -> Result<Vec<SamePic
     ];
     for architecture in [Architecture::Cpu, Architecture::Gpu] {
         let other = Settings { architecture: Some(architecture), ..usual.clone() };
-        found.push(beside(&format!("passes for {architecture:?}s"), &shot(device, scene, other)?.film));
+        let way = format!("passes for {}", architecture.name());
+        found.push(beside(&way, &shot(device, scene, other)?.film));
     }
     for traversal in [Traversal::Links16, Traversal::Links32, Traversal::Stack] {
         let other = Settings { traversal: Some(traversal), ..usual.clone() };

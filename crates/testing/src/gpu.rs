@@ -13,7 +13,8 @@ use etalon::scene::{Camera, Scene};
 use etalon::share::AovPixel;
 use etalon::upload::view::View;
 
-/// The software device with validation, shared by the tests of a program (`crates/vulkan/src/open.rs`).
+/// A device with validation, as a rule the software device, shared by the tests of a program
+/// (`crates/vulkan/src/open.rs`).
 pub struct Gpu {
     /// The device.
     pub device: Arc<Device>,
@@ -37,12 +38,13 @@ impl Gpu {
         Self::opened(place, Device::open)
     }
 
-    /// The first device whose driver reports what its compiler makes of pipelines, with validation; `None` where there
-    /// is none. It may draw nothing: Mesa's RADV compiles without a GPU (docs/decisions/architectures.md).
+    /// The best device, with validation and for exclusive use, where its driver reports what its compiler makes of
+    /// pipelines; otherwise `None`. It may draw nothing: Mesa's RADV compiles without a GPU
+    /// (docs/decisions/architectures.md).
     pub fn that_tells_compiled() -> Option<Self> {
-        let place = Place::Shared { _guard: PLACES.read().unwrap_or_else(PoisonError::into_inner) };
-        let device = Device::open(&DeviceChoice::Best, true).ok().filter(|device| device.tells_compiled())?;
-        Some(Self { device, expects_errors: false, _place: place })
+        let place = Place::Own { _guard: PLACES.write().unwrap_or_else(PoisonError::into_inner) };
+        let gpu = Self::opened(place, |_, validate| Device::open(&DeviceChoice::Best, validate));
+        gpu.device.tells_compiled().then_some(gpu)
     }
 
     /// [`Gpu::open`] for exclusive use in this program: for tests that count created objects, or that expect errors.
@@ -145,6 +147,12 @@ pub fn knobs(choices: &[&str]) -> Knobs {
         knobs.set(choice).expect("a rung");
     }
     knobs
+}
+
+/// The factor on the studio environment that lights a study scene; `None` where its own lights do alone.
+#[must_use]
+pub fn studio_of(scene: &Scene) -> Option<f32> {
+    scene.studio.or(scene.lights.is_empty().then_some(1.0))
 }
 
 /// The bits of a picture.

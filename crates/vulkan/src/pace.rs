@@ -21,7 +21,7 @@ pub(super) struct SliceTimes {
     /// without a window, which no operating system resets.
     pub(super) slice_ms: Option<f64>,
     /// What passes took, by name.
-    pub(super) paces: Mutex<HashMap<String, Pace>>,
+    pub(super) paces: Mutex<HashMap<String, PassPace>>,
     /// Number of dispatches that were split into more than one piece.
     pub(super) cut: AtomicU64,
     /// Number of submissions that the host waited for.
@@ -33,7 +33,7 @@ pub(super) struct SliceTimes {
 
 /// What passes of one name took.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Pace {
+pub(super) struct PassPace {
     /// Milliseconds per workgroup of a dispatch, the mean of the last one that had workgroups; 0 before.
     pub(super) per_group_ms: f64,
     /// Milliseconds of each occurrence in the last frame that had it.

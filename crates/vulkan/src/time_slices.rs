@@ -1,12 +1,12 @@
-//! Time-sliced submission: a frame is as few submissions as are short, so that a window's queue is never blocked for long
-//! and no operating system resets a GPU.
+//! Time-sliced submission: a frame is as few submissions as are short, so that a window's queue is never blocked for
+//! long and no operating system resets a GPU.
 //!
 //! Read the Vulkan specification, chapters Dispatching Commands (`vkCmdDispatchBase`) and Command Buffers. Passes whose
-//! time is known are recorded into one submission as long as they take no longer than a slice together, by their times in
-//! the frame before, and no longer than [`LONGEST_MS`] if every indirect dispatch had the most workgroups that it can
-//! have. A pass that is unknown or longer is submitted and waited for by itself; a long dispatch in pieces of workgroups:
-//! each piece has as many groups as would take a slice at the measured time per group of the piece before. The host must
-//! know the number of groups of such a dispatch, so the arguments of an indirect one are read back first.
+//! time is known are recorded into one submission as long as they take no longer than a slice together, by their times
+//! in the frame before, and no longer than [`LONGEST_MS`] if every indirect dispatch had the most workgroups that it
+//! can have. A pass that is unknown or longer is submitted and waited for by itself; a long dispatch in pieces of
+//! workgroups: each piece has as many groups as would take a slice at the measured time per group of the piece before.
+//! The host must know the number of groups of such a dispatch, so the arguments of an indirect one are read back first.
 
 use std::collections::HashMap;
 use std::sync::atomic::Ordering;
@@ -17,7 +17,7 @@ use ash::vk;
 
 use super::device::{Device, lock};
 use super::memory::{Buffer, Place};
-use super::pace::Pace;
+use super::pace::PassPace;
 use super::recording::{
     ALL, Dispatch, DispatchPiece, Groups, IndirectGroups, Pass, RecordedWork, Recording, begin, label, record_barriers,
     submit, wait, write_first_timestamp,
@@ -100,7 +100,7 @@ impl std::ops::Add for PassEstimate {
 
 impl PassEstimate {
     /// The `occurrence`th pass of a name in a frame, by what passes of this name took; `None` where that is unknown.
-    fn of(pass: &Pass<'_>, occurrence: usize, pace: Option<&Pace>) -> Option<Self> {
+    fn of(pass: &Pass<'_>, occurrence: usize, pace: Option<&PassPace>) -> Option<Self> {
         let pace = pace?;
         let ms = *pace.last_ms.get(occurrence)?;
         let most = match &pass.work {
@@ -155,7 +155,8 @@ impl Recording<'_> {
             drawn.groups.push(None);
             // Without timestamps only a pass by itself has a time.
             let whole = expected.filter(|expected| self.queries != vk::QueryPool::null() && expected.fits(slice_ms));
-            // SAFETY: the caller guarantees both conditions; a batch is submitted before this function returns, or freed.
+            // SAFETY: the caller guarantees both conditions; a batch is submitted before this function returns, or
+            // freed.
             unsafe {
                 let fits = |batch: &Batch| whole.is_some_and(|whole| (batch.expected + whole).fits(slice_ms));
                 if batch.as_ref().is_some_and(|batch| !fits(batch)) {
@@ -352,7 +353,8 @@ impl Recording<'_> {
         Ok(total)
     }
 
-    /// Submits commands once and waits for them; their time in milliseconds, between timestamps and by the host's clock.
+    /// Submits commands once and waits for them; their time in milliseconds, between timestamps and by the host's
+    /// clock.
     unsafe fn turn(
         &self,
         name: &str,
@@ -432,7 +434,7 @@ enum Known {
 
 impl Drawn {
     /// Updates the times by name.
-    fn remember(&self, paces: &mut HashMap<String, Pace>) {
+    fn remember(&self, paces: &mut HashMap<String, PassPace>) {
         let mut sums: HashMap<&str, (f64, u64)> = HashMap::new();
         for (((name, occurrence), &ms), groups) in self.names.iter().zip(&self.ms).zip(&self.groups) {
             let pace = paces.entry(name.clone()).or_default();

@@ -1,11 +1,12 @@
 // Path tracing in steps of one path per invocation: what they leave for each other in memory.
 // Each bounce is three dispatches over the queue: path_extend.comp traces the rays, path_shade.comp shades what they hit and
-// appends the surviving paths to the next queue, path_shadow.comp traces the shadow rays. So a kernel either traverses or
-// shades, and needs the registers of one of both.
+// appends the surviving paths to the next queue, path_shadow.comp traces the shadow rays. So most kernels either traverse or
+// shade, and need the registers of one of both. Shading traverses where surfaces coincide and for light samples beyond the
+// first; shadow rays shade the surfaces that filter light.
 // Where to read: Laine, Karras and Aila, Megakernels Considered Harmful, HPG 2013; pbrt 4, chapter 15;
 // docs/decisions/architectures.md.
-#ifndef PATH_WAVEFRONT_GLSL
-#define PATH_WAVEFRONT_GLSL
+#ifndef PATH_STEPS_GLSL
+#define PATH_STEPS_GLSL
 #include "lib/path_state.glsl"
 #include "lib/queue.glsl"
 
@@ -17,11 +18,9 @@ layout(pass, scalar) buffer Sizes { WorkSize sizes[]; };
 layout(pass, scalar) buffer Hits { uvec4 hits[]; };
 layout(push_constant) uniform Push { uint width; uint places; uint bounce; };
 
-const uint STEP_GROUP = 64; // paths in a workgroup
-
 // An entry of this bounce's queue; TERMINATED where there is none.
 uint own_entry() {
-    uint place = listed_tile(gl_WorkGroupID) * STEP_GROUP + gl_LocalInvocationID.x;
+    uint place = listed_tile(gl_WorkGroupID) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
     return place < sizes[bounce].count ? queues[(bounce & 1u) * places + place] : TERMINATED;
 }
 
