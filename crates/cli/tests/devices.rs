@@ -1,6 +1,7 @@
 //! Devices that one does not own: the one here, lowered to what files describe or to what passports say, draws the same
 //! picture or is refused for what it lacks.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use etalon_mask::{Description, Mask};
@@ -151,4 +152,63 @@ fn want_of_device_memory_is_an_error_and_leaves_no_file() {
         run.failed(1, "memory");
         assert!(!folder.path().join("x.png").exists(), "allocation {allocation}");
     }
+}
+
+/// Errors of arithmetic: of quotients, and of roots and powers.
+const INEXACT: [(&str, &str); 4] = [
+    ("quotients", "\"division\": 2"),
+    ("quotients", "\"division\": -2"),
+    ("roots and powers", "\"root\": 3, \"inverse_root\": 1, \"power\": 2"),
+    ("roots and powers", "\"root\": -3, \"inverse_root\": -1, \"power\": -2"),
+];
+
+/// Outputs whose errors exceed their bounds: function, output, tier and bound, with the largest error in parts of the
+/// bound for each kind of operation.
+fn exceeded(folder: &Path) -> BTreeMap<[String; 4], BTreeMap<&'static str, f64>> {
+    let mut all: BTreeMap<[String; 4], BTreeMap<&'static str, f64>> = BTreeMap::new();
+    for (operations, inexact) in INEXACT {
+        let fault = format!("{{ \"inexact\": {{ {inexact} }} }}");
+        let run = with_fault(folder, &fault, &["verify", "--json", "--cases", "10000"]);
+        let document: serde_json::Value = serde_json::from_str(&run.stdout).expect("JSON");
+        for row in document["outputs"].as_array().expect("outputs") {
+            let of_bound = row["worst"]["of_bound"].as_f64().unwrap_or_default();
+            let Some(bound) = row["bound"].as_str() else { continue };
+            let text = |key: &str| row[key].as_str().unwrap_or_default().to_owned();
+            let name = [text("function"), text("name"), text("tier"), bound.to_owned()];
+            let worst = all.entry(name).or_default().entry(operations).or_default();
+            *worst = worst.max(of_bound);
+        }
+    }
+    all.retain(|_, worst| worst.values().any(|&worst| worst > 1.0));
+    all
+}
+
+/// docs/inexact.md lists the bounds that inexact arithmetic breaks, and no other is broken.
+#[test]
+fn the_page_lists_the_bounds_that_inexact_arithmetic_breaks() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/inexact.md");
+    let page = std::fs::read_to_string(&path).expect("docs/inexact.md");
+    let (head, rest) = page.split_once("<!-- generated: inexact arithmetic -->\n").expect("a generated table");
+    let (_, tail) = rest.split_once("<!-- end -->").expect("its end");
+    let rows: String = exceeded(folder.path())
+        .into_iter()
+        .map(|([function, output, tier, bound], worst)| {
+            let of = |kind: &str| worst.get(kind).filter(|&&x| x > 1.0).map_or(String::new(), |x| format!("{x:.2}"));
+            let [a, b] = ["quotients", "roots and powers"].map(of);
+            format!("| `{function}` | {output} | {tier} | {} | {a} | {b} |\n", bound.replace('|', "\\|"))
+        })
+        .collect();
+    let table = format!(
+        "\n| function | output | tier | bound | quotients off | roots and powers off |\n|---|---|---|---|---|---|\n{rows}\n"
+    );
+    let new = format!("{head}<!-- generated: inexact arithmetic -->\n{table}<!-- end -->{tail}");
+    if std::env::var_os("ETALON_BLESS").is_some() {
+        std::fs::write(&path, new).expect("a written file");
+        return;
+    }
+    assert!(rows.lines().count() > 100, "the errors have no effect");
+    // Which bounds are exceeded, not by how much: that is a figure of this machine.
+    let words = |page: &str| page.replace(|c: char| c.is_ascii_digit(), "");
+    assert!(words(&page) == words(&new), "docs/inexact.md is old: run ETALON_BLESS=1 ./x test --test devices");
 }

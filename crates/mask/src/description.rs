@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use ash::vk;
 use serde::Deserialize;
 
+use crate::arithmetic::Inexact;
+
 /// Environment variable with the path of the description file.
 pub(crate) const VARIABLE: &str = "ETALON_MASK";
 
@@ -40,6 +42,8 @@ pub struct Description {
     pub lost_at_submission: Option<u64>,
     /// Number of the memory allocation, from 1, from which on all fail for want of device memory.
     pub no_memory_from_allocation: Option<u64>,
+    /// Errors of arithmetic operations.
+    pub(crate) inexact: Inexact,
     /// Words in the program's expected refusal. Empty: the program is expected to render.
     pub refused: Vec<String>,
 }
@@ -91,6 +95,7 @@ impl From<MailedPassport> for Description {
             without_memory: MEMORY.into_iter().filter(is_nowhere).map(str::to_owned).collect(),
             without_subgroup_arithmetic: !of.subgroup_arithmetic,
             without_timestamps: !of.timestamps,
+            inexact: Inexact::default(),
             lost_at_submission: None,
             no_memory_from_allocation: None,
             refused: Vec::new(),

@@ -334,6 +334,7 @@ struct DeviceBelow {
     device_proc: vk::PFN_vkGetDeviceProcAddr,
     submit: vk::PFN_vkQueueSubmit2,
     allocate: vk::PFN_vkAllocateMemory,
+    shader: vk::PFN_vkCreateShaderModule,
 }
 
 static DEVICE_BELOW: OnceLock<DeviceBelow> = OnceLock::new();
@@ -387,6 +388,7 @@ unsafe extern "system" fn create_device(
             device_proc,
             submit: next!(c"vkQueueSubmit2", vk::PFN_vkQueueSubmit2),
             allocate: next!(c"vkAllocateMemory", vk::PFN_vkAllocateMemory),
+            shader: next!(c"vkCreateShaderModule", vk::PFN_vkCreateShaderModule),
         });
     }
     vk::Result::SUCCESS
@@ -398,6 +400,7 @@ unsafe extern "system" fn device_proc(device: vk::Device, name: *const c_char) -
         b"vkGetDeviceProcAddr" => ours!(device_proc as vk::PFN_vkGetDeviceProcAddr),
         b"vkQueueSubmit2" => ours!(submit as vk::PFN_vkQueueSubmit2),
         b"vkAllocateMemory" => ours!(allocate as vk::PFN_vkAllocateMemory),
+        b"vkCreateShaderModule" => ours!(shader as vk::PFN_vkCreateShaderModule),
         // SAFETY: the function of the next layer.
         _ => unsafe { (device_below().device_proc)(device, name) },
     }
@@ -434,4 +437,24 @@ unsafe extern "system" fn allocate(
     }
     // SAFETY: the caller's arguments.
     unsafe { (device_below().allocate)(device, info, allocator, memory) }
+}
+
+unsafe extern "system" fn shader(
+    device: vk::Device,
+    info: *const vk::ShaderModuleCreateInfo<'_>,
+    allocator: *const vk::AllocationCallbacks<'_>,
+    module: *mut vk::ShaderModule,
+) -> vk::Result {
+    // SAFETY: the caller's info, with as many bytes of code as it says; the rewritten code outlives the call.
+    unsafe {
+        let words = std::slice::from_raw_parts((*info).p_code, (*info).code_size / 4);
+        match below().description.inexact.rewritten(words) {
+            Some(words) => {
+                let inexact =
+                    vk::ShaderModuleCreateInfo { p_code: words.as_ptr(), code_size: 4 * words.len(), ..*info };
+                (device_below().shader)(device, &raw const inexact, allocator, module)
+            }
+            None => (device_below().shader)(device, info, allocator, module),
+        }
+    }
 }

@@ -5,6 +5,7 @@
 //! capabilities. [`Mask`] gives a program the environment in which the loader finds the layer.
 #![allow(unsafe_code, reason = "a layer is called by the loader, by pointers")]
 
+mod arithmetic;
 mod description;
 mod layer;
 
