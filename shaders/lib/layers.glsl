@@ -34,7 +34,9 @@ float boundary_share(float cos_in, float n1, float n2) {
     if (n1 == n2) return 0.0;
     if (FRESNEL == FRESNEL_EXACT) {
         float r0 = nested_f0(n1, n2);
-        return clamp((fresnel_dielectric(cos_in, n2 / n1).F - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
+        float reflectance = fresnel_dielectric(cos_in, n2 / n1).F;
+        // Where a quotient may be off by some roundings, x/x is not 1, and total internal reflection would be missed.
+        return reflectance >= 1.0 ? 1.0 : clamp((reflectance - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
     }
     float sin2 = max(1.0 - cos_in * cos_in, 0.0) * (n1 / n2) * (n1 / n2);
     float cos_thin = n1 > n2 ? sqrt(max(1.0 - sin2, 0.0)) : cos_in;

@@ -212,3 +212,23 @@ fn the_page_lists_the_bounds_that_inexact_arithmetic_breaks() {
     let words = |page: &str| page.replace(|c: char| c.is_ascii_digit(), "");
     assert!(words(&page) == words(&new), "docs/inexact.md is old: run ETALON_BLESS=1 ./x test --test devices");
 }
+
+/// Quotients and roots that are off change no decision that is seen: once 60/60 < 1 repeated a texture a texel too
+/// late, and (1 − F₀)/(1 − F₀) < 1 missed total internal reflection (mean FLIP 0.031 and 0.0018).
+#[test]
+fn inexact_arithmetic_is_not_seen() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for [scene, model] in [["study:nested", "recursive"], ["study:blend", "global"]] {
+        let render = |to: &'static str| ["render", scene, "--model", model, "--size", "160x90", "-o", to];
+        etalon(folder.path(), &render("exact.png"), &HASTY).succeeded();
+        for sign in ["", "-"] {
+            let fault =
+                format!("{{ \"inexact\": {{ \"division\": {sign}2, \"root\": {sign}3, \"power\": {sign}2 }} }}");
+            with_fault(folder.path(), &fault, &render("inexact.png")).succeeded();
+            let arguments = ["diff", "--metric", "flip", "exact.png", "inexact.png"];
+            let diff = etalon(folder.path(), &arguments, &[]).succeeded();
+            let flip: f64 = diff.stdout.trim().trim_start_matches("flip ").parse().expect("a number");
+            assert!(flip < 1e-3, "{scene}, {sign}: {flip}");
+        }
+    }
+}
