@@ -7,7 +7,7 @@ use gltf::json::{
     validation::Checked,
 };
 
-use super::container::Document;
+use super::document::Document;
 
 /// Largest size in bytes of an accessor without a buffer view: its zeros take no space in the file, so the file size
 /// does not bound them.

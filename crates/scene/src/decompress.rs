@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
-use super::container::view_of;
+use super::document::view_of;
 
 /// Largest number of bytes that all compressed geometry of one file may decode to.
 pub(crate) const MAX_DECODED_BYTES: u64 = 2 << 30;

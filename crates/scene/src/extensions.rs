@@ -5,8 +5,8 @@ use std::path::Path;
 use anyhow::{Context as _, Result};
 use serde::Deserialize;
 
-use super::container::json_of;
 use super::contents;
+use super::glb::json_of;
 use super::lobe::LOBES;
 
 /// Supported extensions, without those of [`LOBES`].

@@ -23,7 +23,8 @@ use rayon::prelude::*;
 use super::{
     Camera, Instance, Light, LightKind, LoadOptions, Material, Mesh, Projection, Scene, Shared,
     accessor::Accessor,
-    container::Document,
+    container,
+    document::Document,
     geometry, gltf_extras,
     gltf_material::{self, KnownImages},
     lenient,
@@ -72,7 +73,7 @@ pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
 }
 
 fn opened<'b>(bytes: &'b [u8], path: &Path, options: &LoadOptions, warnings: &mut Vec<String>) -> Result<Document<'b>> {
-    let mut document = Document::open(bytes, path, warnings)?;
+    let mut document = container::open(bytes, path, warnings)?;
     if let Some(variant) = &options.variant {
         document.choose_variant(variant)?;
     }

@@ -20,10 +20,11 @@ use serde_json::{Map, Value};
 use super::substance::INFINITE_IOR;
 use super::{
     AlphaMode, Image, Material, MissingImages, Sampler, TextureRef, Wrap,
-    container::{Document, short_uri},
+    document::Document,
     gltf_extras,
     lobe::{Factor, LOBES, Lobe, LobeOf},
     pictures::{self, ImageUse},
+    uri::short_uri,
 };
 use etalon_optics::spectra;
 

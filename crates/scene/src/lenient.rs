@@ -8,17 +8,8 @@ use anyhow::{Context, Result, bail};
 use gltf::json::{self, Root};
 use serde_json::{Map, Number, Value, json};
 
-use super::container::Document;
+use super::document::{Document, PointerChannel};
 use super::nodes::sampled;
-
-/// A channel of KHR_animation_pointer.
-#[derive(Debug, Clone)]
-pub(crate) struct PointerChannel {
-    pub(crate) animation: usize,
-    sampler: usize,
-    /// JSON pointer to the animated property, such as `/nodes/3/translation`.
-    pub(crate) pointer: String,
-}
 
 /// Reads JSON that the schema crate refuses as it is; channels with pointers are taken out of it.
 pub(crate) fn read(bytes: &[u8], warnings: &mut Vec<String>) -> Result<(Root, Vec<PointerChannel>)> {

@@ -10,10 +10,12 @@ pub mod canonical;
 mod container;
 #[doc(hidden)]
 pub mod decompress;
+mod document;
 pub mod environment;
 pub mod extensions;
 pub mod framing;
 mod geometry;
+mod glb;
 mod gltf_extras;
 mod gltf_import;
 mod gltf_material;
@@ -34,6 +36,7 @@ pub mod solid;
 pub mod study;
 pub mod substance;
 mod thin;
+mod uri;
 pub mod wavelengths;
 
 use std::io::Read as _;

@@ -14,7 +14,7 @@ use gltf::json::{
 
 use serde_json::Value;
 
-use super::{LoadOptions, accessor::Accessor, container::Document, names::by_name_or_index, outline};
+use super::{LoadOptions, accessor::Accessor, document::Document, names::by_name_or_index, outline};
 
 /// Largest number of copies of one node: more instances than the G-buffer's index holds.
 const MOST_COPIES: usize = 1 << 23;

@@ -9,7 +9,7 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use basisu::{DecodeFlags, SourceFormat, TargetFormat, Transcoder};
 use image::{ImageFormat, ImageReader, Limits};
 
-use super::container::view_of;
+use super::document::view_of;
 use super::{Image, Material, Meaning, MissingImages};
 
 /// Largest width and height in texels, which every Vulkan 1.3 device of interest supports for a 2D image.

@@ -19,7 +19,7 @@ use super::choice::DeviceChoice;
 use super::error::NotOpened;
 use super::limits::{COLOR_TARGETS, STORAGE_BUFFERS, STORAGE_BUFFERS_AND_TABLES, STORAGE_IMAGES, UNIFORM_BUFFERS};
 use super::offers::Offers;
-use super::pace::SliceTimes;
+use super::pace::{OF_FRAME, SliceTimes};
 use super::surface::Surface;
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
@@ -607,8 +607,8 @@ impl Device {
 
     pub(super) fn note(&self, kind: &'static str, name: &str, bytes: u64) {
         self.objects.fetch_add(1, Ordering::Relaxed);
-        // A window runs for hours: a list of every created object would grow without bound.
-        if self.time_slices.beside_window {
+        // A window runs for hours, and a picture has many frames: a list of every object would grow without bound.
+        if self.time_slices.beside_window || name == OF_FRAME {
             return;
         }
         lock(&self.created).push(Created { kind, name: name.to_owned(), bytes });

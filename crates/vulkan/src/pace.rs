@@ -12,6 +12,9 @@ const SHORT_MS: f64 = 10.0;
 /// amdgpu).
 const USUAL_MS: f64 = 100.0;
 
+/// Name of buffers that live for one frame; the device does not list them.
+pub(super) const OF_FRAME: &str = "of one frame";
+
 /// A device's state of time-sliced submission.
 #[derive(Debug)]
 pub(super) struct SliceTimes {

@@ -17,7 +17,7 @@ use ash::vk;
 
 use super::device::{Device, lock};
 use super::memory::{Buffer, Place};
-use super::pace::PassPace;
+use super::pace::{OF_FRAME, PassPace};
 use super::recording::{
     ALL, Dispatch, DispatchPiece, Groups, IndirectGroups, Pass, RecordedWork, Recording, begin, label, record_barriers,
     submit, wait, write_first_timestamp,
@@ -142,9 +142,18 @@ impl Recording<'_> {
     /// # Safety
     /// Every handle of the passes is alive, and nothing else is recorded with the pool.
     pub(super) unsafe fn in_turns(&self, passes: Vec<Pass<'_>>, barriers: &[Vec<Barrier>]) -> Result<Vec<f64>> {
+        let mut drawn = Drawn { ms: vec![None; passes.len()], names: Vec::new(), groups: Vec::new() };
+        // SAFETY: the caller guarantees both conditions.
+        let outcome = unsafe { self.draw_all(passes, barriers, &mut drawn) };
+        // What an abandoned frame has drawn is known, too.
+        drawn.remember(&mut lock(&self.device.time_slices.paces));
+        outcome?;
+        Ok(drawn.ms.into_iter().map(Option::unwrap_or_default).collect())
+    }
+
+    unsafe fn draw_all(&self, passes: Vec<Pass<'_>>, barriers: &[Vec<Barrier>], drawn: &mut Drawn) -> Result<()> {
         let slice_ms = self.device.time_slices.slice_ms.unwrap_or(LONGEST_MS);
-        let room = Buffer::new(self.device, "groups", GROUPS_BYTES * passes.len().max(1) as u64, Place::Readback)?;
-        let mut drawn = Drawn { ms: vec![0.0; passes.len()], names: Vec::new(), groups: Vec::new() };
+        let room = Buffer::new(self.device, OF_FRAME, GROUPS_BYTES * passes.len().max(1) as u64, Place::Readback)?;
         let mut seen: HashMap<String, usize> = HashMap::new();
         let mut batch: Option<Batch> = None;
         for (index, (pass, barriers)) in passes.into_iter().zip(barriers).enumerate() {
@@ -160,7 +169,7 @@ impl Recording<'_> {
             unsafe {
                 let fits = |batch: &Batch| whole.is_some_and(|whole| (batch.expected + whole).fits(slice_ms));
                 if batch.as_ref().is_some_and(|batch| !fits(batch)) {
-                    self.finish_batch(batch.take(), &room, &mut drawn)?;
+                    self.finish_batch(batch.take(), &room, drawn)?;
                 }
                 match whole {
                     Some(whole) => {
@@ -168,23 +177,23 @@ impl Recording<'_> {
                             Some(open) => open,
                             None => self.begin_batch()?,
                         };
+                        if let Err(error) = self.record_whole(pass, barriers, index, open.commands, &room, drawn) {
+                            self.device.raw.free_command_buffers(self.from, &[open.commands]);
+                            return Err(error);
+                        }
                         open.expected = open.expected + whole;
                         open.passes.push(index);
                         batch = Some(open);
-                        let recorded = self.record_whole(pass, barriers, index, batch.as_ref(), &room, &mut drawn);
-                        if let (Err(_), Some(open)) = (&recorded, batch.take_if(|_| recorded.is_err())) {
-                            self.device.raw.free_command_buffers(self.from, &[open.commands]);
-                        }
-                        recorded?;
                     }
-                    None => drawn.ms[index] = self.draw(pass, barriers, &room, &mut drawn, index)?,
+                    None => {
+                        let ms = self.draw(pass, barriers, &room, drawn, index)?;
+                        drawn.ms[index] = Some(ms);
+                    }
                 }
             }
         }
         // SAFETY: as above.
-        unsafe { self.finish_batch(batch, &room, &mut drawn)? };
-        drawn.remember(&mut lock(&self.device.time_slices.paces));
-        Ok(drawn.ms)
+        unsafe { self.finish_batch(batch, &room, drawn) }
     }
 
     unsafe fn begin_batch(&self) -> Result<Batch> {
@@ -196,17 +205,16 @@ impl Recording<'_> {
         }
     }
 
-    /// Records a whole pass into a batch.
+    /// Records a whole pass into the command buffer of a batch.
     unsafe fn record_whole(
         &self,
         pass: Pass<'_>,
         barriers: &[Barrier],
         index: usize,
-        batch: Option<&Batch>,
+        commands: vk::CommandBuffer,
         room: &Buffer,
         drawn: &mut Drawn,
     ) -> Result<()> {
-        let Some(&Batch { commands, .. }) = batch else { return Ok(()) };
         let made = self.pipelines.wait_for(&pass.pipelines)?;
         let query = 2 * index as u32;
         // SAFETY: the command buffer is recording; the caller of `in_turns` keeps all handles alive.
@@ -257,7 +265,7 @@ impl Recording<'_> {
         let took = Took { ms: times.iter().sum(), whole_ms };
         let missing = (took.believed_ms() - took.ms) / passes.len() as f64;
         for (index, ms) in passes.into_iter().zip(times) {
-            drawn.ms[index] = ms + missing;
+            drawn.ms[index] = Some(ms + missing);
             if let Some(known @ Known::InRoom) = &mut drawn.groups[index] {
                 let at = GROUPS_BYTES as usize * index;
                 let words: Vec<u32> = room.read(|bytes| bytemuck::pod_collect_to_vec(&bytes[at..at + 12]));
@@ -420,7 +428,8 @@ impl Recording<'_> {
 
 /// What a frame's passes took, and of how many workgroups.
 struct Drawn {
-    ms: Vec<f64>,
+    /// Milliseconds of each pass that was drawn.
+    ms: Vec<Option<f64>>,
     /// Name of each pass and its occurrence among those of the name.
     names: Vec<(String, usize)>,
     groups: Vec<Option<Known>>,
@@ -436,10 +445,11 @@ impl Drawn {
     /// Updates the times by name.
     fn remember(&self, paces: &mut HashMap<String, PassPace>) {
         let mut sums: HashMap<&str, (f64, u64)> = HashMap::new();
-        for (((name, occurrence), &ms), groups) in self.names.iter().zip(&self.ms).zip(&self.groups) {
+        for (((name, occurrence), ms), groups) in self.names.iter().zip(&self.ms).zip(&self.groups) {
+            let &Some(ms) = ms else { continue };
             let pace = paces.entry(name.clone()).or_default();
-            pace.last_ms.truncate(*occurrence);
-            pace.last_ms.push(ms);
+            pace.last_ms.resize(pace.last_ms.len().max(occurrence + 1), ms);
+            pace.last_ms[*occurrence] = ms;
             if let Some(Known::Now(groups)) = groups {
                 let sum = sums.entry(name).or_default();
                 *sum = (sum.0 + ms, sum.1 + groups);
