@@ -42,6 +42,9 @@ pub struct Description {
     pub lost_at_submission: Option<u64>,
     /// Number of the memory allocation, from 1, from which on all fail for want of device memory.
     pub no_memory_from_allocation: Option<u64>,
+    /// New memory is full of ones: NaN as floats, the largest numbers as integers. For devices whose memory the host
+    /// sees.
+    pub dirty_memory: bool,
     /// Errors of arithmetic operations.
     pub(crate) inexact: Inexact,
     /// Words in the program's expected refusal. Empty: the program is expected to render.
@@ -95,6 +98,7 @@ impl From<MailedPassport> for Description {
             without_memory: MEMORY.into_iter().filter(is_nowhere).map(str::to_owned).collect(),
             without_subgroup_arithmetic: !of.subgroup_arithmetic,
             without_timestamps: !of.timestamps,
+            dirty_memory: false,
             inexact: Inexact::default(),
             lost_at_submission: None,
             no_memory_from_allocation: None,

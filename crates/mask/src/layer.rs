@@ -334,6 +334,8 @@ struct DeviceBelow {
     device_proc: vk::PFN_vkGetDeviceProcAddr,
     submit: vk::PFN_vkQueueSubmit2,
     allocate: vk::PFN_vkAllocateMemory,
+    map: vk::PFN_vkMapMemory,
+    unmap: vk::PFN_vkUnmapMemory,
     shader: vk::PFN_vkCreateShaderModule,
 }
 
@@ -388,6 +390,8 @@ unsafe extern "system" fn create_device(
             device_proc,
             submit: next!(c"vkQueueSubmit2", vk::PFN_vkQueueSubmit2),
             allocate: next!(c"vkAllocateMemory", vk::PFN_vkAllocateMemory),
+            map: next!(c"vkMapMemory", vk::PFN_vkMapMemory),
+            unmap: next!(c"vkUnmapMemory", vk::PFN_vkUnmapMemory),
             shader: next!(c"vkCreateShaderModule", vk::PFN_vkCreateShaderModule),
         });
     }
@@ -435,8 +439,20 @@ unsafe extern "system" fn allocate(
     if below().description.no_memory_from_allocation.is_some_and(|first| number >= first) {
         return vk::Result::ERROR_OUT_OF_DEVICE_MEMORY;
     }
-    // SAFETY: the caller's arguments.
-    unsafe { (device_below().allocate)(device, info, allocator, memory) }
+    let next = device_below();
+    // SAFETY: the caller's arguments. Nobody knows the new memory yet, so it is mapped here alone.
+    unsafe {
+        let answer = (next.allocate)(device, info, allocator, memory);
+        if answer == vk::Result::SUCCESS && below().description.dirty_memory {
+            let (size, mut at) = ((*info).allocation_size, ptr::null_mut());
+            let flags = vk::MemoryMapFlags::empty();
+            if (next.map)(device, *memory, 0, size, flags, &raw mut at) == vk::Result::SUCCESS {
+                ptr::write_bytes(at.cast::<u8>(), 0xff, size as usize);
+                (next.unmap)(device, *memory);
+            }
+        }
+        answer
+    }
 }
 
 unsafe extern "system" fn shader(
