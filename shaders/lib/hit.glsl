@@ -36,7 +36,7 @@ const uint TEXELS_NEAREST = 2;
 
 int wrapped(int i, int size, uint mode) {
     int period = mode == 1 ? 2 * size : size;
-    // Division of integers is slow on lavapipe. That of floats may be below a whole quotient on a GPU: 60/60 < 1 on AMD's.
+    // Division of integers is slow on lavapipe. That of floats may be below a whole quotient on GPUs: 60/60 < 1.
     int repeated = i - int(floor(float(i) / float(period))) * period;
     repeated += repeated < 0 ? period : repeated >= period ? -period : 0;
     int mirrored = repeated < size ? repeated : period - 1 - repeated;

@@ -62,7 +62,7 @@ impl PathSteps {
     ) -> Result<()> {
         let (library, interfaces) = (lighting.library, lighting.plan.rays.unwrap_or_default().interfaces);
         let PathStates { places, width, .. } = *states;
-        let wavefront = || lib::path_steps::Bind { queues: &self.queues, sizes: &self.sizes, hits: &self.hits };
+        let path_steps = || lib::path_steps::Bind { queues: &self.queues, sizes: &self.sizes, hits: &self.hits };
         let path_shadow_ray = || {
             let [shadow_directions, shadow_contributions, shadow_media] = &self.shadow_rays;
             lib::path_shadow_ray::Bind { shadow_directions, shadow_contributions, shadow_media }
@@ -75,7 +75,7 @@ impl PathSteps {
                 most: u64::from(places.div_ceil(path_extend::PROGRAM.local_size[0])),
             };
             let (bind, constants, push) = (
-                path_extend::Bind { path_state: states.bind(), path_steps: wavefront() },
+                path_extend::Bind { path_state: states.bind(), path_steps: path_steps() },
                 path_extend::Constants { library },
                 path_extend::Push { width, places, bounce },
             );
@@ -83,7 +83,7 @@ impl PathSteps {
             let (bind, constants, push) = (
                 path_shade::Bind {
                     path_state: states.bind(),
-                    path_steps: wavefront(),
+                    path_steps: path_steps(),
                     path_shadow_ray: path_shadow_ray(),
                 },
                 path_shade::Constants { library },
@@ -96,7 +96,7 @@ impl PathSteps {
             let (bind, constants, push) = (
                 path_shadow::Bind {
                     path_state: states.bind(),
-                    path_steps: wavefront(),
+                    path_steps: path_steps(),
                     path_shadow_ray: path_shadow_ray(),
                 },
                 path_shadow::Constants { library },

@@ -5,6 +5,8 @@
 //! Instructions: 2.5 ulp for division, 2 for `inversesqrt`, whose reciprocal is `sqrt`, 3 + 2|x| for `exp2`, 3 for
 //! `log2` outside of 0.5 to 2.
 
+use std::collections::HashSet;
+
 use rspirv::binary::Assemble as _;
 use rspirv::dr::{Builder, Instruction, Operand, load_words};
 use rspirv::spirv::{ExecutionMode, GlslStd450Op, Op, Word};
@@ -80,9 +82,10 @@ impl Inexact {
         for (f, function) in module.functions.iter().enumerate() {
             for (b, block) in function.blocks.iter().enumerate() {
                 for (i, instruction) in block.instructions.iter().enumerate() {
-                    let (ulps, size) = (self.of(instruction, extended), instruction.result_type.and_then(size_of));
-                    if let (true, Some(size)) = (ulps != 0, size) {
-                        found.push((f, b, i, ulps, size));
+                    let ulps = self.of(instruction, extended);
+                    let (Some(kind), Some(result)) = (instruction.result_type, instruction.result_id) else { continue };
+                    if let (true, Some(size)) = (ulps != 0, size_of(kind)) {
+                        found.push(([f, b, i], [kind, result], ulps, size));
                     }
                 }
             }
@@ -90,66 +93,54 @@ impl Inexact {
         if found.is_empty() {
             return None;
         }
-        let (uint, boolean) = (builder.type_int(32, 0), builder.type_bool());
-        let mut added = Vec::new();
-        for (f, b, i, ulps, size) in found.into_iter().rev() {
-            let (words_of, bools) = match size {
-                1 => (uint, boolean),
-                size => (builder.type_vector(uint, size), builder.type_vector(boolean, size)),
-            };
-            let mut constant = |value: u32| {
-                let one = builder.constant_bit32(uint, value);
-                if size == 1 { one } else { builder.constant_composite(words_of, vec![one; size as usize]) }
-            };
-            let [exponent, least, range, off, none] =
-                [0x7f80_0000, 0x0080_0000, 0x7f00_0000, ulps as u32, 0].map(&mut constant);
-            let mut id = || builder.id();
-            let [raw, bits, masked, moved, ordinary, by, sum] = [(); 7].map(|()| id());
-            added.push((
-                f,
-                b,
-                i,
-                [words_of, bools],
-                [exponent, least, range, off, none],
-                [raw, bits, masked, moved, ordinary, by, sum],
-            ));
-        }
+        let changes: Vec<_> = found
+            .into_iter()
+            .map(|(place, result, ulps, size)| {
+                let raw = builder.id();
+                (place, result[1], raw, moved_by(&mut builder, raw, result, ulps, size))
+            })
+            .collect();
         let mut module = builder.module();
         module.execution_modes.extend(modes);
-        for (
-            f,
-            b,
-            i,
-            [words_of, bools],
-            [exponent, least, range, off, none],
-            [raw, bits, masked, moved, ordinary, by, sum],
-        ) in added
-        {
+        // A bit pattern is no sum that could be contracted.
+        let results: HashSet<Operand> = changes.iter().map(|(_, result, ..)| Operand::IdRef(*result)).collect();
+        let is_of_result = |a: &Instruction| a.operands.first().is_some_and(|id| results.contains(id));
+        module.annotations.retain(|a| a.class.opcode != Op::Decorate || !is_of_result(a));
+        // From the end, so that earlier places stay.
+        for ([f, b, i], _, raw, after) in changes.into_iter().rev() {
             let block = &mut module.functions[f].blocks[b].instructions;
-            let (kind, result) = (block[i].result_type, block[i].result_id);
             block[i].result_id = Some(raw);
-            let make = |op, kind, result, operands: &[Word]| {
-                Instruction::new(op, Some(kind), Some(result), operands.iter().copied().map(Operand::IdRef).collect())
-            };
-            let (Some(kind), Some(result)) = (kind, result) else { continue };
-            // Only results with an exponent between the least and the greatest: no zero, infinity, NaN.
-            let after = [
-                make(Op::Bitcast, words_of, bits, &[raw]),
-                make(Op::BitwiseAnd, words_of, masked, &[bits, exponent]),
-                make(Op::ISub, words_of, moved, &[masked, least]),
-                make(Op::ULessThan, bools, ordinary, &[moved, range]),
-                make(Op::Select, words_of, by, &[ordinary, off, none]),
-                make(Op::IAdd, words_of, sum, &[bits, by]),
-                make(Op::Bitcast, kind, result, &[sum]),
-            ];
             block.splice(i + 1..i + 1, after);
-            // A bit pattern is no sum that could be contracted.
-            module
-                .annotations
-                .retain(|a| a.class.opcode != Op::Decorate || a.operands.first() != Some(&Operand::IdRef(result)));
         }
         Some(module.assemble())
     }
+}
+
+/// Instructions that give `result`, of type `kind`: `raw` moved by `ulps`. Only numbers with an exponent between the
+/// least and the greatest are moved: no zero, infinity, NaN.
+fn moved_by(builder: &mut Builder, raw: Word, [kind, result]: [Word; 2], ulps: i32, size: u32) -> [Instruction; 7] {
+    let (uint, boolean) = (builder.type_int(32, 0), builder.type_bool());
+    let (words, bools) = match size {
+        1 => (uint, boolean),
+        size => (builder.type_vector(uint, size), builder.type_vector(boolean, size)),
+    };
+    let [exponent, least, range, off, none] = [0x7f80_0000, 0x0080_0000, 0x7f00_0000, ulps as u32, 0].map(|value| {
+        let one = builder.constant_bit32(uint, value);
+        if size == 1 { one } else { builder.constant_composite(words, vec![one; size as usize]) }
+    });
+    let [bits, masked, above, ordinary, by, sum] = [(); 6].map(|()| builder.id());
+    let make = |op, kind, result, operands: &[Word]| {
+        Instruction::new(op, Some(kind), Some(result), operands.iter().copied().map(Operand::IdRef).collect())
+    };
+    [
+        make(Op::Bitcast, words, bits, &[raw]),
+        make(Op::BitwiseAnd, words, masked, &[bits, exponent]),
+        make(Op::ISub, words, above, &[masked, least]),
+        make(Op::ULessThan, bools, ordinary, &[above, range]),
+        make(Op::Select, words, by, &[ordinary, off, none]),
+        make(Op::IAdd, words, sum, &[bits, by]),
+        make(Op::Bitcast, kind, result, &[sum]),
+    ]
 }
 
 /// Words of a module without its `OpExecutionModeId` instructions, and these: the loader of rspirv 0.13 refuses them.
