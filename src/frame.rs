@@ -142,15 +142,12 @@ impl Renderer {
         check_size(device, &settings.knobs, settings.size)?;
         let plan = &mut prepared.plan;
         match (&mut plan.paths, settings.max_error) {
-            (Some(paths), wanted) => {
-                paths.at_once = settings.paths_at_once;
-                plan.samples = if wanted.is_some() { MOST_SAMPLES } else { plan.samples };
-            }
+            (Some(_), Some(_)) => plan.samples = MOST_SAMPLES,
             (None, Some(wanted)) => {
                 let why = format!("{wanted}: only paths tell their error, the model global follows them");
                 return Err(Refused::error(Setting::MaxError, why));
             }
-            (None, None) => {}
+            (_, None) => {}
         }
         plan.architecture = settings.architecture.unwrap_or(Architecture::of(device.is_software()));
         plan.check(&Ability {

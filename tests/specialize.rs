@@ -72,7 +72,13 @@ fn what_is_left_is_valid_whatever_the_constants_are() {
                 .collect();
             let left = specialized(stage.words, &told);
             assert!(left.len() <= stage.words.len());
-            let forms = [Op::SpecConstant, Op::SpecConstantTrue, Op::SpecConstantFalse];
+            let forms = [
+                Op::SpecConstant,
+                Op::SpecConstantTrue,
+                Op::SpecConstantFalse,
+                Op::SpecConstantOp,
+                Op::SpecConstantComposite,
+            ];
             assert!(instructions(&left).iter().all(|one| !forms.contains(&op(one))));
             gpu.device.try_module(&left).expect("a module");
             assert!(gpu.errors().is_empty(), "{told:?}: {:?}", gpu.errors());

@@ -92,15 +92,17 @@ vec3 occluded_environment_light(Surface s) {
     precise vec3 beside = given_back * INV_PI;
     vec3 mirrored = vec3(0.0);
     vec3 coat_mirrored = vec3(0.0);
-    if (REFLECTION && !s.base_traced) {
-        mirrored = radiance_in_base_lobe(s);
-        if (LOBE_RAYS > 0) mirrored = partly_occluded(mirrored, beside, visible_lobe(s, s.n, s.alpha, BASE_LOBE_EVENT));
-    }
-    if (CLEARCOAT && REFLECTION && !s.coat_traced) {
-        coat_mirrored = prefiltered_radiance(reflect_ray(-s.v, s.n_coat).R, s.clearcoat_alpha);
-        if (LOBE_RAYS > 0) {
-            vec3 visible = visible_lobe(s, s.n_coat, s.clearcoat_alpha, COAT_LOBE_EVENT);
-            coat_mirrored = partly_occluded(coat_mirrored, beside, visible);
+    if (REFLECTION && !s.base_traced) mirrored = radiance_in_base_lobe(s);
+    if (CLEARCOAT && REFLECTION && !s.coat_traced) coat_mirrored = prefiltered_radiance(reflect_ray(-s.v, s.n_coat).R, s.clearcoat_alpha);
+    if (REFLECTION && LOBE_RAYS > 0) {
+        // First the base, then the coat, in a loop: the code that traces exists once.
+        for (uint i = 0; i < (CLEARCOAT ? 2 : 1); i++) {
+            bool coat = i == 1;
+            if (coat ? !s.coat_traced : !s.base_traced) {
+                vec3 visible = visible_lobe(s, coat ? s.n_coat : s.n, coat ? s.clearcoat_alpha : s.alpha, coat ? COAT_LOBE_EVENT : BASE_LOBE_EVENT);
+                if (coat) coat_mirrored = partly_occluded(coat_mirrored, beside, visible);
+                else mirrored = partly_occluded(mirrored, beside, visible);
+            }
         }
     }
     return environment_light_of(s, albedo, irradiance, mirrored, coat_mirrored);

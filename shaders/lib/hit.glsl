@@ -43,9 +43,7 @@ int wrapped(int i, int size, uint mode) {
     return mode == 2 ? clamp(i, 0, size - 1) : clamp(mode == 1 ? mirrored : repeated, 0, size - 1);
 }
 
-vec4 texel_at(uint first, ivec2 size, ivec2 at, uint flags) {
-    int x = wrapped(at.x, size.x, flags >> 2 & 3u);
-    int y = wrapped(at.y, size.y, flags >> 4 & 3u);
+vec4 texel_at(uint first, ivec2 size, int x, int y, uint flags) {
     vec4 value = unpackUnorm4x8(imageLoad(texels, int(first) + y * size.x + x).x);
     return (flags & TEXELS_SRGB) != 0 ? vec4(linear_from_srgb(value.rgb), value.a) : value;
 }
@@ -76,8 +74,11 @@ vec4 hit_texture(uint material, uint slot, vec4 uv_sets, float footprint) {
     at = clamp(at, -1e9, 1e9);
     ivec2 corner = ivec2(floor(at));
     vec2 share = nearest ? vec2(0.0) : at - floor(at);
-    vec4 top = mix(texel_at(first, size, corner, flags), texel_at(first, size, corner + ivec2(1, 0), flags), share.x);
-    vec4 bottom = mix(texel_at(first, size, corner + ivec2(0, 1), flags), texel_at(first, size, corner + ivec2(1), flags), share.x);
+    uvec2 modes = uvec2(flags >> 2, flags >> 4) & 3u;
+    ivec2 low = ivec2(wrapped(corner.x, size.x, modes.x), wrapped(corner.y, size.y, modes.y));
+    ivec2 high = ivec2(wrapped(corner.x + 1, size.x, modes.x), wrapped(corner.y + 1, size.y, modes.y));
+    vec4 top = mix(texel_at(first, size, low.x, low.y, flags), texel_at(first, size, high.x, low.y, flags), share.x);
+    vec4 bottom = mix(texel_at(first, size, low.x, high.y, flags), texel_at(first, size, high.x, high.y, flags), share.x);
     return mix(top, bottom, share.y);
 }
 

@@ -78,9 +78,8 @@ vec3 fresnel_of_metal(Surface s, float cos_in) {
     vec3 f = schlick(s.f0_metal, 1.0, cos_in);
     if (CONDUCTORS && FRESNEL == FRESNEL_EXACT) {
         if (s.n_metal.x > 0.0) {
-            f = s.metal_tint * vec3(fresnel_conductor(cos_in, s.n_metal.r, s.kappa_metal.r).F,
-                                    fresnel_conductor(cos_in, s.n_metal.g, s.kappa_metal.g).F,
-                                    fresnel_conductor(cos_in, s.n_metal.b, s.kappa_metal.b).F);
+            // The channels in a loop: the code exists once.
+            for (int i = 0; i < 3; i++) f[i] = s.metal_tint[i] * fresnel_conductor(cos_in, s.n_metal[i], s.kappa_metal[i]).F;
         }
     }
     return f;

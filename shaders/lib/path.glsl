@@ -216,32 +216,33 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     }
     uvec2 words = dimension_words(pixel, vertices_before, DIMENSION_DIRECTION);
     BsdfSample drawn = bsdf_sample(bsdf, x, vec2(unit_float(words.x), unit_float(words.y)));
-    // First the light's direction, then the sampled one, in a loop: the code exists once.
-    vec3 along = normalize(light.to_light);
+    // First towards the light samples, then along the path, in a loop: the code exists once.
     PathEval towards_light = PathEval(vec3(0.0), 0.0, 0.0);
     PathEval on_path = PathEval(vec3(0.0), 0.0, 0.0);
-    for (int i = 0; i < 2; i++) {
-        PathEval now = bsdf_evaluate(bsdf, i == 0 ? along : drawn.direction);
-        if (i == 0) towards_light = now;
-        on_path = now;
-    }
-    if (EMITTERS > 0) {
-        shadow_ray = shadow_ray_to(p, interaction, scatters, front_origin, light, towards_light);
-    }
-    if (LIGHT_SAMPLES > 1) {
-        // 5. Further light samples; their shadow rays are traced here, one after the other.
-        for (uint i = 1; i < LIGHT_SAMPLES; i++) {
-            LightSample other = sample_light(front_origin, dimension_words_of(pixel, vertices_before, DIMENSION_LIGHT, i, LIGHT_SAMPLES));
+    LightSample other = light;
+    for (uint i = 0; i <= LIGHT_SAMPLES; i++) {
+        bool along_path = i == LIGHT_SAMPLES;
+        if (LIGHT_SAMPLES > 1 && i > 0 && !along_path) {
+            other = sample_light(front_origin, dimension_words_of(pixel, vertices_before, DIMENSION_LIGHT, i, LIGHT_SAMPLES));
             if (SAMPLED_ENVIRONMENT && other.pdf > 0.0 && other.t_max == LARGEST) {
                 bool ahead = OTHER_BACKGROUND && (p.state & PATH_TRANSPARENT_SO_FAR) != 0 && dot(hit.n, other.to_light) < 0.0 && !shines_through(b);
                 other.arriving *= ahead ? background_radiance(other.to_light) : environment_radiance(other.to_light);
             }
-            ShadowRay one = shadow_ray_to(p, interaction, scatters, front_origin, other, bsdf_evaluate(bsdf, normalize(other.to_light)));
+        }
+        PathEval now = bsdf_evaluate(bsdf, along_path ? drawn.direction : normalize(other.to_light));
+        if (i == 0) towards_light = now;
+        on_path = now;
+        // 5. Shadow rays of further light samples are traced here, one after the other.
+        if (LIGHT_SAMPLES > 1 && i > 0 && !along_path) {
+            ShadowRay one = shadow_ray_to(p, interaction, scatters, front_origin, other, now);
             one.t_max = alive ? one.t_max : -1.0;
             shadow_rays += one.t_max > 0.0 ? 1u : 0u;
             vec3 arrives = shadow_ray_transmittance(one);
             if (one.t_max > 0.0) gathered += finite_or_zero(one.contribution, pixel, hit.material, vertices_before) * arrives;
         }
+    }
+    if (EMITTERS > 0) {
+        shadow_ray = shadow_ray_to(p, interaction, scatters, front_origin, light, towards_light);
     }
     // 6. The continued path: throughput, start of the next ray, media.
     vec3 weight = drawn.delta ? drawn.weight : on_path.pdf > 0.0 ? on_path.f_cos / on_path.pdf : vec3(0.0);

@@ -90,8 +90,6 @@ pub struct Settings {
     /// [`SampleError::relmse`](crate::image::halves::SampleError::relmse) is at most this, whatever the knob
     /// `samples`.
     pub max_error: Option<f64>,
-    /// Traces all bounces of a path in one dispatch instead of a wavefront: the same film, for comparison.
-    pub paths_at_once: bool,
     /// BVH traversal; `None` selects the one that suits the device and the scene.
     pub traversal: Option<Traversal>,
     /// Architecture of the passes; `None` selects the one that suits the device.
@@ -117,7 +115,6 @@ impl Default for Settings {
             environment_rotation: 0.0,
             seed: 0,
             max_error: None,
-            paths_at_once: false,
             traversal: None,
             architecture: None,
             forced: ForcedEffects::default(),

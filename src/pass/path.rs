@@ -1,6 +1,6 @@
 //! Wavefront path tracing: the paths' states in memory, and the two forms in which bounces follow each other: pairs of
 //! paths in one kernel per bounce (path_pairs.rs), or three kernels per bounce with one path per invocation
-//! (path_steps.rs). Or all bounces in one dispatch (shaders/pass/path_at_once.comp), for comparison in tests.
+//! (path_steps.rs).
 //!
 //! Read pbrt (4th ed.), chapter 15 (wavefront rendering) and sections 13.2 to 13.4; Laine, Karras and Aila 2013,
 //! "Megakernels Considered Harmful"; docs/decisions/paths.md and architectures.md. Estimates use next event estimation
@@ -17,8 +17,7 @@ use super::path_steps::PathSteps;
 use super::rows::{TileShare, rows_of, stride};
 use crate::gpu::{Device, Frame, Image};
 use crate::plan::{Architecture, Paths, Plan};
-use crate::shader::lib::queue::PATHS_IN_GROUP;
-use crate::shader::{lib, path_at_once, path_begin};
+use crate::shader::{lib, path_begin};
 
 /// Pixels per tile; the first queue consists of whole tiles.
 const TILE: u32 = lib::work_tile::WORK_TILE * lib::work_tile::WORK_TILE;
@@ -70,12 +69,6 @@ pub fn paths<'a>(
 ) -> Result<()> {
     let (library, places, tiles) = (lighting.library, paths.states.places, paths.states.places / TILE);
     let stride = stride(lighting.plan.architecture, tiles);
-    if paths.with.at_once {
-        let push = path_at_once::Push { places, stride };
-        let groups = rows_of(places.div_ceil(PATHS_IN_GROUP));
-        let bind = path_at_once::Bind { radiance };
-        return frame.compute("paths at once", &bind, &path_at_once::Constants { library }, &push, groups);
-    }
     let queue = match &paths.form {
         Form::Pairs(pairs) => pairs.first(frame),
         Form::Steps(steps) => steps.first(frame),

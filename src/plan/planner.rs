@@ -370,7 +370,7 @@ impl Planner<'_> {
             knobs.guiding.choice().allows(knobs.guiding != Guiding::Off),
             cause,
         );
-        paths.then_some(Paths { emitting, shaped, guided, at_once: false })
+        paths.then_some(Paths { emitting, shaped, guided })
     }
 
     /// Number of bands of wavelengths, and whether dispersion splits rays by wavelength.

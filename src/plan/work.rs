@@ -150,8 +150,6 @@ pub struct Paths {
     pub shaped: bool,
     /// Path guiding with photons.
     pub guided: bool,
-    /// All bounces in one dispatch instead of a wavefront: the same film, for comparison.
-    pub at_once: bool,
 }
 
 /// Ray marching through grids of σ.

@@ -588,7 +588,6 @@ impl PictureOptions {
             environment_rotation: scene.env_rotation,
             seed: self.seed,
             max_error: self.max_error,
-            paths_at_once: false,
             architecture: None,
             traversal: None,
             forced: self.plan.forced(),

@@ -142,13 +142,7 @@ fn ways(device: &Arc<Device>, scene: &str, size: [u32; 2]) -> Result<Vec<SamePic
         let same = hash(film) == hash(&reference);
         SamePicture { way: way.to_owned(), same, largest: short(largest / f64::from(brightest).max(1e-30)) }
     };
-    let mut found = vec![
-        beside("drawn again", &shot(device, scene, usual.clone())?.film),
-        beside(
-            "all bounces in one dispatch",
-            &shot(device, scene, Settings { paths_at_once: true, ..usual.clone() })?.film,
-        ),
-    ];
+    let mut found = vec![beside("drawn again", &shot(device, scene, usual.clone())?.film)];
     for architecture in [Architecture::Cpu, Architecture::Gpu] {
         let other = Settings { architecture: Some(architecture), ..usual.clone() };
         let way = format!("passes for {}", architecture.name());

@@ -88,8 +88,9 @@ struct Module<'a> {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Type {
     None,
-    /// `bool` or a 32-bit integer: only values of these types are folded.
-    Scalar,
+    Bool,
+    /// A 32-bit number. Only values of this type and of `Bool` are folded.
+    Number,
     Other,
 }
 
@@ -135,7 +136,8 @@ impl Module<'_> {
     /// Folds an instruction and stores its value; whether the value is new.
     fn learn(&mut self, at: &Place, constants: &HashMap<u32, u32>) -> bool {
         let words = &self.words[at.clone()];
-        if words.len() < 3 || self.types.get(words[1] as usize) != Some(&Type::Scalar) {
+        let folds = words.len() > 2 && matches!(self.types.get(words[1] as usize), Some(Type::Bool | Type::Number));
+        if !folds {
             return false;
         }
         let id = words[2];
@@ -159,7 +161,8 @@ impl Module<'_> {
     }
 }
 
-/// `words` with specialization constants as ordinary constants, and without unreachable blocks.
+/// `words` with specialization constants and expressions of them as ordinary constants, and without unreachable blocks.
+/// A module with one such expression left is optimised and validated again by the validation layer for each pipeline.
 ///
 /// `constants` are pairs of id and value; the others keep their defaults. The result computes the same as a driver that
 /// specialises `words`. Decided branches become unconditional, and a phi loses the operands of unreachable
@@ -183,8 +186,8 @@ pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
                 let value = constants.iter().find(|(id, _)| *id == operands[2]).map(|&(_, value)| value);
                 told.extend(value.map(|value| (operands[0], value)));
             }
-            Some(Op::TypeBool) => module.types[operands[0] as usize] = Type::Scalar,
-            Some(Op::TypeInt) if operands[1] == 32 => module.types[operands[0] as usize] = Type::Scalar,
+            Some(Op::TypeBool) => module.types[operands[0] as usize] = Type::Bool,
+            Some(Op::TypeInt | Op::TypeFloat) if operands[1] == 32 => module.types[operands[0] as usize] = Type::Number,
             // Opcodes of type declarations are consecutive.
             Some(ty) if (Op::TypeVoid as u32..=Op::TypeForwardPointer as u32).contains(&(ty as u32)) => {
                 module.types[operands[0] as usize] = Type::Other;
@@ -224,15 +227,18 @@ pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
             Some(Op::Capability) if !adds && instruction[1] == spirv::Capability::GroupNonUniformArithmetic as u32 => {}
             Some(Op::Decorate) if instruction[2] == spirv::Decoration::SpecId as u32 => {}
             Some(Op::Decorate | Op::Name) if removed[instruction[1] as usize] => {}
-            Some(Op::SpecConstantTrue | Op::SpecConstantFalse) => {
-                let constant =
-                    if module.known[instruction[2] as usize] == Some(1) { Op::ConstantTrue } else { Op::ConstantFalse };
-                out.extend([3 << 16 | constant as u32, instruction[1], instruction[2]]);
-            }
-            Some(Op::SpecConstant) => {
-                assert_eq!(instruction.len(), 4, "constants have 32 bits");
-                let value = told.get(&instruction[2]).copied().unwrap_or(instruction[3]);
-                out.extend([4 << 16 | Op::Constant as u32, instruction[1], instruction[2], value]);
+            Some(Op::SpecConstantTrue | Op::SpecConstantFalse | Op::SpecConstant | Op::SpecConstantOp) => {
+                let (ty, id) = (instruction[1], instruction[2]);
+                match (module.types[ty as usize], module.known[id as usize]) {
+                    (Type::Bool, Some(0)) => out.extend([3 << 16 | Op::ConstantFalse as u32, ty, id]),
+                    (Type::Bool, Some(_)) => out.extend([3 << 16 | Op::ConstantTrue as u32, ty, id]),
+                    (_, Some(value)) => out.extend([4 << 16 | Op::Constant as u32, ty, id, value]),
+                    // An expression that is not folded here; none of Etalon's shaders has one (tests/specialize.rs).
+                    (_, None) => {
+                        assert_eq!(op(words, place), Some(Op::SpecConstantOp), "constants have 32 bits");
+                        out.extend_from_slice(instruction);
+                    }
+                }
             }
             _ => out.extend_from_slice(instruction),
         }
