@@ -23,7 +23,7 @@ use super::uri::resolve;
 /// Parses and checks the bytes of a file, and reads every buffer that it names.
 pub(crate) fn open<'a>(bytes: &'a [u8], path: &Path, warnings: &mut Vec<String>) -> Result<Document<'a>> {
     let parts = Parts::of(bytes, path)?;
-    let (mut root, pointers) = match json::deserialize::from_slice(parts.json) {
+    let (mut root, pointers) = match Root::from_slice(parts.json) {
         Ok(root) => (root, Vec::new()),
         Err(error) => {
             lenient::read(parts.json, warnings).map_err(|_| anyhow!("the JSON cannot be read as glTF 2.0: {error}"))?
