@@ -237,7 +237,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
             ShadowRay one = shadow_ray_to(p, interaction, scatters, front_origin, other, now);
             one.t_max = alive ? one.t_max : -1.0;
             shadow_rays += one.t_max > 0.0 ? 1u : 0u;
-            vec3 arrives = shadow_ray_transmittance(one);
+            vec3 arrives = arriving(one);
             if (one.t_max > 0.0) gathered += finite_or_zero(one.contribution, pixel, hit.material, vertices_before) * arrives;
         }
     }
