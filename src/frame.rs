@@ -141,13 +141,12 @@ impl Renderer {
     ) -> Result<Self> {
         check_size(device, &settings.knobs, settings.size)?;
         let plan = &mut prepared.plan;
-        match (&mut plan.paths, settings.max_error) {
-            (Some(_), Some(_)) => plan.samples = MOST_SAMPLES,
-            (None, Some(wanted)) => {
+        if let Some(wanted) = settings.max_error {
+            if plan.paths.is_none() {
                 let why = format!("{wanted}: only paths tell their error, the model global follows them");
                 return Err(Refused::error(Setting::MaxError, why));
             }
-            (_, None) => {}
+            plan.samples = MOST_SAMPLES;
         }
         plan.architecture = settings.architecture.unwrap_or(Architecture::of(device.is_software()));
         plan.check(&Ability {

@@ -3,7 +3,7 @@
 
 use etalon::frame::Settings;
 use etalon::image::Picture;
-use etalon::plan::{Knobs, Model};
+use etalon::plan::{Architecture, Knobs, Model};
 use etalon::scene::environment::{self, Environment};
 use etalon::scene::solid::solids;
 use etalon::scene::{Extent, Light, LightKind, Material, Projection, Scene};
@@ -111,8 +111,7 @@ fn lights_with_a_shape_light_as_their_form_factors_say() {
     }
 }
 
-/// The number of light samples per vertex changes the noise and not the mean. Queues and one dispatch agree to the last
-/// bit.
+/// The number of light samples per vertex changes the noise and not the mean. Both forms agree to the last bit.
 #[test]
 fn more_light_samples_reduce_noise_and_keep_the_mean() {
     let gpu = Gpu::open();
@@ -131,6 +130,11 @@ fn more_light_samples_reduce_noise_and_keep_the_mean() {
         let step = |i: usize| (green[i] - green[i + 1]).powi(2);
         let rows = (3..15).flat_map(|y| (4..8).map(move |x| y * 32 + x));
         noise.push(rows.map(step).sum::<f64>());
+        let [of_cpu, of_gpu] = [Architecture::Cpu, Architecture::Gpu].map(|architecture| {
+            let settings = settings([32, 18], &["samples=4", "interfaces=4", &rung]);
+            bits(&draw(&gpu, &scene, None, Settings { architecture: Some(architecture), ..settings }))
+        });
+        assert!(of_cpu == of_gpu, "{places}");
     }
     eprintln!("{means:?} {noise:?}");
     assert!(means.iter().all(|mean| (mean / means[2] - 1.0).abs() < 0.02), "{means:?}");
@@ -368,19 +372,22 @@ fn guiding_spheres_lie_where_light_is_mirrored() {
 }
 
 #[test]
-fn a_seed_makes_one_film_and_another_seed_another() {
+fn both_forms_make_the_same_film_again_and_again() {
     let gpu = Gpu::open();
     for name in ["etalon", "cornell", "blend", "nested", "haze", "lamps", "materials", "metals", "pool", "radiance"] {
         let scene = etalon::study::load(name).unwrap();
         let sky = Environment::studio();
         let sky = scene.studio.map(|_| &sky);
-        let of = |seed: u32| {
-            let settings = Settings { seed, ..settings([44, 29], &["samples=4"]) };
-            bits(&draw(&gpu, &scene, sky, settings))
+        let of = |architecture, seed: u32| {
+            let settings = settings([44, 29], &["samples=4"]);
+            bits(&draw(&gpu, &scene, sky, Settings { seed, architecture: Some(architecture), ..settings }))
         };
-        let film = of(0);
-        assert!(film == of(0), "{name}: another film the second time");
-        assert!(name == "radiance" || film != of(1), "{name}: the seed changes nothing");
+        let film = of(Architecture::Cpu, 0);
+        let other = of(Architecture::Gpu, 0);
+        let different = film.iter().zip(&other).filter(|(a, b)| a != b).count();
+        assert!(film == other, "{name}: the form for GPUs makes another film, in {different} pixels");
+        assert!(film == of(Architecture::Cpu, 0), "{name}: another film the second time");
+        assert!(name == "radiance" || film != of(Architecture::Cpu, 1), "{name}: the seed changes nothing");
     }
 }
 

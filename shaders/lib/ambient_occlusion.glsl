@@ -96,8 +96,8 @@ vec3 occluded_environment_light(Surface s) {
     if (CLEARCOAT && REFLECTION && !s.coat_traced) coat_mirrored = prefiltered_radiance(reflect_ray(-s.v, s.n_coat).R, s.clearcoat_alpha);
     if (REFLECTION && LOBE_RAYS > 0) {
         // First the base, then the coat, in a loop: the code that traces exists once.
-        for (uint i = 0; i < (CLEARCOAT ? 2 : 1); i++) {
-            bool coat = i == 1;
+        for (uint i = 0; i < (CLEARCOAT ? 2u : 1u); i++) {
+            bool coat = CLEARCOAT && i == 1;
             if (coat ? !s.coat_traced : !s.base_traced) {
                 vec3 visible = visible_lobe(s, coat ? s.n_coat : s.n, coat ? s.clearcoat_alpha : s.alpha, coat ? COAT_LOBE_EVENT : BASE_LOBE_EVENT);
                 if (coat) coat_mirrored = partly_occluded(coat_mirrored, beside, visible);

@@ -146,7 +146,8 @@ ShadowRay shadow_ray_to(Path p, Interaction interaction, bool scatters, vec3 fro
 // Shades one path vertex. Returns the radiance gathered there; also gives the shadow ray still to be traced, and the
 // continued path p.
 // Steps: 1. the interaction; 2. next event estimation; light found by the path itself: 3a. the environment, 3b. emission
-// of the surface; 4. the BSDF sample; 5. further light samples; 6. the continued path; 7. Russian roulette.
+// of the surface; 4. the BSDF sample, and the BSDF towards all light samples and along the path, in one loop; 5. further
+// light samples, in that loop; 6. the continued path; 7. Russian roulette.
 vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRay shadow_ray) {
     // 1. The interaction: absorption on the way, hit, boundary, BSDF.
     shadow_ray = ShadowRay(p.origin, vec3(0.0, 1.0, 0.0), -1.0, p.source_face, p.media, vec3(0.0));
@@ -223,6 +224,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     for (uint i = 0; i <= LIGHT_SAMPLES; i++) {
         bool along_path = i == LIGHT_SAMPLES;
         if (LIGHT_SAMPLES > 1 && i > 0 && !along_path) {
+            // 5. A further light sample; its shadow ray is traced below.
             other = sample_light(front_origin, dimension_words_of(pixel, vertices_before, DIMENSION_LIGHT, i, LIGHT_SAMPLES));
             if (SAMPLED_ENVIRONMENT && other.pdf > 0.0 && other.t_max == LARGEST) {
                 bool ahead = OTHER_BACKGROUND && (p.state & PATH_TRANSPARENT_SO_FAR) != 0 && dot(hit.n, other.to_light) < 0.0 && !shines_through(b);
@@ -232,7 +234,6 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
         PathEval now = bsdf_evaluate(bsdf, along_path ? drawn.direction : normalize(other.to_light));
         if (i == 0) towards_light = now;
         on_path = now;
-        // 5. Shadow rays of further light samples are traced here, one after the other.
         if (LIGHT_SAMPLES > 1 && i > 0 && !along_path) {
             ShadowRay one = shadow_ray_to(p, interaction, scatters, front_origin, other, now);
             one.t_max = alive ? one.t_max : -1.0;
@@ -242,6 +243,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
         }
     }
     if (EMITTERS > 0) {
+        // The first sample's shadow ray is traced by the caller.
         shadow_ray = shadow_ray_to(p, interaction, scatters, front_origin, light, towards_light);
     }
     // 6. The continued path: throughput, start of the next ray, media.

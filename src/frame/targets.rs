@@ -68,7 +68,7 @@ impl Targets {
             parts: settings.parts.iter().map(part).collect::<Result<_>>()?,
             paths: plan
                 .paths
-                .map(|paths| PathsOnDevice::new(device, paths, plan, touching, (size, settings.share)))
+                .map(|_| PathsOnDevice::new(device, plan, touching, (size, settings.share)))
                 .transpose()?,
             display: Display::new(device, size)?,
         })

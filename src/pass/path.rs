@@ -16,7 +16,7 @@ use super::path_states::PathStates;
 use super::path_steps::PathSteps;
 use super::rows::{TileShare, rows_of, stride};
 use crate::gpu::{Device, Frame, Image};
-use crate::plan::{Architecture, Paths, Plan};
+use crate::plan::{Architecture, Plan};
 use crate::shader::{lib, path_begin};
 
 /// Pixels per tile; the first queue consists of whole tiles.
@@ -27,8 +27,6 @@ type Pixels = ([u32; 2], TileShare);
 
 /// State of all paths between two dispatches.
 pub struct PathsOnDevice {
-    /// Settings of path tracing.
-    pub with: Paths,
     states: PathStates,
     form: Form,
 }
@@ -43,11 +41,10 @@ impl PathsOnDevice {
     ///
     /// # Errors
     /// When memory is short.
-    pub fn new(device: &Arc<Device>, with: Paths, plan: &Plan, touching: bool, pixels: Pixels) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, plan: &Plan, touching: bool, pixels: Pixels) -> Result<Self> {
         let (size, share) = pixels;
         let (rays, places) = (plan.rays.unwrap_or_default(), share.tiles(size) * TILE);
         Ok(Self {
-            with,
             states: PathStates::new(device, rays, touching, size, places)?,
             form: match plan.architecture {
                 Architecture::Cpu => Form::Pairs(PathPairs::new(device, places)?),

@@ -30,7 +30,7 @@ fn the_device_here_keeps_what_etalon_relies_on() {
     // lavapipe's fma rounds twice; `precise` products are never fused anywhere.
     assert_eq!((of.precise_fused, of.half_rounds.as_str()), (0.0, "nearest"));
     let pictures = passport.pictures.as_ref().expect("pictures");
-    assert_eq!((pictures.scenes.len(), pictures.ways.len(), pictures.scenes[0].small.len()), (3, 8, 32));
+    assert_eq!((pictures.scenes.len(), pictures.ways.len(), pictures.scenes[0].small.len()), (3, 7, 32));
     let speed = passport.speed.as_ref().expect("speeds");
     assert!(speed.copy > 0.0 && speed.rays.len() == 3 && !speed.lost, "{speed:?}");
     // What is written is what is read.

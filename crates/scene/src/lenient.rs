@@ -41,9 +41,11 @@ pub(crate) fn read(bytes: &[u8], warnings: &mut Vec<String>) -> Result<(Root, Ve
 /// The document of a changed value. It is read by the schema crate's own function for bytes: a generic one would be
 /// compiled here once more, which took a third of this crate's build.
 fn root_of(value: &Value) -> Result<Root> {
-    let read = Root::from_slice(&serde_json::to_vec(value)?);
-    // A place in text that nobody sees is left out.
-    read.map_err(|error| anyhow!("{}", error.to_string().split(" at line ").next().unwrap_or_default()))
+    Root::from_slice(&serde_json::to_vec(value)?).map_err(|error| {
+        // Line and column are left out: nobody sees this text.
+        let message = error.to_string();
+        anyhow!("{}", message.rsplit_once(" at line ").map_or(message.as_str(), |(what, _)| what))
+    })
 }
 
 /// Adds the empty lists that the schema crate demands: a scene's nodes, an animation's channels.
@@ -130,6 +132,12 @@ mod tests {
         let mut value = json!({ "a": [1.0, 0.5, -3.0], "b": 1e300 });
         whole_numbers(&mut value);
         assert_eq!(value, json!({ "a": [1, 0.5, -3], "b": 1e300 }));
+    }
+
+    #[test]
+    fn a_value_that_makes_no_gltf_is_named_without_a_place() {
+        let error = root_of(&json!({ "asset": { "version": "2.0" }, "scene": " at line " })).unwrap_err().to_string();
+        assert!(error.contains("\" at line \"") && !error.contains("column"), "{error}");
     }
 
     #[test]

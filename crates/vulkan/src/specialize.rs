@@ -3,8 +3,8 @@
 //!
 //! Read the Vulkan specification, chapter Pipelines, section Specialization Constants, and the SPIR-V specification,
 //! sections Structured Control Flow and Specialization. `VkSpecializationInfo` would set the constants, too, but then
-//! the driver reads, inlines and optimises every rung of every knob before it discards most of them: of the 1.06 MB of
-//! `interact`, a frame uses some 6 %, and lavapipe spent 0.48 s on one core creating the pipelines of a frame. One pass
+//! the driver reads, inlines and optimises every rung of every knob before it discards most of them: of the 1.06 MB that
+//! `interact` had then, a frame used some 6 %, and lavapipe spent 0.48 s on one core creating the pipelines of a frame. One pass
 //! over the words takes some milliseconds here and removes the unreachable blocks. The optimiser of SPIRV-Tools does
 //! this and more, but takes 0.5 s to load such a module.
 
@@ -161,8 +161,10 @@ impl Module<'_> {
     }
 }
 
-/// `words` with specialization constants and expressions of them as ordinary constants, and without unreachable blocks.
-/// A module with one such expression left is optimised and validated again by the validation layer for each pipeline.
+/// `words` with specialization constants as ordinary constants, and without unreachable blocks.
+///
+/// Expressions of constants become constants, too, where they can be folded: where a single one is left, the validation
+/// layer optimises and validates the module again for each pipeline.
 ///
 /// `constants` are pairs of id and value; the others keep their defaults. The result computes the same as a driver that
 /// specialises `words`. Decided branches become unconditional, and a phi loses the operands of unreachable
