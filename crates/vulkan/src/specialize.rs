@@ -3,10 +3,10 @@
 //!
 //! Read the Vulkan specification, chapter Pipelines, section Specialization Constants, and the SPIR-V specification,
 //! sections Structured Control Flow and Specialization. `VkSpecializationInfo` would set the constants, too, but then
-//! the driver reads, inlines and optimises every rung of every knob before it discards most of them: of the 1.06 MB that
-//! `interact` had then, a frame used some 6 %, and lavapipe spent 0.48 s on one core creating the pipelines of a frame. One pass
-//! over the words takes some milliseconds here and removes the unreachable blocks. The optimiser of SPIRV-Tools does
-//! this and more, but takes 0.5 s to load such a module.
+//! the driver reads, inlines and optimises every rung of every knob before it discards most of them: of the 1.06 MB
+//! that `interact` had then, a frame used some 6 %, and lavapipe spent 0.48 s on one core creating the pipelines of a
+//! frame. One pass over the words takes some milliseconds here and removes the unreachable blocks. The optimiser of
+//! SPIRV-Tools does this and more, but takes 0.5 s to load such a module.
 
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
