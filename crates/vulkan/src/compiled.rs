@@ -75,32 +75,33 @@ impl Device {
         self.executables.is_some()
     }
 
-    /// Statistics of a program with these specialization constants; empty when the driver reports none, or when the
-    /// pipeline does not exist yet.
+    /// Statistics of a program with these specialization constants, of each pipeline: raster programs have one for each
+    /// set of attachments. Empty when the driver reports none, or when no pipeline exists yet.
     ///
     /// # Errors
     /// When memory is short.
     pub fn compiled(&self, program: &'static Program, constants: &[(u32, u32)]) -> Result<Vec<Compiled>> {
         let Some(asked) = &self.executables else { return Ok(Vec::new()) };
         let known = lock(&self.caches);
-        let of = |key: &&super::cache::PipelineKey| key.program.name == program.name && key.constants == constants;
-        let Some(&pipeline) = known.pipelines.keys().find(of).map(|key| &known.pipelines[key]) else {
-            return Ok(Vec::new());
-        };
+        let of = |key: &super::cache::PipelineKey| key.program.name == program.name && key.constants == constants;
         let asking = || format!("asking what \"{}\" was compiled to", program.name);
-        // SAFETY: the pipeline lives as long as its cache, which is locked; it was created with `capture`'s flags.
-        unsafe {
-            let stages = asked
-                .get_pipeline_executable_properties(&vk::PipelineInfoKHR::default().pipeline(pipeline))
-                .with_context(asking)?;
-            let one = |(index, stage): (usize, &vk::PipelineExecutablePropertiesKHR<'_>)| {
-                let info = vk::PipelineExecutableInfoKHR::default().pipeline(pipeline).executable_index(index as u32);
-                let figures = asked.get_pipeline_executable_statistics(&info).with_context(asking)?;
-                let figures = figures.iter().map(|f| (text(f.name_as_c_str()), number(f))).collect();
-                Ok(Compiled { stage: text(stage.name_as_c_str()), figures })
+        let mut all = Vec::new();
+        for (_, &pipeline) in known.pipelines.iter().filter(|(key, _)| of(key)) {
+            // SAFETY: the pipeline lives as long as its cache, which is locked; it was created with `capture`'s flags.
+            let stages = unsafe {
+                asked
+                    .get_pipeline_executable_properties(&vk::PipelineInfoKHR::default().pipeline(pipeline))
+                    .with_context(asking)?
             };
-            stages.iter().enumerate().map(one).collect()
+            for (index, stage) in stages.iter().enumerate() {
+                let info = vk::PipelineExecutableInfoKHR::default().pipeline(pipeline).executable_index(index as u32);
+                // SAFETY: as above; the driver has just named this many executables.
+                let figures = unsafe { asked.get_pipeline_executable_statistics(&info) }.with_context(asking)?;
+                let figures = figures.iter().map(|f| (text(f.name_as_c_str()), number(f))).collect();
+                all.push(Compiled { stage: text(stage.name_as_c_str()), figures });
+            }
         }
+        Ok(all)
     }
 
     /// Flags of pipelines whose statistics will be queried.
